@@ -1,0 +1,20 @@
+//! What the executive layer reports upwards.
+
+use serde::{Deserialize, Serialize};
+use skein_planning::coverage::area::CellId;
+
+/// Something happened that the cooperation layer should know.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Event {
+    /// The camera has seen the whole of these cells.
+    Seen(Vec<CellId>),
+    /// All legs are flown.
+    PlanDone,
+    /// The goal point is reached; the UAV loiters there.
+    Arrived,
+    /// No clear route exists to the next leg; its cells are given up.
+    Refused {
+        /// The cells of the loop, by index, that this UAV cannot reach.
+        cells: Vec<u16>,
+    },
+}

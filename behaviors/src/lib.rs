@@ -1,0 +1,21 @@
+//! The reactive and executive layers (D2.7 §1.2.3): percept and plan in, setpoint
+//! and event out.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`percept`] | what a UAV senses |
+//! | [`setpoint`] | what it is told to fly |
+//! | [`event`] | what the executive layer reports upwards |
+//! | [`executive`] | a plan on the coverage loop, flown leg by leg |
+//! | [`reactive`] | path following, and the envelope that has the last word |
+
+pub mod event;
+pub mod executive;
+pub mod percept;
+pub mod reactive;
+pub mod setpoint;
+
+pub use event::Event;
+pub use executive::{Executive, Forecast, Goal};
+pub use percept::Percept;
+pub use setpoint::{Setpoint, Side, Steer};

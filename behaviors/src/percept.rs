@@ -1,0 +1,25 @@
+//! What a UAV senses, from a simulator or an autopilot.
+
+use serde::{Deserialize, Serialize};
+use skein_planning::frame::Pose;
+
+/// One reading of all sensors that matter here.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Percept {
+    /// The vehicle's scenario time at which this held, milliseconds.
+    pub time_ms: u64,
+    /// Where the UAV is.
+    pub pose: Pose,
+    /// Height above the origin, metres.
+    pub height_m: f64,
+    /// Airspeed, m/s.
+    pub airspeed_mps: f64,
+    /// Wind, m/s towards east.
+    pub wind_east_mps: f64,
+    /// Wind, m/s towards north.
+    pub wind_north_mps: f64,
+    /// Flight time left at cruise, seconds.
+    pub endurance_s: f64,
+    /// Whether the airframe flies its own failsafe loiter for want of setpoints.
+    pub failsafe: bool,
+}

@@ -1,0 +1,1 @@
+//! The envelope: stall, bank, zones; the last word on every setpoint.

@@ -1,0 +1,1 @@
+//! Path following: a curve and a pose in, timed turns out.

@@ -1,0 +1,4 @@
+//! The reactive layer: [`follow`] tracks a curve, [`envelope`] has the last word.
+
+pub mod envelope;
+pub mod follow;

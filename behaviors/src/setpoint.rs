@@ -1,0 +1,43 @@
+//! What a UAV is told to fly: a short piece of trajectory, timed.
+//!
+//! Steps carry times relative to the percept they answer, so a setpoint that
+//! arrives late does not shift what is flown, and percepts may be seldom.
+
+use serde::{Deserialize, Serialize};
+
+/// A side of the UAV.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Side {
+    /// Counter-clockwise.
+    Left,
+    /// Clockwise.
+    Right,
+}
+
+/// A turn held for a while.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Steer {
+    /// Turn rate, rad/s, positive to the left.
+    pub turn_rate_radps: f64,
+    /// For how long, milliseconds.
+    pub duration_ms: u32,
+}
+
+/// The most steps a setpoint may hold: a lane, a corner, a lane, a corner and one
+/// correction fit into the horizon with room to spare.
+pub const MAX_STEPS: usize = 8;
+
+/// A command to the airframe.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Setpoint {
+    /// The time of the percept that this answers, milliseconds.
+    pub from_ms: u64,
+    /// Airspeed to hold, m/s.
+    pub airspeed_mps: f64,
+    /// Height to hold above the origin, metres.
+    pub height_m: f64,
+    /// Turns from `from_ms` on, one after the other; after the last one its rate is held.
+    pub steps: Vec<Steer>,
+    /// On which side the failsafe loiter is clear of the zones.
+    pub loiter: Side,
+}

@@ -1,0 +1,1 @@
+//! The formats of the outside world: QGroundControl plans and GeoJSON.

@@ -1,0 +1,1 @@
+//! A scenario file, resolved: mission, world, fleet, radio, faults, storm, checks.

@@ -1,0 +1,1 @@
+//! The world and the radio around a swarm, in virtual time.

@@ -1,0 +1,11 @@
+//! Area coverage: lane grid, spanning-tree loop, division among UAVs (D2.7 §3.6).
+//!
+//! [`grid`] names cells, [`stc`] strings them on one closed loop, [`backtracking`]
+//! divides the loop.
+
+pub mod backtracking;
+pub mod grid;
+pub mod stc;
+
+pub use grid::{CellId, Grid};
+pub use stc::{AreaProblem, CoverageLoop, Direction, LoopCell, LoopError};

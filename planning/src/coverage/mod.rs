@@ -1,0 +1,3 @@
+//! Coverage planning (D2.7 §3.4–3.6). This slice holds area coverage.
+
+pub mod area;

@@ -1,0 +1,7 @@
+//! Polygons that are valid by construction and no-fly zones (D2.7 §2.3.1).
+
+pub mod polygon;
+pub mod zones;
+
+pub use polygon::{Polygon, PolygonError};
+pub use zones::{NoFlyZones, ZoneError};

@@ -1,0 +1,9 @@
+//! From waypoints to curves a fixed wing can fly (D2.7 §2.4).
+//!
+//! [`curve`] holds lines and arcs joined tangentially; [`dubins`] the shortest
+//! such curve between two poses.
+
+pub mod curve;
+pub mod dubins;
+
+pub use curve::{Curve, Segment};

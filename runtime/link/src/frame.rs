@@ -1,0 +1,1 @@
+//! The frames of the vehicle stream between a node and its world.

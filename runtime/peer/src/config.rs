@@ -1,0 +1,39 @@
+//! What a peer is told before it starts.
+
+use crate::{Mission, PeerId};
+use serde::{Deserialize, Serialize};
+use skein_planning::airframe::Airframe;
+use std::sync::Arc;
+
+/// What a peer is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Flies and plans.
+    Uav,
+    /// Stands on the ground, relays, speaks for the operator, never plans.
+    Ground,
+}
+
+/// The configuration of one peer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PeerConfig {
+    /// Who it is.
+    pub id: PeerId,
+    /// What it is for.
+    pub role: Role,
+    /// First part of every key; peers of other fleets are not heard.
+    pub fleet: String,
+    /// Beacon period T, milliseconds of the peer's clock.
+    pub beacon_period_ms: u32,
+    /// Bit rate of the shared radio channel, bit/s.
+    pub rate_bps: u32,
+    /// The airframe, for a UAV.
+    pub airframe: Option<Airframe>,
+    /// Height slot above the origin, metres, for a UAV.
+    pub height_m: f64,
+    /// The mission it was launched with, if any; a ground station speaks it.
+    pub mission: Option<Arc<Mission>>,
+    /// Seed of the peer's own random stream (beacon jitter, boot nonce).
+    pub seed: u64,
+}

@@ -1,0 +1,88 @@
+//! What can happen to a peer.
+
+use crate::mission::Mission;
+use crate::plan::Answer;
+use serde::{Deserialize, Serialize};
+use skein_behaviors::Percept;
+use std::sync::Arc;
+
+/// The peer's own clock, milliseconds of scenario time since it cares to remember.
+/// Never runs backwards; drivers see to that.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Time(pub u64);
+
+impl Time {
+    /// Later by `ms` milliseconds.
+    #[must_use]
+    pub fn plus_ms(self, ms: u64) -> Self {
+        Self(self.0.saturating_add(ms))
+    }
+
+    /// Milliseconds since `earlier`, 0 if that is later.
+    #[must_use]
+    pub fn since_ms(self, earlier: Self) -> u64 {
+        self.0.saturating_sub(earlier.0)
+    }
+}
+
+/// One thing that happened.
+#[derive(Clone, Debug)]
+pub enum Input {
+    /// The first input: what the journal held, in the order it was written
+    /// (empty on a fresh disk), and a boot nonce the driver drew.
+    Start {
+        /// Bodies of the journal records.
+        persisted: Vec<Vec<u8>>,
+        /// Differs from boot to boot.
+        nonce: u32,
+    },
+    /// The vehicle sensed something.
+    Percept(Percept),
+    /// A transmission was received.
+    Received {
+        /// Who transmitted it (not: who wrote it). Not authenticated.
+        transmitter: u16,
+        /// Hops it had made before this one.
+        hops: u8,
+        /// The record, as sent.
+        bytes: Vec<u8>,
+    },
+    /// Time passed; harmless at any time.
+    Timer,
+    /// The transport believes that a neighbour came or went; a hint, never a verdict.
+    LinkHint {
+        /// The neighbour.
+        neighbour: u16,
+        /// Whether it came.
+        up: bool,
+    },
+    /// An earlier `Store` ended.
+    Stored {
+        /// Of that `Store`.
+        token: u64,
+        /// Whether the record is durable now.
+        ok: bool,
+    },
+    /// An earlier `Plan` was answered.
+    Planned {
+        /// Of that `Plan`.
+        token: u64,
+        /// What [`crate::plan::solve`] returned.
+        answer: Answer,
+    },
+    /// The operator, at a ground station's own console, wants something.
+    Command(Command),
+}
+
+/// What an operator can want. Enters at a ground station and travels by radio.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// Publish a new mission revision.
+    Mission(Arc<Mission>),
+    /// Carry on with the mission.
+    Resume,
+    /// Every UAV loiters where it is.
+    Hold,
+    /// Every UAV returns to base and loiters there.
+    ReturnToBase,
+}

@@ -1,0 +1,139 @@
+//! What a peer wants done, and what it reports.
+
+use crate::plan::Problem;
+use crate::{Incarnation, PeerId};
+use serde::{Deserialize, Serialize};
+use skein_behaviors::Setpoint;
+use skein_planning::coverage::area::backtracking::Leg;
+
+/// One thing to do. Drain them all after each input.
+#[derive(Clone, Debug)]
+pub enum Output {
+    /// Broadcast these bytes one hop, under this key.
+    Publish {
+        /// The natural key, `<fleet>/v1/<kind>/<subject>/<author>`.
+        key: String,
+        /// The record.
+        bytes: Vec<u8>,
+        /// Hops these bytes have made so far; 0 for what this peer wrote itself.
+        hops: u8,
+        /// Which transmissions go first when the channel is short.
+        priority: Priority,
+        /// Drop it if it could not be sent within this time, milliseconds.
+        lifetime_ms: u32,
+    },
+    /// Fly this.
+    Setpoint(Setpoint),
+    /// Make this record durable, then answer with `Stored`.
+    Store {
+        /// Names the answer.
+        token: u64,
+        /// The journal record.
+        record: Vec<u8>,
+    },
+    /// Compute this, then answer with `Planned`.
+    Plan {
+        /// Names the answer.
+        token: u64,
+        /// The problem.
+        problem: Problem,
+    },
+    /// For logs, displays and judges; nothing depends on it.
+    Report(Report),
+}
+
+/// Which transmissions go first. Lower goes first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Priority {
+    /// Approach conflicts.
+    Conflict,
+    /// Claims, rounds, takeovers.
+    Claim,
+    /// Suspicions.
+    Suspicion,
+    /// Beacons.
+    Beacon,
+    /// Coverage, state, missions and all else.
+    Telemetry,
+}
+
+/// What a peer believes of another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Status {
+    /// Heard from recently enough.
+    Alive,
+    /// Silent for too long; may be refuted.
+    Suspect,
+    /// Taken for dead or out of reach; its work may be taken over.
+    Down,
+}
+
+/// Something a person or a judge may want to know.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Report {
+    /// The peer runs under this incarnation.
+    Booted {
+        /// The incarnation.
+        incarnation: Incarnation,
+    },
+    /// The peer holds the mission and has derived its loop.
+    Ready {
+        /// Mission revision.
+        revision: u32,
+        /// Identifies the loop.
+        loop_hash: u64,
+        /// Number of cells on the loop.
+        cells: u16,
+    },
+    /// The belief about another peer changed.
+    Membership {
+        /// Whom it concerns.
+        peer: PeerId,
+        /// Which life of it.
+        incarnation: Incarnation,
+        /// The new belief.
+        status: Status,
+    },
+    /// A round of negotiation was started or joined.
+    Round {
+        /// Its counter.
+        counter: u32,
+        /// Its members.
+        members: Vec<PeerId>,
+    },
+    /// A division was adopted, or cells were taken without a round.
+    Register {
+        /// Counter of the epoch.
+        counter: u32,
+        /// Hash of the epoch's snapshots.
+        epoch: u32,
+        /// How often cells were taken without a round since.
+        take: u16,
+        /// What will be flown, in order.
+        legs: Vec<Leg>,
+        /// Cells given away and not yet taken over.
+        held: Vec<u16>,
+        /// Expected end of the plan, milliseconds from now.
+        eta_ms: u32,
+    },
+    /// Cells newly seen by this peer's own camera, by index on the loop.
+    Covered {
+        /// The cells.
+        cells: Vec<u16>,
+    },
+    /// The whole union is covered, as far as this peer knows.
+    Finished {
+        /// Mission revision.
+        revision: u32,
+    },
+    /// Something a person should look at.
+    Alarm {
+        /// What.
+        text: String,
+    },
+    /// Bytes that were refused; nothing changed.
+    Refused {
+        /// Why.
+        reason: String,
+    },
+}

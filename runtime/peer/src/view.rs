@@ -1,0 +1,47 @@
+//! What a judge may look at: a copy of what one peer believes.
+
+use crate::output::Status;
+use crate::wire::message::Epoch;
+use crate::{Incarnation, PeerId};
+use std::collections::BTreeMap;
+
+/// A peer's beliefs at one moment. For checks and displays; nothing depends on it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct View {
+    /// Its life.
+    pub incarnation: Incarnation,
+    /// Whether its probation is over and it speaks.
+    pub speaks: bool,
+    /// Whether it can take part in planning.
+    pub able: bool,
+    /// Identifies its loop; 0 before it has one.
+    pub loop_hash: u64,
+    /// Mission revision it follows; 0 before it has one.
+    pub revision: u32,
+    /// Covered cells it knows of, one flag a cell of the loop.
+    pub union: Vec<bool>,
+    /// Cells it lists as its own future, in order of flight, uncovered or not.
+    pub plan: Vec<u16>,
+    /// Cells it gave away and still answers for.
+    pub held: Vec<u16>,
+    /// Cells alarmed as beyond anybody's endurance.
+    pub unassigned: Vec<u16>,
+    /// The latest division adopted.
+    pub epoch: Epoch,
+    /// The highest round counter it knows.
+    pub counter: u32,
+    /// Divisions adopted in this life.
+    pub adoptions: u32,
+    /// What it believes of others.
+    pub peers: BTreeMap<PeerId, (Incarnation, Status)>,
+    /// The diameter it reckons with.
+    pub diameter: u32,
+    /// Whether it holds that the mission is finished.
+    pub finished: bool,
+    /// Predicted end of its plan, milliseconds from now.
+    pub eta_ms: u32,
+    /// Flight time it may still spend, milliseconds (endurance less reserve).
+    pub spendable_ms: u32,
+    /// Records held, bytes waiting to be sent, open stores: each with its cap.
+    pub loads: Vec<(&'static str, usize, usize)>,
+}

@@ -1,0 +1,1 @@
+//! Bytes of records: CBOR, bounded, checked.

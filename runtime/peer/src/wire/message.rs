@@ -1,0 +1,314 @@
+//! What peers say: one type a kind, integers only.
+//!
+//! Every type is encoded as a CBOR array (short on the air); the JSON Schemas and
+//! the table of kinds name the places of the arrays.
+
+use crate::Incarnation;
+use serde::{Deserialize, Serialize};
+
+/// The envelope around every body. Relays pass it on unchanged.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Record {
+    /// Who wrote it.
+    pub author: u16,
+    /// In which life.
+    pub incarnation: Incarnation,
+    /// Counts all that the author wrote in this life, over all kinds.
+    pub seq: u32,
+    /// Number of the kind, see [`super::kinds::Kind`].
+    pub kind: u8,
+    /// Which of the author's registers of that kind.
+    pub subject: u16,
+    /// The encoded body.
+    #[serde(with = "serde_bytes")]
+    pub body: Vec<u8>,
+    /// Signature over all of the above as encoded; empty where signing is off.
+    #[serde(with = "serde_bytes")]
+    pub signature: Vec<u8>,
+}
+
+/// "I am here": one hop, every T.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Beacon {
+    /// Counts the beacons of this life.
+    pub heartbeat: u32,
+    /// East, mm.
+    pub east_mm: i32,
+    /// North, mm.
+    pub north_mm: i32,
+    /// Heading, 1e-4 rad.
+    pub heading_e4: i32,
+    /// Whether it can take part in planning.
+    pub able: bool,
+    /// Whether it is a ground station.
+    pub ground: bool,
+    /// Whether it holds that the mission is finished.
+    pub finished: bool,
+    /// Boot nonce: tells two peers under one id apart.
+    pub nonce: u32,
+    /// The highest round counter it knows.
+    pub counter: u32,
+    /// Fewest hops to its farthest live author.
+    pub eccentricity: u8,
+    /// Mission revision it follows.
+    pub revision: u32,
+    /// The loop it derived; 0 when none.
+    pub loop_hash: u64,
+    /// Digest of its union of covered cells.
+    pub cover_digest: u32,
+    /// What it knows of others.
+    pub gossip: Vec<Gossip>,
+}
+
+/// What one peer knows of another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Gossip {
+    /// Whom it concerns.
+    pub id: u16,
+    /// The latest life known.
+    pub incarnation: Incarnation,
+    /// The freshest heartbeat known.
+    pub heartbeat: u32,
+    /// Age of that heartbeat, sum of holding times, 100 ms units.
+    pub age_ds: u16,
+    /// Hops it took.
+    pub hops: u8,
+    /// Age of a suspicion against that heartbeat, 100 ms units, if there is one.
+    pub suspected_ds: Option<u16>,
+    /// Whether it said it can plan.
+    pub able: bool,
+    /// The highest `seq` held of that author and life.
+    pub max_seq: u32,
+    /// Digest of the versions held of that author.
+    pub digest: u16,
+}
+
+/// What a peer does, for people and the ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Behaviour {
+    /// Waits for a mission or for its own probation to end.
+    Waiting,
+    /// Flies its section.
+    Covering,
+    /// Flies to or loiters at base, or where it was told to hold.
+    Loitering,
+    /// Stands on the ground.
+    Ground,
+}
+
+/// How the mission stands, as far as one peer knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum MissionStatus {
+    /// No mission, or its body is incomplete.
+    None,
+    /// Under way.
+    Active,
+    /// All that can be covered is covered.
+    Accomplished,
+    /// Cells remain that nobody has the endurance for.
+    Failed,
+}
+
+/// Pose, fuel, behaviour and mission status, for all.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct State {
+    /// East, mm.
+    pub east_mm: i32,
+    /// North, mm.
+    pub north_mm: i32,
+    /// Height above the origin, mm.
+    pub height_mm: i32,
+    /// Heading, 1e-4 rad.
+    pub heading_e4: i32,
+    /// Airspeed, mm/s.
+    pub airspeed_mmps: u32,
+    /// Flight time left, seconds.
+    pub endurance_s: u32,
+    /// What it does.
+    pub behaviour: Behaviour,
+    /// How the mission stands.
+    pub mission: MissionStatus,
+    /// Cells of the loop it knows to be covered.
+    pub covered: u16,
+    /// Cells of the loop.
+    pub cells: u16,
+}
+
+/// The negotiation to which a listing of cells goes back. Totally ordered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Epoch {
+    /// Counter of the round.
+    pub counter: u32,
+    /// Hash of the round's sorted snapshots.
+    pub hash: u32,
+}
+
+/// Orders listings of the same cell: the higher one keeps it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Stamp {
+    /// The round it goes back to.
+    pub epoch: Epoch,
+    /// How often the cell was taken without a round since.
+    pub take: u16,
+    /// Who lists it.
+    pub id: u16,
+}
+
+/// Cells `first .. first + count` of the loop (cyclic).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Run {
+    /// The first cell, in forward order.
+    pub first: u16,
+    /// How many.
+    pub count: u16,
+}
+
+/// How firm a listing is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Firmness {
+    /// May move in the next round.
+    Tentative,
+    /// Will be flown whatever is decided.
+    Committed,
+    /// Covered.
+    Done,
+}
+
+/// A run of cells in a register, flown in one direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Listing {
+    /// Which cells.
+    pub run: Run,
+    /// Whether they are flown against the order of the loop.
+    pub backward: bool,
+    /// How firm.
+    pub firmness: Firmness,
+    /// By what right.
+    pub stamp: Stamp,
+}
+
+/// A peer's own section: what it will fly, and what it gave away but still answers for.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Register {
+    /// Mission revision.
+    pub revision: u32,
+    /// The loop the cells are counted on.
+    pub loop_hash: u64,
+    /// The latest division adopted.
+    pub epoch: Epoch,
+    /// What it will fly, in order.
+    pub plan: Vec<Listing>,
+    /// What it gave away and nobody has taken over yet.
+    pub held: Vec<Listing>,
+    /// What it has done of the present section.
+    pub done: Vec<Run>,
+    /// Expected end of the plan, milliseconds from this record's writing.
+    pub eta_ms: u32,
+}
+
+/// A member of a round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Member {
+    /// Who.
+    pub id: u16,
+    /// In which life.
+    pub incarnation: Incarnation,
+}
+
+/// A round of negotiation: which members, on which ground.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Round {
+    /// One more than any counter seen by the starter.
+    pub counter: u32,
+    /// Ascending.
+    pub members: Vec<Member>,
+    /// Mission revision.
+    pub revision: u32,
+    /// The loop.
+    pub loop_hash: u64,
+    /// How long to wait for all snapshots, milliseconds.
+    pub wait_ms: u32,
+}
+
+/// A peer's bid in one round. Immutable once spoken.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Snapshot {
+    /// The round it belongs to.
+    pub round: Round,
+    /// Boundary of the loop where it will be.
+    pub anchor: u16,
+    /// Whether it looks against the order of the loop there.
+    pub backward: bool,
+    /// When, milliseconds from now.
+    pub release_ms: u32,
+    /// Ground speed, mm/s.
+    pub speed_mmps: u32,
+    /// Time to turn round, milliseconds.
+    pub turn_ms: u32,
+    /// Flight time it may still spend after its release, milliseconds.
+    pub endurance_ms: u32,
+    /// Covered cells it knows of, run-length encoded, at most 256 bytes.
+    #[serde(with = "serde_bytes")]
+    pub union: Vec<u8>,
+    /// Cells it will finish whatever is decided.
+    pub commits: Vec<Run>,
+    /// Expected end of its present plan, milliseconds from now.
+    pub eta_ms: u32,
+    /// Time since it last adopted a division, milliseconds.
+    pub adopted_ago_ms: u32,
+    /// Cells it covered since.
+    pub cells_since: u16,
+    /// Whether it has nothing left to fly.
+    pub idle: bool,
+}
+
+/// The union of covered cells one peer knows of, from all authors and lives.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Cover {
+    /// Mission revision.
+    pub revision: u32,
+    /// The loop the cells are counted on.
+    pub loop_hash: u64,
+    /// Run-length encoded.
+    #[serde(with = "serde_bytes")]
+    pub union: Vec<u8>,
+}
+
+/// A piece of a mission's body.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MissionChunk {
+    /// Mission revision.
+    pub revision: u32,
+    /// Hash of the content.
+    pub content_hash: u64,
+    /// How many pieces there are; the piece's number is the record's subject.
+    pub chunks: u16,
+    /// The piece, at most 1,024 bytes of the encoded mission.
+    #[serde(with = "serde_bytes")]
+    pub bytes: Vec<u8>,
+}
+
+/// What the operator wants of everybody.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Order {
+    /// Carry on.
+    Resume,
+    /// Loiter where you are.
+    Hold,
+    /// Come home.
+    ReturnToBase,
+}
+
+/// "All that can be covered is covered."
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Finished {
+    /// Mission revision.
+    pub revision: u32,
+}
+
+/// Something people should look at.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Notice {
+    /// What, in one sentence.
+    pub text: String,
+}

@@ -1,0 +1,1 @@
+//! Deterministic tests of the whole swarm; see `swarm.rs`.
