@@ -1,1 +1,9 @@
 //! The world and the radio around a swarm, in virtual time.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`spec`] | a scenario with nothing left to resolve |
+//! | [`chaos`] | one enum of faults, for simulated and live swarms |
+
+pub mod chaos;
+pub mod spec;

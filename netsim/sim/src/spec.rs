@@ -1,0 +1,114 @@
+//! A scenario with nothing left to resolve: no file names, no units to convert.
+
+use crate::chaos::TimedFault;
+use skein_peer::Mission;
+use skein_planning::airframe::Airframe;
+use skein_planning::frame::{Point, Pose};
+use skein_planning::geometry::Polygon;
+use std::sync::Arc;
+
+/// Everything a run needs, besides a seed.
+#[derive(Clone, Debug)]
+pub struct Spec {
+    /// Name of the scenario.
+    pub name: String,
+    /// First part of every key.
+    pub fleet: String,
+    /// The mission, as the operator speaks it.
+    pub mission: Arc<Mission>,
+    /// Buildings, which block radio.
+    pub buildings: Vec<Building>,
+    /// No-fly zones as they are, for the judge.
+    pub zones: Vec<Polygon>,
+    /// The flying peers, ascending by id.
+    pub uavs: Vec<UavSpec>,
+    /// The ground station, if there is one.
+    pub ground: Option<GroundSpec>,
+    /// The radio.
+    pub radio: RadioSpec,
+    /// Beacon period T, milliseconds.
+    pub beacon_period_ms: u32,
+    /// Time between percepts, milliseconds.
+    pub percept_period_ms: u32,
+    /// Scenario seconds per second of wall time in a trial, at most 10.
+    pub time_scale: f64,
+    /// A run that lasts longer has failed, seconds.
+    pub max_time_s: u32,
+    /// Share of the area that must be coverable, 0 to 1.
+    pub min_coverable: f64,
+    /// Smallest separation of airborne UAVs, metres (recorded).
+    pub min_separation_m: f64,
+    /// Faults of the scenario, ascending by time.
+    pub faults: Vec<TimedFault>,
+    /// From what random faults are drawn.
+    pub storm: StormSpec,
+    /// The default seed.
+    pub seed: u64,
+}
+
+/// A prism that blocks radio.
+#[derive(Clone, Debug)]
+pub struct Building {
+    /// Its footprint.
+    pub footprint: Polygon,
+    /// Height of its roof above the origin, metres.
+    pub height_m: f64,
+}
+
+/// One flying peer.
+#[derive(Clone, Debug)]
+pub struct UavSpec {
+    /// Its number.
+    pub id: u16,
+    /// What it can fly.
+    pub airframe: Airframe,
+    /// Where it starts, in the air.
+    pub launch: Pose,
+    /// Its height slot above the origin, metres.
+    pub height_m: f64,
+}
+
+/// The ground station.
+#[derive(Clone, Debug)]
+pub struct GroundSpec {
+    /// Its number.
+    pub id: u16,
+    /// Where it stands.
+    pub position: Point,
+    /// Height of its antenna above the origin, metres.
+    pub height_m: f64,
+}
+
+/// The radio that all peers have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RadioSpec {
+    /// Links longer than this are cut, metres.
+    pub range_m: f64,
+    /// Bit rate of the shared channel, bit/s.
+    pub rate_bps: u32,
+    /// Share of transmissions lost, in thousandths.
+    pub loss_permille: u16,
+    /// Time from the end of a transmission to its reception, milliseconds.
+    pub delay_ms: u16,
+    /// Transmissions that waited longer than this for the channel are dropped, milliseconds.
+    pub queue_age_ms: u32,
+    /// Largest share of the channel that all peers together may use on average, 0 to 1.
+    pub share: f64,
+}
+
+/// From what the faults of one storm are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StormSpec {
+    /// Most UAVs killed for good in one run; at least one always lives.
+    pub max_kills: u16,
+    /// Kills, partitions and restarts happen before this share of the failure-free makespan.
+    pub until: f64,
+    /// Largest loss, in thousandths; each run draws its own.
+    pub max_loss_permille: u16,
+    /// Most partitions in one run, each of which heals.
+    pub max_partitions: u16,
+    /// Longest partition, seconds.
+    pub max_partition_s: u32,
+    /// Most restarts in one run.
+    pub max_restarts: u16,
+}
