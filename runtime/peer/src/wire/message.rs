@@ -226,6 +226,9 @@ pub struct Round {
     pub revision: u32,
     /// The loop.
     pub loop_hash: u64,
+    /// Whether the starter saw cells that nobody lists: such a round needs no gain
+    /// to be adopted.
+    pub loss: bool,
     /// How long to wait for all snapshots, milliseconds.
     pub wait_ms: u32,
 }
