@@ -3,7 +3,9 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`spec`] | a scenario with nothing left to resolve |
+//! | [`world`] | airframes, buildings, the judge |
 //! | [`chaos`] | one enum of faults, for simulated and live swarms |
 
 pub mod chaos;
 pub mod spec;
+pub mod world;
