@@ -1,1 +1,69 @@
 //! The formats of the outside world: QGroundControl plans and GeoJSON.
+//!
+//! Text in, text out: no files are opened here, and nothing of WGS84 leaves this
+//! crate but through [`place::to_plane`]. Malformed input is refused with the JSON
+//! pointer of the value that is wrong; what is well-formed but has no meaning for
+//! Skein comes back as a [`Notice`], so that nothing is dropped silently.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`place`] | latitude and longitude, rings, circles, the way to a mission's plane |
+//! | [`plan`] | QGroundControl `.plan`: geofence, survey, waypoints |
+//! | [`geojson`] | areas, and buildings with heights |
+//! | [`height`] | heights as map data writes them: `12.13 m`, `3.5`, `40 ft` |
+//!
+//! ```
+//! let text = r#"{"type":"FeatureCollection","features":[{"type":"Feature",
+//!     "properties":{"building":"yes","building:levels":"2.5"},
+//!     "geometry":{"type":"Polygon","coordinates":[[[24.9,60.1],[24.91,60.1],[24.91,60.11],[24.9,60.1]]]}}]}"#;
+//! let read = skein_interop::geojson::buildings(text, &Default::default()).unwrap();
+//! assert_eq!(read.buildings.len(), 1);
+//! assert!((read.buildings[0].height_m - 7.5).abs() < 1e-9);
+//! ```
+
+mod cursor;
+pub mod geojson;
+pub mod height;
+pub mod place;
+pub mod plan;
+
+use core::fmt;
+use thiserror::Error;
+
+/// Why a text of a known format was refused. Nothing of it was used.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum FormatError {
+    /// The text is not JSON.
+    #[error("line {line}, column {column}: not valid JSON: {problem}")]
+    Syntax {
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What the parser says.
+        problem: String,
+    },
+    /// A value is missing or wrong.
+    #[error("at {pointer}: {problem}")]
+    Value {
+        /// JSON pointer (RFC 6901) of the value; `/` stands for the whole text.
+        pointer: String,
+        /// What is wrong and what would be right.
+        problem: String,
+    },
+}
+
+/// Something in the input that was understood, but not used as it stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Notice {
+    /// JSON pointer (RFC 6901) of the value.
+    pub pointer: String,
+    /// What it is and what was done with it.
+    pub text: String,
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "at {}: {}", self.pointer, self.text)
+    }
+}

@@ -1,0 +1,322 @@
+//! GeoJSON (RFC 7946): areas, and buildings with heights; written back as areas.
+//! Coordinates are longitude first. Leaves everything in the plane to the caller.
+
+use crate::cursor::{Cursor, parse};
+use crate::place::{LatLon, orient};
+use crate::{FormatError, Notice, height};
+use serde_json::{Map, Value, json};
+
+/// A polygon of the file with its properties.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Feature {
+    /// JSON pointer of the feature.
+    pub pointer: String,
+    /// The outer ring, counter-clockwise, the first point not repeated.
+    pub ring: Vec<LatLon>,
+    /// Number of holes, which the ring does not show.
+    pub holes: usize,
+    /// Its properties.
+    pub properties: Map<String, Value>,
+}
+
+/// What a file holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Features {
+    /// Its polygons; a multi-polygon gives one for each part.
+    pub polygons: Vec<Feature>,
+    /// What was left out.
+    pub notices: Vec<Notice>,
+}
+
+/// How a building without a height gets one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeightRules {
+    /// Height of a storey, metres.
+    pub storey_m: f64,
+    /// Storeys of a building that states neither height nor levels.
+    pub default_storeys: f64,
+}
+
+impl Default for HeightRules {
+    fn default() -> Self {
+        Self {
+            storey_m: 3.0,
+            default_storeys: 3.0,
+        }
+    }
+}
+
+/// A building.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Building {
+    /// JSON pointer of its feature.
+    pub pointer: String,
+    /// Its footprint, counter-clockwise, the first point not repeated.
+    pub ring: Vec<LatLon>,
+    /// Height of its roof above the ground, metres.
+    pub height_m: f64,
+}
+
+/// Buildings of a file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Buildings {
+    /// In the order of the file.
+    pub buildings: Vec<Building>,
+    /// What was left out or assumed beyond the rules.
+    pub notices: Vec<Notice>,
+}
+
+fn position(at: &Cursor<'_>) -> Result<LatLon, FormatError> {
+    let items = at.items()?;
+    if items.len() < 2 {
+        return Err(at.wrong("a position is [longitude, latitude]"));
+    }
+    Ok(LatLon {
+        lon_deg: items[0].within(-180.0, 180.0, "a longitude in degrees")?,
+        lat_deg: items[1].within(-90.0, 90.0, "a latitude in degrees")?,
+    })
+}
+
+fn polygon(at: &Cursor<'_>) -> Result<(Vec<LatLon>, usize), FormatError> {
+    let rings = at.items()?;
+    let outer = rings
+        .first()
+        .ok_or_else(|| at.wrong("a polygon has at least one ring"))?;
+    let points = outer
+        .items()?
+        .iter()
+        .map(position)
+        .collect::<Result<Vec<_>, _>>()?;
+    let ring = orient(points);
+    if ring.len() < 3 {
+        return Err(outer.wrong(format!(
+            "a ring has at least 3 different points, found {}",
+            ring.len()
+        )));
+    }
+    Ok((ring, rings.len() - 1))
+}
+
+fn geometry(
+    at: &Cursor<'_>,
+    pointer: &str,
+    properties: &Map<String, Value>,
+    out: &mut Features,
+) -> Result<(), FormatError> {
+    let kind = at.need("type")?;
+    let mut push = |(ring, holes): (Vec<LatLon>, usize)| {
+        if holes > 0 {
+            let text = format!("{holes} hole(s) ignored: the outer ring counts as solid");
+            out.notices.push(Notice {
+                pointer: pointer.to_owned(),
+                text,
+            });
+        }
+        let properties = properties.clone();
+        out.polygons.push(Feature {
+            pointer: pointer.to_owned(),
+            ring,
+            holes,
+            properties,
+        });
+    };
+    match kind.text()? {
+        "Polygon" => push(polygon(&at.need("coordinates")?)?),
+        "MultiPolygon" => {
+            for part in at.need("coordinates")?.items()? {
+                push(polygon(&part)?);
+            }
+        }
+        "GeometryCollection" => {
+            for part in at.need("geometries")?.items()? {
+                geometry(&part, pointer, properties, out)?;
+            }
+        }
+        other @ ("Point" | "MultiPoint" | "LineString" | "MultiLineString") => {
+            let text = format!("a {other} is no area: ignored");
+            out.notices.push(Notice {
+                pointer: pointer.to_owned(),
+                text,
+            });
+        }
+        other => {
+            return Err(kind.wrong(format!(
+                "\"{other}\" is no GeoJSON geometry; expected Polygon or MultiPolygon"
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn feature(at: &Cursor<'_>, out: &mut Features) -> Result<(), FormatError> {
+    let kind = at.need("type")?;
+    if kind.text()? != "Feature" {
+        return Err(kind.wrong("expected \"Feature\""));
+    }
+    let none = Map::new();
+    let properties = match at.get("properties")? {
+        Some(p) => p.object()?,
+        None => &none,
+    };
+    match at.get("geometry")? {
+        Some(g) => geometry(&g, &at.pointer(), properties, out),
+        None => {
+            out.notices.push(Notice {
+                pointer: at.pointer(),
+                text: "no geometry: ignored".to_owned(),
+            });
+            Ok(())
+        }
+    }
+}
+
+/// Reads all polygons of a GeoJSON text.
+///
+/// # Errors
+/// [`FormatError`] names the value that is wrong.
+pub fn read(text: &str) -> Result<Features, FormatError> {
+    let value = parse(text)?;
+    let root = Cursor::root(&value);
+    let kind = root.need("type")?;
+    let mut out = Features::default();
+    match kind.text()? {
+        "FeatureCollection" => {
+            for f in root.need("features")?.items()? {
+                feature(&f, &mut out)?;
+            }
+        }
+        "Feature" => feature(&root, &mut out)?,
+        _ => geometry(&root, "/", &Map::new(), &mut out)?,
+    }
+    Ok(out)
+}
+
+/// A property that is a string or a number, as text.
+fn tag(properties: &Map<String, Value>, key: &str) -> Option<String> {
+    match properties.get(key)? {
+        Value::String(s) => Some(s.clone()),
+        Value::Number(n) => Some(n.to_string()),
+        _ => None,
+    }
+}
+
+fn building_height(f: &Feature, rules: &HeightRules, notices: &mut Vec<Notice>) -> f64 {
+    for (key, scale) in [("height", 1.0), ("building:levels", rules.storey_m)] {
+        let Some(text) = tag(&f.properties, key) else {
+            continue;
+        };
+        let parsed = if key == "height" {
+            height::metres(&text)
+        } else {
+            height::levels(&text)
+        };
+        match parsed {
+            Some(n) => return n * scale,
+            None => notices.push(Notice {
+                pointer: f.pointer.clone(),
+                text: format!(
+                    "{key} \"{text}\" is not understood: expected a number such as 12.5; ignored"
+                ),
+            }),
+        }
+    }
+    rules.default_storeys * rules.storey_m
+}
+
+/// Reads buildings: heights from `height`, else `building:levels`, else the rules.
+///
+/// # Errors
+/// [`FormatError`] names the value that is wrong.
+pub fn buildings(text: &str, rules: &HeightRules) -> Result<Buildings, FormatError> {
+    let features = read(text)?;
+    let mut out = Buildings {
+        buildings: Vec::with_capacity(features.polygons.len()),
+        notices: features.notices,
+    };
+    for f in features.polygons {
+        let height_m = building_height(&f, rules, &mut out.notices);
+        out.buildings.push(Building {
+            pointer: f.pointer,
+            ring: f.ring,
+            height_m,
+        });
+    }
+    Ok(out)
+}
+
+/// Writes rings with their properties as a feature collection.
+#[must_use]
+pub fn write(polygons: &[(Vec<LatLon>, Map<String, Value>)]) -> String {
+    let features: Vec<Value> = polygons
+        .iter()
+        .map(|(ring, properties)| {
+            let mut ring = orient(ring.clone());
+            ring.extend(ring.first().copied());
+            let points: Vec<Value> = ring.iter().map(|p| json!([p.lon_deg, p.lat_deg])).collect();
+            json!({"type": "Feature", "properties": properties, "geometry": {"type": "Polygon", "coordinates": [points]}})
+        })
+        .collect();
+    json!({"type": "FeatureCollection", "features": features}).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(text: &str) -> String {
+        read(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn errors_name_the_pointer() {
+        assert!(error("{").contains("line 1, column"));
+        assert!(error("[]").contains("at /: expected an object, found a list"));
+        assert!(error(r#"{"type":"FeatureCollection"}"#).contains("\"features\" is missing"));
+        let bad = r#"{"type":"Polygon","coordinates":[[[24.9,60.1],[24.9,"x"],[25,60]]]}"#;
+        assert!(
+            error(bad).contains("at /coordinates/0/1/1: expected a number"),
+            "{}",
+            error(bad)
+        );
+        let far = r#"{"type":"Polygon","coordinates":[[[24.9,160.1],[24.9,60],[25,60]]]}"#;
+        assert!(
+            error(far).contains("at /coordinates/0/0/1: a latitude"),
+            "{}",
+            error(far)
+        );
+        assert!(error(r#"{"type":"Blob"}"#).contains("at /type: \"Blob\""));
+    }
+
+    #[test]
+    fn nothing_is_dropped_silently() {
+        let text = r#"{"type":"FeatureCollection","features":[
+            {"type":"Feature","properties":null,"geometry":{"type":"Point","coordinates":[1,2]}},
+            {"type":"Feature","properties":{},"geometry":null},
+            {"type":"Feature","properties":{"height":"tall","building:levels":2},"geometry":
+              {"type":"MultiPolygon","coordinates":[[[[0,0],[0,1],[1,1],[0,0]],[[0.1,0.1],[0.2,0.1],[0.2,0.2]]]]}}]}"#;
+        let read = buildings(text, &HeightRules::default()).unwrap();
+        assert_eq!(read.notices.len(), 4, "{:?}", read.notices);
+        assert_eq!(read.buildings.len(), 1);
+        assert!((read.buildings[0].height_m - 6.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_is_written_can_be_read() {
+        let ring = vec![
+            LatLon {
+                lat_deg: 60.0,
+                lon_deg: 24.0,
+            },
+            LatLon {
+                lat_deg: 60.5,
+                lon_deg: 24.5,
+            },
+            LatLon {
+                lat_deg: 60.5,
+                lon_deg: 24.0,
+            },
+        ];
+        let text = write(&[(ring.clone(), Map::new())]);
+        assert_eq!(read(&text).unwrap().polygons[0].ring, orient(ring));
+    }
+}

@@ -1,0 +1,208 @@
+//! Latitude and longitude, and the way from there to a mission's plane (D2.7 §2.2).
+//! Leaves validity of polygons to `skein_planning::geometry`.
+
+use skein_planning::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
+use skein_planning::math::{TAU, cos, sin_cos};
+use thiserror::Error;
+
+/// A point on the WGS84 ellipsoid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LatLon {
+    /// Geodetic latitude, degrees north.
+    pub lat_deg: f64,
+    /// Longitude, degrees east.
+    pub lon_deg: f64,
+}
+
+/// A closed region of a foreign file.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// A ring, the first point not repeated, counter-clockwise.
+    Ring(Vec<LatLon>),
+    /// A circle.
+    Circle {
+        /// Its centre.
+        centre: LatLon,
+        /// Its radius, metres.
+        radius_m: f64,
+    },
+}
+
+/// A point is too far from the origin for one tangent plane.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[error(
+    "{lat_deg:.7}, {lon_deg:.7} lies {distance_km:.1} km from the origin: a mission ends at {limit_km:.0} km, where the tangent plane stops being exact",
+    limit_km = MAX_MISSION_RADIUS_M / 1000.0
+)]
+pub struct TooFar {
+    /// Latitude of the point, degrees north.
+    pub lat_deg: f64,
+    /// Longitude of the point, degrees east.
+    pub lon_deg: f64,
+    /// Distance in the plane, kilometres.
+    pub distance_km: f64,
+}
+
+/// A point of the plane, if it is near enough to the origin.
+///
+/// # Errors
+/// [`TooFar`] beyond 20 km.
+pub fn to_plane(origin: Origin, at: LatLon) -> Result<Point, TooFar> {
+    let p = origin.to_enu(at.lat_deg, at.lon_deg);
+    let distance_m = p.coords.norm();
+    // Half the earth away the plane folds back on itself, hence the second test.
+    let near = (at.lat_deg - origin.lat_deg).abs() < 1.0;
+    if near && distance_m <= MAX_MISSION_RADIUS_M {
+        Ok(p)
+    } else {
+        Err(TooFar {
+            lat_deg: at.lat_deg,
+            lon_deg: at.lon_deg,
+            distance_km: distance_m / 1000.0,
+        })
+    }
+}
+
+/// A point of the plane as latitude and longitude.
+#[must_use]
+pub fn from_plane(origin: Origin, p: Point) -> LatLon {
+    let (lat_deg, lon_deg) = origin.to_geodetic(p);
+    LatLon { lat_deg, lon_deg }
+}
+
+/// Corners of the polygon that stands for a circle: 32 keep the difference between
+/// the inner and the outer polygon below half a percent of the radius.
+pub const CIRCLE_CORNERS: u32 = 32;
+
+/// Whether a polygon for a circle lies inside or outside of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The polygon is contained in the circle (right for where one may be).
+    Inside,
+    /// The polygon contains the circle (right for where one may not be).
+    Outside,
+}
+
+/// A regular polygon for a circle in the plane, counter-clockwise.
+#[must_use]
+pub fn circle_ring(centre: Point, radius_m: f64, side: Side) -> Vec<Point> {
+    let step = TAU / f64::from(CIRCLE_CORNERS);
+    let reach_m = match side {
+        Side::Inside => radius_m,
+        Side::Outside => radius_m / cos(step / 2.0),
+    };
+    (0..CIRCLE_CORNERS)
+        .map(|i| {
+            let (s, c) = sin_cos(step * f64::from(i));
+            Point::new(centre.x + reach_m * c, centre.y + reach_m * s)
+        })
+        .collect()
+}
+
+impl Shape {
+    /// The shape as a ring of the plane.
+    ///
+    /// # Errors
+    /// [`TooFar`] names the first point beyond 20 km.
+    pub fn to_plane(&self, origin: Origin, side: Side) -> Result<Vec<Point>, TooFar> {
+        match self {
+            Self::Ring(ring) => ring.iter().map(|p| to_plane(origin, *p)).collect(),
+            Self::Circle { centre, radius_m } => {
+                Ok(circle_ring(to_plane(origin, *centre)?, *radius_m, side))
+            }
+        }
+    }
+}
+
+/// Twice the signed area of a ring in degrees: positive when counter-clockwise.
+fn winding(ring: &[LatLon]) -> f64 {
+    let n = ring.len();
+    (0..n)
+        .map(|i| {
+            let (a, b) = (ring[i], ring[(i + 1) % n]);
+            a.lon_deg * b.lat_deg - b.lon_deg * a.lat_deg
+        })
+        .sum()
+}
+
+/// Drops a repeated last point and turns the ring counter-clockwise. Rings of map
+/// data are wound either way, and unions of mixed windings are silently wrong.
+#[must_use]
+pub fn orient(mut ring: Vec<LatLon>) -> Vec<LatLon> {
+    if ring.len() > 1 && ring.first() == ring.last() {
+        ring.pop();
+    }
+    if winding(&ring) < 0.0 {
+        ring.reverse();
+    }
+    ring
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ORIGIN: Origin = Origin {
+        lat_deg: 60.1655,
+        lon_deg: 24.9355,
+    };
+
+    #[test]
+    fn rings_become_counter_clockwise_and_open() {
+        let p = |lat_deg, lon_deg| LatLon { lat_deg, lon_deg };
+        let clockwise = vec![p(0.0, 0.0), p(1.0, 0.0), p(1.0, 1.0), p(0.0, 0.0)];
+        let ring = orient(clockwise);
+        assert_eq!(ring.len(), 3);
+        assert!(winding(&ring) > 0.0);
+        assert_eq!(orient(ring.clone()), ring);
+    }
+
+    #[test]
+    fn a_mission_ends_at_twenty_kilometres() {
+        assert!(
+            to_plane(
+                ORIGIN,
+                LatLon {
+                    lat_deg: 60.30,
+                    lon_deg: 24.9355
+                }
+            )
+            .is_ok()
+        );
+        assert!(
+            to_plane(
+                ORIGIN,
+                LatLon {
+                    lat_deg: 60.40,
+                    lon_deg: 24.9355
+                }
+            )
+            .is_err()
+        );
+        let antipode = LatLon {
+            lat_deg: -60.1655,
+            lon_deg: 24.9355 - 180.0,
+        };
+        assert!(to_plane(ORIGIN, antipode).is_err());
+    }
+
+    #[test]
+    fn the_outer_polygon_contains_the_circle_and_the_inner_is_contained() {
+        let c = Point::new(3.0, -7.0);
+        for (side, inner) in [(Side::Outside, false), (Side::Inside, true)] {
+            let ring = circle_ring(c, 100.0, side);
+            for i in 0..ring.len() {
+                let mid = nalgebra_mid(ring[i], ring[(i + 1) % ring.len()]);
+                let r = (mid - c).norm();
+                assert!(
+                    if inner { r < 100.0 } else { r > 100.0 - 1e-9 },
+                    "{side:?} {r}"
+                );
+            }
+        }
+    }
+
+    fn nalgebra_mid(a: Point, b: Point) -> Point {
+        Point::new((a.x + b.x) / 2.0, (a.y + b.y) / 2.0)
+    }
+}
