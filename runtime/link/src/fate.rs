@@ -74,7 +74,9 @@ pub fn fate(seed: u64, tx: u16, rx: u16, number: u64, link: &LinkState) -> Fate 
     if draw < u64::from(link.loss_permille) {
         return Fate::Lost(Reason::Loss);
     }
-    Fate::Delivered { delay_ms: link.delay_ms }
+    Fate::Delivered {
+        delay_ms: link.delay_ms,
+    }
 }
 
 /// A 64-bit finaliser with full avalanche (the constants of SplitMix64).
@@ -90,8 +92,13 @@ pub fn mix(x: u64) -> u64 {
 mod tests {
     use super::*;
 
-    const UP: LinkState =
-        LinkState { in_range: true, in_sight: true, cut: false, loss_permille: 300, delay_ms: 2 };
+    const UP: LinkState = LinkState {
+        in_range: true,
+        in_sight: true,
+        cut: false,
+        loss_permille: 300,
+        delay_ms: 2,
+    };
 
     #[test]
     fn loss_is_as_frequent_as_stated() {
@@ -104,8 +111,14 @@ mod tests {
     #[test]
     fn a_blocked_link_says_why() {
         let cut = LinkState { cut: true, ..UP };
-        let far = LinkState { in_range: false, ..UP };
-        let hidden = LinkState { in_sight: false, ..UP };
+        let far = LinkState {
+            in_range: false,
+            ..UP
+        };
+        let hidden = LinkState {
+            in_sight: false,
+            ..UP
+        };
         assert_eq!(fate(1, 1, 2, 3, &cut), Fate::Lost(Reason::Cut));
         assert_eq!(fate(1, 1, 2, 3, &far), Fate::Lost(Reason::Range));
         assert_eq!(fate(1, 1, 2, 3, &hidden), Fate::Lost(Reason::Sight));

@@ -170,7 +170,11 @@ fn check_percept(p: &Percept) -> Result<(), FrameError> {
         p.wind_north_mps,
         p.endurance_s,
     ];
-    if values.iter().all(|v| v.is_finite()) { Ok(()) } else { Err(FrameError::OutOfBounds("percept")) }
+    if values.iter().all(|v| v.is_finite()) {
+        Ok(())
+    } else {
+        Err(FrameError::OutOfBounds("percept"))
+    }
 }
 
 fn check_setpoint(s: &Setpoint) -> Result<(), FrameError> {
@@ -198,7 +202,9 @@ pub fn encode<T: Frame>(frame: &T) -> Result<Vec<u8>, FrameError> {
     if length > MAX_FRAME_BYTES {
         return Err(FrameError::TooLong(length));
     }
-    let prefix = u32::try_from(length).map_err(|_| FrameError::TooLong(length))?.to_be_bytes();
+    let prefix = u32::try_from(length)
+        .map_err(|_| FrameError::TooLong(length))?
+        .to_be_bytes();
     let mut bytes = body;
     bytes[..LENGTH_BYTES].copy_from_slice(&prefix);
     Ok(bytes)
@@ -224,14 +230,18 @@ impl Decoder {
     ///
     /// # Errors
     /// When the stream holds anything but frames of this type; give it up then.
-    pub fn next<T: Frame>(&mut self) -> Result<Option<T>, FrameError> {
+    pub fn pop<T: Frame>(&mut self) -> Result<Option<T>, FrameError> {
         let rest = &self.bytes[self.read..];
-        let Some((prefix, rest)) = rest.split_first_chunk::<LENGTH_BYTES>() else { return Ok(None) };
+        let Some((prefix, rest)) = rest.split_first_chunk::<LENGTH_BYTES>() else {
+            return Ok(None);
+        };
         let length = usize::try_from(u32::from_be_bytes(*prefix)).unwrap_or(usize::MAX);
         if length > MAX_FRAME_BYTES {
             return Err(FrameError::TooLong(length));
         }
-        let Some(body) = rest.get(..length) else { return Ok(None) };
+        let Some(body) = rest.get(..length) else {
+            return Ok(None);
+        };
         let frame: T = decode_exact(body)?;
         frame.check()?;
         self.read += LENGTH_BYTES + length;
@@ -261,15 +271,31 @@ mod tests {
             from_ms: 1200,
             airspeed_mps: 13.0,
             height_m: 60.0,
-            steps: vec![Steer { turn_rate_radps: rate, duration_ms: 400 }; steps],
+            steps: vec![
+                Steer {
+                    turn_rate_radps: rate,
+                    duration_ms: 400
+                };
+                steps
+            ],
             loiter: Side::Left,
         })
     }
 
     fn tick() -> ToPeer {
-        let link =
-            LinkState { in_range: true, in_sight: false, cut: false, loss_permille: 20, delay_ms: 3 };
-        ToPeer::Tick { time_ms: 5_000, scale: 8.0, percept: None, links: Some(vec![(3, link)]) }
+        let link = LinkState {
+            in_range: true,
+            in_sight: false,
+            cut: false,
+            loss_permille: 20,
+            delay_ms: 3,
+        };
+        ToPeer::Tick {
+            time_ms: 5_000,
+            scale: 8.0,
+            percept: None,
+            links: Some(vec![(3, link)]),
+        }
     }
 
     #[test]
@@ -281,7 +307,7 @@ mod tests {
             let mut seen = Vec::new();
             for bytes in stream.chunks(piece) {
                 decoder.push(bytes);
-                while let Some(frame) = decoder.next::<ToPeer>().unwrap() {
+                while let Some(frame) = decoder.pop::<ToPeer>().unwrap() {
                     seen.push(frame);
                 }
             }
@@ -293,7 +319,10 @@ mod tests {
     fn a_length_beyond_the_limit_is_refused_before_its_bytes_come() {
         let mut decoder = Decoder::default();
         decoder.push(&[0xff, 0xff, 0xff, 0xff]);
-        assert!(matches!(decoder.next::<ToPeer>(), Err(FrameError::TooLong(_))));
+        assert!(matches!(
+            decoder.pop::<ToPeer>(),
+            Err(FrameError::TooLong(_))
+        ));
     }
 
     #[test]
@@ -304,7 +333,10 @@ mod tests {
         bytes[..LENGTH_BYTES].copy_from_slice(&length.to_be_bytes());
         let mut decoder = Decoder::default();
         decoder.push(&bytes);
-        assert!(matches!(decoder.next::<ToPeer>(), Err(FrameError::Malformed(_))));
+        assert!(matches!(
+            decoder.pop::<ToPeer>(),
+            Err(FrameError::Malformed(_))
+        ));
     }
 
     #[test]
@@ -316,22 +348,31 @@ mod tests {
             let mut decoder = Decoder::default();
             decoder.push(&bad);
             // Nothing to expect but that it returns.
-            let _ = decoder.next::<ToPeer>();
+            let _ = decoder.pop::<ToPeer>();
         }
         let mut decoder = Decoder::default();
         decoder.push(&bytes[..bytes.len() - 1]);
-        assert_eq!(decoder.next::<ToPeer>(), Ok(None));
+        assert_eq!(decoder.pop::<ToPeer>(), Ok(None));
     }
 
     #[test]
     fn what_is_not_finite_is_neither_written_nor_read() {
-        assert!(matches!(encode(&setpoint(f64::NAN, 1)), Err(FrameError::OutOfBounds(_))));
-        assert!(matches!(encode(&setpoint(0.1, MAX_STEPS + 1)), Err(FrameError::OutOfBounds(_))));
+        assert!(matches!(
+            encode(&setpoint(f64::NAN, 1)),
+            Err(FrameError::OutOfBounds(_))
+        ));
+        assert!(matches!(
+            encode(&setpoint(0.1, MAX_STEPS + 1)),
+            Err(FrameError::OutOfBounds(_))
+        ));
         let body = cbor4ii::serde::to_vec(Vec::new(), &setpoint(f64::INFINITY, 1)).unwrap();
         let mut stream = u32::try_from(body.len()).unwrap().to_be_bytes().to_vec();
         stream.extend(body);
         let mut decoder = Decoder::default();
         decoder.push(&stream);
-        assert!(matches!(decoder.next::<ToWorld>(), Err(FrameError::OutOfBounds(_))));
+        assert!(matches!(
+            decoder.pop::<ToWorld>(),
+            Err(FrameError::OutOfBounds(_))
+        ));
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{Mission, PeerId};
 use serde::{Deserialize, Serialize};
-use skein_planning::airframe::Airframe;
+pub use skein_planning::airframe::Airframe;
 use std::sync::Arc;
 
 /// What a peer is for.
