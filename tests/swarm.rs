@@ -1,1 +1,2 @@
 //! One module a promise.
+mod configs;

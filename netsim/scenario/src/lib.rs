@@ -1,1 +1,98 @@
 //! A scenario file, resolved: mission, world, fleet, radio, faults, storm, checks.
+//!
+//! The text is JSON5. Everything that is wrong with it, in form (an unknown field, a
+//! number out of range, NaN) or in meaning (a zone that swallows the area, lanes too
+//! narrow for the turn radius), is an error that names file, line, column and field
+//! and says what would be right. Fields are explained in `configs/trials/helsinki.json5`.
+//!
+//! ```
+//! let spec = skein_scenario::builtin(skein_scenario::DEFAULT).unwrap();
+//! assert_eq!(spec.uavs.len(), 8);
+//! ```
+
+mod builtin;
+mod document;
+mod error;
+mod faults;
+mod feasibility;
+mod files;
+mod fleet;
+mod resolve;
+mod terrain;
+
+pub use builtin::{
+    DEFAULT, files as builtin_files, load_builtin, names as builtin_names, text as builtin_text,
+};
+pub use error::{Finding, Place, ScenarioError, Severity};
+pub use faults::{chaos_plan, load_chaos_plan};
+pub use feasibility::{Summary, extent_m, feasibility, summary};
+pub use files::Files;
+pub use resolve::{Overrides, Scenario, parse_with};
+
+use skein_netsim::spec::Spec;
+use std::path::Path;
+
+/// Reads and resolves a scenario file with everything that was noticed; files that
+/// it names are looked up beside it.
+///
+/// # Errors
+/// [`ScenarioError`] names the place of what is wrong.
+pub fn load_with(path: &Path, over: &Overrides) -> Result<Scenario, ScenarioError> {
+    let file = path.display().to_string();
+    let text = files::read_text(path).map_err(|problem| ScenarioError::Unreadable {
+        file: file.clone(),
+        problem,
+    })?;
+    let base = path
+        .parent()
+        .map_or_else(Default::default, Path::to_path_buf);
+    parse_with(&file, &text, &Files::Directory(base), over)
+}
+
+/// Reads and resolves a scenario file.
+///
+/// # Errors
+/// [`ScenarioError`] names the place of what is wrong.
+pub fn load(path: &Path) -> Result<Spec, ScenarioError> {
+    load_with(path, &Overrides::default()).map(|s| s.spec)
+}
+
+/// Resolves a scenario from its text; `file` names it in errors.
+///
+/// # Errors
+/// [`ScenarioError`] names the place of what is wrong.
+pub fn parse(file: &str, text: &str, files: &Files<'_>) -> Result<Spec, ScenarioError> {
+    parse_with(file, text, files, &Overrides::default()).map(|s| s.spec)
+}
+
+/// Resolves a built-in scenario by its name.
+///
+/// # Errors
+/// [`ScenarioError`] when there is none of that name.
+pub fn builtin(name: &str) -> Result<Spec, ScenarioError> {
+    load_builtin(name, &Overrides::default()).map(|s| s.spec)
+}
+
+/// What a command line means by a scenario: nothing is the default one, a name that
+/// is no file may be a built-in one.
+///
+/// # Errors
+/// [`ScenarioError`] names the place of what is wrong.
+pub fn open(target: Option<&str>, over: &Overrides) -> Result<Scenario, ScenarioError> {
+    let target = target.unwrap_or(DEFAULT);
+    let path = Path::new(target);
+    if builtin::text(target).is_some() && !path.exists() {
+        return load_builtin(target, over);
+    }
+    if !path.exists() {
+        let problem = format!(
+            "no such file, and no built-in scenario of that name; built in: {}",
+            builtin::names().join(", ")
+        );
+        return Err(ScenarioError::Unreadable {
+            file: target.to_owned(),
+            problem,
+        });
+    }
+    load_with(path, over)
+}

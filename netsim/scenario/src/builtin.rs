@@ -1,0 +1,79 @@
+//! Scenarios that are part of the program, so that a trial runs from any directory.
+
+use crate::error::ScenarioError;
+use crate::files::Files;
+use crate::resolve::{Overrides, Scenario, parse_with};
+
+/// The scenario that is run when none is named.
+pub const DEFAULT: &str = "helsinki";
+
+/// Name, file as errors show it, text.
+const SCENARIOS: [(&str, &str, &str); 2] = [
+    (
+        "helsinki",
+        "helsinki.json5",
+        include_str!("../../../configs/trials/helsinki.json5"),
+    ),
+    (
+        "geofence",
+        "geofence.json5",
+        include_str!("../../../configs/trials/geofence.json5"),
+    ),
+];
+
+/// Files that the built-in scenarios name.
+const DATA: [(&str, &str); 2] = [
+    (
+        "../data/helsinki_buildings.geojson",
+        include_str!("../../../configs/data/helsinki_buildings.geojson"),
+    ),
+    (
+        "../data/px4_multicopter_mission_geofence_avoid.plan",
+        include_str!("../../../configs/data/px4_multicopter_mission_geofence_avoid.plan"),
+    ),
+];
+
+/// Names of the built-in scenarios.
+#[must_use]
+pub fn names() -> Vec<&'static str> {
+    SCENARIOS.iter().map(|(name, _, _)| *name).collect()
+}
+
+/// The text of a built-in scenario.
+#[must_use]
+pub fn text(name: &str) -> Option<&'static str> {
+    SCENARIOS
+        .iter()
+        .find(|(n, _, _)| *n == name)
+        .map(|(_, _, text)| *text)
+}
+
+fn data(name: &str) -> Result<String, String> {
+    let found = DATA.iter().find(|(n, _)| *n == name);
+    found
+        .map(|(_, text)| (*text).to_owned())
+        .ok_or_else(|| "not built in".to_owned())
+}
+
+/// Files of the built-in scenarios.
+#[must_use]
+pub fn files() -> Files<'static> {
+    Files::With(&data)
+}
+
+/// Resolves a built-in scenario.
+///
+/// # Errors
+/// [`ScenarioError`] when there is none of that name, or when `over` does not fit it.
+pub fn load_builtin(name: &str, over: &Overrides) -> Result<Scenario, ScenarioError> {
+    match SCENARIOS.iter().find(|(n, _, _)| *n == name) {
+        Some((_, file, text)) => parse_with(file, text, &files(), over),
+        None => Err(ScenarioError::Unreadable {
+            file: name.to_owned(),
+            problem: format!(
+                "no such file, and no built-in scenario of that name; built in: {}",
+                names().join(", ")
+            ),
+        }),
+    }
+}

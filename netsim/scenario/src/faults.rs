@@ -1,0 +1,480 @@
+//! Faults of a scenario and of a chaos plan: a time, a kind, and perhaps `for_s`,
+//! which adds what ends the fault.
+
+use crate::document::{Document, Fields, Node, suggestion};
+use crate::error::{Finding, ScenarioError, Severity};
+use crate::files::read_text;
+use skein_netsim::chaos::{Fault, TimedFault};
+use skein_netsim::spec::StormSpec;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Kinds of faults and the fields that each has besides `at_s` and `kind`.
+const KINDS: [(&str, &[&str]); 10] = [
+    ("kill", &["peer", "for_s", "fresh_disk"]),
+    ("kill-computer", &["peer", "for_s", "fresh_disk"]),
+    ("terminate", &["peer", "for_s", "fresh_disk"]),
+    ("pause", &["peer", "for_s"]),
+    ("resume", &["peer"]),
+    ("restart", &["peer", "fresh_disk"]),
+    ("cut", &["a", "b", "one_way", "for_s"]),
+    ("partition", &["groups", "for_s"]),
+    ("heal", &[]),
+    ("loss", &["percent", "for_s"]),
+];
+
+/// Who there is, until when, and what a loss goes back to.
+pub(crate) struct Known<'a> {
+    /// Numbers of all peers; `None` when unknown (a chaos plan without a scenario).
+    pub(crate) peers: Option<&'a BTreeSet<u16>>,
+    /// Time at which the run ends, seconds.
+    pub(crate) max_time_s: u32,
+    /// The loss of the scenario, thousandths.
+    pub(crate) loss_permille: u16,
+    /// Faults that name unknown peers are left out with a note: the number of
+    /// peers is not the file's.
+    pub(crate) lenient: bool,
+}
+
+impl Known<'_> {
+    fn peer(&self, node: &Node<'_>) -> Result<u16, ScenarioError> {
+        let id = node.small(0, u16::MAX, "a peer's number")?;
+        if let Some(peers) = self.peers
+            && !peers.contains(&id)
+            && !self.lenient
+        {
+            let all: Vec<String> = peers.iter().map(u16::to_string).collect();
+            return Err(node.wrong(format!(
+                "no peer has the number {id}; there are {}",
+                all.join(", ")
+            )));
+        }
+        Ok(id)
+    }
+
+    fn has(&self, id: u16) -> bool {
+        self.peers.is_none_or(|p| p.contains(&id))
+    }
+}
+
+/// Reads a list of faults; they come back ascending by time.
+pub(crate) fn read(
+    list: &Node<'_>,
+    known: &Known<'_>,
+    notes: &mut Vec<Finding>,
+) -> Result<Vec<TimedFault>, ScenarioError> {
+    let mut out = Vec::new();
+    // Times at which cuts begin and end, to tell when one heal ends several.
+    let mut cuts: Vec<(u64, u64)> = Vec::new();
+    for item in list.items()? {
+        let (fault, end) = one(&item, known)?;
+        if !names_known(&fault.fault, known) {
+            let mut note = Finding::new(
+                Severity::Note,
+                item.path(),
+                "left out: it names a peer that this fleet has not",
+            );
+            note.place = Some(item.place());
+            notes.push(note);
+            continue;
+        }
+        if matches!(fault.fault, Fault::Cut { .. } | Fault::Partition { .. }) {
+            let span = (fault.at_ms, end.as_ref().map_or(u64::MAX, |e| e.at_ms));
+            if cuts.iter().any(|c| c.0 < span.1 && span.0 < c.1) {
+                let text = "overlaps another cut or partition; the first heal ends both";
+                let mut note = Finding::new(Severity::Warning, item.path(), text);
+                note.place = Some(item.place());
+                notes.push(note);
+            }
+            cuts.push(span);
+        }
+        out.push(fault);
+        out.extend(end);
+    }
+    out.sort_by_key(|f| f.at_ms);
+    Ok(out)
+}
+
+fn names_known(fault: &Fault, known: &Known<'_>) -> bool {
+    match fault {
+        Fault::Kill { peer }
+        | Fault::KillComputer { peer }
+        | Fault::Terminate { peer }
+        | Fault::Pause { peer }
+        | Fault::Resume { peer }
+        | Fault::Restart { peer, .. } => known.has(*peer),
+        Fault::Cut { a, b, .. } => known.has(*a) && known.has(*b),
+        Fault::Partition { groups } => groups.iter().flatten().any(|p| known.has(*p)),
+        Fault::Heal | Fault::Loss { .. } => true,
+    }
+}
+
+fn at_ms(f: &Fields<'_>, name: &str, known: &Known<'_>) -> Result<u64, ScenarioError> {
+    let seconds = f.need(name, "70")?.number(
+        0.0,
+        f64::from(known.max_time_s),
+        "seconds, not after max_time_s",
+    )?;
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "between 0 and max_time_s"
+    )]
+    Ok((seconds * 1000.0).round() as u64)
+}
+
+fn groups(node: &Node<'_>, known: &Known<'_>) -> Result<Vec<Vec<u16>>, ScenarioError> {
+    let mut seen = BTreeSet::new();
+    let mut groups = Vec::new();
+    for group in node.items()? {
+        let mut ids = Vec::new();
+        for item in group.items()? {
+            let id = known.peer(&item)?;
+            if !seen.insert(id) {
+                return Err(item.wrong(format!("peer {id} is named twice; a peer is in one group")));
+            }
+            if known.has(id) {
+                ids.push(id);
+            }
+        }
+        groups.push(ids);
+    }
+    groups.retain(|g: &Vec<u16>| !g.is_empty());
+    if groups.is_empty() && !known.lenient {
+        return Err(node.wrong("names no peer; for example [[1, 2], [3, 4, 100]]"));
+    }
+    Ok(groups)
+}
+
+/// A fault and what ends it.
+fn one(
+    item: &Node<'_>,
+    known: &Known<'_>,
+) -> Result<(TimedFault, Option<TimedFault>), ScenarioError> {
+    const ALL: [&str; 10] = [
+        "at_s",
+        "kind",
+        "for_s",
+        "peer",
+        "fresh_disk",
+        "a",
+        "b",
+        "one_way",
+        "groups",
+        "percent",
+    ];
+    let f = item.fields(&ALL)?;
+    let at_ms = at_ms(&f, "at_s", known)?;
+    let kind_node = f.need("kind", "\"kill\"")?;
+    let kind = kind_node.text()?;
+    let names: Vec<&str> = KINDS.iter().map(|(n, _)| *n).collect();
+    let Some((_, own)) = KINDS.iter().find(|(n, _)| *n == kind) else {
+        return Err(kind_node.wrong(format!(
+            "\"{kind}\" is no fault; {}",
+            suggestion(kind, &names)
+        )));
+    };
+    for name in &ALL[2..] {
+        if let Some(n) = f.get(name)
+            && !own.contains(name)
+        {
+            return Err(n.wrong(format!(
+                "a fault of kind {kind} has no such field; it has {}",
+                [&["at_s", "kind"], *own].concat().join(", ")
+            )));
+        }
+    }
+    let peer = || known.peer(f.need("peer", "3")?);
+    let flag = |name| f.get(name).map_or(Ok(false), |n| n.flag());
+    let fresh_disk = flag("fresh_disk")?;
+    let fault = match kind {
+        "kill" => Fault::Kill { peer: peer()? },
+        "kill-computer" => Fault::KillComputer { peer: peer()? },
+        "terminate" => Fault::Terminate { peer: peer()? },
+        "pause" => Fault::Pause { peer: peer()? },
+        "resume" => Fault::Resume { peer: peer()? },
+        "restart" => Fault::Restart {
+            peer: peer()?,
+            fresh_disk,
+        },
+        "cut" => {
+            let (a, b_node) = (known.peer(f.need("a", "1")?)?, f.need("b", "2")?);
+            let b = known.peer(b_node)?;
+            if a == b {
+                return Err(b_node.wrong("both ends are the same peer"));
+            }
+            Fault::Cut {
+                a,
+                b,
+                one_way: flag("one_way")?,
+            }
+        }
+        "partition" => Fault::Partition {
+            groups: groups(f.need("groups", "[[1, 2], [3, 4]]")?, known)?,
+        },
+        "loss" => Fault::Loss {
+            permille: permille(f.need("percent", "10")?)?,
+        },
+        _ => Fault::Heal,
+    };
+    let end = match f.get("for_s") {
+        Some(node) => Some(ending(node, at_ms, &fault, fresh_disk, known)?),
+        None => None,
+    };
+    if let (Some(node), None) = (f.get("fresh_disk"), &end)
+        && kind != "restart"
+    {
+        return Err(node.wrong("says how the peer restarts, so it needs for_s"));
+    }
+    Ok((TimedFault { at_ms, fault }, end))
+}
+
+fn ending(
+    node: &Node<'_>,
+    at_ms: u64,
+    fault: &Fault,
+    fresh_disk: bool,
+    known: &Known<'_>,
+) -> Result<TimedFault, ScenarioError> {
+    let left_s = f64::from(known.max_time_s) - at_ms as f64 / 1000.0;
+    let seconds = node.number(
+        0.001,
+        left_s.max(0.001),
+        "seconds, ending before max_time_s",
+    )?;
+    let fault = match fault {
+        Fault::Kill { peer } | Fault::KillComputer { peer } | Fault::Terminate { peer } => {
+            Fault::Restart {
+                peer: *peer,
+                fresh_disk,
+            }
+        }
+        Fault::Pause { peer } => Fault::Resume { peer: *peer },
+        Fault::Loss { .. } => Fault::Loss {
+            permille: known.loss_permille,
+        },
+        _ => Fault::Heal,
+    };
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "between 0 and max_time_s"
+    )]
+    Ok(TimedFault {
+        at_ms: at_ms + (seconds * 1000.0).round() as u64,
+        fault,
+    })
+}
+
+/// Per cent as thousandths.
+pub(crate) fn permille(node: &Node<'_>) -> Result<u16, ScenarioError> {
+    let percent = node.number(0.0, 100.0, "per cent")?;
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "between 0 and 1000"
+    )]
+    Ok((percent * 10.0).round() as u16)
+}
+
+/// A storm's limits; without the field nothing storms.
+pub(crate) fn storm(
+    node: Option<&Node<'_>>,
+    n_uavs: usize,
+    over_peers: bool,
+) -> Result<StormSpec, ScenarioError> {
+    let calm = StormSpec {
+        max_kills: 0,
+        until: 0.5,
+        max_loss_permille: 0,
+        max_partitions: 0,
+        max_partition_s: 0,
+        max_restarts: 0,
+    };
+    let Some(node) = node else { return Ok(calm) };
+    let f = node.fields(&[
+        "max_kills",
+        "until",
+        "max_loss_percent",
+        "max_partitions",
+        "max_partition_s",
+        "max_restarts",
+    ])?;
+    let mut max_kills = f.small_or("max_kills", 0, 0, u16::MAX, "UAVs")?;
+    if usize::from(max_kills) >= n_uavs {
+        if !over_peers {
+            let at = f.get("max_kills").unwrap_or(node);
+            return Err(at.wrong(format!(
+                "at most {} of {n_uavs} UAVs: one always lives",
+                n_uavs.saturating_sub(1)
+            )));
+        }
+        max_kills = u16::try_from(n_uavs.saturating_sub(1)).unwrap_or(u16::MAX);
+    }
+    Ok(StormSpec {
+        max_kills,
+        until: f.number_or(
+            "until",
+            0.5,
+            0.0,
+            1.0,
+            "as a share of the failure-free makespan",
+        )?,
+        max_loss_permille: f.get("max_loss_percent").map_or(Ok(0), permille)?,
+        max_partitions: f.small_or("max_partitions", 0, 0, 100, "partitions")?,
+        max_partition_s: f.whole_or("max_partition_s", 30, 1, 86_400, "seconds")?,
+        max_restarts: f.small_or("max_restarts", 0, 0, 100, "restarts")?,
+    })
+}
+
+/// Reads a chaos plan: an object with a list `faults`, in the form that scenarios
+/// have. `peers` are the peers of the swarm it is for, if they are known.
+///
+/// # Errors
+/// [`ScenarioError`] names the place.
+pub fn chaos_plan(
+    file: &str,
+    text: &str,
+    peers: Option<&BTreeSet<u16>>,
+) -> Result<Vec<TimedFault>, ScenarioError> {
+    let document = Document::new(file, text);
+    let value = document.parse()?;
+    let root = Node::root(&document, &value);
+    let f = root.fields(&["name", "faults"])?;
+    // A week is longer than any trial.
+    let known = Known {
+        peers,
+        max_time_s: 604_800,
+        loss_permille: 0,
+        lenient: false,
+    };
+    read(
+        f.need("faults", "[{ at_s: 10, kind: \"kill\", peer: 3 }]")?,
+        &known,
+        &mut Vec::new(),
+    )
+}
+
+/// Reads a chaos plan from a file.
+///
+/// # Errors
+/// [`ScenarioError`] names the place.
+pub fn load_chaos_plan(
+    path: &Path,
+    peers: Option<&BTreeSet<u16>>,
+) -> Result<Vec<TimedFault>, ScenarioError> {
+    let file = path.display().to_string();
+    let text = read_text(path).map_err(|problem| ScenarioError::Unreadable {
+        file: file.clone(),
+        problem,
+    })?;
+    chaos_plan(&file, &text, peers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(faults: &str) -> Result<Vec<TimedFault>, String> {
+        let peers = BTreeSet::from([1, 2, 3, 100]);
+        chaos_plan(
+            "c.json5",
+            &format!("{{ faults: [{faults}] }}"),
+            Some(&peers),
+        )
+        .map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn for_s_adds_what_ends_the_fault() {
+        let cases = [
+            (
+                "{at_s:1, kind:'kill-computer', peer:2, for_s:20, fresh_disk:true}",
+                Fault::Restart {
+                    peer: 2,
+                    fresh_disk: true,
+                },
+            ),
+            (
+                "{at_s:1, kind:'pause', peer:2, for_s:20}",
+                Fault::Resume { peer: 2 },
+            ),
+            (
+                "{at_s:1, kind:'partition', groups:[[1,2],[3]], for_s:20}",
+                Fault::Heal,
+            ),
+            ("{at_s:1, kind:'cut', a:1, b:100, for_s:20}", Fault::Heal),
+            (
+                "{at_s:1, kind:'loss', percent:12.5, for_s:20}",
+                Fault::Loss { permille: 0 },
+            ),
+        ];
+        for (text, end) in cases {
+            let faults = plan(text).unwrap();
+            assert_eq!(faults.len(), 2, "{text}");
+            assert_eq!(
+                (faults[1].at_ms, &faults[1].fault),
+                (21_000, &end),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn faults_come_in_the_order_of_time() {
+        let faults = plan("{at_s:9, kind:'heal'}, {at_s:2.5, kind:'kill', peer:1}").unwrap();
+        assert_eq!(
+            faults[0],
+            TimedFault {
+                at_ms: 2500,
+                fault: Fault::Kill { peer: 1 }
+            }
+        );
+    }
+
+    #[test]
+    fn wrong_faults_are_named() {
+        let cases = [
+            (
+                "{at_s:1, kind:'kil', peer:2}",
+                "faults[0].kind: \"kil\" is no fault; did you mean kill?",
+            ),
+            (
+                "{at_s:1, kind:'kill', peer:7}",
+                "faults[0].peer: no peer has the number 7",
+            ),
+            (
+                "{at_s:1, kind:'heal', peer:2}",
+                "faults[0].peer: a fault of kind heal has no such field",
+            ),
+            (
+                "{at_s:-1, kind:'heal'}",
+                "faults[0].at_s: -1 is out of range",
+            ),
+            (
+                "{at_s:1, kind:'partition', groups:[[1],[1]]}",
+                "faults[0].groups[1][0]: peer 1 is named twice",
+            ),
+            (
+                "{at_s:1, kind:'partition', groups:[]}",
+                "faults[0].groups: names no peer",
+            ),
+            ("{at_s:1, kind:'cut', a:1, b:1}", "faults[0].b: both ends"),
+            (
+                "{at_s:1, kind:'kill', peer:1, fresh_disk:true}",
+                "faults[0].fresh_disk: says how",
+            ),
+            (
+                "{kind:'heal'}",
+                "faults[0]: the field faults[0].at_s is missing",
+            ),
+        ];
+        for (text, want) in cases {
+            let e = plan(text).unwrap_err();
+            assert!(
+                e.starts_with("c.json5:1:") && e.contains(want),
+                "{text}: {e}"
+            );
+        }
+    }
+}

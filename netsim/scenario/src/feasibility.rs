@@ -1,0 +1,443 @@
+//! Whether a scenario can succeed at all: turn radius, footprint, endurance, zones,
+//! faults. Estimates only; the world decides.
+
+use crate::error::{Finding, Severity};
+use crate::resolve::bounds;
+use skein_netsim::chaos::Fault;
+use skein_netsim::spec::{Spec, UavSpec};
+use skein_peer::Mission;
+use skein_peer::mission::point_m;
+use skein_peer::plan::Ground;
+use skein_planning::coverage::area::backtracking::{Division, RingCell, Robot, divide};
+use skein_planning::coverage::area::{CellId, CoverageLoop, Direction, Grid};
+use skein_planning::frame::Point;
+use skein_planning::geometry::Polygon;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Endurance, in flights round the whole loop, below which the death of some UAVs
+/// may leave cells that nobody has the fuel for.
+const COMFORTABLE_LOOPS: f64 = 2.5;
+
+/// Turning round on the spot, in turn radii: the shortest curve from a pose to its
+/// reverse is 7/3 of a half circle.
+const TURN_ROUND_RADII: f64 = 7.0 / 3.0 * core::f64::consts::PI;
+
+/// Checks everything that can be told before a run.
+///
+/// A scenario that came from a file was checked when it was read; this is for those
+/// that were built otherwise.
+#[must_use]
+pub fn feasibility(spec: &Spec) -> Vec<Finding> {
+    match spec.mission.ground() {
+        Ok(ground) => with_ground(spec, Ok(&ground)),
+        Err(e) => with_ground(spec, Err(&e)),
+    }
+}
+
+pub(crate) fn with_ground(spec: &Spec, ground: Result<&Ground, &str>) -> Vec<Finding> {
+    let mut out = Vec::new();
+    fleet(spec, &mut out);
+    faults(spec, &mut out);
+    if spec.ground.is_none() {
+        let text = "there is no ground station: nobody hears the swarm when it has finished; add ground: { east_m, north_m }";
+        out.push(Finding::new(Severity::Warning, "ground", text));
+    }
+    match ground {
+        Ok(g) => on_loop(spec, g, &mut out),
+        Err(e) => {
+            let (field, problem) = loop_trouble(&spec.mission, e);
+            out.push(Finding::new(Severity::Error, &field, problem));
+        }
+    }
+    out
+}
+
+/// The field to blame and the words, when a mission has no coverage loop.
+pub(crate) fn loop_trouble(mission: &Mission, e: &str) -> (String, String) {
+    let field = if mission.turn_radius_mm > mission.lane_spacing_mm / 2 {
+        "lanes.spacing_m"
+    } else if e.contains("footprint") {
+        "airframes"
+    } else if e.contains("launch point") {
+        "base"
+    } else if e.contains("zone") {
+        "no_fly"
+    } else {
+        "lanes"
+    };
+    (field.to_owned(), e.to_owned())
+}
+
+fn fleet(spec: &Spec, out: &mut Vec<Finding>) {
+    let mut error =
+        |field: &str, text: String| out.push(Finding::new(Severity::Error, field, text));
+    if spec.uavs.is_empty() {
+        error("fleet", "there is no UAV; expected at least one".to_owned());
+    }
+    let mut ids = BTreeSet::new();
+    for (i, id) in spec
+        .uavs
+        .iter()
+        .map(|u| u.id)
+        .chain(spec.ground.as_ref().map(|g| g.id))
+        .enumerate()
+    {
+        if !ids.insert(id) {
+            error(
+                &format!("fleet.uavs[{i}].id"),
+                format!("the number {id} is taken twice; every peer has its own"),
+            );
+        }
+    }
+    for (i, u) in spec.uavs.iter().enumerate() {
+        if u.airframe.endurance_s <= u.airframe.reserve_s || !u.airframe.endurance_s.is_finite() {
+            let text = format!(
+                "UAV {} has no endurance beyond its reserve of {} s",
+                u.id, u.airframe.reserve_s
+            );
+            error(&format!("fleet.uavs[{i}].airframe"), text);
+        }
+    }
+}
+
+/// Peers that a fault names.
+fn named(fault: &Fault) -> Vec<u16> {
+    match fault {
+        Fault::Kill { peer }
+        | Fault::KillComputer { peer }
+        | Fault::Terminate { peer }
+        | Fault::Pause { peer }
+        | Fault::Resume { peer }
+        | Fault::Restart { peer, .. } => vec![*peer],
+        Fault::Cut { a, b, .. } => vec![*a, *b],
+        Fault::Partition { groups } => groups.concat(),
+        Fault::Heal | Fault::Loss { .. } => Vec::new(),
+    }
+}
+
+fn faults(spec: &Spec, out: &mut Vec<Finding>) {
+    let ids: BTreeSet<u16> = spec
+        .uavs
+        .iter()
+        .map(|u| u.id)
+        .chain(spec.ground.as_ref().map(|g| g.id))
+        .collect();
+    let mut down: BTreeSet<u16> = BTreeSet::new();
+    for f in &spec.faults {
+        // The list of the file is expanded and sorted by now, so its place is all one can name.
+        let at_s = f.at_ms / 1000;
+        let mut tell = |severity, text: String| out.push(Finding::new(severity, "faults", text));
+        if f.at_ms > u64::from(spec.max_time_s) * 1000 {
+            let text = format!(
+                "the fault at {at_s} s is after the end of the run at {} s",
+                spec.max_time_s
+            );
+            tell(Severity::Error, text);
+        }
+        if let Some(id) = named(&f.fault).iter().find(|id| !ids.contains(id)) {
+            tell(
+                Severity::Error,
+                format!("the fault at {at_s} s names a peer {id} that is not there"),
+            );
+        }
+        match &f.fault {
+            Fault::Kill { peer }
+            | Fault::KillComputer { peer }
+            | Fault::Terminate { peer }
+            | Fault::Pause { peer } => {
+                down.insert(*peer);
+            }
+            Fault::Restart { peer, .. } | Fault::Resume { peer } if !down.remove(peer) => {
+                let text = format!(
+                    "peer {peer} is neither down nor paused at {at_s} s: nothing will happen"
+                );
+                tell(Severity::Warning, text);
+            }
+            _ => {}
+        }
+    }
+    if !spec.uavs.is_empty() && spec.uavs.iter().all(|u| down.contains(&u.id)) {
+        let text = "in the end no UAV is left to finish the mission; at least one must live";
+        out.push(Finding::new(Severity::Error, "faults", text));
+    }
+}
+
+fn on_loop(spec: &Spec, ground: &Ground, out: &mut Vec<Finding>) {
+    let summary = summary(spec, ground);
+    if summary.coverable_share < spec.min_coverable {
+        let text = format!(
+            "only {:.1} % of the area can be covered, {:.1} % are asked for: {}",
+            summary.coverable_share * 100.0,
+            spec.min_coverable * 100.0,
+            summary.reasons()
+        );
+        out.push(Finding::new(Severity::Error, "checks.min_coverable", text));
+    }
+    let usable_m: f64 = spec.uavs.iter().map(reach_m).sum();
+    if usable_m < summary.loop_m {
+        let text = format!(
+            "all UAVs together fly {:.1} km before their reserve, the loop has {:.1} km",
+            usable_m / 1000.0,
+            summary.loop_m / 1000.0
+        );
+        out.push(Finding::new(Severity::Error, "airframes", text));
+    } else if !summary.unassigned_cells.is_empty() {
+        let text = format!(
+            "{} cells are beyond the endurance of every UAV that could serve them",
+            summary.unassigned_cells.len()
+        );
+        out.push(Finding::new(Severity::Error, "airframes", text));
+    }
+    let weakest = spec
+        .uavs
+        .iter()
+        .map(|u| reach_m(u) / summary.loop_m)
+        .fold(f64::INFINITY, f64::min);
+    if weakest < COMFORTABLE_LOOPS {
+        let text = format!(
+            "the weakest UAV flies {weakest:.1} times the loop; with less than {COMFORTABLE_LOOPS} the last survivor may be unable to finish"
+        );
+        out.push(Finding::new(Severity::Warning, "airframes", text));
+    }
+    if summary.makespan_s > f64::from(spec.max_time_s) {
+        let text = format!(
+            "covering takes about {:.0} s without any failure, the run ends at {} s",
+            summary.makespan_s, spec.max_time_s
+        );
+        out.push(Finding::new(Severity::Error, "max_time_s", text));
+    }
+    launches(spec, ground, out);
+}
+
+fn launches(spec: &Spec, ground: &Ground, out: &mut Vec<Finding>) {
+    let clearance_m = f64::from(spec.mission.clearance_mm) / 1000.0;
+    for (i, u) in spec.uavs.iter().enumerate() {
+        let d = ground.router.zones().distance_m(u.launch.position());
+        // A launch pose on the loop keeps the clearance but for the last rounding.
+        if d < clearance_m - 0.01 {
+            let text = format!(
+                "starts {d:.1} m from a no-fly zone; expected at least the clearance of {clearance_m:.1} m"
+            );
+            out.push(Finding::new(
+                Severity::Error,
+                &format!("fleet.uavs[{i}].launch"),
+                text,
+            ));
+        }
+    }
+}
+
+/// How far a UAV flies at cruise before its reserve, metres.
+fn reach_m(u: &UavSpec) -> f64 {
+    (u.airframe.endurance_s - u.airframe.reserve_s) * u.airframe.cruise_mps
+}
+
+/// What a scenario amounts to, before it is flown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// The area, square metres.
+    pub area_m2: f64,
+    /// Cells on the loop.
+    pub cells: usize,
+    /// Cells on the loop that are seen by an excursion from it.
+    pub excursions: usize,
+    /// Cells that touch the area and cannot be seen, by reason.
+    pub uncoverable: BTreeMap<String, Vec<CellId>>,
+    /// Share of the area that can be seen, 0 to 1.
+    pub coverable_share: f64,
+    /// Length of the loop with its excursions, metres.
+    pub loop_m: f64,
+    /// Time to cover without any failure, by the planner's own division, seconds.
+    pub makespan_s: f64,
+    /// Cells that no UAV has the endurance for.
+    pub unassigned_cells: Vec<u16>,
+}
+
+impl Summary {
+    /// The reasons for uncoverable cells in one line.
+    #[must_use]
+    pub fn reasons(&self) -> String {
+        let one =
+            |(reason, cells): (&String, &Vec<CellId>)| format!("{} cells: {reason}", cells.len());
+        self.uncoverable
+            .iter()
+            .map(one)
+            .collect::<Vec<_>>()
+            .join("; ")
+    }
+}
+
+/// Adds up what a scenario amounts to.
+#[must_use]
+pub fn summary(spec: &Spec, ground: &Ground) -> Summary {
+    let the_loop = &ground.coverage_loop;
+    let area_m2 = ring_area_m2(
+        &spec
+            .mission
+            .area
+            .iter()
+            .copied()
+            .map(point_m)
+            .collect::<Vec<_>>(),
+    );
+    let mut uncoverable: BTreeMap<String, Vec<CellId>> = BTreeMap::new();
+    let mut lost_m2 = 0.0;
+    let area: Vec<Point> = spec.mission.area.iter().copied().map(point_m).collect();
+    for (cell, reason) in the_loop.uncoverable() {
+        uncoverable.entry(reason.clone()).or_default().push(*cell);
+        lost_m2 += overlap_m2(&area, &the_loop.grid(), *cell);
+    }
+    let division = failure_free(spec, the_loop);
+    Summary {
+        area_m2,
+        cells: the_loop.len(),
+        excursions: the_loop.cells().iter().filter(|c| c.excursion).count(),
+        uncoverable,
+        coverable_share: (1.0 - lost_m2 / area_m2).clamp(0.0, 1.0),
+        loop_m: the_loop
+            .cells()
+            .iter()
+            .map(|c| f64::from(c.service_mm) / 1000.0)
+            .sum(),
+        makespan_s: f64::from(division.makespan_ms) / 1000.0,
+        unassigned_cells: division.unassigned,
+    }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "saturates, which is as good as infinite here"
+)]
+fn whole(x: f64) -> u32 {
+    x.round() as u32
+}
+
+/// The division that the swarm would find with everybody alive and in contact.
+fn failure_free(spec: &Spec, the_loop: &CoverageLoop) -> Division {
+    let ring: Vec<RingCell> = the_loop
+        .cells()
+        .iter()
+        .map(|c| RingCell {
+            service_mm: c.service_mm,
+            travel_mm: c.travel_mm,
+            open: true,
+        })
+        .collect();
+    let robots: Vec<Robot> = spec.uavs.iter().map(|u| robot(u, the_loop)).collect();
+    divide(&ring, &robots)
+}
+
+fn robot(u: &UavSpec, the_loop: &CoverageLoop) -> Robot {
+    let here = u.launch.position();
+    let gap_m = |i: usize| (the_loop.boundary(i).position() - here).norm();
+    let anchor = (0..the_loop.len())
+        .min_by(|a, b| gap_m(*a).total_cmp(&gap_m(*b)))
+        .unwrap_or(0);
+    let ahead = the_loop
+        .boundary(anchor)
+        .direction()
+        .dot(&u.launch.direction())
+        >= 0.0;
+    let v = u.airframe.cruise_mps;
+    let release_s = gap_m(anchor) / v;
+    let usable_s = u.airframe.endurance_s - u.airframe.reserve_s - release_s;
+    Robot {
+        anchor: u16::try_from(anchor).unwrap_or(0),
+        id: u.id,
+        heading: if ahead {
+            Direction::Forward
+        } else {
+            Direction::Backward
+        },
+        release_ms: whole(release_s * 1000.0),
+        speed_mmps: whole(v * 1000.0).max(1),
+        turn_ms: whole(TURN_ROUND_RADII * u.airframe.min_turn_radius_m() / v * 1000.0),
+        endurance_ms: whole(usable_s.max(0.0) * 1000.0),
+    }
+}
+
+fn ring_area_m2(ring: &[Point]) -> f64 {
+    let n = ring.len();
+    let cross = |i: usize| {
+        let (a, b) = (ring[i], ring[(i + 1) % n]);
+        a.x * b.y - b.x * a.y
+    };
+    ((0..n).map(cross).sum::<f64>() / 2.0).abs()
+}
+
+/// Area that a cell shares with the ring: the ring clipped by the cell's four sides
+/// (Sutherland-Hodgman; for concave rings its bridges have no area).
+fn overlap_m2(ring: &[Point], grid: &Grid, cell: CellId) -> f64 {
+    let [low, _, high, _] = grid.corners(cell);
+    let sides: [(bool, f64, f64); 4] = [
+        (true, low.x, 1.0),
+        (true, high.x, -1.0),
+        (false, low.y, 1.0),
+        (false, high.y, -1.0),
+    ];
+    let mut ring = ring.to_vec();
+    for (is_x, at, sign) in sides {
+        let depth = |p: &Point| sign * (if is_x { p.x } else { p.y } - at);
+        let mut out = Vec::with_capacity(ring.len() + 4);
+        for i in 0..ring.len() {
+            let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);
+            let (da, db) = (depth(&a), depth(&b));
+            if da >= 0.0 {
+                out.push(a);
+            }
+            if (da >= 0.0) != (db >= 0.0) {
+                let t = da / (da - db);
+                out.push(Point::new(a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)));
+            }
+        }
+        ring = out;
+    }
+    if ring.len() < 3 {
+        0.0
+    } else {
+        ring_area_m2(&ring)
+    }
+}
+
+/// Width and height of the area's bounding box, metres.
+#[must_use]
+pub fn extent_m(spec: &Spec) -> (f64, f64) {
+    match Polygon::new(spec.mission.area.iter().copied().map(point_m).collect()) {
+        Ok(p) => {
+            let (low, high) = bounds(&p);
+            (high.x - low.x, high.y - low.y)
+        }
+        Err(_) => (0.0, 0.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_are_clipped_by_the_area() {
+        let grid = Grid {
+            lane_spacing_m: 10.0,
+        };
+        let p = Point::new;
+        let triangle = [p(0.0, 0.0), p(20.0, 0.0), p(0.0, 20.0)];
+        let cases = [
+            ((0, 0), 100.0),
+            ((1, 0), 50.0),
+            ((1, 1), 0.0),
+            ((5, 5), 0.0),
+            ((-1, 0), 0.0),
+        ];
+        for ((col, row), want) in cases {
+            let got = overlap_m2(&triangle, &grid, CellId { col, row });
+            assert!((got - want).abs() < 1e-9, "{col},{row}: {got}");
+        }
+        let total: f64 = (0..2)
+            .flat_map(|c| (0..2).map(move |r| CellId { col: c, row: r }))
+            .map(|c| overlap_m2(&triangle, &grid, c))
+            .sum();
+        assert!((total - ring_area_m2(&triangle)).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,150 @@
+//! `skein check`: what is wrong with a scenario before it is flown, and what it amounts to.
+
+use crate::exit;
+use clap::{Args, ValueEnum};
+use skein_scenario::{Overrides, Scenario, Summary, extent_m, summary};
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+/// Cells that are listed for each reason; the rest is counted.
+const LISTED_CELLS: usize = 12;
+
+/// Checks a scenario: every field, and whether the mission can be flown at all.
+///
+/// What is wrong is named by file, line, column and field (exit code 3). Otherwise
+/// prints what the scenario amounts to: area, cells, zones, length of the loop,
+/// time to cover it, and everything worth a warning.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// A scenario file or the name of a built-in scenario; without it the default one.
+    pub scenario: Option<String>,
+    /// Checks with this many UAVs instead of the scenario's number.
+    #[arg(long, value_name = "N")]
+    pub peers: Option<u16>,
+    /// How the result is printed.
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+}
+
+/// Forms of the result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For people.
+    Text,
+    /// One JSON object.
+    Json,
+}
+
+/// Runs the verb: the result on stdout, complaints on stderr.
+///
+/// # Errors
+/// Only when stdout cannot be written.
+pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
+    let over = Overrides { peers: args.peers, ..Overrides::default() };
+    let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {
+        Ok(s) => s,
+        Err(e) => {
+            match args.format {
+                Format::Text => eprintln!("error: {e}"),
+                Format::Json => println!("{}", serde_json::json!({ "ok": false, "error": e.to_string() })),
+            }
+            return Ok(ExitCode::from(exit::CONFIG_INVALID));
+        }
+    };
+    let total = summary(&scenario.spec, &scenario.ground);
+    match args.format {
+        Format::Text => print!("{}", text(&scenario, &total)),
+        Format::Json => println!("{}", json(&scenario, &total)),
+    }
+    Ok(ExitCode::from(exit::OK))
+}
+
+fn text(scenario: &Scenario, total: &Summary) -> String {
+    let spec = &scenario.spec;
+    let (width_m, height_m) = extent_m(spec);
+    let mission = &spec.mission;
+    let lane_m = f64::from(mission.lane_spacing_mm) / 1000.0;
+    let mut out = String::new();
+    let mut line = |name: &str, text: String| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(out, "{name:<12}{text}");
+    };
+    line("scenario", format!("{}, ok", spec.name));
+    line(
+        "area",
+        format!(
+            "{:.3} km² in {width_m:.0} x {height_m:.0} m, {:.2} % coverable",
+            total.area_m2 / 1e6,
+            total.coverable_share * 100.0
+        ),
+    );
+    line(
+        "zones",
+        format!(
+            "{} no-fly, clearance {:.1} m; {} buildings block radio",
+            spec.zones.len(),
+            f64::from(mission.clearance_mm) / 1000.0,
+            spec.buildings.len()
+        ),
+    );
+    line("cells", format!("{} of {lane_m} m on the loop, {} of them seen by excursions", total.cells, total.excursions));
+    for (reason, cells) in &total.uncoverable {
+        let names: Vec<String> = cells.iter().take(LISTED_CELLS).map(|c| format!("({},{})", c.col, c.row)).collect();
+        let more = if cells.len() > LISTED_CELLS { " ..." } else { "" };
+        line("uncoverable", format!("{} cells, {reason}: {}{more}", cells.len(), names.join(" ")));
+    }
+    line("loop", format!("{:.1} km", total.loop_m / 1000.0));
+    let ground = spec.ground.as_ref().map_or("no ground station".to_owned(), |g| format!("ground station {}", g.id));
+    let heights = spec.uavs.iter().map(|u| u.height_m);
+    line(
+        "fleet",
+        format!(
+            "{} UAVs at {:.0} to {:.0} m, {ground}",
+            spec.uavs.len(),
+            heights.clone().fold(f64::INFINITY, f64::min),
+            heights.fold(0.0, f64::max)
+        ),
+    );
+    line("faults", format!("{} at stated times, up to {} kills in a storm", spec.faults.len(), spec.storm.max_kills));
+    line("makespan", format!("about {:.0} s without failures", total.makespan_s));
+    for finding in &scenario.findings {
+        let _ = writeln!(out, "{finding}");
+    }
+    out
+}
+
+fn json(scenario: &Scenario, total: &Summary) -> serde_json::Value {
+    let spec = &scenario.spec;
+    let uncoverable: serde_json::Map<String, serde_json::Value> = total
+        .uncoverable
+        .iter()
+        .map(|(reason, cells)| (reason.clone(), cells.iter().map(|c| vec![c.col, c.row]).collect::<Vec<_>>().into()))
+        .collect();
+    let findings: Vec<serde_json::Value> = scenario
+        .findings
+        .iter()
+        .map(|f| {
+            serde_json::json!({
+                "severity": f.severity.to_string(),
+                "place": f.place.as_ref().map(ToString::to_string),
+                "field": f.field,
+                "problem": f.problem,
+            })
+        })
+        .collect();
+    serde_json::json!({
+        "ok": true,
+        "scenario": spec.name,
+        "area_m2": total.area_m2,
+        "coverable_share": total.coverable_share,
+        "zones": spec.zones.len(),
+        "buildings": spec.buildings.len(),
+        "cells": total.cells,
+        "excursions": total.excursions,
+        "uncoverable": uncoverable,
+        "loop_m": total.loop_m,
+        "uavs": spec.uavs.len(),
+        "makespan_s": total.makespan_s,
+        "findings": findings,
+    })
+}
