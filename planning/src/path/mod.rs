@@ -65,8 +65,12 @@ impl Router {
     /// # Errors
     /// [`RouteError`]; a curve that fails its check is refused, never clipped.
     pub fn route(&self, from: Pose, to: Pose) -> Result<Curve, RouteError> {
-        let _ = (from, to);
-        todo!("planning helper")
+        let c = self.limits.clearance_m;
+        if self.zones.distance_m(to.position()) < c {
+            return Err(RouteError::GoalInZone);
+        }
+        let words = crate::trajectory::dubins::all(from, to, self.limits.turn_radius_m);
+        words.into_iter().find(|w| self.zones.is_clear(w, c)).ok_or(RouteError::NoRoute)
     }
 
     /// As [`Router::route`], for a goal whose heading does not matter.
@@ -74,7 +78,15 @@ impl Router {
     /// # Errors
     /// [`RouteError`].
     pub fn route_to_point(&self, from: Pose, to: Point) -> Result<Curve, RouteError> {
-        let _ = (from, to);
-        todo!("planning helper")
+        let mut best: Option<Curve> = None;
+        for k in 0..16 {
+            let heading_rad = f64::from(k) * crate::math::TAU / 16.0;
+            if let Ok(c) = self.route(from, Pose::new(to, heading_rad))
+                && best.as_ref().is_none_or(|b| c.length_m() < b.length_m())
+            {
+                best = Some(c);
+            }
+        }
+        best.ok_or(RouteError::NoRoute)
     }
 }

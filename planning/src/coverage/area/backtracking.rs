@@ -100,6 +100,244 @@ pub struct Division {
 /// round the ring are few.
 #[must_use]
 pub fn divide(ring: &[RingCell], robots: &[Robot]) -> Division {
-    let _ = (ring, robots);
-    todo!("planning helper")
+    let mut order: Vec<Robot> = robots.to_vec();
+    order.sort_unstable_by_key(|r| (r.anchor, r.id));
+    let solver = Solver::new(ring, &order);
+    let (extents, unassigned) = solver.solve();
+    let mut sections: Vec<Section> = order
+        .iter()
+        .enumerate()
+        .map(|(i, r)| {
+            let (legs, finish_ms) = solver.legs(i, extents[i].0, extents[i].1);
+            Section { id: r.id, legs, finish_ms }
+        })
+        .collect();
+    let makespan_ms = sections.iter().filter(|s| !s.legs.is_empty()).map(|s| s.finish_ms).max().unwrap_or(0);
+    sections.sort_by_key(|s| s.id);
+    Division { sections, makespan_ms, unassigned }
+}
+
+/// The ring unrolled three times, with prefix sums of what is flown.
+struct Solver<'a> {
+    ring: &'a [RingCell],
+    robots: &'a [Robot],
+    serve_mm: Vec<u64>,
+    travel_mm: Vec<u64>,
+    /// Cells from a place back to the last open one before it, by place.
+    last_open: Vec<usize>,
+    next_open: Vec<usize>,
+}
+
+impl<'a> Solver<'a> {
+    fn new(ring: &'a [RingCell], robots: &'a [Robot]) -> Self {
+        let n = ring.len();
+        let (mut serve_mm, mut travel_mm) = (vec![0], vec![0]);
+        let (mut last_open, mut next_open) = (vec![0], vec![3 * n; 3 * n + 1]);
+        for i in 0..3 * n {
+            let c = ring[i % n];
+            let serve = if c.open { c.service_mm } else { c.travel_mm };
+            serve_mm.push(serve_mm[i] + u64::from(serve));
+            travel_mm.push(travel_mm[i] + u64::from(c.travel_mm));
+            last_open.push(if c.open { i + 1 } else { last_open[i] });
+        }
+        for i in (0..3 * n).rev() {
+            next_open[i] = if ring[i % n].open { i } else { next_open[i + 1] };
+        }
+        Self { ring, robots, serve_mm, travel_mm, last_open, next_open }
+    }
+
+    /// Cells between this robot's anchor and the next one's.
+    fn gap(&self, i: usize) -> usize {
+        let n = self.ring.len();
+        let k = self.robots.len();
+        let (a, b) = (usize::from(self.robots[i].anchor), usize::from(self.robots[(i + 1) % k].anchor));
+        if i + 1 == k { n - (a - b) } else { b - a }
+    }
+
+    /// How far a share of `extent` cells really reaches, and what that costs:
+    /// (cells, mm served going out, mm travelled coming back).
+    fn reach(&self, i: usize, extent: usize, right: bool) -> (usize, u64, u64) {
+        let at = self.ring.len() + usize::from(self.robots[i].anchor);
+        let (from, to) = if right {
+            (at, self.last_open[at + extent].max(at))
+        } else {
+            (self.next_open[at - extent].min(at), at)
+        };
+        (to - from, self.serve_mm[to] - self.serve_mm[from], self.travel_mm[to] - self.travel_mm[from])
+    }
+
+    /// The least time after its release in which robot `i` serves both shares, and
+    /// whether it goes right first.
+    fn time_ms(&self, i: usize, left: usize, right: usize) -> (u64, bool) {
+        let r = &self.robots[i];
+        let ms = |mm: u64| (mm * 1000).div_ceil(u64::from(r.speed_mmps.max(1)));
+        let (l, l_out, l_back) = self.reach(i, left, false);
+        let (g, r_out, r_back) = self.reach(i, right, true);
+        let turn = u64::from(r.turn_ms);
+        let away = |forward: bool| if (r.heading == Direction::Forward) == forward { 0 } else { turn };
+        let right_first = match (l, g) {
+            (0, 0) => 0,
+            (0, _) => away(true) + ms(r_out),
+            (_, 0) => u64::MAX,
+            _ => away(true) + ms(r_out) + turn + ms(r_back) + ms(l_out),
+        };
+        let left_first = match (l, g) {
+            (0, _) => u64::MAX,
+            (_, 0) => away(false) + ms(l_out),
+            _ => away(false) + ms(l_out) + turn + ms(l_back) + ms(r_out),
+        };
+        if right_first <= left_first { (right_first, true) } else { (left_first, false) }
+    }
+
+    fn fits(&self, i: usize, left: usize, right: usize, limit_ms: u64) -> bool {
+        let r = &self.robots[i];
+        let t = self.time_ms(i, left, right).0;
+        t == 0 || (t <= u64::from(r.endurance_ms) && t + u64::from(r.release_ms) <= limit_ms)
+    }
+
+    fn most(&self, cap: usize, fits: impl Fn(usize) -> bool) -> usize {
+        let (mut good, mut bad) = (0, cap + 1);
+        while bad - good > 1 {
+            let middle = good.midpoint(bad);
+            if fits(middle) { good = middle } else { bad = middle }
+        }
+        good
+    }
+
+    /// The least left shares with which everything is served in time, if any.
+    fn feasible(&self, limit_ms: u64) -> Option<Vec<(usize, usize)>> {
+        let k = self.robots.len();
+        let mut first_left = 0;
+        loop {
+            let mut left = first_left;
+            let mut extents = Vec::with_capacity(k);
+            for i in 0..k {
+                if !self.fits(i, left, 0, limit_ms) {
+                    return None;
+                }
+                let gap = self.gap(i);
+                let cap = if k == 1 { gap - left } else { gap };
+                let right = self.most(cap, |x| self.fits(i, left, x, limit_ms));
+                extents.push((left, right));
+                left = gap - right;
+            }
+            if k == 1 {
+                left = self.ring.len() - extents[0].1;
+            }
+            if left <= first_left {
+                if k > 1 {
+                    extents[0].0 = left;
+                }
+                return Some(extents);
+            }
+            first_left = left;
+            if first_left > self.gap(k - 1) {
+                return None;
+            }
+        }
+    }
+
+    fn solve(&self) -> (Vec<(usize, usize)>, Vec<u16>) {
+        let open: Vec<u16> = (0u16..).zip(self.ring).filter(|(_, c)| c.open).map(|(i, _)| i).collect();
+        if self.robots.is_empty() {
+            return (Vec::new(), open);
+        }
+        if open.is_empty() {
+            return (vec![(0, 0); self.robots.len()], Vec::new());
+        }
+        const FOREVER_MS: u64 = 1 << 40;
+        if self.feasible(FOREVER_MS).is_none() {
+            return self.most_cells(&open);
+        }
+        let (mut bad, mut good) = (0, 1u64 << 40);
+        while good - bad > 1 {
+            let middle = good.midpoint(bad);
+            if self.feasible(middle).is_some() { good = middle } else { bad = middle }
+        }
+        (self.feasible(good).unwrap_or_default(), Vec::new())
+    }
+
+    /// Too little endurance: each robot in turn takes what it can of what is left.
+    fn most_cells(&self, open: &[u16]) -> (Vec<(usize, usize)>, Vec<u16>) {
+        let k = self.robots.len();
+        let n = self.ring.len();
+        let mut extents: Vec<(usize, usize)> = Vec::new();
+        let mut served = vec![false; n];
+        let mut left_over = 0;
+        for i in 0..k {
+            let gap = self.gap(i);
+            let left = self.most(left_over, |x| self.fits(i, x, 0, u64::MAX >> 1));
+            let cap = if k == 1 { gap - left } else { gap };
+            let right = self.most(cap, |x| self.fits(i, left, x, u64::MAX >> 1));
+            extents.push((left, right));
+            left_over = gap - right;
+            let at = n + usize::from(self.robots[i].anchor);
+            for c in at - left..at + right {
+                served[c % n] = true;
+            }
+        }
+        let rest = open.iter().copied().filter(|c| !served[usize::from(*c)]).collect();
+        (extents, rest)
+    }
+
+    fn legs(&self, i: usize, left: usize, right: usize) -> (Vec<Leg>, u32) {
+        let n = self.ring.len();
+        let r = &self.robots[i];
+        let at = n + usize::from(r.anchor);
+        let (l, g) = (self.reach(i, left, false).0, self.reach(i, right, true).0);
+        let (t, right_first) = self.time_ms(i, left, right);
+        let cell = |x: usize| u16::try_from(x % n.max(1)).unwrap_or(0);
+        let count = |x: usize| u16::try_from(x).unwrap_or(u16::MAX);
+        let mut legs = Vec::new();
+        if g > 0 {
+            let first = self.next_open[at];
+            legs.push(Leg { first: cell(first), count: count(at + g - first), direction: Direction::Forward });
+        }
+        if l > 0 {
+            let last = self.last_open[at];
+            let leg = Leg { first: cell(last - 1), count: count(last - (at - l)), direction: Direction::Backward };
+            if right_first { legs.push(leg) } else { legs.insert(0, leg) }
+        }
+        let finish = if legs.is_empty() { 0 } else { u64::from(r.release_ms) + t };
+        (legs, u32::try_from(finish).unwrap_or(u32::MAX))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ring(n: usize) -> Vec<RingCell> {
+        vec![RingCell { service_mm: 1000, travel_mm: 1000, open: true }; n]
+    }
+
+    fn robot(id: u16, anchor: u16) -> Robot {
+        Robot {
+            anchor,
+            id,
+            heading: Direction::Forward,
+            release_ms: 0,
+            speed_mmps: 1000,
+            turn_ms: 0,
+            endurance_ms: 1_000_000,
+        }
+    }
+
+    #[test]
+    fn contiguous_starts_take_half_the_rest() {
+        for k in 1..5u16 {
+            let robots: Vec<Robot> = (0..k).map(|i| robot(i, i)).collect();
+            let d = divide(&ring(40), &robots);
+            let mut seen = vec![0; 40];
+            for s in &d.sections {
+                for l in &s.legs {
+                    for c in l.cells(40) {
+                        seen[usize::from(c)] += 1;
+                    }
+                }
+            }
+            assert!(seen.iter().all(|x| *x == 1), "{k}: {d:?}");
+            assert!(d.unassigned.is_empty());
+        }
+    }
 }
