@@ -1,0 +1,53 @@
+//! What the world records: facts, not beliefs.
+
+use super::judge::Approach;
+use super::motion::kinematic::Loss;
+use skein_planning::coverage::area::CellId;
+use skein_planning::frame::Point;
+
+/// Something that truly happened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fact {
+    /// A UAV was the first to see a whole cell.
+    Seen {
+        /// When, milliseconds.
+        at_ms: u64,
+        /// Who.
+        uav: u16,
+        /// Which cell.
+        cell: CellId,
+    },
+    /// A UAV flew into a no-fly zone.
+    ZoneEntry {
+        /// When, milliseconds.
+        at_ms: u64,
+        /// Who.
+        uav: u16,
+        /// Which zone, by its place in the scenario.
+        zone: usize,
+        /// Where, to within a chord of the arc.
+        place: Point,
+    },
+    /// Two airborne UAVs came closer than the least separation.
+    TooClose(Approach),
+    /// An airframe is gone.
+    Lost {
+        /// When, milliseconds.
+        at_ms: u64,
+        /// Who.
+        uav: u16,
+        /// Why.
+        cause: Loss,
+        /// Where.
+        place: Point,
+    },
+    /// An airframe began or ended to loiter on its own.
+    Failsafe {
+        /// When the world noticed, milliseconds.
+        at_ms: u64,
+        /// Who.
+        uav: u16,
+        /// Whether it began.
+        on: bool,
+    },
+}

@@ -1,0 +1,533 @@
+//! What truly happened: cells seen, zones entered, separation (D2.7 §3.6, §2.3.1).
+//!
+//! The judge follows the flown pieces themselves, not reports, and uses only the
+//! world's own geometry. The camera looks straight down and stays level in turns.
+
+use super::fact::Fact;
+use super::flat::{Bounds, point_ring_m, segment_ring_m};
+use super::motion::Piece;
+use super::obstacles::Place;
+use super::survey::Survey;
+use skein_planning::airframe::Airframe;
+use skein_planning::coverage::area::CellId;
+use skein_planning::frame::Pose;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The camera looks at least once per this length of flight, metres.
+const LOOK_M: f64 = 1.0;
+/// Arcs are tested as chords no farther than this from them, metres; distances to
+/// zones are exact to this much.
+const SAGITTA_M: f64 = 0.01;
+
+/// Who saw a cell first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sighting {
+    /// When, milliseconds.
+    pub at_ms: u64,
+    /// Who.
+    pub uav: u16,
+}
+
+/// The closest approach of two airborne UAVs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Approach {
+    /// When, milliseconds.
+    pub at_ms: u64,
+    /// One of them.
+    pub a: u16,
+    /// The other.
+    pub b: u16,
+    /// Distance in space, metres.
+    pub distance_m: f64,
+}
+
+/// Follows all airframes and keeps the score.
+#[derive(Clone, Debug)]
+pub struct Judge {
+    survey: Arc<Survey>,
+    seen: Vec<Option<Sighting>>,
+    n_covered: usize,
+    n_coverable: usize,
+    entries: usize,
+    /// By UAV: for every zone whether the UAV was inside it at the end of its last piece.
+    inside: BTreeMap<u16, Vec<bool>>,
+    /// By UAV: the least distance to any zone so far.
+    near_m: BTreeMap<u16, f64>,
+    closest: Option<Approach>,
+    too_close: BTreeMap<(u16, u16), bool>,
+}
+
+impl Judge {
+    /// A judge who has seen nothing yet.
+    #[must_use]
+    pub fn new(survey: Arc<Survey>) -> Self {
+        Self {
+            seen: vec![None; survey.cells().len()],
+            n_covered: 0,
+            n_coverable: survey.n_coverable(),
+            entries: 0,
+            inside: BTreeMap::new(),
+            near_m: BTreeMap::new(),
+            closest: None,
+            too_close: BTreeMap::new(),
+            survey,
+        }
+    }
+
+    /// The cells and which of them can be seen.
+    #[must_use]
+    pub fn survey(&self) -> &Survey {
+        &self.survey
+    }
+
+    /// Who saw a cell first and when, if anybody did.
+    #[must_use]
+    pub fn sighting(&self, cell: CellId) -> Option<Sighting> {
+        self.seen[self.survey.index_of(cell)?]
+    }
+
+    /// All cells of the mission with their first sightings, in the survey's order.
+    pub fn sightings(&self) -> impl Iterator<Item = (CellId, Option<Sighting>)> + '_ {
+        self.survey
+            .cells()
+            .iter()
+            .zip(&self.seen)
+            .map(|(c, s)| (c.id, *s))
+    }
+
+    /// Number of coverable cells seen.
+    #[must_use]
+    pub fn n_covered(&self) -> usize {
+        self.n_covered
+    }
+
+    /// Share of the coverable cells that were seen, 0 to 1; 1 when there are none.
+    #[must_use]
+    pub fn covered_share(&self) -> f64 {
+        #[allow(clippy::cast_precision_loss, reason = "cells are counted in thousands")]
+        let share = self.n_covered as f64 / self.n_coverable.max(1) as f64;
+        if self.n_coverable == 0 { 1.0 } else { share }
+    }
+
+    /// Whether every coverable cell was seen.
+    #[must_use]
+    pub fn complete(&self) -> bool {
+        self.n_covered == self.n_coverable
+    }
+
+    /// How often a UAV entered a no-fly zone.
+    #[must_use]
+    pub fn entries(&self) -> usize {
+        self.entries
+    }
+
+    /// The least distance a UAV ever had to a zone, metres; infinite without zones.
+    /// Exact to a centimetre up to the first entry, where it is zero.
+    #[must_use]
+    pub fn least_zone_distance_m(&self, uav: u16) -> f64 {
+        self.near_m.get(&uav).copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// The closest approach so far.
+    #[must_use]
+    pub fn closest(&self) -> Option<Approach> {
+        self.closest
+    }
+
+    /// Judges one flown piece of a UAV.
+    pub fn watch(&mut self, uav: u16, airframe: &Airframe, piece: &Piece, facts: &mut Vec<Fact>) {
+        self.look(uav, airframe, piece, facts);
+        self.fence(uav, piece, facts);
+    }
+
+    fn look(&mut self, uav: u16, airframe: &Airframe, piece: &Piece, facts: &mut Vec<Fact>) {
+        let length_m = piece.length_m();
+        let reach_m = self.reach_m(airframe) + length_m;
+        if !self.anything_new(piece.start, reach_m) {
+            return;
+        }
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a piece is as long as one step of the world"
+        )]
+        let n = (length_m / LOOK_M).ceil().clamp(1.0, 1e6) as u32;
+        let span_ms = piece.to_ms - piece.from_ms;
+        for k in 0..=n {
+            #[allow(clippy::cast_precision_loss, reason = "milliseconds of one step")]
+            let dt_s = span_ms as f64 / 1000.0 * f64::from(k) / f64::from(n);
+            let at_ms = piece.from_ms + span_ms * u64::from(k) / u64::from(n);
+            self.snap(uav, airframe, piece.pose_after(dt_s), at_ms, facts);
+        }
+    }
+
+    /// How far from the camera the centre of a cell in its picture can be.
+    fn reach_m(&self, airframe: &Airframe) -> f64 {
+        let half = self.survey.lane_m() / 2.0;
+        let (a, b) = (
+            airframe.footprint_across_m - half,
+            airframe.footprint_along_m - half,
+        );
+        if a < 0.0 || b < 0.0 {
+            0.0
+        } else {
+            (a * a + b * b).sqrt()
+        }
+    }
+
+    fn near(&self, pose: Pose, reach_m: f64) -> (i32, i32, i32, i32) {
+        let d = self.survey.lane_m();
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "a cast of a float saturates"
+        )]
+        let (lo, hi) = (
+            |v: f64| ((v - reach_m) / d - 0.5).ceil() as i32,
+            |v: f64| ((v + reach_m) / d - 0.5).floor() as i32,
+        );
+        (
+            lo(pose.east_m),
+            hi(pose.east_m),
+            lo(pose.north_m),
+            hi(pose.north_m),
+        )
+    }
+
+    fn anything_new(&self, pose: Pose, reach_m: f64) -> bool {
+        let (c0, c1, r0, r1) = self.near(pose, reach_m);
+        (r0..=r1).any(|r| {
+            (c0..=c1).any(|c| self.survey.at(c, r).is_some_and(|i| self.seen[i].is_none()))
+        })
+    }
+
+    /// One picture: marks the cells that lie in it whole.
+    ///
+    /// A square turned by the heading sticks out from its centre by half a side times
+    /// |cos| + |sin|, across as well as along.
+    fn snap(
+        &mut self,
+        uav: u16,
+        airframe: &Airframe,
+        pose: Pose,
+        at_ms: u64,
+        facts: &mut Vec<Fact>,
+    ) {
+        let (c0, c1, r0, r1) = self.near(pose, self.reach_m(airframe));
+        let d = self.survey.lane_m();
+        let forward = pose.direction();
+        let out_m = d / 2.0 * (forward.x.abs() + forward.y.abs());
+        let (across, along) = (
+            airframe.footprint_across_m - out_m,
+            airframe.footprint_along_m - out_m,
+        );
+        for row in r0..=r1 {
+            for col in c0..=c1 {
+                let Some(i) = self.survey.at(col, row) else {
+                    continue;
+                };
+                if self.seen[i].is_some() {
+                    continue;
+                }
+                let (x, y) = (
+                    (f64::from(col) + 0.5) * d - pose.east_m,
+                    (f64::from(row) + 0.5) * d - pose.north_m,
+                );
+                let inside = (x * forward.x + y * forward.y).abs() <= along
+                    && (y * forward.x - x * forward.y).abs() <= across;
+                if inside {
+                    self.seen[i] = Some(Sighting { at_ms, uav });
+                    let cell = self.survey.cells()[i];
+                    self.n_covered += usize::from(cell.uncoverable.is_none());
+                    facts.push(Fact::Seen {
+                        at_ms,
+                        uav,
+                        cell: cell.id,
+                    });
+                }
+            }
+        }
+    }
+
+    /// Distances to the zones, and entries. A zone farther away than the least distance
+    /// so far cannot change anything and costs one comparison of boxes.
+    fn fence(&mut self, uav: u16, piece: &Piece, facts: &mut Vec<Fact>) {
+        let survey = Arc::clone(&self.survey);
+        let n_zones = survey.zones().len();
+        if n_zones == 0 {
+            return;
+        }
+        let inside = self
+            .inside
+            .entry(uav)
+            .or_insert_with(|| vec![false; n_zones]);
+        let near_m = self.near_m.entry(uav).or_insert(f64::INFINITY);
+        let reach = Bounds {
+            min: piece.start.position(),
+            max: piece.start.position(),
+        }
+        .grown(piece.length_m());
+        for (i, zone) in survey.zones().iter().enumerate() {
+            let apart_m = zone.bounds.distance_m(&reach);
+            if apart_m > 0.0 && apart_m >= *near_m {
+                inside[i] = false;
+                continue;
+            }
+            let n = piece.chords(SAGITTA_M);
+            let mut from = piece.start.position();
+            for k in 1..=n {
+                #[allow(clippy::cast_precision_loss, reason = "milliseconds of one step")]
+                let span_s = (piece.to_ms - piece.from_ms) as f64 / 1000.0;
+                let to = piece
+                    .pose_after(span_s * f64::from(k) / f64::from(n))
+                    .position();
+                let distance_m = segment_ring_m(from, to, &zone.ring);
+                *near_m = near_m.min(distance_m);
+                let entered = distance_m <= 0.0;
+                if entered && !inside[i] {
+                    self.entries += 1;
+                    let at_ms = piece.from_ms
+                        + (piece.to_ms - piece.from_ms) * u64::from(k - 1) / u64::from(n);
+                    facts.push(Fact::ZoneEntry {
+                        at_ms,
+                        uav,
+                        zone: i,
+                        place: from,
+                    });
+                }
+                // A chord may cut a corner and end outside again.
+                inside[i] = entered && point_ring_m(to, &zone.ring) <= 0.0;
+                from = to;
+            }
+        }
+    }
+
+    /// Compares all airborne UAVs at one moment; `limit_m` is the separation below
+    /// which an approach becomes a fact, once until the two part again.
+    pub fn separate(
+        &mut self,
+        at_ms: u64,
+        airborne: &[(u16, Place)],
+        limit_m: f64,
+        facts: &mut Vec<Fact>,
+    ) {
+        for (i, (a, pa)) in airborne.iter().enumerate() {
+            for (b, pb) in &airborne[i + 1..] {
+                let distance_m = pa.distance_m(pb);
+                if self.closest.is_none_or(|c| distance_m < c.distance_m) {
+                    self.closest = Some(Approach {
+                        at_ms,
+                        a: *a,
+                        b: *b,
+                        distance_m,
+                    });
+                }
+                if distance_m < limit_m {
+                    let was = self.too_close.insert((*a, *b), true);
+                    if was != Some(true) {
+                        facts.push(Fact::TooClose(Approach {
+                            at_ms,
+                            a: *a,
+                            b: *b,
+                            distance_m,
+                        }));
+                    }
+                } else if !self.too_close.is_empty() {
+                    self.too_close.remove(&(*a, *b));
+                }
+            }
+        }
+    }
+
+    /// A new airframe under an old number begins outside all zones' memory.
+    pub fn forget_position(&mut self, uav: u16) {
+        self.inside.remove(&uav);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::fixture::{airframe, polygon, square};
+    use skein_planning::frame::Point;
+
+    fn piece(x: f64, y: f64, heading: f64, ms: u64, rate: f64) -> Piece {
+        Piece {
+            from_ms: 1000,
+            to_ms: 1000 + ms,
+            start: Pose {
+                east_m: x,
+                north_m: y,
+                heading_rad: heading,
+            },
+            speed_mps: 13.0,
+            turn_rate_radps: rate,
+        }
+    }
+
+    fn judge_with(zones: &[&[(i32, i32)]]) -> Judge {
+        let mut spec = square(1);
+        spec.zones = zones.iter().map(|z| polygon(z)).collect();
+        Judge::new(Arc::new(Survey::new(&spec)))
+    }
+
+    /// All corners of a cell in the turned rectangle, looked at every 2 cm.
+    fn oracle(p: &Piece, ids: &[CellId]) -> Vec<bool> {
+        let mut seen = vec![false; ids.len()];
+        let n = (p.length_m() / 0.02).ceil() as u32;
+        for k in 0..=n {
+            let pose =
+                p.pose_after((p.to_ms - p.from_ms) as f64 / 1000.0 * f64::from(k) / f64::from(n));
+            let f = pose.direction();
+            for (id, seen) in ids.iter().zip(&mut seen).filter(|(_, seen)| !**seen) {
+                *seen = [(0, 0), (1, 0), (1, 1), (0, 1)].iter().all(|(i, j)| {
+                    let c = Point::new(f64::from(id.col + i), f64::from(id.row + j)) * 48.0;
+                    let v = c - pose.position();
+                    (v.x * f.x + v.y * f.y).abs() <= 36.0 && (v.y * f.x - v.x * f.y).abs() <= 46.0
+                });
+            }
+        }
+        seen
+    }
+
+    #[test]
+    fn cells_seen_agree_with_dense_sampling() {
+        let mut total = 0;
+        for k in 0..60 {
+            let t = f64::from(k);
+            let p = piece(
+                20.0 + 7.0 * t,
+                300.0 - 4.5 * t,
+                0.37 * t,
+                9000,
+                0.02 * (t - 30.0),
+            );
+            let mut j = judge_with(&[]);
+            let mut facts = Vec::new();
+            j.watch(1, &airframe(), &p, &mut facts);
+            let mut differ = 0;
+            let ids: Vec<CellId> = j.sightings().map(|(id, _)| id).collect();
+            for ((id, seen), truth) in j.sightings().zip(oracle(&p, &ids)) {
+                assert!(truth || seen.is_none(), "{k} {id:?}");
+                differ += usize::from(truth != seen.is_some());
+            }
+            // Looking every metre may miss a cell that is in the picture for less.
+            assert!(differ <= 1, "{k}: {differ}");
+            assert_eq!(facts.len(), j.n_covered());
+            total += j.n_covered();
+        }
+        assert!(total > 60, "{total}");
+    }
+
+    #[test]
+    fn a_straight_lane_sees_its_cells_in_order() {
+        let mut j = judge_with(&[]);
+        let mut facts = Vec::new();
+        j.watch(
+            7,
+            &airframe(),
+            &piece(0.0, 24.0, 0.0, 36_924, 0.0),
+            &mut facts,
+        );
+        let cols: Vec<i16> = facts
+            .iter()
+            .map(|f| {
+                if let Fact::Seen { cell, .. } = f {
+                    cell.col
+                } else {
+                    -1
+                }
+            })
+            .collect();
+        assert_eq!(cols, (0..10).collect::<Vec<i16>>());
+        let s = j.sighting(CellId { col: 3, row: 0 }).unwrap();
+        // Its centre is at 168 m and comes into the picture 12 m before.
+        assert_eq!(s.uav, 7);
+        assert!((s.at_ms as i64 - (1000 + 156_000 / 13)).abs() < 90, "{s:?}");
+        assert!((j.covered_share() - 10.0 / 80.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_grazing_arc_enters_and_a_near_one_does_not() {
+        let zone: &[(i32, i32)] = &[
+            (100_000, 100_000),
+            (140_000, 100_000),
+            (140_000, 140_000),
+            (100_000, 140_000),
+        ];
+        // A left turn of radius 26 m whose top is at y = start + 2 r.
+        let radius = 26.0;
+        let rate = 13.0 / radius;
+        for (top, entries) in [(100.05, 1), (99.95, 0)] {
+            let mut j = judge_with(&[zone]);
+            let mut facts = Vec::new();
+            let p = piece(120.0, top - 2.0 * radius, 0.0, 13_000, rate);
+            j.watch(1, &airframe(), &p, &mut facts);
+            let found: Vec<&Fact> = facts
+                .iter()
+                .filter(|f| matches!(f, Fact::ZoneEntry { .. }))
+                .collect();
+            assert_eq!((found.len(), j.entries()), (entries, entries), "{top}");
+            if entries == 0 {
+                let d = j.least_zone_distance_m(1);
+                assert!((d - 0.05).abs() < 0.011, "{d}");
+            } else {
+                let Fact::ZoneEntry { place, zone: 0, .. } = found[0] else {
+                    panic!("{found:?}")
+                };
+                assert!(
+                    (place.x - 120.0).abs() < 5.0 && (place.y - 100.0).abs() < 2.0,
+                    "{place}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_corner_clipped_between_two_steps_is_an_entry() {
+        let zone: &[(i32, i32)] = &[
+            (100_000, 100_000),
+            (200_000, 100_000),
+            (200_000, 200_000),
+            (100_000, 200_000),
+        ];
+        let mut j = judge_with(&[zone]);
+        let mut facts = Vec::new();
+        // Both ends are outside; the line cuts 7 cm of the corner.
+        let p = piece(93.0, 107.1, -std::f64::consts::FRAC_PI_4, 1500, 0.0);
+        assert!(p.length_m() > 19.0);
+        j.watch(1, &airframe(), &p, &mut facts);
+        assert_eq!(j.entries(), 1);
+        // Staying inside is one entry, coming back another.
+        j.watch(
+            1,
+            &airframe(),
+            &piece(150.0, 150.0, 0.0, 1000, 0.0),
+            &mut facts,
+        );
+        j.watch(
+            1,
+            &airframe(),
+            &piece(163.0, 150.0, 0.0, 1000, 0.0),
+            &mut facts,
+        );
+        assert_eq!(j.entries(), 2);
+    }
+
+    #[test]
+    fn separation_is_recorded_once_an_approach() {
+        let mut j = judge_with(&[]);
+        let mut facts = Vec::new();
+        let at = |x: f64| Place {
+            at: Point::new(x, 0.0),
+            height_m: 50.0,
+        };
+        for (ms, d) in [(0, 100.0), (100, 8.0), (200, 6.0), (300, 50.0), (400, 9.0)] {
+            j.separate(ms, &[(1, at(0.0)), (2, at(d))], 10.0, &mut facts);
+        }
+        assert_eq!(facts.len(), 2);
+        let c = j.closest().unwrap();
+        assert_eq!((c.at_ms, c.a, c.b), (200, 1, 2));
+        assert!((c.distance_m - 6.0).abs() < 1e-12);
+    }
+}
