@@ -1,1 +1,36 @@
 //! The simulated world and radio around live peers.
+//!
+//! A trial launches one process a peer, runs the same world as the simulator in real
+//! time times a factor, and lets peers reach each other only through loopback
+//! proxies.
+//!
+//! | module | what it does |
+//! |---|---|
+//! | [`trial`] | launches, steps the world, ends, judges |
+//! | `faults` | carries out faults and says what should follow |
+//! | [`arena`] | the world, as a trial uses it |
+//! | [`stream`] | percepts and setpoints, one loopback stream a peer |
+//! | [`proxy`] | the transports between each two peers, which can go dark |
+//! | [`cuts`] | faults of links |
+//! | [`process`] | processes, and the guard that leaves none behind |
+//! | [`control`], [`registry`] | how other commands find a trial and talk to it |
+//! | [`ledger`], [`verdict`] | what was seen, and what it adds up to |
+//! | [`pacer`] | scenario time against wall time |
+
+pub mod arena;
+pub mod control;
+pub mod cuts;
+mod faults;
+mod judge;
+pub mod ledger;
+pub mod member;
+pub mod pacer;
+pub mod process;
+pub mod proxy;
+pub mod registry;
+pub mod stream;
+pub mod trial;
+pub mod verdict;
+
+pub use trial::{Event, Options, Progress, TrialError, run};
+pub use verdict::Verdict;

@@ -1,0 +1,264 @@
+//! Faults, carried out: on processes, airframes and links; and what should follow.
+
+use crate::control::Answer;
+use crate::member::{Computer, Member};
+use crate::trial::Trial;
+use nix::sys::signal::Signal;
+use skein_netsim::chaos::Fault;
+
+impl Trial<'_> {
+    /// Carries out a fault of the scenario.
+    pub(crate) async fn scheduled(&mut self, fault: &Fault) {
+        if let Err(why) = self.inject(fault).await {
+            self.ledger.failures.push(format!(
+                "the scenario's fault {fault:?} could not be carried out: {why}"
+            ));
+        }
+    }
+
+    /// Carries out a fault and says what should follow.
+    pub(crate) async fn inject(&mut self, fault: &Fault) -> Answer {
+        let lines = match fault {
+            Fault::Kill { peer } => self.kill(*peer, false).await?,
+            Fault::KillComputer { peer } => self.kill(*peer, true).await?,
+            Fault::Terminate { peer } => self.terminate(*peer)?,
+            Fault::Pause { peer } => self.pause(*peer)?,
+            Fault::Resume { peer } => self.resume(*peer)?,
+            Fault::Restart { peer, fresh_disk } => self.restart(*peer, *fresh_disk).await?,
+            Fault::Cut { .. } | Fault::Partition { .. } | Fault::Heal | Fault::Loss { .. } => {
+                self.links(fault)?
+            }
+        };
+        if let Some(text) = lines.first() {
+            self.note(text.clone());
+        }
+        Ok(lines)
+    }
+
+    fn known(&mut self, peer: u16) -> Result<&mut Member, String> {
+        let known = self
+            .members
+            .keys()
+            .map(|id| format!("uav{id}"))
+            .collect::<Vec<_>>()
+            .join(" ");
+        self.members
+            .get_mut(&peer)
+            .ok_or_else(|| format!("there is no uav{peer}; there are {known}"))
+    }
+
+    async fn kill(&mut self, peer: u16, computer_only: bool) -> Answer {
+        let now_ms = self.now_ms;
+        let member = self.known(peer)?;
+        if !matches!(member.computer, Computer::Runs | Computer::Paused)
+            && (computer_only || !member.airborne)
+        {
+            return Err(format!("uav{peer} does not run"));
+        }
+        member.computer = Computer::Off;
+        if let Some(process) = &mut member.process {
+            process.kill().await;
+        }
+        let flies = member.flies;
+        if !computer_only {
+            member.airborne = false;
+        }
+        if !flies {
+            return Ok(vec![format!("the ground station uav{peer} is gone")]);
+        }
+        if !computer_only {
+            self.arena.remove(peer, now_ms);
+        }
+        let cells = self.ledger.killed(now_ms, peer);
+        let what = if computer_only {
+            "the computer of uav"
+        } else {
+            "uav"
+        };
+        let mut lines = vec![format!(
+            "{what}{peer} is gone; it held {cells} uncovered cells"
+        )];
+        lines.push(self.expect_down(peer));
+        if cells > 0 {
+            lines.push(self.expect_takeover());
+        }
+        if computer_only {
+            lines.push(format!("expect: its airframe loiters by itself after 1 s; `skein chaos restart {peer}` revives it"));
+        }
+        Ok(lines)
+    }
+
+    fn terminate(&mut self, peer: u16) -> Answer {
+        let now_ms = self.now_ms;
+        let member = self.known(peer)?;
+        if member.computer != Computer::Runs {
+            return Err(format!("uav{peer} does not run"));
+        }
+        member.computer = Computer::Off;
+        member.left = true;
+        if let Some(process) = &mut member.process {
+            process.signal(Signal::SIGTERM);
+        }
+        let cells = if member.flies {
+            self.ledger.killed(now_ms, peer)
+        } else {
+            0
+        };
+        Ok(vec![
+            format!("uav{peer} is asked to end; it held {cells} uncovered cells"),
+            self.expect_down(peer),
+        ])
+    }
+
+    fn pause(&mut self, peer: u16) -> Answer {
+        let member = self.known(peer)?;
+        if member.computer != Computer::Runs {
+            return Err(format!("uav{peer} does not run"));
+        }
+        member.computer = Computer::Paused;
+        if let Some(process) = &mut member.process {
+            process.signal(Signal::SIGSTOP);
+        }
+        let text = format!("uav{peer} stands still; its airframe loiters by itself after 1 s");
+        Ok(vec![text, self.expect_down(peer)])
+    }
+
+    fn resume(&mut self, peer: u16) -> Answer {
+        let period_s = f64::from(self.spec.beacon_period_ms) / 1000.0;
+        let member = self.known(peer)?;
+        if member.computer != Computer::Paused {
+            return Err(format!("uav{peer} is not paused"));
+        }
+        member.computer = Computer::Runs;
+        if let Some(process) = &mut member.process {
+            process.signal(Signal::SIGCONT);
+        }
+        Ok(vec![
+            format!("uav{peer} goes on"),
+            format!(
+                "expect: it speaks within {:.0} s, and yields cells that others have listed since",
+                2.0 * period_s
+            ),
+        ])
+    }
+
+    async fn restart(&mut self, peer: u16, fresh_disk: bool) -> Answer {
+        let now_ms = self.now_ms;
+        let period_s = f64::from(self.spec.beacon_period_ms) / 1000.0;
+        let member = self.known(peer)?;
+        let ran = matches!(member.computer, Computer::Runs | Computer::Paused);
+        member.computer = Computer::Off;
+        if let Some(process) = &mut member.process {
+            process.kill().await;
+        }
+        let (flies, airborne) = (member.flies, member.airborne);
+        if fresh_disk {
+            member.wipe();
+        }
+        if ran && flies {
+            self.ledger.killed(now_ms, peer);
+        }
+        if flies && !airborne {
+            self.arena.relaunch(peer, now_ms);
+        }
+        // Its last words must not be taken for the new life's.
+        let member = self.known(peer)?;
+        let radio = std::mem::take(&mut member.radio);
+        self.ledger.add_radio(&radio);
+        self.ledger.restarted(now_ms, peer, fresh_disk);
+        let Some(processes) = &self.processes else {
+            return Err("the trial is ending".to_owned());
+        };
+        let Some(member) = self.members.get_mut(&peer) else {
+            return Err("gone".to_owned());
+        };
+        member.airborne = flies;
+        member
+            .start(processes)
+            .map_err(|e| format!("uav{peer} did not start: {e}"))?;
+        let disk = if fresh_disk {
+            "without its journal"
+        } else {
+            "with its journal"
+        };
+        let place = if flies && !airborne {
+            "at its launch point"
+        } else {
+            "where it is"
+        };
+        Ok(vec![
+            format!("uav{peer} starts again {place}, {disk}"),
+            format!(
+                "expect: a higher incarnation after {:.0} s of listening, and use within {:.0} s more",
+                3.0 * period_s,
+                20.0 * period_s
+            ),
+        ])
+    }
+
+    fn links(&mut self, fault: &Fault) -> Answer {
+        let named: Vec<u16> = match fault {
+            Fault::Cut { a, b, .. } => vec![*a, *b],
+            Fault::Partition { groups } => groups.concat(),
+            _ => Vec::new(),
+        };
+        for peer in named {
+            self.known(peer)?;
+        }
+        self.cuts.apply(fault);
+        let text = match fault {
+            Fault::Cut {
+                a,
+                b,
+                one_way: true,
+            } => format!("the link from uav{a} to uav{b} is cut"),
+            Fault::Cut { a, b, .. } => format!("the link between uav{a} and uav{b} is cut"),
+            Fault::Partition { groups } => format!("the swarm is cut into {groups:?} and the rest"),
+            Fault::Heal => "all cuts are healed".to_owned(),
+            Fault::Loss { permille } => format!(
+                "{:.1} % of all messages are lost",
+                f64::from(*permille) / 10.0
+            ),
+            _ => String::new(),
+        };
+        let follows = match fault {
+            Fault::Cut { .. } => "expect: records go round by other peers; nobody is declared down while a way round exists".to_owned(),
+            Fault::Partition { .. } => {
+                let (_, down_s) = self.bounds_s();
+                format!("expect: each side takes the other for gone within {down_s:.0} s and plans alone; nothing is left out")
+            }
+            Fault::Heal => "expect: the sides know of each other within a few beacons, and duplicates are yielded".to_owned(),
+            _ => "expect: the same, later; detection keeps its bound".to_owned(),
+        };
+        Ok(vec![text, follows])
+    }
+
+    /// When a silent peer is suspected and when it is known to be down everywhere in
+    /// its component, seconds: (k1, k1 + k2 + D + 2) periods.
+    fn bounds_s(&self) -> (f64, f64) {
+        let period_s = f64::from(self.spec.beacon_period_ms) / 1000.0;
+        // The diameter is below the size of the largest component; for an
+        // expectation told to a person its half is close enough.
+        let largest = self.components.iter().map(Vec::len).max().unwrap_or(1);
+        let d = (largest / 2).max(1) as f64;
+        let (k1, k2) = (4.0 + d / 4.0, 4.0 + d / 2.0);
+        (k1 * period_s, (k1 + k2 + d + 2.0) * period_s)
+    }
+
+    fn expect_down(&self, peer: u16) -> String {
+        let (suspect_s, down_s) = self.bounds_s();
+        format!(
+            "expect: uav{peer} suspected within {suspect_s:.0} s, down everywhere within {down_s:.0} s of scenario time"
+        )
+    }
+
+    fn expect_takeover(&self) -> String {
+        let live = self
+            .live_uavs()
+            .iter()
+            .map(|id| format!("uav{id}"))
+            .collect::<Vec<_>>()
+            .join(", ");
+        format!("expect: its cells listed soon after by some of {live}")
+    }
+}

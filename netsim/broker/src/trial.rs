@@ -1,0 +1,742 @@
+//! A trial: launch the peers, run the world around them, inject the faults, judge.
+
+use crate::arena::Arena;
+use crate::control::{Answer, Asked, Control, Request};
+use crate::cuts::Cuts;
+use crate::ledger::{Ledger, secs};
+use crate::member::{Computer, LEASE_MS, Member, Surroundings};
+use crate::pacer::{Pacer, STEP_MS};
+use crate::process::Processes;
+use crate::proxy::Proxy;
+use crate::registry::{Entry, Registered, RegistryError, private_dir, private_file, shared_dir};
+use crate::stream::{Heard, Line, Streams};
+use crate::verdict::Verdict;
+use nix::sys::signal::Signal;
+use skein_link::LinkState;
+use skein_link::frame::ToWorld;
+use skein_netsim::spec::Spec;
+use std::collections::{BTreeMap, VecDeque};
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+use tokio::time::Instant;
+
+/// How long all peers together may take to say hello: debug builds, two cores, 64 of
+/// them.
+const LAUNCH_TIMEOUT: Duration = Duration::from_secs(60);
+
+/// How long peers may take to say goodbye.
+const GOODBYE_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// A link that has been down this long goes dark for the transports too: two leases,
+/// so that a transport that loses a neighbour truly lost it.
+const DARK_AFTER: Duration = Duration::from_millis(2 * LEASE_MS as u64);
+
+/// How often progress is told, milliseconds of scenario time.
+const PROGRESS_MS: u64 = 10_000;
+
+/// What a trial is to be.
+#[derive(Debug)]
+pub struct Options {
+    /// The scenario.
+    pub spec: Spec,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Where to keep everything; a directory of its own if not given.
+    pub run_dir: Option<PathBuf>,
+    /// This program's own file, which peers run.
+    pub program: PathBuf,
+}
+
+/// Something that happened, for a person.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// The trial has a name and a directory.
+    Begun {
+        /// Its name, for `--trial`.
+        id: String,
+        /// Its directory.
+        run_dir: PathBuf,
+    },
+    /// How it stands.
+    Progress(Progress),
+    /// A line worth showing.
+    Note {
+        /// Scenario time, seconds.
+        time_s: f64,
+        /// What.
+        text: String,
+    },
+}
+
+/// How a trial stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Progress {
+    /// Scenario time, seconds.
+    pub time_s: f64,
+    /// Scenario seconds per second at present.
+    pub scale: f64,
+    /// Share of the coverable cells that was seen, 0 to 1.
+    pub covered: f64,
+    /// UAVs that fly with a computer.
+    pub alive: Vec<u16>,
+    /// Parts of the swarm that cannot talk to each other.
+    pub components: usize,
+    /// Cells of dead peers taken over so far.
+    pub taken_over: usize,
+    /// UAVs that hold the mission finished.
+    pub finished: usize,
+}
+
+/// Why a trial has no verdict.
+#[derive(Debug, thiserror::Error)]
+pub enum TrialError {
+    /// A file or a socket failed.
+    #[error("{what}: {cause}")]
+    Io {
+        /// Doing what.
+        what: String,
+        /// Why.
+        cause: std::io::Error,
+    },
+    /// The directory shared with other commands failed.
+    #[error(transparent)]
+    Registry(#[from] RegistryError),
+    /// A peer did not come up.
+    #[error("uav{peer} did not start: {why}")]
+    Launch {
+        /// Which.
+        peer: u16,
+        /// Its last words.
+        why: String,
+    },
+    /// The world refuses the scenario.
+    #[error("the scenario cannot be flown: {0}")]
+    World(String),
+    /// The person at the keyboard had enough.
+    #[error("interrupted; all peers are gone")]
+    Interrupted,
+}
+
+fn io(what: impl Into<String>) -> impl FnOnce(std::io::Error) -> TrialError {
+    let what = what.into();
+    move |cause| TrialError::Io { what, cause }
+}
+
+/// Runs a trial to its end, or until `stop` does. Every process it started is gone
+/// when it returns.
+///
+/// # Errors
+/// When there is nothing to judge.
+pub async fn run(
+    options: Options,
+    stop: impl Future<Output = ()>,
+    tell: &mut (dyn FnMut(Event) + Send),
+) -> Result<Verdict, TrialError> {
+    let keep = options.run_dir.is_some();
+    let mut trial = Trial::prepare(options, tell).await?;
+    let flown = tokio::select! {
+        flown = trial.fly() => flown,
+        () = stop => Err(TrialError::Interrupted),
+    };
+    trial.flown = trial.began.elapsed();
+    trial.end().await;
+    let result = flown.map(|()| trial.verdict());
+    if let Ok(verdict) = &result {
+        let json = serde_json::to_vec_pretty(verdict).map_err(|e| io("verdict")(e.into()))?;
+        private_file(&trial.run_dir.join("verdict.json"), &json)?;
+    }
+    trial
+        .close(keep || result.as_ref().is_ok_and(|v| !v.passed))
+        .await;
+    result
+}
+
+/// The proxy of a pair and the state of its link.
+#[derive(Debug)]
+struct Pair {
+    proxy: Proxy,
+    up: Option<bool>,
+    down_since: Option<Instant>,
+}
+
+pub(crate) struct Trial<'a> {
+    pub(crate) spec: Spec,
+    pub(crate) seed: u64,
+    pub(crate) arena: Arena,
+    pub(crate) cuts: Cuts,
+    pub(crate) members: BTreeMap<u16, Member>,
+    pub(crate) ledger: Ledger,
+    pub(crate) processes: Option<Processes>,
+    pub(crate) now_ms: u64,
+    pub(crate) components: Vec<Vec<u16>>,
+    pub(crate) pacer: Pacer,
+    pub(crate) began: Instant,
+    pub(crate) flown: Duration,
+    pub(crate) setpoint_delay_ms: u64,
+    pairs: BTreeMap<(u16, u16), Pair>,
+    streams: Streams,
+    control: Control,
+    registered: Registered,
+    run_dir: PathBuf,
+    progress_due_ms: u64,
+    tell: &'a mut (dyn FnMut(Event) + Send),
+}
+
+impl<'a> Trial<'a> {
+    /// Opens every port and writes every file; starts only the guard.
+    async fn prepare(
+        options: Options,
+        tell: &'a mut (dyn FnMut(Event) + Send),
+    ) -> Result<Self, TrialError> {
+        let Options {
+            spec,
+            seed,
+            run_dir,
+            program,
+        } = options;
+        let id = format!("{}-{}", spec.name, std::process::id());
+        let run_dir = match run_dir {
+            Some(dir) => dir,
+            None => shared_dir()?.join(&id),
+        };
+        private_dir(&run_dir)?;
+        let run_dir = run_dir
+            .canonicalize()
+            .map_err(io(run_dir.display().to_string()))?;
+        let token = token();
+        let streams = Streams::listen(token.clone())
+            .await
+            .map_err(io("the vehicle streams"))?;
+        let control = Control::listen(token.clone())
+            .await
+            .map_err(io("the control port"))?;
+        let arena = Arena::new(&spec, seed).map_err(TrialError::World)?;
+        let entry = Entry {
+            id: id.clone(),
+            pid: std::process::id(),
+            control: control.address(),
+            token: token.clone(),
+            run_dir: run_dir.clone(),
+            observe: None,
+            fleet: spec.fleet.clone(),
+        };
+        let registered = Registered::enter(entry)?;
+        let mut members: BTreeMap<u16, Member> = spec
+            .uavs
+            .iter()
+            .map(|u| (u.id, Member::new(&run_dir, u.id, true)))
+            .collect();
+        if let Some(g) = &spec.ground {
+            members.insert(g.id, Member::new(&run_dir, g.id, false));
+        }
+        let pairs = bind_pairs(&members).await.map_err(io("a link's proxy"))?;
+        let mut trial = Self {
+            ledger: Ledger::new(spec.uavs.len()),
+            pacer: Pacer::new(spec.time_scale, Instant::now()),
+            began: Instant::now(),
+            flown: Duration::ZERO,
+            processes: None,
+            cuts: Cuts::default(),
+            now_ms: 0,
+            components: Vec::new(),
+            setpoint_delay_ms: 0,
+            progress_due_ms: 0,
+            spec,
+            seed,
+            arena,
+            members,
+            pairs,
+            streams,
+            control,
+            registered,
+            run_dir: run_dir.clone(),
+            tell,
+        };
+        trial.write_configs(&token)?;
+        trial.processes =
+            Some(Processes::start(&program).map_err(io(program.display().to_string()))?);
+        (trial.tell)(Event::Begun { id, run_dir });
+        Ok(trial)
+    }
+
+    fn write_configs(&self, token: &str) -> Result<(), TrialError> {
+        let mission =
+            serde_json::to_vec(&*self.spec.mission).map_err(|e| io("mission.json")(e.into()))?;
+        private_file(&self.run_dir.join("mission.json"), &mission)?;
+        let around = |id: u16| Surroundings {
+            spec: &self.spec,
+            seed: self.seed,
+            world: self.streams.address(),
+            token,
+            links: self
+                .pairs
+                .iter()
+                .filter(|((low, _), _)| *low == id)
+                .map(|(_, p)| p.proxy.address())
+                .collect(),
+        };
+        let uavs = self.spec.uavs.iter().map(|u| (u.id, around(u.id).uav(u)));
+        let ground = self
+            .spec
+            .ground
+            .iter()
+            .map(|g| (g.id, around(g.id).ground(g)));
+        for (id, config) in uavs.chain(ground) {
+            let json =
+                serde_json::to_vec_pretty(&config).map_err(|e| io("a configuration")(e.into()))?;
+            if let Some(member) = self.members.get(&id) {
+                private_file(member.config(), &json)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Launches everybody, and runs the world until the mission is over.
+    async fn fly(&mut self) -> Result<(), TrialError> {
+        self.launch().await?;
+        self.began = Instant::now();
+        self.pacer = Pacer::new(self.spec.time_scale, self.began);
+        let mut faults: VecDeque<_> = self.spec.faults.clone().into();
+        loop {
+            tokio::select! {
+                Some(heard) = self.streams.next() => self.hear(heard),
+                Some(asked) = self.control.next() => self.answer(asked).await,
+                () = tokio::time::sleep_until(self.pacer.next()) => {
+                    while faults.front().is_some_and(|f| f.at_ms <= self.now_ms) {
+                        if let Some(timed) = faults.pop_front() {
+                            self.scheduled(&timed.fault).await;
+                        }
+                    }
+                    self.step();
+                    if self.is_over() {
+                        for missed in &faults {
+                            let text = format!("over before the fault at {:.0} s: {:?}", secs(missed.at_ms), missed.fault);
+                            self.ledger.failures.push(text);
+                        }
+                        return Ok(());
+                    }
+                    if self.pacer.stepped(Instant::now()) {
+                        let text = format!("the machine is too slow; time runs at x{:.1} from now on", self.pacer.scale());
+                        self.note(text);
+                    }
+                }
+            }
+        }
+    }
+
+    async fn launch(&mut self) -> Result<(), TrialError> {
+        let Some(processes) = &self.processes else {
+            return Ok(());
+        };
+        for member in self.members.values_mut() {
+            let started = member.start(processes);
+            started.map_err(|e| TrialError::Launch {
+                peer: member.id,
+                why: e.to_string(),
+            })?;
+        }
+        let deadline = Instant::now() + LAUNCH_TIMEOUT;
+        while let Some(waiting) = self.members.values_mut().find(|m| m.line.is_none()) {
+            let peer = waiting.id;
+            if !waiting
+                .process
+                .as_mut()
+                .is_some_and(super::process::Process::is_there)
+            {
+                return Err(TrialError::Launch {
+                    peer,
+                    why: waiting.last_words(),
+                });
+            }
+            if Instant::now() > deadline {
+                let why = format!(
+                    "no hello within {} s; {}",
+                    LAUNCH_TIMEOUT.as_secs(),
+                    waiting.last_words()
+                );
+                return Err(TrialError::Launch { peer, why });
+            }
+            // The wait is short, so that a process that ended is noticed.
+            let heard = tokio::time::timeout(Duration::from_millis(100), self.streams.next()).await;
+            if let Ok(Some(heard)) = heard {
+                self.hear(heard);
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes what a peer said.
+    fn hear(&mut self, heard: Heard) {
+        match heard {
+            Heard::Hello {
+                id,
+                pid,
+                locator,
+                line,
+            } => self.hello(id, pid, locator, line),
+            Heard::Frame { id, pid, frame } => self.frame(id, pid, frame),
+            Heard::Gone { id, pid } => self.gone(id, pid),
+        }
+    }
+
+    fn hello(&mut self, id: u16, pid: u32, locator: String, line: Line) {
+        let address: Option<SocketAddr> = locator.strip_prefix("tcp/").and_then(|a| a.parse().ok());
+        let Some(member) = self.members.get_mut(&id).filter(|m| m.pid() == Some(pid)) else {
+            return;
+        };
+        let Some(address) = address.filter(|a| a.ip().is_loopback()) else {
+            self.ledger
+                .failures
+                .push(format!("uav{id} listens at {locator}, beyond this machine"));
+            return;
+        };
+        line.welcome(self.seed, self.now_ms, self.pacer.scale());
+        member.line = Some(line);
+        member.locator = Some(locator.clone());
+        for ((_, high), pair) in &self.pairs {
+            if *high == id {
+                pair.proxy.lead_to(address);
+            }
+        }
+        let observed = self
+            .spec
+            .ground
+            .as_ref()
+            .map(|g| g.id)
+            .or_else(|| self.spec.uavs.first().map(|u| u.id));
+        if observed == Some(id)
+            && let Err(cause) = self.registered.observe_at(locator)
+        {
+            tracing::warn!(%cause, "observers will not find this trial");
+        }
+    }
+
+    fn frame(&mut self, id: u16, pid: u32, frame: ToWorld) {
+        let Some(member) = self.members.get_mut(&id).filter(|m| m.pid() == Some(pid)) else {
+            return;
+        };
+        match frame {
+            ToWorld::Setpoint(setpoint) => {
+                let delay_ms = self.now_ms.saturating_sub(setpoint.from_ms);
+                if member.computer == Computer::Runs {
+                    self.setpoint_delay_ms = self.setpoint_delay_ms.max(delay_ms);
+                    if self.pacer.answered(delay_ms) {
+                        let text = format!(
+                            "peers answer late; time runs at x{:.1} from now on",
+                            self.pacer.scale()
+                        );
+                        self.note(text);
+                    }
+                }
+                self.arena.apply(id, setpoint, self.now_ms);
+            }
+            ToWorld::Report(bytes) => match cbor4ii::serde::from_slice(&bytes) {
+                Ok(report) => {
+                    if let Some(line) = self.ledger.report(self.now_ms, id, report) {
+                        self.note(line);
+                    }
+                }
+                Err(cause) => tracing::warn!(id, %cause, "a report cannot be read"),
+            },
+            ToWorld::Radio(counters) => member.radio = counters,
+            ToWorld::Bye => member.left = true,
+            ToWorld::Hello { .. } => {}
+        }
+    }
+
+    fn gone(&mut self, id: u16, pid: u32) {
+        let Some(member) = self.members.get_mut(&id).filter(|m| m.pid() == Some(pid)) else {
+            return;
+        };
+        self.ledger.add_radio(&std::mem::take(&mut member.radio));
+        member.line = None;
+        if member.computer == Computer::Runs && !member.left {
+            member.computer = Computer::Crashed;
+            let text = format!("uav{id} ended by itself: {}", member.last_words());
+            self.ledger.failures.push(text.clone());
+            self.note(text);
+        }
+    }
+
+    /// One step of the world.
+    fn step(&mut self) {
+        self.now_ms += STEP_MS;
+        self.arena.advance(self.now_ms);
+        self.update_pairs();
+        let percepts_due = self
+            .now_ms
+            .is_multiple_of(u64::from(self.spec.percept_period_ms).max(STEP_MS));
+        let (now_ms, scale) = (self.now_ms, self.pacer.scale());
+        let ids: Vec<u16> = self.members.keys().copied().collect();
+        for id in &ids {
+            let row = self.row(*id, &ids);
+            let percept = if percepts_due {
+                self.arena.percept(*id)
+            } else {
+                None
+            };
+            let Some(member) = self.members.get_mut(id) else {
+                continue;
+            };
+            let Some(line) = &member.line else { continue };
+            let links = (member.told.as_ref() != Some(&row)).then(|| row.clone());
+            line.tick(
+                now_ms,
+                scale,
+                percept.filter(|_| member.flies && member.airborne),
+                links,
+            );
+            member.told = Some(row);
+        }
+        if now_ms >= self.progress_due_ms {
+            self.progress_due_ms = now_ms + PROGRESS_MS;
+            let progress = self.progress();
+            (self.tell)(Event::Progress(progress));
+        }
+    }
+
+    fn link(&self, tx: u16, rx: u16) -> LinkState {
+        self.cuts.on(tx, rx, self.arena.link(tx, rx))
+    }
+
+    /// The links into `rx`.
+    fn row(&self, rx: u16, ids: &[u16]) -> Vec<(u16, LinkState)> {
+        let on_air = |id: &u16| self.members.get(id).is_some_and(Member::on_air);
+        ids.iter()
+            .filter(|tx| **tx != rx && on_air(tx))
+            .map(|tx| (*tx, self.link(*tx, rx)))
+            .collect()
+    }
+
+    /// Follows the true links: counts what goes down and why, darkens the proxies of
+    /// what stays down, and finds the components.
+    fn update_pairs(&mut self) {
+        let now = Instant::now();
+        let mut joined = Vec::new();
+        let mut pairs = std::mem::take(&mut self.pairs);
+        for ((low, high), pair) in &mut pairs {
+            let (there, back) = (self.link(*low, *high), self.link(*high, *low));
+            let on_air = [low, high]
+                .iter()
+                .all(|id| self.members.get(id).is_some_and(Member::on_air));
+            if on_air {
+                let up = there.is_up() && back.is_up();
+                if up {
+                    joined.push((*low, *high));
+                }
+                if pair.up == Some(true) && !up {
+                    *self
+                        .ledger
+                        .link_cuts
+                        .entry(why_down(&there, &back))
+                        .or_default() += 1;
+                }
+                pair.up = Some(up);
+            } else {
+                pair.up = None;
+            }
+            // One way up keeps the transport, which can only carry both.
+            if there.is_up() || back.is_up() {
+                pair.down_since = None;
+                pair.proxy.set_dark(false);
+            } else {
+                let since = *pair.down_since.get_or_insert(now);
+                pair.proxy.set_dark(now.duration_since(since) > DARK_AFTER);
+            }
+        }
+        self.pairs = pairs;
+        let on_air = self
+            .members
+            .values()
+            .filter(|m| m.on_air())
+            .map(|m| m.id)
+            .collect();
+        self.components = components(on_air, &joined);
+        if self.now_ms > u64::from(self.spec.beacon_period_ms) {
+            let sizes = self.components.iter().map(Vec::len).collect();
+            if let Some(text) = self.ledger.components(self.now_ms, sizes) {
+                self.note(text);
+            }
+        }
+    }
+
+    pub(crate) fn note(&mut self, text: String) {
+        (self.tell)(Event::Note {
+            time_s: secs(self.now_ms),
+            text,
+        });
+    }
+
+    fn progress(&self) -> Progress {
+        Progress {
+            time_s: secs(self.now_ms),
+            scale: self.pacer.scale(),
+            covered: self.arena.covered_share(),
+            alive: self.live_uavs(),
+            components: self.components.len(),
+            taken_over: self.ledger.taken_over(),
+            finished: self
+                .live_uavs()
+                .iter()
+                .filter(|id| self.ledger.is_finished(**id))
+                .count(),
+        }
+    }
+
+    /// UAVs that fly with a computer that runs.
+    pub(crate) fn live_uavs(&self) -> Vec<u16> {
+        let live = |m: &&Member| m.flies && m.airborne && m.computer == Computer::Runs;
+        self.members.values().filter(live).map(|m| m.id).collect()
+    }
+
+    fn is_over(&self) -> bool {
+        let live = self.live_uavs();
+        let done = self.arena.is_covered() && live.iter().all(|id| self.ledger.is_finished(*id));
+        done || live.is_empty() || self.now_ms >= u64::from(self.spec.max_time_s) * 1000
+    }
+
+    async fn answer(&mut self, asked: Asked) {
+        let answer: Answer = match asked.request {
+            Request::Fault(fault) => self.inject(&fault).await,
+            Request::Order(name) => self.order(name),
+        };
+        // Who asked may have gone away.
+        let _ = asked.answer.send(answer);
+    }
+
+    fn order(&mut self, name: crate::control::OrderName) -> Answer {
+        let ground = self
+            .spec
+            .ground
+            .as_ref()
+            .and_then(|g| self.members.get(&g.id));
+        let line = ground
+            .and_then(|m| m.line.as_ref())
+            .ok_or("there is no ground station to speak it")?;
+        line.order(name.into());
+        Ok(vec![format!("the ground station says {name:?} to all")])
+    }
+
+    /// Tells everybody to leave, and ends who does not.
+    async fn end(&mut self) {
+        for member in self.members.values_mut() {
+            if let (Computer::Paused, Some(process)) = (member.computer, &mut member.process) {
+                process.signal(Signal::SIGCONT);
+            }
+            match (&member.line, &mut member.process) {
+                (Some(line), _) => line.end(),
+                (None, Some(process)) => process.signal(Signal::SIGTERM),
+                (None, None) => {}
+            }
+        }
+        let deadline = Instant::now() + GOODBYE_TIMEOUT;
+        while self.members.values().any(|m| m.line.is_some()) {
+            match tokio::time::timeout_at(deadline, self.streams.next()).await {
+                Ok(Some(
+                    heard @ (Heard::Frame {
+                        frame: ToWorld::Radio(_) | ToWorld::Bye,
+                        ..
+                    }
+                    | Heard::Gone { .. }),
+                )) => {
+                    self.part(heard);
+                }
+                Ok(Some(_)) => {}
+                Ok(None) | Err(_) => break,
+            }
+        }
+        for member in self.members.values_mut() {
+            self.ledger.add_radio(&std::mem::take(&mut member.radio));
+            if let Some(process) = &mut member.process {
+                process.wait_or_kill().await;
+            }
+        }
+    }
+
+    /// Takes last words; whoever leaves now leaves because it was told to.
+    fn part(&mut self, heard: Heard) {
+        if let Heard::Gone { id, .. } = &heard
+            && let Some(member) = self.members.get_mut(id)
+        {
+            member.left = true;
+        }
+        self.hear(heard);
+    }
+
+    /// Ends the guard and removes what is not worth keeping.
+    async fn close(self, keep: bool) {
+        if let Some(processes) = self.processes {
+            processes.end().await;
+        }
+        if !keep {
+            let _ = std::fs::remove_dir_all(&self.run_dir);
+        }
+    }
+}
+
+/// A proxy for each pair of peers.
+async fn bind_pairs(
+    members: &BTreeMap<u16, Member>,
+) -> std::io::Result<BTreeMap<(u16, u16), Pair>> {
+    let mut pairs = BTreeMap::new();
+    for low in members.keys() {
+        for high in members.keys().filter(|high| *high > low) {
+            let pair = Pair {
+                proxy: Proxy::bind().await?,
+                up: None,
+                down_since: None,
+            };
+            pairs.insert((*low, *high), pair);
+        }
+    }
+    Ok(pairs)
+}
+
+fn why_down(there: &LinkState, back: &LinkState) -> &'static str {
+    if there.cut || back.cut {
+        "fault"
+    } else if !there.in_range || !back.in_range {
+        "range"
+    } else {
+        "sight"
+    }
+}
+
+/// The components of a graph, each ascending, in the order of their least members.
+fn components(ids: Vec<u16>, joined: &[(u16, u16)]) -> Vec<Vec<u16>> {
+    let mut label: BTreeMap<u16, u16> = ids.into_iter().map(|id| (id, id)).collect();
+    for (a, b) in joined {
+        let (Some(la), Some(lb)) = (label.get(a).copied(), label.get(b).copied()) else {
+            continue;
+        };
+        for l in label.values_mut().filter(|l| **l == la.max(lb)) {
+            *l = la.min(lb);
+        }
+    }
+    let mut parts: BTreeMap<u16, Vec<u16>> = BTreeMap::new();
+    for (id, l) in label {
+        parts.entry(l).or_default().push(id);
+    }
+    parts.into_values().collect()
+}
+
+/// A word that nobody guesses: only this user can read the files it stands in.
+fn token() -> String {
+    use std::hash::{BuildHasher, RandomState};
+    // The standard library's hasher is seeded by the system for each instance.
+    (0..2)
+        .map(|n| format!("{:016x}", RandomState::new().hash_one(n)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn components_are_what_paths_join() {
+        let parts = components(vec![1, 2, 3, 4, 5], &[(4, 5), (2, 4), (1, 3)]);
+        assert_eq!(parts, [vec![1, 3], vec![2, 4, 5]]);
+    }
+}
