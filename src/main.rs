@@ -1,2 +1,23 @@
-//! The `skein` command.
-fn main() {}
+//! The `skein` command: arguments in, text out, no logic of its own.
+
+mod chaos;
+mod check;
+mod cli;
+mod exit;
+mod observe;
+mod peer;
+mod trial;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = cli::Cli::parse();
+    match cli::run(&cli) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(exit::INTERNAL)
+        }
+    }
+}

@@ -3,7 +3,7 @@
 use crate::registry::Entry;
 use serde::{Deserialize, Serialize};
 use skein_link::frame::Order;
-use skein_netsim::chaos::Fault;
+use skein_netsim::chaos::{Fault, TimedFault};
 use std::net::SocketAddr;
 use std::time::Duration;
 use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
@@ -26,6 +26,8 @@ const INBOX: usize = 16;
 pub enum Request {
     /// Something is to go wrong, or to be put right.
     Fault(Fault),
+    /// The same, later: times count from now.
+    Later(Vec<TimedFault>),
     /// The operator wants something.
     Order(OrderName),
 }

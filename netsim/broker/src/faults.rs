@@ -1,18 +1,64 @@
 //! Faults, carried out: on processes, airframes and links; and what should follow.
 
 use crate::control::Answer;
+use crate::ledger::secs;
 use crate::member::{Computer, Member};
-use crate::trial::Trial;
+use crate::trial::{Due, Trial};
 use nix::sys::signal::Signal;
-use skein_netsim::chaos::Fault;
+use skein_netsim::chaos::{Fault, TimedFault};
+
+/// Faults that wait for their times; a plan of a person is shorter.
+const MAX_DUE: usize = 1000;
 
 impl Trial<'_> {
-    /// Carries out a fault of the scenario.
-    pub(crate) async fn scheduled(&mut self, fault: &Fault) {
-        if let Err(why) = self.inject(fault).await {
-            self.ledger.failures.push(format!(
-                "the scenario's fault {fault:?} could not be carried out: {why}"
-            ));
+    /// Carries out what is due by now, in the order of the times.
+    pub(crate) async fn carry_out_due(&mut self) {
+        while let Some(at) = self
+            .faults
+            .iter()
+            .position(|f| f.timed.at_ms <= self.now_ms)
+        {
+            let Due { timed, scenario } = self.faults.remove(at);
+            if let Err(why) = self.inject(&timed.fault).await {
+                let text = format!("a fault could not be carried out: {:?}: {why}", timed.fault);
+                self.note(text.clone());
+                if scenario {
+                    self.ledger.failures.push(text);
+                }
+            }
+        }
+    }
+
+    /// Takes faults whose times count from now.
+    pub(crate) fn later(&mut self, faults: Vec<TimedFault>) -> Answer {
+        if self.faults.len() + faults.len() > MAX_DUE {
+            return Err(format!("more than {MAX_DUE} faults are waiting"));
+        }
+        let mut lines = Vec::new();
+        for timed in faults {
+            let at_ms = timed.at_ms.saturating_add(self.now_ms);
+            lines.push(format!("at {:.0} s: {:?}", secs(at_ms), timed.fault));
+            self.faults.push(Due {
+                timed: TimedFault {
+                    at_ms,
+                    fault: timed.fault,
+                },
+                scenario: false,
+            });
+        }
+        self.faults.sort_by_key(|f| f.timed.at_ms);
+        Ok(lines)
+    }
+
+    /// A scenario whose faults did not all happen did not show what it was to show.
+    pub(crate) fn name_missed(&mut self) {
+        for missed in self.faults.iter().filter(|f| f.scenario) {
+            let text = format!(
+                "over before the fault at {:.0} s: {:?}",
+                secs(missed.timed.at_ms),
+                missed.timed.fault
+            );
+            self.ledger.failures.push(text);
         }
     }
 

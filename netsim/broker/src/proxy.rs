@@ -58,7 +58,7 @@ impl Proxy {
     /// Sets where the other peer listens.
     pub fn lead_to(&self, target: SocketAddr) {
         self.state
-            .send_if_modified(|s| std::mem::replace(&mut s.target, Some(target)) != Some(target));
+            .send_if_modified(|s| s.target.replace(target) != Some(target));
     }
 
     /// Goes dark, or carries again.

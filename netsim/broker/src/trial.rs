@@ -14,8 +14,9 @@ use crate::verdict::Verdict;
 use nix::sys::signal::Signal;
 use skein_link::LinkState;
 use skein_link::frame::ToWorld;
+use skein_netsim::chaos::TimedFault;
 use skein_netsim::spec::Spec;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -152,6 +153,15 @@ pub async fn run(
     result
 }
 
+/// A fault that has not happened yet.
+#[derive(Clone, Debug)]
+pub(crate) struct Due {
+    /// What and when.
+    pub(crate) timed: TimedFault,
+    /// Whether the scenario wants it, so that the trial fails without it.
+    pub(crate) scenario: bool,
+}
+
 /// The proxy of a pair and the state of its link.
 #[derive(Debug)]
 struct Pair {
@@ -179,6 +189,7 @@ pub(crate) struct Trial<'a> {
     control: Control,
     registered: Registered,
     run_dir: PathBuf,
+    pub(crate) faults: Vec<Due>,
     progress_due_ms: u64,
     tell: &'a mut (dyn FnMut(Event) + Send),
 }
@@ -242,6 +253,14 @@ impl<'a> Trial<'a> {
             components: Vec::new(),
             setpoint_delay_ms: 0,
             progress_due_ms: 0,
+            faults: spec
+                .faults
+                .iter()
+                .map(|f| Due {
+                    timed: f.clone(),
+                    scenario: true,
+                })
+                .collect(),
             spec,
             seed,
             arena,
@@ -297,23 +316,15 @@ impl<'a> Trial<'a> {
         self.launch().await?;
         self.began = Instant::now();
         self.pacer = Pacer::new(self.spec.time_scale, self.began);
-        let mut faults: VecDeque<_> = self.spec.faults.clone().into();
         loop {
             tokio::select! {
                 Some(heard) = self.streams.next() => self.hear(heard),
                 Some(asked) = self.control.next() => self.answer(asked).await,
                 () = tokio::time::sleep_until(self.pacer.next()) => {
-                    while faults.front().is_some_and(|f| f.at_ms <= self.now_ms) {
-                        if let Some(timed) = faults.pop_front() {
-                            self.scheduled(&timed.fault).await;
-                        }
-                    }
+                    self.carry_out_due().await;
                     self.step();
                     if self.is_over() {
-                        for missed in &faults {
-                            let text = format!("over before the fault at {:.0} s: {:?}", secs(missed.at_ms), missed.fault);
-                            self.ledger.failures.push(text);
-                        }
+                        self.name_missed();
                         return Ok(());
                     }
                     if self.pacer.stepped(Instant::now()) {
@@ -599,6 +610,7 @@ impl<'a> Trial<'a> {
     async fn answer(&mut self, asked: Asked) {
         let answer: Answer = match asked.request {
             Request::Fault(fault) => self.inject(&fault).await,
+            Request::Later(faults) => self.later(faults),
             Request::Order(name) => self.order(name),
         };
         // Who asked may have gone away.

@@ -1,0 +1,101 @@
+//! Every verb and every flag; the help is written as prose.
+
+use crate::chaos::ChaosArgs;
+use crate::check::CheckArgs;
+use crate::observe::ObserveArgs;
+use crate::peer::PeerArgs;
+use crate::trial::TrialArgs;
+use crate::{chaos, check, exit, observe, peer, trial};
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+use tracing_subscriber::EnvFilter;
+
+/// A group of UAVs that plans and flies a mission together, without a leader.
+///
+/// Exit codes: 0 all well, 1 the mission failed, 2 wrong usage, 3 a scenario or
+/// configuration is wrong, 4 nobody was there or not in time, 5 a defect.
+#[derive(Debug, Parser)]
+#[command(version, max_term_width = 100)]
+pub struct Cli {
+    /// What to log on stderr, for example `info` or `skein_node=debug,zenoh=warn`.
+    #[arg(long, global = true, value_name = "FILTER", default_value = "warn")]
+    pub log: String,
+
+    /// What to do.
+    #[command(subcommand)]
+    pub verb: Verb,
+}
+
+/// The verbs.
+#[derive(Debug, Subcommand)]
+pub enum Verb {
+    /// Flies a scenario with real processes over Zenoh on this machine, and judges it.
+    Trial(TrialArgs),
+    /// Runs one peer: the computer of a UAV, or a ground station.
+    Peer(PeerArgs),
+    /// Makes something go wrong in a running trial, or puts it right.
+    Chaos(ChaosArgs),
+    /// Shows what the swarm publishes.
+    Observe(ObserveArgs),
+    /// Checks a scenario before it is flown.
+    Check(CheckArgs),
+    /// Outlives a trial and ends what it leaves behind.
+    #[command(name = skein_broker::process::GUARD_COMMAND, hide = true)]
+    Guard,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the program itself fails; everything else is an exit code.
+pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
+    let Ok(filter) = EnvFilter::try_new(&cli.log) else {
+        eprintln!(
+            "error: --log {:?} is no filter; try info, or skein_node=debug,zenoh=warn",
+            cli.log
+        );
+        return Ok(ExitCode::from(exit::USAGE));
+    };
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .init();
+    match &cli.verb {
+        Verb::Trial(args) => trial::run(args),
+        Verb::Peer(args) => peer::run(args),
+        Verb::Chaos(args) => chaos::run(args),
+        Verb::Observe(args) => observe::run(args),
+        Verb::Check(args) => check::run(args),
+        Verb::Guard => {
+            skein_broker::process::guard();
+            Ok(ExitCode::from(exit::OK))
+        }
+    }
+}
+
+/// A runtime with one worker: Zenoh refuses the single-threaded kind.
+///
+/// # Errors
+/// When the system gives no thread.
+pub fn runtime() -> std::io::Result<tokio::runtime::Runtime> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()
+}
+
+/// Ends when the process is asked to: by an interrupt, or by its supervisor.
+pub async fn asked_to_stop() {
+    use tokio::signal::unix::{SignalKind, signal};
+    let (Ok(mut interrupt), Ok(mut terminate)) = (
+        signal(SignalKind::interrupt()),
+        signal(SignalKind::terminate()),
+    ) else {
+        // Without handlers the signals end the process by themselves.
+        return std::future::pending().await;
+    };
+    tokio::select! {
+        _ = interrupt.recv() => {}
+        _ = terminate.recv() => {}
+    }
+}

@@ -1,0 +1,182 @@
+//! `skein trial`: a scenario with real processes, a display, and a verdict.
+
+use crate::check::Format;
+use crate::{cli, exit};
+use anyhow::Context;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use skein_broker::{Event, Options, Progress, TrialError};
+use skein_scenario::{Overrides, Severity};
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Flies a scenario with real processes over Zenoh on this machine, and judges it.
+///
+/// Each peer is a process of its own; they reach each other only through a simulated
+/// radio on 127.0.0.1. Faults of the scenario happen at their times, and others can
+/// be added from another terminal with `skein chaos`. Ends with a verdict: exit code
+/// 0 if everything that can be covered was covered, no no-fly zone was entered and
+/// every live peer knows that the mission is finished, else 1.
+#[derive(Debug, Args)]
+pub struct TrialArgs {
+    /// A scenario file or the name of a built-in scenario; without it the default one.
+    pub scenario: Option<String>,
+    /// Flies with this many UAVs instead of the scenario's number.
+    #[arg(long, value_name = "N")]
+    pub peers: Option<u16>,
+    /// Scenario seconds per second, at most 10.
+    #[arg(long, value_name = "X")]
+    pub time_scale: Option<f64>,
+    /// Seed of everything that is drawn.
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// Keeps configurations, journals, logs and the verdict in this directory. Without
+    /// it they are kept only if the mission failed.
+    #[arg(long, value_name = "DIR")]
+    pub run_dir: Option<PathBuf>,
+    /// How the verdict is printed.
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+}
+
+/// Runs the verb: progress on stderr, the verdict on stdout.
+///
+/// # Errors
+/// When the trial could not be run at all.
+pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
+    if args.time_scale.is_some_and(|x| !(x > 0.0 && x <= 10.0)) {
+        eprintln!(
+            "error: --time-scale must be above 0 and at most 10; Zenoh's own timers know no scenario time"
+        );
+        return Ok(ExitCode::from(exit::USAGE));
+    }
+    let over = Overrides {
+        peers: args.peers,
+        seed: args.seed,
+        time_scale: args.time_scale,
+    };
+    let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {
+        Ok(scenario) => scenario,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return Ok(ExitCode::from(exit::CONFIG_INVALID));
+        }
+    };
+    for finding in scenario
+        .findings
+        .iter()
+        .filter(|f| f.severity == Severity::Warning)
+    {
+        eprintln!("{finding}");
+    }
+    let options = Options {
+        seed: scenario.spec.seed,
+        spec: scenario.spec,
+        run_dir: args.run_dir.clone(),
+        program: std::env::current_exe().context("this program's own file")?,
+    };
+    let mut display = Display::new();
+    let mut tell = |event: Event| display.show(event);
+    let ended =
+        cli::runtime()?.block_on(skein_broker::run(options, cli::asked_to_stop(), &mut tell));
+    display.end();
+    match ended {
+        Ok(verdict) => {
+            match args.format {
+                Format::Text => print!("{verdict}"),
+                Format::Json => println!("{}", serde_json::to_string_pretty(&verdict)?),
+            }
+            Ok(ExitCode::from(if verdict.passed {
+                exit::OK
+            } else {
+                exit::MISSION_FAILED
+            }))
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            Ok(ExitCode::from(match error {
+                TrialError::World(_) => exit::CONFIG_INVALID,
+                TrialError::Launch { .. } | TrialError::Interrupted => exit::NO_PEERS,
+                TrialError::Io { .. } | TrialError::Registry(_) => exit::INTERNAL,
+            }))
+        }
+    }
+}
+
+/// A bar on a terminal, plain lines elsewhere.
+struct Display {
+    bar: Option<ProgressBar>,
+}
+
+/// The bar counts in tenths of a percent.
+const BAR_LENGTH: u64 = 1000;
+
+impl Display {
+    fn new() -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(BAR_LENGTH);
+            if let Ok(style) = ProgressStyle::with_template("{bar:30.cyan} {msg}") {
+                bar.set_style(style);
+            }
+            bar
+        });
+        Self { bar }
+    }
+
+    fn show(&mut self, event: Event) {
+        match event {
+            Event::Begun { id, run_dir } => {
+                self.line(&format!("trial {id} in {}", run_dir.display()));
+            }
+            Event::Note { time_s, text } => self.line(&format!("{time_s:7.1} s  {text}")),
+            Event::Progress(progress) => match &self.bar {
+                Some(bar) => {
+                    #[allow(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "0 to 1000"
+                    )]
+                    bar.set_position((progress.covered * BAR_LENGTH as f64) as u64);
+                    bar.set_message(words(&progress));
+                }
+                None => eprintln!("{}", words(&progress)),
+            },
+        }
+    }
+
+    fn line(&self, text: &str) {
+        match &self.bar {
+            Some(bar) => bar.println(text),
+            None => eprintln!("{text}"),
+        }
+    }
+
+    fn end(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn words(p: &Progress) -> String {
+    let alive = p
+        .alive
+        .iter()
+        .map(|id| format!("uav{id}"))
+        .collect::<Vec<_>>()
+        .join(" ");
+    let parts = if p.components == 1 {
+        "1 component".to_owned()
+    } else {
+        format!("{} components", p.components)
+    };
+    format!(
+        "{:7.1} s  {:5.1} % covered, alive: {alive}, {parts}, {} cells taken over, {} finished (x{:.1})",
+        p.time_s,
+        p.covered * 100.0,
+        p.taken_over,
+        p.finished,
+        p.scale
+    )
+}
