@@ -1,0 +1,664 @@
+//! The narrow-band half-duplex channel that all peers share (D2.7 §2.2).
+//!
+//! A station listens before it sends: it starts when it hears nobody, else it waits for
+//! the end of what it hears plus a short random time. A transmission lasts eight bits a
+//! byte at the channel's rate. At its end every other station either gets it or not:
+//! the link may be down, the draw of [`skein_link::fate()`] may lose it, the station may
+//! have been sending itself, or it may have heard two at once, from senders that did
+//! not hear each other (or began within the same moment).
+//!
+//! Each station has one queue: by priority, then by age; a newer value replaces an
+//! older one of the same key in its place; what has waited too long is dropped.
+
+use super::LinkTable;
+use crate::spec::RadioSpec;
+use skein_link::fate::mix;
+use skein_link::{Fate, Reason, fate};
+use skein_peer::Priority;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Random wait before a station that found the channel busy, or something new in its
+/// queue, listens again, microseconds: about one short frame at 64 kbit/s, so that
+/// eight waiting stations rarely begin together and little air is idle.
+pub const BACKOFF_US: u64 = 16_000;
+
+/// A transmission is heard this long after it began, microseconds: the time a radio
+/// takes from receiving to sending. Two stations that begin within it collide.
+pub const SENSE_US: u64 = 200;
+
+/// Most frames in one queue: the default age of 2 s at 64 kbit/s lets 16,000 bytes out,
+/// and no record is smaller than 40 bytes.
+pub const MAX_QUEUE: usize = 400;
+
+/// What a station wants to send.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Hash of the key; a newer frame of the same key replaces a waiting older one.
+    pub key: u64,
+    /// The record.
+    pub bytes: Arc<[u8]>,
+    /// Hops the record has made before this transmission.
+    pub hops: u8,
+    /// Which frames go first.
+    pub priority: Priority,
+    /// Dropped when it has not begun within this time, milliseconds.
+    pub lifetime_ms: u32,
+}
+
+/// A frame that got through.
+#[derive(Clone, Debug)]
+pub struct Delivery {
+    /// When it is received: the end of the transmission plus the delay of the link, µs.
+    pub at_us: u64,
+    /// When it was handed to the sender's queue, µs.
+    pub queued_us: u64,
+    /// Who sent it.
+    pub tx: u16,
+    /// Who gets it.
+    pub rx: u16,
+    /// The sender's count of transmissions.
+    pub number: u64,
+    /// Hash of the key.
+    pub key: u64,
+    /// Hops the record had made before this transmission.
+    pub hops: u8,
+    /// The record.
+    pub bytes: Arc<[u8]>,
+}
+
+/// What a station did to the channel, and what became of it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Transmissions begun.
+    pub frames: u64,
+    /// Bytes sent.
+    pub bytes: u64,
+    /// Time on the air, microseconds.
+    pub airtime_us: u64,
+    /// Receptions, over all receivers.
+    pub delivered: u64,
+    /// Waiting frames replaced by a newer one of the same key.
+    pub replaced: u64,
+    /// Receptions that failed (over all receivers present) and frames that left the
+    /// queue unsent, by reason.
+    pub dropped: BTreeMap<Reason, u64>,
+}
+
+impl Tally {
+    fn drop_one(&mut self, reason: Reason) {
+        *self.dropped.entry(reason).or_insert(0) += 1;
+    }
+
+    /// Adds another station's figures.
+    pub fn add(&mut self, other: &Self) {
+        self.frames += other.frames;
+        self.bytes += other.bytes;
+        self.airtime_us += other.airtime_us;
+        self.delivered += other.delivered;
+        self.replaced += other.replaced;
+        for (reason, n) in &other.dropped {
+            *self.dropped.entry(*reason).or_insert(0) += n;
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Waiting {
+    frame: Frame,
+    /// When its place in the queue was taken.
+    place_us: u64,
+    /// When this value was handed over.
+    queued_us: u64,
+}
+
+#[derive(Clone, Debug)]
+struct Station {
+    id: u16,
+    queue: Vec<Waiting>,
+    /// When it listens next; nothing while it sends or has nothing to send.
+    listen_us: Option<u64>,
+    sending: bool,
+    sent: u64,
+    draws: u64,
+    tally: Tally,
+}
+
+#[derive(Clone, Debug)]
+struct OnAir {
+    station: usize,
+    from_us: u64,
+    to_us: u64,
+    number: u64,
+    waiting: Waiting,
+    over: bool,
+}
+
+/// The channel and its stations.
+#[derive(Clone, Debug)]
+pub struct Medium {
+    radio: RadioSpec,
+    seed: u64,
+    stations: Vec<Station>,
+    air: Vec<OnAir>,
+}
+
+/// What happens next. Ends come before begins at the same time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Next {
+    End(usize),
+    Listen(usize),
+}
+
+impl Medium {
+    /// A silent channel with some stations.
+    #[must_use]
+    pub fn new(nodes: &[u16], radio: RadioSpec, seed: u64) -> Self {
+        let stations = nodes.iter().map(|id| Station {
+            id: *id,
+            queue: Vec::new(),
+            listen_us: None,
+            sending: false,
+            sent: 0,
+            draws: 0,
+            tally: Tally::default(),
+        });
+        let mut stations: Vec<Station> = stations.collect();
+        stations.sort_by_key(|s| s.id);
+        Self {
+            radio,
+            seed,
+            stations,
+            air: Vec::new(),
+        }
+    }
+
+    /// How long a frame is on the air, microseconds, at least one.
+    #[must_use]
+    pub fn airtime_us(&self, n_bytes: usize) -> u64 {
+        let bits = u64::try_from(n_bytes).unwrap_or(u64::MAX).saturating_mul(8);
+        bits.saturating_mul(1_000_000)
+            .div_ceil(u64::from(self.radio.rate_bps.max(1)))
+            .max(1)
+    }
+
+    /// The figures of one station.
+    #[must_use]
+    pub fn tally(&self, node: u16) -> Option<&Tally> {
+        self.stations
+            .iter()
+            .find(|s| s.id == node)
+            .map(|s| &s.tally)
+    }
+
+    /// The figures of all stations together.
+    #[must_use]
+    pub fn total(&self) -> Tally {
+        let mut sum = Tally::default();
+        for s in &self.stations {
+            sum.add(&s.tally);
+        }
+        sum
+    }
+
+    /// Number of frames waiting at a station.
+    #[must_use]
+    pub fn n_waiting(&self, node: u16) -> usize {
+        self.stations
+            .iter()
+            .find(|s| s.id == node)
+            .map_or(0, |s| s.queue.len())
+    }
+
+    /// Puts a frame into a station's queue. Unknown stations are ignored.
+    pub fn submit(&mut self, now_us: u64, tx: u16, frame: Frame) {
+        let Some(i) = self.stations.iter().position(|s| s.id == tx) else {
+            return;
+        };
+        self.stations[i].enqueue(now_us, frame);
+        if self.stations[i].listen_us.is_none() && !self.stations[i].sending {
+            let wait_us = self.backoff(i);
+            self.stations[i].listen_us = Some(now_us + wait_us);
+        }
+    }
+
+    /// A station falls silent: its queue is gone and what it is sending is lost.
+    pub fn silence(&mut self, node: u16) {
+        let Some(i) = self.stations.iter().position(|s| s.id == node) else {
+            return;
+        };
+        self.stations[i].queue.clear();
+        self.stations[i].listen_us = None;
+        self.stations[i].sending = false;
+        self.air.retain(|a| a.station != i || a.over);
+    }
+
+    /// When the channel wants [`Medium::advance`] next, microseconds.
+    #[must_use]
+    pub fn next_event(&self) -> Option<u64> {
+        self.next().map(|(at_us, _)| at_us)
+    }
+
+    fn next(&self) -> Option<(u64, Next)> {
+        let ends = self
+            .air
+            .iter()
+            .enumerate()
+            .filter(|(_, a)| !a.over)
+            .map(|(k, a)| (a.to_us, Next::End(k)));
+        let listens = self
+            .stations
+            .iter()
+            .enumerate()
+            .filter_map(|(i, s)| Some((s.listen_us?, Next::Listen(i))));
+        ends.chain(listens).min()
+    }
+
+    /// Lets everything happen that is due up to now, under the links as they are, and
+    /// returns what got through, in order of the transmissions' ends. The receptions
+    /// may lie as far after now as the link's delay.
+    pub fn advance(&mut self, now_us: u64, links: &LinkTable) -> Vec<Delivery> {
+        let mut out = Vec::new();
+        while let Some((at_us, what)) = self.next().filter(|(at_us, _)| *at_us <= now_us) {
+            match what {
+                Next::End(k) => self.end(k, links, &mut out),
+                Next::Listen(i) => self.listen(at_us, i, links),
+            }
+        }
+        out
+    }
+
+    /// A draw of the station's own stream: what others do does not shift it.
+    fn backoff(&mut self, i: usize) -> u64 {
+        let s = &mut self.stations[i];
+        s.draws += 1;
+        mix(mix(self.seed ^ (u64::from(s.id) << 48)) ^ s.draws) % BACKOFF_US
+    }
+
+    /// A station with something to send listens, and begins or waits.
+    fn listen(&mut self, at_us: u64, i: usize, links: &LinkTable) {
+        let queue_age_ms = self.radio.queue_age_ms;
+        let s = &mut self.stations[i];
+        s.listen_us = None;
+        s.expire(at_us, queue_age_ms);
+        if s.queue.is_empty() {
+            return;
+        }
+        let id = s.id;
+        let heard_until_us = self
+            .air
+            .iter()
+            .filter(|a| !a.over && a.from_us + SENSE_US <= at_us)
+            .filter(|a| links.state(self.stations[a.station].id, id).is_up())
+            .map(|a| a.to_us)
+            .max();
+        if let Some(until_us) = heard_until_us {
+            let wait_us = self.backoff(i);
+            self.stations[i].listen_us = Some(until_us + wait_us);
+            return;
+        }
+        let n_bytes = self.stations[i].queue[0].frame.bytes.len();
+        let airtime_us = self.airtime_us(n_bytes);
+        let s = &mut self.stations[i];
+        let waiting = s.queue.remove(0);
+        s.sending = true;
+        s.tally.frames += 1;
+        s.tally.bytes += u64::try_from(n_bytes).unwrap_or(u64::MAX);
+        s.tally.airtime_us += airtime_us;
+        let number = s.sent;
+        s.sent += 1;
+        let to_us = at_us + airtime_us;
+        self.air.push(OnAir {
+            station: i,
+            from_us: at_us,
+            to_us,
+            number,
+            waiting,
+            over: false,
+        });
+    }
+
+    /// A transmission ends: every other station gets it or not.
+    fn end(&mut self, k: usize, links: &LinkTable, out: &mut Vec<Delivery>) {
+        self.air[k].over = true;
+        let a = &self.air[k];
+        let (i, tx, to_us) = (a.station, self.stations[a.station].id, a.to_us);
+        let mut fates = Vec::with_capacity(self.stations.len());
+        for r in self
+            .stations
+            .iter()
+            .filter(|r| r.id != tx && links.present(r.id))
+        {
+            let mut f = fate(self.seed, tx, r.id, a.number, &links.state(tx, r.id));
+            if matches!(f, Fate::Delivered { .. }) && self.collides(k, r.id, links) {
+                f = Fate::Lost(Reason::Collision);
+            }
+            fates.push((r.id, f));
+        }
+        let (frame, queued_us) = (&a.waiting.frame, a.waiting.queued_us);
+        let tally = &mut self.stations[i].tally;
+        for (rx, f) in fates {
+            match f {
+                Fate::Lost(reason) => tally.drop_one(reason),
+                Fate::Delivered { delay_ms } => {
+                    tally.delivered += 1;
+                    out.push(Delivery {
+                        at_us: to_us + u64::from(delay_ms) * 1000,
+                        queued_us,
+                        tx,
+                        rx,
+                        number: a.number,
+                        key: frame.key,
+                        hops: frame.hops,
+                        bytes: Arc::clone(&frame.bytes),
+                    });
+                }
+            }
+        }
+        self.stations[i].sending = false;
+        if !self.stations[i].queue.is_empty() {
+            let wait_us = self.backoff(i);
+            self.stations[i].listen_us = Some(to_us + wait_us);
+        }
+        // What ended before everything still on the air began can collide with nothing.
+        let oldest_us = self.air.iter().filter(|a| !a.over).map(|a| a.from_us).min();
+        self.air
+            .retain(|a| !a.over || oldest_us.is_some_and(|t| a.to_us > t));
+    }
+
+    /// Whether something else was on the air at a receiver during a transmission: its
+    /// own sending, or another one that it heard.
+    fn collides(&self, k: usize, rx: u16, links: &LinkTable) -> bool {
+        let a = &self.air[k];
+        self.air.iter().enumerate().any(|(o, b)| {
+            let other = self.stations[b.station].id;
+            o != k
+                && b.station != a.station
+                && b.from_us < a.to_us
+                && a.from_us < b.to_us
+                && (other == rx || links.state(other, rx).is_up())
+        })
+    }
+}
+
+impl Station {
+    fn enqueue(&mut self, now_us: u64, frame: Frame) {
+        let old = self.queue.iter().position(|w| w.frame.key == frame.key);
+        let place_us = match old {
+            Some(k) => {
+                self.tally.replaced += 1;
+                self.queue.remove(k).place_us
+            }
+            None => now_us,
+        };
+        let waiting = Waiting {
+            frame,
+            place_us,
+            queued_us: now_us,
+        };
+        let rank = |w: &Waiting| (w.frame.priority, w.place_us);
+        let at = self.queue.partition_point(|w| rank(w) <= rank(&waiting));
+        self.queue.insert(at, waiting);
+        if self.queue.len() > MAX_QUEUE {
+            // The last in line would be the first to grow too old.
+            self.queue.pop();
+            self.tally.drop_one(Reason::QueueAge);
+        }
+    }
+
+    fn expire(&mut self, now_us: u64, queue_age_ms: u32) {
+        let tally = &mut self.tally;
+        self.queue.retain(|w| {
+            let limit_ms = w.frame.lifetime_ms.min(queue_age_ms);
+            let keep = now_us <= w.queued_us + u64::from(limit_ms) * 1000;
+            if !keep {
+                tally.drop_one(Reason::QueueAge);
+            }
+            keep
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chaos::Fault;
+    use crate::radio::Overlay;
+    use crate::spec::Spec;
+    use crate::world::World;
+    use crate::world::fixture::square;
+
+    fn spec(n: u16) -> Spec {
+        let mut s = square(n);
+        s.buildings.clear();
+        s.ground = None;
+        s
+    }
+
+    fn setup(spec: &Spec, cuts: &[(u16, u16)]) -> (LinkTable, Medium) {
+        let w = World::new(spec, 5);
+        let mut o = Overlay::default();
+        for (a, b) in cuts {
+            o.apply(&Fault::Cut {
+                a: *a,
+                b: *b,
+                one_way: false,
+            });
+        }
+        let mut links = LinkTable::new(w.nodes(), spec.radio);
+        links.compute(&w, &o);
+        (links, Medium::new(w.nodes(), spec.radio, 5))
+    }
+
+    fn frame(key: u64, n_bytes: usize, priority: Priority) -> Frame {
+        Frame {
+            key,
+            bytes: vec![0u8; n_bytes].into(),
+            hops: 0,
+            priority,
+            lifetime_ms: 60_000,
+        }
+    }
+
+    fn drain(m: &mut Medium, links: &LinkTable) -> Vec<Delivery> {
+        let mut all = Vec::new();
+        while let Some(t) = m.next_event() {
+            all.extend(m.advance(t, links));
+        }
+        all
+    }
+
+    #[test]
+    fn one_frame_takes_its_airtime_and_reaches_all() {
+        let (links, mut m) = setup(&spec(4), &[]);
+        m.submit(1_000_000, 2, frame(1, 100, Priority::Beacon));
+        let d = drain(&mut m, &links);
+        assert_eq!(d.iter().map(|d| d.rx).collect::<Vec<_>>(), [1, 3, 4]);
+        // 800 bits at 64 kbit/s are 12.5 ms; 5 ms delay; the rest is the wait.
+        let wait = d[0].at_us - 1_000_000 - 12_500 - 5_000;
+        assert!(wait < BACKOFF_US, "{wait}");
+        let t = m.tally(2).unwrap();
+        assert_eq!(
+            (t.frames, t.bytes, t.airtime_us, t.delivered),
+            (1, 100, 12_500, 3)
+        );
+        assert!(t.dropped.is_empty());
+    }
+
+    #[test]
+    fn loss_is_as_stated_and_counted() {
+        let mut s = spec(3);
+        s.radio.loss_permille = 250;
+        let (links, mut m) = setup(&s, &[]);
+        let mut got = 0;
+        for k in 0..4000u64 {
+            m.submit(k * 50_000, 1, frame(k, 20, Priority::Beacon));
+            got += drain(&mut m, &links).len();
+        }
+        let t = m.tally(1).unwrap();
+        assert_eq!(t.delivered, got as u64);
+        let lost = t.dropped[&Reason::Loss];
+        assert_eq!(lost + t.delivered, 8000);
+        assert!((1880..2120).contains(&lost), "{lost}");
+    }
+
+    #[test]
+    fn stations_in_earshot_take_turns() {
+        let (links, mut m) = setup(&spec(8), &[]);
+        let mut d = Vec::new();
+        for k in 0..200u64 {
+            d.extend(m.advance(k * 400_000, &links));
+            for tx in 1..=8 {
+                m.submit(k * 400_000, tx, frame(u64::from(tx), 150, Priority::Beacon));
+            }
+        }
+        d.extend(drain(&mut m, &links));
+        let t = m.total();
+        let collided = t.dropped.get(&Reason::Collision).copied().unwrap_or(0);
+        assert_eq!(d.len() as u64 + collided, t.frames * 7);
+        // Only those that begin within the sensing time of each other collide.
+        assert!(collided * 5 < d.len() as u64, "{collided} of {}", d.len());
+        assert_eq!(t.airtime_us, t.frames * 18_750);
+        assert!(t.frames + t.replaced + t.dropped.get(&Reason::QueueAge).unwrap_or(&0) == 1600);
+        assert!(t.frames > 1400, "{}", t.frames);
+    }
+
+    #[test]
+    fn hidden_senders_collide_at_the_one_between() {
+        // 1 and 3 hear 2, but not each other; 4 hears 3 alone.
+        let (links, mut m) = setup(&spec(4), &[(1, 3), (1, 4), (2, 4)]);
+        m.submit(0, 1, frame(1, 400, Priority::Beacon));
+        m.submit(0, 3, frame(2, 400, Priority::Beacon));
+        let d = drain(&mut m, &links);
+        assert_eq!(d.iter().map(|d| (d.tx, d.rx)).collect::<Vec<_>>(), [(3, 4)]);
+        let total = m.total();
+        assert_eq!(total.dropped[&Reason::Collision], 2);
+        assert_eq!(total.dropped[&Reason::Cut], 3);
+        // One after the other both are heard.
+        m.submit(1_000_000, 1, frame(1, 400, Priority::Beacon));
+        let mut d = drain(&mut m, &links);
+        m.submit(2_000_000, 3, frame(2, 400, Priority::Beacon));
+        d.extend(drain(&mut m, &links));
+        assert_eq!(
+            d.iter().map(|d| (d.tx, d.rx)).collect::<Vec<_>>(),
+            [(1, 2), (3, 2), (3, 4)]
+        );
+    }
+
+    #[test]
+    fn who_sends_hears_nothing() {
+        // 2 does not hear 1, but 1 hears 2: 1 waits, 2 does not.
+        let s = spec(2);
+        let w = World::new(&s, 5);
+        let mut o = Overlay::default();
+        o.apply(&Fault::Cut {
+            a: 1,
+            b: 2,
+            one_way: true,
+        });
+        let mut links = LinkTable::new(w.nodes(), s.radio);
+        links.compute(&w, &o);
+        let mut m = Medium::new(w.nodes(), s.radio, 5);
+        // 1 sends a long frame; 2 begins in the middle of it and is not heard by 1.
+        m.submit(0, 1, frame(1, 1000, Priority::Beacon));
+        m.submit(40_000, 2, frame(2, 50, Priority::Beacon));
+        let d = drain(&mut m, &links);
+        assert!(d.is_empty());
+        assert_eq!(m.tally(2).unwrap().dropped[&Reason::Collision], 1);
+        assert_eq!(m.tally(1).unwrap().dropped[&Reason::Cut], 1);
+    }
+
+    #[test]
+    fn urgent_first_and_newest_value_in_the_old_place() {
+        let (links, mut m) = setup(&spec(2), &[]);
+        // The first one occupies the air while the others queue up.
+        m.submit(0, 1, frame(100, 200, Priority::Telemetry));
+        assert!(m.advance(BACKOFF_US, &links).is_empty());
+        m.submit(17_000, 1, frame(1, 50, Priority::Telemetry));
+        m.submit(17_001, 1, frame(2, 50, Priority::Telemetry));
+        m.submit(17_002, 1, frame(3, 50, Priority::Claim));
+        m.submit(17_003, 1, frame(4, 50, Priority::Conflict));
+        m.submit(17_004, 1, frame(1, 60, Priority::Telemetry));
+        assert_eq!(m.n_waiting(1), 4);
+        let d = drain(&mut m, &links);
+        assert_eq!(
+            d.iter().map(|d| d.key).collect::<Vec<_>>(),
+            [100, 4, 3, 1, 2]
+        );
+        assert_eq!((d[3].bytes.len(), d[3].queued_us), (60, 17_004));
+        assert_eq!(m.tally(1).unwrap().replaced, 1);
+        assert_eq!(
+            d.iter().map(|d| d.number).collect::<Vec<_>>(),
+            [0, 1, 2, 3, 4]
+        );
+    }
+
+    #[test]
+    fn what_waits_too_long_is_dropped() {
+        let (links, mut m) = setup(&spec(2), &[]);
+        // 20,000 bytes take 2.5 s; the age limit is 2 s, one frame's lifetime 100 ms.
+        m.submit(0, 1, frame(1, 20_000, Priority::Telemetry));
+        m.advance(BACKOFF_US, &links);
+        m.submit(17_000, 1, frame(2, 50, Priority::Conflict));
+        m.submit(2_000_000, 1, frame(3, 50, Priority::Beacon));
+        m.submit(
+            2_000_000,
+            1,
+            Frame {
+                lifetime_ms: 100,
+                ..frame(4, 50, Priority::Beacon)
+            },
+        );
+        let d = drain(&mut m, &links);
+        assert_eq!(d.iter().map(|d| d.key).collect::<Vec<_>>(), [1, 3]);
+        assert_eq!(m.tally(1).unwrap().dropped[&Reason::QueueAge], 2);
+        // A queue has a cap.
+        for k in 0..500 {
+            m.submit(9_000_000, 1, frame(k, 1, Priority::Beacon));
+        }
+        assert_eq!(m.n_waiting(1), MAX_QUEUE);
+        m.silence(1);
+        assert_eq!((m.n_waiting(1), m.next_event()), (0, None));
+    }
+
+    #[test]
+    fn a_station_that_dies_while_sending_is_not_heard() {
+        let (links, mut m) = setup(&spec(3), &[]);
+        m.submit(0, 1, frame(1, 1000, Priority::Beacon));
+        m.advance(20_000, &links);
+        m.silence(1);
+        m.submit(20_000, 2, frame(2, 50, Priority::Beacon));
+        let d = drain(&mut m, &links);
+        assert_eq!(
+            d.iter().map(|d| (d.tx, d.rx)).collect::<Vec<_>>(),
+            [(2, 1), (2, 3)]
+        );
+        m.submit(900_000, 1, frame(3, 10, Priority::Beacon));
+        assert_eq!(drain(&mut m, &links).len(), 2, "and it can come back");
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_air() {
+        let mut s = spec(6);
+        s.radio.loss_permille = 100;
+        let run = || {
+            let (links, mut m) = setup(&s, &[(1, 4), (2, 5)]);
+            let mut d = Vec::new();
+            for k in 0..300u64 {
+                d.extend(m.advance(k * 17_000, &links));
+                m.submit(
+                    k * 17_000,
+                    (k % 6 + 1) as u16,
+                    frame(k % 11, 90, Priority::Beacon),
+                );
+            }
+            d.extend(drain(&mut m, &links));
+            d.iter()
+                .map(|d| (d.at_us, d.tx, d.rx, d.number))
+                .collect::<Vec<_>>()
+        };
+        let a = run();
+        assert!(a.len() > 500);
+        assert_eq!(a, run());
+    }
+}
