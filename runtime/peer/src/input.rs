@@ -8,7 +8,9 @@ use std::sync::Arc;
 
 /// The peer's own clock, milliseconds of scenario time since it cares to remember.
 /// Never runs backwards; drivers see to that.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
 pub struct Time(pub u64);
 
 impl Time {

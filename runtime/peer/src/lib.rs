@@ -20,12 +20,15 @@
 //! `Stored` when the record is durable, not before. `Plan` is answered by `Planned`
 //! with what [`plan::solve`] returned, computed wherever the driver likes.
 
+pub mod cells;
 pub mod config;
 pub mod input;
 pub mod journal;
+pub mod membership;
 pub mod mission;
 pub mod output;
 pub mod plan;
+pub mod relay;
 pub mod wire;
 
 pub use config::{PeerConfig, Role};

@@ -112,7 +112,10 @@ impl Mission {
             launch: point_m(self.launch),
         };
         let coverage_loop = CoverageLoop::build(&problem).map_err(|e| e.to_string())?;
-        let limits = RouteLimits { turn_radius_m: problem.turn_radius_m, clearance_m: problem.clearance_m };
+        let limits = RouteLimits {
+            turn_radius_m: problem.turn_radius_m,
+            clearance_m: problem.clearance_m,
+        };
         let router = Router::new(zones, limits).map_err(|e| e.to_string())?;
         Ok(Arc::new(Ground {
             mission: Arc::clone(self),

@@ -1,1 +1,333 @@
-//! The table of kinds.
+//! The table of kinds: what may be said, how large, how urgent, how long it matters.
+//!
+//! Carries out the communication items of D2.7 §2.4 (which messages the swarm needs).
+//! The bodies themselves are in [`super::message`], their bytes in [`super::codec`].
+
+use crate::output::Priority;
+use core::fmt::Write as _;
+
+/// Largest record of any kind, bytes: what one transmission carries at most.
+pub const RECORD_MAX_BYTES: usize = 4096;
+
+/// What a record is about. The number is on the wire and never reused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// "I am here", with gossip.
+    Beacon = 0,
+    /// Pose, fuel, behaviour, mission status.
+    State = 1,
+    /// A bid in a round of negotiation.
+    Round = 2,
+    /// The author's own section.
+    Claim = 3,
+    /// The union of covered cells the author knows.
+    Cover = 4,
+    /// A piece of a mission.
+    Mission = 5,
+    /// What the operator wants of everybody.
+    Operator = 6,
+    /// "All that can be covered is covered."
+    Finished = 7,
+    /// Something people should look at.
+    Event = 8,
+    /// Reserved: tasks other than coverage.
+    Task = 9,
+    /// Reserved: committed trajectories.
+    Intent = 10,
+    /// Reserved: approach conflicts.
+    Conflict = 11,
+}
+
+/// How long a record waiting to be sent matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lifetime {
+    /// So many beacon periods.
+    Beacons(u32),
+    /// So many milliseconds.
+    Ms(u32),
+}
+
+/// One line of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KindRow {
+    /// The kind.
+    pub kind: Kind,
+    /// Its name in keys.
+    pub name: &'static str,
+    /// Largest body, bytes; every body whose values are valid fits.
+    pub cap_bytes: usize,
+    /// Which transmissions go first.
+    pub priority: Priority,
+    /// How long it may wait to be sent.
+    pub lifetime: Lifetime,
+    /// Whether other peers hold it and pass it on.
+    pub relayed: bool,
+    /// How many registers of this kind an author has: subjects `0 .. subjects`.
+    pub subjects: u16,
+    /// Whether bodies are defined; a reserved kind is refused.
+    pub spoken: bool,
+}
+
+const fn row(
+    kind: Kind,
+    name: &'static str,
+    cap_bytes: usize,
+    priority: Priority,
+    lifetime: Lifetime,
+) -> KindRow {
+    KindRow {
+        kind,
+        name,
+        cap_bytes,
+        priority,
+        lifetime,
+        relayed: true,
+        subjects: 1,
+        spoken: true,
+    }
+}
+
+// Lifetimes: a beacon is out of date when the next one is due; state and cover when
+// two newer ones could have been written; rounds and claims after the longest wait
+// for a round in a component of diameter 3, (2D + 3) periods; what the operator says
+// matters until the longest partition a mission tolerates, and is repaired by
+// anti-entropy afterwards.
+// Caps: the largest valid body, which a test of `codec` computes, rounded up.
+const TABLE: [KindRow; 12] = [
+    KindRow {
+        relayed: false,
+        ..row(
+            Kind::Beacon,
+            "beacon",
+            768,
+            Priority::Beacon,
+            Lifetime::Beacons(1),
+        )
+    },
+    row(
+        Kind::State,
+        "state",
+        64,
+        Priority::Telemetry,
+        Lifetime::Beacons(2),
+    ),
+    row(
+        Kind::Round,
+        "round",
+        1216,
+        Priority::Claim,
+        Lifetime::Beacons(9),
+    ),
+    row(
+        Kind::Claim,
+        "claim",
+        3584,
+        Priority::Claim,
+        Lifetime::Beacons(9),
+    ),
+    // Cover is not passed on: it merges by union, and everybody speaks the whole union.
+    KindRow {
+        relayed: false,
+        ..row(
+            Kind::Cover,
+            "cover",
+            1024,
+            Priority::Telemetry,
+            Lifetime::Beacons(2),
+        )
+    },
+    KindRow {
+        subjects: 64,
+        ..row(
+            Kind::Mission,
+            "mission",
+            1056,
+            Priority::Telemetry,
+            Lifetime::Ms(60_000),
+        )
+    },
+    row(
+        Kind::Operator,
+        "operator",
+        8,
+        Priority::Claim,
+        Lifetime::Ms(60_000),
+    ),
+    row(
+        Kind::Finished,
+        "finished",
+        8,
+        Priority::Telemetry,
+        Lifetime::Ms(60_000),
+    ),
+    KindRow {
+        subjects: 4,
+        ..row(
+            Kind::Event,
+            "event",
+            256,
+            Priority::Telemetry,
+            Lifetime::Ms(60_000),
+        )
+    },
+    KindRow {
+        spoken: false,
+        ..row(
+            Kind::Task,
+            "task",
+            512,
+            Priority::Claim,
+            Lifetime::Beacons(9),
+        )
+    },
+    KindRow {
+        spoken: false,
+        ..row(
+            Kind::Intent,
+            "intent",
+            512,
+            Priority::Conflict,
+            Lifetime::Beacons(1),
+        )
+    },
+    KindRow {
+        spoken: false,
+        ..row(
+            Kind::Conflict,
+            "conflict",
+            512,
+            Priority::Conflict,
+            Lifetime::Beacons(1),
+        )
+    },
+];
+
+impl Kind {
+    /// All kinds, by number.
+    pub const ALL: [Self; 12] = [
+        Self::Beacon,
+        Self::State,
+        Self::Round,
+        Self::Claim,
+        Self::Cover,
+        Self::Mission,
+        Self::Operator,
+        Self::Finished,
+        Self::Event,
+        Self::Task,
+        Self::Intent,
+        Self::Conflict,
+    ];
+
+    /// Its number on the wire.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        self as u8
+    }
+
+    /// The kind of this number, if there is one.
+    #[must_use]
+    pub fn of_number(number: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(number)).copied()
+    }
+
+    /// The kind of this name, if there is one.
+    #[must_use]
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|k| k.name() == name)
+    }
+
+    /// Its line of the table.
+    #[must_use]
+    pub const fn row(self) -> &'static KindRow {
+        &TABLE[self as usize]
+    }
+
+    /// Its name in keys.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// Largest body, bytes.
+    #[must_use]
+    pub const fn cap_bytes(self) -> usize {
+        self.row().cap_bytes
+    }
+
+    /// Which transmissions go first.
+    #[must_use]
+    pub const fn priority(self) -> Priority {
+        self.row().priority
+    }
+
+    /// Whether other peers hold it and pass it on.
+    #[must_use]
+    pub const fn relayed(self) -> bool {
+        self.row().relayed
+    }
+
+    /// How long it may wait to be sent, milliseconds, at a beacon period.
+    #[must_use]
+    pub const fn lifetime_ms(self, beacon_period_ms: u32) -> u32 {
+        match self.row().lifetime {
+            Lifetime::Beacons(n) => beacon_period_ms.saturating_mul(n),
+            Lifetime::Ms(ms) => ms,
+        }
+    }
+}
+
+/// The table of kinds as Markdown, for the documentation.
+#[must_use]
+pub fn docs_table() -> String {
+    let mut text = String::from(
+        "| number | kind | registers | body, bytes | priority | lifetime | passed on |\n|---|---|---|---|---|---|---|\n",
+    );
+    for row in &TABLE {
+        let lifetime = match row.lifetime {
+            Lifetime::Beacons(n) => format!("{n} T"),
+            Lifetime::Ms(ms) => format!("{} s", ms / 1000),
+        };
+        let passed_on = match (row.spoken, row.relayed) {
+            (false, _) => "reserved",
+            (true, true) => "yes",
+            (true, false) => "no",
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "| {} | `{}` | {} | {} | {:?} | {lifetime} | {passed_on} |",
+            row.kind.number(),
+            row.name,
+            row.subjects,
+            row.cap_bytes,
+            row.priority,
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_names_and_rows_agree() {
+        for (i, kind) in Kind::ALL.into_iter().enumerate() {
+            assert_eq!(usize::from(kind.number()), i);
+            assert_eq!(kind.row().kind, kind);
+            assert_eq!(Kind::of_number(kind.number()), Some(kind));
+            assert_eq!(Kind::of_name(kind.name()), Some(kind));
+            assert!(kind.cap_bytes() + super::super::codec::ENVELOPE_MAX_BYTES <= RECORD_MAX_BYTES);
+        }
+        assert_eq!(Kind::of_number(12), None);
+        assert_eq!(Kind::of_name("rumour"), None);
+    }
+
+    #[test]
+    fn the_table_has_a_line_a_kind() {
+        let table = docs_table();
+        assert_eq!(table.lines().count(), Kind::ALL.len() + 2);
+        assert!(table.contains("| 4 | `cover` | 1 | 1024 | Telemetry | 2 T | no |"));
+    }
+}

@@ -135,7 +135,9 @@ pub struct State {
 }
 
 /// The negotiation to which a listing of cells goes back. Totally ordered.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
 pub struct Epoch {
     /// Counter of the round.
     pub counter: u32,
@@ -144,7 +146,9 @@ pub struct Epoch {
 }
 
 /// Orders listings of the same cell: the higher one keeps it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
 pub struct Stamp {
     /// The round it goes back to.
     pub epoch: Epoch,

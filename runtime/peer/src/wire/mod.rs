@@ -1,9 +1,13 @@
 //! Keys, kinds, messages, their bytes and their signatures.
 
+mod cbor;
 pub mod codec;
 pub mod key;
 pub mod kinds;
+pub mod limits;
 pub mod message;
+#[cfg(test)]
+mod samples;
 pub mod signature;
 
 /// FNV-1a, 64 bit: small, stable, and the same everywhere. Not for adversaries.

@@ -1,0 +1,463 @@
+//! Sets of cells of the coverage loop: what is covered, listed or open.
+//!
+//! Carries out the bookkeeping of covered cells of D2.7 §3.6 (progress survives its
+//! author). Coverage merges by union and nothing else, so that loss, order,
+//! duplication and relaying cannot harm it. What the cells mean, and which loop they
+//! are counted on, is left to the callers.
+
+use crate::wire::Fnv;
+use crate::wire::message::Run;
+
+/// Bytes of the longest run length: a `u16` in groups of seven bits.
+const VARINT_MAX_BYTES: usize = 3;
+
+/// Why run lengths were refused; nothing was decoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CellsError {
+    /// A run length is cut off, longer than it need be, or beyond 65,535.
+    #[error("run length at byte {at} is malformed; the set is refused")]
+    Length {
+        /// Offset of the byte.
+        at: usize,
+    },
+    /// A run other than the first is empty: the same set would have two encodings.
+    #[error("run {run} is empty; the set is refused")]
+    Empty {
+        /// Which run, from 0.
+        run: usize,
+    },
+    /// The runs reach beyond the loop.
+    #[error("runs cover {cells} cells of a loop of {n}; the set is refused")]
+    Beyond {
+        /// Cells the runs add up to.
+        cells: u32,
+        /// Cells of the loop.
+        n: u16,
+    },
+    /// The last run is an uncovered one: the same set would have two encodings.
+    #[error("the last run is not of covered cells; the set is refused")]
+    Open,
+}
+
+/// A set of the cells `0 .. n` of a loop.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct CellSet {
+    n: u16,
+    words: Vec<u64>,
+}
+
+impl CellSet {
+    /// The empty set over a loop of `n` cells.
+    #[must_use]
+    pub fn new(n: u16) -> Self {
+        Self {
+            n,
+            words: vec![0; usize::from(n).div_ceil(64)],
+        }
+    }
+
+    /// All cells of a loop of `n` cells.
+    #[must_use]
+    pub fn full(n: u16) -> Self {
+        let mut set = Self::new(n);
+        for cell in 0..n {
+            set.insert(cell);
+        }
+        set
+    }
+
+    /// The set of these cells; those beyond the loop are left out.
+    #[must_use]
+    pub fn of(n: u16, cells: impl IntoIterator<Item = u16>) -> Self {
+        let mut set = Self::new(n);
+        for cell in cells {
+            set.insert(cell);
+        }
+        set
+    }
+
+    fn place(cell: u16) -> (usize, u64) {
+        (usize::from(cell / 64), 1_u64 << (cell % 64))
+    }
+
+    /// Adds a cell; returns whether it was missing. A cell beyond the loop is ignored.
+    pub fn insert(&mut self, cell: u16) -> bool {
+        if cell >= self.n {
+            return false;
+        }
+        let (word, bit) = Self::place(cell);
+        let fresh = self.words[word] & bit == 0;
+        self.words[word] |= bit;
+        fresh
+    }
+
+    /// Adds the cells of a run (cyclic); returns whether any was missing.
+    pub fn insert_run(&mut self, run: Run) -> bool {
+        if self.n == 0 {
+            return false;
+        }
+        let mut fresh = false;
+        let mut cell = run.first % self.n;
+        for _ in 0..run.count.min(self.n) {
+            fresh |= self.insert(cell);
+            cell = if cell + 1 == self.n { 0 } else { cell + 1 };
+        }
+        fresh
+    }
+
+    /// Takes a cell out; returns whether it was there.
+    pub fn remove(&mut self, cell: u16) -> bool {
+        if !self.contains(cell) {
+            return false;
+        }
+        let (word, bit) = Self::place(cell);
+        self.words[word] &= !bit;
+        true
+    }
+
+    /// Whether the cell is in the set.
+    #[must_use]
+    pub fn contains(&self, cell: u16) -> bool {
+        let (word, bit) = Self::place(cell);
+        self.words.get(word).is_some_and(|w| w & bit != 0)
+    }
+
+    /// Cells of the loop, in the set or not.
+    #[must_use]
+    pub fn len(&self) -> u16 {
+        self.n
+    }
+
+    /// Whether no cell is in the set.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.words.iter().all(|w| *w == 0)
+    }
+
+    /// Cells in the set.
+    #[must_use]
+    pub fn count(&self) -> u16 {
+        let ones: u32 = self.words.iter().map(|w| w.count_ones()).sum();
+        u16::try_from(ones).unwrap_or(u16::MAX)
+    }
+
+    /// Whether every cell of the loop is in the set.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        self.count() == self.n
+    }
+
+    /// Adds all cells of `other`; returns whether any was missing. A set over another
+    /// loop length is ignored: its cells have other names.
+    pub fn union_with(&mut self, other: &Self) -> bool {
+        if other.n != self.n {
+            return false;
+        }
+        let mut fresh = false;
+        for (mine, theirs) in self.words.iter_mut().zip(&other.words) {
+            fresh |= theirs & !*mine != 0;
+            *mine |= theirs;
+        }
+        fresh
+    }
+
+    /// Takes all cells of `other` out. A set over another loop length is ignored.
+    pub fn subtract(&mut self, other: &Self) {
+        if other.n != self.n {
+            return;
+        }
+        for (mine, theirs) in self.words.iter_mut().zip(&other.words) {
+            *mine &= !theirs;
+        }
+    }
+
+    /// Whether every cell of this set is in `other` too.
+    #[must_use]
+    pub fn is_subset(&self, other: &Self) -> bool {
+        self.n == other.n
+            && self
+                .words
+                .iter()
+                .zip(&other.words)
+                .all(|(a, b)| a & !b == 0)
+    }
+
+    /// Whether some cell is in both sets.
+    #[must_use]
+    pub fn intersects(&self, other: &Self) -> bool {
+        self.n == other.n && self.words.iter().zip(&other.words).any(|(a, b)| a & b != 0)
+    }
+
+    /// The cells of the loop that are not in the set.
+    #[must_use]
+    pub fn complement(&self) -> Self {
+        let mut rest = Self::full(self.n);
+        rest.subtract(self);
+        rest
+    }
+
+    /// The cells in the set, ascending.
+    pub fn iter(&self) -> impl Iterator<Item = u16> + '_ {
+        self.words.iter().zip(0_u16..).flat_map(|(word, i)| {
+            let mut left = *word;
+            core::iter::from_fn(move || {
+                let bit = left.trailing_zeros();
+                // Clears the lowest bit; 0 stays 0 and ends the iteration.
+                left &= left.wrapping_sub(1);
+                (bit < 64).then(|| i * 64 + u16::try_from(bit).unwrap_or(0))
+            })
+        })
+    }
+
+    /// One flag a cell of the loop.
+    #[must_use]
+    pub fn flags(&self) -> Vec<bool> {
+        (0..self.n).map(|cell| self.contains(cell)).collect()
+    }
+
+    /// Identifies the content: two sets that differ differ here but for chance.
+    #[must_use]
+    pub fn digest(&self) -> u32 {
+        let mut h = Fnv::new();
+        h.write(&self.n.to_le_bytes());
+        for word in &self.words {
+            h.write(&word.to_le_bytes());
+        }
+        let folded = (h.finish() >> 32) ^ (h.finish() & u64::from(u32::MAX));
+        u32::try_from(folded).unwrap_or(u32::MAX)
+    }
+
+    /// The longest runs of consecutive cells, ascending; no run crosses the seam
+    /// between the last cell and cell 0.
+    #[must_use]
+    pub fn runs(&self) -> Vec<Run> {
+        let mut runs: Vec<Run> = Vec::new();
+        for cell in self.iter() {
+            match runs.last_mut() {
+                Some(run) if u32::from(run.first) + u32::from(run.count) == u32::from(cell) => {
+                    run.count += 1;
+                }
+                _ => runs.push(Run {
+                    first: cell,
+                    count: 1,
+                }),
+            }
+        }
+        runs
+    }
+
+    /// Run lengths, uncovered first, alternating, each as a little-endian base-128
+    /// number; the uncovered rest of the loop is left out, so the empty set is no
+    /// bytes. Where `max_bytes` is too little the shortest covered runs are left out:
+    /// that forgets coverage, which costs duplicate work and never leaves a gap.
+    #[must_use]
+    pub fn encode_rle(&self, max_bytes: Option<usize>) -> Vec<u8> {
+        let runs = self.runs();
+        let whole = encode_runs(runs.iter().copied());
+        let Some(cap) = max_bytes.filter(|cap| whole.len() > *cap) else {
+            return whole;
+        };
+        let mut by_length: Vec<usize> = (0..runs.len()).collect();
+        by_length.sort_by_key(|i| (runs[*i].count, *i));
+        let mut dropped_at = vec![0_usize; runs.len()];
+        for (rank, i) in by_length.iter().enumerate() {
+            dropped_at[*i] = rank;
+        }
+        // Leaving out one run more never lengthens the bytes (three numbers become
+        // one that is no longer than they were), so the search may halve.
+        let without = |drop: usize| {
+            encode_runs(
+                runs.iter()
+                    .zip(&dropped_at)
+                    .filter(|(_, rank)| **rank >= drop)
+                    .map(|(run, _)| *run),
+            )
+        };
+        let (mut low, mut high) = (0, runs.len());
+        while high - low > 1 {
+            let mid = usize::midpoint(low, high);
+            if without(mid).len() > cap {
+                low = mid;
+            } else {
+                high = mid;
+            }
+        }
+        without(high)
+    }
+
+    /// Reads what [`CellSet::encode_rle`] wrote, over a loop of `n` cells.
+    ///
+    /// # Errors
+    /// [`CellsError`] where the bytes are not the one encoding of a set that fits.
+    pub fn decode_rle(n: u16, bytes: &[u8]) -> Result<Self, CellsError> {
+        let mut set = Self::new(n);
+        let (mut at, mut cells, mut run) = (0_usize, 0_u32, 0_usize);
+        while at < bytes.len() {
+            let (length, used) = read_varint(&bytes[at..]).ok_or(CellsError::Length { at })?;
+            at += used;
+            if length == 0 && run > 0 {
+                return Err(CellsError::Empty { run });
+            }
+            let first = cells;
+            cells += u32::from(length);
+            if cells > u32::from(n) {
+                return Err(CellsError::Beyond { cells, n });
+            }
+            if run % 2 == 1 {
+                let first = u16::try_from(first).unwrap_or(u16::MAX);
+                set.insert_run(Run {
+                    first,
+                    count: length,
+                });
+            }
+            run += 1;
+        }
+        if run % 2 == 1 {
+            return Err(CellsError::Open);
+        }
+        Ok(set)
+    }
+}
+
+fn encode_runs(runs: impl Iterator<Item = Run>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut end = 0_u16;
+    for run in runs {
+        write_varint(&mut bytes, run.first - end);
+        write_varint(&mut bytes, run.count);
+        // A run ends at the loop's last cell at most, so the sum fits.
+        end = run.first.saturating_add(run.count);
+    }
+    bytes
+}
+
+fn write_varint(bytes: &mut Vec<u8>, mut value: u16) {
+    while value >= 0x80 {
+        bytes.push(0x80 | (value & 0x7f).to_le_bytes()[0]);
+        value >>= 7;
+    }
+    bytes.push(value.to_le_bytes()[0]);
+}
+
+fn read_varint(bytes: &[u8]) -> Option<(u16, usize)> {
+    let mut value = 0_u32;
+    for (i, byte) in bytes.iter().take(VARINT_MAX_BYTES).enumerate() {
+        value |= u32::from(byte & 0x7f) << (7 * i);
+        if byte & 0x80 == 0 {
+            // A last group of zero could have been left out.
+            let shortest = *byte != 0 || i == 0;
+            return u16::try_from(value)
+                .ok()
+                .filter(|_| shortest)
+                .map(|v| (v, i + 1));
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    fn sets() -> impl Strategy<Value = (u16, BTreeSet<u16>)> {
+        (0_u16..700)
+            .prop_flat_map(|n| (Just(n), vec((0..n.max(1), 1_u16..40), 0..40)))
+            .prop_map(|(n, runs)| {
+                let cells = runs
+                    .iter()
+                    .flat_map(|(first, count)| *first..first.saturating_add(*count));
+                (n, cells.filter(|c| *c < n).collect())
+            })
+    }
+
+    proptest! {
+        #[test]
+        fn a_set_behaves_like_a_sorted_set((n, cells) in sets(), probe in any::<u16>()) {
+            let mut set = CellSet::of(n, cells.iter().copied());
+            prop_assert_eq!(set.iter().collect::<Vec<_>>(), cells.iter().copied().collect::<Vec<_>>());
+            prop_assert_eq!(usize::from(set.count()), cells.len());
+            prop_assert_eq!(set.contains(probe), cells.contains(&probe));
+            prop_assert_eq!(set.is_full(), cells.len() == usize::from(n));
+            prop_assert_eq!(set.complement().count(), n - set.count());
+            let listed: u32 = set.runs().iter().map(|r| u32::from(r.count)).sum();
+            prop_assert_eq!(listed, u32::from(set.count()));
+            prop_assert_eq!(set.remove(probe), cells.contains(&probe));
+            prop_assert!(!set.contains(probe));
+        }
+
+        #[test]
+        fn run_lengths_come_back((n, cells) in sets()) {
+            let set = CellSet::of(n, cells);
+            let bytes = set.encode_rle(None);
+            prop_assert_eq!(CellSet::decode_rle(n, &bytes), Ok(set));
+        }
+
+        #[test]
+        fn capped_run_lengths_forget_and_never_invent((n, cells) in sets(), cap in 0_usize..40) {
+            let set = CellSet::of(n, cells);
+            let bytes = set.encode_rle(Some(cap));
+            prop_assert!(bytes.len() <= cap);
+            let read = CellSet::decode_rle(n, &bytes).unwrap();
+            prop_assert!(read.is_subset(&set));
+            let longest = set.runs().iter().map(|r| r.count).max();
+            if cap >= 2 * VARINT_MAX_BYTES && longest.is_some() {
+                prop_assert_eq!(read.runs().iter().map(|r| r.count).max(), longest);
+            }
+        }
+
+        #[test]
+        fn union_is_commutative_associative_idempotent((n, a) in sets(), b in vec(any::<u16>(), 0..60), c in vec(any::<u16>(), 0..60)) {
+            let of = |cells: &[u16]| CellSet::of(n, cells.iter().map(|x| x % n.max(1)));
+            let join = |x: &CellSet, y: &CellSet| { let mut z = x.clone(); z.union_with(y); z };
+            let a = CellSet::of(n, a);
+            let (b, c) = (of(&b), of(&c));
+            prop_assert_eq!(join(&a, &b), join(&b, &a));
+            prop_assert_eq!(join(&join(&a, &b), &c), join(&a, &join(&b, &c)));
+            prop_assert_eq!(join(&a, &a), a.clone());
+            let mut grown = a.clone();
+            prop_assert_eq!(grown.union_with(&b), !b.is_subset(&a));
+            prop_assert_eq!(grown.digest() == a.digest(), b.is_subset(&a));
+            let mut left = a.clone();
+            left.subtract(&b);
+            prop_assert!(!left.intersects(&b) && left.is_subset(&a));
+        }
+
+        #[test]
+        fn garbage_is_refused_or_is_the_one_encoding(n in 0_u16..400, bytes in vec(any::<u8>(), 0..30)) {
+            if let Ok(set) = CellSet::decode_rle(n, &bytes) {
+                prop_assert_eq!(set.encode_rle(None), bytes);
+            }
+        }
+    }
+
+    #[test]
+    fn malformed_run_lengths_are_named() {
+        let refused = [
+            (vec![0x80], CellsError::Length { at: 0 }),
+            (vec![0x80, 0x00], CellsError::Length { at: 0 }),
+            (vec![0xff, 0xff, 0x7f], CellsError::Length { at: 0 }),
+            (vec![0, 0], CellsError::Empty { run: 1 }),
+            (vec![0, 11], CellsError::Beyond { cells: 11, n: 10 }),
+            (vec![0, 2, 3], CellsError::Open),
+        ];
+        for (bytes, why) in refused {
+            assert_eq!(CellSet::decode_rle(10, &bytes), Err(why), "{bytes:?}");
+        }
+    }
+
+    #[test]
+    fn the_largest_loop_fits() {
+        let set = CellSet::full(u16::MAX);
+        assert!(set.is_full());
+        assert_eq!(
+            CellSet::decode_rle(u16::MAX, &set.encode_rle(None)),
+            Ok(set)
+        );
+        let mut wrapped = CellSet::new(10);
+        assert!(wrapped.insert_run(Run { first: 8, count: 4 }));
+        assert_eq!(wrapped.iter().collect::<Vec<_>>(), [0, 1, 8, 9]);
+    }
+}

@@ -1,0 +1,1 @@
+//! What is held, passed on and sent, and when.

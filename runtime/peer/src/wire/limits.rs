@@ -1,0 +1,133 @@
+//! What each value on the wire may hold.
+//!
+//! Carries out the message formats of D2.7 §2.4. A value beyond its limit is refused
+//! with the whole record: nothing is clipped, since a clipped value would be one its
+//! author never said.
+
+use super::codec::{Body, WireError};
+use super::message::{Beacon, Register, Round, Run, Snapshot, State};
+
+/// Gossip entries in a beacon: what a tenth of a second of a 64 kbit/s channel carries.
+pub const GOSSIP_MAX: usize = 20;
+/// Members of a round: the largest fleet.
+pub const MEMBERS_MAX: usize = 64;
+/// Listings in a register's plan: one a fragment; more than a UAV turns in a sortie.
+pub const PLAN_MAX: usize = 64;
+/// Listings a register still answers for: those of one earlier plan, less what merges.
+pub const HELD_MAX: usize = 48;
+/// Runs of the present section done: one a fragment flown, merged as they meet.
+pub const DONE_MAX: usize = 32;
+/// Runs a snapshot commits to: the flight of one waiting time crosses few fragments.
+pub const COMMITS_MAX: usize = 32;
+/// Run-length bytes of the union in a snapshot (short runs are left out beyond).
+pub const SNAPSHOT_UNION_MAX_BYTES: usize = 256;
+/// Run-length bytes of the union in a cover record.
+pub const COVER_UNION_MAX_BYTES: usize = 1000;
+/// Bytes of a mission in one piece.
+pub const CHUNK_MAX_BYTES: usize = 1024;
+/// Pieces of a mission: 64 KiB of rings are some 6,000 corners.
+pub const CHUNKS_MAX: u16 = 64;
+/// Bytes of a notice's text.
+pub const TEXT_MAX_BYTES: usize = 240;
+/// Farthest from the origin that the tangent plane is trusted, mm: 20 km.
+pub const POSITION_MAX_MM: i32 = 20_000_000;
+/// Heading, 1e-4 rad: a turn either way.
+pub const HEADING_MAX_E4: i32 = 62_832;
+/// Fastest speed that makes sense of a UAV, mm/s.
+pub const SPEED_MAX_MMPS: u32 = 200_000;
+/// Longest duration of any plan or endurance, milliseconds: a day.
+pub const DURATION_MAX_MS: u32 = 86_400_000;
+/// Hops beyond which nothing travels.
+pub const HOPS_MAX: u8 = 16;
+
+/// The first field of a body that is out of range.
+pub(super) fn check(body: &Body) -> Result<(), WireError> {
+    match body {
+        Body::Beacon(b) => check_beacon(b),
+        Body::State(s) => check_state(s),
+        Body::Round(s) => check_snapshot(s),
+        Body::Claim(r) => check_register(r),
+        Body::Cover(c) => at_most("union", c.union.len(), COVER_UNION_MAX_BYTES),
+        Body::Mission(m) => {
+            at_most("bytes", m.bytes.len(), CHUNK_MAX_BYTES)?;
+            in_range("chunks", (1..=CHUNKS_MAX).contains(&m.chunks))
+        }
+        Body::Operator(_) | Body::Finished(_) => Ok(()),
+        Body::Event(n) => {
+            at_most("text", n.text.len(), TEXT_MAX_BYTES)?;
+            in_range("text", !n.text.chars().any(char::is_control))
+        }
+    }
+}
+
+pub(super) fn in_range(field: &'static str, holds: bool) -> Result<(), WireError> {
+    if holds {
+        Ok(())
+    } else {
+        Err(WireError::Range { field })
+    }
+}
+
+pub(super) fn at_most(field: &'static str, len: usize, cap: usize) -> Result<(), WireError> {
+    in_range(field, len <= cap)
+}
+
+fn check_pose(east_mm: i32, north_mm: i32, heading_e4: i32) -> Result<(), WireError> {
+    let near = |v: i32, max: i32| v.unsigned_abs() <= max.unsigned_abs();
+    in_range("east_mm", near(east_mm, POSITION_MAX_MM))?;
+    in_range("north_mm", near(north_mm, POSITION_MAX_MM))?;
+    in_range("heading_e4", near(heading_e4, HEADING_MAX_E4))
+}
+
+fn check_beacon(b: &Beacon) -> Result<(), WireError> {
+    check_pose(b.east_mm, b.north_mm, b.heading_e4)?;
+    in_range("eccentricity", b.eccentricity <= HOPS_MAX)?;
+    at_most("gossip", b.gossip.len(), GOSSIP_MAX)?;
+    in_range("hops", b.gossip.iter().all(|g| g.hops <= HOPS_MAX))
+}
+
+fn check_state(s: &State) -> Result<(), WireError> {
+    check_pose(s.east_mm, s.north_mm, s.heading_e4)?;
+    in_range(
+        "height_mm",
+        s.height_mm.unsigned_abs() <= POSITION_MAX_MM.unsigned_abs(),
+    )?;
+    in_range("airspeed_mmps", s.airspeed_mmps <= SPEED_MAX_MMPS)?;
+    in_range("endurance_s", s.endurance_s <= DURATION_MAX_MS / 1000)?;
+    in_range("covered", s.covered <= s.cells)
+}
+
+fn check_runs(field: &'static str, runs: &[Run], max: usize) -> Result<(), WireError> {
+    at_most(field, runs.len(), max)?;
+    in_range(field, runs.iter().all(|r| r.count > 0))
+}
+
+fn check_round(r: &Round) -> Result<(), WireError> {
+    at_most("members", r.members.len(), MEMBERS_MAX)?;
+    in_range("members", r.members.is_sorted_by(|a, b| a.id < b.id))?;
+    in_range("wait_ms", r.wait_ms <= DURATION_MAX_MS)
+}
+
+fn check_snapshot(s: &Snapshot) -> Result<(), WireError> {
+    check_round(&s.round)?;
+    for (field, ms) in [
+        ("release_ms", s.release_ms),
+        ("turn_ms", s.turn_ms),
+        ("endurance_ms", s.endurance_ms),
+        ("eta_ms", s.eta_ms),
+    ] {
+        in_range(field, ms <= DURATION_MAX_MS)?;
+    }
+    in_range("speed_mmps", s.speed_mmps <= SPEED_MAX_MMPS)?;
+    at_most("union", s.union.len(), SNAPSHOT_UNION_MAX_BYTES)?;
+    check_runs("commits", &s.commits, COMMITS_MAX)
+}
+
+fn check_register(r: &Register) -> Result<(), WireError> {
+    for (field, listings, max) in [("plan", &r.plan, PLAN_MAX), ("held", &r.held, HELD_MAX)] {
+        at_most(field, listings.len(), max)?;
+        in_range(field, listings.iter().all(|l| l.run.count > 0))?;
+    }
+    check_runs("done", &r.done, DONE_MAX)?;
+    in_range("eta_ms", r.eta_ms <= DURATION_MAX_MS)
+}

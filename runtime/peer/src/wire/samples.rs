@@ -1,0 +1,278 @@
+//! Bodies that tests share: typical ones with their bytes, and the largest valid ones.
+
+use super::codec::Body;
+use super::limits::*;
+use super::message::*;
+
+/// What is known of a peer, typically.
+pub fn gossip(id: u16) -> Gossip {
+    Gossip {
+        id,
+        incarnation: 2,
+        heartbeat: 300,
+        age_ds: 15,
+        hops: 2,
+        suspected_ds: Some(4),
+        able: true,
+        max_seq: 70_000,
+        digest: 0xbeef,
+    }
+}
+
+/// A run of twelve cells, listed typically.
+pub fn listing(first: u16) -> Listing {
+    Listing {
+        run: Run { first, count: 12 },
+        backward: true,
+        firmness: Firmness::Committed,
+        stamp: Stamp {
+            epoch: Epoch {
+                counter: 7,
+                hash: 0xdead_beef,
+            },
+            take: 1,
+            id: 3,
+        },
+    }
+}
+
+/// A typical body of each kind and its bytes, which must never change within v1.
+pub fn golden() -> Vec<(Body, &'static str)> {
+    let round = Round {
+        counter: 7,
+        members: vec![
+            Member {
+                id: 1,
+                incarnation: 1,
+            },
+            Member {
+                id: 3,
+                incarnation: 2,
+            },
+        ],
+        revision: 1,
+        loop_hash: 0x0123_4567_89ab_cdef,
+        loss: true,
+        wait_ms: 5000,
+    };
+    vec![
+        (
+            Body::Beacon(Beacon {
+                heartbeat: 42,
+                east_mm: -1_234_567,
+                north_mm: 890_123,
+                heading_e4: 15_708,
+                able: true,
+                ground: false,
+                finished: false,
+                nonce: 0xcafe_f00d,
+                counter: 7,
+                eccentricity: 2,
+                revision: 1,
+                loop_hash: 0x0123_4567_89ab_cdef,
+                cover_digest: 99,
+                gossip: vec![
+                    gossip(4),
+                    Gossip {
+                        suspected_ds: None,
+                        ..gossip(5)
+                    },
+                ],
+            }),
+            "8e182a3a0012d6861a000d950b193d5cf5f4f41acafef00d0702011b0123456789abcdef18638289040219012c0f0204f51a0001117019beef89050219012c0f02f6f51a0001117019beef",
+        ),
+        (
+            Body::State(State {
+                east_mm: 1,
+                north_mm: -1,
+                height_mm: 120_000,
+                heading_e4: -31_416,
+                airspeed_mmps: 18_000,
+                endurance_s: 2400,
+                behaviour: Behaviour::Covering,
+                mission: MissionStatus::Active,
+                covered: 100,
+                cells: 480,
+            }),
+            "8a01201a0001d4c0397ab7194650190960010118641901e0",
+        ),
+        (
+            Body::Round(Snapshot {
+                round,
+                anchor: 17,
+                backward: false,
+                release_ms: 4000,
+                speed_mmps: 18_000,
+                turn_ms: 9000,
+                endurance_ms: 1_200_000,
+                union: vec![0, 12, 3, 4],
+                commits: vec![Run {
+                    first: 16,
+                    count: 2,
+                }],
+                eta_ms: 600_000,
+                adopted_ago_ms: 70_000,
+                cells_since: 5,
+                idle: false,
+            }),
+            "8d860782820101820302011b0123456789abcdeff519138811f4190fa01946501923281a00124f8044000c0304818210021a000927c01a0001117005f4",
+        ),
+        (
+            Body::Claim(Register {
+                revision: 1,
+                loop_hash: 0x0123_4567_89ab_cdef,
+                epoch: Epoch {
+                    counter: 7,
+                    hash: 0xdead_beef,
+                },
+                plan: vec![listing(20), listing(40)],
+                held: vec![listing(60)],
+                done: vec![Run { first: 1, count: 3 }],
+                eta_ms: 600_000,
+            }),
+            "87011b0123456789abcdef82071adeadbeef8288140cf501071adeadbeef01038818280cf501071adeadbeef01038188183c0cf501071adeadbeef0103818201031a000927c0",
+        ),
+        (
+            Body::Cover(Cover {
+                revision: 1,
+                loop_hash: 5,
+                union: vec![0, 12],
+            }),
+            "83010542000c",
+        ),
+        (
+            Body::Mission(MissionChunk {
+                revision: 1,
+                content_hash: 6,
+                chunks: 2,
+                bytes: vec![1, 2, 3],
+            }),
+            "8401060243010203",
+        ),
+        (Body::Operator(Order::ReturnToBase), "8102"),
+        (Body::Finished(Finished { revision: 3 }), "8103"),
+        (
+            Body::Event(Notice {
+                text: "low fuel".into(),
+            }),
+            "81686c6f77206675656c",
+        ),
+    ]
+}
+
+/// The largest valid body of each kind.
+pub fn largest() -> Vec<Body> {
+    let gossip = Gossip {
+        id: u16::MAX,
+        incarnation: u32::MAX,
+        heartbeat: u32::MAX,
+        age_ds: u16::MAX,
+        hops: HOPS_MAX,
+        suspected_ds: Some(u16::MAX),
+        able: true,
+        max_seq: u32::MAX,
+        digest: u16::MAX,
+    };
+    let epoch = Epoch {
+        counter: u32::MAX,
+        hash: u32::MAX,
+    };
+    let run = Run {
+        first: u16::MAX,
+        count: u16::MAX,
+    };
+    let stamp = Stamp {
+        epoch,
+        take: u16::MAX,
+        id: u16::MAX,
+    };
+    let listing = Listing {
+        run,
+        backward: true,
+        firmness: Firmness::Done,
+        stamp,
+    };
+    let members = (u16::MAX - 63..=u16::MAX)
+        .map(|id| Member {
+            id,
+            incarnation: u32::MAX,
+        })
+        .collect();
+    vec![
+        Body::Beacon(Beacon {
+            heartbeat: u32::MAX,
+            east_mm: -POSITION_MAX_MM,
+            north_mm: -POSITION_MAX_MM,
+            heading_e4: -HEADING_MAX_E4,
+            able: true,
+            ground: true,
+            finished: true,
+            nonce: u32::MAX,
+            counter: u32::MAX,
+            eccentricity: HOPS_MAX,
+            revision: u32::MAX,
+            loop_hash: u64::MAX,
+            cover_digest: u32::MAX,
+            gossip: vec![gossip; GOSSIP_MAX],
+        }),
+        Body::State(State {
+            east_mm: -POSITION_MAX_MM,
+            north_mm: -POSITION_MAX_MM,
+            height_mm: -POSITION_MAX_MM,
+            heading_e4: -HEADING_MAX_E4,
+            airspeed_mmps: SPEED_MAX_MMPS,
+            endurance_s: DURATION_MAX_MS / 1000,
+            behaviour: Behaviour::Ground,
+            mission: MissionStatus::Failed,
+            covered: u16::MAX,
+            cells: u16::MAX,
+        }),
+        Body::Round(Snapshot {
+            round: Round {
+                counter: u32::MAX,
+                members,
+                revision: u32::MAX,
+                loop_hash: u64::MAX,
+                loss: true,
+                wait_ms: DURATION_MAX_MS,
+            },
+            anchor: u16::MAX,
+            backward: true,
+            release_ms: DURATION_MAX_MS,
+            speed_mmps: SPEED_MAX_MMPS,
+            turn_ms: DURATION_MAX_MS,
+            endurance_ms: DURATION_MAX_MS,
+            union: vec![255; SNAPSHOT_UNION_MAX_BYTES],
+            commits: vec![run; COMMITS_MAX],
+            eta_ms: DURATION_MAX_MS,
+            adopted_ago_ms: u32::MAX,
+            cells_since: u16::MAX,
+            idle: true,
+        }),
+        Body::Claim(Register {
+            revision: u32::MAX,
+            loop_hash: u64::MAX,
+            epoch,
+            plan: vec![listing; PLAN_MAX],
+            held: vec![listing; HELD_MAX],
+            done: vec![run; DONE_MAX],
+            eta_ms: DURATION_MAX_MS,
+        }),
+        Body::Cover(Cover {
+            revision: u32::MAX,
+            loop_hash: u64::MAX,
+            union: vec![9; COVER_UNION_MAX_BYTES],
+        }),
+        Body::Mission(MissionChunk {
+            revision: u32::MAX,
+            content_hash: u64::MAX,
+            chunks: CHUNKS_MAX,
+            bytes: vec![9; CHUNK_MAX_BYTES],
+        }),
+        Body::Operator(Order::ReturnToBase),
+        Body::Finished(Finished { revision: u32::MAX }),
+        Body::Event(Notice {
+            text: "x".repeat(TEXT_MAX_BYTES),
+        }),
+    ]
+}
