@@ -1,6 +1,8 @@
 //! Every file in `configs/` is usable, and every wrong scenario is refused with the
 //! place and the field, never with a panic.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
 use proptest::prelude::*;
 use skein_scenario::{
     Overrides, Severity, builtin_files, builtin_text, load_builtin, load_with, parse,
