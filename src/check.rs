@@ -2,6 +2,8 @@
 
 use crate::exit;
 use clap::{Args, ValueEnum};
+use skein_netsim::world::Survey;
+use skein_planning::coverage::area::CellId;
 use skein_scenario::{Overrides, Scenario, Summary, extent_m, summary};
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -40,26 +42,74 @@ pub enum Format {
 /// # Errors
 /// Only when stdout cannot be written.
 pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
-    let over = Overrides { peers: args.peers, ..Overrides::default() };
+    let over = Overrides {
+        peers: args.peers,
+        ..Overrides::default()
+    };
     let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {
         Ok(s) => s,
         Err(e) => {
             match args.format {
                 Format::Text => eprintln!("error: {e}"),
-                Format::Json => println!("{}", serde_json::json!({ "ok": false, "error": e.to_string() })),
+                Format::Json => println!(
+                    "{}",
+                    serde_json::json!({ "ok": false, "error": e.to_string() })
+                ),
             }
             return Ok(ExitCode::from(exit::CONFIG_INVALID));
         }
     };
     let total = summary(&scenario.spec, &scenario.ground);
+    let judged = Judged::new(&scenario);
     match args.format {
-        Format::Text => print!("{}", text(&scenario, &total)),
-        Format::Json => println!("{}", json(&scenario, &total)),
+        Format::Text => print!("{}", text(&scenario, &total, &judged)),
+        Format::Json => println!("{}", json(&scenario, &total, &judged)),
     }
     Ok(ExitCode::from(exit::OK))
 }
 
-fn text(scenario: &Scenario, total: &Summary) -> String {
+/// What the world's own geometry says of the same area.
+struct Judged {
+    cells: usize,
+    coverable: usize,
+    share: f64,
+    /// Cells that could be seen and are not on the planner's loop.
+    missed: Vec<CellId>,
+}
+
+impl Judged {
+    fn new(scenario: &Scenario) -> Self {
+        let survey = Survey::new(&scenario.spec);
+        let the_loop = &scenario.ground.coverage_loop;
+        let open = survey.cells().iter().filter(|c| c.uncoverable.is_none());
+        Self {
+            cells: survey.cells().len(),
+            coverable: survey.n_coverable(),
+            share: survey.coverable_share(),
+            missed: open
+                .map(|c| c.id)
+                .filter(|id| the_loop.index_of(*id).is_none())
+                .collect(),
+        }
+    }
+}
+
+/// Names of the first cells of a list.
+fn names(cells: &[CellId]) -> String {
+    let first: Vec<String> = cells
+        .iter()
+        .take(LISTED_CELLS)
+        .map(|c| format!("({},{})", c.col, c.row))
+        .collect();
+    let more = if cells.len() > LISTED_CELLS {
+        " ..."
+    } else {
+        ""
+    };
+    format!("{}{more}", first.join(" "))
+}
+
+fn text(scenario: &Scenario, total: &Summary, judged: &Judged) -> String {
     let spec = &scenario.spec;
     let (width_m, height_m) = extent_m(spec);
     let mission = &spec.mission;
@@ -73,9 +123,11 @@ fn text(scenario: &Scenario, total: &Summary) -> String {
     line(
         "area",
         format!(
-            "{:.3} km² in {width_m:.0} x {height_m:.0} m, {:.2} % coverable",
+            "{:.3} km² in {width_m:.0} x {height_m:.0} m; {} of {} cells can be seen, {:.2} % of the area",
             total.area_m2 / 1e6,
-            total.coverable_share * 100.0
+            judged.coverable,
+            judged.cells,
+            judged.share * 100.0
         ),
     );
     line(
@@ -87,14 +139,36 @@ fn text(scenario: &Scenario, total: &Summary) -> String {
             spec.buildings.len()
         ),
     );
-    line("cells", format!("{} of {lane_m} m on the loop, {} of them seen by excursions", total.cells, total.excursions));
+    line(
+        "cells",
+        format!(
+            "{} of {lane_m} m on the loop, {} of them seen by excursions",
+            total.cells, total.excursions
+        ),
+    );
     for (reason, cells) in &total.uncoverable {
-        let names: Vec<String> = cells.iter().take(LISTED_CELLS).map(|c| format!("({},{})", c.col, c.row)).collect();
-        let more = if cells.len() > LISTED_CELLS { " ..." } else { "" };
-        line("uncoverable", format!("{} cells, {reason}: {}{more}", cells.len(), names.join(" ")));
+        line(
+            "uncovered",
+            format!("{} cells, {reason}: {}", cells.len(), names(cells)),
+        );
+    }
+    if !judged.missed.is_empty() {
+        line(
+            "missed",
+            format!(
+                "{} cells that could be seen are not on the loop: {}",
+                judged.missed.len(),
+                names(&judged.missed)
+            ),
+        );
     }
     line("loop", format!("{:.1} km", total.loop_m / 1000.0));
-    let ground = spec.ground.as_ref().map_or("no ground station".to_owned(), |g| format!("ground station {}", g.id));
+    let ground = spec
+        .ground
+        .as_ref()
+        .map_or("no ground station".to_owned(), |g| {
+            format!("ground station {}", g.id)
+        });
     let heights = spec.uavs.iter().map(|u| u.height_m);
     line(
         "fleet",
@@ -105,20 +179,39 @@ fn text(scenario: &Scenario, total: &Summary) -> String {
             heights.fold(0.0, f64::max)
         ),
     );
-    line("faults", format!("{} at stated times, up to {} kills in a storm", spec.faults.len(), spec.storm.max_kills));
-    line("makespan", format!("about {:.0} s without failures", total.makespan_s));
+    line(
+        "faults",
+        format!(
+            "{} at stated times, up to {} kills in a storm",
+            spec.faults.len(),
+            spec.storm.max_kills
+        ),
+    );
+    line(
+        "makespan",
+        format!("about {:.0} s without failures", total.makespan_s),
+    );
     for finding in &scenario.findings {
         let _ = writeln!(out, "{finding}");
     }
     out
 }
 
-fn json(scenario: &Scenario, total: &Summary) -> serde_json::Value {
+fn json(scenario: &Scenario, total: &Summary, judged: &Judged) -> serde_json::Value {
     let spec = &scenario.spec;
     let uncoverable: serde_json::Map<String, serde_json::Value> = total
         .uncoverable
         .iter()
-        .map(|(reason, cells)| (reason.clone(), cells.iter().map(|c| vec![c.col, c.row]).collect::<Vec<_>>().into()))
+        .map(|(reason, cells)| {
+            (
+                reason.clone(),
+                cells
+                    .iter()
+                    .map(|c| vec![c.col, c.row])
+                    .collect::<Vec<_>>()
+                    .into(),
+            )
+        })
         .collect();
     let findings: Vec<serde_json::Value> = scenario
         .findings
@@ -136,7 +229,10 @@ fn json(scenario: &Scenario, total: &Summary) -> serde_json::Value {
         "ok": true,
         "scenario": spec.name,
         "area_m2": total.area_m2,
-        "coverable_share": total.coverable_share,
+        "coverable_share": judged.share,
+        "coverable_cells": judged.coverable,
+        "planned_share": total.coverable_share,
+        "missed": judged.missed.iter().map(|c| [c.col, c.row]).collect::<Vec<_>>(),
         "zones": spec.zones.len(),
         "buildings": spec.buildings.len(),
         "cells": total.cells,

@@ -237,8 +237,10 @@ fn reach_m(u: &UavSpec) -> f64 {
 pub struct Summary {
     /// The area, square metres.
     pub area_m2: f64,
-    /// Cells on the loop.
+    /// Cells of the area on the loop.
     pub cells: usize,
+    /// Cells outside of the area that the loop passes.
+    pub passed: usize,
     /// Cells on the loop that are seen by an excursion from it.
     pub excursions: usize,
     /// Cells that touch the area and cannot be seen, by reason.
@@ -290,14 +292,15 @@ pub fn summary(spec: &Spec, ground: &Ground) -> Summary {
     let division = failure_free(spec, the_loop);
     Summary {
         area_m2,
-        cells: the_loop.len(),
+        cells: the_loop.cells().iter().filter(|c| c.needed).count(),
+        passed: the_loop.cells().iter().filter(|c| !c.needed).count(),
         excursions: the_loop.cells().iter().filter(|c| c.excursion).count(),
         uncoverable,
         coverable_share: (1.0 - lost_m2 / area_m2).clamp(0.0, 1.0),
         loop_m: the_loop
             .cells()
             .iter()
-            .map(|c| f64::from(c.service_mm) / 1000.0)
+            .map(|c| f64::from(if c.needed { c.service_mm } else { c.travel_mm }) / 1000.0)
             .sum(),
         makespan_s: f64::from(division.makespan_ms) / 1000.0,
         unassigned_cells: division.unassigned,
@@ -321,7 +324,7 @@ fn failure_free(spec: &Spec, the_loop: &CoverageLoop) -> Division {
         .map(|c| RingCell {
             service_mm: c.service_mm,
             travel_mm: c.travel_mm,
-            open: true,
+            open: c.needed,
         })
         .collect();
     let robots: Vec<Robot> = spec.uavs.iter().map(|u| robot(u, the_loop)).collect();
