@@ -1,2 +1,4 @@
 //! One module a promise.
+
+mod architecture;
 mod configs;

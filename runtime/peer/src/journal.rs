@@ -1,8 +1,48 @@
 //! What a peer makes durable before it speaks of it, and how it reads it back.
+//!
+//! A journal is a sequence of [`Entry`] records. Only promises are in it: the life
+//! (incarnation), the bids with their round counter, the sections adopted or taken,
+//! and the union of covered cells now and then. Everything else a peer hears again.
 
 use crate::Incarnation;
+use crate::cells::CellSet;
 use crate::wire::message::{Register, Snapshot};
 use serde::{Deserialize, Serialize};
+
+/// One journal record.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Entry {
+    /// A life begins.
+    Life(Incarnation),
+    /// A bid is about to be spoken.
+    Bid(Snapshot),
+    /// A section is about to be flown.
+    Section(Register),
+    /// Covered cells known of.
+    Union {
+        /// The loop they are counted on.
+        loop_hash: u64,
+        /// Number of cells of that loop.
+        cells: u16,
+        /// Run-length encoded.
+        #[serde(with = "serde_bytes")]
+        union: Vec<u8>,
+    },
+}
+
+impl Entry {
+    /// The bytes of the record.
+    #[must_use]
+    pub fn encode(&self) -> Vec<u8> {
+        cbor4ii::serde::to_vec(Vec::with_capacity(128), self).unwrap_or_default()
+    }
+
+    /// Reads a record back; `None` when it was written by a later version.
+    #[must_use]
+    pub fn decode(bytes: &[u8]) -> Option<Self> {
+        cbor4ii::serde::from_slice(bytes).ok()
+    }
+}
 
 /// The state that a journal holds after all its records.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,6 +59,8 @@ pub struct Durable {
     pub union: Vec<u8>,
     /// The loop of `union`.
     pub loop_hash: u64,
+    /// Number of cells of that loop.
+    pub cells: u16,
 }
 
 impl Durable {
@@ -26,7 +68,67 @@ impl Durable {
     /// be read is skipped and counted; it was written by a later version.
     #[must_use]
     pub fn replay(records: &[Vec<u8>]) -> (Self, usize) {
-        let _ = records;
-        todo!("peer")
+        let mut durable = Self::default();
+        let mut unread = 0;
+        for bytes in records {
+            match Entry::decode(bytes) {
+                Some(entry) => durable.apply(&entry),
+                None => unread += 1,
+            }
+        }
+        (durable, unread)
+    }
+
+    /// Takes one more record into account. Coverage only grows: unions on the same
+    /// loop are merged, not replaced.
+    pub fn apply(&mut self, entry: &Entry) {
+        match entry {
+            Entry::Life(incarnation) => self.incarnation = self.incarnation.max(*incarnation),
+            Entry::Bid(snapshot) => {
+                self.counter = self.counter.max(snapshot.round.counter);
+                self.snapshot = Some(snapshot.clone());
+            }
+            Entry::Section(register) => {
+                self.counter = self.counter.max(register.epoch.counter);
+                self.register = Some(register.clone());
+            }
+            Entry::Union { loop_hash, cells, union } => {
+                let mut merged = union.clone();
+                if (self.loop_hash, self.cells) == (*loop_hash, *cells)
+                    && let (Ok(mut a), Ok(b)) =
+                        (CellSet::decode_rle(*cells, &self.union), CellSet::decode_rle(*cells, union))
+                {
+                    a.union_with(&b);
+                    merged = a.encode_rle(None);
+                }
+                self.loop_hash = *loop_hash;
+                self.cells = *cells;
+                self.union = merged;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn union(cells: &[u16]) -> Entry {
+        let mut set = CellSet::new(20);
+        for c in cells {
+            set.insert(*c);
+        }
+        Entry::Union { loop_hash: 5, cells: 20, union: set.encode_rle(None) }
+    }
+
+    #[test]
+    fn replaying_gives_the_newest_promises_and_all_coverage() {
+        let entries = [Entry::Life(3), union(&[1, 2]), union(&[7]), Entry::Life(4)];
+        let mut records: Vec<Vec<u8>> = entries.iter().map(Entry::encode).collect();
+        records.push(vec![0xff, 0x00]);
+        let (d, unread) = Durable::replay(&records);
+        assert_eq!((d.incarnation, unread), (4, 1));
+        let set = CellSet::decode_rle(20, &d.union).unwrap();
+        assert_eq!(set.iter().collect::<Vec<_>>(), [1, 2, 7]);
     }
 }

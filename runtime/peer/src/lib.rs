@@ -20,21 +20,30 @@
 //! `Stored` when the record is durable, not before. `Plan` is answered by `Planned`
 //! with what [`plan::solve`] returned, computed wherever the driver likes.
 
+mod boot;
 pub mod cells;
 pub mod config;
+mod cooperation;
+pub mod coverage;
+mod ear;
 pub mod input;
 pub mod journal;
 pub mod membership;
 pub mod mission;
 pub mod output;
+pub mod peer;
 pub mod plan;
 pub mod relay;
+pub mod view;
+mod voice;
 pub mod wire;
 
 pub use config::{PeerConfig, Role};
 pub use input::{Command, Input, Time};
 pub use mission::Mission;
 pub use output::{Output, Priority, Report};
+pub use peer::Peer;
+pub use view::View;
 
 use serde::{Deserialize, Serialize};
 
@@ -48,53 +57,5 @@ pub type Incarnation = u32;
 impl core::fmt::Display for PeerId {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(f, "uav{}", self.0)
-    }
-}
-
-pub use view::View;
-
-pub mod view;
-
-/// The mind of one peer.
-#[derive(Debug)]
-pub struct Peer {
-    config: PeerConfig,
-}
-
-impl Peer {
-    /// A peer that has not started; its first input must be [`Input::Start`].
-    #[must_use]
-    pub fn new(config: PeerConfig) -> Self {
-        Self { config }
-    }
-
-    /// Takes one input at the peer's own time.
-    pub fn handle(&mut self, now: Time, input: Input) {
-        let _ = (now, input, &self.config);
-        todo!("peer")
-    }
-
-    /// The next output of the last input, if there is one left.
-    pub fn poll(&mut self) -> Option<Output> {
-        todo!("peer")
-    }
-
-    /// When the peer wants [`Input::Timer`] at the latest.
-    #[must_use]
-    pub fn next_timeout(&self) -> Option<Time> {
-        todo!("peer")
-    }
-
-    /// A copy of what it believes.
-    #[must_use]
-    pub fn view(&self) -> View {
-        todo!("peer")
-    }
-
-    /// What it believes to be durable, in the order it was written: a judge
-    /// compares it with what replaying the journal gives.
-    #[must_use]
-    pub fn durable(&self) -> journal::Durable {
-        todo!("peer")
     }
 }

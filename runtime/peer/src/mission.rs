@@ -1,11 +1,13 @@
 //! What a mission is: area, zones, lanes, level, origin, revision.
 
 use crate::plan::Ground;
+use crate::wire::message::MissionChunk;
 use serde::{Deserialize, Serialize};
 use skein_planning::coverage::area::{AreaProblem, CoverageLoop};
 use skein_planning::frame::Point;
 use skein_planning::geometry::{NoFlyZones, Polygon};
 use skein_planning::path::{RouteLimits, Router};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A point in millimetres east and north of the mission's origin.
@@ -122,5 +124,141 @@ impl Mission {
             coverage_loop: Arc::new(coverage_loop),
             router: Arc::new(router),
         }))
+    }
+}
+
+/// Largest piece of a mission's body in one record: with its envelope it stays
+/// below a quarter of the record cap, so that a lost piece is cheap to repeat.
+pub const CHUNK_BYTES: usize = 1024;
+
+/// Most pieces of a mission: 64 KiB hold about 6,000 vertices.
+pub const MAX_CHUNKS: u16 = 64;
+
+/// Most revisions whose pieces are collected at one time; the oldest is forgotten.
+pub const MAX_PARTIAL: usize = 4;
+
+/// The body of a mission in pieces. Empty when it is too large to be spoken.
+#[must_use]
+pub fn chunks(mission: &Mission) -> Vec<MissionChunk> {
+    let bytes = cbor4ii::serde::to_vec(Vec::new(), mission).unwrap_or_default();
+    let pieces = bytes.chunks(CHUNK_BYTES);
+    let Ok(count) = u16::try_from(pieces.len()) else {
+        return Vec::new();
+    };
+    if count > MAX_CHUNKS {
+        return Vec::new();
+    }
+    pieces
+        .map(|piece| MissionChunk {
+            revision: mission.revision,
+            content_hash: mission.content_hash(),
+            chunks: count,
+            bytes: piece.to_vec(),
+        })
+        .collect()
+}
+
+/// The missions a peer holds whole, and the pieces of those it does not.
+#[derive(Clone, Debug, Default)]
+pub struct Library {
+    whole: Option<Arc<Mission>>,
+    partial: BTreeMap<(u32, u64), BTreeMap<u16, MissionChunk>>,
+}
+
+impl Library {
+    /// A library that begins with the mission found on disk, if any.
+    #[must_use]
+    pub fn new(mission: Option<Arc<Mission>>) -> Self {
+        Self { whole: mission, partial: BTreeMap::new() }
+    }
+
+    /// The newest whole mission.
+    #[must_use]
+    pub fn newest(&self) -> Option<Arc<Mission>> {
+        self.whole.clone()
+    }
+
+    /// Takes a whole mission if it is newer than the one held.
+    pub fn offer(&mut self, mission: Arc<Mission>) {
+        if self.whole.as_ref().is_none_or(|w| mission.revision > w.revision) {
+            self.partial.retain(|(revision, _), _| *revision > mission.revision);
+            self.whole = Some(mission);
+        }
+    }
+
+    /// Takes a piece. Returns whether it completed a newer mission.
+    ///
+    /// # Errors
+    /// A sentence when the pieces do not give the mission they claim to be; they
+    /// are forgotten, and the mission held stays in force.
+    pub fn chunk(&mut self, index: u16, chunk: &MissionChunk) -> Result<bool, String> {
+        let known = self.whole.as_ref().map_or(0, |w| w.revision);
+        if chunk.revision <= known || chunk.chunks == 0 || chunk.chunks > MAX_CHUNKS || index >= chunk.chunks {
+            return Ok(false);
+        }
+        let key = (chunk.revision, chunk.content_hash);
+        let pieces = self.partial.entry(key).or_default();
+        pieces.insert(index, chunk.clone());
+        if pieces.len() < usize::from(chunk.chunks) {
+            while self.partial.len() > MAX_PARTIAL {
+                self.partial.pop_first();
+            }
+            return Ok(false);
+        }
+        let bytes: Vec<u8> = pieces.values().flat_map(|c| c.bytes.iter().copied()).collect();
+        self.partial.remove(&key);
+        let mission: Mission = cbor4ii::serde::from_slice(&bytes)
+            .map_err(|e| format!("mission revision {} cannot be read: {e}", chunk.revision))?;
+        if mission.content_hash() != chunk.content_hash || mission.revision != chunk.revision {
+            return Err(format!("mission revision {} is not what its hash says", chunk.revision));
+        }
+        self.offer(Arc::new(mission));
+        Ok(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mission(revision: u32, vertices: i32) -> Mission {
+        Mission {
+            revision,
+            origin_lat_e7: 601_655_000,
+            origin_lon_e7: 249_355_000,
+            area: (0..vertices).map(|i| (i * 1000, i * i)).collect(),
+            zones: vec![vec![(1, 2), (3, 4), (5, 9)]],
+            lane_spacing_mm: 48_000,
+            turn_radius_mm: 23_000,
+            clearance_mm: 8_000,
+            footprint_across_mm: 46_000,
+            footprint_along_mm: 36_000,
+            tracking_error_mm: 2_000,
+            launch: (0, 0),
+            base: (0, 0),
+        }
+    }
+
+    #[test]
+    fn a_mission_in_pieces_is_put_together_in_any_order() {
+        let m = mission(2, 500);
+        let pieces = chunks(&m);
+        assert!(pieces.len() > 2);
+        let mut library = Library::new(Some(Arc::new(mission(1, 4))));
+        for (i, piece) in pieces.iter().enumerate().rev() {
+            let done = library.chunk(u16::try_from(i).unwrap(), piece).unwrap();
+            assert_eq!(done, i == 0);
+        }
+        assert_eq!(*library.newest().unwrap(), m);
+    }
+
+    #[test]
+    fn a_forged_piece_is_refused_and_the_old_mission_stays() {
+        let m = mission(2, 4);
+        let mut pieces = chunks(&m);
+        pieces[0].content_hash ^= 1;
+        let mut library = Library::new(Some(Arc::new(mission(1, 4))));
+        assert!(library.chunk(0, &pieces[0]).is_err());
+        assert_eq!(library.newest().unwrap().revision, 1);
     }
 }

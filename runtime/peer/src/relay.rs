@@ -1,1 +1,436 @@
-//! What is held, passed on and sent, and when.
+//! What a peer holds of everybody, and what it passes on.
+//!
+//! Records travel by two ways: a relayed record is passed on once when it is new
+//! (unless enough neighbours were heard doing so), and beacons tell neighbours which
+//! versions a peer holds, so that whoever has newer ones puts them on the air again.
+//! So a record reaches everybody that a chain of meetings reaches, also long after
+//! its author died.
+//!
+//! Everything a peer sends goes through one token bucket: its fair share of the
+//! channel it hears. Newer values replace older ones of the same key in the queue.
+
+use crate::Incarnation;
+use crate::input::Time;
+use crate::output::Priority;
+use crate::wire::Fnv;
+use crate::wire::key;
+use crate::wire::kinds::Kind;
+use crate::wire::message::{Beacon, Record};
+use std::collections::BTreeMap;
+
+/// Most records held: 64 peers with a state, a bid, a claim, a finish, an order, an
+/// event, and one mission of 64 pieces.
+pub const MAX_RECORDS: usize = 448;
+
+/// Most transmissions waiting: all records of one neighbourhood once.
+pub const MAX_QUEUE: usize = 128;
+
+/// A record passed on so many hops is not passed on again.
+pub const MAX_HOPS: u8 = 16;
+
+/// A copy is not passed on if so many neighbours were heard sending it first: one is
+/// not enough where three in ten are lost.
+const COPIES_HEARD: u8 = 2;
+
+/// Share of the fair share that a peer may use: the rest is for collisions, beacons
+/// of newcomers and the error of counting neighbours.
+const SHARE_PERCENT: u64 = 80;
+
+/// Bytes that Zenoh, the attachment and the radio add to a record.
+pub const OVERHEAD_BYTES: usize = 26;
+
+/// A passed-on record waits at least this long and up to four times as long, so that
+/// neighbours do not all answer at once, milliseconds.
+const RELAY_DELAY_MS: u64 = 20;
+
+/// What became of a record that was heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Offer {
+    /// Newer than what was held.
+    New,
+    /// Held already.
+    Duplicate,
+    /// Older than what is held.
+    Stale,
+}
+
+/// A transmission that may go out now.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Out {
+    /// The natural key.
+    pub key: String,
+    /// The record.
+    pub bytes: Vec<u8>,
+    /// Hops it has made so far.
+    pub hops: u8,
+    /// Which goes first.
+    pub priority: Priority,
+    /// Worth sending for this long, milliseconds.
+    pub lifetime_ms: u32,
+}
+
+type RecordKey = (u8, u16, u16);
+
+#[derive(Clone, Debug)]
+struct Held {
+    record: Record,
+    bytes: Vec<u8>,
+    hops: u8,
+    copies: u8,
+    /// When somebody, this peer included, was last heard sending this version.
+    sent: Time,
+}
+
+#[derive(Clone, Debug)]
+struct Waiting {
+    from: Time,
+    until: Time,
+    priority: Priority,
+}
+
+/// The relay of one peer.
+#[derive(Clone, Debug)]
+pub struct Relay {
+    me: u16,
+    period_ms: u64,
+    rate_bps: u64,
+    fleet: String,
+    held: BTreeMap<RecordKey, Held>,
+    queue: BTreeMap<RecordKey, Waiting>,
+    neighbours: BTreeMap<u16, Time>,
+    answered: BTreeMap<u16, Time>,
+    tokens_mb: u64,
+    filled: Time,
+    salt: u64,
+}
+
+impl Relay {
+    /// An empty relay of `me` on a channel of `rate_bps`, beacon period in milliseconds.
+    #[must_use]
+    pub fn new(me: u16, fleet: &str, rate_bps: u32, period_ms: u32) -> Self {
+        Self {
+            me,
+            fleet: fleet.to_owned(),
+            period_ms: u64::from(period_ms.max(1)),
+            rate_bps: u64::from(rate_bps.max(1)),
+            held: BTreeMap::new(),
+            queue: BTreeMap::new(),
+            neighbours: BTreeMap::new(),
+            answered: BTreeMap::new(),
+            tokens_mb: 0,
+            filled: Time(0),
+            salt: u64::from(me).wrapping_mul(0x9E37_79B9_7F4A_7C15),
+        }
+    }
+
+    /// A new life of this peer: its own old records are void.
+    pub fn new_life(&mut self) {
+        let me = self.me;
+        self.held.retain(|k, _| k.2 != me);
+        self.queue.retain(|k, _| k.2 != me);
+    }
+
+    /// A record of this peer's own: held, and queued at once.
+    pub fn own(&mut self, now: Time, record: &Record, bytes: Vec<u8>) {
+        let key = (record.kind, record.subject, record.author);
+        let Some(kind) = Kind::of_number(record.kind) else {
+            return;
+        };
+        self.hold(now, key, Held { record: record.clone(), bytes, hops: 0, copies: 0, sent: now });
+        self.wait(now, key, kind, 0);
+    }
+
+    /// A record of somebody else's that was heard.
+    pub fn offer(&mut self, now: Time, record: &Record, bytes: &[u8], transmitter: u16, hops: u8) -> Offer {
+        let key = (record.kind, record.subject, record.author);
+        let version = (record.incarnation, record.seq);
+        let Some(kind) = Kind::of_number(record.kind) else {
+            return Offer::Stale;
+        };
+        if let Some(h) = self.held.get_mut(&key) {
+            let known = (h.record.incarnation, h.record.seq);
+            if version < known {
+                return Offer::Stale;
+            }
+            if version == known {
+                h.copies = h.copies.saturating_add(1);
+                h.sent = now;
+                if h.copies >= COPIES_HEARD {
+                    self.queue.remove(&key);
+                }
+                return Offer::Duplicate;
+            }
+        }
+        if self.newest_life(record.author) > record.incarnation {
+            return Offer::Stale;
+        }
+        self.held.retain(|k, h| k.2 != record.author || h.record.incarnation >= record.incarnation);
+        let hops = hops.saturating_add(1);
+        let held = Held { record: record.clone(), bytes: bytes.to_vec(), hops, copies: 1, sent: now };
+        self.hold(now, key, held);
+        if kind.relayed() && hops < MAX_HOPS {
+            let delay = RELAY_DELAY_MS + self.jitter(&key, version) % (3 * RELAY_DELAY_MS);
+            self.wait(now, key, kind, delay);
+        }
+        let _ = transmitter;
+        Offer::New
+    }
+
+    fn newest_life(&self, author: u16) -> Incarnation {
+        self.held.iter().filter(|(k, _)| k.2 == author).map(|(_, h)| h.record.incarnation).max().unwrap_or(0)
+    }
+
+    fn jitter(&self, key: &RecordKey, version: (Incarnation, u32)) -> u64 {
+        let mut h = Fnv::new();
+        for v in [u64::from(key.0), u64::from(key.1), u64::from(key.2), u64::from(version.1), self.salt] {
+            h.write(&v.to_le_bytes());
+        }
+        h.finish() >> 16
+    }
+
+    fn hold(&mut self, now: Time, key: RecordKey, held: Held) {
+        if self.held.len() >= MAX_RECORDS && !self.held.contains_key(&key) {
+            let me = self.me;
+            let oldest = self.held.iter().filter(|(k, _)| k.2 != me).min_by_key(|(k, h)| (h.sent, **k));
+            if let Some(k) = oldest.map(|(k, _)| *k) {
+                self.held.remove(&k);
+                self.queue.remove(&k);
+            }
+        }
+        let _ = now;
+        self.held.insert(key, held);
+    }
+
+    fn wait(&mut self, now: Time, key: RecordKey, kind: Kind, delay_ms: u64) {
+        if self.queue.len() >= MAX_QUEUE && !self.queue.contains_key(&key) {
+            let last = self.queue.iter().max_by_key(|(k, w)| (w.priority, w.from, **k)).map(|(k, _)| *k);
+            if let Some(k) = last {
+                self.queue.remove(&k);
+            }
+        }
+        let row = kind.row();
+        let from = now.plus_ms(delay_ms);
+        let until = from.plus_ms(u64::from(self.lifetime_ms(kind)));
+        self.queue.insert(key, Waiting { from, until, priority: row.priority });
+    }
+
+    fn lifetime_ms(&self, kind: Kind) -> u32 {
+        kind.lifetime_ms(u32::try_from(self.period_ms).unwrap_or(u32::MAX))
+    }
+
+    /// A neighbour's beacon: what it lacks is queued for it.
+    pub fn on_beacon(&mut self, now: Time, author: u16, beacon: &Beacon) {
+        self.neighbours.insert(author, now);
+        let window = 4 * self.period_ms;
+        self.neighbours.retain(|_, t| now.since_ms(*t) < window);
+        self.answered.retain(|_, t| now.since_ms(*t) < window);
+        let mut theirs: BTreeMap<u16, (Incarnation, u32, u16)> = BTreeMap::new();
+        for g in &beacon.gossip {
+            theirs.insert(g.id, (g.incarnation, g.max_seq, g.digest));
+        }
+        let authors: Vec<u16> = theirs.keys().copied().collect();
+        for subject in authors {
+            if subject == author {
+                continue;
+            }
+            let (incarnation, max_seq, digest) = theirs[&subject];
+            self.catch_up(now, subject, incarnation, max_seq, digest);
+        }
+    }
+
+    /// Queues what a neighbour lacks of one author's records.
+    fn catch_up(&mut self, now: Time, author: u16, incarnation: Incarnation, max_seq: u32, digest: u16) {
+        let life = self.newest_life(author);
+        let (mine_seq, mine_digest) = self.version(author, life);
+        if life == 0 || life < incarnation || (life == incarnation && mine_seq < max_seq) {
+            return;
+        }
+        if (life, mine_seq, mine_digest) == (incarnation, max_seq, digest) {
+            return;
+        }
+        let quiet = 2 * self.period_ms;
+        if self.answered.get(&author).is_some_and(|t| now.since_ms(*t) < quiet) {
+            return;
+        }
+        self.answered.insert(author, now);
+        let all = life > incarnation || mine_seq == max_seq;
+        let lacking: Vec<(RecordKey, Kind)> = self
+            .held
+            .iter()
+            .filter(|(k, h)| {
+                k.2 == author
+                    && h.record.incarnation == life
+                    && (all || h.record.seq > max_seq)
+                    && (now.since_ms(h.sent) >= quiet || h.copies == 0)
+            })
+            .filter_map(|(k, _)| Kind::of_number(k.0).map(|kind| (*k, kind)))
+            .filter(|(_, kind)| kind.relayed())
+            .collect();
+        for (key, kind) in lacking {
+            if !self.queue.contains_key(&key) {
+                let version = (life, u32::try_from(now.0 & 0xffff_ffff).unwrap_or(0));
+                let delay = RELAY_DELAY_MS + self.jitter(&key, version) % (8 * RELAY_DELAY_MS);
+                if let Some(h) = self.held.get_mut(&key) {
+                    h.copies = 0;
+                }
+                self.wait(now, key, kind, delay);
+            }
+        }
+    }
+
+    /// The versions held of an author's records of one life: highest `seq`, digest.
+    #[must_use]
+    pub fn version(&self, author: u16, incarnation: Incarnation) -> (u32, u16) {
+        let mut max = 0;
+        let mut h = Fnv::new();
+        for (k, held) in &self.held {
+            let relayed = Kind::of_number(k.0).is_some_and(Kind::relayed);
+            if k.2 == author && held.record.incarnation == incarnation && relayed {
+                max = max.max(held.record.seq);
+                h.write(&[k.0]);
+                h.write(&k.1.to_le_bytes());
+                h.write(&held.record.seq.to_le_bytes());
+            }
+        }
+        let d = h.finish();
+        #[allow(clippy::cast_possible_truncation, reason = "folded to 16 bits on purpose")]
+        let digest = (d ^ (d >> 16) ^ (d >> 32) ^ (d >> 48)) as u16;
+        (max, digest)
+    }
+
+    /// All records held, newest versions, in order of key.
+    #[must_use]
+    pub fn records(&self) -> Vec<Record> {
+        self.held.values().map(|h| h.record.clone()).collect()
+    }
+
+    /// Bytes per second this peer may send.
+    fn rate_bytes_ps(&self) -> u64 {
+        let sharers = self.neighbours.len() as u64 + 1;
+        (self.rate_bps / 8 * SHARE_PERCENT / 100 / sharers).max(1)
+    }
+
+    fn refill(&mut self, now: Time) {
+        let rate = self.rate_bytes_ps();
+        let most = 2 * rate * 1000;
+        self.tokens_mb = (self.tokens_mb + now.since_ms(self.filled) * rate).min(most);
+        self.filled = now;
+    }
+
+    /// A transmission that did not go through the queue, in bytes.
+    pub fn charge(&mut self, now: Time, bytes: usize) {
+        self.refill(now);
+        self.tokens_mb = self.tokens_mb.saturating_sub((bytes + OVERHEAD_BYTES) as u64 * 1000);
+    }
+
+    /// What may go out now, the most urgent first; `None` when nothing may.
+    pub fn poll(&mut self, now: Time) -> Option<Out> {
+        self.queue.retain(|_, w| w.until >= now);
+        let (key, priority) = self.first(now)?;
+        self.refill(now);
+        let held = self.held.get_mut(&key)?;
+        let cost = (held.bytes.len() + OVERHEAD_BYTES) as u64 * 1000;
+        if self.tokens_mb < cost {
+            return None;
+        }
+        let kind = Kind::of_number(key.0)?;
+        self.tokens_mb -= cost;
+        self.queue.remove(&key);
+        held.sent = now;
+        held.copies = held.copies.saturating_add(1);
+        Some(Out {
+            key: key::key(&self.fleet, kind, key.1, key.2),
+            bytes: held.bytes.clone(),
+            hops: held.hops,
+            priority,
+            lifetime_ms: kind.lifetime_ms(u32::try_from(self.period_ms).unwrap_or(u32::MAX)),
+        })
+    }
+
+    fn first(&self, now: Time) -> Option<(RecordKey, Priority)> {
+        self.queue
+            .iter()
+            .filter(|(_, w)| w.from <= now)
+            .min_by_key(|(k, w)| (w.priority, w.from, **k))
+            .map(|(k, w)| (*k, w.priority))
+    }
+
+    /// When [`Relay::poll`] may have something, if it ever will.
+    #[must_use]
+    pub fn next_timeout(&self, now: Time) -> Option<Time> {
+        let due = self.queue.values().map(|w| w.from).min()?;
+        if due > now {
+            return Some(due);
+        }
+        let (key, _) = self.first(now)?;
+        let cost = (self.held.get(&key)?.bytes.len() + OVERHEAD_BYTES) as u64 * 1000;
+        let rate = self.rate_bytes_ps();
+        let have = self.tokens_mb + now.since_ms(self.filled) * rate;
+        Some(now.plus_ms(cost.saturating_sub(have).div_ceil(rate).max(1)))
+    }
+
+    /// What is held and what waits, each with its cap.
+    #[must_use]
+    pub fn loads(&self) -> [(&'static str, usize, usize); 2] {
+        [("records", self.held.len(), MAX_RECORDS), ("queue", self.queue.len(), MAX_QUEUE)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(author: u16, seq: u32) -> Record {
+        Record { author, incarnation: 1, seq, kind: 1, subject: 0, body: vec![0; 20], signature: Vec::new() }
+    }
+
+    fn relay(me: u16) -> Relay {
+        Relay::new(me, "f", 64_000, 1000)
+    }
+
+    #[test]
+    fn a_new_record_is_passed_on_once() {
+        let mut r = relay(2);
+        assert_eq!(r.offer(Time(5000), &record(1, 1), &[1; 40], 1, 0), Offer::New);
+        assert_eq!(r.poll(Time(5000)), None);
+        let out = r.poll(Time(5200)).unwrap();
+        assert_eq!((out.hops, out.bytes.len()), (1, 40));
+        assert_eq!(r.poll(Time(6000)), None);
+        assert_eq!(r.offer(Time(6000), &record(1, 1), &[1; 40], 1, 0), Offer::Duplicate);
+        assert_eq!(r.offer(Time(6000), &record(1, 0), &[1; 40], 1, 0), Offer::Stale);
+    }
+
+    #[test]
+    fn two_copies_heard_are_enough() {
+        let mut r = relay(3);
+        r.offer(Time(5000), &record(1, 1), &[1; 40], 1, 0);
+        r.offer(Time(5001), &record(1, 1), &[1; 40], 2, 1);
+        assert_eq!(r.poll(Time(5500)), None);
+    }
+
+    #[test]
+    fn what_a_neighbour_lacks_is_sent_again() {
+        let mut r = relay(2);
+        r.offer(Time(5000), &record(1, 7), &[1; 40], 1, 0);
+        assert!(r.poll(Time(5200)).is_some());
+        r.catch_up(Time(9000), 1, 1, 3, 0);
+        assert!(r.poll(Time(9500)).is_some());
+        let (seq, digest) = r.version(1, 1);
+        r.catch_up(Time(20_000), 1, 1, seq, digest);
+        assert_eq!(r.poll(Time(20_500)), None, "nothing is lacking");
+    }
+
+    #[test]
+    fn the_bucket_bounds_what_is_sent() {
+        let mut r = relay(2);
+        let mut bytes = 0;
+        for t in 0..10_000u64 {
+            r.own(Time(t), &record(2, u32::try_from(t).unwrap()), vec![0; 200]);
+            while let Some(out) = r.poll(Time(t)) {
+                bytes += out.bytes.len() + OVERHEAD_BYTES;
+            }
+        }
+        assert!(bytes <= 64_000 / 8 * 10, "{bytes}");
+        assert!(bytes >= 50_000, "{bytes}");
+    }
+}

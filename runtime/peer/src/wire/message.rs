@@ -192,7 +192,7 @@ pub struct Listing {
 }
 
 /// A peer's own section: what it will fly, and what it gave away but still answers for.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Register {
     /// Mission revision.
     pub revision: u32,

@@ -40,6 +40,37 @@ impl Fnv {
     }
 }
 
+/// Writes every integer little-endian, so that a hash is the same everywhere.
+impl core::hash::Hasher for Fnv {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        Self::write(self, bytes);
+    }
+
+    fn write_u16(&mut self, v: u16) {
+        Self::write(self, &v.to_le_bytes());
+    }
+
+    fn write_u32(&mut self, v: u32) {
+        Self::write(self, &v.to_le_bytes());
+    }
+
+    fn write_u64(&mut self, v: u64) {
+        Self::write(self, &v.to_le_bytes());
+    }
+
+    fn write_usize(&mut self, v: usize) {
+        Self::write(self, &(v as u64).to_le_bytes());
+    }
+
+    fn write_isize(&mut self, v: isize) {
+        Self::write(self, &(v as i64).to_le_bytes());
+    }
+}
+
 impl Default for Fnv {
     fn default() -> Self {
         Self::new()

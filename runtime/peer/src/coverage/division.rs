@@ -1,0 +1,113 @@
+//! What a complete round decides: a function of its snapshots alone.
+
+use super::rounds::Open;
+use super::section::cells_of;
+use crate::cells::CellSet;
+use crate::wire::message::{Run, Snapshot};
+use skein_planning::coverage::area::backtracking::{Division, RingCell, Robot};
+use skein_planning::coverage::area::{CoverageLoop, Direction};
+
+/// A division without a loss is adopted only if it ends the work this much sooner:
+/// the new makespan is at most this many percent of the present one.
+const GAIN_PERCENT: u64 = 90;
+
+/// Divisions without a loss are at least this many beacon periods apart.
+pub const CALM_PERIODS: u64 = 20;
+
+/// The open cells and the members of a complete round, as the solver wants them.
+#[must_use]
+pub fn problem(open: &Open, coverage_loop: &CoverageLoop, covered: &CellSet) -> (Vec<RingCell>, Vec<Robot>) {
+    let n = covered.len();
+    let mut done = covered.clone();
+    for s in open.snapshots.values() {
+        if let Ok(union) = CellSet::decode_rle(n, &s.union) {
+            done.union_with(&union);
+        }
+        for run in &s.commits {
+            for c in cells_of(*run, n) {
+                done.insert(c);
+            }
+        }
+    }
+    let ring = coverage_loop
+        .cells()
+        .iter()
+        .zip(0..n)
+        .map(|(cell, i)| RingCell {
+            service_mm: cell.service_mm,
+            travel_mm: cell.travel_mm,
+            open: !done.contains(i),
+        })
+        .collect();
+    let robots = open
+        .snapshots
+        .iter()
+        .map(|(id, s)| Robot {
+            anchor: s.anchor % n.max(1),
+            id: *id,
+            heading: if s.backward { Direction::Backward } else { Direction::Forward },
+            release_ms: s.release_ms,
+            speed_mmps: s.speed_mmps.max(1),
+            turn_ms: s.turn_ms,
+            endurance_ms: s.endurance_ms,
+        })
+        .collect();
+    (ring, robots)
+}
+
+/// Whether the division of a complete round is adopted. All members judge alike:
+/// only the snapshots count.
+#[must_use]
+pub fn worthwhile(open: &Open, division: &Division, beacon_period_ms: u64) -> bool {
+    if open.round.loss {
+        return true;
+    }
+    let all = || open.snapshots.values();
+    let present = all().map(|s| u64::from(s.eta_ms)).max().unwrap_or(0);
+    let calm = all().all(|s| u64::from(s.adopted_ago_ms) >= CALM_PERIODS * beacon_period_ms);
+    let progress = all().any(|s| s.cells_since > 0);
+    calm && progress && u64::from(division.makespan_ms) * 100 <= present * GAIN_PERCENT
+}
+
+/// The cells of one member's section that are open in the round, in order of
+/// flight, each with whether it is flown backward.
+#[must_use]
+pub fn section_of(division: &Division, ring: &[RingCell], id: u16) -> Vec<(u16, bool)> {
+    let mut out = Vec::new();
+    let Some(section) = division.sections.iter().find(|s| s.id == id) else {
+        return out;
+    };
+    let mut seen = vec![false; ring.len()];
+    for leg in &section.legs {
+        for c in leg.cells(ring.len()) {
+            let i = usize::from(c);
+            if ring.get(i).is_some_and(|r| r.open) && !seen[i] {
+                seen[i] = true;
+                out.push((c, leg.direction == Direction::Backward));
+            }
+        }
+    }
+    out
+}
+
+/// Cells of commitments, in the order of the runs.
+#[must_use]
+pub fn commits_of(snapshot: &Snapshot, n: u16) -> CellSet {
+    let mut set = CellSet::new(n);
+    for run in &snapshot.commits {
+        for c in cells_of(*run, n) {
+            set.insert(c);
+        }
+    }
+    set
+}
+
+/// Runs of the given cells, in forward order, for a bid.
+#[must_use]
+pub fn runs_of(cells: &[u16], n: u16) -> Vec<Run> {
+    let mut set = CellSet::new(n);
+    for c in cells {
+        set.insert(*c);
+    }
+    set.runs()
+}

@@ -1,0 +1,316 @@
+//! Rounds: how sections are negotiated, from immutable bids alone.
+//!
+//! A round names its members. Each member speaks one snapshot in it; whoever holds
+//! all of them computes the same division, so there is no leader and no vote.
+//!
+//! | state | event | next state | output |
+//! |---|---|---|---|
+//! | any | a higher round that names me | open (that round) | a bid is wanted |
+//! | open | my bid is durable | open | it may be spoken |
+//! | open | a snapshot of this round | open, or complete with the last one | |
+//! | open | a snapshot of a lower round | open | ignored: it is dead |
+//! | complete | decided | closed | the counter stays |
+//! | any | a round that does not name me | same | only its counter is remembered |
+//!
+//! Rounds are ordered by (counter, number of members, hash of members and ground);
+//! a higher one abandons a lower one, and snapshots of different rounds never mix.
+
+use crate::wire::Fnv;
+use crate::wire::message::{Epoch, Member, Round, Snapshot};
+use std::collections::BTreeMap;
+use std::hash::Hash;
+
+/// The order of rounds.
+pub type RoundOrder = (u32, usize, u32);
+
+/// Where a round stands in the order of rounds. The waiting time is not part of it.
+#[must_use]
+pub fn order_of(round: &Round) -> RoundOrder {
+    let mut h = Fnv::new();
+    (&round.members, round.revision, round.loop_hash, round.loss).hash(&mut h);
+    (round.counter, round.members.len(), fold(h.finish()))
+}
+
+fn fold(h: u64) -> u32 {
+    #[allow(clippy::cast_possible_truncation, reason = "both halves are folded into one on purpose")]
+    let folded = (h ^ (h >> 32)) as u32;
+    folded
+}
+
+/// The highest round that names this peer, with the snapshots held.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Open {
+    /// The round; its waiting time is the longest heard.
+    pub round: Round,
+    /// Held snapshots by member, this peer's own only once it is durable.
+    pub snapshots: BTreeMap<u16, Snapshot>,
+}
+
+/// What a heard snapshot changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeardSnapshot {
+    /// Nothing, or only the counter.
+    Nothing,
+    /// It opened a higher round that names this peer: a bid is wanted.
+    BidWanted,
+    /// It belongs to the open round.
+    Added,
+}
+
+/// All that a peer remembers of rounds.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Rounds {
+    me: Member,
+    counter: u32,
+    open: Option<Open>,
+    closed: Option<RoundOrder>,
+    silent: BTreeMap<Member, u8>,
+}
+
+impl Rounds {
+    /// No round yet; `counter` is what the journal promised.
+    #[must_use]
+    pub fn new(me: Member, counter: u32) -> Self {
+        Self { me, counter, open: None, closed: None, silent: BTreeMap::new() }
+    }
+
+    /// The highest counter seen anywhere.
+    #[must_use]
+    pub fn counter(&self) -> u32 {
+        self.counter
+    }
+
+    /// Remembers a counter heard of.
+    pub fn hear_counter(&mut self, counter: u32) {
+        self.counter = self.counter.max(counter);
+    }
+
+    /// The open round, if there is one.
+    #[must_use]
+    pub fn open(&self) -> Option<&Open> {
+        self.open.as_ref()
+    }
+
+    /// A snapshot by its author, who speaks in the given life.
+    pub fn hear(&mut self, author: Member, snapshot: &Snapshot) -> HeardSnapshot {
+        let round = &snapshot.round;
+        self.counter = self.counter.max(round.counter);
+        if !round.members.contains(&self.me) || !round.members.contains(&author) || author == self.me {
+            return HeardSnapshot::Nothing;
+        }
+        let order = order_of(round);
+        if self.closed.is_some_and(|c| order <= c) {
+            return HeardSnapshot::Nothing;
+        }
+        match &mut self.open {
+            Some(open) if order_of(&open.round) == order => {
+                open.round.wait_ms = open.round.wait_ms.max(round.wait_ms);
+                self.silent.remove(&author);
+                match open.snapshots.entry(author.id) {
+                    std::collections::btree_map::Entry::Occupied(_) => HeardSnapshot::Nothing,
+                    std::collections::btree_map::Entry::Vacant(v) => {
+                        v.insert(snapshot.clone());
+                        HeardSnapshot::Added
+                    }
+                }
+            }
+            Some(open) if order_of(&open.round) > order => HeardSnapshot::Nothing,
+            _ => {
+                self.silent.remove(&author);
+                let snapshots = BTreeMap::from([(author.id, snapshot.clone())]);
+                self.open = Some(Open { round: round.clone(), snapshots });
+                HeardSnapshot::BidWanted
+            }
+        }
+    }
+
+    /// Opens a round of this peer's own making, one above every counter seen.
+    /// `members` must hold this peer; whoever was silent in two rounds running is
+    /// left out. The bid is wanted next.
+    pub fn start(&mut self, mut members: Vec<Member>, revision: u32, loop_hash: u64, loss: bool, wait_ms: u32) {
+        members.retain(|m| *m == self.me || self.silent.get(m).copied().unwrap_or(0) < SILENT_ROUNDS);
+        members.sort_unstable();
+        self.counter = self.counter.saturating_add(1);
+        let round = Round { counter: self.counter, members, revision, loop_hash, loss, wait_ms };
+        self.open = Some(Open { round, snapshots: BTreeMap::new() });
+    }
+
+    /// This peer's own bid is durable. Returns whether it belongs to the open round.
+    pub fn bid(&mut self, snapshot: Snapshot) -> bool {
+        let order = order_of(&snapshot.round);
+        match &mut self.open {
+            Some(open) if order_of(&open.round) == order => {
+                open.snapshots.insert(self.me.id, snapshot);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// The open round with all its snapshots, if none is missing, and its epoch.
+    #[must_use]
+    pub fn complete(&self) -> Option<(Epoch, &Open)> {
+        let open = self.open.as_ref()?;
+        if open.round.members.iter().any(|m| !open.snapshots.contains_key(&m.id)) {
+            return None;
+        }
+        Some((epoch_of(open), open))
+    }
+
+    /// Members of the open round whose snapshot is missing.
+    #[must_use]
+    pub fn missing(&self) -> Vec<Member> {
+        self.open.as_ref().map_or_else(Vec::new, |open| {
+            open.round.members.iter().filter(|m| !open.snapshots.contains_key(&m.id)).copied().collect()
+        })
+    }
+
+    /// The open round ended in a decision: it is closed, and all that answered are
+    /// no longer silent.
+    pub fn close(&mut self) {
+        if let Some(open) = self.open.take() {
+            self.closed = Some(order_of(&open.round));
+            self.silent.clear();
+        }
+    }
+
+    /// The open round ended without a decision: its missing members were silent
+    /// once more.
+    pub fn give_up(&mut self) {
+        for m in self.missing() {
+            if m != self.me {
+                let s = self.silent.entry(m).or_default();
+                *s = s.saturating_add(1);
+            }
+        }
+        if let Some(open) = self.open.take() {
+            self.closed = Some(order_of(&open.round));
+        }
+    }
+
+    /// A new life of this peer: rounds of the old one are void.
+    pub fn set_me(&mut self, me: Member) {
+        self.me = me;
+        self.open = None;
+    }
+}
+
+/// A member that was silent in so many rounds running is left out of the next.
+pub const SILENT_ROUNDS: u8 = 2;
+
+/// The epoch of a complete round: its counter and the hash of its sorted snapshots.
+#[must_use]
+pub fn epoch_of(open: &Open) -> Epoch {
+    let mut h = Fnv::new();
+    for (id, s) in &open.snapshots {
+        (id, order_of(&s.round)).hash(&mut h);
+        (s.anchor, s.backward, s.release_ms, s.speed_mmps, s.turn_ms, s.endurance_ms).hash(&mut h);
+        (&s.union, &s.commits, s.eta_ms, s.adopted_ago_ms, s.cells_since, s.idle).hash(&mut h);
+    }
+    Epoch { counter: open.round.counter, hash: fold(h.finish()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn member(id: u16) -> Member {
+        Member { id, incarnation: 1 }
+    }
+
+    fn snapshot(round: &Round, anchor: u16) -> Snapshot {
+        Snapshot {
+            round: round.clone(),
+            anchor,
+            backward: false,
+            release_ms: 0,
+            speed_mmps: 13_000,
+            turn_ms: 10_000,
+            endurance_ms: 1_000_000,
+            union: Vec::new(),
+            commits: Vec::new(),
+            eta_ms: 0,
+            adopted_ago_ms: 0,
+            cells_since: 0,
+            idle: true,
+        }
+    }
+
+    fn round(counter: u32, ids: &[u16]) -> Round {
+        Round {
+            counter,
+            members: ids.iter().map(|i| member(*i)).collect(),
+            revision: 1,
+            loop_hash: 7,
+            loss: true,
+            wait_ms: 5000,
+        }
+    }
+
+    #[test]
+    fn all_members_compute_the_same_epoch_in_any_order_of_arrival() {
+        let r = round(1, &[1, 2, 3]);
+        let mut epochs = Vec::new();
+        for (me, order) in [(1, [2, 3]), (2, [3, 1]), (3, [1, 2])] {
+            let mut rounds = Rounds::new(member(me), 0);
+            let mut wanted = 0;
+            for id in order {
+                if rounds.hear(member(id), &snapshot(&r, id)) == HeardSnapshot::BidWanted {
+                    wanted += 1;
+                    assert!(rounds.complete().is_none());
+                    assert!(rounds.bid(snapshot(&r, me)));
+                }
+            }
+            assert_eq!(wanted, 1);
+            epochs.push(rounds.complete().unwrap().0);
+        }
+        assert!(epochs.windows(2).all(|w| w[0] == w[1]));
+    }
+
+    #[test]
+    fn a_higher_round_abandons_a_lower_one_for_good() {
+        let (low, high) = (round(1, &[1, 2]), round(2, &[1, 2]));
+        let mut rounds = Rounds::new(member(1), 0);
+        rounds.hear(member(2), &snapshot(&low, 0));
+        assert_eq!(rounds.hear(member(2), &snapshot(&high, 0)), HeardSnapshot::BidWanted);
+        assert!(!rounds.bid(snapshot(&low, 1)), "a bid for a dead round is not spoken");
+        assert_eq!(rounds.hear(member(2), &snapshot(&low, 0)), HeardSnapshot::Nothing);
+        assert!(rounds.complete().is_none());
+    }
+
+    #[test]
+    fn the_same_round_started_twice_is_one_round() {
+        let mut a = Rounds::new(member(1), 4);
+        let mut b = Rounds::new(member(2), 4);
+        let members = vec![member(2), member(1)];
+        a.start(members.clone(), 1, 7, true, 5000);
+        b.start(members, 1, 7, true, 9000);
+        let ra = a.open().unwrap().round.clone();
+        let rb = b.open().unwrap().round.clone();
+        a.bid(snapshot(&ra, 1));
+        assert_eq!(a.hear(member(2), &snapshot(&rb, 2)), HeardSnapshot::Added);
+        assert!(a.complete().is_some());
+        assert_eq!(a.open().unwrap().round.wait_ms, 9000);
+    }
+
+    #[test]
+    fn who_is_silent_twice_is_left_out() {
+        let mut a = Rounds::new(member(1), 0);
+        for _ in 0..2 {
+            a.start(vec![member(1), member(2)], 1, 7, true, 5000);
+            assert_eq!(a.open().unwrap().round.members.len(), 2);
+            a.give_up();
+        }
+        a.start(vec![member(1), member(2)], 1, 7, true, 5000);
+        assert_eq!(a.open().unwrap().round.members, [member(1)]);
+    }
+
+    #[test]
+    fn a_round_that_does_not_name_me_only_raises_the_counter() {
+        let mut a = Rounds::new(member(1), 0);
+        let r = round(9, &[2, 3]);
+        assert_eq!(a.hear(member(2), &snapshot(&r, 0)), HeardSnapshot::Nothing);
+        assert!(a.open().is_none());
+        assert_eq!(a.counter(), 9);
+    }
+}

@@ -1,0 +1,552 @@
+//! A peer's own section of the loop, and the rules by which cells change hands
+//! (D2.7 §3.6.5, made safe for lost and late messages).
+//!
+//! The owner of a cell is whoever's own newest register lists it. Nobody owns
+//! anything by somebody else's computation, so the rules below read only registers:
+//!
+//! | rule | when | what |
+//! |---|---|---|
+//! | yield | a live register *plans* one of my planned cells at a higher stamp | I drop it |
+//! | release | a live register *plans* one of my held cells at a higher stamp | I drop it |
+//! | orphan | an uncovered cell that no live register lists | anybody may take it |
+//! | adopt | a round is decided | new cells at `(epoch, 0, id)`; what I give away is held |
+//! | take | without a round | at `(epoch, 1 + highest take heard, id)` |
+//! | expire | held too long | dropped; it is an orphan from then on |
+//!
+//! Stamps of one cell only grow, so of two listings exactly one yields. A late or
+//! lost adoption is duplicate work, never a gap.
+//!
+//! There is no time in here: *when* a rule may be used is the business of
+//! [`super::negotiation`]; that it is safe whenever it is used is checked
+//! exhaustively on small swarms in `tests/model.rs`.
+
+use crate::Incarnation;
+use crate::cells::CellSet;
+use crate::wire::message::{Epoch, Firmness, Listing, Register, Run, Stamp};
+use std::collections::BTreeMap;
+
+/// Most runs of cells in the plan of one register. A section has at most two legs
+/// and the remains of a commitment; three takeovers add a leg each; the rest is room.
+pub const MAX_PLAN_RUNS: usize = 16;
+
+/// Most runs of held cells in one register, for the same reason.
+pub const MAX_HELD_RUNS: usize = 16;
+
+/// Most runs of done cells in one register; they inform people, nothing depends on them.
+pub const MAX_DONE_RUNS: usize = 8;
+
+/// The peers that are not believed dead, with the life in which they are alive.
+pub type Live = BTreeMap<u16, Incarnation>;
+
+/// A cell that this peer will fly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PlanCell {
+    /// Which cell of the loop.
+    pub cell: u16,
+    /// Whether it is flown against the order of the loop.
+    pub backward: bool,
+    /// Whether it was committed in a bid: it is flown whatever is decided.
+    pub committed: bool,
+    /// By what right it is listed.
+    pub stamp: Stamp,
+}
+
+/// The newest register heard from another peer.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Heard {
+    /// In which life it was written.
+    pub incarnation: Incarnation,
+    /// Its version within that life.
+    pub seq: u32,
+    /// What it says.
+    pub register: Register,
+    listed: CellSet,
+}
+
+/// The state that the rules work on.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Section {
+    me: u16,
+    cells: u16,
+    epoch: Epoch,
+    plan: Vec<PlanCell>,
+    held: BTreeMap<u16, Stamp>,
+    done: CellSet,
+    union: CellSet,
+    unassigned: CellSet,
+    heard: BTreeMap<u16, Heard>,
+}
+
+impl Section {
+    /// An empty section on a loop of `cells` cells, of which `covered` need no service.
+    #[must_use]
+    pub fn new(me: u16, cells: u16, covered: CellSet) -> Self {
+        Self {
+            me,
+            cells,
+            epoch: Epoch::default(),
+            plan: Vec::new(),
+            held: BTreeMap::new(),
+            done: CellSet::new(cells),
+            union: covered,
+            unassigned: CellSet::new(cells),
+            heard: BTreeMap::new(),
+        }
+    }
+
+    /// Number of cells of the loop.
+    #[must_use]
+    pub fn cells(&self) -> u16 {
+        self.cells
+    }
+
+    /// Covered cells known of.
+    #[must_use]
+    pub fn union(&self) -> &CellSet {
+        &self.union
+    }
+
+    /// What will be flown, in order.
+    #[must_use]
+    pub fn plan(&self) -> &[PlanCell] {
+        &self.plan
+    }
+
+    /// What was given away and is still answered for.
+    #[must_use]
+    pub fn held(&self) -> &BTreeMap<u16, Stamp> {
+        &self.held
+    }
+
+    /// Cells known to be beyond anybody's endurance.
+    #[must_use]
+    pub fn unassigned(&self) -> &CellSet {
+        &self.unassigned
+    }
+
+    /// The latest division adopted.
+    #[must_use]
+    pub fn epoch(&self) -> Epoch {
+        self.epoch
+    }
+
+    /// The newest register heard of each other peer.
+    #[must_use]
+    pub fn heard(&self) -> &BTreeMap<u16, Heard> {
+        &self.heard
+    }
+
+    /// Whether everything is covered.
+    #[must_use]
+    pub fn complete(&self) -> bool {
+        self.union.is_full()
+    }
+
+    /// Adds covered cells; covered cells leave the plan. Returns whether any was new.
+    pub fn cover(&mut self, covered: &CellSet) -> bool {
+        if !self.union.union_with(covered) {
+            return false;
+        }
+        let union = &self.union;
+        let done = &mut self.done;
+        self.plan.retain(|p| {
+            let open = !union.contains(p.cell);
+            if !open {
+                done.insert(p.cell);
+            }
+            open
+        });
+        self.held.retain(|c, _| !union.contains(*c));
+        true
+    }
+
+    /// Notes a register of another peer, unless an equally new one is known.
+    /// Returns whether it was newer.
+    pub fn hear(&mut self, author: u16, incarnation: Incarnation, seq: u32, register: Register) -> bool {
+        if author == self.me {
+            return false;
+        }
+        if let Some(known) = self.heard.get(&author)
+            && (known.incarnation, known.seq) >= (incarnation, seq)
+        {
+            return false;
+        }
+        let mut listed = CellSet::new(self.cells);
+        for l in register.plan.iter().chain(&register.held) {
+            for c in cells_of(l.run, self.cells) {
+                listed.insert(c);
+            }
+        }
+        self.heard.insert(author, Heard { incarnation, seq, register, listed });
+        true
+    }
+
+    /// Rules *yield* and *release*, against every live register. Returns whether
+    /// this peer's own register changed.
+    pub fn settle(&mut self, live: &Live) -> bool {
+        let mut theirs: BTreeMap<u16, Stamp> = BTreeMap::new();
+        for (author, h) in &self.heard {
+            if live.get(author) != Some(&h.incarnation) {
+                continue;
+            }
+            for l in &h.register.plan {
+                for c in cells_of(l.run, self.cells) {
+                    let s = theirs.entry(c).or_default();
+                    *s = (*s).max(l.stamp);
+                }
+            }
+        }
+        let before = (self.plan.len(), self.held.len());
+        let outbid = |cell: u16, mine: Stamp| theirs.get(&cell).is_some_and(|s| *s > mine);
+        self.plan.retain(|p| !outbid(p.cell, p.stamp));
+        self.held.retain(|c, s| !outbid(*c, *s));
+        before != (self.plan.len(), self.held.len())
+    }
+
+    /// Uncovered cells that no live register lists, this peer's own included, and
+    /// that are not known to be beyond anybody's endurance.
+    #[must_use]
+    pub fn orphans(&self, live: &Live) -> CellSet {
+        let mut free = CellSet::full(self.cells);
+        free.subtract(&self.union);
+        free.subtract(&self.unassigned);
+        for p in &self.plan {
+            free.remove(p.cell);
+        }
+        for c in self.held.keys() {
+            free.remove(*c);
+        }
+        for (author, h) in &self.heard {
+            if live.get(author) == Some(&h.incarnation) {
+                free.subtract(&h.listed);
+            }
+        }
+        free
+    }
+
+    /// Uncovered cells of another peer's newest plan, in its order of flight.
+    #[must_use]
+    pub fn plan_of(&self, author: u16) -> Vec<PlanCell> {
+        let Some(h) = self.heard.get(&author) else {
+            return Vec::new();
+        };
+        unpack(&h.register.plan, self.cells)
+            .into_iter()
+            .filter(|p| !self.union.contains(p.cell))
+            .collect()
+    }
+
+    /// Rule *adopt*: `commits`, then `section`, in order of flight. What was planned
+    /// and is no longer, is held. Covered cells and repetitions are left out.
+    pub fn adopt(&mut self, epoch: Epoch, commits: &[(u16, bool)], section: &[(u16, bool)]) {
+        let stamp = Stamp { epoch, take: 0, id: self.me };
+        let mut seen = self.union.clone();
+        let mut plan = Vec::new();
+        for (list, committed) in [(commits, true), (section, false)] {
+            for &(cell, backward) in list {
+                if cell < self.cells && !seen.contains(cell) {
+                    seen.insert(cell);
+                    plan.push(PlanCell { cell, backward, committed, stamp });
+                }
+            }
+        }
+        for p in &self.plan {
+            if !seen.contains(p.cell) {
+                let s = self.held.entry(p.cell).or_insert(p.stamp);
+                *s = (*s).max(p.stamp);
+            }
+        }
+        for p in &plan {
+            self.held.remove(&p.cell);
+        }
+        self.plan = plan;
+        self.epoch = epoch;
+        self.done = CellSet::new(self.cells);
+        self.trim();
+    }
+
+    /// Rule *take*: adds cells to the end of the plan at a stamp above all that was
+    /// heard for them. Covered cells and cells already planned are left out.
+    /// Returns how many were taken.
+    pub fn take(&mut self, cells: &[(u16, bool)]) -> usize {
+        let before = self.plan.len();
+        for &(cell, backward) in cells {
+            if cell >= self.cells || self.union.contains(cell) || self.plan.iter().any(|p| p.cell == cell) {
+                continue;
+            }
+            let mut top = Stamp { epoch: self.epoch, take: 0, id: self.me };
+            for h in self.heard.values() {
+                for l in h.register.plan.iter().chain(&h.register.held) {
+                    if cells_of(l.run, self.cells).any(|c| c == cell) {
+                        top = top.max(l.stamp);
+                    }
+                }
+            }
+            if let Some(s) = self.held.remove(&cell) {
+                top = top.max(s);
+            }
+            let stamp = Stamp { epoch: top.epoch, take: top.take.saturating_add(1), id: self.me };
+            self.plan.push(PlanCell { cell, backward, committed: false, stamp });
+            self.unassigned.remove(cell);
+        }
+        let taken = self.plan.len() - before;
+        self.trim();
+        taken
+    }
+
+    /// Rule *expire*: nobody took over what was given away; it becomes orphaned.
+    pub fn expire_held(&mut self) {
+        self.held.clear();
+    }
+
+    /// Gives up planned cells that cannot be flown; they become orphans.
+    pub fn give_up(&mut self, cells: &[u16]) {
+        self.plan.retain(|p| !cells.contains(&p.cell));
+    }
+
+    /// Keeps only the first `count` planned cells; the others become orphans.
+    pub fn keep(&mut self, count: usize) {
+        self.plan.truncate(count);
+    }
+
+    /// Notes which cells are beyond anybody's endurance.
+    pub fn set_unassigned(&mut self, cells: &[u16]) {
+        self.unassigned = CellSet::new(self.cells);
+        for c in cells {
+            self.unassigned.insert(*c);
+        }
+    }
+
+    /// Forgets all ownership, as after a restart; coverage stays.
+    pub fn reset_ownership(&mut self) {
+        self.plan.clear();
+        self.held.clear();
+    }
+
+    /// The register to be published.
+    #[must_use]
+    pub fn register(&self, revision: u32, loop_hash: u64, eta_ms: u32) -> Register {
+        let held: Vec<PlanCell> = self
+            .held
+            .iter()
+            .map(|(c, s)| PlanCell { cell: *c, backward: false, committed: false, stamp: *s })
+            .collect();
+        let mut done: Vec<Run> = self.done.runs();
+        done.truncate(MAX_DONE_RUNS);
+        Register {
+            revision,
+            loop_hash,
+            epoch: self.epoch,
+            plan: self.pack(&self.plan, MAX_PLAN_RUNS).0,
+            held: self.pack(&held, MAX_HELD_RUNS).0,
+            done,
+            eta_ms,
+        }
+    }
+
+    /// What does not fit into a register is not flown: it would be a secret.
+    fn trim(&mut self) {
+        let fits = self.pack(&self.plan, MAX_PLAN_RUNS).1;
+        self.plan.truncate(fits);
+        let held: Vec<PlanCell> = self
+            .held
+            .iter()
+            .map(|(c, s)| PlanCell { cell: *c, backward: false, committed: false, stamp: *s })
+            .collect();
+        let fits = self.pack(&held, MAX_HELD_RUNS).1;
+        for p in held.iter().skip(fits) {
+            self.held.remove(&p.cell);
+        }
+    }
+
+    /// Packs cells into runs, bridging gaps of covered cells; returns the runs and
+    /// how many of the cells they hold.
+    fn pack(&self, cells: &[PlanCell], max_runs: usize) -> (Vec<Listing>, usize) {
+        let mut runs: Vec<(PlanCell, u16)> = Vec::new();
+        for (i, p) in cells.iter().enumerate() {
+            if let Some((first, count)) = runs.last_mut()
+                && let Some(reach) = self.reach(first, *count, p)
+            {
+                *count = reach;
+            } else if runs.len() == max_runs {
+                return (runs.iter().map(|r| self.listing(r)).collect(), i);
+            } else {
+                runs.push((*p, 1));
+            }
+        }
+        (runs.iter().map(|r| self.listing(r)).collect(), cells.len())
+    }
+
+    /// The length of the run `first, count` after `next` joins it, if it can.
+    fn reach(&self, first: &PlanCell, count: u16, next: &PlanCell) -> Option<u16> {
+        if (first.backward, first.committed, first.stamp) != (next.backward, next.committed, next.stamp) {
+            return None;
+        }
+        let n = self.cells;
+        let step = |from: u16, to: u16| if to >= from { to - from } else { n - from + to };
+        let offset = if first.backward { step(next.cell, first.cell) } else { step(first.cell, next.cell) };
+        if offset < count {
+            return None;
+        }
+        let bridged = (count..offset).all(|k| {
+            let c = if first.backward { step(k, first.cell) } else { (first.cell + k) % n };
+            self.union.contains(c)
+        });
+        bridged.then_some(offset + 1)
+    }
+
+    fn listing(&self, (first, count): &(PlanCell, u16)) -> Listing {
+        let n = self.cells;
+        let start = if first.backward { (first.cell + n - (count - 1) % n) % n } else { first.cell };
+        Listing {
+            run: Run { first: start, count: *count },
+            backward: first.backward,
+            firmness: if first.committed { Firmness::Committed } else { Firmness::Tentative },
+            stamp: first.stamp,
+        }
+    }
+}
+
+/// The cells of a run on a loop of `n`, in forward order.
+pub fn cells_of(run: Run, n: u16) -> impl Iterator<Item = u16> {
+    let n32 = u32::from(n.max(1));
+    (0..u32::from(run.count.min(n))).map(move |k| {
+        u16::try_from((u32::from(run.first) + k) % n32).unwrap_or(0)
+    })
+}
+
+/// The cells of listings in order of flight.
+#[must_use]
+pub fn unpack(listings: &[Listing], n: u16) -> Vec<PlanCell> {
+    let mut out = Vec::new();
+    for l in listings {
+        let mut cells: Vec<u16> = cells_of(l.run, n).collect();
+        if l.backward {
+            cells.reverse();
+        }
+        out.extend(cells.into_iter().map(|cell| PlanCell {
+            cell,
+            backward: l.backward,
+            committed: l.firmness == Firmness::Committed,
+            stamp: l.stamp,
+        }));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stamp(counter: u32, take: u16, id: u16) -> Stamp {
+        Stamp { epoch: Epoch { counter, hash: 0 }, take, id }
+    }
+
+    fn register(plan: &[(u16, u16, Stamp)]) -> Register {
+        Register {
+            plan: plan
+                .iter()
+                .map(|(first, count, stamp)| Listing {
+                    run: Run { first: *first, count: *count },
+                    backward: false,
+                    firmness: Firmness::Tentative,
+                    stamp: *stamp,
+                })
+                .collect(),
+            ..Register::default()
+        }
+    }
+
+    fn section(me: u16) -> Section {
+        Section::new(me, 10, CellSet::new(10))
+    }
+
+    fn forward(cells: &[u16]) -> Vec<(u16, bool)> {
+        cells.iter().map(|c| (*c, false)).collect()
+    }
+
+    #[test]
+    fn a_planned_cell_yields_to_a_higher_stamp_of_a_live_peer_only() {
+        let mut s = section(1);
+        s.adopt(Epoch { counter: 1, hash: 0 }, &[], &forward(&[2, 3, 4]));
+        s.hear(2, 1, 1, register(&[(4, 2, stamp(2, 0, 2))]));
+        assert!(!s.settle(&Live::new()), "a dead register takes nothing");
+        assert!(s.settle(&Live::from([(2, 1)])));
+        assert_eq!(s.plan().iter().map(|p| p.cell).collect::<Vec<_>>(), [2, 3]);
+        assert!(!s.settle(&Live::from([(2, 1)])));
+    }
+
+    #[test]
+    fn of_two_equal_listings_exactly_one_yields() {
+        let e = Epoch { counter: 3, hash: 9 };
+        let (mut a, mut b) = (section(1), section(2));
+        a.adopt(e, &[], &forward(&[5]));
+        b.adopt(e, &[], &forward(&[5]));
+        let (ra, rb) = (a.register(1, 1, 0), b.register(1, 1, 0));
+        a.hear(2, 1, 1, rb);
+        b.hear(1, 1, 1, ra);
+        let live = Live::from([(1, 1), (2, 1)]);
+        a.settle(&live);
+        b.settle(&live);
+        assert_eq!(a.plan().len() + b.plan().len(), 1);
+    }
+
+    #[test]
+    fn what_is_given_away_is_held_until_somebody_lists_it() {
+        let mut s = section(1);
+        s.adopt(Epoch { counter: 1, hash: 0 }, &[], &forward(&[0, 1, 2, 3]));
+        s.adopt(Epoch { counter: 2, hash: 0 }, &forward(&[0]), &forward(&[1]));
+        assert_eq!(s.held().keys().copied().collect::<Vec<_>>(), [2, 3]);
+        let live = Live::from([(2, 1)]);
+        assert!(!s.orphans(&live).contains(2));
+        s.hear(2, 1, 1, register(&[(2, 1, stamp(2, 0, 2))]));
+        assert!(s.settle(&live));
+        assert_eq!(s.held().keys().copied().collect::<Vec<_>>(), [3]);
+        s.expire_held();
+        assert!(s.orphans(&live).contains(3) && !s.orphans(&live).contains(2));
+    }
+
+    #[test]
+    fn a_take_beats_every_stamp_heard() {
+        let mut s = section(1);
+        s.hear(2, 1, 1, register(&[(7, 1, stamp(5, 3, 2))]));
+        assert_eq!(s.take(&[(7, true), (7, true)]), 1);
+        assert_eq!(s.plan()[0].stamp, stamp(5, 4, 1));
+    }
+
+    #[test]
+    fn covered_cells_leave_plan_and_held() {
+        let mut s = section(1);
+        s.adopt(Epoch { counter: 1, hash: 0 }, &[], &forward(&[0, 1, 2]));
+        s.adopt(Epoch { counter: 2, hash: 0 }, &[], &forward(&[0]));
+        let mut c = CellSet::new(10);
+        c.insert(0);
+        c.insert(1);
+        assert!(s.cover(&c));
+        assert!(!s.cover(&c));
+        assert!(s.plan().is_empty());
+        assert_eq!(s.held().keys().copied().collect::<Vec<_>>(), [2]);
+    }
+
+    #[test]
+    fn packing_and_unpacking_keep_order_and_direction() {
+        let mut s = section(1);
+        let cells = [(8, false), (9, false), (0, false), (4, true), (3, true), (6, false)];
+        s.adopt(Epoch { counter: 1, hash: 0 }, &[], &cells);
+        let r = s.register(1, 1, 0);
+        assert_eq!(r.plan.len(), 3);
+        let back: Vec<(u16, bool)> = unpack(&r.plan, 10).iter().map(|p| (p.cell, p.backward)).collect();
+        assert_eq!(back, cells);
+    }
+
+    #[test]
+    fn what_does_not_fit_into_a_register_is_not_planned() {
+        let n = 200;
+        let mut s = Section::new(1, n, CellSet::new(n));
+        let scattered: Vec<(u16, bool)> = (0..n).step_by(2).map(|c| (c, false)).collect();
+        s.adopt(Epoch { counter: 1, hash: 0 }, &[], &scattered);
+        assert_eq!(s.plan().len(), MAX_PLAN_RUNS);
+        let listed: Vec<u16> = unpack(&s.register(1, 1, 0).plan, n).iter().map(|p| p.cell).collect();
+        assert_eq!(listed, s.plan().iter().map(|p| p.cell).collect::<Vec<_>>());
+    }
+}

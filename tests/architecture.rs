@@ -1,0 +1,160 @@
+//! Who may import whom: read from `cargo metadata`, so that a wrong arrow fails here
+//! and not in a review.
+
+use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// For each crate: which of ours it may use, and which others it must not reach,
+/// even through somebody else.
+const RULES: &[(&str, &[&str], &[&str])] = &[
+    ("skein-planning", &[], &["tokio", "zenoh", "rand_core"]),
+    ("skein-behaviors", &["skein-planning"], &["tokio", "zenoh", "rand_core"]),
+    ("skein-peer", &["skein-planning", "skein-behaviors"], &["tokio", "zenoh", "skein-netsim"]),
+    ("skein-link", &["skein-planning", "skein-behaviors"], &["tokio", "zenoh", "skein-netsim"]),
+    ("skein-interop", &["skein-planning", "skein-peer"], &["tokio", "zenoh", "skein-netsim"]),
+    (
+        "skein-netsim",
+        &["skein-link", "skein-peer", "skein-behaviors", "skein-planning"],
+        &["tokio", "zenoh", "skein-node"],
+    ),
+    (
+        "skein-scenario",
+        &["skein-netsim", "skein-interop", "skein-peer", "skein-planning"],
+        &["tokio", "zenoh", "skein-node"],
+    ),
+    ("skein-node", &["skein-link", "skein-peer", "skein-behaviors"], &["skein-netsim", "skein-scenario"]),
+    (
+        "skein-broker",
+        &["skein-scenario", "skein-netsim", "skein-link", "skein-peer", "skein-behaviors", "skein-planning"],
+        &["zenoh", "skein-node"],
+    ),
+    (
+        "skein-tests",
+        &[
+            "skein-planning",
+            "skein-behaviors",
+            "skein-peer",
+            "skein-link",
+            "skein-netsim",
+            "skein-scenario",
+            "skein-interop",
+        ],
+        &["zenoh", "skein-node", "skein-broker"],
+    ),
+];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
+}
+
+fn metadata() -> Metadata {
+    MetadataCommand::new()
+        .manifest_path(root().join("Cargo.toml"))
+        .other_options(vec!["--offline".into(), "--locked".into()])
+        .exec()
+        .unwrap()
+}
+
+fn package<'a>(metadata: &'a Metadata, name: &str) -> &'a Package {
+    metadata.packages.iter().find(|p| p.name.as_str() == name).unwrap_or_else(|| panic!("no package {name}"))
+}
+
+/// All packages that a build of `name` links, by way of normal dependencies.
+fn reaches(metadata: &Metadata, name: &str) -> BTreeSet<String> {
+    let resolve = metadata.resolve.as_ref().unwrap();
+    let nodes: BTreeMap<_, _> = resolve.nodes.iter().map(|n| (&n.id, n)).collect();
+    let names: BTreeMap<_, _> = metadata.packages.iter().map(|p| (&p.id, p.name.to_string())).collect();
+    let mut open = vec![&package(metadata, name).id];
+    let mut seen = BTreeSet::new();
+    while let Some(id) = open.pop() {
+        if seen.insert(names[id].clone()) {
+            for dep in &nodes[id].deps {
+                if dep.dep_kinds.iter().any(|k| k.kind == DependencyKind::Normal) {
+                    open.push(&dep.pkg);
+                }
+            }
+        }
+    }
+    seen
+}
+
+#[test]
+fn imports_point_from_the_shell_to_the_core() {
+    let metadata = metadata();
+    for (name, allowed, forbidden) in RULES {
+        for dep in &package(&metadata, name).dependencies {
+            let is_test_of_tests = *name == "skein-tests" || dep.kind == DependencyKind::Normal;
+            if dep.name.starts_with("skein-") && is_test_of_tests {
+                assert!(allowed.contains(&dep.name.as_str()), "{name} may not use {}", dep.name);
+            }
+        }
+        let reached = reaches(&metadata, name);
+        for f in *forbidden {
+            assert!(!reached.contains(*f), "{name} reaches {f}");
+        }
+    }
+}
+
+#[test]
+fn every_package_of_the_workspace_has_a_rule() {
+    let metadata = metadata();
+    for p in metadata.workspace_packages() {
+        let known = p.name.as_str() == "skein" || RULES.iter().any(|r| r.0 == p.name.as_str());
+        assert!(known, "{} has no rule in tests/architecture.rs", p.name);
+    }
+}
+
+#[test]
+fn every_third_party_crate_has_a_reason() {
+    let text = std::fs::read_to_string(root().join("docs/decisions/dependencies.md")).unwrap();
+    let reasons: BTreeSet<&str> = text
+        .lines()
+        .filter_map(|l| l.strip_prefix("- ")?.split_once(": "))
+        .map(|(name, _)| name.trim_matches('`'))
+        .collect();
+    let metadata = metadata();
+    for p in metadata.workspace_packages() {
+        for dep in p.dependencies.iter().filter(|d| !d.name.starts_with("skein-")) {
+            assert!(reasons.contains(dep.name.as_str()), "{} uses {} without a reason", p.name, dep.name);
+        }
+    }
+}
+
+/// Rust files below the given folders.
+fn sources(folders: &[&str]) -> Vec<PathBuf> {
+    let mut open: Vec<PathBuf> = folders.iter().map(|f| root().join(f)).collect();
+    let mut out = Vec::new();
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            open.extend(std::fs::read_dir(path).unwrap().map(|e| e.unwrap().path()));
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            out.push(path);
+        }
+    }
+    out.sort();
+    out
+}
+
+#[test]
+fn the_core_asks_neither_clock_nor_chance() {
+    let banned = ["Instant::now", "SystemTime", "HashMap", "HashSet", "std::thread", "std::fs", "std::net", "OsRng"];
+    for file in sources(&["planning/src", "behaviors/src", "runtime/peer/src", "runtime/link/src", "netsim/sim/src"]) {
+        let text = std::fs::read_to_string(&file).unwrap();
+        for (i, line) in text.lines().enumerate().filter(|(_, l)| !l.trim_start().starts_with("//")) {
+            for b in banned {
+                assert!(!line.contains(b), "{}:{}: {b} has no place in the core", file.display(), i + 1);
+            }
+        }
+    }
+}
+
+#[test]
+fn only_the_bus_speaks_zenoh() {
+    for file in sources(&["src", "runtime", "netsim", "planning", "behaviors", "interop"]) {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let speaks = text.lines().any(|l| l.contains("use zenoh") || (l.contains("zenoh::") && !l.contains("//")));
+        let is_bus = file.ends_with("runtime/node/src/bus.rs");
+        assert!(is_bus || !speaks, "{} uses zenoh; only runtime/node/src/bus.rs may", file.display());
+    }
+}
