@@ -28,7 +28,11 @@ impl Pose {
     /// A pose at `position`, heading as given.
     #[must_use]
     pub fn new(position: Point, heading_rad: f64) -> Self {
-        Self { east_m: position.x, north_m: position.y, heading_rad }
+        Self {
+            east_m: position.x,
+            north_m: position.y,
+            heading_rad,
+        }
     }
 
     /// The position without the heading.
@@ -47,7 +51,10 @@ impl Pose {
     /// The same place, looking back.
     #[must_use]
     pub fn reversed(&self) -> Self {
-        Self { heading_rad: wrap_pi(self.heading_rad + crate::math::PI), ..*self }
+        Self {
+            heading_rad: wrap_pi(self.heading_rad + crate::math::PI),
+            ..*self
+        }
     }
 }
 
@@ -121,8 +128,15 @@ mod tests {
 
     #[test]
     fn geodetic_and_enu_invert_each_other() {
-        let o = Origin { lat_deg: 60.1655, lon_deg: 24.9355 };
-        for p in [Point::new(1000.0, 1000.0), Point::new(-8000.0, 12000.0), Point::new(0.0, 0.0)] {
+        let o = Origin {
+            lat_deg: 60.1655,
+            lon_deg: 24.9355,
+        };
+        for p in [
+            Point::new(1000.0, 1000.0),
+            Point::new(-8000.0, 12000.0),
+            Point::new(0.0, 0.0),
+        ] {
             let (lat, lon) = o.to_geodetic(p);
             assert!((o.to_enu(lat, lon) - p).norm() < 1e-5, "{p:?}");
         }
@@ -130,7 +144,10 @@ mod tests {
 
     #[test]
     fn one_arc_minute_of_latitude_is_about_a_nautical_mile() {
-        let o = Origin { lat_deg: 45.0, lon_deg: 0.0 };
+        let o = Origin {
+            lat_deg: 45.0,
+            lon_deg: 0.0,
+        };
         let p = o.to_enu(45.0 + 1.0 / 60.0, 0.0);
         assert!((p.y - 1852.0).abs() < 1.0 && p.x.abs() < 1e-6, "{p:?}");
     }

@@ -2,9 +2,16 @@
 
 use crate::frame::{Point, Pose};
 use crate::geometry::{NoFlyZones, ZoneError};
-use crate::trajectory::Curve;
+use crate::math::{TAU, atan2};
+use crate::trajectory::{Curve, dubins};
 use std::sync::Arc;
 use thiserror::Error;
+
+/// Slack for ends that lie on the clearance exactly, metres.
+const ROUNDING_M: f64 = 1e-6;
+
+/// Headings tried at a goal without one: every 45°, beside the two straight ones.
+const GOAL_HEADINGS: u8 = 8;
 
 /// What a route must respect.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,12 +72,8 @@ impl Router {
     /// # Errors
     /// [`RouteError`]; a curve that fails its check is refused, never clipped.
     pub fn route(&self, from: Pose, to: Pose) -> Result<Curve, RouteError> {
-        let c = self.limits.clearance_m;
-        if self.zones.distance_m(to.position()) < c {
-            return Err(RouteError::GoalInZone);
-        }
-        let words = crate::trajectory::dubins::all(from, to, self.limits.turn_radius_m);
-        words.into_iter().find(|w| self.zones.is_clear(w, c)).ok_or(RouteError::NoRoute)
+        self.check_ends(from.position(), to.position())?;
+        self.direct(from, to).ok_or(RouteError::NoRoute)
     }
 
     /// As [`Router::route`], for a goal whose heading does not matter.
@@ -78,15 +81,56 @@ impl Router {
     /// # Errors
     /// [`RouteError`].
     pub fn route_to_point(&self, from: Pose, to: Point) -> Result<Curve, RouteError> {
+        self.check_ends(from.position(), to)?;
         let mut best: Option<Curve> = None;
-        for k in 0..16 {
-            let heading_rad = f64::from(k) * crate::math::TAU / 16.0;
-            if let Ok(c) = self.route(from, Pose::new(to, heading_rad))
+        for heading_rad in self.headings_at(from, to) {
+            if let Some(c) = self.direct(from, Pose::new(to, heading_rad))
                 && best.as_ref().is_none_or(|b| c.length_m() < b.length_m())
             {
                 best = Some(c);
             }
         }
         best.ok_or(RouteError::NoRoute)
+    }
+
+    fn check_ends(&self, from: Point, to: Point) -> Result<(), RouteError> {
+        // A distance that is no number fails both comparisons' negations.
+        let clear = |p: Point| {
+            p.x.is_finite()
+                && p.y.is_finite()
+                && self.zones.distance_m(p) >= self.limits.clearance_m - ROUNDING_M
+        };
+        if !clear(from) {
+            return Err(RouteError::StartInZone);
+        }
+        if !clear(to) {
+            return Err(RouteError::GoalInZone);
+        }
+        Ok(())
+    }
+
+    /// The shortest Dubins word that keeps clear.
+    fn direct(&self, from: Pose, to: Pose) -> Option<Curve> {
+        dubins::all(from, to, self.limits.turn_radius_m)
+            .into_iter()
+            .find(|c| self.zones.is_clear(c, self.limits.clearance_m))
+    }
+
+    /// Headings worth trying at a goal that has none: those at which a turn to
+    /// either side runs straight on to the goal, and all around.
+    fn headings_at(&self, from: Pose, to: Point) -> Vec<f64> {
+        let r = self.limits.turn_radius_m;
+        let d = from.direction();
+        let mut headings = Vec::new();
+        for turn in [1.0, -1.0] {
+            let centre = Point::new(from.east_m - turn * r * d.y, from.north_m + turn * r * d.x);
+            let v = to - centre;
+            let straight = v.norm_squared() - r * r;
+            if straight > 0.0 {
+                headings.push(atan2(v.y, v.x) + turn * atan2(r, straight.sqrt()));
+            }
+        }
+        headings.extend((0..GOAL_HEADINGS).map(|i| TAU * f64::from(i) / f64::from(GOAL_HEADINGS)));
+        headings
     }
 }

@@ -57,13 +57,20 @@ impl Segment {
         }
         let (s, c) = sin_cos(self.start.heading_rad);
         let r = 1.0 / self.curvature_per_m;
-        Some(Point::new(self.start.east_m - r * s, self.start.north_m + r * c))
+        Some(Point::new(
+            self.start.east_m - r * s,
+            self.start.north_m + r * c,
+        ))
     }
 
     /// The same piece flown from its end to its start.
     #[must_use]
     pub fn reversed(&self) -> Self {
-        Self { start: self.end().reversed(), curvature_per_m: -self.curvature_per_m, length_m: self.length_m }
+        Self {
+            start: self.end().reversed(),
+            curvature_per_m: -self.curvature_per_m,
+            length_m: self.length_m,
+        }
     }
 }
 
@@ -88,7 +95,11 @@ impl Curve {
         let mut at = start;
         for &(curvature_per_m, length_m) in pieces {
             if length_m > 1e-4 {
-                let s = Segment { start: at, curvature_per_m, length_m };
+                let s = Segment {
+                    start: at,
+                    curvature_per_m,
+                    length_m,
+                };
                 at = s.end();
                 segments.push(s);
             }
@@ -142,7 +153,9 @@ impl Curve {
     /// The same curve flown backwards.
     #[must_use]
     pub fn reversed(&self) -> Self {
-        Self { segments: self.segments.iter().rev().map(Segment::reversed).collect() }
+        Self {
+            segments: self.segments.iter().rev().map(Segment::reversed).collect(),
+        }
     }
 
     /// Appends a piece as it is.
@@ -158,7 +171,10 @@ impl Curve {
     /// The largest curvature, 1/m, without sign.
     #[must_use]
     pub fn max_curvature_per_m(&self) -> f64 {
-        self.segments.iter().map(|s| s.curvature_per_m.abs()).fold(0.0, f64::max)
+        self.segments
+            .iter()
+            .map(|s| s.curvature_per_m.abs())
+            .fold(0.0, f64::max)
     }
 
     /// The largest gap between the end of a piece and the start of the next, metres.
@@ -178,7 +194,11 @@ mod tests {
 
     #[test]
     fn a_quarter_turn_left_ends_where_it_should() {
-        let start = Pose { east_m: 0.0, north_m: 0.0, heading_rad: 0.0 };
+        let start = Pose {
+            east_m: 0.0,
+            north_m: 0.0,
+            heading_rad: 0.0,
+        };
         let c = Curve::from_pieces(start, &[(0.1, 10.0 * FRAC_PI_2)]);
         let e = c.end().unwrap();
         assert!((e.east_m - 10.0).abs() < 1e-9 && (e.north_m - 10.0).abs() < 1e-9);
@@ -187,7 +207,11 @@ mod tests {
 
     #[test]
     fn reversing_twice_gives_the_same_poses() {
-        let start = Pose { east_m: 3.0, north_m: -2.0, heading_rad: 1.0 };
+        let start = Pose {
+            east_m: 3.0,
+            north_m: -2.0,
+            heading_rad: 1.0,
+        };
         let c = Curve::from_pieces(start, &[(0.05, 20.0), (0.0, 15.0), (-0.04, 30.0)]);
         let r = c.reversed();
         assert!((r.length_m() - c.length_m()).abs() < 1e-12);

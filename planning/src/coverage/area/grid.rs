@@ -27,7 +27,10 @@ impl Grid {
     #[must_use]
     pub fn centre(&self, cell: CellId) -> Point {
         let d = self.lane_spacing_m;
-        Point::new((f64::from(cell.col) + 0.5) * d, (f64::from(cell.row) + 0.5) * d)
+        Point::new(
+            (f64::from(cell.col) + 0.5) * d,
+            (f64::from(cell.row) + 0.5) * d,
+        )
     }
 
     /// The four corners of a cell, counter-clockwise from the south-west.
@@ -35,14 +38,25 @@ impl Grid {
     pub fn corners(&self, cell: CellId) -> [Point; 4] {
         let d = self.lane_spacing_m;
         let (x, y) = (f64::from(cell.col) * d, f64::from(cell.row) * d);
-        [Point::new(x, y), Point::new(x + d, y), Point::new(x + d, y + d), Point::new(x, y + d)]
+        [
+            Point::new(x, y),
+            Point::new(x + d, y),
+            Point::new(x + d, y + d),
+            Point::new(x, y + d),
+        ]
     }
 
     /// The cell a point lies in.
     #[must_use]
     pub fn cell_at(&self, p: Point) -> CellId {
         let d = self.lane_spacing_m;
-        #[allow(clippy::cast_possible_truncation, reason = "missions end at 20 km from the origin")]
-        CellId { col: (p.x / d).floor() as i16, row: (p.y / d).floor() as i16 }
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "missions end at 20 km from the origin"
+        )]
+        CellId {
+            col: (p.x / d).floor() as i16,
+            row: (p.y / d).floor() as i16,
+        }
     }
 }
