@@ -2,6 +2,7 @@
 
 use crate::exit;
 use clap::{Args, ValueEnum};
+use skein_netsim::spec::Spec;
 use skein_netsim::world::Survey;
 use skein_planning::coverage::area::CellId;
 use skein_scenario::{Overrides, Scenario, Summary, extent_m, summary};
@@ -110,91 +111,91 @@ fn names(cells: &[CellId]) -> String {
 }
 
 fn text(scenario: &Scenario, total: &Summary, judged: &Judged) -> String {
-    let spec = &scenario.spec;
-    let (width_m, height_m) = extent_m(spec);
-    let mission = &spec.mission;
-    let lane_m = f64::from(mission.lane_spacing_mm) / 1000.0;
+    let mut lines = area_lines(&scenario.spec, total, judged);
+    lines.extend(fleet_lines(&scenario.spec, total));
     let mut out = String::new();
-    let mut line = |name: &str, text: String| {
+    for (name, text) in lines {
         // Writing to a string cannot fail.
         let _ = writeln!(out, "{name:<12}{text}");
-    };
-    line("scenario", format!("{}, ok", spec.name));
-    line(
-        "area",
-        format!(
-            "{:.3} km² in {width_m:.0} x {height_m:.0} m; {} of {} cells can be seen, {:.2} % of the area",
-            total.area_m2 / 1e6,
-            judged.coverable,
-            judged.cells,
-            judged.share * 100.0
-        ),
-    );
-    line(
-        "zones",
-        format!(
-            "{} no-fly, clearance {:.1} m; {} buildings block radio",
-            spec.zones.len(),
-            f64::from(mission.clearance_mm) / 1000.0,
-            spec.buildings.len()
-        ),
-    );
-    line(
-        "cells",
-        format!(
-            "{} of {lane_m} m on the loop, {} of them seen by excursions",
-            total.cells, total.excursions
-        ),
-    );
-    for (reason, cells) in &total.uncoverable {
-        line(
-            "uncovered",
-            format!("{} cells, {reason}: {}", cells.len(), names(cells)),
-        );
     }
-    if !judged.missed.is_empty() {
-        line(
-            "missed",
-            format!(
-                "{} cells that could be seen are not on the loop: {}",
-                judged.missed.len(),
-                names(&judged.missed)
-            ),
-        );
-    }
-    line("loop", format!("{:.1} km", total.loop_m / 1000.0));
-    let ground = spec
-        .ground
-        .as_ref()
-        .map_or("no ground station".to_owned(), |g| {
-            format!("ground station {}", g.id)
-        });
-    let heights = spec.uavs.iter().map(|u| u.height_m);
-    line(
-        "fleet",
-        format!(
-            "{} UAVs at {:.0} to {:.0} m, {ground}",
-            spec.uavs.len(),
-            heights.clone().fold(f64::INFINITY, f64::min),
-            heights.fold(0.0, f64::max)
-        ),
-    );
-    line(
-        "faults",
-        format!(
-            "{} at stated times, up to {} kills in a storm",
-            spec.faults.len(),
-            spec.storm.max_kills
-        ),
-    );
-    line(
-        "makespan",
-        format!("about {:.0} s without failures", total.makespan_s),
-    );
     for finding in &scenario.findings {
         let _ = writeln!(out, "{finding}");
     }
     out
+}
+
+type Line = (&'static str, String);
+
+fn area_lines(spec: &Spec, total: &Summary, judged: &Judged) -> Vec<Line> {
+    let (width_m, height_m) = extent_m(spec);
+    let mission = &spec.mission;
+    let area = format!(
+        "{:.3} km² in {width_m:.0} x {height_m:.0} m; {} of {} cells can be seen, {:.2} % of the area",
+        total.area_m2 / 1e6,
+        judged.coverable,
+        judged.cells,
+        judged.share * 100.0
+    );
+    let zones = format!(
+        "{} no-fly, clearance {:.1} m; {} buildings block radio",
+        spec.zones.len(),
+        f64::from(mission.clearance_mm) / 1000.0,
+        spec.buildings.len()
+    );
+    let cells = format!(
+        "{} of {} m on the loop, {} of them seen by excursions",
+        total.cells,
+        f64::from(mission.lane_spacing_mm) / 1000.0,
+        total.excursions
+    );
+    let mut lines = vec![
+        ("scenario", format!("{}, ok", spec.name)),
+        ("area", area),
+        ("zones", zones),
+        ("cells", cells),
+    ];
+    for (reason, cells) in &total.uncoverable {
+        lines.push((
+            "uncovered",
+            format!("{} cells, {reason}: {}", cells.len(), names(cells)),
+        ));
+    }
+    if !judged.missed.is_empty() {
+        let n = judged.missed.len();
+        let text = format!(
+            "{n} cells that could be seen are not on the loop: {}",
+            names(&judged.missed)
+        );
+        lines.push(("missed", text));
+    }
+    lines.push(("loop", format!("{:.1} km", total.loop_m / 1000.0)));
+    lines
+}
+
+fn fleet_lines(spec: &Spec, total: &Summary) -> Vec<Line> {
+    let ground = spec.ground.as_ref();
+    let ground = ground.map_or("no ground station".to_owned(), |g| {
+        format!("ground station {}", g.id)
+    });
+    let heights = spec.uavs.iter().map(|u| u.height_m);
+    let fleet = format!(
+        "{} UAVs at {:.0} to {:.0} m, {ground}",
+        spec.uavs.len(),
+        heights.clone().fold(f64::INFINITY, f64::min),
+        heights.fold(0.0, f64::max)
+    );
+    let (n, kills) = (spec.faults.len(), spec.storm.max_kills);
+    vec![
+        ("fleet", fleet),
+        (
+            "faults",
+            format!("{n} at stated times, up to {kills} kills in a storm"),
+        ),
+        (
+            "makespan",
+            format!("about {:.0} s without failures", total.makespan_s),
+        ),
+    ]
 }
 
 fn json(scenario: &Scenario, total: &Summary, judged: &Judged) -> serde_json::Value {

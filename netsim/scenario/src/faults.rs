@@ -146,30 +146,27 @@ fn groups(node: &Node<'_>, known: &Known<'_>) -> Result<Vec<Vec<u16>>, ScenarioE
     Ok(groups)
 }
 
-/// A fault and what ends it.
-fn one(
-    item: &Node<'_>,
-    known: &Known<'_>,
-) -> Result<(TimedFault, Option<TimedFault>), ScenarioError> {
-    const ALL: [&str; 10] = [
-        "at_s",
-        "kind",
-        "for_s",
-        "peer",
-        "fresh_disk",
-        "a",
-        "b",
-        "one_way",
-        "groups",
-        "percent",
-    ];
-    let f = item.fields(&ALL)?;
-    let at_ms = at_ms(&f, "at_s", known)?;
-    let kind_node = f.need("kind", "\"kill\"")?;
-    let kind = kind_node.text()?;
+/// Every field that some kind of fault has.
+const ALL: [&str; 10] = [
+    "at_s",
+    "kind",
+    "for_s",
+    "peer",
+    "fresh_disk",
+    "a",
+    "b",
+    "one_way",
+    "groups",
+    "percent",
+];
+
+/// The kind of a fault, with no field that belongs to another kind.
+fn kind<'a>(f: &Fields<'a>) -> Result<&'a str, ScenarioError> {
+    let node = f.need("kind", "\"kill\"")?;
+    let kind = node.text()?;
     let names: Vec<&str> = KINDS.iter().map(|(n, _)| *n).collect();
     let Some((_, own)) = KINDS.iter().find(|(n, _)| *n == kind) else {
-        return Err(kind_node.wrong(format!(
+        return Err(node.wrong(format!(
             "\"{kind}\" is no fault; {}",
             suggestion(kind, &names)
         )));
@@ -184,9 +181,23 @@ fn one(
             )));
         }
     }
+    Ok(kind)
+}
+
+fn flag(f: &Fields<'_>, name: &str) -> Result<bool, ScenarioError> {
+    f.get(name).map_or(Ok(false), Node::flag)
+}
+
+/// A fault and what ends it.
+fn one(
+    item: &Node<'_>,
+    known: &Known<'_>,
+) -> Result<(TimedFault, Option<TimedFault>), ScenarioError> {
+    let f = item.fields(&ALL)?;
+    let at_ms = at_ms(&f, "at_s", known)?;
+    let kind = kind(&f)?;
     let peer = || known.peer(f.need("peer", "3")?);
-    let flag = |name| f.get(name).map_or(Ok(false), |n| n.flag());
-    let fresh_disk = flag("fresh_disk")?;
+    let fresh_disk = flag(&f, "fresh_disk")?;
     let fault = match kind {
         "kill" => Fault::Kill { peer: peer()? },
         "kill-computer" => Fault::KillComputer { peer: peer()? },
@@ -197,18 +208,7 @@ fn one(
             peer: peer()?,
             fresh_disk,
         },
-        "cut" => {
-            let (a, b_node) = (known.peer(f.need("a", "1")?)?, f.need("b", "2")?);
-            let b = known.peer(b_node)?;
-            if a == b {
-                return Err(b_node.wrong("both ends are the same peer"));
-            }
-            Fault::Cut {
-                a,
-                b,
-                one_way: flag("one_way")?,
-            }
-        }
+        "cut" => cut(&f, known)?,
         "partition" => Fault::Partition {
             groups: groups(f.need("groups", "[[1, 2], [3, 4]]")?, known)?,
         },
@@ -227,6 +227,19 @@ fn one(
         return Err(node.wrong("says how the peer restarts, so it needs for_s"));
     }
     Ok((TimedFault { at_ms, fault }, end))
+}
+
+fn cut(f: &Fields<'_>, known: &Known<'_>) -> Result<Fault, ScenarioError> {
+    let far = f.need("b", "2")?;
+    let (a, b) = (known.peer(f.need("a", "1")?)?, known.peer(far)?);
+    if a == b {
+        return Err(far.wrong("both ends are the same peer"));
+    }
+    Ok(Fault::Cut {
+        a,
+        b,
+        one_way: flag(f, "one_way")?,
+    })
 }
 
 fn ending(

@@ -418,6 +418,8 @@ pub fn extent_m(spec: &Spec) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use skein_netsim::chaos::TimedFault;
+    use skein_planning::frame::Pose;
 
     #[test]
     fn cells_are_clipped_by_the_area() {
@@ -442,5 +444,127 @@ mod tests {
             .map(|c| overlap_m2(&triangle, &grid, c))
             .sum();
         assert!((total - ring_area_m2(&triangle)).abs() < 1e-9);
+    }
+
+    /// Breaks the fixture and returns errors (or worse findings) as lines.
+    fn told(n: u16, change: impl FnOnce(&mut Spec)) -> Vec<String> {
+        let mut spec = skein_netsim::world::fixture::square(n);
+        change(&mut spec);
+        feasibility(&spec).iter().map(ToString::to_string).collect()
+    }
+
+    fn at(at_ms: u64, fault: Fault) -> TimedFault {
+        TimedFault { at_ms, fault }
+    }
+
+    /// What is done to the fixture, and what must be said.
+    type Case = (fn(&mut Spec), &'static str);
+
+    #[test]
+    fn what_cannot_succeed_is_an_error() {
+        let cases: [Case; 11] = [
+            (|s| s.uavs.clear(), "error: fleet: there is no UAV"),
+            (
+                |s| s.uavs[1].id = 1,
+                "error: fleet.uavs[1].id: the number 1 is taken twice",
+            ),
+            (
+                |s| s.uavs[0].id = 100,
+                "error: fleet.uavs[3].id: the number 100 is taken twice",
+            ),
+            (
+                |s| s.uavs[2].airframe.endurance_s = 0.0,
+                "error: fleet.uavs[2].airframe: UAV 3 has no endurance",
+            ),
+            (
+                |s| s.ground = None,
+                "warning: ground: there is no ground station",
+            ),
+            (
+                |s| s.max_time_s = 5,
+                "error: max_time_s: covering takes about",
+            ),
+            (
+                |s| s.uavs[0].launch = Pose::new(Point::new(240.0, 240.0), 0.0),
+                "error: fleet.uavs[0].launch: starts 0.0 m from a no-fly zone",
+            ),
+            (
+                |s| {
+                    s.uavs
+                        .iter_mut()
+                        .for_each(|u| u.airframe.endurance_s = 70.0)
+                },
+                "error: airframes: all UAVs together fly",
+            ),
+            (
+                |s| {
+                    s.faults = vec![at(
+                        1,
+                        Fault::Partition {
+                            groups: vec![vec![1], vec![9]],
+                        },
+                    )]
+                },
+                "error: faults: the fault at 0 s names a peer 9 that is not there",
+            ),
+            (
+                |s| s.faults = vec![at(10_000_000, Fault::Heal)],
+                "error: faults: the fault at 10000 s is after the end",
+            ),
+            (
+                |s| s.faults = (1..=3).map(|peer| at(1, Fault::Kill { peer })).collect(),
+                "error: faults: in the end no UAV is left",
+            ),
+        ];
+        for (change, want) in cases {
+            let all = told(3, change);
+            assert!(
+                all.iter().any(|f| f.starts_with(want)),
+                "expected {want}, found {all:#?}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_may_disappoint_is_a_warning() {
+        let all = told(3, |s| {
+            s.faults = vec![at(
+                1,
+                Fault::Restart {
+                    peer: 2,
+                    fresh_disk: false,
+                },
+            )]
+        });
+        assert!(
+            all.iter()
+                .any(|f| f.starts_with("warning: faults: peer 2 is neither down")),
+            "{all:?}"
+        );
+        let short = |s: &mut Spec| {
+            s.uavs
+                .iter_mut()
+                .for_each(|u| u.airframe.endurance_s = 500.0)
+        };
+        let all = told(3, short);
+        assert!(
+            all.iter()
+                .any(|f| f.starts_with("warning: airframes: the weakest UAV")),
+            "{all:?}"
+        );
+    }
+
+    #[test]
+    fn lanes_that_are_too_narrow_are_blamed() {
+        let all = told(3, |s| {
+            let mut mission = (*s.mission).clone();
+            mission.lane_spacing_mm = 40_000;
+            s.mission = std::sync::Arc::new(mission);
+        });
+        assert!(
+            all.iter()
+                .any(|f| f.starts_with("error: lanes.spacing_m: a turn radius of 23.0 m")),
+            "{all:?}"
+        );
     }
 }

@@ -112,39 +112,14 @@ fn resolve(
     let name = word(f.need("name", "\"city\"")?)?;
     let max_time_s = f.whole_or("max_time_s", 6000, 1, 604_800, "seconds")?;
     let (time_scale, beacon_period_ms) = times(&f, over)?;
-    let mut notices = Notices::new();
-    let terrain = terrain::read(&f, files, &mut notices)?;
-    findings.extend(notices.into_iter().map(|(field, text)| {
-        let mut note = Finding::new(Severity::Note, &field, text);
-        note.place = Some(root.locate(&field));
-        note
-    }));
-    let airframes = fleet::airframes(f.need("airframes", "{ swift: { ... } }")?, terrain.level_m)?;
+    let terrain = told_terrain(root, &f, files, findings)?;
     let ground_spec = f.get("ground").map(ground_station).transpose()?;
     let ground_id = ground_spec.as_ref().map(|g| g.id);
-    let fleet_node = f.need(
-        "fleet",
-        "{ count: 8, airframes: [\"swift\"], launch: \"spread\" }",
-    )?;
-    let fleet = fleet::read(
-        fleet_node,
-        &airframes,
-        &name,
-        terrain.level_m,
-        ground_id,
-        over,
-    )?;
+    let fleet = the_fleet(&f, &name, terrain.level_m, ground_id, over)?;
     let mission = Arc::new(mission(&f, &terrain, &fleet, ground_spec.as_ref())?);
     check_size(&f, &mission, &terrain.area)?;
     check_places(&f, &mission, &terrain, &fleet)?;
-    let ground = mission.ground().map_err(|e| {
-        let (field, problem) = loop_trouble(&mission, &e);
-        ScenarioError::Invalid {
-            place: root.locate(&field),
-            field,
-            problem,
-        }
-    })?;
+    let ground = common_ground(root, &mission)?;
     let uavs = launch(&fleet, &ground);
     let radio = radio(f.need("radio", "{ range_m: 500, rate_bps: 64000 }")?)?;
     let peers: BTreeSet<u16> = uavs.iter().map(|u| u.id).chain(ground_id).collect();
@@ -182,6 +157,54 @@ fn resolve(
         },
     };
     Ok((spec, ground))
+}
+
+/// The terrain, and what its files told as notes.
+fn told_terrain(
+    root: &Node<'_>,
+    f: &Fields<'_>,
+    files: &Files<'_>,
+    findings: &mut Vec<Finding>,
+) -> Result<Terrain, ScenarioError> {
+    let mut notices = Notices::new();
+    let terrain = terrain::read(f, files, &mut notices)?;
+    findings.extend(notices.into_iter().map(|(field, text)| {
+        let mut note = Finding::new(Severity::Note, &field, text);
+        note.place = Some(root.locate(&field));
+        note
+    }));
+    Ok(terrain)
+}
+
+fn the_fleet(
+    f: &Fields<'_>,
+    name: &str,
+    level_m: f64,
+    ground_id: Option<u16>,
+    over: &Overrides,
+) -> Result<Fleet, ScenarioError> {
+    let airframes = fleet::airframes(f.need("airframes", "{ swift: { ... } }")?, level_m)?;
+    let example = "{ count: 8, airframes: [\"swift\"], launch: \"spread\" }";
+    fleet::read(
+        f.need("fleet", example)?,
+        &airframes,
+        name,
+        level_m,
+        ground_id,
+        over,
+    )
+}
+
+/// The loop and the routes that all UAVs derive from the mission.
+fn common_ground(root: &Node<'_>, mission: &Arc<Mission>) -> Result<Arc<Ground>, ScenarioError> {
+    mission.ground().map_err(|e| {
+        let (field, problem) = loop_trouble(mission, &e);
+        ScenarioError::Invalid {
+            place: root.locate(&field),
+            field,
+            problem,
+        }
+    })
 }
 
 /// Time scale and beacon period, which limit each other.

@@ -196,6 +196,10 @@ impl Reader<'_> {
                 );
                 notices.push(told("/mission/items", &said));
             }
+            if p.surveys.is_empty() && !p.keep_in.is_empty() {
+                let said = "the inclusion fence is the area to cover; UAVs turn outside of it";
+                notices.push(told("/geoFence", said));
+            }
             // A survey says what to see; without one the fence that must not be left does.
             let area = if p.surveys.is_empty() {
                 p.keep_in
