@@ -1,16 +1,77 @@
 //! The executive layer: flies legs of the coverage loop one after the other, and
-//! goes to a point when told to.
+//! goes to a point when told to (D2.7 §1.2.3, executive layer).
+//!
+//! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
+//! it cell by cell. Ways between cells come from [`chart`], what the camera saw from
+//! [`camera`], expectations for the peer from [`outlook`]; following the track and the
+//! safety of every setpoint are the reactive layer's.
+//!
+//! | goal | track | events |
+//! |---|---|---|
+//! | hold | the nearest circle with room | none |
+//! | legs | open cells in order, then a circle | `Seen`, `Refused`, `PlanDone` once |
+//! | point | a route, then a circle | `Arrived` once, `Refused` without cells if there is no route |
+//!
+//! # Guarantees
+//! An open cell of the legs is flown until it is seen or refused. Equal inputs give
+//! equal outputs.
+//!
+//! # Complexity
+//! A step costs a projection, a few footprint tests and the envelope; the router is
+//! asked only where the next open cell does not follow on the loop.
+
+pub mod camera;
+pub mod chart;
+pub mod outlook;
 
 use crate::event::Event;
 use crate::percept::Percept;
-use crate::setpoint::Setpoint;
+use crate::reactive::envelope::{Envelope, is_finite};
+use crate::reactive::follow::{HORIZON_S, Offset, Track};
+use crate::setpoint::{Setpoint, Side};
+use camera::{Played, look};
+use chart::{Chart, Hop, Move, Place};
+pub use outlook::{UNREACHABLE_MS, View};
 use serde::{Deserialize, Serialize};
 use skein_planning::airframe::Airframe;
 use skein_planning::coverage::area::backtracking::Leg;
 use skein_planning::coverage::area::{CoverageLoop, Direction};
-use skein_planning::frame::Point;
+use skein_planning::frame::{Point, Pose};
 use skein_planning::path::Router;
+use skein_planning::trajectory::{Curve, Segment};
+use std::collections::VecDeque;
 use std::sync::Arc;
+
+/// How far a UAV may stray from its curve unless the mission says otherwise, metres.
+pub const DEFAULT_TRACKING_ERROR_M: f64 = 2.0;
+
+/// A UAV farther off its track than this plans anew from where it is, metres: three
+/// times what following allows, so only a failsafe or a long silence gets there.
+const LOST_M: f64 = 6.0;
+
+/// The same for its heading, radians.
+const LOST_RAD: f64 = 0.8;
+
+/// Within these of its track a UAV plans anew from the track and not from its own
+/// pose: a millimetre beside a lane must not cost a circle to get back onto it.
+const ON_TRACK_M: f64 = 0.5;
+const ON_TRACK_RAD: f64 = 0.1;
+
+/// A cell that was flown this often and not seen is given up.
+const MAX_TRIES: u8 = 3;
+
+/// Progress may exceed what the airspeed explains by this much, metres.
+const WINDOW_M: f64 = 5.0;
+
+/// Percepts later than this do not widen the search on the track, seconds: within it
+/// the track ahead has been flown.
+const WINDOW_S: f64 = 3.0;
+
+/// Cells remembered as reported: the peer may close a cell a few percepts later.
+const RECENT: usize = 16;
+
+/// A point counts as reached within so many turn radii.
+const ARRIVAL_RADII: f64 = 2.0;
 
 /// What a UAV is doing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,20 +99,111 @@ pub struct Forecast {
     pub finish_ms: u32,
 }
 
+/// The goal, without its legs: those are in the queue.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Aim {
+    Hold,
+    Legs,
+    Point(Point),
+}
+
+/// What a stretch of the track is for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Serve(Hop),
+    Pass(u16, Direction),
+    Route,
+    Loiter(Segment),
+}
+
+impl Kind {
+    fn hop(&self) -> Option<Hop> {
+        match self {
+            Self::Serve(h) => Some(*h),
+            _ => None,
+        }
+    }
+
+    fn cell(&self) -> Option<(u16, Direction)> {
+        match self {
+            Self::Serve(h) => Some((h.cell, h.direction)),
+            Self::Pass(c, d) => Some((*c, *d)),
+            _ => None,
+        }
+    }
+}
+
+/// A stretch of the track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stretch {
+    kind: Kind,
+    /// Arc length of the track at its end, metres.
+    end_m: f64,
+    end: Place,
+}
+
 /// The executive of one UAV.
 #[derive(Clone, Debug)]
 pub struct Executive {
-    airframe: Airframe,
+    chart: Chart,
     height_m: f64,
-    coverage_loop: Arc<CoverageLoop>,
-    router: Arc<Router>,
+    envelope: Envelope,
+    aim: Aim,
+    /// Cells to be served after those on the track.
+    queue: VecDeque<Hop>,
+    track: Track,
+    stretches: VecDeque<Stretch>,
+    /// Whether the track is to be given up at the next step.
+    replan: bool,
+    /// Whether the end of the goal has been reported.
+    told: bool,
+    played: Option<Played>,
+    recent: VecDeque<u16>,
+    /// Events that came up between two steps.
+    pending: Vec<Event>,
 }
 
 impl Executive {
     /// An executive that holds until it is given a goal.
     #[must_use]
-    pub fn new(airframe: Airframe, height_m: f64, coverage_loop: Arc<CoverageLoop>, router: Arc<Router>) -> Self {
-        Self { airframe, height_m, coverage_loop, router }
+    pub fn new(
+        airframe: Airframe,
+        height_m: f64,
+        coverage_loop: Arc<CoverageLoop>,
+        router: Arc<Router>,
+    ) -> Self {
+        let envelope = Self::envelope(airframe, &router, DEFAULT_TRACKING_ERROR_M);
+        Self {
+            chart: Chart {
+                coverage_loop,
+                router,
+                airframe,
+            },
+            height_m,
+            envelope,
+            aim: Aim::Hold,
+            queue: VecDeque::new(),
+            track: Track::default(),
+            stretches: VecDeque::new(),
+            replan: true,
+            told: false,
+            played: None,
+            recent: VecDeque::with_capacity(RECENT),
+            pending: Vec::new(),
+        }
+    }
+
+    /// The same, with the tracking error of the mission, metres: the envelope lets
+    /// flights come this much nearer to zones than curves may.
+    #[must_use]
+    pub fn with_tracking_error_m(mut self, tracking_error_m: f64) -> Self {
+        self.envelope = Self::envelope(self.chart.airframe, &self.chart.router, tracking_error_m);
+        self
+    }
+
+    fn envelope(airframe: Airframe, router: &Router, tracking_error_m: f64) -> Envelope {
+        let least_m = (router.limits().clearance_m - tracking_error_m).max(0.0);
+        Envelope::new(airframe, Arc::clone(router.zones()), least_m)
     }
 
     /// Replaces the goal. Legs already under way go on where they are if the new
@@ -60,21 +212,483 @@ impl Executive {
     /// `is_open` tells which cells of the loop still need service: cells that do
     /// not are passed, or flown round by a direct route where that is shorter.
     pub fn set_goal(&mut self, goal: Goal, is_open: &dyn Fn(u16) -> bool) {
-        let _ = (goal, is_open);
-        todo!("behaviors helper")
+        let mut begins_with = None;
+        let (aim, kept, queue) = match goal {
+            Goal::Legs(legs) => {
+                let hops = self.hops(&legs);
+                begins_with = hops.iter().find(|h| is_open(h.cell)).copied();
+                let (kept, queue) = self.continued(hops, is_open);
+                (Aim::Legs, kept, queue)
+            }
+            Goal::Hold => (
+                Aim::Hold,
+                self.loitering(self.aim == Aim::Hold),
+                VecDeque::new(),
+            ),
+            Goal::Point(p) => {
+                let same = self.aim == Aim::Point(p) && !self.replan;
+                (
+                    Aim::Point(p),
+                    if same { self.stretches.len() } else { 0 },
+                    VecDeque::new(),
+                )
+            }
+        };
+        self.told = self.told && aim == self.aim && aim != Aim::Legs;
+        self.aim = aim;
+        self.replan = self.replan || kept == 0;
+        if kept > 0 {
+            self.keep(kept);
+            self.serve_first(begins_with);
+            self.queue = queue;
+            self.lengthen_now(is_open);
+        } else {
+            // What is on the track is no longer wanted; it is flown until the next step.
+            for s in &mut self.stretches {
+                if let Kind::Serve(h) = s.kind {
+                    s.kind = Kind::Pass(h.cell, h.direction);
+                }
+            }
+            self.queue = queue;
+        }
+    }
+
+    /// A track that was cut off goes on before the next percept, by which the UAV may
+    /// have flown past its end.
+    fn lengthen_now(&mut self, is_open: &dyn Fn(u16) -> bool) {
+        let Some(end) = self.stretches.back().map(|s| s.end) else {
+            return;
+        };
+        let mut events = std::mem::take(&mut self.pending);
+        self.lengthen(end, is_open, &mut events);
+        self.pending = events;
+    }
+
+    /// A cell that was only passed is to be served from now on.
+    fn serve_first(&mut self, begins_with: Option<Hop>) {
+        if let (Some(front), Some(hop)) = (self.stretches.front_mut(), begins_with)
+            && front.kind == Kind::Pass(hop.cell, hop.direction)
+        {
+            front.kind = Kind::Serve(hop);
+        }
+    }
+
+    /// All stretches if they are a loiter and may stay, else none.
+    fn loitering(&self, may_stay: bool) -> usize {
+        let is = matches!(
+            self.stretches.front().map(|s| s.kind),
+            Some(Kind::Loiter(_))
+        );
+        if is && may_stay && !self.replan {
+            self.stretches.len()
+        } else {
+            0
+        }
+    }
+
+    /// The cells of legs, in order of flight.
+    fn hops(&self, legs: &[Leg]) -> VecDeque<Hop> {
+        let n = self.chart.coverage_loop.len();
+        legs.iter()
+            .flat_map(|l| {
+                l.cells(n).map(|cell| Hop {
+                    cell,
+                    direction: l.direction,
+                    tries: 0,
+                })
+            })
+            .collect()
+    }
+
+    /// How many stretches stay when `hops` become the plan, and which hops then wait.
+    fn continued(
+        &self,
+        mut hops: VecDeque<Hop>,
+        is_open: &dyn Fn(u16) -> bool,
+    ) -> (usize, VecDeque<Hop>) {
+        let first = hops.front().map(|h| (h.cell, h.direction));
+        hops.retain(|h| is_open(h.cell));
+        let Some(next) = hops.front().copied() else {
+            return (self.loitering(true), hops);
+        };
+        let Some(front) = self.stretches.front().filter(|_| !self.replan) else {
+            return (0, hops);
+        };
+        let next_cell = Some((next.cell, next.direction));
+        if front.kind.cell() == next_cell {
+            hops.pop_front();
+            return (self.matching(1, &mut hops), hops);
+        }
+        if front.kind == Kind::Route {
+            return (self.matching(0, &mut hops), hops);
+        }
+        if front.kind.cell().is_none() {
+            return (0, hops);
+        }
+        let finishes = first.is_some()
+            && front.kind.cell() == first
+            && !is_open(front.kind.cell().map_or(0, |c| c.0));
+        if finishes || self.is_shorter_after(front, &next) {
+            return (self.matching(1, &mut hops), hops);
+        }
+        (0, hops)
+    }
+
+    /// Of the stretches after the first `kept`, those stay too that lead to the cells
+    /// that `hops` wants next; these are taken off it.
+    fn matching(&self, mut kept: usize, hops: &mut VecDeque<Hop>) -> usize {
+        for (i, s) in self.stretches.iter().enumerate().skip(kept) {
+            let Some(hop) = s.kind.hop() else { continue };
+            if !hops
+                .front()
+                .is_some_and(|h| (h.cell, h.direction) == (hop.cell, hop.direction))
+            {
+                break;
+            }
+            hops.pop_front();
+            kept = i + 1;
+        }
+        kept
+    }
+
+    /// Whether finishing the stretch that is flown first costs no way to `next`.
+    fn is_shorter_after(&self, front: &Stretch, next: &Hop) -> bool {
+        let entry = self.chart.entry(next.cell, next.direction);
+        let length_m = |from: &Place| {
+            let moves = self.chart.connect(from, entry, next.direction)?;
+            Some(moves.iter().map(|m| self.chart.length_m(m)).sum::<f64>())
+        };
+        let Some(after_m) = length_m(&front.end) else {
+            return false;
+        };
+        let Some(pose) = self.track.pose() else {
+            return false;
+        };
+        let now_m = length_m(&Place {
+            pose,
+            boundary: None,
+        });
+        let finish_m = front.end_m - self.track.at_m();
+        now_m.is_none_or(|m| finish_m + after_m <= m + 1.0)
+    }
+
+    /// Gives up all stretches but the first `count`.
+    fn keep(&mut self, count: usize) {
+        self.stretches.truncate(count);
+        if let Some(last) = self.stretches.back() {
+            self.track.truncate(last.end_m);
+        }
     }
 
     /// Answers a percept with a setpoint, already passed through the envelope.
-    pub fn step(&mut self, percept: &Percept, is_open: &dyn Fn(u16) -> bool) -> (Setpoint, Vec<Event>) {
-        let _ = (percept, is_open, &self.airframe, self.height_m, &self.coverage_loop, &self.router);
-        todo!("behaviors helper")
+    pub fn step(
+        &mut self,
+        percept: &Percept,
+        is_open: &dyn Fn(u16) -> bool,
+    ) -> (Setpoint, Vec<Event>) {
+        let mut events = std::mem::take(&mut self.pending);
+        if !is_finite(&percept.pose) {
+            return (
+                self.envelope
+                    .check(percept, self.setpoint(percept, Vec::new())),
+                events,
+            );
+        }
+        self.report_seen(percept, is_open, &mut events);
+        let offset = self.progress(percept);
+        self.count_misses(is_open, &mut events);
+        self.skip_closed(is_open);
+        if self.replan || self.stretches.is_empty() {
+            self.replan = true;
+            self.requeue();
+        }
+        let start = self.start(percept, offset);
+        self.lengthen(start, is_open, &mut events);
+        self.report_end(percept, &mut events);
+        let offset = if self.replan {
+            self.restart(percept)
+        } else {
+            offset
+        };
+        let speed = self.speed_mps();
+        let limit = self.chart.airframe.max_turn_rate_radps(speed);
+        let still = Offset {
+            cross_m: 0.0,
+            heading_rad: 0.0,
+        };
+        let steps = self.track.steps(offset.unwrap_or(still), speed, limit);
+        let setpoint = self.envelope.check(percept, self.setpoint(percept, steps));
+        let steps = setpoint.steps.clone();
+        self.played = Some(Played {
+            percept: *percept,
+            steps,
+            airspeed_mps: setpoint.airspeed_mps,
+        });
+        (setpoint, events)
     }
 
-    /// Where the UAV will be `window_ms` from its last percept, at the end of a cell.
-    #[must_use]
-    pub fn forecast(&self, window_ms: u32, is_open: &dyn Fn(u16) -> bool) -> Forecast {
-        let _ = (window_ms, is_open);
-        todo!("behaviors helper")
+    fn setpoint(&self, percept: &Percept, steps: Vec<crate::setpoint::Steer>) -> Setpoint {
+        Setpoint {
+            from_ms: percept.time_ms,
+            airspeed_mps: self.speed_mps(),
+            height_m: self.height_m,
+            steps,
+            loiter: Side::Left,
+        }
+    }
+
+    /// The airspeed that is commanded, m/s.
+    fn speed_mps(&self) -> f64 {
+        self.envelope.airspeed_mps(self.chart.airframe.cruise_mps)
+    }
+
+    /// Reports the cells that the camera saw since the last percept.
+    fn report_seen(
+        &mut self,
+        percept: &Percept,
+        is_open: &dyn Fn(u16) -> bool,
+        events: &mut Vec<Event>,
+    ) {
+        let mut seen = Vec::new();
+        let c = &self.chart;
+        look(
+            &c.coverage_loop,
+            &c.airframe,
+            self.played.as_ref(),
+            percept,
+            is_open,
+            &mut seen,
+        );
+        if seen.is_empty() {
+            return;
+        }
+        let cells = self.chart.coverage_loop.cells();
+        events.push(Event::Seen(
+            seen.iter().map(|i| cells[usize::from(*i)].id).collect(),
+        ));
+        for cell in seen {
+            if !self.recent.contains(&cell) {
+                if self.recent.len() == RECENT {
+                    self.recent.pop_front();
+                }
+                self.recent.push_back(cell);
+            }
+        }
+    }
+
+    /// Follows the UAV on its track; asks for a new one when it is lost.
+    fn progress(&mut self, percept: &Percept) -> Option<Offset> {
+        #[allow(clippy::cast_precision_loss, reason = "clamped right after")]
+        let since_s = self
+            .played
+            .as_ref()
+            .map_or(WINDOW_S, |p| {
+                percept.time_ms.saturating_sub(p.percept.time_ms) as f64 / 1000.0
+            })
+            .min(WINDOW_S);
+        let window_m = self.chart.airframe.max_mps * since_s + WINDOW_M;
+        let offset = self.track.advance(&percept.pose, window_m);
+        let lost =
+            offset.is_none_or(|o| o.cross_m.abs() > LOST_M || o.heading_rad.abs() > LOST_RAD);
+        self.replan = self.replan || lost;
+        offset
+    }
+
+    /// Takes stretches off that are behind; cells flown and not seen are flown again.
+    fn count_misses(&mut self, is_open: &dyn Fn(u16) -> bool, events: &mut Vec<Event>) {
+        let mut missed = None;
+        while let Some(front) = self.stretches.front().copied() {
+            if front.end_m > self.track.at_m() || missed.is_some() {
+                break;
+            }
+            self.stretches.pop_front();
+            missed = front
+                .kind
+                .hop()
+                .filter(|h| is_open(h.cell) && !self.recent.contains(&h.cell));
+        }
+        let Some(hop) = missed else { return };
+        let tries = hop.tries + 1;
+        if tries >= MAX_TRIES {
+            events.push(Event::Refused {
+                cells: vec![hop.cell],
+            });
+            return;
+        }
+        self.requeue();
+        self.queue.push_front(Hop { tries, ..hop });
+        self.replan = true;
+    }
+
+    /// Puts the cells on the track back into the queue and takes the stretches off.
+    fn requeue(&mut self) {
+        for s in self.stretches.drain(..).rev() {
+            if let Some(hop) = s.kind.hop() {
+                self.queue.push_front(hop);
+            }
+        }
+    }
+
+    /// A cell that was seen while the UAV was on its way there is no goal any more.
+    fn skip_closed(&mut self, is_open: &dyn Fn(u16) -> bool) {
+        let Some(front) = self.stretches.front() else {
+            return;
+        };
+        if front.kind.hop().is_some() || matches!(front.kind, Kind::Loiter(_)) {
+            return;
+        }
+        let target = self.stretches.iter().find_map(|s| s.kind.hop());
+        if target.is_some_and(|h| !is_open(h.cell)) {
+            if front.kind == Kind::Route {
+                self.replan = true;
+            } else {
+                let rest: Vec<Hop> = self
+                    .stretches
+                    .iter()
+                    .skip(1)
+                    .filter_map(|s| s.kind.hop())
+                    .collect();
+                self.keep(1);
+                for hop in rest.into_iter().rev() {
+                    self.queue.push_front(hop);
+                }
+            }
+        }
+    }
+
+    /// Where the next stretch begins: at the end of the track, or where a new track is
+    /// to begin.
+    fn start(&self, percept: &Percept, offset: Option<Offset>) -> Place {
+        if let Some(last) = self.stretches.back() {
+            return last.end;
+        }
+        let near = offset
+            .is_some_and(|o| o.cross_m.abs() < ON_TRACK_M && o.heading_rad.abs() < ON_TRACK_RAD);
+        let pose = self.track.pose().filter(|_| near).unwrap_or(percept.pose);
+        Place {
+            pose,
+            boundary: None,
+        }
+    }
+
+    /// Lengthens the track until it reaches beyond the horizon of a setpoint.
+    fn lengthen(&mut self, start: Place, is_open: &dyn Fn(u16) -> bool, events: &mut Vec<Event>) {
+        if self.stretches.is_empty() {
+            self.track.clear();
+        }
+        let least_m = self.chart.airframe.max_mps * (HORIZON_S + 0.5);
+        let mut at = start;
+        while self.track.left_m() < least_m {
+            for step in self.next_moves(&at, is_open, events) {
+                at = self.push(&at, step);
+            }
+        }
+    }
+
+    /// What follows at the end of the track.
+    fn next_moves(
+        &mut self,
+        at: &Place,
+        is_open: &dyn Fn(u16) -> bool,
+        events: &mut Vec<Event>,
+    ) -> Vec<Move> {
+        if self.aim == Aim::Legs {
+            let mut cells = Vec::new();
+            let moves = self.chart.next(at, &mut self.queue, is_open, &mut cells);
+            if !cells.is_empty() {
+                events.push(Event::Refused { cells });
+            }
+            if let Some(moves) = moves {
+                return moves;
+            }
+        }
+        if let Some(Kind::Loiter(circle)) = self.stretches.back().map(|s| s.kind) {
+            return vec![Move::Loiter(circle)];
+        }
+        if let Aim::Point(p) = self.aim {
+            match self.chart.connect_to_point(at, p) {
+                Some(mut moves) => {
+                    let end = moves
+                        .iter()
+                        .fold(*at, |place, step| self.chart.end_of(&place, step));
+                    moves.extend(self.chart.hold(&end));
+                    return moves;
+                }
+                None => events.push(Event::Refused { cells: Vec::new() }),
+            }
+        }
+        self.chart.hold(at)
+    }
+
+    /// Appends a move to the track.
+    fn push(&mut self, at: &Place, step: Move) -> Place {
+        let end = self.chart.end_of(at, &step);
+        let c = &self.chart.coverage_loop;
+        let kind = match step {
+            Move::Serve(h) => {
+                self.track
+                    .extend(&c.curve(usize::from(h.cell), h.direction));
+                Kind::Serve(h)
+            }
+            Move::Pass(cell, direction) => {
+                self.track.extend(&c.curve(usize::from(cell), direction));
+                Kind::Pass(cell, direction)
+            }
+            Move::Route(curve) => {
+                self.track.extend(&curve);
+                Kind::Route
+            }
+            Move::Loiter(circle) => {
+                let mut curve = Curve::empty();
+                curve.push(circle);
+                self.track.extend(&curve);
+                Kind::Loiter(circle)
+            }
+        };
+        self.stretches.push_back(Stretch {
+            kind,
+            end_m: self.track.end_m(),
+            end,
+        });
+        end
+    }
+
+    /// Where the UAV is on a track that has just been made anew.
+    fn restart(&mut self, percept: &Percept) -> Option<Offset> {
+        self.replan = false;
+        self.track.advance(&percept.pose, WINDOW_M)
+    }
+
+    /// Reports the end of the goal, once.
+    fn report_end(&mut self, percept: &Percept, events: &mut Vec<Event>) {
+        if self.told {
+            return;
+        }
+        let done = match self.aim {
+            Aim::Hold => return,
+            Aim::Legs => {
+                self.queue.is_empty() && !self.stretches.iter().any(|s| s.kind.hop().is_some())
+            }
+            Aim::Point(p) => self.is_near(&percept.pose, p),
+        };
+        if done {
+            self.told = true;
+            events.push(if self.aim == Aim::Legs {
+                Event::PlanDone
+            } else {
+                Event::Arrived
+            });
+        }
+    }
+
+    fn is_near(&self, pose: &Pose, p: Point) -> bool {
+        let radius_m = self
+            .chart
+            .router
+            .limits()
+            .turn_radius_m
+            .max(self.chart.airframe.min_turn_radius_m());
+        (pose.position() - p).norm() <= ARRIVAL_RADII * radius_m
     }
 
     /// When all legs are flown, milliseconds from the last percept.
@@ -103,3 +717,7 @@ impl Executive {
         todo!("behaviors")
     }
 }
+
+#[cfg(test)]
+#[path = "executive/stories.rs"]
+mod stories;

@@ -14,8 +14,10 @@ pub mod executive;
 pub mod percept;
 pub mod reactive;
 pub mod setpoint;
+#[cfg(test)]
+mod testing;
 
 pub use event::Event;
-pub use executive::{Executive, Forecast, Goal};
+pub use executive::{Executive, Forecast, Goal, View};
 pub use percept::Percept;
 pub use setpoint::{Setpoint, Side, Steer};

@@ -1,1 +1,398 @@
-//! The envelope: stall, bank, zones; the last word on every setpoint.
+//! The envelope: stall, bank, zones; the last word on every setpoint (D2.7 §1.2.3,
+//! reactive layer).
+//!
+//! Whatever asks for a flight, what leaves here can be flown: the airspeed keeps a
+//! tenth from stall, turns keep the bank limit, numbers are numbers, and a flight
+//! that would come too near to a zone is replaced by a loiter on the clearer side.
+//! Height belongs to the UAV's slot and is passed through.
+//!
+//! # Complexity
+//! Zones near the UAV are gathered once every [`GATHER_M`] flown; a setpoint is then
+//! checked against those alone, and for nothing where there are none.
+
+use super::follow::HORIZON_S;
+use crate::percept::Percept;
+use crate::setpoint::{MAX_STEPS, Setpoint, Side, Steer};
+use skein_planning::airframe::Airframe;
+use skein_planning::frame::{Point, Pose};
+use skein_planning::geometry::NoFlyZones;
+use skein_planning::math::TAU;
+use skein_planning::trajectory::Segment;
+use std::sync::Arc;
+
+/// The least airspeed commanded, in stall speeds: a level turn with a bank of 35°
+/// needs a tenth more airspeed than level flight.
+pub const STALL_MARGIN: f64 = 1.1;
+
+/// Flown distance after which the zones nearby are gathered anew, metres: some four
+/// seconds, so that it costs nothing on average.
+const GATHER_M: f64 = 60.0;
+
+/// How far ahead the failsafe loiter may begin, seconds: the time without setpoints
+/// after which an airframe flies it.
+const FAILSAFE_S: f64 = 1.0;
+
+/// A side of the failsafe loiter is changed only for this much more room, metres, so
+/// that rounding does not swap it back and forth.
+const SIDE_MARGIN_M: f64 = 0.5;
+
+/// Checks setpoints of one UAV.
+#[derive(Clone, Debug)]
+pub struct Envelope {
+    airframe: Airframe,
+    zones: Arc<NoFlyZones>,
+    /// Nearer than this to a zone a flight is refused, metres.
+    least_m: f64,
+    near: NoFlyZones,
+    gathered_at: Option<Point>,
+    side: Side,
+}
+
+impl Envelope {
+    /// An envelope that refuses flights nearer than `least_m` to a zone: the
+    /// clearance that curves keep, less what following a curve may stray.
+    #[must_use]
+    pub fn new(airframe: Airframe, zones: Arc<NoFlyZones>, least_m: f64) -> Self {
+        let near = NoFlyZones::new(Vec::new());
+        Self {
+            airframe,
+            zones,
+            least_m,
+            near,
+            gathered_at: None,
+            side: Side::Left,
+        }
+    }
+
+    /// The airspeed nearest to `mps` that may be commanded, m/s.
+    #[must_use]
+    pub fn airspeed_mps(&self, mps: f64) -> f64 {
+        let least = (self.airframe.stall_mps * STALL_MARGIN).min(self.airframe.max_mps);
+        let wanted = if mps.is_finite() {
+            mps
+        } else {
+            self.airframe.cruise_mps
+        };
+        wanted.max(least).min(self.airframe.max_mps)
+    }
+
+    /// The setpoint to fly instead of `wanted`, which is `wanted` where it is safe.
+    pub fn check(&mut self, percept: &Percept, wanted: Setpoint) -> Setpoint {
+        let mut out = wanted;
+        out.airspeed_mps = self.airspeed_mps(out.airspeed_mps);
+        let limit = self.airframe.max_turn_rate_radps(out.airspeed_mps);
+        let finite = out.steps.iter().all(|s| s.turn_rate_radps.is_finite());
+        out.steps.truncate(MAX_STEPS);
+        for s in &mut out.steps {
+            s.turn_rate_radps = s.turn_rate_radps.clamp(-limit, limit);
+        }
+        if !is_finite(&percept.pose) {
+            out.loiter = self.side;
+            out.steps = self.loiter_steps(limit);
+            return out;
+        }
+        self.gather(percept.pose.position());
+        if !self.near.zones().is_empty() {
+            self.side = self.choose_side(&percept.pose);
+        }
+        out.loiter = self.side;
+        if !finite || out.steps.is_empty() || self.too_near(&percept.pose, &out) {
+            out.steps = self.loiter_steps(limit);
+        }
+        out
+    }
+
+    /// The sharpest turn on the chosen side.
+    fn loiter_steps(&self, limit_radps: f64) -> Vec<Steer> {
+        let turn_rate_radps = match self.side {
+            Side::Left => limit_radps,
+            Side::Right => -limit_radps,
+        };
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a small constant"
+        )]
+        let duration_ms = (HORIZON_S * 1000.0) as u32;
+        vec![Steer {
+            turn_rate_radps,
+            duration_ms,
+        }]
+    }
+
+    /// Gathers the zones that matter until the UAV has flown [`GATHER_M`].
+    fn gather(&mut self, at: Point) {
+        if self.gathered_at.is_some_and(|p| (p - at).norm() < GATHER_M) {
+            return;
+        }
+        let flight_m = self.airframe.max_mps * HORIZON_S;
+        let loiter_m = self.airframe.max_mps * FAILSAFE_S
+            + 2.0 * self.airframe.turn_radius_m(self.airframe.max_mps);
+        let reach_m = GATHER_M + flight_m.max(loiter_m) + self.least_m.max(0.0);
+        let near = self
+            .zones
+            .zones()
+            .iter()
+            .filter(|z| z.distance_m(at) < reach_m)
+            .cloned()
+            .collect();
+        self.near = NoFlyZones::new(near);
+        self.gathered_at = Some(at);
+    }
+
+    /// The side on which a loiter of the least radius, begun here or within
+    /// [`FAILSAFE_S`] straight ahead, keeps farther from the zones nearby.
+    fn choose_side(&self, pose: &Pose) -> Side {
+        let (left, right) = (
+            self.room_m(pose, Side::Left),
+            self.room_m(pose, Side::Right),
+        );
+        match self.side {
+            Side::Left if right > left + SIDE_MARGIN_M => Side::Right,
+            Side::Right if left > right + SIDE_MARGIN_M => Side::Left,
+            same => same,
+        }
+    }
+
+    /// Distance of the failsafe loiter discs from the nearest zone, metres; may be
+    /// negative, infinite without zones nearby.
+    fn room_m(&self, pose: &Pose, side: Side) -> f64 {
+        let radius_m = self.airframe.min_turn_radius_m();
+        let d = pose.direction();
+        let out = match side {
+            Side::Left => radius_m,
+            Side::Right => -radius_m,
+        };
+        let centre = Point::new(pose.east_m - out * d.y, pose.north_m + out * d.x);
+        let ahead = centre + d * (self.airframe.cruise_mps * FAILSAFE_S);
+        self.near
+            .distance_m(centre)
+            .min(self.near.distance_m(ahead))
+            - radius_m
+    }
+
+    /// Whether the commanded flight comes too near to a zone and a loiter does not
+    /// come as near.
+    fn too_near(&self, pose: &Pose, setpoint: &Setpoint) -> bool {
+        if self.near.zones().is_empty() {
+            return false;
+        }
+        let reach_m = setpoint.airspeed_mps * HORIZON_S;
+        if self.near.distance_m(pose.position()) - reach_m >= self.least_m {
+            return false;
+        }
+        let commanded = self.flight_distance_m(pose, setpoint);
+        commanded < self.least_m
+            && self.loiter_distance_m(pose, setpoint.airspeed_mps) > commanded + 1e-6
+    }
+
+    /// Distance of the commanded flight over [`HORIZON_S`] from the nearest zone, metres.
+    fn flight_distance_m(&self, pose: &Pose, setpoint: &Setpoint) -> f64 {
+        let v = setpoint.airspeed_mps;
+        let mut start = *pose;
+        let mut left_s = HORIZON_S;
+        let mut least = f64::INFINITY;
+        for (i, s) in setpoint.steps.iter().enumerate() {
+            let last = i + 1 == setpoint.steps.len();
+            let t = if last {
+                left_s
+            } else {
+                left_s.min(f64::from(s.duration_ms) / 1000.0)
+            };
+            let piece = Segment {
+                start,
+                curvature_per_m: s.turn_rate_radps / v,
+                length_m: v * t,
+            };
+            least = least.min(self.near.segment_distance_m(&piece));
+            start = piece.end();
+            left_s -= t;
+        }
+        least
+    }
+
+    /// Distance of the loiter on the chosen side from the nearest zone, metres.
+    fn loiter_distance_m(&self, pose: &Pose, airspeed_mps: f64) -> f64 {
+        let radius_m = self.airframe.turn_radius_m(airspeed_mps);
+        let curvature_per_m = match self.side {
+            Side::Left => 1.0 / radius_m,
+            Side::Right => -1.0 / radius_m,
+        };
+        // Halves, because a whole circle ends where it begins.
+        let half = Segment {
+            start: *pose,
+            curvature_per_m,
+            length_m: 0.5 * TAU * radius_m,
+        };
+        let other = Segment {
+            start: half.end(),
+            ..half
+        };
+        self.near
+            .segment_distance_m(&half)
+            .min(self.near.segment_distance_m(&other))
+    }
+}
+
+/// Whether a pose is made of numbers.
+#[must_use]
+pub fn is_finite(pose: &Pose) -> bool {
+    pose.east_m.is_finite() && pose.north_m.is_finite() && pose.heading_rad.is_finite()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{airframe, percept_at, square};
+    use skein_planning::math::FRAC_PI_2;
+
+    fn straight(airspeed_mps: f64) -> Setpoint {
+        let steps = vec![Steer {
+            turn_rate_radps: 0.0,
+            duration_ms: 2500,
+        }];
+        Setpoint {
+            from_ms: 0,
+            airspeed_mps,
+            height_m: 90.0,
+            steps,
+            loiter: Side::Left,
+        }
+    }
+
+    fn envelope(zones: Vec<skein_planning::geometry::Polygon>) -> Envelope {
+        Envelope::new(airframe(), Arc::new(NoFlyZones::new(zones)), 8.0)
+    }
+
+    #[test]
+    fn airspeed_and_bank_are_clamped() {
+        let a = airframe();
+        let mut e = envelope(vec![]);
+        let p = percept_at(
+            Pose {
+                east_m: 0.0,
+                north_m: 0.0,
+                heading_rad: 0.0,
+            },
+            0,
+        );
+        for (asked, given) in [
+            (1.0, a.stall_mps * 1.1),
+            (99.0, a.max_mps),
+            (13.0, 13.0),
+            (f64::NAN, a.cruise_mps),
+        ] {
+            let mut s = straight(asked);
+            s.steps = vec![
+                Steer {
+                    turn_rate_radps: -9.0,
+                    duration_ms: 10
+                };
+                20
+            ];
+            let out = e.check(&p, s);
+            assert!((out.airspeed_mps - given).abs() < 1e-12);
+            assert_eq!(out.steps.len(), MAX_STEPS);
+            let limit = a.max_turn_rate_radps(given);
+            assert!(
+                out.steps
+                    .iter()
+                    .all(|s| (s.turn_rate_radps + limit).abs() < 1e-12)
+            );
+        }
+    }
+
+    #[test]
+    fn numbers_that_are_none_become_a_loiter() {
+        let mut e = envelope(vec![]);
+        let here = Pose {
+            east_m: 0.0,
+            north_m: 0.0,
+            heading_rad: 0.0,
+        };
+        let mut bad = straight(13.0);
+        bad.steps[0].turn_rate_radps = f64::NAN;
+        let lost = Pose {
+            east_m: f64::NAN,
+            ..here
+        };
+        let mut none = straight(13.0);
+        none.steps.clear();
+        for (pose, s) in [(here, bad), (lost, straight(13.0)), (here, none)] {
+            let out = e.check(&percept_at(pose, 0), s);
+            let limit = airframe().max_turn_rate_radps(13.0);
+            assert!(
+                out.steps.len() == 1 && (out.steps[0].turn_rate_radps.abs() - limit).abs() < 1e-9
+            );
+        }
+    }
+
+    #[test]
+    fn a_flight_into_a_zone_becomes_a_loiter_on_the_clear_side() {
+        // The zone is ahead and to the left of a UAV that flies north.
+        let mut e = envelope(vec![square(-60.0, 35.0, 70.0)]);
+        let out = e.check(
+            &percept_at(
+                Pose {
+                    east_m: 0.0,
+                    north_m: 0.0,
+                    heading_rad: FRAC_PI_2,
+                },
+                0,
+            ),
+            straight(13.0),
+        );
+        assert_eq!(out.loiter, Side::Right);
+        assert!(out.steps[0].turn_rate_radps < 0.0);
+        // Flying away from it the same UAV is left alone.
+        let out = e.check(
+            &percept_at(
+                Pose {
+                    east_m: 0.0,
+                    north_m: 30.0,
+                    heading_rad: -FRAC_PI_2,
+                },
+                0,
+            ),
+            straight(13.0),
+        );
+        assert!(out.steps[0].turn_rate_radps.abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_flight_out_of_the_clearance_is_not_held_back() {
+        let mut e = envelope(vec![square(-70.0, -35.0, 68.0)]);
+        let out = e.check(
+            &percept_at(
+                Pose {
+                    east_m: 0.0,
+                    north_m: 0.0,
+                    heading_rad: 0.0,
+                },
+                0,
+            ),
+            straight(13.0),
+        );
+        assert!(out.steps[0].turn_rate_radps.abs() < 1e-12);
+    }
+
+    #[test]
+    fn zones_far_away_come_into_view_while_flying() {
+        let mut e = envelope(vec![square(400.0, -50.0, 100.0)]);
+        let mut held = false;
+        for i in 0..150 {
+            let pose = Pose {
+                east_m: 2.6 * f64::from(i),
+                north_m: 0.0,
+                heading_rad: 0.0,
+            };
+            let out = e.check(&percept_at(pose, 0), straight(13.0));
+            held = out.steps[0].turn_rate_radps.abs() > 0.1;
+            if held {
+                assert!(pose.east_m > 340.0 && pose.east_m < 380.0);
+                break;
+            }
+        }
+        assert!(held);
+    }
+}

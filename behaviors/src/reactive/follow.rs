@@ -168,13 +168,18 @@ impl Track {
         self.forget();
         let on = self.pose()?;
         let (v, d) = (p - on.position(), on.direction());
-        Some(Offset { cross_m: v.y * d.x - v.x * d.y, heading_rad: wrap_pi(pose.heading_rad - on.heading_rad) })
+        Some(Offset {
+            cross_m: v.y * d.x - v.x * d.y,
+            heading_rad: wrap_pi(pose.heading_rad - on.heading_rad),
+        })
     }
 
     /// Drops pieces that are wholly behind.
     fn forget(&mut self) {
         while self.segments.len() > 1 {
-            let Some(first) = self.segments.front() else { return };
+            let Some(first) = self.segments.front() else {
+                return;
+            };
             if self.front_m + first.length_m > self.at_m {
                 return;
             }
@@ -199,9 +204,17 @@ impl Track {
                 let beside = (1.0 - k * offset.cross_m).max(0.5);
                 let until_s = (to - self.at_m) / speed_mps;
                 let late = k * speed_mps;
-                let early = if time_s < 2.0 * CORRECTION_S { late / beside } else { late };
+                let early = if time_s < 2.0 * CORRECTION_S {
+                    late / beside
+                } else {
+                    late
+                };
                 out.turn(early + first, time_s, until_s.min(CORRECTION_S));
-                out.turn(early + second, time_s.max(CORRECTION_S), until_s.min(2.0 * CORRECTION_S));
+                out.turn(
+                    early + second,
+                    time_s.max(CORRECTION_S),
+                    until_s.min(2.0 * CORRECTION_S),
+                );
                 out.turn(late, time_s.max(2.0 * CORRECTION_S), until_s.min(HORIZON_S));
                 time_s = until_s;
             }
@@ -243,7 +256,11 @@ fn nearest_on(s: &Segment, p: Point) -> f64 {
     let around = angle / k.abs();
     // Past the middle of what the piece leaves out, the point is before its start.
     let whole = TAU / k.abs();
-    if around > 0.5 * (s.length_m + whole) { around - whole } else { around }
+    if around > 0.5 * (s.length_m + whole) {
+        around - whole
+    } else {
+        around
+    }
 }
 
 /// Collects turns, merges equal ones and rounds their ends to milliseconds.
@@ -256,11 +273,20 @@ struct Steps {
 
 impl Steps {
     fn new(limit_radps: f64) -> Self {
-        Self { limit_radps, out: Vec::with_capacity(MAX_STEPS), end_ms: 0, limit_ms: u32::MAX }
+        Self {
+            limit_radps,
+            out: Vec::with_capacity(MAX_STEPS),
+            end_ms: 0,
+            limit_ms: u32::MAX,
+        }
     }
 
     fn turn(&mut self, rate_radps: f64, from_s: f64, until_s: f64) {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "times are within the horizon")]
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "times are within the horizon"
+        )]
         let until_ms = (until_s.clamp(0.0, HORIZON_S) * 1000.0).round() as u32;
         if until_s <= from_s || until_ms <= self.end_ms || self.end_ms >= self.limit_ms {
             return;
@@ -269,10 +295,15 @@ impl Steps {
         let duration_ms = until_ms - self.end_ms;
         let full = self.out.len() == MAX_STEPS;
         match self.out.last_mut() {
-            Some(last) if (last.turn_rate_radps - turn_rate_radps).abs() < 1e-9 => last.duration_ms += duration_ms,
+            Some(last) if (last.turn_rate_radps - turn_rate_radps).abs() < 1e-9 => {
+                last.duration_ms += duration_ms
+            }
             // What comes after this is cut off: the next percept is earlier.
             _ if full => self.limit_ms = self.end_ms,
-            _ => self.out.push(Steer { turn_rate_radps, duration_ms }),
+            _ => self.out.push(Steer {
+                turn_rate_radps,
+                duration_ms,
+            }),
         }
         if self.limit_ms == u32::MAX {
             self.end_ms = until_ms;
@@ -291,14 +322,23 @@ pub fn fly(pose: Pose, speed_mps: f64, steps: &[Steer], after_ms: u32) -> Pose {
     let mut left_ms = after_ms;
     for (i, s) in steps.iter().enumerate() {
         let held = i + 1 == steps.len();
-        let ms = if held { left_ms } else { left_ms.min(s.duration_ms) };
+        let ms = if held {
+            left_ms
+        } else {
+            left_ms.min(s.duration_ms)
+        };
         at = turn(at, speed_mps, s.turn_rate_radps, ms);
         left_ms -= ms;
         if left_ms == 0 {
             break;
         }
     }
-    turn(at, speed_mps, 0.0, if steps.is_empty() { left_ms } else { 0 })
+    turn(
+        at,
+        speed_mps,
+        0.0,
+        if steps.is_empty() { left_ms } else { 0 },
+    )
 }
 
 /// The pose after one turn.
@@ -309,7 +349,11 @@ fn turn(at: Pose, speed_mps: f64, rate_radps: f64, ms: u32) -> Pose {
     let t = f64::from(ms) / 1000.0;
     let half = 0.5 * rate_radps * t;
     // The chord of an arc: its length shrinks by sin(x)/x, it points half-way.
-    let sinc = if half.abs() < 1e-6 { 1.0 } else { sin(half) / half };
+    let sinc = if half.abs() < 1e-6 {
+        1.0
+    } else {
+        sin(half) / half
+    };
     let chord = speed_mps * t * sinc;
     let course = at.heading_rad + half;
     Pose {
@@ -334,10 +378,31 @@ mod tests {
     const LIMIT: f64 = V / 23.0;
 
     fn lane() -> Curve {
-        let start = Pose { east_m: 0.0, north_m: 0.0, heading_rad: 0.4 };
+        let start = Pose {
+            east_m: 0.0,
+            north_m: 0.0,
+            heading_rad: 0.4,
+        };
         let q = 24.0 * FRAC_PI_2;
         let (l, r) = ((1.0 / 24.0, q), (-1.0 / 24.0, q));
-        let pieces = [(0.0, 96.0), l, l, (0.0, 48.0), r, l, r, r, (0.0, 48.0), (0.0, 48.0), l, (0.0, 48.0), l, l, l, r];
+        let pieces = [
+            (0.0, 96.0),
+            l,
+            l,
+            (0.0, 48.0),
+            r,
+            l,
+            r,
+            r,
+            (0.0, 48.0),
+            (0.0, 48.0),
+            l,
+            (0.0, 48.0),
+            l,
+            l,
+            l,
+            r,
+        ];
         Curve::from_pieces(start, &[&pieces[..], &pieces[..], &pieces[..]].concat())
     }
 
@@ -348,13 +413,21 @@ mod tests {
         let curve = lane();
         let mut track = Track::new(&curve);
         let mut pose = start;
-        let mut old: (Vec<Steer>, u32) = (vec![Steer { turn_rate_radps: 0.0, duration_ms: 1 }], 0);
+        let mut old: (Vec<Steer>, u32) = (
+            vec![Steer {
+                turn_rate_radps: 0.0,
+                duration_ms: 1,
+            }],
+            0,
+        );
         let (mut worst, mut last): (f64, f64) = (0.0, 0.0);
         let mut i = 0;
         while track.left_m() > 60.0 {
             let period = periods_ms[i % periods_ms.len()];
             i += 1;
-            let offset = track.advance(&pose, V * f64::from(period) / 1000.0 * 1.5 + 5.0).unwrap();
+            let offset = track
+                .advance(&pose, V * f64::from(period) / 1000.0 * 1.5 + 5.0)
+                .unwrap();
             last = offset.cross_m.abs();
             worst = worst.max(last);
             let steps = track.steps(offset, V, LIMIT);
@@ -362,11 +435,19 @@ mod tests {
             // one from the time it was made for.
             let late = late_ms.min(period);
             for ms in 1..=period {
-                let (s, age) = if ms <= late { (&old.0, old.1 + ms - 1) } else { (&steps, ms - 1) };
+                let (s, age) = if ms <= late {
+                    (&old.0, old.1 + ms - 1)
+                } else {
+                    (&steps, ms - 1)
+                };
                 let rate = rate_at(s, age);
                 pose = turn(pose, V, rate, 1);
             }
-            old = if late < period { (steps, period) } else { (old.0, old.1 + period) };
+            old = if late < period {
+                (steps, period)
+            } else {
+                (old.0, old.1 + period)
+            };
         }
         (worst, last)
     }
@@ -409,7 +490,10 @@ mod tests {
             };
             for periods in [&[200][..], &[500, 350, 600][..]] {
                 let (worst, last) = flown(start, periods, 0);
-                assert!(worst < 5.6 && last < 0.05, "{cross} {turned}: {worst} {last}");
+                assert!(
+                    worst < 5.6 && last < 0.05,
+                    "{cross} {turned}: {worst} {last}"
+                );
             }
         }
     }
@@ -417,8 +501,13 @@ mod tests {
     #[test]
     fn progress_never_goes_back_or_jumps() {
         // A circle passes the same place again and again.
-        let start = Pose { east_m: 0.0, north_m: 0.0, heading_rad: 0.0 };
-        let circle = Curve::from_pieces(start, &[(1.0 / 24.0, 24.0 * TAU), (1.0 / 24.0, 24.0 * TAU)]);
+        let start = Pose {
+            east_m: 0.0,
+            north_m: 0.0,
+            heading_rad: 0.0,
+        };
+        let circle =
+            Curve::from_pieces(start, &[(1.0 / 24.0, 24.0 * TAU), (1.0 / 24.0, 24.0 * TAU)]);
         let mut track = Track::new(&circle);
         let mut before = 0.0;
         for i in 0..110 {
@@ -443,10 +532,23 @@ mod tests {
 
     #[test]
     fn no_more_steps_than_allowed() {
-        let start = Pose { east_m: 0.0, north_m: 0.0, heading_rad: 0.0 };
-        let wiggle: Vec<(f64, f64)> = (0..40).map(|i| (if i % 2 == 0 { 0.04 } else { -0.04 }, 2.0)).collect();
+        let start = Pose {
+            east_m: 0.0,
+            north_m: 0.0,
+            heading_rad: 0.0,
+        };
+        let wiggle: Vec<(f64, f64)> = (0..40)
+            .map(|i| (if i % 2 == 0 { 0.04 } else { -0.04 }, 2.0))
+            .collect();
         let track = Track::new(&Curve::from_pieces(start, &wiggle));
-        let steps = track.steps(Offset { cross_m: 1.0, heading_rad: 0.1 }, V, LIMIT);
+        let steps = track.steps(
+            Offset {
+                cross_m: 1.0,
+                heading_rad: 0.1,
+            },
+            V,
+            LIMIT,
+        );
         assert!(steps.len() <= MAX_STEPS && !steps.is_empty());
         assert!(steps.iter().all(|s| s.turn_rate_radps.abs() <= LIMIT));
     }

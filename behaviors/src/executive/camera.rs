@@ -1,0 +1,138 @@
+//! Which cells the camera has seen whole (D2.7 §1.2.3; the footprint is §2.2's).
+//!
+//! A cell is reported only for a pose that the UAV was truly at: the poses of
+//! percepts, and poses between two percepts where the commanded turns, played from
+//! the first, end at the second. Anything else stays unseen and is flown again.
+
+use crate::percept::Percept;
+use crate::reactive::follow::fly;
+use crate::setpoint::Steer;
+use skein_planning::airframe::Airframe;
+use skein_planning::coverage::area::stc::footprint_contains;
+use skein_planning::coverage::area::{CellId, CoverageLoop};
+use skein_planning::frame::Pose;
+use skein_planning::math::wrap_pi;
+
+/// Taken off the footprint for rounding and for what a percept's pose may be off,
+/// metres.
+pub const POSE_ERROR_M: f64 = 0.05;
+
+/// Taken off besides for poses between percepts, metres.
+const BETWEEN_M: f64 = 0.1;
+
+/// Longest time between two percepts that is filled, milliseconds: after it the
+/// airframe flies its failsafe, and the commanded turns no longer tell where it was.
+const FILLED_MS: u64 = 1000;
+
+/// The prediction must meet the second percept within these.
+const MET_M: f64 = 0.3;
+const MET_RAD: f64 = 0.01;
+
+/// Distance between the poses that are looked at, metres: a third of the stretch of a
+/// quarter turn from which a cell just fits the frame.
+const BETWEEN_POSES_M: f64 = 1.0;
+
+/// What was commanded at a percept.
+#[derive(Clone, Debug)]
+pub struct Played {
+    /// The percept.
+    pub percept: Percept,
+    /// The turns from then on.
+    pub steps: Vec<Steer>,
+    /// The airspeed from then on, m/s.
+    pub airspeed_mps: f64,
+}
+
+/// Reports open cells of the loop, by index, that were seen whole at `now` or since
+/// `before`.
+pub fn look(
+    coverage_loop: &CoverageLoop,
+    airframe: &Airframe,
+    before: Option<&Played>,
+    now: &Percept,
+    is_open: &dyn Fn(u16) -> bool,
+    seen: &mut Vec<u16>,
+) {
+    let lens = Lens {
+        coverage_loop,
+        airframe,
+        is_open,
+    };
+    lens.look(&now.pose, POSE_ERROR_M, seen);
+    let Some(before) = before else { return };
+    let Some(ms) = now
+        .time_ms
+        .checked_sub(before.percept.time_ms)
+        .filter(|ms| (1..=FILLED_MS).contains(ms))
+    else {
+        return;
+    };
+    if now.failsafe || before.percept.failsafe {
+        return;
+    }
+    let v = before.airspeed_mps;
+    #[allow(clippy::cast_possible_truncation, reason = "at most FILLED_MS")]
+    let ms = ms as u32;
+    let end = fly(before.percept.pose, v, &before.steps, ms);
+    let off_m = (end.position() - now.pose.position()).norm();
+    let off_rad = wrap_pi(end.heading_rad - now.pose.heading_rad).abs();
+    if !(off_m <= MET_M && off_rad <= MET_RAD) {
+        return;
+    }
+    let reach_m = airframe.footprint_across_m + airframe.footprint_along_m;
+    let slack_m = POSE_ERROR_M + BETWEEN_M + off_m + off_rad * reach_m;
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a few dozen poses at most"
+    )]
+    let parts = (v * f64::from(ms) / 1000.0 / BETWEEN_POSES_M)
+        .ceil()
+        .clamp(1.0, 64.0) as u32;
+    for i in 1..parts {
+        let pose = fly(before.percept.pose, v, &before.steps, ms * i / parts);
+        lens.look(&pose, slack_m, seen);
+    }
+}
+
+struct Lens<'a> {
+    coverage_loop: &'a CoverageLoop,
+    airframe: &'a Airframe,
+    is_open: &'a dyn Fn(u16) -> bool,
+}
+
+impl Lens<'_> {
+    /// Cells that the frame at `pose`, less `slack_m` on all sides, contains.
+    fn look(&self, pose: &Pose, slack_m: f64, seen: &mut Vec<u16>) {
+        let grid = self.coverage_loop.grid();
+        let side_m = grid.lane_spacing_m;
+        let across_m = self.airframe.footprint_across_m - slack_m;
+        let along_m = self.airframe.footprint_along_m - slack_m;
+        // Seen from its centre a cell reaches at least half a side in any direction.
+        let (a, b) = (across_m - 0.5 * side_m, along_m - 0.5 * side_m);
+        if a < 0.0 || b < 0.0 {
+            return;
+        }
+        let reach_m = (a * a + b * b).sqrt();
+        let p = pose.position();
+        let low = grid.cell_at(p.map(|x| x - reach_m - 0.5 * side_m));
+        let high = grid.cell_at(p.map(|x| x + reach_m - 0.5 * side_m));
+        for row in low.row..=high.row {
+            for col in low.col..=high.col {
+                let id = CellId { col, row };
+                if (grid.centre(id) - p).norm_squared() > reach_m * reach_m {
+                    continue;
+                }
+                let Some(cell) = self.coverage_loop.index_of(id) else {
+                    continue;
+                };
+                if (self.is_open)(cell)
+                    && !seen.contains(&cell)
+                    && footprint_contains(&grid, id, *pose, across_m, along_m)
+                {
+                    seen.push(cell);
+                }
+            }
+        }
+    }
+}

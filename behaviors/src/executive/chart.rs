@@ -1,0 +1,465 @@
+//! How to get from here to the next cell, or to a place to hold: the moves that the
+//! executive strings together (D2.7 §1.2.3, executive layer; routes are §2.3, §2.4).
+//!
+//! Pure questions about the loop, the zones and a pose; what is flown and when is
+//! the executive's.
+
+use skein_planning::airframe::Airframe;
+use skein_planning::coverage::area::{CoverageLoop, Direction};
+use skein_planning::frame::{Point, Pose};
+use skein_planning::math::TAU;
+use skein_planning::path::{RouteError, Router};
+use skein_planning::trajectory::{Curve, Segment};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Boundaries tried when no direct route leads to a cell. Zones that cut off one
+/// boundary cut off its neighbours too, so more than a block's worth is waste.
+const DETOURS: usize = 8;
+
+/// Boundaries tried when the way onto the loop is asked for. Three blocks' worth.
+const NEAREST: usize = 6;
+
+/// Lengths of the piece flown to get out of a zone's clearance, metres: from what a
+/// tracking error needs to a half turn.
+const ESCAPES_M: [f64; 4] = [5.0, 15.0, 35.0, 75.0];
+
+/// Loiters are flown with this many times the least radius where there is room, so
+/// that following them has authority on both sides.
+const LOITER_RADII: [f64; 2] = [1.2, 1.0];
+
+/// Distances are compared with this much leniency, metres.
+const ROUNDING_M: f64 = 1e-6;
+
+/// A cell of the plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hop {
+    /// Which cell of the loop.
+    pub cell: u16,
+    /// Which way it is flown.
+    pub direction: Direction,
+    /// How often it was flown without being seen.
+    pub tries: u8,
+}
+
+/// Where a stretch begins or ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// The pose.
+    pub pose: Pose,
+    /// The boundary of the loop this is, and which way it looks, if it is one.
+    pub boundary: Option<(u16, Direction)>,
+}
+
+/// One stretch to fly.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Move {
+    /// A cell, to serve it.
+    Serve(Hop),
+    /// A cell, because it is on the way.
+    Pass(u16, Direction),
+    /// A curve off the loop.
+    Route(Curve),
+    /// A full circle, to be flown again and again.
+    Loiter(Segment),
+}
+
+/// The loop, the zones and the airframe, as far as ways depend on them.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// The loop.
+    pub coverage_loop: Arc<CoverageLoop>,
+    /// Routes off the loop.
+    pub router: Arc<Router>,
+    /// Who flies.
+    pub airframe: Airframe,
+}
+
+impl Chart {
+    fn len(&self) -> usize {
+        self.coverage_loop.len()
+    }
+
+    /// The boundary where a cell is entered.
+    #[must_use]
+    pub fn entry(&self, cell: u16, direction: Direction) -> u16 {
+        match direction {
+            Direction::Forward => cell,
+            Direction::Backward => self.after(cell),
+        }
+    }
+
+    /// The boundary where a cell is left.
+    #[must_use]
+    pub fn exit(&self, cell: u16, direction: Direction) -> u16 {
+        self.entry(cell, direction.opposite())
+    }
+
+    fn after(&self, index: u16) -> u16 {
+        let next = usize::from(index) + 1;
+        if next >= self.len() { 0 } else { index + 1 }
+    }
+
+    fn before(&self, index: u16) -> u16 {
+        if index == 0 {
+            u16::try_from(self.len() - 1).unwrap_or(u16::MAX)
+        } else {
+            index - 1
+        }
+    }
+
+    /// The place at a boundary.
+    #[must_use]
+    pub fn place(&self, boundary: u16, direction: Direction) -> Place {
+        let pose = self
+            .coverage_loop
+            .boundary_towards(usize::from(boundary), direction);
+        Place {
+            pose,
+            boundary: Some((boundary, direction)),
+        }
+    }
+
+    /// Where a move ends.
+    #[must_use]
+    pub fn end_of(&self, from: &Place, step: &Move) -> Place {
+        match step {
+            Move::Serve(h) => self.place(self.exit(h.cell, h.direction), h.direction),
+            Move::Pass(cell, direction) => self.place(self.exit(*cell, *direction), *direction),
+            Move::Route(curve) => Place {
+                pose: curve.end().unwrap_or(from.pose),
+                boundary: None,
+            },
+            Move::Loiter(circle) => Place {
+                pose: circle.end(),
+                boundary: None,
+            },
+        }
+    }
+
+    /// Length of a move, metres.
+    #[must_use]
+    pub fn length_m(&self, step: &Move) -> f64 {
+        let cells = self.coverage_loop.cells();
+        match step {
+            Move::Serve(h) => f64::from(cells[usize::from(h.cell)].service_mm) / 1000.0,
+            Move::Pass(cell, _) => f64::from(cells[usize::from(*cell)].travel_mm) / 1000.0,
+            Move::Route(curve) => curve.length_m(),
+            Move::Loiter(circle) => circle.length_m,
+        }
+    }
+
+    /// The way from `from` to the next cell of `queue` that is open and can be
+    /// reached, with that cell as its last move; cells that cannot be reached go to
+    /// `refused`. `None` when the queue holds nothing more to fly.
+    pub fn next(
+        &self,
+        from: &Place,
+        queue: &mut VecDeque<Hop>,
+        is_open: &dyn Fn(u16) -> bool,
+        refused: &mut Vec<u16>,
+    ) -> Option<Vec<Move>> {
+        while let Some(hop) = queue.pop_front() {
+            if usize::from(hop.cell) >= self.len() || !is_open(hop.cell) {
+                continue;
+            }
+            match self.connect(from, self.entry(hop.cell, hop.direction), hop.direction) {
+                Some(mut moves) => {
+                    moves.push(Move::Serve(hop));
+                    return Some(moves);
+                }
+                None => refused.push(hop.cell),
+            }
+        }
+        None
+    }
+
+    /// The way from `from` to a boundary, looking `direction`: along the loop where
+    /// that is not longer than a direct route, else direct, else with a turn
+    /// elsewhere. `None` when there is no clear way.
+    #[must_use]
+    pub fn connect(&self, from: &Place, to: u16, direction: Direction) -> Option<Vec<Move>> {
+        let goal = self.place(to, direction);
+        let straight_m = (goal.pose.position() - from.pose.position()).norm();
+        let ahead = from
+            .boundary
+            .filter(|(_, d)| *d == direction)
+            .map(|(b, _)| b);
+        // Straight along the loop nothing can be shorter: no need to ask the router.
+        if let Some(moves) = ahead.and_then(|b| self.along(b, direction, to, straight_m + 1e-3)) {
+            return Some(moves);
+        }
+        if let Ok(curve) = self.route(from.pose, goal.pose) {
+            let along = ahead.and_then(|b| self.along(b, direction, to, curve.length_m() + 1e-3));
+            return Some(along.unwrap_or_else(|| vec![Move::Route(curve)]));
+        }
+        if let Some(moves) = ahead.and_then(|b| self.along(b, direction, to, f64::INFINITY)) {
+            return Some(moves);
+        }
+        match from.boundary {
+            Some((b, d)) => self.turn_then_along(b, d, to, direction),
+            None => self.join_then_along(from, to, direction),
+        }
+    }
+
+    /// The cells between two boundaries in one direction, unless they are longer
+    /// than `most_m`. Excursions need not be flown to get past them.
+    fn along(&self, from: u16, direction: Direction, to: u16, most_m: f64) -> Option<Vec<Move>> {
+        let cells = self.coverage_loop.cells();
+        let mut moves = Vec::new();
+        let mut length_m = 0.0;
+        let mut at = from;
+        while at != to {
+            let cell = match direction {
+                Direction::Forward => at,
+                Direction::Backward => self.before(at),
+            };
+            let c = &cells[usize::from(cell)];
+            if !c.excursion {
+                length_m += f64::from(c.travel_mm) / 1000.0;
+                moves.push(Move::Pass(cell, direction));
+            }
+            if length_m > most_m || moves.len() > cells.len() {
+                return None;
+            }
+            at = self.exit(cell, direction);
+        }
+        Some(moves)
+    }
+
+    /// Flies on until it can turn round, turns, and follows the loop.
+    fn turn_then_along(
+        &self,
+        at: u16,
+        looking: Direction,
+        to: u16,
+        direction: Direction,
+    ) -> Option<Vec<Move>> {
+        if looking == direction {
+            return None;
+        }
+        let mut moves = Vec::new();
+        let mut b = at;
+        for _ in 0..DETOURS.min(self.len()) {
+            let back = self.place(b, direction);
+            if let Ok(turn) = self.route(self.place(b, looking).pose, back.pose) {
+                moves.push(Move::Route(turn));
+                moves.extend(self.along(b, direction, to, f64::INFINITY)?);
+                return Some(moves);
+            }
+            let next = match looking {
+                Direction::Forward => self.after(b),
+                Direction::Backward => self.before(b),
+            };
+            moves.extend(self.along(b, looking, next, f64::INFINITY)?);
+            b = next;
+        }
+        None
+    }
+
+    /// Joins the loop near by, looking the right way, and follows it.
+    fn join_then_along(&self, from: &Place, to: u16, direction: Direction) -> Option<Vec<Move>> {
+        let (b, curve) = self.join(from.pose, &[direction])?;
+        let mut moves = vec![Move::Route(curve)];
+        moves.extend(self.along(b.0, direction, to, f64::INFINITY)?);
+        Some(moves)
+    }
+
+    /// The shortest of the routes to the nearest boundaries.
+    fn join(&self, from: Pose, directions: &[Direction]) -> Option<((u16, Direction), Curve)> {
+        let mut best: Option<((u16, Direction), Curve, f64)> = None;
+        for b in self.nearest(from.position(), DETOURS) {
+            for d in directions {
+                if let Ok(curve) = self.route(from, self.place(b, *d).pose) {
+                    let m = curve.length_m();
+                    if best.as_ref().is_none_or(|(_, _, least)| m < *least) {
+                        best = Some(((b, *d), curve, m));
+                    }
+                }
+            }
+        }
+        best.map(|(b, c, _)| (b, c))
+    }
+
+    /// The cheapest way onto the loop: the boundary, which way it looks, and the
+    /// length of the route, metres. `None` when no boundary near by can be reached.
+    #[must_use]
+    pub fn way_on(&self, from: Pose) -> Option<(u16, Direction, f64)> {
+        let both = [Direction::Forward, Direction::Backward];
+        self.join(from, &both)
+            .map(|((b, d), c)| (b, d, c.length_m()))
+    }
+
+    /// The boundaries nearest to a point, nearest first, ties by index.
+    #[must_use]
+    pub fn nearest(&self, p: Point, count: usize) -> Vec<u16> {
+        let mut all: Vec<(f64, u16)> = (0..self.len())
+            .map(|i| (self.coverage_loop.boundary(i).position() - p).norm_squared())
+            .zip(0u16..)
+            .collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        all.truncate(count);
+        all.into_iter().map(|(_, b)| b).collect()
+    }
+
+    /// A clear route; from inside a zone's clearance with a piece that leads out of
+    /// it first.
+    fn route(&self, from: Pose, to: Pose) -> Result<Curve, RouteError> {
+        match self.router.route(from, to) {
+            Err(e) if e != RouteError::GoalInZone && self.is_tight(&from) => {
+                self.escape(from, |out| self.router.route(out, to)).ok_or(e)
+            }
+            answer => answer,
+        }
+    }
+
+    /// As [`Chart::connect`], to a point, whatever the heading there: by a direct
+    /// route, else by the loop to one of the boundaries nearest to the point.
+    #[must_use]
+    pub fn connect_to_point(&self, from: &Place, to: Point) -> Option<Vec<Move>> {
+        let direct = match self.router.route_to_point(from.pose, to) {
+            Err(_) if self.is_tight(&from.pose) => {
+                self.escape(from.pose, |out| self.router.route_to_point(out, to))
+            }
+            answer => answer.ok(),
+        };
+        if let Some(curve) = direct {
+            return Some(vec![Move::Route(curve)]);
+        }
+        for b in self.nearest(to, NEAREST) {
+            for d in [Direction::Forward, Direction::Backward] {
+                if let Ok(last) = self.router.route_to_point(self.place(b, d).pose, to)
+                    && let Some(mut moves) = self.connect(from, b, d)
+                {
+                    moves.push(Move::Route(last));
+                    return Some(moves);
+                }
+            }
+        }
+        None
+    }
+
+    /// Whether a pose is inside the clearance of a zone.
+    fn is_tight(&self, pose: &Pose) -> bool {
+        self.router.zones().distance_m(pose.position()) < self.router.limits().clearance_m + 1e-6
+    }
+
+    /// The shortest single piece that comes no nearer to the zones than `from` is
+    /// (less what rounding takes) and from whose end `onward` finds a way.
+    fn escape(
+        &self,
+        from: Pose,
+        onward: impl Fn(Pose) -> Result<Curve, RouteError>,
+    ) -> Option<Curve> {
+        let zones = self.router.zones();
+        let least_m = zones.distance_m(from.position()) - 0.25;
+        let bend = 1.0 / self.router.limits().turn_radius_m;
+        for length_m in ESCAPES_M {
+            for curvature_per_m in [0.0, bend, -bend] {
+                let piece = Segment {
+                    start: from,
+                    curvature_per_m,
+                    length_m,
+                };
+                if least_m <= 0.0 || zones.segment_distance_m(&piece) < least_m {
+                    continue;
+                }
+                if let Ok(rest) = onward(piece.end()) {
+                    let mut out = Curve::empty();
+                    out.push(piece);
+                    out.extend(&rest);
+                    return Some(out);
+                }
+            }
+        }
+        None
+    }
+
+    /// The way to a circle that keeps clear of the zones, and that circle: here, else
+    /// on along the loop, else at the nearest boundary with room. Where there is no
+    /// such place, the circle here that keeps farthest.
+    #[must_use]
+    pub fn hold(&self, from: &Place) -> Vec<Move> {
+        let clearance_m = self.router.limits().clearance_m;
+        let (here, room_m) = self.circle(&from.pose);
+        if room_m >= clearance_m - ROUNDING_M {
+            return vec![Move::Loiter(here)];
+        }
+        let mut moves = Vec::new();
+        let mut at = from.boundary;
+        while let Some((b, d)) = at.filter(|_| moves.len() < DETOURS) {
+            let next = match d {
+                Direction::Forward => self.after(b),
+                Direction::Backward => self.before(b),
+            };
+            moves.extend(self.along(b, d, next, f64::INFINITY).unwrap_or_default());
+            let (circle, room_m) = self.circle(&self.place(next, d).pose);
+            if room_m >= clearance_m - ROUNDING_M {
+                moves.push(Move::Loiter(circle));
+                return moves;
+            }
+            at = Some((next, d)).filter(|_| next != b);
+        }
+        for b in self.nearest(from.pose.position(), NEAREST) {
+            for d in [Direction::Forward, Direction::Backward] {
+                let (circle, room_m) = self.circle(&self.place(b, d).pose);
+                if room_m >= clearance_m - ROUNDING_M
+                    && let Ok(curve) = self.route(from.pose, circle.start)
+                {
+                    return vec![Move::Route(curve), Move::Loiter(circle)];
+                }
+            }
+        }
+        vec![Move::Loiter(here)]
+    }
+
+    /// The circle through a pose that keeps farthest from the zones, and how far; a
+    /// wide one if that keeps clear.
+    fn circle(&self, pose: &Pose) -> (Segment, f64) {
+        let zones = self.router.zones();
+        let clearance_m = self.router.limits().clearance_m;
+        let least_m = self
+            .router
+            .limits()
+            .turn_radius_m
+            .max(self.airframe.min_turn_radius_m());
+        let mut best: Option<(Segment, f64)> = None;
+        for factor in LOITER_RADII {
+            for side in [1.0, -1.0] {
+                let radius_m = factor * least_m;
+                let half = Segment {
+                    start: *pose,
+                    curvature_per_m: side / radius_m,
+                    length_m: 0.5 * TAU * radius_m,
+                };
+                let other = Segment {
+                    start: half.end(),
+                    ..half
+                };
+                let room_m = zones
+                    .segment_distance_m(&half)
+                    .min(zones.segment_distance_m(&other));
+                if best.is_none_or(|(_, m)| room_m > m) {
+                    best = Some((
+                        Segment {
+                            length_m: TAU * radius_m,
+                            ..half
+                        },
+                        room_m,
+                    ));
+                }
+            }
+            if best.is_some_and(|(_, m)| m >= clearance_m - ROUNDING_M) {
+                break;
+            }
+        }
+        best.unwrap_or((
+            Segment {
+                start: *pose,
+                curvature_per_m: 1.0 / least_m,
+                length_m: TAU * least_m,
+            },
+            0.0,
+        ))
+    }
+}

@@ -1,0 +1,262 @@
+//! What an executive expects of its own flight: forecast, durations, endurance
+//! (D2.7 §3.6.5 needs them from every UAV that shares a loop).
+//!
+//! Everything here is a question; nothing changes what is flown.
+
+use super::chart::{Hop, Move, Place};
+use super::{Executive, Forecast, Kind};
+use crate::percept::Percept;
+use skein_planning::coverage::area::Direction;
+use skein_planning::coverage::area::backtracking::Leg;
+use skein_planning::math::PI;
+use std::collections::VecDeque;
+
+/// Told instead of a time when there is no way: a day, beyond any endurance.
+pub const UNREACHABLE_MS: u32 = 86_400_000;
+
+/// Time added to a turn, milliseconds: a setpoint and its corrections.
+const TURN_MARGIN_MS: f64 = 1000.0;
+
+/// One stretch of the flight to come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Item {
+    /// The cell that it serves, if it does.
+    hop: Option<Hop>,
+    /// The cell that it flies, served or passed.
+    cell: Option<(u16, Direction)>,
+    /// Distance from here to its end, metres.
+    end_m: f64,
+    /// Where it ends.
+    end: Place,
+}
+
+/// What a UAV is at, for reports.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// The cell being flown, to serve it or on the way.
+    pub current: Option<(u16, Direction)>,
+    /// Cells still to be served, in order, with the one being served.
+    pub queue: Vec<(u16, Direction)>,
+    /// The last percept.
+    pub percept: Option<Percept>,
+}
+
+impl Executive {
+    /// What the UAV is at.
+    #[must_use]
+    pub fn view(&self) -> View {
+        let current = self
+            .stretches
+            .front()
+            .filter(|_| !self.replan)
+            .and_then(|s| s.kind.cell());
+        let under_way = self.stretches.iter().filter_map(|s| s.kind.hop());
+        let queue = under_way
+            .chain(self.queue.iter().copied())
+            .map(|h| (h.cell, h.direction))
+            .collect();
+        View {
+            current,
+            queue,
+            percept: self.played.as_ref().map(|p| p.percept),
+        }
+    }
+
+    /// Where the UAV will be `window_ms` from its last percept, at the end of a cell.
+    ///
+    /// The cell that it is in is always finished first. A UAV without legs is
+    /// foretold at the boundary that it reaches soonest. Where there is no way at
+    /// all, or no percept yet, the release is [`UNREACHABLE_MS`].
+    #[must_use]
+    pub fn forecast(&self, window_ms: u32, is_open: &dyn Fn(u16) -> bool) -> Forecast {
+        let Some(from) = self.here() else {
+            return Self::nowhere();
+        };
+        let kept = if self.replan { 0 } else { self.stretches.len() };
+        let items = self.items(&from, kept, self.waiting(kept), is_open);
+        let finish_ms = items
+            .iter()
+            .rev()
+            .find(|i| i.hop.is_some())
+            .map_or(0, |i| self.ms(i.end_m));
+        let mut cells = Vec::new();
+        let mut anchor: Option<(Place, f64)> = None;
+        let mut before_m = 0.0;
+        for (i, item) in items.iter().enumerate() {
+            let in_it = i == 0 && kept > 0;
+            let fits = self.ms(item.end_m) <= window_ms;
+            match (item.hop, item.cell) {
+                (Some(hop), _) if in_it || fits => {
+                    if is_open(hop.cell) {
+                        cells.push(hop.cell);
+                    }
+                    anchor = Some((item.end, item.end_m));
+                }
+                (None, Some(_)) if in_it => anchor = Some((item.end, item.end_m)),
+                (Some(hop), _) => {
+                    // The way to it is begun, so that is where it will be next.
+                    let entry = self
+                        .chart
+                        .place(self.chart.entry(hop.cell, hop.direction), hop.direction);
+                    anchor = anchor.or(Some((entry, before_m)));
+                    break;
+                }
+                _ => {}
+            }
+            before_m = item.end_m;
+        }
+        let on_loop = anchor.and_then(|(place, m)| place.boundary.map(|b| (b, m)));
+        let found = on_loop.or_else(|| self.chart.way_on(from.pose).map(|(b, d, m)| ((b, d), m)));
+        match found {
+            Some(((anchor, heading), m)) => Forecast {
+                cells,
+                anchor,
+                heading,
+                release_ms: self.ms(m),
+                finish_ms,
+            },
+            None => Self::nowhere(),
+        }
+    }
+
+    fn nowhere() -> Forecast {
+        Forecast {
+            cells: Vec::new(),
+            anchor: 0,
+            heading: Direction::Forward,
+            release_ms: UNREACHABLE_MS,
+            finish_ms: 0,
+        }
+    }
+
+    /// When each open cell of `legs` would be done if they became the goal now, in
+    /// the order of flight, milliseconds from the last percept. Cells that cannot be
+    /// reached are left out.
+    #[must_use]
+    pub fn schedule(&self, legs: &[Leg], is_open: &dyn Fn(u16) -> bool) -> Vec<(u16, u32)> {
+        let Some(from) = self.here() else {
+            return Vec::new();
+        };
+        let (kept, queue) = self.continued(self.hops(legs), is_open);
+        let items = self.items(&from, kept, queue, is_open);
+        items
+            .iter()
+            .filter_map(|i| i.hop.map(|h| (h.cell, self.ms(i.end_m))))
+            .collect()
+    }
+
+    /// Flown time of `legs` if they became the goal now, milliseconds. Without a
+    /// percept [`UNREACHABLE_MS`].
+    #[must_use]
+    pub fn leg_time_ms(&self, legs: &[Leg], is_open: &dyn Fn(u16) -> bool) -> u32 {
+        if self.played.is_none() {
+            return UNREACHABLE_MS;
+        }
+        self.schedule(legs, is_open).last().map_or(0, |(_, ms)| *ms)
+    }
+
+    /// Flight time that may still be planned: what is left less the reserve,
+    /// milliseconds.
+    #[must_use]
+    pub fn spendable_ms(&self, percept: &Percept) -> u32 {
+        whole_ms((percept.endurance_s - self.chart.airframe.reserve_s) * 1000.0)
+    }
+
+    /// Time to turn round where it is, milliseconds: the turn to the reversed pose
+    /// takes 7π/3 radii, whatever the place.
+    #[must_use]
+    pub fn turn_ms(&self) -> u32 {
+        let radius_m = self
+            .chart
+            .router
+            .limits()
+            .turn_radius_m
+            .max(self.chart.airframe.min_turn_radius_m());
+        self.ms(7.0 * PI / 3.0 * radius_m)
+            .saturating_add(whole_ms(TURN_MARGIN_MS))
+    }
+
+    /// Where the flight to come begins.
+    fn here(&self) -> Option<Place> {
+        let pose = self.played.as_ref()?.percept.pose;
+        Some(Place {
+            pose: if self.replan {
+                pose
+            } else {
+                self.track.pose().unwrap_or(pose)
+            },
+            boundary: None,
+        })
+    }
+
+    /// Cells to be served that are not on the first `kept` stretches.
+    fn waiting(&self, kept: usize) -> VecDeque<Hop> {
+        let dropped = self
+            .stretches
+            .iter()
+            .skip(kept)
+            .filter_map(|s| s.kind.hop());
+        dropped.chain(self.queue.iter().copied()).collect()
+    }
+
+    /// The first `kept` stretches, then the way along `queue`.
+    fn items(
+        &self,
+        from: &Place,
+        kept: usize,
+        mut queue: VecDeque<Hop>,
+        is_open: &dyn Fn(u16) -> bool,
+    ) -> Vec<Item> {
+        let mut items = Vec::with_capacity(kept + queue.len());
+        let mut place = *from;
+        let mut end_m = 0.0;
+        for s in self
+            .stretches
+            .iter()
+            .take(kept)
+            .take_while(|s| !matches!(s.kind, Kind::Loiter(_)))
+        {
+            end_m = (s.end_m - self.track.at_m()).max(0.0);
+            place = s.end;
+            items.push(Item {
+                hop: s.kind.hop(),
+                cell: s.kind.cell(),
+                end_m,
+                end: place,
+            });
+        }
+        let mut refused = Vec::new();
+        while let Some(moves) = self.chart.next(&place, &mut queue, is_open, &mut refused) {
+            for step in moves {
+                end_m += self.chart.length_m(&step);
+                place = self.chart.end_of(&place, &step);
+                let (hop, cell) = match &step {
+                    Move::Serve(h) => (Some(*h), Some((h.cell, h.direction))),
+                    Move::Pass(c, d) => (None, Some((*c, *d))),
+                    Move::Route(_) | Move::Loiter(_) => (None, None),
+                };
+                items.push(Item {
+                    hop,
+                    cell,
+                    end_m,
+                    end: place,
+                });
+            }
+        }
+        items
+    }
+
+    /// Time to fly so many metres, milliseconds, rounded up.
+    fn ms(&self, length_m: f64) -> u32 {
+        whole_ms((length_m / self.speed_mps() * 1000.0).ceil())
+    }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a cast of a float saturates"
+)]
+fn whole_ms(ms: f64) -> u32 {
+    ms as u32
+}

@@ -1,0 +1,510 @@
+//! Stories of one UAV on a real loop, flown by an exact airframe.
+//!
+//! Every story checks on the way what must always hold: what is reported seen was in
+//! a true frame, and the flown path keeps its distance from the zones.
+
+use super::*;
+use crate::testing::{CLEARANCE_M, LANE_M, Wing, airframe, ground, rectangle, square};
+use Direction::{Backward, Forward};
+use proptest::prelude::*;
+use skein_planning::geometry::Polygon;
+
+struct Story {
+    executive: Executive,
+    wing: Wing,
+    open: Vec<bool>,
+    told: Vec<Event>,
+    zones: Vec<Polygon>,
+    looked: usize,
+}
+
+impl Story {
+    fn new(cols: u32, rows: u32, zones: Vec<Polygon>, start: Pose) -> Self {
+        let (coverage_loop, router) = ground(cols, rows, zones.clone());
+        let open = vec![true; coverage_loop.len()];
+        let executive = Executive::new(airframe(), 90.0, coverage_loop, router);
+        Self {
+            executive,
+            wing: Wing::new(start),
+            open,
+            told: Vec::new(),
+            zones,
+            looked: 0,
+        }
+    }
+
+    fn n(&self) -> u16 {
+        u16::try_from(self.open.len()).unwrap()
+    }
+
+    fn legs(&mut self, legs: &[(u16, u16, Direction)]) {
+        let legs = legs
+            .iter()
+            .map(|&(first, count, direction)| Leg {
+                first,
+                count,
+                direction,
+            })
+            .collect();
+        let open = self.open.clone();
+        self.executive
+            .set_goal(Goal::Legs(legs), &|c| open[usize::from(c)]);
+    }
+
+    fn leg_time_ms(&self, legs: &[(u16, u16, Direction)]) -> u32 {
+        let legs: Vec<Leg> = legs
+            .iter()
+            .map(|&(first, count, direction)| Leg {
+                first,
+                count,
+                direction,
+            })
+            .collect();
+        self.executive
+            .leg_time_ms(&legs, &|c| self.open[usize::from(c)])
+    }
+
+    fn forecast(&self, window_ms: u32) -> Forecast {
+        self.executive
+            .forecast(window_ms, &|c| self.open[usize::from(c)])
+    }
+
+    /// One percept, answered at once, and the flight until the next.
+    fn step(&mut self, period_ms: u64) -> Vec<Event> {
+        self.step_late(period_ms, 0)
+    }
+
+    /// One percept whose answer takes `late_ms`, and the flight until the next.
+    fn step_late(&mut self, period_ms: u64, late_ms: u64) -> Vec<Event> {
+        let open = self.open.clone();
+        let (setpoint, events) = self
+            .executive
+            .step(&self.wing.percept(), &|c| open[usize::from(c)]);
+        for e in &events {
+            if let Event::Seen(cells) = e {
+                for id in cells {
+                    self.assert_truly_seen(*id);
+                    let i = self.executive.chart.coverage_loop.index_of(*id).unwrap();
+                    self.open[usize::from(i)] = false;
+                }
+            }
+        }
+        self.told.extend(
+            events
+                .iter()
+                .filter(|e| !matches!(e, Event::Seen(_)))
+                .cloned(),
+        );
+        self.looked = self.wing.flown.len() - 1;
+        self.wing.fly(late_ms);
+        self.wing.setpoint = Some(setpoint);
+        self.wing.fly(period_ms - late_ms);
+        events
+    }
+
+    /// Some pose truly flown since the percept before had all of the cell in frame.
+    fn assert_truly_seen(&self, id: skein_planning::coverage::area::CellId) {
+        let (w, s) = (f64::from(id.col) * LANE_M, f64::from(id.row) * LANE_M);
+        let corners = [
+            (w, s),
+            (w + LANE_M, s),
+            (w, s + LANE_M),
+            (w + LANE_M, s + LANE_M),
+        ];
+        let a = airframe();
+        let framed = self.wing.flown[self.looked..].iter().any(|p| {
+            let (sin, cos) = p.heading_rad.sin_cos();
+            corners.iter().all(|(x, y)| {
+                let (x, y) = (x - p.east_m, y - p.north_m);
+                (x * cos + y * sin).abs() <= a.footprint_along_m
+                    && (y * cos - x * sin).abs() <= a.footprint_across_m
+            })
+        });
+        assert!(framed, "{id:?} was reported and not seen");
+    }
+
+    fn until(
+        &mut self,
+        periods_ms: &[u64],
+        late_ms: u64,
+        most_s: u64,
+        end: impl Fn(&Event) -> bool,
+    ) {
+        for i in 0.. {
+            assert!(
+                self.wing.time_ms < most_s * 1000,
+                "no end: {:?}",
+                self.executive.view()
+            );
+            let events = self.step_late(periods_ms[i % periods_ms.len()], late_ms);
+            if events.iter().any(&end) {
+                return;
+            }
+        }
+    }
+
+    fn until_done(&mut self, most_s: u64) {
+        self.until(&[200], 0, most_s, |e| *e == Event::PlanDone);
+    }
+
+    fn least_distance_m(&self) -> f64 {
+        let distance = |p: &Pose| {
+            self.zones
+                .iter()
+                .map(|z| z.distance_m(p.position()))
+                .fold(f64::INFINITY, f64::min)
+        };
+        self.wing
+            .flown
+            .iter()
+            .map(distance)
+            .fold(f64::INFINITY, f64::min)
+    }
+}
+
+fn outside() -> Pose {
+    Pose {
+        east_m: -30.0,
+        north_m: -30.0,
+        heading_rad: 0.7,
+    }
+}
+
+fn block() -> Vec<Polygon> {
+    vec![rectangle(
+        4.0 * LANE_M + 10.0,
+        2.0 * LANE_M + 12.0,
+        60.0,
+        70.0,
+    )]
+}
+
+#[test]
+fn one_uav_sees_the_whole_loop_in_either_direction() {
+    for direction in [Forward, Backward] {
+        let mut story = Story::new(10, 8, block(), outside());
+        let n = story.n();
+        assert!(n > 60);
+        story.step(200);
+        let foretold_s = u64::from(story.leg_time_ms(&[(3, n, direction)])) / 1000;
+        story.legs(&[(3, n, direction)]);
+        story.until_done(foretold_s + 60);
+        assert!(story.open.iter().all(|o| !o));
+        assert_eq!(story.told, [Event::PlanDone]);
+        assert!(story.wing.time_ms / 1000 + 10 > foretold_s, "{foretold_s}");
+        assert!(
+            story.least_distance_m() > CLEARANCE_M - 0.3,
+            "{}",
+            story.least_distance_m()
+        );
+        // Afterwards it loiters where it is, and says nothing more.
+        let there = story.wing.pose.position();
+        for _ in 0..400 {
+            assert!(story.step(200).is_empty());
+            assert!((story.wing.pose.position() - there).norm() < 120.0);
+        }
+        assert!(story.least_distance_m() > CLEARANCE_M - 0.3);
+    }
+}
+
+#[test]
+fn a_flight_that_is_set_up_once_is_on_time_to_the_second() {
+    let mut story = Story::new(10, 8, block(), outside());
+    story.step(200);
+    let legs = [(0, 30, Forward), (70, 8, Backward)];
+    let foretold_ms = u64::from(story.leg_time_ms(&legs));
+    let from_ms = story.wing.time_ms - 200;
+    story.legs(&legs);
+    story.until_done(1000);
+    let flown_ms = story.wing.time_ms - from_ms;
+    assert!(
+        flown_ms.abs_diff(foretold_ms) < 2000,
+        "{flown_ms} {foretold_ms}"
+    );
+}
+
+#[test]
+fn gaps_in_a_plan_are_passed_or_cut_short() {
+    let mut story = Story::new(10, 8, block(), outside());
+    for i in (10..30).chain(33..50) {
+        story.open[i] = false;
+    }
+    story.step(200);
+    let whole_ms = u64::from(story.n()) * 3700;
+    story.legs(&[(5, 50, Forward)]);
+    story.until_done(400);
+    let left: Vec<usize> = (5..55).filter(|i| story.open[*i]).collect();
+    assert!(left.is_empty(), "{left:?}");
+    assert!(story.wing.time_ms < whole_ms, "{}", story.wing.time_ms);
+    assert!(story.least_distance_m() > CLEARANCE_M - 0.3);
+}
+
+#[test]
+fn it_turns_round_for_a_second_leg() {
+    let mut story = Story::new(10, 8, vec![], outside());
+    story.step(200);
+    story.legs(&[(10, 6, Forward), (9, 6, Backward)]);
+    story.until_done(300);
+    assert!((4..16).all(|i| !story.open[i]));
+    assert_eq!(story.told, [Event::PlanDone]);
+}
+
+#[test]
+fn late_and_missing_percepts_leave_no_gap() {
+    for (periods, late) in [
+        (&[500, 420, 610, 380][..], 0),
+        (&[500, 420, 610, 380][..], 120),
+        (&[200, 200, 900][..], 50),
+        (&[[200; 150].as_slice(), &[3500]].concat()[..], 30),
+    ] {
+        let mut story = Story::new(10, 8, block(), outside());
+        story.step(200);
+        story.legs(&[(0, 40, Forward)]);
+        story.until(periods, late, 900, |e| *e == Event::PlanDone);
+        assert!((0..40).all(|i| !story.open[i]), "{periods:?}");
+        assert_eq!(story.told, [Event::PlanDone]);
+        assert!(
+            story.least_distance_m() > CLEARANCE_M - 2.0,
+            "{periods:?}: {}",
+            story.least_distance_m()
+        );
+    }
+}
+
+#[test]
+fn a_cell_that_cannot_be_reached_is_refused_and_the_rest_flown() {
+    // Walls on all sides of the area but no way in: the UAV is outside.
+    let wall = |e: f64, n: f64, w: f64, h: f64| rectangle(e, n, w, h);
+    let zones = vec![
+        wall(-140.0, -140.0, 680.0, 20.0),
+        wall(-140.0, 500.0, 680.0, 20.0),
+        wall(-140.0, -120.0, 20.0, 620.0),
+        wall(520.0, -120.0, 20.0, 620.0),
+    ];
+    let mut story = Story::new(
+        8,
+        8,
+        zones,
+        Pose {
+            east_m: -300.0,
+            north_m: 0.0,
+            heading_rad: 1.0,
+        },
+    );
+    story.step(200);
+    assert_eq!(story.forecast(5000).release_ms, UNREACHABLE_MS);
+    story.legs(&[(0, 5, Forward)]);
+    story.until_done(20);
+    let refused: Vec<u16> = story
+        .told
+        .iter()
+        .flat_map(|e| {
+            if let Event::Refused { cells } = e {
+                cells.clone()
+            } else {
+                vec![]
+            }
+        })
+        .collect();
+    assert_eq!(refused, [0, 1, 2, 3, 4]);
+}
+
+#[test]
+fn a_cell_that_the_camera_never_sees_is_refused_after_three_tries() {
+    let mut story = Story::new(6, 6, vec![], outside());
+    story.executive.chart.airframe.footprint_along_m = 20.0;
+    story.step(200);
+    story.legs(&[(3, 1, Forward)]);
+    story.until_done(300);
+    assert_eq!(
+        story.told,
+        [Event::Refused { cells: vec![3] }, Event::PlanDone]
+    );
+    assert!(story.wing.time_ms > 30_000);
+}
+
+#[test]
+fn new_legs_that_begin_where_it_is_change_nothing_on_the_way() {
+    let mut plain = Story::new(10, 8, vec![], outside());
+    plain.step(200);
+    plain.legs(&[(0, 20, Forward)]);
+    let mut again = Story::new(10, 8, vec![], outside());
+    again.step(200);
+    again.legs(&[(0, 20, Forward)]);
+    let mut last = 0;
+    while again.open[15] {
+        plain.step(200);
+        again.step(200);
+        if let Some((cell, Forward)) = again.executive.view().current
+            && cell < 15
+        {
+            // The cell under way may be seen already: the plan then begins after it.
+            let first = if again.open[usize::from(cell)] {
+                cell
+            } else {
+                cell + 1
+            };
+            again.legs(&[(first, 20 - first, Forward)]);
+            last = cell;
+        }
+        let off_m = (plain.wing.pose.position() - again.wing.pose.position()).norm();
+        assert!(off_m < 0.05, "{off_m} {:?}", again.executive.view());
+    }
+    assert!(last >= 13);
+}
+
+#[test]
+fn forecasts_come_true() {
+    let mut story = Story::new(10, 8, block(), outside());
+    story.step(200);
+    let first = story.forecast(1000);
+    assert!(first.cells.is_empty() && first.release_ms > 0 && first.release_ms < 60_000);
+    story.legs(&[(0, 40, Forward)]);
+    story.step(200);
+    while story.open[6] {
+        story.step(200);
+    }
+    for window_ms in [0, 3_000, 15_000] {
+        story.step(200);
+        let f = story.forecast(window_ms);
+        assert_eq!(f.heading, Forward);
+        assert!(f.release_ms <= window_ms.max(4_000), "{f:?}");
+        let mut later = Story {
+            executive: story.executive.clone(),
+            wing: story.wing.clone(),
+            open: story.open.clone(),
+            told: vec![],
+            zones: vec![],
+            looked: story.looked,
+        };
+        // The forecast was made 200 ms ago, at the last percept.
+        for _ in 0..f.release_ms.saturating_sub(200) / 10 {
+            later.wing.fly(10);
+            if later.wing.time_ms % 200 == 0 {
+                later.step(0);
+            }
+        }
+        let anchor = later.executive.chart.place(f.anchor, f.heading).pose;
+        let off_m = (later.wing.pose.position() - anchor.position()).norm();
+        assert!(off_m < 0.5, "{f:?}: {off_m}");
+        assert!(
+            f.cells.iter().all(|c| !later.open[usize::from(*c)]),
+            "{f:?}"
+        );
+    }
+}
+
+#[test]
+fn it_arrives_at_a_point_once_and_stays_there() {
+    let mut story = Story::new(10, 8, block(), outside());
+    let goal = Point::new(420.0, 330.0);
+    story.step(200);
+    story.executive.set_goal(Goal::Point(goal), &|_| false);
+    story.until(&[200], 0, 120, |e| *e == Event::Arrived);
+    for _ in 0..300 {
+        story.step(200);
+        story.executive.set_goal(Goal::Point(goal), &|_| false);
+        assert!((story.wing.pose.position() - goal).norm() < 130.0);
+    }
+    assert_eq!(story.told, [Event::Arrived]);
+}
+
+#[test]
+fn without_a_goal_it_holds_where_it_is() {
+    let mut story = Story::new(10, 8, block(), outside());
+    for _ in 0..500 {
+        story.step(200);
+        assert!((story.wing.pose.position() - outside().position()).norm() < 70.0);
+    }
+    assert!(story.told.is_empty());
+}
+
+#[test]
+fn it_comes_back_from_its_failsafe() {
+    let mut story = Story::new(10, 8, block(), outside());
+    story.step(200);
+    story.legs(&[(0, 30, Forward)]);
+    for i in 0..200 {
+        story.step(if i % 60 == 59 { 20_000 } else { 200 });
+    }
+    story.until_done(900);
+    assert!((0..30).all(|i| !story.open[i]));
+    assert!(story.least_distance_m() > 0.5);
+}
+
+#[test]
+fn a_percept_without_numbers_is_answered_safely() {
+    let mut story = Story::new(6, 6, vec![], outside());
+    let mut percept = story.wing.percept();
+    percept.pose.heading_rad = f64::NAN;
+    let (setpoint, events) = story.executive.step(&percept, &|_| true);
+    assert!(events.is_empty() && setpoint.steps.iter().all(|s| s.turn_rate_radps.is_finite()));
+}
+
+#[test]
+fn leg_times_grow_with_the_legs() {
+    let mut story = Story::new(10, 8, block(), outside());
+    assert_eq!(story.leg_time_ms(&[(0, 1, Forward)]), UNREACHABLE_MS);
+    story.step(200);
+    let times: Vec<u32> = (0..20)
+        .map(|k| story.leg_time_ms(&[(0, k, Forward)]))
+        .collect();
+    assert!(times[0] == 0 && times.windows(2).all(|w| w[0] < w[1]));
+    let p = story.wing.percept();
+    assert_eq!(story.executive.spendable_ms(&p), 2_880_000);
+    assert_eq!(
+        story.executive.spendable_ms(&Percept {
+            endurance_s: 5.0,
+            ..p
+        }),
+        0
+    );
+    assert!((12_000..17_000).contains(&story.executive.turn_ms()));
+}
+
+/// A step where nothing has to be planned is cheap: no step of a steady flight may
+/// ask the router, which a poisoned one would show, and wall time is for callgrind.
+#[test]
+fn a_steady_flight_plans_nothing() {
+    let mut story = Story::new(10, 8, vec![square(100.0, 900.0, 50.0)], outside());
+    story.step(200);
+    story.legs(&[(0, 60, Forward)]);
+    while story.open[5] {
+        story.step(200);
+    }
+    for _ in 0..300 {
+        story.step(200);
+        assert!(story.executive.stretches.len() <= 4 && !story.executive.replan);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
+    #[test]
+    fn no_open_cell_of_the_legs_is_skipped(
+        legs in prop::collection::vec((0u16..70, 1u16..9, any::<bool>()), 1..4),
+        closed in prop::collection::vec(0usize..70, 0..40),
+        period in 15u64..60,
+        east in -60.0..300.0f64,
+        heading in -3.0..3.0f64,
+    ) {
+        let start = Pose { east_m: east, north_m: -60.0, heading_rad: heading };
+        let mut story = Story::new(10, 8, block(), start);
+        for c in closed {
+            story.open[c] = false;
+        }
+        story.step(200);
+        let n = story.n();
+        let legs: Vec<_> = legs.into_iter()
+            .map(|(f, c, b)| (f % n, c, if b { Backward } else { Forward }))
+            .collect();
+        story.legs(&legs);
+        story.until(&[period * 10], 0, 1200, |e| *e == Event::PlanDone);
+        for (first, count, direction) in legs {
+            for cell in (Leg { first, count, direction }).cells(usize::from(n)) {
+                prop_assert!(!story.open[usize::from(cell)], "cell {cell} was skipped: {:?}", story.told);
+            }
+        }
+        prop_assert!(story.least_distance_m() > CLEARANCE_M - 2.0);
+    }
+}
