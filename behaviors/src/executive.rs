@@ -696,26 +696,6 @@ impl Executive {
     pub fn finish_ms(&self, is_open: &dyn Fn(u16) -> bool) -> u32 {
         self.forecast(0, is_open).finish_ms
     }
-
-    /// Predicted flight time of legs from the present state, milliseconds.
-    #[must_use]
-    pub fn leg_time_ms(&self, legs: &[Leg], is_open: &dyn Fn(u16) -> bool) -> u32 {
-        let _ = (legs, is_open);
-        todo!("behaviors")
-    }
-
-    /// Flight time left above the reserve, milliseconds.
-    #[must_use]
-    pub fn spendable_ms(&self, percept: &Percept) -> u32 {
-        let _ = percept;
-        todo!("behaviors")
-    }
-
-    /// Time of a turn to the opposite heading at the same place, milliseconds.
-    #[must_use]
-    pub fn turn_ms(&self) -> u32 {
-        todo!("behaviors")
-    }
 }
 
 #[cfg(test)]
