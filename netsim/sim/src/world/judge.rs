@@ -393,7 +393,7 @@ mod tests {
     #[test]
     fn cells_seen_agree_with_dense_sampling() {
         let mut total = 0;
-        for k in 0..60 {
+        for k in (0..60).step_by(3) {
             let t = f64::from(k);
             let p = piece(
                 20.0 + 7.0 * t,
@@ -416,7 +416,7 @@ mod tests {
             assert_eq!(facts.len(), j.n_covered());
             total += j.n_covered();
         }
-        assert!(total > 60, "{total}");
+        assert!(total > 20, "{total}");
     }
 
     #[test]

@@ -14,13 +14,12 @@
 //! the samples sees is missed, so the verdict errs by at most one sample, on the side
 //! of "uncoverable". Only zones keep anybody out: passes may leave the area.
 
-use super::flat::{Bounds, area_m2, circle_ring_m, clip, in_ring, point_ring_m, segment_ring_m};
+use super::flat::{Bounds, area_m2, circle_ring_m, clip, point_ring_m, segment_ring_m};
 use crate::spec::Spec;
 use skein_peer::mission::{Mission, point_m};
 use skein_planning::coverage::area::CellId;
 use skein_planning::frame::{Point, Pose, Vector};
 use skein_planning::math::{PI, sin_cos};
-use std::collections::BTreeMap;
 
 /// Headings tried, over half a turn: a pass flown backwards is the same pass.
 const HEADINGS: u32 = 24;
@@ -472,24 +471,6 @@ impl FreePlane {
         // Outside the raster there are no zones, hence only one part.
         inside.peek().is_none() || inside.any(|i| self.reached[i])
     }
-}
-
-/// Whether the launch of every UAV is clear of the zones themselves: a scenario that
-/// starts inside a zone cannot be flown.
-#[must_use]
-pub fn launches_clear(spec: &Spec) -> BTreeMap<u16, bool> {
-    spec.uavs
-        .iter()
-        .map(|u| {
-            (
-                u.id,
-                !spec
-                    .zones
-                    .iter()
-                    .any(|z| in_ring(u.launch.position(), z.vertices())),
-            )
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -384,9 +384,9 @@ mod tests {
 
     fn euler(k: &Kinematic, rates: &[(f64, u32)]) -> Pose {
         let mut p = k.pose();
-        let dt = 1e-5;
+        let dt = 1e-4;
         for (rate, ms) in rates {
-            for _ in 0..ms * 100 {
+            for _ in 0..ms * 10 {
                 // The middle of the step, second order.
                 let h = p.heading_rad + rate * dt / 2.0;
                 p.east_m += 13.0 * dt * cos(h);
