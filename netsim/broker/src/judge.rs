@@ -59,12 +59,7 @@ impl Trial<'_> {
             restarts: self.ledger.restarts(),
             splits: components.splits,
             merges: components.merges,
-            most_components: components
-                .history
-                .iter()
-                .map(|(_, s)| s.len())
-                .max()
-                .unwrap_or(0),
+            most_components: components.most,
             link_cuts: self
                 .ledger
                 .link_cuts

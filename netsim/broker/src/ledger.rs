@@ -44,11 +44,15 @@ struct Restart {
     productive_ms: Option<u64>,
 }
 
-/// The changes of the number of components of the true link graph.
+/// The components of the true link graph, and how they changed.
 #[derive(Clone, Debug, Default)]
 pub struct Components {
-    /// When, and how many peers each component has from then on, descending.
+    /// The components at present.
+    now: Vec<Vec<u16>>,
+    /// When one fell apart or some met, and how many peers each has from then on.
     pub history: Vec<(u64, Vec<usize>)>,
+    /// The most at once.
+    pub most: usize,
     /// How often one became more.
     pub splits: usize,
     /// How often more became fewer.
@@ -258,29 +262,31 @@ impl Ledger {
     }
 
     /// Takes down the present components of the true link graph; gives a line when
-    /// their number changed.
-    pub fn components(&mut self, now_ms: u64, mut sizes: Vec<usize>) -> Option<String> {
-        sizes.sort_unstable_by(|a, b| b.cmp(a));
-        let before = self.components.history.last().map(|(_, s)| s.len());
-        if before == Some(sizes.len()) {
+    /// one fell apart or some met. Peers that come and go do neither.
+    pub fn components(&mut self, now_ms: u64, parts: &[Vec<u16>]) -> Option<String> {
+        if self.components.now == parts {
             return None;
         }
-        let shown = sizes
+        let before = std::mem::replace(&mut self.components.now, parts.to_vec());
+        self.components.most = self.components.most.max(parts.len());
+        let falls = before.iter().any(|old| scattered(old, parts));
+        let meets = parts.iter().any(|new| scattered(new, &before));
+        let shown = parts
             .iter()
-            .map(ToString::to_string)
+            .map(|p| p.len().to_string())
             .collect::<Vec<_>>()
             .join(" + ");
-        self.components.history.push((now_ms, sizes.clone()));
-        match before {
-            Some(n) if sizes.len() > n => {
-                self.components.splits += 1;
-                Some(format!("the swarm is split: {shown}"))
-            }
-            Some(_) => {
-                self.components.merges += 1;
-                Some(format!("parts of the swarm meet again: {shown}"))
-            }
-            None => None,
+        self.components.splits += usize::from(falls);
+        self.components.merges += usize::from(meets);
+        if falls || meets {
+            self.components
+                .history
+                .push((now_ms, parts.iter().map(Vec::len).collect()));
+        }
+        match (falls, meets) {
+            (true, _) => Some(format!("the swarm is split: {shown}")),
+            (false, true) => Some(format!("parts of the swarm meet again: {shown}")),
+            (false, false) => None,
         }
     }
 
@@ -361,6 +367,15 @@ impl Kill {
             left: self.pending.len(),
         }
     }
+}
+
+/// Whether the peers of `group` stand in more than one of `parts`.
+fn scattered(group: &[u16], parts: &[Vec<u16>]) -> bool {
+    parts
+        .iter()
+        .filter(|part| part.iter().any(|id| group.contains(id)))
+        .count()
+        > 1
 }
 
 fn merge<K: Ord + Copy>(sum: &mut Vec<(K, u64)>, more: &[(K, u64)]) {
@@ -475,18 +490,24 @@ mod tests {
     }
 
     #[test]
-    fn splits_and_merges_are_counted_by_changes_of_the_number() {
+    fn splits_and_merges_are_changes_of_who_can_reach_whom() {
         let mut l = ledger();
-        for (t, sizes) in [
-            (0, vec![3]),
-            (1, vec![3]),
-            (2, vec![1, 2]),
-            (3, vec![2, 1]),
-            (4, vec![3]),
-        ] {
-            l.components(t, sizes);
+        let steps: [&[&[u16]]; 6] = [
+            &[&[1, 2, 3]],
+            &[&[1], &[2, 3]],
+            // The first one dies and comes back: nothing fell apart, nothing met.
+            &[&[2, 3]],
+            &[&[1], &[2, 3]],
+            &[&[1, 2, 3]],
+            &[&[1, 2, 3]],
+        ];
+        for (t, parts) in (0..).zip(steps) {
+            let parts: Vec<Vec<u16>> = parts.iter().map(|p| p.to_vec()).collect();
+            l.components(t, &parts);
         }
-        assert_eq!((l.components.splits, l.components.merges), (1, 1));
-        assert_eq!(l.components.history.len(), 3);
+        assert_eq!(
+            (l.components.splits, l.components.merges, l.components.most),
+            (1, 1, 2)
+        );
     }
 }

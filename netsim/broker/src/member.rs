@@ -99,11 +99,22 @@ impl Member {
     #[must_use]
     pub fn last_words(&self) -> String {
         let text = std::fs::read_to_string(&self.files.log).unwrap_or_default();
-        let last = text
-            .lines()
-            .rev()
-            .find(|l| !l.trim().is_empty())
-            .unwrap_or("it left no message");
+        let lines: Vec<&str> = text.lines().filter(|l| !l.trim().is_empty()).collect();
+        // A panic says where in one line and why in the next.
+        let panic = lines.iter().rposition(|l| l.contains("panicked at"));
+        let last = match panic {
+            Some(at) => lines[at..]
+                .iter()
+                .take(2)
+                .copied()
+                .collect::<Vec<_>>()
+                .join(" "),
+            None => lines
+                .last()
+                .copied()
+                .unwrap_or("it left no message")
+                .to_owned(),
+        };
         format!("{last} (see {})", self.files.log.display())
     }
 

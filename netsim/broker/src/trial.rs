@@ -565,8 +565,7 @@ impl<'a> Trial<'a> {
             .collect();
         self.components = components(on_air, &joined);
         if self.now_ms > u64::from(self.spec.beacon_period_ms) {
-            let sizes = self.components.iter().map(Vec::len).collect();
-            if let Some(text) = self.ledger.components(self.now_ms, sizes) {
+            if let Some(text) = self.ledger.components(self.now_ms, &self.components) {
                 self.note(text);
             }
         }

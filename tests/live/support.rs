@@ -1,0 +1,247 @@
+//! Trials as processes, and looking at what they leave.
+
+use serde_json::Value;
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// The repository's root.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Waits for the machine to be free of other trials.
+pub fn alone() -> MutexGuard<'static, ()> {
+    static MACHINE: Mutex<()> = Mutex::new(());
+    MACHINE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Looks again and again until `done`, or panics at the deadline.
+pub fn wait_until(limit: Duration, what: &str, mut done: impl FnMut() -> bool) {
+    let deadline = Instant::now() + limit;
+    while !done() {
+        assert!(Instant::now() < deadline, "not in time: {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// A directory of its own, which also keeps trials of other tests out of sight.
+pub struct Place {
+    dir: tempfile::TempDir,
+}
+
+impl Place {
+    pub fn new() -> Self {
+        Self { dir: tempfile::tempdir().unwrap() }
+    }
+
+    fn command(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_skein"));
+        command.args(args).env("TMPDIR", self.dir.path()).stdin(Stdio::null());
+        command
+    }
+
+    /// Runs a verb to its end: exit code, stdout and stderr together.
+    pub fn skein(&self, args: &[&str]) -> (i32, String) {
+        let out = self.command(args).output().unwrap();
+        let text = String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
+        (out.status.code().unwrap_or(-1), text)
+    }
+
+    pub fn file(&self, name: &str, text: &str) -> String {
+        let path = self.dir.path().join(name);
+        fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    }
+
+    /// All processes whose environment names this place, the zombies left out.
+    pub fn processes(&self) -> Vec<u32> {
+        let mark = format!("TMPDIR={}", self.dir.path().display());
+        let mut pids = Vec::new();
+        for entry in fs::read_dir("/proc").unwrap().flatten() {
+            let Ok(pid) = entry.file_name().to_string_lossy().parse::<u32>() else { continue };
+            let environment = fs::read(entry.path().join("environ")).unwrap_or_default();
+            if environment.split(|b| *b == 0).any(|v| v == mark.as_bytes()) {
+                pids.push(pid);
+            }
+        }
+        pids
+    }
+
+    /// Runs the Python example on the only trial.
+    pub fn observe_py(&self, python: &str, seconds: &str) -> String {
+        let shared = fs::read_dir(self.dir.path()).unwrap().flatten().find(|e| e.file_name() != "peer.json5");
+        let entry = fs::read_dir(shared.unwrap().path())
+            .unwrap()
+            .flatten()
+            .find(|e| e.path().extension().is_some_and(|x| x == "json"))
+            .unwrap();
+        let entry: Value = serde_json::from_slice(&fs::read(entry.path()).unwrap()).unwrap();
+        let script = root().join("examples/observe.py");
+        let endpoint = entry["observe"].as_str().unwrap();
+        let out = Command::new(python).arg(script).args([endpoint, seconds]).output().unwrap();
+        String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr)
+    }
+}
+
+/// A Python that has what the example needs.
+pub fn python() -> Option<String> {
+    let works = |p: &&str| {
+        let out = Command::new(p).args(["-c", "import zenoh, cbor2"]).output();
+        out.is_ok_and(|o| o.status.success())
+    };
+    ["python3", "python"].iter().find(|p| works(p)).map(|p| (*p).to_owned())
+}
+
+/// A running `skein trial`.
+pub struct Trial {
+    child: Child,
+    id: String,
+    lines: Arc<Mutex<Vec<String>>>,
+    stdout: Option<std::process::ChildStdout>,
+    pids: Vec<u32>,
+}
+
+impl Trial {
+    /// Starts the small scenario under `name`, and waits until it has begun.
+    pub fn start(place: &Place, name: &str, more: &[&str]) -> Self {
+        let text = fs::read_to_string(root().join("tests/live/square.json5")).unwrap();
+        let file = place.file(&format!("{name}.json5"), &text.replace("name: \"square\"", &format!("name: \"{name}\"")));
+        let args = [&["trial", &file, "--format", "json"], more].concat();
+        let mut child =
+            place.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let lines = Arc::new(Mutex::new(Vec::new()));
+        let stderr = child.stderr.take().unwrap();
+        let said = Arc::clone(&lines);
+        std::thread::spawn(move || {
+            for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+                said.lock().unwrap().push(line);
+            }
+        });
+        let stdout = child.stdout.take();
+        let mut trial = Self { child, id: String::new(), lines, stdout, pids: Vec::new() };
+        let begun = |l: &String| l.strip_prefix("trial ").map(|r| r.split(' ').next().unwrap().to_owned());
+        wait_until(Duration::from_secs(30), "the trial begins", || {
+            let found = trial.lines.lock().unwrap().iter().find_map(begun);
+            trial.id = found.unwrap_or_default();
+            !trial.id.is_empty()
+        });
+        trial
+    }
+
+    pub fn id(&self) -> &str {
+        &self.id
+    }
+
+    /// Waits until the flight has begun and, by the wall clock at the scenario's
+    /// scale of at most 10, has gone on for `time_s`.
+    pub fn wait_for_time(&mut self, time_s: f64, limit: Duration) {
+        let told = |l: &String| l.split_once(" s  ").and_then(|(t, _)| t.trim().parse::<f64>().ok());
+        let deadline = Instant::now() + limit;
+        let mut began = None;
+        loop {
+            let newest = self.lines.lock().unwrap().iter().filter_map(told).fold(None, |m, t| Some(t.max(m.unwrap_or(t))));
+            if newest.is_some() && began.is_none() {
+                began = Some(Instant::now());
+            }
+            let at_least = began.map_or(0.0, |b: Instant| b.elapsed().as_secs_f64() * 2.5);
+            if newest.is_some_and(|t| t.max(at_least) >= time_s) {
+                break;
+            }
+            assert!(self.child.try_wait().unwrap().is_none(), "the trial has ended: {:#?}", self.lines.lock().unwrap());
+            assert!(Instant::now() < deadline, "not in time: {:#?}", self.lines.lock().unwrap());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        self.pids = children_of_group(self.child.id());
+    }
+
+    /// Every socket of the trial and its peers is bound to 127.0.0.1.
+    pub fn assert_loopback_only(&self) {
+        assert!(self.pids.len() >= 6, "{:?}", self.pids);
+        for pid in &self.pids {
+            for socket in sockets(*pid) {
+                assert!(socket.starts_with("0100007F:"), "process {pid} has a socket at {socket}");
+            }
+        }
+    }
+
+    /// Waits for the end; the exit code.
+    pub fn wait(&mut self, limit: Duration) -> Option<i32> {
+        let mut status = None;
+        wait_until(limit, "the trial ends", || {
+            status = self.child.try_wait().unwrap();
+            status.is_some()
+        });
+        status.and_then(|s| s.code())
+    }
+
+    /// Waits for the end, and reads the verdict.
+    pub fn verdict(&mut self, limit: Duration) -> Value {
+        let mut stdout = self.stdout.take().unwrap();
+        let reader = std::thread::spawn(move || {
+            let mut text = String::new();
+            stdout.read_to_string(&mut text).map(|_| text)
+        });
+        self.wait(limit);
+        let text = reader.join().unwrap().unwrap();
+        serde_json::from_str(&text)
+            .unwrap_or_else(|e| panic!("{e}: {text} {:#?}", self.lines.lock().unwrap()))
+    }
+
+    pub fn kill(&mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
+    pub fn interrupt(&self) {
+        let pid = self.child.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    }
+}
+
+impl Drop for Trial {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// A process and all its children.
+fn children_of_group(parent: u32) -> Vec<u32> {
+    let mut pids = vec![parent];
+    for entry in fs::read_dir("/proc").unwrap().flatten() {
+        let Ok(pid) = entry.file_name().to_string_lossy().parse::<u32>() else { continue };
+        let stat = fs::read_to_string(entry.path().join("stat")).unwrap_or_default();
+        let after_name = stat.rsplit_once(") ").map_or("", |(_, rest)| rest);
+        if after_name.split(' ').nth(1) == Some(&parent.to_string()) {
+            pids.push(pid);
+        }
+    }
+    pids
+}
+
+/// Local addresses of the internet sockets of a process, as the kernel writes them.
+fn sockets(pid: u32) -> Vec<String> {
+    let mut inodes = Vec::new();
+    for fd in fs::read_dir(format!("/proc/{pid}/fd")).into_iter().flatten().flatten() {
+        let link = fs::read_link(fd.path()).unwrap_or_default();
+        let link = link.to_string_lossy();
+        if let Some(inode) = link.strip_prefix("socket:[").and_then(|l| l.strip_suffix(']')) {
+            inodes.push(inode.to_owned());
+        }
+    }
+    let mut found = Vec::new();
+    for table in ["tcp", "tcp6", "udp", "udp6"] {
+        let text = fs::read_to_string(format!("/proc/{pid}/net/{table}")).unwrap_or_default();
+        for line in text.lines().skip(1) {
+            let fields: Vec<&str> = line.split_whitespace().collect();
+            if fields.get(9).is_some_and(|inode| inodes.iter().any(|i| i == inode)) {
+                found.push(fields[1].to_owned());
+            }
+        }
+    }
+    found
+}
