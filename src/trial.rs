@@ -96,7 +96,6 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
         Err(error) => {
             eprintln!("error: {error}");
             Ok(ExitCode::from(match error {
-                TrialError::World(_) => exit::CONFIG_INVALID,
                 TrialError::Launch { .. } | TrialError::Interrupted => exit::NO_PEERS,
                 TrialError::Io { .. } | TrialError::Registry(_) => exit::INTERNAL,
             }))

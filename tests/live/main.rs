@@ -24,7 +24,10 @@ fn a_killed_uav_is_taken_over_and_observers_see_the_swarm() {
     observe_from_python(&place);
     let (code, said) = place.skein(&["chaos", "kill", "uav2"]);
     assert_eq!(code, 0, "{said}");
-    assert!(said.contains("uav2 is gone") && said.contains("expect: uav2 suspected within"), "{said}");
+    assert!(
+        said.contains("uav2 is gone") && said.contains("expect: uav2 suspected within"),
+        "{said}"
+    );
     let (code, said) = place.skein(&["chaos", "kill", "9"]);
     assert_eq!(code, 4, "{said}");
     assert!(said.contains("there is no uav9"), "{said}");
@@ -36,19 +39,40 @@ fn a_killed_uav_is_taken_over_and_observers_see_the_swarm() {
     assert_eq!(kill["left"], 0, "{kill:#}");
     assert!(kill["cells_held"].as_u64().unwrap() > 0, "{kill:#}");
     assert!(kill["detected_after_s"].as_f64().unwrap() > 0.0, "{kill:#}");
-    assert!(!kill["taken_over_by"].as_array().unwrap().is_empty(), "{kill:#}");
-    assert_eq!(verdict["coverage"]["covered"], verdict["coverage"]["coverable"]);
+    assert!(
+        !kill["taken_over_by"].as_array().unwrap().is_empty(),
+        "{kill:#}"
+    );
+    assert_eq!(
+        verdict["coverage"]["covered"],
+        verdict["coverage"]["coverable"]
+    );
     assert_eq!(verdict["finished"].as_array().unwrap().len(), 3);
     assert_eq!(place.processes(), Vec::<u32>::new());
 }
 
 /// `skein observe` hears every UAV, and explains itself when nobody is there.
 fn observe(place: &Place) {
-    let (code, said) = place.skein(&["observe", "live/v1/state/**", "--timeout", "3", "--format", "jsonl"]);
+    let (code, said) = place.skein(&[
+        "observe",
+        "live/v1/state/**",
+        "--timeout",
+        "3",
+        "--format",
+        "jsonl",
+    ]);
     assert_eq!(code, 0, "{said}");
-    let lines: Vec<Value> = said.lines().filter_map(|l| serde_json::from_str(l).ok()).collect();
+    let lines: Vec<Value> = said
+        .lines()
+        .filter_map(|l| serde_json::from_str(l).ok())
+        .collect();
     for id in 1..=4 {
-        assert!(lines.iter().any(|l| l["author"] == id && l["kind"] == "state"), "uav{id} is not seen: {said}");
+        assert!(
+            lines
+                .iter()
+                .any(|l| l["author"] == id && l["kind"] == "state"),
+            "uav{id} is not seen: {said}"
+        );
     }
     let (code, said) = place.skein(&["observe", "--endpoint", "tcp/127.0.0.1:9", "--timeout", "1"]);
     assert_eq!(code, 4);
@@ -62,7 +86,10 @@ fn observe_from_python(place: &Place) {
         return;
     };
     let said = place.observe_py(&python, "2");
-    assert!(said.contains("live/v1/state/") && said.contains("uav1 life"), "{said}");
+    assert!(
+        said.contains("live/v1/state/") && said.contains("uav1 life"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -89,15 +116,24 @@ fn a_partition_heals_and_restarts_bring_peers_back_in_two_trials_side_by_side() 
 
     let verdict = cut.verdict(DEADLINE);
     assert_eq!(verdict["passed"], true, "{verdict:#}");
-    assert!(verdict["splits"].as_u64().unwrap() >= 1 && verdict["merges"].as_u64().unwrap() >= 1, "{verdict:#}");
-    assert!(verdict["link_cuts"]["fault"].as_u64().unwrap() >= 6, "{verdict:#}");
+    assert!(
+        verdict["splits"].as_u64().unwrap() >= 1 && verdict["merges"].as_u64().unwrap() >= 1,
+        "{verdict:#}"
+    );
+    assert!(
+        verdict["link_cuts"]["fault"].as_u64().unwrap() >= 6,
+        "{verdict:#}"
+    );
 
     let verdict = restart.verdict(DEADLINE);
     assert_eq!(verdict["passed"], true, "{verdict:#}");
     for (row, fresh_disk) in [(0, false), (1, true)] {
         let r = &verdict["restarts"][row];
         assert_eq!(r["fresh_disk"], fresh_disk);
-        assert!(r["incarnation_after"].as_u64().unwrap() > r["incarnation_before"].as_u64().unwrap(), "{r:#}");
+        assert!(
+            r["incarnation_after"].as_u64().unwrap() > r["incarnation_before"].as_u64().unwrap(),
+            "{r:#}"
+        );
         assert!(r["productive_after_s"].as_f64().is_some(), "{r:#}");
     }
     assert_eq!(place.processes(), Vec::<u32>::new());
@@ -109,11 +145,17 @@ fn a_trial_that_is_killed_with_a_paused_peer_leaves_no_process() {
     let place = Place::new();
     let mut trial = Trial::start(&place, "killed", &[]);
     trial.wait_for_time(2.0, DEADLINE);
-    assert!(place.processes().len() >= 6, "a trial, a guard, five peers: {:?}", place.processes());
+    assert!(
+        place.processes().len() >= 6,
+        "a trial, a guard, five peers: {:?}",
+        place.processes()
+    );
     let (code, said) = place.skein(&["chaos", "pause", "1"]);
     assert_eq!(code, 0, "{said}");
     trial.kill();
-    support::wait_until(Duration::from_secs(10), "all processes are gone", || place.processes().is_empty());
+    support::wait_until(Duration::from_secs(10), "all processes are gone", || {
+        place.processes().is_empty()
+    });
     let (code, said) = place.skein(&["observe"]);
     assert_eq!(code, 4);
     assert!(said.contains("no trial is running"), "{said}");
@@ -140,7 +182,11 @@ fn wrong_configurations_are_named_with_their_place() {
     let port = format!("tcp/{}", taken.local_addr().unwrap());
     let cases = [
         ("lease_ms: 500", "lease: 500", "peer.json5:"),
-        ("tcp/127.0.0.1:0", "tcp/0.0.0.0:0", "nothing listens or connects beyond 127.0.0.1"),
+        (
+            "tcp/127.0.0.1:0",
+            "tcp/0.0.0.0:0",
+            "nothing listens or connects beyond 127.0.0.1",
+        ),
         ("tcp/127.0.0.1:0", &port, "in use"),
     ];
     for (right, wrong, message) in cases {
@@ -152,7 +198,10 @@ fn wrong_configurations_are_named_with_their_place() {
     let (code, said) = place.skein(&["peer", "--config", "/nowhere.json5"]);
     assert!(code == 3 && said.contains("/nowhere.json5"), "{said}");
     // A valid file whose world is not there: nobody to fly for.
-    let file = place.file("peer.json5", &example.replace("127.0.0.1:4000", "127.0.0.1:9"));
+    let file = place.file(
+        "peer.json5",
+        &example.replace("127.0.0.1:4000", "127.0.0.1:9"),
+    );
     let (code, said) = place.skein(&["peer", "--config", &file]);
     assert!(code == 4 && said.contains("cannot be reached"), "{said}");
 }

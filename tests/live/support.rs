@@ -35,19 +35,25 @@ pub struct Place {
 
 impl Place {
     pub fn new() -> Self {
-        Self { dir: tempfile::tempdir().unwrap() }
+        Self {
+            dir: tempfile::tempdir().unwrap(),
+        }
     }
 
     fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_skein"));
-        command.args(args).env("TMPDIR", self.dir.path()).stdin(Stdio::null());
+        command
+            .args(args)
+            .env("TMPDIR", self.dir.path())
+            .stdin(Stdio::null());
         command
     }
 
     /// Runs a verb to its end: exit code, stdout and stderr together.
     pub fn skein(&self, args: &[&str]) -> (i32, String) {
         let out = self.command(args).output().unwrap();
-        let text = String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
+        let text = String::from_utf8_lossy(&out.stdout).into_owned()
+            + &String::from_utf8_lossy(&out.stderr);
         (out.status.code().unwrap_or(-1), text)
     }
 
@@ -62,7 +68,9 @@ impl Place {
         let mark = format!("TMPDIR={}", self.dir.path().display());
         let mut pids = Vec::new();
         for entry in fs::read_dir("/proc").unwrap().flatten() {
-            let Ok(pid) = entry.file_name().to_string_lossy().parse::<u32>() else { continue };
+            let Ok(pid) = entry.file_name().to_string_lossy().parse::<u32>() else {
+                continue;
+            };
             let environment = fs::read(entry.path().join("environ")).unwrap_or_default();
             if environment.split(|b| *b == 0).any(|v| v == mark.as_bytes()) {
                 pids.push(pid);
@@ -73,7 +81,10 @@ impl Place {
 
     /// Runs the Python example on the only trial.
     pub fn observe_py(&self, python: &str, seconds: &str) -> String {
-        let shared = fs::read_dir(self.dir.path()).unwrap().flatten().find(|e| e.file_name() != "peer.json5");
+        let shared = fs::read_dir(self.dir.path())
+            .unwrap()
+            .flatten()
+            .find(|e| e.file_name() != "peer.json5");
         let entry = fs::read_dir(shared.unwrap().path())
             .unwrap()
             .flatten()
@@ -82,7 +93,11 @@ impl Place {
         let entry: Value = serde_json::from_slice(&fs::read(entry.path()).unwrap()).unwrap();
         let script = root().join("examples/observe.py");
         let endpoint = entry["observe"].as_str().unwrap();
-        let out = Command::new(python).arg(script).args([endpoint, seconds]).output().unwrap();
+        let out = Command::new(python)
+            .arg(script)
+            .args([endpoint, seconds])
+            .output()
+            .unwrap();
         String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr)
     }
 }
@@ -93,7 +108,10 @@ pub fn python() -> Option<String> {
         let out = Command::new(p).args(["-c", "import zenoh, cbor2"]).output();
         out.is_ok_and(|o| o.status.success())
     };
-    ["python3", "python"].iter().find(|p| works(p)).map(|p| (*p).to_owned())
+    ["python3", "python"]
+        .iter()
+        .find(|p| works(p))
+        .map(|p| (*p).to_owned())
 }
 
 /// A running `skein trial`.
@@ -109,10 +127,17 @@ impl Trial {
     /// Starts the small scenario under `name`, and waits until it has begun.
     pub fn start(place: &Place, name: &str, more: &[&str]) -> Self {
         let text = fs::read_to_string(root().join("tests/live/square.json5")).unwrap();
-        let file = place.file(&format!("{name}.json5"), &text.replace("name: \"square\"", &format!("name: \"{name}\"")));
+        let file = place.file(
+            &format!("{name}.json5"),
+            &text.replace("name: \"square\"", &format!("name: \"{name}\"")),
+        );
         let args = [&["trial", &file, "--format", "json"], more].concat();
-        let mut child =
-            place.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut child = place
+            .command(&args)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
         let lines = Arc::new(Mutex::new(Vec::new()));
         let stderr = child.stderr.take().unwrap();
         let said = Arc::clone(&lines);
@@ -122,8 +147,17 @@ impl Trial {
             }
         });
         let stdout = child.stdout.take();
-        let mut trial = Self { child, id: String::new(), lines, stdout, pids: Vec::new() };
-        let begun = |l: &String| l.strip_prefix("trial ").map(|r| r.split(' ').next().unwrap().to_owned());
+        let mut trial = Self {
+            child,
+            id: String::new(),
+            lines,
+            stdout,
+            pids: Vec::new(),
+        };
+        let begun = |l: &String| {
+            l.strip_prefix("trial ")
+                .map(|r| r.split(' ').next().unwrap().to_owned())
+        };
         wait_until(Duration::from_secs(30), "the trial begins", || {
             let found = trial.lines.lock().unwrap().iter().find_map(begun);
             trial.id = found.unwrap_or_default();
@@ -139,11 +173,20 @@ impl Trial {
     /// Waits until the flight has begun and, by the wall clock at the scenario's
     /// scale of at most 10, has gone on for `time_s`.
     pub fn wait_for_time(&mut self, time_s: f64, limit: Duration) {
-        let told = |l: &String| l.split_once(" s  ").and_then(|(t, _)| t.trim().parse::<f64>().ok());
+        let told = |l: &String| {
+            l.split_once(" s  ")
+                .and_then(|(t, _)| t.trim().parse::<f64>().ok())
+        };
         let deadline = Instant::now() + limit;
         let mut began = None;
         loop {
-            let newest = self.lines.lock().unwrap().iter().filter_map(told).fold(None, |m, t| Some(t.max(m.unwrap_or(t))));
+            let newest = self
+                .lines
+                .lock()
+                .unwrap()
+                .iter()
+                .filter_map(told)
+                .fold(None, |m, t| Some(t.max(m.unwrap_or(t))));
             if newest.is_some() && began.is_none() {
                 began = Some(Instant::now());
             }
@@ -151,8 +194,16 @@ impl Trial {
             if newest.is_some_and(|t| t.max(at_least) >= time_s) {
                 break;
             }
-            assert!(self.child.try_wait().unwrap().is_none(), "the trial has ended: {:#?}", self.lines.lock().unwrap());
-            assert!(Instant::now() < deadline, "not in time: {:#?}", self.lines.lock().unwrap());
+            assert!(
+                self.child.try_wait().unwrap().is_none(),
+                "the trial has ended: {:#?}",
+                self.lines.lock().unwrap()
+            );
+            assert!(
+                Instant::now() < deadline,
+                "not in time: {:#?}",
+                self.lines.lock().unwrap()
+            );
             std::thread::sleep(Duration::from_millis(20));
         }
         self.pids = children_of_group(self.child.id());
@@ -163,7 +214,10 @@ impl Trial {
         assert!(self.pids.len() >= 6, "{:?}", self.pids);
         for pid in &self.pids {
             for socket in sockets(*pid) {
-                assert!(socket.starts_with("0100007F:"), "process {pid} has a socket at {socket}");
+                assert!(
+                    socket.starts_with("0100007F:"),
+                    "process {pid} has a socket at {socket}"
+                );
             }
         }
     }
@@ -198,7 +252,13 @@ impl Trial {
 
     pub fn interrupt(&self) {
         let pid = self.child.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+        assert!(
+            Command::new("kill")
+                .args(["-INT", &pid])
+                .status()
+                .unwrap()
+                .success()
+        );
     }
 }
 
@@ -213,7 +273,9 @@ impl Drop for Trial {
 fn children_of_group(parent: u32) -> Vec<u32> {
     let mut pids = vec![parent];
     for entry in fs::read_dir("/proc").unwrap().flatten() {
-        let Ok(pid) = entry.file_name().to_string_lossy().parse::<u32>() else { continue };
+        let Ok(pid) = entry.file_name().to_string_lossy().parse::<u32>() else {
+            continue;
+        };
         let stat = fs::read_to_string(entry.path().join("stat")).unwrap_or_default();
         let after_name = stat.rsplit_once(") ").map_or("", |(_, rest)| rest);
         if after_name.split(' ').nth(1) == Some(&parent.to_string()) {
@@ -226,10 +288,17 @@ fn children_of_group(parent: u32) -> Vec<u32> {
 /// Local addresses of the internet sockets of a process, as the kernel writes them.
 fn sockets(pid: u32) -> Vec<String> {
     let mut inodes = Vec::new();
-    for fd in fs::read_dir(format!("/proc/{pid}/fd")).into_iter().flatten().flatten() {
+    for fd in fs::read_dir(format!("/proc/{pid}/fd"))
+        .into_iter()
+        .flatten()
+        .flatten()
+    {
         let link = fs::read_link(fd.path()).unwrap_or_default();
         let link = link.to_string_lossy();
-        if let Some(inode) = link.strip_prefix("socket:[").and_then(|l| l.strip_suffix(']')) {
+        if let Some(inode) = link
+            .strip_prefix("socket:[")
+            .and_then(|l| l.strip_suffix(']'))
+        {
             inodes.push(inode.to_owned());
         }
     }
@@ -238,7 +307,10 @@ fn sockets(pid: u32) -> Vec<String> {
         let text = fs::read_to_string(format!("/proc/{pid}/net/{table}")).unwrap_or_default();
         for line in text.lines().skip(1) {
             let fields: Vec<&str> = line.split_whitespace().collect();
-            if fields.get(9).is_some_and(|inode| inodes.iter().any(|i| i == inode)) {
+            if fields
+                .get(9)
+                .is_some_and(|inode| inodes.iter().any(|i| i == inode))
+            {
                 found.push(fields[1].to_owned());
             }
         }

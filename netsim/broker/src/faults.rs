@@ -113,7 +113,9 @@ impl Trial<'_> {
             return Ok(vec![format!("the ground station uav{peer} is gone")]);
         }
         if !computer_only {
-            self.arena.remove(peer, now_ms);
+            self.arena.remove(peer);
+        } else {
+            self.arena.set_computer(peer, false);
         }
         let cells = self.ledger.killed(now_ms, peer);
         let what = if computer_only {
@@ -205,7 +207,9 @@ impl Trial<'_> {
             self.ledger.killed(now_ms, peer);
         }
         if flies && !airborne {
-            self.arena.relaunch(peer, now_ms);
+            self.arena.relaunch(peer);
+        } else {
+            self.arena.set_computer(peer, true);
         }
         // Its last words must not be taken for the new life's.
         let member = self.known(peer)?;
@@ -251,7 +255,7 @@ impl Trial<'_> {
         for peer in named {
             self.known(peer)?;
         }
-        self.cuts.apply(fault);
+        self.arena.fault(fault);
         let text = match fault {
             Fault::Cut {
                 a,
@@ -283,10 +287,7 @@ impl Trial<'_> {
     /// its component, seconds: (k1, k1 + k2 + D + 2) periods.
     fn bounds_s(&self) -> (f64, f64) {
         let period_s = f64::from(self.spec.beacon_period_ms) / 1000.0;
-        // The diameter is below the size of the largest component; for an
-        // expectation told to a person its half is close enough.
-        let largest = self.components.iter().map(Vec::len).max().unwrap_or(1);
-        let d = (largest / 2).max(1) as f64;
+        let d = f64::from(self.arena.diameter(|id| self.on_air(id)));
         let (k1, k2) = (4.0 + d / 4.0, 4.0 + d / 2.0);
         (k1 * period_s, (k1 + k2 + d + 2.0) * period_s)
     }

@@ -60,12 +60,7 @@ impl Trial<'_> {
             splits: components.splits,
             merges: components.merges,
             most_components: components.most,
-            link_cuts: self
-                .ledger
-                .link_cuts
-                .iter()
-                .map(|(k, v)| ((*k).to_owned(), *v))
-                .collect(),
+            link_cuts: self.arena.link_cuts(),
             messages_lost: radio
                 .lost
                 .iter()

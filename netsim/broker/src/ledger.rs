@@ -72,8 +72,6 @@ pub struct Ledger {
     restarts: Vec<Restart>,
     /// Components of the true link graph.
     pub components: Components,
-    /// Links that went down, by reason.
-    pub link_cuts: BTreeMap<&'static str, u64>,
     /// What the radios of peers that have ended did.
     pub radio: RadioCounters,
     /// What people should look at.

@@ -8,10 +8,9 @@
 //! |---|---|
 //! | [`trial`] | launches, steps the world, ends, judges |
 //! | `faults` | carries out faults and says what should follow |
-//! | [`arena`] | the world, as a trial uses it |
+//! | [`arena`] | the world and its radio links, as a trial uses them |
 //! | [`stream`] | percepts and setpoints, one loopback stream a peer |
 //! | [`proxy`] | the transports between each two peers, which can go dark |
-//! | [`cuts`] | faults of links |
 //! | [`process`] | processes, and the guard that leaves none behind |
 //! | [`control`], [`registry`] | how other commands find a trial and talk to it |
 //! | [`ledger`], [`verdict`] | what was seen, and what it adds up to |
@@ -19,7 +18,6 @@
 
 pub mod arena;
 pub mod control;
-pub mod cuts;
 mod faults;
 mod judge;
 pub mod ledger;

@@ -2,7 +2,6 @@
 
 use crate::arena::Arena;
 use crate::control::{Answer, Asked, Control, Request};
-use crate::cuts::Cuts;
 use crate::ledger::{Ledger, secs};
 use crate::member::{Computer, LEASE_MS, Member, Surroundings};
 use crate::pacer::{Pacer, STEP_MS};
@@ -16,6 +15,7 @@ use skein_link::LinkState;
 use skein_link::frame::ToWorld;
 use skein_netsim::chaos::TimedFault;
 use skein_netsim::spec::Spec;
+use skein_netsim::world::{Fact, Loss};
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -111,9 +111,6 @@ pub enum TrialError {
         /// Its last words.
         why: String,
     },
-    /// The world refuses the scenario.
-    #[error("the scenario cannot be flown: {0}")]
-    World(String),
     /// The person at the keyboard had enough.
     #[error("interrupted; all peers are gone")]
     Interrupted,
@@ -166,7 +163,6 @@ pub(crate) struct Due {
 #[derive(Debug)]
 struct Pair {
     proxy: Proxy,
-    up: Option<bool>,
     down_since: Option<Instant>,
 }
 
@@ -174,7 +170,6 @@ pub(crate) struct Trial<'a> {
     pub(crate) spec: Spec,
     pub(crate) seed: u64,
     pub(crate) arena: Arena,
-    pub(crate) cuts: Cuts,
     pub(crate) members: BTreeMap<u16, Member>,
     pub(crate) ledger: Ledger,
     pub(crate) processes: Option<Processes>,
@@ -222,7 +217,7 @@ impl<'a> Trial<'a> {
         let control = Control::listen(token.clone())
             .await
             .map_err(io("the control port"))?;
-        let arena = Arena::new(&spec, seed).map_err(TrialError::World)?;
+        let arena = Arena::new(&spec, seed);
         let entry = Entry {
             id: id.clone(),
             pid: std::process::id(),
@@ -248,7 +243,6 @@ impl<'a> Trial<'a> {
             began: Instant::now(),
             flown: Duration::ZERO,
             processes: None,
-            cuts: Cuts::default(),
             now_ms: 0,
             components: Vec::new(),
             setpoint_delay_ms: 0,
@@ -440,7 +434,7 @@ impl<'a> Trial<'a> {
                         self.note(text);
                     }
                 }
-                self.arena.apply(id, setpoint, self.now_ms);
+                self.arena.apply(id, setpoint);
             }
             ToWorld::Report(bytes) => match cbor4ii::serde::from_slice(&bytes) {
                 Ok(report) => {
@@ -473,8 +467,10 @@ impl<'a> Trial<'a> {
     /// One step of the world.
     fn step(&mut self) {
         self.now_ms += STEP_MS;
-        self.arena.advance(self.now_ms);
-        self.update_pairs();
+        for fact in self.arena.advance(self.now_ms) {
+            self.fact(&fact);
+        }
+        self.follow_links();
         let percepts_due = self
             .now_ms
             .is_multiple_of(u64::from(self.spec.percept_period_ms).max(STEP_MS));
@@ -507,46 +503,21 @@ impl<'a> Trial<'a> {
         }
     }
 
-    fn link(&self, tx: u16, rx: u16) -> LinkState {
-        self.cuts.on(tx, rx, self.arena.link(tx, rx))
-    }
-
     /// The links into `rx`.
     fn row(&self, rx: u16, ids: &[u16]) -> Vec<(u16, LinkState)> {
         let on_air = |id: &u16| self.members.get(id).is_some_and(Member::on_air);
         ids.iter()
             .filter(|tx| **tx != rx && on_air(tx))
-            .map(|tx| (*tx, self.link(*tx, rx)))
+            .map(|tx| (*tx, self.arena.link(*tx, rx)))
             .collect()
     }
 
-    /// Follows the true links: counts what goes down and why, darkens the proxies of
-    /// what stays down, and finds the components.
-    fn update_pairs(&mut self) {
+    /// Follows the true links: darkens the proxies of what stays down, and finds the
+    /// components.
+    fn follow_links(&mut self) {
         let now = Instant::now();
-        let mut joined = Vec::new();
-        let mut pairs = std::mem::take(&mut self.pairs);
-        for ((low, high), pair) in &mut pairs {
-            let (there, back) = (self.link(*low, *high), self.link(*high, *low));
-            let on_air = [low, high]
-                .iter()
-                .all(|id| self.members.get(id).is_some_and(Member::on_air));
-            if on_air {
-                let up = there.is_up() && back.is_up();
-                if up {
-                    joined.push((*low, *high));
-                }
-                if pair.up == Some(true) && !up {
-                    *self
-                        .ledger
-                        .link_cuts
-                        .entry(why_down(&there, &back))
-                        .or_default() += 1;
-                }
-                pair.up = Some(up);
-            } else {
-                pair.up = None;
-            }
+        for ((low, high), pair) in &mut self.pairs {
+            let (there, back) = (self.arena.link(*low, *high), self.arena.link(*high, *low));
             // One way up keeps the transport, which can only carry both.
             if there.is_up() || back.is_up() {
                 pair.down_since = None;
@@ -556,18 +527,42 @@ impl<'a> Trial<'a> {
                 pair.proxy.set_dark(now.duration_since(since) > DARK_AFTER);
             }
         }
-        self.pairs = pairs;
-        let on_air = self
-            .members
-            .values()
-            .filter(|m| m.on_air())
-            .map(|m| m.id)
-            .collect();
-        self.components = components(on_air, &joined);
-        if self.now_ms > u64::from(self.spec.beacon_period_ms) {
-            if let Some(text) = self.ledger.components(self.now_ms, &self.components) {
-                self.note(text);
+        self.components = self.arena.components(|id| self.on_air(id));
+        if let Some(text) = self.ledger.components(self.now_ms, &self.components) {
+            self.note(text);
+        }
+    }
+
+    /// Whether the radio of a peer works.
+    pub(crate) fn on_air(&self, id: u16) -> bool {
+        self.members.get(&id).is_some_and(Member::on_air)
+    }
+
+    /// What truly happened in the world.
+    fn fact(&mut self, fact: &Fact) {
+        match fact {
+            Fact::ZoneEntry { uav, zone, .. } => {
+                self.note(format!("uav{uav} entered no-fly zone {zone}"))
             }
+            Fact::Lost { uav, cause, .. } if *cause != Loss::Killed => {
+                let text = format!("uav{uav} is lost: {cause:?}");
+                self.ledger.failures.push(text.clone());
+                self.note(text);
+                self.ledger.killed(self.now_ms, *uav);
+                if let Some(member) = self.members.get_mut(uav) {
+                    member.airborne = false;
+                    member.computer = Computer::Off;
+                    if let Some(process) = &mut member.process {
+                        process.signal(Signal::SIGKILL);
+                    }
+                }
+            }
+            Fact::Failsafe { uav, on: true, .. } if self.on_air(*uav) => {
+                self.note(format!(
+                    "uav{uav} got no setpoint for too long and loiters by itself"
+                ));
+            }
+            Fact::Seen { .. } | Fact::TooClose(_) | Fact::Lost { .. } | Fact::Failsafe { .. } => {}
         }
     }
 
@@ -704,34 +699,6 @@ async fn bind_pairs(
     Ok(pairs)
 }
 
-fn why_down(there: &LinkState, back: &LinkState) -> &'static str {
-    if there.cut || back.cut {
-        "fault"
-    } else if !there.in_range || !back.in_range {
-        "range"
-    } else {
-        "sight"
-    }
-}
-
-/// The components of a graph, each ascending, in the order of their least members.
-fn components(ids: Vec<u16>, joined: &[(u16, u16)]) -> Vec<Vec<u16>> {
-    let mut label: BTreeMap<u16, u16> = ids.into_iter().map(|id| (id, id)).collect();
-    for (a, b) in joined {
-        let (Some(la), Some(lb)) = (label.get(a).copied(), label.get(b).copied()) else {
-            continue;
-        };
-        for l in label.values_mut().filter(|l| **l == la.max(lb)) {
-            *l = la.min(lb);
-        }
-    }
-    let mut parts: BTreeMap<u16, Vec<u16>> = BTreeMap::new();
-    for (id, l) in label {
-        parts.entry(l).or_default().push(id);
-    }
-    parts.into_values().collect()
-}
-
 /// A word that nobody guesses: only this user can read the files it stands in.
 fn token() -> String {
     use std::hash::{BuildHasher, RandomState};
@@ -739,15 +706,4 @@ fn token() -> String {
     (0..2)
         .map(|n| format!("{:016x}", RandomState::new().hash_one(n)))
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn components_are_what_paths_join() {
-        let parts = components(vec![1, 2, 3, 4, 5], &[(4, 5), (2, 4), (1, 3)]);
-        assert_eq!(parts, [vec![1, 3], vec![2, 4, 5]]);
-    }
 }

@@ -81,8 +81,21 @@ pub struct CoverageVerdict {
     pub needed_share: f64,
     /// Why the other cells cannot be seen.
     pub uncoverable: BTreeMap<String, usize>,
-    /// Where the other cells are, metres east and north of the origin.
-    pub uncoverable_at: Vec<(f64, f64)>,
+    /// Which cells, by column and row of the lane grid.
+    pub uncoverable_cells: Vec<Uncovered>,
+    /// Coverable cells that were not seen, by column and row.
+    pub missed: Vec<(i32, i32)>,
+}
+
+/// A cell that cannot be seen.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Uncovered {
+    /// Column of the lane grid.
+    pub col: i32,
+    /// Row of the lane grid.
+    pub row: i32,
+    /// Why.
+    pub reason: String,
 }
 
 /// What became of the work of a peer that was killed.
