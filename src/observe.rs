@@ -4,7 +4,9 @@ use crate::{cli, exit};
 use clap::{Args, ValueEnum};
 use skein_broker::registry;
 use skein_node::bus::{Observed, Observer};
-use skein_peer::wire::message::Record;
+use skein_peer::wire::codec::{Body, open};
+use skein_peer::wire::message::{Listing, Record};
+use skein_peer::wire::signature::Off;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::process::ExitCode;
@@ -105,13 +107,9 @@ async fn watch(args: &ObserveArgs, endpoint: &str) -> anyhow::Result<ExitCode> {
             seen = observer.next() => {
                 let Some(seen) = seen else { break };
                 heard += 1;
-                if newest.is_new(&seen) {
-                    shown += 1;
-                    if show(args.format, &seen).is_err() {
-                        // Whoever read this has closed the pipe.
-                        break;
-                    }
-                }
+                // On an error, whoever read this has closed the pipe.
+                let Ok(new) = show(args.format, &mut newest, &seen) else { break };
+                shown += u64::from(new);
             }
         }
     }
@@ -129,51 +127,140 @@ async fn watch(args: &ObserveArgs, endpoint: &str) -> anyhow::Result<ExitCode> {
 struct Newest(BTreeMap<String, (u32, u32)>);
 
 impl Newest {
-    fn is_new(&mut self, seen: &Observed) -> bool {
-        let Some(record) = record(&seen.bytes) else {
-            return true;
-        };
+    fn is_new(&mut self, key: &str, record: &Record) -> bool {
         let version = (record.incarnation, record.seq);
-        match self.0.get(&seen.key) {
+        match self.0.get(key) {
             Some(newest) if *newest >= version => false,
             _ => {
-                self.0.insert(seen.key.clone(), version);
+                self.0.insert(key.to_owned(), version);
                 true
             }
         }
     }
 }
 
-fn record(bytes: &[u8]) -> Option<Record> {
-    cbor4ii::serde::from_slice(bytes).ok()
+/// Shows a record unless it was shown before; tells whether it did.
+fn show(format: Format, newest: &mut Newest, seen: &Observed) -> std::io::Result<bool> {
+    let mut out = std::io::stdout().lock();
+    let (record, body) = match open(&seen.bytes, &Off) {
+        Ok(opened) => opened,
+        Err(error) => {
+            match format {
+                Format::Text => writeln!(out, "{}  refused: {error}", seen.key)?,
+                Format::Jsonl => {
+                    writeln!(
+                        out,
+                        "{}",
+                        serde_json::json!({ "key": seen.key, "refused": error.to_string() })
+                    )?;
+                }
+            }
+            return Ok(true);
+        }
+    };
+    if !newest.is_new(&seen.key, &record) {
+        return Ok(false);
+    }
+    match format {
+        Format::Text => {
+            let (author, life, seq) = (record.author, record.incarnation, record.seq);
+            writeln!(
+                out,
+                "{}  uav{author} life {life} #{seq}  {}",
+                seen.key,
+                words(&body)
+            )?;
+        }
+        Format::Jsonl => writeln!(out, "{}", json(seen, &record, &body))?,
+    }
+    Ok(true)
 }
 
-fn show(format: Format, seen: &Observed) -> std::io::Result<()> {
-    let record = record(&seen.bytes);
-    let body = record.as_ref().map_or_else(
-        || "unreadable".to_owned(),
-        |r| format!("{} bytes", r.body.len()),
-    );
-    let mut out = std::io::stdout().lock();
-    match format {
-        Format::Text => match &record {
-            Some(r) => writeln!(
-                out,
-                "{}  uav{} life {} #{}  {body}",
-                seen.key, r.author, r.incarnation, r.seq
-            ),
-            None => writeln!(out, "{}  {body}", seen.key),
-        },
-        Format::Jsonl => {
-            let json = serde_json::json!({
-                "key": seen.key,
-                "author": record.as_ref().map(|r| r.author),
-                "incarnation": record.as_ref().map(|r| r.incarnation),
-                "seq": record.as_ref().map(|r| r.seq),
-                "hops": seen.hop.map(|h| h.hops),
-                "body": body,
-            });
-            writeln!(out, "{json}")
-        }
+fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
+    let value = match body {
+        Body::Beacon(b) => serde_json::to_value(b),
+        Body::State(b) => serde_json::to_value(b),
+        Body::Round(b) => serde_json::to_value(b),
+        Body::Claim(b) => serde_json::to_value(b),
+        Body::Cover(b) => serde_json::to_value(b),
+        Body::Mission(b) => serde_json::to_value(b),
+        Body::Operator(b) => serde_json::to_value(b),
+        Body::Finished(b) => serde_json::to_value(b),
+        Body::Event(b) => serde_json::to_value(b),
+    };
+    serde_json::json!({
+        "key": seen.key,
+        "kind": body.kind().name(),
+        "author": record.author,
+        "incarnation": record.incarnation,
+        "seq": record.seq,
+        "transmitter": seen.hop.map(|h| h.transmitter),
+        "hops": seen.hop.map(|h| h.hops),
+        "body": value.unwrap_or_default(),
+    })
+}
+
+/// A record in words.
+fn words(body: &Body) -> String {
+    let metres = |mm: i32| f64::from(mm) / 1000.0;
+    match body {
+        Body::Beacon(b) => format!(
+            "at ({:.0}, {:.0}) m, heartbeat {}, knows {} others{}",
+            metres(b.east_mm),
+            metres(b.north_mm),
+            b.heartbeat,
+            b.gossip.len(),
+            if b.finished { ", finished" } else { "" }
+        ),
+        Body::State(s) => format!(
+            "{:?} at ({:.0}, {:.0}, {:.0}) m, {:.1} m/s, {} s of fuel, mission {:?}, {} of {} cells",
+            s.behaviour,
+            metres(s.east_mm),
+            metres(s.north_mm),
+            metres(s.height_mm),
+            f64::from(s.airspeed_mmps) / 1000.0,
+            s.endurance_s,
+            s.mission,
+            s.covered,
+            s.cells
+        ),
+        Body::Round(s) => format!(
+            "bids in round {} of {}, from cell {}",
+            s.round.counter,
+            s.round
+                .members
+                .iter()
+                .map(|m| format!("uav{}", m.id))
+                .collect::<Vec<_>>()
+                .join(" "),
+            s.anchor
+        ),
+        Body::Claim(r) => format!(
+            "round {}: flies {}; answers for {}; done in {:.0} s",
+            r.epoch.counter,
+            listings(&r.plan),
+            listings(&r.held),
+            f64::from(r.eta_ms) / 1000.0
+        ),
+        Body::Cover(c) => format!(
+            "coverage of revision {}, {} bytes",
+            c.revision,
+            c.union.len()
+        ),
+        Body::Mission(m) => format!("mission revision {} of {} pieces", m.revision, m.chunks),
+        Body::Operator(order) => format!("{order:?}"),
+        Body::Finished(f) => format!("revision {} is finished", f.revision),
+        Body::Event(e) => e.text.clone(),
     }
+}
+
+fn listings(all: &[Listing]) -> String {
+    if all.is_empty() {
+        return "nothing".to_owned();
+    }
+    let one = |l: &Listing| {
+        let way = if l.backward { "<" } else { ">" };
+        format!("{}+{}{way}{:?}", l.run.first, l.run.count, l.firmness)
+    };
+    all.iter().map(one).collect::<Vec<_>>().join(" ")
 }

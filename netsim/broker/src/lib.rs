@@ -6,7 +6,10 @@
 //!
 //! | module | what it does |
 //! |---|---|
-//! | [`trial`] | launches, steps the world, ends, judges |
+//! | [`trial`] | prepares, steps the world, ends |
+//! | `lifecycle` | starts and ends the peers |
+//! | `ear` | takes in what peers say |
+//! | `judge` | draws the verdict |
 //! | `faults` | carries out faults and says what should follow |
 //! | [`arena`] | the world and its radio links, as a trial uses them |
 //! | [`stream`] | percepts and setpoints, one loopback stream a peer |
@@ -18,9 +21,11 @@
 
 pub mod arena;
 pub mod control;
+mod ear;
 mod faults;
 mod judge;
 pub mod ledger;
+mod lifecycle;
 pub mod member;
 pub mod pacer;
 pub mod process;

@@ -3,31 +3,22 @@
 use crate::arena::Arena;
 use crate::control::{Answer, Asked, Control, Request};
 use crate::ledger::{Ledger, secs};
-use crate::member::{Computer, LEASE_MS, Member, Surroundings};
+use crate::member::{Computer, LEASE_MS, Member};
 use crate::pacer::{Pacer, STEP_MS};
 use crate::process::Processes;
 use crate::proxy::Proxy;
 use crate::registry::{Entry, Registered, RegistryError, private_dir, private_file, shared_dir};
-use crate::stream::{Heard, Line, Streams};
+use crate::stream::Streams;
 use crate::verdict::Verdict;
 use nix::sys::signal::Signal;
 use skein_link::LinkState;
-use skein_link::frame::ToWorld;
 use skein_netsim::chaos::TimedFault;
 use skein_netsim::spec::Spec;
 use skein_netsim::world::{Fact, Loss};
 use std::collections::BTreeMap;
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 use tokio::time::Instant;
-
-/// How long all peers together may take to say hello: debug builds, two cores, 64 of
-/// them.
-const LAUNCH_TIMEOUT: Duration = Duration::from_secs(60);
-
-/// How long peers may take to say goodbye.
-const GOODBYE_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// A link that has been down this long goes dark for the transports too: two leases,
 /// so that a transport that loses a neighbour truly lost it.
@@ -116,7 +107,7 @@ pub enum TrialError {
     Interrupted,
 }
 
-fn io(what: impl Into<String>) -> impl FnOnce(std::io::Error) -> TrialError {
+pub(crate) fn io(what: impl Into<String>) -> impl FnOnce(std::io::Error) -> TrialError {
     let what = what.into();
     move |cause| TrialError::Io { what, cause }
 }
@@ -161,8 +152,8 @@ pub(crate) struct Due {
 
 /// The proxy of a pair and the state of its link.
 #[derive(Debug)]
-struct Pair {
-    proxy: Proxy,
+pub(crate) struct Pair {
+    pub(crate) proxy: Proxy,
     down_since: Option<Instant>,
 }
 
@@ -179,13 +170,13 @@ pub(crate) struct Trial<'a> {
     pub(crate) began: Instant,
     pub(crate) flown: Duration,
     pub(crate) setpoint_delay_ms: u64,
-    pairs: BTreeMap<(u16, u16), Pair>,
-    streams: Streams,
-    control: Control,
-    registered: Registered,
-    run_dir: PathBuf,
+    pub(crate) pairs: BTreeMap<(u16, u16), Pair>,
+    pub(crate) streams: Streams,
+    pub(crate) control: Control,
+    pub(crate) registered: Registered,
+    pub(crate) run_dir: PathBuf,
     pub(crate) faults: Vec<Due>,
-    progress_due_ms: u64,
+    pub(crate) progress_due_ms: u64,
     tell: &'a mut (dyn FnMut(Event) + Send),
 }
 
@@ -273,38 +264,6 @@ impl<'a> Trial<'a> {
         Ok(trial)
     }
 
-    fn write_configs(&self, token: &str) -> Result<(), TrialError> {
-        let mission =
-            serde_json::to_vec(&*self.spec.mission).map_err(|e| io("mission.json")(e.into()))?;
-        private_file(&self.run_dir.join("mission.json"), &mission)?;
-        let around = |id: u16| Surroundings {
-            spec: &self.spec,
-            seed: self.seed,
-            world: self.streams.address(),
-            token,
-            links: self
-                .pairs
-                .iter()
-                .filter(|((low, _), _)| *low == id)
-                .map(|(_, p)| p.proxy.address())
-                .collect(),
-        };
-        let uavs = self.spec.uavs.iter().map(|u| (u.id, around(u.id).uav(u)));
-        let ground = self
-            .spec
-            .ground
-            .iter()
-            .map(|g| (g.id, around(g.id).ground(g)));
-        for (id, config) in uavs.chain(ground) {
-            let json =
-                serde_json::to_vec_pretty(&config).map_err(|e| io("a configuration")(e.into()))?;
-            if let Some(member) = self.members.get(&id) {
-                private_file(member.config(), &json)?;
-            }
-        }
-        Ok(())
-    }
-
     /// Launches everybody, and runs the world until the mission is over.
     async fn fly(&mut self) -> Result<(), TrialError> {
         self.launch().await?;
@@ -327,140 +286,6 @@ impl<'a> Trial<'a> {
                     }
                 }
             }
-        }
-    }
-
-    async fn launch(&mut self) -> Result<(), TrialError> {
-        let Some(processes) = &self.processes else {
-            return Ok(());
-        };
-        for member in self.members.values_mut() {
-            let started = member.start(processes);
-            started.map_err(|e| TrialError::Launch {
-                peer: member.id,
-                why: e.to_string(),
-            })?;
-        }
-        let deadline = Instant::now() + LAUNCH_TIMEOUT;
-        while let Some(waiting) = self.members.values_mut().find(|m| m.line.is_none()) {
-            let peer = waiting.id;
-            if !waiting
-                .process
-                .as_mut()
-                .is_some_and(super::process::Process::is_there)
-            {
-                return Err(TrialError::Launch {
-                    peer,
-                    why: waiting.last_words(),
-                });
-            }
-            if Instant::now() > deadline {
-                let why = format!(
-                    "no hello within {} s; {}",
-                    LAUNCH_TIMEOUT.as_secs(),
-                    waiting.last_words()
-                );
-                return Err(TrialError::Launch { peer, why });
-            }
-            // The wait is short, so that a process that ended is noticed.
-            let heard = tokio::time::timeout(Duration::from_millis(100), self.streams.next()).await;
-            if let Ok(Some(heard)) = heard {
-                self.hear(heard);
-            }
-        }
-        Ok(())
-    }
-
-    /// Takes what a peer said.
-    fn hear(&mut self, heard: Heard) {
-        match heard {
-            Heard::Hello {
-                id,
-                pid,
-                locator,
-                line,
-            } => self.hello(id, pid, locator, line),
-            Heard::Frame { id, pid, frame } => self.frame(id, pid, frame),
-            Heard::Gone { id, pid } => self.gone(id, pid),
-        }
-    }
-
-    fn hello(&mut self, id: u16, pid: u32, locator: String, line: Line) {
-        let address: Option<SocketAddr> = locator.strip_prefix("tcp/").and_then(|a| a.parse().ok());
-        let Some(member) = self.members.get_mut(&id).filter(|m| m.pid() == Some(pid)) else {
-            return;
-        };
-        let Some(address) = address.filter(|a| a.ip().is_loopback()) else {
-            self.ledger
-                .failures
-                .push(format!("uav{id} listens at {locator}, beyond this machine"));
-            return;
-        };
-        line.welcome(self.seed, self.now_ms, self.pacer.scale());
-        member.line = Some(line);
-        member.locator = Some(locator.clone());
-        for ((_, high), pair) in &self.pairs {
-            if *high == id {
-                pair.proxy.lead_to(address);
-            }
-        }
-        let observed = self
-            .spec
-            .ground
-            .as_ref()
-            .map(|g| g.id)
-            .or_else(|| self.spec.uavs.first().map(|u| u.id));
-        if observed == Some(id)
-            && let Err(cause) = self.registered.observe_at(locator)
-        {
-            tracing::warn!(%cause, "observers will not find this trial");
-        }
-    }
-
-    fn frame(&mut self, id: u16, pid: u32, frame: ToWorld) {
-        let Some(member) = self.members.get_mut(&id).filter(|m| m.pid() == Some(pid)) else {
-            return;
-        };
-        match frame {
-            ToWorld::Setpoint(setpoint) => {
-                let delay_ms = self.now_ms.saturating_sub(setpoint.from_ms);
-                if member.computer == Computer::Runs {
-                    self.setpoint_delay_ms = self.setpoint_delay_ms.max(delay_ms);
-                    if self.pacer.answered(delay_ms) {
-                        let text = format!(
-                            "peers answer late; time runs at x{:.1} from now on",
-                            self.pacer.scale()
-                        );
-                        self.note(text);
-                    }
-                }
-                self.arena.apply(id, setpoint);
-            }
-            ToWorld::Report(bytes) => match cbor4ii::serde::from_slice(&bytes) {
-                Ok(report) => {
-                    if let Some(line) = self.ledger.report(self.now_ms, id, report) {
-                        self.note(line);
-                    }
-                }
-                Err(cause) => tracing::warn!(id, %cause, "a report cannot be read"),
-            },
-            ToWorld::Radio(counters) => member.radio = counters,
-            ToWorld::Bye => member.left = true,
-            ToWorld::Hello { .. } => {}
-        }
-    }
-
-    fn gone(&mut self, id: u16, pid: u32) {
-        let Some(member) = self.members.get_mut(&id).filter(|m| m.pid() == Some(pid)) else {
-            return;
-        };
-        self.ledger.add_radio(&std::mem::take(&mut member.radio));
-        member.line = None;
-        if member.computer == Computer::Runs && !member.left {
-            member.computer = Computer::Crashed;
-            let text = format!("uav{id} ended by itself: {}", member.last_words());
-            self.ledger.failures.push(text.clone());
-            self.note(text);
         }
     }
 
@@ -610,75 +435,6 @@ impl<'a> Trial<'a> {
         // Who asked may have gone away.
         let _ = asked.answer.send(answer);
     }
-
-    fn order(&mut self, name: crate::control::OrderName) -> Answer {
-        let ground = self
-            .spec
-            .ground
-            .as_ref()
-            .and_then(|g| self.members.get(&g.id));
-        let line = ground
-            .and_then(|m| m.line.as_ref())
-            .ok_or("there is no ground station to speak it")?;
-        line.order(name.into());
-        Ok(vec![format!("the ground station says {name:?} to all")])
-    }
-
-    /// Tells everybody to leave, and ends who does not.
-    async fn end(&mut self) {
-        for member in self.members.values_mut() {
-            if let (Computer::Paused, Some(process)) = (member.computer, &mut member.process) {
-                process.signal(Signal::SIGCONT);
-            }
-            match (&member.line, &mut member.process) {
-                (Some(line), _) => line.end(),
-                (None, Some(process)) => process.signal(Signal::SIGTERM),
-                (None, None) => {}
-            }
-        }
-        let deadline = Instant::now() + GOODBYE_TIMEOUT;
-        while self.members.values().any(|m| m.line.is_some()) {
-            match tokio::time::timeout_at(deadline, self.streams.next()).await {
-                Ok(Some(
-                    heard @ (Heard::Frame {
-                        frame: ToWorld::Radio(_) | ToWorld::Bye,
-                        ..
-                    }
-                    | Heard::Gone { .. }),
-                )) => {
-                    self.part(heard);
-                }
-                Ok(Some(_)) => {}
-                Ok(None) | Err(_) => break,
-            }
-        }
-        for member in self.members.values_mut() {
-            self.ledger.add_radio(&std::mem::take(&mut member.radio));
-            if let Some(process) = &mut member.process {
-                process.wait_or_kill().await;
-            }
-        }
-    }
-
-    /// Takes last words; whoever leaves now leaves because it was told to.
-    fn part(&mut self, heard: Heard) {
-        if let Heard::Gone { id, .. } = &heard
-            && let Some(member) = self.members.get_mut(id)
-        {
-            member.left = true;
-        }
-        self.hear(heard);
-    }
-
-    /// Ends the guard and removes what is not worth keeping.
-    async fn close(self, keep: bool) {
-        if let Some(processes) = self.processes {
-            processes.end().await;
-        }
-        if !keep {
-            let _ = std::fs::remove_dir_all(&self.run_dir);
-        }
-    }
 }
 
 /// A proxy for each pair of peers.
@@ -690,7 +446,6 @@ async fn bind_pairs(
         for high in members.keys().filter(|high| *high > low) {
             let pair = Pair {
                 proxy: Proxy::bind().await?,
-                up: None,
                 down_since: None,
             };
             pairs.insert((*low, *high), pair);

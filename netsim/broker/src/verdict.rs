@@ -84,16 +84,16 @@ pub struct CoverageVerdict {
     /// Which cells, by column and row of the lane grid.
     pub uncoverable_cells: Vec<Uncovered>,
     /// Coverable cells that were not seen, by column and row.
-    pub missed: Vec<(i32, i32)>,
+    pub missed: Vec<(i16, i16)>,
 }
 
 /// A cell that cannot be seen.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Uncovered {
     /// Column of the lane grid.
-    pub col: i32,
+    pub col: i16,
     /// Row of the lane grid.
-    pub row: i32,
+    pub row: i16,
     /// Why.
     pub reason: String,
 }
