@@ -4,6 +4,7 @@
 //! Each test has a deadline. Trials run one after the other, because each wants the
 //! whole machine; where two are to run side by side, one test starts both.
 
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod support;
 
 use serde_json::Value;
