@@ -21,6 +21,9 @@ pub const GUARD_COMMAND: &str = "__guard";
 /// have better uses for 64 threads. Measured: no loss, lower latency.
 const ZENOH_RUNTIME: &str = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app),app:(worker_threads:1))";
 
+/// What peers write to their logs: their reports, and what others complain about.
+const PEER_LOG: &str = "warn,skein_node=info";
+
 /// How long a peer may take to leave by itself before it is killed.
 const LEAVE_TIMEOUT: Duration = Duration::from_secs(2);
 
@@ -73,7 +76,7 @@ impl Processes {
     pub fn launch(&self, config: &Path, log: &Path) -> std::io::Result<Process> {
         let log = File::options().create(true).append(true).open(log)?;
         let child = Command::new(&self.program)
-            .arg("peer")
+            .args(["--log", PEER_LOG, "peer"])
             .arg("--config")
             .arg(config)
             .env("ZENOH_RUNTIME", ZENOH_RUNTIME)
