@@ -462,8 +462,7 @@ fn leg_times_grow_with_the_legs() {
     assert!((12_000..17_000).contains(&story.executive.turn_ms()));
 }
 
-/// A step where nothing has to be planned is cheap: no step of a steady flight may
-/// ask the router, which a poisoned one would show, and wall time is for callgrind.
+/// The track is lengthened cell by cell and never made anew while all goes well.
 #[test]
 fn a_steady_flight_plans_nothing() {
     let mut story = Story::new(10, 8, vec![square(100.0, 900.0, 50.0)], outside());
