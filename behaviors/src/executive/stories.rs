@@ -380,7 +380,7 @@ fn forecasts_come_true() {
         // The forecast was made 200 ms ago, at the last percept.
         for _ in 0..f.release_ms.saturating_sub(200) / 10 {
             later.wing.fly(10);
-            if later.wing.time_ms % 200 == 0 {
+            if later.wing.time_ms.is_multiple_of(200) {
                 later.step(0);
             }
         }

@@ -7,7 +7,7 @@
 //! Height belongs to the UAV's slot and is passed through.
 //!
 //! # Complexity
-//! Zones near the UAV are gathered once every [`GATHER_M`] flown; a setpoint is then
+//! Zones near the UAV are gathered once every 60 m flown; a setpoint is then
 //! checked against those alone, and for nothing where there are none.
 
 use super::follow::HORIZON_S;
@@ -120,7 +120,7 @@ impl Envelope {
         }]
     }
 
-    /// Gathers the zones that matter until the UAV has flown [`GATHER_M`].
+    /// Gathers the zones that matter until the UAV has flown `GATHER_M`.
     fn gather(&mut self, at: Point) {
         if self.gathered_at.is_some_and(|p| (p - at).norm() < GATHER_M) {
             return;

@@ -1,0 +1,185 @@
+//! What stays of a flight when its goal changes (D2.7 §1.2.3, executive layer).
+//!
+//! New legs that go on where the UAV is must not disturb the flight; others are taken
+//! up at the next percept, or at the end of the cell where that is no detour.
+
+use super::chart::{Hop, Place};
+use super::{Aim, Executive, Goal, Kind, Stretch};
+use skein_planning::coverage::area::backtracking::Leg;
+use std::collections::VecDeque;
+
+impl Executive {
+    /// Replaces the goal. Legs already under way go on where they are if the new
+    /// legs begin with the cell being flown in the same direction.
+    ///
+    /// `is_open` tells which cells of the loop still need service: cells that do
+    /// not are passed, or flown round by a direct route where that is shorter.
+    pub fn set_goal(&mut self, goal: Goal, is_open: &dyn Fn(u16) -> bool) {
+        let mut begins_with = None;
+        let (aim, kept, queue) = match goal {
+            Goal::Legs(legs) => {
+                let hops = self.hops(&legs);
+                begins_with = hops.iter().find(|h| is_open(h.cell)).copied();
+                let (kept, queue) = self.continued(hops, is_open);
+                (Aim::Legs, kept, queue)
+            }
+            Goal::Hold => (
+                Aim::Hold,
+                self.loitering(self.aim == Aim::Hold),
+                VecDeque::new(),
+            ),
+            Goal::Point(p) => {
+                let same = self.aim == Aim::Point(p) && !self.replan;
+                (
+                    Aim::Point(p),
+                    if same { self.stretches.len() } else { 0 },
+                    VecDeque::new(),
+                )
+            }
+        };
+        self.told = self.told && aim == self.aim && aim != Aim::Legs;
+        self.aim = aim;
+        self.replan = self.replan || kept == 0;
+        if kept > 0 {
+            self.keep(kept);
+            self.serve_first(begins_with);
+            self.queue = queue;
+            self.lengthen_now(is_open);
+        } else {
+            // What is on the track is no longer wanted; it is flown until the next step.
+            for s in &mut self.stretches {
+                if let Kind::Serve(h) = s.kind {
+                    s.kind = Kind::Pass(h.cell, h.direction);
+                }
+            }
+            self.queue = queue;
+        }
+    }
+
+    /// A track that was cut off goes on before the next percept, by which the UAV may
+    /// have flown past its end.
+    fn lengthen_now(&mut self, is_open: &dyn Fn(u16) -> bool) {
+        let Some(end) = self.stretches.back().map(|s| s.end) else {
+            return;
+        };
+        let mut events = std::mem::take(&mut self.pending);
+        self.lengthen(end, is_open, &mut events);
+        self.pending = events;
+    }
+
+    /// A cell that was only passed is to be served from now on.
+    fn serve_first(&mut self, begins_with: Option<Hop>) {
+        if let (Some(front), Some(hop)) = (self.stretches.front_mut(), begins_with)
+            && front.kind == Kind::Pass(hop.cell, hop.direction)
+        {
+            front.kind = Kind::Serve(hop);
+        }
+    }
+
+    /// All stretches if they are a loiter and may stay, else none.
+    fn loitering(&self, may_stay: bool) -> usize {
+        let is = matches!(
+            self.stretches.front().map(|s| s.kind),
+            Some(Kind::Loiter(_))
+        );
+        if is && may_stay && !self.replan {
+            self.stretches.len()
+        } else {
+            0
+        }
+    }
+
+    /// The cells of legs, in order of flight.
+    pub(super) fn hops(&self, legs: &[Leg]) -> VecDeque<Hop> {
+        let n = self.chart.coverage_loop.len();
+        legs.iter()
+            .flat_map(|l| {
+                l.cells(n).map(|cell| Hop {
+                    cell,
+                    direction: l.direction,
+                    tries: 0,
+                })
+            })
+            .collect()
+    }
+
+    /// How many stretches stay when `hops` become the plan, and which hops then wait.
+    pub(super) fn continued(
+        &self,
+        mut hops: VecDeque<Hop>,
+        is_open: &dyn Fn(u16) -> bool,
+    ) -> (usize, VecDeque<Hop>) {
+        let first = hops.front().map(|h| (h.cell, h.direction));
+        hops.retain(|h| is_open(h.cell));
+        let Some(next) = hops.front().copied() else {
+            return (self.loitering(true), hops);
+        };
+        let Some(front) = self.stretches.front().filter(|_| !self.replan) else {
+            return (0, hops);
+        };
+        let next_cell = Some((next.cell, next.direction));
+        if front.kind.cell() == next_cell {
+            hops.pop_front();
+            return (self.matching(1, &mut hops), hops);
+        }
+        if front.kind == Kind::Route {
+            return (self.matching(0, &mut hops), hops);
+        }
+        if front.kind.cell().is_none() {
+            return (0, hops);
+        }
+        let finishes = first.is_some()
+            && front.kind.cell() == first
+            && !is_open(front.kind.cell().map_or(0, |c| c.0));
+        if finishes || self.is_shorter_after(front, &next) {
+            return (self.matching(1, &mut hops), hops);
+        }
+        (0, hops)
+    }
+
+    /// Of the stretches after the first `kept`, those stay too that lead to the cells
+    /// that `hops` wants next; these are taken off it.
+    fn matching(&self, mut kept: usize, hops: &mut VecDeque<Hop>) -> usize {
+        for (i, s) in self.stretches.iter().enumerate().skip(kept) {
+            let Some(hop) = s.kind.hop() else { continue };
+            if hops
+                .front()
+                .is_none_or(|h| (h.cell, h.direction) != (hop.cell, hop.direction))
+            {
+                break;
+            }
+            hops.pop_front();
+            kept = i + 1;
+        }
+        kept
+    }
+
+    /// Whether finishing the stretch that is flown first costs no way to `next`.
+    fn is_shorter_after(&self, front: &Stretch, next: &Hop) -> bool {
+        let entry = self.chart.entry(next.cell, next.direction);
+        let length_m = |from: &Place| {
+            let moves = self.chart.connect(from, entry, next.direction)?;
+            Some(moves.iter().map(|m| self.chart.length_m(m)).sum::<f64>())
+        };
+        let Some(after_m) = length_m(&front.end) else {
+            return false;
+        };
+        let Some(pose) = self.track.pose() else {
+            return false;
+        };
+        let now_m = length_m(&Place {
+            pose,
+            boundary: None,
+        });
+        let finish_m = front.end_m - self.track.at_m();
+        now_m.is_none_or(|m| finish_m + after_m <= m + 1.0)
+    }
+
+    /// Gives up all stretches but the first `count`.
+    pub(super) fn keep(&mut self, count: usize) {
+        self.stretches.truncate(count);
+        if let Some(last) = self.stretches.back() {
+            self.track.truncate(last.end_m);
+        }
+    }
+}
