@@ -4,8 +4,9 @@ use crate::chaos::ChaosArgs;
 use crate::check::CheckArgs;
 use crate::observe::ObserveArgs;
 use crate::peer::PeerArgs;
+use crate::sim::SimArgs;
 use crate::trial::TrialArgs;
-use crate::{chaos, check, exit, observe, peer, trial};
+use crate::{chaos, check, exit, observe, peer, sim, trial};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
@@ -31,6 +32,8 @@ pub struct Cli {
 pub enum Verb {
     /// Flies a scenario with real processes over Zenoh on this machine, and judges it.
     Trial(TrialArgs),
+    /// Flies a scenario in virtual time, once or a thousand times.
+    Sim(SimArgs),
     /// Runs one peer: the computer of a UAV, or a ground station.
     Peer(PeerArgs),
     /// Makes something go wrong in a running trial, or puts it right.
@@ -62,6 +65,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         .init();
     match &cli.verb {
         Verb::Trial(args) => trial::run(args),
+        Verb::Sim(args) => sim::run(args),
         Verb::Peer(args) => peer::run(args),
         Verb::Chaos(args) => chaos::run(args),
         Verb::Observe(args) => observe::run(args),

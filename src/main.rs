@@ -6,6 +6,7 @@ mod cli;
 mod exit;
 mod observe;
 mod peer;
+mod sim;
 mod trial;
 
 use clap::Parser;

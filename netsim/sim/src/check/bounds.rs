@@ -1,0 +1,117 @@
+//! How long things may take (protocol §8), and how hard a bound is at which loss.
+
+/// The bounds at one beacon period and one diameter, milliseconds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bounds {
+    /// Beacon period T.
+    pub period_ms: u64,
+    /// Hop diameter D: the larger of the true one within the last 10·T and the one
+    /// that any live peer reckons with, because peers must act on the latter.
+    pub diameter: u64,
+}
+
+/// How often a bound may be exceeded in a single case at light loss.
+pub const LIGHT_FACTOR: u64 = 7;
+
+impl Bounds {
+    /// Everybody in a component knows of a death: (k1 + k2 + D + 2)·T with
+    /// k1 = 4 + D/4 and k2 = 4 + D/2, plus the rounding of an age, 100 ms a hop.
+    #[must_use]
+    pub fn detection_ms(&self) -> u64 {
+        let quarters = 4 * (4 + 4 + 2) + (1 + 2 + 4) * self.diameter;
+        (quarters * self.period_ms).div_ceil(4) + 100 * (self.diameter + 1)
+    }
+
+    /// W0 = (2D + 3)·T: how long a round waits for its snapshots at first.
+    #[must_use]
+    pub fn first_wait_ms(&self) -> u64 {
+        (2 * self.diameter + 3) * self.period_ms
+    }
+
+    /// L2: an orphan is listed by a live peer within 2·T + 2·W0.
+    #[must_use]
+    pub fn takeover_ms(&self) -> u64 {
+        2 * self.period_ms + 2 * self.first_wait_ms()
+    }
+
+    /// L4: every record older than (3D + 5)·T is held by all.
+    #[must_use]
+    pub fn spread_ms(&self) -> u64 {
+        (3 * self.diameter + 5) * self.period_ms
+    }
+
+    /// S5: a peer yields what it hears listed at a higher stamp within 2·T.
+    #[must_use]
+    pub fn yield_ms(&self) -> u64 {
+        2 * self.period_ms
+    }
+
+    /// A boot listens for 3·T before it speaks.
+    #[must_use]
+    pub fn probation_ms(&self) -> u64 {
+        3 * self.period_ms
+    }
+
+    /// L6: a restarted peer is productive within 20·T of the end of its probation.
+    #[must_use]
+    pub fn productive_ms(&self) -> u64 {
+        20 * self.period_ms
+    }
+}
+
+/// How hard a graded bound is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Grade {
+    /// No loss: every case keeps the bound.
+    Hard,
+    /// At most a tenth is lost: 95 of 100 cases keep the bound, each seven times it.
+    Light,
+    /// More is lost: cases are reported.
+    Reported,
+}
+
+impl Grade {
+    /// The grade at some loss, thousandths.
+    #[must_use]
+    pub fn of(loss_permille: u16) -> Self {
+        match loss_permille {
+            0 => Self::Hard,
+            1..=100 => Self::Light,
+            _ => Self::Reported,
+        }
+    }
+
+    /// What no single case may exceed, if anything, milliseconds.
+    #[must_use]
+    pub fn limit_ms(self, bound_ms: u64) -> Option<u64> {
+        match self {
+            Self::Hard => Some(bound_ms),
+            Self::Light => Some(bound_ms * LIGHT_FACTOR),
+            Self::Reported => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bounds_are_those_of_the_protocol() {
+        let b = Bounds {
+            period_ms: 1000,
+            diameter: 4,
+        };
+        assert_eq!(b.detection_ms(), (5 + 6 + 4 + 2) * 1000 + 500);
+        assert_eq!(b.first_wait_ms(), 11_000);
+        assert_eq!(b.takeover_ms(), 24_000);
+        assert_eq!(b.spread_ms(), 17_000);
+    }
+
+    #[test]
+    fn loss_grades_a_bound() {
+        assert_eq!(Grade::of(0).limit_ms(10), Some(10));
+        assert_eq!(Grade::of(100).limit_ms(10), Some(70));
+        assert_eq!(Grade::of(101).limit_ms(10), None);
+    }
+}

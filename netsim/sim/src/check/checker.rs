@@ -1,0 +1,266 @@
+//! All checks of one run behind one door: the driver tells what happened, the checks
+//! decide what it means.
+
+use super::cover::CoverCheck;
+use super::graph::{Graph, Stability};
+use super::listing::{ListingCheck, Takeover};
+use super::membership::Membership;
+use super::progress::ProgressCheck;
+use super::record::{RecordCheck, Said};
+use super::{Bounds, Findings, Look, Mind};
+use skein_peer::Report;
+use skein_peer::journal::Durable;
+use skein_peer::output::Status;
+use std::collections::BTreeMap;
+
+/// Hard places that a batch of seeds must have reached to mean anything.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reached {
+    /// A peer died that held cells it had taken over from the dead.
+    pub takeover_of_takeover: u32,
+    /// Both sides of a partition adopted a division while it lasted.
+    pub both_halves_planned: u32,
+    /// A peer was restarted while a round was undecided.
+    pub restart_in_round: u32,
+    /// A peer died that joined two parts of its component.
+    pub articulation_lost: u32,
+    /// A mission revision arrived at peers more than a beacon period apart.
+    pub staggered_revision: u32,
+}
+
+/// The checks of one run.
+#[derive(Clone, Debug)]
+pub struct Checker {
+    period_ms: u64,
+    /// What was found.
+    pub found: Findings,
+    /// Who knows of whose death.
+    pub members: Membership,
+    /// Who lists what.
+    pub listing: ListingCheck,
+    /// The hard places reached.
+    pub reached: Reached,
+    record: RecordCheck,
+    cover: CoverCheck,
+    progress: ProgressCheck,
+    graph: Graph,
+    stability: Stability,
+    bounds: Bounds,
+    open_round: BTreeMap<u16, u32>,
+    adopted: BTreeMap<u16, u32>,
+    split_at: Option<BTreeMap<u16, u32>>,
+    ready_ms: BTreeMap<u32, u64>,
+}
+
+impl Checker {
+    /// The checks of the run with this seed, at beacon period T.
+    #[must_use]
+    pub fn new(seed: u64, period_ms: u32) -> Self {
+        let period_ms = u64::from(period_ms.max(1));
+        Self {
+            period_ms,
+            found: Findings::new(seed),
+            members: Membership::default(),
+            listing: ListingCheck::default(),
+            reached: Reached::default(),
+            record: RecordCheck::default(),
+            cover: CoverCheck::default(),
+            progress: ProgressCheck::default(),
+            graph: Graph::default(),
+            stability: Stability::default(),
+            bounds: Bounds {
+                period_ms,
+                diameter: 1,
+            },
+            open_round: BTreeMap::new(),
+            adopted: BTreeMap::new(),
+            split_at: None,
+            ready_ms: BTreeMap::new(),
+        }
+    }
+
+    /// A process starts. `again` unless it is the first time; `fresh` without its disk.
+    pub fn on_boot(&mut self, now_ms: u64, id: u16, again: bool, fresh: bool) {
+        self.members.on_running(id, true);
+        self.cover.on_boot(id);
+        if fresh {
+            self.record.on_erased(id);
+        }
+        if again {
+            self.progress.on_restart(now_ms, id);
+            if !self.open_round.is_empty() {
+                self.reached.restart_in_round += 1;
+            }
+        }
+    }
+
+    /// A process goes on after standing still.
+    pub fn on_resume(&mut self, id: u16) {
+        self.members.on_running(id, false);
+    }
+
+    /// A process ends (`death`) or stands still.
+    pub fn on_silent(&mut self, now_ms: u64, id: u16, death: bool, covered: &[bool]) {
+        if death && self.graph.is_articulation(id) {
+            self.reached.articulation_lost += 1;
+        }
+        self.members
+            .on_silent(now_ms, id, death, self.bounds.diameter);
+        self.listing.on_silent(now_ms, id, death, covered);
+        if death && self.listing.takeovers.last().is_some_and(|t| t.second_hand) {
+            self.reached.takeover_of_takeover += 1;
+        }
+        self.progress.on_silent(id);
+        self.progress.on_loss();
+        self.open_round.remove(&id);
+        self.stability.forget(id);
+    }
+
+    /// A process ends: what it believes durable, and what its disk holds.
+    pub fn on_crash(&mut self, now_ms: u64, id: u16, believed: &Durable, journal: &[Vec<u8>]) {
+        self.record
+            .on_crash(now_ms, id, believed, journal, &mut self.found);
+    }
+
+    /// The links were cut into groups, or healed.
+    pub fn on_partition(&mut self, begins: bool, side: impl Fn(u16) -> usize) {
+        if begins {
+            self.split_at = Some(self.adopted.clone());
+            return;
+        }
+        let Some(before) = self.split_at.take() else {
+            return;
+        };
+        let mut sides: Vec<usize> = self
+            .adopted
+            .iter()
+            .filter(|(id, counter)| before.get(id) != Some(counter))
+            .map(|(id, _)| side(*id))
+            .collect();
+        sides.sort_unstable();
+        sides.dedup();
+        if sides.len() > 1 {
+            self.reached.both_halves_planned += 1;
+        }
+    }
+
+    /// A peer reports something.
+    pub fn on_report(&mut self, now_ms: u64, id: u16, report: &Report) {
+        match report {
+            Report::Booted { incarnation } => {
+                self.members.on_life(now_ms, id, *incarnation);
+                self.progress.on_loss();
+            }
+            Report::Membership {
+                peer,
+                incarnation,
+                status,
+            } => {
+                let joined_ms = self.stability.joined_since_ms(id, peer.0);
+                self.members.on_belief(
+                    now_ms,
+                    (id, peer.0),
+                    (*incarnation, *status),
+                    &self.bounds,
+                    joined_ms,
+                );
+                if *status != Status::Suspect {
+                    self.progress.on_loss();
+                }
+            }
+            Report::Round { counter, .. } => {
+                self.open_round.insert(id, *counter);
+            }
+            Report::Register { counter, .. } => {
+                if self.open_round.get(&id).is_some_and(|c| c <= counter) {
+                    self.open_round.remove(&id);
+                }
+                self.adopted.insert(id, *counter);
+            }
+            Report::Covered { .. } => self.progress.on_covered(id),
+            Report::Ready { revision, .. } => {
+                let first_ms = *self.ready_ms.entry(*revision).or_insert(now_ms);
+                if *revision > 1 && now_ms > first_ms + self.period_ms {
+                    self.reached.staggered_revision += 1;
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A peer publishes bytes it wrote itself.
+    pub fn on_said(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        said: &Said,
+        bytes_hash: u64,
+        journal: &[Vec<u8>],
+    ) {
+        self.record
+            .on_said(now_ms, id, said, bytes_hash, journal, &mut self.found);
+        if let Some(claim) = &said.claim {
+            self.listing.on_published(id, std::sync::Arc::clone(claim));
+        }
+    }
+
+    /// A UAV flew into a zone.
+    pub fn on_zone_entry(&mut self, time_ms: u64, id: u16, zone: usize) {
+        ProgressCheck::on_zone_entry(time_ms, id, zone, &mut self.found);
+    }
+
+    /// The true graph at this moment. Returns whether a component changed.
+    pub fn on_graph(&mut self, now_ms: u64, graph: Graph) -> bool {
+        let window_ms = 10 * self.period_ms;
+        let members = &self.members;
+        let changed = self
+            .stability
+            .observe(now_ms, &graph, |id| members.life(id), window_ms);
+        self.graph = graph;
+        changed
+    }
+
+    /// The true graph when last looked at.
+    #[must_use]
+    pub fn graph(&self) -> &Graph {
+        &self.graph
+    }
+
+    /// Looks at everybody's beliefs, once a beacon period.
+    pub fn on_look(
+        &mut self,
+        now_ms: u64,
+        loss_permille: u16,
+        minds: &[Mind],
+        covered: &[bool],
+        loop_hash: u64,
+    ) {
+        let held = minds.iter().map(|m| m.view.diameter).max().unwrap_or(1);
+        self.bounds.diameter = u64::from(held.max(self.stability.diameter()));
+        let look = Look {
+            now_ms,
+            loss_permille,
+            bounds: self.bounds,
+            graph: &self.graph,
+            stability: &self.stability,
+            minds,
+            covered,
+            loop_hash,
+        };
+        let orphans = self.listing.orphans();
+        self.members.on_look(&look, &mut self.found);
+        self.listing.on_look(&look, &self.members, &mut self.found);
+        if self.listing.orphans() > orphans {
+            self.progress.on_loss();
+        }
+        self.record.on_look(&look, &mut self.found);
+        self.cover.on_look(&look, &mut self.found);
+        self.progress.on_look(&look, &self.members, &mut self.found);
+    }
+
+    /// What became of the sections of the dead.
+    #[must_use]
+    pub fn takeovers(&self) -> &[Takeover] {
+        &self.listing.takeovers
+    }
+}

@@ -1,0 +1,195 @@
+//! What peers mark as covered: truly seen (S6), never forgotten (S3), and soon known
+//! to all (L4).
+
+use super::{Clocks, Findings, Look};
+use std::collections::BTreeMap;
+
+/// What the marks of one run were found to be.
+#[derive(Clone, Debug, Default)]
+pub struct CoverCheck {
+    known: BTreeMap<u16, (u64, Vec<bool>)>,
+    lacking: Clocks<(u16, u16)>,
+    false_marks: BTreeMap<(u16, u16), ()>,
+}
+
+impl CoverCheck {
+    /// A process starts with what its disk held: it may know less than before.
+    pub fn on_boot(&mut self, id: u16) {
+        self.known.remove(&id);
+        self.lacking.retain(|(p, _)| *p != id);
+    }
+
+    /// Looks at everybody's union of covered cells.
+    pub fn on_look(&mut self, look: &Look<'_>, found: &mut Findings) {
+        for m in look
+            .minds
+            .iter()
+            .filter(|m| m.view.loop_hash == look.loop_hash)
+        {
+            self.check_marks(look, m.id, &m.view.union, found);
+        }
+        self.check_spread(look, found);
+    }
+
+    fn check_marks(&mut self, look: &Look<'_>, id: u16, union: &[bool], found: &mut Findings) {
+        for (c, (marked, seen)) in union.iter().zip(look.covered).enumerate() {
+            let cell = u16::try_from(c).unwrap_or(u16::MAX);
+            if *marked && !*seen && self.false_marks.insert((id, cell), ()).is_none() {
+                found.broken("S6", look.now_ms, Some(id), || {
+                    format!("marks cell {cell} as covered, no camera has seen it")
+                });
+            }
+        }
+        let known = self.known.entry(id).or_default();
+        if known.0 == look.loop_hash {
+            if let Some(c) = known.1.iter().zip(union).position(|(was, is)| *was && !*is) {
+                found.broken("S3", look.now_ms, Some(id), || {
+                    format!("forgot that cell {c} is covered")
+                });
+            }
+            known.1.copy_from_slice(union);
+        } else {
+            *known = (look.loop_hash, union.to_vec());
+        }
+    }
+
+    /// L4: what one member of an unchanged component knows, all know soon.
+    fn check_spread(&mut self, look: &Look<'_>, found: &mut Findings) {
+        let n = look.covered.len();
+        let bound_ms = look.bounds.spread_ms();
+        let mut lacks: Vec<(u16, u16, u64)> = Vec::new();
+        for component in look.graph.components() {
+            let minds: Vec<_> = component
+                .iter()
+                .filter_map(|id| look.mind(*id))
+                .filter(|m| {
+                    m.view.loop_hash == look.loop_hash && m.view.speaks && m.view.union.len() == n
+                })
+                .collect();
+            let since_ms = component
+                .first()
+                .and_then(|id| look.stability.component_since_ms(*id));
+            for c in 0..n {
+                if !minds.iter().any(|m| m.view.union[c]) {
+                    continue;
+                }
+                for m in minds.iter().filter(|m| !m.view.union[c]) {
+                    lacks.push((
+                        m.id,
+                        u16::try_from(c).unwrap_or(u16::MAX),
+                        since_ms.unwrap_or(look.now_ms).max(m.since_ms),
+                    ));
+                }
+            }
+        }
+        lacks.sort_unstable();
+        let mut ended = Vec::new();
+        self.lacking.retain(|k| {
+            let goes_on = lacks.binary_search_by(|l| (l.0, l.1).cmp(k)).is_ok();
+            if !goes_on {
+                ended.push(*k);
+            }
+            goes_on
+        });
+        for (id, cell, from_ms) in lacks {
+            let since_ms = self.lacking.start((id, cell), look.now_ms).max(from_ms);
+            let took_ms = look.now_ms - since_ms;
+            if look.grade().limit_ms(bound_ms).is_some_and(|l| took_ms > l)
+                && self.lacking.tell_once((id, cell))
+            {
+                found.broken("L4", look.now_ms, Some(id), || {
+                    format!("does not know that cell {cell} is covered, {took_ms} ms after a peer of its component did (bound {bound_ms} ms)")
+                });
+            }
+        }
+        // What ended between two looks kept the bound unless it was told above.
+        for _ in ended {
+            found.took("L4", look.grade(), look.bounds.period_ms, bound_ms);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Bounds, Graph, Mind, Stability};
+    use super::*;
+    use skein_peer::View;
+
+    fn look_at(
+        check: &mut CoverCheck,
+        found: &mut Findings,
+        s: &mut Stability,
+        now_ms: u64,
+        unions: &[(u16, [bool; 2])],
+    ) {
+        let minds: Vec<Mind> = unions
+            .iter()
+            .map(|(id, union)| Mind {
+                id: *id,
+                uav: true,
+                since_ms: 0,
+                view: View {
+                    speaks: true,
+                    loop_hash: 3,
+                    union: union.to_vec(),
+                    ..View::default()
+                },
+            })
+            .collect();
+        let graph = Graph::new(minds.iter().map(|m| m.id).collect(), |_, _| true);
+        s.observe(now_ms, &graph, |_| 1, 10_000);
+        let look = Look {
+            now_ms,
+            loss_permille: 0,
+            bounds: Bounds {
+                period_ms: 1000,
+                diameter: 1,
+            },
+            graph: &graph,
+            stability: s,
+            minds: &minds,
+            covered: &[true, false],
+            loop_hash: 3,
+        };
+        check.on_look(&look, found);
+    }
+
+    #[test]
+    fn marking_forgetting_and_not_hearing_are_all_found() {
+        let (mut c, mut found, mut s) = (
+            CoverCheck::default(),
+            Findings::new(1),
+            Stability::default(),
+        );
+        for t in 0..9 {
+            look_at(
+                &mut c,
+                &mut found,
+                &mut s,
+                t * 1000,
+                &[(1, [true, false]), (2, [false, false])],
+            );
+        }
+        assert!(found.counts.is_empty(), "{:?}", found.violations);
+        look_at(
+            &mut c,
+            &mut found,
+            &mut s,
+            9000,
+            &[(1, [true, true]), (2, [false, false])],
+        );
+        assert_eq!(
+            found.counts.keys().copied().collect::<Vec<_>>(),
+            ["L4", "S6"]
+        );
+        look_at(
+            &mut c,
+            &mut found,
+            &mut s,
+            10_000,
+            &[(1, [false, true]), (2, [false, false])],
+        );
+        assert_eq!(found.counts.get("S3"), Some(&1));
+        assert_eq!(found.counts.get("S6"), Some(&1));
+    }
+}

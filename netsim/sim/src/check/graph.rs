@@ -1,0 +1,262 @@
+//! The true radio graph: components, diameter, articulation peers, and since when
+//! each pair has been joined. Built from the links of the world, never from beliefs.
+
+use std::collections::BTreeMap;
+
+/// The most radios a graph may hold: one bit each.
+pub const MAX_NODES: usize = 64;
+
+/// Who can reach whom at one moment.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Graph {
+    ids: Vec<u16>,
+    /// Bit `j` of entry `i`: radio `i` and radio `j` hear each other.
+    adjacent: Vec<u64>,
+    /// Bit `j` of entry `i`: some path joins them (a radio reaches itself).
+    reach: Vec<u64>,
+    diameter: u32,
+}
+
+impl Graph {
+    /// The graph of the radios `ids` (ascending, at most [`MAX_NODES`] are taken)
+    /// where `linked(i, j)` tells whether both directions between two of them are up.
+    #[must_use]
+    pub fn new(ids: Vec<u16>, mut linked: impl FnMut(u16, u16) -> bool) -> Self {
+        let mut ids = ids;
+        ids.truncate(MAX_NODES);
+        let n = ids.len();
+        let mut adjacent = vec![0u64; n];
+        for i in 0..n {
+            for j in i + 1..n {
+                if linked(ids[i], ids[j]) {
+                    adjacent[i] |= 1 << j;
+                    adjacent[j] |= 1 << i;
+                }
+            }
+        }
+        let (reach, diameter) = close(&adjacent);
+        Self {
+            ids,
+            adjacent,
+            reach,
+            diameter,
+        }
+    }
+
+    /// The radios, ascending.
+    #[must_use]
+    pub fn ids(&self) -> &[u16] {
+        &self.ids
+    }
+
+    /// The largest hop diameter of any component, at least 1.
+    #[must_use]
+    pub fn diameter(&self) -> u32 {
+        self.diameter.max(1)
+    }
+
+    /// Whether a path joins two radios.
+    #[must_use]
+    pub fn joined(&self, a: u16, b: u16) -> bool {
+        match (self.ids.binary_search(&a), self.ids.binary_search(&b)) {
+            (Ok(i), Ok(j)) => self.reach[i] >> j & 1 == 1,
+            _ => false,
+        }
+    }
+
+    /// The component of a radio, ascending; empty when it is not there.
+    #[must_use]
+    pub fn component(&self, a: u16) -> Vec<u16> {
+        let Ok(i) = self.ids.binary_search(&a) else {
+            return Vec::new();
+        };
+        (0..self.ids.len())
+            .filter(|j| self.reach[i] >> j & 1 == 1)
+            .map(|j| self.ids[j])
+            .collect()
+    }
+
+    /// The components, each ascending, in the order of their least members.
+    #[must_use]
+    pub fn components(&self) -> Vec<Vec<u16>> {
+        let mut out = Vec::new();
+        for (i, &id) in self.ids.iter().enumerate() {
+            if self.reach[i].trailing_zeros() as usize == i {
+                out.push(self.component(id));
+            }
+        }
+        out
+    }
+
+    /// Whether losing this radio would split its component.
+    #[must_use]
+    pub fn is_articulation(&self, a: u16) -> bool {
+        let Ok(i) = self.ids.binary_search(&a) else {
+            return false;
+        };
+        let rest: Vec<u64> = self
+            .adjacent
+            .iter()
+            .enumerate()
+            .map(|(k, bits)| if k == i { 0 } else { bits & !(1 << i) })
+            .collect();
+        let (reach, _) = close(&rest);
+        let others = self.reach[i] & !(1 << i);
+        others != 0 && reach[others.trailing_zeros() as usize] & others != others
+    }
+}
+
+/// Reachability of every node and the longest of all shortest paths.
+fn close(adjacent: &[u64]) -> (Vec<u64>, u32) {
+    let mut diameter = 0;
+    let reach = (0..adjacent.len())
+        .map(|i| {
+            let (mut seen, mut front, mut hops) = (1u64 << i, 1u64 << i, 0);
+            loop {
+                let mut next = 0;
+                let mut bits = front;
+                while bits != 0 {
+                    next |= adjacent[bits.trailing_zeros() as usize];
+                    bits &= bits - 1;
+                }
+                front = next & !seen;
+                if front == 0 {
+                    break;
+                }
+                seen |= front;
+                hops += 1;
+            }
+            diameter = diameter.max(hops);
+            seen
+        })
+        .collect();
+    (reach, diameter)
+}
+
+/// Since when each radio's component has been what it is, and each pair joined.
+#[derive(Clone, Debug, Default)]
+pub struct Stability {
+    component: BTreeMap<u16, (Vec<(u16, u32)>, u64)>,
+    joined: BTreeMap<(u16, u16), u64>,
+    diameters: Vec<(u64, u32)>,
+}
+
+impl Stability {
+    /// Takes the graph at `now_ms`; `life(id)` counts the lives of a radio, so that a
+    /// restart counts as a change even when it falls between two looks.
+    /// Returns whether any component changed.
+    pub fn observe(
+        &mut self,
+        now_ms: u64,
+        graph: &Graph,
+        life: impl Fn(u16) -> u32,
+        window_ms: u64,
+    ) -> bool {
+        let mut changed = false;
+        for members in graph.components() {
+            let named: Vec<(u16, u32)> = members.iter().map(|m| (*m, life(*m))).collect();
+            for m in &members {
+                let known = self.component.get(m);
+                if known.is_none_or(|(old, _)| *old != named) {
+                    self.component.insert(*m, (named.clone(), now_ms));
+                    changed = true;
+                }
+            }
+        }
+        let before = self.component.len();
+        self.component
+            .retain(|id, _| graph.ids().binary_search(id).is_ok());
+        changed |= before != self.component.len();
+        self.join(now_ms, graph);
+        self.diameters.retain(|(t, _)| t + window_ms >= now_ms);
+        self.diameters.push((now_ms, graph.diameter()));
+        changed
+    }
+
+    fn join(&mut self, now_ms: u64, graph: &Graph) {
+        self.joined.retain(|(a, b), _| graph.joined(*a, *b));
+        for (i, &a) in graph.ids().iter().enumerate() {
+            for &b in &graph.ids()[i + 1..] {
+                if graph.joined(a, b) {
+                    self.joined.entry((a, b)).or_insert(now_ms);
+                }
+            }
+        }
+    }
+
+    /// A radio fell silent or began a new life: its pairs start again.
+    pub fn forget(&mut self, id: u16) {
+        self.joined.retain(|(a, b), _| *a != id && *b != id);
+        self.component.remove(&id);
+    }
+
+    /// Since when a path has joined the two without a break, if one does.
+    #[must_use]
+    pub fn joined_since_ms(&self, a: u16, b: u16) -> Option<u64> {
+        self.joined.get(&(a.min(b), a.max(b))).copied()
+    }
+
+    /// Since when the component of a radio has been what it is.
+    #[must_use]
+    pub fn component_since_ms(&self, id: u16) -> Option<u64> {
+        self.component.get(&id).map(|(_, since)| *since)
+    }
+
+    /// The largest true diameter within the window.
+    #[must_use]
+    pub fn diameter(&self) -> u32 {
+        self.diameters
+            .iter()
+            .map(|(_, d)| *d)
+            .max()
+            .unwrap_or(1)
+            .max(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn graph(ids: &[u16], edges: &[(u16, u16)]) -> Graph {
+        Graph::new(ids.to_vec(), |a, b| {
+            edges.contains(&(a, b)) || edges.contains(&(b, a))
+        })
+    }
+
+    #[test]
+    fn a_chain_has_its_length_as_diameter_and_its_inner_peers_as_articulations() {
+        let g = graph(&[1, 2, 3, 9], &[(1, 2), (2, 3), (3, 9)]);
+        assert_eq!(g.diameter(), 3);
+        assert_eq!(g.components(), [vec![1, 2, 3, 9]]);
+        let cuts: Vec<bool> = g.ids().iter().map(|i| g.is_articulation(*i)).collect();
+        assert_eq!(cuts, [false, true, true, false]);
+    }
+
+    #[test]
+    fn separate_radios_make_separate_components() {
+        let g = graph(&[1, 2, 3, 4], &[(1, 3), (2, 4)]);
+        assert_eq!(g.components(), [vec![1, 3], vec![2, 4]]);
+        assert!(g.joined(1, 3) && !g.joined(1, 2) && g.joined(2, 2));
+        assert!(!g.is_articulation(1));
+    }
+
+    #[test]
+    fn stability_counts_from_the_last_change_and_a_new_life_is_one() {
+        let mut s = Stability::default();
+        let whole = graph(&[1, 2, 3], &[(1, 2), (2, 3)]);
+        let split = graph(&[1, 2, 3], &[(1, 2)]);
+        assert!(s.observe(0, &whole, |_| 1, 10_000));
+        assert!(!s.observe(1000, &whole, |_| 1, 10_000));
+        assert_eq!(s.component_since_ms(2), Some(0));
+        assert!(s.observe(2000, &split, |_| 1, 10_000));
+        assert_eq!(
+            (s.joined_since_ms(2, 1), s.joined_since_ms(2, 3)),
+            (Some(0), None)
+        );
+        assert_eq!(s.diameter(), 2);
+        assert!(s.observe(3000, &split, |p| if p == 2 { 2 } else { 1 }, 10_000));
+        assert_eq!(s.component_since_ms(1), Some(3000));
+        assert_eq!(s.component_since_ms(3), Some(2000));
+    }
+}

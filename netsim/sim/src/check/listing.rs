@@ -1,0 +1,467 @@
+//! Who lists which cell: orphans (I1, L2), takeovers, and yielding to a higher
+//! stamp (S5).
+
+use super::membership::Membership;
+use super::{Clocks, Findings, Look, bounds::LIGHT_FACTOR};
+use serde::Serialize;
+use skein_peer::output::Status;
+use skein_peer::wire::message::{Firmness, Listing, Register, Stamp};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// What became of the section of a peer that died.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Takeover {
+    /// Who died.
+    pub dead: u16,
+    /// When, milliseconds.
+    pub died_ms: u64,
+    /// When a live peer first knew, milliseconds.
+    pub detected_ms: Option<u64>,
+    /// When the last of its uncovered cells was listed by a live peer or covered, milliseconds.
+    pub taken_ms: Option<u64>,
+    /// How many of its cells each live peer listed first.
+    pub by: BTreeMap<u16, u32>,
+    /// Cells it listed and nobody had covered when it died.
+    pub cells: u32,
+    /// Whether some of them it had itself taken over from a peer that died.
+    pub second_hand: bool,
+}
+
+/// A cell that nobody live lists.
+#[derive(Clone, Copy, Debug)]
+struct Orphan {
+    since_ms: u64,
+    owner: Option<u16>,
+    told: bool,
+}
+
+/// What listing found out in one run.
+#[derive(Clone, Debug, Default)]
+pub struct ListingCheck {
+    orphans: BTreeMap<u16, Orphan>,
+    last_lister: BTreeMap<u16, u16>,
+    inherited: BTreeMap<u16, u16>,
+    able_since_ms: Option<u64>,
+    own: BTreeMap<u16, Arc<Register>>,
+    heard: BTreeMap<(u16, u16), (Arc<Register>, u32)>,
+    clashes: Clocks<(u16, u16, u16)>,
+    /// Sections of peers that died, in the order of their deaths.
+    pub takeovers: Vec<Takeover>,
+}
+
+impl ListingCheck {
+    /// A process ended; `death` is false when it only stands still.
+    pub fn on_silent(&mut self, now_ms: u64, id: u16, death: bool, covered: &[bool]) {
+        self.own.remove(&id);
+        self.heard.retain(|(o, _), _| *o != id);
+        if !death {
+            return;
+        }
+        let open = |c: u16| !covered.get(usize::from(c)).copied().unwrap_or(false);
+        let cells: Vec<u16> = self
+            .last_lister
+            .iter()
+            .filter(|(c, l)| **l == id && open(**c))
+            .map(|(c, _)| *c)
+            .collect();
+        let second_hand = cells.iter().any(|c| self.inherited.get(c) == Some(&id));
+        self.takeovers.push(Takeover {
+            dead: id,
+            died_ms: now_ms,
+            detected_ms: None,
+            taken_ms: None,
+            by: BTreeMap::new(),
+            cells: u32::try_from(cells.len()).unwrap_or(u32::MAX),
+            second_hand,
+        });
+    }
+
+    /// A peer published its own section.
+    pub fn on_published(&mut self, id: u16, register: Arc<Register>) {
+        self.own.insert(id, register);
+    }
+
+    /// A peer was given another's section, written in that one's life `incarnation`.
+    pub fn on_heard(
+        &mut self,
+        (by, author): (u16, u16),
+        incarnation: u32,
+        register: &Arc<Register>,
+    ) {
+        if by == author {
+            return;
+        }
+        let known = self.heard.get(&(by, author));
+        if known.is_none_or(|(r, i)| *i <= incarnation && !Arc::ptr_eq(r, register)) {
+            self.heard
+                .insert((by, author), (Arc::clone(register), incarnation));
+        }
+    }
+
+    /// Looks at everybody's plans.
+    pub fn on_look(&mut self, look: &Look<'_>, members: &Membership, found: &mut Findings) {
+        self.look_for_orphans(look, members, found);
+        self.look_for_clashes(look, members, found);
+    }
+
+    fn look_for_orphans(&mut self, look: &Look<'_>, members: &Membership, found: &mut Findings) {
+        let n = look.covered.len();
+        if n == 0 || look.able().next().is_none() {
+            self.able_since_ms = None;
+            return;
+        }
+        let able_since_ms = *self.able_since_ms.get_or_insert(look.now_ms);
+        let mut lister: Vec<Option<u16>> = vec![None; n];
+        let mut settled = look.covered.to_vec();
+        for m in look
+            .minds
+            .iter()
+            .filter(|m| m.view.loop_hash == look.loop_hash)
+        {
+            for (c, known) in m.view.union.iter().enumerate().take(n) {
+                settled[c] |= *known;
+            }
+            for c in &m.view.unassigned {
+                if let Some(s) = settled.get_mut(usize::from(*c)) {
+                    *s = true;
+                }
+            }
+            for c in m.view.held.iter().chain(&m.view.plan) {
+                if let Some(l) = lister.get_mut(usize::from(*c)) {
+                    *l = Some(m.id);
+                }
+            }
+        }
+        // An orphan is to be listed in every component with an able peer, so the one that
+        // has been stable for longest is the one that counts.
+        let stable_ms = look
+            .able()
+            .filter_map(|m| look.stability.component_since_ms(m.id))
+            .min();
+        let counts_from_ms = stable_ms.unwrap_or(look.now_ms).max(able_since_ms);
+        for c in 0..n {
+            let cell = u16::try_from(c).unwrap_or(u16::MAX);
+            if settled[c] || lister[c].is_some() {
+                self.settle(look, cell, lister[c], members, counts_from_ms, found);
+            } else {
+                self.orphaned(look, cell, members, counts_from_ms, found);
+            }
+        }
+        self.close_takeovers(look, members, &lister, &settled);
+    }
+
+    fn settle(
+        &mut self,
+        look: &Look<'_>,
+        cell: u16,
+        lister: Option<u16>,
+        members: &Membership,
+        counts_from_ms: u64,
+        found: &mut Findings,
+    ) {
+        if let Some(o) = self.orphans.remove(&cell) {
+            let from_ms = counted_from(&o, members)
+                .unwrap_or(look.now_ms)
+                .max(counts_from_ms);
+            found.took(
+                "L2",
+                look.grade(),
+                look.now_ms.saturating_sub(from_ms),
+                look.bounds.takeover_ms(),
+            );
+        }
+        let Some(by) = lister else {
+            return;
+        };
+        let before = self.last_lister.insert(cell, by);
+        if let Some(dead) =
+            before.filter(|b| *b != by && members.silence(*b).is_some_and(|s| s.death))
+        {
+            self.inherited.insert(cell, by);
+            if let Some(t) = self.takeovers.iter_mut().rev().find(|t| t.dead == dead) {
+                *t.by.entry(by).or_default() += 1;
+            }
+        } else if before != Some(by) {
+            self.inherited.remove(&cell);
+        }
+    }
+
+    fn orphaned(
+        &mut self,
+        look: &Look<'_>,
+        cell: u16,
+        members: &Membership,
+        counts_from_ms: u64,
+        found: &mut Findings,
+    ) {
+        let owner = self.last_lister.get(&cell).copied();
+        let o = self.orphans.entry(cell).or_insert(Orphan {
+            since_ms: look.now_ms,
+            owner,
+            told: false,
+        });
+        let bound_ms = look.bounds.takeover_ms();
+        let Some(from_ms) = counted_from(o, members) else {
+            return;
+        };
+        let took_ms = look.now_ms.saturating_sub(from_ms.max(counts_from_ms));
+        let graded = look.grade().limit_ms(bound_ms).is_some_and(|l| took_ms > l);
+        let gone_ms = look
+            .now_ms
+            .saturating_sub(from_ms.max(self.able_since_ms.unwrap_or(look.now_ms)));
+        let lost = gone_ms > bound_ms * LIGHT_FACTOR;
+        if (graded || lost) && !std::mem::replace(&mut o.told, true) {
+            let (check, owner) = (if graded { "L2" } else { "I1" }, o.owner);
+            found.broken(check, look.now_ms, owner, || {
+                format!(
+                    "cell {cell} is listed by no live peer, for {gone_ms} ms ({took_ms} ms since the components last changed; bound {bound_ms} ms); its last owner was {owner:?}"
+                )
+            });
+        }
+    }
+
+    fn close_takeovers(
+        &mut self,
+        look: &Look<'_>,
+        members: &Membership,
+        lister: &[Option<u16>],
+        settled: &[bool],
+    ) {
+        for t in self.takeovers.iter_mut().filter(|t| t.taken_ms.is_none()) {
+            t.detected_ms = t.detected_ms.or_else(|| members.detected_ms(t.dead));
+            let open = self.last_lister.iter().any(|(c, l)| {
+                let c = usize::from(*c);
+                *l == t.dead
+                    && !settled.get(c).copied().unwrap_or(true)
+                    && lister.get(c).is_some_and(Option::is_none)
+            });
+            if !open {
+                t.taken_ms = Some(look.now_ms);
+            }
+        }
+    }
+
+    /// S5: of two listings that know of each other the lower one yields within 2·T.
+    fn look_for_clashes(&mut self, look: &Look<'_>, members: &Membership, found: &mut Findings) {
+        let n = look.covered.len();
+        let bound_ms = look.bounds.yield_ms();
+        let mut seen: Vec<(u16, u16, u16)> = Vec::new();
+        for m in look
+            .minds
+            .iter()
+            .filter(|m| m.uav && m.view.loop_hash == look.loop_hash)
+        {
+            let Some(own) = self
+                .own
+                .get(&m.id)
+                .filter(|r| r.loop_hash == look.loop_hash)
+            else {
+                continue;
+            };
+            let mut stamps: Vec<Option<Stamp>> = vec![None; n];
+            own.plan
+                .iter()
+                .for_each(|l| each_cell(l, n, |c| stamps[c] = Some(l.stamp)));
+            let mut flies = vec![false; n];
+            for c in &m.view.plan {
+                let c = usize::from(*c);
+                if c < n && !m.view.union.get(c).copied().unwrap_or(false) {
+                    flies[c] = true;
+                }
+            }
+            for (&(_, author), (register, life)) in self.heard.range((m.id, 0)..=(m.id, u16::MAX)) {
+                let alive = members.belief(m.id, author) == Some((*life, Status::Alive));
+                if !alive || register.loop_hash != look.loop_hash {
+                    continue;
+                }
+                for l in &register.plan {
+                    each_cell(l, n, |c| {
+                        if flies[c] && stamps[c].is_some_and(|s| s < l.stamp) {
+                            seen.push((m.id, author, u16::try_from(c).unwrap_or(u16::MAX)));
+                        }
+                    });
+                }
+            }
+        }
+        seen.sort_unstable();
+        self.clashes.retain(|k| seen.binary_search(k).is_ok());
+        for key in seen {
+            let since_ms = self.clashes.start(key, look.now_ms);
+            // A look comes once a period, so what two looks saw lasted at least one less.
+            let took_ms = look.now_ms - since_ms;
+            if took_ms > bound_ms && self.clashes.tell_once(key) {
+                let (id, author, cell) = key;
+                found.broken("S5", look.now_ms, Some(id), || {
+                    format!("still plans cell {cell}, which it heard peer {author} list at a higher stamp {took_ms} ms ago (bound {bound_ms} ms)")
+                });
+            }
+        }
+    }
+
+    /// Cells that are orphans at this moment.
+    #[must_use]
+    pub fn orphans(&self) -> usize {
+        self.orphans.len()
+    }
+}
+
+/// From when an orphan counts: from the detection of its owner's death where it has
+/// one; `None` while nobody knows, which the check of detection bounds.
+fn counted_from(o: &Orphan, members: &Membership) -> Option<u64> {
+    match o.owner {
+        Some(owner) if members.silence(owner).is_some() => {
+            members.detected_ms(owner).map(|d| d.max(o.since_ms))
+        }
+        _ => Some(o.since_ms),
+    }
+}
+
+/// Calls `f` with each cell of a listing that is still to be flown.
+fn each_cell(l: &Listing, n: usize, mut f: impl FnMut(usize)) {
+    if l.firmness == Firmness::Done || n == 0 {
+        return;
+    }
+    for k in 0..usize::from(l.run.count) {
+        f((usize::from(l.run.first) + k) % n);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Bounds, Graph, Mind, Stability};
+    use super::*;
+    use skein_peer::View;
+    use skein_peer::wire::message::{Epoch, Run};
+
+    const BOUNDS: Bounds = Bounds {
+        period_ms: 1000,
+        diameter: 1,
+    };
+
+    struct Story {
+        check: ListingCheck,
+        members: Membership,
+        found: Findings,
+        stability: Stability,
+        loss: u16,
+    }
+
+    impl Story {
+        fn new(loss: u16) -> Self {
+            Self {
+                check: ListingCheck::default(),
+                members: Membership::default(),
+                found: Findings::new(1),
+                stability: Stability::default(),
+                loss,
+            }
+        }
+
+        /// One look at a ring of four cells: each peer with its plan.
+        fn look(&mut self, now_ms: u64, plans: &[(u16, &[u16])]) {
+            let minds: Vec<Mind> = plans
+                .iter()
+                .map(|(id, plan)| Mind {
+                    id: *id,
+                    uav: true,
+                    since_ms: 0,
+                    view: View {
+                        able: true,
+                        loop_hash: 9,
+                        union: vec![false; 4],
+                        plan: plan.to_vec(),
+                        ..View::default()
+                    },
+                })
+                .collect();
+            let graph = Graph::new(minds.iter().map(|m| m.id).collect(), |_, _| true);
+            self.stability.observe(now_ms, &graph, |_| 1, 10_000);
+            let look = Look {
+                now_ms,
+                loss_permille: self.loss,
+                bounds: BOUNDS,
+                graph: &graph,
+                stability: &self.stability,
+                minds: &minds,
+                covered: &[false; 4],
+                loop_hash: 9,
+            };
+            self.check.on_look(&look, &self.members, &mut self.found);
+        }
+    }
+
+    #[test]
+    fn a_cell_without_an_owner_for_longer_than_l2_is_a_violation_unless_much_is_lost() {
+        for (loss, at_14, at_90) in [(0, 1, 1), (50, 0, 1), (300, 0, 1)] {
+            let mut s = Story::new(loss);
+            for t in 0..14 {
+                s.look(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
+            }
+            assert_eq!(s.found.counts.values().sum::<u64>(), at_14, "loss {loss}");
+            for t in 14..90 {
+                s.look(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
+            }
+            assert_eq!(s.found.counts.values().sum::<u64>(), at_90, "loss {loss}");
+        }
+    }
+
+    #[test]
+    fn a_takeover_names_who_took_how_many_cells_and_counts_from_detection() {
+        let mut s = Story::new(0);
+        s.members.on_life(0, 2, 1);
+        s.look(0, &[(1, &[0, 1]), (2, &[2, 3])]);
+        s.members.on_silent(500, 2, true, 1);
+        s.check.on_silent(500, 2, true, &[false; 4]);
+        for t in 1..40 {
+            s.look(t * 1000, &[(1, &[0, 1])]);
+        }
+        assert!(
+            s.found.counts.is_empty(),
+            "nobody knows yet: {:?}",
+            s.found.violations
+        );
+        s.members
+            .on_belief(40_500, (1, 2), (1, Status::Down), &BOUNDS, None);
+        s.look(41_000, &[(1, &[0, 1])]);
+        s.look(42_000, &[(1, &[0, 1, 3, 2])]);
+        let t = &s.check.takeovers[0];
+        assert_eq!(
+            (t.cells, t.detected_ms, t.taken_ms),
+            (2, Some(40_500), Some(42_000))
+        );
+        assert_eq!(t.by, BTreeMap::from([(1, 2)]));
+        assert!(s.found.counts.is_empty());
+    }
+
+    #[test]
+    fn a_peer_that_keeps_a_cell_heard_at_a_higher_stamp_breaks_s5() {
+        let register = |counter: u32, id: u16| {
+            Arc::new(Register {
+                loop_hash: 9,
+                plan: vec![Listing {
+                    run: Run { first: 3, count: 2 },
+                    backward: false,
+                    firmness: Firmness::Tentative,
+                    stamp: Stamp {
+                        epoch: Epoch { counter, hash: 0 },
+                        take: 0,
+                        id,
+                    },
+                }],
+                ..Register::default()
+            })
+        };
+        for (other, broken) in [(7, true), (2, false)] {
+            let mut s = Story::new(300);
+            s.members
+                .on_belief(0, (1, 2), (1, Status::Alive), &BOUNDS, None);
+            s.check.on_published(1, register(5, 1));
+            s.check.on_heard((1, 2), 1, &register(other, 2));
+            for t in 1..6 {
+                s.look(t * 1000, &[(1, &[3, 0, 1, 2]), (2, &[])]);
+            }
+            assert_eq!(s.found.counts.contains_key("S5"), broken);
+        }
+    }
+}

@@ -1,0 +1,345 @@
+//! Who knows of whose death, and how soon: detection at any loss, false downs, and
+//! agreement on the members of a component (L1).
+
+use super::{Bounds, Clocks, Findings, Look};
+use skein_peer::output::Status;
+use std::collections::BTreeMap;
+
+/// A peer that cannot be heard because its process does not run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Silence {
+    /// Since when, milliseconds.
+    pub since_ms: u64,
+    /// Its last life.
+    pub incarnation: u32,
+    /// Whether its process ended; otherwise it stands still.
+    pub death: bool,
+    /// The largest diameter that mattered since.
+    diameter: u64,
+}
+
+/// What membership found out in one run.
+#[derive(Clone, Debug, Default)]
+pub struct Membership {
+    silences: BTreeMap<u16, Silence>,
+    lives: BTreeMap<u16, (u32, u64)>,
+    speaks_since: BTreeMap<u16, u64>,
+    beliefs: BTreeMap<(u16, u16), (u32, Status)>,
+    detected: BTreeMap<u16, u64>,
+    late: Clocks<(u16, u16)>,
+    disagreements: Clocks<(u16, u16)>,
+    /// Time from each death to its detection by each live peer, milliseconds.
+    pub detect_ms: Vec<u64>,
+    /// Living peers declared Down although a path to them had existed for a whole bound.
+    pub false_downs: u64,
+}
+
+impl Membership {
+    /// A peer runs under an incarnation: at boot, or after it learned of a higher one.
+    pub fn on_life(&mut self, now_ms: u64, id: u16, incarnation: u32) {
+        self.lives.insert(id, (incarnation, now_ms));
+        self.speaks_since.remove(&id);
+    }
+
+    /// A process starts, or goes on after standing still. A starting one believes nothing.
+    pub fn on_running(&mut self, id: u16, boot: bool) {
+        self.silences.remove(&id);
+        self.detected.remove(&id);
+        self.late.retain(|(o, x)| *o != id && *x != id);
+        if boot {
+            self.beliefs.retain(|(o, _), _| *o != id);
+            self.speaks_since.remove(&id);
+        }
+    }
+
+    /// A process ended or stands still.
+    pub fn on_silent(&mut self, now_ms: u64, id: u16, death: bool, diameter: u64) {
+        let incarnation = self.lives.get(&id).map_or(0, |l| l.0);
+        self.silences.insert(
+            id,
+            Silence {
+                since_ms: now_ms,
+                incarnation,
+                death,
+                diameter,
+            },
+        );
+        self.detected.remove(&id);
+        self.late.retain(|(o, _)| *o != id);
+    }
+
+    /// The present incarnation of a peer, 0 before its first boot.
+    #[must_use]
+    pub fn life(&self, id: u16) -> u32 {
+        self.lives.get(&id).map_or(0, |l| l.0)
+    }
+
+    /// The silence of a peer, if it is silent.
+    #[must_use]
+    pub fn silence(&self, id: u16) -> Option<Silence> {
+        self.silences.get(&id).copied()
+    }
+
+    /// When a live peer first found out that this silent one is down.
+    #[must_use]
+    pub fn detected_ms(&self, id: u16) -> Option<u64> {
+        self.detected.get(&id).copied()
+    }
+
+    /// What one peer last reported of another.
+    #[must_use]
+    pub fn belief(&self, observer: u16, subject: u16) -> Option<(u32, Status)> {
+        self.beliefs.get(&(observer, subject)).copied()
+    }
+
+    /// A belief changed. `joined_since_ms` tells since when a path has joined the two.
+    pub fn on_belief(
+        &mut self,
+        now_ms: u64,
+        (observer, subject): (u16, u16),
+        (incarnation, status): (u32, Status),
+        bounds: &Bounds,
+        joined_since_ms: Option<u64>,
+    ) {
+        let before = self
+            .beliefs
+            .insert((observer, subject), (incarnation, status));
+        if status != Status::Down {
+            return;
+        }
+        if let Some(s) = self.silences.get(&subject) {
+            if s.death
+                && before.is_some_and(|(_, b)| b != Status::Down)
+                && incarnation == s.incarnation
+            {
+                self.detect_ms.push(now_ms.saturating_sub(s.since_ms));
+            }
+            self.detected.entry(subject).or_insert(now_ms);
+            return;
+        }
+        let Some(&(life, began_ms)) = self.lives.get(&subject) else {
+            return;
+        };
+        let bound_ms = bounds.detection_ms();
+        let heard_ms = began_ms + bounds.probation_ms() + bound_ms;
+        let joined = joined_since_ms.is_some_and(|t| t + bound_ms <= now_ms);
+        if life == incarnation && joined && heard_ms <= now_ms {
+            self.false_downs += 1;
+        }
+    }
+
+    /// Looks at everybody's beliefs.
+    pub fn on_look(&mut self, look: &Look<'_>, found: &mut Findings) {
+        for m in look.minds {
+            if m.view.speaks {
+                self.speaks_since.entry(m.id).or_insert(look.now_ms);
+            } else {
+                self.speaks_since.remove(&m.id);
+            }
+        }
+        self.look_for_late_detection(look, found);
+        self.look_for_disagreement(look, found);
+    }
+
+    /// Everybody who runs since before a death knows of it within the bound, at any loss:
+    /// the rule on the age of a heartbeat needs no message.
+    fn look_for_late_detection(&mut self, look: &Look<'_>, found: &mut Findings) {
+        for (&subject, silence) in &mut self.silences {
+            silence.diameter = silence.diameter.max(look.bounds.diameter);
+            let bounds = Bounds {
+                diameter: silence.diameter,
+                ..look.bounds
+            };
+            let due_ms = silence.since_ms + bounds.detection_ms();
+            if look.now_ms <= due_ms {
+                continue;
+            }
+            for m in look
+                .minds
+                .iter()
+                .filter(|m| m.since_ms < silence.since_ms && m.id != subject)
+            {
+                let Some((_, status)) = self.beliefs.get(&(m.id, subject)) else {
+                    continue;
+                };
+                let key = (m.id, subject);
+                if *status == Status::Down {
+                    self.late.stop(key);
+                    continue;
+                }
+                self.late.start(key, look.now_ms);
+                if self.late.tell_once(key) {
+                    found.broken("detect", look.now_ms, Some(m.id), || {
+                        format!(
+                            "still holds peer {subject} for {status:?}, {} ms after it fell silent (bound {} ms, D = {})",
+                            look.now_ms - silence.since_ms,
+                            bounds.detection_ms(),
+                            silence.diameter
+                        )
+                    });
+                }
+            }
+        }
+    }
+
+    /// L1: the members of a component hold each other for alive, in their present lives.
+    fn look_for_disagreement(&mut self, look: &Look<'_>, found: &mut Findings) {
+        let bound_ms = look.bounds.detection_ms();
+        for m in look.minds {
+            for x in look.minds.iter().filter(|x| x.id != m.id) {
+                let key = (m.id, x.id);
+                let since_ms = self.countable_since_ms(look, m.id, x.id);
+                let agreed = match (since_ms, m.view.peers.get(&skein_peer::PeerId(x.id))) {
+                    (None, _) => true,
+                    (Some(_), Some((life, status))) => {
+                        *life == self.life(x.id) && *status != Status::Down
+                    }
+                    (Some(_), None) => false,
+                };
+                if agreed {
+                    if let Some(t) = self.disagreements.stop(key) {
+                        found.took("L1", look.grade(), look.now_ms - t, bound_ms);
+                    }
+                    continue;
+                }
+                let since_ms = since_ms
+                    .unwrap_or(look.now_ms)
+                    .max(self.disagreements.start(key, look.now_ms));
+                let took_ms = look.now_ms.saturating_sub(since_ms);
+                if look.grade().limit_ms(bound_ms).is_some_and(|l| took_ms > l)
+                    && self.disagreements.tell_once(key)
+                {
+                    found.broken("L1", look.now_ms, Some(m.id), || {
+                        let held = m.view.peers.get(&skein_peer::PeerId(x.id));
+                        format!(
+                            "holds {held:?} of peer {} (life {}) in its own component, for {took_ms} ms (bound {bound_ms} ms)",
+                            x.id,
+                            self.life(x.id)
+                        )
+                    });
+                }
+            }
+        }
+    }
+
+    /// Since when two peers have been in one unchanged component, both speaking.
+    fn countable_since_ms(&self, look: &Look<'_>, a: u16, b: u16) -> Option<u64> {
+        if !look.graph.joined(a, b) {
+            return None;
+        }
+        let spoke_ms = (*self.speaks_since.get(&a)?).max(*self.speaks_since.get(&b)?);
+        Some(look.stability.component_since_ms(a)?.max(spoke_ms))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Graph, Mind, Stability};
+    use super::*;
+    use skein_peer::{PeerId, View};
+
+    /// A peer and what it believes of others.
+    type Believes<'a> = (u16, &'a [(u16, u32, Status)]);
+
+    const BOUNDS: Bounds = Bounds {
+        period_ms: 1000,
+        diameter: 1,
+    };
+
+    fn look_at(
+        m: &mut Membership,
+        found: &mut Findings,
+        now_ms: u64,
+        loss_permille: u16,
+        views: &[Believes<'_>],
+        stability: &mut Stability,
+    ) {
+        let minds: Vec<Mind> = views
+            .iter()
+            .map(|(id, believes)| Mind {
+                id: *id,
+                uav: true,
+                since_ms: 0,
+                view: View {
+                    speaks: true,
+                    peers: believes
+                        .iter()
+                        .map(|(p, i, s)| (PeerId(*p), (*i, *s)))
+                        .collect(),
+                    ..View::default()
+                },
+            })
+            .collect();
+        let graph = Graph::new(minds.iter().map(|m| m.id).collect(), |_, _| true);
+        stability.observe(now_ms, &graph, |_| 1, 10_000);
+        let look = Look {
+            now_ms,
+            loss_permille,
+            bounds: BOUNDS,
+            graph: &graph,
+            stability,
+            minds: &minds,
+            covered: &[],
+            loop_hash: 0,
+        };
+        m.on_look(&look, found);
+    }
+
+    #[test]
+    fn a_death_found_in_time_is_a_sample_and_one_missed_is_a_violation() {
+        for found_out in [true, false] {
+            let (mut m, mut found, mut s) = (
+                Membership::default(),
+                Findings::new(1),
+                Stability::default(),
+            );
+            m.on_life(0, 1, 1);
+            m.on_life(0, 2, 1);
+            m.on_belief(3000, (1, 2), (1, Status::Alive), &BOUNDS, Some(0));
+            m.on_silent(50_000, 2, true, 1);
+            if found_out {
+                m.on_belief(59_000, (1, 2), (1, Status::Down), &BOUNDS, None);
+                assert_eq!(m.detect_ms, [9000]);
+                assert_eq!(m.detected_ms(2), Some(59_000));
+            }
+            look_at(&mut m, &mut found, 61_000, 300, &[(1, &[])], &mut s);
+            assert!(found.counts.is_empty());
+            look_at(&mut m, &mut found, 63_000, 300, &[(1, &[])], &mut s);
+            look_at(&mut m, &mut found, 64_000, 300, &[(1, &[])], &mut s);
+            assert_eq!(
+                found.counts.get("detect").copied().unwrap_or(0),
+                u64::from(!found_out)
+            );
+        }
+    }
+
+    #[test]
+    fn a_living_peer_in_reach_declared_down_is_a_false_down() {
+        let mut m = Membership::default();
+        m.on_life(0, 1, 1);
+        m.on_life(0, 2, 1);
+        m.on_belief(60_000, (1, 2), (1, Status::Down), &BOUNDS, Some(55_000));
+        assert_eq!(m.false_downs, 0);
+        m.on_belief(60_000, (1, 2), (1, Status::Down), &BOUNDS, Some(10_000));
+        assert_eq!(m.false_downs, 1);
+    }
+
+    #[test]
+    fn disagreement_longer_than_the_bound_breaks_l1_only_without_loss() {
+        for (loss, broken) in [(0, true), (50, false), (300, false)] {
+            let (mut m, mut found, mut s) = (
+                Membership::default(),
+                Findings::new(1),
+                Stability::default(),
+            );
+            m.on_life(0, 1, 1);
+            m.on_life(0, 2, 1);
+            let views: [Believes<'_>; 2] =
+                [(1, &[(2, 1, Status::Down)]), (2, &[(1, 1, Status::Alive)])];
+            for t in 0..20 {
+                look_at(&mut m, &mut found, t * 1000, loss, &views, &mut s);
+            }
+            assert_eq!(found.counts.contains_key("L1"), broken, "loss {loss}");
+        }
+    }
+}

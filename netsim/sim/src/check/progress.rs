@@ -1,0 +1,258 @@
+//! Limits and progress: no zone entered (S2), every queue within its cap (S9), plans
+//! within endurance (S10), restarted peers productive again (L6), adoptions bounded (L7).
+
+use super::membership::Membership;
+use super::{Clocks, Findings, Look, Mind};
+use std::collections::BTreeMap;
+
+/// A plan may be longer than the fuel by this much, milliseconds: ETA and fuel are
+/// rounded to a millisecond and taken at two percepts half a second apart.
+const ETA_ROUNDING_MS: u32 = 1_000;
+
+/// What progress found out in one run.
+#[derive(Clone, Debug, Default)]
+pub struct ProgressCheck {
+    restarted: BTreeMap<u16, Restarted>,
+    over: Clocks<(u16, &'static str)>,
+    losses: u64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Restarted {
+    boot_ms: u64,
+    productive: bool,
+    told: bool,
+}
+
+impl ProgressCheck {
+    /// A peer was started again.
+    pub fn on_restart(&mut self, now_ms: u64, id: u16) {
+        self.restarted.insert(
+            id,
+            Restarted {
+                boot_ms: now_ms,
+                productive: false,
+                told: false,
+            },
+        );
+    }
+
+    /// A peer ended.
+    pub fn on_silent(&mut self, id: u16) {
+        self.restarted.remove(&id);
+        self.over.retain(|(p, _)| *p != id);
+    }
+
+    /// A peer saw cells that nobody had covered.
+    pub fn on_covered(&mut self, id: u16) {
+        if let Some(r) = self.restarted.get_mut(&id) {
+            r.productive = true;
+        }
+    }
+
+    /// Something happened that allows everybody one more adoption: a member lost or
+    /// new, or a cell orphaned.
+    pub fn on_loss(&mut self) {
+        self.losses += 1;
+    }
+
+    /// A UAV flew into a zone.
+    pub fn on_zone_entry(now_ms: u64, id: u16, zone: usize, found: &mut Findings) {
+        found.broken("S2", now_ms, Some(id), || format!("flew into zone {zone}"));
+    }
+
+    /// Looks at everybody's loads and plans.
+    pub fn on_look(&mut self, look: &Look<'_>, members: &Membership, found: &mut Findings) {
+        for m in look.minds {
+            self.check_limits(look.now_ms, m, found);
+            self.check_adoptions(look, m, found);
+        }
+        self.check_restarted(look, members, found);
+    }
+
+    fn check_limits(&mut self, now_ms: u64, m: &Mind, found: &mut Findings) {
+        for (name, used, cap) in &m.view.loads {
+            if self.exceeds((m.id, name), *used > *cap, now_ms) {
+                found.broken("S9", now_ms, Some(m.id), || {
+                    format!("{name}: {used} of at most {cap}")
+                });
+            }
+        }
+        let v = &m.view;
+        let short = !v.plan.is_empty() && v.eta_ms > v.spendable_ms.saturating_add(ETA_ROUNDING_MS);
+        if self.exceeds((m.id, "plan"), short, now_ms) {
+            found.broken("S10", now_ms, Some(m.id), || {
+                format!("plans {} ms with {} ms to spend", v.eta_ms, v.spendable_ms)
+            });
+        }
+    }
+
+    fn exceeds(&mut self, key: (u16, &'static str), over: bool, now_ms: u64) -> bool {
+        if !over {
+            self.over.stop(key);
+            return false;
+        }
+        self.over.start(key, now_ms);
+        self.over.tell_once(key)
+    }
+
+    /// L7: adoptions are bounded by cells and losses.
+    fn check_adoptions(&mut self, look: &Look<'_>, m: &Mind, found: &mut Findings) {
+        let cap = look.covered.len() as u64 + self.losses + 1;
+        if self.exceeds(
+            (m.id, "adoptions"),
+            m.view.loop_hash != 0 && u64::from(m.view.adoptions) > cap,
+            look.now_ms,
+        ) {
+            found.broken("L7", look.now_ms, Some(m.id), || {
+                format!("adopted {} divisions, {cap} are allowed", m.view.adoptions)
+            });
+        }
+    }
+
+    /// L6: a restarted peer covers, plans, is done, or is not needed: everything open is
+    /// listed by others, near whose seam it waits.
+    fn check_restarted(&mut self, look: &Look<'_>, members: &Membership, found: &mut Findings) {
+        let bounds = look.bounds;
+        for (id, r) in &mut self.restarted {
+            let Some(m) = look.mind(*id).filter(|m| m.uav && !r.productive) else {
+                continue;
+            };
+            let waits = m.view.able && all_listed(look);
+            if m.view.finished || !m.view.plan.is_empty() || waits {
+                r.productive = true;
+                continue;
+            }
+            let stable_ms = look
+                .stability
+                .component_since_ms(*id)
+                .unwrap_or(look.now_ms);
+            let from_ms = (r.boot_ms + bounds.probation_ms()).max(stable_ms);
+            let took_ms = look.now_ms.saturating_sub(from_ms);
+            if look
+                .grade()
+                .limit_ms(bounds.productive_ms())
+                .is_some_and(|l| took_ms > l)
+                && !r.told
+            {
+                r.told = true;
+                found.broken("L6", look.now_ms, Some(*id), || {
+                    format!(
+                        "restarted at {} ms (life {}), and {took_ms} ms after its probation neither covers nor plans (able: {})",
+                        r.boot_ms,
+                        members.life(*id),
+                        m.view.able
+                    )
+                });
+            }
+        }
+    }
+}
+
+/// Whether every cell is covered or in somebody's plan.
+fn all_listed(look: &Look<'_>) -> bool {
+    let mut open: Vec<bool> = look.covered.iter().map(|c| !c).collect();
+    for m in look
+        .minds
+        .iter()
+        .filter(|m| m.view.loop_hash == look.loop_hash)
+    {
+        for c in m
+            .view
+            .plan
+            .iter()
+            .chain(&m.view.held)
+            .chain(&m.view.unassigned)
+        {
+            if let Some(o) = open.get_mut(usize::from(*c)) {
+                *o = false;
+            }
+        }
+    }
+    open.iter().all(|o| !o)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Bounds, Graph, Stability};
+    use super::*;
+    use skein_peer::View;
+
+    fn run(view: &View, seconds: u64, restart: bool) -> BTreeMap<&'static str, u64> {
+        let (mut check, mut found, mut s) = (
+            ProgressCheck::default(),
+            Findings::new(1),
+            Stability::default(),
+        );
+        if restart {
+            check.on_restart(0, 1);
+        }
+        for t in 0..seconds {
+            let minds = [Mind {
+                id: 1,
+                uav: true,
+                since_ms: 0,
+                view: view.clone(),
+            }];
+            let graph = Graph::new(vec![1], |_, _| false);
+            s.observe(t * 1000, &graph, |_| 1, 10_000);
+            let look = Look {
+                now_ms: t * 1000,
+                loss_permille: 0,
+                bounds: Bounds {
+                    period_ms: 1000,
+                    diameter: 1,
+                },
+                graph: &graph,
+                stability: &s,
+                minds: &minds,
+                covered: &[false, false],
+                loop_hash: 3,
+            };
+            check.on_look(&look, &Membership::default(), &mut found);
+        }
+        found.counts
+    }
+
+    #[test]
+    fn limits_are_kept_or_told_once() {
+        let good = View {
+            loop_hash: 3,
+            plan: vec![0],
+            eta_ms: 5000,
+            spendable_ms: 6000,
+            adoptions: 3,
+            loads: vec![("queue", 4, 4)],
+            ..View::default()
+        };
+        assert!(run(&good, 3, false).is_empty());
+        let bad = View {
+            spendable_ms: 1000,
+            adoptions: 4,
+            loads: vec![("queue", 5, 4)],
+            ..good
+        };
+        assert_eq!(
+            run(&bad, 3, false),
+            BTreeMap::from([("L7", 1), ("S10", 1), ("S9", 1)])
+        );
+    }
+
+    #[test]
+    fn a_restarted_peer_that_stays_idle_beside_open_cells_breaks_l6() {
+        let idle = View {
+            loop_hash: 3,
+            able: true,
+            ..View::default()
+        };
+        assert!(run(&idle, 23, true).is_empty());
+        assert_eq!(run(&idle, 26, true), BTreeMap::from([("L6", 1)]));
+        let busy = View {
+            plan: vec![1],
+            spendable_ms: 9,
+            ..idle.clone()
+        };
+        assert!(run(&busy, 60, true).is_empty());
+        assert!(run(&idle, 60, false).is_empty());
+    }
+}

@@ -1,0 +1,302 @@
+//! What peers say against what they promised: versions never go back (S3), one
+//! speaker a key (S4), no promise before it is durable (S7), and a journal that gives
+//! back the state it was written from (S11).
+
+use super::{Findings, Look};
+use skein_peer::View;
+use skein_peer::journal::Durable;
+use skein_peer::wire::codec::{self, Body};
+use skein_peer::wire::kinds::Kind;
+use skein_peer::wire::message::{Epoch, Firmness, Record, Register, Stamp};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A transmission that a peer wrote itself, read back.
+#[derive(Clone, Debug)]
+pub struct Said {
+    /// The envelope.
+    pub record: Record,
+    /// The body.
+    pub body: Body,
+    /// The section, where it is a claim.
+    pub claim: Option<Arc<Register>>,
+}
+
+impl Said {
+    /// Reads bytes that a peer of ours published; `None` when they cannot be read.
+    #[must_use]
+    pub fn read(bytes: &[u8]) -> Option<Self> {
+        let record = codec::decode_record(bytes).ok()?;
+        let kind = Kind::of_number(record.kind)?;
+        let body = codec::decode_body(kind, &record.body).ok()?;
+        let claim = match &body {
+            Body::Claim(register) => Some(Arc::new(register.clone())),
+            _ => None,
+        };
+        Some(Self {
+            record,
+            body,
+            claim,
+        })
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Versions {
+    incarnation: u32,
+    counter: u32,
+    epoch: Epoch,
+}
+
+/// What the records of one run were found to be.
+#[derive(Clone, Debug, Default)]
+pub struct RecordCheck {
+    /// By author and key: life, highest number, hash of what was said under it.
+    spoken: BTreeMap<(u16, u8, u16), (u32, u32, u64)>,
+    versions: BTreeMap<u16, Versions>,
+    durable: BTreeMap<u16, (usize, Durable)>,
+}
+
+impl RecordCheck {
+    /// The disk of a peer was erased: what it promised is forgotten.
+    pub fn on_erased(&mut self, id: u16) {
+        self.durable.remove(&id);
+        self.versions.remove(&id);
+    }
+
+    /// A peer says something of its own. `journal` is what its disk holds for certain.
+    pub fn on_said(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        said: &Said,
+        bytes_hash: u64,
+        journal: &[Vec<u8>],
+        found: &mut Findings,
+    ) {
+        let r = &said.record;
+        if r.author != id {
+            found.broken("S4", now_ms, Some(id), || {
+                format!("spoke under the name of peer {}", r.author)
+            });
+            return;
+        }
+        self.check_speaker(now_ms, r, bytes_hash, found);
+        self.check_promises(now_ms, id, said, journal, found);
+    }
+
+    fn check_speaker(&mut self, now_ms: u64, r: &Record, bytes_hash: u64, found: &mut Findings) {
+        let key = (r.author, r.kind, r.subject);
+        let Some((life, seq, hash)) = self.spoken.insert(key, (r.incarnation, r.seq, bytes_hash))
+        else {
+            return;
+        };
+        let fits = match r.incarnation.cmp(&life) {
+            core::cmp::Ordering::Less => false,
+            core::cmp::Ordering::Equal => r.seq > seq || (r.seq == seq && hash == bytes_hash),
+            core::cmp::Ordering::Greater => true,
+        };
+        if !fits {
+            found.broken("S4", now_ms, Some(r.author), || {
+                format!(
+                    "kind {} subject {}: version ({}, {}) after ({life}, {seq})",
+                    r.kind, r.subject, r.incarnation, r.seq
+                )
+            });
+        }
+    }
+
+    fn check_promises(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        said: &Said,
+        journal: &[Vec<u8>],
+        found: &mut Findings,
+    ) {
+        let known = self.durable.get(&id);
+        let stale = known.is_none_or(|(n, _)| *n != journal.len());
+        let new_life = known.is_none_or(|(_, d)| d.incarnation != said.record.incarnation);
+        let promise = matches!(said.body, Body::Claim(_) | Body::Round(_));
+        // Replaying costs a pass over the journal, so it is done only when a promise is spoken.
+        if stale && (promise || new_life) {
+            self.durable
+                .insert(id, (journal.len(), Durable::replay(journal).0));
+        }
+        let Some((_, durable)) = self.durable.get(&id) else {
+            return;
+        };
+        if said.record.incarnation > durable.incarnation {
+            found.broken("S7", now_ms, Some(id), || {
+                format!(
+                    "speaks in life {}, its disk holds {}",
+                    said.record.incarnation, durable.incarnation
+                )
+            });
+        }
+        match &said.body {
+            Body::Round(snapshot) => {
+                let kept = durable
+                    .snapshot
+                    .as_ref()
+                    .is_some_and(|s| s == snapshot || s.round.counter > snapshot.round.counter);
+                if !kept {
+                    found.broken("S7", now_ms, Some(id), || {
+                        format!(
+                            "bids in round {}, which its disk does not hold",
+                            snapshot.round.counter
+                        )
+                    });
+                }
+            }
+            Body::Claim(register) => {
+                if let Some(text) = unpersisted(register, durable.register.as_ref()) {
+                    found.broken("S7", now_ms, Some(id), || text);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A process ended: its journal gives back what it believed to be durable.
+    pub fn on_crash(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        believed: &Durable,
+        journal: &[Vec<u8>],
+        found: &mut Findings,
+    ) {
+        let (replayed, unread) = Durable::replay(journal);
+        if replayed != *believed || unread > 0 {
+            found.broken("S11", now_ms, Some(id), || {
+                format!("replaying {} records ({unread} unread) gives {replayed:?}, it believed {believed:?}", journal.len())
+            });
+        }
+    }
+
+    /// Versions never go back, within a life and across restarts with a disk.
+    pub fn on_look(&mut self, look: &Look<'_>, found: &mut Findings) {
+        for m in look.minds {
+            let now = versions(&m.view);
+            let old = self.versions.insert(m.id, now).unwrap_or_default();
+            // A boot that has not read its journal yet has no life.
+            if now.incarnation == 0 {
+                self.versions.insert(m.id, old);
+                continue;
+            }
+            let loop_known = m.view.loop_hash != 0;
+            let back = now.incarnation < old.incarnation
+                || (loop_known && (now.counter < old.counter || now.epoch < old.epoch));
+            if !loop_known {
+                self.versions.insert(
+                    m.id,
+                    Versions {
+                        incarnation: now.incarnation,
+                        ..old
+                    },
+                );
+            }
+            if back {
+                found.broken("S3", look.now_ms, Some(m.id), || {
+                    format!("went back from {old:?} to {now:?}")
+                });
+            }
+        }
+    }
+}
+
+fn versions(v: &View) -> Versions {
+    Versions {
+        incarnation: v.incarnation,
+        counter: v.counter,
+        epoch: v.epoch,
+    }
+}
+
+/// A listed cell that no durable section lists at that stamp, as a sentence.
+fn unpersisted(said: &Register, durable: Option<&Register>) -> Option<String> {
+    let mut promised: BTreeMap<u16, Stamp> = BTreeMap::new();
+    if let Some(d) = durable {
+        for l in d.plan.iter().chain(&d.held) {
+            for k in 0..l.run.count {
+                let s = promised
+                    .entry(l.run.first.wrapping_add(k))
+                    .or_insert(l.stamp);
+                *s = (*s).max(l.stamp);
+            }
+        }
+    }
+    for l in said.plan.iter().filter(|l| l.firmness != Firmness::Done) {
+        for k in 0..l.run.count {
+            let cell = l.run.first.wrapping_add(k);
+            if promised.get(&cell).is_none_or(|s| *s < l.stamp) {
+                return Some(format!(
+                    "lists cell {cell} at {:?}, its disk holds {:?}",
+                    l.stamp,
+                    promised.get(&cell)
+                ));
+            }
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skein_peer::wire::message::{Listing, Run};
+
+    fn register(counter: u32, count: u16) -> Register {
+        Register {
+            plan: vec![Listing {
+                run: Run { first: 3, count },
+                backward: false,
+                firmness: Firmness::Tentative,
+                stamp: Stamp {
+                    epoch: Epoch { counter, hash: 0 },
+                    take: 0,
+                    id: 1,
+                },
+            }],
+            ..Register::default()
+        }
+    }
+
+    #[test]
+    fn a_section_may_shrink_but_not_grow_beyond_what_is_durable() {
+        let durable = register(4, 5);
+        assert_eq!(unpersisted(&register(4, 5), Some(&durable)), None);
+        assert_eq!(unpersisted(&register(4, 2), Some(&durable)), None);
+        assert!(unpersisted(&register(4, 6), Some(&durable)).is_some());
+        assert!(unpersisted(&register(5, 5), Some(&durable)).is_some());
+        assert!(unpersisted(&register(4, 1), None).is_some());
+    }
+
+    #[test]
+    fn a_key_has_one_speaker_whose_numbers_rise() {
+        let said = |incarnation, seq, body: &[u8]| Record {
+            author: 1,
+            incarnation,
+            seq,
+            kind: 2,
+            subject: 0,
+            body: body.to_vec(),
+            signature: Vec::new(),
+        };
+        type Case<'a> = (&'a [(u32, u32, u64)], u64);
+        let cases: [Case<'_>; 4] = [
+            (&[(1, 1, 5), (1, 2, 6), (2, 1, 7)], 0),
+            (&[(1, 2, 5), (1, 2, 5)], 0),
+            (&[(1, 2, 5), (1, 2, 6)], 1),
+            (&[(2, 1, 5), (1, 9, 6)], 1),
+        ];
+        for (sequence, broken) in cases {
+            let (mut c, mut found) = (RecordCheck::default(), Findings::new(1));
+            for (life, seq, hash) in sequence {
+                c.check_speaker(0, &said(*life, *seq, b"x"), *hash, &mut found);
+            }
+            assert_eq!(found.counts.get("S4").copied().unwrap_or(0), broken);
+        }
+    }
+}

@@ -1,0 +1,268 @@
+//! What many runs come to: one set of figures, the same for any order of the runs.
+
+use crate::check::{Grade, Violation};
+use crate::swarm::Outcome;
+use serde::Serialize;
+use skein_peer::wire::Fnv;
+use std::collections::BTreeMap;
+
+/// Violations that a summary quotes.
+const QUOTED: usize = 20;
+
+/// Three figures that describe many.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Spread {
+    /// Half are at most this.
+    pub p50: f64,
+    /// 95 of 100 are at most this.
+    pub p95: f64,
+    /// The largest.
+    pub max: f64,
+    /// How many there were.
+    pub n: usize,
+}
+
+impl Spread {
+    /// Of any number of values (nearest rank); all zero for none.
+    #[must_use]
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let n = values.len();
+        let rank = |percent: usize| {
+            let r = (n * percent).div_ceil(100).max(1);
+            values.get(r - 1).copied().unwrap_or(0.0)
+        };
+        Self {
+            p50: rank(50),
+            p95: rank(95),
+            max: rank(100),
+            n,
+        }
+    }
+}
+
+/// How often a batch reached the hard places.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Places {
+    /// Takeovers of cells that had been taken over before.
+    pub takeover_of_takeover: u32,
+    /// Partitions in which both sides planned.
+    pub both_halves_planned: u32,
+    /// Restarts during a round.
+    pub restart_in_round: u32,
+    /// Losses of a relay that joined two parts.
+    pub articulation_lost: u32,
+    /// Revisions that arrived one peer at a time.
+    pub staggered_revision: u32,
+}
+
+/// The figures of a batch.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Summary {
+    /// Runs.
+    pub runs: usize,
+    /// Runs that covered everything and ended in time.
+    pub completed: usize,
+    /// Runs that ended with cells beyond anybody's endurance.
+    pub infeasible: usize,
+    /// Violations by rule; empty when all held.
+    pub violations: BTreeMap<String, u64>,
+    /// The least share of the coverable cells covered in any run.
+    pub coverage_min: f64,
+    /// Makespan relative to the reference, over the runs where it was computed.
+    pub makespan_ratio: Spread,
+    /// From a death to its detection by each live peer, seconds.
+    pub detect_s: Spread,
+    /// From the detection of a death to the last of its cells being listed again, seconds.
+    pub takeover_s: Spread,
+    /// Living peers in reach declared Down, at a loss of at most a tenth.
+    pub false_downs_per_peer_hour: f64,
+    /// The same at any loss.
+    pub false_downs_per_peer_hour_at_any_loss: f64,
+    /// Bytes transmitted per second and running peer.
+    pub bytes_per_peer_s: f64,
+    /// Simulated seconds per second of wall time.
+    pub real_time_factor: f64,
+    /// Graded liveness under light loss: time taken as a share of the bound.
+    pub liveness_share: BTreeMap<String, Spread>,
+    /// How many runs killed how many UAVs for good.
+    pub dead: BTreeMap<u32, usize>,
+    /// How often the hard places were reached.
+    pub reached: Places,
+    /// Seeds that failed.
+    pub failed_seeds: Vec<u64>,
+    /// The first violations, in the order of seeds.
+    pub quoted: Vec<Violation>,
+    /// Hash over the histories of all runs, in the order of seeds, hexadecimal.
+    pub history_hash: String,
+}
+
+/// Whether a run failed: it did not complete, was infeasible, or broke a rule.
+#[must_use]
+pub fn failed(o: &Outcome) -> bool {
+    !o.completed || o.infeasible || !o.violation_counts.is_empty()
+}
+
+/// Sums up runs in any order. `wall_s` is how long the batch took.
+#[must_use]
+pub fn summarise(mut runs: Vec<Outcome>, wall_s: f64) -> Summary {
+    runs.sort_by_key(|o| o.seed);
+    let mut s = Summary {
+        runs: runs.len(),
+        completed: runs.iter().filter(|o| o.completed).count(),
+        infeasible: runs.iter().filter(|o| o.infeasible).count(),
+        coverage_min: runs.iter().map(|o| o.coverage).fold(1.0, f64::min),
+        makespan_ratio: Spread::of(runs.iter().filter_map(|o| o.makespan_ratio).collect()),
+        detect_s: Spread::of(
+            runs.iter()
+                .flat_map(|o| &o.detect_ms)
+                .map(|ms| seconds(*ms))
+                .collect(),
+        ),
+        takeover_s: Spread::of(runs.iter().flat_map(takeover_s).collect()),
+        failed_seeds: runs.iter().filter(|o| failed(o)).map(|o| o.seed).collect(),
+        quoted: runs
+            .iter()
+            .flat_map(|o| o.violations.iter().cloned())
+            .take(QUOTED)
+            .collect(),
+        ..Summary::default()
+    };
+    add_rates(&mut s, &runs, wall_s);
+    add_violations(&mut s, &runs);
+    let mut hash = Fnv::new();
+    for o in &runs {
+        hash.write(&o.seed.to_le_bytes());
+        hash.write(&o.history_hash.to_le_bytes());
+        *s.dead.entry(o.dead).or_default() += 1;
+        s.reached.takeover_of_takeover += o.reached.takeover_of_takeover;
+        s.reached.both_halves_planned += o.reached.both_halves_planned;
+        s.reached.restart_in_round += o.reached.restart_in_round;
+        s.reached.articulation_lost += o.reached.articulation_lost;
+        s.reached.staggered_revision += o.reached.staggered_revision;
+    }
+    s.history_hash = format!("{:016x}", hash.finish());
+    s
+}
+
+fn add_rates(s: &mut Summary, runs: &[Outcome], wall_s: f64) {
+    let peer_s = |light: bool| {
+        let of = runs
+            .iter()
+            .filter(|o| !light || Grade::of(o.loss_permille) != Grade::Reported);
+        let (mut ms, mut downs) = (0, 0);
+        for o in of {
+            ms += o.peer_ms;
+            downs += o.false_downs;
+        }
+        (seconds(ms), downs)
+    };
+    #[allow(
+        clippy::cast_precision_loss,
+        reason = "a batch stays below 2^52 of anything"
+    )]
+    let per = |n: u64, d: f64| if d > 0.0 { n as f64 / d } else { 0.0 };
+    let (light_s, light_downs) = peer_s(true);
+    let (all_s, all_downs) = peer_s(false);
+    s.false_downs_per_peer_hour = per(light_downs, light_s / 3600.0);
+    s.false_downs_per_peer_hour_at_any_loss = per(all_downs, all_s / 3600.0);
+    s.bytes_per_peer_s = per(runs.iter().map(|o| o.bytes).sum(), all_s);
+    let simulated_s: f64 = runs.iter().map(|o| seconds(o.end_ms)).sum();
+    s.real_time_factor = if wall_s > 0.0 {
+        simulated_s / wall_s
+    } else {
+        0.0
+    };
+}
+
+/// Violations of single runs, and bounds that 95 of 100 cases under light loss should
+/// keep and did not.
+fn add_violations(s: &mut Summary, runs: &[Outcome]) {
+    let mut shares: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for o in runs {
+        for (check, n) in &o.violation_counts {
+            *s.violations.entry((*check).to_owned()).or_default() += n;
+        }
+        for (check, values) in &o.ratios {
+            shares.entry(check).or_default().extend(values);
+        }
+    }
+    for (check, values) in shares {
+        let spread = Spread::of(values);
+        if spread.p95 > 1.0 {
+            *s.violations.entry(format!("{check}-p95")).or_default() += 1;
+        }
+        s.liveness_share.insert(check.to_owned(), spread);
+    }
+}
+
+fn takeover_s(o: &Outcome) -> Vec<f64> {
+    let times = o.takeovers.iter().filter(|t| t.cells > 0);
+    times
+        .filter_map(|t| t.taken_ms.zip(t.detected_ms))
+        .map(|(taken, detected)| seconds(taken.saturating_sub(detected)))
+        .collect()
+}
+
+#[allow(clippy::cast_precision_loss, reason = "times stay below 2^52 ms")]
+fn seconds(ms: u64) -> f64 {
+    ms as f64 / 1000.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_are_nearest_ranks() {
+        let s = Spread::of((1..=100).map(f64::from).collect());
+        assert_eq!((s.p50, s.p95, s.max, s.n), (50.0, 95.0, 100.0, 100));
+        assert_eq!(
+            Spread::of(vec![7.0]),
+            Spread {
+                p50: 7.0,
+                p95: 7.0,
+                max: 7.0,
+                n: 1
+            }
+        );
+        assert_eq!(Spread::of(Vec::new()), Spread::default());
+    }
+
+    #[test]
+    fn the_order_of_the_runs_does_not_matter() {
+        let run = |seed: u64| Outcome {
+            seed,
+            completed: true,
+            coverage: 1.0,
+            end_ms: 1000,
+            peer_ms: 9000,
+            bytes: 900,
+            history_hash: seed * 77,
+            ..Outcome::default()
+        };
+        let forward = summarise((0..9).map(run).collect(), 1.0);
+        let backward = summarise((0..9).rev().map(run).collect(), 1.0);
+        assert_eq!(forward, backward);
+        assert_eq!((forward.runs, forward.completed), (9, 9));
+        assert!((forward.bytes_per_peer_s - 100.0).abs() < 1e-9);
+        let other = summarise((1..10).map(run).collect(), 1.0);
+        assert_ne!(forward.history_hash, other.history_hash);
+    }
+
+    #[test]
+    fn a_bound_that_one_case_in_ten_misses_under_light_loss_is_a_violation() {
+        let run = |share: f64| Outcome {
+            ratios: BTreeMap::from([(
+                "L2",
+                (0..10).map(|i| if i == 0 { share } else { 0.5 }).collect(),
+            )]),
+            ..Outcome::default()
+        };
+        assert_eq!(
+            summarise(vec![run(3.0)], 1.0).violations.get("L2-p95"),
+            Some(&1)
+        );
+        assert!(summarise(vec![run(0.9)], 1.0).violations.is_empty());
+    }
+}

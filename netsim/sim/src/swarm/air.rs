@@ -1,0 +1,165 @@
+//! The world and the radio as the driver of a swarm uses them: airframes, links,
+//! channel, judge, in milliseconds of scenario time.
+
+use super::stream::{Concern, Stream};
+use crate::chaos::Fault;
+use crate::check::Graph;
+use crate::radio::{Delivery, Frame, LinkTable, Medium, Overlay};
+use crate::spec::RadioSpec;
+use crate::stage::Stage;
+use crate::world::{Fact, World};
+use skein_behaviors::{Percept, Setpoint};
+use skein_link::Reason;
+use skein_planning::coverage::area::CellId;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// World, links and channel of one run.
+#[derive(Debug)]
+pub struct Air {
+    world: World,
+    links: LinkTable,
+    overlay: Overlay,
+    medium: Medium,
+    radio: RadioSpec,
+    /// A fault or a loss made the links stale.
+    stale: bool,
+}
+
+impl Air {
+    /// Everything at time 0.
+    #[must_use]
+    pub fn new(stage: &Stage, seed: u64) -> Self {
+        let radio_seed = Stream::new(seed, Concern::Radio).any();
+        let world = World::on(Arc::clone(&stage.site), &stage.spec, seed);
+        let radio = stage.spec.radio;
+        Self {
+            links: LinkTable::new(world.nodes(), radio),
+            medium: Medium::new(world.nodes(), radio, radio_seed),
+            overlay: Overlay::default(),
+            world,
+            radio,
+            stale: true,
+        }
+    }
+
+    /// Moves everything on to a time.
+    pub fn advance(&mut self, to_ms: u64) {
+        self.world.advance(to_ms);
+        self.refresh();
+    }
+
+    fn refresh(&mut self) {
+        if std::mem::take(&mut self.stale) {
+            self.links.compute(&self.world, &self.overlay);
+        } else {
+            self.links.refresh(&self.world, &self.overlay);
+        }
+    }
+
+    /// What the world recorded since the last call.
+    pub fn facts(&mut self) -> Vec<Fact> {
+        self.world.take_facts()
+    }
+
+    /// What a UAV senses; nothing once its airframe is gone.
+    #[must_use]
+    pub fn percept(&self, id: u16) -> Option<Percept> {
+        self.world.percept(id)
+    }
+
+    /// Hands a setpoint to an airframe.
+    pub fn apply(&mut self, id: u16, setpoint: Setpoint) {
+        self.world.apply(id, setpoint);
+    }
+
+    /// A computer starts, in a new airframe where the old one is gone.
+    pub fn start(&mut self, id: u16) {
+        self.world.respawn(id);
+        self.stale = true;
+    }
+
+    /// A computer ends, and its airframe with it or not.
+    pub fn stop(&mut self, id: u16, airframe: bool) {
+        if airframe {
+            self.world.kill(id);
+        }
+        self.world.set_computer(id, false);
+        self.medium.silence(id);
+        self.stale = true;
+    }
+
+    /// Takes a fault that concerns the radio.
+    pub fn strike(&mut self, fault: &Fault) {
+        if self.overlay.apply(fault) {
+            self.stale = true;
+        }
+    }
+
+    /// The share of transmissions lost in force, thousandths.
+    #[must_use]
+    pub fn loss_permille(&self) -> u16 {
+        self.overlay.loss_permille(&self.radio)
+    }
+
+    /// Puts a frame into a transmitter's queue.
+    pub fn transmit(&mut self, now_ms: u64, id: u16, frame: Frame) {
+        self.medium.submit(now_ms * 1000, id, frame);
+    }
+
+    /// When the channel wants [`Air::carry`] next: the first whole millisecond after it.
+    #[must_use]
+    pub fn next_ms(&self) -> Option<u64> {
+        self.medium.next_event().map(|us| us.div_ceil(1000))
+    }
+
+    /// Lets the channel do what is due, and returns what got through.
+    pub fn carry(&mut self, now_ms: u64) -> Vec<Delivery> {
+        if self.stale {
+            self.refresh();
+        }
+        self.medium.advance(now_ms * 1000, &self.links)
+    }
+
+    /// The true graph among some radios.
+    pub fn graph(&mut self, ids: Vec<u16>) -> Graph {
+        self.refresh();
+        Graph::new(ids, |a, b| self.links.joined(a, b))
+    }
+
+    /// Whether the judge saw a camera cover this cell.
+    #[must_use]
+    pub fn is_covered(&self, cell: CellId) -> bool {
+        self.world.judge().sighting(cell).is_some()
+    }
+
+    /// Whether every coverable cell is covered.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.world.judge().complete()
+    }
+
+    /// Share of the coverable cells that are covered, 0 to 1.
+    #[must_use]
+    pub fn coverage(&self) -> f64 {
+        self.world.judge().covered_share()
+    }
+
+    /// Smallest distance between two airborne UAVs so far, metres.
+    #[must_use]
+    pub fn separation_m(&self) -> Option<f64> {
+        self.world.judge().closest().map(|a| a.distance_m)
+    }
+
+    /// Bytes all peers transmitted.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.medium.total().bytes
+    }
+
+    /// Receptions that failed and frames never sent, by reason.
+    #[must_use]
+    pub fn lost(&self) -> BTreeMap<Reason, u64> {
+        self.medium.total().dropped
+    }
+}

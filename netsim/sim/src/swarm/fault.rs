@@ -1,0 +1,143 @@
+//! What each fault does to a simulated swarm. A fault that does not fit the state of
+//! its peer (restarting one that runs) changes nothing.
+
+use super::slot::Process;
+use super::{Event, Kind, Phase, Swarm, What};
+use crate::chaos::Fault;
+use skein_peer::{Input, Role};
+
+impl Swarm {
+    /// Applies a fault now.
+    pub fn strike(&mut self, fault: &Fault) {
+        self.history
+            .keep(self.now_ms, || What::Fault(fault.clone()));
+        self.air.advance(self.now_ms);
+        self.air.strike(fault);
+        let subject = match fault {
+            Fault::Kill { peer } | Fault::KillComputer { peer } | Fault::Terminate { peer } => {
+                let airframe = matches!(fault, Fault::Kill { .. });
+                if let Some(slot) = self.slot_of(*peer) {
+                    self.end_process(slot, airframe);
+                }
+                *peer
+            }
+            Fault::Pause { peer } => {
+                self.pause(*peer);
+                *peer
+            }
+            Fault::Resume { peer } => {
+                self.resume(*peer);
+                *peer
+            }
+            Fault::Restart { peer, fresh_disk } => {
+                if let Some(slot) = self.slot_of(*peer)
+                    && self.slots[slot].process == Process::Stopped
+                {
+                    self.boot(slot, true, *fresh_disk);
+                }
+                *peer
+            }
+            Fault::Cut { a, .. } => *a,
+            Fault::Partition { groups } => {
+                let named = groups.iter().enumerate();
+                self.sides = named
+                    .flat_map(|(i, g)| g.iter().map(move |p| (*p, i)))
+                    .collect();
+                self.checker.on_partition(true, |_| 0);
+                0
+            }
+            Fault::Heal => {
+                let sides = std::mem::take(&mut self.sides);
+                self.checker
+                    .on_partition(false, |id| sides.get(&id).copied().unwrap_or(usize::MAX));
+                0
+            }
+            Fault::Loss { permille } => {
+                self.loss_max_permille = self.loss_max_permille.max(*permille);
+                *permille
+            }
+        };
+        self.history.fold(self.now_ms, subject, Kind::Fault, 0);
+        self.observe_graph();
+    }
+
+    /// Starts a process, with a new airframe where the old one is gone.
+    pub(super) fn boot(&mut self, slot: usize, again: bool, fresh: bool) {
+        let now_ms = self.now_ms;
+        let s = &mut self.slots[slot];
+        if fresh {
+            s.disk.erase();
+        }
+        let uav = s.config.role == Role::Uav;
+        if uav {
+            s.airframe = true;
+            self.air.start(s.id());
+        }
+        let start = s.start(now_ms);
+        let (id, boot) = (s.id(), s.boots);
+        self.history.fold(now_ms, id, Kind::Boot, u64::from(boot));
+        self.checker.on_boot(now_ms, id, again, fresh);
+        self.feed(slot, start);
+        if uav {
+            let first_ms = self.first_percept_ms(slot);
+            self.queue
+                .push(first_ms, Phase::Sense, Event::Percept { slot, boot });
+        }
+    }
+
+    /// The process ends, and the airframe with it or not.
+    fn end_process(&mut self, slot: usize, airframe: bool) {
+        let now_ms = self.now_ms;
+        let s = &mut self.slots[slot];
+        let id = s.id();
+        s.airframe &= !airframe;
+        self.air.stop(id, airframe);
+        if s.process == Process::Stopped {
+            return;
+        }
+        self.kills += 1;
+        if let Some(peer) = s.stop(now_ms) {
+            let believed = peer.durable();
+            self.checker
+                .on_crash(now_ms, id, &believed, self.slots[slot].disk.records());
+        }
+        self.refresh_covered();
+        self.checker.on_silent(now_ms, id, true, &self.covered);
+    }
+
+    /// The world took the airframe: out of fuel, or flown into something.
+    pub(super) fn airframe_lost(&mut self, slot: usize) {
+        self.end_process(slot, true);
+        self.observe_graph();
+    }
+
+    fn pause(&mut self, id: u16) {
+        if let Some(slot) = self.slot_of(id)
+            && self.slots[slot].process == Process::Running
+        {
+            self.slots[slot].stand_still(self.now_ms);
+            self.checker
+                .on_silent(self.now_ms, id, false, &self.covered);
+        }
+    }
+
+    /// What waited is handled at once, in order; what the peer says to it comes late.
+    fn resume(&mut self, id: u16) {
+        let Some(slot) = self.slot_of(id) else {
+            return;
+        };
+        let s = &mut self.slots[slot];
+        if s.process != Process::Paused {
+            return;
+        }
+        s.process = Process::Running;
+        s.since_ms = self.now_ms;
+        s.timer_ms = None;
+        let waiting: Vec<Input> = s.inbox.drain(..).collect();
+        self.checker.on_resume(id);
+        for input in waiting {
+            self.feed(slot, input);
+        }
+        self.feed(slot, Input::Timer);
+    }
+}

@@ -1,0 +1,640 @@
+//! A swarm in virtual time: N peers, one world, one radio, one seed, one clock.
+//!
+//! The order of a tick is fixed: act → move → radio → sense → decide (see
+//! [`queue::Phase`]). One run is single-threaded and owes everything to its seed, its
+//! scenario and its faults: the same three give the same history, event for event.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`queue`] | the event queue |
+//! | [`stream`] | independent random streams |
+//! | [`slot`] | one peer: process, clock, disk, inbox |
+//! | [`air`] | the world and the medium as the driver uses them |
+//! | [`ground`] | common ground derived once |
+//! | [`fault`] | what each fault does |
+//! | [`outcome`] | what a run came to |
+
+pub mod air;
+pub mod fault;
+pub mod ground;
+pub mod outcome;
+pub mod queue;
+pub mod slot;
+pub mod stream;
+
+pub use ground::Grounds;
+pub use outcome::Outcome;
+
+use crate::chaos::TimedFault;
+use crate::check::record::Said;
+use crate::check::{Checker, Mind};
+use crate::history::{History, Kind, What, bytes_hash, report_hash};
+use crate::radio::{Delivery, Frame};
+use crate::spec::Spec;
+use crate::stage::Stage;
+use crate::world::Fact;
+use air::Air;
+use queue::{Phase, Queue};
+use skein_behaviors::Setpoint;
+use skein_peer::plan::{Answer, Problem};
+use skein_peer::wire::message::Register;
+use skein_peer::{Input, Output, PeerConfig, PeerId, Report, Role, View};
+use slot::{Process, Slot};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// How long a division is modelled to take, milliseconds: ten times what a desktop
+/// needs for the largest ring, about what a flight computer does.
+const DIVIDE_MS: u64 = 50;
+/// How long deriving the loop is modelled to take, milliseconds.
+const GROUND_MS: u64 = 200;
+
+/// Something to come.
+#[derive(Debug)]
+enum Event {
+    Fault(usize),
+    Percept {
+        slot: usize,
+        boot: u32,
+    },
+    Timer {
+        slot: usize,
+        boot: u32,
+        due_ms: u64,
+    },
+    Stored {
+        slot: usize,
+        boot: u32,
+    },
+    Planned {
+        slot: usize,
+        boot: u32,
+        token: u64,
+        answer: Answer,
+    },
+    Receive(Vec<Delivery>),
+    Look,
+}
+
+/// A run under way.
+#[derive(Debug)]
+pub struct Swarm {
+    spec: Arc<Spec>,
+    seed: u64,
+    now_ms: u64,
+    end_ms: u64,
+    queue: Queue<Event>,
+    slots: Vec<Slot>,
+    air: Air,
+    grounds: Grounds,
+    faults: Vec<TimedFault>,
+    history: History,
+    checker: Checker,
+    covered: Vec<bool>,
+    loop_hash: u64,
+    covered_ms: Option<u64>,
+    /// Sections spoken so far, by hash of their bytes: author, life, section.
+    claims: BTreeMap<u64, (u16, u32, Arc<Register>)>,
+    done: bool,
+    unassigned: bool,
+    kills: u32,
+    /// Which group of the last partition each peer was in.
+    sides: BTreeMap<u16, usize>,
+    loss_max_permille: u16,
+}
+
+impl Swarm {
+    /// A swarm before its first event. `keep` keeps the main events for a timeline.
+    #[must_use]
+    pub fn new(stage: &Stage, seed: u64, faults: Vec<TimedFault>, keep: bool) -> Self {
+        let spec = &stage.spec;
+        let mut grounds = stage.grounds.clone();
+        let loop_of = grounds.of(&spec.mission);
+        let (covered, loop_hash) = loop_of.map_or((Vec::new(), 0), |g| {
+            (vec![false; g.coverage_loop.len()], g.coverage_loop.hash())
+        });
+        let mut swarm = Self {
+            spec: Arc::clone(spec),
+            seed,
+            now_ms: 0,
+            end_ms: u64::from(spec.max_time_s) * 1000,
+            queue: Queue::default(),
+            slots: slots(spec, seed),
+            air: Air::new(stage, seed),
+            grounds,
+            faults,
+            history: History::new(keep),
+            checker: Checker::new(seed, spec.beacon_period_ms),
+            covered,
+            loop_hash,
+            covered_ms: None,
+            claims: BTreeMap::new(),
+            done: false,
+            unassigned: false,
+            kills: 0,
+            sides: BTreeMap::new(),
+            loss_max_permille: spec.radio.loss_permille,
+        };
+        for (i, f) in swarm.faults.iter().enumerate() {
+            swarm.queue.push(f.at_ms, Phase::Act, Event::Fault(i));
+        }
+        for slot in 0..swarm.slots.len() {
+            swarm.boot(slot, false, false);
+        }
+        swarm
+            .queue
+            .push(swarm.period_ms(), Phase::Judge, Event::Look);
+        swarm
+    }
+
+    /// Runs to the end: mission complete and every live UAV finished, or out of time.
+    #[must_use]
+    pub fn run(mut self) -> Outcome {
+        while self.step() {}
+        self.outcome()
+    }
+
+    /// Runs until some scenario time, or the end; returns whether it goes on.
+    pub fn run_until(&mut self, until_ms: u64) -> bool {
+        while self.queue.next().is_some_and(|(t, _)| t <= until_ms) {
+            if !self.step() {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Handles the next event; false when the run is over.
+    pub fn step(&mut self) -> bool {
+        let radio_ms = self.air.next_ms();
+        let queued = self.queue.next();
+        let radio_first = match (radio_ms, queued) {
+            (Some(r), Some(q)) => (r, Phase::Radio) <= q,
+            (Some(_), None) => true,
+            _ => false,
+        };
+        let next_ms = if radio_first {
+            radio_ms
+        } else {
+            queued.map(|q| q.0)
+        };
+        let Some(next_ms) = next_ms.filter(|t| *t < self.end_ms && !self.done) else {
+            return false;
+        };
+        self.now_ms = self.now_ms.max(next_ms);
+        if radio_first {
+            self.carry();
+        } else if let Some((_, event)) = self.queue.pop() {
+            self.happen(event);
+        }
+        true
+    }
+
+    /// Scenario time, milliseconds.
+    #[must_use]
+    pub fn now_ms(&self) -> u64 {
+        self.now_ms
+    }
+
+    /// What a running peer believes.
+    #[must_use]
+    pub fn view(&self, id: u16) -> Option<View> {
+        let slot = &self.slots[self.slot_of(id)?];
+        slot.peer.as_ref().map(skein_peer::Peer::view)
+    }
+
+    /// The checks so far.
+    #[must_use]
+    pub fn checker(&self) -> &Checker {
+        &self.checker
+    }
+
+    /// The history so far.
+    #[must_use]
+    pub fn history(&self) -> &History {
+        &self.history
+    }
+
+    fn period_ms(&self) -> u64 {
+        u64::from(self.spec.beacon_period_ms.max(1))
+    }
+
+    fn slot_of(&self, id: u16) -> Option<usize> {
+        self.slots.iter().position(|s| s.id() == id)
+    }
+
+    fn happen(&mut self, event: Event) {
+        match event {
+            Event::Fault(i) => {
+                let fault = self.faults[i].fault.clone();
+                self.strike(&fault);
+            }
+            Event::Percept { slot, boot } => self.sense(slot, boot),
+            Event::Timer { slot, boot, due_ms } => self.timer(slot, boot, due_ms),
+            Event::Stored { slot, boot } => {
+                if self.slots[slot].boots == boot
+                    && let Some(token) = self.slots[slot].disk.sync()
+                {
+                    self.fold(slot, Kind::Stored, token);
+                    self.feed(slot, Input::Stored { token, ok: true });
+                }
+            }
+            Event::Planned {
+                slot,
+                boot,
+                token,
+                answer,
+            } => {
+                if self.slots[slot].boots == boot {
+                    self.fold(slot, Kind::Planned, token);
+                    self.feed(slot, Input::Planned { token, answer });
+                }
+            }
+            Event::Receive(deliveries) => self.receive(deliveries),
+            Event::Look => self.look(),
+        }
+    }
+
+    fn fold(&mut self, slot: usize, kind: Kind, content: u64) {
+        self.history
+            .fold(self.now_ms, self.slots[slot].id(), kind, content);
+    }
+
+    /// Percepts of different UAVs are spread over the period, so that no tick does all
+    /// the work and no two minds decide on the same instant by construction.
+    fn first_percept_ms(&self, slot: usize) -> u64 {
+        let period_ms = u64::from(self.spec.percept_period_ms.max(1));
+        let spread_ms = slot as u64 * period_ms / self.slots.len().max(1) as u64;
+        // The world steps at multiples of its own step; other instants would cost more of them.
+        let phase_ms = spread_ms - spread_ms % crate::world::STEP_MS;
+        let past = (self.now_ms + period_ms).saturating_sub(phase_ms) / period_ms;
+        past * period_ms + phase_ms
+    }
+
+    fn sense(&mut self, slot: usize, boot: u32) {
+        let s = &self.slots[slot];
+        if s.boots != boot || s.process == Process::Stopped || !s.airframe {
+            return;
+        }
+        let id = s.id();
+        self.air.advance(self.now_ms);
+        self.judge_world();
+        let Some(percept) = self.air.percept(id) else {
+            self.airframe_lost(slot);
+            return;
+        };
+        self.history
+            .fold(self.now_ms, id, Kind::Percept, quantised(&percept.pose));
+        let again_ms = self.now_ms + u64::from(self.spec.percept_period_ms.max(1));
+        self.queue
+            .push(again_ms, Phase::Sense, Event::Percept { slot, boot });
+        self.feed(slot, Input::Percept(percept));
+    }
+
+    /// Zone entries and the moment of completion, as the world's judge sees them.
+    fn judge_world(&mut self) {
+        for fact in self.air.facts() {
+            if let Fact::ZoneEntry {
+                at_ms, uav, zone, ..
+            } = fact
+            {
+                self.checker.on_zone_entry(at_ms, uav, zone);
+            }
+        }
+        if self.covered_ms.is_none() && self.air.is_complete() {
+            self.covered_ms = Some(self.now_ms);
+            self.history.keep(self.now_ms, || What::Covered);
+        }
+    }
+
+    fn timer(&mut self, slot: usize, boot: u32, due_ms: u64) {
+        let s = &mut self.slots[slot];
+        if s.boots != boot || s.timer_ms != Some(due_ms) {
+            return;
+        }
+        s.timer_ms = None;
+        if s.process != Process::Running {
+            return;
+        }
+        let wants_ms = s
+            .peer
+            .as_ref()
+            .and_then(skein_peer::Peer::next_timeout)
+            .map(|t| t.0.saturating_sub(s.offset_ms));
+        // The peer may want it later by now: then no input is spent.
+        if wants_ms.is_some_and(|w| w <= self.now_ms) {
+            self.fold(slot, Kind::Timer, 0);
+            self.feed(slot, Input::Timer);
+        } else {
+            self.schedule_timer(slot);
+        }
+    }
+
+    fn schedule_timer(&mut self, slot: usize) {
+        let now_ms = self.now_ms;
+        let s = &mut self.slots[slot];
+        let Some(wants) = s.peer.as_ref().and_then(skein_peer::Peer::next_timeout) else {
+            return;
+        };
+        // At least a millisecond ahead: a peer that wants "now" after its timer must not stop time.
+        let due_ms = wants.0.saturating_sub(s.offset_ms).max(now_ms + 1);
+        if s.timer_ms.is_none_or(|t| due_ms < t || t <= now_ms) {
+            s.timer_ms = Some(due_ms);
+            let boot = s.boots;
+            self.queue
+                .push(due_ms, Phase::Decide, Event::Timer { slot, boot, due_ms });
+        }
+    }
+
+    /// The channel does what is due; what got through is received after its delay. All
+    /// that ends at the same instant is one event.
+    fn carry(&mut self) {
+        let mut batch: Vec<Delivery> = Vec::new();
+        for d in self.air.carry(self.now_ms) {
+            if batch.first().is_some_and(|b| b.at_us != d.at_us) {
+                self.receive_later(std::mem::take(&mut batch));
+            }
+            batch.push(d);
+        }
+        self.receive_later(batch);
+    }
+
+    fn receive_later(&mut self, batch: Vec<Delivery>) {
+        if let Some(first) = batch.first() {
+            let at_ms = first.at_us.div_ceil(1000).max(self.now_ms);
+            self.queue.push(at_ms, Phase::Radio, Event::Receive(batch));
+        }
+    }
+
+    fn receive(&mut self, deliveries: Vec<Delivery>) {
+        let mut known: Option<(*const u8, u64)> = None;
+        for d in deliveries {
+            let Some(slot) = self.slot_of(d.rx) else {
+                continue;
+            };
+            if self.slots[slot].process == Process::Stopped {
+                continue;
+            }
+            // Receivers of one transmission share its bytes, so they are hashed once.
+            let hash = match known {
+                Some((at, hash)) if at == d.bytes.as_ptr() => hash,
+                _ => bytes_hash(&d.bytes),
+            };
+            known = Some((d.bytes.as_ptr(), hash));
+            self.fold(slot, Kind::Receive, hash);
+            if self.slots[slot].process == Process::Running
+                && let Some((author, life, claim)) = self.claims.get(&hash)
+            {
+                self.checker.listing.on_heard((d.rx, *author), *life, claim);
+            }
+            self.feed(
+                slot,
+                Input::Received {
+                    transmitter: d.tx,
+                    hops: d.hops,
+                    bytes: d.bytes.to_vec(),
+                },
+            );
+        }
+    }
+
+    /// Gives one input to a peer and does what it says.
+    fn feed(&mut self, slot: usize, input: Input) {
+        let now_ms = self.now_ms;
+        let s = &mut self.slots[slot];
+        match s.process {
+            Process::Stopped => return,
+            Process::Paused => return s.wait(input),
+            Process::Running => {}
+        }
+        let Some(mut peer) = s.peer.take() else {
+            return;
+        };
+        peer.handle(s.clock(now_ms), input);
+        while let Some(output) = peer.poll() {
+            self.perform(slot, output);
+        }
+        self.slots[slot].peer = Some(peer);
+        self.schedule_timer(slot);
+    }
+
+    fn perform(&mut self, slot: usize, output: Output) {
+        let id = self.slots[slot].id();
+        let boot = self.slots[slot].boots;
+        match output {
+            Output::Publish {
+                key,
+                bytes,
+                hops,
+                priority,
+                lifetime_ms,
+            } => {
+                let hash = bytes_hash(&bytes);
+                self.history.fold(self.now_ms, id, Kind::Publish, hash);
+                if hops == 0 {
+                    self.said(slot, &bytes, hash);
+                }
+                let frame = Frame {
+                    key: bytes_hash(key.as_bytes()),
+                    bytes: bytes.into(),
+                    hops,
+                    priority,
+                    lifetime_ms,
+                };
+                self.air.transmit(self.now_ms, id, frame);
+            }
+            Output::Setpoint(setpoint) => {
+                self.history
+                    .fold(self.now_ms, id, Kind::Setpoint, setpoint_hash(&setpoint));
+                self.air.apply(id, setpoint);
+            }
+            Output::Store { token, record } => {
+                let done_ms = self.slots[slot].disk.write(self.now_ms, token, record);
+                self.queue
+                    .push(done_ms, Phase::Answer, Event::Stored { slot, boot });
+            }
+            Output::Plan { token, problem } => {
+                let takes_ms = match problem {
+                    Problem::Ground(_) => GROUND_MS,
+                    Problem::Divide { .. } => DIVIDE_MS,
+                };
+                let answer = self.grounds.answer(&problem);
+                self.queue.push(
+                    self.now_ms + takes_ms,
+                    Phase::Answer,
+                    Event::Planned {
+                        slot,
+                        boot,
+                        token,
+                        answer,
+                    },
+                );
+            }
+            Output::Report(report) => self.reported(id, report),
+        }
+    }
+
+    fn said(&mut self, slot: usize, bytes: &[u8], hash: u64) {
+        let id = self.slots[slot].id();
+        if let Some(said) = Said::read(bytes) {
+            let journal = self.slots[slot].disk.records();
+            self.checker.on_said(self.now_ms, id, &said, hash, journal);
+            if let Some(claim) = said.claim {
+                self.claims
+                    .insert(hash, (said.record.author, said.record.incarnation, claim));
+            }
+        } else {
+            self.checker.found.broken("S8", self.now_ms, Some(id), || {
+                "published bytes nobody can read".to_owned()
+            });
+        }
+    }
+
+    fn reported(&mut self, id: u16, report: Report) {
+        self.history
+            .fold(self.now_ms, id, Kind::Report, report_hash(&report));
+        self.checker.on_report(self.now_ms, id, &report);
+        self.history
+            .keep(self.now_ms, || What::Report { peer: id, report });
+    }
+
+    /// Looks at every mind, once a beacon period.
+    fn look(&mut self) {
+        self.queue
+            .push(self.now_ms + self.period_ms(), Phase::Judge, Event::Look);
+        self.air.advance(self.now_ms);
+        self.judge_world();
+        self.observe_graph();
+        self.refresh_covered();
+        let minds: Vec<Mind> = self.slots.iter().filter_map(mind).collect();
+        let loss_permille = self.air.loss_permille();
+        self.checker.on_look(
+            self.now_ms,
+            loss_permille,
+            &minds,
+            &self.covered,
+            self.loop_hash,
+        );
+        self.unassigned = minds.iter().any(|m| !m.view.unassigned.is_empty());
+        let mut flying = 0;
+        let mut finished = true;
+        for m in minds.iter().filter(|m| m.uav) {
+            flying += 1;
+            finished &= m.view.finished;
+        }
+        self.done = self.covered_ms.is_some() && flying > 0 && finished;
+        for v in self.checker.found.drain_fresh() {
+            self.history.keep(v.time_ms, || What::Violation {
+                check: v.check,
+                peer: v.peer,
+                text: v.text,
+            });
+        }
+    }
+
+    fn observe_graph(&mut self) {
+        let running = self
+            .slots
+            .iter()
+            .filter(|s| s.process == Process::Running)
+            .map(Slot::id);
+        let mut ids: Vec<u16> = running.collect();
+        ids.sort_unstable();
+        let graph = self.air.graph(ids);
+        if self.checker.on_graph(self.now_ms, graph) {
+            let components = self.checker.graph().components();
+            self.history
+                .keep(self.now_ms, || What::Components(components));
+        }
+    }
+
+    fn refresh_covered(&mut self) {
+        if let Ok(ground) = self.grounds.of(&self.spec.mission) {
+            for (flag, cell) in self.covered.iter_mut().zip(ground.coverage_loop.cells()) {
+                *flag = *flag || self.air.is_covered(cell.id);
+            }
+        }
+    }
+}
+
+/// The peers of a scenario, ascending by number.
+fn slots(spec: &Spec, seed: u64) -> Vec<Slot> {
+    let config = |id: u16| PeerConfig {
+        id: PeerId(id),
+        role: Role::Uav,
+        fleet: spec.fleet.clone(),
+        beacon_period_ms: spec.beacon_period_ms,
+        rate_bps: spec.radio.rate_bps,
+        airframe: None,
+        height_m: 0.0,
+        mission: Some(Arc::clone(&spec.mission)),
+        seed: 0,
+    };
+    let mut slots: Vec<Slot> = spec
+        .uavs
+        .iter()
+        .map(|u| {
+            Slot::new(
+                seed,
+                PeerConfig {
+                    airframe: Some(u.airframe),
+                    height_m: u.height_m,
+                    ..config(u.id)
+                },
+            )
+        })
+        .collect();
+    if let Some(g) = &spec.ground {
+        slots.push(Slot::new(
+            seed,
+            PeerConfig {
+                role: Role::Ground,
+                height_m: g.height_m,
+                ..config(g.id)
+            },
+        ));
+    }
+    slots.sort_by_key(Slot::id);
+    slots
+}
+
+fn mind(slot: &Slot) -> Option<Mind> {
+    let peer = slot
+        .peer
+        .as_ref()
+        .filter(|_| slot.process == Process::Running)?;
+    Some(Mind {
+        id: slot.id(),
+        uav: slot.config.role == Role::Uav,
+        since_ms: slot.since_ms,
+        view: peer.view(),
+    })
+}
+
+/// A pose as one number: millimetres and 1e-7 radians.
+fn quantised(pose: &skein_planning::frame::Pose) -> u64 {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "casts from floats saturate, and only bits count"
+    )]
+    let q = |v: f64, scale: f64| (v * scale).round() as i64 as u64;
+    q(pose.east_m, 1e3).rotate_left(42)
+        ^ q(pose.north_m, 1e3).rotate_left(21)
+        ^ q(pose.heading_rad, 1e7)
+}
+
+fn setpoint_hash(s: &Setpoint) -> u64 {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "casts from floats saturate, and only bits count"
+    )]
+    let q = |v: f64| (v * 1e6).round() as i64 as u64;
+    s.steps
+        .iter()
+        .fold(s.from_ms ^ q(s.airspeed_mps).rotate_left(32), |h, step| {
+            (h ^ q(step.turn_rate_radps) ^ (u64::from(step.duration_ms) << 40))
+                .wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        })
+}
