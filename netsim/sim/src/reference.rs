@@ -193,7 +193,7 @@ impl<'a> Reference<'a> {
                 heading: forecast.heading,
                 release_ms: forecast.release_ms,
                 speed_mmps: rounded(u.airframe.cruise_mps * 1000.0).max(1),
-                turn_ms: turn_ms(&u.airframe),
+                turn_ms: mind.turn_ms(),
                 endurance_ms: rounded((percept.endurance_s - u.airframe.reserve_s) * 1000.0)
                     .saturating_sub(forecast.release_ms),
             });
@@ -228,10 +228,4 @@ fn is_open(covered: &[bool], cell: u16) -> bool {
 )]
 fn rounded(v: f64) -> u32 {
     v.round() as u32
-}
-
-/// Time to turn round: a keyhole of at most one and a half circles at cruise.
-fn turn_ms(airframe: &skein_planning::airframe::Airframe) -> u32 {
-    let circle_m = skein_planning::math::TAU * airframe.min_turn_radius_m();
-    rounded(1.5 * circle_m / airframe.cruise_mps.max(1.0) * 1000.0)
 }
