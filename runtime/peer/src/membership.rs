@@ -1,34 +1,51 @@
-//! Who is there: one-hop beacons, gossiped heartbeats with their ages, suspicion,
-//! and a bound that holds at any loss (D2.7 §1.3: nodes relay for each other).
+//! Who is there: one-hop beacons, gossiped heartbeats with their ages, suspicion, and
+//! a bound that holds at any loss.
+//!
+//! Carries out the fault detection of D2.7 §3.6: who is lost is found without a
+//! leader, and everybody in a component knows within one bound. With the beacon
+//! period T and the hop diameter D, k1 = 4 + D/4 and k2 = 4 + D/2:
 //!
 //! | state | event | next state |
 //! |---|---|---|
-//! | unknown | a heartbeat younger than the bound | alive |
-//! | alive | no fresher heartbeat for k1 T | suspect |
-//! | suspect | a fresher heartbeat from anybody | alive |
+//! | unknown | a heartbeat younger than the bound, not condemned | alive or suspect |
+//! | alive | k1 T silent, and it used to be heard directly | suspect |
+//! | alive | a suspicion against this very heartbeat is heard | suspect |
+//! | suspect | a fresher heartbeat from anybody, younger than the bound | alive |
 //! | suspect | k2 T unrefuted | down |
-//! | alive, suspect | freshest heartbeat older than (k1 + k2 + D + 2) T | down |
-//! | down | a fresher heartbeat, younger than the bound | alive |
-//! | any | a heartbeat of a later life | alive, in that life |
+//! | alive, suspect | heartbeat older than (k1 + k2 + D + 2) T | down |
+//! | down | a fresher heartbeat from anybody, younger than the bound | alive |
+//! | any | a heartbeat of a later life, younger than the bound | alive, in that life |
 //!
-//! k1 = 4 + D/4 and k2 = 4 + D/2 periods. Ages are sums of holding times, so that a
-//! heartbeat that travelled long is known to be old: an old one refutes and revives
-//! nothing, and a merging component cannot raise the dead.
+//! Ages are sums of holding times, never differences of clocks, and they count
+//! wherever a heartbeat is heard: so one that travelled long is known to be old, and
+//! a merging component cannot raise the dead. What follows from a verdict is left to
+//! the callers; here it revokes nothing.
 
 use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Status;
+use crate::wire::limits::HOPS_MAX;
 use crate::wire::message::{Beacon, Gossip};
 use std::collections::BTreeMap;
 
-/// Most peers remembered; a fleet is smaller, and a flood of made-up ids must end.
+/// Most peers known: the largest fleet. A flood of made-up ids must end somewhere.
 pub const MAX_KNOWN: usize = 64;
 
-/// Hops and eccentricities count for this many periods after they were heard.
+/// Hops and eccentricities count for so many periods after they were heard: long
+/// enough that each of a full fleet's entries, 20 a beacon, came round three times.
 const HOP_PERIODS: u64 = 10;
 
-/// No relay path is longer; more hops than this are somebody's error.
-pub const MAX_HOPS: u8 = 16;
+/// News about a peer goes first in gossip for so many periods: one beacon may be
+/// lost, two hardly are.
+const URGENT_PERIODS: u64 = 2;
+
+/// [`Membership::tick`] is wanted so often in a period: verdicts are late by a
+/// quarter period at most.
+const TICKS_PER_PERIOD: u64 = 4;
+
+/// Restarts of one peer that are remembered: waiting doubles with each, and eight
+/// doublings of ten periods are longer than any sortie.
+const MAX_RESTARTS: usize = 8;
 
 /// A belief that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,38 +54,79 @@ pub struct Change {
     pub peer: u16,
     /// In which life.
     pub incarnation: Incarnation,
-    /// The new belief.
+    /// The new belief; `Alive` for a peer or a life not known before.
     pub status: Status,
 }
 
-/// What a peer last said of itself.
+/// What a peer last said of itself in its present life.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Info {
-    /// Whether it can plan.
+    /// Whether it can plan; by its own beacon or by gossip.
     pub able: bool,
     /// Whether it is a ground station.
     pub ground: bool,
     /// Whether it holds that the mission is finished.
     pub finished: bool,
-    /// Mission revision it follows.
+    /// Mission revision it follows; of whoever told of it, until it is heard itself.
     pub revision: u32,
-    /// The loop it derived.
+    /// The loop it derived, likewise.
     pub loop_hash: u64,
+    /// The highest round counter it knew.
+    pub counter: u32,
+    /// Digest of its union of covered cells.
+    pub cover_digest: u32,
+    /// Where it was, mm east and north and 1e-4 rad, once heard itself.
+    pub pose: Option<(i32, i32, i32)>,
+    /// Since when this life was never taken for down.
+    pub steady_since: Time,
+    /// When its own beacon was last heard, without a relay.
+    pub heard: Option<Time>,
+}
+
+/// What was heard of this peer itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Oneself {
+    /// A later life of this id was known: take that plus one.
+    Later(Incarnation),
+    /// A heartbeat of this very life that this peer never sent: somebody else has its
+    /// id. Its boot nonce, where it was heard itself.
+    Double(Option<u32>),
+}
+
+/// An age that grows: so much when it was heard, and the time since.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Age {
+    told_ms: u64,
+    at: Time,
+}
+
+impl Age {
+    fn ms(self, now: Time) -> u64 {
+        self.told_ms.saturating_add(now.since_ms(self.at))
+    }
+}
+
+/// One heartbeat as it was heard.
+#[derive(Clone, Copy, Debug)]
+struct Heartbeat {
+    id: u16,
+    incarnation: Incarnation,
+    count: u32,
+    age: Age,
+    hops: u8,
+    suspected: Option<Age>,
 }
 
 #[derive(Clone, Debug)]
 struct Known {
-    incarnation: Incarnation,
-    heartbeat: u32,
-    /// When the freshest heartbeat was made, on our clock.
-    made: Time,
-    suspected: Option<Time>,
+    freshest: Heartbeat,
     status: Status,
     info: Info,
-    /// Whether `info` is of this life and heard from itself or by gossip.
-    hops: Vec<(Time, u8)>,
+    /// Fewest hops by period, for the last ten: (period, hops).
+    hops: [(u64, u8); 10],
     eccentricity: u8,
-    eccentricity_heard: Time,
+    urgent_until: Time,
+    restarts: Vec<Time>,
 }
 
 /// All that a peer believes of others.
@@ -76,292 +134,525 @@ struct Known {
 pub struct Membership {
     me: u16,
     period_ms: u64,
+    incarnation: Incarnation,
+    nonce: u32,
+    heartbeat: u32,
     known: BTreeMap<u16, Known>,
     next_gossip: u16,
-    expected_tick: Option<Time>,
-    late_until: Time,
+    last_tick: Option<Time>,
+    doubt_until: Time,
 }
 
 impl Membership {
-    /// Nobody is known yet.
+    /// Nobody is known yet; `period_ms` is the beacon period T.
     #[must_use]
     pub fn new(me: u16, period_ms: u32) -> Self {
         Self {
             me,
             period_ms: u64::from(period_ms.max(1)),
+            incarnation: 0,
+            nonce: 0,
+            heartbeat: 0,
             known: BTreeMap::new(),
             next_gossip: 0,
-            expected_tick: None,
-            late_until: Time(0),
+            last_tick: None,
+            doubt_until: Time(0),
         }
     }
 
     /// A new life of this peer itself: what it knows of others stays.
-    pub fn set_self(&mut self, _incarnation: Incarnation) {}
+    pub fn set_self(&mut self, incarnation: Incarnation) {
+        self.incarnation = incarnation;
+        self.heartbeat = 0;
+    }
 
-    fn k1_ms(&self, now: Time) -> u64 {
+    /// What this peer last spoke: its boot nonce and its heartbeat.
+    pub fn set_voice(&mut self, nonce: u32, heartbeat: u32) {
+        self.nonce = nonce;
+        self.heartbeat = heartbeat;
+    }
+
+    /// Silence before a direct neighbour suspects, milliseconds: k1 T.
+    #[must_use]
+    pub fn k1_ms(&self, now: Time) -> u64 {
         self.doubt(now) * self.period_ms * (16 + u64::from(self.diameter(now))) / 4
     }
 
-    fn k2_ms(&self, now: Time) -> u64 {
+    /// Time to refute a suspicion, milliseconds: k2 T.
+    #[must_use]
+    pub fn k2_ms(&self, now: Time) -> u64 {
         self.doubt(now) * self.period_ms * (8 + u64::from(self.diameter(now))) / 2
     }
 
-    /// A peer whose own loop ran late doubts its verdicts: both factors double.
+    /// A peer whose own loop ran late doubts its verdicts first: both factors double.
     fn doubt(&self, now: Time) -> u64 {
-        if now < self.late_until { 2 } else { 1 }
+        if now < self.doubt_until { 2 } else { 1 }
     }
 
-    /// Everybody in the component knows of a death within this time, milliseconds.
+    /// Everybody in the component knows of a death within this time, milliseconds:
+    /// (k1 + k2 + D + 2) T.
     #[must_use]
     pub fn bound_ms(&self, now: Time) -> u64 {
-        self.k1_ms(now) + self.k2_ms(now) + (u64::from(self.diameter(now)) + 2) * self.period_ms
+        let travel = (u64::from(self.diameter(now)) + 2) * self.period_ms;
+        self.k1_ms(now) + self.k2_ms(now) + travel
     }
 
-    /// A beacon, heard from its author directly.
-    pub fn on_beacon(&mut self, now: Time, author: u16, incarnation: Incarnation, beacon: &Beacon) -> Vec<Change> {
+    /// A beacon, heard from its author directly. Returns what changed.
+    pub fn on_beacon(
+        &mut self,
+        now: Time,
+        author: u16,
+        incarnation: Incarnation,
+        beacon: &Beacon,
+    ) -> Vec<Change> {
         let mut changes = Vec::new();
-        let info = Info {
-            able: beacon.able,
-            ground: beacon.ground,
-            finished: beacon.finished,
-            revision: beacon.revision,
-            loop_hash: beacon.loop_hash,
-        };
-        self.heartbeat(now, author, incarnation, beacon.heartbeat, now, 1, &mut changes);
-        if let Some(k) = self.known.get_mut(&author)
-            && k.incarnation == incarnation
-        {
-            k.info = info;
-            k.eccentricity = beacon.eccentricity.min(MAX_HOPS);
-            k.eccentricity_heard = now;
+        if author == self.me {
+            return changes;
         }
-        let me = self.me;
-        for g in beacon.gossip.iter().filter(|g| g.id != me && g.id != author) {
-            self.on_gossip(now, g, &info, &mut changes);
+        let limits = (self.bound_ms(now), self.k2_ms(now));
+        let age = Age {
+            told_ms: 0,
+            at: now,
+        };
+        let count = beacon.heartbeat;
+        let own = Heartbeat {
+            id: author,
+            incarnation,
+            count,
+            age,
+            hops: 1,
+            suspected: None,
+        };
+        self.hear(now, own, limits, &mut changes);
+        let Some(teller) = self.known.get_mut(&author) else {
+            return changes;
+        };
+        if (teller.freshest.incarnation, teller.freshest.count) == (incarnation, count) {
+            let steady_since = teller.info.steady_since;
+            teller.info = info_of(beacon, steady_since, now);
+            teller.eccentricity = beacon.eccentricity.min(HOPS_MAX);
+        }
+        for told in &beacon.gossip {
+            if told.id != self.me && told.id != author {
+                self.on_gossip(now, told, beacon, limits, &mut changes);
+            }
         }
         changes
     }
 
-    fn on_gossip(&mut self, now: Time, g: &Gossip, teller: &Info, changes: &mut Vec<Change>) {
-        let age_ms = u64::from(g.age_ds) * 100;
-        if age_ms > self.bound_ms(now) || g.hops >= MAX_HOPS {
-            return;
-        }
-        let made = Time(now.0.saturating_sub(age_ms));
-        let fresher = self.heartbeat(now, g.id, g.incarnation, g.heartbeat, made, g.hops + 1, changes);
-        let Some(k) = self.known.get_mut(&g.id) else {
-            return;
+    fn on_gossip(
+        &mut self,
+        now: Time,
+        told: &Gossip,
+        teller: &Beacon,
+        limits: (u64, u64),
+        changes: &mut Vec<Change>,
+    ) {
+        let age = |ds: u16| Age {
+            told_ms: u64::from(ds) * 100,
+            at: now,
         };
-        if k.incarnation != g.incarnation {
+        let heartbeat = Heartbeat {
+            id: told.id,
+            incarnation: told.incarnation,
+            count: told.heartbeat,
+            age: age(told.age_ds),
+            hops: told.hops.saturating_add(1),
+            suspected: told.suspected_ds.map(age),
+        };
+        if !self.hear(now, heartbeat, limits, changes) {
             return;
         }
-        if fresher {
-            k.info.able = g.able;
-            if k.info.loop_hash == 0 && g.able {
-                // Members work on one ground; who says able by way of a member of ours
-                // is on it, until its own beacon tells otherwise.
-                k.info.revision = teller.revision;
-                k.info.loop_hash = teller.loop_hash;
+        if let Some(known) = self.known.get_mut(&told.id) {
+            known.info.able = told.able;
+            // Members work on one ground: who is said to be able by a peer is on that
+            // peer's ground, until its own beacon or register says otherwise.
+            if known.info.heard.is_none() && told.able {
+                known.info.revision = teller.revision;
+                known.info.loop_hash = teller.loop_hash;
             }
-        }
-        if let Some(ds) = g.suspected_ds
-            && g.heartbeat >= k.heartbeat
-            && k.status == Status::Alive
-        {
-            k.suspected = Some(Time(now.0.saturating_sub(u64::from(ds) * 100)));
-            k.status = Status::Suspect;
-            changes.push(Change { peer: g.id, incarnation: k.incarnation, status: Status::Suspect });
-        } else if let (Some(ds), Some(since)) = (g.suspected_ds, k.suspected)
-            && g.heartbeat >= k.heartbeat
-        {
-            k.suspected = Some(since.min(Time(now.0.saturating_sub(u64::from(ds) * 100))));
         }
     }
 
-    /// A heartbeat made at `made` on our clock. Returns whether it is fresher than
-    /// what was known.
-    #[allow(clippy::too_many_arguments, reason = "one heartbeat, all of its parts")]
-    fn heartbeat(
+    /// Merges one heartbeat; `limits` are the bound and k2 T. Returns whether it was
+    /// fresher than what was known.
+    fn hear(
         &mut self,
         now: Time,
-        id: u16,
-        incarnation: Incarnation,
-        heartbeat: u32,
-        made: Time,
-        hops: u8,
+        heard: Heartbeat,
+        limits: (u64, u64),
         changes: &mut Vec<Change>,
     ) -> bool {
-        if id == self.me {
+        let (bound_ms, k2_ms) = limits;
+        if heard.age.ms(now) > bound_ms || heard.hops > HOPS_MAX {
             return false;
         }
-        let Some(k) = self.known.get_mut(&id) else {
-            self.make_room();
-            self.known.insert(
-                id,
-                Known {
-                    incarnation,
-                    heartbeat,
-                    made,
-                    suspected: None,
-                    status: Status::Alive,
-                    info: Info::default(),
-                    hops: vec![(now, hops)],
-                    eccentricity: 0,
-                    eccentricity_heard: Time(0),
-                },
-            );
-            changes.push(Change { peer: id, incarnation, status: Status::Alive });
+        let period = now.0 / self.period_ms;
+        let urgent_until = now.plus_ms(URGENT_PERIODS * self.period_ms);
+        let Some(known) = self.known.get_mut(&heard.id) else {
+            let condemned = heard.suspected.is_some_and(|age| age.ms(now) >= k2_ms);
+            if condemned || !self.make_room(now) {
+                return false;
+            }
+            let known = Known::new(now, heard, period, urgent_until);
+            changes.push(known.change());
+            self.known.insert(heard.id, known);
             return true;
         };
-        if (incarnation, heartbeat) <= (k.incarnation, k.heartbeat) {
-            if (incarnation, heartbeat) == (k.incarnation, k.heartbeat) {
-                // Every hop adds a little delay, so the oldest estimate is the truest;
-                // taking the youngest would let gossip keep the dead alive.
-                k.made = k.made.min(made);
-                k.hops.push((now, hops));
-            }
+        let version = |h: &Heartbeat| (h.incarnation, h.count);
+        if version(&heard) < version(&known.freshest) {
             return false;
         }
-        let new_life = incarnation > k.incarnation;
-        if new_life {
-            k.info = Info::default();
+        if version(&heard) == version(&known.freshest) {
+            known.merge_same(now, heard, period, urgent_until, changes);
+            return false;
         }
-        k.incarnation = incarnation;
-        k.heartbeat = heartbeat;
-        k.made = made;
-        k.suspected = None;
-        k.hops.push((now, hops));
-        if new_life || k.status != Status::Alive {
-            k.status = Status::Alive;
-            changes.push(Change { peer: id, incarnation, status: Status::Alive });
+        let new_life = heard.incarnation > known.freshest.incarnation;
+        if new_life {
+            known.info = Info::default();
+            known.eccentricity = 0;
+            known.restarts.push(now);
+            let surplus = known.restarts.len().saturating_sub(MAX_RESTARTS);
+            known.restarts.drain(..surplus);
+        }
+        if new_life || known.status == Status::Down {
+            known.info.steady_since = now;
+        }
+        known.freshest = heard;
+        known.note_hops(period, heard.hops);
+        let status = if heard.suspected.is_some() {
+            Status::Suspect
+        } else {
+            Status::Alive
+        };
+        if new_life || status != known.status {
+            known.status = status;
+            known.urgent_until = urgent_until;
+            changes.push(known.change());
         }
         true
     }
 
-    fn make_room(&mut self) {
-        if self.known.len() >= MAX_KNOWN {
-            let oldest = self.known.iter().min_by_key(|(id, k)| (k.status != Status::Down, k.made, **id));
-            if let Some(id) = oldest.map(|(id, _)| *id) {
-                self.known.remove(&id);
-            }
+    /// Makes room for one more, if need be by forgetting the longest dead; the living
+    /// are never forgotten, or made-up ids could displace them. Returns whether there
+    /// is room.
+    fn make_room(&mut self, now: Time) -> bool {
+        if self.known.len() < MAX_KNOWN {
+            return true;
         }
+        let dead = self.known.iter().filter(|(_, k)| k.status == Status::Down);
+        let longest = dead
+            .max_by_key(|(id, k)| (k.freshest.age.ms(now), **id))
+            .map(|(id, _)| *id);
+        longest.is_some_and(|id| self.known.remove(&id).is_some())
     }
 
-    /// Looks at the time: raises suspicions and passes verdicts.
+    /// Looks at the time: raises suspicions and passes verdicts. Returns what changed.
     pub fn tick(&mut self, now: Time) -> Vec<Change> {
-        if let Some(expected) = self.expected_tick
-            && now.since_ms(expected) > self.period_ms / 2
-        {
-            self.late_until = now.plus_ms(self.period_ms * 2);
+        let late = self.last_tick.is_some_and(|last| {
+            now.since_ms(last) > self.period_ms / TICKS_PER_PERIOD + self.period_ms / 2
+        });
+        if late {
+            // What arrived meanwhile is heard within a period.
+            self.doubt_until = now.plus_ms(self.period_ms);
         }
-        self.expected_tick = Some(now.plus_ms(self.period_ms / 4));
-        let (k1, k2, bound) = (self.k1_ms(now), self.k2_ms(now), self.bound_ms(now));
-        let window = HOP_PERIODS * self.period_ms;
+        self.last_tick = Some(now);
+        let (k1_ms, k2_ms, bound_ms) = (self.k1_ms(now), self.k2_ms(now), self.bound_ms(now));
+        let oldest_period = (now.0 / self.period_ms).saturating_sub(HOP_PERIODS);
+        let urgent_until = now.plus_ms(URGENT_PERIODS * self.period_ms);
         let mut changes = Vec::new();
-        for (id, k) in &mut self.known {
-            k.hops.retain(|(t, _)| now.since_ms(*t) < window);
-            if k.hops.len() > 64 {
-                k.hops.drain(..32);
+        for known in self.known.values_mut().filter(|k| k.status != Status::Down) {
+            let silent_ms = known.freshest.age.ms(now);
+            let neighbour = known.fewest_hops(oldest_period) == Some(1);
+            if known.freshest.suspected.is_none() && neighbour && silent_ms >= k1_ms {
+                known.freshest.suspected = Some(Age {
+                    told_ms: 0,
+                    at: now,
+                });
             }
-            if k.status == Status::Down {
-                continue;
-            }
-            let silent = now.since_ms(k.made);
-            if silent >= k1 && k.suspected.is_none() {
-                k.suspected = Some(now);
-            }
-            let condemned = k.suspected.is_some_and(|t| now.since_ms(t) >= k2);
-            let status = if silent >= bound || condemned {
+            let condemned = known
+                .freshest
+                .suspected
+                .is_some_and(|age| age.ms(now) >= k2_ms);
+            let status = if condemned || silent_ms > bound_ms {
                 Status::Down
-            } else if k.suspected.is_some() {
+            } else if known.freshest.suspected.is_some() {
                 Status::Suspect
             } else {
                 Status::Alive
             };
-            if status != k.status {
-                k.status = status;
-                changes.push(Change { peer: *id, incarnation: k.incarnation, status });
+            if status != known.status {
+                known.status = status;
+                known.urgent_until = urgent_until;
+                changes.push(known.change());
             }
         }
         changes
     }
 
-    /// What to say of others: at most `max` entries, rotating, so that nobody is left
-    /// out for long. The relay fills in the versions of records.
+    /// When [`Membership::tick`] is wanted at the latest; at once before the first.
+    #[must_use]
+    pub fn next_timeout(&self, now: Time) -> Time {
+        let step = (self.period_ms / TICKS_PER_PERIOD).max(1);
+        self.last_tick.map_or(now, |last| last.plus_ms(step))
+    }
+
+    /// What to say of others: at most `max` entries, news first (half of them at
+    /// most), then in rotation, so that nobody is left out for long. The relay fills
+    /// in the versions of records.
     pub fn gossip(&mut self, now: Time, max: usize) -> Vec<Gossip> {
-        let bound = self.bound_ms(now);
-        let ids: Vec<u16> = self
+        let urgent = self.known.iter().filter(|(_, k)| k.urgent_until > now);
+        let mut ids: Vec<u16> = urgent.map(|(id, _)| *id).collect();
+        // The latest news first: a flood of them must not starve the last one.
+        ids.sort_by_key(|id| core::cmp::Reverse(self.known.get(id).map(|k| k.urgent_until)));
+        ids.truncate(max / 2);
+        let rotation = self
             .known
             .range(self.next_gossip..)
-            .chain(self.known.range(..self.next_gossip))
+            .chain(self.known.range(..self.next_gossip));
+        let rest: Vec<u16> = rotation
             .map(|(id, _)| *id)
-            .take(max)
+            .filter(|id| !ids.contains(id))
+            .take(max - ids.len())
             .collect();
-        if let Some(last) = ids.last() {
-            self.next_gossip = last.saturating_add(1);
+        if let Some(last) = rest.last() {
+            self.next_gossip = last.wrapping_add(1);
         }
-        ids.iter().filter_map(|id| self.gossip_of(now, *id, bound)).collect()
-    }
-
-    fn gossip_of(&self, now: Time, id: u16, bound_ms: u64) -> Option<Gossip> {
-        let k = self.known.get(&id)?;
-        let age_ms = now.since_ms(k.made).min(bound_ms.saturating_mul(2));
-        let ds = |ms: u64| u16::try_from(ms.div_ceil(100)).unwrap_or(u16::MAX);
-        Some(Gossip {
-            id,
-            incarnation: k.incarnation,
-            heartbeat: k.heartbeat,
-            age_ds: ds(age_ms),
-            hops: self.hops(id, now).unwrap_or(MAX_HOPS),
-            suspected_ds: k.suspected.map(|t| ds(now.since_ms(t))),
-            able: k.info.able,
-            max_seq: 0,
-            digest: 0,
-        })
-    }
-
-    fn hops(&self, id: u16, now: Time) -> Option<u8> {
-        let window = HOP_PERIODS * self.period_ms;
-        let k = self.known.get(&id)?;
-        k.hops.iter().filter(|(t, _)| now.since_ms(*t) < window).map(|(_, h)| *h).min()
+        ids.extend(rest);
+        ids.iter()
+            .filter_map(|id| self.known.get(id))
+            .map(|k| k.gossip(now))
+            .collect()
     }
 
     /// Fewest hops to the farthest live author of the last 10 T.
     #[must_use]
     pub fn eccentricity(&self, now: Time) -> u8 {
-        let live = self.known.iter().filter(|(_, k)| k.status != Status::Down);
-        live.filter_map(|(id, _)| self.hops(*id, now)).max().unwrap_or(0)
+        let oldest = (now.0 / self.period_ms).saturating_sub(HOP_PERIODS);
+        let live = self.known.values().filter(|k| k.status != Status::Down);
+        live.filter_map(|k| k.fewest_hops(oldest))
+            .max()
+            .unwrap_or(0)
     }
 
-    /// The largest eccentricity heard from live peers, at least 1, at most 16.
+    /// The largest eccentricity heard from live peers within 10 T, at least 1.
     #[must_use]
     pub fn diameter(&self, now: Time) -> u32 {
         let window = HOP_PERIODS * self.period_ms;
-        let heard = self
-            .known
-            .values()
-            .filter(|k| k.status != Status::Down && now.since_ms(k.eccentricity_heard) < window)
+        let recent = |k: &&Known| k.info.heard.is_some_and(|t| now.since_ms(t) < window);
+        let live = self.known.values().filter(|k| k.status != Status::Down);
+        let heard = live
+            .filter(recent)
             .map(|k| k.eccentricity)
             .max()
             .unwrap_or(0);
-        u32::from(heard.max(self.eccentricity(now)).clamp(1, MAX_HOPS))
+        u32::from(heard.max(self.eccentricity(now)).clamp(1, HOPS_MAX))
     }
 
     /// Everybody known: id, life, belief.
     pub fn all(&self) -> impl Iterator<Item = (u16, Incarnation, Status)> + '_ {
-        self.known.iter().map(|(id, k)| (*id, k.incarnation, k.status))
+        self.known
+            .iter()
+            .map(|(id, k)| (*id, k.freshest.incarnation, k.status))
     }
 
-    /// Everybody not believed dead: id and life.
+    /// Everybody not taken for down: id and life.
     pub fn live(&self) -> impl Iterator<Item = (u16, Incarnation)> + '_ {
-        self.all().filter(|(_, _, s)| *s != Status::Down).map(|(id, i, _)| (id, i))
+        self.all()
+            .filter(|(_, _, s)| *s != Status::Down)
+            .map(|(id, i, _)| (id, i))
+    }
+
+    /// What is believed of a peer, if it is known.
+    #[must_use]
+    pub fn status(&self, id: u16) -> Option<(Incarnation, Status)> {
+        self.known
+            .get(&id)
+            .map(|k| (k.freshest.incarnation, k.status))
     }
 
     /// What a peer last said of itself.
     #[must_use]
     pub fn info(&self, id: u16) -> Option<Info> {
         self.known.get(&id).map(|k| k.info)
+    }
+
+    /// The ground a peer works on, learnt from a record of its own.
+    pub fn learn_ground(
+        &mut self,
+        id: u16,
+        incarnation: Incarnation,
+        revision: u32,
+        loop_hash: u64,
+    ) {
+        if let Some(known) = self.known.get_mut(&id)
+            && known.freshest.incarnation == incarnation
+        {
+            known.info.revision = revision;
+            known.info.loop_hash = loop_hash;
+        }
+    }
+
+    /// Restarts of a peer seen within the last `window_ms`, 8 at most.
+    #[must_use]
+    pub fn restarts(&self, id: u16, now: Time, window_ms: u64) -> usize {
+        let recent = |t: &&Time| now.since_ms(**t) <= window_ms;
+        self.known
+            .get(&id)
+            .map_or(0, |k| k.restarts.iter().filter(recent).count())
+    }
+
+    /// What a beacon says of this peer itself, if that is not what it said.
+    #[must_use]
+    pub fn heard_myself(
+        &self,
+        now: Time,
+        author: u16,
+        incarnation: Incarnation,
+        beacon: &Beacon,
+    ) -> Option<Oneself> {
+        if author == self.me {
+            return match incarnation.cmp(&self.incarnation) {
+                core::cmp::Ordering::Greater => Some(Oneself::Later(incarnation)),
+                core::cmp::Ordering::Equal if beacon.nonce != self.nonce => {
+                    Some(Oneself::Double(Some(beacon.nonce)))
+                }
+                _ => None,
+            };
+        }
+        let told = beacon
+            .gossip
+            .iter()
+            .filter(|g| g.id == self.me)
+            .max_by_key(|g| (g.incarnation, g.heartbeat))?;
+        if told.incarnation > self.incarnation {
+            return Some(Oneself::Later(told.incarnation));
+        }
+        let fresh = u64::from(told.age_ds) * 100 <= self.bound_ms(now);
+        let unsent = told.incarnation == self.incarnation && told.heartbeat > self.heartbeat;
+        (fresh && unsent).then_some(Oneself::Double(None))
+    }
+
+    /// How many are known, and the cap.
+    #[must_use]
+    pub fn loads(&self) -> [(&'static str, usize, usize); 1] {
+        [("peers known", self.known.len(), MAX_KNOWN)]
+    }
+}
+
+fn info_of(beacon: &Beacon, steady_since: Time, now: Time) -> Info {
+    Info {
+        able: beacon.able,
+        ground: beacon.ground,
+        finished: beacon.finished,
+        revision: beacon.revision,
+        loop_hash: beacon.loop_hash,
+        counter: beacon.counter,
+        cover_digest: beacon.cover_digest,
+        pose: Some((beacon.east_mm, beacon.north_mm, beacon.heading_e4)),
+        steady_since,
+        heard: Some(now),
+    }
+}
+
+impl Known {
+    fn new(now: Time, heard: Heartbeat, period: u64, urgent_until: Time) -> Self {
+        let status = if heard.suspected.is_some() {
+            Status::Suspect
+        } else {
+            Status::Alive
+        };
+        let mut known = Self {
+            freshest: heard,
+            status,
+            info: Info {
+                steady_since: now,
+                ..Info::default()
+            },
+            hops: [(0, u8::MAX); 10],
+            eccentricity: 0,
+            urgent_until,
+            restarts: Vec::new(),
+        };
+        known.note_hops(period, heard.hops);
+        known
+    }
+
+    /// The heartbeat known, heard once more. Its age stays as first heard: taking the
+    /// younger would let echoes keep the dead alive, taking the older would age the
+    /// living by the rounding of every echo.
+    fn merge_same(
+        &mut self,
+        now: Time,
+        heard: Heartbeat,
+        period: u64,
+        urgent_until: Time,
+        changes: &mut Vec<Change>,
+    ) {
+        if heard.hops < self.freshest.hops {
+            self.freshest.hops = heard.hops;
+            self.note_hops(period, heard.hops);
+        }
+        let Some(told) = heard.suspected else {
+            return;
+        };
+        if self
+            .freshest
+            .suspected
+            .is_none_or(|mine| mine.ms(now) < told.ms(now))
+        {
+            self.freshest.suspected = Some(told);
+        }
+        if self.status == Status::Alive {
+            self.status = Status::Suspect;
+            self.urgent_until = urgent_until;
+            changes.push(self.change());
+        }
+    }
+
+    fn note_hops(&mut self, period: u64, hops: u8) {
+        let place = usize::try_from(period % HOP_PERIODS).unwrap_or(0);
+        let slot = &mut self.hops[place];
+        *slot = if slot.0 == period {
+            (period, slot.1.min(hops))
+        } else {
+            (period, hops)
+        };
+    }
+
+    /// Fewest hops in the periods after `oldest`.
+    fn fewest_hops(&self, oldest: u64) -> Option<u8> {
+        let recent = self
+            .hops
+            .iter()
+            .filter(|(p, h)| *h != u8::MAX && (*p > oldest || oldest == 0));
+        recent.map(|(_, hops)| *hops).min()
+    }
+
+    fn change(&self) -> Change {
+        let Heartbeat {
+            id, incarnation, ..
+        } = self.freshest;
+        Change {
+            peer: id,
+            incarnation,
+            status: self.status,
+        }
+    }
+
+    fn gossip(&self, now: Time) -> Gossip {
+        let ds = |age: Age| u16::try_from(age.ms(now).div_ceil(100)).unwrap_or(u16::MAX);
+        Gossip {
+            id: self.freshest.id,
+            incarnation: self.freshest.incarnation,
+            heartbeat: self.freshest.count,
+            age_ds: ds(self.freshest.age),
+            hops: self.freshest.hops,
+            suspected_ds: self.freshest.suspected.map(ds),
+            able: self.info.able,
+            max_seq: 0,
+            digest: 0,
+        }
     }
 }
 
@@ -425,7 +716,11 @@ mod tests {
         assert!(changes.iter().all(|c| c.peer == 3));
         let fresh = Gossip { age_ds: 5, ..old };
         let changes = m.on_beacon(Time(20_100), 3, 1, &beacon(10, vec![fresh]));
-        assert!(changes.contains(&Change { peer: 2, incarnation: 1, status: Status::Alive }));
+        assert!(changes.contains(&Change {
+            peer: 2,
+            incarnation: 1,
+            status: Status::Alive
+        }));
     }
 
     #[test]
@@ -434,5 +729,172 @@ mod tests {
         m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
         m.tick(Time(0));
         assert!(m.tick(Time(9_000)).iter().all(|c| c.status != Status::Down));
+    }
+
+    fn entry(id: u16, heartbeat: u32, age_ds: u16, suspected_ds: Option<u16>) -> Gossip {
+        Gossip {
+            id,
+            incarnation: 1,
+            heartbeat,
+            age_ds,
+            hops: 1,
+            suspected_ds,
+            able: true,
+            max_seq: 0,
+            digest: 0,
+        }
+    }
+
+    #[test]
+    fn a_suspicion_is_taken_over_and_refuted() {
+        let mut m = Membership::new(1, 1000);
+        m.on_beacon(Time(0), 3, 1, &beacon(1, vec![entry(2, 7, 40, None)]));
+        assert_eq!(m.status(2), Some((1, Status::Alive)));
+        // An older suspicion concerns a heartbeat that is refuted already.
+        m.on_beacon(Time(1000), 3, 1, &beacon(2, vec![entry(2, 6, 60, Some(9))]));
+        assert_eq!(m.status(2), Some((1, Status::Alive)));
+        m.on_beacon(
+            Time(2000),
+            3,
+            1,
+            &beacon(3, vec![entry(2, 7, 60, Some(20))]),
+        );
+        assert_eq!(m.status(2), Some((1, Status::Suspect)));
+        assert_eq!(
+            m.gossip(Time(2000), 20)[0].suspected_ds,
+            Some(20),
+            "news go first, with their age"
+        );
+        m.on_beacon(Time(3000), 3, 1, &beacon(4, vec![entry(2, 8, 10, None)]));
+        assert_eq!(m.status(2), Some((1, Status::Alive)));
+        m.on_beacon(Time(3500), 3, 1, &beacon(5, vec![entry(2, 8, 15, Some(0))]));
+        let down: Vec<_> = (14..40)
+            .flat_map(|i| m.tick(Time(i * 250)).into_iter().map(move |c| (i * 250, c)))
+            .filter(|(_, c)| c.peer == 2 && c.status == Status::Down)
+            .collect();
+        // D is 2 here: told at 3.5 s, and k2 is 5 periods.
+        assert_eq!(
+            down,
+            [(
+                8500,
+                Change {
+                    peer: 2,
+                    incarnation: 1,
+                    status: Status::Down
+                }
+            )]
+        );
+        assert_eq!(m.info(2).unwrap().steady_since, Time(0));
+        m.on_beacon(Time(9500), 2, 1, &beacon(17, Vec::new()));
+        assert_eq!(
+            m.info(2).unwrap().steady_since,
+            Time(9500),
+            "a return begins anew"
+        );
+    }
+
+    #[test]
+    fn who_is_already_condemned_is_not_met_as_alive() {
+        let mut m = Membership::new(1, 1000);
+        let told = vec![
+            entry(2, 7, 100, Some(60)),
+            entry(4, 7, 500, None),
+            entry(5, 7, 3, None),
+        ];
+        m.on_beacon(Time(0), 3, 1, &beacon(1, told));
+        assert_eq!(m.all().map(|(id, ..)| id).collect::<Vec<_>>(), [3, 5]);
+    }
+
+    #[test]
+    fn a_later_life_counts_as_a_restart() {
+        let mut m = Membership::new(1, 1000);
+        m.on_beacon(Time(0), 2, 1, &beacon(900, Vec::new()));
+        let changes = m.on_beacon(Time(5000), 2, 3, &beacon(1, Vec::new()));
+        assert_eq!(
+            changes,
+            [Change {
+                peer: 2,
+                incarnation: 3,
+                status: Status::Alive
+            }]
+        );
+        assert!(
+            m.on_beacon(Time(5100), 2, 1, &beacon(901, Vec::new()))
+                .is_empty()
+        );
+        assert_eq!(m.status(2), Some((3, Status::Alive)));
+        assert_eq!(m.restarts(2, Time(6000), 300_000), 1);
+        assert_eq!(m.restarts(2, Time(400_000), 300_000), 0);
+    }
+
+    #[test]
+    fn every_peer_comes_round_in_gossip() {
+        let mut m = Membership::new(1, 1000);
+        for id in 2..50 {
+            m.on_beacon(Time(0), id, 1, &beacon(1, Vec::new()));
+        }
+        let later = Time(3000);
+        let mut told = std::collections::BTreeSet::new();
+        for _ in 0..3 {
+            let said = m.gossip(later, 20);
+            assert_eq!(said.len(), 20);
+            assert!(said.iter().all(|g| g.age_ds == 30));
+            told.extend(said.iter().map(|g| g.id));
+        }
+        assert_eq!(told.len(), 48);
+    }
+
+    #[test]
+    fn made_up_ids_do_not_displace_the_living() {
+        let mut m = Membership::new(1, 1000);
+        for id in 2..500 {
+            m.on_beacon(Time(0), id, 1, &beacon(1, Vec::new()));
+        }
+        assert_eq!(m.all().count(), MAX_KNOWN);
+        assert!(m.status(2).is_some() && m.status(499).is_none());
+        for i in 0..80 {
+            m.tick(Time(i * 250));
+        }
+        m.on_beacon(Time(20_000), 499, 1, &beacon(1, Vec::new()));
+        assert_eq!((m.all().count(), m.live().count()), (MAX_KNOWN, 1));
+    }
+
+    #[test]
+    fn what_is_said_of_myself_is_noticed() {
+        let mut m = Membership::new(1, 1000);
+        m.set_self(2);
+        m.set_voice(77, 40);
+        let now = Time(50_000);
+        let of_me = |incarnation, heartbeat| Gossip {
+            incarnation,
+            ..entry(1, heartbeat, 10, None)
+        };
+        let via = |g| m.heard_myself(now, 3, 1, &beacon(1, vec![g]));
+        assert_eq!(via(of_me(2, 40)), None);
+        assert_eq!(via(of_me(1, 900)), None);
+        assert_eq!(via(of_me(3, 1)), Some(Oneself::Later(3)));
+        assert_eq!(via(of_me(2, 41)), Some(Oneself::Double(None)));
+        assert_eq!(
+            via(Gossip {
+                age_ds: 900,
+                ..of_me(2, 41)
+            }),
+            None,
+            "not fresh"
+        );
+        let direct = |incarnation, nonce| {
+            m.heard_myself(
+                now,
+                1,
+                incarnation,
+                &Beacon {
+                    nonce,
+                    ..beacon(3, Vec::new())
+                },
+            )
+        };
+        assert_eq!(direct(2, 77), None);
+        assert_eq!(direct(2, 78), Some(Oneself::Double(Some(78))));
+        assert_eq!(direct(4, 78), Some(Oneself::Later(4)));
     }
 }
