@@ -99,11 +99,8 @@ impl Ledger {
             }
             Report::Booted { incarnation } => {
                 self.incarnations.insert(peer, incarnation);
-                for r in self
-                    .restarts
-                    .iter_mut()
-                    .filter(|r| r.peer == peer && r.after.is_none())
-                {
+                // A life without its disk begins low and rises when it hears of itself.
+                if let Some(r) = self.restarts.iter_mut().rfind(|r| r.peer == peer) {
                     r.after = Some(incarnation);
                 }
                 None
