@@ -19,8 +19,11 @@ struct Kill {
     at_ms: u64,
     held: usize,
     share: f64,
+    listed_already: usize,
     pending: BTreeSet<u16>,
     takers: BTreeMap<u16, Taking>,
+    unseen: BTreeSet<u16>,
+    seen_by: BTreeMap<u16, usize>,
     seen_unlisted: usize,
     over_at_ms: Option<u64>,
     detected: Option<(u16, u64)>,
@@ -130,6 +133,10 @@ impl Ledger {
                     let before = kill.pending.len();
                     kill.pending.retain(|c| !cells.contains(c));
                     kill.seen_unlisted += before - kill.pending.len();
+                    let seen = cells.iter().filter(|c| kill.unseen.remove(c)).count();
+                    if seen > 0 {
+                        *kill.seen_by.entry(peer).or_default() += seen;
+                    }
                     kill.close(now_ms);
                 }
                 self.covered.extend(cells);
@@ -210,6 +217,7 @@ impl Ledger {
         pending.retain(|c| !self.covered.contains(c));
         let even = f64::from(self.cells).max(1.0) / self.n_uavs.max(1) as f64;
         let held = pending.len();
+        let unseen = pending.clone();
         // What somebody else lists already needs no taking over.
         for (other, cells) in &self.listed {
             if *other != peer
@@ -227,8 +235,11 @@ impl Ledger {
             at_ms: now_ms,
             held,
             share: held as f64 / even,
+            listed_already: held - pending.len(),
             pending,
             takers: BTreeMap::new(),
+            unseen,
+            seen_by: BTreeMap::new(),
             seen_unlisted: 0,
             over_at_ms: None,
             detected: None,
@@ -357,7 +368,9 @@ impl Kill {
             detected_by: self.detected.map(|(by, _)| by),
             detected_after_s: self.detected.map(|(_, t)| after(t)),
             taken_over_by: self.takers.iter().map(taker).collect(),
+            listed_already: self.listed_already,
             seen_in_passing: self.seen_unlisted,
+            flown_by: self.seen_by.clone(),
             all_after_s: self.over_at_ms.map(after),
             left: self.pending.len(),
         }

@@ -27,6 +27,11 @@ const DARK_AFTER: Duration = Duration::from_millis(2 * LEASE_MS as u64);
 /// How often progress is told, milliseconds of scenario time.
 const PROGRESS_MS: u64 = 10_000;
 
+/// Once all live UAVs hold the mission finished nobody looks for more; after this
+/// long, milliseconds of scenario time, what was not seen by then never will be. Long
+/// enough for somebody to learn that it was wrong.
+const IDLE_MS: u64 = 30_000;
+
 /// What a trial is to be.
 #[derive(Debug)]
 pub struct Options {
@@ -177,6 +182,7 @@ pub(crate) struct Trial<'a> {
     pub(crate) run_dir: PathBuf,
     pub(crate) faults: Vec<Due>,
     pub(crate) progress_due_ms: u64,
+    all_finished_ms: Option<u64>,
     tell: &'a mut (dyn FnMut(Event) + Send),
 }
 
@@ -238,6 +244,7 @@ impl<'a> Trial<'a> {
             components: Vec::new(),
             setpoint_delay_ms: 0,
             progress_due_ms: 0,
+            all_finished_ms: None,
             faults: spec
                 .faults
                 .iter()
@@ -420,10 +427,15 @@ impl<'a> Trial<'a> {
         self.members.values().filter(live).map(|m| m.id).collect()
     }
 
-    fn is_over(&self) -> bool {
+    fn is_over(&mut self) -> bool {
         let live = self.live_uavs();
-        let done = self.arena.is_covered() && live.iter().all(|id| self.ledger.is_finished(*id));
-        done || live.is_empty() || self.now_ms >= u64::from(self.spec.max_time_s) * 1000
+        let finished = live.iter().all(|id| self.ledger.is_finished(*id));
+        self.all_finished_ms = finished.then(|| self.all_finished_ms.unwrap_or(self.now_ms));
+        let idle = self
+            .all_finished_ms
+            .is_some_and(|since| self.now_ms - since >= IDLE_MS);
+        let done = finished && self.arena.is_covered();
+        done || idle || live.is_empty() || self.now_ms >= u64::from(self.spec.max_time_s) * 1000
     }
 
     async fn answer(&mut self, asked: Asked) {

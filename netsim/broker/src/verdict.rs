@@ -115,8 +115,12 @@ pub struct KillVerdict {
     pub detected_after_s: Option<f64>,
     /// Who listed its cells.
     pub taken_over_by: Vec<Taker>,
+    /// Cells that somebody else listed already when it was killed.
+    pub listed_already: usize,
     /// Cells that somebody saw without having listed them.
     pub seen_in_passing: usize,
+    /// Who flew its cells in the end, and how many.
+    pub flown_by: BTreeMap<u16, usize>,
     /// When the last of its cells was listed or seen, seconds after the kill.
     pub all_after_s: Option<f64>,
     /// Cells that nobody listed or saw.
@@ -223,6 +227,9 @@ impl Verdict {
             if let (Some(by), Some(after)) = (k.detected_by, k.detected_after_s) {
                 write!(f, "; noticed by uav{by} after {after:.1} s")?;
             }
+            if k.listed_already > 0 {
+                write!(f, "; {} listed by others already", k.listed_already)?;
+            }
             for t in &k.taken_over_by {
                 write!(
                     f,
@@ -233,10 +240,15 @@ impl Verdict {
             if k.seen_in_passing > 0 {
                 write!(f, "; {} seen in passing", k.seen_in_passing)?;
             }
-            match k.all_after_s {
-                Some(after) if k.cells_held > 0 => writeln!(f, "; all settled after {after:.1} s")?,
-                Some(_) => writeln!(f)?,
-                None => writeln!(f, "; {} left", k.left)?,
+            if k.left > 0 {
+                write!(f, "; {} left", k.left)?;
+            }
+            let flown = k.flown_by.iter().map(|(id, n)| format!("{n} by uav{id}"));
+            let flown = flown.collect::<Vec<_>>().join(", ");
+            if flown.is_empty() {
+                writeln!(f)?;
+            } else {
+                writeln!(f, "; flown: {flown}")?;
             }
         }
         for r in &self.restarts {

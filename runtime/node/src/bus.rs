@@ -341,6 +341,9 @@ pub fn effective_config(config: &BusConfig) -> Result<zenoh::Config, BusError> {
         ("scouting/gossip/enabled", "true".to_owned()),
         ("scouting/gossip/multihop", "false".to_owned()),
         ("scouting/gossip/autoconnect", "[]".to_owned()),
+        // Nobody needs to be there when a peer starts.
+        ("open/return_conditions/connect_scouted", "false".to_owned()),
+        ("open/return_conditions/declares", "false".to_owned()),
         ("timestamping/enabled", "true".to_owned()),
         ("transport/unicast/open_timeout", "1000".to_owned()),
         ("transport/unicast/accept_timeout", "1000".to_owned()),
