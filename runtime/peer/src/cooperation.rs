@@ -159,6 +159,9 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
     if let Some(union) = boot::remembered(&peer.durable, coverage_loop.hash(), n) {
         negotiation.section.cover(&union);
     }
+    if let Some(register) = peer.durable.register.as_ref().filter(|r| r.loop_hash == coverage_loop.hash()) {
+        negotiation.section.restore_epoch(register.epoch);
+    }
     let executive = peer.config.airframe.map(|airframe| {
         let router = Arc::clone(&ground.router);
         Executive::new(airframe, peer.config.height_m, Arc::clone(&coverage_loop), router)

@@ -3,7 +3,10 @@
 //! [`grid`] names cells, [`stc`] strings them on one closed loop, [`backtracking`]
 //! divides the loop.
 
+mod assembly;
 pub mod backtracking;
+mod blocks;
+mod excursion;
 pub mod grid;
 pub mod stc;
 

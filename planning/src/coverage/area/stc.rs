@@ -8,6 +8,8 @@
 //! closed curve that leaves the loop at a boundary, looks at the cell, and comes
 //! back to the same boundary pose; skipping it costs nothing.
 
+use super::assembly::{Assembly, cells_of, check, hash_of};
+use super::blocks::closed_loop;
 use super::grid::{CellId, Grid};
 use crate::frame::{Point, Pose};
 use crate::geometry::{NoFlyZones, Polygon};
@@ -75,6 +77,8 @@ pub struct LoopCell {
     pub needed: bool,
     /// Length flown when the cell needs no service, millimetres: 0 for excursions.
     pub travel_mm: u32,
+    /// Where along `curve` one frame holds the whole cell, metres.
+    pub view_m: f64,
 }
 
 /// The loop on which all UAVs work. Cell `i` lies between boundary `i` and
@@ -116,6 +120,18 @@ pub enum LoopError {
     /// More cells than a mission may have.
     #[error("the area has {0} cells, a mission may have at most 65,535")]
     TooManyCells(usize),
+    /// The area or the launch point lies too far from the origin.
+    #[error("the area or the launch point lies more than 20 km from the mission's origin")]
+    Extent,
+    /// A length is no number, negative or too small.
+    #[error("the {0} is not a usable length")]
+    Number(&'static str),
+    /// The zones could not be grown by the clearance.
+    #[error("the no-fly zones could not be grown safely")]
+    Zones,
+    /// No route leads from the launch point to the loop.
+    #[error("no flyable route leads from the launch point to the area: no-fly zones part them")]
+    CutOff,
     /// The launch point cannot reach the loop.
     #[error("the launch point lies inside a no-fly zone or its clearance")]
     Launch,
@@ -134,7 +150,18 @@ impl CoverageLoop {
     /// # Errors
     /// [`LoopError`].
     pub fn build(problem: &AreaProblem) -> Result<Self, LoopError> {
-        Builder::new(problem)?.build()
+        check(problem)?;
+        let grid = Grid { lane_spacing_m: problem.lane_spacing_m };
+        let needed = cells_of(&problem.area, grid)?;
+        let ring = closed_loop(problem, grid, &needed);
+        if ring.is_empty() {
+            return Err(LoopError::Nothing);
+        }
+        let Assembly { cells, uncoverable } = Assembly::new(problem, grid, &needed, ring)?;
+        let boundaries = cells.iter().filter_map(|c| c.curve.start()).collect();
+        let index = (0u16..).zip(&cells).map(|(i, c)| (c.id, i)).collect();
+        let hash = hash_of(grid, &cells);
+        Ok(Self { grid, cells, boundaries, index, uncoverable, hash })
     }
 
     /// Number of cells.
@@ -202,228 +229,6 @@ impl CoverageLoop {
     pub fn hash(&self) -> u64 {
         self.hash
     }
-}
-
-/// Half a footprint across must be this many lane spacings for one frame to hold a
-/// cell from the middle of a quarter turn: √2 − ½.
-const ACROSS_SPACINGS: f64 = core::f64::consts::SQRT_2 - 0.5;
-
-/// The same along the track: √½.
-const ALONG_SPACINGS: f64 = core::f64::consts::FRAC_1_SQRT_2;
-
-type Block = (i16, i16);
-
-struct Builder<'a> {
-    problem: &'a AreaProblem,
-    grid: Grid,
-}
-
-impl<'a> Builder<'a> {
-    fn new(problem: &'a AreaProblem) -> Result<Self, LoopError> {
-        let d = problem.lane_spacing_m;
-        if !(problem.turn_radius_m <= d / 2.0) {
-            return Err(LoopError::TurnRadius { radius_m: problem.turn_radius_m, spacing_m: d });
-        }
-        let across_m = ACROSS_SPACINGS * d + problem.tracking_error_m;
-        let along_m = ALONG_SPACINGS * d + problem.tracking_error_m;
-        if !(problem.footprint_across_m >= across_m && problem.footprint_along_m >= along_m) {
-            return Err(LoopError::Footprint { spacing_m: d, across_m, along_m });
-        }
-        Ok(Self { problem, grid: Grid { lane_spacing_m: d } })
-    }
-
-    fn build(&self) -> Result<CoverageLoop, LoopError> {
-        let needed = self.needed_cells()?;
-        let blocks = self.component(&needed);
-        if blocks.is_empty() {
-            return Err(LoopError::Nothing);
-        }
-        let order = circumnavigate(&blocks);
-        let n = order.len();
-        let mut boundaries = Vec::with_capacity(n);
-        for i in 0..n {
-            boundaries.push(self.boundary(order[(i + n - 1) % n], order[i]));
-        }
-        let mut cells = Vec::with_capacity(n);
-        for i in 0..n {
-            let curve = self.through(boundaries[i], boundaries[(i + 1) % n]);
-            let mm = mm(curve.length_m());
-            cells.push(LoopCell {
-                id: order[i],
-                curve,
-                excursion: false,
-                service_mm: mm,
-                needed: needed.contains(&order[i]),
-                travel_mm: mm,
-            });
-        }
-        let index: BTreeMap<CellId, u16> =
-            order.iter().enumerate().map(|(i, c)| (*c, u16::try_from(i).unwrap_or(u16::MAX))).collect();
-        let uncoverable = needed
-            .iter()
-            .filter(|c| !index.contains_key(c))
-            .map(|c| (*c, "no straight pass that sees all of it keeps clear of the zones".to_owned()))
-            .collect();
-        let mut hash = 0xcbf2_9ce4_8422_2325u64;
-        for c in &cells {
-            for v in [i64::from(c.id.col), i64::from(c.id.row), i64::from(c.service_mm), i64::from(c.needed)] {
-                for b in v.to_le_bytes() {
-                    hash = (hash ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3);
-                }
-            }
-        }
-        Ok(CoverageLoop { grid: self.grid, cells, boundaries, index, uncoverable, hash })
-    }
-
-    /// Cells that have a point in common with the area (its corners, its border or a
-    /// vertex of it).
-    fn needed_cells(&self) -> Result<std::collections::BTreeSet<CellId>, LoopError> {
-        let v = self.problem.area.vertices();
-        let (mut lo, mut hi) = (v[0], v[0]);
-        for p in v {
-            lo = Point::new(lo.x.min(p.x), lo.y.min(p.y));
-            hi = Point::new(hi.x.max(p.x), hi.y.max(p.y));
-        }
-        let (a, b) = (self.grid.cell_at(lo), self.grid.cell_at(hi));
-        let count = (i64::from(b.col) - i64::from(a.col) + 1) * (i64::from(b.row) - i64::from(a.row) + 1);
-        if count > 65_535 {
-            return Err(LoopError::TooManyCells(usize::try_from(count).unwrap_or(usize::MAX)));
-        }
-        let mut out = std::collections::BTreeSet::new();
-        for row in a.row..=b.row {
-            for col in a.col..=b.col {
-                let id = CellId { col, row };
-                if self.touches_area(id) {
-                    out.insert(id);
-                }
-            }
-        }
-        Ok(out)
-    }
-
-    fn touches_area(&self, id: CellId) -> bool {
-        let c = self.grid.centre(id);
-        let h = self.grid.lane_spacing_m / 2.0 - 1e-6;
-        let inner = [(-h, -h), (h, -h), (h, h), (-h, h)].map(|(x, y)| Point::new(c.x + x, c.y + y));
-        let inside = |p: &Point| (p.x - c.x).abs() <= h && (p.y - c.y).abs() <= h;
-        inner.iter().any(|p| self.problem.area.contains(*p))
-            || self.problem.area.vertices().iter().any(inside)
-            || self.problem.area.edges().any(|(a, b)| {
-                (0..4).any(|i| crate::geometry::polygon::segments_meet(a, b, inner[i], inner[(i + 1) % 4]))
-            })
-    }
-
-    /// The connected blocks with the most needed cells.
-    fn component(&self, needed: &std::collections::BTreeSet<CellId>) -> std::collections::BTreeSet<Block> {
-        let mut free: std::collections::BTreeSet<Block> =
-            needed.iter().map(|c| (c.col.div_euclid(2), c.row.div_euclid(2))).collect();
-        free.retain(|b| self.block_clear(*b));
-        let mut best = (0, std::collections::BTreeSet::new());
-        while let Some(first) = free.pop_first() {
-            let mut open = vec![first];
-            let mut part = std::collections::BTreeSet::from([first]);
-            while let Some(b) = open.pop() {
-                for n in neighbours(b) {
-                    if free.remove(&n) {
-                        part.insert(n);
-                        open.push(n);
-                    }
-                }
-            }
-            let size = part.iter().flat_map(|b| cells_of(*b)).filter(|c| needed.contains(c)).count();
-            if size > best.0 {
-                best = (size, part);
-            }
-        }
-        best.1
-    }
-
-    fn block_clear(&self, block: Block) -> bool {
-        let d = self.grid.lane_spacing_m;
-        let centre = Point::new((f64::from(block.0) * 2.0 + 1.0) * d, (f64::from(block.1) * 2.0 + 1.0) * d);
-        let reach = d * core::f64::consts::SQRT_2 * 0.75 + self.problem.clearance_m;
-        self.problem.zones.distance_m(centre) >= reach
-    }
-
-    /// The pose in the middle of the edge between two neighbouring cells.
-    fn boundary(&self, from: CellId, to: CellId) -> Pose {
-        let (a, b) = (self.grid.centre(from), self.grid.centre(to));
-        let v = b - a;
-        Pose::new(a + v * 0.5, crate::math::atan2(v.y, v.x))
-    }
-
-    /// From the middle of one edge to the middle of another.
-    fn through(&self, from: Pose, to: Pose) -> Curve {
-        let d = self.grid.lane_spacing_m;
-        let turn = crate::math::wrap_pi(to.heading_rad - from.heading_rad);
-        if turn.abs() < 0.1 {
-            Curve::from_pieces(from, &[(0.0, d)])
-        } else {
-            let r = d / 2.0;
-            Curve::from_pieces(from, &[(turn.signum() / r, r * crate::math::FRAC_PI_2)])
-        }
-    }
-}
-
-fn mm(m: f64) -> u32 {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "curves are shorter than 4,000 km")]
-    let mm = (m * 1000.0).round() as u32;
-    mm
-}
-
-fn neighbours((x, y): Block) -> [Block; 4] {
-    [(x, y + 1), (x, y - 1), (x - 1, y), (x + 1, y)]
-}
-
-fn cells_of((x, y): Block) -> [CellId; 4] {
-    let c = |col, row| CellId { col, row };
-    [c(2 * x, 2 * y), c(2 * x + 1, 2 * y), c(2 * x + 1, 2 * y + 1), c(2 * x, 2 * y + 1)]
-}
-
-/// The cells round a spanning tree of the blocks, counter-clockwise.
-fn circumnavigate(blocks: &std::collections::BTreeSet<Block>) -> Vec<CellId> {
-    let mut tree = std::collections::BTreeSet::new();
-    let mut seen = std::collections::BTreeSet::new();
-    let Some(root) = blocks.first().copied() else {
-        return Vec::new();
-    };
-    let mut stack = vec![(root, root)];
-    while let Some((from, b)) = stack.pop() {
-        if !seen.insert(b) {
-            continue;
-        }
-        tree.insert((from, b));
-        tree.insert((b, from));
-        for n in neighbours(b).into_iter().rev() {
-            if blocks.contains(&n) && !seen.contains(&n) {
-                stack.push((b, n));
-            }
-        }
-    }
-    let next = |c: CellId| -> CellId {
-        let b = (c.col.div_euclid(2), c.row.div_euclid(2));
-        let linked = |n: Block| n != b && tree.contains(&(b, n));
-        let (right, top) = (c.col.rem_euclid(2) == 1, c.row.rem_euclid(2) == 1);
-        let step = |dc: i16, dr: i16| CellId { col: c.col + dc, row: c.row + dr };
-        match (right, top) {
-            (false, false) if linked((b.0, b.1 - 1)) => step(0, -1),
-            (false, false) => step(1, 0),
-            (true, false) if linked((b.0 + 1, b.1)) => step(1, 0),
-            (true, false) => step(0, 1),
-            (true, true) if linked((b.0, b.1 + 1)) => step(0, 1),
-            (true, true) => step(-1, 0),
-            (false, true) if linked((b.0 - 1, b.1)) => step(-1, 0),
-            (false, true) => step(0, -1),
-        }
-    };
-    let start = CellId { col: root.0 * 2, row: root.1 * 2 };
-    let mut order = vec![start];
-    let mut at = next(start);
-    while at != start && order.len() < blocks.len() * 4 {
-        order.push(at);
-        at = next(at);
-    }
-    order
 }
 
 /// Whether the footprint of a camera at `pose` contains the whole cell.

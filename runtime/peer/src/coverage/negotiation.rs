@@ -125,6 +125,8 @@ pub struct Negotiation {
     take_pending: bool,
     idle_since: Option<Time>,
     progress: BTreeMap<u16, Progress>,
+    members: Vec<Member>,
+    members_since: Time,
     /// Divisions adopted in this life.
     pub adoptions: u32,
 }
@@ -152,6 +154,8 @@ impl Negotiation {
             take_pending: false,
             idle_since: None,
             progress: BTreeMap::new(),
+            members: Vec::new(),
+            members_since: Time(0),
             adoptions: 0,
         }
     }
@@ -230,10 +234,15 @@ impl Negotiation {
     }
 
     fn watch_orphans(&mut self, ctx: &Context<'_>, orphans: &CellSet) {
-        if orphans.count() == 0 {
+        if orphans.count() == 0 || ctx.able_since.is_none() {
+            // Who cannot plan yet does not count: it would act on what it has not heard.
             self.orphan_since = None;
         } else if self.orphan_since.is_none() {
             self.orphan_since = Some(ctx.now);
+        }
+        if self.members != ctx.members {
+            self.members = ctx.members.to_vec();
+            self.members_since = ctx.now;
         }
         let idle = self.section.plan().is_empty();
         self.idle_since = if idle { self.idle_since.or(Some(ctx.now)) } else { None };
@@ -267,6 +276,12 @@ impl Negotiation {
             }
             return;
         };
+        // Before its first division a peer waits until nobody new was heard for a while:
+        // a swarm that starts together begins with one round, not with many.
+        let steady = ctx.now.since_ms(self.members_since) >= 2 * ctx.period_ms;
+        if self.decided_at.is_none() && !steady && orphaned_ms < 10 * ctx.period_ms {
+            return;
+        }
         let settled = self.decided_at.is_none_or(|t| ctx.now.since_ms(t) >= 5 * ctx.period_ms);
         let patience = if settled { 2 * ctx.period_ms } else { 5 * ctx.period_ms };
         let stagger = self.rank(ctx) * ctx.period_ms / 8;

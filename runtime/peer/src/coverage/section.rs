@@ -317,6 +317,12 @@ impl Section {
         }
     }
 
+    /// The division that an earlier life adopted: what is taken from now on counts as
+    /// later, so that an epoch never goes back.
+    pub fn restore_epoch(&mut self, epoch: Epoch) {
+        self.epoch = self.epoch.max(epoch);
+    }
+
     /// Forgets all ownership, as after a restart; coverage stays.
     pub fn reset_ownership(&mut self) {
         self.plan.clear();
