@@ -36,6 +36,8 @@ pub mod output;
 pub mod peer;
 pub mod plan;
 pub mod relay;
+#[cfg(test)]
+mod relay_net;
 pub mod view;
 mod voice;
 pub mod wire;

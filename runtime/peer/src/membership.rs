@@ -8,6 +8,7 @@
 //! | state | event | next state |
 //! |---|---|---|
 //! | unknown | a heartbeat younger than the bound, not condemned | alive or suspect |
+//! | unknown | a heartbeat older than the bound, or condemned | down: its records are asked for |
 //! | alive | k1 T silent, and it used to be heard directly | suspect |
 //! | alive | a suspicion against this very heartbeat is heard | suspect |
 //! | suspect | a fresher heartbeat from anybody, younger than the bound | alive |
@@ -284,14 +285,22 @@ impl Membership {
         changes: &mut Vec<Change>,
     ) -> bool {
         let (bound_ms, k2_ms) = limits;
-        if heard.age.ms(now) > bound_ms || heard.hops > HOPS_MAX {
+        if heard.hops > HOPS_MAX {
+            return false;
+        }
+        let condemned = heard.suspected.is_some_and(|age| age.ms(now) >= k2_ms);
+        let known_life = self.known.get(&heard.id).map(|k| k.freshest.incarnation);
+        let too_old = heard.age.ms(now) > bound_ms;
+        if too_old || (condemned && known_life.is_none()) {
+            if known_life.is_none_or(|life| life < heard.incarnation) {
+                self.remember_dead(now, heard, changes);
+            }
             return false;
         }
         let period = now.0 / self.period_ms;
         let urgent_until = now.plus_ms(URGENT_PERIODS * self.period_ms);
         let Some(known) = self.known.get_mut(&heard.id) else {
-            let condemned = heard.suspected.is_some_and(|age| age.ms(now) >= k2_ms);
-            if condemned || !self.make_room(now) {
+            if !self.make_room(now) {
                 return false;
             }
             let known = Known::new(now, heard, period, urgent_until);
@@ -331,6 +340,24 @@ impl Membership {
             changes.push(known.change());
         }
         true
+    }
+
+    /// A life that ended before it was ever met, or while it was out of reach: known
+    /// as down, so that this peer's beacons ask for the records it left. Nobody else
+    /// is forgotten for it.
+    fn remember_dead(&mut self, now: Time, heard: Heartbeat, changes: &mut Vec<Change>) {
+        let before = self.known.get(&heard.id);
+        if before.is_none() && self.known.len() >= MAX_KNOWN {
+            return;
+        }
+        let believed = before.is_some_and(|k| k.status != Status::Down);
+        let mut dead = Known::new(now, heard, 0, now);
+        dead.status = Status::Down;
+        dead.hops = NO_HOPS;
+        if believed {
+            changes.push(dead.change());
+        }
+        self.known.insert(heard.id, dead);
     }
 
     /// Makes room for one more, if need be by forgetting the longest dead; the living
@@ -555,6 +582,9 @@ fn info_of(beacon: &Beacon, steady_since: Time, now: Time) -> Info {
     }
 }
 
+/// Hops of somebody who was not heard in the last ten periods.
+const NO_HOPS: [(u64, u8); 10] = [(0, u8::MAX); 10];
+
 impl Known {
     fn new(now: Time, heard: Heartbeat, period: u64, urgent_until: Time) -> Self {
         let status = if heard.suspected.is_some() {
@@ -569,7 +599,7 @@ impl Known {
                 steady_since: now,
                 ..Info::default()
             },
-            hops: [(0, u8::MAX); 10],
+            hops: NO_HOPS,
             eccentricity: 0,
             urgent_until,
             restarts: Vec::new(),
@@ -801,8 +831,32 @@ mod tests {
             entry(4, 7, 500, None),
             entry(5, 7, 3, None),
         ];
-        m.on_beacon(Time(0), 3, 1, &beacon(1, told));
-        assert_eq!(m.all().map(|(id, ..)| id).collect::<Vec<_>>(), [3, 5]);
+        let changes = m.on_beacon(Time(0), 3, 1, &beacon(1, told));
+        assert_eq!(changes.iter().map(|c| c.peer).collect::<Vec<_>>(), [3, 5]);
+        assert_eq!(m.live().map(|(id, _)| id).collect::<Vec<_>>(), [3, 5]);
+        assert_eq!(m.all().count(), 4, "the dead are asked after");
+        let later = Gossip {
+            incarnation: 2,
+            ..entry(4, 1, 600, None)
+        };
+        assert!(
+            m.on_beacon(Time(900), 3, 1, &beacon(2, vec![later]))
+                .is_empty()
+        );
+        assert_eq!(m.status(4), Some((2, Status::Down)));
+        let over = Gossip {
+            incarnation: 2,
+            ..entry(5, 1, 600, None)
+        };
+        let changes = m.on_beacon(Time(1900), 3, 1, &beacon(3, vec![over]));
+        assert_eq!(
+            changes,
+            [Change {
+                peer: 5,
+                incarnation: 2,
+                status: Status::Down
+            }]
+        );
     }
 
     #[test]

@@ -14,13 +14,13 @@ use crate::input::Time;
 use crate::output::Priority;
 use crate::wire::Fnv;
 use crate::wire::key;
-use crate::wire::kinds::Kind;
+use crate::wire::kinds::{Kind, RECORD_MAX_BYTES};
 use crate::wire::message::{Beacon, Record};
 use std::collections::BTreeMap;
 
-/// Most records held: 64 peers with a state, a bid, a claim, a finish, an order, an
-/// event, and one mission of 64 pieces.
-pub const MAX_RECORDS: usize = 448;
+/// Most records held: 64 peers with a state, a bid, a claim, an order, a finish and
+/// four events each, and one mission of 64 pieces.
+pub const MAX_RECORDS: usize = 64 * 9 + 64;
 
 /// Most transmissions waiting: all records of one neighbourhood once.
 pub const MAX_QUEUE: usize = 128;
@@ -31,6 +31,14 @@ pub const MAX_HOPS: u8 = 16;
 /// A copy is not passed on if so many neighbours were heard sending it first: one is
 /// not enough where three in ten are lost.
 const COPIES_HEARD: u8 = 2;
+
+/// Most neighbours counted: the largest fleet. Made-up ids must not take a peer's
+/// share of the channel away for good.
+const MAX_NEIGHBOURS: usize = 64;
+
+/// A token bucket holds at least one of the largest records, or a small share would
+/// never let it through.
+const BUCKET_MIN_BYTES: usize = RECORD_MAX_BYTES + OVERHEAD_BYTES;
 
 /// Share of the fair share that a peer may use: the rest is for collisions, beacons
 /// of newcomers and the error of counting neighbours.
@@ -69,7 +77,17 @@ pub struct Out {
     pub lifetime_ms: u32,
 }
 
-type RecordKey = (u8, u16, u16);
+/// Author, kind, subject: an author's records lie together.
+type RecordKey = (u16, u8, u16);
+
+fn key_of(record: &Record) -> RecordKey {
+    (record.author, record.kind, record.subject)
+}
+
+/// All keys of one author.
+fn keys_of(author: u16) -> core::ops::RangeInclusive<RecordKey> {
+    (author, 0, 0)..=(author, u8::MAX, u16::MAX)
+}
 
 #[derive(Clone, Debug)]
 struct Held {
@@ -126,23 +144,39 @@ impl Relay {
     /// A new life of this peer: its own old records are void.
     pub fn new_life(&mut self) {
         let me = self.me;
-        self.held.retain(|k, _| k.2 != me);
-        self.queue.retain(|k, _| k.2 != me);
+        self.held.retain(|k, _| k.0 != me);
+        self.queue.retain(|k, _| k.0 != me);
     }
 
     /// A record of this peer's own: held, and queued at once.
     pub fn own(&mut self, now: Time, record: &Record, bytes: Vec<u8>) {
-        let key = (record.kind, record.subject, record.author);
+        let key = key_of(record);
         let Some(kind) = Kind::of_number(record.kind) else {
             return;
         };
-        self.hold(now, key, Held { record: record.clone(), bytes, hops: 0, copies: 0, sent: now });
+        self.hold(
+            key,
+            Held {
+                record: record.clone(),
+                bytes,
+                hops: 0,
+                copies: 0,
+                sent: now,
+            },
+        );
         self.wait(now, key, kind, 0);
     }
 
     /// A record of somebody else's that was heard.
-    pub fn offer(&mut self, now: Time, record: &Record, bytes: &[u8], transmitter: u16, hops: u8) -> Offer {
-        let key = (record.kind, record.subject, record.author);
+    pub fn offer(
+        &mut self,
+        now: Time,
+        record: &Record,
+        bytes: &[u8],
+        transmitter: u16,
+        hops: u8,
+    ) -> Offer {
+        let key = key_of(record);
         let version = (record.incarnation, record.seq);
         let Some(kind) = Kind::of_number(record.kind) else {
             return Offer::Stale;
@@ -155,6 +189,8 @@ impl Relay {
             if version == known {
                 h.copies = h.copies.saturating_add(1);
                 h.sent = now;
+                // A copy by a shorter way: what is passed on has made fewer hops.
+                h.hops = h.hops.min(hops.saturating_add(1));
                 if h.copies >= COPIES_HEARD {
                     self.queue.remove(&key);
                 }
@@ -164,10 +200,16 @@ impl Relay {
         if self.newest_life(record.author) > record.incarnation {
             return Offer::Stale;
         }
-        self.held.retain(|k, h| k.2 != record.author || h.record.incarnation >= record.incarnation);
+        self.void(record.author, record.incarnation);
         let hops = hops.saturating_add(1);
-        let held = Held { record: record.clone(), bytes: bytes.to_vec(), hops, copies: 1, sent: now };
-        self.hold(now, key, held);
+        let held = Held {
+            record: record.clone(),
+            bytes: bytes.to_vec(),
+            hops,
+            copies: 1,
+            sent: now,
+        };
+        self.hold(key, held);
         if kind.relayed() && hops < MAX_HOPS {
             let delay = RELAY_DELAY_MS + self.jitter(&key, version) % (3 * RELAY_DELAY_MS);
             self.wait(now, key, kind, delay);
@@ -177,33 +219,64 @@ impl Relay {
     }
 
     fn newest_life(&self, author: u16) -> Incarnation {
-        self.held.iter().filter(|(k, _)| k.2 == author).map(|(_, h)| h.record.incarnation).max().unwrap_or(0)
+        self.held
+            .range(keys_of(author))
+            .map(|(_, h)| h.record.incarnation)
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// A later life supersedes all that earlier ones said: it is neither held nor
+    /// sent any more.
+    fn void(&mut self, author: u16, incarnation: Incarnation) {
+        let earlier = self
+            .held
+            .range(keys_of(author))
+            .filter(|(_, h)| h.record.incarnation < incarnation);
+        let earlier: Vec<RecordKey> = earlier.map(|(key, _)| *key).collect();
+        for key in earlier {
+            self.held.remove(&key);
+            self.queue.remove(&key);
+        }
     }
 
     fn jitter(&self, key: &RecordKey, version: (Incarnation, u32)) -> u64 {
         let mut h = Fnv::new();
-        for v in [u64::from(key.0), u64::from(key.1), u64::from(key.2), u64::from(version.1), self.salt] {
+        for v in [
+            u64::from(key.0),
+            u64::from(key.1),
+            u64::from(key.2),
+            u64::from(version.1),
+            self.salt,
+        ] {
             h.write(&v.to_le_bytes());
         }
         h.finish() >> 16
     }
 
-    fn hold(&mut self, now: Time, key: RecordKey, held: Held) {
+    /// Holds a record, if need be in place of another's: telemetry goes before what
+    /// the living and the dead claimed, and what was on the air longest ago first.
+    fn hold(&mut self, key: RecordKey, held: Held) {
         if self.held.len() >= MAX_RECORDS && !self.held.contains_key(&key) {
             let me = self.me;
-            let oldest = self.held.iter().filter(|(k, _)| k.2 != me).min_by_key(|(k, h)| (h.sent, **k));
+            let urgency = |k: &RecordKey| Kind::of_number(k.1).map(Kind::priority);
+            let others = self.held.iter().filter(|(k, _)| k.0 != me);
+            let oldest = others.min_by_key(|(k, h)| (core::cmp::Reverse(urgency(k)), h.sent, **k));
             if let Some(k) = oldest.map(|(k, _)| *k) {
                 self.held.remove(&k);
                 self.queue.remove(&k);
             }
         }
-        let _ = now;
         self.held.insert(key, held);
     }
 
     fn wait(&mut self, now: Time, key: RecordKey, kind: Kind, delay_ms: u64) {
         if self.queue.len() >= MAX_QUEUE && !self.queue.contains_key(&key) {
-            let last = self.queue.iter().max_by_key(|(k, w)| (w.priority, w.from, **k)).map(|(k, _)| *k);
+            let last = self
+                .queue
+                .iter()
+                .max_by_key(|(k, w)| (w.priority, w.from, **k))
+                .map(|(k, _)| *k);
             if let Some(k) = last {
                 self.queue.remove(&k);
             }
@@ -211,7 +284,14 @@ impl Relay {
         let row = kind.row();
         let from = now.plus_ms(delay_ms);
         let until = from.plus_ms(u64::from(self.lifetime_ms(kind)));
-        self.queue.insert(key, Waiting { from, until, priority: row.priority });
+        self.queue.insert(
+            key,
+            Waiting {
+                from,
+                until,
+                priority: row.priority,
+            },
+        );
     }
 
     fn lifetime_ms(&self, kind: Kind) -> u32 {
@@ -220,9 +300,11 @@ impl Relay {
 
     /// A neighbour's beacon: what it lacks is queued for it.
     pub fn on_beacon(&mut self, now: Time, author: u16, beacon: &Beacon) {
-        self.neighbours.insert(author, now);
         let window = 4 * self.period_ms;
         self.neighbours.retain(|_, t| now.since_ms(*t) < window);
+        if self.neighbours.len() < MAX_NEIGHBOURS || self.neighbours.contains_key(&author) {
+            self.neighbours.insert(author, now);
+        }
         self.answered.retain(|_, t| now.since_ms(*t) < window);
         let mut theirs: BTreeMap<u16, (Incarnation, u32, u16)> = BTreeMap::new();
         for g in &beacon.gossip {
@@ -239,7 +321,14 @@ impl Relay {
     }
 
     /// Queues what a neighbour lacks of one author's records.
-    fn catch_up(&mut self, now: Time, author: u16, incarnation: Incarnation, max_seq: u32, digest: u16) {
+    fn catch_up(
+        &mut self,
+        now: Time,
+        author: u16,
+        incarnation: Incarnation,
+        max_seq: u32,
+        digest: u16,
+    ) {
         let life = self.newest_life(author);
         let (mine_seq, mine_digest) = self.version(author, life);
         if life == 0 || life < incarnation || (life == incarnation && mine_seq < max_seq) {
@@ -249,21 +338,24 @@ impl Relay {
             return;
         }
         let quiet = 2 * self.period_ms;
-        if self.answered.get(&author).is_some_and(|t| now.since_ms(*t) < quiet) {
+        if self
+            .answered
+            .get(&author)
+            .is_some_and(|t| now.since_ms(*t) < quiet)
+        {
             return;
         }
         self.answered.insert(author, now);
         let all = life > incarnation || mine_seq == max_seq;
         let lacking: Vec<(RecordKey, Kind)> = self
             .held
-            .iter()
-            .filter(|(k, h)| {
-                k.2 == author
-                    && h.record.incarnation == life
+            .range(keys_of(author))
+            .filter(|(_, h)| {
+                h.record.incarnation == life
                     && (all || h.record.seq > max_seq)
                     && (now.since_ms(h.sent) >= quiet || h.copies == 0)
             })
-            .filter_map(|(k, _)| Kind::of_number(k.0).map(|kind| (*k, kind)))
+            .filter_map(|(k, _)| Kind::of_number(k.1).map(|kind| (*k, kind)))
             .filter(|(_, kind)| kind.relayed())
             .collect();
         for (key, kind) in lacking {
@@ -283,22 +375,25 @@ impl Relay {
     pub fn version(&self, author: u16, incarnation: Incarnation) -> (u32, u16) {
         let mut max = 0;
         let mut h = Fnv::new();
-        for (k, held) in &self.held {
-            let relayed = Kind::of_number(k.0).is_some_and(Kind::relayed);
-            if k.2 == author && held.record.incarnation == incarnation && relayed {
+        for (k, held) in self.held.range(keys_of(author)) {
+            let relayed = Kind::of_number(k.1).is_some_and(Kind::relayed);
+            if held.record.incarnation == incarnation && relayed {
                 max = max.max(held.record.seq);
-                h.write(&[k.0]);
-                h.write(&k.1.to_le_bytes());
+                h.write(&[k.1]);
+                h.write(&k.2.to_le_bytes());
                 h.write(&held.record.seq.to_le_bytes());
             }
         }
         let d = h.finish();
-        #[allow(clippy::cast_possible_truncation, reason = "folded to 16 bits on purpose")]
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "folded to 16 bits on purpose"
+        )]
         let digest = (d ^ (d >> 16) ^ (d >> 32) ^ (d >> 48)) as u16;
         (max, digest)
     }
 
-    /// All records held, newest versions, in order of key.
+    /// All records held, newest versions, by author, kind and subject.
     #[must_use]
     pub fn records(&self) -> Vec<Record> {
         self.held.values().map(|h| h.record.clone()).collect()
@@ -312,7 +407,7 @@ impl Relay {
 
     fn refill(&mut self, now: Time) {
         let rate = self.rate_bytes_ps();
-        let most = 2 * rate * 1000;
+        let most = (2 * rate).max(BUCKET_MIN_BYTES as u64) * 1000;
         self.tokens_mb = (self.tokens_mb + now.since_ms(self.filled) * rate).min(most);
         self.filled = now;
     }
@@ -320,7 +415,9 @@ impl Relay {
     /// A transmission that did not go through the queue, in bytes.
     pub fn charge(&mut self, now: Time, bytes: usize) {
         self.refill(now);
-        self.tokens_mb = self.tokens_mb.saturating_sub((bytes + OVERHEAD_BYTES) as u64 * 1000);
+        self.tokens_mb = self
+            .tokens_mb
+            .saturating_sub((bytes + OVERHEAD_BYTES) as u64 * 1000);
     }
 
     /// What may go out now, the most urgent first; `None` when nothing may.
@@ -333,13 +430,13 @@ impl Relay {
         if self.tokens_mb < cost {
             return None;
         }
-        let kind = Kind::of_number(key.0)?;
+        let kind = Kind::of_number(key.1)?;
         self.tokens_mb -= cost;
         self.queue.remove(&key);
         held.sent = now;
         held.copies = held.copies.saturating_add(1);
         Some(Out {
-            key: key::key(&self.fleet, kind, key.1, key.2),
+            key: key::key(&self.fleet, kind, key.2, key.0),
             bytes: held.bytes.clone(),
             hops: held.hops,
             priority,
@@ -371,8 +468,12 @@ impl Relay {
 
     /// What is held and what waits, each with its cap.
     #[must_use]
-    pub fn loads(&self) -> [(&'static str, usize, usize); 2] {
-        [("records", self.held.len(), MAX_RECORDS), ("queue", self.queue.len(), MAX_QUEUE)]
+    pub fn loads(&self) -> [(&'static str, usize, usize); 3] {
+        [
+            ("records", self.held.len(), MAX_RECORDS),
+            ("queue", self.queue.len(), MAX_QUEUE),
+            ("neighbours", self.neighbours.len(), MAX_NEIGHBOURS),
+        ]
     }
 }
 
@@ -381,7 +482,15 @@ mod tests {
     use super::*;
 
     fn record(author: u16, seq: u32) -> Record {
-        Record { author, incarnation: 1, seq, kind: 1, subject: 0, body: vec![0; 20], signature: Vec::new() }
+        Record {
+            author,
+            incarnation: 1,
+            seq,
+            kind: 1,
+            subject: 0,
+            body: vec![0; 20],
+            signature: Vec::new(),
+        }
     }
 
     fn relay(me: u16) -> Relay {
@@ -391,13 +500,22 @@ mod tests {
     #[test]
     fn a_new_record_is_passed_on_once() {
         let mut r = relay(2);
-        assert_eq!(r.offer(Time(5000), &record(1, 1), &[1; 40], 1, 0), Offer::New);
+        assert_eq!(
+            r.offer(Time(5000), &record(1, 1), &[1; 40], 1, 0),
+            Offer::New
+        );
         assert_eq!(r.poll(Time(5000)), None);
         let out = r.poll(Time(5200)).unwrap();
         assert_eq!((out.hops, out.bytes.len()), (1, 40));
         assert_eq!(r.poll(Time(6000)), None);
-        assert_eq!(r.offer(Time(6000), &record(1, 1), &[1; 40], 1, 0), Offer::Duplicate);
-        assert_eq!(r.offer(Time(6000), &record(1, 0), &[1; 40], 1, 0), Offer::Stale);
+        assert_eq!(
+            r.offer(Time(6000), &record(1, 1), &[1; 40], 1, 0),
+            Offer::Duplicate
+        );
+        assert_eq!(
+            r.offer(Time(6000), &record(1, 0), &[1; 40], 1, 0),
+            Offer::Stale
+        );
     }
 
     #[test]
