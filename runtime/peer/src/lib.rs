@@ -29,8 +29,6 @@ mod ear;
 pub mod input;
 pub mod journal;
 pub mod membership;
-#[cfg(test)]
-mod membership_net;
 pub mod mission;
 pub mod output;
 pub mod peer;

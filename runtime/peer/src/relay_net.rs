@@ -2,7 +2,7 @@
 
 use crate::input::Time;
 use crate::membership::Membership;
-use crate::membership_net::Dice;
+use crate::membership::net::Dice;
 use crate::relay::{Offer, Relay};
 use crate::wire::codec;
 use crate::wire::message::{Beacon, Record};

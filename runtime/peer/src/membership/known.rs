@@ -1,0 +1,148 @@
+//! One peer as another knows it: its freshest heartbeat, how old that is, by how many
+//! hops it came.
+
+use super::{Change, HOP_PERIODS, Info};
+use crate::Incarnation;
+use crate::input::Time;
+use crate::output::Status;
+use crate::wire::message::Gossip;
+
+/// An age that grows: so much when it was heard, and the time since.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Age {
+    pub(super) told_ms: u64,
+    pub(super) at: Time,
+}
+
+impl Age {
+    pub(super) fn ms(self, now: Time) -> u64 {
+        self.told_ms.saturating_add(now.since_ms(self.at))
+    }
+}
+
+/// One heartbeat as it was heard.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Heartbeat {
+    pub(super) id: u16,
+    pub(super) incarnation: Incarnation,
+    pub(super) count: u32,
+    pub(super) age: Age,
+    pub(super) hops: u8,
+    pub(super) suspected: Option<Age>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Known {
+    pub(super) freshest: Heartbeat,
+    pub(super) status: Status,
+    pub(super) info: Info,
+    /// Fewest hops by period, for the last ten: (period, hops).
+    pub(super) hops: [(u64, u8); 10],
+    pub(super) eccentricity: u8,
+    pub(super) urgent_until: Time,
+    pub(super) restarts: Vec<Time>,
+}
+
+/// Hops of somebody who was not heard in the last ten periods.
+pub(super) const NO_HOPS: [(u64, u8); 10] = [(0, u8::MAX); 10];
+
+impl Known {
+    pub(super) fn new(now: Time, heard: Heartbeat, period: u64, urgent_until: Time) -> Self {
+        let status = if heard.suspected.is_some() {
+            Status::Suspect
+        } else {
+            Status::Alive
+        };
+        let mut known = Self {
+            freshest: heard,
+            status,
+            info: Info {
+                steady_since: now,
+                ..Info::default()
+            },
+            hops: NO_HOPS,
+            eccentricity: 0,
+            urgent_until,
+            restarts: Vec::new(),
+        };
+        known.note_hops(period, heard.hops);
+        known
+    }
+
+    /// The heartbeat known, heard once more. Its age stays as first heard: taking the
+    /// younger would let echoes keep the dead alive, taking the older would age the
+    /// living by the rounding of every echo.
+    pub(super) fn merge_same(
+        &mut self,
+        now: Time,
+        heard: Heartbeat,
+        period: u64,
+        urgent_until: Time,
+        changes: &mut Vec<Change>,
+    ) {
+        if heard.hops < self.freshest.hops {
+            self.freshest.hops = heard.hops;
+            self.note_hops(period, heard.hops);
+        }
+        let Some(told) = heard.suspected else {
+            return;
+        };
+        if self
+            .freshest
+            .suspected
+            .is_none_or(|mine| mine.ms(now) < told.ms(now))
+        {
+            self.freshest.suspected = Some(told);
+        }
+        if self.status == Status::Alive {
+            self.status = Status::Suspect;
+            self.urgent_until = urgent_until;
+            changes.push(self.change());
+        }
+    }
+
+    pub(super) fn note_hops(&mut self, period: u64, hops: u8) {
+        let place = usize::try_from(period % HOP_PERIODS).unwrap_or(0);
+        let slot = &mut self.hops[place];
+        *slot = if slot.0 == period {
+            (period, slot.1.min(hops))
+        } else {
+            (period, hops)
+        };
+    }
+
+    /// Fewest hops in the periods after `oldest`.
+    pub(super) fn fewest_hops(&self, oldest: u64) -> Option<u8> {
+        let recent = self
+            .hops
+            .iter()
+            .filter(|(p, h)| *h != u8::MAX && (*p > oldest || oldest == 0));
+        recent.map(|(_, hops)| *hops).min()
+    }
+
+    pub(super) fn change(&self) -> Change {
+        let Heartbeat {
+            id, incarnation, ..
+        } = self.freshest;
+        Change {
+            peer: id,
+            incarnation,
+            status: self.status,
+        }
+    }
+
+    pub(super) fn gossip(&self, now: Time) -> Gossip {
+        let ds = |age: Age| u16::try_from(age.ms(now).div_ceil(100)).unwrap_or(u16::MAX);
+        Gossip {
+            id: self.freshest.id,
+            incarnation: self.freshest.incarnation,
+            heartbeat: self.freshest.count,
+            age_ds: ds(self.freshest.age),
+            hops: self.freshest.hops,
+            suspected_ds: self.freshest.suspected.map(ds),
+            able: self.info.able,
+            max_seq: 0,
+            digest: 0,
+        }
+    }
+}

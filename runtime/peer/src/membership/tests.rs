@@ -1,0 +1,265 @@
+//! One failure detector, step by step.
+
+use super::*;
+
+fn beacon(heartbeat: u32, gossip: Vec<Gossip>) -> Beacon {
+    Beacon {
+        heartbeat,
+        east_mm: 0,
+        north_mm: 0,
+        heading_e4: 0,
+        able: true,
+        ground: false,
+        finished: false,
+        nonce: 1,
+        counter: 0,
+        eccentricity: 1,
+        revision: 1,
+        loop_hash: 1,
+        cover_digest: 0,
+        gossip,
+    }
+}
+
+#[test]
+fn silence_leads_to_suspicion_and_then_to_a_verdict() {
+    let mut m = Membership::new(1, 1000);
+    m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
+    let mut seen = Vec::new();
+    for t in 0..80 {
+        for c in m.tick(Time(t * 250)) {
+            seen.push((t * 250, c.status));
+        }
+    }
+    assert_eq!(seen, [(4250, Status::Suspect), (8750, Status::Down)]);
+    assert!(8750 <= m.bound_ms(Time(20_000)));
+}
+
+#[test]
+fn an_old_heartbeat_does_not_raise_the_dead() {
+    let mut m = Membership::new(1, 1000);
+    m.on_beacon(Time(0), 2, 1, &beacon(5, Vec::new()));
+    for t in 0..80 {
+        m.tick(Time(t * 250));
+    }
+    assert_eq!(m.live().count(), 0);
+    let old = Gossip {
+        id: 2,
+        incarnation: 1,
+        heartbeat: 6,
+        age_ds: 190,
+        hops: 1,
+        suspected_ds: None,
+        able: true,
+        max_seq: 0,
+        digest: 0,
+    };
+    let changes = m.on_beacon(Time(20_000), 3, 1, &beacon(9, vec![old]));
+    assert!(changes.iter().all(|c| c.peer == 3));
+    let fresh = Gossip { age_ds: 5, ..old };
+    let changes = m.on_beacon(Time(20_100), 3, 1, &beacon(10, vec![fresh]));
+    assert!(changes.contains(&Change {
+        peer: 2,
+        incarnation: 1,
+        status: Status::Alive
+    }));
+}
+
+#[test]
+fn a_late_loop_doubts_itself() {
+    let mut m = Membership::new(1, 1000);
+    m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
+    m.tick(Time(0));
+    assert!(m.tick(Time(9_000)).iter().all(|c| c.status != Status::Down));
+}
+
+fn entry(id: u16, heartbeat: u32, age_ds: u16, suspected_ds: Option<u16>) -> Gossip {
+    Gossip {
+        id,
+        incarnation: 1,
+        heartbeat,
+        age_ds,
+        hops: 1,
+        suspected_ds,
+        able: true,
+        max_seq: 0,
+        digest: 0,
+    }
+}
+
+#[test]
+fn a_suspicion_is_taken_over_and_refuted() {
+    let mut m = Membership::new(1, 1000);
+    m.on_beacon(Time(0), 3, 1, &beacon(1, vec![entry(2, 7, 40, None)]));
+    assert_eq!(m.status(2), Some((1, Status::Alive)));
+    // An older suspicion concerns a heartbeat that is refuted already.
+    m.on_beacon(Time(1000), 3, 1, &beacon(2, vec![entry(2, 6, 60, Some(9))]));
+    assert_eq!(m.status(2), Some((1, Status::Alive)));
+    m.on_beacon(
+        Time(2000),
+        3,
+        1,
+        &beacon(3, vec![entry(2, 7, 60, Some(20))]),
+    );
+    assert_eq!(m.status(2), Some((1, Status::Suspect)));
+    assert_eq!(
+        m.gossip(Time(2000), 20)[0].suspected_ds,
+        Some(20),
+        "news go first, with their age"
+    );
+    m.on_beacon(Time(3000), 3, 1, &beacon(4, vec![entry(2, 8, 10, None)]));
+    assert_eq!(m.status(2), Some((1, Status::Alive)));
+    m.on_beacon(Time(3500), 3, 1, &beacon(5, vec![entry(2, 8, 15, Some(0))]));
+    let down: Vec<_> = (14..40)
+        .flat_map(|i| m.tick(Time(i * 250)).into_iter().map(move |c| (i * 250, c)))
+        .filter(|(_, c)| c.peer == 2 && c.status == Status::Down)
+        .collect();
+    // D is 2 here: told at 3.5 s, and k2 is 5 periods.
+    assert_eq!(
+        down,
+        [(
+            8500,
+            Change {
+                peer: 2,
+                incarnation: 1,
+                status: Status::Down
+            }
+        )]
+    );
+    assert_eq!(m.info(2).unwrap().steady_since, Time(0));
+    m.on_beacon(Time(9500), 2, 1, &beacon(17, Vec::new()));
+    assert_eq!(
+        m.info(2).unwrap().steady_since,
+        Time(9500),
+        "a return begins anew"
+    );
+}
+
+#[test]
+fn who_is_already_condemned_is_not_met_as_alive() {
+    let mut m = Membership::new(1, 1000);
+    let told = vec![
+        entry(2, 7, 100, Some(60)),
+        entry(4, 7, 500, None),
+        entry(5, 7, 3, None),
+    ];
+    let changes = m.on_beacon(Time(0), 3, 1, &beacon(1, told));
+    assert_eq!(changes.iter().map(|c| c.peer).collect::<Vec<_>>(), [3, 5]);
+    assert_eq!(m.live().map(|(id, _)| id).collect::<Vec<_>>(), [3, 5]);
+    assert_eq!(m.all().count(), 4, "the dead are asked after");
+    let later = Gossip {
+        incarnation: 2,
+        ..entry(4, 1, 600, None)
+    };
+    assert!(
+        m.on_beacon(Time(900), 3, 1, &beacon(2, vec![later]))
+            .is_empty()
+    );
+    assert_eq!(m.status(4), Some((2, Status::Down)));
+    let over = Gossip {
+        incarnation: 2,
+        ..entry(5, 1, 600, None)
+    };
+    let changes = m.on_beacon(Time(1900), 3, 1, &beacon(3, vec![over]));
+    assert_eq!(
+        changes,
+        [Change {
+            peer: 5,
+            incarnation: 2,
+            status: Status::Down
+        }]
+    );
+}
+
+#[test]
+fn a_later_life_counts_as_a_restart() {
+    let mut m = Membership::new(1, 1000);
+    m.on_beacon(Time(0), 2, 1, &beacon(900, Vec::new()));
+    let changes = m.on_beacon(Time(5000), 2, 3, &beacon(1, Vec::new()));
+    assert_eq!(
+        changes,
+        [Change {
+            peer: 2,
+            incarnation: 3,
+            status: Status::Alive
+        }]
+    );
+    assert!(
+        m.on_beacon(Time(5100), 2, 1, &beacon(901, Vec::new()))
+            .is_empty()
+    );
+    assert_eq!(m.status(2), Some((3, Status::Alive)));
+    assert_eq!(m.restarts(2, Time(6000), 300_000), 1);
+    assert_eq!(m.restarts(2, Time(400_000), 300_000), 0);
+}
+
+#[test]
+fn every_peer_comes_round_in_gossip() {
+    let mut m = Membership::new(1, 1000);
+    for id in 2..50 {
+        m.on_beacon(Time(0), id, 1, &beacon(1, Vec::new()));
+    }
+    let later = Time(3000);
+    let mut told = std::collections::BTreeSet::new();
+    for _ in 0..3 {
+        let said = m.gossip(later, 20);
+        assert_eq!(said.len(), 20);
+        assert!(said.iter().all(|g| g.age_ds == 30));
+        told.extend(said.iter().map(|g| g.id));
+    }
+    assert_eq!(told.len(), 48);
+}
+
+#[test]
+fn made_up_ids_do_not_displace_the_living() {
+    let mut m = Membership::new(1, 1000);
+    for id in 2..500 {
+        m.on_beacon(Time(0), id, 1, &beacon(1, Vec::new()));
+    }
+    assert_eq!(m.all().count(), MAX_KNOWN);
+    assert!(m.status(2).is_some() && m.status(499).is_none());
+    for i in 0..80 {
+        m.tick(Time(i * 250));
+    }
+    m.on_beacon(Time(20_000), 499, 1, &beacon(1, Vec::new()));
+    assert_eq!((m.all().count(), m.live().count()), (MAX_KNOWN, 1));
+}
+
+#[test]
+fn what_is_said_of_myself_is_noticed() {
+    let mut m = Membership::new(1, 1000);
+    m.set_self(2);
+    m.set_voice(77, 40);
+    let now = Time(50_000);
+    let of_me = |incarnation, heartbeat| Gossip {
+        incarnation,
+        ..entry(1, heartbeat, 10, None)
+    };
+    let via = |g| m.heard_myself(now, 3, 1, &beacon(1, vec![g]));
+    assert_eq!(via(of_me(2, 40)), None);
+    assert_eq!(via(of_me(1, 900)), None);
+    assert_eq!(via(of_me(3, 1)), Some(Oneself::Later(3)));
+    assert_eq!(via(of_me(2, 41)), Some(Oneself::Double(None)));
+    assert_eq!(
+        via(Gossip {
+            age_ds: 900,
+            ..of_me(2, 41)
+        }),
+        None,
+        "not fresh"
+    );
+    let direct = |incarnation, nonce| {
+        m.heard_myself(
+            now,
+            1,
+            incarnation,
+            &Beacon {
+                nonce,
+                ..beacon(3, Vec::new())
+            },
+        )
+    };
+    assert_eq!(direct(2, 77), None);
+    assert_eq!(direct(2, 78), Some(Oneself::Double(Some(78))));
+    assert_eq!(direct(4, 78), Some(Oneself::Later(4)));
+}
