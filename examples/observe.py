@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # What the swarm publishes, in Python: pip install eclipse-zenoh cbor2
-# Usage: observe.py tcp/127.0.0.1:PORT [SECONDS] [KEYS]
+# Usage: observe.py tcp/127.0.0.1:PORT [SECONDS [KEYS]]
 import json, sys, time
 import cbor2, zenoh
 
@@ -8,10 +8,13 @@ endpoint, seconds, keys = (sys.argv[1:] + ["10", "**"][len(sys.argv) - 2:])[:3]
 config = zenoh.Config()
 for key, value in [("mode", "client"), ("connect/endpoints", [endpoint]), ("scouting/multicast/enabled", False)]:
     config.insert_json5(key, json.dumps(value))
+shown = set()
 
 def show(sample):
-    author, incarnation, seq, kind, subject, body, *_ = cbor2.loads(bytes(sample.payload))
-    print(sample.key_expr, f"uav{author} life {incarnation} #{seq}", cbor2.loads(body), flush=True)
+    author, life, seq, kind, subject, body, *_ = cbor2.loads(bytes(sample.payload))
+    if (author, life, seq) not in shown:  # several peers may have passed it on
+        shown.add((author, life, seq))
+        print(sample.key_expr, f"uav{author} life {life} #{seq}", cbor2.loads(body), flush=True)
 
 with zenoh.open(config) as session:
     subscriber = session.declare_subscriber(keys, show)

@@ -1,8 +1,8 @@
 //! `skein chaos`: something goes wrong in a running trial, or is put right.
 
 use crate::{cli, exit};
-use clap::{Args, Subcommand};
-use skein_broker::control::{Request, ask};
+use clap::{Args, Subcommand, ValueEnum};
+use skein_broker::control::{OrderName, Request, ask};
 use skein_broker::registry;
 use skein_netsim::chaos::{Fault, TimedFault};
 use std::path::PathBuf;
@@ -95,11 +95,37 @@ pub enum What {
         #[arg(value_parser = percent)]
         percent: f64,
     },
+    /// The operator, at the ground station's console, wants something of all UAVs.
+    Order {
+        /// What.
+        order: OrderArg,
+    },
     /// The faults of a file happen, at their times from now on.
     Plan {
         /// A list of faults as in a scenario; see `configs/chaos/`.
         file: PathBuf,
     },
+}
+
+/// What an operator may want.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum OrderArg {
+    /// Carry on with the mission.
+    Resume,
+    /// Loiter where you are.
+    Hold,
+    /// Come home and loiter there.
+    ReturnToBase,
+}
+
+impl From<OrderArg> for OrderName {
+    fn from(order: OrderArg) -> Self {
+        match order {
+            OrderArg::Resume => Self::Resume,
+            OrderArg::Hold => Self::Hold,
+            OrderArg::ReturnToBase => Self::ReturnToBase,
+        }
+    }
 }
 
 /// Peers that stay together.
@@ -168,6 +194,9 @@ fn requests(args: &ChaosArgs) -> Result<Vec<Request>, (u8, String)> {
             Err(error) => Err((exit::CONFIG_INVALID, error.to_string())),
         };
     }
+    if let What::Order { order } = args.what {
+        return Ok(vec![Request::Order(order.into())]);
+    }
     let fault = fault(&args.what).ok_or((exit::USAGE, "nothing to do".to_owned()))?;
     let mut requests = vec![Request::Fault(fault.clone())];
     if let Some(seconds) = args.for_s {
@@ -208,7 +237,7 @@ fn fault(what: &What) -> Option<Fault> {
         What::Loss { percent } => Fault::Loss {
             permille: (percent * 10.0).round() as u16,
         },
-        What::Plan { .. } => return None,
+        What::Order { .. } | What::Plan { .. } => return None,
     })
 }
 

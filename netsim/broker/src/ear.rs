@@ -58,6 +58,11 @@ impl Trial<'_> {
         let Some(member) = self.members.get_mut(&id).filter(|m| m.pid() == Some(pid)) else {
             return;
         };
+        // What was under way when a computer ended is not said any more.
+        let silent = matches!(member.computer, Computer::Off | Computer::Crashed);
+        if silent && matches!(frame, ToWorld::Setpoint(_) | ToWorld::Report(_)) {
+            return;
+        }
         match frame {
             ToWorld::Setpoint(setpoint) => {
                 let delay_ms = self.now_ms.saturating_sub(setpoint.from_ms);

@@ -117,7 +117,7 @@ impl Trial<'_> {
         } else {
             self.arena.set_computer(peer, false);
         }
-        let cells = self.ledger.killed(now_ms, peer);
+        let cells = self.ledger.killed(now_ms, peer, computer_only);
         let what = if computer_only {
             "the computer of uav"
         } else {
@@ -148,7 +148,7 @@ impl Trial<'_> {
             process.signal(Signal::SIGTERM);
         }
         let cells = if member.flies {
-            self.ledger.killed(now_ms, peer)
+            self.ledger.killed(now_ms, peer, true)
         } else {
             0
         };
@@ -204,7 +204,7 @@ impl Trial<'_> {
             member.wipe();
         }
         if ran && flies {
-            self.ledger.killed(now_ms, peer);
+            self.ledger.killed(now_ms, peer, true);
         }
         if flies && !airborne {
             self.arena.relaunch(peer);

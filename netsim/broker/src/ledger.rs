@@ -17,6 +17,7 @@ const MAX_NOTES: usize = 50;
 struct Kill {
     peer: u16,
     at_ms: u64,
+    computer_only: bool,
     held: usize,
     share: f64,
     listed_already: usize,
@@ -210,8 +211,9 @@ impl Ledger {
         line
     }
 
-    /// Takes down that a peer is gone, and how many uncovered cells it held.
-    pub fn killed(&mut self, now_ms: u64, peer: u16) -> usize {
+    /// Takes down that a peer, or only its computer, is gone; gives how many uncovered
+    /// cells it held.
+    pub fn killed(&mut self, now_ms: u64, peer: u16, computer_only: bool) -> usize {
         let empty = BTreeSet::new();
         let mut pending = self.listed.get(&peer).unwrap_or(&empty).clone();
         pending.retain(|c| !self.covered.contains(c));
@@ -233,6 +235,7 @@ impl Ledger {
         let mut kill = Kill {
             peer,
             at_ms: now_ms,
+            computer_only,
             held,
             share: held as f64 / even,
             listed_already: held - pending.len(),
@@ -363,6 +366,7 @@ impl Kill {
         KillVerdict {
             peer: self.peer,
             at_s: secs(self.at_ms),
+            computer_only: self.computer_only,
             cells_held: self.held,
             of_even_share: (self.share * 1000.0).round() / 1000.0,
             detected_by: self.detected.map(|(by, _)| by),
@@ -444,7 +448,7 @@ mod tests {
     fn a_takeover_is_told_by_whom_how_much_and_when() {
         let mut l = ledger();
         l.report(1_000, 1, Report::Covered { cells: vec![0, 1] });
-        assert_eq!(l.killed(2_000, 1), 8);
+        assert_eq!(l.killed(2_000, 1, false), 8);
         let down = Report::Membership {
             peer: PeerId(1),
             incarnation: 1,
@@ -471,7 +475,7 @@ mod tests {
     #[test]
     fn what_nobody_takes_over_is_left() {
         let mut l = ledger();
-        l.killed(0, 1);
+        l.killed(0, 1, false);
         l.report(5_000, 2, register(5, 10));
         l.report(6_000, 2, Report::Covered { cells: vec![4] });
         let kill = &l.kills()[0];
@@ -485,7 +489,7 @@ mod tests {
     fn a_restart_counts_as_useful_only_in_its_new_life() {
         let mut l = ledger();
         l.report(0, 1, Report::Booted { incarnation: 1 });
-        l.killed(1_000, 1);
+        l.killed(1_000, 1, false);
         l.restarted(2_000, 1, true);
         l.report(2_500, 1, Report::Booted { incarnation: 2 });
         l.report(9_000, 1, register(0, 3));

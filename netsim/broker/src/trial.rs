@@ -380,7 +380,7 @@ impl<'a> Trial<'a> {
                 let text = format!("uav{uav} is lost: {cause:?}");
                 self.ledger.failures.push(text.clone());
                 self.note(text);
-                self.ledger.killed(self.now_ms, *uav);
+                self.ledger.killed(self.now_ms, *uav, false);
                 if let Some(member) = self.members.get_mut(uav) {
                     member.airborne = false;
                     member.computer = Computer::Off;

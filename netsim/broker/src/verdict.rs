@@ -105,6 +105,8 @@ pub struct KillVerdict {
     pub peer: u16,
     /// When, seconds of scenario time.
     pub at_s: f64,
+    /// Whether its airframe stayed in the air.
+    pub computer_only: bool,
     /// Uncovered cells that it listed.
     pub cells_held: usize,
     /// The same, as a share of an even share of the whole loop.
@@ -218,7 +220,12 @@ impl Verdict {
         for k in &self.kills {
             write!(
                 f,
-                "  killed     uav{} at {:.1} s with {} cells uncovered ({:.0} % of an even share)",
+                "  killed     {}uav{} at {:.1} s with {} cells uncovered ({:.0} % of an even share)",
+                if k.computer_only {
+                    "the computer of "
+                } else {
+                    ""
+                },
                 k.peer,
                 k.at_s,
                 k.cells_held,
