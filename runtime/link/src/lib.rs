@@ -1,7 +1,7 @@
 //! What a node and a world share: the link table, the fate of a transmission, the
 //! frames of the vehicle stream.
 //!
-//! The radio is judged per message, at the receiver, by [`fate`]: a pure function
+//! The radio is judged per message, at the receiver, by [`fate()`]: a pure function
 //! of the seed, the two ends, the number of the transmission and the state of the
 //! link. The simulator and a live node call the same one.
 
