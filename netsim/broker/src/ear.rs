@@ -69,11 +69,7 @@ impl Trial<'_> {
                 if member.computer == Computer::Runs {
                     self.setpoint_delay_ms = self.setpoint_delay_ms.max(delay_ms);
                     if self.pacer.answered(delay_ms) {
-                        let text = format!(
-                            "peers answer late; time runs at x{:.1} from now on",
-                            self.pacer.scale()
-                        );
-                        self.note(text);
+                        self.note_slow("peers answer late");
                     }
                 }
                 self.arena.apply(id, setpoint);

@@ -71,6 +71,7 @@ pub struct Ledger {
     covered: BTreeSet<u16>,
     listed: BTreeMap<u16, BTreeSet<u16>>,
     incarnations: BTreeMap<u16, u32>,
+    ready: BTreeSet<u16>,
     finished: BTreeSet<u16>,
     kills: Vec<Kill>,
     restarts: Vec<Restart>,
@@ -99,6 +100,7 @@ impl Ledger {
         match report {
             Report::Ready { cells, .. } => {
                 self.cells = self.cells.max(cells);
+                self.ready.insert(peer);
                 None
             }
             Report::Booted { incarnation } => {
@@ -310,6 +312,12 @@ impl Ledger {
         sum.overrun += c.overrun;
         merge(&mut sum.relayed_by, &c.relayed_by);
         merge(&mut sum.lost, &c.lost);
+    }
+
+    /// Whether that peer has ever held a mission and derived its loop.
+    #[must_use]
+    pub fn is_ready(&self, peer: u16) -> bool {
+        self.ready.contains(&peer)
     }
 
     /// Whether that peer holds that the mission is finished.

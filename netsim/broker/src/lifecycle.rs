@@ -14,6 +14,11 @@ use tokio::time::Instant;
 /// them.
 const LAUNCH_TIMEOUT: Duration = Duration::from_secs(60);
 
+/// How long UAVs may take to derive the loop of the mission before time begins
+/// without them: they share two cores, and a square kilometre takes a debug build
+/// some seconds each.
+const READY_TIMEOUT: Duration = Duration::from_secs(45);
+
 /// How long peers may take to say goodbye.
 const GOODBYE_TIMEOUT: Duration = Duration::from_secs(2);
 
@@ -86,7 +91,24 @@ impl Trial<'_> {
                 self.hear(heard);
             }
         }
+        self.wait_until_ready().await;
         Ok(())
+    }
+
+    /// Waits until all UAVs have derived the loop of their mission: nobody launches an
+    /// airframe whose computer is still busy starting, and here all computers share
+    /// one machine. Time stands still meanwhile.
+    async fn wait_until_ready(&mut self) {
+        let deadline = Instant::now() + READY_TIMEOUT;
+        while !self.live_uavs().iter().all(|id| self.ledger.is_ready(*id)) {
+            match tokio::time::timeout_at(deadline, self.streams.next()).await {
+                Ok(Some(heard)) => self.hear(heard),
+                Ok(None) | Err(_) => {
+                    let text = "not all UAVs are ready; time begins all the same";
+                    return self.note(text.to_owned());
+                }
+            }
+        }
     }
 
     /// Tells everybody to leave, and ends who does not.

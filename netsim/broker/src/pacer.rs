@@ -29,9 +29,22 @@ const MAX_DELAY_MS: u64 = 1_000;
 /// Late answers in a row before the scale is lowered: one may be a paused process.
 const LATE_ANSWERS: u32 = 40;
 
+/// Steps without trouble after which the scale is raised again by a tenth, up to what
+/// was asked for: 10 s of scenario time, longer than any burst of planning.
+const CALM_STEPS: u32 = 100;
+
+/// By how much it is raised at once.
+const FASTER: f64 = 1.1;
+
+/// Steps between two times that the scale is lowered: the first must show before the
+/// second can be judged.
+const SETTLE_STEPS: u32 = 20;
+
 /// When the next step is due.
 #[derive(Debug)]
 pub struct Pacer {
+    asked: f64,
+    calm: u32,
     scale: f64,
     lowest: f64,
     next: Instant,
@@ -44,6 +57,8 @@ impl Pacer {
     pub fn new(scale: f64, now: Instant) -> Self {
         let scale = scale.clamp(MIN_SCALE, MAX_SCALE);
         Self {
+            asked: scale,
+            calm: 0,
             scale,
             lowest: scale,
             next: now,
@@ -76,12 +91,23 @@ impl Pacer {
     /// A step was made at `now`; tells whether the scale was lowered.
     pub fn stepped(&mut self, now: Instant) -> bool {
         self.next += self.period();
+        self.calm = self.calm.saturating_add(1);
         let behind = now.saturating_duration_since(self.next);
-        if behind <= self.period().mul_f64(MAX_BEHIND) {
-            return false;
+        if behind > self.period().mul_f64(MAX_BEHIND) {
+            self.next = now;
+            return self.slow_down();
         }
-        self.next = now;
-        self.slow_down()
+        if self.calm >= CALM_STEPS && self.scale < self.asked {
+            self.calm = 0;
+            self.scale = (self.scale * FASTER).min(self.asked);
+        }
+        false
+    }
+
+    /// An airframe got no setpoint for so long that it loiters by itself, though its
+    /// computer runs; tells whether the scale was lowered.
+    pub fn starved(&mut self) -> bool {
+        self.calm >= SETTLE_STEPS && self.slow_down()
     }
 
     /// A peer answered a percept with that delay; tells whether the scale was lowered.
@@ -96,10 +122,11 @@ impl Pacer {
 
     fn slow_down(&mut self) -> bool {
         self.late = 0;
+        self.calm = 0;
+        let before = self.scale;
         self.scale = (self.scale * SLOWER).max(MIN_SCALE);
-        let lower = self.scale < self.lowest;
         self.lowest = self.lowest.min(self.scale);
-        lower
+        self.scale < before
     }
 }
 
@@ -131,5 +158,25 @@ mod tests {
         let lowered = (0..LATE_ANSWERS).filter(|_| pacer.answered(5_000)).count();
         assert_eq!(lowered, 1);
         assert!((pacer.scale() - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn starved_airframes_slow_down_once_and_calm_brings_the_scale_back() {
+        let start = Instant::now();
+        let mut pacer = Pacer::new(10.0, start);
+        let mut now = start;
+        for _ in 0..SETTLE_STEPS {
+            pacer.stepped(now);
+            now = pacer.next();
+        }
+        assert!(pacer.starved());
+        assert!(!pacer.starved(), "the first has not shown yet");
+        assert!((pacer.scale() - 8.0).abs() < 1e-9);
+        for _ in 0..5 * CALM_STEPS {
+            pacer.stepped(now);
+            now = pacer.next();
+        }
+        assert!((pacer.scale() - 10.0).abs() < 1e-9);
+        assert!((pacer.lowest() - 8.0).abs() < 1e-9);
     }
 }

@@ -288,8 +288,7 @@ impl<'a> Trial<'a> {
                         return Ok(());
                     }
                     if self.pacer.stepped(Instant::now()) {
-                        let text = format!("the machine is too slow; time runs at x{:.1} from now on", self.pacer.scale());
-                        self.note(text);
+                        self.note_slow("the world is behind");
                     }
                 }
             }
@@ -393,6 +392,9 @@ impl<'a> Trial<'a> {
                 self.note(format!(
                     "uav{uav} got no setpoint for too long and loiters by itself"
                 ));
+                if self.pacer.starved() {
+                    self.note_slow("computers are starved");
+                }
             }
             Fact::Seen { .. } | Fact::TooClose(_) | Fact::Lost { .. } | Fact::Failsafe { .. } => {}
         }
@@ -403,6 +405,13 @@ impl<'a> Trial<'a> {
             time_s: secs(self.now_ms),
             text,
         });
+    }
+
+    pub(crate) fn note_slow(&mut self, why: &str) {
+        let scale = self.pacer.scale();
+        self.note(format!(
+            "the machine is too slow ({why}); time runs at x{scale:.1} for now"
+        ));
     }
 
     fn progress(&self) -> Progress {

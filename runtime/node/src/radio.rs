@@ -3,7 +3,7 @@
 //!
 //! In a trial the world tells, with every frame, the state of the links into this
 //! peer; each transmission that the bus brings then meets the same
-//! [`skein_link::fate`] as in the simulator. In flight, without a world, the air
+//! [`skein_link::fate()`] as in the simulator. In flight, without a world, the air
 //! does this itself and the shim lets everything pass. It also counts.
 
 use skein_link::frame::RadioCounters;
