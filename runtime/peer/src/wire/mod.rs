@@ -8,6 +8,7 @@ pub mod limits;
 pub mod message;
 #[cfg(test)]
 mod samples;
+pub mod schema;
 pub mod signature;
 
 /// FNV-1a, 64 bit: small, stable, and the same everywhere. Not for adversaries.

@@ -1,0 +1,539 @@
+//! A JSON Schema per kind, so that a subscriber in any language needs no source of ours.
+//!
+//! Carries out the message formats of D2.7 §2.4. A body is a CBOR array; the schemas
+//! describe its data model and name the places of the array. What no schema can say
+//! (members ascend, positions are those of a mission) is in the descriptions.
+
+use super::kinds::Kind;
+use super::limits::{
+    CHUNK_MAX_BYTES, CHUNKS_MAX, COMMITS_MAX, COVER_UNION_MAX_BYTES, DONE_MAX, DURATION_MAX_MS,
+    GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX, HOPS_MAX, MEMBERS_MAX, PLAN_MAX, POSITION_MAX_MM,
+    SNAPSHOT_UNION_MAX_BYTES, SPEED_MAX_MMPS, TEXT_MAX_BYTES,
+};
+use core::fmt::Write as _;
+
+/// What a place of an array may hold.
+#[derive(Clone, Copy, Debug)]
+pub enum Shape {
+    /// A number from the first to the second.
+    Number(i128, i128),
+    /// True or false.
+    Flag,
+    /// A byte string of at most so many bytes.
+    Bytes(usize),
+    /// Text of at most so many bytes.
+    Text(usize),
+    /// A number that stands for one of these.
+    Choice(&'static [&'static str]),
+    /// A number up to this, or null.
+    Maybe(i128),
+    /// At most so many arrays of these places.
+    Rows(&'static [Place], usize),
+    /// One array of these places.
+    Row(&'static [Place]),
+}
+
+/// A place of an array.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Its name.
+    pub name: &'static str,
+    /// What it means, with its unit.
+    pub what: &'static str,
+    /// What it may hold.
+    pub shape: Shape,
+}
+
+const fn at(name: &'static str, what: &'static str, shape: Shape) -> Place {
+    Place { name, what, shape }
+}
+
+const U8: Shape = Shape::Number(0, u8::MAX as i128);
+const U16: Shape = Shape::Number(0, u16::MAX as i128);
+const COUNT: Shape = Shape::Number(1, u16::MAX as i128);
+const U32: Shape = Shape::Number(0, u32::MAX as i128);
+const U64: Shape = Shape::Number(0, u64::MAX as i128);
+const HOPS: Shape = Shape::Number(0, HOPS_MAX as i128);
+const MM: Shape = Shape::Number(-(POSITION_MAX_MM as i128), POSITION_MAX_MM as i128);
+const E4: Shape = Shape::Number(-(HEADING_MAX_E4 as i128), HEADING_MAX_E4 as i128);
+const SPEED: Shape = Shape::Number(0, SPEED_MAX_MMPS as i128);
+const MS: Shape = Shape::Number(0, DURATION_MAX_MS as i128);
+
+const REVISION: Place = at("revision", "mission revision", U32);
+const LOOP_HASH: Place = at("loop_hash", "identifies the loop; 0 for none", U64);
+const EAST: Place = at("east_mm", "mm east of the mission's origin", MM);
+const NORTH: Place = at("north_mm", "mm north of the mission's origin", MM);
+const HEADING: Place = at("heading_e4", "1e-4 rad counter-clockwise from east", E4);
+const ETA: Place = at("eta_ms", "expected end of the plan, ms from writing", MS);
+
+const ENVELOPE: &[Place] = &[
+    at("author", "who wrote it", U16),
+    at("incarnation", "in which life", U32),
+    at(
+        "seq",
+        "counts what the author wrote in this life; beacons count for themselves",
+        U32,
+    ),
+    at("kind", "number of the kind", U8),
+    at(
+        "subject",
+        "which of the author's registers of that kind",
+        U16,
+    ),
+    at("body", "the encoded body", Shape::Bytes(4096)),
+    at(
+        "signature",
+        "over all bytes before it; empty where signing is off",
+        Shape::Bytes(64),
+    ),
+];
+
+const GOSSIP: &[Place] = &[
+    at("id", "whom it concerns", U16),
+    at("incarnation", "the latest life known", U32),
+    at("heartbeat", "the freshest heartbeat known", U32),
+    at("age_ds", "its age, sum of holding times, 100 ms", U16),
+    at("hops", "hops it took", HOPS),
+    at(
+        "suspected_ds",
+        "age of a suspicion against it, 100 ms, or null",
+        Shape::Maybe(u16::MAX as i128),
+    ),
+    at("able", "whether it said it can plan", Shape::Flag),
+    at("max_seq", "highest seq held of that author and life", U32),
+    at("digest", "of the versions held of that author", U16),
+];
+
+const BEACON: &[Place] = &[
+    at("heartbeat", "counts the beacons of this life", U32),
+    EAST,
+    NORTH,
+    HEADING,
+    at("able", "whether it can take part in planning", Shape::Flag),
+    at("ground", "whether it is a ground station", Shape::Flag),
+    at(
+        "finished",
+        "whether it holds that the mission is finished",
+        Shape::Flag,
+    ),
+    at("nonce", "boot nonce", U32),
+    at("counter", "the highest round counter it knows", U32),
+    at(
+        "eccentricity",
+        "fewest hops to its farthest live author",
+        HOPS,
+    ),
+    REVISION,
+    LOOP_HASH,
+    at("cover_digest", "digest of its union of covered cells", U32),
+    at(
+        "gossip",
+        "what it knows of others",
+        Shape::Rows(GOSSIP, GOSSIP_MAX),
+    ),
+];
+
+const STATE: &[Place] = &[
+    EAST,
+    NORTH,
+    at("height_mm", "mm above the mission's origin", MM),
+    HEADING,
+    at("airspeed_mmps", "mm/s", SPEED),
+    at(
+        "endurance_s",
+        "flight time left, s",
+        Shape::Number(0, DURATION_MAX_MS as i128 / 1000),
+    ),
+    at(
+        "behaviour",
+        "what it does",
+        Shape::Choice(&["waiting", "covering", "loitering", "ground"]),
+    ),
+    at(
+        "mission",
+        "how the mission stands",
+        Shape::Choice(&["none", "active", "accomplished", "failed"]),
+    ),
+    at(
+        "covered",
+        "cells it knows to be covered, at most `cells`",
+        U16,
+    ),
+    at("cells", "cells of the loop", U16),
+];
+
+const RUN: &[Place] = &[
+    at("first", "first cell", U16),
+    at("count", "how many, cyclic", COUNT),
+];
+
+const MEMBER: &[Place] = &[
+    at("id", "who, ascending", U16),
+    at("incarnation", "in which life", U32),
+];
+
+const ROUND: &[Place] = &[
+    at(
+        "counter",
+        "one more than any counter the starter had seen",
+        U32,
+    ),
+    at(
+        "members",
+        "who takes part",
+        Shape::Rows(MEMBER, MEMBERS_MAX),
+    ),
+    REVISION,
+    LOOP_HASH,
+    at(
+        "loss",
+        "whether the starter saw cells that nobody lists",
+        Shape::Flag,
+    ),
+    at("wait_ms", "how long to wait for all bids, ms", MS),
+];
+
+const BID: &[Place] = &[
+    at("round", "the round it belongs to", Shape::Row(ROUND)),
+    at("anchor", "boundary of the loop where it will be", U16),
+    at(
+        "backward",
+        "whether it looks against the order of the loop there",
+        Shape::Flag,
+    ),
+    at("release_ms", "when, ms from writing", MS),
+    at("speed_mmps", "ground speed, mm/s", SPEED),
+    at("turn_ms", "time to turn round, ms", MS),
+    at(
+        "endurance_ms",
+        "flight time it may spend after its release, ms",
+        MS,
+    ),
+    at(
+        "union",
+        "covered cells, run lengths",
+        Shape::Bytes(SNAPSHOT_UNION_MAX_BYTES),
+    ),
+    at(
+        "commits",
+        "cells it will finish whatever is decided",
+        Shape::Rows(RUN, COMMITS_MAX),
+    ),
+    ETA,
+    at(
+        "adopted_ago_ms",
+        "time since it last adopted a division, ms",
+        U32,
+    ),
+    at("cells_since", "cells it covered since", U16),
+    at("idle", "whether it has nothing left to fly", Shape::Flag),
+];
+
+const EPOCH: &[Place] = &[
+    at("counter", "counter of the round", U32),
+    at("hash", "hash of the round's bids", U32),
+];
+
+const LISTING: &[Place] = &[
+    at("first", "first cell", U16),
+    at("count", "how many, cyclic", COUNT),
+    at(
+        "backward",
+        "whether they are flown against the order of the loop",
+        Shape::Flag,
+    ),
+    at(
+        "firmness",
+        "how firm",
+        Shape::Choice(&["tentative", "committed", "done"]),
+    ),
+    at("counter", "stamp: counter of the round", U32),
+    at("hash", "stamp: hash of the round's bids", U32),
+    at("take", "stamp: takes without a round since", U16),
+    at("id", "stamp: who lists it", U16),
+];
+
+const CLAIM: &[Place] = &[
+    REVISION,
+    LOOP_HASH,
+    at("epoch", "the latest division adopted", Shape::Row(EPOCH)),
+    at(
+        "plan",
+        "what it will fly, in order",
+        Shape::Rows(LISTING, PLAN_MAX),
+    ),
+    at(
+        "held",
+        "what it gave away and nobody has taken over yet",
+        Shape::Rows(LISTING, HELD_MAX),
+    ),
+    at(
+        "done",
+        "what it has done of the present section",
+        Shape::Rows(RUN, DONE_MAX),
+    ),
+    ETA,
+];
+
+const COVER: &[Place] = &[
+    REVISION,
+    LOOP_HASH,
+    at(
+        "union",
+        "covered cells, run lengths",
+        Shape::Bytes(COVER_UNION_MAX_BYTES),
+    ),
+];
+
+const MISSION: &[Place] = &[
+    REVISION,
+    at("content_hash", "hash of the content", U64),
+    at(
+        "chunks",
+        "pieces; the subject is this piece's number",
+        Shape::Number(1, CHUNKS_MAX as i128),
+    ),
+    at("bytes", "the piece", Shape::Bytes(CHUNK_MAX_BYTES)),
+];
+
+const OPERATOR: &[Place] = &[at(
+    "order",
+    "what everybody is to do",
+    Shape::Choice(&["resume", "hold", "return to base"]),
+)];
+
+const FINISHED: &[Place] = &[REVISION];
+
+const EVENT: &[Place] = &[at("text", "one sentence", Shape::Text(TEXT_MAX_BYTES))];
+
+/// The places of a kind's body; `None` for a reserved kind.
+#[must_use]
+pub fn places(kind: Kind) -> Option<&'static [Place]> {
+    match kind {
+        Kind::Beacon => Some(BEACON),
+        Kind::State => Some(STATE),
+        Kind::Round => Some(BID),
+        Kind::Claim => Some(CLAIM),
+        Kind::Cover => Some(COVER),
+        Kind::Mission => Some(MISSION),
+        Kind::Operator => Some(OPERATOR),
+        Kind::Finished => Some(FINISHED),
+        Kind::Event => Some(EVENT),
+        Kind::Task | Kind::Intent | Kind::Conflict => None,
+    }
+}
+
+/// The JSON Schema of a kind's body; `None` for a reserved kind.
+#[must_use]
+pub fn schema(kind: Kind) -> Option<String> {
+    places(kind).map(|places| document(kind.name(), places))
+}
+
+/// The JSON Schema of the envelope around every body.
+#[must_use]
+pub fn envelope_schema() -> String {
+    document("record", ENVELOPE)
+}
+
+fn document(title: &str, places: &[Place]) -> String {
+    let mut out = String::from("{\"$schema\":\"https://json-schema.org/draft/2020-12/schema\",");
+    put(
+        &mut out,
+        format_args!("\"title\":\"skein {} {title}\",", super::key::VERSION),
+    );
+    row(&mut out, places);
+    out.push('}');
+    out
+}
+
+fn put(out: &mut String, text: core::fmt::Arguments<'_>) {
+    // Writing to a string cannot fail.
+    let _ = out.write_fmt(text);
+}
+
+/// The members of a schema of one array, without braces.
+fn row(out: &mut String, places: &[Place]) {
+    out.push_str("\"type\":\"array\",\"prefixItems\":[");
+    for (i, place) in places.iter().enumerate() {
+        if i > 0 {
+            out.push(',');
+        }
+        // Names and descriptions are ours and hold nothing that needs escaping.
+        put(
+            out,
+            format_args!(
+                "{{\"title\":\"{}\",\"description\":\"{}",
+                place.name, place.what
+            ),
+        );
+        if let Shape::Choice(names) = place.shape {
+            for (n, name) in names.iter().enumerate() {
+                put(
+                    out,
+                    format_args!("{} {n} {name}", if n == 0 { ":" } else { "," }),
+                );
+            }
+        }
+        out.push_str("\",");
+        shape(out, place.shape);
+        out.push('}');
+    }
+    let n = places.len();
+    put(
+        out,
+        format_args!("],\"items\":false,\"minItems\":{n},\"maxItems\":{n}"),
+    );
+}
+
+fn shape(out: &mut String, shape: Shape) {
+    match shape {
+        Shape::Number(min, max) => {
+            put(
+                out,
+                format_args!("\"type\":\"integer\",\"minimum\":{min},\"maximum\":{max}"),
+            );
+        }
+        Shape::Flag => out.push_str("\"type\":\"boolean\""),
+        Shape::Bytes(max) => {
+            // JSON has no byte strings: as text they are base64, four characters for three bytes.
+            let max = max.div_ceil(3) * 4;
+            put(
+                out,
+                format_args!(
+                    "\"type\":\"string\",\"contentEncoding\":\"base64\",\"maxLength\":{max}"
+                ),
+            );
+        }
+        Shape::Text(max) => put(out, format_args!("\"type\":\"string\",\"maxLength\":{max}")),
+        Shape::Choice(names) => {
+            let max = names.len().saturating_sub(1);
+            put(
+                out,
+                format_args!("\"type\":\"integer\",\"minimum\":0,\"maximum\":{max}"),
+            );
+        }
+        Shape::Maybe(max) => {
+            put(
+                out,
+                format_args!("\"type\":[\"integer\",\"null\"],\"minimum\":0,\"maximum\":{max}"),
+            );
+        }
+        Shape::Rows(places, max) => {
+            put(
+                out,
+                format_args!("\"type\":\"array\",\"maxItems\":{max},\"items\":{{"),
+            );
+            row(out, places);
+            out.push('}');
+        }
+        Shape::Row(places) => row(out, places),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::codec::{self, encode_body};
+    use super::super::message::Record;
+    use super::super::samples::{golden, largest};
+    use super::*;
+    use cbor4ii::core::Value;
+    use cbor4ii::core::dec::Decode;
+    use cbor4ii::core::utils::SliceReader;
+
+    fn fits(shape: Shape, value: &Value) -> bool {
+        match (shape, value) {
+            (Shape::Number(min, max), Value::Integer(v)) => (min..=max).contains(v),
+            (Shape::Flag, Value::Bool(_)) | (Shape::Maybe(_), Value::Null) => true,
+            (Shape::Bytes(max), Value::Bytes(b)) => b.len() <= max,
+            (Shape::Text(max), Value::Text(t)) => t.len() <= max,
+            (Shape::Choice(names), Value::Integer(v)) => {
+                usize::try_from(*v).is_ok_and(|v| v < names.len())
+            }
+            (Shape::Maybe(max), Value::Integer(v)) => (0..=max).contains(v),
+            (Shape::Rows(places, max), Value::Array(rows)) => {
+                rows.len() <= max && rows.iter().all(|r| fits(Shape::Row(places), r))
+            }
+            (Shape::Row(places), Value::Array(values)) => {
+                places.len() == values.len()
+                    && places.iter().zip(values).all(|(p, v)| fits(p.shape, v))
+            }
+            _ => false,
+        }
+    }
+
+    fn value(bytes: &[u8]) -> Value {
+        Value::decode(&mut SliceReader::new(bytes)).unwrap()
+    }
+
+    #[test]
+    fn schemas_say_what_the_codec_writes() {
+        let bodies = golden().into_iter().map(|(body, _)| body).chain(largest());
+        for body in bodies {
+            let places = places(body.kind()).unwrap();
+            let bytes = encode_body(&body);
+            assert!(
+                fits(Shape::Row(places), &value(&bytes)),
+                "{:?}",
+                body.kind()
+            );
+            let mut record = Record {
+                author: 1,
+                incarnation: 1,
+                seq: 1,
+                kind: body.kind().number(),
+                subject: 0,
+                body: bytes,
+                signature: Vec::new(),
+            };
+            let bytes = codec::seal(&mut record, &super::super::signature::Off);
+            assert!(fits(Shape::Row(ENVELOPE), &value(&bytes)));
+        }
+    }
+
+    #[test]
+    fn a_body_with_a_place_more_or_beyond_its_limit_does_not_fit() {
+        assert!(fits(
+            Shape::Row(FINISHED),
+            &Value::Array(vec![Value::Integer(3)])
+        ));
+        assert!(!fits(
+            Shape::Row(FINISHED),
+            &Value::Array(vec![Value::Integer(3); 2])
+        ));
+        assert!(!fits(
+            Shape::Row(FINISHED),
+            &Value::Array(vec![Value::Integer(1 << 32)])
+        ));
+        assert!(!fits(
+            Shape::Row(OPERATOR),
+            &Value::Array(vec![Value::Integer(3)])
+        ));
+    }
+
+    #[test]
+    fn every_spoken_kind_has_a_schema_in_plain_json() {
+        for kind in Kind::ALL {
+            assert_eq!(schema(kind).is_some(), kind.row().spoken);
+        }
+        let texts = Kind::ALL
+            .into_iter()
+            .filter_map(schema)
+            .chain([envelope_schema()]);
+        for text in texts {
+            for (open, close) in [('{', '}'), ('[', ']')] {
+                let count = |c| text.chars().filter(|x| *x == c).count();
+                assert_eq!(count(open), count(close));
+            }
+            assert_eq!(text.matches('"').count() % 2, 0);
+            assert!(!text.contains('\\') && !text.contains(",}") && !text.contains(",]"));
+        }
+        assert_eq!(
+            schema(Kind::Finished).unwrap(),
+            "{\"$schema\":\"https://json-schema.org/draft/2020-12/schema\",\
+             \"title\":\"skein v1 finished\",\"type\":\"array\",\"prefixItems\":[\
+             {\"title\":\"revision\",\"description\":\"mission revision\",\
+             \"type\":\"integer\",\"minimum\":0,\"maximum\":4294967295}],\
+             \"items\":false,\"minItems\":1,\"maxItems\":1}"
+        );
+    }
+}
