@@ -8,7 +8,7 @@
 //! differently from the same record. Another layout is another version in the key.
 //!
 //! Nothing here recurses with the input, allocates more than a few times its length,
-//! or panics. The primitives are in [`super::cbor`], schemas in [`super::schema`].
+//! or panics. The primitives are in `cbor.rs`, schemas in [`super::schema`].
 
 use super::cbor::{In, Listed, Out, Wire, array_of, number_of};
 use super::kinds::{Kind, RECORD_MAX_BYTES};
