@@ -103,10 +103,13 @@ pub fn run(args: &SimArgs) -> anyhow::Result<ExitCode> {
             return Ok(ExitCode::from(exit::CONFIG_INVALID));
         }
     };
-    let stage = Stage::new(scenario.spec);
+    fly(args, &Stage::new(scenario.spec))
+}
+
+fn fly(args: &SimArgs, stage: &Stage) -> anyhow::Result<ExitCode> {
     let ok = match args.seeds {
-        Some(seeds) => many(args, &stage, seeds)?,
-        None => one(args, &stage)?,
+        Some(seeds) => many(args, stage, seeds)?,
+        None => one(args, stage)?,
     };
     Ok(ExitCode::from(if ok {
         exit::OK

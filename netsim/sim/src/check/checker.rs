@@ -53,9 +53,9 @@ pub struct Checker {
 }
 
 impl Checker {
-    /// The checks of the run with this seed, at beacon period T.
+    /// The checks of the run with this seed, at beacon period T, on a loop of so many cells.
     #[must_use]
-    pub fn new(seed: u64, period_ms: u32) -> Self {
+    pub fn new(seed: u64, period_ms: u32, n_cells: usize) -> Self {
         let period_ms = u64::from(period_ms.max(1));
         Self {
             period_ms,
@@ -63,7 +63,7 @@ impl Checker {
             members: Membership::default(),
             listing: ListingCheck::default(),
             reached: Reached::default(),
-            record: RecordCheck::default(),
+            record: RecordCheck::new(n_cells),
             cover: CoverCheck::default(),
             progress: ProgressCheck::default(),
             graph: Graph::default(),

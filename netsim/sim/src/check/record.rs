@@ -7,7 +7,7 @@ use skein_peer::View;
 use skein_peer::journal::Durable;
 use skein_peer::wire::codec::{self, Body};
 use skein_peer::wire::kinds::Kind;
-use skein_peer::wire::message::{Epoch, Firmness, Record, Register, Stamp};
+use skein_peer::wire::message::{Epoch, Firmness, Listing, Record, Register, Stamp};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -55,9 +55,16 @@ pub struct RecordCheck {
     spoken: BTreeMap<(u16, u8, u16), (u32, u32, u64)>,
     versions: BTreeMap<u16, Versions>,
     durable: BTreeMap<u16, (usize, Durable)>,
+    n_cells: usize,
 }
 
 impl RecordCheck {
+    /// Checks for a loop of so many cells.
+    #[must_use]
+    pub fn new(n_cells: usize) -> Self {
+        Self { n_cells, ..Self::default() }
+    }
+
     /// The disk of a peer was erased: what it promised is forgotten.
     pub fn on_erased(&mut self, id: u16) {
         self.durable.remove(&id);
@@ -150,7 +157,7 @@ impl RecordCheck {
                 }
             }
             Body::Claim(register) => {
-                if let Some(text) = unpersisted(register, durable.register.as_ref()) {
+                if let Some(text) = unpersisted(register, durable.register.as_ref(), self.n_cells) {
                     found.broken("S7", now_ms, Some(id), || text);
                 }
             }
@@ -215,13 +222,18 @@ fn versions(v: &View) -> Versions {
 }
 
 /// A listed cell that no durable section lists at that stamp, as a sentence.
-fn unpersisted(said: &Register, durable: Option<&Register>) -> Option<String> {
+fn unpersisted(said: &Register, durable: Option<&Register>, n_cells: usize) -> Option<String> {
+    // Runs are cyclic: the same cell may be named with and without a lap.
+    let n = u32::try_from(n_cells).unwrap_or(u32::MAX).max(1);
+    let cell_of = |l: &Listing, k: u16| {
+        u16::try_from((u32::from(l.run.first) + u32::from(k)) % n).unwrap_or(u16::MAX)
+    };
     let mut promised: BTreeMap<u16, Stamp> = BTreeMap::new();
     if let Some(d) = durable {
         for l in d.plan.iter().chain(&d.held) {
             for k in 0..l.run.count {
                 let s = promised
-                    .entry(l.run.first.wrapping_add(k))
+                    .entry(cell_of(l, k))
                     .or_insert(l.stamp);
                 *s = (*s).max(l.stamp);
             }
@@ -229,7 +241,7 @@ fn unpersisted(said: &Register, durable: Option<&Register>) -> Option<String> {
     }
     for l in said.plan.iter().filter(|l| l.firmness != Firmness::Done) {
         for k in 0..l.run.count {
-            let cell = l.run.first.wrapping_add(k);
+            let cell = cell_of(l, k);
             if promised.get(&cell).is_none_or(|s| *s < l.stamp) {
                 return Some(format!(
                     "lists cell {cell} at {:?}, its disk holds {:?}",
@@ -245,7 +257,7 @@ fn unpersisted(said: &Register, durable: Option<&Register>) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_peer::wire::message::{Listing, Run};
+    use skein_peer::wire::message::Run;
 
     fn register(counter: u32, count: u16) -> Register {
         Register {
@@ -266,11 +278,11 @@ mod tests {
     #[test]
     fn a_section_may_shrink_but_not_grow_beyond_what_is_durable() {
         let durable = register(4, 5);
-        assert_eq!(unpersisted(&register(4, 5), Some(&durable)), None);
-        assert_eq!(unpersisted(&register(4, 2), Some(&durable)), None);
-        assert!(unpersisted(&register(4, 6), Some(&durable)).is_some());
-        assert!(unpersisted(&register(5, 5), Some(&durable)).is_some());
-        assert!(unpersisted(&register(4, 1), None).is_some());
+        assert_eq!(unpersisted(&register(4, 5), Some(&durable), 20), None);
+        assert_eq!(unpersisted(&register(4, 2), Some(&durable), 20), None);
+        assert!(unpersisted(&register(4, 6), Some(&durable), 20).is_some());
+        assert!(unpersisted(&register(5, 5), Some(&durable), 20).is_some());
+        assert!(unpersisted(&register(4, 1), None, 20).is_some());
     }
 
     #[test]

@@ -124,7 +124,7 @@ impl Swarm {
             grounds,
             faults,
             history: History::new(keep),
-            checker: Checker::new(seed, spec.beacon_period_ms),
+            checker: Checker::new(seed, spec.beacon_period_ms, covered.len()),
             covered,
             loop_hash,
             covered_ms: None,
