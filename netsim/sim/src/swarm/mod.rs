@@ -25,6 +25,9 @@ pub mod stream;
 pub use ground::Grounds;
 pub use outcome::Outcome;
 
+#[cfg(test)]
+mod tests;
+
 use crate::chaos::TimedFault;
 use crate::check::record::Said;
 use crate::check::{Checker, Mind};
@@ -52,6 +55,7 @@ const GROUND_MS: u64 = 200;
 /// Something to come.
 #[derive(Debug)]
 enum Event {
+    Boot(usize),
     Fault(usize),
     Percept {
         slot: usize,
@@ -138,8 +142,10 @@ impl Swarm {
         for (i, f) in swarm.faults.iter().enumerate() {
             swarm.queue.push(f.at_ms, Phase::Act, Event::Fault(i));
         }
+        let latest_ms = swarm.period_ms() / 2;
         for slot in 0..swarm.slots.len() {
-            swarm.boot(slot, false, false);
+            let first_ms = swarm.slots[slot].first_boot_ms(latest_ms);
+            swarm.queue.push(first_ms, Phase::Act, Event::Boot(slot));
         }
         swarm
             .queue
@@ -228,6 +234,12 @@ impl Swarm {
             Event::Fault(i) => {
                 let fault = self.faults[i].fault.clone();
                 self.strike(&fault);
+            }
+            // A fault may have started it before.
+            Event::Boot(slot) => {
+                if self.slots[slot].boots == 0 {
+                    self.boot(slot, false, false);
+                }
             }
             Event::Percept { slot, boot } => self.sense(slot, boot),
             Event::Timer { slot, boot, due_ms } => self.timer(slot, boot, due_ms),

@@ -85,6 +85,12 @@ impl Slot {
         self.config.id.0
     }
 
+    /// When it is switched on for the first time, milliseconds: no two computers of a
+    /// fleet start in the same instant, and peers that did would send in step for ever.
+    pub fn first_boot_ms(&mut self, latest_ms: u64) -> u64 {
+        self.clock.between(0, latest_ms)
+    }
+
     /// Starts a process, with a clock of its own, and returns its first input.
     pub fn start(&mut self, now_ms: u64) -> Input {
         self.boots += 1;
