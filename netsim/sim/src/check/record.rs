@@ -62,11 +62,16 @@ impl RecordCheck {
     /// Checks for a loop of so many cells.
     #[must_use]
     pub fn new(n_cells: usize) -> Self {
-        Self { n_cells, ..Self::default() }
+        Self {
+            n_cells,
+            ..Self::default()
+        }
     }
 
-    /// The disk of a peer was erased: what it promised is forgotten.
+    /// The disk of a peer was erased: what it promised is forgotten, and unless somebody
+    /// in reach remembers its last life it has no way to know that it had one.
     pub fn on_erased(&mut self, id: u16) {
+        self.spoken.retain(|(author, _, _), _| *author != id);
         self.durable.remove(&id);
         self.versions.remove(&id);
     }
@@ -232,9 +237,7 @@ fn unpersisted(said: &Register, durable: Option<&Register>, n_cells: usize) -> O
     if let Some(d) = durable {
         for l in d.plan.iter().chain(&d.held) {
             for k in 0..l.run.count {
-                let s = promised
-                    .entry(cell_of(l, k))
-                    .or_insert(l.stamp);
+                let s = promised.entry(cell_of(l, k)).or_insert(l.stamp);
                 *s = (*s).max(l.stamp);
             }
         }

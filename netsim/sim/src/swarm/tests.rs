@@ -19,7 +19,12 @@ fn at(at_ms: u64, fault: Fault) -> TimedFault {
 }
 
 fn completed(o: &Outcome) {
-    assert!(o.completed && o.coverage >= 1.0, "seed {}: {:?}", o.seed, o.violations);
+    assert!(
+        o.completed && o.coverage >= 1.0,
+        "seed {}: {:?}",
+        o.seed,
+        o.violations
+    );
 }
 
 #[test]
@@ -28,7 +33,13 @@ fn three_peers_cover_the_square_and_all_know() {
     completed(&o);
     assert!(o.violation_counts.is_empty(), "{:?}", o.violations);
     let finished = o.entries.iter().filter(|e| {
-        matches!(&e.what, What::Report { report: Report::Finished { .. }, .. })
+        matches!(
+            &e.what,
+            What::Report {
+                report: Report::Finished { .. },
+                ..
+            }
+        )
     });
     assert!(finished.count() >= 3);
     assert!(o.bytes > 0 && o.peer_ms >= 3 * o.makespan_ms.unwrap());
@@ -37,7 +48,10 @@ fn three_peers_cover_the_square_and_all_know() {
 #[test]
 fn the_same_seed_gives_the_same_history_and_another_seed_another() {
     let stage = stage(3);
-    let faults = vec![at(30_000, Fault::Kill { peer: 2 }), at(0, Fault::Loss { permille: 200 })];
+    let faults = vec![
+        at(30_000, Fault::Kill { peer: 2 }),
+        at(0, Fault::Loss { permille: 200 }),
+    ];
     let run = |seed: u64| {
         let o = stage.run(seed, faults.clone(), false);
         (o.history_hash, o.events)
@@ -54,22 +68,37 @@ fn the_section_of_a_killed_peer_is_taken_over_and_the_story_says_by_whom() {
     assert_eq!(o.takeovers.len(), 1);
     let t = &o.takeovers[0];
     assert_eq!((t.dead, t.died_ms), (3, 40_000));
-    assert!(t.cells > 0 && t.by.values().sum::<u32>() >= t.cells, "{t:?}");
+    assert!(
+        t.cells > 0 && t.by.values().sum::<u32>() >= t.cells,
+        "{t:?}"
+    );
     assert!(t.detected_ms.unwrap() > 40_000 && t.taken_ms.unwrap() >= t.detected_ms.unwrap());
-    assert!(!o.detect_ms.is_empty() && o.detect_ms.iter().all(|ms| *ms < 13_000), "{:?}", o.detect_ms);
+    assert!(
+        !o.detect_ms.is_empty() && o.detect_ms.iter().all(|ms| *ms < 13_000),
+        "{:?}",
+        o.detect_ms
+    );
 }
 
 #[test]
 fn a_paused_peer_goes_on_and_a_partition_heals() {
     let faults = vec![
-        at(20_000, Fault::Partition { groups: vec![vec![1, 2], vec![3, 4, fixture::GROUND_ID]] }),
+        at(
+            20_000,
+            Fault::Partition {
+                groups: vec![vec![1, 2], vec![3, 4, fixture::GROUND_ID]],
+            },
+        ),
         at(35_000, Fault::Pause { peer: 4 }),
         at(45_000, Fault::Resume { peer: 4 }),
         at(50_000, Fault::Heal),
     ];
     let o = stage(4).run(3, faults, true);
     completed(&o);
-    let split = o.entries.iter().any(|e| matches!(&e.what, What::Components(parts) if parts.len() > 1));
+    let split = o
+        .entries
+        .iter()
+        .any(|e| matches!(&e.what, What::Components(parts) if parts.len() > 1));
     assert!(split);
 }
 
@@ -78,12 +107,21 @@ fn a_restarted_computer_comes_back_in_a_higher_life_with_disk_and_without() {
     for fresh_disk in [false, true] {
         let faults = vec![
             at(20_000, Fault::KillComputer { peer: 1 }),
-            at(30_000, Fault::Restart { peer: 1, fresh_disk }),
+            at(
+                30_000,
+                Fault::Restart {
+                    peer: 1,
+                    fresh_disk,
+                },
+            ),
         ];
         let mut swarm = Swarm::new(&stage(3), 4, faults, false);
         swarm.run_until(45_000);
         let view = swarm.view(1).unwrap();
-        assert!(view.incarnation > 1 && view.speaks, "fresh disk {fresh_disk}: {view:?}");
+        assert!(
+            view.incarnation > 1 && view.speaks,
+            "fresh disk {fresh_disk}: {view:?}"
+        );
         completed(&swarm.run());
     }
 }
@@ -91,7 +129,13 @@ fn a_restarted_computer_comes_back_in_a_higher_life_with_disk_and_without() {
 #[test]
 fn faults_that_do_not_fit_change_nothing() {
     let faults = vec![
-        at(1_000, Fault::Restart { peer: 1, fresh_disk: true }),
+        at(
+            1_000,
+            Fault::Restart {
+                peer: 1,
+                fresh_disk: true,
+            },
+        ),
         at(2_000, Fault::Resume { peer: 2 }),
         at(3_000, Fault::Kill { peer: 77 }),
         at(4_000, Fault::Heal),

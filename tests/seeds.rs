@@ -1,0 +1,72 @@
+//! Replays the seeds that once failed (`tests/seeds/*.txt`: scenario, seed, flags, one
+//! a line). Each must complete, break no rule, and give the same history twice.
+
+use skein_netsim::Stage;
+use skein_netsim::summary::failed;
+use skein_netsim::world::fixture;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+/// UAVs of the small scenarios.
+const N_UAVS: u16 = 8;
+
+fn stage(scenario: &str) -> Stage {
+    Stage::new(match scenario {
+        "square" => fixture::square(N_UAVS),
+        "open" => {
+            let mut spec = fixture::square(N_UAVS);
+            spec.zones.clear();
+            let mut mission = (*spec.mission).clone();
+            mission.zones.clear();
+            spec.mission = Arc::new(mission);
+            spec
+        }
+        name => {
+            skein_scenario::open(Some(name), &skein_scenario::Overrides::default())
+                .expect("a built-in scenario")
+                .spec
+        }
+    })
+}
+
+#[test]
+fn seeds_that_once_failed_hold() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("seeds");
+    let mut files: Vec<_> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|f| f.unwrap().path())
+        .collect();
+    files.sort();
+    let mut stages: BTreeMap<String, (Stage, u64)> = BTreeMap::new();
+    let mut replayed = 0;
+    for file in files {
+        let text = std::fs::read_to_string(&file).unwrap();
+        for line in text
+            .lines()
+            .map(str::trim)
+            .filter(|l| !l.is_empty() && !l.starts_with('#'))
+        {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let [scenario, seed, flags @ ..] = words.as_slice() else {
+                panic!("{}: {line:?} needs a scenario and a seed", file.display());
+            };
+            let seed: u64 = seed.parse().unwrap();
+            let (stage, free_ms) = stages.entry((*scenario).to_owned()).or_insert_with(|| {
+                let stage = stage(scenario);
+                let free_ms = stage.failure_free_makespan_ms();
+                (stage, free_ms)
+            });
+            let run = || match flags {
+                ["storm"] => stage.storm(seed, *free_ms, 0, false),
+                [] => stage.planned(seed, 0, false),
+                other => panic!("{}: unknown flags {other:?}", file.display()),
+            };
+            let (first, second) = (run(), run());
+            assert!(!failed(&first), "skein sim {line}: {:#?}", first.violations);
+            assert_eq!(first.history_hash, second.history_hash, "{line}");
+            replayed += 1;
+        }
+    }
+    assert!(replayed > 0, "no seed was replayed");
+}
