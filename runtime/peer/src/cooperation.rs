@@ -365,14 +365,14 @@ fn on_want(peer: &mut Peer, want: Want) {
         Want::Divide { epoch, ring, robots } => {
             peer.ask(Asked::Division(epoch), Problem::Divide { ring, robots });
         }
-        Want::Take(cells) => {
+        Want::Take(taken) => {
             let Some(crew) = &mut peer.crew else {
                 return;
             };
-            let mut next = crew.negotiation.section.clone();
-            next.take(&cells);
-            let register = next.register(crew.revision(), crew.loop_hash(), 0);
-            if !peer.store(Promise::Take(cells), Entry::Section(register))
+            let section = &crew.negotiation.section;
+            let plan: Vec<PlanCell> = section.plan().iter().chain(&taken).copied().collect();
+            let register = section.register_with(section.epoch(), &plan, crew.revision(), crew.loop_hash());
+            if !peer.store(Promise::Take(taken), Entry::Section(register))
                 && let Some(crew) = &mut peer.crew
             {
                 crew.negotiation.take(&[]);
@@ -441,9 +441,8 @@ pub(crate) fn divided(peer: &mut Peer, epoch: Epoch, division: &Division) {
     let Some(adoption) = crew.negotiation.divided(now, period_ms, epoch, division) else {
         return;
     };
-    let mut next = crew.negotiation.section.clone();
-    next.adopt(adoption.epoch, &adoption.commits, &adoption.section);
-    let register = next.register(crew.revision(), crew.loop_hash(), 0);
+    let section = &crew.negotiation.section;
+    let register = section.register_with(adoption.epoch, &adoption.plan, crew.revision(), crew.loop_hash());
     peer.store(Promise::Adopt(Box::new(adoption)), Entry::Section(register));
 }
 
@@ -467,12 +466,12 @@ pub(crate) fn adopt(peer: &mut Peer, adoption: &Adoption) {
 }
 
 /// Cells taken without a round are durable: they are flown from now on.
-pub(crate) fn take(peer: &mut Peer, cells: &[(u16, bool)]) {
+pub(crate) fn take(peer: &mut Peer, taken: &[PlanCell]) {
     let percept = peer.percept;
     let Some(crew) = &mut peer.crew else {
         return;
     };
-    crew.negotiation.take(cells);
+    crew.negotiation.take(taken);
     keep_within_endurance(crew, percept.as_ref());
     changed(peer);
     steer(peer);

@@ -9,6 +9,7 @@
 
 use crate::config::{PeerConfig, Role};
 use crate::cooperation::Crew;
+use crate::coverage::section::PlanCell;
 use crate::input::{Command, Input, Time};
 use crate::journal::{Durable, Entry};
 use crate::membership::Membership;
@@ -45,7 +46,7 @@ pub(crate) enum Promise {
     /// An adoption.
     Adopt(Box<crate::coverage::negotiation::Adoption>),
     /// Cells taken without a round.
-    Take(Vec<(u16, bool)>),
+    Take(Vec<PlanCell>),
     /// Coverage; nothing waits for it.
     Union,
 }

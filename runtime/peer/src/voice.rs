@@ -153,9 +153,16 @@ pub(crate) fn speak_claim(peer: &mut Peer) {
         eta_ms: register.eta_ms,
     };
     peer.voice.claim_changed = false;
-    peer.voice.last_claim = peer.now;
+    peer.voice.last_claim = jittered(peer);
     speak(peer, Kind::Claim, 0, &Body::Claim(register));
     peer.report(report);
+}
+
+/// Now, and up to a quarter of a period: what recurs must not recur in step with
+/// others, or it collides for ever.
+fn jittered(peer: &mut Peer) -> Time {
+    let spread = peer.period_ms() / 4 + 1;
+    peer.now.plus_ms(u64::from(peer.rng.next_u32()) % spread)
 }
 
 fn speak_cover(peer: &mut Peer) {
@@ -169,7 +176,7 @@ fn speak_cover(peer: &mut Peer) {
     };
     peer.voice.cover_changed = false;
     peer.voice.cover_wanted = false;
-    peer.voice.last_cover = peer.now;
+    peer.voice.last_cover = jittered(peer);
     speak(peer, Kind::Cover, 0, &Body::Cover(cover));
 }
 
@@ -180,7 +187,7 @@ fn speak_state(peer: &mut Peer) {
         |c| (c.behaviour(), c.status(), c.union().count(), c.union().len()),
     );
     let p = peer.percept;
-    peer.voice.last_state = peer.now;
+    peer.voice.last_state = jittered(peer);
     let state = State {
         east_mm: p.map_or(0, |p| mm(p.pose.east_m)),
         north_mm: p.map_or(0, |p| mm(p.pose.north_m)),

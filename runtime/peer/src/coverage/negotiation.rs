@@ -68,7 +68,7 @@ pub enum Want {
         robots: Vec<Robot>,
     },
     /// Make these takes durable, then call [`Negotiation::take`].
-    Take(Vec<(u16, bool)>),
+    Take(Vec<PlanCell>),
     /// The own register changed: publish it and fly by it.
     Changed,
 }
@@ -78,10 +78,8 @@ pub enum Want {
 pub struct Adoption {
     /// The round.
     pub epoch: Epoch,
-    /// Committed cells in order of flight.
-    pub commits: Vec<(u16, bool)>,
-    /// The new section in order of flight.
-    pub section: Vec<(u16, bool)>,
+    /// Committed cells, then the new section, in order of flight.
+    pub plan: Vec<PlanCell>,
     /// Cells nobody has the endurance for.
     pub unassigned: Vec<u16>,
     /// Waiting time of the round, milliseconds.
@@ -219,8 +217,11 @@ impl Negotiation {
         if ctx.able_since.is_some() && !self.section.complete() {
             self.run_rounds(ctx, &orphans);
             if let Some(take) = self.inherit(ctx, &orphans, coverage_loop) {
-                self.take_pending = true;
-                wants.push(Want::Take(take));
+                let taken = self.section.taken(&take);
+                self.take_pending = !taken.is_empty();
+                if self.take_pending {
+                    wants.push(Want::Take(taken));
+                }
             }
         }
         self.loss_seen = false;
@@ -338,10 +339,11 @@ impl Negotiation {
         let mine = open.snapshots.get(&self.me)?;
         let committed = division::commits_of(mine, self.section.cells());
         let commits = self.section.plan().iter().filter(|p| committed.contains(p.cell));
+        let commits: Vec<(u16, bool)> = commits.map(|p| (p.cell, p.backward)).collect();
+        let section = division::section_of(division, &dividing.ring, self.me);
         let adoption = Adoption {
             epoch,
-            commits: commits.map(|p| (p.cell, p.backward)).collect(),
-            section: division::section_of(division, &dividing.ring, self.me),
+            plan: self.section.adopted(epoch, &commits, &section),
             unassigned: division.unassigned.clone(),
             wait_ms: open.round.wait_ms,
         };
@@ -353,7 +355,9 @@ impl Negotiation {
 
     /// The adoption is durable: it is the plan from now on.
     pub fn adopt(&mut self, now: Time, adoption: &Adoption) {
-        self.section.adopt(adoption.epoch, &adoption.commits, &adoption.section);
+        if !self.section.install(adoption.epoch, &adoption.plan) {
+            return;
+        }
         self.section.set_unassigned(&adoption.unassigned);
         self.adopted_at = Some(now);
         self.decided_at = Some(now);
@@ -363,9 +367,9 @@ impl Negotiation {
     }
 
     /// The takes are durable.
-    pub fn take(&mut self, cells: &[(u16, bool)]) -> usize {
+    pub fn take(&mut self, taken: &[PlanCell]) -> usize {
         self.take_pending = false;
-        self.section.take(cells)
+        self.section.append(taken)
     }
 
     /// A new life: ownership of the old one is void, coverage stays.

@@ -198,7 +198,9 @@ impl Rounds {
 /// A member that was silent in so many rounds running is left out of the next.
 pub const SILENT_ROUNDS: u8 = 2;
 
-/// The epoch of a complete round: its counter and the hash of its sorted snapshots.
+/// The epoch of a complete round: its counter, then the round's place in the order of
+/// rounds, then the hash of its sorted snapshots, so that of two rounds with one
+/// counter the higher one has the higher epoch.
 #[must_use]
 pub fn epoch_of(open: &Open) -> Epoch {
     let mut h = Fnv::new();
@@ -207,7 +209,10 @@ pub fn epoch_of(open: &Open) -> Epoch {
         (s.anchor, s.backward, s.release_ms, s.speed_mmps, s.turn_ms, s.endurance_ms).hash(&mut h);
         (&s.union, &s.commits, s.eta_ms, s.adopted_ago_ms, s.cells_since, s.idle).hash(&mut h);
     }
-    Epoch { counter: open.round.counter, hash: fold(h.finish()) }
+    let (counter, members, order) = order_of(&open.round);
+    let members = u32::try_from(members.min(255)).unwrap_or(255);
+    let hash = (members << 24) | (order >> 20 << 12) | (fold(h.finish()) & 0xfff);
+    Epoch { counter, hash }
 }
 
 #[cfg(test)]

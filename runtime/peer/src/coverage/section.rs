@@ -236,9 +236,11 @@ impl Section {
             .collect()
     }
 
-    /// Rule *adopt*: `commits`, then `section`, in order of flight. What was planned
-    /// and is no longer, is held. Covered cells and repetitions are left out.
-    pub fn adopt(&mut self, epoch: Epoch, commits: &[(u16, bool)], section: &[(u16, bool)]) {
+    /// Rule *adopt*: what the plan becomes with `commits`, then `section`, in order of
+    /// flight. Covered cells and repetitions are left out. Nothing changes yet: the
+    /// plan must be durable before it is flown, see [`Section::install`].
+    #[must_use]
+    pub fn adopted(&self, epoch: Epoch, commits: &[(u16, bool)], section: &[(u16, bool)]) -> Vec<PlanCell> {
         let stamp = Stamp { epoch, take: 0, id: self.me };
         let mut seen = self.union.clone();
         let mut plan = Vec::new();
@@ -250,28 +252,50 @@ impl Section {
                 }
             }
         }
+        let fits = self.pack(&plan, MAX_PLAN_RUNS).1;
+        plan.truncate(fits);
+        plan
+    }
+
+    /// Makes a durable plan of [`Section::adopted`] the plan. What was planned and is
+    /// no longer, is held. An epoch that is not above the present one is refused.
+    pub fn install(&mut self, epoch: Epoch, plan: &[PlanCell]) -> bool {
+        if epoch <= self.epoch {
+            return false;
+        }
+        let mut kept = CellSet::new(self.cells);
+        for p in plan {
+            kept.insert(p.cell);
+        }
         for p in &self.plan {
-            if !seen.contains(p.cell) {
+            if !kept.contains(p.cell) {
                 let s = self.held.entry(p.cell).or_insert(p.stamp);
                 *s = (*s).max(p.stamp);
             }
         }
-        for p in &plan {
-            self.held.remove(&p.cell);
-        }
-        self.plan = plan;
+        self.held.retain(|c, _| !kept.contains(*c));
+        self.plan = plan.iter().filter(|p| !self.union.contains(p.cell)).copied().collect();
         self.epoch = epoch;
         self.done = CellSet::new(self.cells);
         self.trim();
+        true
     }
 
-    /// Rule *take*: adds cells to the end of the plan at a stamp above all that was
-    /// heard for them. Covered cells and cells already planned are left out.
-    /// Returns how many were taken.
-    pub fn take(&mut self, cells: &[(u16, bool)]) -> usize {
-        let before = self.plan.len();
+    /// Rules *adopt* and install in one step, for when nothing can come in between.
+    pub fn adopt(&mut self, epoch: Epoch, commits: &[(u16, bool)], section: &[(u16, bool)]) -> bool {
+        let plan = self.adopted(epoch, commits, section);
+        self.install(epoch, &plan)
+    }
+
+    /// Rule *take*: the cells with stamps above all that was heard for them. Covered
+    /// cells and cells already planned are left out. Nothing changes yet: a take must
+    /// be durable before it is flown, see [`Section::append`].
+    #[must_use]
+    pub fn taken(&self, cells: &[(u16, bool)]) -> Vec<PlanCell> {
+        let mut out: Vec<PlanCell> = Vec::new();
         for &(cell, backward) in cells {
-            if cell >= self.cells || self.union.contains(cell) || self.plan.iter().any(|p| p.cell == cell) {
+            let planned = self.plan.iter().chain(&out).any(|p| p.cell == cell);
+            if cell >= self.cells || self.union.contains(cell) || planned {
                 continue;
             }
             let mut top = Stamp { epoch: self.epoch, take: 0, id: self.me };
@@ -282,16 +306,41 @@ impl Section {
                     }
                 }
             }
-            if let Some(s) = self.held.remove(&cell) {
-                top = top.max(s);
+            if let Some(s) = self.held.get(&cell) {
+                top = top.max(*s);
             }
             let stamp = Stamp { epoch: top.epoch, take: top.take.saturating_add(1), id: self.me };
-            self.plan.push(PlanCell { cell, backward, committed: false, stamp });
-            self.unassigned.remove(cell);
+            out.push(PlanCell { cell, backward, committed: false, stamp });
         }
-        let taken = self.plan.len() - before;
+        out
+    }
+
+    /// Adds durable takes of [`Section::taken`] to the end of the plan, but for cells
+    /// covered or planned meanwhile. Returns how many were added.
+    pub fn append(&mut self, taken: &[PlanCell]) -> usize {
+        let before = self.plan.len();
+        for p in taken {
+            if !self.union.contains(p.cell) && !self.plan.iter().any(|q| q.cell == p.cell) {
+                self.plan.push(*p);
+                self.held.remove(&p.cell);
+                self.unassigned.remove(p.cell);
+            }
+        }
         self.trim();
-        taken
+        self.plan.len().saturating_sub(before)
+    }
+
+    /// Rules *take* and append in one step, for when nothing can come in between.
+    pub fn take(&mut self, cells: &[(u16, bool)]) -> usize {
+        let taken = self.taken(cells);
+        self.append(&taken)
+    }
+
+    /// The register as it would be with another plan: what is made durable first.
+    #[must_use]
+    pub fn register_with(&self, epoch: Epoch, plan: &[PlanCell], revision: u32, loop_hash: u64) -> Register {
+        let plan = self.pack(plan, MAX_PLAN_RUNS).0;
+        Register { revision, loop_hash, epoch, plan, ..Register::default() }
     }
 
     /// Rule *expire*: nobody took over what was given away; it becomes orphaned.
