@@ -13,9 +13,10 @@ use skein_planning::coverage::area::{CellId, CoverageLoop};
 use skein_planning::frame::Pose;
 use skein_planning::math::wrap_pi;
 
-/// Taken off the footprint for rounding and for what a percept's pose may be off,
-/// metres.
-pub const POSE_ERROR_M: f64 = 0.05;
+/// Taken off the footprint for rounding, for what a percept's pose may be off, and so
+/// that a cell is in the picture for a stretch of flight, not for an instant only: a
+/// witness that looks every quarter of a metre sees it too. Metres.
+pub const POSE_ERROR_M: f64 = 0.4;
 
 /// Taken off besides for poses between percepts, metres.
 const BETWEEN_M: f64 = 0.1;

@@ -49,6 +49,9 @@ pub(crate) struct Crew {
     exhausted: bool,
     unsaved_cells: u16,
     return_ms: u32,
+    /// Divisions that are being made durable; only the last of them is installed,
+    /// for it is the one that the journal ends with.
+    adopting: u16,
 }
 
 impl Crew {
@@ -179,6 +182,7 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
         exhausted: false,
         unsaved_cells: 0,
         return_ms,
+        adopting: 0,
     });
     peer.report(Report::Ready { revision: ground.mission.revision, loop_hash: coverage_loop.hash(), cells: n });
     crate::ear::hear_again(peer);
@@ -365,12 +369,22 @@ fn on_want(peer: &mut Peer, want: Want) {
         Want::Divide { epoch, ring, robots } => {
             peer.ask(Asked::Division(epoch), Problem::Divide { ring, robots });
         }
-        Want::Take(taken) => {
+        Want::Take(mut taken) => {
             let Some(crew) = &mut peer.crew else {
                 return;
             };
+            if crew.adopting > 0 {
+                crew.negotiation.take(&[]);
+                return;
+            }
             let section = &crew.negotiation.section;
-            let plan: Vec<PlanCell> = section.plan().iter().chain(&taken).copied().collect();
+            let mut plan: Vec<PlanCell> = section.plan().iter().chain(&taken).copied().collect();
+            plan.truncate(section.fitting(&plan));
+            taken.truncate(plan.len().saturating_sub(section.plan().len()));
+            if taken.is_empty() {
+                crew.negotiation.take(&[]);
+                return;
+            }
             let register = section.register_with(section.epoch(), &plan, crew.revision(), crew.loop_hash());
             if !peer.store(Promise::Take(taken), Entry::Section(register))
                 && let Some(crew) = &mut peer.crew
@@ -443,7 +457,11 @@ pub(crate) fn divided(peer: &mut Peer, epoch: Epoch, division: &Division) {
     };
     let section = &crew.negotiation.section;
     let register = section.register_with(adoption.epoch, &adoption.plan, crew.revision(), crew.loop_hash());
-    peer.store(Promise::Adopt(Box::new(adoption)), Entry::Section(register));
+    if peer.store(Promise::Adopt(Box::new(adoption)), Entry::Section(register))
+        && let Some(crew) = &mut peer.crew
+    {
+        crew.adopting = crew.adopting.saturating_add(1);
+    }
 }
 
 /// The division is durable: it is flown from now on.
@@ -453,6 +471,10 @@ pub(crate) fn adopt(peer: &mut Peer, adoption: &Adoption) {
     let Some(crew) = &mut peer.crew else {
         return;
     };
+    crew.adopting = crew.adopting.saturating_sub(1);
+    if crew.adopting > 0 {
+        return;
+    }
     crew.negotiation.adopt(now, adoption);
     keep_within_endurance(crew, percept.as_ref());
     if !adoption.unassigned.is_empty() {
@@ -471,6 +493,10 @@ pub(crate) fn take(peer: &mut Peer, taken: &[PlanCell]) {
     let Some(crew) = &mut peer.crew else {
         return;
     };
+    if crew.adopting > 0 {
+        crew.negotiation.take(&[]);
+        return;
+    }
     crew.negotiation.take(taken);
     keep_within_endurance(crew, percept.as_ref());
     changed(peer);
@@ -480,8 +506,12 @@ pub(crate) fn take(peer: &mut Peer, taken: &[PlanCell]) {
 
 /// A promise could not be made durable, so what it was for does not happen.
 pub(crate) fn broken(peer: &mut Peer, promise: &Promise) {
-    if let (Some(crew), Promise::Take(_)) = (&mut peer.crew, promise) {
-        crew.negotiation.take(&[]);
+    match (&mut peer.crew, promise) {
+        (Some(crew), Promise::Take(_)) => {
+            crew.negotiation.take(&[]);
+        }
+        (Some(crew), Promise::Adopt(_)) => crew.adopting = crew.adopting.saturating_sub(1),
+        _ => {}
     }
 }
 
@@ -596,7 +626,7 @@ pub(crate) fn view(peer: &Peer, view: &mut View) {
     view.held = section.held().keys().copied().collect();
     view.unassigned = section.unassigned().iter().collect();
     view.epoch = section.epoch();
-    view.counter = crew.negotiation.rounds.counter();
+    view.counter = peer.durable.counter;
     view.adoptions = crew.negotiation.adoptions;
     view.finished = crew.finished;
     view.eta_ms = crew.eta_ms();

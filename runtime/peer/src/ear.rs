@@ -27,10 +27,8 @@ pub(crate) fn hear(peer: &mut Peer, transmitter: u16, hops: u8, bytes: &[u8]) {
     if let Body::Beacon(beacon) = &body {
         return hear_beacon(peer, &record, beacon);
     }
-    if kind.relayed() {
-        if peer.relay.offer(peer.now, &record, bytes, transmitter, hops) != Offer::New {
-            return;
-        }
+    if kind.relayed() && peer.relay.offer(peer.now, &record, bytes, transmitter, hops) != Offer::New {
+        return;
     }
     deliver(peer, &record, body);
 }

@@ -28,7 +28,7 @@ pub struct View {
     pub unassigned: Vec<u16>,
     /// The latest division adopted.
     pub epoch: Epoch,
-    /// The highest round counter it knows.
+    /// The highest round counter it has promised: a durable one.
     pub counter: u32,
     /// Divisions adopted in this life.
     pub adoptions: u32,

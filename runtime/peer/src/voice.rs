@@ -16,6 +16,7 @@ use crate::peer::Peer;
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
+use crate::wire::limits::COVER_UNION_MAX_BYTES;
 use crate::wire::message::{
     Beacon, Behaviour, Cover, Finished, MissionStatus, Order, Record, Snapshot, State,
 };
@@ -172,7 +173,7 @@ fn speak_cover(peer: &mut Peer) {
     let cover = Cover {
         revision: crew.revision(),
         loop_hash: crew.loop_hash(),
-        union: crew.union().encode_rle(None),
+        union: crew.union().encode_rle(Some(COVER_UNION_MAX_BYTES)),
     };
     peer.voice.cover_changed = false;
     peer.voice.cover_wanted = false;

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The camera looks at least once per this length of flight, metres.
-const LOOK_M: f64 = 1.0;
+const LOOK_M: f64 = 0.25;
 /// Arcs are tested as chords no farther than this from them, metres; distances to
 /// zones are exact to this much.
 const SAGITTA_M: f64 = 0.01;

@@ -336,6 +336,12 @@ impl Section {
         self.append(&taken)
     }
 
+    /// How many cells of a plan fit into one register, from the first on.
+    #[must_use]
+    pub fn fitting(&self, plan: &[PlanCell]) -> usize {
+        self.pack(plan, MAX_PLAN_RUNS).1
+    }
+
     /// The register as it would be with another plan: what is made durable first.
     #[must_use]
     pub fn register_with(&self, epoch: Epoch, plan: &[PlanCell], revision: u32, loop_hash: u64) -> Register {
