@@ -2,4 +2,5 @@
 
 mod architecture;
 mod configs;
+mod d27;
 mod seeds;

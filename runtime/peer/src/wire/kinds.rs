@@ -132,8 +132,8 @@ const TABLE: [KindRow; 12] = [
             Kind::Cover,
             "cover",
             1024,
-            Priority::Telemetry,
-            Lifetime::Beacons(2),
+            Priority::Beacon,
+            Lifetime::Beacons(4),
         )
     },
     KindRow {
