@@ -9,24 +9,61 @@ use std::path::{Path, PathBuf};
 /// even through somebody else.
 const RULES: &[(&str, &[&str], &[&str])] = &[
     ("skein-planning", &[], &["tokio", "zenoh", "rand_core"]),
-    ("skein-behaviors", &["skein-planning"], &["tokio", "zenoh", "rand_core"]),
-    ("skein-peer", &["skein-planning", "skein-behaviors"], &["tokio", "zenoh", "skein-netsim"]),
-    ("skein-link", &["skein-planning", "skein-behaviors"], &["tokio", "zenoh", "skein-netsim"]),
-    ("skein-interop", &["skein-planning", "skein-peer"], &["tokio", "zenoh", "skein-netsim"]),
+    (
+        "skein-behaviors",
+        &["skein-planning"],
+        &["tokio", "zenoh", "rand_core"],
+    ),
+    (
+        "skein-peer",
+        &["skein-planning", "skein-behaviors"],
+        &["tokio", "zenoh", "skein-netsim"],
+    ),
+    (
+        "skein-link",
+        &["skein-planning", "skein-behaviors"],
+        &["tokio", "zenoh", "skein-netsim"],
+    ),
+    (
+        "skein-interop",
+        &["skein-planning", "skein-peer"],
+        &["tokio", "zenoh", "skein-netsim"],
+    ),
     (
         "skein-netsim",
-        &["skein-link", "skein-peer", "skein-behaviors", "skein-planning"],
+        &[
+            "skein-link",
+            "skein-peer",
+            "skein-behaviors",
+            "skein-planning",
+        ],
         &["tokio", "zenoh", "skein-node"],
     ),
     (
         "skein-scenario",
-        &["skein-netsim", "skein-interop", "skein-peer", "skein-planning"],
+        &[
+            "skein-netsim",
+            "skein-interop",
+            "skein-peer",
+            "skein-planning",
+        ],
         &["tokio", "zenoh", "skein-node"],
     ),
-    ("skein-node", &["skein-link", "skein-peer", "skein-behaviors"], &["skein-netsim", "skein-scenario"]),
+    (
+        "skein-node",
+        &["skein-link", "skein-peer", "skein-behaviors"],
+        &["skein-netsim", "skein-scenario"],
+    ),
     (
         "skein-broker",
-        &["skein-scenario", "skein-netsim", "skein-link", "skein-peer", "skein-behaviors", "skein-planning"],
+        &[
+            "skein-scenario",
+            "skein-netsim",
+            "skein-link",
+            "skein-peer",
+            "skein-behaviors",
+            "skein-planning",
+        ],
         &["zenoh", "skein-node"],
     ),
     (
@@ -45,7 +82,10 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
 ];
 
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap()
+        .to_path_buf()
 }
 
 fn metadata() -> Metadata {
@@ -57,20 +97,32 @@ fn metadata() -> Metadata {
 }
 
 fn package<'a>(metadata: &'a Metadata, name: &str) -> &'a Package {
-    metadata.packages.iter().find(|p| p.name.as_str() == name).unwrap_or_else(|| panic!("no package {name}"))
+    metadata
+        .packages
+        .iter()
+        .find(|p| p.name.as_str() == name)
+        .unwrap_or_else(|| panic!("no package {name}"))
 }
 
 /// All packages that a build of `name` links, by way of normal dependencies.
 fn reaches(metadata: &Metadata, name: &str) -> BTreeSet<String> {
     let resolve = metadata.resolve.as_ref().unwrap();
     let nodes: BTreeMap<_, _> = resolve.nodes.iter().map(|n| (&n.id, n)).collect();
-    let names: BTreeMap<_, _> = metadata.packages.iter().map(|p| (&p.id, p.name.to_string())).collect();
+    let names: BTreeMap<_, _> = metadata
+        .packages
+        .iter()
+        .map(|p| (&p.id, p.name.to_string()))
+        .collect();
     let mut open = vec![&package(metadata, name).id];
     let mut seen = BTreeSet::new();
     while let Some(id) = open.pop() {
         if seen.insert(names[id].clone()) {
             for dep in &nodes[id].deps {
-                if dep.dep_kinds.iter().any(|k| k.kind == DependencyKind::Normal) {
+                if dep
+                    .dep_kinds
+                    .iter()
+                    .any(|k| k.kind == DependencyKind::Normal)
+                {
                     open.push(&dep.pkg);
                 }
             }
@@ -86,7 +138,11 @@ fn imports_point_from_the_shell_to_the_core() {
         for dep in &package(&metadata, name).dependencies {
             let is_test_of_tests = *name == "skein-tests" || dep.kind == DependencyKind::Normal;
             if dep.name.starts_with("skein-") && is_test_of_tests {
-                assert!(allowed.contains(&dep.name.as_str()), "{name} may not use {}", dep.name);
+                assert!(
+                    allowed.contains(&dep.name.as_str()),
+                    "{name} may not use {}",
+                    dep.name
+                );
             }
         }
         let reached = reaches(&metadata, name);
@@ -115,8 +171,17 @@ fn every_third_party_crate_has_a_reason() {
         .collect();
     let metadata = metadata();
     for p in metadata.workspace_packages() {
-        for dep in p.dependencies.iter().filter(|d| !d.name.starts_with("skein-")) {
-            assert!(reasons.contains(dep.name.as_str()), "{} uses {} without a reason", p.name, dep.name);
+        for dep in p
+            .dependencies
+            .iter()
+            .filter(|d| !d.name.starts_with("skein-"))
+        {
+            assert!(
+                reasons.contains(dep.name.as_str()),
+                "{} uses {} without a reason",
+                p.name,
+                dep.name
+            );
         }
     }
 }
@@ -138,12 +203,36 @@ fn sources(folders: &[&str]) -> Vec<PathBuf> {
 
 #[test]
 fn the_core_asks_neither_clock_nor_chance() {
-    let banned = ["Instant::now", "SystemTime", "HashMap", "HashSet", "std::thread", "std::fs", "std::net", "OsRng"];
-    for file in sources(&["planning/src", "behaviors/src", "runtime/peer/src", "runtime/link/src", "netsim/sim/src"]) {
+    let banned = [
+        "Instant::now",
+        "SystemTime",
+        "HashMap",
+        "HashSet",
+        "std::thread",
+        "std::fs",
+        "std::net",
+        "OsRng",
+    ];
+    for file in sources(&[
+        "planning/src",
+        "behaviors/src",
+        "runtime/peer/src",
+        "runtime/link/src",
+        "netsim/sim/src",
+    ]) {
         let text = std::fs::read_to_string(&file).unwrap();
-        for (i, line) in text.lines().enumerate().filter(|(_, l)| !l.trim_start().starts_with("//")) {
+        for (i, line) in text
+            .lines()
+            .enumerate()
+            .filter(|(_, l)| !l.trim_start().starts_with("//"))
+        {
             for b in banned {
-                assert!(!line.contains(b), "{}:{}: {b} has no place in the core", file.display(), i + 1);
+                assert!(
+                    !line.contains(b),
+                    "{}:{}: {b} has no place in the core",
+                    file.display(),
+                    i + 1
+                );
             }
         }
     }
@@ -151,10 +240,23 @@ fn the_core_asks_neither_clock_nor_chance() {
 
 #[test]
 fn only_the_bus_speaks_zenoh() {
-    for file in sources(&["src", "runtime", "netsim", "planning", "behaviors", "interop"]) {
+    for file in sources(&[
+        "src",
+        "runtime",
+        "netsim",
+        "planning",
+        "behaviors",
+        "interop",
+    ]) {
         let text = std::fs::read_to_string(&file).unwrap();
-        let speaks = text.lines().any(|l| l.contains("use zenoh") || (l.contains("zenoh::") && !l.contains("//")));
+        let speaks = text
+            .lines()
+            .any(|l| l.contains("use zenoh") || (l.contains("zenoh::") && !l.contains("//")));
         let is_bus = file.ends_with("runtime/node/src/bus.rs");
-        assert!(is_bus || !speaks, "{} uses zenoh; only runtime/node/src/bus.rs may", file.display());
+        assert!(
+            is_bus || !speaks,
+            "{} uses zenoh; only runtime/node/src/bus.rs may",
+            file.display()
+        );
     }
 }

@@ -3,13 +3,25 @@
 use std::path::{Path, PathBuf};
 
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap()
+        .to_path_buf()
 }
 
 /// All Rust source of the workspace in one string.
 fn all_source() -> String {
-    let mut open: Vec<PathBuf> =
-        ["planning", "behaviors", "runtime", "netsim", "interop", "tests", "src"].map(|f| root().join(f)).to_vec();
+    let mut open: Vec<PathBuf> = [
+        "planning",
+        "behaviors",
+        "runtime",
+        "netsim",
+        "interop",
+        "tests",
+        "src",
+    ]
+    .map(|f| root().join(f))
+    .to_vec();
     let mut text = String::new();
     while let Some(path) = open.pop() {
         if path.is_dir() {
@@ -26,7 +38,10 @@ fn every_section_names_a_file_and_a_test_that_exist() {
     let table = std::fs::read_to_string(root().join("docs/d27.md")).unwrap();
     let source = all_source();
     let mut sections = 0;
-    for line in table.lines().filter(|l| l.starts_with("| ") && !l.starts_with("| section")) {
+    for line in table
+        .lines()
+        .filter(|l| l.starts_with("| ") && !l.starts_with("| section"))
+    {
         let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
         assert_eq!(cells.len(), 5, "{line}");
         sections += 1;
@@ -36,7 +51,11 @@ fn every_section_names_a_file_and_a_test_that_exist() {
             continue;
         }
         assert!(root().join(file).exists(), "{}: no file {file}", cells[0]);
-        assert!(source.contains(&format!("fn {test}(")), "{}: no test {test}", cells[0]);
+        assert!(
+            source.contains(&format!("fn {test}(")),
+            "{}: no test {test}",
+            cells[0]
+        );
     }
     assert!(sections >= 28, "only {sections} sections are traced");
 }

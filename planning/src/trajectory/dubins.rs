@@ -34,7 +34,11 @@ pub fn shortest(from: Pose, to: Pose, radius_m: f64) -> Curve {
 /// Length of [`shortest`], metres, without making the curve.
 #[must_use]
 pub fn length_m(from: Pose, to: Pose, radius_m: f64) -> f64 {
-    words(from, to, radius_m).into_iter().flatten().map(|w| w.1).fold(f64::INFINITY, f64::min)
+    words(from, to, radius_m)
+        .into_iter()
+        .flatten()
+        .map(|w| w.1)
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// All Dubins words that exist between two poses, shortest first (ties by word).

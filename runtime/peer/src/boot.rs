@@ -49,7 +49,9 @@ pub(crate) fn start(peer: &mut Peer, persisted: &[Vec<u8>], nonce: u32) {
     let (durable, unread) = Durable::replay(persisted);
     peer.durable = durable;
     if unread > 0 {
-        peer.alarm(&format!("{unread} journal records of a later version were skipped"));
+        peer.alarm(&format!(
+            "{unread} journal records of a later version were skipped"
+        ));
     }
     peer.boot.nonce = nonce;
     peer.boot.listens_until = peer.now.plus_ms(PROBATION_PERIODS * peer.period_ms());
@@ -77,7 +79,10 @@ pub(crate) fn lives(peer: &mut Peer, incarnation: Incarnation) {
     peer.membership.set_self(incarnation);
     peer.relay.new_life();
     voice::new_life(peer);
-    let me = Member { id: peer.config.id.0, incarnation };
+    let me = Member {
+        id: peer.config.id.0,
+        incarnation,
+    };
     if let Some(crew) = &mut peer.crew {
         crew.new_life(me);
     }
@@ -88,7 +93,9 @@ pub(crate) fn lives(peer: &mut Peer, incarnation: Incarnation) {
 pub(crate) fn heard_of_myself(peer: &mut Peer, incarnation: Incarnation, heartbeat: u32) {
     let mine = peer.boot.promised.unwrap_or(0).max(peer.boot.incarnation);
     let never_sent = incarnation == peer.boot.incarnation && heartbeat > peer.voice.heartbeat;
-    if incarnation > mine || (incarnation == mine && never_sent) || (peer.boot.incarnation == 0 && incarnation >= mine)
+    if incarnation > mine
+        || (incarnation == mine && never_sent)
+        || (peer.boot.incarnation == 0 && incarnation >= mine)
     {
         promise(peer, incarnation.saturating_add(1));
     }

@@ -19,9 +19,7 @@ use crate::output::Report;
 use crate::peer::{Asked, Peer, Promise};
 use crate::plan::{Ground, Problem};
 use crate::view::View;
-use crate::wire::message::{
-    Behaviour, Epoch, Member, MissionStatus, Order, Register, Snapshot,
-};
+use crate::wire::message::{Behaviour, Epoch, Member, MissionStatus, Order, Register, Snapshot};
 use crate::{boot, voice};
 use skein_behaviors::{Event, Executive, Goal, Percept};
 use skein_planning::coverage::area::backtracking::{Division, Leg};
@@ -102,7 +100,9 @@ impl Crew {
 
     /// The own register, with the expected end of the plan.
     pub fn register(&self) -> Register {
-        self.negotiation.section.register(self.revision(), self.loop_hash(), self.eta_ms())
+        self.negotiation
+            .section
+            .register(self.revision(), self.loop_hash(), self.eta_ms())
     }
 
     pub fn eta_ms(&self) -> u32 {
@@ -126,7 +126,11 @@ pub(crate) fn consider_mission(peer: &mut Peer) {
     let Some(mission) = peer.library.newest() else {
         return;
     };
-    if peer.crew.as_ref().is_some_and(|c| c.ground.mission.revision >= mission.revision) {
+    if peer
+        .crew
+        .as_ref()
+        .is_some_and(|c| c.ground.mission.revision >= mission.revision)
+    {
         return;
     }
     let hash = mission.content_hash();
@@ -153,21 +157,42 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
             base.insert(u16::try_from(i).unwrap_or(u16::MAX));
         }
     }
-    let me = Member { id: peer.config.id.0, incarnation: peer.boot.incarnation };
-    let counter = peer.durable.counter.max(peer.crew.as_ref().map_or(0, |c| c.negotiation.rounds.counter()));
+    let me = Member {
+        id: peer.config.id.0,
+        incarnation: peer.boot.incarnation,
+    };
+    let counter = peer.durable.counter.max(
+        peer.crew
+            .as_ref()
+            .map_or(0, |c| c.negotiation.rounds.counter()),
+    );
     let mut negotiation = Negotiation::new(me, base, counter);
     if let Some(old) = &peer.crew {
-        negotiation.section.cover(&carried_over(&old.ground.coverage_loop, old.union(), &coverage_loop));
+        negotiation.section.cover(&carried_over(
+            &old.ground.coverage_loop,
+            old.union(),
+            &coverage_loop,
+        ));
     }
     if let Some(union) = boot::remembered(&peer.durable, coverage_loop.hash(), n) {
         negotiation.section.cover(&union);
     }
-    if let Some(register) = peer.durable.register.as_ref().filter(|r| r.loop_hash == coverage_loop.hash()) {
+    if let Some(register) = peer
+        .durable
+        .register
+        .as_ref()
+        .filter(|r| r.loop_hash == coverage_loop.hash())
+    {
         negotiation.section.restore_epoch(register.epoch);
     }
     let executive = peer.config.airframe.map(|airframe| {
         let router = Arc::clone(&ground.router);
-        Executive::new(airframe, peer.config.height_m, Arc::clone(&coverage_loop), router)
+        Executive::new(
+            airframe,
+            peer.config.height_m,
+            Arc::clone(&coverage_loop),
+            router,
+        )
     });
     let return_ms = return_time_ms(peer, &ground);
     peer.crew = Some(Crew {
@@ -184,7 +209,11 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
         return_ms,
         adopting: 0,
     });
-    peer.report(Report::Ready { revision: ground.mission.revision, loop_hash: coverage_loop.hash(), cells: n });
+    peer.report(Report::Ready {
+        revision: ground.mission.revision,
+        loop_hash: coverage_loop.hash(),
+        cells: n,
+    });
     crate::ear::hear_again(peer);
 }
 
@@ -192,7 +221,12 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
 fn carried_over(old: &CoverageLoop, union: &CellSet, new: &CoverageLoop) -> CellSet {
     let mut out = CellSet::new(u16::try_from(new.len()).unwrap_or(u16::MAX));
     for c in union.iter() {
-        if let Some(i) = old.cells().get(usize::from(c)).filter(|c| c.needed).and_then(|c| new.index_of(c.id)) {
+        if let Some(i) = old
+            .cells()
+            .get(usize::from(c))
+            .filter(|c| c.needed)
+            .and_then(|c| new.index_of(c.id))
+        {
             out.insert(i);
         }
     }
@@ -203,9 +237,15 @@ fn carried_over(old: &CoverageLoop, union: &CellSet, new: &CoverageLoop) -> Cell
 fn return_time_ms(peer: &Peer, ground: &Ground) -> u32 {
     let base = point_m(ground.mission.base);
     let lp = &ground.coverage_loop;
-    let far_m = (0..lp.len()).map(|i| (lp.boundary(i).position() - base).norm()).fold(0.0, f64::max);
+    let far_m = (0..lp.len())
+        .map(|i| (lp.boundary(i).position() - base).norm())
+        .fold(0.0, f64::max);
     let cruise_mps = peer.config.airframe.map_or(1.0, |a| a.cruise_mps.max(1.0));
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates at the ends of u32")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "saturates at the ends of u32"
+    )]
     let ms = ((far_m / cruise_mps + 30.0) * 1000.0) as u32;
     ms
 }
@@ -246,7 +286,9 @@ fn on_event(peer: &mut Peer, event: Event) {
             crew.negotiation.section.cover(&seen);
             crew.negotiation.covered_myself(seen.count());
             crew.unsaved_cells = crew.unsaved_cells.saturating_add(seen.count());
-            peer.report(Report::Covered { cells: seen.iter().collect() });
+            peer.report(Report::Covered {
+                cells: seen.iter().collect(),
+            });
             peer.voice.cover_changed = true;
             save_union(peer, false);
         }
@@ -287,7 +329,11 @@ pub(crate) fn look(peer: &mut Peer) {
     let Some(crew) = &mut peer.crew else {
         return;
     };
-    crew.able_since = if able { crew.able_since.or(Some(now)) } else { None };
+    crew.able_since = if able {
+        crew.able_since.or(Some(now))
+    } else {
+        None
+    };
     let lost = crew.live.iter().any(|(id, inc)| live.get(id) != Some(inc));
     crew.live.clone_from(&live);
     if lost {
@@ -329,7 +375,10 @@ fn can_plan(peer: &mut Peer) -> bool {
         }
     }
     peer.crew.as_ref().is_some_and(|c| {
-        peer.config.role == Role::Uav && c.executive.is_some() && peer.percept.is_some() && !c.exhausted
+        peer.config.role == Role::Uav
+            && c.executive.is_some()
+            && peer.percept.is_some()
+            && !c.exhausted
     }) && speaks
         && resume
 }
@@ -344,13 +393,19 @@ fn members(peer: &Peer, able: bool) -> Vec<Member> {
         .live()
         .filter(|(id, _)| {
             peer.membership.info(*id).is_some_and(|i| {
-                i.able && !i.ground && i.revision == crew.revision() && i.loop_hash == crew.loop_hash()
+                i.able
+                    && !i.ground
+                    && i.revision == crew.revision()
+                    && i.loop_hash == crew.loop_hash()
             })
         })
         .map(|(id, incarnation)| Member { id, incarnation })
         .collect();
     if able {
-        members.push(Member { id: peer.config.id.0, incarnation: peer.boot.incarnation });
+        members.push(Member {
+            id: peer.config.id.0,
+            incarnation: peer.boot.incarnation,
+        });
     }
     members.sort_unstable();
     members
@@ -360,13 +415,25 @@ fn on_want(peer: &mut Peer, want: Want) {
     match want {
         Want::Bid => {
             if let Some(snapshot) = bid(peer) {
-                let members = snapshot.round.members.iter().map(|m| crate::PeerId(m.id)).collect();
-                peer.report(Report::Round { counter: snapshot.round.counter, members });
+                let members = snapshot
+                    .round
+                    .members
+                    .iter()
+                    .map(|m| crate::PeerId(m.id))
+                    .collect();
+                peer.report(Report::Round {
+                    counter: snapshot.round.counter,
+                    members,
+                });
                 let entry = Entry::Bid(snapshot.clone());
                 peer.store(Promise::Bid(Box::new(snapshot)), entry);
             }
         }
-        Want::Divide { epoch, ring, robots } => {
+        Want::Divide {
+            epoch,
+            ring,
+            robots,
+        } => {
             peer.ask(Asked::Division(epoch), Problem::Divide { ring, robots });
         }
         Want::Take(mut taken) => {
@@ -385,7 +452,8 @@ fn on_want(peer: &mut Peer, want: Want) {
                 crew.negotiation.take(&[]);
                 return;
             }
-            let register = section.register_with(section.epoch(), &plan, crew.revision(), crew.loop_hash());
+            let register =
+                section.register_with(section.epoch(), &plan, crew.revision(), crew.loop_hash());
             if !peer.store(Promise::Take(taken), Entry::Section(register))
                 && let Some(crew) = &mut peer.crew
             {
@@ -412,10 +480,18 @@ fn bid(peer: &Peer) -> Option<Snapshot> {
     let section = &crew.negotiation.section;
     let is_open = |c: u16| !section.union().contains(c);
     let forecast = executive.forecast(open.round.wait_ms, &is_open);
-    let planned: Vec<u16> =
-        forecast.cells.iter().copied().filter(|c| section.plan().iter().any(|p| p.cell == *c)).collect();
+    let planned: Vec<u16> = forecast
+        .cells
+        .iter()
+        .copied()
+        .filter(|c| section.plan().iter().any(|p| p.cell == *c))
+        .collect();
     let airframe = peer.config.airframe?;
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an airspeed is a small positive number")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "an airspeed is a small positive number"
+    )]
     let speed_mmps = (airframe.cruise_mps * 1000.0) as u32;
     let spendable = crew.spendable_ms(peer.percept.as_ref());
     Some(Snapshot {
@@ -428,7 +504,11 @@ fn bid(peer: &Peer) -> Option<Snapshot> {
         endurance_ms: spendable.saturating_sub(forecast.release_ms),
         union: section.union().encode_rle(Some(MAX_BID_UNION_BYTES)),
         commits: division::runs_of(&planned, section.cells()),
-        eta_ms: if section.plan().is_empty() { 0 } else { forecast.finish_ms },
+        eta_ms: if section.plan().is_empty() {
+            0
+        } else {
+            forecast.finish_ms
+        },
         adopted_ago_ms: crew.negotiation.adopted_ago_ms(peer.now),
         cells_since: crew.negotiation.cells_since(),
         idle: section.plan().is_empty(),
@@ -456,7 +536,12 @@ pub(crate) fn divided(peer: &mut Peer, epoch: Epoch, division: &Division) {
         return;
     };
     let section = &crew.negotiation.section;
-    let register = section.register_with(adoption.epoch, &adoption.plan, crew.revision(), crew.loop_hash());
+    let register = section.register_with(
+        adoption.epoch,
+        &adoption.plan,
+        crew.revision(),
+        crew.loop_hash(),
+    );
     if peer.store(Promise::Adopt(Box::new(adoption)), Entry::Section(register))
         && let Some(crew) = &mut peer.crew
     {
@@ -525,7 +610,8 @@ fn keep_within_endurance(crew: &mut Crew, percept: Option<&Percept>) {
     let union = section.union().clone();
     let is_open = |c: u16| !union.contains(c);
     let fits = |count: usize| {
-        executive.leg_time_ms(&legs_of(&section.plan()[..count], union.len()), &is_open) <= spendable
+        executive.leg_time_ms(&legs_of(&section.plan()[..count], union.len()), &is_open)
+            <= spendable
     };
     let total = section.plan().len();
     if total == 0 || fits(total) {
@@ -534,7 +620,11 @@ fn keep_within_endurance(crew: &mut Crew, percept: Option<&Percept>) {
     let (mut good, mut bad) = (0, total);
     while bad - good > 1 {
         let middle = good.midpoint(bad);
-        if fits(middle) { good = middle } else { bad = middle }
+        if fits(middle) {
+            good = middle
+        } else {
+            bad = middle
+        }
     }
     section.keep(good);
 }
@@ -601,11 +691,23 @@ pub fn legs_of(plan: &[PlanCell], n: u16) -> Vec<Leg> {
     let mut legs: Vec<Leg> = Vec::new();
     let mut last = 0;
     for p in plan {
-        let direction = if p.backward { Direction::Backward } else { Direction::Forward };
-        let next = if p.backward { (last + n - 1) % n.max(1) } else { (last + 1) % n.max(1) };
+        let direction = if p.backward {
+            Direction::Backward
+        } else {
+            Direction::Forward
+        };
+        let next = if p.backward {
+            (last + n - 1) % n.max(1)
+        } else {
+            (last + 1) % n.max(1)
+        };
         match legs.last_mut() {
             Some(leg) if leg.direction == direction && next == p.cell => leg.count += 1,
-            _ => legs.push(Leg { first: p.cell, count: 1, direction }),
+            _ => legs.push(Leg {
+                first: p.cell,
+                count: 1,
+                direction,
+            }),
         }
         last = p.cell;
     }
@@ -621,7 +723,9 @@ pub(crate) fn view(peer: &Peer, view: &mut View) {
     view.able = crew.able();
     view.loop_hash = crew.loop_hash();
     view.revision = crew.revision();
-    view.union = (0..section.cells()).map(|c| section.union().contains(c)).collect();
+    view.union = (0..section.cells())
+        .map(|c| section.union().contains(c))
+        .collect();
     view.plan = section.plan().iter().map(|p| p.cell).collect();
     view.held = section.held().keys().copied().collect();
     view.unassigned = section.unassigned().iter().collect();

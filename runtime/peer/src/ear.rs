@@ -27,20 +27,29 @@ pub(crate) fn hear(peer: &mut Peer, transmitter: u16, hops: u8, bytes: &[u8]) {
     if let Body::Beacon(beacon) = &body {
         return hear_beacon(peer, &record, beacon);
     }
-    if kind.relayed() && peer.relay.offer(peer.now, &record, bytes, transmitter, hops) != Offer::New {
+    if kind.relayed()
+        && peer
+            .relay
+            .offer(peer.now, &record, bytes, transmitter, hops)
+            != Offer::New
+    {
         return;
     }
     deliver(peer, &record, body);
 }
 
 fn refuse(peer: &mut Peer, reason: &str) {
-    peer.report(Report::Refused { reason: reason.to_owned() });
+    peer.report(Report::Refused {
+        reason: reason.to_owned(),
+    });
 }
 
 /// Something under this peer's own name: an echo, an earlier life, or a double.
 fn hear_own(peer: &mut Peer, record: &Record, body: &Body) {
     match body {
-        Body::Beacon(b) if record.incarnation == peer.boot.incarnation && b.nonce != peer.boot.nonce => {
+        Body::Beacon(b)
+            if record.incarnation == peer.boot.incarnation && b.nonce != peer.boot.nonce =>
+        {
             peer.alarm("another peer speaks under this id");
             if b.nonce > peer.boot.nonce {
                 peer.voice.silenced = true;
@@ -53,7 +62,9 @@ fn hear_own(peer: &mut Peer, record: &Record, body: &Body) {
 
 fn hear_beacon(peer: &mut Peer, record: &Record, beacon: &Beacon) {
     let now = peer.now;
-    let changes = peer.membership.on_beacon(now, record.author, record.incarnation, beacon);
+    let changes = peer
+        .membership
+        .on_beacon(now, record.author, record.incarnation, beacon);
     on_changes(peer, changes);
     for g in &beacon.gossip {
         if g.id == peer.config.id.0 {
@@ -70,7 +81,10 @@ fn hear_beacon(peer: &mut Peer, record: &Record, beacon: &Beacon) {
             && beacon.loop_hash != 0
             && !core::mem::replace(&mut peer.voice.mismatch_said, true)
         {
-            peer.alarm(&format!("uav{} derived another loop from the same mission", record.author));
+            peer.alarm(&format!(
+                "uav{} derived another loop from the same mission",
+                record.author
+            ));
         }
     }
 }
@@ -80,21 +94,38 @@ pub(crate) fn on_changes(peer: &mut Peer, changes: Vec<membership::Change>) {
     for c in changes {
         let (id, incarnation, status) = (PeerId(c.peer), c.incarnation, c.status);
         if status == Status::Down {
-            tracing::info!(peer = peer.config.id.0, at_ms = peer.now.0, down = c.peer, "believed down");
+            tracing::info!(
+                peer = peer.config.id.0,
+                at_ms = peer.now.0,
+                down = c.peer,
+                "believed down"
+            );
         }
-        peer.report(Report::Membership { peer: id, incarnation, status });
+        peer.report(Report::Membership {
+            peer: id,
+            incarnation,
+            status,
+        });
     }
 }
 
 /// A record that is new here.
 fn deliver(peer: &mut Peer, record: &Record, body: Body) {
-    let author = Member { id: record.author, incarnation: record.incarnation };
+    let author = Member {
+        id: record.author,
+        incarnation: record.incarnation,
+    };
     match body {
         Body::Claim(register) => {
             if let Some(crew) = &mut peer.crew
                 && register.loop_hash == crew.loop_hash()
                 && register.revision == crew.revision()
-                && crew.negotiation.section.hear(author.id, author.incarnation, record.seq, register)
+                && crew.negotiation.section.hear(
+                    author.id,
+                    author.incarnation,
+                    record.seq,
+                    register,
+                )
             {
                 cooperation::look(peer);
             }

@@ -92,11 +92,17 @@ impl Durable {
                 self.counter = self.counter.max(register.epoch.counter);
                 self.register = Some(register.clone());
             }
-            Entry::Union { loop_hash, cells, union } => {
+            Entry::Union {
+                loop_hash,
+                cells,
+                union,
+            } => {
                 let mut merged = union.clone();
                 if (self.loop_hash, self.cells) == (*loop_hash, *cells)
-                    && let (Ok(mut a), Ok(b)) =
-                        (CellSet::decode_rle(*cells, &self.union), CellSet::decode_rle(*cells, union))
+                    && let (Ok(mut a), Ok(b)) = (
+                        CellSet::decode_rle(*cells, &self.union),
+                        CellSet::decode_rle(*cells, union),
+                    )
                 {
                     a.union_with(&b);
                     merged = a.encode_rle(None);
@@ -118,7 +124,11 @@ mod tests {
         for c in cells {
             set.insert(*c);
         }
-        Entry::Union { loop_hash: 5, cells: 20, union: set.encode_rle(None) }
+        Entry::Union {
+            loop_hash: 5,
+            cells: 20,
+            union: set.encode_rle(None),
+        }
     }
 
     #[test]

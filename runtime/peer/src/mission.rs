@@ -169,7 +169,10 @@ impl Library {
     /// A library that begins with the mission found on disk, if any.
     #[must_use]
     pub fn new(mission: Option<Arc<Mission>>) -> Self {
-        Self { whole: mission, partial: BTreeMap::new() }
+        Self {
+            whole: mission,
+            partial: BTreeMap::new(),
+        }
     }
 
     /// The newest whole mission.
@@ -180,8 +183,13 @@ impl Library {
 
     /// Takes a whole mission if it is newer than the one held.
     pub fn offer(&mut self, mission: Arc<Mission>) {
-        if self.whole.as_ref().is_none_or(|w| mission.revision > w.revision) {
-            self.partial.retain(|(revision, _), _| *revision > mission.revision);
+        if self
+            .whole
+            .as_ref()
+            .is_none_or(|w| mission.revision > w.revision)
+        {
+            self.partial
+                .retain(|(revision, _), _| *revision > mission.revision);
             self.whole = Some(mission);
         }
     }
@@ -193,7 +201,11 @@ impl Library {
     /// are forgotten, and the mission held stays in force.
     pub fn chunk(&mut self, index: u16, chunk: &MissionChunk) -> Result<bool, String> {
         let known = self.whole.as_ref().map_or(0, |w| w.revision);
-        if chunk.revision <= known || chunk.chunks == 0 || chunk.chunks > MAX_CHUNKS || index >= chunk.chunks {
+        if chunk.revision <= known
+            || chunk.chunks == 0
+            || chunk.chunks > MAX_CHUNKS
+            || index >= chunk.chunks
+        {
             return Ok(false);
         }
         let key = (chunk.revision, chunk.content_hash);
@@ -205,12 +217,18 @@ impl Library {
             }
             return Ok(false);
         }
-        let bytes: Vec<u8> = pieces.values().flat_map(|c| c.bytes.iter().copied()).collect();
+        let bytes: Vec<u8> = pieces
+            .values()
+            .flat_map(|c| c.bytes.iter().copied())
+            .collect();
         self.partial.remove(&key);
         let mission: Mission = cbor4ii::serde::from_slice(&bytes)
             .map_err(|e| format!("mission revision {} cannot be read: {e}", chunk.revision))?;
         if mission.content_hash() != chunk.content_hash || mission.revision != chunk.revision {
-            return Err(format!("mission revision {} is not what its hash says", chunk.revision));
+            return Err(format!(
+                "mission revision {} is not what its hash says",
+                chunk.revision
+            ));
         }
         self.offer(Arc::new(mission));
         Ok(true)

@@ -106,7 +106,10 @@ impl Peer {
             library: Library::new(config.mission.clone()),
             voice: Voice::default(),
             crew: None,
-            order: Ordered { order: Order::Resume, version: (0, 0, 0) },
+            order: Ordered {
+                order: Order::Resume,
+                version: (0, 0, 0),
+            },
             percept: None,
             durable: Durable::default(),
             outputs: VecDeque::new(),
@@ -136,7 +139,11 @@ impl Peer {
         match input {
             Input::Start { .. } => {}
             Input::Percept(percept) => self.on_percept(percept),
-            Input::Received { transmitter, hops, bytes } => ear::hear(self, transmitter, hops, &bytes),
+            Input::Received {
+                transmitter,
+                hops,
+                bytes,
+            } => ear::hear(self, transmitter, hops, &bytes),
             Input::Timer => {}
             Input::LinkHint { .. } => {}
             Input::Stored { token, ok } => self.on_stored(token, ok),
@@ -181,9 +188,16 @@ impl Peer {
     }
 
     fn on_percept(&mut self, percept: Percept) {
-        let finite = [percept.pose.east_m, percept.pose.north_m, percept.pose.heading_rad, percept.endurance_s];
+        let finite = [
+            percept.pose.east_m,
+            percept.pose.north_m,
+            percept.pose.heading_rad,
+            percept.endurance_s,
+        ];
         if finite.iter().any(|v| !v.is_finite()) {
-            self.report(Report::Refused { reason: "a percept that is not finite".into() });
+            self.report(Report::Refused {
+                reason: "a percept that is not finite".into(),
+            });
             return;
         }
         self.percept = Some(percept);
@@ -211,7 +225,9 @@ impl Peer {
 
     fn on_planned(&mut self, token: u64, answer: Answer) {
         match (self.plans.remove(&token), answer) {
-            (Some(Asked::Ground(hash)), Answer::Ground(ground)) => cooperation::grounded(self, hash, ground),
+            (Some(Asked::Ground(hash)), Answer::Ground(ground)) => {
+                cooperation::grounded(self, hash, ground)
+            }
             (Some(Asked::Division(epoch)), Answer::Divide(division)) => {
                 cooperation::divided(self, epoch, &division);
             }
@@ -241,7 +257,10 @@ impl Peer {
             return false;
         }
         let token = self.token();
-        self.outputs.push_back(Output::Store { token, record: entry.encode() });
+        self.outputs.push_back(Output::Store {
+            token,
+            record: entry.encode(),
+        });
         self.stores.insert(token, (promise, entry));
         true
     }
@@ -266,7 +285,9 @@ impl Peer {
 
     pub(crate) fn alarm(&mut self, text: &str) {
         tracing::warn!(peer = self.config.id.0, at_ms = self.now.0, "{text}");
-        self.report(Report::Alarm { text: text.to_owned() });
+        self.report(Report::Alarm {
+            text: text.to_owned(),
+        });
     }
 
     pub(crate) fn period_ms(&self) -> u64 {

@@ -98,10 +98,14 @@ pub(crate) fn look(peer: &mut Peer) {
     if peer.crew.is_none() {
         return;
     }
-    if peer.config.role == Role::Uav && (peer.voice.claim_changed || due(peer.voice.last_claim, CLAIM_PERIODS)) {
+    if peer.config.role == Role::Uav
+        && (peer.voice.claim_changed || due(peer.voice.last_claim, CLAIM_PERIODS))
+    {
         speak_claim(peer);
     }
-    if (peer.voice.cover_changed || peer.voice.cover_wanted) && due(peer.voice.last_cover, COVER_PERIODS) {
+    if (peer.voice.cover_changed || peer.voice.cover_wanted)
+        && due(peer.voice.last_cover, COVER_PERIODS)
+    {
         speak_cover(peer);
     }
     if due(peer.voice.last_state, STATE_PERIODS) {
@@ -111,7 +115,12 @@ pub(crate) fn look(peer: &mut Peer) {
         && let Some(crew) = &peer.crew
     {
         let revision = crew.revision();
-        speak(peer, Kind::Finished, 0, &Body::Finished(Finished { revision }));
+        speak(
+            peer,
+            Kind::Finished,
+            0,
+            &Body::Finished(Finished { revision }),
+        );
     }
 }
 
@@ -144,7 +153,12 @@ pub(crate) fn speak_claim(peer: &mut Peer) {
     }
     let register = crew.register();
     let section = &crew.negotiation.section;
-    let take = section.plan().iter().map(|p| p.stamp.take).max().unwrap_or(0);
+    let take = section
+        .plan()
+        .iter()
+        .map(|p| p.stamp.take)
+        .max()
+        .unwrap_or(0);
     let report = Report::Register {
         counter: register.epoch.counter,
         epoch: register.epoch.hash,
@@ -183,10 +197,17 @@ fn speak_cover(peer: &mut Peer) {
 
 fn speak_state(peer: &mut Peer) {
     let ground = peer.config.role == Role::Ground;
-    let (behaviour, mission, covered, cells) = peer.crew.as_ref().map_or(
-        (Behaviour::Waiting, MissionStatus::None, 0, 0),
-        |c| (c.behaviour(), c.status(), c.union().count(), c.union().len()),
-    );
+    let (behaviour, mission, covered, cells) =
+        peer.crew
+            .as_ref()
+            .map_or((Behaviour::Waiting, MissionStatus::None, 0, 0), |c| {
+                (
+                    c.behaviour(),
+                    c.status(),
+                    c.union().count(),
+                    c.union().len(),
+                )
+            });
     let p = peer.percept;
     peer.voice.last_state = jittered(peer);
     let state = State {
@@ -234,7 +255,10 @@ pub(crate) fn speak_mission(peer: &mut Peer) {
     }
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "casts from floats saturate; missions end at 20 km")]
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "casts from floats saturate; missions end at 20 km"
+)]
 fn mm(m: f64) -> i32 {
     (m * 1000.0).round() as i32
 }

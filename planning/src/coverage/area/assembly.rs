@@ -55,12 +55,19 @@ pub(super) fn check(problem: &AreaProblem) -> Result<(), LoopError> {
         return Err(LoopError::Extent);
     }
     if problem.turn_radius_m > d / 2.0 {
-        return Err(LoopError::TurnRadius { radius_m: problem.turn_radius_m, spacing_m: d });
+        return Err(LoopError::TurnRadius {
+            radius_m: problem.turn_radius_m,
+            spacing_m: d,
+        });
     }
     let across_m = ACROSS_SPACINGS * d + problem.tracking_error_m;
     let along_m = ALONG_SPACINGS * d + problem.tracking_error_m;
     if problem.footprint_across_m < across_m || problem.footprint_along_m < along_m {
-        return Err(LoopError::Footprint { spacing_m: d, across_m, along_m });
+        return Err(LoopError::Footprint {
+            spacing_m: d,
+            across_m,
+            along_m,
+        });
     }
     if problem.zones.distance_m(problem.launch) < problem.clearance_m {
         return Err(LoopError::Launch);
@@ -73,9 +80,16 @@ pub(super) fn cells_of(area: &Polygon, grid: Grid) -> Result<BTreeSet<CellId>, L
     let d = grid.lane_spacing_m;
     let (low, high) = area.bounds();
     let squares = ((high.x - low.x) / d + 2.0) * ((high.y - low.y) / d + 2.0);
-    let farthest = [low.x, low.y, high.x, high.y].into_iter().map(|v| (v / d).abs()).fold(0.0, f64::max);
+    let farthest = [low.x, low.y, high.x, high.y]
+        .into_iter()
+        .map(|v| (v / d).abs())
+        .fold(0.0, f64::max);
     if squares > MAX_SQUARES || farthest > f64::from(i16::MAX) - 2.0 {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a cast of a float saturates")]
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a cast of a float saturates"
+        )]
         return Err(LoopError::TooManyCells(squares as usize));
     }
     let (first, last) = (grid.cell_at(low), grid.cell_at(high));
@@ -100,7 +114,12 @@ pub(super) fn cells_of(area: &Polygon, grid: Grid) -> Result<BTreeSet<CellId>, L
 /// they add nothing to the area.
 fn area_within_m2(polygon: &Polygon, low: Point, high: Point) -> f64 {
     let mut ring = polygon.vertices().to_vec();
-    for (axis, limit, sign) in [(0, low.x, 1.0), (0, high.x, -1.0), (1, low.y, 1.0), (1, high.y, -1.0)] {
+    for (axis, limit, sign) in [
+        (0, low.x, 1.0),
+        (0, high.x, -1.0),
+        (1, low.y, 1.0),
+        (1, high.y, -1.0),
+    ] {
         let depth = |p: Point| sign * (p[axis] - limit);
         let mut kept = Vec::with_capacity(ring.len() + 4);
         for (i, &b) in ring.iter().enumerate() {
@@ -118,7 +137,10 @@ fn area_within_m2(polygon: &Polygon, low: Point, high: Point) -> f64 {
     let Some(&o) = ring.first() else {
         return 0.0;
     };
-    ring.windows(2).map(|w| (w[0] - o).perp(&(w[1] - o))).sum::<f64>() / 2.0
+    ring.windows(2)
+        .map(|w| (w[0] - o).perp(&(w[1] - o)))
+        .sum::<f64>()
+        / 2.0
 }
 
 /// Puts the closed part, the excursions and the cells that cannot be seen together.
@@ -137,17 +159,32 @@ impl Assembly {
         let gates: Vec<Pose> = ring.iter().filter_map(|(_, curve)| curve.start()).collect();
         let on_ring: BTreeSet<CellId> = ring.iter().map(|(id, _)| *id).collect();
         let finder = Finder::new(problem, grid, &gates).ok_or(LoopError::Zones)?;
-        if !gates.iter().step_by(gates.len().div_ceil(LAUNCH_GATES)).any(|&g| finder.launch_reaches(g)) {
+        if !gates
+            .iter()
+            .step_by(gates.len().div_ceil(LAUNCH_GATES))
+            .any(|&g| finder.launch_reaches(g))
+        {
             return Err(LoopError::CutOff);
         }
         let mut beside: BTreeMap<usize, Vec<LoopCell>> = BTreeMap::new();
         let mut uncoverable = Vec::new();
         for &id in needed.difference(&on_ring) {
             match finder.find(id) {
-                Ok(Excursion { gate, curve, view_m }) => {
+                Ok(Excursion {
+                    gate,
+                    curve,
+                    view_m,
+                }) => {
                     let service_mm = millimetres(&curve);
-                    let cell =
-                        LoopCell { id, curve, excursion: true, service_mm, travel_mm: 0, needed: true, view_m };
+                    let cell = LoopCell {
+                        id,
+                        curve,
+                        excursion: true,
+                        service_mm,
+                        travel_mm: 0,
+                        needed: true,
+                        view_m,
+                    };
                     beside.entry(gate).or_default().push(cell);
                 }
                 Err(reason) => uncoverable.push((id, reason)),
@@ -180,7 +217,11 @@ impl Assembly {
 const LAUNCH_GATES: usize = 8;
 
 fn millimetres(curve: &Curve) -> u32 {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a cast of a float saturates")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a cast of a float saturates"
+    )]
     let mm = (curve.length_m() * 1000.0).round() as u32;
     mm
 }
@@ -212,7 +253,13 @@ mod tests {
     use std::sync::Arc;
 
     fn rectangle(x0: f64, y0: f64, x1: f64, y1: f64) -> Polygon {
-        Polygon::new(vec![Point::new(x0, y0), Point::new(x1, y0), Point::new(x1, y1), Point::new(x0, y1)]).unwrap()
+        Polygon::new(vec![
+            Point::new(x0, y0),
+            Point::new(x1, y0),
+            Point::new(x1, y1),
+            Point::new(x0, y1),
+        ])
+        .unwrap()
     }
 
     fn problem(area: Polygon, zones: Vec<Polygon>) -> AreaProblem {
@@ -241,8 +288,10 @@ mod tests {
     /// Everything a loop owes, checked without the code that made it.
     fn judge(p: &AreaProblem, l: &CoverageLoop) {
         let needed = cells_of(&p.area, l.grid()).unwrap();
-        let (across, along) =
-            (p.footprint_across_m - p.tracking_error_m, p.footprint_along_m - p.tracking_error_m);
+        let (across, along) = (
+            p.footprint_across_m - p.tracking_error_m,
+            p.footprint_along_m - p.tracking_error_m,
+        );
         let mut left = needed.clone();
         for (i, c) in l.cells().iter().enumerate() {
             assert_eq!(c.needed, needed.contains(&c.id));
@@ -253,10 +302,18 @@ mod tests {
             assert!(c.curve.largest_gap_m() < 1e-2);
             assert!(c.curve.max_curvature_per_m() <= 1.0 / p.turn_radius_m + 1e-12);
             let (end, next) = (c.curve.end().unwrap(), l.boundary(i + 1));
-            assert!((end.position() - next.position()).norm() < 1e-2, "cell {i} {:?} {end:?} {next:?}", c.id);
+            assert!(
+                (end.position() - next.position()).norm() < 1e-2,
+                "cell {i} {:?} {end:?} {next:?}",
+                c.id
+            );
             assert!(wrap_pi(end.heading_rad - next.heading_rad).abs() < 1e-3);
             let view = c.curve.pose_at(c.view_m).unwrap();
-            assert!(footprint_contains(&l.grid(), c.id, view, across + 1e-2, along + 1e-2), "{:?}", c.id);
+            assert!(
+                footprint_contains(&l.grid(), c.id, view, across + 1e-2, along + 1e-2),
+                "{:?}",
+                c.id
+            );
             assert_eq!(c.travel_mm, if c.excursion { 0 } else { c.service_mm });
             if c.excursion {
                 assert!((l.boundary(i).position() - next.position()).norm() < 1e-2);
@@ -276,7 +333,11 @@ mod tests {
             let l = CoverageLoop::build(&p).unwrap();
             judge(&p, &l);
             let seen = l.cells().iter().filter(|c| c.needed).count();
-            assert!(seen * 100 >= 97 * 440, "clearance {clearance_m}: {seen} of 440: {:?}", l.uncoverable());
+            assert!(
+                seen * 100 >= 97 * 440,
+                "clearance {clearance_m}: {seen} of 440: {:?}",
+                l.uncoverable()
+            );
             assert_eq!(l.hash(), CoverageLoop::build(&p).unwrap().hash());
         }
     }
@@ -288,7 +349,11 @@ mod tests {
         judge(&p, &l);
         assert_eq!(l.len(), 60);
         assert!(l.uncoverable().is_empty());
-        let turns = l.cells().iter().filter(|c| c.curve.max_curvature_per_m() > 0.0).count();
+        let turns = l
+            .cells()
+            .iter()
+            .filter(|c| c.curve.max_curvature_per_m() > 0.0)
+            .count();
         // Three block rows joined at one end: the fewest corners a comb can have.
         assert!(turns <= 16, "{turns} quarter turns");
     }
@@ -298,7 +363,10 @@ mod tests {
         let p = problem(rectangle(10.0, 10.0, 130.0, 140.0), vec![]);
         let l = CoverageLoop::build(&p).unwrap();
         judge(&p, &l);
-        assert_eq!((l.len(), l.cells().iter().filter(|c| c.needed).count()), (16, 9));
+        assert_eq!(
+            (l.len(), l.cells().iter().filter(|c| c.needed).count()),
+            (16, 9)
+        );
     }
 
     #[test]
@@ -326,7 +394,10 @@ mod tests {
             },
             "at most 65,535",
         );
-        check(&|p| (p.lane_spacing_m, p.turn_radius_m) = (0.01, 0.004), "at most 65,535");
+        check(
+            &|p| (p.lane_spacing_m, p.turn_radius_m) = (0.01, 0.004),
+            "at most 65,535",
+        );
         check(
             &|p| p.zones = Arc::new(NoFlyZones::new(vec![rectangle(-30.0, -30.0, 0.0, 0.0)])),
             "launch point lies inside",

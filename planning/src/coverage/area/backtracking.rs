@@ -55,7 +55,11 @@ impl Leg {
                 Direction::Forward => k,
                 Direction::Backward => -k,
             };
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 <= x < n <= 65,535")]
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "0 <= x < n <= 65,535"
+            )]
             let c = (i64::from(self.first) + step).rem_euclid(n) as u16;
             c
         })
@@ -109,12 +113,25 @@ pub fn divide(ring: &[RingCell], robots: &[Robot]) -> Division {
         .enumerate()
         .map(|(i, r)| {
             let (legs, finish_ms) = solver.legs(i, extents[i].0, extents[i].1);
-            Section { id: r.id, legs, finish_ms }
+            Section {
+                id: r.id,
+                legs,
+                finish_ms,
+            }
         })
         .collect();
-    let makespan_ms = sections.iter().filter(|s| !s.legs.is_empty()).map(|s| s.finish_ms).max().unwrap_or(0);
+    let makespan_ms = sections
+        .iter()
+        .filter(|s| !s.legs.is_empty())
+        .map(|s| s.finish_ms)
+        .max()
+        .unwrap_or(0);
     sections.sort_by_key(|s| s.id);
-    Division { sections, makespan_ms, unassigned }
+    Division {
+        sections,
+        makespan_ms,
+        unassigned,
+    }
 }
 
 /// The ring unrolled three times, with prefix sums of what is flown.
@@ -141,16 +158,30 @@ impl<'a> Solver<'a> {
             last_open.push(if c.open { i + 1 } else { last_open[i] });
         }
         for i in (0..3 * n).rev() {
-            next_open[i] = if ring[i % n].open { i } else { next_open[i + 1] };
+            next_open[i] = if ring[i % n].open {
+                i
+            } else {
+                next_open[i + 1]
+            };
         }
-        Self { ring, robots, serve_mm, travel_mm, last_open, next_open }
+        Self {
+            ring,
+            robots,
+            serve_mm,
+            travel_mm,
+            last_open,
+            next_open,
+        }
     }
 
     /// Cells between this robot's anchor and the next one's.
     fn gap(&self, i: usize) -> usize {
         let n = self.ring.len();
         let k = self.robots.len();
-        let (a, b) = (usize::from(self.robots[i].anchor), usize::from(self.robots[(i + 1) % k].anchor));
+        let (a, b) = (
+            usize::from(self.robots[i].anchor),
+            usize::from(self.robots[(i + 1) % k].anchor),
+        );
         if i + 1 == k { n - (a - b) } else { b - a }
     }
 
@@ -163,7 +194,11 @@ impl<'a> Solver<'a> {
         } else {
             (self.next_open[at - extent].min(at), at)
         };
-        (to - from, self.serve_mm[to] - self.serve_mm[from], self.travel_mm[to] - self.travel_mm[from])
+        (
+            to - from,
+            self.serve_mm[to] - self.serve_mm[from],
+            self.travel_mm[to] - self.travel_mm[from],
+        )
     }
 
     /// The least time after its release in which robot `i` serves both shares, and
@@ -174,7 +209,13 @@ impl<'a> Solver<'a> {
         let (l, l_out, l_back) = self.reach(i, left, false);
         let (g, r_out, r_back) = self.reach(i, right, true);
         let turn = u64::from(r.turn_ms);
-        let away = |forward: bool| if (r.heading == Direction::Forward) == forward { 0 } else { turn };
+        let away = |forward: bool| {
+            if (r.heading == Direction::Forward) == forward {
+                0
+            } else {
+                turn
+            }
+        };
         let right_first = match (l, g) {
             (0, 0) => 0,
             (0, _) => away(true) + ms(r_out),
@@ -186,7 +227,11 @@ impl<'a> Solver<'a> {
             (_, 0) => away(false) + ms(l_out),
             _ => away(false) + ms(l_out) + turn + ms(l_back) + ms(r_out),
         };
-        if right_first <= left_first { (right_first, true) } else { (left_first, false) }
+        if right_first <= left_first {
+            (right_first, true)
+        } else {
+            (left_first, false)
+        }
     }
 
     fn fits(&self, i: usize, left: usize, right: usize, limit_ms: u64) -> bool {
@@ -199,7 +244,11 @@ impl<'a> Solver<'a> {
         let (mut good, mut bad) = (0, cap + 1);
         while bad - good > 1 {
             let middle = good.midpoint(bad);
-            if fits(middle) { good = middle } else { bad = middle }
+            if fits(middle) {
+                good = middle
+            } else {
+                bad = middle
+            }
         }
         good
     }
@@ -238,7 +287,11 @@ impl<'a> Solver<'a> {
     }
 
     fn solve(&self) -> (Vec<(usize, usize)>, Vec<u16>) {
-        let open: Vec<u16> = (0u16..).zip(self.ring).filter(|(_, c)| c.open).map(|(i, _)| i).collect();
+        let open: Vec<u16> = (0u16..)
+            .zip(self.ring)
+            .filter(|(_, c)| c.open)
+            .map(|(i, _)| i)
+            .collect();
         if self.robots.is_empty() {
             return (Vec::new(), open);
         }
@@ -252,7 +305,11 @@ impl<'a> Solver<'a> {
         let (mut bad, mut good) = (0, 1u64 << 40);
         while good - bad > 1 {
             let middle = good.midpoint(bad);
-            if self.feasible(middle).is_some() { good = middle } else { bad = middle }
+            if self.feasible(middle).is_some() {
+                good = middle
+            } else {
+                bad = middle
+            }
         }
         (self.feasible(good).unwrap_or_default(), Vec::new())
     }
@@ -276,7 +333,11 @@ impl<'a> Solver<'a> {
                 served[c % n] = true;
             }
         }
-        let rest = open.iter().copied().filter(|c| !served[usize::from(*c)]).collect();
+        let rest = open
+            .iter()
+            .copied()
+            .filter(|c| !served[usize::from(*c)])
+            .collect();
         (extents, rest)
     }
 
@@ -291,14 +352,30 @@ impl<'a> Solver<'a> {
         let mut legs = Vec::new();
         if g > 0 {
             let first = self.next_open[at];
-            legs.push(Leg { first: cell(first), count: count(at + g - first), direction: Direction::Forward });
+            legs.push(Leg {
+                first: cell(first),
+                count: count(at + g - first),
+                direction: Direction::Forward,
+            });
         }
         if l > 0 {
             let last = self.last_open[at];
-            let leg = Leg { first: cell(last - 1), count: count(last - (at - l)), direction: Direction::Backward };
-            if right_first { legs.push(leg) } else { legs.insert(0, leg) }
+            let leg = Leg {
+                first: cell(last - 1),
+                count: count(last - (at - l)),
+                direction: Direction::Backward,
+            };
+            if right_first {
+                legs.push(leg)
+            } else {
+                legs.insert(0, leg)
+            }
         }
-        let finish = if legs.is_empty() { 0 } else { u64::from(r.release_ms) + t };
+        let finish = if legs.is_empty() {
+            0
+        } else {
+            u64::from(r.release_ms) + t
+        };
         (legs, u32::try_from(finish).unwrap_or(u32::MAX))
     }
 }
@@ -308,7 +385,14 @@ mod tests {
     use super::*;
 
     fn ring(n: usize) -> Vec<RingCell> {
-        vec![RingCell { service_mm: 1000, travel_mm: 1000, open: true }; n]
+        vec![
+            RingCell {
+                service_mm: 1000,
+                travel_mm: 1000,
+                open: true
+            };
+            n
+        ]
     }
 
     fn robot(id: u16, anchor: u16) -> Robot {

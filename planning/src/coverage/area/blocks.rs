@@ -65,12 +65,18 @@ struct Block {
 
 impl Block {
     fn of(cell: CellId) -> Self {
-        Self { col: i32::from(cell.col).div_euclid(2), row: i32::from(cell.row).div_euclid(2) }
+        Self {
+            col: i32::from(cell.col).div_euclid(2),
+            row: i32::from(cell.row).div_euclid(2),
+        }
     }
 
     fn next(self, side: Side) -> Self {
         let (dc, dr) = side.step();
-        Self { col: self.col + dc, row: self.row + dr }
+        Self {
+            col: self.col + dc,
+            row: self.row + dr,
+        }
     }
 
     /// South-west, south-east, north-east, north-west; `None` at the edge of the numbers.
@@ -81,7 +87,10 @@ impl Block {
         Some([
             CellId { col, row },
             CellId { col: east, row },
-            CellId { col: east, row: north },
+            CellId {
+                col: east,
+                row: north,
+            },
             CellId { col, row: north },
         ])
     }
@@ -90,9 +99,21 @@ impl Block {
 /// The closed loop through all cells of the best component of blocks: each cell
 /// with its curve, in order of flight, counter-clockwise round the tree. Empty
 /// if no block is free.
-pub(super) fn closed_loop(problem: &AreaProblem, grid: Grid, needed: &BTreeSet<CellId>) -> Vec<(CellId, Curve)> {
-    let blocks: Vec<Block> = needed.iter().map(|&c| Block::of(c)).collect::<BTreeSet<_>>().into_iter().collect();
-    let free: Vec<Block> = blocks.into_iter().filter(|&b| is_free(problem, grid, b)).collect();
+pub(super) fn closed_loop(
+    problem: &AreaProblem,
+    grid: Grid,
+    needed: &BTreeSet<CellId>,
+) -> Vec<(CellId, Curve)> {
+    let blocks: Vec<Block> = needed
+        .iter()
+        .map(|&c| Block::of(c))
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .collect();
+    let free: Vec<Block> = blocks
+        .into_iter()
+        .filter(|&b| is_free(problem, grid, b))
+        .collect();
     let component = best_component(&free, needed);
     let links = spanning_tree(&component);
     circumnavigate(&component, &links, grid)
@@ -113,8 +134,7 @@ fn is_free(problem: &AreaProblem, grid: Grid, block: Block) -> bool {
     cells.iter().enumerate().all(|(quadrant, &cell)| {
         pieces_of(quadrant).into_iter().all(|(entry, exit)| {
             let curve = crossing(grid, cell, entry, exit);
-            problem.zones.is_clear(&curve, problem.clearance_m)
-                && problem.contingency_clear(&curve)
+            problem.zones.is_clear(&curve, problem.clearance_m) && problem.contingency_clear(&curve)
         })
     })
 }
@@ -135,7 +155,12 @@ fn corner(quadrant: usize) -> [Side; 4] {
 /// The four ways (entry side, exit side) through a cell of a block.
 fn pieces_of(quadrant: usize) -> [(Side, Side); 4] {
     let [from, to, link_in, link_out] = corner(quadrant);
-    [(from, to), (from, link_out), (link_in, to), (link_in, link_out)]
+    [
+        (from, to),
+        (from, link_out),
+        (link_in, to),
+        (link_in, link_out),
+    ]
 }
 
 /// The curve through a cell from the middle of one side to the middle of another.
@@ -146,7 +171,10 @@ fn crossing(grid: Grid, cell: CellId, entry: Side, exit: Side) -> Curve {
         return Curve::from_pieces(start, &[(0.0, d)]);
     }
     // Left if the exit follows the entry's opposite counter-clockwise.
-    let left = matches!((entry.opposite(), exit), (East, North) | (North, West) | (West, South) | (South, East));
+    let left = matches!(
+        (entry.opposite(), exit),
+        (East, North) | (North, West) | (West, South) | (South, East)
+    );
     let curvature = if left { 2.0 / d } else { -2.0 / d };
     Curve::from_pieces(start, &[(curvature, d / 2.0 * FRAC_PI_2)])
 }
@@ -156,7 +184,10 @@ fn gate(grid: Grid, cell: CellId, towards: Side, side: Side) -> Pose {
     let half = grid.lane_spacing_m / 2.0;
     let c = grid.centre(cell);
     let (dx, dy) = side.step();
-    Pose::new(Point::new(c.x + half * f64::from(dx), c.y + half * f64::from(dy)), towards.heading_rad())
+    Pose::new(
+        Point::new(c.x + half * f64::from(dx), c.y + half * f64::from(dy)),
+        towards.heading_rad(),
+    )
 }
 
 /// The connected blocks that hold the most needed cells (ties: the first block).
@@ -170,17 +201,26 @@ fn best_component(free: &[Block], needed: &BTreeSet<CellId>) -> BTreeSet<Block> 
             }
         }
     }
-    let weight = |b: &Block| b.cells().map_or(0, |c| c.iter().filter(|c| needed.contains(c)).count());
+    let weight = |b: &Block| {
+        b.cells()
+            .map_or(0, |c| c.iter().filter(|c| needed.contains(c)).count())
+    };
     // Group → (needed cells, first block).
     let mut totals: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
     for (i, b) in free.iter().enumerate() {
         totals.entry(groups.find(i)).or_insert((0, i)).0 += weight(b);
     }
-    let best = totals.iter().max_by_key(|(_, (count, first))| (*count, std::cmp::Reverse(*first)));
+    let best = totals
+        .iter()
+        .max_by_key(|(_, (count, first))| (*count, std::cmp::Reverse(*first)));
     let Some((&root, _)) = best else {
         return BTreeSet::new();
     };
-    free.iter().enumerate().filter(|&(i, _)| groups.find(i) == root).map(|(_, &b)| b).collect()
+    free.iter()
+        .enumerate()
+        .filter(|&(i, _)| groups.find(i) == root)
+        .map(|(_, &b)| b)
+        .collect()
 }
 
 /// Links of a spanning tree, as (block, side) from both ends.
@@ -200,7 +240,11 @@ fn spanning_tree(component: &BTreeSet<Block>) -> BTreeSet<(Block, usize)> {
         for side in [East, North] {
             if let Some(&j) = nodes.get(&b.next(side)) {
                 let across = (side == East) != rows_run_east;
-                let key = if rows_run_east { (b.col, b.row) } else { (b.row, b.col) };
+                let key = if rows_run_east {
+                    (b.col, b.row)
+                } else {
+                    (b.row, b.col)
+                };
                 graph.add_edge(i, j, (across, key.0, key.1));
             }
         }
@@ -221,7 +265,11 @@ fn spanning_tree(component: &BTreeSet<Block>) -> BTreeSet<(Block, usize)> {
 }
 
 /// Walks round the tree, keeping it on the left, through every cell once.
-fn circumnavigate(component: &BTreeSet<Block>, links: &BTreeSet<(Block, usize)>, grid: Grid) -> Vec<(CellId, Curve)> {
+fn circumnavigate(
+    component: &BTreeSet<Block>,
+    links: &BTreeSet<(Block, usize)>,
+    grid: Grid,
+) -> Vec<(CellId, Curve)> {
     let Some(&first) = component.iter().next() else {
         return Vec::new();
     };
@@ -230,10 +278,21 @@ fn circumnavigate(component: &BTreeSet<Block>, links: &BTreeSet<(Block, usize)>,
     // A tree of n blocks is walked round in exactly 4n steps.
     for _ in 0..4 * component.len() {
         let [from, to, link_in, link_out] = corner(quadrant);
-        let entry = if links.contains(&(block, link_in as usize)) { link_in } else { from };
-        let exit = if links.contains(&(block, link_out as usize)) { link_out } else { to };
+        let entry = if links.contains(&(block, link_in as usize)) {
+            link_in
+        } else {
+            from
+        };
+        let exit = if links.contains(&(block, link_out as usize)) {
+            link_out
+        } else {
+            to
+        };
         if let Some(cells) = block.cells() {
-            out.push((cells[quadrant], crossing(grid, cells[quadrant], entry, exit)));
+            out.push((
+                cells[quadrant],
+                crossing(grid, cells[quadrant], entry, exit),
+            ));
         }
         if exit == link_out {
             // Beyond a link lies the cell that is a mirror image across the side.

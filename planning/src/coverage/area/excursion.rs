@@ -34,12 +34,23 @@ struct Effort {
 }
 
 /// Plain headings and the nearest gates: enough for most cells beside a zone.
-const FIRST: Effort = Effort { headings: 8, lateral_step_m: 6.0, along_offsets: &[0.0], slack_m: 2.0, gates: 12 };
+const FIRST: Effort = Effort {
+    headings: 8,
+    lateral_step_m: 6.0,
+    along_offsets: &[0.0],
+    slack_m: 2.0,
+    gates: 12,
+};
 
 /// Every 7.5° and 2 m, so that a cell is given up only when a sample of a pass
 /// this fine finds no room; gates within several lanes.
-const SECOND: Effort =
-    Effort { headings: 48, lateral_step_m: 2.0, along_offsets: &[0.0, 0.5, -0.5, 1.0, -1.0], slack_m: 0.0, gates: 24 };
+const SECOND: Effort = Effort {
+    headings: 48,
+    lateral_step_m: 2.0,
+    along_offsets: &[0.0, 0.5, -0.5, 1.0, -1.0],
+    slack_m: 0.0,
+    gates: 24,
+};
 
 /// Pairs of gate and pass that are completed at most, shortest bound first. A
 /// pair that fails is blocked by a zone; so many failures leave only the router.
@@ -91,9 +102,17 @@ pub(super) struct Finder<'a> {
 impl<'a> Finder<'a> {
     /// Prepares the search; `None` if the zones cannot be offset.
     pub(super) fn new(problem: &'a AreaProblem, grid: Grid, gates: &'a [Pose]) -> Option<Self> {
-        let limits = RouteLimits { turn_radius_m: problem.turn_radius_m, clearance_m: problem.clearance_m };
+        let limits = RouteLimits {
+            turn_radius_m: problem.turn_radius_m,
+            clearance_m: problem.clearance_m,
+        };
         let router = Router::new(problem.zones.clone(), limits).ok()?;
-        Some(Self { problem, grid, gates, router })
+        Some(Self {
+            problem,
+            grid,
+            gates,
+            router,
+        })
     }
 
     /// Whether the loop can be reached from the launch point, whatever the heading
@@ -111,7 +130,12 @@ impl<'a> Finder<'a> {
     /// A sentence that says why there is none.
     pub(super) fn find(&self, cell: CellId) -> Result<Excursion, String> {
         let zones = &self.problem.zones;
-        if self.grid.corners(cell).iter().all(|&c| zones.distance_m(c) <= 0.0) {
+        if self
+            .grid
+            .corners(cell)
+            .iter()
+            .all(|&c| zones.distance_m(c) <= 0.0)
+        {
             return Err("inside a no-fly zone".to_owned());
         }
         let gates = self.gates_by_distance(cell);
@@ -121,7 +145,9 @@ impl<'a> Finder<'a> {
         }
         let passes = self.passes(cell, &SECOND);
         if passes.is_empty() {
-            return Err("no straight pass that sees all of it keeps clear of the no-fly zones".to_owned());
+            return Err(
+                "no straight pass that sees all of it keeps clear of the no-fly zones".to_owned(),
+            );
         }
         self.by_words(&passes, &gates[..gates.len().min(SECOND.gates)])
             .or_else(|| self.by_routes(&passes, &gates))
@@ -130,8 +156,12 @@ impl<'a> Finder<'a> {
 
     fn gates_by_distance(&self, cell: CellId) -> Vec<usize> {
         let centre = self.grid.centre(cell);
-        let mut order: Vec<(f64, usize)> =
-            self.gates.iter().enumerate().map(|(i, g)| ((g.position() - centre).norm_squared(), i)).collect();
+        let mut order: Vec<(f64, usize)> = self
+            .gates
+            .iter()
+            .enumerate()
+            .map(|(i, g)| ((g.position() - centre).norm_squared(), i))
+            .collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         order.into_iter().map(|(_, i)| i).collect()
     }
@@ -140,7 +170,10 @@ impl<'a> Finder<'a> {
     fn passes(&self, cell: CellId, effort: &Effort) -> Vec<Pass> {
         let p = self.problem;
         let d = self.grid.lane_spacing_m;
-        let (across_m, along_m) = (p.footprint_across_m - p.tracking_error_m, p.footprint_along_m - p.tracking_error_m);
+        let (across_m, along_m) = (
+            p.footprint_across_m - p.tracking_error_m,
+            p.footprint_along_m - p.tracking_error_m,
+        );
         let centre = self.grid.centre(cell);
         if p.zones.distance_m(centre) + across_m.max(along_m) < p.clearance_m {
             return Vec::new();
@@ -163,7 +196,10 @@ impl<'a> Finder<'a> {
                     if p.zones.distance_m(at) < p.clearance_m {
                         continue;
                     }
-                    let pass = Pass { view: Pose::new(at, heading_rad), run_m: RUN_PER_SPACING * d };
+                    let pass = Pass {
+                        view: Pose::new(at, heading_rad),
+                        run_m: RUN_PER_SPACING * d,
+                    };
                     if self.flyable(&pass.curve()) {
                         found.push(pass);
                     }
@@ -185,7 +221,8 @@ impl<'a> Finder<'a> {
         for (i, pass) in passes.iter().enumerate() {
             for &g in gates {
                 let gate = self.gates[g];
-                let bound = dubins::length_m(gate, pass.start(), r) + dubins::length_m(pass.end(), gate, r);
+                let bound =
+                    dubins::length_m(gate, pass.start(), r) + dubins::length_m(pass.end(), gate, r);
                 pairs.push((bound, g, i));
             }
         }
@@ -193,12 +230,21 @@ impl<'a> Finder<'a> {
         let mut best: Option<(f64, Excursion)> = None;
         for &(bound, g, i) in pairs.iter().take(MAX_PAIRS) {
             let run_m = 2.0 * passes[i].run_m;
-            if best.as_ref().is_some_and(|(length, _)| bound + run_m >= *length) {
+            if best
+                .as_ref()
+                .is_some_and(|(length, _)| bound + run_m >= *length)
+            {
                 break;
             }
-            let word = |from: Pose, to: Pose| dubins::all(from, to, r).into_iter().find(|c| self.flyable(c));
+            let word = |from: Pose, to: Pose| {
+                dubins::all(from, to, r)
+                    .into_iter()
+                    .find(|c| self.flyable(c))
+            };
             if let Some(e) = self.joined(g, &passes[i], word)
-                && best.as_ref().is_none_or(|(length, _)| e.curve.length_m() < *length)
+                && best
+                    .as_ref()
+                    .is_none_or(|(length, _)| e.curve.length_m() < *length)
             {
                 best = Some((e.curve.length_m(), e));
             }
@@ -212,7 +258,10 @@ impl<'a> Finder<'a> {
         for pass in passes.iter().step_by(stride) {
             for &g in gates.iter().take(ROUTED_GATES) {
                 let route = |from: Pose, to: Pose| {
-                    self.router.route(from, to).ok().filter(|c| self.problem.contingency_clear(c))
+                    self.router
+                        .route(from, to)
+                        .ok()
+                        .filter(|c| self.problem.contingency_clear(c))
                 };
                 if let Some(e) = self.joined(g, pass, route) {
                     return Some(e);
@@ -222,14 +271,23 @@ impl<'a> Finder<'a> {
         None
     }
 
-    fn joined(&self, gate: usize, pass: &Pass, link: impl Fn(Pose, Pose) -> Option<Curve>) -> Option<Excursion> {
+    fn joined(
+        &self,
+        gate: usize,
+        pass: &Pass,
+        link: impl Fn(Pose, Pose) -> Option<Curve>,
+    ) -> Option<Excursion> {
         let at = self.gates[gate];
         let mut curve = link(at, pass.start())?;
         let back = link(pass.end(), at)?;
         let view_m = curve.length_m() + pass.run_m;
         curve.extend(&pass.curve());
         curve.extend(&back);
-        Some(Excursion { gate, curve, view_m })
+        Some(Excursion {
+            gate,
+            curve,
+            view_m,
+        })
     }
 }
 
@@ -238,7 +296,12 @@ impl AreaProblem {
     pub(super) fn contingency_clear(&self, curve: &Curve) -> bool {
         // Farther out than a loiter is wide, no circle reaches a zone.
         self.clearance_m >= 2.0 * self.turn_radius_m + self.tracking_error_m
-            || contingency_clear(&self.zones, curve, self.turn_radius_m, self.clearance_m / 2.0)
+            || contingency_clear(
+                &self.zones,
+                curve,
+                self.turn_radius_m,
+                self.clearance_m / 2.0,
+            )
     }
 }
 

@@ -97,7 +97,9 @@ pub struct CoverageLoop {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum LoopError {
     /// The turn radius does not fit into the lane spacing.
-    #[error("a turn radius of {radius_m:.1} m does not fit lanes of {spacing_m:.1} m: the radius may be at most half the spacing")]
+    #[error(
+        "a turn radius of {radius_m:.1} m does not fit lanes of {spacing_m:.1} m: the radius may be at most half the spacing"
+    )]
     TurnRadius {
         /// Turn radius, metres.
         radius_m: f64,
@@ -105,7 +107,9 @@ pub enum LoopError {
         spacing_m: f64,
     },
     /// The footprint is too small to see a cell from the loop.
-    #[error("the camera footprint is too small: seeing a {spacing_m:.1} m cell from a turn needs half a footprint of at least {across_m:.1} m across and {along_m:.1} m along")]
+    #[error(
+        "the camera footprint is too small: seeing a {spacing_m:.1} m cell from a turn needs half a footprint of at least {across_m:.1} m across and {along_m:.1} m along"
+    )]
     Footprint {
         /// Lane spacing, metres.
         spacing_m: f64,
@@ -151,7 +155,9 @@ impl CoverageLoop {
     /// [`LoopError`].
     pub fn build(problem: &AreaProblem) -> Result<Self, LoopError> {
         check(problem)?;
-        let grid = Grid { lane_spacing_m: problem.lane_spacing_m };
+        let grid = Grid {
+            lane_spacing_m: problem.lane_spacing_m,
+        };
         let needed = cells_of(&problem.area, grid)?;
         let ring = closed_loop(problem, grid, &needed);
         if ring.is_empty() {
@@ -161,7 +167,14 @@ impl CoverageLoop {
         let boundaries = cells.iter().filter_map(|c| c.curve.start()).collect();
         let index = (0u16..).zip(&cells).map(|(i, c)| (c.id, i)).collect();
         let hash = hash_of(grid, &cells);
-        Ok(Self { grid, cells, boundaries, index, uncoverable, hash })
+        Ok(Self {
+            grid,
+            cells,
+            boundaries,
+            index,
+            uncoverable,
+            hash,
+        })
     }
 
     /// Number of cells.
@@ -236,7 +249,13 @@ impl CoverageLoop {
 /// The footprint is a rectangle aligned with the heading, of half sizes
 /// `across_m` and `along_m`.
 #[must_use]
-pub fn footprint_contains(grid: &Grid, cell: CellId, pose: Pose, across_m: f64, along_m: f64) -> bool {
+pub fn footprint_contains(
+    grid: &Grid,
+    cell: CellId,
+    pose: Pose,
+    across_m: f64,
+    along_m: f64,
+) -> bool {
     let d = pose.direction();
     grid.corners(cell).iter().all(|c| {
         let v = c - pose.position();

@@ -16,7 +16,11 @@ pub const CALM_PERIODS: u64 = 20;
 
 /// The open cells and the members of a complete round, as the solver wants them.
 #[must_use]
-pub fn problem(open: &Open, coverage_loop: &CoverageLoop, covered: &CellSet) -> (Vec<RingCell>, Vec<Robot>) {
+pub fn problem(
+    open: &Open,
+    coverage_loop: &CoverageLoop,
+    covered: &CellSet,
+) -> (Vec<RingCell>, Vec<Robot>) {
     let n = covered.len();
     let mut done = covered.clone();
     for s in open.snapshots.values() {
@@ -45,7 +49,11 @@ pub fn problem(open: &Open, coverage_loop: &CoverageLoop, covered: &CellSet) -> 
         .map(|(id, s)| Robot {
             anchor: s.anchor % n.max(1),
             id: *id,
-            heading: if s.backward { Direction::Backward } else { Direction::Forward },
+            heading: if s.backward {
+                Direction::Backward
+            } else {
+                Direction::Forward
+            },
             release_ms: s.release_ms,
             speed_mmps: s.speed_mmps.max(1),
             turn_ms: s.turn_ms,

@@ -171,7 +171,9 @@ impl Negotiation {
     /// Milliseconds since the last adoption; very long if there was none.
     #[must_use]
     pub fn adopted_ago_ms(&self, now: Time) -> u32 {
-        self.adopted_at.map_or(u32::MAX, |t| u32::try_from(now.since_ms(t)).unwrap_or(u32::MAX))
+        self.adopted_at.map_or(u32::MAX, |t| {
+            u32::try_from(now.since_ms(t)).unwrap_or(u32::MAX)
+        })
     }
 
     /// Cells covered since the last adoption.
@@ -246,7 +248,11 @@ impl Negotiation {
             self.members_since = ctx.now;
         }
         let idle = self.section.plan().is_empty();
-        self.idle_since = if idle { self.idle_since.or(Some(ctx.now)) } else { None };
+        self.idle_since = if idle {
+            self.idle_since.or(Some(ctx.now))
+        } else {
+            None
+        };
     }
 
     fn rank(&self, ctx: &Context<'_>) -> u64 {
@@ -257,9 +263,11 @@ impl Negotiation {
     fn run_rounds(&mut self, ctx: &Context<'_>, orphans: &CellSet) {
         let orphaned_ms = self.orphan_since.map(|t| ctx.now.since_ms(t));
         if let Some(open) = self.rounds.open() {
-            let gone = open.round.members.iter().any(|m| {
-                m.id != self.me && (ctx.live.get(&m.id) != Some(&m.incarnation))
-            });
+            let gone = open
+                .round
+                .members
+                .iter()
+                .any(|m| m.id != self.me && (ctx.live.get(&m.id) != Some(&m.incarnation)));
             let waited = ctx.now.since_ms(self.opened_at);
             let loss = open.round.loss || orphans.count() > 0;
             if gone {
@@ -283,8 +291,14 @@ impl Negotiation {
         if self.decided_at.is_none() && !steady && orphaned_ms < 10 * ctx.period_ms {
             return;
         }
-        let settled = self.decided_at.is_none_or(|t| ctx.now.since_ms(t) >= 5 * ctx.period_ms);
-        let patience = if settled { 2 * ctx.period_ms } else { 5 * ctx.period_ms };
+        let settled = self
+            .decided_at
+            .is_none_or(|t| ctx.now.since_ms(t) >= 5 * ctx.period_ms);
+        let patience = if settled {
+            2 * ctx.period_ms
+        } else {
+            5 * ctx.period_ms
+        };
         let stagger = self.rank(ctx) * ctx.period_ms / 8;
         if (self.loss_seen && settled) || orphaned_ms >= patience + stagger {
             self.start(ctx, true, 0);
@@ -299,19 +313,34 @@ impl Negotiation {
         let base = ctx.base_wait_ms();
         let wait = (base << retries.min(2)).min(4 * base);
         let wait = u32::try_from(wait).unwrap_or(u32::MAX);
-        self.rounds.start(ctx.members.to_vec(), ctx.revision, ctx.loop_hash, loss, wait);
+        self.rounds.start(
+            ctx.members.to_vec(),
+            ctx.revision,
+            ctx.loop_hash,
+            loss,
+            wait,
+        );
         self.opened(ctx.now);
     }
 
     /// Idle while others have much left: a new division may end the work sooner.
     fn gain_in_sight(&self, ctx: &Context<'_>) -> bool {
-        let steady = ctx.able_since.is_some_and(|t| ctx.now.since_ms(t) >= 10 * ctx.period_ms);
-        let idle = self.idle_since.is_some_and(|t| ctx.now.since_ms(t) >= 2 * ctx.period_ms);
+        let steady = ctx
+            .able_since
+            .is_some_and(|t| ctx.now.since_ms(t) >= 10 * ctx.period_ms);
+        let idle = self
+            .idle_since
+            .is_some_and(|t| ctx.now.since_ms(t) >= 2 * ctx.period_ms);
         let calm = CALM_PERIODS * ctx.period_ms;
         let stagger = self.rank(ctx) * ctx.period_ms / 8;
         let last = self.decided_at.max(self.adopted_at);
         let rested = last.is_none_or(|t| ctx.now.since_ms(t) >= calm + stagger);
-        let left: usize = ctx.live.keys().map(|id| self.section.plan_of(*id).len()).max().unwrap_or(0);
+        let left: usize = ctx
+            .live
+            .keys()
+            .map(|id| self.section.plan_of(*id).len())
+            .max()
+            .unwrap_or(0);
         steady && idle && rested && left > ctx.members.len()
     }
 
@@ -322,14 +351,27 @@ impl Negotiation {
             return None;
         }
         let (ring, robots) = division::problem(open, coverage_loop, &self.base);
-        self.dividing = Some(Dividing { epoch, ring: ring.clone() });
-        Some(Want::Divide { epoch, ring, robots })
+        self.dividing = Some(Dividing {
+            epoch,
+            ring: ring.clone(),
+        });
+        Some(Want::Divide {
+            epoch,
+            ring,
+            robots,
+        })
     }
 
     /// The answer to [`Want::Divide`]. Returns what is to be made durable and then
     /// given to [`Negotiation::adopt`], unless the round was abandoned meanwhile or
     /// its division is not worth the change.
-    pub fn divided(&mut self, now: Time, period_ms: u64, epoch: Epoch, division: &Division) -> Option<Adoption> {
+    pub fn divided(
+        &mut self,
+        now: Time,
+        period_ms: u64,
+        epoch: Epoch,
+        division: &Division,
+    ) -> Option<Adoption> {
         let dividing = self.dividing.take_if(|d| d.epoch == epoch)?;
         let (now_epoch, open) = self.rounds.complete()?;
         if now_epoch != epoch {
@@ -338,7 +380,11 @@ impl Negotiation {
         let worthwhile = division::worthwhile(open, division, period_ms);
         let mine = open.snapshots.get(&self.me)?;
         let committed = division::commits_of(mine, self.section.cells());
-        let commits = self.section.plan().iter().filter(|p| committed.contains(p.cell));
+        let commits = self
+            .section
+            .plan()
+            .iter()
+            .filter(|p| committed.contains(p.cell));
         let commits: Vec<(u16, bool)> = commits.map(|p| (p.cell, p.backward)).collect();
         let section = division::section_of(division, &dividing.ring, self.me);
         let adoption = Adoption {
@@ -411,14 +457,21 @@ impl Negotiation {
     }
 
     /// Inheritance: what to take without a round, if anything.
-    fn inherit(&self, ctx: &Context<'_>, orphans: &CellSet, lp: &CoverageLoop) -> Option<Vec<(u16, bool)>> {
+    fn inherit(
+        &self,
+        ctx: &Context<'_>,
+        orphans: &CellSet,
+        lp: &CoverageLoop,
+    ) -> Option<Vec<(u16, bool)>> {
         if self.take_pending {
             return None;
         }
         let stagger = self.rank(ctx) * ctx.period_ms / 2;
         if let Some(since) = self.orphan_since {
             let patience = 2 * ctx.period_ms + ctx.base_wait_ms() + stagger;
-            return (ctx.now.since_ms(since) >= patience).then(|| self.nearest_run(orphans, lp)).flatten();
+            return (ctx.now.since_ms(since) >= patience)
+                .then(|| self.nearest_run(orphans, lp))
+                .flatten();
         }
         let idle_ms = self.idle_since.map(|t| ctx.now.since_ms(t))?;
         if idle_ms < 10 * ctx.period_ms + stagger || self.rounds.open().is_some() {
@@ -445,11 +498,17 @@ impl Negotiation {
             let d = (i32::from(c) - here).rem_euclid(n);
             d.min(n - d)
         };
-        let (first, count) = orphans.runs().into_iter().map(|r| (r.first, r.count)).min_by_key(|(first, count)| {
-            let last = u16::try_from((i32::from(*first) + i32::from(*count) - 1).rem_euclid(n)).unwrap_or(0);
-            (away(*first).min(away(last)), *first)
-        })?;
-        let last = u16::try_from((i32::from(first) + i32::from(count) - 1).rem_euclid(n)).unwrap_or(0);
+        let (first, count) = orphans
+            .runs()
+            .into_iter()
+            .map(|r| (r.first, r.count))
+            .min_by_key(|(first, count)| {
+                let last = u16::try_from((i32::from(*first) + i32::from(*count) - 1).rem_euclid(n))
+                    .unwrap_or(0);
+                (away(*first).min(away(last)), *first)
+            })?;
+        let last =
+            u16::try_from((i32::from(first) + i32::from(count) - 1).rem_euclid(n)).unwrap_or(0);
         let backward = away(last) < away(first);
         let mut cells: Vec<(u16, bool)> = (first..=last).map(|c| (c, backward)).collect();
         if backward {
@@ -461,5 +520,9 @@ impl Negotiation {
 
 /// The second half of an owner's plan, from its far end.
 fn far_half(plan: &[PlanCell]) -> Vec<(u16, bool)> {
-    plan.iter().skip(plan.len() / 2).rev().map(|p| (p.cell, !p.backward)).collect()
+    plan.iter()
+        .skip(plan.len() / 2)
+        .rev()
+        .map(|p| (p.cell, !p.backward))
+        .collect()
 }

@@ -32,7 +32,10 @@ pub fn order_of(round: &Round) -> RoundOrder {
 }
 
 fn fold(h: u64) -> u32 {
-    #[allow(clippy::cast_possible_truncation, reason = "both halves are folded into one on purpose")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "both halves are folded into one on purpose"
+    )]
     let folded = (h ^ (h >> 32)) as u32;
     folded
 }
@@ -71,7 +74,13 @@ impl Rounds {
     /// No round yet; `counter` is what the journal promised.
     #[must_use]
     pub fn new(me: Member, counter: u32) -> Self {
-        Self { me, counter, open: None, closed: None, silent: BTreeMap::new() }
+        Self {
+            me,
+            counter,
+            open: None,
+            closed: None,
+            silent: BTreeMap::new(),
+        }
     }
 
     /// The highest counter seen anywhere.
@@ -95,7 +104,10 @@ impl Rounds {
     pub fn hear(&mut self, author: Member, snapshot: &Snapshot) -> HeardSnapshot {
         let round = &snapshot.round;
         self.counter = self.counter.max(round.counter);
-        if !round.members.contains(&self.me) || !round.members.contains(&author) || author == self.me {
+        if !round.members.contains(&self.me)
+            || !round.members.contains(&author)
+            || author == self.me
+        {
             return HeardSnapshot::Nothing;
         }
         let order = order_of(round);
@@ -118,7 +130,10 @@ impl Rounds {
             _ => {
                 self.silent.remove(&author);
                 let snapshots = BTreeMap::from([(author.id, snapshot.clone())]);
-                self.open = Some(Open { round: round.clone(), snapshots });
+                self.open = Some(Open {
+                    round: round.clone(),
+                    snapshots,
+                });
                 HeardSnapshot::BidWanted
             }
         }
@@ -127,12 +142,30 @@ impl Rounds {
     /// Opens a round of this peer's own making, one above every counter seen.
     /// `members` must hold this peer; whoever was silent in two rounds running is
     /// left out. The bid is wanted next.
-    pub fn start(&mut self, mut members: Vec<Member>, revision: u32, loop_hash: u64, loss: bool, wait_ms: u32) {
-        members.retain(|m| *m == self.me || self.silent.get(m).copied().unwrap_or(0) < SILENT_ROUNDS);
+    pub fn start(
+        &mut self,
+        mut members: Vec<Member>,
+        revision: u32,
+        loop_hash: u64,
+        loss: bool,
+        wait_ms: u32,
+    ) {
+        members
+            .retain(|m| *m == self.me || self.silent.get(m).copied().unwrap_or(0) < SILENT_ROUNDS);
         members.sort_unstable();
         self.counter = self.counter.saturating_add(1);
-        let round = Round { counter: self.counter, members, revision, loop_hash, loss, wait_ms };
-        self.open = Some(Open { round, snapshots: BTreeMap::new() });
+        let round = Round {
+            counter: self.counter,
+            members,
+            revision,
+            loop_hash,
+            loss,
+            wait_ms,
+        };
+        self.open = Some(Open {
+            round,
+            snapshots: BTreeMap::new(),
+        });
     }
 
     /// This peer's own bid is durable. Returns whether it belongs to the open round.
@@ -151,7 +184,12 @@ impl Rounds {
     #[must_use]
     pub fn complete(&self) -> Option<(Epoch, &Open)> {
         let open = self.open.as_ref()?;
-        if open.round.members.iter().any(|m| !open.snapshots.contains_key(&m.id)) {
+        if open
+            .round
+            .members
+            .iter()
+            .any(|m| !open.snapshots.contains_key(&m.id))
+        {
             return None;
         }
         Some((epoch_of(open), open))
@@ -161,7 +199,12 @@ impl Rounds {
     #[must_use]
     pub fn missing(&self) -> Vec<Member> {
         self.open.as_ref().map_or_else(Vec::new, |open| {
-            open.round.members.iter().filter(|m| !open.snapshots.contains_key(&m.id)).copied().collect()
+            open.round
+                .members
+                .iter()
+                .filter(|m| !open.snapshots.contains_key(&m.id))
+                .copied()
+                .collect()
         })
     }
 
@@ -206,8 +249,24 @@ pub fn epoch_of(open: &Open) -> Epoch {
     let mut h = Fnv::new();
     for (id, s) in &open.snapshots {
         (id, order_of(&s.round)).hash(&mut h);
-        (s.anchor, s.backward, s.release_ms, s.speed_mmps, s.turn_ms, s.endurance_ms).hash(&mut h);
-        (&s.union, &s.commits, s.eta_ms, s.adopted_ago_ms, s.cells_since, s.idle).hash(&mut h);
+        (
+            s.anchor,
+            s.backward,
+            s.release_ms,
+            s.speed_mmps,
+            s.turn_ms,
+            s.endurance_ms,
+        )
+            .hash(&mut h);
+        (
+            &s.union,
+            &s.commits,
+            s.eta_ms,
+            s.adopted_ago_ms,
+            s.cells_since,
+            s.idle,
+        )
+            .hash(&mut h);
     }
     let (counter, members, order) = order_of(&open.round);
     let members = u32::try_from(members.min(255)).unwrap_or(255);
@@ -277,9 +336,18 @@ mod tests {
         let (low, high) = (round(1, &[1, 2]), round(2, &[1, 2]));
         let mut rounds = Rounds::new(member(1), 0);
         rounds.hear(member(2), &snapshot(&low, 0));
-        assert_eq!(rounds.hear(member(2), &snapshot(&high, 0)), HeardSnapshot::BidWanted);
-        assert!(!rounds.bid(snapshot(&low, 1)), "a bid for a dead round is not spoken");
-        assert_eq!(rounds.hear(member(2), &snapshot(&low, 0)), HeardSnapshot::Nothing);
+        assert_eq!(
+            rounds.hear(member(2), &snapshot(&high, 0)),
+            HeardSnapshot::BidWanted
+        );
+        assert!(
+            !rounds.bid(snapshot(&low, 1)),
+            "a bid for a dead round is not spoken"
+        );
+        assert_eq!(
+            rounds.hear(member(2), &snapshot(&low, 0)),
+            HeardSnapshot::Nothing
+        );
         assert!(rounds.complete().is_none());
     }
 
