@@ -383,6 +383,7 @@ impl<'a> Solver<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn ring(n: usize) -> Vec<RingCell> {
         vec![
@@ -412,7 +413,7 @@ mod tests {
         for k in 1..5u16 {
             let robots: Vec<Robot> = (0..k).map(|i| robot(i, i)).collect();
             let d = divide(&ring(40), &robots);
-            let mut seen = vec![0; 40];
+            let mut seen = [0; 40];
             for s in &d.sections {
                 for l in &s.legs {
                     for c in l.cells(40) {
@@ -422,6 +423,166 @@ mod tests {
             }
             assert!(seen.iter().all(|x| *x == 1), "{k}: {d:?}");
             assert!(d.unassigned.is_empty());
+        }
+    }
+
+    /// The least makespan over all splits of all gaps, by trying each, or `None` when
+    /// no split is within the endurance.
+    fn brute(ring: &[RingCell], robots: &[Robot]) -> Option<u64> {
+        let mut order = robots.to_vec();
+        order.sort_unstable_by_key(|r| (r.anchor, r.id));
+        let k = order.len();
+        let n = ring.len();
+        let gap = |i: usize| {
+            let (a, b) = (order[i].anchor as usize, order[(i + 1) % k].anchor as usize);
+            if i + 1 == k { n - (a - b) } else { b - a }
+        };
+        let mut rights = vec![0usize; k];
+        let mut best: Option<u64> = None;
+        loop {
+            let mut worst = Some(0u64);
+            for i in 0..k {
+                let before = (i + k - 1) % k;
+                let left = gap(before) - rights[before];
+                let t = flown(ring, &order[i], left, rights[i]);
+                worst = worst.zip(t).map(|(w, t)| w.max(t));
+            }
+            best = match (best, worst) {
+                (Some(b), Some(w)) => Some(b.min(w)),
+                (b, w) => b.or(w),
+            };
+            let Some(i) = (0..k).find(|i| rights[*i] < gap(*i)) else {
+                return best;
+            };
+            rights[i] += 1;
+            rights[..i].fill(0);
+        }
+    }
+
+    /// When a robot is done with `left` cells behind and `right` cells ahead of its
+    /// anchor, flying cell by cell; `None` beyond its endurance.
+    fn flown(ring: &[RingCell], r: &Robot, left: usize, right: usize) -> Option<u64> {
+        let n = ring.len();
+        let cell = |i: i64| ring[(i64::from(r.anchor) + i).rem_euclid(n as i64) as usize];
+        let ahead: Vec<RingCell> = (0..right as i64).map(cell).collect();
+        let behind: Vec<RingCell> = (1..=left as i64).map(|i| cell(-i)).collect();
+        let need = |side: &[RingCell]| side.iter().rposition(|c| c.open).map_or(0, |p| p + 1);
+        let (a, b) = (need(&ahead), need(&behind));
+        let out = |side: &[RingCell], m: usize| -> u64 {
+            side[..m]
+                .iter()
+                .map(|c| u64::from(if c.open { c.service_mm } else { c.travel_mm }))
+                .sum()
+        };
+        let back = |side: &[RingCell], m: usize| -> u64 {
+            side[..m].iter().map(|c| u64::from(c.travel_mm)).sum()
+        };
+        let ms = |mm: u64| (mm * 1000).div_ceil(u64::from(r.speed_mmps));
+        let turn = u64::from(r.turn_ms);
+        let forward = r.heading == Direction::Forward;
+        let t = match (a, b) {
+            (0, 0) => return Some(0),
+            (a, 0) => ms(out(&ahead, a)) + if forward { 0 } else { turn },
+            (0, b) => ms(out(&behind, b)) + if forward { turn } else { 0 },
+            (a, b) => {
+                let first_ahead =
+                    ms(out(&ahead, a)) + turn + ms(back(&ahead, a)) + ms(out(&behind, b));
+                let first_behind =
+                    ms(out(&behind, b)) + turn + ms(back(&behind, b)) + ms(out(&ahead, a));
+                (first_ahead + if forward { 0 } else { turn })
+                    .min(first_behind + if forward { turn } else { 0 })
+            }
+        };
+        (t <= u64::from(r.endurance_ms)).then_some(t + u64::from(r.release_ms))
+    }
+
+    fn cells() -> impl Strategy<Value = Vec<RingCell>> {
+        let cell = (1u32..5, 0u32..5, any::<bool>()).prop_map(|(s, t, open)| RingCell {
+            service_mm: s * 1000,
+            travel_mm: (t * 1000).min(s * 1000),
+            open,
+        });
+        prop::collection::vec(cell, 1..9)
+    }
+
+    fn robots(n: u16, endurance_s: core::ops::Range<u32>) -> impl Strategy<Value = Vec<Robot>> {
+        let robot = (0..n, any::<bool>(), 0u32..6, 1u32..4, 0u32..4, endurance_s).prop_map(
+            |(anchor, forward, release, speed, turn, endurance)| Robot {
+                anchor,
+                id: 0,
+                heading: if forward {
+                    Direction::Forward
+                } else {
+                    Direction::Backward
+                },
+                release_ms: release * 1000,
+                speed_mmps: speed * 1000,
+                turn_ms: turn * 1000,
+                endurance_ms: endurance * 1000,
+            },
+        );
+        prop::collection::vec(robot, 1..4).prop_map(|mut robots| {
+            for (id, r) in (0u16..).zip(&mut robots) {
+                r.id = id;
+            }
+            robots
+        })
+    }
+
+    /// Every open cell is in exactly one section or unassigned, and no section is
+    /// beyond its robot's endurance.
+    fn assert_sound(ring: &[RingCell], robots: &[Robot], d: &Division) {
+        let mut owners = vec![0; ring.len()];
+        for s in &d.sections {
+            let mut mine = vec![false; ring.len()];
+            for leg in &s.legs {
+                for c in leg.cells(ring.len()) {
+                    mine[usize::from(c)] |= ring[usize::from(c)].open;
+                }
+            }
+            for (o, m) in owners.iter_mut().zip(mine) {
+                *o += u32::from(m);
+            }
+            let r = robots.iter().find(|r| r.id == s.id).unwrap();
+            let spent = s.finish_ms.saturating_sub(r.release_ms);
+            assert!(
+                s.legs.is_empty() || spent <= r.endurance_ms,
+                "{s:?} of {r:?}"
+            );
+        }
+        for c in &d.unassigned {
+            owners[usize::from(*c)] += 1;
+        }
+        for (o, c) in owners.iter().zip(ring) {
+            assert_eq!(*o, u32::from(c.open), "{d:?}");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        #[test]
+        fn no_split_is_faster((ring, robots) in cells().prop_flat_map(|r| {
+            let n = u16::try_from(r.len()).unwrap();
+            (Just(r), robots(n, 900..1000))
+        })) {
+            let d = divide(&ring, &robots);
+            assert_sound(&ring, &robots, &d);
+            prop_assert!(d.unassigned.is_empty());
+            prop_assert_eq!(Some(u64::from(d.makespan_ms)), brute(&ring, &robots), "{:?}", d);
+        }
+
+        #[test]
+        fn short_endurance_is_kept_and_a_feasible_split_is_found((ring, robots) in cells().prop_flat_map(|r| {
+            let n = u16::try_from(r.len()).unwrap();
+            (Just(r), robots(n, 1..25))
+        })) {
+            let d = divide(&ring, &robots);
+            assert_sound(&ring, &robots, &d);
+            if let Some(best) = brute(&ring, &robots) {
+                prop_assert!(d.unassigned.is_empty(), "{:?}", d);
+                prop_assert_eq!(u64::from(d.makespan_ms), best, "{:?}", d);
+            }
         }
     }
 }
