@@ -237,17 +237,22 @@ impl Section {
     }
 
     /// Rule *adopt*: what the plan becomes with `commits`, then `section`, in order of
-    /// flight. Covered cells and repetitions are left out. Nothing changes yet: the
-    /// plan must be durable before it is flown, see [`Section::install`].
+    /// flight. Covered cells and repetitions are left out. A cell this peer lists
+    /// already at a higher stamp keeps it: another may have yielded to it, and a lower
+    /// one would yield in turn to what that other said before. Nothing changes yet:
+    /// the plan must be durable before it is flown, see [`Section::install`].
     #[must_use]
     pub fn adopted(&self, epoch: Epoch, commits: &[(u16, bool)], section: &[(u16, bool)]) -> Vec<PlanCell> {
         let stamp = Stamp { epoch, take: 0, id: self.me };
+        let planned = self.plan.iter().map(|p| (p.cell, p.stamp));
+        let listed: BTreeMap<u16, Stamp> = self.held.iter().map(|(c, s)| (*c, *s)).chain(planned).collect();
         let mut seen = self.union.clone();
         let mut plan = Vec::new();
         for (list, committed) in [(commits, true), (section, false)] {
             for &(cell, backward) in list {
                 if cell < self.cells && !seen.contains(cell) {
                     seen.insert(cell);
+                    let stamp = listed.get(&cell).map_or(stamp, |s| stamp.max(*s));
                     plan.push(PlanCell { cell, backward, committed, stamp });
                 }
             }
@@ -565,6 +570,17 @@ mod tests {
         assert_eq!(s.held().keys().copied().collect::<Vec<_>>(), [3]);
         s.expire_held();
         assert!(s.orphans(&live).contains(3) && !s.orphans(&live).contains(2));
+    }
+
+    #[test]
+    fn an_adoption_below_a_take_does_not_lower_its_stamp() {
+        let mut s = section(1);
+        s.hear(2, 1, 1, register(&[(7, 1, stamp(2, 0, 2))]));
+        s.take(&[(7, false)]);
+        // Peer 2 yields to this take; then a division that was decided before ends.
+        s.adopt(Epoch { counter: 1, hash: 0 }, &[], &forward(&[6, 7]));
+        assert_eq!(s.plan().iter().map(|p| p.stamp).collect::<Vec<_>>(), [stamp(1, 0, 1), stamp(2, 1, 1)]);
+        assert!(!s.settle(&Live::from([(2, 1)])), "what peer 2 said before it yielded takes nothing back");
     }
 
     #[test]
