@@ -3,4 +3,5 @@
 mod architecture;
 mod configs;
 mod d27;
+mod model;
 mod seeds;

@@ -79,7 +79,7 @@ pub fn ground(cols: u32, rows: u32, zones: Vec<Polygon>) -> (Arc<CoverageLoop>, 
     };
     (
         Arc::new(coverage_loop),
-        Arc::new(Router::new(zones, limits).unwrap()),
+        Arc::new(Router::new(zones, limits)),
     )
 }
 

@@ -1,29 +1,20 @@
 //! No-fly zones and their outward offset (D2.7 §2.3.1).
 //!
-//! Every curve of a plan is checked here, by exact distances, before it is
-//! handed out. [`super::offset`] grows the zones for the obstacle graph.
+//! A curve is outside the exact Minkowski sum of the zones with a disc if and only if
+//! it keeps the disc's radius from them, so nothing is polygonised: every curve of a
+//! plan is checked by exact distances before it is handed out.
 
 use super::Polygon;
 use super::distance::{segment_bounds, segment_to_polygon_m};
-use super::offset::grow;
 use crate::frame::{Point, Pose};
 use crate::math::TAU;
 use crate::trajectory::{Curve, Segment};
-use thiserror::Error;
 
 /// The no-fly zones of a mission at its flight level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoFlyZones {
     zones: Vec<Polygon>,
     boxes: Vec<(Point, Point)>,
-}
-
-/// Why zones cannot be used.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum ZoneError {
-    /// The offset of a zone could not be certified to contain the exact one.
-    #[error("the offset of zone {0} could not be certified")]
-    Offset(usize),
 }
 
 /// Slack of [`NoFlyZones::is_clear`], metres: curves are built to touch the
@@ -91,18 +82,6 @@ impl NoFlyZones {
             (end.east_m + end.north_m + s.start.east_m + s.start.north_m).is_finite()
                 && self.nearest_m(s, clearance_m) >= clearance_m - ROUNDING_M
         })
-    }
-
-    /// The zones grown by `radius_m` and united: polygons (outer rings and holes
-    /// as `(outer, holes)`) that contain the exact Minkowski sum.
-    ///
-    /// # Guarantees
-    /// Every point of every output edge is at least `radius_m` from every zone.
-    ///
-    /// # Errors
-    /// [`ZoneError::Offset`] when an output fails its certificate.
-    pub fn offset(&self, radius_m: f64) -> Result<Vec<(Polygon, Vec<Polygon>)>, ZoneError> {
-        grow(self, radius_m)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The shortest flyable route from here to there with clearance (D2.7 §2.3).
 
 use crate::frame::{Point, Pose};
-use crate::geometry::{NoFlyZones, ZoneError};
+use crate::geometry::NoFlyZones;
 use crate::math::{TAU, atan2};
 use crate::trajectory::{Curve, dubins};
 use std::sync::Arc;
@@ -46,12 +46,10 @@ pub enum RouteError {
 }
 
 impl Router {
-    /// Prepares the offset zones and the obstacle graph.
-    ///
-    /// # Errors
-    /// [`ZoneError`] when a zone cannot be offset safely.
-    pub fn new(zones: Arc<NoFlyZones>, limits: RouteLimits) -> Result<Self, ZoneError> {
-        Ok(Self { zones, limits })
+    /// A router round these zones within these limits.
+    #[must_use]
+    pub fn new(zones: Arc<NoFlyZones>, limits: RouteLimits) -> Self {
+        Self { zones, limits }
     }
 
     /// The zones this router avoids.
@@ -66,8 +64,7 @@ impl Router {
         self.limits
     }
 
-    /// A curve from `from` to `to`: the shortest clear Dubins word, else along the
-    /// visibility graph of the offset zones, smoothed and checked.
+    /// The shortest Dubins word from `from` to `to` that keeps clear; all six are tried.
     ///
     /// # Errors
     /// [`RouteError`]; a curve that fails its check is refused, never clipped.

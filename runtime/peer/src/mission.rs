@@ -118,7 +118,7 @@ impl Mission {
             turn_radius_m: problem.turn_radius_m,
             clearance_m: problem.clearance_m,
         };
-        let router = Router::new(zones, limits).map_err(|e| e.to_string())?;
+        let router = Router::new(zones, limits);
         Ok(Arc::new(Ground {
             mission: Arc::clone(self),
             coverage_loop: Arc::new(coverage_loop),

@@ -3,7 +3,7 @@
 //! | record | when |
 //! |---|---|
 //! | beacon | every T, ±10 % |
-//! | claim | at once when the own section changed; every 10 T for its ETA |
+//! | claim | at once when a section was adopted or taken, within T when it shrank by a rule; every 10 T for its ETA |
 //! | cover | own or heard coverage is news, at most every 2 T |
 //! | state | every 5 T |
 //! | round | a bid, once it is durable |
@@ -99,7 +99,8 @@ pub(crate) fn look(peer: &mut Peer) {
         return;
     }
     if peer.config.role == Role::Uav
-        && (peer.voice.claim_changed || due(peer.voice.last_claim, CLAIM_PERIODS))
+        && ((peer.voice.claim_changed && due(peer.voice.last_claim, 1))
+            || due(peer.voice.last_claim, CLAIM_PERIODS))
     {
         speak_claim(peer);
     }

@@ -106,7 +106,7 @@ impl<'a> Finder<'a> {
             turn_radius_m: problem.turn_radius_m,
             clearance_m: problem.clearance_m,
         };
-        let router = Router::new(problem.zones.clone(), limits).ok()?;
+        let router = Router::new(problem.zones.clone(), limits);
         Some(Self {
             problem,
             grid,

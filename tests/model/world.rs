@@ -1,0 +1,285 @@
+//! What a state of the small swarm is: peers, messages on the air, covered cells; and
+//! which states are one. What may happen to it is in `step.rs`.
+
+use super::PEERS;
+use skein_peer::cells::CellSet;
+use skein_peer::coverage::division::commits_of;
+use skein_peer::coverage::rounds::{HeardSnapshot, RoundOrder, Rounds, order_of};
+use skein_peer::coverage::section::{Live, Section};
+use skein_peer::wire::message::{Epoch, Member, Register, Run, Snapshot, Stamp};
+use std::collections::BTreeMap;
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Node {
+    pub(super) me: Member,
+    pub(super) section: Section,
+    pub(super) rounds: Rounds,
+    /// What the failure detector says.
+    pub(super) live: Live,
+    pub(super) seq: u32,
+    pub(super) said: Register,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct World {
+    pub(super) nodes: Vec<Option<Arc<Node>>>,
+    pub(super) lives: Vec<u32>,
+    pub(super) claims: BTreeMap<Member, Vec<(u32, Arc<Register>)>>,
+    pub(super) bids: Vec<(Member, RoundOrder, Arc<Snapshot>)>,
+    pub(super) flown: CellSet,
+    pub(super) split: bool,
+    pub(super) crashes: u8,
+    pub(super) restarts: u8,
+    pub(super) suspicions: u8,
+    /// A cell that a hand-over lost.
+    pub(super) gap: Option<u16>,
+    /// A cell that a peer lists at a lower stamp than before.
+    pub(super) sunk: Option<u16>,
+}
+
+/// Two states are one if no rule can tell them apart.
+impl Hash for World {
+    fn hash<H: Hasher>(&self, h: &mut H) {
+        for n in &self.nodes {
+            let Some(n) = n else {
+                0_u8.hash(h);
+                continue;
+            };
+            (n.me.incarnation, &n.rounds, &n.live).hash(h);
+            hash_ownership(&n.section, h);
+            for (id, heard) in n.section.heard() {
+                let author = Member {
+                    id: *id,
+                    incarnation: heard.incarnation,
+                };
+                let newer = self
+                    .claims
+                    .get(&author)
+                    .into_iter()
+                    .flatten()
+                    .filter(|c| c.0 > heard.seq)
+                    .count();
+                (id, heard.incarnation, &heard.register, newer).hash(h);
+            }
+        }
+        for (author, versions) in &self.claims {
+            author.hash(h);
+            for (_, register) in versions {
+                register.hash(h);
+            }
+        }
+        (&self.bids, &self.flown, &self.lives, self.gap, self.sunk).hash(h);
+        (self.split, self.crashes, self.restarts, self.suspicions).hash(h);
+    }
+}
+
+pub(super) fn hash_ownership<H: Hasher>(s: &Section, h: &mut H) {
+    (s.union(), s.plan(), s.held(), s.epoch()).hash(h);
+}
+
+impl Node {
+    pub(super) fn born(cells: u16, id: u16, incarnation: u32) -> Self {
+        let me = Member { id, incarnation };
+        Self {
+            me,
+            section: Section::new(id, cells, CellSet::new(cells)),
+            rounds: Rounds::new(me, 0),
+            live: Live::new(),
+            seq: 0,
+            said: Register::default(),
+        }
+    }
+
+    /// The register as others will read it.
+    pub(super) fn register(&self) -> Register {
+        Register {
+            done: Vec::new(),
+            epoch: Epoch::default(),
+            ..self.section.register(0, 0, 0)
+        }
+    }
+
+    /// A bid for the open round: the first planned cell is committed.
+    pub(super) fn bid(&mut self) -> Option<Arc<Snapshot>> {
+        let round = self.rounds.open()?.round.clone();
+        let commits = self.section.plan().iter().take(1).map(|p| Run {
+            first: p.cell,
+            count: 1,
+        });
+        let snapshot = Snapshot {
+            round,
+            anchor: 0,
+            backward: false,
+            release_ms: 0,
+            speed_mmps: 1,
+            turn_ms: 0,
+            endurance_ms: 0,
+            union: self.section.union().encode_rle(None),
+            commits: commits.collect(),
+            eta_ms: 0,
+            adopted_ago_ms: 0,
+            cells_since: 0,
+            idle: false,
+        };
+        self.rounds
+            .bid(snapshot.clone())
+            .then(|| Arc::new(snapshot))
+    }
+
+    /// Opens a round of all that are believed alive.
+    pub(super) fn start(&mut self) -> Option<Arc<Snapshot>> {
+        if self.rounds.open().is_some() {
+            self.rounds.give_up();
+        }
+        let mut members: Vec<Member> = self
+            .live
+            .iter()
+            .map(|(id, incarnation)| Member {
+                id: *id,
+                incarnation: *incarnation,
+            })
+            .collect();
+        members.push(self.me);
+        self.rounds.start(members, 0, 0, true, 0);
+        self.bid()
+    }
+
+    /// What a complete round decides: the open cells dealt out in runs, to other
+    /// members in each round, so that as many cells as can be change hands.
+    pub(super) fn decide(&mut self) {
+        let Some((epoch, open)) = self.rounds.complete() else {
+            return;
+        };
+        let n = self.section.cells();
+        let mut free = CellSet::full(n);
+        for s in open.snapshots.values() {
+            free.subtract(&CellSet::decode_rle(n, &s.union).unwrap());
+            free.subtract(&commits_of(s, n));
+        }
+        let members: Vec<u16> = open.snapshots.keys().copied().collect();
+        let mine = members.iter().position(|m| *m == self.me.id).unwrap();
+        let place = (mine + open.round.counter as usize) % members.len();
+        let share = usize::from(free.count()).div_ceil(members.len());
+        let section: Vec<(u16, bool)> = free
+            .iter()
+            .skip(place * share)
+            .take(share)
+            .map(|c| (c, false))
+            .collect();
+        let committed = commits_of(&open.snapshots[&self.me.id], n);
+        let commits = self
+            .section
+            .plan()
+            .iter()
+            .filter(|p| committed.contains(p.cell));
+        let commits: Vec<(u16, bool)> = commits.map(|p| (p.cell, p.backward)).collect();
+        self.rounds.close();
+        self.section.adopt(epoch, &commits, &section);
+    }
+
+    /// By what right this peer lists a cell.
+    pub(super) fn stamp(&self, cell: u16) -> Option<Stamp> {
+        let planned = self
+            .section
+            .plan()
+            .iter()
+            .find(|p| p.cell == cell)
+            .map(|p| p.stamp);
+        planned.or_else(|| self.section.held().get(&cell).copied())
+    }
+
+    pub(super) fn plans(&self, cell: u16) -> bool {
+        self.section.plan().iter().any(|p| p.cell == cell)
+    }
+
+    pub(super) fn lists(&self, cell: u16) -> bool {
+        self.plans(cell) || self.section.held().contains_key(&cell)
+    }
+}
+
+impl World {
+    pub(super) fn alive(&self) -> impl Iterator<Item = &Arc<Node>> {
+        self.nodes.iter().flatten()
+    }
+
+    /// The partition cuts off the highest id.
+    pub(super) fn reach(&self, a: u16, b: u16) -> bool {
+        !self.split || (a == PEERS) == (b == PEERS)
+    }
+
+    pub(super) fn lister(&self, cell: u16) -> bool {
+        self.alive().any(|n| n.lists(cell))
+    }
+
+    pub(super) fn act<T>(&mut self, i: usize, what: impl FnOnce(&mut Node) -> T) -> Option<T> {
+        self.nodes[i].as_mut().map(|n| what(Arc::make_mut(n)))
+    }
+
+    /// Publishes the register of a peer, if it changed.
+    pub(super) fn publish(&mut self, i: usize, keep: usize) {
+        let said = self.act(i, |n| {
+            let register = n.register();
+            (register != n.said).then(|| {
+                n.seq += 1;
+                n.said = register.clone();
+                (n.me, n.seq, Arc::new(register))
+            })
+        });
+        if let Some(Some((me, seq, register))) = said {
+            let versions = self.claims.entry(me).or_default();
+            versions.push((seq, register));
+            if versions.len() > keep {
+                versions.remove(0);
+            }
+        }
+    }
+
+    pub(super) fn speak(&mut self, i: usize, bid: Option<Arc<Snapshot>>) {
+        if let (Some(bid), Some(n)) = (bid, &self.nodes[i]) {
+            self.bids.push((n.me, order_of(&bid.round), bid));
+            self.bids
+                .sort_by_key(|(author, order, _)| (*author, *order));
+        }
+    }
+
+    /// Whether a snapshot may still change something for a peer.
+    pub(super) fn wants(n: &Node, author: Member, s: &Snapshot, order: RoundOrder) -> bool {
+        if author.id == n.me.id {
+            return false;
+        }
+        if !s.round.members.contains(&n.me) || !s.round.members.contains(&author) {
+            return n.rounds.counter() < s.round.counter;
+        }
+        match n.rounds.open() {
+            Some(open) if order_of(&open.round) >= order => {
+                order_of(&open.round) == order && !open.snapshots.contains_key(&author.id)
+            }
+            _ => {
+                let mut rounds = n.rounds.clone();
+                rounds.hear(author, s) != HeardSnapshot::Nothing
+                    || rounds.counter() > n.rounds.counter()
+            }
+        }
+    }
+
+    /// Takes off the air what nobody alive or yet to be born could use.
+    pub(super) fn tidy(&mut self, births: bool) {
+        let nodes: Vec<Arc<Node>> = self.alive().cloned().collect();
+        self.bids
+            .retain(|(author, order, s)| nodes.iter().any(|n| Self::wants(n, *author, s, *order)));
+        for (author, versions) in &mut self.claims {
+            let last = versions.last().map(|v| v.0);
+            versions.retain(|(seq, _)| {
+                let new = |n: &Arc<Node>| {
+                    let heard = n.section.heard().get(&author.id);
+                    n.me.id != author.id
+                        && heard.is_none_or(|h| (h.incarnation, h.seq) < (author.incarnation, *seq))
+                };
+                (births && Some(*seq) == last) || nodes.iter().any(new)
+            });
+        }
+        self.claims.retain(|_, versions| !versions.is_empty());
+    }
+}
