@@ -402,7 +402,10 @@ fn verdict(o: &Outcome, s: &Summary) -> String {
         "  bytes          {:.0} a second and peer",
         s.bytes_per_peer_s
     );
-    let _ = writeln!(out, "  false downs    {}", o.false_downs);
+    let _ = writeln!(out, "  false downs    {}", o.false_downs.len());
+    for (ms, by, of) in &o.false_downs {
+        let _ = writeln!(out, "    {:8.1} s  peer {by} of peer {of}", secs(*ms));
+    }
     if let Some(m) = o.separation_m {
         let _ = writeln!(out, "  separation     {m:.1} m at least");
     }

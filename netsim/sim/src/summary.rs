@@ -153,7 +153,7 @@ fn add_rates(s: &mut Summary, runs: &[Outcome], wall_s: f64) {
         let (mut ms, mut downs) = (0, 0);
         for o in of {
             ms += o.peer_ms;
-            downs += o.false_downs;
+            downs += o.false_downs.len() as u64;
         }
         (seconds(ms), downs)
     };

@@ -30,8 +30,9 @@ pub struct Membership {
     disagreements: Clocks<(u16, u16)>,
     /// Time from each death to its detection by each live peer, milliseconds.
     pub detect_ms: Vec<u64>,
-    /// Living peers declared Down although a path to them had existed for a whole bound.
-    pub false_downs: u64,
+    /// Living peers declared Down although a path to them had existed for a whole bound:
+    /// when, by whom, whom.
+    pub false_downs: Vec<(u64, u16, u16)>,
 }
 
 impl Membership {
@@ -124,7 +125,7 @@ impl Membership {
         let heard_ms = began_ms + bounds.probation_ms() + bound_ms;
         let joined = joined_since_ms.is_some_and(|t| t + bound_ms <= now_ms);
         if life == incarnation && joined && heard_ms <= now_ms {
-            self.false_downs += 1;
+            self.false_downs.push((now_ms, observer, subject));
         }
     }
 
@@ -319,9 +320,9 @@ mod tests {
         m.on_life(0, 1, 1);
         m.on_life(0, 2, 1);
         m.on_belief(60_000, (1, 2), (1, Status::Down), &BOUNDS, Some(55_000));
-        assert_eq!(m.false_downs, 0);
+        assert!(m.false_downs.is_empty());
         m.on_belief(60_000, (1, 2), (1, Status::Down), &BOUNDS, Some(10_000));
-        assert_eq!(m.false_downs, 1);
+        assert_eq!(m.false_downs, [(60_000, 1, 2)]);
     }
 
     #[test]

@@ -36,8 +36,8 @@ pub struct Outcome {
     pub detect_ms: Vec<u64>,
     /// What became of the sections of the dead.
     pub takeovers: Vec<Takeover>,
-    /// Living peers in reach that were declared Down.
-    pub false_downs: u64,
+    /// Living peers in reach that were declared Down: when, milliseconds, by whom, whom.
+    pub false_downs: Vec<(u64, u16, u16)>,
     /// Milliseconds all processes ran, together.
     pub peer_ms: u64,
     /// Bytes all peers transmitted.
@@ -100,7 +100,7 @@ impl Swarm {
             end_ms: self.now_ms,
             detect_ms: std::mem::take(&mut self.checker.members.detect_ms),
             takeovers,
-            false_downs: self.checker.members.false_downs,
+            false_downs: std::mem::take(&mut self.checker.members.false_downs),
             peer_ms: self.slots.iter().map(|s| s.ran_ms(self.now_ms)).sum(),
             bytes: self.air.bytes(),
             kills: self.kills,
