@@ -162,7 +162,13 @@ impl Section {
 
     /// Notes a register of another peer, unless an equally new one is known.
     /// Returns whether it was newer.
-    pub fn hear(&mut self, author: u16, incarnation: Incarnation, seq: u32, register: Register) -> bool {
+    pub fn hear(
+        &mut self,
+        author: u16,
+        incarnation: Incarnation,
+        seq: u32,
+        register: Register,
+    ) -> bool {
         if author == self.me {
             return false;
         }
@@ -177,7 +183,15 @@ impl Section {
                 listed.insert(c);
             }
         }
-        self.heard.insert(author, Heard { incarnation, seq, register, listed });
+        self.heard.insert(
+            author,
+            Heard {
+                incarnation,
+                seq,
+                register,
+                listed,
+            },
+        );
         true
     }
 
@@ -242,10 +256,24 @@ impl Section {
     /// one would yield in turn to what that other said before. Nothing changes yet:
     /// the plan must be durable before it is flown, see [`Section::install`].
     #[must_use]
-    pub fn adopted(&self, epoch: Epoch, commits: &[(u16, bool)], section: &[(u16, bool)]) -> Vec<PlanCell> {
-        let stamp = Stamp { epoch, take: 0, id: self.me };
+    pub fn adopted(
+        &self,
+        epoch: Epoch,
+        commits: &[(u16, bool)],
+        section: &[(u16, bool)],
+    ) -> Vec<PlanCell> {
+        let stamp = Stamp {
+            epoch,
+            take: 0,
+            id: self.me,
+        };
         let planned = self.plan.iter().map(|p| (p.cell, p.stamp));
-        let listed: BTreeMap<u16, Stamp> = self.held.iter().map(|(c, s)| (*c, *s)).chain(planned).collect();
+        let listed: BTreeMap<u16, Stamp> = self
+            .held
+            .iter()
+            .map(|(c, s)| (*c, *s))
+            .chain(planned)
+            .collect();
         let mut seen = self.union.clone();
         let mut plan = Vec::new();
         for (list, committed) in [(commits, true), (section, false)] {
@@ -253,7 +281,12 @@ impl Section {
                 if cell < self.cells && !seen.contains(cell) {
                     seen.insert(cell);
                     let stamp = listed.get(&cell).map_or(stamp, |s| stamp.max(*s));
-                    plan.push(PlanCell { cell, backward, committed, stamp });
+                    plan.push(PlanCell {
+                        cell,
+                        backward,
+                        committed,
+                        stamp,
+                    });
                 }
             }
         }
@@ -279,7 +312,11 @@ impl Section {
             }
         }
         self.held.retain(|c, _| !kept.contains(*c));
-        self.plan = plan.iter().filter(|p| !self.union.contains(p.cell)).copied().collect();
+        self.plan = plan
+            .iter()
+            .filter(|p| !self.union.contains(p.cell))
+            .copied()
+            .collect();
         self.epoch = epoch;
         self.done = CellSet::new(self.cells);
         self.trim();
@@ -287,7 +324,12 @@ impl Section {
     }
 
     /// Rules *adopt* and install in one step, for when nothing can come in between.
-    pub fn adopt(&mut self, epoch: Epoch, commits: &[(u16, bool)], section: &[(u16, bool)]) -> bool {
+    pub fn adopt(
+        &mut self,
+        epoch: Epoch,
+        commits: &[(u16, bool)],
+        section: &[(u16, bool)],
+    ) -> bool {
         let plan = self.adopted(epoch, commits, section);
         self.install(epoch, &plan)
     }
@@ -303,7 +345,11 @@ impl Section {
             if cell >= self.cells || self.union.contains(cell) || planned {
                 continue;
             }
-            let mut top = Stamp { epoch: self.epoch, take: 0, id: self.me };
+            let mut top = Stamp {
+                epoch: self.epoch,
+                take: 0,
+                id: self.me,
+            };
             for h in self.heard.values() {
                 for l in h.register.plan.iter().chain(&h.register.held) {
                     if cells_of(l.run, self.cells).any(|c| c == cell) {
@@ -314,8 +360,17 @@ impl Section {
             if let Some(s) = self.held.get(&cell) {
                 top = top.max(*s);
             }
-            let stamp = Stamp { epoch: top.epoch, take: top.take.saturating_add(1), id: self.me };
-            out.push(PlanCell { cell, backward, committed: false, stamp });
+            let stamp = Stamp {
+                epoch: top.epoch,
+                take: top.take.saturating_add(1),
+                id: self.me,
+            };
+            out.push(PlanCell {
+                cell,
+                backward,
+                committed: false,
+                stamp,
+            });
         }
         out
     }
@@ -349,9 +404,21 @@ impl Section {
 
     /// The register as it would be with another plan: what is made durable first.
     #[must_use]
-    pub fn register_with(&self, epoch: Epoch, plan: &[PlanCell], revision: u32, loop_hash: u64) -> Register {
+    pub fn register_with(
+        &self,
+        epoch: Epoch,
+        plan: &[PlanCell],
+        revision: u32,
+        loop_hash: u64,
+    ) -> Register {
         let plan = self.pack(plan, MAX_PLAN_RUNS).0;
-        Register { revision, loop_hash, epoch, plan, ..Register::default() }
+        Register {
+            revision,
+            loop_hash,
+            epoch,
+            plan,
+            ..Register::default()
+        }
     }
 
     /// Rule *expire*: nobody took over what was given away; it becomes orphaned.
@@ -395,7 +462,12 @@ impl Section {
         let held: Vec<PlanCell> = self
             .held
             .iter()
-            .map(|(c, s)| PlanCell { cell: *c, backward: false, committed: false, stamp: *s })
+            .map(|(c, s)| PlanCell {
+                cell: *c,
+                backward: false,
+                committed: false,
+                stamp: *s,
+            })
             .collect();
         let mut done: Vec<Run> = self.done.runs();
         done.truncate(MAX_DONE_RUNS);
@@ -417,7 +489,12 @@ impl Section {
         let held: Vec<PlanCell> = self
             .held
             .iter()
-            .map(|(c, s)| PlanCell { cell: *c, backward: false, committed: false, stamp: *s })
+            .map(|(c, s)| PlanCell {
+                cell: *c,
+                backward: false,
+                committed: false,
+                stamp: *s,
+            })
             .collect();
         let fits = self.pack(&held, MAX_HELD_RUNS).1;
         for p in held.iter().skip(fits) {
@@ -445,17 +522,27 @@ impl Section {
 
     /// The length of the run `first, count` after `next` joins it, if it can.
     fn reach(&self, first: &PlanCell, count: u16, next: &PlanCell) -> Option<u16> {
-        if (first.backward, first.committed, first.stamp) != (next.backward, next.committed, next.stamp) {
+        if (first.backward, first.committed, first.stamp)
+            != (next.backward, next.committed, next.stamp)
+        {
             return None;
         }
         let n = self.cells;
         let step = |from: u16, to: u16| if to >= from { to - from } else { n - from + to };
-        let offset = if first.backward { step(next.cell, first.cell) } else { step(first.cell, next.cell) };
+        let offset = if first.backward {
+            step(next.cell, first.cell)
+        } else {
+            step(first.cell, next.cell)
+        };
         if offset < count {
             return None;
         }
         let bridged = (count..offset).all(|k| {
-            let c = if first.backward { step(k, first.cell) } else { (first.cell + k) % n };
+            let c = if first.backward {
+                step(k, first.cell)
+            } else {
+                (first.cell + k) % n
+            };
             self.union.contains(c)
         });
         bridged.then_some(offset + 1)
@@ -463,11 +550,22 @@ impl Section {
 
     fn listing(&self, (first, count): &(PlanCell, u16)) -> Listing {
         let n = self.cells;
-        let start = if first.backward { (first.cell + n - (count - 1) % n) % n } else { first.cell };
+        let start = if first.backward {
+            (first.cell + n - (count - 1) % n) % n
+        } else {
+            first.cell
+        };
         Listing {
-            run: Run { first: start, count: *count },
+            run: Run {
+                first: start,
+                count: *count,
+            },
             backward: first.backward,
-            firmness: if first.committed { Firmness::Committed } else { Firmness::Tentative },
+            firmness: if first.committed {
+                Firmness::Committed
+            } else {
+                Firmness::Tentative
+            },
             stamp: first.stamp,
         }
     }
@@ -476,9 +574,8 @@ impl Section {
 /// The cells of a run on a loop of `n`, in forward order.
 pub fn cells_of(run: Run, n: u16) -> impl Iterator<Item = u16> {
     let n32 = u32::from(n.max(1));
-    (0..u32::from(run.count.min(n))).map(move |k| {
-        u16::try_from((u32::from(run.first) + k) % n32).unwrap_or(0)
-    })
+    (0..u32::from(run.count.min(n)))
+        .map(move |k| u16::try_from((u32::from(run.first) + k) % n32).unwrap_or(0))
 }
 
 /// The cells of listings in order of flight.
@@ -505,7 +602,11 @@ mod tests {
     use super::*;
 
     fn stamp(counter: u32, take: u16, id: u16) -> Stamp {
-        Stamp { epoch: Epoch { counter, hash: 0 }, take, id }
+        Stamp {
+            epoch: Epoch { counter, hash: 0 },
+            take,
+            id,
+        }
     }
 
     fn register(plan: &[(u16, u16, Stamp)]) -> Register {
@@ -513,7 +614,10 @@ mod tests {
             plan: plan
                 .iter()
                 .map(|(first, count, stamp)| Listing {
-                    run: Run { first: *first, count: *count },
+                    run: Run {
+                        first: *first,
+                        count: *count,
+                    },
                     backward: false,
                     firmness: Firmness::Tentative,
                     stamp: *stamp,
@@ -534,7 +638,14 @@ mod tests {
     #[test]
     fn a_planned_cell_yields_to_a_higher_stamp_of_a_live_peer_only() {
         let mut s = section(1);
-        s.adopt(Epoch { counter: 1, hash: 0 }, &[], &forward(&[2, 3, 4]));
+        s.adopt(
+            Epoch {
+                counter: 1,
+                hash: 0,
+            },
+            &[],
+            &forward(&[2, 3, 4]),
+        );
         s.hear(2, 1, 1, register(&[(4, 2, stamp(2, 0, 2))]));
         assert!(!s.settle(&Live::new()), "a dead register takes nothing");
         assert!(s.settle(&Live::from([(2, 1)])));
@@ -544,7 +655,10 @@ mod tests {
 
     #[test]
     fn of_two_equal_listings_exactly_one_yields() {
-        let e = Epoch { counter: 3, hash: 9 };
+        let e = Epoch {
+            counter: 3,
+            hash: 9,
+        };
         let (mut a, mut b) = (section(1), section(2));
         a.adopt(e, &[], &forward(&[5]));
         b.adopt(e, &[], &forward(&[5]));
@@ -560,8 +674,22 @@ mod tests {
     #[test]
     fn what_is_given_away_is_held_until_somebody_lists_it() {
         let mut s = section(1);
-        s.adopt(Epoch { counter: 1, hash: 0 }, &[], &forward(&[0, 1, 2, 3]));
-        s.adopt(Epoch { counter: 2, hash: 0 }, &forward(&[0]), &forward(&[1]));
+        s.adopt(
+            Epoch {
+                counter: 1,
+                hash: 0,
+            },
+            &[],
+            &forward(&[0, 1, 2, 3]),
+        );
+        s.adopt(
+            Epoch {
+                counter: 2,
+                hash: 0,
+            },
+            &forward(&[0]),
+            &forward(&[1]),
+        );
         assert_eq!(s.held().keys().copied().collect::<Vec<_>>(), [2, 3]);
         let live = Live::from([(2, 1)]);
         assert!(!s.orphans(&live).contains(2));
@@ -578,9 +706,22 @@ mod tests {
         s.hear(2, 1, 1, register(&[(7, 1, stamp(2, 0, 2))]));
         s.take(&[(7, false)]);
         // Peer 2 yields to this take; then a division that was decided before ends.
-        s.adopt(Epoch { counter: 1, hash: 0 }, &[], &forward(&[6, 7]));
-        assert_eq!(s.plan().iter().map(|p| p.stamp).collect::<Vec<_>>(), [stamp(1, 0, 1), stamp(2, 1, 1)]);
-        assert!(!s.settle(&Live::from([(2, 1)])), "what peer 2 said before it yielded takes nothing back");
+        s.adopt(
+            Epoch {
+                counter: 1,
+                hash: 0,
+            },
+            &[],
+            &forward(&[6, 7]),
+        );
+        assert_eq!(
+            s.plan().iter().map(|p| p.stamp).collect::<Vec<_>>(),
+            [stamp(1, 0, 1), stamp(2, 1, 1)]
+        );
+        assert!(
+            !s.settle(&Live::from([(2, 1)])),
+            "what peer 2 said before it yielded takes nothing back"
+        );
     }
 
     #[test]
@@ -594,8 +735,22 @@ mod tests {
     #[test]
     fn covered_cells_leave_plan_and_held() {
         let mut s = section(1);
-        s.adopt(Epoch { counter: 1, hash: 0 }, &[], &forward(&[0, 1, 2]));
-        s.adopt(Epoch { counter: 2, hash: 0 }, &[], &forward(&[0]));
+        s.adopt(
+            Epoch {
+                counter: 1,
+                hash: 0,
+            },
+            &[],
+            &forward(&[0, 1, 2]),
+        );
+        s.adopt(
+            Epoch {
+                counter: 2,
+                hash: 0,
+            },
+            &[],
+            &forward(&[0]),
+        );
         let mut c = CellSet::new(10);
         c.insert(0);
         c.insert(1);
@@ -608,11 +763,28 @@ mod tests {
     #[test]
     fn packing_and_unpacking_keep_order_and_direction() {
         let mut s = section(1);
-        let cells = [(8, false), (9, false), (0, false), (4, true), (3, true), (6, false)];
-        s.adopt(Epoch { counter: 1, hash: 0 }, &[], &cells);
+        let cells = [
+            (8, false),
+            (9, false),
+            (0, false),
+            (4, true),
+            (3, true),
+            (6, false),
+        ];
+        s.adopt(
+            Epoch {
+                counter: 1,
+                hash: 0,
+            },
+            &[],
+            &cells,
+        );
         let r = s.register(1, 1, 0);
         assert_eq!(r.plan.len(), 3);
-        let back: Vec<(u16, bool)> = unpack(&r.plan, 10).iter().map(|p| (p.cell, p.backward)).collect();
+        let back: Vec<(u16, bool)> = unpack(&r.plan, 10)
+            .iter()
+            .map(|p| (p.cell, p.backward))
+            .collect();
         assert_eq!(back, cells);
     }
 
@@ -621,9 +793,19 @@ mod tests {
         let n = 200;
         let mut s = Section::new(1, n, CellSet::new(n));
         let scattered: Vec<(u16, bool)> = (0..n).step_by(2).map(|c| (c, false)).collect();
-        s.adopt(Epoch { counter: 1, hash: 0 }, &[], &scattered);
+        s.adopt(
+            Epoch {
+                counter: 1,
+                hash: 0,
+            },
+            &[],
+            &scattered,
+        );
         assert_eq!(s.plan().len(), MAX_PLAN_RUNS);
-        let listed: Vec<u16> = unpack(&s.register(1, 1, 0).plan, n).iter().map(|p| p.cell).collect();
+        let listed: Vec<u16> = unpack(&s.register(1, 1, 0).plan, n)
+            .iter()
+            .map(|p| p.cell)
+            .collect();
         assert_eq!(listed, s.plan().iter().map(|p| p.cell).collect::<Vec<_>>());
     }
 }
