@@ -69,6 +69,9 @@ fn hear_beacon(peer: &mut Peer, record: &Record, beacon: &Beacon) {
     for g in &beacon.gossip {
         if g.id == peer.config.id.0 {
             boot::heard_of_myself(peer, g.incarnation, g.heartbeat);
+            if g.suspected_ds.is_some() && g.incarnation == peer.boot.incarnation {
+                voice::refute(peer);
+            }
         }
     }
     peer.relay.on_beacon(now, record.author, beacon);

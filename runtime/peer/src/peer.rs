@@ -2,10 +2,10 @@
 //!
 //! | what happens | who decides |
 //! |---|---|
-//! | life, probation, silence | [`crate::boot`] |
-//! | records heard | [`crate::ear`] |
-//! | records spoken | [`crate::voice`] |
-//! | mission, goal, sections | [`crate::cooperation`] |
+//! | life, probation, silence | `boot` |
+//! | records heard | `ear` |
+//! | records spoken | `voice` |
+//! | mission, goal, sections | `cooperation` |
 
 use crate::config::{PeerConfig, Role};
 use crate::cooperation::Crew;

@@ -2,7 +2,7 @@
 //!
 //! | record | when |
 //! |---|---|
-//! | beacon | every T, ±10 % |
+//! | beacon | every T, ±10 %; at once when this peer hears that it is suspected |
 //! | claim | at once when a section was adopted or taken, within T when it shrank by a rule; every 10 T for its ETA |
 //! | cover | own or heard coverage is news, at most every 2 T |
 //! | state | every 5 T |
@@ -41,6 +41,7 @@ pub(crate) struct Voice {
     pub heartbeat: u32,
     pub seq: u32,
     pub next_beacon: Time,
+    last_beacon: Time,
     pub claim_changed: bool,
     pub cover_changed: bool,
     pub cover_wanted: bool,
@@ -269,6 +270,16 @@ fn e4(rad: f64) -> i32 {
     (rad * 10_000.0).round() as i32
 }
 
+/// Somebody suspects this peer: it says at once that it lives, but not more often
+/// than three times a period, or suspicion would jam the channel that it is about.
+pub(crate) fn refute(peer: &mut Peer) {
+    let t = peer.period_ms();
+    let spread = u64::from(peer.rng.next_u32()) % (t / 8 + 1);
+    let soonest = peer.voice.last_beacon.plus_ms(t / 3);
+    let at = peer.now.plus_ms(spread).max(soonest);
+    peer.voice.next_beacon = peer.voice.next_beacon.min(at);
+}
+
 /// "I am here", with gossip.
 pub(crate) fn beacon(peer: &mut Peer) {
     let t = peer.period_ms();
@@ -278,6 +289,7 @@ pub(crate) fn beacon(peer: &mut Peer) {
         return;
     }
     peer.voice.heartbeat = peer.voice.heartbeat.saturating_add(1);
+    peer.voice.last_beacon = peer.now;
     let mut gossip = peer.membership.gossip(peer.now, MAX_GOSSIP);
     for g in &mut gossip {
         (g.max_seq, g.digest) = peer.relay.version(g.id, g.incarnation);
