@@ -47,9 +47,11 @@ pub(crate) struct Crew {
     exhausted: bool,
     unsaved_cells: u16,
     return_ms: u32,
-    /// Divisions that are being made durable; only the last of them is installed,
-    /// for it is the one that the journal ends with.
-    adopting: u16,
+    /// Counts the sections handed to the journal; only the last of them may be
+    /// installed, for it is the one that the journal ends with.
+    written: u64,
+    /// The last of them whose answer came.
+    answered: u64,
 }
 
 impl Crew {
@@ -207,7 +209,8 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
         exhausted: false,
         unsaved_cells: 0,
         return_ms,
-        adopting: 0,
+        written: 0,
+        answered: 0,
     });
     peer.report(Report::Ready {
         revision: ground.mission.revision,
@@ -440,7 +443,7 @@ fn on_want(peer: &mut Peer, want: Want) {
             let Some(crew) = &mut peer.crew else {
                 return;
             };
-            if crew.adopting > 0 {
+            if crew.answered < crew.written {
                 crew.negotiation.take(&[]);
                 return;
             }
@@ -454,10 +457,10 @@ fn on_want(peer: &mut Peer, want: Want) {
             }
             let register =
                 section.register_with(section.epoch(), &plan, crew.revision(), crew.loop_hash());
-            if !peer.store(Promise::Take(taken), Entry::Section(register))
-                && let Some(crew) = &mut peer.crew
-            {
-                crew.negotiation.take(&[]);
+            crew.written += 1;
+            let promise = Promise::Take(crew.written, taken);
+            if !peer.store(promise.clone(), Entry::Section(register)) {
+                broken(peer, &promise);
             }
         }
         Want::Changed => changed(peer),
@@ -542,22 +545,22 @@ pub(crate) fn divided(peer: &mut Peer, epoch: Epoch, division: &Division) {
         crew.revision(),
         crew.loop_hash(),
     );
-    if peer.store(Promise::Adopt(Box::new(adoption)), Entry::Section(register))
-        && let Some(crew) = &mut peer.crew
-    {
-        crew.adopting = crew.adopting.saturating_add(1);
+    crew.written += 1;
+    let promise = Promise::Adopt(crew.written, Box::new(adoption));
+    if !peer.store(promise.clone(), Entry::Section(register)) {
+        broken(peer, &promise);
     }
 }
 
 /// The division is durable: it is flown from now on.
-pub(crate) fn adopt(peer: &mut Peer, adoption: &Adoption) {
+pub(crate) fn adopt(peer: &mut Peer, written: u64, adoption: &Adoption) {
     let now = peer.now;
     let percept = peer.percept;
     let Some(crew) = &mut peer.crew else {
         return;
     };
-    crew.adopting = crew.adopting.saturating_sub(1);
-    if crew.adopting > 0 {
+    crew.answered = crew.answered.max(written);
+    if written < crew.written {
         return;
     }
     crew.negotiation.adopt(now, adoption);
@@ -573,12 +576,13 @@ pub(crate) fn adopt(peer: &mut Peer, adoption: &Adoption) {
 }
 
 /// Cells taken without a round are durable: they are flown from now on.
-pub(crate) fn take(peer: &mut Peer, taken: &[PlanCell]) {
+pub(crate) fn take(peer: &mut Peer, written: u64, taken: &[PlanCell]) {
     let percept = peer.percept;
     let Some(crew) = &mut peer.crew else {
         return;
     };
-    if crew.adopting > 0 {
+    crew.answered = crew.answered.max(written);
+    if written < crew.written {
         crew.negotiation.take(&[]);
         return;
     }
@@ -592,10 +596,11 @@ pub(crate) fn take(peer: &mut Peer, taken: &[PlanCell]) {
 /// A promise could not be made durable, so what it was for does not happen.
 pub(crate) fn broken(peer: &mut Peer, promise: &Promise) {
     match (&mut peer.crew, promise) {
-        (Some(crew), Promise::Take(_)) => {
+        (Some(crew), Promise::Take(written, _)) => {
+            crew.answered = crew.answered.max(*written);
             crew.negotiation.take(&[]);
         }
-        (Some(crew), Promise::Adopt(_)) => crew.adopting = crew.adopting.saturating_sub(1),
+        (Some(crew), Promise::Adopt(written, _)) => crew.answered = crew.answered.max(*written),
         _ => {}
     }
 }

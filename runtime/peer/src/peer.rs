@@ -43,10 +43,10 @@ pub(crate) enum Promise {
     Life(Incarnation),
     /// A bid.
     Bid(Box<crate::wire::message::Snapshot>),
-    /// An adoption.
-    Adopt(Box<crate::coverage::negotiation::Adoption>),
-    /// Cells taken without a round.
-    Take(Vec<PlanCell>),
+    /// An adoption, and which of the sections written it is.
+    Adopt(u64, Box<crate::coverage::negotiation::Adoption>),
+    /// Cells taken without a round, likewise.
+    Take(u64, Vec<PlanCell>),
     /// Coverage; nothing waits for it.
     Union,
 }
@@ -217,8 +217,8 @@ impl Peer {
         match promise {
             Promise::Life(incarnation) => boot::lives(self, incarnation),
             Promise::Bid(snapshot) => cooperation::bid_is_durable(self, *snapshot),
-            Promise::Adopt(adoption) => cooperation::adopt(self, &adoption),
-            Promise::Take(cells) => cooperation::take(self, &cells),
+            Promise::Adopt(written, adoption) => cooperation::adopt(self, written, &adoption),
+            Promise::Take(written, cells) => cooperation::take(self, written, &cells),
             Promise::Union => {}
         }
     }
