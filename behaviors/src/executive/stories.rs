@@ -191,7 +191,10 @@ fn one_uav_sees_the_whole_loop_in_either_direction() {
         story.until_done(foretold_s + 60);
         assert!(story.open.iter().all(|o| !o));
         assert_eq!(story.told, [Event::PlanDone]);
-        assert!(story.wing.time_ms / 1000 + 10 > foretold_s, "{foretold_s}");
+        // It is never late; cells seen in passing make it early, for their excursions
+        // are not flown.
+        let flown_s = story.wing.time_ms / 1000;
+        assert!(flown_s * 10 > foretold_s * 6, "{flown_s} {foretold_s}");
         assert!(
             story.least_distance_m() > CLEARANCE_M - 0.3,
             "{}",
@@ -209,7 +212,7 @@ fn one_uav_sees_the_whole_loop_in_either_direction() {
 
 #[test]
 fn a_flight_that_is_set_up_once_is_on_time_to_the_second() {
-    let mut story = Story::new(10, 8, block(), outside());
+    let mut story = Story::new(10, 8, vec![], outside());
     story.step(200);
     let legs = [(0, 30, Forward), (70, 8, Backward)];
     let foretold_ms = u64::from(story.leg_time_ms(&legs));
@@ -368,7 +371,8 @@ fn forecasts_come_true() {
         story.step(200);
         let f = story.forecast(window_ms);
         assert_eq!(f.heading, Forward);
-        assert!(f.release_ms <= window_ms.max(4_000), "{f:?}");
+        // The cell under way is finished, and an excursion takes up to 15 s.
+        assert!(f.release_ms <= window_ms + 15_000, "{f:?}");
         let mut later = Story {
             executive: story.executive.clone(),
             wing: story.wing.clone(),
@@ -400,7 +404,8 @@ fn it_arrives_at_a_point_once_and_stays_there() {
     let goal = Point::new(420.0, 330.0);
     story.step(200);
     story.executive.set_goal(Goal::Point(goal), &|_| false);
-    story.until(&[200], 0, 120, |e| *e == Event::Arrived);
+    // A block stands in the way, so it may have to follow the loop for a while.
+    story.until(&[200], 0, 600, |e| *e == Event::Arrived);
     for _ in 0..300 {
         story.step(200);
         story.executive.set_goal(Goal::Point(goal), &|_| false);

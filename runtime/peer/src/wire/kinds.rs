@@ -328,6 +328,6 @@ mod tests {
     fn the_table_has_a_line_a_kind() {
         let table = docs_table();
         assert_eq!(table.lines().count(), Kind::ALL.len() + 2);
-        assert!(table.contains("| 4 | `cover` | 1 | 1024 | Telemetry | 2 T | no |"));
+        assert!(table.contains("| 4 | `cover` | 1 | 1024 | Beacon | 4 T | no |"));
     }
 }
