@@ -96,7 +96,8 @@ pub struct Division {
 ///
 /// # Guarantees
 /// The makespan is the least possible for that shape of plan, in integer
-/// milliseconds. With too little endurance, the plan that serves the most cells.
+/// milliseconds. With too little endurance each robot in turn takes what it can, and
+/// the rest is listed: sound, but not proven to serve the most cells.
 /// Each open cell is in exactly one section or in `unassigned`.
 ///
 /// # Complexity
