@@ -459,16 +459,7 @@ impl Section {
     /// The register to be published.
     #[must_use]
     pub fn register(&self, revision: u32, loop_hash: u64, eta_ms: u32) -> Register {
-        let held: Vec<PlanCell> = self
-            .held
-            .iter()
-            .map(|(c, s)| PlanCell {
-                cell: *c,
-                backward: false,
-                committed: false,
-                stamp: *s,
-            })
-            .collect();
+        let held = self.held_cells();
         let mut done: Vec<Run> = self.done.runs();
         done.truncate(MAX_DONE_RUNS);
         Register {
@@ -482,12 +473,9 @@ impl Section {
         }
     }
 
-    /// What does not fit into a register is not flown: it would be a secret.
-    fn trim(&mut self) {
-        let fits = self.pack(&self.plan, MAX_PLAN_RUNS).1;
-        self.plan.truncate(fits);
-        let held: Vec<PlanCell> = self
-            .held
+    /// Held cells, ascending, in the form in which runs are packed.
+    fn held_cells(&self) -> Vec<PlanCell> {
+        self.held
             .iter()
             .map(|(c, s)| PlanCell {
                 cell: *c,
@@ -495,7 +483,14 @@ impl Section {
                 committed: false,
                 stamp: *s,
             })
-            .collect();
+            .collect()
+    }
+
+    /// What does not fit into a register is not flown: it would be a secret.
+    fn trim(&mut self) {
+        let fits = self.pack(&self.plan, MAX_PLAN_RUNS).1;
+        self.plan.truncate(fits);
+        let held = self.held_cells();
         let fits = self.pack(&held, MAX_HELD_RUNS).1;
         for p in held.iter().skip(fits) {
             self.held.remove(&p.cell);
