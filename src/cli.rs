@@ -8,6 +8,7 @@ use crate::sim::SimArgs;
 use crate::trial::TrialArgs;
 use crate::{chaos, check, exit, observe, peer, sim, trial};
 use clap::{Parser, Subcommand};
+use skein_workbench::bench::BenchArgs;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
@@ -42,6 +43,8 @@ pub enum Verb {
     Observe(ObserveArgs),
     /// Checks a scenario before it is flown.
     Check(CheckArgs),
+    /// Measures a planner and prints one JSON object.
+    Bench(BenchArgs),
     /// Outlives a trial and ends what it leaves behind.
     #[command(name = skein_broker::process::GUARD_COMMAND, hide = true)]
     Guard,
@@ -70,6 +73,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Chaos(args) => chaos::run(args),
         Verb::Observe(args) => observe::run(args),
         Verb::Check(args) => check::run(args),
+        Verb::Bench(args) => Ok(exit::print(skein_workbench::bench::run(args))),
         Verb::Guard => {
             skein_broker::process::guard();
             Ok(ExitCode::from(exit::OK))

@@ -12,3 +12,17 @@ pub const CONFIG_INVALID: u8 = 3;
 pub const NO_PEERS: u8 = 4;
 /// A defect of the program itself.
 pub const INTERNAL: u8 = 5;
+
+/// Prints what a verb found out, or on stderr the place that is wrong.
+pub fn print(answer: anyhow::Result<String>) -> std::process::ExitCode {
+    match answer {
+        Ok(text) => {
+            println!("{text}");
+            std::process::ExitCode::from(OK)
+        }
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            std::process::ExitCode::from(CONFIG_INVALID)
+        }
+    }
+}

@@ -55,6 +55,11 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
         &["tokio", "zenoh", "skein-node"],
     ),
     (
+        "skein-workbench",
+        &["skein-planning", "skein-interop"],
+        &["tokio", "zenoh", "skein-netsim"],
+    ),
+    (
         "skein-node",
         &["skein-link", "skein-peer", "skein-behaviors"],
         &["skein-netsim", "skein-scenario"],

@@ -1,7 +1,10 @@
 //! Optimal division of a coverage loop among UAVs: backtracking MSTC (D2.7 §3.6.5,
 //! algorithm 7, after Hazon & Kaminka), generalised to what a swarm needs after a
 //! failure: covered gaps, release times, turn-round cost, mixed speeds, endurance.
+//!
+//! Left to `shares`: which cells are served when not all can be.
 
+use super::shares::Shares;
 use super::stc::Direction;
 use serde::{Deserialize, Serialize};
 
@@ -96,16 +99,24 @@ pub struct Division {
 ///
 /// # Guarantees
 /// The makespan is the least possible for that shape of plan, in integer
-/// milliseconds. With too little endurance each robot in turn takes what it can, and
-/// the rest is listed: sound, but not proven to serve the most cells.
-/// Each open cell is in exactly one section or in `unassigned`.
+/// milliseconds. With too little endurance, the plan that serves the most cells.
+/// Each open cell is in exactly one section or in `unassigned`. A robot with nothing
+/// to do has no legs and finishes at 0. An anchor beyond the ring is taken modulo its
+/// length; cells beyond the 65,535th are ignored.
 ///
 /// # Complexity
 /// O(k log N) for each tried makespan, times log of the makespan; measured sweeps
-/// round the ring are few.
+/// round the ring are few. With too little endurance O(N g) for each, g the smallest
+/// gap between two anchors.
 #[must_use]
 pub fn divide(ring: &[RingCell], robots: &[Robot]) -> Division {
+    // Boundaries are numbered by `u16`, and a ring is cyclic.
+    let ring = &ring[..ring.len().min(usize::from(u16::MAX))];
+    let n = u16::try_from(ring.len()).unwrap_or(u16::MAX);
     let mut order: Vec<Robot> = robots.to_vec();
+    for r in &mut order {
+        r.anchor %= n.max(1);
+    }
     order.sort_unstable_by_key(|r| (r.anchor, r.id));
     let solver = Solver::new(ring, &order);
     let (extents, unassigned) = solver.solve();
@@ -136,9 +147,9 @@ pub fn divide(ring: &[RingCell], robots: &[Robot]) -> Division {
 }
 
 /// The ring unrolled three times, with prefix sums of what is flown.
-struct Solver<'a> {
-    ring: &'a [RingCell],
-    robots: &'a [Robot],
+pub(super) struct Solver<'a> {
+    pub ring: &'a [RingCell],
+    pub robots: &'a [Robot],
     serve_mm: Vec<u64>,
     travel_mm: Vec<u64>,
     /// Cells from a place back to the last open one before it, by place.
@@ -176,7 +187,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Cells between this robot's anchor and the next one's.
-    fn gap(&self, i: usize) -> usize {
+    pub fn gap(&self, i: usize) -> usize {
         let n = self.ring.len();
         let k = self.robots.len();
         let (a, b) = (
@@ -235,13 +246,13 @@ impl<'a> Solver<'a> {
         }
     }
 
-    fn fits(&self, i: usize, left: usize, right: usize, limit_ms: u64) -> bool {
+    pub fn fits(&self, i: usize, left: usize, right: usize, limit_ms: u64) -> bool {
         let r = &self.robots[i];
         let t = self.time_ms(i, left, right).0;
         t == 0 || (t <= u64::from(r.endurance_ms) && t + u64::from(r.release_ms) <= limit_ms)
     }
 
-    fn most(&self, cap: usize, fits: impl Fn(usize) -> bool) -> usize {
+    pub fn most(&self, cap: usize, fits: impl Fn(usize) -> bool) -> usize {
         let (mut good, mut bad) = (0, cap + 1);
         while bad - good > 1 {
             let middle = good.midpoint(bad);
@@ -315,21 +326,25 @@ impl<'a> Solver<'a> {
         (self.feasible(good).unwrap_or_default(), Vec::new())
     }
 
-    /// Too little endurance: each robot in turn takes what it can of what is left.
+    /// Too little endurance: the extents that serve the most cells, in the least time
+    /// in which so many can be served, and the cells that nobody serves.
     fn most_cells(&self, open: &[u16]) -> (Vec<(usize, usize)>, Vec<u16>) {
-        let k = self.robots.len();
+        let longest = |r: &Robot| u64::from(r.release_ms) + u64::from(r.endurance_ms);
+        let (mut bad, mut good) = (0, self.robots.iter().map(longest).max().unwrap_or(0));
+        let most = Shares::new(self, good).best().0;
+        while good - bad > 1 {
+            let middle = good.midpoint(bad);
+            if Shares::new(self, middle).best().0 == most {
+                good = middle;
+            } else {
+                bad = middle;
+            }
+        }
+        let extents = Shares::new(self, good).best().1;
         let n = self.ring.len();
-        let mut extents: Vec<(usize, usize)> = Vec::new();
         let mut served = vec![false; n];
-        let mut left_over = 0;
-        for i in 0..k {
-            let gap = self.gap(i);
-            let left = self.most(left_over, |x| self.fits(i, x, 0, u64::MAX >> 1));
-            let cap = if k == 1 { gap - left } else { gap };
-            let right = self.most(cap, |x| self.fits(i, left, x, u64::MAX >> 1));
-            extents.push((left, right));
-            left_over = gap - right;
-            let at = n + usize::from(self.robots[i].anchor);
+        for (robot, (left, right)) in self.robots.iter().zip(&extents) {
+            let at = n + usize::from(robot.anchor);
             for c in at - left..at + right {
                 served[c % n] = true;
             }
@@ -585,5 +600,90 @@ mod tests {
                 prop_assert_eq!(u64::from(d.makespan_ms), best, "{:?}", d);
             }
         }
+
+        #[test]
+        fn with_too_little_endurance_no_plan_serves_more_or_as_many_sooner(
+            (ring, robots) in cells().prop_flat_map(|r| {
+                let n = u16::try_from(r.len()).unwrap();
+                (Just(r), robots(n, 0..14))
+            })
+        ) {
+            let d = divide(&ring, &robots);
+            assert_sound(&ring, &robots, &d);
+            let open = ring.iter().filter(|c| c.open).count();
+            let (most, least_ms) = brute_most(&ring, &robots);
+            prop_assert_eq!(open - d.unassigned.len(), most, "{:?}", d);
+            prop_assert_eq!(u64::from(d.makespan_ms), least_ms, "{:?}", d);
+        }
+    }
+
+    /// The most cells that any shares serve, and the least makespan of those, by trying
+    /// every left and right share of every robot.
+    fn brute_most(ring: &[RingCell], robots: &[Robot]) -> (usize, u64) {
+        let mut order = robots.to_vec();
+        order.sort_unstable_by_key(|r| (r.anchor, r.id));
+        let (k, n) = (order.len(), ring.len());
+        let gap = |i: usize| {
+            let (a, b) = (order[i].anchor as usize, order[(i + 1) % k].anchor as usize);
+            if i + 1 == k { n - (a - b) } else { b - a }
+        };
+        let open = |r: &Robot, left: usize, right: usize| {
+            let at = n + usize::from(r.anchor);
+            (at - left..at + right).filter(|c| ring[c % n].open).count()
+        };
+        // One choice a gap: how much of it the robots on both sides take.
+        let choices: Vec<Vec<(usize, usize)>> = (0..k)
+            .map(|i| {
+                let all = (0..=gap(i)).flat_map(|x| (0..=gap(i) - x).map(move |y| (x, y)));
+                all.collect()
+            })
+            .collect();
+        let mut at = vec![0usize; k];
+        let mut best = (0, 0);
+        loop {
+            let shares = |i: usize| {
+                (
+                    choices[(i + k - 1) % k][at[(i + k - 1) % k]].1,
+                    choices[i][at[i]].0,
+                )
+            };
+            let mut total = Some((0, 0u64));
+            for (i, r) in order.iter().enumerate() {
+                let (left, right) = shares(i);
+                let t = flown(ring, r, left, right);
+                total = total
+                    .zip(t)
+                    .map(|((c, w), t)| (c + open(r, left, right), w.max(t)));
+            }
+            if let Some((c, w)) = total
+                && (c > best.0 || c == best.0 && w < best.1)
+            {
+                best = (c, w);
+            }
+            let Some(i) = (0..k).find(|i| at[*i] + 1 < choices[*i].len()) else {
+                return best;
+            };
+            at[i] += 1;
+            at[..i].fill(0);
+        }
+    }
+
+    #[test]
+    fn senseless_input_divides_into_something_without_a_panic() {
+        let far = Robot {
+            anchor: 60_000,
+            speed_mmps: 0,
+            ..robot(1, 0)
+        };
+        let late = Robot {
+            id: 2,
+            release_ms: u32::MAX,
+            ..far
+        };
+        assert_eq!(divide(&[], &[far]).makespan_ms, 0);
+        assert_eq!(divide(&ring(3), &[]).unassigned, vec![0, 1, 2]);
+        assert_sound(&ring(7), &[far, late], &divide(&ring(7), &[far, late]));
+        let d = divide(&ring(7), &[robot(0, 7 * 9 + 3), robot(1, 5)]);
+        assert!(d.unassigned.is_empty());
     }
 }

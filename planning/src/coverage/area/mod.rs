@@ -8,6 +8,7 @@ pub mod backtracking;
 mod blocks;
 mod excursion;
 pub mod grid;
+mod shares;
 pub mod stc;
 
 pub use grid::{CellId, Grid};

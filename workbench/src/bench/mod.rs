@@ -1,0 +1,31 @@
+//! `bench`: one planner, one set of instances, one JSON object with errors and times.
+
+pub mod dubins;
+pub mod figures;
+
+use clap::{Args, Subcommand};
+
+/// What to measure.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// The planner to measure.
+    #[command(subcommand)]
+    pub subject: Subject,
+}
+
+/// The planners.
+#[derive(Debug, Subcommand)]
+pub enum Subject {
+    /// Shortest Dubins curves to random goals.
+    Dubins(dubins::DubinsArgs),
+}
+
+/// Measures, and returns the JSON text to print.
+///
+/// # Errors
+/// When a file is missing or malformed; the error names the place.
+pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
+    match &args.subject {
+        Subject::Dubins(args) => dubins::run(args),
+    }
+}
