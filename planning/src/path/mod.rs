@@ -1,5 +1,7 @@
 //! The shortest flyable route from here to there with clearance (D2.7 §2.3).
 
+pub mod visibility;
+
 use crate::frame::{Point, Pose};
 use crate::geometry::NoFlyZones;
 use crate::math::{TAU, atan2};

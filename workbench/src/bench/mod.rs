@@ -2,6 +2,7 @@
 
 pub mod dubins;
 pub mod figures;
+pub mod route_polygons;
 
 use clap::{Args, Subcommand};
 
@@ -18,6 +19,8 @@ pub struct BenchArgs {
 pub enum Subject {
     /// Shortest Dubins curves to random goals.
     Dubins(dubins::DubinsArgs),
+    /// Shortest paths among polygons by the visibility graph.
+    RoutePolygons(route_polygons::RoutePolygonsArgs),
 }
 
 /// Measures, and returns the JSON text to print.
@@ -27,5 +30,6 @@ pub enum Subject {
 pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
     match &args.subject {
         Subject::Dubins(args) => dubins::run(args),
+        Subject::RoutePolygons(args) => route_polygons::run(args),
     }
 }
