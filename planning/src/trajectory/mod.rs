@@ -1,9 +1,10 @@
 //! From waypoints to curves a fixed wing can fly (D2.7 §2.4).
 //!
 //! [`curve`] holds lines and arcs joined tangentially; [`dubins`] the shortest
-//! such curve between two poses.
+//! such curve between two poses; [`wind`] the fastest in a constant wind.
 
 pub mod curve;
 pub mod dubins;
+pub mod wind;
 
 pub use curve::{Curve, Segment};

@@ -3,6 +3,7 @@
 pub mod dubins;
 pub mod figures;
 pub mod route_polygons;
+pub mod wind;
 
 use clap::{Args, Subcommand};
 
@@ -21,6 +22,8 @@ pub enum Subject {
     Dubins(dubins::DubinsArgs),
     /// Shortest paths among polygons by the visibility graph.
     RoutePolygons(route_polygons::RoutePolygonsArgs),
+    /// Fastest flights in a constant wind.
+    Wind(wind::WindArgs),
 }
 
 /// Measures, and returns the JSON text to print.
@@ -31,5 +34,6 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
     match &args.subject {
         Subject::Dubins(args) => dubins::run(args),
         Subject::RoutePolygons(args) => route_polygons::run(args),
+        Subject::Wind(args) => wind::run(args),
     }
 }
