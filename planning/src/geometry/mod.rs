@@ -1,6 +1,7 @@
 //! Polygons that are valid by construction and no-fly zones (D2.7 §2.3.1).
 
 mod distance;
+pub mod offset;
 pub mod polygon;
 pub mod zones;
 

@@ -2,6 +2,7 @@
 
 pub mod dubins;
 pub mod figures;
+pub mod offset;
 pub mod route_polygons;
 pub mod wind;
 
@@ -24,6 +25,8 @@ pub enum Subject {
     RoutePolygons(route_polygons::RoutePolygonsArgs),
     /// Fastest flights in a constant wind.
     Wind(wind::WindArgs),
+    /// No-fly zones grown by a radius.
+    Offset(offset::OffsetArgs),
 }
 
 /// Measures, and returns the JSON text to print.
@@ -35,5 +38,6 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
         Subject::Dubins(args) => dubins::run(args),
         Subject::RoutePolygons(args) => route_polygons::run(args),
         Subject::Wind(args) => wind::run(args),
+        Subject::Offset(args) => offset::run(args),
     }
 }
