@@ -1,5 +1,6 @@
 //! `bench`: one planner, one set of instances, one JSON object with errors and times.
 
+pub mod cover;
 pub mod dubins;
 pub mod figures;
 pub mod offset;
@@ -19,6 +20,8 @@ pub struct BenchArgs {
 /// The planners.
 #[derive(Debug, Subcommand)]
 pub enum Subject {
+    /// Coverage plans for a team on public grid maps.
+    Cover(cover::CoverArgs),
     /// Shortest Dubins curves to random goals.
     Dubins(dubins::DubinsArgs),
     /// Shortest paths among polygons by the visibility graph.
@@ -35,6 +38,7 @@ pub enum Subject {
 /// When a file is missing or malformed; the error names the place.
 pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
     match &args.subject {
+        Subject::Cover(args) => cover::run(args),
         Subject::Dubins(args) => dubins::run(args),
         Subject::RoutePolygons(args) => route_polygons::run(args),
         Subject::Wind(args) => wind::run(args),

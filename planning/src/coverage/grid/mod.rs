@@ -1,0 +1,35 @@
+//! Coverage of a lane-cell map by a team that moves from cell to cell (D2.7 §3.6.2,
+//! 3.6.4–3.6.6): how long it takes at least, and planners from the document's own
+//! division of one loop to the default, in which each UAV flies a region of its own.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`map`] | which cells are free, distances, shortest ways |
+//! | [`plan`] | a task, a plan, and what a plan costs |
+//! | [`bounds`] | how long any plan takes at least |
+//! | [`spanning`] | one closed loop over all cells, from a spanning tree over 2×2 blocks |
+//! | [`mstc`] | the loop divided without and with backtracking, from where the UAVs stand |
+//! | [`ring`] | the exact division with backtracking, mixed speeds and endurance |
+//! | [`free`] | the loop divided, each UAV flying straight to its arc |
+//! | [`partition`] | a connected region for each UAV |
+//! | [`search`] | local search over the orders of cells |
+//! | [`improve`] | the default planner |
+//! | [`stream`] | numbers that look random and are the same everywhere |
+//!
+//! Left to others: exact curves, cameras and no-fly zones (`area`); which cells a
+//! polygon becomes.
+
+pub mod bounds;
+pub mod free;
+pub mod improve;
+pub mod map;
+pub mod mstc;
+pub mod partition;
+pub mod plan;
+pub mod ring;
+pub mod search;
+pub mod spanning;
+pub mod stream;
+
+pub use map::{Cell, LaneMap, MapError};
+pub use plan::{Plan, Task};

@@ -1,0 +1,423 @@
+//! A region for each UAV: connected, holding its root, and as large as it can fly in the
+//! common time (D2.7 §3.6.3–3.6.4 divide by trees; here nothing is covered twice).
+//!
+//! Regions are made of *pieces*: the connected free cells of one 2×2 block, so that a
+//! loop round a region's blocks covers it without a repeat. All regions grow at once;
+//! then pieces pass across borders from regions with too much to regions with too little.
+//!
+//! Left to others: the path through a region, and the balance of single cells.
+
+use super::map::{Cell, LaneMap, NOWHERE, UNREACHED};
+use super::plan::Task;
+use super::stream::Stream;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// Regions of a task.
+#[derive(Clone, Debug)]
+pub struct Regions {
+    /// By cell number: the UAV whose region it is; [`NOBODY`] for blocked cells.
+    pub owner: Vec<u32>,
+    /// By UAV: the cell at which it enters its region; `None` for an empty region.
+    pub entry: Vec<Option<Cell>>,
+}
+
+/// The owner of cells that belong to no region.
+pub const NOBODY: u32 = u32::MAX;
+
+/// Sweeps over all pieces at most: a piece passes one border a sweep, and a region is
+/// reached over fewer borders than this on all maps tried.
+const SWEEPS: usize = 400;
+
+/// Pieces looked at to show that a region stays connected without one; beyond, the piece
+/// stays.
+const WAY_ROUND: usize = 400;
+
+/// A region is small below one part in this many of an even share.
+const SMALL: i64 = 4;
+
+struct Piece {
+    cells: [Cell; 4],
+    n: u32,
+}
+
+pub(super) struct Partition<'a> {
+    task: &'a Task,
+    /// By cell: its piece.
+    piece_of: Vec<u32>,
+    pieces: Vec<Piece>,
+    /// By piece: neighbouring pieces, from `links[first[i]]` on.
+    first: Vec<u32>,
+    links: Vec<u32>,
+    owner: Vec<u32>,
+    /// By region: the piece where it begins, moves to get there, and its cells.
+    seed: Vec<u32>,
+    entry: Vec<i64>,
+    size: Vec<i64>,
+    /// By region: time of one move.
+    pace: Vec<i64>,
+    /// For searches: the last search that saw a piece.
+    seen: Vec<u32>,
+    search: u32,
+}
+
+/// Divides a task's cells among its UAVs, with blocks at `offset`.
+///
+/// # Guarantees
+/// Each free cell belongs to one region; a region is connected.
+///
+/// # Complexity
+/// O(N log N) to grow, O(N) for each of at most [`SWEEPS`] sweeps.
+#[must_use]
+pub fn regions(task: &Task, offset: (u32, u32)) -> Regions {
+    let mut p = Partition::new(task, offset);
+    p.sow();
+    p.grow();
+    p.balance();
+    p.finish()
+}
+
+impl<'a> Partition<'a> {
+    pub(super) fn new(task: &'a Task, offset: (u32, u32)) -> Self {
+        let map = &task.map;
+        let (piece_of, pieces) = cut(map, offset);
+        let (mut first, mut links) = (vec![0], Vec::new());
+        for (i, piece) in (0u32..).zip(&pieces) {
+            let from = links.len();
+            for cell in &piece.cells[..piece.n as usize] {
+                for near in map.neighbours(*cell) {
+                    let other = piece_of[near as usize];
+                    if other != i && !links[from..].contains(&other) {
+                        links.push(other);
+                    }
+                }
+            }
+            first.push(u32::try_from(links.len()).unwrap_or(u32::MAX));
+        }
+        let fastest = i64::from(task.speeds.iter().copied().max().unwrap_or(1));
+        let n = pieces.len();
+        Self {
+            task,
+            piece_of,
+            pieces,
+            first,
+            links,
+            owner: vec![NOBODY; n],
+            seed: vec![NOBODY; task.n_uavs()],
+            entry: vec![0; task.n_uavs()],
+            size: vec![0; task.n_uavs()],
+            pace: task
+                .speeds
+                .iter()
+                .map(|v| 16 * fastest / i64::from((*v).max(1)))
+                .collect(),
+            seen: vec![0; n],
+            search: 0,
+        }
+    }
+
+    fn near(&self, piece: u32) -> core::ops::Range<usize> {
+        self.first[piece as usize] as usize..self.first[piece as usize + 1] as usize
+    }
+
+    fn load(&self, uav: usize) -> i64 {
+        (self.entry[uav] + self.size[uav]) * self.pace[uav]
+    }
+
+    fn cells(&self, piece: u32) -> i64 {
+        i64::from(self.pieces[piece as usize].n)
+    }
+
+    /// Gives each UAV the nearest piece that nobody has yet.
+    fn sow(&mut self) {
+        for uav in 0..self.task.n_uavs() {
+            if self.task.map.is_free(self.task.roots[uav]) {
+                self.settle(uav);
+            }
+        }
+    }
+
+    /// Begins a region at the unclaimed piece that is nearest to its root.
+    fn settle(&mut self, uav: usize) -> bool {
+        let root = self.task.roots[uav];
+        self.search += 1;
+        let mut queue = vec![self.piece_of[root as usize]];
+        self.seen[queue[0] as usize] = self.search;
+        let mut done = 0;
+        while let Some(&at) = queue.get(done) {
+            done += 1;
+            if self.owner[at as usize] == NOBODY {
+                self.owner[at as usize] = u32::try_from(uav).unwrap_or(NOBODY);
+                self.begin_at(uav, at);
+                self.size[uav] = self.cells(at);
+                return true;
+            }
+            for i in self.near(at) {
+                let to = self.links[i];
+                if self.seen[to as usize] != self.search {
+                    self.seen[to as usize] = self.search;
+                    queue.push(to);
+                }
+            }
+        }
+        false
+    }
+
+    fn begin_at(&mut self, uav: usize, piece: u32) {
+        let cell = self.pieces[piece as usize].cells[0];
+        self.seed[uav] = piece;
+        self.entry[uav] = i64::from(self.task.map.straight(self.task.roots[uav], cell));
+    }
+
+    /// The region with least to fly takes the next piece, nearest to its seed. A region
+    /// that is shut in while still small begins anew outside.
+    fn grow(&mut self) {
+        let share = self.task.map.n_free() as i64 / self.seed.len().max(1) as i64;
+        let mut turns: BinaryHeap<Reverse<(i64, usize)>> = BinaryHeap::new();
+        let mut fringes: Vec<BinaryHeap<Reverse<(u32, u32)>>> = Vec::new();
+        for uav in 0..self.seed.len() {
+            let mut fringe = BinaryHeap::new();
+            if self.seed[uav] != NOBODY {
+                fringe.extend(
+                    self.near(self.seed[uav])
+                        .map(|i| Reverse((1, self.links[i]))),
+                );
+            }
+            turns.push(Reverse((self.load(uav), uav)));
+            fringes.push(fringe);
+        }
+        while let Some(Reverse((_, uav))) = turns.pop() {
+            let mut taken = self.take(uav, &mut fringes[uav]);
+            if !taken && self.size[uav] < share / SMALL {
+                let old = self.seed[uav];
+                taken = self.settle(uav);
+                if taken {
+                    let seed = self.seed[uav];
+                    self.give_away(uav, old, seed);
+                    fringes[uav].extend(self.near(seed).map(|i| Reverse((1, self.links[i]))));
+                }
+            }
+            if taken {
+                turns.push(Reverse((self.load(uav), uav)));
+            }
+        }
+    }
+
+    /// Takes the next free piece of a fringe.
+    fn take(&mut self, uav: usize, fringe: &mut BinaryHeap<Reverse<(u32, u32)>>) -> bool {
+        while let Some(Reverse((depth, piece))) = fringe.pop() {
+            if self.owner[piece as usize] != NOBODY {
+                continue;
+            }
+            self.owner[piece as usize] = u32::try_from(uav).unwrap_or(NOBODY);
+            self.size[uav] += self.cells(piece);
+            for i in self.near(piece) {
+                let to = self.links[i];
+                if self.owner[to as usize] == NOBODY {
+                    fringe.push(Reverse((depth + 1, to)));
+                }
+            }
+            return true;
+        }
+        false
+    }
+
+    /// Gives the pieces of a region around `old` to the neighbours, but for `kept`.
+    fn give_away(&mut self, uav: usize, old: u32, kept: u32) {
+        let Ok(me) = u32::try_from(uav) else { return };
+        if old == NOBODY {
+            return;
+        }
+        let mut mine = vec![old];
+        let mut done = 0;
+        self.search += 1;
+        self.seen[old as usize] = self.search;
+        self.seen[kept as usize] = self.search;
+        while let Some(&at) = mine.get(done) {
+            done += 1;
+            for i in self.near(at) {
+                let to = self.links[i];
+                if self.owner[to as usize] == me && self.seen[to as usize] != self.search {
+                    self.seen[to as usize] = self.search;
+                    mine.push(to);
+                }
+            }
+        }
+        // A shut-in region has neighbours all round; each pass gives what touches them.
+        while !mine.is_empty() {
+            let before = mine.len();
+            mine.retain(|piece| {
+                let to = self
+                    .near(*piece)
+                    .map(|i| self.owner[self.links[i] as usize])
+                    .filter(|o| *o != me && *o != NOBODY)
+                    .min_by_key(|o| self.load(*o as usize));
+                if let Some(to) = to {
+                    self.owner[*piece as usize] = to;
+                    self.size[to as usize] += self.cells(*piece);
+                }
+                to.is_none()
+            });
+            if mine.len() == before {
+                // Nobody else is near: the pieces are free again.
+                for piece in mine.drain(..) {
+                    self.owner[piece as usize] = NOBODY;
+                }
+            }
+        }
+    }
+
+    /// Passes pieces from regions with more to fly to neighbours with less.
+    fn balance(&mut self) {
+        let n = self.pieces.len();
+        if n == 0 {
+            return;
+        }
+        let mut stream = Stream::new(n as u64);
+        // A stride that is coprime to most n spreads the order over the map.
+        let stride = (7919 % n).max(1);
+        for _ in 0..SWEEPS {
+            let mut passed = 0;
+            let mut at = stream.below(n);
+            for _ in 0..n {
+                passed += usize::from(self.pass(u32::try_from(at).unwrap_or(0)));
+                at = (at + stride) % n;
+            }
+            if passed == 0 {
+                break;
+            }
+        }
+    }
+
+    /// Passes a piece to the neighbouring region with the least to fly, if that is then
+    /// still less than what the giver had.
+    fn pass(&mut self, piece: u32) -> bool {
+        let from = self.owner[piece as usize];
+        let mut best: Option<(i64, u32)> = None;
+        for i in self.near(piece) {
+            let to = self.owner[self.links[i] as usize];
+            if to != from && to != NOBODY {
+                let offer = (self.load(to as usize), to);
+                best = Some(best.map_or(offer, |b| b.min(offer)));
+            }
+        }
+        let Some((load, to)) = best else {
+            return false;
+        };
+        if from == NOBODY {
+            return false;
+        }
+        let cells = self.cells(piece);
+        let (uav, heir) = (from as usize, to as usize);
+        if self.load(uav) <= load + cells * self.pace[heir] || !self.connected_without(piece) {
+            return false;
+        }
+        if self.seed[uav] == piece {
+            let next = self
+                .near(piece)
+                .map(|i| self.links[i])
+                .find(|p| self.owner[*p as usize] == from);
+            let Some(next) = next else { return false };
+            self.begin_at(uav, next);
+        }
+        self.owner[piece as usize] = to;
+        self.size[uav] -= cells;
+        self.size[heir] += cells;
+        true
+    }
+
+    /// Whether the neighbours of a piece in its region reach each other without it,
+    /// within a short way round.
+    fn connected_without(&mut self, piece: u32) -> bool {
+        let region = self.owner[piece as usize];
+        let mine: Vec<u32> = self
+            .near(piece)
+            .map(|i| self.links[i])
+            .filter(|p| self.owner[*p as usize] == region)
+            .collect();
+        if mine.len() < 2 {
+            return true;
+        }
+        self.search += 1;
+        self.seen[piece as usize] = self.search;
+        self.seen[mine[0] as usize] = self.search;
+        let mut queue = vec![mine[0]];
+        let mut missing = mine.len() - 1;
+        let mut done = 0;
+        while let Some(&at) = queue.get(done) {
+            done += 1;
+            for i in self.near(at) {
+                let to = self.links[i];
+                if self.owner[to as usize] == region && self.seen[to as usize] != self.search {
+                    self.seen[to as usize] = self.search;
+                    queue.push(to);
+                    if mine[1..].contains(&to) {
+                        missing -= 1;
+                        if missing == 0 {
+                            return true;
+                        }
+                    }
+                }
+            }
+            if done > WAY_ROUND {
+                return false;
+            }
+        }
+        false
+    }
+
+    fn finish(self) -> Regions {
+        let map = &self.task.map;
+        let mut owner = vec![NOBODY; map.table_len()];
+        for cell in map.cells() {
+            owner[cell as usize] = self.owner[self.piece_of[cell as usize] as usize];
+        }
+        let mut entry = Vec::new();
+        for (uav, root) in self.task.roots.iter().enumerate() {
+            let seed = self.seed[uav];
+            entry.push((seed != NOBODY).then(|| {
+                let piece = &self.pieces[seed as usize];
+                let cells = piece.cells[..piece.n as usize].iter().copied();
+                cells
+                    .min_by_key(|c| (map.straight(*root, *c), *c))
+                    .unwrap_or(NOWHERE)
+            }));
+        }
+        Regions { owner, entry }
+    }
+}
+
+/// Cuts the free cells into the connected parts of blocks.
+fn cut(map: &LaneMap, offset: (u32, u32)) -> (Vec<u32>, Vec<Piece>) {
+    let mut piece_of = vec![UNREACHED; map.table_len()];
+    let mut pieces: Vec<Piece> = Vec::new();
+    let block = |cell: Cell| {
+        let (row, col) = map.place(cell);
+        ((row + offset.0) / 2, (col + offset.1) / 2)
+    };
+    for cell in map.cells() {
+        if piece_of[cell as usize] != UNREACHED {
+            continue;
+        }
+        let id = u32::try_from(pieces.len()).unwrap_or(UNREACHED);
+        let mut piece = Piece {
+            cells: [cell; 4],
+            n: 1,
+        };
+        piece_of[cell as usize] = id;
+        let mut done = 0;
+        while done < piece.n {
+            let at = piece.cells[done as usize];
+            done += 1;
+            for near in map.neighbours(at) {
+                if piece_of[near as usize] == UNREACHED && block(near) == block(cell) {
+                    piece_of[near as usize] = id;
+                    piece.cells[piece.n as usize] = near;
+                    piece.n += 1;
+                }
+            }
+        }
+        pieces.push(piece);
+    }
+    (piece_of, pieces)
+}

@@ -1,0 +1,577 @@
+//! Local search over the orders in which UAVs come to their cells: fewer cells flown
+//! twice, and equal times (the improvement behind D2.7 §3.6.4–3.6.5's divisions).
+//!
+//! An order visits each cell once; where two cells in a row are not neighbours, the UAV
+//! *hops* over cells that are covered anyway. All waste of a plan is in its hops and in
+//! unequal times, so every trial begins at a hop, at an end of an order, or at a border
+//! between two UAVs. Trials that neither gain nor lose are taken: hops wander until two
+//! of them meet and vanish.
+//!
+//! Left to others: the first orders, and when to stop.
+
+use super::map::{Cell, NOWHERE, Router};
+use super::plan::Task;
+use super::stream::Stream;
+
+/// Hops longer than this are not considered as new ones: the search for their length
+/// would cost more than they ever gain.
+const LONGEST_NEW_HOP: u32 = 24;
+
+/// What a hop that is too long for [`LONGEST_NEW_HOP`] counts as.
+const TOO_LONG: u32 = 1 << 20;
+
+/// A reversal that gains nothing is taken only up to this many cells, since its cost
+/// grows with them.
+const IDLE_REVERSAL: usize = 1000;
+
+/// Remembered distances: a power of two, direct-mapped, about the size of a core's
+/// second cache.
+const REMEMBERED: usize = 1 << 15;
+
+/// Cells moved together at most.
+const SEGMENT: usize = 4;
+
+/// Prices of time: a unit of time of any UAV costs this, besides what lateness costs.
+const TIME_PRICE: i64 = 16;
+
+/// Orders under improvement.
+pub struct Search<'a> {
+    task: &'a Task,
+    router: Router<'a>,
+    orders: Vec<Vec<Cell>>,
+    /// By cell: whose order, and where in it.
+    at: Vec<(u32, u32)>,
+    /// By UAV: moves.
+    moves: Vec<i64>,
+    /// By UAV: time of a move, the fastest UAV's being 1 / [`PACE`] of the unit.
+    pace: Vec<i64>,
+    total_cells: i64,
+    /// Cells that may be beside a hop, and whether a cell is listed.
+    hops: Vec<Cell>,
+    listed: Vec<bool>,
+    stream: Stream,
+    remembered: Vec<(Cell, Cell, u32)>,
+    /// The common time aimed at.
+    target: i64,
+    /// Highest loss accepted, in price units per 256ths of a draw.
+    heat: i64,
+}
+
+/// Time units of one move of the fastest UAV.
+pub const PACE: i64 = 1;
+
+/// A place in an order: whose, and how many cells before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Spot {
+    uav: usize,
+    index: usize,
+}
+
+impl<'a> Search<'a> {
+    /// A search that begins with `orders`; each cell of the task in exactly one of them.
+    #[must_use]
+    pub fn new(task: &'a Task, orders: Vec<Vec<Cell>>) -> Self {
+        let n = task.map.table_len();
+        let fastest = i64::from(task.speeds.iter().copied().max().unwrap_or(1));
+        let mut search = Self {
+            task,
+            router: Router::new(&task.map),
+            at: vec![(0, 0); n],
+            moves: vec![0; orders.len()],
+            pace: task
+                .speeds
+                .iter()
+                .map(|v| PACE * fastest / i64::from((*v).max(1)))
+                .collect(),
+            total_cells: 0,
+            hops: Vec::new(),
+            listed: vec![false; n],
+            stream: Stream::new(n as u64),
+            remembered: vec![(NOWHERE, NOWHERE, 0); REMEMBERED],
+            target: 0,
+            heat: 0,
+            orders,
+        };
+        for uav in 0..search.orders.len() {
+            search.index(uav, 0, search.orders[uav].len());
+            search.total_cells += search.orders[uav].len() as i64;
+            search.recount(uav);
+        }
+        search.aim();
+        search
+    }
+
+    /// The orders.
+    #[must_use]
+    pub fn orders(&self) -> &[Vec<Cell>] {
+        &self.orders
+    }
+
+    /// Moves of each UAV.
+    #[must_use]
+    pub fn moves(&self) -> &[i64] {
+        &self.moves
+    }
+
+    /// The time of the last UAV, in units of 1 / [`PACE`] of the fastest UAV's move.
+    #[must_use]
+    pub fn makespan(&self) -> i64 {
+        let times = self.moves.iter().zip(&self.pace).map(|(m, p)| m * p);
+        times.max().unwrap_or(0)
+    }
+
+    fn index(&mut self, uav: usize, from: usize, to: usize) {
+        for i in from..to {
+            self.at[self.orders[uav][i] as usize] = (uav as u32, i as u32);
+        }
+    }
+
+    fn recount(&mut self, uav: usize) {
+        let mut moves = 0;
+        for i in 0..=self.orders[uav].len() {
+            let spot = Spot { uav, index: i };
+            let (a, b) = (self.before(spot), self.after(spot));
+            let d = self.exact(a, b);
+            if d > 1 {
+                self.list(a);
+                self.list(b);
+            }
+            moves += i64::from(d);
+        }
+        self.moves[uav] = moves;
+        if let Some(&last) = self.orders[uav].last() {
+            self.list(last);
+        }
+    }
+
+    /// Aims at the mean of the times.
+    pub fn aim(&mut self) {
+        let work: f64 = self.moves.iter().map(|m| *m as f64).sum();
+        let speed: f64 = self.pace.iter().map(|p| 1.0 / *p as f64).sum();
+        self.target = if speed > 0.0 {
+            (work / speed) as i64
+        } else {
+            0
+        };
+    }
+
+    /// Sets the greatest loss that is sometimes accepted, in thousandths of a move.
+    pub fn heat(&mut self, milli_moves: i64) {
+        self.heat = milli_moves * TIME_PRICE;
+    }
+
+    /// The cell before a spot: the root at the beginning.
+    fn before(&self, spot: Spot) -> Cell {
+        match spot.index.checked_sub(1) {
+            Some(i) => self.orders[spot.uav][i],
+            None => self.task.roots[spot.uav],
+        }
+    }
+
+    /// The cell after a spot: at the end the root if the UAV returns, or none.
+    fn after(&self, spot: Spot) -> Cell {
+        let order = &self.orders[spot.uav];
+        match order.get(spot.index) {
+            Some(cell) => *cell,
+            None if self.task.closed => self.task.roots[spot.uav],
+            None => NOWHERE,
+        }
+    }
+
+    fn list(&mut self, cell: Cell) {
+        if cell != NOWHERE && !self.listed[cell as usize] {
+            self.listed[cell as usize] = true;
+            self.hops.push(cell);
+        }
+    }
+
+    fn exact(&mut self, a: Cell, b: Cell) -> u32 {
+        self.distance(a, b, u32::MAX - 1)
+    }
+
+    fn fresh(&mut self, a: Cell, b: Cell) -> u32 {
+        self.distance(a, b, LONGEST_NEW_HOP)
+    }
+
+    /// Moves between two cells, [`TOO_LONG`] above `most`; none to or from nowhere.
+    fn distance(&mut self, a: Cell, b: Cell, most: u32) -> u32 {
+        if a == b || a == NOWHERE || b == NOWHERE {
+            return 0;
+        }
+        if self.task.map.adjacent(a, b) {
+            return 1;
+        }
+        if self.task.map.straight(a, b) > most {
+            return TOO_LONG;
+        }
+        let (low, high) = (a.min(b), a.max(b));
+        let mixed = (low.wrapping_mul(0x9E37_79B1)) ^ high.wrapping_mul(0x85EB_CA6B);
+        let slot = (mixed >> 17) as usize % REMEMBERED;
+        let (x, y, d) = self.remembered[slot];
+        if (x, y) == (low, high) && (d < TOO_LONG || most <= LONGEST_NEW_HOP) {
+            return if d > most { TOO_LONG } else { d };
+        }
+        let d = self.router.moves(a, b, most).unwrap_or(TOO_LONG);
+        self.remembered[slot] = (low, high, d);
+        d
+    }
+
+    /// What the times cost: each unit the same, and the square of what is off the target.
+    fn price(&self, uav: usize, moves: i64) -> i64 {
+        let time = moves * self.pace[uav];
+        let off = time - self.target;
+        time * TIME_PRICE + off * off
+    }
+
+    fn change(&self, uav: usize, delta: i64) -> i64 {
+        self.price(uav, self.moves[uav] + delta) - self.price(uav, self.moves[uav])
+    }
+
+    /// The loss that this trial may make.
+    fn allowance(&mut self) -> i64 {
+        if self.heat == 0 {
+            return 0;
+        }
+        // A geometric draw: each further unit of heat is half as likely.
+        let bits = self.stream.bits();
+        i64::from(bits.trailing_zeros().min(12)) * self.heat * ((bits >> 40) & 255) as i64 / 256_000
+    }
+
+    /// Tries `steps` changes.
+    pub fn run(&mut self, steps: usize) {
+        for _ in 0..steps {
+            let draw = self.stream.below(16);
+            match draw {
+                0..=5 => self.try_hop(),
+                _ => self.try_border(),
+            }
+        }
+    }
+
+    /// A change at a hop or an end.
+    fn try_hop(&mut self) {
+        if self.hops.is_empty() {
+            return;
+        }
+        let pick = self.stream.below(self.hops.len());
+        let cell = self.hops[pick];
+        let Some(spot) = self.hop_at(cell) else {
+            self.listed[cell as usize] = false;
+            self.hops.swap_remove(pick);
+            return;
+        };
+        match self.stream.below(4) {
+            0 | 1 => self.try_reversal(spot),
+            2 => self.try_fill(spot),
+            _ => self.try_move_from(spot),
+        }
+    }
+
+    /// The spot of a hop beside a cell, or the end of its order.
+    fn hop_at(&mut self, cell: Cell) -> Option<Spot> {
+        let (uav, index) = self.at[cell as usize];
+        let (uav, index) = (uav as usize, index as usize);
+        if self.orders[uav].get(index) != Some(&cell) {
+            return None;
+        }
+        let (before, after) = (
+            Spot { uav, index },
+            Spot {
+                uav,
+                index: index + 1,
+            },
+        );
+        let flip = self.stream.bits() & 1 == 0;
+        for spot in if flip {
+            [before, after]
+        } else {
+            [after, before]
+        } {
+            let (a, b) = (self.before(spot), self.after(spot));
+            let end = b == NOWHERE;
+            if end || (a != b && !self.task.map.adjacent(a, b)) {
+                return Some(spot);
+            }
+        }
+        None
+    }
+
+    fn random_near(&mut self, cell: Cell) -> Option<Cell> {
+        let side = self.stream.below(4);
+        let near = self.task.map.around(cell)[side];
+        self.task.map.is_free(near).then_some(near)
+    }
+
+    /// Replaces the hop between `a` and `b` by a link from one of them to a neighbour `x`
+    /// in the same order, and flies what lies between the other way round.
+    fn try_reversal(&mut self, spot: Spot) {
+        let uav = spot.uav;
+        let (a, b) = (self.before(spot), self.after(spot));
+        let from_a =
+            b == NOWHERE || spot.index == self.orders[uav].len() || self.stream.bits() & 1 == 0;
+        let Some(x) = self.random_near(if from_a { a } else { b }) else {
+            return;
+        };
+        let (owner, at) = self.at[x as usize];
+        if owner as usize != uav {
+            self.try_tails(spot, x, from_a);
+            return;
+        }
+        // The other spot whose link is cut: after x when x joins a, before x otherwise.
+        let other = Spot {
+            uav,
+            index: at as usize + usize::from(from_a),
+        };
+        if other.index == spot.index {
+            return;
+        }
+        let (p, q) = (self.before(other), self.after(other));
+        let (low, high) = (spot.index.min(other.index), spot.index.max(other.index));
+        if self.task.closed && high > self.orders[uav].len() {
+            return;
+        }
+        let old = self.exact(a, b) + self.exact(p, q);
+        let new = self.fresh(a, p) + self.fresh(b, q);
+        let delta = i64::from(new) - i64::from(old);
+        let allowed = self.allowance();
+        if self.change(uav, delta) > allowed || (delta >= 0 && high - low > IDLE_REVERSAL) {
+            return;
+        }
+        self.orders[uav][low..high].reverse();
+        self.index(uav, low, high);
+        self.moves[uav] += delta;
+        self.list_ends(uav, low, high);
+    }
+
+    fn list_ends(&mut self, uav: usize, low: usize, high: usize) {
+        for index in [low, high] {
+            let spot = Spot { uav, index };
+            let (a, b) = (self.before(spot), self.after(spot));
+            if b == NOWHERE || (a != b && !self.task.map.adjacent(a, b)) {
+                self.list(a);
+                self.list(b);
+            }
+        }
+    }
+
+    /// Two UAVs exchange what they fly after the hop and after (or from) `x`.
+    fn try_tails(&mut self, spot: Spot, x: Cell, from_a: bool) {
+        let uav = spot.uav;
+        let (other, at) = self.at[x as usize];
+        let other = Spot {
+            uav: other as usize,
+            index: at as usize + usize::from(!from_a),
+        };
+        let (a, b) = (self.before(spot), self.after(spot));
+        let (p, q) = (self.before(other), self.after(other));
+        let (mine, theirs) = (
+            self.orders[uav].len() - spot.index,
+            self.orders[other.uav].len() - other.index,
+        );
+        // Only tails of about the same length can pay; their exact lengths cost a count.
+        if self.task.closed || mine.abs_diff(theirs) > 40 || mine + theirs > 4 * IDLE_REVERSAL {
+            return;
+        }
+        let (link_a, link_b) = (self.fresh(a, q), self.fresh(p, b));
+        if link_a + link_b >= TOO_LONG {
+            return;
+        }
+        let (tail, other_tail) = (self.tail(spot), self.tail(other));
+        let (old, old_other) = (self.exact(a, b), self.exact(p, q));
+        let delta = i64::from(link_a) + other_tail - i64::from(old) - tail;
+        let delta_other = i64::from(link_b) + tail - i64::from(old_other) - other_tail;
+        let allowed = self.allowance();
+        if self.change(uav, delta) + self.change(other.uav, delta_other) > allowed {
+            return;
+        }
+        let tail = self.orders[uav].split_off(spot.index);
+        let other_tail = self.orders[other.uav].split_off(other.index);
+        self.orders[uav].extend(other_tail);
+        self.orders[other.uav].extend(tail);
+        self.moves[uav] += delta;
+        self.moves[other.uav] += delta_other;
+        for s in [spot, other] {
+            let len = self.orders[s.uav].len();
+            self.index(s.uav, s.index, len);
+            self.list_ends(s.uav, s.index, len);
+        }
+    }
+
+    /// Moves after the first cell after a spot.
+    fn tail(&mut self, spot: Spot) -> i64 {
+        let mut moves = 0;
+        for i in spot.index + 1..self.orders[spot.uav].len() {
+            let (a, b) = (self.orders[spot.uav][i - 1], self.orders[spot.uav][i]);
+            moves += i64::from(self.exact(a, b));
+        }
+        moves
+    }
+
+    /// Fills a hop with a few cells from elsewhere that begin beside it.
+    fn try_fill(&mut self, spot: Spot) {
+        let (a, b) = (self.before(spot), self.after(spot));
+        let beside = if b == NOWHERE || self.stream.bits() & 1 == 0 {
+            a
+        } else {
+            b
+        };
+        let Some(x) = self.random_near(beside) else {
+            return;
+        };
+        let (uav, at) = self.at[x as usize];
+        let len = 1 + self.stream.below(SEGMENT);
+        let ahead = self.stream.bits() & 1 == 0;
+        let at = at as usize;
+        let low = if ahead {
+            at
+        } else {
+            (at + 1).saturating_sub(len)
+        };
+        self.try_shift(uav as usize, low, len, spot);
+    }
+
+    /// Moves a few cells beside a hop to elsewhere.
+    fn try_move_from(&mut self, spot: Spot) {
+        let len = 1 + self.stream.below(SEGMENT);
+        let low = if self.stream.bits() & 1 == 0 {
+            spot.index
+        } else {
+            spot.index.saturating_sub(len)
+        };
+        self.try_segment(spot.uav, low, len);
+    }
+
+    /// Moves a few cells at a border to the neighbour.
+    fn try_border(&mut self) {
+        let n = self.orders.len();
+        let (one, two) = (self.stream.below(n), self.stream.below(n));
+        let late = |uav: usize| self.moves[uav] * self.pace[uav];
+        let uav = if late(one) >= late(two) { one } else { two };
+        let len = self.orders[uav].len();
+        if len == 0 {
+            return;
+        }
+        let low = self.stream.below(len);
+        let x = self.orders[uav][low];
+        let side = self.stream.below(4);
+        let near = self.task.map.around(x)[side];
+        if !self.task.map.is_free(near) || self.at[near as usize].0 as usize == uav {
+            return;
+        }
+        let len = 1 + self.stream.below(SEGMENT);
+        let low = if self.stream.bits() & 1 == 0 {
+            low
+        } else {
+            (low + 1).saturating_sub(len)
+        };
+        self.try_beside(uav, low, len, near);
+    }
+
+    /// Moves cells `low..low + len` of an order beside a neighbour of one of their ends.
+    fn try_segment(&mut self, uav: usize, low: usize, len: usize) {
+        let high = (low + len).min(self.orders[uav].len());
+        if low >= high {
+            return;
+        }
+        let end = if self.stream.bits() & 1 == 0 {
+            low
+        } else {
+            high - 1
+        };
+        let Some(near) = self.random_near(self.orders[uav][end]) else {
+            return;
+        };
+        self.try_beside(uav, low, len, near);
+    }
+
+    fn try_beside(&mut self, uav: usize, low: usize, len: usize, near: Cell) {
+        let (owner, at) = self.at[near as usize];
+        let index = at as usize + usize::from(self.stream.bits() & 1 == 0);
+        self.try_shift(
+            uav,
+            low,
+            len,
+            Spot {
+                uav: owner as usize,
+                index,
+            },
+        );
+    }
+
+    /// Moves cells `low..low + len` of an order to a spot outside them, whichever way
+    /// round is shorter.
+    fn try_shift(&mut self, uav: usize, low: usize, len: usize, to: Spot) {
+        let high = (low + len).min(self.orders[uav].len());
+        if low >= high || (to.uav == uav && to.index >= low && to.index <= high) {
+            return;
+        }
+        if self.task.closed && to.index > self.orders[to.uav].len() {
+            return;
+        }
+        let (first, last) = (self.orders[uav][low], self.orders[uav][high - 1]);
+        let (p, n) = (
+            self.before(Spot { uav, index: low }),
+            self.after(Spot { uav, index: high }),
+        );
+        let (a, b) = (self.before(to), self.after(to));
+        let inside = self.inside(uav, low, high);
+        let taken = i64::from(self.exact(p, first)) + i64::from(self.exact(last, n)) + inside;
+        let kept = i64::from(self.fresh(p, n)) - taken;
+        let joined = i64::from(self.fresh(a, first)) + i64::from(self.fresh(last, b));
+        let turned = i64::from(self.fresh(a, last)) + i64::from(self.fresh(first, b));
+        let added = joined.min(turned) + inside - i64::from(self.exact(a, b));
+        let allowed = self.allowance();
+        let change = if to.uav == uav {
+            self.change(uav, kept + added)
+        } else {
+            self.change(uav, kept) + self.change(to.uav, added)
+        };
+        if change > allowed || (to.uav == uav && to.index.abs_diff(low) > 2 * IDLE_REVERSAL) {
+            return;
+        }
+        self.moves[uav] += kept;
+        self.moves[to.uav] += added;
+        self.shift(uav, low, high, to, turned < joined);
+    }
+
+    fn inside(&mut self, uav: usize, low: usize, high: usize) -> i64 {
+        let mut moves = 0;
+        for i in low + 1..high {
+            let (a, b) = (self.orders[uav][i - 1], self.orders[uav][i]);
+            moves += i64::from(self.exact(a, b));
+        }
+        moves
+    }
+
+    fn shift(&mut self, uav: usize, low: usize, high: usize, to: Spot, turned: bool) {
+        let len = high - low;
+        if turned {
+            self.orders[uav][low..high].reverse();
+        }
+        if to.uav == uav {
+            let index = if to.index > low {
+                self.orders[uav][low..to.index].rotate_left(len);
+                self.index(uav, low, to.index);
+                to.index - len
+            } else {
+                self.orders[uav][to.index..high].rotate_right(len);
+                self.index(uav, to.index, high);
+                to.index
+            };
+            self.list_ends(uav, index, index + len);
+            let gap = if to.index > low { low } else { high };
+            self.list_ends(uav, gap, gap);
+            return;
+        }
+        let mut cells = [NOWHERE; SEGMENT];
+        cells[..len].copy_from_slice(&self.orders[uav][low..high]);
+        self.orders[uav].drain(low..high);
+        let from_len = self.orders[uav].len();
+        self.index(uav, low, from_len);
+        self.orders[to.uav].splice(to.index..to.index, cells[..len].iter().copied());
+        let to_len = self.orders[to.uav].len();
+        self.index(to.uav, to.index, to_len);
+        self.list_ends(uav, low, low);
+        self.list_ends(to.uav, to.index, to.index + len);
+    }
+}
