@@ -5,3 +5,4 @@
 //! Arguments in, one text out: nothing here prints.
 
 pub mod bench;
+pub mod navmesh;

@@ -1,5 +1,7 @@
 //! The shortest flyable route from here to there with clearance (D2.7 §2.3).
 
+pub mod mesh;
+pub mod two_point;
 pub mod visibility;
 
 use crate::frame::{Point, Pose};

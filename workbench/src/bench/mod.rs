@@ -4,6 +4,7 @@ pub mod cover;
 pub mod dubins;
 pub mod figures;
 pub mod offset;
+pub mod route;
 pub mod route_polygons;
 pub mod wind;
 
@@ -30,6 +31,8 @@ pub enum Subject {
     Wind(wind::WindArgs),
     /// No-fly zones grown by a radius.
     Offset(offset::OffsetArgs),
+    /// Shortest paths on a mesh, against reference lengths.
+    Route(route::RouteArgs),
 }
 
 /// Measures, and returns the JSON text to print.
@@ -43,5 +46,6 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
         Subject::RoutePolygons(args) => route_polygons::run(args),
         Subject::Wind(args) => wind::run(args),
         Subject::Offset(args) => offset::run(args),
+        Subject::Route(args) => route::run(args),
     }
 }
