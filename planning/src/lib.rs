@@ -11,7 +11,7 @@
 //! | [`airframe`] | what a UAV can fly | 2.2 |
 //! | [`geometry`] | polygons valid by construction, no-fly zones and their offset | 2.3.1 |
 //! | [`path`] | the shortest route with clearance | 2.3.2 |
-//! | [`trajectory`] | curves of lines and arcs, Dubins words | 2.4.1 |
+//! | [`trajectory`] | curves, Dubins words, flights in wind, timed trajectories | 2.4 |
 //! | [`coverage`] | the spanning-tree loop and its division among UAVs | 3.6.2, 3.6.5 |
 
 pub mod airframe;

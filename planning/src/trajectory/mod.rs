@@ -1,10 +1,13 @@
 //! From waypoints to curves a fixed wing can fly (D2.7 §2.4).
 //!
 //! [`curve`] holds lines and arcs joined tangentially; [`dubins`] the shortest
-//! such curve between two poses; [`wind`] the fastest in a constant wind.
+//! such curve between two poses; [`wind`] the fastest in a constant wind; [`timed`]
+//! paths with the time at which every place is passed.
 
 pub mod curve;
 pub mod dubins;
+pub mod timed;
 pub mod wind;
 
 pub use curve::{Curve, Segment};
+pub use timed::Trajectory;
