@@ -77,11 +77,18 @@ impl NoFlyZones {
     /// A curve with a coordinate that is no number is never clear.
     #[must_use]
     pub fn is_clear(&self, curve: &Curve, clearance_m: f64) -> bool {
-        curve.segments().iter().all(|s| {
-            let end = s.end();
-            (end.east_m + end.north_m + s.start.east_m + s.start.north_m).is_finite()
-                && self.nearest_m(s, clearance_m) >= clearance_m - ROUNDING_M
-        })
+        curve
+            .segments()
+            .iter()
+            .all(|s| self.is_segment_clear(s, clearance_m))
+    }
+
+    /// As [`NoFlyZones::is_clear`], of one piece.
+    #[must_use]
+    pub fn is_segment_clear(&self, s: &Segment, clearance_m: f64) -> bool {
+        let end = s.end();
+        (end.east_m + end.north_m + s.start.east_m + s.start.north_m).is_finite()
+            && self.nearest_m(s, clearance_m) >= clearance_m - ROUNDING_M
     }
 }
 

@@ -15,6 +15,7 @@ mod tests;
 
 use crate::frame::Point;
 use crate::geometry::Polygon;
+use crate::geometry::offset::Region;
 use crate::geometry::polygon::{MAX_COORDINATE_M, side};
 use obstacles::{Obstacles, index};
 use std::cmp::{Ordering, Reverse};
@@ -61,6 +62,14 @@ impl VisibilityGraph {
                 .enumerate()
                 .map(|(i, p)| (index(i), p.vertices())),
         )
+    }
+
+    /// As [`VisibilityGraph::new`], of regions with holes, as
+    /// [`grow`](crate::geometry::offset::grow) makes them.
+    #[must_use]
+    pub fn round(regions: &[Region]) -> Self {
+        let rings = |(i, r)| Region::rings(r).map(move |ring| (index(i), ring));
+        Self::of_rings(regions.iter().enumerate().flat_map(rings))
     }
 
     /// As [`VisibilityGraph::new`], of rings with the number of the obstacle that each

@@ -1,13 +1,17 @@
-//! `bench route-polygons`: shortest paths among polygons by the visibility graph.
+//! `bench route-polygons`: shortest paths among polygons by the visibility graph, or
+//! with a turn radius the routes that a UAV flies among them.
 
 use super::figures::{Times, timed};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde::Serialize;
-use skein_planning::frame::Point;
-use skein_planning::geometry::Polygon;
+use skein_planning::frame::{Point, Pose};
+use skein_planning::geometry::{NoFlyZones, Polygon};
+use skein_planning::math::atan2;
 use skein_planning::path::visibility::VisibilityGraph;
+use skein_planning::path::{RouteLimits, Router};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// One map of polygons and the questions in the same file.
 #[derive(Debug, Args)]
@@ -19,6 +23,13 @@ pub struct RoutePolygonsArgs {
     /// Reference lengths, one a line, `inf` where there is no path.
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
+    /// Fly the questions: from start to goal point, facing it, with this turn radius,
+    /// in the unit of the file.
+    #[arg(long, value_name = "R", conflicts_with = "reference")]
+    pub turn_radius: Option<f64>,
+    /// Distance kept from the polygons when flying.
+    #[arg(long, value_name = "R", default_value_t = 0.0)]
+    pub clearance: f64,
 }
 
 #[derive(Serialize)]
@@ -47,6 +58,13 @@ const TOLERANCE: f64 = 1e-9;
 /// When a file is missing or malformed; the error names the line.
 pub fn run(args: &RoutePolygonsArgs) -> Result<String> {
     let (obstacles, questions) = read(&args.polygons)?;
+    if let Some(turn_radius_m) = args.turn_radius {
+        let limits = RouteLimits {
+            turn_radius_m,
+            clearance_m: args.clearance,
+        };
+        return fly(&obstacles, &questions, limits);
+    }
     let (graph, build_us) = timed(|| VisibilityGraph::new(&obstacles));
     let mut lengths = Vec::with_capacity(questions.len());
     let mut each_us = Vec::with_capacity(questions.len());
@@ -99,6 +117,57 @@ pub fn run(args: &RoutePolygonsArgs) -> Result<String> {
         better: count(|e| e < -TOLERANCE),
         build_ms: build_us / 1e3,
         times: Times::of(each_us),
+    })?)
+}
+
+#[derive(Serialize)]
+struct Flown {
+    n: usize,
+    vertices: usize,
+    refused: usize,
+    /// Length over that of the shortest path of a point that keeps no distance.
+    mean_over_taut: f64,
+    max_over_taut: f64,
+    build_ms: f64,
+    /// Times of the first pass over the questions, which fills the router.
+    first: Times,
+    #[serde(flatten)]
+    times: Times,
+}
+
+/// Routes instead of paths; asked twice, because a router keeps what it finds out.
+fn fly(obstacles: &[Polygon], questions: &[(Point, Point)], limits: RouteLimits) -> Result<String> {
+    if !(limits.turn_radius_m > 0.0 && limits.clearance_m >= 0.0) {
+        bail!("a turn radius is above zero and a clearance not below");
+    }
+    let graph = VisibilityGraph::new(obstacles);
+    let zones = Arc::new(NoFlyZones::new(obstacles.to_vec()));
+    let (router, build_us) = timed(|| Router::new(zones, limits));
+    let mut ratios = Vec::new();
+    let mut passes = [Vec::new(), Vec::new()];
+    for (i, pass) in passes.iter_mut().enumerate() {
+        for &(from, to) in questions {
+            let d = to - from;
+            let start = Pose::new(from, atan2(d.y, d.x));
+            let (route, us) = timed(|| router.route_to_point(start, to));
+            pass.push(us);
+            if i == 0
+                && let (Ok(route), Some(taut)) = (route, graph.shortest(from, to))
+            {
+                ratios.push(route.length_m() / taut.length_m);
+            }
+        }
+    }
+    let [first, again] = passes;
+    Ok(serde_json::to_string(&Flown {
+        n: questions.len(),
+        vertices: obstacles.iter().map(|o| o.vertices().len()).sum(),
+        refused: questions.len() - ratios.len(),
+        mean_over_taut: ratios.iter().sum::<f64>() / ratios.len().max(1) as f64,
+        max_over_taut: ratios.iter().copied().fold(0.0, f64::max),
+        build_ms: build_us / 1e3,
+        first: Times::of(first),
+        times: Times::of(again),
     })?)
 }
 
