@@ -56,6 +56,26 @@ pub(super) fn segment_bounds(segment: &Segment) -> (Point, Point) {
     (low, high)
 }
 
+/// Distance from an arc, walked counter-clockwise from the first end to the second,
+/// to the edge `a b`, metres.
+pub(super) fn arc_to_edge_m(
+    centre: Point,
+    radius_m: f64,
+    ends: [Point; 2],
+    a: Point,
+    b: Point,
+) -> f64 {
+    let (v, w) = (ends[0] - centre, ends[1] - centre);
+    let arc = Arc {
+        centre,
+        radius_m,
+        begin_rad: atan2(v.y, v.x),
+        turned_rad: wrap_tau(atan2(v.perp(&w), v.dot(&w))),
+        ends,
+    };
+    arc.distance_m(a, b)
+}
+
 struct Arc {
     centre: Point,
     radius_m: f64,

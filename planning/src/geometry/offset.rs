@@ -3,7 +3,8 @@
 //! [`grow`] takes zones as map data has them and returns disjoint simple regions with
 //! holes that contain the exact Minkowski sum of the zones with a disc. Arcs become
 //! tangent polygons, so the outline is never nearer than the radius; a certificate
-//! checks that for every answer and nothing is handed out without it. Curves are
+//! checks that for every answer and nothing is handed out without it. [`grow_exact`]
+//! keeps the arcs, for routes that turn with the radius itself. Curves are
 //! measured against the zones as they are in [`super::zones`].
 //!
 //! # Guarantees
@@ -14,6 +15,7 @@
 //! # Complexity
 //! O(n log n) and the pairs of edges whose boxes overlap, for n vertices.
 
+mod arcs;
 mod arrangement;
 mod boxes;
 mod certificate;
@@ -24,6 +26,7 @@ mod shape;
 #[cfg(test)]
 mod tests;
 
+pub use arcs::{ArcGrown, ArcRegion, Piece, grow_exact};
 pub use layers::{LayeredZone, at_level};
 
 use super::Polygon;
@@ -60,6 +63,10 @@ const ATTEMPTS: u32 = 5;
 /// The boundary is traced with edges no shorter than this share of the margin; what
 /// the merged vertices move is within the margin.
 const MERGE_SHARE: f64 = 0.05;
+
+/// Neighbouring edges are looked at together up to this size, in radii: half a circle
+/// is two wide and one high.
+const CHAIN_RADII: f64 = 3.0;
 
 /// A zone as it is drawn: any winding, closed or not.
 ///
@@ -419,6 +426,7 @@ struct Failure {
 
 fn outline(shapes: &[&Shape], by_edge: &[bool], reach: &Reach) -> Result<(Loops, f64), Failure> {
     let mut raw = Raw::default();
+    let chain_m = CHAIN_RADII * reach.radius_m;
     for (s, &by_edge) in shapes.iter().zip(by_edge) {
         for ring in &s.rings {
             if by_edge {
@@ -428,15 +436,16 @@ fn outline(shapes: &[&Shape], by_edge: &[bool], reach: &Reach) -> Result<(Loops,
             }
         }
     }
-    let mut loops =
-        arrangement::positive_region(&raw, MERGE_SHARE * reach.margin_m).map_err(|d| Failure {
+    let mut loops = arrangement::positive_region(&raw, chain_m, MERGE_SHARE * reach.margin_m)
+        .map_err(|d| Failure {
             at: d.0,
             by_chance: true,
         })?;
-    let least_m = certificate::prove(shapes, &mut loops, reach.radius_m).map_err(|u| Failure {
-        at: u.0,
-        by_chance: false,
-    })?;
+    let least_m =
+        certificate::prove(shapes, &mut loops, reach.radius_m, chain_m).map_err(|u| Failure {
+            at: u.0,
+            by_chance: false,
+        })?;
     Ok((loops, least_m))
 }
 

@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use skein_planning::frame::Point;
-use skein_planning::geometry::offset::{Growth, Zone, grow};
+use skein_planning::geometry::offset::{Growth, Piece, Zone, grow, grow_exact};
 use skein_planning::math::{TAU, sin_cos};
 
 /// An outline is a violation from this share of the radius below it, so that nobody
@@ -31,6 +31,9 @@ pub struct OffsetArgs {
     /// Where the random numbers begin.
     #[arg(long, default_value_t = 1, value_name = "SEED")]
     pub seed: u64,
+    /// Outlines of lines and true arcs instead of tangent polygons.
+    #[arg(long)]
+    pub arcs: bool,
     /// Grow the same polygons with another library, too.
     #[cfg(feature = "rivals")]
     #[arg(long, value_enum)]
@@ -75,7 +78,8 @@ struct Answer {
     n: usize,
     vertices: usize,
     radius_m: f64,
-    not_simple: usize,
+    /// Polygons that were put right, for example because they cross themselves.
+    repaired: usize,
     max_margin_m: f64,
     #[serde(flatten)]
     figures: Figures,
@@ -97,18 +101,35 @@ pub fn run(args: &OffsetArgs) -> Result<String> {
         "--vertices must be from 3 to 100000"
     );
     let mut tally = Tally::new(args);
-    let (mut not_simple, mut max_margin_m) = (0, 0.0f64);
+    let (mut repairs, mut max_margin_m) = (0, 0.0f64);
     #[cfg(feature = "rivals")]
     let mut rival = args.against.map(|_| Tally::new(args));
     let mut random = Random(args.seed);
     for _ in 0..args.n {
         let zone = [draw(args, &mut random)];
-        let (answer, us) = timed(|| grow(&zone, &growth));
+        let answer = if args.arcs {
+            let (answer, us) = timed(|| grow_exact(&zone, args.radius_m));
+            answer.map(|g| {
+                let loops = g.regions.iter().flat_map(|r| r.loops()).map(chords);
+                (loops.collect(), g.united_m, !g.repairs.is_empty(), us)
+            })
+        } else {
+            let (answer, us) = timed(|| grow(&zone, &growth));
+            answer.map(|g| {
+                let rings: Vec<Vec<Point>> = g
+                    .regions
+                    .iter()
+                    .flat_map(|r| r.rings())
+                    .map(<[Point]>::to_vec)
+                    .collect();
+                (rings, g.margin_m, !g.repairs.is_empty(), us)
+            })
+        };
         match answer {
-            Ok(g) => {
-                not_simple += usize::from(!g.repairs.is_empty());
-                max_margin_m = max_margin_m.max(g.margin_m);
-                let rings: Vec<&[Point]> = g.regions.iter().flat_map(|r| r.rings()).collect();
+            Ok((rings, margin_m, repaired, us)) => {
+                repairs += usize::from(repaired);
+                max_margin_m = max_margin_m.max(margin_m);
+                let rings: Vec<&[Point]> = rings.iter().map(Vec::as_slice).collect();
                 tally.add(&zone[0], &rings, us);
             }
             Err(_) => tally.refused += 1,
@@ -127,7 +148,7 @@ pub fn run(args: &OffsetArgs) -> Result<String> {
         n: args.n,
         vertices: args.vertices,
         radius_m: args.radius_m,
-        not_simple,
+        repaired: repairs,
         max_margin_m,
         ratio: rival
             .as_ref()
@@ -137,9 +158,27 @@ pub fn run(args: &OffsetArgs) -> Result<String> {
     })?)
 }
 
+/// Chords of an arc that are measured in its place.
+const CHORDS: usize = 512;
+
+/// Polylines with their corners on the arcs; their chords are nearer to the zone by
+/// the sagitta, less than a share of 5e-6 of the radius for half a circle.
+fn chords(pieces: &[Piece]) -> Vec<Point> {
+    let mut ring = Vec::new();
+    for p in pieces {
+        let n = match p {
+            Piece::Line { .. } => 1,
+            Piece::Arc { .. } => CHORDS,
+        };
+        ring.extend((0..n).map(|i| p.at(i as f64 / n as f64)));
+    }
+    ring
+}
+
 /// Errors and times of one library.
 struct Tally {
     radius_m: f64,
+    arcs: bool,
     violations: usize,
     violations_1_percent: usize,
     refused: usize,
@@ -152,6 +191,7 @@ impl Tally {
     fn new(args: &OffsetArgs) -> Self {
         Self {
             radius_m: args.radius_m,
+            arcs: args.arcs,
             violations: 0,
             violations_1_percent: 0,
             refused: 0,
@@ -187,8 +227,9 @@ impl Tally {
         // An outline that keeps its distance may still not be around the zone.
         let enclosed: i32 = rings.iter().map(|r| winding(r, ring[0])).sum();
         self.least_m = self.least_m.min(least);
+        let sagitta = if self.arcs { 5e-6 } else { 0.0 };
         let below = |share: f64| usize::from(least < self.radius_m * share || enclosed != 1);
-        self.violations += below(1.0 - ROUNDING);
+        self.violations += below(1.0 - ROUNDING - sagitta);
         self.violations_1_percent += below(0.99);
     }
 
@@ -311,6 +352,7 @@ mod tests {
                 radius_m: 30.0,
                 kind,
                 seed: 7,
+                arcs: false,
                 #[cfg(feature = "rivals")]
                 against: None,
             })

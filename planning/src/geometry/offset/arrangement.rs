@@ -4,7 +4,7 @@
 //! the caller moves every vertex a little and asks again. Whether the answer means
 //! what it should is left to the certificate (D2.7 §2.3.1).
 
-use super::boxes::{Bounds, overlaps, sort};
+use super::boxes::{Bounds, Chains};
 use super::raw::{Raw, Source};
 use super::shape::{double_area, small, winding};
 use crate::frame::Point;
@@ -76,16 +76,17 @@ struct Entry {
 
 /// The loops of the boundary, the region on their left.
 ///
-/// `merge_m` is the length below which an edge of the boundary is dropped.
+/// `chain_m` is the size of neighbouring edges that are looked at together, and
+/// `merge_m` the length below which an edge of the boundary is dropped.
 ///
 /// # Complexity
 /// A sweep over the boxes of n edges, then O(k log k) for k crossings.
 ///
 /// # Errors
 /// [`Degenerate`] when a turn has no sign or the windings contradict each other.
-pub(super) fn positive_region(raw: &Raw, merge_m: f64) -> Result<Loops, Degenerate> {
+pub(super) fn positive_region(raw: &Raw, chain_m: f64, merge_m: f64) -> Result<Loops, Degenerate> {
     let next = successors(raw);
-    let entries = crossings(raw, &next)?;
+    let entries = crossings(raw, &next, chain_m)?;
     let arrangement = Arrangement::new(raw, next, entries);
     let right = arrangement.windings()?;
     arrangement.trace(&right, merge_m)
@@ -107,15 +108,12 @@ fn turn(a: Point, b: Point, c: Point) -> f64 {
 }
 
 /// All proper crossings, two entries each, sorted by edge and place on it.
-fn crossings(raw: &Raw, next: &[u32]) -> Result<Vec<Entry>, Degenerate> {
+fn crossings(raw: &Raw, next: &[u32], chain_m: f64) -> Result<Vec<Entry>, Degenerate> {
     let p = &raw.points;
-    let mut boxes: Vec<Bounds> = (0..p.len())
-        .map(|i| Bounds::of(p[i], p[next[i] as usize], small(i)))
-        .collect();
-    sort(&mut boxes);
+    let chains = Chains::new(p, &raw.ends, chain_m);
     let mut entries: Vec<Entry> = Vec::new();
     let mut count = 0;
-    overlaps(&boxes, |e, f| {
+    chains.overlaps(|e, f| {
         if next[e as usize] == f || next[f as usize] == e {
             return Ok(());
         }

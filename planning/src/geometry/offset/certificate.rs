@@ -7,7 +7,7 @@
 //! meet no loop, so with that one point all of them are inside.
 
 use super::arrangement::Loops;
-use super::boxes::{Bounds, overlaps, overlaps_between, sort};
+use super::boxes::{Bounds, Chains, sort};
 use super::raw::Source;
 use super::shape::{Shape, double_area, small, winding};
 use crate::frame::Point;
@@ -26,9 +26,14 @@ pub(super) struct Unproven(pub(super) Source);
 ///
 /// # Errors
 /// [`Unproven`] when an edge comes too near, loops touch, or a zone is not enclosed.
-pub(super) fn prove(shapes: &[&Shape], loops: &mut Loops, radius_m: f64) -> Result<f64, Unproven> {
+pub(super) fn prove(
+    shapes: &[&Shape],
+    loops: &mut Loops,
+    radius_m: f64,
+    chain_m: f64,
+) -> Result<f64, Unproven> {
     keep(loops, |ring| !shapes.iter().any(|s| s.contains(ring[0])));
-    let mut outline = Outline::of(loops);
+    let mut outline = Outline::of(loops, chain_m);
     let mut least = distances(shapes, &outline, radius_m)?;
     if least.too_near.iter().any(|&n| n) {
         // Where a disc surrounds a whole hole, the windings of the two rings cancel
@@ -38,13 +43,13 @@ pub(super) fn prove(shapes: &[&Shape], loops: &mut Loops, radius_m: f64) -> Resu
             number += 1;
             !(least.too_near[number - 1] && double_area(ring) < 0.0)
         });
-        outline = Outline::of(loops);
+        outline = Outline::of(loops, chain_m);
         least = distances(shapes, &outline, radius_m)?;
         if let Some(place) = least.place {
             return Err(Unproven(place));
         }
     }
-    simple(&mut outline).map_err(|()| Unproven(first_of(shapes[0])))?;
+    simple(&outline).map_err(|()| Unproven(first_of(shapes[0])))?;
     for s in shapes {
         let p = s.rings[0].points[0];
         if loops.iter().map(|r| winding(r, p)).sum::<i32>() != 1 {
@@ -81,7 +86,7 @@ fn keep(loops: &mut Loops, mut good: impl FnMut(&[Point]) -> bool) {
 
 /// The edges of all loops.
 struct Outline {
-    boxes: Vec<Bounds>,
+    chains: Chains,
     edges: Vec<Edge>,
 }
 
@@ -95,7 +100,7 @@ struct Edge {
 }
 
 impl Outline {
-    fn of(loops: &Loops) -> Self {
+    fn of(loops: &Loops, chain_m: f64) -> Self {
         let mut edges: Vec<Edge> = Vec::with_capacity(loops.points.len());
         let mut first = 0;
         for (ring, points) in loops.iter().enumerate() {
@@ -108,12 +113,8 @@ impl Outline {
             }));
             first += n;
         }
-        let boxes = edges
-            .iter()
-            .enumerate()
-            .map(|(i, e)| Bounds::of(e.a, e.b, small(i)))
-            .collect();
-        Self { boxes, edges }
+        let chains = Chains::new(&loops.points, &loops.ends, chain_m);
+        Self { chains, edges }
     }
 }
 
@@ -140,13 +141,14 @@ fn distances(shapes: &[&Shape], outline: &Outline, radius_m: f64) -> Result<Dist
     for s in shapes {
         for r in &s.rings {
             let edges: Vec<(Point, Point)> = r.edges().collect();
-            let near: Vec<Bounds> = edges
+            let mut near: Vec<Bounds> = edges
                 .iter()
                 .enumerate()
                 // A little more than the radius, so that the tangent edges count.
                 .map(|(i, e)| Bounds::of(e.0, e.1, small(i)).grown(radius_m * (1.0 + 1e-6) + 1e-4))
                 .collect();
-            let done: Result<(), ()> = overlaps_between(&near, &outline.boxes, |i, j| {
+            sort(&mut near);
+            let done: Result<(), ()> = outline.chains.overlaps_with(&near, |i, j| {
                 let (a, b) = edges[i as usize];
                 let e = outline.edges[j as usize];
                 let d = gap_squared(a, b, e.a, e.b);
@@ -199,14 +201,13 @@ pub(super) fn is_simple(shape: &Shape) -> bool {
         rings.points.extend_from_slice(&r.points);
         rings.ends.push(rings.points.len());
     }
-    simple(&mut Outline::of(&rings)).is_ok()
+    simple(&Outline::of(&rings, 0.0)).is_ok()
 }
 
 /// Whether no two edges have more in common than the vertex between them.
-fn simple(outline: &mut Outline) -> Result<(), ()> {
-    sort(&mut outline.boxes);
+fn simple(outline: &Outline) -> Result<(), ()> {
     let edges = &outline.edges;
-    overlaps(&outline.boxes, |i, j| {
+    outline.chains.overlaps(|i, j| {
         let (e, f) = (edges[i as usize], edges[j as usize]);
         let contact = if e.next == j {
             folds_back(e.a, e.b, f.b)
