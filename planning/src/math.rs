@@ -4,6 +4,8 @@
 //! differently; peers must agree to the bit, so these go through `libm`.
 //! Square roots, sums and products are exact by IEEE 754 and need no care.
 
+pub mod kernels;
+
 pub use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Sine of an angle in radians.
