@@ -207,6 +207,16 @@ impl Mesh {
         );
     }
 
+    /// Calls `visit` with every cell that contains `p`.
+    #[inline]
+    pub(crate) fn for_cells_at(&self, p: Point, mut visit: impl FnMut(u32)) {
+        for &cell in self.buckets.at(p) {
+            if self.cell_contains(cell, p) {
+                visit(cell);
+            }
+        }
+    }
+
     fn cell_contains(&self, cell: u32, p: Point) -> bool {
         let first = self.starts[cell as usize] as usize;
         let last = self.starts[cell as usize + 1] as usize;

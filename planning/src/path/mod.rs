@@ -6,9 +6,13 @@
 //! them where no Dubins word is clear. A curve that fails its check is refused,
 //! never clipped.
 
+pub mod continuous;
+#[cfg(test)]
+mod crowded;
 mod loose_ends;
 pub mod mesh;
 mod search;
+mod sight;
 #[cfg(test)]
 mod tests;
 pub mod two_point;

@@ -11,16 +11,14 @@
 //!
 //! One source with many goals is the business of [`super::continuous`].
 
-use super::mesh::{Mesh, NONE, turn};
+use super::mesh::{Mesh, NONE};
+use super::sight::{self, Ray, SOURCE, View, Watcher};
 use crate::frame::Point;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// Marks a bound of sight that is the straight continuation of the way to the root.
 const STRAIGHT_ON: u32 = NONE - 1;
-
-/// The start of the path, as the root of a sight.
-const SOURCE: u32 = NONE - 2;
 
 /// Something left to look at, with a lower bound of the paths through it.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +38,18 @@ struct Node {
     right: u32,
 }
 
+impl Node {
+    /// The start itself.
+    const START: Self = Self {
+        bound_m: 0.0,
+        root_m: 0.0,
+        root: SOURCE,
+        edge: NONE,
+        left: NONE,
+        right: NONE,
+    };
+}
+
 /// The best way to a vertex so far.
 #[derive(Clone, Copy, Debug)]
 struct Label {
@@ -48,17 +58,6 @@ struct Label {
     query: u32,
     /// The bend before, or [`SOURCE`].
     before: u32,
-}
-
-/// A straight line through two points, for exact side tests.
-#[derive(Clone, Copy)]
-struct Ray(Point, Point);
-
-impl Ray {
-    #[inline]
-    fn side(self, p: Point) -> f64 {
-        turn(self.0, self.1, p)
-    }
 }
 
 /// Two-point queries on one mesh; keeps its memory between queries.
@@ -80,6 +79,8 @@ pub struct Search<'m> {
     to: Point,
     best_m: f64,
     best_root: u32,
+    /// The node being opened.
+    opened: Node,
 }
 
 impl<'m> Search<'m> {
@@ -107,6 +108,7 @@ impl<'m> Search<'m> {
             to: Point::origin(),
             best_m: f64::INFINITY,
             best_root: NONE,
+            opened: Node::START,
         }
     }
 
@@ -156,7 +158,11 @@ impl<'m> Search<'m> {
             self.best_root = SOURCE;
             return Some(self.best_m);
         }
-        self.look_from_start();
+        let mesh = self.mesh;
+        self.opened = Node::START;
+        for i in 0..self.from_cells.len() {
+            sight::look_from_start(self, mesh, self.from_cells[i]);
+        }
         while let Some(node) = self.next_node() {
             if node.bound_m >= self.best_m {
                 break;
@@ -166,10 +172,18 @@ impl<'m> Search<'m> {
             if stale {
                 continue;
             }
+            self.opened = node;
             if node.edge == NONE {
-                self.look_round(node);
+                sight::look_round(self, mesh, node.root);
             } else {
-                self.look_through(node);
+                self.look_for_goal(&node);
+                let view = View {
+                    root: node.root,
+                    edge: node.edge,
+                    left: node.left,
+                    right: node.right,
+                };
+                sight::look_through(self, mesh, view);
             }
         }
         self.best_m.is_finite().then_some(self.best_m)
@@ -219,13 +233,6 @@ impl<'m> Search<'m> {
         joined
     }
 
-    #[inline]
-    fn is_useful(&self, cell: u32) -> bool {
-        let above = self.mesh.blocks.above[cell as usize];
-        (above != NONE && self.block_marks[above as usize] == self.query)
-            || self.cell_marks[cell as usize] == self.query
-    }
-
     fn next_node(&mut self) -> Option<Node> {
         let top = self.heap.peek().map(|&(Reverse(key), _)| key);
         if let Some(node) = self.carried.take() {
@@ -259,105 +266,6 @@ impl<'m> Search<'m> {
         }
     }
 
-    #[inline]
-    fn at(&self, root: u32) -> Point {
-        if root == SOURCE {
-            self.from
-        } else {
-            self.mesh.vertices[root as usize].at
-        }
-    }
-
-    /// The line of a bound of sight.
-    #[inline]
-    fn ray(&self, root: u32, bound: u32) -> Ray {
-        if bound == STRAIGHT_ON {
-            let before = self.labels[root as usize].before;
-            Ray(self.at(before), self.at(root))
-        } else {
-            Ray(self.at(root), self.at(bound))
-        }
-    }
-
-    /// Everything the start sees in its own cells.
-    fn look_from_start(&mut self) {
-        for i in 0..self.from_cells.len() {
-            let cell = self.from_cells[i] as usize;
-            for j in self.mesh.starts[cell]..self.mesh.starts[cell + 1] {
-                let a = self.mesh.edges[j as usize];
-                let b = self.mesh.edges[self.mesh.next(j) as usize];
-                self.see_vertex(SOURCE, 0.0, a.vertex);
-                if turn(self.from, a.origin, b.origin) > 0.0 {
-                    self.see_side(0.0, SOURCE, 0.0, j, b.vertex, a.vertex);
-                }
-            }
-        }
-    }
-
-    /// A path may bend at `vertex`, seen straight from `root`.
-    fn see_vertex(&mut self, root: u32, root_m: f64, vertex: u32) {
-        let v = &self.mesh.vertices[vertex as usize];
-        if !v.corner {
-            return;
-        }
-        let origin = self.at(root);
-        let step_m = (v.at - origin).norm();
-        // The start on a corner sees all round anyway.
-        if step_m <= 0.0 {
-            return;
-        }
-        let length_m = root_m + step_m;
-        let label = &mut self.labels[vertex as usize];
-        // A way as long as the known one leads to nothing shorter: whatever only it
-        // can go on to without slack, another path reaches sooner.
-        if label.query == self.query && label.length_m <= length_m {
-            return;
-        }
-        *label = Label {
-            length_m,
-            query: self.query,
-            before: root,
-        };
-        let right = turn(origin, v.at, v.right_wall);
-        let left = turn(origin, v.at, v.left_wall);
-        if (right > 0.0 || left > 0.0) && (right < 0.0 || left < 0.0) {
-            return;
-        }
-        self.push(Node {
-            bound_m: length_m + (self.to - v.at).norm(),
-            root_m: length_m,
-            root: vertex,
-            edge: NONE,
-            left: NONE,
-            right: NONE,
-        });
-    }
-
-    /// The root sees through the side `edge` of a cell, between two rays.
-    fn see_side(
-        &mut self,
-        parent_m: f64,
-        root: u32,
-        root_m: f64,
-        edge: u32,
-        left: u32,
-        right: u32,
-    ) {
-        let e = &self.mesh.edges[edge as usize];
-        if e.twin == NONE || self.block_marks[e.block as usize] != self.query {
-            return;
-        }
-        let bound_m = self.bound_m(root, e.twin, left, right) + root_m;
-        self.push(Node {
-            bound_m: bound_m.max(parent_m),
-            root_m,
-            root,
-            edge: e.twin,
-            left,
-            right,
-        });
-    }
-
     /// The shortest line from the root through the sight to the goal or its mirror image.
     fn bound_m(&self, root: u32, edge: u32, left: u32, right: u32) -> f64 {
         let e = &self.mesh.edges[edge as usize];
@@ -387,174 +295,25 @@ impl<'m> Search<'m> {
         let x = if vertex == end.vertex {
             end.origin
         } else {
-            crossing(ray, a, b)
+            ray.crossing(a, b)
         };
         (x - origin).norm() + (to - x).norm()
     }
 
-    /// Carries a sight through a cell to its other sides.
-    fn look_through(&mut self, node: Node) {
-        let mesh = self.mesh;
-        let Node { root, root_m, .. } = node;
-        let right = self.ray(root, node.right);
-        let left = self.ray(root, node.left);
-        let cell = mesh.edges[node.edge as usize].cell;
+    /// Whether the goal lies in the cell that is looked into, and in sight.
+    fn look_for_goal(&mut self, node: &Node) {
+        let cell = self.mesh.edges[node.edge as usize].cell;
         if self.goal_marks[cell as usize] == self.query
-            && right.side(self.to) >= 0.0
-            && left.side(self.to) <= 0.0
+            && self.ray(node.root, node.right).side(self.to) >= 0.0
+            && self.ray(node.root, node.left).side(self.to) <= 0.0
         {
-            self.reach(root, root_m);
-        }
-        let mut j = mesh.next(node.edge);
-        let mut a = &mesh.edges[j as usize];
-        let mut a_right = if a.vertex == node.right {
-            0.0
-        } else {
-            right.side(a.origin)
-        };
-        // Several vertices may lie on the left ray; all are seen, nothing beyond them.
-        let mut at_left = false;
-        loop {
-            let k = mesh.next(j);
-            if k == node.edge && at_left {
-                return;
-            }
-            let b = &mesh.edges[k as usize];
-            let b_right = right.side(b.origin);
-            if b_right >= 0.0 {
-                let b_left = left.side(b.origin);
-                if b_left <= 0.0 && k != node.edge {
-                    self.see_vertex(root, root_m, b.vertex);
-                }
-                if b_right > 0.0 {
-                    if !at_left {
-                        let r = if a_right >= 0.0 { a.vertex } else { node.right };
-                        let l = if b_left <= 0.0 { b.vertex } else { node.left };
-                        self.see_side(node.bound_m, root, root_m, j, l, r);
-                    }
-                    if b_left > 0.0 {
-                        return;
-                    }
-                    at_left = b_left >= 0.0;
-                }
-            }
-            if k == node.edge {
-                return;
-            }
-            (j, a, a_right) = (k, b, b_right);
-        }
-    }
-
-    /// Opens a corner: what it sees between its wall and the straight way on.
-    fn look_round(&mut self, node: Node) {
-        let v = self.mesh.vertices[node.root as usize];
-        let on = self.ray(node.root, STRAIGHT_ON);
-        let right = on.side(v.right_wall);
-        let left = on.side(v.left_wall);
-        if right <= 0.0 && left <= 0.0 {
-            self.look_right(node, on, v.first);
-        }
-        if right >= 0.0 && left >= 0.0 {
-            self.look_left(node, on, v.last);
-        }
-    }
-
-    /// Bends right: from the wall on the right up to the straight way on.
-    fn look_right(&mut self, node: Node, on: Ray, first: u32) {
-        let mesh = self.mesh;
-        let origin = self.at(node.root);
-        let mut h = first;
-        loop {
-            let cell = mesh.edges[h as usize].cell;
-            let useful = self.is_useful(cell);
-            if useful && self.goal_marks[cell as usize] == self.query {
-                self.reach(node.root, node.root_m);
-            }
-            let end = mesh.previous(h);
-            let mut j = mesh.next(h);
-            let mut a = &mesh.edges[j as usize];
-            let mut a_on = on.side(a.origin);
-            if useful {
-                self.see_vertex(node.root, node.root_m, a.vertex);
-            }
-            while j != end {
-                let k = mesh.next(j);
-                let b = &mesh.edges[k as usize];
-                let b_on = on.side(b.origin);
-                if useful {
-                    if b_on <= 0.0 {
-                        self.see_vertex(node.root, node.root_m, b.vertex);
-                    }
-                    if a_on < 0.0 && turn(origin, a.origin, b.origin) > 0.0 {
-                        let l = if b_on <= 0.0 { b.vertex } else { STRAIGHT_ON };
-                        self.see_side(node.bound_m, node.root, node.root_m, j, l, a.vertex);
-                    }
-                }
-                if b_on > 0.0 {
-                    return;
-                }
-                (j, a, a_on) = (k, b, b_on);
-            }
-            if a_on >= 0.0 {
-                return;
-            }
-            h = mesh.edges[end as usize].twin;
-            if h == NONE {
-                return;
-            }
-        }
-    }
-
-    /// Bends left: from the wall on the left down to the straight way on.
-    fn look_left(&mut self, node: Node, on: Ray, last: u32) {
-        let mesh = self.mesh;
-        let origin = self.at(node.root);
-        let mut h = last;
-        loop {
-            let cell = mesh.edges[h as usize].cell;
-            let useful = self.is_useful(cell);
-            if useful && self.goal_marks[cell as usize] == self.query {
-                self.reach(node.root, node.root_m);
-            }
-            let end = mesh.next(h);
-            let mut k = mesh.previous(h);
-            let mut b = &mesh.edges[k as usize];
-            let mut b_on = on.side(b.origin);
-            if useful {
-                self.see_vertex(node.root, node.root_m, b.vertex);
-            }
-            while k != end {
-                let j = mesh.previous(k);
-                let a = &mesh.edges[j as usize];
-                let a_on = on.side(a.origin);
-                if useful {
-                    if a_on >= 0.0 {
-                        self.see_vertex(node.root, node.root_m, a.vertex);
-                    }
-                    if b_on > 0.0 && turn(origin, a.origin, b.origin) > 0.0 {
-                        let r = if a_on >= 0.0 { a.vertex } else { STRAIGHT_ON };
-                        self.see_side(node.bound_m, node.root, node.root_m, j, b.vertex, r);
-                    }
-                }
-                if a_on < 0.0 {
-                    return;
-                }
-                (k, b, b_on) = (j, a, a_on);
-            }
-            if b_on <= 0.0 {
-                return;
-            }
-            let twin = mesh.edges[h as usize].twin;
-            if twin == NONE {
-                return;
-            }
-            h = mesh.next(twin);
+            self.reach(node.root);
         }
     }
 
     /// The goal is seen straight from `root`.
-    fn reach(&mut self, root: u32, root_m: f64) {
-        let length_m = root_m + (self.to - self.at(root)).norm();
+    fn reach(&mut self, root: u32) {
+        let length_m = self.opened.root_m + (self.to - self.at(root)).norm();
         if length_m < self.best_m {
             self.best_m = length_m;
             self.best_root = root;
@@ -562,16 +321,109 @@ impl<'m> Search<'m> {
     }
 }
 
-/// Where a ray meets the line through `a` and `b`, kept between them; for bounds only.
-fn crossing(ray: Ray, a: Point, b: Point) -> Point {
-    let d = ray.1 - ray.0;
-    let to_a = d.perp(&(a - ray.0));
-    let to_b = d.perp(&(b - ray.0));
-    let span = to_a - to_b;
-    if span.abs() > 0.0 {
-        a + (b - a) * (to_a / span).clamp(0.0, 1.0)
-    } else {
-        a
+impl Watcher for Search<'_> {
+    type Bound = u32;
+
+    #[inline]
+    fn through(&self, vertex: u32) -> u32 {
+        vertex
+    }
+
+    #[inline]
+    fn straight_on(&self) -> u32 {
+        STRAIGHT_ON
+    }
+
+    #[inline]
+    fn vertex_of(&self, bound: u32) -> u32 {
+        bound
+    }
+
+    #[inline]
+    fn ray(&self, root: u32, bound: u32) -> Ray {
+        if bound == STRAIGHT_ON {
+            let before = self.labels[root as usize].before;
+            Ray(self.at(before), self.at(root))
+        } else {
+            Ray(self.at(root), self.at(bound))
+        }
+    }
+
+    #[inline]
+    fn at(&self, root: u32) -> Point {
+        if root == SOURCE {
+            self.from
+        } else {
+            self.mesh.vertices[root as usize].at
+        }
+    }
+
+    #[inline]
+    fn is_open(&self, cell: u32) -> bool {
+        let above = self.mesh.blocks.above[cell as usize];
+        (above != NONE && self.block_marks[above as usize] == self.query)
+            || self.cell_marks[cell as usize] == self.query
+    }
+
+    #[inline]
+    fn see_cell(&mut self, root: u32, cell: u32) {
+        if self.goal_marks[cell as usize] == self.query {
+            self.reach(root);
+        }
+    }
+
+    fn see_vertex(&mut self, root: u32, vertex: u32) {
+        let v = &self.mesh.vertices[vertex as usize];
+        if !v.corner {
+            return;
+        }
+        let origin = self.at(root);
+        let step_m = (v.at - origin).norm();
+        // The start on a corner sees all round anyway.
+        if step_m <= 0.0 {
+            return;
+        }
+        let length_m = self.opened.root_m + step_m;
+        let label = &mut self.labels[vertex as usize];
+        // A way as long as the known one leads to nothing shorter: whatever only it
+        // can go on to without slack, another path reaches sooner.
+        if label.query == self.query && label.length_m <= length_m {
+            return;
+        }
+        *label = Label {
+            length_m,
+            query: self.query,
+            before: root,
+        };
+        if sight::bends(self.mesh, origin, vertex) == (false, false) {
+            return;
+        }
+        self.push(Node {
+            bound_m: length_m + (self.to - v.at).norm(),
+            root_m: length_m,
+            root: vertex,
+            edge: NONE,
+            left: NONE,
+            right: NONE,
+        });
+    }
+
+    #[inline]
+    fn see_side(&mut self, root: u32, edge: u32, left: u32, right: u32) {
+        let e = &self.mesh.edges[edge as usize];
+        if e.twin == NONE || self.block_marks[e.block as usize] != self.query {
+            return;
+        }
+        let root_m = self.opened.root_m;
+        let bound_m = self.bound_m(root, e.twin, left, right) + root_m;
+        self.push(Node {
+            bound_m: bound_m.max(self.opened.bound_m),
+            root_m,
+            root,
+            edge: e.twin,
+            left,
+            right,
+        });
     }
 }
 
@@ -579,30 +431,8 @@ fn crossing(ray: Ray, a: Point, b: Point) -> Point {
 mod tests {
     use super::*;
     use crate::geometry::polygon::side;
+    use crate::path::crowded::{Rings, crowded, mesh_of, square};
     use proptest::prelude::*;
-
-    type Rings = Vec<Vec<Point>>;
-
-    fn square(x: f64, y: f64, side: f64) -> Vec<Point> {
-        [(x, y), (x + side, y), (x + side, y + side), (x, y + side)]
-            .map(|(x, y)| Point::new(x, y))
-            .to_vec()
-    }
-
-    fn mesh_of(rings: &Rings) -> Mesh {
-        let rings: Vec<&[Point]> = rings.iter().map(Vec::as_slice).collect();
-        Mesh::from_rings(&rings).unwrap()
-    }
-
-    /// Boxes on a coarse grid: they share corners and lines, and all is collinear.
-    fn crowded(cells: &[bool], n: usize, offset: f64) -> Rings {
-        let mut rings = vec![square(offset, offset, n as f64 * 10.0)];
-        for (i, _) in cells.iter().enumerate().filter(|(_, full)| **full) {
-            let (x, y) = ((i % n) as f64 * 10.0, (i / n) as f64 * 10.0);
-            rings.push(square(offset + x, offset + y, 10.0));
-        }
-        rings
-    }
 
     /// The oracle: Dijkstra over all points that see each other, where sight is
     /// tested box by box: a line is blocked if it enters the inside of a box, or
@@ -619,8 +449,6 @@ mod tests {
                 points.push(Point::new(i as f64 * 10.0, j as f64 * 10.0));
             }
         }
-        // Each corner of the grid is split into its free quarters; a point is
-        // entered through one of the quarters that are joined round it.
         let sees = |a: Point, b: Point| {
             let d = b - a;
             let steps = (d.norm() / 0.05).ceil() as usize;
@@ -644,7 +472,7 @@ mod tests {
             done[i] = true;
             for j in 0..m {
                 let step = (points[j] - points[i]).norm();
-                if !done[j] && step > 0.0 && sees(points[i], points[j]) {
+                if !done[j] && sees(points[i], points[j]) {
                     best[j] = best[j].min(best[i] + step);
                 }
             }

@@ -5,6 +5,7 @@ use crate::navmesh::{self, Query};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use skein_planning::path::continuous::{Effort, PathMap};
 use skein_planning::path::mesh::Mesh;
 use skein_planning::path::two_point::Search;
 use std::hint::black_box;
@@ -16,6 +17,12 @@ const EXACT: f64 = 1e-9;
 /// Runs over all queries before and besides the one that is timed; the best is kept,
 /// because every other run was disturbed by something else on the machine.
 const ROUNDS: usize = 3;
+
+/// Maps built, from sources evenly spread over the queries.
+const MAPS: usize = 16;
+
+/// Goals of each map that are compared with two-point queries.
+const CHECKS: usize = 100;
 
 /// A mesh, and queries with reference lengths.
 #[derive(Debug, Args)]
@@ -50,10 +57,28 @@ struct Figures {
     times: Times,
 }
 
+/// Shortest path maps: lengths against two-point queries, and times.
+#[derive(Serialize)]
+struct MapFigures {
+    map_n: usize,
+    map_max_rel_error: f64,
+    map_mismatches: usize,
+    /// Mean over the maps.
+    map_build_ms: f64,
+    /// Mean of one distance query.
+    map_query_us: f64,
+    /// Most windows of any map, and most of them on one side of a cell.
+    map_windows: usize,
+    map_windows_kept: usize,
+    map_most_on_a_side: usize,
+}
+
 #[derive(Serialize)]
 struct Answer {
     #[serde(flatten)]
     ours: Figures,
+    #[serde(flatten)]
+    maps: MapFigures,
     vertices: usize,
     cells: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -83,6 +108,7 @@ pub fn run(args: &RouteArgs) -> Result<String> {
         cells: mesh.n_cells(),
         ratio: rival.as_ref().map(|r| ours.times.mean_us / r.times.mean_us),
         ours,
+        maps: maps(&mesh, &queries),
         rival,
     })?)
 }
@@ -105,6 +131,56 @@ fn two_point(mesh: &Mesh, queries: &[Query], build_ms: f64) -> Figures {
             f64::NAN
         }
     })
+}
+
+fn maps(mesh: &Mesh, queries: &[Query]) -> MapFigures {
+    let mut search = Search::new(mesh);
+    let (mut n, mut max_rel_error, mut mismatches) = (0, 0.0f64, 0);
+    let (mut build_us, mut query_us, mut built) = (0.0, 0.0, 0);
+    let mut effort = Effort::default();
+    for source in queries.iter().step_by(queries.len().div_ceil(MAPS).max(1)) {
+        let (map, us) = timed(|| PathMap::new(mesh, source.from));
+        built += 1;
+        build_us += us;
+        let most = map.effort();
+        effort.windows = effort.windows.max(most.windows);
+        effort.kept = effort.kept.max(most.kept);
+        effort.most_on_a_side = effort.most_on_a_side.max(most.most_on_a_side);
+        let ((), us) = timed(|| {
+            for q in queries {
+                black_box(map.distance_m(black_box(q.to)));
+            }
+        });
+        query_us += us / queries.len() as f64;
+        let others = queries.iter().step_by(queries.len().div_ceil(CHECKS));
+        for goal in others.chain(std::iter::once(source)) {
+            n += 1;
+            let pair = (
+                map.distance_m(goal.to),
+                search.distance_m(source.from, goal.to),
+            );
+            match pair {
+                (Some(a), Some(b)) => {
+                    let error = (a - b).abs() / b.max(1.0);
+                    max_rel_error = max_rel_error.max(error);
+                    mismatches += usize::from(error > EXACT);
+                }
+                (None, None) => {}
+                _ => mismatches += 1,
+            }
+        }
+    }
+    let n_maps = f64::from(built.max(1));
+    MapFigures {
+        map_n: n,
+        map_max_rel_error: max_rel_error,
+        map_mismatches: mismatches,
+        map_build_ms: build_us / 1e3 / n_maps,
+        map_query_us: query_us / n_maps,
+        map_windows: effort.windows,
+        map_windows_kept: effort.kept,
+        map_most_on_a_side: effort.most_on_a_side,
+    }
 }
 
 /// Times each query in several rounds, keeps the best round, and compares all lengths.
