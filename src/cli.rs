@@ -9,6 +9,7 @@ use crate::trial::TrialArgs;
 use crate::{chaos, check, exit, observe, peer, sim, trial};
 use clap::{Parser, Subcommand};
 use skein_workbench::bench::BenchArgs;
+use skein_workbench::plan::PlanArgs;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
@@ -45,6 +46,8 @@ pub enum Verb {
     Check(CheckArgs),
     /// Measures a planner and prints one JSON object.
     Bench(BenchArgs),
+    /// Plans for a person, from files as other programs write them.
+    Plan(PlanArgs),
     /// Outlives a trial and ends what it leaves behind.
     #[command(name = skein_broker::process::GUARD_COMMAND, hide = true)]
     Guard,
@@ -74,6 +77,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Observe(args) => observe::run(args),
         Verb::Check(args) => check::run(args),
         Verb::Bench(args) => Ok(exit::print(skein_workbench::bench::run(args))),
+        Verb::Plan(args) => Ok(exit::print(skein_workbench::plan::run(args))),
         Verb::Guard => {
             skein_broker::process::guard();
             Ok(ExitCode::from(exit::OK))

@@ -2,6 +2,7 @@
 
 use clap::{Parser, Subcommand};
 use skein_workbench::bench::BenchArgs;
+use skein_workbench::plan::PlanArgs;
 use std::process::ExitCode;
 
 /// Plans for a person, and measurements of the planners.
@@ -16,11 +17,14 @@ struct Cli {
 enum Verb {
     /// Measures a planner and prints one JSON object.
     Bench(BenchArgs),
+    /// Plans for a person, from files as other programs write them.
+    Plan(PlanArgs),
 }
 
 fn main() -> ExitCode {
     let answer = match &Cli::parse().verb {
         Verb::Bench(args) => skein_workbench::bench::run(args),
+        Verb::Plan(args) => skein_workbench::plan::run(args),
     };
     match answer {
         Ok(text) => {

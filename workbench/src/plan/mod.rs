@@ -1,0 +1,78 @@
+//! `plan`: a plan for a person, from files as other programs write them.
+
+mod map;
+pub mod route;
+
+use anyhow::{Context, Result, ensure};
+use clap::{Args, Subcommand};
+use skein_interop::place::LatLon;
+
+/// What to plan.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// The kind of plan.
+    #[command(subcommand)]
+    pub subject: Subject,
+}
+
+/// The kinds of plans.
+#[derive(Debug, Subcommand)]
+pub enum Subject {
+    /// The shortest way from one place to another round the no-fly zones of a file.
+    Route(route::RouteArgs),
+}
+
+/// Plans, and returns the text to print.
+///
+/// # Errors
+/// When a file is missing or malformed, or there is no such plan; the error names
+/// the place.
+pub fn run(args: &PlanArgs) -> Result<String> {
+    match &args.subject {
+        Subject::Route(args) => route::run(args),
+    }
+}
+
+/// Reads `LAT,LON` in degrees.
+fn lat_lon(text: &str) -> Result<LatLon> {
+    let (lat, lon) = text
+        .split_once(',')
+        .with_context(|| format!("{text:?} is not LAT,LON, for example 47.3975,8.5460"))?;
+    let degrees = |part: &str, what: &str, limit: f64| -> Result<f64> {
+        let n: f64 = part
+            .trim()
+            .parse()
+            .with_context(|| format!("{:?} is no {what} in degrees", part.trim()))?;
+        ensure!(
+            n.abs() <= limit,
+            "a {what} of {n} is beyond {limit} degrees"
+        );
+        Ok(n)
+    };
+    Ok(LatLon {
+        lat_deg: degrees(lat, "latitude", 90.0)?,
+        lon_deg: degrees(lon, "longitude", 180.0)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_a_latitude_and_a_longitude() {
+        let at = lat_lon("-33.5, 151.25").unwrap();
+        assert!((at.lat_deg + 33.5).abs() < 1e-12 && (at.lon_deg - 151.25).abs() < 1e-12);
+        for (bad, says) in [
+            ("33.5", "is not LAT,LON"),
+            ("x,1", "\"x\" is no latitude"),
+            ("1,", "\"\" is no longitude"),
+            ("91,1", "beyond 90"),
+            ("1,181", "beyond 180"),
+            ("NaN,1", "beyond 90"),
+        ] {
+            let error = lat_lon(bad).unwrap_err().to_string();
+            assert!(error.contains(says), "{bad}: {error}");
+        }
+    }
+}
