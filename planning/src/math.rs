@@ -50,6 +50,18 @@ pub fn asin(s: f64) -> f64 {
     libm::asin(s.clamp(-1.0, 1.0))
 }
 
+/// Natural logarithm.
+#[must_use]
+pub fn ln(x: f64) -> f64 {
+    libm::log(x)
+}
+
+/// The exponential function.
+#[must_use]
+pub fn exp(x: f64) -> f64 {
+    libm::exp(x)
+}
+
 /// Length of the vector `(x, y)`.
 #[must_use]
 pub fn hypot(x: f64, y: f64) -> f64 {

@@ -1,4 +1,7 @@
-//! Coverage planning (D2.7 §3.4–3.6). This slice holds area coverage.
+//! Coverage planning (D2.7 §3.4–3.6): points, lines and strips, areas.
 
 pub mod area;
+mod dice;
 pub mod grid;
+pub mod line;
+pub mod metric;

@@ -3,6 +3,7 @@
 pub mod cover;
 pub mod dubins;
 pub mod figures;
+pub mod line;
 pub mod offset;
 pub mod route;
 pub mod route_polygons;
@@ -33,6 +34,8 @@ pub enum Subject {
     Offset(offset::OffsetArgs),
     /// Shortest paths on a mesh, against reference lengths.
     Route(route::RouteArgs),
+    /// Tours of a team along all roads of a network.
+    Line(line::LineArgs),
 }
 
 /// Measures, and returns the JSON text to print.
@@ -47,5 +50,6 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
         Subject::Wind(args) => wind::run(args),
         Subject::Offset(args) => offset::run(args),
         Subject::Route(args) => route::run(args),
+        Subject::Line(args) => line::run(args),
     }
 }

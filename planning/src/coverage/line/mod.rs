@@ -1,0 +1,150 @@
+//! Line and strip coverage: the rural postman, for one UAV and for a team (D2.7 §3.5).
+//!
+//! D2.7 states the min-max k-rural-postman problem and has no algorithm for it. Here:
+//! pair up the places where an odd number of lines end, join what is apart, walk it;
+//! cut the walk into one tour a UAV; move lines between the tours until the longest
+//! stops shrinking.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `network` | lines, team, tours |
+//! | `blossom`, `matching` | the cheapest pairing of places, exact |
+//! | `postman` | one tour along all lines |
+//! | `split` | one tour cut into several |
+//! | `improve` | local search on the longest tour |
+//! | `trim` | what is left out when endurance is short |
+//! | `bound` | what no plan can beat |
+//!
+//! Wind: on closed tours a constant wind is a symmetric cost
+//! ([`crate::coverage::metric::InWind`]), so nothing here needs to know of it, unless
+//! lines are flown at another airspeed than deadheads: then they have two costs.
+//!
+//! ```
+//! use skein_planning::coverage::line::{Line, Surveyor, plan};
+//! use skein_planning::coverage::metric::{Metric, Straight};
+//! use skein_planning::frame::Point;
+//! // Three sides of a square: the fourth is the only deadhead.
+//! let at = [(0.0, 0.0), (100.0, 0.0), (100.0, 100.0), (0.0, 100.0)];
+//! let at: Vec<Point> = at.iter().map(|&(x, y)| Point::new(x, y)).collect();
+//! let roads = Straight(&at);
+//! let lines: Vec<Line> = (0..3).map(|i| Line::new(i, i + 1, roads.cost(i, i + 1))).collect();
+//! let plan = plan(&lines, &[Surveyor::at(0)], &roads, 1000).unwrap();
+//! assert!((plan.makespan - 400.0).abs() < 1e-9);
+//! assert_eq!(plan.tours[0].places(&lines, 0).len(), 5);
+//! ```
+
+mod blossom;
+mod bound;
+mod improve;
+mod matching;
+mod network;
+mod postman;
+mod split;
+mod trim;
+
+pub use network::{Line, LineError, LinePlan, LineTour, Pass, Surveyor, tour_cost};
+
+use crate::coverage::metric::Metric;
+
+/// Steps of improvement that a mission uses unless it says otherwise: about a third of a
+/// second for the roads of a square kilometre.
+pub const DEFAULT_STEPS: usize = 20_000;
+
+/// Steps for a single tour, whose start is at most a few percent from the optimum.
+const STEPS_ALONE: usize = 1_000;
+
+/// Lines above which a single tour is left as it is: looking up the neighbours of all
+/// would take longer than the tour, for the last tenth of a percent.
+const MOST_ALONE: usize = 1_000;
+
+/// Plans closed tours for a team so that every line is flown along once and the longest
+/// tour is short.
+///
+/// `metric` says what it costs to fly from one end of a line (or depot) to another; it
+/// must obey the triangle inequality for the guarantees to hold. `steps` bounds the
+/// improvement; the same steps give the same plan everywhere.
+///
+/// # Guarantees
+/// Each line is in exactly one tour or in `unserved`; every tour is within its UAV's
+/// endurance. For one UAV, with the lines connected, its depot on them and the same cost
+/// both ways, the tour is the shortest possible and equals `lower_bound`. Otherwise
+/// `makespan / lower_bound` tells how far from the optimum the plan may be at most.
+///
+/// # Complexity
+/// One tour: nearly O(n log n) searches and O(n²) distances. Improvement: O(k) for each
+/// line moved in a step.
+///
+/// # Errors
+/// [`LineError`] when there is nobody to fly, or a figure is no sensible number.
+pub fn plan(
+    lines: &[Line],
+    team: &[Surveyor],
+    metric: &impl Metric,
+    steps: usize,
+) -> Result<LinePlan, LineError> {
+    network::check(lines, team)?;
+    let all: Vec<usize> = (0..lines.len()).collect();
+    let lower_bound = bound::makespan(lines, team, metric);
+    let giant = postman::tour(lines, &all, team[0].depot, metric);
+    let mut tours = if team.len() == 1 {
+        vec![giant]
+    } else {
+        split::split(&giant, lines, team, metric)
+    };
+    let search = improve::Search {
+        lines,
+        team,
+        metric,
+        lower_bound,
+    };
+    let times = |tours: &[Vec<Pass>]| {
+        let time = |(tour, uav): (&Vec<Pass>, &Surveyor)| {
+            tour_cost(tour, lines, uav.depot, metric) / uav.speed
+        };
+        tours.iter().zip(team).map(time).fold(0.0, f64::max)
+    };
+    // A tour that meets the bound is optimal.
+    if times(&tours) > lower_bound * (1.0 + 1e-9) {
+        let steps = match team.len() {
+            1 if lines.len() > MOST_ALONE => 0,
+            1 => steps.min(STEPS_ALONE),
+            _ => steps,
+        };
+        search.run(&mut tours, steps, 1);
+        postmen_again(&mut tours, lines, team, metric);
+    }
+    let unserved = trim::trim(&mut tours, lines, team, metric);
+    let makespan = times(&tours);
+    let tours = tours
+        .into_iter()
+        .zip(team)
+        .map(|(passes, uav)| LineTour {
+            cost: tour_cost(&passes, lines, uav.depot, metric),
+            passes,
+        })
+        .collect();
+    Ok(LinePlan {
+        tours,
+        makespan,
+        lower_bound,
+        unserved,
+    })
+}
+
+/// Replaces a tour by the postman's own for the same lines where that is shorter.
+fn postmen_again(tours: &mut [Vec<Pass>], lines: &[Line], team: &[Surveyor], metric: &impl Metric) {
+    for (tour, uav) in tours.iter_mut().zip(team) {
+        let ids: Vec<usize> = tour.iter().map(|p| p.line).collect();
+        if ids.is_empty() {
+            continue;
+        }
+        let again = postman::tour(lines, &ids, uav.depot, metric);
+        let cost = |passes: &[Pass]| tour_cost(passes, lines, uav.depot, metric);
+        if cost(&again) < cost(tour) {
+            *tour = again;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

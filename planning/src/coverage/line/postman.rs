@@ -1,0 +1,274 @@
+//! One UAV along all lines: the rural postman's tour (D2.7 §3.5, where one tour is k = 1).
+//!
+//! Pair up the places where an odd number of lines end, join what is still apart, and
+//! walk the result. Leaves several tours to `split` and `improve`.
+
+use super::matching::pair_up;
+use super::network::{Line, Parts, Pass};
+use crate::coverage::metric::Metric;
+
+/// The postman's graph: lines and deadheads over places renumbered from 0.
+struct Graph<'a, M> {
+    lines: &'a [Line],
+    chosen: &'a [usize],
+    /// The places in use, ascending; the graph numbers them by their index here.
+    places: Vec<usize>,
+    depot: usize,
+    ends: Vec<(usize, usize)>,
+    metric: &'a M,
+}
+
+/// A tour from `depot` along the `chosen` lines and back.
+///
+/// # Guarantees
+/// Where the lines hang together and the depot lies on them, and each line costs the
+/// same both ways, the tour is the shortest there is: the lines plus a cheapest pairing
+/// of the places where an odd number of them end. Otherwise the parts are joined by the
+/// cheapest exchanges found, and the bound of [`shortest`] tells how far off that may be.
+pub(super) fn tour(
+    lines: &[Line],
+    chosen: &[usize],
+    depot: usize,
+    metric: &impl Metric,
+) -> Vec<Pass> {
+    let graph = Graph::new(lines, chosen, depot, metric);
+    let mut deadheads = graph.pairs();
+    graph.join_parts(&mut deadheads);
+    graph.walk(&deadheads)
+}
+
+/// No closed tour along the `chosen` lines is cheaper than this.
+pub(super) fn shortest(lines: &[Line], chosen: &[usize], metric: &impl Metric) -> f64 {
+    let Some(&first) = chosen.first() else {
+        return 0.0;
+    };
+    let graph = Graph::new(lines, chosen, lines[first].a, metric);
+    let deadheads = graph.pairs();
+    let flown: f64 = chosen
+        .iter()
+        .map(|&l| lines[l].cost[0].min(lines[l].cost[1]))
+        .sum();
+    flown
+        + deadheads
+            .iter()
+            .map(|&(a, b)| graph.cost(a, b))
+            .sum::<f64>()
+}
+
+impl<'a, M: Metric> Graph<'a, M> {
+    fn new(lines: &'a [Line], chosen: &'a [usize], depot: usize, metric: &'a M) -> Self {
+        let mut places: Vec<usize> = chosen
+            .iter()
+            .flat_map(|&l| [lines[l].a, lines[l].b])
+            .chain([depot])
+            .collect();
+        places.sort_unstable();
+        places.dedup();
+        let number = |p: usize| places.binary_search(&p).unwrap_or(0);
+        let ends = chosen
+            .iter()
+            .map(|&l| (number(lines[l].a), number(lines[l].b)))
+            .collect();
+        Self {
+            lines,
+            chosen,
+            depot: number(depot),
+            places,
+            ends,
+            metric,
+        }
+    }
+
+    fn cost(&self, a: usize, b: usize) -> f64 {
+        self.metric.cost(self.places[a], self.places[b])
+    }
+
+    /// The cheapest pairing of the places where an odd number of lines end.
+    fn pairs(&self) -> Vec<(usize, usize)> {
+        let mut odd = vec![false; self.places.len()];
+        for &(a, b) in &self.ends {
+            odd[a] = !odd[a];
+            odd[b] = !odd[b];
+        }
+        let places: Vec<usize> = (0..odd.len()).filter(|&p| odd[p]).collect();
+        let known: Vec<usize> = places.iter().map(|&p| self.places[p]).collect();
+        pair_up(&known, self.metric)
+            .into_iter()
+            .map(|(a, b)| (places[a], places[b]))
+            .collect()
+    }
+
+    /// Changes the deadheads until all lines and the depot hang together: the smallest
+    /// part that is apart is joined in the cheapest way, and so on.
+    fn join_parts(&self, deadheads: &mut Vec<(usize, usize)>) {
+        let n = self.places.len();
+        let mut parts = Parts::new(n);
+        let mut left = n;
+        for &(a, b) in self.ends.iter().chain(deadheads.iter()) {
+            left -= usize::from(parts.join(a, b));
+        }
+        while left > 1 {
+            let root: Vec<usize> = (0..n).map(|p| parts.find(p)).collect();
+            let mut size = vec![0usize; n];
+            for &r in &root {
+                size[r] += 1;
+            }
+            let smallest = (0..n)
+                .filter(|&r| size[r] > 0)
+                .min_by_key(|&r| (size[r], r));
+            let inside: Vec<bool> = root.iter().map(|&r| Some(r) == smallest).collect();
+            let Some(change) = self.cheapest_join(&inside, deadheads) else {
+                return;
+            };
+            let (x, y) = change.apply(deadheads);
+            left -= usize::from(parts.join(x, y));
+        }
+    }
+
+    fn cheapest_join(&self, inside: &[bool], deadheads: &[(usize, usize)]) -> Option<Join> {
+        let mut best: Option<(f64, Join)> = None;
+        let mut offer = |cost: f64, join: Join| {
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, join));
+            }
+        };
+        let (within, without): (Vec<usize>, Vec<usize>) =
+            (0..inside.len()).partition(|&p| inside[p]);
+        for &x in &within {
+            for &y in &without {
+                offer(2.0 * self.cost(x, y), Join::Return(x, y));
+            }
+        }
+        let (own, others): (Vec<usize>, Vec<usize>) =
+            (0..deadheads.len()).partition(|&d| inside[deadheads[d].0]);
+        for (these, places) in [(&own, &without), (&others, &within)] {
+            for &d in these {
+                let (a, b) = deadheads[d];
+                let direct = self.cost(a, b);
+                for &via in places {
+                    let cost = self.cost(a, via) + self.cost(via, b) - direct;
+                    offer(cost, Join::Detour(d, via));
+                }
+            }
+        }
+        for &d in &own {
+            let (a, b) = deadheads[d];
+            for &e in &others {
+                let (p, q) = deadheads[e];
+                let now = self.cost(a, b) + self.cost(p, q);
+                offer(
+                    self.cost(a, p) + self.cost(b, q) - now,
+                    Join::Exchange(d, e, false),
+                );
+                offer(
+                    self.cost(a, q) + self.cost(b, p) - now,
+                    Join::Exchange(d, e, true),
+                );
+            }
+        }
+        best.map(|(_, join)| join)
+    }
+
+    /// A closed walk from the depot over every line and deadhead once (Hierholzer).
+    fn walk(&self, deadheads: &[(usize, usize)]) -> Vec<Pass> {
+        let n = self.places.len();
+        let edges: Vec<(usize, usize)> = self.ends.iter().chain(deadheads).copied().collect();
+        let mut first = vec![0usize; n + 1];
+        for &(a, b) in &edges {
+            first[a + 1] += 1;
+            first[b + 1] += 1;
+        }
+        for p in 0..n {
+            first[p + 1] += first[p];
+        }
+        let mut fill = first.clone();
+        let mut at = vec![0usize; edges.len() * 2];
+        for (e, &(a, b)) in edges.iter().enumerate() {
+            for p in [a, b] {
+                at[fill[p]] = e;
+                fill[p] += 1;
+            }
+        }
+        let mut used = vec![false; edges.len()];
+        let mut next = first.clone();
+        let mut stack = vec![(self.depot, usize::MAX)];
+        let mut passes = Vec::with_capacity(self.chosen.len());
+        while let Some(&(p, came)) = stack.last() {
+            while next[p] < first[p + 1] && used[at[next[p]]] {
+                next[p] += 1;
+            }
+            if next[p] < first[p + 1] {
+                let e = at[next[p]];
+                used[e] = true;
+                let (a, b) = edges[e];
+                stack.push((if a == p { b } else { a }, e));
+            } else {
+                stack.pop();
+                // The walk comes out reversed: the edge that led to `p` is left from `p`.
+                if came < self.ends.len() {
+                    passes.push(Pass {
+                        line: self.chosen[came],
+                        backward: self.ends[came].0 != p,
+                    });
+                }
+            }
+        }
+        self.cheaper_way_round(passes)
+    }
+
+    /// The walk or its reverse, whichever costs less.
+    fn cheaper_way_round(&self, passes: Vec<Pass>) -> Vec<Pass> {
+        let turned: Vec<Pass> = passes
+            .iter()
+            .rev()
+            .map(|p| Pass {
+                backward: !p.backward,
+                ..*p
+            })
+            .collect();
+        let cost = |passes: &[Pass]| passes.iter().map(|p| p.cost(self.lines)).sum::<f64>();
+        if cost(&turned) < cost(&passes) {
+            turned
+        } else {
+            passes
+        }
+    }
+}
+
+/// A way to join two parts without making any place odd.
+#[derive(Clone, Copy, Debug)]
+enum Join {
+    /// There and back.
+    Return(usize, usize),
+    /// A deadhead bends over a place.
+    Detour(usize, usize),
+    /// Two deadheads exchange their ends.
+    Exchange(usize, usize, bool),
+}
+
+impl Join {
+    /// Carries it out; two places that hang together now.
+    fn apply(self, deadheads: &mut Vec<(usize, usize)>) -> (usize, usize) {
+        match self {
+            Self::Return(x, y) => {
+                deadheads.extend([(x, y), (x, y)]);
+                (x, y)
+            }
+            Self::Detour(d, via) => {
+                let (a, b) = deadheads[d];
+                deadheads[d] = (a, via);
+                deadheads.push((via, b));
+                (a, via)
+            }
+            Self::Exchange(d, e, crossed) => {
+                let ((a, b), (mut p, mut q)) = (deadheads[d], deadheads[e]);
+                if crossed {
+                    (p, q) = (q, p);
+                }
+                deadheads[d] = (a, p);
+                deadheads[e] = (b, q);
+                (a, p)
+            }
+        }
+    }
+}
