@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use skein_planning::frame::Point;
 use skein_planning::geometry::offset::{Growth, Piece, Zone, grow, grow_exact};
-use skein_planning::math::{TAU, sin_cos};
+use skein_planning::math::{PI, TAU, sin_cos};
 
 /// An outline is a violation from this share of the radius below it, so that nobody
 /// is blamed for the last bits of a distance.
@@ -158,8 +158,8 @@ pub fn run(args: &OffsetArgs) -> Result<String> {
     })?)
 }
 
-/// Chords of an arc that are measured in its place.
-const CHORDS: usize = 512;
+/// Chords of half a circle that are measured in its place.
+const CHORDS: f64 = 512.0;
 
 /// Polylines with their corners on the arcs; their chords are nearer to the zone by
 /// the sagitta, less than a share of 5e-6 of the radius for half a circle.
@@ -168,7 +168,7 @@ fn chords(pieces: &[Piece]) -> Vec<Point> {
     for p in pieces {
         let n = match p {
             Piece::Line { .. } => 1,
-            Piece::Arc { .. } => CHORDS,
+            Piece::Arc { .. } => (p.turn_rad() / PI * CHORDS).ceil().max(1.0) as usize,
         };
         ring.extend((0..n).map(|i| p.at(i as f64 / n as f64)));
     }

@@ -310,6 +310,33 @@ fn star(n: core::ops::Range<usize>) -> impl Strategy<Value = Zone> {
         })
 }
 
+/// Numbers that arithmetic likes least.
+fn nasty() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        proptest::sample::select(vec![
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            1.0 + 1e-15,
+            5e-324,
+            1e-300,
+            1e-12,
+            1e-6,
+            0.1,
+            1e3,
+            1e6,
+            -1e6,
+            1e6 - 1e-9,
+            f64::NAN,
+            f64::INFINITY,
+            1e300,
+        ]),
+        -1e6..1e6f64,
+        -1e-3..1e-3f64,
+    ]
+}
+
 /// Any ring at all, on a coarse grid half of the time, so that contacts are common.
 fn wild() -> impl Strategy<Value = Zone> {
     let free = proptest::collection::vec((-200.0..200.0f64, -200.0..200.0f64), 3..14);
@@ -347,6 +374,25 @@ proptest! {
             Ok(g) => if radius_m > 0.01 { check(&zones, &g, &growth) },
             Err(OffsetError::TooFewVertices { zone, .. }) => prop_assert!(zone < zones.len()),
             Err(e) => prop_assert!(false, "{} {:?}", e, zones),
+        }
+    }
+
+    #[test]
+    fn no_numbers_cause_a_panic(
+        outer in proptest::collection::vec((nasty(), nasty()), 0..9),
+        hole in proptest::collection::vec((nasty(), nasty()), 0..6),
+        radius_m in prop_oneof![nasty(), 0.0..100.0],
+    ) {
+        let mut z = zone(&outer);
+        z.holes.push(zone(&hole).outer);
+        let zones = [z, zone(&SQUARE)];
+        if let Ok(growth) = Growth::new(radius_m) {
+            if let Ok(g) = grow(&zones, &growth) {
+                prop_assert!(g.least_distance_m >= radius_m);
+            }
+            if let Ok(g) = grow_exact(&zones, radius_m) {
+                prop_assert!(g.least_distance_m >= radius_m);
+            }
         }
     }
 

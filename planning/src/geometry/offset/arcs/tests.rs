@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::geometry::polygon::point_to_line_m;
+use crate::math::TAU;
 use proptest::prelude::*;
 
 fn zone(points: &[(f64, f64)]) -> Zone {
