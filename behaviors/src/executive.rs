@@ -28,6 +28,7 @@ pub mod outlook;
 
 use crate::event::Event;
 use crate::percept::Percept;
+use crate::reactive::air::{self, Air};
 use crate::reactive::envelope::{Envelope, is_finite};
 use crate::reactive::follow::{HORIZON_S, Offset, Track};
 use crate::setpoint::{Setpoint, Side};
@@ -40,6 +41,7 @@ use skein_planning::coverage::area::backtracking::Leg;
 use skein_planning::coverage::area::{CoverageLoop, Direction};
 use skein_planning::frame::{Point, Pose};
 use skein_planning::path::Router;
+use skein_planning::trajectory::wind::Wind;
 use skein_planning::trajectory::{Curve, Segment};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -58,6 +60,10 @@ const LOST_RAD: f64 = 0.8;
 /// pose: a millimetre beside a lane must not cost a circle to get back onto it.
 const ON_TRACK_M: f64 = 0.5;
 const ON_TRACK_RAD: f64 = 0.1;
+
+/// A wind that changed by less is the same wind, m/s: following takes it as an error
+/// and the times told are off by two percent.
+const NOTICED_MPS: f64 = 0.3;
 
 /// A cell that was flown this often and not seen is given up.
 const MAX_TRIES: u8 = 3;
@@ -175,12 +181,10 @@ impl Executive {
         router: Arc<Router>,
     ) -> Self {
         let envelope = Self::envelope(airframe, &router, DEFAULT_TRACKING_ERROR_M);
+        let mut chart = Chart::new(coverage_loop, router, airframe);
+        chart.breathe(Air::calm(envelope.airspeed_mps(airframe.cruise_mps)));
         Self {
-            chart: Chart {
-                coverage_loop,
-                router,
-                airframe,
-            },
+            chart,
             height_m,
             envelope,
             aim: Aim::Hold,
@@ -222,6 +226,7 @@ impl Executive {
                 events,
             );
         }
+        self.feel(percept);
         self.report_seen(percept, is_open, &mut events);
         let offset = self.progress(percept);
         self.count_misses(is_open, &mut events);
@@ -244,7 +249,8 @@ impl Executive {
             cross_m: 0.0,
             heading_rad: 0.0,
         };
-        let steps = self.track.steps(offset.unwrap_or(still), speed, limit);
+        let offset = offset.unwrap_or(still);
+        let steps = air::steps(&self.track, offset, self.chart.air(), limit);
         let setpoint = self.envelope.check(percept, self.setpoint(percept, steps));
         let steps = setpoint.steps.clone();
         self.played = Some(Played {
@@ -267,7 +273,21 @@ impl Executive {
 
     /// The airspeed that is commanded, m/s.
     fn speed_mps(&self) -> f64 {
-        self.envelope.airspeed_mps(self.chart.airframe.cruise_mps)
+        self.chart.air().airspeed_mps
+    }
+
+    /// Takes note of the wind: curves over the ground must stay flyable in it, and
+    /// what they cost changes.
+    fn feel(&mut self, percept: &Percept) {
+        let wind = Wind::new(percept.wind_east_mps, percept.wind_north_mps);
+        let changed_mps = (wind.velocity() - self.chart.air().wind.velocity()).norm();
+        if changed_mps.is_nan() || changed_mps < NOTICED_MPS {
+            return;
+        }
+        let radius_m = self.chart.router.limits().turn_radius_m;
+        let wanted = Air::airspeed_for_turns_mps(&self.chart.airframe, wind, radius_m);
+        let airspeed_mps = self.envelope.airspeed_mps(wanted);
+        self.chart.breathe(Air { wind, airspeed_mps });
     }
 
     /// Reports the cells that the camera saw since the last percept.
@@ -314,8 +334,10 @@ impl Executive {
                 percept.time_ms.saturating_sub(p.percept.time_ms) as f64 / 1000.0
             })
             .min(WINDOW_S);
-        let window_m = self.chart.airframe.max_mps * since_s + WINDOW_M;
-        let offset = self.track.advance(&percept.pose, window_m);
+        let wind_mps = self.chart.air().wind.speed_mps();
+        let window_m = (self.chart.airframe.max_mps + wind_mps) * since_s + WINDOW_M;
+        let pose = self.chart.air().over_ground(percept.pose);
+        let offset = self.track.advance(&pose, window_m);
         let lost =
             offset.is_none_or(|o| o.cross_m.abs() > LOST_M || o.heading_rad.abs() > LOST_RAD);
         self.replan = self.replan || lost;
@@ -392,7 +414,8 @@ impl Executive {
         }
         let near = offset
             .is_some_and(|o| o.cross_m.abs() < ON_TRACK_M && o.heading_rad.abs() < ON_TRACK_RAD);
-        let pose = self.track.pose().filter(|_| near).unwrap_or(percept.pose);
+        let here = self.chart.air().over_ground(percept.pose);
+        let pose = self.track.pose().filter(|_| near).unwrap_or(here);
         Place {
             pose,
             boundary: None,
@@ -404,7 +427,8 @@ impl Executive {
         if self.stretches.is_empty() {
             self.track.clear();
         }
-        let least_m = self.chart.airframe.max_mps * (HORIZON_S + 0.5);
+        let fastest_mps = self.chart.airframe.max_mps + self.chart.air().wind.speed_mps();
+        let least_m = fastest_mps * (HORIZON_S + 0.5);
         let mut at = start;
         while self.track.left_m() < least_m {
             for step in self.next_moves(&at, is_open, events) {
@@ -484,7 +508,8 @@ impl Executive {
     /// Where the UAV is on a track that has just been made anew.
     fn restart(&mut self, percept: &Percept) -> Option<Offset> {
         self.replan = false;
-        self.track.advance(&percept.pose, WINDOW_M)
+        let pose = self.chart.air().over_ground(percept.pose);
+        self.track.advance(&pose, WINDOW_M)
     }
 
     /// Reports the end of the goal, once.

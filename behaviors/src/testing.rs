@@ -90,6 +90,8 @@ pub struct Wing {
     pub time_ms: u64,
     pub setpoint: Option<Setpoint>,
     pub failsafe: bool,
+    /// The wind, m/s towards east and north.
+    pub wind_mps: (f64, f64),
     /// Every pose flown, one for each 10 ms.
     pub flown: Vec<Pose>,
 }
@@ -101,6 +103,7 @@ impl Wing {
             time_ms: 0,
             setpoint: None,
             failsafe: false,
+            wind_mps: (0.0, 0.0),
             flown: vec![pose],
         }
     }
@@ -108,6 +111,8 @@ impl Wing {
     pub fn percept(&self) -> Percept {
         Percept {
             failsafe: self.failsafe,
+            wind_east_mps: self.wind_mps.0,
+            wind_north_mps: self.wind_mps.1,
             ..percept_at(self.pose, self.time_ms)
         }
     }
@@ -116,6 +121,8 @@ impl Wing {
     pub fn fly(&mut self, ms: u64) {
         for _ in 0..ms / 10 {
             self.pose = self.next();
+            self.pose.east_m += 0.01 * self.wind_mps.0;
+            self.pose.north_m += 0.01 * self.wind_mps.1;
             self.time_ms += 10;
             self.flown.push(self.pose);
         }

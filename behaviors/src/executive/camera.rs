@@ -74,7 +74,17 @@ pub fn look(
     let v = before.airspeed_mps;
     #[allow(clippy::cast_possible_truncation, reason = "at most FILLED_MS")]
     let ms = ms as u32;
-    let end = fly(before.percept.pose, v, &before.steps, ms);
+    let wind = (before.percept.wind_east_mps, before.percept.wind_north_mps);
+    let flown = |ms: u32| {
+        let pose = fly(before.percept.pose, v, &before.steps, ms);
+        let t_s = f64::from(ms) / 1000.0;
+        Pose {
+            east_m: pose.east_m + wind.0 * t_s,
+            north_m: pose.north_m + wind.1 * t_s,
+            ..pose
+        }
+    };
+    let end = flown(ms);
     let off_m = (end.position() - now.pose.position()).norm();
     let off_rad = wrap_pi(end.heading_rad - now.pose.heading_rad).abs();
     if !(off_m <= MET_M && off_rad <= MET_RAD) {
@@ -91,7 +101,7 @@ pub fn look(
         .ceil()
         .clamp(1.0, 64.0) as u32;
     for i in 1..parts {
-        let pose = fly(before.percept.pose, v, &before.steps, ms * i / parts);
+        let pose = flown(ms * i / parts);
         lens.look(&pose, slack_m, seen);
     }
 }

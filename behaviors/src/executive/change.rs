@@ -171,7 +171,7 @@ impl Executive {
             pose,
             boundary: None,
         });
-        let finish_m = front.end_m - self.track.at_m();
+        let finish_m = self.air_m_until(front.end_m);
         now_m.is_none_or(|m| finish_m + after_m <= m + 1.0)
     }
 

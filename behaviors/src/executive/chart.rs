@@ -4,6 +4,7 @@
 //! Pure questions about the loop, the zones and a pose; what is flown and when is
 //! the executive's.
 
+use crate::reactive::air::Air;
 use skein_planning::airframe::Airframe;
 use skein_planning::coverage::area::{CoverageLoop, Direction};
 use skein_planning::frame::{Point, Pose};
@@ -73,9 +74,55 @@ pub struct Chart {
     pub router: Arc<Router>,
     /// Who flies.
     pub airframe: Airframe,
+    /// The wind, and the airspeed flown in it.
+    air: Air,
+    /// Distances through the air along each cell, forward and backward, metres;
+    /// empty in calm air, where they are the lengths.
+    cells_air_m: Vec<[f64; 2]>,
 }
 
 impl Chart {
+    /// A chart for calm air at cruise.
+    #[must_use]
+    pub fn new(coverage_loop: Arc<CoverageLoop>, router: Arc<Router>, airframe: Airframe) -> Self {
+        Self {
+            coverage_loop,
+            router,
+            airframe,
+            air: Air::calm(airframe.cruise_mps),
+            cells_air_m: Vec::new(),
+        }
+    }
+
+    /// The wind, and the airspeed flown in it.
+    #[must_use]
+    pub fn air(&self) -> &Air {
+        &self.air
+    }
+
+    /// From now on lengths are distances through this air.
+    pub fn breathe(&mut self, air: Air) {
+        self.air = air;
+        self.cells_air_m.clear();
+        if air.is_calm() {
+            return;
+        }
+        let c = &self.coverage_loop;
+        let along = |i, direction| air.air_length_m(&c.curve(i, direction));
+        self.cells_air_m = (0..c.len())
+            .map(|i| [along(i, Direction::Forward), along(i, Direction::Backward)])
+            .collect();
+    }
+
+    /// Distance through the air along a cell, if there is a wind, metres.
+    fn cell_air_m(&self, cell: u16, direction: Direction) -> Option<f64> {
+        let both = self.cells_air_m.get(usize::from(cell))?;
+        Some(match direction {
+            Direction::Forward => both[0],
+            Direction::Backward => both[1],
+        })
+    }
+
     fn len(&self) -> usize {
         self.coverage_loop.len()
     }
@@ -137,15 +184,19 @@ impl Chart {
         }
     }
 
-    /// Length of a move, metres.
+    /// Distance through the air of a move, metres: in calm air its length.
     #[must_use]
     pub fn length_m(&self, step: &Move) -> f64 {
         let cells = self.coverage_loop.cells();
         match step {
-            Move::Serve(h) => f64::from(cells[usize::from(h.cell)].service_mm) / 1000.0,
-            Move::Pass(cell, _) => f64::from(cells[usize::from(*cell)].travel_mm) / 1000.0,
-            Move::Route(curve) => curve.length_m(),
-            Move::Loiter(circle) => circle.length_m,
+            Move::Serve(h) => self
+                .cell_air_m(h.cell, h.direction)
+                .unwrap_or_else(|| f64::from(cells[usize::from(h.cell)].service_mm) / 1000.0),
+            Move::Pass(cell, direction) => self
+                .cell_air_m(*cell, *direction)
+                .unwrap_or_else(|| f64::from(cells[usize::from(*cell)].travel_mm) / 1000.0),
+            Move::Route(curve) => self.air.air_length_m(curve),
+            Move::Loiter(circle) => self.air.longest_m(circle.length_m),
         }
     }
 
@@ -271,7 +322,7 @@ impl Chart {
         for b in self.nearest(from.position(), DETOURS) {
             for d in directions {
                 if let Ok(curve) = self.route(from, self.place(b, *d).pose) {
-                    let m = curve.length_m();
+                    let m = self.air.air_length_m(&curve);
                     if best.as_ref().is_none_or(|(_, _, least)| m < *least) {
                         best = Some(((b, *d), curve, m));
                     }
@@ -282,12 +333,12 @@ impl Chart {
     }
 
     /// The cheapest way onto the loop: the boundary, which way it looks, and the
-    /// length of the route, metres. `None` when no boundary near by can be reached.
+    /// distance through the air to it, metres. `None` when no boundary near by can be reached.
     #[must_use]
     pub fn way_on(&self, from: Pose) -> Option<(u16, Direction, f64)> {
         let both = [Direction::Forward, Direction::Backward];
         self.join(from, &both)
-            .map(|((b, d), c)| (b, d, c.length_m()))
+            .map(|((b, d), c)| (b, d, self.air.air_length_m(&c)))
     }
 
     /// The boundaries nearest to a point, nearest first, ties by index.

@@ -24,7 +24,7 @@ struct Item {
     hop: Option<Hop>,
     /// The cell that it flies, served or passed.
     cell: Option<(u16, Direction)>,
-    /// Distance from here to its end, metres.
+    /// Distance through the air from here to its end, metres.
     end_m: f64,
     /// Where it ends.
     end: Place,
@@ -172,13 +172,16 @@ impl Executive {
             .limits()
             .turn_radius_m
             .max(self.chart.airframe.min_turn_radius_m());
-        self.ms(7.0 * PI / 3.0 * radius_m)
+        self.ms(self.chart.air().longest_m(7.0 * PI / 3.0 * radius_m))
             .saturating_add(whole_ms(TURN_MARGIN_MS))
     }
 
     /// Where the flight to come begins.
     fn here(&self) -> Option<Place> {
-        let pose = self.played.as_ref()?.percept.pose;
+        let pose = self
+            .chart
+            .air()
+            .over_ground(self.played.as_ref()?.percept.pose);
         Some(Place {
             pose: if self.replan {
                 pose
@@ -216,7 +219,7 @@ impl Executive {
             .take(kept)
             .take_while(|s| !matches!(s.kind, Kind::Loiter(_)))
         {
-            end_m = (s.end_m - self.track.at_m()).max(0.0);
+            end_m = self.air_m_until(s.end_m);
             place = s.end;
             items.push(Item {
                 hop: s.kind.hop(),
@@ -246,9 +249,20 @@ impl Executive {
         items
     }
 
-    /// Time to fly so many metres, milliseconds, rounded up.
+    /// Distance through the air to a place on the track, metres.
+    pub(super) fn air_m_until(&self, end_m: f64) -> f64 {
+        let ground_m = (end_m - self.track.at_m()).max(0.0);
+        let air = self.chart.air();
+        if air.is_calm() {
+            ground_m
+        } else {
+            air.air_length_m(&self.track.ahead(ground_m))
+        }
+    }
+
+    /// Time to fly so many metres through the air, milliseconds, rounded up.
     fn ms(&self, length_m: f64) -> u32 {
-        whole_ms((length_m / self.speed_mps() * 1000.0).ceil())
+        whole_ms((length_m / self.speed_mps() * 1000.0).ceil()).min(UNREACHABLE_MS)
     }
 }
 

@@ -227,6 +227,76 @@ fn a_flight_that_is_set_up_once_is_on_time_to_the_second() {
 }
 
 #[test]
+fn a_wind_hides_no_cell_and_brings_nobody_nearer_to_a_zone() {
+    for (direction, wind) in [
+        (Forward, (1.8, -0.9)),
+        (Backward, (-1.2, 1.6)),
+        (Forward, (0.0, 2.4)),
+    ] {
+        let mut story = Story::new(10, 8, block(), outside());
+        story.wing.wind_mps = wind;
+        let n = story.n();
+        story.step(200);
+        let foretold_s = u64::from(story.leg_time_ms(&[(3, n, direction)])) / 1000;
+        story.legs(&[(3, n, direction)]);
+        story.until_done(foretold_s + 60);
+        assert!(story.open.iter().all(|o| !o));
+        assert_eq!(story.told, [Event::PlanDone]);
+        let least_m = story.least_distance_m();
+        assert!(least_m > CLEARANCE_M - 0.6, "{wind:?}: {least_m}");
+        // Its loiter stands over the ground.
+        let there = story.wing.pose.position();
+        for _ in 0..400 {
+            assert!(story.step(200).is_empty());
+            assert!((story.wing.pose.position() - there).norm() < 120.0);
+        }
+        assert!(story.least_distance_m() > CLEARANCE_M - 0.6);
+    }
+}
+
+#[test]
+fn in_a_wind_it_is_on_time_too() {
+    let mut times_ms = Vec::new();
+    for wind in [(0.0, 0.0), (2.0, 0.0), (-1.0, -1.5)] {
+        let mut story = Story::new(10, 8, vec![], outside());
+        story.wing.wind_mps = wind;
+        story.step(200);
+        let legs = [(0, 30, Forward), (70, 8, Backward)];
+        let foretold_ms = u64::from(story.leg_time_ms(&legs));
+        let from_ms = story.wing.time_ms - 200;
+        story.legs(&legs);
+        story.until_done(1000);
+        let flown_ms = story.wing.time_ms - from_ms;
+        let late_ms = flown_ms.abs_diff(foretold_ms);
+        assert!(late_ms < 2500, "{wind:?}: {flown_ms} {foretold_ms}");
+        times_ms.push(foretold_ms);
+    }
+    assert!(
+        times_ms[0] + 5000 < times_ms[1].min(times_ms[2]),
+        "{times_ms:?}"
+    );
+}
+
+#[test]
+fn a_wind_that_turns_on_the_way_is_followed() {
+    let mut story = Story::new(10, 8, block(), outside());
+    story.step(200);
+    story.legs(&[(0, story.n(), Forward)]);
+    for (i, wind) in [(0.0, 2.0), (2.0, 0.4), (0.0, 0.0), (-1.4, -1.4)]
+        .into_iter()
+        .enumerate()
+    {
+        story.wing.wind_mps = wind;
+        for _ in 0..200 + i {
+            story.step(200);
+        }
+    }
+    story.until_done(1500);
+    assert!(story.open.iter().all(|o| !o));
+    assert!(story.least_distance_m() > CLEARANCE_M - 1.0);
+}
+
+#[test]
 fn gaps_in_a_plan_are_passed_or_cut_short() {
     let mut story = Story::new(10, 8, block(), outside());
     for i in (10..30).chain(33..50) {

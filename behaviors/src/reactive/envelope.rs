@@ -14,9 +14,9 @@ use super::follow::HORIZON_S;
 use crate::percept::Percept;
 use crate::setpoint::{MAX_STEPS, Setpoint, Side, Steer};
 use skein_planning::airframe::Airframe;
-use skein_planning::frame::{Point, Pose};
+use skein_planning::frame::{Point, Pose, Vector};
 use skein_planning::geometry::NoFlyZones;
-use skein_planning::math::TAU;
+use skein_planning::math::{TAU, atan2};
 use skein_planning::trajectory::Segment;
 use std::sync::Arc;
 
@@ -31,6 +31,10 @@ const GATHER_M: f64 = 60.0;
 /// How far ahead the failsafe loiter may begin, seconds: the time without setpoints
 /// after which an airframe flies it.
 const FAILSAFE_S: f64 = 1.0;
+
+/// Trochoids are measured by chords of this duration, seconds: at a turn of 0.6 g they
+/// stray a few centimetres.
+const CHORD_S: f64 = 0.25;
 
 /// A side of the failsafe loiter is changed only for this much more room, metres, so
 /// that rounding does not swap it back and forth.
@@ -96,7 +100,7 @@ impl Envelope {
             self.side = self.choose_side(&percept.pose);
         }
         out.loiter = self.side;
-        if !finite || out.steps.is_empty() || self.too_near(&percept.pose, &out) {
+        if !finite || out.steps.is_empty() || self.too_near(percept, &out) {
             out.steps = self.loiter_steps(limit);
         }
         out
@@ -173,21 +177,22 @@ impl Envelope {
 
     /// Whether the commanded flight comes too near to a zone and a loiter does not
     /// come as near.
-    fn too_near(&self, pose: &Pose, setpoint: &Setpoint) -> bool {
+    fn too_near(&self, percept: &Percept, setpoint: &Setpoint) -> bool {
+        let (pose, wind) = (&percept.pose, wind_of(percept));
         if self.near.zones().is_empty() {
             return false;
         }
-        let reach_m = setpoint.airspeed_mps * HORIZON_S;
+        let reach_m = (setpoint.airspeed_mps + wind.norm()) * HORIZON_S;
         if self.near.distance_m(pose.position()) - reach_m >= self.least_m {
             return false;
         }
-        let commanded = self.flight_distance_m(pose, setpoint);
+        let commanded = self.flight_distance_m(pose, setpoint, wind);
         commanded < self.least_m
-            && self.loiter_distance_m(pose, setpoint.airspeed_mps) > commanded + 1e-6
+            && self.loiter_distance_m(pose, setpoint.airspeed_mps, wind) > commanded + 1e-6
     }
 
     /// Distance of the commanded flight over [`HORIZON_S`] from the nearest zone, metres.
-    fn flight_distance_m(&self, pose: &Pose, setpoint: &Setpoint) -> f64 {
+    fn flight_distance_m(&self, pose: &Pose, setpoint: &Setpoint, wind: Vector) -> f64 {
         let v = setpoint.airspeed_mps;
         let mut start = *pose;
         let mut left_s = HORIZON_S;
@@ -204,15 +209,15 @@ impl Envelope {
                 curvature_per_m: s.turn_rate_radps / v,
                 length_m: v * t,
             };
-            least = least.min(self.near.segment_distance_m(&piece));
-            start = piece.end();
+            least = least.min(self.drifting_m(&piece, v, wind));
+            start = drifted(piece.end(), wind * t);
             left_s -= t;
         }
         least
     }
 
     /// Distance of the loiter on the chosen side from the nearest zone, metres.
-    fn loiter_distance_m(&self, pose: &Pose, airspeed_mps: f64) -> f64 {
+    fn loiter_distance_m(&self, pose: &Pose, airspeed_mps: f64, wind: Vector) -> f64 {
         let radius_m = self.airframe.turn_radius_m(airspeed_mps);
         let curvature_per_m = match self.side {
             Side::Left => 1.0 / radius_m,
@@ -225,13 +230,57 @@ impl Envelope {
             length_m: 0.5 * TAU * radius_m,
         };
         let other = Segment {
-            start: half.end(),
+            start: drifted(half.end(), wind * (half.length_m / airspeed_mps)),
             ..half
         };
-        self.near
-            .segment_distance_m(&half)
-            .min(self.near.segment_distance_m(&other))
+        self.drifting_m(&half, airspeed_mps, wind)
+            .min(self.drifting_m(&other, airspeed_mps, wind))
     }
+
+    /// Distance from the nearest zone of a piece flown through air that drifts, metres;
+    /// a little less where the piece is a trochoid, which is measured by its chords.
+    fn drifting_m(&self, piece: &Segment, airspeed_mps: f64, wind: Vector) -> f64 {
+        if wind.norm_squared() <= 0.0 {
+            return self.near.segment_distance_m(piece);
+        }
+        let lasts_s = piece.length_m / airspeed_mps;
+        let chords = (lasts_s / CHORD_S).ceil().max(1.0);
+        let each_s = lasts_s / chords;
+        // A stretch of duration d strays at most a d²/8 from its chord.
+        let stray_m =
+            airspeed_mps * airspeed_mps * piece.curvature_per_m.abs() * each_s * each_s / 8.0;
+        let at = |i: f64| {
+            let pose = piece.pose_at(airspeed_mps * each_s * i);
+            drifted(pose, wind * (each_s * i)).position()
+        };
+        let (mut least, mut i) = (f64::INFINITY, 0.0);
+        while i < chords {
+            let (a, b) = (at(i), at(i + 1.0));
+            let along = b - a;
+            let chord = Segment {
+                start: Pose::new(a, atan2(along.y, along.x)),
+                curvature_per_m: 0.0,
+                length_m: along.norm(),
+            };
+            least = least.min(self.near.segment_distance_m(&chord));
+            i += 1.0;
+        }
+        least - stray_m
+    }
+}
+
+/// The wind a percept tells, m/s; none if it is no number.
+fn wind_of(percept: &Percept) -> Vector {
+    let wind = Vector::new(percept.wind_east_mps, percept.wind_north_mps);
+    if wind.norm().is_finite() {
+        wind
+    } else {
+        Vector::zeros()
+    }
+}
+
+fn drifted(pose: Pose, by: Vector) -> Pose {
+    Pose::new(pose.position() + by, pose.heading_rad)
 }
 
 /// Whether a pose is made of numbers.

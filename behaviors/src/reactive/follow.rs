@@ -10,7 +10,8 @@
 //! # Guarantees
 //! In still air at the commanded airspeed the pair of turns brings a small error
 //! to zero at its end (dead beat); repeated at every percept it is a second-order
-//! filter with a damping of 0.75. Wind is not compensated beyond that feedback.
+//! filter with a damping of 0.75. A track knows nothing of wind; [`air`](super::air)
+//! does.
 //!
 //! # Complexity
 //! O(pieces within the horizon) a percept, no allocation but the steps.
@@ -28,7 +29,7 @@ pub const HORIZON_S: f64 = 2.5;
 /// Duration of each of the two correcting turns, seconds: three percepts of
 /// 200 ms, so that the filter (natural frequency 1/T) is sampled well, and short
 /// enough to end before the next corner.
-const CORRECTION_S: f64 = 0.6;
+pub(super) const CORRECTION_S: f64 = 0.6;
 
 /// Errors of place count as at most this in a correction, metres: larger ones are
 /// approached at up to asin(4 / (1.5 V T)), some 20 degrees, and not head-on.
@@ -188,6 +189,30 @@ impl Track {
         }
     }
 
+    /// What is ahead of the UAV, at most `length_m` of it.
+    #[must_use]
+    pub fn ahead(&self, length_m: f64) -> Curve {
+        let mut ahead = Curve::empty();
+        let until_m = self.at_m + length_m;
+        let mut from = self.front_m;
+        for s in &self.segments {
+            let to = from + s.length_m;
+            let (a, b) = (from.max(self.at_m), to.min(until_m));
+            if b > a {
+                ahead.push(Segment {
+                    start: s.pose_at(a - from),
+                    length_m: b - a,
+                    ..*s
+                });
+            }
+            if to >= until_m {
+                break;
+            }
+            from = to;
+        }
+        ahead
+    }
+
     /// The turns of the next [`HORIZON_S`] for a UAV that is off by `offset`,
     /// flies at `speed_mps` and turns at most at `limit_radps`.
     #[must_use]
@@ -229,7 +254,7 @@ impl Track {
 
 /// The two rates that, held for [`CORRECTION_S`] each, end on the curve and along
 /// it: with e' = V η and η' = δ these are the only pair.
-fn correction(offset: Offset, speed_mps: f64) -> (f64, f64) {
+pub(super) fn correction(offset: Offset, speed_mps: f64) -> (f64, f64) {
     if offset.cross_m.abs() < DEAD_BAND_M && offset.heading_rad.abs() < DEAD_BAND_RAD {
         return (0.0, 0.0);
     }
@@ -264,7 +289,7 @@ fn nearest_on(s: &Segment, p: Point) -> f64 {
 }
 
 /// Collects turns, merges equal ones and rounds their ends to milliseconds.
-struct Steps {
+pub(super) struct Steps {
     limit_radps: f64,
     out: Vec<Steer>,
     end_ms: u32,
@@ -272,7 +297,7 @@ struct Steps {
 }
 
 impl Steps {
-    fn new(limit_radps: f64) -> Self {
+    pub(super) fn new(limit_radps: f64) -> Self {
         Self {
             limit_radps,
             out: Vec::with_capacity(MAX_STEPS),
@@ -281,7 +306,7 @@ impl Steps {
         }
     }
 
-    fn turn(&mut self, rate_radps: f64, from_s: f64, until_s: f64) {
+    pub(super) fn turn(&mut self, rate_radps: f64, from_s: f64, until_s: f64) {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -310,7 +335,7 @@ impl Steps {
         }
     }
 
-    fn finish(self) -> Vec<Steer> {
+    pub(super) fn finish(self) -> Vec<Steer> {
         self.out
     }
 }

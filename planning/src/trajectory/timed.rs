@@ -230,7 +230,7 @@ impl Trajectory {
             ..piece
         };
         self.pieces.push(piece);
-        piece.state(piece.duration_s, self.wind).pose()
+        piece.state_after(piece.duration_s, self.wind).pose()
     }
 
     /// The pieces, in order of flight.
@@ -285,20 +285,20 @@ impl Trajectory {
         let after = self.pieces.partition_point(|p| p.start_s <= t_s);
         let piece = self.pieces.get(after.saturating_sub(1))?;
         let after_s = (t_s - piece.start_s).clamp(0.0, piece.duration_s);
-        Some(piece.state(after_s, self.wind))
+        Some(piece.state_after(after_s, self.wind))
     }
 
     /// How it begins; `None` when empty.
     #[must_use]
     pub fn start(&self) -> Option<State> {
-        self.pieces.first().map(|p| p.state(0.0, self.wind))
+        self.pieces.first().map(|p| p.state_after(0.0, self.wind))
     }
 
     /// How it ends; `None` when empty.
     #[must_use]
     pub fn end(&self) -> Option<State> {
         let last = self.pieces.last()?;
-        Some(last.state(last.duration_s, self.wind))
+        Some(last.state_after(last.duration_s, self.wind))
     }
 
     /// Whether an airframe can fly it: airspeeds, bank with the wind's drift on curves

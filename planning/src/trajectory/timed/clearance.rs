@@ -40,7 +40,10 @@ impl Trajectory {
 }
 
 fn piece_is_clear(piece: &Piece, wind: Wind, zones: &NoFlyZones, margin_m: f64) -> bool {
-    let (from, to) = (piece.state(0.0, wind), piece.state(piece.duration_s, wind));
+    let (from, to) = (
+        piece.state_after(0.0, wind),
+        piece.state_after(piece.duration_s, wind),
+    );
     let sum = from.position.x + from.position.y + to.position.x + to.position.y;
     if !(sum + piece.duration_s * (1.0 + piece.acceleration_mps2())).is_finite() {
         return false;
@@ -68,7 +71,7 @@ fn stretch_is_clear(
     (from_s, to_s): (f64, f64),
 ) -> bool {
     let middle_s = 0.5 * (from_s + to_s);
-    let middle_m = zones.distance_m(piece.state(middle_s, wind).position);
+    let middle_m = zones.distance_m(piece.state_after(middle_s, wind).position);
     if middle_m < margin_m - ROUNDING_M {
         return false;
     }
@@ -77,7 +80,10 @@ fn stretch_is_clear(
         return true;
     }
     let doubt_m = piece.acceleration_mps2() * lasts_s * lasts_s / 8.0;
-    let (a, b) = (piece.state(from_s, wind), piece.state(to_s, wind));
+    let (a, b) = (
+        piece.state_after(from_s, wind),
+        piece.state_after(to_s, wind),
+    );
     let chord_m = zones.segment_distance_m(&chord(a.position, b.position));
     if chord_m - doubt_m >= margin_m - ROUNDING_M {
         return true;

@@ -100,7 +100,8 @@ impl Piece {
     }
 
     /// How the UAV flies `after_s` seconds from the piece's beginning.
-    pub(super) fn state(&self, after_s: f64, wind: Wind) -> State {
+    #[must_use]
+    pub fn state_after(&self, after_s: f64, wind: Wind) -> State {
         let time_s = self.start_s + after_s;
         match self.medium {
             Medium::Air => {
@@ -215,7 +216,7 @@ impl Piece {
     /// trajectory's start.
     pub(super) fn steepest(&self, wind: Wind) -> (f64, f64) {
         if self.medium == Medium::Air || !self.is_arc() {
-            let rate = self.state(0.0, wind).turn_rate_radps;
+            let rate = self.state_after(0.0, wind).turn_rate_radps;
             return (bank_rad(self.airspeed_mps, rate), self.start_s);
         }
         let k = self.segment.curvature_per_m;

@@ -55,7 +55,7 @@ fn flown(t: &Trajectory, a: &Airframe) -> (f64, f64) {
         let h = p.duration_s / f64::from(n);
         let mut before: Option<State> = None;
         for i in 0..=n {
-            let s = p.state(h * f64::from(i), t.wind());
+            let s = p.state_after(h * f64::from(i), t.wind());
             let weight = match i {
                 0 => 1.0,
                 _ if i == n => 1.0,
