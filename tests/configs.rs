@@ -43,6 +43,28 @@ fn all_trials_are_feasible() {
 }
 
 #[test]
+fn a_wind_comes_from_where_it_is_said_to_and_must_leave_the_turns_flyable() {
+    let windy = |speed: &str| {
+        let text = helsinki().replacen(
+            "  // wind: { from_deg: 225, speed_mps: 2 },",
+            &format!("wind: {{ from_deg: 225, speed_mps: {speed} }},"),
+            1,
+        );
+        assert_ne!(text, helsinki());
+        skein_scenario::parse_with("x", &text, &builtin_files(), &Overrides::default())
+    };
+    let wind = windy("2").unwrap().spec.wind;
+    assert!(
+        (wind.east_mps - 2f64.sqrt()).abs() < 1e-9 && (wind.north_mps - 2f64.sqrt()).abs() < 1e-9
+    );
+    let refused = windy("6").unwrap_err().to_string();
+    assert!(
+        refused.contains("wind.speed_mps") && refused.contains("wider lanes"),
+        "{refused}"
+    );
+}
+
+#[test]
 fn all_chaos_plans_can_be_read() {
     for path in files_in("chaos", ".json5") {
         let faults = skein_scenario::load_chaos_plan(&path, None).unwrap_or_else(|e| panic!("{e}"));

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 /// Standard gravity, m/s².
 pub const GRAVITY_MPS2: f64 = 9.806_65;
 
+/// Share of the ground speed that turns may need in a wind: following them takes the rest.
+const TURN_AUTHORITY: f64 = 0.97;
+
 /// The limits of a fixed-wing airframe and its camera.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Airframe {
@@ -38,6 +41,17 @@ impl Airframe {
     #[must_use]
     pub fn turn_radius_m(&self, airspeed_mps: f64) -> f64 {
         airspeed_mps * airspeed_mps / (GRAVITY_MPS2 * tan(self.max_bank_rad))
+    }
+
+    /// The airspeed, at most cruise, at which turns of `radius_m` over the ground can be
+    /// followed in a wind of `wind_mps`, with a little to spare for corrections, m/s; may
+    /// be below the stall.
+    ///
+    /// Downwind such a turn needs the turn rate (V + w)²/(V r), and so g tan φ = (V + w)²/r.
+    #[must_use]
+    pub fn airspeed_for_turns_mps(&self, radius_m: f64, wind_mps: f64) -> f64 {
+        let most = (radius_m * GRAVITY_MPS2 * tan(self.max_bank_rad)).sqrt();
+        self.cruise_mps.min(TURN_AUTHORITY * most - wind_mps)
     }
 
     /// The fastest turn at `airspeed_mps`, rad/s.

@@ -114,6 +114,19 @@ impl Chart {
             .collect();
     }
 
+    /// Length of the whole loop over the ground as a share of that through the air,
+    /// both ways; 0 where the wind forbids a part of it.
+    #[must_use]
+    pub fn loop_share(&self) -> f64 {
+        if self.cells_air_m.is_empty() {
+            return 1.0;
+        }
+        let air_m: f64 = self.cells_air_m.iter().map(|both| both[0] + both[1]).sum();
+        let cells = self.coverage_loop.cells();
+        let ground_m: f64 = cells.iter().map(|c| f64::from(c.service_mm) / 500.0).sum();
+        ground_m / air_m
+    }
+
     /// Distance through the air along a cell, if there is a wind, metres.
     fn cell_air_m(&self, cell: u16, direction: Direction) -> Option<f64> {
         let both = self.cells_air_m.get(usize::from(cell))?;

@@ -162,6 +162,17 @@ impl Executive {
         whole_ms((percept.endurance_s - self.chart.airframe.reserve_s) * 1000.0)
     }
 
+    /// Mean speed over the ground along the whole loop, m/s: cruise in calm air.
+    #[must_use]
+    pub fn loop_speed_mps(&self) -> f64 {
+        let air = self.chart.air();
+        if air.is_calm() {
+            self.chart.airframe.cruise_mps
+        } else {
+            self.chart.loop_share() * air.airspeed_mps
+        }
+    }
+
     /// Time to turn round where it is, milliseconds: the turn to the reversed pose
     /// takes 7π/3 radii, whatever the place.
     #[must_use]

@@ -10,17 +10,14 @@
 
 use super::follow::{CORRECTION_S, HORIZON_S, Offset, Steps, Track, correction};
 use crate::setpoint::Steer;
-use skein_planning::airframe::{Airframe, GRAVITY_MPS2};
+use skein_planning::airframe::Airframe;
 use skein_planning::frame::Pose;
-use skein_planning::math::{tan, wrap_pi};
+use skein_planning::math::{cos, wrap_pi};
 use skein_planning::trajectory::wind::{Heading, Wind};
 use skein_planning::trajectory::{Curve, Trajectory};
 
 /// Winds below this are left to the feedback, m/s: a percent of any airspeed.
 const CALM_MPS: f64 = 0.1;
-
-/// Share of the turn rate that curves may need in a wind: what is left corrects.
-const AUTHORITY: f64 = 0.97;
 
 /// A turn over the ground is flown as steps of constant rate no longer than this,
 /// seconds: between their ends the heading is off by a thousandth of a radian.
@@ -53,15 +50,12 @@ impl Air {
 
     /// The airspeed at which an airframe can follow turns of `radius_m` over the
     /// ground in this wind, at most its cruise, m/s.
-    ///
-    /// Downwind such a turn needs the turn rate (V + w)²/(V r).
     #[must_use]
     pub fn airspeed_for_turns_mps(airframe: &Airframe, wind: Wind, radius_m: f64) -> f64 {
         if wind.speed_mps() < CALM_MPS {
             return airframe.cruise_mps;
         }
-        let most = (radius_m * GRAVITY_MPS2 * tan(airframe.max_bank_rad)).sqrt();
-        airframe.cruise_mps.min(AUTHORITY * most - wind.speed_mps())
+        airframe.airspeed_for_turns_mps(radius_m, wind.speed_mps())
     }
 
     /// The same place with the course instead of the heading.
@@ -124,7 +118,7 @@ pub fn steps(track: &Track, offset: Offset, air: &Air, limit_radps: f64) -> Vec<
     let ground_mps = now.ground_velocity.norm();
     // How much the nose turns for each radian that the course does.
     let (c, h) = (now.course.0, now.heading.0);
-    let lead = ground_mps / (v * skein_planning::math::cos(c - h)).max(1.0);
+    let lead = ground_mps / (v * cos(c - h)).max(1.0);
     let (first, second) = correction(offset, ground_mps.max(1.0));
     let mut out = Steps::new(limit_radps);
     for p in plan.pieces() {
@@ -167,7 +161,7 @@ mod tests {
     use crate::testing::airframe;
     use proptest::prelude::*;
     use skein_planning::frame::Point;
-    use skein_planning::math::{FRAC_PI_2, PI, TAU, cos, sin};
+    use skein_planning::math::{FRAC_PI_2, PI, TAU, sin};
 
     /// Lanes with quarter turns of 24 m, as on a loop.
     fn lanes(start: Pose) -> Curve {

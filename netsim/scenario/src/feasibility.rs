@@ -18,6 +18,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// may leave cells that nobody has the fuel for.
 const COMFORTABLE_LOOPS: f64 = 2.5;
 
+/// The least airspeed that is commanded, in stall speeds, as in the envelope.
+const STALL_MARGIN: f64 = 1.1;
+
 /// Turning round on the spot, in turn radii: the shortest curve from a pose to its
 /// reverse is 7/3 of a half circle.
 const TURN_ROUND_RADII: f64 = 7.0 / 3.0 * core::f64::consts::PI;
@@ -98,6 +101,32 @@ fn fleet(spec: &Spec, out: &mut Vec<Finding>) {
             error(&format!("fleet.uavs[{i}].airframe"), text);
         }
     }
+    if let Some(text) = too_windy(spec) {
+        error("wind.speed_mps", text);
+    }
+}
+
+/// What to say when the wind carries a UAV out of the turns of the loop even at its
+/// slowest.
+fn too_windy(spec: &Spec) -> Option<String> {
+    let wind_mps = spec.wind.speed_mps();
+    let radius_m = f64::from(spec.mission.turn_radius_mm) / 1000.0;
+    let spare_mps = |u: &UavSpec| {
+        let slowest = STALL_MARGIN * u.airframe.stall_mps;
+        u.airframe.airspeed_for_turns_mps(radius_m, wind_mps) - slowest
+    };
+    let worst = spec
+        .uavs
+        .iter()
+        .min_by(|a, b| spare_mps(a).total_cmp(&spare_mps(b)))?;
+    let most_mps = wind_mps + spare_mps(worst);
+    (wind_mps > 0.0 && most_mps < wind_mps).then(|| {
+        format!(
+            "a wind of {wind_mps} m/s carries UAV {} out of turns of {radius_m} m even at its slowest; at most {:.1} m/s, or wider lanes",
+            worst.id,
+            most_mps.max(0.0)
+        )
+    })
 }
 
 /// Peers that a fault names.

@@ -14,11 +14,13 @@ use skein_peer::mission::PointMm;
 use skein_peer::plan::Ground;
 use skein_planning::frame::{Point, Pose};
 use skein_planning::geometry::{NoFlyZones, Polygon};
+use skein_planning::math::sin_cos;
+use skein_planning::trajectory::wind::Wind;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// All fields of a scenario.
-const FIELDS: [&str; 21] = [
+const FIELDS: [&str; 22] = [
     "name",
     "seed",
     "time_scale",
@@ -34,6 +36,7 @@ const FIELDS: [&str; 21] = [
     "airframes",
     "fleet",
     "ground",
+    "wind",
     "radio",
     "beacon_period_s",
     "percept_period_ms",
@@ -121,6 +124,7 @@ fn resolve(
     check_places(&f, &mission, &terrain, &fleet)?;
     let ground = common_ground(root, &mission)?;
     let uavs = launch(&fleet, &ground);
+    let wind = f.get("wind").map_or(Ok(Wind::CALM), wind)?;
     let radio = radio(f.need("radio", "{ range_m: 500, rate_bps: 64000 }")?)?;
     let peers: BTreeSet<u16> = uavs.iter().map(|u| u.id).chain(ground_id).collect();
     let known = Known {
@@ -142,6 +146,7 @@ fn resolve(
         zones: terrain.zones,
         uavs,
         ground: ground_spec,
+        wind,
         radio,
         beacon_period_ms,
         percept_period_ms: f.whole_or("percept_period_ms", 200, 20, 1000, "milliseconds")?,
@@ -239,6 +244,17 @@ fn ground_station(node: &Node<'_>) -> Result<GroundSpec, ScenarioError> {
         position: position(&f)?,
         height_m: f.number_or("height_m", 2.0, 0.0, MAX_HEIGHT_M, "metres")?,
     })
+}
+
+/// The wind as forecasts tell it: where it comes from, and how fast.
+fn wind(node: &Node<'_>) -> Result<Wind, ScenarioError> {
+    let f = node.fields(&["from_deg", "speed_mps"])?;
+    let from_deg = f
+        .need("from_deg", "270")?
+        .number(0.0, 360.0, "degrees clockwise from north")?;
+    let speed_mps = f.need("speed_mps", "3")?.number(0.0, 50.0, "m/s")?;
+    let (s, c) = sin_cos(from_deg.to_radians());
+    Ok(Wind::new(-speed_mps * s, -speed_mps * c))
 }
 
 fn radio(node: &Node<'_>) -> Result<RadioSpec, ScenarioError> {

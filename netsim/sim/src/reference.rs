@@ -192,7 +192,7 @@ impl<'a> Reference<'a> {
                 id: u.id,
                 heading: forecast.heading,
                 release_ms: forecast.release_ms,
-                speed_mmps: rounded(u.airframe.cruise_mps * 1000.0).max(1),
+                speed_mmps: rounded(mind.loop_speed_mps() * 1000.0).max(1),
                 turn_ms: mind.turn_ms(),
                 endurance_ms: rounded((percept.endurance_s - u.airframe.reserve_s) * 1000.0)
                     .saturating_sub(forecast.release_ms),

@@ -5,6 +5,7 @@ use skein_peer::Mission;
 use skein_planning::airframe::Airframe;
 use skein_planning::frame::{Point, Pose};
 use skein_planning::geometry::Polygon;
+use skein_planning::trajectory::wind::Wind;
 use std::sync::Arc;
 
 /// Everything a run needs, besides a seed.
@@ -24,6 +25,8 @@ pub struct Spec {
     pub uavs: Vec<UavSpec>,
     /// The ground station, if there is one.
     pub ground: Option<GroundSpec>,
+    /// The wind, everywhere and all the time.
+    pub wind: Wind,
     /// The radio.
     pub radio: RadioSpec,
     /// Beacon period T, milliseconds.

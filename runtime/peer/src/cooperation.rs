@@ -489,13 +489,12 @@ fn bid(peer: &Peer) -> Option<Snapshot> {
         .copied()
         .filter(|c| section.plan().iter().any(|p| p.cell == *c))
         .collect();
-    let airframe = peer.config.airframe?;
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "an airspeed is a small positive number"
     )]
-    let speed_mmps = (airframe.cruise_mps * 1000.0) as u32;
+    let speed_mmps = (executive.loop_speed_mps() * 1000.0) as u32;
     let spendable = crew.spendable_ms(peer.percept.as_ref());
     Some(Snapshot {
         round: open.round.clone(),

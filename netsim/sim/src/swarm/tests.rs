@@ -3,6 +3,7 @@
 use super::*;
 use crate::chaos::Fault;
 use crate::world::fixture;
+use skein_planning::trajectory::wind::Wind;
 
 /// The fixture without its zone: every cell of it is on the loop.
 fn stage(n_uavs: u16) -> Stage {
@@ -43,6 +44,19 @@ fn three_peers_cover_the_square_and_all_know() {
     });
     assert!(finished.count() >= 3);
     assert!(o.bytes > 0 && o.peer_ms >= 3 * o.makespan_ms.unwrap());
+}
+
+#[test]
+fn a_wind_costs_time_and_nothing_else() {
+    let calm = stage(3).run(1, Vec::new(), false);
+    for wind in [Wind::new(2.0, 1.0), Wind::new(-1.5, 2.0)] {
+        let mut spec = fixture::square(3);
+        spec.wind = wind;
+        let o = Stage::new(spec).run(1, vec![at(60_000, Fault::Kill { peer: 2 })], false);
+        assert!(o.completed, "{:?}", o.violations);
+        assert!(o.violation_counts.is_empty(), "{:?}", o.violations);
+        assert!(o.makespan_ms > calm.makespan_ms);
+    }
 }
 
 #[test]

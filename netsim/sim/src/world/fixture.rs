@@ -116,6 +116,7 @@ pub fn square(n_uavs: u16) -> Spec {
             position: Point::new(240.0, -30.0),
             height_m: 2.0,
         }),
+        wind: skein_planning::trajectory::wind::Wind::CALM,
         radio: radio(),
         beacon_period_ms: 1000,
         percept_period_ms: 500,

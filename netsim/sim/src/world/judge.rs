@@ -362,6 +362,7 @@ mod tests {
             },
             speed_mps: 13.0,
             turn_rate_radps: rate,
+            wind: skein_planning::trajectory::wind::Wind::CALM,
         }
     }
 

@@ -89,7 +89,7 @@ impl World {
             .iter()
             .map(|u| Uav {
                 id: u.id,
-                body: Kinematic::new(u.airframe, u.launch, u.height_m, 0),
+                body: Kinematic::new(u.airframe, u.launch, u.height_m, 0).in_wind(spec.wind),
                 computer: true,
                 failsafe: false,
             })

@@ -1,6 +1,6 @@
 //! A kinematic fixed wing: constant airspeed and turn rate piece by piece, flown
-//! exactly (D2.7 §2.2, §2.4). Wind, climb and the lag of a real airframe belong to
-//! the dynamic model.
+//! exactly (D2.7 §2.2, §2.4), in air that drifts with a constant wind. Climb and the
+//! lag of a real airframe belong to the dynamic model.
 //!
 //! A leg is a circular arc or a line from an anchor pose. The pose at any time comes
 //! from the anchor in closed form, so it does not depend on how often somebody asked.
@@ -9,6 +9,7 @@ use skein_behaviors::{Percept, Setpoint, Side};
 use skein_planning::airframe::Airframe;
 use skein_planning::frame::{Point, Pose};
 use skein_planning::math::{sin, sin_cos, tan, wrap_pi};
+use skein_planning::trajectory::wind::Wind;
 
 /// An airframe that was given no setpoint for this long loiters on its own. Two
 /// percept periods of the slowest sensible peer (500 ms) are lost before it trips.
@@ -30,13 +31,15 @@ pub struct Piece {
     pub speed_mps: f64,
     /// Turn rate, rad/s, positive to the left.
     pub turn_rate_radps: f64,
+    /// The wind that carries it.
+    pub wind: Wind,
 }
 
 impl Piece {
-    /// Length in metres.
+    /// Length in metres; in a wind the most that it can be over the ground.
     #[must_use]
     pub fn length_m(&self) -> f64 {
-        self.speed_mps * seconds(self.to_ms - self.from_ms)
+        (self.speed_mps + self.wind.speed_mps()) * seconds(self.to_ms - self.from_ms)
     }
 
     /// The pose a number of seconds after the beginning, exact.
@@ -52,8 +55,8 @@ impl Piece {
         let chord_m = self.speed_mps * dt_s * shrink;
         let (s, c) = sin_cos(self.start.heading_rad + half_rad);
         Pose {
-            east_m: self.start.east_m + chord_m * c,
-            north_m: self.start.north_m + chord_m * s,
+            east_m: self.start.east_m + chord_m * c + self.wind.east_mps * dt_s,
+            north_m: self.start.north_m + chord_m * s + self.wind.north_mps * dt_s,
             heading_rad: wrap_pi(self.start.heading_rad + 2.0 * half_rad),
         }
     }
@@ -75,7 +78,8 @@ impl Piece {
         if turned_rad < 1e-9 {
             return 1;
         }
-        // A chord over the angle d of radius r has the sagitta r (1 - cos(d/2)) <= r d² / 8.
+        // A chord over the angle d of radius r has the sagitta r (1 - cos(d/2)) <= r d² / 8;
+        // that of a trochoid is no more, for wind adds no acceleration.
         let radius_m = self.speed_mps / self.turn_rate_radps.abs();
         let n = (turned_rad / (8.0 * sagitta_m / radius_m).sqrt()).ceil();
         #[allow(
@@ -138,6 +142,7 @@ impl Kinematic {
                 start: launch,
                 speed_mps: airframe.cruise_mps,
                 turn_rate_radps: 0.0,
+                wind: Wind::CALM,
             },
             fuel_ms: endurance_ms(&airframe),
             setpoint: None,
@@ -147,9 +152,17 @@ impl Kinematic {
         }
     }
 
+    /// The same in a wind.
+    #[must_use]
+    pub fn in_wind(mut self, wind: Wind) -> Self {
+        self.leg.wind = wind;
+        self
+    }
+
     /// A new airframe at the launch point.
     pub fn relaunch(&mut self, now_ms: u64) {
-        *self = Self::new(self.airframe, self.launch, self.height_m, now_ms);
+        let wind = self.leg.wind;
+        *self = Self::new(self.airframe, self.launch, self.height_m, now_ms).in_wind(wind);
     }
 
     /// Takes the airframe out of the air.
@@ -207,8 +220,8 @@ impl Kinematic {
             pose: self.pose(),
             height_m: self.height_m,
             airspeed_mps: self.leg.speed_mps,
-            wind_east_mps: 0.0,
-            wind_north_mps: 0.0,
+            wind_east_mps: self.leg.wind.east_mps,
+            wind_north_mps: self.leg.wind.north_mps,
             endurance_s: seconds(self.fuel_ms),
             failsafe: self.failsafe,
         })
@@ -318,6 +331,7 @@ impl Kinematic {
                 start,
                 speed_mps: speed,
                 turn_rate_radps: rate,
+                wind: self.leg.wind,
             };
         }
     }
@@ -421,6 +435,27 @@ mod tests {
     }
 
     #[test]
+    fn a_wind_carries_it_along_and_is_told() {
+        let wind = Wind::new(3.0, -1.0);
+        let (mut calm, mut blown) = (fresh(), fresh().in_wind(wind));
+        for k in [&mut calm, &mut blown] {
+            assert!(k.apply(setpoint(0, &[(0.3, 333), (-0.5, 400)]), 0));
+            k.advance(350, &mut Vec::new());
+            k.advance(900, &mut Vec::new());
+        }
+        let drift = blown.position() - calm.position();
+        assert!((drift - wind.velocity() * 0.9).norm() < 1e-9, "{drift}");
+        assert!(wrap_pi(blown.pose().heading_rad - calm.pose().heading_rad).abs() < 1e-12);
+        let told = blown.percept().unwrap();
+        assert!(
+            (told.wind_east_mps - 3.0).abs() < 1e-12 && (told.wind_north_mps + 1.0).abs() < 1e-12
+        );
+        blown.relaunch(1000);
+        blown.advance(1500, &mut Vec::new());
+        assert!((blown.percept().unwrap().wind_east_mps - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
     fn physics_limits_airspeed_and_bank() {
         let mut k = fresh();
         let wild = Setpoint {
@@ -520,6 +555,7 @@ mod tests {
             start: fresh().pose(),
             speed_mps: 13.0,
             turn_rate_radps: 0.7,
+            wind: Wind::CALM,
         };
         let n = p.chords(0.01);
         let (a, b) = (p.pose_after(0.0), p.pose_after(5.0 / f64::from(n)));
