@@ -22,9 +22,8 @@ pub(super) fn segment_to_polygon_m(segment: &Segment, polygon: &Polygon) -> f64 
     if polygon.contains(from) {
         return 0.0;
     }
-    let turned = segment.curvature_per_m * segment.length_m;
     match segment.centre() {
-        Some(centre) if turned.abs() > STRAIGHT_RAD => {
+        Some(centre) if is_arc(segment) => {
             let arc = Arc::new(centre, segment, from, to);
             polygon
                 .edges()
@@ -36,6 +35,11 @@ pub(super) fn segment_to_polygon_m(segment: &Segment, polygon: &Polygon) -> f64 
             .map(|(a, b)| line_to_line_m(from, to, a, b))
             .fold(f64::INFINITY, f64::min),
     }
+}
+
+/// Whether a piece is measured as an arc, not as a line.
+pub(super) fn is_arc(segment: &Segment) -> bool {
+    (segment.curvature_per_m * segment.length_m).abs() > STRAIGHT_RAD
 }
 
 /// The smallest box around a piece: south-west and north-east corners.

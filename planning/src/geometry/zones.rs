@@ -5,7 +5,8 @@
 //! plan is checked by exact distances before it is handed out.
 
 use super::Polygon;
-use super::distance::{segment_bounds, segment_to_polygon_m};
+use super::distance::{is_arc, segment_bounds, segment_to_polygon_m};
+use super::polygon::point_to_line_m;
 use crate::frame::{Point, Pose};
 use crate::math::TAU;
 use crate::trajectory::{Curve, Segment};
@@ -15,6 +16,7 @@ use crate::trajectory::{Curve, Segment};
 pub struct NoFlyZones {
     zones: Vec<Polygon>,
     boxes: Vec<(Point, Point)>,
+    discs: Vec<(Point, f64)>,
 }
 
 /// Slack of [`NoFlyZones::is_clear`], metres: curves are built to touch the
@@ -31,8 +33,18 @@ impl NoFlyZones {
     /// The zones as they are; they may overlap.
     #[must_use]
     pub fn new(zones: Vec<Polygon>) -> Self {
-        let boxes = zones.iter().map(Polygon::bounds).collect();
-        Self { zones, boxes }
+        let boxes: Vec<(Point, Point)> = zones.iter().map(Polygon::bounds).collect();
+        let disc = |(zone, (low, high)): (&Polygon, &(Point, Point))| {
+            let centre = low + (high - low) / 2.0;
+            let farthest = |r: f64, v: &Point| r.max((v - centre).norm());
+            (centre, zone.vertices().iter().fold(0.0, farthest))
+        };
+        let discs = zones.iter().zip(&boxes).map(disc).collect();
+        Self {
+            zones,
+            boxes,
+            discs,
+        }
     }
 
     /// The zones as given.
@@ -62,11 +74,20 @@ impl NoFlyZones {
 
     /// Distance from `segment` to the nearest zone, or `limit_m` if none is nearer.
     fn nearest_m(&self, segment: &Segment, limit_m: f64) -> f64 {
+        self.first_nearer_m(segment, limit_m, f64::NEG_INFINITY)
+    }
+
+    /// As [`NoFlyZones::nearest_m`], but any distance below `enough_m` will do.
+    fn first_nearer_m(&self, segment: &Segment, limit_m: f64, enough_m: f64) -> f64 {
         let around = segment_bounds(segment);
+        let reach = Reach::of(segment);
         let mut least = limit_m;
-        for (zone, bounds) in self.zones.iter().zip(&self.boxes) {
-            if box_gap_m(bounds, &around) < least {
+        for ((zone, bounds), disc) in self.zones.iter().zip(&self.boxes).zip(&self.discs) {
+            if box_gap_m(bounds, &around) < least && reach.gap_m(disc) < least {
                 least = least.min(segment_to_polygon_m(segment, zone));
+                if least < enough_m {
+                    return least;
+                }
             }
         }
         least
@@ -88,7 +109,8 @@ impl NoFlyZones {
     pub fn is_segment_clear(&self, s: &Segment, clearance_m: f64) -> bool {
         let end = s.end();
         (end.east_m + end.north_m + s.start.east_m + s.start.north_m).is_finite()
-            && self.nearest_m(s, clearance_m) >= clearance_m - ROUNDING_M
+            && self.first_nearer_m(s, clearance_m, clearance_m - ROUNDING_M)
+                >= clearance_m - ROUNDING_M
     }
 }
 
@@ -136,6 +158,37 @@ pub fn loiter_clear(zones: &NoFlyZones, pose: Pose, radius_m: f64, margin_m: f64
         };
         zones.nearest_m(&circle, margin_m) >= margin_m - ROUNDING_M
     })
+}
+
+/// What a cheap bound on a distance needs to know of a piece.
+enum Reach {
+    /// A straight line between two points.
+    Line(Point, Point),
+    /// All of an arc's circle.
+    Circle(Point, f64),
+}
+
+impl Reach {
+    fn of(segment: &Segment) -> Self {
+        let (from, to) = (segment.start.position(), segment.end().position());
+        // An arc that hardly turns is measured as a line; so it is bounded as one.
+        match segment.centre() {
+            Some(centre) if is_arc(segment) => {
+                Self::Circle(centre, 1.0 / segment.curvature_per_m.abs())
+            }
+            _ => Self::Line(from, to),
+        }
+    }
+
+    /// No more than the distance to anything inside a disc, metres.
+    fn gap_m(&self, (centre, radius_m): &(Point, f64)) -> f64 {
+        let to_centre_m = match self {
+            Self::Line(a, b) => point_to_line_m(*centre, *a, *b),
+            // A huge circle's own rounding must not hide a zone.
+            Self::Circle(c, r) => ((centre - c).norm() - r).abs() - r * 1e-14,
+        };
+        to_centre_m - radius_m - ROUNDING_M
+    }
 }
 
 /// Distance between two boxes, zero when they overlap, metres.

@@ -111,7 +111,8 @@ struct Wheel {
 }
 
 impl Wheel {
-    fn new(centre: Point, radius_m: f64, normals: [Vector; 2], beyond_rad: f64) -> Self {
+    /// A circle that bends from one normal to the other, and as far beyond each.
+    fn new(centre: Point, radius_m: f64, normals: [Vector; 2], beyond_rad: [f64; 2]) -> Self {
         let turned = |v: Vector, by_rad: f64| {
             let (s, c) = crate::math::sin_cos(by_rad);
             Vector::new(c * v.x - s * v.y, s * v.x + c * v.y)
@@ -120,9 +121,9 @@ impl Wheel {
         Self {
             centre,
             radius_m,
-            from: turned(normals[0], -beyond_rad),
-            to: turned(normals[1], beyond_rad),
-            reach_rad: wrap_tau(between) + 2.0 * beyond_rad,
+            from: turned(normals[0], -beyond_rad[0]),
+            to: turned(normals[1], beyond_rad[1]),
+            reach_rad: wrap_tau(between) + beyond_rad[0] + beyond_rad[1],
         }
     }
 
@@ -172,8 +173,8 @@ pub(super) struct Wheels {
 }
 
 impl Wheels {
-    /// One wheel for each convex corner; a second, wider one where the clearance is
-    /// smaller than the turn radius.
+    /// One wheel for each convex corner. Where the clearance is smaller than the turn
+    /// radius, one that is sunk into the corner, and at short edges a wider one too.
     pub fn new(zones: &NoFlyZones, limits: &RouteLimits) -> Self {
         let (turn_m, keep_m) = (limits.turn_radius_m, limits.clearance_m);
         let mut wheels = Vec::new();
@@ -187,7 +188,7 @@ impl Wheels {
                 }
                 let normals = [outward(u, at), outward(at, x)];
                 if keep_m >= turn_m {
-                    wheels.push(Wheel::new(at, keep_m, normals, 0.0));
+                    wheels.push(Wheel::new(at, keep_m, normals, [0.0; 2]));
                     continue;
                 }
                 let middle = normals[0] + normals[1];
@@ -198,9 +199,17 @@ impl Wheels {
                 } else {
                     Vector::new(-normals[0].y, normals[0].x)
                 };
-                let sunk = at - middle * (turn_m - keep_m);
-                wheels.push(Wheel::new(sunk, turn_m, normals, BEYOND_RAD));
-                wheels.push(Wheel::new(at, turn_m, normals, 0.0));
+                let depth_m = turn_m - keep_m;
+                // Along an edge longer than this, sunk circles stand in the order of
+                // their corners; along a shorter one they may have changed places.
+                let is_short = |a: Point, b: Point| (b - a).norm() < 2.0 * depth_m;
+                let short = [is_short(u, at), is_short(at, x)];
+                let beyond_rad = short.map(|s| if s { BEYOND_RAD } else { 0.0 });
+                let sunk = at - middle * depth_m;
+                wheels.push(Wheel::new(sunk, turn_m, normals, beyond_rad));
+                if short[0] || short[1] {
+                    wheels.push(Wheel::new(at, turn_m, normals, [0.0; 2]));
+                }
             }
         }
         let lines = vec![OnceLock::new(); 2 * wheels.len()];
