@@ -2,8 +2,11 @@
 //! line at all edges, and Dijkstra over all of them.
 
 use super::*;
+use crate::geometry::offset::{Growth, Zone, grow};
 use crate::geometry::polygon::point_to_line_m;
 use crate::math::atan2;
+use crate::path::mesh::Mesh;
+use crate::path::two_point::Search;
 use proptest::prelude::*;
 
 fn polygon(points: &[(i32, i32)]) -> Option<Polygon> {
@@ -138,6 +141,26 @@ proptest! {
             let back = graph.shortest(to, from).unwrap();
             prop_assert!((back.length_m - path.length_m).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn the_graph_agrees_with_the_mesh(
+        obstacles in map(8), radius_m in 0.05f64..2.0, from in place(), to in place(),
+    ) {
+        let drawn: Vec<Zone> = obstacles.iter().map(Zone::from).collect();
+        let regions = grow(&drawn, &Growth::new(radius_m).unwrap()).unwrap().regions;
+        let graph = VisibilityGraph::round(&regions).shortest(from, to);
+        let border = rectangle(-100, -100, 150, 150);
+        let rings: Vec<&[Point]> = std::iter::once(border.vertices())
+            .chain(regions.iter().flat_map(Region::rings))
+            .collect();
+        let mesh = Mesh::from_rings(&rings).unwrap();
+        let meshed = Search::new(&mesh).distance_m(from, to);
+        let equal = match (&graph, meshed) {
+            (Some(a), Some(b)) => (a.length_m - b).abs() < 1e-9,
+            (a, b) => a.is_none() && b.is_none(),
+        };
+        prop_assert!(equal, "{graph:?} {meshed:?}");
     }
 
     #[test]
