@@ -223,7 +223,9 @@ mod tests {
             let start = Pose::new(Point::new(0.0, 0.0), heading);
             let curve = lanes(start);
             let (worst_m, last_m, time_s) = flown(wind, start, &curve, period_ms);
-            prop_assert!(worst_m < 0.5 && last_m < 0.5, "{worst_m} {last_m}");
+            // Half of the default tracking error even with percepts of half a second.
+            let most_m = if period_ms > 200 { 1.0 } else { 0.5 };
+            prop_assert!(worst_m < most_m && last_m < most_m, "{worst_m} {last_m}");
             // The forecast is what it took.
             let v = Air::airspeed_for_turns_mps(&airframe(), wind, 23.5);
             let air = Air { wind, airspeed_mps: v };
