@@ -4,7 +4,7 @@
 //! LSR, RSL, LRL, RLR. Each is built from the centres of its turning circles, so
 //! the formulas are those of tangent lines and of a circle touching two others.
 
-mod length;
+pub(super) mod length;
 
 pub use length::{length_m, lengths_m};
 

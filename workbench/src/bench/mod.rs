@@ -3,6 +3,7 @@
 pub mod cover;
 pub mod dubins;
 pub mod figures;
+pub mod headings;
 pub mod line;
 pub mod offset;
 pub mod route;
@@ -26,6 +27,8 @@ pub enum Subject {
     Cover(cover::CoverArgs),
     /// Shortest Dubins curves to random goals.
     Dubins(dubins::DubinsArgs),
+    /// Headings at random waypoints, with a certified gap.
+    Headings(headings::HeadingsArgs),
     /// Shortest paths among polygons by the visibility graph.
     RoutePolygons(route_polygons::RoutePolygonsArgs),
     /// Fastest flights in a constant wind.
@@ -46,6 +49,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
     match &args.subject {
         Subject::Cover(args) => cover::run(args),
         Subject::Dubins(args) => dubins::run(args),
+        Subject::Headings(args) => headings::run(args),
         Subject::RoutePolygons(args) => route_polygons::run(args),
         Subject::Wind(args) => wind::run(args),
         Subject::Offset(args) => offset::run(args),

@@ -23,7 +23,7 @@ const LARGEST_RAD: f64 = 1e5;
 
 /// A goal seen from the start, in turn radii.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Goal {
+pub(in crate::trajectory) struct Goal {
     /// Ahead.
     pub x: f64,
     /// To the left.
@@ -145,7 +145,7 @@ impl Goal {
 
     /// LSL.
     #[inline(always)]
-    fn same(&self) -> f64 {
+    pub fn same(&self) -> f64 {
         let v = self.left_left();
         let straight = (v.0 * v.0 + v.1 * v.1).sqrt();
         // A last turn left out turns the goal itself, a first one the straight.
@@ -161,7 +161,7 @@ impl Goal {
 
     /// LSR; infinite where the circles overlap.
     #[inline(always)]
-    fn cross(&self) -> f64 {
+    pub fn cross(&self) -> f64 {
         let v = self.left_right();
         let square = v.0 * v.0 + v.1 * v.1;
         let gap = square - 4.0;
@@ -180,7 +180,7 @@ impl Goal {
 
     /// LRL with the middle turn above a half circle; infinite where the circles
     /// are too far apart, or one and the same.
-    fn three(&self) -> f64 {
+    pub fn three(&self) -> f64 {
         let v = self.left_left();
         let apart = (v.0 * v.0 + v.1 * v.1).sqrt();
         if apart > 4.0 || apart <= self.tol {
@@ -234,13 +234,13 @@ impl Goal {
 
     /// The shortest of all; infinite when something is not a number.
     #[inline(always)]
-    fn shortest(&self) -> f64 {
+    pub fn shortest(&self) -> f64 {
         self.finish(self.with_straight())
     }
 
     /// The shortest of all, given the best with a straight.
     #[inline(always)]
-    fn finish(&self, best: f64) -> f64 {
+    pub fn finish(&self, best: f64) -> f64 {
         // A middle turn alone is longer than a half circle.
         if self.near() && best > PI {
             least(self.without_straight(), best)

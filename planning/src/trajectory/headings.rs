@@ -1,0 +1,340 @@
+//! Headings at a sequence of waypoints for the shortest chain of Dubins curves,
+//! with a certified gap (D2.7 §2.4.3, no wind).
+//!
+//! Each waypoint's headings are cut into intervals. A shortest path over them,
+//! with a lower bound for every pair of neighbouring intervals ([`leg`]), bounds
+//! every choice of headings from below; a shortest path over the intervals'
+//! middles, polished one waypoint at a time, is a choice and bounds from above.
+//! Intervals through which even the bound is no better than what is asked for are
+//! put aside with it, the others halved, until the two bounds meet.
+//!
+//! D2.7 proposes gradient descent, which can tell neither. Which order to visit
+//! the waypoints in, and wind, are for others.
+
+mod chain;
+mod interval;
+mod leg;
+
+use super::dubins;
+use crate::frame::{Point, Pose, Vector};
+use crate::math::{TAU, wrap_tau};
+use chain::{Ends, Layers};
+use leg::Arc;
+
+/// Intervals of the whole circle in the first round: the bound of a leg is of
+/// second order below a fifth of a radian half width.
+const FIRST_INTERVALS: u32 = 16;
+
+/// Rounds at most: after 20 halvings an interval is a millionth of a radian, the
+/// bounds agree to 1e-12 of the radius, and only equal answers are left to tell apart.
+const MAX_ROUNDS: usize = 20;
+
+/// Pairs of intervals in one round at most, 10 s of work; with more the gap
+/// reached so far is the answer.
+const MAX_PAIRS: usize = 40_000_000;
+
+/// Relative rounding of a sum of legs: the lower bound stays below it.
+const ROUNDING: f64 = 1e-12;
+
+/// Whether the chain of waypoints is a loop, and which headings are given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Chain {
+    /// From the first waypoint to the last; a heading that is given is kept, radians.
+    Open {
+        /// Heading at the first waypoint.
+        first_rad: Option<f64>,
+        /// Heading at the last waypoint.
+        last_rad: Option<f64>,
+    },
+    /// And back to the first, smoothly.
+    Closed,
+}
+
+/// What was asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Request<'a> {
+    /// Waypoints in order, metres.
+    pub waypoints: &'a [Point],
+    /// Ends of the chain.
+    pub chain: Chain,
+    /// Turn radius, metres.
+    pub radius_m: f64,
+    /// The share of the length the answer may be above the optimum.
+    pub gap: f64,
+}
+
+/// Both bounds after a round, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// No choice of headings is shorter.
+    pub lower_m: f64,
+    /// The best choice found so far.
+    pub upper_m: f64,
+}
+
+/// The answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Headings {
+    /// One heading a waypoint, radians in [0, 2π).
+    pub headings_rad: Vec<f64>,
+    /// Length of the chain of shortest Dubins curves with these headings, metres.
+    pub length_m: f64,
+    /// No choice of headings is shorter, metres.
+    pub lower_bound_m: f64,
+    /// Both bounds round by round.
+    pub rounds: Vec<Bounds>,
+}
+
+impl Headings {
+    /// How far above the optimum the length may be, as a share of the length.
+    #[must_use]
+    pub fn gap(&self) -> f64 {
+        if self.length_m > 0.0 {
+            1.0 - self.lower_bound_m / self.length_m
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Why there is no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum HeadingsError {
+    /// One waypoint is no chain.
+    #[error("{0} waypoints make no chain: two are needed")]
+    TooFew(usize),
+    /// A coordinate or a given heading is infinite or no number.
+    #[error("waypoint {0} or its heading is not a finite number")]
+    NotFinite(usize),
+    /// The turn radius is not positive.
+    #[error("a turn radius must be positive and finite")]
+    Radius,
+    /// The gap is negative or no number.
+    #[error("a gap is a share of the length, zero or more")]
+    Gap,
+}
+
+/// Chooses the headings.
+///
+/// # Guarantees
+/// `lower_bound_m` ≤ the optimum ≤ `length_m`, and [`Headings::gap`] is at most
+/// the gap asked for unless the rounds run out (hundreds of waypoints much nearer
+/// than a turn radius); then it is what was reached. Bounds never get worse from
+/// round to round. The same bits on every machine.
+///
+/// # Errors
+/// When the request is malformed.
+pub fn choose(request: &Request) -> Result<Headings, HeadingsError> {
+    check(request)?;
+    let r = request.radius_m;
+    let points = request.waypoints;
+    let closed = request.chain == Chain::Closed;
+    let count = points.len();
+    let legs: Vec<Vector> = (0..count - usize::from(!closed))
+        .map(|i| (points[(i + 1) % count] - points[i]) / r)
+        .collect();
+    let mut layers = first_layers(request);
+    let mut best = (f64::INFINITY, Vec::new());
+    // The least bound among the intervals put aside, and what is known so far.
+    let (mut aside, mut lower) = (f64::INFINITY, 0.0f64);
+    let mut rounds = Vec::new();
+    let mut slopes = vec![0.0; layers[0].len()];
+    for _ in 0..MAX_ROUNDS {
+        let ends = if closed { Ends::Closed } else { Ends::Open };
+        let solved = Layers::solve(&legs, &layers, ends, &slopes);
+        let mut headings = solved.headings;
+        let length = polish(&legs, &mut headings, request.chain);
+        if length < best.0 {
+            best = (length, headings);
+        }
+        lower = lower
+            .max(solved.least.min(aside) * (1.0 - ROUNDING))
+            .min(best.0);
+        rounds.push(Bounds {
+            lower_m: lower * r,
+            upper_m: best.0 * r,
+        });
+        let wanted = best.0 * (1.0 - request.gap);
+        if lower >= wanted {
+            break;
+        }
+        let kept = halved(&layers, &solved.through, &solved.slopes, wanted, &mut aside);
+        layers = kept.0;
+        slopes = kept.1;
+        if layers.iter().any(Vec::is_empty) {
+            // Every choice passes an interval that was put aside.
+            lower = lower.max(aside * (1.0 - ROUNDING)).min(best.0);
+            break;
+        }
+        if pairs(&layers, closed) > MAX_PAIRS {
+            break;
+        }
+    }
+    Ok(Headings {
+        headings_rad: best.1.into_iter().map(wrap_tau).collect(),
+        length_m: best.0 * r,
+        lower_bound_m: lower * r,
+        rounds,
+    })
+}
+
+fn check(request: &Request) -> Result<(), HeadingsError> {
+    let points = request.waypoints;
+    if points.len() < 2 {
+        return Err(HeadingsError::TooFew(points.len()));
+    }
+    if !(request.radius_m > 0.0 && request.radius_m.is_finite()) {
+        return Err(HeadingsError::Radius);
+    }
+    if request.gap.is_nan() || request.gap < 0.0 {
+        return Err(HeadingsError::Gap);
+    }
+    let finite = |p: &Point| p.x.is_finite() && p.y.is_finite();
+    if let Some(i) = points.iter().position(|p| !finite(p)) {
+        return Err(HeadingsError::NotFinite(i));
+    }
+    if let Chain::Open {
+        first_rad,
+        last_rad,
+    } = request.chain
+    {
+        for (at, heading) in [(0, first_rad), (points.len() - 1, last_rad)] {
+            if heading.is_some_and(|h| !h.is_finite()) {
+                return Err(HeadingsError::NotFinite(at));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The whole circle at every waypoint, but for headings that are given.
+fn first_layers(request: &Request) -> Vec<Vec<Arc>> {
+    let half = TAU / 2.0 / f64::from(FIRST_INTERVALS);
+    let circle: Vec<Arc> = (0..FIRST_INTERVALS)
+        .map(|i| Arc::new(half * f64::from(2 * i + 1), half))
+        .collect();
+    let mut layers = vec![circle; request.waypoints.len()];
+    if let Chain::Open {
+        first_rad,
+        last_rad,
+    } = request.chain
+    {
+        let last = layers.len() - 1;
+        for (at, heading) in [(0, first_rad), (last, last_rad)] {
+            if let Some(h) = heading {
+                layers[at] = vec![Arc::new(wrap_tau(h), 0.0)];
+            }
+        }
+    }
+    layers
+}
+
+/// Puts intervals aside whose bound is at least `wanted`, and halves the others;
+/// also the slopes of the first waypoint's halves.
+fn halved(
+    layers: &[Vec<Arc>],
+    through: &[Vec<f64>],
+    slopes: &[f64],
+    wanted: f64,
+    aside: &mut f64,
+) -> (Vec<Vec<Arc>>, Vec<f64>) {
+    let mut kept_slopes = Vec::new();
+    let kept = layers
+        .iter()
+        .zip(through)
+        .enumerate()
+        .map(|(i, (layer, bounds))| {
+            let mut kept = Vec::with_capacity(2 * layer.len());
+            for (j, (arc, bound)) in layer.iter().zip(bounds).enumerate() {
+                if *bound >= wanted {
+                    *aside = aside.min(*bound);
+                    continue;
+                }
+                let half = arc.half_rad / 2.0;
+                if half > 0.0 {
+                    kept.push(Arc::new(arc.mid_rad - half, half));
+                    kept.push(Arc::new(arc.mid_rad + half, half));
+                } else {
+                    kept.push(*arc);
+                }
+                if i == 0 {
+                    kept_slopes.resize(kept.len(), slopes[j]);
+                }
+            }
+            kept
+        })
+        .collect();
+    (kept, kept_slopes)
+}
+
+/// Pairs of neighbouring intervals.
+fn pairs(layers: &[Vec<Arc>], closed: bool) -> usize {
+    let last = layers.len() - 1;
+    let joint = if closed {
+        layers[last].len() * layers[0].len()
+    } else {
+        0
+    };
+    let between: usize = layers.windows(2).map(|w| w[0].len() * w[1].len()).sum();
+    between + joint
+}
+
+/// Length of one leg between two headings, turn radii.
+fn leg_length(v: Vector, a_rad: f64, b_rad: f64) -> f64 {
+    let from = Pose::new(Point::new(0.0, 0.0), a_rad);
+    dubins::length_m(from, Pose::new(Point::new(v.x, v.y), b_rad), 1.0)
+}
+
+/// Moves one heading at a time while that shortens the two legs it joins; the
+/// length reached, turn radii.
+fn polish(legs: &[Vector], headings: &mut [f64], chain: Chain) -> f64 {
+    const FIRST_STEP_RAD: f64 = 0.1;
+    const LAST_STEP_RAD: f64 = 1e-4;
+    let count = headings.len();
+    let fixed = |i: usize| match chain {
+        Chain::Open {
+            first_rad,
+            last_rad,
+        } => (i == 0 && first_rad.is_some()) || (i + 1 == count && last_rad.is_some()),
+        Chain::Closed => false,
+    };
+    let around = |headings: &[f64], i: usize, h: f64| {
+        let mut sum = 0.0;
+        if i < legs.len() {
+            sum += leg_length(legs[i], h, headings[(i + 1) % count]);
+        }
+        let before = if i > 0 { i - 1 } else { count - 1 };
+        if before < legs.len() {
+            sum += leg_length(legs[before], headings[before], h);
+        }
+        sum
+    };
+    let mut step = FIRST_STEP_RAD;
+    while step > LAST_STEP_RAD {
+        let mut gained = 0.0;
+        for i in 0..count {
+            if fixed(i) {
+                continue;
+            }
+            let here = around(headings, i, headings[i]);
+            for h in [headings[i] + step, headings[i] - step] {
+                let there = around(headings, i, h);
+                if there < here {
+                    gained += here - there;
+                    headings[i] = h;
+                    break;
+                }
+            }
+        }
+        if gained < 0.1 * step * step {
+            step *= 0.5;
+        }
+    }
+    legs.iter()
+        .enumerate()
+        .map(|(i, v)| leg_length(*v, headings[i], headings[(i + 1) % count]))
+        .sum()
+}
+
+#[cfg(test)]
+mod tests;
