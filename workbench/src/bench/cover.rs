@@ -6,7 +6,9 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use skein_planning::coverage::grid::improve::Improver;
-use skein_planning::coverage::grid::{Cell, LaneMap, Plan, Task, bounds, free, improve, mstc};
+use skein_planning::coverage::grid::{
+    Cell, LaneMap, Plan, Task, TaskError, bounds, free, improve, mstc,
+};
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -151,11 +153,12 @@ fn solve<'a>(map: &LaneMap, instance: &'a Instance, args: &CoverArgs) -> Result<
             .with_context(|| format!("root [{row}, {col}] is not a free cell"))
     };
     let roots: Vec<Cell> = instance.roots.iter().map(root).collect::<Result<_>>()?;
-    let ((task, plan), plan_us) = timed(|| {
-        let task = Task::new(map, &roots, args.closed);
+    let (planned, plan_us) = timed(|| {
+        let task = Task::new(map, &roots, args.closed)?;
         let plan = plan(&task, args);
-        (task, plan)
+        Ok::<_, TaskError>((task, plan))
     });
+    let (task, plan) = planned?;
     let lower_bound = bounds::reach_moves(&task);
     let makespan_moves = plan.makespan_moves();
     let cells_total = task.map.n_free();

@@ -97,10 +97,13 @@ mod tests {
     fn a_corridor_needs_its_length() {
         let map = LaneMap::new(1, 10, |_, _| true).unwrap();
         let end = map.cell(0, 0).unwrap();
-        assert_eq!(reach_moves(&Task::new(&map, &[end], false)), 9);
-        assert_eq!(reach_moves(&Task::new(&map, &[end], true)), 18);
-        assert_eq!(reach_moves(&Task::new(&map, &[end, end], false)), 9);
-        assert!((reach_time(&Task::new(&map, &[end], false)) - 9.0).abs() < 1e-12);
+        assert_eq!(reach_moves(&Task::new(&map, &[end], false).unwrap()), 9);
+        assert_eq!(reach_moves(&Task::new(&map, &[end], true).unwrap()), 18);
+        assert_eq!(
+            reach_moves(&Task::new(&map, &[end, end], false).unwrap()),
+            9
+        );
+        assert!((reach_time(&Task::new(&map, &[end], false).unwrap()) - 9.0).abs() < 1e-12);
     }
 
     #[test]
@@ -109,7 +112,7 @@ mod tests {
         let at = map.cell(10, 10).unwrap();
         // The other 399 cells, shared by four; who returns flies over some of the four
         // beside the root once more.
-        assert_eq!(reach_moves(&Task::new(&map, &[at; 4], false)), 100);
-        assert_eq!(reach_moves(&Task::new(&map, &[at; 4], true)), 102);
+        assert_eq!(reach_moves(&Task::new(&map, &[at; 4], false).unwrap()), 100);
+        assert_eq!(reach_moves(&Task::new(&map, &[at; 4], true).unwrap()), 102);
     }
 }

@@ -5,28 +5,48 @@
 //! same plan byte for byte.
 
 use super::map::{Cell, NOWHERE};
-use super::partition;
 use super::plan::{Plan, Task};
-use super::search::Search;
+use super::search::{PACE, Search};
 use super::spanning::{Tree, best_offset, region_loops};
+use super::{bounds, partition, peel};
 
 /// Steps in a round: between two of them the aim is set anew and the caller may stop.
 pub const ROUND: usize = 20_000;
 
+/// Loss accepted at the beginning, thousandths of a move.
+const HOTTEST: i64 = 300;
+
+/// Times that work is peeled off to find how many moves suffice.
+const PEELS: usize = 4;
+
+/// One cell in this many may be left over when work is peeled off: neighbours take it.
+const FEW_LEFT: usize = 300;
+
 /// Steps by default.
-pub const STEPS: usize = 3_000_000;
+pub const STEPS: usize = 1_500_000;
 
 /// A plan that gets better the longer it is improved.
 pub struct Improver<'a> {
     task: &'a Task,
     search: Search<'a>,
     best: Vec<Vec<Cell>>,
-    best_makespan: i64,
+    best_score: (i64, i64),
+    /// No makespan is less.
+    bound: i64,
     done: usize,
     steps: usize,
 }
 
 /// Plans with the default number of steps.
+///
+/// # Guarantees
+/// Covers every cell of the task, unless a UAV's endurance is too short. The same task
+/// gives the same plan on every machine. No factor of the optimum is promised;
+/// [`bounds`] says how far from it a plan can be.
+///
+/// # Complexity
+/// O(k N) for the first plan; a step costs O(1) and, when it is taken, a move of up to
+/// one UAV's cells in memory.
 #[must_use]
 pub fn best(task: &Task) -> Plan {
     let mut improver = Improver::new(task, STEPS);
@@ -41,49 +61,93 @@ impl<'a> Improver<'a> {
     pub fn new(task: &'a Task, steps: usize) -> Self {
         let search = Search::new(task, first_orders(task));
         let best = search.orders().to_vec();
-        let best_makespan = search.makespan();
+        let best_score = search.score();
+        let equal = task.speeds.iter().all(|v| *v == task.speeds[0]);
+        let bound = if equal {
+            i64::from(bounds::reach_moves(task)) * PACE
+        } else {
+            0
+        };
         Self {
             task,
             search,
             best,
-            best_makespan,
+            best_score,
+            bound,
             done: 0,
             steps,
         }
     }
 
-    /// Improves for one round; false when the steps are spent.
+    /// Improves for one round; false when the steps are spent or nothing better exists.
     pub fn round(&mut self) -> bool {
-        if self.done >= self.steps {
+        if self.done >= self.steps || self.best_score <= (0, self.bound) {
             return false;
         }
-        let left = (self.steps - self.done) as i64;
-        // Cooling to nothing at three quarters of the way.
-        let heat = (left * 4 / self.steps.max(1) as i64).max(0);
-        let _ = heat;
+        // Cooling from a third of a move to nothing at three quarters of the way.
+        let (left, steps) = ((self.steps - self.done) as i64, self.steps as i64);
         self.search
-            .heat(300 * (left - self.steps as i64 / 4).max(0) / self.steps as i64);
+            .heat(HOTTEST * (left - steps / 4).max(0) / steps);
         self.search.run(ROUND.min(self.steps - self.done));
         self.done += ROUND;
         self.search.aim();
-        let makespan = self.search.makespan();
-        if makespan < self.best_makespan {
-            self.best_makespan = makespan;
+        let score = self.search.score();
+        if score < self.best_score {
+            self.best_score = score;
             self.best = self.search.orders().to_vec();
         }
         true
     }
 
-    /// The best plan so far.
+    /// The best plan so far. A UAV whose endurance does not suffice flies as much of its
+    /// share as it can; [`Plan::uncovered`] tells what is left.
     #[must_use]
     pub fn plan(&self) -> Plan {
         self.task.fly(&self.best)
     }
 }
 
-/// Each UAV's region in the order of a loop round it, cut open where it enters.
+/// The first plan: a region each that all grow at once, or work peeled off from afar,
+/// whichever is done sooner.
 fn first_orders(task: &Task) -> Vec<Vec<Cell>> {
     let offset = best_offset(&task.map);
+    let grown = grown_orders(task, offset);
+    let peeled = peeled_orders(task, offset);
+    let score = |orders: &[Vec<Cell>]| Search::new(task, orders.to_vec()).score();
+    if score(&grown) <= score(&peeled) {
+        grown
+    } else {
+        peeled
+    }
+}
+
+/// Work peeled off from afar, with about the least moves that suffice for all.
+fn peeled_orders(task: &Task, offset: (u32, u32)) -> Vec<Vec<Cell>> {
+    let n_cells = task.map.n_free();
+    let n_uavs = u32::try_from(task.n_uavs()).unwrap_or(u32::MAX).max(1);
+    let mut low = bounds::reach_moves(task);
+    let mut moves = low + low / 80;
+    let mut best = None;
+    for _ in 0..PEELS {
+        let (orders, left) = peel::orders(task, offset, moves);
+        if left * FEW_LEFT > n_cells {
+            low = moves;
+            let more = u32::try_from(left).unwrap_or(u32::MAX) / n_uavs;
+            moves += 1 + more;
+            best = best.or(Some(orders));
+        } else {
+            best = Some(orders);
+            moves = low.midpoint(moves);
+            if moves <= low + low / 100 {
+                break;
+            }
+        }
+    }
+    best.unwrap_or_default()
+}
+
+/// Regions that all grow at once, in the order of loops round them.
+fn grown_orders(task: &Task, offset: (u32, u32)) -> Vec<Vec<Cell>> {
     let regions = partition::regions(task, offset);
     let entries: Vec<Cell> = regions.entry.iter().flatten().copied().collect();
     let loops = region_loops(
@@ -94,19 +158,172 @@ fn first_orders(task: &Task) -> Vec<Vec<Cell>> {
         &entries,
     );
     let order = |entry: &Option<Cell>| {
-        let mut order = entry.map(|e| loops.from(e)).unwrap_or_default();
-        // An open path drops the last link: the longer one of the two at the entry.
-        let link = |c: Option<&Cell>| {
-            let (entry, c) = (
-                order.first().copied().unwrap_or(NOWHERE),
-                c.copied().unwrap_or(NOWHERE),
-            );
-            task.map.straight(entry, c)
-        };
-        if link(order.get(1)) > link(order.last()) {
-            order[1..].reverse();
-        }
-        order
+        let cells = entry.map(|e| loops.from(e));
+        cells.map(|c| cut_open(task, c)).unwrap_or_default()
     };
-    regions.entry.iter().map(order).collect()
+    insert_missing(task, regions.entry.iter().map(order).collect())
+}
+
+/// An open path drops the last link of its loop: the longer one of the two at the entry.
+fn cut_open(task: &Task, mut order: Vec<Cell>) -> Vec<Cell> {
+    if let [entry, second, .., last] = order[..]
+        && task.map.straight(entry, second) > task.map.straight(entry, last)
+    {
+        order[1..].reverse();
+    }
+    order
+}
+
+/// Inserts each cell that is in no order after a neighbour that is.
+pub(super) fn insert_missing(task: &Task, mut orders: Vec<Vec<Cell>>) -> Vec<Vec<Cell>> {
+    let map = &task.map;
+    let mut next = vec![NOWHERE; map.table_len()];
+    let mut there = vec![false; map.table_len()];
+    let mut open = Vec::new();
+    // A part of the map where nobody has any work has at least an idle UAV's root.
+    let mut rooted: Vec<Cell> = orders.iter().flatten().copied().collect();
+    rooted.sort_unstable();
+    for (order, root) in orders.iter_mut().zip(&task.roots) {
+        if order.is_empty()
+            && let Err(i) = rooted.binary_search(root)
+        {
+            rooted.insert(i, *root);
+            order.push(*root);
+        }
+    }
+    for order in &mut orders {
+        order.retain(|cell| !core::mem::replace(&mut there[*cell as usize], true));
+        for pair in order.windows(2) {
+            next[pair[0] as usize] = pair[1];
+        }
+        open.extend(order.iter().copied());
+    }
+    let mut done = 0;
+    while let Some(&at) = open.get(done) {
+        done += 1;
+        for near in map.around(at) {
+            if map.is_free(near) && !there[near as usize] {
+                there[near as usize] = true;
+                next[near as usize] = next[at as usize];
+                next[at as usize] = near;
+                open.push(near);
+            }
+        }
+    }
+    let follow = |order: Vec<Cell>| {
+        let mut at = order.first().copied().unwrap_or(NOWHERE);
+        let mut full = Vec::new();
+        while at != NOWHERE {
+            full.push(at);
+            at = next[at as usize];
+        }
+        full
+    };
+    orders.into_iter().map(follow).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::map::LaneMap;
+    use super::*;
+    use proptest::prelude::*;
+
+    fn assert_sound(task: &Task, plan: &Plan) {
+        assert_eq!(plan.n_covered(task), task.map.n_free());
+        for (path, root) in plan.paths.iter().zip(&task.roots) {
+            assert_eq!(path[0], *root);
+            assert!(!task.closed || path.last() == Some(root));
+            for step in path.windows(2) {
+                assert!(task.map.adjacent(step[0], step[1]) && task.map.is_free(step[1]));
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+
+        #[test]
+        fn every_cell_is_covered_by_paths_from_the_roots(
+            free in prop::collection::vec(prop::bool::weighted(0.75), 12 * 13),
+            picks in prop::collection::vec(any::<prop::sample::Index>(), 1..6),
+            closed in any::<bool>(),
+            speeds in prop::collection::vec(1u32..4, 6),
+        ) {
+            let map = LaneMap::new(12, 13, |r, c| free[(r * 13 + c) as usize]).unwrap();
+            let cells: Vec<Cell> = map.cells().collect();
+            prop_assume!(!cells.is_empty());
+            let roots: Vec<Cell> = picks.iter().map(|p| cells[p.index(cells.len())]).collect();
+            let mut task = Task::new(&map, &roots, closed).unwrap();
+            let mut improver = Improver::new(&task, 40_000);
+            while improver.round() {}
+            let plan = improver.plan();
+            assert_sound(&task, &plan);
+            prop_assert!(plan.makespan_moves() >= bounds::reach_moves(&task));
+            task.speeds = speeds[..roots.len()].to_vec();
+            let mut improver = Improver::new(&task, 20_000);
+            while improver.round() {}
+            assert_sound(&task, &improver.plan());
+            for orders in [grown_orders(&task, (0, 1)), peeled_orders(&task, (1, 0))] {
+                let mut all: Vec<Cell> = orders.into_iter().flatten().collect();
+                all.sort_unstable();
+                let cells: Vec<Cell> = task.map.cells().collect();
+                prop_assert_eq!(all, cells, "each cell in one order");
+            }
+        }
+    }
+
+    #[test]
+    fn from_one_base_more_uavs_pay() {
+        let map = LaneMap::new(40, 40, |r, c| r % 9 != 4 || c % 7 > 1).unwrap();
+        let base = |k: usize| vec![map.cell(20, 20).unwrap(); k];
+        let mut last = u32::MAX;
+        for k in [1, 2, 4, 8] {
+            let task = Task::new(&map, &base(k), false).unwrap();
+            let mut improver = Improver::new(&task, 300_000);
+            while improver.round() {}
+            let plan = improver.plan();
+            assert_sound(&task, &plan);
+            let ratio = f64::from(plan.makespan_moves()) / f64::from(bounds::reach_moves(&task));
+            assert!(ratio < 1.12, "k = {k}: {ratio}");
+            assert!(plan.makespan_moves() < last);
+            last = plan.makespan_moves();
+        }
+    }
+
+    #[test]
+    fn the_same_task_gives_the_same_plan() {
+        let map = LaneMap::new(30, 30, |r, c| (r * 7 + c * 3) % 11 != 0).unwrap();
+        let roots: Vec<Cell> = map.cells().step_by(200).collect();
+        let task = Task::new(&map, &roots, false).unwrap();
+        let plan = || {
+            let mut improver = Improver::new(&task, 100_000);
+            while improver.round() {}
+            improver.plan()
+        };
+        assert_eq!(plan(), plan());
+    }
+
+    #[test]
+    fn a_short_endurance_is_kept_and_the_rest_is_told() {
+        let map = LaneMap::new(20, 20, |_, _| true).unwrap();
+        for closed in [false, true] {
+            let roots = [map.cell(0, 0).unwrap(), map.cell(19, 19).unwrap()];
+            let mut task = Task::new(&map, &roots, closed).unwrap();
+            task.endurance = vec![50, 300];
+            let mut improver = Improver::new(&task, 200_000);
+            while improver.round() {}
+            let plan = improver.plan();
+            let moves = plan.moves();
+            assert!(moves[0] <= 50 && moves[1] <= 300, "{moves:?}");
+            let left = plan.uncovered(&task).len();
+            assert_eq!(left + plan.n_covered(&task), 400);
+            assert!(left <= 70, "{left}");
+            // Enough for all when it is shared unevenly.
+            task.endurance = vec![60, 360];
+            let mut improver = Improver::new(&task, 200_000);
+            while improver.round() {}
+            let left = improver.plan().uncovered(&task).len();
+            assert!(left <= 4, "{left}");
+        }
+    }
 }

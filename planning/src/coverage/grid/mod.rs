@@ -12,6 +12,7 @@
 //! | [`ring`] | the exact division with backtracking, mixed speeds and endurance |
 //! | [`free`] | the loop divided, each UAV flying straight to its arc |
 //! | [`partition`] | a connected region for each UAV |
+//! | [`peel`] | work for UAVs that begin close together, farthest first |
 //! | [`search`] | local search over the orders of cells |
 //! | [`improve`] | the default planner |
 //! | [`stream`] | numbers that look random and are the same everywhere |
@@ -25,6 +26,7 @@ pub mod improve;
 pub mod map;
 pub mod mstc;
 pub mod partition;
+pub mod peel;
 pub mod plan;
 pub mod ring;
 pub mod search;
@@ -32,4 +34,4 @@ pub mod spanning;
 pub mod stream;
 
 pub use map::{Cell, LaneMap, MapError};
-pub use plan::{Plan, Task};
+pub use plan::{Plan, Task, TaskError};

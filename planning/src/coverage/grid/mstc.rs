@@ -137,7 +137,7 @@ mod tests {
             let map = map.reachable(&[first]);
             let cells: Vec<Cell> = map.cells().collect();
             let roots: Vec<Cell> = picks.iter().map(|p| cells[p.index(cells.len())]).collect();
-            let task = Task::new(&map, &roots, false);
+            let task = Task::new(&map, &roots, false).unwrap();
             for plan in [without_backtracking(&task), with_backtracking(&task)] {
                 prop_assert_eq!(plan.n_covered(&task), cells.len());
                 for (path, root) in plan.paths.iter().zip(&roots) {

@@ -31,10 +31,13 @@ const SWEEPS: usize = 400;
 
 /// Pieces looked at to show that a region stays connected without one; beyond, the piece
 /// stays.
-const WAY_ROUND: usize = 400;
+const WAY_ROUND: usize = 64;
 
 /// A region is small below one part in this many of an even share.
-const SMALL: i64 = 4;
+const SMALL: i64 = 16;
+
+/// Sweeps end when fewer than one piece in this many has passed.
+const FEW: usize = 5000;
 
 struct Piece {
     cells: [Cell; 4],
@@ -276,17 +279,28 @@ impl<'a> Partition<'a> {
         let mut stream = Stream::new(n as u64);
         // A stride that is coprime to most n spreads the order over the map.
         let stride = (7919 % n).max(1);
-        for _ in 0..SWEEPS {
+        for sweep in 1..=SWEEPS {
+            if sweep % 40 == 0 && self.hopeless() {
+                break;
+            }
             let mut passed = 0;
             let mut at = stream.below(n);
             for _ in 0..n {
                 passed += usize::from(self.pass(u32::try_from(at).unwrap_or(0)));
                 at = (at + stride) % n;
             }
-            if passed == 0 {
+            if passed * FEW <= n {
                 break;
             }
         }
+    }
+
+    /// Whether the regions are still so uneven that sweeps will not help.
+    fn hopeless(&self) -> bool {
+        let loads = (0..self.seed.len()).map(|u| self.load(u));
+        let sum: i64 = loads.clone().sum();
+        let most = loads.max().unwrap_or(0);
+        most * 2 * self.seed.len() as i64 > sum * 3
     }
 
     /// Passes a piece to the neighbouring region with the least to fly, if that is then

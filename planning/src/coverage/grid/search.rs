@@ -13,11 +13,11 @@ use super::map::{Cell, NOWHERE, Router};
 use super::plan::Task;
 use super::stream::Stream;
 
-/// Hops longer than this are not considered as new ones: the search for their length
-/// would cost more than they ever gain.
-const LONGEST_NEW_HOP: u32 = 24;
+/// New links longer by this than all links that they replace are not considered: the
+/// search for their length would cost more than they ever gain.
+const LONGER: u32 = 12;
 
-/// What a hop that is too long for [`LONGEST_NEW_HOP`] counts as.
+/// What a link that is too long counts as.
 const TOO_LONG: u32 = 1 << 20;
 
 /// A reversal that gains nothing is taken only up to this many cells, since its cost
@@ -34,6 +34,21 @@ const SEGMENT: usize = 4;
 /// Prices of time: a unit of time of any UAV costs this, besides what lateness costs.
 const TIME_PRICE: i64 = 16;
 
+/// How far before the target the pressure towards it still grows, in units of time: a
+/// move of the earliest UAV keeps a price, so that it is not wasted for nothing.
+const EARLY: i64 = 6;
+
+/// How far behind the target it still grows: one part in so many of the target, or so
+/// many units of time. Beyond, it would buy balance with waste.
+const LATE_PART: i64 = 12;
+const LATE_LEAST: i64 = 16;
+
+/// Price of a move beyond the endurance: more than any pressure towards the target.
+const OVER_PRICE: i64 = 1 << 16;
+
+/// One try in so many to exchange tails is made: most cost a count of both for nothing.
+const TAILS: usize = 8;
+
 /// Orders under improvement.
 pub struct Search<'a> {
     task: &'a Task,
@@ -43,22 +58,26 @@ pub struct Search<'a> {
     at: Vec<(u32, u32)>,
     /// By UAV: moves.
     moves: Vec<i64>,
-    /// By UAV: time of a move, the fastest UAV's being 1 / [`PACE`] of the unit.
+    /// By UAV: time of a move, the fastest UAV's being [`PACE`].
     pace: Vec<i64>,
-    total_cells: i64,
     /// Cells that may be beside a hop, and whether a cell is listed.
     hops: Vec<Cell>,
     listed: Vec<bool>,
+    /// Cells that may be at a border between two UAVs, and whether a cell is listed.
+    borders: Vec<Cell>,
+    bordering: Vec<bool>,
     stream: Stream,
     remembered: Vec<(Cell, Cell, u32)>,
     /// The common time aimed at.
     target: i64,
+    /// How late the pressure still grows.
+    late: i64,
     /// Highest loss accepted, in price units per 256ths of a draw.
     heat: i64,
 }
 
-/// Time units of one move of the fastest UAV.
-pub const PACE: i64 = 1;
+/// Units of time in one move of the fastest UAV: a slower one's move is rounded to them.
+pub const PACE: i64 = 16;
 
 /// A place in an order: whose, and how many cells before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,18 +102,22 @@ impl<'a> Search<'a> {
                 .iter()
                 .map(|v| PACE * fastest / i64::from((*v).max(1)))
                 .collect(),
-            total_cells: 0,
             hops: Vec::new(),
             listed: vec![false; n],
+            borders: task.map.cells().collect(),
+            bordering: task.map.cells().fold(vec![false; n], |mut all, c| {
+                all[c as usize] = true;
+                all
+            }),
             stream: Stream::new(n as u64),
             remembered: vec![(NOWHERE, NOWHERE, 0); REMEMBERED],
             target: 0,
+            late: 16,
             heat: 0,
             orders,
         };
         for uav in 0..search.orders.len() {
             search.index(uav, 0, search.orders[uav].len());
-            search.total_cells += search.orders[uav].len() as i64;
             search.recount(uav);
         }
         search.aim();
@@ -113,11 +136,20 @@ impl<'a> Search<'a> {
         &self.moves
     }
 
-    /// The time of the last UAV, in units of 1 / [`PACE`] of the fastest UAV's move.
+    /// The time of the last UAV, in 1 / [`PACE`] of the fastest UAV's move.
     #[must_use]
     pub fn makespan(&self) -> i64 {
         let times = self.moves.iter().zip(&self.pace).map(|(m, p)| m * p);
         times.max().unwrap_or(0)
+    }
+
+    /// How good the orders are, less is better: moves beyond the endurance of all UAVs,
+    /// then the makespan.
+    #[must_use]
+    pub fn score(&self) -> (i64, i64) {
+        let each = self.moves.iter().zip(&self.task.endurance);
+        let over = each.map(|(m, e)| (m - i64::from(*e)).max(0)).sum();
+        (over, self.makespan())
     }
 
     fn index(&mut self, uav: usize, from: usize, to: usize) {
@@ -153,6 +185,7 @@ impl<'a> Search<'a> {
         } else {
             0
         };
+        self.late = (self.target / PACE / LATE_PART).max(LATE_LEAST);
     }
 
     /// Sets the greatest loss that is sometimes accepted, in thousandths of a move.
@@ -189,8 +222,17 @@ impl<'a> Search<'a> {
         self.distance(a, b, u32::MAX - 1)
     }
 
-    fn fresh(&mut self, a: Cell, b: Cell) -> u32 {
-        self.distance(a, b, LONGEST_NEW_HOP)
+    /// Moves between two cells at least.
+    fn least(&self, a: Cell, b: Cell) -> i64 {
+        if a == NOWHERE || b == NOWHERE {
+            return 0;
+        }
+        i64::from(self.task.map.straight(a, b))
+    }
+
+    /// Moves of a link that takes the place of links of `old` moves in all.
+    fn fresh(&mut self, a: Cell, b: Cell, old: i64) -> u32 {
+        self.distance(a, b, u32::try_from(old).unwrap_or(0) + LONGER)
     }
 
     /// Moves between two cells, [`TOO_LONG`] above `most`; none to or from nowhere.
@@ -208,23 +250,42 @@ impl<'a> Search<'a> {
         let mixed = (low.wrapping_mul(0x9E37_79B1)) ^ high.wrapping_mul(0x85EB_CA6B);
         let slot = (mixed >> 17) as usize % REMEMBERED;
         let (x, y, d) = self.remembered[slot];
-        if (x, y) == (low, high) && (d < TOO_LONG || most <= LONGEST_NEW_HOP) {
-            return if d > most { TOO_LONG } else { d };
+        if (x, y) == (low, high) {
+            if d < TOO_LONG {
+                return if d > most { TOO_LONG } else { d };
+            }
+            // Only known to be more than what was once asked for.
+            if most <= d - TOO_LONG {
+                return TOO_LONG;
+            }
         }
-        let d = self.router.moves(a, b, most).unwrap_or(TOO_LONG);
-        self.remembered[slot] = (low, high, d);
-        d
+        let moves = self.router.moves(a, b, most);
+        self.remembered[slot] = (low, high, moves.unwrap_or(TOO_LONG.saturating_add(most)));
+        moves.unwrap_or(TOO_LONG)
     }
 
-    /// What the times cost: each unit the same, and the square of what is off the target.
+    /// What the times cost, a move of the fastest UAV as the unit: each the same, the
+    /// square of what is off the target, and what is beyond the endurance dearly.
     fn price(&self, uav: usize, moves: i64) -> i64 {
         let time = moves * self.pace[uav];
-        let off = time - self.target;
-        time * TIME_PRICE + off * off
+        let off = (time - self.target) / PACE;
+        // Beyond both limits the pressure grows no more.
+        let near = off.clamp(-EARLY, self.late);
+        let over = (moves - i64::from(self.task.endurance[uav])).max(0);
+        time * TIME_PRICE / PACE + near * (2 * off - near) + over * OVER_PRICE
     }
 
     fn change(&self, uav: usize, delta: i64) -> i64 {
         self.price(uav, self.moves[uav] + delta) - self.price(uav, self.moves[uav])
+    }
+
+    /// The change of price when two UAVs' moves change; they may be the same.
+    fn both(&self, uav: usize, delta: i64, other: usize, other_delta: i64) -> i64 {
+        if uav == other {
+            self.change(uav, delta + other_delta)
+        } else {
+            self.change(uav, delta) + self.change(other, other_delta)
+        }
     }
 
     /// The loss that this trial may make.
@@ -240,11 +301,20 @@ impl<'a> Search<'a> {
     /// Tries `steps` changes.
     pub fn run(&mut self, steps: usize) {
         for _ in 0..steps {
-            let draw = self.stream.below(16);
-            match draw {
-                0..=5 => self.try_hop(),
+            match self.stream.below(32) {
+                0..=11 => self.try_hop(),
+                12 => self.try_end(),
                 _ => self.try_border(),
             }
+        }
+    }
+
+    /// Lengthens the order of any UAV at its end: an idle one gets work by this alone.
+    fn try_end(&mut self) {
+        let uav = self.stream.below(self.orders.len());
+        let index = self.orders[uav].len();
+        if !self.task.closed || index == 0 {
+            self.try_fill(Spot { uav, index });
         }
     }
 
@@ -314,7 +384,9 @@ impl<'a> Search<'a> {
         };
         let (owner, at) = self.at[x as usize];
         if owner as usize != uav {
-            self.try_tails(spot, x, from_a);
+            if self.stream.below(TAILS) == 0 {
+                self.try_tails(spot, x, from_a);
+            }
             return;
         }
         // The other spot whose link is cut: after x when x joins a, before x otherwise.
@@ -330,10 +402,14 @@ impl<'a> Search<'a> {
         if self.task.closed && high > self.orders[uav].len() {
             return;
         }
-        let old = self.exact(a, b) + self.exact(p, q);
-        let new = self.fresh(a, p) + self.fresh(b, q);
-        let delta = i64::from(new) - i64::from(old);
+        let old = i64::from(self.exact(a, b)) + i64::from(self.exact(p, q));
         let allowed = self.allowance();
+        let least = self.least(a, p) + self.least(b, q);
+        if self.change(uav, least - old) > allowed {
+            return;
+        }
+        let new = self.fresh(a, p, old) + self.fresh(b, q, old);
+        let delta = i64::from(new) - old;
         if self.change(uav, delta) > allowed || (delta >= 0 && high - low > IDLE_REVERSAL) {
             return;
         }
@@ -372,12 +448,13 @@ impl<'a> Search<'a> {
         if self.task.closed || mine.abs_diff(theirs) > 40 || mine + theirs > 4 * IDLE_REVERSAL {
             return;
         }
-        let (link_a, link_b) = (self.fresh(a, q), self.fresh(p, b));
+        let (old, old_other) = (self.exact(a, b), self.exact(p, q));
+        let both = i64::from(old) + i64::from(old_other);
+        let (link_a, link_b) = (self.fresh(a, q, both), self.fresh(p, b, both));
         if link_a + link_b >= TOO_LONG {
             return;
         }
         let (tail, other_tail) = (self.tail(spot), self.tail(other));
-        let (old, old_other) = (self.exact(a, b), self.exact(p, q));
         let delta = i64::from(link_a) + other_tail - i64::from(old) - tail;
         let delta_other = i64::from(link_b) + tail - i64::from(old_other) - other_tail;
         let allowed = self.allowance();
@@ -394,6 +471,9 @@ impl<'a> Search<'a> {
             let len = self.orders[s.uav].len();
             self.index(s.uav, s.index, len);
             self.list_ends(s.uav, s.index, len);
+            for i in s.index..len {
+                self.list_border(self.orders[s.uav][i]);
+            }
         }
     }
 
@@ -441,30 +521,57 @@ impl<'a> Search<'a> {
         self.try_segment(spot.uav, low, len);
     }
 
-    /// Moves a few cells at a border to the neighbour.
+    /// Moves a few cells at a border from the later UAV to the earlier one.
     fn try_border(&mut self) {
-        let n = self.orders.len();
-        let (one, two) = (self.stream.below(n), self.stream.below(n));
-        let late = |uav: usize| self.moves[uav] * self.pace[uav];
-        let uav = if late(one) >= late(two) { one } else { two };
-        let len = self.orders[uav].len();
-        if len == 0 {
+        if self.borders.is_empty() {
             return;
         }
-        let low = self.stream.below(len);
-        let x = self.orders[uav][low];
-        let side = self.stream.below(4);
-        let near = self.task.map.around(x)[side];
-        if !self.task.map.is_free(near) || self.at[near as usize].0 as usize == uav {
+        let pick = self.stream.below(self.borders.len());
+        let cell = self.borders[pick];
+        let first = self.stream.below(4);
+        let around = self.task.map.around(cell);
+        let own = self.at[cell as usize].0;
+        let other = (0..4)
+            .map(|i| around[(first + i) % 4])
+            .find(|near| self.task.map.is_free(*near) && self.at[*near as usize].0 != own);
+        let Some(near) = other else {
+            self.bordering[cell as usize] = false;
+            self.borders.swap_remove(pick);
             return;
-        }
+        };
+        let (one, two) = (self.urgency(cell), self.urgency(near));
+        let (x, near) = if one >= two {
+            (cell, near)
+        } else {
+            (near, cell)
+        };
+        let (uav, low) = self.at[x as usize];
+        let low = low as usize;
         let len = 1 + self.stream.below(SEGMENT);
         let low = if self.stream.bits() & 1 == 0 {
             low
         } else {
             (low + 1).saturating_sub(len)
         };
-        self.try_beside(uav, low, len, near);
+        self.try_beside(uav as usize, low, len, near);
+    }
+
+    /// How much the UAV that flies a cell wants to get rid of cells: a time, and first of
+    /// all what is beyond its endurance.
+    fn urgency(&self, cell: Cell) -> (i64, i64) {
+        let uav = self.at[cell as usize].0 as usize;
+        let over = self.moves[uav] - i64::from(self.task.endurance[uav]);
+        (over.max(0), self.moves[uav] * self.pace[uav])
+    }
+
+    /// Lists a cell that has changed hands, and its neighbours, as at a border.
+    fn list_border(&mut self, cell: Cell) {
+        for near in self.task.map.around(cell).into_iter().chain([cell]) {
+            if self.task.map.is_free(near) && !self.bordering[near as usize] {
+                self.bordering[near as usize] = true;
+                self.borders.push(near);
+            }
+        }
     }
 
     /// Moves cells `low..low + len` of an order beside a neighbour of one of their ends.
@@ -514,19 +621,27 @@ impl<'a> Search<'a> {
             self.after(Spot { uav, index: high }),
         );
         let (a, b) = (self.before(to), self.after(to));
-        let inside = self.inside(uav, low, high);
-        let taken = i64::from(self.exact(p, first)) + i64::from(self.exact(last, n)) + inside;
-        let kept = i64::from(self.fresh(p, n)) - taken;
-        let joined = i64::from(self.fresh(a, first)) + i64::from(self.fresh(last, b));
-        let turned = i64::from(self.fresh(a, last)) + i64::from(self.fresh(first, b));
-        let added = joined.min(turned) + inside - i64::from(self.exact(a, b));
         let allowed = self.allowance();
-        let change = if to.uav == uav {
-            self.change(uav, kept + added)
-        } else {
-            self.change(uav, kept) + self.change(to.uav, added)
-        };
-        if change > allowed || (to.uav == uav && to.index.abs_diff(low) > 2 * IDLE_REVERSAL) {
+        let inside = self.inside(uav, low, high);
+        let opened = i64::from(self.exact(a, b));
+        let taken = i64::from(self.exact(p, first)) + i64::from(self.exact(last, n)) + inside;
+        let (joined, turned) = (
+            self.least(a, first) + self.least(last, b),
+            self.least(a, last) + self.least(first, b),
+        );
+        // What it would come to if nothing were in the way: most trials end here.
+        let added = joined.min(turned) + inside - opened;
+        if self.both(uav, self.least(p, n) - taken, to.uav, added) > allowed {
+            return;
+        }
+        let old = taken + opened;
+        let kept = i64::from(self.fresh(p, n, old)) - taken;
+        let joined = i64::from(self.fresh(a, first, old)) + i64::from(self.fresh(last, b, old));
+        let turned = i64::from(self.fresh(a, last, old)) + i64::from(self.fresh(first, b, old));
+        let added = joined.min(turned) + inside - opened;
+        if self.both(uav, kept, to.uav, added) > allowed
+            || (to.uav == uav && to.index.abs_diff(low) > 2 * IDLE_REVERSAL)
+        {
             return;
         }
         self.moves[uav] += kept;
@@ -573,5 +688,8 @@ impl<'a> Search<'a> {
         self.index(to.uav, to.index, to_len);
         self.list_ends(uav, low, low);
         self.list_ends(to.uav, to.index, to.index + len);
+        for cell in &cells[..len] {
+            self.list_border(*cell);
+        }
     }
 }
