@@ -207,6 +207,16 @@ impl Mesh {
         );
     }
 
+    /// A point inside the part of the mesh that has the most cells.
+    pub(crate) fn middle_of_largest_part(&self) -> Point {
+        let cell = self.blocks.largest_part();
+        let ring = self.cell(cell as usize).collect::<Vec<_>>();
+        let sum = ring
+            .iter()
+            .fold(nalgebra::Vector2::zeros(), |s, p| s + p.coords);
+        Point::from(sum / ring.len() as f64)
+    }
+
     /// Calls `visit` with every cell that contains `p`.
     #[inline]
     pub(crate) fn for_cells_at(&self, p: Point, mut visit: impl FnMut(u32)) {

@@ -9,6 +9,7 @@
 pub mod continuous;
 #[cfg(test)]
 mod crowded;
+pub mod landmarks;
 mod loose_ends;
 pub mod mesh;
 mod search;

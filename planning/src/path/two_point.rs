@@ -11,6 +11,7 @@
 //!
 //! One source with many goals is the business of [`super::continuous`].
 
+use super::landmarks::{self, Landmarks, Lengths};
 use super::mesh::{Mesh, NONE};
 use super::sight::{self, Ray, SOURCE, View, Watcher};
 use crate::frame::Point;
@@ -19,6 +20,9 @@ use std::collections::BinaryHeap;
 
 /// Marks a bound of sight that is the straight continuation of the way to the root.
 const STRAIGHT_ON: u32 = NONE - 1;
+
+/// Nodes opened before the landmarks are asked: most near goals are found sooner.
+const BEFORE_LANDMARKS: u32 = 24;
 
 /// Something left to look at, with a lower bound of the paths through it.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +40,8 @@ struct Node {
     left: u32,
     /// The vertex on the right ray.
     right: u32,
+    /// Whether the landmarks have had their say.
+    sharp: bool,
 }
 
 impl Node {
@@ -47,6 +53,7 @@ impl Node {
         edge: NONE,
         left: NONE,
         right: NONE,
+        sharp: true,
     };
 }
 
@@ -81,6 +88,10 @@ pub struct Search<'m> {
     best_root: u32,
     /// The node being opened.
     opened: Node,
+    n_opened: u32,
+    landmarks: Option<&'m Landmarks<'m>>,
+    from_lengths: Lengths,
+    to_lengths: Lengths,
 }
 
 impl<'m> Search<'m> {
@@ -109,6 +120,20 @@ impl<'m> Search<'m> {
             best_m: f64::INFINITY,
             best_root: NONE,
             opened: Node::START,
+            n_opened: 0,
+            landmarks: None,
+            from_lengths: Lengths::default(),
+            to_lengths: Lengths::default(),
+        }
+    }
+
+    /// Memory for queries that are guided by landmarks of the same mesh: the same
+    /// lengths, sooner.
+    #[must_use]
+    pub fn with_landmarks(mesh: &'m Mesh, landmarks: &'m Landmarks<'m>) -> Self {
+        Self {
+            landmarks: Some(landmarks),
+            ..Self::new(mesh)
         }
     }
 
@@ -172,6 +197,14 @@ impl<'m> Search<'m> {
             if stale {
                 continue;
             }
+            if !node.sharp
+                && self.n_opened >= BEFORE_LANDMARKS
+                && let Some(landmarks) = self.landmarks
+            {
+                self.sharpen(node, landmarks);
+                continue;
+            }
+            self.n_opened += 1;
             self.opened = node;
             if node.edge == NONE {
                 sight::look_round(self, mesh, node.root);
@@ -189,6 +222,37 @@ impl<'m> Search<'m> {
         self.best_m.is_finite().then_some(self.best_m)
     }
 
+    /// Puts a node back with what the landmarks say about it.
+    fn sharpen(&mut self, node: Node, landmarks: &Landmarks) {
+        if self.n_opened == BEFORE_LANDMARKS {
+            self.n_opened += 1;
+            self.from_lengths = landmarks.at_point(self.from);
+            self.to_lengths = landmarks.at_point(self.to);
+        }
+        let root = if node.root == SOURCE {
+            &self.from_lengths
+        } else {
+            landmarks.at_vertex(node.root)
+        };
+        let mut rest_m = landmarks::between_m(root, &self.to_lengths);
+        if node.edge != NONE {
+            let a = &self.mesh.edges[node.edge as usize];
+            let b = &self.mesh.edges[self.mesh.next(node.edge) as usize];
+            let (l, r) = (landmarks.at_vertex(a.vertex), landmarks.at_vertex(b.vertex));
+            let along = b.origin - a.origin;
+            let square = along.norm_squared();
+            let d = self.at(node.root) - a.origin;
+            let nearest = along * (d.dot(&along) / square).clamp(0.0, 1.0);
+            let beyond_m = landmarks::to_side_m(&self.to_lengths, l, r, square.sqrt());
+            rest_m = rest_m.max((d - nearest).norm() + beyond_m);
+        }
+        self.push(Node {
+            bound_m: node.bound_m.max(node.root_m + rest_m),
+            sharp: true,
+            ..node
+        });
+    }
+
     fn begin(&mut self, from: Point, to: Point) {
         if self.query == u32::MAX {
             self.labels.iter_mut().for_each(|l| l.query = 0);
@@ -201,6 +265,7 @@ impl<'m> Search<'m> {
         self.heap.clear();
         self.nodes.clear();
         self.carried = None;
+        self.n_opened = 0;
         self.from = from;
         self.to = to;
         self.best_m = f64::INFINITY;
@@ -405,6 +470,7 @@ impl Watcher for Search<'_> {
             edge: NONE,
             left: NONE,
             right: NONE,
+            sharp: false,
         });
     }
 
@@ -423,6 +489,7 @@ impl Watcher for Search<'_> {
             edge: e.twin,
             left,
             right,
+            sharp: false,
         });
     }
 }

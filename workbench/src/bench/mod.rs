@@ -7,6 +7,7 @@ pub mod headings;
 pub mod line;
 pub mod offset;
 pub mod route;
+pub mod route_maps;
 pub mod route_polygons;
 pub mod wind;
 

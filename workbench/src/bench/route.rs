@@ -1,15 +1,18 @@
 //! `bench route`: shortest paths on a mesh, two-point and from a map, against reference lengths.
 
 use super::figures::{Times, timed};
+use super::route_maps;
 use crate::navmesh::{self, Query};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use skein_planning::frame::Point;
 use skein_planning::path::continuous::{Effort, PathMap};
+use skein_planning::path::landmarks::Landmarks;
 use skein_planning::path::mesh::Mesh;
 use skein_planning::path::two_point::Search;
 use std::hint::black_box;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Lengths further from the reference than this share of it are mismatches.
 const EXACT: f64 = 1e-9;
@@ -17,6 +20,15 @@ const EXACT: f64 = 1e-9;
 /// Runs over all queries before and besides the one that is timed; the best is kept,
 /// because every other run was disturbed by something else on the machine.
 const ROUNDS: usize = 3;
+
+/// Queries on a map that is made up.
+const QUERIES: usize = 200;
+
+/// The largest field of octagons: 8 million vertices.
+const MAX_SIDE: usize = 1000;
+
+/// The largest comb: a million windows for each hundred megabytes.
+const MAX_TEETH: usize = 2000;
 
 /// Maps built, from sources evenly spread over the queries.
 const MAPS: usize = 16;
@@ -28,11 +40,17 @@ const CHECKS: usize = 100;
 #[derive(Debug, Args)]
 pub struct RouteArgs {
     /// The mesh, in the `.mesh` format, version 2.
-    #[arg(long, value_name = "FILE")]
-    pub mesh: PathBuf,
+    #[arg(long, value_name = "FILE", requires = "queries", required_unless_present_any = ["octagons", "comb"])]
+    pub mesh: Option<PathBuf>,
     /// Queries, one a line: from x y, to x y, length.
-    #[arg(long, value_name = "FILE")]
-    pub queries: PathBuf,
+    #[arg(long, value_name = "FILE", requires = "mesh")]
+    pub queries: Option<PathBuf>,
+    /// Instead of files: N by N octagons, triangulated, and random queries.
+    #[arg(long, value_name = "N", conflicts_with_all = ["mesh", "comb"])]
+    pub octagons: Option<usize>,
+    /// Instead of files: N diamonds below a shaft, hard for continuous Dijkstra.
+    #[arg(long, value_name = "N", conflicts_with = "mesh")]
+    pub comb: Option<usize>,
     /// Also measure a rival in this process (needs the cargo feature `rivals`).
     #[arg(long, value_name = "RIVAL")]
     pub against: Option<Rival>,
@@ -63,9 +81,9 @@ struct MapFigures {
     map_n: usize,
     map_max_rel_error: f64,
     map_mismatches: usize,
-    /// Mean over the maps.
+    /// Median over the maps.
     map_build_ms: f64,
-    /// Mean of one distance query.
+    /// Of one distance query, median over batches.
     map_query_us: f64,
     /// Most windows of any map, and most of them on one side of a cell.
     map_windows: usize,
@@ -81,10 +99,14 @@ struct Answer {
     maps: MapFigures,
     vertices: usize,
     cells: usize,
+    /// Two-point queries with landmarks; the build is that of the landmarks.
+    guided: Figures,
     #[serde(skip_serializing_if = "Option::is_none")]
     rival: Option<Figures>,
     #[serde(skip_serializing_if = "Option::is_none")]
     ratio: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    guided_ratio: Option<f64>,
 }
 
 /// Solves all queries and compares.
@@ -92,37 +114,105 @@ struct Answer {
 /// # Errors
 /// When a file is missing or malformed; the error names the line.
 pub fn run(args: &RouteArgs) -> Result<String> {
-    let text = read(&args.mesh)?;
-    let cells = navmesh::read_cells(&text).with_context(|| name(&args.mesh))?;
-    let queries =
-        navmesh::read_queries(&read(&args.queries)?).with_context(|| name(&args.queries))?;
-    let (mesh, build_us) = timed(|| navmesh::link(&cells));
-    let mesh = mesh.with_context(|| name(&args.mesh))?;
-    let ours = two_point(&mesh, &queries, build_us / 1e3);
-    let rival = match args.against {
-        Some(Rival::Polyanya) => Some(against_polyanya(&text, &queries)?),
-        None => None,
+    let problem = problem(args)?;
+    let Problem { mesh, queries, .. } = &problem;
+    let ours = two_point(Search::new(mesh), queries, problem.build_ms);
+    let (landmarks, guide_us) = timed(|| Landmarks::new(mesh));
+    let guided = Search::with_landmarks(mesh, &landmarks);
+    let guided = two_point(guided, queries, guide_us / 1e3);
+    let rival = match (args.against, &problem.text) {
+        (Some(Rival::Polyanya), Some(text)) => Some(against_polyanya(text, queries)?),
+        (Some(Rival::Polyanya), None) => anyhow::bail!("a rival needs --mesh"),
+        (None, _) => None,
     };
     Ok(serde_json::to_string(&Answer {
         vertices: mesh.n_vertices(),
         cells: mesh.n_cells(),
         ratio: rival.as_ref().map(|r| ours.times.mean_us / r.times.mean_us),
+        guided_ratio: rival
+            .as_ref()
+            .map(|r| guided.times.mean_us / r.times.mean_us),
         ours,
-        maps: maps(&mesh, &queries),
+        guided,
+        maps: maps(mesh, queries),
         rival,
     })?)
 }
 
-fn name(file: &std::path::Path) -> String {
+/// A mesh and what is asked about it.
+struct Problem {
+    text: Option<String>,
+    mesh: Mesh,
+    queries: Vec<Query>,
+    build_ms: f64,
+}
+
+fn problem(args: &RouteArgs) -> Result<Problem> {
+    let (rings, queries) = match (&args.mesh, &args.queries, args.octagons, args.comb) {
+        (Some(mesh), Some(queries), ..) => return read_problem(mesh, queries),
+        (_, _, Some(n), _) => (
+            route_maps::octagons(n.min(MAX_SIDE)),
+            route_maps::octagon_queries(n.min(MAX_SIDE), QUERIES),
+        ),
+        (_, _, _, Some(n)) => (
+            route_maps::comb(n.min(MAX_TEETH)),
+            route_maps::comb_queries(n.min(MAX_TEETH), QUERIES),
+        ),
+        _ => anyhow::bail!("--mesh with --queries, --octagons or --comb"),
+    };
+    let rings: Vec<&[Point]> = rings.iter().map(Vec::as_slice).collect();
+    let (mesh, build_us) = best_of_rounds(|| Mesh::from_rings(&rings));
+    let mesh = mesh?;
+    let reachable = |q: &Query| mesh.contains(q.from) && mesh.contains(q.to);
+    let mut queries: Vec<Query> = queries.into_iter().filter(reachable).collect();
+    // No reference is known: the landmarks' search is compared with the plain one,
+    // and the maps with both.
+    let mut search = Search::new(&mesh);
+    for q in &mut queries {
+        q.length_m = search.distance_m(q.from, q.to).unwrap_or(f64::NAN);
+    }
+    drop(search);
+    Ok(Problem {
+        text: None,
+        mesh,
+        queries,
+        build_ms: build_us / 1e3,
+    })
+}
+
+fn read_problem(mesh: &Path, queries: &Path) -> Result<Problem> {
+    let text = read(mesh)?;
+    let cells = navmesh::read_cells(&text).with_context(|| name(mesh))?;
+    let queries = navmesh::read_queries(&read(queries)?).with_context(|| name(queries))?;
+    let (linked, build_us) = best_of_rounds(|| navmesh::link(&cells));
+    Ok(Problem {
+        mesh: linked.with_context(|| name(mesh))?,
+        text: Some(text),
+        queries,
+        build_ms: build_us / 1e3,
+    })
+}
+
+/// The time of the least disturbed of several runs, microseconds.
+fn best_of_rounds<T>(mut work: impl FnMut() -> T) -> (T, f64) {
+    let (mut value, mut best_us) = timed(&mut work);
+    for _ in 1..ROUNDS {
+        let us;
+        (value, us) = timed(&mut work);
+        best_us = best_us.min(us);
+    }
+    (value, best_us)
+}
+
+fn name(file: &Path) -> String {
     file.display().to_string()
 }
 
-fn read(file: &std::path::Path) -> Result<String> {
+fn read(file: &Path) -> Result<String> {
     std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))
 }
 
-fn two_point(mesh: &Mesh, queries: &[Query], build_ms: f64) -> Figures {
-    let mut search = Search::new(mesh);
+fn two_point(mut search: Search, queries: &[Query], build_ms: f64) -> Figures {
     let mut path = Vec::new();
     measure(queries, build_ms, |q| {
         if search.shortest_into(q.from, q.to, &mut path) {
@@ -136,23 +226,26 @@ fn two_point(mesh: &Mesh, queries: &[Query], build_ms: f64) -> Figures {
 fn maps(mesh: &Mesh, queries: &[Query]) -> MapFigures {
     let mut search = Search::new(mesh);
     let (mut n, mut max_rel_error, mut mismatches) = (0, 0.0f64, 0);
-    let (mut build_us, mut query_us, mut built) = (0.0, 0.0, 0);
+    let (mut build_us, mut query_us) = (Vec::new(), Vec::new());
     let mut effort = Effort::default();
     for source in queries.iter().step_by(queries.len().div_ceil(MAPS).max(1)) {
         let (map, us) = timed(|| PathMap::new(mesh, source.from));
-        built += 1;
-        build_us += us;
+        build_us.push(us);
         let most = map.effort();
         effort.windows = effort.windows.max(most.windows);
         effort.kept = effort.kept.max(most.kept);
         effort.most_on_a_side = effort.most_on_a_side.max(most.most_on_a_side);
-        let ((), us) = timed(|| {
-            for q in queries {
-                black_box(map.distance_m(black_box(q.to)));
-            }
-        });
-        query_us += us / queries.len() as f64;
-        let others = queries.iter().step_by(queries.len().div_ceil(CHECKS));
+        for batch in queries.chunks(CHECKS) {
+            let ((), us) = timed(|| {
+                for q in batch {
+                    black_box(map.distance_m(black_box(q.to)));
+                }
+            });
+            query_us.push(us / batch.len() as f64);
+        }
+        let others = queries
+            .iter()
+            .step_by(queries.len().div_ceil(CHECKS).max(1));
         for goal in others.chain(std::iter::once(source)) {
             n += 1;
             let pair = (
@@ -170,13 +263,12 @@ fn maps(mesh: &Mesh, queries: &[Query]) -> MapFigures {
             }
         }
     }
-    let n_maps = f64::from(built.max(1));
     MapFigures {
         map_n: n,
         map_max_rel_error: max_rel_error,
         map_mismatches: mismatches,
-        map_build_ms: build_us / 1e3 / n_maps,
-        map_query_us: query_us / n_maps,
+        map_build_ms: Times::of(build_us).p50_us / 1e3,
+        map_query_us: Times::of(query_us).p50_us,
         map_windows: effort.windows,
         map_windows_kept: effort.kept,
         map_most_on_a_side: effort.most_on_a_side,
@@ -232,7 +324,7 @@ fn against_polyanya(text: &str, queries: &[Query]) -> Result<Figures> {
         })
     });
     let mesh = mesh.map_err(|error| anyhow::anyhow!("polyanya: {error:?}"))?;
-    let point = |p: skein_planning::frame::Point| glam::Vec2::new(p.x as f32, p.y as f32);
+    let point = |p: Point| glam::Vec2::new(p.x as f32, p.y as f32);
     Ok(measure(queries, build_us / 1e3, |q| {
         mesh.path(point(q.from), point(q.to))
             .map_or(f64::NAN, |path| f64::from(path.length))

@@ -88,6 +88,16 @@ impl Blocks {
         self.root[a as usize] == self.root[b as usize]
     }
 
+    /// The root cell of the component with the most cells.
+    pub fn largest_part(&self) -> u32 {
+        let mut sizes = vec![0u32; self.root.len()];
+        for &root in &self.root {
+            sizes[root as usize] += 1;
+        }
+        let largest = (0..sizes.len()).max_by_key(|&c| (sizes[c], std::cmp::Reverse(c)));
+        largest.unwrap_or(0) as u32
+    }
+
     /// Calls `mark` with each block between two connected cells, and its top cell.
     pub fn between(&self, mut a: u32, mut b: u32, mut mark: impl FnMut(u32, u32)) {
         while a != b {
