@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use skein_planning::coverage::grid::improve::Improver;
 use skein_planning::coverage::grid::{
-    Cell, LaneMap, Plan, Task, TaskError, bounds, free, improve, mstc,
+    Cell, LaneMap, Plan, Task, TaskError, bounds, free, improve, mstc, patrol,
 };
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
@@ -32,6 +32,8 @@ pub enum Planner {
     Free,
     /// The default: a region each, then local search.
     Best,
+    /// The first period of a patrol of one loop.
+    Patrol,
 }
 
 /// Instances, maps and a planner.
@@ -189,6 +191,7 @@ fn plan(task: &Task, args: &CoverArgs) -> Plan {
         Planner::Mstc => mstc::without_backtracking(task),
         Planner::Bmstc => mstc::with_backtracking(task),
         Planner::Free => free::free_entry(task),
+        Planner::Patrol => patrol::first_period(task),
         Planner::Best => best(task, args.budget_ms),
     }
 }

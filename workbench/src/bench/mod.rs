@@ -1,6 +1,7 @@
 //! `bench`: one planner, one set of instances, one JSON object with errors and times.
 
 pub mod cover;
+pub mod cover_loop;
 pub mod dubins;
 pub mod figures;
 pub mod headings;
@@ -26,6 +27,8 @@ pub struct BenchArgs {
 pub enum Subject {
     /// Coverage plans for a team on public grid maps.
     Cover(cover::CoverArgs),
+    /// The loop over all cells of a large map, and its exact division.
+    CoverLoop(cover_loop::CoverLoopArgs),
     /// Shortest Dubins curves to random goals.
     Dubins(dubins::DubinsArgs),
     /// Headings at random waypoints, with a certified gap.
@@ -49,6 +52,7 @@ pub enum Subject {
 pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
     match &args.subject {
         Subject::Cover(args) => cover::run(args),
+        Subject::CoverLoop(args) => cover_loop::run(args),
         Subject::Dubins(args) => dubins::run(args),
         Subject::Headings(args) => headings::run(args),
         Subject::RoutePolygons(args) => route_polygons::run(args),

@@ -15,6 +15,7 @@
 //! | [`peel`] | work for UAVs that begin close together, farthest first |
 //! | [`search`] | local search over the orders of cells |
 //! | [`improve`] | the default planner |
+//! | [`patrol`] | a loop flown again and again |
 //! | [`stream`] | numbers that look random and are the same everywhere |
 //!
 //! Left to others: exact curves, cameras and no-fly zones (`area`); which cells a
@@ -26,6 +27,7 @@ pub mod improve;
 pub mod map;
 pub mod mstc;
 pub mod partition;
+pub mod patrol;
 pub mod peel;
 pub mod plan;
 pub mod ring;
@@ -33,5 +35,5 @@ pub mod search;
 pub mod spanning;
 pub mod stream;
 
-pub use map::{Cell, LaneMap, MapError};
+pub use map::{Cell, LaneMap, MapError, NOWHERE};
 pub use plan::{Plan, Task, TaskError};
