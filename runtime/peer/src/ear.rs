@@ -69,8 +69,13 @@ fn hear_beacon(peer: &mut Peer, record: &Record, beacon: &Beacon) {
     for g in &beacon.gossip {
         if g.id == peer.config.id.0 {
             boot::heard_of_myself(peer, g.incarnation, g.heartbeat);
-            if g.suspected_ds.is_some() && g.incarnation == peer.boot.incarnation {
+            if g.incarnation != peer.boot.incarnation {
+                continue;
+            }
+            if g.suspected_ds.is_some() {
                 voice::refute(peer);
+            } else {
+                voice::believed(peer);
             }
         }
     }

@@ -5,7 +5,7 @@
 //! | beacon | every T, ±10 %; at once when this peer hears that it is suspected |
 //! | claim | at once when a section was adopted or taken, within T when it shrank by a rule; every 10 T for its ETA |
 //! | cover | own or heard coverage is news, at most every 2 T |
-//! | state | every 5 T |
+//! | state | every 10 T |
 //! | round | a bid, once it is durable |
 //! | finished | once a mission revision |
 
@@ -30,7 +30,7 @@ pub const CLAIM_PERIODS: u64 = 10;
 pub const COVER_PERIODS: u64 = 2;
 
 /// State is for people: they read no faster.
-pub const STATE_PERIODS: u64 = 5;
+pub const STATE_PERIODS: u64 = 10;
 
 /// Most peers one beacon gossips about.
 pub const MAX_GOSSIP: usize = 20;
@@ -41,6 +41,10 @@ pub(crate) struct Voice {
     pub heartbeat: u32,
     pub seq: u32,
     pub next_beacon: Time,
+    /// When the next beacon with all its gossip is due.
+    next_full: Time,
+    /// Until when this peer answers a suspicion.
+    suspected_until: Time,
     last_beacon: Time,
     pub claim_changed: bool,
     pub cover_changed: bool,
@@ -64,6 +68,7 @@ pub(crate) fn new_life(peer: &mut Peer) {
 
 pub(crate) fn first_beacon(peer: &mut Peer) {
     peer.voice.next_beacon = peer.boot.listens_until;
+    peer.voice.next_full = peer.boot.listens_until;
 }
 
 fn may_speak(peer: &Peer) -> bool {
@@ -270,27 +275,46 @@ fn e4(rad: f64) -> i32 {
     (rad * 10_000.0).round() as i32
 }
 
-/// Somebody suspects this peer: it says at once that it lives, but not more often
-/// than three times a period, or suspicion would jam the channel that it is about.
+/// Somebody suspects this peer: it says that it lives, four times a period, until it is
+/// believed or the verdict is passed. The suspicion tells that its beacons collide, so
+/// these carry no gossip: what is short collides rarely.
 pub(crate) fn refute(peer: &mut Peer) {
     let t = peer.period_ms();
+    peer.voice.suspected_until = peer.now.plus_ms(peer.membership.k2_ms(peer.now));
     let spread = u64::from(peer.rng.next_u32()) % (t / 8 + 1);
-    let soonest = peer.voice.last_beacon.plus_ms(t / 3);
+    let soonest = peer.voice.last_beacon.plus_ms(t / 4);
     let at = peer.now.plus_ms(spread).max(soonest);
     peer.voice.next_beacon = peer.voice.next_beacon.min(at);
+}
+
+/// A neighbour believes again that this peer lives.
+pub(crate) fn believed(peer: &mut Peer) {
+    if peer.now < peer.voice.suspected_until {
+        peer.voice.suspected_until = peer.now;
+        peer.voice.next_beacon = peer.voice.next_full;
+    }
 }
 
 /// "I am here", with gossip.
 pub(crate) fn beacon(peer: &mut Peer) {
     let t = peer.period_ms();
+    let bare = peer.now < peer.voice.next_full;
     let jitter = u64::from(peer.rng.next_u32()) % (t / 5 + 1);
-    peer.voice.next_beacon = peer.now.plus_ms(t - t / 10 + jitter);
+    if !bare {
+        peer.voice.next_full = peer.now.plus_ms(t - t / 10 + jitter);
+    }
+    peer.voice.next_beacon = peer.voice.next_full;
+    if peer.now < peer.voice.suspected_until {
+        let again = peer.now.plus_ms(t / 4 + jitter / 2);
+        peer.voice.next_beacon = peer.voice.next_beacon.min(again);
+    }
     if !may_speak(peer) {
         return;
     }
     peer.voice.heartbeat = peer.voice.heartbeat.saturating_add(1);
     peer.voice.last_beacon = peer.now;
-    let mut gossip = peer.membership.gossip(peer.now, MAX_GOSSIP);
+    let most = if bare { 0 } else { MAX_GOSSIP };
+    let mut gossip = peer.membership.gossip(peer.now, most);
     for g in &mut gossip {
         (g.max_seq, g.digest) = peer.relay.version(g.id, g.incarnation);
     }

@@ -28,6 +28,9 @@ pub struct Takeover {
     pub second_hand: bool,
 }
 
+/// Life and number of a record.
+pub type Version = (u32, u32);
+
 /// A cell that nobody live lists.
 #[derive(Clone, Copy, Debug)]
 struct Orphan {
@@ -44,7 +47,7 @@ pub struct ListingCheck {
     inherited: BTreeMap<u16, u16>,
     able_since_ms: Option<u64>,
     own: BTreeMap<u16, Arc<Register>>,
-    heard: BTreeMap<(u16, u16), (Arc<Register>, u32)>,
+    heard: BTreeMap<(u16, u16), (Arc<Register>, Version)>,
     clashes: Clocks<(u16, u16, u16)>,
     /// Sections of peers that died, in the order of their deaths.
     pub takeovers: Vec<Takeover>,
@@ -82,20 +85,21 @@ impl ListingCheck {
         self.own.insert(id, register);
     }
 
-    /// A peer was given another's section, written in that one's life `incarnation`.
+    /// A peer was given another's section. What was written earlier than what it has
+    /// says nothing new: the medium may deliver in any order.
     pub fn on_heard(
         &mut self,
         (by, author): (u16, u16),
-        incarnation: u32,
+        version: Version,
         register: &Arc<Register>,
     ) {
         if by == author {
             return;
         }
         let known = self.heard.get(&(by, author));
-        if known.is_none_or(|(r, i)| *i <= incarnation && !Arc::ptr_eq(r, register)) {
+        if known.is_none_or(|(_, v)| *v < version) {
             self.heard
-                .insert((by, author), (Arc::clone(register), incarnation));
+                .insert((by, author), (Arc::clone(register), version));
         }
     }
 
@@ -270,7 +274,9 @@ impl ListingCheck {
                     flies[c] = true;
                 }
             }
-            for (&(_, author), (register, life)) in self.heard.range((m.id, 0)..=(m.id, u16::MAX)) {
+            for (&(_, author), (register, (life, _))) in
+                self.heard.range((m.id, 0)..=(m.id, u16::MAX))
+            {
                 let alive = members.belief(m.id, author) == Some((*life, Status::Alive));
                 if !alive || register.loop_hash != look.loop_hash {
                     continue;
@@ -457,7 +463,8 @@ mod tests {
             s.members
                 .on_belief(0, (1, 2), (1, Status::Alive), &BOUNDS, None);
             s.check.on_published(1, register(5, 1));
-            s.check.on_heard((1, 2), 1, &register(other, 2));
+            s.check.on_heard((1, 2), (1, 8), &register(other, 2));
+            s.check.on_heard((1, 2), (1, 7), &register(9, 2));
             for t in 1..6 {
                 s.look(t * 1000, &[(1, &[3, 0, 1, 2]), (2, &[])]);
             }

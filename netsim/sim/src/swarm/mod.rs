@@ -29,6 +29,7 @@ pub use outcome::Outcome;
 mod tests;
 
 use crate::chaos::TimedFault;
+use crate::check::listing::Version;
 use crate::check::record::Said;
 use crate::check::{Checker, Mind};
 use crate::history::{History, Kind, What, bytes_hash, report_hash};
@@ -98,7 +99,7 @@ pub struct Swarm {
     loop_hash: u64,
     covered_ms: Option<u64>,
     /// Sections spoken so far, by hash of their bytes: author, life, section.
-    claims: BTreeMap<u64, (u16, u32, Arc<Register>)>,
+    claims: BTreeMap<u64, (u16, Version, Arc<Register>)>,
     done: bool,
     unassigned: bool,
     kills: u32,
@@ -395,9 +396,11 @@ impl Swarm {
             known = Some((d.bytes.as_ptr(), hash));
             self.fold(slot, Kind::Receive, hash);
             if self.slots[slot].process == Process::Running
-                && let Some((author, life, claim)) = self.claims.get(&hash)
+                && let Some((author, version, claim)) = self.claims.get(&hash)
             {
-                self.checker.listing.on_heard((d.rx, *author), *life, claim);
+                self.checker
+                    .listing
+                    .on_heard((d.rx, *author), *version, claim);
             }
             self.feed(
                 slot,
@@ -492,8 +495,9 @@ impl Swarm {
             let journal = self.slots[slot].disk.records();
             self.checker.on_said(self.now_ms, id, &said, hash, journal);
             if let Some(claim) = said.claim {
+                let r = &said.record;
                 self.claims
-                    .insert(hash, (said.record.author, said.record.incarnation, claim));
+                    .insert(hash, (r.author, (r.incarnation, r.seq), claim));
             }
         } else {
             self.checker.found.broken("S8", self.now_ms, Some(id), || {
