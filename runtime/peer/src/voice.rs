@@ -110,8 +110,8 @@ pub(crate) fn look(peer: &mut Peer) {
     {
         speak_claim(peer);
     }
-    if (peer.voice.cover_changed || peer.voice.cover_wanted)
-        && due(peer.voice.last_cover, COVER_PERIODS)
+    if (peer.voice.cover_changed && due(peer.voice.last_cover, COVER_PERIODS))
+        || (peer.voice.cover_wanted && due(peer.voice.last_cover, 1))
     {
         speak_cover(peer);
     }
