@@ -55,7 +55,7 @@ pub struct Checker {
 impl Checker {
     /// The checks of the run with this seed, at beacon period T, on a loop of so many cells.
     #[must_use]
-    pub fn new(seed: u64, period_ms: u32, n_cells: usize) -> Self {
+    pub fn new(seed: u64, period_ms: u32) -> Self {
         let period_ms = u64::from(period_ms.max(1));
         Self {
             period_ms,
@@ -63,7 +63,7 @@ impl Checker {
             members: Membership::default(),
             listing: ListingCheck::default(),
             reached: Reached::default(),
-            record: RecordCheck::new(n_cells),
+            record: RecordCheck::default(),
             cover: CoverCheck::default(),
             progress: ProgressCheck::default(),
             graph: Graph::default(),
@@ -188,17 +188,18 @@ impl Checker {
         }
     }
 
-    /// A peer publishes bytes it wrote itself.
+    /// A peer publishes bytes it wrote itself; `durable` is its disk, and of each cell
+    /// whether a camera has seen it.
     pub fn on_said(
         &mut self,
         now_ms: u64,
         id: u16,
         said: &Said,
         bytes_hash: u64,
-        journal: &[Vec<u8>],
+        durable: (&[Vec<u8>], &[bool]),
     ) {
         self.record
-            .on_said(now_ms, id, said, bytes_hash, journal, &mut self.found);
+            .on_said(now_ms, id, said, bytes_hash, durable, &mut self.found);
         if let Some(claim) = &said.claim {
             self.listing.on_published(id, std::sync::Arc::clone(claim));
         }

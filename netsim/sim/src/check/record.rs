@@ -55,19 +55,9 @@ pub struct RecordCheck {
     spoken: BTreeMap<(u16, u8, u16), (u32, u32, u64)>,
     versions: BTreeMap<u16, Versions>,
     durable: BTreeMap<u16, (usize, Durable)>,
-    n_cells: usize,
 }
 
 impl RecordCheck {
-    /// Checks for a loop of so many cells.
-    #[must_use]
-    pub fn new(n_cells: usize) -> Self {
-        Self {
-            n_cells,
-            ..Self::default()
-        }
-    }
-
     /// The disk of a peer was erased: what it promised is forgotten, and unless somebody
     /// in reach remembers its last life it has no way to know that it had one.
     pub fn on_erased(&mut self, id: u16) {
@@ -76,14 +66,15 @@ impl RecordCheck {
         self.versions.remove(&id);
     }
 
-    /// A peer says something of its own. `journal` is what its disk holds for certain.
+    /// A peer says something of its own. `journal` is what its disk holds for
+    /// certain, `covered` tells of each cell whether a camera has seen it.
     pub fn on_said(
         &mut self,
         now_ms: u64,
         id: u16,
         said: &Said,
         bytes_hash: u64,
-        journal: &[Vec<u8>],
+        (journal, covered): (&[Vec<u8>], &[bool]),
         found: &mut Findings,
     ) {
         let r = &said.record;
@@ -94,7 +85,7 @@ impl RecordCheck {
             return;
         }
         self.check_speaker(now_ms, r, bytes_hash, found);
-        self.check_promises(now_ms, id, said, journal, found);
+        self.check_promises(now_ms, id, said, (journal, covered), found);
     }
 
     fn check_speaker(&mut self, now_ms: u64, r: &Record, bytes_hash: u64, found: &mut Findings) {
@@ -123,7 +114,7 @@ impl RecordCheck {
         now_ms: u64,
         id: u16,
         said: &Said,
-        journal: &[Vec<u8>],
+        (journal, covered): (&[Vec<u8>], &[bool]),
         found: &mut Findings,
     ) {
         let known = self.durable.get(&id);
@@ -162,7 +153,7 @@ impl RecordCheck {
                 }
             }
             Body::Claim(register) => {
-                if let Some(text) = unpersisted(register, durable.register.as_ref(), self.n_cells) {
+                if let Some(text) = unpersisted(register, durable.register.as_ref(), covered) {
                     found.broken("S7", now_ms, Some(id), || text);
                 }
             }
@@ -227,9 +218,10 @@ fn versions(v: &View) -> Versions {
 }
 
 /// A listed cell that no durable section lists at that stamp, as a sentence.
-fn unpersisted(said: &Register, durable: Option<&Register>, n_cells: usize) -> Option<String> {
+/// A run may bridge cells covered meanwhile: to fly over those is no promise.
+fn unpersisted(said: &Register, durable: Option<&Register>, covered: &[bool]) -> Option<String> {
     // Runs are cyclic: the same cell may be named with and without a lap.
-    let n = u32::try_from(n_cells).unwrap_or(u32::MAX).max(1);
+    let n = u32::try_from(covered.len()).unwrap_or(u32::MAX).max(1);
     let cell_of = |l: &Listing, k: u16| {
         u16::try_from((u32::from(l.run.first) + u32::from(k)) % n).unwrap_or(u16::MAX)
     };
@@ -245,7 +237,8 @@ fn unpersisted(said: &Register, durable: Option<&Register>, n_cells: usize) -> O
     for l in said.plan.iter().filter(|l| l.firmness != Firmness::Done) {
         for k in 0..l.run.count {
             let cell = cell_of(l, k);
-            if promised.get(&cell).is_none_or(|s| *s < l.stamp) {
+            let bridged = covered.get(usize::from(cell)).copied().unwrap_or(false);
+            if !bridged && promised.get(&cell).is_none_or(|s| *s < l.stamp) {
                 return Some(format!(
                     "lists cell {cell} at {:?}, its disk holds {:?}",
                     l.stamp,
@@ -281,11 +274,15 @@ mod tests {
     #[test]
     fn a_section_may_shrink_but_not_grow_beyond_what_is_durable() {
         let durable = register(4, 5);
-        assert_eq!(unpersisted(&register(4, 5), Some(&durable), 20), None);
-        assert_eq!(unpersisted(&register(4, 2), Some(&durable), 20), None);
-        assert!(unpersisted(&register(4, 6), Some(&durable), 20).is_some());
-        assert!(unpersisted(&register(5, 5), Some(&durable), 20).is_some());
-        assert!(unpersisted(&register(4, 1), None, 20).is_some());
+        let open = [false; 20];
+        let mut covered = open;
+        covered[8] = true;
+        assert_eq!(unpersisted(&register(4, 5), Some(&durable), &open), None);
+        assert_eq!(unpersisted(&register(4, 2), Some(&durable), &open), None);
+        assert!(unpersisted(&register(4, 6), Some(&durable), &open).is_some());
+        assert_eq!(unpersisted(&register(4, 6), Some(&durable), &covered), None);
+        assert!(unpersisted(&register(5, 5), Some(&durable), &open).is_some());
+        assert!(unpersisted(&register(4, 1), None, &open).is_some());
     }
 
     #[test]

@@ -129,7 +129,7 @@ impl Swarm {
             grounds,
             faults,
             history: History::new(keep),
-            checker: Checker::new(seed, spec.beacon_period_ms, covered.len()),
+            checker: Checker::new(seed, spec.beacon_period_ms),
             covered,
             loop_hash,
             covered_ms: None,
@@ -492,8 +492,11 @@ impl Swarm {
     fn said(&mut self, slot: usize, bytes: &[u8], hash: u64) {
         let id = self.slots[slot].id();
         if let Some(said) = Said::read(bytes) {
-            let journal = self.slots[slot].disk.records();
-            self.checker.on_said(self.now_ms, id, &said, hash, journal);
+            if said.claim.is_some() {
+                self.refresh_covered();
+            }
+            let durable = (self.slots[slot].disk.records(), self.covered.as_slice());
+            self.checker.on_said(self.now_ms, id, &said, hash, durable);
             if let Some(claim) = said.claim {
                 let r = &said.record;
                 self.claims
