@@ -347,6 +347,7 @@ fn fault(f: &Fault) -> String {
         ),
         Fault::Partition { groups } => format!("partition {groups:?}"),
         Fault::Heal => "all links heal".to_owned(),
+        Fault::Rebase { .. } => "the operator moves the base".to_owned(),
         Fault::Loss { permille } => format!(
             "{:.1} % of transmissions are lost",
             f64::from(*permille) / 10.0

@@ -74,6 +74,9 @@ impl Trial<'_> {
             Fault::Cut { .. } | Fault::Partition { .. } | Fault::Heal | Fault::Loss { .. } => {
                 self.links(fault)?
             }
+            Fault::Rebase { .. } => {
+                return Err("a live ground station takes no new mission yet; `skein sim --storm` revises missions".to_owned());
+            }
         };
         if let Some(text) = lines.first() {
             self.note(text.clone());

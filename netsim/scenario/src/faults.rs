@@ -105,7 +105,7 @@ fn names_known(fault: &Fault, known: &Known<'_>) -> bool {
         | Fault::Restart { peer, .. } => known.has(*peer),
         Fault::Cut { a, b, .. } => known.has(*a) && known.has(*b),
         Fault::Partition { groups } => groups.iter().flatten().any(|p| known.has(*p)),
-        Fault::Heal | Fault::Loss { .. } => true,
+        Fault::Heal | Fault::Loss { .. } | Fault::Rebase { .. } => true,
     }
 }
 
@@ -303,6 +303,7 @@ pub(crate) fn storm(
         max_partitions: 0,
         max_partition_s: 0,
         max_restarts: 0,
+        max_revisions: 0,
     };
     let Some(node) = node else { return Ok(calm) };
     let f = node.fields(&[
@@ -312,6 +313,7 @@ pub(crate) fn storm(
         "max_partitions",
         "max_partition_s",
         "max_restarts",
+        "max_revisions",
     ])?;
     let mut max_kills = f.small_or("max_kills", 0, 0, u16::MAX, "UAVs")?;
     if usize::from(max_kills) >= n_uavs {
@@ -337,6 +339,7 @@ pub(crate) fn storm(
         max_partitions: f.small_or("max_partitions", 0, 0, 100, "partitions")?,
         max_partition_s: f.whole_or("max_partition_s", 30, 1, 86_400, "seconds")?,
         max_restarts: f.small_or("max_restarts", 0, 0, 100, "restarts")?,
+        max_revisions: f.small_or("max_revisions", 0, 0, 10, "revisions")?,
     })
 }
 

@@ -140,7 +140,7 @@ fn named(fault: &Fault) -> Vec<u16> {
         | Fault::Restart { peer, .. } => vec![*peer],
         Fault::Cut { a, b, .. } => vec![*a, *b],
         Fault::Partition { groups } => groups.concat(),
-        Fault::Heal | Fault::Loss { .. } => Vec::new(),
+        Fault::Heal | Fault::Loss { .. } | Fault::Rebase { .. } => Vec::new(),
     }
 }
 

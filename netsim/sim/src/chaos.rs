@@ -57,6 +57,13 @@ pub enum Fault {
     },
     /// All cuts and partitions end.
     Heal,
+    /// The operator moves the base: the ground station speaks the mission's next revision.
+    Rebase {
+        /// East of the mission's origin, mm.
+        east_mm: i32,
+        /// North of it, mm.
+        north_mm: i32,
+    },
     /// The share of transmissions lost on every link, in thousandths.
     Loss {
         /// Thousandths.

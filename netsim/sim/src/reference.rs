@@ -108,7 +108,11 @@ impl<'a> Reference<'a> {
                     self.start(*peer);
                 }
             }
-            Fault::Cut { .. } | Fault::Partition { .. } | Fault::Heal | Fault::Loss { .. } => {}
+            Fault::Cut { .. }
+            | Fault::Partition { .. }
+            | Fault::Heal
+            | Fault::Loss { .. }
+            | Fault::Rebase { .. } => {}
         }
     }
 

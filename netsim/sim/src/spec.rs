@@ -114,4 +114,6 @@ pub struct StormSpec {
     pub max_partition_s: u32,
     /// Most restarts in one run.
     pub max_restarts: u16,
+    /// Most revisions of the mission in one run, each of which moves the base.
+    pub max_revisions: u16,
 }

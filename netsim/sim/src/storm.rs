@@ -41,6 +41,7 @@ pub fn draw(spec: &Spec, seed: u64, makespan_ms: u64) -> Vec<TimedFault> {
     }
     restarts(&mut s, spec, others, end_ms, &mut faults);
     partitions(&mut s, spec, &ids, end_ms, &mut faults);
+    revisions(&mut s, spec, end_ms, &mut faults);
     faults.sort_by_key(|f| f.at_ms);
     faults
 }
@@ -143,6 +144,31 @@ fn partitions(s: &mut Stream, spec: &Spec, ids: &[u16], end_ms: u64, out: &mut V
     }
 }
 
+/// Each revision moves the base to where some UAV was launched: clear of the zones.
+fn revisions(s: &mut Stream, spec: &Spec, end_ms: u64, out: &mut Vec<TimedFault>) {
+    let n = s.between(0, u64::from(spec.storm.max_revisions));
+    if spec.ground.is_none() || spec.uavs.is_empty() {
+        return;
+    }
+    for _ in 0..n {
+        let which = usize::try_from(s.between(0, spec.uavs.len() as u64 - 1)).unwrap_or(0);
+        let launch = spec.uavs[which].launch;
+        let fault = Fault::Rebase {
+            east_mm: mm(launch.east_m),
+            north_mm: mm(launch.north_m),
+        };
+        out.push(at(s.between(QUIET_START_MS, end_ms), fault));
+    }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "a mission ends 20 km from its origin"
+)]
+fn mm(m: f64) -> i32 {
+    (m * 1000.0).round() as i32
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -168,6 +194,7 @@ mod tests {
                     split = false;
                 }
                 Fault::Loss { permille } => assert!(*permille <= spec.storm.max_loss_permille),
+                Fault::Rebase { .. } => assert!(spec.ground.is_some()),
                 other => panic!("{other:?} is no storm fault"),
             }
         }

@@ -153,6 +153,53 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
     let Ok(n) = u16::try_from(coverage_loop.len()) else {
         return;
     };
+    let executive = peer.config.airframe.map(|airframe| {
+        let router = Arc::clone(&ground.router);
+        Executive::new(
+            airframe,
+            peer.config.height_m,
+            Arc::clone(&coverage_loop),
+            router,
+        )
+    });
+    let return_ms = return_time_ms(peer, &ground);
+    let old = peer.crew.take();
+    // What is still being written was promised for the old ground: it is not installed.
+    let written = old.as_ref().map_or(0, |c| c.written + 1);
+    let exhausted = old.as_ref().is_some_and(|c| c.exhausted);
+    let (negotiation, able_since, live) = match old {
+        // On the same loop sections stay what they are; only rounds begin anew.
+        Some(mut old) if old.loop_hash() == coverage_loop.hash() => {
+            old.negotiation.revised();
+            (old.negotiation, old.able_since, old.live)
+        }
+        old => (begun(peer, old, &coverage_loop, n), None, Live::new()),
+    };
+    peer.crew = Some(Crew {
+        ground: Arc::clone(&ground),
+        executive,
+        negotiation,
+        goal: None,
+        replan: true,
+        able_since,
+        live,
+        finished: false,
+        exhausted,
+        unsaved_cells: 0,
+        return_ms,
+        written,
+        answered: written,
+    });
+    peer.report(Report::Ready {
+        revision: ground.mission.revision,
+        loop_hash: coverage_loop.hash(),
+        cells: n,
+    });
+    crate::ear::hear_again(peer);
+}
+
+/// A negotiation on a new loop, with all that is known to be covered.
+fn begun(peer: &Peer, old: Option<Crew>, coverage_loop: &CoverageLoop, n: u16) -> Negotiation {
     let mut base = CellSet::new(n);
     for (i, c) in coverage_loop.cells().iter().enumerate() {
         if !c.needed {
@@ -163,17 +210,16 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
         id: peer.config.id.0,
         incarnation: peer.boot.incarnation,
     };
-    let counter = peer.durable.counter.max(
-        peer.crew
-            .as_ref()
-            .map_or(0, |c| c.negotiation.rounds.counter()),
-    );
+    let counter = peer
+        .durable
+        .counter
+        .max(old.as_ref().map_or(0, |c| c.negotiation.rounds.counter()));
     let mut negotiation = Negotiation::new(me, base, counter);
-    if let Some(old) = &peer.crew {
+    if let Some(old) = &old {
         negotiation.section.cover(&carried_over(
             &old.ground.coverage_loop,
             old.union(),
-            &coverage_loop,
+            coverage_loop,
         ));
     }
     if let Some(union) = boot::remembered(&peer.durable, coverage_loop.hash(), n) {
@@ -187,37 +233,7 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
     {
         negotiation.section.restore_epoch(register.epoch);
     }
-    let executive = peer.config.airframe.map(|airframe| {
-        let router = Arc::clone(&ground.router);
-        Executive::new(
-            airframe,
-            peer.config.height_m,
-            Arc::clone(&coverage_loop),
-            router,
-        )
-    });
-    let return_ms = return_time_ms(peer, &ground);
-    peer.crew = Some(Crew {
-        ground: Arc::clone(&ground),
-        executive,
-        negotiation,
-        goal: None,
-        replan: true,
-        able_since: None,
-        live: Live::new(),
-        finished: false,
-        exhausted: false,
-        unsaved_cells: 0,
-        return_ms,
-        written: 0,
-        answered: 0,
-    });
-    peer.report(Report::Ready {
-        revision: ground.mission.revision,
-        loop_hash: coverage_loop.hash(),
-        cells: n,
-    });
-    crate::ear::hear_again(peer);
+    negotiation
 }
 
 /// Covered cells of one loop, found again by name on another.

@@ -127,7 +127,6 @@ fn deliver(peer: &mut Peer, record: &Record, body: Body) {
         Body::Claim(register) => {
             if let Some(crew) = &mut peer.crew
                 && register.loop_hash == crew.loop_hash()
-                && register.revision == crew.revision()
                 && crew.negotiation.section.hear(
                     author.id,
                     author.incarnation,

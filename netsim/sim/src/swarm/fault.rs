@@ -4,7 +4,9 @@
 use super::slot::Process;
 use super::{Event, Kind, Phase, Swarm, What};
 use crate::chaos::Fault;
+use skein_peer::input::Command;
 use skein_peer::{Input, Role};
+use std::sync::Arc;
 
 impl Swarm {
     /// Applies a fault now.
@@ -50,6 +52,10 @@ impl Swarm {
                 let sides = std::mem::take(&mut self.sides);
                 self.checker
                     .on_partition(false, |id| sides.get(&id).copied().unwrap_or(usize::MAX));
+                0
+            }
+            Fault::Rebase { east_mm, north_mm } => {
+                self.revise((*east_mm, *north_mm));
                 0
             }
             Fault::Loss { permille } => {
@@ -109,6 +115,24 @@ impl Swarm {
     pub(super) fn airframe_lost(&mut self, slot: usize) {
         self.end_process(slot, true);
         self.observe_graph();
+    }
+
+    /// The operator's next revision enters at the ground station.
+    fn revise(&mut self, base: skein_peer::mission::PointMm) {
+        let mut mission = (*self.mission).clone();
+        mission.revision += 1;
+        mission.base = base;
+        self.mission = Arc::new(mission);
+        let ground = self
+            .slots
+            .iter()
+            .position(|s| s.config.role == Role::Ground);
+        if let Some(slot) = ground
+            && self.slots[slot].process == Process::Running
+        {
+            let command = Command::Mission(Arc::clone(&self.mission));
+            self.feed(slot, Input::Command(command));
+        }
     }
 
     fn pause(&mut self, id: u16) {

@@ -42,7 +42,7 @@ use queue::{Phase, Queue};
 use skein_behaviors::Setpoint;
 use skein_peer::plan::{Answer, Problem};
 use skein_peer::wire::message::Register;
-use skein_peer::{Input, Output, PeerConfig, PeerId, Report, Role, View};
+use skein_peer::{Input, Mission, Output, PeerConfig, PeerId, Report, Role, View};
 use slot::{Process, Slot};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -92,6 +92,8 @@ pub struct Swarm {
     slots: Vec<Slot>,
     air: Air,
     grounds: Grounds,
+    /// The operator's newest.
+    mission: Arc<Mission>,
     faults: Vec<TimedFault>,
     history: History,
     checker: Checker,
@@ -127,6 +129,7 @@ impl Swarm {
             slots: slots(spec, seed),
             air: Air::new(stage, seed),
             grounds,
+            mission: Arc::clone(&spec.mission),
             faults,
             history: History::new(keep),
             checker: Checker::new(seed, spec.beacon_period_ms),

@@ -58,6 +58,7 @@ pub fn storm(n_uavs: u16) -> StormSpec {
         max_partitions: 2,
         max_partition_s: 60,
         max_restarts: 2,
+        max_revisions: 1,
     }
 }
 
