@@ -166,30 +166,25 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
     let old = peer.crew.take();
     // What is still being written was promised for the old ground: it is not installed.
     let written = old.as_ref().map_or(0, |c| c.written + 1);
-    let exhausted = old.as_ref().is_some_and(|c| c.exhausted);
-    let (negotiation, able_since, live) = match old {
-        // On the same loop sections stay what they are; only rounds begin anew.
-        Some(mut old) if old.loop_hash() == coverage_loop.hash() => {
-            old.negotiation.revised();
-            (old.negotiation, old.able_since, old.live)
-        }
-        old => (begun(peer, old, &coverage_loop, n), None, Live::new()),
-    };
-    peer.crew = Some(Crew {
+    let mut crew = Crew {
+        negotiation: begun(peer, old.as_ref(), &coverage_loop, n),
         ground: Arc::clone(&ground),
         executive,
-        negotiation,
         goal: None,
         replan: true,
-        able_since,
-        live,
+        able_since: None,
+        live: Live::new(),
         finished: false,
-        exhausted,
+        exhausted: old.as_ref().is_some_and(|c| c.exhausted),
         unsaved_cells: 0,
         return_ms,
         written,
         answered: written,
-    });
+    };
+    if let Some(old) = old {
+        keep_on(&mut crew, old);
+    }
+    peer.crew = Some(crew);
     peer.report(Report::Ready {
         revision: ground.mission.revision,
         loop_hash: coverage_loop.hash(),
@@ -198,8 +193,31 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
     crate::ear::hear_again(peer);
 }
 
+/// On the same loop sections and rounds stay what they are, so that a revision which
+/// arrives at one peer after the other parts nobody; between the same zones a UAV stays
+/// on its curve, too.
+fn keep_on(crew: &mut Crew, old: Crew) {
+    if old.loop_hash() != crew.loop_hash() {
+        return;
+    }
+    crew.negotiation = old.negotiation;
+    crew.able_since = old.able_since;
+    crew.live = old.live;
+    (crew.written, crew.answered) = (old.written, old.answered);
+    crew.unsaved_cells = old.unsaved_cells;
+    let (new, before) = (&crew.ground.mission, &old.ground.mission);
+    let flown_alike = new.zones == before.zones
+        && new.turn_radius_mm == before.turn_radius_mm
+        && new.clearance_mm == before.clearance_mm;
+    if flown_alike {
+        crew.executive = old.executive;
+        crew.goal = old.goal;
+        crew.replan = old.replan;
+    }
+}
+
 /// A negotiation on a new loop, with all that is known to be covered.
-fn begun(peer: &Peer, old: Option<Crew>, coverage_loop: &CoverageLoop, n: u16) -> Negotiation {
+fn begun(peer: &Peer, old: Option<&Crew>, coverage_loop: &CoverageLoop, n: u16) -> Negotiation {
     let mut base = CellSet::new(n);
     for (i, c) in coverage_loop.cells().iter().enumerate() {
         if !c.needed {
@@ -215,7 +233,7 @@ fn begun(peer: &Peer, old: Option<Crew>, coverage_loop: &CoverageLoop, n: u16) -
         .counter
         .max(old.as_ref().map_or(0, |c| c.negotiation.rounds.counter()));
     let mut negotiation = Negotiation::new(me, base, counter);
-    if let Some(old) = &old {
+    if let Some(old) = old {
         negotiation.section.cover(&carried_over(
             &old.ground.coverage_loop,
             old.union(),
@@ -411,12 +429,9 @@ fn members(peer: &Peer, able: bool) -> Vec<Member> {
         .membership
         .live()
         .filter(|(id, _)| {
-            peer.membership.info(*id).is_some_and(|i| {
-                i.able
-                    && !i.ground
-                    && i.revision == crew.revision()
-                    && i.loop_hash == crew.loop_hash()
-            })
+            peer.membership
+                .info(*id)
+                .is_some_and(|i| i.able && !i.ground && i.loop_hash == crew.loop_hash())
         })
         .map(|(id, incarnation)| Member { id, incarnation })
         .collect();

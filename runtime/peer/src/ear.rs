@@ -141,9 +141,7 @@ fn deliver(peer: &mut Peer, record: &Record, body: Body) {
             let now = peer.now;
             if let Some(crew) = &mut peer.crew {
                 let n = crew.union().len();
-                if snapshot.round.loop_hash == crew.loop_hash()
-                    && snapshot.round.revision == crew.revision()
-                {
+                if snapshot.round.loop_hash == crew.loop_hash() {
                     if let Ok(union) = CellSet::decode_rle(n, &snapshot.union) {
                         crew.negotiation.section.cover(&union);
                     }

@@ -182,15 +182,6 @@ impl Negotiation {
         self.cells_since
     }
 
-    /// The mission was revised, and its loop is the same: who flies what stays, and
-    /// rounds among those who follow the old revision are void.
-    pub fn revised(&mut self) {
-        self.rounds.abandon();
-        self.dividing = None;
-        self.bid_wanted = false;
-        self.take_pending = false;
-    }
-
     /// A snapshot was heard.
     pub fn hear_snapshot(&mut self, now: Time, author: Member, snapshot: &Snapshot) {
         if self.rounds.hear(author, snapshot) == HeardSnapshot::BidWanted {

@@ -231,13 +231,6 @@ impl Rounds {
         }
     }
 
-    /// The open round is void, and that is nobody's fault.
-    pub fn abandon(&mut self) {
-        if let Some(open) = self.open.take() {
-            self.closed = Some(order_of(&open.round));
-        }
-    }
-
     /// A new life of this peer: rounds of the old one are void.
     pub fn set_me(&mut self, me: Member) {
         self.me = me;
