@@ -10,6 +10,7 @@
 //! | unknown | a heartbeat younger than the bound, not condemned | alive or suspect |
 //! | unknown | a heartbeat older than the bound, or condemned | down: its records are asked for |
 //! | alive | k1 T silent, and it used to be heard directly | suspect |
+//! | alive | half of that, and the transport says that the link is gone | suspect |
 //! | alive | a suspicion against this very heartbeat is heard | suspect |
 //! | suspect | a fresher heartbeat from anybody, younger than the bound | alive |
 //! | suspect | k2 T unrefuted | down |
@@ -34,7 +35,7 @@ use crate::output::Status;
 use crate::wire::limits::HOPS_MAX;
 use crate::wire::message::{Beacon, Gossip};
 use known::{Age, Heartbeat, Known, NO_HOPS};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Most peers known: the largest fleet. A flood of made-up ids must end somewhere.
 pub const MAX_KNOWN: usize = 64;
@@ -113,6 +114,8 @@ pub struct Membership {
     next_gossip: u16,
     last_tick: Option<Time>,
     doubt_until: Time,
+    /// Neighbours whose link the transport holds for gone.
+    gone: BTreeSet<u16>,
 }
 
 impl Membership {
@@ -129,6 +132,7 @@ impl Membership {
             next_gossip: 0,
             last_tick: None,
             doubt_until: Time(0),
+            gone: BTreeSet::new(),
         }
     }
 
@@ -142,6 +146,16 @@ impl Membership {
     pub fn set_voice(&mut self, nonce: u32, heartbeat: u32) {
         self.nonce = nonce;
         self.heartbeat = heartbeat;
+    }
+
+    /// The transport believes that a neighbour came or went. A hint: it halves the
+    /// silence after which that neighbour is suspected, and decides nothing.
+    pub fn link(&mut self, neighbour: u16, up: bool) {
+        if up {
+            self.gone.remove(&neighbour);
+        } else if self.known.contains_key(&neighbour) {
+            self.gone.insert(neighbour);
+        }
     }
 
     /// Silence before a direct neighbour suspects, milliseconds: k1 T.
@@ -342,7 +356,10 @@ impl Membership {
         let longest = dead
             .max_by_key(|(id, k)| (k.freshest.age.ms(now), **id))
             .map(|(id, _)| *id);
-        longest.is_some_and(|id| self.known.remove(&id).is_some())
+        longest.is_some_and(|id| {
+            self.gone.remove(&id);
+            self.known.remove(&id).is_some()
+        })
     }
 
     /// Looks at the time: raises suspicions and passes verdicts. Returns what changed.
@@ -362,7 +379,12 @@ impl Membership {
         for known in self.known.values_mut().filter(|k| k.status != Status::Down) {
             let silent_ms = known.freshest.age.ms(now);
             let neighbour = known.fewest_hops(oldest_period) == Some(1);
-            if known.freshest.suspected.is_none() && neighbour && silent_ms >= k1_ms {
+            let patience_ms = if self.gone.contains(&known.freshest.id) {
+                k1_ms / 2
+            } else {
+                k1_ms
+            };
+            if known.freshest.suspected.is_none() && neighbour && silent_ms >= patience_ms {
                 known.freshest.suspected = Some(Age {
                     told_ms: 0,
                     at: now,

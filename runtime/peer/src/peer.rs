@@ -145,7 +145,7 @@ impl Peer {
                 bytes,
             } => ear::hear(self, transmitter, hops, &bytes),
             Input::Timer => {}
-            Input::LinkHint { .. } => {}
+            Input::LinkHint { neighbour, up } => self.membership.link(neighbour, up),
             Input::Stored { token, ok } => self.on_stored(token, ok),
             Input::Planned { token, answer } => self.on_planned(token, answer),
             Input::Command(command) => self.on_command(&command),

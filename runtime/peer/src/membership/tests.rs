@@ -36,6 +36,25 @@ fn silence_leads_to_suspicion_and_then_to_a_verdict() {
 }
 
 #[test]
+fn a_link_that_is_gone_halves_the_patience_and_passes_no_verdict() {
+    let mut m = Membership::new(1, 1000);
+    m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
+    m.link(2, false);
+    m.link(77, false);
+    let mut seen = Vec::new();
+    for t in 0..40 {
+        for c in m.tick(Time(t * 250)) {
+            seen.push((t * 250, c.status));
+        }
+        if t == 12 {
+            m.on_beacon(Time(t * 250), 2, 1, &beacon(2, Vec::new()));
+            m.link(2, true);
+        }
+    }
+    assert_eq!(seen, [(2250, Status::Suspect), (7250, Status::Suspect)]);
+}
+
+#[test]
 fn an_old_heartbeat_does_not_raise_the_dead() {
     let mut m = Membership::new(1, 1000);
     m.on_beacon(Time(0), 2, 1, &beacon(5, Vec::new()));
