@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use skein_planning::coverage::grid::improve::Improver;
 use skein_planning::coverage::grid::{
-    Cell, LaneMap, Plan, Task, TaskError, bounds, free, improve, mstc, patrol,
+    Cell, LaneMap, Plan, Task, TaskError, bounds, forest, free, improve, mstc, patrol,
 };
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
@@ -28,6 +28,8 @@ pub enum Planner {
     Mstc,
     /// One loop, divided exactly with backtracking.
     Bmstc,
+    /// A tree cover of the blocks, each UAV flies round its tree.
+    Mfc,
     /// One loop, each UAV flies straight to its arc.
     Free,
     /// The default: a region each, then local search.
@@ -190,6 +192,7 @@ fn plan(task: &Task, args: &CoverArgs) -> Plan {
     match args.planner {
         Planner::Mstc => mstc::without_backtracking(task),
         Planner::Bmstc => mstc::with_backtracking(task),
+        Planner::Mfc => forest::plan(task),
         Planner::Free => free::free_entry(task),
         Planner::Patrol => patrol::first_period(task),
         Planner::Best => best(task, args.budget_ms),

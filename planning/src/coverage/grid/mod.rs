@@ -10,6 +10,7 @@
 //! | [`spanning`] | one closed loop over all cells, from a spanning tree over 2×2 blocks |
 //! | [`mstc`] | the loop divided without and with backtracking, from where the UAVs stand |
 //! | [`ring`] | the exact division with backtracking, mixed speeds and endurance |
+//! | [`forest`] | a tree cover with a proven factor |
 //! | [`free`] | the loop divided, each UAV flying straight to its arc |
 //! | [`partition`] | a connected region for each UAV |
 //! | [`peel`] | work for UAVs that begin close together, farthest first |
@@ -22,6 +23,7 @@
 //! polygon becomes.
 
 pub mod bounds;
+pub mod forest;
 pub mod free;
 pub mod improve;
 pub mod map;

@@ -39,7 +39,8 @@ const SMALL: i64 = 16;
 /// Sweeps end when fewer than one piece in this many has passed.
 const FEW: usize = 5000;
 
-struct Piece {
+/// The connected free cells of one block.
+pub(super) struct Piece {
     cells: [Cell; 4],
     n: u32,
 }
@@ -401,8 +402,15 @@ impl<'a> Partition<'a> {
     }
 }
 
+impl Piece {
+    /// Its cells.
+    pub(super) fn cells(&self) -> &[Cell] {
+        &self.cells[..self.n as usize]
+    }
+}
+
 /// Cuts the free cells into the connected parts of blocks.
-fn cut(map: &LaneMap, offset: (u32, u32)) -> (Vec<u32>, Vec<Piece>) {
+pub(super) fn cut(map: &LaneMap, offset: (u32, u32)) -> (Vec<u32>, Vec<Piece>) {
     let mut piece_of = vec![UNREACHED; map.table_len()];
     let mut pieces: Vec<Piece> = Vec::new();
     let block = |cell: Cell| {
