@@ -10,6 +10,7 @@
 //! | [`place`] | latitude and longitude, rings, circles, the way to a mission's plane |
 //! | [`plan`] | QGroundControl `.plan`: geofence, survey, waypoints |
 //! | [`geojson`] | areas, and buildings with heights |
+//! | [`targets`] | points and lines to look at, of both formats |
 //! | [`height`] | heights as map data writes them: `12.13 m`, `3.5`, `40 ft` |
 //!
 //! ```
@@ -26,6 +27,7 @@ pub mod geojson;
 pub mod height;
 pub mod place;
 pub mod plan;
+pub mod targets;
 
 use core::fmt;
 use thiserror::Error;

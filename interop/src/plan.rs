@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 const MAX_CIRCLE_M: f64 = 40_000.0;
 
 /// MAVLink command of a waypoint.
-const NAV_WAYPOINT: i64 = 16;
+pub(crate) const NAV_WAYPOINT: i64 = 16;
 
 /// MAVLink frame of an altitude above home.
 const FRAME_RELATIVE_ALT: i64 = 3;

@@ -5,3 +5,4 @@ mod dice;
 pub mod grid;
 pub mod line;
 pub mod metric;
+pub mod pinpoint;

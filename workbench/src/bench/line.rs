@@ -150,3 +150,106 @@ pub fn run(args: &LineArgs) -> Result<String> {
         .with_context(|| format!("cannot write {}", args.out.display()))?;
     Ok(serde_json::to_string(&answer)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    /// The tours of a plan, recounted from the files alone: their lengths, after checking
+    /// that each starts and ends at the depot and that together they fly along every road.
+    fn recount(dir: &Path, told: &serde_json::Value) -> Vec<f64> {
+        let nodes = std::fs::read_to_string(dir.join("node_data")).unwrap();
+        let at = |id: u64| -> (f64, f64) {
+            let row = nodes
+                .lines()
+                .map(|l| l.split_whitespace().collect::<Vec<_>>())
+                .find(|f| f[0] == id.to_string())
+                .unwrap();
+            (row[1].parse().unwrap(), row[2].parse().unwrap())
+        };
+        let mut left = BTreeSet::new();
+        for row in std::fs::read_to_string(dir.join("req_edge_list"))
+            .unwrap()
+            .lines()
+        {
+            let ids: Vec<u64> = row.split_whitespace().map(|f| f.parse().unwrap()).collect();
+            left.insert((ids[0].min(ids[1]), ids[0].max(ids[1])));
+        }
+        let mut lengths = Vec::new();
+        for tour in told["tours"].as_array().unwrap() {
+            let ids: Vec<u64> = tour
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|v| v.as_u64().unwrap())
+                .collect();
+            assert_eq!(Some(&told["depot"].as_u64().unwrap()), ids.first());
+            assert_eq!(ids.first(), ids.last());
+            let mut length = 0.0;
+            for w in ids.windows(2) {
+                left.remove(&(w[0].min(w[1]), w[0].max(w[1])));
+                let (p, q) = (at(w[0]), at(w[1]));
+                length += ((p.0 - q.0).powi(2) + (p.1 - q.1).powi(2)).sqrt();
+            }
+            lengths.push(length);
+        }
+        assert!(left.is_empty(), "not flown: {left:?}");
+        lengths
+    }
+
+    fn planned(city: &str, k: usize) -> (Vec<f64>, serde_json::Value) {
+        let dir = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("data/roads")
+            .join(city);
+        let out =
+            std::env::temp_dir().join(format!("skein-line-{}-{city}-{k}", std::process::id()));
+        run(&LineArgs {
+            city: dir.clone(),
+            k,
+            depot: None,
+            steps: 2_000,
+            out: out.clone(),
+        })
+        .unwrap();
+        let told: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(&out).unwrap()).unwrap();
+        std::fs::remove_file(&out).unwrap();
+        let lengths = recount(&dir, &told);
+        for (length, said) in lengths.iter().zip(told["length_m"].as_array().unwrap()) {
+            assert!((length - said.as_f64().unwrap()).abs() < 1e-6);
+        }
+        (lengths, told)
+    }
+
+    #[test]
+    fn one_tour_meets_the_known_bounds_of_real_roads() {
+        // Roads plus the cheapest matching of odd crossings, computed independently.
+        let (lengths, _) = planned("kuala_lumpur", 1);
+        assert!((lengths[0] - 5104.38).abs() < 0.02, "{lengths:?}");
+        let (lengths, _) = planned("hong_kong", 1);
+        assert!(lengths[0] < 5213.25 * 1.001, "{lengths:?}");
+    }
+
+    #[test]
+    fn teams_share_real_roads_evenly() {
+        let (lengths, told) = planned("kuala_lumpur", 2);
+        let longest = lengths.iter().copied().fold(0.0, f64::max);
+        assert!(longest < 1.05 * 2552.2, "{lengths:?}");
+        assert!((longest - told["makespan_m"].as_f64().unwrap()).abs() < 1e-6);
+        let (lengths, _) = planned("hong_kong", 5);
+        assert_eq!(lengths.len(), 5);
+    }
+
+    #[test]
+    fn files_that_are_wrong_are_named() {
+        let args = LineArgs {
+            city: PathBuf::from("no-such-city"),
+            k: 1,
+            depot: None,
+            steps: 0,
+            out: PathBuf::from("unused"),
+        };
+        assert!(run(&args).unwrap_err().to_string().contains("node_data"));
+    }
+}

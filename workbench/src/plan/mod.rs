@@ -1,7 +1,10 @@
 //! `plan`: a plan for a person, from files as other programs write them.
 
+pub mod line;
 mod map;
 pub mod route;
+pub mod tours;
+pub mod visit;
 
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand};
@@ -20,6 +23,10 @@ pub struct PlanArgs {
 pub enum Subject {
     /// The shortest way from one place to another round the no-fly zones of a file.
     Route(route::RouteArgs),
+    /// Tours of a team along all lines of a file.
+    Line(line::LineArgs),
+    /// Tours of a team over all points of a file.
+    Visit(visit::VisitArgs),
 }
 
 /// Plans, and returns the text to print.
@@ -30,6 +37,8 @@ pub enum Subject {
 pub fn run(args: &PlanArgs) -> Result<String> {
     match &args.subject {
         Subject::Route(args) => route::run(args),
+        Subject::Line(args) => line::run(args),
+        Subject::Visit(args) => visit::run(args),
     }
 }
 

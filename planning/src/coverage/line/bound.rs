@@ -34,7 +34,7 @@ pub(super) fn makespan(lines: &[Line], team: &[Surveyor], metric: &impl Metric) 
 }
 
 /// The time in which UAVs that each lose `2 d` can do `work` together.
-fn shared(team: &[Surveyor], d: f64, work: f64) -> f64 {
+pub(in crate::coverage) fn shared(team: &[Surveyor], d: f64, work: f64) -> f64 {
     let mut slowest_first: Vec<f64> = team.iter().map(|u| u.speed).collect();
     slowest_first.sort_by(f64::total_cmp);
     let speed: f64 = slowest_first.iter().sum();

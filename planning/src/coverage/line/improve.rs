@@ -27,8 +27,14 @@ const STEEP: f64 = 0.5;
 /// How many seconds of flight one second beyond endurance weighs.
 const BEYOND_ENDURANCE: f64 = 10.0;
 
-/// Losses accepted at first and at last, in mean deadheads a line.
-const WARM: f64 = 0.3;
+/// Losses accepted at first when a search begins far from a good plan, in mean deadheads
+/// a line.
+pub(super) const WARM: f64 = 0.3;
+
+/// The same when it goes on from a good plan.
+pub(super) const LUKEWARM: f64 = 0.1;
+
+/// Losses accepted at last.
 const COLD: f64 = 0.003;
 
 /// No line.
@@ -36,14 +42,12 @@ const NONE: u32 = u32::MAX;
 
 /// What the search is about.
 pub(super) struct Search<'a, M> {
-    /// All lines of the problem.
-    pub lines: &'a [Line],
-    /// The team.
-    pub team: &'a [Surveyor],
-    /// Costs of deadheads.
-    pub metric: &'a M,
-    /// No makespan below this is possible.
-    pub lower_bound: f64,
+    lines: &'a [Line],
+    team: &'a [Surveyor],
+    metric: &'a M,
+    lower_bound: f64,
+    /// For each line the lines nearest to it.
+    near: Vec<Vec<u32>>,
 }
 
 /// Lines and tours as rings: every tour is a cyclic list through a node of its own.
@@ -63,8 +67,6 @@ struct Rings {
 
 struct Engine<'a, M> {
     search: &'a Search<'a, M>,
-    lines: Vec<Line>,
-    near: Vec<Vec<u32>>,
     now: Rings,
     target: f64,
     dice: Dice,
@@ -85,22 +87,38 @@ enum Change {
     },
 }
 
-impl<M: Metric> Search<'_, M> {
-    /// Improves `tours` in `steps` steps; the first aim is the makespan, the second the
-    /// total.
-    pub(super) fn run(&self, tours: &mut [Vec<Pass>], steps: usize, seed: u64) {
-        let ids: Vec<usize> = tours.iter().flatten().map(|p| p.line).collect();
-        if ids.len() < 2 || steps == 0 {
+impl<'a, M: Metric> Search<'a, M> {
+    /// Prepares the search; no makespan below `lower_bound` is possible.
+    pub(super) fn new(
+        lines: &'a [Line],
+        team: &'a [Surveyor],
+        metric: &'a M,
+        lower_bound: f64,
+    ) -> Self {
+        Self {
+            lines,
+            team,
+            metric,
+            lower_bound,
+            near: neighbours(lines, metric),
+        }
+    }
+
+    /// Improves `tours` in `steps` steps that begin as bold as `warm`; the first aim is
+    /// the makespan, the second the total.
+    pub(super) fn run(&self, tours: &mut [Vec<Pass>], steps: usize, warm: f64, seed: u64) {
+        let n = self.lines.len();
+        if n < 2 || steps == 0 {
             return;
         }
-        let mut engine = Engine::new(self, &ids, tours, seed);
-        let best = engine.anneal(steps);
+        let mut engine = Engine::new(self, tours, seed);
+        let best = engine.anneal(steps, warm);
         for (t, tour) in tours.iter_mut().enumerate() {
             *tour = best
-                .line_of(t, ids.len())
-                .map(|i| Pass {
-                    line: ids[i],
-                    backward: best.backward[i],
+                .line_of(t, n)
+                .map(|line| Pass {
+                    line,
+                    backward: best.backward[line],
                 })
                 .collect();
         }
@@ -119,9 +137,8 @@ impl Rings {
 }
 
 impl<'a, M: Metric> Engine<'a, M> {
-    fn new(search: &'a Search<'a, M>, ids: &[usize], tours: &[Vec<Pass>], seed: u64) -> Self {
-        let n = ids.len();
-        let lines: Vec<Line> = ids.iter().map(|&i| search.lines[i]).collect();
+    fn new(search: &'a Search<'a, M>, tours: &[Vec<Pass>], seed: u64) -> Self {
+        let n = search.lines.len();
         let nodes = n + tours.len();
         let mut now = Rings {
             next: vec![NONE; nodes],
@@ -132,7 +149,6 @@ impl<'a, M: Metric> Engine<'a, M> {
             backward: vec![false; nodes],
             length: vec![0.0; tours.len()],
         };
-        let mut i = 0;
         for (t, tour) in tours.iter().enumerate() {
             let depot = n + t;
             now.tour[depot] = t as u32;
@@ -140,6 +156,7 @@ impl<'a, M: Metric> Engine<'a, M> {
             now.leave[depot] = search.team[t].depot;
             let mut last = depot;
             for pass in tour {
+                let i = pass.line;
                 now.next[last] = i as u32;
                 now.prev[i] = last as u32;
                 now.tour[i] = t as u32;
@@ -147,18 +164,14 @@ impl<'a, M: Metric> Engine<'a, M> {
                 now.enter[i] = pass.start(search.lines);
                 now.leave[i] = pass.end(search.lines);
                 last = i;
-                i += 1;
             }
             now.next[last] = depot as u32;
             now.prev[depot] = last as u32;
             now.length[t] =
                 super::network::tour_cost(tour, search.lines, search.team[t].depot, search.metric);
         }
-        let near = neighbours(&lines, search.metric);
         Self {
             search,
-            lines,
-            near,
             now,
             target: 0.0,
             dice: Dice::new(seed),
@@ -173,7 +186,7 @@ impl<'a, M: Metric> Engine<'a, M> {
     }
 
     fn service(&self, line: u32) -> f64 {
-        self.lines[line as usize].cost[usize::from(self.now.backward[line as usize])]
+        self.search.lines[line as usize].cost[usize::from(self.now.backward[line as usize])]
     }
 
     /// What a tour of this length adds to the objective.
@@ -223,7 +236,7 @@ impl<'a, M: Metric> Engine<'a, M> {
 
     fn link(&mut self, line: u32, after: u32, backward: bool) {
         let i = line as usize;
-        let l = self.lines[i];
+        let l = self.search.lines[i];
         self.now.backward[i] = backward;
         (self.now.enter[i], self.now.leave[i]) = if backward { (l.b, l.a) } else { (l.a, l.b) };
         let next = self.now.next[after as usize];
@@ -269,12 +282,12 @@ impl<'a, M: Metric> Engine<'a, M> {
     /// Takes out runs of lines around one line, one run from each tour at most.
     fn ruin(&mut self) {
         self.out.clear();
-        let n = self.lines.len();
+        let n = self.search.lines.len();
         let seed = self.seed_line() as u32;
         let wanted = 1 + self.dice.below(2 * REMOVED);
         let mut hit: Vec<u32> = Vec::new();
         let mut around = vec![seed];
-        around.extend(&self.near[seed as usize]);
+        around.extend(&self.search.near[seed as usize]);
         for line in around {
             if self.out.len() >= wanted.min(n) {
                 break;
@@ -307,7 +320,7 @@ impl<'a, M: Metric> Engine<'a, M> {
 
     /// A line to start from: of the longest tour in every other step.
     fn seed_line(&mut self) -> usize {
-        let n = self.lines.len();
+        let n = self.search.lines.len();
         let any = self.dice.below(n);
         if self.dice.below(2) == 0 {
             return any;
@@ -330,7 +343,7 @@ impl<'a, M: Metric> Engine<'a, M> {
         match self.dice.below(3) {
             0 => self.dice.shuffle(&mut self.out),
             1 => {
-                let lines = &self.lines;
+                let lines = self.search.lines;
                 self.out.sort_unstable_by(|&a, &b| {
                     let cost = |l: u32| lines[l as usize].cost[0];
                     cost(b).total_cmp(&cost(a)).then(a.cmp(&b))
@@ -351,7 +364,7 @@ impl<'a, M: Metric> Engine<'a, M> {
 
     /// Where `line` costs least: beside a neighbour, or at an end of a tour.
     fn best_place(&mut self, line: u32) -> (u32, bool) {
-        let n = self.lines.len() as u32;
+        let n = self.search.lines.len() as u32;
         let mut best = (f64::INFINITY, n, false);
         for t in 0..self.now.length.len() as u32 {
             self.try_place(line, n + t, &mut best);
@@ -360,8 +373,8 @@ impl<'a, M: Metric> Engine<'a, M> {
                 self.try_place(line, last, &mut best);
             }
         }
-        for i in 0..self.near[line as usize].len() {
-            let other = self.near[line as usize][i];
+        for i in 0..self.search.near[line as usize].len() {
+            let other = self.search.near[line as usize][i];
             if self.now.tour[other as usize] == NONE || self.dice.below(64) == 0 {
                 continue;
             }
@@ -378,7 +391,7 @@ impl<'a, M: Metric> Engine<'a, M> {
         let next = now.next[after as usize];
         let (from, to) = (now.leave[after as usize], now.enter[next as usize]);
         let metric = self.search.metric;
-        let l = self.lines[line as usize];
+        let l = self.search.lines[line as usize];
         let ahead = metric.cost(from, l.a) + l.cost[0] + metric.cost(l.b, to);
         let back = metric.cost(from, l.b) + l.cost[1] + metric.cost(l.a, to);
         let backward = back < ahead;
@@ -391,14 +404,13 @@ impl<'a, M: Metric> Engine<'a, M> {
     }
 
     /// Simulated annealing; the best tours found.
-    fn anneal(&mut self, steps: usize) -> Rings {
+    fn anneal(&mut self, steps: usize, warm: f64) -> Rings {
         let mut best = self.now.clone();
         let mut best_key = (self.makespan(), self.now.length.iter().sum::<f64>());
         self.aim(best_key.0);
-        let total: f64 = self.lines.iter().map(|l| l.cost[0]).sum();
-        let (warm, cold) = (WARM, COLD);
-        let scale = (best_key.1 - total).max(0.01 * total) / self.lines.len() as f64;
-        let cooling = math::exp(math::ln(cold / warm) / steps as f64);
+        let total: f64 = self.search.lines.iter().map(|l| l.cost[0]).sum();
+        let scale = (best_key.1 - total).max(0.01 * total) / self.search.lines.len() as f64;
+        let cooling = math::exp(math::ln(COLD / warm) / steps as f64);
         let mut heat = warm * scale;
         let mut score = self.objective();
         let mut length = self.now.length.clone();

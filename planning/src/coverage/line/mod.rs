@@ -12,6 +12,7 @@
 //! | `postman` | one tour along all lines |
 //! | `split` | one tour cut into several |
 //! | `improve` | local search on the longest tour |
+//! | [`strip`] | strips wider than a swath, as lanes |
 //! | `trim` | what is left out when endurance is short |
 //! | `bound` | what no plan can beat |
 //!
@@ -40,8 +41,11 @@ mod matching;
 mod network;
 mod postman;
 mod split;
+pub mod strip;
 mod trim;
 
+pub(super) use bound::shared as shared_time;
+pub(super) use network::Parts;
 pub use network::{Line, LineError, LinePlan, LineTour, Pass, Surveyor, tour_cost};
 
 use crate::coverage::metric::Metric;
@@ -52,6 +56,9 @@ pub const DEFAULT_STEPS: usize = 20_000;
 
 /// Steps for a single tour, whose start is at most a few percent from the optimum.
 const STEPS_ALONE: usize = 1_000;
+
+/// Plans that the improvement begins with; the best goes on.
+const STARTS: usize = 4;
 
 /// Lines above which a single tour is left as it is: looking up the neighbours of all
 /// would take longer than the tour, for the last tenth of a percent.
@@ -85,36 +92,26 @@ pub fn plan(
     network::check(lines, team)?;
     let all: Vec<usize> = (0..lines.len()).collect();
     let lower_bound = bound::makespan(lines, team, metric);
-    let giant = postman::tour(lines, &all, team[0].depot, metric);
-    let mut tours = if team.len() == 1 {
-        vec![giant]
-    } else {
-        split::split(&giant, lines, team, metric)
-    };
-    let search = improve::Search {
-        lines,
-        team,
-        metric,
-        lower_bound,
-    };
-    let times = |tours: &[Vec<Pass>]| {
-        let time = |(tour, uav): (&Vec<Pass>, &Surveyor)| {
-            tour_cost(tour, lines, uav.depot, metric) / uav.speed
-        };
-        tours.iter().zip(team).map(time).fold(0.0, f64::max)
-    };
-    // A tour that meets the bound is optimal.
-    if times(&tours) > lower_bound * (1.0 + 1e-9) {
-        let steps = match team.len() {
-            1 if lines.len() > MOST_ALONE => 0,
-            1 => steps.min(STEPS_ALONE),
-            _ => steps,
-        };
-        search.run(&mut tours, steps, 1);
-        postmen_again(&mut tours, lines, team, metric);
-    }
+    // One UAV flies the tour as it is; several begin from different walks of it.
+    let starts = if team.len() == 1 { 1 } else { STARTS };
+    let giants = postman::tours(lines, &all, team[0].depot, metric, starts);
+    improved(lines, team, metric, steps, lower_bound, giants)
+}
+
+/// Shares each of the tours `giants` out among the team, improves the shares and goes on
+/// with the best: what is the same for lines and for points.
+pub(super) fn improved(
+    lines: &[Line],
+    team: &[Surveyor],
+    metric: &impl Metric,
+    steps: usize,
+    lower_bound: f64,
+    giants: Vec<Vec<Pass>>,
+) -> Result<LinePlan, LineError> {
+    network::check(lines, team)?;
+    let mut tours = shared_out(lines, team, metric, steps, lower_bound, giants);
     let unserved = trim::trim(&mut tours, lines, team, metric);
-    let makespan = times(&tours);
+    let times = times(&tours, lines, team, metric);
     let tours = tours
         .into_iter()
         .zip(team)
@@ -125,10 +122,71 @@ pub fn plan(
         .collect();
     Ok(LinePlan {
         tours,
-        makespan,
+        makespan: times.0,
         lower_bound,
         unserved,
     })
+}
+
+fn shared_out(
+    lines: &[Line],
+    team: &[Surveyor],
+    metric: &impl Metric,
+    steps: usize,
+    lower_bound: f64,
+    giants: Vec<Vec<Pass>>,
+) -> Vec<Vec<Pass>> {
+    let share = |giant: Vec<Pass>| match team.len() {
+        1 => vec![giant],
+        _ => split::split(&giant, lines, team, metric),
+    };
+    let mut plans: Vec<Vec<Vec<Pass>>> = giants.into_iter().map(share).collect();
+    let key = |tours: &Vec<Vec<Pass>>| times(tours, lines, team, metric);
+    let order = |a: &Vec<Vec<Pass>>, b: &Vec<Vec<Pass>>| {
+        let (a, b) = (key(a), key(b));
+        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+    };
+    plans.sort_by(order);
+    let Some(mut best) = plans.first().cloned() else {
+        return vec![Vec::new(); team.len()];
+    };
+    let alone = team.len() == 1;
+    // A tour that meets the bound is optimal; so is one of a single UAV nearly, and
+    // large ones are not worth the search.
+    if key(&best).0 <= lower_bound * (1.0 + 1e-9) || (alone && lines.len() > MOST_ALONE) {
+        return best;
+    }
+    let search = improve::Search::new(lines, team, metric, lower_bound);
+    if alone {
+        search.run(&mut best, steps.min(STEPS_ALONE), improve::LUKEWARM, 0);
+        return best;
+    }
+    for seed in 0..STARTS {
+        let start = seed % plans.len();
+        let mut plan = plans[start].clone();
+        search.run(&mut plan, steps / (2 * STARTS), improve::WARM, seed as u64);
+        if order(&plan, &best).is_lt() {
+            best = plan;
+        }
+    }
+    search.run(&mut best, steps / 2, improve::LUKEWARM, STARTS as u64);
+    postmen_again(&mut best, lines, team, metric);
+    best
+}
+
+/// The longest time and the sum of all times.
+fn times(
+    tours: &[Vec<Pass>],
+    lines: &[Line],
+    team: &[Surveyor],
+    metric: &impl Metric,
+) -> (f64, f64) {
+    let mut both = (0.0f64, 0.0);
+    for (tour, uav) in tours.iter().zip(team) {
+        let time = tour_cost(tour, lines, uav.depot, metric) / uav.speed;
+        both = (both.0.max(time), both.1 + time);
+    }
+    both
 }
 
 /// Replaces a tour by the postman's own for the same lines where that is shorter.

@@ -194,18 +194,18 @@ pub(super) fn check(lines: &[Line], team: &[Surveyor]) -> Result<(), LineError> 
 }
 
 /// Places that are joined, as a forest of references to the root.
-pub(super) struct Parts {
+pub(in crate::coverage) struct Parts {
     up: Vec<usize>,
 }
 
 impl Parts {
-    pub(super) fn new(n: usize) -> Self {
+    pub(in crate::coverage) fn new(n: usize) -> Self {
         Self {
             up: (0..n).collect(),
         }
     }
 
-    pub(super) fn find(&mut self, mut x: usize) -> usize {
+    pub(in crate::coverage) fn find(&mut self, mut x: usize) -> usize {
         while self.up[x] != x {
             self.up[x] = self.up[self.up[x]];
             x = self.up[x];
@@ -214,7 +214,7 @@ impl Parts {
     }
 
     /// Joins two parts; `false` when they were one already.
-    pub(super) fn join(&mut self, a: usize, b: usize) -> bool {
+    pub(in crate::coverage) fn join(&mut self, a: usize, b: usize) -> bool {
         let (a, b) = (self.find(a), self.find(b));
         self.up[a.max(b)] = a.min(b);
         a != b

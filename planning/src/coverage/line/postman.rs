@@ -5,6 +5,7 @@
 
 use super::matching::pair_up;
 use super::network::{Line, Parts, Pass};
+use crate::coverage::dice::Dice;
 use crate::coverage::metric::Metric;
 
 /// The postman's graph: lines and deadheads over places renumbered from 0.
@@ -31,10 +32,25 @@ pub(super) fn tour(
     depot: usize,
     metric: &impl Metric,
 ) -> Vec<Pass> {
+    let mut all = tours(lines, chosen, depot, metric, 1);
+    all.pop().unwrap_or_default()
+}
+
+/// The same tour as [`tour`] in `count` different walks: which lines come one after the
+/// other matters when a tour is cut.
+pub(super) fn tours(
+    lines: &[Line],
+    chosen: &[usize],
+    depot: usize,
+    metric: &impl Metric,
+    count: usize,
+) -> Vec<Vec<Pass>> {
     let graph = Graph::new(lines, chosen, depot, metric);
     let mut deadheads = graph.pairs();
     graph.join_parts(&mut deadheads);
-    graph.walk(&deadheads)
+    (0..count)
+        .map(|seed| graph.walk(&deadheads, seed as u64))
+        .collect()
 }
 
 /// No closed tour along the `chosen` lines is cheaper than this.
@@ -170,7 +186,9 @@ impl<'a, M: Metric> Graph<'a, M> {
     }
 
     /// A closed walk from the depot over every line and deadhead once (Hierholzer).
-    fn walk(&self, deadheads: &[(usize, usize)]) -> Vec<Pass> {
+    ///
+    /// Where several lead on, the `seed` decides which comes first.
+    fn walk(&self, deadheads: &[(usize, usize)], seed: u64) -> Vec<Pass> {
         let n = self.places.len();
         let edges: Vec<(usize, usize)> = self.ends.iter().chain(deadheads).copied().collect();
         let mut first = vec![0usize; n + 1];
@@ -183,7 +201,12 @@ impl<'a, M: Metric> Graph<'a, M> {
         }
         let mut fill = first.clone();
         let mut at = vec![0usize; edges.len() * 2];
-        for (e, &(a, b)) in edges.iter().enumerate() {
+        let mut order: Vec<usize> = (0..edges.len()).collect();
+        if seed > 0 {
+            Dice::new(seed).shuffle(&mut order);
+        }
+        for e in order {
+            let (a, b) = edges[e];
             for p in [a, b] {
                 at[fill[p]] = e;
                 fill[p] += 1;

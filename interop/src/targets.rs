@@ -1,0 +1,277 @@
+//! What is to be looked at, as points and lines: GeoJSON points and lines, QGroundControl
+//! waypoints and corridor scans. Leaves areas to [`crate::geojson`] and [`crate::plan`].
+
+use crate::cursor::{Cursor, parse};
+use crate::place::LatLon;
+use crate::{FormatError, Notice, plan};
+
+/// A point to look at.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointTarget {
+    /// JSON pointer of the item.
+    pub pointer: String,
+    /// Where.
+    pub at: LatLon,
+    /// Radius around it that must be seen, metres; 0 for the point alone.
+    pub radius_m: f64,
+}
+
+/// A line to look along.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LineTarget {
+    /// JSON pointer of the item.
+    pub pointer: String,
+    /// At least two points.
+    pub way: Vec<LatLon>,
+    /// Width of the strip around it that must be seen, metres; 0 for the line alone.
+    pub width_m: f64,
+}
+
+/// What a file holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Targets {
+    /// In the order of the file.
+    pub points: Vec<PointTarget>,
+    /// In the order of the file.
+    pub lines: Vec<LineTarget>,
+    /// Where the vehicles start, if the file says so.
+    pub home: Option<LatLon>,
+    /// What was left out.
+    pub notices: Vec<Notice>,
+}
+
+/// The largest radius and width that are believed, metres.
+const WIDEST_M: f64 = 40_000.0;
+
+/// Reads the points and lines of a QGroundControl plan or of GeoJSON.
+///
+/// In a plan, waypoints are points and corridor scans are lines of their width. In
+/// GeoJSON the properties `radius_m` of a point and `width_m` of a line are read.
+///
+/// # Errors
+/// [`FormatError`] names the value that is wrong.
+pub fn read(text: &str) -> Result<Targets, FormatError> {
+    let value = parse(text)?;
+    let root = Cursor::root(&value);
+    if root.get("fileType")?.is_some() {
+        return of_plan(text, &root);
+    }
+    let mut out = Targets::default();
+    let kind = root.need("type")?;
+    match kind.text()? {
+        "FeatureCollection" => {
+            for f in root.need("features")?.items()? {
+                feature(&f, &mut out)?;
+            }
+        }
+        "Feature" => feature(&root, &mut out)?,
+        _ => geometry(&root, "/", (0.0, 0.0), &mut out)?,
+    }
+    Ok(out)
+}
+
+fn of_plan(text: &str, root: &Cursor<'_>) -> Result<Targets, FormatError> {
+    let file = plan::read(text)?;
+    let mut out = Targets {
+        home: file.home,
+        ..Targets::default()
+    };
+    let waypoints = file.waypoints.iter().enumerate();
+    out.points = waypoints
+        .filter(|(_, w)| w.command == plan::NAV_WAYPOINT)
+        .map(|(i, w)| PointTarget {
+            pointer: format!("waypoint {}", i + 1),
+            at: w.at,
+            radius_m: 0.0,
+        })
+        .collect();
+    // The plan's reader knows no corridors and says that it ignored them.
+    let corridor = |n: &Notice| n.text.contains("CorridorScan");
+    out.notices = file.notices.into_iter().filter(|n| !corridor(n)).collect();
+    let Some(mission) = root.get("mission")? else {
+        return Ok(out);
+    };
+    let Some(items) = mission.get("items")? else {
+        return Ok(out);
+    };
+    for item in items.items()? {
+        let Some(kind) = item.get("complexItemType")? else {
+            continue;
+        };
+        if kind.text()? != "CorridorScan" {
+            continue;
+        }
+        let width = item.need("CorridorWidth")?;
+        let line = item.need("polyline")?;
+        let mut way = Vec::new();
+        for p in line.items()? {
+            let pair = p.items()?;
+            if pair.len() < 2 {
+                return Err(p.wrong("a position is [latitude, longitude]"));
+            }
+            way.push(LatLon {
+                lat_deg: pair[0].within(-90.0, 90.0, "a latitude in degrees")?,
+                lon_deg: pair[1].within(-180.0, 180.0, "a longitude in degrees")?,
+            });
+        }
+        push_line(
+            &line,
+            &item.pointer(),
+            way,
+            width.within(0.0, WIDEST_M, "a width in metres")?,
+            &mut out,
+        )?;
+    }
+    Ok(out)
+}
+
+fn push_line(
+    at: &Cursor<'_>,
+    pointer: &str,
+    way: Vec<LatLon>,
+    width_m: f64,
+    out: &mut Targets,
+) -> Result<(), FormatError> {
+    if way.len() < 2 {
+        return Err(at.wrong(format!("a line has at least 2 points, found {}", way.len())));
+    }
+    out.lines.push(LineTarget {
+        pointer: pointer.to_owned(),
+        way,
+        width_m,
+    });
+    Ok(())
+}
+
+fn position(at: &Cursor<'_>) -> Result<LatLon, FormatError> {
+    let items = at.items()?;
+    if items.len() < 2 {
+        return Err(at.wrong("a position is [longitude, latitude]"));
+    }
+    Ok(LatLon {
+        lon_deg: items[0].within(-180.0, 180.0, "a longitude in degrees")?,
+        lat_deg: items[1].within(-90.0, 90.0, "a latitude in degrees")?,
+    })
+}
+
+fn feature(at: &Cursor<'_>, out: &mut Targets) -> Result<(), FormatError> {
+    let kind = at.need("type")?;
+    if kind.text()? != "Feature" {
+        return Err(kind.wrong("expected \"Feature\""));
+    }
+    let size = |key: &str| match at.get("properties")? {
+        Some(p) => match p.get(key)? {
+            Some(n) => n.within(0.0, WIDEST_M, "a size in metres"),
+            None => Ok(0.0),
+        },
+        None => Ok(0.0),
+    };
+    let sizes = (size("radius_m")?, size("width_m")?);
+    match at.get("geometry")? {
+        Some(g) => geometry(&g, &at.pointer(), sizes, out),
+        None => {
+            out.notices.push(Notice {
+                pointer: at.pointer(),
+                text: "no geometry: ignored".to_owned(),
+            });
+            Ok(())
+        }
+    }
+}
+
+fn geometry(
+    at: &Cursor<'_>,
+    pointer: &str,
+    (radius_m, width_m): (f64, f64),
+    out: &mut Targets,
+) -> Result<(), FormatError> {
+    let kind = at.need("type")?;
+    let point = |p: &Cursor<'_>, out: &mut Targets| -> Result<(), FormatError> {
+        out.points.push(PointTarget {
+            pointer: pointer.to_owned(),
+            at: position(p)?,
+            radius_m,
+        });
+        Ok(())
+    };
+    let line = |l: &Cursor<'_>, out: &mut Targets| -> Result<(), FormatError> {
+        let way = l.items()?.iter().map(position).collect::<Result<_, _>>()?;
+        push_line(l, pointer, way, width_m, out)
+    };
+    match kind.text()? {
+        "Point" => point(&at.need("coordinates")?, out)?,
+        "MultiPoint" => {
+            for p in at.need("coordinates")?.items()? {
+                point(&p, out)?;
+            }
+        }
+        "LineString" => line(&at.need("coordinates")?, out)?,
+        "MultiLineString" => {
+            for l in at.need("coordinates")?.items()? {
+                line(&l, out)?;
+            }
+        }
+        "GeometryCollection" => {
+            for part in at.need("geometries")?.items()? {
+                geometry(&part, pointer, (radius_m, width_m), out)?;
+            }
+        }
+        other @ ("Polygon" | "MultiPolygon") => out.notices.push(Notice {
+            pointer: pointer.to_owned(),
+            text: format!("a {other} is neither point nor line: ignored"),
+        }),
+        other => return Err(kind.wrong(format!("\"{other}\" is no GeoJSON geometry"))),
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GEOJSON: &str = r#"{"type":"FeatureCollection","features":[
+        {"type":"Feature","properties":{"radius_m":25},"geometry":{"type":"Point","coordinates":[24.9,60.1]}},
+        {"type":"Feature","properties":{"width_m":60},"geometry":{"type":"LineString","coordinates":[[24.9,60.1],[24.91,60.1]]}},
+        {"type":"Feature","geometry":{"type":"MultiLineString","coordinates":[[[24.9,60.1],[24.91,60.1]],[[24.9,60.2],[24.91,60.2]]]}},
+        {"type":"Feature","geometry":{"type":"Polygon","coordinates":[[[24.9,60.1],[24.91,60.1],[24.91,60.11],[24.9,60.1]]]}}]}"#;
+
+    #[test]
+    fn geojson_points_and_lines_with_their_sizes() {
+        let t = read(GEOJSON).unwrap();
+        assert_eq!((t.points.len(), t.lines.len(), t.notices.len()), (1, 3, 1));
+        assert!((t.points[0].radius_m - 25.0).abs() < 1e-9);
+        assert!((t.lines[0].width_m - 60.0).abs() < 1e-9 && t.lines[1].width_m.abs() < 1e-9);
+        assert_eq!(t.lines[2].pointer, "/features/2");
+        for end in 0..GEOJSON.len() {
+            assert!(read(&GEOJSON[..end]).is_err());
+        }
+        let says = |from: &str, to: &str| {
+            let error = read(&GEOJSON.replacen(from, to, 1)).unwrap_err();
+            error.to_string()
+        };
+        assert!(says("25}", "-1}").contains("at /features/0/properties/radius_m"));
+        assert!(says(",[24.91,60.1]]}", "]}").contains("at least 2 points"));
+    }
+
+    #[test]
+    fn corridors_and_waypoints_of_a_plan() {
+        let text = r#"{"fileType":"Plan","mission":{"plannedHomePosition":[47,8,400],"items":[
+            {"type":"SimpleItem","command":22,"params":[0,0,0,null,47,8,30]},
+            {"type":"SimpleItem","command":16,"params":[0,0,0,null,47.1,8.1,30]},
+            {"type":"ComplexItem","complexItemType":"CorridorScan","CorridorWidth":80,
+             "polyline":[[47,8],[47.01,8.02],[47.02,8.02]]},
+            {"type":"ComplexItem","complexItemType":"StructureScan"}]}}"#;
+        let t = read(text).unwrap();
+        assert_eq!((t.points.len(), t.lines.len(), t.notices.len()), (1, 1, 1));
+        assert!((t.lines[0].width_m - 80.0).abs() < 1e-9);
+        assert_eq!(t.lines[0].way.len(), 3);
+        assert!(t.home.is_some());
+        let wrong = text.replace("80", "\"x\"");
+        assert!(
+            read(&wrong)
+                .unwrap_err()
+                .to_string()
+                .contains("/mission/items/2/CorridorWidth")
+        );
+    }
+}

@@ -1,0 +1,97 @@
+//! `plan visit`: tours of a team over all points of a file (D2.7 §3.4).
+
+use super::tours::{TourArgs, Ways};
+use anyhow::{Context, Result};
+use clap::Args;
+use skein_interop::targets::read;
+use skein_planning::coverage::pinpoint::multi::{look_at, visit};
+use skein_planning::math::atan2;
+use std::path::PathBuf;
+
+/// Tours of a team over all points of a file, the longest as short as can be found.
+///
+/// Points of GeoJSON (property `radius_m` asks for one to be seen with its surroundings:
+/// in one pass, or in a small sweep) or waypoints of a QGroundControl `.plan`.
+#[derive(Debug, Args)]
+pub struct VisitArgs {
+    /// A QGroundControl `.plan` or GeoJSON.
+    pub file: PathBuf,
+    /// Team, wind and form of the result.
+    #[command(flatten)]
+    pub tours: TourArgs,
+}
+
+/// Plans, and returns the text to print.
+///
+/// # Errors
+/// When the file or a flag is wrong; the error names the place.
+pub fn run(args: &VisitArgs) -> Result<String> {
+    let text = std::fs::read_to_string(&args.file)
+        .with_context(|| format!("cannot read {}", args.file.display()))?;
+    let targets = read(&text).with_context(|| args.file.display().to_string())?;
+    let mut notices: Vec<String> = targets.notices.iter().map(ToString::to_string).collect();
+    if !targets.lines.is_empty() {
+        let n = targets.lines.len();
+        notices.push(format!("{n} line(s) ignored: `plan line` plans for lines"));
+    }
+    let first = targets.points.first().map(|p| p.at);
+    let mut ways = Ways::new(&args.tours, targets.home.or(first), notices)?;
+    for point in &targets.points {
+        let centre = ways.point(point.at, &point.pointer)?;
+        // Lanes along the way out from the depot: the sweep starts without a turn.
+        let heading_rad = atan2(centre.y, centre.x);
+        let way = look_at(centre, point.radius_m, args.tours.swath_m, heading_rad).with_context(
+            || {
+                format!(
+                    "{}: no sweep of radius {} m with --swath-m {}",
+                    point.pointer, point.radius_m, args.tours.swath_m
+                )
+            },
+        )?;
+        ways.push(&way, &point.pointer);
+    }
+    ways.plan(&args.tours, |lines, team, metric| {
+        Ok(visit(lines, team, metric, args.tours.steps)?)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Cli {
+        #[command(flatten)]
+        args: VisitArgs,
+    }
+
+    #[test]
+    fn points_are_shared_out_and_wide_ones_swept() {
+        let dir = std::env::temp_dir().join(format!("skein-plan-visit-{}", std::process::id()));
+        std::fs::create_dir_all(&dir).unwrap();
+        let file = dir.join("points.geojson");
+        let text = r#"{"type":"FeatureCollection","features":[
+            {"type":"Feature","geometry":{"type":"MultiPoint","coordinates":[[8.54,47.40],[8.56,47.40],[8.54,47.42]]}},
+            {"type":"Feature","properties":{"radius_m":100},"geometry":{"type":"Point","coordinates":[8.57,47.41]}}]}"#;
+        std::fs::write(&file, text).unwrap();
+        let path = file.display().to_string();
+        let told = |more: &[&str]| -> Result<serde_json::Value> {
+            let all = ["visit", &path].into_iter().chain(more.iter().copied());
+            Ok(serde_json::from_str(
+                &run(&Cli::try_parse_from(all)?.args)?,
+            )?)
+        };
+        let one = told(&[]).unwrap();
+        assert_eq!(one["targets"], 4);
+        // The depot and four lanes for the disc of 200 m, two other points.
+        assert_eq!(one["tours"][0]["points"].as_array().unwrap().len(), 12);
+        let two = told(&["--k", "2", "--depot", "47.405,8.55"]).unwrap();
+        assert!(two["makespan_s"].as_f64() < one["makespan_s"].as_f64());
+        assert!(two["unserved"].as_array().unwrap().is_empty());
+        let short = told(&["--endurance-s", "100"]).unwrap();
+        assert!(!short["unserved"].as_array().unwrap().is_empty());
+        assert!(told(&["--swath-m", "0"]).is_err());
+        std::fs::remove_dir_all(&dir).unwrap();
+    }
+}
