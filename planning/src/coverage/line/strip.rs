@@ -40,7 +40,7 @@ pub fn lanes(centre: &[Point], width_m: f64, swath_m: f64) -> Option<Vec<Vec<Poi
         if count < 1.5 {
             way.clone()
         } else {
-            lane(&way, offset, width_m / 2.0)
+            lane(&way, offset, spacing, width_m / 2.0)
         }
     });
     Some(lanes.collect())
@@ -48,10 +48,11 @@ pub fn lanes(centre: &[Point], width_m: f64, swath_m: f64) -> Option<Vec<Vec<Poi
 
 /// The polyline `way` moved to its left by `offset`.
 ///
-/// On the outside of a bend both pieces run on to where they meet, but no farther than
-/// `half_m`: nothing of the strip lies beyond. On the inside they are cut where they
-/// meet, if both are long enough; otherwise they stay whole and overlap.
-fn lane(way: &[Point], offset: f64, half_m: f64) -> Vec<Point> {
+/// Around a bend the two pieces of a lane part where the outer edges of their swaths,
+/// half a `spacing` farther out than the lane, meet: outside they run on, but no farther
+/// than `half_m`, as nothing of the strip lies beyond; inside they are cut, if both are
+/// long enough, and otherwise stay whole and overlap.
+fn lane(way: &[Point], offset: f64, spacing: f64, half_m: f64) -> Vec<Point> {
     let pieces: Vec<(Point, Vector, f64)> = way
         .windows(2)
         .map(|w| {
@@ -67,12 +68,12 @@ fn lane(way: &[Point], offset: f64, half_m: f64) -> Vec<Point> {
         let ((from, u, length), (next, v, next_length)) = (pair[0], pair[1]);
         let end = from + u * length;
         let bend = atan2(u.x * v.y - u.y * v.x, u.dot(&v));
-        // Positive outside the bend, negative inside.
-        let beyond = -offset * tan(bend / 2.0);
-        let run = if beyond >= 0.0 || !beyond.is_finite() {
-            beyond.min(half_m)
-        } else if -beyond <= 0.5 * length.min(next_length) {
-            beyond
+        let outward = if bend >= 0.0 { -offset } else { offset };
+        let run = (outward + spacing / 2.0) * tan(bend.abs() / 2.0);
+        let run = if run >= 0.0 {
+            run.min(half_m)
+        } else if -run <= 0.5 * length.min(next_length) {
+            run
         } else {
             0.0
         };
