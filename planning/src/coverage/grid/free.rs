@@ -15,7 +15,7 @@ const OFFSETS: usize = 17;
 const MOST_TABLE: usize = 1 << 26;
 
 /// Divides one loop into arcs so that the longest of way and arc is shortest, among
-/// [`OFFSETS`] places to begin.
+/// seventeen places to begin.
 ///
 /// # Guarantees
 /// Covers every cell.

@@ -71,7 +71,7 @@ pub(super) struct Partition<'a> {
 /// Each free cell belongs to one region; a region is connected.
 ///
 /// # Complexity
-/// O(N log N) to grow, O(N) for each of at most [`SWEEPS`] sweeps.
+/// O(N log N) to grow, O(N) for each of at most 400 sweeps.
 #[must_use]
 pub fn regions(task: &Task, offset: (u32, u32)) -> Regions {
     let mut p = Partition::new(task, offset);
