@@ -84,8 +84,11 @@ pub fn near_sin_cos(a_rad: f64) -> (f64, f64) {
     let s = x + x * z * odd;
     let c = 1.0 - (0.5 * z - z2 * even);
     // Quarter turns 1 and 3 swap the two, 2 and 3 turn the sine's sign, 1 and 2 the cosine's.
-    let swap = quarter & 1 == 1;
-    let (s, c) = (if swap { c } else { s }, if swap { s } else { c });
+    // In masks, because comparing whole numbers keeps some machines from lanes.
+    let swap = 0u64.wrapping_sub(quarter & 1);
+    let exchanged = (s.to_bits() ^ c.to_bits()) & swap;
+    let s = f64::from_bits(s.to_bits() ^ exchanged);
+    let c = f64::from_bits(c.to_bits() ^ exchanged);
     let sign = |v: f64, flip: u64| f64::from_bits(v.to_bits() ^ (flip << 63));
     (
         sign(s, (quarter >> 1) & 1),

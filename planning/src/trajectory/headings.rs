@@ -14,24 +14,29 @@
 mod chain;
 mod interval;
 mod leg;
+mod polish;
 
-use super::dubins;
-use crate::frame::{Point, Pose, Vector};
+use crate::frame::{Point, Vector};
 use crate::math::{TAU, wrap_tau};
-use chain::{Ends, Layers};
+use chain::{Ends, Known, Layers, middles};
 use leg::Arc;
+use polish::Polish;
 
 /// Intervals of the whole circle in the first round: the bound of a leg is of
 /// second order below a fifth of a radian half width.
 const FIRST_INTERVALS: u32 = 16;
 
-/// Rounds at most: after 20 halvings an interval is a millionth of a radian, the
-/// bounds agree to 1e-12 of the radius, and only equal answers are left to tell apart.
-const MAX_ROUNDS: usize = 20;
+/// Rounds at most: not every round halves every interval, and after 20 halvings
+/// one is a millionth of a radian, so that only equal answers are left to tell apart.
+const MAX_ROUNDS: usize = 40;
 
 /// Pairs of intervals in one round at most, 10 s of work; with more the gap
 /// reached so far is the answer.
 const MAX_PAIRS: usize = 40_000_000;
+
+/// A waypoint's intervals are fine enough when they loosen the bound by this share
+/// of what the gap allows on the average: the rest is left to the others.
+const FINE_SHARE: f64 = 0.3;
 
 /// Relative rounding of a sum of legs: the lower bound stays below it.
 const ROUNDING: f64 = 1e-12;
@@ -135,18 +140,31 @@ pub fn choose(request: &Request) -> Result<Headings, HeadingsError> {
         .collect();
     let mut layers = first_layers(request);
     let mut best = (f64::INFINITY, Vec::new());
-    // The least bound among the intervals put aside, and what is known so far.
+    // What bounds the choices put aside, and what is known so far.
     let (mut aside, mut lower) = (f64::INFINITY, 0.0f64);
     let mut rounds = Vec::new();
     let mut slopes = vec![0.0; layers[0].len()];
+    let fixed = given(request);
+    let polish = Polish {
+        legs: &legs,
+        fixed: &fixed,
+        closed,
+    };
+    let mut known = Known::default();
+    let mut step = TAU / f64::from(2 * FIRST_INTERVALS);
     for _ in 0..MAX_ROUNDS {
         let ends = if closed { Ends::Closed } else { Ends::Open };
-        let solved = Layers::solve(&legs, &layers, ends, &slopes);
-        let mut headings = solved.headings;
-        let length = polish(&legs, &mut headings, request.chain);
-        if length < best.0 {
-            best = (length, headings);
+        let solved = Layers::solve(&legs, &layers, ends, &slopes, &known);
+        for mut headings in solved.ways.iter().map(|way| middles(way, &layers)) {
+            if headings.is_empty() {
+                continue;
+            }
+            let length = polish.run(&mut headings, step);
+            if length < best.0 {
+                best = (length, headings);
+            }
         }
+        step *= 0.5;
         lower = lower
             .max(solved.least.min(aside) * (1.0 - ROUNDING))
             .min(best.0);
@@ -154,13 +172,18 @@ pub fn choose(request: &Request) -> Result<Headings, HeadingsError> {
             lower_m: lower * r,
             upper_m: best.0 * r,
         });
-        let wanted = best.0 * (1.0 - request.gap);
-        if lower >= wanted {
+        if lower >= best.0 * (1.0 - request.gap) {
             break;
         }
-        let kept = halved(&layers, &solved.through, &solved.slopes, wanted, &mut aside);
-        layers = kept.0;
-        slopes = kept.1;
+        let wanted = best.0 * (1.0 - 0.99 * request.gap);
+        aside = aside.min(wanted);
+        let fine = best.0 * request.gap * FINE_SHARE / count as f64;
+        let kept = halved(&layers, &solved, wanted, fine);
+        (layers, slopes) = kept;
+        known = Known {
+            pairs: solved.pairs,
+            wanted,
+        };
         if layers.iter().any(Vec::is_empty) {
             // Every choice passes an interval that was put aside.
             lower = lower.max(aside * (1.0 - ROUNDING)).min(best.0);
@@ -211,7 +234,7 @@ fn check(request: &Request) -> Result<(), HeadingsError> {
 fn first_layers(request: &Request) -> Vec<Vec<Arc>> {
     let half = TAU / 2.0 / f64::from(FIRST_INTERVALS);
     let circle: Vec<Arc> = (0..FIRST_INTERVALS)
-        .map(|i| Arc::new(half * f64::from(2 * i + 1), half))
+        .map(|i| Arc::new(half * f64::from(2 * i + 1), half, 0))
         .collect();
     let mut layers = vec![circle; request.waypoints.len()];
     if let Chain::Open {
@@ -222,49 +245,45 @@ fn first_layers(request: &Request) -> Vec<Vec<Arc>> {
         let last = layers.len() - 1;
         for (at, heading) in [(0, first_rad), (last, last_rad)] {
             if let Some(h) = heading {
-                layers[at] = vec![Arc::new(wrap_tau(h), 0.0)];
+                layers[at] = vec![Arc::new(wrap_tau(h), 0.0, 0)];
             }
         }
     }
     layers
 }
 
-/// Puts intervals aside whose bound is at least `wanted`, and halves the others;
-/// also the slopes of the first waypoint's halves.
+/// Leaves out intervals whose bound is at least `wanted`, and halves the others
+/// where the bound is looser than `fine`; also the slopes of the first waypoint's
+/// intervals.
 fn halved(
     layers: &[Vec<Arc>],
-    through: &[Vec<f64>],
-    slopes: &[f64],
+    solved: &Layers,
     wanted: f64,
-    aside: &mut f64,
+    fine: f64,
 ) -> (Vec<Vec<Arc>>, Vec<f64>) {
-    let mut kept_slopes = Vec::new();
-    let kept = layers
-        .iter()
-        .zip(through)
-        .enumerate()
-        .map(|(i, (layer, bounds))| {
-            let mut kept = Vec::with_capacity(2 * layer.len());
-            for (j, (arc, bound)) in layer.iter().zip(bounds).enumerate() {
-                if *bound >= wanted {
-                    *aside = aside.min(*bound);
-                    continue;
-                }
-                let half = arc.half_rad / 2.0;
-                if half > 0.0 {
-                    kept.push(Arc::new(arc.mid_rad - half, half));
-                    kept.push(Arc::new(arc.mid_rad + half, half));
-                } else {
-                    kept.push(*arc);
-                }
-                if i == 0 {
-                    kept_slopes.resize(kept.len(), slopes[j]);
-                }
+    let any_loose = solved.looseness.iter().any(|l| *l > fine);
+    let mut slopes = Vec::new();
+    let mut kept = Vec::with_capacity(layers.len());
+    for (i, (layer, bounds)) in layers.iter().zip(&solved.through).enumerate() {
+        let mut next = Vec::with_capacity(2 * layer.len());
+        for (j, (arc, bound)) in layer.iter().zip(bounds).enumerate() {
+            if *bound >= wanted {
+                continue;
             }
-            kept
-        })
-        .collect();
-    (kept, kept_slopes)
+            let half = arc.half_rad / 2.0;
+            if half > 0.0 && (solved.looseness[i] > fine || !any_loose) {
+                next.push(Arc::new(arc.mid_rad - half, half, j));
+                next.push(Arc::new(arc.mid_rad + half, half, j));
+            } else {
+                next.push(Arc { parent: j, ..*arc });
+            }
+            if i == 0 {
+                slopes.resize(next.len(), solved.slopes[j]);
+            }
+        }
+        kept.push(next);
+    }
+    (kept, slopes)
 }
 
 /// Pairs of neighbouring intervals.
@@ -279,61 +298,19 @@ fn pairs(layers: &[Vec<Arc>], closed: bool) -> usize {
     between + joint
 }
 
-/// Length of one leg between two headings, turn radii.
-fn leg_length(v: Vector, a_rad: f64, b_rad: f64) -> f64 {
-    let from = Pose::new(Point::new(0.0, 0.0), a_rad);
-    dubins::length_m(from, Pose::new(Point::new(v.x, v.y), b_rad), 1.0)
-}
-
-/// Moves one heading at a time while that shortens the two legs it joins; the
-/// length reached, turn radii.
-fn polish(legs: &[Vector], headings: &mut [f64], chain: Chain) -> f64 {
-    const FIRST_STEP_RAD: f64 = 0.1;
-    const LAST_STEP_RAD: f64 = 1e-4;
-    let count = headings.len();
-    let fixed = |i: usize| match chain {
-        Chain::Open {
-            first_rad,
-            last_rad,
-        } => (i == 0 && first_rad.is_some()) || (i + 1 == count && last_rad.is_some()),
-        Chain::Closed => false,
-    };
-    let around = |headings: &[f64], i: usize, h: f64| {
-        let mut sum = 0.0;
-        if i < legs.len() {
-            sum += leg_length(legs[i], h, headings[(i + 1) % count]);
-        }
-        let before = if i > 0 { i - 1 } else { count - 1 };
-        if before < legs.len() {
-            sum += leg_length(legs[before], headings[before], h);
-        }
-        sum
-    };
-    let mut step = FIRST_STEP_RAD;
-    while step > LAST_STEP_RAD {
-        let mut gained = 0.0;
-        for i in 0..count {
-            if fixed(i) {
-                continue;
-            }
-            let here = around(headings, i, headings[i]);
-            for h in [headings[i] + step, headings[i] - step] {
-                let there = around(headings, i, h);
-                if there < here {
-                    gained += here - there;
-                    headings[i] = h;
-                    break;
-                }
-            }
-        }
-        if gained < 0.1 * step * step {
-            step *= 0.5;
-        }
+/// Which headings are given.
+fn given(request: &Request) -> Vec<bool> {
+    let mut fixed = vec![false; request.waypoints.len()];
+    if let Chain::Open {
+        first_rad,
+        last_rad,
+    } = request.chain
+    {
+        let last = fixed.len() - 1;
+        fixed[0] = first_rad.is_some();
+        fixed[last] = last_rad.is_some();
     }
-    legs.iter()
-        .enumerate()
-        .map(|(i, v)| leg_length(*v, headings[i], headings[(i + 1) % count]))
-        .sum()
+    fixed
 }
 
 #[cfg(test)]

@@ -281,14 +281,20 @@ pub fn lengths_m(from: Pose, to: &[Pose], radius_m: f64, out_m: &mut [f64]) {
             north[i] = g.north_m;
             heading[i] = tame(g.heading_rad);
         }
-        let mut solved = [frame.goal(0.0, 0.0, 0.0); LANES];
         let mut best = [0.0; LANES];
         for i in 0..LANES {
-            solved[i] = frame.goal(east[i], north[i], heading[i]);
-            best[i] = solved[i].with_straight();
+            best[i] = frame.goal(east[i], north[i], heading[i]).with_straight();
         }
         for (i, o) in out.iter_mut().enumerate() {
-            *o = solved[i].finish(best[i]) * radius_m;
+            let (e, n) = (east[i] - from.east_m, north[i] - from.north_m);
+            // A little more than what counts as near: only those are seen again.
+            let length = if e * e + n * n <= 17.0 * radius_m * radius_m {
+                let goal = frame.goal(east[i], north[i], heading[i]);
+                goal.finish(best[i])
+            } else {
+                least(best[i], f64::INFINITY)
+            };
+            *o = length * radius_m;
         }
     }
 }

@@ -163,7 +163,7 @@ mod tests {
         ) {
             const STEPS: i32 = 30;
             let v = Vector::new(x, y) * [1.0, 0.4][near];
-            let found = shortest(v, &Arc::new(a, first), &Arc::new(b, last));
+            let found = shortest(v, &Arc::new(a, first, 0), &Arc::new(b, last, 0));
             let mut least = f64::INFINITY;
             for i in -STEPS..=STEPS {
                 for j in -STEPS..=STEPS {

@@ -11,8 +11,8 @@
 //! make it convex, so its tangent plane at the centre is a bound, and beyond a
 //! half circle it falls below that plane by no more than the sines allow. Turns
 //! are continued through zero: a word that would need a full circle there is only
-//! longer. Where p may vanish, and for words without a straight, the quantities'
-//! ranges give a bound of first order.
+//! longer. Where p may vanish, what the length is at least when circles touch or
+//! coincide has a tangent plane; so do words without a straight.
 
 use super::interval;
 use crate::frame::Vector;
@@ -29,23 +29,26 @@ pub(super) struct Arc {
     pub half_rad: f64,
     pub sin: f64,
     pub cos: f64,
+    /// Which interval of the round before it is a part of.
+    pub parent: usize,
 }
 
 impl Arc {
-    pub fn new(mid_rad: f64, half_rad: f64) -> Self {
+    pub fn new(mid_rad: f64, half_rad: f64, parent: usize) -> Self {
         let (sin, cos) = crate::math::kernels::sin_cos(mid_rad);
         Self {
             mid_rad,
             half_rad,
             sin,
             cos,
+            parent,
         }
     }
 }
 
 /// A bound linear in the slopes: a word is nowhere shorter than
 /// `low − |first + λ₁| h₁ − |last − λ₂| h₂` with the slopes paid.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Plane {
     low: f64,
     first: f64,
@@ -62,14 +65,16 @@ const NOWHERE: Plane = Plane {
 /// widths is doubtful: no word with a straight is steeper than 2.
 const DOUBTFUL: f64 = 2.0;
 
+/// Beyond this distance of the centres the middle turn of LRL is too steep for a
+/// tangent plane; where they part, at 4, it is infinitely so.
+const STEEP_APART: f64 = 3.95;
+
 /// One leg between two intervals, in turn radii.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leg {
-    planes: [Plane; 5],
+    planes: [Plane; 6],
     /// Length of the shortest curve between the middles.
     pub length: f64,
-    /// Its derivative in the last heading, 0 for words without a straight.
-    pub slope: f64,
 }
 
 /// Half widths of both ends, and the distance of the two waypoints.
@@ -112,31 +117,28 @@ impl Leg {
             cross(&goal, reach),
             flip(cross(&mirror, reach)),
         ];
-        let mut planes = [NOWHERE; 5];
+        let mut planes = [NOWHERE; 6];
         let mut length = f64::INFINITY;
-        let mut slope = 0.0;
         for (plane, word) in planes.iter_mut().zip(words) {
             *plane = word.0;
-            if word.1 < length {
-                length = word.1;
-                slope = word.0.last;
-            }
+            length = length.min(word.1);
         }
         // Beyond 4 radii the shortest has a straight.
         if reach.distance <= 4.0 {
-            let low = three(&goal, reach).min(three(&mirror, reach));
-            planes[4].low = low.max(reach.distance);
-            let best = goal.finish(length);
-            if best < length {
-                length = best;
-                slope = 0.0;
-            }
+            planes[4] = three(&goal, reach);
+            planes[5] = flip((three(&mirror, reach), 0.0)).0;
+            length = goal.finish(length);
         }
-        Self {
-            planes,
-            length,
-            slope,
-        }
+        Self { planes, length }
+    }
+
+    /// The bound with only the first slope paid, and the last slope that would
+    /// take nothing away from it.
+    pub fn open_bound(&self, a: &Arc, slope_a: f64) -> (f64, f64) {
+        self.planes.iter().fold((f64::INFINITY, 0.0), |least, p| {
+            let low = p.low - (p.first + slope_a).abs() * a.half_rad;
+            if low < least.0 { (low, p.last) } else { least }
+        })
     }
 
     /// No pair of headings in the two intervals has a shorter curve, slopes paid.
@@ -155,6 +157,32 @@ impl Leg {
         }
         let paid = slope_a.abs() * a.half_rad + slope_b.abs() * b.half_rad;
         planes.max(interval::shortest(v, a, b) - paid)
+    }
+
+    /// How much of the bound's looseness narrower intervals at either end would
+    /// take away: all that is known of it is where the slopes do not fit.
+    pub fn looseness(&self, bound: f64, a: (&Arc, f64), b: (&Arc, f64)) -> (f64, f64) {
+        let wide = (a.0.half_rad, b.0.half_rad);
+        if bound < self.length - 2.0 * DOUBTFUL * (wide.0 + wide.1) {
+            return (
+                if wide.0 > 0.0 { f64::INFINITY } else { 0.0 },
+                if wide.1 > 0.0 { f64::INFINITY } else { 0.0 },
+            );
+        }
+        let mut least = (f64::INFINITY, (0.0, 0.0));
+        for p in &self.planes {
+            let loss = (
+                (p.first + a.1).abs() * wide.0,
+                (p.last - b.1).abs() * wide.1,
+            );
+            if p.low - loss.0 - loss.1 < least.0 {
+                least = (p.low - loss.0 - loss.1, loss);
+            }
+        }
+        if least.0 < bound {
+            return (a.1.abs() * wide.0, b.1.abs() * wide.1);
+        }
+        least.1
     }
 }
 
@@ -201,15 +229,10 @@ fn same(goal: &Goal, r: Reach) -> (Plane, f64) {
         return tangent(p, (t, q), slopes, 1.3 * moved / p, r);
     }
     // Both turns together are the headings' difference, or a circle more.
-    let both = if goal.turn < moved || goal.turn > TAU - moved {
-        0.0
-    } else {
-        goal.turn - moved
-    };
     let plane = Plane {
-        low: both.max(r.distance),
-        first: 0.0,
-        last: 0.0,
+        low: continued(goal.turn, moved),
+        first: -1.0,
+        last: 1.0,
     };
     let length = if p > goal.tol { p + t + q } else { goal.turn };
     (plane, length)
@@ -240,64 +263,84 @@ fn cross(goal: &Goal, r: Reach) -> (Plane, f64) {
     } else {
         f64::INFINITY
     };
-    let mut low = r.distance;
+    let mut plane = Plane {
+        low: r.distance,
+        first: 0.0,
+        last: 0.0,
+    };
     if apart * 0.9 > moved {
-        // p + 2 atan(2/p) is at least π, its value for circles that touch.
+        // p + 2 atan(2/p) is at least π, its value for circles that touch. What
+        // remains is twice the angle of v less both headings, which bends by no
+        // more than the circle's centres do, seen from the nearest they come.
         let swing = 1.3 * moved / apart;
         let t = angle_tau(v.0, -v.1);
         let q = wrapped(t - goal.turn);
         let touching = continued(t, r.first + swing) + continued(q, r.last + swing);
-        low = low.max(touching - moved - 2.0 * swing);
+        let squares = r.first * r.first + r.last * r.last;
+        let bend = squares / nearest + moved * moved / (nearest * nearest);
+        plane = Plane {
+            low: touching - bend,
+            first: -2.0 * v.1 / square - 1.0,
+            last: 2.0 * (v.0 * goal.sin - v.1 * goal.cos) / square - 1.0,
+        };
     }
-    let plane = Plane {
-        low,
-        first: 0.0,
-        last: 0.0,
-    };
     (plane, length)
 }
 
-/// A lower bound of LRL with the middle turn above a half circle.
-fn three(goal: &Goal, r: Reach) -> f64 {
+/// LRL with the middle turn above a half circle.
+///
+/// Its length is the headings' difference and twice the middle turn, which
+/// depends on the distance of the centres alone.
+fn three(goal: &Goal, r: Reach) -> Plane {
     let v = goal.left_left();
     let apart = (v.0 * v.0 + v.1 * v.1).sqrt();
     let moved = r.first + r.last;
-    if apart - moved > 4.0 {
-        return f64::INFINITY;
+    let (least, most) = (apart - moved, apart + moved);
+    if least > 4.0 {
+        return NOWHERE;
+    }
+    if apart * 0.9 <= moved {
+        return Plane {
+            low: PI.max(r.distance),
+            ..Plane::default()
+        };
     }
     // The middle turn shrinks as the centres part.
     let lean = |d: f64| {
-        let cos = d / 4.0;
-        angle_tau((1.0 - cos * cos).max(0.0).sqrt(), cos)
+        let cos = d.clamp(0.0, 4.0) / 4.0;
+        angle_tau((1.0 - cos * cos).sqrt(), cos)
     };
-    let lean_low = lean((apart + moved).min(4.0));
-    let lean_high = lean((apart - moved).max(0.0));
-    let (least, most) = (PI + 2.0 * lean_low, PI + 2.0 * lean_high);
-    let lean_mid = lean(apart.min(4.0));
-    // Whatever the turns, they make up for the middle one.
-    let (from, to) = (goal.turn - moved + least, goal.turn + moved + most);
-    let circles = (from / TAU).floor();
-    let any = if to < (circles + 1.0) * TAU {
-        least + from - circles * TAU
-    } else {
-        least
-    };
-    if apart * 0.9 <= moved {
-        return any;
-    }
-    // Continued through zero, both outer turns together are the middle one and the
-    // headings' difference, up to a constant.
-    let swing = 1.3 * moved / apart + (lean_high - lean_mid).max(lean_mid - lean_low);
-    let out = angle_tau(v.1, v.0) + lean_mid + FRAC_PI_2;
+    let (low, mid, high) = (lean(most), lean(apart), lean(least));
+    // Continued through zero, both outer turns follow the headings and the middle.
+    let swing = 1.3 * moved / apart + (high - mid).max(mid - low);
+    let out = angle_tau(v.1, v.0) + mid + FRAC_PI_2;
     let out = if out >= TAU { out - TAU } else { out };
-    let middle = PI + 2.0 * lean_mid;
+    let middle = PI + 2.0 * mid;
     let back = goal.turn - out + middle;
     let back = wrapped(if back >= TAU { back - TAU } else { back });
     let (t, q) = (
         continued(out, r.first + swing),
         continued(back, r.last + swing),
     );
-    any.max(t + q + middle - moved - 4.0 * (lean_mid - lean_low))
+    let length = t + middle + q;
+    if most > STEEP_APART {
+        return Plane {
+            low: (length - moved - 4.0 * (mid - low)).max(r.distance),
+            ..Plane::default()
+        };
+    }
+    // The middle turn's first and second derivative in the distance, at its steepest.
+    let root = |d: f64| (16.0 - d * d).sqrt();
+    let steep = 2.0 / root(most);
+    let bent = 2.0 * most / (root(most) * root(most) * root(most));
+    let squares = r.first * r.first + r.last * r.last;
+    let bend = bent * moved * moved + steep * (squares + moved * moved / least);
+    let shrink = -4.0 / (root(apart) * apart);
+    Plane {
+        low: length - bend,
+        first: shrink * v.0 - 1.0,
+        last: 1.0 - shrink * (v.0 * goal.cos + v.1 * goal.sin),
+    }
 }
 
 #[cfg(test)]
@@ -332,7 +375,7 @@ mod tests {
         ) {
             let scale = [1.0, 0.35][near];
             let v = Vector::new(scale * x, scale * y);
-            let (a, b) = (Arc::new(a, width), Arc::new(b, width * ratio));
+            let (a, b) = (Arc::new(a, width, 0), Arc::new(b, width * ratio, 0));
             let leg = Leg::new(v, &a, &b);
             let to = Pose::new(Point::new(v.x, v.y), b.mid_rad);
             let middle = length_m(Pose::new(Point::new(0.0, 0.0), a.mid_rad), to, 1.0);
@@ -347,7 +390,7 @@ mod tests {
             course in 0.0f64..6.3, a in 0.0f64..6.3, b in 0.0f64..6.3, width in 0.001f64..0.02,
         ) {
             let v = Vector::new(9.0 * crate::math::cos(course), 9.0 * crate::math::sin(course));
-            let (p, q) = (Arc::new(a, width), Arc::new(b, width));
+            let (p, q) = (Arc::new(a, width, 0), Arc::new(b, width, 0));
             let leg = Leg::new(v, &p, &q);
             let sharp = leg.planes.iter().find(|w| (w.low - leg.length).abs() < 1e-3);
             prop_assume!(sharp.is_some());

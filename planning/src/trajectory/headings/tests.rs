@@ -1,5 +1,6 @@
 //! Bounds against brute force, symmetry, and what is refused.
 
+use super::polish::leg_length;
 use super::*;
 use proptest::prelude::*;
 
