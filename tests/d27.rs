@@ -22,6 +22,7 @@ fn all_source() -> String {
         "runtime",
         "netsim",
         "interop",
+        "workbench",
         "tests",
         "src",
     ]
