@@ -240,8 +240,9 @@ impl Negotiation {
         if orphans.count() == 0 || ctx.able_since.is_none() {
             // Who cannot plan yet does not count: it would act on what it has not heard.
             self.orphan_since = None;
-        } else if self.orphan_since.is_none() {
-            self.orphan_since = Some(ctx.now);
+        } else {
+            // What a decision gave to others is an orphan until they speak of it.
+            self.orphan_since = self.orphan_since.or(Some(ctx.now)).max(self.decided_at);
         }
         if self.members != ctx.members {
             self.members = ctx.members.to_vec();
