@@ -2,7 +2,7 @@
 //! with a certified gap (D2.7 §2.4.3, no wind).
 //!
 //! Each waypoint's headings are cut into intervals. A shortest path over them,
-//! with a lower bound for every pair of neighbouring intervals ([`leg`]), bounds
+//! with a lower bound for every pair of neighbouring intervals (`leg`), bounds
 //! every choice of headings from below; a shortest path over the intervals'
 //! middles, polished one waypoint at a time, is a choice and bounds from above.
 //! Intervals through which even the bound is no better than what is asked for are
