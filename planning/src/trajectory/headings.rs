@@ -38,6 +38,11 @@ const MAX_PAIRS: usize = 40_000_000;
 /// of what the gap allows on the average: the rest is left to the others.
 const FINE_SHARE: f64 = 0.3;
 
+/// Intervals whose bound exceeds the least by more than this times their half
+/// width wait: halving the others moves the least by no more than slopes of 2 at
+/// both ends do, unless a full circle is lost, and then their turn comes.
+const NEAR_SLOPE: f64 = 6.0;
+
 /// Relative rounding of a sum of legs: the lower bound stays below it.
 const ROUNDING: f64 = 1e-12;
 
@@ -253,7 +258,7 @@ fn first_layers(request: &Request) -> Vec<Vec<Arc>> {
 }
 
 /// Leaves out intervals whose bound is at least `wanted`, and halves the others
-/// where the bound is looser than `fine`; also the slopes of the first waypoint's
+/// where the bound is looser than `fine` and they matter soon; also the slopes of the first waypoint's
 /// intervals.
 fn halved(
     layers: &[Vec<Arc>],
@@ -271,7 +276,8 @@ fn halved(
                 continue;
             }
             let half = arc.half_rad / 2.0;
-            if half > 0.0 && (solved.looseness[i] > fine || !any_loose) {
+            let low = *bound - solved.least <= NEAR_SLOPE * arc.half_rad;
+            if half > 0.0 && low && (solved.looseness[i] > fine || !any_loose) {
                 next.push(Arc::new(arc.mid_rad - half, half, j));
                 next.push(Arc::new(arc.mid_rad + half, half, j));
             } else {

@@ -125,9 +125,13 @@ impl Leg {
         }
         // Beyond 4 radii the shortest has a straight.
         if reach.distance <= 4.0 {
-            planes[4] = three(&goal, reach);
-            planes[5] = flip((three(&mirror, reach), 0.0)).0;
-            length = goal.finish(length);
+            for (plane, word) in planes[4..].iter_mut().zip([
+                three(&goal, reach, length),
+                flip(three(&mirror, reach, length)),
+            ]) {
+                *plane = word.0;
+                length = length.min(word.1);
+            }
         }
         Self { planes, length }
     }
@@ -290,20 +294,27 @@ fn cross(goal: &Goal, r: Reach) -> (Plane, f64) {
 /// LRL with the middle turn above a half circle.
 ///
 /// Its length is the headings' difference and twice the middle turn, which
-/// depends on the distance of the centres alone.
-fn three(goal: &Goal, r: Reach) -> Plane {
+/// depends on the distance of the centres alone. Not looked into where the middle
+/// turn alone is longer than `other`.
+fn three(goal: &Goal, r: Reach, other: f64) -> (Plane, f64) {
     let v = goal.left_left();
     let apart = (v.0 * v.0 + v.1 * v.1).sqrt();
     let moved = r.first + r.last;
     let (least, most) = (apart - moved, apart + moved);
     if least > 4.0 {
-        return NOWHERE;
+        return (NOWHERE, f64::INFINITY);
+    }
+    let flat = |low: f64| Plane {
+        low: low.max(r.distance),
+        ..Plane::default()
+    };
+    // The arc cosine lies above its chord.
+    let middle = PI + PI * (1.0 - most / 4.0).max(0.0);
+    if other <= middle {
+        return (flat(middle), f64::INFINITY);
     }
     if apart * 0.9 <= moved {
-        return Plane {
-            low: PI.max(r.distance),
-            ..Plane::default()
-        };
+        return (flat(middle), goal.three());
     }
     // The middle turn shrinks as the centres part.
     let lean = |d: f64| {
@@ -323,11 +334,13 @@ fn three(goal: &Goal, r: Reach) -> Plane {
         continued(back, r.last + swing),
     );
     let length = t + middle + q;
+    let whole = if apart <= 4.0 {
+        out + middle + back
+    } else {
+        f64::INFINITY
+    };
     if most > STEEP_APART {
-        return Plane {
-            low: (length - moved - 4.0 * (mid - low)).max(r.distance),
-            ..Plane::default()
-        };
+        return (flat(length - moved - 4.0 * (mid - low)), whole);
     }
     // The middle turn's first and second derivative in the distance, at its steepest.
     let root = |d: f64| (16.0 - d * d).sqrt();
@@ -336,11 +349,12 @@ fn three(goal: &Goal, r: Reach) -> Plane {
     let squares = r.first * r.first + r.last * r.last;
     let bend = bent * moved * moved + steep * (squares + moved * moved / least);
     let shrink = -4.0 / (root(apart) * apart);
-    Plane {
+    let plane = Plane {
         low: length - bend,
         first: shrink * v.0 - 1.0,
         last: 1.0 - shrink * (v.0 * goal.cos + v.1 * goal.sin),
-    }
+    };
+    (plane, whole)
 }
 
 #[cfg(test)]
@@ -379,7 +393,7 @@ mod tests {
             let leg = Leg::new(v, &a, &b);
             let to = Pose::new(Point::new(v.x, v.y), b.mid_rad);
             let middle = length_m(Pose::new(Point::new(0.0, 0.0), a.mid_rad), to, 1.0);
-            prop_assert!((leg.length - middle).abs() < 1e-9, "{} {middle}", leg.length);
+            prop_assert!((leg.length - middle).abs() < 1e-7, "{} {middle}", leg.length);
             let least = brute(v, &a, slopes[0], &b, slopes[1]);
             let bound = leg.bound(v, &a, slopes[0], &b, slopes[1]);
             prop_assert!(bound <= least + 1e-9, "{bound} {least}");

@@ -11,7 +11,7 @@ use crate::trajectory::dubins;
 const WINDOW: usize = 5;
 
 /// The least step, radians: half of its square a waypoint is far below any gap.
-const LAST_STEP_RAD: f64 = 1e-3;
+const LAST_STEP_RAD: f64 = 4e-3;
 
 /// What may be moved: legs in turn radii, and the headings that are given.
 pub(super) struct Polish<'a> {
