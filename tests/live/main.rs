@@ -58,7 +58,7 @@ fn observe(place: &Place) {
         "observe",
         "live/v1/state/**",
         "--timeout",
-        "2",
+        "4",
         "--format",
         "jsonl",
     ]);
