@@ -66,7 +66,8 @@ pub struct Buildings {
     pub notices: Vec<Notice>,
 }
 
-fn position(at: &Cursor<'_>) -> Result<LatLon, FormatError> {
+/// `[longitude, latitude, ...]`.
+pub(crate) fn position(at: &Cursor<'_>) -> Result<LatLon, FormatError> {
     let items = at.items()?;
     if items.len() < 2 {
         return Err(at.wrong("a position is [longitude, latitude]"));

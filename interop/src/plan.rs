@@ -47,7 +47,7 @@ pub struct PlanFile {
 }
 
 /// `[latitude, longitude, ...]`.
-fn lat_lon(at: &Cursor<'_>) -> Result<LatLon, FormatError> {
+pub(crate) fn lat_lon(at: &Cursor<'_>) -> Result<LatLon, FormatError> {
     let items = at.items()?;
     if items.len() < 2 {
         return Err(at.wrong("a position is [latitude, longitude]"));

@@ -2,6 +2,7 @@
 //! waypoints and corridor scans. Leaves areas to [`crate::geojson`] and [`crate::plan`].
 
 use crate::cursor::{Cursor, parse};
+use crate::geojson::position;
 use crate::place::LatLon;
 use crate::{FormatError, Notice, plan};
 
@@ -103,17 +104,8 @@ fn of_plan(text: &str, root: &Cursor<'_>) -> Result<Targets, FormatError> {
         }
         let width = item.need("CorridorWidth")?;
         let line = item.need("polyline")?;
-        let mut way = Vec::new();
-        for p in line.items()? {
-            let pair = p.items()?;
-            if pair.len() < 2 {
-                return Err(p.wrong("a position is [latitude, longitude]"));
-            }
-            way.push(LatLon {
-                lat_deg: pair[0].within(-90.0, 90.0, "a latitude in degrees")?,
-                lon_deg: pair[1].within(-180.0, 180.0, "a longitude in degrees")?,
-            });
-        }
+        let points = line.items()?;
+        let way = points.iter().map(plan::lat_lon).collect::<Result<_, _>>()?;
         push_line(
             &line,
             &item.pointer(),
@@ -141,17 +133,6 @@ fn push_line(
         width_m,
     });
     Ok(())
-}
-
-fn position(at: &Cursor<'_>) -> Result<LatLon, FormatError> {
-    let items = at.items()?;
-    if items.len() < 2 {
-        return Err(at.wrong("a position is [longitude, latitude]"));
-    }
-    Ok(LatLon {
-        lon_deg: items[0].within(-180.0, 180.0, "a longitude in degrees")?,
-        lat_deg: items[1].within(-90.0, 90.0, "a latitude in degrees")?,
-    })
 }
 
 fn feature(at: &Cursor<'_>, out: &mut Targets) -> Result<(), FormatError> {

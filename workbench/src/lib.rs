@@ -5,5 +5,6 @@
 //! Arguments in, one text out: nothing here prints.
 
 pub mod bench;
+pub mod measure;
 pub mod navmesh;
 pub mod plan;

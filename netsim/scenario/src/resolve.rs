@@ -10,7 +10,7 @@ use crate::fleet::{self, Fleet, word};
 use crate::terrain::{self, MAX_HEIGHT_M, Notices, Terrain, position};
 use skein_netsim::spec::{GroundSpec, RadioSpec, Spec, UavSpec};
 use skein_peer::Mission;
-use skein_peer::mission::PointMm;
+use skein_peer::mission::{PointMm, mm};
 use skein_peer::plan::Ground;
 use skein_planning::frame::{Point, Pose};
 use skein_planning::geometry::{NoFlyZones, Polygon};
@@ -285,15 +285,6 @@ fn checks(node: Option<&Node<'_>>) -> Result<(f64, f64), ScenarioError> {
         f.number_or("min_coverable", 0.97, 0.0, 1.0, "as a share of the area")?,
         f.number_or("min_separation_m", 0.0, 0.0, 10_000.0, "metres")?,
     ))
-}
-
-/// Whole millimetres; what comes in is within 20 km, so it fits.
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "readers limit coordinates to 20 km"
-)]
-fn mm(m: f64) -> i32 {
-    (m * 1000.0).round() as i32
 }
 
 #[allow(

@@ -7,6 +7,7 @@
 use crate::chaos::{Fault, TimedFault};
 use crate::spec::Spec;
 use crate::swarm::stream::{Concern, Stream};
+use skein_peer::mission::mm;
 
 /// No fault happens before this time: peers listen for three beacon periods, then
 /// negotiate their first round, milliseconds.
@@ -159,14 +160,6 @@ fn revisions(s: &mut Stream, spec: &Spec, end_ms: u64, out: &mut Vec<TimedFault>
         };
         out.push(at(s.between(QUIET_START_MS, end_ms), fault));
     }
-}
-
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "a mission ends 20 km from its origin"
-)]
-fn mm(m: f64) -> i32 {
-    (m * 1000.0).round() as i32
 }
 
 #[cfg(test)]

@@ -49,6 +49,17 @@ fn metres(mm: u32) -> f64 {
     f64::from(mm) / 1000.0
 }
 
+/// Whole millimetres, the nearest; missions end at 20 km, and beyond what fits it
+/// saturates.
+#[must_use]
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "casts from floats saturate; missions end at 20 km"
+)]
+pub fn mm(m: f64) -> i32 {
+    (m * 1000.0).round() as i32
+}
+
 /// A point of the plane, in metres.
 #[must_use]
 pub fn point_m(p: PointMm) -> Point {

@@ -11,6 +11,7 @@
 
 use crate::config::Role;
 use crate::input::Time;
+use crate::mission::mm;
 use crate::output::{Output, Priority, Report};
 use crate::peer::Peer;
 use crate::wire::codec::{self, Body};
@@ -260,14 +261,6 @@ pub(crate) fn speak_mission(peer: &mut Peer) {
         let subject = u16::try_from(i).unwrap_or(u16::MAX);
         speak(peer, Kind::Mission, subject, &Body::Mission(chunk));
     }
-}
-
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "casts from floats saturate; missions end at 20 km"
-)]
-fn mm(m: f64) -> i32 {
-    (m * 1000.0).round() as i32
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "a heading is at most 2 pi")]

@@ -4,6 +4,7 @@
 //! arc tangents, ends with the goal by flying the curve.
 
 use super::figures::{Times, timed};
+use super::stream::Stream;
 use anyhow::Result;
 use clap::Args;
 #[cfg(feature = "rivals")]
@@ -126,15 +127,8 @@ pub fn run(args: &DubinsArgs) -> Result<String> {
 
 /// Starts at the origin and goals about it, the same in every run.
 fn draw(args: &DubinsArgs) -> Vec<(Pose, Pose)> {
-    let mut stream = 1u64;
-    let mut unit = || {
-        // Weyl sequence with a mixing step.
-        stream = stream.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = stream;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut stream = Stream(1);
+    let mut unit = || stream.unit();
     (0..args.n)
         .map(|_| {
             let from = Pose::new(Point::new(0.0, 0.0), TAU * unit());

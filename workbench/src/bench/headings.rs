@@ -4,6 +4,7 @@
 //! neighbour, so the more there are the nearer they lie.
 
 use super::figures::{Times, timed};
+use super::stream::Stream;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
@@ -58,7 +59,7 @@ struct Answer {
 /// # Errors
 /// When the request is malformed.
 pub fn run(args: &HeadingsArgs) -> Result<String> {
-    let mut stream = args.seed;
+    let mut stream = Stream(args.seed);
     let mut answer = Answer {
         n: args.n,
         instances: args.instances,
@@ -102,15 +103,9 @@ pub fn run(args: &HeadingsArgs) -> Result<String> {
 }
 
 /// Uniform waypoints, each followed by the nearest not yet visited.
-fn draw(args: &HeadingsArgs, stream: &mut u64) -> Vec<Point> {
+fn draw(args: &HeadingsArgs, stream: &mut Stream) -> Vec<Point> {
     let side_m = args.side * args.radius_m;
-    let mut unit = || {
-        *stream = stream.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = *stream;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut unit = || stream.unit();
     let mut left: Vec<Point> = (0..args.n)
         .map(|_| Point::new(side_m * unit(), side_m * unit()))
         .collect();

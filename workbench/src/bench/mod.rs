@@ -10,6 +10,7 @@ pub mod offset;
 pub mod route;
 pub mod route_maps;
 pub mod route_polygons;
+pub mod stream;
 pub mod wind;
 
 use clap::{Args, Subcommand};

@@ -2,6 +2,8 @@
 //! against its zone by a check of its own (D2.7 §2.3.1).
 
 use super::figures::{Times, timed};
+use super::stream::Stream;
+use crate::measure::to_piece_m;
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -104,7 +106,7 @@ pub fn run(args: &OffsetArgs) -> Result<String> {
     let (mut repairs, mut max_margin_m) = (0, 0.0f64);
     #[cfg(feature = "rivals")]
     let mut rival = args.against.map(|_| Tally::new(args));
-    let mut random = Random(args.seed);
+    let mut random = Stream(args.seed);
     for _ in 0..args.n {
         let zone = [draw(args, &mut random)];
         let answer = if args.arcs {
@@ -246,17 +248,6 @@ impl Tally {
     }
 }
 
-fn to_piece_m(p: Point, a: Point, b: Point) -> f64 {
-    let along = b - a;
-    let square = along.norm_squared();
-    let t = if square > 0.0 {
-        ((p - a).dot(&along) / square).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    (p - (a + along * t)).norm()
-}
-
 fn cross(a: Point, b: Point, c: Point, d: Point) -> bool {
     let left = |p: Point, q: Point, x: Point| (q - p).perp(&(x - p)) > 0.0;
     left(a, b, c) != left(a, b, d) && left(c, d, a) != left(c, d, b)
@@ -276,20 +267,7 @@ fn winding(ring: &[Point], p: Point) -> i32 {
     count
 }
 
-/// Weyl sequence with a mixing step: the same polygons in every run.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
-
-fn draw(args: &OffsetArgs, random: &mut Random) -> Zone {
+fn draw(args: &OffsetArgs, random: &mut Stream) -> Zone {
     let n = args.vertices;
     let outer = (0..n)
         .map(|i| match args.kind {

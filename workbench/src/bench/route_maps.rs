@@ -1,21 +1,8 @@
 //! Maps made up for `bench route`: a field of octagons, and a hard case for windows.
 
+use super::stream::Stream;
 use crate::navmesh::Query;
 use skein_planning::frame::Point;
-
-/// Pseudo-random numbers in [0, 1): the same in every run.
-struct Stream(u64);
-
-impl Stream {
-    fn next(&mut self) -> f64 {
-        // Weyl sequence with a mixing step.
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
 
 fn rectangle(low: Point, high: Point) -> Vec<Point> {
     vec![
@@ -35,12 +22,12 @@ pub fn octagons(n: usize) -> Vec<Vec<Point>> {
     let size = n as f64 * PITCH_M;
     let mut rings = vec![rectangle(Point::origin(), Point::new(size, size))];
     for i in 0..n * n {
-        let radius = 2.0 + stream.next();
+        let radius = 2.0 + stream.unit();
         let room = PITCH_M / 2.0 - radius - 0.5;
-        let mut shift = || (2.0 * stream.next() - 1.0) * room;
+        let mut shift = || (2.0 * stream.unit() - 1.0) * room;
         let x = ((i % n) as f64 + 0.5) * PITCH_M + shift();
         let y = ((i / n) as f64 + 0.5) * PITCH_M + shift();
-        let turn = stream.next();
+        let turn = stream.unit();
         rings.push(
             (0..8)
                 .map(|k| {
@@ -58,7 +45,7 @@ pub fn octagons(n: usize) -> Vec<Vec<Point>> {
 pub fn octagon_queries(n: usize, count: usize) -> Vec<Query> {
     let mut stream = Stream(2);
     let size = n as f64 * 10.0;
-    let mut point = || Point::new(size * stream.next(), size * stream.next());
+    let mut point = || Point::new(size * stream.unit(), size * stream.unit());
     (0..count)
         .map(|_| Query {
             from: point(),
@@ -107,8 +94,8 @@ pub fn comb_queries(n: usize, count: usize) -> Vec<Query> {
         .map(|_| Query {
             from,
             to: Point::new(
-                2.0 * n as f64 * stream.next(),
-                2.0 + n as f64 * stream.next(),
+                2.0 * n as f64 * stream.unit(),
+                2.0 + n as f64 * stream.unit(),
             ),
             length_m: f64::NAN,
         })

@@ -2,6 +2,7 @@
 //! against a dense oracle.
 
 use super::figures::{Times, timed};
+use super::stream::Stream;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -231,15 +232,8 @@ fn read_reference(path: &PathBuf) -> Result<Vec<f64>> {
 }
 
 fn random_cases(args: &WindArgs) -> Vec<Case> {
-    let mut stream = args.seed;
-    let mut between = |low: f64, high: f64| {
-        // Weyl sequence with a mixing step: the same cases in every run.
-        stream = stream.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = stream;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        low + (high - low) * (((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64)
-    };
+    let mut stream = Stream(args.seed);
+    let mut between = |low: f64, high: f64| low + (high - low) * stream.unit();
     let (distance, strength) = match args.kind {
         Kind::Near => ((0.0, 4.0), (0.02, 0.5)),
         Kind::Far => ((4.0, 20.0), (0.02, 0.5)),

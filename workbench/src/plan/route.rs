@@ -6,6 +6,7 @@
 
 use super::lat_lon;
 use super::map::{self, Level, Map};
+use crate::measure::to_piece_m;
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -319,17 +320,6 @@ fn least_distance_m(path: &[Point], zones: &[Zone]) -> f64 {
         }
     }
     least
-}
-
-fn to_piece_m(p: Point, a: Point, b: Point) -> f64 {
-    let along = b - a;
-    let square = along.norm_squared();
-    let t = if square > 0.0 {
-        ((p - a).dot(&along) / square).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    (p - (a + along * t)).norm()
 }
 
 #[cfg(test)]

@@ -1,24 +1,22 @@
 //! A stream of numbers that looks random and is the same on every machine: what a search
 //! draws its choices from, so that every peer computes the same plan byte for byte.
 
+use crate::coverage::dice::Dice;
+
 /// The stream; its seed is its whole state.
 #[derive(Clone, Copy, Debug)]
-pub struct Stream(u64);
+pub struct Stream(Dice);
 
 impl Stream {
     /// The stream of a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        Self(seed)
+        Self(Dice::new(seed))
     }
 
-    /// The next 64 bits: a Weyl sequence with two mixing steps.
+    /// The next 64 bits.
     pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
+        self.0.bits()
     }
 
     /// A number below `n`; 0 when `n` is 0.
