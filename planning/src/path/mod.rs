@@ -152,7 +152,15 @@ impl Router {
     /// [`RouteError`].
     pub fn route_to_point(&self, from: Pose, to: Point) -> Result<Curve, RouteError> {
         self.check_ends(from.position(), to)?;
-        self.find(from, Goal::Point(to)).ok_or(RouteError::NoRoute)
+        // Near zones a heading that no straight way gives may be the only one.
+        let any_heading = || {
+            self.headings_at(from, to)
+                .into_iter()
+                .find_map(|h| self.find(from, Goal::Pose(Pose::new(to, h))))
+        };
+        self.find(from, Goal::Point(to))
+            .or_else(any_heading)
+            .ok_or(RouteError::NoRoute)
     }
 
     /// As [`Router::route`], over points in their order; the headings there are

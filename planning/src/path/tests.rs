@@ -205,6 +205,21 @@ fn zone() -> impl Strategy<Value = Polygon> {
     ]
 }
 
+#[test]
+fn a_point_is_reached_where_a_pose_there_is() {
+    let triangle =
+        |ring: [(f64, f64); 3]| Polygon::new(ring.map(|(x, y)| Point::new(x, y)).to_vec()).unwrap();
+    let zones = vec![
+        triangle([(359.13, 378.48), (322.43, 379.99), (355.39, 358.02)]),
+        triangle([(270.70, 255.78), (373.48, 282.77), (295.41, 369.96)]),
+    ];
+    let router = router(zones, 17.8);
+    let (from, to) = (pose(522.93, 366.9, -2.50883), Point::new(0.0, 370.99));
+    assert!(router.find(from, Goal::Point(to)).is_none());
+    let curve = router.route_to_point(from, to).unwrap();
+    judge(&router, from, to, None, &curve);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
