@@ -24,6 +24,7 @@
 pub mod camera;
 mod change;
 pub mod chart;
+mod leg;
 pub mod outlook;
 
 use crate::event::Event;
@@ -535,12 +536,7 @@ impl Executive {
     }
 
     fn is_near(&self, pose: &Pose, p: Point) -> bool {
-        let radius_m = self
-            .chart
-            .router
-            .limits()
-            .turn_radius_m
-            .max(self.chart.airframe.min_turn_radius_m());
+        let radius_m = self.chart.turn_radius_m();
         (pose.position() - p).norm() <= ARRIVAL_RADII * radius_m
     }
 

@@ -9,6 +9,10 @@ pub const GRAVITY_MPS2: f64 = 9.806_65;
 /// Share of the ground speed that turns may need in a wind: following them takes the rest.
 const TURN_AUTHORITY: f64 = 0.97;
 
+/// The least airspeed that is commanded in level flight, in stall speeds: a gust of a
+/// tenth must not stall the wing.
+const STALL_MARGIN: f64 = 1.1;
+
 /// The limits of a fixed-wing airframe and its camera.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Airframe {
@@ -40,7 +44,21 @@ impl Airframe {
     /// Radius of a turn at `airspeed_mps` with the largest bank, metres.
     #[must_use]
     pub fn turn_radius_m(&self, airspeed_mps: f64) -> f64 {
-        airspeed_mps * airspeed_mps / (GRAVITY_MPS2 * tan(self.max_bank_rad))
+        self.banked_radius_m(airspeed_mps, self.max_bank_rad)
+    }
+
+    /// Radius of a coordinated turn at `airspeed_mps` and a bank, metres.
+    #[must_use]
+    pub fn banked_radius_m(&self, airspeed_mps: f64, bank_rad: f64) -> f64 {
+        airspeed_mps * airspeed_mps / (GRAVITY_MPS2 * tan(bank_rad))
+    }
+
+    /// The least radius of a turn over the ground that can be followed at `airspeed_mps`
+    /// in a wind of `wind_mps`, with a little to spare for corrections, metres: the
+    /// answer of [`Airframe::airspeed_for_turns_mps`], asked for the radius.
+    #[must_use]
+    pub fn ground_turn_radius_m(&self, airspeed_mps: f64, wind_mps: f64) -> f64 {
+        self.turn_radius_m((airspeed_mps + wind_mps) / TURN_AUTHORITY)
     }
 
     /// The airspeed, at most cruise, at which turns of `radius_m` over the ground can be
@@ -68,6 +86,16 @@ impl Airframe {
     pub fn steepest_bank_rad(&self, airspeed_mps: f64) -> f64 {
         let share = self.stall_mps / airspeed_mps;
         self.max_bank_rad.min(acos(share * share))
+    }
+
+    /// The least airspeed that is commanded, m/s: a tenth above the stall, and no less
+    /// than the wing needs in the steepest turn, where it carries 1/cos φ times the
+    /// weight; at most cruise, at which turns are planned.
+    #[must_use]
+    pub fn least_airspeed_mps(&self) -> f64 {
+        let turning_mps = self.stall_in_turn_mps(self.max_bank_rad);
+        let least_mps = turning_mps.max(STALL_MARGIN * self.stall_mps);
+        least_mps.min(self.cruise_mps)
     }
 
     /// Airspeed at which the wing stalls in a coordinated turn, m/s.

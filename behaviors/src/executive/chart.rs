@@ -10,6 +10,7 @@ use skein_planning::coverage::area::{CoverageLoop, Direction};
 use skein_planning::frame::{Point, Pose};
 use skein_planning::math::TAU;
 use skein_planning::path::{RouteError, Router};
+use skein_planning::trajectory::timed::Objective;
 use skein_planning::trajectory::{Curve, Segment};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -79,6 +80,11 @@ pub struct Chart {
     /// Distances through the air along each cell, forward and backward, metres;
     /// empty in calm air, where they are the lengths.
     cells_air_m: Vec<[f64; 2]>,
+    /// What legs should spend little of.
+    pub(super) objective: Objective,
+    /// What passing each cell costs, forward and backward, metres; empty where that is
+    /// the cell's length.
+    pub(super) cells_cost_m: Vec<[f64; 2]>,
 }
 
 impl Chart {
@@ -91,7 +97,17 @@ impl Chart {
             airframe,
             air: Air::calm(airframe.cruise_mps),
             cells_air_m: Vec::new(),
+            objective: Objective::Time,
+            cells_cost_m: Vec::new(),
         }
+    }
+
+    /// The same with another objective.
+    #[must_use]
+    pub fn with_objective(mut self, objective: Objective) -> Self {
+        self.objective = objective;
+        self.breathe(self.air);
+        self
     }
 
     /// The wind, and the airspeed flown in it.
@@ -104,14 +120,27 @@ impl Chart {
     pub fn breathe(&mut self, air: Air) {
         self.air = air;
         self.cells_air_m.clear();
-        if air.is_calm() {
-            return;
+        if !air.is_calm() {
+            self.cells_air_m = self.each_cell(|curve| air.air_length_m(curve));
         }
+        self.cells_cost_m = match self.objective {
+            Objective::Time => self.cells_air_m.clone(),
+            Objective::Distance => Vec::new(),
+            Objective::Energy => self.each_cell(|curve| self.cost_m(curve)),
+        };
+    }
+
+    /// Something of each cell's curve, forward and backward.
+    fn each_cell(&self, of: impl Fn(&Curve) -> f64) -> Vec<[f64; 2]> {
         let c = &self.coverage_loop;
-        let along = |i, direction| air.air_length_m(&c.curve(i, direction));
-        self.cells_air_m = (0..c.len())
-            .map(|i| [along(i, Direction::Forward), along(i, Direction::Backward)])
-            .collect();
+        let both = [Direction::Forward, Direction::Backward];
+        let cells = 0..c.len();
+        cells.map(|i| both.map(|d| of(&c.curve(i, d)))).collect()
+    }
+
+    /// Length of a cell that is only passed, metres.
+    pub(super) fn travel_m(&self, cell: u16) -> f64 {
+        f64::from(self.coverage_loop.cells()[usize::from(cell)].travel_mm) / 1000.0
     }
 
     /// Length of the whole loop over the ground as a share of that through the air,
@@ -207,7 +236,7 @@ impl Chart {
                 .unwrap_or_else(|| f64::from(cells[usize::from(h.cell)].service_mm) / 1000.0),
             Move::Pass(cell, direction) => self
                 .cell_air_m(*cell, *direction)
-                .unwrap_or_else(|| f64::from(cells[usize::from(*cell)].travel_mm) / 1000.0),
+                .unwrap_or_else(|| self.travel_m(*cell)),
             Move::Route(curve) => self.air.air_length_m(curve),
             Move::Loiter(circle) => self.air.longest_m(circle.length_m),
         }
@@ -254,7 +283,8 @@ impl Chart {
             return Some(moves);
         }
         if let Ok(curve) = self.route(from.pose, goal.pose) {
-            let along = ahead.and_then(|b| self.along(b, direction, to, curve.length_m() + 1e-3));
+            let most_m = self.cost_m(&curve) + 1e-3;
+            let along = ahead.and_then(|b| self.not_dearer(b, direction, to, most_m));
             return Some(along.unwrap_or_else(|| vec![Move::Route(curve)]));
         }
         if let Some(moves) = ahead.and_then(|b| self.along(b, direction, to, f64::INFINITY)) {
@@ -269,6 +299,30 @@ impl Chart {
     /// The cells between two boundaries in one direction, unless they are longer
     /// than `most_m`. Excursions need not be flown to get past them.
     fn along(&self, from: u16, direction: Direction, to: u16, most_m: f64) -> Option<Vec<Move>> {
+        self.pass(from, direction, to, most_m, &|cell| self.travel_m(cell))
+    }
+
+    /// The same, unless they cost more than `most_m`.
+    fn not_dearer(
+        &self,
+        from: u16,
+        direction: Direction,
+        to: u16,
+        most_m: f64,
+    ) -> Option<Vec<Move>> {
+        self.pass(from, direction, to, most_m, &|cell| {
+            self.passing_m(cell, direction)
+        })
+    }
+
+    fn pass(
+        &self,
+        from: u16,
+        direction: Direction,
+        to: u16,
+        most_m: f64,
+        price_m: &dyn Fn(u16) -> f64,
+    ) -> Option<Vec<Move>> {
         let cells = self.coverage_loop.cells();
         let mut moves = Vec::new();
         let mut length_m = 0.0;
@@ -280,7 +334,7 @@ impl Chart {
             };
             let c = &cells[usize::from(cell)];
             if !c.excursion {
-                length_m += f64::from(c.travel_mm) / 1000.0;
+                length_m += price_m(cell);
                 moves.push(Move::Pass(cell, direction));
             }
             if length_m > most_m || moves.len() > cells.len() {
@@ -335,7 +389,7 @@ impl Chart {
         for b in self.nearest(from.position(), DETOURS) {
             for d in directions {
                 if let Ok(curve) = self.route(from, self.place(b, *d).pose) {
-                    let m = self.air.air_length_m(&curve);
+                    let m = self.cost_m(&curve);
                     if best.as_ref().is_none_or(|(_, _, least)| m < *least) {
                         best = Some(((b, *d), curve, m));
                     }
@@ -369,9 +423,9 @@ impl Chart {
     /// A clear route; from inside a zone's clearance with a piece that leads out of
     /// it first.
     fn route(&self, from: Pose, to: Pose) -> Result<Curve, RouteError> {
-        match self.router.route(from, to) {
+        match self.leg(from, to) {
             Err(e) if e != RouteError::GoalInZone && self.is_tight(&from) => {
-                self.escape(from, |out| self.router.route(out, to)).ok_or(e)
+                self.escape(from, |out| self.leg(out, to)).ok_or(e)
             }
             answer => answer,
         }
@@ -381,9 +435,9 @@ impl Chart {
     /// route, else by the loop to one of the boundaries nearest to the point.
     #[must_use]
     pub fn connect_to_point(&self, from: &Place, to: Point) -> Option<Vec<Move>> {
-        let direct = match self.router.route_to_point(from.pose, to) {
+        let direct = match self.leg_to_point(from.pose, to) {
             Err(_) if self.is_tight(&from.pose) => {
-                self.escape(from.pose, |out| self.router.route_to_point(out, to))
+                self.escape(from.pose, |out| self.leg_to_point(out, to))
             }
             answer => answer.ok(),
         };
@@ -392,7 +446,7 @@ impl Chart {
         }
         for b in self.nearest(to, NEAREST) {
             for d in [Direction::Forward, Direction::Backward] {
-                if let Ok(last) = self.router.route_to_point(self.place(b, d).pose, to)
+                if let Ok(last) = self.leg_to_point(self.place(b, d).pose, to)
                     && let Some(mut moves) = self.connect(from, b, d)
                 {
                     moves.push(Move::Route(last));
@@ -477,16 +531,26 @@ impl Chart {
         vec![Move::Loiter(here)]
     }
 
+    /// The least radius over the ground that is flown, metres: the mission's, more where
+    /// the wind demands it.
+    #[must_use]
+    pub fn turn_radius_m(&self) -> f64 {
+        let least_m = if self.air.is_calm() {
+            self.airframe.min_turn_radius_m()
+        } else {
+            let wind_mps = self.air.wind.speed_mps();
+            let airspeed_mps = self.air.airspeed_mps;
+            self.airframe.ground_turn_radius_m(airspeed_mps, wind_mps)
+        };
+        self.router.limits().turn_radius_m.max(least_m)
+    }
+
     /// The circle through a pose that keeps farthest from the zones, and how far; a
     /// wide one if that keeps clear.
     fn circle(&self, pose: &Pose) -> (Segment, f64) {
         let zones = self.router.zones();
         let clearance_m = self.router.limits().clearance_m;
-        let least_m = self
-            .router
-            .limits()
-            .turn_radius_m
-            .max(self.airframe.min_turn_radius_m());
+        let least_m = self.turn_radius_m();
         let mut best: Option<(Segment, f64)> = None;
         for factor in LOITER_RADII {
             for side in [1.0, -1.0] {

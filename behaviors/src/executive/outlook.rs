@@ -173,18 +173,16 @@ impl Executive {
         }
     }
 
-    /// Time to turn round where it is, milliseconds: the turn to the reversed pose
-    /// takes 7π/3 radii, whatever the place.
+    /// Time to turn round where it is, milliseconds: in calm air the turn to the reversed
+    /// pose takes 7π/3 radii, in a wind as long as the worst course makes it.
     #[must_use]
     pub fn turn_ms(&self) -> u32 {
-        let radius_m = self
-            .chart
-            .router
-            .limits()
-            .turn_radius_m
-            .max(self.chart.airframe.min_turn_radius_m());
-        self.ms(self.chart.air().longest_m(7.0 * PI / 3.0 * radius_m))
-            .saturating_add(whole_ms(TURN_MARGIN_MS))
+        let way_m = if self.chart.air().is_calm() {
+            7.0 * PI / 3.0 * self.chart.turn_radius_m()
+        } else {
+            self.chart.turn_round_s() * self.speed_mps()
+        };
+        self.ms(way_m).saturating_add(whole_ms(TURN_MARGIN_MS))
     }
 
     /// Where the flight to come begins.

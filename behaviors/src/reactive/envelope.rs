@@ -1,8 +1,8 @@
 //! The envelope: stall, bank, zones; the last word on every setpoint (D2.7 §1.2.3,
 //! reactive layer).
 //!
-//! Whatever asks for a flight, what leaves here can be flown: the airspeed keeps a
-//! tenth from stall, turns keep the bank limit, numbers are numbers, and a flight
+//! Whatever asks for a flight, what leaves here can be flown: the airspeed keeps
+//! above the stall, in the steepest turn too, turns keep the bank limit, numbers are numbers, and a flight
 //! that would come too near to a zone is replaced by a loiter on the clearer side.
 //! Height belongs to the UAV's slot and is passed through.
 //!
@@ -19,10 +19,6 @@ use skein_planning::geometry::NoFlyZones;
 use skein_planning::math::{TAU, atan2};
 use skein_planning::trajectory::Segment;
 use std::sync::Arc;
-
-/// The least airspeed commanded, in stall speeds: a level turn with a bank of 35°
-/// needs a tenth more airspeed than level flight.
-pub const STALL_MARGIN: f64 = 1.1;
 
 /// Flown distance after which the zones nearby are gathered anew, metres: some four
 /// seconds, so that it costs nothing on average.
@@ -71,7 +67,10 @@ impl Envelope {
     /// The airspeed nearest to `mps` that may be commanded, m/s.
     #[must_use]
     pub fn airspeed_mps(&self, mps: f64) -> f64 {
-        let least = (self.airframe.stall_mps * STALL_MARGIN).min(self.airframe.max_mps);
+        let least = self
+            .airframe
+            .least_airspeed_mps()
+            .min(self.airframe.max_mps);
         let wanted = if mps.is_finite() {
             mps
         } else {
@@ -326,7 +325,7 @@ mod tests {
             0,
         );
         for (asked, given) in [
-            (1.0, a.stall_mps * 1.1),
+            (1.0, a.least_airspeed_mps()),
             (99.0, a.max_mps),
             (13.0, 13.0),
             (f64::NAN, a.cruise_mps),

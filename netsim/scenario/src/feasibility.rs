@@ -18,9 +18,6 @@ use std::collections::{BTreeMap, BTreeSet};
 /// may leave cells that nobody has the fuel for.
 const COMFORTABLE_LOOPS: f64 = 2.5;
 
-/// The least airspeed that is commanded, in stall speeds, as in the envelope.
-const STALL_MARGIN: f64 = 1.1;
-
 /// Turning round on the spot, in turn radii: the shortest curve from a pose to its
 /// reverse is 7/3 of a half circle.
 const TURN_ROUND_RADII: f64 = 7.0 / 3.0 * core::f64::consts::PI;
@@ -112,8 +109,8 @@ fn too_windy(spec: &Spec) -> Option<String> {
     let wind_mps = spec.wind.speed_mps();
     let radius_m = f64::from(spec.mission.turn_radius_mm) / 1000.0;
     let spare_mps = |u: &UavSpec| {
-        let slowest = STALL_MARGIN * u.airframe.stall_mps;
-        u.airframe.airspeed_for_turns_mps(radius_m, wind_mps) - slowest
+        let slowest_mps = u.airframe.least_airspeed_mps();
+        u.airframe.airspeed_for_turns_mps(radius_m, wind_mps) - slowest_mps
     };
     let worst = spec
         .uavs

@@ -31,6 +31,7 @@
 
 mod clearance;
 mod elliptic;
+mod fit;
 mod piece;
 mod plan;
 #[cfg(test)]

@@ -95,7 +95,7 @@ impl Piece {
         Ok(piece)
     }
 
-    fn is_arc(&self) -> bool {
+    pub(super) fn is_arc(&self) -> bool {
         (self.segment.curvature_per_m * self.segment.length_m).abs() > STRAIGHT_RAD
     }
 

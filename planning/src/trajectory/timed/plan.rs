@@ -26,13 +26,15 @@ pub enum Objective {
 }
 
 /// Which airspeeds may be flown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum Airspeeds {
     /// The airframe's cruise only.
     #[default]
     Cruise,
     /// Anything between the margin above the stall and the most that thrust allows.
     Any,
+    /// This one, m/s.
+    Only(f64),
 }
 
 /// Airspeeds tried between the slowest and the fastest: neighbours differ by a tenth
@@ -63,6 +65,9 @@ pub struct Flight<'a> {
     pub zones: &'a NoFlyZones,
     /// Distance kept from the zones, metres.
     pub margin_m: f64,
+    /// Share of the fastest turn that is planned, over 0 to 1: whoever follows the
+    /// trajectory with an error needs the rest.
+    pub turning: f64,
 }
 
 impl Flight<'_> {
@@ -106,6 +111,9 @@ impl Flight<'_> {
 
     fn speeds_mps(&self) -> Vec<f64> {
         let a = self.airframe;
+        if let Airspeeds::Only(airspeed_mps) = self.airspeeds {
+            return vec![airspeed_mps];
+        }
         let slowest = a.stall_mps * ABOVE_STALL;
         if self.airspeeds == Airspeeds::Cruise || slowest >= a.max_mps {
             return vec![a.cruise_mps];
@@ -123,7 +131,8 @@ impl Flight<'_> {
         let bank_rad = self.airframe.steepest_bank_rad(airspeed_mps);
         let performance = Performance {
             airspeed_mps,
-            turn_radius_m: airspeed_mps * airspeed_mps / (GRAVITY_MPS2 * tan(bank_rad)),
+            turn_radius_m: airspeed_mps * airspeed_mps
+                / (GRAVITY_MPS2 * tan(bank_rad) * self.turning),
         };
         let air = match time_optimal(self.from, self.to, performance, self.wind) {
             Ok(Answer::Path(path)) => self.within_limits(Trajectory::through_air(&path)),

@@ -42,6 +42,7 @@ fn flight<'a>(a: &'a Airframe, zones: &'a NoFlyZones) -> Flight<'a> {
         objective: Objective::Time,
         zones,
         margin_m: 10.0,
+        turning: 1.0,
     }
 }
 
@@ -293,5 +294,40 @@ proptest! {
         let full = Curve::from_pieces(pose(0.0, 0.0, a), &[(k, TAU / k)]);
         let t = Trajectory::along(&full, 16.0, wind).unwrap().duration_s();
         prop_assert!(t >= TAU / k / 16.0 - 1e-9);
+    }
+
+    #[test]
+    fn lines_and_arcs_follow_a_trochoid_closely(
+        x in -400.0f64..400.0, y in -400.0f64..400.0, a in -4.0f64..4.0, b in -4.0f64..4.0,
+        share in 0.0f64..0.8, towards in 0.0f64..TAU, tolerance_m in 0.005f64..0.5,
+    ) {
+        let (uav, wind) = (airframe(), blowing(16.0 * share, towards));
+        let path = time_optimal(pose(1.0, -2.0, a), pose(x, y, b), Performance::of(&uav, 16.0), wind)
+            .unwrap().path().unwrap();
+        let t = Trajectory::through_air(&path);
+        let curve = t.over_ground(tolerance_m);
+        prop_assert!(curve.largest_gap_m() < 2e-4, "{}", curve.largest_gap_m());
+        for w in curve.segments().windows(2) {
+            let turned = wrap_pi(w[1].start.heading_rad - w[0].end().heading_rad).abs();
+            prop_assert!(turned < 1e-3 + w[0].curvature_per_m.abs().max(w[1].curvature_per_m.abs()) * 2e-4, "{turned}");
+        }
+        let (start, end) = (t.start().unwrap(), t.end().unwrap());
+        prop_assert!((curve.start().unwrap().position() - start.position).norm() < 1e-3);
+        prop_assert!((curve.end().unwrap().position() - end.position).norm() < 1e-3);
+        prop_assert!((curve.length_m() - t.ground_length_m()).abs() < 1e-3 * (10.0 + t.ground_length_m()));
+        // Places on the trochoid, by distance flown over the ground, lie on the curve.
+        let n = 400;
+        let (mut at_m, mut before) = (0.0, start.position);
+        for i in 1..=n {
+            let s = t.at(t.duration_s() * f64::from(i) / f64::from(n)).unwrap();
+            at_m += (s.position - before).norm();
+            before = s.position;
+            let on = (-40..=40)
+                .map(|j| curve.pose_at(at_m + 0.05 * f64::from(j)).unwrap().position())
+                .map(|p| (p - s.position).norm())
+                .fold(f64::INFINITY, f64::min);
+            prop_assert!(on < 1.5 * tolerance_m + 0.03, "{on} off at {at_m} of {}", curve.length_m());
+        }
+        prop_assert!(curve.segments().len() < 400, "{}", curve.segments().len());
     }
 }

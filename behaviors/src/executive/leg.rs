@@ -1,0 +1,291 @@
+//! Legs off the loop, by what the mission wants to spend little of (D2.7 §2.4.2).
+//!
+//! In calm air a leg is the router's curve. In a wind the fastest flight between two
+//! poses is made of trochoids, which turn with the air and not against it; so the
+//! best flight of [`Flight`] competes with the router's curve, flown with the nose held
+//! into the wind, and the cheaper one is flown. Both are curves over the ground when
+//! they leave here, proved to keep the clearance from the zones as they are; what has
+//! no proof is not emitted.
+//!
+//! What a leg costs is told in metres: of the way through the air for time, over the
+//! ground for distance, of cruise for energy.
+
+use super::chart::Chart;
+use skein_planning::coverage::area::Direction;
+use skein_planning::frame::{Point, Pose};
+use skein_planning::math::{PI, TAU, atan2, wrap_pi};
+use skein_planning::path::RouteError;
+use skein_planning::trajectory::timed::{Airspeeds, Flight, Objective};
+use skein_planning::trajectory::wind::{Course, Performance, time_s};
+use skein_planning::trajectory::{Curve, Trajectory};
+
+/// Lines and arcs stray at most this from the trochoid that they stand for, metres: a
+/// hundredth of the least tracking error.
+const FIT_M: f64 = 0.02;
+
+/// Share of the fastest turn that legs through the air plan: the rest takes errors away.
+const TURNING: f64 = 0.9;
+
+/// Courses tried at a point where any will do: between neighbours the time differs by
+/// a twentieth of a turn.
+const COURSES: u8 = 16;
+
+impl Chart {
+    /// A clear way between two poses that look along their courses, the cheapest found.
+    pub(super) fn leg(&self, from: Pose, to: Pose) -> Result<Curve, RouteError> {
+        let over_ground = self.router.route(from, to);
+        if self.air().is_calm() {
+            return over_ground;
+        }
+        self.cheaper(self.through_air(from, to), over_ground)
+    }
+
+    /// As [`Chart::leg`], with any course at the end.
+    pub(super) fn leg_to_point(&self, from: Pose, to: Point) -> Result<Curve, RouteError> {
+        let over_ground = self.router.route_to_point(from, to);
+        if self.air().is_calm() {
+            return over_ground;
+        }
+        let ahead = to - from.position();
+        let straight_rad = atan2(ahead.y, ahead.x);
+        let all = (0..COURSES).filter_map(|i| {
+            let course_rad = straight_rad + TAU * f64::from(i) / f64::from(COURSES);
+            self.through_air(from, Pose::new(to, wrap_pi(course_rad)))
+        });
+        let priced = all.map(|curve| (self.cost_m(&curve), curve));
+        let best = priced.min_by(|a, b| a.0.total_cmp(&b.0));
+        self.cheaper(best.map(|(_, curve)| curve), over_ground)
+    }
+
+    fn cheaper(
+        &self,
+        through_air: Option<Curve>,
+        over_ground: Result<Curve, RouteError>,
+    ) -> Result<Curve, RouteError> {
+        match (through_air, over_ground) {
+            (Some(a), Ok(g)) if self.cost_m(&g) <= self.cost_m(&a) => Ok(g),
+            (Some(a), _) => Ok(a),
+            (None, g) => g,
+        }
+    }
+
+    /// The cheapest flight at the airspeed of the mission, as a curve over the ground;
+    /// `None` where none is proved clear.
+    fn through_air(&self, from: Pose, to: Pose) -> Option<Curve> {
+        let air = self.air();
+        let nose = |p: Pose| {
+            let heading = air
+                .wind
+                .heading_for_course(Course(p.heading_rad), air.airspeed_mps)?;
+            Some(Pose::new(p.position(), heading.0))
+        };
+        let zones = self.router.zones();
+        let clearance_m = self.router.limits().clearance_m;
+        let flight = Flight {
+            from: nose(from)?,
+            to: nose(to)?,
+            airframe: &self.airframe,
+            airspeeds: Airspeeds::Only(air.airspeed_mps),
+            wind: air.wind,
+            objective: self.objective,
+            zones,
+            margin_m: clearance_m,
+            turning: TURNING,
+        };
+        let (trajectory, _) = flight.best().ok()?;
+        let curve = trajectory.over_ground(FIT_M);
+        zones.is_clear(&curve, clearance_m).then_some(curve)
+    }
+
+    /// What a curve over the ground costs, metres.
+    pub(super) fn cost_m(&self, curve: &Curve) -> f64 {
+        let air = self.air();
+        match self.objective {
+            Objective::Time => air.air_length_m(curve),
+            Objective::Distance => curve.length_m(),
+            Objective::Energy => Trajectory::along(curve, air.airspeed_mps, air.wind)
+                .map_or(f64::INFINITY, |t| {
+                    t.energy_s(&self.airframe) * self.airframe.cruise_mps
+                }),
+        }
+    }
+
+    /// What a cell costs that is only passed, metres.
+    pub(super) fn passing_m(&self, cell: u16, direction: Direction) -> f64 {
+        let both = self.cells_cost_m.get(usize::from(cell));
+        match (both, direction) {
+            (Some(both), Direction::Forward) => both[0],
+            (Some(both), Direction::Backward) => both[1],
+            (None, _) => self.travel_m(cell),
+        }
+    }
+
+    /// The longest time to turn round in the wind, whatever the course, seconds.
+    #[must_use]
+    pub fn turn_round_s(&self) -> f64 {
+        let air = self.air();
+        let bank_rad = self.airframe.steepest_bank_rad(air.airspeed_mps);
+        let uav = Performance {
+            airspeed_mps: air.airspeed_mps,
+            turn_radius_m: self.airframe.banked_radius_m(air.airspeed_mps, bank_rad) / TURNING,
+        };
+        let origin = Point::new(0.0, 0.0);
+        let time = |course_rad: f64| {
+            let nose = |rad: f64| air.wind.heading_for_course(Course(rad), air.airspeed_mps);
+            let (from, to) = (nose(course_rad)?, nose(course_rad + PI)?);
+            time_s(
+                Pose::new(origin, from.0),
+                Pose::new(origin, to.0),
+                uav,
+                air.wind,
+            )
+            .ok()
+        };
+        (0..COURSES)
+            .map(|i| time(TAU * f64::from(i) / f64::from(COURSES)).unwrap_or(f64::INFINITY))
+            .fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reactive::air::{self, Air};
+    use crate::reactive::follow::{Track, fly};
+    use crate::testing::{CLEARANCE_M, airframe, ground, rectangle};
+    use proptest::prelude::*;
+    use skein_planning::geometry::Polygon;
+    use skein_planning::math::{cos, sin};
+    use skein_planning::trajectory::wind::Wind;
+
+    /// A chart in a wind of `share` of what the turns of the mission allow.
+    fn chart(zones: Vec<Polygon>, share: f64, towards_rad: f64, objective: Objective) -> Chart {
+        let (coverage_loop, router) = ground(8, 6, zones);
+        let a = airframe();
+        let radius_m = router.limits().turn_radius_m;
+        let most_mps = a.airspeed_for_turns_mps(radius_m, 0.0).min(a.cruise_mps);
+        let wind_mps = share * (most_mps - a.least_airspeed_mps());
+        let wind = Wind::new(wind_mps * cos(towards_rad), wind_mps * sin(towards_rad));
+        let airspeed_mps = Air::airspeed_for_turns_mps(&a, wind, radius_m);
+        let mut chart = Chart::new(coverage_loop, router, a).with_objective(objective);
+        chart.breathe(Air { wind, airspeed_mps });
+        chart
+    }
+
+    /// The least distance of a curve from the zones by places a decimetre apart, metres.
+    fn sampled_m(curve: &Curve, zones: &[Polygon]) -> f64 {
+        let mut least_m = f64::INFINITY;
+        let mut at_m = 0.0;
+        while at_m <= curve.length_m() {
+            let p = curve.pose_at(at_m).unwrap().position();
+            let each = zones.iter().map(|z| z.distance_m(p));
+            least_m = each.fold(least_m, f64::min);
+            at_m += 0.1;
+        }
+        least_m
+    }
+
+    fn objectives() -> impl Strategy<Value = Objective> {
+        prop::sample::select(vec![
+            Objective::Time,
+            Objective::Distance,
+            Objective::Energy,
+        ])
+    }
+
+    /// The largest distance from a curve that is flown by percepts every 200 ms, metres.
+    fn strayed_m(chart: &Chart, curve: &Curve) -> f64 {
+        let air = *chart.air();
+        let limit = chart.airframe.max_turn_rate_radps(air.airspeed_mps);
+        let start = curve.start().unwrap();
+        let heading = air
+            .wind
+            .heading_for_course(Course(start.heading_rad), air.airspeed_mps);
+        let mut pose = Pose::new(start.position(), heading.unwrap().0);
+        let (mut track, mut worst_m) = (Track::new(curve), 0.0f64);
+        for _ in 0..3000 {
+            let offset = track.advance(&air.over_ground(pose), 6.0).unwrap();
+            worst_m = worst_m.max(offset.cross_m.abs());
+            if track.left_m() < 1.0 {
+                return worst_m;
+            }
+            let turns = air::steps(&track, offset, &air, limit);
+            pose = fly(pose, air.airspeed_mps, &turns, 200);
+            pose.east_m += 0.2 * air.wind.east_mps;
+            pose.north_m += 0.2 * air.wind.north_mps;
+        }
+        f64::INFINITY
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(96))]
+
+        #[test]
+        fn every_leg_keeps_clear_and_is_followed(
+            share in 0.0f64..1.0, towards in 0.0f64..TAU, objective in objectives(),
+            blocks in prop::collection::vec((20.0f64..340.0, 20.0f64..240.0, 8.0f64..70.0, 8.0f64..70.0), 0..4),
+            from in (0.0f64..380.0, 0.0f64..280.0, -3.1f64..3.1), to in (0.0f64..380.0, 0.0f64..280.0, -3.1f64..3.1),
+        ) {
+            let zones: Vec<Polygon> = blocks.iter().map(|&(x, y, w, h)| rectangle(x, y, w, h)).collect();
+            let chart = chart(zones.clone(), share, towards, objective);
+            let pose = |(x, y, rad): (f64, f64, f64)| Pose::new(Point::new(x, y), rad);
+            let (from, to) = (pose(from), pose(to));
+            let plain = chart.router.route(from, to);
+            let leg = chart.leg(from, to);
+            prop_assert!(leg.is_ok() || plain.is_err());
+            let any = chart.leg_to_point(from, to.position());
+            for curve in [&leg, &any].into_iter().flatten() {
+                prop_assert!(sampled_m(curve, &zones) > CLEARANCE_M - 1e-3);
+                prop_assert!((curve.end().unwrap().position() - to.position()).norm() < 0.01);
+                prop_assert!(curve.largest_gap_m() < 1e-3);
+                let strayed_m = strayed_m(&chart, curve);
+                prop_assert!(strayed_m < 1.0, "{strayed_m}");
+            }
+            if let (Ok(leg), Ok(plain)) = (&leg, &plain) {
+                prop_assert!(chart.cost_m(leg) <= chart.cost_m(plain) + 1e-6);
+                prop_assert!(wrap_pi(leg.end().unwrap().heading_rad - to.heading_rad).abs() < 1e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn turning_with_the_air_saves_time_and_each_objective_gets_its_own() {
+        let charts = [Objective::Time, Objective::Distance, Objective::Energy]
+            .map(|objective| chart(Vec::new(), 1.0, PI / 3.0, objective));
+        let from = Pose::new(Point::new(0.0, 0.0), 0.0);
+        let mut sums = [[0.0; 3]; 4];
+        for i in 0..200 {
+            let (angle_rad, heading_rad) = (f64::from(i) * 2.4, f64::from(i) * 1.7);
+            let away_m = 30.0 + f64::from(i % 20) * 12.0;
+            let at = Point::new(away_m * cos(angle_rad), away_m * sin(angle_rad));
+            let to = Pose::new(at, wrap_pi(heading_rad));
+            let legs = charts.each_ref().map(|c| c.leg(from, to).unwrap());
+            let plain = charts[0].router.route(from, to).unwrap();
+            for (sum, leg) in sums.iter_mut().zip(legs.iter().chain([&plain])) {
+                for (total, c) in sum.iter_mut().zip(&charts) {
+                    *total += c.cost_m(leg);
+                }
+            }
+        }
+        let [time, distance, energy, plain] = sums;
+        assert!(time[0] < 0.97 * plain[0], "{sums:?}");
+        for (i, own) in [time, distance, energy].iter().enumerate() {
+            let others = [time, distance, energy, plain];
+            let least = others.iter().map(|o| o[i]).fold(f64::INFINITY, f64::min);
+            assert!(own[i] <= least + 1e-6, "{i}: {sums:?}");
+        }
+        assert!(time[0] < energy[0] && energy[2] < time[2], "{sums:?}");
+    }
+
+    #[test]
+    fn a_wind_from_any_side_is_turned_round_in_within_what_is_told() {
+        let c = chart(Vec::new(), 0.8, 1.0, Objective::Time);
+        let told_s = c.turn_round_s();
+        for i in 0..24 {
+            let from = Pose::new(Point::new(0.0, 0.0), f64::from(i) * 0.26);
+            let leg = c.leg(from, from.reversed()).unwrap();
+            let took_s = c.air().air_length_m(&leg) / c.air().airspeed_mps;
+            assert!(took_s < told_s + 0.3, "{took_s} {told_s}");
+        }
+    }
+}
