@@ -163,7 +163,7 @@ fn solve<'a>(map: &LaneMap, instance: &'a Instance, args: &CoverArgs) -> Result<
         Ok::<_, TaskError>((task, plan))
     });
     let (task, plan) = planned?;
-    let lower_bound = bounds::reach_moves(&task);
+    let lower_bound = bounds::least_moves(&task);
     let makespan_moves = plan.makespan_moves();
     let cells_total = task.map.n_free();
     let line = Line {

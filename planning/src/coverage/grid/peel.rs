@@ -41,6 +41,7 @@ struct Peel<'a> {
     corridor: Vec<bool>,
     /// By UAV: the corridor, and the cells where regions are entered.
     ways: Vec<Vec<Cell>>,
+    backs: Vec<Vec<Cell>>,
     entries: Vec<Vec<Cell>>,
     n_regions: u32,
     /// The cells taken so far.
@@ -66,6 +67,7 @@ pub fn orders(task: &Task, offset: (u32, u32), moves: u32) -> (Vec<Vec<Cell>>, u
         step: steps(map),
         corridor: vec![false; map.table_len()],
         ways: vec![Vec::new(); task.n_uavs()],
+        backs: vec![Vec::new(); task.n_uavs()],
         entries: vec![Vec::new(); task.n_uavs()],
         n_regions: 0,
         taken: Vec::new(),
@@ -112,6 +114,19 @@ impl Peel<'_> {
             }
         }
         waiting.sort_unstable();
+        self.cheapest(goal, |at| {
+            let first = waiting.partition_point(|w| w.0 < at);
+            let (root, uav) = waiting.get(first)?;
+            (*root == at).then_some(*uav)
+        })
+    }
+
+    /// The cheapest corridor that ends at `goal` and begins where `is_there` says so.
+    fn cheapest<T>(
+        &mut self,
+        goal: Cell,
+        is_there: impl Fn(Cell) -> Option<T>,
+    ) -> Option<(T, Vec<Cell>)> {
         self.search += 1;
         self.cost[goal as usize] = (self.search, 0, NOWHERE);
         // Buckets by cost, as many as a step can cost, used in turn.
@@ -129,17 +144,14 @@ impl Peel<'_> {
             if self.cost[at as usize].1 < cost {
                 continue;
             }
-            let first = waiting.partition_point(|w| w.0 < at);
-            if let Some((root, uav)) = waiting.get(first)
-                && *root == at
-            {
+            if let Some(found) = is_there(at) {
                 let mut way = Vec::new();
                 let mut step = at;
                 while step != NOWHERE {
                     way.push(step);
                     step = self.cost[step as usize].2;
                 }
-                return Some((*uav, way));
+                return Some((found, way));
             }
             for near in self.map.around(at) {
                 let step = self.step[near as usize];
@@ -203,16 +215,16 @@ impl Peel<'_> {
         }
         let prefix = &way[..(before as usize).min(way.len())];
         let mut here = way.get(before as usize).copied();
-        if self.task.closed {
-            self.widen(prefix, &mut here);
-        } else {
-            for cell in prefix {
-                if self.is_left(*cell) {
-                    self.claim(*cell);
-                    self.corridor[*cell as usize] = true;
-                    self.ways[uav].push(*cell);
-                }
-            }
+        let mine = self.lay(prefix);
+        self.ways[uav] = mine;
+        if self.task.closed
+            && let Some(entry) = here
+        {
+            self.n_regions += 1;
+            let back = self.way_back(entry, self.task.roots[uav]);
+            let length = u32::try_from(back.len()).unwrap_or(u32::MAX);
+            spent += length.saturating_sub(before);
+            self.backs[uav] = self.lay(&back);
         }
         while let Some(entry) = here {
             self.entries[uav].push(entry);
@@ -228,24 +240,35 @@ impl Peel<'_> {
         self.n_regions += 1;
     }
 
+    /// Makes what is left on a way a corridor; the cells of it.
+    fn lay(&mut self, way: &[Cell]) -> Vec<Cell> {
+        let mut mine = Vec::new();
+        for cell in way {
+            if self.is_left(*cell) {
+                self.claim(*cell);
+                self.corridor[*cell as usize] = true;
+                mine.push(*cell);
+            }
+        }
+        mine
+    }
+
+    /// The cheapest corridor from a region's entry to the root.
+    fn way_back(&mut self, entry: Cell, root: Cell) -> Vec<Cell> {
+        // The search runs from the root, so that the links lead there.
+        let mut way = self
+            .cheapest(root, |at| (at == entry).then_some(()))
+            .map(|(_, way)| way)
+            .unwrap_or_default();
+        if way.first() == Some(&entry) {
+            way.remove(0);
+        }
+        way
+    }
+
     /// How often a UAV flies the way to its region.
     fn ways_each(&self) -> u32 {
         if self.task.closed { 2 } else { 1 }
-    }
-
-    /// Makes the last part of the way that nobody covers yet, as wide as the blocks it
-    /// passes, part of the region at hand: a UAV that returns flies it both ways.
-    fn widen(&mut self, way: &[Cell], entry: &mut Option<Cell>) {
-        for cell in way.iter().rev() {
-            if self.is_left(*cell) {
-                for part in self.piece(*cell) {
-                    self.claim(part);
-                }
-            } else if self.owner[*cell as usize] != self.n_regions {
-                return;
-            }
-            *entry = Some(*cell);
-        }
     }
 
     /// Takes cells round `goal`, far ones first, until they and the way `before` them
@@ -361,11 +384,12 @@ impl Peel<'_> {
             &entries,
         );
         let mut orders = Vec::new();
-        for (way, entries) in self.ways.iter().zip(&self.entries) {
+        for ((way, back), entries) in self.ways.iter().zip(&self.backs).zip(&self.entries) {
             let mut order = way.clone();
             for entry in entries {
                 order.extend(loops.from(*entry));
             }
+            order.extend(back);
             orders.push(order);
         }
         insert_missing(self.task, orders)
