@@ -2,6 +2,7 @@
 
 pub mod area;
 mod dice;
+pub mod exact;
 pub mod grid;
 pub mod line;
 pub mod metric;

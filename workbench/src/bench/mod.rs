@@ -1,6 +1,7 @@
 //! `bench`: one planner, one set of instances, one JSON object with errors and times.
 
 pub mod cover;
+pub mod cover_exact;
 pub mod cover_loop;
 pub mod dubins;
 pub mod figures;
@@ -28,6 +29,8 @@ pub struct BenchArgs {
 pub enum Subject {
     /// Coverage plans for a team on public grid maps.
     Cover(cover::CoverArgs),
+    /// Exact coverage of areas with no-fly zones by straight passes.
+    Exact(cover_exact::ExactArgs),
     /// The loop over all cells of a large map, and its exact division.
     CoverLoop(cover_loop::CoverLoopArgs),
     /// Shortest Dubins curves to random goals.
@@ -53,6 +56,7 @@ pub enum Subject {
 pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
     match &args.subject {
         Subject::Cover(args) => cover::run(args),
+        Subject::Exact(args) => cover_exact::run(args),
         Subject::CoverLoop(args) => cover_loop::run(args),
         Subject::Dubins(args) => dubins::run(args),
         Subject::Headings(args) => headings::run(args),
