@@ -8,7 +8,9 @@
 
 mod blocks;
 mod build;
+mod lines;
 mod locate;
+mod triangles;
 
 use crate::frame::Point;
 use robust::{Coord, orient2d};

@@ -1,15 +1,13 @@
 //! A mesh from an area with holes: triangulate, keep what is free, merge.
 //!
-//! The triangulation is constrained Delaunay (`spade`, exact predicates). What is
-//! free is decided by parity: each ring line that is crossed changes sides. Then
+//! The triangulation is constrained Delaunay ([`super::triangles`]). What is free is decided by parity: each ring line that is crossed changes sides. Then
 //! every line between two free cells that together are convex is taken out, the
 //! longest first: fewer cells mean fewer steps of a search.
 
+use super::triangles::{FRAME, Triangles, WALL, next, previous};
 use super::{HalfEdge, MAX_MESH_COORDINATE_M, Mesh, MeshError, NONE, turn};
 use crate::frame::Point;
 use crate::geometry::Polygon;
-use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
-use std::collections::VecDeque;
 
 /// Coordinates below this are zero: the triangulation squares them without underflow.
 const SMALLEST_M: f64 = 1e-30;
@@ -40,34 +38,34 @@ impl Mesh {
     /// As [`Mesh::from_polygons`], and [`MeshError::BadCoordinate`], counted over
     /// all rings.
     pub fn from_rings(rings: &[&[Point]]) -> Result<Self, MeshError> {
-        let (points, ids) = distinct(rings)?;
-        let mut lines = Vec::with_capacity(ids.len());
+        let (mut triangles, ids) = Triangles::of(&checked(rings)?);
         let mut first = 0;
+        let mut is_empty = true;
         for ring in rings {
             for i in 0..ring.len() {
                 let a = ids[first + i];
                 let b = ids[first + (i + 1) % ring.len()];
                 if a != b {
-                    lines.push([a as usize, b as usize]);
+                    is_empty = false;
+                    triangles.set_line(a, b)?;
                 }
             }
             first += ring.len();
         }
-        if lines.is_empty() {
+        if is_empty {
             return Err(MeshError::Empty);
         }
-        let triangles = Triangles::of(&points, lines)?;
-        triangles.merge().into_mesh(&points)
+        Faces::of(triangles).merge().into_mesh()
     }
 }
 
-/// Distinct points of all rings, and the point of each ring vertex.
-fn distinct(rings: &[&[Point]]) -> Result<(Vec<Point>, Vec<u32>), MeshError> {
+/// The points of all rings.
+fn checked(rings: &[&[Point]]) -> Result<Vec<Point>, MeshError> {
     let snap = |c: f64| if c.abs() < SMALLEST_M { 0.0 } else { c };
     let all: Vec<Point> = rings
         .iter()
         .flat_map(|ring| ring.iter())
-        .map(|p| Point::new(snap(p.x), snap(p.y)))
+        .map(|p| p.map(snap))
         .collect();
     let bad = |c: f64| !c.is_finite() || c.abs() > MAX_MESH_COORDINATE_M;
     if let Some(i) = all.iter().position(|p| bad(p.x) || bad(p.y)) {
@@ -76,159 +74,116 @@ fn distinct(rings: &[&[Point]]) -> Result<(Vec<Point>, Vec<u32>), MeshError> {
     if all.len() >= NONE as usize / 8 {
         return Err(MeshError::TooLarge(all.len(), NONE / 8));
     }
-    let mut order: Vec<u32> = (0..all.len() as u32).collect();
-    let by_place = |&a: &u32, &b: &u32| {
-        let (p, q) = (all[a as usize], all[b as usize]);
-        p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y))
-    };
-    order.sort_unstable_by(by_place);
-    let mut points: Vec<Point> = Vec::with_capacity(all.len());
-    let mut ids = vec![0u32; all.len()];
-    for i in order {
-        let p = all[i as usize];
-        if points.last().is_none_or(|q| (p - q).norm_squared() > 0.0) {
-            points.push(p);
-        }
-        ids[i as usize] = points.len() as u32 - 1;
+    if all.is_empty() {
+        return Err(MeshError::Empty);
     }
-    Ok((points, ids))
+    Ok(all)
 }
 
-/// A planar subdivision by directed edges; `e ^ 1` is `e` the other way round.
-struct Triangles<'a> {
-    points: &'a [Point],
+/// Faces of a planar subdivision by their half-edges.
+struct Faces {
+    points: Vec<Point>,
     origin: Vec<u32>,
+    twin: Vec<u32>,
     next: Vec<u32>,
     previous: Vec<u32>,
-    /// Whether the face on the left is free.
+    /// Whether a triangle is free.
     free: Vec<bool>,
-    /// Whether the edge was taken out.
+    /// Whether the side was taken out.
     gone: Vec<bool>,
 }
 
-impl<'a> Triangles<'a> {
-    fn of(points: &'a [Point], lines: Vec<[usize; 2]>) -> Result<Self, MeshError> {
-        let vertices = points.iter().map(|p| Point2::new(p.x, p.y)).collect();
-        let mut crossing = None;
-        let cdt: ConstrainedDelaunayTriangulation<Point2<f64>> =
-            ConstrainedDelaunayTriangulation::try_bulk_load_cdt(vertices, lines.clone(), |line| {
-                crossing = crossing.or(Some(line));
-            })
-            .map_err(|_| MeshError::Empty)?;
-        if let Some([a, b]) = crossing {
-            return Err(MeshError::Crossing(points[a], points[b]));
-        }
-        let n = cdt.num_directed_edges();
-        let mut edges = Self {
-            points,
-            origin: vec![0; n],
-            next: vec![NONE; n],
-            previous: vec![NONE; n],
-            free: vec![false; n],
-            gone: vec![false; n],
-        };
-        let mut around = vec![NONE; points.len()];
-        for e in cdt.directed_edges() {
-            let i = e.fix().index();
-            edges.origin[i] = e.from().fix().index() as u32;
-            edges.next[i] = e.next().fix().index() as u32;
-            edges.previous[i] = e.prev().fix().index() as u32;
-            around[edges.origin[i] as usize] = i as u32;
-        }
-        let outside = cdt
-            .outer_face()
-            .adjacent_edge()
-            .ok_or(MeshError::Empty)?
-            .fix()
-            .index() as u32;
-        let walls = edges.walls(&around, &lines)?;
-        edges.fill(&walls, outside);
-        Ok(edges)
-    }
-
-    fn at(&self, edge: u32) -> Point {
-        self.points[self.origin[edge as usize] as usize]
-    }
-
-    /// Which edges change sides: those that an odd number of ring lines runs over.
-    fn walls(&self, around: &[u32], lines: &[[usize; 2]]) -> Result<Vec<bool>, MeshError> {
-        let mut walls = vec![false; self.origin.len()];
-        for &[a, b] in lines {
-            let (mut at, to) = (a as u32, b as u32);
-            let crossing = MeshError::Crossing(self.points[a], self.points[b]);
-            while at != to {
-                let e = self
-                    .towards(around[at as usize], to)
-                    .ok_or(crossing.clone())?;
-                walls[e as usize] = !walls[e as usize];
-                walls[e as usize ^ 1] = !walls[e as usize ^ 1];
-                at = self.origin[e as usize ^ 1];
-            }
-        }
-        Ok(walls)
-    }
-
-    /// The edge from a vertex to `to`, or to a vertex on the straight way there.
-    fn towards(&self, first: u32, to: u32) -> Option<u32> {
-        let goal = self.points[to as usize];
-        let mut e = first;
-        let mut on_the_way = None;
-        loop {
-            let end = self.origin[e as usize ^ 1];
-            if end == to {
-                return Some(e);
-            }
-            let (a, b) = (self.at(e), self.points[end as usize]);
-            if turn(a, b, goal).abs() <= 0.0 && (b - a).dot(&(goal - a)) > 0.0 {
-                on_the_way = Some(e);
-            }
-            e = self.previous[e as usize] ^ 1;
-            if e == first {
-                return on_the_way;
-            }
-        }
-    }
-
-    /// Colours all faces from the outside inwards.
-    fn fill(&mut self, walls: &[bool], outside: u32) {
-        let mut seen = vec![false; self.origin.len()];
-        let mut queue = VecDeque::from([(outside, false)]);
-        while let Some((first, free)) = queue.pop_front() {
-            if seen[first as usize] {
+/// Which triangles lie inside an odd number of rings.
+fn free_triangles(triangles: &Triangles) -> Vec<bool> {
+    let n = triangles.origin.len() / 3;
+    let mut free = vec![false; n];
+    let mut seen = vec![false; n];
+    let of_the_frame = triangles.around[0] / 3;
+    let mut stack = vec![of_the_frame];
+    seen[of_the_frame as usize] = true;
+    while let Some(t) = stack.pop() {
+        for e in 3 * t..3 * t + 3 {
+            let twin = triangles.twin[e as usize];
+            if twin == NONE || seen[twin as usize / 3] {
                 continue;
             }
-            let mut e = first;
-            loop {
-                seen[e as usize] = true;
-                self.free[e as usize] = free;
-                if !seen[e as usize ^ 1] {
-                    queue.push_back((e ^ 1, free != walls[e as usize]));
-                }
-                e = self.next[e as usize];
-                if e == first {
-                    break;
-                }
-            }
+            let is_wall = triangles.marks[e as usize] & WALL != 0;
+            seen[twin as usize / 3] = true;
+            free[twin as usize / 3] = free[t as usize] != is_wall;
+            stack.push(twin / 3);
+        }
+    }
+    free
+}
+
+impl Faces {
+    fn of(triangles: Triangles) -> Self {
+        let n = triangles.origin.len();
+        Self {
+            free: free_triangles(&triangles),
+            points: triangles.points,
+            origin: triangles.origin,
+            twin: triangles.twin,
+            next: (0..n as u32).map(next).collect(),
+            previous: (0..n as u32).map(previous).collect(),
+            gone: vec![false; n],
         }
     }
 
-    /// Takes out every line between two free faces that together are convex.
+    fn at(&self, side: u32) -> Point {
+        self.points[self.origin[side as usize] as usize]
+    }
+
+    fn is_free(&self, side: u32) -> bool {
+        self.free[side as usize / 3]
+    }
+
+    /// Takes out every side between two free faces that together are convex.
     fn merge(mut self) -> Self {
-        let mut inner: Vec<(u64, u32)> = (0..self.origin.len() as u32)
-            .step_by(2)
-            .filter(|&e| self.free[e as usize] && self.free[e as usize ^ 1])
-            .map(|e| ((self.at(e ^ 1) - self.at(e)).norm_squared().to_bits(), e))
-            .collect();
-        // Squares are not negative, so their bits sort as they do.
-        inner.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
-        for (_, e) in inner {
+        for e in self.inner_longest_first() {
             self.try_take_out(e);
         }
         self
     }
 
+    /// The sides between free faces, by length to within a few per cent.
+    fn inner_longest_first(&self) -> Vec<u32> {
+        /// Bits of a length's square that do not count: an octave is cut in sixteen.
+        const FINE_BITS: u32 = 48;
+        /// What is 2⁶⁴ times shorter than the longest is as good as that.
+        const CLASSES: usize = 16 * 128;
+        let is_inner = |&(e, &twin): &(u32, &u32)| {
+            e < twin && twin != NONE && self.is_free(e) && self.is_free(twin)
+        };
+        // Squares are not negative, so their bits sort as they do.
+        let inner: Vec<(u32, u32)> = (0..)
+            .zip(&self.twin)
+            .filter(is_inner)
+            .map(|(e, &twin)| {
+                let square = (self.at(twin) - self.at(e)).norm_squared();
+                ((square.to_bits() >> FINE_BITS) as u32, e)
+            })
+            .collect();
+        let longest = inner.iter().map(|&(class, _)| class).max().unwrap_or(0);
+        let class = |c: u32| ((longest - c) as usize).min(CLASSES - 1);
+        let mut ends = vec![0u32; CLASSES + 1];
+        for &(c, _) in &inner {
+            ends[class(c) + 1] += 1;
+        }
+        for c in 0..CLASSES {
+            ends[c + 1] += ends[c];
+        }
+        let mut sorted = vec![0u32; inner.len()];
+        for (c, e) in inner {
+            let end = &mut ends[class(c)];
+            sorted[*end as usize] = e;
+            *end += 1;
+        }
+        sorted
+    }
+
     fn try_take_out(&mut self, e: u32) {
-        let back = e ^ 1;
+        let back = self.twin[e as usize];
         if self.stays_convex(e, back) && self.stays_convex(back, e) {
             self.join(self.previous[e as usize], self.next[back as usize]);
             self.join(self.previous[back as usize], self.next[e as usize]);
@@ -252,7 +207,7 @@ impl<'a> Triangles<'a> {
     }
 
     /// The free faces as cells.
-    fn into_mesh(self, points: &[Point]) -> Result<Mesh, MeshError> {
+    fn into_mesh(self) -> Result<Mesh, MeshError> {
         let n = self.origin.len();
         let mut index = vec![NONE; n];
         let mut edges = Vec::with_capacity(n);
@@ -260,7 +215,7 @@ impl<'a> Triangles<'a> {
         let mut starts = vec![0];
         for first in 0..n as u32 {
             let i = first as usize;
-            if !self.free[i] || self.gone[i] || index[i] != NONE {
+            if !self.is_free(first) || self.gone[i] || index[i] != NONE {
                 continue;
             }
             let mut e = first;
@@ -269,7 +224,7 @@ impl<'a> Triangles<'a> {
                 sources.push(e);
                 edges.push(HalfEdge {
                     origin: self.at(e),
-                    vertex: self.origin[e as usize],
+                    vertex: self.origin[e as usize] - FRAME,
                     twin: NONE,
                     cell: starts.len() as u32 - 1,
                     block: NONE,
@@ -285,9 +240,14 @@ impl<'a> Triangles<'a> {
             return Err(MeshError::Empty);
         }
         for (edge, &e) in edges.iter_mut().zip(&sources) {
-            edge.twin = index[e as usize ^ 1];
+            let twin = self.twin[e as usize];
+            edge.twin = if twin == NONE {
+                NONE
+            } else {
+                index[twin as usize]
+            };
         }
-        Mesh::finish(points, edges, starts)
+        Mesh::finish(&self.points[FRAME as usize..], edges, starts)
     }
 }
 

@@ -61,85 +61,95 @@ impl Buckets {
         &self.cells[self.starts[bucket] as usize..self.starts[bucket + 1] as usize]
     }
 
-    /// Two passes over all cells: count, then place.
+    /// Gathers which cells reach into which rows, counts, then places.
     fn fill(&mut self, mesh: &Mesh) {
-        let mut counts = vec![0u32; self.n[0] * self.n[1] + 1];
-        let mut spans = Vec::new();
-        for cell in 0..mesh.n_cells() {
+        let mut spans = Vec::with_capacity(2 * mesh.n_cells());
+        for cell in 0..mesh.n_cells() as u32 {
             self.spans(mesh, cell, &mut spans);
-            for &(row, from, to) in &spans {
-                for bucket in row * self.n[0] + from..=row * self.n[0] + to {
-                    counts[bucket + 1] += 1;
-                }
+        }
+        let mut starts = vec![0u32; self.n[0] * self.n[1] + 1];
+        for span in &spans {
+            for bucket in span.from..=span.to {
+                starts[bucket as usize + 1] += 1;
             }
         }
-        for i in 1..counts.len() {
-            counts[i] += counts[i - 1];
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
         }
-        let mut fill = counts.clone();
-        let mut cells = vec![0u32; counts[counts.len() - 1] as usize];
-        for cell in 0..mesh.n_cells() {
-            self.spans(mesh, cell, &mut spans);
-            for &(row, from, to) in &spans {
-                for bucket in row * self.n[0] + from..=row * self.n[0] + to {
-                    cells[fill[bucket] as usize] = cell as u32;
-                    fill[bucket] += 1;
-                }
+        let mut cells = vec![0u32; starts[starts.len() - 1] as usize];
+        // Each start moves to its bucket's end, which is where the next one starts.
+        for span in &spans {
+            for bucket in span.from..=span.to {
+                let at = &mut starts[bucket as usize];
+                cells[*at as usize] = span.cell;
+                *at += 1;
             }
         }
-        self.starts = counts;
+        starts.rotate_right(1);
+        starts[0] = 0;
+        self.starts = starts;
         self.cells = cells;
     }
 
-    /// The row and the first and last column of buckets that a cell reaches into.
-    fn spans(&self, mesh: &Mesh, cell: usize, into: &mut Vec<(usize, usize, usize)>) {
+    /// The buckets of each row that a cell reaches into.
+    fn spans(&self, mesh: &Mesh, cell: u32, into: &mut Vec<Span>) {
         // Rounding moves a border by far less than this share of a bucket.
         const SLACK: f64 = 1e-6;
-        into.clear();
-        let column = |x: f64| x.clamp(0.0, self.n[0] as f64 - 1.0) as usize;
-        let row = |y: f64| y.clamp(0.0, self.n[1] as f64 - 1.0) as usize;
-        let scaled = |p: Point| {
-            let at = |k: usize| (p[k] - self.low[k]) * self.per_m[k];
-            (at(0), at(1))
-        };
-        let edges = &mesh.edges[mesh.starts[cell] as usize..mesh.starts[cell + 1] as usize];
-        let (mut bottom, mut top) = (f64::INFINITY, f64::NEG_INFINITY);
+        let clamped = |x: f64, k: usize| x.clamp(0.0, self.n[k] as f64 - 1.0) as usize;
+        let scaled = |p: Point| [0, 1].map(|k| (p[k] - self.low[k]) * self.per_m[k]);
+        let (first, last) = (mesh.starts[cell as usize], mesh.starts[cell as usize + 1]);
+        let edges = &mesh.edges[first as usize..last as usize];
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for e in edges {
-            let (_, y) = scaled(e.origin);
-            bottom = bottom.min(y);
-            top = top.max(y);
+            let p = scaled(e.origin);
+            for k in 0..2 {
+                low[k] = low[k].min(p[k]);
+                high[k] = high[k].max(p[k]);
+            }
         }
-        for r in row(bottom - SLACK)..=row(top + SLACK) {
-            let (y0, y1) = (r as f64 - SLACK, r as f64 + 1.0 + SLACK);
+        let rows = clamped(low[1] - SLACK, 1)..=clamped(high[1] + SLACK, 1);
+        let mut add = |row: usize, from: f64, to: f64| {
+            let bucket = |x: f64| (row * self.n[0] + clamped(x, 0)) as u32;
+            let (from, to) = (bucket(from - SLACK), bucket(to + SLACK));
+            into.push(Span { from, to, cell });
+        };
+        // Low or narrow cells fill their box well enough.
+        if rows.end() - rows.start() < 2 || high[0] - low[0] < 1.0 {
+            rows.for_each(|row| add(row, low[0], high[0]));
+            return;
+        }
+        for row in rows {
+            let (y0, y1) = (row as f64 - SLACK, row as f64 + 1.0 + SLACK);
             let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
             let mut a = scaled(edges[edges.len() - 1].origin);
             for e in edges {
                 let b = scaled(e.origin);
                 // The part of this side between the row's lower and upper line.
-                let (lo, hi) = if a.1 <= b.1 { (a, b) } else { (b, a) };
-                if hi.1 >= y0 && lo.1 <= y1 {
-                    let height = hi.1 - lo.1;
-                    let x_at = |y: f64| {
-                        if height > 0.0 {
-                            lo.0 + (hi.0 - lo.0) * ((y - lo.1) / height).clamp(0.0, 1.0)
-                        } else {
-                            lo.0
-                        }
+                let (lo, hi) = if a[1] <= b[1] { (a, b) } else { (b, a) };
+                if hi[1] >= y0 && lo[1] <= y1 {
+                    let height = hi[1] - lo[1];
+                    let x_at =
+                        |y: f64| lo[0] + (hi[0] - lo[0]) * ((y - lo[1]) / height).clamp(0.0, 1.0);
+                    let ends = if height > 0.0 {
+                        [x_at(y0), x_at(y1)]
+                    } else {
+                        [lo[0], hi[0]]
                     };
-                    for x in [
-                        x_at(y0),
-                        x_at(y1),
-                        if height > 0.0 { x_at(y0) } else { hi.0 },
-                    ] {
-                        from = from.min(x);
-                        to = to.max(x);
-                    }
+                    from = from.min(ends[0]).min(ends[1]);
+                    to = to.max(ends[0]).max(ends[1]);
                 }
                 a = b;
             }
             if from <= to {
-                into.push((r, column(from - SLACK), column(to + SLACK)));
+                add(row, from, to);
             }
         }
     }
+}
+
+/// Neighbouring buckets of a row that a cell reaches into.
+struct Span {
+    from: u32,
+    to: u32,
+    cell: u32,
 }
