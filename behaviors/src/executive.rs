@@ -42,6 +42,7 @@ use skein_planning::coverage::area::backtracking::Leg;
 use skein_planning::coverage::area::{CoverageLoop, Direction};
 use skein_planning::frame::{Point, Pose};
 use skein_planning::path::Router;
+use skein_planning::trajectory::timed::Objective;
 use skein_planning::trajectory::wind::Wind;
 use skein_planning::trajectory::{Curve, Segment};
 use std::collections::VecDeque;
@@ -170,6 +171,9 @@ pub struct Executive {
     recent: VecDeque<u16>,
     /// Events that came up between two steps.
     pending: Vec<Event>,
+    /// Where it must be able to return to, and how long that takes from the farthest
+    /// boundary of the loop, milliseconds.
+    home: Option<(Point, u32)>,
 }
 
 impl Executive {
@@ -197,7 +201,24 @@ impl Executive {
             played: None,
             recent: VecDeque::with_capacity(RECENT),
             pending: Vec::new(),
+            home: None,
         }
+    }
+
+    /// The same with an objective for its legs off the loop and its airspeed.
+    #[must_use]
+    pub fn with_objective(mut self, objective: Objective) -> Self {
+        self.chart = self.chart.with_objective(objective);
+        let wind = self.chart.air().wind;
+        self.breathe(wind);
+        self
+    }
+
+    /// The same with a place to which it must be able to return before its reserve.
+    #[must_use]
+    pub fn with_home(mut self, home: Point) -> Self {
+        self.home = Some((home, self.return_ms(home)));
+        self
     }
 
     /// The same, with the tracking error of the mission, metres: the envelope lets
@@ -285,10 +306,16 @@ impl Executive {
         if changed_mps.is_nan() || changed_mps < NOTICED_MPS {
             return;
         }
+        self.breathe(wind);
+    }
+
+    fn breathe(&mut self, wind: Wind) {
         let radius_m = self.chart.router.limits().turn_radius_m;
-        let wanted = Air::airspeed_for_turns_mps(&self.chart.airframe, wind, radius_m);
+        let (airframe, objective) = (&self.chart.airframe, self.chart.objective);
+        let wanted = Air::airspeed_for_mps(objective, airframe, wind, radius_m);
         let airspeed_mps = self.envelope.airspeed_mps(wanted);
         self.chart.breathe(Air { wind, airspeed_mps });
+        self.home = self.home.map(|(home, _)| (home, self.return_ms(home)));
     }
 
     /// Reports the cells that the camera saw since the last percept.

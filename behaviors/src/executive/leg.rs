@@ -13,10 +13,10 @@
 use super::chart::Chart;
 use skein_planning::coverage::area::Direction;
 use skein_planning::frame::{Point, Pose};
-use skein_planning::math::{PI, TAU, atan2, wrap_pi};
+use skein_planning::math::{TAU, atan2, wrap_pi};
 use skein_planning::path::RouteError;
 use skein_planning::trajectory::timed::{Airspeeds, Flight, Objective};
-use skein_planning::trajectory::wind::{Course, Performance, time_s};
+use skein_planning::trajectory::wind::{Course, Performance, turn_round_s};
 use skein_planning::trajectory::{Curve, Trajectory};
 
 /// Lines and arcs stray at most this from the trochoid that they stand for, metres: a
@@ -129,21 +129,7 @@ impl Chart {
             airspeed_mps: air.airspeed_mps,
             turn_radius_m: self.airframe.banked_radius_m(air.airspeed_mps, bank_rad) / TURNING,
         };
-        let origin = Point::new(0.0, 0.0);
-        let time = |course_rad: f64| {
-            let nose = |rad: f64| air.wind.heading_for_course(Course(rad), air.airspeed_mps);
-            let (from, to) = (nose(course_rad)?, nose(course_rad + PI)?);
-            time_s(
-                Pose::new(origin, from.0),
-                Pose::new(origin, to.0),
-                uav,
-                air.wind,
-            )
-            .ok()
-        };
-        (0..COURSES)
-            .map(|i| time(TAU * f64::from(i) / f64::from(COURSES)).unwrap_or(f64::INFINITY))
-            .fold(0.0, f64::max)
+        turn_round_s(uav, air.wind).unwrap_or(f64::INFINITY)
     }
 }
 
@@ -155,7 +141,7 @@ mod tests {
     use crate::testing::{CLEARANCE_M, airframe, ground, rectangle};
     use proptest::prelude::*;
     use skein_planning::geometry::Polygon;
-    use skein_planning::math::{cos, sin};
+    use skein_planning::math::{PI, cos, sin};
     use skein_planning::trajectory::wind::Wind;
 
     /// A chart in a wind of `share` of what the turns of the mission allow.

@@ -8,7 +8,9 @@ use super::{Executive, Forecast, Kind};
 use crate::percept::Percept;
 use skein_planning::coverage::area::Direction;
 use skein_planning::coverage::area::backtracking::Leg;
-use skein_planning::math::PI;
+use skein_planning::frame::Point;
+use skein_planning::math::{PI, atan2};
+use skein_planning::trajectory::wind::Course;
 use std::collections::VecDeque;
 
 /// Told instead of a time when there is no way: a day, beyond any endurance.
@@ -16,6 +18,10 @@ pub const UNREACHABLE_MS: u32 = 86_400_000;
 
 /// Time added to a turn, milliseconds: a setpoint and its corrections.
 const TURN_MARGIN_MS: f64 = 1000.0;
+
+/// A turn at each end of the way home, seconds: two full circles of a UAV of cruise
+/// 13 m/s at half of its bank.
+const TURNS_S: f64 = 30.0;
 
 /// One stretch of the flight to come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,11 +161,40 @@ impl Executive {
         self.schedule(legs, is_open).last().map_or(0, |(_, ms)| *ms)
     }
 
-    /// Flight time that may still be planned: what is left less the reserve,
-    /// milliseconds.
+    /// Flight time that may still be planned: what is left less the reserve and the way
+    /// home, milliseconds.
     #[must_use]
     pub fn spendable_ms(&self, percept: &Percept) -> u32 {
+        let home_ms = self.home.map_or(0, |(_, ms)| ms);
         whole_ms((percept.endurance_s - self.chart.airframe.reserve_s) * 1000.0)
+            .saturating_sub(home_ms)
+    }
+
+    /// The longest way home from the loop, at cruise, in a wind at what it leaves of the
+    /// airspeed on that course, with a turn at each end, milliseconds.
+    pub(super) fn return_ms(&self, home: Point) -> u32 {
+        let (chart, air) = (&self.chart, self.chart.air());
+        let cruise_mps = chart.airframe.cruise_mps.max(1.0);
+        let way_s = |i: usize| {
+            let way = home - chart.coverage_loop.boundary(i).position();
+            let speed_mps = if air.is_calm() {
+                Some(cruise_mps)
+            } else {
+                let course = Course(atan2(way.y, way.x));
+                air.wind.ground_speed_mps(course, air.airspeed_mps)
+            };
+            let makes_way = speed_mps.filter(|speed| *speed > 0.0);
+            makes_way.map_or(f64::INFINITY, |speed| way.norm() / speed)
+        };
+        let longest_s = (0..chart.coverage_loop.len())
+            .map(way_s)
+            .fold(0.0, f64::max);
+        let turns_s = if air.is_calm() {
+            TURNS_S
+        } else {
+            TURNS_S.max(2.0 * chart.turn_round_s())
+        };
+        whole_ms((longest_s + turns_s) * 1000.0).min(UNREACHABLE_MS)
     }
 
     /// Mean speed over the ground along the whole loop, m/s: cruise in calm air.

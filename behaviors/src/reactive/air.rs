@@ -10,10 +10,11 @@
 
 use super::follow::{CORRECTION_S, HORIZON_S, Offset, Steps, Track, correction};
 use crate::setpoint::Steer;
-use skein_planning::airframe::Airframe;
+use skein_planning::airframe::{Airframe, PowerModel};
 use skein_planning::frame::Pose;
-use skein_planning::math::{cos, wrap_pi};
-use skein_planning::trajectory::wind::{Heading, Wind};
+use skein_planning::math::{TAU, cos, wrap_pi};
+use skein_planning::trajectory::timed::Objective;
+use skein_planning::trajectory::wind::{Course, Heading, Wind};
 use skein_planning::trajectory::{Curve, Trajectory};
 
 /// Winds below this are left to the feedback, m/s: a percent of any airspeed.
@@ -22,6 +23,13 @@ const CALM_MPS: f64 = 0.1;
 /// A turn over the ground is flown as steps of constant rate no longer than this,
 /// seconds: between their ends the heading is off by a thousandth of a radian.
 const ARC_STEP_S: f64 = 0.4;
+
+/// Airspeeds compared for the thriftiest: neighbours differ by a tenth of a m/s or two,
+/// and near its least value an energy changes with the square of that.
+const AIRSPEEDS: u8 = 40;
+
+/// Courses over which its energy is averaged.
+const COURSES: u8 = 16;
 
 /// The wind that a UAV flies in, and its airspeed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +64,40 @@ impl Air {
             return airframe.cruise_mps;
         }
         airframe.airspeed_for_turns_mps(radius_m, wind.speed_mps())
+    }
+
+    /// The airspeed for an objective, m/s: for energy the one that spends least on a
+    /// metre over the ground, averaged over all courses, and no more than turns allow;
+    /// else as fast as they allow.
+    #[must_use]
+    pub fn airspeed_for_mps(
+        objective: Objective,
+        airframe: &Airframe,
+        wind: Wind,
+        radius_m: f64,
+    ) -> f64 {
+        let most_mps = Self::airspeed_for_turns_mps(airframe, wind, radius_m);
+        let least_mps = airframe.least_airspeed_mps();
+        if objective != Objective::Energy || least_mps >= most_mps {
+            return most_mps;
+        }
+        let model = PowerModel::of(airframe);
+        let each_metre = |airspeed_mps: f64| {
+            let over = |i: u8| {
+                let course = Course(TAU * f64::from(i) / f64::from(COURSES));
+                let speed = wind.ground_speed_mps(course, airspeed_mps);
+                let makes_way = speed.filter(|speed| *speed > 0.0);
+                makes_way.map_or(f64::INFINITY, |speed| 1.0 / speed)
+            };
+            model.share(airspeed_mps, 0.0) * (0..COURSES).map(over).sum::<f64>()
+        };
+        let share =
+            |i: u8| least_mps + (most_mps - least_mps) * f64::from(i) / f64::from(AIRSPEEDS);
+        (0..=AIRSPEEDS)
+            .map(|i| share(AIRSPEEDS - i))
+            .map(|mps| (each_metre(mps), mps))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or(most_mps, |(_, mps)| mps)
     }
 
     /// The same place with the course instead of the heading.
@@ -161,7 +203,7 @@ mod tests {
     use crate::testing::airframe;
     use proptest::prelude::*;
     use skein_planning::frame::Point;
-    use skein_planning::math::{FRAC_PI_2, PI, TAU, sin};
+    use skein_planning::math::{FRAC_PI_2, PI, sin};
 
     /// Lanes with quarter turns of 24 m, as on a loop.
     fn lanes(start: Pose) -> Curve {

@@ -10,14 +10,16 @@
 //! Zones near the UAV are gathered once every 60 m flown; a setpoint is then
 //! checked against those alone, and for nothing where there are none.
 
-use super::follow::HORIZON_S;
+use super::air::{self, Air};
+use super::follow::{HORIZON_S, Offset, Track};
 use crate::percept::Percept;
 use crate::setpoint::{MAX_STEPS, Setpoint, Side, Steer};
 use skein_planning::airframe::Airframe;
 use skein_planning::frame::{Point, Pose, Vector};
 use skein_planning::geometry::NoFlyZones;
 use skein_planning::math::{TAU, atan2};
-use skein_planning::trajectory::Segment;
+use skein_planning::trajectory::wind::Wind;
+use skein_planning::trajectory::{Curve, Segment};
 use std::sync::Arc;
 
 /// Flown distance after which the zones nearby are gathered anew, metres: some four
@@ -46,6 +48,8 @@ pub struct Envelope {
     near: NoFlyZones,
     gathered_at: Option<Point>,
     side: Side,
+    /// The wind of the last percept, and the airspeed commanded in it.
+    air: Air,
 }
 
 impl Envelope {
@@ -54,6 +58,7 @@ impl Envelope {
     #[must_use]
     pub fn new(airframe: Airframe, zones: Arc<NoFlyZones>, least_m: f64) -> Self {
         let near = NoFlyZones::new(Vec::new());
+        let air = Air::calm(airframe.cruise_mps);
         Self {
             airframe,
             zones,
@@ -61,6 +66,7 @@ impl Envelope {
             near,
             gathered_at: None,
             side: Side::Left,
+            air,
         }
     }
 
@@ -83,6 +89,11 @@ impl Envelope {
     pub fn check(&mut self, percept: &Percept, wanted: Setpoint) -> Setpoint {
         let mut out = wanted;
         out.airspeed_mps = self.airspeed_mps(out.airspeed_mps);
+        let drift = wind_of(percept);
+        self.air = Air {
+            wind: Wind::new(drift.x, drift.y),
+            airspeed_mps: out.airspeed_mps,
+        };
         let limit = self.airframe.max_turn_rate_radps(out.airspeed_mps);
         let finite = out.steps.iter().all(|s| s.turn_rate_radps.is_finite());
         out.steps.truncate(MAX_STEPS);
@@ -91,7 +102,7 @@ impl Envelope {
         }
         if !is_finite(&percept.pose) {
             out.loiter = self.side;
-            out.steps = self.loiter_steps(limit);
+            out.steps = self.sharpest(limit);
             return out;
         }
         self.gather(percept.pose.position());
@@ -100,13 +111,47 @@ impl Envelope {
         }
         out.loiter = self.side;
         if !finite || out.steps.is_empty() || self.too_near(percept, &out) {
-            out.steps = self.loiter_steps(limit);
+            out.steps = self.loiter_steps(&percept.pose, limit);
         }
         out
     }
 
+    /// The loiter on the chosen side: the sharpest turn, in a wind the circle over the
+    /// ground.
+    fn loiter_steps(&self, pose: &Pose, limit_radps: f64) -> Vec<Steer> {
+        let Some(radius_m) = self.circle_radius_m() else {
+            return self.sharpest(limit_radps);
+        };
+        let track = Track::new(&self.circle(pose, self.side, radius_m));
+        let on_it = Offset {
+            cross_m: 0.0,
+            heading_rad: 0.0,
+        };
+        air::steps(&track, on_it, &self.air, limit_radps)
+    }
+
+    /// Radius of a loiter that stands over the ground in the wind, metres; `None` in
+    /// calm air, and where no loiter can stand.
+    fn circle_radius_m(&self) -> Option<f64> {
+        let (v, w) = (self.air.airspeed_mps, self.air.wind.speed_mps());
+        let stands = !self.air.is_calm() && w < v;
+        stands.then(|| self.airframe.ground_turn_radius_m(v, w))
+    }
+
+    /// The circle over the ground that begins at a pose with the nose's heading.
+    fn circle(&self, pose: &Pose, side: Side, radius_m: f64) -> Curve {
+        let bend = match side {
+            Side::Left => 1.0 / radius_m,
+            Side::Right => -1.0 / radius_m,
+        };
+        // Halves, because a whole circle ends where it begins.
+        let half_m = 0.5 * TAU * radius_m;
+        let start = self.air.over_ground(*pose);
+        Curve::from_pieces(start, &[(bend, half_m), (bend, half_m)])
+    }
+
     /// The sharpest turn on the chosen side.
-    fn loiter_steps(&self, limit_radps: f64) -> Vec<Steer> {
+    fn sharpest(&self, limit_radps: f64) -> Vec<Steer> {
         let turn_rate_radps = match self.side {
             Side::Left => limit_radps,
             Side::Right => -limit_radps,
@@ -129,8 +174,11 @@ impl Envelope {
             return;
         }
         let flight_m = self.airframe.max_mps * HORIZON_S;
-        let loiter_m = self.airframe.max_mps * FAILSAFE_S
-            + 2.0 * self.airframe.turn_radius_m(self.airframe.max_mps);
+        let radius_m = self.airframe.turn_radius_m(self.airframe.max_mps);
+        let radius_m = radius_m.max(self.circle_radius_m().unwrap_or(0.0));
+        let wind_mps = self.air.wind.speed_mps();
+        let flight_m = flight_m + wind_mps * HORIZON_S;
+        let loiter_m = (self.airframe.max_mps + wind_mps) * FAILSAFE_S + 2.0 * radius_m;
         let reach_m = GATHER_M + flight_m.max(loiter_m) + self.least_m.max(0.0);
         let near = self
             .zones
@@ -160,14 +208,19 @@ impl Envelope {
     /// Distance of the failsafe loiter discs from the nearest zone, metres; may be
     /// negative, infinite without zones nearby.
     fn room_m(&self, pose: &Pose, side: Side) -> f64 {
-        let radius_m = self.airframe.min_turn_radius_m();
-        let d = pose.direction();
+        let circle_m = self.circle_radius_m();
+        let radius_m = circle_m.unwrap_or(self.airframe.min_turn_radius_m());
+        let d = self.air.over_ground(*pose).direction();
         let out = match side {
             Side::Left => radius_m,
             Side::Right => -radius_m,
         };
         let centre = Point::new(pose.east_m - out * d.y, pose.north_m + out * d.x);
-        let ahead = centre + d * (self.airframe.cruise_mps * FAILSAFE_S);
+        let fastest_mps = match circle_m {
+            Some(_) => self.air.airspeed_mps + self.air.wind.speed_mps(),
+            None => self.airframe.cruise_mps,
+        };
+        let ahead = centre + d * (fastest_mps * FAILSAFE_S);
         self.near
             .distance_m(centre)
             .min(self.near.distance_m(ahead))
@@ -217,6 +270,13 @@ impl Envelope {
 
     /// Distance of the loiter on the chosen side from the nearest zone, metres.
     fn loiter_distance_m(&self, pose: &Pose, airspeed_mps: f64, wind: Vector) -> f64 {
+        if let Some(radius_m) = self.circle_radius_m() {
+            let circle = self.circle(pose, self.side, radius_m);
+            let each = circle.segments().iter();
+            return each
+                .map(|s| self.near.segment_distance_m(s))
+                .fold(f64::INFINITY, f64::min);
+        }
         let radius_m = self.airframe.turn_radius_m(airspeed_mps);
         let curvature_per_m = match self.side {
             Side::Left => 1.0 / radius_m,

@@ -203,6 +203,7 @@ impl Surroundings<'_> {
             "rate_bps": self.spec.radio.rate_bps,
             "height_m": height_m,
             "airframe": airframe,
+            "objective": self.spec.objective,
             "mission": "mission.json",
             "seed": skein_link::fate::mix(self.seed ^ (u64::from(id) << 40)),
             "journal": format!("uav{id}.journal"),

@@ -1,6 +1,7 @@
 //! Whether a scenario can succeed at all: turn radius, footprint, endurance, zones,
 //! faults. Estimates only; the world decides.
 
+use crate::air::{Pace, return_s, too_windy};
 use crate::error::{Finding, Severity};
 use crate::resolve::bounds;
 use skein_netsim::chaos::Fault;
@@ -20,7 +21,7 @@ const COMFORTABLE_LOOPS: f64 = 2.5;
 
 /// Turning round on the spot, in turn radii: the shortest curve from a pose to its
 /// reverse is 7/3 of a half circle.
-const TURN_ROUND_RADII: f64 = 7.0 / 3.0 * core::f64::consts::PI;
+pub(crate) const TURN_ROUND_RADII: f64 = 7.0 / 3.0 * core::f64::consts::PI;
 
 /// Checks everything that can be told before a run.
 ///
@@ -103,29 +104,6 @@ fn fleet(spec: &Spec, out: &mut Vec<Finding>) {
     }
 }
 
-/// What to say when the wind carries a UAV out of the turns of the loop even at its
-/// slowest.
-fn too_windy(spec: &Spec) -> Option<String> {
-    let wind_mps = spec.wind.speed_mps();
-    let radius_m = f64::from(spec.mission.turn_radius_mm) / 1000.0;
-    let spare_mps = |u: &UavSpec| {
-        let slowest_mps = u.airframe.least_airspeed_mps();
-        u.airframe.airspeed_for_turns_mps(radius_m, wind_mps) - slowest_mps
-    };
-    let worst = spec
-        .uavs
-        .iter()
-        .min_by(|a, b| spare_mps(a).total_cmp(&spare_mps(b)))?;
-    let most_mps = wind_mps + spare_mps(worst);
-    (wind_mps > 0.0 && most_mps < wind_mps).then(|| {
-        format!(
-            "a wind of {wind_mps} m/s carries UAV {} out of turns of {radius_m} m even at its slowest; at most {:.1} m/s, or wider lanes",
-            worst.id,
-            most_mps.max(0.0)
-        )
-    })
-}
-
 /// Peers that a fault names.
 fn named(fault: &Fault) -> Vec<u16> {
     match fault {
@@ -199,6 +177,7 @@ fn on_loop(spec: &Spec, ground: &Ground, out: &mut Vec<Finding>) {
         );
         out.push(Finding::new(Severity::Error, "checks.min_coverable", text));
     }
+    let reach_m = |u: &UavSpec| reach_m(u, spec, &ground.coverage_loop);
     let usable_m: f64 = spec.uavs.iter().map(reach_m).sum();
     if usable_m < summary.loop_m {
         let text = format!(
@@ -253,9 +232,12 @@ fn launches(spec: &Spec, ground: &Ground, out: &mut Vec<Finding>) {
     }
 }
 
-/// How far a UAV flies at cruise before its reserve, metres.
-fn reach_m(u: &UavSpec) -> f64 {
-    (u.airframe.endurance_s - u.airframe.reserve_s) * u.airframe.cruise_mps
+/// How far over the ground a UAV flies along the loop before it must return with its
+/// reserve, metres.
+fn reach_m(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> f64 {
+    let pace = Pace::of(u, spec, the_loop);
+    let kept_s = u.airframe.reserve_s + return_s(&pace, spec, the_loop);
+    (u.airframe.endurance_s - kept_s).max(0.0) * pace.loop_mps
 }
 
 /// What a scenario amounts to, before it is flown.
@@ -353,11 +335,11 @@ fn failure_free(spec: &Spec, the_loop: &CoverageLoop) -> Division {
             open: c.needed,
         })
         .collect();
-    let robots: Vec<Robot> = spec.uavs.iter().map(|u| robot(u, the_loop)).collect();
+    let robots: Vec<Robot> = spec.uavs.iter().map(|u| robot(u, spec, the_loop)).collect();
     divide(&ring, &robots)
 }
 
-fn robot(u: &UavSpec, the_loop: &CoverageLoop) -> Robot {
+fn robot(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Robot {
     let here = u.launch.position();
     let gap_m = |i: usize| (the_loop.boundary(i).position() - here).norm();
     let anchor = (0..the_loop.len())
@@ -368,9 +350,10 @@ fn robot(u: &UavSpec, the_loop: &CoverageLoop) -> Robot {
         .direction()
         .dot(&u.launch.direction())
         >= 0.0;
-    let v = u.airframe.cruise_mps;
-    let release_s = gap_m(anchor) / v;
-    let usable_s = u.airframe.endurance_s - u.airframe.reserve_s - release_s;
+    let pace = Pace::of(u, spec, the_loop);
+    let release_s = gap_m(anchor) / pace.least_mps.max(0.0);
+    let kept_s = u.airframe.reserve_s + return_s(&pace, spec, the_loop);
+    let usable_s = u.airframe.endurance_s - kept_s - release_s;
     Robot {
         anchor: u16::try_from(anchor).unwrap_or(0),
         id: u.id,
@@ -380,8 +363,8 @@ fn robot(u: &UavSpec, the_loop: &CoverageLoop) -> Robot {
             Direction::Backward
         },
         release_ms: whole(release_s * 1000.0),
-        speed_mmps: whole(v * 1000.0).max(1),
-        turn_ms: whole(TURN_ROUND_RADII * u.airframe.min_turn_radius_m() / v * 1000.0),
+        speed_mmps: whole(pace.loop_mps * 1000.0).max(1),
+        turn_ms: whole(pace.turn_s * 1000.0),
         endurance_ms: whole(usable_s.max(0.0) * 1000.0),
     }
 }

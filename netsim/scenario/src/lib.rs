@@ -10,6 +10,7 @@
 //! assert_eq!(spec.uavs.len(), 8);
 //! ```
 
+mod air;
 mod builtin;
 mod document;
 mod error;

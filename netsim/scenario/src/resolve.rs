@@ -1,6 +1,7 @@
 //! From a scenario's text to a [`Spec`] with nothing left open: mission, fleet on
 //! its loop, radio, faults. Leaves judging whether it can succeed to `feasibility`.
 
+use crate::air;
 use crate::document::{Document, Fields, Node};
 use crate::error::{Finding, ScenarioError, Severity};
 use crate::faults::{self, Known, permille};
@@ -14,13 +15,13 @@ use skein_peer::mission::{PointMm, mm};
 use skein_peer::plan::Ground;
 use skein_planning::frame::{Point, Pose};
 use skein_planning::geometry::{NoFlyZones, Polygon};
-use skein_planning::math::sin_cos;
+use skein_planning::trajectory::timed::Objective;
 use skein_planning::trajectory::wind::Wind;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// All fields of a scenario.
-const FIELDS: [&str; 22] = [
+const FIELDS: [&str; 23] = [
     "name",
     "seed",
     "time_scale",
@@ -37,6 +38,7 @@ const FIELDS: [&str; 22] = [
     "fleet",
     "ground",
     "wind",
+    "objective",
     "radio",
     "beacon_period_s",
     "percept_period_ms",
@@ -119,12 +121,12 @@ fn resolve(
     let ground_spec = f.get("ground").map(ground_station).transpose()?;
     let ground_id = ground_spec.as_ref().map(|g| g.id);
     let fleet = the_fleet(&f, &name, terrain.level_m, ground_id, over)?;
-    let mission = Arc::new(mission(&f, &terrain, &fleet, ground_spec.as_ref())?);
+    let wind = f.get("wind").map_or(Ok(Wind::CALM), air::wind)?;
+    let mission = Arc::new(mission(&f, &terrain, &fleet, ground_spec.as_ref(), wind)?);
     check_size(&f, &mission, &terrain.area)?;
     check_places(&f, &mission, &terrain, &fleet)?;
     let ground = common_ground(root, &mission)?;
     let uavs = launch(&fleet, &ground);
-    let wind = f.get("wind").map_or(Ok(Wind::CALM), wind)?;
     let radio = radio(f.need("radio", "{ range_m: 500, rate_bps: 64000 }")?)?;
     let peers: BTreeSet<u16> = uavs.iter().map(|u| u.id).chain(ground_id).collect();
     let known = Known {
@@ -147,6 +149,9 @@ fn resolve(
         uavs,
         ground: ground_spec,
         wind,
+        objective: f
+            .get("objective")
+            .map_or(Ok(Objective::Time), air::objective)?,
         radio,
         beacon_period_ms,
         percept_period_ms: f.whole_or("percept_period_ms", 200, 20, 1000, "milliseconds")?,
@@ -246,17 +251,6 @@ fn ground_station(node: &Node<'_>) -> Result<GroundSpec, ScenarioError> {
     })
 }
 
-/// The wind as forecasts tell it: where it comes from, and how fast.
-fn wind(node: &Node<'_>) -> Result<Wind, ScenarioError> {
-    let f = node.fields(&["from_deg", "speed_mps"])?;
-    let from_deg = f
-        .need("from_deg", "270")?
-        .number(0.0, 360.0, "degrees clockwise from north")?;
-    let speed_mps = f.need("speed_mps", "3")?.number(0.0, 50.0, "m/s")?;
-    let (s, c) = sin_cos(from_deg.to_radians());
-    Ok(Wind::new(-speed_mps * s, -speed_mps * c))
-}
-
 fn radio(node: &Node<'_>) -> Result<RadioSpec, ScenarioError> {
     let f = node.fields(&[
         "range_m",
@@ -305,6 +299,7 @@ fn mission(
     t: &Terrain,
     fleet: &Fleet,
     ground: Option<&GroundSpec>,
+    wind: Wind,
 ) -> Result<Mission, ScenarioError> {
     let lanes = f.need("lanes", "{ spacing_m: 48 }")?.fields(&[
         "spacing_m",
@@ -315,9 +310,8 @@ fn mission(
         .need("spacing_m", "48")?
         .number(2.0, 5000.0, "metres")?;
     let error_m = lanes.number_or("tracking_error_m", 3.0, 0.0, 1000.0, "metres")?;
-    let over = |value: fn(&skein_planning::airframe::Airframe) -> f64| {
-        fleet.members.iter().map(move |m| value(&m.airframe))
-    };
+    let airframes = || fleet.members.iter().map(|m| &m.airframe);
+    let over = |value: fn(&skein_planning::airframe::Airframe) -> f64| airframes().map(value);
     let turn_m = over(|a| a.min_turn_radius_m()).fold(0.0, f64::max);
     if turn_m > spacing_m / 2.0 {
         return Err(lanes.need("spacing_m", "48")?.wrong(format!(
@@ -325,6 +319,9 @@ fn mission(
             2.0 * turn_m
         )));
     }
+    let turn_m = airframes()
+        .map(|a| air::turn_radius_m(a, wind, spacing_m))
+        .fold(turn_m, f64::max);
     // An airframe without its computer circles where it is, within two radii.
     let clearance_m =
         lanes.number_or("clearance_m", 2.0 * turn_m + error_m, 0.0, 5000.0, "metres")?;
@@ -339,6 +336,10 @@ fn mission(
         .first()
         .and_then(|m| m.launch)
         .map_or(base, |l| l.position());
+    let seen = |side: fn((f64, f64)) -> f64| {
+        let each = airframes().map(|a| side(air::footprint_m(a, wind, turn_m)));
+        each.fold(f64::MAX, f64::min)
+    };
     Ok(Mission {
         revision: 1,
         origin_lat_e7: e7(t.origin.lat_deg),
@@ -348,12 +349,8 @@ fn mission(
         lane_spacing_mm: length_mm(spacing_m * 1000.0),
         turn_radius_mm: length_mm((turn_m * 1000.0).ceil()),
         clearance_mm: length_mm((clearance_m * 1000.0).ceil()),
-        footprint_across_mm: length_mm(
-            (over(|a| a.footprint_across_m).fold(f64::MAX, f64::min) * 1000.0).floor(),
-        ),
-        footprint_along_mm: length_mm(
-            (over(|a| a.footprint_along_m).fold(f64::MAX, f64::min) * 1000.0).floor(),
-        ),
+        footprint_across_mm: length_mm((seen(|m| m.0) * 1000.0).floor()),
+        footprint_along_mm: length_mm((seen(|m| m.1) * 1000.0).floor()),
         tracking_error_mm: length_mm(error_m * 1000.0),
         launch: (mm(launch.x), mm(launch.y)),
         base: (mm(base.x), mm(base.y)),

@@ -5,6 +5,7 @@ use skein_peer::Mission;
 use skein_planning::airframe::Airframe;
 use skein_planning::frame::{Point, Pose};
 use skein_planning::geometry::Polygon;
+use skein_planning::trajectory::timed::Objective;
 use skein_planning::trajectory::wind::Wind;
 use std::sync::Arc;
 
@@ -27,6 +28,8 @@ pub struct Spec {
     pub ground: Option<GroundSpec>,
     /// The wind, everywhere and all the time.
     pub wind: Wind,
+    /// What UAVs spend little of, off the loop.
+    pub objective: Objective,
     /// The radio.
     pub radio: RadioSpec,
     /// Beacon period T, milliseconds.

@@ -54,10 +54,14 @@ mod triple;
 use super::Segment;
 use crate::airframe::Airframe;
 use crate::frame::{Pose, Vector};
-use crate::math::{asin, atan2, hypot, sin_cos, wrap_pi};
+use crate::math::{PI, TAU, asin, atan2, hypot, sin_cos, wrap_pi};
 use problem::{Problem, fastest};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+/// Courses from which a turn round is timed: between neighbours the time differs by
+/// less than the tenth part of a radian's turn.
+const COURSES: u8 = 24;
 
 /// Where the nose points: radians counter-clockwise from east.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
@@ -416,6 +420,32 @@ pub fn time_s(
     let problem = normalised(from, to, performance, wind)?;
     let unit_s = performance.turn_radius_m / performance.airspeed_mps;
     Ok(fastest(&problem, true).map_or(f64::INFINITY, |best| best.time * unit_s))
+}
+
+/// The longest time to turn round in place, whatever the course, seconds: from a course
+/// over the ground to its opposite. Infinite when the wind forbids some course.
+///
+/// # Errors
+/// [`WindError`] when a number is none or not in its range.
+pub fn turn_round_s(performance: Performance, wind: Wind) -> Result<f64, WindError> {
+    let nose = |rad: f64| wind.heading_for_course(Course(rad), performance.airspeed_mps);
+    let mut longest_s = 0.0f64;
+    for i in 0..COURSES {
+        let course_rad = TAU * f64::from(i) / f64::from(COURSES);
+        let lasts_s = match (nose(course_rad), nose(course_rad + PI)) {
+            (Some(from), Some(to)) => {
+                let at = |heading: Heading| Pose {
+                    east_m: 0.0,
+                    north_m: 0.0,
+                    heading_rad: heading.0,
+                };
+                time_s(at(from), at(to), performance, wind)?
+            }
+            _ => f64::INFINITY,
+        };
+        longest_s = longest_s.max(lasts_s);
+    }
+    Ok(longest_s)
 }
 
 /// The question with radius and airspeed 1, from the origin heading east.

@@ -5,7 +5,7 @@
 
 use crate::bus::{BusConfig, loopback_address};
 use crate::fields::{FieldError, Fields, Text};
-use skein_peer::config::Airframe;
+use skein_peer::config::{Airframe, Objective};
 use skein_peer::{Mission, PeerConfig, PeerId, Role};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -81,6 +81,7 @@ impl NodeConfig {
             beacon_period_ms: small(f.integer("beacon_period_ms", 100, 60_000)?),
             rate_bps: small(f.integer("rate_bps", 300, 1_000_000_000)?),
             airframe,
+            objective: objective(&mut f)?,
             height_m: f.number("height_m", -1_000.0, 20_000.0)?,
             mission: mission(&mut f, base)?,
             seed: f.integer("seed", 0, u64::MAX)?,
@@ -134,6 +135,19 @@ fn role(f: &mut Fields<'_>) -> Result<Role, FieldError> {
         "uav" => Ok(Role::Uav),
         "ground" => Ok(Role::Ground),
         _ => Err(wrong(at, "\"uav\" or \"ground\"")),
+    }
+}
+
+/// What legs should spend little of; time unless it says otherwise.
+fn objective(f: &mut Fields<'_>) -> Result<Objective, FieldError> {
+    let Some((text, at)) = f.optional_string("objective")? else {
+        return Ok(Objective::Time);
+    };
+    match text.as_str() {
+        "time" => Ok(Objective::Time),
+        "distance" => Ok(Objective::Distance),
+        "energy" => Ok(Objective::Energy),
+        _ => Err(wrong(at, "\"time\", \"distance\" or \"energy\"")),
     }
 }
 
@@ -257,6 +271,11 @@ mod tests {
                 "whole number",
             ),
             ("seed: 1,", "seed: 1 ]", "peer.json5:"),
+            (
+                "objective: \"time\"",
+                "objective: \"fun\"",
+                "expected \"time\", \"distance\" or \"energy\"",
+            ),
         ];
         for (right, wrong, message) in cases {
             assert!(EXAMPLE.contains(right), "the example holds {right}");

@@ -3,6 +3,7 @@
 use crate::{Mission, PeerId};
 use serde::{Deserialize, Serialize};
 pub use skein_planning::airframe::Airframe;
+pub use skein_planning::trajectory::timed::Objective;
 use std::sync::Arc;
 
 /// What a peer is for.
@@ -30,6 +31,9 @@ pub struct PeerConfig {
     pub rate_bps: u32,
     /// The airframe, for a UAV.
     pub airframe: Option<Airframe>,
+    /// What legs off the loop, and the airspeed, should spend little of. Peers of one
+    /// mission may differ in it.
+    pub objective: Objective,
     /// Height slot above the origin, metres, for a UAV.
     pub height_m: f64,
     /// The mission it was launched with, if any; a ground station speaks it.

@@ -50,7 +50,6 @@ pub(crate) struct Crew {
     finished: bool,
     exhausted: bool,
     unsaved_cells: u16,
-    return_ms: u32,
     /// Counts the sections handed to the journal; only the last of them may be
     /// installed, for it is the one that the journal ends with.
     written: u64,
@@ -121,7 +120,7 @@ impl Crew {
 
     fn spendable_ms(&self, percept: Option<&Percept>) -> u32 {
         match (&self.executive, percept) {
-            (Some(e), Some(p)) => e.spendable_ms(p).saturating_sub(self.return_ms),
+            (Some(e), Some(p)) => e.spendable_ms(p),
             _ => 0,
         }
     }

@@ -588,6 +588,7 @@ fn slots(spec: &Spec, seed: u64) -> Vec<Slot> {
         beacon_period_ms: spec.beacon_period_ms,
         rate_bps: spec.radio.rate_bps,
         airframe: None,
+        objective: spec.objective,
         height_m: 0.0,
         mission: Some(Arc::clone(&spec.mission)),
         seed: 0,

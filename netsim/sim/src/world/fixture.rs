@@ -118,6 +118,7 @@ pub fn square(n_uavs: u16) -> Spec {
             height_m: 2.0,
         }),
         wind: skein_planning::trajectory::wind::Wind::CALM,
+        objective: skein_planning::trajectory::timed::Objective::Time,
         radio: radio(),
         beacon_period_ms: 1000,
         percept_period_ms: 500,

@@ -12,9 +12,11 @@ use crate::geometry::NoFlyZones;
 use crate::math::tan;
 use crate::trajectory::dubins;
 use crate::trajectory::wind::{Answer, Heading, Performance, Wind, time_optimal};
+use serde::{Deserialize, Serialize};
 
 /// What a trajectory should spend little of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Objective {
     /// Seconds.
     #[default]

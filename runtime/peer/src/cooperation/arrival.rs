@@ -55,8 +55,9 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
             Arc::clone(&coverage_loop),
             router,
         )
+        .with_objective(peer.config.objective)
+        .with_home(point_m(ground.mission.base))
     });
-    let return_ms = return_time_ms(peer, &ground);
     let old = peer.crew.take();
     // What is still being written was promised for the old ground: it is not installed.
     let written = old.as_ref().map_or(0, |c| c.written + 1);
@@ -71,7 +72,6 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
         finished: false,
         exhausted: old.as_ref().is_some_and(|c| c.exhausted),
         unsaved_cells: 0,
-        return_ms,
         written,
         answered: written,
     };
@@ -104,7 +104,8 @@ fn keep_on(crew: &mut Crew, old: Crew) {
         && new.turn_radius_mm == before.turn_radius_mm
         && new.clearance_mm == before.clearance_mm;
     if flown_alike {
-        crew.executive = old.executive;
+        let base = point_m(new.base);
+        crew.executive = old.executive.map(|e| e.with_home(base));
         crew.goal = old.goal;
         crew.replan = old.replan;
     }
@@ -162,21 +163,4 @@ fn carried_over(old: &CoverageLoop, union: &CellSet, new: &CoverageLoop) -> Cell
         }
     }
     out
-}
-
-/// The longest way home from the loop, at cruise, with a turn at each end.
-fn return_time_ms(peer: &Peer, ground: &Ground) -> u32 {
-    let base = point_m(ground.mission.base);
-    let lp = &ground.coverage_loop;
-    let far_m = (0..lp.len())
-        .map(|i| (lp.boundary(i).position() - base).norm())
-        .fold(0.0, f64::max);
-    let cruise_mps = peer.config.airframe.map_or(1.0, |a| a.cruise_mps.max(1.0));
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "saturates at the ends of u32"
-    )]
-    let ms = ((far_m / cruise_mps + 30.0) * 1000.0) as u32;
-    ms
 }

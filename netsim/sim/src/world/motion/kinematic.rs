@@ -8,8 +8,8 @@
 use skein_behaviors::{Percept, Setpoint, Side};
 use skein_planning::airframe::Airframe;
 use skein_planning::frame::{Point, Pose};
-use skein_planning::math::{sin, sin_cos, tan, wrap_pi};
-use skein_planning::trajectory::wind::Wind;
+use skein_planning::math::{FRAC_PI_2, atan2, sin, sin_cos, tan, wrap_pi};
+use skein_planning::trajectory::wind::{Course, Heading, Wind};
 
 /// An airframe that was given no setpoint for this long loiters on its own. Two
 /// percept periods of the slowest sensible peer (500 ms) are lost before it trips.
@@ -17,6 +17,27 @@ pub const FAILSAFE_MS: u64 = 1000;
 
 /// Standard gravity, m/s²; the world keeps its own copy of the physics.
 const G_MPS2: f64 = 9.806_65;
+
+/// How often the failsafe loiter corrects its turn in a wind, milliseconds: the course
+/// turns by a few degrees meanwhile.
+const HOLD_STEP_MS: u64 = 100;
+
+/// The part of an error of place that the failsafe loiter takes away in a second.
+const HOLD_GAIN: f64 = 0.3;
+
+/// The steepest angle at which it approaches its circle, radians.
+const HOLD_MOST_RAD: f64 = 0.3;
+
+/// The circle over the ground that the failsafe loiter holds in a wind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Hold {
+    centre: Point,
+    radius_m: f64,
+    /// 1 to the left, −1 to the right.
+    side: f64,
+    /// When the turn is corrected next, milliseconds.
+    until_ms: u64,
+}
 
 /// A stretch flown at constant airspeed and turn rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,6 +145,8 @@ pub struct Kinematic {
     /// When the failsafe trips unless something newer comes.
     fresh_until_ms: u64,
     failsafe: bool,
+    /// The circle of the failsafe, once begun in a wind.
+    hold: Option<Hold>,
     lost: Option<Loss>,
 }
 
@@ -148,6 +171,7 @@ impl Kinematic {
             setpoint: None,
             fresh_until_ms: now_ms + FAILSAFE_MS,
             failsafe: false,
+            hold: None,
             lost: None,
         }
     }
@@ -285,15 +309,9 @@ impl Kinematic {
     fn command(&mut self) -> (f64, f64, u64) {
         self.failsafe = self.now_ms >= self.fresh_until_ms;
         if self.failsafe {
-            let side = self.setpoint.as_ref().map_or(Side::Left, |s| s.loiter);
-            let speed = self.airframe.cruise_mps;
-            let rate = self.max_rate(speed);
-            return (
-                if side == Side::Left { rate } else { -rate },
-                speed,
-                u64::MAX,
-            );
+            return self.loiter();
         }
+        self.hold = None;
         let Some(s) = &self.setpoint else {
             return (0.0, self.airframe.cruise_mps, self.fresh_until_ms);
         };
@@ -312,6 +330,70 @@ impl Kinematic {
             speed,
             until_ms.min(self.fresh_until_ms),
         )
+    }
+
+    /// The failsafe: the sharpest turn at cruise, in a wind a circle over the ground.
+    fn loiter(&mut self) -> (f64, f64, u64) {
+        let side = match self.setpoint.as_ref().map_or(Side::Left, |s| s.loiter) {
+            Side::Left => 1.0,
+            Side::Right => -1.0,
+        };
+        let (wind, cruise_mps) = (self.leg.wind, self.airframe.cruise_mps);
+        let calm = (side * self.max_rate(cruise_mps), cruise_mps, u64::MAX);
+        let v = self.holding_mps();
+        if wind.speed_mps() <= 0.0 || wind.speed_mps() >= v {
+            return calm;
+        }
+        let pose = self.leg.pose_at(self.now_ms);
+        let mut hold = self.hold.unwrap_or_else(|| {
+            let radius_m = self.airframe.ground_turn_radius_m(v, wind.speed_mps());
+            let (s, c) = sin_cos(wind.course_of(Heading(pose.heading_rad), v).0);
+            let out_m = side * radius_m;
+            Hold {
+                centre: Point::new(pose.east_m - out_m * s, pose.north_m + out_m * c),
+                radius_m,
+                side,
+                until_ms: self.now_ms,
+            }
+        });
+        let mut rate = self.leg.turn_rate_radps;
+        if self.now_ms >= hold.until_ms {
+            hold.until_ms = self.now_ms + HOLD_STEP_MS;
+            rate = self.holding_rate(&hold, pose, v);
+        }
+        self.hold = Some(hold);
+        (rate, v, hold.until_ms)
+    }
+
+    /// The airspeed of the failsafe in a wind: the last that was commanded, for which
+    /// turns over the ground were planned, or as slow as turns may be flown.
+    fn holding_mps(&self) -> f64 {
+        let a = &self.airframe;
+        let last = self.setpoint.as_ref().map(|s| s.airspeed_mps);
+        last.unwrap_or(a.least_airspeed_mps())
+            .max(a.stall_mps)
+            .min(a.max_mps)
+    }
+
+    /// The turn that has the nose along the circle at the end of the next step.
+    fn holding_rate(&self, hold: &Hold, pose: Pose, v: f64) -> f64 {
+        let wind = self.leg.wind;
+        let out = pose.position() - hold.centre;
+        let around_rad = atan2(out.y, out.x) + hold.side * FRAC_PI_2;
+        let step_s = seconds(HOLD_STEP_MS);
+        let speed_mps = wind.ground_speed_mps(Course(around_rad), v).unwrap_or(v);
+        let next_rad = around_rad + hold.side * speed_mps * step_s / hold.radius_m;
+        let wide_m = out.norm() - hold.radius_m;
+        let inward_rad =
+            (HOLD_GAIN * wide_m / speed_mps.max(1.0)).clamp(-HOLD_MOST_RAD, HOLD_MOST_RAD);
+        let course = Course(next_rad + hold.side * inward_rad);
+        let heading = wind
+            .heading_for_course(course, v)
+            .unwrap_or(Heading(course.0));
+        let limit = self.max_rate(v);
+        (wrap_pi(heading.0 - pose.heading_rad) / step_s)
+            .max(-limit)
+            .min(limit)
     }
 
     /// The fastest turn that the bank limit allows, rad/s.
@@ -500,6 +582,47 @@ mod tests {
         k.advance(13_700, &mut flown);
         assert!(!k.failsafe());
         assert!(flown.last().unwrap().turn_rate_radps.abs() < 1e-12);
+    }
+
+    #[test]
+    fn in_a_wind_it_loiters_over_one_place_and_keeps_its_limits() {
+        for (wind, side) in [
+            (Wind::new(3.0, -1.0), Side::Left),
+            (Wind::new(-6.0, 2.0), Side::Right),
+            (Wind::new(0.0, 0.4), Side::Right),
+        ] {
+            let mut k = fresh().in_wind(wind);
+            let loiter = side;
+            assert!(k.apply(
+                Setpoint {
+                    loiter,
+                    ..setpoint(0, &[(0.2, 400)])
+                },
+                0
+            ));
+            k.advance(1000, &mut Vec::new());
+            let at = k.pose();
+            let radius_m = airframe().ground_turn_radius_m(13.0, wind.speed_mps());
+            let (s, c) = sin_cos(wind.course_of(Heading(at.heading_rad), 13.0).0);
+            let out_m = if side == Side::Left {
+                radius_m
+            } else {
+                -radius_m
+            };
+            let centre = Point::new(at.east_m - out_m * s, at.north_m + out_m * c);
+            let mut flown = Vec::new();
+            let mut other = k.clone();
+            k.advance(120_000, &mut flown);
+            for p in &flown {
+                let off_m = ((p.start.position() - centre).norm() - radius_m).abs();
+                assert!(off_m < 0.5, "{wind:?}: {off_m} at {}", p.from_ms);
+                assert!(p.turn_rate_radps.abs() <= 9.806_65 / 13.0 + 1e-12);
+            }
+            for t in [1001, 1777, 9000, 60_123, 120_000] {
+                other.advance(t, &mut Vec::new());
+            }
+            assert_eq!(k.pose(), other.pose(), "however often it is asked");
+        }
     }
 
     #[test]
