@@ -58,6 +58,8 @@ pub(super) struct Partition<'a> {
     seed: Vec<u32>,
     entry: Vec<i64>,
     size: Vec<i64>,
+    /// By region: moves that its path was seen to take beyond one a cell and the way.
+    waste: Vec<i64>,
     /// By region: time of one move.
     pace: Vec<i64>,
     /// For searches: the last search that saw a piece.
@@ -74,14 +76,30 @@ pub(super) struct Partition<'a> {
 /// O(N log N) to grow, O(N) for each of at most 400 sweeps.
 #[must_use]
 pub fn regions(task: &Task, offset: (u32, u32)) -> Regions {
-    let mut p = Partition::new(task, offset);
-    p.sow();
-    p.grow();
-    p.balance();
-    p.finish()
+    Partition::grown(task, offset).regions()
 }
 
 impl<'a> Partition<'a> {
+    /// Regions that all grew at once, evened by cells.
+    pub(super) fn grown(task: &'a Task, offset: (u32, u32)) -> Self {
+        let mut p = Self::new(task, offset);
+        p.sow();
+        p.grow();
+        p.balance();
+        p
+    }
+
+    /// Evens the regions again, now that their paths are known to take `moves`: a region
+    /// of corridors and corners takes more than its cells.
+    pub(super) fn even(&mut self, moves: &[i64]) {
+        for (uav, moves) in moves.iter().enumerate() {
+            let seen = moves - self.entry[uav] - self.size[uav];
+            // Half the difference at a time: the borders that move change the waste too.
+            self.waste[uav] = self.waste[uav].midpoint(seen);
+        }
+        self.balance();
+    }
+
     pub(super) fn new(task: &'a Task, offset: (u32, u32)) -> Self {
         let map = &task.map;
         let (piece_of, pieces) = cut(map, offset);
@@ -110,6 +128,7 @@ impl<'a> Partition<'a> {
             seed: vec![NOBODY; task.n_uavs()],
             entry: vec![0; task.n_uavs()],
             size: vec![0; task.n_uavs()],
+            waste: vec![0; task.n_uavs()],
             pace: task
                 .speeds
                 .iter()
@@ -125,7 +144,7 @@ impl<'a> Partition<'a> {
     }
 
     fn load(&self, uav: usize) -> i64 {
-        (self.entry[uav] + self.size[uav]) * self.pace[uav]
+        (self.entry[uav] + self.size[uav] + self.waste[uav]) * self.pace[uav]
     }
 
     fn cells(&self, piece: u32) -> i64 {
@@ -170,7 +189,8 @@ impl<'a> Partition<'a> {
     fn begin_at(&mut self, uav: usize, piece: u32) {
         let cell = self.pieces[piece as usize].cells[0];
         self.seed[uav] = piece;
-        self.entry[uav] = i64::from(self.task.map.straight(self.task.roots[uav], cell));
+        let ways = if self.task.closed { 2 } else { 1 };
+        self.entry[uav] = ways * i64::from(self.task.map.straight(self.task.roots[uav], cell));
     }
 
     /// The region with least to fly takes the next piece, nearest to its seed. A region
@@ -297,7 +317,7 @@ impl<'a> Partition<'a> {
     }
 
     /// Whether the regions are still so uneven that sweeps will not help.
-    fn hopeless(&self) -> bool {
+    pub(super) fn hopeless(&self) -> bool {
         let loads = (0..self.seed.len()).map(|u| self.load(u));
         let sum: i64 = loads.clone().sum();
         let most = loads.max().unwrap_or(0);
@@ -381,7 +401,8 @@ impl<'a> Partition<'a> {
         false
     }
 
-    fn finish(self) -> Regions {
+    /// The regions by cell.
+    pub(super) fn regions(&self) -> Regions {
         let map = &self.task.map;
         let mut owner = vec![NOBODY; map.table_len()];
         for cell in map.cells() {

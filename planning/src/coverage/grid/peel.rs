@@ -209,6 +209,7 @@ impl Peel<'_> {
             self.on_way[*cell as usize] = i;
         }
         let mut before = u32::try_from(way.len()).unwrap_or(u32::MAX);
+        let moves = moves.saturating_sub(self.detour(&way));
         let mut spent = self.take_round(goal, &mut before, moves);
         for cell in &way {
             self.on_way[*cell as usize] = u32::MAX;
@@ -264,6 +265,23 @@ impl Peel<'_> {
             way.remove(0);
         }
         way
+    }
+
+    /// By how much the way back will be longer than this way out.
+    fn detour(&mut self, way: &[Cell]) -> u32 {
+        let (true, Some((root, goal))) = (self.task.closed, way.first().zip(way.last())) else {
+            return 0;
+        };
+        let (root, goal) = (*root, *goal);
+        let steps: Vec<u32> = way.iter().map(|c| self.step[*c as usize]).collect();
+        for cell in way {
+            self.step[*cell as usize] = COVERED;
+        }
+        let back = self.way_back(goal, root);
+        for (cell, step) in way.iter().zip(steps) {
+            self.step[*cell as usize] = step;
+        }
+        u32::try_from(back.len().saturating_sub(way.len())).unwrap_or(u32::MAX)
     }
 
     /// How often a UAV flies the way to its region.

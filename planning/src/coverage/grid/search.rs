@@ -49,6 +49,10 @@ const OVER_PRICE: i64 = 1 << 16;
 /// One try in so many to exchange tails is made: most cost a count of both for nothing.
 const TAILS: usize = 8;
 
+/// Tables of the moves to every root beyond this many entries in all would be too large;
+/// ways home are then searched one by one.
+const MOST_HOME: usize = 1 << 23;
+
 /// Orders under improvement.
 pub struct Search<'a> {
     task: &'a Task,
@@ -68,12 +72,54 @@ pub struct Search<'a> {
     bordering: Vec<bool>,
     stream: Stream,
     remembered: Vec<(Cell, Cell, u32)>,
+    /// Moves between the roots and every cell, when UAVs return.
+    home: Home,
     /// The common time aimed at.
     target: i64,
     /// How late the pressure still grows.
     late: i64,
     /// Highest loss accepted, in price units per 256ths of a draw.
     heat: i64,
+}
+
+/// Moves between roots and any cell: the longest hops of UAVs that return, asked for at
+/// every change of what they do first or last.
+#[derive(Default)]
+struct Home {
+    /// By cell: which table, if it is a root; empty when there are no tables.
+    table_of: Vec<u8>,
+    tables: Vec<Vec<u32>>,
+}
+
+impl Home {
+    /// A cell that is no root.
+    const NONE: u8 = u8::MAX;
+
+    fn new(task: &Task) -> Self {
+        let mut roots = task.roots.clone();
+        roots.sort_unstable();
+        roots.dedup();
+        let entries = roots.len().saturating_mul(task.map.table_len());
+        if !task.closed || entries > MOST_HOME || roots.len() > usize::from(Self::NONE) {
+            return Self::default();
+        }
+        let mut table_of = vec![Self::NONE; task.map.table_len()];
+        for (i, root) in (0u8..).zip(&roots) {
+            table_of[*root as usize] = i;
+        }
+        let tables = roots.iter().map(|r| task.map.distances(&[*r])).collect();
+        Self { table_of, tables }
+    }
+
+    fn moves(&self, a: Cell, b: Cell) -> Option<u32> {
+        for (root, other) in [(a, b), (b, a)] {
+            let table = self.table_of.get(root as usize)?;
+            if let Some(table) = self.tables.get(usize::from(*table)) {
+                return Some(table[other as usize]);
+            }
+        }
+        None
+    }
 }
 
 /// Units of time in one move of the fastest UAV: a slower one's move is rounded to them.
@@ -111,6 +157,7 @@ impl<'a> Search<'a> {
             }),
             stream: Stream::new(n as u64),
             remembered: vec![(NOWHERE, NOWHERE, 0); REMEMBERED],
+            home: Home::new(task),
             target: 0,
             late: 16,
             heat: 0,
@@ -245,6 +292,9 @@ impl<'a> Search<'a> {
         }
         if self.task.map.straight(a, b) > most {
             return TOO_LONG;
+        }
+        if let Some(moves) = self.home.moves(a, b) {
+            return if moves > most { TOO_LONG } else { moves };
         }
         let (low, high) = (a.min(b), a.max(b));
         let mixed = (low.wrapping_mul(0x9E37_79B1)) ^ high.wrapping_mul(0x85EB_CA6B);
