@@ -26,6 +26,7 @@ mod change;
 pub mod chart;
 mod leg;
 pub mod outlook;
+mod proof;
 
 use crate::event::Event;
 use crate::percept::Percept;
@@ -226,6 +227,7 @@ impl Executive {
     #[must_use]
     pub fn with_tracking_error_m(mut self, tracking_error_m: f64) -> Self {
         self.envelope = Self::envelope(self.chart.airframe, &self.chart.router, tracking_error_m);
+        self.chart.tracking_error_m = tracking_error_m;
         self
     }
 
@@ -459,7 +461,8 @@ impl Executive {
         let least_m = fastest_mps * (HORIZON_S + 0.5);
         let mut at = start;
         while self.track.left_m() < least_m {
-            for step in self.next_moves(&at, is_open, events) {
+            let moves = self.next_moves(&at, is_open, events);
+            for step in self.proved(&at, moves, events) {
                 at = self.push(&at, step);
             }
         }

@@ -26,6 +26,10 @@ const NEAREST: usize = 6;
 /// tracking error needs to a half turn.
 const ESCAPES_M: [f64; 4] = [5.0, 15.0, 35.0, 75.0];
 
+/// A way out of a zone's clearance may come this much nearer to it at first, metres:
+/// what rounding and a bend take.
+pub(super) const ESCAPE_SLACK_M: f64 = 0.25;
+
 /// Loiters are flown with this many times the least radius where there is room, so
 /// that following them has authority on both sides.
 const LOITER_RADII: [f64; 2] = [1.2, 1.0];
@@ -82,6 +86,8 @@ pub struct Chart {
     cells_air_m: Vec<[f64; 2]>,
     /// What legs should spend little of.
     pub(super) objective: Objective,
+    /// How far a UAV may stray from a curve, metres.
+    pub(super) tracking_error_m: f64,
     /// What passing each cell costs, forward and backward, metres; empty where that is
     /// the cell's length.
     pub(super) cells_cost_m: Vec<[f64; 2]>,
@@ -98,6 +104,7 @@ impl Chart {
             air: Air::calm(airframe.cruise_mps),
             cells_air_m: Vec::new(),
             objective: Objective::Time,
+            tracking_error_m: super::DEFAULT_TRACKING_ERROR_M,
             cells_cost_m: Vec::new(),
         }
     }
@@ -470,7 +477,7 @@ impl Chart {
         onward: impl Fn(Pose) -> Result<Curve, RouteError>,
     ) -> Option<Curve> {
         let zones = self.router.zones();
-        let least_m = zones.distance_m(from.position()) - 0.25;
+        let least_m = zones.distance_m(from.position()) - ESCAPE_SLACK_M;
         let bend = 1.0 / self.router.limits().turn_radius_m;
         for length_m in ESCAPES_M {
             for curvature_per_m in [0.0, bend, -bend] {
@@ -543,6 +550,12 @@ impl Chart {
             self.airframe.ground_turn_radius_m(airspeed_mps, wind_mps)
         };
         self.router.limits().turn_radius_m.max(least_m)
+    }
+
+    /// The circle here that keeps farthest from the zones.
+    #[must_use]
+    pub fn stay(&self, at: &Place) -> Move {
+        Move::Loiter(self.circle(&at.pose).0)
     }
 
     /// The circle through a pose that keeps farthest from the zones, and how far; a

@@ -297,6 +297,30 @@ fn a_wind_that_turns_on_the_way_is_followed() {
 }
 
 #[test]
+fn a_cell_without_its_proof_is_refused_and_not_flown() {
+    // The loop knows nothing of the zone: the certificate alone keeps the UAV out of it.
+    let mut story = Story::new(10, 8, vec![], outside());
+    let zones = vec![square(186.0, 138.0, 60.0)];
+    let (_, router) = ground(10, 8, zones.clone());
+    let blind = Arc::clone(&story.executive.chart.coverage_loop);
+    story.executive = Executive::new(airframe(), 90.0, blind, router);
+    story.zones = zones;
+    story.step(200);
+    story.legs(&[(0, story.n(), Forward)]);
+    story.until_done(1500);
+    let refused = story.told.iter().filter_map(|e| match e {
+        Event::Refused { cells } => Some(cells.len()),
+        _ => None,
+    });
+    let refused: usize = refused.sum();
+    let open = story.open.iter().filter(|o| **o).count();
+    assert!(refused > 0 && refused < 12, "{:?}", story.told);
+    assert!(open <= refused, "{open} {refused}");
+    let least_m = story.least_distance_m();
+    assert!(least_m > DEFAULT_TRACKING_ERROR_M, "{least_m}");
+}
+
+#[test]
 fn gaps_in_a_plan_are_passed_or_cut_short() {
     let mut story = Story::new(10, 8, block(), outside());
     for i in (10..30).chain(33..50) {
@@ -580,5 +604,40 @@ proptest! {
             }
         }
         prop_assert!(story.least_distance_m() > CLEARANCE_M - 2.0);
+    }
+
+    #[test]
+    fn whatever_is_asked_in_a_wind_every_track_keeps_its_margin(
+        blocks in prop::collection::vec((1u32..8, 1u32..6, 10.0f64..60.0, 10.0f64..60.0), 0..4),
+        (speed, towards) in (0.0f64..2.7, 0.0f64..std::f64::consts::TAU),
+        goals in prop::collection::vec((0u8..3, 0u16..70, -20.0f64..500.0, -20.0f64..400.0), 1..5),
+        heading in -3.0..3.0f64,
+    ) {
+        let at = |cell: u32, side_m: f64| f64::from(cell) * LANE_M + 30.0 - side_m / 2.0;
+        let zones = blocks.iter().map(|&(x, y, w, h)| rectangle(at(x, w), at(y, h), w, h));
+        let start = Pose { east_m: -30.0, north_m: -30.0, heading_rad: heading };
+        let mut story = Story::new(10, 8, zones.collect(), start);
+        story.wing.wind_mps = (speed * towards.cos(), speed * towards.sin());
+        let n = story.n();
+        for (kind, first, east, north) in goals {
+            match kind {
+                0 => story.executive.set_goal(Goal::Hold, &|_| true),
+                1 => story.legs(&[(first % n, 6, if first % 2 == 0 { Forward } else { Backward })]),
+                _ => story.executive.set_goal(Goal::Point(Point::new(east, north)), &|_| true),
+            }
+            for _ in 0..150 {
+                story.step(200);
+                let ahead = story.executive.track.ahead(1e9);
+                let mut at_m = 0.0;
+                while at_m < ahead.length_m() {
+                    let p = ahead.pose_at(at_m).unwrap().position();
+                    let near = story.zones.iter().map(|z| z.distance_m(p));
+                    let least_m = near.fold(f64::INFINITY, f64::min);
+                    prop_assert!(least_m > DEFAULT_TRACKING_ERROR_M - 1e-3, "{least_m} at {p}");
+                    at_m += 0.5;
+                }
+            }
+        }
+        prop_assert!(story.least_distance_m() > CLEARANCE_M - 2.0, "{}", story.least_distance_m());
     }
 }

@@ -302,4 +302,30 @@ mod tests {
         let (worst_m, last_m, _) = flown(wind, start, &curve, 200);
         assert!(worst_m < 0.3 && last_m < 0.01, "{worst_m} {last_m}");
     }
+
+    #[test]
+    fn the_thriftiest_airspeed_is_slower_than_a_fast_cruise_and_faster_in_a_wind() {
+        let fast = Airframe {
+            cruise_mps: 22.0,
+            max_mps: 28.0,
+            ..airframe()
+        };
+        let of = |objective, wind| Air::airspeed_for_mps(objective, &fast, wind, 200.0);
+        let calm_mps = of(Objective::Energy, Wind::CALM);
+        // Least energy on a metre is at the least power's airspeed times the fourth root of 3.
+        assert!(
+            (calm_mps - 1.25 * 9.0 * 3.0f64.sqrt().sqrt()).abs() < 0.3,
+            "{calm_mps}"
+        );
+        let wind = Wind::new(4.0, -3.0);
+        let windy_mps = of(Objective::Energy, wind);
+        assert!(
+            windy_mps > calm_mps + 0.5 && windy_mps < 22.0,
+            "{windy_mps}"
+        );
+        for objective in [Objective::Time, Objective::Distance] {
+            assert!((of(objective, Wind::CALM) - 22.0).abs() < 1e-12);
+            assert!((of(objective, wind) - 22.0).abs() < 1e-12);
+        }
+    }
 }

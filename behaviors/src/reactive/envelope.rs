@@ -485,6 +485,42 @@ mod tests {
     }
 
     #[test]
+    fn in_a_wind_a_refused_flight_circles_over_one_place() {
+        // Towards a zone in the north, with the wind.
+        let zone = square(-200.0, 75.0, 400.0);
+        let mut e = envelope(vec![zone.clone()]);
+        let (wind, mut pose) = (
+            Vector::new(0.5, 2.5),
+            Pose::new(Point::new(0.0, 0.0), FRAC_PI_2),
+        );
+        let speed_mps = airframe().least_airspeed_mps();
+        let (mut held, mut least_m, mut most_m) = (0, f64::INFINITY, 0.0f64);
+        let mut at = pose.position();
+        for i in 0..600 {
+            let percept = Percept {
+                wind_east_mps: wind.x,
+                wind_north_mps: wind.y,
+                ..percept_at(pose, i * 200)
+            };
+            let out = e.check(&percept, straight(speed_mps));
+            if out.steps[0].turn_rate_radps.abs() > 0.05 {
+                held += 1;
+                if held == 1 {
+                    at = pose.position();
+                }
+                most_m = most_m.max((pose.position() - at).norm());
+            } else if held > 0 {
+                break;
+            }
+            pose = crate::reactive::follow::fly(pose, out.airspeed_mps, &out.steps, 200);
+            pose = drifted(pose, wind * 0.2);
+            least_m = least_m.min(zone.distance_m(pose.position()));
+        }
+        assert!(held > 10 && least_m > 7.0, "{held} {least_m}");
+        assert!(most_m < 70.0, "{most_m}");
+    }
+
+    #[test]
     fn zones_far_away_come_into_view_while_flying() {
         let mut e = envelope(vec![square(400.0, -50.0, 100.0)]);
         let mut held = false;

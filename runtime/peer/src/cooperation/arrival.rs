@@ -55,6 +55,7 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
             Arc::clone(&coverage_loop),
             router,
         )
+        .with_tracking_error_m(f64::from(ground.mission.tracking_error_mm) / 1000.0)
         .with_objective(peer.config.objective)
         .with_home(point_m(ground.mission.base))
     });

@@ -1,0 +1,74 @@
+//! The certificate of every stretch that is put on a track (D2.7 §2.3.1).
+//!
+//! Cells, routes, turns, trochoids as the arcs that stand for them, and loiters: each is
+//! measured exactly against the zones as they are, and must keep the tracking margin
+//! from them, so that a UAV which strays by that much is still outside. Whoever is
+//! nearer already, blown there or lost, must come no nearer on its way out. A stretch
+//! without proof is not flown: its cell is refused, its route is replaced by the circle
+//! here that keeps farthest.
+
+use super::chart::{Chart, ESCAPE_SLACK_M, Move, Place};
+use super::{Event, Executive};
+use skein_planning::frame::Pose;
+use skein_planning::trajectory::{Curve, Segment};
+
+impl Chart {
+    /// Distance from the zones that a stretch beginning at a pose must keep, metres.
+    #[must_use]
+    pub fn margin_m(&self, from: &Pose) -> f64 {
+        let here_m = self.router.zones().distance_m(from.position()) - ESCAPE_SLACK_M;
+        self.tracking_error_m.min(here_m.max(0.0))
+    }
+
+    /// Whether a move that begins at a place is proved to keep the margin.
+    #[must_use]
+    pub fn is_proved(&self, from: &Place, step: &Move) -> bool {
+        let (zones, margin_m) = (self.router.zones(), self.margin_m(&from.pose));
+        let c = &self.coverage_loop;
+        match step {
+            Move::Serve(h) => zones.is_clear(&c.curve(usize::from(h.cell), h.direction), margin_m),
+            Move::Pass(cell, d) => zones.is_clear(&c.curve(usize::from(*cell), *d), margin_m),
+            Move::Route(curve) => zones.is_clear(curve, margin_m),
+            Move::Loiter(circle) => zones.is_clear(&halves(circle), margin_m),
+        }
+    }
+}
+
+/// A full circle in two halves, because a whole one ends where it begins.
+fn halves(circle: &Segment) -> Curve {
+    let piece = (circle.curvature_per_m, 0.5 * circle.length_m);
+    Curve::from_pieces(circle.start, &[piece, piece])
+}
+
+impl Executive {
+    /// Of moves that follow each other from a place, what may be flown. Where one lacks
+    /// its proof, the cell they lead to is refused; without a cell it is held instead.
+    pub(super) fn proved(
+        &self,
+        at: &Place,
+        moves: Vec<Move>,
+        events: &mut Vec<Event>,
+    ) -> Vec<Move> {
+        let mut place = *at;
+        let all = moves.iter().all(|step| {
+            let proved = self.chart.is_proved(&place, step);
+            place = self.chart.end_of(&place, step);
+            proved
+        });
+        if all {
+            return moves;
+        }
+        let cells: Vec<u16> = moves
+            .iter()
+            .filter_map(|step| match step {
+                Move::Serve(h) => Some(h.cell),
+                _ => None,
+            })
+            .collect();
+        if cells.is_empty() {
+            return vec![self.chart.stay(at)];
+        }
+        events.push(Event::Refused { cells });
+        Vec::new()
+    }
+}
