@@ -31,7 +31,7 @@ pub fn run(args: &LineArgs) -> Result<String> {
     let text = std::fs::read_to_string(&args.file)
         .with_context(|| format!("cannot read {}", args.file.display()))?;
     let targets = read(&text).with_context(|| args.file.display().to_string())?;
-    let ways = ways(&targets, args)?;
+    let mut ways = ways(&targets, args)?;
     ways.plan(&args.tours, |lines, team, metric| {
         Ok(plan(lines, team, metric, args.tours.steps)?)
     })
@@ -46,14 +46,15 @@ fn ways(targets: &Targets, args: &LineArgs) -> Result<Ways> {
         ));
     }
     let first = targets.lines.first().map(|l| l.way[0]);
-    let mut ways = Ways::new(&args.tours, targets.home.or(first), notices)?;
-    let wide = |l: &&LineTarget| l.width_m > args.tours.swath_m;
+    let mut ways = Ways::new(&args.tours, targets.home.or(first), notices, &args.file)?;
+    let swath_m = ways.swath_m(&args.tours);
+    let wide = |l: &&LineTarget| l.width_m > swath_m;
     for line in targets.lines.iter().filter(wide) {
         let centre = plane(&ways, line)?;
-        let lanes = strip::lanes(&centre, line.width_m, args.tours.swath_m).with_context(|| {
+        let lanes = strip::lanes(&centre, line.width_m, swath_m).with_context(|| {
             format!(
                 "{}: a strip {} m wide has no lanes of --swath-m {}",
-                line.pointer, line.width_m, args.tours.swath_m
+                line.pointer, line.width_m, swath_m
             )
         })?;
         for lane in lanes {

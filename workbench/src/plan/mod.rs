@@ -1,5 +1,8 @@
 //! `plan`: a plan for a person, from files as other programs write them.
 
+pub mod approximate;
+pub mod around;
+pub mod fleet;
 pub mod line;
 mod map;
 pub mod route;

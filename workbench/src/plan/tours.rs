@@ -1,20 +1,29 @@
-//! What `plan line` and `plan visit` share: the team, the wind, and how tours are printed.
-//! Leaves to them which lines there are to fly.
+//! What `plan line` and `plan visit` share: the team, the wind, the zones on the way, and
+//! how tours are printed. Leaves to them which lines there are to fly.
 
-use super::lat_lon;
+use super::around::{Around, Asker};
+use super::fleet::{self, Member};
+use super::{lat_lon, map};
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use skein_interop::place::{LatLon, from_plane, to_plane};
 use skein_interop::plan::{PlanFile, Waypoint, write};
+use skein_interop::{geojson, plan as qgc};
 use skein_planning::coverage::line::{Line, LinePlan, Surveyor};
-use skein_planning::coverage::metric::{InWind, Metric};
+use skein_planning::coverage::metric::{InWind, Matrix, Metric};
 use skein_planning::frame::{Origin, Point, Vector};
+use skein_planning::geometry::offset::Zone;
 use skein_planning::math::sin_cos;
-use std::path::PathBuf;
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
 
-/// The most UAVs that are planned for: the same as a swarm's.
-const MAX_TEAM: usize = 1_000;
+/// Round zones the ways between all places are written down: more places than this take
+/// too long.
+const MOST_PLACES: usize = 3_000;
+
+/// Speeds that differ by less than this are the same, m/s.
+const SAME_SPEED_MPS: f64 = 1e-9;
 
 /// Points nearer to each other than this are one in the track, metres.
 const COINCIDENT_M: f64 = 1e-3;
@@ -25,6 +34,22 @@ pub struct TourArgs {
     /// How many UAVs.
     #[arg(long, default_value_t = 1, value_name = "K")]
     pub k: usize,
+    /// The UAVs, one by one, instead of `--k`: JSON5, a list of `{name, speed_mps,
+    /// endurance_s?, start?: [lat, lon], swath_m?, turn_radius_m?}`.
+    #[arg(long, value_name = "FILE")]
+    pub fleet: Option<PathBuf>,
+    /// Zones to fly round on the way, besides those of the file itself: fences of a
+    /// `.plan`, or polygons of GeoJSON.
+    #[arg(long, value_name = "FILE")]
+    pub zones: Option<PathBuf>,
+    /// Distance kept from every zone, metres.
+    #[arg(
+        long,
+        default_value_t = 10.0,
+        value_name = "M",
+        allow_hyphen_values = true
+    )]
+    pub clearance_m: f64,
     /// Where all UAVs start and end, degrees; by default the file's home position, or
     /// its first target.
     #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true)]
@@ -82,14 +107,41 @@ pub struct Ways {
     /// Each way as places in order, and the name of the item that it serves.
     pub ways: Vec<(Vec<usize>, String)>,
     notices: Vec<String>,
+    /// The UAVs, and the place where each starts and ends.
+    team: Vec<Member>,
+    depots: Vec<usize>,
+    zones: Vec<Zone>,
+}
+
+/// What flights cost: straight, or round zones.
+pub enum Cost<'a> {
+    /// Straight.
+    Straight(InWind<'a>),
+    /// Written down.
+    Round(Matrix),
+}
+
+impl Metric for Cost<'_> {
+    fn cost(&self, a: usize, b: usize) -> f64 {
+        match self {
+            Self::Straight(wind) => wind.cost(a, b),
+            Self::Round(matrix) => matrix.cost(a, b),
+        }
+    }
 }
 
 impl Ways {
-    /// No ways yet, and a depot: the flag's, or `home`.
+    /// No ways yet, and a depot: the flag's, or `home`; the zones are those of `file` and
+    /// of the flag.
     ///
     /// # Errors
-    /// When the flag is wrong, or there is nothing to go by.
-    pub fn new(args: &TourArgs, home: Option<LatLon>, notices: Vec<String>) -> Result<Self> {
+    /// When a flag is wrong, or there is nothing to go by.
+    pub fn new(
+        args: &TourArgs,
+        home: Option<LatLon>,
+        notices: Vec<String>,
+        file: &Path,
+    ) -> Result<Self> {
         let depot = match &args.depot {
             Some(text) => lat_lon(text).context("--depot")?,
             None => home.context("the file holds nothing to plan")?,
@@ -98,12 +150,42 @@ impl Ways {
             lat_deg: depot.lat_deg,
             lon_deg: depot.lon_deg,
         };
-        Ok(Self {
+        let mut ways = Self {
             origin,
             at: vec![to_plane(origin, depot)?],
             ways: Vec::new(),
             notices,
-        })
+            team: fleet::team(
+                args.fleet.as_deref(),
+                args.k,
+                args.speed_mps,
+                args.endurance_s,
+            )?,
+            depots: Vec::new(),
+            zones: zones_inside(file, origin)?,
+        };
+        if let Some(file) = &args.zones {
+            let map = map::read(file, depot, depot, None).context("--zones")?;
+            ways.zones.extend(map.zones);
+        }
+        for uav in 0..ways.team.len() {
+            let place = match ways.team[uav].place() {
+                Some(at) => {
+                    let p = ways.point(at, &ways.team[uav].name)?;
+                    ways.place(p)
+                }
+                None => 0,
+            };
+            ways.depots.push(place);
+        }
+        Ok(ways)
+    }
+
+    /// The narrowest swath of the team, metres: lanes are laid for it.
+    #[must_use]
+    pub fn swath_m(&self, args: &TourArgs) -> f64 {
+        let each = self.team.iter().map(|m| m.swath_m.unwrap_or(args.swath_m));
+        each.fold(f64::INFINITY, f64::min)
     }
 
     /// A point of the file in the plane.
@@ -131,115 +213,238 @@ impl Ways {
     /// # Errors
     /// When a flag is wrong, or a file cannot be written.
     pub fn plan(
-        &self,
+        &mut self,
         args: &TourArgs,
-        planner: impl FnOnce(&[Line], &[Surveyor], &InWind<'_>) -> Result<LinePlan>,
+        planner: impl FnOnce(&[Line], &[Surveyor], &Cost<'_>) -> Result<LinePlan>,
     ) -> Result<String> {
-        ensure!(
-            (1..=MAX_TEAM).contains(&args.k),
-            "--k must be between 1 and {MAX_TEAM}, found {}",
-            args.k
-        );
+        let around = Around::new(&self.zones, args.clearance_m, &self.at)?;
+        self.leave_out_forbidden(&around)?;
         let (s, c) = sin_cos(args.wind_from_deg.to_radians());
         let wind = Vector::new(-s, -c) * args.wind_mps;
-        let metric = InWind::new(&self.at, args.speed_mps, wind).context("--wind-mps")?;
+        let base_mps = self.team[0].speed_mps;
+        let alike = |m: &Member| (m.speed_mps - base_mps).abs() < SAME_SPEED_MPS;
+        ensure!(
+            args.wind_mps.abs() < SAME_SPEED_MPS || self.team.iter().all(alike),
+            "--wind-mps: in a wind, UAVs of unlike speeds cannot be planned together"
+        );
+        let straight = InWind::new(&self.at, base_mps, wind).context("--wind-mps")?;
         let lines: Vec<Line> = self
             .ways
             .iter()
             .map(|(way, _)| {
-                let cost = way.windows(2).map(|w| metric.cost(w[0], w[1])).sum();
+                let cost = way.windows(2).map(|w| straight.cost(w[0], w[1])).sum();
                 let ends = way.first().zip(way.last());
                 let (a, b) = ends.map_or((0, 0), |(a, b)| (*a, *b));
                 Line::new(a, b, cost)
             })
             .collect();
-        let uav = Surveyor {
-            endurance: args.endurance_s.unwrap_or(f64::INFINITY),
-            ..Surveyor::at(0)
+        let metric = if around.is_needed() {
+            Cost::Round(self.round(&around, base_mps, wind)?)
+        } else {
+            Cost::Straight(straight)
         };
-        let plan = planner(&lines, &vec![uav; args.k], &metric)?;
+        let uav = |(m, depot): (&Member, &usize)| Surveyor {
+            depot: *depot,
+            speed: m.speed_mps / base_mps,
+            endurance: m.endurance_s.unwrap_or(f64::INFINITY),
+        };
+        let team: Vec<Surveyor> = self.team.iter().zip(&self.depots).map(uav).collect();
+        let plan = planner(&lines, &team, &metric)?;
+        let sheet = Sheet {
+            ways: self,
+            around: &around,
+            plan: &plan,
+        };
         match args.format {
-            Format::Json => Ok(self.json(&plan).to_string()),
-            Format::Geojson => Ok(self.geojson(&plan).to_string()),
-            Format::Plan => self.plans(args, &plan),
+            Format::Json => Ok(sheet.json().to_string()),
+            Format::Geojson => Ok(sheet.geojson().to_string()),
+            Format::Plan => sheet.plans(args),
         }
     }
 
-    /// The points of a tour, from the depot back to it.
-    fn track(&self, plan: &LinePlan, uav: usize) -> Vec<Point> {
-        let mut places = vec![0];
-        for pass in &plan.tours[uav].passes {
-            let way = &self.ways[pass.line].0;
-            if pass.backward {
-                places.extend(way.iter().rev());
-            } else {
-                places.extend(way);
-            }
+    /// Costs of the shortest ways round the zones between all places.
+    fn round(&self, around: &Around, speed_mps: f64, wind: Vector) -> Result<Matrix> {
+        ensure!(
+            self.at.len() <= MOST_PLACES,
+            "{} places are too many to plan round zones, {MOST_PLACES} are possible",
+            self.at.len()
+        );
+        let asker = RefCell::new(around.asker());
+        let cost = |a: usize, b: usize| -> f64 {
+            let way = asker.borrow_mut().way(self.at[a], self.at[b]);
+            // Places without a way have been left out before.
+            let way = way.unwrap_or_else(|| vec![self.at[a], self.at[b]]);
+            let legs = way.windows(2).map(|leg| {
+                let wind = InWind::new(leg, speed_mps, wind);
+                wind.map_or(f64::MAX, |w| w.cost(0, 1))
+            });
+            legs.sum()
+        };
+        Ok(Matrix::of(self.at.len(), &cost))
+    }
+
+    /// Leaves out, with a notice, what cannot be flown without entering a zone.
+    fn leave_out_forbidden(&mut self, around: &Around) -> Result<()> {
+        if !around.is_needed() {
+            return Ok(());
         }
-        places.push(0);
-        let mut track: Vec<Point> = places.iter().map(|&p| self.at[p]).collect();
+        let mut asker = around.asker();
+        for (uav, depot) in self.team.iter().zip(&self.depots) {
+            ensure!(
+                !around.forbids(self.at[*depot]),
+                "{} starts in a zone or nearer to one than the clearance",
+                uav.name
+            );
+        }
+        let home = self.at[self.depots[0]];
+        let (at, notices) = (&self.at, &mut self.notices);
+        self.ways.retain(|(way, name)| {
+            let mut legs = way.windows(2);
+            let clear = way.iter().all(|p| !around.forbids(at[*p]))
+                && legs.all(|w| asker.is_straight(at[w[0]], at[w[1]]))
+                && way
+                    .first()
+                    .is_none_or(|p| asker.way(home, at[*p]).is_some());
+            if !clear {
+                notices.push(format!("{name}: left out, a zone is in the way"));
+            }
+            clear
+        });
+        Ok(())
+    }
+}
+
+/// Zones that a file of targets holds itself: fences of a `.plan`, polygons of GeoJSON
+/// with the property `"no_fly": true`.
+fn zones_inside(file: &Path, origin: Origin) -> Result<Vec<Zone>> {
+    let named = || file.display().to_string();
+    let text = std::fs::read_to_string(file).with_context(named)?;
+    if file.extension().is_some_and(|e| e == "plan") {
+        // Without a fence there is nothing to read twice.
+        let fences = qgc::read(&text).with_context(named)?;
+        if fences.keep_in.is_empty() && fences.keep_out.is_empty() {
+            return Ok(Vec::new());
+        }
+        let at = LatLon {
+            lat_deg: origin.lat_deg,
+            lon_deg: origin.lon_deg,
+        };
+        return Ok(map::read(file, at, at, None)?.zones);
+    }
+    let mut zones = Vec::new();
+    for f in geojson::read(&text).with_context(named)?.polygons {
+        if f.properties.get("no_fly").and_then(Value::as_bool) == Some(true) {
+            let ring = f.ring.iter().map(|p| to_plane(origin, *p));
+            zones.push(Zone {
+                outer: ring
+                    .collect::<Result<_, _>>()
+                    .with_context(|| f.pointer.clone())?,
+                holes: Vec::new(),
+            });
+        }
+    }
+    Ok(zones)
+}
+
+/// Tours to be printed.
+struct Sheet<'a> {
+    ways: &'a Ways,
+    around: &'a Around,
+    plan: &'a LinePlan,
+}
+
+impl Sheet<'_> {
+    /// The points of a tour, from the depot back to it.
+    fn track(&self, uav: usize) -> Vec<Point> {
+        let depot = self.ways.at[self.ways.depots[uav]];
+        let mut asker = self.around.asker();
+        let mut track = vec![depot];
+        let go = |track: &mut Vec<Point>, asker: &mut Asker<'_>, to: Point| {
+            let from = track.last().copied().unwrap_or(depot);
+            let way = asker.way(from, to);
+            track.extend(way.iter().flatten().skip(1));
+        };
+        for pass in &self.plan.tours[uav].passes {
+            let way = &self.ways.ways[pass.line].0;
+            let mut way: Vec<Point> = way.iter().map(|p| self.ways.at[*p]).collect();
+            if pass.backward {
+                way.reverse();
+            }
+            if let Some(first) = way.first() {
+                go(&mut track, &mut asker, *first);
+            }
+            track.extend(way.iter().skip(1));
+        }
+        go(&mut track, &mut asker, depot);
         // Different places may coincide, a target with the depot for example.
         track.dedup_by(|p, q| (*p - *q).norm() < COINCIDENT_M);
         track
     }
 
-    fn summary(&self, plan: &LinePlan) -> Value {
+    fn summary(&self) -> Value {
+        let (plan, ways) = (self.plan, self.ways);
         let unserved: Vec<&str> = plan
             .unserved
             .iter()
-            .map(|&i| self.ways[i].1.as_str())
+            .map(|&i| ways.ways[i].1.as_str())
             .collect();
         json!({
             "makespan_s": plan.makespan, "lower_bound_s": plan.lower_bound,
-            "total_s": plan.tours.iter().map(|t| t.cost).sum::<f64>(),
-            "targets": self.ways.len(), "unserved": unserved, "notices": self.notices,
+            "total_s": (0..plan.tours.len()).map(|uav| self.time_s(uav)).sum::<f64>(),
+            "targets": ways.ways.len(), "unserved": unserved, "notices": ways.notices,
         })
     }
 
-    fn tour(&self, plan: &LinePlan, uav: usize) -> Value {
-        let track = self.track(plan, uav);
+    fn time_s(&self, uav: usize) -> f64 {
+        let team = &self.ways.team;
+        self.plan.tours[uav].cost * team[0].speed_mps / team[uav].speed_mps
+    }
+
+    fn tour(&self, uav: usize) -> Value {
+        let track = self.track(uav);
         let length_m: f64 = track.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
         json!({
-            "uav": uav + 1, "time_s": plan.tours[uav].cost, "length_m": length_m,
-            "targets": plan.tours[uav].passes.len(),
+            "uav": uav + 1, "name": self.ways.team[uav].name,
+            "time_s": self.time_s(uav),
+            "length_m": length_m, "targets": self.plan.tours[uav].passes.len(),
         })
     }
 
-    fn json(&self, plan: &LinePlan) -> Value {
-        let tours: Vec<Value> = (0..plan.tours.len())
+    fn json(&self) -> Value {
+        let tours: Vec<Value> = (0..self.plan.tours.len())
             .map(|uav| {
-                let passes: Vec<Value> = plan.tours[uav]
+                let passes: Vec<Value> = self.plan.tours[uav]
                     .passes
                     .iter()
-                    .map(|p| json!({"target": self.ways[p.line].1, "backward": p.backward}))
+                    .map(|p| json!({"target": self.ways.ways[p.line].1, "backward": p.backward}))
                     .collect();
                 let points: Vec<Value> = self
-                    .track(plan, uav)
+                    .track(uav)
                     .iter()
                     .map(|p| {
-                        let at = from_plane(self.origin, *p);
+                        let at = from_plane(self.ways.origin, *p);
                         json!({"lat_deg": at.lat_deg, "lon_deg": at.lon_deg})
                     })
                     .collect();
-                let mut tour = self.tour(plan, uav);
+                let mut tour = self.tour(uav);
                 tour["passes"] = json!(passes);
                 tour["points"] = json!(points);
                 tour
             })
             .collect();
-        let mut out = self.summary(plan);
+        let mut out = self.summary();
         out["tours"] = json!(tours);
         out
     }
 
-    fn geojson(&self, plan: &LinePlan) -> Value {
-        let features: Vec<Value> = (0..plan.tours.len())
+    fn geojson(&self) -> Value {
+        let features: Vec<Value> = (0..self.plan.tours.len())
             .map(|uav| {
                 let line: Vec<Value> = self
-                    .track(plan, uav)
+                    .track(uav)
                     .iter()
                     .map(|p| {
-                        let at = from_plane(self.origin, *p);
+                        let at = from_plane(self.ways.origin, *p);
                         json!([at.lon_deg, at.lat_deg])
                     })
                     .collect();
@@ -249,43 +454,44 @@ impl Ways {
                 } else {
                     json!({"type": "LineString", "coordinates": line})
                 };
-                json!({"type": "Feature", "properties": self.tour(plan, uav), "geometry": geometry})
+                json!({"type": "Feature", "properties": self.tour(uav), "geometry": geometry})
             })
             .collect();
-        let mut out = self.summary(plan);
+        let mut out = self.summary();
         out["type"] = json!("FeatureCollection");
         out["features"] = json!(features);
         out
     }
 
     /// One QGroundControl plan a UAV.
-    fn plans(&self, args: &TourArgs, plan: &LinePlan) -> Result<String> {
-        let home = from_plane(self.origin, self.at[0]);
+    fn plans(&self, args: &TourArgs) -> Result<String> {
         let text = |uav: usize| {
-            let track = self.track(plan, uav);
-            let waypoint = |p: &Point| Waypoint::new(from_plane(self.origin, *p), args.altitude_m);
+            let home = from_plane(self.ways.origin, self.ways.at[self.ways.depots[uav]]);
+            let track = self.track(uav);
+            let waypoint =
+                |p: &Point| Waypoint::new(from_plane(self.ways.origin, *p), args.altitude_m);
             write(&PlanFile {
                 waypoints: track.iter().skip(1).map(waypoint).collect(),
                 home: Some(home),
-                cruise_mps: Some(args.speed_mps),
+                cruise_mps: Some(self.ways.team[uav].speed_mps),
                 ..PlanFile::default()
             })
         };
         let Some(dir) = &args.out else {
-            if plan.tours.len() == 1 {
+            if self.plan.tours.len() == 1 {
                 return Ok(text(0));
             }
             bail!("--format plan for several UAVs needs --out DIR: one file a UAV");
         };
         std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
         let mut written = Vec::new();
-        for uav in 0..plan.tours.len() {
-            let path = dir.join(format!("uav-{}.plan", uav + 1));
+        for uav in 0..self.plan.tours.len() {
+            let path = dir.join(format!("{}.plan", self.ways.team[uav].name));
             std::fs::write(&path, text(uav) + "\n")
                 .with_context(|| format!("cannot write {}", path.display()))?;
             written.push(path.display().to_string());
         }
-        let mut out = self.summary(plan);
+        let mut out = self.summary();
         out["files"] = json!(written);
         Ok(out.to_string())
     }

@@ -35,19 +35,18 @@ pub fn run(args: &VisitArgs) -> Result<String> {
         notices.push(format!("{n} line(s) ignored: `plan line` plans for lines"));
     }
     let first = targets.points.first().map(|p| p.at);
-    let mut ways = Ways::new(&args.tours, targets.home.or(first), notices)?;
+    let mut ways = Ways::new(&args.tours, targets.home.or(first), notices, &args.file)?;
+    let swath_m = ways.swath_m(&args.tours);
     for point in &targets.points {
         let centre = ways.point(point.at, &point.pointer)?;
         // Lanes along the way out from the depot: the sweep starts without a turn.
         let heading_rad = atan2(centre.y, centre.x);
-        let way = look_at(centre, point.radius_m, args.tours.swath_m, heading_rad).with_context(
-            || {
-                format!(
-                    "{}: no sweep of radius {} m with --swath-m {}",
-                    point.pointer, point.radius_m, args.tours.swath_m
-                )
-            },
-        )?;
+        let way = look_at(centre, point.radius_m, swath_m, heading_rad).with_context(|| {
+            format!(
+                "{}: no sweep of radius {} m with --swath-m {}",
+                point.pointer, point.radius_m, swath_m
+            )
+        })?;
         ways.push(&way, &point.pointer);
     }
     ways.plan(&args.tours, |lines, team, metric| {
@@ -92,6 +91,40 @@ mod tests {
         let short = told(&["--endurance-s", "100"]).unwrap();
         assert!(!short["unserved"].as_array().unwrap().is_empty());
         assert!(told(&["--swath-m", "0"]).is_err());
+        // A zone between the depot and the points makes the way longer, one over a point
+        // leaves it out.
+        let write = |name: &str, text: &str| {
+            let path = dir.join(name);
+            std::fs::write(&path, text).unwrap();
+            path.display().to_string()
+        };
+        let square = |west: f64, south: f64, east: f64, north: f64| {
+            format!(
+                r#"{{"type":"Polygon","coordinates":[[[{west},{south}],[{east},{south}],[{east},{north}],[{west},{north}],[{west},{south}]]]}}"#
+            )
+        };
+        let wall = write("wall.geojson", &square(8.545, 47.39, 8.55, 47.415));
+        let round = told(&["--zones", &wall]).unwrap();
+        assert!(round["makespan_s"].as_f64() > one["makespan_s"].as_f64());
+        assert!(round["unserved"].as_array().unwrap().is_empty() && round["targets"] == 4);
+        let length = |told: &serde_json::Value| told["tours"][0]["length_m"].as_f64().unwrap();
+        let (flown_m, time_s) = (length(&round), round["makespan_s"].as_f64().unwrap());
+        assert!(
+            (flown_m / 15.0 - time_s).abs() < 1e-6 * time_s,
+            "as long as it is flown"
+        );
+        let over = write("over.geojson", &square(8.559, 47.399, 8.561, 47.401));
+        let less = told(&["--zones", &over]).unwrap();
+        assert_eq!(less["targets"], 3);
+        assert!(less["notices"].to_string().contains("a zone is in the way"));
+        let fleet =
+            "[{name: 'slow', speed_mps: 10}, {name: 'fast', speed_mps: 20, start: [47.42, 8.56]}]";
+        let fleet = write("fleet.json5", fleet);
+        let pair = told(&["--fleet", &fleet]).unwrap();
+        assert_eq!(pair["tours"][1]["name"], "fast");
+        assert!((pair["tours"][1]["points"][0]["lat_deg"].as_f64().unwrap() - 47.42).abs() < 1e-9);
+        assert!(told(&["--fleet", &fleet, "--wind-mps", "3"]).is_err());
+        assert!(told(&["--zones", &wall, "--clearance-m", "-1"]).is_err());
         std::fs::remove_dir_all(&dir).unwrap();
     }
 }

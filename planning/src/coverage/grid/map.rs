@@ -54,10 +54,8 @@ impl LaneMap {
     ) -> Result<Self, MapError> {
         let too_large = MapError::TooLarge { rows, cols };
         let width = u64::from(cols) + 2;
+        Self::check(rows, cols)?;
         let padded = width.next_power_of_two() * (u64::from(rows) + 2);
-        if padded > MOST_CELLS {
-            return Err(too_large);
-        }
         let size = usize::try_from(padded).map_err(|_| too_large)?;
         let mut map = Self {
             rows,
@@ -76,6 +74,22 @@ impl LaneMap {
             }
         }
         Ok(map)
+    }
+
+    /// Whether a map of this size can be made.
+    ///
+    /// # Errors
+    /// When it is too large to number its cells.
+    pub fn check(rows: u32, cols: u32) -> Result<(), MapError> {
+        let width = u64::from(cols) + 2;
+        if width
+            .next_power_of_two()
+            .saturating_mul(u64::from(rows) + 2)
+            > MOST_CELLS
+        {
+            return Err(MapError::TooLarge { rows, cols });
+        }
+        Ok(())
     }
 
     fn number(&self, row: u32, col: u32) -> Cell {

@@ -16,11 +16,11 @@
 //! | [`peel`] | work for UAVs that begin close together, farthest first |
 //! | [`search`] | local search over the orders of cells |
 //! | [`improve`] | the default planner |
+//! | [`raster`] | which cells an area becomes |
 //! | [`patrol`] | a loop flown again and again |
 //! | [`stream`] | numbers that look random and are the same everywhere |
 //!
-//! Left to others: exact curves, cameras and no-fly zones (`area`); which cells a
-//! polygon becomes.
+//! Left to others: exact curves, cameras and no-fly zones (`area`).
 
 pub mod bounds;
 pub mod forest;
@@ -32,6 +32,7 @@ pub mod partition;
 pub mod patrol;
 pub mod peel;
 pub mod plan;
+pub mod raster;
 pub mod ring;
 pub mod search;
 pub mod spanning;
