@@ -15,6 +15,9 @@ pub struct Feature {
     pub ring: Vec<LatLon>,
     /// Number of holes, which the ring does not show.
     pub holes: usize,
+    /// The rings of those of its holes that have at least three different points,
+    /// counter-clockwise, the first point not repeated.
+    pub hole_rings: Vec<Vec<LatLon>>,
     /// Its properties.
     pub properties: Map<String, Value>,
 }
@@ -78,24 +81,29 @@ pub(crate) fn position(at: &Cursor<'_>) -> Result<LatLon, FormatError> {
     })
 }
 
-fn polygon(at: &Cursor<'_>) -> Result<(Vec<LatLon>, usize), FormatError> {
+/// The outer ring, the number of holes, and the rings of the holes that have an area.
+type Rings = (Vec<LatLon>, usize, Vec<Vec<LatLon>>);
+
+fn polygon(at: &Cursor<'_>) -> Result<Rings, FormatError> {
     let rings = at.items()?;
     let outer = rings
         .first()
         .ok_or_else(|| at.wrong("a polygon has at least one ring"))?;
-    let points = outer
-        .items()?
-        .iter()
-        .map(position)
-        .collect::<Result<Vec<_>, _>>()?;
-    let ring = orient(points);
-    if ring.len() < 3 {
-        return Err(outer.wrong(format!(
-            "a ring has at least 3 different points, found {}",
-            ring.len()
-        )));
-    }
-    Ok((ring, rings.len() - 1))
+    let read = |ring: &Cursor<'_>| {
+        let points = ring.items()?;
+        let points = points.iter().map(position).collect::<Result<Vec<_>, _>>()?;
+        let points = orient(points);
+        if points.len() < 3 {
+            return Err(ring.wrong(format!(
+                "a ring has at least 3 different points, found {}",
+                points.len()
+            )));
+        }
+        Ok(points)
+    };
+    // Whoever takes the outer ring for solid does not mind what is wrong in a hole.
+    let holes = rings.iter().skip(1).filter_map(|r| read(r).ok()).collect();
+    Ok((read(outer)?, rings.len() - 1, holes))
 }
 
 fn geometry(
@@ -105,7 +113,7 @@ fn geometry(
     out: &mut Features,
 ) -> Result<(), FormatError> {
     let kind = at.need("type")?;
-    let mut push = |(ring, holes): (Vec<LatLon>, usize)| {
+    let mut push = |(ring, holes, hole_rings): Rings| {
         if holes > 0 {
             let text = format!("{holes} hole(s) ignored: the outer ring counts as solid");
             out.notices.push(Notice {
@@ -118,6 +126,7 @@ fn geometry(
             pointer: pointer.to_owned(),
             ring,
             holes,
+            hole_rings,
             properties,
         });
     };

@@ -2,10 +2,12 @@
 
 pub mod approximate;
 pub mod around;
+pub mod cover;
 pub mod fleet;
 pub mod line;
 mod map;
 pub mod route;
+pub mod site;
 pub mod tours;
 pub mod visit;
 
@@ -26,6 +28,8 @@ pub struct PlanArgs {
 pub enum Subject {
     /// The shortest way from one place to another round the no-fly zones of a file.
     Route(route::RouteArgs),
+    /// Flights of a team that cover an area.
+    Cover(cover::CoverArgs),
     /// Tours of a team along all lines of a file.
     Line(line::LineArgs),
     /// Tours of a team over all points of a file.
@@ -40,6 +44,7 @@ pub enum Subject {
 pub fn run(args: &PlanArgs) -> Result<String> {
     match &args.subject {
         Subject::Route(args) => route::run(args),
+        Subject::Cover(args) => cover::run(args),
         Subject::Line(args) => line::run(args),
         Subject::Visit(args) => visit::run(args),
     }

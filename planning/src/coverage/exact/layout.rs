@@ -1,20 +1,21 @@
-//! All passes of an area: headings, cells, lanes, passes along borders (D2.7 §3.6.1).
+//! All passes of an area: headings, cells, lanes, passes into pockets (D2.7 §3.6.1).
 //!
 //! The area is cut along the heading that promises the shortest tour among those with the
 //! least altitudes; then each cell may turn its lanes, if it stays one cell that way and
 //! its passes and turns get shorter. Leaves the order of the passes to others.
 
 use super::cells::{Cell, decompose};
+use super::common::common_lanes;
 use super::direction::{half_turn, sweep_directions};
 use super::frame::{Axes, Edge, Kind, Ring, edges};
-use super::lanes::{Ground, Leftover, chosen, lanes};
+use super::lanes::{Ground, Leftover, Sheet, choose, lanes};
 use super::ways::Ways;
 use super::{
     CellPlan, Decomposition, Directions, ExactError, ExactProblem, MOST_PASSES, Measures, Pass,
 };
 use crate::frame::Point;
 use crate::geometry::offset::{Growth, Region, Zone, grow};
-use crate::math::{PI, atan2};
+use crate::math::PI;
 
 /// What lanes keep beyond the clearance, so that their ends are outside of the outlines
 /// that the ways between them go round, metres.
@@ -28,6 +29,9 @@ const OVERSHOOT: f64 = 0.083;
 /// Headings of the whole area that are laid out and compared.
 const HEADINGS: usize = 6;
 
+/// Where the first of the common strips begins, as a share of what whole lanes leave.
+const SHIFTS: [f64; 4] = [0.5, 0.0, 1.0, 0.25];
+
 /// Headings of a cell that are compared.
 const CELL_HEADINGS: usize = 12;
 
@@ -35,7 +39,7 @@ const CELL_HEADINGS: usize = 12;
 pub(super) struct Layout {
     pub(super) passes: Vec<Pass>,
     pub(super) cells: Vec<CellPlan>,
-    pub(super) border_passes: usize,
+    pub(super) pocket_passes: usize,
     /// What is to be seen, square metres.
     pub(super) area_m2: f64,
     /// The zones grown by the clearance.
@@ -102,7 +106,7 @@ impl<'a> Borders<'a> {
     }
 }
 
-/// A cell with its passes.
+/// A cell with lanes of its own.
 struct Covered {
     heading_rad: f64,
     cell: Cell,
@@ -113,13 +117,12 @@ struct Covered {
 impl Covered {
     fn new(cell: Cell, heading_rad: f64, zones: &[Edge], measures: &Measures) -> Self {
         let mut leftovers = Vec::new();
-        let lanes = lanes(
-            &cell,
-            Axes::new(heading_rad),
-            &Ground { zones },
+        let sheet = Sheet {
+            axes: Axes::new(heading_rad),
+            ground: &Ground { zones },
             measures,
-            &mut leftovers,
-        );
+        };
+        let lanes = lanes(&cell, &sheet, &mut leftovers);
         Self {
             heading_rad,
             cell,
@@ -130,16 +133,88 @@ impl Covered {
 
     /// What its passes and their turns will take about, metres.
     fn estimate_m(&self, measures: &Measures) -> f64 {
-        let more = chosen(self.leftovers.clone(), &self.lanes, measures);
-        let all = self.lanes.iter().chain(&more);
-        all.map(|p| p.length_m() + measures.turn_m()).sum()
+        let mut passes = self.lanes.clone();
+        choose(&self.leftovers, &mut passes, measures);
+        estimate_m(&passes, measures)
     }
 }
 
 impl Measures {
     /// What a turn from lane to lane takes about, metres.
-    fn turn_m(&self) -> f64 {
+    pub(super) fn turn_m(&self) -> f64 {
         (PI * self.turn_radius_m).max(self.lane_spacing_m)
+    }
+}
+
+/// What passes and their turns will take about, metres.
+fn estimate_m(passes: &[Pass], measures: &Measures) -> f64 {
+    let each = |p: &Pass| p.length_m() + measures.turn_m();
+    passes.iter().map(each).sum()
+}
+
+/// All passes of an area in one of the ways to lay them.
+#[derive(Default)]
+struct Draft {
+    passes: Vec<Pass>,
+    cells: Vec<CellPlan>,
+    /// How many passes are beside the lanes.
+    extra: usize,
+}
+
+impl Draft {
+    /// Lanes cell by cell.
+    fn by_cell(covered: Vec<Covered>, measures: &Measures) -> Self {
+        let mut draft = Self::default();
+        let mut leftovers = Vec::new();
+        for c in covered {
+            let lanes = c.lanes.len();
+            draft.cells.push(cell_plan(&c.cell, c.heading_rad, lanes));
+            draft.passes.extend(c.lanes);
+            leftovers.extend(c.leftovers);
+        }
+        draft.add(&leftovers, measures);
+        draft
+    }
+
+    /// Lanes of one heading that are common to all cells.
+    fn common(
+        cells: &[Cell],
+        heading_rad: f64,
+        zones: &[Edge],
+        measures: &Measures,
+        shift: f64,
+    ) -> Self {
+        let sheet = Sheet {
+            axes: Axes::new(heading_rad),
+            ground: &Ground { zones },
+            measures,
+        };
+        let found = common_lanes(cells, &sheet, shift);
+        let mut draft = Self {
+            passes: found.lanes,
+            cells: cells.iter().map(|c| cell_plan(c, heading_rad, 0)).collect(),
+            extra: 0,
+        };
+        draft.add(&found.corners, measures);
+        draft.add(&found.pockets, measures);
+        draft
+    }
+
+    /// Adds the passes that see what the present ones do not.
+    fn add(&mut self, leftovers: &[Leftover], measures: &Measures) {
+        let before = self.passes.len();
+        choose(leftovers, &mut self.passes, measures);
+        self.extra += self.passes.len() - before;
+    }
+}
+
+fn cell_plan(cell: &Cell, heading_rad: f64, lanes: usize) -> CellPlan {
+    let axes = Axes::new(heading_rad);
+    CellPlan {
+        ring: cell.ring().into_iter().map(|p| axes.back(p)).collect(),
+        area_m2: cell.area_m2(),
+        heading_rad,
+        lanes,
     }
 }
 
@@ -150,51 +225,50 @@ impl Layout {
         let outlines = grown(problem, GAP_M)?;
         let borders = Borders::new(problem, &outlines);
         let measures = problem.measures();
+        let mut best: Option<(f64, Draft)> = None;
+        let mut offer = |draft: Draft| {
+            let cost = estimate_m(&draft.passes, &measures);
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, draft));
+            }
+        };
         let headings: Vec<f64> = match problem.directions {
             Directions::Fixed(heading) => vec![half_turn(heading)],
             Directions::Huang => first(&borders, 1),
-            Directions::PerCell => first(&borders, HEADINGS),
+            Directions::PerCell | Directions::Best => first(&borders, HEADINGS),
         };
-        let mut best: Option<(f64, Vec<Covered>)> = None;
         for heading in headings {
-            let mut covered = sweep(&borders, heading, problem.decomposition, &measures)?;
-            if problem.directions == Directions::PerCell {
+            let sweep = Sweep::new(&borders, heading, problem.decomposition, &measures)?;
+            if matches!(problem.directions, Directions::Best | Directions::Fixed(_)) {
+                for shift in SHIFTS {
+                    let zones = &sweep.zones;
+                    offer(Draft::common(
+                        &sweep.cells,
+                        heading,
+                        zones,
+                        &measures,
+                        shift,
+                    ));
+                }
+            }
+            let mut covered = sweep.covered(&measures);
+            if matches!(problem.directions, Directions::Best | Directions::PerCell) {
                 for cell in &mut covered {
                     turn(cell, &borders, &measures);
                 }
             }
-            let cost: f64 = covered.iter().map(|c| c.estimate_m(&measures)).sum();
-            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                best = Some((cost, covered));
-            }
+            offer(Draft::by_cell(covered, &measures));
         }
-        let covered = best.map(|b| b.1).unwrap_or_default();
-        Self::assemble(covered, &borders, &measures, grown(problem, 0.0)?)
+        let draft = best.map(|b| b.1).unwrap_or_default();
+        Self::assemble(draft, grown(problem, 0.0)?)
     }
 
-    fn assemble(
-        covered: Vec<Covered>,
-        borders: &Borders<'_>,
-        measures: &Measures,
-        zones: Vec<Region>,
-    ) -> Result<Self, ExactError> {
-        let mut passes = Vec::new();
-        let mut cells = Vec::new();
-        let mut leftovers = Vec::new();
-        for c in covered {
-            let axes = Axes::new(c.heading_rad);
-            cells.push(CellPlan {
-                ring: c.cell.ring().into_iter().map(|p| axes.back(p)).collect(),
-                area_m2: c.cell.area_m2(),
-                heading_rad: c.heading_rad,
-                lanes: c.lanes.len(),
-            });
-            passes.extend(c.lanes);
-            leftovers.extend(c.leftovers);
-        }
-        let more = chosen(leftovers, &passes, measures);
-        let border_passes = more.len();
-        passes.extend(more.into_iter().map(|p| stretched(p, borders, measures)));
+    fn assemble(draft: Draft, zones: Vec<Region>) -> Result<Self, ExactError> {
+        let Draft {
+            passes,
+            cells,
+            extra,
+        } = draft;
         if passes.is_empty() {
             return Err(ExactError::Nothing);
         }
@@ -205,7 +279,7 @@ impl Layout {
             passes,
             area_m2: cells.iter().map(|c| c.area_m2).sum(),
             cells,
-            border_passes,
+            pocket_passes: extra,
             zones,
         })
     }
@@ -239,27 +313,43 @@ fn first(borders: &Borders<'_>, n: usize) -> Vec<f64> {
     all.into_iter().take(n).map(|(h, _)| h).collect()
 }
 
-/// The whole area in lanes of one heading.
-fn sweep(
-    borders: &Borders<'_>,
+/// The whole area swept in one heading.
+struct Sweep {
     heading_rad: f64,
-    kind: Decomposition,
-    measures: &Measures,
-) -> Result<Vec<Covered>, ExactError> {
-    let axes = Axes::new(heading_rad);
-    let zones = borders.zone_edges(axes);
-    let cells = decompose(&borders.edges(axes), kind);
-    let lanes: f64 = cells
-        .iter()
-        .map(|c| ((c.right() - c.left()) / measures.lane_spacing_m).ceil())
-        .sum();
-    if lanes > MOST_PASSES as f64 {
-        return Err(ExactError::TooMany);
+    cells: Vec<Cell>,
+    zones: Vec<Edge>,
+}
+
+impl Sweep {
+    fn new(
+        borders: &Borders<'_>,
+        heading_rad: f64,
+        kind: Decomposition,
+        measures: &Measures,
+    ) -> Result<Self, ExactError> {
+        let axes = Axes::new(heading_rad);
+        let cells = decompose(&borders.edges(axes), kind);
+        let lanes: f64 = cells
+            .iter()
+            .map(|c| ((c.right() - c.left()) / measures.lane_spacing_m).ceil())
+            .sum();
+        if lanes > MOST_PASSES as f64 {
+            return Err(ExactError::TooMany);
+        }
+        Ok(Self {
+            heading_rad,
+            cells,
+            zones: borders.zone_edges(axes),
+        })
     }
-    Ok(cells
-        .into_iter()
-        .map(|c| Covered::new(c, heading_rad, &zones, measures))
-        .collect())
+
+    /// Each cell in lanes of its own.
+    fn covered(&self, measures: &Measures) -> Vec<Covered> {
+        let cells = self.cells.iter().cloned();
+        cells
+            .map(|c| Covered::new(c, self.heading_rad, &self.zones, measures))
+            .collect()
+    }
 }
 
 /// Turns the lanes of a cell to the heading of one of its sides where that is shorter.
@@ -296,22 +386,5 @@ fn turn(covered: &mut Covered, borders: &Borders<'_>, measures: &Measures) {
             least = cost;
             *covered = turned;
         }
-    }
-}
-
-/// A pass along a border prolonged to the shortest length.
-fn stretched(pass: Pass, borders: &Borders<'_>, measures: &Measures) -> Pass {
-    if pass.length_m() >= measures.shortest_pass_m {
-        return pass;
-    }
-    let d = pass.to - pass.from;
-    let axes = Axes::new(atan2(d.y, d.x));
-    let zones = borders.zone_edges(axes);
-    let (from, to) = (axes.into(pass.from), axes.into(pass.to));
-    let ground = Ground { zones: &zones };
-    let (low, high) = ground.stretched(from.x, from.y, to.y, measures.shortest_pass_m);
-    Pass {
-        from: axes.back(Point::new(from.x, low)),
-        to: axes.back(Point::new(from.x, high)),
     }
 }

@@ -6,8 +6,10 @@
 //! | `frame` | the turned frame of the sweep, on a grid |
 //! | `cells` | boustrophedon and trapezoidal decomposition |
 //! | `direction` | Huang's sweep direction |
-//! | `lanes` | lanes of a cell, and passes along steep borders |
+//! | `lanes` | lanes of a cell, and passes into pockets |
+//! | `common` | lanes common to all cells of one heading |
 //! | `layout` | all passes of an area: directions, cells, lanes |
+//! | `team` | the passes shared out among UAVs |
 //! | `ways` | what it costs to fly from pass to pass |
 //!
 //! The sensor is a rectangle that flies along: half a lane spacing to either side,
@@ -29,14 +31,17 @@
 //! ```
 
 mod cells;
+mod common;
 mod direction;
 mod frame;
 mod lanes;
 mod layout;
+mod team;
 mod ways;
 
 pub use cells::Decomposition;
 pub use direction::{altitudes_m, sweep_directions};
+pub use team::{Member, TeamPlan, plan_team};
 
 use crate::coverage::line::{self, Line, LineError, Surveyor};
 use crate::coverage::metric::Matrix;
@@ -47,11 +52,15 @@ use crate::math::atan2;
 use layout::Layout;
 use std::sync::Arc;
 use thiserror::Error;
-use ways::Places;
+use ways::{Places, Ways};
 
 /// Lanes are refused when there would be more than this: an area of 20 km by 20 km at
 /// lanes of 20 m has a thousand, with holes a few times as many.
 const MOST_PASSES: usize = 20_000;
+
+/// Ways round zones are searched for between places nearer than this, in turns; others
+/// are guessed, but for those that are flown.
+const NEAR_TURNS: f64 = 3.0;
 
 /// Steps of improvement of a plan unless the caller says otherwise.
 pub const DEFAULT_STEPS: usize = 2_000;
@@ -116,15 +125,18 @@ impl Pass {
     }
 }
 
-/// Which headings lanes may have.
+/// How lanes are laid.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum Directions {
-    /// The best for each cell.
+    /// What promises the shortest tour: lanes common to all cells in one of the headings
+    /// with the least altitudes, or lanes cell by cell.
     #[default]
+    Best,
+    /// Lanes cell by cell, each cell in the heading that is best for it.
     PerCell,
-    /// Huang's direction for the whole area.
+    /// Lanes cell by cell, all in Huang's direction: the document's own planner.
     Huang,
-    /// This heading everywhere, radians counter-clockwise from east.
+    /// All lanes in this heading, radians counter-clockwise from east.
     Fixed(f64),
 }
 
@@ -267,7 +279,7 @@ pub struct CellPlan {
     pub area_m2: f64,
     /// Heading of its lanes, radians counter-clockwise from east.
     pub heading_rad: f64,
-    /// How many lanes it has.
+    /// How many lanes it has of its own; 0 where lanes are common to all cells.
     pub lanes: usize,
 }
 
@@ -276,10 +288,13 @@ pub struct CellPlan {
 pub struct ExactPlan {
     /// The passes in the order of flight, from the launch point back to it.
     pub passes: Vec<Pass>,
+    /// The whole flight: launch point, ends of passes and bends round zones between them,
+    /// launch point.
+    pub track: Vec<Point>,
     /// The cells.
     pub cells: Vec<CellPlan>,
-    /// Passes along borders of zones that no lane sees wholly; they are in `passes` too.
-    pub border_passes: usize,
+    /// Passes at borders of zones for what no lane sees; they are in `passes` too.
+    pub pocket_passes: usize,
     /// Length of all passes, metres.
     pub passes_m: f64,
     /// Length of the whole tour with its turns and the ways from and to the launch
@@ -294,7 +309,7 @@ pub struct ExactPlan {
 /// # Guarantees
 /// Every pass keeps the clearance from every zone. Every point of the area farther from
 /// all zones than the clearance (and what the outlines of grown zones add to it) is seen,
-/// up to 2 % of a lane spacing at the ends of lanes. Each pass is flown once.
+/// up to 0.2 % of a lane spacing at the ends of lanes. Each pass is flown once.
 ///
 /// # Complexity
 /// Near-linear decomposition; for p passes O(p²) ways and the steps of improvement.
@@ -311,19 +326,28 @@ pub fn plan(problem: &ExactProblem) -> Result<ExactPlan, ExactError> {
         problem.turn_radius_m,
     );
     let n = layout.passes.len();
-    let costs = Matrix::of(2 * n + 1, &places);
+    let near_m = NEAR_TURNS * problem.measures().turn_m();
+    let costs = Matrix::of(2 * n + 1, &|a, b| places.guess_m(a, b, near_m));
     let lines = lines(&layout.passes);
     let found = line::plan(&lines, &[Surveyor::at(2 * n)], &costs, problem.steps)?;
     let order: Vec<line::Pass> = found.tours.into_iter().flat_map(|t| t.passes).collect();
-    let length_m = line::tour_cost(&order, &lines, 2 * n, &costs);
+    let length_m = line::tour_cost(&order, &lines, 2 * n, &places);
+    let passes = in_order(&layout.passes, &order);
     Ok(ExactPlan {
-        passes: in_order(&layout.passes, &order),
-        border_passes: layout.border_passes,
+        track: track(&ways, problem.launch, &passes),
+        passes,
+        pocket_passes: layout.pocket_passes,
         passes_m: layout.passes.iter().map(Pass::length_m).sum(),
         length_m,
         lower_bound_m: layout.area_m2 / problem.lane_spacing_m,
         cells: layout.cells,
     })
+}
+
+/// The whole flight over `passes` from a launch point and back.
+fn track(ways: &Ways, launch: Point, passes: &[Pass]) -> Vec<Point> {
+    let ends = passes.iter().flat_map(|p| [p.from, p.to]);
+    ways.track([launch].into_iter().chain(ends).chain([launch]))
 }
 
 fn lines(passes: &[Pass]) -> Vec<Line> {

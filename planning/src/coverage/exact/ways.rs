@@ -24,8 +24,11 @@ const OUTSKIRTS_M: f64 = 1_000.0;
 #[derive(Debug)]
 pub(super) struct Ways {
     mesh: Option<Mesh>,
-    zones: Vec<(Point, Point, Vec<Point>)>,
+    zones: Vec<Boxed>,
 }
+
+/// A border of a zone with the low and the high corner of the box round it.
+type Boxed = (Point, Point, Vec<Point>);
 
 impl Ways {
     /// Ways round grown zones for places within `reach_m` of the origin.
@@ -61,13 +64,41 @@ impl Ways {
         Self { mesh, zones }
     }
 
+    /// The points of a flight from place to place in this order, with the bends round
+    /// zones between them.
+    pub(super) fn track(&self, places: impl Iterator<Item = Point>) -> Vec<Point> {
+        let mut search = self.mesh.as_ref().map(Search::new);
+        let mut track: Vec<Point> = Vec::new();
+        let mut way = Vec::new();
+        for p in places {
+            let bends = track
+                .last()
+                .is_some_and(|from| self.is_blocked(*from, p))
+                .then_some(())
+                .and(search.as_mut());
+            if let (Some(search), Some(&from)) = (bends, track.last())
+                && search.shortest_into(from, p, &mut way)
+                && way.len() > 2
+            {
+                track.extend(&way[1..way.len() - 1]);
+            }
+            track.push(p);
+        }
+        track
+    }
+
     /// Whether the straight line crosses a border of a zone.
     fn is_blocked(&self, a: Point, b: Point) -> bool {
+        self.blocking(a, b).next().is_some()
+    }
+
+    /// The borders of zones that the straight line crosses.
+    fn blocking(&self, a: Point, b: Point) -> impl Iterator<Item = &Boxed> {
         let (low, high) = (
             Point::new(a.x.min(b.x), a.y.min(b.y)),
             Point::new(a.x.max(b.x), a.y.max(b.y)),
         );
-        self.zones.iter().any(|(l, h, ring)| {
+        self.zones.iter().filter(move |(l, h, ring)| {
             l.x <= high.x && low.x <= h.x && l.y <= high.y && low.y <= h.y && crosses(a, b, ring)
         })
     }
@@ -141,6 +172,23 @@ impl<'a> Places<'a> {
         let mut search = self.search.borrow_mut();
         let around = search.as_mut().and_then(|s| s.distance_m(a, b));
         around.unwrap_or(straight)
+    }
+
+    /// As [`Metric::cost`], but where a zone lies between places that are farther apart
+    /// than `near_m`, the way round it is guessed from its size and not searched for:
+    /// hardly any such way is flown, and nearly all pairs of places are far apart.
+    pub(super) fn guess_m(&self, a: usize, b: usize, near_m: f64) -> f64 {
+        let (p, q) = (self.at[a], self.at[b]);
+        let straight = (q - p).norm();
+        let ends = self.out_rad.len();
+        if straight <= near_m || a >= ends || b >= ends {
+            return self.cost(a, b);
+        }
+        let blocking = self.ways.blocking(p, q);
+        let round: f64 = blocking
+            .map(|(low, high, _)| (high.x - low.x) + (high.y - low.y))
+            .sum();
+        straight + round + self.turns_m(a, b).max(0.0)
     }
 
     /// What the turns at both ends add to a straight line, metres.
