@@ -17,6 +17,7 @@
 mod envelope;
 mod front;
 
+use super::content::Content;
 use super::mesh::{Mesh, NONE};
 use super::sight::{self, SOURCE};
 use crate::frame::Point;
@@ -86,6 +87,17 @@ impl<'m> PathMap<'m> {
     #[must_use]
     pub fn source(&self) -> Point {
         self.source
+    }
+
+    /// The same number for the same map, on every machine: processes that built their
+    /// own compare it.
+    #[must_use]
+    pub fn content_hash(&self) -> u64 {
+        let start = Content::of("map")
+            .with(self.mesh.content_hash())
+            .with_point(self.source);
+        let add = |c: Content, l: &Label| c.with_number(l.length_m).with(u64::from(l.before));
+        self.labels.iter().fold(start, add).hash()
     }
 
     /// How much work the map was.

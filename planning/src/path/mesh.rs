@@ -8,15 +8,20 @@
 
 mod blocks;
 mod build;
+mod cut;
 mod lines;
 mod locate;
+mod repair;
 mod triangles;
 
+use super::content::Content;
 use crate::frame::Point;
 use robust::{Coord, orient2d};
 use thiserror::Error;
 
 use blocks::Blocks;
+pub use build::delaunay;
+pub use cut::Cut;
 use locate::Buckets;
 
 /// No vertex, no half-edge, no cell.
@@ -64,6 +69,9 @@ pub(crate) struct Vertex {
 #[derive(Clone, Debug)]
 pub struct Mesh {
     pub(crate) vertices: Vec<Vertex>,
+    /// The first vertices are all places; those behind them stand where an earlier one
+    /// does, and this is which.
+    twice: Vec<u32>,
     pub(crate) edges: Vec<HalfEdge>,
     /// Where each cell's half-edges begin; one entry more than cells.
     pub(crate) starts: Vec<u32>,
@@ -146,6 +154,7 @@ impl Mesh {
     fn finish(points: &[Point], edges: Vec<HalfEdge>, starts: Vec<u32>) -> Result<Self, MeshError> {
         let mut mesh = Self {
             vertices: Vec::new(),
+            twice: Vec::new(),
             edges,
             starts,
             blocks: Blocks::default(),
@@ -155,6 +164,18 @@ impl Mesh {
         mesh.blocks = Blocks::of(&mut mesh.edges, &mesh.starts);
         mesh.buckets = Buckets::of(&mesh);
         Ok(mesh)
+    }
+
+    /// The same number for the same cells, on every machine: processes that built
+    /// their own mesh compare it.
+    #[must_use]
+    pub fn content_hash(&self) -> u64 {
+        let start = Content::of("mesh").with_indices(self.starts.iter().copied());
+        let add = |c: Content, e: &HalfEdge| {
+            let links = (u64::from(e.vertex) << 32) | u64::from(e.twin);
+            c.with_point(e.origin).with(links)
+        };
+        self.edges.iter().fold(start, add).hash()
     }
 
     /// Number of convex cells.
@@ -211,7 +232,11 @@ impl Mesh {
 
     /// A point inside the part of the mesh that has the most cells.
     pub(crate) fn middle_of_largest_part(&self) -> Point {
-        let cell = self.blocks.largest_part();
+        self.middle_of(self.blocks.largest_part())
+    }
+
+    /// A point inside a cell.
+    fn middle_of(&self, cell: u32) -> Point {
         let ring = self.cell(cell as usize).collect::<Vec<_>>();
         let sum = ring
             .iter()
@@ -227,6 +252,13 @@ impl Mesh {
                 visit(cell);
             }
         }
+    }
+
+    /// The first vertex at the place of a vertex.
+    fn place_of(&self, vertex: u32) -> u32 {
+        let n_places = self.vertices.len() - self.twice.len();
+        let extra = (vertex as usize).checked_sub(n_places);
+        extra.map_or(vertex, |i| self.twice[i])
     }
 
     fn cell_contains(&self, cell: u32, p: Point) -> bool {
@@ -280,6 +312,7 @@ impl Mesh {
                         self.vertices[v] = fan;
                     } else {
                         self.vertices.push(fan);
+                        self.twice.push(v as u32);
                     }
                     n_fans += 1;
                     n_seen += n;

@@ -6,16 +6,20 @@
 //! them where no Dubins word is clear. A curve that fails its check is refused,
 //! never clipped.
 
+mod content;
 pub mod continuous;
 #[cfg(test)]
 mod crowded;
 pub mod landmarks;
 mod loose_ends;
 pub mod mesh;
+#[cfg(test)]
+mod properties;
 mod search;
 mod sight;
 #[cfg(test)]
 mod tests;
+pub mod through;
 pub mod two_point;
 pub mod visibility;
 mod wheels;

@@ -13,6 +13,7 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 
+use super::content::Content;
 use crate::frame::Point;
 use crate::geometry::Polygon;
 use crate::geometry::offset::Region;
@@ -106,6 +107,23 @@ impl VisibilityGraph {
             begins,
             targets,
         }
+    }
+
+    /// The same number for the same graph, on every machine: processes that built
+    /// their own compare it.
+    #[must_use]
+    pub fn content_hash(&self) -> u64 {
+        let corners = self.corners.iter().copied();
+        let mut content = Content::of("graph")
+            .with_indices(corners)
+            .with_indices(self.begins.iter().copied());
+        for &p in &self.obstacles.vertices {
+            content = content.with_point(p);
+        }
+        for &(target, length_m) in &self.targets {
+            content = content.with(u64::from(target)).with_number(length_m);
+        }
+        content.hash()
     }
 
     /// How many corners the graph has.

@@ -9,6 +9,8 @@ pub mod headings;
 pub mod line;
 pub mod offset;
 pub mod route;
+pub mod route_clearance;
+pub mod route_graph;
 pub mod route_maps;
 pub mod route_polygons;
 pub mod stream;
@@ -37,13 +39,13 @@ pub enum Subject {
     Dubins(dubins::DubinsArgs),
     /// Headings at random waypoints, with a certified gap.
     Headings(headings::HeadingsArgs),
-    /// Shortest paths among polygons by the visibility graph.
-    RoutePolygons(route_polygons::RoutePolygonsArgs),
     /// Fastest flights in a constant wind.
     Wind(wind::WindArgs),
     /// No-fly zones grown by a radius.
     Offset(offset::OffsetArgs),
-    /// Shortest paths on a mesh, against reference lengths.
+    /// Routes that keep some distance against the route of most distance.
+    Clearance(route_clearance::ClearanceArgs),
+    /// Shortest paths on a mesh or among polygons, against reference lengths.
     Route(route::RouteArgs),
     /// Tours of a team along all roads of a network.
     Line(line::LineArgs),
@@ -60,9 +62,9 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
         Subject::CoverLoop(args) => cover_loop::run(args),
         Subject::Dubins(args) => dubins::run(args),
         Subject::Headings(args) => headings::run(args),
-        Subject::RoutePolygons(args) => route_polygons::run(args),
         Subject::Wind(args) => wind::run(args),
         Subject::Offset(args) => offset::run(args),
+        Subject::Clearance(args) => route_clearance::run(args),
         Subject::Route(args) => route::run(args),
         Subject::Line(args) => line::run(args),
     }

@@ -1,9 +1,11 @@
 //! `bench route`: shortest paths on a mesh, two-point and from a map, against reference lengths.
 
 use super::figures::{Times, timed};
-use super::route_maps;
+use super::route_graph::GraphFigures;
+use super::route_polygons::{self, PolygonsArgs};
+use super::{route_graph, route_maps};
 use crate::navmesh::{self, Query};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use skein_planning::frame::Point;
@@ -33,6 +35,9 @@ const MAX_TEETH: usize = 2000;
 /// Maps built, from sources evenly spread over the queries.
 const MAPS: usize = 16;
 
+/// Zones taken out and put back.
+const REPAIRS: usize = 16;
+
 /// Goals of each map that are compared with two-point queries.
 const CHECKS: usize = 100;
 
@@ -40,17 +45,23 @@ const CHECKS: usize = 100;
 #[derive(Debug, Args)]
 pub struct RouteArgs {
     /// The mesh, in the `.mesh` format, version 2.
-    #[arg(long, value_name = "FILE", requires = "queries", required_unless_present_any = ["octagons", "comb"])]
+    #[arg(long, value_name = "FILE", requires = "queries", required_unless_present_any = ["octagons", "comb", "polygons"])]
     pub mesh: Option<PathBuf>,
     /// Queries, one a line: from x y, to x y, length.
     #[arg(long, value_name = "FILE", requires = "mesh")]
     pub queries: Option<PathBuf>,
     /// Instead of files: N by N octagons, triangulated, and random queries.
-    #[arg(long, value_name = "N", conflicts_with_all = ["mesh", "comb"])]
+    #[arg(long, value_name = "N", conflicts_with_all = ["mesh", "comb"], group = "made_up")]
     pub octagons: Option<usize>,
     /// Instead of files: N diamonds below a shaft, hard for continuous Dijkstra.
-    #[arg(long, value_name = "N", conflicts_with = "mesh")]
+    #[arg(long, value_name = "N", conflicts_with = "mesh", group = "made_up")]
     pub comb: Option<usize>,
+    /// Instead of a mesh: polygons, and questions in the same file.
+    #[command(flatten)]
+    pub among: PolygonsArgs,
+    /// Also build the visibility graph of the made-up map, and ask it the same.
+    #[arg(long, requires = "made_up")]
+    pub graph: bool,
     /// Also measure a rival in this process (needs the cargo feature `rivals`).
     #[arg(long, value_name = "RIVAL")]
     pub against: Option<Rival>,
@@ -99,6 +110,13 @@ struct Answer {
     maps: MapFigures,
     vertices: usize,
     cells: usize,
+    /// Number by which processes compare the mesh they have built.
+    structure_hash: String,
+    #[serde(flatten)]
+    graph: Option<GraphFigures>,
+    /// A zone taken out of the made-up map, or put back: mean of some.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    repair_ms: Option<f64>,
     /// Two-point queries with landmarks; the build is that of the landmarks.
     guided: Figures,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -114,6 +132,10 @@ struct Answer {
 /// # Errors
 /// When a file is missing or malformed; the error names the line.
 pub fn run(args: &RouteArgs) -> Result<String> {
+    if let Some(file) = &args.among.polygons {
+        ensure!(args.against.is_none(), "a rival needs --mesh");
+        return route_polygons::run(file, &args.among);
+    }
     let problem = problem(args)?;
     let Problem { mesh, queries, .. } = &problem;
     let ours = two_point(Search::new(mesh), queries, problem.build_ms);
@@ -128,6 +150,11 @@ pub fn run(args: &RouteArgs) -> Result<String> {
     Ok(serde_json::to_string(&Answer {
         vertices: mesh.n_vertices(),
         cells: mesh.n_cells(),
+        structure_hash: format!("{:016x}", mesh.content_hash()),
+        graph: args.graph.then(|| {
+            route_graph::measure(&problem.rings, queries, ours.build_ms, ours.times.mean_us)
+        }),
+        repair_ms: repair_ms(mesh, &problem.rings)?,
         ratio: rival.as_ref().map(|r| ours.times.mean_us / r.times.mean_us),
         guided_ratio: rival
             .as_ref()
@@ -142,6 +169,8 @@ pub fn run(args: &RouteArgs) -> Result<String> {
 /// A mesh and what is asked about it.
 struct Problem {
     text: Option<String>,
+    /// The border and the holes, if the map was made up.
+    rings: Vec<Vec<Point>>,
     mesh: Mesh,
     queries: Vec<Query>,
     build_ms: f64,
@@ -160,8 +189,8 @@ fn problem(args: &RouteArgs) -> Result<Problem> {
         ),
         _ => anyhow::bail!("--mesh with --queries, --octagons or --comb"),
     };
-    let rings: Vec<&[Point]> = rings.iter().map(Vec::as_slice).collect();
-    let (mesh, build_us) = best_of_rounds(|| Mesh::from_rings(&rings));
+    let slices: Vec<&[Point]> = rings.iter().map(Vec::as_slice).collect();
+    let (mesh, build_us) = best_of_rounds(|| Mesh::from_rings(&slices));
     let mesh = mesh?;
     let reachable = |q: &Query| mesh.contains(q.from) && mesh.contains(q.to);
     let mut queries: Vec<Query> = queries.into_iter().filter(reachable).collect();
@@ -174,10 +203,29 @@ fn problem(args: &RouteArgs) -> Result<Problem> {
     drop(search);
     Ok(Problem {
         text: None,
+        rings,
         mesh,
         queries,
         build_ms: build_us / 1e3,
     })
+}
+
+/// Takes zones out and puts them back, one by one.
+fn repair_ms(mesh: &Mesh, rings: &[Vec<Point>]) -> Result<Option<f64>> {
+    let mut times_us = Vec::new();
+    for ring in rings.iter().skip(1).step_by((rings.len() / REPAIRS).max(1)) {
+        let (without, us) = timed(|| mesh.with_ring_changed(ring));
+        times_us.push(us);
+        let without = without?;
+        let (with, us) = timed(|| without.with_ring_changed(ring));
+        times_us.push(us);
+        ensure!(
+            with?.n_vertices() == mesh.n_vertices(),
+            "a repair left something behind"
+        );
+    }
+    let mean_ms = Times::of(times_us).mean_us / 1e3;
+    Ok((rings.len() > 1).then_some(mean_ms))
 }
 
 fn read_problem(mesh: &Path, queries: &Path) -> Result<Problem> {
@@ -188,6 +236,7 @@ fn read_problem(mesh: &Path, queries: &Path) -> Result<Problem> {
     Ok(Problem {
         mesh: linked.with_context(|| name(mesh))?,
         text: Some(text),
+        rings: Vec::new(),
         queries,
         build_ms: build_us / 1e3,
     })

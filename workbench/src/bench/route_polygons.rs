@@ -1,44 +1,67 @@
-//! `bench route-polygons`: shortest paths among polygons by the visibility graph, or
-//! with a turn radius the routes that a UAV flies among them.
+//! `bench route --polygons`: shortest paths among polygons by either engine, or with a
+//! turn radius the routes that a UAV flies among them.
 
 use super::figures::{Times, timed};
+use crate::plan::route::Engine;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde::Serialize;
 use skein_planning::frame::{Point, Pose};
 use skein_planning::geometry::{NoFlyZones, Polygon};
 use skein_planning::math::atan2;
+use skein_planning::path::mesh::Mesh;
+use skein_planning::path::two_point::Search;
 use skein_planning::path::visibility::VisibilityGraph;
 use skein_planning::path::{RouteLimits, Router};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// One map of polygons and the questions in the same file.
+/// A map of polygons and the questions in the same file.
 #[derive(Debug, Args)]
-pub struct RoutePolygonsArgs {
-    /// First line: questions and obstacles; then an obstacle a line as `x y x y …`;
-    /// then a question a line as `Q x y x y`.
-    #[arg(long, value_name = "FILE")]
-    pub polygons: PathBuf,
-    /// Reference lengths, one a line, `inf` where there is no path.
-    #[arg(long, value_name = "FILE")]
+pub struct PolygonsArgs {
+    /// Polygons and questions. First line: their numbers; then an obstacle a line as
+    /// `x y x y …`; then a question a line as `Q x y x y`.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["mesh", "octagons", "comb"])]
+    pub polygons: Option<PathBuf>,
+    /// Reference lengths for the questions, one a line, `inf` where there is no path.
+    #[arg(long, value_name = "FILE", requires = "polygons")]
     pub reference: Option<PathBuf>,
+    /// Which engine answers the questions.
+    #[arg(long, value_enum, default_value_t = Engine::Graph, requires = "polygons")]
+    pub engine: Engine,
     /// Fly the questions: from start to goal point, facing it, with this turn radius,
     /// in the unit of the file.
-    #[arg(long, value_name = "R", conflicts_with = "reference")]
+    #[arg(
+        long,
+        value_name = "R",
+        requires = "polygons",
+        conflicts_with = "reference"
+    )]
     pub turn_radius: Option<f64>,
     /// Distance kept from the polygons when flying.
-    #[arg(long, value_name = "R", default_value_t = 0.0)]
+    #[arg(
+        long,
+        value_name = "R",
+        default_value_t = 0.0,
+        requires = "turn_radius"
+    )]
     pub clearance: f64,
 }
+
+/// How far beyond all polygons and questions the mesh ends, as a share of the map:
+/// paths bend at polygons only, so any room at all is enough.
+const OUTSKIRTS: f64 = 0.1;
 
 #[derive(Serialize)]
 struct Answer {
     n: usize,
     vertices: usize,
+    /// Corners and edges of the graph, or of the mesh its corners and cells.
     corners: usize,
     edges: usize,
     unreachable: usize,
+    /// Number by which processes compare what they have built.
+    structure_hash: String,
     /// The sum of all lengths, to compare two runs.
     total_length: f64,
     max_rel_error: Option<f64>,
@@ -56,8 +79,8 @@ const TOLERANCE: f64 = 1e-9;
 ///
 /// # Errors
 /// When a file is missing or malformed; the error names the line.
-pub fn run(args: &RoutePolygonsArgs) -> Result<String> {
-    let (obstacles, questions) = read(&args.polygons)?;
+pub fn run(polygons: &PathBuf, args: &PolygonsArgs) -> Result<String> {
+    let (obstacles, questions) = read(polygons)?;
     if let Some(turn_radius_m) = args.turn_radius {
         let limits = RouteLimits {
             turn_radius_m,
@@ -65,14 +88,11 @@ pub fn run(args: &RoutePolygonsArgs) -> Result<String> {
         };
         return fly(&obstacles, &questions, limits);
     }
-    let (graph, build_us) = timed(|| VisibilityGraph::new(&obstacles));
-    let mut lengths = Vec::with_capacity(questions.len());
-    let mut each_us = Vec::with_capacity(questions.len());
-    for &(from, to) in &questions {
-        let (path, us) = timed(|| graph.shortest(from, to));
-        lengths.push(path.map_or(f64::INFINITY, |p| p.length_m));
-        each_us.push(us);
-    }
+    let built = match args.engine {
+        Engine::Graph => by_graph(&obstacles, &questions),
+        Engine::Mesh => by_mesh(&obstacles, &questions)?,
+    };
+    let lengths = &built.lengths;
     let against = args.reference.as_ref().map(numbers).transpose()?;
     if let Some(want) = &against
         && want.len() != lengths.len()
@@ -106,8 +126,9 @@ pub fn run(args: &RoutePolygonsArgs) -> Result<String> {
     Ok(serde_json::to_string(&Answer {
         n: questions.len(),
         vertices: obstacles.iter().map(|o| o.vertices().len()).sum(),
-        corners: graph.corners(),
-        edges: graph.edges(),
+        corners: built.corners,
+        edges: built.edges,
+        structure_hash: format!("{:016x}", built.hash),
         unreachable: lengths.iter().filter(|l| l.is_infinite()).count(),
         total_length: lengths.iter().filter(|l| l.is_finite()).sum(),
         max_rel_error: errors
@@ -115,9 +136,90 @@ pub fn run(args: &RoutePolygonsArgs) -> Result<String> {
             .map(|e| e.iter().fold(0.0, |m: f64, e| m.max(e.abs()))),
         mismatches: count(|e| e.abs() > TOLERANCE),
         better: count(|e| e < -TOLERANCE),
-        build_ms: build_us / 1e3,
-        times: Times::of(each_us),
+        build_ms: built.build_us / 1e3,
+        times: Times::of(built.each_us),
     })?)
+}
+
+/// A structure, and what it answered.
+struct Built {
+    corners: usize,
+    edges: usize,
+    hash: u64,
+    build_us: f64,
+    lengths: Vec<f64>,
+    each_us: Vec<f64>,
+}
+
+type Ends = (Point, Point);
+
+/// Lengths of all paths, infinite where there is none, and the times.
+fn ask(questions: &[Ends], mut length: impl FnMut(&Ends) -> Option<f64>) -> (Vec<f64>, Vec<f64>) {
+    let answer = |q| {
+        let (length, us) = timed(|| length(q));
+        (length.unwrap_or(f64::INFINITY), us)
+    };
+    questions.iter().map(answer).unzip()
+}
+
+fn by_graph(obstacles: &[Polygon], questions: &[Ends]) -> Built {
+    let (graph, build_us) = timed(|| VisibilityGraph::new(obstacles));
+    let (lengths, each_us) = ask(questions, |&(from, to)| {
+        graph.shortest(from, to).map(|p| p.length_m)
+    });
+    Built {
+        corners: graph.corners(),
+        edges: graph.edges(),
+        hash: graph.content_hash(),
+        build_us,
+        lengths,
+        each_us,
+    }
+}
+
+fn by_mesh(obstacles: &[Polygon], questions: &[Ends]) -> Result<Built> {
+    let border = border(obstacles, questions);
+    let rings: Vec<&[Point]> = std::iter::once(border.as_slice())
+        .chain(obstacles.iter().map(Polygon::vertices))
+        .collect();
+    let (mesh, build_us) = timed(|| Mesh::from_rings(&rings));
+    let mesh = mesh.context("polygons must not cross each other for the mesh")?;
+    let mut search = Search::new(&mesh);
+    let (lengths, each_us) = ask(questions, |&(from, to)| search.distance_m(from, to));
+    Ok(Built {
+        corners: mesh.n_corners(),
+        edges: mesh.n_cells(),
+        hash: mesh.content_hash(),
+        build_us,
+        lengths,
+        each_us,
+    })
+}
+
+/// A rectangle round everything, with some room.
+pub(super) fn border(obstacles: &[Polygon], questions: &[Ends]) -> Vec<Point> {
+    let ends = questions.iter().flat_map(|&(a, b)| [a, b]);
+    let points = obstacles
+        .iter()
+        .flat_map(Polygon::vertices)
+        .copied()
+        .chain(ends);
+    let (mut low, mut high) = (Point::origin(), Point::origin());
+    for (i, p) in points.enumerate() {
+        (low, high) = if i == 0 {
+            (p, p)
+        } else {
+            (low.inf(&p), high.sup(&p))
+        };
+    }
+    let room = OUTSKIRTS * (high - low).amax().max(1.0);
+    let (low, high) = (low.map(|c| c - room), high.map(|c| c + room));
+    vec![
+        low,
+        Point::new(high.x, low.y),
+        high,
+        Point::new(low.x, high.y),
+    ]
 }
 
 #[derive(Serialize)]
@@ -171,7 +273,7 @@ fn fly(obstacles: &[Polygon], questions: &[(Point, Point)], limits: RouteLimits)
     })?)
 }
 
-type Map = (Vec<Polygon>, Vec<(Point, Point)>);
+type Map = (Vec<Polygon>, Vec<Ends>);
 
 fn read(path: &PathBuf) -> Result<Map> {
     let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;

@@ -48,16 +48,18 @@ struct Sheet {
     notices: Vec<String>,
 }
 
-/// Reads a `.plan` or GeoJSON file; with a level, buildings below it are flown over.
+/// Reads a `.plan` or GeoJSON file around the places that a route names; with a level,
+/// buildings below it are flown over.
 ///
 /// # Errors
 /// When the file cannot be read or something of it is wrong; names the place.
-pub(super) fn read(file: &Path, from: LatLon, to: LatLon, level: Option<Level>) -> Result<Map> {
+pub(super) fn read(
+    file: &Path,
+    origin: Origin,
+    places: &[Point],
+    level: Option<Level>,
+) -> Result<Map> {
     let text = std::fs::read_to_string(file).with_context(|| format!("{}", file.display()))?;
-    let origin = Origin {
-        lat_deg: from.lat_deg,
-        lon_deg: from.lon_deg,
-    };
     let is_plan = file.extension().is_some_and(|e| e == "plan");
     let sheet = if is_plan {
         of_plan(&text, origin)
@@ -65,8 +67,7 @@ pub(super) fn read(file: &Path, from: LatLon, to: LatLon, level: Option<Level>) 
         of_geojson(&text, origin, level)
     };
     let sheet = sheet.with_context(|| format!("{}", file.display()))?;
-    let goal = to_plane(origin, to).context("--to")?;
-    Ok(assemble(sheet, goal, level))
+    Ok(assemble(sheet, places, level))
 }
 
 fn of_plan(text: &str, origin: Origin) -> Result<Sheet> {
@@ -126,7 +127,7 @@ fn of_geojson(text: &str, origin: Origin, level: Option<Level>) -> Result<Sheet>
     Ok(sheet)
 }
 
-fn assemble(sheet: Sheet, goal: Point, level: Option<Level>) -> Map {
+fn assemble(sheet: Sheet, places: &[Point], level: Option<Level>) -> Map {
     let mut map = Map {
         notices: sheet.notices,
         ..Map::default()
@@ -157,8 +158,8 @@ fn assemble(sheet: Sheet, goal: Point, level: Option<Level>) -> Map {
         map.names.push(sheet.keep_out[i].name.clone());
     }
     let drawn = sheet.keep_out.iter().chain(&sheet.keep_in);
-    let mut reach_m = goal.coords.amax();
-    for p in drawn.flat_map(|d| &d.ring) {
+    let mut reach_m: f64 = 0.0;
+    for p in drawn.flat_map(|d| &d.ring).chain(places) {
         reach_m = reach_m.max(p.coords.amax());
     }
     // Outside of an inclusion fence is a zone with the fence as its hole.

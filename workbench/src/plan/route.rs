@@ -14,6 +14,7 @@ use skein_interop::place::{LatLon, from_plane, to_plane};
 use skein_planning::frame::{Origin, Point};
 use skein_planning::geometry::offset::{Grown, Growth, OffsetError, Place, Region, Zone, grow};
 use skein_planning::path::mesh::Mesh;
+use skein_planning::path::through::NoLeg;
 use skein_planning::path::two_point::Search;
 use skein_planning::path::visibility::VisibilityGraph;
 use std::path::PathBuf;
@@ -36,6 +37,9 @@ pub struct RouteArgs {
     /// Where it ends, degrees.
     #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true)]
     pub to: String,
+    /// A place to fly over on the way, degrees; given several times, in this order.
+    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true)]
+    pub via: Vec<String>,
     /// Distance kept from every zone and from the fence, metres.
     #[arg(long, value_name = "R")]
     pub clearance_m: f64,
@@ -81,24 +85,39 @@ pub fn run(args: &RouteArgs) -> Result<String> {
     let to = lat_lon(&args.to).context("--to")?;
     let growth = Growth::new(args.clearance_m).context("--clearance-m")?;
     let level = level(args)?;
-    let mut map = map::read(&args.file, from, to, level)?;
-    map.widen(args.clearance_m)?;
-    let grown = grow(&map.zones, &growth).map_err(|e| named(&e, &map))?;
     let origin = Origin {
         lat_deg: from.lat_deg,
         lon_deg: from.lon_deg,
     };
-    let ends = [
+    let mut places = vec![(
+        "--from".to_owned(),
         to_plane(origin, from).context("--from")?,
-        to_plane(origin, to).context("--to")?,
-    ];
-    for (p, flag) in ends.iter().zip(["--from", "--to"]) {
-        check_end(*p, flag, &grown, &map, args.clearance_m)?;
+    )];
+    for text in &args.via {
+        let flag = format!("--via {text}");
+        let at = lat_lon(text).and_then(|p| Ok(to_plane(origin, p)?));
+        let at = at.with_context(|| flag.clone())?;
+        places.push((flag, at));
     }
-    let path = shortest(args.engine, ends, &grown, &map)?.with_context(|| {
-        format!(
+    places.push(("--to".to_owned(), to_plane(origin, to).context("--to")?));
+    let (flags, places): (Vec<String>, Vec<Point>) = places.into_iter().unzip();
+    let mut map = map::read(&args.file, origin, &places, level)?;
+    map.widen(args.clearance_m)?;
+    let grown = grow(&map.zones, &growth).map_err(|e| named(&e, &map))?;
+    for (flag, p) in flags.iter().zip(&places) {
+        check_place(*p, flag, &grown, &map, args.clearance_m)?;
+    }
+    let (path, hash) = shortest(args.engine, &places, &grown, &map)?;
+    let path = path.map_err(|NoLeg { leg }| {
+        let names: Vec<&String> = std::iter::once(&args.from)
+            .chain(&args.via)
+            .chain(std::iter::once(&args.to))
+            .collect();
+        anyhow::anyhow!(
             "there is no way from {} to {} that keeps {} m from every zone",
-            args.from, args.to, args.clearance_m
+            names[leg],
+            names[leg + 1],
+            args.clearance_m
         )
     })?;
     let least_m = least_distance_m(&path, &map.zones);
@@ -109,6 +128,7 @@ pub fn run(args: &RouteArgs) -> Result<String> {
     let route = Route {
         origin,
         path,
+        hash,
         least_m,
         grown,
         map,
@@ -148,7 +168,7 @@ fn named(error: &OffsetError, map: &Map) -> anyhow::Error {
     }
 }
 
-fn check_end(p: Point, flag: &str, grown: &Grown, map: &Map, clearance_m: f64) -> Result<()> {
+fn check_place(p: Point, flag: &str, grown: &Grown, map: &Map, clearance_m: f64) -> Result<()> {
     if !grown.contains(p) {
         return Ok(());
     }
@@ -168,29 +188,26 @@ fn check_end(p: Point, flag: &str, grown: &Grown, map: &Map, clearance_m: f64) -
     }
 }
 
+/// The path, and the number by which the structure it was found on is compared.
 fn shortest(
     engine: Engine,
-    ends: [Point; 2],
+    places: &[Point],
     grown: &Grown,
     map: &Map,
-) -> Result<Option<Vec<Point>>> {
-    let rings = || grown.regions.iter().flat_map(Region::rings);
+) -> Result<(Result<Vec<Point>, NoLeg>, u64)> {
     match engine {
         Engine::Mesh => {
+            let rings = grown.regions.iter().flat_map(Region::rings);
             let all: Vec<&[Point]> = std::iter::once(map.border.as_slice())
-                .chain(rings())
+                .chain(rings)
                 .collect();
             let mesh = Mesh::from_rings(&all).context("the grown zones have no mesh")?;
-            Ok(Search::new(&mesh).shortest(ends[0], ends[1]))
+            let path = Search::new(&mesh).shortest_through(places);
+            Ok((path, mesh.content_hash()))
         }
         Engine::Graph => {
-            let numbered = grown
-                .regions
-                .iter()
-                .zip(0u32..)
-                .flat_map(|(r, i)| r.rings().map(move |ring| (i, ring)));
-            let graph = VisibilityGraph::of_rings(numbered);
-            Ok(graph.shortest(ends[0], ends[1]).map(|p| p.points))
+            let graph = VisibilityGraph::round(&grown.regions);
+            Ok((graph.shortest_through(places), graph.content_hash()))
         }
     }
 }
@@ -199,6 +216,7 @@ fn shortest(
 struct Route {
     origin: Origin,
     path: Vec<Point>,
+    hash: u64,
     least_m: f64,
     grown: Grown,
     map: Map,
@@ -217,6 +235,7 @@ impl Route {
             "straight_m": ends.map_or(0.0, |(a, b)| (b - a).norm()),
             "bends": self.path.len().saturating_sub(2),
             "least_distance_m": least_m,
+            "structure_hash": format!("{:016x}", self.hash),
         })
     }
 
@@ -332,6 +351,7 @@ mod tests {
             file: data.join(file),
             from: from.to_owned(),
             to: to.to_owned(),
+            via: Vec::new(),
             clearance_m,
             level_m: None,
             vertical_margin_m: 10.0,
@@ -374,6 +394,29 @@ mod tests {
         let text = run(&a).unwrap();
         let zones = skein_interop::geojson::read(&text).unwrap().polygons.len();
         assert!(zones > 0, "{text}");
+    }
+
+    #[test]
+    fn a_place_on_the_way_is_flown_over_and_two_runs_compare_their_structure() {
+        let mut a = args(PLAN, HERE, THERE, 20.0);
+        let straight = answer(&a);
+        a.via = vec![THERE.to_owned(), HERE.to_owned()];
+        let over = answer(&a);
+        let length_m = |v: &Value| v["length_m"].as_f64().unwrap();
+        assert!(
+            (length_m(&over) - 3.0 * length_m(&straight)).abs() < 1e-3,
+            "{over}"
+        );
+        let bends = |v: &Value| v["points"].as_array().unwrap().len();
+        assert_eq!(bends(&over), 3 * bends(&straight) - 2);
+        a.via.clear();
+        assert_eq!(answer(&a)["structure_hash"], straight["structure_hash"]);
+        a.clearance_m = 21.0;
+        assert_ne!(answer(&a)["structure_hash"], straight["structure_hash"]);
+        a.via = vec!["47.3953,8.5429".to_owned()];
+        assert!(error(&a).starts_with("--via 47.3953,8.5429 lies in a zone: exclusion fence 1"));
+        a.via = vec!["47.3953".to_owned()];
+        assert!(error(&a).starts_with("--via 47.3953: "));
     }
 
     #[test]

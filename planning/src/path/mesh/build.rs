@@ -38,29 +38,67 @@ impl Mesh {
     /// As [`Mesh::from_polygons`], and [`MeshError::BadCoordinate`], counted over
     /// all rings.
     pub fn from_rings(rings: &[&[Point]]) -> Result<Self, MeshError> {
-        let (mut triangles, ids) = Triangles::of(&checked(rings)?);
+        let points = checked(rings)?;
         let mut first = 0;
-        let mut is_empty = true;
+        let mut lines = Vec::with_capacity(points.len());
         for ring in rings {
-            for i in 0..ring.len() {
-                let a = ids[first + i];
-                let b = ids[first + (i + 1) % ring.len()];
-                if a != b {
-                    is_empty = false;
-                    triangles.set_line(a, b)?;
-                }
-            }
-            first += ring.len();
+            let n = ring.len();
+            lines.extend((0..n).map(|i| [first + i, first + (i + 1) % n]));
+            first += n;
         }
-        if is_empty {
-            return Err(MeshError::Empty);
-        }
-        Faces::of(triangles).merge().into_mesh()
+        let (points, edges, starts) = cells_between(&points, &lines)?;
+        Self::finish(&points, edges, starts)
     }
 }
 
+/// Points, half-edges by cell, and where each cell's half-edges begin.
+pub(super) type CellParts = (Vec<Point>, Vec<HalfEdge>, Vec<u32>);
+
+/// Convex cells of what an odd number of lines parts from the outside.
+pub(super) fn cells_between(
+    points: &[Point],
+    lines: &[[usize; 2]],
+) -> Result<CellParts, MeshError> {
+    if lines.is_empty() {
+        return Err(MeshError::Empty);
+    }
+    let (mut triangles, ids) = Triangles::of(points);
+    for line in lines {
+        let [a, b] = line.map(|i| ids[i]);
+        triangles.set_line(a, b)?;
+    }
+    let cells = Faces::of(triangles).merge().into_cells();
+    if cells.1.is_empty() {
+        return Err(MeshError::Empty);
+    }
+    Ok(cells)
+}
+
+/// The Delaunay triangles of some points, each by its corners counter-clockwise, exact
+/// but for the last bits. Of points in one place one is used; on a straight border
+/// slivers may be missing.
+///
+/// # Complexity
+/// O(n log n) on points as maps have them.
+///
+/// # Errors
+/// As [`Mesh::from_rings`] for coordinates, and [`MeshError::Empty`] without points.
+pub fn delaunay(points: &[Point]) -> Result<Vec<[usize; 3]>, MeshError> {
+    let points = checked(&[points])?;
+    let (triangles, ids) = Triangles::of(&points);
+    let mut of_id = vec![NONE; triangles.points.len()];
+    for (&id, i) in ids.iter().zip(0u32..) {
+        of_id[id as usize] = i;
+    }
+    let inner = triangles.origin.chunks_exact(3);
+    let inner = inner.filter(|corners| corners.iter().all(|&v| v >= FRAME));
+    Ok(inner
+        .map(|t| [t[0], t[1], t[2]].map(|v| of_id[v as usize] as usize))
+        .collect())
+}
+
 /// The points of all rings.
-fn checked(rings: &[&[Point]]) -> Result<Vec<Point>, MeshError> {
+pub(super) fn checked(rings: &[&[Point]]) -> Result<Vec<Point>, MeshError> {
     let snap = |c: f64| if c.abs() < SMALLEST_M { 0.0 } else { c };
     let all: Vec<Point> = rings
         .iter()
@@ -207,7 +245,7 @@ impl Faces {
     }
 
     /// The free faces as cells.
-    fn into_mesh(self) -> Result<Mesh, MeshError> {
+    fn into_cells(mut self) -> CellParts {
         let n = self.origin.len();
         let mut index = vec![NONE; n];
         let mut edges = Vec::with_capacity(n);
@@ -236,9 +274,6 @@ impl Faces {
             }
             starts.push(edges.len() as u32);
         }
-        if edges.is_empty() {
-            return Err(MeshError::Empty);
-        }
         for (edge, &e) in edges.iter_mut().zip(&sources) {
             let twin = self.twin[e as usize];
             edge.twin = if twin == NONE {
@@ -247,7 +282,7 @@ impl Faces {
                 index[twin as usize]
             };
         }
-        Mesh::finish(&self.points[FRAME as usize..], edges, starts)
+        (self.points.split_off(FRAME as usize), edges, starts)
     }
 }
 
