@@ -165,7 +165,7 @@ impl Ways {
             zones: zones_inside(file, origin)?,
         };
         if let Some(file) = &args.zones {
-            let map = map::read(file, depot, depot, None).context("--zones")?;
+            let map = map::read(file, origin, &[], None).context("--zones")?;
             ways.zones.extend(map.zones);
         }
         for uav in 0..ways.team.len() {
@@ -325,11 +325,7 @@ fn zones_inside(file: &Path, origin: Origin) -> Result<Vec<Zone>> {
         if fences.keep_in.is_empty() && fences.keep_out.is_empty() {
             return Ok(Vec::new());
         }
-        let at = LatLon {
-            lat_deg: origin.lat_deg,
-            lon_deg: origin.lon_deg,
-        };
-        return Ok(map::read(file, at, at, None)?.zones);
+        return Ok(map::read(file, origin, &[], None)?.zones);
     }
     let mut zones = Vec::new();
     for f in geojson::read(&text).with_context(named)?.polygons {
