@@ -44,6 +44,8 @@ pub struct Flights {
     pub tracks: Vec<Vec<Point>>,
     /// By UAV: length of its flight, metres.
     pub lengths_m: Vec<f64>,
+    /// By cell number: whether somebody covers it.
+    covered: Vec<bool>,
     /// Middles of the cells that nobody has the endurance or the way to cover.
     pub left: Vec<Point>,
     /// No plan of these cells is done sooner than this, seconds; for equal UAVs only.
@@ -55,7 +57,7 @@ impl Flights {
     #[must_use]
     pub fn sees(&self, p: Point) -> bool {
         let cell = self.raster.cell_at(p);
-        cell.is_some_and(|c| !self.left.contains(&self.raster.middle(c)))
+        cell.is_some_and(|c| self.covered[c as usize])
     }
 }
 
@@ -92,9 +94,16 @@ pub fn plan(request: &Request<'_>) -> Result<Flights> {
         .zip(&ways)
         .map(|(path, way)| track(&middles(path), way, &mut asker))
         .collect();
-    let reached = |c: &Cell| !task.map.is_free(*c);
-    let mut left = middles(&plan.uncovered(&task));
-    left.extend(raster.map.cells().filter(reached).map(|c| raster.middle(c)));
+    let mut covered = vec![false; raster.map.table_len()];
+    // A UAV that stays at home does not see the cell where it would begin.
+    for cell in plan.paths.iter().filter(|p| p.len() > 1).flatten() {
+        covered[*cell as usize] = true;
+    }
+    let left: Vec<Cell> = raster
+        .map
+        .cells()
+        .filter(|c| !covered[*c as usize])
+        .collect();
     let first = &request.team[0];
     let equal = request
         .team
@@ -104,7 +113,8 @@ pub fn plan(request: &Request<'_>) -> Result<Flights> {
     Ok(Flights {
         lengths_m: tracks.iter().map(|t| length_m(t)).collect(),
         tracks,
-        left,
+        left: middles(&left),
+        covered,
         least_s: equal.then(|| least_m / first.speed_mps),
         raster,
     })

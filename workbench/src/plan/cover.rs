@@ -1,24 +1,34 @@
-//! `plan cover`: an area covered by a team (D2.7 §3.6), exactly by straight passes.
+//! `plan cover`: an area covered by a team (D2.7 §3.6), exactly by straight passes, or
+//! approximately by lane cells, or the better of both.
 
+use super::approximate::{self, Request};
+use super::around::Around;
+use super::fleet::{self, Member};
+use super::flights::{Flight, Flights, Sheet, covered_share};
 use super::site::{self, Site};
 use super::tours::Format;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
-use serde_json::{Value, json};
-use skein_interop::place::from_plane;
-use skein_interop::plan::{PlanFile, Waypoint, write};
-use skein_planning::coverage::exact::{Directions, ExactProblem, Member, TeamPlan, plan_team};
+use serde_json::{Map, Value, json};
+use skein_interop::place::to_plane;
+use skein_planning::coverage::exact::{self, Directions, ExactProblem, plan_team};
 use skein_planning::frame::Point;
+use skein_planning::geometry::offset::Zone;
 use std::path::PathBuf;
 
-/// The most UAVs that are planned for: the same as a swarm's.
-const MAX_TEAM: usize = 1_000;
+/// Shares of the area that differ by less than this are the same to a person: samples
+/// are no finer.
+const SAME_SHARE: f64 = 0.002;
 
-/// Points nearer to each other than this are one in the track, metres.
-const COINCIDENT_M: f64 = 1e-3;
+/// Steps of improvement of the approximate planner for each of the exact one's: its steps
+/// are smaller.
+const CELL_STEPS: usize = 50;
 
 /// An area covered by a team: one closed flight a UAV, the longest as short as can be
 /// found.
+///
+/// Without `--exact` or `--approximate` both planners are asked, both are told, and the
+/// flights are those of the one that sees more, or as much sooner.
 ///
 /// The survey of a QGroundControl `.plan` with its exclusion fences, or a GeoJSON polygon
 /// with its holes, and zones with the property "no_fly": true. Times are without wind.
@@ -27,11 +37,19 @@ pub struct CoverArgs {
     /// A QGroundControl `.plan` or GeoJSON.
     pub file: PathBuf,
     /// Exact coverage: cells of the area as it is drawn, in straight passes.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "approximate")]
     pub exact: bool,
+    /// Approximate coverage: lane cells as wide as the swath, a region of them each.
+    #[arg(long)]
+    pub approximate: bool,
     /// How many UAVs.
     #[arg(long, default_value_t = 1, value_name = "K")]
     pub k: usize,
+    /// The UAVs, one by one, instead of `--k`: JSON5, a list of `{name, speed_mps,
+    /// endurance_s?, start?: [lat, lon], swath_m?, turn_radius_m?}`. Lanes are laid for
+    /// the narrowest swath and the widest turn.
+    #[arg(long, value_name = "FILE")]
+    pub fleet: Option<PathBuf>,
     /// Where all UAVs start and end, degrees; by default the file's home position, or the
     /// area's first corner.
     #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true)]
@@ -82,169 +100,247 @@ pub struct CoverArgs {
 /// # Errors
 /// When the file or a flag is wrong; the error names the place.
 pub fn run(args: &CoverArgs) -> Result<String> {
-    ensure!(
-        (1..=MAX_TEAM).contains(&args.k),
-        "--k must be between 1 and {MAX_TEAM}, found {}",
-        args.k
-    );
-    let site = site::read(&args.file, args.launch.as_deref())?;
-    exact(args, &site)
-}
-
-/// Exact coverage: straight passes over the area as it is drawn.
-fn exact(args: &CoverArgs, site: &Site) -> Result<String> {
-    let problem = ExactProblem {
-        holes: site.holes.clone(),
-        zones: site.zones.clone(),
-        clearance_m: args.clearance_m,
-        look_ahead_m: args.look_ahead_m.unwrap_or(args.swath_m / 2.0),
-        steps: args.steps,
-        directions: match args.course_deg {
-            Some(course) => Directions::Fixed((90.0 - course).to_radians()),
-            None => Directions::Best,
-        },
-        ..ExactProblem::new(
-            site.area.clone(),
-            args.swath_m,
-            args.turn_radius_m,
-            Point::origin(),
-        )
-    };
-    let member = Member {
-        speed: args.speed_mps,
-        endurance: args.endurance_s.unwrap_or(f64::INFINITY),
-        ..Member::at(Point::origin())
-    };
-    let plan = plan_team(&problem, &vec![member; args.k])
-        .with_context(|| args.file.display().to_string())?;
-    let sheet = Sheet { args, site, plan };
-    match args.format {
-        Format::Json => Ok(sheet.json().to_string()),
-        Format::Geojson => Ok(sheet.geojson().to_string()),
-        Format::Plan => sheet.plans(),
+    let team = fleet::team(
+        args.fleet.as_deref(),
+        args.k,
+        args.speed_mps,
+        args.endurance_s,
+    )?;
+    for (flag, value) in [
+        ("--speed-mps: the speed", args.speed_mps),
+        ("--turn-radius-m: the turn radius", args.turn_radius_m),
+    ] {
+        ensure!(
+            value.is_finite() && value > 0.0,
+            "{flag} must be above 0, found {value}"
+        );
     }
+    let mut site = site::read(&args.file, args.launch.as_deref())?;
+    let starts = starts(&site, &team)?;
+    let job = Job {
+        lane_m: narrowest(&team, args.swath_m),
+        turn_radius_m: widest(&team, args.turn_radius_m),
+        args,
+        site: &site,
+        team: &team,
+        starts: &starts,
+    };
+    let mut notices = Vec::new();
+    let mut plans = Vec::new();
+    if !args.approximate {
+        plans.push(job.exact());
+    }
+    if !args.exact {
+        plans.push(job.approximate());
+    }
+    if plans.iter().any(Result::is_ok) {
+        // One planner's refusal is worth a notice when the other one has a plan.
+        let refused = plans.iter().filter_map(|p| p.as_ref().err());
+        notices.extend(refused.map(|e| format!("{e:#}")));
+        plans.retain(Result::is_ok);
+    }
+    let plans: Vec<Flights> = plans
+        .into_iter()
+        .collect::<Result<_>>()
+        .with_context(|| args.file.display().to_string())?;
+    let best = plans.iter().reduce(|a, b| better(a, b));
+    let flights = best.context("no planner was asked")?;
+    site.notices.extend(notices);
+    Sheet {
+        origin: site.origin,
+        flights,
+        compared: plans.iter().map(Flights::compared).collect(),
+        notices: &site.notices,
+        altitude_m: args.altitude_m,
+    }
+    .print(args.format, args.out.as_deref())
 }
 
-/// A plan to be printed.
-struct Sheet<'a> {
+/// The plan that sees more, or as much sooner.
+fn better<'a>(a: &'a Flights, b: &'a Flights) -> &'a Flights {
+    let more = a.covered_share - b.covered_share;
+    let first = if more.abs() > SAME_SHARE {
+        more > 0.0
+    } else {
+        a.makespan_s() <= b.makespan_s()
+    };
+    if first { a } else { b }
+}
+
+fn starts(site: &Site, team: &[Member]) -> Result<Vec<Point>> {
+    let start = |member: &Member| match member.place() {
+        Some(at) => to_plane(site.origin, at).with_context(|| member.name.clone()),
+        None => Ok(Point::origin()),
+    };
+    team.iter().map(start).collect()
+}
+
+fn narrowest(team: &[Member], swath_m: f64) -> f64 {
+    let each = team.iter().map(|m| m.swath_m.unwrap_or(swath_m));
+    each.fold(f64::INFINITY, f64::min)
+}
+
+fn widest(team: &[Member], turn_radius_m: f64) -> f64 {
+    let each = team
+        .iter()
+        .map(|m| m.turn_radius_m.unwrap_or(turn_radius_m));
+    each.fold(0.0, f64::max)
+}
+
+/// What both planners are asked.
+struct Job<'a> {
     args: &'a CoverArgs,
     site: &'a Site,
-    plan: TeamPlan,
+    team: &'a [Member],
+    starts: &'a [Point],
+    lane_m: f64,
+    turn_radius_m: f64,
 }
 
-impl Sheet<'_> {
-    fn summary(&self) -> Value {
-        let length_m: f64 = self.plan.lengths_m.iter().sum();
-        json!({
-            "planner": "exact",
-            "makespan_s": self.plan.makespan,
-            "total_m": length_m,
-            "area_m2": self.plan.cells.iter().map(|c| c.area_m2).sum::<f64>(),
-            "cells": self.plan.cells.len(),
-            "passes": self.plan.tours.iter().map(Vec::len).sum::<usize>(),
-            "unserved_passes": self.plan.unserved.len(),
-            "notices": self.site.notices,
-        })
-    }
-
-    fn tour(&self, uav: usize) -> Value {
-        json!({
-            "uav": uav + 1,
-            "time_s": self.plan.lengths_m[uav] / self.args.speed_mps,
-            "length_m": self.plan.lengths_m[uav],
-            "passes": self.plan.tours[uav].len(),
-        })
-    }
-
-    fn track(&self, uav: usize) -> Vec<Point> {
-        let mut track = self.plan.tracks[uav].clone();
-        track.dedup_by(|p, q| (*p - *q).norm() < COINCIDENT_M);
-        track
-    }
-
-    fn json(&self) -> Value {
-        let tours = (0..self.plan.tours.len()).map(|uav| {
-            let points = self.track(uav).into_iter().map(|p| {
-                let at = from_plane(self.site.origin, p);
-                json!({"lat_deg": at.lat_deg, "lon_deg": at.lon_deg})
-            });
-            let mut tour = self.tour(uav);
-            tour["points"] = points.collect();
-            tour
-        });
-        let mut out = self.summary();
-        out["tours"] = tours.collect();
-        out
-    }
-
-    fn geojson(&self) -> Value {
-        let place = |p: &Point| {
-            let at = from_plane(self.site.origin, *p);
-            json!([at.lon_deg, at.lat_deg])
-        };
-        let flights = (0..self.plan.tours.len()).map(|uav| {
-            let line: Vec<Value> = self.track(uav).iter().map(place).collect();
-            // A line has two points at least; a UAV that stays has one.
-            let geometry = if line.len() < 2 {
-                json!({"type": "Point", "coordinates": line.first()})
-            } else {
-                json!({"type": "LineString", "coordinates": line})
-            };
-            json!({"type": "Feature", "properties": self.tour(uav), "geometry": geometry})
-        });
-        let cells = self.plan.cells.iter().enumerate().map(|(i, cell)| {
-            let ring: Vec<Value> = cell
-                .ring
-                .iter()
-                .chain(cell.ring.first())
-                .map(place)
-                .collect();
-            json!({
-                "type": "Feature",
-                "properties": {"cell": i + 1, "area_m2": cell.area_m2},
-                "geometry": {"type": "Polygon", "coordinates": [ring]},
-            })
-        });
-        let mut out = self.summary();
-        out["type"] = json!("FeatureCollection");
-        out["features"] = flights.chain(cells).collect();
-        out
-    }
-
-    /// One QGroundControl plan a UAV.
-    fn plans(&self) -> Result<String> {
-        let home = from_plane(self.site.origin, Point::origin());
-        let text = |uav: usize| {
-            let at = |p: &Point| from_plane(self.site.origin, *p);
-            let track = self.track(uav);
-            let waypoints = track.iter().skip(1);
-            write(&PlanFile {
-                waypoints: waypoints
-                    .map(|p| Waypoint::new(at(p), self.args.altitude_m))
-                    .collect(),
-                home: Some(home),
-                cruise_mps: Some(self.args.speed_mps),
-                ..PlanFile::default()
-            })
-        };
-        let Some(dir) = &self.args.out else {
-            if self.plan.tours.len() == 1 {
-                return Ok(text(0));
-            }
-            bail!("--format plan for several UAVs needs --out DIR: one file a UAV");
-        };
-        std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
-        let mut written = Vec::new();
-        for uav in 0..self.plan.tours.len() {
-            let path = dir.join(format!("uav-{}.plan", uav + 1));
-            std::fs::write(&path, text(uav) + "\n")
-                .with_context(|| format!("cannot write {}", path.display()))?;
-            written.push(path.display().to_string());
+impl Job<'_> {
+    /// One UAV's flight, without what a planner may add.
+    fn flight(&self, uav: usize, track: &[Point], length_m: f64) -> Flight {
+        let member = &self.team[uav];
+        Flight {
+            name: member.name.clone(),
+            track: track.to_vec(),
+            length_m,
+            speed_mps: member.speed_mps,
+            turn_radius_m: member.turn_radius_m.unwrap_or(self.args.turn_radius_m),
+            more: Map::new(),
         }
-        let mut out = self.summary();
-        out["files"] = json!(written);
-        Ok(out.to_string())
     }
+
+    fn share(&self, sees: impl Fn(Point) -> bool) -> f64 {
+        covered_share(&self.site.area, &self.site.holes, self.lane_m, sees)
+    }
+
+    /// Exact coverage: straight passes over the area as it is drawn.
+    fn exact(&self) -> Result<Flights> {
+        let (args, site) = (self.args, self.site);
+        let look_ahead_m = args.look_ahead_m.unwrap_or(self.lane_m / 2.0);
+        let problem = ExactProblem {
+            holes: site.holes.clone(),
+            zones: site.zones.clone(),
+            clearance_m: args.clearance_m,
+            look_ahead_m,
+            steps: args.steps,
+            directions: match args.course_deg {
+                Some(course) => Directions::Fixed((90.0 - course).to_radians()),
+                None => Directions::Best,
+            },
+            ..ExactProblem::new(
+                site.area.clone(),
+                self.lane_m,
+                self.turn_radius_m,
+                Point::origin(),
+            )
+        };
+        let members = self.team.iter().zip(self.starts);
+        let members: Vec<exact::Member> = members
+            .map(|(member, start)| exact::Member {
+                speed: member.speed_mps,
+                endurance: member.endurance_s.unwrap_or(f64::INFINITY),
+                ..exact::Member::at(*start)
+            })
+            .collect();
+        let plan = plan_team(&problem, &members)?;
+        let passes: Vec<&exact::Pass> = plan.tours.iter().flatten().collect();
+        let flights = (0..plan.tours.len()).map(|uav| {
+            let mut flight = self.flight(uav, &plan.tracks[uav], plan.lengths_m[uav]);
+            let n = plan.tours[uav].len();
+            flight.more.insert("passes".to_owned(), json!(n));
+            flight
+        });
+        let shapes = plan.cells.iter().enumerate().map(|(i, cell)| {
+            let properties = json!({"cell": i + 1, "area_m2": cell.area_m2});
+            (cell.ring.clone(), properties)
+        });
+        let area_m2: f64 = plan.cells.iter().map(|c| c.area_m2).sum();
+        Ok(Flights {
+            planner: "exact",
+            flights: flights.collect(),
+            covered_share: self.share(|p| {
+                let sees = |pass: &&exact::Pass| pass.sees(p, self.lane_m / 2.0, look_ahead_m);
+                passes.iter().any(sees)
+            }),
+            more: fields(json!({
+                "area_m2": area_m2,
+                "cells": plan.cells.len(),
+                "passes": passes.len(),
+                "unserved_passes": plan.unserved.len(),
+            })),
+            shapes: shapes.collect(),
+        })
+    }
+
+    /// Approximate coverage: lane cells.
+    fn approximate(&self) -> Result<Flights> {
+        let (args, site) = (self.args, self.site);
+        let zones: Vec<Zone> = site
+            .zones
+            .zones()
+            .iter()
+            .map(|zone| Zone {
+                outer: zone.vertices().to_vec(),
+                holes: Vec::new(),
+            })
+            .collect();
+        let mut places = self.starts.to_vec();
+        places.extend(site.area.vertices());
+        let around = Around::new(&zones, args.clearance_m, &places)?;
+        for (member, start) in self.team.iter().zip(self.starts) {
+            ensure!(
+                !around.forbids(*start),
+                "the launch point of {} lies in a zone or nearer to one than the clearance",
+                member.name
+            );
+        }
+        let plan = approximate::plan(&Request {
+            area: &site.area,
+            holes: &site.holes,
+            around: &around,
+            team: self.team,
+            starts: self.starts,
+            lane_m: self.lane_m,
+            steps: args.steps.saturating_mul(CELL_STEPS),
+        })?;
+        let flights = (0..self.team.len())
+            .map(|uav| self.flight(uav, &plan.tracks[uav], plan.lengths_m[uav]));
+        Ok(Flights {
+            planner: "approximate",
+            flights: flights.collect(),
+            covered_share: self.share(|p| plan.sees(p)),
+            more: fields(json!({
+                "lower_bound_s": plan.least_s,
+                "cells": plan.raster.map.n_free(),
+                "cells_blocked": plan.raster.n_blocked,
+                "cells_left": plan.left.len(),
+                "turns_fit": 2.0 * self.turn_radius_m <= self.lane_m,
+            })),
+            shapes: plan
+                .left
+                .iter()
+                .map(|p| (square(*p, self.lane_m), json!({"left": true})))
+                .collect(),
+        })
+    }
+}
+
+/// The fields of an object.
+fn fields(object: Value) -> Map<String, Value> {
+    match object {
+        Value::Object(fields) => fields,
+        _ => Map::new(),
+    }
+}
+
+/// A square round a point, to show a cell.
+fn square(middle: Point, side_m: f64) -> Vec<Point> {
+    let half = side_m / 2.0;
+    [(-half, -half), (half, -half), (half, half), (-half, half)]
+        .map(|(x, y)| Point::new(middle.x + x, middle.y + y))
+        .to_vec()
 }
 
 #[cfg(test)]
@@ -262,9 +358,7 @@ mod tests {
         let file = dir.join("area.geojson");
         std::fs::write(&file, text).unwrap();
         let file = file.display().to_string();
-        let all = ["cover", &file, "--exact"]
-            .into_iter()
-            .chain(more.iter().copied());
+        let all = ["cover", &file].into_iter().chain(more.iter().copied());
         run(&Cli::try_parse_from(all).unwrap().args)
     }
 
@@ -279,15 +373,15 @@ mod tests {
     fn a_field_with_a_hole_and_a_zone_is_planned_in_every_form() {
         let dir = std::env::temp_dir().join(format!("skein-plan-cover-{}", std::process::id()));
         std::fs::create_dir_all(&dir).unwrap();
-        let alone: Value = serde_json::from_str(&told(&dir, FIELD, &[]).unwrap()).unwrap();
+        let alone: Value = serde_json::from_str(&told(&dir, FIELD, &["--exact"]).unwrap()).unwrap();
         assert_eq!(alone["tours"].as_array().unwrap().len(), 1);
         assert!(alone["cells"].as_u64().unwrap() >= 4);
-        let three = ["--k", "3", "--format", "geojson"];
+        let three = ["--exact", "--k", "3", "--format", "geojson"];
         let map: Value = serde_json::from_str(&told(&dir, FIELD, &three).unwrap()).unwrap();
         assert!(map["features"].as_array().unwrap().len() > 6);
         assert!(map["makespan_s"].as_f64() < alone["makespan_s"].as_f64());
         let out = dir.join("plans").display().to_string();
-        let split = ["--k", "2", "--format", "plan", "--out", &out];
+        let split = ["--exact", "--k", "2", "--format", "plan", "--out", &out];
         assert!(told(&dir, FIELD, &split).unwrap().contains("uav-2.plan"));
         let text = std::fs::read_to_string(dir.join("plans/uav-1.plan")).unwrap();
         assert!(skein_interop::plan::read(&text).unwrap().waypoints.len() > 4);
@@ -303,8 +397,46 @@ mod tests {
             (survey, &[], "found 0"),
             ("{", &[], "not valid JSON"),
         ] {
-            let error = format!("{:#}", told(&dir, text, more).unwrap_err());
-            assert!(error.contains(says), "{error}");
+            for planner in [&["--exact"][..], &["--approximate"], &[]] {
+                let flags: Vec<&str> = planner.iter().chain(more).copied().collect();
+                let error = format!("{:#}", told(&dir, text, &flags).unwrap_err());
+                let approximate = planner.first() == Some(&"--approximate");
+                // What only the exact planner calls so.
+                let says = match says {
+                    "lane spacing" if approximate => "a cell of 0 m",
+                    says => says,
+                };
+                assert!(error.contains(says), "{error}");
+            }
+        }
+        std::fs::remove_dir_all(&dir).unwrap();
+    }
+
+    #[test]
+    fn both_planners_are_told_side_by_side() {
+        let dir = std::env::temp_dir().join(format!("skein-plan-both-{}", std::process::id()));
+        std::fs::create_dir_all(&dir).unwrap();
+        let flags = ["--k", "3", "--turn-radius-m", "25"];
+        let both: Value = serde_json::from_str(&told(&dir, FIELD, &flags).unwrap()).unwrap();
+        let compared = both["compared"].as_array().unwrap();
+        assert_eq!(compared.len(), 2);
+        for plan in compared {
+            let share = plan["covered_share"].as_f64().unwrap();
+            assert!((0.9..=1.0).contains(&share), "{plan}");
+            assert!(plan["energy_s"].as_f64() > plan["makespan_s"].as_f64());
+        }
+        let fleet = dir.join("fleet.json5");
+        let text = "[{name: 'slow', speed_mps: 10, swath_m: 40}, {name: 'fast', speed_mps: 20, endurance_s: 400, start: [47.40, 8.55]}]";
+        std::fs::write(&fleet, text).unwrap();
+        let fleet = fleet.display().to_string();
+        for planner in ["--exact", "--approximate"] {
+            let flags = [planner, "--fleet", &fleet, "--turn-radius-m", "15"];
+            let told: Value = serde_json::from_str(&told(&dir, FIELD, &flags).unwrap()).unwrap();
+            let fast = &told["tours"][1];
+            assert_eq!(fast["name"], "fast");
+            assert!(fast["time_s"].as_f64().unwrap() <= 400.0 + 1e-6, "{fast}");
+            assert!((fast["points"][0]["lon_deg"].as_f64().unwrap() - 8.55).abs() < 1e-9);
+            assert!(told.get("compared").is_none());
         }
         std::fs::remove_dir_all(&dir).unwrap();
     }

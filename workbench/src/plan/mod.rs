@@ -4,6 +4,7 @@ pub mod approximate;
 pub mod around;
 pub mod cover;
 pub mod fleet;
+pub mod flights;
 pub mod line;
 mod map;
 pub mod route;
