@@ -16,6 +16,47 @@ const DUPLICATIONS: u8 = 40;
 /// Above this the modulus counts as one, where the integral is a sine.
 const ONE: f64 = 1.0 - 1e-13;
 
+/// Nodes and weights of Gauss and Legendre for eight places of an interval, by halves.
+const GAUSS: [(f64, f64); 4] = [
+    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
+    (0.525_532_409_916_329, 0.313_706_645_877_887_27),
+    (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
+    (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
+];
+
+/// Sums replace the integral up to this modulus. Its nearest branch point then lies
+/// 0.88 off the real axis, four half strips away, and a sum of eight errs by 1e-14.
+const SMOOTH: f64 = 0.5;
+
+/// Width of a strip, radians.
+const STRIP_RAD: f64 = 0.44;
+
+/// More strips than this cost more than the closed form.
+const STRIPS: f64 = 8.0;
+
+/// E(to | m) − E(from | m): by sums where they are quicker, which they are for the arcs
+/// of routes in winds that can be flown in.
+pub(super) fn second_kind_between(from: f64, to: f64, m: f64) -> f64 {
+    let strips = ((to - from).abs() / STRIP_RAD).ceil().max(1.0);
+    if m > SMOOTH || strips > STRIPS {
+        return second_kind(to, m) - second_kind(from, m);
+    }
+    let half = (to - from) / (2.0 * strips);
+    let height = |phi: f64| {
+        let s = sin(phi);
+        (1.0 - m * s * s).sqrt()
+    };
+    let (mut sum, mut i) = (0.0, 0.0);
+    while i < strips {
+        let middle = from + half * (2.0 * i + 1.0);
+        for (node, weight) in GAUSS {
+            sum += weight * (height(middle - half * node) + height(middle + half * node));
+        }
+        i += 1.0;
+    }
+    sum * half
+}
+
 /// E(φ | m): the integral of √(1 − m sin²) from 0 to `phi`, for 0 ≤ m ≤ 1.
 pub(super) fn second_kind(phi: f64, m: f64) -> f64 {
     let halves = (phi / PI).round();
@@ -92,6 +133,12 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn sums_are_the_closed_form(from in -8.0f64..8.0, wide in -5.0f64..5.0, m in 0.0f64..0.7) {
+            let closed = second_kind(from + wide, m) - second_kind(from, m);
+            prop_assert!((second_kind_between(from, from + wide, m) - closed).abs() < 2e-14 * 20.0);
+        }
+
         #[test]
         fn it_is_the_integral(phi in -8.0f64..8.0, m in 0.0f64..0.999) {
             let f = |a: f64| (1.0 - m * sin(a) * sin(a)).sqrt();

@@ -9,7 +9,7 @@
 //! √((V + w)² − 4Vw sin²(θ/2)) for a heading θ off the wind, and the length over the
 //! ground 2(V + w) E(θ/2 | 4Vw/(V + w)²) per radius.
 
-use super::elliptic::second_kind;
+use super::elliptic::second_kind_between;
 use super::{State, TimedError};
 use crate::airframe::{Airframe, GRAVITY_MPS2, PowerModel};
 use crate::math::{PI, atan2, sin, wrap_pi};
@@ -155,7 +155,7 @@ impl Piece {
         let from = off_wind(wind, self.segment.start.heading_rad);
         let to = from + k * s_m;
         let m = (w / v) * (w / v);
-        let arc = second_kind(to, m) - second_kind(from, m);
+        let arc = second_kind_between(from, to, m);
         (v * arc - w * (sin(to) - sin(from))) / (k * (v * v - w * w))
     }
 
@@ -206,7 +206,7 @@ impl Piece {
                 let k = self.segment.curvature_per_m;
                 let to = from + k * self.segment.length_m;
                 let m = 4.0 * v * w / ((v + w) * (v + w));
-                let arc = second_kind(to / 2.0, m) - second_kind(from / 2.0, m);
+                let arc = second_kind_between(from / 2.0, to / 2.0, m);
                 2.0 * (v + w) * arc / (k * v)
             }
         }

@@ -6,10 +6,9 @@
 //! wind. They are tried in the order of their cost until one keeps clear of the zones.
 
 use super::{LimitError, TimedError, Trajectory};
-use crate::airframe::{Airframe, GRAVITY_MPS2};
+use crate::airframe::Airframe;
 use crate::frame::Pose;
 use crate::geometry::NoFlyZones;
-use crate::math::tan;
 use crate::trajectory::dubins;
 use crate::trajectory::wind::{Answer, Heading, Performance, Wind, time_optimal};
 use serde::{Deserialize, Serialize};
@@ -82,6 +81,9 @@ impl Flight<'_> {
     /// [`TimedError::NotClear`] if zones do, [`TimedError::Limit`] or
     /// [`TimedError::Wind`] for a flight that no airspeed makes possible.
     pub fn best(&self) -> Result<(Trajectory, f64), TimedError> {
+        if let Some(fastest) = self.fastest_at_one_airspeed() {
+            return Ok(fastest);
+        }
         let mut candidates = Vec::new();
         let mut refused = TimedError::NoWay;
         for airspeed_mps in self.speeds_mps() {
@@ -128,20 +130,42 @@ impl Flight<'_> {
         speeds
     }
 
-    /// What can be flown at one airspeed.
-    fn candidates(&self, airspeed_mps: f64) -> Vec<Result<Trajectory, TimedError>> {
-        let bank_rad = self.airframe.steepest_bank_rad(airspeed_mps);
-        let performance = Performance {
-            airspeed_mps,
-            turn_radius_m: airspeed_mps * airspeed_mps
-                / (GRAVITY_MPS2 * tan(bank_rad) * self.turning),
+    /// Where one airspeed is flown and time counts, nothing is better than the fastest
+    /// flight through the air, if it is clear.
+    fn fastest_at_one_airspeed(&self) -> Option<(Trajectory, f64)> {
+        let speeds = self.speeds_mps();
+        let [airspeed_mps] = speeds[..] else {
+            return None;
         };
-        let air = match time_optimal(self.from, self.to, performance, self.wind) {
+        if self.objective != Objective::Time {
+            return None;
+        }
+        let fastest = self.through_air(self.performance(airspeed_mps)).ok()?;
+        let clear = fastest.stays_clear(self.zones, self.margin_m);
+        clear.then(|| (fastest.clone(), fastest.duration_s()))
+    }
+
+    fn performance(&self, airspeed_mps: f64) -> Performance {
+        let bank_rad = self.airframe.steepest_bank_rad(airspeed_mps);
+        Performance {
+            airspeed_mps,
+            turn_radius_m: self.airframe.banked_radius_m(airspeed_mps, bank_rad) / self.turning,
+        }
+    }
+
+    /// The fastest flight through the air.
+    fn through_air(&self, performance: Performance) -> Result<Trajectory, TimedError> {
+        match time_optimal(self.from, self.to, performance, self.wind) {
             Ok(Answer::Path(path)) => self.within_limits(Trajectory::through_air(&path)),
             Ok(Answer::Unreachable) => Err(TimedError::NoWay),
             Err(error) => Err(error.into()),
-        };
-        let mut all = vec![air];
+        }
+    }
+
+    /// What can be flown at one airspeed.
+    fn candidates(&self, airspeed_mps: f64) -> Vec<Result<Trajectory, TimedError>> {
+        let performance = self.performance(airspeed_mps);
+        let mut all = vec![self.through_air(performance)];
         let share = self.wind.speed_mps() / airspeed_mps;
         if share < 1.0 {
             let over_ground = |pose: Pose| {
