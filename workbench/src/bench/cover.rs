@@ -5,6 +5,7 @@ use super::figures::timed;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
+use skein_planning::coverage::exact::on_grid;
 use skein_planning::coverage::grid::improve::Improver;
 use skein_planning::coverage::grid::{
     Cell, LaneMap, Plan, Task, TaskError, bounds, forest, free, improve, mstc, patrol,
@@ -36,6 +37,8 @@ pub enum Planner {
     Best,
     /// The first period of a patrol of one loop.
     Patrol,
+    /// The boustrophedon decomposition, its walk divided as the loop is.
+    Exact,
 }
 
 /// Instances, maps and a planner.
@@ -195,6 +198,7 @@ fn plan(task: &Task, args: &CoverArgs) -> Plan {
         Planner::Mfc => forest::plan(task),
         Planner::Free => free::free_entry(task),
         Planner::Patrol => patrol::first_period(task),
+        Planner::Exact => on_grid::plan(task),
         Planner::Best => best(task, args.budget_ms),
     }
 }

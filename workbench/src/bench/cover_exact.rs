@@ -9,7 +9,9 @@ use clap::Args;
 use serde::Serialize;
 use skein_interop::geojson;
 use skein_interop::place::to_plane;
-use skein_planning::coverage::exact::{Directions, ExactPlan, ExactProblem, plan};
+use skein_planning::coverage::exact::{
+    Directions, ExactPlan, ExactProblem, Member, plan, plan_team,
+};
 use skein_planning::frame::{Origin, Point};
 use skein_planning::geometry::{NoFlyZones, Polygon};
 use std::path::PathBuf;
@@ -17,6 +19,9 @@ use std::sync::Arc;
 
 /// The most areas that are generated: a run of some minutes.
 const MOST_AREAS: usize = 10_000;
+
+/// The largest team: the same as a swarm.
+const MOST_UAVS: usize = 1_000;
 
 /// Exact coverage of generated areas, and of the fields of a file.
 #[derive(Debug, Args)]
@@ -36,9 +41,15 @@ pub struct ExactArgs {
     /// Turn radius in lane spacings.
     #[arg(long, default_value_t = 0.5, value_name = "R")]
     pub turn_radius: f64,
+    /// UAVs of the team that each area is planned for as well.
+    #[arg(long, default_value_t = 1, value_name = "K")]
+    pub k: usize,
     /// Steps of improvement.
     #[arg(long, default_value_t = skein_planning::coverage::exact::DEFAULT_STEPS, value_name = "N")]
     pub steps: usize,
+    /// Steps of improvement of a team's plan.
+    #[arg(long, default_value_t = 20_000, value_name = "N")]
+    pub team_steps: usize,
     /// Random points that are looked for in each area.
     #[arg(long, default_value_t = 50_000, value_name = "N")]
     pub samples: usize,
@@ -55,6 +66,10 @@ struct Answer {
     length_over_bound_mean: f64,
     over_one_direction_mean: f64,
     over_one_direction_worst: f64,
+    k: usize,
+    team_ratio_mean: f64,
+    team_ratio_worst: f64,
+    team_ms_mean: f64,
     seen_share_mean: f64,
     seen_share_least: f64,
     nearest_to_zone: f64,
@@ -83,6 +98,11 @@ pub fn run(args: &ExactArgs) -> Result<String> {
         "--lanes must be above 1 and at most 1000, found {}",
         args.lanes
     );
+    ensure!(
+        (1..=MOST_UAVS).contains(&args.k),
+        "--k must be between 1 and {MOST_UAVS}, found {}",
+        args.k
+    );
     let instances = instances(args)?;
     let mut rows = Vec::new();
     for (i, instance) in instances.iter().enumerate() {
@@ -93,6 +113,11 @@ pub fn run(args: &ExactArgs) -> Result<String> {
 
 struct Row {
     best: ExactPlan,
+    /// The longest tour of the team over a fair share of the work, or over the farthest
+    /// pass there and back, whichever is longer. The work is the tour of one UAV, with
+    /// the way out and back to the nearest pass for each UAV more.
+    team_ratio: f64,
+    team_us: f64,
     one_direction_m: f64,
     seen: f64,
     nearest: f64,
@@ -106,9 +131,25 @@ fn measure(instance: &Instance, args: &ExactArgs, seed: u64) -> Result<Row> {
         directions: Directions::Huang,
         ..instance.problem.clone()
     })?;
+    let team = vec![Member::at(instance.problem.launch); args.k];
+    let team_problem = ExactProblem {
+        steps: args.team_steps,
+        ..instance.problem.clone()
+    };
+    let (together, team_us) = timed(|| plan_team(&team_problem, &team));
+    let together = together?;
+    let launch = instance.problem.launch;
+    let ends = best.passes.iter().flat_map(|p| [p.from, p.to]);
+    let way_m = ends
+        .map(|p| (p - launch).norm())
+        .fold(f64::INFINITY, f64::min);
+    let k = args.k as f64;
+    let share_m = ((best.length_m + 2.0 * (k - 1.0) * way_m) / k).max(together.farthest);
     let seen = seen_share(instance, &best, args.samples, seed);
     let nearest = nearest_m(instance, &best) / instance.problem.clearance_m;
     Ok(Row {
+        team_ratio: together.makespan / share_m,
+        team_us,
         one_direction_m: one.length_m,
         seen,
         nearest,
@@ -131,6 +172,10 @@ fn sum_up(args: &ExactArgs, instances: &[Instance], rows: &[Row]) -> Answer {
         length_over_bound_mean: mean(&|r| r.best.length_m / r.best.lower_bound_m),
         over_one_direction_mean: mean(&over_one),
         over_one_direction_worst: rows.iter().map(over_one).fold(0.0, f64::max),
+        k: args.k,
+        team_ratio_mean: mean(&|r| r.team_ratio),
+        team_ratio_worst: rows.iter().map(|r| r.team_ratio).fold(0.0, f64::max),
+        team_ms_mean: mean(&|r| r.team_us / 1000.0),
         seen_share_mean: mean(&|r| r.seen),
         seen_share_least: rows.iter().map(|r| r.seen).fold(1.0, f64::min),
         nearest_to_zone: rows.iter().map(|r| r.nearest).fold(f64::INFINITY, f64::min),

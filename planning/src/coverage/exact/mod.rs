@@ -10,6 +10,7 @@
 //! | `common` | lanes common to all cells of one heading |
 //! | `layout` | all passes of an area: directions, cells, lanes |
 //! | `team` | the passes shared out among UAVs |
+//! | [`on_grid`] | the decomposition of a lane-cell map |
 //! | `ways` | what it costs to fly from pass to pass |
 //!
 //! The sensor is a rectangle that flies along: half a lane spacing to either side,
@@ -36,6 +37,7 @@ mod direction;
 mod frame;
 mod lanes;
 mod layout;
+pub mod on_grid;
 mod team;
 mod ways;
 
@@ -56,7 +58,11 @@ use ways::{Places, Ways};
 
 /// Lanes are refused when there would be more than this: an area of 20 km by 20 km at
 /// lanes of 20 m has a thousand, with holes a few times as many.
-const MOST_PASSES: usize = 20_000;
+const MOST_PASSES: usize = 5_000;
+
+/// Up to this many passes the costs between all ends are written down, 70 MB at most;
+/// beyond that each is computed when it is asked for.
+const MOST_WRITTEN: usize = 1_500;
 
 /// Ways round zones are searched for between places nearer than this, in turns; others
 /// are guessed, but for those that are flown.
@@ -327,9 +333,15 @@ pub fn plan(problem: &ExactProblem) -> Result<ExactPlan, ExactError> {
     );
     let n = layout.passes.len();
     let near_m = NEAR_TURNS * problem.measures().turn_m();
-    let costs = Matrix::of(2 * n + 1, &|a, b| places.guess_m(a, b, near_m));
+    let guess = |a, b| places.guess_m(a, b, near_m);
     let lines = lines(&layout.passes);
-    let found = line::plan(&lines, &[Surveyor::at(2 * n)], &costs, problem.steps)?;
+    let alone = [Surveyor::at(2 * n)];
+    let found = if n <= MOST_WRITTEN {
+        let costs = Matrix::of(2 * n + 1, &guess);
+        line::plan(&lines, &alone, &costs, problem.steps)?
+    } else {
+        line::plan(&lines, &alone, &guess, problem.steps)?
+    };
     let order: Vec<line::Pass> = found.tours.into_iter().flat_map(|t| t.passes).collect();
     let length_m = line::tour_cost(&order, &lines, 2 * n, &places);
     let passes = in_order(&layout.passes, &order);

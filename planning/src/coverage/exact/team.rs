@@ -7,7 +7,7 @@
 
 use super::layout::Layout;
 use super::ways::Places;
-use super::{CellPlan, ExactError, ExactProblem, Pass, in_order, lines};
+use super::{CellPlan, ExactError, ExactProblem, MOST_WRITTEN, Pass, in_order, lines};
 use crate::coverage::line::{self, LineError, LineTour, Surveyor, tour_cost};
 use crate::coverage::metric::{Matrix, Metric};
 use crate::frame::Point;
@@ -91,6 +91,9 @@ pub fn plan_team(problem: &ExactProblem, team: &[Member]) -> Result<TeamPlan, Ex
     let ways = layout.ways(&launches)?;
     let places = Places::new(&ways, &layout.passes, &launches, problem.turn_radius_m);
     let first = 2 * layout.passes.len();
+    if layout.passes.len() + team.len() > MOST_WRITTEN {
+        return Err(ExactError::TooMany);
+    }
     let costs = Matrix::of(first + team.len(), &places);
     let lines = lines(&layout.passes);
     let uavs: Vec<Surveyor> = team

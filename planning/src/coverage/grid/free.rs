@@ -24,14 +24,20 @@ const MOST_TABLE: usize = 1 << 26;
 /// O(k N) for the distances, then O(k log N) for each offset.
 #[must_use]
 pub fn free_entry(task: &Task) -> Plan {
-    let walk = closed_walk(task, Tree::BreadthFirst);
+    along(task, &closed_walk(task, Tree::BreadthFirst))
+}
+
+/// The same for any closed walk over all cells: each cell a neighbour of the next, the
+/// last one of the first.
+#[must_use]
+pub fn along(task: &Task, walk: &[Cell]) -> Plan {
     if walk.is_empty() {
         return Plan {
             paths: task.roots.iter().map(|r| vec![*r]).collect(),
         };
     }
     let ways = Ways::new(task);
-    let places = places(task, &walk);
+    let places = places(task, walk);
     let mut order: Vec<usize> = (0..task.n_uavs()).collect();
     order.sort_by_key(|i| (places[*i], *i));
     let n = walk.len();
@@ -41,7 +47,7 @@ pub fn free_entry(task: &Task) -> Plan {
         let begin = (places[order[0]] + i * n / (OFFSETS * order.len())) % n;
         let splitter = Splitter {
             task,
-            walk: &walk,
+            walk,
             ways: &ways,
             order: &order,
             begin,
