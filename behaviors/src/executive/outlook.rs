@@ -19,8 +19,7 @@ pub const UNREACHABLE_MS: u32 = 86_400_000;
 /// Time added to a turn, milliseconds: a setpoint and its corrections.
 const TURN_MARGIN_MS: f64 = 1000.0;
 
-/// A turn at each end of the way home, seconds: two full circles of a UAV of cruise
-/// 13 m/s at half of its bank.
+/// A turn at each end of the way home, seconds: two full circles of 30 m at 13 m/s.
 const TURNS_S: f64 = 30.0;
 
 /// One stretch of the flight to come.

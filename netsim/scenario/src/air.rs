@@ -70,6 +70,10 @@ fn airspeed_mps(u: &UavSpec, spec: &Spec) -> f64 {
 pub(crate) fn footprint_m(airframe: &Airframe, wind: Wind, radius_m: f64) -> (f64, f64) {
     let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
     let airspeed_mps = turning_mps(airframe, wind.speed_mps(), radius_m);
+    if airframe.airspeed_for_turns_mps(radius_m, wind.speed_mps()) < airspeed_mps {
+        // The wind itself will be refused, which tells more than a camera that is too small.
+        return (across_m, along_m);
+    }
     let s = (wind.speed_mps() / airspeed_mps).min(1.0);
     let c = (1.0 - s * s).sqrt();
     let share = (across_m / (across_m * c + along_m * s))
@@ -164,7 +168,7 @@ pub(crate) fn too_windy(spec: &Spec) -> Option<String> {
         let a = &worst.airframe;
         let wide_m = a.ground_turn_radius_m(a.least_airspeed_mps(), wind_mps);
         format!(
-            "a wind of {wind_mps} m/s carries UAV {} out of turns of {radius_m} m even at its slowest; at most {:.1} m/s, or lanes of {:.0} m",
+            "a wind of {wind_mps} m/s carries UAV {} out of turns of {radius_m} m even at its slowest; at most {:.1} m/s, or wider lanes: {:.0} m",
             worst.id,
             most_mps.max(0.0),
             (2.0 * wide_m).ceil()

@@ -8,11 +8,16 @@ use crate::resolve::{Overrides, Scenario, parse_with};
 pub const DEFAULT: &str = "helsinki";
 
 /// Name, file as errors show it, text.
-const SCENARIOS: [(&str, &str, &str); 2] = [
+const SCENARIOS: [(&str, &str, &str); 3] = [
     (
         "helsinki",
         "helsinki.json5",
         include_str!("../../../configs/trials/helsinki.json5"),
+    ),
+    (
+        "helsinki_wind",
+        "helsinki_wind.json5",
+        include_str!("../../../configs/trials/helsinki_wind.json5"),
     ),
     (
         "geofence",

@@ -59,8 +59,8 @@ use problem::{Problem, fastest};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Courses from which a turn round is timed: between neighbours the time differs by
-/// less than the tenth part of a radian's turn.
+/// Courses from which a turn round is timed: its time changes smoothly with the course,
+/// so every 15° will do for an estimate.
 const COURSES: u8 = 24;
 
 /// Where the nose points: radians counter-clockwise from east.
@@ -422,8 +422,8 @@ pub fn time_s(
     Ok(fastest(&problem, true).map_or(f64::INFINITY, |best| best.time * unit_s))
 }
 
-/// The longest time to turn round in place, whatever the course, seconds: from a course
-/// over the ground to its opposite. Infinite when the wind forbids some course.
+/// The longest time to turn round in place, seconds, of 24 courses all round: from a
+/// course over the ground to its opposite. Infinite when the wind forbids some course.
 ///
 /// # Errors
 /// [`WindError`] when a number is none or not in its range.
