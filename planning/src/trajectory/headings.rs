@@ -160,10 +160,14 @@ pub fn choose(request: &Request) -> Result<Headings, HeadingsError> {
     for _ in 0..MAX_ROUNDS {
         let ends = if closed { Ends::Closed } else { Ends::Open };
         let solved = Layers::solve(&legs, &layers, ends, &slopes, &known);
-        for mut headings in solved.ways.iter().map(|way| middles(way, &layers)) {
-            if headings.is_empty() {
-                continue;
-            }
+        let start = solved
+            .ways
+            .iter()
+            .filter(|way| !way.is_empty())
+            .map(|way| middles(way, &layers))
+            .map(|headings| (polish.length(&headings), headings))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, mut headings)) = start {
             let length = polish.run(&mut headings, step);
             if length < best.0 {
                 best = (length, headings);

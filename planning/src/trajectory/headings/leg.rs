@@ -5,14 +5,14 @@
 //! to first order by a slope: the incoming leg pays `−λ(θ−c)`, the outgoing one
 //! `+λ(θ−c)`, which cancel wherever both agree.
 //!
-//! For a word with a straight of length p > 0 and turns t, q the length has the
-//! gradient ∓(1 − cos t), ±(1 − cos q) in the two headings and the Hessian
-//! diag(sin t, sin q) + s sᵀ/p with s = (sin t, sin q). Turns up to a half circle
-//! make it convex, so its tangent plane at the centre is a bound, and beyond a
-//! half circle it falls below that plane by no more than the sines allow. Turns
-//! are continued through zero: a word that would need a full circle there is only
-//! longer. Where p may vanish, what the length is at least when circles touch or
-//! coincide has a tangent plane; so do words without a straight.
+//! A word with a straight is, for any fixed direction, at least its share in that
+//! direction plus its turns: a sum of one function a heading whose second derivative
+//! is the sine of the turn. Its tangent plane at the middle is a bound wherever the
+//! turns are below a half circle, and falls short by no more than the sines allow
+//! elsewhere. Turns are continued through zero: a word that would need a full circle
+//! there is only longer. Where it does, the word ends: a clip, one linear condition
+//! that must hold for the plane to count, takes away what the plane gives too much
+//! beyond. Words without a straight have tangent planes and clips, too.
 
 use super::interval;
 use crate::frame::Vector;
@@ -46,28 +46,137 @@ impl Arc {
     }
 }
 
-/// A bound linear in the slopes: a word is nowhere shorter than
-/// `low − |first + λ₁| h₁ − |last − λ₂| h₂` with the slopes paid.
-#[derive(Clone, Copy, Debug, Default)]
+/// A bound linear in the headings: a word is nowhere shorter than
+/// `low + first·δ₁ + last·δ₂`, nor exists unless `clip` is met, or else costs a
+/// full circle more.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Plane {
     low: f64,
     first: f64,
     last: f64,
+    clip: Clip,
 }
 
-const NOWHERE: Plane = Plane {
-    low: f64::INFINITY,
+/// What must hold for a turn not to have passed through zero:
+/// `room + first·δ₁ + last·δ₂ ≥ 0`.
+#[derive(Clone, Copy, Debug)]
+struct Clip {
+    room: f64,
+    first: f64,
+    last: f64,
+}
+
+/// Holds everywhere.
+const FREE: Clip = Clip {
+    room: f64::INFINITY,
     first: 0.0,
     last: 0.0,
 };
+
+const NOWHERE: Plane = flat(f64::INFINITY);
+
+/// A bound that no heading changes.
+const fn flat(low: f64) -> Plane {
+    Plane {
+        low,
+        first: 0.0,
+        last: 0.0,
+        clip: FREE,
+    }
+}
+
+impl Clip {
+    /// How far below zero it goes in the box; negative when it always holds.
+    fn depth(&self, r: &Reach) -> f64 {
+        self.first.abs() * r.first + self.last.abs() * r.last - self.room
+    }
+
+    /// Whether it holds nowhere in the box.
+    fn never(&self, r: &Reach) -> bool {
+        self.room + self.first.abs() * r.first + self.last.abs() * r.last < 0.0
+    }
+
+    /// The one of two that cuts away more of the box, if any cuts it.
+    fn tighter(self, other: Self, r: &Reach) -> Self {
+        let share = |c: &Self| {
+            let depth = c.depth(r);
+            if depth > 0.0 {
+                depth / (c.room + depth).max(1e-300)
+            } else {
+                0.0
+            }
+        };
+        let (one, two) = (share(&self), share(&other));
+        if one.max(two) <= 0.0 {
+            FREE
+        } else if one >= two {
+            self
+        } else {
+            other
+        }
+    }
+}
+
+impl Plane {
+    fn mirrored(self) -> Self {
+        Self {
+            first: -self.first,
+            last: -self.last,
+            clip: Clip {
+                first: -self.clip.first,
+                last: -self.clip.last,
+                ..self.clip
+            },
+            ..self
+        }
+    }
+
+    /// Least value over the half widths `h` with the slopes paid, and the share of
+    /// the clip in it.
+    ///
+    /// By duality: every positive share of the clip may be taken off the plane, and
+    /// the best one makes one of the slopes vanish.
+    fn least(&self, h: (f64, f64), paid: (f64, f64)) -> (f64, f64) {
+        let (x, y) = (self.first + paid.0, self.last - paid.1);
+        let plain = self.low - x.abs() * h.0 - y.abs() * h.1;
+        let c = &self.clip;
+        if c.room >= c.first.abs() * h.0 + c.last.abs() * h.1 {
+            return (plain, 0.0);
+        }
+        let next = plain + TAU;
+        if c.room + c.first.abs() * h.0 + c.last.abs() * h.1 < 0.0 {
+            return (next, 0.0);
+        }
+        let mut best = (plain, 0.0);
+        for share in [x / c.first, y / c.last] {
+            if share > 0.0 && share < f64::INFINITY {
+                let value = self.low
+                    - share * c.room
+                    - (x - share * c.first).abs() * h.0
+                    - (y - share * c.last).abs() * h.1;
+                if value > best.0 {
+                    best = (value, share);
+                }
+            }
+        }
+        (best.0.min(next), best.1)
+    }
+}
 
 /// A bound further below the length at the middle than this slope times the half
 /// widths is doubtful: no word with a straight is steeper than 2.
 const DOUBTFUL: f64 = 2.0;
 
+/// A clip may make any slope of a word's plane; beyond this, that of a word with a
+/// straight, it fits no other leg.
+const STEEPEST: f64 = 2.0;
+
 /// Beyond this distance of the centres the middle turn of LRL is too steep for a
 /// tangent plane; where they part, at 4, it is infinitely so.
 const STEEP_APART: f64 = 3.95;
+
+/// Angles and places are rounded by less, radians and turn radii.
+const SLACK: f64 = 1e-9;
 
 /// One leg between two intervals, in turn radii.
 #[derive(Clone, Copy, Debug)]
@@ -83,6 +192,22 @@ struct Reach {
     first: f64,
     last: f64,
     distance: f64,
+}
+
+impl Reach {
+    /// How far the centres move at most.
+    fn moved(&self) -> f64 {
+        self.first + self.last
+    }
+
+    /// How much a clip bends at either end: the goal and a unit vector turn.
+    fn bends(&self) -> (f64, f64) {
+        let both = self.moved() * self.moved();
+        (
+            0.5 * (self.distance * self.first * self.first + both) + SLACK,
+            0.5 * (self.distance * self.last * self.last + both) + SLACK,
+        )
+    }
 }
 
 impl Leg {
@@ -103,14 +228,7 @@ impl Leg {
             last: b.half_rad,
             distance: (v.x * v.x + v.y * v.y).sqrt(),
         };
-        let flip = |(p, l): (Plane, f64)| {
-            let flipped = Plane {
-                first: -p.first,
-                last: -p.last,
-                ..p
-            };
-            (flipped, l)
-        };
+        let flip = |(p, l): (Plane, f64)| (p.mirrored(), l);
         let words = [
             same(&goal, reach),
             flip(same(&mirror, reach)),
@@ -139,9 +257,15 @@ impl Leg {
     /// The bound with only the first slope paid, and the last slope that would
     /// take nothing away from it.
     pub fn open_bound(&self, a: &Arc, slope_a: f64) -> (f64, f64) {
+        let h = (a.half_rad, 0.0);
         self.planes.iter().fold((f64::INFINITY, 0.0), |least, p| {
-            let low = p.low - (p.first + slope_a).abs() * a.half_rad;
-            if low < least.0 { (low, p.last) } else { least }
+            let (low, share) = p.least(h, (slope_a, p.last));
+            if low < least.0 {
+                let slope = p.last - share * p.clip.last;
+                (low, slope.clamp(-STEEPEST, STEEPEST))
+            } else {
+                least
+            }
         })
     }
 
@@ -150,11 +274,9 @@ impl Leg {
     /// Far below the middle's length, where a word may begin or end within the
     /// intervals, the exact optimum without slopes may say more.
     pub fn bound(&self, v: Vector, a: &Arc, slope_a: f64, b: &Arc, slope_b: f64) -> f64 {
+        let h = (a.half_rad, b.half_rad);
         let planes = self.planes.iter().fold(f64::INFINITY, |least, p| {
-            let low = p.low
-                - (p.first + slope_a).abs() * a.half_rad
-                - (p.last - slope_b).abs() * b.half_rad;
-            least.min(low)
+            least.min(p.least(h, (slope_a, slope_b)).0)
         });
         if planes > self.length - DOUBTFUL * (a.half_rad + b.half_rad) {
             return planes;
@@ -175,12 +297,13 @@ impl Leg {
         }
         let mut least = (f64::INFINITY, (0.0, 0.0));
         for p in &self.planes {
-            let loss = (
-                (p.first + a.1).abs() * wide.0,
-                (p.last - b.1).abs() * wide.1,
-            );
-            if p.low - loss.0 - loss.1 < least.0 {
-                least = (p.low - loss.0 - loss.1, loss);
+            let (low, share) = p.least(wide, (a.1, b.1));
+            if low < least.0 {
+                let loss = (
+                    (p.first + a.1 - share * p.clip.first).abs() * wide.0,
+                    (p.last - b.1 - share * p.clip.last).abs() * wide.1,
+                );
+                least = (low, loss);
             }
         }
         if least.0 < bound {
@@ -195,9 +318,11 @@ fn continued(turn: f64, reach: f64) -> f64 {
     if turn > TAU - reach { turn - TAU } else { turn }
 }
 
-/// How far below zero the sine of a turn may be within `reach` of `turn`.
-fn dip(turn: f64, reach: f64) -> f64 {
-    (reach - turn).max(turn + reach - PI).clamp(0.0, 1.0)
+/// How far a sum of two ends falls below its tangents: each bends by the sine of its
+/// turn, which changes by no more than the half width.
+fn dips(r: &Reach, sines: (f64, f64)) -> f64 {
+    let dip = |h: f64, sin: f64| 0.5 * h * h * (h - sin).clamp(0.0, 1.0);
+    dip(r.first, sines.0) + dip(r.last, sines.1)
 }
 
 /// An angle of at most two circles, in [0, 2π).
@@ -205,90 +330,177 @@ fn wrapped(a_rad: f64) -> f64 {
     if a_rad < 0.0 { a_rad + TAU } else { a_rad }
 }
 
-/// The tangent plane of a word with a straight, and its length at the middle.
-fn tangent(p: f64, turns: (f64, f64), slopes: (f64, f64), swing: f64, r: Reach) -> (Plane, f64) {
-    let (near, far) = (r.first + swing, r.last + swing);
-    let (t, q) = (continued(turns.0, near), continued(turns.1, far));
-    let below = 0.5 * (dip(t, near) * r.first * r.first + dip(q, far) * r.last * r.last);
-    let plane = Plane {
-        low: p + t + q - below,
-        first: slopes.0,
-        last: slopes.1,
-    };
-    (plane, p + turns.0 + turns.1)
-}
-
 /// LSL.
+///
+/// The straight is at least as long as its share in any one direction u, so with v
+/// from centre to centre the word is at least u·v and both turns, the headings'
+/// difference. That is a function of each heading alone.
 fn same(goal: &Goal, r: Reach) -> (Plane, f64) {
     let v = goal.left_left();
     let p = (v.0 * v.0 + v.1 * v.1).sqrt();
-    let moved = r.first + r.last;
-    let t = angle_tau(v.1, v.0);
-    let q = wrapped(goal.turn - t);
-    // The centres move by `moved` at most, which turns the straight by asin(moved/p);
-    // that is below 1.3 times its argument up to 0.9.
-    if p * 0.9 > moved {
-        let end = v.0 * goal.cos + v.1 * goal.sin;
-        let slopes = (v.0 / p - 1.0, 1.0 - end / p);
-        return tangent(p, (t, q), slopes, 1.3 * moved / p, r);
-    }
-    // Both turns together are the headings' difference, or a circle more.
-    let plane = Plane {
-        low: continued(goal.turn, moved),
-        first: -1.0,
-        last: 1.0,
+    let u = if p > goal.tol {
+        (v.0 / p, v.1 / p)
+    } else {
+        (1.0, 0.0)
     };
-    let length = if p > goal.tol { p + t + q } else { goal.turn };
-    (plane, length)
+    let end = (
+        u.0 * goal.cos + u.1 * goal.sin,
+        u.0 * goal.sin - u.1 * goal.cos,
+    );
+    let (turn, clip) = both_turns(goal, v, p, r);
+    let plane = Plane {
+        low: p + turn - dips(&r, (u.1, end.1)),
+        first: u.0 - 1.0,
+        last: 1.0 - end.0,
+        clip,
+    };
+    (plane, goal.same())
+}
+
+/// The least that both turns of LSL can be together, and where they are so.
+///
+/// Turned by the headings' difference the straight's course lies between the two:
+/// left of the first (e₁ × v ≥ 0) and right of the last (v × e₂ ≥ 0), or, if the
+/// difference is above a half circle, either of the two.
+fn both_turns(goal: &Goal, v: (f64, f64), p: f64, r: Reach) -> (f64, Clip) {
+    let (along, across) = (
+        v.0 * goal.cos + v.1 * goal.sin,
+        v.0 * goal.sin - v.1 * goal.cos,
+    );
+    let bends = r.bends();
+    let after = Clip {
+        room: v.1 + bends.0,
+        first: -v.0,
+        last: -goal.sin,
+    };
+    let before = Clip {
+        room: across + bends.1,
+        first: goal.sin,
+        last: along,
+    };
+    let moved = r.moved();
+    let turn = continued(goal.turn, moved + SLACK);
+    if turn + moved <= PI {
+        // Between headings so alike backward is between, too.
+        let ahead = v.0 + along + 2.0 * moved + p * moved + SLACK;
+        if after.never(&r) || before.never(&r) || ahead < 0.0 {
+            return (turn + TAU, FREE);
+        }
+        return (turn, after.tighter(before, &r));
+    }
+    let (no_after, no_before) = (after.never(&r), before.never(&r));
+    if no_after && no_before {
+        return (turn + TAU, FREE);
+    }
+    let (after_counts, before_counts) = if turn - moved < PI {
+        // A course ahead of a heading has turned by less than a quarter there.
+        (
+            v.0 > moved + p * r.first + SLACK,
+            along > moved + p * r.last + SLACK,
+        )
+    } else {
+        (no_before, no_after)
+    };
+    let clip = |counts: bool, clip: Clip| if counts { clip } else { FREE };
+    let both = clip(after_counts, after).tighter(clip(before_counts, before), &r);
+    (turn, both)
 }
 
 /// LSR.
+///
+/// Let v lead from centre to centre and u be the straight's direction θ. Of all θ
+/// that are less than a quarter circle to the left of v the word's own makes
+/// u·v + 2θ the most, so any of them bounds it from below, and again as a function
+/// of each heading alone.
 fn cross(goal: &Goal, r: Reach) -> (Plane, f64) {
     let v = goal.left_right();
     let square = v.0 * v.0 + v.1 * v.1;
+    let moved = r.moved();
     let apart = square.sqrt();
-    let moved = r.first + r.last;
-    if apart + moved < 2.0 {
+    if apart + moved < 2.0 - SLACK {
         return (NOWHERE, f64::INFINITY);
     }
-    let p = (square - 4.0).max(0.0).sqrt();
-    let course = (v.0 * p - 2.0 * v.1, 2.0 * v.0 + v.1 * p);
-    let t = angle_tau(course.1, course.0);
-    let q = wrapped(t - goal.turn);
-    let nearest = apart - moved;
-    let least = (nearest * nearest - 4.0).max(0.0).sqrt();
-    if nearest > 2.0 && moved < least {
-        let end = course.0 * goal.cos + course.1 * goal.sin;
-        let slopes = (course.0 / square - 1.0, end / square - 1.0);
-        return tangent(p, (t, q), slopes, moved / least, r);
-    }
+    let straight = (square - 4.0).max(0.0).sqrt();
+    let own = (v.0 * straight - 2.0 * v.1, 2.0 * v.0 + v.1 * straight);
+    let own_turn = angle_tau(own.1, own.0);
     let length = if square >= 4.0 {
-        p + t + q
+        straight + own_turn + wrapped(own_turn - goal.turn)
     } else {
         f64::INFINITY
     };
-    let mut plane = Plane {
-        low: r.distance,
-        first: 0.0,
-        last: 0.0,
-    };
-    if apart * 0.9 > moved {
-        // p + 2 atan(2/p) is at least π, its value for circles that touch. What
-        // remains is twice the angle of v less both headings, which bends by no
-        // more than the circle's centres do, seen from the nearest they come.
-        let swing = 1.3 * moved / apart;
-        let t = angle_tau(v.0, -v.1);
-        let q = wrapped(t - goal.turn);
-        let touching = continued(t, r.first + swing) + continued(q, r.last + swing);
-        let squares = r.first * r.first + r.last * r.last;
-        let bend = squares / nearest + moved * moved / (nearest * nearest);
-        plane = Plane {
-            low: touching - bend,
-            first: -2.0 * v.1 / square - 1.0,
-            last: 2.0 * (v.0 * goal.sin - v.1 * goal.cos) / square - 1.0,
-        };
+    if apart * 0.9 <= moved {
+        return (flat(r.distance), length);
     }
+    // Where circles may touch, v may come to lie across the own direction; one
+    // that is turned back towards v stays on its right side.
+    let (u, along, turn) = if straight >= moved && square > 4.0 {
+        ((own.0 / square, own.1 / square), straight, own_turn)
+    } else {
+        let cos = moved / apart;
+        let sin = (1.0 - cos * cos).sqrt();
+        let w = (v.0 / apart, v.1 / apart);
+        let u = (w.0 * cos - w.1 * sin, w.1 * cos + w.0 * sin);
+        (u, moved, angle_tau(u.1, u.0))
+    };
+    let swing = swing(apart, moved);
+    let t = continued(turn, r.first + swing);
+    let q = continued(wrapped(turn - goal.turn), r.last + swing);
+    let end = (
+        u.0 * goal.cos + u.1 * goal.sin,
+        u.1 * goal.cos - u.0 * goal.sin,
+    );
+    let plane = Plane {
+        low: along + t + q - dips(&r, (u.1, end.1)),
+        first: u.0 - 1.0,
+        last: end.0 - 1.0,
+        clip: cross_clip(goal, v, r, (t + swing, q + swing)),
+    };
     (plane, length)
+}
+
+/// How far the straight of LSR may be from the direction taken, radians.
+fn swing(apart: f64, moved: f64) -> f64 {
+    let nearest = apart - moved;
+    let least = nearest * nearest - 4.0;
+    let steady = if nearest > 2.0 {
+        moved / least.max(1e-300).sqrt()
+    } else {
+        f64::INFINITY
+    };
+    // The arc sine of x is at most πx/2.
+    let veer = FRAC_PI_2 * moved / apart;
+    let farthest = apart + moved;
+    let lean = 0.5 * (farthest * farthest - 4.0).max(0.0).sqrt();
+    steady.min(veer + lean.max(veer))
+}
+
+/// Where the circles of LSR do not overlap and neither turn, at most `turns`, has
+/// passed through zero: then the goal's circle is left of the first heading's
+/// tangent, and the start's of the last.
+fn cross_clip(goal: &Goal, v: (f64, f64), r: Reach, turns: (f64, f64)) -> Clip {
+    let bends = r.bends();
+    let small = |turn: f64, h: f64, clip: Clip| if turn + h < PI { clip } else { FREE };
+    let first = Clip {
+        room: v.1 + 2.0 + bends.0,
+        first: -v.0,
+        last: goal.sin,
+    };
+    let last = Clip {
+        room: goal.cos * v.1 - goal.sin * v.0 + 2.0 + bends.1,
+        first: -goal.sin,
+        last: -(goal.cos * v.0 + goal.sin * v.1),
+    };
+    let apart = (v.0 * v.0 + v.1 * v.1).sqrt();
+    let moved = r.moved();
+    let squares = r.first * r.first + r.last * r.last;
+    let exists = Clip {
+        room: apart - 2.0 + 0.5 * (squares + moved * moved / (apart - moved)) + SLACK,
+        first: v.0 / apart,
+        last: (v.0 * goal.cos + v.1 * goal.sin) / apart,
+    };
+    small(turns.0, r.first, first)
+        .tighter(small(turns.1, r.last, last), &r)
+        .tighter(exists, &r)
 }
 
 /// LRL with the middle turn above a half circle.
@@ -299,15 +511,12 @@ fn cross(goal: &Goal, r: Reach) -> (Plane, f64) {
 fn three(goal: &Goal, r: Reach, other: f64) -> (Plane, f64) {
     let v = goal.left_left();
     let apart = (v.0 * v.0 + v.1 * v.1).sqrt();
-    let moved = r.first + r.last;
+    let moved = r.moved();
     let (least, most) = (apart - moved, apart + moved);
     if least > 4.0 {
         return (NOWHERE, f64::INFINITY);
     }
-    let flat = |low: f64| Plane {
-        low: low.max(r.distance),
-        ..Plane::default()
-    };
+    let flat = |low: f64| flat(low.max(r.distance));
     // The arc cosine lies above its chord.
     let middle = PI + PI * (1.0 - most / 4.0).max(0.0);
     if other <= middle {
@@ -349,12 +558,32 @@ fn three(goal: &Goal, r: Reach, other: f64) -> (Plane, f64) {
     let squares = r.first * r.first + r.last * r.last;
     let bend = bent * moved * moved + steep * (squares + moved * moved / least);
     let shrink = -4.0 / (root(apart) * apart);
+    let along = v.0 * goal.cos + v.1 * goal.sin;
     let plane = Plane {
         low: length - bend,
         first: shrink * v.0 - 1.0,
-        last: 1.0 - shrink * (v.0 * goal.cos + v.1 * goal.sin),
+        last: 1.0 - shrink * along,
+        clip: FREE,
     };
-    (plane, whole)
+    // A quarter of it for half the middle turn, the rest for the centres' bearing.
+    let bends = 0.25 * bend + 0.5 * (moved * moved / (least * least) + squares / least) + SLACK;
+    let bearing = {
+        let square = apart * apart;
+        (-v.1 / square, (v.1 * goal.cos - v.0 * goal.sin) / square)
+    };
+    let lean = (0.25 * shrink * v.0, -0.25 * shrink * along);
+    let first = Clip {
+        room: t + bends,
+        first: bearing.0 + lean.0 - 1.0,
+        last: bearing.1 + lean.1,
+    };
+    let last = Clip {
+        room: q + bends,
+        first: lean.0 - bearing.0,
+        last: 1.0 + lean.1 - bearing.1,
+    };
+    let clip = first.tighter(last, &r);
+    (Plane { clip, ..plane }, whole)
 }
 
 #[cfg(test)]

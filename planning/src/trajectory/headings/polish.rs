@@ -7,8 +7,8 @@
 use crate::frame::{Point, Pose, Vector};
 use crate::trajectory::dubins;
 
-/// Headings tried at a waypoint: the present one and two to either side.
-const WINDOW: usize = 5;
+/// Headings tried at a waypoint: the present one and one to either side.
+const WINDOW: usize = 3;
 
 /// The least step, radians: half of its square a waypoint is far below any gap.
 const LAST_STEP_RAD: f64 = 4e-3;
@@ -51,13 +51,13 @@ impl Polish<'_> {
         let mut options = [headings[i]; WINDOW];
         if !self.fixed[i] {
             for (k, o) in options.iter_mut().enumerate() {
-                *o += step * (k as f64 - 2.0);
+                *o += step * (k as f64 - 1.0);
             }
         }
         options
     }
 
-    /// The best headings within a window of two steps to either side.
+    /// The best headings within a window of a step to either side.
     fn step(&self, headings: &mut [f64], step: f64, length: f64) -> f64 {
         let count = headings.len();
         let options: Vec<[f64; WINDOW]> = (0..count)
