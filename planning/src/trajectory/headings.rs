@@ -1,5 +1,5 @@
 //! Headings at a sequence of waypoints for the shortest chain of Dubins curves,
-//! with a certified gap (D2.7 §2.4.3, no wind).
+//! or the fastest chain of flights in wind, with a certified gap (D2.7 §2.4.3).
 //!
 //! Each waypoint's headings are cut into intervals. A shortest path over them,
 //! with a lower bound for every pair of neighbouring intervals (`leg`), bounds
@@ -8,9 +8,11 @@
 //! Intervals through which even the bound is no better than what is asked for are
 //! put aside with it, the others halved, until the two bounds meet.
 //!
-//! D2.7 proposes gradient descent, which can tell neither. Which order to visit
-//! the waypoints in, and wind, are for others.
+//! D2.7 proposes gradient descent, which can tell neither. In wind
+//! (`air`) the same is done in time. Which order to visit the waypoints in is for
+//! others.
 
+mod air;
 mod chain;
 mod interval;
 mod leg;
@@ -18,6 +20,8 @@ mod polish;
 
 use crate::frame::{Point, Vector};
 use crate::math::{TAU, wrap_tau};
+use crate::trajectory::wind::Wind;
+use air::Air;
 use chain::{Ends, Known, Layers, middles};
 use leg::Arc;
 use polish::Polish;
@@ -33,6 +37,9 @@ const MAX_ROUNDS: usize = 40;
 /// Pairs of intervals in one round at most, 10 s of work; with more the gap
 /// reached so far is the answer.
 const MAX_PAIRS: usize = 40_000_000;
+
+/// The same in wind, where a pair takes ten times as long.
+const MAX_PAIRS_IN_WIND: usize = 400_000;
 
 /// A waypoint's intervals are fine enough when they loosen the bound by this share
 /// of what the gap allows on the average: the rest is left to the others.
@@ -122,6 +129,37 @@ pub enum HeadingsError {
     /// The gap is negative or no number.
     #[error("a gap is a share of the length, zero or more")]
     Gap,
+    /// The airspeed is not positive, or the wind is no slower.
+    #[error(
+        "the wind must be finite and slower than the airspeed, so that every heading is reached"
+    )]
+    Wind,
+}
+
+/// The answer in wind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimedHeadings {
+    /// One heading of the nose a waypoint, radians in [0, 2π).
+    pub headings_rad: Vec<f64>,
+    /// Duration of the chain of fastest flights with these headings, seconds.
+    pub time_s: f64,
+    /// No choice of headings is faster, seconds.
+    pub lower_bound_s: f64,
+    /// Both bounds round by round, seconds: no choice is faster than the first, and
+    /// one that lasts the second is found.
+    pub rounds_s: Vec<(f64, f64)>,
+}
+
+impl TimedHeadings {
+    /// How far above the optimum the duration may be, as a share of it.
+    #[must_use]
+    pub fn gap(&self) -> f64 {
+        if self.time_s > 0.0 {
+            1.0 - self.lower_bound_s / self.time_s
+        } else {
+            0.0
+        }
+    }
 }
 
 /// Chooses the headings.
@@ -136,6 +174,69 @@ pub enum HeadingsError {
 /// When the request is malformed.
 pub fn choose(request: &Request) -> Result<Headings, HeadingsError> {
     check(request)?;
+    let found = solve(request, Air::default());
+    let r = request.radius_m;
+    Ok(Headings {
+        headings_rad: found.headings_rad,
+        length_m: found.upper * r,
+        lower_bound_m: found.lower * r,
+        rounds: found
+            .rounds
+            .iter()
+            .map(|b| Bounds {
+                lower_m: b.0 * r,
+                upper_m: b.1 * r,
+            })
+            .collect(),
+    })
+}
+
+/// Chooses the headings of the nose in a constant wind, for the shortest time at
+/// `airspeed_mps` through the air.
+///
+/// # Guarantees
+/// As [`choose`], in seconds; the rounds run out sooner, so that among waypoints nearer
+/// than a turn radius the gap may be wider than asked for. Flights are those of [`crate::trajectory::wind`]: three
+/// pieces, no turn longer than a circle.
+///
+/// # Errors
+/// When the request is malformed, or the wind no slower than the UAV.
+pub fn choose_in_wind(
+    request: &Request,
+    airspeed_mps: f64,
+    wind: Wind,
+) -> Result<TimedHeadings, HeadingsError> {
+    check(request)?;
+    let share = wind.velocity() / airspeed_mps;
+    if !(airspeed_mps > 0.0 && airspeed_mps.is_finite() && share.norm() < 1.0) {
+        return Err(HeadingsError::Wind);
+    }
+    let air = Air {
+        wind: (share.norm() > 0.0).then_some(share),
+    };
+    let found = solve(request, air);
+    let unit_s = request.radius_m / airspeed_mps;
+    Ok(TimedHeadings {
+        headings_rad: found.headings_rad,
+        time_s: found.upper * unit_s,
+        lower_bound_s: found.lower * unit_s,
+        rounds_s: found
+            .rounds
+            .iter()
+            .map(|b| (b.0 * unit_s, b.1 * unit_s))
+            .collect(),
+    })
+}
+
+/// What was found, in turn radii or the time of a radian's turn.
+struct Solved {
+    headings_rad: Vec<f64>,
+    upper: f64,
+    lower: f64,
+    rounds: Vec<(f64, f64)>,
+}
+
+fn solve(request: &Request, air: Air) -> Solved {
     let r = request.radius_m;
     let points = request.waypoints;
     let closed = request.chain == Chain::Closed;
@@ -151,6 +252,7 @@ pub fn choose(request: &Request) -> Result<Headings, HeadingsError> {
     let mut slopes = vec![0.0; layers[0].len()];
     let fixed = given(request);
     let polish = Polish {
+        air,
         legs: &legs,
         fixed: &fixed,
         closed,
@@ -159,7 +261,7 @@ pub fn choose(request: &Request) -> Result<Headings, HeadingsError> {
     let mut step = TAU / f64::from(2 * FIRST_INTERVALS);
     for _ in 0..MAX_ROUNDS {
         let ends = if closed { Ends::Closed } else { Ends::Open };
-        let solved = Layers::solve(&legs, &layers, ends, &slopes, &known);
+        let solved = Layers::solve(&air, &legs, &layers, ends, &slopes, &known);
         let start = solved
             .ways
             .iter()
@@ -177,10 +279,7 @@ pub fn choose(request: &Request) -> Result<Headings, HeadingsError> {
         lower = lower
             .max(solved.least.min(aside) * (1.0 - ROUNDING))
             .min(best.0);
-        rounds.push(Bounds {
-            lower_m: lower * r,
-            upper_m: best.0 * r,
-        });
+        rounds.push((lower, best.0));
         if lower >= best.0 * (1.0 - request.gap) {
             break;
         }
@@ -198,16 +297,21 @@ pub fn choose(request: &Request) -> Result<Headings, HeadingsError> {
             lower = lower.max(aside * (1.0 - ROUNDING)).min(best.0);
             break;
         }
-        if pairs(&layers, closed) > MAX_PAIRS {
+        let most = if air.wind.is_some() {
+            MAX_PAIRS_IN_WIND
+        } else {
+            MAX_PAIRS
+        };
+        if pairs(&layers, closed) > most {
             break;
         }
     }
-    Ok(Headings {
+    Solved {
         headings_rad: best.1.into_iter().map(wrap_tau).collect(),
-        length_m: best.0 * r,
-        lower_bound_m: lower * r,
+        upper: best.0,
+        lower,
         rounds,
-    })
+    }
 }
 
 fn check(request: &Request) -> Result<(), HeadingsError> {

@@ -1,6 +1,7 @@
 //! Shortest paths over the intervals of all waypoints: the bound of every
 //! interval, and the best middles.
 
+use super::air::Air;
 use super::leg::{Arc, Leg};
 use crate::frame::Vector;
 
@@ -81,13 +82,14 @@ impl Layers {
     /// Solves the chain of `legs` over `layers`; `slopes` are those of the first
     /// layer, used when the chain is closed.
     pub fn solve(
+        air: &Air,
         legs: &[Vector],
         layers: &[Vec<Arc>],
         ends: Ends,
         slopes: &[f64],
         known: &Known,
     ) -> Self {
-        let tables = Tables::new(legs, layers, ends, slopes, known);
+        let tables = Tables::new(air, legs, layers, ends, slopes, known);
         let starts: Vec<Vec<f64>> = starts(layers[0].len(), ends);
         let mut through: Vec<Vec<f64>> = layers
             .iter()
@@ -118,7 +120,7 @@ impl Layers {
             least,
             through,
             pairs,
-            looseness: looseness(legs, layers, &tables, &by_bound),
+            looseness: looseness(air, legs, layers, &tables, &by_bound),
             slopes: tables.first,
             ways: [by_length, by_bound],
         }
@@ -163,7 +165,14 @@ fn ends_at(start: &[f64], ends: Ends, layers: &[Vec<Arc>]) -> Vec<f64> {
 impl Tables {
     /// An interval's slope is that of the way on which the bound reaches it, so that
     /// the bound along good ways is one of second order.
-    fn new(legs: &[Vector], layers: &[Vec<Arc>], ends: Ends, first: &[f64], known: &Known) -> Self {
+    fn new(
+        air: &Air,
+        legs: &[Vector],
+        layers: &[Vec<Arc>],
+        ends: Ends,
+        first: &[f64],
+        known: &Known,
+    ) -> Self {
         let at_ends = |n: usize| match ends {
             Ends::Open => vec![0.0; n],
             Ends::Closed => first.to_vec(),
@@ -187,7 +196,7 @@ impl Tables {
                     if known.aside(i, a, b) {
                         continue;
                     }
-                    let leg = Leg::new(*v, a, b);
+                    let leg = air.leg(*v, a, b);
                     let (low, last) = leg.open_bound(a, slopes[j]);
                     if reached[j] + low < best[k].0 {
                         best[k] = (reached[j] + low, last);
@@ -285,7 +294,13 @@ pub(super) fn middles(way: &[usize], layers: &[Vec<Arc>]) -> Vec<f64> {
 }
 
 /// How loose the bound is at each waypoint of a way.
-fn looseness(legs: &[Vector], layers: &[Vec<Arc>], tables: &Tables, way: &[usize]) -> Vec<f64> {
+fn looseness(
+    air: &Air,
+    legs: &[Vector],
+    layers: &[Vec<Arc>],
+    tables: &Tables,
+    way: &[usize],
+) -> Vec<f64> {
     let mut loose = vec![0.0; layers.len()];
     for (i, v) in legs.iter().enumerate() {
         let next = (i + 1) % layers.len();
@@ -294,7 +309,7 @@ fn looseness(legs: &[Vector], layers: &[Vec<Arc>], tables: &Tables, way: &[usize
         };
         let (from, to) = (&layers[i][a], &layers[next][b]);
         let bound = tables.bounds[i].row(a)[b];
-        let leg = Leg::new(*v, from, to);
+        let leg = air.leg(*v, from, to);
         let paid = (tables.paid[i][a], tables.paid[i + 1][b]);
         let (first, last) = leg.looseness(bound, (from, paid.0), (to, paid.1));
         loose[i] += first;

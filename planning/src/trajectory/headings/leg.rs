@@ -55,6 +55,8 @@ pub(super) struct Plane {
     first: f64,
     last: f64,
     clip: Clip,
+    /// What a full circle costs.
+    circle: f64,
 }
 
 /// What must hold for a turn not to have passed through zero:
@@ -82,6 +84,7 @@ const fn flat(low: f64) -> Plane {
         first: 0.0,
         last: 0.0,
         clip: FREE,
+        circle: TAU,
     }
 }
 
@@ -118,6 +121,19 @@ impl Clip {
 }
 
 impl Plane {
+    /// What a bound of the length at a moment says of the time, when the straight's
+    /// direction meets the wind with the share `along`: the goal drifts the other way.
+    fn in_time(self, along: f64, r: &Reach) -> Self {
+        let pace = 1.0 / (1.0 + along);
+        Self {
+            low: r.moment + (self.low - r.moment) * pace,
+            first: self.first * pace,
+            last: self.last * pace,
+            circle: self.circle * pace,
+            ..self
+        }
+    }
+
     fn mirrored(self) -> Self {
         Self {
             first: -self.first,
@@ -143,7 +159,7 @@ impl Plane {
         if c.room >= c.first.abs() * h.0 + c.last.abs() * h.1 {
             return (plain, 0.0);
         }
-        let next = plain + TAU;
+        let next = plain + self.circle;
         if c.room + c.first.abs() * h.0 + c.last.abs() * h.1 < 0.0 {
             return (next, 0.0);
         }
@@ -181,9 +197,30 @@ const SLACK: f64 = 1e-9;
 /// One leg between two intervals, in turn radii.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leg {
-    planes: [Plane; 6],
+    planes: [Plane; 8],
     /// Length of the shortest curve between the middles.
     pub length: f64,
+    /// What is known without planes, when the air drifts.
+    pub slice: Option<Slice>,
+}
+
+/// Times between which planes hold.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slice {
+    /// No pair of headings arrives before.
+    pub from: f64,
+    /// What arrives later is not bounded by a plane.
+    pub until: f64,
+}
+
+/// The air's drift while a leg is flown; one turn radius and one radian's time.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Drift {
+    /// The air's velocity in airspeeds.
+    pub wind: Vector,
+    /// Where the goal is looked at, and how much earlier or later it may be met.
+    pub moment: f64,
+    pub spread: f64,
 }
 
 /// Half widths of both ends, and the distance of the two waypoints.
@@ -192,31 +229,76 @@ struct Reach {
     first: f64,
     last: f64,
     distance: f64,
+    moment: f64,
+    /// How far the goal may drift from where it is looked at.
+    drift: f64,
+    /// The wind as seen from the start.
+    wind: (f64, f64),
+    /// Words that are shorter come too early: their next circle is looked at.
+    from: f64,
 }
 
 impl Reach {
     /// How far the centres move at most.
     fn moved(&self) -> f64 {
-        self.first + self.last
+        self.first + self.last + self.drift
     }
 
-    /// How much a clip bends at either end: the goal and a unit vector turn.
+    /// The same reach in a mirror.
+    fn mirrored(&self) -> Self {
+        Self {
+            wind: (self.wind.0, -self.wind.1),
+            ..*self
+        }
+    }
+
+    /// No curve is shorter.
+    fn nearest(&self) -> f64 {
+        self.distance - self.drift
+    }
+
+    /// Full circles that a word must be longer by, if its length is at most `most`, in
+    /// order not to come too early.
+    fn waits(&self, most: f64) -> f64 {
+        if most < self.from - SLACK {
+            TAU * ((self.from - SLACK - most) / TAU).ceil()
+        } else {
+            0.0
+        }
+    }
+
+    /// How much a clip bends at either end: the goal and a unit vector turn; and how
+    /// much the drift may move it.
     fn bends(&self) -> (f64, f64) {
         let both = self.moved() * self.moved();
-        (
-            0.5 * (self.distance * self.first * self.first + both) + SLACK,
-            0.5 * (self.distance * self.last * self.last + both) + SLACK,
-        )
+        let bend = |h: f64| 0.5 * (self.distance * h * h + both) + self.drift * (1.0 + h) + SLACK;
+        (bend(self.first), bend(self.last))
     }
 }
 
 impl Leg {
+    /// A leg that no heading flies.
+    pub fn nowhere() -> Self {
+        Self {
+            planes: [NOWHERE; 8],
+            length: f64::INFINITY,
+            slice: None,
+        }
+    }
+
     /// The leg that goes by `v` turn radii from `a` to `b`.
     pub fn new(v: Vector, a: &Arc, b: &Arc) -> Self {
+        Self::drifting(v, a, b, &Drift::default())
+    }
+
+    /// The leg to a goal that lies by `v` at the drift's moment.
+    pub fn drifting(v: Vector, a: &Arc, b: &Arc, drift: &Drift) -> Self {
         let turn = near_pi(b.mid_rad - a.mid_rad);
+        let seen = |v: Vector| (v.x * a.cos + v.y * a.sin, v.y * a.cos - v.x * a.sin);
+        let (x, y) = seen(v);
         let goal = Goal {
-            x: v.x * a.cos + v.y * a.sin,
-            y: v.y * a.cos - v.x * a.sin,
+            x,
+            y,
             turn: if turn < 0.0 { turn + TAU } else { turn },
             sin: b.sin * a.cos - b.cos * a.sin,
             cos: b.cos * a.cos + b.sin * a.sin,
@@ -227,42 +309,74 @@ impl Leg {
             first: a.half_rad,
             last: b.half_rad,
             distance: (v.x * v.x + v.y * v.y).sqrt(),
+            moment: drift.moment,
+            drift: drift.spread * drift.wind.norm(),
+            wind: seen(drift.wind),
+            from: drift.moment - drift.spread,
         };
+        let back = reach.mirrored();
         let flip = |(p, l): (Plane, f64)| (p.mirrored(), l);
         let words = [
             same(&goal, reach),
-            flip(same(&mirror, reach)),
+            flip(same(&mirror, back)),
             cross(&goal, reach),
-            flip(cross(&mirror, reach)),
+            flip(cross(&mirror, back)),
         ];
-        let mut planes = [NOWHERE; 6];
+        let mut planes = [NOWHERE; 8];
         let mut length = f64::INFINITY;
         for (plane, word) in planes.iter_mut().zip(words) {
             *plane = word.0;
             length = length.min(word.1);
         }
         // Beyond 4 radii the shortest has a straight.
-        if reach.distance <= 4.0 {
+        if reach.nearest() <= 4.0 {
+            let other = if drift.spread > 0.0 {
+                f64::INFINITY
+            } else {
+                length
+            };
             for (plane, word) in planes[4..].iter_mut().zip([
-                three(&goal, reach, length),
-                flip(three(&mirror, reach, length)),
+                three(&goal, reach, other),
+                flip(three(&mirror, back, other)),
             ]) {
                 *plane = word.0;
                 length = length.min(word.1);
             }
         }
-        Self { planes, length }
+        if drift.spread > 0.0 {
+            planes[6] = three_short(&goal, reach);
+            planes[7] = three_short(&mirror, back).mirrored();
+        }
+        Self {
+            planes,
+            length,
+            slice: None,
+        }
+    }
+
+    /// The planes there are: middle turns below a half circle are in drifting air only.
+    fn known(&self) -> &[Plane] {
+        &self.planes[..if self.slice.is_some() { 8 } else { 6 }]
+    }
+
+    /// The least over all planes, no slopes paid.
+    pub fn least(&self, a: &Arc, b: &Arc) -> f64 {
+        let h = (a.half_rad, b.half_rad);
+        self.known()
+            .iter()
+            .fold(f64::INFINITY, |l, p| l.min(p.least(h, (0.0, 0.0)).0))
     }
 
     /// The bound with only the first slope paid, and the last slope that would
     /// take nothing away from it.
     pub fn open_bound(&self, a: &Arc, slope_a: f64) -> (f64, f64) {
         let h = (a.half_rad, 0.0);
-        self.planes.iter().fold((f64::INFINITY, 0.0), |least, p| {
+        self.known().iter().fold((f64::INFINITY, 0.0), |least, p| {
             let (low, share) = p.least(h, (slope_a, p.last));
             if low < least.0 {
                 let slope = p.last - share * p.clip.last;
-                (low, slope.clamp(-STEEPEST, STEEPEST))
+                let bent = slope.clamp(-STEEPEST, STEEPEST);
+                (low, if share > 0.0 { bent } else { slope })
             } else {
                 least
             }
@@ -275,13 +389,16 @@ impl Leg {
     /// intervals, the exact optimum without slopes may say more.
     pub fn bound(&self, v: Vector, a: &Arc, slope_a: f64, b: &Arc, slope_b: f64) -> f64 {
         let h = (a.half_rad, b.half_rad);
-        let planes = self.planes.iter().fold(f64::INFINITY, |least, p| {
+        let planes = self.known().iter().fold(f64::INFINITY, |least, p| {
             least.min(p.least(h, (slope_a, slope_b)).0)
         });
+        let paid = slope_a.abs() * a.half_rad + slope_b.abs() * b.half_rad;
+        if let Some(slice) = &self.slice {
+            return planes.min(slice.until - paid).max(slice.from - paid);
+        }
         if planes > self.length - DOUBTFUL * (a.half_rad + b.half_rad) {
             return planes;
         }
-        let paid = slope_a.abs() * a.half_rad + slope_b.abs() * b.half_rad;
         planes.max(interval::shortest(v, a, b) - paid)
     }
 
@@ -296,7 +413,7 @@ impl Leg {
             );
         }
         let mut least = (f64::INFINITY, (0.0, 0.0));
-        for p in &self.planes {
+        for p in self.known() {
             let (low, share) = p.least(wide, (a.1, b.1));
             if low < least.0 {
                 let loss = (
@@ -348,13 +465,17 @@ fn same(goal: &Goal, r: Reach) -> (Plane, f64) {
         u.0 * goal.sin - u.1 * goal.cos,
     );
     let (turn, clip) = both_turns(goal, v, p, r);
+    let wait = r.waits(p + turn + 2.0 * r.moved());
+    let (turn, clip) = (turn + wait, if wait > 0.0 { FREE } else { clip });
     let plane = Plane {
         low: p + turn - dips(&r, (u.1, end.1)),
         first: u.0 - 1.0,
         last: 1.0 - end.0,
         clip,
+        circle: TAU,
     };
-    (plane, goal.same())
+    let along = u.0 * r.wind.0 + u.1 * r.wind.1;
+    (plane.in_time(along, &r), goal.same())
 }
 
 /// The least that both turns of LSL can be together, and where they are so.
@@ -429,7 +550,7 @@ fn cross(goal: &Goal, r: Reach) -> (Plane, f64) {
         f64::INFINITY
     };
     if apart * 0.9 <= moved {
-        return (flat(r.distance), length);
+        return (flat(r.nearest()), length);
     }
     // Where circles may touch, v may come to lie across the own direction; one
     // that is turned back towards v stays on its right side.
@@ -449,13 +570,22 @@ fn cross(goal: &Goal, r: Reach) -> (Plane, f64) {
         u.0 * goal.cos + u.1 * goal.sin,
         u.1 * goal.cos - u.0 * goal.sin,
     );
+    let farthest = apart + moved;
+    let longest = (farthest * farthest - 4.0).max(0.0).sqrt();
+    let wait = r.waits(longest + t + q + 2.0 * swing + moved);
     let plane = Plane {
-        low: along + t + q - dips(&r, (u.1, end.1)),
+        low: along + t + q + wait - dips(&r, (u.1, end.1)),
         first: u.0 - 1.0,
         last: end.0 - 1.0,
-        clip: cross_clip(goal, v, r, (t + swing, q + swing)),
+        clip: if wait > 0.0 {
+            FREE
+        } else {
+            cross_clip(goal, v, r, (t + swing, q + swing))
+        },
+        circle: TAU,
     };
-    (plane, length)
+    let along = u.0 * r.wind.0 + u.1 * r.wind.1;
+    (plane.in_time(along, &r), length)
 }
 
 /// How far the straight of LSR may be from the direction taken, radians.
@@ -494,7 +624,7 @@ fn cross_clip(goal: &Goal, v: (f64, f64), r: Reach, turns: (f64, f64)) -> Clip {
     let moved = r.moved();
     let squares = r.first * r.first + r.last * r.last;
     let exists = Clip {
-        room: apart - 2.0 + 0.5 * (squares + moved * moved / (apart - moved)) + SLACK,
+        room: apart - 2.0 + 0.5 * (squares + moved * moved / (apart - moved)) + r.drift + SLACK,
         first: v.0 / apart,
         last: (v.0 * goal.cos + v.1 * goal.sin) / apart,
     };
@@ -516,7 +646,7 @@ fn three(goal: &Goal, r: Reach, other: f64) -> (Plane, f64) {
     if least > 4.0 {
         return (NOWHERE, f64::INFINITY);
     }
-    let flat = |low: f64| flat(low.max(r.distance));
+    let flat = |low: f64| flat(low.max(r.nearest()));
     // The arc cosine lies above its chord.
     let middle = PI + PI * (1.0 - most / 4.0).max(0.0);
     if other <= middle {
@@ -542,7 +672,8 @@ fn three(goal: &Goal, r: Reach, other: f64) -> (Plane, f64) {
         continued(out, r.first + swing),
         continued(back, r.last + swing),
     );
-    let length = t + middle + q;
+    let wait = r.waits(t + middle + q + 2.0 * swing + moved + 2.0 * (high - mid));
+    let length = t + middle + q + wait;
     let whole = if apart <= 4.0 {
         out + middle + back
     } else {
@@ -560,13 +691,17 @@ fn three(goal: &Goal, r: Reach, other: f64) -> (Plane, f64) {
     let shrink = -4.0 / (root(apart) * apart);
     let along = v.0 * goal.cos + v.1 * goal.sin;
     let plane = Plane {
-        low: length - bend,
+        low: length - bend + shrink * apart * r.drift,
         first: shrink * v.0 - 1.0,
         last: 1.0 - shrink * along,
         clip: FREE,
+        circle: TAU,
     };
     // A quarter of it for half the middle turn, the rest for the centres' bearing.
-    let bends = 0.25 * bend + 0.5 * (moved * moved / (least * least) + squares / least) + SLACK;
+    let bends = 0.25 * bend
+        + 0.5 * (moved * moved / (least * least) + squares / least)
+        + r.drift * (1.0 / least + 0.5 * steep)
+        + SLACK;
     let bearing = {
         let square = apart * apart;
         (-v.1 / square, (v.1 * goal.cos - v.0 * goal.sin) / square)
@@ -582,8 +717,57 @@ fn three(goal: &Goal, r: Reach, other: f64) -> (Plane, f64) {
         first: lean.0 - bearing.0,
         last: 1.0 + lean.1 - bearing.1,
     };
-    let clip = first.tighter(last, &r);
+    let clip = if wait > 0.0 {
+        FREE
+    } else {
+        first.tighter(last, &r)
+    };
     (Plane { clip, ..plane }, whole)
+}
+
+/// LRL with the middle turn below a half circle: never the shortest, but in drifting
+/// air the shortest may come too early.
+fn three_short(goal: &Goal, r: Reach) -> Plane {
+    let v = goal.left_left();
+    let apart = (v.0 * v.0 + v.1 * v.1).sqrt();
+    let moved = r.moved();
+    if apart - moved > 4.0 {
+        return NOWHERE;
+    }
+    let lean = |d: f64| {
+        let cos = d.clamp(0.0, 4.0) / 4.0;
+        angle_tau((1.0 - cos * cos).sqrt(), cos)
+    };
+    if apart * 0.9 <= moved {
+        // Nearly a single turn: the headings' difference and twice the middle turn.
+        let most = PI - 2.0 * lean(apart + moved);
+        let turn = continued(goal.turn, moved + most);
+        return Plane {
+            low: turn + r.waits(turn + 2.0 * most + moved),
+            first: -1.0,
+            last: 1.0,
+            ..flat(0.0)
+        };
+    }
+    let (low, mid, high) = (lean(apart + moved), lean(apart), lean(apart - moved));
+    let swing = 1.3 * moved / apart + (high - mid).max(mid - low);
+    let out = wrapped(angle_tau(v.1, v.0) - mid + FRAC_PI_2);
+    let out = if out >= TAU { out - TAU } else { out };
+    let middle = PI - 2.0 * mid;
+    let back = wrapped(goal.turn - out + middle);
+    let back = if back >= TAU { back - TAU } else { back };
+    let (t, q) = (
+        continued(out, r.first + swing),
+        continued(back, r.last + swing),
+    );
+    let length = t + middle + q;
+    let wait = r.waits(length + moved + 4.0 * (mid - low));
+    Plane {
+        low: length + wait - 4.0 * (high - mid),
+        first: -1.0,
+        last: 1.0,
+        ..flat(0.0)
+    }
 }
 
 #[cfg(test)]
@@ -591,6 +775,7 @@ mod tests {
     use super::*;
     use crate::frame::{Point, Pose};
     use crate::trajectory::dubins::length_m;
+    use crate::trajectory::headings::air::Air;
     use proptest::prelude::*;
 
     /// The least length over a grid of headings with slopes paid.
@@ -626,6 +811,28 @@ mod tests {
             let least = brute(v, &a, slopes[0], &b, slopes[1]);
             let bound = leg.bound(v, &a, slopes[0], &b, slopes[1]);
             prop_assert!(bound <= least + 1e-9, "{bound} {least}");
+        }
+
+        #[test]
+        fn no_flight_in_wind_beats_the_bound(
+            x in -6.0f64..6.0, y in -6.0f64..6.0, near in 0usize..2, a in 0.0f64..6.3, b in 0.0f64..6.3,
+            width in 0.0f64..0.25, ratio in 0.0f64..1.5, slopes in prop::array::uniform2(-2.0f64..2.0),
+            share in 0.0f64..0.6, course in 0.0f64..6.3,
+        ) {
+            const STEPS: i32 = 8;
+            let v = Vector::new(x, y) * [1.0, 0.35][near];
+            let air = Air { wind: Some(Vector::new(crate::math::cos(course), crate::math::sin(course)) * share) };
+            let (a, b) = (Arc::new(a, width, 0), Arc::new(b, width * ratio, 0));
+            let mut least = f64::INFINITY;
+            for i in -STEPS..=STEPS {
+                for j in -STEPS..=STEPS {
+                    let x = a.half_rad * f64::from(i) / f64::from(STEPS);
+                    let y = b.half_rad * f64::from(j) / f64::from(STEPS);
+                    least = least.min(air.cost(v, a.mid_rad + x, b.mid_rad + y) + slopes[0] * x - slopes[1] * y);
+                }
+            }
+            let bound = air.leg(v, &a, &b).bound(v, &a, slopes[0], &b, slopes[1]);
+            prop_assert!(bound <= least + 1e-7, "{bound} {least}");
         }
 
         #[test]

@@ -4,8 +4,8 @@
 //! present one, in ever smaller steps. One waypoint at a time would stop where two
 //! neighbours must turn together, as they must where a word begins or ends.
 
-use crate::frame::{Point, Pose, Vector};
-use crate::trajectory::dubins;
+use super::air::Air;
+use crate::frame::Vector;
 
 /// Headings tried at a waypoint: the present one and one to either side.
 const WINDOW: usize = 3;
@@ -15,6 +15,7 @@ const LAST_STEP_RAD: f64 = 4e-3;
 
 /// What may be moved: legs in turn radii, and the headings that are given.
 pub(super) struct Polish<'a> {
+    pub air: Air,
     pub legs: &'a [Vector],
     /// By waypoint, whether the heading is given.
     pub fixed: &'a [bool],
@@ -43,7 +44,10 @@ impl Polish<'_> {
         self.legs
             .iter()
             .enumerate()
-            .map(|(i, v)| leg_length(*v, headings[i], headings[(i + 1) % headings.len()]))
+            .map(|(i, v)| {
+                self.air
+                    .cost(*v, headings[i], headings[(i + 1) % headings.len()])
+            })
             .sum()
     }
 
@@ -69,7 +73,7 @@ impl Polish<'_> {
             .enumerate()
             .map(|(i, v)| {
                 let to = options[(i + 1) % count];
-                options[i].map(|a| to.map(|b| leg_length(*v, a, b)))
+                options[i].map(|a| to.map(|b| self.air.cost(*v, a, b)))
             })
             .collect();
         let mut best = (length, None);
@@ -120,10 +124,4 @@ fn shortest(tables: &[[[f64; WINDOW]; WINDOW]], start: usize, closed: bool) -> (
     }
     way.reverse();
     (cost, way)
-}
-
-/// Length of one leg between two headings, turn radii.
-pub(super) fn leg_length(v: Vector, a_rad: f64, b_rad: f64) -> f64 {
-    let from = Pose::new(Point::new(0.0, 0.0), a_rad);
-    dubins::length_m(from, Pose::new(Point::new(v.x, v.y), b_rad), 1.0)
 }
