@@ -16,7 +16,9 @@ mod air;
 mod chain;
 mod interval;
 mod leg;
+mod plane;
 mod polish;
+mod words;
 
 use crate::frame::{Point, Vector};
 use crate::math::{TAU, wrap_tau};
