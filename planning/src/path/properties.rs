@@ -58,6 +58,17 @@ fn moved(rings: &Rings, to_there: impl Fn(Point) -> Point) -> Rings {
         .collect()
 }
 
+/// Small whole numbers, so that rings touch, and what no map has.
+fn coordinate() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        20 => (-6i8..6).prop_map(f64::from),
+        4 => -6.0f64..6.0,
+        1 => prop::sample::select(vec![
+            1e8, -1e8, 1e-30, -1e-31, -0.0, 1e9, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE,
+        ]),
+    ]
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
@@ -111,5 +122,30 @@ proptest! {
         check_equal(&after, &lengths(&repaired, &ends), 1e-9)?;
         let again = repaired.with_ring_changed(&gone).unwrap();
         check_equal(&before, &lengths(&again, &ends), 1e-9)?;
+    }
+
+    /// Whatever the rings, there is a mesh or an error, and what a mesh answers holds.
+    #[test]
+    fn no_ring_is_too_odd_for_an_answer(
+        rings in prop::collection::vec(prop::collection::vec((coordinate(), coordinate()), 0..8), 0..5),
+        change in prop::collection::vec((coordinate(), coordinate()), 0..6),
+        ends in prop::collection::vec((coordinate(), coordinate()), 2),
+    ) {
+        let points = |ring: &Vec<(f64, f64)>| -> Vec<Point> {
+            ring.iter().map(|&(x, y)| Point::new(x, y)).collect()
+        };
+        let rings: Rings = rings.iter().map(points).collect();
+        let slices: Vec<&[Point]> = rings.iter().map(Vec::as_slice).collect();
+        if let Ok(mesh) = Mesh::from_rings(&slices) {
+            let ends = points(&ends);
+            let _ = mesh.cut_between(ends[0], ends[1]);
+            if let Some(length_m) = Search::new(&mesh).distance_m(ends[0], ends[1]) {
+                prop_assert!(length_m >= (ends[1] - ends[0]).norm() * (1.0 - 1e-9));
+                prop_assert!(mesh.cut_between(ends[0], ends[1]).is_none());
+            }
+            if let Ok(changed) = mesh.with_ring_changed(&points(&change)) {
+                prop_assert!(changed.n_cells() > 0);
+            }
+        }
     }
 }
