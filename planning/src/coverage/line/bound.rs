@@ -5,7 +5,7 @@
 //! the work that lies beyond `d`, deadheads included, must fit into what is left.
 
 use super::network::{Line, Surveyor};
-use super::{matching::pair_up, moats, postman};
+use super::{matching::pair_up, postman};
 use crate::coverage::metric::Metric;
 
 /// Distances `d` that are tried, besides zero: the bound is flat near its maximum.
@@ -19,13 +19,7 @@ const DISTANCES: usize = 8;
 pub(super) fn makespan(lines: &[Line], team: &[Surveyor], metric: &impl Metric) -> f64 {
     let all: Vec<usize> = (0..lines.len()).collect();
     let speed: f64 = team.iter().map(|u| u.speed).sum();
-    let mut whole = postman::shortest(lines, &all, metric);
-    let depot = team.first().map_or(0, |u| u.depot);
-    if team.iter().all(|u| u.depot == depot) {
-        // Tours from one depot hang together there: none of the parts is left apart.
-        let flown = lines.iter().map(|l| l.cost[0].min(l.cost[1])).sum::<f64>();
-        whole = whole.max(flown + moats::deadheads(lines, depot, metric));
-    }
+    let whole = postman::shortest(lines, &all, metric);
     let mut best = farthest(lines, team, metric).max(whole / speed);
     if team.len() > 1 {
         let beyond = Beyond::new(lines, team, metric);

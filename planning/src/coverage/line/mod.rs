@@ -14,7 +14,7 @@
 //! | `improve` | local search on the longest tour |
 //! | [`strip`] | strips wider than a swath, as lanes |
 //! | `trim` | what is left out when endurance is short |
-//! | `bound`, `moats` | what no plan can beat |
+//! | `bound` | what no plan can beat |
 //!
 //! Wind: on closed tours a constant wind is a symmetric cost
 //! ([`crate::coverage::metric::InWind`]), so nothing here needs to know of it, unless
@@ -38,7 +38,6 @@ mod blossom;
 mod bound;
 mod improve;
 mod matching;
-mod moats;
 mod network;
 mod postman;
 mod split;
