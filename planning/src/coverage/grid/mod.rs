@@ -25,6 +25,7 @@
 pub mod bounds;
 pub mod forest;
 pub mod free;
+mod home;
 pub mod improve;
 pub mod map;
 pub mod mstc;

@@ -9,6 +9,7 @@
 //!
 //! Left to others: the first orders, and when to stop.
 
+use super::home::Home;
 use super::map::{Cell, NOWHERE, Router};
 use super::plan::Task;
 use super::stream::Stream;
@@ -49,10 +50,6 @@ const OVER_PRICE: i64 = 1 << 16;
 /// One try in so many to exchange tails is made: most cost a count of both for nothing.
 const TAILS: usize = 8;
 
-/// Tables of the moves to every root beyond this many entries in all would be too large;
-/// ways home are then searched one by one.
-const MOST_HOME: usize = 1 << 23;
-
 /// Orders under improvement.
 pub struct Search<'a> {
     task: &'a Task,
@@ -80,46 +77,6 @@ pub struct Search<'a> {
     late: i64,
     /// Highest loss accepted, in price units per 256ths of a draw.
     heat: i64,
-}
-
-/// Moves between roots and any cell: the longest hops of UAVs that return, asked for at
-/// every change of what they do first or last.
-#[derive(Default)]
-struct Home {
-    /// By cell: which table, if it is a root; empty when there are no tables.
-    table_of: Vec<u8>,
-    tables: Vec<Vec<u32>>,
-}
-
-impl Home {
-    /// A cell that is no root.
-    const NONE: u8 = u8::MAX;
-
-    fn new(task: &Task) -> Self {
-        let mut roots = task.roots.clone();
-        roots.sort_unstable();
-        roots.dedup();
-        let entries = roots.len().saturating_mul(task.map.table_len());
-        if !task.closed || entries > MOST_HOME || roots.len() > usize::from(Self::NONE) {
-            return Self::default();
-        }
-        let mut table_of = vec![Self::NONE; task.map.table_len()];
-        for (i, root) in (0u8..).zip(&roots) {
-            table_of[*root as usize] = i;
-        }
-        let tables = roots.iter().map(|r| task.map.distances(&[*r])).collect();
-        Self { table_of, tables }
-    }
-
-    fn moves(&self, a: Cell, b: Cell) -> Option<u32> {
-        for (root, other) in [(a, b), (b, a)] {
-            let table = self.table_of.get(root as usize)?;
-            if let Some(table) = self.tables.get(usize::from(*table)) {
-                return Some(table[other as usize]);
-            }
-        }
-        None
-    }
 }
 
 /// Units of time in one move of the fastest UAV: a slower one's move is rounded to them.
