@@ -56,13 +56,10 @@ use std::sync::Arc;
 use thiserror::Error;
 use ways::{Places, Ways};
 
-/// Lanes are refused when there would be more than this: an area of 20 km by 20 km at
-/// lanes of 20 m has a thousand, with holes a few times as many.
-const MOST_PASSES: usize = 5_000;
-
-/// Up to this many passes the costs between all ends are written down, 70 MB at most;
-/// beyond that each is computed when it is asked for.
-const MOST_WRITTEN: usize = 1_500;
+/// Areas that need more passes are refused: the order of so many takes some seconds, and
+/// the costs between all their ends 70 MB. An area of 20 km by 20 km at lanes of 20 m has
+/// a thousand.
+const MOST_PASSES: usize = 1_500;
 
 /// Ways round zones are searched for between places nearer than this, in turns; others
 /// are guessed, but for those that are flown.
@@ -336,12 +333,8 @@ pub fn plan(problem: &ExactProblem) -> Result<ExactPlan, ExactError> {
     let guess = |a, b| places.guess_m(a, b, near_m);
     let lines = lines(&layout.passes);
     let alone = [Surveyor::at(2 * n)];
-    let found = if n <= MOST_WRITTEN {
-        let costs = Matrix::of(2 * n + 1, &guess);
-        line::plan(&lines, &alone, &costs, problem.steps)?
-    } else {
-        line::plan(&lines, &alone, &guess, problem.steps)?
-    };
+    let costs = Matrix::of(2 * n + 1, &guess);
+    let found = line::plan(&lines, &alone, &costs, problem.steps)?;
     let order: Vec<line::Pass> = found.tours.into_iter().flat_map(|t| t.passes).collect();
     let length_m = line::tour_cost(&order, &lines, 2 * n, &places);
     let passes = in_order(&layout.passes, &order);

@@ -7,13 +7,16 @@
 
 use super::layout::Layout;
 use super::ways::Places;
-use super::{CellPlan, ExactError, ExactProblem, MOST_WRITTEN, Pass, in_order, lines};
+use super::{CellPlan, ExactError, ExactProblem, NEAR_TURNS, Pass, in_order, lines};
 use crate::coverage::line::{self, LineError, LineTour, Surveyor, tour_cost};
 use crate::coverage::metric::{Matrix, Metric};
 use crate::frame::Point;
 
 /// A pass is cut when it is longer than this share of what each UAV has to fly.
 const LONGEST_SHARE: f64 = 0.5;
+
+/// Passes are cut for a team of this size at most: each UAV makes two pieces more.
+const MOST_CUT: usize = 200;
 
 /// The most UAVs: the same as a swarm's.
 const MOST_UAVS: usize = 1_000;
@@ -81,7 +84,17 @@ pub fn plan_team(problem: &ExactProblem, team: &[Member]) -> Result<TeamPlan, Ex
     if team.len() > MOST_UAVS {
         return Err(ExactError::Number("number of UAVs"));
     }
-    let launches: Vec<Point> = team.iter().map(|m| m.launch).collect();
+    let mut launches: Vec<Point> = Vec::new();
+    let mut from = Vec::with_capacity(team.len());
+    for member in team {
+        let known = launches
+            .iter()
+            .position(|p| (p - member.launch).norm() <= 0.0);
+        from.push(known.unwrap_or(launches.len()));
+        if known.is_none() {
+            launches.push(member.launch);
+        }
+    }
     let finite = |p: &Point| p.x.is_finite() && p.y.is_finite();
     if !launches.iter().all(finite) {
         return Err(ExactError::Number("launch point"));
@@ -91,31 +104,38 @@ pub fn plan_team(problem: &ExactProblem, team: &[Member]) -> Result<TeamPlan, Ex
     let ways = layout.ways(&launches)?;
     let places = Places::new(&ways, &layout.passes, &launches, problem.turn_radius_m);
     let first = 2 * layout.passes.len();
-    if layout.passes.len() + team.len() > MOST_WRITTEN {
-        return Err(ExactError::TooMany);
-    }
-    let costs = Matrix::of(first + team.len(), &places);
+    let near_m = NEAR_TURNS * problem.measures().turn_m();
+    let guessed = Matrix::of(first + launches.len(), &|a, b| places.guess_m(a, b, near_m));
     let lines = lines(&layout.passes);
     let uavs: Vec<Surveyor> = team
         .iter()
-        .enumerate()
-        .map(|(i, m)| Surveyor {
+        .zip(&from)
+        .map(|(m, launch)| Surveyor {
             speed: m.speed,
             endurance: m.endurance,
-            ..Surveyor::at(first + i)
+            ..Surveyor::at(first + launch)
         })
         .collect();
-    let found = line::plan(&lines, &uavs, &costs, problem.steps)?;
+    let mut found = line::plan(&lines, &uavs, &guessed, problem.steps)?;
+    let time =
+        |(t, u): (&LineTour, &Surveyor)| tour_cost(&t.passes, &lines, u.depot, &places) / u.speed;
+    let too_long = |(t, u): (&LineTour, &Surveyor)| time((t, u)) > u.endurance;
+    if found.tours.iter().zip(&uavs).any(too_long) {
+        // A guess was too short where endurance is: here every way counts as it is.
+        let costs = Matrix::of(first + launches.len(), &places);
+        found = line::plan(&lines, &uavs, &costs, problem.steps)?;
+    }
     let reach = |i: usize, uav: &Surveyor| {
         let (a, b) = (2 * i, 2 * i + 1);
-        let way = costs.cost(uav.depot, a) + lines[i].cost[0] + costs.cost(b, uav.depot);
+        // Ways from and to launch points are never guessed.
+        let way = guessed.cost(uav.depot, a) + lines[i].cost[0] + guessed.cost(b, uav.depot);
         way / uav.speed
     };
     let soonest = |i: usize| {
         let times = uavs.iter().map(|u| reach(i, u));
         times.fold(f64::INFINITY, f64::min)
     };
-    let length_m = |(t, u): (&LineTour, &Surveyor)| tour_cost(&t.passes, &lines, u.depot, &costs);
+    let length_m = |(t, u): (&LineTour, &Surveyor)| tour_cost(&t.passes, &lines, u.depot, &places);
     let passes = |t: &LineTour| in_order(&layout.passes, &t.passes);
     let tours: Vec<Vec<Pass>> = found.tours.iter().map(passes).collect();
     let flights = tours.iter().zip(team);
@@ -125,7 +145,7 @@ pub fn plan_team(problem: &ExactProblem, team: &[Member]) -> Result<TeamPlan, Ex
             .map(|(t, m)| super::track(&ways, m.launch, t))
             .collect(),
         tours,
-        makespan: found.makespan,
+        makespan: found.tours.iter().zip(&uavs).map(time).fold(0.0, f64::max),
         farthest: (0..lines.len()).map(soonest).fold(0.0, f64::max),
         unserved: found.unserved.iter().map(|&i| layout.passes[i]).collect(),
         cells: layout.cells,
@@ -135,7 +155,7 @@ pub fn plan_team(problem: &ExactProblem, team: &[Member]) -> Result<TeamPlan, Ex
 /// Cuts passes into equal pieces, so that none is longer than a fair share for `k` UAVs.
 fn cut(passes: &mut Vec<Pass>, k: usize, shortest_m: f64) {
     let total_m: f64 = passes.iter().map(Pass::length_m).sum();
-    let most_m = (LONGEST_SHARE * total_m / k as f64).max(shortest_m);
+    let most_m = (LONGEST_SHARE * total_m / k.min(MOST_CUT) as f64).max(shortest_m);
     let mut pieces = Vec::with_capacity(passes.len());
     for pass in passes.iter() {
         let n = (pass.length_m() / most_m).ceil().max(1.0);
