@@ -5,7 +5,7 @@
 
 use proptest::prelude::*;
 use skein_scenario::{
-    Overrides, Severity, builtin_files, builtin_text, load_builtin, load_with, parse,
+    Overrides, Severity, builtin_files, builtin_text, load_builtin, load_with, parse, parse_with,
 };
 use std::path::{Path, PathBuf};
 
@@ -51,7 +51,7 @@ fn a_wind_comes_from_where_it_is_said_to_and_must_leave_the_turns_flyable() {
             1,
         );
         assert_ne!(text, helsinki());
-        skein_scenario::parse_with("x", &text, &builtin_files(), &Overrides::default())
+        parse_with("x", &text, &builtin_files(), &Overrides::default())
     };
     let wind = windy("2").unwrap().spec.wind;
     assert!(
@@ -122,20 +122,87 @@ fn helsinki_is_what_it_says() {
 /// must plan for, else no run could ever succeed.
 #[test]
 fn the_planner_misses_no_cell_that_the_world_calls_coverable() {
-    let scenario = load_builtin("helsinki", &Overrides::default()).unwrap();
-    let survey = skein_netsim::world::Survey::new(&scenario.spec);
+    for name in skein_scenario::builtin_names() {
+        let scenario = load_builtin(name, &Overrides::default()).unwrap();
+        let survey = skein_netsim::world::Survey::new(&scenario.spec);
+        assert!(
+            survey.coverable_share() >= scenario.spec.min_coverable,
+            "{name}: {}",
+            survey.coverable_share()
+        );
+        let open = survey.cells().iter().filter(|c| c.uncoverable.is_none());
+        let the_loop = &scenario.ground.coverage_loop;
+        let missed: Vec<_> = open
+            .filter(|c| the_loop.index_of(c.id).is_none())
+            .map(|c| c.id)
+            .collect();
+        assert!(missed.is_empty(), "{name}: {missed:?}");
+    }
+}
+
+#[test]
+fn targets_are_what_their_files_say() {
+    let load = |name: &str| load_builtin(name, &Overrides::default()).unwrap();
+    let points = load("points");
+    assert_eq!(points.spec.mission.pieces().unwrap().len(), 48);
+    assert_eq!(points.ground.coverage_loop.len(), 48);
+    let roads = load("roads");
+    let total = skein_scenario::summary(&roads.spec, &roads.ground);
+    // 14.5 km of road, flown once and a little between.
     assert!(
-        survey.coverable_share() >= 0.97,
+        total.loop_m > 14_000.0 && total.loop_m < 25_000.0,
         "{}",
-        survey.coverable_share()
+        total.loop_m
     );
-    let open = survey.cells().iter().filter(|c| c.uncoverable.is_none());
-    let the_loop = &scenario.ground.coverage_loop;
-    let missed: Vec<_> = open
-        .filter(|c| the_loop.index_of(c.id).is_none())
-        .map(|c| c.id)
-        .collect();
-    assert!(missed.is_empty(), "{missed:?}");
+    assert!(total.coverable_share >= 0.97, "{}", total.reasons());
+}
+
+#[test]
+fn wrong_targets_are_refused_where_they_stand() {
+    let refused = |from: &str, to: &str| {
+        let text = builtin_text("roads").unwrap().replacen(from, to, 1);
+        assert!(text != builtin_text("roads").unwrap(), "{from}");
+        parse_with(
+            "roads.json5",
+            &text,
+            &builtin_files(),
+            &Overrides::default(),
+        )
+        .unwrap_err()
+        .to_string()
+    };
+    let lines = "lines: { file: \"../data/helsinki_roads.geojson\", width_m: 8 },";
+    for (to, what) in [
+        ("lines: { ways_m: [[[0, 0]]] },", "at least 2 points"),
+        ("lines: { ways_m: [] },", "no line is given"),
+        (
+            "lines: { ways_m: [[[5000, 0], [5100, 0]]] },",
+            "lies within the area",
+        ),
+        (
+            "lines: { file: \"../data/nothing.geojson\" },",
+            "nothing.geojson",
+        ),
+        (
+            "points: [], lines: { ways_m: [[[0, 0], [9, 9]]] },",
+            "not both",
+        ),
+        ("points: [{ east_m: 3 }],", "points[0].north_m"),
+        (
+            "points: { file: \"../data/helsinki_roads.geojson\" },",
+            "no point is given",
+        ),
+        (
+            "lines: { ways_m: [[[0, 0], [90, 90]]], width_m: -1 },",
+            "width_m",
+        ),
+    ] {
+        let said = refused(lines, to);
+        assert!(
+            said.contains(what) && said.contains("roads.json5:1"),
+            "{to}: {said}"
+        );
+    }
 }
 
 #[test]

@@ -8,8 +8,8 @@ use crate::percept::Percept;
 use crate::reactive::follow::fly;
 use crate::setpoint::Steer;
 use skein_planning::airframe::Airframe;
-use skein_planning::coverage::area::stc::footprint_contains;
-use skein_planning::coverage::area::{CellId, CoverageLoop};
+use skein_planning::coverage::area::CoverageLoop;
+use skein_planning::coverage::area::patch::frame_holds;
 use skein_planning::frame::Pose;
 use skein_planning::math::wrap_pi;
 
@@ -115,35 +115,18 @@ struct Lens<'a> {
 impl Lens<'_> {
     /// Cells that the frame at `pose`, less `slack_m` on all sides, contains.
     fn look(&self, pose: &Pose, slack_m: f64, seen: &mut Vec<u16>) {
-        let grid = self.coverage_loop.grid();
-        let side_m = grid.lane_spacing_m;
         let across_m = self.airframe.footprint_across_m - slack_m;
         let along_m = self.airframe.footprint_along_m - slack_m;
-        // Seen from its centre a cell reaches at least half a side in any direction.
-        let (a, b) = (across_m - 0.5 * side_m, along_m - 0.5 * side_m);
-        if a < 0.0 || b < 0.0 {
-            return;
-        }
-        let reach_m = (a * a + b * b).sqrt();
         let p = pose.position();
-        let low = grid.cell_at(p.map(|x| x - reach_m - 0.5 * side_m));
-        let high = grid.cell_at(p.map(|x| x + reach_m - 0.5 * side_m));
-        for row in low.row..=high.row {
-            for col in low.col..=high.col {
-                let id = CellId { col, row };
-                if (grid.centre(id) - p).norm_squared() > reach_m * reach_m {
-                    continue;
-                }
-                let Some(cell) = self.coverage_loop.index_of(id) else {
-                    continue;
-                };
-                if (self.is_open)(cell)
-                    && !seen.contains(&cell)
-                    && footprint_contains(&grid, id, *pose, across_m, along_m)
-                {
-                    seen.push(cell);
-                }
+        let mut held = |cell: u16, corners: &_| {
+            if (self.is_open)(cell)
+                && !seen.contains(&cell)
+                && frame_holds(corners, *pose, across_m, along_m)
+            {
+                seen.push(cell);
             }
-        }
+        };
+        self.coverage_loop
+            .cells_near(p, across_m, along_m, &mut held);
     }
 }

@@ -8,7 +8,7 @@ use crate::resolve::{Overrides, Scenario, parse_with};
 pub const DEFAULT: &str = "helsinki";
 
 /// Name, file as errors show it, text.
-const SCENARIOS: [(&str, &str, &str); 3] = [
+const SCENARIOS: &[(&str, &str, &str)] = &[
     (
         "helsinki",
         "helsinki.json5",
@@ -24,13 +24,27 @@ const SCENARIOS: [(&str, &str, &str); 3] = [
         "geofence.json5",
         include_str!("../../../configs/trials/geofence.json5"),
     ),
+    (
+        "points",
+        "points.json5",
+        include_str!("../../../configs/trials/points.json5"),
+    ),
+    (
+        "roads",
+        "roads.json5",
+        include_str!("../../../configs/trials/roads.json5"),
+    ),
 ];
 
 /// Files that the built-in scenarios name.
-const DATA: [(&str, &str); 2] = [
+const DATA: &[(&str, &str)] = &[
     (
         "../data/helsinki_buildings.geojson",
         include_str!("../../../configs/data/helsinki_buildings.geojson"),
+    ),
+    (
+        "../data/helsinki_roads.geojson",
+        include_str!("../../../configs/data/helsinki_roads.geojson"),
     ),
     (
         "../data/px4_multicopter_mission_geofence_avoid.plan",

@@ -243,7 +243,7 @@ fn reach_m(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> f64 {
 /// What a scenario amounts to, before it is flown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
-    /// The area, square metres.
+    /// What is to be seen, square metres: the area, or all pieces of the targets.
     pub area_m2: f64,
     /// Cells of the area on the loop.
     pub cells: usize,
@@ -281,21 +281,23 @@ impl Summary {
 #[must_use]
 pub fn summary(spec: &Spec, ground: &Ground) -> Summary {
     let the_loop = &ground.coverage_loop;
-    let area_m2 = ring_area_m2(
-        &spec
-            .mission
-            .area
+    let area: Vec<Point> = spec.mission.area.iter().copied().map(point_m).collect();
+    let area_m2 = match spec.mission.pieces() {
+        Some(pieces) => pieces
             .iter()
-            .copied()
-            .map(point_m)
-            .collect::<Vec<_>>(),
-    );
+            .map(|p| ring_area_m2(p).max(POINT_M2))
+            .sum::<f64>(),
+        None => ring_area_m2(&area),
+    };
     let mut uncoverable: BTreeMap<String, Vec<CellId>> = BTreeMap::new();
     let mut lost_m2 = 0.0;
-    let area: Vec<Point> = spec.mission.area.iter().copied().map(point_m).collect();
     for (cell, reason) in the_loop.uncoverable() {
         uncoverable.entry(reason.clone()).or_default().push(*cell);
-        lost_m2 += overlap_m2(&area, &the_loop.grid(), *cell);
+        lost_m2 += match (the_loop.grid(), the_loop.patches().corners(*cell)) {
+            (Some(grid), _) => overlap_m2(&area, &grid, *cell),
+            (None, Some(corners)) => ring_area_m2(&corners).max(POINT_M2),
+            (None, None) => 0.0,
+        };
     }
     let division = failure_free(spec, the_loop);
     Summary {
@@ -368,6 +370,9 @@ fn robot(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Robot {
         endurance_ms: whole(usable_s.max(0.0) * 1000.0),
     }
 }
+
+/// What a point, or a line without width, counts for, square metres.
+const POINT_M2: f64 = 1e-6;
 
 fn ring_area_m2(ring: &[Point]) -> f64 {
     let n = ring.len();

@@ -19,6 +19,7 @@ mod feasibility;
 mod files;
 mod fleet;
 mod resolve;
+mod task;
 mod terrain;
 
 pub use builtin::{

@@ -21,13 +21,15 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// All fields of a scenario.
-const FIELDS: [&str; 23] = [
+const FIELDS: &[&str] = &[
     "name",
     "seed",
     "time_scale",
     "max_time_s",
     "origin",
     "area",
+    "points",
+    "lines",
     "level_m",
     "vertical_margin_m",
     "no_fly",
@@ -113,7 +115,7 @@ fn resolve(
     over: &Overrides,
     findings: &mut Vec<Finding>,
 ) -> Result<(Spec, Arc<Ground>), ScenarioError> {
-    let f = root.fields(&FIELDS)?;
+    let f = root.fields(FIELDS)?;
     let name = word(f.need("name", "\"city\"")?)?;
     let max_time_s = f.whole_or("max_time_s", 6000, 1, 604_800, "seconds")?;
     let (time_scale, beacon_period_ms) = times(&f, over)?;
@@ -354,6 +356,7 @@ fn mission(
         tracking_error_mm: length_mm(error_m * 1000.0),
         launch: (mm(launch.x), mm(launch.y)),
         base: (mm(base.x), mm(base.y)),
+        task: t.task.clone(),
     })
 }
 

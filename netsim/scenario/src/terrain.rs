@@ -4,10 +4,12 @@
 use crate::document::{Fields, Node};
 use crate::error::ScenarioError;
 use crate::files::Files;
+use crate::task;
 use skein_interop::geojson::{self, HeightRules};
 use skein_interop::place::{LatLon, Shape, Side, circle_ring, to_plane};
 use skein_interop::plan;
 use skein_netsim::spec::Building;
+use skein_peer::Task;
 use skein_planning::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
 use skein_planning::geometry::{Polygon, PolygonError};
 
@@ -23,6 +25,7 @@ pub(crate) struct Terrain {
     pub(crate) area: Polygon,
     pub(crate) zones: Vec<Polygon>,
     pub(crate) buildings: Vec<Building>,
+    pub(crate) task: Task,
 }
 
 /// What a file told besides what was asked.
@@ -39,13 +42,7 @@ pub(crate) fn read(
         .number(1.0, MAX_HEIGHT_M, "metres")?;
     let margin_m = f.number_or("vertical_margin_m", 10.0, 0.0, MAX_HEIGHT_M, "metres")?;
     let reader = Reader { origin, files };
-    let area = reader.area(
-        f.need(
-            "area",
-            "{ west_m: 0, south_m: 0, east_m: 960, north_m: 960 }",
-        )?,
-        notices,
-    )?;
+    let (area, task) = reader.asked(f, notices)?;
     let mut zones = Vec::new();
     if let Some(list) = f.get("no_fly") {
         for entry in list.items()? {
@@ -81,6 +78,7 @@ pub(crate) fn read(
         area,
         zones,
         buildings,
+        task,
     })
 }
 
@@ -138,6 +136,28 @@ struct Reader<'f> {
 }
 
 impl Reader<'_> {
+    /// The area, and what is to be seen in it. Targets need no area of their own.
+    fn asked(
+        &self,
+        f: &Fields<'_>,
+        notices: &mut Notices,
+    ) -> Result<(Polygon, Task), ScenarioError> {
+        let targets = f.get("points").or(f.get("lines"));
+        let area = match (f.get("area"), targets) {
+            (None, Some(_)) => None,
+            _ => {
+                let example = "{ west_m: 0, south_m: 0, east_m: 960, north_m: 960 }";
+                Some(self.area(f.need("area", example)?, notices)?)
+            }
+        };
+        let task = task::read(f, self.files, self.origin, area.as_ref(), notices)?;
+        let area = match (area, targets) {
+            (Some(area), _) => area,
+            (None, node) => task::extent(&task, node.unwrap_or(f.node()))?,
+        };
+        Ok((area, task))
+    }
+
     fn ring_m(&self, node: &Node<'_>) -> Result<Polygon, ScenarioError> {
         let items = node.items()?;
         let mut points = Vec::with_capacity(items.len());

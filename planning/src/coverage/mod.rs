@@ -7,3 +7,4 @@ pub mod grid;
 pub mod line;
 pub mod metric;
 pub mod pinpoint;
+pub mod stations;

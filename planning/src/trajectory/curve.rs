@@ -150,6 +150,32 @@ impl Curve {
         self.end()
     }
 
+    /// The curve up to `s_m` metres along it, and the rest; `s_m` is clamped to both
+    /// ends.
+    #[must_use]
+    pub fn split_at(&self, s_m: f64) -> (Self, Self) {
+        let mut left_m = s_m.max(0.0);
+        let (mut before, mut after) = (Self::empty(), Self::empty());
+        for s in &self.segments {
+            let cut_m = left_m.min(s.length_m);
+            left_m -= cut_m;
+            if cut_m > 0.0 {
+                before.push(Segment {
+                    length_m: cut_m,
+                    ..*s
+                });
+            }
+            if cut_m < s.length_m {
+                after.push(Segment {
+                    start: s.pose_at(cut_m),
+                    length_m: s.length_m - cut_m,
+                    ..*s
+                });
+            }
+        }
+        (before, after)
+    }
+
     /// The same curve flown backwards.
     #[must_use]
     pub fn reversed(&self) -> Self {

@@ -36,6 +36,7 @@ pub mod plan;
 pub mod relay;
 #[cfg(test)]
 mod relay_net;
+pub mod task;
 pub mod view;
 mod voice;
 pub mod wire;
@@ -45,6 +46,7 @@ pub use input::{Command, Input, Time};
 pub use mission::Mission;
 pub use output::{Output, Priority, Report};
 pub use peer::Peer;
+pub use task::Task;
 pub use view::View;
 
 use serde::{Deserialize, Serialize};

@@ -1,9 +1,12 @@
 //! What a mission is: area, zones, lanes, level, origin, revision.
 
 use crate::plan::Ground;
+use crate::task::Task;
 use crate::wire::message::MissionChunk;
 use serde::{Deserialize, Serialize};
-use skein_planning::coverage::area::{AreaProblem, CoverageLoop};
+use skein_planning::coverage::area::patch::Corners;
+use skein_planning::coverage::area::{AreaProblem, CoverageLoop, LoopError};
+use skein_planning::coverage::stations::{self, StationsProblem};
 use skein_planning::frame::Point;
 use skein_planning::geometry::{NoFlyZones, Polygon};
 use skein_planning::path::{RouteLimits, Router};
@@ -13,7 +16,7 @@ use std::sync::Arc;
 /// A point in millimetres east and north of the mission's origin.
 pub type PointMm = (i32, i32);
 
-/// An area-coverage mission. Integers only, so that its bytes and its hash are the
+/// A coverage mission. Integers only, so that its bytes and its hash are the
 /// same everywhere.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Mission {
@@ -43,6 +46,9 @@ pub struct Mission {
     pub launch: PointMm,
     /// Where UAVs loiter when all is done.
     pub base: PointMm,
+    /// What is to be seen.
+    #[serde(default, skip_serializing_if = "Task::is_area")]
+    pub task: Task,
 }
 
 fn metres(mm: u32) -> f64 {
@@ -98,7 +104,16 @@ impl Mission {
             h.write_i64(i64::from(v));
         }
         ring(&mut h, &[self.launch, self.base]);
+        self.task.hash(&mut h);
         h.finish()
+    }
+
+    /// The pieces that have to be seen, each by one frame; none where the mission asks
+    /// for the cells of its area. Lines are cut to the lane spacing at most.
+    #[must_use]
+    pub fn pieces(&self) -> Option<Vec<Corners>> {
+        let targets = self.task.targets()?;
+        Some(targets.pieces(metres(self.lane_spacing_mm)))
     }
 
     /// Derives the loop and the router.
@@ -124,7 +139,7 @@ impl Mission {
             tracking_error_m: metres(self.tracking_error_mm),
             launch: point_m(self.launch),
         };
-        let coverage_loop = CoverageLoop::build(&problem).map_err(|e| e.to_string())?;
+        let coverage_loop = self.the_loop(&problem).map_err(|e| e.to_string())?;
         let limits = RouteLimits {
             turn_radius_m: problem.turn_radius_m,
             clearance_m: problem.clearance_m,
@@ -135,6 +150,24 @@ impl Mission {
             coverage_loop: Arc::new(coverage_loop),
             router: Arc::new(router),
         }))
+    }
+
+    fn the_loop(&self, problem: &AreaProblem) -> Result<CoverageLoop, LoopError> {
+        let Some(targets) = self.task.targets() else {
+            return CoverageLoop::build(problem);
+        };
+        let stations = StationsProblem {
+            stations: Vec::new(),
+            order: Vec::new(),
+            zones: Arc::clone(&problem.zones),
+            turn_radius_m: problem.turn_radius_m,
+            clearance_m: problem.clearance_m,
+            footprint_across_m: problem.footprint_across_m,
+            footprint_along_m: problem.footprint_along_m,
+            tracking_error_m: problem.tracking_error_m,
+            launch: problem.launch,
+        };
+        stations::build(&stations.with_targets(&targets, problem.lane_spacing_m))
     }
 }
 
@@ -265,6 +298,7 @@ mod tests {
             tracking_error_mm: 2_000,
             launch: (0, 0),
             base: (0, 0),
+            task: Task::Area,
         }
     }
 

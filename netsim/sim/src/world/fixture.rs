@@ -155,6 +155,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         tracking_error_mm: 2_000,
         launch: (mm(launch.x), mm(launch.y)),
         base: (96_000, 60_000),
+        task: skein_peer::Task::Area,
     }
 }
 

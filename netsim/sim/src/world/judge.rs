@@ -144,7 +144,13 @@ impl Judge {
     fn look(&mut self, uav: u16, airframe: &Airframe, piece: &Piece, facts: &mut Vec<Fact>) {
         let length_m = piece.length_m();
         let reach_m = self.reach_m(airframe) + length_m;
-        if !self.anything_new(piece.start, reach_m) {
+        let new = match self.survey.pieces() {
+            Some(pieces) => pieces
+                .near(piece.start.position(), reach_m)
+                .any(|i| self.seen[i].is_none()),
+            None => self.anything_new(piece.start, reach_m),
+        };
+        if !new {
             return;
         }
         #[allow(
@@ -158,12 +164,54 @@ impl Judge {
             #[allow(clippy::cast_precision_loss, reason = "milliseconds of one step")]
             let dt_s = span_ms as f64 / 1000.0 * f64::from(k) / f64::from(n);
             let at_ms = piece.from_ms + span_ms * u64::from(k) / u64::from(n);
-            self.snap(uav, airframe, piece.pose_after(dt_s), at_ms, facts);
+            let pose = piece.pose_after(dt_s);
+            if self.survey.pieces().is_some() {
+                self.snap_pieces(uav, airframe, pose, at_ms, facts);
+            } else {
+                self.snap(uav, airframe, pose, at_ms, facts);
+            }
         }
+    }
+
+    /// One picture of a mission for targets: marks the pieces that lie in it whole.
+    fn snap_pieces(
+        &mut self,
+        uav: u16,
+        airframe: &Airframe,
+        pose: Pose,
+        at_ms: u64,
+        facts: &mut Vec<Fact>,
+    ) {
+        let survey = Arc::clone(&self.survey);
+        let Some(pieces) = survey.pieces() else {
+            return;
+        };
+        let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
+        for i in pieces.near(pose.position(), self.reach_m(airframe)) {
+            if self.seen[i].is_none() && pieces.held(i, pose, across_m, along_m) {
+                self.see(i, Sighting { at_ms, uav }, facts);
+            }
+        }
+    }
+
+    fn see(&mut self, i: usize, sighting: Sighting, facts: &mut Vec<Fact>) {
+        self.seen[i] = Some(sighting);
+        let cell = self.survey.cells()[i];
+        self.n_covered += usize::from(cell.uncoverable.is_none());
+        facts.push(Fact::Seen {
+            at_ms: sighting.at_ms,
+            uav: sighting.uav,
+            cell: cell.id,
+        });
     }
 
     /// How far from the camera the centre of a cell in its picture can be.
     fn reach_m(&self, airframe: &Airframe) -> f64 {
+        if self.survey.pieces().is_some() {
+            // A corner of a piece may lie in a corner of the picture.
+            let (a, b) = (airframe.footprint_across_m, airframe.footprint_along_m);
+            return (a * a + b * b).sqrt();
+        }
         let half = self.survey.lane_m() / 2.0;
         let (a, b) = (
             airframe.footprint_across_m - half,
@@ -236,14 +284,7 @@ impl Judge {
                 let inside = (x * forward.x + y * forward.y).abs() <= along
                     && (y * forward.x - x * forward.y).abs() <= across;
                 if inside {
-                    self.seen[i] = Some(Sighting { at_ms, uav });
-                    let cell = self.survey.cells()[i];
-                    self.n_covered += usize::from(cell.uncoverable.is_none());
-                    facts.push(Fact::Seen {
-                        at_ms,
-                        uav,
-                        cell: cell.id,
-                    });
+                    self.see(i, Sighting { at_ms, uav }, facts);
                 }
             }
         }

@@ -10,6 +10,7 @@ pub mod flat;
 pub mod judge;
 pub mod motion;
 pub mod obstacles;
+pub mod pieces;
 pub mod survey;
 
 pub use fact::Fact;

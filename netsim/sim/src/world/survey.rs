@@ -15,6 +15,7 @@
 //! of "uncoverable". Only zones keep anybody out: passes may leave the area.
 
 use super::flat::{Bounds, area_m2, circle_ring_m, clip, point_ring_m, segment_ring_m};
+use super::pieces::Pieces;
 use crate::spec::Spec;
 use skein_peer::mission::{Mission, point_m};
 use skein_planning::coverage::area::CellId;
@@ -83,6 +84,8 @@ pub struct Survey {
     size: (i32, i32),
     zones: Vec<Zone>,
     area_m2: f64,
+    /// The pieces of a mission for targets, in the order of `cells`.
+    pieces: Option<Pieces>,
 }
 
 impl Survey {
@@ -108,13 +111,24 @@ impl Survey {
             size: (0, 0),
             zones,
             area_m2: area_m2(&area).abs(),
+            pieces: mission.pieces().map(Pieces::new),
         };
-        survey.lay_cells(&area);
+        if survey.pieces.is_some() {
+            survey.lay_pieces();
+        } else {
+            survey.lay_cells(&area);
+        }
         let free = FreePlane::flood(mission, &survey);
         for i in 0..survey.cells.len() {
-            survey.cells[i].uncoverable = survey.verdict(mission, &free, survey.cells[i].id);
+            survey.cells[i].uncoverable = survey.verdict(mission, &free, i);
         }
         survey
+    }
+
+    /// The pieces of a mission for targets; none where cells of the area are to be seen.
+    #[must_use]
+    pub fn pieces(&self) -> Option<&Pieces> {
+        self.pieces.as_ref()
     }
 
     /// The cells of the mission, row by row from the south-west.
@@ -163,6 +177,12 @@ impl Survey {
     /// Where in [`Survey::cells`] a cell is, if the mission has it.
     #[must_use]
     pub fn index_of(&self, id: CellId) -> Option<usize> {
+        if self.pieces.is_some() {
+            return id
+                .number()
+                .map(usize::from)
+                .filter(|&n| n < self.cells.len());
+        }
         self.at(i32::from(id.col), i32::from(id.row))
     }
 
@@ -223,18 +243,41 @@ impl Survey {
         }
     }
 
+    /// Every piece is a cell; their sum is what there is to see.
+    fn lay_pieces(&mut self) {
+        let Some(pieces) = &self.pieces else {
+            return;
+        };
+        let cell = |(n, ring): (u16, &[Point; 4])| Cell {
+            id: CellId::numbered(n),
+            // A point, or a line without width, counts by a square millimetre.
+            area_m2: area_m2(ring).abs().max(1e-6),
+            uncoverable: None,
+        };
+        self.cells = (0u16..).zip(pieces.rings()).map(cell).collect();
+        self.area_m2 = self.cells.iter().map(|c| c.area_m2).sum();
+    }
+
     /// Why a cell cannot be seen, or nothing.
-    fn verdict(&self, mission: &Mission, free: &FreePlane, id: CellId) -> Option<Uncoverable> {
-        let square = self.square(i32::from(id.col), i32::from(id.row));
-        let centre = square.min + (square.max - square.min) / 2.0;
+    fn verdict(&self, mission: &Mission, free: &FreePlane, index: usize) -> Option<Uncoverable> {
         let pass = Pass::of(mission, self.lane_m);
+        let id = self.cells[index].id;
+        let (bounds, poses): (Bounds, Box<dyn Iterator<Item = Pose> + '_>);
+        if let Some(pieces) = &self.pieces {
+            let ring = &pieces.rings()[index];
+            (bounds, poses) = (Bounds::around(ring), Box::new(pass.poses_of(ring)));
+        } else {
+            let square = self.square(i32::from(id.col), i32::from(id.row));
+            let centre = square.min + (square.max - square.min) / 2.0;
+            (bounds, poses) = (square, Box::new(pass.poses(centre)));
+        }
         let near: Vec<&Zone> = self
             .zones
             .iter()
-            .filter(|z| z.bounds.distance_m(&square) <= pass.reach_m())
+            .filter(|z| z.bounds.distance_m(&bounds) <= pass.reach_m())
             .collect();
         let mut why = Uncoverable::NoPass;
-        for pose in pass.poses(centre) {
+        for pose in poses {
             if !pass.clear(pose, &near) {
                 continue;
             }
@@ -293,6 +336,33 @@ impl Pass {
                 offsets(self.along_m - out_m),
             );
             let (forward, left) = (Vector::new(c, s), Vector::new(-s, c));
+            across.into_iter().flat_map(move |a| {
+                along
+                    .clone()
+                    .into_iter()
+                    .map(move |b| Pose::new(centre + left * a + forward * b, turned))
+            })
+        })
+    }
+
+    /// The poses whose footprint contains a whole piece.
+    fn poses_of<'a>(&'a self, ring: &'a [Point]) -> impl Iterator<Item = Pose> + 'a {
+        (0..HEADINGS).flat_map(move |h| {
+            let turned = f64::from(h) * PI / f64::from(HEADINGS);
+            let (s, c) = sin_cos(turned);
+            let (forward, left) = (Vector::new(c, s), Vector::new(-s, c));
+            let span = |axis: Vector| {
+                ring.iter()
+                    .map(|p| p.coords.dot(&axis))
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+                        (l.min(x), h.max(x))
+                    })
+            };
+            let ((back, front), (right, over)) = (span(forward), span(left));
+            let centre =
+                Point::from(forward * ((back + front) / 2.0) + left * ((right + over) / 2.0));
+            let across = offsets(self.across_m - (over - right) / 2.0);
+            let along = offsets(self.along_m - (front - back) / 2.0);
             across.into_iter().flat_map(move |a| {
                 along
                     .clone()

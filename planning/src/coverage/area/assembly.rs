@@ -227,14 +227,16 @@ fn millimetres(curve: &Curve) -> u32 {
 }
 
 /// FNV-1a over whole numbers: the same on every machine, and cheap.
-pub(super) fn hash_of(grid: Grid, cells: &[LoopCell]) -> u64 {
+///
+/// `patches` stands for what the cells look like.
+pub(in crate::coverage) fn hash_of(patches: u64, cells: &[LoopCell]) -> u64 {
     let mut h: u64 = 0xcbf2_9ce4_8422_2325;
     let mut eat = |value: u64| {
         for byte in value.to_le_bytes() {
             h = (h ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
         }
     };
-    eat(grid.lane_spacing_m.to_bits());
+    eat(patches);
     for c in cells {
         eat(u64::from(c.id.col.cast_unsigned()) << 16 | u64::from(c.id.row.cast_unsigned()));
         eat(u64::from(c.service_mm) << 32 | u64::from(c.travel_mm));
@@ -245,7 +247,8 @@ pub(super) fn hash_of(grid: Grid, cells: &[LoopCell]) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::stc::{CoverageLoop, footprint_contains};
+    use super::super::patch::footprint_contains;
+    use super::super::stc::CoverageLoop;
     use super::*;
     use crate::geometry::NoFlyZones;
     use crate::math::wrap_pi;
@@ -287,7 +290,8 @@ mod tests {
 
     /// Everything a loop owes, checked without the code that made it.
     fn judge(p: &AreaProblem, l: &CoverageLoop) {
-        let needed = cells_of(&p.area, l.grid()).unwrap();
+        let grid = l.grid().unwrap();
+        let needed = cells_of(&p.area, grid).unwrap();
         let (across, along) = (
             p.footprint_across_m - p.tracking_error_m,
             p.footprint_along_m - p.tracking_error_m,
@@ -310,7 +314,7 @@ mod tests {
             assert!(wrap_pi(end.heading_rad - next.heading_rad).abs() < 1e-3);
             let view = c.curve.pose_at(c.view_m).unwrap();
             assert!(
-                footprint_contains(&l.grid(), c.id, view, across + 1e-2, along + 1e-2),
+                footprint_contains(&grid, c.id, view, across + 1e-2, along + 1e-2),
                 "{:?}",
                 c.id
             );

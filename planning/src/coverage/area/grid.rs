@@ -15,6 +15,27 @@ pub struct CellId {
     pub row: i16,
 }
 
+/// Numbers in one row of names: a cell that no grid names is named by its number.
+const NUMBERS_A_ROW: u16 = 256;
+
+impl CellId {
+    /// The name of the cell with this number, where cells are pieces of targets.
+    #[must_use]
+    pub fn numbered(n: u16) -> Self {
+        Self {
+            col: (n % NUMBERS_A_ROW).cast_signed(),
+            row: (n / NUMBERS_A_ROW).cast_signed(),
+        }
+    }
+
+    /// The number of such a cell; `None` for a name that no number has.
+    #[must_use]
+    pub fn number(self) -> Option<u16> {
+        let (col, row) = (u16::try_from(self.col).ok()?, u16::try_from(self.row).ok()?);
+        (col < NUMBERS_A_ROW && row < NUMBERS_A_ROW).then(|| row * NUMBERS_A_ROW + col)
+    }
+}
+
 /// The grid of one lane spacing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {

@@ -8,8 +8,10 @@ pub mod backtracking;
 mod blocks;
 mod excursion;
 pub mod grid;
+pub mod patch;
 mod shares;
 pub mod stc;
 
+pub(super) use assembly::hash_of;
 pub use grid::{CellId, Grid};
 pub use stc::{AreaProblem, CoverageLoop, Direction, LoopCell, LoopError};

@@ -11,6 +11,7 @@
 use super::assembly::{Assembly, cells_of, check, hash_of};
 use super::blocks::closed_loop;
 use super::grid::{CellId, Grid};
+use super::patch::Patches;
 use crate::frame::{Point, Pose};
 use crate::geometry::{NoFlyZones, Polygon};
 use crate::trajectory::Curve;
@@ -85,7 +86,7 @@ pub struct LoopCell {
 /// boundary `i + 1`, cyclically.
 #[derive(Clone, Debug)]
 pub struct CoverageLoop {
-    grid: Grid,
+    patches: Patches,
     cells: Vec<LoopCell>,
     boundaries: Vec<Pose>,
     index: BTreeMap<CellId, u16>,
@@ -164,17 +165,30 @@ impl CoverageLoop {
             return Err(LoopError::Nothing);
         }
         let Assembly { cells, uncoverable } = Assembly::new(problem, grid, &needed, ring)?;
-        let boundaries = cells.iter().filter_map(|c| c.curve.start()).collect();
-        let index = (0u16..).zip(&cells).map(|(i, c)| (c.id, i)).collect();
-        let hash = hash_of(grid, &cells);
-        Ok(Self {
-            grid,
+        let hash = hash_of(grid.lane_spacing_m.to_bits(), &cells);
+        Ok(Self::assembled(
+            Patches::Grid(grid),
             cells,
-            boundaries,
-            index,
             uncoverable,
             hash,
-        })
+        ))
+    }
+
+    /// A loop of cells whose curves already join.
+    pub(in crate::coverage) fn assembled(
+        patches: Patches,
+        cells: Vec<LoopCell>,
+        uncoverable: Vec<(CellId, String)>,
+        hash: u64,
+    ) -> Self {
+        Self {
+            patches,
+            boundaries: cells.iter().filter_map(|c| c.curve.start()).collect(),
+            index: (0u16..).zip(&cells).map(|(i, c)| (c.id, i)).collect(),
+            cells,
+            uncoverable,
+            hash,
+        }
     }
 
     /// Number of cells.
@@ -189,10 +203,37 @@ impl CoverageLoop {
         self.cells.is_empty()
     }
 
-    /// The grid that names the cells.
+    /// What the cells look like, and which lie where.
     #[must_use]
-    pub fn grid(&self) -> Grid {
-        self.grid
+    pub fn patches(&self) -> &Patches {
+        &self.patches
+    }
+
+    /// The grid that names the cells; none where the cells are pieces of targets.
+    #[must_use]
+    pub fn grid(&self) -> Option<Grid> {
+        match self.patches {
+            Patches::Grid(grid) => Some(grid),
+            Patches::Listed(_) => None,
+        }
+    }
+
+    /// Calls `visit` with every cell of the loop, by index and corners, that a frame
+    /// at `at` reaching `across_m` and `along_m` to its sides may hold whole, whatever
+    /// its heading; and perhaps with others.
+    pub fn cells_near(
+        &self,
+        at: Point,
+        across_m: f64,
+        along_m: f64,
+        visit: &mut impl FnMut(u16, &[Point; 4]),
+    ) {
+        self.patches
+            .near(at, across_m, along_m, &mut |id, corners| {
+                if let Some(cell) = self.index_of(id) {
+                    visit(cell, corners);
+                }
+            });
     }
 
     /// The cells in forward order.
@@ -242,25 +283,4 @@ impl CoverageLoop {
     pub fn hash(&self) -> u64 {
         self.hash
     }
-}
-
-/// Whether the footprint of a camera at `pose` contains the whole cell.
-///
-/// The footprint is a rectangle aligned with the heading, of half sizes
-/// `across_m` and `along_m`.
-#[must_use]
-pub fn footprint_contains(
-    grid: &Grid,
-    cell: CellId,
-    pose: Pose,
-    across_m: f64,
-    along_m: f64,
-) -> bool {
-    let d = pose.direction();
-    grid.corners(cell).iter().all(|c| {
-        let v = c - pose.position();
-        let along = v.x * d.x + v.y * d.y;
-        let across = v.y * d.x - v.x * d.y;
-        along.abs() <= along_m && across.abs() <= across_m
-    })
 }

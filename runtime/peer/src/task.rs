@@ -1,0 +1,101 @@
+//! What a mission asks for within its area (D2.7 §3.2): all of it in lanes or in exact
+//! passes, points, or lines; and how often.
+
+use crate::mission::{PointMm, point_m};
+use crate::wire::Fnv;
+use serde::{Deserialize, Serialize};
+use skein_planning::coverage::stations::targets::{LineTarget, PointTarget, Targets};
+
+/// What is to be seen.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Task {
+    /// The whole area, in cells of the lane grid on a spanning-tree loop (§3.6.2).
+    #[default]
+    Area,
+    /// Points with what lies around them (§3.4).
+    Points(Vec<PointTask>),
+    /// Lines and corridors along their whole length (§3.5).
+    Lines(Vec<LineTask>),
+}
+
+/// A point and what lies around it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PointTask {
+    /// Where.
+    pub at: PointMm,
+    /// Radius of what is to be seen, mm.
+    pub radius_mm: u32,
+}
+
+/// A line and what lies along it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LineTask {
+    /// Its vertices in order.
+    pub way: Vec<PointMm>,
+    /// Width of what is to be seen along it, mm.
+    pub width_mm: u32,
+}
+
+fn metres(mm: u32) -> f64 {
+    f64::from(mm) / 1000.0
+}
+
+impl Task {
+    /// Whether it is the whole area in lanes.
+    #[must_use]
+    pub fn is_area(&self) -> bool {
+        *self == Self::Area
+    }
+
+    /// The targets, in metres; none for areas.
+    #[must_use]
+    pub fn targets(&self) -> Option<Targets> {
+        match self {
+            Self::Area => None,
+            Self::Points(points) => {
+                let target = |p: &PointTask| PointTarget {
+                    at: point_m(p.at),
+                    radius_m: metres(p.radius_mm),
+                };
+                Some(Targets::Points(points.iter().map(target).collect()))
+            }
+            Self::Lines(lines) => {
+                let target = |l: &LineTask| LineTarget {
+                    way: l.way.iter().copied().map(point_m).collect(),
+                    width_m: metres(l.width_mm),
+                };
+                Some(Targets::Lines(lines.iter().map(target).collect()))
+            }
+        }
+    }
+
+    /// Adds the content to a hash; nothing for an area, which is what missions ask for
+    /// unless they say otherwise.
+    pub(crate) fn hash(&self, h: &mut Fnv) {
+        let point = |h: &mut Fnv, p: PointMm| {
+            h.write_i64(i64::from(p.0));
+            h.write_i64(i64::from(p.1));
+        };
+        let count = |h: &mut Fnv, n: usize| h.write_i64(i64::try_from(n).unwrap_or(i64::MAX));
+        match self {
+            Self::Area => {}
+            Self::Points(points) => {
+                h.write_i64(1);
+                count(h, points.len());
+                for p in points {
+                    point(h, p.at);
+                    h.write_i64(i64::from(p.radius_mm));
+                }
+            }
+            Self::Lines(lines) => {
+                h.write_i64(2);
+                count(h, lines.len());
+                for l in lines {
+                    count(h, l.way.len());
+                    l.way.iter().for_each(|&p| point(h, p));
+                    h.write_i64(i64::from(l.width_mm));
+                }
+            }
+        }
+    }
+}
