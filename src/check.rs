@@ -4,6 +4,7 @@ use crate::exit;
 use clap::{Args, ValueEnum};
 use skein_netsim::spec::Spec;
 use skein_netsim::world::Survey;
+use skein_peer::Task;
 use skein_planning::coverage::area::CellId;
 use skein_scenario::{Overrides, Scenario, Summary, extent_m, summary};
 use std::fmt::Write as _;
@@ -87,9 +88,12 @@ impl Judged {
             cells: survey.cells().len(),
             coverable: survey.n_coverable(),
             share: survey.coverable_share(),
+            // Squares of the judge's own have no names on the loop.
             missed: open
                 .map(|c| c.id)
-                .filter(|id| the_loop.index_of(*id).is_none())
+                .filter(|id| {
+                    scenario.spec.mission.task != Task::Exact && the_loop.index_of(*id).is_none()
+                })
                 .collect(),
         }
     }

@@ -25,6 +25,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/geofence.json5"),
     ),
     (
+        "field",
+        "field.json5",
+        include_str!("../../../configs/trials/field.json5"),
+    ),
+    (
         "points",
         "points.json5",
         include_str!("../../../configs/trials/points.json5"),

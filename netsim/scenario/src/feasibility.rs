@@ -282,6 +282,7 @@ impl Summary {
 pub fn summary(spec: &Spec, ground: &Ground) -> Summary {
     let the_loop = &ground.coverage_loop;
     let area: Vec<Point> = spec.mission.area.iter().copied().map(point_m).collect();
+    // A mission for targets asks for their pieces.
     let area_m2 = match spec.mission.pieces() {
         Some(pieces) => pieces
             .iter()

@@ -30,6 +30,7 @@ const FIELDS: &[&str] = &[
     "area",
     "points",
     "lines",
+    "planner",
     "level_m",
     "vertical_margin_m",
     "no_fly",

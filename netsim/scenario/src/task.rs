@@ -33,8 +33,13 @@ pub(crate) fn read(
     notices: &mut Notices,
 ) -> Result<Task, ScenarioError> {
     let reader = Reader { origin, files };
+    if let (Some(node), Some(_)) = (f.get("planner"), f.get("points").or(f.get("lines"))) {
+        return Err(
+            node.wrong("points and lines have one planner each; leave this out, or cover an area")
+        );
+    }
     match (f.get("points"), f.get("lines")) {
-        (None, None) => Ok(Task::Area),
+        (None, None) => Ok(area_task(f)?),
         (Some(_), Some(lines)) => Err(lines.wrong(
             "a mission has points or lines, not both; plan two missions, or give a point as a short line",
         )),
@@ -43,11 +48,25 @@ pub(crate) fn read(
     }
 }
 
+/// How an area is covered, as its planner is named.
+fn area_task(f: &Fields<'_>) -> Result<Task, ScenarioError> {
+    let Some(node) = f.get("planner") else {
+        return Ok(Task::Area);
+    };
+    match node.text()? {
+        "lanes" => Ok(Task::Area),
+        "exact" => Ok(Task::Exact),
+        other => Err(node.wrong(format!(
+            "{other} is no planner of the swarm; expected \"lanes\" (spanning-tree loop over a lane grid) or \"exact\" (straight passes over the cells of a boustrophedon decomposition)"
+        ))),
+    }
+}
+
 /// The rectangle around all that the task asks for.
 pub(crate) fn extent(task: &Task, node: &Node<'_>) -> Result<Polygon, ScenarioError> {
     let of = |p: skein_peer::mission::PointMm| skein_peer::mission::point_m(p);
     let all: Vec<Point> = match task {
-        Task::Area => Vec::new(),
+        Task::Area | Task::Exact => Vec::new(),
         Task::Points(points) => points.iter().map(|p| of(p.at)).collect(),
         Task::Lines(lines) => lines
             .iter()

@@ -6,6 +6,7 @@ use crate::wire::message::MissionChunk;
 use serde::{Deserialize, Serialize};
 use skein_planning::coverage::area::patch::Corners;
 use skein_planning::coverage::area::{AreaProblem, CoverageLoop, LoopError};
+use skein_planning::coverage::exact::{self, ExactProblem};
 use skein_planning::coverage::stations::{self, StationsProblem};
 use skein_planning::frame::Point;
 use skein_planning::geometry::{NoFlyZones, Polygon};
@@ -153,9 +154,9 @@ impl Mission {
     }
 
     fn the_loop(&self, problem: &AreaProblem) -> Result<CoverageLoop, LoopError> {
-        let Some(targets) = self.task.targets() else {
+        if self.task.is_area() {
             return CoverageLoop::build(problem);
-        };
+        }
         let stations = StationsProblem {
             stations: Vec::new(),
             order: Vec::new(),
@@ -167,7 +168,26 @@ impl Mission {
             tracking_error_m: problem.tracking_error_m,
             launch: problem.launch,
         };
-        stations::build(&stations.with_targets(&targets, problem.lane_spacing_m))
+        let lane_m = problem.lane_spacing_m;
+        let stations = if let Some(targets) = self.task.targets() {
+            stations.with_targets(&targets, lane_m)
+        } else {
+            let passes = exact::plan(&ExactProblem {
+                zones: Arc::clone(&problem.zones),
+                clearance_m: problem.clearance_m,
+                // What the camera sees beyond the ends of a pass is left for the turns.
+                look_ahead_m: 0.0,
+                ..ExactProblem::new(
+                    problem.area.clone(),
+                    lane_m,
+                    problem.turn_radius_m,
+                    problem.launch,
+                )
+            })?
+            .passes;
+            stations.with_passes(&passes, lane_m)
+        };
+        stations::build(&stations)
     }
 }
 

@@ -12,6 +12,9 @@ pub enum Task {
     /// The whole area, in cells of the lane grid on a spanning-tree loop (§3.6.2).
     #[default]
     Area,
+    /// The whole area but what is nearer to a zone than the clearance, in straight
+    /// passes over the cells of an exact decomposition (§3.6.1).
+    Exact,
     /// Points with what lies around them (§3.4).
     Points(Vec<PointTask>),
     /// Lines and corridors along their whole length (§3.5).
@@ -51,7 +54,7 @@ impl Task {
     #[must_use]
     pub fn targets(&self) -> Option<Targets> {
         match self {
-            Self::Area => None,
+            Self::Area | Self::Exact => None,
             Self::Points(points) => {
                 let target = |p: &PointTask| PointTarget {
                     at: point_m(p.at),
@@ -79,6 +82,7 @@ impl Task {
         let count = |h: &mut Fnv, n: usize| h.write_i64(i64::try_from(n).unwrap_or(i64::MAX));
         match self {
             Self::Area => {}
+            Self::Exact => h.write_i64(3),
             Self::Points(points) => {
                 h.write_i64(1);
                 count(h, points.len());

@@ -130,7 +130,7 @@ impl Air {
     /// Whether the judge saw a camera cover this cell.
     #[must_use]
     pub fn is_covered(&self, cell: CellId) -> bool {
-        self.world.judge().sighting(cell).is_some()
+        self.world.judge().saw(cell)
     }
 
     /// Whether every coverable cell is covered.

@@ -7,6 +7,7 @@ use super::fact::Fact;
 use super::flat::{Bounds, point_ring_m, segment_ring_m};
 use super::motion::Piece;
 use super::obstacles::Place;
+use super::pieces::Pieces;
 use super::survey::Survey;
 use skein_planning::airframe::Airframe;
 use skein_planning::coverage::area::CellId;
@@ -54,6 +55,8 @@ pub struct Judge {
     inside: BTreeMap<u16, Vec<bool>>,
     /// By UAV: the least distance to any zone so far.
     near_m: BTreeMap<u16, f64>,
+    /// What peers name cells, where the survey knows other ones; and which were seen.
+    claims: Option<(Arc<Pieces>, Vec<bool>)>,
     closest: Option<Approach>,
     too_close: BTreeMap<(u16, u16), bool>,
 }
@@ -71,7 +74,31 @@ impl Judge {
             near_m: BTreeMap::new(),
             closest: None,
             too_close: BTreeMap::new(),
+            claims: None,
             survey,
+        }
+    }
+
+    /// Watches these pieces besides, so that what peers claim to have seen can be
+    /// checked where the survey knows other cells than they do.
+    #[must_use]
+    pub fn with_claims(mut self, pieces: Option<Arc<Pieces>>) -> Self {
+        self.claims = pieces.map(|p| {
+            let seen = vec![false; p.rings().len()];
+            (p, seen)
+        });
+        self
+    }
+
+    /// Whether a camera saw what peers call this cell.
+    #[must_use]
+    pub fn saw(&self, cell: CellId) -> bool {
+        match &self.claims {
+            Some((_, seen)) => cell
+                .number()
+                .and_then(|n| seen.get(usize::from(n)))
+                .is_some_and(|s| *s),
+            None => self.sighting(cell).is_some(),
         }
     }
 
@@ -150,7 +177,7 @@ impl Judge {
                 .any(|i| self.seen[i].is_none()),
             None => self.anything_new(piece.start, reach_m),
         };
-        if !new {
+        if !new && self.claims.is_none() {
             return;
         }
         #[allow(
@@ -170,6 +197,18 @@ impl Judge {
             } else {
                 self.snap(uav, airframe, pose, at_ms, facts);
             }
+            self.snap_claims(airframe, pose);
+        }
+    }
+
+    fn snap_claims(&mut self, airframe: &Airframe, pose: Pose) {
+        let Some((pieces, seen)) = &mut self.claims else {
+            return;
+        };
+        let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
+        let reach_m = (across_m * across_m + along_m * along_m).sqrt();
+        for i in pieces.near(pose.position(), reach_m) {
+            seen[i] = seen[i] || pieces.held(i, pose, across_m, along_m);
         }
     }
 
@@ -212,7 +251,7 @@ impl Judge {
             let (a, b) = (airframe.footprint_across_m, airframe.footprint_along_m);
             return (a * a + b * b).sqrt();
         }
-        let half = self.survey.lane_m() / 2.0;
+        let half = self.survey.extent_m() / 2.0;
         let (a, b) = (
             airframe.footprint_across_m - half,
             airframe.footprint_along_m - half,
@@ -264,7 +303,7 @@ impl Judge {
         let (c0, c1, r0, r1) = self.near(pose, self.reach_m(airframe));
         let d = self.survey.lane_m();
         let forward = pose.direction();
-        let out_m = d / 2.0 * (forward.x.abs() + forward.y.abs());
+        let out_m = self.survey.extent_m() / 2.0 * (forward.x.abs() + forward.y.abs());
         let (across, along) = (
             airframe.footprint_across_m - out_m,
             airframe.footprint_along_m - out_m,

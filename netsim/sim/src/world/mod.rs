@@ -22,6 +22,7 @@ pub use survey::{Cell, Survey, Uncoverable};
 use crate::spec::Spec;
 use motion::{Kinematic, Piece};
 use skein_behaviors::{Percept, Setpoint};
+use skein_planning::coverage::area::patch::Patches;
 use std::sync::Arc;
 
 /// The world moves in steps of at most this long, aligned to its multiples, so that
@@ -36,6 +37,8 @@ pub struct Site {
     pub obstacles: Obstacles,
     /// The cells.
     pub survey: Arc<Survey>,
+    /// What peers name cells, where the survey knows other ones.
+    pub claims: Option<Arc<pieces::Pieces>>,
 }
 
 impl Site {
@@ -45,6 +48,7 @@ impl Site {
         Self {
             obstacles: Obstacles::new(&spec.buildings),
             survey: Arc::new(Survey::new(spec)),
+            claims: claims(spec),
         }
     }
 }
@@ -57,6 +61,20 @@ struct Uav {
     /// Whether its computer, and with it its radio, works.
     computer: bool,
     failsafe: bool,
+}
+
+/// The pieces in which peers see an area that they cover by exact passes: they come
+/// from the planner, and serve to check what peers say, not whether all was seen.
+fn claims(spec: &Spec) -> Option<Arc<pieces::Pieces>> {
+    if spec.mission.task != skein_peer::Task::Exact {
+        return None;
+    }
+    let ground = spec.mission.ground().ok()?;
+    let corners = match ground.coverage_loop.patches() {
+        Patches::Listed(list) => list.corners().to_vec(),
+        Patches::Grid(_) => return None,
+    };
+    Some(Arc::new(pieces::Pieces::new(corners)))
 }
 
 /// The state of everything that is not a peer's mind.
@@ -112,7 +130,7 @@ impl World {
             .collect();
         nodes.sort_unstable();
         nodes.dedup();
-        let judge = Judge::new(Arc::clone(&site.survey));
+        let judge = Judge::new(Arc::clone(&site.survey)).with_claims(site.claims.clone());
         Self {
             site,
             seed,

@@ -17,6 +17,7 @@
 use super::flat::{Bounds, area_m2, circle_ring_m, clip, point_ring_m, segment_ring_m};
 use super::pieces::Pieces;
 use crate::spec::Spec;
+use skein_peer::Task;
 use skein_peer::mission::{Mission, point_m};
 use skein_planning::coverage::area::CellId;
 use skein_planning::frame::{Point, Pose, Vector};
@@ -35,6 +36,9 @@ const SLIVER_M2: f64 = 1e-3;
 /// refused by the scenario's own check and has no cells here.
 const MAX_SQUARES: f64 = 16e6;
 
+/// Squares of the judge along one lane where the mission knows no cells.
+const PARTS_OF_A_LANE: f64 = 6.0;
+
 /// Why a cell cannot be seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Uncoverable {
@@ -42,6 +46,8 @@ pub enum Uncoverable {
     NoPass,
     /// Passes exist, but zones part them from the launch point.
     CutOff,
+    /// The mission asks only for what is farther from all zones than the clearance.
+    NotAsked,
 }
 
 impl core::fmt::Display for Uncoverable {
@@ -49,6 +55,7 @@ impl core::fmt::Display for Uncoverable {
         f.write_str(match self {
             Self::NoPass => "no straight pass with room to turn sees it clear of the no-fly zones",
             Self::CutOff => "no-fly zones part it from the launch point",
+            Self::NotAsked => "nearer to a no-fly zone than the clearance",
         })
     }
 }
@@ -76,7 +83,9 @@ pub struct Zone {
 /// All that the judge knows before anybody flies.
 #[derive(Clone, Debug)]
 pub struct Survey {
+    /// Side of a square.
     lane_m: f64,
+    extent_m: f64,
     cells: Vec<Cell>,
     /// Row by row over the bounding box of the cells: index into `cells` plus one.
     dense: Vec<u32>,
@@ -103,8 +112,14 @@ impl Survey {
             .collect();
         let area: Vec<Point> = mission.area.iter().copied().map(point_m).collect();
         let lane_m = f64::from(mission.lane_spacing_mm) / 1000.0;
+        let (lane_m, extent_m) = if mission.task == Task::Exact {
+            (lane_m / PARTS_OF_A_LANE, 0.0)
+        } else {
+            (lane_m, lane_m)
+        };
         let mut survey = Self {
             lane_m,
+            extent_m,
             cells: Vec::new(),
             dense: Vec::new(),
             min: (0, 0),
@@ -147,6 +162,13 @@ impl Survey {
     #[must_use]
     pub fn lane_m(&self) -> f64 {
         self.lane_m
+    }
+
+    /// How much of the side of a square has to lie in one picture, metres: all of it, or
+    /// its middle alone.
+    #[must_use]
+    pub fn extent_m(&self) -> f64 {
+        self.extent_m
     }
 
     /// Number of cells that can be seen.
@@ -260,7 +282,7 @@ impl Survey {
 
     /// Why a cell cannot be seen, or nothing.
     fn verdict(&self, mission: &Mission, free: &FreePlane, index: usize) -> Option<Uncoverable> {
-        let pass = Pass::of(mission, self.lane_m);
+        let pass = Pass::of(mission, f64::from(mission.lane_spacing_mm) / 1000.0);
         let id = self.cells[index].id;
         let (bounds, poses): (Bounds, Box<dyn Iterator<Item = Pose> + '_>);
         if let Some(pieces) = &self.pieces {
@@ -269,13 +291,28 @@ impl Survey {
         } else {
             let square = self.square(i32::from(id.col), i32::from(id.row));
             let centre = square.min + (square.max - square.min) / 2.0;
-            (bounds, poses) = (square, Box::new(pass.poses(centre)));
+            (bounds, poses) = (square, Box::new(pass.poses(centre, self.extent_m)));
         }
         let near: Vec<&Zone> = self
             .zones
             .iter()
             .filter(|z| z.bounds.distance_m(&bounds) <= pass.reach_m())
             .collect();
+        let b = bounds;
+        let corners = [
+            b.min,
+            Point::new(b.max.x, b.min.y),
+            b.max,
+            Point::new(b.min.x, b.max.y),
+        ];
+        let asked = |z: &&Zone| {
+            (0..4).all(|i| {
+                segment_ring_m(corners[i], corners[(i + 1) % 4], &z.ring) >= pass.clearance_m
+            })
+        };
+        if mission.task == Task::Exact && !near.iter().all(asked) {
+            return Some(Uncoverable::NotAsked);
+        }
         let mut why = Uncoverable::NoPass;
         for pose in poses {
             if !pass.clear(pose, &near) {
@@ -325,12 +362,12 @@ impl Pass {
     ///
     /// A square turned by the heading sticks out from its centre by half a side times
     /// |cos| + |sin| both across and along, so containing it is a test of the centre.
-    fn poses(&self, centre: Point) -> impl Iterator<Item = Pose> + '_ {
+    fn poses(&self, centre: Point, side_m: f64) -> impl Iterator<Item = Pose> + '_ {
         (0..HEADINGS).flat_map(move |h| {
             // Along the lanes first: 0°, 90°, then all others.
             let turned = f64::from((h % 2) * (HEADINGS / 2) + h / 2) * PI / f64::from(HEADINGS);
             let (s, c) = sin_cos(turned);
-            let out_m = self.lane_m / 2.0 * (s.abs() + c.abs());
+            let out_m = side_m / 2.0 * (s.abs() + c.abs());
             let (across, along) = (
                 offsets(self.across_m - out_m),
                 offsets(self.along_m - out_m),

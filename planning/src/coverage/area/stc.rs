@@ -12,6 +12,7 @@ use super::assembly::{Assembly, cells_of, check, hash_of};
 use super::blocks::closed_loop;
 use super::grid::{CellId, Grid};
 use super::patch::Patches;
+use crate::coverage::exact::ExactError;
 use crate::frame::{Point, Pose};
 use crate::geometry::{NoFlyZones, Polygon};
 use crate::trajectory::Curve;
@@ -137,6 +138,9 @@ pub enum LoopError {
     /// No route leads from the launch point to the loop.
     #[error("no flyable route leads from the launch point to the area: no-fly zones part them")]
     CutOff,
+    /// No exact passes over the area.
+    #[error(transparent)]
+    Exact(#[from] ExactError),
     /// The launch point cannot reach the loop.
     #[error("the launch point lies inside a no-fly zone or its clearance")]
     Launch,

@@ -6,6 +6,7 @@
 
 use super::{Station, StationsProblem, order};
 use crate::coverage::area::patch::Corners;
+use crate::coverage::exact::Pass;
 use crate::coverage::line::strip;
 use crate::frame::{Point, Vector};
 use crate::math::atan2;
@@ -35,6 +36,42 @@ pub enum Targets {
     Points(Vec<PointTarget>),
     /// Lines, seen along their whole length. Lines that share a vertex hang together.
     Lines(Vec<LineTarget>),
+}
+
+/// What the ends of passes may leave out, in lane widths; their pieces reach over it.
+const END_LANES: f64 = 0.02;
+
+/// Passes over an area as stations, in the order of flight: each cut to at most
+/// `longest_m`, as wide as a lane, seen at its own heading.
+#[must_use]
+pub fn of_passes(passes: &[Pass], lane_m: f64, longest_m: f64) -> Vec<Station> {
+    let mut stations = Vec::new();
+    for pass in passes {
+        let over = (pass.to - pass.from) / pass.length_m().max(1e-3) * (END_LANES * lane_m);
+        let (from, to) = (pass.from - over, pass.to + over);
+        let stretch = Stretch {
+            way: vec![from, to],
+            width_m: lane_m,
+            first: 0,
+            pieces: count((to - from).norm(), longest_m),
+        };
+        stations.extend(cut(&stretch).into_iter().map(|patch| Station {
+            patch,
+            heading_rad: Some(pass.heading_rad()),
+        }));
+    }
+    stations
+}
+
+/// How many pieces a length is cut into.
+fn count(length_m: f64, longest_m: f64) -> usize {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a cast of a float saturates"
+    )]
+    let pieces = (length_m / longest_m).ceil().max(1.0) as usize;
+    pieces
 }
 
 /// One stretch of a line between places where lines meet, as a lane is flown.
@@ -82,6 +119,14 @@ impl StationsProblem {
         (self.stations, self.order) = targets.stations(longest_m, self.launch);
         self
     }
+
+    /// Takes stations from passes in their order, in pieces as long as a lane is wide.
+    #[must_use]
+    pub fn with_passes(mut self, passes: &[Pass], lane_m: f64) -> Self {
+        self.stations = of_passes(passes, lane_m, lane_m);
+        self.order = (0..self.stations.len()).collect();
+        self
+    }
 }
 
 fn square(p: &PointTarget) -> Corners {
@@ -111,12 +156,7 @@ pub(super) fn stretches(lines: &[LineTarget], longest_m: f64) -> Vec<Stretch> {
         if length_m <= 0.0 {
             continue;
         }
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a cast of a float saturates"
-        )]
-        let pieces = (length_m / longest_m).ceil().max(1.0) as usize;
+        let pieces = count(length_m, longest_m);
         stretches.push(Stretch {
             way,
             width_m,
