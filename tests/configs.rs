@@ -135,15 +135,15 @@ fn the_planner_misses_no_cell_that_the_world_calls_coverable() {
         );
         let open = survey.cells().iter().filter(|c| c.uncoverable.is_none());
         let the_loop = &scenario.ground.coverage_loop;
-        // Squares of the judge's own lie in the pieces of the passes.
+        // The middles of the judge's own squares lie in the pieces of the passes.
         let planned = |c: &&skein_netsim::world::Cell| match the_loop.patches() {
             Patches::Listed(list) if scenario.spec.mission.task == Task::Exact => {
-                let quarter_m = survey.lane_m();
+                let side_m = survey.lane_m();
                 let at = Point::new(
-                    (f64::from(c.id.col) + 0.5) * quarter_m,
-                    (f64::from(c.id.row) + 0.5) * quarter_m,
+                    (f64::from(c.id.col) + 0.5) * side_m,
+                    (f64::from(c.id.row) + 0.5) * side_m,
                 );
-                list.corners().iter().any(|p| within(p, at, quarter_m))
+                list.corners().iter().any(|p| within(p, at, 0.01))
             }
             _ => the_loop.index_of(c.id).is_some(),
         };
@@ -152,8 +152,7 @@ fn the_planner_misses_no_cell_that_the_world_calls_coverable() {
     }
 }
 
-/// Whether a point lies in a rectangle, or no farther than `slack_m` from its sides: a
-/// camera sees more than the lane it flies in.
+/// Whether a point lies in a rectangle, or no farther than `slack_m` from its sides.
 fn within(p: &[Point; 4], at: Point, slack_m: f64) -> bool {
     let (u, v) = (p[1] - p[0], p[3] - p[0]);
     let w = at - p[0];
