@@ -14,7 +14,7 @@
 //! the samples sees is missed, so the verdict errs by at most one sample, on the side
 //! of "uncoverable". Only zones keep anybody out: passes may leave the area.
 
-use super::flat::{Bounds, area_m2, circle_ring_m, clip, point_ring_m, segment_ring_m};
+use super::flat::{Bounds, area_m2, circle_ring_m, clip, in_ring, point_ring_m, segment_ring_m};
 use super::pieces::Pieces;
 use crate::spec::Spec;
 use skein_peer::Task;
@@ -132,6 +132,9 @@ impl Survey {
             survey.lay_pieces();
         } else {
             survey.lay_cells(&area);
+            if extent_m <= 0.0 {
+                survey.area_m2 = survey.cells.iter().map(|c| c.area_m2).sum();
+            }
         }
         let free = FreePlane::flood(mission, &survey);
         for i in 0..survey.cells.len() {
@@ -247,9 +250,12 @@ impl Survey {
         self.size = (max.0 - self.min.0 + 1, max.1 - self.min.1 + 1);
         for row in self.min.1..=max.1 {
             for col in self.min.0..=max.0 {
-                let part_m2 = area_m2(&clip(area, &self.square(col, row))).abs();
+                let square = self.square(col, row);
+                let part_m2 = area_m2(&clip(area, &square)).abs();
                 let mut slot = 0;
-                if part_m2 > SLIVER_M2 {
+                // Where the middle stands for the square, it has to be in the area itself.
+                let middle = square.min + (square.max - square.min) / 2.0;
+                if part_m2 > SLIVER_M2 && (self.extent_m > 0.0 || in_ring(middle, area)) {
                     let (Ok(c), Ok(r)) = (i16::try_from(col), i16::try_from(row)) else {
                         continue;
                     };
