@@ -573,7 +573,8 @@ impl Swarm {
     fn refresh_covered(&mut self) {
         if let Ok(ground) = self.grounds.of(&self.spec.mission) {
             for (flag, cell) in self.covered.iter_mut().zip(ground.coverage_loop.cells()) {
-                *flag = *flag || self.air.is_covered(cell.id);
+                // A cell that nobody needs counts as covered from the start.
+                *flag = *flag || !cell.needed || self.air.is_covered(cell.id);
             }
         }
     }

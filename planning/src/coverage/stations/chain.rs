@@ -11,7 +11,7 @@ use crate::frame::Pose;
 use crate::math::TAU;
 use crate::path::Router;
 use crate::trajectory::{Curve, dubins};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Routes that are searched for one leg; the pairs of poses left over count as
 /// blocked. Each takes up to milliseconds.
@@ -50,6 +50,22 @@ pub(super) struct Chain<'a> {
     /// By station of departure: poses of departure times poses of arrival.
     legs: Vec<Vec<Leg>>,
     routed: Vec<u8>,
+    /// By station: how often a leg from or to it was blocked.
+    blame: BTreeMap<usize, u32>,
+    /// What was left out, with one more chance when the other end of the leg that was
+    /// blocked is left out, too.
+    left: Vec<Left>,
+    /// What came back: the second time it is left out for good.
+    returned: BTreeSet<usize>,
+    /// Where each station stands in the order.
+    rank: BTreeMap<usize, usize>,
+}
+
+/// A station that was left out.
+struct Left {
+    station: usize,
+    stands: Vec<Pose>,
+    other: usize,
 }
 
 impl<'a> Chain<'a> {
@@ -63,6 +79,10 @@ impl<'a> Chain<'a> {
             router,
             legs: Vec::new(),
             routed: vec![0; stands.len()],
+            blame: BTreeMap::new(),
+            left: Vec::new(),
+            returned: BTreeSet::new(),
+            rank: stands.iter().map(|s| s.0).zip(0..).collect(),
             stands,
         };
         chain.legs = (0..chain.stands.len()).map(|i| chain.guesses(i)).collect();
@@ -71,25 +91,17 @@ impl<'a> Chain<'a> {
 
     /// The stations as they are flown, and the numbers of those that nothing reaches.
     pub(super) fn solve(mut self) -> (Vec<Visit>, Vec<usize>) {
-        let mut cut_off = Vec::new();
-        loop {
-            if self.stands.is_empty() {
-                return (Vec::new(), cut_off);
-            }
-            let choice = self.choose();
-            match choice {
+        while !self.stands.is_empty() {
+            match self.choose() {
                 Some(poses) => {
                     if let Some(visits) = self.realise(&poses) {
-                        return (visits, cut_off);
+                        return (visits, self.left.iter().map(|l| l.station).collect());
                     }
                 }
-                None => {
-                    let i = self.blocked();
-                    cut_off.push(self.stands[i].0);
-                    self.leave_out(i);
-                }
+                None => self.give_up(),
             }
         }
+        (Vec::new(), self.left.iter().map(|l| l.station).collect())
     }
 
     fn next(&self, i: usize) -> usize {
@@ -232,32 +244,67 @@ impl<'a> Chain<'a> {
             .map_or(Leg::Blocked, Leg::Clear)
     }
 
-    /// The station to give up: one at an end of the leg that has the fewest ways left,
-    /// and of the two the one whose other leg has fewer.
-    fn blocked(&self) -> usize {
+    /// Leaves out one end of the leg that has the fewest ways left: the one that was in
+    /// the way more often. What was left out because of it comes back, once.
+    fn give_up(&mut self) {
         let n = self.stands.len();
-        let open = |i: usize| {
-            self.legs[i]
-                .iter()
-                .filter(|l| l.cost_m().is_finite())
-                .count()
+        let open = |i: &usize| {
+            let ways = self.legs[*i].iter();
+            ways.filter(|l| l.cost_m().is_finite()).count()
         };
-        let ways: BTreeMap<usize, usize> = (0..n).map(|i| (i, open(i))).collect();
-        let i = (0..n).min_by_key(|i| ways[i]).unwrap_or(0);
-        let (before, after) = (ways[&((i + n - 1) % n)], ways[&self.next(i)]);
-        if before < after { i } else { self.next(i) }
+        let i = (0..n).min_by_key(open).unwrap_or(0);
+        let (a, b) = (self.stands[i].0, self.stands[self.next(i)].0);
+        for end in [a, b] {
+            *self.blame.entry(end).or_default() += 1;
+        }
+        let (out, other) = if self.blame[&a] > self.blame[&b] {
+            (i, b)
+        } else {
+            (self.next(i), a)
+        };
+        let (station, stands) = self.leave_out(out);
+        let back: Vec<Left>;
+        (back, self.left) = std::mem::take(&mut self.left)
+            .into_iter()
+            .partition(|l| l.other == station && !self.returned.contains(&l.station));
+        for l in back {
+            self.blame.remove(&l.station);
+            self.returned.insert(l.station);
+            self.put_back(l.station, l.stands);
+        }
+        self.left.push(Left {
+            station,
+            stands,
+            other,
+        });
     }
 
-    fn leave_out(&mut self, i: usize) {
-        self.stands.remove(i);
+    fn leave_out(&mut self, i: usize) -> (usize, Vec<Pose>) {
+        let out = self.stands.remove(i);
         self.legs.remove(i);
         self.routed.remove(i);
         let n = self.stands.len();
         if n > 0 {
-            let before = (i + n - 1) % n;
-            self.routed[before] = 0;
-            self.legs[before] = self.guesses(before);
+            self.renew((i + n - 1) % n);
         }
+        out
+    }
+
+    fn put_back(&mut self, station: usize, stands: Vec<Pose>) {
+        let rank = self.rank[&station];
+        let i = self.stands.partition_point(|s| self.rank[&s.0] < rank);
+        self.stands.insert(i, (station, stands));
+        self.legs.insert(i, Vec::new());
+        self.routed.insert(i, 0);
+        let n = self.stands.len();
+        self.renew(i);
+        self.renew((i + n - 1) % n);
+    }
+
+    /// Forgets what is known of a leg whose other end has changed.
+    fn renew(&mut self, i: usize) {
+        self.routed[i] = 0;
+        self.legs[i] = self.guesses(i);
     }
 }
 

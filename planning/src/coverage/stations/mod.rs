@@ -28,20 +28,11 @@ use crate::trajectory::Curve;
 use chain::Chain;
 use std::sync::Arc;
 
-/// One piece that has to be seen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Station {
-    /// What one frame has to hold.
-    pub patch: Corners,
-    /// The heading at which it is best seen, if one is better than others, radians.
-    pub heading_rad: Option<f64>,
-}
-
 /// What is to be strung on a loop, and with what it is flown.
 #[derive(Clone, Debug)]
 pub struct StationsProblem {
-    /// The pieces; their numbers name the cells.
-    pub stations: Vec<Station>,
+    /// The pieces, each to be held by one frame; their numbers name the cells.
+    pub stations: Vec<Corners>,
     /// The order in which they are flown: each number once.
     pub order: Vec<usize>,
     /// Where nobody may fly.
@@ -104,7 +95,7 @@ pub fn build(problem: &StationsProblem) -> Result<CoverageLoop, LoopError> {
     let cells = cells(&visits);
     reachable(problem, &router, &cells)?;
     uncoverable.sort();
-    let corners: Vec<Corners> = problem.stations.iter().map(|s| s.patch).collect();
+    let corners = problem.stations.clone();
     let hash = hash_of(corners_hash(&corners), &cells);
     let reach_m = problem.footprint_across_m.max(problem.footprint_along_m);
     Ok(CoverageLoop::assembled(
@@ -146,7 +137,7 @@ fn check(p: &StationsProblem) -> Result<(), LoopError> {
         return Err(LoopError::Nothing);
     }
     let inside = |p: &Point| p.x.abs() <= MAX_MISSION_RADIUS_M && p.y.abs() <= MAX_MISSION_RADIUS_M;
-    if !p.stations.iter().flat_map(|s| &s.patch).all(inside) || !inside(&p.launch) {
+    if !p.stations.iter().flatten().all(inside) || !inside(&p.launch) {
         return Err(LoopError::Extent);
     }
     if p.zones.distance_m(p.launch) < p.clearance_m {

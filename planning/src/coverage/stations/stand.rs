@@ -3,15 +3,15 @@
 //!
 //! Left to others: which of them is flown ([`super::chain`]).
 
+use super::StationsProblem;
 use super::targets::along;
-use super::{Station, StationsProblem};
-use crate::coverage::area::patch::{frame_holds, middle};
+use crate::coverage::area::patch::{Corners, frame_holds, middle};
 use crate::frame::{Point, Pose, Vector};
 use crate::geometry::contingency_clear;
 use crate::math::{TAU, sin_cos, wrap_pi};
 use crate::trajectory::Curve;
 
-/// Headings offered where none is better than another.
+/// Headings offered at each piece.
 const HEADINGS: u8 = 16;
 
 /// Poses offered for a piece beside a zone, the nearest to its middle first.
@@ -34,25 +34,18 @@ const FINE_HEADINGS: u8 = 48;
 /// A clause that says why there is none.
 pub(super) fn stands(problem: &StationsProblem, n: usize) -> Result<Vec<Pose>, &'static str> {
     let station = &problem.stations[n];
-    let at = middle(&station.patch);
+    let at = middle(station);
     let lens = Lens::of(problem);
-    let plain = match station.heading_rad {
-        Some(h) => vec![Pose::new(at, h)],
-        // Along the piece and all round from there: a straight road is flown straight.
-        None => all_round(HEADINGS)
-            .map(|h| Pose::new(at, wrap_pi(along(&station.patch) + h)))
-            .collect(),
-    };
-    let held: Vec<Pose> = plain
-        .into_iter()
-        .filter(|&pose| lens.holds(station, pose))
+    // Along the piece and all round from there: a straight road is flown straight.
+    let plain = all_round(HEADINGS).map(|h| Pose::new(at, wrap_pi(along(station) + h)));
+    let clear: Vec<Pose> = plain
+        .filter(|&pose| lens.holds(station, pose) && flyable(problem, pose))
         .collect();
-    let clear: Vec<Pose> = held.into_iter().filter(|&p| flyable(problem, p)).collect();
     if !clear.is_empty() {
         return Ok(clear);
     }
     let inside = |p: &Point| problem.zones.distance_m(*p) <= 0.0;
-    if station.patch.iter().all(inside) {
+    if station.iter().all(inside) {
         return Err("inside a no-fly zone");
     }
     let beside = beside(problem, station, &lens);
@@ -71,8 +64,8 @@ fn all_round(headings: u8) -> impl Iterator<Item = f64> {
 }
 
 /// Poses around the middle of the piece, the nearest first.
-fn beside(problem: &StationsProblem, station: &Station, lens: &Lens) -> Vec<Pose> {
-    let at = middle(&station.patch);
+fn beside(problem: &StationsProblem, station: &Corners, lens: &Lens) -> Vec<Pose> {
+    let at = middle(station);
     let mut found: Vec<(f64, Pose)> = Vec::new();
     for h in all_round(FINE_HEADINGS) {
         let (s, c) = sin_cos(h);
@@ -122,13 +115,13 @@ impl Lens {
         }
     }
 
-    fn holds(&self, station: &Station, pose: Pose) -> bool {
-        frame_holds(&station.patch, pose, self.across_m, self.along_m)
+    fn holds(&self, station: &Corners, pose: Pose) -> bool {
+        frame_holds(station, pose, self.across_m, self.along_m)
     }
 
     /// Whether the frame holds the piece at any heading, zones aside.
-    fn ever_holds(&self, station: &Station) -> bool {
-        let at = middle(&station.patch);
+    fn ever_holds(&self, station: &Corners) -> bool {
+        let at = middle(station);
         all_round(FINE_HEADINGS).any(|h| self.holds(station, Pose::new(at, h)))
     }
 }

@@ -4,7 +4,7 @@
 //! The pieces belong to the mission, not to a planner: who plans and who judges cut
 //! the same way.
 
-use super::{Station, StationsProblem, order};
+use super::{StationsProblem, order};
 use crate::coverage::area::patch::Corners;
 use crate::coverage::exact::Pass;
 use crate::coverage::line::strip;
@@ -42,9 +42,9 @@ pub enum Targets {
 const END_LANES: f64 = 0.02;
 
 /// Passes over an area as stations, in the order of flight: each cut to at most
-/// `longest_m`, as wide as a lane, seen at its own heading.
+/// `longest_m`, as wide as a lane.
 #[must_use]
-pub fn of_passes(passes: &[Pass], lane_m: f64, longest_m: f64) -> Vec<Station> {
+pub fn of_passes(passes: &[Pass], lane_m: f64, longest_m: f64) -> Vec<Corners> {
     let mut stations = Vec::new();
     for pass in passes {
         let over = (pass.to - pass.from) / pass.length_m().max(1e-3) * (END_LANES * lane_m);
@@ -55,10 +55,7 @@ pub fn of_passes(passes: &[Pass], lane_m: f64, longest_m: f64) -> Vec<Station> {
             first: 0,
             pieces: count((to - from).norm(), longest_m),
         };
-        stations.extend(cut(&stretch).into_iter().map(|patch| Station {
-            patch,
-            heading_rad: Some(pass.heading_rad()),
-        }));
+        stations.extend(cut(&stretch));
     }
     stations
 }
@@ -98,12 +95,8 @@ impl Targets {
     /// The pieces as stations, and the order in which one closed tour from `launch`
     /// sees them.
     #[must_use]
-    pub fn stations(&self, longest_m: f64, launch: Point) -> (Vec<Station>, Vec<usize>) {
-        let free = |patch: Corners| Station {
-            patch,
-            heading_rad: None,
-        };
-        let stations: Vec<Station> = self.pieces(longest_m).into_iter().map(free).collect();
+    pub fn stations(&self, longest_m: f64, launch: Point) -> (Vec<Corners>, Vec<usize>) {
+        let stations = self.pieces(longest_m);
         let order = match self {
             Self::Points(points) => order::of_points(points, launch),
             Self::Lines(lines) => order::of_lines(&stretches(lines, longest_m), launch),

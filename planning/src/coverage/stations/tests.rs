@@ -54,7 +54,7 @@ fn judge(p: &StationsProblem, l: &CoverageLoop) {
         );
         let view = c.curve.pose_at(c.view_m).unwrap();
         assert!(
-            frame_holds(&p.stations[n].patch, view, across_m + 1e-2, along_m + 1e-2),
+            frame_holds(&p.stations[n], view, across_m + 1e-2, along_m + 1e-2),
             "{n}"
         );
     }
@@ -127,6 +127,7 @@ fn what_cannot_be_seen_is_listed_with_the_reason() {
             (3, "no flyable curve links it with the others")
         ]
     );
+    // A way into a dead end costs the pieces in it, not those after it.
     let large = Targets::Points(vec![PointTarget {
         at: Point::new(0.0, 0.0),
         radius_m: 60.0,
@@ -162,13 +163,10 @@ fn a_crossing_of_roads_is_seen_piece_by_piece() {
             for i in 0..=100u8 {
                 let at = w[0] + (w[1] - w[0]) * (f64::from(i) / 100.0);
                 let held = p.stations.iter().any(|s| {
-                    let u = (s.patch[1] - s.patch[0]).normalize();
-                    let v = at - s.patch[0];
+                    let u = (s[1] - s[0]).normalize();
+                    let v = at - s[0];
                     let (along, across) = (v.dot(&u), u.perp(&v));
-                    let (long, wide) = (
-                        (s.patch[1] - s.patch[0]).norm(),
-                        (s.patch[3] - s.patch[0]).norm(),
-                    );
+                    let (long, wide) = ((s[1] - s[0]).norm(), (s[3] - s[0]).norm());
                     along >= -1e-6
                         && along <= long + 1e-6
                         && across >= -1e-6
@@ -222,7 +220,7 @@ proptest! {
         order.sort_unstable();
         prop_assert_eq!(order, (0..stations.len()).collect::<Vec<_>>());
         for s in &stations {
-            let diagonal = (s.patch[2] - s.patch[0]).norm();
+            let diagonal = (s[2] - s[0]).norm();
             prop_assert!(diagonal <= 48.0 + 48.0 + width_m, "{}", diagonal);
         }
     }
