@@ -410,6 +410,9 @@ fn verdict(o: &Outcome, s: &Summary) -> String {
     if let Some(m) = o.separation_m {
         let _ = writeln!(out, "  separation     {m:.1} m at least");
     }
+    if let Some(ms) = o.revisit_ms {
+        let _ = writeln!(out, "  revisit        {:.1} s at most", secs(ms));
+    }
     for (check, n) in &o.violation_counts {
         let _ = writeln!(out, "  violations     {check}: {n}");
     }

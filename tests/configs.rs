@@ -203,6 +203,26 @@ fn a_field_is_covered_but_for_what_lies_at_its_zones() {
 }
 
 #[test]
+fn a_patrol_goes_round_as_often_as_it_says() {
+    let patrol = load_builtin("patrol", &Overrides::default()).unwrap();
+    assert_eq!(patrol.spec.mission.further_laps, 4);
+    let text = builtin_text("patrol").unwrap();
+    for (to, what) in [
+        ("laps: 0,", "laps: 0 is out of range"),
+        (
+            "laps: 2, planner: \"exact\",",
+            "exact passes are flown once",
+        ),
+    ] {
+        let text = text.replacen("laps: 5,", to, 1);
+        let said = parse_with("p", &text, &builtin_files(), &Overrides::default())
+            .unwrap_err()
+            .to_string();
+        assert!(said.contains(what), "{said}");
+    }
+}
+
+#[test]
 fn wrong_targets_are_refused_where_they_stand() {
     let refused = |from: &str, to: &str| {
         let text = builtin_text("roads").unwrap().replacen(from, to, 1);

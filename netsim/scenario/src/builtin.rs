@@ -30,6 +30,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/field.json5"),
     ),
     (
+        "patrol",
+        "patrol.json5",
+        include_str!("../../../configs/trials/patrol.json5"),
+    ),
+    (
         "points",
         "points.json5",
         include_str!("../../../configs/trials/points.json5"),

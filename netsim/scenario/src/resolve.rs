@@ -10,9 +10,9 @@ use crate::files::Files;
 use crate::fleet::{self, Fleet, word};
 use crate::terrain::{self, MAX_HEIGHT_M, Notices, Terrain, position};
 use skein_netsim::spec::{GroundSpec, RadioSpec, Spec, UavSpec};
-use skein_peer::Mission;
 use skein_peer::mission::{PointMm, mm};
 use skein_peer::plan::Ground;
+use skein_peer::{Mission, Task};
 use skein_planning::frame::{Point, Pose};
 use skein_planning::geometry::{NoFlyZones, Polygon};
 use skein_planning::trajectory::timed::Objective;
@@ -31,6 +31,7 @@ const FIELDS: &[&str] = &[
     "points",
     "lines",
     "planner",
+    "laps",
     "level_m",
     "vertical_margin_m",
     "no_fly",
@@ -358,7 +359,19 @@ fn mission(
         launch: (mm(launch.x), mm(launch.y)),
         base: (mm(base.x), mm(base.y)),
         task: t.task.clone(),
+        lap: 0,
+        further_laps: laps(f, t)? - 1,
     })
+}
+
+/// How often everything is to be seen.
+fn laps(f: &Fields<'_>, t: &Terrain) -> Result<u16, ScenarioError> {
+    let laps = f.small_or("laps", 1, 1, 1000, "times")?;
+    match f.get("laps") {
+        Some(node) if laps > 1 && t.task == Task::Exact => Err(node
+            .wrong("exact passes are flown once; for several times round take planner \"lanes\"")),
+        _ => Ok(laps),
+    }
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "at most 1.8e9")]

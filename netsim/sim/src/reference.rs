@@ -51,6 +51,8 @@ struct Reference<'a> {
     covered: Vec<bool>,
     stale: bool,
     solved_ms: u64,
+    /// Times round still to come.
+    further_laps: u16,
 }
 
 impl<'a> Reference<'a> {
@@ -64,6 +66,7 @@ impl<'a> Reference<'a> {
             busy: BTreeMap::new(),
             stale: true,
             solved_ms: 0,
+            further_laps: stage.spec.mission.further_laps,
         };
         for u in &stage.spec.uavs {
             r.start(u.id);
@@ -123,6 +126,7 @@ impl<'a> Reference<'a> {
                 self.stop(id);
             }
         }
+        self.next_lap();
         let idle = self.busy.values().all(|b| !b) && now_ms >= self.solved_ms + RETRY_MS;
         if (self.stale || idle) && !self.minds.is_empty() {
             self.stale = false;
@@ -133,6 +137,22 @@ impl<'a> Reference<'a> {
             for id in ids {
                 self.fly(id);
             }
+        }
+    }
+
+    /// All is covered and is to be covered again: everything is open once more.
+    fn next_lap(&mut self) {
+        let cells = self.ground.coverage_loop.cells();
+        let over = || {
+            cells
+                .iter()
+                .zip(&self.covered)
+                .all(|(c, done)| *done || !c.needed)
+        };
+        if self.further_laps > 0 && over() {
+            self.further_laps -= 1;
+            self.covered.fill(false);
+            self.stale = true;
         }
     }
 

@@ -83,6 +83,9 @@ pub struct Summary {
     pub bytes_per_peer_s: f64,
     /// Simulated seconds per second of wall time.
     pub real_time_factor: f64,
+    /// Longest time in which a cell was not seen again, seconds, where everything is to be
+    /// seen several times.
+    pub revisit_s: Spread,
     /// Graded liveness under light loss: time taken as a share of the bound.
     pub liveness_share: BTreeMap<String, Spread>,
     /// How many runs killed how many UAVs for good.
@@ -113,6 +116,12 @@ pub fn summarise(mut runs: Vec<Outcome>, wall_s: f64) -> Summary {
         infeasible: runs.iter().filter(|o| o.infeasible).count(),
         coverage_min: runs.iter().map(|o| o.coverage).fold(1.0, f64::min),
         makespan_ratio: Spread::of(runs.iter().filter_map(|o| o.makespan_ratio).collect()),
+        revisit_s: Spread::of(
+            runs.iter()
+                .filter_map(|o| o.revisit_ms)
+                .map(seconds)
+                .collect(),
+        ),
         detect_s: Spread::of(
             runs.iter()
                 .flat_map(|o| &o.detect_ms)

@@ -48,6 +48,8 @@ pub(crate) struct Crew {
     able_since: Option<crate::Time>,
     live: Live,
     finished: bool,
+    /// Since when all is covered and another time round is to come.
+    over_since: Option<crate::Time>,
     exhausted: bool,
     unsaved_cells: u16,
     /// Counts the sections handed to the journal; only the last of them may be
@@ -503,12 +505,41 @@ fn keep_within_endurance(crew: &mut Crew, percept: Option<&Percept>) {
     section.keep(good);
 }
 
+/// Beacon periods for which the last cells of a time round are told before the next
+/// begins: one to speak, two to be passed on. Who misses them looks at those cells
+/// again, and hears of the next time round from the ground station.
+const LAP_PERIODS: u64 = 3;
+
+/// Everything is covered and is to be covered again: begins the next time round, once
+/// the others had the time to hear of the last cells.
+fn next_lap(peer: &mut Peer) {
+    let (now, pause_ms) = (peer.now, LAP_PERIODS * peer.period_ms());
+    let Some(crew) = &mut peer.crew else {
+        return;
+    };
+    let Some(since) = crew.over_since else {
+        crew.over_since = Some(now);
+        peer.voice.cover_changed = true;
+        save_union(peer, true);
+        return;
+    };
+    if now.since_ms(since) >= pause_ms
+        && let Some(next) = crew.ground.mission.next_lap()
+    {
+        peer.library.offer(Arc::new(next));
+    }
+}
+
 /// Whether all that can be covered is covered.
 fn finish(peer: &mut Peer) {
     let Some(crew) = &mut peer.crew else {
         return;
     };
     let complete = crew.negotiation.section.complete();
+    if complete && crew.ground.mission.further_laps > 0 {
+        next_lap(peer);
+        return;
+    }
     if complete == crew.finished {
         return;
     }

@@ -50,6 +50,20 @@ pub struct Mission {
     /// What is to be seen.
     #[serde(default, skip_serializing_if = "Task::is_area")]
     pub task: Task,
+    /// Which time round it is, from 0 (D2.7 §3.6.6: continuous coverage).
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub lap: u16,
+    /// How many more times everything is to be seen after this one.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub further_laps: u16,
+}
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "the signature that serde asks for"
+)]
+fn is_zero(n: &u16) -> bool {
+    *n == 0
 }
 
 fn metres(mm: u32) -> f64 {
@@ -106,7 +120,24 @@ impl Mission {
         }
         ring(&mut h, &[self.launch, self.base]);
         self.task.hash(&mut h);
+        if self.lap > 0 || self.further_laps > 0 {
+            h.write_i64(i64::from(self.lap));
+            h.write_i64(i64::from(self.further_laps));
+        }
         h.finish()
+    }
+
+    /// The mission of the next time round, the same for whoever derives it; none after
+    /// the last.
+    #[must_use]
+    pub fn next_lap(&self) -> Option<Self> {
+        let further_laps = self.further_laps.checked_sub(1)?;
+        Some(Self {
+            revision: self.revision.checked_add(1)?,
+            lap: self.lap.checked_add(1)?,
+            further_laps,
+            ..self.clone()
+        })
     }
 
     /// The pieces that have to be seen, each by one frame; none where the mission asks
@@ -148,7 +179,7 @@ impl Mission {
         let router = Router::new(zones, limits);
         Ok(Arc::new(Ground {
             mission: Arc::clone(self),
-            coverage_loop: Arc::new(coverage_loop),
+            coverage_loop: Arc::new(coverage_loop.of_lap(self.lap)),
             router: Arc::new(router),
         }))
     }
@@ -319,6 +350,8 @@ mod tests {
             launch: (0, 0),
             base: (0, 0),
             task: Task::Area,
+            lap: 0,
+            further_laps: 0,
         }
     }
 
@@ -333,6 +366,25 @@ mod tests {
             assert_eq!(done, i == 0);
         }
         assert_eq!(*library.newest().unwrap(), m);
+    }
+
+    #[test]
+    fn laps_follow_each_other_and_end() {
+        let mut m = mission(1, 4);
+        m.further_laps = 2;
+        let second = m.next_lap().unwrap();
+        assert_eq!(
+            (second.revision, second.lap, second.further_laps),
+            (2, 1, 1)
+        );
+        assert_ne!(second.content_hash(), m.content_hash());
+        assert_eq!(second.next_lap().unwrap().next_lap(), None);
+        let pieces = chunks(&second);
+        let mut library = Library::new(Some(Arc::new(m)));
+        for (i, piece) in (0u16..).zip(&pieces) {
+            library.chunk(i, piece).unwrap();
+        }
+        assert_eq!(*library.newest().unwrap(), second);
     }
 
     #[test]

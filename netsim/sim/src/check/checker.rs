@@ -94,6 +94,15 @@ impl Checker {
         }
     }
 
+    /// Another time round begins, with everything open.
+    pub fn on_lap(&mut self) {
+        let takeovers = std::mem::take(&mut self.listing.takeovers);
+        self.listing = ListingCheck::default();
+        self.listing.takeovers = takeovers;
+        self.cover = CoverCheck::default();
+        self.progress = ProgressCheck::default();
+    }
+
     /// A process goes on after standing still.
     pub fn on_resume(&mut self, id: u16) {
         self.members.on_running(id, false);

@@ -46,6 +46,8 @@ struct Versions {
     incarnation: u32,
     counter: u32,
     epoch: Epoch,
+    /// The loop whose epoch that is: another loop begins with none.
+    loop_hash: u64,
 }
 
 /// What the records of one run were found to be.
@@ -190,7 +192,8 @@ impl RecordCheck {
             }
             let loop_known = m.view.loop_hash != 0;
             let back = now.incarnation < old.incarnation
-                || (loop_known && (now.counter < old.counter || now.epoch < old.epoch));
+                || (loop_known && now.counter < old.counter)
+                || (now.loop_hash == old.loop_hash && now.epoch < old.epoch);
             if !loop_known {
                 self.versions.insert(
                     m.id,
@@ -214,6 +217,7 @@ fn versions(v: &View) -> Versions {
         incarnation: v.incarnation,
         counter: v.counter,
         epoch: v.epoch,
+        loop_hash: v.loop_hash,
     }
 }
 

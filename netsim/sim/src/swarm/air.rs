@@ -127,10 +127,10 @@ impl Air {
         Graph::new(ids, |a, b| self.links.joined(a, b))
     }
 
-    /// Whether the judge saw a camera cover this cell.
+    /// Whether the judge saw a camera cover this cell, in that many times round.
     #[must_use]
-    pub fn is_covered(&self, cell: CellId) -> bool {
-        self.world.judge().saw(cell)
+    pub fn is_covered(&self, cell: CellId, laps: u16) -> bool {
+        self.world.judge().saw(cell, laps)
     }
 
     /// Whether every coverable cell is covered.
@@ -149,6 +149,12 @@ impl Air {
     #[must_use]
     pub fn separation_m(&self) -> Option<f64> {
         self.world.judge().closest().map(|a| a.distance_m)
+    }
+
+    /// The longest time in which a cell was not seen again, milliseconds.
+    #[must_use]
+    pub fn longest_gap_ms(&self) -> Option<u64> {
+        self.world.judge().longest_gap_ms()
     }
 
     /// Bytes all peers transmitted.

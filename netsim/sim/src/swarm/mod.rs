@@ -99,6 +99,8 @@ pub struct Swarm {
     checker: Checker,
     covered: Vec<bool>,
     loop_hash: u64,
+    /// The newest time round that any peer has begun, from 0.
+    lap: u16,
     covered_ms: Option<u64>,
     /// Sections spoken so far, by hash of their bytes: author, life, section.
     claims: BTreeMap<u64, (u16, Version, Arc<Register>)>,
@@ -135,6 +137,7 @@ impl Swarm {
             checker: Checker::new(seed, spec.beacon_period_ms),
             covered,
             loop_hash,
+            lap: 0,
             covered_ms: None,
             claims: BTreeMap::new(),
             done: false,
@@ -516,6 +519,14 @@ impl Swarm {
         self.history
             .fold(self.now_ms, id, Kind::Report, report_hash(&report));
         self.checker.on_report(self.now_ms, id, &report);
+        if let Report::Ready {
+            revision,
+            loop_hash,
+            ..
+        } = &report
+        {
+            self.lap_begun(*revision, *loop_hash);
+        }
         self.history
             .keep(self.now_ms, || What::Report { peer: id, report });
     }
@@ -570,11 +581,26 @@ impl Swarm {
         }
     }
 
+    /// A peer begins a time round that nobody has begun before.
+    fn lap_begun(&mut self, revision: u32, loop_hash: u64) {
+        let lap = u16::try_from(revision.saturating_sub(self.spec.mission.revision));
+        if let Ok(lap) = lap
+            && self.spec.mission.further_laps > 0
+            && lap > self.lap
+        {
+            self.lap = lap;
+            self.loop_hash = loop_hash;
+            self.covered.fill(false);
+            self.refresh_covered();
+            self.checker.on_lap();
+        }
+    }
+
     fn refresh_covered(&mut self) {
         if let Ok(ground) = self.grounds.of(&self.spec.mission) {
             for (flag, cell) in self.covered.iter_mut().zip(ground.coverage_loop.cells()) {
                 // A cell that nobody needs counts as covered from the start.
-                *flag = *flag || !cell.needed || self.air.is_covered(cell.id);
+                *flag = *flag || !cell.needed || self.air.is_covered(cell.id, self.lap + 1);
             }
         }
     }

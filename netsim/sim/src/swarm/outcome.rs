@@ -54,6 +54,9 @@ pub struct Outcome {
     pub separation_m: Option<f64>,
     /// Transmissions that did not arrive, by reason.
     pub lost: BTreeMap<Reason, u64>,
+    /// Longest time in which a cell was not seen again, milliseconds, where everything is
+    /// to be seen several times.
+    pub revisit_ms: Option<u64>,
     /// Hash of the history.
     pub history_hash: u64,
     /// Events in it.
@@ -110,6 +113,7 @@ impl Swarm {
             reached: self.checker.reached,
             separation_m: self.air.separation_m(),
             lost: self.air.lost(),
+            revisit_ms: self.air.longest_gap_ms(),
             history_hash: self.history.hash(),
             events: self.history.events(),
             entries: self.history.entries().to_vec(),

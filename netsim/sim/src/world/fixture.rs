@@ -156,6 +156,8 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         launch: (mm(launch.x), mm(launch.y)),
         base: (96_000, 60_000),
         task: skein_peer::Task::Area,
+        lap: 0,
+        further_laps: 0,
     }
 }
 

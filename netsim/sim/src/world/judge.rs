@@ -57,6 +57,13 @@ pub struct Judge {
     near_m: BTreeMap<u16, f64>,
     /// What peers name cells, where the survey knows other ones; and which were seen.
     claims: Option<(Arc<Pieces>, Vec<bool>)>,
+    /// How often everything is to be seen, and which time it is.
+    laps: u16,
+    lap: u16,
+    /// In how many of the laps a cell was seen, and when it was seen first in the last.
+    times: Vec<(u16, u64)>,
+    /// Longest time from one first sighting of a cell to that of the next lap.
+    longest_gap_ms: u64,
     closest: Option<Approach>,
     too_close: BTreeMap<(u16, u16), bool>,
 }
@@ -75,8 +82,26 @@ impl Judge {
             closest: None,
             too_close: BTreeMap::new(),
             claims: None,
+            laps: 1,
+            lap: 1,
+            times: vec![(0, 0); survey.cells().len()],
+            longest_gap_ms: 0,
             survey,
         }
+    }
+
+    /// Wants everything to be seen so many times, one time round after the other.
+    #[must_use]
+    pub fn with_laps(mut self, laps: u16) -> Self {
+        self.laps = laps.max(1);
+        self
+    }
+
+    /// The longest time between the first sightings of a cell in one time round and the
+    /// next, milliseconds; none where everything is seen once.
+    #[must_use]
+    pub fn longest_gap_ms(&self) -> Option<u64> {
+        (self.laps > 1).then_some(self.longest_gap_ms)
     }
 
     /// Watches these pieces besides, so that what peers claim to have seen can be
@@ -90,15 +115,18 @@ impl Judge {
         self
     }
 
-    /// Whether a camera saw what peers call this cell.
+    /// Whether a camera saw what peers call this cell, in that many times round.
     #[must_use]
-    pub fn saw(&self, cell: CellId) -> bool {
+    pub fn saw(&self, cell: CellId, laps: u16) -> bool {
         match &self.claims {
             Some((_, seen)) => cell
                 .number()
                 .and_then(|n| seen.get(usize::from(n)))
                 .is_some_and(|s| *s),
-            None => self.sighting(cell).is_some(),
+            None => self
+                .survey
+                .index_of(cell)
+                .is_some_and(|i| self.times[i].0 >= laps),
         }
     }
 
@@ -140,7 +168,7 @@ impl Judge {
     /// Whether every coverable cell was seen.
     #[must_use]
     pub fn complete(&self) -> bool {
-        self.n_covered == self.n_coverable
+        self.n_covered == self.n_coverable && self.lap == self.laps
     }
 
     /// How often a UAV entered a no-fly zone.
@@ -242,6 +270,17 @@ impl Judge {
             uav: sighting.uav,
             cell: cell.id,
         });
+        let (times, before_ms) = self.times[i];
+        if times > 0 {
+            let gap_ms = sighting.at_ms.saturating_sub(before_ms);
+            self.longest_gap_ms = self.longest_gap_ms.max(gap_ms);
+        }
+        self.times[i] = (times + 1, sighting.at_ms);
+        if self.n_covered == self.n_coverable && self.lap < self.laps {
+            self.lap += 1;
+            self.n_covered = 0;
+            self.seen.fill(None);
+        }
     }
 
     /// How far from the camera the centre of a cell in its picture can be.

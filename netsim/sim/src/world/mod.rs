@@ -130,7 +130,9 @@ impl World {
             .collect();
         nodes.sort_unstable();
         nodes.dedup();
-        let judge = Judge::new(Arc::clone(&site.survey)).with_claims(site.claims.clone());
+        let judge = Judge::new(Arc::clone(&site.survey))
+            .with_claims(site.claims.clone())
+            .with_laps(spec.mission.further_laps.saturating_add(1));
         Self {
             site,
             seed,

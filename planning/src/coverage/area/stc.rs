@@ -282,6 +282,14 @@ impl CoverageLoop {
         &self.uncoverable
     }
 
+    /// The same loop another time round: what was covered before does not count on it.
+    #[must_use]
+    pub fn of_lap(mut self, lap: u16) -> Self {
+        // The golden ratio's odd multiple spreads small numbers over all bits.
+        self.hash ^= u64::from(lap).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self
+    }
+
     /// Identifies the loop: equal on all peers that derived it from the same mission.
     #[must_use]
     pub fn hash(&self) -> u64 {

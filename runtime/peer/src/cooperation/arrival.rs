@@ -63,7 +63,7 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
     // What is still being written was promised for the old ground: it is not installed.
     let written = old.as_ref().map_or(0, |c| c.written + 1);
     let mut crew = Crew {
-        negotiation: begun(peer, old.as_ref(), &coverage_loop, n),
+        negotiation: begun(peer, old.as_ref(), &ground, n),
         ground: Arc::clone(&ground),
         executive,
         goal: None,
@@ -71,6 +71,7 @@ pub(crate) fn grounded(peer: &mut Peer, hash: u64, ground: Result<Arc<Ground>, S
         able_since: None,
         live: Live::new(),
         finished: false,
+        over_since: None,
         exhausted: old.as_ref().is_some_and(|c| c.exhausted),
         unsaved_cells: 0,
         written,
@@ -113,7 +114,8 @@ fn keep_on(crew: &mut Crew, old: Crew) {
 }
 
 /// A negotiation on a new loop, with all that is known to be covered.
-fn begun(peer: &Peer, old: Option<&Crew>, coverage_loop: &CoverageLoop, n: u16) -> Negotiation {
+fn begun(peer: &Peer, old: Option<&Crew>, ground: &Ground, n: u16) -> Negotiation {
+    let coverage_loop = &ground.coverage_loop;
     let mut base = CellSet::new(n);
     for (i, c) in coverage_loop.cells().iter().enumerate() {
         if !c.needed {
@@ -129,7 +131,9 @@ fn begun(peer: &Peer, old: Option<&Crew>, coverage_loop: &CoverageLoop, n: u16) 
         .counter
         .max(old.as_ref().map_or(0, |c| c.negotiation.rounds.counter()));
     let mut negotiation = Negotiation::new(me, base, counter);
-    if let Some(old) = old {
+    // Every time round begins with nothing covered.
+    let same_lap = |old: &&Crew| old.ground.mission.lap == ground.mission.lap;
+    if let Some(old) = old.filter(same_lap) {
         negotiation.section.cover(&carried_over(
             &old.ground.coverage_loop,
             old.union(),
