@@ -216,7 +216,8 @@ impl Assembly {
 /// than one only matters where a zone crowds the first.
 const LAUNCH_GATES: usize = 8;
 
-fn millimetres(curve: &Curve) -> u32 {
+/// Length of a curve in whole millimetres, as loops count it.
+pub(in crate::coverage) fn millimetres(curve: &Curve) -> u32 {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

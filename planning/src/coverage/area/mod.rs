@@ -12,6 +12,6 @@ pub mod patch;
 mod shares;
 pub mod stc;
 
-pub(super) use assembly::hash_of;
+pub(super) use assembly::{hash_of, millimetres};
 pub use grid::{CellId, Grid};
 pub use stc::{AreaProblem, CoverageLoop, Direction, LoopCell, LoopError};

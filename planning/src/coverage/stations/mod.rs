@@ -20,7 +20,7 @@ mod tests;
 
 use super::area::patch::{Corners, Listed, Patches};
 use super::area::stc::{CoverageLoop, LoopCell, LoopError};
-use super::area::{CellId, hash_of};
+use super::area::{CellId, hash_of, millimetres};
 use crate::frame::{MAX_MISSION_RADIUS_M, Point, Pose};
 use crate::geometry::NoFlyZones;
 use crate::path::{RouteLimits, Router};
@@ -176,16 +176,6 @@ fn cells(visits: &[Visit]) -> Vec<LoopCell> {
             }
         })
         .collect()
-}
-
-fn millimetres(curve: &Curve) -> u32 {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a cast of a float saturates"
-    )]
-    let mm = (curve.length_m() * 1000.0).round() as u32;
-    mm
 }
 
 /// Boundaries of the loop that are tried from the launch point, evenly spread.
