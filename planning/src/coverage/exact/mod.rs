@@ -25,9 +25,9 @@
 //! let area = Polygon::new(corners.map(|(x, y)| Point::new(x, y)).to_vec())?;
 //! let problem = ExactProblem::new(area, 50.0, 20.0, Point::new(0.0, 0.0));
 //! let plan = plan(&problem)?;
-//! // Four lanes along the longer side.
+//! // Four lanes along the longer side; they see half a spacing beyond their ends.
 //! assert_eq!(plan.passes.len(), 4);
-//! assert!((plan.passes_m - 1600.0).abs() < 1e-6);
+//! assert!(plan.passes_m > 1350.0 && plan.passes_m < 1500.0, "{}", plan.passes_m);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
