@@ -171,7 +171,7 @@ fn targets_are_what_their_files_say() {
     assert_eq!(points.ground.coverage_loop.len(), 48);
     let roads = load("roads");
     let total = skein_scenario::summary(&roads.spec, &roads.ground);
-    // 14.5 km of road, with the ways between and the turns of a fixed wing.
+    // Some 13.5 km of road, with the ways between and the turns of a fixed wing.
     assert!(
         total.loop_m > 14_000.0 && total.loop_m < 30_000.0,
         "{}",

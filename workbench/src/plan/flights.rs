@@ -175,6 +175,7 @@ impl Sheet<'_> {
     /// # Errors
     /// When a file cannot be written, or several plans have no folder.
     pub fn print(&self, format: Format, out: Option<&Path>) -> Result<String> {
+        format.check_out(out)?;
         match format {
             Format::Json => Ok(self.json().to_string()),
             Format::Geojson => Ok(self.geojson().to_string()),

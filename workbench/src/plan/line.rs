@@ -168,6 +168,7 @@ mod tests {
             (&["--k", "0"][..], "--k must be"),
             (&["--wind-mps", "20"], "--wind-mps"),
             (&["--k", "2", "--format", "plan"], "--out DIR"),
+            (&["--out", "plans"], "add --format plan"),
             (&["--depot", "x"], "--depot"),
             (&["--swath-m", "0"], "/features/"),
         ] {

@@ -99,6 +99,19 @@ pub enum Format {
     Plan,
 }
 
+impl Format {
+    /// Refuses a folder for what is printed, so that nobody looks for files there.
+    ///
+    /// # Errors
+    /// When there is a folder and the form is not that of files.
+    pub fn check_out(self, out: Option<&std::path::Path>) -> Result<()> {
+        if out.is_some() && self != Self::Plan {
+            bail!("--out is for .plan files, one a UAV: add --format plan, or leave it out");
+        }
+        Ok(())
+    }
+}
+
 /// The ways to fly, over numbered places.
 pub struct Ways {
     origin: Origin,
@@ -255,6 +268,7 @@ impl Ways {
             around: &around,
             plan: &plan,
         };
+        args.format.check_out(args.out.as_deref())?;
         match args.format {
             Format::Json => Ok(sheet.json().to_string()),
             Format::Geojson => Ok(sheet.geojson().to_string()),
