@@ -188,20 +188,8 @@ impl Mission {
         if self.task.is_area() {
             return CoverageLoop::build(problem);
         }
-        let stations = StationsProblem {
-            stations: Vec::new(),
-            order: Vec::new(),
-            zones: Arc::clone(&problem.zones),
-            turn_radius_m: problem.turn_radius_m,
-            clearance_m: problem.clearance_m,
-            footprint_across_m: problem.footprint_across_m,
-            footprint_along_m: problem.footprint_along_m,
-            tracking_error_m: problem.tracking_error_m,
-            launch: problem.launch,
-        };
-        let lane_m = problem.lane_spacing_m;
         let stations = if let Some(targets) = self.task.targets() {
-            stations.with_targets(&targets, lane_m)
+            StationsProblem::of_targets(problem, &targets)
         } else {
             let passes = exact::plan(&ExactProblem {
                 zones: Arc::clone(&problem.zones),
@@ -210,13 +198,13 @@ impl Mission {
                 look_ahead_m: 0.0,
                 ..ExactProblem::new(
                     problem.area.clone(),
-                    lane_m,
+                    problem.lane_spacing_m,
                     problem.turn_radius_m,
                     problem.launch,
                 )
             })?
             .passes;
-            stations.with_passes(&passes, lane_m)
+            StationsProblem::of_passes(problem, &passes)
         };
         stations::build(&stations)
     }

@@ -32,6 +32,17 @@ const SLIVER: f64 = 1e-6;
 
 /// Refuses what cannot be flown or has no meaning.
 pub(super) fn check(problem: &AreaProblem) -> Result<(), LoopError> {
+    let inside = |p: &Point| p.x.abs() <= MAX_MISSION_RADIUS_M && p.y.abs() <= MAX_MISSION_RADIUS_M;
+    check_figures(problem)?;
+    if !problem.area.vertices().iter().all(inside) || !inside(&problem.launch) {
+        return Err(LoopError::Extent);
+    }
+    check_lanes(problem)?;
+    check_launch(problem)
+}
+
+/// Refuses lengths that have no meaning.
+pub(in crate::coverage) fn check_figures(problem: &AreaProblem) -> Result<(), LoopError> {
     let d = problem.lane_spacing_m;
     let positive = [(d, "lane spacing"), (problem.turn_radius_m, "turn radius")];
     let not_negative = [
@@ -50,10 +61,12 @@ pub(super) fn check(problem: &AreaProblem) -> Result<(), LoopError> {
     if let Some(e) = not_negative.into_iter().find_map(|v| bad(v, 0.0)) {
         return Err(e);
     }
-    let inside = |p: &Point| p.x.abs() <= MAX_MISSION_RADIUS_M && p.y.abs() <= MAX_MISSION_RADIUS_M;
-    if !problem.area.vertices().iter().all(inside) || !inside(&problem.launch) {
-        return Err(LoopError::Extent);
-    }
+    Ok(())
+}
+
+/// Refuses lanes that cannot be flown or seen.
+fn check_lanes(problem: &AreaProblem) -> Result<(), LoopError> {
+    let d = problem.lane_spacing_m;
     if problem.turn_radius_m > d / 2.0 {
         return Err(LoopError::TurnRadius {
             radius_m: problem.turn_radius_m,
@@ -69,6 +82,11 @@ pub(super) fn check(problem: &AreaProblem) -> Result<(), LoopError> {
             along_m,
         });
     }
+    Ok(())
+}
+
+/// Refuses a launch point inside a zone's clearance.
+pub(in crate::coverage) fn check_launch(problem: &AreaProblem) -> Result<(), LoopError> {
     if problem.zones.distance_m(problem.launch) < problem.clearance_m {
         return Err(LoopError::Launch);
     }
@@ -159,11 +177,7 @@ impl Assembly {
         let gates: Vec<Pose> = ring.iter().filter_map(|(_, curve)| curve.start()).collect();
         let on_ring: BTreeSet<CellId> = ring.iter().map(|(id, _)| *id).collect();
         let finder = Finder::new(problem, grid, &gates).ok_or(LoopError::Zones)?;
-        if !gates
-            .iter()
-            .step_by(gates.len().div_ceil(LAUNCH_GATES))
-            .any(|&g| finder.launch_reaches(g))
-        {
+        if !finder.launch_reaches_some() {
             return Err(LoopError::CutOff);
         }
         let mut beside: BTreeMap<usize, Vec<LoopCell>> = BTreeMap::new();
@@ -212,10 +226,6 @@ impl Assembly {
     }
 }
 
-/// Gates of the loop that are tried from the launch point, evenly spread: more
-/// than one only matters where a zone crowds the first.
-const LAUNCH_GATES: usize = 8;
-
 /// Length of a curve in whole millimetres, as loops count it.
 pub(in crate::coverage) fn millimetres(curve: &Curve) -> u32 {
     #[allow(
@@ -228,22 +238,25 @@ pub(in crate::coverage) fn millimetres(curve: &Curve) -> u32 {
 }
 
 /// FNV-1a over whole numbers: the same on every machine, and cheap.
-///
-/// `patches` stands for what the cells look like.
+pub(in crate::coverage) fn hash_words(words: impl IntoIterator<Item = u64>) -> u64 {
+    words
+        .into_iter()
+        .flat_map(u64::to_le_bytes)
+        .fold(0xcbf2_9ce4_8422_2325, |h, byte| {
+            (h ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        })
+}
+
+/// Identifies a loop; `patches` stands for what the cells look like.
 pub(in crate::coverage) fn hash_of(patches: u64, cells: &[LoopCell]) -> u64 {
-    let mut h: u64 = 0xcbf2_9ce4_8422_2325;
-    let mut eat = |value: u64| {
-        for byte in value.to_le_bytes() {
-            h = (h ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        }
+    let cell = |c: &LoopCell| {
+        [
+            u64::from(c.id.col.cast_unsigned()) << 16 | u64::from(c.id.row.cast_unsigned()),
+            u64::from(c.service_mm) << 32 | u64::from(c.travel_mm),
+            u64::from(c.excursion) << 1 | u64::from(c.needed),
+        ]
     };
-    eat(patches);
-    for c in cells {
-        eat(u64::from(c.id.col.cast_unsigned()) << 16 | u64::from(c.id.row.cast_unsigned()));
-        eat(u64::from(c.service_mm) << 32 | u64::from(c.travel_mm));
-        eat(u64::from(c.excursion) << 1 | u64::from(c.needed));
-    }
-    h
+    hash_words(std::iter::once(patches).chain(cells.iter().flat_map(cell)))
 }
 
 #[cfg(test)]

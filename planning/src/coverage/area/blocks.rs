@@ -134,7 +134,7 @@ fn is_free(problem: &AreaProblem, grid: Grid, block: Block) -> bool {
     cells.iter().enumerate().all(|(quadrant, &cell)| {
         pieces_of(quadrant).into_iter().all(|(entry, exit)| {
             let curve = crossing(grid, cell, entry, exit);
-            problem.zones.is_clear(&curve, problem.clearance_m) && problem.contingency_clear(&curve)
+            problem.flyable(&curve)
         })
     })
 }

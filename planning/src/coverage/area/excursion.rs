@@ -23,6 +23,11 @@ pub(super) struct Excursion {
     pub view_m: f64,
 }
 
+/// Gates of a loop that are tried from the launch point, and headings there.
+const LAUNCH_GATES: usize = 8;
+/// See [`LAUNCH_GATES`].
+const LAUNCH_HEADINGS: u8 = 8;
+
 /// How passes are sampled, and how many gates are tried.
 struct Effort {
     headings: u16,
@@ -115,13 +120,9 @@ impl<'a> Finder<'a> {
         })
     }
 
-    /// Whether the loop can be reached from the launch point, whatever the heading
-    /// there.
-    pub(super) fn launch_reaches(&self, gate: Pose) -> bool {
-        (0..8u8).any(|i| {
-            let pose = Pose::new(self.problem.launch, TAU * f64::from(i) / 8.0);
-            self.router.route(pose, gate).is_ok()
-        })
+    /// Whether the loop can be reached from the launch point.
+    pub(super) fn launch_reaches_some(&self) -> bool {
+        self.problem.launch_reaches(&self.router, self.gates)
     }
 
     /// The shortest excursion found that sees the whole cell.
@@ -200,18 +201,13 @@ impl<'a> Finder<'a> {
                         view: Pose::new(at, heading_rad),
                         run_m: RUN_PER_SPACING * d,
                     };
-                    if self.flyable(&pass.curve()) {
+                    if p.flyable(&pass.curve()) {
                         found.push(pass);
                     }
                 }
             }
         }
         found
-    }
-
-    fn flyable(&self, curve: &Curve) -> bool {
-        let p = self.problem;
-        p.zones.is_clear(curve, p.clearance_m) && p.contingency_clear(curve)
     }
 
     /// Joins gates and passes by Dubins words, the shortest whole first.
@@ -239,7 +235,7 @@ impl<'a> Finder<'a> {
             let word = |from: Pose, to: Pose| {
                 dubins::all(from, to, r)
                     .into_iter()
-                    .find(|c| self.flyable(c))
+                    .find(|c| self.problem.flyable(c))
             };
             if let Some(e) = self.joined(g, &passes[i], word)
                 && best
@@ -292,6 +288,28 @@ impl<'a> Finder<'a> {
 }
 
 impl AreaProblem {
+    /// Whether a curve keeps the clearance, and a UAV that has to loiter anywhere on it
+    /// stays out of the zones.
+    pub(in crate::coverage) fn flyable(&self, curve: &Curve) -> bool {
+        self.zones.is_clear(curve, self.clearance_m) && self.contingency_clear(curve)
+    }
+
+    /// Whether one of some gates, evenly spread over all, can be reached from the launch
+    /// point, whatever the heading there. More than one gate only matters where a zone
+    /// crowds the first.
+    pub(in crate::coverage) fn launch_reaches(&self, router: &Router, gates: &[Pose]) -> bool {
+        let heading = |i: u8| TAU * f64::from(i) / f64::from(LAUNCH_HEADINGS);
+        gates
+            .iter()
+            .step_by(gates.len().div_ceil(LAUNCH_GATES).max(1))
+            .any(|&gate| {
+                (0..LAUNCH_HEADINGS).any(|i| {
+                    let pose = Pose::new(self.launch, heading(i));
+                    router.route(pose, gate).is_ok()
+                })
+            })
+    }
+
     /// Whether a UAV that has to loiter anywhere on the curve stays out of the zones.
     pub(super) fn contingency_clear(&self, curve: &Curve) -> bool {
         // Farther out than a loiter is wide, no circle reaches a zone.

@@ -12,6 +12,6 @@ pub mod patch;
 mod shares;
 pub mod stc;
 
-pub(super) use assembly::{hash_of, millimetres};
+pub(super) use assembly::{check_figures, check_launch, hash_of, hash_words, millimetres};
 pub use grid::{CellId, Grid};
 pub use stc::{AreaProblem, CoverageLoop, Direction, LoopCell, LoopError};

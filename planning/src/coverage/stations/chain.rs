@@ -5,8 +5,8 @@
 //! A closed chain is cut open at a station whose pose an open chain has chosen, so the
 //! answer is the shortest through that pose, not always the shortest of all.
 
-use super::stand::clear;
-use super::{StationsProblem, Visit};
+use super::Visit;
+use crate::coverage::area::AreaProblem;
 use crate::frame::Pose;
 use crate::math::TAU;
 use crate::path::Router;
@@ -44,7 +44,7 @@ impl Leg {
 
 /// Stations in order, with the poses they may be seen at.
 pub(super) struct Chain<'a> {
-    problem: &'a StationsProblem,
+    problem: &'a AreaProblem,
     router: &'a Router,
     stands: Vec<(usize, Vec<Pose>)>,
     /// By station of departure: poses of departure times poses of arrival.
@@ -70,7 +70,7 @@ struct Left {
 
 impl<'a> Chain<'a> {
     pub(super) fn new(
-        problem: &'a StationsProblem,
+        problem: &'a AreaProblem,
         router: &'a Router,
         stands: Vec<(usize, Vec<Pose>)>,
     ) -> Self {
@@ -226,11 +226,11 @@ impl<'a> Chain<'a> {
             return [1.0, -1.0]
                 .map(|turn| Curve::from_pieces(from, &[(turn / r, TAU * r)]))
                 .into_iter()
-                .find(|c| clear(self.problem, c))
+                .find(|c| self.problem.flyable(c))
                 .map_or(Leg::Blocked, Leg::Clear);
         }
         let shortest = dubins::shortest(from, to, r);
-        if clear(self.problem, &shortest) {
+        if self.problem.flyable(&shortest) {
             return Leg::Clear(shortest);
         }
         if self.routed[i] == ROUTES_A_LEG {
@@ -240,7 +240,7 @@ impl<'a> Chain<'a> {
         self.router
             .route(from, to)
             .ok()
-            .filter(|c| clear(self.problem, c))
+            .filter(|c| self.problem.flyable(c))
             .map_or(Leg::Blocked, Leg::Clear)
     }
 

@@ -20,9 +20,10 @@ mod tests;
 
 use super::area::patch::{Corners, Listed, Patches};
 use super::area::stc::{CoverageLoop, LoopCell, LoopError};
-use super::area::{CellId, hash_of, millimetres};
+use super::area::{
+    AreaProblem, CellId, check_figures, check_launch, hash_of, hash_words, millimetres,
+};
 use crate::frame::{MAX_MISSION_RADIUS_M, Point, Pose};
-use crate::geometry::NoFlyZones;
 use crate::path::{RouteLimits, Router};
 use crate::trajectory::Curve;
 use chain::Chain;
@@ -30,25 +31,14 @@ use std::sync::Arc;
 
 /// What is to be strung on a loop, and with what it is flown.
 #[derive(Clone, Debug)]
-pub struct StationsProblem {
+pub struct StationsProblem<'a> {
+    /// Zones, lengths and launch point of the mission; pieces of lines are as long as its
+    /// lanes are wide.
+    pub flown: &'a AreaProblem,
     /// The pieces, each to be held by one frame; their numbers name the cells.
     pub stations: Vec<Corners>,
     /// The order in which they are flown: each number once.
     pub order: Vec<usize>,
-    /// Where nobody may fly.
-    pub zones: Arc<NoFlyZones>,
-    /// Smallest turn radius of all UAVs of the mission, metres.
-    pub turn_radius_m: f64,
-    /// Distance that every curve keeps from the zones, metres.
-    pub clearance_m: f64,
-    /// Half the camera footprint across the track, metres.
-    pub footprint_across_m: f64,
-    /// Half the camera footprint along the track, metres.
-    pub footprint_along_m: f64,
-    /// How far a UAV may stray from its curve, metres; taken off the footprint.
-    pub tracking_error_m: f64,
-    /// A point from which the loop must be reachable (a launch point).
-    pub launch: Point,
 }
 
 /// Most stations of a loop: cells are numbered by `u16`.
@@ -66,13 +56,14 @@ const MAX_STATIONS: usize = 65_535;
 ///
 /// # Errors
 /// [`LoopError`].
-pub fn build(problem: &StationsProblem) -> Result<CoverageLoop, LoopError> {
+pub fn build(problem: &StationsProblem<'_>) -> Result<CoverageLoop, LoopError> {
     check(problem)?;
+    let flown = problem.flown;
     let limits = RouteLimits {
-        turn_radius_m: problem.turn_radius_m,
-        clearance_m: problem.clearance_m,
+        turn_radius_m: flown.turn_radius_m,
+        clearance_m: flown.clearance_m,
     };
-    let router = Router::new(Arc::clone(&problem.zones), limits);
+    let router = Router::new(Arc::clone(&flown.zones), limits);
     let mut uncoverable = Vec::new();
     let mut stands = Vec::with_capacity(problem.order.len());
     for &n in &problem.order {
@@ -81,7 +72,7 @@ pub fn build(problem: &StationsProblem) -> Result<CoverageLoop, LoopError> {
             Err(why) => uncoverable.push((name(n), why.to_owned())),
         }
     }
-    let chain = Chain::new(problem, &router, stands);
+    let chain = Chain::new(flown, &router, stands);
     let (visits, cut_off) = chain.solve();
     uncoverable.extend(cut_off.into_iter().map(|n| {
         (
@@ -93,11 +84,14 @@ pub fn build(problem: &StationsProblem) -> Result<CoverageLoop, LoopError> {
         return Err(LoopError::Nothing);
     }
     let cells = cells(&visits);
-    reachable(problem, &router, &cells)?;
+    let gates: Vec<Pose> = cells.iter().filter_map(|c| c.curve.start()).collect();
+    if !flown.launch_reaches(&router, &gates) {
+        return Err(LoopError::CutOff);
+    }
     uncoverable.sort();
     let corners = problem.stations.clone();
     let hash = hash_of(corners_hash(&corners), &cells);
-    let reach_m = problem.footprint_across_m.max(problem.footprint_along_m);
+    let reach_m = flown.footprint_across_m.max(flown.footprint_along_m);
     Ok(CoverageLoop::assembled(
         Patches::Listed(Listed::new(corners, reach_m)),
         cells,
@@ -112,24 +106,8 @@ fn name(n: usize) -> CellId {
 }
 
 /// Refuses what cannot be flown or has no meaning.
-fn check(p: &StationsProblem) -> Result<(), LoopError> {
-    let positive = [(p.turn_radius_m, "turn radius")];
-    let not_negative = [
-        (p.clearance_m, "clearance"),
-        (p.footprint_across_m, "footprint across the track"),
-        (p.footprint_along_m, "footprint along the track"),
-        (p.tracking_error_m, "tracking error"),
-    ];
-    let bad = |(value, least, name): (f64, f64, &'static str)| {
-        (!value.is_finite() || value < least).then_some(LoopError::Number(name))
-    };
-    let figures = positive
-        .map(|(v, name)| (v, 1e-3, name))
-        .into_iter()
-        .chain(not_negative.map(|(v, name)| (v, 0.0, name)));
-    if let Some(e) = figures.into_iter().find_map(bad) {
-        return Err(e);
-    }
+fn check(p: &StationsProblem<'_>) -> Result<(), LoopError> {
+    check_figures(p.flown)?;
     if p.stations.len() > MAX_STATIONS {
         return Err(LoopError::TooManyCells(p.stations.len()));
     }
@@ -137,13 +115,10 @@ fn check(p: &StationsProblem) -> Result<(), LoopError> {
         return Err(LoopError::Nothing);
     }
     let inside = |p: &Point| p.x.abs() <= MAX_MISSION_RADIUS_M && p.y.abs() <= MAX_MISSION_RADIUS_M;
-    if !p.stations.iter().flatten().all(inside) || !inside(&p.launch) {
+    if !p.stations.iter().flatten().all(inside) || !inside(&p.flown.launch) {
         return Err(LoopError::Extent);
     }
-    if p.zones.distance_m(p.launch) < p.clearance_m {
-        return Err(LoopError::Launch);
-    }
-    Ok(())
+    check_launch(p.flown)
 }
 
 /// A station as it is flown: at this pose, and on to the next by this curve.
@@ -178,41 +153,13 @@ fn cells(visits: &[Visit]) -> Vec<LoopCell> {
         .collect()
 }
 
-/// Boundaries of the loop that are tried from the launch point, evenly spread.
-const LAUNCH_GATES: usize = 8;
-
-/// Headings tried at the launch point.
-const LAUNCH_HEADINGS: u8 = 8;
-
-fn reachable(p: &StationsProblem, router: &Router, cells: &[LoopCell]) -> Result<(), LoopError> {
-    let gates = cells
-        .iter()
-        .step_by(cells.len().div_ceil(LAUNCH_GATES))
-        .filter_map(|c| c.curve.start());
-    let heading = |i: u8| crate::math::TAU * f64::from(i) / f64::from(LAUNCH_HEADINGS);
-    for gate in gates {
-        if (0..LAUNCH_HEADINGS).any(|i| router.route(Pose::new(p.launch, heading(i)), gate).is_ok())
-        {
-            return Ok(());
-        }
-    }
-    Err(LoopError::CutOff)
-}
-
-/// FNV-1a over the corners, in whole millimetres.
+/// Identifies what the pieces look like, to the millimetre.
 fn corners_hash(corners: &[Corners]) -> u64 {
-    let mut h: u64 = 0xcbf2_9ce4_8422_2325;
-    for p in corners.iter().flatten() {
-        for v in [p.x, p.y] {
-            #[allow(
-                clippy::cast_possible_truncation,
-                reason = "within 20 km of the origin"
-            )]
-            let mm = (v * 1000.0).round() as i64;
-            for byte in mm.to_le_bytes() {
-                h = (h ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-            }
-        }
-    }
-    h
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "within 20 km of the origin"
+    )]
+    let mm = |v: f64| ((v * 1000.0).round() as i64).cast_unsigned();
+    let words = |p: &Point| [mm(p.x), mm(p.y)];
+    hash_words(corners.iter().flatten().flat_map(words))
 }

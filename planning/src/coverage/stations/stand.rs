@@ -7,7 +7,6 @@ use super::StationsProblem;
 use super::targets::along;
 use crate::coverage::area::patch::{Corners, frame_holds, middle};
 use crate::frame::{Point, Pose, Vector};
-use crate::geometry::contingency_clear;
 use crate::math::{TAU, sin_cos, wrap_pi};
 use crate::trajectory::Curve;
 
@@ -32,19 +31,19 @@ const FINE_HEADINGS: u8 = 48;
 ///
 /// # Errors
 /// A clause that says why there is none.
-pub(super) fn stands(problem: &StationsProblem, n: usize) -> Result<Vec<Pose>, &'static str> {
+pub(super) fn stands(problem: &StationsProblem<'_>, n: usize) -> Result<Vec<Pose>, &'static str> {
     let station = &problem.stations[n];
     let at = middle(station);
     let lens = Lens::of(problem);
     // Along the piece and all round from there: a straight road is flown straight.
     let plain = all_round(HEADINGS).map(|h| Pose::new(at, wrap_pi(along(station) + h)));
     let clear: Vec<Pose> = plain
-        .filter(|&pose| lens.holds(station, pose) && flyable(problem, pose))
+        .filter(|&pose| lens.holds(station, pose) && problem.flown.flyable(&run(pose)))
         .collect();
     if !clear.is_empty() {
         return Ok(clear);
     }
-    let inside = |p: &Point| problem.zones.distance_m(*p) <= 0.0;
+    let inside = |p: &Point| problem.flown.zones.distance_m(*p) <= 0.0;
     if station.iter().all(inside) {
         return Err("inside a no-fly zone");
     }
@@ -64,7 +63,7 @@ fn all_round(headings: u8) -> impl Iterator<Item = f64> {
 }
 
 /// Poses around the middle of the piece, the nearest first.
-fn beside(problem: &StationsProblem, station: &Corners, lens: &Lens) -> Vec<Pose> {
+fn beside(problem: &StationsProblem<'_>, station: &Corners, lens: &Lens) -> Vec<Pose> {
     let at = middle(station);
     let mut found: Vec<(f64, Pose)> = Vec::new();
     for h in all_round(FINE_HEADINGS) {
@@ -74,7 +73,7 @@ fn beside(problem: &StationsProblem, station: &Corners, lens: &Lens) -> Vec<Pose
             for b in offsets(lens.along_m) {
                 let pose = Pose::new(at + left * a + forward * b, h);
                 if lens.holds(station, pose)
-                    && problem.zones.distance_m(pose.position()) >= problem.clearance_m
+                    && problem.flown.zones.distance_m(pose.position()) >= problem.flown.clearance_m
                 {
                     found.push((a.abs() + b.abs(), pose));
                 }
@@ -85,7 +84,7 @@ fn beside(problem: &StationsProblem, station: &Corners, lens: &Lens) -> Vec<Pose
     found
         .into_iter()
         .map(|(_, pose)| pose)
-        .filter(|&pose| flyable(problem, pose))
+        .filter(|&pose| problem.flown.flyable(&run(pose)))
         .take(MOST)
         .collect()
 }
@@ -108,10 +107,10 @@ struct Lens {
 }
 
 impl Lens {
-    fn of(p: &StationsProblem) -> Self {
+    fn of(p: &StationsProblem<'_>) -> Self {
         Self {
-            across_m: p.footprint_across_m - p.tracking_error_m,
-            along_m: p.footprint_along_m - p.tracking_error_m - SLACK_M,
+            across_m: p.flown.footprint_across_m - p.flown.tracking_error_m,
+            along_m: p.flown.footprint_along_m - p.flown.tracking_error_m - SLACK_M,
         }
     }
 
@@ -127,19 +126,7 @@ impl Lens {
 }
 
 /// The short straight through a pose.
-pub(super) fn run(pose: Pose) -> Curve {
+fn run(pose: Pose) -> Curve {
     let start = Pose::new(pose.position() - pose.direction() * RUN_M, pose.heading_rad);
     Curve::from_pieces(start, &[(0.0, 2.0 * RUN_M)])
-}
-
-fn flyable(problem: &StationsProblem, pose: Pose) -> bool {
-    clear(problem, &run(pose))
-}
-
-/// Whether a curve keeps the clearance, and a UAV that has to loiter anywhere on it
-/// stays out of the zones.
-pub(super) fn clear(p: &StationsProblem, curve: &Curve) -> bool {
-    p.zones.is_clear(curve, p.clearance_m)
-        && (p.clearance_m >= 2.0 * p.turn_radius_m + p.tracking_error_m
-            || contingency_clear(&p.zones, curve, p.turn_radius_m, p.clearance_m / 2.0))
 }

@@ -5,6 +5,7 @@
 //! the same way.
 
 use super::{StationsProblem, order};
+use crate::coverage::area::AreaProblem;
 use crate::coverage::area::patch::Corners;
 use crate::coverage::exact::Pass;
 use crate::coverage::line::strip;
@@ -43,8 +44,7 @@ const END_LANES: f64 = 0.02;
 
 /// Passes over an area as stations, in the order of flight: each cut to at most
 /// `longest_m`, as wide as a lane.
-#[must_use]
-pub fn of_passes(passes: &[Pass], lane_m: f64, longest_m: f64) -> Vec<Corners> {
+fn of_passes(passes: &[Pass], lane_m: f64, longest_m: f64) -> Vec<Corners> {
     let mut stations = Vec::new();
     for pass in passes {
         let over = (pass.to - pass.from) / pass.length_m().max(1e-3) * (END_LANES * lane_m);
@@ -91,34 +91,41 @@ impl Targets {
             Self::Lines(lines) => stretches(lines, longest_m).iter().flat_map(cut).collect(),
         }
     }
-
-    /// The pieces as stations, and the order in which one closed tour from `launch`
-    /// sees them.
-    #[must_use]
-    pub fn stations(&self, longest_m: f64, launch: Point) -> (Vec<Corners>, Vec<usize>) {
-        let stations = self.pieces(longest_m);
-        let order = match self {
-            Self::Points(points) => order::of_points(points, launch),
-            Self::Lines(lines) => order::of_lines(&stretches(lines, longest_m), launch),
-        };
-        (stations, order)
-    }
 }
 
-impl StationsProblem {
-    /// Takes stations and their order from targets.
+impl<'a> StationsProblem<'a> {
+    /// The pieces of targets, in the order in which one closed tour from the launch point
+    /// sees them.
     #[must_use]
-    pub fn with_targets(mut self, targets: &Targets, longest_m: f64) -> Self {
-        (self.stations, self.order) = targets.stations(longest_m, self.launch);
-        self
+    pub fn of_targets(flown: &'a AreaProblem, targets: &Targets) -> Self {
+        let longest_m = flown.lane_spacing_m;
+        let (stations, order) = match targets {
+            Targets::Points(points) => (
+                points.iter().map(square).collect(),
+                order::of_points(points, flown.launch),
+            ),
+            Targets::Lines(lines) => {
+                let stretches = stretches(lines, longest_m);
+                let pieces = stretches.iter().flat_map(cut).collect();
+                (pieces, order::of_lines(&stretches, flown.launch))
+            }
+        };
+        Self {
+            flown,
+            stations,
+            order,
+        }
     }
 
-    /// Takes stations from passes in their order, in pieces as long as a lane is wide.
+    /// Passes in their order, in pieces as long as a lane is wide.
     #[must_use]
-    pub fn with_passes(mut self, passes: &[Pass], lane_m: f64) -> Self {
-        self.stations = of_passes(passes, lane_m, lane_m);
-        self.order = (0..self.stations.len()).collect();
-        self
+    pub fn of_passes(flown: &'a AreaProblem, passes: &[Pass]) -> Self {
+        let stations = of_passes(passes, flown.lane_spacing_m, flown.lane_spacing_m);
+        Self {
+            flown,
+            order: (0..stations.len()).collect(),
+            stations,
+        }
     }
 }
 

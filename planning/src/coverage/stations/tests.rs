@@ -3,7 +3,7 @@
 use super::targets::{LineTarget, PointTarget, Targets};
 use super::*;
 use crate::coverage::area::patch::frame_holds;
-use crate::geometry::{Polygon, contingency_clear};
+use crate::geometry::{NoFlyZones, Polygon, contingency_clear};
 use crate::math::wrap_pi;
 use proptest::prelude::*;
 
@@ -12,11 +12,12 @@ fn rectangle(x0: f64, y0: f64, x1: f64, y1: f64) -> Polygon {
     Polygon::new(ring.map(|(x, y)| Point::new(x, y)).to_vec()).unwrap()
 }
 
-fn problem(targets: &Targets, zones: Vec<Polygon>) -> StationsProblem {
-    StationsProblem {
-        stations: Vec::new(),
-        order: Vec::new(),
+/// What a mission of these zones is flown with.
+fn flown(zones: Vec<Polygon>) -> AreaProblem {
+    AreaProblem {
+        area: rectangle(0.0, 0.0, 1000.0, 1000.0),
         zones: Arc::new(NoFlyZones::new(zones)),
+        lane_spacing_m: 48.0,
         turn_radius_m: 23.0,
         clearance_m: 20.0,
         footprint_across_m: 59.0,
@@ -24,11 +25,11 @@ fn problem(targets: &Targets, zones: Vec<Polygon>) -> StationsProblem {
         tracking_error_m: 3.0,
         launch: Point::new(-200.0, -200.0),
     }
-    .with_targets(targets, 48.0)
 }
 
-fn judge(p: &StationsProblem, l: &CoverageLoop) {
-    let mut seen = vec![0; p.stations.len()];
+fn judge(problem: &StationsProblem<'_>, l: &CoverageLoop) {
+    let (p, stations) = (problem.flown, &problem.stations);
+    let mut seen = vec![0; stations.len()];
     let (across_m, along_m) = (
         p.footprint_across_m - p.tracking_error_m,
         p.footprint_along_m - p.tracking_error_m,
@@ -54,7 +55,7 @@ fn judge(p: &StationsProblem, l: &CoverageLoop) {
         );
         let view = c.curve.pose_at(c.view_m).unwrap();
         assert!(
-            frame_holds(&p.stations[n], view, across_m + 1e-2, along_m + 1e-2),
+            frame_holds(&stations[n], view, across_m + 1e-2, along_m + 1e-2),
             "{n}"
         );
     }
@@ -81,7 +82,8 @@ fn points_are_strung_on_one_loop() {
         (0.0, 400.0),
         (250.0, 900.0),
     ]);
-    let p = problem(&targets, vec![rectangle(200.0, 350.0, 300.0, 450.0)]);
+    let flown = flown(vec![rectangle(200.0, 350.0, 300.0, 450.0)]);
+    let p = StationsProblem::of_targets(&flown, &targets);
     let l = build(&p).unwrap();
     judge(&p, &l);
     assert_eq!(l.len(), 5);
@@ -94,7 +96,8 @@ fn points_are_strung_on_one_loop() {
 #[test]
 fn one_point_is_circled_and_two_of_the_same_are_two_cells() {
     for targets in [points(&[(50.0, 0.0)]), points(&[(50.0, 0.0), (50.0, 0.0)])] {
-        let p = problem(&targets, vec![]);
+        let flown = flown(vec![]);
+        let p = StationsProblem::of_targets(&flown, &targets);
         let l = build(&p).unwrap();
         judge(&p, &l);
         assert!(l.cells().iter().all(|c| c.curve.length_m() > 100.0));
@@ -112,7 +115,8 @@ fn what_cannot_be_seen_is_listed_with_the_reason() {
         wall(700.0, 711.0, 710.0, 1089.0),
         wall(1090.0, 711.0, 1100.0, 1089.0),
     ];
-    let p = problem(&targets, zones);
+    let flown = flown(zones);
+    let p = StationsProblem::of_targets(&flown, &targets);
     let l = build(&p).unwrap();
     judge(&p, &l);
     let why: Vec<(u16, &str)> = l
@@ -133,7 +137,7 @@ fn what_cannot_be_seen_is_listed_with_the_reason() {
         radius_m: 60.0,
     }]);
     assert_eq!(
-        build(&problem(&large, vec![])).unwrap_err(),
+        build(&StationsProblem::of_targets(&self::flown(vec![]), &large)).unwrap_err(),
         LoopError::Nothing
     );
 }
@@ -148,7 +152,8 @@ fn a_crossing_of_roads_is_seen_piece_by_piece() {
         way(&[(0.0, 300.0), (300.0, 300.0), (600.0, 310.0)]),
         way(&[(300.0, 0.0), (300.0, 300.0), (280.0, 600.0)]),
     ]);
-    let p = problem(&targets, vec![]);
+    let flown = flown(vec![]);
+    let p = StationsProblem::of_targets(&flown, &targets);
     // Four arms of 300 m in seven pieces each.
     assert_eq!(p.stations.len(), 28);
     let l = build(&p).unwrap();
@@ -187,7 +192,8 @@ fn a_corridor_wider_than_a_lane_is_flown_in_lanes() {
         way: vec![Point::new(0.0, 0.0), Point::new(960.0, 0.0)],
         width_m: 144.0,
     }]);
-    let p = problem(&targets, vec![]);
+    let flown = flown(vec![]);
+    let p = StationsProblem::of_targets(&flown, &targets);
     assert_eq!(p.stations.len(), 3 * 20);
     let l = build(&p).unwrap();
     judge(&p, &l);
@@ -203,7 +209,8 @@ proptest! {
         houses in prop::collection::vec((0.0f64..800.0, 0.0f64..800.0, 10.0f64..150.0, 10.0f64..150.0), 0..5),
     ) {
         let zones = houses.iter().map(|&(x, y, w, h)| rectangle(x, y, x + w, y + h)).collect();
-        let p = problem(&points(&at), zones);
+        let flown = flown(zones);
+    let p = StationsProblem::of_targets(&flown, &points(&at));
         match build(&p) {
             Ok(l) => judge(&p, &l),
             Err(e) => prop_assert!(matches!(e, LoopError::Nothing | LoopError::CutOff), "{e}"),
@@ -216,7 +223,8 @@ proptest! {
     ) {
         let way: Vec<Point> = at.iter().map(|&(x, y)| Point::new(x, y)).collect();
         let targets = Targets::Lines(vec![LineTarget { way: way.clone(), width_m }]);
-        let (stations, mut order) = targets.stations(48.0, Point::origin());
+        let flown = flown(vec![]);
+        let StationsProblem { stations, mut order, .. } = StationsProblem::of_targets(&flown, &targets);
         order.sort_unstable();
         prop_assert_eq!(order, (0..stations.len()).collect::<Vec<_>>());
         for s in &stations {
