@@ -4,9 +4,9 @@
 use super::approximate::{self, Request};
 use super::around::Around;
 use super::fleet::{self, Member};
-use super::flights::{Flight, Flights, Sheet, covered_share};
+use super::flights::{Flight, Flights, covered_share};
+use super::output::OutputArgs;
 use super::site::{self, Site};
-use super::tours::Format;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use serde_json::{Map, Value, json};
@@ -84,15 +84,9 @@ pub struct CoverArgs {
     /// Steps of improvement; the same steps give the same plan everywhere.
     #[arg(long, default_value_t = 20_000, value_name = "N")]
     pub steps: usize,
-    /// Height of the waypoints above home in `.plan` files, metres.
-    #[arg(long, default_value_t = 60.0, value_name = "M")]
-    pub altitude_m: f64,
-    /// How the result is printed.
-    #[arg(long, value_enum, default_value_t = Format::Json)]
-    pub format: Format,
-    /// Directory for the `.plan` files, one a UAV, instead of printing.
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
+    /// The form of the result.
+    #[command(flatten)]
+    pub output: OutputArgs,
 }
 
 /// Plans, and returns the text to print.
@@ -106,6 +100,7 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         args.speed_mps,
         args.endurance_s,
     )?;
+    args.output.check(team.len())?;
     for (flag, value) in [
         ("--speed-mps: the speed", args.speed_mps),
         ("--turn-radius-m: the turn radius", args.turn_radius_m),
@@ -146,14 +141,10 @@ pub fn run(args: &CoverArgs) -> Result<String> {
     let best = plans.iter().reduce(|a, b| better(a, b));
     let flights = best.context("no planner was asked")?;
     site.notices.extend(notices);
-    Sheet {
-        origin: site.origin,
-        flights,
-        compared: plans.iter().map(Flights::compared).collect(),
-        notices: &site.notices,
-        altitude_m: args.altitude_m,
-    }
-    .print(args.format, args.out.as_deref())
+    let compared: Vec<Value> = plans.iter().map(Flights::compared).collect();
+    let notices = &site.notices;
+    let sheet = flights.sheet(site.origin, &compared, notices, args.output.altitude_m);
+    args.output.print(&sheet)
 }
 
 /// The plan that sees more, or as much sooner.

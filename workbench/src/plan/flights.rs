@@ -1,19 +1,12 @@
 //! Flights of a team over an area, whoever planned them: what they are predicted to take,
-//! how much they see, and how they are printed (D2.7 §3.6).
+//! and how much they see (D2.7 §3.6).
 
-use super::tours::Format;
-use anyhow::{Context, Result, bail};
+use super::output::{Printed, Sheet};
 use serde_json::{Map, Value, json};
-use skein_interop::place::from_plane;
-use skein_interop::plan::{PlanFile, Waypoint, write};
 use skein_planning::airframe::{Airframe, GRAVITY_MPS2, PowerModel};
 use skein_planning::frame::{Origin, Point};
 use skein_planning::geometry::Polygon;
 use skein_planning::math::{PI, atan2};
-use std::path::Path;
-
-/// Points nearer to each other than this are one in the track, metres.
-const COINCIDENT_M: f64 = 1e-3;
 
 /// Points of the area that are looked at to tell the share that is seen: a tenth of a
 /// percent is one in a thousand.
@@ -70,20 +63,19 @@ impl Flight {
         self.time_s() + more * turned_rad * self.turn_radius_m / v
     }
 
-    fn told(&self, uav: usize) -> Value {
-        let mut out = self.more.clone();
-        out.insert("uav".to_owned(), json!(uav + 1));
-        out.insert("name".to_owned(), json!(self.name));
-        out.insert("time_s".to_owned(), json!(self.time_s()));
-        out.insert("length_m".to_owned(), json!(self.length_m));
-        out.insert("energy_s".to_owned(), json!(self.energy_s()));
-        Value::Object(out)
-    }
-
-    fn points(&self) -> Vec<Point> {
-        let mut track = self.track.clone();
-        track.dedup_by(|p, q| (*p - *q).norm() < COINCIDENT_M);
-        track
+    fn printed(&self, altitude_m: f64) -> Printed {
+        let mut told = self.more.clone();
+        told.insert("time_s".to_owned(), json!(self.time_s()));
+        told.insert("length_m".to_owned(), json!(self.length_m));
+        told.insert("energy_s".to_owned(), json!(self.energy_s()));
+        Printed {
+            name: self.name.clone(),
+            track: self.track.clone(),
+            altitude_m,
+            speed_mps: self.speed_mps,
+            told,
+            details: Map::new(),
+        }
     }
 }
 
@@ -126,6 +118,31 @@ impl Flights {
             "energy_s": self.flights.iter().map(Flight::energy_s).sum::<f64>(),
         })
     }
+
+    /// What is printed, with what all planners that were asked came to.
+    #[must_use]
+    pub fn sheet(
+        &self,
+        origin: Origin,
+        compared: &[Value],
+        notices: &[String],
+        altitude_m: f64,
+    ) -> Sheet {
+        let mut summary = self.compared();
+        for (key, value) in &self.more {
+            summary[key] = value.clone();
+        }
+        if compared.len() > 1 {
+            summary["compared"] = json!(compared);
+        }
+        summary["notices"] = json!(notices);
+        Sheet {
+            origin,
+            summary,
+            flights: self.flights.iter().map(|f| f.printed(altitude_m)).collect(),
+            shapes: self.shapes.clone(),
+        }
+    }
 }
 
 /// The share of an area without holes that is seen, by samples.
@@ -153,135 +170,6 @@ pub fn covered_share(
         y += pitch_m;
     }
     f64::from(seen) / f64::from(all.max(1))
-}
-
-/// Flights to be printed.
-pub struct Sheet<'a> {
-    /// Where the plane lies.
-    pub origin: Origin,
-    /// What is printed.
-    pub flights: &'a Flights,
-    /// What all planners that were asked came to.
-    pub compared: Vec<Value>,
-    /// What was left out of the file.
-    pub notices: &'a [String],
-    /// Height of waypoints above home, metres.
-    pub altitude_m: f64,
-}
-
-impl Sheet<'_> {
-    /// The text to print.
-    ///
-    /// # Errors
-    /// When a file cannot be written, or several plans have no folder.
-    pub fn print(&self, format: Format, out: Option<&Path>) -> Result<String> {
-        format.check_out(out)?;
-        match format {
-            Format::Json => Ok(self.json().to_string()),
-            Format::Geojson => Ok(self.geojson().to_string()),
-            Format::Plan => self.plans(out),
-        }
-    }
-
-    fn summary(&self) -> Value {
-        let mut out = self.flights.compared();
-        for (key, value) in &self.flights.more {
-            out[key] = value.clone();
-        }
-        if self.compared.len() > 1 {
-            out["compared"] = json!(self.compared);
-        }
-        out["notices"] = json!(self.notices);
-        out
-    }
-
-    fn json(&self) -> Value {
-        let tours = self
-            .flights
-            .flights
-            .iter()
-            .enumerate()
-            .map(|(uav, flight)| {
-                let points = flight.points().into_iter().map(|p| {
-                    let at = from_plane(self.origin, p);
-                    json!({"lat_deg": at.lat_deg, "lon_deg": at.lon_deg})
-                });
-                let mut tour = flight.told(uav);
-                tour["points"] = points.collect();
-                tour
-            });
-        let mut out = self.summary();
-        out["tours"] = tours.collect();
-        out
-    }
-
-    fn geojson(&self) -> Value {
-        let place = |p: &Point| {
-            let at = from_plane(self.origin, *p);
-            json!([at.lon_deg, at.lat_deg])
-        };
-        let flights = self
-            .flights
-            .flights
-            .iter()
-            .enumerate()
-            .map(|(uav, flight)| {
-                let line: Vec<Value> = flight.points().iter().map(place).collect();
-                // A line has two points at least; a UAV that stays has one.
-                let geometry = if line.len() < 2 {
-                    json!({"type": "Point", "coordinates": line.first()})
-                } else {
-                    json!({"type": "LineString", "coordinates": line})
-                };
-                json!({"type": "Feature", "properties": flight.told(uav), "geometry": geometry})
-            });
-        let shapes = self.flights.shapes.iter().map(|(ring, properties)| {
-            let ring: Vec<Value> = ring.iter().chain(ring.first()).map(place).collect();
-            json!({
-                "type": "Feature", "properties": properties,
-                "geometry": {"type": "Polygon", "coordinates": [ring]},
-            })
-        });
-        let mut out = self.summary();
-        out["type"] = json!("FeatureCollection");
-        out["features"] = flights.chain(shapes).collect();
-        out
-    }
-
-    /// One QGroundControl plan a UAV.
-    fn plans(&self, out: Option<&Path>) -> Result<String> {
-        let text = |flight: &Flight| {
-            let at = |p: &Point| from_plane(self.origin, *p);
-            let track = flight.points();
-            let waypoints = track.iter().skip(1);
-            write(&PlanFile {
-                waypoints: waypoints
-                    .map(|p| Waypoint::new(at(p), self.altitude_m))
-                    .collect(),
-                home: track.first().map(at),
-                cruise_mps: Some(flight.speed_mps),
-                ..PlanFile::default()
-            })
-        };
-        let flights = &self.flights.flights;
-        let Some(dir) = out else {
-            if let [flight] = flights.as_slice() {
-                return Ok(text(flight));
-            }
-            bail!("--format plan for several UAVs needs --out DIR: one file a UAV");
-        };
-        std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
-        let mut written = Vec::new();
-        for flight in flights {
-            let path = dir.join(format!("{}.plan", flight.name));
-            std::fs::write(&path, text(flight) + "\n")
-                .with_context(|| format!("cannot write {}", path.display()))?;
-            written.push(path.display().to_string());
-        }
-        let mut out = self.summary();
-        out["files"] = json!(written);
-        Ok(out.to_string())
-    }
 }
 
 #[cfg(test)]

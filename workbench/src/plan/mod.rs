@@ -7,6 +7,7 @@ pub mod fleet;
 pub mod flights;
 pub mod line;
 mod map;
+pub mod output;
 pub mod route;
 pub mod site;
 pub mod tours;

@@ -1,16 +1,16 @@
-//! What `plan line` and `plan visit` share: the team, the wind, the zones on the way, and
-//! how tours are printed. Leaves to them which lines there are to fly.
+//! What `plan line` and `plan visit` share: the team, the wind, and the zones on the way.
+//! Leaves to them which lines there are to fly.
 
 use super::around::{Around, Asker};
 use super::fleet::{self, Member};
+use super::output::{OutputArgs, Printed, Sheet};
 use super::{lat_lon, map};
-use anyhow::{Context, Result, bail, ensure};
-use clap::{Args, ValueEnum};
+use anyhow::{Context, Result, ensure};
+use clap::Args;
 use serde_json::{Value, json};
-use skein_interop::place::{LatLon, from_plane, to_plane};
-use skein_interop::plan::{PlanFile, Waypoint, write};
+use skein_interop::place::{LatLon, to_plane};
 use skein_interop::{geojson, plan as qgc};
-use skein_planning::coverage::line::{Line, LinePlan, Surveyor};
+use skein_planning::coverage::line::{Line, LinePlan, Pass, Surveyor};
 use skein_planning::coverage::metric::{InWind, Matrix, Metric};
 use skein_planning::frame::{Origin, Point, Vector};
 use skein_planning::geometry::offset::Zone;
@@ -24,9 +24,6 @@ const MOST_PLACES: usize = 3_000;
 
 /// Speeds that differ by less than this are the same, m/s.
 const SAME_SPEED_MPS: f64 = 1e-9;
-
-/// Points nearer to each other than this are one in the track, metres.
-const COINCIDENT_M: f64 = 1e-3;
 
 /// The team, the wind and the form of the result.
 #[derive(Debug, Args)]
@@ -77,39 +74,9 @@ pub struct TourArgs {
     /// Steps of improvement; the same steps give the same plan everywhere.
     #[arg(long, default_value_t = skein_planning::coverage::line::DEFAULT_STEPS, value_name = "N")]
     pub steps: usize,
-    /// Height of the waypoints above home in `.plan` files, metres.
-    #[arg(long, default_value_t = 60.0, value_name = "M")]
-    pub altitude_m: f64,
-    /// How the result is printed.
-    #[arg(long, value_enum, default_value_t = Format::Json)]
-    pub format: Format,
-    /// Directory for the `.plan` files, one a UAV, instead of printing.
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-}
-
-/// Forms of the result.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Format {
-    /// One JSON object.
-    Json,
-    /// A feature collection: one line a UAV.
-    Geojson,
-    /// QGroundControl plans, one a UAV: several need `--out`.
-    Plan,
-}
-
-impl Format {
-    /// Refuses a folder for what is printed, so that nobody looks for files there.
-    ///
-    /// # Errors
-    /// When there is a folder and the form is not that of files.
-    pub fn check_out(self, out: Option<&std::path::Path>) -> Result<()> {
-        if out.is_some() && self != Self::Plan {
-            bail!("--out is for .plan files, one a UAV: add --format plan, or leave it out");
-        }
-        Ok(())
-    }
+    /// The form of the result.
+    #[command(flatten)]
+    pub output: OutputArgs,
 }
 
 /// The ways to fly, over numbered places.
@@ -177,6 +144,7 @@ impl Ways {
             depots: Vec::new(),
             zones: zones_inside(file, origin)?,
         };
+        args.output.check(ways.team.len())?;
         if let Some(file) = &args.zones {
             let map = map::read(file, origin, &[], None).context("--zones")?;
             ways.zones.extend(map.zones);
@@ -263,17 +231,12 @@ impl Ways {
         };
         let team: Vec<Surveyor> = self.team.iter().zip(&self.depots).map(uav).collect();
         let plan = planner(&lines, &team, &metric)?;
-        let sheet = Sheet {
+        let tours = Tours {
             ways: self,
             around: &around,
             plan: &plan,
         };
-        args.format.check_out(args.out.as_deref())?;
-        match args.format {
-            Format::Json => Ok(sheet.json().to_string()),
-            Format::Geojson => Ok(sheet.geojson().to_string()),
-            Format::Plan => sheet.plans(args),
-        }
+        args.output.print(&tours.sheet(args.output.altitude_m))
     }
 
     /// Costs of the shortest ways round the zones between all places.
@@ -356,14 +319,14 @@ fn zones_inside(file: &Path, origin: Origin) -> Result<Vec<Zone>> {
     Ok(zones)
 }
 
-/// Tours to be printed.
-struct Sheet<'a> {
+/// Tours to be told about.
+struct Tours<'a> {
     ways: &'a Ways,
     around: &'a Around,
     plan: &'a LinePlan,
 }
 
-impl Sheet<'_> {
+impl Tours<'_> {
     /// The points of a tour, from the depot back to it.
     fn track(&self, uav: usize) -> Vec<Point> {
         let depot = self.ways.at[self.ways.depots[uav]];
@@ -386,8 +349,6 @@ impl Sheet<'_> {
             track.extend(way.iter().skip(1));
         }
         go(&mut track, &mut asker, depot);
-        // Different places may coincide, a target with the depot for example.
-        track.dedup_by(|p, q| (*p - *q).norm() < COINCIDENT_M);
         track
     }
 
@@ -410,99 +371,36 @@ impl Sheet<'_> {
         self.plan.tours[uav].cost * team[0].speed_mps / team[uav].speed_mps
     }
 
-    fn tour(&self, uav: usize) -> Value {
+    fn printed(&self, uav: usize, altitude_m: f64) -> Printed {
         let track = self.track(uav);
+        let member = &self.ways.team[uav];
+        let passes = &self.plan.tours[uav].passes;
         let length_m: f64 = track.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
-        json!({
-            "uav": uav + 1, "name": self.ways.team[uav].name,
-            "time_s": self.time_s(uav),
-            "length_m": length_m, "targets": self.plan.tours[uav].passes.len(),
-        })
-    }
-
-    fn json(&self) -> Value {
-        let tours: Vec<Value> = (0..self.plan.tours.len())
-            .map(|uav| {
-                let passes: Vec<Value> = self.plan.tours[uav]
-                    .passes
-                    .iter()
-                    .map(|p| json!({"target": self.ways.ways[p.line].1, "backward": p.backward}))
-                    .collect();
-                let points: Vec<Value> = self
-                    .track(uav)
-                    .iter()
-                    .map(|p| {
-                        let at = from_plane(self.ways.origin, *p);
-                        json!({"lat_deg": at.lat_deg, "lon_deg": at.lon_deg})
-                    })
-                    .collect();
-                let mut tour = self.tour(uav);
-                tour["passes"] = json!(passes);
-                tour["points"] = json!(points);
-                tour
-            })
-            .collect();
-        let mut out = self.summary();
-        out["tours"] = json!(tours);
-        out
-    }
-
-    fn geojson(&self) -> Value {
-        let features: Vec<Value> = (0..self.plan.tours.len())
-            .map(|uav| {
-                let line: Vec<Value> = self
-                    .track(uav)
-                    .iter()
-                    .map(|p| {
-                        let at = from_plane(self.ways.origin, *p);
-                        json!([at.lon_deg, at.lat_deg])
-                    })
-                    .collect();
-                // A line has two points at least; a UAV that stays has one.
-                let geometry = if line.len() < 2 {
-                    json!({"type": "Point", "coordinates": line.first()})
-                } else {
-                    json!({"type": "LineString", "coordinates": line})
-                };
-                json!({"type": "Feature", "properties": self.tour(uav), "geometry": geometry})
-            })
-            .collect();
-        let mut out = self.summary();
-        out["type"] = json!("FeatureCollection");
-        out["features"] = json!(features);
-        out
-    }
-
-    /// One QGroundControl plan a UAV.
-    fn plans(&self, args: &TourArgs) -> Result<String> {
-        let text = |uav: usize| {
-            let home = from_plane(self.ways.origin, self.ways.at[self.ways.depots[uav]]);
-            let track = self.track(uav);
-            let waypoint =
-                |p: &Point| Waypoint::new(from_plane(self.ways.origin, *p), args.altitude_m);
-            write(&PlanFile {
-                waypoints: track.iter().skip(1).map(waypoint).collect(),
-                home: Some(home),
-                cruise_mps: Some(self.ways.team[uav].speed_mps),
-                ..PlanFile::default()
-            })
-        };
-        let Some(dir) = &args.out else {
-            if self.plan.tours.len() == 1 {
-                return Ok(text(0));
-            }
-            bail!("--format plan for several UAVs needs --out DIR: one file a UAV");
-        };
-        std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
-        let mut written = Vec::new();
-        for uav in 0..self.plan.tours.len() {
-            let path = dir.join(format!("{}.plan", self.ways.team[uav].name));
-            std::fs::write(&path, text(uav) + "\n")
-                .with_context(|| format!("cannot write {}", path.display()))?;
-            written.push(path.display().to_string());
+        let told = [
+            ("time_s", json!(self.time_s(uav))),
+            ("length_m", json!(length_m)),
+            ("targets", json!(passes.len())),
+        ];
+        let pass = |p: &Pass| json!({"target": self.ways.ways[p.line].1, "backward": p.backward});
+        let details = [("passes", passes.iter().map(pass).collect())];
+        let named = |(key, value): (&str, Value)| (key.to_owned(), value);
+        Printed {
+            name: member.name.clone(),
+            track,
+            altitude_m,
+            speed_mps: member.speed_mps,
+            told: told.into_iter().map(named).collect(),
+            details: details.into_iter().map(named).collect(),
         }
-        let mut out = self.summary();
-        out["files"] = json!(written);
-        Ok(out.to_string())
+    }
+
+    fn sheet(&self, altitude_m: f64) -> Sheet {
+        let uavs = 0..self.plan.tours.len();
+        Sheet {
+            origin: self.ways.origin,
+            summary: self.summary(),
+            flights: uavs.map(|uav| self.printed(uav, altitude_m)).collect(),
+            shapes: Vec::new(),
+        }
     }
 }
