@@ -17,6 +17,7 @@
 //! | alive, suspect | heartbeat older than (k1 + k2 + D + 2) T | down |
 //! | down | a fresher heartbeat from anybody, younger than the bound | alive |
 //! | any | a heartbeat of a later life, younger than the bound | alive, in that life |
+//! | alive | an old heartbeat of the same life with a higher count | alive; gossip says it, until its author takes a new life |
 //!
 //! Ages are sums of holding times, never differences of clocks, and they count
 //! wherever a heartbeat is heard: so one that travelled long is known to be old, and
@@ -279,6 +280,11 @@ impl Membership {
         if too_old || (condemned && known_life.is_none()) {
             if known_life.is_none_or(|life| life < heard.incarnation) {
                 self.remember_dead(now, heard, changes);
+            } else if let Some(known) = self.known.get_mut(&heard.id)
+                && known.freshest.incarnation == heard.incarnation
+                && known.status == Status::Alive
+            {
+                known.note_beaten(heard);
             }
             return false;
         }
@@ -313,6 +319,9 @@ impl Membership {
             known.info.steady_since = now;
         }
         known.freshest = heard;
+        if new_life || known.beaten_before.is_some_and(|h| h.count <= heard.count) {
+            known.beaten_before = None;
+        }
         known.note_hops(period, heard.hops);
         let status = if heard.suspected.is_some() {
             Status::Suspect
@@ -417,10 +426,14 @@ impl Membership {
         self.last_tick.map_or(now, |last| last.plus_ms(step))
     }
 
-    /// What to say of others: at most `max` entries, news first (half of them at
-    /// most), then in rotation, so that nobody is left out for long. The relay fills
-    /// in the versions of records.
+    /// What to say of others: at most `max` entries. Who began a life anew without
+    /// knowing is reminded first (a quarter of the entries at most), then news (half of
+    /// the rest at most), then all in rotation, so that nobody is left out for long. The
+    /// relay fills in the versions of records.
     pub fn gossip(&mut self, now: Time, max: usize) -> Vec<Gossip> {
+        let reminders = self.known.values().filter_map(|k| k.reminder(now));
+        let mut told: Vec<Gossip> = reminders.take(max / 4).collect();
+        let max = max - told.len();
         let urgent = self.known.iter().filter(|(_, k)| k.urgent_until > now);
         let mut ids: Vec<u16> = urgent.map(|(id, _)| *id).collect();
         // The latest news first: a flood of them must not starve the last one.
@@ -439,10 +452,9 @@ impl Membership {
             self.next_gossip = last.wrapping_add(1);
         }
         ids.extend(rest);
-        ids.iter()
-            .filter_map(|id| self.known.get(id))
-            .map(|k| k.gossip(now))
-            .collect()
+        let entries = ids.iter().filter_map(|id| self.known.get(id));
+        told.extend(entries.map(|k| k.gossip(now)));
+        told
     }
 
     /// Fewest hops to the farthest live author of the last 10 T.

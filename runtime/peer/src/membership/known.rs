@@ -41,6 +41,9 @@ pub(super) struct Known {
     pub(super) eccentricity: u8,
     pub(super) urgent_until: Time,
     pub(super) restarts: Vec<Time>,
+    /// An old heartbeat of this very life beyond the one that it now beats: it began the
+    /// life anew without knowing, and has to be told.
+    pub(super) beaten_before: Option<Heartbeat>,
 }
 
 /// Hops of somebody who was not heard in the last ten periods.
@@ -64,6 +67,7 @@ impl Known {
             eccentricity: 0,
             urgent_until,
             restarts: Vec::new(),
+            beaten_before: None,
         };
         known.note_hops(period, heard.hops);
         known
@@ -132,17 +136,35 @@ impl Known {
     }
 
     pub(super) fn gossip(&self, now: Time) -> Gossip {
+        self.told(&self.freshest, now)
+    }
+
+    /// What the peer itself has to hear, if it began a life anew without knowing.
+    pub(super) fn reminder(&self, now: Time) -> Option<Gossip> {
+        self.beaten_before.as_ref().map(|h| self.told(h, now))
+    }
+
+    fn told(&self, heard: &Heartbeat, now: Time) -> Gossip {
         let ds = |age: Age| u16::try_from(age.ms(now).div_ceil(100)).unwrap_or(u16::MAX);
         Gossip {
-            id: self.freshest.id,
-            incarnation: self.freshest.incarnation,
-            heartbeat: self.freshest.count,
-            age_ds: ds(self.freshest.age),
-            hops: self.freshest.hops,
-            suspected_ds: self.freshest.suspected.map(ds),
+            id: heard.id,
+            incarnation: heard.incarnation,
+            heartbeat: heard.count,
+            age_ds: ds(heard.age),
+            hops: heard.hops,
+            suspected_ds: heard.suspected.map(ds),
             able: self.info.able,
             max_seq: 0,
             digest: 0,
+        }
+    }
+
+    /// An old heartbeat of this life that goes beyond a fresh one: nobody's heart counts
+    /// backwards, so the life was begun anew.
+    pub(super) fn note_beaten(&mut self, heard: Heartbeat) {
+        let before = self.beaten_before.map_or(self.freshest.count, |h| h.count);
+        if heard.count > before.max(self.freshest.count) {
+            self.beaten_before = Some(heard);
         }
     }
 }

@@ -107,6 +107,29 @@ fn entry(id: u16, heartbeat: u32, age_ds: u16, suspected_ds: Option<u16>) -> Gos
 }
 
 #[test]
+fn who_began_a_life_anew_is_reminded_through_those_who_never_met_the_first() {
+    let mut m = Membership::new(6, 1000);
+    // The new beginning is heard directly, the old end of the same life from afar.
+    m.on_beacon(Time(0), 4, 1, &beacon(3, Vec::new()));
+    let from_afar = |heartbeat| beacon(heartbeat, vec![entry(4, 51, 500, None)]);
+    m.on_beacon(Time(100), 9, 1, &from_afar(1));
+    assert_eq!(m.status(4), Some((1, Status::Alive)));
+    let of_four = |m: &mut Membership, max| -> Vec<u32> {
+        let told = m.gossip(Time(200), max);
+        assert!(told.len() <= max);
+        let of_four = told.iter().filter(|g| g.id == 4);
+        of_four.map(|g| g.heartbeat).collect()
+    };
+    assert_eq!(of_four(&mut m, 20), [51, 3]);
+    assert!(of_four(&mut m, 0).is_empty(), "bare beacons carry none");
+    // A life of its own ends the reminder, as does a heart that has counted so far.
+    m.on_beacon(Time(1000), 4, 2, &beacon(1, Vec::new()));
+    assert_eq!(of_four(&mut m, 20), [1]);
+    m.on_beacon(Time(1100), 9, 1, &from_afar(2));
+    assert_eq!(of_four(&mut m, 20), [1]);
+}
+
+#[test]
 fn a_suspicion_is_taken_over_and_refuted() {
     let mut m = Membership::new(1, 1000);
     m.on_beacon(Time(0), 3, 1, &beacon(1, vec![entry(2, 7, 40, None)]));
