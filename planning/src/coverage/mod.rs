@@ -6,5 +6,6 @@ pub mod exact;
 pub mod grid;
 pub mod line;
 pub mod metric;
+pub mod patrol;
 pub mod pinpoint;
 pub mod stations;

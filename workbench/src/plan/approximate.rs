@@ -42,6 +42,8 @@ pub struct Flights {
     pub raster: Raster,
     /// By UAV: corners of its flight, from its start and back to it.
     pub tracks: Vec<Vec<Point>>,
+    /// By UAV: the corners of its flight over cells alone.
+    pub laps: Vec<Vec<Point>>,
     /// By UAV: length of its flight, metres.
     pub lengths_m: Vec<f64>,
     /// By cell number: whether somebody covers it.
@@ -94,6 +96,8 @@ pub fn plan(request: &Request<'_>) -> Result<Flights> {
         .zip(&ways)
         .map(|(path, way)| track(&middles(path), way, &mut asker))
         .collect();
+    let laps = plan.paths.iter().map(|path| corners(middles(path)));
+    let laps = laps.collect();
     let mut covered = vec![false; raster.map.table_len()];
     // A UAV that stays at home does not see the cell where it would begin.
     for cell in plan.paths.iter().filter(|p| p.len() > 1).flatten() {
@@ -113,6 +117,7 @@ pub fn plan(request: &Request<'_>) -> Result<Flights> {
     Ok(Flights {
         lengths_m: tracks.iter().map(|t| length_m(t)).collect(),
         tracks,
+        laps,
         left: middles(&left),
         covered,
         least_s: equal.then(|| least_m / first.speed_mps),

@@ -94,6 +94,17 @@ pub struct CoverArgs {
 /// # Errors
 /// When the file or a flag is wrong; the error names the place.
 pub fn run(args: &CoverArgs) -> Result<String> {
+    let (site, plans) = planned(args)?;
+    let flights = plans.iter().reduce(|a, b| better(a, b));
+    let flights = flights.context("no planner was asked")?;
+    let compared: Vec<Value> = plans.iter().map(Flights::compared).collect();
+    let notices = &site.notices;
+    let sheet = flights.sheet(site.origin, &compared, notices, args.output.altitude_m);
+    args.output.print(&sheet)
+}
+
+/// The site, and the plans of those that were asked.
+pub(super) fn planned(args: &CoverArgs) -> Result<(Site, Vec<Flights>)> {
     let team = fleet::team(
         args.fleet.as_deref(),
         args.k,
@@ -138,17 +149,12 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         .into_iter()
         .collect::<Result<_>>()
         .with_context(|| args.file.display().to_string())?;
-    let best = plans.iter().reduce(|a, b| better(a, b));
-    let flights = best.context("no planner was asked")?;
     site.notices.extend(notices);
-    let compared: Vec<Value> = plans.iter().map(Flights::compared).collect();
-    let notices = &site.notices;
-    let sheet = flights.sheet(site.origin, &compared, notices, args.output.altitude_m);
-    args.output.print(&sheet)
+    Ok((site, plans))
 }
 
 /// The plan that sees more, or as much sooner.
-fn better<'a>(a: &'a Flights, b: &'a Flights) -> &'a Flights {
+pub(super) fn better<'a>(a: &'a Flights, b: &'a Flights) -> &'a Flights {
     let more = a.covered_share - b.covered_share;
     let first = if more.abs() > SAME_SHARE {
         more > 0.0
@@ -158,7 +164,31 @@ fn better<'a>(a: &'a Flights, b: &'a Flights) -> &'a Flights {
     if first { a } else { b }
 }
 
-fn starts(site: &Site, team: &[Member]) -> Result<Vec<Point>> {
+/// The zones of a site to fly round; nobody may start in one.
+pub(super) fn around(
+    site: &Site,
+    clearance_m: f64,
+    team: &[Member],
+    starts: &[Point],
+) -> Result<Around> {
+    let zones = site.zones.zones().iter().map(|zone| Zone {
+        outer: zone.vertices().to_vec(),
+        holes: Vec::new(),
+    });
+    let mut places = starts.to_vec();
+    places.extend(site.area.vertices());
+    let around = Around::new(&zones.collect::<Vec<_>>(), clearance_m, &places)?;
+    for (member, start) in team.iter().zip(starts) {
+        ensure!(
+            !around.forbids(*start),
+            "the launch point of {} lies in a zone or nearer to one than the clearance",
+            member.name
+        );
+    }
+    Ok(around)
+}
+
+pub(super) fn starts(site: &Site, team: &[Member]) -> Result<Vec<Point>> {
     let start = |member: &Member| match member.place() {
         Some(at) => to_plane(site.origin, at).with_context(|| member.name.clone()),
         None => Ok(Point::origin()),
@@ -195,6 +225,7 @@ impl Job<'_> {
         Flight {
             name: member.name.clone(),
             track: track.to_vec(),
+            lap: Vec::new(),
             length_m,
             speed_mps: member.speed_mps,
             turn_radius_m: member.turn_radius_m.unwrap_or(self.args.turn_radius_m),
@@ -240,6 +271,7 @@ impl Job<'_> {
         let flights = (0..plan.tours.len()).map(|uav| {
             let mut flight = self.flight(uav, &plan.tracks[uav], plan.lengths_m[uav]);
             let n = plan.tours[uav].len();
+            flight.lap = lap(&plan.tracks[uav], &plan.tours[uav]);
             flight.more.insert("passes".to_owned(), json!(n));
             flight
         });
@@ -268,25 +300,7 @@ impl Job<'_> {
     /// Approximate coverage: lane cells.
     fn approximate(&self) -> Result<Flights> {
         let (args, site) = (self.args, self.site);
-        let zones: Vec<Zone> = site
-            .zones
-            .zones()
-            .iter()
-            .map(|zone| Zone {
-                outer: zone.vertices().to_vec(),
-                holes: Vec::new(),
-            })
-            .collect();
-        let mut places = self.starts.to_vec();
-        places.extend(site.area.vertices());
-        let around = Around::new(&zones, args.clearance_m, &places)?;
-        for (member, start) in self.team.iter().zip(self.starts) {
-            ensure!(
-                !around.forbids(*start),
-                "the launch point of {} lies in a zone or nearer to one than the clearance",
-                member.name
-            );
-        }
+        let around = around(site, args.clearance_m, self.team, self.starts)?;
         let plan = approximate::plan(&Request {
             area: &site.area,
             holes: &site.holes,
@@ -296,8 +310,10 @@ impl Job<'_> {
             lane_m: self.lane_m,
             steps: args.steps.saturating_mul(CELL_STEPS),
         })?;
-        let flights = (0..self.team.len())
-            .map(|uav| self.flight(uav, &plan.tracks[uav], plan.lengths_m[uav]));
+        let flights = (0..self.team.len()).map(|uav| Flight {
+            lap: plan.laps[uav].clone(),
+            ..self.flight(uav, &plan.tracks[uav], plan.lengths_m[uav])
+        });
         Ok(Flights {
             planner: "approximate",
             flights: flights.collect(),
@@ -316,6 +332,19 @@ impl Job<'_> {
                 .collect(),
         })
     }
+}
+
+/// What lies between the beginning of the first pass and the end of the last one.
+fn lap(track: &[Point], passes: &[exact::Pass]) -> Vec<Point> {
+    let place = |p: Point| move |q: &Point| (q - p).norm() < 1e-9;
+    let from = passes
+        .first()
+        .and_then(|p| track.iter().position(place(p.from)));
+    let to = passes
+        .last()
+        .and_then(|p| track.iter().rposition(place(p.to)));
+    let ends = from.zip(to).filter(|(from, to)| from <= to);
+    ends.map_or_else(|| track.to_vec(), |(from, to)| track[from..=to].to_vec())
 }
 
 /// The fields of an object.

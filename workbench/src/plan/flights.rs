@@ -25,6 +25,9 @@ pub struct Flight {
     pub name: String,
     /// Its corners, from its start and back to it.
     pub track: Vec<Point>,
+    /// Its corners without the ways from its start and back: what closes to be flown again
+    /// and again.
+    pub lap: Vec<Point>,
     /// Length, metres.
     pub length_m: f64,
     /// Speed, m/s.

@@ -4,7 +4,7 @@
 use super::tours::{TourArgs, Ways};
 use anyhow::{Context, Result};
 use clap::Args;
-use skein_interop::targets::{LineTarget, Targets, read};
+use skein_interop::targets::{LineTarget, read};
 use skein_planning::coverage::line::{plan, strip};
 use skein_planning::frame::Point;
 use std::collections::BTreeMap;
@@ -28,16 +28,16 @@ pub struct LineArgs {
 /// # Errors
 /// When the file or a flag is wrong; the error names the place.
 pub fn run(args: &LineArgs) -> Result<String> {
-    let text = std::fs::read_to_string(&args.file)
-        .with_context(|| format!("cannot read {}", args.file.display()))?;
-    let targets = read(&text).with_context(|| args.file.display().to_string())?;
-    let mut ways = ways(&targets, args)?;
-    ways.plan(&args.tours, |lines, team, metric| {
+    ways(args)?.plan(&args.tours, |lines, team, metric| {
         Ok(plan(lines, team, metric, args.tours.steps)?)
     })
 }
 
-fn ways(targets: &Targets, args: &LineArgs) -> Result<Ways> {
+/// What there is to fly along.
+pub(super) fn ways(args: &LineArgs) -> Result<Ways> {
+    let text = std::fs::read_to_string(&args.file)
+        .with_context(|| format!("cannot read {}", args.file.display()))?;
+    let targets = read(&text).with_context(|| args.file.display().to_string())?;
     let mut notices: Vec<String> = targets.notices.iter().map(ToString::to_string).collect();
     if !targets.points.is_empty() {
         let n = targets.points.len();

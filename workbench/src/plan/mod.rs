@@ -8,6 +8,7 @@ pub mod flights;
 pub mod line;
 mod map;
 pub mod output;
+pub mod patrol;
 pub mod route;
 pub mod site;
 pub mod tours;
@@ -36,6 +37,8 @@ pub enum Subject {
     Line(line::LineArgs),
     /// Tours of a team over all points of a file.
     Visit(visit::VisitArgs),
+    /// Points, lines or an area seen again and again by a team.
+    Patrol(patrol::PatrolArgs),
 }
 
 /// Plans, and returns the text to print.
@@ -49,6 +52,7 @@ pub fn run(args: &PlanArgs) -> Result<String> {
         Subject::Cover(args) => cover::run(args),
         Subject::Line(args) => line::run(args),
         Subject::Visit(args) => visit::run(args),
+        Subject::Patrol(args) => patrol::run(args),
     }
 }
 

@@ -26,7 +26,7 @@ const MOST_PLACES: usize = 3_000;
 const SAME_SPEED_MPS: f64 = 1e-9;
 
 /// The team, the wind and the form of the result.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct TourArgs {
     /// How many UAVs.
     #[arg(long, default_value_t = 1, value_name = "K")]
@@ -79,17 +79,29 @@ pub struct TourArgs {
     pub output: OutputArgs,
 }
 
+impl TourArgs {
+    /// The wind, where it blows to, m/s.
+    #[must_use]
+    pub fn wind(&self) -> Vector {
+        let (s, c) = sin_cos(self.wind_from_deg.to_radians());
+        Vector::new(-s, -c) * self.wind_mps
+    }
+}
+
 /// The ways to fly, over numbered places.
 pub struct Ways {
-    origin: Origin,
+    /// Where the plane lies.
+    pub origin: Origin,
     /// All places: the depot first.
     pub at: Vec<Point>,
     /// Each way as places in order, and the name of the item that it serves.
     pub ways: Vec<(Vec<usize>, String)>,
-    notices: Vec<String>,
-    /// The UAVs, and the place where each starts and ends.
-    team: Vec<Member>,
-    depots: Vec<usize>,
+    /// What was left out.
+    pub notices: Vec<String>,
+    /// The UAVs.
+    pub team: Vec<Member>,
+    /// By UAV: the place where it starts and ends.
+    pub depots: Vec<usize>,
     zones: Vec<Zone>,
 }
 
@@ -198,10 +210,27 @@ impl Ways {
         args: &TourArgs,
         planner: impl FnOnce(&[Line], &[Surveyor], &Cost<'_>) -> Result<LinePlan>,
     ) -> Result<String> {
+        let (plan, around) = self.solve(args, planner)?;
+        let tours = Tours {
+            ways: self,
+            around: &around,
+            plan: &plan,
+        };
+        args.output.print(&tours.sheet(args.output.altitude_m))
+    }
+
+    /// Plans with `planner`; gives the zones that the ways lead round as well.
+    ///
+    /// # Errors
+    /// When a flag is wrong.
+    pub fn solve(
+        &mut self,
+        args: &TourArgs,
+        planner: impl FnOnce(&[Line], &[Surveyor], &Cost<'_>) -> Result<LinePlan>,
+    ) -> Result<(LinePlan, Around)> {
         let around = Around::new(&self.zones, args.clearance_m, &self.at)?;
         self.leave_out_forbidden(&around)?;
-        let (s, c) = sin_cos(args.wind_from_deg.to_radians());
-        let wind = Vector::new(-s, -c) * args.wind_mps;
+        let wind = args.wind();
         let base_mps = self.team[0].speed_mps;
         let alike = |m: &Member| (m.speed_mps - base_mps).abs() < SAME_SPEED_MPS;
         ensure!(
@@ -230,13 +259,32 @@ impl Ways {
             endurance: m.endurance_s.unwrap_or(f64::INFINITY),
         };
         let team: Vec<Surveyor> = self.team.iter().zip(&self.depots).map(uav).collect();
-        let plan = planner(&lines, &team, &metric)?;
-        let tours = Tours {
-            ways: self,
-            around: &around,
-            plan: &plan,
+        Ok((planner(&lines, &team, &metric)?, around))
+    }
+
+    /// The points flown along some ways in order, from a place and back to it.
+    #[must_use]
+    pub fn track(&self, around: &Around, passes: &[Pass], depot: Point) -> Vec<Point> {
+        let mut asker = around.asker();
+        let mut track = vec![depot];
+        let go = |track: &mut Vec<Point>, asker: &mut Asker<'_>, to: Point| {
+            let from = track.last().copied().unwrap_or(depot);
+            let way = asker.way(from, to);
+            track.extend(way.iter().flatten().skip(1));
         };
-        args.output.print(&tours.sheet(args.output.altitude_m))
+        for pass in passes {
+            let way = &self.ways[pass.line].0;
+            let mut way: Vec<Point> = way.iter().map(|p| self.at[*p]).collect();
+            if pass.backward {
+                way.reverse();
+            }
+            if let Some(first) = way.first() {
+                go(&mut track, &mut asker, *first);
+            }
+            track.extend(way.iter().skip(1));
+        }
+        go(&mut track, &mut asker, depot);
+        track
     }
 
     /// Costs of the shortest ways round the zones between all places.
@@ -330,26 +378,8 @@ impl Tours<'_> {
     /// The points of a tour, from the depot back to it.
     fn track(&self, uav: usize) -> Vec<Point> {
         let depot = self.ways.at[self.ways.depots[uav]];
-        let mut asker = self.around.asker();
-        let mut track = vec![depot];
-        let go = |track: &mut Vec<Point>, asker: &mut Asker<'_>, to: Point| {
-            let from = track.last().copied().unwrap_or(depot);
-            let way = asker.way(from, to);
-            track.extend(way.iter().flatten().skip(1));
-        };
-        for pass in &self.plan.tours[uav].passes {
-            let way = &self.ways.ways[pass.line].0;
-            let mut way: Vec<Point> = way.iter().map(|p| self.ways.at[*p]).collect();
-            if pass.backward {
-                way.reverse();
-            }
-            if let Some(first) = way.first() {
-                go(&mut track, &mut asker, *first);
-            }
-            track.extend(way.iter().skip(1));
-        }
-        go(&mut track, &mut asker, depot);
-        track
+        let passes = &self.plan.tours[uav].passes;
+        self.ways.track(self.around, passes, depot)
     }
 
     fn summary(&self) -> Value {

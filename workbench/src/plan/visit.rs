@@ -26,6 +26,13 @@ pub struct VisitArgs {
 /// # Errors
 /// When the file or a flag is wrong; the error names the place.
 pub fn run(args: &VisitArgs) -> Result<String> {
+    ways(args)?.plan(&args.tours, |lines, team, metric| {
+        Ok(visit(lines, team, metric, args.tours.steps)?)
+    })
+}
+
+/// What there is to visit.
+pub(super) fn ways(args: &VisitArgs) -> Result<Ways> {
     let text = std::fs::read_to_string(&args.file)
         .with_context(|| format!("cannot read {}", args.file.display()))?;
     let targets = read(&text).with_context(|| args.file.display().to_string())?;
@@ -49,9 +56,7 @@ pub fn run(args: &VisitArgs) -> Result<String> {
         })?;
         ways.push(&way, &point.pointer);
     }
-    ways.plan(&args.tours, |lines, team, metric| {
-        Ok(visit(lines, team, metric, args.tours.steps)?)
-    })
+    Ok(ways)
 }
 
 #[cfg(test)]
