@@ -1,12 +1,16 @@
 //! `skein check`: what is wrong with a scenario before it is flown, and what it amounts to.
 
 use crate::exit;
+use crate::planner::PlannerArgs;
 use clap::{Args, ValueEnum};
 use skein_netsim::spec::Spec;
 use skein_netsim::world::Survey;
 use skein_peer::Task;
 use skein_planning::coverage::area::CellId;
-use skein_scenario::{Overrides, Scenario, Summary, extent_m, summary};
+use skein_scenario::{
+    AreaPlanner, Forecast, Overrides, Scenario, ScenarioError, Summary, extent_m, forecast,
+    side_by_side, summary,
+};
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
@@ -25,6 +29,9 @@ pub struct CheckArgs {
     /// Checks with this many UAVs instead of the scenario's number.
     #[arg(long, value_name = "N")]
     pub peers: Option<u16>,
+    /// Who plans an area; without a flag both are told side by side.
+    #[command(flatten)]
+    pub planner: PlannerArgs,
     /// How the result is printed.
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
@@ -46,6 +53,7 @@ pub enum Format {
 pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     let over = Overrides {
         peers: args.peers,
+        planner: args.planner.chosen(),
         ..Overrides::default()
     };
     let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {
@@ -63,9 +71,16 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     };
     let total = summary(&scenario.spec, &scenario.ground);
     let judged = Judged::new(&scenario);
+    let forecasts = match args.planner.chosen() {
+        Some(planner) => forecast(&scenario)
+            .map(|f| (planner, Ok(f)))
+            .into_iter()
+            .collect(),
+        None => side_by_side(args.scenario.as_deref(), &over, &scenario),
+    };
     match args.format {
-        Format::Text => print!("{}", text(&scenario, &total, &judged)),
-        Format::Json => println!("{}", json(&scenario, &total, &judged)),
+        Format::Text => print!("{}", text(&scenario, &total, &judged, &forecasts)),
+        Format::Json => println!("{}", json(&scenario, &total, &judged, &forecasts)),
     }
     Ok(ExitCode::from(exit::OK))
 }
@@ -114,9 +129,11 @@ fn names(cells: &[CellId]) -> String {
     format!("{}{more}", first.join(" "))
 }
 
-fn text(scenario: &Scenario, total: &Summary, judged: &Judged) -> String {
+fn text(scenario: &Scenario, total: &Summary, judged: &Judged, forecasts: &[Forecasted]) -> String {
     let mut lines = area_lines(&scenario.spec, total, judged);
     lines.extend(fleet_lines(&scenario.spec, total));
+    let own = AreaPlanner::of(&scenario.spec.mission.task);
+    lines.extend(forecasts.iter().map(|told| planner_line(told, own)));
     let mut out = String::new();
     for (name, text) in lines {
         // Writing to a string cannot fail.
@@ -176,6 +193,34 @@ fn area_lines(spec: &Spec, total: &Summary, judged: &Judged) -> Vec<Line> {
     lines
 }
 
+/// What a planner is expected to make of the area, or why it has no plan.
+type Forecasted = (AreaPlanner, Result<Forecast, ScenarioError>);
+
+fn planner_line((planner, told): &Forecasted, own: Option<AreaPlanner>) -> Line {
+    let kind = match planner {
+        AreaPlanner::Lanes => "approximate",
+        AreaPlanner::Exact => "exact",
+    };
+    let mut text = match told {
+        Ok(f) => {
+            let energy = f.energy_s.map_or("no energy in this wind".to_owned(), |s| {
+                format!("energy {s:.0} s of cruise")
+            });
+            format!(
+                "about {:.0} s, sees {:.2} % of the area, loop {:.1} km, {energy}",
+                f.makespan_s,
+                f.seen_share * 100.0,
+                f.loop_m / 1000.0
+            )
+        }
+        Err(e) => e.to_string(),
+    };
+    if own == Some(*planner) {
+        text.push_str(" (flown)");
+    }
+    (kind, text)
+}
+
 fn fleet_lines(spec: &Spec, total: &Summary) -> Vec<Line> {
     let ground = spec.ground.as_ref();
     let ground = ground.map_or("no ground station".to_owned(), |g| {
@@ -202,7 +247,25 @@ fn fleet_lines(spec: &Spec, total: &Summary) -> Vec<Line> {
     ]
 }
 
-fn json(scenario: &Scenario, total: &Summary, judged: &Judged) -> serde_json::Value {
+fn json(
+    scenario: &Scenario,
+    total: &Summary,
+    judged: &Judged,
+    forecasts: &[Forecasted],
+) -> serde_json::Value {
+    let planners: Vec<serde_json::Value> = forecasts
+        .iter()
+        .map(|(planner, told)| match told {
+            Ok(f) => serde_json::json!({
+                "planner": planner.name(),
+                "makespan_s": f.makespan_s,
+                "seen_share": f.seen_share,
+                "loop_m": f.loop_m,
+                "energy_s": f.energy_s,
+            }),
+            Err(e) => serde_json::json!({"planner": planner.name(), "error": e.to_string()}),
+        })
+        .collect();
     let spec = &scenario.spec;
     let uncoverable: serde_json::Map<String, serde_json::Value> = total
         .uncoverable
@@ -246,6 +309,7 @@ fn json(scenario: &Scenario, total: &Summary, judged: &Judged) -> serde_json::Va
         "loop_m": total.loop_m,
         "uavs": spec.uavs.len(),
         "makespan_s": total.makespan_s,
+        "planners": planners,
         "findings": findings,
     })
 }

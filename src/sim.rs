@@ -3,6 +3,7 @@
 
 use crate::check::Format;
 use crate::exit;
+use crate::planner::PlannerArgs;
 use anyhow::Context;
 use clap::Args;
 use skein_netsim::Stage;
@@ -40,6 +41,9 @@ pub struct SimArgs {
     /// Flies with this many UAVs instead of the scenario's number.
     #[arg(long, value_name = "N")]
     pub peers: Option<u16>,
+    /// Who plans an area.
+    #[command(flatten)]
+    pub planner: PlannerArgs,
     /// The seed of one run; without it the scenario's.
     #[arg(long, value_name = "S", conflicts_with = "seeds")]
     pub seed: Option<u64>,
@@ -94,6 +98,7 @@ pub fn run(args: &SimArgs) -> anyhow::Result<ExitCode> {
     let over = Overrides {
         peers: args.peers,
         seed: args.seed,
+        planner: args.planner.chosen(),
         ..Overrides::default()
     };
     let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {

@@ -1,6 +1,7 @@
 //! `skein trial`: a scenario with real processes, a display, and a verdict.
 
 use crate::check::Format;
+use crate::planner::PlannerArgs;
 use crate::{cli, exit};
 use anyhow::Context;
 use clap::Args;
@@ -25,6 +26,9 @@ pub struct TrialArgs {
     /// Flies with this many UAVs instead of the scenario's number.
     #[arg(long, value_name = "N")]
     pub peers: Option<u16>,
+    /// Who plans an area.
+    #[command(flatten)]
+    pub planner: PlannerArgs,
     /// Scenario seconds per second, at most 10.
     #[arg(long, value_name = "X")]
     pub time_scale: Option<f64>,
@@ -55,6 +59,7 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
         peers: args.peers,
         seed: args.seed,
         time_scale: args.time_scale,
+        planner: args.planner.chosen(),
     };
     let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {
         Ok(scenario) => scenario,

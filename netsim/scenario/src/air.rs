@@ -58,7 +58,7 @@ fn turning_mps(airframe: &Airframe, wind_mps: f64, radius_m: f64) -> f64 {
     wanted.max(airframe.least_airspeed_mps())
 }
 
-fn airspeed_mps(u: &UavSpec, spec: &Spec) -> f64 {
+pub(crate) fn airspeed_mps(u: &UavSpec, spec: &Spec) -> f64 {
     let radius_m = f64::from(spec.mission.turn_radius_mm) / 1000.0;
     turning_mps(&u.airframe, spec.wind.speed_mps(), radius_m)
 }

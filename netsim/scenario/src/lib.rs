@@ -18,6 +18,7 @@ mod faults;
 mod feasibility;
 mod files;
 mod fleet;
+mod forecast;
 mod resolve;
 mod task;
 mod terrain;
@@ -29,6 +30,7 @@ pub use error::{Finding, Place, ScenarioError, Severity};
 pub use faults::{chaos_plan, load_chaos_plan};
 pub use feasibility::{Summary, extent_m, feasibility, summary};
 pub use files::Files;
+pub use forecast::{AreaPlanner, Forecast, forecast, side_by_side};
 pub use resolve::{Overrides, Scenario, parse_with};
 
 use skein_netsim::spec::Spec;

@@ -8,6 +8,7 @@ use crate::faults::{self, Known, permille};
 use crate::feasibility::{self, loop_trouble};
 use crate::files::Files;
 use crate::fleet::{self, Fleet, word};
+use crate::forecast::AreaPlanner;
 use crate::terrain::{self, MAX_HEIGHT_M, Notices, Terrain, position};
 use skein_netsim::spec::{GroundSpec, RadioSpec, Spec, UavSpec};
 use skein_peer::mission::{PointMm, mm};
@@ -64,6 +65,8 @@ pub struct Overrides {
     pub seed: Option<u64>,
     /// Scenario seconds per second of wall time, at most 10.
     pub time_scale: Option<f64>,
+    /// Who plans an area, instead of whom the scenario names.
+    pub planner: Option<AreaPlanner>,
 }
 
 /// A scenario, resolved, and all that was noticed on the way.
@@ -121,7 +124,16 @@ fn resolve(
     let name = word(f.need("name", "\"city\"")?)?;
     let max_time_s = f.whole_or("max_time_s", 6000, 1, 604_800, "seconds")?;
     let (time_scale, beacon_period_ms) = times(&f, over)?;
-    let terrain = told_terrain(root, &f, files, findings)?;
+    let mut terrain = told_terrain(root, &f, files, findings)?;
+    if let Some(planner) = over.planner {
+        if AreaPlanner::of(&terrain.task).is_none() {
+            let node = f.get("points").or(f.get("lines")).unwrap_or(f.node());
+            return Err(node.wrong(
+                "a planner can be chosen for an area; points and lines have one planner each",
+            ));
+        }
+        terrain.task = planner.task();
+    }
     let ground_spec = f.get("ground").map(ground_station).transpose()?;
     let ground_id = ground_spec.as_ref().map(|g| g.id);
     let fleet = the_fleet(&f, &name, terrain.level_m, ground_id, over)?;

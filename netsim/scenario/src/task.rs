@@ -4,6 +4,7 @@
 use crate::document::{Fields, Node};
 use crate::error::ScenarioError;
 use crate::files::Files;
+use crate::forecast::AreaPlanner;
 use crate::terrain::{Notices, position};
 use skein_interop::place::{LatLon, to_plane};
 use skein_interop::targets;
@@ -53,11 +54,11 @@ fn area_task(f: &Fields<'_>) -> Result<Task, ScenarioError> {
     let Some(node) = f.get("planner") else {
         return Ok(Task::Area);
     };
-    match node.text()? {
-        "lanes" => Ok(Task::Area),
-        "exact" => Ok(Task::Exact),
-        other => Err(node.wrong(format!(
-            "{other} is no planner of the swarm; expected \"lanes\" (spanning-tree loop over a lane grid) or \"exact\" (straight passes over the cells of a boustrophedon decomposition)"
+    let name = node.text()?;
+    match AreaPlanner::ALL.into_iter().find(|p| p.name() == name) {
+        Some(planner) => Ok(planner.task()),
+        None => Err(node.wrong(format!(
+            "{name} is no planner of the swarm; expected \"lanes\" (spanning-tree loop over a lane grid) or \"exact\" (straight passes over the cells of a boustrophedon decomposition)"
         ))),
     }
 }

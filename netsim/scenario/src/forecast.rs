@@ -1,0 +1,281 @@
+//! What a mission is expected to take before it is flown, told the same way for each
+//! planner of an area (D2.7 §3.6.1 exact, §3.6.2 approximate): time, what is seen, energy.
+//!
+//! Leaves to others: laying the loop, and what is worth a warning (`feasibility`).
+
+use crate::air::airspeed_mps;
+use crate::error::ScenarioError;
+use crate::feasibility::summary;
+use crate::resolve::{Overrides, Scenario, bounds};
+use skein_netsim::spec::{Spec, UavSpec};
+use skein_peer::Task;
+use skein_peer::mission::point_m;
+use skein_peer::plan::Ground;
+use skein_planning::coverage::area::stc::{CoverageLoop, Direction};
+use skein_planning::frame::Point;
+use skein_planning::geometry::Polygon;
+use skein_planning::trajectory::timed::Trajectory;
+
+/// Samples along one lane: a point in 36 of a cell decides a tenth of a percent of a
+/// field of 28 cells.
+const SAMPLES_A_LANE: f64 = 6.0;
+
+/// Most samples along one side of the area, against missions of absurd proportions.
+const MAX_SAMPLES: f64 = 4000.0;
+
+/// How an area is covered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AreaPlanner {
+    /// A spanning-tree loop over a grid of lanes: approximate coverage.
+    Lanes,
+    /// Straight passes over the cells of a boustrophedon decomposition: exact coverage.
+    Exact,
+}
+
+impl AreaPlanner {
+    /// Both, in the order in which they are told.
+    pub const ALL: [Self; 2] = [Self::Lanes, Self::Exact];
+
+    /// Its name in a scenario file.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lanes => "lanes",
+            Self::Exact => "exact",
+        }
+    }
+
+    /// What it makes of an area.
+    pub(crate) fn task(self) -> Task {
+        match self {
+            Self::Lanes => Task::Area,
+            Self::Exact => Task::Exact,
+        }
+    }
+
+    /// The planner of a task over an area; `None` for points and lines.
+    #[must_use]
+    pub fn of(task: &Task) -> Option<Self> {
+        Self::ALL.into_iter().find(|p| p.task() == *task)
+    }
+}
+
+/// What a planner is expected to make of an area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forecast {
+    /// The planner.
+    pub planner: AreaPlanner,
+    /// Time to cover without any failure, by the swarm's own division, seconds.
+    pub makespan_s: f64,
+    /// Share of the area that is seen, 0 to 1, by points a sixth of a lane apart.
+    pub seen_share: f64,
+    /// Length of the loop, metres.
+    pub loop_m: f64,
+    /// Energy to fly the loop once, in seconds of level cruise, averaged over the fleet;
+    /// `None` where the wind forbids a part of it.
+    pub energy_s: Option<f64>,
+}
+
+/// The forecast of a scenario over an area; `None` for points and lines.
+#[must_use]
+pub fn forecast(scenario: &Scenario) -> Option<Forecast> {
+    let (spec, ground) = (&scenario.spec, &*scenario.ground);
+    let planner = AreaPlanner::of(&spec.mission.task)?;
+    let total = summary(spec, ground);
+    let energies: Option<Vec<f64>> = spec
+        .uavs
+        .iter()
+        .map(|u| energy_s(u, spec, &ground.coverage_loop))
+        .collect();
+    let mean = |all: Vec<f64>| all.iter().sum::<f64>() / all.len().max(1) as f64;
+    Some(Forecast {
+        planner,
+        makespan_s: total.makespan_s,
+        seen_share: seen_share(spec, ground),
+        loop_m: total.loop_m,
+        energy_s: energies.map(mean),
+    })
+}
+
+/// The forecast of both planners, or why one of them has none. Empty for points and
+/// lines.
+#[must_use]
+pub fn side_by_side(
+    target: Option<&str>,
+    over: &Overrides,
+    known: &Scenario,
+) -> Vec<(AreaPlanner, Result<Forecast, ScenarioError>)> {
+    let Some(own) = AreaPlanner::of(&known.spec.mission.task) else {
+        return Vec::new();
+    };
+    let told = AreaPlanner::ALL.map(|planner| {
+        let told = if planner == own {
+            Ok(forecast(known))
+        } else {
+            let over = Overrides {
+                planner: Some(planner),
+                ..*over
+            };
+            crate::open(target, &over).map(|s| forecast(&s))
+        };
+        told.transpose().map(|told| (planner, told))
+    });
+    told.into_iter().flatten().collect()
+}
+
+/// Energy of one UAV along the whole loop, in seconds of its cruise.
+fn energy_s(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Option<f64> {
+    let airspeed_mps = airspeed_mps(u, spec);
+    let one = |i: usize| {
+        let curve = the_loop.curve(i, Direction::Forward);
+        let flown = Trajectory::along(&curve, airspeed_mps, spec.wind).ok()?;
+        Some(flown.energy_s(&u.airframe))
+    };
+    (0..the_loop.len()).map(one).sum()
+}
+
+/// Share of the area's points that lie in a piece of the loop which the mission sees.
+fn seen_share(spec: &Spec, ground: &Ground) -> f64 {
+    let the_loop = &ground.coverage_loop;
+    let ring = spec.mission.area.iter().copied().map(point_m).collect();
+    let Ok(area) = Polygon::new(ring) else {
+        return 0.0;
+    };
+    let (low, high) = bounds(&area);
+    let longest_m = (high.x - low.x).max(high.y - low.y);
+    let lane_m = f64::from(spec.mission.lane_spacing_mm) / 1000.0;
+    let step_m = (lane_m / SAMPLES_A_LANE).max(longest_m / MAX_SAMPLES);
+    let seen = the_loop.cells().iter().filter(|c| c.needed);
+    let patches: Vec<[Point; 4]> = seen
+        .filter_map(|c| the_loop.patches().corners(c.id))
+        .collect();
+    let samples = Samples::new(low, high, step_m);
+    let mut hit = vec![false; samples.rows * samples.cols];
+    for patch in &patches {
+        samples.within(patch, |i| hit[i] = true);
+    }
+    let (mut inside, mut of_it) = (0.0, 0.0);
+    for (i, hit) in hit.iter().enumerate() {
+        if area.contains(samples.at(i)) {
+            inside += 1.0;
+            of_it += if *hit { 1.0 } else { 0.0 };
+        }
+    }
+    if inside > 0.0 { of_it / inside } else { 0.0 }
+}
+
+/// Points in rows and columns, in the middles of squares.
+struct Samples {
+    low: Point,
+    step_m: f64,
+    rows: usize,
+    cols: usize,
+}
+
+impl Samples {
+    fn new(low: Point, high: Point, step_m: f64) -> Self {
+        let n = |length_m: f64| count((length_m / step_m).ceil()).max(1);
+        Self {
+            low,
+            step_m,
+            rows: n(high.y - low.y),
+            cols: n(high.x - low.x),
+        }
+    }
+
+    fn at(&self, i: usize) -> Point {
+        let place = |n: usize| (n as f64 + 0.5) * self.step_m;
+        Point::new(
+            self.low.x + place(i % self.cols),
+            self.low.y + place(i / self.cols),
+        )
+    }
+
+    /// The samples within a convex patch, its corners counter-clockwise.
+    fn within(&self, patch: &[Point; 4], mut visit: impl FnMut(usize)) {
+        let span = |axis: usize, n: usize| {
+            let all = patch
+                .iter()
+                .map(|p| (p[axis] - self.low[axis]) / self.step_m);
+            let (from, to) = all.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+            count(from.floor())..count(to.ceil()).min(n)
+        };
+        for row in span(1, self.rows) {
+            for col in span(0, self.cols) {
+                let i = row * self.cols + col;
+                let p = self.at(i);
+                let left = |k: usize| {
+                    let (a, b) = (patch[k], patch[(k + 1) % 4]);
+                    (b - a).perp(&(p - a)) >= 0.0
+                };
+                if (0..4).all(left) {
+                    visit(i);
+                }
+            }
+        }
+    }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a cast of a float saturates"
+)]
+fn count(x: f64) -> usize {
+    x.max(0.0) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_planners_of_a_field_are_told_and_targets_have_none() {
+        let over = Overrides::default();
+        let field = crate::open(Some("field"), &over).unwrap();
+        let told = side_by_side(Some("field"), &over, &field);
+        assert_eq!(told.len(), 2);
+        let told: Vec<Forecast> = told.into_iter().map(|(_, f)| f.unwrap()).collect();
+        for f in &told {
+            assert!((0.85..=1.0).contains(&f.seen_share), "{f:?}");
+            // What 5 UAVs fly together is more than what the last one takes; turns make
+            // the energy more than the time at cruise.
+            assert!(
+                f.makespan_s > 0.0 && f.energy_s.unwrap() > f.makespan_s,
+                "{f:?}"
+            );
+            assert!(f.energy_s.unwrap() > f.loop_m / 20.0, "{f:?}");
+        }
+        assert!((told[0].loop_m - told[1].loop_m).abs() > 1.0);
+        let points = crate::open(Some("points"), &over).unwrap();
+        assert!(side_by_side(Some("points"), &over, &points).is_empty());
+    }
+
+    #[test]
+    fn a_planner_is_for_areas() {
+        let over = Overrides {
+            planner: Some(AreaPlanner::Exact),
+            ..Overrides::default()
+        };
+        let error = crate::open(Some("roads"), &over).unwrap_err().to_string();
+        assert!(
+            error.contains("points and lines have one planner each"),
+            "{error}"
+        );
+        let square = crate::open(Some("helsinki"), &over).unwrap();
+        assert_eq!(square.spec.mission.task, Task::Exact);
+    }
+
+    #[test]
+    fn a_patch_holds_the_samples_within() {
+        let samples = Samples::new(Point::new(0.0, 0.0), Point::new(10.0, 10.0), 1.0);
+        let patch = [(2.0, 2.0), (5.0, 2.0), (5.0, 4.0), (2.0, 4.0)].map(|(x, y)| Point::new(x, y));
+        let mut n = 0;
+        samples.within(&patch, |_| n += 1);
+        assert_eq!(n, 6);
+        let beyond = patch.map(|p| Point::new(p.x - 4.0, p.y + 7.0));
+        n = 0;
+        samples.within(&beyond, |_| n += 1);
+        assert_eq!(n, 1);
+    }
+}
