@@ -3,6 +3,7 @@
 pub mod area;
 mod dice;
 pub mod exact;
+pub mod fleet;
 pub mod grid;
 pub mod line;
 pub mod metric;

@@ -4,7 +4,7 @@
 //! Leaves to others: reading files, printing, and the exact planner.
 
 use super::around::{Around, Asker};
-use super::fleet::Member;
+use super::flyers::Flyer;
 use anyhow::{Context, Result};
 use skein_planning::coverage::grid::improve::Improver;
 use skein_planning::coverage::grid::raster::Raster;
@@ -26,10 +26,8 @@ pub struct Request<'a> {
     pub holes: &'a [Polygon],
     /// Zones with clearance.
     pub around: &'a Around,
-    /// The team, and where each starts and ends.
-    pub team: &'a [Member],
-    /// By UAV: where it starts and ends.
-    pub starts: &'a [Point],
+    /// The team.
+    pub team: &'a [Flyer],
     /// Width of a lane: of the narrowest swath, metres.
     pub lane_m: f64,
     /// Steps of improvement.
@@ -74,13 +72,13 @@ pub fn plan(request: &Request<'_>) -> Result<Flights> {
     let mut asker = request.around.asker();
     let mut roots = Vec::new();
     let mut ways = Vec::new();
-    for (member, start) in request.team.iter().zip(request.starts) {
+    for flyer in request.team {
         let root = raster
-            .nearest(*start)
+            .nearest(flyer.start)
             .context("no cell of the area keeps the clearance from the zones")?;
         let way = asker
-            .way(*start, raster.middle(root))
-            .with_context(|| format!("{} has no way from its start to the area", member.name))?;
+            .way(flyer.start, raster.middle(root))
+            .with_context(|| format!("{} has no way from its start to the area", flyer.name))?;
         roots.push(root);
         ways.push(way);
     }
@@ -139,10 +137,10 @@ fn task(
         reason = "a cast of a float saturates"
     )]
     let whole = |x: f64| x.max(0.0) as u32;
-    for (uav, member) in request.team.iter().enumerate() {
-        task.speeds[uav] = whole((member.speed_mps * SPEED_UNITS).round()).max(1);
-        if let Some(endurance_s) = member.endurance_s {
-            let left_m = endurance_s * member.speed_mps - 2.0 * length_m(&ways[uav]);
+    for (uav, flyer) in request.team.iter().enumerate() {
+        task.speeds[uav] = whole((flyer.speed_mps * SPEED_UNITS).round()).max(1);
+        if flyer.endurance_s.is_finite() {
+            let left_m = flyer.endurance_s * flyer.speed_mps - 2.0 * length_m(&ways[uav]);
             task.endurance[uav] = whole((left_m / raster.side_m()).floor());
         }
     }
@@ -197,19 +195,27 @@ mod tests {
         Polygon::new(corners.map(at).to_vec()).unwrap()
     }
 
-    fn team(speeds: &[f64], endurance_s: Option<f64>) -> Vec<Member> {
-        let member = |(i, v): (usize, &f64)| Member::plain(i, *v, endurance_s);
-        speeds.iter().enumerate().map(member).collect()
+    fn team(speeds: &[f64], endurance_s: f64, start: Point) -> Vec<Flyer> {
+        let flyer = |(uav, v): (usize, &f64)| Flyer {
+            uav,
+            name: String::new(),
+            start,
+            speed_mps: *v,
+            endurance_s,
+            swath_m: 30.0,
+            turn_radius_m: 15.0,
+            cruise_power_w: None,
+        };
+        speeds.iter().enumerate().map(flyer).collect()
     }
 
-    fn planned(team: &[Member], start: Point) -> Flights {
+    fn planned(team: &[Flyer]) -> Flights {
         let around = Around::new(&[], 0.0, &[]).unwrap();
         plan(&Request {
             area: &square(300.0),
             holes: &[],
             around: &around,
             team,
-            starts: &vec![start; team.len()],
             lane_m: 30.0,
             steps: 60_000,
         })
@@ -219,7 +225,7 @@ mod tests {
     #[test]
     fn a_faster_uav_flies_more_and_all_is_seen() {
         let start = Point::new(-400.0, -300.0);
-        let flights = planned(&team(&[10.0, 20.0], None), start);
+        let flights = planned(&team(&[10.0, 20.0], f64::INFINITY, start));
         assert!(flights.left.is_empty() && flights.least_s.is_none());
         assert!(flights.sees(Point::new(299.0, -299.0)) && !flights.sees(Point::new(330.0, 0.0)));
         let ratio = flights.lengths_m[1] / flights.lengths_m[0];
@@ -234,7 +240,7 @@ mod tests {
 
     #[test]
     fn a_short_endurance_is_kept_and_the_rest_is_listed() {
-        let flights = planned(&team(&[15.0, 15.0], Some(300.0)), Point::new(0.0, 0.0));
+        let flights = planned(&team(&[15.0, 15.0], 300.0, Point::new(0.0, 0.0)));
         assert!(flights.lengths_m.iter().all(|l| *l <= 4500.0 + 1e-6));
         // 9 km of lanes of the 12 km that there are.
         assert!(

@@ -4,12 +4,16 @@
 use anyhow::{Context, Result, bail, ensure};
 use jsonc_parser::{ParseOptions, parse_to_serde_value};
 use serde::Deserialize;
-use skein_interop::place::LatLon;
-use std::collections::BTreeSet;
+use skein_interop::place::{LatLon, to_plane};
+use skein_planning::frame::{Origin, Point};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The most UAVs that are planned for: the same as a swarm's.
 pub const MAX_TEAM: usize = 1_000;
+
+/// The widest field of view, degrees: beyond, the edge of the picture is the horizon.
+const WIDEST_FOV_DEG: f64 = 150.0;
 
 /// A UAV of a fleet file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -32,6 +36,28 @@ pub struct Member {
     /// Turn radius, metres; the flag's if not said.
     #[serde(default)]
     pub turn_radius_m: Option<f64>,
+    /// Field of view across the track instead of a swath, degrees: the swath follows from
+    /// the height.
+    #[serde(default)]
+    pub fov_across_deg: Option<f64>,
+    /// Its sensors by name.
+    #[serde(default)]
+    pub sensors: BTreeMap<String, Sensor>,
+    /// Power in level cruise, watts; energies are seconds of cruise if not said.
+    #[serde(default)]
+    pub cruise_power_w: Option<f64>,
+}
+
+/// A sensor of a UAV: its swath, or its field of view.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sensor {
+    /// Width of the ground that it sees, metres.
+    #[serde(default)]
+    pub swath_m: Option<f64>,
+    /// Field of view across the track, degrees.
+    #[serde(default)]
+    pub fov_across_deg: Option<f64>,
 }
 
 impl Member {
@@ -45,6 +71,9 @@ impl Member {
             start: None,
             swath_m: None,
             turn_radius_m: None,
+            fov_across_deg: None,
+            sensors: BTreeMap::new(),
+            cruise_power_w: None,
         }
     }
 
@@ -55,12 +84,23 @@ impl Member {
             .map(|[lat_deg, lon_deg]| LatLon { lat_deg, lon_deg })
     }
 
+    /// Where it starts in the plane of `origin`, which is where all do that do not say.
+    ///
+    /// # Errors
+    /// When that is too far away; names the UAV.
+    pub fn start_in(&self, origin: Origin) -> Result<Point> {
+        match self.place() {
+            Some(at) => to_plane(origin, at).with_context(|| self.name.clone()),
+            None => Ok(Point::origin()),
+        }
+    }
+
     fn check(&self) -> Result<()> {
         let some = [
             ("speed_mps", Some(self.speed_mps)),
             ("endurance_s", self.endurance_s),
-            ("swath_m", self.swath_m),
             ("turn_radius_m", self.turn_radius_m),
+            ("cruise_power_w", self.cruise_power_w),
         ];
         for (field, value) in some {
             if let Some(x) = value {
@@ -78,6 +118,15 @@ impl Member {
                 self.name
             );
         }
+        check_view(&self.name, self.swath_m, self.fov_across_deg)?;
+        for (sensor, seen) in &self.sensors {
+            let shown = format!("{}: sensor {sensor:?}", self.name);
+            ensure!(
+                seen.swath_m.is_some() || seen.fov_across_deg.is_some(),
+                "{shown} needs swath_m or fov_across_deg"
+            );
+            check_view(&shown, seen.swath_m, seen.fov_across_deg)?;
+        }
         let plain = |c: char| c.is_alphanumeric() || "-_ ".contains(c);
         // Names become names of files.
         ensure!(
@@ -87,6 +136,27 @@ impl Member {
         );
         Ok(())
     }
+}
+
+/// Refuses swaths and fields of view that are none.
+fn check_view(name: &str, swath_m: Option<f64>, fov_deg: Option<f64>) -> Result<()> {
+    if let Some(x) = swath_m {
+        ensure!(
+            x.is_finite() && x > 0.0,
+            "{name}: swath_m must be above 0, found {x}"
+        );
+        ensure!(
+            fov_deg.is_none(),
+            "{name}: swath_m and fov_across_deg say the same: leave one out"
+        );
+    }
+    if let Some(x) = fov_deg {
+        ensure!(
+            x > 0.0 && x <= WIDEST_FOV_DEG,
+            "{name}: fov_across_deg must be above 0 and at most {WIDEST_FOV_DEG}, found {x}"
+        );
+    }
+    Ok(())
 }
 
 /// Reads a fleet file.
@@ -99,7 +169,7 @@ pub fn read(file: &Path) -> Result<Vec<Member>> {
     parse(&text).with_context(shown)
 }
 
-fn parse(text: &str) -> Result<Vec<Member>> {
+pub(super) fn parse(text: &str) -> Result<Vec<Member>> {
     let fleet: Vec<Member> = parse_to_serde_value(text, &ParseOptions::default())
         .map_err(|e| anyhow::anyhow!("not a list of UAVs: {e}"))?;
     ensure!(
@@ -160,6 +230,31 @@ mod tests {
             ("[{name: 'a', speed_mps: 1, wings: 2}]", "wings"),
             ("[{name: 'a/b', speed_mps: 1}]", "a name has"),
             ("[{name: 'a', speed_mps: 1, start: [91, 0]}]", "a: start"),
+            (
+                "[{name: 'a', speed_mps: 1, swath_m: -1}]",
+                "a: swath_m must be",
+            ),
+            (
+                "[{name: 'a', speed_mps: 1, cruise_power_w: 0}]",
+                "a: cruise_power_w must be",
+            ),
+            (
+                "[{name: 'a', speed_mps: 1, fov_across_deg: 180}]",
+                "a: fov_across_deg must be",
+            ),
+            (
+                "[{name: 'a', speed_mps: 1, swath_m: 9, fov_across_deg: 60}]",
+                "leave one out",
+            ),
+            (
+                "[{name: 'a', speed_mps: 1, sensors: {rgb: {}}}]",
+                "a: sensor \"rgb\" needs",
+            ),
+            (
+                "[{name: 'a', speed_mps: 1, sensors: {rgb: {swath_m: 0}}}]",
+                "sensor \"rgb\": swath_m must be",
+            ),
+            ("[{name: 'a', speed_mps: 1, sensors: ['rgb']}]", "map"),
             (
                 "[{name: 'a', speed_mps: 1}, {name: 'a', speed_mps: 2}]",
                 "two UAVs",

@@ -1,16 +1,17 @@
 //! Flights of a team over an area, whoever planned them: what they are predicted to take,
 //! and how much they see (D2.7 §3.6).
 
-use super::output::{Printed, Sheet};
+use super::objective::Worth;
+use super::output::Printed;
 use serde_json::{Map, Value, json};
 use skein_planning::airframe::{Airframe, GRAVITY_MPS2, PowerModel};
-use skein_planning::frame::{Origin, Point};
+use skein_planning::frame::Point;
 use skein_planning::geometry::Polygon;
 use skein_planning::math::{PI, atan2};
 
 /// Points of the area that are looked at to tell the share that is seen: a tenth of a
 /// percent is one in a thousand.
-const MOST_SAMPLES: f64 = 40_000.0;
+pub const MOST_SAMPLES: f64 = 40_000.0;
 
 /// Samples along a swath at least.
 const SAMPLES_A_SWATH: f64 = 8.0;
@@ -21,6 +22,8 @@ const TYPICAL_STALL: f64 = 0.6;
 /// One UAV's flight.
 #[derive(Clone, Debug, Default)]
 pub struct Flight {
+    /// Which of the team, from 0.
+    pub uav: usize,
     /// What it is called.
     pub name: String,
     /// Its corners, from its start and back to it.
@@ -34,13 +37,31 @@ pub struct Flight {
     pub speed_mps: f64,
     /// Turn radius, metres.
     pub turn_radius_m: f64,
+    /// Distance of the lanes it flies, metres.
+    pub lane_m: f64,
+    /// Power in level cruise, watts.
+    pub cruise_power_w: Option<f64>,
     /// What else is worth telling.
     pub more: Map<String, Value>,
 }
 
 impl Flight {
-    fn time_s(&self) -> f64 {
+    /// Whether it leaves its start at all.
+    #[must_use]
+    pub fn flies(&self) -> bool {
+        self.track.len() > 1
+    }
+
+    /// How long it takes, seconds.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
         self.length_m / self.speed_mps
+    }
+
+    /// Energy, watt-hours, if the power of cruise is known.
+    fn energy_wh(&self) -> Option<f64> {
+        let power_w = self.cruise_power_w?;
+        Some(self.energy_s() * power_w / 3600.0)
     }
 
     /// Energy as seconds of level cruise: turns take more than level flight.
@@ -66,11 +87,19 @@ impl Flight {
         self.time_s() + more * turned_rad * self.turn_radius_m / v
     }
 
-    fn printed(&self, altitude_m: f64) -> Printed {
+    /// What is told about it.
+    #[must_use]
+    pub fn printed(&self, altitude_m: f64) -> Printed {
         let mut told = self.more.clone();
         told.insert("time_s".to_owned(), json!(self.time_s()));
         told.insert("length_m".to_owned(), json!(self.length_m));
         told.insert("energy_s".to_owned(), json!(self.energy_s()));
+        if let Some(energy_wh) = self.energy_wh() {
+            told.insert("energy_wh".to_owned(), json!(energy_wh));
+        }
+        if self.flies() {
+            told.insert("lane_m".to_owned(), json!(self.lane_m));
+        }
         Printed {
             name: self.name.clone(),
             track: self.track.clone(),
@@ -88,12 +117,32 @@ fn turn_rad(a: Point, b: Point, c: Point) -> f64 {
     atan2(u.perp(&v).abs(), u.dot(&v)).min(PI)
 }
 
+/// How the lanes of a team are laid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Laid {
+    /// One width for all: that of the narrowest swath, with the widest turn.
+    Common,
+    /// A section for each crew of like swath, with lanes of its own.
+    Sections,
+}
+
+impl Laid {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Common => "common",
+            Self::Sections => "sections",
+        }
+    }
+}
+
 /// What a planner made.
 #[derive(Clone, Debug)]
 pub struct Flights {
     /// Which planner.
     pub planner: &'static str,
-    /// By UAV.
+    /// How the lanes are laid.
+    pub laid: Laid,
+    /// Of the UAVs that were planned for; some may stay at their start.
     pub flights: Vec<Flight>,
     /// The share of the area that is seen.
     pub covered_share: f64,
@@ -110,61 +159,67 @@ impl Flights {
         self.flights.iter().map(Flight::time_s).fold(0.0, f64::max)
     }
 
+    fn energy_wh(&self) -> Option<f64> {
+        self.flights
+            .iter()
+            .filter(|f| f.flies())
+            .map(Flight::energy_wh)
+            .sum()
+    }
+
+    /// What it is compared by; energies in watt-hours or in seconds of cruise.
+    #[must_use]
+    pub fn worth(&self, in_watt_hours: bool) -> Worth {
+        let cruise_s = || self.flights.iter().map(Flight::energy_s).sum();
+        Worth {
+            share: self.covered_share,
+            makespan_s: self.makespan_s(),
+            total_m: self.flights.iter().map(|f| f.length_m).sum(),
+            energy: match self.energy_wh() {
+                Some(energy_wh) if in_watt_hours => energy_wh,
+                _ => cruise_s(),
+            },
+        }
+    }
+
     /// What a person compares.
     #[must_use]
     pub fn compared(&self) -> Value {
-        json!({
+        let worth = self.worth(false);
+        let mut out = json!({
             "planner": self.planner,
-            "makespan_s": self.makespan_s(),
-            "covered_share": self.covered_share,
-            "total_m": self.flights.iter().map(|f| f.length_m).sum::<f64>(),
-            "energy_s": self.flights.iter().map(Flight::energy_s).sum::<f64>(),
-        })
-    }
-
-    /// What is printed, with what all planners that were asked came to.
-    #[must_use]
-    pub fn sheet(
-        &self,
-        origin: Origin,
-        compared: &[Value],
-        notices: &[String],
-        altitude_m: f64,
-    ) -> Sheet {
-        let mut summary = self.compared();
-        for (key, value) in &self.more {
-            summary[key] = value.clone();
+            "lanes": self.laid.name(),
+            "makespan_s": worth.makespan_s,
+            "covered_share": worth.share,
+            "total_m": worth.total_m,
+            "energy_s": worth.energy,
+            "uavs_flying": self.flights.iter().filter(|f| f.flies()).count(),
+        });
+        if let Some(energy_wh) = self.energy_wh() {
+            out["energy_wh"] = json!(energy_wh);
         }
-        if compared.len() > 1 {
-            summary["compared"] = json!(compared);
-        }
-        summary["notices"] = json!(notices);
-        Sheet {
-            origin,
-            summary,
-            flights: self.flights.iter().map(|f| f.printed(altitude_m)).collect(),
-            shapes: self.shapes.clone(),
-        }
+        out
     }
 }
 
-/// The share of an area without holes that is seen, by samples.
+/// The share of the wanted ground of an area that is seen, by samples.
 pub fn covered_share(
     area: &Polygon,
-    holes: &[Polygon],
+    wanted: impl Fn(Point) -> bool,
     swath_m: f64,
+    most_samples: f64,
     sees: impl Fn(Point) -> bool,
 ) -> f64 {
     let (low, high) = area.bounds();
     let size = high - low;
-    let pitch_m = (swath_m / SAMPLES_A_SWATH).max((size.x * size.y / MOST_SAMPLES).sqrt());
+    let pitch_m = (swath_m / SAMPLES_A_SWATH).max((size.x * size.y / most_samples).sqrt());
     let (mut all, mut seen) = (0u32, 0u32);
     let mut y = low.y + pitch_m / 2.0;
     while y < high.y {
         let mut x = low.x + pitch_m / 2.0;
         while x < high.x {
             let p = Point::new(x, y);
-            if area.contains(p) && !holes.iter().any(|h| h.contains(p)) {
+            if area.contains(p) && wanted(p) {
                 all += 1;
                 seen += u32::from(sees(p));
             }
@@ -205,9 +260,15 @@ mod tests {
             .unwrap()
         };
         let (area, hole) = (square(100.0), square(50.0));
-        let half = covered_share(&area, &[], 40.0, |p| p.x > 0.0);
+        let half = covered_share(&area, |_| true, 40.0, MOST_SAMPLES, |p| p.x > 0.0);
         assert!((half - 0.5).abs() < 0.01);
-        let rest = covered_share(&area, &[hole], 40.0, |p| p.x.abs() > 50.0);
+        let rest = covered_share(
+            &area,
+            |p| !hole.contains(p),
+            40.0,
+            MOST_SAMPLES,
+            |p| p.x.abs() > 50.0,
+        );
         // 2 × 50 × 200 of 30,000 square metres.
         assert!((rest - 2.0 / 3.0).abs() < 0.01, "{rest}");
     }

@@ -2,13 +2,19 @@
 
 pub mod approximate;
 pub mod around;
+pub mod choice;
 pub mod cover;
 pub mod fleet;
 pub mod flights;
+pub mod flyers;
+pub mod heights;
+pub mod lanes;
 pub mod line;
 mod map;
+pub mod objective;
 pub mod output;
 pub mod patrol;
+pub mod planners;
 pub mod route;
 pub mod site;
 pub mod tours;

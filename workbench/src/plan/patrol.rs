@@ -7,8 +7,13 @@
 use super::around::{Around, Asker};
 use super::cover::{self, CoverArgs};
 use super::fleet::Member;
+use super::flyers::{Defaults, swath_m};
+use super::heights::LayerArgs;
+use super::lanes::Lanes;
 use super::line::{self, LineArgs};
+use super::objective::Objective;
 use super::output::{Printed, Sheet};
+use super::planners;
 use super::tours::{TourArgs, Ways};
 use super::visit::{self, VisitArgs};
 use anyhow::{Context, Result, bail, ensure};
@@ -165,7 +170,13 @@ fn over_area(args: &PatrolArgs) -> Result<Course> {
         tours.endurance_s,
     )?;
     tours.output.check(team.len())?;
-    let swath = |m: &Member| m.swath_m.unwrap_or(tours.swath_m);
+    let defaults = Defaults {
+        swath_m: tours.swath_m,
+        turn_radius_m: args.turn_radius_m,
+        sensor: None,
+    };
+    let height_m = tours.output.altitude_m;
+    let swath = |m: &Member| swath_m(m, defaults, height_m).unwrap_or(tours.swath_m);
     let radius = |m: &Member| m.turn_radius_m.unwrap_or(args.turn_radius_m);
     let alone = CoverArgs {
         file: args.file.clone(),
@@ -181,15 +192,21 @@ fn over_area(args: &PatrolArgs) -> Result<Course> {
         speed_mps: tours.speed_mps,
         endurance_s: None,
         course_deg: None,
+        sensor: None,
+        objective: Objective::Time,
+        lanes: Lanes::Common,
+        layers: LayerArgs::FLAT,
         steps: tours.steps,
         output: tours.output.clone(),
     };
-    let (site, plans) = cover::planned(&alone)?;
-    let best = plans.iter().reduce(|a, b| cover::better(a, b));
-    let best = best.context("no planner was asked")?;
+    let (site, best) = cover::planned(&alone)?;
     let flight = best.flights.first().context("nothing is flown")?;
-    let starts = cover::starts(&site, &team)?;
-    let around = cover::around(&site, tours.clearance_m, &team, &starts)?;
+    let starts = team.iter().map(|m| m.start_in(site.origin));
+    let starts: Vec<Point> = starts.collect::<Result<_>>()?;
+    let around = planners::around(&site, tours.clearance_m, starts.iter().copied())?;
+    for (member, start) in team.iter().zip(&starts) {
+        planners::check_start(&around, &member.name, *start)?;
+    }
     let mut lap = flight.lap.clone();
     if let (Some(first), Some(last)) = (lap.first().copied(), lap.last().copied()) {
         let home = around.asker().way(last, first).unwrap_or_default();

@@ -3,6 +3,7 @@
 
 use super::lat_lon;
 use anyhow::{Context, Result, bail};
+use serde_json::Value;
 use skein_interop::place::{LatLon, Shape, Side, to_plane};
 use skein_interop::{geojson, plan};
 use skein_planning::frame::{Origin, Point};
@@ -21,14 +22,24 @@ pub struct Site {
     pub holes: Vec<Polygon>,
     /// Where nobody may fly.
     pub zones: Arc<NoFlyZones>,
+    /// The sensor that it is to be seen with, if the file says so.
+    pub sensor: Option<String>,
     /// What of the file was left out.
     pub notices: Vec<String>,
+}
+
+/// An area of a file.
+struct Drawn {
+    name: String,
+    ring: Vec<LatLon>,
+    holes: Vec<Vec<LatLon>>,
+    sensor: Option<String>,
 }
 
 /// The rings of a file with their names.
 #[derive(Default)]
 struct Sheet {
-    areas: Vec<(String, Vec<LatLon>, Vec<Vec<LatLon>>)>,
+    areas: Vec<Drawn>,
     zones: Vec<(String, Shape)>,
     home: Option<LatLon>,
     notices: Vec<String>,
@@ -39,7 +50,8 @@ struct Sheet {
 ///
 /// In a `.plan` the survey's polygon is the area and exclusion fences are zones. In
 /// GeoJSON a polygon with the property `"no_fly": true` is a zone, the other one the
-/// area; its holes need not be seen.
+/// area; its holes need not be seen, and its property `sensor` names what it is to be
+/// seen with.
 ///
 /// # Errors
 /// When the file cannot be read, has no area or more than one, or something of it is
@@ -65,7 +77,12 @@ fn of_plan(text: &str) -> Result<Sheet> {
     };
     let named = |what: &str, i: usize| format!("{what} {}", i + 1);
     for (i, ring) in file.surveys.into_iter().enumerate() {
-        sheet.areas.push((named("survey", i), ring, Vec::new()));
+        sheet.areas.push(Drawn {
+            name: named("survey", i),
+            ring,
+            holes: Vec::new(),
+            sensor: None,
+        });
     }
     for (i, shape) in file.keep_out.into_iter().enumerate() {
         sheet.zones.push((named("exclusion fence", i), shape));
@@ -96,14 +113,35 @@ fn of_geojson(text: &str) -> Result<Sheet> {
                 let text = format!("at {}: a hole without an area was filled", f.pointer);
                 sheet.notices.push(text);
             }
-            sheet.areas.push((f.pointer, f.ring, f.hole_rings));
+            let sensor = match f.properties.get("sensor") {
+                None | Some(Value::Null) => None,
+                Some(Value::String(name)) => Some(name.clone()),
+                Some(other) => bail!(
+                    "at {}/properties/sensor: expected the name of a sensor, found {other}",
+                    f.pointer
+                ),
+            };
+            sheet.areas.push(Drawn {
+                name: f.pointer,
+                ring: f.ring,
+                holes: f.hole_rings,
+                sensor,
+            });
         }
     }
     Ok(sheet)
 }
 
 fn site(sheet: Sheet, launch: Option<&str>) -> Result<Site> {
-    let [(name, ring, holes)] = sheet.areas.as_slice() else {
+    let [
+        Drawn {
+            name,
+            ring,
+            holes,
+            sensor,
+        },
+    ] = sheet.areas.as_slice()
+    else {
         bail!(
             "one area is planned at a time, found {}: a survey of a .plan, or a polygon of GeoJSON without \"no_fly\": true",
             sheet.areas.len()
@@ -142,6 +180,7 @@ fn site(sheet: Sheet, launch: Option<&str>) -> Result<Site> {
         area: polygon(ring, name)?,
         holes: holes.collect::<Result<_>>()?,
         zones: Arc::new(NoFlyZones::new(zones.collect::<Result<_>>()?)),
+        sensor: sensor.clone(),
         notices: sheet.notices,
     })
 }

@@ -1,0 +1,87 @@
+//! Which UAVs of a team fly over an area, and the plan of those (D2.7 §3.1).
+//!
+//! Leaves to [`super::lanes`] the plans of a team.
+
+use super::flights::Flights;
+use super::flyers::Flyer;
+use super::lanes::{Care, Desk};
+use super::objective::Objective;
+use anyhow::Result;
+use skein_planning::coverage::fleet::sections::alike;
+use skein_planning::coverage::fleet::who::{kinds, search};
+
+/// Teams are compared with this part of the steps.
+const SEARCH_PART: usize = 8;
+
+/// The best plan for each kind of lanes that was found, the best of all first.
+///
+/// # Errors
+/// When there is no plan for any team.
+pub fn choose(desk: &Desk<'_>, flyers: &[Flyer], steps: usize) -> Result<Vec<Flights>> {
+    let care = Care {
+        steps,
+        rough: false,
+    };
+    let whole = desk.plans(flyers, care);
+    let mut found: Vec<Flights> = match who(desk, flyers, steps / SEARCH_PART) {
+        Some(team) if team.len() < flyers.len() => desk.plans(&members(flyers, &team), care)?,
+        _ => Vec::new(),
+    };
+    match whole {
+        Ok(plans) => found.extend(plans),
+        // Fewer may do what all cannot: lanes for the narrowest swath can be too many.
+        Err(error) if found.is_empty() => return Err(error),
+        Err(_) => {}
+    }
+    let mut best: Vec<Flights> = Vec::new();
+    for plan in found {
+        match best.iter_mut().find(|b| b.laid == plan.laid) {
+            Some(known) if desk.beats(&plan, known) => *known = plan,
+            Some(_) => {}
+            None => best.push(plan),
+        }
+    }
+    if let [first, second] = best.as_slice()
+        && desk.beats(second, first)
+    {
+        best.reverse();
+    }
+    Ok(best)
+}
+
+fn members(flyers: &[Flyer], team: &[usize]) -> Vec<Flyer> {
+    team.iter().map(|i| flyers[*i].clone()).collect()
+}
+
+/// The team that promises the best plan.
+fn who(desk: &Desk<'_>, flyers: &[Flyer], steps: usize) -> Option<Vec<usize>> {
+    let evaluate = |team: &[usize]| -> Option<Flights> {
+        let rough = Care { steps, rough: true };
+        let plans = desk.plans(&members(flyers, team), rough).ok()?;
+        plans
+            .into_iter()
+            .reduce(|a, b| if desk.beats(&b, &a) { b } else { a })
+    };
+    let better = |a: &Flights, b: &Flights| desk.beats(a, b);
+    if desk.objective != Objective::Time {
+        let found = search(&kinds(flyers, Flyer::is_like), evaluate, better);
+        return found.map(|(team, _)| team);
+    }
+    // More UAVs are sooner, but for those with so narrow a swath that all get their lanes.
+    let swaths: Vec<f64> = flyers.iter().map(|f| f.swath_m).collect();
+    let groups = alike(&swaths);
+    if groups.len() < 2 {
+        return None;
+    }
+    let mut best: Option<(Vec<usize>, Flights)> = None;
+    for narrowest in 0..groups.len() {
+        let mut team: Vec<usize> = groups[narrowest..].concat();
+        team.sort_unstable();
+        if let Some(found) = evaluate(&team)
+            && best.as_ref().is_none_or(|(_, b)| better(&found, b))
+        {
+            best = Some((team, found));
+        }
+    }
+    best.map(|(team, _)| team)
+}

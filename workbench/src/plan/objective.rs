@@ -1,0 +1,112 @@
+//! What a plan is to be short in: time, distance or energy (D2.7 §3.1).
+//!
+//! Leaves to the planners which plans there are to choose from.
+
+use super::fleet::Member;
+use anyhow::{Result, bail};
+use clap::ValueEnum;
+use serde::Serialize;
+
+/// Shares of the work that differ by less than this are the same to a person: samples
+/// are no finer.
+pub const SAME_SHARE: f64 = 0.002;
+
+/// Figures that differ by less than this share are the same.
+const SAME: f64 = 1e-9;
+
+/// What is to be least.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Objective {
+    /// The time until the last UAV is back.
+    #[default]
+    Time,
+    /// The length of all flights together: one UAV may fly alone.
+    Distance,
+    /// The energy of all flights together: watt-hours where the fleet states
+    /// `cruise_power_w`, else seconds of cruise.
+    Energy,
+}
+
+/// What a plan comes to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Worth {
+    /// The share of the work that is done.
+    pub share: f64,
+    /// The longest flight, seconds.
+    pub makespan_s: f64,
+    /// All flights together, metres.
+    pub total_m: f64,
+    /// All flights together, in one unit of energy.
+    pub energy: f64,
+}
+
+impl Worth {
+    /// The figure of an objective.
+    #[must_use]
+    pub fn figure(&self, objective: Objective) -> f64 {
+        match objective {
+            Objective::Time => self.makespan_s,
+            Objective::Distance => self.total_m,
+            Objective::Energy => self.energy,
+        }
+    }
+
+    /// Whether this plan does more than the other, or as much for less; for as much, what
+    /// is sooner and then shorter.
+    #[must_use]
+    pub fn beats(&self, other: &Self, objective: Objective) -> bool {
+        let more = self.share - other.share;
+        if more.abs() > SAME_SHARE {
+            return more > 0.0;
+        }
+        let both = |w: &Self| [w.figure(objective), w.makespan_s, w.total_m];
+        for (a, b) in both(self).into_iter().zip(both(other)) {
+            if (a - b).abs() > SAME * a.abs().max(b.abs()) {
+                return a < b;
+            }
+        }
+        false
+    }
+}
+
+/// Whether energies of this team are watt-hours: when every UAV states its power.
+///
+/// # Errors
+/// When energy is asked for and only some of the team state their power.
+pub fn in_watt_hours(team: &[Member], objective: Objective) -> Result<bool> {
+    let without = team.iter().find(|m| m.cruise_power_w.is_none());
+    let with = team.iter().find(|m| m.cruise_power_w.is_some());
+    if let (Objective::Energy, Some(without), Some(with)) = (objective, without, with) {
+        bail!(
+            "--objective energy: {} has no cruise_power_w, but {} has: state it for all UAVs or for none",
+            without.name,
+            with.name
+        );
+    }
+    Ok(without.is_none())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_is_better_than_less_for_less() {
+        let worth = |share: f64, figures: [f64; 3]| Worth {
+            share,
+            makespan_s: figures[0],
+            total_m: figures[1],
+            energy: figures[2],
+        };
+        let (soon, short) = (
+            worth(1.0, [10.0, 300.0, 30.0]),
+            worth(1.0, [20.0, 200.0, 20.0]),
+        );
+        assert!(soon.beats(&short, Objective::Time) && !short.beats(&soon, Objective::Time));
+        assert!(short.beats(&soon, Objective::Distance) && short.beats(&soon, Objective::Energy));
+        let less = worth(0.9, [1.0, 1.0, 1.0]);
+        assert!(!less.beats(&soon, Objective::Distance) && soon.beats(&less, Objective::Energy));
+        assert!(!soon.beats(&soon, Objective::Time));
+    }
+}
