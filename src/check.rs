@@ -103,13 +103,14 @@ impl Judged {
             cells: survey.cells().len(),
             coverable: survey.n_coverable(),
             share: survey.coverable_share(),
-            // Squares of the judge's own have no names on the loop.
-            missed: open
-                .map(|c| c.id)
-                .filter(|id| {
-                    scenario.spec.mission.task != Task::Exact && the_loop.index_of(*id).is_none()
-                })
-                .collect(),
+            // Squares and pieces of the judge's own have no names on the loop.
+            missed: match scenario.spec.mission.task {
+                Task::Area | Task::Points(_) => open
+                    .map(|c| c.id)
+                    .filter(|id| the_loop.index_of(*id).is_none())
+                    .collect(),
+                Task::Exact | Task::Lines(_) => Vec::new(),
+            },
         }
     }
 }

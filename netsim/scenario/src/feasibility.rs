@@ -10,6 +10,7 @@ use skein_peer::Mission;
 use skein_peer::mission::point_m;
 use skein_peer::plan::Ground;
 use skein_planning::coverage::area::backtracking::{Division, RingCell, Robot, divide};
+use skein_planning::coverage::area::patch::Patches;
 use skein_planning::coverage::area::{CellId, CoverageLoop, Direction, Grid};
 use skein_planning::frame::Point;
 use skein_planning::geometry::Polygon;
@@ -300,6 +301,15 @@ pub fn summary(spec: &Spec, ground: &Ground) -> Summary {
             (None, None) => 0.0,
         };
     }
+    // Stations may be larger than the pieces that they hold.
+    let whole_m2 = match the_loop.patches() {
+        Patches::Listed(list) => list
+            .corners()
+            .iter()
+            .map(|c| ring_area_m2(c).max(POINT_M2))
+            .sum(),
+        Patches::Grid(_) => area_m2,
+    };
     let division = failure_free(spec, the_loop);
     Summary {
         area_m2,
@@ -307,7 +317,7 @@ pub fn summary(spec: &Spec, ground: &Ground) -> Summary {
         passed: the_loop.cells().iter().filter(|c| !c.needed).count(),
         excursions: the_loop.cells().iter().filter(|c| c.excursion).count(),
         uncoverable,
-        coverable_share: (1.0 - lost_m2 / area_m2).clamp(0.0, 1.0),
+        coverable_share: (1.0 - lost_m2 / whole_m2).clamp(0.0, 1.0),
         loop_m: the_loop
             .cells()
             .iter()

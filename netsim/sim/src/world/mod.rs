@@ -22,6 +22,7 @@ pub use survey::{Cell, Survey, Uncoverable};
 use crate::spec::Spec;
 use motion::{Kinematic, Piece};
 use skein_behaviors::{Percept, Setpoint};
+use skein_peer::Task;
 use skein_planning::coverage::area::patch::Patches;
 use std::sync::Arc;
 
@@ -63,11 +64,13 @@ struct Uav {
     failsafe: bool,
 }
 
-/// The pieces in which peers see an area that they cover by exact passes: they come
-/// from the planner, and serve to check what peers say, not whether all was seen.
+/// The pieces in which peers see an area by exact passes, and lines by stations of
+/// several pieces: they come from the planner, and serve to check what peers say, not
+/// whether all was seen.
 fn claims(spec: &Spec) -> Option<Arc<pieces::Pieces>> {
-    if spec.mission.task != skein_peer::Task::Exact {
-        return None;
+    match spec.mission.task {
+        Task::Exact | Task::Lines(_) => {}
+        Task::Area | Task::Points(_) => return None,
     }
     let ground = spec.mission.ground().ok()?;
     let corners = match ground.coverage_loop.patches() {

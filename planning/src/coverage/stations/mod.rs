@@ -7,10 +7,12 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`targets`] | what a mission may ask for, and its pieces |
+//! | `bundle` | which pieces of lines one frame holds together |
 //! | `order` | in which order the pieces are flown |
 //! | `stand` | where a UAV may be when it sees a piece |
 //! | `chain` | which of these places are joined, and how |
 
+mod bundle;
 mod chain;
 mod order;
 mod stand;

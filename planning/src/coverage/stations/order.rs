@@ -2,22 +2,30 @@
 //! the postman's of §3.5 (D2.7).
 
 use super::targets::{PointTarget, Stretch};
+use crate::coverage::area::AreaProblem;
+use crate::coverage::area::patch::{Corners, middle};
 use crate::coverage::line::{self, Line, Surveyor};
 use crate::coverage::metric::Straight;
 use crate::coverage::pinpoint::tour;
 use crate::frame::Point;
+use crate::math::atan2;
 use std::collections::BTreeMap;
 
 /// Points by a short closed tour, beginning near `launch`.
 pub(super) fn of_points(points: &[PointTarget], launch: Point) -> Vec<usize> {
     let at: Vec<Point> = points.iter().map(|p| p.at).collect();
-    let Some(first) = nearest(&at, launch) else {
+    by_places(&at, launch)
+}
+
+/// Places by a short closed tour, beginning near `launch`.
+fn by_places(at: &[Point], launch: Point) -> Vec<usize> {
+    let Some(first) = nearest(at, launch) else {
         return Vec::new();
     };
     let places: Vec<usize> = std::iter::once(first)
         .chain((0..at.len()).filter(|&i| i != first))
         .collect();
-    tour::tour(&places, &Straight(&at)).order
+    tour::tour(&places, &Straight(at)).order
 }
 
 /// Pieces of lines in the order of one closed tour along all of them.
@@ -53,6 +61,38 @@ pub(super) fn of_lines(stretches: &[Stretch], launch: Point) -> Vec<usize> {
         }
     }
     order
+}
+
+/// Stations in an order of flight: as the postman comes by them first, or by a short tour
+/// over their middles, whichever bends and flies less.
+pub(super) fn of_bundles(
+    stations: &[Corners],
+    along: impl Iterator<Item = usize>,
+    flown: &AreaProblem,
+) -> Vec<usize> {
+    let mut seen = vec![false; stations.len()];
+    let first = along.filter(|&n| !std::mem::replace(&mut seen[n], true));
+    let first: Vec<usize> = first.collect();
+    let at: Vec<Point> = stations.iter().map(middle).collect();
+    let tour = by_places(&at, flown.launch);
+    let cost_m = |order: &[usize]| bent_m(order, &at, flown.turn_radius_m);
+    if cost_m(&tour) < cost_m(&first) {
+        tour
+    } else {
+        first
+    }
+}
+
+/// Length of a closed tour over places in straight legs, and of its bends at this radius.
+fn bent_m(order: &[usize], at: &[Point], turn_radius_m: f64) -> f64 {
+    let n = order.len();
+    let place = |i: usize| at[order[i % n]];
+    let leg = |i: usize| place(i + 1) - place(i);
+    let bend = |i: usize| {
+        let (a, b) = (leg(i), leg(i + 1));
+        atan2(a.perp(&b), a.dot(&b)).abs() * turn_radius_m
+    };
+    (0..n).map(|i| leg(i).norm() + bend(i)).sum()
 }
 
 /// Ways cut at every vertex that another way, or the same a second time, goes through.

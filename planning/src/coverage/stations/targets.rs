@@ -4,6 +4,7 @@
 //! The pieces belong to the mission, not to a planner: who plans and who judges cut
 //! the same way.
 
+use super::bundle::{Bundles, bundle};
 use super::{StationsProblem, order};
 use crate::coverage::area::AreaProblem;
 use crate::coverage::area::patch::Corners;
@@ -95,7 +96,7 @@ impl Targets {
 
 impl<'a> StationsProblem<'a> {
     /// The pieces of targets, in the order in which one closed tour from the launch point
-    /// sees them.
+    /// sees them; pieces of lines that one frame holds together are one station.
     #[must_use]
     pub fn of_targets(flown: &'a AreaProblem, targets: &Targets) -> Self {
         let longest_m = flown.lane_spacing_m;
@@ -106,8 +107,12 @@ impl<'a> StationsProblem<'a> {
             ),
             Targets::Lines(lines) => {
                 let stretches = stretches(lines, longest_m);
-                let pieces = stretches.iter().flat_map(cut).collect();
-                (pieces, order::of_lines(&stretches, flown.launch))
+                let pieces: Vec<Corners> = stretches.iter().flat_map(cut).collect();
+                let along = order::of_lines(&stretches, flown.launch);
+                let Bundles { stations, of_piece } = bundle(&pieces, flown);
+                let along = along.into_iter().map(|piece| of_piece[piece]);
+                let order = order::of_bundles(&stations, along, flown);
+                (stations, order)
             }
         };
         Self {
