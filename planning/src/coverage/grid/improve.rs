@@ -4,12 +4,14 @@
 //! It stops after a number of *steps*, not after a time, so that every peer computes the
 //! same plan byte for byte.
 
+use super::home::Home;
 use super::map::{Cell, NOWHERE};
 use super::partition::{Partition, Regions};
 use super::plan::{Plan, Task};
 use super::search::{PACE, Search};
 use super::spanning::{Tree, best_offset, region_loops};
 use super::{bounds, peel};
+use std::sync::Arc;
 
 /// Steps in a round: between two of them the aim is set anew and the caller may stop.
 pub const ROUND: usize = 20_000;
@@ -119,7 +121,9 @@ impl<'a> Improver<'a> {
 
 /// The search that stands best after a few steps from each first plan.
 fn race(task: &Task, steps: usize) -> Search<'_> {
-    let [mut first, mut second] = first_orders(task).map(|orders| Search::new(task, orders));
+    let home = Arc::new(Home::new(task));
+    let [mut first, mut second] =
+        first_orders(task, &home).map(|orders| Search::with(task, Arc::clone(&home), orders));
     let (one, two) = (first.makespan(), second.makespan());
     if one.min(two) * OUT_OF_REACH < one.max(two) {
         return if one < two { first } else { second };
@@ -138,9 +142,12 @@ fn race(task: &Task, steps: usize) -> Search<'_> {
 }
 
 /// The first plans: a region each that all grow at once, and work peeled off from afar.
-fn first_orders(task: &Task) -> [Vec<Vec<Cell>>; 2] {
+fn first_orders(task: &Task, home: &Arc<Home>) -> [Vec<Vec<Cell>>; 2] {
     let offset = best_offset(&task.map);
-    [grown_orders(task, offset), peeled_orders(task, offset)]
+    [
+        grown_orders(task, home, offset),
+        peeled_orders(task, offset),
+    ]
 }
 
 /// Work peeled off from afar, with about the least moves that suffice for all.
@@ -168,20 +175,23 @@ fn peeled_orders(task: &Task, offset: (u32, u32)) -> Vec<Vec<Cell>> {
     best.unwrap_or_default()
 }
 
-/// Regions that all grow at once, in the order of loops round them, evened until that
-/// pays no more.
-fn grown_orders(task: &Task, offset: (u32, u32)) -> Vec<Vec<Cell>> {
-    let mut partition = Partition::grown(task, offset);
+/// Regions that all grow at once, in the order of loops round them, shaken and evened
+/// until that pays no more.
+fn grown_orders(task: &Task, home: &Arc<Home>, offset: (u32, u32)) -> Vec<Vec<Cell>> {
+    let mut partition = Partition::grown(task, home, offset);
     let mut best = loop_orders(task, &partition.regions(), offset);
-    let mut search = Search::new(task, best.clone());
+    let mut search = Search::with(task, Arc::clone(home), best.clone());
     let mut best_score = search.score();
-    for _ in 0..EVENINGS {
-        if partition.hopeless() {
+    for round in 0..=EVENINGS {
+        if round == 0 {
+            partition.shake();
+        } else if partition.hopeless() {
             break;
+        } else {
+            partition.even(search.moves());
         }
-        partition.even(search.moves());
         let orders = loop_orders(task, &partition.regions(), offset);
-        search = Search::new(task, orders.clone());
+        search = Search::with(task, Arc::clone(home), orders.clone());
         if search.score() < best_score {
             best_score = search.score();
             best = orders;
@@ -306,7 +316,7 @@ mod tests {
             let mut improver = Improver::new(&task, 20_000);
             while improver.round() {}
             assert_sound(&task, &improver.plan());
-            for orders in [grown_orders(&task, (0, 1)), peeled_orders(&task, (1, 0))] {
+            for orders in [grown_orders(&task, &Arc::new(Home::new(&task)), (0, 1)), peeled_orders(&task, (1, 0))] {
                 let mut all: Vec<Cell> = orders.into_iter().flatten().collect();
                 all.sort_unstable();
                 let cells: Vec<Cell> = task.map.cells().collect();

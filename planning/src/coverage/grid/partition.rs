@@ -3,13 +3,18 @@
 //!
 //! Regions are made of *pieces*: the connected free cells of one 2×2 block, so that a
 //! loop round a region's blocks covers it without a repeat. All regions grow at once;
-//! then pieces pass across borders from regions with too much to regions with too little.
+//! then pieces pass across borders from regions with too much to regions with too little,
+//! and regions go to the UAVs that they suit.
 //!
-//! Left to others: the path through a region, and the balance of single cells.
+//! Left to others: which pieces may pass, the path through a region, and the
+//! balance of single cells.
 
+mod assign;
+mod pass;
+
+use super::home::Home;
 use super::map::{Cell, LaneMap, NOWHERE, UNREACHED};
 use super::plan::Task;
-use super::stream::Stream;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -25,19 +30,23 @@ pub struct Regions {
 /// The owner of cells that belong to no region.
 pub const NOBODY: u32 = u32::MAX;
 
-/// Sweeps over all pieces at most: a piece passes one border a sweep, and a region is
-/// reached over fewer borders than this on all maps tried.
-const SWEEPS: usize = 400;
-
-/// Pieces looked at to show that a region stays connected without one; beyond, the piece
-/// stays.
-const WAY_ROUND: usize = 64;
-
 /// A region is small below one part in this many of an even share.
 const SMALL: i64 = 16;
 
-/// Sweeps end when fewer than one piece in this many has passed.
-const FEW: usize = 5000;
+/// More UAVs than this keep the regions that they grew: the time to assign them grows with
+/// the cube.
+const MOST_ASSIGNED: usize = 256;
+
+/// Times that regions are given to the UAVs that they suit before their borders move
+/// against the grain.
+const ASSIGNED: usize = 2;
+
+/// Cells a UAV below which regions that are far from even are worth assigning: with long
+/// arcs work is peeled off instead.
+const SHORT: usize = 100;
+
+/// Units of time in one move of the fastest UAV.
+const PACE: i64 = 16;
 
 /// The connected free cells of one block.
 pub(super) struct Piece {
@@ -47,6 +56,7 @@ pub(super) struct Piece {
 
 pub(super) struct Partition<'a> {
     task: &'a Task,
+    home: &'a Home,
     /// By cell: its piece.
     piece_of: Vec<u32>,
     pieces: Vec<Piece>,
@@ -65,6 +75,9 @@ pub(super) struct Partition<'a> {
     /// For searches: the last search that saw a piece.
     seen: Vec<u32>,
     search: u32,
+    /// Pieces that are to change hands together, and pieces that a search has found.
+    part: Vec<u32>,
+    found: Vec<u32>,
 }
 
 /// Divides a task's cells among its UAVs, with blocks at `offset`.
@@ -76,17 +89,36 @@ pub(super) struct Partition<'a> {
 /// O(N log N) to grow, O(N) for each of at most 400 sweeps.
 #[must_use]
 pub fn regions(task: &Task, offset: (u32, u32)) -> Regions {
-    Partition::grown(task, offset).regions()
+    Partition::grown(task, &Home::new(task), offset).regions()
 }
 
 impl<'a> Partition<'a> {
     /// Regions that all grew at once, evened by cells.
-    pub(super) fn grown(task: &'a Task, offset: (u32, u32)) -> Self {
-        let mut p = Self::new(task, offset);
+    pub(super) fn grown(task: &'a Task, home: &'a Home, offset: (u32, u32)) -> Self {
+        let mut p = Self::new(task, home, offset);
         p.sow();
         p.grow();
         p.balance();
         p
+    }
+
+    /// Gives regions to the UAVs that they suit, and shakes the borders: what is shut in
+    /// between others has to pass through them.
+    pub(super) fn shake(&mut self) {
+        let short = self.task.map.n_free() < SHORT * self.seed.len();
+        for _ in 0..ASSIGNED {
+            if short || !self.hopeless() {
+                self.reassign();
+                self.balance();
+            }
+        }
+        if self.hopeless() {
+            return;
+        }
+        self.anneal();
+        self.balance();
+        self.reassign();
+        self.balance();
     }
 
     /// Evens the regions again, now that their paths are known to take `moves`: a region
@@ -98,9 +130,58 @@ impl<'a> Partition<'a> {
             self.waste[uav] = self.waste[uav].midpoint(seen);
         }
         self.balance();
+        self.reassign();
+        self.balance();
     }
 
-    pub(super) fn new(task: &'a Task, offset: (u32, u32)) -> Self {
+    /// Gives each region to the UAV that it suits, so that the times are most even.
+    fn reassign(&mut self) {
+        let n = self.seed.len();
+        if n > MOST_ASSIGNED || self.seed.contains(&NOBODY) {
+            return;
+        }
+        // By UAV and region: the way to the nearest piece, and that piece.
+        let mut nearest = vec![(i64::MAX, NOBODY); n * n];
+        for (uav, ways) in nearest.chunks_mut(n).enumerate() {
+            for (piece, owner) in (0u32..).zip(&self.owner) {
+                if let Some(way) = ways.get_mut(*owner as usize) {
+                    *way = (*way).min((self.way(uav, piece), piece));
+                }
+            }
+        }
+        let time = |uav: usize, region: usize| {
+            let moves = nearest[uav * n + region].0 + self.size[region] + self.waste[region];
+            moves * self.pace[uav] / PACE
+        };
+        let region_of = assign::assign(n, |uav, region| time(uav, region).pow(2));
+        let mut uav_of = vec![NOBODY; n];
+        let (size, waste) = (self.size.clone(), self.waste.clone());
+        for (uav, region) in region_of.iter().enumerate() {
+            uav_of[*region] = u32::try_from(uav).unwrap_or(NOBODY);
+            (self.entry[uav], self.seed[uav]) = nearest[uav * n + region];
+            self.size[uav] = size[*region];
+            self.waste[uav] = waste[*region];
+        }
+        for owner in &mut self.owner {
+            *owner = uav_of.get(*owner as usize).copied().unwrap_or(NOBODY);
+        }
+    }
+
+    /// Moves that the way of a UAV to a piece costs it.
+    fn way(&self, uav: usize, piece: u32) -> i64 {
+        let root = self.task.roots[uav];
+        let moves = |cell: &Cell| self.moves(root, *cell);
+        let least = self.pieces[piece as usize].cells().iter().map(moves).min();
+        let ways = if self.task.closed { 2 } else { 1 };
+        ways * i64::from(least.unwrap_or(0))
+    }
+
+    fn moves(&self, root: Cell, cell: Cell) -> u32 {
+        let known = self.home.moves(root, cell);
+        known.unwrap_or_else(|| self.task.map.straight(root, cell))
+    }
+
+    pub(super) fn new(task: &'a Task, home: &'a Home, offset: (u32, u32)) -> Self {
         let map = &task.map;
         let (piece_of, pieces) = cut(map, offset);
         let (mut first, mut links) = (vec![0], Vec::new());
@@ -120,6 +201,7 @@ impl<'a> Partition<'a> {
         let n = pieces.len();
         Self {
             task,
+            home,
             piece_of,
             pieces,
             first,
@@ -132,10 +214,12 @@ impl<'a> Partition<'a> {
             pace: task
                 .speeds
                 .iter()
-                .map(|v| 16 * fastest / i64::from((*v).max(1)))
+                .map(|v| PACE * fastest / i64::from((*v).max(1)))
                 .collect(),
             seen: vec![0; n],
             search: 0,
+            part: Vec::new(),
+            found: Vec::new(),
         }
     }
 
@@ -187,10 +271,8 @@ impl<'a> Partition<'a> {
     }
 
     fn begin_at(&mut self, uav: usize, piece: u32) {
-        let cell = self.pieces[piece as usize].cells[0];
         self.seed[uav] = piece;
-        let ways = if self.task.closed { 2 } else { 1 };
-        self.entry[uav] = ways * i64::from(self.task.map.straight(self.task.roots[uav], cell));
+        self.entry[uav] = self.way(uav, piece);
     }
 
     /// The region with least to fly takes the next piece, nearest to its seed. A region
@@ -291,114 +373,12 @@ impl<'a> Partition<'a> {
         }
     }
 
-    /// Passes pieces from regions with more to fly to neighbours with less.
-    fn balance(&mut self) {
-        let n = self.pieces.len();
-        if n == 0 {
-            return;
-        }
-        let mut stream = Stream::new(n as u64);
-        // A stride that is coprime to most n spreads the order over the map.
-        let stride = (7919 % n).max(1);
-        for sweep in 1..=SWEEPS {
-            if sweep % 40 == 0 && self.hopeless() {
-                break;
-            }
-            let mut passed = 0;
-            let mut at = stream.below(n);
-            for _ in 0..n {
-                passed += usize::from(self.pass(u32::try_from(at).unwrap_or(0)));
-                at = (at + stride) % n;
-            }
-            if passed * FEW <= n {
-                break;
-            }
-        }
-    }
-
     /// Whether the regions are still so uneven that sweeps will not help.
     pub(super) fn hopeless(&self) -> bool {
         let loads = (0..self.seed.len()).map(|u| self.load(u));
         let sum: i64 = loads.clone().sum();
         let most = loads.max().unwrap_or(0);
         most * 2 * self.seed.len() as i64 > sum * 3
-    }
-
-    /// Passes a piece to the neighbouring region with the least to fly, if that is then
-    /// still less than what the giver had.
-    fn pass(&mut self, piece: u32) -> bool {
-        let from = self.owner[piece as usize];
-        let mut best: Option<(i64, u32)> = None;
-        for i in self.near(piece) {
-            let to = self.owner[self.links[i] as usize];
-            if to != from && to != NOBODY {
-                let offer = (self.load(to as usize), to);
-                best = Some(best.map_or(offer, |b| b.min(offer)));
-            }
-        }
-        let Some((load, to)) = best else {
-            return false;
-        };
-        if from == NOBODY {
-            return false;
-        }
-        let cells = self.cells(piece);
-        let (uav, heir) = (from as usize, to as usize);
-        if self.load(uav) <= load + cells * self.pace[heir] || !self.connected_without(piece) {
-            return false;
-        }
-        if self.seed[uav] == piece {
-            let next = self
-                .near(piece)
-                .map(|i| self.links[i])
-                .find(|p| self.owner[*p as usize] == from);
-            let Some(next) = next else { return false };
-            self.begin_at(uav, next);
-        }
-        self.owner[piece as usize] = to;
-        self.size[uav] -= cells;
-        self.size[heir] += cells;
-        true
-    }
-
-    /// Whether the neighbours of a piece in its region reach each other without it,
-    /// within a short way round.
-    fn connected_without(&mut self, piece: u32) -> bool {
-        let region = self.owner[piece as usize];
-        let mine: Vec<u32> = self
-            .near(piece)
-            .map(|i| self.links[i])
-            .filter(|p| self.owner[*p as usize] == region)
-            .collect();
-        if mine.len() < 2 {
-            return true;
-        }
-        self.search += 1;
-        self.seen[piece as usize] = self.search;
-        self.seen[mine[0] as usize] = self.search;
-        let mut queue = vec![mine[0]];
-        let mut missing = mine.len() - 1;
-        let mut done = 0;
-        while let Some(&at) = queue.get(done) {
-            done += 1;
-            for i in self.near(at) {
-                let to = self.links[i];
-                if self.owner[to as usize] == region && self.seen[to as usize] != self.search {
-                    self.seen[to as usize] = self.search;
-                    queue.push(to);
-                    if mine[1..].contains(&to) {
-                        missing -= 1;
-                        if missing == 0 {
-                            return true;
-                        }
-                    }
-                }
-            }
-            if done > WAY_ROUND {
-                return false;
-            }
-        }
-        false
     }
 
     /// The regions by cell.
@@ -415,7 +395,7 @@ impl<'a> Partition<'a> {
                 let piece = &self.pieces[seed as usize];
                 let cells = piece.cells[..piece.n as usize].iter().copied();
                 cells
-                    .min_by_key(|c| (map.straight(*root, *c), *c))
+                    .min_by_key(|c| (self.moves(*root, *c), *c))
                     .unwrap_or(NOWHERE)
             }));
         }

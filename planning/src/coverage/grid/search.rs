@@ -13,6 +13,7 @@ use super::home::Home;
 use super::map::{Cell, NOWHERE, Router};
 use super::plan::Task;
 use super::stream::Stream;
+use std::sync::Arc;
 
 /// New links longer by this than all links that they replace are not considered: the
 /// search for their length would cost more than they ever gain.
@@ -70,7 +71,7 @@ pub struct Search<'a> {
     stream: Stream,
     remembered: Vec<(Cell, Cell, u32)>,
     /// Moves between the roots and every cell, when UAVs return.
-    home: Home,
+    home: Arc<Home>,
     /// The common time aimed at.
     target: i64,
     /// How late the pressure still grows.
@@ -93,6 +94,11 @@ impl<'a> Search<'a> {
     /// A search that begins with `orders`; each cell of the task in exactly one of them.
     #[must_use]
     pub fn new(task: &'a Task, orders: Vec<Vec<Cell>>) -> Self {
+        Self::with(task, Arc::new(Home::new(task)), orders)
+    }
+
+    /// The same, with the ways home known.
+    pub(super) fn with(task: &'a Task, home: Arc<Home>, orders: Vec<Vec<Cell>>) -> Self {
         let n = task.map.table_len();
         let fastest = i64::from(task.speeds.iter().copied().max().unwrap_or(1));
         let mut search = Self {
@@ -114,7 +120,7 @@ impl<'a> Search<'a> {
             }),
             stream: Stream::new(n as u64),
             remembered: vec![(NOWHERE, NOWHERE, 0); REMEMBERED],
-            home: Home::new(task),
+            home,
             target: 0,
             late: 16,
             heat: 0,
