@@ -9,7 +9,7 @@
 
 use crate::config::{PeerConfig, Role};
 use crate::cooperation::Crew;
-use crate::coverage::section::PlanCell;
+use crate::coverage::runs::PlanCell;
 use crate::input::{Command, Input, Time};
 use crate::journal::{Durable, Entry};
 use crate::membership::Membership;

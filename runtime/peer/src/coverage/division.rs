@@ -1,7 +1,7 @@
 //! What a complete round decides: a function of its snapshots alone.
 
 use super::rounds::Open;
-use super::section::cells_of;
+use super::runs::cells_of;
 use crate::cells::CellSet;
 use crate::wire::message::{Run, Snapshot};
 use skein_planning::coverage::area::backtracking::{Division, RingCell, Robot};

@@ -14,7 +14,8 @@
 
 use super::division::{self, CALM_PERIODS};
 use super::rounds::{HeardSnapshot, Rounds};
-use super::section::{Live, PlanCell, Section};
+use super::runs::PlanCell;
+use super::section::{Live, Section};
 use crate::Time;
 use crate::cells::CellSet;
 use crate::wire::message::{Epoch, Member, Snapshot};

@@ -18,11 +18,13 @@
 //!
 //! There is no time in here: *when* a rule may be used is the business of
 //! [`super::negotiation`]; that it is safe whenever it is used is checked
-//! exhaustively on small swarms in `tests/model.rs`.
+//! exhaustively on small swarms in `tests/model.rs`. How cells are written into a
+//! register is left to [`super::runs`].
 
+use super::runs::{Packer, PlanCell, cells_of, unpack};
 use crate::Incarnation;
 use crate::cells::CellSet;
-use crate::wire::message::{Epoch, Firmness, Listing, Register, Run, Stamp};
+use crate::wire::message::{Epoch, Register, Run, Stamp};
 use std::collections::BTreeMap;
 
 /// Most runs of cells in the plan of one register. A section has at most two legs
@@ -37,19 +39,6 @@ pub const MAX_DONE_RUNS: usize = 8;
 
 /// The peers that are not believed dead, with the life in which they are alive.
 pub type Live = BTreeMap<u16, Incarnation>;
-
-/// A cell that this peer will fly.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct PlanCell {
-    /// Which cell of the loop.
-    pub cell: u16,
-    /// Whether it is flown against the order of the loop.
-    pub backward: bool,
-    /// Whether it was committed in a bid: it is flown whatever is decided.
-    pub committed: bool,
-    /// By what right it is listed.
-    pub stamp: Stamp,
-}
 
 /// The newest register heard from another peer.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -290,7 +279,7 @@ impl Section {
                 }
             }
         }
-        let fits = self.pack(&plan, MAX_PLAN_RUNS).1;
+        let fits = self.packer().pack(&plan, MAX_PLAN_RUNS).1;
         plan.truncate(fits);
         plan
     }
@@ -399,7 +388,7 @@ impl Section {
     /// How many cells of a plan fit into one register, from the first on.
     #[must_use]
     pub fn fitting(&self, plan: &[PlanCell]) -> usize {
-        self.pack(plan, MAX_PLAN_RUNS).1
+        self.packer().pack(plan, MAX_PLAN_RUNS).1
     }
 
     /// The register as it would be with another plan: what is made durable first.
@@ -411,7 +400,7 @@ impl Section {
         revision: u32,
         loop_hash: u64,
     ) -> Register {
-        let plan = self.pack(plan, MAX_PLAN_RUNS).0;
+        let plan = self.packer().pack(plan, MAX_PLAN_RUNS).0;
         Register {
             revision,
             loop_hash,
@@ -466,10 +455,17 @@ impl Section {
             revision,
             loop_hash,
             epoch: self.epoch,
-            plan: self.pack(&self.plan, MAX_PLAN_RUNS).0,
-            held: self.pack(&held, MAX_HELD_RUNS).0,
+            plan: self.packer().pack(&self.plan, MAX_PLAN_RUNS).0,
+            held: self.packer().pack(&held, MAX_HELD_RUNS).0,
             done,
             eta_ms,
+        }
+    }
+
+    fn packer(&self) -> Packer<'_> {
+        Packer {
+            cells: self.cells,
+            covered: &self.union,
         }
     }
 
@@ -488,113 +484,20 @@ impl Section {
 
     /// What does not fit into a register is not flown: it would be a secret.
     fn trim(&mut self) {
-        let fits = self.pack(&self.plan, MAX_PLAN_RUNS).1;
+        let fits = self.packer().pack(&self.plan, MAX_PLAN_RUNS).1;
         self.plan.truncate(fits);
         let held = self.held_cells();
-        let fits = self.pack(&held, MAX_HELD_RUNS).1;
+        let fits = self.packer().pack(&held, MAX_HELD_RUNS).1;
         for p in held.iter().skip(fits) {
             self.held.remove(&p.cell);
         }
     }
-
-    /// Packs cells into runs, bridging gaps of covered cells; returns the runs and
-    /// how many of the cells they hold.
-    fn pack(&self, cells: &[PlanCell], max_runs: usize) -> (Vec<Listing>, usize) {
-        let mut runs: Vec<(PlanCell, u16)> = Vec::new();
-        for (i, p) in cells.iter().enumerate() {
-            if let Some((first, count)) = runs.last_mut()
-                && let Some(reach) = self.reach(first, *count, p)
-            {
-                *count = reach;
-            } else if runs.len() == max_runs {
-                return (runs.iter().map(|r| self.listing(r)).collect(), i);
-            } else {
-                runs.push((*p, 1));
-            }
-        }
-        (runs.iter().map(|r| self.listing(r)).collect(), cells.len())
-    }
-
-    /// The length of the run `first, count` after `next` joins it, if it can.
-    fn reach(&self, first: &PlanCell, count: u16, next: &PlanCell) -> Option<u16> {
-        if (first.backward, first.committed, first.stamp)
-            != (next.backward, next.committed, next.stamp)
-        {
-            return None;
-        }
-        let n = self.cells;
-        let step = |from: u16, to: u16| if to >= from { to - from } else { n - from + to };
-        let offset = if first.backward {
-            step(next.cell, first.cell)
-        } else {
-            step(first.cell, next.cell)
-        };
-        if offset < count {
-            return None;
-        }
-        let bridged = (count..offset).all(|k| {
-            let c = if first.backward {
-                step(k, first.cell)
-            } else {
-                (first.cell + k) % n
-            };
-            self.union.contains(c)
-        });
-        bridged.then_some(offset + 1)
-    }
-
-    fn listing(&self, (first, count): &(PlanCell, u16)) -> Listing {
-        let n = self.cells;
-        let start = if first.backward {
-            (first.cell + n - (count - 1) % n) % n
-        } else {
-            first.cell
-        };
-        Listing {
-            run: Run {
-                first: start,
-                count: *count,
-            },
-            backward: first.backward,
-            firmness: if first.committed {
-                Firmness::Committed
-            } else {
-                Firmness::Tentative
-            },
-            stamp: first.stamp,
-        }
-    }
-}
-
-/// The cells of a run on a loop of `n`, in forward order.
-pub fn cells_of(run: Run, n: u16) -> impl Iterator<Item = u16> {
-    let n32 = u32::from(n.max(1));
-    (0..u32::from(run.count.min(n)))
-        .map(move |k| u16::try_from((u32::from(run.first) + k) % n32).unwrap_or(0))
-}
-
-/// The cells of listings in order of flight.
-#[must_use]
-pub fn unpack(listings: &[Listing], n: u16) -> Vec<PlanCell> {
-    let mut out = Vec::new();
-    for l in listings {
-        let mut cells: Vec<u16> = cells_of(l.run, n).collect();
-        if l.backward {
-            cells.reverse();
-        }
-        out.extend(cells.into_iter().map(|cell| PlanCell {
-            cell,
-            backward: l.backward,
-            committed: l.firmness == Firmness::Committed,
-            stamp: l.stamp,
-        }));
-    }
-    out
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wire::message::{Firmness, Listing};
 
     fn stamp(counter: u32, take: u16, id: u16) -> Stamp {
         Stamp {
@@ -753,34 +656,6 @@ mod tests {
         assert!(!s.cover(&c));
         assert!(s.plan().is_empty());
         assert_eq!(s.held().keys().copied().collect::<Vec<_>>(), [2]);
-    }
-
-    #[test]
-    fn packing_and_unpacking_keep_order_and_direction() {
-        let mut s = section(1);
-        let cells = [
-            (8, false),
-            (9, false),
-            (0, false),
-            (4, true),
-            (3, true),
-            (6, false),
-        ];
-        s.adopt(
-            Epoch {
-                counter: 1,
-                hash: 0,
-            },
-            &[],
-            &cells,
-        );
-        let r = s.register(1, 1, 0);
-        assert_eq!(r.plan.len(), 3);
-        let back: Vec<(u16, bool)> = unpack(&r.plan, 10)
-            .iter()
-            .map(|p| (p.cell, p.backward))
-            .collect();
-        assert_eq!(back, cells);
     }
 
     #[test]

@@ -1,0 +1,165 @@
+//! Runs: how the cells of a section are written into a register, in order of flight
+//! (D2.7 §3.6.5). Leaves which cells these are to [`super::section`].
+
+use crate::cells::CellSet;
+use crate::wire::message::{Firmness, Listing, Run, Stamp};
+
+/// A cell that this peer will fly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PlanCell {
+    /// Which cell of the loop.
+    pub cell: u16,
+    /// Whether it is flown against the order of the loop.
+    pub backward: bool,
+    /// Whether it was committed in a bid: it is flown whatever is decided.
+    pub committed: bool,
+    /// By what right it is listed.
+    pub stamp: Stamp,
+}
+
+/// Packs cells of a loop.
+pub(super) struct Packer<'a> {
+    /// How many cells the loop has.
+    pub(super) cells: u16,
+    /// Cells that nobody needs to fly any more: runs may bridge them.
+    pub(super) covered: &'a CellSet,
+}
+
+impl Packer<'_> {
+    /// Packs cells into at most `max_runs` runs, bridging gaps of covered cells; returns
+    /// the runs and how many of the cells they hold.
+    pub(super) fn pack(&self, cells: &[PlanCell], max_runs: usize) -> (Vec<Listing>, usize) {
+        let mut runs: Vec<(PlanCell, u16)> = Vec::new();
+        for (i, p) in cells.iter().enumerate() {
+            if let Some((first, count)) = runs.last_mut()
+                && let Some(reach) = self.reach(first, *count, p)
+            {
+                *count = reach;
+            } else if runs.len() == max_runs {
+                return (runs.iter().map(|r| self.listing(r)).collect(), i);
+            } else {
+                runs.push((*p, 1));
+            }
+        }
+        (runs.iter().map(|r| self.listing(r)).collect(), cells.len())
+    }
+
+    /// The length of the run `first, count` after `next` joins it, if it can.
+    fn reach(&self, first: &PlanCell, count: u16, next: &PlanCell) -> Option<u16> {
+        if (first.backward, first.committed, first.stamp)
+            != (next.backward, next.committed, next.stamp)
+        {
+            return None;
+        }
+        let n = self.cells;
+        let step = |from: u16, to: u16| if to >= from { to - from } else { n - from + to };
+        let offset = if first.backward {
+            step(next.cell, first.cell)
+        } else {
+            step(first.cell, next.cell)
+        };
+        if offset < count {
+            return None;
+        }
+        let bridged = (count..offset).all(|k| {
+            let c = if first.backward {
+                step(k, first.cell)
+            } else {
+                (first.cell + k) % n
+            };
+            self.covered.contains(c)
+        });
+        bridged.then_some(offset + 1)
+    }
+
+    fn listing(&self, (first, count): &(PlanCell, u16)) -> Listing {
+        let n = self.cells;
+        let start = if first.backward {
+            (first.cell + n - (count - 1) % n) % n
+        } else {
+            first.cell
+        };
+        Listing {
+            run: Run {
+                first: start,
+                count: *count,
+            },
+            backward: first.backward,
+            firmness: if first.committed {
+                Firmness::Committed
+            } else {
+                Firmness::Tentative
+            },
+            stamp: first.stamp,
+        }
+    }
+}
+
+/// The cells of a run on a loop of `n`, in forward order.
+pub fn cells_of(run: Run, n: u16) -> impl Iterator<Item = u16> {
+    let n32 = u32::from(n.max(1));
+    (0..u32::from(run.count.min(n)))
+        .map(move |k| u16::try_from((u32::from(run.first) + k) % n32).unwrap_or(0))
+}
+
+/// The cells of listings in order of flight.
+#[must_use]
+pub fn unpack(listings: &[Listing], n: u16) -> Vec<PlanCell> {
+    let mut out = Vec::new();
+    for l in listings {
+        let mut cells: Vec<u16> = cells_of(l.run, n).collect();
+        if l.backward {
+            cells.reverse();
+        }
+        out.extend(cells.into_iter().map(|cell| PlanCell {
+            cell,
+            backward: l.backward,
+            committed: l.firmness == Firmness::Committed,
+            stamp: l.stamp,
+        }));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packing_and_unpacking_keep_order_and_direction() {
+        let covered = CellSet::new(10);
+        let packer = Packer {
+            cells: 10,
+            covered: &covered,
+        };
+        let cell = |(cell, backward): &(u16, bool)| PlanCell {
+            cell: *cell,
+            backward: *backward,
+            committed: false,
+            stamp: Stamp::default(),
+        };
+        let flown = [
+            (8, false),
+            (9, false),
+            (0, false),
+            (4, true),
+            (3, true),
+            (6, false),
+        ];
+        let cells: Vec<PlanCell> = flown.iter().map(cell).collect();
+        let (listings, packed) = packer.pack(&cells, 16);
+        assert_eq!((listings.len(), packed), (3, 6));
+        assert_eq!(unpack(&listings, 10), cells);
+        // What does not fit is left out from its first run on.
+        assert_eq!(packer.pack(&cells, 2).1, 5);
+        // A covered cell between two others is bridged.
+        let mut covered = CellSet::new(10);
+        covered.insert(1);
+        let packer = Packer {
+            cells: 10,
+            covered: &covered,
+        };
+        let gap: Vec<PlanCell> = [(0, false), (2, false)].iter().map(cell).collect();
+        assert_eq!(packer.pack(&gap, 16).0.len(), 1);
+    }
+}
