@@ -15,6 +15,8 @@ pub struct PointTarget {
     pub at: LatLon,
     /// Radius around it that must be seen, metres; 0 for the point alone.
     pub radius_m: f64,
+    /// The sensor that it is to be seen with, if the file says so.
+    pub sensor: Option<String>,
 }
 
 /// A line to look along.
@@ -26,6 +28,8 @@ pub struct LineTarget {
     pub way: Vec<LatLon>,
     /// Width of the strip around it that must be seen, metres; 0 for the line alone.
     pub width_m: f64,
+    /// The sensor that it is to be seen with, if the file says so.
+    pub sensor: Option<String>,
 }
 
 /// What a file holds.
@@ -47,7 +51,8 @@ const WIDEST_M: f64 = 40_000.0;
 /// Reads the points and lines of a QGroundControl plan or of GeoJSON.
 ///
 /// In a plan, waypoints are points and corridor scans are lines of their width. In
-/// GeoJSON the properties `radius_m` of a point and `width_m` of a line are read.
+/// GeoJSON the properties `radius_m` of a point, `width_m` of a line and `sensor` of both
+/// are read.
 ///
 /// # Errors
 /// [`FormatError`] names the value that is wrong.
@@ -66,7 +71,7 @@ pub fn read(text: &str) -> Result<Targets, FormatError> {
             }
         }
         "Feature" => feature(&root, &mut out)?,
-        _ => geometry(&root, "/", (0.0, 0.0), &mut out)?,
+        _ => geometry(&root, "/", &Asked::default(), &mut out)?,
     }
     Ok(out)
 }
@@ -84,6 +89,7 @@ fn of_plan(text: &str, root: &Cursor<'_>) -> Result<Targets, FormatError> {
             pointer: format!("waypoint {}", i + 1),
             at: w.at,
             radius_m: 0.0,
+            sensor: None,
         })
         .collect();
     // The plan's reader knows no corridors and says that it ignored them.
@@ -106,22 +112,28 @@ fn of_plan(text: &str, root: &Cursor<'_>) -> Result<Targets, FormatError> {
         let line = item.need("polyline")?;
         let points = line.items()?;
         let way = points.iter().map(plan::lat_lon).collect::<Result<_, _>>()?;
-        push_line(
-            &line,
-            &item.pointer(),
-            way,
-            width.within(0.0, WIDEST_M, "a width in metres")?,
-            &mut out,
-        )?;
+        let asked = Asked {
+            width_m: width.within(0.0, WIDEST_M, "a width in metres")?,
+            ..Asked::default()
+        };
+        push_line(&line, &item.pointer(), way, &asked, &mut out)?;
     }
     Ok(out)
+}
+
+/// What the properties of a feature ask for.
+#[derive(Default)]
+struct Asked {
+    radius_m: f64,
+    width_m: f64,
+    sensor: Option<String>,
 }
 
 fn push_line(
     at: &Cursor<'_>,
     pointer: &str,
     way: Vec<LatLon>,
-    width_m: f64,
+    asked: &Asked,
     out: &mut Targets,
 ) -> Result<(), FormatError> {
     if way.len() < 2 {
@@ -130,7 +142,8 @@ fn push_line(
     out.lines.push(LineTarget {
         pointer: pointer.to_owned(),
         way,
-        width_m,
+        width_m: asked.width_m,
+        sensor: asked.sensor.clone(),
     });
     Ok(())
 }
@@ -140,16 +153,24 @@ fn feature(at: &Cursor<'_>, out: &mut Targets) -> Result<(), FormatError> {
     if kind.text()? != "Feature" {
         return Err(kind.wrong("expected \"Feature\""));
     }
-    let size = |key: &str| match at.get("properties")? {
-        Some(p) => match p.get(key)? {
-            Some(n) => n.within(0.0, WIDEST_M, "a size in metres"),
-            None => Ok(0.0),
-        },
+    let property = |key: &str| match at.get("properties")? {
+        Some(p) => p.get(key),
+        None => Ok(None),
+    };
+    let size = |key: &str| match property(key)? {
+        Some(n) => n.within(0.0, WIDEST_M, "a size in metres"),
         None => Ok(0.0),
     };
-    let sizes = (size("radius_m")?, size("width_m")?);
+    let asked = Asked {
+        radius_m: size("radius_m")?,
+        width_m: size("width_m")?,
+        sensor: match property("sensor")? {
+            Some(name) => Some(name.text()?.to_owned()),
+            None => None,
+        },
+    };
     match at.get("geometry")? {
-        Some(g) => geometry(&g, &at.pointer(), sizes, out),
+        Some(g) => geometry(&g, &at.pointer(), &asked, out),
         None => {
             out.notices.push(Notice {
                 pointer: at.pointer(),
@@ -163,7 +184,7 @@ fn feature(at: &Cursor<'_>, out: &mut Targets) -> Result<(), FormatError> {
 fn geometry(
     at: &Cursor<'_>,
     pointer: &str,
-    (radius_m, width_m): (f64, f64),
+    asked: &Asked,
     out: &mut Targets,
 ) -> Result<(), FormatError> {
     let kind = at.need("type")?;
@@ -171,13 +192,14 @@ fn geometry(
         out.points.push(PointTarget {
             pointer: pointer.to_owned(),
             at: position(p)?,
-            radius_m,
+            radius_m: asked.radius_m,
+            sensor: asked.sensor.clone(),
         });
         Ok(())
     };
     let line = |l: &Cursor<'_>, out: &mut Targets| -> Result<(), FormatError> {
         let way = l.items()?.iter().map(position).collect::<Result<_, _>>()?;
-        push_line(l, pointer, way, width_m, out)
+        push_line(l, pointer, way, asked, out)
     };
     match kind.text()? {
         "Point" => point(&at.need("coordinates")?, out)?,
@@ -194,7 +216,7 @@ fn geometry(
         }
         "GeometryCollection" => {
             for part in at.need("geometries")?.items()? {
-                geometry(&part, pointer, (radius_m, width_m), out)?;
+                geometry(&part, pointer, asked, out)?;
             }
         }
         other @ ("Polygon" | "MultiPolygon") => out.notices.push(Notice {
@@ -211,7 +233,7 @@ mod tests {
     use super::*;
 
     const GEOJSON: &str = r#"{"type":"FeatureCollection","features":[
-        {"type":"Feature","properties":{"radius_m":25},"geometry":{"type":"Point","coordinates":[24.9,60.1]}},
+        {"type":"Feature","properties":{"radius_m":25,"sensor":"rgb"},"geometry":{"type":"Point","coordinates":[24.9,60.1]}},
         {"type":"Feature","properties":{"width_m":60},"geometry":{"type":"LineString","coordinates":[[24.9,60.1],[24.91,60.1]]}},
         {"type":"Feature","geometry":{"type":"MultiLineString","coordinates":[[[24.9,60.1],[24.91,60.1]],[[24.9,60.2],[24.91,60.2]]]}},
         {"type":"Feature","geometry":{"type":"Polygon","coordinates":[[[24.9,60.1],[24.91,60.1],[24.91,60.11],[24.9,60.1]]]}}]}"#;
@@ -223,6 +245,8 @@ mod tests {
         assert!((t.points[0].radius_m - 25.0).abs() < 1e-9);
         assert!((t.lines[0].width_m - 60.0).abs() < 1e-9 && t.lines[1].width_m.abs() < 1e-9);
         assert_eq!(t.lines[2].pointer, "/features/2");
+        assert_eq!(t.points[0].sensor.as_deref(), Some("rgb"));
+        assert_eq!(t.lines[0].sensor, None);
         for end in 0..GEOJSON.len() {
             assert!(read(&GEOJSON[..end]).is_err());
         }
@@ -230,7 +254,8 @@ mod tests {
             let error = read(&GEOJSON.replacen(from, to, 1)).unwrap_err();
             error.to_string()
         };
-        assert!(says("25}", "-1}").contains("at /features/0/properties/radius_m"));
+        assert!(says("25,", "-1,").contains("at /features/0/properties/radius_m"));
+        assert!(says("\"rgb\"", "[]").contains("at /features/0/properties/sensor"));
         assert!(says(",[24.91,60.1]]}", "]}").contains("at least 2 points"));
     }
 

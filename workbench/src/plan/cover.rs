@@ -300,7 +300,7 @@ impl<'a> Job<'a> {
             let lacks = !takes_part.iter().any(|f| f.uav == uav);
             let why = match self.sensor {
                 Some(sensor) if lacks => format!("has no sensor {sensor:?}"),
-                _ => "is not needed, or has not the endurance".to_owned(),
+                _ => super::NOT_NEEDED.to_owned(),
             };
             json!({"name": member.name, "why": why})
         });

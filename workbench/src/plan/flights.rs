@@ -59,13 +59,15 @@ impl Flight {
     }
 
     /// Energy, watt-hours, if the power of cruise is known.
-    fn energy_wh(&self) -> Option<f64> {
+    #[must_use]
+    pub fn energy_wh(&self) -> Option<f64> {
         let power_w = self.cruise_power_w?;
         Some(self.energy_s() * power_w / 3600.0)
     }
 
     /// Energy as seconds of level cruise: turns take more than level flight.
-    fn energy_s(&self) -> f64 {
+    #[must_use]
+    pub fn energy_s(&self) -> f64 {
         let v = self.speed_mps;
         let bank_rad = atan2(v * v, GRAVITY_MPS2 * self.turn_radius_m);
         let power = PowerModel::of(&Airframe {

@@ -94,7 +94,8 @@ pub fn flyers(
 }
 
 /// Which sensors a team has, for a person.
-fn carried(team: &[Member]) -> String {
+#[must_use]
+pub fn carried(team: &[Member]) -> String {
     let all: BTreeSet<&str> = team
         .iter()
         .flat_map(|m| m.sensors.keys().map(String::as_str))

@@ -9,6 +9,9 @@ use clap::Args;
 use skein_planning::coverage::fleet::layers::layers;
 use skein_planning::frame::Point;
 
+/// Height between two layers unless said otherwise, metres: twice what a barometer errs.
+const LAYER_STEP_M: f64 = 20.0;
+
 /// How flights are kept apart.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct LayerArgs {
@@ -20,11 +23,20 @@ pub struct LayerArgs {
     /// Height between two layers, metres; 0 leaves all at one height.
     #[arg(
         long,
-        default_value_t = 20.0,
+        default_value_t = LAYER_STEP_M,
         value_name = "M",
         allow_hyphen_values = true
     )]
     pub layer_step_m: f64,
+}
+
+impl Default for LayerArgs {
+    fn default() -> Self {
+        Self {
+            separation_m: None,
+            layer_step_m: LAYER_STEP_M,
+        }
+    }
 }
 
 impl LayerArgs {

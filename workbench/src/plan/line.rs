@@ -1,7 +1,8 @@
 //! `plan line`: tours of a team along all lines of a file; wide strips in lanes
 //! (D2.7 §3.5).
 
-use super::tours::{TourArgs, Ways};
+use super::errands::{self, Solver, Wishes};
+use super::tours::{TourArgs, Way, Ways};
 use anyhow::{Context, Result};
 use clap::Args;
 use skein_interop::targets::{LineTarget, read};
@@ -13,7 +14,8 @@ use std::path::PathBuf;
 /// Tours of a team along all lines of a file, the longest as short as can be found.
 ///
 /// Lines of GeoJSON (property `width_m` makes one a strip) or corridor scans of a
-/// QGroundControl `.plan`. Lines that share a point hang together there, as roads do.
+/// QGroundControl `.plan`. Lines that share a point hang together there, as roads do. The
+/// property `sensor` names the sensor that a line is to be seen with.
 #[derive(Debug, Args)]
 pub struct LineArgs {
     /// A QGroundControl `.plan` or GeoJSON.
@@ -21,6 +23,9 @@ pub struct LineArgs {
     /// Team, wind and form of the result.
     #[command(flatten)]
     pub tours: TourArgs,
+    /// Sensor, objective and heights.
+    #[command(flatten)]
+    pub wishes: Wishes,
 }
 
 /// Plans, and returns the text to print.
@@ -28,9 +33,8 @@ pub struct LineArgs {
 /// # Errors
 /// When the file or a flag is wrong; the error names the place.
 pub fn run(args: &LineArgs) -> Result<String> {
-    ways(args)?.plan(&args.tours, |lines, team, metric| {
-        Ok(plan(lines, team, metric, args.tours.steps)?)
-    })
+    let solver: Solver = |lines, team, metric, steps| plan(lines, team, metric, steps);
+    errands::run(ways(args)?, &args.tours, &args.wishes, solver)
 }
 
 /// What there is to fly along.
@@ -47,9 +51,14 @@ pub(super) fn ways(args: &LineArgs) -> Result<Ways> {
     }
     let first = targets.lines.first().map(|l| l.way[0]);
     let mut ways = Ways::new(&args.tours, targets.home.or(first), notices, &args.file)?;
-    let swath_m = ways.swath_m(&args.tours);
-    let wide = |l: &&LineTarget| l.width_m > swath_m;
-    for line in targets.lines.iter().filter(wide) {
+    let mut narrow: Vec<&LineTarget> = Vec::new();
+    for line in &targets.lines {
+        let sensor = args.wishes.sensor_for(line.sensor.as_ref());
+        let swath_m = ways.swath_m(&args.tours, sensor, &line.pointer)?;
+        if line.width_m <= swath_m {
+            narrow.push(line);
+            continue;
+        }
         let centre = plane(&ways, line)?;
         let lanes = strip::lanes(&centre, line.width_m, swath_m).with_context(|| {
             format!(
@@ -58,11 +67,10 @@ pub(super) fn ways(args: &LineArgs) -> Result<Ways> {
             )
         })?;
         for lane in lanes {
-            ways.push(&lane, &line.pointer);
+            ways.push(&lane, &line.pointer, sensor);
         }
     }
-    let narrow: Vec<&LineTarget> = targets.lines.iter().filter(|l| !wide(l)).collect();
-    network(&mut ways, &narrow)?;
+    network(&mut ways, &narrow, &args.wishes)?;
     Ok(ways)
 }
 
@@ -72,7 +80,7 @@ fn plane(ways: &Ways, line: &LineTarget) -> Result<Vec<Point>> {
 }
 
 /// Adds lines that hang together where they share a point: each is cut there.
-fn network(ways: &mut Ways, lines: &[&LineTarget]) -> Result<()> {
+fn network(ways: &mut Ways, lines: &[&LineTarget], wishes: &Wishes) -> Result<()> {
     // Coordinates are told apart at the seventh decimal, a centimetre.
     #[allow(clippy::cast_possible_truncation, reason = "at most 1.8e9")]
     let key = |deg: f64| (deg * 1e7).round() as i64;
@@ -93,20 +101,23 @@ fn network(ways: &mut Ways, lines: &[&LineTarget]) -> Result<()> {
             places.entry(at).or_insert((place, 0)).1 += 1;
             way.push(place);
         }
-        numbered.push((way, &line.pointer));
+        numbered.push((way, *line));
     }
     let mut uses = vec![0; ways.at.len()];
     for (place, count) in places.into_values() {
         uses[place] = count;
     }
-    for (way, name) in numbered {
+    for (way, line) in numbered {
         let mut piece = Vec::new();
         for (i, &p) in way.iter().enumerate() {
             piece.push(p);
             let last = i + 1 == way.len();
             if piece.len() > 1 && (last || uses[p] > 1) {
-                ways.ways
-                    .push((std::mem::replace(&mut piece, vec![p]), name.clone()));
+                ways.ways.push(Way {
+                    places: std::mem::replace(&mut piece, vec![p]),
+                    name: line.pointer.clone(),
+                    sensor: wishes.sensor_for(line.sensor.as_ref()).map(str::to_owned),
+                });
             }
         }
     }

@@ -4,6 +4,7 @@ pub mod approximate;
 pub mod around;
 pub mod choice;
 pub mod cover;
+pub mod errands;
 pub mod fleet;
 pub mod flights;
 pub mod flyers;
@@ -23,6 +24,9 @@ pub mod visit;
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand};
 use skein_interop::place::LatLon;
+
+/// Why a UAV stays that could take part.
+const NOT_NEEDED: &str = "is not needed, or has not the endurance";
 
 /// What to plan.
 #[derive(Debug, Args)]

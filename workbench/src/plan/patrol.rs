@@ -6,6 +6,7 @@
 
 use super::around::{Around, Asker};
 use super::cover::{self, CoverArgs};
+use super::errands::Wishes;
 use super::fleet::Member;
 use super::flyers::{Defaults, swath_m};
 use super::heights::LayerArgs;
@@ -121,9 +122,11 @@ fn over_targets(args: &PatrolArgs) -> Result<Course> {
         "--exact and --approximate are for --over area"
     );
     let (file, tours) = (args.file.clone(), args.tours.clone());
+    let wishes = Wishes::default();
     let steps = tours.steps;
     let alone = |ways: &mut Ways, points: bool| -> Result<(LinePlan, Around)> {
-        ways.solve(&args.tours, |lines, _, metric| {
+        ways.solve(&args.tours, |q| {
+            let (lines, metric) = (q.lines, q.metric);
             let first = lines.first().context("the file holds nothing to patrol")?;
             let one = [Surveyor::at(first.a)];
             Ok(if points {
@@ -135,12 +138,20 @@ fn over_targets(args: &PatrolArgs) -> Result<Course> {
     };
     let points = args.over == Over::Points;
     let mut ways = if points {
-        visit::ways(&VisitArgs { file, tours })?
+        visit::ways(&VisitArgs {
+            file,
+            tours,
+            wishes,
+        })?
     } else {
-        line::ways(&LineArgs { file, tours })?
+        line::ways(&LineArgs {
+            file,
+            tours,
+            wishes,
+        })?
     };
     let (plan, around) = alone(&mut ways, points)?;
-    let first = ways.ways.first().and_then(|w| w.0.first());
+    let first = ways.ways.first().and_then(|w| w.places.first());
     let first = first.context("the file holds nothing to patrol")?;
     let mut lap = ways.track(&around, &plan.tours[0].passes, ways.at[*first]);
     lap.pop();

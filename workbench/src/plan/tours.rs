@@ -3,14 +3,15 @@
 
 use super::around::{Around, Asker};
 use super::fleet::{self, Member};
-use super::output::{OutputArgs, Printed, Sheet};
+use super::flyers::{Defaults, carried, swath_m};
+use super::output::OutputArgs;
 use super::{lat_lon, map};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::Value;
 use skein_interop::place::{LatLon, to_plane};
 use skein_interop::{geojson, plan as qgc};
-use skein_planning::coverage::line::{Line, LinePlan, Pass, Surveyor};
+use skein_planning::coverage::line::{Line, Pass, Surveyor};
 use skein_planning::coverage::metric::{InWind, Matrix, Metric};
 use skein_planning::frame::{Origin, Point, Vector};
 use skein_planning::geometry::offset::Zone;
@@ -22,6 +23,10 @@ use std::path::{Path, PathBuf};
 /// too long.
 const MOST_PLACES: usize = 3_000;
 
+/// Turn radius of a UAV that does not state its own, metres: what `plan cover` has for a
+/// default.
+pub const TURN_RADIUS_M: f64 = 30.0;
+
 /// Speeds that differ by less than this are the same, m/s.
 const SAME_SPEED_MPS: f64 = 1e-9;
 
@@ -32,7 +37,8 @@ pub struct TourArgs {
     #[arg(long, default_value_t = 1, value_name = "K")]
     pub k: usize,
     /// The UAVs, one by one, instead of `--k`: JSON5, a list of `{name, speed_mps,
-    /// endurance_s?, start?: [lat, lon], swath_m?, turn_radius_m?}`.
+    /// endurance_s?, start?: [lat, lon], swath_m? or fov_across_deg?, turn_radius_m?,
+    /// sensors?: {rgb: {swath_m or fov_across_deg}, ...}, cruise_power_w?}`.
     #[arg(long, value_name = "FILE")]
     pub fleet: Option<PathBuf>,
     /// Zones to fly round on the way, besides those of the file itself: fences of a
@@ -88,14 +94,39 @@ impl TourArgs {
     }
 }
 
+/// A way that is flown along in one piece.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Way {
+    /// Its places in order.
+    pub places: Vec<usize>,
+    /// The name of the item that it serves.
+    pub name: String,
+    /// The sensor that is asked for.
+    pub sensor: Option<String>,
+}
+
+/// What is to be planned: lines between places, and who flies.
+pub struct Question<'a> {
+    /// The ways that the lines stand for, one each.
+    pub ways: &'a Ways,
+    /// The lines.
+    pub lines: &'a [Line],
+    /// The team.
+    pub team: &'a [Surveyor],
+    /// What flights cost.
+    pub metric: &'a Cost<'a>,
+    /// The zones that ways lead round.
+    pub around: &'a Around,
+}
+
 /// The ways to fly, over numbered places.
 pub struct Ways {
     /// Where the plane lies.
     pub origin: Origin,
     /// All places: the depot first.
     pub at: Vec<Point>,
-    /// Each way as places in order, and the name of the item that it serves.
-    pub ways: Vec<(Vec<usize>, String)>,
+    /// The ways.
+    pub ways: Vec<Way>,
     /// What was left out.
     pub notices: Vec<String>,
     /// The UAVs.
@@ -174,11 +205,27 @@ impl Ways {
         Ok(ways)
     }
 
-    /// The narrowest swath of the team, metres: lanes are laid for it.
-    #[must_use]
-    pub fn swath_m(&self, args: &TourArgs) -> f64 {
-        let each = self.team.iter().map(|m| m.swath_m.unwrap_or(args.swath_m));
-        each.fold(f64::INFINITY, f64::min)
+    /// The narrowest swath of those who can see an item, metres: lanes are laid for it.
+    ///
+    /// # Errors
+    /// When nobody can; the error names the item.
+    pub fn swath_m(&self, args: &TourArgs, sensor: Option<&str>, name: &str) -> Result<f64> {
+        let defaults = Defaults {
+            swath_m: args.swath_m,
+            turn_radius_m: TURN_RADIUS_M,
+            sensor,
+        };
+        let height_m = args.output.altitude_m;
+        let each = self.team.iter();
+        let each = each.filter_map(|m| swath_m(m, defaults, height_m));
+        let narrowest = each.min_by(f64::total_cmp);
+        narrowest.with_context(|| {
+            let sensor = sensor.unwrap_or_default();
+            format!(
+                "{name} asks for the sensor {sensor:?}, nobody carries it: {}",
+                carried(&self.team)
+            )
+        })
     }
 
     /// A point of the file in the plane.
@@ -196,38 +243,24 @@ impl Ways {
     }
 
     /// Adds a way over new places.
-    pub fn push(&mut self, way: &[Point], name: &str) {
+    pub fn push(&mut self, way: &[Point], name: &str, sensor: Option<&str>) {
         let places = way.iter().map(|&p| self.place(p)).collect();
-        self.ways.push((places, name.to_owned()));
-    }
-
-    /// Plans with `planner` and returns the text to print.
-    ///
-    /// # Errors
-    /// When a flag is wrong, or a file cannot be written.
-    pub fn plan(
-        &mut self,
-        args: &TourArgs,
-        planner: impl FnOnce(&[Line], &[Surveyor], &Cost<'_>) -> Result<LinePlan>,
-    ) -> Result<String> {
-        let (plan, around) = self.solve(args, planner)?;
-        let tours = Tours {
-            ways: self,
-            around: &around,
-            plan: &plan,
-        };
-        args.output.print(&tours.sheet(args.output.altitude_m))
+        self.ways.push(Way {
+            places,
+            name: name.to_owned(),
+            sensor: sensor.map(str::to_owned),
+        });
     }
 
     /// Plans with `planner`; gives the zones that the ways lead round as well.
     ///
     /// # Errors
     /// When a flag is wrong.
-    pub fn solve(
+    pub fn solve<T>(
         &mut self,
         args: &TourArgs,
-        planner: impl FnOnce(&[Line], &[Surveyor], &Cost<'_>) -> Result<LinePlan>,
-    ) -> Result<(LinePlan, Around)> {
+        planner: impl FnOnce(&Question<'_>) -> Result<T>,
+    ) -> Result<(T, Around)> {
         let around = Around::new(&self.zones, args.clearance_m, &self.at)?;
         self.leave_out_forbidden(&around)?;
         let wind = args.wind();
@@ -241,7 +274,8 @@ impl Ways {
         let lines: Vec<Line> = self
             .ways
             .iter()
-            .map(|(way, _)| {
+            .map(|way| {
+                let way = &way.places;
                 let cost = way.windows(2).map(|w| straight.cost(w[0], w[1])).sum();
                 let ends = way.first().zip(way.last());
                 let (a, b) = ends.map_or((0, 0), |(a, b)| (*a, *b));
@@ -259,7 +293,14 @@ impl Ways {
             endurance: m.endurance_s.unwrap_or(f64::INFINITY),
         };
         let team: Vec<Surveyor> = self.team.iter().zip(&self.depots).map(uav).collect();
-        Ok((planner(&lines, &team, &metric)?, around))
+        let found = planner(&Question {
+            ways: self,
+            lines: &lines,
+            team: &team,
+            metric: &metric,
+            around: &around,
+        })?;
+        Ok((found, around))
     }
 
     /// The points flown along some ways in order, from a place and back to it.
@@ -273,7 +314,7 @@ impl Ways {
             track.extend(way.iter().flatten().skip(1));
         };
         for pass in passes {
-            let way = &self.ways[pass.line].0;
+            let way = &self.ways[pass.line].places;
             let mut way: Vec<Point> = way.iter().map(|p| self.at[*p]).collect();
             if pass.backward {
                 way.reverse();
@@ -323,18 +364,22 @@ impl Ways {
         }
         let home = self.at[self.depots[0]];
         let (at, notices) = (&self.at, &mut self.notices);
-        self.ways.retain(|(way, name)| {
-            let mut legs = way.windows(2);
-            let clear = way.iter().all(|p| !around.forbids(at[*p]))
-                && legs.all(|w| asker.is_straight(at[w[0]], at[w[1]]))
-                && way
-                    .first()
-                    .is_none_or(|p| asker.way(home, at[*p]).is_some());
-            if !clear {
-                notices.push(format!("{name}: left out, a zone is in the way"));
-            }
-            clear
-        });
+        self.ways.retain(
+            |Way {
+                 places: way, name, ..
+             }| {
+                let mut legs = way.windows(2);
+                let clear = way.iter().all(|p| !around.forbids(at[*p]))
+                    && legs.all(|w| asker.is_straight(at[w[0]], at[w[1]]))
+                    && way
+                        .first()
+                        .is_none_or(|p| asker.way(home, at[*p]).is_some());
+                if !clear {
+                    notices.push(format!("{name}: left out, a zone is in the way"));
+                }
+                clear
+            },
+        );
         Ok(())
     }
 }
@@ -365,72 +410,4 @@ fn zones_inside(file: &Path, origin: Origin) -> Result<Vec<Zone>> {
         }
     }
     Ok(zones)
-}
-
-/// Tours to be told about.
-struct Tours<'a> {
-    ways: &'a Ways,
-    around: &'a Around,
-    plan: &'a LinePlan,
-}
-
-impl Tours<'_> {
-    /// The points of a tour, from the depot back to it.
-    fn track(&self, uav: usize) -> Vec<Point> {
-        let depot = self.ways.at[self.ways.depots[uav]];
-        let passes = &self.plan.tours[uav].passes;
-        self.ways.track(self.around, passes, depot)
-    }
-
-    fn summary(&self) -> Value {
-        let (plan, ways) = (self.plan, self.ways);
-        let unserved: Vec<&str> = plan
-            .unserved
-            .iter()
-            .map(|&i| ways.ways[i].1.as_str())
-            .collect();
-        json!({
-            "makespan_s": plan.makespan, "lower_bound_s": plan.lower_bound,
-            "total_s": (0..plan.tours.len()).map(|uav| self.time_s(uav)).sum::<f64>(),
-            "targets": ways.ways.len(), "unserved": unserved, "notices": ways.notices,
-        })
-    }
-
-    fn time_s(&self, uav: usize) -> f64 {
-        let team = &self.ways.team;
-        self.plan.tours[uav].cost * team[0].speed_mps / team[uav].speed_mps
-    }
-
-    fn printed(&self, uav: usize, altitude_m: f64) -> Printed {
-        let track = self.track(uav);
-        let member = &self.ways.team[uav];
-        let passes = &self.plan.tours[uav].passes;
-        let length_m: f64 = track.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
-        let told = [
-            ("time_s", json!(self.time_s(uav))),
-            ("length_m", json!(length_m)),
-            ("targets", json!(passes.len())),
-        ];
-        let pass = |p: &Pass| json!({"target": self.ways.ways[p.line].1, "backward": p.backward});
-        let details = [("passes", passes.iter().map(pass).collect())];
-        let named = |(key, value): (&str, Value)| (key.to_owned(), value);
-        Printed {
-            name: member.name.clone(),
-            track,
-            altitude_m,
-            speed_mps: member.speed_mps,
-            told: told.into_iter().map(named).collect(),
-            details: details.into_iter().map(named).collect(),
-        }
-    }
-
-    fn sheet(&self, altitude_m: f64) -> Sheet {
-        let uavs = 0..self.plan.tours.len();
-        Sheet {
-            origin: self.ways.origin,
-            summary: self.summary(),
-            flights: uavs.map(|uav| self.printed(uav, altitude_m)).collect(),
-            shapes: Vec::new(),
-        }
-    }
 }

@@ -1,5 +1,6 @@
 //! `plan visit`: tours of a team over all points of a file (D2.7 §3.4).
 
+use super::errands::{self, Solver, Wishes};
 use super::tours::{TourArgs, Ways};
 use anyhow::{Context, Result};
 use clap::Args;
@@ -11,7 +12,8 @@ use std::path::PathBuf;
 /// Tours of a team over all points of a file, the longest as short as can be found.
 ///
 /// Points of GeoJSON (property `radius_m` asks for one to be seen with its surroundings:
-/// in one pass, or in a small sweep) or waypoints of a QGroundControl `.plan`.
+/// in one pass, or in a small sweep; property `sensor` names what it is to be seen with)
+/// or waypoints of a QGroundControl `.plan`.
 #[derive(Debug, Args)]
 pub struct VisitArgs {
     /// A QGroundControl `.plan` or GeoJSON.
@@ -19,6 +21,9 @@ pub struct VisitArgs {
     /// Team, wind and form of the result.
     #[command(flatten)]
     pub tours: TourArgs,
+    /// Sensor, objective and heights.
+    #[command(flatten)]
+    pub wishes: Wishes,
 }
 
 /// Plans, and returns the text to print.
@@ -26,9 +31,8 @@ pub struct VisitArgs {
 /// # Errors
 /// When the file or a flag is wrong; the error names the place.
 pub fn run(args: &VisitArgs) -> Result<String> {
-    ways(args)?.plan(&args.tours, |lines, team, metric| {
-        Ok(visit(lines, team, metric, args.tours.steps)?)
-    })
+    let solver: Solver = |lines, team, metric, steps| visit(lines, team, metric, steps);
+    errands::run(ways(args)?, &args.tours, &args.wishes, solver)
 }
 
 /// What there is to visit.
@@ -43,8 +47,9 @@ pub(super) fn ways(args: &VisitArgs) -> Result<Ways> {
     }
     let first = targets.points.first().map(|p| p.at);
     let mut ways = Ways::new(&args.tours, targets.home.or(first), notices, &args.file)?;
-    let swath_m = ways.swath_m(&args.tours);
     for point in &targets.points {
+        let sensor = args.wishes.sensor_for(point.sensor.as_ref());
+        let swath_m = ways.swath_m(&args.tours, sensor, &point.pointer)?;
         let centre = ways.point(point.at, &point.pointer)?;
         // Lanes along the way out from the depot: the sweep starts without a turn.
         let heading_rad = atan2(centre.y, centre.x);
@@ -54,7 +59,7 @@ pub(super) fn ways(args: &VisitArgs) -> Result<Ways> {
                 point.pointer, point.radius_m, swath_m
             )
         })?;
-        ways.push(&way, &point.pointer);
+        ways.push(&way, &point.pointer, sensor);
     }
     Ok(ways)
 }
