@@ -113,10 +113,15 @@ pub fn run(args: &CoverArgs) -> Result<String> {
     args.output.print(&job.sheet(&chosen)?)
 }
 
-/// The site, and its best plan.
+/// The site, and its best plan, whatever sensor the file asks for: what a patrol flies
+/// round, all on one tour.
 pub(super) fn planned(args: &CoverArgs) -> Result<(Site, Flights)> {
     let team = team(args)?;
     let mut site = site::read(&args.file, args.launch.as_deref())?;
+    if let Some(sensor) = site.sensor.take() {
+        let text = format!("sensor {sensor:?} of the area ignored: all fly the same tour");
+        site.notices.push(text);
+    }
     let mut chosen = Job::new(args, &site, &team)?.planned()?;
     site.notices.append(&mut chosen.refused);
     let best = chosen.plans.into_iter().next();

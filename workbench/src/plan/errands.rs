@@ -331,7 +331,8 @@ impl Desk<'_> {
         Ok(Errands {
             flights: flights.collect(),
             unserved: plan.unserved.iter().map(|i| lines[*i]).collect(),
-            lower_bound_s: Some(plan.lower_bound),
+            // Of the team that flies: without a meaning where that is a choice.
+            lower_bound_s: (self.objective == Objective::Time).then_some(plan.lower_bound),
         })
     }
 }

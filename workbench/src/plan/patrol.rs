@@ -151,6 +151,7 @@ fn over_targets(args: &PatrolArgs) -> Result<Course> {
         })?
     };
     let (plan, around) = alone(&mut ways, points)?;
+    ways.ignore_sensors();
     let first = ways.ways.first().and_then(|w| w.places.first());
     let first = first.context("the file holds nothing to patrol")?;
     let mut lap = ways.track(&around, &plan.tours[0].passes, ways.at[*first]);

@@ -228,6 +228,14 @@ impl Ways {
         })
     }
 
+    /// Says so where targets ask for sensors and all fly the same tour.
+    pub fn ignore_sensors(&mut self) {
+        if self.ways.iter().any(|w| w.sensor.is_some()) {
+            let text = "sensors of the targets ignored: all fly the same tour";
+            self.notices.push(text.to_owned());
+        }
+    }
+
     /// A point of the file in the plane.
     ///
     /// # Errors

@@ -127,6 +127,13 @@ impl Folder {
         serde_json::from_str(&told(&self.0, area, &flags).unwrap()).unwrap()
     }
 
+    fn patrolled(&self, area: &str) -> (Site, Flights) {
+        let file = self.0.join("area.geojson");
+        std::fs::write(&file, area).unwrap();
+        let file = file.display().to_string();
+        planned(&Cli::try_parse_from(["cover", &file]).unwrap().args).unwrap()
+    }
+
     fn error(&self, area: &str, fleet: &str, more: &[&str]) -> String {
         let fleet = self.fleet(fleet);
         let flags: Vec<&str> = ["--fleet", &fleet].iter().chain(more).copied().collect();
@@ -203,6 +210,9 @@ fn only_who_carries_the_sensor_takes_part() {
     let error = |area: &str, more: &[&str]| dir.error(area, fleet, more);
     assert!(error(&feature, &["--sensor", "thermal"]).contains("the area asks for \"rgb\""));
     assert!(error(&area, &["--sensor", "lidar"]).contains("the team has rgb, thermal"));
+    // A patrol's one tour is planned whatever the file asks for.
+    let (site, flights) = dir.patrolled(&feature);
+    assert!(site.notices.iter().any(|n| n.contains("\"rgb\"")) && flights.covered_share > 0.999);
     let wrong = feature.replace("\"rgb\"", "7");
     assert!(error(&wrong, &[]).contains("/properties/sensor"));
 }
