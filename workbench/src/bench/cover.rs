@@ -47,7 +47,8 @@ pub struct CoverArgs {
     /// Instances, one JSON object a line with `map`, `k`, `mode`, `seed`, `roots`.
     #[arg(long, value_name = "FILE")]
     pub instances: PathBuf,
-    /// Folder of the maps (`octile` text, one character a cell).
+    /// Folder of the maps (`octile` text, one character a cell); an open field named
+    /// `empty-ROWS-COLUMNS` needs no file.
     #[arg(long, value_name = "DIR")]
     pub maps: PathBuf,
     /// The planner.
@@ -133,8 +134,8 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         let place = || format!("{}:{number}", args.instances.display());
         let instance: Instance = serde_json::from_str(line).with_context(place)?;
         if !maps.contains_key(&instance.map) {
-            let path = args.maps.join(format!("{}.map", instance.map));
-            maps.insert(instance.map.clone(), read_map(&path).with_context(place)?);
+            let map = named_map(&args.maps, &instance.map).with_context(place)?;
+            maps.insert(instance.map.clone(), map);
         }
         let map = &maps[&instance.map];
         let (line, cells) = solve(map, &instance, args).with_context(place)?;
@@ -240,6 +241,20 @@ fn sum_up(args: &CoverArgs, results: &[(f64, f64, f64, bool)]) -> Answer {
         plan_ms_mean: results.iter().map(|r| r.2).sum::<f64>() / results.len().max(1) as f64,
         plan_ms_max: results.iter().map(|r| r.2).fold(0.0, f64::max),
     }
+}
+
+/// The map of a name: a file of the folder, or without one an open field,
+/// `empty-ROWS-COLUMNS`.
+fn named_map(folder: &Path, name: &str) -> Result<LaneMap> {
+    let path = folder.join(format!("{name}.map"));
+    if !path.exists()
+        && let Some(sides) = name.strip_prefix("empty-")
+        && let Some((rows, cols)) = sides.split_once('-')
+        && let (Ok(rows), Ok(cols)) = (rows.parse(), cols.parse())
+    {
+        return Ok(LaneMap::new(rows, cols, |_, _| true)?);
+    }
+    read_map(&path)
 }
 
 /// Reads a map: `height` and `width` lines, then `map`, then the rows; `.`, `G` and `S`

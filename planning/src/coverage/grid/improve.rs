@@ -20,7 +20,10 @@ pub const ROUND: usize = 20_000;
 const HOTTEST: i64 = 300;
 
 /// Times that work is peeled off to find how many moves suffice.
-const PEELS: usize = 4;
+const PEELS: usize = 6;
+
+/// They end when one part in this many is all that is still unknown.
+const NEAR: u32 = 100;
 
 /// One cell in this many may be left over when work is peeled off: neighbours take it.
 const FEW_LEFT: usize = 300;
@@ -155,6 +158,7 @@ fn peeled_orders(task: &Task, offset: (u32, u32)) -> Vec<Vec<Cell>> {
     let n_cells = task.map.n_free();
     let n_uavs = u32::try_from(task.n_uavs()).unwrap_or(u32::MAX).max(1);
     let mut low = bounds::reach_moves(task);
+    let mut high = u32::MAX;
     let mut moves = low + low / 80;
     let mut best = None;
     for _ in 0..PEELS {
@@ -162,14 +166,16 @@ fn peeled_orders(task: &Task, offset: (u32, u32)) -> Vec<Vec<Cell>> {
         if left * FEW_LEFT > n_cells {
             low = moves;
             let more = u32::try_from(left).unwrap_or(u32::MAX) / n_uavs;
-            moves += 1 + more;
+            // What is left does not tell much when much is left.
+            moves = (moves + 1 + more).min(low.midpoint(high).max(low + 1));
             best = best.or(Some(orders));
         } else {
             best = Some(orders);
+            high = moves;
             moves = low.midpoint(moves);
-            if moves <= low + low / 100 {
-                break;
-            }
+        }
+        if high - low <= 1 + low / NEAR {
+            break;
         }
     }
     best.unwrap_or_default()

@@ -19,7 +19,7 @@ use std::collections::BinaryHeap;
 /// stays in one piece; through its middle; over what another UAV covers.
 const EDGE: u32 = 4;
 const MIDDLE: u32 = 5;
-const COVERED: u32 = 9;
+const COVERED: u32 = 7;
 
 /// Cells that are cut off from all roots are taken along up to this many; more are worth
 /// another UAV's way over covered cells.
@@ -129,19 +129,23 @@ impl Peel<'_> {
     ) -> Option<(T, Vec<Cell>)> {
         self.search += 1;
         self.cost[goal as usize] = (self.search, 0, NOWHERE);
-        // Buckets by cost, as many as a step can cost, used in turn.
-        let mut open: Vec<Vec<Cell>> = vec![Vec::new(); COVERED as usize + 1];
-        open[0].push(goal);
-        let (mut cost, mut empty) = (0u32, 0);
+        // A step nearer to the roots costs at least EDGE: cells are taken up by what the
+        // whole corridor costs at least. Buckets by that, as many as it can grow in a
+        // step, used in turn.
+        let mut open: Vec<Vec<Cell>> = vec![Vec::new(); (COVERED + EDGE) as usize + 1];
+        let mut total = EDGE * self.far[goal as usize];
+        open[total as usize % (COVERED + EDGE + 1) as usize].push(goal);
+        let mut empty = 0;
         while empty < open.len() {
-            let bucket = cost as usize % open.len();
+            let bucket = total as usize % open.len();
             let Some(at) = open[bucket].pop() else {
-                cost += 1;
+                total += 1;
                 empty += 1;
                 continue;
             };
             empty = 0;
-            if self.cost[at as usize].1 < cost {
+            let cost = self.cost[at as usize].1;
+            if cost + EDGE * self.far[at as usize] < total {
                 continue;
             }
             if let Some(found) = is_there(at) {
@@ -158,11 +162,11 @@ impl Peel<'_> {
                 if step == 0 {
                     continue;
                 }
-                let total = cost + step;
+                let through = cost + step;
                 let slot = &mut self.cost[near as usize];
-                if slot.0 != self.search || total < slot.1 {
-                    *slot = (self.search, total, at);
-                    let bucket = total as usize % open.len();
+                if slot.0 != self.search || through < slot.1 {
+                    *slot = (self.search, through, at);
+                    let bucket = (through + EDGE * self.far[near as usize]) as usize % open.len();
                     open[bucket].push(near);
                 }
             }
@@ -256,11 +260,11 @@ impl Peel<'_> {
 
     /// The cheapest corridor from a region's entry to the root.
     fn way_back(&mut self, entry: Cell, root: Cell) -> Vec<Cell> {
-        // The search runs from the root, so that the links lead there.
         let mut way = self
-            .cheapest(root, |at| (at == entry).then_some(()))
+            .cheapest(entry, |at| (at == root).then_some(()))
             .map(|(_, way)| way)
             .unwrap_or_default();
+        way.reverse();
         if way.first() == Some(&entry) {
             way.remove(0);
         }

@@ -7,7 +7,11 @@
 //! between two UAVs. Trials that neither gain nor lose are taken: hops wander until two
 //! of them meet and vanish.
 //!
-//! Left to others: the first orders, and when to stop.
+//! Left to others: the changes themselves (`link`, `shift`), the first orders, and when
+//! to stop.
+
+mod link;
+mod shift;
 
 use super::home::Home;
 use super::map::{Cell, NOWHERE, Router};
@@ -19,19 +23,16 @@ use std::sync::Arc;
 /// search for their length would cost more than they ever gain.
 const LONGER: u32 = 12;
 
-/// What a link that is too long counts as.
-const TOO_LONG: u32 = 1 << 20;
-
 /// A reversal that gains nothing is taken only up to this many cells, since its cost
 /// grows with them.
 const IDLE_REVERSAL: usize = 1000;
 
+/// What a link that is too long counts as.
+const TOO_LONG: u32 = 1 << 20;
+
 /// Remembered distances: a power of two, direct-mapped, about the size of a core's
 /// second cache.
 const REMEMBERED: usize = 1 << 15;
-
-/// Cells moved together at most.
-const SEGMENT: usize = 4;
 
 /// Prices of time: a unit of time of any UAV costs this, besides what lateness costs.
 const TIME_PRICE: i64 = 16;
@@ -47,9 +48,6 @@ const LATE_LEAST: i64 = 16;
 
 /// Price of a move beyond the endurance: more than any pressure towards the target.
 const OVER_PRICE: i64 = 1 << 16;
-
-/// One try in so many to exchange tails is made: most cost a count of both for nothing.
-const TAILS: usize = 8;
 
 /// Orders under improvement.
 pub struct Search<'a> {
@@ -385,53 +383,6 @@ impl<'a> Search<'a> {
         self.task.map.is_free(near).then_some(near)
     }
 
-    /// Replaces the hop between `a` and `b` by a link from one of them to a neighbour `x`
-    /// in the same order, and flies what lies between the other way round.
-    fn try_reversal(&mut self, spot: Spot) {
-        let uav = spot.uav;
-        let (a, b) = (self.before(spot), self.after(spot));
-        let from_a =
-            b == NOWHERE || spot.index == self.orders[uav].len() || self.stream.bits() & 1 == 0;
-        let Some(x) = self.random_near(if from_a { a } else { b }) else {
-            return;
-        };
-        let (owner, at) = self.at[x as usize];
-        if owner as usize != uav {
-            if self.stream.below(TAILS) == 0 {
-                self.try_tails(spot, x, from_a);
-            }
-            return;
-        }
-        // The other spot whose link is cut: after x when x joins a, before x otherwise.
-        let other = Spot {
-            uav,
-            index: at as usize + usize::from(from_a),
-        };
-        if other.index == spot.index {
-            return;
-        }
-        let (p, q) = (self.before(other), self.after(other));
-        let (low, high) = (spot.index.min(other.index), spot.index.max(other.index));
-        if self.task.closed && high > self.orders[uav].len() {
-            return;
-        }
-        let old = i64::from(self.exact(a, b)) + i64::from(self.exact(p, q));
-        let allowed = self.allowance();
-        let least = self.least(a, p) + self.least(b, q);
-        if self.change(uav, least - old) > allowed {
-            return;
-        }
-        let new = self.fresh(a, p, old) + self.fresh(b, q, old);
-        let delta = i64::from(new) - old;
-        if self.change(uav, delta) > allowed || (delta >= 0 && high - low > IDLE_REVERSAL) {
-            return;
-        }
-        self.orders[uav][low..high].reverse();
-        self.index(uav, low, high);
-        self.moves[uav] += delta;
-        self.list_ends(uav, low, high);
-    }
-
     fn list_ends(&mut self, uav: usize, low: usize, high: usize) {
         for index in [low, high] {
             let spot = Spot { uav, index };
@@ -443,140 +394,6 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Two UAVs exchange what they fly after the hop and after (or from) `x`.
-    fn try_tails(&mut self, spot: Spot, x: Cell, from_a: bool) {
-        let uav = spot.uav;
-        let (other, at) = self.at[x as usize];
-        let other = Spot {
-            uav: other as usize,
-            index: at as usize + usize::from(!from_a),
-        };
-        let (a, b) = (self.before(spot), self.after(spot));
-        let (p, q) = (self.before(other), self.after(other));
-        let (mine, theirs) = (
-            self.orders[uav].len() - spot.index,
-            self.orders[other.uav].len() - other.index,
-        );
-        // Only tails of about the same length can pay; their exact lengths cost a count.
-        if self.task.closed || mine.abs_diff(theirs) > 40 || mine + theirs > 4 * IDLE_REVERSAL {
-            return;
-        }
-        let (old, old_other) = (self.exact(a, b), self.exact(p, q));
-        let both = i64::from(old) + i64::from(old_other);
-        let (link_a, link_b) = (self.fresh(a, q, both), self.fresh(p, b, both));
-        if link_a + link_b >= TOO_LONG {
-            return;
-        }
-        let (tail, other_tail) = (self.tail(spot), self.tail(other));
-        let delta = i64::from(link_a) + other_tail - i64::from(old) - tail;
-        let delta_other = i64::from(link_b) + tail - i64::from(old_other) - other_tail;
-        let allowed = self.allowance();
-        if self.change(uav, delta) + self.change(other.uav, delta_other) > allowed {
-            return;
-        }
-        let tail = self.orders[uav].split_off(spot.index);
-        let other_tail = self.orders[other.uav].split_off(other.index);
-        self.orders[uav].extend(other_tail);
-        self.orders[other.uav].extend(tail);
-        self.moves[uav] += delta;
-        self.moves[other.uav] += delta_other;
-        for s in [spot, other] {
-            let len = self.orders[s.uav].len();
-            self.index(s.uav, s.index, len);
-            self.list_ends(s.uav, s.index, len);
-            for i in s.index..len {
-                self.list_border(self.orders[s.uav][i]);
-            }
-        }
-    }
-
-    /// Moves after the first cell after a spot.
-    fn tail(&mut self, spot: Spot) -> i64 {
-        let mut moves = 0;
-        for i in spot.index + 1..self.orders[spot.uav].len() {
-            let (a, b) = (self.orders[spot.uav][i - 1], self.orders[spot.uav][i]);
-            moves += i64::from(self.exact(a, b));
-        }
-        moves
-    }
-
-    /// Fills a hop with a few cells from elsewhere that begin beside it.
-    fn try_fill(&mut self, spot: Spot) {
-        let (a, b) = (self.before(spot), self.after(spot));
-        let beside = if b == NOWHERE || self.stream.bits() & 1 == 0 {
-            a
-        } else {
-            b
-        };
-        let Some(x) = self.random_near(beside) else {
-            return;
-        };
-        let (uav, at) = self.at[x as usize];
-        let len = 1 + self.stream.below(SEGMENT);
-        let ahead = self.stream.bits() & 1 == 0;
-        let at = at as usize;
-        let low = if ahead {
-            at
-        } else {
-            (at + 1).saturating_sub(len)
-        };
-        self.try_shift(uav as usize, low, len, spot);
-    }
-
-    /// Moves a few cells beside a hop to elsewhere.
-    fn try_move_from(&mut self, spot: Spot) {
-        let len = 1 + self.stream.below(SEGMENT);
-        let low = if self.stream.bits() & 1 == 0 {
-            spot.index
-        } else {
-            spot.index.saturating_sub(len)
-        };
-        self.try_segment(spot.uav, low, len);
-    }
-
-    /// Moves a few cells at a border from the later UAV to the earlier one.
-    fn try_border(&mut self) {
-        if self.borders.is_empty() {
-            return;
-        }
-        let pick = self.stream.below(self.borders.len());
-        let cell = self.borders[pick];
-        let first = self.stream.below(4);
-        let around = self.task.map.around(cell);
-        let own = self.at[cell as usize].0;
-        let other = (0..4)
-            .map(|i| around[(first + i) % 4])
-            .find(|near| self.task.map.is_free(*near) && self.at[*near as usize].0 != own);
-        let Some(near) = other else {
-            self.bordering[cell as usize] = false;
-            self.borders.swap_remove(pick);
-            return;
-        };
-        let (one, two) = (self.urgency(cell), self.urgency(near));
-        let (x, near) = if one >= two {
-            (cell, near)
-        } else {
-            (near, cell)
-        };
-        let (uav, low) = self.at[x as usize];
-        let low = low as usize;
-        let len = 1 + self.stream.below(SEGMENT);
-        let low = if self.stream.bits() & 1 == 0 {
-            low
-        } else {
-            (low + 1).saturating_sub(len)
-        };
-        self.try_beside(uav as usize, low, len, near);
-    }
-
-    /// How much the UAV that flies a cell wants to get rid of cells: a time, and first of
-    /// all what is beyond its endurance.
-    fn urgency(&self, cell: Cell) -> (i64, i64) {
-        let uav = self.at[cell as usize].0 as usize;
-        let over = self.moves[uav] - i64::from(self.task.endurance[uav]);
-        (over.max(0), self.moves[uav] * self.pace[uav])
-    }
-
     /// Lists a cell that has changed hands, and its neighbours, as at a border.
     fn list_border(&mut self, cell: Cell) {
         for near in self.task.map.around(cell).into_iter().chain([cell]) {
@@ -584,125 +401,6 @@ impl<'a> Search<'a> {
                 self.bordering[near as usize] = true;
                 self.borders.push(near);
             }
-        }
-    }
-
-    /// Moves cells `low..low + len` of an order beside a neighbour of one of their ends.
-    fn try_segment(&mut self, uav: usize, low: usize, len: usize) {
-        let high = (low + len).min(self.orders[uav].len());
-        if low >= high {
-            return;
-        }
-        let end = if self.stream.bits() & 1 == 0 {
-            low
-        } else {
-            high - 1
-        };
-        let Some(near) = self.random_near(self.orders[uav][end]) else {
-            return;
-        };
-        self.try_beside(uav, low, len, near);
-    }
-
-    fn try_beside(&mut self, uav: usize, low: usize, len: usize, near: Cell) {
-        let (owner, at) = self.at[near as usize];
-        let index = at as usize + usize::from(self.stream.bits() & 1 == 0);
-        self.try_shift(
-            uav,
-            low,
-            len,
-            Spot {
-                uav: owner as usize,
-                index,
-            },
-        );
-    }
-
-    /// Moves cells `low..low + len` of an order to a spot outside them, whichever way
-    /// round is shorter.
-    fn try_shift(&mut self, uav: usize, low: usize, len: usize, to: Spot) {
-        let high = (low + len).min(self.orders[uav].len());
-        if low >= high || (to.uav == uav && to.index >= low && to.index <= high) {
-            return;
-        }
-        if self.task.closed && to.index > self.orders[to.uav].len() {
-            return;
-        }
-        let (first, last) = (self.orders[uav][low], self.orders[uav][high - 1]);
-        let (p, n) = (
-            self.before(Spot { uav, index: low }),
-            self.after(Spot { uav, index: high }),
-        );
-        let (a, b) = (self.before(to), self.after(to));
-        let allowed = self.allowance();
-        let inside = self.inside(uav, low, high);
-        let opened = i64::from(self.exact(a, b));
-        let taken = i64::from(self.exact(p, first)) + i64::from(self.exact(last, n)) + inside;
-        let (joined, turned) = (
-            self.least(a, first) + self.least(last, b),
-            self.least(a, last) + self.least(first, b),
-        );
-        // What it would come to if nothing were in the way: most trials end here.
-        let added = joined.min(turned) + inside - opened;
-        if self.both(uav, self.least(p, n) - taken, to.uav, added) > allowed {
-            return;
-        }
-        let old = taken + opened;
-        let kept = i64::from(self.fresh(p, n, old)) - taken;
-        let joined = i64::from(self.fresh(a, first, old)) + i64::from(self.fresh(last, b, old));
-        let turned = i64::from(self.fresh(a, last, old)) + i64::from(self.fresh(first, b, old));
-        let added = joined.min(turned) + inside - opened;
-        if self.both(uav, kept, to.uav, added) > allowed
-            || (to.uav == uav && to.index.abs_diff(low) > 2 * IDLE_REVERSAL)
-        {
-            return;
-        }
-        self.moves[uav] += kept;
-        self.moves[to.uav] += added;
-        self.shift(uav, low, high, to, turned < joined);
-    }
-
-    fn inside(&mut self, uav: usize, low: usize, high: usize) -> i64 {
-        let mut moves = 0;
-        for i in low + 1..high {
-            let (a, b) = (self.orders[uav][i - 1], self.orders[uav][i]);
-            moves += i64::from(self.exact(a, b));
-        }
-        moves
-    }
-
-    fn shift(&mut self, uav: usize, low: usize, high: usize, to: Spot, turned: bool) {
-        let len = high - low;
-        if turned {
-            self.orders[uav][low..high].reverse();
-        }
-        if to.uav == uav {
-            let index = if to.index > low {
-                self.orders[uav][low..to.index].rotate_left(len);
-                self.index(uav, low, to.index);
-                to.index - len
-            } else {
-                self.orders[uav][to.index..high].rotate_right(len);
-                self.index(uav, to.index, high);
-                to.index
-            };
-            self.list_ends(uav, index, index + len);
-            let gap = if to.index > low { low } else { high };
-            self.list_ends(uav, gap, gap);
-            return;
-        }
-        let mut cells = [NOWHERE; SEGMENT];
-        cells[..len].copy_from_slice(&self.orders[uav][low..high]);
-        self.orders[uav].drain(low..high);
-        let from_len = self.orders[uav].len();
-        self.index(uav, low, from_len);
-        self.orders[to.uav].splice(to.index..to.index, cells[..len].iter().copied());
-        let to_len = self.orders[to.uav].len();
-        self.index(to.uav, to.index, to_len);
-        self.list_ends(uav, low, low);
-        self.list_ends(to.uav, to.index, to.index + len);
-        for cell in &cells[..len] {
-            self.list_border(*cell);
         }
     }
 }

@@ -35,7 +35,7 @@ const MOST_TRIES: usize = 600_000;
 
 /// Highest loss accepted at the beginning, in squares of moves: passing a block between
 /// two equal regions loses 32.
-const HOT: i64 = 128;
+const HOT: i64 = 256;
 
 /// What each pair of neighbouring pieces on two sides of a border costs, in the same
 /// unit: regions without tails can pass more.
