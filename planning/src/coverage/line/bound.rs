@@ -4,22 +4,21 @@
 //! farther than `d` from the depots spends at least `2 d` on the way there and back, so
 //! the work that lies beyond `d`, deadheads included, must fit into what is left.
 
+use super::matching::pair_up;
 use super::network::{Line, Surveyor};
-use super::{matching::pair_up, postman};
 use crate::coverage::metric::Metric;
 
 /// Distances `d` that are tried, besides zero: the bound is flat near its maximum.
 const DISTANCES: usize = 8;
 
-/// No plan that flies along every line has a makespan below this.
+/// No plan that flies along every line has a makespan below this; `whole` is the least
+/// that all tours cost together.
 ///
 /// # Guarantees
 /// A lower bound where the costs obey the triangle inequality and no line is shorter
 /// than the distance between its ends. With one UAV and connected lines it is reached.
-pub(super) fn makespan(lines: &[Line], team: &[Surveyor], metric: &impl Metric) -> f64 {
-    let all: Vec<usize> = (0..lines.len()).collect();
+pub(super) fn makespan(lines: &[Line], team: &[Surveyor], metric: &impl Metric, whole: f64) -> f64 {
     let speed: f64 = team.iter().map(|u| u.speed).sum();
-    let whole = postman::shortest(lines, &all, metric);
     let mut best = farthest(lines, team, metric).max(whole / speed);
     if team.len() > 1 {
         let beyond = Beyond::new(lines, team, metric);

@@ -10,6 +10,7 @@
 //! | `network` | lines, team, tours |
 //! | `blossom`, `matching` | the cheapest pairing of places, exact |
 //! | `postman` | one tour along all lines |
+//! | `moats` | parts that are apart: what joining them costs, and how |
 //! | `split` | one tour cut into several |
 //! | `improve` | local search on the longest tour |
 //! | [`strip`] | strips wider than a swath, as lanes |
@@ -38,6 +39,7 @@ mod blossom;
 mod bound;
 mod improve;
 mod matching;
+mod moats;
 mod network;
 mod postman;
 mod split;
@@ -91,11 +93,12 @@ pub fn plan(
 ) -> Result<LinePlan, LineError> {
     network::check(lines, team)?;
     let all: Vec<usize> = (0..lines.len()).collect();
-    let lower_bound = bound::makespan(lines, team, metric);
     // One UAV flies the tour as it is; several begin from different walks of it.
     let starts = if team.len() == 1 { 1 } else { STARTS };
-    let giants = postman::tours(lines, &all, team[0].depot, metric, starts);
-    improved(lines, team, metric, steps, lower_bound, giants)
+    let depots: Vec<usize> = team.iter().map(|u| u.depot).collect();
+    let found = postman::solve(lines, &all, &depots, metric, starts);
+    let lower_bound = bound::makespan(lines, team, metric, found.bound);
+    improved(lines, team, metric, steps, lower_bound, found.tours)
 }
 
 /// Shares each of the tours `giants` out among the team, improves the shares and goes on

@@ -4,79 +4,96 @@
 //! walk the result. Leaves several tours to `split` and `improve`.
 
 use super::matching::pair_up;
+use super::moats;
 use super::network::{Line, Parts, Pass};
 use crate::coverage::dice::Dice;
 use crate::coverage::metric::Metric;
 
+/// Deadheads by the numbers of the places that they join.
+pub(super) type Deadheads = Vec<(usize, usize)>;
+
 /// The postman's graph: lines and deadheads over places renumbered from 0.
-struct Graph<'a, M> {
+pub(super) struct Graph<'a, M> {
     lines: &'a [Line],
     chosen: &'a [usize],
     /// The places in use, ascending; the graph numbers them by their index here.
     places: Vec<usize>,
-    depot: usize,
+    /// Tours begin at the first; a graph with several is no good for walks.
+    depots: Vec<usize>,
     ends: Vec<(usize, usize)>,
     metric: &'a M,
+}
+
+/// What the postman found.
+pub(super) struct Found {
+    /// Closed tours along the same deadheads; they differ in which lines come one after
+    /// the other, which matters when a tour is cut.
+    pub tours: Vec<Vec<Pass>>,
+    /// No tour along the lines is cheaper.
+    pub bound: f64,
 }
 
 /// A tour from `depot` along the `chosen` lines and back.
 ///
 /// # Guarantees
-/// Where the lines hang together and the depot lies on them, and each line costs the
-/// same both ways, the tour is the shortest there is: the lines plus a cheapest pairing
-/// of the places where an odd number of them end. Otherwise the parts are joined by the
-/// cheapest exchanges found, and the bound of [`shortest`] tells how far off that may be.
+/// As [`solve`].
 pub(super) fn tour(
     lines: &[Line],
     chosen: &[usize],
     depot: usize,
     metric: &impl Metric,
 ) -> Vec<Pass> {
-    let mut all = tours(lines, chosen, depot, metric, 1);
-    all.pop().unwrap_or_default()
-}
-
-/// The same tour as [`tour`] in `count` different walks: which lines come one after the
-/// other matters when a tour is cut.
-pub(super) fn tours(
-    lines: &[Line],
-    chosen: &[usize],
-    depot: usize,
-    metric: &impl Metric,
-    count: usize,
-) -> Vec<Vec<Pass>> {
-    let graph = Graph::new(lines, chosen, depot, metric);
+    let graph = Graph::new(lines, chosen, &[depot], metric);
     let mut deadheads = graph.pairs();
     graph.join_parts(&mut deadheads);
-    (0..count)
-        .map(|seed| graph.walk(&deadheads, seed as u64))
-        .collect()
+    graph.walk(&deadheads, 0)
 }
 
-/// No closed tour along the `chosen` lines is cheaper than this.
-pub(super) fn shortest(lines: &[Line], chosen: &[usize], metric: &impl Metric) -> f64 {
-    let Some(&first) = chosen.first() else {
-        return 0.0;
+/// Tours from the first of `depots` along the `chosen` lines and back, in `count`
+/// different walks, and what no closed tours from the depots can beat together.
+///
+/// # Guarantees
+/// Where the lines hang together and the depot lies on them, and each line costs the
+/// same both ways, a tour is the shortest there is: the lines plus a cheapest pairing
+/// of the places where an odd number of them end. Otherwise the parts are joined by the
+/// cheapest exchanges found, and the bound tells how far off that may be.
+pub(super) fn solve(
+    lines: &[Line],
+    chosen: &[usize],
+    depots: &[usize],
+    metric: &impl Metric,
+    count: usize,
+) -> Found {
+    let mut apart = depots.to_vec();
+    apart.sort_unstable();
+    apart.dedup();
+    let first: Vec<usize> = depots.iter().copied().take(1).collect();
+    let graph = Graph::new(lines, chosen, &first, metric);
+    let joined = moats::join(&graph, graph.pairs());
+    let bound = if apart.len() > 1 {
+        // Several depots join for nothing what hangs on them.
+        let graph = Graph::new(lines, chosen, &apart, metric);
+        moats::join(&graph, graph.pairs()).bound
+    } else {
+        joined.bound
     };
-    let graph = Graph::new(lines, chosen, lines[first].a, metric);
-    let deadheads = graph.pairs();
-    let flown: f64 = chosen
+    let flown = chosen
         .iter()
-        .map(|&l| lines[l].cost[0].min(lines[l].cost[1]))
-        .sum();
-    flown
-        + deadheads
-            .iter()
-            .map(|&(a, b)| graph.cost(a, b))
-            .sum::<f64>()
+        .map(|&l| lines[l].cost[0].min(lines[l].cost[1]));
+    Found {
+        bound: flown.sum::<f64>() + bound,
+        tours: (0..count)
+            .map(|seed| graph.walk(&joined.deadheads, seed as u64))
+            .collect(),
+    }
 }
 
 impl<'a, M: Metric> Graph<'a, M> {
-    fn new(lines: &'a [Line], chosen: &'a [usize], depot: usize, metric: &'a M) -> Self {
+    fn new(lines: &'a [Line], chosen: &'a [usize], depots: &[usize], metric: &'a M) -> Self {
         let mut places: Vec<usize> = chosen
             .iter()
             .flat_map(|&l| [lines[l].a, lines[l].b])
-            .chain([depot])
+            .chain(depots.iter().copied())
             .collect();
         places.sort_unstable();
         places.dedup();
@@ -88,25 +105,48 @@ impl<'a, M: Metric> Graph<'a, M> {
         Self {
             lines,
             chosen,
-            depot: number(depot),
+            depots: depots.iter().map(|&d| number(d)).collect(),
             places,
             ends,
             metric,
         }
     }
 
-    fn cost(&self, a: usize, b: usize) -> f64 {
+    /// How many places there are.
+    pub(super) fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// The cost of a deadhead.
+    pub(super) fn cost(&self, a: usize, b: usize) -> f64 {
         self.metric.cost(self.places[a], self.places[b])
     }
 
-    /// The cheapest pairing of the places where an odd number of lines end.
-    fn pairs(&self) -> Vec<(usize, usize)> {
+    /// The places where an odd number of lines end.
+    pub(super) fn odd(&self) -> Vec<usize> {
         let mut odd = vec![false; self.places.len()];
         for &(a, b) in &self.ends {
             odd[a] = !odd[a];
             odd[b] = !odd[b];
         }
-        let places: Vec<usize> = (0..odd.len()).filter(|&p| odd[p]).collect();
+        (0..odd.len()).filter(|&p| odd[p]).collect()
+    }
+
+    /// What the lines alone join; all depots count as joined.
+    pub(super) fn parts(&self) -> Parts {
+        let mut parts = Parts::new(self.places.len());
+        for w in self.depots.windows(2) {
+            parts.join(w[0], w[1]);
+        }
+        for &(a, b) in &self.ends {
+            parts.join(a, b);
+        }
+        parts
+    }
+
+    /// The cheapest pairing of the places where an odd number of lines end.
+    fn pairs(&self) -> Deadheads {
+        let places = self.odd();
         let known: Vec<usize> = places.iter().map(|&p| self.places[p]).collect();
         pair_up(&known, self.metric)
             .into_iter()
@@ -114,15 +154,15 @@ impl<'a, M: Metric> Graph<'a, M> {
             .collect()
     }
 
-    /// Changes the deadheads until all lines and the depot hang together: the smallest
+    /// Changes the deadheads until all lines and the depots hang together: the smallest
     /// part that is apart is joined in the cheapest way, and so on.
-    fn join_parts(&self, deadheads: &mut Vec<(usize, usize)>) {
+    pub(super) fn join_parts(&self, deadheads: &mut Deadheads) {
         let n = self.places.len();
-        let mut parts = Parts::new(n);
-        let mut left = n;
-        for &(a, b) in self.ends.iter().chain(deadheads.iter()) {
-            left -= usize::from(parts.join(a, b));
+        let mut parts = self.parts();
+        for &(a, b) in deadheads.iter() {
+            parts.join(a, b);
         }
+        let mut left = (0..n).filter(|&p| parts.find(p) == p).count();
         while left > 1 {
             let root: Vec<usize> = (0..n).map(|p| parts.find(p)).collect();
             let mut size = vec![0usize; n];
@@ -214,7 +254,8 @@ impl<'a, M: Metric> Graph<'a, M> {
         }
         let mut used = vec![false; edges.len()];
         let mut next = first.clone();
-        let mut stack = vec![(self.depot, usize::MAX)];
+        let mut stack: Vec<(usize, usize)> =
+            vec![(self.depots.first().copied().unwrap_or(0), usize::MAX)];
         let mut passes = Vec::with_capacity(self.chosen.len());
         while let Some(&(p, came)) = stack.last() {
             while next[p] < first[p + 1] && used[at[next[p]]] {

@@ -162,6 +162,37 @@ fn scattered_lines_come_close_to_the_optimum() {
 }
 
 #[test]
+fn joining_parts_costs_little_more_than_its_bound() {
+    let mut dice = Dice::new(17);
+    let (mut loose, mut far, rounds) = (0.0, 0.0, 200);
+    for _ in 0..rounds {
+        let mut at = scattered(&mut dice, 9);
+        // A few parts far from each other: pairing leaves most of them apart.
+        for (i, p) in at.iter_mut().enumerate() {
+            p.x += 1500.0 * (i / 3) as f64;
+        }
+        let m = Straight(&at);
+        let lines: Vec<Line> = (0..8)
+            .map(|_| {
+                let part = 3 * dice.below(3);
+                let (a, b) = (part + dice.below(3), part + dice.below(3));
+                Line::new(a, b, m.cost(a, b) * (1.0 + dice.unit()))
+            })
+            .collect();
+        let team = [Surveyor::at(dice.below(9))];
+        let found = plan(&lines, &team, &m, 0).unwrap();
+        recount(&found, &lines, &team, &m);
+        let best = oracle(&lines, team[0].depot, &m)[(1 << lines.len()) - 1];
+        assert!(found.lower_bound <= best + 1e-4, "{found:?} {best}");
+        loose += best / found.lower_bound;
+        far += found.makespan / best;
+    }
+    let (loose, far) = (loose / f64::from(rounds), far / f64::from(rounds));
+    // A pairing alone lies 1.5 times below the best tours of these.
+    assert!(loose < 1.085 && far < 1.03, "{loose} {far}");
+}
+
+#[test]
 fn teams_come_close_to_the_least_makespan() {
     let mut dice = Dice::new(13);
     let (mut sum, mut worst, rounds) = (0.0, 0.0f64, 60);
