@@ -1,15 +1,22 @@
 //! What no plan for lines can beat (D2.7 §3.5 has no bound).
 //!
-//! Two arguments. Somebody flies to each line, along it and back. And whoever works
-//! farther than `d` from the depots spends at least `2 d` on the way there and back, so
-//! the work that lies beyond `d`, deadheads included, must fit into what is left.
+//! Somebody flies to each line, along it and back. All tours together pair up the places
+//! where an odd number of lines end and join all parts (`postman`). And whoever works
+//! farther than `d` from the depots crosses every circle up to `d` twice: what a team
+//! flies is at least those crossings, and of lines and pairing what they do not need for
+//! themselves to get on outwards or inwards. How many UAVs must work beyond each `d`
+//! follows from a makespan that is supposed; the least that leads to no contradiction is
+//! the bound.
 
 use super::matching::pair_up;
 use super::network::{Line, Surveyor};
 use crate::coverage::metric::Metric;
 
 /// Distances `d` that are tried, besides zero: the bound is flat near its maximum.
-const DISTANCES: usize = 8;
+const DISTANCES: usize = 12;
+
+/// Halvings of the interval of the bound: below a millionth of it.
+const HALVINGS: usize = 24;
 
 /// No plan that flies along every line has a makespan below this; `whole` is the least
 /// that all tours cost together.
@@ -22,12 +29,7 @@ pub(super) fn makespan(lines: &[Line], team: &[Surveyor], metric: &impl Metric, 
     let mut best = farthest(lines, team, metric).max(whole / speed);
     if team.len() > 1 {
         let beyond = Beyond::new(lines, team, metric);
-        let far = beyond.reach.iter().copied().fold(0.0, f64::max);
-        for step in 1..=DISTANCES {
-            // Beyond two thirds of the way little work is left.
-            let d = far * step as f64 / (1.5 * DISTANCES as f64);
-            best = best.max(shared(team, d, beyond.work(d)));
-        }
+        best = Circles::new(team, &beyond).least_time(best);
     }
     best
 }
@@ -71,6 +73,95 @@ fn farthest(lines: &[Line], team: &[Surveyor], metric: &impl Metric) -> f64 {
     lines.iter().map(easiest).fold(0.0, f64::max)
 }
 
+/// Circles round the depots, and the work beyond and within each.
+struct Circles {
+    /// The speeds of the team, the fastest first.
+    speeds: Vec<f64>,
+    rings: Vec<Ring>,
+}
+
+/// A circle and the ring between it and the next smaller one.
+struct Ring {
+    radius: f64,
+    width: f64,
+    /// What those who come beyond the circle fly besides crossing it and all smaller ones.
+    beyond: f64,
+    /// What lines within the circle need besides.
+    within: f64,
+}
+
+impl Circles {
+    fn new<M: Metric>(team: &[Surveyor], beyond: &Beyond<'_, M>) -> Self {
+        let mut speeds: Vec<f64> = team.iter().map(|u| u.speed).collect();
+        speeds.sort_by(|a, b| b.total_cmp(a));
+        let far = beyond.reach.iter().copied().fold(0.0, f64::max);
+        let width = far / (DISTANCES + 1) as f64;
+        let ring = |step: usize| {
+            let radius = width * step as f64;
+            let (out, within) = beyond.work(radius);
+            Ring {
+                radius,
+                width,
+                beyond: out,
+                within,
+            }
+        };
+        Self {
+            speeds,
+            rings: (1..=DISTANCES).map(ring).collect(),
+        }
+    }
+
+    /// The least time, from `least` on, in which the team may be done.
+    fn least_time(&self, least: f64) -> f64 {
+        if self.is_possible(least) {
+            return least;
+        }
+        let (mut least, mut most) = (least, 2.0 * least);
+        while !self.is_possible(most) && most.is_finite() {
+            (least, most) = (most, 2.0 * most);
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (least + most);
+            if self.is_possible(middle) {
+                most = middle;
+            } else {
+                least = middle;
+            }
+        }
+        least
+    }
+
+    /// Whether nothing here speaks against a makespan of `time`.
+    fn is_possible(&self, time: f64) -> bool {
+        let all: f64 = self.speeds.iter().map(|v| v * time).sum();
+        let mut crossings = 0.0;
+        for ring in &self.rings {
+            let Some(count) = self.needed(ring, time) else {
+                return false;
+            };
+            crossings += 2.0 * ring.width * count as f64;
+            if crossings + ring.beyond + ring.within > all {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// How many UAVs at least work beyond a circle; `None` when all are too few.
+    fn needed(&self, ring: &Ring, time: f64) -> Option<usize> {
+        let (mut left, mut count) = (ring.beyond, 0);
+        for v in &self.speeds {
+            if left <= 0.0 {
+                break;
+            }
+            left -= (v * time - 2.0 * ring.radius).max(0.0);
+            count += 1;
+        }
+        (left <= 0.0).then_some(count)
+    }
+}
+
 /// How much of the work lies beyond a distance from all depots.
 struct Beyond<'a, M> {
     lines: &'a [Line],
@@ -110,15 +201,22 @@ impl<'a, M: Metric> Beyond<'a, M> {
         }
     }
 
-    /// The least that is flown beyond `d`.
+    /// The least that is flown by those who come farther than `d` from all depots, and
+    /// on lines within `d`, both besides crossing the circles up to `d`.
     ///
-    /// A point at `s` along a leg from `a` is at most `s` nearer to the depots than `a`,
-    /// so at least the lesser of the leg and of what both ends stick out lies outside.
-    fn work(&self, d: f64) -> f64 {
+    /// Along a line the distance from the depots changes by the difference of its ends at
+    /// least; that much of it may be what a circle's crossing needs, the rest is not.
+    fn work(&self, d: f64) -> (f64, f64) {
         let out = |r: f64| (r - d).max(0.0);
-        let flown =
-            |(l, &(a, b)): (&Line, &(f64, f64))| l.cost[0].min(l.cost[1]).min(out(a) + out(b));
-        let flown: f64 = self.lines.iter().zip(&self.ends).map(flown).sum();
+        let (mut beyond, mut within) = (0.0, 0.0);
+        for (l, &(a, b)) in self.lines.iter().zip(&self.ends) {
+            let besides = l.cost[0].min(l.cost[1]) - (a.min(d) - b.min(d)).abs();
+            if a.max(b) > d {
+                beyond += besides.max(0.0);
+            } else {
+                within += besides.max(0.0);
+            }
+        }
         let mut outside: Vec<usize> = (0..self.odd.len()).filter(|&i| self.reach[i] > d).collect();
         if outside.len() % 2 == 1 {
             // One of them is joined to the inside.
@@ -134,7 +232,7 @@ impl<'a, M: Metric> Beyond<'a, M> {
         };
         let pairs = pair_up(&outside, &joined);
         let deadheads = pairs.iter().map(|&(x, y)| joined(outside[x], outside[y]));
-        flown + deadheads.sum::<f64>()
+        (beyond + deadheads.sum::<f64>(), within)
     }
 }
 

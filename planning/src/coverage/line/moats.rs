@@ -119,18 +119,17 @@ impl<'a, M: Metric> Ascent<'a, M> {
     fn new(graph: &'a Graph<'a, M>, pairs: &Deadheads) -> Option<Self> {
         let n = graph.len();
         let mut joined = graph.parts();
-        let mut number = vec![usize::MAX; n];
-        let (mut part, mut parts) = (vec![0; n], 0);
-        for p in 0..n {
-            let root = joined.find(p);
-            if number[root] == usize::MAX {
-                number[root] = parts;
-                parts += 1;
-            }
-            part[p] = number[root];
-        }
+        let roots: Vec<usize> = (0..n).map(|p| joined.find(p)).collect();
+        let mut tops = roots.clone();
+        tops.sort_unstable();
+        tops.dedup();
+        let part: Vec<usize> = roots
+            .iter()
+            .map(|r| tops.partition_point(|t| t < r))
+            .collect();
+        let parts = tops.len();
         let odd = graph.odd();
-        if parts > MOST_PARTS || parts < 2 || odd.len() * n * n > LOOKS {
+        if !(2..=MOST_PARTS).contains(&parts) || odd.len() * n * n > LOOKS {
             return None;
         }
         let mut costs = vec![0.0; n * n];
