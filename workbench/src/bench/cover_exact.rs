@@ -2,10 +2,11 @@
 //!
 //! What is seen is recounted here by random points, with code of its own.
 
+use super::cover_trees;
 use super::figures::{Times, timed};
 use super::stream::Stream;
 use anyhow::{Context, Result, ensure};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 use skein_interop::geojson;
 use skein_interop::place::to_plane;
@@ -19,6 +20,9 @@ use std::sync::Arc;
 
 /// The most areas that are generated: a run of some minutes.
 const MOST_AREAS: usize = 10_000;
+
+/// Zones in an area up to which each is as large as if it were alone.
+const MOST_LARGE: usize = 15;
 
 /// The largest team: the same as a swarm.
 const MOST_UAVS: usize = 1_000;
@@ -50,9 +54,19 @@ pub struct ExactArgs {
     /// Steps of improvement of a team's plan.
     #[arg(long, default_value_t = 20_000, value_name = "N")]
     pub team_steps: usize,
+    /// A planner that teams are compared with.
+    #[arg(long, value_enum, value_name = "PLANNER")]
+    pub baseline: Option<Baseline>,
     /// Random points that are looked for in each area.
     #[arg(long, default_value_t = 50_000, value_name = "N")]
     pub samples: usize,
+}
+
+/// What teams are compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Baseline {
+    /// D2.7's own: a tree of whole cells for each UAV.
+    Trees,
 }
 
 #[derive(Serialize)]
@@ -69,6 +83,12 @@ struct Answer {
     k: usize,
     team_ratio_mean: f64,
     team_ratio_worst: f64,
+    team_over_bound_mean: f64,
+    team_over_bound_worst: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    over_trees_mean: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    over_trees_worst: Option<f64>,
     team_ms_mean: f64,
     seen_share_mean: f64,
     seen_share_least: f64,
@@ -117,6 +137,10 @@ struct Row {
     /// pass there and back, whichever is longer. The work is the tour of one UAV, with
     /// the way out and back to the nearest pass for each UAV more.
     team_ratio: f64,
+    /// The longest tour of the team over what no tours along the passes can beat.
+    over_bound: f64,
+    /// The longest tour of the team over that of the baseline.
+    over_trees: Option<f64>,
     team_us: f64,
     one_direction_m: f64,
     seen: f64,
@@ -147,8 +171,14 @@ fn measure(instance: &Instance, args: &ExactArgs, seed: u64) -> Result<Row> {
     let share_m = ((best.length_m + 2.0 * (k - 1.0) * way_m) / k).max(together.farthest);
     let seen = seen_share(instance, &best, args.samples, seed);
     let nearest = nearest_m(instance, &best) / instance.problem.clearance_m;
+    let over_trees = args.baseline.and_then(|Baseline::Trees| {
+        let trees_m = cover_trees::makespan_m(&instance.problem, &one, args.k)?;
+        Some(together.makespan / trees_m)
+    });
     Ok(Row {
         team_ratio: together.makespan / share_m,
+        over_bound: together.makespan / together.lower_bound.max(together.farthest),
+        over_trees,
         team_us,
         one_direction_m: one.length_m,
         seen,
@@ -161,7 +191,9 @@ fn measure(instance: &Instance, args: &ExactArgs, seed: u64) -> Result<Row> {
 fn sum_up(args: &ExactArgs, instances: &[Instance], rows: &[Row]) -> Answer {
     let n = rows.len().max(1) as f64;
     let mean = |f: &dyn Fn(&Row) -> f64| rows.iter().map(f).sum::<f64>() / n;
+    let worst = |f: &dyn Fn(&Row) -> f64| rows.iter().map(f).fold(0.0, f64::max);
     let over_one = |r: &Row| r.best.length_m / r.one_direction_m;
+    let over_trees = |r: &Row| r.over_trees.unwrap_or(0.0);
     Answer {
         areas: rows.len(),
         fields: instances.iter().filter(|i| i.is_field).count(),
@@ -171,10 +203,14 @@ fn sum_up(args: &ExactArgs, instances: &[Instance], rows: &[Row]) -> Answer {
         pocket_passes_mean: mean(&|r| r.best.pocket_passes as f64),
         length_over_bound_mean: mean(&|r| r.best.length_m / r.best.lower_bound_m),
         over_one_direction_mean: mean(&over_one),
-        over_one_direction_worst: rows.iter().map(over_one).fold(0.0, f64::max),
+        over_one_direction_worst: worst(&over_one),
         k: args.k,
         team_ratio_mean: mean(&|r| r.team_ratio),
-        team_ratio_worst: rows.iter().map(|r| r.team_ratio).fold(0.0, f64::max),
+        team_ratio_worst: worst(&|r| r.team_ratio),
+        team_over_bound_mean: mean(&|r| r.over_bound),
+        team_over_bound_worst: worst(&|r| r.over_bound),
+        over_trees_mean: args.baseline.map(|_| mean(&over_trees)),
+        over_trees_worst: args.baseline.map(|_| worst(&over_trees)),
         team_ms_mean: mean(&|r| r.team_us / 1000.0),
         seen_share_mean: mean(&|r| r.seen),
         seen_share_least: rows.iter().map(|r| r.seen).fold(1.0, f64::min),
@@ -236,6 +272,8 @@ fn instance(
     let area = Polygon::new(ring)?;
     let size_m = area.area_m2().sqrt();
     let (low, high) = area.bounds();
+    // More zones than a few take no more of the area, but are smaller.
+    let scale_m = size_m * (MOST_LARGE as f64 / holes.max(MOST_LARGE) as f64).sqrt();
     let mut zones = Vec::new();
     while zones.len() < holes {
         let at = Point::new(
@@ -244,7 +282,7 @@ fn instance(
         );
         if is_inside(at, area.vertices()) {
             let spokes = 4 + (dice.unit() * 5.0) as usize;
-            zones.push(star(at, spokes, 0.02 * size_m, 0.06 * size_m, dice));
+            zones.push(star(at, spokes, 0.02 * scale_m, 0.06 * scale_m, dice));
         }
     }
     let spacing_m = size_m / args.lanes;
@@ -264,7 +302,7 @@ fn instance(
 }
 
 /// Crossing parity of a ray to the right.
-fn is_inside(p: Point, ring: &[Point]) -> bool {
+pub(super) fn is_inside(p: Point, ring: &[Point]) -> bool {
     let mut inside = false;
     for (i, a) in ring.iter().enumerate() {
         let b = ring[(i + 1) % ring.len()];

@@ -3,6 +3,7 @@
 pub mod cover;
 pub mod cover_exact;
 pub mod cover_loop;
+mod cover_trees;
 pub mod dubins;
 pub mod figures;
 pub mod headings;

@@ -56,6 +56,10 @@ pub struct TeamPlan {
     pub lengths_m: Vec<f64>,
     /// The longest time of a tour.
     pub makespan: f64,
+    /// No tours along these passes have a smaller longest time: the passes, the cheapest
+    /// turns between them, and the ways out and back of as many UAVs as must come so far.
+    /// Where ways round zones are guessed it is a bound if no guess is too long.
+    pub lower_bound: f64,
     /// The time to the farthest pass, along it and back, of the UAV that is there first:
     /// no team is faster.
     pub farthest: f64,
@@ -146,6 +150,7 @@ pub fn plan_team(problem: &ExactProblem, team: &[Member]) -> Result<TeamPlan, Ex
             .collect(),
         tours,
         makespan: found.tours.iter().zip(&uavs).map(time).fold(0.0, f64::max),
+        lower_bound: found.lower_bound,
         farthest: (0..lines.len()).map(soonest).fold(0.0, f64::max),
         unserved: found.unserved.iter().map(|&i| layout.passes[i]).collect(),
         cells: layout.cells,

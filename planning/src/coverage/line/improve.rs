@@ -19,9 +19,10 @@ const REMOVED: usize = 10;
 /// The longest run of lines taken from one tour.
 const LONGEST_RUN: usize = 10;
 
-/// Weight of the part of the objective that grows steeply with a tour's length. A metre
-/// of the longest tour then counts 5.5 times as much as one of a short tour: a plan may
-/// grow in total when its longest tour shrinks, and the middling tours stay level.
+/// Weight of the part of the objective that grows with the 32nd power of a tour's length
+/// over the longest. A metre of the longest tour then counts 17 times as much as one of a
+/// short tour, and twice as much at nine tenths of it: a plan may grow in total when its
+/// longest tour shrinks. With the 8th power tours of ten UAVs stayed 1.5 % longer.
 const STEEP: f64 = 0.5;
 
 /// How many seconds of flight one second beyond endurance weighs.
@@ -195,7 +196,9 @@ impl<'a, M: Metric> Engine<'a, M> {
         let x = length / (self.target.min(uav.endurance) * uav.speed).max(f64::MIN_POSITIVE);
         let x2 = x * x;
         let x4 = x2 * x2;
-        length * (1.0 + STEEP * x4 * x4)
+        let x8 = x4 * x4;
+        let x16 = x8 * x8;
+        length * (1.0 + STEEP * x16 * x16)
     }
 
     fn objective(&self) -> f64 {
