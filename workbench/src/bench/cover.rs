@@ -259,7 +259,7 @@ fn named_map(folder: &Path, name: &str) -> Result<LaneMap> {
 
 /// Reads a map: `height` and `width` lines, then `map`, then the rows; `.`, `G` and `S`
 /// are free.
-fn read_map(path: &Path) -> Result<LaneMap> {
+pub(super) fn read_map(path: &Path) -> Result<LaneMap> {
     let shown = path.display();
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {shown}"))?;
     let mut lines = text.lines();

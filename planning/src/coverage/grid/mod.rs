@@ -8,6 +8,7 @@
 //! | [`plan`] | a task, a plan, and what a plan costs |
 //! | [`bounds`] | how long any plan takes at least |
 //! | [`spanning`] | one closed loop over all cells, from a spanning tree over 2×2 blocks |
+//! | `mend` | cells that a loop leaves out, brought together so that they cost nothing |
 //! | [`mstc`] | the loop divided without and with backtracking, from where the UAVs stand |
 //! | [`ring`] | the exact division with backtracking, mixed speeds and endurance |
 //! | [`forest`] | a tree cover with a proven factor |
@@ -28,6 +29,7 @@ pub mod free;
 mod home;
 pub mod improve;
 pub mod map;
+mod mend;
 pub mod mstc;
 pub mod partition;
 pub mod patrol;

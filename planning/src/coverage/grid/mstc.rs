@@ -8,7 +8,10 @@
 use super::map::{Cell, NOWHERE, Router};
 use super::plan::{Plan, Task};
 use super::ring::{Robot, divide};
-use super::spanning::{Tree, closed_loop};
+use super::spanning::{Tree, closed_loop, lean_loop};
+
+/// Cells a UAV from which on the loop is laid so that little is flown twice.
+const LONG_ARC: usize = 500;
 
 /// The closed walk over all cells, each a neighbour of the next and the last of the
 /// first; a cell with no way round is there more than once.
@@ -17,7 +20,10 @@ pub fn closed_walk(task: &Task, tree: Tree) -> Vec<Cell> {
     let Some(&root) = task.roots.first() else {
         return Vec::new();
     };
-    let order = closed_loop(&task.map, root, tree);
+    // Where arcs are short, where the UAVs happen to stand weighs more than the length.
+    let long = task.map.n_free() >= LONG_ARC * task.n_uavs();
+    let lay = if long { lean_loop } else { closed_loop };
+    let order = lay(&task.map, root, tree);
     let mut router = Router::new(&task.map);
     let mut walk = Vec::with_capacity(order.len() + order.len() / 8);
     walk.extend(order.first());
