@@ -107,10 +107,9 @@ pub fn plan(request: &Request<'_>) -> Result<Flights> {
         .filter(|c| !covered[*c as usize])
         .collect();
     let first = &request.team[0];
-    let equal = request
-        .team
-        .iter()
-        .all(|m| (m.speed_mps - first.speed_mps).abs() < 1e-9);
+    let equal = request.team.iter().all(|m| {
+        (m.speed_mps - first.speed_mps).abs() < 1e-9 && (m.pace - first.pace).abs() < 1e-9
+    });
     let least_m = f64::from(bounds::least_moves(&task)) * raster.side_m();
     Ok(Flights {
         lengths_m: tracks.iter().map(|t| length_m(t)).collect(),
@@ -138,7 +137,7 @@ fn task(
     )]
     let whole = |x: f64| x.max(0.0) as u32;
     for (uav, flyer) in request.team.iter().enumerate() {
-        task.speeds[uav] = whole((flyer.speed_mps * SPEED_UNITS).round()).max(1);
+        task.speeds[uav] = whole((flyer.speed_mps * flyer.pace * SPEED_UNITS).round()).max(1);
         if flyer.endurance_s.is_finite() {
             let left_m = flyer.endurance_s * flyer.speed_mps - 2.0 * length_m(&ways[uav]);
             task.endurance[uav] = whole((left_m / raster.side_m()).floor());
@@ -205,6 +204,7 @@ mod tests {
             swath_m: 30.0,
             turn_radius_m: 15.0,
             cruise_power_w: None,
+            pace: 1.0,
         };
         speeds.iter().enumerate().map(flyer).collect()
     }

@@ -26,6 +26,9 @@ pub struct Flyer {
     pub turn_radius_m: f64,
     /// Power in level cruise, watts.
     pub cruise_power_w: Option<f64>,
+    /// How much of its share of the work it is given, 1 for all that its speed is good
+    /// for: less leaves more to others that cost less.
+    pub pace: f64,
 }
 
 impl Flyer {
@@ -82,6 +85,7 @@ pub fn flyers(
             swath_m,
             turn_radius_m: member.turn_radius_m.unwrap_or(defaults.turn_radius_m),
             cruise_power_w: member.cruise_power_w,
+            pace: 1.0,
         });
     }
     let sensor = defaults.sensor.unwrap_or_default();

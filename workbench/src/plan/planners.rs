@@ -175,8 +175,9 @@ impl<'a> Ground<'a> {
             )
         };
         let member = |flyer: &Flyer| exact::Member {
-            speed: flyer.speed_mps,
-            endurance: flyer.endurance_s,
+            speed: flyer.speed_mps * flyer.pace,
+            // In the time of that pace, so that the length is the same.
+            endurance: flyer.endurance_s / flyer.pace,
             ..exact::Member::at(flyer.start)
         };
         let members: Vec<exact::Member> = job.crew.iter().map(member).collect();

@@ -252,6 +252,15 @@ fn distance_and_energy_leave_the_dear_at_home() {
             number(&told, "unserved_passes") > 0.0 && number(&told, "makespan_s") <= 200.0 + 1e-6
         );
     }
+    // Who costs less flies as long as it can, and the dear one flies the rest.
+    let short = "[{name: 'dear', speed_mps: 15, cruise_power_w: 900}, {name: 'cheap', speed_mps: 15, cruise_power_w: 100, endurance_s: 600}]";
+    let [even, cheap] = ["time", "energy"].map(|objective| {
+        let told = dir.json(&area, short, &["--exact", "--objective", objective]);
+        assert!((number(&told, "covered_share") - 1.0).abs() < 0.002);
+        told
+    });
+    assert!(number(&cheap, "energy_wh") < 0.8 * number(&even, "energy_wh"));
+    assert!(number(&cheap["tours"][1], "time_s") <= 600.0 + 1e-6);
     let some = fleet.replacen(", cruise_power_w: 900", "", 1);
     let error = dir.error(&area, &some, &["--objective", "energy"]);
     assert!(error.contains("dear has no cruise_power_w"), "{error}");
