@@ -29,10 +29,15 @@ pub fn choose(desk: &Desk<'_>, flyers: &[Flyer], steps: usize) -> Result<Vec<Fli
         rough: false,
     };
     let whole = desk.plans(flyers, care);
-    let mut found: Vec<Flights> = match who(desk, flyers, steps / SEARCH_PART) {
-        Some(team) if team.len() < flyers.len() => desk.plans(&members(flyers, &team), care)?,
-        _ => Vec::new(),
-    };
+    let mut found: Vec<Flights> = Vec::new();
+    // Apart for each kind, so that asking for both is never worse than asking for one.
+    for desk in desk.kinds() {
+        if let Some(team) = who(&desk, flyers, steps / SEARCH_PART)
+            && team.len() < flyers.len()
+        {
+            found.extend(desk.plans(&members(flyers, &team), care)?);
+        }
+    }
     match whole {
         Ok(plans) => found.extend(plans),
         // Fewer may do what all cannot: lanes for the narrowest swath can be too many.

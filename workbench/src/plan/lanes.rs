@@ -48,6 +48,7 @@ pub struct Care {
 }
 
 /// What plans of a team are asked.
+#[derive(Clone, Copy)]
 pub struct Desk<'a> {
     /// The area.
     pub ground: &'a Ground<'a>,
@@ -62,6 +63,17 @@ pub struct Desk<'a> {
 }
 
 impl Desk<'_> {
+    /// The same question for each kind of lanes alone.
+    #[must_use]
+    pub fn kinds(&self) -> Vec<Self> {
+        match self.lanes {
+            Lanes::Best => [Lanes::Common, Lanes::Sections]
+                .map(|lanes| Self { lanes, ..*self })
+                .to_vec(),
+            Lanes::Common | Lanes::Sections => vec![*self],
+        }
+    }
+
     /// Whether one plan is better than another.
     #[must_use]
     pub fn beats(&self, a: &Flights, b: &Flights) -> bool {

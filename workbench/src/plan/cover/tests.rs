@@ -169,8 +169,11 @@ fn unlike_swaths_get_sections_with_lanes_of_their_own() {
         assert!((number(&told["tours"][1], "lane_m") - 30.0).abs() < 1e-9);
         let common = &told["compared"][0];
         assert_eq!(common["lanes"], "common");
-        assert!(number(common, "makespan_s") > 1.3 * number(&told, "makespan_s"));
+        assert!(number(common, "makespan_s") > 1.05 * number(&told, "makespan_s"));
+        // What is told of the other lanes is the best that they come to.
         let only = dir.json(&area, fleet, &[planner, "--lanes", "common"]);
+        let gap_s = number(&only, "makespan_s") - number(common, "makespan_s");
+        assert!(gap_s.abs() < 1e-6, "{gap_s}");
         assert!(only["lanes"] == "common" && only.get("compared").is_none());
     }
     // Sections are drawn.
