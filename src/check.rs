@@ -190,7 +190,11 @@ fn area_lines(spec: &Spec, total: &Summary, judged: &Judged) -> Vec<Line> {
         );
         lines.push(("missed", text));
     }
-    lines.push(("loop", format!("{:.1} km", total.loop_m / 1000.0)));
+    let lanes = match mission.task {
+        Task::Area => format!(", round the tree \"{}\"", mission.tree.name()),
+        Task::Exact | Task::Points(_) | Task::Lines(_) => String::new(),
+    };
+    lines.push(("loop", format!("{:.1} km{lanes}", total.loop_m / 1000.0)));
     lines
 }
 
@@ -308,6 +312,7 @@ fn json(
         "excursions": total.excursions,
         "uncoverable": uncoverable,
         "loop_m": total.loop_m,
+        "tree": spec.mission.tree.name(),
         "uavs": spec.uavs.len(),
         "makespan_s": total.makespan_s,
         "planners": planners,

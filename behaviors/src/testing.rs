@@ -71,6 +71,7 @@ pub fn ground(cols: u32, rows: u32, zones: Vec<Polygon>) -> (Arc<CoverageLoop>, 
         footprint_along_m: 36.0,
         tracking_error_m: 2.0,
         launch: Point::new(-30.0, -30.0),
+        tree: skein_planning::coverage::area::Tree::default(),
     };
     let coverage_loop = CoverageLoop::build(&problem).unwrap();
     let limits = RouteLimits {

@@ -50,7 +50,7 @@ pub(crate) fn turn_radius_m(airframe: &Airframe, wind: Wind, spacing_m: f64) -> 
 }
 
 /// The airspeed at which turns of a radius over the ground are flown in the wind, m/s.
-fn turning_mps(airframe: &Airframe, wind_mps: f64, radius_m: f64) -> f64 {
+pub(crate) fn turning_mps(airframe: &Airframe, wind_mps: f64, radius_m: f64) -> f64 {
     if wind_mps <= 0.0 {
         return airframe.cruise_mps;
     }
@@ -58,7 +58,7 @@ fn turning_mps(airframe: &Airframe, wind_mps: f64, radius_m: f64) -> f64 {
     wanted.max(airframe.least_airspeed_mps())
 }
 
-pub(crate) fn airspeed_mps(u: &UavSpec, spec: &Spec) -> f64 {
+fn airspeed_mps(u: &UavSpec, spec: &Spec) -> f64 {
     let radius_m = f64::from(spec.mission.turn_radius_mm) / 1000.0;
     turning_mps(&u.airframe, spec.wind.speed_mps(), radius_m)
 }

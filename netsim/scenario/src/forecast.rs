@@ -3,18 +3,17 @@
 //!
 //! Leaves to others: laying the loop, and what is worth a warning (`feasibility`).
 
-use crate::air::airspeed_mps;
 use crate::error::ScenarioError;
 use crate::feasibility::summary;
 use crate::resolve::{Overrides, Scenario, bounds};
-use skein_netsim::spec::{Spec, UavSpec};
+use crate::tree::loop_energy_s;
+use skein_netsim::spec::Spec;
 use skein_peer::Task;
 use skein_peer::mission::point_m;
 use skein_peer::plan::Ground;
-use skein_planning::coverage::area::stc::{CoverageLoop, Direction};
+use skein_planning::airframe::Airframe;
 use skein_planning::frame::Point;
 use skein_planning::geometry::Polygon;
-use skein_planning::trajectory::timed::Trajectory;
 
 /// Samples along one lane: a point in 36 of a cell decides a tenth of a percent of a
 /// field of 28 cells.
@@ -82,18 +81,15 @@ pub fn forecast(scenario: &Scenario) -> Option<Forecast> {
     let (spec, ground) = (&scenario.spec, &*scenario.ground);
     let planner = AreaPlanner::of(&spec.mission.task)?;
     let total = summary(spec, ground);
-    let energies: Option<Vec<f64>> = spec
-        .uavs
-        .iter()
-        .map(|u| energy_s(u, spec, &ground.coverage_loop))
-        .collect();
-    let mean = |all: Vec<f64>| all.iter().sum::<f64>() / all.len().max(1) as f64;
+    let airframes: Vec<Airframe> = spec.uavs.iter().map(|u| u.airframe).collect();
+    let radius_m = f64::from(spec.mission.turn_radius_mm) / 1000.0;
+    let the_loop = &ground.coverage_loop;
     Some(Forecast {
         planner,
         makespan_s: total.makespan_s,
         seen_share: seen_share(spec, ground),
         loop_m: total.loop_m,
-        energy_s: energies.map(mean),
+        energy_s: loop_energy_s(the_loop, &airframes, spec.wind, radius_m),
     })
 }
 
@@ -121,17 +117,6 @@ pub fn side_by_side(
         told.transpose().map(|told| (planner, told))
     });
     told.into_iter().flatten().collect()
-}
-
-/// Energy of one UAV along the whole loop, in seconds of its cruise.
-fn energy_s(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Option<f64> {
-    let airspeed_mps = airspeed_mps(u, spec);
-    let one = |i: usize| {
-        let curve = the_loop.curve(i, Direction::Forward);
-        let flown = Trajectory::along(&curve, airspeed_mps, spec.wind).ok()?;
-        Some(flown.energy_s(&u.airframe))
-    };
-    (0..the_loop.len()).map(one).sum()
 }
 
 /// Share of the area's points that lie in a piece of the loop which the mission sees.

@@ -22,6 +22,7 @@ mod forecast;
 mod resolve;
 mod task;
 mod terrain;
+mod tree;
 
 pub use builtin::{
     DEFAULT, files as builtin_files, load_builtin, names as builtin_names, text as builtin_text,

@@ -10,6 +10,7 @@ use crate::files::Files;
 use crate::fleet::{self, Fleet, word};
 use crate::forecast::AreaPlanner;
 use crate::terrain::{self, MAX_HEIGHT_M, Notices, Terrain, position};
+use crate::tree;
 use skein_netsim::spec::{GroundSpec, RadioSpec, Spec, UavSpec};
 use skein_peer::mission::{PointMm, mm};
 use skein_peer::plan::Ground;
@@ -142,6 +143,12 @@ fn resolve(
     check_size(&f, &mission, &terrain.area)?;
     check_places(&f, &mission, &terrain, &fleet)?;
     let ground = common_ground(root, &mission)?;
+    let (mission, ground) = if tree::is_open(&f)? {
+        let airframes: Vec<_> = fleet.members.iter().map(|m| m.airframe).collect();
+        tree::cheapest(mission, ground, &airframes, wind)
+    } else {
+        (mission, ground)
+    };
     let uavs = launch(&fleet, &ground);
     let radio = radio(f.need("radio", "{ range_m: 500, rate_bps: 64000 }")?)?;
     let peers: BTreeSet<u16> = uavs.iter().map(|u| u.id).chain(ground_id).collect();
@@ -317,11 +324,7 @@ fn mission(
     ground: Option<&GroundSpec>,
     wind: Wind,
 ) -> Result<Mission, ScenarioError> {
-    let lanes = f.need("lanes", "{ spacing_m: 48 }")?.fields(&[
-        "spacing_m",
-        "clearance_m",
-        "tracking_error_m",
-    ])?;
+    let lanes = f.need("lanes", "{ spacing_m: 48 }")?.fields(tree::LANES)?;
     let spacing_m = lanes
         .need("spacing_m", "48")?
         .number(2.0, 5000.0, "metres")?;
@@ -373,6 +376,7 @@ fn mission(
         task: t.task.clone(),
         lap: 0,
         further_laps: laps(f, t)? - 1,
+        tree: tree::stated(&lanes)?.unwrap_or_default(),
     })
 }
 
@@ -417,11 +421,7 @@ fn check_size(f: &Fields<'_>, mission: &Mission, area: &Polygon) -> Result<(), S
     // Cells are named by 16-bit columns and rows.
     let farthest = low.coords.abs().max().max(high.coords.abs().max()) / spacing_m;
     if cells > MAX_BOX_CELLS || farthest > 32_000.0 {
-        let lanes = f.need("lanes", "{ spacing_m: 48 }")?.fields(&[
-            "spacing_m",
-            "clearance_m",
-            "tracking_error_m",
-        ])?;
+        let lanes = f.need("lanes", "{ spacing_m: 48 }")?.fields(tree::LANES)?;
         return Err(lanes.need("spacing_m", "48")?.wrong(format!(
             "an area of {:.0} x {:.0} m has too many cells of {spacing_m} m; a mission may have 65,535: widen the lanes or shrink the area",
             high.x - low.x,

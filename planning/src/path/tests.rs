@@ -161,6 +161,7 @@ fn a_launch_behind_a_large_zone_is_not_cut_off() {
         footprint_along_m: 36.0,
         tracking_error_m: 2.0,
         launch: Point::new(200.0, -400.0),
+        tree: crate::coverage::area::Tree::default(),
     };
     let coverage_loop = CoverageLoop::build(&problem).unwrap();
     assert_eq!(coverage_loop.len(), 32);

@@ -5,7 +5,7 @@ use crate::task::Task;
 use crate::wire::message::MissionChunk;
 use serde::{Deserialize, Serialize};
 use skein_planning::coverage::area::patch::Corners;
-use skein_planning::coverage::area::{AreaProblem, CoverageLoop, LoopError};
+use skein_planning::coverage::area::{AreaProblem, CoverageLoop, LoopError, Tree};
 use skein_planning::coverage::exact::{self, ExactProblem};
 use skein_planning::coverage::stations::{self, StationsProblem};
 use skein_planning::frame::Point;
@@ -56,6 +56,10 @@ pub struct Mission {
     /// How many more times everything is to be seen after this one.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub further_laps: u16,
+    /// Which spanning tree the lanes of an area follow: whoever makes the mission knows
+    /// the wind and chooses.
+    #[serde(default, skip_serializing_if = "Tree::is_default")]
+    pub tree: Tree,
 }
 
 #[allow(
@@ -120,6 +124,11 @@ impl Mission {
         }
         ring(&mut h, &[self.launch, self.base]);
         self.task.hash(&mut h);
+        if !self.tree.is_default() {
+            for letter in self.tree.name().bytes() {
+                h.write_i64(i64::from(letter));
+            }
+        }
         if self.lap > 0 || self.further_laps > 0 {
             h.write_i64(i64::from(self.lap));
             h.write_i64(i64::from(self.further_laps));
@@ -170,6 +179,7 @@ impl Mission {
             footprint_along_m: metres(self.footprint_along_mm),
             tracking_error_m: metres(self.tracking_error_mm),
             launch: point_m(self.launch),
+            tree: self.tree,
         };
         let coverage_loop = self.the_loop(&problem).map_err(|e| e.to_string())?;
         let limits = RouteLimits {
@@ -340,6 +350,7 @@ mod tests {
             task: Task::Area,
             lap: 0,
             further_laps: 0,
+            tree: Tree::default(),
         }
     }
 

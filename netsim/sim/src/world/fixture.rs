@@ -158,6 +158,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         task: skein_peer::Task::Area,
         lap: 0,
         further_laps: 0,
+        tree: skein_planning::coverage::area::Tree::default(),
     }
 }
 

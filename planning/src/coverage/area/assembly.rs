@@ -263,6 +263,7 @@ pub(in crate::coverage) fn hash_of(patches: u64, cells: &[LoopCell]) -> u64 {
 mod tests {
     use super::super::patch::footprint_contains;
     use super::super::stc::CoverageLoop;
+    use super::super::tree::Tree;
     use super::*;
     use crate::geometry::NoFlyZones;
     use crate::math::wrap_pi;
@@ -290,6 +291,7 @@ mod tests {
             footprint_along_m: 36.0,
             tracking_error_m: 2.0,
             launch: Point::new(-20.0, -20.0),
+            tree: Tree::default(),
         }
     }
 
@@ -358,6 +360,31 @@ mod tests {
             );
             assert_eq!(l.hash(), CoverageLoop::build(&p).unwrap().hash());
         }
+    }
+
+    #[test]
+    fn every_tree_gives_a_loop_over_the_same_cells() {
+        let plain = CoverageLoop::build(&city()).unwrap();
+        let cells = |l: &CoverageLoop| {
+            let mut ids: Vec<CellId> = l.cells().iter().map(|c| c.id).collect();
+            ids.sort_unstable();
+            ids
+        };
+        let mut turns = Vec::new();
+        for tree in Tree::ALL {
+            let p = AreaProblem { tree, ..city() };
+            let l = CoverageLoop::build(&p).unwrap();
+            judge(&p, &l);
+            assert_eq!(cells(&l), cells(&plain), "{tree:?}");
+            let bent = l
+                .cells()
+                .iter()
+                .filter(|c| c.curve.max_curvature_per_m() > 0.0);
+            turns.push(bent.count());
+        }
+        // 1,056 m from west to east, 960 m from south to north.
+        assert_eq!(turns[0], turns[1]);
+        assert!(turns[0] < turns[2], "{turns:?}");
     }
 
     #[test]

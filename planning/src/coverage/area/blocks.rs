@@ -5,6 +5,7 @@
 
 use super::grid::{CellId, Grid};
 use super::stc::AreaProblem;
+use super::tree::{Tree, depth_first};
 use crate::frame::{Point, Pose};
 use crate::math::{FRAC_PI_2, PI};
 use crate::trajectory::Curve;
@@ -115,7 +116,7 @@ pub(super) fn closed_loop(
         .filter(|&b| is_free(problem, grid, b))
         .collect();
     let component = best_component(&free, needed);
-    let links = spanning_tree(&component);
+    let links = spanning_tree(&component, problem.tree);
     circumnavigate(&component, &links, grid)
 }
 
@@ -224,16 +225,39 @@ fn best_component(free: &[Block], needed: &BTreeSet<CellId>) -> BTreeSet<Block> 
 }
 
 /// Links of a spanning tree, as (block, side) from both ends.
-///
-/// Long rows along the component's longer direction, joined as far to one end as
-/// possible: few corners, so few turns. Weights are all different, so the tree
-/// is the only least one.
-fn spanning_tree(component: &BTreeSet<Block>) -> BTreeSet<(Block, usize)> {
+fn spanning_tree(component: &BTreeSet<Block>, tree: Tree) -> BTreeSet<(Block, usize)> {
     let span = |value: fn(&Block) -> i32| {
         let low = component.iter().map(value).min().unwrap_or(0);
         component.iter().map(value).max().unwrap_or(0) - low
     };
-    let rows_run_east = span(|b| b.col) >= span(|b| b.row);
+    let edges = match tree {
+        Tree::Longer => least(component, span(|b| b.col) >= span(|b| b.row)),
+        Tree::East => least(component, true),
+        Tree::North => least(component, false),
+        Tree::DepthFirst => {
+            let places = component.iter().map(|b| (b.col, b.row)).collect();
+            let block = |(col, row)| Block { col, row };
+            let edges = depth_first(&places).into_iter();
+            edges.map(|[a, b]| (block(a), block(b))).collect()
+        }
+    };
+    let mut links = BTreeSet::new();
+    for (a, b) in edges {
+        for (from, to) in [(a, b), (b, a)] {
+            for side in [East, North, West, South] {
+                if from.next(side) == to {
+                    links.insert((from, side as usize));
+                }
+            }
+        }
+    }
+    links
+}
+
+/// The least spanning tree: long rows in one direction, joined as far to one end as
+/// possible: few corners, so few turns. Weights are all different, so that it is the
+/// only one.
+fn least(component: &BTreeSet<Block>, rows_run_east: bool) -> Vec<(Block, Block)> {
     let mut graph: UnGraph<Block, (bool, i32, i32)> = UnGraph::new_undirected();
     let nodes: BTreeMap<Block, _> = component.iter().map(|&b| (b, graph.add_node(b))).collect();
     for (&b, &i) in &nodes {
@@ -250,18 +274,8 @@ fn spanning_tree(component: &BTreeSet<Block>) -> BTreeSet<(Block, usize)> {
         }
     }
     let tree: UnGraph<Block, (bool, i32, i32)> = UnGraph::from_elements(min_spanning_tree(&graph));
-    let mut links = BTreeSet::new();
-    for edge in tree.raw_edges() {
-        let (a, b) = (tree[edge.source()], tree[edge.target()]);
-        for (from, to) in [(a, b), (b, a)] {
-            for side in [East, North, West, South] {
-                if from.next(side) == to {
-                    links.insert((from, side as usize));
-                }
-            }
-        }
-    }
-    links
+    let ends = |e: &petgraph::graph::Edge<_>| (tree[e.source()], tree[e.target()]);
+    tree.raw_edges().iter().map(ends).collect()
 }
 
 /// Walks round the tree, keeping it on the left, through every cell once.

@@ -11,7 +11,9 @@ pub mod grid;
 pub mod patch;
 mod shares;
 pub mod stc;
+mod tree;
 
 pub(super) use assembly::{check_figures, check_launch, hash_of, hash_words, millimetres};
 pub use grid::{CellId, Grid};
 pub use stc::{AreaProblem, CoverageLoop, Direction, LoopCell, LoopError};
+pub use tree::Tree;

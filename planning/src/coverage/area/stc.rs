@@ -12,6 +12,7 @@ use super::assembly::{Assembly, cells_of, check, hash_of};
 use super::blocks::closed_loop;
 use super::grid::{CellId, Grid};
 use super::patch::Patches;
+use super::tree::Tree;
 use crate::coverage::exact::ExactError;
 use crate::frame::{Point, Pose};
 use crate::geometry::{NoFlyZones, Polygon};
@@ -62,6 +63,8 @@ pub struct AreaProblem {
     pub tracking_error_m: f64,
     /// A point from which the loop must be reachable (a launch point).
     pub launch: Point,
+    /// Which spanning tree the loop goes round.
+    pub tree: Tree,
 }
 
 /// One cell of the loop.

@@ -24,6 +24,7 @@ fn flown(zones: Vec<Polygon>) -> AreaProblem {
         footprint_along_m: 45.0,
         tracking_error_m: 3.0,
         launch: Point::new(-200.0, -200.0),
+        tree: crate::coverage::area::Tree::default(),
     }
 }
 
