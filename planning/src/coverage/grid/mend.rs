@@ -10,6 +10,7 @@
 //! Left to others: the loop ([`super::spanning`]), and the cells that find no other.
 
 use super::map::{Cell, LaneMap, NOWHERE};
+use super::spanning::detour;
 
 /// Places that one cell is shifted to before it is given up: most that find another do so
 /// within twenty, and a search costs a few microseconds.
@@ -173,11 +174,7 @@ impl<'a, F: Fn(Cell, Cell) -> bool> Mender<'a, F> {
             if !self.linked(x, u) || !self.linked(y, v) {
                 continue;
             }
-            let (from, to, first, second) = if self.next[u as usize] == v {
-                (u, v, x, y)
-            } else if self.next[v as usize] == u {
-                (v, u, y, x)
-            } else {
+            let Some([from, first, second, to]) = detour(self.next, (u, v), (x, y)) else {
                 continue;
             };
             self.link(from, first);

@@ -139,6 +139,22 @@ pub fn best_offset(map: &LaneMap) -> (u32, u32) {
     OFFSETS[best]
 }
 
+/// The loop's edge between `u` and `v`, whichever way it is flown, led over `x` beside
+/// `u` and `y` beside `v`: the four cells in order of flight, if there is that edge.
+pub(super) fn detour(
+    next: &[Cell],
+    (u, v): (Cell, Cell),
+    (x, y): (Cell, Cell),
+) -> Option<[Cell; 4]> {
+    if next[u as usize] == v {
+        Some([u, x, y, v])
+    } else if next[v as usize] == u {
+        Some([v, y, x, u])
+    } else {
+        None
+    }
+}
+
 /// Tree edges of a block, one bit a side.
 const EAST: u8 = 1;
 const SOUTH: u8 = 2;
@@ -386,11 +402,7 @@ impl<'a, F: Fn(Cell, Cell) -> bool> Builder<'a, F> {
                 if mine.is_some_and(|mine| !mine[u as usize]) {
                     continue;
                 }
-                let (from, to, first, second) = if self.next[u as usize] == v {
-                    (u, v, x, y)
-                } else if self.next[v as usize] == u {
-                    (v, u, y, x)
-                } else {
+                let Some([from, first, second, to]) = detour(&self.next, (u, v), (x, y)) else {
                     continue;
                 };
                 self.next[from as usize] = first;
