@@ -334,7 +334,7 @@ pub fn plan(problem: &ExactProblem) -> Result<ExactPlan, ExactError> {
     let lines = lines(&layout.passes);
     let alone = [Surveyor::at(2 * n)];
     let costs = Matrix::of(2 * n + 1, &guess);
-    let found = line::plan(&lines, &alone, &costs, problem.steps)?;
+    let found = line::plan_passes(&lines, &alone, &costs, problem.steps)?;
     let order: Vec<line::Pass> = found.tours.into_iter().flat_map(|t| t.passes).collect();
     let length_m = line::tour_cost(&order, &lines, 2 * n, &places);
     let passes = in_order(&layout.passes, &order);

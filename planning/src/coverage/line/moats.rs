@@ -67,8 +67,17 @@ struct Ascent<'a, M> {
     moats: Vec<Moat>,
 }
 
+/// How thoroughly parts are joined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Joining {
+    /// In the cheapest way at hand; the bound is that of the pairing.
+    Simple,
+    /// Against a bound that moats raise.
+    Proven,
+}
+
 /// Joins the parts of `graph`, whose cheapest pairing is `pairs`.
-pub(super) fn join<M: Metric>(graph: &Graph<'_, M>, pairs: Deadheads) -> Joined {
+pub(super) fn join<M: Metric>(graph: &Graph<'_, M>, pairs: Deadheads, how: Joining) -> Joined {
     let simple = |deadheads: &Deadheads| -> f64 {
         let costs = deadheads.iter().map(|&(a, b)| graph.cost(a, b));
         costs.sum()
@@ -80,6 +89,9 @@ pub(super) fn join<M: Metric>(graph: &Graph<'_, M>, pairs: Deadheads) -> Joined 
     graph.join_parts(&mut best.deadheads);
     let mut cost = simple(&best.deadheads);
     if best.deadheads.len() == pairs.len() && cost <= best.bound * (1.0 + 1e-12) {
+        return best;
+    }
+    if how == Joining::Simple {
         return best;
     }
     let Some(mut ascent) = Ascent::new(graph, &pairs) else {

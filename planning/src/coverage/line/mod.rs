@@ -51,6 +51,7 @@ pub(super) use network::Parts;
 pub use network::{Line, LineError, LinePlan, LineTour, Pass, Surveyor, tour_cost};
 
 use crate::coverage::metric::Metric;
+use moats::Joining;
 
 /// Steps of improvement that a mission uses unless it says otherwise: about a third of a
 /// second for the roads of a square kilometre.
@@ -91,12 +92,36 @@ pub fn plan(
     metric: &impl Metric,
     steps: usize,
 ) -> Result<LinePlan, LineError> {
+    planned(lines, team, metric, steps, Joining::Proven)
+}
+
+/// As [`plan`], for passes over an area, which all lie apart: they are joined in the
+/// cheapest way at hand, and the local search does the rest. `lower_bound` is weaker.
+///
+/// # Errors
+/// As [`plan`].
+pub(super) fn plan_passes(
+    lines: &[Line],
+    team: &[Surveyor],
+    metric: &impl Metric,
+    steps: usize,
+) -> Result<LinePlan, LineError> {
+    planned(lines, team, metric, steps, Joining::Simple)
+}
+
+fn planned(
+    lines: &[Line],
+    team: &[Surveyor],
+    metric: &impl Metric,
+    steps: usize,
+    how: Joining,
+) -> Result<LinePlan, LineError> {
     network::check(lines, team)?;
     let all: Vec<usize> = (0..lines.len()).collect();
     // One UAV flies the tour as it is; several begin from different walks of it.
     let starts = if team.len() == 1 { 1 } else { STARTS };
     let depots: Vec<usize> = team.iter().map(|u| u.depot).collect();
-    let found = postman::solve(lines, &all, &depots, metric, starts);
+    let found = postman::solve(lines, &all, &depots, metric, starts, how);
     let lower_bound = bound::makespan(lines, team, metric, found.bound);
     improved(lines, team, metric, steps, lower_bound, found.tours)
 }

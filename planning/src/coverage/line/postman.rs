@@ -4,7 +4,7 @@
 //! walk the result. Leaves several tours to `split` and `improve`.
 
 use super::matching::pair_up;
-use super::moats;
+use super::moats::{self, Joining};
 use super::network::{Line, Parts, Pass};
 use crate::coverage::dice::Dice;
 use crate::coverage::metric::Metric;
@@ -63,17 +63,18 @@ pub(super) fn solve(
     depots: &[usize],
     metric: &impl Metric,
     count: usize,
+    how: Joining,
 ) -> Found {
     let mut apart = depots.to_vec();
     apart.sort_unstable();
     apart.dedup();
     let first: Vec<usize> = depots.iter().copied().take(1).collect();
     let graph = Graph::new(lines, chosen, &first, metric);
-    let joined = moats::join(&graph, graph.pairs());
+    let joined = moats::join(&graph, graph.pairs(), how);
     let bound = if apart.len() > 1 {
         // Several depots join for nothing what hangs on them.
         let graph = Graph::new(lines, chosen, &apart, metric);
-        moats::join(&graph, graph.pairs()).bound
+        moats::join(&graph, graph.pairs(), how).bound
     } else {
         joined.bound
     };
