@@ -143,7 +143,7 @@ fn resolve(
     check_size(&f, &mission, &terrain.area)?;
     check_places(&f, &mission, &terrain, &fleet)?;
     let ground = common_ground(root, &mission)?;
-    let (mission, ground) = if tree::is_open(&f)? {
+    let (mission, ground) = if tree::stated(&tree::lanes(&f)?)?.is_none() {
         let airframes: Vec<_> = fleet.members.iter().map(|m| m.airframe).collect();
         tree::cheapest(mission, ground, &airframes, wind)
     } else {
@@ -324,7 +324,7 @@ fn mission(
     ground: Option<&GroundSpec>,
     wind: Wind,
 ) -> Result<Mission, ScenarioError> {
-    let lanes = f.need("lanes", "{ spacing_m: 48 }")?.fields(tree::LANES)?;
+    let lanes = tree::lanes(f)?;
     let spacing_m = lanes
         .need("spacing_m", "48")?
         .number(2.0, 5000.0, "metres")?;
@@ -421,7 +421,7 @@ fn check_size(f: &Fields<'_>, mission: &Mission, area: &Polygon) -> Result<(), S
     // Cells are named by 16-bit columns and rows.
     let farthest = low.coords.abs().max().max(high.coords.abs().max()) / spacing_m;
     if cells > MAX_BOX_CELLS || farthest > 32_000.0 {
-        let lanes = f.need("lanes", "{ spacing_m: 48 }")?.fields(tree::LANES)?;
+        let lanes = tree::lanes(f)?;
         return Err(lanes.need("spacing_m", "48")?.wrong(format!(
             "an area of {:.0} x {:.0} m has too many cells of {spacing_m} m; a mission may have 65,535: widen the lanes or shrink the area",
             high.x - low.x,

@@ -20,7 +20,15 @@ use std::sync::Arc;
 /// those of excursions, and a mission should not change its lanes for them.
 const WORTH: f64 = 0.01;
 
-/// The tree that `lanes` names, if any.
+/// The fields of `lanes`.
+const LANES: &[&str] = &["spacing_m", "clearance_m", "tracking_error_m", "tree"];
+
+/// What a scenario says of its lanes.
+pub(crate) fn lanes<'a>(f: &Fields<'a>) -> Result<Fields<'a>, ScenarioError> {
+    f.need("lanes", "{ spacing_m: 48 }")?.fields(LANES)
+}
+
+/// The tree that `lanes` names; none when the scenario leaves it open.
 pub(crate) fn stated(lanes: &Fields<'_>) -> Result<Option<Tree>, ScenarioError> {
     let Some(node) = lanes.get("tree") else {
         return Ok(None);
@@ -44,15 +52,6 @@ fn unknown(node: &Node<'_>, name: &str) -> ScenarioError {
     ))
 }
 
-/// Whether the scenario leaves it open.
-pub(crate) fn is_open(f: &Fields<'_>) -> Result<bool, ScenarioError> {
-    let lanes = f.need("lanes", "{ spacing_m: 48 }")?.fields(LANES)?;
-    Ok(stated(&lanes)?.is_none())
-}
-
-/// The fields of `lanes`.
-pub(crate) const LANES: &[&str] = &["spacing_m", "clearance_m", "tracking_error_m", "tree"];
-
 /// The mission with the tree whose loop takes the least energy, and its ground; as it is
 /// for missions without lanes of a tree.
 pub(crate) fn cheapest(
@@ -74,20 +73,31 @@ pub(crate) fn cheapest(
     let Some(own) = energy(&ground) else {
         return (mission, ground);
     };
-    let mut best = (own.0, own.1 * (1.0 - WORTH), mission, ground);
-    for tree in [Tree::East, Tree::North] {
-        let other = Arc::new(Mission {
-            tree,
-            ..(*best.2).clone()
-        });
-        if let Ok(ground) = other.ground()
-            && let Some((unseen, energy_s)) = energy(&ground)
-            && (unseen, energy_s) < (best.0, best.1)
+    // The mission's own tree is one of the two; only the other one is built.
+    let tree = if runs_east(&ground.coverage_loop) {
+        Tree::North
+    } else {
+        Tree::East
+    };
+    let other = Arc::new(Mission {
+        tree,
+        ..(*mission).clone()
+    });
+    match other.ground() {
+        Ok(across)
+            if energy(&across)
+                .is_some_and(|(unseen, s)| (unseen, s) < (own.0, own.1 * (1.0 - WORTH))) =>
         {
-            best = (unseen, energy_s, other, ground);
+            (other, across)
         }
+        _ => (mission, ground),
     }
-    (best.2, best.3)
+}
+
+/// Whether more of a loop runs east and west than north and south.
+fn runs_east(the_loop: &CoverageLoop) -> bool {
+    let headings = (0..the_loop.len()).map(|i| the_loop.boundary(i).direction());
+    headings.map(|d| d.x.abs() - d.y.abs()).sum::<f64>() >= 0.0
 }
 
 /// Energy to fly a loop once, in seconds of level cruise, averaged over airframes and

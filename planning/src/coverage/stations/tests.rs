@@ -213,7 +213,7 @@ proptest! {
     ) {
         let zones = houses.iter().map(|&(x, y, w, h)| rectangle(x, y, x + w, y + h)).collect();
         let flown = flown(zones);
-    let p = StationsProblem::of_targets(&flown, &points(&at));
+        let p = StationsProblem::of_targets(&flown, &points(&at));
         match build(&p) {
             Ok(l) => judge(&p, &l),
             Err(e) => prop_assert!(matches!(e, LoopError::Nothing | LoopError::CutOff), "{e}"),

@@ -162,8 +162,9 @@ impl Known {
     /// An old heartbeat of this life that goes beyond a fresh one: nobody's heart counts
     /// backwards, so the life was begun anew.
     pub(super) fn note_beaten(&mut self, heard: Heartbeat) {
-        let before = self.beaten_before.map_or(self.freshest.count, |h| h.count);
-        if heard.count > before.max(self.freshest.count) {
+        // What was noted before goes beyond the fresh one itself.
+        let most = self.beaten_before.map_or(self.freshest.count, |h| h.count);
+        if heard.count > most {
             self.beaten_before = Some(heard);
         }
     }
