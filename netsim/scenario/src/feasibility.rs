@@ -1,8 +1,8 @@
 //! Whether a scenario can succeed at all: turn radius, footprint, endurance, zones,
 //! faults. Estimates only; the world decides.
 
-use crate::air::{Pace, return_s, too_windy};
 use crate::error::{Finding, Severity};
+use crate::flight_model::{Pace, return_s, too_windy};
 use crate::resolve::bounds;
 use skein_netsim::chaos::Fault;
 use skein_netsim::spec::{Spec, UavSpec};

@@ -3,10 +3,10 @@
 //!
 //! Leaves to others: laying the loop, and what is worth a warning (`feasibility`).
 
+use crate::choose_tree::loop_energy_s;
 use crate::error::ScenarioError;
 use crate::feasibility::summary;
 use crate::resolve::{Overrides, Scenario, bounds};
-use crate::tree::loop_energy_s;
 use skein_netsim::spec::Spec;
 use skein_peer::Task;
 use skein_peer::mission::point_m;

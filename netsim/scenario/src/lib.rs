@@ -10,28 +10,25 @@
 //! assert_eq!(spec.uavs.len(), 8);
 //! ```
 
-mod air;
 mod builtin;
+mod choose_tree;
 mod document;
 mod error;
-mod faults;
 mod feasibility;
 mod files;
-mod fleet;
+mod flight_model;
 mod forecast;
+mod read;
 mod resolve;
-mod task;
-mod terrain;
-mod tree;
 
 pub use builtin::{
     DEFAULT, files as builtin_files, load_builtin, names as builtin_names, text as builtin_text,
 };
 pub use error::{Finding, Place, ScenarioError, Severity};
-pub use faults::{chaos_plan, load_chaos_plan};
 pub use feasibility::{Summary, extent_m, feasibility, summary};
 pub use files::Files;
 pub use forecast::{AreaPlanner, Forecast, forecast, side_by_side};
+pub use read::faults::{chaos_plan, load_chaos_plan};
 pub use resolve::{Overrides, Scenario, parse_with};
 
 use skein_netsim::spec::Spec;

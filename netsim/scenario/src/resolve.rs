@@ -1,16 +1,16 @@
 //! From a scenario's text to a [`Spec`] with nothing left open: mission, fleet on
 //! its loop, radio, faults. Leaves judging whether it can succeed to `feasibility`.
 
-use crate::air;
+use crate::choose_tree;
 use crate::document::{Document, Fields, Node};
 use crate::error::{Finding, ScenarioError, Severity};
-use crate::faults::{self, Known, permille};
 use crate::feasibility::{self, loop_trouble};
 use crate::files::Files;
-use crate::fleet::{self, Fleet, word};
+use crate::flight_model;
 use crate::forecast::AreaPlanner;
-use crate::terrain::{self, MAX_HEIGHT_M, Notices, Terrain, position};
-use crate::tree;
+use crate::read::faults::{self, Known, permille};
+use crate::read::fleet::{self, Fleet, word};
+use crate::read::terrain::{self, MAX_HEIGHT_M, Notices, Terrain, position};
 use skein_netsim::spec::{GroundSpec, RadioSpec, Spec, UavSpec};
 use skein_peer::mission::{PointMm, mm};
 use skein_peer::plan::Ground;
@@ -138,14 +138,14 @@ fn resolve(
     let ground_spec = f.get("ground").map(ground_station).transpose()?;
     let ground_id = ground_spec.as_ref().map(|g| g.id);
     let fleet = the_fleet(&f, &name, terrain.level_m, ground_id, over)?;
-    let wind = f.get("wind").map_or(Ok(Wind::CALM), air::wind)?;
+    let wind = f.get("wind").map_or(Ok(Wind::CALM), flight_model::wind)?;
     let mission = Arc::new(mission(&f, &terrain, &fleet, ground_spec.as_ref(), wind)?);
     check_size(&f, &mission, &terrain.area)?;
     check_places(&f, &mission, &terrain, &fleet)?;
     let ground = common_ground(root, &mission)?;
-    let (mission, ground) = if tree::stated(&tree::lanes(&f)?)?.is_none() {
+    let (mission, ground) = if choose_tree::stated(&choose_tree::lanes(&f)?)?.is_none() {
         let airframes: Vec<_> = fleet.members.iter().map(|m| m.airframe).collect();
-        tree::cheapest(mission, ground, &airframes, wind)
+        choose_tree::cheapest(mission, ground, &airframes, wind)
     } else {
         (mission, ground)
     };
@@ -174,7 +174,7 @@ fn resolve(
         wind,
         objective: f
             .get("objective")
-            .map_or(Ok(Objective::Time), air::objective)?,
+            .map_or(Ok(Objective::Time), flight_model::objective)?,
         radio,
         beacon_period_ms,
         percept_period_ms: f.whole_or("percept_period_ms", 200, 20, 1000, "milliseconds")?,
@@ -324,7 +324,7 @@ fn mission(
     ground: Option<&GroundSpec>,
     wind: Wind,
 ) -> Result<Mission, ScenarioError> {
-    let lanes = tree::lanes(f)?;
+    let lanes = choose_tree::lanes(f)?;
     let spacing_m = lanes
         .need("spacing_m", "48")?
         .number(2.0, 5000.0, "metres")?;
@@ -339,7 +339,7 @@ fn mission(
         )));
     }
     let turn_m = airframes()
-        .map(|a| air::turn_radius_m(a, wind, spacing_m))
+        .map(|a| flight_model::turn_radius_m(a, wind, spacing_m))
         .fold(turn_m, f64::max);
     // An airframe without its computer circles where it is, within two radii.
     let clearance_m =
@@ -356,7 +356,7 @@ fn mission(
         .and_then(|m| m.launch)
         .map_or(base, |l| l.position());
     let seen = |side: fn((f64, f64)) -> f64| {
-        let each = airframes().map(|a| side(air::footprint_m(a, wind, turn_m)));
+        let each = airframes().map(|a| side(flight_model::footprint_m(a, wind, turn_m)));
         each.fold(f64::MAX, f64::min)
     };
     Ok(Mission {
@@ -376,7 +376,7 @@ fn mission(
         task: t.task.clone(),
         lap: 0,
         further_laps: laps(f, t)? - 1,
-        tree: tree::stated(&lanes)?.unwrap_or_default(),
+        tree: choose_tree::stated(&lanes)?.unwrap_or_default(),
     })
 }
 
@@ -421,7 +421,7 @@ fn check_size(f: &Fields<'_>, mission: &Mission, area: &Polygon) -> Result<(), S
     // Cells are named by 16-bit columns and rows.
     let farthest = low.coords.abs().max().max(high.coords.abs().max()) / spacing_m;
     if cells > MAX_BOX_CELLS || farthest > 32_000.0 {
-        let lanes = tree::lanes(f)?;
+        let lanes = choose_tree::lanes(f)?;
         return Err(lanes.need("spacing_m", "48")?.wrong(format!(
             "an area of {:.0} x {:.0} m has too many cells of {spacing_m} m; a mission may have 65,535: widen the lanes or shrink the area",
             high.x - low.x,

@@ -112,7 +112,7 @@ impl Pace {
             return Self {
                 loop_mps: v,
                 least_mps: v,
-                turn_s: super::feasibility::TURN_ROUND_RADII * radius_m / v,
+                turn_s: crate::feasibility::TURN_ROUND_RADII * radius_m / v,
             };
         }
         let uav = Performance::of(&u.airframe, v);

@@ -5,7 +5,7 @@ use crate::document::{Fields, Node};
 use crate::error::ScenarioError;
 use crate::files::Files;
 use crate::forecast::AreaPlanner;
-use crate::terrain::{Notices, position};
+use crate::read::terrain::{Notices, position};
 use skein_interop::place::{LatLon, to_plane};
 use skein_interop::targets;
 use skein_peer::Task;

@@ -3,8 +3,8 @@
 
 use crate::document::{Fields, Node, suggestion};
 use crate::error::ScenarioError;
+use crate::read::terrain::{MAX_HEIGHT_M, position};
 use crate::resolve::Overrides;
-use crate::terrain::{MAX_HEIGHT_M, position};
 use skein_planning::airframe::Airframe;
 use skein_planning::frame::Pose;
 use skein_planning::math::{FRAC_PI_2, tan, wrap_pi};

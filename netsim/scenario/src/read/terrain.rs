@@ -4,7 +4,7 @@
 use crate::document::{Fields, Node};
 use crate::error::ScenarioError;
 use crate::files::Files;
-use crate::task;
+use crate::read::targets;
 use skein_interop::geojson::{self, HeightRules};
 use skein_interop::place::{LatLon, Shape, Side, circle_ring, to_plane};
 use skein_interop::plan;
@@ -150,10 +150,10 @@ impl Reader<'_> {
                 Some(self.area(f.need("area", example)?, notices)?)
             }
         };
-        let task = task::read(f, self.files, self.origin, area.as_ref(), notices)?;
+        let task = targets::read(f, self.files, self.origin, area.as_ref(), notices)?;
         let area = match (area, targets) {
             (Some(area), _) => area,
-            (None, node) => task::extent(&task, node.unwrap_or(f.node()))?,
+            (None, node) => targets::extent(&task, node.unwrap_or(f.node()))?,
         };
         Ok((area, task))
     }

@@ -5,9 +5,9 @@
 //! what the wind costs (lanes across it are sooner flown than lanes along it). Peers do
 //! not choose: the mission names the tree.
 
-use crate::air::turning_mps;
 use crate::document::{Fields, Node};
 use crate::error::ScenarioError;
+use crate::flight_model::turning_mps;
 use skein_peer::mission::Mission;
 use skein_peer::plan::Ground;
 use skein_planning::airframe::Airframe;
