@@ -4,7 +4,7 @@
 //! reports on their vehicle streams; nothing here listens to the radio.
 
 use crate::verdict::{KillVerdict, RestartVerdict, Taker};
-use skein_link::frame::RadioCounters;
+use skein_link::RadioCounters;
 use skein_peer::output::{Report, Status};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -3,7 +3,7 @@
 use crate::process::{Process, Processes};
 use crate::stream::Line;
 use skein_link::LinkState;
-use skein_link::frame::RadioCounters;
+use skein_link::RadioCounters;
 use skein_netsim::spec::{GroundSpec, Spec, UavSpec};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};

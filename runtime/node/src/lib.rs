@@ -9,6 +9,7 @@
 //! | [`clock`] | scenario time |
 //! | [`journal`] | what must not be forgotten |
 //! | [`vehicle`] | percepts up, setpoints down |
+//! | [`simulator`] | a vehicle in a simulated world |
 //! | [`drive`] | waits for one thing, makes it one input, drains the outputs |
 //!
 //! The whole lifecycle is [`run`].
@@ -20,6 +21,7 @@ pub mod drive;
 pub mod fields;
 pub mod journal;
 pub mod radio;
+pub mod simulator;
 pub mod vehicle;
 
 pub use config::{ConfigError, NodeConfig, VehicleConfig};
@@ -29,12 +31,12 @@ use clock::Clock;
 use drive::Driver;
 use journal::{Journal, JournalError};
 use radio::Radio;
+use simulator::{Simulated, StreamError};
 use skein_link::frame::ToWorld;
 use skein_peer::{Input, Peer};
 use std::net::SocketAddr;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use vehicle::NoVehicle;
-use vehicle::simulator::{Simulated, StreamError};
 
 /// Why a node did not start.
 #[derive(Debug, thiserror::Error)]

@@ -6,7 +6,7 @@
 //! [`skein_link::fate()`] as in the simulator. In flight, without a world, the air
 //! does this itself and the shim lets everything pass. It also counts.
 
-use skein_link::frame::RadioCounters;
+use skein_link::RadioCounters;
 use skein_link::{Fate, LinkState, Reason, fate};
 use skein_peer::Time;
 use std::cmp::Reverse;

@@ -3,7 +3,7 @@
 //! Frames are read as fast as they come and merged: after a pause of the process
 //! only the newest state of everything waits, never a backlog of old percepts.
 
-use super::{News, Tick, Vehicle};
+use crate::vehicle::{News, Tick, Vehicle};
 use skein_link::frame::{Decoder, FrameError, Order, ToPeer, ToWorld, encode};
 use std::collections::VecDeque;
 use std::net::SocketAddr;

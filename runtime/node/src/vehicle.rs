@@ -2,8 +2,6 @@
 //!
 //! A vehicle is a simulator's stream today; an autopilot would be another file here.
 
-pub mod simulator;
-
 use skein_behaviors::Percept;
 use skein_link::LinkState;
 use skein_link::frame::{Order, ToWorld};
