@@ -4,7 +4,7 @@ use crate::{cli, exit};
 use clap::{Args, Subcommand, ValueEnum};
 use skein_broker::control::{OrderName, Request, ask};
 use skein_broker::registry;
-use skein_netsim::chaos::{Fault, TimedFault};
+use skein_netsim::fault::{Fault, TimedFault};
 use std::path::PathBuf;
 use std::process::ExitCode;
 

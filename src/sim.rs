@@ -6,8 +6,8 @@ use crate::exit;
 use crate::planner::PlannerArgs;
 use anyhow::Context;
 use clap::Args;
-use skein_netsim::Stage;
-use skein_netsim::chaos::Fault;
+use skein_netsim::Prepared;
+use skein_netsim::fault::Fault;
 use skein_netsim::history::{Entry, What};
 use skein_netsim::summary::{self, Summary};
 use skein_netsim::swarm::Outcome;
@@ -108,13 +108,13 @@ pub fn run(args: &SimArgs) -> anyhow::Result<ExitCode> {
             return Ok(ExitCode::from(exit::CONFIG_INVALID));
         }
     };
-    fly(args, &Stage::new(scenario.spec))
+    fly(args, &Prepared::new(scenario.spec))
 }
 
-fn fly(args: &SimArgs, stage: &Stage) -> anyhow::Result<ExitCode> {
+fn fly(args: &SimArgs, prepared: &Prepared) -> anyhow::Result<ExitCode> {
     let ok = match args.seeds {
-        Some(seeds) => many(args, stage, seeds)?,
-        None => one(args, stage)?,
+        Some(seeds) => many(args, prepared, seeds)?,
+        None => one(args, prepared)?,
     };
     Ok(ExitCode::from(if ok {
         exit::OK
@@ -123,13 +123,18 @@ fn fly(args: &SimArgs, stage: &Stage) -> anyhow::Result<ExitCode> {
     }))
 }
 
-fn one(args: &SimArgs, stage: &Stage) -> anyhow::Result<bool> {
-    let seed = args.seed.unwrap_or(stage.spec.seed);
+fn one(args: &SimArgs, prepared: &Prepared) -> anyhow::Result<bool> {
+    let seed = args.seed.unwrap_or(prepared.spec.seed);
     let started = Instant::now();
     let outcome = if args.storm {
-        stage.storm(seed, stage.failure_free_makespan_ms(), COMPARED_KILLS, true)
+        prepared.storm(
+            seed,
+            prepared.failure_free_makespan_ms(),
+            COMPARED_KILLS,
+            true,
+        )
     } else {
-        stage.planned(seed, COMPARED_KILLS, true)
+        prepared.planned(seed, COMPARED_KILLS, true)
     };
     if let Some(path) = &args.history {
         let file = std::fs::File::create(path)
@@ -154,9 +159,9 @@ fn one(args: &SimArgs, stage: &Stage) -> anyhow::Result<bool> {
     Ok(!failed)
 }
 
-fn many(args: &SimArgs, stage: &Stage, seeds: Seeds) -> anyhow::Result<bool> {
+fn many(args: &SimArgs, prepared: &Prepared, seeds: Seeds) -> anyhow::Result<bool> {
     let free_ms = if args.storm {
-        stage.failure_free_makespan_ms()
+        prepared.failure_free_makespan_ms()
     } else {
         0
     };
@@ -176,9 +181,9 @@ fn many(args: &SimArgs, stage: &Stage, seeds: Seeds) -> anyhow::Result<bool> {
                         return;
                     }
                     let outcome = if args.storm {
-                        stage.storm(seed, free_ms, COMPARED_KILLS, false)
+                        prepared.storm(seed, free_ms, COMPARED_KILLS, false)
                     } else {
-                        stage.planned(seed, COMPARED_KILLS, false)
+                        prepared.planned(seed, COMPARED_KILLS, false)
                     };
                     if summary::failed(&outcome) {
                         eprintln!("seed {seed} failed: {}", why(&outcome));

@@ -2,7 +2,7 @@
 //! a line). Each must complete and break no rule, and the first must give the same history
 //! twice.
 
-use skein_netsim::Stage;
+use skein_netsim::Prepared;
 use skein_netsim::summary::failed;
 use skein_netsim::world::fixture;
 use std::collections::BTreeMap;
@@ -12,8 +12,8 @@ use std::sync::Arc;
 /// UAVs of the small scenarios.
 const N_UAVS: u16 = 8;
 
-fn stage(scenario: &str) -> Stage {
-    Stage::new(match scenario {
+fn prepared(scenario: &str) -> Prepared {
+    Prepared::new(match scenario {
         "square" => fixture::square(N_UAVS),
         "open" => {
             let mut spec = fixture::square(N_UAVS);
@@ -39,7 +39,7 @@ fn seeds_that_once_failed_hold() {
         .map(|f| f.unwrap().path())
         .collect();
     files.sort();
-    let mut stages: BTreeMap<String, (Stage, u64)> = BTreeMap::new();
+    let mut prepared_by_name: BTreeMap<String, (Prepared, u64)> = BTreeMap::new();
     let mut replayed = 0;
     for file in files {
         let text = std::fs::read_to_string(&file).unwrap();
@@ -53,14 +53,16 @@ fn seeds_that_once_failed_hold() {
                 panic!("{}: {line:?} needs a scenario and a seed", file.display());
             };
             let seed: u64 = seed.parse().unwrap();
-            let (stage, free_ms) = stages.entry((*scenario).to_owned()).or_insert_with(|| {
-                let stage = stage(scenario);
-                let free_ms = stage.failure_free_makespan_ms();
-                (stage, free_ms)
-            });
+            let (prepared, free_ms) = prepared_by_name
+                .entry((*scenario).to_owned())
+                .or_insert_with(|| {
+                    let prepared = prepared(scenario);
+                    let free_ms = prepared.failure_free_makespan_ms();
+                    (prepared, free_ms)
+                });
             let run = || match flags {
-                ["storm"] => stage.storm(seed, *free_ms, 0, false),
-                [] => stage.planned(seed, 0, false),
+                ["storm"] => prepared.storm(seed, *free_ms, 0, false),
+                [] => prepared.planned(seed, 0, false),
                 other => panic!("{}: unknown flags {other:?}", file.display()),
             };
             let first = run();

@@ -3,7 +3,7 @@
 use crate::registry::Entry;
 use serde::{Deserialize, Serialize};
 use skein_link::frame::Order;
-use skein_netsim::chaos::{Fault, TimedFault};
+use skein_netsim::fault::{Fault, TimedFault};
 use std::net::SocketAddr;
 use std::time::Duration;
 use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};

@@ -5,7 +5,7 @@ use crate::ledger::secs;
 use crate::member::{Computer, Member};
 use crate::trial::{Due, Trial};
 use nix::sys::signal::Signal;
-use skein_netsim::chaos::{Fault, TimedFault};
+use skein_netsim::fault::{Fault, TimedFault};
 
 /// Faults that wait for their times; a plan of a person is shorter.
 const MAX_DUE: usize = 1000;
@@ -116,9 +116,9 @@ impl Trial<'_> {
             return Ok(vec![format!("the ground station uav{peer} is gone")]);
         }
         if !computer_only {
-            self.arena.remove(peer);
+            self.world.remove(peer);
         } else {
-            self.arena.set_computer(peer, false);
+            self.world.set_computer(peer, false);
         }
         let cells = self.ledger.killed(now_ms, peer, computer_only);
         let what = if computer_only {
@@ -210,9 +210,9 @@ impl Trial<'_> {
             self.ledger.killed(now_ms, peer, true);
         }
         if flies && !airborne {
-            self.arena.relaunch(peer);
+            self.world.relaunch(peer);
         } else {
-            self.arena.set_computer(peer, true);
+            self.world.set_computer(peer, true);
         }
         // Its last words must not be taken for the new life's.
         let member = self.known(peer)?;
@@ -258,7 +258,7 @@ impl Trial<'_> {
         for peer in named {
             self.known(peer)?;
         }
-        self.arena.fault(fault);
+        self.world.fault(fault);
         let text = match fault {
             Fault::Cut {
                 a,
@@ -290,7 +290,7 @@ impl Trial<'_> {
     /// its component, seconds: (k1, k1 + k2 + D + 2) periods.
     fn bounds_s(&self) -> (f64, f64) {
         let period_s = f64::from(self.spec.beacon_period_ms) / 1000.0;
-        let d = f64::from(self.arena.diameter(|id| self.on_air(id)));
+        let d = f64::from(self.world.diameter(|id| self.on_air(id)));
         let (k1, k2) = (4.0 + d / 4.0, 4.0 + d / 2.0);
         (k1 * period_s, (k1 + k2 + d + 2.0) * period_s)
     }

@@ -9,12 +9,12 @@ use std::collections::BTreeMap;
 impl Trial<'_> {
     /// Draws the verdict; call it when everybody is gone.
     pub(crate) fn verdict(&self) -> Verdict {
-        let coverage = self.arena.coverage(self.spec.min_coverable);
+        let coverage = self.world.coverage(self.spec.min_coverable);
         let live = self.live_uavs();
         let (finished, unfinished): (Vec<u16>, Vec<u16>) =
             live.iter().partition(|id| self.ledger.is_finished(**id));
         let kills = self.ledger.kills();
-        let zone_entries = self.arena.zone_entries();
+        let zone_entries = self.world.zone_entries();
         let mut failures = self.ledger.failures.clone();
         if coverage.covered < coverage.coverable {
             failures.push(format!(
@@ -54,13 +54,13 @@ impl Trial<'_> {
             lowest_time_scale: self.pacer.lowest(),
             coverage,
             zone_entries,
-            separation_m: self.arena.separation_m(),
+            separation_m: self.world.separation_m(),
             kills,
             restarts: self.ledger.restarts(),
             splits: components.splits,
             merges: components.merges,
             most_components: components.most,
-            link_cuts: self.arena.link_cuts(),
+            link_cuts: self.world.link_cuts(),
             messages_lost: radio
                 .lost
                 .iter()

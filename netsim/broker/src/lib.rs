@@ -8,10 +8,10 @@
 //! |---|---|
 //! | [`trial`] | prepares, steps the world, ends |
 //! | `lifecycle` | starts and ends the peers |
-//! | `ear` | takes in what peers say |
+//! | `from_peers` | takes in what peers say |
 //! | `judge` | draws the verdict |
 //! | `faults` | carries out faults and says what should follow |
-//! | [`arena`] | the world and its radio links, as a trial uses them |
+//! | [`live_world`] | the world and its radio links, as a trial uses them |
 //! | [`stream`] | percepts and setpoints, one loopback stream a peer |
 //! | [`proxy`] | the transports between each two peers, which can go dark |
 //! | [`process`] | processes, and the guard that leaves none behind |
@@ -19,13 +19,13 @@
 //! | [`ledger`], [`verdict`] | what was seen, and what it adds up to |
 //! | [`pacer`] | scenario time against wall time |
 
-pub mod arena;
 pub mod control;
-mod ear;
 mod faults;
+mod from_peers;
 mod judge;
 pub mod ledger;
 mod lifecycle;
+pub mod live_world;
 pub mod member;
 pub mod pacer;
 pub mod process;

@@ -1,8 +1,8 @@
 //! A trial: launch the peers, run the world around them, inject the faults, judge.
 
-use crate::arena::Arena;
 use crate::control::{Answer, Asked, Control, Request};
 use crate::ledger::{Ledger, secs};
+use crate::live_world::LiveWorld;
 use crate::member::{Computer, LEASE_MS, Member};
 use crate::pacer::{Pacer, STEP_MS};
 use crate::process::Processes;
@@ -12,7 +12,7 @@ use crate::stream::Streams;
 use crate::verdict::Verdict;
 use nix::sys::signal::Signal;
 use skein_link::LinkState;
-use skein_netsim::chaos::TimedFault;
+use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::Spec;
 use skein_netsim::world::{Fact, Loss};
 use std::collections::BTreeMap;
@@ -165,7 +165,7 @@ pub(crate) struct Pair {
 pub(crate) struct Trial<'a> {
     pub(crate) spec: Spec,
     pub(crate) seed: u64,
-    pub(crate) arena: Arena,
+    pub(crate) world: LiveWorld,
     pub(crate) members: BTreeMap<u16, Member>,
     pub(crate) ledger: Ledger,
     pub(crate) processes: Option<Processes>,
@@ -214,7 +214,7 @@ impl<'a> Trial<'a> {
         let control = Control::listen(token.clone())
             .await
             .map_err(io("the control port"))?;
-        let arena = Arena::new(&spec, seed);
+        let world = LiveWorld::new(&spec, seed);
         let entry = Entry {
             id: id.clone(),
             pid: std::process::id(),
@@ -255,7 +255,7 @@ impl<'a> Trial<'a> {
                 .collect(),
             spec,
             seed,
-            arena,
+            world,
             members,
             pairs,
             streams,
@@ -298,7 +298,7 @@ impl<'a> Trial<'a> {
     /// One step of the world.
     fn step(&mut self) {
         self.now_ms += STEP_MS;
-        for fact in self.arena.advance(self.now_ms) {
+        for fact in self.world.advance(self.now_ms) {
             self.fact(&fact);
         }
         self.follow_links();
@@ -310,7 +310,7 @@ impl<'a> Trial<'a> {
         for id in &ids {
             let row = self.row(*id, &ids);
             let percept = if percepts_due {
-                self.arena.percept(*id)
+                self.world.percept(*id)
             } else {
                 None
             };
@@ -339,7 +339,7 @@ impl<'a> Trial<'a> {
         let on_air = |id: &u16| self.members.get(id).is_some_and(Member::on_air);
         ids.iter()
             .filter(|tx| **tx != rx && on_air(tx))
-            .map(|tx| (*tx, self.arena.link(*tx, rx)))
+            .map(|tx| (*tx, self.world.link(*tx, rx)))
             .collect()
     }
 
@@ -348,7 +348,7 @@ impl<'a> Trial<'a> {
     fn follow_links(&mut self) {
         let now = Instant::now();
         for ((low, high), pair) in &mut self.pairs {
-            let (there, back) = (self.arena.link(*low, *high), self.arena.link(*high, *low));
+            let (there, back) = (self.world.link(*low, *high), self.world.link(*high, *low));
             // One way up keeps the transport, which can only carry both.
             if there.is_up() || back.is_up() {
                 pair.down_since = None;
@@ -358,7 +358,7 @@ impl<'a> Trial<'a> {
                 pair.proxy.set_dark(now.duration_since(since) > DARK_AFTER);
             }
         }
-        self.components = self.arena.components(|id| self.on_air(id));
+        self.components = self.world.components(|id| self.on_air(id));
         if let Some(text) = self.ledger.components(self.now_ms, &self.components) {
             self.note(text);
         }
@@ -418,7 +418,7 @@ impl<'a> Trial<'a> {
         Progress {
             time_s: secs(self.now_ms),
             scale: self.pacer.scale(),
-            covered: self.arena.covered_share(),
+            covered: self.world.covered_share(),
             alive: self.live_uavs(),
             components: self.components.len(),
             taken_over: self.ledger.taken_over(),
@@ -443,7 +443,7 @@ impl<'a> Trial<'a> {
         let idle = self
             .all_finished_ms
             .is_some_and(|since| self.now_ms - since >= IDLE_MS);
-        let done = finished && self.arena.is_covered();
+        let done = finished && self.world.is_covered();
         done || idle || live.is_empty() || self.now_ms >= u64::from(self.spec.max_time_s) * 1000
     }
 

@@ -4,7 +4,7 @@
 use crate::error::{Finding, Severity};
 use crate::flight_model::{Pace, return_s, too_windy};
 use crate::resolve::bounds;
-use skein_netsim::chaos::Fault;
+use skein_netsim::fault::Fault;
 use skein_netsim::spec::{Spec, UavSpec};
 use skein_peer::Mission;
 use skein_peer::mission::point_m;
@@ -443,7 +443,7 @@ pub fn extent_m(spec: &Spec) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_netsim::chaos::TimedFault;
+    use skein_netsim::fault::TimedFault;
     use skein_planning::frame::Pose;
 
     #[test]

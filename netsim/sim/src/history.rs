@@ -4,7 +4,7 @@
 //! Only integers are folded (time, peer, kind, content), so the hash of a seed is the
 //! same in debug and release builds and on every platform.
 
-use crate::chaos::Fault;
+use crate::fault::Fault;
 use serde::Serialize;
 use skein_peer::Report;
 use skein_peer::output::Status;

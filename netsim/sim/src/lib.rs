@@ -5,27 +5,29 @@
 //! | [`spec`] | a scenario with nothing left to resolve |
 //! | [`world`] | airframes, buildings, the judge |
 //! | [`radio`] | links, the graph they form, the shared channel |
-//! | [`chaos`] | one enum of faults, for simulated and live swarms |
-//! | [`storm`] | random faults for one run |
+//! | [`fault`] | one enum of faults, for simulated and live swarms |
+//! | [`fault_generator`] | random faults for one run |
 //! | [`disk`] | virtual disks |
-//! | [`stage`] | what all runs of a scenario share |
+//! | [`prepared`] | what all runs of a scenario share |
 //! | [`swarm`] | peers, world and radio under one virtual clock |
 //! | [`check`] | what must hold, judged while a run goes on |
+//! | [`geometry_cache`] | loops and routers, derived once for all peers and runs |
 //! | [`history`] | what happened, hashed and replayable |
-//! | [`reference`](mod@reference) | how long it takes when everybody knows everything |
+//! | [`omniscient_baseline`] | how long it takes when everybody knows everything |
 //! | [`summary`] | what many runs come to |
 
-pub mod chaos;
 pub mod check;
 pub mod disk;
+pub mod fault;
+pub mod fault_generator;
+pub mod geometry_cache;
 pub mod history;
+pub mod omniscient_baseline;
+pub mod prepared;
 pub mod radio;
-pub mod reference;
 pub mod spec;
-pub mod stage;
-pub mod storm;
 pub mod summary;
 pub mod swarm;
 pub mod world;
 
-pub use stage::Stage;
+pub use prepared::Prepared;

@@ -1,6 +1,6 @@
 //! A scenario with nothing left to resolve: no file names, no units to convert.
 
-use crate::chaos::TimedFault;
+use crate::fault::TimedFault;
 use skein_peer::Mission;
 use skein_planning::airframe::Airframe;
 use skein_planning::frame::{Point, Pose};

@@ -4,7 +4,7 @@
 use crate::document::{Document, Fields, Node, suggestion};
 use crate::error::{Finding, ScenarioError, Severity};
 use crate::files::read_text;
-use skein_netsim::chaos::{Fault, TimedFault};
+use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::spec::StormSpec;
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -7,7 +7,7 @@ use super::listing::{ListingCheck, Takeover};
 use super::membership::Membership;
 use super::progress::ProgressCheck;
 use super::record::{RecordCheck, Said};
-use super::{Bounds, Findings, Look, Mind};
+use super::{Bounds, Findings, PeerSnapshot, Snapshot};
 use skein_peer::Report;
 use skein_peer::journal::Durable;
 use skein_peer::output::Status;
@@ -230,42 +230,44 @@ impl Checker {
         changed
     }
 
-    /// The true graph when last looked at.
+    /// The true graph in the last snapshot.
     #[must_use]
     pub fn graph(&self) -> &Graph {
         &self.graph
     }
 
-    /// Looks at everybody's beliefs, once a beacon period.
-    pub fn on_look(
+    /// Judges everybody's beliefs, once a beacon period.
+    pub fn on_snapshot(
         &mut self,
         now_ms: u64,
         loss_permille: u16,
-        minds: &[Mind],
+        peers: &[PeerSnapshot],
         covered: &[bool],
         loop_hash: u64,
     ) {
-        let held = minds.iter().map(|m| m.view.diameter).max().unwrap_or(1);
+        let held = peers.iter().map(|m| m.view.diameter).max().unwrap_or(1);
         self.bounds.diameter = u64::from(held.max(self.stability.diameter()));
-        let look = Look {
+        let snapshot = Snapshot {
             now_ms,
             loss_permille,
             bounds: self.bounds,
             graph: &self.graph,
             stability: &self.stability,
-            minds,
+            peers,
             covered,
             loop_hash,
         };
         let orphans = self.listing.orphans();
-        self.members.on_look(&look, &mut self.found);
-        self.listing.on_look(&look, &self.members, &mut self.found);
+        self.members.on_snapshot(&snapshot, &mut self.found);
+        self.listing
+            .on_snapshot(&snapshot, &self.members, &mut self.found);
         if self.listing.orphans() > orphans {
             self.progress.on_loss();
         }
-        self.record.on_look(&look, &mut self.found);
-        self.cover.on_look(&look, &mut self.found);
-        self.progress.on_look(&look, &self.members, &mut self.found);
+        self.record.on_snapshot(&snapshot, &mut self.found);
+        self.cover.on_snapshot(&snapshot, &mut self.found);
+        self.progress
+            .on_snapshot(&snapshot, &self.members, &mut self.found);
     }
 
     /// What became of the sections of the dead.

@@ -1,7 +1,7 @@
 //! What peers mark as covered: truly seen (S6), never forgotten (S3), and soon known
 //! to all (L4).
 
-use super::{Clocks, Findings, Look};
+use super::{Clocks, Findings, Snapshot};
 use std::collections::BTreeMap;
 
 /// What the marks of one run were found to be.
@@ -20,64 +20,72 @@ impl CoverCheck {
     }
 
     /// Looks at everybody's union of covered cells.
-    pub fn on_look(&mut self, look: &Look<'_>, found: &mut Findings) {
-        for m in look
-            .minds
+    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        for m in snapshot
+            .peers
             .iter()
-            .filter(|m| m.view.loop_hash == look.loop_hash)
+            .filter(|m| m.view.loop_hash == snapshot.loop_hash)
         {
-            self.check_marks(look, m.id, &m.view.union, found);
+            self.check_marks(snapshot, m.id, &m.view.union, found);
         }
-        self.check_spread(look, found);
+        self.check_spread(snapshot, found);
     }
 
-    fn check_marks(&mut self, look: &Look<'_>, id: u16, union: &[bool], found: &mut Findings) {
-        for (c, (marked, seen)) in union.iter().zip(look.covered).enumerate() {
+    fn check_marks(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        id: u16,
+        union: &[bool],
+        found: &mut Findings,
+    ) {
+        for (c, (marked, seen)) in union.iter().zip(snapshot.covered).enumerate() {
             let cell = u16::try_from(c).unwrap_or(u16::MAX);
             if *marked && !*seen && self.false_marks.insert((id, cell), ()).is_none() {
-                found.broken("S6", look.now_ms, Some(id), || {
+                found.broken("S6", snapshot.now_ms, Some(id), || {
                     format!("marks cell {cell} as covered, no camera has seen it")
                 });
             }
         }
         let known = self.known.entry(id).or_default();
-        if known.0 == look.loop_hash {
+        if known.0 == snapshot.loop_hash {
             if let Some(c) = known.1.iter().zip(union).position(|(was, is)| *was && !*is) {
-                found.broken("S3", look.now_ms, Some(id), || {
+                found.broken("S3", snapshot.now_ms, Some(id), || {
                     format!("forgot that cell {c} is covered")
                 });
             }
             known.1.copy_from_slice(union);
         } else {
-            *known = (look.loop_hash, union.to_vec());
+            *known = (snapshot.loop_hash, union.to_vec());
         }
     }
 
     /// L4: what one member of an unchanged component knows, all know soon.
-    fn check_spread(&mut self, look: &Look<'_>, found: &mut Findings) {
-        let n = look.covered.len();
-        let bound_ms = look.bounds.spread_ms();
+    fn check_spread(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        let n = snapshot.covered.len();
+        let bound_ms = snapshot.bounds.spread_ms();
         let mut lacks: Vec<(u16, u16, u64)> = Vec::new();
-        for component in look.graph.components() {
-            let minds: Vec<_> = component
+        for component in snapshot.graph.components() {
+            let peers: Vec<_> = component
                 .iter()
-                .filter_map(|id| look.mind(*id))
+                .filter_map(|id| snapshot.peer(*id))
                 .filter(|m| {
-                    m.view.loop_hash == look.loop_hash && m.view.speaks && m.view.union.len() == n
+                    m.view.loop_hash == snapshot.loop_hash
+                        && m.view.speaks
+                        && m.view.union.len() == n
                 })
                 .collect();
             let since_ms = component
                 .first()
-                .and_then(|id| look.stability.component_since_ms(*id));
+                .and_then(|id| snapshot.stability.component_since_ms(*id));
             for c in 0..n {
-                if !minds.iter().any(|m| m.view.union[c]) {
+                if !peers.iter().any(|m| m.view.union[c]) {
                     continue;
                 }
-                for m in minds.iter().filter(|m| !m.view.union[c]) {
+                for m in peers.iter().filter(|m| !m.view.union[c]) {
                     lacks.push((
                         m.id,
                         u16::try_from(c).unwrap_or(u16::MAX),
-                        since_ms.unwrap_or(look.now_ms).max(m.since_ms),
+                        since_ms.unwrap_or(snapshot.now_ms).max(m.since_ms),
                     ));
                 }
             }
@@ -92,26 +100,29 @@ impl CoverCheck {
             goes_on
         });
         for (id, cell, from_ms) in lacks {
-            let since_ms = self.lacking.start((id, cell), look.now_ms).max(from_ms);
-            let took_ms = look.now_ms - since_ms;
-            if look.grade().limit_ms(bound_ms).is_some_and(|l| took_ms > l)
+            let since_ms = self.lacking.start((id, cell), snapshot.now_ms).max(from_ms);
+            let took_ms = snapshot.now_ms - since_ms;
+            if snapshot
+                .grade()
+                .limit_ms(bound_ms)
+                .is_some_and(|l| took_ms > l)
                 && self.lacking.tell_once((id, cell))
             {
-                found.broken("L4", look.now_ms, Some(id), || {
+                found.broken("L4", snapshot.now_ms, Some(id), || {
                     format!("does not know that cell {cell} is covered, {took_ms} ms after a peer of its component did (bound {bound_ms} ms)")
                 });
             }
         }
-        // What ended between two looks kept the bound unless it was told above.
+        // What ended between two snapshots kept the bound unless it was told above.
         for _ in ended {
-            found.took("L4", look.grade(), look.bounds.period_ms, bound_ms);
+            found.took("L4", snapshot.grade(), snapshot.bounds.period_ms, bound_ms);
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Bounds, Graph, Mind, Stability};
+    use super::super::{Bounds, Graph, PeerSnapshot, Stability};
     use super::*;
     use skein_peer::View;
 
@@ -122,9 +133,9 @@ mod tests {
         now_ms: u64,
         unions: &[(u16, [bool; 2])],
     ) {
-        let minds: Vec<Mind> = unions
+        let peers: Vec<PeerSnapshot> = unions
             .iter()
-            .map(|(id, union)| Mind {
+            .map(|(id, union)| PeerSnapshot {
                 id: *id,
                 uav: true,
                 since_ms: 0,
@@ -136,9 +147,9 @@ mod tests {
                 },
             })
             .collect();
-        let graph = Graph::new(minds.iter().map(|m| m.id).collect(), |_, _| true);
+        let graph = Graph::new(peers.iter().map(|m| m.id).collect(), |_, _| true);
         s.observe(now_ms, &graph, |_| 1, 10_000);
-        let look = Look {
+        let snapshot = Snapshot {
             now_ms,
             loss_permille: 0,
             bounds: Bounds {
@@ -147,11 +158,11 @@ mod tests {
             },
             graph: &graph,
             stability: s,
-            minds: &minds,
+            peers: &peers,
             covered: &[true, false],
             loop_hash: 3,
         };
-        check.on_look(&look, found);
+        check.on_snapshot(&snapshot, found);
     }
 
     #[test]

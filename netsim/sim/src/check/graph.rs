@@ -143,7 +143,7 @@ pub struct Stability {
 
 impl Stability {
     /// Takes the graph at `now_ms`; `life(id)` counts the lives of a radio, so that a
-    /// restart counts as a change even when it falls between two looks.
+    /// restart counts as a change even when it falls between two snapshots.
     /// Returns whether any component changed.
     pub fn observe(
         &mut self,

@@ -2,7 +2,7 @@
 //! stamp (S5).
 
 use super::membership::Membership;
-use super::{Clocks, Findings, Look, bounds::LIGHT_FACTOR};
+use super::{Clocks, Findings, Snapshot, bounds::LIGHT_FACTOR};
 use serde::Serialize;
 use skein_peer::output::Status;
 use skein_peer::wire::message::{Firmness, Listing, Register, Stamp};
@@ -103,25 +103,35 @@ impl ListingCheck {
         }
     }
 
-    /// Looks at everybody's plans.
-    pub fn on_look(&mut self, look: &Look<'_>, members: &Membership, found: &mut Findings) {
-        self.look_for_orphans(look, members, found);
-        self.look_for_clashes(look, members, found);
+    /// Judges everybody's plans.
+    pub fn on_snapshot(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        members: &Membership,
+        found: &mut Findings,
+    ) {
+        self.look_for_orphans(snapshot, members, found);
+        self.look_for_clashes(snapshot, members, found);
     }
 
-    fn look_for_orphans(&mut self, look: &Look<'_>, members: &Membership, found: &mut Findings) {
-        let n = look.covered.len();
-        if n == 0 || look.able().next().is_none() {
+    fn look_for_orphans(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        members: &Membership,
+        found: &mut Findings,
+    ) {
+        let n = snapshot.covered.len();
+        if n == 0 || snapshot.able().next().is_none() {
             self.able_since_ms = None;
             return;
         }
-        let able_since_ms = *self.able_since_ms.get_or_insert(look.now_ms);
+        let able_since_ms = *self.able_since_ms.get_or_insert(snapshot.now_ms);
         let mut lister: Vec<Option<u16>> = vec![None; n];
-        let mut settled = look.covered.to_vec();
-        for m in look
-            .minds
+        let mut settled = snapshot.covered.to_vec();
+        for m in snapshot
+            .peers
             .iter()
-            .filter(|m| m.view.loop_hash == look.loop_hash)
+            .filter(|m| m.view.loop_hash == snapshot.loop_hash)
         {
             for (c, known) in m.view.union.iter().enumerate().take(n) {
                 settled[c] |= *known;
@@ -139,25 +149,25 @@ impl ListingCheck {
         }
         // An orphan is to be listed in every component with an able peer, so the one that
         // has been stable for longest is the one that counts.
-        let stable_ms = look
+        let stable_ms = snapshot
             .able()
-            .filter_map(|m| look.stability.component_since_ms(m.id))
+            .filter_map(|m| snapshot.stability.component_since_ms(m.id))
             .min();
-        let counts_from_ms = stable_ms.unwrap_or(look.now_ms).max(able_since_ms);
+        let counts_from_ms = stable_ms.unwrap_or(snapshot.now_ms).max(able_since_ms);
         for c in 0..n {
             let cell = u16::try_from(c).unwrap_or(u16::MAX);
             if settled[c] || lister[c].is_some() {
-                self.settle(look, cell, lister[c], members, counts_from_ms, found);
+                self.settle(snapshot, cell, lister[c], members, counts_from_ms, found);
             } else {
-                self.orphaned(look, cell, members, counts_from_ms, found);
+                self.orphaned(snapshot, cell, members, counts_from_ms, found);
             }
         }
-        self.close_takeovers(look, members, &lister, &settled);
+        self.close_takeovers(snapshot, members, &lister, &settled);
     }
 
     fn settle(
         &mut self,
-        look: &Look<'_>,
+        snapshot: &Snapshot<'_>,
         cell: u16,
         lister: Option<u16>,
         members: &Membership,
@@ -166,13 +176,13 @@ impl ListingCheck {
     ) {
         if let Some(o) = self.orphans.remove(&cell) {
             let from_ms = counted_from(&o, members)
-                .unwrap_or(look.now_ms)
+                .unwrap_or(snapshot.now_ms)
                 .max(counts_from_ms);
             found.took(
                 "L2",
-                look.grade(),
-                look.now_ms.saturating_sub(from_ms),
-                look.bounds.takeover_ms(),
+                snapshot.grade(),
+                snapshot.now_ms.saturating_sub(from_ms),
+                snapshot.bounds.takeover_ms(),
             );
         }
         let Some(by) = lister else {
@@ -193,7 +203,7 @@ impl ListingCheck {
 
     fn orphaned(
         &mut self,
-        look: &Look<'_>,
+        snapshot: &Snapshot<'_>,
         cell: u16,
         members: &Membership,
         counts_from_ms: u64,
@@ -201,23 +211,26 @@ impl ListingCheck {
     ) {
         let owner = self.last_lister.get(&cell).copied();
         let o = self.orphans.entry(cell).or_insert(Orphan {
-            since_ms: look.now_ms,
+            since_ms: snapshot.now_ms,
             owner,
             told: false,
         });
-        let bound_ms = look.bounds.takeover_ms();
+        let bound_ms = snapshot.bounds.takeover_ms();
         let Some(from_ms) = counted_from(o, members) else {
             return;
         };
-        let took_ms = look.now_ms.saturating_sub(from_ms.max(counts_from_ms));
-        let graded = look.grade().limit_ms(bound_ms).is_some_and(|l| took_ms > l);
-        let gone_ms = look
+        let took_ms = snapshot.now_ms.saturating_sub(from_ms.max(counts_from_ms));
+        let graded = snapshot
+            .grade()
+            .limit_ms(bound_ms)
+            .is_some_and(|l| took_ms > l);
+        let gone_ms = snapshot
             .now_ms
-            .saturating_sub(from_ms.max(self.able_since_ms.unwrap_or(look.now_ms)));
+            .saturating_sub(from_ms.max(self.able_since_ms.unwrap_or(snapshot.now_ms)));
         let lost = gone_ms > bound_ms * LIGHT_FACTOR;
         if (graded || lost) && !std::mem::replace(&mut o.told, true) {
             let (check, owner) = (if graded { "L2" } else { "I1" }, o.owner);
-            found.broken(check, look.now_ms, owner, || {
+            found.broken(check, snapshot.now_ms, owner, || {
                 format!(
                     "cell {cell} is listed by no live peer, for {gone_ms} ms ({took_ms} ms since the components last changed; bound {bound_ms} ms); its last owner was {owner:?}"
                 )
@@ -227,7 +240,7 @@ impl ListingCheck {
 
     fn close_takeovers(
         &mut self,
-        look: &Look<'_>,
+        snapshot: &Snapshot<'_>,
         members: &Membership,
         lister: &[Option<u16>],
         settled: &[bool],
@@ -241,25 +254,30 @@ impl ListingCheck {
                     && lister.get(c).is_some_and(Option::is_none)
             });
             if !open {
-                t.taken_ms = Some(look.now_ms);
+                t.taken_ms = Some(snapshot.now_ms);
             }
         }
     }
 
     /// S5: of two listings that know of each other the lower one yields within 2·T.
-    fn look_for_clashes(&mut self, look: &Look<'_>, members: &Membership, found: &mut Findings) {
-        let n = look.covered.len();
-        let bound_ms = look.bounds.yield_ms();
+    fn look_for_clashes(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        members: &Membership,
+        found: &mut Findings,
+    ) {
+        let n = snapshot.covered.len();
+        let bound_ms = snapshot.bounds.yield_ms();
         let mut seen: Vec<(u16, u16, u16)> = Vec::new();
-        for m in look
-            .minds
+        for m in snapshot
+            .peers
             .iter()
-            .filter(|m| m.uav && m.view.loop_hash == look.loop_hash)
+            .filter(|m| m.uav && m.view.loop_hash == snapshot.loop_hash)
         {
             let Some(own) = self
                 .own
                 .get(&m.id)
-                .filter(|r| r.loop_hash == look.loop_hash)
+                .filter(|r| r.loop_hash == snapshot.loop_hash)
             else {
                 continue;
             };
@@ -278,7 +296,7 @@ impl ListingCheck {
                 self.heard.range((m.id, 0)..=(m.id, u16::MAX))
             {
                 let alive = members.belief(m.id, author) == Some((*life, Status::Alive));
-                if !alive || register.loop_hash != look.loop_hash {
+                if !alive || register.loop_hash != snapshot.loop_hash {
                     continue;
                 }
                 for l in &register.plan {
@@ -293,12 +311,12 @@ impl ListingCheck {
         seen.sort_unstable();
         self.clashes.retain(|k| seen.binary_search(k).is_ok());
         for key in seen {
-            let since_ms = self.clashes.start(key, look.now_ms);
-            // A look comes once a period, so what two looks saw lasted at least one less.
-            let took_ms = look.now_ms - since_ms;
+            let since_ms = self.clashes.start(key, snapshot.now_ms);
+            // A snapshot comes once a period, so what two of them show lasted at least one less.
+            let took_ms = snapshot.now_ms - since_ms;
             if took_ms > bound_ms && self.clashes.tell_once(key) {
                 let (id, author, cell) = key;
-                found.broken("S5", look.now_ms, Some(id), || {
+                found.broken("S5", snapshot.now_ms, Some(id), || {
                     format!("still plans cell {cell}, which it heard peer {author} list at a higher stamp {took_ms} ms ago (bound {bound_ms} ms)")
                 });
             }
@@ -335,7 +353,7 @@ fn each_cell(l: &Listing, n: usize, mut f: impl FnMut(usize)) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Bounds, Graph, Mind, Stability};
+    use super::super::{Bounds, Graph, PeerSnapshot, Stability};
     use super::*;
     use skein_peer::View;
     use skein_peer::wire::message::{Epoch, Run};
@@ -364,11 +382,11 @@ mod tests {
             }
         }
 
-        /// One look at a ring of four cells: each peer with its plan.
-        fn look(&mut self, now_ms: u64, plans: &[(u16, &[u16])]) {
-            let minds: Vec<Mind> = plans
+        /// One snapshot of a ring of four cells: each peer with its plan.
+        fn snapshot(&mut self, now_ms: u64, plans: &[(u16, &[u16])]) {
+            let peers: Vec<PeerSnapshot> = plans
                 .iter()
-                .map(|(id, plan)| Mind {
+                .map(|(id, plan)| PeerSnapshot {
                     id: *id,
                     uav: true,
                     since_ms: 0,
@@ -381,19 +399,20 @@ mod tests {
                     },
                 })
                 .collect();
-            let graph = Graph::new(minds.iter().map(|m| m.id).collect(), |_, _| true);
+            let graph = Graph::new(peers.iter().map(|m| m.id).collect(), |_, _| true);
             self.stability.observe(now_ms, &graph, |_| 1, 10_000);
-            let look = Look {
+            let snapshot = Snapshot {
                 now_ms,
                 loss_permille: self.loss,
                 bounds: BOUNDS,
                 graph: &graph,
                 stability: &self.stability,
-                minds: &minds,
+                peers: &peers,
                 covered: &[false; 4],
                 loop_hash: 9,
             };
-            self.check.on_look(&look, &self.members, &mut self.found);
+            self.check
+                .on_snapshot(&snapshot, &self.members, &mut self.found);
         }
     }
 
@@ -402,11 +421,11 @@ mod tests {
         for (loss, at_14, at_90) in [(0, 1, 1), (50, 0, 1), (300, 0, 1)] {
             let mut s = Story::new(loss);
             for t in 0..14 {
-                s.look(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
             }
             assert_eq!(s.found.counts.values().sum::<u64>(), at_14, "loss {loss}");
             for t in 14..90 {
-                s.look(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
             }
             assert_eq!(s.found.counts.values().sum::<u64>(), at_90, "loss {loss}");
         }
@@ -416,11 +435,11 @@ mod tests {
     fn a_takeover_names_who_took_how_many_cells_and_counts_from_detection() {
         let mut s = Story::new(0);
         s.members.on_life(0, 2, 1);
-        s.look(0, &[(1, &[0, 1]), (2, &[2, 3])]);
+        s.snapshot(0, &[(1, &[0, 1]), (2, &[2, 3])]);
         s.members.on_silent(500, 2, true, 1);
         s.check.on_silent(500, 2, true, &[false; 4]);
         for t in 1..40 {
-            s.look(t * 1000, &[(1, &[0, 1])]);
+            s.snapshot(t * 1000, &[(1, &[0, 1])]);
         }
         assert!(
             s.found.counts.is_empty(),
@@ -429,8 +448,8 @@ mod tests {
         );
         s.members
             .on_belief(40_500, (1, 2), (1, Status::Down), &BOUNDS, None);
-        s.look(41_000, &[(1, &[0, 1])]);
-        s.look(42_000, &[(1, &[0, 1, 3, 2])]);
+        s.snapshot(41_000, &[(1, &[0, 1])]);
+        s.snapshot(42_000, &[(1, &[0, 1, 3, 2])]);
         let t = &s.check.takeovers[0];
         assert_eq!(
             (t.cells, t.detected_ms, t.taken_ms),
@@ -466,7 +485,7 @@ mod tests {
             s.check.on_heard((1, 2), (1, 8), &register(other, 2));
             s.check.on_heard((1, 2), (1, 7), &register(9, 2));
             for t in 1..6 {
-                s.look(t * 1000, &[(1, &[3, 0, 1, 2]), (2, &[])]);
+                s.snapshot(t * 1000, &[(1, &[3, 0, 1, 2]), (2, &[])]);
             }
             assert_eq!(s.found.counts.contains_key("S5"), broken);
         }

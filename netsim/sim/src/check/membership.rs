@@ -1,7 +1,7 @@
 //! Who knows of whose death, and how soon: detection at any loss, false downs, and
 //! agreement on the members of a component (L1).
 
-use super::{Bounds, Clocks, Findings, Look};
+use super::{Bounds, Clocks, Findings, Snapshot};
 use skein_peer::output::Status;
 use std::collections::BTreeMap;
 
@@ -129,34 +129,34 @@ impl Membership {
         }
     }
 
-    /// Looks at everybody's beliefs.
-    pub fn on_look(&mut self, look: &Look<'_>, found: &mut Findings) {
-        for m in look.minds {
+    /// Judges everybody's beliefs.
+    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        for m in snapshot.peers {
             if m.view.speaks {
-                self.speaks_since.entry(m.id).or_insert(look.now_ms);
+                self.speaks_since.entry(m.id).or_insert(snapshot.now_ms);
             } else {
                 self.speaks_since.remove(&m.id);
             }
         }
-        self.look_for_late_detection(look, found);
-        self.look_for_disagreement(look, found);
+        self.look_for_late_detection(snapshot, found);
+        self.look_for_disagreement(snapshot, found);
     }
 
     /// Everybody who runs since before a death knows of it within the bound, at any loss:
     /// the rule on the age of a heartbeat needs no message.
-    fn look_for_late_detection(&mut self, look: &Look<'_>, found: &mut Findings) {
+    fn look_for_late_detection(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         for (&subject, silence) in &mut self.silences {
-            silence.diameter = silence.diameter.max(look.bounds.diameter);
+            silence.diameter = silence.diameter.max(snapshot.bounds.diameter);
             let bounds = Bounds {
                 diameter: silence.diameter,
-                ..look.bounds
+                ..snapshot.bounds
             };
             let due_ms = silence.since_ms + bounds.detection_ms();
-            if look.now_ms <= due_ms {
+            if snapshot.now_ms <= due_ms {
                 continue;
             }
-            for m in look
-                .minds
+            for m in snapshot
+                .peers
                 .iter()
                 .filter(|m| m.since_ms < silence.since_ms && m.id != subject)
             {
@@ -168,12 +168,12 @@ impl Membership {
                     self.late.stop(key);
                     continue;
                 }
-                self.late.start(key, look.now_ms);
+                self.late.start(key, snapshot.now_ms);
                 if self.late.tell_once(key) {
-                    found.broken("detect", look.now_ms, Some(m.id), || {
+                    found.broken("detect", snapshot.now_ms, Some(m.id), || {
                         format!(
                             "still holds peer {subject} for {status:?}, {} ms after it fell silent (bound {} ms, D = {})",
-                            look.now_ms - silence.since_ms,
+                            snapshot.now_ms - silence.since_ms,
                             bounds.detection_ms(),
                             silence.diameter
                         )
@@ -184,12 +184,12 @@ impl Membership {
     }
 
     /// L1: the members of a component hold each other for alive, in their present lives.
-    fn look_for_disagreement(&mut self, look: &Look<'_>, found: &mut Findings) {
-        let bound_ms = look.bounds.detection_ms();
-        for m in look.minds {
-            for x in look.minds.iter().filter(|x| x.id != m.id) {
+    fn look_for_disagreement(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        let bound_ms = snapshot.bounds.detection_ms();
+        for m in snapshot.peers {
+            for x in snapshot.peers.iter().filter(|x| x.id != m.id) {
                 let key = (m.id, x.id);
-                let since_ms = self.countable_since_ms(look, m.id, x.id);
+                let since_ms = self.countable_since_ms(snapshot, m.id, x.id);
                 let agreed = match (since_ms, m.view.peers.get(&skein_peer::PeerId(x.id))) {
                     (None, _) => true,
                     (Some(_), Some((life, status))) => {
@@ -199,18 +199,21 @@ impl Membership {
                 };
                 if agreed {
                     if let Some(t) = self.disagreements.stop(key) {
-                        found.took("L1", look.grade(), look.now_ms - t, bound_ms);
+                        found.took("L1", snapshot.grade(), snapshot.now_ms - t, bound_ms);
                     }
                     continue;
                 }
                 let since_ms = since_ms
-                    .unwrap_or(look.now_ms)
-                    .max(self.disagreements.start(key, look.now_ms));
-                let took_ms = look.now_ms.saturating_sub(since_ms);
-                if look.grade().limit_ms(bound_ms).is_some_and(|l| took_ms > l)
+                    .unwrap_or(snapshot.now_ms)
+                    .max(self.disagreements.start(key, snapshot.now_ms));
+                let took_ms = snapshot.now_ms.saturating_sub(since_ms);
+                if snapshot
+                    .grade()
+                    .limit_ms(bound_ms)
+                    .is_some_and(|l| took_ms > l)
                     && self.disagreements.tell_once(key)
                 {
-                    found.broken("L1", look.now_ms, Some(m.id), || {
+                    found.broken("L1", snapshot.now_ms, Some(m.id), || {
                         let held = m.view.peers.get(&skein_peer::PeerId(x.id));
                         format!(
                             "holds {held:?} of peer {} (life {}) in its own component, for {took_ms} ms (bound {bound_ms} ms)",
@@ -224,18 +227,18 @@ impl Membership {
     }
 
     /// Since when two peers have been in one unchanged component, both speaking.
-    fn countable_since_ms(&self, look: &Look<'_>, a: u16, b: u16) -> Option<u64> {
-        if !look.graph.joined(a, b) {
+    fn countable_since_ms(&self, snapshot: &Snapshot<'_>, a: u16, b: u16) -> Option<u64> {
+        if !snapshot.graph.joined(a, b) {
             return None;
         }
         let spoke_ms = (*self.speaks_since.get(&a)?).max(*self.speaks_since.get(&b)?);
-        Some(look.stability.component_since_ms(a)?.max(spoke_ms))
+        Some(snapshot.stability.component_since_ms(a)?.max(spoke_ms))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Graph, Mind, Stability};
+    use super::super::{Graph, PeerSnapshot, Stability};
     use super::*;
     use skein_peer::{PeerId, View};
 
@@ -255,9 +258,9 @@ mod tests {
         views: &[Believes<'_>],
         stability: &mut Stability,
     ) {
-        let minds: Vec<Mind> = views
+        let peers: Vec<PeerSnapshot> = views
             .iter()
-            .map(|(id, believes)| Mind {
+            .map(|(id, believes)| PeerSnapshot {
                 id: *id,
                 uav: true,
                 since_ms: 0,
@@ -271,19 +274,19 @@ mod tests {
                 },
             })
             .collect();
-        let graph = Graph::new(minds.iter().map(|m| m.id).collect(), |_, _| true);
+        let graph = Graph::new(peers.iter().map(|m| m.id).collect(), |_, _| true);
         stability.observe(now_ms, &graph, |_| 1, 10_000);
-        let look = Look {
+        let snapshot = Snapshot {
             now_ms,
             loss_permille,
             bounds: BOUNDS,
             graph: &graph,
             stability,
-            minds: &minds,
+            peers: &peers,
             covered: &[],
             loop_hash: 0,
         };
-        m.on_look(&look, found);
+        m.on_snapshot(&snapshot, found);
     }
 
     #[test]

@@ -113,9 +113,9 @@ impl Findings {
     }
 }
 
-/// One running peer at the moment of a look.
+/// One running peer at the moment of a snapshot.
 #[derive(Clone, Debug)]
-pub struct Mind {
+pub struct PeerSnapshot {
     /// Which peer.
     pub id: u16,
     /// Whether it flies.
@@ -126,9 +126,9 @@ pub struct Mind {
     pub view: View,
 }
 
-/// Everything a look sees.
+/// Everything a check may look at: what each peer believes, beside what is true.
 #[derive(Debug)]
-pub struct Look<'a> {
+pub struct Snapshot<'a> {
     /// Scenario time, milliseconds.
     pub now_ms: u64,
     /// Loss on every link now, thousandths.
@@ -140,14 +140,14 @@ pub struct Look<'a> {
     /// Since when it has been so.
     pub stability: &'a Stability,
     /// The running peers, ascending by id.
-    pub minds: &'a [Mind],
+    pub peers: &'a [PeerSnapshot],
     /// What the world saw, by index on the loop; empty before any peer has a loop.
     pub covered: &'a [bool],
     /// Identifies that loop.
     pub loop_hash: u64,
 }
 
-impl Look<'_> {
+impl Snapshot<'_> {
     /// How the present loss grades a bound.
     #[must_use]
     pub fn grade(&self) -> Grade {
@@ -156,16 +156,16 @@ impl Look<'_> {
 
     /// A running peer by its number.
     #[must_use]
-    pub fn mind(&self, id: u16) -> Option<&Mind> {
-        self.minds
+    pub fn peer(&self, id: u16) -> Option<&PeerSnapshot> {
+        self.peers
             .binary_search_by_key(&id, |m| m.id)
             .ok()
-            .map(|i| &self.minds[i])
+            .map(|i| &self.peers[i])
     }
 
     /// The UAVs that hold the loop and can take part in planning.
-    pub fn able(&self) -> impl Iterator<Item = &Mind> {
-        self.minds
+    pub fn able(&self) -> impl Iterator<Item = &PeerSnapshot> {
+        self.peers
             .iter()
             .filter(|m| m.uav && m.view.able && m.view.loop_hash == self.loop_hash)
     }

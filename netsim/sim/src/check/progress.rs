@@ -2,7 +2,7 @@
 //! within endurance (S10), restarted peers productive again (L6), adoptions bounded (L7).
 
 use super::membership::Membership;
-use super::{Clocks, Findings, Look, Mind};
+use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use std::collections::BTreeMap;
 
 /// A plan may be longer than the fuel by this much, milliseconds: ETA and fuel are
@@ -62,15 +62,20 @@ impl ProgressCheck {
     }
 
     /// Looks at everybody's loads and plans.
-    pub fn on_look(&mut self, look: &Look<'_>, members: &Membership, found: &mut Findings) {
-        for m in look.minds {
-            self.check_limits(look.now_ms, m, found);
-            self.check_adoptions(look, m, found);
+    pub fn on_snapshot(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        members: &Membership,
+        found: &mut Findings,
+    ) {
+        for m in snapshot.peers {
+            self.check_limits(snapshot.now_ms, m, found);
+            self.check_adoptions(snapshot, m, found);
         }
-        self.check_restarted(look, members, found);
+        self.check_restarted(snapshot, members, found);
     }
 
-    fn check_limits(&mut self, now_ms: u64, m: &Mind, found: &mut Findings) {
+    fn check_limits(&mut self, now_ms: u64, m: &PeerSnapshot, found: &mut Findings) {
         for (name, used, cap) in &m.view.loads {
             if self.exceeds((m.id, name), *used > *cap, now_ms) {
                 found.broken("S9", now_ms, Some(m.id), || {
@@ -97,14 +102,14 @@ impl ProgressCheck {
     }
 
     /// L7: adoptions are bounded by cells and losses.
-    fn check_adoptions(&mut self, look: &Look<'_>, m: &Mind, found: &mut Findings) {
-        let cap = look.covered.len() as u64 + self.losses + 1;
+    fn check_adoptions(&mut self, snapshot: &Snapshot<'_>, m: &PeerSnapshot, found: &mut Findings) {
+        let cap = snapshot.covered.len() as u64 + self.losses + 1;
         if self.exceeds(
             (m.id, "adoptions"),
             m.view.loop_hash != 0 && u64::from(m.view.adoptions) > cap,
-            look.now_ms,
+            snapshot.now_ms,
         ) {
-            found.broken("L7", look.now_ms, Some(m.id), || {
+            found.broken("L7", snapshot.now_ms, Some(m.id), || {
                 format!("adopted {} divisions, {cap} are allowed", m.view.adoptions)
             });
         }
@@ -112,31 +117,36 @@ impl ProgressCheck {
 
     /// L6: a restarted peer covers, plans, is done, or is not needed: everything open is
     /// listed by others, near whose seam it waits.
-    fn check_restarted(&mut self, look: &Look<'_>, members: &Membership, found: &mut Findings) {
-        let bounds = look.bounds;
+    fn check_restarted(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        members: &Membership,
+        found: &mut Findings,
+    ) {
+        let bounds = snapshot.bounds;
         for (id, r) in &mut self.restarted {
-            let Some(m) = look.mind(*id).filter(|m| m.uav && !r.productive) else {
+            let Some(m) = snapshot.peer(*id).filter(|m| m.uav && !r.productive) else {
                 continue;
             };
-            let waits = m.view.able && all_listed(look);
+            let waits = m.view.able && all_listed(snapshot);
             if m.view.finished || !m.view.plan.is_empty() || waits {
                 r.productive = true;
                 continue;
             }
-            let stable_ms = look
+            let stable_ms = snapshot
                 .stability
                 .component_since_ms(*id)
-                .unwrap_or(look.now_ms);
+                .unwrap_or(snapshot.now_ms);
             let from_ms = (r.boot_ms + bounds.probation_ms()).max(stable_ms);
-            let took_ms = look.now_ms.saturating_sub(from_ms);
-            if look
+            let took_ms = snapshot.now_ms.saturating_sub(from_ms);
+            if snapshot
                 .grade()
                 .limit_ms(bounds.productive_ms())
                 .is_some_and(|l| took_ms > l)
                 && !r.told
             {
                 r.told = true;
-                found.broken("L6", look.now_ms, Some(*id), || {
+                found.broken("L6", snapshot.now_ms, Some(*id), || {
                     format!(
                         "restarted at {} ms (life {}), and {took_ms} ms after its probation neither covers nor plans (able: {})",
                         r.boot_ms,
@@ -150,12 +160,12 @@ impl ProgressCheck {
 }
 
 /// Whether every cell is covered or in somebody's plan.
-fn all_listed(look: &Look<'_>) -> bool {
-    let mut open: Vec<bool> = look.covered.iter().map(|c| !c).collect();
-    for m in look
-        .minds
+fn all_listed(snapshot: &Snapshot<'_>) -> bool {
+    let mut open: Vec<bool> = snapshot.covered.iter().map(|c| !c).collect();
+    for m in snapshot
+        .peers
         .iter()
-        .filter(|m| m.view.loop_hash == look.loop_hash)
+        .filter(|m| m.view.loop_hash == snapshot.loop_hash)
     {
         for c in m
             .view
@@ -188,7 +198,7 @@ mod tests {
             check.on_restart(0, 1);
         }
         for t in 0..seconds {
-            let minds = [Mind {
+            let peers = [PeerSnapshot {
                 id: 1,
                 uav: true,
                 since_ms: 0,
@@ -196,7 +206,7 @@ mod tests {
             }];
             let graph = Graph::new(vec![1], |_, _| false);
             s.observe(t * 1000, &graph, |_| 1, 10_000);
-            let look = Look {
+            let snapshot = Snapshot {
                 now_ms: t * 1000,
                 loss_permille: 0,
                 bounds: Bounds {
@@ -205,11 +215,11 @@ mod tests {
                 },
                 graph: &graph,
                 stability: &s,
-                minds: &minds,
+                peers: &peers,
                 covered: &[false, false],
                 loop_hash: 3,
             };
-            check.on_look(&look, &Membership::default(), &mut found);
+            check.on_snapshot(&snapshot, &Membership::default(), &mut found);
         }
         found.counts
     }

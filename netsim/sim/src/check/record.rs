@@ -2,7 +2,7 @@
 //! speaker a key (S4), no promise before it is durable (S7), and a journal that gives
 //! back the state it was written from (S11).
 
-use super::{Findings, Look};
+use super::{Findings, Snapshot};
 use skein_peer::View;
 use skein_peer::journal::Durable;
 use skein_peer::wire::codec::{self, Body};
@@ -181,8 +181,8 @@ impl RecordCheck {
     }
 
     /// Versions never go back, within a life and across restarts with a disk.
-    pub fn on_look(&mut self, look: &Look<'_>, found: &mut Findings) {
-        for m in look.minds {
+    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        for m in snapshot.peers {
             let now = versions(&m.view);
             let old = self.versions.insert(m.id, now).unwrap_or_default();
             // A boot that has not read its journal yet has no life.
@@ -204,7 +204,7 @@ impl RecordCheck {
                 );
             }
             if back {
-                found.broken("S3", look.now_ms, Some(m.id), || {
+                found.broken("S3", snapshot.now_ms, Some(m.id), || {
                     format!("went back from {old:?} to {now:?}")
                 });
             }

@@ -73,7 +73,7 @@ impl LinkTable {
 
 #[cfg(test)]
 mod tests {
-    use crate::chaos::Fault;
+    use crate::fault::Fault;
     use crate::radio::{LinkTable, Overlay};
     use crate::world::World;
     use crate::world::fixture::square;

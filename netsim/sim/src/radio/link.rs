@@ -3,7 +3,7 @@
 //! In this mode a link beyond the range or behind a building is simply cut; path loss
 //! and fading belong to a budget mode.
 
-use crate::chaos::Fault;
+use crate::fault::Fault;
 use crate::spec::RadioSpec;
 use crate::world::{Place, World};
 use skein_link::{LinkState, Reason};

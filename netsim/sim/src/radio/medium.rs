@@ -422,7 +422,7 @@ impl Station {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chaos::Fault;
+    use crate::fault::Fault;
     use crate::radio::Overlay;
     use crate::spec::Spec;
     use crate::world::World;

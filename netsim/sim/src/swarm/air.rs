@@ -2,11 +2,11 @@
 //! channel, judge, in milliseconds of scenario time.
 
 use super::stream::{Concern, Stream};
-use crate::chaos::Fault;
 use crate::check::Graph;
+use crate::fault::Fault;
+use crate::prepared::Prepared;
 use crate::radio::{Delivery, Frame, LinkTable, Medium, Overlay};
 use crate::spec::RadioSpec;
-use crate::stage::Stage;
 use crate::world::{Fact, World};
 use skein_behaviors::{Percept, Setpoint};
 use skein_link::Reason;
@@ -29,10 +29,10 @@ pub struct Air {
 impl Air {
     /// Everything at time 0.
     #[must_use]
-    pub fn new(stage: &Stage, seed: u64) -> Self {
+    pub fn new(prepared: &Prepared, seed: u64) -> Self {
         let radio_seed = Stream::new(seed, Concern::Radio).any();
-        let world = World::on(Arc::clone(&stage.site), &stage.spec, seed);
-        let radio = stage.spec.radio;
+        let world = World::on(Arc::clone(&prepared.site), &prepared.spec, seed);
+        let radio = prepared.spec.radio;
         Self {
             links: LinkTable::new(world.nodes(), radio),
             medium: Medium::new(world.nodes(), radio, radio_seed),

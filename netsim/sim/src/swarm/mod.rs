@@ -8,42 +8,40 @@
 //! |---|---|
 //! | [`queue`] | the event queue |
 //! | [`stream`] | independent random streams |
-//! | [`slot`] | one peer: process, clock, disk, inbox |
+//! | [`sim_peer`] | one peer: process, clock, disk, inbox |
 //! | [`air`] | the world and the medium as the driver uses them |
-//! | [`ground`] | common ground derived once |
-//! | [`fault`] | what each fault does |
+//! | [`fault_effects`] | what each fault does |
 //! | [`outcome`] | what a run came to |
 
 pub mod air;
-pub mod fault;
-pub mod ground;
+pub mod fault_effects;
 pub mod outcome;
 pub mod queue;
-pub mod slot;
+pub mod sim_peer;
 pub mod stream;
 
-pub use ground::Grounds;
+pub use crate::geometry_cache::Grounds;
 pub use outcome::Outcome;
 
 #[cfg(test)]
 mod tests;
 
-use crate::chaos::TimedFault;
 use crate::check::listing::Version;
 use crate::check::record::Said;
-use crate::check::{Checker, Mind};
+use crate::check::{Checker, PeerSnapshot};
+use crate::fault::TimedFault;
 use crate::history::{History, Kind, What, bytes_hash, report_hash};
+use crate::prepared::Prepared;
 use crate::radio::{Delivery, Frame};
 use crate::spec::Spec;
-use crate::stage::Stage;
 use crate::world::Fact;
 use air::Air;
 use queue::{Phase, Queue};
+use sim_peer::{Process, SimPeer};
 use skein_behaviors::Setpoint;
 use skein_peer::plan::{Answer, Problem};
 use skein_peer::wire::message::Register;
 use skein_peer::{Input, Mission, Output, PeerConfig, PeerId, Report, Role, View};
-use slot::{Process, Slot};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -59,26 +57,26 @@ enum Event {
     Boot(usize),
     Fault(usize),
     Percept {
-        slot: usize,
+        idx: usize,
         boot: u32,
     },
     Timer {
-        slot: usize,
+        idx: usize,
         boot: u32,
         due_ms: u64,
     },
     Stored {
-        slot: usize,
+        idx: usize,
         boot: u32,
     },
     Planned {
-        slot: usize,
+        idx: usize,
         boot: u32,
         token: u64,
         answer: Answer,
     },
     Receive(Vec<Delivery>),
-    Look,
+    Judge,
 }
 
 /// A run under way.
@@ -89,7 +87,7 @@ pub struct Swarm {
     now_ms: u64,
     end_ms: u64,
     queue: Queue<Event>,
-    slots: Vec<Slot>,
+    peers: Vec<SimPeer>,
     air: Air,
     grounds: Grounds,
     /// The operator's newest.
@@ -115,9 +113,9 @@ pub struct Swarm {
 impl Swarm {
     /// A swarm before its first event. `keep` keeps the main events for a timeline.
     #[must_use]
-    pub fn new(stage: &Stage, seed: u64, faults: Vec<TimedFault>, keep: bool) -> Self {
-        let spec = &stage.spec;
-        let mut grounds = stage.grounds.clone();
+    pub fn new(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, keep: bool) -> Self {
+        let spec = &prepared.spec;
+        let mut grounds = prepared.grounds.clone();
         let loop_of = grounds.of(&spec.mission);
         let (covered, loop_hash) = loop_of.map_or((Vec::new(), 0), |g| {
             (vec![false; g.coverage_loop.len()], g.coverage_loop.hash())
@@ -128,8 +126,8 @@ impl Swarm {
             now_ms: 0,
             end_ms: u64::from(spec.max_time_s) * 1000,
             queue: Queue::default(),
-            slots: slots(spec, seed),
-            air: Air::new(stage, seed),
+            peers: sim_peers(spec, seed),
+            air: Air::new(prepared, seed),
             grounds,
             mission: Arc::clone(&spec.mission),
             faults,
@@ -150,13 +148,13 @@ impl Swarm {
             swarm.queue.push(f.at_ms, Phase::Act, Event::Fault(i));
         }
         let latest_ms = swarm.period_ms() / 2;
-        for slot in 0..swarm.slots.len() {
-            let first_ms = swarm.slots[slot].first_boot_ms(latest_ms);
-            swarm.queue.push(first_ms, Phase::Act, Event::Boot(slot));
+        for idx in 0..swarm.peers.len() {
+            let first_ms = swarm.peers[idx].first_boot_ms(latest_ms);
+            swarm.queue.push(first_ms, Phase::Act, Event::Boot(idx));
         }
         swarm
             .queue
-            .push(swarm.period_ms(), Phase::Judge, Event::Look);
+            .push(swarm.period_ms(), Phase::Judge, Event::Judge);
         swarm
     }
 
@@ -212,8 +210,8 @@ impl Swarm {
     /// What a running peer believes.
     #[must_use]
     pub fn view(&self, id: u16) -> Option<View> {
-        let slot = &self.slots[self.slot_of(id)?];
-        slot.peer.as_ref().map(skein_peer::Peer::view)
+        let sim_peer = &self.peers[self.peer_idx(id)?];
+        sim_peer.peer.as_ref().map(skein_peer::Peer::view)
     }
 
     /// The checks so far.
@@ -232,8 +230,8 @@ impl Swarm {
         u64::from(self.spec.beacon_period_ms.max(1))
     }
 
-    fn slot_of(&self, id: u16) -> Option<usize> {
-        self.slots.iter().position(|s| s.id() == id)
+    fn peer_idx(&self, id: u16) -> Option<usize> {
+        self.peers.iter().position(|s| s.id() == id)
     }
 
     fn happen(&mut self, event: Event) {
@@ -243,55 +241,55 @@ impl Swarm {
                 self.strike(&fault);
             }
             // A fault may have started it before.
-            Event::Boot(slot) => {
-                if self.slots[slot].boots == 0 {
-                    self.boot(slot, false, false);
+            Event::Boot(idx) => {
+                if self.peers[idx].boots == 0 {
+                    self.boot(idx, false, false);
                 }
             }
-            Event::Percept { slot, boot } => self.sense(slot, boot),
-            Event::Timer { slot, boot, due_ms } => self.timer(slot, boot, due_ms),
-            Event::Stored { slot, boot } => {
-                if self.slots[slot].boots == boot
-                    && let Some(token) = self.slots[slot].disk.sync()
+            Event::Percept { idx, boot } => self.sense(idx, boot),
+            Event::Timer { idx, boot, due_ms } => self.timer(idx, boot, due_ms),
+            Event::Stored { idx, boot } => {
+                if self.peers[idx].boots == boot
+                    && let Some(token) = self.peers[idx].disk.sync()
                 {
-                    self.fold(slot, Kind::Stored, token);
-                    self.feed(slot, Input::Stored { token, ok: true });
+                    self.fold(idx, Kind::Stored, token);
+                    self.feed(idx, Input::Stored { token, ok: true });
                 }
             }
             Event::Planned {
-                slot,
+                idx,
                 boot,
                 token,
                 answer,
             } => {
-                if self.slots[slot].boots == boot {
-                    self.fold(slot, Kind::Planned, token);
-                    self.feed(slot, Input::Planned { token, answer });
+                if self.peers[idx].boots == boot {
+                    self.fold(idx, Kind::Planned, token);
+                    self.feed(idx, Input::Planned { token, answer });
                 }
             }
             Event::Receive(deliveries) => self.receive(deliveries),
-            Event::Look => self.look(),
+            Event::Judge => self.judge(),
         }
     }
 
-    fn fold(&mut self, slot: usize, kind: Kind, content: u64) {
+    fn fold(&mut self, idx: usize, kind: Kind, content: u64) {
         self.history
-            .fold(self.now_ms, self.slots[slot].id(), kind, content);
+            .fold(self.now_ms, self.peers[idx].id(), kind, content);
     }
 
     /// Percepts of different UAVs are spread over the period, so that no tick does all
-    /// the work and no two minds decide on the same instant by construction.
-    fn first_percept_ms(&self, slot: usize) -> u64 {
+    /// the work and no two peers decide on the same instant by construction.
+    fn first_percept_ms(&self, idx: usize) -> u64 {
         let period_ms = u64::from(self.spec.percept_period_ms.max(1));
-        let spread_ms = slot as u64 * period_ms / self.slots.len().max(1) as u64;
+        let spread_ms = idx as u64 * period_ms / self.peers.len().max(1) as u64;
         // The world steps at multiples of its own step; other instants would cost more of them.
         let phase_ms = spread_ms - spread_ms % crate::world::STEP_MS;
         let past = (self.now_ms + period_ms).saturating_sub(phase_ms) / period_ms;
         past * period_ms + phase_ms
     }
 
-    fn sense(&mut self, slot: usize, boot: u32) {
-        let s = &self.slots[slot];
+    fn sense(&mut self, idx: usize, boot: u32) {
+        let s = &self.peers[idx];
         if s.boots != boot || s.process == Process::Stopped || !s.airframe {
             return;
         }
@@ -299,15 +297,15 @@ impl Swarm {
         self.air.advance(self.now_ms);
         self.judge_world();
         let Some(percept) = self.air.percept(id) else {
-            self.airframe_lost(slot);
+            self.airframe_lost(idx);
             return;
         };
         self.history
             .fold(self.now_ms, id, Kind::Percept, quantised(&percept.pose));
         let again_ms = self.now_ms + u64::from(self.spec.percept_period_ms.max(1));
         self.queue
-            .push(again_ms, Phase::Sense, Event::Percept { slot, boot });
-        self.feed(slot, Input::Percept(percept));
+            .push(again_ms, Phase::Sense, Event::Percept { idx, boot });
+        self.feed(idx, Input::Percept(percept));
     }
 
     /// Zone entries and the moment of completion, as the world's judge sees them.
@@ -326,8 +324,8 @@ impl Swarm {
         }
     }
 
-    fn timer(&mut self, slot: usize, boot: u32, due_ms: u64) {
-        let s = &mut self.slots[slot];
+    fn timer(&mut self, idx: usize, boot: u32, due_ms: u64) {
+        let s = &mut self.peers[idx];
         if s.boots != boot || s.timer_ms != Some(due_ms) {
             return;
         }
@@ -342,16 +340,16 @@ impl Swarm {
             .map(|t| t.0.saturating_sub(s.offset_ms));
         // The peer may want it later by now: then no input is spent.
         if wants_ms.is_some_and(|w| w <= self.now_ms) {
-            self.fold(slot, Kind::Timer, 0);
-            self.feed(slot, Input::Timer);
+            self.fold(idx, Kind::Timer, 0);
+            self.feed(idx, Input::Timer);
         } else {
-            self.schedule_timer(slot);
+            self.schedule_timer(idx);
         }
     }
 
-    fn schedule_timer(&mut self, slot: usize) {
+    fn schedule_timer(&mut self, idx: usize) {
         let now_ms = self.now_ms;
-        let s = &mut self.slots[slot];
+        let s = &mut self.peers[idx];
         let Some(wants) = s.peer.as_ref().and_then(skein_peer::Peer::next_timeout) else {
             return;
         };
@@ -361,7 +359,7 @@ impl Swarm {
             s.timer_ms = Some(due_ms);
             let boot = s.boots;
             self.queue
-                .push(due_ms, Phase::Decide, Event::Timer { slot, boot, due_ms });
+                .push(due_ms, Phase::Decide, Event::Timer { idx, boot, due_ms });
         }
     }
 
@@ -388,10 +386,10 @@ impl Swarm {
     fn receive(&mut self, deliveries: Vec<Delivery>) {
         let mut known: Option<(*const u8, u64)> = None;
         for d in deliveries {
-            let Some(slot) = self.slot_of(d.rx) else {
+            let Some(idx) = self.peer_idx(d.rx) else {
                 continue;
             };
-            if self.slots[slot].process == Process::Stopped {
+            if self.peers[idx].process == Process::Stopped {
                 continue;
             }
             // Receivers of one transmission share its bytes, so they are hashed once.
@@ -400,8 +398,8 @@ impl Swarm {
                 _ => bytes_hash(&d.bytes),
             };
             known = Some((d.bytes.as_ptr(), hash));
-            self.fold(slot, Kind::Receive, hash);
-            if self.slots[slot].process == Process::Running
+            self.fold(idx, Kind::Receive, hash);
+            if self.peers[idx].process == Process::Running
                 && let Some((author, version, claim)) = self.claims.get(&hash)
             {
                 self.checker
@@ -409,7 +407,7 @@ impl Swarm {
                     .on_heard((d.rx, *author), *version, claim);
             }
             self.feed(
-                slot,
+                idx,
                 Input::Received {
                     transmitter: d.tx,
                     hops: d.hops,
@@ -420,9 +418,9 @@ impl Swarm {
     }
 
     /// Gives one input to a peer and does what it says.
-    fn feed(&mut self, slot: usize, input: Input) {
+    fn feed(&mut self, idx: usize, input: Input) {
         let now_ms = self.now_ms;
-        let s = &mut self.slots[slot];
+        let s = &mut self.peers[idx];
         match s.process {
             Process::Stopped => return,
             Process::Paused => return s.wait(input),
@@ -433,15 +431,15 @@ impl Swarm {
         };
         peer.handle(s.clock(now_ms), input);
         while let Some(output) = peer.poll() {
-            self.perform(slot, output);
+            self.perform(idx, output);
         }
-        self.slots[slot].peer = Some(peer);
-        self.schedule_timer(slot);
+        self.peers[idx].peer = Some(peer);
+        self.schedule_timer(idx);
     }
 
-    fn perform(&mut self, slot: usize, output: Output) {
-        let id = self.slots[slot].id();
-        let boot = self.slots[slot].boots;
+    fn perform(&mut self, idx: usize, output: Output) {
+        let id = self.peers[idx].id();
+        let boot = self.peers[idx].boots;
         match output {
             Output::Publish {
                 key,
@@ -453,7 +451,7 @@ impl Swarm {
                 let hash = bytes_hash(&bytes);
                 self.history.fold(self.now_ms, id, Kind::Publish, hash);
                 if hops == 0 {
-                    self.said(slot, &bytes, hash);
+                    self.said(idx, &bytes, hash);
                 }
                 let frame = Frame {
                     key: bytes_hash(key.as_bytes()),
@@ -470,9 +468,9 @@ impl Swarm {
                 self.air.apply(id, setpoint);
             }
             Output::Store { token, record } => {
-                let done_ms = self.slots[slot].disk.write(self.now_ms, token, record);
+                let done_ms = self.peers[idx].disk.write(self.now_ms, token, record);
                 self.queue
-                    .push(done_ms, Phase::Answer, Event::Stored { slot, boot });
+                    .push(done_ms, Phase::Answer, Event::Stored { idx, boot });
             }
             Output::Plan { token, problem } => {
                 let takes_ms = match problem {
@@ -484,7 +482,7 @@ impl Swarm {
                     self.now_ms + takes_ms,
                     Phase::Answer,
                     Event::Planned {
-                        slot,
+                        idx,
                         boot,
                         token,
                         answer,
@@ -495,13 +493,13 @@ impl Swarm {
         }
     }
 
-    fn said(&mut self, slot: usize, bytes: &[u8], hash: u64) {
-        let id = self.slots[slot].id();
+    fn said(&mut self, idx: usize, bytes: &[u8], hash: u64) {
+        let id = self.peers[idx].id();
         if let Some(said) = Said::read(bytes) {
             if said.claim.is_some() {
                 self.refresh_covered();
             }
-            let durable = (self.slots[slot].disk.records(), self.covered.as_slice());
+            let durable = (self.peers[idx].disk.records(), self.covered.as_slice());
             self.checker.on_said(self.now_ms, id, &said, hash, durable);
             if let Some(claim) = said.claim {
                 let r = &said.record;
@@ -531,27 +529,27 @@ impl Swarm {
             .keep(self.now_ms, || What::Report { peer: id, report });
     }
 
-    /// Looks at every mind, once a beacon period.
-    fn look(&mut self) {
+    /// Judges what every peer believes, once a beacon period.
+    fn judge(&mut self) {
         self.queue
-            .push(self.now_ms + self.period_ms(), Phase::Judge, Event::Look);
+            .push(self.now_ms + self.period_ms(), Phase::Judge, Event::Judge);
         self.air.advance(self.now_ms);
         self.judge_world();
         self.observe_graph();
         self.refresh_covered();
-        let minds: Vec<Mind> = self.slots.iter().filter_map(mind).collect();
+        let peers: Vec<PeerSnapshot> = self.peers.iter().filter_map(snapshot).collect();
         let loss_permille = self.air.loss_permille();
-        self.checker.on_look(
+        self.checker.on_snapshot(
             self.now_ms,
             loss_permille,
-            &minds,
+            &peers,
             &self.covered,
             self.loop_hash,
         );
-        self.unassigned = minds.iter().any(|m| !m.view.unassigned.is_empty());
+        self.unassigned = peers.iter().any(|m| !m.view.unassigned.is_empty());
         let mut flying = 0;
         let mut finished = true;
-        for m in minds.iter().filter(|m| m.uav) {
+        for m in peers.iter().filter(|m| m.uav) {
             flying += 1;
             finished &= m.view.finished;
         }
@@ -567,10 +565,10 @@ impl Swarm {
 
     fn observe_graph(&mut self) {
         let running = self
-            .slots
+            .peers
             .iter()
             .filter(|s| s.process == Process::Running)
-            .map(Slot::id);
+            .map(SimPeer::id);
         let mut ids: Vec<u16> = running.collect();
         ids.sort_unstable();
         let graph = self.air.graph(ids);
@@ -607,7 +605,7 @@ impl Swarm {
 }
 
 /// The peers of a scenario, ascending by number.
-fn slots(spec: &Spec, seed: u64) -> Vec<Slot> {
+fn sim_peers(spec: &Spec, seed: u64) -> Vec<SimPeer> {
     let config = |id: u16| PeerConfig {
         id: PeerId(id),
         role: Role::Uav,
@@ -620,11 +618,11 @@ fn slots(spec: &Spec, seed: u64) -> Vec<Slot> {
         mission: Some(Arc::clone(&spec.mission)),
         seed: 0,
     };
-    let mut slots: Vec<Slot> = spec
+    let mut peers: Vec<SimPeer> = spec
         .uavs
         .iter()
         .map(|u| {
-            Slot::new(
+            SimPeer::new(
                 seed,
                 PeerConfig {
                     airframe: Some(u.airframe),
@@ -635,7 +633,7 @@ fn slots(spec: &Spec, seed: u64) -> Vec<Slot> {
         })
         .collect();
     if let Some(g) = &spec.ground {
-        slots.push(Slot::new(
+        peers.push(SimPeer::new(
             seed,
             PeerConfig {
                 role: Role::Ground,
@@ -644,19 +642,19 @@ fn slots(spec: &Spec, seed: u64) -> Vec<Slot> {
             },
         ));
     }
-    slots.sort_by_key(Slot::id);
-    slots
+    peers.sort_by_key(SimPeer::id);
+    peers
 }
 
-fn mind(slot: &Slot) -> Option<Mind> {
-    let peer = slot
+fn snapshot(of: &SimPeer) -> Option<PeerSnapshot> {
+    let peer = of
         .peer
         .as_ref()
-        .filter(|_| slot.process == Process::Running)?;
-    Some(Mind {
-        id: slot.id(),
-        uav: slot.config.role == Role::Uav,
-        since_ms: slot.since_ms,
+        .filter(|_| of.process == Process::Running)?;
+    Some(PeerSnapshot {
+        id: of.id(),
+        uav: of.config.role == Role::Uav,
+        since_ms: of.since_ms,
         view: peer.view(),
     })
 }

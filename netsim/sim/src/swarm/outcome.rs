@@ -1,11 +1,11 @@
 //! What a run came to.
 
-use super::{Swarm, slot::Slot};
-use crate::chaos::TimedFault;
+use super::{Swarm, sim_peer::SimPeer};
 use crate::check::listing::Takeover;
 use crate::check::{Reached, Violation};
+use crate::fault::TimedFault;
 use crate::history::Entry;
-use crate::stage::Stage;
+use crate::prepared::Prepared;
 use skein_link::Reason;
 use std::collections::BTreeMap;
 
@@ -86,10 +86,10 @@ impl Swarm {
                 )
             });
         }
-        for slot in &self.slots {
-            if let Some(peer) = &slot.peer {
+        for p in &self.peers {
+            if let Some(peer) = &p.peer {
                 self.checker
-                    .on_crash(self.now_ms, slot.id(), &peer.durable(), slot.disk.records());
+                    .on_crash(self.now_ms, p.id(), &peer.durable(), p.disk.records());
             }
         }
         let takeovers = self.checker.takeovers().to_vec();
@@ -104,10 +104,10 @@ impl Swarm {
             detect_ms: std::mem::take(&mut self.checker.members.detect_ms),
             takeovers,
             false_downs: std::mem::take(&mut self.checker.members.false_downs),
-            peer_ms: self.slots.iter().map(|s| s.ran_ms(self.now_ms)).sum(),
+            peer_ms: self.peers.iter().map(|s| s.ran_ms(self.now_ms)).sum(),
             bytes: self.air.bytes(),
             kills: self.kills,
-            dead: u32::try_from(self.slots.iter().filter(|s| is_gone(s)).count())
+            dead: u32::try_from(self.peers.iter().filter(|s| is_gone(s)).count())
                 .unwrap_or(u32::MAX),
             loss_permille: self.loss_max_permille,
             reached: self.checker.reached,
@@ -124,16 +124,16 @@ impl Swarm {
     }
 
     fn unfinished(&self) -> Vec<u16> {
-        let running = self.slots.iter().filter(|s| s.config.airframe.is_some());
+        let running = self.peers.iter().filter(|s| s.config.airframe.is_some());
         running
             .filter(|s| s.peer.as_ref().is_some_and(|p| !p.view().finished))
-            .map(Slot::id)
+            .map(SimPeer::id)
             .collect()
     }
 }
 
-fn is_gone(slot: &Slot) -> bool {
-    slot.config.airframe.is_some() && slot.peer.is_none()
+fn is_gone(p: &SimPeer) -> bool {
+    p.config.airframe.is_some() && p.peer.is_none()
 }
 
 impl Outcome {
@@ -147,8 +147,8 @@ impl Outcome {
 
 /// Runs a swarm; a panic anywhere in it becomes a violation of S12 that names the seed.
 #[must_use]
-pub fn run_guarded(stage: &Stage, seed: u64, faults: Vec<TimedFault>, keep: bool) -> Outcome {
-    let run = std::panic::AssertUnwindSafe(|| Swarm::new(stage, seed, faults, keep).run());
+pub fn run_guarded(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, keep: bool) -> Outcome {
+    let run = std::panic::AssertUnwindSafe(|| Swarm::new(prepared, seed, faults, keep).run());
     std::panic::catch_unwind(run).unwrap_or_else(|payload| {
         let text = payload
             .downcast_ref::<&str>()

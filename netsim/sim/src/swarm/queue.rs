@@ -5,7 +5,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// What comes first among events of the same millisecond: faults act, the radio
-/// carries, disks and planners answer, sensors sense, minds decide, judges look.
+/// carries, disks and planners answer, sensors sense, peers decide, checks run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Phase {
     /// Faults of the scenario.

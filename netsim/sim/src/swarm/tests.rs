@@ -1,18 +1,18 @@
 //! Stories of whole swarms on the small fixture, with every check running.
 
 use super::*;
-use crate::chaos::Fault;
+use crate::fault::Fault;
 use crate::world::fixture;
 use skein_planning::trajectory::wind::Wind;
 
 /// The fixture without its zone: every cell of it is on the loop.
-fn stage(n_uavs: u16) -> Stage {
+fn prepared(n_uavs: u16) -> Prepared {
     let mut spec = fixture::square(n_uavs);
     spec.zones.clear();
     let mut mission = (*spec.mission).clone();
     mission.zones.clear();
     spec.mission = Arc::new(mission);
-    Stage::new(spec)
+    Prepared::new(spec)
 }
 
 fn at(at_ms: u64, fault: Fault) -> TimedFault {
@@ -30,7 +30,7 @@ fn completed(o: &Outcome) {
 
 #[test]
 fn three_peers_cover_the_square_and_all_know() {
-    let o = stage(3).run(1, Vec::new(), true);
+    let o = prepared(3).run(1, Vec::new(), true);
     completed(&o);
     assert!(o.violation_counts.is_empty(), "{:?}", o.violations);
     let finished = o.entries.iter().filter(|e| {
@@ -48,11 +48,11 @@ fn three_peers_cover_the_square_and_all_know() {
 
 #[test]
 fn a_wind_costs_time_and_nothing_else() {
-    let calm = stage(3).run(1, Vec::new(), false);
+    let calm = prepared(3).run(1, Vec::new(), false);
     for wind in [Wind::new(2.0, 1.0), Wind::new(-1.5, 2.0)] {
         let mut spec = fixture::square(3);
         spec.wind = wind;
-        let o = Stage::new(spec).run(1, vec![at(60_000, Fault::Kill { peer: 2 })], false);
+        let o = Prepared::new(spec).run(1, vec![at(60_000, Fault::Kill { peer: 2 })], false);
         assert!(o.completed, "{:?}", o.violations);
         assert!(o.violation_counts.is_empty(), "{:?}", o.violations);
         assert!(o.makespan_ms > calm.makespan_ms);
@@ -61,13 +61,13 @@ fn a_wind_costs_time_and_nothing_else() {
 
 #[test]
 fn the_same_seed_gives_the_same_history_and_another_seed_another() {
-    let stage = stage(3);
+    let prepared = prepared(3);
     let faults = vec![
         at(30_000, Fault::Kill { peer: 2 }),
         at(0, Fault::Loss { permille: 200 }),
     ];
     let run = |seed: u64| {
-        let o = stage.run(seed, faults.clone(), false);
+        let o = prepared.run(seed, faults.clone(), false);
         (o.history_hash, o.events)
     };
     let first = run(7);
@@ -77,7 +77,7 @@ fn the_same_seed_gives_the_same_history_and_another_seed_another() {
 
 #[test]
 fn the_section_of_a_killed_peer_is_taken_over_and_the_story_says_by_whom() {
-    let o = stage(4).run(2, vec![at(40_000, Fault::Kill { peer: 3 })], false);
+    let o = prepared(4).run(2, vec![at(40_000, Fault::Kill { peer: 3 })], false);
     completed(&o);
     assert_eq!(o.takeovers.len(), 1);
     let t = &o.takeovers[0];
@@ -107,7 +107,7 @@ fn a_paused_peer_goes_on_and_a_partition_heals() {
         at(45_000, Fault::Resume { peer: 4 }),
         at(50_000, Fault::Heal),
     ];
-    let o = stage(4).run(3, faults, true);
+    let o = prepared(4).run(3, faults, true);
     completed(&o);
     let split = o
         .entries
@@ -129,7 +129,7 @@ fn a_restarted_computer_comes_back_in_a_higher_life_with_disk_and_without() {
                 },
             ),
         ];
-        let mut swarm = Swarm::new(&stage(3), 4, faults, false);
+        let mut swarm = Swarm::new(&prepared(3), 4, faults, false);
         swarm.run_until(45_000);
         let view = swarm.view(1).unwrap();
         assert!(
@@ -154,7 +154,7 @@ fn faults_that_do_not_fit_change_nothing() {
         at(3_000, Fault::Kill { peer: 77 }),
         at(4_000, Fault::Heal),
     ];
-    let o = stage(2).run(5, faults, false);
+    let o = prepared(2).run(5, faults, false);
     completed(&o);
     assert_eq!((o.dead, o.kills), (0, 0));
 }
@@ -163,7 +163,7 @@ fn faults_that_do_not_fit_change_nothing() {
 fn who_is_out_of_fuel_is_gone_and_an_impossible_mission_ends_at_its_longest_time() {
     let mut spec = fixture::square(2);
     spec.max_time_s = 60;
-    let o = Stage::new(spec).run(1, Vec::new(), false);
+    let o = Prepared::new(spec).run(1, Vec::new(), false);
     assert!(!o.completed && o.end_ms <= 60_000);
     assert_eq!(o.violation_counts.get("L5"), Some(&1));
 }

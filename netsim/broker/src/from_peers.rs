@@ -72,7 +72,7 @@ impl Trial<'_> {
                         self.note_slow("peers answer late");
                     }
                 }
-                self.arena.apply(id, setpoint);
+                self.world.apply(id, setpoint);
             }
             ToWorld::Report(bytes) => match cbor4ii::serde::from_slice(&bytes) {
                 Ok(report) => {

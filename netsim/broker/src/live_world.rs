@@ -3,7 +3,7 @@
 use crate::verdict::{CoverageVerdict, Uncovered};
 use skein_behaviors::{Percept, Setpoint};
 use skein_link::LinkState;
-use skein_netsim::chaos::Fault;
+use skein_netsim::fault::Fault;
 use skein_netsim::radio::{LinkTable, Overlay};
 use skein_netsim::spec::Spec;
 use skein_netsim::world::{Fact, World};
@@ -11,13 +11,13 @@ use std::collections::BTreeMap;
 
 /// The world of one trial.
 #[derive(Debug)]
-pub struct Arena {
+pub struct LiveWorld {
     world: World,
     links: LinkTable,
     faults: Overlay,
 }
 
-impl Arena {
+impl LiveWorld {
     /// The world of a scenario, before anybody moved.
     #[must_use]
     pub fn new(spec: &Spec, seed: u64) -> Self {

@@ -25,7 +25,7 @@ pub enum Process {
 
 /// One peer.
 #[derive(Debug)]
-pub struct Slot {
+pub struct SimPeer {
     /// What it is told before it starts.
     pub config: PeerConfig,
     /// The mind, while there is a process.
@@ -48,13 +48,13 @@ pub struct Slot {
     pub inbox: VecDeque<Input>,
     /// For when the earliest timer event in the queue is, scenario time.
     pub timer_ms: Option<u64>,
-    /// Whether it held that the mission is finished when last looked at.
+    /// Whether it held that the mission is finished when last judged.
     pub finished: bool,
     clock: Stream,
     nonce: Stream,
 }
 
-impl Slot {
+impl SimPeer {
     /// A peer whose process has not been started.
     #[must_use]
     pub fn new(seed: u64, mut config: PeerConfig) -> Self {

@@ -1,7 +1,7 @@
 //! What all runs of one scenario share, prepared once: the surveyed site and the
 //! common ground of its mission.
 
-use crate::chaos::TimedFault;
+use crate::fault::TimedFault;
 use crate::spec::Spec;
 use crate::swarm::{Grounds, Outcome, Swarm, outcome};
 use crate::world::Site;
@@ -13,7 +13,7 @@ const FAILURE_FREE_SEED: u64 = 0;
 
 /// A scenario, ready to run with any seed and any faults. Cheap to clone and to share.
 #[derive(Clone, Debug)]
-pub struct Stage {
+pub struct Prepared {
     /// The scenario.
     pub spec: Arc<Spec>,
     /// Its buildings and cells.
@@ -22,7 +22,7 @@ pub struct Stage {
     pub grounds: Grounds,
 }
 
-impl Stage {
+impl Prepared {
     /// Surveys the site and derives the loop.
     #[must_use]
     pub fn new(spec: Spec) -> Self {
@@ -73,7 +73,7 @@ impl Stage {
         compare_up_to: u32,
         keep: bool,
     ) -> Outcome {
-        let faults = crate::storm::draw(&self.spec, seed, failure_free_ms);
+        let faults = crate::fault_generator::draw(&self.spec, seed, failure_free_ms);
         self.compared(seed, faults, compare_up_to, keep)
     }
 
@@ -84,10 +84,10 @@ impl Stage {
         compare_up_to: u32,
         keep: bool,
     ) -> Outcome {
-        let compare = crate::storm::kills(&faults) <= compare_up_to;
+        let compare = crate::fault_generator::kills(&faults) <= compare_up_to;
         let mut outcome = self.run(seed, faults.clone(), keep);
         if compare && outcome.makespan_ms.is_some() {
-            outcome.compare(crate::reference::makespan_ms(self, seed, &faults));
+            outcome.compare(crate::omniscient_baseline::makespan_ms(self, seed, &faults));
         }
         outcome
     }

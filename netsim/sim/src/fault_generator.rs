@@ -4,7 +4,7 @@
 //! The number of kills is drawn first and evenly from none to the most allowed, so
 //! that a batch of seeds meets each of them equally often; all else fits round it.
 
-use crate::chaos::{Fault, TimedFault};
+use crate::fault::{Fault, TimedFault};
 use crate::spec::Spec;
 use crate::swarm::stream::{Concern, Stream};
 use skein_peer::mission::mm;

@@ -5,8 +5,8 @@
 //! UAVs that are there; each flies its section with the same executive and airframe.
 //! A UAV whose computer stands still or is down flies nothing, as in the swarm.
 
-use crate::chaos::{Fault, TimedFault};
-use crate::stage::Stage;
+use crate::fault::{Fault, TimedFault};
+use crate::prepared::Prepared;
 use crate::world::World;
 use skein_behaviors::{Event, Executive, Goal};
 use skein_peer::plan::Ground;
@@ -20,11 +20,11 @@ const RETRY_MS: u64 = 5_000;
 
 /// When all coverable cells are covered, milliseconds; `None` when they never are.
 #[must_use]
-pub fn makespan_ms(stage: &Stage, seed: u64, faults: &[TimedFault]) -> Option<u64> {
-    let ground = stage.grounds.clone().of(&stage.spec.mission).ok()?;
-    let mut r = Reference::new(stage, seed, ground);
-    let end_ms = u64::from(stage.spec.max_time_s) * 1000;
-    let period_ms = u64::from(stage.spec.percept_period_ms.max(1));
+pub fn makespan_ms(prepared: &Prepared, seed: u64, faults: &[TimedFault]) -> Option<u64> {
+    let ground = prepared.grounds.clone().of(&prepared.spec.mission).ok()?;
+    let mut r = Baseline::new(prepared, seed, ground);
+    let end_ms = u64::from(prepared.spec.max_time_s) * 1000;
+    let period_ms = u64::from(prepared.spec.percept_period_ms.max(1));
     let mut faults = faults.iter().peekable();
     let mut now_ms = 0;
     while now_ms < end_ms {
@@ -42,8 +42,8 @@ pub fn makespan_ms(stage: &Stage, seed: u64, faults: &[TimedFault]) -> Option<u6
 }
 
 #[derive(Debug)]
-struct Reference<'a> {
-    stage: &'a Stage,
+struct Baseline<'a> {
+    prepared: &'a Prepared,
     world: World,
     ground: Arc<Ground>,
     minds: BTreeMap<u16, Executive>,
@@ -55,27 +55,27 @@ struct Reference<'a> {
     further_laps: u16,
 }
 
-impl<'a> Reference<'a> {
-    fn new(stage: &'a Stage, seed: u64, ground: Arc<Ground>) -> Self {
+impl<'a> Baseline<'a> {
+    fn new(prepared: &'a Prepared, seed: u64, ground: Arc<Ground>) -> Self {
         let mut r = Self {
-            stage,
-            world: World::on(Arc::clone(&stage.site), &stage.spec, seed),
+            prepared,
+            world: World::on(Arc::clone(&prepared.site), &prepared.spec, seed),
             covered: vec![false; ground.coverage_loop.len()],
             ground,
             minds: BTreeMap::new(),
             busy: BTreeMap::new(),
             stale: true,
             solved_ms: 0,
-            further_laps: stage.spec.mission.further_laps,
+            further_laps: prepared.spec.mission.further_laps,
         };
-        for u in &stage.spec.uavs {
+        for u in &prepared.spec.uavs {
             r.start(u.id);
         }
         r
     }
 
     fn start(&mut self, id: u16) {
-        let Some(u) = self.stage.spec.uavs.iter().find(|u| u.id == id) else {
+        let Some(u) = self.prepared.spec.uavs.iter().find(|u| u.id == id) else {
             return;
         };
         let (ring, router) = (&self.ground.coverage_loop, &self.ground.router);
@@ -189,7 +189,7 @@ impl<'a> Reference<'a> {
         let mut robots = Vec::with_capacity(self.minds.len());
         let mut first: BTreeMap<u16, Vec<Leg>> = BTreeMap::new();
         for u in self
-            .stage
+            .prepared
             .spec
             .uavs
             .iter()

@@ -1,9 +1,9 @@
 //! What each fault does to a simulated swarm. A fault that does not fit the state of
 //! its peer (restarting one that runs) changes nothing.
 
-use super::slot::Process;
+use super::sim_peer::Process;
 use super::{Event, Kind, Phase, Swarm, What};
-use crate::chaos::Fault;
+use crate::fault::Fault;
 use skein_peer::input::Command;
 use skein_peer::{Input, Role};
 use std::sync::Arc;
@@ -18,8 +18,8 @@ impl Swarm {
         let subject = match fault {
             Fault::Kill { peer } | Fault::KillComputer { peer } | Fault::Terminate { peer } => {
                 let airframe = matches!(fault, Fault::Kill { .. });
-                if let Some(slot) = self.slot_of(*peer) {
-                    self.end_process(slot, airframe);
+                if let Some(idx) = self.peer_idx(*peer) {
+                    self.end_process(idx, airframe);
                 }
                 *peer
             }
@@ -32,10 +32,10 @@ impl Swarm {
                 *peer
             }
             Fault::Restart { peer, fresh_disk } => {
-                if let Some(slot) = self.slot_of(*peer)
-                    && self.slots[slot].process == Process::Stopped
+                if let Some(idx) = self.peer_idx(*peer)
+                    && self.peers[idx].process == Process::Stopped
                 {
-                    self.boot(slot, true, *fresh_disk);
+                    self.boot(idx, true, *fresh_disk);
                 }
                 *peer
             }
@@ -68,9 +68,9 @@ impl Swarm {
     }
 
     /// Starts a process, with a new airframe where the old one is gone.
-    pub(super) fn boot(&mut self, slot: usize, again: bool, fresh: bool) {
+    pub(super) fn boot(&mut self, idx: usize, again: bool, fresh: bool) {
         let now_ms = self.now_ms;
-        let s = &mut self.slots[slot];
+        let s = &mut self.peers[idx];
         if fresh {
             s.disk.erase();
         }
@@ -83,18 +83,18 @@ impl Swarm {
         let (id, boot) = (s.id(), s.boots);
         self.history.fold(now_ms, id, Kind::Boot, u64::from(boot));
         self.checker.on_boot(now_ms, id, again, fresh);
-        self.feed(slot, start);
+        self.feed(idx, start);
         if uav {
-            let first_ms = self.first_percept_ms(slot);
+            let first_ms = self.first_percept_ms(idx);
             self.queue
-                .push(first_ms, Phase::Sense, Event::Percept { slot, boot });
+                .push(first_ms, Phase::Sense, Event::Percept { idx, boot });
         }
     }
 
     /// The process ends, and the airframe with it or not.
-    fn end_process(&mut self, slot: usize, airframe: bool) {
+    fn end_process(&mut self, idx: usize, airframe: bool) {
         let now_ms = self.now_ms;
-        let s = &mut self.slots[slot];
+        let s = &mut self.peers[idx];
         let id = s.id();
         s.airframe &= !airframe;
         self.air.stop(id, airframe);
@@ -105,15 +105,15 @@ impl Swarm {
         if let Some(peer) = s.stop(now_ms) {
             let believed = peer.durable();
             self.checker
-                .on_crash(now_ms, id, &believed, self.slots[slot].disk.records());
+                .on_crash(now_ms, id, &believed, self.peers[idx].disk.records());
         }
         self.refresh_covered();
         self.checker.on_silent(now_ms, id, true, &self.covered);
     }
 
     /// The world took the airframe: out of fuel, or flown into something.
-    pub(super) fn airframe_lost(&mut self, slot: usize) {
-        self.end_process(slot, true);
+    pub(super) fn airframe_lost(&mut self, idx: usize) {
+        self.end_process(idx, true);
         self.observe_graph();
     }
 
@@ -124,22 +124,22 @@ impl Swarm {
         mission.base = base;
         self.mission = Arc::new(mission);
         let ground = self
-            .slots
+            .peers
             .iter()
             .position(|s| s.config.role == Role::Ground);
-        if let Some(slot) = ground
-            && self.slots[slot].process == Process::Running
+        if let Some(idx) = ground
+            && self.peers[idx].process == Process::Running
         {
             let command = Command::Mission(Arc::clone(&self.mission));
-            self.feed(slot, Input::Command(command));
+            self.feed(idx, Input::Command(command));
         }
     }
 
     fn pause(&mut self, id: u16) {
-        if let Some(slot) = self.slot_of(id)
-            && self.slots[slot].process == Process::Running
+        if let Some(idx) = self.peer_idx(id)
+            && self.peers[idx].process == Process::Running
         {
-            self.slots[slot].stand_still(self.now_ms);
+            self.peers[idx].stand_still(self.now_ms);
             self.checker
                 .on_silent(self.now_ms, id, false, &self.covered);
         }
@@ -147,10 +147,10 @@ impl Swarm {
 
     /// What waited is handled at once, in order; what the peer says to it comes late.
     fn resume(&mut self, id: u16) {
-        let Some(slot) = self.slot_of(id) else {
+        let Some(idx) = self.peer_idx(id) else {
             return;
         };
-        let s = &mut self.slots[slot];
+        let s = &mut self.peers[idx];
         if s.process != Process::Paused {
             return;
         }
@@ -160,8 +160,8 @@ impl Swarm {
         let waiting: Vec<Input> = s.inbox.drain(..).collect();
         self.checker.on_resume(id);
         for input in waiting {
-            self.feed(slot, input);
+            self.feed(idx, input);
         }
-        self.feed(slot, Input::Timer);
+        self.feed(idx, Input::Timer);
     }
 }
