@@ -1,4 +1,4 @@
-//! The rules of the negotiation (protocol §4: rounds, stamps, release, inheritance,
+//! The rules of the negotiation (docs/protocol.md §4: rounds, stamps, release, inheritance,
 //! end; D2.7 §3.6.5 made safe for lost messages), checked exhaustively on a small
 //! swarm: three peers, four to six cells, and `Section` and `Rounds` as they fly.
 //! Left to others: time, radio and motion, which the simulator's stories test.

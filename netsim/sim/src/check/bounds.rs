@@ -1,4 +1,4 @@
-//! How long things may take (protocol §8), and how hard a bound is at which loss.
+//! How long things may take (docs/protocol.md §8), and how hard a bound is at which loss.
 
 /// The bounds at one beacon period and one diameter, milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

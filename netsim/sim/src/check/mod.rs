@@ -1,4 +1,6 @@
-//! What must hold of a swarm, judged from outside while it runs.
+//! What must hold of a swarm, judged from outside while it runs: the rules of
+//! docs/protocol.md §8, which says of each what it means, its bound, and what its
+//! check does not see.
 //!
 //! | module | rules |
 //! |---|---|

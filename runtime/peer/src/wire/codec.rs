@@ -1,6 +1,6 @@
 //! Bytes of records and bodies: CBOR arrays, bounded, checked, one encoding a value.
 //!
-//! Carries out the message formats of D2.7 §2.4. Numbers are in their shortest form,
+//! The formats of docs/protocol.md §7. Numbers are in their shortest form,
 //! lengths are stated, and an array has exactly the elements of its version: what
 //! decodes encodes to the same bytes again, so that hashes and signatures over bytes
 //! and over values agree. **Unknown trailing elements are refused**, not skipped: a

@@ -1,6 +1,6 @@
 //! Natural keys: `<fleet>/v1/<kind>/<subject>/<author>`.
 //!
-//! Carries out the addressing of D2.7 §2.4: an observer attached to any peer sees the
+//! The addressing of docs/protocol.md §7: an observer attached to any peer sees the
 //! whole fleet under names that say what they carry. Only the author *originates*
 //! under its keys; relays put the same bytes there again.
 

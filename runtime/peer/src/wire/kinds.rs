@@ -1,6 +1,7 @@
 //! The table of kinds: what may be said, how large, how urgent, how long it matters.
 //!
-//! Carries out the communication items of D2.7 §2.4 (which messages the swarm needs).
+//! D2.7 §1.3 asks that members tell each other their state and mission status, over
+//! relays too; which records that takes is in docs/protocol.md §7.
 //! The bodies themselves are in [`super::message`], their bytes in [`super::codec`].
 
 use crate::output::Priority;

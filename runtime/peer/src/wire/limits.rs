@@ -1,6 +1,6 @@
 //! What each value on the wire may hold.
 //!
-//! Carries out the message formats of D2.7 §2.4. A value beyond its limit is refused
+//! The limits of docs/protocol.md §7. A value beyond its limit is refused
 //! with the whole record: nothing is clipped, since a clipped value would be one its
 //! author never said.
 

@@ -1,6 +1,6 @@
 //! A JSON Schema per kind, so that a subscriber in any language needs no source of ours.
 //!
-//! Carries out the message formats of D2.7 §2.4. A body is a CBOR array; the schemas
+//! The formats of docs/protocol.md §7. A body is a CBOR array; the schemas
 //! describe its data model and name the places of the array. What no schema can say
 //! (members ascend, positions are those of a mission) is in the descriptions.
 

@@ -1,6 +1,6 @@
 //! The place of the signature.
 //!
-//! Carries out the protection item of D2.7 §2.4. A record ends with its signature,
+//! The protection of docs/protocol.md §7. A record ends with its signature,
 //! and what is signed is every byte before it *as received*, never a re-encoding: so
 //! relays pass records on that they could not have written, and no two readings of
 //! the same content can disagree about its signature.
