@@ -1,4 +1,5 @@
-//! One module a promise.
+//! All deterministic tests of the workspace in one binary: each module holds one thing
+//! that the repository promises.
 
 #![allow(
     clippy::unwrap_used,
@@ -8,5 +9,7 @@
 mod architecture;
 mod configs;
 mod d27;
+mod documents;
 mod model;
+mod names_of_checks;
 mod seeds;
