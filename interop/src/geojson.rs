@@ -1,9 +1,9 @@
 //! GeoJSON (RFC 7946): areas, and buildings with heights; written back as areas.
 //! Coordinates are longitude first. Leaves everything in the plane to the caller.
 
-use crate::cursor::{Cursor, parse};
+use crate::json::{Document, Error, Node};
 use crate::place::{LatLon, orient};
-use crate::{FormatError, Notice, height};
+use crate::{Notice, height};
 use serde_json::{Map, Value, json};
 
 /// A polygon of the file with its properties.
@@ -70,26 +70,26 @@ pub struct Buildings {
 }
 
 /// `[longitude, latitude, ...]`.
-pub(crate) fn position(at: &Cursor<'_>) -> Result<LatLon, FormatError> {
+pub(crate) fn position(at: &Node<'_>) -> Result<LatLon, Error> {
     let items = at.items()?;
     if items.len() < 2 {
         return Err(at.wrong("a position is [longitude, latitude]"));
     }
     Ok(LatLon {
-        lon_deg: items[0].within(-180.0, 180.0, "a longitude in degrees")?,
-        lat_deg: items[1].within(-90.0, 90.0, "a latitude in degrees")?,
+        lon_deg: items[0].number(-180.0, 180.0, "a longitude in degrees")?,
+        lat_deg: items[1].number(-90.0, 90.0, "a latitude in degrees")?,
     })
 }
 
 /// The outer ring, the number of holes, and the rings of the holes that have an area.
 type Rings = (Vec<LatLon>, usize, Vec<Vec<LatLon>>);
 
-fn polygon(at: &Cursor<'_>) -> Result<Rings, FormatError> {
+fn polygon(at: &Node<'_>) -> Result<Rings, Error> {
     let rings = at.items()?;
     let outer = rings
         .first()
         .ok_or_else(|| at.wrong("a polygon has at least one ring"))?;
-    let read = |ring: &Cursor<'_>| {
+    let read = |ring: &Node<'_>| {
         let points = ring.items()?;
         let points = points.iter().map(position).collect::<Result<Vec<_>, _>>()?;
         let points = orient(points);
@@ -107,11 +107,11 @@ fn polygon(at: &Cursor<'_>) -> Result<Rings, FormatError> {
 }
 
 fn geometry(
-    at: &Cursor<'_>,
+    at: &Node<'_>,
     pointer: &str,
     properties: &Map<String, Value>,
     out: &mut Features,
-) -> Result<(), FormatError> {
+) -> Result<(), Error> {
     let kind = at.need("type")?;
     let mut push = |(ring, holes, hole_rings): Rings| {
         if holes > 0 {
@@ -158,18 +158,25 @@ fn geometry(
     Ok(())
 }
 
-fn feature(at: &Cursor<'_>, out: &mut Features) -> Result<(), FormatError> {
+fn properties(at: &Node<'_>) -> Result<Map<String, Value>, Error> {
+    at.members()?;
+    match at.to_json() {
+        Value::Object(map) => Ok(map),
+        _ => Ok(Map::new()),
+    }
+}
+
+fn feature(at: &Node<'_>, out: &mut Features) -> Result<(), Error> {
     let kind = at.need("type")?;
     if kind.text()? != "Feature" {
         return Err(kind.wrong("expected \"Feature\""));
     }
-    let none = Map::new();
     let properties = match at.get("properties")? {
-        Some(p) => p.object()?,
-        None => &none,
+        Some(p) => properties(&p)?,
+        None => Map::new(),
     };
     match at.get("geometry")? {
-        Some(g) => geometry(&g, &at.pointer(), properties, out),
+        Some(g) => geometry(&g, &at.pointer(), &properties, out),
         None => {
             out.notices.push(Notice {
                 pointer: at.pointer(),
@@ -183,10 +190,10 @@ fn feature(at: &Cursor<'_>, out: &mut Features) -> Result<(), FormatError> {
 /// Reads all polygons of a GeoJSON text.
 ///
 /// # Errors
-/// [`FormatError`] names the value that is wrong.
-pub fn read(text: &str) -> Result<Features, FormatError> {
-    let value = parse(text)?;
-    let root = Cursor::root(&value);
+/// [`Error`] names the value that is wrong.
+pub fn read(text: &str) -> Result<Features, Error> {
+    let document = Document::parse("GeoJSON", "", text)?;
+    let root = document.root();
     let kind = root.need("type")?;
     let mut out = Features::default();
     match kind.text()? {
@@ -236,8 +243,8 @@ fn building_height(f: &Feature, rules: &HeightRules, notices: &mut Vec<Notice>) 
 /// Reads buildings: heights from `height`, else `building:levels`, else the rules.
 ///
 /// # Errors
-/// [`FormatError`] names the value that is wrong.
-pub fn buildings(text: &str, rules: &HeightRules) -> Result<Buildings, FormatError> {
+/// [`Error`] names the value that is wrong.
+pub fn buildings(text: &str, rules: &HeightRules) -> Result<Buildings, Error> {
     let features = read(text)?;
     let mut out = Buildings {
         buildings: Vec::with_capacity(features.polygons.len()),
@@ -278,23 +285,23 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_pointer() {
+    fn errors_name_the_place() {
         assert!(error("{").contains("line 1, column"));
-        assert!(error("[]").contains("at /: expected an object, found a list"));
-        assert!(error(r#"{"type":"FeatureCollection"}"#).contains("\"features\" is missing"));
+        assert!(error("[]").contains("GeoJSON: expected an object { ... }, found a list"));
+        assert!(error(r#"{"type":"FeatureCollection"}"#).contains("the field features is missing"));
         let bad = r#"{"type":"Polygon","coordinates":[[[24.9,60.1],[24.9,"x"],[25,60]]]}"#;
         assert!(
-            error(bad).contains("at /coordinates/0/1/1: expected a number"),
+            error(bad).contains("line 1, column 53: coordinates[0][1][1]: expected a number"),
             "{}",
             error(bad)
         );
         let far = r#"{"type":"Polygon","coordinates":[[[24.9,160.1],[24.9,60],[25,60]]]}"#;
         assert!(
-            error(far).contains("at /coordinates/0/0/1: a latitude"),
+            error(far).contains("coordinates[0][0][1]: 160.1 is out of range; expected a latitude"),
             "{}",
             error(far)
         );
-        assert!(error(r#"{"type":"Blob"}"#).contains("at /type: \"Blob\""));
+        assert!(error(r#"{"type":"Blob"}"#).contains("type: \"Blob\""));
     }
 
     #[test]

@@ -1,16 +1,20 @@
-//! The formats of the outside world: QGroundControl plans and GeoJSON.
+//! The formats of the outside world: QGroundControl plans and GeoJSON; and the one reader
+//! of JSON and JSON5 that keeps places, for these and for Skein's own files.
 //!
 //! Text in, text out: no files are opened here, and nothing of WGS84 leaves this
-//! crate but through [`place::to_plane`]. Malformed input is refused with the JSON
-//! pointer of the value that is wrong; what is well-formed but has no meaning for
+//! crate but through [`place::to_plane`]. Malformed input is refused with line, column
+//! and path of the value that is wrong; what is well-formed but has no meaning for
 //! Skein comes back as a [`Notice`], so that nothing is dropped silently.
 //!
 //! | module | what it holds |
 //! |---|---|
+//! | [`json`] | a parsed text whose values know their places |
 //! | [`place`] | latitude and longitude, rings, circles, the way to a mission's plane |
 //! | [`plan`] | QGroundControl `.plan`: geofence, survey, waypoints |
 //! | [`geojson`] | areas, and buildings with heights |
 //! | [`targets`] | points and lines to look at, of both formats |
+//! | [`airframe`] | airframes of scenarios and of peers, with their limits |
+//! | [`fleet`] | fleet files of plans for a team |
 //! | [`height`] | heights as map data writes them: `12.13 m`, `3.5`, `40 ft` |
 //!
 //! ```
@@ -22,38 +26,16 @@
 //! assert!((read.buildings[0].height_m - 7.5).abs() < 1e-9);
 //! ```
 
-mod cursor;
+pub mod airframe;
+pub mod fleet;
 pub mod geojson;
 pub mod height;
+pub mod json;
 pub mod place;
 pub mod plan;
 pub mod targets;
 
 use core::fmt;
-use thiserror::Error;
-
-/// Why a text of a known format was refused. Nothing of it was used.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum FormatError {
-    /// The text is not JSON.
-    #[error("line {line}, column {column}: not valid JSON: {problem}")]
-    Syntax {
-        /// Line, from 1.
-        line: usize,
-        /// Column, from 1.
-        column: usize,
-        /// What the parser says.
-        problem: String,
-    },
-    /// A value is missing or wrong.
-    #[error("at {pointer}: {problem}")]
-    Value {
-        /// JSON pointer (RFC 6901) of the value; `/` stands for the whole text.
-        pointer: String,
-        /// What is wrong and what would be right.
-        problem: String,
-    },
-}
 
 /// Something in the input that was understood, but not used as it stands.
 #[derive(Clone, Debug, PartialEq, Eq)]

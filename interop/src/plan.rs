@@ -1,9 +1,9 @@
 //! QGroundControl `.plan` files: geofence, survey polygons, simple waypoints.
 //! Leaves to the caller what a fence or a survey means for a mission.
 
-use crate::cursor::{Cursor, parse};
+use crate::Notice;
+use crate::json::{Document, Error, Node};
 use crate::place::{LatLon, Shape, orient};
-use crate::{FormatError, Notice};
 use serde_json::{Value, json};
 
 /// The largest radius of a fence circle that is believed, metres: twice the
@@ -47,18 +47,18 @@ pub struct PlanFile {
 }
 
 /// `[latitude, longitude, ...]`.
-pub(crate) fn lat_lon(at: &Cursor<'_>) -> Result<LatLon, FormatError> {
+pub(crate) fn lat_lon(at: &Node<'_>) -> Result<LatLon, Error> {
     let items = at.items()?;
     if items.len() < 2 {
         return Err(at.wrong("a position is [latitude, longitude]"));
     }
     Ok(LatLon {
-        lat_deg: items[0].within(-90.0, 90.0, "a latitude in degrees")?,
-        lon_deg: items[1].within(-180.0, 180.0, "a longitude in degrees")?,
+        lat_deg: items[0].number(-90.0, 90.0, "a latitude in degrees")?,
+        lon_deg: items[1].number(-180.0, 180.0, "a longitude in degrees")?,
     })
 }
 
-fn ring(at: &Cursor<'_>) -> Result<Vec<LatLon>, FormatError> {
+fn ring(at: &Node<'_>) -> Result<Vec<LatLon>, Error> {
     let points = at
         .items()?
         .iter()
@@ -74,7 +74,7 @@ fn ring(at: &Cursor<'_>) -> Result<Vec<LatLon>, FormatError> {
     Ok(ring)
 }
 
-fn fence(at: &Cursor<'_>, out: &mut PlanFile) -> Result<(), FormatError> {
+fn fence(at: &Node<'_>, out: &mut PlanFile) -> Result<(), Error> {
     let mut shapes = Vec::new();
     if let Some(polygons) = at.get("polygons")? {
         for p in polygons.items()? {
@@ -88,7 +88,7 @@ fn fence(at: &Cursor<'_>, out: &mut PlanFile) -> Result<(), FormatError> {
         for c in circles.items()? {
             let circle = c.need("circle")?;
             let radius = circle.need("radius")?;
-            let radius_m = radius.within(0.0, MAX_CIRCLE_M, "a radius in metres")?;
+            let radius_m = radius.number(0.0, MAX_CIRCLE_M, "a radius in metres")?;
             if radius_m <= 0.0 {
                 return Err(radius.wrong("a radius must be above 0"));
             }
@@ -126,17 +126,18 @@ fn fence(at: &Cursor<'_>, out: &mut PlanFile) -> Result<(), FormatError> {
     Ok(())
 }
 
-fn simple_item(at: &Cursor<'_>, out: &mut PlanFile) -> Result<(), FormatError> {
+fn simple_item(at: &Node<'_>, out: &mut PlanFile) -> Result<(), Error> {
     let number = at.need("command")?;
     #[allow(
         clippy::cast_possible_truncation,
         reason = "checked to be a 16-bit command"
     )]
-    let command = number.within(0.0, 65_535.0, "a MAVLink command")? as i64;
+    let command = number.number(0.0, 65_535.0, "a MAVLink command")? as i64;
     let params = at.need("params")?;
     let items = params.items()?;
-    let placed = items.len() == 7 && items[4].value().is_number() && items[5].value().is_number();
-    let zero = |c: &Cursor<'_>| c.value().as_f64().is_some_and(|n| n.abs() < 1e-12);
+    let placed =
+        items.len() == 7 && items[4].as_number().is_some() && items[5].as_number().is_some();
+    let zero = |c: &Node<'_>| c.as_number().is_some_and(|n| n.abs() < 1e-12);
     if !placed || (zero(&items[4]) && zero(&items[5])) {
         let text = format!("command {command} has no place: ignored");
         out.notices.push(Notice {
@@ -148,24 +149,24 @@ fn simple_item(at: &Cursor<'_>, out: &mut PlanFile) -> Result<(), FormatError> {
     out.waypoints.push(Waypoint {
         command,
         at: LatLon {
-            lat_deg: items[4].within(-90.0, 90.0, "a latitude in degrees")?,
-            lon_deg: items[5].within(-180.0, 180.0, "a longitude in degrees")?,
+            lat_deg: items[4].number(-90.0, 90.0, "a latitude in degrees")?,
+            lon_deg: items[5].number(-180.0, 180.0, "a longitude in degrees")?,
         },
-        altitude_m: if items[6].value().is_null() {
+        altitude_m: if items[6].is_null() {
             0.0
         } else {
-            items[6].number()?
+            items[6].finite()?
         },
     });
     Ok(())
 }
 
-fn mission(at: &Cursor<'_>, out: &mut PlanFile) -> Result<(), FormatError> {
+fn mission(at: &Node<'_>, out: &mut PlanFile) -> Result<(), Error> {
     if let Some(home) = at.get("plannedHomePosition")? {
         out.home = Some(lat_lon(&home)?);
     }
     if let Some(speed) = at.get("cruiseSpeed")? {
-        out.cruise_mps = Some(speed.number()?);
+        out.cruise_mps = Some(speed.finite()?);
     }
     let Some(items) = at.get("items")? else {
         return Ok(());
@@ -205,10 +206,13 @@ fn mission(at: &Cursor<'_>, out: &mut PlanFile) -> Result<(), FormatError> {
 /// Reads a plan.
 ///
 /// # Errors
-/// [`FormatError`] names the value that is wrong.
-pub fn read(text: &str) -> Result<PlanFile, FormatError> {
-    let value = parse(text)?;
-    let root = Cursor::root(&value);
+/// [`Error`] names the value that is wrong.
+pub fn read(text: &str) -> Result<PlanFile, Error> {
+    of(&Document::parse("plan", "", text)?.root())
+}
+
+/// The same of a text that was parsed already.
+pub(crate) fn of(root: &Node<'_>) -> Result<PlanFile, Error> {
     let kind = root.need("fileType")?;
     if kind.text()? != "Plan" {
         return Err(kind.wrong("expected \"Plan\""));
@@ -334,20 +338,20 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_pointer() {
+    fn errors_name_the_place() {
         let says =
             |from: &str, to: &str| read(&AVOID.replacen(from, to, 1)).unwrap_err().to_string();
         assert!(
             says("\"radius\":111.05361447891983", "\"radius\":-1")
-                .contains("at /geoFence/circles/0/circle/radius")
+                .contains("geoFence.circles[0].circle.radius: -1 is out of range")
         );
         assert!(
             says("47.3991036", "\"x\"")
-                .contains("at /geoFence/polygons/0/polygon/0/0: expected a number")
+                .contains("geoFence.polygons[0].polygon[0][0]: expected a number")
         );
-        assert!(says("\"Plan\"", "\"Map\"").contains("at /fileType"));
+        assert!(says("\"Plan\"", "\"Map\"").contains(": fileType: expected"));
         assert!(says("{\"UUID\"", "\"UUID\"").contains("line 1"));
-        assert!(says("\"SimpleItem\"", "\"OddItem\"").contains("at /mission/items/0/type"));
+        assert!(says("\"SimpleItem\"", "\"OddItem\"").contains("mission.items[0].type: "));
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! What is to be looked at, as points and lines: GeoJSON points and lines, QGroundControl
 //! waypoints and corridor scans. Leaves areas to [`crate::geojson`] and [`crate::plan`].
 
-use crate::cursor::{Cursor, parse};
 use crate::geojson::position;
+use crate::json::{Document, Error, Node};
 use crate::place::LatLon;
-use crate::{FormatError, Notice, plan};
+use crate::{Notice, plan};
 
 /// A point to look at.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,12 +55,12 @@ const WIDEST_M: f64 = 40_000.0;
 /// are read.
 ///
 /// # Errors
-/// [`FormatError`] names the value that is wrong.
-pub fn read(text: &str) -> Result<Targets, FormatError> {
-    let value = parse(text)?;
-    let root = Cursor::root(&value);
+/// [`Error`] names the value that is wrong.
+pub fn read(text: &str) -> Result<Targets, Error> {
+    let document = Document::parse("targets", "", text)?;
+    let root = document.root();
     if root.get("fileType")?.is_some() {
-        return of_plan(text, &root);
+        return of_plan(&root);
     }
     let mut out = Targets::default();
     let kind = root.need("type")?;
@@ -76,8 +76,8 @@ pub fn read(text: &str) -> Result<Targets, FormatError> {
     Ok(out)
 }
 
-fn of_plan(text: &str, root: &Cursor<'_>) -> Result<Targets, FormatError> {
-    let file = plan::read(text)?;
+fn of_plan(root: &Node<'_>) -> Result<Targets, Error> {
+    let file = plan::of(root)?;
     let mut out = Targets {
         home: file.home,
         ..Targets::default()
@@ -113,7 +113,7 @@ fn of_plan(text: &str, root: &Cursor<'_>) -> Result<Targets, FormatError> {
         let points = line.items()?;
         let way = points.iter().map(plan::lat_lon).collect::<Result<_, _>>()?;
         let asked = Asked {
-            width_m: width.within(0.0, WIDEST_M, "a width in metres")?,
+            width_m: width.number(0.0, WIDEST_M, "a width in metres")?,
             ..Asked::default()
         };
         push_line(&line, &item.pointer(), way, &asked, &mut out)?;
@@ -130,12 +130,12 @@ struct Asked {
 }
 
 fn push_line(
-    at: &Cursor<'_>,
+    at: &Node<'_>,
     pointer: &str,
     way: Vec<LatLon>,
     asked: &Asked,
     out: &mut Targets,
-) -> Result<(), FormatError> {
+) -> Result<(), Error> {
     if way.len() < 2 {
         return Err(at.wrong(format!("a line has at least 2 points, found {}", way.len())));
     }
@@ -148,7 +148,7 @@ fn push_line(
     Ok(())
 }
 
-fn feature(at: &Cursor<'_>, out: &mut Targets) -> Result<(), FormatError> {
+fn feature(at: &Node<'_>, out: &mut Targets) -> Result<(), Error> {
     let kind = at.need("type")?;
     if kind.text()? != "Feature" {
         return Err(kind.wrong("expected \"Feature\""));
@@ -158,7 +158,7 @@ fn feature(at: &Cursor<'_>, out: &mut Targets) -> Result<(), FormatError> {
         None => Ok(None),
     };
     let size = |key: &str| match property(key)? {
-        Some(n) => n.within(0.0, WIDEST_M, "a size in metres"),
+        Some(n) => n.number(0.0, WIDEST_M, "a size in metres"),
         None => Ok(0.0),
     };
     let asked = Asked {
@@ -181,14 +181,9 @@ fn feature(at: &Cursor<'_>, out: &mut Targets) -> Result<(), FormatError> {
     }
 }
 
-fn geometry(
-    at: &Cursor<'_>,
-    pointer: &str,
-    asked: &Asked,
-    out: &mut Targets,
-) -> Result<(), FormatError> {
+fn geometry(at: &Node<'_>, pointer: &str, asked: &Asked, out: &mut Targets) -> Result<(), Error> {
     let kind = at.need("type")?;
-    let point = |p: &Cursor<'_>, out: &mut Targets| -> Result<(), FormatError> {
+    let point = |p: &Node<'_>, out: &mut Targets| -> Result<(), Error> {
         out.points.push(PointTarget {
             pointer: pointer.to_owned(),
             at: position(p)?,
@@ -197,7 +192,7 @@ fn geometry(
         });
         Ok(())
     };
-    let line = |l: &Cursor<'_>, out: &mut Targets| -> Result<(), FormatError> {
+    let line = |l: &Node<'_>, out: &mut Targets| -> Result<(), Error> {
         let way = l.items()?.iter().map(position).collect::<Result<_, _>>()?;
         push_line(l, pointer, way, asked, out)
     };
@@ -254,8 +249,8 @@ mod tests {
             let error = read(&GEOJSON.replacen(from, to, 1)).unwrap_err();
             error.to_string()
         };
-        assert!(says("25,", "-1,").contains("at /features/0/properties/radius_m"));
-        assert!(says("\"rgb\"", "[]").contains("at /features/0/properties/sensor"));
+        assert!(says("25,", "-1,").contains("features[0].properties.radius_m: -1 is"));
+        assert!(says("\"rgb\"", "[]").contains("features[0].properties.sensor: "));
         assert!(says(",[24.91,60.1]]}", "]}").contains("at least 2 points"));
     }
 
@@ -277,7 +272,7 @@ mod tests {
             read(&wrong)
                 .unwrap_err()
                 .to_string()
-                .contains("/mission/items/2/CorridorWidth")
+                .contains("mission.items[2].CorridorWidth: ")
         );
     }
 }

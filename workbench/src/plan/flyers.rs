@@ -4,7 +4,6 @@
 use super::fleet::{Member, Sensor};
 use anyhow::{Result, ensure};
 use skein_planning::frame::{Origin, Point};
-use skein_planning::math::tan;
 use std::collections::BTreeSet;
 
 /// A UAV that takes part.
@@ -133,15 +132,6 @@ pub fn swath_m(member: &Member, defaults: Defaults<'_>, height_m: f64) -> Option
         .or(Some(defaults.swath_m))
 }
 
-impl Sensor {
-    /// Width of the ground that it sees from a height, metres, if it is known.
-    #[must_use]
-    pub fn across_m(&self, height_m: f64) -> Option<f64> {
-        let seen = |fov_deg: f64| 2.0 * height_m * tan(fov_deg.to_radians() / 2.0);
-        self.swath_m.or(self.fov_across_deg.map(seen))
-    }
-}
-
 /// Whether a UAV sees wider from higher.
 #[must_use]
 pub fn depends_on_height(member: &Member) -> bool {
@@ -156,7 +146,7 @@ mod tests {
     fn the_swath_is_that_of_the_sensor_at_its_height() {
         let text = "[{name: 'a', speed_mps: 15, sensors: {rgb: {swath_m: 60}, thermal: {fov_across_deg: 53.13010235415598}}},
             {name: 'b', speed_mps: 15, swath_m: 40, sensors: {rgb: {swath_m: 80}}}, {name: 'c', speed_mps: 15}]";
-        let team = super::super::fleet::parse(text).unwrap();
+        let team = skein_interop::fleet::read("fleet", text).unwrap();
         let origin = Origin {
             lat_deg: 47.0,
             lon_deg: 8.0,

@@ -214,7 +214,7 @@ fn over_area(args: &PatrolArgs) -> Result<Course> {
     let (site, best) = cover::planned(&alone)?;
     let flight = best.flights.first().context("nothing is flown")?;
     let starts = team.iter().map(|m| m.start_in(site.origin));
-    let starts: Vec<Point> = starts.collect::<Result<_>>()?;
+    let starts: Vec<Point> = starts.collect::<Result<_, _>>()?;
     let around = planners::around(&site, tours.clearance_m, starts.iter().copied())?;
     for (member, start) in team.iter().zip(&starts) {
         planners::check_start(&around, &member.name, *start)?;

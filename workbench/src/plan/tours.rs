@@ -193,7 +193,7 @@ impl Ways {
             ways.zones.extend(map.zones);
         }
         for uav in 0..ways.team.len() {
-            let place = match ways.team[uav].place() {
+            let place = match ways.team[uav].start {
                 Some(at) => {
                     let p = ways.point(at, &ways.team[uav].name)?;
                     ways.place(p)

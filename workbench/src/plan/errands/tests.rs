@@ -120,7 +120,7 @@ fn targets_are_flown_by_who_can_see_them() {
         "{text}"
     );
     let number = json!({"type": "Feature", "properties": {"sensor": 3}, "geometry": {"type": "Point", "coordinates": [8.5, 47.0]}});
-    assert!(error(&number, FLEET, &[]).contains("/properties/sensor"));
+    assert!(error(&number, FLEET, &[]).contains("properties.sensor: expected a text"));
     let plain = "[{name: 'a', speed_mps: 15}]";
     assert!(error(&alone, plain, &[]).contains("no UAV of the team lists `sensors`"));
     assert!(error(&alone, FLEET, &["--layer-step-m", "-1"]).contains("--layer-step-m"));
