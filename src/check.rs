@@ -5,7 +5,7 @@ use crate::planner::PlannerArgs;
 use clap::{Args, ValueEnum};
 use skein_netsim::spec::Spec;
 use skein_netsim::world::Survey;
-use skein_peer::Task;
+use skein_peer::CoverageTask;
 use skein_planning::coverage::area::CellId;
 use skein_scenario::{
     AreaPlanner, Forecast, Overrides, Scenario, ScenarioError, Summary, extent_m, forecast,
@@ -105,11 +105,11 @@ impl Judged {
             share: survey.coverable_share(),
             // Squares and pieces of the judge's own have no names on the loop.
             missed: match scenario.spec.mission.task {
-                Task::Area | Task::Points(_) => open
+                CoverageTask::Area | CoverageTask::Points(_) => open
                     .map(|c| c.id)
                     .filter(|id| the_loop.index_of(*id).is_none())
                     .collect(),
-                Task::Exact | Task::Lines(_) => Vec::new(),
+                CoverageTask::Exact | CoverageTask::Lines(_) => Vec::new(),
             },
         }
     }
@@ -191,8 +191,8 @@ fn area_lines(spec: &Spec, total: &Summary, judged: &Judged) -> Vec<Line> {
         lines.push(("missed", text));
     }
     let lanes = match mission.task {
-        Task::Area => format!(", round the tree \"{}\"", mission.tree.name()),
-        Task::Exact | Task::Points(_) | Task::Lines(_) => String::new(),
+        CoverageTask::Area => format!(", round the tree \"{}\"", mission.tree.name()),
+        CoverageTask::Exact | CoverageTask::Points(_) | CoverageTask::Lines(_) => String::new(),
     };
     lines.push(("loop", format!("{:.1} km{lanes}", total.loop_m / 1000.0)));
     lines

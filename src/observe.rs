@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum};
 use skein_broker::registry;
 use skein_node::bus::{Observed, Observer};
 use skein_peer::wire::codec::{Body, open};
-use skein_peer::wire::message::{Listing, Record};
+use skein_peer::wire::message::{ListedRun, Record};
 use skein_peer::wire::signature::Off;
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -180,7 +180,7 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
     let value = match body {
         Body::Beacon(b) => serde_json::to_value(b),
         Body::State(b) => serde_json::to_value(b),
-        Body::Round(b) => serde_json::to_value(b),
+        Body::Bid(b) => serde_json::to_value(b),
         Body::Claim(b) => serde_json::to_value(b),
         Body::Cover(b) => serde_json::to_value(b),
         Body::Mission(b) => serde_json::to_value(b),
@@ -224,7 +224,7 @@ fn words(body: &Body) -> String {
             s.covered,
             s.cells
         ),
-        Body::Round(s) => format!(
+        Body::Bid(s) => format!(
             "bids in round {} of {}, from cell {}",
             s.round.counter,
             s.round
@@ -245,7 +245,7 @@ fn words(body: &Body) -> String {
         Body::Cover(c) => format!(
             "coverage of revision {}, {} bytes",
             c.revision,
-            c.union.len()
+            c.covered.len()
         ),
         Body::Mission(m) => format!("mission revision {} of {} pieces", m.revision, m.chunks),
         Body::Operator(order) => format!("{order:?}"),
@@ -254,11 +254,11 @@ fn words(body: &Body) -> String {
     }
 }
 
-fn listings(all: &[Listing]) -> String {
+fn listings(all: &[ListedRun]) -> String {
     if all.is_empty() {
         return "nothing".to_owned();
     }
-    let one = |l: &Listing| {
+    let one = |l: &ListedRun| {
         let way = if l.backward { "<" } else { ">" };
         format!("{}+{}{way}{:?}", l.run.first, l.run.count, l.firmness)
     };

@@ -303,7 +303,7 @@ fn reported(
             let line = format!("round {counter} among {}", members.join(", "));
             return told.insert(line.clone()).then_some(line);
         }
-        Report::Register {
+        Report::Claim {
             counter,
             take,
             legs,
@@ -312,7 +312,7 @@ fn reported(
             ..
         } => {
             let cells: u32 = legs.iter().map(|l| u32::from(l.count)).sum();
-            let key = format!("register {peer} {counter} {take}");
+            let key = format!("claim {peer} {counter} {take}");
             return told.insert(key).then(|| {
                 let held = if held.is_empty() {
                     String::new()

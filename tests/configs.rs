@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use proptest::prelude::*;
-use skein_peer::Task;
+use skein_peer::CoverageTask;
 use skein_planning::coverage::area::patch::Patches;
 use skein_planning::frame::{Point, Vector};
 use skein_scenario::{
@@ -138,12 +138,14 @@ fn the_planner_misses_no_cell_that_the_world_calls_coverable() {
         // The middles of the judge's own squares lie in the pieces of the passes, and its
         // pieces of lines in the stations.
         let planned = |c: &&skein_netsim::world::Cell| match the_loop.patches() {
-            Patches::Listed(list) if matches!(scenario.spec.mission.task, Task::Lines(_)) => {
+            Patches::Listed(list)
+                if matches!(scenario.spec.mission.task, CoverageTask::Lines(_)) =>
+            {
                 let piece = survey.pieces().unwrap().rings()[usize::from(c.id.number().unwrap())];
                 let holds = |station: &[Point; 4]| piece.iter().all(|p| within(station, *p, 0.01));
                 list.corners().iter().any(holds)
             }
-            Patches::Listed(list) if scenario.spec.mission.task == Task::Exact => {
+            Patches::Listed(list) if scenario.spec.mission.task == CoverageTask::Exact => {
                 let side_m = survey.lane_m();
                 let at = Point::new(
                     (f64::from(c.id.col) + 0.5) * side_m,

@@ -20,14 +20,14 @@
 //! - Covered cells are learnt one by one from anybody who knows them: every stale,
 //!   cut or repeated union is some sequence of such steps.
 //! - Versions count only by their order, and fields that no rule reads (ETA, cells
-//!   done, the register's own epoch) are not published.
+//!   done, the claim's own epoch) are not published.
 //! - What all have heard, and what would change nothing any more, leaves the air.
 //! - A cut link in the middle of a round is a message that never arrives, so a
 //!   partition stands from the beginning, believed in by all, and heals at any moment.
 //!
 //! And these bounds are real: a round may start at any time but only while its
 //! counter is within the case's; only peer 2 crashes or is wrongly suspected; of an
-//! author's registers the newest, or the two newest, can still arrive; some cases
+//! author's claims the newest, or the two newest, can still arrive; some cases
 //! stop at a depth.
 
 mod calm;
@@ -65,7 +65,7 @@ struct Case {
     crashes: u8,
     /// Its restarts without a disk.
     restarts: u8,
-    /// So many of an author's newest registers stay on the air.
+    /// So many of an author's newest claims stay on the air.
     versions: usize,
     /// Whether it begins in a partition.
     begins_split: bool,
@@ -107,11 +107,11 @@ enum Event {
     Halved,
     /// A round was decided by fewer than all peers.
     DecidedByFew,
-    /// A snapshot of an abandoned round was at hand, and changed nothing.
+    /// A bid of an abandoned round was at hand, and changed nothing.
     StaleSnapshot,
     /// A round was abandoned for a higher one.
     Abandoned,
-    /// A register of an earlier life arrived while the new life was believed in.
+    /// A claim of an earlier life arrived while the new life was believed in.
     OldLife,
 }
 
@@ -165,15 +165,15 @@ impl Model for Case {
     fn properties(&self) -> Vec<Property<Self>> {
         let mut all = vec![
             Property::<Self>::always("covered is only what was flown", |_, w| {
-                w.alive().all(|n| n.section.union().is_subset(&w.flown))
+                w.alive().all(|n| n.sections.covered().is_subset(&w.flown))
             }),
             Property::<Self>::always("nobody finishes early", |_, w| {
-                w.flown.is_full() || w.alive().all(|n| !n.section.complete())
+                w.flown.is_full() || w.alive().all(|n| !n.sections.complete())
             }),
             Property::<Self>::always("a cell has one owner at one stamp", |_, w| {
                 let mut seen = BTreeSet::new();
                 w.alive()
-                    .flat_map(|n| n.section.plan())
+                    .flat_map(|n| n.sections.plan())
                     .all(|p| seen.insert((p.cell, p.stamp)))
             }),
             Property::<Self>::always("no hand-over loses a cell", |_, w| w.gap.is_none()),
@@ -244,11 +244,11 @@ impl Case {
 }
 
 fn all_plan(_: &Case, w: &World) -> bool {
-    w.alive().all(|n| !n.section.plan().is_empty())
+    w.alive().all(|n| !n.sections.plan().is_empty())
 }
 
 fn somebody_holds(_: &Case, w: &World) -> bool {
-    w.alive().any(|n| !n.section.held().is_empty())
+    w.alive().any(|n| !n.sections.held().is_empty())
 }
 
 fn planned_twice(case: &Case, w: &World) -> bool {
@@ -262,24 +262,27 @@ fn all_taken_over(case: &Case, w: &World) -> bool {
 
 fn reborn_plans(_: &Case, w: &World) -> bool {
     w.alive()
-        .any(|n| n.me.incarnation > 1 && !n.section.plan().is_empty())
+        .any(|n| n.me.incarnation > 1 && !n.sections.plan().is_empty())
 }
 
 fn all_covered_after_a_crash(_: &Case, w: &World) -> bool {
-    w.crashes > 0 && w.alive().all(|n| n.section.complete())
+    w.crashes > 0 && w.alive().all(|n| n.sections.complete())
 }
 
 fn one_finished_others_not(_: &Case, w: &World) -> bool {
-    w.alive().any(|n| n.section.complete()) && w.alive().any(|n| !n.section.complete())
+    w.alive().any(|n| n.sections.complete()) && w.alive().any(|n| !n.sections.complete())
 }
 
 /// After the partition, two halves that divided everything list what they did.
 fn halves_disagree(case: &Case, w: &World) -> bool {
-    !w.split && planned_twice(case, w) && w.alive().all(|n| n.section.epoch().counter == 2)
+    !w.split && planned_twice(case, w) && w.alive().all(|n| n.sections.epoch().counter == 2)
 }
 
 fn halves_agree(case: &Case, w: &World) -> bool {
-    let rounds = w.alive().filter(|n| n.section.epoch().counter == 2).count();
+    let rounds = w
+        .alive()
+        .filter(|n| n.sections.epoch().counter == 2)
+        .count();
     !w.split
         && rounds == 3
         && (0..case.cells).all(|c| w.alive().filter(|n| n.plans(c)).count() == 1)

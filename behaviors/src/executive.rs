@@ -2,8 +2,8 @@
 //! goes to a point when told to (D2.7 §1.2.3, executive layer).
 //!
 //! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
-//! it cell by cell. Ways between cells come from [`chart`], what the camera saw from
-//! [`camera`], expectations for the peer from [`outlook`], what stays of a flight when the
+//! it cell by cell. Ways between cells come from [`transit`], what the camera saw from
+//! [`camera`], expectations for the peer from [`prediction`], what stays of a flight when the
 //! goal changes from `change`; following the track and the
 //! safety of every setpoint are the reactive layer's.
 //!
@@ -22,11 +22,11 @@
 //! asked only where the next open cell does not follow on the loop.
 
 pub mod camera;
-mod change;
-pub mod chart;
-mod leg;
-pub mod outlook;
-mod proof;
+mod clearance_check;
+pub mod prediction;
+mod replan;
+mod transfer;
+pub mod transit;
 
 use crate::event::Event;
 use crate::percept::Percept;
@@ -35,8 +35,7 @@ use crate::reactive::envelope::{Envelope, is_finite};
 use crate::reactive::follow::{HORIZON_S, Offset, Track};
 use crate::setpoint::{Setpoint, Side};
 use camera::{Played, look};
-use chart::{Chart, Hop, Move, Place};
-pub use outlook::{UNREACHABLE_MS, View};
+pub use prediction::{UNREACHABLE_MS, View};
 use serde::{Deserialize, Serialize};
 use skein_planning::airframe::Airframe;
 use skein_planning::coverage::area::backtracking::Leg;
@@ -48,6 +47,7 @@ use skein_planning::trajectory::wind::Wind;
 use skein_planning::trajectory::{Curve, Segment};
 use std::collections::VecDeque;
 use std::sync::Arc;
+use transit::{CellVisit, Move, Place, Transit};
 
 /// How far a UAV may stray from its curve unless the mission says otherwise, metres.
 pub const DEFAULT_TRACKING_ERROR_M: f64 = 2.0;
@@ -121,14 +121,14 @@ enum Aim {
 /// What a stretch of the track is for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
-    Serve(Hop),
+    Serve(CellVisit),
     Pass(u16, Direction),
     Route,
     Loiter(Segment),
 }
 
 impl Kind {
-    fn hop(&self) -> Option<Hop> {
+    fn visit(&self) -> Option<CellVisit> {
         match self {
             Self::Serve(h) => Some(*h),
             _ => None,
@@ -156,18 +156,18 @@ struct Stretch {
 /// The executive of one UAV.
 #[derive(Clone, Debug)]
 pub struct Executive {
-    chart: Chart,
+    transit: Transit,
     height_m: f64,
     envelope: Envelope,
     aim: Aim,
     /// Cells to be served after those on the track.
-    queue: VecDeque<Hop>,
+    queue: VecDeque<CellVisit>,
     track: Track,
     stretches: VecDeque<Stretch>,
     /// Whether the track is to be given up at the next step.
     replan: bool,
     /// Whether the end of the goal has been reported.
-    told: bool,
+    end_reported: bool,
     played: Option<Played>,
     recent: VecDeque<u16>,
     /// Events that came up between two steps.
@@ -187,10 +187,10 @@ impl Executive {
         router: Arc<Router>,
     ) -> Self {
         let envelope = Self::envelope(airframe, &router, DEFAULT_TRACKING_ERROR_M);
-        let mut chart = Chart::new(coverage_loop, router, airframe);
-        chart.breathe(Air::calm(envelope.airspeed_mps(airframe.cruise_mps)));
+        let mut transit = Transit::new(coverage_loop, router, airframe);
+        transit.set_air(Air::calm(envelope.airspeed_mps(airframe.cruise_mps)));
         Self {
-            chart,
+            transit,
             height_m,
             envelope,
             aim: Aim::Hold,
@@ -198,7 +198,7 @@ impl Executive {
             track: Track::default(),
             stretches: VecDeque::new(),
             replan: true,
-            told: false,
+            end_reported: false,
             played: None,
             recent: VecDeque::with_capacity(RECENT),
             pending: Vec::new(),
@@ -209,9 +209,9 @@ impl Executive {
     /// The same with an objective for its legs off the loop and its airspeed.
     #[must_use]
     pub fn with_objective(mut self, objective: Objective) -> Self {
-        self.chart = self.chart.with_objective(objective);
-        let wind = self.chart.air().wind;
-        self.breathe(wind);
+        self.transit = self.transit.with_objective(objective);
+        let wind = self.transit.air().wind;
+        self.set_air(wind);
         self
     }
 
@@ -226,8 +226,12 @@ impl Executive {
     /// flights come this much nearer to zones than curves may.
     #[must_use]
     pub fn with_tracking_error_m(mut self, tracking_error_m: f64) -> Self {
-        self.envelope = Self::envelope(self.chart.airframe, &self.chart.router, tracking_error_m);
-        self.chart.tracking_error_m = tracking_error_m;
+        self.envelope = Self::envelope(
+            self.transit.airframe,
+            &self.transit.router,
+            tracking_error_m,
+        );
+        self.transit.tracking_error_m = tracking_error_m;
         self
     }
 
@@ -250,7 +254,7 @@ impl Executive {
                 events,
             );
         }
-        self.feel(percept);
+        self.note_wind(percept);
         self.report_seen(percept, is_open, &mut events);
         let offset = self.progress(percept);
         self.count_misses(is_open, &mut events);
@@ -268,13 +272,13 @@ impl Executive {
             offset
         };
         let speed = self.speed_mps();
-        let limit = self.chart.airframe.max_turn_rate_radps(speed);
+        let limit = self.transit.airframe.max_turn_rate_radps(speed);
         let still = Offset {
             cross_m: 0.0,
             heading_rad: 0.0,
         };
         let offset = offset.unwrap_or(still);
-        let steps = air::steps(&self.track, offset, self.chart.air(), limit);
+        let steps = air::steps(&self.track, offset, self.transit.air(), limit);
         let setpoint = self.envelope.check(percept, self.setpoint(percept, steps));
         let steps = setpoint.steps.clone();
         self.played = Some(Played {
@@ -297,26 +301,26 @@ impl Executive {
 
     /// The airspeed that is commanded, m/s.
     fn speed_mps(&self) -> f64 {
-        self.chart.air().airspeed_mps
+        self.transit.air().airspeed_mps
     }
 
     /// Takes note of the wind: curves over the ground must stay flyable in it, and
     /// what they cost changes.
-    fn feel(&mut self, percept: &Percept) {
+    fn note_wind(&mut self, percept: &Percept) {
         let wind = Wind::new(percept.wind_east_mps, percept.wind_north_mps);
-        let changed_mps = (wind.velocity() - self.chart.air().wind.velocity()).norm();
+        let changed_mps = (wind.velocity() - self.transit.air().wind.velocity()).norm();
         if changed_mps.is_nan() || changed_mps < NOTICED_MPS {
             return;
         }
-        self.breathe(wind);
+        self.set_air(wind);
     }
 
-    fn breathe(&mut self, wind: Wind) {
-        let radius_m = self.chart.router.limits().turn_radius_m;
-        let (airframe, objective) = (&self.chart.airframe, self.chart.objective);
+    fn set_air(&mut self, wind: Wind) {
+        let radius_m = self.transit.router.limits().turn_radius_m;
+        let (airframe, objective) = (&self.transit.airframe, self.transit.objective);
         let wanted = Air::airspeed_for_mps(objective, airframe, wind, radius_m);
         let airspeed_mps = self.envelope.airspeed_mps(wanted);
-        self.chart.breathe(Air { wind, airspeed_mps });
+        self.transit.set_air(Air { wind, airspeed_mps });
         self.home = self.home.map(|(home, _)| (home, self.return_ms(home)));
     }
 
@@ -328,7 +332,7 @@ impl Executive {
         events: &mut Vec<Event>,
     ) {
         let mut seen = Vec::new();
-        let c = &self.chart;
+        let c = &self.transit;
         look(
             &c.coverage_loop,
             &c.airframe,
@@ -340,7 +344,7 @@ impl Executive {
         if seen.is_empty() {
             return;
         }
-        let cells = self.chart.coverage_loop.cells();
+        let cells = self.transit.coverage_loop.cells();
         events.push(Event::Seen(
             seen.iter().map(|i| cells[usize::from(*i)].id).collect(),
         ));
@@ -364,9 +368,9 @@ impl Executive {
                 percept.time_ms.saturating_sub(p.percept.time_ms) as f64 / 1000.0
             })
             .min(WINDOW_S);
-        let wind_mps = self.chart.air().wind.speed_mps();
-        let window_m = (self.chart.airframe.max_mps + wind_mps) * since_s + WINDOW_M;
-        let pose = self.chart.air().over_ground(percept.pose);
+        let wind_mps = self.transit.air().wind.speed_mps();
+        let window_m = (self.transit.airframe.max_mps + wind_mps) * since_s + WINDOW_M;
+        let pose = self.transit.air().over_ground(percept.pose);
         let offset = self.track.advance(&pose, window_m);
         let lost =
             offset.is_none_or(|o| o.cross_m.abs() > LOST_M || o.heading_rad.abs() > LOST_RAD);
@@ -384,27 +388,27 @@ impl Executive {
             self.stretches.pop_front();
             missed = front
                 .kind
-                .hop()
+                .visit()
                 .filter(|h| is_open(h.cell) && !self.recent.contains(&h.cell));
         }
-        let Some(hop) = missed else { return };
-        let tries = hop.tries + 1;
+        let Some(visit) = missed else { return };
+        let tries = visit.tries + 1;
         if tries >= MAX_TRIES {
             events.push(Event::Refused {
-                cells: vec![hop.cell],
+                cells: vec![visit.cell],
             });
             return;
         }
         self.requeue();
-        self.queue.push_front(Hop { tries, ..hop });
+        self.queue.push_front(CellVisit { tries, ..visit });
         self.replan = true;
     }
 
     /// Puts the cells on the track back into the queue and takes the stretches off.
     fn requeue(&mut self) {
         for s in self.stretches.drain(..).rev() {
-            if let Some(hop) = s.kind.hop() {
-                self.queue.push_front(hop);
+            if let Some(visit) = s.kind.visit() {
+                self.queue.push_front(visit);
             }
         }
     }
@@ -414,23 +418,23 @@ impl Executive {
         let Some(front) = self.stretches.front() else {
             return;
         };
-        if front.kind.hop().is_some() || matches!(front.kind, Kind::Loiter(_)) {
+        if front.kind.visit().is_some() || matches!(front.kind, Kind::Loiter(_)) {
             return;
         }
-        let target = self.stretches.iter().find_map(|s| s.kind.hop());
+        let target = self.stretches.iter().find_map(|s| s.kind.visit());
         if target.is_some_and(|h| !is_open(h.cell)) {
             if front.kind == Kind::Route {
                 self.replan = true;
             } else {
-                let rest: Vec<Hop> = self
+                let rest: Vec<CellVisit> = self
                     .stretches
                     .iter()
                     .skip(1)
-                    .filter_map(|s| s.kind.hop())
+                    .filter_map(|s| s.kind.visit())
                     .collect();
                 self.keep(1);
-                for hop in rest.into_iter().rev() {
-                    self.queue.push_front(hop);
+                for visit in rest.into_iter().rev() {
+                    self.queue.push_front(visit);
                 }
             }
         }
@@ -444,7 +448,7 @@ impl Executive {
         }
         let near = offset
             .is_some_and(|o| o.cross_m.abs() < ON_TRACK_M && o.heading_rad.abs() < ON_TRACK_RAD);
-        let here = self.chart.air().over_ground(percept.pose);
+        let here = self.transit.air().over_ground(percept.pose);
         let pose = self.track.pose().filter(|_| near).unwrap_or(here);
         Place {
             pose,
@@ -457,12 +461,12 @@ impl Executive {
         if self.stretches.is_empty() {
             self.track.clear();
         }
-        let fastest_mps = self.chart.airframe.max_mps + self.chart.air().wind.speed_mps();
+        let fastest_mps = self.transit.airframe.max_mps + self.transit.air().wind.speed_mps();
         let least_m = fastest_mps * (HORIZON_S + 0.5);
         let mut at = start;
         while self.track.left_m() < least_m {
             let moves = self.next_moves(&at, is_open, events);
-            for step in self.proved(&at, moves, events) {
+            for step in self.cleared(&at, moves, events) {
                 at = self.push(&at, step);
             }
         }
@@ -477,7 +481,7 @@ impl Executive {
     ) -> Vec<Move> {
         if self.aim == Aim::Legs {
             let mut cells = Vec::new();
-            let moves = self.chart.next(at, &mut self.queue, is_open, &mut cells);
+            let moves = self.transit.next(at, &mut self.queue, is_open, &mut cells);
             if !cells.is_empty() {
                 events.push(Event::Refused { cells });
             }
@@ -489,24 +493,24 @@ impl Executive {
             return vec![Move::Loiter(circle)];
         }
         if let Aim::Point(p) = self.aim {
-            match self.chart.connect_to_point(at, p) {
+            match self.transit.connect_to_point(at, p) {
                 Some(mut moves) => {
                     let end = moves
                         .iter()
-                        .fold(*at, |place, step| self.chart.end_of(&place, step));
-                    moves.extend(self.chart.hold(&end));
+                        .fold(*at, |place, step| self.transit.end_of(&place, step));
+                    moves.extend(self.transit.hold(&end));
                     return moves;
                 }
                 None => events.push(Event::Refused { cells: Vec::new() }),
             }
         }
-        self.chart.hold(at)
+        self.transit.hold(at)
     }
 
     /// Appends a move to the track.
     fn push(&mut self, at: &Place, step: Move) -> Place {
-        let end = self.chart.end_of(at, &step);
-        let c = &self.chart.coverage_loop;
+        let end = self.transit.end_of(at, &step);
+        let c = &self.transit.coverage_loop;
         let kind = match step {
             Move::Serve(h) => {
                 self.track
@@ -539,24 +543,24 @@ impl Executive {
     /// Where the UAV is on a track that has just been made anew.
     fn restart(&mut self, percept: &Percept) -> Option<Offset> {
         self.replan = false;
-        let pose = self.chart.air().over_ground(percept.pose);
+        let pose = self.transit.air().over_ground(percept.pose);
         self.track.advance(&pose, WINDOW_M)
     }
 
     /// Reports the end of the goal, once.
     fn report_end(&mut self, percept: &Percept, events: &mut Vec<Event>) {
-        if self.told {
+        if self.end_reported {
             return;
         }
         let done = match self.aim {
             Aim::Hold => return,
             Aim::Legs => {
-                self.queue.is_empty() && !self.stretches.iter().any(|s| s.kind.hop().is_some())
+                self.queue.is_empty() && !self.stretches.iter().any(|s| s.kind.visit().is_some())
             }
             Aim::Point(p) => self.is_near(&percept.pose, p),
         };
         if done {
-            self.told = true;
+            self.end_reported = true;
             events.push(if self.aim == Aim::Legs {
                 Event::PlanDone
             } else {
@@ -566,7 +570,7 @@ impl Executive {
     }
 
     fn is_near(&self, pose: &Pose, p: Point) -> bool {
-        let radius_m = self.chart.turn_radius_m();
+        let radius_m = self.transit.turn_radius_m();
         (pose.position() - p).norm() <= ARRIVAL_RADII * radius_m
     }
 
@@ -578,5 +582,4 @@ impl Executive {
 }
 
 #[cfg(test)]
-#[path = "executive/stories.rs"]
-mod stories;
+mod tests;

@@ -3,8 +3,8 @@
 use super::Case;
 use super::world::{Node, World, hash_ownership};
 use skein_peer::cells::CellSet;
-use skein_peer::coverage::section::Live;
-use skein_peer::wire::message::{Member, Register};
+use skein_peer::protocol::sections::LivePeers;
+use skein_peer::wire::message::{Claim, Member};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// No calm swarm needs more steps to the end: each fixpoint takes an exchange per
@@ -18,9 +18,9 @@ pub(super) fn calm_leads_to_the_end(case: &Case, w: &World) -> bool {
     let mut h = DefaultHasher::new();
     for n in w.alive() {
         n.me.hash(&mut h);
-        hash_ownership(&n.section, &mut h);
-        for (id, heard) in n.section.heard() {
-            (id, heard.incarnation, &heard.register).hash(&mut h);
+        hash_ownership(&n.sections, &mut h);
+        for (id, heard) in n.sections.heard() {
+            (id, heard.incarnation, &heard.claim).hash(&mut h);
         }
     }
     let key = h.finish();
@@ -34,7 +34,7 @@ pub(super) fn calm_leads_to_the_end(case: &Case, w: &World) -> bool {
 
 fn bring_to_the_end(case: &Case, w: &World) -> bool {
     let mut nodes: Vec<Node> = w.alive().map(|n| Node::clone(n)).collect();
-    let alive: Live = nodes.iter().map(|n| (n.me.id, n.me.incarnation)).collect();
+    let alive: LivePeers = nodes.iter().map(|n| (n.me.id, n.me.incarnation)).collect();
     for n in &mut nodes {
         n.live = alive
             .iter()
@@ -45,35 +45,37 @@ fn bring_to_the_end(case: &Case, w: &World) -> bool {
         n.seq = 1_000_000;
     }
     for _ in 0..CALM_STEPS {
-        if nodes.iter().all(|n| n.section.complete()) {
+        if nodes.iter().all(|n| n.sections.complete()) {
             return true;
         }
         if exchange(&mut nodes) {
             continue;
         }
         for c in 0..case.cells {
-            let covered = nodes.iter().any(|n| n.section.union().contains(c));
+            let covered = nodes.iter().any(|n| n.sections.covered().contains(c));
             let plans = nodes.iter().filter(|n| n.plans(c)).count();
             let listed = nodes.iter().any(|n| n.lists(c));
-            let orphan = nodes.iter().all(|n| n.section.orphans(&n.live).contains(c));
+            let orphan = nodes
+                .iter()
+                .all(|n| n.sections.orphans(&n.live).contains(c));
             if plans > 1 || !(covered || listed || orphan) {
                 return false;
             }
         }
         for n in &mut nodes {
             let mut flown = CellSet::new(case.cells);
-            for p in n.section.plan() {
+            for p in n.sections.plan() {
                 flown.insert(p.cell);
             }
-            n.section.cover(&flown);
-            n.section.expire_held();
+            n.sections.cover(&flown);
+            n.sections.expire_held();
             let orphans: Vec<(u16, bool)> = n
-                .section
+                .sections
                 .orphans(&n.live)
                 .iter()
                 .map(|c| (c, false))
                 .collect();
-            n.section.take(&orphans);
+            n.sections.take(&orphans);
         }
     }
     nodes.is_empty()
@@ -81,20 +83,20 @@ fn bring_to_the_end(case: &Case, w: &World) -> bool {
 
 /// All hear all, once. Returns whether anything changed.
 fn exchange(nodes: &mut [Node]) -> bool {
-    let said: Vec<(Member, u32, Register, CellSet)> = nodes
+    let said: Vec<(Member, u32, Claim, CellSet)> = nodes
         .iter()
-        .map(|n| (n.me, n.seq, n.register(), n.section.union().clone()))
+        .map(|n| (n.me, n.seq, n.claim(), n.sections.covered().clone()))
         .collect();
     let mut changed = false;
     for n in nodes {
-        for (author, seq, register, union) in &said {
-            let known = n.section.heard().get(&author.id).map(|h| &h.register);
-            changed |= author.id != n.me.id && known != Some(register);
-            n.section
-                .hear(author.id, author.incarnation, *seq, register.clone());
-            changed |= n.section.cover(union);
+        for (author, seq, claim, covered) in &said {
+            let known = n.sections.heard().get(&author.id).map(|h| &h.claim);
+            changed |= author.id != n.me.id && known != Some(claim);
+            n.sections
+                .hear(author.id, author.incarnation, *seq, claim.clone());
+            changed |= n.sections.cover(covered);
         }
-        changed |= n.section.settle(&n.live);
+        changed |= n.sections.settle(&n.live);
         n.seq += 1;
     }
     changed

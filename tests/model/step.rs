@@ -4,8 +4,8 @@
 use super::world::{Node, World};
 use super::{Case, Event, MORTAL, PEERS};
 use skein_peer::cells::CellSet;
-use skein_peer::coverage::rounds::{HeardSnapshot, order_of};
-use skein_peer::wire::message::{Member, Register, Snapshot};
+use skein_peer::protocol::rounds::{HeardBid, order_of};
+use skein_peer::wire::message::{Bid, Claim, Member};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -13,8 +13,8 @@ use std::sync::atomic::Ordering;
 /// One step of the swarm; peers are named by their place.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Action {
-    Claim(usize, Member, u32, Arc<Register>),
-    Bid(usize, Member, Arc<Snapshot>),
+    Claim(usize, Member, u32, Arc<Claim>),
+    Bid(usize, Member, Arc<Bid>),
     Learn(usize, u16),
     Start { who: usize, informed: bool },
     Decide(usize),
@@ -84,15 +84,15 @@ impl Case {
                 self.hear_bid(w, i, author, &s);
             }
             for (author, versions) in w.claims.clone() {
-                for (seq, register) in versions {
-                    self.hear_claim(w, i, author, seq, &register);
+                for (seq, claim) in versions {
+                    self.hear_claim(w, i, author, seq, &claim);
                 }
             }
             w.publish(i, self.versions);
         }
     }
 
-    fn hear_claim(&self, w: &mut World, i: usize, author: Member, seq: u32, register: &Register) {
+    fn hear_claim(&self, w: &mut World, i: usize, author: Member, seq: u32, claim: &Claim) {
         w.act(i, |n| {
             if n.live
                 .get(&author.id)
@@ -100,38 +100,38 @@ impl Case {
             {
                 self.meet(Event::OldLife);
             }
-            n.section
-                .hear(author.id, author.incarnation, seq, register.clone());
+            n.sections
+                .hear(author.id, author.incarnation, seq, claim.clone());
             self.settle(n);
         });
     }
 
     fn settle(&self, n: &mut Node) {
-        let (plan, held) = (n.section.plan().len(), n.section.held().len());
-        n.section.settle(&n.live);
-        if n.section.plan().len() < plan {
+        let (plan, held) = (n.sections.plan().len(), n.sections.held().len());
+        n.sections.settle(&n.live);
+        if n.sections.plan().len() < plan {
             self.meet(Event::Yielded);
         }
-        if n.section.held().len() < held {
+        if n.sections.held().len() < held {
             self.meet(Event::Released);
         }
     }
 
-    fn hear_bid(&self, w: &mut World, i: usize, author: Member, s: &Snapshot) {
+    fn hear_bid(&self, w: &mut World, i: usize, author: Member, s: &Bid) {
         let bid = w.act(i, |n| {
             let was_open = n.rounds.open().is_some();
             match n.rounds.hear(author, s) {
-                HeardSnapshot::BidWanted => {
+                HeardBid::BidWanted => {
                     if was_open {
                         self.meet(Event::Abandoned);
                     }
                     n.bid()
                 }
-                HeardSnapshot::Added => {
+                HeardBid::Added => {
                     self.decide(n);
                     None
                 }
-                HeardSnapshot::Nothing => None,
+                HeardBid::Nothing => None,
             }
         });
         w.speak(i, bid.flatten());
@@ -140,7 +140,7 @@ impl Case {
     fn decide(&self, n: &mut Node) {
         if n.rounds
             .complete()
-            .is_some_and(|(_, open)| open.snapshots.len() < usize::from(PEERS))
+            .is_some_and(|(_, open)| open.bids.len() < usize::from(PEERS))
         {
             self.meet(Event::DecidedByFew);
         }
@@ -149,13 +149,13 @@ impl Case {
     }
 
     fn take(&self, n: &mut Node, cells: &[(u16, bool)]) {
-        n.section.take(cells);
+        n.sections.take(cells);
         self.settle(n);
     }
 
     /// What a peer may do by itself.
     pub(super) fn own_actions(&self, w: &World, i: usize, n: &Node, actions: &mut Vec<Action>) {
-        let section = &n.section;
+        let section = &n.sections;
         let top = section
             .plan()
             .iter()
@@ -202,13 +202,13 @@ impl Case {
                 continue;
             }
             let known = n
-                .section
+                .sections
                 .heard()
                 .get(&author.id)
                 .map(|h| (h.incarnation, h.seq));
-            for (seq, register) in versions {
+            for (seq, claim) in versions {
                 if known < Some((author.incarnation, *seq)) {
-                    actions.push(Action::Claim(i, *author, *seq, Arc::clone(register)));
+                    actions.push(Action::Claim(i, *author, *seq, Arc::clone(claim)));
                 }
             }
         }
@@ -227,10 +227,14 @@ impl Case {
                 }
             }
         }
-        for c in w.flown.iter().filter(|c| !n.section.union().contains(*c)) {
+        for c in w
+            .flown
+            .iter()
+            .filter(|c| !n.sections.covered().contains(*c))
+        {
             if !w.split
                 || w.alive()
-                    .any(|o| w.reach(o.me.id, n.me.id) && o.section.union().contains(c))
+                    .any(|o| w.reach(o.me.id, n.me.id) && o.sections.covered().contains(c))
             {
                 actions.push(Action::Learn(i, c));
             }
@@ -258,8 +262,8 @@ impl Case {
     /// Carries out an action; returns who acted.
     pub(super) fn step(&self, w: &mut World, action: Action) -> Option<usize> {
         let actor = match action {
-            Action::Claim(i, author, seq, register) => {
-                self.hear_claim(w, i, author, seq, &register);
+            Action::Claim(i, author, seq, claim) => {
+                self.hear_claim(w, i, author, seq, &claim);
                 i
             }
             Action::Bid(i, author, s) => {
@@ -267,7 +271,7 @@ impl Case {
                 i
             }
             Action::Learn(i, c) => {
-                w.act(i, |n| n.section.cover(&CellSet::of(self.cells, [c])));
+                w.act(i, |n| n.sections.cover(&CellSet::of(self.cells, [c])));
                 i
             }
             Action::Start { who, informed } => {
@@ -289,16 +293,16 @@ impl Case {
                 i
             }
             Action::Fly(i) => {
-                let c = w.nodes[i].as_ref()?.section.plan().first()?.cell;
+                let c = w.nodes[i].as_ref()?.sections.plan().first()?.cell;
                 w.flown.insert(c);
-                w.act(i, |n| n.section.cover(&CellSet::of(self.cells, [c])));
+                w.act(i, |n| n.sections.cover(&CellSet::of(self.cells, [c])));
                 i
             }
             Action::Take(i) => {
                 self.meet(Event::Taken);
                 w.act(i, |n| {
                     let orphans: Vec<(u16, bool)> = n
-                        .section
+                        .sections
                         .orphans(&n.live)
                         .iter()
                         .map(|c| (c, false))
@@ -310,7 +314,7 @@ impl Case {
             Action::Halve(i, owner) => {
                 self.meet(Event::Halved);
                 w.act(i, |n| {
-                    let plan = n.section.plan_of(owner);
+                    let plan = n.sections.plan_of(owner);
                     let far: Vec<(u16, bool)> = plan
                         .iter()
                         .skip(plan.len() / 2)
@@ -322,7 +326,7 @@ impl Case {
             }
             Action::Expire(i) => {
                 self.meet(Event::Expired);
-                w.act(i, |n| n.section.expire_held());
+                w.act(i, |n| n.sections.expire_held());
                 i
             }
             other => return self.fate(w, &other),

@@ -3,10 +3,10 @@
 
 use super::PEERS;
 use skein_peer::cells::CellSet;
-use skein_peer::coverage::division::commits_of;
-use skein_peer::coverage::rounds::{HeardSnapshot, RoundOrder, Rounds, order_of};
-use skein_peer::coverage::section::{Live, Section};
-use skein_peer::wire::message::{Epoch, Member, Register, Run, Snapshot, Stamp};
+use skein_peer::protocol::division::commits_of;
+use skein_peer::protocol::rounds::{HeardBid, RoundOrder, Rounds, order_of};
+use skein_peer::protocol::sections::{LivePeers, Sections};
+use skein_peer::wire::message::{Bid, CellRun, Claim, Epoch, Member, Stamp};
 use std::collections::BTreeMap;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
@@ -14,20 +14,20 @@ use std::sync::Arc;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Node {
     pub(super) me: Member,
-    pub(super) section: Section,
+    pub(super) sections: Sections,
     pub(super) rounds: Rounds,
     /// What the failure detector says.
-    pub(super) live: Live,
+    pub(super) live: LivePeers,
     pub(super) seq: u32,
-    pub(super) said: Register,
+    pub(super) said: Claim,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct World {
     pub(super) nodes: Vec<Option<Arc<Node>>>,
     pub(super) lives: Vec<u32>,
-    pub(super) claims: BTreeMap<Member, Vec<(u32, Arc<Register>)>>,
-    pub(super) bids: Vec<(Member, RoundOrder, Arc<Snapshot>)>,
+    pub(super) claims: BTreeMap<Member, Vec<(u32, Arc<Claim>)>>,
+    pub(super) bids: Vec<(Member, RoundOrder, Arc<Bid>)>,
     pub(super) flown: CellSet,
     pub(super) split: bool,
     pub(super) crashes: u8,
@@ -48,8 +48,8 @@ impl Hash for World {
                 continue;
             };
             (n.me.incarnation, &n.rounds, &n.live).hash(h);
-            hash_ownership(&n.section, h);
-            for (id, heard) in n.section.heard() {
+            hash_ownership(&n.sections, h);
+            for (id, heard) in n.sections.heard() {
                 let author = Member {
                     id: *id,
                     incarnation: heard.incarnation,
@@ -61,13 +61,13 @@ impl Hash for World {
                     .flatten()
                     .filter(|c| c.0 > heard.seq)
                     .count();
-                (id, heard.incarnation, &heard.register, newer).hash(h);
+                (id, heard.incarnation, &heard.claim, newer).hash(h);
             }
         }
         for (author, versions) in &self.claims {
             author.hash(h);
-            for (_, register) in versions {
-                register.hash(h);
+            for (_, claim) in versions {
+                claim.hash(h);
             }
         }
         (&self.bids, &self.flown, &self.lives, self.gap, self.sunk).hash(h);
@@ -75,8 +75,8 @@ impl Hash for World {
     }
 }
 
-pub(super) fn hash_ownership<H: Hasher>(s: &Section, h: &mut H) {
-    (s.union(), s.plan(), s.held(), s.epoch()).hash(h);
+pub(super) fn hash_ownership<H: Hasher>(s: &Sections, h: &mut H) {
+    (s.covered(), s.plan(), s.held(), s.epoch()).hash(h);
 }
 
 impl Node {
@@ -84,31 +84,31 @@ impl Node {
         let me = Member { id, incarnation };
         Self {
             me,
-            section: Section::new(id, cells, CellSet::new(cells)),
+            sections: Sections::new(id, cells, CellSet::new(cells)),
             rounds: Rounds::new(me, 0),
-            live: Live::new(),
+            live: LivePeers::new(),
             seq: 0,
-            said: Register::default(),
+            said: Claim::default(),
         }
     }
 
-    /// The register as others will read it.
-    pub(super) fn register(&self) -> Register {
-        Register {
+    /// The claim as others will read it.
+    pub(super) fn claim(&self) -> Claim {
+        Claim {
             done: Vec::new(),
             epoch: Epoch::default(),
-            ..self.section.register(0, 0, 0)
+            ..self.sections.claim(0, 0, 0)
         }
     }
 
     /// A bid for the open round: the first planned cell is committed.
-    pub(super) fn bid(&mut self) -> Option<Arc<Snapshot>> {
+    pub(super) fn bid(&mut self) -> Option<Arc<Bid>> {
         let round = self.rounds.open()?.round.clone();
-        let commits = self.section.plan().iter().take(1).map(|p| Run {
+        let commits = self.sections.plan().iter().take(1).map(|p| CellRun {
             first: p.cell,
             count: 1,
         });
-        let snapshot = Snapshot {
+        let bid = Bid {
             round,
             anchor: 0,
             backward: false,
@@ -116,20 +116,18 @@ impl Node {
             speed_mmps: 1,
             turn_ms: 0,
             endurance_ms: 0,
-            union: self.section.union().encode_rle(None),
+            covered: self.sections.covered().encode_rle(None),
             commits: commits.collect(),
             eta_ms: 0,
             adopted_ago_ms: 0,
             cells_since: 0,
             idle: false,
         };
-        self.rounds
-            .bid(snapshot.clone())
-            .then(|| Arc::new(snapshot))
+        self.rounds.bid(bid.clone()).then(|| Arc::new(bid))
     }
 
     /// Opens a round of all that are believed alive.
-    pub(super) fn start(&mut self) -> Option<Arc<Snapshot>> {
+    pub(super) fn start(&mut self) -> Option<Arc<Bid>> {
         if self.rounds.open().is_some() {
             self.rounds.give_up();
         }
@@ -152,13 +150,13 @@ impl Node {
         let Some((epoch, open)) = self.rounds.complete() else {
             return;
         };
-        let n = self.section.cells();
+        let n = self.sections.cells();
         let mut free = CellSet::full(n);
-        for s in open.snapshots.values() {
-            free.subtract(&CellSet::decode_rle(n, &s.union).unwrap());
+        for s in open.bids.values() {
+            free.subtract(&CellSet::decode_rle(n, &s.covered).unwrap());
             free.subtract(&commits_of(s, n));
         }
-        let members: Vec<u16> = open.snapshots.keys().copied().collect();
+        let members: Vec<u16> = open.bids.keys().copied().collect();
         let mine = members.iter().position(|m| *m == self.me.id).unwrap();
         let place = (mine + open.round.counter as usize) % members.len();
         let share = usize::from(free.count()).div_ceil(members.len());
@@ -168,34 +166,34 @@ impl Node {
             .take(share)
             .map(|c| (c, false))
             .collect();
-        let committed = commits_of(&open.snapshots[&self.me.id], n);
+        let committed = commits_of(&open.bids[&self.me.id], n);
         let commits = self
-            .section
+            .sections
             .plan()
             .iter()
             .filter(|p| committed.contains(p.cell));
         let commits: Vec<(u16, bool)> = commits.map(|p| (p.cell, p.backward)).collect();
         self.rounds.close();
-        self.section.adopt(epoch, &commits, &section);
+        self.sections.adopt(epoch, &commits, &section);
     }
 
     /// By what right this peer lists a cell.
     pub(super) fn stamp(&self, cell: u16) -> Option<Stamp> {
         let planned = self
-            .section
+            .sections
             .plan()
             .iter()
             .find(|p| p.cell == cell)
             .map(|p| p.stamp);
-        planned.or_else(|| self.section.held().get(&cell).copied())
+        planned.or_else(|| self.sections.held().get(&cell).copied())
     }
 
     pub(super) fn plans(&self, cell: u16) -> bool {
-        self.section.plan().iter().any(|p| p.cell == cell)
+        self.sections.plan().iter().any(|p| p.cell == cell)
     }
 
     pub(super) fn lists(&self, cell: u16) -> bool {
-        self.plans(cell) || self.section.held().contains_key(&cell)
+        self.plans(cell) || self.sections.held().contains_key(&cell)
     }
 }
 
@@ -217,26 +215,26 @@ impl World {
         self.nodes[i].as_mut().map(|n| what(Arc::make_mut(n)))
     }
 
-    /// Publishes the register of a peer, if it changed.
+    /// Publishes the claim of a peer, if it changed.
     pub(super) fn publish(&mut self, i: usize, keep: usize) {
         let said = self.act(i, |n| {
-            let register = n.register();
-            (register != n.said).then(|| {
+            let claim = n.claim();
+            (claim != n.said).then(|| {
                 n.seq += 1;
-                n.said = register.clone();
-                (n.me, n.seq, Arc::new(register))
+                n.said = claim.clone();
+                (n.me, n.seq, Arc::new(claim))
             })
         });
-        if let Some(Some((me, seq, register))) = said {
+        if let Some(Some((me, seq, claim))) = said {
             let versions = self.claims.entry(me).or_default();
-            versions.push((seq, register));
+            versions.push((seq, claim));
             if versions.len() > keep {
                 versions.remove(0);
             }
         }
     }
 
-    pub(super) fn speak(&mut self, i: usize, bid: Option<Arc<Snapshot>>) {
+    pub(super) fn speak(&mut self, i: usize, bid: Option<Arc<Bid>>) {
         if let (Some(bid), Some(n)) = (bid, &self.nodes[i]) {
             self.bids.push((n.me, order_of(&bid.round), bid));
             self.bids
@@ -244,8 +242,8 @@ impl World {
         }
     }
 
-    /// Whether a snapshot may still change something for a peer.
-    pub(super) fn wants(n: &Node, author: Member, s: &Snapshot, order: RoundOrder) -> bool {
+    /// Whether a bid may still change something for a peer.
+    pub(super) fn wants(n: &Node, author: Member, s: &Bid, order: RoundOrder) -> bool {
         if author.id == n.me.id {
             return false;
         }
@@ -254,12 +252,11 @@ impl World {
         }
         match n.rounds.open() {
             Some(open) if order_of(&open.round) >= order => {
-                order_of(&open.round) == order && !open.snapshots.contains_key(&author.id)
+                order_of(&open.round) == order && !open.bids.contains_key(&author.id)
             }
             _ => {
                 let mut rounds = n.rounds.clone();
-                rounds.hear(author, s) != HeardSnapshot::Nothing
-                    || rounds.counter() > n.rounds.counter()
+                rounds.hear(author, s) != HeardBid::Nothing || rounds.counter() > n.rounds.counter()
             }
         }
     }
@@ -273,7 +270,7 @@ impl World {
             let last = versions.last().map(|v| v.0);
             versions.retain(|(seq, _)| {
                 let new = |n: &Arc<Node>| {
-                    let heard = n.section.heard().get(&author.id);
+                    let heard = n.sections.heard().get(&author.id);
                     n.me.id != author.id
                         && heard.is_none_or(|h| (h.incarnation, h.seq) < (author.incarnation, *seq))
                 };

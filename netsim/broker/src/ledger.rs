@@ -119,7 +119,7 @@ impl Ledger {
                 self.down(now_ms, peer, whom.0);
                 None
             }
-            Report::Register { legs, held, .. } => {
+            Report::Claim { legs, held, .. } => {
                 let n = usize::from(self.cells).max(1);
                 let mut cells: BTreeSet<u16> = legs.iter().flat_map(|leg| leg.cells(n)).collect();
                 if !cells.is_empty() {
@@ -420,13 +420,13 @@ mod tests {
     use skein_planning::coverage::area::Direction;
     use skein_planning::coverage::area::backtracking::Leg;
 
-    fn register(first: u16, count: u16) -> Report {
+    fn claim(first: u16, count: u16) -> Report {
         let legs = vec![Leg {
             first,
             count,
             direction: Direction::Forward,
         }];
-        Report::Register {
+        Report::Claim {
             counter: 1,
             epoch: 1,
             take: 0,
@@ -447,8 +447,8 @@ mod tests {
                 cells: 20,
             },
         );
-        ledger.report(0, 1, register(0, 10));
-        ledger.report(0, 2, register(10, 10));
+        ledger.report(0, 1, claim(0, 10));
+        ledger.report(0, 2, claim(10, 10));
         ledger
     }
 
@@ -463,7 +463,7 @@ mod tests {
             status: Status::Down,
         };
         l.report(11_000, 2, down);
-        let line = l.report(12_500, 2, register(2, 18)).unwrap();
+        let line = l.report(12_500, 2, claim(2, 18)).unwrap();
         assert_eq!(
             line,
             "uav2 takes over 8 cells of uav1, 10.5 s after its end"
@@ -484,7 +484,7 @@ mod tests {
     fn what_nobody_takes_over_is_left() {
         let mut l = ledger();
         l.killed(0, 1, false);
-        l.report(5_000, 2, register(5, 10));
+        l.report(5_000, 2, claim(5, 10));
         l.report(6_000, 2, Report::Covered { cells: vec![4] });
         let kill = &l.kills()[0];
         assert_eq!(
@@ -500,7 +500,7 @@ mod tests {
         l.killed(1_000, 1, false);
         l.restarted(2_000, 1, true);
         l.report(2_500, 1, Report::Booted { incarnation: 2 });
-        l.report(9_000, 1, register(0, 3));
+        l.report(9_000, 1, claim(0, 3));
         let r = &l.restarts()[0];
         assert_eq!(
             (r.incarnation_before, r.incarnation_after),

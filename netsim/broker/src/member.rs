@@ -4,7 +4,7 @@ use crate::process::{Process, Processes};
 use crate::stream::Line;
 use skein_link::LinkState;
 use skein_link::RadioCounters;
-use skein_netsim::spec::{GroundSpec, Spec, UavSpec};
+use skein_netsim::spec::{GroundStationSpec, Spec, UavSpec};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
@@ -178,7 +178,7 @@ impl Surroundings<'_> {
 
     /// The configuration of the ground station.
     #[must_use]
-    pub fn ground(&self, ground: &GroundSpec) -> serde_json::Value {
+    pub fn ground(&self, ground: &GroundStationSpec) -> serde_json::Value {
         self.config(
             ground.id,
             "ground",

@@ -9,7 +9,7 @@ use crate::document::{Fields, Node};
 use crate::error::ScenarioError;
 use crate::flight_model::turning_mps;
 use skein_peer::mission::Mission;
-use skein_peer::plan::Ground;
+use skein_peer::offload::MissionGeometry;
 use skein_planning::airframe::Airframe;
 use skein_planning::coverage::area::{CoverageLoop, Direction, Tree};
 use skein_planning::trajectory::timed::Trajectory;
@@ -56,15 +56,15 @@ fn unknown(node: &Node<'_>, name: &str) -> ScenarioError {
 /// for missions without lanes of a tree.
 pub(crate) fn cheapest(
     mission: Arc<Mission>,
-    ground: Arc<Ground>,
+    ground: Arc<MissionGeometry>,
     airframes: &[Airframe],
     wind: Wind,
-) -> (Arc<Mission>, Arc<Ground>) {
+) -> (Arc<Mission>, Arc<MissionGeometry>) {
     if !mission.task.is_area() {
         return (mission, ground);
     }
     let radius_m = f64::from(mission.turn_radius_mm) / 1000.0;
-    let energy = |ground: &Ground| {
+    let energy = |ground: &MissionGeometry| {
         let the_loop = &ground.coverage_loop;
         // What is not seen at all is no saving.
         let unseen = the_loop.uncoverable().len();
@@ -83,7 +83,7 @@ pub(crate) fn cheapest(
         tree,
         ..(*mission).clone()
     });
-    match other.ground() {
+    match other.geometry() {
         Ok(across)
             if energy(&across)
                 .is_some_and(|(unseen, s)| (unseen, s) < (own.0, own.1 * (1.0 - WORTH))) =>

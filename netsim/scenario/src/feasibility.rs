@@ -8,7 +8,7 @@ use skein_netsim::fault::Fault;
 use skein_netsim::spec::{Spec, UavSpec};
 use skein_peer::Mission;
 use skein_peer::mission::point_m;
-use skein_peer::plan::Ground;
+use skein_peer::offload::MissionGeometry;
 use skein_planning::coverage::area::backtracking::{Division, RingCell, Robot, divide};
 use skein_planning::coverage::area::patch::Patches;
 use skein_planning::coverage::area::{CellId, CoverageLoop, Direction, Grid};
@@ -30,13 +30,13 @@ pub(crate) const TURN_ROUND_RADII: f64 = 7.0 / 3.0 * core::f64::consts::PI;
 /// that were built otherwise.
 #[must_use]
 pub fn feasibility(spec: &Spec) -> Vec<Finding> {
-    match spec.mission.ground() {
+    match spec.mission.geometry() {
         Ok(ground) => with_ground(spec, Ok(&ground)),
         Err(e) => with_ground(spec, Err(&e)),
     }
 }
 
-pub(crate) fn with_ground(spec: &Spec, ground: Result<&Ground, &str>) -> Vec<Finding> {
+pub(crate) fn with_ground(spec: &Spec, ground: Result<&MissionGeometry, &str>) -> Vec<Finding> {
     let mut out = Vec::new();
     fleet(spec, &mut out);
     faults(spec, &mut out);
@@ -167,7 +167,7 @@ fn faults(spec: &Spec, out: &mut Vec<Finding>) {
     }
 }
 
-fn on_loop(spec: &Spec, ground: &Ground, out: &mut Vec<Finding>) {
+fn on_loop(spec: &Spec, ground: &MissionGeometry, out: &mut Vec<Finding>) {
     let summary = summary(spec, ground);
     if summary.coverable_share < spec.min_coverable {
         let text = format!(
@@ -215,7 +215,7 @@ fn on_loop(spec: &Spec, ground: &Ground, out: &mut Vec<Finding>) {
     launches(spec, ground, out);
 }
 
-fn launches(spec: &Spec, ground: &Ground, out: &mut Vec<Finding>) {
+fn launches(spec: &Spec, ground: &MissionGeometry, out: &mut Vec<Finding>) {
     let clearance_m = f64::from(spec.mission.clearance_mm) / 1000.0;
     for (i, u) in spec.uavs.iter().enumerate() {
         let d = ground.router.zones().distance_m(u.launch.position());
@@ -280,7 +280,7 @@ impl Summary {
 
 /// Adds up what a scenario amounts to.
 #[must_use]
-pub fn summary(spec: &Spec, ground: &Ground) -> Summary {
+pub fn summary(spec: &Spec, ground: &MissionGeometry) -> Summary {
     let the_loop = &ground.coverage_loop;
     let area: Vec<Point> = spec.mission.area.iter().copied().map(point_m).collect();
     // A mission for targets asks for their pieces.

@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn the_pace_on_a_closed_loop_is_less_in_any_wind() {
         let calm = with(Wind::CALM);
-        let ground = calm.mission.ground().unwrap();
+        let ground = calm.mission.geometry().unwrap();
         let the_loop = &ground.coverage_loop;
         let pace = |spec: &Spec| Pace::of(&spec.uavs[0], spec, the_loop);
         let before = pace(&calm);

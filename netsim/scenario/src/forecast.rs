@@ -8,9 +8,9 @@ use crate::error::ScenarioError;
 use crate::feasibility::summary;
 use crate::resolve::{Overrides, Scenario, bounds};
 use skein_netsim::spec::Spec;
-use skein_peer::Task;
+use skein_peer::CoverageTask;
 use skein_peer::mission::point_m;
-use skein_peer::plan::Ground;
+use skein_peer::offload::MissionGeometry;
 use skein_planning::airframe::Airframe;
 use skein_planning::frame::Point;
 use skein_planning::geometry::Polygon;
@@ -45,16 +45,16 @@ impl AreaPlanner {
     }
 
     /// What it makes of an area.
-    pub(crate) fn task(self) -> Task {
+    pub(crate) fn task(self) -> CoverageTask {
         match self {
-            Self::Lanes => Task::Area,
-            Self::Exact => Task::Exact,
+            Self::Lanes => CoverageTask::Area,
+            Self::Exact => CoverageTask::Exact,
         }
     }
 
     /// The planner of a task over an area; `None` for points and lines.
     #[must_use]
-    pub fn of(task: &Task) -> Option<Self> {
+    pub fn of(task: &CoverageTask) -> Option<Self> {
         Self::ALL.into_iter().find(|p| p.task() == *task)
     }
 }
@@ -120,7 +120,7 @@ pub fn side_by_side(
 }
 
 /// Share of the area's points that lie in a piece of the loop which the mission sees.
-fn seen_share(spec: &Spec, ground: &Ground) -> f64 {
+fn seen_share(spec: &Spec, ground: &MissionGeometry) -> f64 {
     let the_loop = &ground.coverage_loop;
     let ring = spec.mission.area.iter().copied().map(point_m).collect();
     let Ok(area) = Polygon::new(ring) else {
@@ -248,7 +248,7 @@ mod tests {
             "{error}"
         );
         let square = crate::open(Some("helsinki"), &over).unwrap();
-        assert_eq!(square.spec.mission.task, Task::Exact);
+        assert_eq!(square.spec.mission.task, CoverageTask::Exact);
     }
 
     #[test]

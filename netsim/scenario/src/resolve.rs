@@ -11,10 +11,10 @@ use crate::forecast::AreaPlanner;
 use crate::read::faults::{self, Known, permille};
 use crate::read::fleet::{self, Fleet, word};
 use crate::read::terrain::{self, MAX_HEIGHT_M, Notices, Terrain, position};
-use skein_netsim::spec::{GroundSpec, RadioSpec, Spec, UavSpec};
+use skein_netsim::spec::{GroundStationSpec, RadioSpec, Spec, UavSpec};
 use skein_peer::mission::{PointMm, mm};
-use skein_peer::plan::Ground;
-use skein_peer::{Mission, Task};
+use skein_peer::offload::MissionGeometry;
+use skein_peer::{CoverageTask, Mission};
 use skein_planning::frame::{Point, Pose};
 use skein_planning::geometry::{NoFlyZones, Polygon};
 use skein_planning::trajectory::timed::Objective;
@@ -76,7 +76,7 @@ pub struct Scenario {
     /// What a run needs.
     pub spec: Spec,
     /// The coverage loop and the routes that follow from the mission.
-    pub ground: Arc<Ground>,
+    pub ground: Arc<MissionGeometry>,
     /// Notes and warnings, with their places; no errors.
     pub findings: Vec<Finding>,
 }
@@ -120,7 +120,7 @@ fn resolve(
     files: &Files<'_>,
     over: &Overrides,
     findings: &mut Vec<Finding>,
-) -> Result<(Spec, Arc<Ground>), ScenarioError> {
+) -> Result<(Spec, Arc<MissionGeometry>), ScenarioError> {
     let f = root.fields(FIELDS)?;
     let name = word(f.need("name", "\"city\"")?)?;
     let max_time_s = f.whole_or("max_time_s", 6000, 1, 604_800, "seconds")?;
@@ -229,8 +229,11 @@ fn the_fleet(
 }
 
 /// The loop and the routes that all UAVs derive from the mission.
-fn common_ground(root: &Node<'_>, mission: &Arc<Mission>) -> Result<Arc<Ground>, ScenarioError> {
-    mission.ground().map_err(|e| {
+fn common_ground(
+    root: &Node<'_>,
+    mission: &Arc<Mission>,
+) -> Result<Arc<MissionGeometry>, ScenarioError> {
+    mission.geometry().map_err(|e| {
         let (field, problem) = loop_trouble(mission, &e);
         ScenarioError::Invalid {
             place: root.locate(&field),
@@ -265,9 +268,9 @@ fn times(f: &Fields<'_>, over: &Overrides) -> Result<(f64, u32), ScenarioError> 
     Ok((time_scale, (beacon_s * 1000.0).round() as u32))
 }
 
-fn ground_station(node: &Node<'_>) -> Result<GroundSpec, ScenarioError> {
+fn ground_station(node: &Node<'_>) -> Result<GroundStationSpec, ScenarioError> {
     let f = node.fields(&["id", "east_m", "north_m", "height_m"])?;
-    Ok(GroundSpec {
+    Ok(GroundStationSpec {
         id: f.small_or("id", 100, 1, u16::MAX, "a peer's number")?,
         position: position(&f)?,
         height_m: f.number_or("height_m", 2.0, 0.0, MAX_HEIGHT_M, "metres")?,
@@ -321,7 +324,7 @@ fn mission(
     f: &Fields<'_>,
     t: &Terrain,
     fleet: &Fleet,
-    ground: Option<&GroundSpec>,
+    ground: Option<&GroundStationSpec>,
     wind: Wind,
 ) -> Result<Mission, ScenarioError> {
     let lanes = choose_tree::lanes(f)?;
@@ -384,7 +387,7 @@ fn mission(
 fn laps(f: &Fields<'_>, t: &Terrain) -> Result<u16, ScenarioError> {
     let laps = f.small_or("laps", 1, 1, 1000, "times")?;
     match f.get("laps") {
-        Some(node) if laps > 1 && t.task == Task::Exact => Err(node
+        Some(node) if laps > 1 && t.task == CoverageTask::Exact => Err(node
             .wrong("exact passes are flown once; for several times round take planner \"lanes\"")),
         _ => Ok(laps),
     }
@@ -481,7 +484,7 @@ fn check_places(
 }
 
 /// Gives every UAV its launch pose: its own, or evenly spread round the loop.
-fn launch(fleet: &Fleet, ground: &Ground) -> Vec<UavSpec> {
+fn launch(fleet: &Fleet, ground: &MissionGeometry) -> Vec<UavSpec> {
     let n = ground.coverage_loop.len();
     let k = fleet.members.len();
     let on_loop = |i: usize| -> Pose { ground.coverage_loop.boundary(i * n / k) };

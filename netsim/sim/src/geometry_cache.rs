@@ -2,30 +2,30 @@
 //! a pure function of it, so a thousand runs of one scenario build it once.
 
 use skein_peer::Mission;
-use skein_peer::plan::{Answer, Ground, Problem, solve};
+use skein_peer::offload::{Job, JobResult, MissionGeometry, run};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Answers by [`Mission::content_hash`]. Cheap to clone: the ground is shared.
 #[derive(Clone, Debug, Default)]
-pub struct Grounds {
-    by_hash: BTreeMap<u64, Result<Arc<Ground>, String>>,
+pub struct GeometryCache {
+    by_hash: BTreeMap<u64, Result<Arc<MissionGeometry>, String>>,
 }
 
-impl Grounds {
+impl GeometryCache {
     /// The ground of a mission, derived on first use.
-    pub fn of(&mut self, mission: &Arc<Mission>) -> Result<Arc<Ground>, String> {
+    pub fn of(&mut self, mission: &Arc<Mission>) -> Result<Arc<MissionGeometry>, String> {
         self.by_hash
             .entry(mission.content_hash())
-            .or_insert_with(|| mission.ground())
+            .or_insert_with(|| mission.geometry())
             .clone()
     }
 
     /// Solves a problem, ground from memory.
-    pub fn answer(&mut self, problem: &Problem) -> Answer {
-        match problem {
-            Problem::Ground(mission) => Answer::Ground(self.of(mission)),
-            Problem::Divide { .. } => solve(problem),
+    pub fn answer(&mut self, job: &Job) -> JobResult {
+        match job {
+            Job::Geometry(mission) => JobResult::Geometry(self.of(mission)),
+            Job::Divide { .. } => run(job),
         }
     }
 }

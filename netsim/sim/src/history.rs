@@ -179,7 +179,7 @@ pub fn report_hash(report: &Report) -> u64 {
                 .iter()
                 .for_each(|m| words(&mut h, 0, &[u64::from(m.0)]));
         }
-        Report::Register {
+        Report::Claim {
             counter,
             epoch,
             take,

@@ -9,7 +9,7 @@ use crate::fault::{Fault, TimedFault};
 use crate::prepared::Prepared;
 use crate::world::World;
 use skein_behaviors::{Event, Executive, Goal};
-use skein_peer::plan::Ground;
+use skein_peer::offload::MissionGeometry;
 use skein_planning::coverage::area::backtracking::{Leg, RingCell, Robot, divide};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ pub fn makespan_ms(prepared: &Prepared, seed: u64, faults: &[TimedFault]) -> Opt
 struct Baseline<'a> {
     prepared: &'a Prepared,
     world: World,
-    ground: Arc<Ground>,
+    ground: Arc<MissionGeometry>,
     minds: BTreeMap<u16, Executive>,
     busy: BTreeMap<u16, bool>,
     covered: Vec<bool>,
@@ -56,7 +56,7 @@ struct Baseline<'a> {
 }
 
 impl<'a> Baseline<'a> {
-    fn new(prepared: &'a Prepared, seed: u64, ground: Arc<Ground>) -> Self {
+    fn new(prepared: &'a Prepared, seed: u64, ground: Arc<MissionGeometry>) -> Self {
         let mut r = Self {
             prepared,
             world: World::on(Arc::clone(&prepared.site), &prepared.spec, seed),

@@ -3,7 +3,7 @@
 
 use crate::fault::TimedFault;
 use crate::spec::Spec;
-use crate::swarm::{Grounds, Outcome, Swarm, outcome};
+use crate::swarm::{GeometryCache, Outcome, Swarm, outcome};
 use crate::world::Site;
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ pub struct Prepared {
     /// Its buildings and cells.
     pub site: Arc<Site>,
     /// The common ground of its mission.
-    pub grounds: Grounds,
+    pub grounds: GeometryCache,
 }
 
 impl Prepared {
@@ -28,7 +28,7 @@ impl Prepared {
     pub fn new(spec: Spec) -> Self {
         let site = Arc::new(Site::new(&spec));
         let spec = Arc::new(spec);
-        let mut grounds = Grounds::default();
+        let mut grounds = GeometryCache::default();
         // A mission without a ground is found out by every run; here it is only remembered.
         let _ = grounds.of(&spec.mission);
         Self {

@@ -25,7 +25,7 @@ pub struct Spec {
     /// The flying peers, ascending by id.
     pub uavs: Vec<UavSpec>,
     /// The ground station, if there is one.
-    pub ground: Option<GroundSpec>,
+    pub ground: Option<GroundStationSpec>,
     /// The wind, everywhere and all the time.
     pub wind: Wind,
     /// What UAVs spend little of, off the loop.
@@ -76,7 +76,7 @@ pub struct UavSpec {
 
 /// The ground station.
 #[derive(Clone, Debug)]
-pub struct GroundSpec {
+pub struct GroundStationSpec {
     /// Its number.
     pub id: u16,
     /// Where it stands.

@@ -133,7 +133,7 @@ fn role(f: &mut Fields<'_>) -> Result<Role, FieldError> {
     let (text, at) = f.string("role")?;
     match text.as_str() {
         "uav" => Ok(Role::Uav),
-        "ground" => Ok(Role::Ground),
+        "ground" => Ok(Role::GroundStation),
         _ => Err(wrong(at, "\"uav\" or \"ground\"")),
     }
 }

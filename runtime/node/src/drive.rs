@@ -10,7 +10,7 @@ use crate::journal::Journal;
 use crate::radio::Radio;
 use crate::vehicle::{News, Tick, Vehicle};
 use skein_link::frame::{Order, ToWorld};
-use skein_peer::plan::{Answer, Problem, solve};
+use skein_peer::offload::{Job, JobResult, run};
 use skein_peer::{Command, Input, Output, Peer, Time};
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
@@ -58,8 +58,8 @@ pub struct Driver<M, V> {
     radio: Radio,
     bus: Bus,
     journal: Journal,
-    plans: mpsc::Receiver<(u64, Answer)>,
-    planner: mpsc::Sender<(u64, Answer)>,
+    plans: mpsc::Receiver<(u64, JobResult)>,
+    planner: mpsc::Sender<(u64, JobResult)>,
     counters_due: Time,
 }
 
@@ -67,7 +67,7 @@ pub struct Driver<M, V> {
 enum Happened {
     News(News),
     Stored(crate::journal::Stored),
-    Planned(u64, Answer),
+    Computed(u64, JobResult),
     Bus(Event),
     Time,
 }
@@ -106,7 +106,7 @@ impl<M: Mind, V: Vehicle> Driver<M, V> {
                 () = &mut stop => break,
                 news = self.vehicle.next() => Happened::News(news),
                 Some(stored) = self.journal.answer() => Happened::Stored(stored),
-                Some((token, answer)) = self.plans.recv() => Happened::Planned(token, answer),
+                Some((token, result)) = self.plans.recv() => Happened::Computed(token, result),
                 event = self.bus.next() => Happened::Bus(event),
                 () = tokio::time::sleep(wait) => Happened::Time,
             };
@@ -147,7 +147,7 @@ impl<M: Mind, V: Vehicle> Driver<M, V> {
                 })
                 .await
             }
-            Happened::Planned(token, answer) => self.step(Input::Planned { token, answer }).await,
+            Happened::Computed(token, result) => self.step(Input::Computed { token, result }).await,
             Happened::Bus(Event::Link { neighbour, up }) => {
                 self.step(Input::LinkHint { neighbour, up }).await;
             }
@@ -224,7 +224,7 @@ impl<M: Mind, V: Vehicle> Driver<M, V> {
             }
             Output::Setpoint(setpoint) => self.vehicle.tell(ToWorld::Setpoint(setpoint)).await,
             Output::Store { token, record } => self.journal.store(token, record).await,
-            Output::Plan { token, problem } => self.plan(token, problem),
+            Output::Compute { token, job } => self.compute(token, job),
             Output::Report(report) => {
                 tracing::info!(time_ms = now.0, ?report);
                 match cbor4ii::serde::to_vec(Vec::new(), &report) {
@@ -235,12 +235,12 @@ impl<M: Mind, V: Vehicle> Driver<M, V> {
         }
     }
 
-    fn plan(&self, token: u64, problem: Problem) {
+    fn compute(&self, token: u64, job: Job) {
         let planner = self.planner.clone();
         tokio::task::spawn_blocking(move || {
-            let answer = solve(&problem);
+            let result = run(&job);
             // A loop that has ended needs no answer.
-            let _ = planner.blocking_send((token, answer));
+            let _ = planner.blocking_send((token, result));
         });
     }
 

@@ -6,7 +6,7 @@
 //! are counted on, is left to the callers.
 
 use crate::wire::Fnv;
-use crate::wire::message::Run;
+use crate::wire::message::CellRun;
 
 /// Bytes of the longest run length: a `u16` in groups of seven bits.
 const VARINT_MAX_BYTES: usize = 3;
@@ -92,7 +92,7 @@ impl CellSet {
     }
 
     /// Adds the cells of a run (cyclic); returns whether any was missing.
-    pub fn insert_run(&mut self, run: Run) -> bool {
+    pub fn insert_run(&mut self, run: CellRun) -> bool {
         if self.n == 0 {
             return false;
         }
@@ -124,7 +124,7 @@ impl CellSet {
 
     /// Cells of the loop, in the set or not.
     #[must_use]
-    pub fn len(&self) -> u16 {
+    pub fn capacity(&self) -> u16 {
         self.n
     }
 
@@ -230,14 +230,14 @@ impl CellSet {
     /// The longest runs of consecutive cells, ascending; no run crosses the seam
     /// between the last cell and cell 0.
     #[must_use]
-    pub fn runs(&self) -> Vec<Run> {
-        let mut runs: Vec<Run> = Vec::new();
+    pub fn runs(&self) -> Vec<CellRun> {
+        let mut runs: Vec<CellRun> = Vec::new();
         for cell in self.iter() {
             match runs.last_mut() {
                 Some(run) if u32::from(run.first) + u32::from(run.count) == u32::from(cell) => {
                     run.count += 1;
                 }
-                _ => runs.push(Run {
+                _ => runs.push(CellRun {
                     first: cell,
                     count: 1,
                 }),
@@ -305,7 +305,7 @@ impl CellSet {
             }
             if run % 2 == 1 {
                 let first = u16::try_from(first).unwrap_or(u16::MAX);
-                set.insert_run(Run {
+                set.insert_run(CellRun {
                     first,
                     count: length,
                 });
@@ -319,7 +319,7 @@ impl CellSet {
     }
 }
 
-fn encode_runs(runs: impl Iterator<Item = Run>) -> Vec<u8> {
+fn encode_runs(runs: impl Iterator<Item = CellRun>) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut end = 0_u16;
     for run in runs {
@@ -457,7 +457,7 @@ mod tests {
             Ok(set)
         );
         let mut wrapped = CellSet::new(10);
-        assert!(wrapped.insert_run(Run { first: 8, count: 4 }));
+        assert!(wrapped.insert_run(CellRun { first: 8, count: 4 }));
         assert_eq!(wrapped.iter().collect::<Vec<_>>(), [0, 1, 8, 9]);
     }
 }

@@ -13,7 +13,8 @@ pub enum Role {
     /// Flies and plans.
     Uav,
     /// Stands on the ground, relays, speaks for the operator, never plans.
-    Ground,
+    #[serde(rename = "ground")]
+    GroundStation,
 }
 
 /// The configuration of one peer.

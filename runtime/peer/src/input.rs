@@ -1,7 +1,7 @@
 //! What can happen to a peer.
 
 use crate::mission::Mission;
-use crate::plan::Answer;
+use crate::offload::JobResult;
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Percept;
 use std::sync::Arc;
@@ -65,12 +65,12 @@ pub enum Input {
         /// Whether the record is durable now.
         ok: bool,
     },
-    /// An earlier `Plan` was answered.
-    Planned {
-        /// Of that `Plan`.
+    /// An earlier `Compute` was answered.
+    Computed {
+        /// Of that `Compute`.
         token: u64,
-        /// What [`crate::plan::solve`] returned.
-        answer: Answer,
+        /// What [`crate::offload::run`] returned.
+        result: JobResult,
     },
     /// The operator, at a ground station's own console, wants something.
     Command(Command),

@@ -6,7 +6,7 @@
 
 use crate::Incarnation;
 use crate::cells::CellSet;
-use crate::wire::message::{Register, Snapshot};
+use crate::wire::message::{Bid, Claim};
 use serde::{Deserialize, Serialize};
 
 /// One journal record.
@@ -15,18 +15,18 @@ pub enum Entry {
     /// A life begins.
     Life(Incarnation),
     /// A bid is about to be spoken.
-    Bid(Snapshot),
+    Bid(Bid),
     /// A section is about to be flown.
-    Section(Register),
+    Claim(Claim),
     /// Covered cells known of.
-    Union {
+    Covered {
         /// The loop they are counted on.
         loop_hash: u64,
         /// Number of cells of that loop.
         cells: u16,
         /// Run-length encoded.
         #[serde(with = "serde_bytes")]
-        union: Vec<u8>,
+        covered: Vec<u8>,
     },
 }
 
@@ -52,11 +52,11 @@ pub struct Durable {
     /// The highest round counter promised.
     pub counter: u32,
     /// The latest bid.
-    pub snapshot: Option<Snapshot>,
+    pub bid: Option<Bid>,
     /// The latest section adopted.
-    pub register: Option<Register>,
+    pub claim: Option<Claim>,
     /// Covered cells, run-length encoded along the loop of `loop_hash`.
-    pub union: Vec<u8>,
+    pub covered: Vec<u8>,
     /// The loop of `union`.
     pub loop_hash: u64,
     /// Number of cells of that loop.
@@ -84,24 +84,24 @@ impl Durable {
     pub fn apply(&mut self, entry: &Entry) {
         match entry {
             Entry::Life(incarnation) => self.incarnation = self.incarnation.max(*incarnation),
-            Entry::Bid(snapshot) => {
-                self.counter = self.counter.max(snapshot.round.counter);
-                self.snapshot = Some(snapshot.clone());
+            Entry::Bid(bid) => {
+                self.counter = self.counter.max(bid.round.counter);
+                self.bid = Some(bid.clone());
             }
-            Entry::Section(register) => {
-                self.counter = self.counter.max(register.epoch.counter);
-                self.register = Some(register.clone());
+            Entry::Claim(claim) => {
+                self.counter = self.counter.max(claim.epoch.counter);
+                self.claim = Some(claim.clone());
             }
-            Entry::Union {
+            Entry::Covered {
                 loop_hash,
                 cells,
-                union,
+                covered,
             } => {
-                let mut merged = union.clone();
+                let mut merged = covered.clone();
                 if (self.loop_hash, self.cells) == (*loop_hash, *cells)
                     && let (Ok(mut a), Ok(b)) = (
-                        CellSet::decode_rle(*cells, &self.union),
-                        CellSet::decode_rle(*cells, union),
+                        CellSet::decode_rle(*cells, &self.covered),
+                        CellSet::decode_rle(*cells, covered),
                     )
                 {
                     a.union_with(&b);
@@ -109,7 +109,7 @@ impl Durable {
                 }
                 self.loop_hash = *loop_hash;
                 self.cells = *cells;
-                self.union = merged;
+                self.covered = merged;
             }
         }
     }
@@ -119,26 +119,31 @@ impl Durable {
 mod tests {
     use super::*;
 
-    fn union(cells: &[u16]) -> Entry {
+    fn covered(cells: &[u16]) -> Entry {
         let mut set = CellSet::new(20);
         for c in cells {
             set.insert(*c);
         }
-        Entry::Union {
+        Entry::Covered {
             loop_hash: 5,
             cells: 20,
-            union: set.encode_rle(None),
+            covered: set.encode_rle(None),
         }
     }
 
     #[test]
     fn replaying_gives_the_newest_promises_and_all_coverage() {
-        let entries = [Entry::Life(3), union(&[1, 2]), union(&[7]), Entry::Life(4)];
+        let entries = [
+            Entry::Life(3),
+            covered(&[1, 2]),
+            covered(&[7]),
+            Entry::Life(4),
+        ];
         let mut records: Vec<Vec<u8>> = entries.iter().map(Entry::encode).collect();
         records.push(vec![0xff, 0x00]);
         let (d, unread) = Durable::replay(&records);
         assert_eq!((d.incarnation, unread), (4, 1));
-        let set = CellSet::decode_rle(20, &d.union).unwrap();
+        let set = CellSet::decode_rle(20, &d.covered).unwrap();
         assert_eq!(set.iter().collect::<Vec<_>>(), [1, 2, 7]);
     }
 }

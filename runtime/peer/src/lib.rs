@@ -17,37 +17,33 @@
 //! 4. sleep until [`Peer::next_timeout`] or the next thing that happens.
 //!
 //! `Publish` is a one-hop broadcast: there are no addressees. `Store` is answered by
-//! `Stored` when the record is durable, not before. `Plan` is answered by `Planned`
+//! `Stored` when the record is durable, not before. `Compute` is answered by `Computed`
 //! with what [`plan::solve`] returned, computed wherever the driver likes.
 
-mod boot;
+pub mod beliefs;
 pub mod cells;
 pub mod config;
 mod cooperation;
-pub mod coverage;
-mod ear;
+mod inbound;
 pub mod input;
 pub mod journal;
-pub mod membership;
 pub mod mission;
+mod mission_state;
+pub mod offload;
+mod outbound;
 pub mod output;
 pub mod peer;
-pub mod plan;
-pub mod relay;
-#[cfg(test)]
-mod relay_net;
+pub mod protocol;
 pub mod task;
-pub mod view;
-mod voice;
 pub mod wire;
 
+pub use beliefs::Beliefs;
 pub use config::{PeerConfig, Role};
 pub use input::{Command, Input, Time};
 pub use mission::Mission;
 pub use output::{Output, Priority, Report};
 pub use peer::Peer;
-pub use task::Task;
-pub use view::View;
+pub use task::CoverageTask;
 
 use serde::{Deserialize, Serialize};
 

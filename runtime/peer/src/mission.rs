@@ -1,7 +1,7 @@
 //! What a mission is: area, zones, lanes, level, origin, revision.
 
-use crate::plan::Ground;
-use crate::task::Task;
+use crate::offload::MissionGeometry;
+use crate::task::CoverageTask;
 use crate::wire::message::MissionChunk;
 use serde::{Deserialize, Serialize};
 use skein_planning::coverage::area::patch::Corners;
@@ -48,8 +48,8 @@ pub struct Mission {
     /// Where UAVs loiter when all is done.
     pub base: PointMm,
     /// What is to be seen.
-    #[serde(default, skip_serializing_if = "Task::is_area")]
-    pub task: Task,
+    #[serde(default, skip_serializing_if = "CoverageTask::is_area")]
+    pub task: CoverageTask,
     /// Which time round it is, from 0 (D2.7 §3.6.6: continuous coverage).
     #[serde(default, skip_serializing_if = "is_zero")]
     pub lap: u16,
@@ -161,7 +161,7 @@ impl Mission {
     ///
     /// # Errors
     /// A sentence that names what is wrong with the mission.
-    pub fn ground(self: &Arc<Self>) -> Result<Arc<Ground>, String> {
+    pub fn geometry(self: &Arc<Self>) -> Result<Arc<MissionGeometry>, String> {
         let ring = |r: &[PointMm]| Polygon::new(r.iter().copied().map(point_m).collect());
         let area = ring(&self.area).map_err(|e| format!("area: {e}"))?;
         let mut zones = Vec::with_capacity(self.zones.len());
@@ -187,7 +187,7 @@ impl Mission {
             clearance_m: problem.clearance_m,
         };
         let router = Router::new(zones, limits);
-        Ok(Arc::new(Ground {
+        Ok(Arc::new(MissionGeometry {
             mission: Arc::clone(self),
             coverage_loop: Arc::new(coverage_loop.of_lap(self.lap)),
             router: Arc::new(router),
@@ -347,7 +347,7 @@ mod tests {
             tracking_error_mm: 2_000,
             launch: (0, 0),
             base: (0, 0),
-            task: Task::Area,
+            task: CoverageTask::Area,
             lap: 0,
             further_laps: 0,
             tree: Tree::default(),

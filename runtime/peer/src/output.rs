@@ -1,6 +1,6 @@
 //! What a peer wants done, and what it reports.
 
-use crate::plan::Problem;
+use crate::offload::Job;
 use crate::{Incarnation, PeerId};
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Setpoint;
@@ -31,12 +31,12 @@ pub enum Output {
         /// The journal record.
         record: Vec<u8>,
     },
-    /// Compute this, then answer with `Planned`.
-    Plan {
+    /// Compute this, then answer with `Computed`.
+    Compute {
         /// Names the answer.
         token: u64,
         /// The problem.
-        problem: Problem,
+        job: Job,
     },
     /// For logs, displays and judges; nothing depends on it.
     Report(Report),
@@ -102,10 +102,10 @@ pub enum Report {
         members: Vec<PeerId>,
     },
     /// A division was adopted, or cells were taken without a round.
-    Register {
+    Claim {
         /// Counter of the epoch.
         counter: u32,
-        /// Hash of the epoch's snapshots.
+        /// Hash of the epoch's bids.
         epoch: u32,
         /// How often cells were taken without a round since.
         take: u16,

@@ -2,25 +2,25 @@
 //!
 //! | what happens | who decides |
 //! |---|---|
-//! | life, probation, silence | `boot` |
-//! | records heard | `ear` |
-//! | records spoken | `voice` |
+//! | life, probation, silence | `life` |
+//! | records heard | `inbound` |
+//! | records spoken | `outbound` |
 //! | mission, goal, sections | `cooperation` |
 
+use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
-use crate::cooperation::Crew;
-use crate::coverage::runs::PlanCell;
 use crate::input::{Command, Input, Time};
 use crate::journal::{Durable, Entry};
-use crate::membership::Membership;
 use crate::mission::Library;
+use crate::mission_state::MissionState;
+use crate::offload::{Job, JobResult};
+use crate::outbound::Outbound;
 use crate::output::{Output, Report};
-use crate::plan::{Answer, Problem};
-use crate::relay::Relay;
-use crate::view::View;
-use crate::voice::Voice;
+use crate::protocol::membership::Membership;
+use crate::protocol::relay::Relay;
+use crate::protocol::runs::PlannedCell;
 use crate::wire::message::{Epoch, Order};
-use crate::{Incarnation, PeerId, boot, cooperation, ear, voice};
+use crate::{Incarnation, PeerId, cooperation, inbound, outbound, protocol::life};
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
 use skein_behaviors::Percept;
@@ -31,7 +31,7 @@ use std::collections::{BTreeMap, VecDeque};
 pub const MAX_STORES: usize = 32;
 
 /// Most plans under way: one ground a mission revision, one division a round.
-pub const MAX_PLANS: usize = 8;
+pub const MAX_JOBS: usize = 8;
 
 /// How often a peer looks at its deadlines, as a fraction of the beacon period.
 pub const CADENCE: u64 = 4;
@@ -42,20 +42,20 @@ pub(crate) enum Promise {
     /// A life.
     Life(Incarnation),
     /// A bid.
-    Bid(Box<crate::wire::message::Snapshot>),
+    Bid(Box<crate::wire::message::Bid>),
     /// An adoption, and which of the sections written it is.
-    Adopt(u64, Box<crate::coverage::negotiation::Adoption>),
+    Adopt(u64, Box<crate::protocol::negotiation::Adoption>),
     /// Cells taken without a round, likewise.
-    Take(u64, Vec<PlanCell>),
+    Take(u64, Vec<PlannedCell>),
     /// Coverage; nothing waits for it.
-    Union,
+    Covered,
 }
 
 /// What waits for an answer of the planner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Asked {
+pub(crate) enum PendingJob {
     /// The common ground of the mission with this hash.
-    Ground(u64),
+    Geometry(u64),
     /// A division of this epoch.
     Division(Epoch),
 }
@@ -66,26 +66,26 @@ pub struct Peer {
     pub(crate) config: PeerConfig,
     pub(crate) now: Time,
     pub(crate) started: bool,
-    pub(crate) boot: boot::Boot,
+    pub(crate) life: life::Life,
     pub(crate) rng: ChaCha8Rng,
     pub(crate) membership: Membership,
     pub(crate) relay: Relay,
     pub(crate) library: Library,
-    pub(crate) voice: Voice,
-    pub(crate) crew: Option<Crew>,
-    pub(crate) order: Ordered,
+    pub(crate) outbound: Outbound,
+    pub(crate) mission_state: Option<MissionState>,
+    pub(crate) order: StandingOrder,
     pub(crate) percept: Option<Percept>,
     pub(crate) durable: Durable,
     pub(crate) outputs: VecDeque<Output>,
     next_token: u64,
     stores: BTreeMap<u64, (Promise, Entry)>,
-    plans: BTreeMap<u64, Asked>,
-    next_look: Time,
+    jobs: BTreeMap<u64, PendingJob>,
+    next_tick: Time,
 }
 
 /// The operator's standing order and the version of the record that gave it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Ordered {
+pub(crate) struct StandingOrder {
     /// What is wanted.
     pub order: Order,
     /// (incarnation, seq, author) of the record; none yet when zero.
@@ -104,9 +104,9 @@ impl Peer {
             membership: Membership::new(config.id.0, period),
             relay: Relay::new(config.id.0, &config.fleet, config.rate_bps, period),
             library: Library::new(config.mission.clone()),
-            voice: Voice::default(),
-            crew: None,
-            order: Ordered {
+            outbound: Outbound::default(),
+            mission_state: None,
+            order: StandingOrder {
                 order: Order::Resume,
                 version: (0, 0, 0),
             },
@@ -115,11 +115,11 @@ impl Peer {
             outputs: VecDeque::new(),
             next_token: 1,
             stores: BTreeMap::new(),
-            plans: BTreeMap::new(),
-            next_look: Time(0),
+            jobs: BTreeMap::new(),
+            next_tick: Time(0),
             now: Time(0),
             started: false,
-            boot: boot::Boot::default(),
+            life: life::Life::default(),
             rng: ChaCha8Rng::from_seed(seed),
             config,
         }
@@ -131,8 +131,8 @@ impl Peer {
         if !self.started {
             if let Input::Start { persisted, nonce } = input {
                 self.started = true;
-                self.next_look = self.now;
-                boot::start(self, &persisted, nonce);
+                self.next_tick = self.now;
+                life::start(self, &persisted, nonce);
             }
             return;
         }
@@ -143,14 +143,14 @@ impl Peer {
                 transmitter,
                 hops,
                 bytes,
-            } => ear::hear(self, transmitter, hops, &bytes),
+            } => inbound::hear(self, transmitter, hops, &bytes),
             Input::Timer => {}
             Input::LinkHint { neighbour, up } => self.membership.link(neighbour, up),
             Input::Stored { token, ok } => self.on_stored(token, ok),
-            Input::Planned { token, answer } => self.on_planned(token, answer),
+            Input::Computed { token, result } => self.on_computed(token, result),
             Input::Command(command) => self.on_command(&command),
         }
-        self.look();
+        self.tick();
     }
 
     /// The next output of the last input, if there is one left.
@@ -164,7 +164,7 @@ impl Peer {
         if !self.started {
             return None;
         }
-        let mut next = self.next_look.min(self.voice.next_beacon);
+        let mut next = self.next_tick.min(self.outbound.next_beacon);
         if let Some(t) = self.relay.next_timeout(self.now) {
             next = next.min(t);
         }
@@ -172,19 +172,19 @@ impl Peer {
     }
 
     /// The deadlines that are due, then whatever may be sent now.
-    fn look(&mut self) {
-        if self.now >= self.next_look {
-            self.next_look = self.now.plus_ms(self.period_ms() / CADENCE);
-            boot::look(self);
+    fn tick(&mut self) {
+        if self.now >= self.next_tick {
+            self.next_tick = self.now.plus_ms(self.period_ms() / CADENCE);
+            life::tick(self);
             let changes = self.membership.tick(self.now);
-            ear::on_changes(self, changes);
-            cooperation::look(self);
-            voice::look(self);
+            inbound::on_changes(self, changes);
+            cooperation::tick(self);
+            outbound::tick(self);
         }
-        if self.now >= self.voice.next_beacon {
-            voice::beacon(self);
+        if self.now >= self.outbound.next_beacon {
+            outbound::beacon(self);
         }
-        voice::send(self);
+        outbound::send(self);
     }
 
     fn on_percept(&mut self, percept: Percept) {
@@ -215,20 +215,20 @@ impl Peer {
         }
         self.durable.apply(&entry);
         match promise {
-            Promise::Life(incarnation) => boot::lives(self, incarnation),
-            Promise::Bid(snapshot) => cooperation::bid_is_durable(self, *snapshot),
+            Promise::Life(incarnation) => life::lives(self, incarnation),
+            Promise::Bid(bid) => cooperation::bid_is_durable(self, *bid),
             Promise::Adopt(written, adoption) => cooperation::adopt(self, written, &adoption),
             Promise::Take(written, cells) => cooperation::take(self, written, &cells),
-            Promise::Union => {}
+            Promise::Covered => {}
         }
     }
 
-    fn on_planned(&mut self, token: u64, answer: Answer) {
-        match (self.plans.remove(&token), answer) {
-            (Some(Asked::Ground(hash)), Answer::Ground(ground)) => {
-                cooperation::grounded(self, hash, ground)
+    fn on_computed(&mut self, token: u64, result: JobResult) {
+        match (self.jobs.remove(&token), result) {
+            (Some(PendingJob::Geometry(hash)), JobResult::Geometry(geometry)) => {
+                cooperation::geometry_arrived(self, hash, geometry)
             }
-            (Some(Asked::Division(epoch)), Answer::Divide(division)) => {
+            (Some(PendingJob::Division(epoch)), JobResult::Divide(division)) => {
                 cooperation::divided(self, epoch, &division);
             }
             _ => {}
@@ -236,18 +236,18 @@ impl Peer {
     }
 
     fn on_command(&mut self, command: &Command) {
-        if self.config.role != Role::Ground {
+        if self.config.role != Role::GroundStation {
             self.alarm("a command reached a peer that is no ground station; it was ignored");
             return;
         }
         match command {
             Command::Mission(mission) => {
                 self.library.offer(mission.clone());
-                voice::speak_mission(self);
+                outbound::speak_mission(self);
             }
-            Command::Resume => voice::speak_order(self, Order::Resume),
-            Command::Hold => voice::speak_order(self, Order::Hold),
-            Command::ReturnToBase => voice::speak_order(self, Order::ReturnToBase),
+            Command::Resume => outbound::speak_order(self, Order::Resume),
+            Command::Hold => outbound::speak_order(self, Order::Hold),
+            Command::ReturnToBase => outbound::speak_order(self, Order::ReturnToBase),
         }
     }
 
@@ -266,11 +266,11 @@ impl Peer {
     }
 
     /// Asks the planner.
-    pub(crate) fn ask(&mut self, asked: Asked, problem: Problem) {
-        if self.plans.len() < MAX_PLANS && !self.plans.values().any(|a| *a == asked) {
+    pub(crate) fn ask(&mut self, pending: PendingJob, job: Job) {
+        if self.jobs.len() < MAX_JOBS && !self.jobs.values().any(|p| *p == pending) {
             let token = self.token();
-            self.outputs.push_back(Output::Plan { token, problem });
-            self.plans.insert(token, asked);
+            self.outputs.push_back(Output::Compute { token, job });
+            self.jobs.insert(token, pending);
         }
     }
 
@@ -296,18 +296,18 @@ impl Peer {
 
     /// A copy of what it believes.
     #[must_use]
-    pub fn view(&self) -> View {
-        let mut view = View {
-            incarnation: self.boot.incarnation,
-            speaks: self.boot.speaks(self.now),
+    pub fn beliefs(&self) -> Beliefs {
+        let mut view = Beliefs {
+            incarnation: self.life.incarnation,
+            speaks: self.life.speaks(self.now),
             diameter: self.membership.diameter(self.now),
-            ..View::default()
+            ..Beliefs::default()
         };
         for (id, incarnation, status) in self.membership.all() {
             view.peers.insert(PeerId(id), (incarnation, status));
         }
         view.loads.push(("stores", self.stores.len(), MAX_STORES));
-        view.loads.push(("plans", self.plans.len(), MAX_PLANS));
+        view.loads.push(("jobs", self.jobs.len(), MAX_JOBS));
         view.loads.extend(self.relay.loads());
         cooperation::view(self, &mut view);
         view

@@ -8,7 +8,7 @@ use skein_planning::coverage::stations::targets::{LineTarget, PointTarget, Targe
 
 /// What is to be seen.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Task {
+pub enum CoverageTask {
     /// The whole area, in cells of the lane grid on a spanning-tree loop (§3.6.2).
     #[default]
     Area,
@@ -43,7 +43,7 @@ fn metres(mm: u32) -> f64 {
     f64::from(mm) / 1000.0
 }
 
-impl Task {
+impl CoverageTask {
     /// Whether it is the whole area in lanes.
     #[must_use]
     pub fn is_area(&self) -> bool {

@@ -8,7 +8,7 @@ use crate::forecast::AreaPlanner;
 use crate::read::terrain::{Notices, position};
 use skein_interop::place::{LatLon, to_plane};
 use skein_interop::targets;
-use skein_peer::Task;
+use skein_peer::CoverageTask;
 use skein_peer::mission::mm;
 use skein_peer::task::{LineTask, PointTask};
 use skein_planning::frame::{MAX_MISSION_RADIUS_M, Origin, Point, Vector};
@@ -32,7 +32,7 @@ pub(crate) fn read(
     origin: Origin,
     area: Option<&Polygon>,
     notices: &mut Notices,
-) -> Result<Task, ScenarioError> {
+) -> Result<CoverageTask, ScenarioError> {
     let reader = Reader { origin, files };
     if let (Some(node), Some(_)) = (f.get("planner"), f.get("points").or(f.get("lines"))) {
         return Err(
@@ -50,9 +50,9 @@ pub(crate) fn read(
 }
 
 /// How an area is covered, as its planner is named.
-fn area_task(f: &Fields<'_>) -> Result<Task, ScenarioError> {
+fn area_task(f: &Fields<'_>) -> Result<CoverageTask, ScenarioError> {
     let Some(node) = f.get("planner") else {
-        return Ok(Task::Area);
+        return Ok(CoverageTask::Area);
     };
     let name = node.text()?;
     match AreaPlanner::ALL.into_iter().find(|p| p.name() == name) {
@@ -64,12 +64,12 @@ fn area_task(f: &Fields<'_>) -> Result<Task, ScenarioError> {
 }
 
 /// The rectangle around all that the task asks for.
-pub(crate) fn extent(task: &Task, node: &Node<'_>) -> Result<Polygon, ScenarioError> {
+pub(crate) fn extent(task: &CoverageTask, node: &Node<'_>) -> Result<Polygon, ScenarioError> {
     let of = |p: skein_peer::mission::PointMm| skein_peer::mission::point_m(p);
     let all: Vec<Point> = match task {
-        Task::Area | Task::Exact => Vec::new(),
-        Task::Points(points) => points.iter().map(|p| of(p.at)).collect(),
-        Task::Lines(lines) => lines
+        CoverageTask::Area | CoverageTask::Exact => Vec::new(),
+        CoverageTask::Points(points) => points.iter().map(|p| of(p.at)).collect(),
+        CoverageTask::Lines(lines) => lines
             .iter()
             .flat_map(|l| l.way.iter().map(|p| of(*p)))
             .collect(),
@@ -119,7 +119,7 @@ impl Reader<'_> {
         node: &Node<'_>,
         area: Option<&Polygon>,
         notices: &mut Notices,
-    ) -> Result<Task, ScenarioError> {
+    ) -> Result<CoverageTask, ScenarioError> {
         let mut points: Vec<(Point, f64)> = Vec::new();
         if let Ok(items) = node.items() {
             for item in items {
@@ -145,7 +145,7 @@ impl Reader<'_> {
             at: (mm(p.x), mm(p.y)),
             radius_mm: mm(radius_m).unsigned_abs(),
         };
-        Ok(Task::Points(points.into_iter().map(task).collect()))
+        Ok(CoverageTask::Points(points.into_iter().map(task).collect()))
     }
 
     fn lines(
@@ -153,7 +153,7 @@ impl Reader<'_> {
         node: &Node<'_>,
         area: Option<&Polygon>,
         notices: &mut Notices,
-    ) -> Result<Task, ScenarioError> {
+    ) -> Result<CoverageTask, ScenarioError> {
         let f = node.fields(&["file", "ways_m", "width_m"])?;
         let width_m = f.number_or("width_m", 0.0, 0.0, WIDEST_M, "metres")?;
         let mut ways: Vec<(Vec<Point>, f64)> = Vec::new();
@@ -184,7 +184,7 @@ impl Reader<'_> {
             way: way.iter().map(|p| (mm(p.x), mm(p.y))).collect(),
             width_mm: mm(width_m).unsigned_abs(),
         };
-        Ok(Task::Lines(ways.into_iter().map(task).collect()))
+        Ok(CoverageTask::Lines(ways.into_iter().map(task).collect()))
     }
 }
 

@@ -9,7 +9,7 @@ use skein_interop::geojson::{self, HeightRules};
 use skein_interop::place::{LatLon, Shape, Side, circle_ring, to_plane};
 use skein_interop::plan;
 use skein_netsim::spec::Building;
-use skein_peer::Task;
+use skein_peer::CoverageTask;
 use skein_planning::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
 use skein_planning::geometry::{Polygon, PolygonError};
 
@@ -25,7 +25,7 @@ pub(crate) struct Terrain {
     pub(crate) area: Polygon,
     pub(crate) zones: Vec<Polygon>,
     pub(crate) buildings: Vec<Building>,
-    pub(crate) task: Task,
+    pub(crate) task: CoverageTask,
 }
 
 /// What a file told besides what was asked.
@@ -141,7 +141,7 @@ impl Reader<'_> {
         &self,
         f: &Fields<'_>,
         notices: &mut Notices,
-    ) -> Result<(Polygon, Task), ScenarioError> {
+    ) -> Result<(Polygon, CoverageTask), ScenarioError> {
         let targets = f.get("points").or(f.get("lines"));
         let area = match (f.get("area"), targets) {
             (None, Some(_)) => None,

@@ -180,7 +180,7 @@ impl Checker {
             Report::Round { counter, .. } => {
                 self.open_round.insert(id, *counter);
             }
-            Report::Register { counter, .. } => {
+            Report::Claim { counter, .. } => {
                 if self.open_round.get(&id).is_some_and(|c| c <= counter) {
                     self.open_round.remove(&id);
                 }

@@ -26,7 +26,7 @@ impl CoverCheck {
             .iter()
             .filter(|m| m.view.loop_hash == snapshot.loop_hash)
         {
-            self.check_marks(snapshot, m.id, &m.view.union, found);
+            self.check_marks(snapshot, m.id, &m.view.covered, found);
         }
         self.check_spread(snapshot, found);
     }
@@ -35,10 +35,10 @@ impl CoverCheck {
         &mut self,
         snapshot: &Snapshot<'_>,
         id: u16,
-        union: &[bool],
+        covered: &[bool],
         found: &mut Findings,
     ) {
-        for (c, (marked, seen)) in union.iter().zip(snapshot.covered).enumerate() {
+        for (c, (marked, seen)) in covered.iter().zip(snapshot.covered).enumerate() {
             let cell = u16::try_from(c).unwrap_or(u16::MAX);
             if *marked && !*seen && self.false_marks.insert((id, cell), ()).is_none() {
                 found.broken("S6", snapshot.now_ms, Some(id), || {
@@ -48,14 +48,19 @@ impl CoverCheck {
         }
         let known = self.known.entry(id).or_default();
         if known.0 == snapshot.loop_hash {
-            if let Some(c) = known.1.iter().zip(union).position(|(was, is)| *was && !*is) {
+            if let Some(c) = known
+                .1
+                .iter()
+                .zip(covered)
+                .position(|(was, is)| *was && !*is)
+            {
                 found.broken("S3", snapshot.now_ms, Some(id), || {
                     format!("forgot that cell {c} is covered")
                 });
             }
-            known.1.copy_from_slice(union);
+            known.1.copy_from_slice(covered);
         } else {
-            *known = (snapshot.loop_hash, union.to_vec());
+            *known = (snapshot.loop_hash, covered.to_vec());
         }
     }
 
@@ -71,17 +76,17 @@ impl CoverCheck {
                 .filter(|m| {
                     m.view.loop_hash == snapshot.loop_hash
                         && m.view.speaks
-                        && m.view.union.len() == n
+                        && m.view.covered.len() == n
                 })
                 .collect();
             let since_ms = component
                 .first()
                 .and_then(|id| snapshot.stability.component_since_ms(*id));
             for c in 0..n {
-                if !peers.iter().any(|m| m.view.union[c]) {
+                if !peers.iter().any(|m| m.view.covered[c]) {
                     continue;
                 }
-                for m in peers.iter().filter(|m| !m.view.union[c]) {
+                for m in peers.iter().filter(|m| !m.view.covered[c]) {
                     lacks.push((
                         m.id,
                         u16::try_from(c).unwrap_or(u16::MAX),
@@ -124,7 +129,7 @@ impl CoverCheck {
 mod tests {
     use super::super::{Bounds, Graph, PeerSnapshot, Stability};
     use super::*;
-    use skein_peer::View;
+    use skein_peer::Beliefs;
 
     fn look_at(
         check: &mut CoverCheck,
@@ -135,15 +140,15 @@ mod tests {
     ) {
         let peers: Vec<PeerSnapshot> = unions
             .iter()
-            .map(|(id, union)| PeerSnapshot {
+            .map(|(id, covered)| PeerSnapshot {
                 id: *id,
                 uav: true,
                 since_ms: 0,
-                view: View {
+                view: Beliefs {
                     speaks: true,
                     loop_hash: 3,
-                    union: union.to_vec(),
-                    ..View::default()
+                    covered: covered.to_vec(),
+                    ..Beliefs::default()
                 },
             })
             .collect();

@@ -5,7 +5,7 @@ use super::membership::Membership;
 use super::{Clocks, Findings, Snapshot, bounds::LIGHT_FACTOR};
 use serde::Serialize;
 use skein_peer::output::Status;
-use skein_peer::wire::message::{Firmness, Listing, Register, Stamp};
+use skein_peer::wire::message::{Claim, Firmness, ListedRun, Stamp};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -46,8 +46,8 @@ pub struct ListingCheck {
     last_lister: BTreeMap<u16, u16>,
     inherited: BTreeMap<u16, u16>,
     able_since_ms: Option<u64>,
-    own: BTreeMap<u16, Arc<Register>>,
-    heard: BTreeMap<(u16, u16), (Arc<Register>, Version)>,
+    own: BTreeMap<u16, Arc<Claim>>,
+    heard: BTreeMap<(u16, u16), (Arc<Claim>, Version)>,
     clashes: Clocks<(u16, u16, u16)>,
     /// Sections of peers that died, in the order of their deaths.
     pub takeovers: Vec<Takeover>,
@@ -81,25 +81,20 @@ impl ListingCheck {
     }
 
     /// A peer published its own section.
-    pub fn on_published(&mut self, id: u16, register: Arc<Register>) {
-        self.own.insert(id, register);
+    pub fn on_published(&mut self, id: u16, claim: Arc<Claim>) {
+        self.own.insert(id, claim);
     }
 
     /// A peer was given another's section. What was written earlier than what it has
     /// says nothing new: the medium may deliver in any order.
-    pub fn on_heard(
-        &mut self,
-        (by, author): (u16, u16),
-        version: Version,
-        register: &Arc<Register>,
-    ) {
+    pub fn on_heard(&mut self, (by, author): (u16, u16), version: Version, claim: &Arc<Claim>) {
         if by == author {
             return;
         }
         let known = self.heard.get(&(by, author));
         if known.is_none_or(|(_, v)| *v < version) {
             self.heard
-                .insert((by, author), (Arc::clone(register), version));
+                .insert((by, author), (Arc::clone(claim), version));
         }
     }
 
@@ -133,7 +128,7 @@ impl ListingCheck {
             .iter()
             .filter(|m| m.view.loop_hash == snapshot.loop_hash)
         {
-            for (c, known) in m.view.union.iter().enumerate().take(n) {
+            for (c, known) in m.view.covered.iter().enumerate().take(n) {
                 settled[c] |= *known;
             }
             for c in &m.view.unassigned {
@@ -288,18 +283,17 @@ impl ListingCheck {
             let mut flies = vec![false; n];
             for c in &m.view.plan {
                 let c = usize::from(*c);
-                if c < n && !m.view.union.get(c).copied().unwrap_or(false) {
+                if c < n && !m.view.covered.get(c).copied().unwrap_or(false) {
                     flies[c] = true;
                 }
             }
-            for (&(_, author), (register, (life, _))) in
-                self.heard.range((m.id, 0)..=(m.id, u16::MAX))
+            for (&(_, author), (claim, (life, _))) in self.heard.range((m.id, 0)..=(m.id, u16::MAX))
             {
                 let alive = members.belief(m.id, author) == Some((*life, Status::Alive));
-                if !alive || register.loop_hash != snapshot.loop_hash {
+                if !alive || claim.loop_hash != snapshot.loop_hash {
                     continue;
                 }
-                for l in &register.plan {
+                for l in &claim.plan {
                     each_cell(l, n, |c| {
                         if flies[c] && stamps[c].is_some_and(|s| s < l.stamp) {
                             seen.push((m.id, author, u16::try_from(c).unwrap_or(u16::MAX)));
@@ -342,7 +336,7 @@ fn counted_from(o: &Orphan, members: &Membership) -> Option<u64> {
 }
 
 /// Calls `f` with each cell of a listing that is still to be flown.
-fn each_cell(l: &Listing, n: usize, mut f: impl FnMut(usize)) {
+fn each_cell(l: &ListedRun, n: usize, mut f: impl FnMut(usize)) {
     if l.firmness == Firmness::Done || n == 0 {
         return;
     }
@@ -355,8 +349,8 @@ fn each_cell(l: &Listing, n: usize, mut f: impl FnMut(usize)) {
 mod tests {
     use super::super::{Bounds, Graph, PeerSnapshot, Stability};
     use super::*;
-    use skein_peer::View;
-    use skein_peer::wire::message::{Epoch, Run};
+    use skein_peer::Beliefs;
+    use skein_peer::wire::message::{CellRun, Epoch};
 
     const BOUNDS: Bounds = Bounds {
         period_ms: 1000,
@@ -390,12 +384,12 @@ mod tests {
                     id: *id,
                     uav: true,
                     since_ms: 0,
-                    view: View {
+                    view: Beliefs {
                         able: true,
                         loop_hash: 9,
-                        union: vec![false; 4],
+                        covered: vec![false; 4],
                         plan: plan.to_vec(),
-                        ..View::default()
+                        ..Beliefs::default()
                     },
                 })
                 .collect();
@@ -461,11 +455,11 @@ mod tests {
 
     #[test]
     fn a_peer_that_keeps_a_cell_heard_at_a_higher_stamp_breaks_s5() {
-        let register = |counter: u32, id: u16| {
-            Arc::new(Register {
+        let claim = |counter: u32, id: u16| {
+            Arc::new(Claim {
                 loop_hash: 9,
-                plan: vec![Listing {
-                    run: Run { first: 3, count: 2 },
+                plan: vec![ListedRun {
+                    run: CellRun { first: 3, count: 2 },
                     backward: false,
                     firmness: Firmness::Tentative,
                     stamp: Stamp {
@@ -474,16 +468,16 @@ mod tests {
                         id,
                     },
                 }],
-                ..Register::default()
+                ..Claim::default()
             })
         };
         for (other, broken) in [(7, true), (2, false)] {
             let mut s = Story::new(300);
             s.members
                 .on_belief(0, (1, 2), (1, Status::Alive), &BOUNDS, None);
-            s.check.on_published(1, register(5, 1));
-            s.check.on_heard((1, 2), (1, 8), &register(other, 2));
-            s.check.on_heard((1, 2), (1, 7), &register(9, 2));
+            s.check.on_published(1, claim(5, 1));
+            s.check.on_heard((1, 2), (1, 8), &claim(other, 2));
+            s.check.on_heard((1, 2), (1, 7), &claim(9, 2));
             for t in 1..6 {
                 s.snapshot(t * 1000, &[(1, &[3, 0, 1, 2]), (2, &[])]);
             }

@@ -240,7 +240,7 @@ impl Membership {
 mod tests {
     use super::super::{Graph, PeerSnapshot, Stability};
     use super::*;
-    use skein_peer::{PeerId, View};
+    use skein_peer::{Beliefs, PeerId};
 
     /// A peer and what it believes of others.
     type Believes<'a> = (u16, &'a [(u16, u32, Status)]);
@@ -264,13 +264,13 @@ mod tests {
                 id: *id,
                 uav: true,
                 since_ms: 0,
-                view: View {
+                view: Beliefs {
                     speaks: true,
                     peers: believes
                         .iter()
                         .map(|(p, i, s)| (PeerId(*p), (*i, *s)))
                         .collect(),
-                    ..View::default()
+                    ..Beliefs::default()
                 },
             })
             .collect();

@@ -10,7 +10,7 @@
 //! | [`membership`] | detection of deaths, false downs, L1 |
 //! | [`listing`] | I1, L2, S5: who lists which cell, takeovers |
 //! | [`record`] | S3, S4, S7, S11: versions, speakers, promises |
-//! | [`cover`] | S3 (union), S6, L4: what is marked covered |
+//! | [`cover`] | S3 (covered), S6, L4: what is marked covered |
 //! | [`progress`] | S2, S9, S10, L6, L7: limits and restarts |
 //!
 //! S1 is recorded by the world, S12 caught by the driver, L5 decided at the end of a
@@ -31,7 +31,7 @@ pub use checker::{Checker, Reached};
 pub use graph::{Graph, Stability};
 
 use serde::Serialize;
-use skein_peer::View;
+use skein_peer::Beliefs;
 use std::collections::BTreeMap;
 
 /// A rule that was broken.
@@ -125,7 +125,7 @@ pub struct PeerSnapshot {
     /// When its process last started or was resumed, milliseconds.
     pub since_ms: u64,
     /// What it believes.
-    pub view: View,
+    pub view: Beliefs,
 }
 
 /// Everything a check may look at: what each peer believes, beside what is true.

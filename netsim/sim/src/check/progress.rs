@@ -186,9 +186,9 @@ fn all_listed(snapshot: &Snapshot<'_>) -> bool {
 mod tests {
     use super::super::{Bounds, Graph, Stability};
     use super::*;
-    use skein_peer::View;
+    use skein_peer::Beliefs;
 
-    fn run(view: &View, seconds: u64, restart: bool) -> BTreeMap<&'static str, u64> {
+    fn run(view: &Beliefs, seconds: u64, restart: bool) -> BTreeMap<&'static str, u64> {
         let (mut check, mut found, mut s) = (
             ProgressCheck::default(),
             Findings::new(1),
@@ -226,17 +226,17 @@ mod tests {
 
     #[test]
     fn limits_are_kept_or_told_once() {
-        let good = View {
+        let good = Beliefs {
             loop_hash: 3,
             plan: vec![0],
             eta_ms: 5000,
             spendable_ms: 6000,
             adoptions: 3,
             loads: vec![("queue", 4, 4)],
-            ..View::default()
+            ..Beliefs::default()
         };
         assert!(run(&good, 3, false).is_empty());
-        let bad = View {
+        let bad = Beliefs {
             spendable_ms: 1000,
             adoptions: 4,
             loads: vec![("queue", 5, 4)],
@@ -250,14 +250,14 @@ mod tests {
 
     #[test]
     fn a_restarted_peer_that_stays_idle_beside_open_cells_breaks_l6() {
-        let idle = View {
+        let idle = Beliefs {
             loop_hash: 3,
             able: true,
-            ..View::default()
+            ..Beliefs::default()
         };
         assert!(run(&idle, 23, true).is_empty());
         assert_eq!(run(&idle, 26, true), BTreeMap::from([("L6", 1)]));
-        let busy = View {
+        let busy = Beliefs {
             plan: vec![1],
             spendable_ms: 9,
             ..idle.clone()

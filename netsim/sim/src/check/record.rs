@@ -3,11 +3,11 @@
 //! back the state it was written from (S11).
 
 use super::{Findings, Snapshot};
-use skein_peer::View;
+use skein_peer::Beliefs;
 use skein_peer::journal::Durable;
 use skein_peer::wire::codec::{self, Body};
 use skein_peer::wire::kinds::Kind;
-use skein_peer::wire::message::{Epoch, Firmness, Listing, Record, Register, Stamp};
+use skein_peer::wire::message::{Claim, Epoch, Firmness, ListedRun, Record, Stamp};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ pub struct Said {
     /// The body.
     pub body: Body,
     /// The section, where it is a claim.
-    pub claim: Option<Arc<Register>>,
+    pub claim: Option<Arc<Claim>>,
 }
 
 impl Said {
@@ -30,7 +30,7 @@ impl Said {
         let kind = Kind::of_number(record.kind)?;
         let body = codec::decode_body(kind, &record.body).ok()?;
         let claim = match &body {
-            Body::Claim(register) => Some(Arc::new(register.clone())),
+            Body::Claim(claim) => Some(Arc::new(claim.clone())),
             _ => None,
         };
         Some(Self {
@@ -122,7 +122,7 @@ impl RecordCheck {
         let known = self.durable.get(&id);
         let stale = known.is_none_or(|(n, _)| *n != journal.len());
         let new_life = known.is_none_or(|(_, d)| d.incarnation != said.record.incarnation);
-        let promise = matches!(said.body, Body::Claim(_) | Body::Round(_));
+        let promise = matches!(said.body, Body::Claim(_) | Body::Bid(_));
         // Replaying costs a pass over the journal, so it is done only when a promise is spoken.
         if stale && (promise || new_life) {
             self.durable
@@ -140,22 +140,22 @@ impl RecordCheck {
             });
         }
         match &said.body {
-            Body::Round(snapshot) => {
+            Body::Bid(bid) => {
                 let kept = durable
-                    .snapshot
+                    .bid
                     .as_ref()
-                    .is_some_and(|s| s == snapshot || s.round.counter > snapshot.round.counter);
+                    .is_some_and(|b| b == bid || b.round.counter > bid.round.counter);
                 if !kept {
                     found.broken("S7", now_ms, Some(id), || {
                         format!(
                             "bids in round {}, which its disk does not hold",
-                            snapshot.round.counter
+                            bid.round.counter
                         )
                     });
                 }
             }
-            Body::Claim(register) => {
-                if let Some(text) = unpersisted(register, durable.register.as_ref(), covered) {
+            Body::Claim(claim) => {
+                if let Some(text) = unpersisted(claim, durable.claim.as_ref(), covered) {
                     found.broken("S7", now_ms, Some(id), || text);
                 }
             }
@@ -212,7 +212,7 @@ impl RecordCheck {
     }
 }
 
-fn versions(v: &View) -> Versions {
+fn versions(v: &Beliefs) -> Versions {
     Versions {
         incarnation: v.incarnation,
         counter: v.counter,
@@ -223,10 +223,10 @@ fn versions(v: &View) -> Versions {
 
 /// A listed cell that no durable section lists at that stamp, as a sentence.
 /// A run may bridge cells covered meanwhile: to fly over those is no promise.
-fn unpersisted(said: &Register, durable: Option<&Register>, covered: &[bool]) -> Option<String> {
+fn unpersisted(said: &Claim, durable: Option<&Claim>, covered: &[bool]) -> Option<String> {
     // Runs are cyclic: the same cell may be named with and without a lap.
     let n = u32::try_from(covered.len()).unwrap_or(u32::MAX).max(1);
-    let cell_of = |l: &Listing, k: u16| {
+    let cell_of = |l: &ListedRun, k: u16| {
         u16::try_from((u32::from(l.run.first) + u32::from(k)) % n).unwrap_or(u16::MAX)
     };
     let mut promised: BTreeMap<u16, Stamp> = BTreeMap::new();
@@ -257,12 +257,12 @@ fn unpersisted(said: &Register, durable: Option<&Register>, covered: &[bool]) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_peer::wire::message::Run;
+    use skein_peer::wire::message::CellRun;
 
-    fn register(counter: u32, count: u16) -> Register {
-        Register {
-            plan: vec![Listing {
-                run: Run { first: 3, count },
+    fn claim(counter: u32, count: u16) -> Claim {
+        Claim {
+            plan: vec![ListedRun {
+                run: CellRun { first: 3, count },
                 backward: false,
                 firmness: Firmness::Tentative,
                 stamp: Stamp {
@@ -271,22 +271,22 @@ mod tests {
                     id: 1,
                 },
             }],
-            ..Register::default()
+            ..Claim::default()
         }
     }
 
     #[test]
     fn a_section_may_shrink_but_not_grow_beyond_what_is_durable() {
-        let durable = register(4, 5);
+        let durable = claim(4, 5);
         let open = [false; 20];
         let mut covered = open;
         covered[8] = true;
-        assert_eq!(unpersisted(&register(4, 5), Some(&durable), &open), None);
-        assert_eq!(unpersisted(&register(4, 2), Some(&durable), &open), None);
-        assert!(unpersisted(&register(4, 6), Some(&durable), &open).is_some());
-        assert_eq!(unpersisted(&register(4, 6), Some(&durable), &covered), None);
-        assert!(unpersisted(&register(5, 5), Some(&durable), &open).is_some());
-        assert!(unpersisted(&register(4, 1), None, &open).is_some());
+        assert_eq!(unpersisted(&claim(4, 5), Some(&durable), &open), None);
+        assert_eq!(unpersisted(&claim(4, 2), Some(&durable), &open), None);
+        assert!(unpersisted(&claim(4, 6), Some(&durable), &open).is_some());
+        assert_eq!(unpersisted(&claim(4, 6), Some(&durable), &covered), None);
+        assert!(unpersisted(&claim(5, 5), Some(&durable), &open).is_some());
+        assert!(unpersisted(&claim(4, 1), None, &open).is_some());
     }
 
     #[test]

@@ -126,7 +126,7 @@ impl Swarm {
         let ground = self
             .peers
             .iter()
-            .position(|s| s.config.role == Role::Ground);
+            .position(|s| s.config.role == Role::GroundStation);
         if let Some(idx) = ground
             && self.peers[idx].process == Process::Running
         {

@@ -20,7 +20,7 @@ pub mod queue;
 pub mod sim_peer;
 pub mod stream;
 
-pub use crate::geometry_cache::Grounds;
+pub use crate::geometry_cache::GeometryCache;
 pub use outcome::Outcome;
 
 #[cfg(test)]
@@ -39,9 +39,9 @@ use air::Air;
 use queue::{Phase, Queue};
 use sim_peer::{Process, SimPeer};
 use skein_behaviors::Setpoint;
-use skein_peer::plan::{Answer, Problem};
-use skein_peer::wire::message::Register;
-use skein_peer::{Input, Mission, Output, PeerConfig, PeerId, Report, Role, View};
+use skein_peer::offload::{Job, JobResult};
+use skein_peer::wire::message::Claim;
+use skein_peer::{Beliefs, Input, Mission, Output, PeerConfig, PeerId, Report, Role};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -73,7 +73,7 @@ enum Event {
         idx: usize,
         boot: u32,
         token: u64,
-        answer: Answer,
+        answer: JobResult,
     },
     Receive(Vec<Delivery>),
     Judge,
@@ -89,7 +89,7 @@ pub struct Swarm {
     queue: Queue<Event>,
     peers: Vec<SimPeer>,
     air: Air,
-    grounds: Grounds,
+    grounds: GeometryCache,
     /// The operator's newest.
     mission: Arc<Mission>,
     faults: Vec<TimedFault>,
@@ -101,7 +101,7 @@ pub struct Swarm {
     lap: u16,
     covered_ms: Option<u64>,
     /// Sections spoken so far, by hash of their bytes: author, life, section.
-    claims: BTreeMap<u64, (u16, Version, Arc<Register>)>,
+    claims: BTreeMap<u64, (u16, Version, Arc<Claim>)>,
     done: bool,
     unassigned: bool,
     kills: u32,
@@ -209,9 +209,9 @@ impl Swarm {
 
     /// What a running peer believes.
     #[must_use]
-    pub fn view(&self, id: u16) -> Option<View> {
+    pub fn view(&self, id: u16) -> Option<Beliefs> {
         let sim_peer = &self.peers[self.peer_idx(id)?];
-        sim_peer.peer.as_ref().map(skein_peer::Peer::view)
+        sim_peer.peer.as_ref().map(skein_peer::Peer::beliefs)
     }
 
     /// The checks so far.
@@ -264,7 +264,13 @@ impl Swarm {
             } => {
                 if self.peers[idx].boots == boot {
                     self.fold(idx, Kind::Planned, token);
-                    self.feed(idx, Input::Planned { token, answer });
+                    self.feed(
+                        idx,
+                        Input::Computed {
+                            token,
+                            result: answer,
+                        },
+                    );
                 }
             }
             Event::Receive(deliveries) => self.receive(deliveries),
@@ -472,12 +478,12 @@ impl Swarm {
                 self.queue
                     .push(done_ms, Phase::Answer, Event::Stored { idx, boot });
             }
-            Output::Plan { token, problem } => {
-                let takes_ms = match problem {
-                    Problem::Ground(_) => GROUND_MS,
-                    Problem::Divide { .. } => DIVIDE_MS,
+            Output::Compute { token, job } => {
+                let takes_ms = match job {
+                    Job::Geometry(_) => GROUND_MS,
+                    Job::Divide { .. } => DIVIDE_MS,
                 };
-                let answer = self.grounds.answer(&problem);
+                let answer = self.grounds.answer(&job);
                 self.queue.push(
                     self.now_ms + takes_ms,
                     Phase::Answer,
@@ -636,7 +642,7 @@ fn sim_peers(spec: &Spec, seed: u64) -> Vec<SimPeer> {
         peers.push(SimPeer::new(
             seed,
             PeerConfig {
-                role: Role::Ground,
+                role: Role::GroundStation,
                 height_m: g.height_m,
                 ..config(g.id)
             },
@@ -655,7 +661,7 @@ fn snapshot(of: &SimPeer) -> Option<PeerSnapshot> {
         id: of.id(),
         uav: of.config.role == Role::Uav,
         since_ms: of.since_ms,
-        view: peer.view(),
+        view: peer.beliefs(),
     })
 }
 

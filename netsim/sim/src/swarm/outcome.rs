@@ -126,7 +126,7 @@ impl Swarm {
     fn unfinished(&self) -> Vec<u16> {
         let running = self.peers.iter().filter(|s| s.config.airframe.is_some());
         running
-            .filter(|s| s.peer.as_ref().is_some_and(|p| !p.view().finished))
+            .filter(|s| s.peer.as_ref().is_some_and(|p| !p.beliefs().finished))
             .map(SimPeer::id)
             .collect()
     }

@@ -2,7 +2,7 @@
 //! buildings (D2.7 §2.2). Every field is public, so a test starts from it and changes
 //! what it is about. Scenario files are read elsewhere.
 
-use crate::spec::{Building, GroundSpec, RadioSpec, Spec, StormSpec, UavSpec};
+use crate::spec::{Building, GroundStationSpec, RadioSpec, Spec, StormSpec, UavSpec};
 use skein_peer::Mission;
 use skein_peer::mission::PointMm;
 use skein_planning::airframe::Airframe;
@@ -112,7 +112,7 @@ pub fn square(n_uavs: u16) -> Spec {
         ],
         zones: vec![polygon(&tower)],
         uavs,
-        ground: Some(GroundSpec {
+        ground: Some(GroundStationSpec {
             id: GROUND_ID,
             position: Point::new(240.0, -30.0),
             height_m: 2.0,
@@ -155,7 +155,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         tracking_error_mm: 2_000,
         launch: (mm(launch.x), mm(launch.y)),
         base: (96_000, 60_000),
-        task: skein_peer::Task::Area,
+        task: skein_peer::CoverageTask::Area,
         lap: 0,
         further_laps: 0,
         tree: skein_planning::coverage::area::Tree::default(),

@@ -22,7 +22,7 @@ pub use survey::{Cell, Survey, Uncoverable};
 use crate::spec::Spec;
 use motion::{Kinematic, Piece};
 use skein_behaviors::{Percept, Setpoint};
-use skein_peer::Task;
+use skein_peer::CoverageTask;
 use skein_planning::coverage::area::patch::Patches;
 use std::sync::Arc;
 
@@ -69,10 +69,10 @@ struct Uav {
 /// whether all was seen.
 fn claims(spec: &Spec) -> Option<Arc<pieces::Pieces>> {
     match spec.mission.task {
-        Task::Exact | Task::Lines(_) => {}
-        Task::Area | Task::Points(_) => return None,
+        CoverageTask::Exact | CoverageTask::Lines(_) => {}
+        CoverageTask::Area | CoverageTask::Points(_) => return None,
     }
-    let ground = spec.mission.ground().ok()?;
+    let ground = spec.mission.geometry().ok()?;
     let corners = match ground.coverage_loop.patches() {
         Patches::Listed(list) => list.corners().to_vec(),
         Patches::Grid(_) => return None,

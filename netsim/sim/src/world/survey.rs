@@ -17,7 +17,7 @@
 use super::flat::{Bounds, area_m2, circle_ring_m, clip, in_ring, point_ring_m, segment_ring_m};
 use super::pieces::Pieces;
 use crate::spec::Spec;
-use skein_peer::Task;
+use skein_peer::CoverageTask;
 use skein_peer::mission::{Mission, point_m};
 use skein_planning::coverage::area::CellId;
 use skein_planning::frame::{Point, Pose, Vector};
@@ -112,7 +112,7 @@ impl Survey {
             .collect();
         let area: Vec<Point> = mission.area.iter().copied().map(point_m).collect();
         let lane_m = f64::from(mission.lane_spacing_mm) / 1000.0;
-        let (lane_m, extent_m) = if mission.task == Task::Exact {
+        let (lane_m, extent_m) = if mission.task == CoverageTask::Exact {
             (lane_m / PARTS_OF_A_LANE, 0.0)
         } else {
             (lane_m, lane_m)
@@ -316,7 +316,7 @@ impl Survey {
                 segment_ring_m(corners[i], corners[(i + 1) % 4], &z.ring) >= pass.clearance_m
             })
         };
-        if mission.task == Task::Exact && !near.iter().all(asked) {
+        if mission.task == CoverageTask::Exact && !near.iter().all(asked) {
             return Some(Uncoverable::NotAsked);
         }
         let mut why = Uncoverable::NoPass;

@@ -14,8 +14,8 @@ use super::cbor::{In, Listed, Out, Wire, array_of, number_of};
 use super::kinds::{Kind, RECORD_MAX_BYTES};
 use super::limits::{self, COMMITS_MAX, GOSSIP_MAX, MEMBERS_MAX, PLAN_MAX, at_most, in_range};
 use super::message::{
-    Beacon, Behaviour, Cover, Epoch, Finished, Firmness, Gossip, Listing, Member, MissionChunk,
-    MissionStatus, Notice, Order, Record, Register, Round, Run, Snapshot, Stamp, State,
+    Beacon, Behaviour, Bid, CellRun, Claim, Cover, Epoch, Finished, Firmness, Gossip, ListedRun,
+    Member, MissionChunk, MissionStatus, Notice, Order, Record, Round, Stamp, State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
 
@@ -71,8 +71,8 @@ pub enum WireError {
 pub enum Body {
     Beacon(Beacon),
     State(State),
-    Round(Snapshot),
-    Claim(Register),
+    Bid(Bid),
+    Claim(Claim),
     Cover(Cover),
     Mission(MissionChunk),
     Operator(Order),
@@ -87,7 +87,7 @@ impl Body {
         match self {
             Self::Beacon(_) => Kind::Beacon,
             Self::State(_) => Kind::State,
-            Self::Round(_) => Kind::Round,
+            Self::Bid(_) => Kind::Bid,
             Self::Claim(_) => Kind::Claim,
             Self::Cover(_) => Kind::Cover,
             Self::Mission(_) => Kind::Mission,
@@ -114,7 +114,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
     match body {
         Body::Beacon(b) => b.put(&mut out),
         Body::State(b) => b.put(&mut out),
-        Body::Round(b) => b.put(&mut out),
+        Body::Bid(b) => b.put(&mut out),
         Body::Claim(b) => b.put(&mut out),
         Body::Cover(b) => b.put(&mut out),
         Body::Mission(b) => b.put(&mut out),
@@ -143,7 +143,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
     let body = match kind {
         Kind::Beacon => Body::Beacon(Wire::get(&mut input)?),
         Kind::State => Body::State(Wire::get(&mut input)?),
-        Kind::Round => Body::Round(Wire::get(&mut input)?),
+        Kind::Bid => Body::Bid(Wire::get(&mut input)?),
         Kind::Claim => Body::Claim(Wire::get(&mut input)?),
         Kind::Cover => Body::Cover(Wire::get(&mut input)?),
         Kind::Mission => Body::Mission(Wire::get(&mut input)?),
@@ -250,7 +250,7 @@ array_of!(Beacon {
     north_mm,
     heading_e4,
     able,
-    ground,
+    ground_station,
     finished,
     nonce,
     counter,
@@ -284,7 +284,7 @@ array_of!(State {
     cells
 });
 array_of!(Epoch { counter, hash });
-array_of!(Run { first, count });
+array_of!(CellRun { first, count });
 array_of!(Member { id, incarnation });
 array_of!(Round {
     counter,
@@ -294,7 +294,7 @@ array_of!(Round {
     loss,
     wait_ms
 });
-array_of!(Snapshot {
+array_of!(Bid {
     round,
     anchor,
     backward,
@@ -302,14 +302,14 @@ array_of!(Snapshot {
     speed_mmps,
     turn_ms,
     endurance_ms,
-    union,
+    covered,
     commits,
     eta_ms,
     adopted_ago_ms,
     cells_since,
     idle
 });
-array_of!(Register {
+array_of!(Claim {
     revision,
     loop_hash,
     epoch,
@@ -321,7 +321,7 @@ array_of!(Register {
 array_of!(Cover {
     revision,
     loop_hash,
-    union
+    covered
 });
 array_of!(MissionChunk {
     revision,
@@ -360,15 +360,15 @@ impl Listed for Gossip {
 impl Listed for Member {
     const MAX: usize = MEMBERS_MAX;
 }
-impl Listed for Run {
+impl Listed for CellRun {
     const MAX: usize = COMMITS_MAX;
 }
-impl Listed for Listing {
+impl Listed for ListedRun {
     const MAX: usize = PLAN_MAX;
 }
 
 /// A listing is flat on the wire: nested arrays would cost three bytes each time.
-impl Wire for Listing {
+impl Wire for ListedRun {
     fn put(&self, out: &mut Out) {
         out.array(8);
         self.run.first.put(out);
@@ -383,7 +383,7 @@ impl Wire for Listing {
 
     fn get(input: &mut In<'_>) -> Result<Self, WireError> {
         input.array("listing", 8)?;
-        let run = Run {
+        let run = CellRun {
             first: Wire::get(input)?,
             count: Wire::get(input)?,
         };
@@ -526,17 +526,17 @@ mod tests {
         empty.plan[0].run.count = 0;
         refused(Body::Claim(empty), "plan");
         refused(
-            Body::Claim(Register {
+            Body::Claim(Claim {
                 held: vec![listing(1); HELD_MAX + 1],
                 ..claim
             }),
             "held",
         );
-        let Body::Round(mut bid) = golden().remove(2).0 else {
+        let Body::Bid(mut bid) = golden().remove(2).0 else {
             panic!("a bid comes third")
         };
         bid.round.members.reverse();
-        refused(Body::Round(bid), "members");
+        refused(Body::Bid(bid), "members");
         // The list is refused before it is read.
         let more = Body::Beacon(Beacon {
             gossip: vec![gossip(1); GOSSIP_MAX + 1],

@@ -18,7 +18,7 @@ pub enum Kind {
     /// Pose, fuel, behaviour, mission status.
     State = 1,
     /// A bid in a round of negotiation.
-    Round = 2,
+    Bid = 2,
     /// The author's own section.
     Claim = 3,
     /// The union of covered cells the author knows.
@@ -113,8 +113,8 @@ const TABLE: [KindRow; 12] = [
         Lifetime::Beacons(2),
     ),
     row(
-        Kind::Round,
-        "round",
+        Kind::Bid,
+        "bid",
         1216,
         Priority::Claim,
         Lifetime::Beacons(9),
@@ -208,7 +208,7 @@ impl Kind {
     pub const ALL: [Self; 12] = [
         Self::Beacon,
         Self::State,
-        Self::Round,
+        Self::Bid,
         Self::Claim,
         Self::Cover,
         Self::Mission,

@@ -5,7 +5,7 @@
 //! author never said.
 
 use super::codec::{Body, WireError};
-use super::message::{Beacon, Register, Round, Run, Snapshot, State};
+use super::message::{Beacon, Bid, CellRun, Claim, Round, State};
 
 /// Gossip entries in a beacon: what a tenth of a second of a 64 kbit/s channel carries.
 pub const GOSSIP_MAX: usize = 20;
@@ -17,12 +17,12 @@ pub const PLAN_MAX: usize = 64;
 pub const HELD_MAX: usize = 48;
 /// Runs of the present section done: one a fragment flown, merged as they meet.
 pub const DONE_MAX: usize = 32;
-/// Runs a snapshot commits to: the flight of one waiting time crosses few fragments.
+/// Runs a bid commits to: the flight of one waiting time crosses few fragments.
 pub const COMMITS_MAX: usize = 32;
-/// Run-length bytes of the union in a snapshot (short runs are left out beyond).
-pub const SNAPSHOT_UNION_MAX_BYTES: usize = 256;
+/// Run-length bytes of the union in a bid (short runs are left out beyond).
+pub const BID_COVERED_MAX_BYTES: usize = 256;
 /// Run-length bytes of the union in a cover record.
-pub const COVER_UNION_MAX_BYTES: usize = 1000;
+pub const COVERED_MAX_BYTES: usize = 1000;
 /// Bytes of a mission in one piece.
 pub const CHUNK_MAX_BYTES: usize = 1024;
 /// Pieces of a mission: 64 KiB of rings are some 6,000 corners.
@@ -45,9 +45,9 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
     match body {
         Body::Beacon(b) => check_beacon(b),
         Body::State(s) => check_state(s),
-        Body::Round(s) => check_snapshot(s),
-        Body::Claim(r) => check_register(r),
-        Body::Cover(c) => at_most("union", c.union.len(), COVER_UNION_MAX_BYTES),
+        Body::Bid(s) => check_bid(s),
+        Body::Claim(r) => check_claim(r),
+        Body::Cover(c) => at_most("covered", c.covered.len(), COVERED_MAX_BYTES),
         Body::Mission(m) => {
             at_most("bytes", m.bytes.len(), CHUNK_MAX_BYTES)?;
             in_range("chunks", (1..=CHUNKS_MAX).contains(&m.chunks))
@@ -97,7 +97,7 @@ fn check_state(s: &State) -> Result<(), WireError> {
     in_range("covered", s.covered <= s.cells)
 }
 
-fn check_runs(field: &'static str, runs: &[Run], max: usize) -> Result<(), WireError> {
+fn check_runs(field: &'static str, runs: &[CellRun], max: usize) -> Result<(), WireError> {
     at_most(field, runs.len(), max)?;
     in_range(field, runs.iter().all(|r| r.count > 0))
 }
@@ -108,7 +108,7 @@ fn check_round(r: &Round) -> Result<(), WireError> {
     in_range("wait_ms", r.wait_ms <= DURATION_MAX_MS)
 }
 
-fn check_snapshot(s: &Snapshot) -> Result<(), WireError> {
+fn check_bid(s: &Bid) -> Result<(), WireError> {
     check_round(&s.round)?;
     for (field, ms) in [
         ("release_ms", s.release_ms),
@@ -119,11 +119,11 @@ fn check_snapshot(s: &Snapshot) -> Result<(), WireError> {
         in_range(field, ms <= DURATION_MAX_MS)?;
     }
     in_range("speed_mmps", s.speed_mmps <= SPEED_MAX_MMPS)?;
-    at_most("union", s.union.len(), SNAPSHOT_UNION_MAX_BYTES)?;
+    at_most("covered", s.covered.len(), BID_COVERED_MAX_BYTES)?;
     check_runs("commits", &s.commits, COMMITS_MAX)
 }
 
-fn check_register(r: &Register) -> Result<(), WireError> {
+fn check_claim(r: &Claim) -> Result<(), WireError> {
     for (field, listings, max) in [("plan", &r.plan, PLAN_MAX), ("held", &r.held, HELD_MAX)] {
         at_most(field, listings.len(), max)?;
         in_range(field, listings.iter().all(|l| l.run.count > 0))?;

@@ -41,7 +41,7 @@ pub struct Beacon {
     /// Whether it can take part in planning.
     pub able: bool,
     /// Whether it is a ground station.
-    pub ground: bool,
+    pub ground_station: bool,
     /// Whether it holds that the mission is finished.
     pub finished: bool,
     /// Boot nonce: tells two peers under one id apart.
@@ -141,7 +141,7 @@ pub struct State {
 pub struct Epoch {
     /// Counter of the round.
     pub counter: u32,
-    /// Hash of the round's sorted snapshots.
+    /// Hash of the round's sorted bids.
     pub hash: u32,
 }
 
@@ -160,7 +160,7 @@ pub struct Stamp {
 
 /// Cells `first .. first + count` of the loop (cyclic).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub struct Run {
+pub struct CellRun {
     /// The first cell, in forward order.
     pub first: u16,
     /// How many.
@@ -180,9 +180,9 @@ pub enum Firmness {
 
 /// A run of cells in a register, flown in one direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub struct Listing {
+pub struct ListedRun {
     /// Which cells.
-    pub run: Run,
+    pub run: CellRun,
     /// Whether they are flown against the order of the loop.
     pub backward: bool,
     /// How firm.
@@ -193,7 +193,7 @@ pub struct Listing {
 
 /// A peer's own section: what it will fly, and what it gave away but still answers for.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct Register {
+pub struct Claim {
     /// Mission revision.
     pub revision: u32,
     /// The loop the cells are counted on.
@@ -201,11 +201,11 @@ pub struct Register {
     /// The latest division adopted.
     pub epoch: Epoch,
     /// What it will fly, in order.
-    pub plan: Vec<Listing>,
+    pub plan: Vec<ListedRun>,
     /// What it gave away and nobody has taken over yet.
-    pub held: Vec<Listing>,
+    pub held: Vec<ListedRun>,
     /// What it has done of the present section.
-    pub done: Vec<Run>,
+    pub done: Vec<CellRun>,
     /// Expected end of the plan, milliseconds from this record's writing.
     pub eta_ms: u32,
 }
@@ -233,13 +233,13 @@ pub struct Round {
     /// Whether the starter saw cells that nobody lists: such a round needs no gain
     /// to be adopted.
     pub loss: bool,
-    /// How long to wait for all snapshots, milliseconds.
+    /// How long to wait for all bids, milliseconds.
     pub wait_ms: u32,
 }
 
 /// A peer's bid in one round. Immutable once spoken.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct Snapshot {
+pub struct Bid {
     /// The round it belongs to.
     pub round: Round,
     /// Boundary of the loop where it will be.
@@ -256,9 +256,9 @@ pub struct Snapshot {
     pub endurance_ms: u32,
     /// Covered cells it knows of, run-length encoded, at most 256 bytes.
     #[serde(with = "serde_bytes")]
-    pub union: Vec<u8>,
+    pub covered: Vec<u8>,
     /// Cells it will finish whatever is decided.
-    pub commits: Vec<Run>,
+    pub commits: Vec<CellRun>,
     /// Expected end of its present plan, milliseconds from now.
     pub eta_ms: u32,
     /// Time since it last adopted a division, milliseconds.
@@ -278,7 +278,7 @@ pub struct Cover {
     pub loop_hash: u64,
     /// Run-length encoded.
     #[serde(with = "serde_bytes")]
-    pub union: Vec<u8>,
+    pub covered: Vec<u8>,
 }
 
 /// A piece of a mission's body.

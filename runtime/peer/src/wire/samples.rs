@@ -20,9 +20,9 @@ pub fn gossip(id: u16) -> Gossip {
 }
 
 /// A run of twelve cells, listed typically.
-pub fn listing(first: u16) -> Listing {
-    Listing {
-        run: Run { first, count: 12 },
+pub fn listing(first: u16) -> ListedRun {
+    ListedRun {
+        run: CellRun { first, count: 12 },
         backward: true,
         firmness: Firmness::Committed,
         stamp: Stamp {
@@ -63,7 +63,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                 north_mm: 890_123,
                 heading_e4: 15_708,
                 able: true,
-                ground: false,
+                ground_station: false,
                 finished: false,
                 nonce: 0xcafe_f00d,
                 counter: 7,
@@ -97,7 +97,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
             "8a01201a0001d4c0397ab7194650190960010118641901e0",
         ),
         (
-            Body::Round(Snapshot {
+            Body::Bid(Bid {
                 round,
                 anchor: 17,
                 backward: false,
@@ -105,8 +105,8 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                 speed_mmps: 18_000,
                 turn_ms: 9000,
                 endurance_ms: 1_200_000,
-                union: vec![0, 12, 3, 4],
-                commits: vec![Run {
+                covered: vec![0, 12, 3, 4],
+                commits: vec![CellRun {
                     first: 16,
                     count: 2,
                 }],
@@ -118,7 +118,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
             "8d860782820101820302011b0123456789abcdeff519138811f4190fa01946501923281a00124f8044000c0304818210021a000927c01a0001117005f4",
         ),
         (
-            Body::Claim(Register {
+            Body::Claim(Claim {
                 revision: 1,
                 loop_hash: 0x0123_4567_89ab_cdef,
                 epoch: Epoch {
@@ -127,7 +127,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                 },
                 plan: vec![listing(20), listing(40)],
                 held: vec![listing(60)],
-                done: vec![Run { first: 1, count: 3 }],
+                done: vec![CellRun { first: 1, count: 3 }],
                 eta_ms: 600_000,
             }),
             "87011b0123456789abcdef82071adeadbeef8288140cf501071adeadbeef01038818280cf501071adeadbeef01038188183c0cf501071adeadbeef0103818201031a000927c0",
@@ -136,7 +136,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
             Body::Cover(Cover {
                 revision: 1,
                 loop_hash: 5,
-                union: vec![0, 12],
+                covered: vec![0, 12],
             }),
             "83010542000c",
         ),
@@ -177,7 +177,7 @@ pub fn largest() -> Vec<Body> {
         counter: u32::MAX,
         hash: u32::MAX,
     };
-    let run = Run {
+    let run = CellRun {
         first: u16::MAX,
         count: u16::MAX,
     };
@@ -186,7 +186,7 @@ pub fn largest() -> Vec<Body> {
         take: u16::MAX,
         id: u16::MAX,
     };
-    let listing = Listing {
+    let listing = ListedRun {
         run,
         backward: true,
         firmness: Firmness::Done,
@@ -205,7 +205,7 @@ pub fn largest() -> Vec<Body> {
             north_mm: -POSITION_MAX_MM,
             heading_e4: -HEADING_MAX_E4,
             able: true,
-            ground: true,
+            ground_station: true,
             finished: true,
             nonce: u32::MAX,
             counter: u32::MAX,
@@ -227,7 +227,7 @@ pub fn largest() -> Vec<Body> {
             covered: u16::MAX,
             cells: u16::MAX,
         }),
-        Body::Round(Snapshot {
+        Body::Bid(Bid {
             round: Round {
                 counter: u32::MAX,
                 members,
@@ -242,14 +242,14 @@ pub fn largest() -> Vec<Body> {
             speed_mmps: SPEED_MAX_MMPS,
             turn_ms: DURATION_MAX_MS,
             endurance_ms: DURATION_MAX_MS,
-            union: vec![255; SNAPSHOT_UNION_MAX_BYTES],
+            covered: vec![255; BID_COVERED_MAX_BYTES],
             commits: vec![run; COMMITS_MAX],
             eta_ms: DURATION_MAX_MS,
             adopted_ago_ms: u32::MAX,
             cells_since: u16::MAX,
             idle: true,
         }),
-        Body::Claim(Register {
+        Body::Claim(Claim {
             revision: u32::MAX,
             loop_hash: u64::MAX,
             epoch,
@@ -261,7 +261,7 @@ pub fn largest() -> Vec<Body> {
         Body::Cover(Cover {
             revision: u32::MAX,
             loop_hash: u64::MAX,
-            union: vec![9; COVER_UNION_MAX_BYTES],
+            covered: vec![9; COVERED_MAX_BYTES],
         }),
         Body::Mission(MissionChunk {
             revision: u32::MAX,

@@ -6,9 +6,9 @@
 
 use super::kinds::Kind;
 use super::limits::{
-    CHUNK_MAX_BYTES, CHUNKS_MAX, COMMITS_MAX, COVER_UNION_MAX_BYTES, DONE_MAX, DURATION_MAX_MS,
-    GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX, HOPS_MAX, MEMBERS_MAX, PLAN_MAX, POSITION_MAX_MM,
-    SNAPSHOT_UNION_MAX_BYTES, SPEED_MAX_MMPS, TEXT_MAX_BYTES,
+    BID_COVERED_MAX_BYTES, CHUNK_MAX_BYTES, CHUNKS_MAX, COMMITS_MAX, COVERED_MAX_BYTES, DONE_MAX,
+    DURATION_MAX_MS, GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX, HOPS_MAX, MEMBERS_MAX, PLAN_MAX,
+    POSITION_MAX_MM, SPEED_MAX_MMPS, TEXT_MAX_BYTES,
 };
 use core::fmt::Write as _;
 
@@ -110,7 +110,11 @@ const BEACON: &[Place] = &[
     NORTH,
     HEADING,
     at("able", "whether it can take part in planning", Shape::Flag),
-    at("ground", "whether it is a ground station", Shape::Flag),
+    at(
+        "ground_station",
+        "whether it is a ground station",
+        Shape::Flag,
+    ),
     at(
         "finished",
         "whether it holds that the mission is finished",
@@ -210,9 +214,9 @@ const BID: &[Place] = &[
         MS,
     ),
     at(
-        "union",
+        "covered",
         "covered cells, run lengths",
-        Shape::Bytes(SNAPSHOT_UNION_MAX_BYTES),
+        Shape::Bytes(BID_COVERED_MAX_BYTES),
     ),
     at(
         "commits",
@@ -279,9 +283,9 @@ const COVER: &[Place] = &[
     REVISION,
     LOOP_HASH,
     at(
-        "union",
+        "covered",
         "covered cells, run lengths",
-        Shape::Bytes(COVER_UNION_MAX_BYTES),
+        Shape::Bytes(COVERED_MAX_BYTES),
     ),
 ];
 
@@ -312,7 +316,7 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
     match kind {
         Kind::Beacon => Some(BEACON),
         Kind::State => Some(STATE),
-        Kind::Round => Some(BID),
+        Kind::Bid => Some(BID),
         Kind::Claim => Some(CLAIM),
         Kind::Cover => Some(COVER),
         Kind::Mission => Some(MISSION),

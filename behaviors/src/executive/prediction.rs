@@ -3,7 +3,7 @@
 //!
 //! Everything here is a question; nothing changes what is flown.
 
-use super::chart::{Hop, Move, Place};
+use super::transit::{CellVisit, Move, Place};
 use super::{Executive, Forecast, Kind};
 use crate::percept::Percept;
 use skein_planning::coverage::area::Direction;
@@ -26,7 +26,7 @@ const TURNS_S: f64 = 30.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Item {
     /// The cell that it serves, if it does.
-    hop: Option<Hop>,
+    visit: Option<CellVisit>,
     /// The cell that it flies, served or passed.
     cell: Option<(u16, Direction)>,
     /// Distance through the air from here to its end, metres.
@@ -55,7 +55,7 @@ impl Executive {
             .front()
             .filter(|_| !self.replan)
             .and_then(|s| s.kind.cell());
-        let under_way = self.stretches.iter().filter_map(|s| s.kind.hop());
+        let under_way = self.stretches.iter().filter_map(|s| s.kind.visit());
         let queue = under_way
             .chain(self.queue.iter().copied())
             .map(|h| (h.cell, h.direction))
@@ -82,7 +82,7 @@ impl Executive {
         let finish_ms = items
             .iter()
             .rev()
-            .find(|i| i.hop.is_some())
+            .find(|i| i.visit.is_some())
             .map_or(0, |i| self.ms(i.end_m));
         let mut cells = Vec::new();
         let mut anchor: Option<(Place, f64)> = None;
@@ -90,19 +90,20 @@ impl Executive {
         for (i, item) in items.iter().enumerate() {
             let in_it = i == 0 && kept > 0;
             let fits = self.ms(item.end_m) <= window_ms;
-            match (item.hop, item.cell) {
-                (Some(hop), _) if in_it || fits => {
-                    if is_open(hop.cell) {
-                        cells.push(hop.cell);
+            match (item.visit, item.cell) {
+                (Some(visit), _) if in_it || fits => {
+                    if is_open(visit.cell) {
+                        cells.push(visit.cell);
                     }
                     anchor = Some((item.end, item.end_m));
                 }
                 (None, Some(_)) if in_it => anchor = Some((item.end, item.end_m)),
-                (Some(hop), _) => {
+                (Some(visit), _) => {
                     // The way to it is begun, so that is where it will be next.
-                    let entry = self
-                        .chart
-                        .place(self.chart.entry(hop.cell, hop.direction), hop.direction);
+                    let entry = self.transit.place(
+                        self.transit.entry(visit.cell, visit.direction),
+                        visit.direction,
+                    );
                     anchor = anchor.or(Some((entry, before_m)));
                     break;
                 }
@@ -111,7 +112,7 @@ impl Executive {
             before_m = item.end_m;
         }
         let on_loop = anchor.and_then(|(place, m)| place.boundary.map(|b| (b, m)));
-        let found = on_loop.or_else(|| self.chart.way_on(from.pose).map(|(b, d, m)| ((b, d), m)));
+        let found = on_loop.or_else(|| self.transit.way_on(from.pose).map(|(b, d, m)| ((b, d), m)));
         match found {
             Some(((anchor, heading), m)) => Forecast {
                 cells,
@@ -142,11 +143,11 @@ impl Executive {
         let Some(from) = self.here() else {
             return Vec::new();
         };
-        let (kept, queue) = self.continued(self.hops(legs), is_open);
+        let (kept, queue) = self.continued(self.visits(legs), is_open);
         let items = self.items(&from, kept, queue, is_open);
         items
             .iter()
-            .filter_map(|i| i.hop.map(|h| (h.cell, self.ms(i.end_m))))
+            .filter_map(|i| i.visit.map(|h| (h.cell, self.ms(i.end_m))))
             .collect()
     }
 
@@ -165,17 +166,17 @@ impl Executive {
     #[must_use]
     pub fn spendable_ms(&self, percept: &Percept) -> u32 {
         let home_ms = self.home.map_or(0, |(_, ms)| ms);
-        whole_ms((percept.endurance_s - self.chart.airframe.reserve_s) * 1000.0)
+        whole_ms((percept.endurance_s - self.transit.airframe.reserve_s) * 1000.0)
             .saturating_sub(home_ms)
     }
 
     /// The longest way home from the loop, at cruise, in a wind at what it leaves of the
     /// airspeed on that course, with a turn at each end, milliseconds.
     pub(super) fn return_ms(&self, home: Point) -> u32 {
-        let (chart, air) = (&self.chart, self.chart.air());
-        let cruise_mps = chart.airframe.cruise_mps.max(1.0);
+        let (transit, air) = (&self.transit, self.transit.air());
+        let cruise_mps = transit.airframe.cruise_mps.max(1.0);
         let way_s = |i: usize| {
-            let way = home - chart.coverage_loop.boundary(i).position();
+            let way = home - transit.coverage_loop.boundary(i).position();
             let speed_mps = if air.is_calm() {
                 Some(cruise_mps)
             } else {
@@ -185,13 +186,13 @@ impl Executive {
             let makes_way = speed_mps.filter(|speed| *speed > 0.0);
             makes_way.map_or(f64::INFINITY, |speed| way.norm() / speed)
         };
-        let longest_s = (0..chart.coverage_loop.len())
+        let longest_s = (0..transit.coverage_loop.len())
             .map(way_s)
             .fold(0.0, f64::max);
         let turns_s = if air.is_calm() {
             TURNS_S
         } else {
-            TURNS_S.max(2.0 * chart.turn_round_s())
+            TURNS_S.max(2.0 * transit.turn_round_s())
         };
         whole_ms((longest_s + turns_s) * 1000.0).min(UNREACHABLE_MS)
     }
@@ -199,11 +200,11 @@ impl Executive {
     /// Mean speed over the ground along the whole loop, m/s: cruise in calm air.
     #[must_use]
     pub fn loop_speed_mps(&self) -> f64 {
-        let air = self.chart.air();
+        let air = self.transit.air();
         if air.is_calm() {
-            self.chart.airframe.cruise_mps
+            self.transit.airframe.cruise_mps
         } else {
-            self.chart.loop_share() * air.airspeed_mps
+            self.transit.loop_share() * air.airspeed_mps
         }
     }
 
@@ -211,10 +212,10 @@ impl Executive {
     /// pose takes 7π/3 radii, in a wind as long as the worst course makes it.
     #[must_use]
     pub fn turn_ms(&self) -> u32 {
-        let way_m = if self.chart.air().is_calm() {
-            7.0 * PI / 3.0 * self.chart.turn_radius_m()
+        let way_m = if self.transit.air().is_calm() {
+            7.0 * PI / 3.0 * self.transit.turn_radius_m()
         } else {
-            self.chart.turn_round_s() * self.speed_mps()
+            self.transit.turn_round_s() * self.speed_mps()
         };
         self.ms(way_m).saturating_add(whole_ms(TURN_MARGIN_MS))
     }
@@ -222,7 +223,7 @@ impl Executive {
     /// Where the flight to come begins.
     fn here(&self) -> Option<Place> {
         let pose = self
-            .chart
+            .transit
             .air()
             .over_ground(self.played.as_ref()?.percept.pose);
         Some(Place {
@@ -236,12 +237,12 @@ impl Executive {
     }
 
     /// Cells to be served that are not on the first `kept` stretches.
-    fn waiting(&self, kept: usize) -> VecDeque<Hop> {
+    fn waiting(&self, kept: usize) -> VecDeque<CellVisit> {
         let dropped = self
             .stretches
             .iter()
             .skip(kept)
-            .filter_map(|s| s.kind.hop());
+            .filter_map(|s| s.kind.visit());
         dropped.chain(self.queue.iter().copied()).collect()
     }
 
@@ -250,7 +251,7 @@ impl Executive {
         &self,
         from: &Place,
         kept: usize,
-        mut queue: VecDeque<Hop>,
+        mut queue: VecDeque<CellVisit>,
         is_open: &dyn Fn(u16) -> bool,
     ) -> Vec<Item> {
         let mut items = Vec::with_capacity(kept + queue.len());
@@ -265,24 +266,24 @@ impl Executive {
             end_m = self.air_m_until(s.end_m);
             place = s.end;
             items.push(Item {
-                hop: s.kind.hop(),
+                visit: s.kind.visit(),
                 cell: s.kind.cell(),
                 end_m,
                 end: place,
             });
         }
         let mut refused = Vec::new();
-        while let Some(moves) = self.chart.next(&place, &mut queue, is_open, &mut refused) {
+        while let Some(moves) = self.transit.next(&place, &mut queue, is_open, &mut refused) {
             for step in moves {
-                end_m += self.chart.length_m(&step);
-                place = self.chart.end_of(&place, &step);
-                let (hop, cell) = match &step {
+                end_m += self.transit.length_m(&step);
+                place = self.transit.end_of(&place, &step);
+                let (visit, cell) = match &step {
                     Move::Serve(h) => (Some(*h), Some((h.cell, h.direction))),
                     Move::Pass(c, d) => (None, Some((*c, *d))),
                     Move::Route(_) | Move::Loiter(_) => (None, None),
                 };
                 items.push(Item {
-                    hop,
+                    visit,
                     cell,
                     end_m,
                     end: place,
@@ -295,7 +296,7 @@ impl Executive {
     /// Distance through the air to a place on the track, metres.
     pub(super) fn air_m_until(&self, end_m: f64) -> f64 {
         let ground_m = (end_m - self.track.at_m()).max(0.0);
-        let air = self.chart.air();
+        let air = self.transit.air();
         if air.is_calm() {
             ground_m
         } else {

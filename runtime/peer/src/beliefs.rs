@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// A peer's beliefs at one moment. For checks and displays; nothing depends on it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct View {
+pub struct Beliefs {
     /// Its life.
     pub incarnation: Incarnation,
     /// Whether its probation is over and it speaks.
@@ -19,7 +19,7 @@ pub struct View {
     /// Mission revision it follows; 0 before it has one.
     pub revision: u32,
     /// Covered cells it knows of, one flag a cell of the loop.
-    pub union: Vec<bool>,
+    pub covered: Vec<bool>,
     /// Cells it lists as its own future, in order of flight, uncovered or not.
     pub plan: Vec<u16>,
     /// Cells it gave away and still answers for.

@@ -1,12 +1,12 @@
-//! Runs: how the cells of a section are written into a register, in order of flight
-//! (D2.7 §3.6.5). Leaves which cells these are to [`super::section`].
+//! Runs: how the cells of a section are written into a claim, in order of flight
+//! (D2.7 §3.6.5). Leaves which cells these are to [`super::sections`].
 
 use crate::cells::CellSet;
-use crate::wire::message::{Firmness, Listing, Run, Stamp};
+use crate::wire::message::{CellRun, Firmness, ListedRun, Stamp};
 
 /// A cell that this peer will fly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct PlanCell {
+pub struct PlannedCell {
     /// Which cell of the loop.
     pub cell: u16,
     /// Whether it is flown against the order of the loop.
@@ -28,8 +28,8 @@ pub(super) struct Packer<'a> {
 impl Packer<'_> {
     /// Packs cells into at most `max_runs` runs, bridging gaps of covered cells; returns
     /// the runs and how many of the cells they hold.
-    pub(super) fn pack(&self, cells: &[PlanCell], max_runs: usize) -> (Vec<Listing>, usize) {
-        let mut runs: Vec<(PlanCell, u16)> = Vec::new();
+    pub(super) fn pack(&self, cells: &[PlannedCell], max_runs: usize) -> (Vec<ListedRun>, usize) {
+        let mut runs: Vec<(PlannedCell, u16)> = Vec::new();
         for (i, p) in cells.iter().enumerate() {
             if let Some((first, count)) = runs.last_mut()
                 && let Some(reach) = self.reach(first, *count, p)
@@ -45,7 +45,7 @@ impl Packer<'_> {
     }
 
     /// The length of the run `first, count` after `next` joins it, if it can.
-    fn reach(&self, first: &PlanCell, count: u16, next: &PlanCell) -> Option<u16> {
+    fn reach(&self, first: &PlannedCell, count: u16, next: &PlannedCell) -> Option<u16> {
         if (first.backward, first.committed, first.stamp)
             != (next.backward, next.committed, next.stamp)
         {
@@ -72,15 +72,15 @@ impl Packer<'_> {
         bridged.then_some(offset + 1)
     }
 
-    fn listing(&self, (first, count): &(PlanCell, u16)) -> Listing {
+    fn listing(&self, (first, count): &(PlannedCell, u16)) -> ListedRun {
         let n = self.cells;
         let start = if first.backward {
             (first.cell + n - (count - 1) % n) % n
         } else {
             first.cell
         };
-        Listing {
-            run: Run {
+        ListedRun {
+            run: CellRun {
                 first: start,
                 count: *count,
             },
@@ -96,7 +96,7 @@ impl Packer<'_> {
 }
 
 /// The cells of a run on a loop of `n`, in forward order.
-pub fn cells_of(run: Run, n: u16) -> impl Iterator<Item = u16> {
+pub fn cells_of(run: CellRun, n: u16) -> impl Iterator<Item = u16> {
     let n32 = u32::from(n.max(1));
     (0..u32::from(run.count.min(n)))
         .map(move |k| u16::try_from((u32::from(run.first) + k) % n32).unwrap_or(0))
@@ -104,14 +104,14 @@ pub fn cells_of(run: Run, n: u16) -> impl Iterator<Item = u16> {
 
 /// The cells of listings in order of flight.
 #[must_use]
-pub fn unpack(listings: &[Listing], n: u16) -> Vec<PlanCell> {
+pub fn unpack(listings: &[ListedRun], n: u16) -> Vec<PlannedCell> {
     let mut out = Vec::new();
     for l in listings {
         let mut cells: Vec<u16> = cells_of(l.run, n).collect();
         if l.backward {
             cells.reverse();
         }
-        out.extend(cells.into_iter().map(|cell| PlanCell {
+        out.extend(cells.into_iter().map(|cell| PlannedCell {
             cell,
             backward: l.backward,
             committed: l.firmness == Firmness::Committed,
@@ -132,7 +132,7 @@ mod tests {
             cells: 10,
             covered: &covered,
         };
-        let cell = |(cell, backward): &(u16, bool)| PlanCell {
+        let cell = |(cell, backward): &(u16, bool)| PlannedCell {
             cell: *cell,
             backward: *backward,
             committed: false,
@@ -146,7 +146,7 @@ mod tests {
             (3, true),
             (6, false),
         ];
-        let cells: Vec<PlanCell> = flown.iter().map(cell).collect();
+        let cells: Vec<PlannedCell> = flown.iter().map(cell).collect();
         let (listings, packed) = packer.pack(&cells, 16);
         assert_eq!((listings.len(), packed), (3, 6));
         assert_eq!(unpack(&listings, 10), cells);
@@ -159,7 +159,7 @@ mod tests {
             cells: 10,
             covered: &covered,
         };
-        let gap: Vec<PlanCell> = [(0, false), (2, false)].iter().map(cell).collect();
+        let gap: Vec<PlannedCell> = [(0, false), (2, false)].iter().map(cell).collect();
         assert_eq!(packer.pack(&gap, 16).0.len(), 1);
     }
 }

@@ -3,7 +3,7 @@
 //! New legs that go on where the UAV is must not disturb the flight; others are taken
 //! up at the next percept, or at the end of the cell where that is no detour.
 
-use super::chart::{Hop, Place};
+use super::transit::{CellVisit, Place};
 use super::{Aim, Executive, Goal, Kind, Stretch};
 use skein_planning::coverage::area::backtracking::Leg;
 use std::collections::VecDeque;
@@ -18,9 +18,9 @@ impl Executive {
         let mut begins_with = None;
         let (aim, kept, queue) = match goal {
             Goal::Legs(legs) => {
-                let hops = self.hops(&legs);
-                begins_with = hops.iter().find(|h| is_open(h.cell)).copied();
-                let (kept, queue) = self.continued(hops, is_open);
+                let visits = self.visits(&legs);
+                begins_with = visits.iter().find(|h| is_open(h.cell)).copied();
+                let (kept, queue) = self.continued(visits, is_open);
                 (Aim::Legs, kept, queue)
             }
             Goal::Hold => (
@@ -37,7 +37,7 @@ impl Executive {
                 )
             }
         };
-        self.told = self.told && aim == self.aim && aim != Aim::Legs;
+        self.end_reported = self.end_reported && aim == self.aim && aim != Aim::Legs;
         self.aim = aim;
         self.replan = self.replan || kept == 0;
         if kept > 0 {
@@ -68,11 +68,11 @@ impl Executive {
     }
 
     /// A cell that was only passed is to be served from now on.
-    fn serve_first(&mut self, begins_with: Option<Hop>) {
-        if let (Some(front), Some(hop)) = (self.stretches.front_mut(), begins_with)
-            && front.kind == Kind::Pass(hop.cell, hop.direction)
+    fn serve_first(&mut self, begins_with: Option<CellVisit>) {
+        if let (Some(front), Some(visit)) = (self.stretches.front_mut(), begins_with)
+            && front.kind == Kind::Pass(visit.cell, visit.direction)
         {
-            front.kind = Kind::Serve(hop);
+            front.kind = Kind::Serve(visit);
         }
     }
 
@@ -90,11 +90,11 @@ impl Executive {
     }
 
     /// The cells of legs, in order of flight.
-    pub(super) fn hops(&self, legs: &[Leg]) -> VecDeque<Hop> {
-        let n = self.chart.coverage_loop.len();
+    pub(super) fn visits(&self, legs: &[Leg]) -> VecDeque<CellVisit> {
+        let n = self.transit.coverage_loop.len();
         legs.iter()
             .flat_map(|l| {
-                l.cells(n).map(|cell| Hop {
+                l.cells(n).map(|cell| CellVisit {
                     cell,
                     direction: l.direction,
                     tries: 0,
@@ -103,63 +103,65 @@ impl Executive {
             .collect()
     }
 
-    /// How many stretches stay when `hops` become the plan, and which hops then wait.
+    /// How many stretches stay when `visits` become the plan, and which visits then wait.
     pub(super) fn continued(
         &self,
-        mut hops: VecDeque<Hop>,
+        mut visits: VecDeque<CellVisit>,
         is_open: &dyn Fn(u16) -> bool,
-    ) -> (usize, VecDeque<Hop>) {
-        let first = hops.front().map(|h| (h.cell, h.direction));
-        hops.retain(|h| is_open(h.cell));
-        let Some(next) = hops.front().copied() else {
-            return (self.loitering(true), hops);
+    ) -> (usize, VecDeque<CellVisit>) {
+        let first = visits.front().map(|h| (h.cell, h.direction));
+        visits.retain(|h| is_open(h.cell));
+        let Some(next) = visits.front().copied() else {
+            return (self.loitering(true), visits);
         };
         let Some(front) = self.stretches.front().filter(|_| !self.replan) else {
-            return (0, hops);
+            return (0, visits);
         };
         let next_cell = Some((next.cell, next.direction));
         if front.kind.cell() == next_cell {
-            hops.pop_front();
-            return (self.matching(1, &mut hops), hops);
+            visits.pop_front();
+            return (self.matching(1, &mut visits), visits);
         }
         if front.kind == Kind::Route {
-            return (self.matching(0, &mut hops), hops);
+            return (self.matching(0, &mut visits), visits);
         }
         if front.kind.cell().is_none() {
-            return (0, hops);
+            return (0, visits);
         }
         let finishes = first.is_some()
             && front.kind.cell() == first
             && !is_open(front.kind.cell().map_or(0, |c| c.0));
         if finishes || self.is_shorter_after(front, &next) {
-            return (self.matching(1, &mut hops), hops);
+            return (self.matching(1, &mut visits), visits);
         }
-        (0, hops)
+        (0, visits)
     }
 
     /// Of the stretches after the first `kept`, those stay too that lead to the cells
-    /// that `hops` wants next; these are taken off it.
-    fn matching(&self, mut kept: usize, hops: &mut VecDeque<Hop>) -> usize {
+    /// that `visits` wants next; these are taken off it.
+    fn matching(&self, mut kept: usize, visits: &mut VecDeque<CellVisit>) -> usize {
         for (i, s) in self.stretches.iter().enumerate().skip(kept) {
-            let Some(hop) = s.kind.hop() else { continue };
-            if hops
+            let Some(visit) = s.kind.visit() else {
+                continue;
+            };
+            if visits
                 .front()
-                .is_none_or(|h| (h.cell, h.direction) != (hop.cell, hop.direction))
+                .is_none_or(|h| (h.cell, h.direction) != (visit.cell, visit.direction))
             {
                 break;
             }
-            hops.pop_front();
+            visits.pop_front();
             kept = i + 1;
         }
         kept
     }
 
     /// Whether finishing the stretch that is flown first costs no way to `next`.
-    fn is_shorter_after(&self, front: &Stretch, next: &Hop) -> bool {
-        let entry = self.chart.entry(next.cell, next.direction);
+    fn is_shorter_after(&self, front: &Stretch, next: &CellVisit) -> bool {
+        let entry = self.transit.entry(next.cell, next.direction);
         let length_m = |from: &Place| {
-            let moves = self.chart.connect(from, entry, next.direction)?;
-            Some(moves.iter().map(|m| self.chart.length_m(m)).sum::<f64>())
+            let moves = self.transit.connect(from, entry, next.direction)?;
+            Some(moves.iter().map(|m| self.transit.length_m(m)).sum::<f64>())
         };
         let Some(after_m) = length_m(&front.end) else {
             return false;

@@ -16,6 +16,9 @@ use crate::wire::Fnv;
 use crate::wire::key;
 use crate::wire::kinds::{Kind, RECORD_MAX_BYTES};
 use crate::wire::message::{Beacon, Record};
+#[cfg(test)]
+mod many_relays;
+
 use std::collections::BTreeMap;
 
 /// Most records held: 64 peers with a state, a bid, a claim, an order, a finish and
@@ -129,7 +132,7 @@ pub struct Relay {
     queue: BTreeMap<RecordKey, Waiting>,
     neighbours: BTreeMap<u16, Time>,
     answered: BTreeMap<u16, Time>,
-    tokens_mb: u64,
+    tokens_millibytes: u64,
     filled: Time,
     salt: u64,
 }
@@ -147,7 +150,7 @@ impl Relay {
             queue: BTreeMap::new(),
             neighbours: BTreeMap::new(),
             answered: BTreeMap::new(),
-            tokens_mb: 0,
+            tokens_millibytes: 0,
             filled: Time(0),
             salt: u64::from(me).wrapping_mul(0x9E37_79B9_7F4A_7C15),
         }
@@ -176,7 +179,7 @@ impl Relay {
                 sent: now,
             },
         );
-        let delay = if kind == Kind::Round {
+        let delay = if kind == Kind::Bid {
             self.jitter(&key, (record.incarnation, record.seq)) % BID_SPREAD_MS
         } else {
             0
@@ -425,15 +428,16 @@ impl Relay {
     fn refill(&mut self, now: Time) {
         let rate = self.rate_bytes_ps();
         let most = (2 * rate).max(BUCKET_MIN_BYTES as u64) * 1000;
-        self.tokens_mb = (self.tokens_mb + now.since_ms(self.filled) * rate).min(most);
+        self.tokens_millibytes =
+            (self.tokens_millibytes + now.since_ms(self.filled) * rate).min(most);
         self.filled = now;
     }
 
     /// A transmission that did not go through the queue, in bytes.
     pub fn charge(&mut self, now: Time, bytes: usize) {
         self.refill(now);
-        self.tokens_mb = self
-            .tokens_mb
+        self.tokens_millibytes = self
+            .tokens_millibytes
             .saturating_sub((bytes + OVERHEAD_BYTES) as u64 * 1000);
     }
 
@@ -444,11 +448,11 @@ impl Relay {
         self.refill(now);
         let held = self.held.get_mut(&key)?;
         let cost = (held.bytes.len() + OVERHEAD_BYTES) as u64 * 1000;
-        if self.tokens_mb < cost {
+        if self.tokens_millibytes < cost {
             return None;
         }
         let kind = Kind::of_number(key.1)?;
-        self.tokens_mb -= cost;
+        self.tokens_millibytes -= cost;
         self.queue.remove(&key);
         held.sent = now;
         held.copies = held.copies.saturating_add(1);
@@ -479,7 +483,7 @@ impl Relay {
         let (key, _) = self.first(now)?;
         let cost = (self.held.get(&key)?.bytes.len() + OVERHEAD_BYTES) as u64 * 1000;
         let rate = self.rate_bytes_ps();
-        let have = self.tokens_mb + now.since_ms(self.filled) * rate;
+        let have = self.tokens_millibytes + now.since_ms(self.filled) * rate;
         Some(now.plus_ms(cost.saturating_sub(have).div_ceil(rate).max(1)))
     }
 

@@ -1,15 +1,18 @@
 //! Area coverage by a swarm: sections negotiated in rounds, taken over from the
 //! fallen, finished by whoever is left (D2.7 §3.6.5).
 //!
-//! [`section`] holds the rules by which cells change hands, [`runs`] how they are
-//! written into a register, [`rounds`] the exchange of bids, [`negotiation`] when each
+//! [`sections`] holds the rules by which cells change hands, [`runs`] how they are
+//! written into a claim, [`rounds`] the exchange of bids, [`negotiation`] when each
 //! is used, [`division`] what a complete round decides.
 
 pub mod division;
+pub(crate) mod life;
+pub mod membership;
 pub mod negotiation;
+pub mod relay;
 pub mod rounds;
 pub mod runs;
-pub mod section;
+pub mod sections;
 
 pub use negotiation::Negotiation;
-pub use section::{Live, Section};
+pub use sections::{LivePeers, Sections};

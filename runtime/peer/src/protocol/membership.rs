@@ -26,7 +26,7 @@
 
 mod known;
 #[cfg(test)]
-pub(crate) mod net;
+pub(crate) mod many_detectors;
 #[cfg(test)]
 mod tests;
 
@@ -74,7 +74,7 @@ pub struct Info {
     /// Whether it can plan; by its own beacon or by gossip.
     pub able: bool,
     /// Whether it is a ground station.
-    pub ground: bool,
+    pub ground_station: bool,
     /// Whether it holds that the mission is finished.
     pub finished: bool,
     /// Mission revision it follows; of whoever told of it, until it is heard itself.
@@ -575,7 +575,7 @@ impl Membership {
 fn info_of(beacon: &Beacon, steady_since: Time, now: Time) -> Info {
     Info {
         able: beacon.able,
-        ground: beacon.ground,
+        ground_station: beacon.ground_station,
         finished: beacon.finished,
         revision: beacon.revision,
         loop_hash: beacon.loop_hash,

@@ -39,7 +39,7 @@ const ROUNDING_M: f64 = 1e-6;
 
 /// A cell of the plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Hop {
+pub struct CellVisit {
     /// Which cell of the loop.
     pub cell: u16,
     /// Which way it is flown.
@@ -61,7 +61,7 @@ pub struct Place {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Move {
     /// A cell, to serve it.
-    Serve(Hop),
+    Serve(CellVisit),
     /// A cell, because it is on the way.
     Pass(u16, Direction),
     /// A curve off the loop.
@@ -72,7 +72,7 @@ pub enum Move {
 
 /// The loop, the zones and the airframe, as far as ways depend on them.
 #[derive(Clone, Debug)]
-pub struct Chart {
+pub struct Transit {
     /// The loop.
     pub coverage_loop: Arc<CoverageLoop>,
     /// Routes off the loop.
@@ -93,8 +93,8 @@ pub struct Chart {
     pub(super) cells_cost_m: Vec<[f64; 2]>,
 }
 
-impl Chart {
-    /// A chart for calm air at cruise.
+impl Transit {
+    /// A transit for calm air at cruise.
     #[must_use]
     pub fn new(coverage_loop: Arc<CoverageLoop>, router: Arc<Router>, airframe: Airframe) -> Self {
         Self {
@@ -113,7 +113,7 @@ impl Chart {
     #[must_use]
     pub fn with_objective(mut self, objective: Objective) -> Self {
         self.objective = objective;
-        self.breathe(self.air);
+        self.set_air(self.air);
         self
     }
 
@@ -124,7 +124,7 @@ impl Chart {
     }
 
     /// From now on lengths are distances through this air.
-    pub fn breathe(&mut self, air: Air) {
+    pub fn set_air(&mut self, air: Air) {
         self.air = air;
         self.cells_air_m.clear();
         if !air.is_calm() {
@@ -255,20 +255,24 @@ impl Chart {
     pub fn next(
         &self,
         from: &Place,
-        queue: &mut VecDeque<Hop>,
+        queue: &mut VecDeque<CellVisit>,
         is_open: &dyn Fn(u16) -> bool,
         refused: &mut Vec<u16>,
     ) -> Option<Vec<Move>> {
-        while let Some(hop) = queue.pop_front() {
-            if usize::from(hop.cell) >= self.len() || !is_open(hop.cell) {
+        while let Some(visit) = queue.pop_front() {
+            if usize::from(visit.cell) >= self.len() || !is_open(visit.cell) {
                 continue;
             }
-            match self.connect(from, self.entry(hop.cell, hop.direction), hop.direction) {
+            match self.connect(
+                from,
+                self.entry(visit.cell, visit.direction),
+                visit.direction,
+            ) {
                 Some(mut moves) => {
-                    moves.push(Move::Serve(hop));
+                    moves.push(Move::Serve(visit));
                     return Some(moves);
                 }
-                None => refused.push(hop.cell),
+                None => refused.push(visit.cell),
             }
         }
         None
@@ -430,21 +434,21 @@ impl Chart {
     /// A clear route; from inside a zone's clearance with a piece that leads out of
     /// it first.
     fn route(&self, from: Pose, to: Pose) -> Result<Curve, RouteError> {
-        match self.leg(from, to) {
+        match self.transfer(from, to) {
             Err(e) if e != RouteError::GoalInZone && self.is_tight(&from) => {
-                self.escape(from, |out| self.leg(out, to)).ok_or(e)
+                self.escape(from, |out| self.transfer(out, to)).ok_or(e)
             }
             answer => answer,
         }
     }
 
-    /// As [`Chart::connect`], to a point, whatever the heading there: by a direct
+    /// As [`Transit::connect`], to a point, whatever the heading there: by a direct
     /// route, else by the loop to one of the boundaries nearest to the point.
     #[must_use]
     pub fn connect_to_point(&self, from: &Place, to: Point) -> Option<Vec<Move>> {
-        let direct = match self.leg_to_point(from.pose, to) {
+        let direct = match self.transfer_to_point(from.pose, to) {
             Err(_) if self.is_tight(&from.pose) => {
-                self.escape(from.pose, |out| self.leg_to_point(out, to))
+                self.escape(from.pose, |out| self.transfer_to_point(out, to))
             }
             answer => answer.ok(),
         };
@@ -453,7 +457,7 @@ impl Chart {
         }
         for b in self.nearest(to, NEAREST) {
             for d in [Direction::Forward, Direction::Backward] {
-                if let Ok(last) = self.leg_to_point(self.place(b, d).pose, to)
+                if let Ok(last) = self.transfer_to_point(self.place(b, d).pose, to)
                     && let Some(mut moves) = self.connect(from, b, d)
                 {
                     moves.push(Move::Route(last));

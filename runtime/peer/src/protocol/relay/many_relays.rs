@@ -1,9 +1,9 @@
 //! Many relays on a lossy channel: eventual delivery, suppression, bytes, partitions.
 
 use crate::input::Time;
-use crate::membership::Membership;
-use crate::membership::net::Dice;
-use crate::relay::{Offer, Relay};
+use crate::protocol::membership::Membership;
+use crate::protocol::membership::many_detectors::Dice;
+use crate::protocol::relay::{Offer, Relay};
 use crate::wire::codec;
 use crate::wire::message::{Beacon, Record};
 use proptest::prelude::*;
@@ -130,7 +130,7 @@ impl Net {
             north_mm: 0,
             heading_e4: 0,
             able: true,
-            ground: false,
+            ground_station: false,
             finished: false,
             nonce: 1,
             counter: 0,
@@ -358,7 +358,7 @@ fn empty_beacon() -> Beacon {
         north_mm: 0,
         heading_e4: 0,
         able: true,
-        ground: false,
+        ground_station: false,
         finished: false,
         nonce: 1,
         counter: 0,

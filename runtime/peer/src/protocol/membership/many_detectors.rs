@@ -1,8 +1,8 @@
 //! Many failure detectors against each other: random loss, hops, deaths, merges.
 
 use crate::input::Time;
-use crate::membership::{Change, Membership};
 use crate::output::Status;
+use crate::protocol::membership::{Change, Membership};
 use crate::wire::message::Beacon;
 use proptest::prelude::*;
 
@@ -58,7 +58,7 @@ fn beacon(heartbeat: u32, eccentricity: u8) -> Beacon {
         north_mm: 0,
         heading_e4: 0,
         able: true,
-        ground: false,
+        ground_station: false,
         finished: false,
         nonce: 1,
         counter: 0,

@@ -1,9 +1,9 @@
-//! What a complete round decides: a function of its snapshots alone.
+//! What a complete round decides: a function of its bids alone.
 
-use super::rounds::Open;
+use super::rounds::OpenRound;
 use super::runs::cells_of;
 use crate::cells::CellSet;
-use crate::wire::message::{Run, Snapshot};
+use crate::wire::message::{Bid, CellRun};
 use skein_planning::coverage::area::backtracking::{Division, RingCell, Robot};
 use skein_planning::coverage::area::{CoverageLoop, Direction};
 
@@ -17,15 +17,15 @@ pub const CALM_PERIODS: u64 = 20;
 /// The open cells and the members of a complete round, as the solver wants them.
 #[must_use]
 pub fn problem(
-    open: &Open,
+    open: &OpenRound,
     coverage_loop: &CoverageLoop,
     covered: &CellSet,
 ) -> (Vec<RingCell>, Vec<Robot>) {
-    let n = covered.len();
+    let n = covered.capacity();
     let mut done = covered.clone();
-    for s in open.snapshots.values() {
-        if let Ok(union) = CellSet::decode_rle(n, &s.union) {
-            done.union_with(&union);
+    for s in open.bids.values() {
+        if let Ok(covered) = CellSet::decode_rle(n, &s.covered) {
+            done.union_with(&covered);
         }
         for run in &s.commits {
             for c in cells_of(*run, n) {
@@ -44,7 +44,7 @@ pub fn problem(
         })
         .collect();
     let robots = open
-        .snapshots
+        .bids
         .iter()
         .map(|(id, s)| Robot {
             anchor: s.anchor % n.max(1),
@@ -64,13 +64,13 @@ pub fn problem(
 }
 
 /// Whether the division of a complete round is adopted. All members judge alike:
-/// only the snapshots count.
+/// only the bids count.
 #[must_use]
-pub fn worthwhile(open: &Open, division: &Division, beacon_period_ms: u64) -> bool {
+pub fn worthwhile(open: &OpenRound, division: &Division, beacon_period_ms: u64) -> bool {
     if open.round.loss {
         return true;
     }
-    let all = || open.snapshots.values();
+    let all = || open.bids.values();
     let present = all().map(|s| u64::from(s.eta_ms)).max().unwrap_or(0);
     let calm = all().all(|s| u64::from(s.adopted_ago_ms) >= CALM_PERIODS * beacon_period_ms);
     let progress = all().any(|s| s.cells_since > 0);
@@ -100,9 +100,9 @@ pub fn section_of(division: &Division, ring: &[RingCell], id: u16) -> Vec<(u16, 
 
 /// Cells of commitments, in the order of the runs.
 #[must_use]
-pub fn commits_of(snapshot: &Snapshot, n: u16) -> CellSet {
+pub fn commits_of(bid: &Bid, n: u16) -> CellSet {
     let mut set = CellSet::new(n);
-    for run in &snapshot.commits {
+    for run in &bid.commits {
         for c in cells_of(*run, n) {
             set.insert(c);
         }
@@ -112,7 +112,7 @@ pub fn commits_of(snapshot: &Snapshot, n: u16) -> CellSet {
 
 /// Runs of the given cells, in forward order, for a bid.
 #[must_use]
-pub fn runs_of(cells: &[u16], n: u16) -> Vec<Run> {
+pub fn runs_of(cells: &[u16], n: u16) -> Vec<CellRun> {
     let mut set = CellSet::new(n);
     for c in cells {
         set.insert(*c);

@@ -1,5 +1,5 @@
 //! Work that may take longer than a percept may wait: asked for by an output,
-//! computed by the driver with [`solve`], answered by an input.
+//! computed by the driver with [`run`], answered by an input.
 
 use crate::mission::Mission;
 use skein_planning::coverage::area::CoverageLoop;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 /// What every UAV of a mission derives from it: the loop and the routes.
 #[derive(Clone, Debug)]
-pub struct Ground {
+pub struct MissionGeometry {
     /// The mission it was derived from.
     pub mission: Arc<Mission>,
     /// The loop on which all work.
@@ -20,10 +20,10 @@ pub struct Ground {
 
 /// A problem to be solved beside the loop.
 #[derive(Clone, Debug)]
-pub enum Problem {
+pub enum Job {
     /// Derive the common ground of a mission. Drivers of many peers may remember
     /// the answer by [`Mission::content_hash`].
-    Ground(Arc<Mission>),
+    Geometry(Arc<Mission>),
     /// Divide the open cells of the loop.
     Divide {
         /// The loop's cells.
@@ -33,20 +33,20 @@ pub enum Problem {
     },
 }
 
-/// The answer to a [`Problem`] of the same name.
+/// The answer to a [`Job`] of the same name.
 #[derive(Clone, Debug)]
-pub enum Answer {
+pub enum JobResult {
     /// The common ground, or why there is none.
-    Ground(Result<Arc<Ground>, String>),
+    Geometry(Result<Arc<MissionGeometry>, String>),
     /// The division.
     Divide(Division),
 }
 
 /// Solves a problem. Pure; may take milliseconds.
 #[must_use]
-pub fn solve(problem: &Problem) -> Answer {
-    match problem {
-        Problem::Ground(mission) => Answer::Ground(mission.ground()),
-        Problem::Divide { ring, robots } => Answer::Divide(divide(ring, robots)),
+pub fn run(job: &Job) -> JobResult {
+    match job {
+        Job::Geometry(mission) => JobResult::Geometry(mission.geometry()),
+        Job::Divide { ring, robots } => JobResult::Divide(divide(ring, robots)),
     }
 }

@@ -9,7 +9,7 @@ fn beacon(heartbeat: u32, gossip: Vec<Gossip>) -> Beacon {
         north_mm: 0,
         heading_e4: 0,
         able: true,
-        ground: false,
+        ground_station: false,
         finished: false,
         nonce: 1,
         counter: 0,

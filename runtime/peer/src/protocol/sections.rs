@@ -1,14 +1,14 @@
 //! A peer's own section of the loop, and the rules by which cells change hands
 //! (D2.7 §3.6.5, made safe for lost and late messages).
 //!
-//! The owner of a cell is whoever's own newest register lists it. Nobody owns
-//! anything by somebody else's computation, so the rules below read only registers:
+//! The owner of a cell is whoever's own newest claim lists it. Nobody owns
+//! anything by somebody else's computation, so the rules below read only claims:
 //!
 //! | rule | when | what |
 //! |---|---|---|
-//! | yield | a live register *plans* one of my planned cells at a higher stamp | I drop it |
-//! | release | a live register *plans* one of my held cells at a higher stamp | I drop it |
-//! | orphan | an uncovered cell that no live register lists | anybody may take it |
+//! | yield | a live claim *plans* one of my planned cells at a higher stamp | I drop it |
+//! | release | a live claim *plans* one of my held cells at a higher stamp | I drop it |
+//! | orphan | an uncovered cell that no live claim lists | anybody may take it |
 //! | adopt | a round is decided | new cells at `(epoch, 0, id)`; what I give away is held |
 //! | take | without a round | at `(epoch, 1 + highest take heard, id)` |
 //! | expire | held too long | dropped; it is an orphan from then on |
@@ -19,28 +19,28 @@
 //! There is no time in here: *when* a rule may be used is the business of
 //! [`super::negotiation`]; that it is safe whenever it is used is checked
 //! exhaustively on small swarms in `tests/model.rs`. How cells are written into a
-//! register is left to [`super::runs`].
+//! claim is left to [`super::runs`].
 
-use super::runs::{Packer, PlanCell, cells_of, unpack};
+use super::runs::{Packer, PlannedCell, cells_of, unpack};
 use crate::Incarnation;
 use crate::cells::CellSet;
-use crate::wire::message::{Epoch, Register, Run, Stamp};
+use crate::wire::message::{CellRun, Claim, Epoch, Stamp};
 use std::collections::BTreeMap;
 
-/// Most runs of cells in the plan of one register. A section has at most two legs
+/// Most runs of cells in the plan of one claim. A section has at most two legs
 /// and the remains of a commitment; three takeovers add a leg each; the rest is room.
 pub const MAX_PLAN_RUNS: usize = 16;
 
-/// Most runs of held cells in one register, for the same reason.
+/// Most runs of held cells in one claim, for the same reason.
 pub const MAX_HELD_RUNS: usize = 16;
 
-/// Most runs of done cells in one register; they inform people, nothing depends on them.
+/// Most runs of done cells in one claim; they inform people, nothing depends on them.
 pub const MAX_DONE_RUNS: usize = 8;
 
 /// The peers that are not believed dead, with the life in which they are alive.
-pub type Live = BTreeMap<u16, Incarnation>;
+pub type LivePeers = BTreeMap<u16, Incarnation>;
 
-/// The newest register heard from another peer.
+/// The newest claim heard from another peer.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Heard {
     /// In which life it was written.
@@ -48,25 +48,25 @@ pub struct Heard {
     /// Its version within that life.
     pub seq: u32,
     /// What it says.
-    pub register: Register,
+    pub claim: Claim,
     listed: CellSet,
 }
 
 /// The state that the rules work on.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Section {
+pub struct Sections {
     me: u16,
     cells: u16,
     epoch: Epoch,
-    plan: Vec<PlanCell>,
+    plan: Vec<PlannedCell>,
     held: BTreeMap<u16, Stamp>,
     done: CellSet,
-    union: CellSet,
+    covered: CellSet,
     unassigned: CellSet,
     heard: BTreeMap<u16, Heard>,
 }
 
-impl Section {
+impl Sections {
     /// An empty section on a loop of `cells` cells, of which `covered` need no service.
     #[must_use]
     pub fn new(me: u16, cells: u16, covered: CellSet) -> Self {
@@ -77,7 +77,7 @@ impl Section {
             plan: Vec::new(),
             held: BTreeMap::new(),
             done: CellSet::new(cells),
-            union: covered,
+            covered: covered,
             unassigned: CellSet::new(cells),
             heard: BTreeMap::new(),
         }
@@ -91,13 +91,13 @@ impl Section {
 
     /// Covered cells known of.
     #[must_use]
-    pub fn union(&self) -> &CellSet {
-        &self.union
+    pub fn covered(&self) -> &CellSet {
+        &self.covered
     }
 
     /// What will be flown, in order.
     #[must_use]
-    pub fn plan(&self) -> &[PlanCell] {
+    pub fn plan(&self) -> &[PlannedCell] {
         &self.plan
     }
 
@@ -119,7 +119,7 @@ impl Section {
         self.epoch
     }
 
-    /// The newest register heard of each other peer.
+    /// The newest claim heard of each other peer.
     #[must_use]
     pub fn heard(&self) -> &BTreeMap<u16, Heard> {
         &self.heard
@@ -128,36 +128,30 @@ impl Section {
     /// Whether everything is covered.
     #[must_use]
     pub fn complete(&self) -> bool {
-        self.union.is_full()
+        self.covered.is_full()
     }
 
     /// Adds covered cells; covered cells leave the plan. Returns whether any was new.
     pub fn cover(&mut self, covered: &CellSet) -> bool {
-        if !self.union.union_with(covered) {
+        if !self.covered.union_with(covered) {
             return false;
         }
-        let union = &self.union;
+        let covered = &self.covered;
         let done = &mut self.done;
         self.plan.retain(|p| {
-            let open = !union.contains(p.cell);
+            let open = !covered.contains(p.cell);
             if !open {
                 done.insert(p.cell);
             }
             open
         });
-        self.held.retain(|c, _| !union.contains(*c));
+        self.held.retain(|c, _| !covered.contains(*c));
         true
     }
 
-    /// Notes a register of another peer, unless an equally new one is known.
+    /// Notes a claim of another peer, unless an equally new one is known.
     /// Returns whether it was newer.
-    pub fn hear(
-        &mut self,
-        author: u16,
-        incarnation: Incarnation,
-        seq: u32,
-        register: Register,
-    ) -> bool {
+    pub fn hear(&mut self, author: u16, incarnation: Incarnation, seq: u32, claim: Claim) -> bool {
         if author == self.me {
             return false;
         }
@@ -167,7 +161,7 @@ impl Section {
             return false;
         }
         let mut listed = CellSet::new(self.cells);
-        for l in register.plan.iter().chain(&register.held) {
+        for l in claim.plan.iter().chain(&claim.held) {
             for c in cells_of(l.run, self.cells) {
                 listed.insert(c);
             }
@@ -177,22 +171,22 @@ impl Section {
             Heard {
                 incarnation,
                 seq,
-                register,
+                claim,
                 listed,
             },
         );
         true
     }
 
-    /// Rules *yield* and *release*, against every live register. Returns whether
-    /// this peer's own register changed.
-    pub fn settle(&mut self, live: &Live) -> bool {
+    /// Rules *yield* and *release*, against every live claim. Returns whether
+    /// this peer's own claim changed.
+    pub fn settle(&mut self, live: &LivePeers) -> bool {
         let mut theirs: BTreeMap<u16, Stamp> = BTreeMap::new();
         for (author, h) in &self.heard {
             if live.get(author) != Some(&h.incarnation) {
                 continue;
             }
-            for l in &h.register.plan {
+            for l in &h.claim.plan {
                 for c in cells_of(l.run, self.cells) {
                     let s = theirs.entry(c).or_default();
                     *s = (*s).max(l.stamp);
@@ -206,12 +200,12 @@ impl Section {
         before != (self.plan.len(), self.held.len())
     }
 
-    /// Uncovered cells that no live register lists, this peer's own included, and
+    /// Uncovered cells that no live claim lists, this peer's own included, and
     /// that are not known to be beyond anybody's endurance.
     #[must_use]
-    pub fn orphans(&self, live: &Live) -> CellSet {
+    pub fn orphans(&self, live: &LivePeers) -> CellSet {
         let mut free = CellSet::full(self.cells);
-        free.subtract(&self.union);
+        free.subtract(&self.covered);
         free.subtract(&self.unassigned);
         for p in &self.plan {
             free.remove(p.cell);
@@ -229,13 +223,13 @@ impl Section {
 
     /// Uncovered cells of another peer's newest plan, in its order of flight.
     #[must_use]
-    pub fn plan_of(&self, author: u16) -> Vec<PlanCell> {
+    pub fn plan_of(&self, author: u16) -> Vec<PlannedCell> {
         let Some(h) = self.heard.get(&author) else {
             return Vec::new();
         };
-        unpack(&h.register.plan, self.cells)
+        unpack(&h.claim.plan, self.cells)
             .into_iter()
-            .filter(|p| !self.union.contains(p.cell))
+            .filter(|p| !self.covered.contains(p.cell))
             .collect()
     }
 
@@ -243,14 +237,14 @@ impl Section {
     /// flight. Covered cells and repetitions are left out. A cell this peer lists
     /// already at a higher stamp keeps it: another may have yielded to it, and a lower
     /// one would yield in turn to what that other said before. Nothing changes yet:
-    /// the plan must be durable before it is flown, see [`Section::install`].
+    /// the plan must be durable before it is flown, see [`Sections::install`].
     #[must_use]
     pub fn adopted(
         &self,
         epoch: Epoch,
         commits: &[(u16, bool)],
         section: &[(u16, bool)],
-    ) -> Vec<PlanCell> {
+    ) -> Vec<PlannedCell> {
         let stamp = Stamp {
             epoch,
             take: 0,
@@ -263,14 +257,14 @@ impl Section {
             .map(|(c, s)| (*c, *s))
             .chain(planned)
             .collect();
-        let mut seen = self.union.clone();
+        let mut seen = self.covered.clone();
         let mut plan = Vec::new();
         for (list, committed) in [(commits, true), (section, false)] {
             for &(cell, backward) in list {
                 if cell < self.cells && !seen.contains(cell) {
                     seen.insert(cell);
                     let stamp = listed.get(&cell).map_or(stamp, |s| stamp.max(*s));
-                    plan.push(PlanCell {
+                    plan.push(PlannedCell {
                         cell,
                         backward,
                         committed,
@@ -284,9 +278,9 @@ impl Section {
         plan
     }
 
-    /// Makes a durable plan of [`Section::adopted`] the plan. What was planned and is
+    /// Makes a durable plan of [`Sections::adopted`] the plan. What was planned and is
     /// no longer, is held. An epoch that is not above the present one is refused.
-    pub fn install(&mut self, epoch: Epoch, plan: &[PlanCell]) -> bool {
+    pub fn install(&mut self, epoch: Epoch, plan: &[PlannedCell]) -> bool {
         if epoch <= self.epoch {
             return false;
         }
@@ -303,7 +297,7 @@ impl Section {
         self.held.retain(|c, _| !kept.contains(*c));
         self.plan = plan
             .iter()
-            .filter(|p| !self.union.contains(p.cell))
+            .filter(|p| !self.covered.contains(p.cell))
             .copied()
             .collect();
         self.epoch = epoch;
@@ -325,13 +319,13 @@ impl Section {
 
     /// Rule *take*: the cells with stamps above all that was heard for them. Covered
     /// cells and cells already planned are left out. Nothing changes yet: a take must
-    /// be durable before it is flown, see [`Section::append`].
+    /// be durable before it is flown, see [`Sections::append`].
     #[must_use]
-    pub fn taken(&self, cells: &[(u16, bool)]) -> Vec<PlanCell> {
-        let mut out: Vec<PlanCell> = Vec::new();
+    pub fn taken(&self, cells: &[(u16, bool)]) -> Vec<PlannedCell> {
+        let mut out: Vec<PlannedCell> = Vec::new();
         for &(cell, backward) in cells {
             let planned = self.plan.iter().chain(&out).any(|p| p.cell == cell);
-            if cell >= self.cells || self.union.contains(cell) || planned {
+            if cell >= self.cells || self.covered.contains(cell) || planned {
                 continue;
             }
             let mut top = Stamp {
@@ -340,7 +334,7 @@ impl Section {
                 id: self.me,
             };
             for h in self.heard.values() {
-                for l in h.register.plan.iter().chain(&h.register.held) {
+                for l in h.claim.plan.iter().chain(&h.claim.held) {
                     if cells_of(l.run, self.cells).any(|c| c == cell) {
                         top = top.max(l.stamp);
                     }
@@ -354,7 +348,7 @@ impl Section {
                 take: top.take.saturating_add(1),
                 id: self.me,
             };
-            out.push(PlanCell {
+            out.push(PlannedCell {
                 cell,
                 backward,
                 committed: false,
@@ -364,12 +358,12 @@ impl Section {
         out
     }
 
-    /// Adds durable takes of [`Section::taken`] to the end of the plan, but for cells
+    /// Adds durable takes of [`Sections::taken`] to the end of the plan, but for cells
     /// covered or planned meanwhile. Returns how many were added.
-    pub fn append(&mut self, taken: &[PlanCell]) -> usize {
+    pub fn append(&mut self, taken: &[PlannedCell]) -> usize {
         let before = self.plan.len();
         for p in taken {
-            if !self.union.contains(p.cell) && !self.plan.iter().any(|q| q.cell == p.cell) {
+            if !self.covered.contains(p.cell) && !self.plan.iter().any(|q| q.cell == p.cell) {
                 self.plan.push(*p);
                 self.held.remove(&p.cell);
                 self.unassigned.remove(p.cell);
@@ -385,28 +379,28 @@ impl Section {
         self.append(&taken)
     }
 
-    /// How many cells of a plan fit into one register, from the first on.
+    /// How many cells of a plan fit into one claim, from the first on.
     #[must_use]
-    pub fn fitting(&self, plan: &[PlanCell]) -> usize {
+    pub fn fitting(&self, plan: &[PlannedCell]) -> usize {
         self.packer().pack(plan, MAX_PLAN_RUNS).1
     }
 
-    /// The register as it would be with another plan: what is made durable first.
+    /// The claim as it would be with another plan: what is made durable first.
     #[must_use]
-    pub fn register_with(
+    pub fn claim_with(
         &self,
         epoch: Epoch,
-        plan: &[PlanCell],
+        plan: &[PlannedCell],
         revision: u32,
         loop_hash: u64,
-    ) -> Register {
+    ) -> Claim {
         let plan = self.packer().pack(plan, MAX_PLAN_RUNS).0;
-        Register {
+        Claim {
             revision,
             loop_hash,
             epoch,
             plan,
-            ..Register::default()
+            ..Claim::default()
         }
     }
 
@@ -445,13 +439,13 @@ impl Section {
         self.held.clear();
     }
 
-    /// The register to be published.
+    /// The claim to be published.
     #[must_use]
-    pub fn register(&self, revision: u32, loop_hash: u64, eta_ms: u32) -> Register {
+    pub fn claim(&self, revision: u32, loop_hash: u64, eta_ms: u32) -> Claim {
         let held = self.held_cells();
-        let mut done: Vec<Run> = self.done.runs();
+        let mut done: Vec<CellRun> = self.done.runs();
         done.truncate(MAX_DONE_RUNS);
-        Register {
+        Claim {
             revision,
             loop_hash,
             epoch: self.epoch,
@@ -465,15 +459,15 @@ impl Section {
     fn packer(&self) -> Packer<'_> {
         Packer {
             cells: self.cells,
-            covered: &self.union,
+            covered: &self.covered,
         }
     }
 
     /// Held cells, ascending, in the form in which runs are packed.
-    fn held_cells(&self) -> Vec<PlanCell> {
+    fn held_cells(&self) -> Vec<PlannedCell> {
         self.held
             .iter()
-            .map(|(c, s)| PlanCell {
+            .map(|(c, s)| PlannedCell {
                 cell: *c,
                 backward: false,
                 committed: false,
@@ -482,7 +476,7 @@ impl Section {
             .collect()
     }
 
-    /// What does not fit into a register is not flown: it would be a secret.
+    /// What does not fit into a claim is not flown: it would be a secret.
     fn trim(&mut self) {
         let fits = self.packer().pack(&self.plan, MAX_PLAN_RUNS).1;
         self.plan.truncate(fits);
@@ -497,7 +491,7 @@ impl Section {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::message::{Firmness, Listing};
+    use crate::wire::message::{Firmness, ListedRun};
 
     fn stamp(counter: u32, take: u16, id: u16) -> Stamp {
         Stamp {
@@ -507,12 +501,12 @@ mod tests {
         }
     }
 
-    fn register(plan: &[(u16, u16, Stamp)]) -> Register {
-        Register {
+    fn claim(plan: &[(u16, u16, Stamp)]) -> Claim {
+        Claim {
             plan: plan
                 .iter()
-                .map(|(first, count, stamp)| Listing {
-                    run: Run {
+                .map(|(first, count, stamp)| ListedRun {
+                    run: CellRun {
                         first: *first,
                         count: *count,
                     },
@@ -521,12 +515,12 @@ mod tests {
                     stamp: *stamp,
                 })
                 .collect(),
-            ..Register::default()
+            ..Claim::default()
         }
     }
 
-    fn section(me: u16) -> Section {
-        Section::new(me, 10, CellSet::new(10))
+    fn sections(me: u16) -> Sections {
+        Sections::new(me, 10, CellSet::new(10))
     }
 
     fn forward(cells: &[u16]) -> Vec<(u16, bool)> {
@@ -535,7 +529,7 @@ mod tests {
 
     #[test]
     fn a_planned_cell_yields_to_a_higher_stamp_of_a_live_peer_only() {
-        let mut s = section(1);
+        let mut s = sections(1);
         s.adopt(
             Epoch {
                 counter: 1,
@@ -544,11 +538,11 @@ mod tests {
             &[],
             &forward(&[2, 3, 4]),
         );
-        s.hear(2, 1, 1, register(&[(4, 2, stamp(2, 0, 2))]));
-        assert!(!s.settle(&Live::new()), "a dead register takes nothing");
-        assert!(s.settle(&Live::from([(2, 1)])));
+        s.hear(2, 1, 1, claim(&[(4, 2, stamp(2, 0, 2))]));
+        assert!(!s.settle(&LivePeers::new()), "a dead claim takes nothing");
+        assert!(s.settle(&LivePeers::from([(2, 1)])));
         assert_eq!(s.plan().iter().map(|p| p.cell).collect::<Vec<_>>(), [2, 3]);
-        assert!(!s.settle(&Live::from([(2, 1)])));
+        assert!(!s.settle(&LivePeers::from([(2, 1)])));
     }
 
     #[test]
@@ -557,13 +551,13 @@ mod tests {
             counter: 3,
             hash: 9,
         };
-        let (mut a, mut b) = (section(1), section(2));
+        let (mut a, mut b) = (sections(1), sections(2));
         a.adopt(e, &[], &forward(&[5]));
         b.adopt(e, &[], &forward(&[5]));
-        let (ra, rb) = (a.register(1, 1, 0), b.register(1, 1, 0));
+        let (ra, rb) = (a.claim(1, 1, 0), b.claim(1, 1, 0));
         a.hear(2, 1, 1, rb);
         b.hear(1, 1, 1, ra);
-        let live = Live::from([(1, 1), (2, 1)]);
+        let live = LivePeers::from([(1, 1), (2, 1)]);
         a.settle(&live);
         b.settle(&live);
         assert_eq!(a.plan().len() + b.plan().len(), 1);
@@ -571,7 +565,7 @@ mod tests {
 
     #[test]
     fn what_is_given_away_is_held_until_somebody_lists_it() {
-        let mut s = section(1);
+        let mut s = sections(1);
         s.adopt(
             Epoch {
                 counter: 1,
@@ -589,9 +583,9 @@ mod tests {
             &forward(&[1]),
         );
         assert_eq!(s.held().keys().copied().collect::<Vec<_>>(), [2, 3]);
-        let live = Live::from([(2, 1)]);
+        let live = LivePeers::from([(2, 1)]);
         assert!(!s.orphans(&live).contains(2));
-        s.hear(2, 1, 1, register(&[(2, 1, stamp(2, 0, 2))]));
+        s.hear(2, 1, 1, claim(&[(2, 1, stamp(2, 0, 2))]));
         assert!(s.settle(&live));
         assert_eq!(s.held().keys().copied().collect::<Vec<_>>(), [3]);
         s.expire_held();
@@ -600,8 +594,8 @@ mod tests {
 
     #[test]
     fn an_adoption_below_a_take_does_not_lower_its_stamp() {
-        let mut s = section(1);
-        s.hear(2, 1, 1, register(&[(7, 1, stamp(2, 0, 2))]));
+        let mut s = sections(1);
+        s.hear(2, 1, 1, claim(&[(7, 1, stamp(2, 0, 2))]));
         s.take(&[(7, false)]);
         // Peer 2 yields to this take; then a division that was decided before ends.
         s.adopt(
@@ -617,22 +611,22 @@ mod tests {
             [stamp(1, 0, 1), stamp(2, 1, 1)]
         );
         assert!(
-            !s.settle(&Live::from([(2, 1)])),
+            !s.settle(&LivePeers::from([(2, 1)])),
             "what peer 2 said before it yielded takes nothing back"
         );
     }
 
     #[test]
     fn a_take_beats_every_stamp_heard() {
-        let mut s = section(1);
-        s.hear(2, 1, 1, register(&[(7, 1, stamp(5, 3, 2))]));
+        let mut s = sections(1);
+        s.hear(2, 1, 1, claim(&[(7, 1, stamp(5, 3, 2))]));
         assert_eq!(s.take(&[(7, true), (7, true)]), 1);
         assert_eq!(s.plan()[0].stamp, stamp(5, 4, 1));
     }
 
     #[test]
     fn covered_cells_leave_plan_and_held() {
-        let mut s = section(1);
+        let mut s = sections(1);
         s.adopt(
             Epoch {
                 counter: 1,
@@ -661,7 +655,7 @@ mod tests {
     #[test]
     fn what_does_not_fit_into_a_register_is_not_planned() {
         let n = 200;
-        let mut s = Section::new(1, n, CellSet::new(n));
+        let mut s = Sections::new(1, n, CellSet::new(n));
         let scattered: Vec<(u16, bool)> = (0..n).step_by(2).map(|c| (c, false)).collect();
         s.adopt(
             Epoch {
@@ -672,7 +666,7 @@ mod tests {
             &scattered,
         );
         assert_eq!(s.plan().len(), MAX_PLAN_RUNS);
-        let listed: Vec<u16> = unpack(&s.register(1, 1, 0).plan, n)
+        let listed: Vec<u16> = unpack(&s.claim(1, 1, 0).plan, n)
             .iter()
             .map(|p| p.cell)
             .collect();

@@ -17,7 +17,7 @@ use crate::journal::{Durable, Entry};
 use crate::output::Report;
 use crate::peer::{Peer, Promise};
 use crate::wire::message::Member;
-use crate::{Incarnation, cooperation, voice};
+use crate::{Incarnation, cooperation, outbound};
 
 /// A new life only listens for this many beacon periods: long enough to hear a
 /// neighbour's gossip about an earlier life at 30 % loss with 97 % certainty, and
@@ -26,7 +26,7 @@ pub const PROBATION_PERIODS: u64 = 3;
 
 /// Where a life stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Boot {
+pub struct Life {
     /// The life that is durable; 0 before the first.
     pub incarnation: Incarnation,
     /// The life that is being made durable.
@@ -37,7 +37,7 @@ pub struct Boot {
     pub nonce: u32,
 }
 
-impl Boot {
+impl Life {
     /// Whether the peer may speak.
     #[must_use]
     pub fn speaks(&self, now: Time) -> bool {
@@ -53,57 +53,57 @@ pub(crate) fn start(peer: &mut Peer, persisted: &[Vec<u8>], nonce: u32) {
             "{unread} journal records of a later version were skipped"
         ));
     }
-    peer.boot.nonce = nonce;
-    peer.boot.listens_until = peer.now.plus_ms(PROBATION_PERIODS * peer.period_ms());
-    voice::first_beacon(peer);
+    peer.life.nonce = nonce;
+    peer.life.listens_until = peer.now.plus_ms(PROBATION_PERIODS * peer.period_ms());
+    outbound::first_beacon(peer);
     promise(peer, peer.durable.incarnation.saturating_add(1));
     cooperation::consider_mission(peer);
 }
 
 fn promise(peer: &mut Peer, incarnation: Incarnation) {
-    if peer.boot.promised.is_some_and(|p| p >= incarnation) {
+    if peer.life.promised.is_some_and(|p| p >= incarnation) {
         return;
     }
     if peer.store(Promise::Life(incarnation), Entry::Life(incarnation)) {
-        peer.boot.promised = Some(incarnation);
+        peer.life.promised = Some(incarnation);
     }
 }
 
 /// The life is durable and may be spoken of.
 pub(crate) fn lives(peer: &mut Peer, incarnation: Incarnation) {
-    if peer.boot.promised != Some(incarnation) {
+    if peer.life.promised != Some(incarnation) {
         return;
     }
-    peer.boot.promised = None;
-    peer.boot.incarnation = incarnation;
+    peer.life.promised = None;
+    peer.life.incarnation = incarnation;
     peer.membership.set_self(incarnation);
     peer.relay.new_life();
-    voice::new_life(peer);
+    outbound::new_life(peer);
     let me = Member {
         id: peer.config.id.0,
         incarnation,
     };
-    if let Some(crew) = &mut peer.crew {
-        crew.new_life(me);
+    if let Some(mission_state) = &mut peer.mission_state {
+        mission_state.new_life(me);
     }
     peer.report(Report::Booted { incarnation });
 }
 
 /// Somebody speaks of this peer's own id in the given life, with a heartbeat.
 pub(crate) fn heard_of_myself(peer: &mut Peer, incarnation: Incarnation, heartbeat: u32) {
-    let mine = peer.boot.promised.unwrap_or(0).max(peer.boot.incarnation);
-    let never_sent = incarnation == peer.boot.incarnation && heartbeat > peer.voice.heartbeat;
+    let mine = peer.life.promised.unwrap_or(0).max(peer.life.incarnation);
+    let never_sent = incarnation == peer.life.incarnation && heartbeat > peer.outbound.heartbeat;
     if incarnation > mine
         || (incarnation == mine && never_sent)
-        || (peer.boot.incarnation == 0 && incarnation >= mine)
+        || (peer.life.incarnation == 0 && incarnation >= mine)
     {
         promise(peer, incarnation.saturating_add(1));
     }
 }
 
 /// A store of the life that failed is tried again.
-pub(crate) fn look(peer: &mut Peer) {
-    if peer.boot.incarnation == 0 && peer.boot.promised.is_none() {
+pub(crate) fn tick(peer: &mut Peer) {
+    if peer.life.incarnation == 0 && peer.life.promised.is_none() {
         promise(peer, peer.durable.incarnation.saturating_add(1));
     }
 }
@@ -111,7 +111,7 @@ pub(crate) fn look(peer: &mut Peer) {
 /// Covered cells the journal held, if they are counted on this loop.
 pub(crate) fn remembered(durable: &Durable, loop_hash: u64, cells: u16) -> Option<CellSet> {
     if durable.loop_hash == loop_hash && durable.cells == cells {
-        CellSet::decode_rle(cells, &durable.union).ok()
+        CellSet::decode_rle(cells, &durable.covered).ok()
     } else {
         None
     }

@@ -2,11 +2,12 @@
 
 use crate::output::{Report, Status};
 use crate::peer::Peer;
-use crate::relay::Offer;
+use crate::protocol::relay::Offer;
+use crate::protocol::{life, membership};
 use crate::wire::codec::{self, Body};
 use crate::wire::kinds::Kind;
 use crate::wire::message::{Beacon, Member, MissionChunk, Record};
-use crate::{PeerId, boot, cells::CellSet, cooperation, membership, voice};
+use crate::{PeerId, cells::CellSet, cooperation, outbound};
 
 /// One transmission, as received.
 pub(crate) fn hear(peer: &mut Peer, transmitter: u16, hops: u8, bytes: &[u8]) {
@@ -48,15 +49,15 @@ fn refuse(peer: &mut Peer, reason: &str) {
 fn hear_own(peer: &mut Peer, record: &Record, body: &Body) {
     match body {
         Body::Beacon(b)
-            if record.incarnation == peer.boot.incarnation && b.nonce != peer.boot.nonce =>
+            if record.incarnation == peer.life.incarnation && b.nonce != peer.life.nonce =>
         {
             peer.alarm("another peer speaks under this id");
-            if b.nonce > peer.boot.nonce {
-                peer.voice.silenced = true;
+            if b.nonce > peer.life.nonce {
+                peer.outbound.silenced = true;
             }
         }
-        Body::Beacon(b) => boot::heard_of_myself(peer, record.incarnation, b.heartbeat),
-        _ => boot::heard_of_myself(peer, record.incarnation, 0),
+        Body::Beacon(b) => life::heard_of_myself(peer, record.incarnation, b.heartbeat),
+        _ => life::heard_of_myself(peer, record.incarnation, 0),
     }
 }
 
@@ -68,26 +69,31 @@ fn hear_beacon(peer: &mut Peer, record: &Record, beacon: &Beacon) {
     on_changes(peer, changes);
     for g in &beacon.gossip {
         if g.id == peer.config.id.0 {
-            boot::heard_of_myself(peer, g.incarnation, g.heartbeat);
-            if g.incarnation != peer.boot.incarnation {
+            life::heard_of_myself(peer, g.incarnation, g.heartbeat);
+            if g.incarnation != peer.life.incarnation {
                 continue;
             }
             if g.suspected_ds.is_some() {
-                voice::refute(peer);
+                outbound::refute(peer);
             } else {
-                voice::believed(peer);
+                outbound::believed(peer);
             }
         }
     }
     peer.relay.on_beacon(now, record.author, beacon);
-    if let Some(crew) = &mut peer.crew {
-        crew.negotiation.rounds.hear_counter(beacon.counter);
-        if beacon.loop_hash == crew.loop_hash() && beacon.cover_digest != crew.union().digest() {
-            peer.voice.cover_wanted = true;
-        } else if beacon.revision == crew.revision()
-            && beacon.loop_hash != crew.loop_hash()
+    if let Some(mission_state) = &mut peer.mission_state {
+        mission_state
+            .negotiation
+            .rounds
+            .hear_counter(beacon.counter);
+        if beacon.loop_hash == mission_state.loop_hash()
+            && beacon.cover_digest != mission_state.covered().digest()
+        {
+            peer.outbound.cover_wanted = true;
+        } else if beacon.revision == mission_state.revision()
+            && beacon.loop_hash != mission_state.loop_hash()
             && beacon.loop_hash != 0
-            && !core::mem::replace(&mut peer.voice.mismatch_said, true)
+            && !core::mem::replace(&mut peer.outbound.mismatch_said, true)
         {
             peer.alarm(&format!(
                 "uav{} derived another loop from the same mission",
@@ -124,48 +130,52 @@ fn deliver(peer: &mut Peer, record: &Record, body: Body) {
         incarnation: record.incarnation,
     };
     match body {
-        Body::Claim(register) => {
-            if let Some(crew) = &mut peer.crew
-                && register.loop_hash == crew.loop_hash()
-                && crew.negotiation.section.hear(
+        Body::Claim(claim) => {
+            if let Some(mission_state) = &mut peer.mission_state
+                && claim.loop_hash == mission_state.loop_hash()
+                && mission_state.negotiation.sections.hear(
                     author.id,
                     author.incarnation,
                     record.seq,
-                    register,
+                    claim,
                 )
             {
-                cooperation::look(peer);
+                cooperation::tick(peer);
             }
         }
-        Body::Round(snapshot) => {
+        Body::Bid(bid) => {
             let now = peer.now;
-            if let Some(crew) = &mut peer.crew {
-                let n = crew.union().len();
-                if snapshot.round.loop_hash == crew.loop_hash() {
-                    if let Ok(union) = CellSet::decode_rle(n, &snapshot.union) {
-                        crew.negotiation.section.cover(&union);
+            if let Some(mission_state) = &mut peer.mission_state {
+                let n = mission_state.covered().capacity();
+                if bid.round.loop_hash == mission_state.loop_hash() {
+                    if let Ok(covered) = CellSet::decode_rle(n, &bid.covered) {
+                        mission_state.negotiation.sections.cover(&covered);
                     }
-                    crew.negotiation.hear_snapshot(now, author, &snapshot);
-                    cooperation::look(peer);
+                    mission_state.negotiation.hear_bid(now, author, &bid);
+                    cooperation::tick(peer);
                 } else {
-                    crew.negotiation.rounds.hear_counter(snapshot.round.counter);
+                    mission_state
+                        .negotiation
+                        .rounds
+                        .hear_counter(bid.round.counter);
                 }
             }
         }
         Body::Cover(cover) => {
-            if let Some(crew) = &mut peer.crew
-                && cover.loop_hash == crew.loop_hash()
-                && let Ok(union) = CellSet::decode_rle(crew.union().len(), &cover.union)
-                && crew.negotiation.section.cover(&union)
+            if let Some(mission_state) = &mut peer.mission_state
+                && cover.loop_hash == mission_state.loop_hash()
+                && let Ok(covered) =
+                    CellSet::decode_rle(mission_state.covered().capacity(), &cover.covered)
+                && mission_state.negotiation.sections.cover(&covered)
             {
-                peer.voice.cover_changed = true;
+                peer.outbound.cover_changed = true;
             }
         }
         Body::Mission(chunk) => hear_mission(peer, record, &chunk),
         Body::Operator(order) => {
             let version = (record.incarnation, record.seq, record.author);
             if version > peer.order.version {
-                peer.order = crate::peer::Ordered { order, version };
+                peer.order = crate::peer::StandingOrder { order, version };
             }
         }
         Body::Beacon(_) | Body::State(_) | Body::Finished(_) | Body::Event(_) => {}
@@ -186,12 +196,12 @@ pub(crate) fn hear_again(peer: &mut Peer) {
         let Some(kind) = Kind::of_number(record.kind) else {
             continue;
         };
-        if matches!(kind, Kind::Claim | Kind::Round)
+        if matches!(kind, Kind::Claim | Kind::Bid)
             && record.author != peer.config.id.0
             && let Ok(body) = codec::decode_body(kind, &record.body)
         {
             deliver(peer, &record, body);
         }
     }
-    voice::speak_claim(peer);
+    outbound::speak_claim(peer);
 }

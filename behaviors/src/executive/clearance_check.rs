@@ -7,12 +7,12 @@
 //! without proof is not flown: its cell is refused, its route is replaced by the circle
 //! here that keeps farthest.
 
-use super::chart::{Chart, ESCAPE_SLACK_M, Move, Place};
+use super::transit::{ESCAPE_SLACK_M, Move, Place, Transit};
 use super::{Event, Executive};
 use skein_planning::frame::Pose;
 use skein_planning::trajectory::{Curve, Segment};
 
-impl Chart {
+impl Transit {
     /// Distance from the zones that a stretch beginning at a pose must keep, metres.
     #[must_use]
     pub fn margin_m(&self, from: &Pose) -> f64 {
@@ -22,7 +22,7 @@ impl Chart {
 
     /// Whether a move that begins at a place is proved to keep the margin.
     #[must_use]
-    pub fn is_proved(&self, from: &Place, step: &Move) -> bool {
+    pub fn is_cleared(&self, from: &Place, step: &Move) -> bool {
         let (zones, margin_m) = (self.router.zones(), self.margin_m(&from.pose));
         let c = &self.coverage_loop;
         match step {
@@ -43,7 +43,7 @@ fn halves(circle: &Segment) -> Curve {
 impl Executive {
     /// Of moves that follow each other from a place, what may be flown. Where one lacks
     /// its proof, the cell they lead to is refused; without a cell it is held instead.
-    pub(super) fn proved(
+    pub(super) fn cleared(
         &self,
         at: &Place,
         moves: Vec<Move>,
@@ -51,9 +51,9 @@ impl Executive {
     ) -> Vec<Move> {
         let mut place = *at;
         let all = moves.iter().all(|step| {
-            let proved = self.chart.is_proved(&place, step);
-            place = self.chart.end_of(&place, step);
-            proved
+            let cleared = self.transit.is_cleared(&place, step);
+            place = self.transit.end_of(&place, step);
+            cleared
         });
         if all {
             return moves;
@@ -66,7 +66,7 @@ impl Executive {
             })
             .collect();
         if cells.is_empty() {
-            return vec![self.chart.stay(at)];
+            return vec![self.transit.stay(at)];
         }
         events.push(Event::Refused { cells });
         Vec::new()

@@ -17,9 +17,9 @@ use crate::peer::Peer;
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
-use crate::wire::limits::COVER_UNION_MAX_BYTES;
+use crate::wire::limits::COVERED_MAX_BYTES;
 use crate::wire::message::{
-    Beacon, Behaviour, Cover, Finished, MissionStatus, Order, Record, Snapshot, State,
+    Beacon, Behaviour, Bid, Cover, Finished, MissionStatus, Order, Record, State,
 };
 use rand_core::Rng;
 
@@ -38,7 +38,7 @@ pub const MAX_GOSSIP: usize = 20;
 
 /// What is due to be said.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Voice {
+pub(crate) struct Outbound {
     pub heartbeat: u32,
     pub seq: u32,
     pub next_beacon: Time,
@@ -60,20 +60,20 @@ pub(crate) struct Voice {
 }
 
 pub(crate) fn new_life(peer: &mut Peer) {
-    peer.voice.seq = 0;
-    peer.voice.heartbeat = 0;
-    peer.voice.mission_said = None;
-    peer.voice.claim_changed = true;
-    peer.voice.cover_changed = true;
+    peer.outbound.seq = 0;
+    peer.outbound.heartbeat = 0;
+    peer.outbound.mission_said = None;
+    peer.outbound.claim_changed = true;
+    peer.outbound.cover_changed = true;
 }
 
 pub(crate) fn first_beacon(peer: &mut Peer) {
-    peer.voice.next_beacon = peer.boot.listens_until;
-    peer.voice.next_full = peer.boot.listens_until;
+    peer.outbound.next_beacon = peer.life.listens_until;
+    peer.outbound.next_full = peer.life.listens_until;
 }
 
 fn may_speak(peer: &Peer) -> bool {
-    peer.boot.speaks(peer.now) && !peer.voice.silenced
+    peer.life.speaks(peer.now) && !peer.outbound.silenced
 }
 
 /// Sends what the relay lets go.
@@ -93,36 +93,36 @@ pub(crate) fn send(peer: &mut Peer) {
 }
 
 /// Says whatever is due.
-pub(crate) fn look(peer: &mut Peer) {
+pub(crate) fn tick(peer: &mut Peer) {
     if !may_speak(peer) {
         return;
     }
     let (now, t) = (peer.now, peer.period_ms());
-    if peer.config.role == Role::Ground {
+    if peer.config.role == Role::GroundStation {
         speak_mission(peer);
     }
     let due = |last: Time, periods: u64| now.since_ms(last) >= periods * t;
-    if peer.crew.is_none() {
+    if peer.mission_state.is_none() {
         return;
     }
     if peer.config.role == Role::Uav
-        && ((peer.voice.claim_changed && due(peer.voice.last_claim, 1))
-            || due(peer.voice.last_claim, CLAIM_PERIODS))
+        && ((peer.outbound.claim_changed && due(peer.outbound.last_claim, 1))
+            || due(peer.outbound.last_claim, CLAIM_PERIODS))
     {
         speak_claim(peer);
     }
-    if (peer.voice.cover_changed && due(peer.voice.last_cover, COVER_PERIODS))
-        || (peer.voice.cover_wanted && due(peer.voice.last_cover, 1))
+    if (peer.outbound.cover_changed && due(peer.outbound.last_cover, COVER_PERIODS))
+        || (peer.outbound.cover_wanted && due(peer.outbound.last_cover, 1))
     {
         speak_cover(peer);
     }
-    if due(peer.voice.last_state, STATE_PERIODS) {
+    if due(peer.outbound.last_state, STATE_PERIODS) {
         speak_state(peer);
     }
-    if core::mem::take(&mut peer.voice.finished_due)
-        && let Some(crew) = &peer.crew
+    if core::mem::take(&mut peer.outbound.finished_due)
+        && let Some(mission_state) = &peer.mission_state
     {
-        let revision = crew.revision();
+        let revision = mission_state.revision();
         speak(
             peer,
             Kind::Finished,
@@ -137,11 +137,11 @@ fn speak(peer: &mut Peer, kind: Kind, subject: u16, body: &Body) {
     if !may_speak(peer) {
         return;
     }
-    peer.voice.seq = peer.voice.seq.saturating_add(1);
+    peer.outbound.seq = peer.outbound.seq.saturating_add(1);
     let record = Record {
         author: peer.config.id.0,
-        incarnation: peer.boot.incarnation,
-        seq: peer.voice.seq,
+        incarnation: peer.life.incarnation,
+        seq: peer.outbound.seq,
         kind: kind.number(),
         subject,
         body: codec::encode_body(body),
@@ -153,31 +153,31 @@ fn speak(peer: &mut Peer, kind: Kind, subject: u16, body: &Body) {
 
 /// The own section, as a claim.
 pub(crate) fn speak_claim(peer: &mut Peer) {
-    let Some(crew) = &peer.crew else {
+    let Some(mission_state) = &peer.mission_state else {
         return;
     };
     if peer.config.role != Role::Uav || !may_speak(peer) {
         return;
     }
-    let register = crew.register();
-    let section = &crew.negotiation.section;
-    let take = section
+    let claim = mission_state.claim();
+    let sections = &mission_state.negotiation.sections;
+    let take = sections
         .plan()
         .iter()
         .map(|p| p.stamp.take)
         .max()
         .unwrap_or(0);
-    let report = Report::Register {
-        counter: register.epoch.counter,
-        epoch: register.epoch.hash,
+    let report = Report::Claim {
+        counter: claim.epoch.counter,
+        epoch: claim.epoch.hash,
         take,
-        legs: crate::cooperation::legs_of(section.plan(), section.cells()),
-        held: section.held().keys().copied().collect(),
-        eta_ms: register.eta_ms,
+        legs: crate::cooperation::legs_of(sections.plan(), sections.cells()),
+        held: sections.held().keys().copied().collect(),
+        eta_ms: claim.eta_ms,
     };
-    peer.voice.claim_changed = false;
-    peer.voice.last_claim = jittered(peer);
-    speak(peer, Kind::Claim, 0, &Body::Claim(register));
+    peer.outbound.claim_changed = false;
+    peer.outbound.last_claim = jittered(peer);
+    speak(peer, Kind::Claim, 0, &Body::Claim(claim));
     peer.report(report);
 }
 
@@ -189,35 +189,35 @@ fn jittered(peer: &mut Peer) -> Time {
 }
 
 fn speak_cover(peer: &mut Peer) {
-    let Some(crew) = &peer.crew else {
+    let Some(mission_state) = &peer.mission_state else {
         return;
     };
     let cover = Cover {
-        revision: crew.revision(),
-        loop_hash: crew.loop_hash(),
-        union: crew.union().encode_rle(Some(COVER_UNION_MAX_BYTES)),
+        revision: mission_state.revision(),
+        loop_hash: mission_state.loop_hash(),
+        covered: mission_state.covered().encode_rle(Some(COVERED_MAX_BYTES)),
     };
-    peer.voice.cover_changed = false;
-    peer.voice.cover_wanted = false;
-    peer.voice.last_cover = jittered(peer);
+    peer.outbound.cover_changed = false;
+    peer.outbound.cover_wanted = false;
+    peer.outbound.last_cover = jittered(peer);
     speak(peer, Kind::Cover, 0, &Body::Cover(cover));
 }
 
 fn speak_state(peer: &mut Peer) {
-    let ground = peer.config.role == Role::Ground;
+    let ground = peer.config.role == Role::GroundStation;
     let (behaviour, mission, covered, cells) =
-        peer.crew
+        peer.mission_state
             .as_ref()
             .map_or((Behaviour::Waiting, MissionStatus::None, 0, 0), |c| {
                 (
                     c.behaviour(),
                     c.status(),
-                    c.union().count(),
-                    c.union().len(),
+                    c.covered().count(),
+                    c.covered().capacity(),
                 )
             });
     let p = peer.percept;
-    peer.voice.last_state = jittered(peer);
+    peer.outbound.last_state = jittered(peer);
     let state = State {
         east_mm: p.map_or(0, |p| mm(p.pose.east_m)),
         north_mm: p.map_or(0, |p| mm(p.pose.north_m)),
@@ -234,16 +234,16 @@ fn speak_state(peer: &mut Peer) {
 }
 
 /// A bid that is durable.
-pub(crate) fn speak_bid(peer: &mut Peer, snapshot: &Snapshot) {
-    speak(peer, Kind::Round, 0, &Body::Round(snapshot.clone()));
+pub(crate) fn speak_bid(peer: &mut Peer, bid: &Bid) {
+    speak(peer, Kind::Bid, 0, &Body::Bid(bid.clone()));
 }
 
 /// The operator's standing order.
 pub(crate) fn speak_order(peer: &mut Peer, order: Order) {
     speak(peer, Kind::Operator, 0, &Body::Operator(order));
-    peer.order = crate::peer::Ordered {
+    peer.order = crate::peer::StandingOrder {
         order,
-        version: (peer.boot.incarnation, peer.voice.seq, peer.config.id.0),
+        version: (peer.life.incarnation, peer.outbound.seq, peer.config.id.0),
     };
 }
 
@@ -253,10 +253,10 @@ pub(crate) fn speak_mission(peer: &mut Peer) {
         return;
     };
     let hash = mission.content_hash();
-    if !may_speak(peer) || peer.voice.mission_said == Some(hash) {
+    if !may_speak(peer) || peer.outbound.mission_said == Some(hash) {
         return;
     }
-    peer.voice.mission_said = Some(hash);
+    peer.outbound.mission_said = Some(hash);
     for (i, chunk) in crate::mission::chunks(&mission).into_iter().enumerate() {
         let subject = u16::try_from(i).unwrap_or(u16::MAX);
         speak(peer, Kind::Mission, subject, &Body::Mission(chunk));
@@ -273,66 +273,66 @@ fn e4(rad: f64) -> i32 {
 /// these carry no gossip: what is short collides rarely.
 pub(crate) fn refute(peer: &mut Peer) {
     let t = peer.period_ms();
-    peer.voice.suspected_until = peer.now.plus_ms(peer.membership.k2_ms(peer.now));
+    peer.outbound.suspected_until = peer.now.plus_ms(peer.membership.k2_ms(peer.now));
     let spread = u64::from(peer.rng.next_u32()) % (t / 8 + 1);
-    let soonest = peer.voice.last_beacon.plus_ms(t / 4);
+    let soonest = peer.outbound.last_beacon.plus_ms(t / 4);
     let at = peer.now.plus_ms(spread).max(soonest);
-    peer.voice.next_beacon = peer.voice.next_beacon.min(at);
+    peer.outbound.next_beacon = peer.outbound.next_beacon.min(at);
 }
 
 /// A neighbour believes again that this peer lives.
 pub(crate) fn believed(peer: &mut Peer) {
-    if peer.now < peer.voice.suspected_until {
-        peer.voice.suspected_until = peer.now;
-        peer.voice.next_beacon = peer.voice.next_full;
+    if peer.now < peer.outbound.suspected_until {
+        peer.outbound.suspected_until = peer.now;
+        peer.outbound.next_beacon = peer.outbound.next_full;
     }
 }
 
 /// "I am here", with gossip.
 pub(crate) fn beacon(peer: &mut Peer) {
     let t = peer.period_ms();
-    let bare = peer.now < peer.voice.next_full;
+    let bare = peer.now < peer.outbound.next_full;
     let jitter = u64::from(peer.rng.next_u32()) % (t / 5 + 1);
     if !bare {
-        peer.voice.next_full = peer.now.plus_ms(t - t / 10 + jitter);
+        peer.outbound.next_full = peer.now.plus_ms(t - t / 10 + jitter);
     }
-    peer.voice.next_beacon = peer.voice.next_full;
-    if peer.now < peer.voice.suspected_until {
+    peer.outbound.next_beacon = peer.outbound.next_full;
+    if peer.now < peer.outbound.suspected_until {
         let again = peer.now.plus_ms(t / 4 + jitter / 2);
-        peer.voice.next_beacon = peer.voice.next_beacon.min(again);
+        peer.outbound.next_beacon = peer.outbound.next_beacon.min(again);
     }
     if !may_speak(peer) {
         return;
     }
-    peer.voice.heartbeat = peer.voice.heartbeat.saturating_add(1);
-    peer.voice.last_beacon = peer.now;
+    peer.outbound.heartbeat = peer.outbound.heartbeat.saturating_add(1);
+    peer.outbound.last_beacon = peer.now;
     let most = if bare { 0 } else { MAX_GOSSIP };
     let mut gossip = peer.membership.gossip(peer.now, most);
     for g in &mut gossip {
         (g.max_seq, g.digest) = peer.relay.version(g.id, g.incarnation);
     }
     let pose = peer.percept.map(|p| p.pose);
-    let crew = peer.crew.as_ref();
+    let mission_state = peer.mission_state.as_ref();
     let beacon = Beacon {
-        heartbeat: peer.voice.heartbeat,
+        heartbeat: peer.outbound.heartbeat,
         east_mm: pose.map_or(0, |p| mm(p.east_m)),
         north_mm: pose.map_or(0, |p| mm(p.north_m)),
         heading_e4: pose.map_or(0, |p| e4(p.heading_rad)),
-        able: crew.is_some_and(crate::cooperation::Crew::able),
-        ground: peer.config.role == Role::Ground,
-        finished: crew.is_some_and(crate::cooperation::Crew::finished),
-        nonce: peer.boot.nonce,
-        counter: crew.map_or(0, |c| c.negotiation.rounds.counter()),
+        able: mission_state.is_some_and(crate::mission_state::MissionState::able),
+        ground_station: peer.config.role == Role::GroundStation,
+        finished: mission_state.is_some_and(crate::mission_state::MissionState::finished),
+        nonce: peer.life.nonce,
+        counter: mission_state.map_or(0, |c| c.negotiation.rounds.counter()),
         eccentricity: peer.membership.eccentricity(peer.now),
-        revision: crew.map_or(0, crate::cooperation::Crew::revision),
-        loop_hash: crew.map_or(0, crate::cooperation::Crew::loop_hash),
-        cover_digest: crew.map_or(0, |c| c.union().digest()),
+        revision: mission_state.map_or(0, crate::mission_state::MissionState::revision),
+        loop_hash: mission_state.map_or(0, crate::mission_state::MissionState::loop_hash),
+        cover_digest: mission_state.map_or(0, |c| c.covered().digest()),
         gossip,
     };
     let record = Record {
         author: peer.config.id.0,
-        incarnation: peer.boot.incarnation,
-        seq: peer.voice.heartbeat,
+        incarnation: peer.life.incarnation,
+        seq: peer.outbound.heartbeat,
         kind: Kind::Beacon.number(),
         subject: 0,
         body: codec::encode_body(&Body::Beacon(beacon)),

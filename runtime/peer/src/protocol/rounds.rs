@@ -1,22 +1,22 @@
 //! Rounds: how sections are negotiated, from immutable bids alone.
 //!
-//! A round names its members. Each member speaks one snapshot in it; whoever holds
+//! A round names its members. Each member speaks one bid in it; whoever holds
 //! all of them computes the same division, so there is no leader and no vote.
 //!
 //! | state | event | next state | output |
 //! |---|---|---|---|
 //! | any | a higher round that names me | open (that round) | a bid is wanted |
 //! | open | my bid is durable | open | it may be spoken |
-//! | open | a snapshot of this round | open, or complete with the last one | |
-//! | open | a snapshot of a lower round | open | ignored: it is dead |
+//! | open | a bid of this round | open, or complete with the last one | |
+//! | open | a bid of a lower round | open | ignored: it is dead |
 //! | complete | decided | closed | the counter stays |
 //! | any | a round that does not name me | same | only its counter is remembered |
 //!
 //! Rounds are ordered by (counter, number of members, hash of members and ground);
-//! a higher one abandons a lower one, and snapshots of different rounds never mix.
+//! a higher one abandons a lower one, and bids of different rounds never mix.
 
 use crate::wire::Fnv;
-use crate::wire::message::{Epoch, Member, Round, Snapshot};
+use crate::wire::message::{Bid, Epoch, Member, Round};
 use std::collections::BTreeMap;
 use std::hash::Hash;
 
@@ -40,18 +40,18 @@ fn fold(h: u64) -> u32 {
     folded
 }
 
-/// The highest round that names this peer, with the snapshots held.
+/// The highest round that names this peer, with the bids held.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Open {
+pub struct OpenRound {
     /// The round; its waiting time is the longest heard.
     pub round: Round,
-    /// Held snapshots by member, this peer's own only once it is durable.
-    pub snapshots: BTreeMap<u16, Snapshot>,
+    /// Held bids by member, this peer's own only once it is durable.
+    pub bids: BTreeMap<u16, Bid>,
 }
 
-/// What a heard snapshot changed.
+/// What a heard bid changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HeardSnapshot {
+pub enum HeardBid {
     /// Nothing, or only the counter.
     Nothing,
     /// It opened a higher round that names this peer: a bid is wanted.
@@ -65,7 +65,7 @@ pub enum HeardSnapshot {
 pub struct Rounds {
     me: Member,
     counter: u32,
-    open: Option<Open>,
+    open: Option<OpenRound>,
     closed: Option<RoundOrder>,
     silent: BTreeMap<Member, u8>,
 }
@@ -96,45 +96,45 @@ impl Rounds {
 
     /// The open round, if there is one.
     #[must_use]
-    pub fn open(&self) -> Option<&Open> {
+    pub fn open(&self) -> Option<&OpenRound> {
         self.open.as_ref()
     }
 
-    /// A snapshot by its author, who speaks in the given life.
-    pub fn hear(&mut self, author: Member, snapshot: &Snapshot) -> HeardSnapshot {
-        let round = &snapshot.round;
+    /// A bid by its author, who speaks in the given life.
+    pub fn hear(&mut self, author: Member, bid: &Bid) -> HeardBid {
+        let round = &bid.round;
         self.counter = self.counter.max(round.counter);
         if !round.members.contains(&self.me)
             || !round.members.contains(&author)
             || author == self.me
         {
-            return HeardSnapshot::Nothing;
+            return HeardBid::Nothing;
         }
         let order = order_of(round);
         if self.closed.is_some_and(|c| order <= c) {
-            return HeardSnapshot::Nothing;
+            return HeardBid::Nothing;
         }
         match &mut self.open {
             Some(open) if order_of(&open.round) == order => {
                 open.round.wait_ms = open.round.wait_ms.max(round.wait_ms);
                 self.silent.remove(&author);
-                match open.snapshots.entry(author.id) {
-                    std::collections::btree_map::Entry::Occupied(_) => HeardSnapshot::Nothing,
+                match open.bids.entry(author.id) {
+                    std::collections::btree_map::Entry::Occupied(_) => HeardBid::Nothing,
                     std::collections::btree_map::Entry::Vacant(v) => {
-                        v.insert(snapshot.clone());
-                        HeardSnapshot::Added
+                        v.insert(bid.clone());
+                        HeardBid::Added
                     }
                 }
             }
-            Some(open) if order_of(&open.round) > order => HeardSnapshot::Nothing,
+            Some(open) if order_of(&open.round) > order => HeardBid::Nothing,
             _ => {
                 self.silent.remove(&author);
-                let snapshots = BTreeMap::from([(author.id, snapshot.clone())]);
-                self.open = Some(Open {
+                let bids = BTreeMap::from([(author.id, bid.clone())]);
+                self.open = Some(OpenRound {
                     round: round.clone(),
-                    snapshots,
+                    bids,
                 });
-                HeardSnapshot::BidWanted
+                HeardBid::BidWanted
             }
         }
     }
@@ -162,47 +162,47 @@ impl Rounds {
             loss,
             wait_ms,
         };
-        self.open = Some(Open {
+        self.open = Some(OpenRound {
             round,
-            snapshots: BTreeMap::new(),
+            bids: BTreeMap::new(),
         });
     }
 
     /// This peer's own bid is durable. Returns whether it belongs to the open round.
-    pub fn bid(&mut self, snapshot: Snapshot) -> bool {
-        let order = order_of(&snapshot.round);
+    pub fn bid(&mut self, bid: Bid) -> bool {
+        let order = order_of(&bid.round);
         match &mut self.open {
             Some(open) if order_of(&open.round) == order => {
-                open.snapshots.insert(self.me.id, snapshot);
+                open.bids.insert(self.me.id, bid);
                 true
             }
             _ => false,
         }
     }
 
-    /// The open round with all its snapshots, if none is missing, and its epoch.
+    /// The open round with all its bids, if none is missing, and its epoch.
     #[must_use]
-    pub fn complete(&self) -> Option<(Epoch, &Open)> {
+    pub fn complete(&self) -> Option<(Epoch, &OpenRound)> {
         let open = self.open.as_ref()?;
         if open
             .round
             .members
             .iter()
-            .any(|m| !open.snapshots.contains_key(&m.id))
+            .any(|m| !open.bids.contains_key(&m.id))
         {
             return None;
         }
         Some((epoch_of(open), open))
     }
 
-    /// Members of the open round whose snapshot is missing.
+    /// Members of the open round whose bid is missing.
     #[must_use]
     pub fn missing(&self) -> Vec<Member> {
         self.open.as_ref().map_or_else(Vec::new, |open| {
             open.round
                 .members
                 .iter()
-                .filter(|m| !open.snapshots.contains_key(&m.id))
+                .filter(|m| !open.bids.contains_key(&m.id))
                 .copied()
                 .collect()
         })
@@ -242,12 +242,12 @@ impl Rounds {
 pub const SILENT_ROUNDS: u8 = 2;
 
 /// The epoch of a complete round: its counter, then the round's place in the order of
-/// rounds, then the hash of its sorted snapshots, so that of two rounds with one
+/// rounds, then the hash of its sorted bids, so that of two rounds with one
 /// counter the higher one has the higher epoch.
 #[must_use]
-pub fn epoch_of(open: &Open) -> Epoch {
+pub fn epoch_of(open: &OpenRound) -> Epoch {
     let mut h = Fnv::new();
-    for (id, s) in &open.snapshots {
+    for (id, s) in &open.bids {
         (id, order_of(&s.round)).hash(&mut h);
         (
             s.anchor,
@@ -259,7 +259,7 @@ pub fn epoch_of(open: &Open) -> Epoch {
         )
             .hash(&mut h);
         (
-            &s.union,
+            &s.covered,
             &s.commits,
             s.eta_ms,
             s.adopted_ago_ms,
@@ -282,8 +282,8 @@ mod tests {
         Member { id, incarnation: 1 }
     }
 
-    fn snapshot(round: &Round, anchor: u16) -> Snapshot {
-        Snapshot {
+    fn bid(round: &Round, anchor: u16) -> Bid {
+        Bid {
             round: round.clone(),
             anchor,
             backward: false,
@@ -291,7 +291,7 @@ mod tests {
             speed_mmps: 13_000,
             turn_ms: 10_000,
             endurance_ms: 1_000_000,
-            union: Vec::new(),
+            covered: Vec::new(),
             commits: Vec::new(),
             eta_ms: 0,
             adopted_ago_ms: 0,
@@ -319,10 +319,10 @@ mod tests {
             let mut rounds = Rounds::new(member(me), 0);
             let mut wanted = 0;
             for id in order {
-                if rounds.hear(member(id), &snapshot(&r, id)) == HeardSnapshot::BidWanted {
+                if rounds.hear(member(id), &bid(&r, id)) == HeardBid::BidWanted {
                     wanted += 1;
                     assert!(rounds.complete().is_none());
-                    assert!(rounds.bid(snapshot(&r, me)));
+                    assert!(rounds.bid(bid(&r, me)));
                 }
             }
             assert_eq!(wanted, 1);
@@ -335,19 +335,13 @@ mod tests {
     fn a_higher_round_abandons_a_lower_one_for_good() {
         let (low, high) = (round(1, &[1, 2]), round(2, &[1, 2]));
         let mut rounds = Rounds::new(member(1), 0);
-        rounds.hear(member(2), &snapshot(&low, 0));
-        assert_eq!(
-            rounds.hear(member(2), &snapshot(&high, 0)),
-            HeardSnapshot::BidWanted
-        );
+        rounds.hear(member(2), &bid(&low, 0));
+        assert_eq!(rounds.hear(member(2), &bid(&high, 0)), HeardBid::BidWanted);
         assert!(
-            !rounds.bid(snapshot(&low, 1)),
+            !rounds.bid(bid(&low, 1)),
             "a bid for a dead round is not spoken"
         );
-        assert_eq!(
-            rounds.hear(member(2), &snapshot(&low, 0)),
-            HeardSnapshot::Nothing
-        );
+        assert_eq!(rounds.hear(member(2), &bid(&low, 0)), HeardBid::Nothing);
         assert!(rounds.complete().is_none());
     }
 
@@ -360,8 +354,8 @@ mod tests {
         b.start(members, 1, 7, true, 9000);
         let ra = a.open().unwrap().round.clone();
         let rb = b.open().unwrap().round.clone();
-        a.bid(snapshot(&ra, 1));
-        assert_eq!(a.hear(member(2), &snapshot(&rb, 2)), HeardSnapshot::Added);
+        a.bid(bid(&ra, 1));
+        assert_eq!(a.hear(member(2), &bid(&rb, 2)), HeardBid::Added);
         assert!(a.complete().is_some());
         assert_eq!(a.open().unwrap().round.wait_ms, 9000);
     }
@@ -382,7 +376,7 @@ mod tests {
     fn a_round_that_does_not_name_me_only_raises_the_counter() {
         let mut a = Rounds::new(member(1), 0);
         let r = round(9, &[2, 3]);
-        assert_eq!(a.hear(member(2), &snapshot(&r, 0)), HeardSnapshot::Nothing);
+        assert_eq!(a.hear(member(2), &bid(&r, 0)), HeardBid::Nothing);
         assert!(a.open().is_none());
         assert_eq!(a.counter(), 9);
     }

@@ -1,4 +1,4 @@
-//! When the rules of [`super::section`] and [`super::rounds`] are used: the only
+//! When the rules of [`super::sections`] and [`super::rounds`] are used: the only
 //! part of the negotiation that knows time.
 //!
 //! | what is seen | for how long | what follows |
@@ -13,12 +13,12 @@
 //! | cells held | 2 W | they expire |
 
 use super::division::{self, CALM_PERIODS};
-use super::rounds::{HeardSnapshot, Rounds};
-use super::runs::PlanCell;
-use super::section::{Live, Section};
+use super::rounds::{HeardBid, Rounds};
+use super::runs::PlannedCell;
+use super::sections::{LivePeers, Sections};
 use crate::Time;
 use crate::cells::CellSet;
-use crate::wire::message::{Epoch, Member, Snapshot};
+use crate::wire::message::{Bid, Epoch, Member};
 use skein_planning::coverage::area::CoverageLoop;
 use skein_planning::coverage::area::backtracking::{Division, RingCell, Robot};
 use std::collections::BTreeMap;
@@ -31,7 +31,7 @@ pub struct Context<'a> {
     /// Beacon period T, milliseconds.
     pub period_ms: u64,
     /// Peers not believed dead.
-    pub live: &'a Live,
+    pub live: &'a LivePeers,
     /// Planning members, this peer included if it is able; ascending.
     pub members: &'a [Member],
     /// Hop diameter of the component.
@@ -55,7 +55,7 @@ impl Context<'_> {
 
 /// What the negotiation wants done.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Want {
+pub enum Action {
     /// Make a bid for the open round, make it durable, then call
     /// [`Negotiation::bid_is_durable`].
     Bid,
@@ -69,8 +69,8 @@ pub enum Want {
         robots: Vec<Robot>,
     },
     /// Make these takes durable, then call [`Negotiation::take`].
-    Take(Vec<PlanCell>),
-    /// The own register changed: publish it and fly by it.
+    Take(Vec<PlannedCell>),
+    /// The own claim changed: publish it and fly by it.
     Changed,
 }
 
@@ -80,7 +80,7 @@ pub struct Adoption {
     /// The round.
     pub epoch: Epoch,
     /// Committed cells, then the new section, in order of flight.
-    pub plan: Vec<PlanCell>,
+    pub plan: Vec<PlannedCell>,
     /// Cells nobody has the endurance for.
     pub unassigned: Vec<u16>,
     /// Waiting time of the round, milliseconds.
@@ -106,7 +106,7 @@ struct Progress {
 #[derive(Clone, Debug)]
 pub struct Negotiation {
     /// Who has which cells.
-    pub section: Section,
+    pub sections: Sections,
     /// Bids.
     pub rounds: Rounds,
     me: u16,
@@ -134,9 +134,9 @@ impl Negotiation {
     /// Nothing negotiated yet. `base` holds the cells that need no service.
     #[must_use]
     pub fn new(me: Member, base: CellSet, counter: u32) -> Self {
-        let cells = base.len();
+        let cells = base.capacity();
         Self {
-            section: Section::new(me.id, cells, base.clone()),
+            sections: Sections::new(me.id, cells, base.clone()),
             rounds: Rounds::new(me, counter),
             me: me.id,
             base,
@@ -183,9 +183,9 @@ impl Negotiation {
         self.cells_since
     }
 
-    /// A snapshot was heard.
-    pub fn hear_snapshot(&mut self, now: Time, author: Member, snapshot: &Snapshot) {
-        if self.rounds.hear(author, snapshot) == HeardSnapshot::BidWanted {
+    /// A bid was heard.
+    pub fn hear_bid(&mut self, now: Time, author: Member, bid: &Bid) {
+        if self.rounds.hear(author, bid) == HeardBid::BidWanted {
             self.opened(now);
         }
     }
@@ -197,44 +197,44 @@ impl Negotiation {
     }
 
     /// The bid is durable. Returns whether it may still be spoken.
-    pub fn bid_is_durable(&mut self, snapshot: Snapshot) -> bool {
-        self.rounds.bid(snapshot)
+    pub fn bid_is_durable(&mut self, bid: Bid) -> bool {
+        self.rounds.bid(bid)
     }
 
     /// Looks at the time and at what is known, and says what is to be done.
-    pub fn tick(&mut self, ctx: &Context<'_>, coverage_loop: &CoverageLoop) -> Vec<Want> {
-        let mut wants = Vec::new();
-        if self.section.settle(ctx.live) {
-            wants.push(Want::Changed);
+    pub fn tick(&mut self, ctx: &Context<'_>, coverage_loop: &CoverageLoop) -> Vec<Action> {
+        let mut actions = Vec::new();
+        if self.sections.settle(ctx.live) {
+            actions.push(Action::Changed);
         }
         if self.held_until.is_some_and(|t| ctx.now >= t) {
             self.held_until = None;
-            if !self.section.held().is_empty() {
-                self.section.expire_held();
-                wants.push(Want::Changed);
+            if !self.sections.held().is_empty() {
+                self.sections.expire_held();
+                actions.push(Action::Changed);
             }
         }
-        let orphans = self.section.orphans(ctx.live);
+        let orphans = self.sections.orphans(ctx.live);
         self.watch_orphans(ctx, &orphans);
         self.watch_progress(ctx);
-        if ctx.able_since.is_some() && !self.section.complete() {
+        if ctx.able_since.is_some() && !self.sections.complete() {
             self.run_rounds(ctx, &orphans);
             if let Some(take) = self.inherit(ctx, &orphans, coverage_loop) {
-                let taken = self.section.taken(&take);
+                let taken = self.sections.taken(&take);
                 self.take_pending = !taken.is_empty();
                 if self.take_pending {
-                    wants.push(Want::Take(taken));
+                    actions.push(Action::Take(taken));
                 }
             }
         }
         self.loss_seen = false;
         if core::mem::take(&mut self.bid_wanted) && ctx.able_since.is_some() {
-            wants.push(Want::Bid);
+            actions.push(Action::Bid);
         }
         if let Some(divide) = self.divide(coverage_loop) {
-            wants.push(divide);
+            actions.push(divide);
         }
-        wants
+        actions
     }
 
     fn watch_orphans(&mut self, ctx: &Context<'_>, orphans: &CellSet) {
@@ -249,7 +249,7 @@ impl Negotiation {
             self.members = ctx.members.to_vec();
             self.members_since = ctx.now;
         }
-        let idle = self.section.plan().is_empty();
+        let idle = self.sections.plan().is_empty();
         self.idle_since = if idle {
             self.idle_since.or(Some(ctx.now))
         } else {
@@ -340,14 +340,14 @@ impl Negotiation {
         let left: usize = ctx
             .live
             .keys()
-            .map(|id| self.section.plan_of(*id).len())
+            .map(|id| self.sections.plan_of(*id).len())
             .max()
             .unwrap_or(0);
         steady && idle && rested && left > ctx.members.len()
     }
 
     /// Asks for the division of a complete round, once.
-    fn divide(&mut self, coverage_loop: &CoverageLoop) -> Option<Want> {
+    fn divide(&mut self, coverage_loop: &CoverageLoop) -> Option<Action> {
         let (epoch, open) = self.rounds.complete()?;
         if self.dividing.as_ref().is_some_and(|d| d.epoch == epoch) {
             return None;
@@ -357,14 +357,14 @@ impl Negotiation {
             epoch,
             ring: ring.clone(),
         });
-        Some(Want::Divide {
+        Some(Action::Divide {
             epoch,
             ring,
             robots,
         })
     }
 
-    /// The answer to [`Want::Divide`]. Returns what is to be made durable and then
+    /// The answer to [`Action::Divide`]. Returns what is to be made durable and then
     /// given to [`Negotiation::adopt`], unless the round was abandoned meanwhile or
     /// its division is not worth the change.
     pub fn divided(
@@ -380,10 +380,10 @@ impl Negotiation {
             return None;
         }
         let worthwhile = division::worthwhile(open, division, period_ms);
-        let mine = open.snapshots.get(&self.me)?;
-        let committed = division::commits_of(mine, self.section.cells());
+        let mine = open.bids.get(&self.me)?;
+        let committed = division::commits_of(mine, self.sections.cells());
         let commits = self
-            .section
+            .sections
             .plan()
             .iter()
             .filter(|p| committed.contains(p.cell));
@@ -391,7 +391,7 @@ impl Negotiation {
         let section = division::section_of(division, &dividing.ring, self.me);
         let adoption = Adoption {
             epoch,
-            plan: self.section.adopted(epoch, &commits, &section),
+            plan: self.sections.adopted(epoch, &commits, &section),
             unassigned: division.unassigned.clone(),
             wait_ms: open.round.wait_ms,
         };
@@ -403,10 +403,10 @@ impl Negotiation {
 
     /// The adoption is durable: it is the plan from now on.
     pub fn adopt(&mut self, now: Time, adoption: &Adoption) {
-        if !self.section.install(adoption.epoch, &adoption.plan) {
+        if !self.sections.install(adoption.epoch, &adoption.plan) {
             return;
         }
-        self.section.set_unassigned(&adoption.unassigned);
+        self.sections.set_unassigned(&adoption.unassigned);
         self.adopted_at = Some(now);
         self.decided_at = Some(now);
         self.cells_since = 0;
@@ -415,15 +415,15 @@ impl Negotiation {
     }
 
     /// The takes are durable.
-    pub fn take(&mut self, taken: &[PlanCell]) -> usize {
+    pub fn take(&mut self, taken: &[PlannedCell]) -> usize {
         self.take_pending = false;
-        self.section.append(taken)
+        self.sections.append(taken)
     }
 
     /// A new life: ownership of the old one is void, coverage stays.
     pub fn new_life(&mut self, me: Member) {
         self.rounds.set_me(me);
-        self.section.reset_ownership();
+        self.sections.reset_ownership();
         self.dividing = None;
         self.bid_wanted = false;
         self.take_pending = false;
@@ -434,13 +434,13 @@ impl Negotiation {
     fn watch_progress(&mut self, ctx: &Context<'_>) {
         let cell_bound = 12_000 + 2 * u64::from(ctx.diameter) * ctx.period_ms;
         let heard: Vec<(u16, Epoch, u32)> = self
-            .section
+            .sections
             .heard()
             .iter()
-            .map(|(id, h)| (*id, h.register.epoch, h.register.eta_ms))
+            .map(|(id, h)| (*id, h.claim.epoch, h.claim.eta_ms))
             .collect();
         for (id, epoch, eta_ms) in heard {
-            let left = self.section.plan_of(id).len();
+            let left = self.sections.plan_of(id).len();
             let slack = u64::from(eta_ms / 4) + 10 * ctx.period_ms + cell_bound;
             let fresh = Progress {
                 left,
@@ -485,13 +485,13 @@ impl Negotiation {
                 && ctx.live.contains_key(id)
                 && (ctx.now.since_ms(p.since) >= 3 * stalled_ms || ctx.now >= p.bound)
         })?;
-        Some(far_half(&self.section.plan_of(*owner)))
+        Some(far_half(&self.sections.plan_of(*owner)))
     }
 
     /// The run of orphans nearest along the loop to where this peer works.
     fn nearest_run(&self, orphans: &CellSet, lp: &CoverageLoop) -> Option<Vec<(u16, bool)>> {
-        let n = i32::from(self.section.cells());
-        let here = self.section.plan().last().map(|p| i32::from(p.cell));
+        let n = i32::from(self.sections.cells());
+        let here = self.sections.plan().last().map(|p| i32::from(p.cell));
         let here = here.unwrap_or_else(|| {
             let members = lp.len() as u64;
             i32::try_from(u64::from(self.me) * 7919 % members.max(1)).unwrap_or(0)
@@ -521,7 +521,7 @@ impl Negotiation {
 }
 
 /// The second half of an owner's plan, from its far end.
-fn far_half(plan: &[PlanCell]) -> Vec<(u16, bool)> {
+fn far_half(plan: &[PlannedCell]) -> Vec<(u16, bool)> {
     plan.iter()
         .skip(plan.len() / 2)
         .rev()

@@ -10,7 +10,7 @@
 //! What a leg costs is told in metres: of the way through the air for time, over the
 //! ground for distance, of cruise for energy.
 
-use super::chart::Chart;
+use super::transit::Transit;
 use skein_planning::coverage::area::Direction;
 use skein_planning::frame::{Point, Pose};
 use skein_planning::math::{TAU, atan2, wrap_pi};
@@ -30,9 +30,9 @@ const TURNING: f64 = 0.9;
 /// missed by a few percent of a turn's time.
 const COURSES: u8 = 16;
 
-impl Chart {
+impl Transit {
     /// A clear way between two poses that look along their courses, the cheapest found.
-    pub(super) fn leg(&self, from: Pose, to: Pose) -> Result<Curve, RouteError> {
+    pub(super) fn transfer(&self, from: Pose, to: Pose) -> Result<Curve, RouteError> {
         let over_ground = self.router.route(from, to);
         if self.is_shortest_best() {
             return over_ground;
@@ -40,8 +40,8 @@ impl Chart {
         self.cheaper(self.through_air(from, to), over_ground)
     }
 
-    /// As [`Chart::leg`], with any course at the end.
-    pub(super) fn leg_to_point(&self, from: Pose, to: Point) -> Result<Curve, RouteError> {
+    /// As [`Transit::transfer`], with any course at the end.
+    pub(super) fn transfer_to_point(&self, from: Pose, to: Point) -> Result<Curve, RouteError> {
         let over_ground = self.router.route_to_point(from, to);
         if self.is_shortest_best() {
             return over_ground;
@@ -157,8 +157,8 @@ mod tests {
     use skein_planning::math::{PI, cos, sin};
     use skein_planning::trajectory::wind::Wind;
 
-    /// A chart in a wind of `share` of what the turns of the mission allow.
-    fn chart(zones: Vec<Polygon>, share: f64, towards_rad: f64, objective: Objective) -> Chart {
+    /// A transit in a wind of `share` of what the turns of the mission allow.
+    fn transit(zones: Vec<Polygon>, share: f64, towards_rad: f64, objective: Objective) -> Transit {
         let (coverage_loop, router) = ground(8, 6, zones);
         let a = airframe();
         let radius_m = router.limits().turn_radius_m;
@@ -166,9 +166,9 @@ mod tests {
         let wind_mps = share * (most_mps - a.least_airspeed_mps());
         let wind = Wind::new(wind_mps * cos(towards_rad), wind_mps * sin(towards_rad));
         let airspeed_mps = Air::airspeed_for_turns_mps(&a, wind, radius_m);
-        let mut chart = Chart::new(coverage_loop, router, a).with_objective(objective);
-        chart.breathe(Air { wind, airspeed_mps });
-        chart
+        let mut transit = Transit::new(coverage_loop, router, a).with_objective(objective);
+        transit.set_air(Air { wind, airspeed_mps });
+        transit
     }
 
     /// The least distance of a curve from the zones by places a decimetre apart, metres.
@@ -193,9 +193,9 @@ mod tests {
     }
 
     /// The largest distance from a curve that is flown by percepts every 200 ms, metres.
-    fn strayed_m(chart: &Chart, curve: &Curve) -> f64 {
-        let air = *chart.air();
-        let limit = chart.airframe.max_turn_rate_radps(air.airspeed_mps);
+    fn strayed_m(transit: &Transit, curve: &Curve) -> f64 {
+        let air = *transit.air();
+        let limit = transit.airframe.max_turn_rate_radps(air.airspeed_mps);
         let start = curve.start().unwrap();
         let heading = air
             .wind
@@ -226,23 +226,23 @@ mod tests {
             from in (0.0f64..380.0, 0.0f64..280.0, -3.1f64..3.1), to in (0.0f64..380.0, 0.0f64..280.0, -3.1f64..3.1),
         ) {
             let zones: Vec<Polygon> = blocks.iter().map(|&(x, y, w, h)| rectangle(x, y, w, h)).collect();
-            let chart = chart(zones.clone(), share, towards, objective);
+            let transit = transit(zones.clone(), share, towards, objective);
             let pose = |(x, y, rad): (f64, f64, f64)| Pose::new(Point::new(x, y), rad);
             let (from, to) = (pose(from), pose(to));
-            let plain = chart.router.route(from, to);
-            let leg = chart.leg(from, to);
+            let plain = transit.router.route(from, to);
+            let leg = transit.transfer(from, to);
             prop_assert!(leg.is_ok() || plain.is_err());
-            let any = chart.leg_to_point(from, to.position());
+            let any = transit.transfer_to_point(from, to.position());
             for curve in [&leg, &any].into_iter().flatten() {
                 prop_assert!(sampled_m(curve, &zones) > CLEARANCE_M - 1e-3);
                 prop_assert!((curve.end().unwrap().position() - to.position()).norm() < 0.01);
                 prop_assert!(curve.largest_gap_m() < 1e-3);
-                let strayed_m = strayed_m(&chart, curve);
+                let strayed_m = strayed_m(&transit, curve);
                 prop_assert!(strayed_m < 1.0, "{strayed_m}");
             }
             if let (Ok(leg), Ok(plain)) = (&leg, &plain) {
                 // Lines and arcs cost what the trochoid does but for what they cut.
-                prop_assert!(chart.cost_m(leg) <= chart.cost_m(plain) * 1.0002 + 0.02);
+                prop_assert!(transit.cost_m(leg) <= transit.cost_m(plain) * 1.0002 + 0.02);
                 prop_assert!(wrap_pi(leg.end().unwrap().heading_rad - to.heading_rad).abs() < 1e-3);
             }
         }
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn turning_with_the_air_saves_time_and_each_objective_gets_its_own() {
         let charts = [Objective::Time, Objective::Distance, Objective::Energy]
-            .map(|objective| chart(Vec::new(), 1.0, PI / 3.0, objective));
+            .map(|objective| transit(Vec::new(), 1.0, PI / 3.0, objective));
         let from = Pose::new(Point::new(0.0, 0.0), 0.0);
         let mut sums = [[0.0; 3]; 4];
         for i in 0..200 {
@@ -259,7 +259,7 @@ mod tests {
             let away_m = 30.0 + f64::from(i % 20) * 12.0;
             let at = Point::new(away_m * cos(angle_rad), away_m * sin(angle_rad));
             let to = Pose::new(at, wrap_pi(heading_rad));
-            let legs = charts.each_ref().map(|c| c.leg(from, to).unwrap());
+            let legs = charts.each_ref().map(|c| c.transfer(from, to).unwrap());
             let plain = charts[0].router.route(from, to).unwrap();
             for (sum, leg) in sums.iter_mut().zip(legs.iter().chain([&plain])) {
                 for (total, c) in sum.iter_mut().zip(&charts) {
@@ -279,11 +279,11 @@ mod tests {
 
     #[test]
     fn a_wind_from_any_side_is_turned_round_in_within_what_is_told() {
-        let c = chart(Vec::new(), 0.8, 1.0, Objective::Time);
+        let c = transit(Vec::new(), 0.8, 1.0, Objective::Time);
         let told_s = c.turn_round_s();
         for i in 0..24 {
             let from = Pose::new(Point::new(0.0, 0.0), f64::from(i) * 0.26);
-            let leg = c.leg(from, from.reversed()).unwrap();
+            let leg = c.transfer(from, from.reversed()).unwrap();
             let took_s = c.air().air_length_m(&leg) / c.air().airspeed_mps;
             assert!(took_s < told_s + 0.3, "{took_s} {told_s}");
         }

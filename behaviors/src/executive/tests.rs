@@ -84,7 +84,7 @@ impl Story {
             if let Event::Seen(cells) = e {
                 for id in cells {
                     self.assert_truly_seen(*id);
-                    let i = self.executive.chart.coverage_loop.index_of(*id).unwrap();
+                    let i = self.executive.transit.coverage_loop.index_of(*id).unwrap();
                     self.open[usize::from(i)] = false;
                 }
             }
@@ -302,7 +302,7 @@ fn a_cell_without_its_proof_is_refused_and_not_flown() {
     let mut story = Story::new(10, 8, vec![], outside());
     let zones = vec![square(186.0, 138.0, 60.0)];
     let (_, router) = ground(10, 8, zones.clone());
-    let blind = Arc::clone(&story.executive.chart.coverage_loop);
+    let blind = Arc::clone(&story.executive.transit.coverage_loop);
     story.executive = Executive::new(airframe(), 90.0, blind, router);
     story.zones = zones;
     story.step(200);
@@ -409,7 +409,7 @@ fn a_cell_that_cannot_be_reached_is_refused_and_the_rest_flown() {
 #[test]
 fn a_cell_that_the_camera_never_sees_is_refused_after_three_tries() {
     let mut story = Story::new(6, 6, vec![], outside());
-    story.executive.chart.airframe.footprint_along_m = 20.0;
+    story.executive.transit.airframe.footprint_along_m = 20.0;
     story.step(200);
     story.legs(&[(3, 1, Forward)]);
     story.until_done(300);
@@ -482,7 +482,7 @@ fn forecasts_come_true() {
                 later.step(0);
             }
         }
-        let anchor = later.executive.chart.place(f.anchor, f.heading).pose;
+        let anchor = later.executive.transit.place(f.anchor, f.heading).pose;
         let off_m = (later.wing.pose.position() - anchor.position()).norm();
         assert!(off_m < 0.5, "{f:?}: {off_m}");
         assert!(
