@@ -2,7 +2,7 @@
 
 use crate::{cli, exit};
 use clap::{Args, Subcommand, ValueEnum};
-use skein_broker::control::{OrderName, Request, ask};
+use skein_broker::control::{Request, ask};
 use skein_broker::registry;
 use skein_netsim::fault::{Fault, TimedFault};
 use std::path::PathBuf;
@@ -118,7 +118,7 @@ pub enum OrderArg {
     ReturnToBase,
 }
 
-impl From<OrderArg> for OrderName {
+impl From<OrderArg> for skein_behaviors::Order {
     fn from(order: OrderArg) -> Self {
         match order {
             OrderArg::Resume => Self::Resume,

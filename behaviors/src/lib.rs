@@ -5,12 +5,14 @@
 //! |---|---|
 //! | [`percept`] | what a UAV senses |
 //! | [`setpoint`] | what it is told to fly |
+//! | [`order`] | what the operator wants of all |
 //! | [`event`] | what the executive layer reports upwards |
 //! | [`executive`] | a plan on the coverage loop, flown leg by leg |
 //! | [`reactive`] | path following, and the envelope that has the last word |
 
 pub mod event;
 pub mod executive;
+pub mod order;
 pub mod percept;
 pub mod reactive;
 pub mod setpoint;
@@ -19,5 +21,6 @@ mod testing;
 
 pub use event::Event;
 pub use executive::{Executive, Forecast, Goal, View};
+pub use order::Order;
 pub use percept::Percept;
 pub use setpoint::{Setpoint, Side, Steer};

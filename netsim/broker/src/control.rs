@@ -2,7 +2,7 @@
 
 use crate::registry::Entry;
 use serde::{Deserialize, Serialize};
-use skein_link::frame::Order;
+use skein_behaviors::Order;
 use skein_netsim::fault::{Fault, TimedFault};
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -29,29 +29,7 @@ pub enum Request {
     /// The same, later: times count from now.
     Later(Vec<TimedFault>),
     /// The operator wants something.
-    Order(OrderName),
-}
-
-/// An operator's order, as it is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum OrderName {
-    /// Carry on.
-    Resume,
-    /// Loiter where you are.
-    Hold,
-    /// Come home.
-    ReturnToBase,
-}
-
-impl From<OrderName> for Order {
-    fn from(name: OrderName) -> Self {
-        match name {
-            OrderName::Resume => Self::Resume,
-            OrderName::Hold => Self::Hold,
-            OrderName::ReturnToBase => Self::ReturnToBase,
-        }
-    }
+    Order(Order),
 }
 
 /// What a trial answers: lines for a person, or why it did nothing.
@@ -245,7 +223,7 @@ mod tests {
         );
         let stranger = ask(&entry(address, "guess"), kill).await.unwrap_err();
         assert!(matches!(stranger, AskError::Refused(..)));
-        let refused = ask(&entry(address, "secret"), Request::Order(OrderName::Hold))
+        let refused = ask(&entry(address, "secret"), Request::Order(Order::Hold))
             .await
             .unwrap_err();
         assert_eq!(refused.to_string(), "trial t refused: no");

@@ -1,9 +1,10 @@
 //! What peers say on their vehicle streams, taken in.
 
-use crate::control::{Answer, OrderName};
+use crate::control::Answer;
 use crate::member::Computer;
 use crate::stream::{Heard, Line};
 use crate::trial::Trial;
+use skein_behaviors::Order;
 use skein_link::frame::ToWorld;
 use std::net::SocketAddr;
 
@@ -103,7 +104,7 @@ impl Trial<'_> {
     }
 
     /// Passes an operator's order to the ground station.
-    pub(crate) fn order(&mut self, name: OrderName) -> Answer {
+    pub(crate) fn order(&mut self, order: Order) -> Answer {
         let ground = self
             .spec
             .ground
@@ -112,7 +113,7 @@ impl Trial<'_> {
         let line = ground
             .and_then(|m| m.line.as_ref())
             .ok_or("there is no ground station to speak it")?;
-        line.order(name.into());
-        Ok(vec![format!("the ground station says {name:?} to all")])
+        line.order(order);
+        Ok(vec![format!("the ground station says {order:?} to all")])
     }
 }

@@ -7,6 +7,7 @@
 
 use crate::{LinkState, RadioCounters};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+pub use skein_behaviors::Order;
 use skein_behaviors::Percept;
 use skein_behaviors::Setpoint;
 use skein_behaviors::setpoint::MAX_STEPS;
@@ -17,17 +18,6 @@ pub const MAX_FRAME_BYTES: usize = 256 * 1024;
 
 /// Bytes of the length before each frame.
 const LENGTH_BYTES: usize = 4;
-
-/// What an operator at a ground station wants of the whole swarm.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Order {
-    /// Carry on.
-    Resume,
-    /// Loiter where you are.
-    Hold,
-    /// Come home.
-    ReturnToBase,
-}
 
 /// From the world to a node.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -9,7 +9,7 @@ use crate::clock::Clock;
 use crate::journal::Journal;
 use crate::radio::Radio;
 use crate::vehicle::{News, Tick, Vehicle};
-use skein_link::frame::{Order, ToWorld};
+use skein_link::frame::ToWorld;
 use skein_peer::offload::{Job, JobResult, run};
 use skein_peer::{Command, Input, Output, Peer, Time};
 use std::time::{Duration, Instant};
@@ -139,7 +139,9 @@ impl<M: Mind, V: Vehicle> Driver<M, V> {
         match happened {
             Happened::News(News::End) => return false,
             Happened::News(News::Tick(tick)) => self.tick(tick).await,
-            Happened::News(News::Command(order)) => self.step(Input::Command(command(order))).await,
+            Happened::News(News::Command(order)) => {
+                self.step(Input::Command(Command::Order(order))).await
+            }
             Happened::Stored(s) => {
                 self.step(Input::Stored {
                     token: s.token,
@@ -251,13 +253,5 @@ impl<M: Mind, V: Vehicle> Driver<M, V> {
         self.vehicle.tell(ToWorld::Bye).await;
         self.bus.close().await;
         let _ = tokio::task::spawn_blocking(move || self.journal.close()).await;
-    }
-}
-
-fn command(order: Order) -> Command {
-    match order {
-        Order::Resume => Command::Resume,
-        Order::Hold => Command::Hold,
-        Order::ReturnToBase => Command::ReturnToBase,
     }
 }

@@ -3,7 +3,7 @@
 use crate::mission::Mission;
 use crate::offload::JobResult;
 use serde::{Deserialize, Serialize};
-use skein_behaviors::Percept;
+use skein_behaviors::{Order, Percept};
 use std::sync::Arc;
 
 /// The peer's own clock, milliseconds of scenario time since it cares to remember.
@@ -81,10 +81,6 @@ pub enum Input {
 pub enum Command {
     /// Publish a new mission revision.
     Mission(Arc<Mission>),
-    /// Carry on with the mission.
-    Resume,
-    /// Every UAV loiters where it is.
-    Hold,
-    /// Every UAV returns to base and loiters there.
-    ReturnToBase,
+    /// A new standing order for every UAV.
+    Order(Order),
 }

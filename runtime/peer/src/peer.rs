@@ -245,9 +245,7 @@ impl Peer {
                 self.library.offer(mission.clone());
                 outbound::speak_mission(self);
             }
-            Command::Resume => outbound::speak_order(self, Order::Resume),
-            Command::Hold => outbound::speak_order(self, Order::Hold),
-            Command::ReturnToBase => outbound::speak_order(self, Order::ReturnToBase),
+            Command::Order(order) => outbound::speak_order(self, *order),
         }
     }
 

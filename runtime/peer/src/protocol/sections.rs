@@ -77,7 +77,7 @@ impl Sections {
             plan: Vec::new(),
             held: BTreeMap::new(),
             done: CellSet::new(cells),
-            covered: covered,
+            covered,
             unassigned: CellSet::new(cells),
             heard: BTreeMap::new(),
         }

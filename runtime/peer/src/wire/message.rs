@@ -5,6 +5,7 @@
 
 use crate::Incarnation;
 use serde::{Deserialize, Serialize};
+pub use skein_behaviors::Order;
 
 /// The envelope around every body. Relays pass it on unchanged.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -293,17 +294,6 @@ pub struct MissionChunk {
     /// The piece, at most 1,024 bytes of the encoded mission.
     #[serde(with = "serde_bytes")]
     pub bytes: Vec<u8>,
-}
-
-/// What the operator wants of everybody.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Order {
-    /// Carry on.
-    Resume,
-    /// Loiter where you are.
-    Hold,
-    /// Come home.
-    ReturnToBase,
 }
 
 /// "All that can be covered is covered."
