@@ -42,6 +42,7 @@ use skein_behaviors::Setpoint;
 use skein_peer::offload::{Job, JobResult};
 use skein_peer::wire::message::Claim;
 use skein_peer::{Beliefs, Input, Mission, Output, PeerConfig, PeerId, Report, Role};
+use skein_planning::frame::Pose;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -212,6 +213,12 @@ impl Swarm {
     pub fn view(&self, id: u16) -> Option<Beliefs> {
         let sim_peer = &self.peers[self.peer_idx(id)?];
         sim_peer.peer.as_ref().map(skein_peer::Peer::beliefs)
+    }
+
+    /// Where a UAV is; nothing once its airframe is gone.
+    #[must_use]
+    pub fn pose(&self, id: u16) -> Option<Pose> {
+        self.air.percept(id).map(|p| p.pose)
     }
 
     /// The checks so far.
