@@ -3,10 +3,10 @@
 use crate::exit;
 use crate::planner::PlannerArgs;
 use clap::{Args, ValueEnum};
+use skein_flight::coverage::area::CellId;
 use skein_netsim::spec::Spec;
 use skein_netsim::world::Survey;
 use skein_peer::CoverageTask;
-use skein_planning::coverage::area::CellId;
 use skein_scenario::{
     AreaPlanner, Forecast, Overrides, Scenario, ScenarioError, Summary, extent_m, forecast,
     side_by_side, summary,

@@ -4,12 +4,11 @@ use crate::chaos::ChaosArgs;
 use crate::check::CheckArgs;
 use crate::observe::ObserveArgs;
 use crate::peer::PeerArgs;
+use crate::plan::PlanArgs;
 use crate::sim::SimArgs;
 use crate::trial::TrialArgs;
-use crate::{chaos, check, exit, observe, peer, sim, trial};
+use crate::{chaos, check, exit, observe, peer, plan, sim, trial};
 use clap::{Parser, Subcommand};
-use skein_workbench::bench::BenchArgs;
-use skein_workbench::plan::PlanArgs;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
@@ -44,8 +43,6 @@ pub enum Verb {
     Observe(ObserveArgs),
     /// Checks a scenario before it is flown.
     Check(CheckArgs),
-    /// Measures a planner and prints one JSON object.
-    Bench(BenchArgs),
     /// Plans for a person, from files as other programs write them.
     Plan(PlanArgs),
     /// Outlives a trial and ends what it leaves behind.
@@ -76,8 +73,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Chaos(args) => chaos::run(args),
         Verb::Observe(args) => observe::run(args),
         Verb::Check(args) => check::run(args),
-        Verb::Bench(args) => Ok(exit::print(skein_workbench::bench::run(args))),
-        Verb::Plan(args) => Ok(exit::print(skein_workbench::plan::run(args))),
+        Verb::Plan(args) => Ok(exit::print(plan::run(args))),
         Verb::Guard => {
             skein_broker::process::guard();
             Ok(ExitCode::from(exit::OK))

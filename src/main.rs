@@ -6,6 +6,7 @@ mod cli;
 mod exit;
 mod observe;
 mod peer;
+mod plan;
 mod planner;
 mod sim;
 mod trial;

@@ -13,26 +13,59 @@ use std::path::{Path, PathBuf};
 /// For each crate: which of ours it may use, and which others it must not reach,
 /// even through somebody else.
 const RULES: &[(&str, &[&str], &[&str])] = &[
-    ("skein-planning", &[], &["tokio", "zenoh", "rand_core"]),
+    ("skein-geometry", &[], &["tokio", "zenoh", "rand_core"]),
     (
-        "skein-behaviors",
-        &["skein-planning"],
+        "skein-flight",
+        &["skein-geometry"],
         &["tokio", "zenoh", "rand_core"],
     ),
     (
+        "skein-survey",
+        &["skein-geometry", "skein-flight"],
+        &["tokio", "zenoh", "rand_core"],
+    ),
+    (
+        "skein-lab",
+        &["skein-geometry", "skein-flight", "skein-survey"],
+        &["tokio", "zenoh", "rand_core"],
+    ),
+    (
+        "skein-behaviors",
+        &["skein-geometry", "skein-flight"],
+        &["tokio", "zenoh", "rand_core", "skein-survey", "skein-lab"],
+    ),
+    (
         "skein-peer",
-        &["skein-planning", "skein-behaviors"],
-        &["tokio", "zenoh", "skein-netsim"],
+        &["skein-geometry", "skein-flight", "skein-behaviors"],
+        &[
+            "tokio",
+            "zenoh",
+            "skein-netsim",
+            "skein-survey",
+            "skein-lab",
+        ],
     ),
     (
         "skein-link",
-        &["skein-planning", "skein-behaviors"],
-        &["tokio", "zenoh", "skein-netsim"],
+        &["skein-geometry", "skein-flight", "skein-behaviors"],
+        &[
+            "tokio",
+            "zenoh",
+            "skein-netsim",
+            "skein-survey",
+            "skein-lab",
+        ],
     ),
     (
         "skein-interop",
-        &["skein-planning", "skein-peer"],
-        &["tokio", "zenoh", "skein-netsim"],
+        &["skein-geometry", "skein-flight", "skein-peer"],
+        &[
+            "tokio",
+            "zenoh",
+            "skein-netsim",
+            "skein-survey",
+            "skein-lab",
+        ],
     ),
     (
         "skein-netsim",
@@ -40,9 +73,10 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-link",
             "skein-peer",
             "skein-behaviors",
-            "skein-planning",
+            "skein-geometry",
+            "skein-flight",
         ],
-        &["tokio", "zenoh", "skein-node"],
+        &["tokio", "zenoh", "skein-node", "skein-survey", "skein-lab"],
     ),
     (
         "skein-scenario",
@@ -50,19 +84,31 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-netsim",
             "skein-interop",
             "skein-peer",
-            "skein-planning",
+            "skein-geometry",
+            "skein-flight",
         ],
-        &["tokio", "zenoh", "skein-node"],
+        &["tokio", "zenoh", "skein-node", "skein-survey", "skein-lab"],
     ),
     (
-        "skein-workbench",
-        &["skein-planning", "skein-interop"],
+        "skein-bench",
+        &[
+            "skein-geometry",
+            "skein-flight",
+            "skein-survey",
+            "skein-lab",
+            "skein-interop",
+        ],
         &["tokio", "zenoh", "skein-netsim"],
     ),
     (
         "skein-node",
         &["skein-link", "skein-peer", "skein-behaviors"],
-        &["skein-netsim", "skein-scenario"],
+        &[
+            "skein-netsim",
+            "skein-scenario",
+            "skein-survey",
+            "skein-lab",
+        ],
     ),
     (
         "skein-broker",
@@ -72,14 +118,16 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-link",
             "skein-peer",
             "skein-behaviors",
-            "skein-planning",
+            "skein-geometry",
+            "skein-flight",
         ],
-        &["zenoh", "skein-node"],
+        &["zenoh", "skein-node", "skein-survey", "skein-lab"],
     ),
     (
         "skein-tests",
         &[
-            "skein-planning",
+            "skein-geometry",
+            "skein-flight",
             "skein-behaviors",
             "skein-peer",
             "skein-link",
@@ -175,6 +223,13 @@ fn imports_point_from_the_shell_to_the_core() {
 }
 
 #[test]
+fn the_command_carries_no_laboratory() {
+    let reached = reaches(&metadata(), "skein");
+    assert!(reached.contains("skein-survey"), "`plan` is a verb");
+    assert!(!reached.contains("skein-lab") && !reached.contains("skein-bench"));
+}
+
+#[test]
 fn every_package_of_the_workspace_has_a_rule() {
     let metadata = metadata();
     for p in metadata.workspace_packages() {
@@ -236,7 +291,10 @@ fn the_core_asks_neither_clock_nor_chance() {
         "OsRng",
     ];
     for file in sources(&[
-        "planning/src",
+        "planning/geometry/src",
+        "planning/flight/src",
+        "planning/survey/src",
+        "planning/lab/src",
         "behaviors/src",
         "runtime/peer/src",
         "runtime/link/src",

@@ -4,9 +4,9 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use proptest::prelude::*;
+use skein_flight::coverage::area::patch::Patches;
+use skein_geometry::frame::{Point, Vector};
 use skein_peer::CoverageTask;
-use skein_planning::coverage::area::patch::Patches;
-use skein_planning::frame::{Point, Vector};
 use skein_scenario::{
     Overrides, Severity, builtin_files, builtin_text, load_builtin, load_with, parse, parse_with,
 };

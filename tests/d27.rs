@@ -22,7 +22,7 @@ fn all_source() -> String {
         "runtime",
         "netsim",
         "interop",
-        "workbench",
+        "bench",
         "tests",
         "src",
     ]

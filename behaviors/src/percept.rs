@@ -1,7 +1,7 @@
 //! What a UAV senses, from a simulator or an autopilot.
 
 use serde::{Deserialize, Serialize};
-use skein_planning::frame::Pose;
+use skein_geometry::frame::Pose;
 
 /// One reading of all sensors that matter here.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -3,12 +3,12 @@
 use crate::percept::Percept;
 use crate::reactive::follow::fly;
 use crate::setpoint::{Setpoint, Side};
-use skein_planning::airframe::Airframe;
-use skein_planning::coverage::area::{AreaProblem, CoverageLoop};
-use skein_planning::frame::{Point, Pose};
-use skein_planning::geometry::{NoFlyZones, Polygon};
-use skein_planning::math::PI;
-use skein_planning::path::{RouteLimits, Router};
+use skein_flight::airframe::Airframe;
+use skein_flight::coverage::area::{AreaProblem, CoverageLoop};
+use skein_flight::path::{RouteLimits, Router};
+use skein_geometry::frame::{Point, Pose};
+use skein_geometry::math::PI;
+use skein_geometry::{NoFlyZones, Polygon};
 use std::sync::Arc;
 
 /// Lane spacing of all tests, metres.
@@ -71,7 +71,7 @@ pub fn ground(cols: u32, rows: u32, zones: Vec<Polygon>) -> (Arc<CoverageLoop>, 
         footprint_along_m: 36.0,
         tracking_error_m: 2.0,
         launch: Point::new(-30.0, -30.0),
-        tree: skein_planning::coverage::area::Tree::default(),
+        tree: skein_flight::coverage::area::Tree::default(),
     };
     let coverage_loop = CoverageLoop::build(&problem).unwrap();
     let limits = RouteLimits {

@@ -5,9 +5,9 @@
 //! half sides ([`Airframe`]).
 
 use crate::json::{Error, Fields, Node};
-use skein_planning::airframe::Airframe;
-use skein_planning::math::tan;
-use skein_planning::trajectory::timed::Objective;
+use skein_flight::airframe::Airframe;
+use skein_flight::trajectory::timed::Objective;
+use skein_geometry::math::tan;
 
 /// Airspeeds that are accepted, m/s: from a kite to the fastest small jet.
 pub const SPEED_MPS: (f64, f64) = (1.0, 150.0);

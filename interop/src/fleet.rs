@@ -5,8 +5,8 @@
 use crate::airframe::{ENDURANCE_S, FIELD_OF_VIEW_DEG, SPEED_MPS};
 use crate::json::{Document, Error, Fields, Node};
 use crate::place::{LatLon, TooFar, to_plane};
-use skein_planning::frame::{Origin, Point};
-use skein_planning::math::tan;
+use skein_geometry::frame::{Origin, Point};
+use skein_geometry::math::tan;
 use std::collections::BTreeMap;
 
 /// The most UAVs that are planned for.

@@ -1,8 +1,8 @@
 //! Latitude and longitude, and the way from there to a mission's plane (D2.7 §2.2).
-//! Leaves validity of polygons to `skein_planning::geometry`.
+//! Leaves validity of polygons to `skein_geometry`.
 
-use skein_planning::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
-use skein_planning::math::{TAU, cos, sin_cos};
+use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
+use skein_geometry::math::{TAU, cos, sin_cos};
 use thiserror::Error;
 
 /// A point on the WGS84 ellipsoid.

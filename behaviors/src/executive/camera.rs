@@ -7,11 +7,11 @@
 use crate::percept::Percept;
 use crate::reactive::follow::fly;
 use crate::setpoint::Steer;
-use skein_planning::airframe::Airframe;
-use skein_planning::coverage::area::CoverageLoop;
-use skein_planning::coverage::area::patch::frame_holds;
-use skein_planning::frame::Pose;
-use skein_planning::math::wrap_pi;
+use skein_flight::airframe::Airframe;
+use skein_flight::coverage::area::CoverageLoop;
+use skein_flight::coverage::area::patch::frame_holds;
+use skein_geometry::frame::Pose;
+use skein_geometry::math::wrap_pi;
 
 /// Taken off the footprint for rounding, for what a percept's pose may be off, and so
 /// that a cell is in the picture for a stretch of flight, not for an instant only: a

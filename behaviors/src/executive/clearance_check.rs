@@ -9,8 +9,8 @@
 
 use super::transit::{ESCAPE_SLACK_M, Move, Place, Transit};
 use super::{Event, Executive};
-use skein_planning::frame::Pose;
-use skein_planning::trajectory::{Curve, Segment};
+use skein_geometry::frame::Pose;
+use skein_geometry::{Curve, Segment};
 
 impl Transit {
     /// Distance from the zones that a stretch beginning at a pose must keep, metres.

@@ -6,11 +6,11 @@
 use super::transit::{CellVisit, Move, Place};
 use super::{Executive, Forecast, Kind};
 use crate::percept::Percept;
-use skein_planning::coverage::area::Direction;
-use skein_planning::coverage::area::backtracking::Leg;
-use skein_planning::frame::Point;
-use skein_planning::math::{PI, atan2};
-use skein_planning::trajectory::wind::Course;
+use skein_flight::coverage::area::Direction;
+use skein_flight::coverage::area::backtracking::Leg;
+use skein_flight::trajectory::wind::Course;
+use skein_geometry::frame::Point;
+use skein_geometry::math::{PI, atan2};
 use std::collections::VecDeque;
 
 /// Told instead of a time when there is no way: a day, beyond any endurance.

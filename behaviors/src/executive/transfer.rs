@@ -11,13 +11,14 @@
 //! ground for distance, of cruise for energy.
 
 use super::transit::Transit;
-use skein_planning::coverage::area::Direction;
-use skein_planning::frame::{Point, Pose};
-use skein_planning::math::{TAU, atan2, wrap_pi};
-use skein_planning::path::RouteError;
-use skein_planning::trajectory::timed::{Airspeeds, Flight, Objective};
-use skein_planning::trajectory::wind::{Course, Performance, turn_round_s};
-use skein_planning::trajectory::{Curve, Trajectory};
+use skein_flight::coverage::area::Direction;
+use skein_flight::path::RouteError;
+use skein_flight::trajectory::Trajectory;
+use skein_flight::trajectory::timed::{Airspeeds, Flight, Objective};
+use skein_flight::trajectory::wind::{Course, Performance, turn_round_s};
+use skein_geometry::Curve;
+use skein_geometry::frame::{Point, Pose};
+use skein_geometry::math::{TAU, atan2, wrap_pi};
 
 /// Lines and arcs stray at most this from the trochoid that they stand for, metres: a
 /// hundredth of the least tracking error.
@@ -153,9 +154,9 @@ mod tests {
     use crate::reactive::follow::{Track, fly};
     use crate::testing::{CLEARANCE_M, airframe, ground, rectangle};
     use proptest::prelude::*;
-    use skein_planning::geometry::Polygon;
-    use skein_planning::math::{PI, cos, sin};
-    use skein_planning::trajectory::wind::Wind;
+    use skein_flight::trajectory::wind::Wind;
+    use skein_geometry::Polygon;
+    use skein_geometry::math::{PI, cos, sin};
 
     /// A transit in a wind of `share` of what the turns of the mission allow.
     fn transit(zones: Vec<Polygon>, share: f64, towards_rad: f64, objective: Objective) -> Transit {

@@ -5,13 +5,13 @@
 //! the executive's.
 
 use crate::reactive::air::Air;
-use skein_planning::airframe::Airframe;
-use skein_planning::coverage::area::{CoverageLoop, Direction};
-use skein_planning::frame::{Point, Pose};
-use skein_planning::math::TAU;
-use skein_planning::path::{RouteError, Router};
-use skein_planning::trajectory::timed::Objective;
-use skein_planning::trajectory::{Curve, Segment};
+use skein_flight::airframe::Airframe;
+use skein_flight::coverage::area::{CoverageLoop, Direction};
+use skein_flight::path::{RouteError, Router};
+use skein_flight::trajectory::timed::Objective;
+use skein_geometry::frame::{Point, Pose};
+use skein_geometry::math::TAU;
+use skein_geometry::{Curve, Segment};
 use std::collections::VecDeque;
 use std::sync::Arc;
 

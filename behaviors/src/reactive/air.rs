@@ -10,12 +10,13 @@
 
 use super::follow::{CORRECTION_S, HORIZON_S, Offset, Steps, Track, correction};
 use crate::setpoint::Steer;
-use skein_planning::airframe::{Airframe, PowerModel};
-use skein_planning::frame::Pose;
-use skein_planning::math::{TAU, cos, wrap_pi};
-use skein_planning::trajectory::timed::Objective;
-use skein_planning::trajectory::wind::{Course, Heading, Wind};
-use skein_planning::trajectory::{Curve, Trajectory};
+use skein_flight::airframe::{Airframe, PowerModel};
+use skein_flight::trajectory::Trajectory;
+use skein_flight::trajectory::timed::Objective;
+use skein_flight::trajectory::wind::{Course, Heading, Wind};
+use skein_geometry::Curve;
+use skein_geometry::frame::Pose;
+use skein_geometry::math::{TAU, cos, wrap_pi};
 
 /// Winds below this are left to the feedback, m/s: a percent of any airspeed.
 const CALM_MPS: f64 = 0.1;
@@ -202,8 +203,8 @@ mod tests {
     use crate::reactive::follow::fly;
     use crate::testing::airframe;
     use proptest::prelude::*;
-    use skein_planning::frame::Point;
-    use skein_planning::math::{FRAC_PI_2, PI, sin};
+    use skein_geometry::frame::Point;
+    use skein_geometry::math::{FRAC_PI_2, PI, sin};
 
     /// Lanes with quarter turns of 24 m, as on a loop.
     fn lanes(start: Pose) -> Curve {

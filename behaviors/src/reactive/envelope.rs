@@ -14,12 +14,12 @@ use super::air::{self, Air};
 use super::follow::{HORIZON_S, Offset, Track};
 use crate::percept::Percept;
 use crate::setpoint::{MAX_STEPS, Setpoint, Side, Steer};
-use skein_planning::airframe::Airframe;
-use skein_planning::frame::{Point, Pose, Vector};
-use skein_planning::geometry::NoFlyZones;
-use skein_planning::math::{TAU, atan2};
-use skein_planning::trajectory::wind::Wind;
-use skein_planning::trajectory::{Curve, Segment};
+use skein_flight::airframe::Airframe;
+use skein_flight::trajectory::wind::Wind;
+use skein_geometry::NoFlyZones;
+use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::math::{TAU, atan2};
+use skein_geometry::{Curve, Segment};
 use std::sync::Arc;
 
 /// Flown distance after which the zones nearby are gathered anew, metres: some four
@@ -352,7 +352,7 @@ pub fn is_finite(pose: &Pose) -> bool {
 mod tests {
     use super::*;
     use crate::testing::{airframe, percept_at, square};
-    use skein_planning::math::FRAC_PI_2;
+    use skein_geometry::math::FRAC_PI_2;
 
     fn straight(airspeed_mps: f64) -> Setpoint {
         let steps = vec![Steer {
@@ -368,7 +368,7 @@ mod tests {
         }
     }
 
-    fn envelope(zones: Vec<skein_planning::geometry::Polygon>) -> Envelope {
+    fn envelope(zones: Vec<skein_geometry::Polygon>) -> Envelope {
         Envelope::new(airframe(), Arc::new(NoFlyZones::new(zones)), 8.0)
     }
 

@@ -17,9 +17,9 @@
 //! O(pieces within the horizon) a percept, no allocation but the steps.
 
 use crate::setpoint::{MAX_STEPS, Steer};
-use skein_planning::frame::{Point, Pose};
-use skein_planning::math::{TAU, asin, atan2, cos, sin, wrap_pi, wrap_tau};
-use skein_planning::trajectory::{Curve, Segment};
+use skein_geometry::frame::{Point, Pose};
+use skein_geometry::math::{TAU, asin, atan2, cos, sin, wrap_pi, wrap_tau};
+use skein_geometry::{Curve, Segment};
 use std::collections::VecDeque;
 
 /// How far a setpoint reaches, seconds: one second until the airframe's failsafe
@@ -397,7 +397,7 @@ pub fn approach_angle_rad(speed_mps: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_planning::math::FRAC_PI_2;
+    use skein_geometry::math::FRAC_PI_2;
 
     const V: f64 = 13.0;
     const LIMIT: f64 = V / 23.0;

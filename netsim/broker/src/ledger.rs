@@ -416,9 +416,9 @@ pub fn secs(ms: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use skein_flight::coverage::area::Direction;
+    use skein_flight::coverage::area::backtracking::Leg;
     use skein_peer::PeerId;
-    use skein_planning::coverage::area::Direction;
-    use skein_planning::coverage::area::backtracking::Leg;
 
     fn claim(first: u16, count: u16) -> Report {
         let legs = vec![Leg {

@@ -8,13 +8,13 @@
 //!
 //! After the scenario's name or file, a seed may follow.
 
+use skein_flight::coverage::area::CoverageLoop;
+use skein_geometry::Polygon;
+use skein_geometry::frame::Point;
 use skein_netsim::Prepared;
 use skein_netsim::history::What;
 use skein_netsim::swarm::Swarm;
 use skein_peer::Report;
-use skein_planning::coverage::area::CoverageLoop;
-use skein_planning::frame::Point;
-use skein_planning::geometry::Polygon;
 use skein_scenario::Overrides;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;

@@ -8,12 +8,12 @@
 use crate::document::{Fields, Node};
 use crate::error::ScenarioError;
 use crate::flight_model::turning_mps;
+use skein_flight::airframe::Airframe;
+use skein_flight::coverage::area::{CoverageLoop, Direction, Tree};
+use skein_flight::trajectory::timed::Trajectory;
+use skein_flight::trajectory::wind::Wind;
 use skein_peer::mission::Mission;
 use skein_peer::offload::MissionGeometry;
-use skein_planning::airframe::Airframe;
-use skein_planning::coverage::area::{CoverageLoop, Direction, Tree};
-use skein_planning::trajectory::timed::Trajectory;
-use skein_planning::trajectory::wind::Wind;
 use std::sync::Arc;
 
 /// Another tree has to save this share of the energy at least: smaller differences are

@@ -4,16 +4,16 @@
 use crate::error::{Finding, Severity};
 use crate::flight_model::{Pace, return_s, too_windy};
 use crate::resolve::bounds;
+use skein_flight::coverage::area::backtracking::{Division, RingCell, Robot, divide};
+use skein_flight::coverage::area::patch::Patches;
+use skein_flight::coverage::area::{CellId, CoverageLoop, Direction, Grid};
+use skein_geometry::Polygon;
+use skein_geometry::frame::Point;
 use skein_netsim::fault::Fault;
 use skein_netsim::spec::{Spec, UavSpec};
 use skein_peer::Mission;
 use skein_peer::mission::point_m;
 use skein_peer::offload::MissionGeometry;
-use skein_planning::coverage::area::backtracking::{Division, RingCell, Robot, divide};
-use skein_planning::coverage::area::patch::Patches;
-use skein_planning::coverage::area::{CellId, CoverageLoop, Direction, Grid};
-use skein_planning::frame::Point;
-use skein_planning::geometry::Polygon;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Endurance, in flights round the whole loop, below which the death of some UAVs
@@ -443,8 +443,8 @@ pub fn extent_m(spec: &Spec) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use skein_geometry::frame::Pose;
     use skein_netsim::fault::TimedFault;
-    use skein_planning::frame::Pose;
 
     #[test]
     fn cells_are_clipped_by_the_area() {

@@ -5,14 +5,14 @@
 
 use crate::document::Node;
 use crate::error::ScenarioError;
+use skein_flight::airframe::Airframe;
+use skein_flight::coverage::area::{CoverageLoop, Direction};
+use skein_flight::trajectory::Trajectory;
+use skein_flight::trajectory::timed::Objective;
+use skein_flight::trajectory::wind::{Performance, Wind, turn_round_s};
+use skein_geometry::math::sin_cos;
 use skein_netsim::spec::{Spec, UavSpec};
 use skein_peer::mission::point_m;
-use skein_planning::airframe::Airframe;
-use skein_planning::coverage::area::{CoverageLoop, Direction};
-use skein_planning::math::sin_cos;
-use skein_planning::trajectory::Trajectory;
-use skein_planning::trajectory::timed::Objective;
-use skein_planning::trajectory::wind::{Performance, Wind, turn_round_s};
 
 /// The wind as forecasts tell it: where it comes from, and how fast.
 pub(crate) fn wind(node: &Node<'_>) -> Result<Wind, ScenarioError> {

@@ -7,13 +7,13 @@ use crate::choose_tree::loop_energy_s;
 use crate::error::ScenarioError;
 use crate::feasibility::summary;
 use crate::resolve::{Overrides, Scenario, bounds};
+use skein_flight::airframe::Airframe;
+use skein_geometry::Polygon;
+use skein_geometry::frame::Point;
 use skein_netsim::spec::Spec;
 use skein_peer::CoverageTask;
 use skein_peer::mission::point_m;
 use skein_peer::offload::MissionGeometry;
-use skein_planning::airframe::Airframe;
-use skein_planning::frame::Point;
-use skein_planning::geometry::Polygon;
 
 /// Samples along one lane: a point in 36 of a cell decides a tenth of a percent of a
 /// field of 28 cells.

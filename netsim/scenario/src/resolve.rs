@@ -11,14 +11,14 @@ use crate::forecast::AreaPlanner;
 use crate::read::faults::{self, Known, permille};
 use crate::read::fleet::{self, Fleet, word};
 use crate::read::terrain::{self, MAX_HEIGHT_M, Notices, Terrain, position};
+use skein_flight::trajectory::timed::Objective;
+use skein_flight::trajectory::wind::Wind;
+use skein_geometry::frame::{Point, Pose};
+use skein_geometry::{NoFlyZones, Polygon};
 use skein_netsim::spec::{GroundStationSpec, RadioSpec, Spec, UavSpec};
 use skein_peer::mission::{PointMm, mm};
 use skein_peer::offload::MissionGeometry;
 use skein_peer::{CoverageTask, Mission};
-use skein_planning::frame::{Point, Pose};
-use skein_planning::geometry::{NoFlyZones, Polygon};
-use skein_planning::trajectory::timed::Objective;
-use skein_planning::trajectory::wind::Wind;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -333,7 +333,7 @@ fn mission(
         .number(2.0, 5000.0, "metres")?;
     let error_m = lanes.number_or("tracking_error_m", 3.0, 0.0, 1000.0, "metres")?;
     let airframes = || fleet.members.iter().map(|m| &m.airframe);
-    let over = |value: fn(&skein_planning::airframe::Airframe) -> f64| airframes().map(value);
+    let over = |value: fn(&skein_flight::airframe::Airframe) -> f64| airframes().map(value);
     let turn_m = over(|a| a.min_turn_radius_m()).fold(0.0, f64::max);
     if turn_m > spacing_m / 2.0 {
         return Err(lanes.need("spacing_m", "48")?.wrong(format!(

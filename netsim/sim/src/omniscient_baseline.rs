@@ -9,8 +9,8 @@ use crate::fault::{Fault, TimedFault};
 use crate::prepared::Prepared;
 use crate::world::World;
 use skein_behaviors::{Event, Executive, Goal};
+use skein_flight::coverage::area::backtracking::{Leg, RingCell, Robot, divide};
 use skein_peer::offload::MissionGeometry;
-use skein_planning::coverage::area::backtracking::{Leg, RingCell, Robot, divide};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -1,12 +1,12 @@
 //! A scenario with nothing left to resolve: no file names, no units to convert.
 
 use crate::fault::TimedFault;
+use skein_flight::airframe::Airframe;
+use skein_flight::trajectory::timed::Objective;
+use skein_flight::trajectory::wind::Wind;
+use skein_geometry::Polygon;
+use skein_geometry::frame::{Point, Pose};
 use skein_peer::Mission;
-use skein_planning::airframe::Airframe;
-use skein_planning::frame::{Point, Pose};
-use skein_planning::geometry::Polygon;
-use skein_planning::trajectory::timed::Objective;
-use skein_planning::trajectory::wind::Wind;
 use std::sync::Arc;
 
 /// Everything a run needs, besides a seed.

@@ -2,8 +2,8 @@
 
 use crate::{Mission, PeerId};
 use serde::{Deserialize, Serialize};
-pub use skein_planning::airframe::Airframe;
-pub use skein_planning::trajectory::timed::Objective;
+pub use skein_flight::airframe::Airframe;
+pub use skein_flight::trajectory::timed::Objective;
 use std::sync::Arc;
 
 /// What a peer is for.

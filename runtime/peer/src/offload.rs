@@ -2,9 +2,9 @@
 //! computed by the driver with [`run`], answered by an input.
 
 use crate::mission::Mission;
-use skein_planning::coverage::area::CoverageLoop;
-use skein_planning::coverage::area::backtracking::{Division, RingCell, Robot, divide};
-use skein_planning::path::Router;
+use skein_flight::coverage::area::CoverageLoop;
+use skein_flight::coverage::area::backtracking::{Division, RingCell, Robot, divide};
+use skein_flight::path::Router;
 use std::sync::Arc;
 
 /// What every UAV of a mission derives from it: the loop and the routes.

@@ -4,7 +4,7 @@
 use crate::mission::{PointMm, point_m};
 use crate::wire::Fnv;
 use serde::{Deserialize, Serialize};
-use skein_planning::coverage::stations::targets::{LineTarget, PointTarget, Targets};
+use skein_flight::coverage::stations::targets::{LineTarget, PointTarget, Targets};
 
 /// What is to be seen.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

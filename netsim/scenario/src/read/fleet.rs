@@ -5,9 +5,9 @@ use crate::document::{Fields, Node, suggestion};
 use crate::error::ScenarioError;
 use crate::read::terrain::{MAX_HEIGHT_M, position};
 use crate::resolve::Overrides;
-use skein_planning::airframe::Airframe;
-use skein_planning::frame::Pose;
-use skein_planning::math::{FRAC_PI_2, tan, wrap_pi};
+use skein_flight::airframe::Airframe;
+use skein_geometry::frame::Pose;
+use skein_geometry::math::{FRAC_PI_2, tan, wrap_pi};
 
 /// Most UAVs of one scenario: peers are numbered in 16 bits and the simulator is
 /// built for thousands.

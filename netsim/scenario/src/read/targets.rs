@@ -6,13 +6,13 @@ use crate::error::ScenarioError;
 use crate::files::Files;
 use crate::forecast::AreaPlanner;
 use crate::read::terrain::{Notices, position};
+use skein_geometry::Polygon;
+use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Origin, Point, Vector};
 use skein_interop::place::{LatLon, to_plane};
 use skein_interop::targets;
 use skein_peer::CoverageTask;
 use skein_peer::mission::mm;
 use skein_peer::task::{LineTask, PointTask};
-use skein_planning::frame::{MAX_MISSION_RADIUS_M, Origin, Point, Vector};
-use skein_planning::geometry::Polygon;
 
 /// Most pieces that a mission for points or lines may ask for; more would not fit
 /// into what a mission may be spoken in.

@@ -5,13 +5,13 @@ use crate::document::{Fields, Node};
 use crate::error::ScenarioError;
 use crate::files::Files;
 use crate::read::targets;
+use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
+use skein_geometry::{Polygon, PolygonError};
 use skein_interop::geojson::{self, HeightRules};
 use skein_interop::place::{LatLon, Shape, Side, circle_ring, to_plane};
 use skein_interop::plan;
 use skein_netsim::spec::Building;
 use skein_peer::CoverageTask;
-use skein_planning::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
-use skein_planning::geometry::{Polygon, PolygonError};
 
 /// Highest flight level and roof that are accepted, metres: the service ceiling of
 /// small fixed wings with room to spare.

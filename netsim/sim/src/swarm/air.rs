@@ -9,8 +9,8 @@ use crate::radio::{Delivery, Frame, LinkTable, Medium, Overlay};
 use crate::spec::RadioSpec;
 use crate::world::{Fact, World};
 use skein_behaviors::{Percept, Setpoint};
+use skein_flight::coverage::area::CellId;
 use skein_link::Reason;
-use skein_planning::coverage::area::CellId;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

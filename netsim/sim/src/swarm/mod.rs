@@ -39,10 +39,10 @@ use air::Air;
 use queue::{Phase, Queue};
 use sim_peer::{Process, SimPeer};
 use skein_behaviors::Setpoint;
+use skein_geometry::frame::Pose;
 use skein_peer::offload::{Job, JobResult};
 use skein_peer::wire::message::Claim;
 use skein_peer::{Beliefs, Input, Mission, Output, PeerConfig, PeerId, Report, Role};
-use skein_planning::frame::Pose;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -673,7 +673,7 @@ fn snapshot(of: &SimPeer) -> Option<PeerSnapshot> {
 }
 
 /// A pose as one number: millimetres and 1e-7 radians.
-fn quantised(pose: &skein_planning::frame::Pose) -> u64 {
+fn quantised(pose: &skein_geometry::frame::Pose) -> u64 {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

@@ -3,7 +3,7 @@
 use super::*;
 use crate::fault::Fault;
 use crate::world::fixture;
-use skein_planning::trajectory::wind::Wind;
+use skein_flight::trajectory::wind::Wind;
 
 /// The fixture without its zone: every cell of it is on the loop.
 fn prepared(n_uavs: u16) -> Prepared {

@@ -2,8 +2,8 @@
 
 use super::judge::Approach;
 use super::motion::kinematic::Loss;
-use skein_planning::coverage::area::CellId;
-use skein_planning::frame::Point;
+use skein_flight::coverage::area::CellId;
+use skein_geometry::frame::Point;
 
 /// Something that truly happened.
 #[derive(Clone, Copy, Debug, PartialEq)]

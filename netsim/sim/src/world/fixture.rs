@@ -3,12 +3,12 @@
 //! what it is about. Scenario files are read elsewhere.
 
 use crate::spec::{Building, GroundStationSpec, RadioSpec, Spec, StormSpec, UavSpec};
+use skein_flight::airframe::Airframe;
+use skein_geometry::Polygon;
+use skein_geometry::frame::{Point, Pose};
+use skein_geometry::math::{FRAC_PI_2, PI};
 use skein_peer::Mission;
 use skein_peer::mission::PointMm;
-use skein_planning::airframe::Airframe;
-use skein_planning::frame::{Point, Pose};
-use skein_planning::geometry::Polygon;
-use skein_planning::math::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
 /// Width of the area, metres: ten lanes.
@@ -117,8 +117,8 @@ pub fn square(n_uavs: u16) -> Spec {
             position: Point::new(240.0, -30.0),
             height_m: 2.0,
         }),
-        wind: skein_planning::trajectory::wind::Wind::CALM,
-        objective: skein_planning::trajectory::timed::Objective::Time,
+        wind: skein_flight::trajectory::wind::Wind::CALM,
+        objective: skein_flight::trajectory::timed::Objective::Time,
         radio: radio(),
         beacon_period_ms: 1000,
         percept_period_ms: 500,
@@ -158,7 +158,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         task: skein_peer::CoverageTask::Area,
         lap: 0,
         further_laps: 0,
-        tree: skein_planning::coverage::area::Tree::default(),
+        tree: skein_flight::coverage::area::Tree::default(),
     }
 }
 

@@ -2,7 +2,7 @@
 //! (D2.7 §2.3.1). It shares no code with the planner, so that one wrong formula
 //! cannot both plan a path and approve it.
 
-use skein_planning::frame::Point;
+use skein_geometry::frame::Point;
 
 /// An axis-aligned box, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]

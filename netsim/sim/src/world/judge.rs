@@ -9,9 +9,9 @@ use super::motion::Piece;
 use super::obstacles::Place;
 use super::pieces::Pieces;
 use super::survey::Survey;
-use skein_planning::airframe::Airframe;
-use skein_planning::coverage::area::CellId;
-use skein_planning::frame::Pose;
+use skein_flight::airframe::Airframe;
+use skein_flight::coverage::area::CellId;
+use skein_geometry::frame::Pose;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -468,7 +468,7 @@ impl Judge {
 mod tests {
     use super::*;
     use crate::world::fixture::{airframe, polygon, square};
-    use skein_planning::frame::Point;
+    use skein_geometry::frame::Point;
 
     fn piece(x: f64, y: f64, heading: f64, ms: u64, rate: f64) -> Piece {
         Piece {
@@ -481,7 +481,7 @@ mod tests {
             },
             speed_mps: 13.0,
             turn_rate_radps: rate,
-            wind: skein_planning::trajectory::wind::Wind::CALM,
+            wind: skein_flight::trajectory::wind::Wind::CALM,
         }
     }
 

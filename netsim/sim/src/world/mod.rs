@@ -22,8 +22,8 @@ pub use survey::{Cell, Survey, Uncoverable};
 use crate::spec::Spec;
 use motion::{Kinematic, Piece};
 use skein_behaviors::{Percept, Setpoint};
+use skein_flight::coverage::area::patch::Patches;
 use skein_peer::CoverageTask;
-use skein_planning::coverage::area::patch::Patches;
 use std::sync::Arc;
 
 /// The world moves in steps of at most this long, aligned to its multiples, so that
@@ -327,7 +327,7 @@ fn place_of(body: &Kinematic) -> Place {
 mod tests {
     use super::*;
     use skein_behaviors::{Side, Steer};
-    use skein_planning::coverage::area::CellId;
+    use skein_flight::coverage::area::CellId;
 
     fn straight(from_ms: u64) -> Setpoint {
         Setpoint {

@@ -11,7 +11,7 @@ use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vec3;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, TraversalAction};
 use parry3d_f64::query::{Ray, RayCast};
-use skein_planning::frame::Point;
+use skein_geometry::frame::Point;
 
 /// A place in the air or on the ground, metres east, north and above the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]

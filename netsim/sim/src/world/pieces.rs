@@ -2,7 +2,7 @@
 //! picture holds whole (D2.7 §3.3).
 
 use super::flat::Bounds;
-use skein_planning::frame::{Point, Pose};
+use skein_geometry::frame::{Point, Pose};
 use std::collections::BTreeMap;
 
 /// Side of the squares by which pieces are looked up, metres: about as far as a camera

@@ -17,11 +17,11 @@
 use super::flat::{Bounds, area_m2, circle_ring_m, clip, in_ring, point_ring_m, segment_ring_m};
 use super::pieces::Pieces;
 use crate::spec::Spec;
+use skein_flight::coverage::area::CellId;
+use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::math::{PI, sin_cos};
 use skein_peer::CoverageTask;
 use skein_peer::mission::{Mission, point_m};
-use skein_planning::coverage::area::CellId;
-use skein_planning::frame::{Point, Pose, Vector};
-use skein_planning::math::{PI, sin_cos};
 
 /// Headings tried, over half a turn: a pass flown backwards is the same pass.
 const HEADINGS: u32 = 24;

@@ -4,8 +4,8 @@ use super::rounds::OpenRound;
 use super::runs::cells_of;
 use crate::cells::CellSet;
 use crate::wire::message::{Bid, CellRun};
-use skein_planning::coverage::area::backtracking::{Division, RingCell, Robot};
-use skein_planning::coverage::area::{CoverageLoop, Direction};
+use skein_flight::coverage::area::backtracking::{Division, RingCell, Robot};
+use skein_flight::coverage::area::{CoverageLoop, Direction};
 
 /// A division without a loss is adopted only if it ends the work this much sooner:
 /// the new makespan is at most this many percent of the present one.

@@ -19,8 +19,8 @@ use super::sections::{LivePeers, Sections};
 use crate::Time;
 use crate::cells::CellSet;
 use crate::wire::message::{Bid, Epoch, Member};
-use skein_planning::coverage::area::CoverageLoop;
-use skein_planning::coverage::area::backtracking::{Division, RingCell, Robot};
+use skein_flight::coverage::area::CoverageLoop;
+use skein_flight::coverage::area::backtracking::{Division, RingCell, Robot};
 use std::collections::BTreeMap;
 
 /// What the rest of the peer knows that the negotiation needs.

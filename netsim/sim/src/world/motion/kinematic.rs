@@ -6,10 +6,10 @@
 //! from the anchor in closed form, so it does not depend on how often somebody asked.
 
 use skein_behaviors::{Percept, Setpoint, Side};
-use skein_planning::airframe::Airframe;
-use skein_planning::frame::{Point, Pose};
-use skein_planning::math::{FRAC_PI_2, atan2, sin, sin_cos, tan, wrap_pi};
-use skein_planning::trajectory::wind::{Course, Heading, Wind};
+use skein_flight::airframe::Airframe;
+use skein_flight::trajectory::wind::{Course, Heading, Wind};
+use skein_geometry::frame::{Point, Pose};
+use skein_geometry::math::{FRAC_PI_2, atan2, sin, sin_cos, tan, wrap_pi};
 
 /// An airframe that was given no setpoint for this long loiters on its own. Two
 /// percept periods of the slowest sensible peer (500 ms) are lost before it trips.
@@ -447,7 +447,7 @@ mod tests {
     use super::*;
     use crate::world::fixture::airframe;
     use skein_behaviors::Steer;
-    use skein_planning::math::cos;
+    use skein_geometry::math::cos;
 
     fn fresh() -> Kinematic {
         Kinematic::new(

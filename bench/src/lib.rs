@@ -1,0 +1,77 @@
+//! Measurements of the planners: one planner, one set of instances, one JSON object with
+//! errors and times.
+//!
+//! Rival libraries run in the same process under the feature `rivals`.
+
+pub mod cover;
+pub mod cover_exact;
+pub mod cover_loop;
+mod cover_trees;
+pub mod dubins;
+pub mod figures;
+pub mod headings;
+pub mod line;
+pub mod measure;
+pub mod navmesh;
+pub mod offset;
+pub mod route;
+pub mod route_clearance;
+pub mod route_graph;
+pub mod route_maps;
+pub mod route_polygons;
+pub mod stream;
+pub mod wind;
+
+use clap::{Args, Subcommand};
+
+/// What to measure.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// The planner to measure.
+    #[command(subcommand)]
+    pub subject: Subject,
+}
+
+/// The planners.
+#[derive(Debug, Subcommand)]
+pub enum Subject {
+    /// Coverage plans for a team on public grid maps.
+    Cover(cover::CoverArgs),
+    /// Exact coverage of areas with no-fly zones by straight passes.
+    Exact(cover_exact::ExactArgs),
+    /// The loop over all cells of a large map, and its exact division.
+    CoverLoop(cover_loop::CoverLoopArgs),
+    /// Shortest Dubins curves to random goals.
+    Dubins(dubins::DubinsArgs),
+    /// Headings at random waypoints, with a certified gap.
+    Headings(headings::HeadingsArgs),
+    /// Fastest flights in a constant wind.
+    Wind(wind::WindArgs),
+    /// No-fly zones grown by a radius.
+    Offset(offset::OffsetArgs),
+    /// Routes that keep some distance against the route of most distance.
+    Clearance(route_clearance::ClearanceArgs),
+    /// Shortest paths on a mesh or among polygons, against reference lengths.
+    Route(route::RouteArgs),
+    /// Tours of a team along all roads of a network.
+    Line(line::LineArgs),
+}
+
+/// Measures, and returns the JSON text to print.
+///
+/// # Errors
+/// When a file is missing or malformed; the error names the place.
+pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
+    match &args.subject {
+        Subject::Cover(args) => cover::run(args),
+        Subject::Exact(args) => cover_exact::run(args),
+        Subject::CoverLoop(args) => cover_loop::run(args),
+        Subject::Dubins(args) => dubins::run(args),
+        Subject::Headings(args) => headings::run(args),
+        Subject::Wind(args) => wind::run(args),
+        Subject::Offset(args) => offset::run(args),
+        Subject::Clearance(args) => route_clearance::run(args),
+        Subject::Route(args) => route::run(args),
+        Subject::Line(args) => line::run(args),
+    }
+}

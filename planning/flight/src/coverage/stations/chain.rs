@@ -1,0 +1,315 @@
+//! Which pose each station is seen at, and the curves between them: the shortest
+//! closed chain over the poses offered, with the curves checked against the zones only
+//! where the chain runs (D2.7 §2.4.3, §3.4).
+//!
+//! A closed chain is cut open at a station whose pose an open chain has chosen, so the
+//! answer is the shortest through that pose, not always the shortest of all.
+
+use super::Visit;
+use crate::coverage::area::AreaProblem;
+use crate::path::Router;
+use crate::trajectory::dubins;
+use skein_geometry::Curve;
+use skein_geometry::frame::Pose;
+use skein_geometry::math::TAU;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Routes that are searched for one leg; the pairs of poses left over count as
+/// blocked. Each takes up to milliseconds.
+const ROUTES_A_LEG: u8 = 6;
+
+/// Two poses closer than this are the same: what joins them is a full circle.
+const SAME_M: f64 = 1e-2;
+const SAME_RAD: f64 = 1e-3;
+
+/// What is known of flying from one pose to another.
+#[derive(Clone, Debug)]
+enum Leg {
+    /// The shortest Dubins curve, not yet held against the zones.
+    Guess(f64),
+    /// A curve that keeps clear.
+    Clear(Curve),
+    /// None was found.
+    Blocked,
+}
+
+impl Leg {
+    fn cost_m(&self) -> f64 {
+        match self {
+            Self::Guess(m) => *m,
+            Self::Clear(curve) => curve.length_m(),
+            Self::Blocked => f64::INFINITY,
+        }
+    }
+}
+
+/// Stations in order, with the poses they may be seen at.
+pub(super) struct Chain<'a> {
+    problem: &'a AreaProblem,
+    router: &'a Router,
+    stands: Vec<(usize, Vec<Pose>)>,
+    /// By station of departure: poses of departure times poses of arrival.
+    legs: Vec<Vec<Leg>>,
+    routed: Vec<u8>,
+    /// By station: how often a leg from or to it was blocked.
+    blame: BTreeMap<usize, u32>,
+    /// What was left out, with one more chance when the other end of the leg that was
+    /// blocked is left out, too.
+    left: Vec<Left>,
+    /// What came back: the second time it is left out for good.
+    returned: BTreeSet<usize>,
+    /// Where each station stands in the order.
+    rank: BTreeMap<usize, usize>,
+}
+
+/// A station that was left out.
+struct Left {
+    station: usize,
+    stands: Vec<Pose>,
+    other: usize,
+}
+
+impl<'a> Chain<'a> {
+    pub(super) fn new(
+        problem: &'a AreaProblem,
+        router: &'a Router,
+        stands: Vec<(usize, Vec<Pose>)>,
+    ) -> Self {
+        let mut chain = Self {
+            problem,
+            router,
+            legs: Vec::new(),
+            routed: vec![0; stands.len()],
+            blame: BTreeMap::new(),
+            left: Vec::new(),
+            returned: BTreeSet::new(),
+            rank: stands.iter().map(|s| s.0).zip(0..).collect(),
+            stands,
+        };
+        chain.legs = (0..chain.stands.len()).map(|i| chain.guesses(i)).collect();
+        chain
+    }
+
+    /// The stations as they are flown, and the numbers of those that nothing reaches.
+    pub(super) fn solve(mut self) -> (Vec<Visit>, Vec<usize>) {
+        while !self.stands.is_empty() {
+            match self.choose() {
+                Some(poses) => {
+                    if let Some(visits) = self.realise(&poses) {
+                        return (visits, self.left.iter().map(|l| l.station).collect());
+                    }
+                }
+                None => self.give_up(),
+            }
+        }
+        (Vec::new(), self.left.iter().map(|l| l.station).collect())
+    }
+
+    fn next(&self, i: usize) -> usize {
+        (i + 1) % self.stands.len()
+    }
+
+    fn guesses(&self, i: usize) -> Vec<Leg> {
+        let r = self.problem.turn_radius_m;
+        let (from, to) = (&self.stands[i].1, &self.stands[self.next(i)].1);
+        let mut legs = Vec::with_capacity(from.len() * to.len());
+        for &a in from {
+            for &b in to {
+                let length_m = if same(a, b) {
+                    TAU * r
+                } else {
+                    dubins::length_m(a, b, r)
+                };
+                legs.push(Leg::Guess(length_m));
+            }
+        }
+        legs
+    }
+
+    fn leg(&self, i: usize, a: usize, b: usize) -> &Leg {
+        &self.legs[i][a * self.stands[self.next(i)].1.len() + b]
+    }
+
+    /// A pose for each station, or nothing where some leg has no way left.
+    fn choose(&self) -> Option<Vec<usize>> {
+        let n = self.stands.len();
+        // Where the chain is cut open the choice is made by a chain that is open there
+        // and closes half way round.
+        let half = n / 2;
+        let (_, open) = (0..self.stands[half].1.len())
+            .filter_map(|b| self.pass(half, b, false))
+            .min_by(|x, y| x.0.total_cmp(&y.0))
+            .or_else(|| {
+                let starts = 0..self.stands[half].1.len();
+                starts.filter_map(|b| self.pass(half, b, true)).next()
+            })?;
+        let closed = self.pass(0, open[0], true).map(|(_, poses)| poses);
+        closed.or_else(|| {
+            (0..self.stands[0].1.len())
+                .filter_map(|a| self.pass(0, a, true))
+                .min_by(|x, y| x.0.total_cmp(&y.0))
+                .map(|(_, poses)| poses)
+        })
+    }
+
+    /// The shortest chain that begins at pose `a` of station `first` and goes once
+    /// round: back to the same pose when `closed`, else to any.
+    fn pass(&self, first: usize, a: usize, closed: bool) -> Option<(f64, Vec<usize>)> {
+        let n = self.stands.len();
+        let mut cost = vec![f64::INFINITY; self.stands[first].1.len()];
+        cost[a] = 0.0;
+        let mut back: Vec<Vec<usize>> = Vec::with_capacity(n);
+        for step in 0..n {
+            let i = (first + step) % n;
+            let to = self.stands[self.next(i)].1.len();
+            let mut best = vec![(f64::INFINITY, 0); to];
+            for (from, &so_far) in cost.iter().enumerate().filter(|(_, c)| c.is_finite()) {
+                for (b, slot) in best.iter_mut().enumerate() {
+                    let total = so_far + self.leg(i, from, b).cost_m();
+                    if total < slot.0 {
+                        *slot = (total, from);
+                    }
+                }
+            }
+            cost = best.iter().map(|b| b.0).collect();
+            back.push(best.into_iter().map(|b| b.1).collect());
+        }
+        let end = if closed {
+            a
+        } else {
+            (0..cost.len()).min_by(|x, y| cost[*x].total_cmp(&cost[*y]))?
+        };
+        if !cost[end].is_finite() {
+            return None;
+        }
+        let mut poses = vec![0; n];
+        let mut at = end;
+        for step in (0..n).rev() {
+            at = back[step][at];
+            poses[(first + step) % n] = at;
+        }
+        Some((cost[end], poses))
+    }
+
+    /// Holds the legs of a choice against the zones. The curves, or nothing when some
+    /// leg turned out longer than guessed or blocked: then the choice is made again.
+    fn realise(&mut self, poses: &[usize]) -> Option<Vec<Visit>> {
+        let n = self.stands.len();
+        let mut as_guessed = true;
+        for i in 0..n {
+            let (a, b) = (poses[i], poses[self.next(i)]);
+            if let Leg::Guess(guess_m) = *self.leg(i, a, b) {
+                let leg = self.flown(i, a, b);
+                as_guessed &= leg.cost_m() <= guess_m + 1e-6;
+                let at = a * self.stands[self.next(i)].1.len() + b;
+                self.legs[i][at] = leg;
+            }
+        }
+        if !as_guessed {
+            return None;
+        }
+        let visit = |i: usize| match self.leg(i, poses[i], poses[self.next(i)]) {
+            Leg::Clear(onward) => Some(Visit {
+                station: self.stands[i].0,
+                onward: onward.clone(),
+            }),
+            _ => None,
+        };
+        (0..n).map(visit).collect()
+    }
+
+    /// A curve from pose to pose that keeps clear: a Dubins word, else a route round
+    /// the zones.
+    fn flown(&mut self, i: usize, a: usize, b: usize) -> Leg {
+        let r = self.problem.turn_radius_m;
+        let (from, to) = (self.stands[i].1[a], self.stands[self.next(i)].1[b]);
+        if same(from, to) {
+            return [1.0, -1.0]
+                .map(|turn| Curve::from_pieces(from, &[(turn / r, TAU * r)]))
+                .into_iter()
+                .find(|c| self.problem.flyable(c))
+                .map_or(Leg::Blocked, Leg::Clear);
+        }
+        let shortest = dubins::shortest(from, to, r);
+        if self.problem.flyable(&shortest) {
+            return Leg::Clear(shortest);
+        }
+        if self.routed[i] == ROUTES_A_LEG {
+            return Leg::Blocked;
+        }
+        self.routed[i] += 1;
+        self.router
+            .route(from, to)
+            .ok()
+            .filter(|c| self.problem.flyable(c))
+            .map_or(Leg::Blocked, Leg::Clear)
+    }
+
+    /// Leaves out one end of the leg that has the fewest ways left: the one that was in
+    /// the way more often. What was left out because of it comes back, once.
+    fn give_up(&mut self) {
+        let n = self.stands.len();
+        let open = |i: &usize| {
+            let ways = self.legs[*i].iter();
+            ways.filter(|l| l.cost_m().is_finite()).count()
+        };
+        let i = (0..n).min_by_key(open).unwrap_or(0);
+        let (a, b) = (self.stands[i].0, self.stands[self.next(i)].0);
+        for end in [a, b] {
+            *self.blame.entry(end).or_default() += 1;
+        }
+        let (out, other) = if self.blame[&a] > self.blame[&b] {
+            (i, b)
+        } else {
+            (self.next(i), a)
+        };
+        let (station, stands) = self.leave_out(out);
+        let back: Vec<Left>;
+        (back, self.left) = std::mem::take(&mut self.left)
+            .into_iter()
+            .partition(|l| l.other == station && !self.returned.contains(&l.station));
+        for l in back {
+            self.blame.remove(&l.station);
+            self.returned.insert(l.station);
+            self.put_back(l.station, l.stands);
+        }
+        self.left.push(Left {
+            station,
+            stands,
+            other,
+        });
+    }
+
+    fn leave_out(&mut self, i: usize) -> (usize, Vec<Pose>) {
+        let out = self.stands.remove(i);
+        self.legs.remove(i);
+        self.routed.remove(i);
+        let n = self.stands.len();
+        if n > 0 {
+            self.renew((i + n - 1) % n);
+        }
+        out
+    }
+
+    fn put_back(&mut self, station: usize, stands: Vec<Pose>) {
+        let rank = self.rank[&station];
+        let i = self.stands.partition_point(|s| self.rank[&s.0] < rank);
+        self.stands.insert(i, (station, stands));
+        self.legs.insert(i, Vec::new());
+        self.routed.insert(i, 0);
+        let n = self.stands.len();
+        self.renew(i);
+        self.renew((i + n - 1) % n);
+    }
+
+    /// Forgets what is known of a leg whose other end has changed.
+    fn renew(&mut self, i: usize) {
+        self.routed[i] = 0;
+        self.legs[i] = self.guesses(i);
+    }
+}
+
+fn same(a: Pose, b: Pose) -> bool {
+    (a.position() - b.position()).norm() < SAME_M
+        && skein_geometry::math::wrap_pi(a.heading_rad - b.heading_rad).abs() < SAME_RAD
+}

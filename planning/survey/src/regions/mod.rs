@@ -1,0 +1,35 @@
+//! Coverage of a lane-cell map by a team that moves from cell to cell (D2.7 §3.6.2,
+//! 3.6.4–3.6.5): how long it takes at least, and the default planner, in which each UAV
+//! flies a region of its own. The document's own planners stand in `skein-lab`.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`map`] | which cells are free, distances, shortest ways |
+//! | [`plan`] | a task, a plan, and what a plan costs |
+//! | [`bounds`] | how long any plan takes at least |
+//! | [`spanning`] | one closed loop over all cells, from a spanning tree over 2×2 blocks |
+//! | `mend` | cells that a loop leaves out, brought together so that they cost nothing |
+//! | [`partition`] | a connected region for each UAV |
+//! | [`peel`] | work for UAVs that begin close together, farthest first |
+//! | [`search`] | local search over the orders of cells |
+//! | [`improve`] | the default planner |
+//! | [`raster`] | which cells an area becomes |
+//! | [`stream`] | numbers that look random and are the same everywhere |
+//!
+//! Left to others: exact curves, cameras and no-fly zones (`area`).
+
+pub mod bounds;
+mod home;
+pub mod improve;
+pub mod map;
+mod mend;
+pub mod partition;
+pub mod peel;
+pub mod plan;
+pub mod raster;
+pub mod search;
+pub mod spanning;
+pub mod stream;
+
+pub use map::{Cell, LaneMap, MapError, NOWHERE};
+pub use plan::{Plan, Task, TaskError};

@@ -1,0 +1,121 @@
+//! Shortest ways round no-fly zones with clearance, for flights from target to target
+//! (D2.7 §3.4: costs are the lengths of shortest paths between the points).
+//!
+//! Leaves to others: curves, and what a file's zones are.
+
+use anyhow::{Context, Result};
+use skein_flight::path::mesh::Mesh;
+use skein_flight::path::two_point::Search;
+use skein_geometry::frame::Point;
+use skein_geometry::offset::{Grown, Growth, Region, Zone, grow};
+
+/// How far beyond all zones and places the mesh ends, metres: there is room to pass.
+const OUTSKIRTS_M: f64 = 1_000.0;
+
+/// Grown zones and the mesh of what they leave free.
+pub struct Around {
+    grown: Grown,
+    mesh: Option<Mesh>,
+}
+
+impl Around {
+    /// Zones to keep `clearance_m` from, and the places that ways will lead to.
+    ///
+    /// # Errors
+    /// When the clearance is no length or the zones cannot be grown.
+    pub fn new(zones: &[Zone], clearance_m: f64, places: &[Point]) -> Result<Self> {
+        let growth = Growth::new(clearance_m).context("--clearance-m")?;
+        let grown = grow(zones, &growth).context("the no-fly zones cannot be grown")?;
+        let rings: Vec<&[Point]> = grown.regions.iter().flat_map(Region::rings).collect();
+        if rings.is_empty() {
+            return Ok(Self { grown, mesh: None });
+        }
+        let far = |p: &Point| p.coords.amax();
+        let inside = rings.iter().flat_map(|r| r.iter()).chain(places);
+        let half_m = inside.map(far).fold(0.0, f64::max) + OUTSKIRTS_M;
+        let border = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+            .map(|(x, y)| Point::new(x * half_m, y * half_m));
+        let all: Vec<&[Point]> = std::iter::once(border.as_slice()).chain(rings).collect();
+        let mesh = Mesh::from_rings(&all).context("the grown zones have no mesh")?;
+        Ok(Self {
+            grown,
+            mesh: Some(mesh),
+        })
+    }
+
+    /// Whether there is anything to fly round.
+    #[must_use]
+    pub fn is_needed(&self) -> bool {
+        self.mesh.is_some()
+    }
+
+    /// Outlines and holes of the grown zones.
+    #[must_use]
+    pub fn rings(&self) -> Vec<&[Point]> {
+        self.grown.regions.iter().flat_map(Region::rings).collect()
+    }
+
+    /// Whether a place is nearer to a zone than the clearance.
+    #[must_use]
+    pub fn forbids(&self, p: Point) -> bool {
+        self.grown.contains(p)
+    }
+
+    /// Memory for many questions.
+    #[must_use]
+    pub fn asker(&self) -> Asker<'_> {
+        Asker {
+            search: self.mesh.as_ref().map(Search::new),
+        }
+    }
+}
+
+/// Answers questions about ways.
+pub struct Asker<'a> {
+    search: Option<Search<'a>>,
+}
+
+impl Asker<'_> {
+    /// The shortest way, both ends included; `None` when there is none.
+    pub fn way(&mut self, from: Point, to: Point) -> Option<Vec<Point>> {
+        match &mut self.search {
+            Some(search) => search.shortest(from, to),
+            None => Some(vec![from, to]),
+        }
+    }
+
+    /// Whether the straight way keeps the clearance.
+    pub fn is_straight(&mut self, from: Point, to: Point) -> bool {
+        self.way(from, to).is_some_and(|way| way.len() <= 2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ways_lead_round_a_zone_with_clearance() {
+        let square = |half: f64| {
+            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                .map(|(x, y)| Point::new(x * half, y * half))
+                .to_vec()
+        };
+        let zone = Zone {
+            outer: square(50.0),
+            holes: Vec::new(),
+        };
+        let (a, b) = (Point::new(-200.0, 0.0), Point::new(200.0, 0.0));
+        let around = Around::new(&[zone], 10.0, &[a, b]).unwrap();
+        assert!(around.is_needed() && around.forbids(Point::new(55.0, 0.0)));
+        let mut asker = around.asker();
+        let way = asker.way(a, b).unwrap();
+        assert!(way.len() > 2 && !asker.is_straight(a, b));
+        assert!(asker.is_straight(a, Point::new(-200.0, 300.0)));
+        assert_eq!(asker.way(a, Point::new(0.0, 0.0)), None);
+        let free = Around::new(&[], 10.0, &[a, b]).unwrap();
+        assert!(!free.is_needed());
+        assert_eq!(free.asker().way(a, b), Some(vec![a, b]));
+        assert!(Around::new(&[], f64::NAN, &[]).is_err());
+    }
+}

@@ -1,0 +1,264 @@
+//! Lanes for a team of unlike swaths: one width for all, or a section of the area for each
+//! crew of like swath (D2.7 §3.1, §3.6).
+//!
+//! Leaves to [`super::planners`] the flights over a part, and to the caller which UAVs
+//! there are.
+
+use super::flights::{Flight, Flights, Laid, MOST_SAMPLES, covered_share};
+use super::flyers::Flyer;
+use super::objective::Objective;
+use super::planners::{Ground, Job, Part, Planner};
+use anyhow::Result;
+use clap::ValueEnum;
+use serde_json::{Map, Value, json};
+use skein_geometry::Polygon;
+use skein_survey::fleet::sections::{self, Crew, Mate, Outcome, alike, evened, styles};
+
+/// Ways to cut an area that are planned; they are sorted by how much they promise.
+const STYLES: usize = 3;
+
+/// Sections are evened with this part of the steps.
+const EVENING_PART: usize = 8;
+
+/// Samples of the area while plans are only compared.
+const FEW_SAMPLES: f64 = 4_000.0;
+
+/// A section of which next to nothing can be flown counts as if this were done of it.
+const LEAST_DONE: f64 = 0.05;
+
+/// Which lanes are planned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Lanes {
+    /// One width for all: that of the narrowest swath, with the widest turn.
+    Common,
+    /// A section of the area for the UAVs of like swath, with lanes of their own.
+    Sections,
+    /// Both, and the better one is flown.
+    #[default]
+    Best,
+}
+
+/// How thoroughly a plan is made.
+#[derive(Clone, Copy, Debug)]
+pub struct Care {
+    /// Steps of improvement.
+    pub steps: usize,
+    /// Whether it is only compared with others.
+    pub rough: bool,
+}
+
+/// What plans of a team are asked.
+#[derive(Clone, Copy)]
+pub struct Desk<'a> {
+    /// The area.
+    pub ground: &'a Ground<'a>,
+    /// The planner.
+    pub planner: Planner,
+    /// Which lanes.
+    pub lanes: Lanes,
+    /// What is to be least.
+    pub objective: Objective,
+    /// Whether energies are watt-hours.
+    pub in_watt_hours: bool,
+}
+
+impl Desk<'_> {
+    /// The same question for each kind of lanes alone.
+    #[must_use]
+    pub fn kinds(&self) -> Vec<Self> {
+        match self.lanes {
+            Lanes::Best => [Lanes::Common, Lanes::Sections]
+                .map(|lanes| Self { lanes, ..*self })
+                .to_vec(),
+            Lanes::Common | Lanes::Sections => vec![*self],
+        }
+    }
+
+    /// Whether one plan is better than another.
+    #[must_use]
+    pub fn beats(&self, a: &Flights, b: &Flights) -> bool {
+        let worth = |f: &Flights| f.worth(self.in_watt_hours);
+        worth(a).beats(&worth(b), self.objective)
+    }
+
+    /// Plans a team, with all lanes that were asked for.
+    ///
+    /// # Errors
+    /// When there is no plan.
+    pub fn plans(&self, team: &[Flyer], care: Care) -> Result<Vec<Flights>> {
+        let swaths: Vec<f64> = team.iter().map(|f| f.swath_m).collect();
+        let groups = alike(&swaths);
+        let mut plans = Vec::new();
+        if groups.len() < 2 || self.lanes != Lanes::Sections {
+            plans.push(self.common(team, care));
+        }
+        if groups.len() > 1 && self.lanes != Lanes::Common {
+            plans.extend(self.sections(team, &groups, care).map(Ok));
+        }
+        if plans.iter().any(Result::is_ok) {
+            plans.retain(Result::is_ok);
+        }
+        plans.into_iter().collect()
+    }
+
+    /// One width for all.
+    fn common(&self, team: &[Flyer], care: Care) -> Result<Flights> {
+        let part = self.part(&self.ground.site.area, team, care.steps)?;
+        Ok(self.joined(Laid::Common, vec![part], care))
+    }
+
+    fn part(&self, area: &Polygon, crew: &[Flyer], steps: usize) -> Result<Part> {
+        let lane_m = crew.iter().map(|f| f.swath_m).fold(f64::INFINITY, f64::min);
+        let turn_radius_m = crew.iter().map(|f| f.turn_radius_m).fold(0.0, f64::max);
+        let job = Job {
+            area,
+            crew,
+            lane_m,
+            turn_radius_m,
+            steps,
+        };
+        self.ground.plan(self.planner, job)
+    }
+
+    /// A section for each group; nothing when the area cannot be cut for them.
+    fn sections(&self, team: &[Flyer], groups: &[Vec<usize>], care: Care) -> Option<Flights> {
+        let site = self.ground.site;
+        let blocked: Vec<&Polygon> = site.holes.iter().chain(site.zones.zones()).collect();
+        let ground = sections::Ground::new(&site.area, &blocked);
+        let members: Vec<Vec<Flyer>> = groups
+            .iter()
+            .map(|g| g.iter().map(|i| team[*i].clone()).collect())
+            .collect();
+        let crews: Vec<Crew> = members.iter().map(|m| crew(m)).collect();
+        let shares = ground.shares(&crews);
+        let rough = Care {
+            steps: care.steps / EVENING_PART,
+            rough: true,
+        };
+        let (n, rounds) = if care.rough {
+            (1, 1)
+        } else {
+            (STYLES, sections::ROUNDS)
+        };
+        let better = |a: &Cut, b: &Cut| self.beats(&a.flights, &b.flights);
+        let mut best: Option<Cut> = None;
+        for style in styles(&ground, &crews, &shares).iter().take(n) {
+            let plan = |parts: &[Option<Polygon>]| self.outcome(parts, &members, rough);
+            let cut = evened(&ground, &crews, style, &shares, rounds, plan, better);
+            if let Some(cut) = cut
+                && best.as_ref().is_none_or(|b| better(&cut, b))
+            {
+                best = Some(cut);
+            }
+        }
+        let best = best?;
+        if care.rough {
+            return Some(best.flights);
+        }
+        let cut = self.outcome(&best.sections, &members, care)?.plan;
+        Some(cut.flights)
+    }
+
+    /// Plans all sections, each for its crew.
+    fn outcome(
+        &self,
+        sections: &[Option<Polygon>],
+        members: &[Vec<Flyer>],
+        care: Care,
+    ) -> Option<Outcome<Cut>> {
+        let mut parts = Vec::new();
+        let mut times_s = Vec::new();
+        for (section, crew) in sections.iter().zip(members) {
+            let Some(section) = section else {
+                times_s.push(0.0);
+                continue;
+            };
+            let mut part = self.part(section, crew, care.steps).ok()?;
+            times_s.push(part.makespan_s() / part.done_share.max(LEAST_DONE));
+            let names: Vec<&str> = crew.iter().map(|f| f.name.as_str()).collect();
+            let lane_m = part.flights.first().map_or(0.0, |f| f.lane_m);
+            let told = json!({"section": parts.len() + 1, "uavs": names, "lane_m": lane_m});
+            part.shapes.push((section.vertices().to_vec(), told));
+            parts.push(part);
+        }
+        Some(Outcome {
+            times_s,
+            plan: Cut {
+                sections: sections.to_vec(),
+                flights: self.joined(Laid::Sections, parts, care),
+            },
+        })
+    }
+
+    /// Parts as one plan.
+    fn joined(&self, laid: Laid, parts: Vec<Part>, care: Care) -> Flights {
+        let lanes = parts.iter().flat_map(|p| &p.flights).map(|f| f.lane_m);
+        let lane_m = lanes.fold(f64::INFINITY, f64::min);
+        let most = if care.rough {
+            FEW_SAMPLES
+        } else {
+            MOST_SAMPLES
+        };
+        let sees = |p| parts.iter().any(|part| part.sees(p));
+        let wanted = |p| self.ground.wants(p);
+        let share = covered_share(&self.ground.site.area, wanted, lane_m, most, sees);
+        let mut more = Map::new();
+        let (mut flights, mut shapes): (Vec<Flight>, Vec<_>) = (Vec::new(), Vec::new());
+        for part in parts {
+            flights.extend(part.flights);
+            shapes.extend(part.shapes);
+            for (key, value) in part.more {
+                let sum = more.remove(&key).map_or(value.clone(), |v| sum(&v, &value));
+                more.insert(key, sum);
+            }
+        }
+        flights.sort_by_key(|f| f.uav);
+        if laid == Laid::Sections {
+            // What bounds one section says nothing about all.
+            more.remove("lower_bound_s");
+        }
+        Flights {
+            planner: self.planner.name(),
+            laid,
+            flights,
+            covered_share: share,
+            more,
+            shapes,
+        }
+    }
+}
+
+/// An area cut into sections, and the flights over them.
+struct Cut {
+    sections: Vec<Option<Polygon>>,
+    flights: Flights,
+}
+
+fn crew(members: &[Flyer]) -> Crew {
+    let mate = |f: &Flyer| Mate {
+        start: f.start,
+        speed_mps: f.speed_mps,
+        endurance_s: f.endurance_s,
+    };
+    Crew {
+        swath_m: members
+            .iter()
+            .map(|f| f.swath_m)
+            .fold(f64::INFINITY, f64::min),
+        turn_radius_m: members.iter().map(|f| f.turn_radius_m).fold(0.0, f64::max),
+        mates: members.iter().map(mate).collect(),
+    }
+}
+
+/// What two parts tell under one name: numbers add up, facts hold for both; what is not
+/// known of one is not known of both.
+fn sum(a: &Value, b: &Value) -> Value {
+    match (a, b) {
+        (Value::Bool(a), Value::Bool(b)) => json!(*a && *b),
+        (Value::Number(a), Value::Number(b)) => match (a.as_u64(), b.as_u64()) {
+            (Some(a), Some(b)) => json!(a + b),
+            _ => json!(a.as_f64().zip(b.as_f64()).map(|(a, b)| a + b)),
+        },
+        _ => Value::Null,
+    }
+}

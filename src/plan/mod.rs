@@ -1,0 +1,112 @@
+//! `plan`: a plan for a person, from files as other programs write them.
+
+pub mod approximate;
+pub mod around;
+pub mod choice;
+pub mod cover;
+pub mod errands;
+pub mod fleet;
+pub mod flights;
+pub mod flyers;
+pub mod heights;
+pub mod lanes;
+pub mod line;
+mod map;
+mod measure;
+pub mod objective;
+pub mod output;
+pub mod patrol;
+pub mod planners;
+pub mod route;
+pub mod site;
+pub mod tours;
+pub mod visit;
+
+use anyhow::{Context, Result, ensure};
+use clap::{Args, Subcommand};
+use skein_interop::place::LatLon;
+
+/// Why a UAV stays that could take part.
+const NOT_NEEDED: &str = "is not needed, or has not the endurance";
+
+/// What to plan.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// The kind of plan.
+    #[command(subcommand)]
+    pub subject: Subject,
+}
+
+/// The kinds of plans.
+#[derive(Debug, Subcommand)]
+pub enum Subject {
+    /// The shortest way from one place to another round the no-fly zones of a file.
+    Route(route::RouteArgs),
+    /// Flights of a team that cover an area.
+    Cover(cover::CoverArgs),
+    /// Tours of a team along all lines of a file.
+    Line(line::LineArgs),
+    /// Tours of a team over all points of a file.
+    Visit(visit::VisitArgs),
+    /// Points, lines or an area seen again and again by a team.
+    Patrol(patrol::PatrolArgs),
+}
+
+/// Plans, and returns the text to print.
+///
+/// # Errors
+/// When a file is missing or malformed, or there is no such plan; the error names
+/// the place.
+pub fn run(args: &PlanArgs) -> Result<String> {
+    match &args.subject {
+        Subject::Route(args) => route::run(args),
+        Subject::Cover(args) => cover::run(args),
+        Subject::Line(args) => line::run(args),
+        Subject::Visit(args) => visit::run(args),
+        Subject::Patrol(args) => patrol::run(args),
+    }
+}
+
+/// Reads `LAT,LON` in degrees.
+fn lat_lon(text: &str) -> Result<LatLon> {
+    let (lat, lon) = text
+        .split_once(',')
+        .with_context(|| format!("{text:?} is not LAT,LON, for example 47.3975,8.5460"))?;
+    let degrees = |part: &str, what: &str, limit: f64| -> Result<f64> {
+        let n: f64 = part
+            .trim()
+            .parse()
+            .with_context(|| format!("{:?} is no {what} in degrees", part.trim()))?;
+        ensure!(
+            n.abs() <= limit,
+            "a {what} of {n} is beyond {limit} degrees"
+        );
+        Ok(n)
+    };
+    Ok(LatLon {
+        lat_deg: degrees(lat, "latitude", 90.0)?,
+        lon_deg: degrees(lon, "longitude", 180.0)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_a_latitude_and_a_longitude() {
+        let at = lat_lon("-33.5, 151.25").unwrap();
+        assert!((at.lat_deg + 33.5).abs() < 1e-12 && (at.lon_deg - 151.25).abs() < 1e-12);
+        for (bad, says) in [
+            ("33.5", "is not LAT,LON"),
+            ("x,1", "\"x\" is no latitude"),
+            ("1,", "\"\" is no longitude"),
+            ("91,1", "beyond 90"),
+            ("1,181", "beyond 180"),
+            ("NaN,1", "beyond 90"),
+        ] {
+            let error = lat_lon(bad).unwrap_err().to_string();
+            assert!(error.contains(says), "{bad}: {error}");
+        }
+    }
+}
