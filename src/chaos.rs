@@ -1,8 +1,8 @@
 //! `skein chaos`: something goes wrong in a running trial, or is put right.
 
 use crate::{cli, exit};
-use clap::{Args, Subcommand, ValueEnum};
-use skein_broker::control::{Request, ask};
+use clap::{Args, Subcommand};
+use skein_broker::control::{Request, command};
 use skein_broker::registry;
 use skein_netsim::fault::{Fault, TimedFault};
 use std::path::PathBuf;
@@ -95,37 +95,11 @@ pub enum What {
         #[arg(value_parser = percent)]
         percent: f64,
     },
-    /// The operator, at the ground station's console, wants something of all UAVs.
-    Order {
-        /// What.
-        order: OrderArg,
-    },
     /// The faults of a file happen, at their times from now on.
     Plan {
         /// A list of faults as in a scenario; see `configs/chaos/`.
         file: PathBuf,
     },
-}
-
-/// What an operator may want.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum OrderArg {
-    /// Carry on with the mission.
-    Resume,
-    /// Loiter where you are.
-    Hold,
-    /// Come home and loiter there.
-    ReturnToBase,
-}
-
-impl From<OrderArg> for skein_behaviors::Order {
-    fn from(order: OrderArg) -> Self {
-        match order {
-            OrderArg::Resume => Self::Resume,
-            OrderArg::Hold => Self::Hold,
-            OrderArg::ReturnToBase => Self::ReturnToBase,
-        }
-    }
 }
 
 /// Peers that stay together.
@@ -175,7 +149,7 @@ pub fn run(args: &ChaosArgs) -> anyhow::Result<ExitCode> {
     };
     let runtime = cli::runtime()?;
     for request in requests {
-        match runtime.block_on(ask(&trial, request)) {
+        match runtime.block_on(command(&trial, &request)) {
             Ok(lines) => lines.iter().for_each(|line| println!("{line}")),
             Err(error) => {
                 eprintln!("error: {error}");
@@ -193,9 +167,6 @@ fn requests(args: &ChaosArgs) -> Result<Vec<Request>, (u8, String)> {
             Ok(faults) => Ok(vec![Request::Later(faults)]),
             Err(error) => Err((exit::CONFIG_INVALID, error.to_string())),
         };
-    }
-    if let What::Order { order } = args.what {
-        return Ok(vec![Request::Order(order.into())]);
     }
     let fault = fault(&args.what).ok_or((exit::USAGE, "nothing to do".to_owned()))?;
     let mut requests = vec![Request::Fault(fault.clone())];
@@ -237,7 +208,7 @@ fn fault(what: &What) -> Option<Fault> {
         What::Loss { percent } => Fault::Loss {
             permille: (percent * 10.0).round() as u16,
         },
-        What::Order { .. } | What::Plan { .. } => return None,
+        What::Plan { .. } => return None,
     })
 }
 

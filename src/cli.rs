@@ -2,12 +2,13 @@
 
 use crate::chaos::ChaosArgs;
 use crate::check::CheckArgs;
+use crate::console::{MissionArgs, OrderArgs};
 use crate::observe::ObserveArgs;
 use crate::peer::PeerArgs;
 use crate::plan::PlanArgs;
 use crate::sim::SimArgs;
 use crate::trial::TrialArgs;
-use crate::{chaos, check, exit, observe, peer, plan, sim, trial};
+use crate::{chaos, check, console, exit, observe, peer, plan, sim, trial};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
@@ -39,6 +40,10 @@ pub enum Verb {
     Peer(PeerArgs),
     /// Makes something go wrong in a running trial, or puts it right.
     Chaos(ChaosArgs),
+    /// Tells all UAVs to hold, to go on or to come home, at a ground station's console.
+    Order(OrderArgs),
+    /// Gives all UAVs a new mission, at a ground station's console.
+    Mission(MissionArgs),
     /// Shows what the swarm publishes.
     Observe(ObserveArgs),
     /// Checks a scenario before it is flown.
@@ -71,6 +76,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Sim(args) => sim::run(args),
         Verb::Peer(args) => peer::run(args),
         Verb::Chaos(args) => chaos::run(args),
+        Verb::Order(args) => console::order(args),
+        Verb::Mission(args) => console::mission(args),
         Verb::Observe(args) => observe::run(args),
         Verb::Check(args) => check::run(args),
         Verb::Plan(args) => Ok(exit::print(plan::run(args))),

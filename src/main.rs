@@ -3,6 +3,7 @@
 mod chaos;
 mod check;
 mod cli;
+mod console;
 mod exit;
 mod observe;
 mod peer;

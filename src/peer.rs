@@ -8,7 +8,7 @@ use skein_node::{NodeConfig, NodeError};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Runs one peer until it is told to end: by SIGTERM, or by its vehicle's stream.
+/// Runs one peer until it is told to end: by SIGTERM, or by the world that it flies in.
 ///
 /// A trial starts its peers like this. `configs/peer.json5` explains every field of
 /// the configuration; what is wrong in it is named with line and column.
@@ -48,7 +48,8 @@ fn code(error: &NodeError) -> u8 {
         | NodeError::Bus(
             BusError::InUse(_) | BusError::NotLoopback(_) | BusError::Configuration { .. },
         ) => exit::CONFIG_INVALID,
-        NodeError::Vehicle(_) | NodeError::Bus(BusError::NoPeer { .. }) => exit::NO_PEERS,
+        NodeError::Console(_) => exit::CONFIG_INVALID,
+        NodeError::World(_) | NodeError::Bus(BusError::NoPeer { .. }) => exit::NO_PEERS,
         NodeError::Bus(BusError::Open { .. }) => exit::INTERNAL,
     }
 }

@@ -102,7 +102,9 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
             eprintln!("error: {error}");
             Ok(ExitCode::from(match error {
                 TrialError::Launch { .. } | TrialError::Interrupted => exit::NO_PEERS,
-                TrialError::Io { .. } | TrialError::Registry(_) => exit::INTERNAL,
+                TrialError::Io { .. } | TrialError::Registry(_) | TrialError::Token(_) => {
+                    exit::INTERNAL
+                }
             }))
         }
     }

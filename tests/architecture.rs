@@ -57,6 +57,11 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
         ],
     ),
     (
+        "skein-console",
+        &["skein-peer", "skein-behaviors"],
+        &["zenoh", "skein-node", "skein-netsim"],
+    ),
+    (
         "skein-interop",
         &["skein-geometry", "skein-flight", "skein-peer"],
         &[
@@ -102,7 +107,12 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
     ),
     (
         "skein-node",
-        &["skein-link", "skein-peer", "skein-behaviors"],
+        &[
+            "skein-link",
+            "skein-console",
+            "skein-peer",
+            "skein-behaviors",
+        ],
         &[
             "skein-netsim",
             "skein-scenario",
@@ -116,6 +126,7 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-scenario",
             "skein-netsim",
             "skein-link",
+            "skein-console",
             "skein-peer",
             "skein-behaviors",
             "skein-geometry",
@@ -337,6 +348,22 @@ fn only_the_bus_speaks_zenoh() {
         assert!(
             is_bus || !speaks,
             "{} uses zenoh; only runtime/node/src/bus.rs may",
+            file.display()
+        );
+    }
+}
+
+#[test]
+fn only_one_file_of_the_node_knows_the_simulators_frames() {
+    for file in sources(&["runtime/node/src"]) {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let knows = ["link::frame", "ToWorld", "ToPeer"]
+            .iter()
+            .any(|word| text.contains(word));
+        assert_eq!(
+            knows,
+            file.ends_with("simulator.rs"),
+            "{}: frames belong to runtime/node/src/simulator.rs",
             file.display()
         );
     }

@@ -14,3 +14,18 @@ pub enum Order {
     /// Return to base and loiter there.
     ReturnToBase,
 }
+
+impl Order {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Self; 3] = [Self::Resume, Self::Hold, Self::ReturnToBase];
+
+    /// Its name, as a person writes it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Resume => "resume",
+            Self::Hold => "hold",
+            Self::ReturnToBase => "return-to-base",
+        }
+    }
+}

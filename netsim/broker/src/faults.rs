@@ -1,14 +1,18 @@
 //! Faults, carried out: on processes, airframes and links; and what should follow.
 
-use crate::control::Answer;
 use crate::ledger::secs;
 use crate::member::{Computer, Member};
 use crate::trial::{Due, Trial};
 use nix::sys::signal::Signal;
+use skein_console::{Answer, Command, Token, ask};
 use skein_netsim::fault::{Fault, TimedFault};
+use std::time::Duration;
 
 /// Faults that wait for their times; a plan of a person is shorter.
 const MAX_DUE: usize = 1000;
+
+/// How long the ground station may take to judge a mission and speak it.
+const CONSOLE_TIMEOUT: Duration = Duration::from_secs(20);
 
 impl Trial<'_> {
     /// Carries out what is due by now, in the order of the times.
@@ -74,8 +78,8 @@ impl Trial<'_> {
             Fault::Cut { .. } | Fault::Partition { .. } | Fault::Heal | Fault::Loss { .. } => {
                 self.links(fault)?
             }
-            Fault::Rebase { .. } => {
-                return Err("a live ground station takes no new mission yet; `skein sim --storm` revises missions".to_owned());
+            Fault::Rebase { east_mm, north_mm } => {
+                self.operate(&Command::Base((*east_mm, *north_mm))).await?
             }
         };
         if let Some(text) = lines.first() {
@@ -94,6 +98,22 @@ impl Trial<'_> {
         self.members
             .get_mut(&peer)
             .ok_or_else(|| format!("there is no uav{peer}; there are {known}"))
+    }
+
+    /// Says something at the console of the ground station, as an operator does.
+    async fn operate(&self, command: &Command) -> Answer {
+        let ground = self.spec.ground.as_ref().map(|g| g.id);
+        let runs = |m: &&Member| m.computer == Computer::Runs;
+        let console = ground
+            .and_then(|id| self.members.get(&id))
+            .filter(runs)
+            .and(self.registered.console())
+            .ok_or("there is no ground station to speak it")?;
+        let token = Token::read(&console.token_file).map_err(|e| e.to_string())?;
+        match tokio::time::timeout(CONSOLE_TIMEOUT, ask(console.at, &token, command)).await {
+            Ok(said) => said.map_err(|e| e.to_string()),
+            Err(_) => Err("the ground station does not answer".to_owned()),
+        }
     }
 
     async fn kill(&mut self, peer: u16, computer_only: bool) -> Answer {

@@ -1,10 +1,9 @@
 //! What peers say on their vehicle streams, taken in.
 
-use crate::control::Answer;
 use crate::member::Computer;
+use crate::registry::ConsoleEntry;
 use crate::stream::{Heard, Line};
 use crate::trial::Trial;
-use skein_behaviors::Order;
 use skein_link::frame::ToWorld;
 use std::net::SocketAddr;
 
@@ -16,14 +15,22 @@ impl Trial<'_> {
                 id,
                 pid,
                 locator,
+                console,
                 line,
-            } => self.hello(id, pid, locator, line),
+            } => self.hello(id, pid, (locator, console), line),
             Heard::Frame { id, pid, frame } => self.frame(id, pid, frame),
             Heard::Gone { id, pid } => self.gone(id, pid),
         }
     }
 
-    fn hello(&mut self, id: u16, pid: u32, locator: String, line: Line) {
+    /// A peer's process is up; it listens for neighbours, and perhaps for an operator.
+    fn hello(
+        &mut self,
+        id: u16,
+        pid: u32,
+        (locator, console): (String, Option<String>),
+        line: Line,
+    ) {
         let address: Option<SocketAddr> = locator.strip_prefix("tcp/").and_then(|a| a.parse().ok());
         let Some(member) = self.members.get_mut(&id).filter(|m| m.pid() == Some(pid)) else {
             return;
@@ -37,6 +44,16 @@ impl Trial<'_> {
         line.welcome(self.seed, self.now_ms, self.pacer.scale());
         member.line = Some(line);
         member.locator = Some(locator.clone());
+        let console = console.and_then(|at| at.parse::<SocketAddr>().ok());
+        if let Some(at) = console {
+            let console = ConsoleEntry {
+                at,
+                token_file: member.console_token().to_owned(),
+            };
+            if let Err(cause) = self.registered.console_at(console) {
+                tracing::warn!(%cause, "orders will not find the ground station of this trial");
+            }
+        }
         for ((_, high), pair) in &self.pairs {
             if *high == id {
                 pair.proxy.lead_to(address);
@@ -101,19 +118,5 @@ impl Trial<'_> {
             self.ledger.failures.push(text.clone());
             self.note(text);
         }
-    }
-
-    /// Passes an operator's order to the ground station.
-    pub(crate) fn order(&mut self, order: Order) -> Answer {
-        let ground = self
-            .spec
-            .ground
-            .as_ref()
-            .and_then(|g| self.members.get(&g.id));
-        let line = ground
-            .and_then(|m| m.line.as_ref())
-            .ok_or("there is no ground station to speak it")?;
-        line.order(order);
-        Ok(vec![format!("the ground station says {order:?} to all")])
     }
 }

@@ -57,6 +57,7 @@ struct Files {
     config: PathBuf,
     journal: PathBuf,
     log: PathBuf,
+    console_token: PathBuf,
 }
 
 impl Member {
@@ -79,6 +80,7 @@ impl Member {
                 config: file("json5"),
                 journal: file("journal"),
                 log: file("log"),
+                console_token: file("token"),
             },
         }
     }
@@ -93,6 +95,12 @@ impl Member {
     #[must_use]
     pub fn config(&self) -> &Path {
         &self.files.config
+    }
+
+    /// The file with the token of its console, if it has one.
+    #[must_use]
+    pub fn console_token(&self) -> &Path {
+        &self.files.console_token
     }
 
     /// The last line of its log, for errors.
@@ -179,12 +187,17 @@ impl Surroundings<'_> {
     /// The configuration of the ground station.
     #[must_use]
     pub fn ground(&self, ground: &GroundStationSpec) -> serde_json::Value {
-        self.config(
+        let mut config = self.config(
             ground.id,
             "ground",
             ground.height_m,
             serde_json::Value::Null,
-        )
+        );
+        config["console"] = serde_json::json!({
+            "listen": "127.0.0.1:0",
+            "token_file": format!("uav{}.token", ground.id),
+        });
+        config
     }
 
     fn config(
@@ -201,6 +214,7 @@ impl Surroundings<'_> {
             "fleet": self.spec.fleet,
             "beacon_period_ms": self.spec.beacon_period_ms,
             "rate_bps": self.spec.radio.rate_bps,
+            "queue_age_ms": self.spec.radio.queue_age_ms,
             "height_m": height_m,
             "airframe": airframe,
             "objective": self.spec.objective,

@@ -27,8 +27,19 @@ pub struct Entry {
     pub run_dir: PathBuf,
     /// The peer that observers attach to, as `tcp/127.0.0.1:PORT`, once it is up.
     pub observe: Option<String>,
+    /// The console of the ground station, once it is up.
+    pub console: Option<ConsoleEntry>,
     /// First part of every key.
     pub fleet: String,
+}
+
+/// How the console of a ground station is reached.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ConsoleEntry {
+    /// Where it listens.
+    pub at: SocketAddr,
+    /// The file with its token, which only this user can read.
+    pub token_file: PathBuf,
 }
 
 /// Why no trial was found, or none can be entered.
@@ -125,6 +136,21 @@ impl Registered {
         self.write()
     }
 
+    /// The ground station's console, once it is up.
+    #[must_use]
+    pub fn console(&self) -> Option<&ConsoleEntry> {
+        self.entry.console.as_ref()
+    }
+
+    /// Says where the ground station's console is.
+    ///
+    /// # Errors
+    /// When the entry cannot be written.
+    pub fn console_at(&mut self, console: ConsoleEntry) -> Result<(), RegistryError> {
+        self.entry.console = Some(console);
+        self.write()
+    }
+
     fn write(&self) -> Result<(), RegistryError> {
         let json = serde_json::to_vec_pretty(&self.entry).map_err(|e| RegistryError::Io {
             path: self.path.clone(),
@@ -216,6 +242,7 @@ mod tests {
             token: String::new(),
             run_dir: PathBuf::new(),
             observe: None,
+            console: None,
             fleet: "f".to_owned(),
         }
     }

@@ -6,7 +6,7 @@
 
 use skein_behaviors::Percept;
 use skein_link::LinkState;
-use skein_link::frame::{Decoder, Frame, Order, ToPeer, ToWorld, encode};
+use skein_link::frame::{Decoder, Frame, ToPeer, ToWorld, encode};
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -22,9 +22,6 @@ const INBOX: usize = 2048;
 /// How long a connection may take to say who it is.
 const HELLO_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Orders that wait for a peer; more are dropped.
-const MAX_ORDERS: usize = 16;
-
 /// Something that peers said.
 #[derive(Debug)]
 pub enum Heard {
@@ -36,6 +33,8 @@ pub enum Heard {
         pid: u32,
         /// Where its transport listens.
         locator: String,
+        /// Where it listens for an operator, if it does.
+        console: Option<String>,
         /// What is said to it goes here.
         line: Line,
     },
@@ -128,7 +127,6 @@ struct Unsaid {
     tick: Option<(u64, f64)>,
     percept: Option<Percept>,
     links: Option<Vec<(u16, LinkState)>>,
-    orders: Vec<Order>,
     end: bool,
 }
 
@@ -136,9 +134,6 @@ impl Unsaid {
     fn pop(&mut self) -> Option<ToPeer> {
         if let Some(welcome) = self.welcome.take() {
             return Some(welcome);
-        }
-        if !self.orders.is_empty() {
-            return Some(ToPeer::Command(self.orders.remove(0)));
         }
         if let Some((time_ms, scale)) = self.tick.take() {
             let (percept, links) = (self.percept.take(), self.links.take());
@@ -193,15 +188,6 @@ impl Line {
         });
     }
 
-    /// The operator wants something.
-    pub fn order(&self, order: Order) {
-        self.change(|u| {
-            if u.orders.len() < MAX_ORDERS {
-                u.orders.push(order);
-            }
-        });
-    }
-
     /// It is over.
     pub fn end(&self) {
         self.change(|u| u.end = true);
@@ -220,6 +206,7 @@ async fn serve(stream: TcpStream, token: String, heard: mpsc::Sender<Heard>) {
         pid,
         token: said,
         locator,
+        console,
     })) = hello
     else {
         tracing::warn!("a connection did not say hello");
@@ -238,6 +225,7 @@ async fn serve(stream: TcpStream, token: String, heard: mpsc::Sender<Heard>) {
             id,
             pid,
             locator,
+            console,
             line,
         })
         .await
@@ -303,6 +291,7 @@ mod tests {
             pid: 99,
             token: token.to_owned(),
             locator: "tcp/127.0.0.1:1".to_owned(),
+            console: None,
         }
     }
 

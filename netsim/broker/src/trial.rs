@@ -1,6 +1,6 @@
 //! A trial: launch the peers, run the world around them, inject the faults, judge.
 
-use crate::control::{Answer, Asked, Control, Request};
+use crate::control::{Control, Request};
 use crate::ledger::{Ledger, secs};
 use crate::live_world::LiveWorld;
 use crate::member::{Computer, LEASE_MS, Member};
@@ -11,6 +11,7 @@ use crate::registry::{Entry, Registered, RegistryError, private_dir, private_fil
 use crate::stream::Streams;
 use crate::verdict::Verdict;
 use nix::sys::signal::Signal;
+use skein_console::{Answer, Asked, Token, TokenError};
 use skein_link::LinkState;
 use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::Spec;
@@ -99,6 +100,9 @@ pub enum TrialError {
     /// The directory shared with other commands failed.
     #[error(transparent)]
     Registry(#[from] RegistryError),
+    /// There is no token for its ports.
+    #[error(transparent)]
+    Token(#[from] TokenError),
     /// A peer did not come up.
     #[error("uav{peer} did not start: {why}")]
     Launch {
@@ -207,11 +211,11 @@ impl<'a> Trial<'a> {
         let run_dir = run_dir
             .canonicalize()
             .map_err(io(run_dir.display().to_string()))?;
-        let token = token();
-        let streams = Streams::listen(token.clone())
+        let token = Token::draw()?;
+        let streams = Streams::listen(token.secret().to_owned())
             .await
             .map_err(io("the vehicle streams"))?;
-        let control = Control::listen(token.clone())
+        let control = Control::listen(0, token.clone())
             .await
             .map_err(io("the control port"))?;
         let world = LiveWorld::new(&spec, seed);
@@ -219,9 +223,10 @@ impl<'a> Trial<'a> {
             id: id.clone(),
             pid: std::process::id(),
             control: control.address(),
-            token: token.clone(),
+            token: token.secret().to_owned(),
             run_dir: run_dir.clone(),
             observe: None,
+            console: None,
             fleet: spec.fleet.clone(),
         };
         let registered = Registered::enter(entry)?;
@@ -264,7 +269,7 @@ impl<'a> Trial<'a> {
             run_dir: run_dir.clone(),
             tell,
         };
-        trial.write_configs(&token)?;
+        trial.write_configs(token.secret())?;
         trial.processes =
             Some(Processes::start(&program).map_err(io(program.display().to_string()))?);
         (trial.tell)(Event::Begun { id, run_dir });
@@ -447,11 +452,10 @@ impl<'a> Trial<'a> {
         done || idle || live.is_empty() || self.now_ms >= u64::from(self.spec.max_time_s) * 1000
     }
 
-    async fn answer(&mut self, asked: Asked) {
+    async fn answer(&mut self, asked: Asked<Request>) {
         let answer: Answer = match asked.request {
             Request::Fault(fault) => self.inject(&fault).await,
             Request::Later(faults) => self.later(faults),
-            Request::Order(name) => self.order(name),
         };
         // Who asked may have gone away.
         let _ = asked.answer.send(answer);
@@ -473,13 +477,4 @@ async fn bind_pairs(
         }
     }
     Ok(pairs)
-}
-
-/// A word that nobody guesses: only this user can read the files it stands in.
-fn token() -> String {
-    use std::hash::{BuildHasher, RandomState};
-    // The standard library's hasher is seeded by the system for each instance.
-    (0..2)
-        .map(|n| format!("{:016x}", RandomState::new().hash_one(n)))
-        .collect()
 }

@@ -7,7 +7,6 @@
 
 use crate::{LinkState, RadioCounters};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
-pub use skein_behaviors::Order;
 use skein_behaviors::Percept;
 use skein_behaviors::Setpoint;
 use skein_behaviors::setpoint::MAX_STEPS;
@@ -42,8 +41,6 @@ pub enum ToPeer {
         /// Links into this peer from each transmitter, when one of them changed.
         links: Option<Vec<(u16, LinkState)>>,
     },
-    /// The operator, at this ground station's console, wants something.
-    Command(Order),
     /// The trial is over: flush and leave.
     End,
 }
@@ -61,6 +58,8 @@ pub enum ToWorld {
         token: String,
         /// Where its transport listens, as `tcp/127.0.0.1:PORT`.
         locator: String,
+        /// Where it listens for an operator, as `127.0.0.1:PORT`, if it does.
+        console: Option<String>,
     },
     /// What the vehicle is to fly.
     Setpoint(Setpoint),
@@ -106,7 +105,7 @@ impl Frame for ToPeer {
                 check_scale(*scale)?;
                 percept.as_ref().map_or(Ok(()), check_percept)
             }
-            Self::Command(_) | Self::End => Ok(()),
+            Self::End => Ok(()),
         }
     }
 }
@@ -269,7 +268,7 @@ mod tests {
 
     #[test]
     fn frames_survive_any_cutting_of_the_stream() {
-        let frames = [tick(), ToPeer::Command(Order::Hold), ToPeer::End];
+        let frames = [tick(), ToPeer::End];
         let stream: Vec<u8> = frames.iter().flat_map(|f| encode(f).unwrap()).collect();
         for piece in [1, 2, 3, 7, stream.len()] {
             let mut decoder = Decoder::default();

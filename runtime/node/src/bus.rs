@@ -8,6 +8,7 @@
 //! the radio's business, what they mean the peer's.
 
 use crate::radio::Hop;
+use crate::transport::{Event, Transport};
 use skein_peer::Priority;
 use std::collections::VecDeque;
 use std::net::{IpAddr, SocketAddr};
@@ -80,25 +81,6 @@ pub enum BusError {
         endpoint: String,
         /// Why.
         cause: String,
-    },
-}
-
-/// Something the bus brings.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Event {
-    /// A transmission of a neighbour.
-    Heard {
-        /// What changes at each hop; `None` where it cannot be read.
-        hop: Option<Hop>,
-        /// The record.
-        bytes: Vec<u8>,
-    },
-    /// The transport to a neighbour came or went.
-    Link {
-        /// The neighbour.
-        neighbour: u16,
-        /// Whether it came.
-        up: bool,
     },
 }
 
@@ -201,10 +183,12 @@ impl Bus {
     pub fn locator(&self) -> &str {
         &self.locator
     }
+}
 
-    /// Transmits to all linked neighbours. A message that finds a full queue is
-    /// dropped there: what is late on the air is worth nothing.
-    pub async fn publish(&self, key: &str, bytes: Vec<u8>, hop: Hop, priority: Priority) {
+impl Transport for Bus {
+    /// A message that finds a full queue is dropped there: what is late on the air is
+    /// worth nothing.
+    async fn publish(&mut self, key: &str, bytes: Vec<u8>, hop: Hop, priority: Priority) {
         let put = self
             .session
             .put(key, bytes)
@@ -218,8 +202,7 @@ impl Bus {
         }
     }
 
-    /// The next event. Cancel-safe.
-    pub async fn next(&self) -> Event {
+    async fn next(&mut self) -> Event {
         loop {
             if let Some(event) = self.inbox.pop() {
                 return event;
@@ -228,14 +211,11 @@ impl Bus {
         }
     }
 
-    /// Messages dropped because the loop was behind.
-    #[must_use]
-    pub fn overrun(&self) -> u64 {
+    fn overrun(&self) -> u64 {
         self.inbox.overrun()
     }
 
-    /// Says goodbye to the neighbours.
-    pub async fn close(self) {
+    async fn close(self) {
         if tokio::time::timeout(CLOSE_TIMEOUT, self.session.close())
             .await
             .is_err()
@@ -620,8 +600,8 @@ mod tests {
     #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
     async fn neighbours_hear_each_other_and_nobody_hears_himself() {
         let deadline = Duration::from_secs(20);
-        let b = Bus::open(&config(2, vec![])).await.unwrap();
-        let a = Bus::open(&config(1, vec![b.locator().to_owned()]))
+        let mut b = Bus::open(&config(2, vec![])).await.unwrap();
+        let mut a = Bus::open(&config(1, vec![b.locator().to_owned()]))
             .await
             .unwrap();
         let mut observer = Observer::open(b.locator(), "bus-test/**").await.unwrap();

@@ -72,6 +72,15 @@ impl Clock {
         Time(self.latest_ms)
     }
 
+    /// Whether it waits for the world at `at`: the last frame is too long ago.
+    #[must_use]
+    pub fn stands_still(&self, at: Instant) -> bool {
+        let ran_s = at.saturating_duration_since(self.frame_at).as_secs_f64();
+        #[allow(clippy::cast_precision_loss, reason = "half a second")]
+        let limit_s = self.limit_ms.map(|limit| limit as f64 / 1000.0);
+        limit_s.is_some_and(|limit| ran_s * self.scale >= limit)
+    }
+
     /// How long to wait from `at` until `target`; `None` when only another frame can
     /// bring the clock there.
     pub fn wait_until(&mut self, target: Time, at: Instant) -> Option<Duration> {
@@ -108,6 +117,7 @@ mod tests {
         assert_eq!(clock.now(t0 + ms(20)), Time(10_160));
         assert_eq!(clock.now(t0 + ms(5_000)), Time(10_000 + MAX_AHEAD_MS));
         assert_eq!(clock.wait_until(Time(10_600), t0 + ms(5_000)), None);
+        assert!(!clock.stands_still(t0 + ms(20)) && clock.stands_still(t0 + ms(63)));
     }
 
     #[test]
@@ -134,5 +144,6 @@ mod tests {
         let t0 = Instant::now();
         let mut clock = Clock::free(t0);
         assert_eq!(clock.now(t0 + ms(90_000)), Time(90_000));
+        assert!(!clock.stands_still(t0 + ms(90_000)));
     }
 }

@@ -4,10 +4,12 @@
 //! socket or a journal is opened.
 
 use crate::bus::{BusConfig, loopback_address};
+use crate::console::ConsoleConfig;
 use crate::fields::{FieldError, Fields, Text};
+use crate::simulator::SimulatorConfig;
 use skein_peer::config::{Airframe, Objective};
 use skein_peer::{Mission, PeerConfig, PeerId, Role};
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -20,22 +22,12 @@ pub struct NodeConfig {
     pub bus: BusConfig,
     /// Where promises are kept.
     pub journal: PathBuf,
-    /// What is below.
-    pub vehicle: VehicleConfig,
-}
-
-/// What is below the peer.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum VehicleConfig {
-    /// A vehicle in a simulated world.
-    Simulator {
-        /// Where the world listens.
-        address: SocketAddr,
-        /// Proves that this peer belongs to that world.
-        token: String,
-    },
-    /// Nothing: a ground station on its own.
-    None,
+    /// The world that it flies in, if that is a simulated one.
+    pub simulator: Option<SimulatorConfig>,
+    /// Where an operator can speak to it.
+    pub console: Option<ConsoleConfig>,
+    /// What waited longer than this for the channel is not sent, milliseconds.
+    pub queue_age_ms: u32,
 }
 
 /// Why a configuration cannot be used.
@@ -86,6 +78,7 @@ impl NodeConfig {
             mission: mission(&mut f, base)?,
             seed: f.integer("seed", 0, u64::MAX)?,
         };
+        let queue_age_ms = small(f.integer("queue_age_ms", 1, 60_000)?);
         let bus = BusConfig {
             id,
             fleet,
@@ -98,16 +91,26 @@ impl NodeConfig {
             lease_ms: small(f.integer("lease_ms", 100, 60_000)?),
         };
         let journal = base.join(f.string("journal")?.0);
-        let vehicle = f.optional_object("vehicle")?.map(vehicle).transpose()?;
-        if role == Role::Uav && vehicle.is_none() {
+        let simulator = f.optional_object("vehicle")?.map(vehicle).transpose()?;
+        if role == Role::Uav && simulator.is_none() {
             return Err(f.error("a peer of role \"uav\" needs a vehicle").into());
+        }
+        let console = f
+            .optional_object("console")?
+            .map(|c| console(c, base))
+            .transpose()?;
+        if role == Role::Uav && console.is_some() {
+            let why = "only a peer of role \"ground\" has a console; its operator speaks for all";
+            return Err(f.error(why).into());
         }
         f.done()?;
         Ok(Self {
             peer,
             bus,
             journal,
-            vehicle: vehicle.unwrap_or(VehicleConfig::None),
+            simulator,
+            console,
+            queue_age_ms,
         })
     }
 }
@@ -191,15 +194,27 @@ fn airframe(mut f: Fields<'_>) -> Result<Airframe, FieldError> {
     Ok(result)
 }
 
-fn vehicle(mut f: Fields<'_>) -> Result<VehicleConfig, FieldError> {
-    let (text, at) = f.string("simulator")?;
-    let address: SocketAddr = match text.parse::<SocketAddr>() {
-        Ok(a) if a.ip().is_loopback() && a.is_ipv4() => a,
-        _ => return Err(wrong(at, "127.0.0.1:PORT")),
-    };
+/// A port on this machine and no other.
+fn local(field: (String, FieldError)) -> Result<SocketAddr, FieldError> {
+    let (text, at) = field;
+    match text.parse::<SocketAddr>() {
+        Ok(a) if a.ip() == Ipv4Addr::LOCALHOST => Ok(a),
+        _ => Err(wrong(at, "127.0.0.1:PORT")),
+    }
+}
+
+fn vehicle(mut f: Fields<'_>) -> Result<SimulatorConfig, FieldError> {
+    let address = local(f.string("simulator")?)?;
     let token = f.string("token")?.0;
     f.done()?;
-    Ok(VehicleConfig::Simulator { address, token })
+    Ok(SimulatorConfig { address, token })
+}
+
+fn console(mut f: Fields<'_>, base: &Path) -> Result<ConsoleConfig, FieldError> {
+    let port = local(f.string("listen")?)?.port();
+    let token_file = base.join(f.string("token_file")?.0);
+    f.done()?;
+    Ok(ConsoleConfig { port, token_file })
 }
 
 fn mission(f: &mut Fields<'_>, base: &Path) -> Result<Option<Arc<Mission>>, ConfigError> {
@@ -237,7 +252,7 @@ mod tests {
     fn the_explained_example_is_valid() {
         let config = parse(EXAMPLE).unwrap();
         assert_eq!(config.peer.role, Role::Uav);
-        assert!(matches!(config.vehicle, VehicleConfig::Simulator { .. }));
+        assert!(config.simulator.is_some() && config.console.is_none());
     }
 
     #[test]
@@ -289,6 +304,38 @@ mod tests {
                     "{wrong}: {error}"
                 );
             }
+        }
+    }
+
+    /// The example, as a ground station.
+    fn ground(console: &str) -> String {
+        let start = EXAMPLE.find("  airframe: {").unwrap();
+        let end = EXAMPLE.find("  // What its ways off the loop").unwrap();
+        let mut text = EXAMPLE.to_owned();
+        text.replace_range(start..end, "  airframe: null,\n");
+        text.replace("role: \"uav\"", "role: \"ground\"")
+            .replace("console: null", &format!("console: {console}"))
+    }
+
+    #[test]
+    fn a_console_is_for_a_ground_station_and_stays_on_this_machine() {
+        let console = "{ listen: \"127.0.0.1:4100\", token_file: \"secret\" }";
+        let config = parse(&ground(console)).unwrap();
+        let expected = ConsoleConfig {
+            port: 4100,
+            token_file: "/nowhere/secret".into(),
+        };
+        assert_eq!(config.console, Some(expected));
+        let uav = EXAMPLE.replace("console: null", &format!("console: {console}"));
+        let error = parse(&uav).unwrap_err().to_string();
+        assert!(error.contains("only a peer of role \"ground\""), "{error}");
+        for (right, wrong, message) in [
+            ("127.0.0.1:4100", "0.0.0.0:4100", "expected 127.0.0.1:PORT"),
+            ("127.0.0.1:4100", "127.0.0.1", "expected 127.0.0.1:PORT"),
+            ("token_file:", "file:", "token_file is missing"),
+        ] {
+            let error = parse(&ground(&console.replace(right, wrong))).unwrap_err();
+            assert!(error.to_string().contains(message), "{wrong}: {error}");
         }
     }
 

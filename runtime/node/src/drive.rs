@@ -1,41 +1,57 @@
 //! The driver: wait for one thing, make it one input, drain the outputs (the
 //! canonical loop of `skein_peer`; D2.7 §1.2: the layers of one UAV).
 //!
-//! Nothing here decides anything. Planning runs beside the loop, storing in its own
-//! thread; percept to setpoint waits for neither.
+//! It knows its surroundings by their traits alone: vehicle, world, console,
+//! transport. Computing runs beside the loop, storing in its own thread; percept to
+//! setpoint waits for neither. What the world tells goes first: nothing that came
+//! later is given to the peer at an earlier time.
+//!
+//! The only thing decided here is what an operator is told ([`crate::console`]).
 
-use crate::bus::{Bus, Event};
 use crate::clock::Clock;
-use crate::journal::Journal;
+use crate::console::{Console, can_be_flown, fits};
+use crate::journal::{Journal, Stored};
+use crate::outgoing::{Frame, Outgoing};
 use crate::radio::Radio;
-use crate::vehicle::{News, Tick, Vehicle};
-use skein_link::frame::ToWorld;
+use crate::transport::{Event, Transport};
+use crate::vehicle::Vehicle;
+use crate::world::{News, Tick, World};
+use skein_behaviors::{Order, Percept};
+use skein_console::{Answer, Asked, Command as Request};
 use skein_peer::offload::{Job, JobResult, run};
-use skein_peer::{Command, Input, Output, Peer, Time};
+use skein_peer::{Command, Incarnation, Input, Mission, Output, Peer, Time};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 
 /// How often the radio's counters go to the world, milliseconds of scenario time.
 const COUNTERS_PERIOD_MS: u64 = 1_000;
 
-/// Plans under way at once: a peer asks for the next division only when the last
-/// one is dead, and for the ground once a revision.
-const MAX_OPEN_PLANS: usize = 16;
+/// Jobs under way at once: a peer asks for the next division only when the last
+/// one is dead, and for the geometry once a revision.
+const MAX_OPEN_JOBS: usize = 16;
 
 /// Without anything else to wait for, look again after this long.
 const IDLE: Duration = Duration::from_secs(3_600);
 
-/// What a driver needs of a mind. [`Peer`] is the one that flies.
-pub trait Mind: Send {
+/// What the driver needs of a peer. [`Peer`] is the one that flies; a test has one
+/// that does as it is told.
+pub trait PeerLogic: Send {
     /// Takes one input.
     fn handle(&mut self, now: Time, input: Input);
     /// The next output of the last input.
     fn poll(&mut self) -> Option<Output>;
     /// When it wants [`Input::Timer`] at the latest.
     fn next_timeout(&self) -> Option<Time>;
+    /// The life in which it speaks at present; none while it only listens.
+    fn speaks_in(&self) -> Option<Incarnation>;
+    /// The newest mission that it holds.
+    fn mission(&self) -> Option<Arc<Mission>>;
+    /// The revision that the operator's next mission must have to be flown.
+    fn next_revision(&self) -> u32;
 }
 
-impl Mind for Peer {
+impl PeerLogic for Peer {
     fn handle(&mut self, now: Time, input: Input) {
         Peer::handle(self, now, input);
     }
@@ -47,83 +63,171 @@ impl Mind for Peer {
     fn next_timeout(&self) -> Option<Time> {
         Peer::next_timeout(self)
     }
+
+    fn speaks_in(&self) -> Option<Incarnation> {
+        Peer::speaks_in(self)
+    }
+
+    fn mission(&self) -> Option<Arc<Mission>> {
+        Peer::mission(self)
+    }
+
+    fn next_revision(&self) -> u32 {
+        Peer::next_revision(self)
+    }
 }
 
-/// A mind and everything it acts through.
+/// What is around a peer.
 #[derive(Debug)]
-pub struct Driver<M, V> {
-    mind: M,
-    vehicle: V,
+pub struct Surroundings<V, W, C, T> {
+    /// What it flies.
+    pub vehicle: V,
+    /// What rules its clock and its radio.
+    pub world: W,
+    /// Where the operator speaks.
+    pub console: C,
+    /// What carries its transmissions.
+    pub transport: T,
+}
+
+/// What a driver keeps itself.
+#[derive(Debug)]
+pub struct Equipment {
+    /// The peer's time.
+    pub clock: Clock,
+    /// What the air does to each message.
+    pub radio: Radio,
+    /// What waits to be sent.
+    pub outgoing: Outgoing,
+    /// What must not be forgotten.
+    pub journal: Journal,
+}
+
+/// A peer and everything it acts through.
+#[derive(Debug)]
+pub struct Driver<P, V, W, C, T> {
+    peer: P,
+    around: Surroundings<V, W, C, T>,
     clock: Clock,
     radio: Radio,
-    bus: Bus,
+    outgoing: Outgoing,
     journal: Journal,
-    plans: mpsc::Receiver<(u64, JobResult)>,
-    planner: mpsc::Sender<(u64, JobResult)>,
+    results: mpsc::Receiver<(u64, JobResult)>,
+    workers: mpsc::Sender<(u64, JobResult)>,
+    judged: mpsc::Receiver<Judged>,
+    judge: mpsc::Sender<Judged>,
+    judging: bool,
+    order: Option<Order>,
+    /// The life in which the order was spoken.
+    ordered_in: Option<Incarnation>,
+    /// Came while the clock stood still.
+    early: Option<Event>,
     counters_due: Time,
+}
+
+/// A mission of the operator, judged.
+#[derive(Debug)]
+struct Judged {
+    mission: Mission,
+    verdict: Result<(), String>,
+    answer: oneshot::Sender<Answer>,
 }
 
 /// Something that happened.
 enum Happened {
-    News(News),
-    Stored(crate::journal::Stored),
+    World(News),
+    Sensed(Percept),
+    Stored(Stored),
     Computed(u64, JobResult),
-    Bus(Event),
+    Asked(Asked<Request>),
+    Judged(Judged),
+    Transport(Event),
     Time,
 }
 
-impl<M: Mind, V: Vehicle> Driver<M, V> {
+impl<P, V, W, C, T> Driver<P, V, W, C, T>
+where
+    P: PeerLogic,
+    V: Vehicle,
+    W: World,
+    C: Console,
+    T: Transport,
+{
     /// Puts the parts together.
-    pub fn new(
-        mind: M,
-        vehicle: V,
-        clock: Clock,
-        radio: Radio,
-        bus: Bus,
-        journal: Journal,
-    ) -> Self {
-        let (planner, plans) = mpsc::channel(MAX_OPEN_PLANS);
-        Self {
-            mind,
-            vehicle,
+    pub fn new(peer: P, around: Surroundings<V, W, C, T>, equipment: Equipment) -> Self {
+        let (workers, results) = mpsc::channel(MAX_OPEN_JOBS);
+        let (judge, judged) = mpsc::channel(1);
+        let Equipment {
             clock,
             radio,
-            bus,
+            outgoing,
             journal,
-            plans,
-            planner,
+        } = equipment;
+        Self {
+            peer,
+            around,
+            clock,
+            radio,
+            outgoing,
+            journal,
+            results,
+            workers,
+            judged,
+            judge,
+            judging: false,
+            order: None,
+            ordered_in: None,
+            early: None,
             counters_due: Time(0),
         }
     }
 
-    /// Runs from the first input until the vehicle's stream ends or `stop` does.
+    /// Runs from the first input until the world ends or `stop` does.
     pub async fn run(mut self, start: Input, stop: impl Future<Output = ()>) {
         tokio::pin!(stop);
         self.step(start).await;
         loop {
             let wait = self.wait();
+            // While the clock stands still (after a pause of the process, say) messages
+            // wait for the frame that tells how late it is: their ages count from then.
+            let hears = self.early.is_none() && !self.clock.stands_still(Instant::now());
+            let Surroundings {
+                vehicle,
+                world,
+                console,
+                transport,
+            } = &mut self.around;
             let happened = tokio::select! {
+                biased;
                 () = &mut stop => break,
-                news = self.vehicle.next() => Happened::News(news),
+                news = world.next() => Happened::World(news),
+                percept = vehicle.sense() => Happened::Sensed(percept),
                 Some(stored) = self.journal.answer() => Happened::Stored(stored),
-                Some((token, result)) = self.plans.recv() => Happened::Computed(token, result),
-                event = self.bus.next() => Happened::Bus(event),
+                Some((token, result)) = self.results.recv() => Happened::Computed(token, result),
+                asked = console.next() => Happened::Asked(asked),
+                Some(judged) = self.judged.recv() => Happened::Judged(judged),
+                event = transport.next(), if hears => Happened::Transport(event),
                 () = tokio::time::sleep(wait) => Happened::Time,
             };
             if !self.take(happened).await {
                 break;
             }
             self.deliver().await;
+            self.repeat_order().await;
+            self.look().await;
+            self.transmit().await;
         }
         self.leave().await;
     }
 
     /// How long nothing but the passing of time can be due.
     fn wait(&mut self) -> Duration {
-        let due = [self.mind.next_timeout(), self.radio.next_due()]
-            .into_iter()
-            .flatten()
-            .min();
+        let due = [
+            self.peer.next_timeout(),
+            self.radio.next_due(),
+            self.outgoing.next_due(),
+        ];
+        let due = due.into_iter().flatten().min();
         let at = Instant::now();
         // Where only a frame of the world can bring the time, the frame will wake us.
         due.and_then(|t| self.clock.wait_until(t, at))
@@ -137,35 +241,21 @@ impl<M: Mind, V: Vehicle> Driver<M, V> {
     /// Makes one input of what happened; false when it is the end.
     async fn take(&mut self, happened: Happened) -> bool {
         match happened {
-            Happened::News(News::End) => return false,
-            Happened::News(News::Tick(tick)) => self.tick(tick).await,
-            Happened::News(News::Command(order)) => {
-                self.step(Input::Command(Command::Order(order))).await
-            }
-            Happened::Stored(s) => {
-                self.step(Input::Stored {
-                    token: s.token,
-                    ok: s.ok,
-                })
-                .await
-            }
+            Happened::World(News::End) => return false,
+            Happened::World(News::Tick(tick)) => self.tick(tick).await,
+            Happened::Sensed(percept) => self.step(Input::Percept(percept)).await,
+            Happened::Stored(Stored { token, ok }) => self.step(Input::Stored { token, ok }).await,
             Happened::Computed(token, result) => self.step(Input::Computed { token, result }).await,
-            Happened::Bus(Event::Link { neighbour, up }) => {
-                self.step(Input::LinkHint { neighbour, up }).await;
-            }
-            Happened::Bus(Event::Heard { hop, bytes }) => match hop {
-                Some(hop) => {
-                    let now = self.now();
-                    self.radio.receive(now, hop, bytes);
-                }
-                None => self.radio.refuse(),
-            },
-            Happened::Time => {
-                let now = self.now();
-                if self.mind.next_timeout().is_some_and(|due| due <= now) {
-                    self.step(Input::Timer).await;
+            Happened::Asked(asked) => self.asked(asked).await,
+            Happened::Judged(judged) => self.judged(judged).await,
+            Happened::Transport(event) => {
+                if self.clock.stands_still(Instant::now()) {
+                    self.early = Some(event);
+                } else {
+                    self.hear(event).await;
                 }
             }
+            Happened::Time => {}
         }
         true
     }
@@ -175,21 +265,38 @@ impl<M: Mind, V: Vehicle> Driver<M, V> {
         if let Some(table) = tick.links {
             self.radio.links(table);
         }
-        if let Some(percept) = tick.percept {
-            self.step(Input::Percept(percept)).await;
+        if let Some(event) = self.early.take() {
+            self.hear(event).await;
         }
         let now = self.now();
-        if self.mind.next_timeout().is_some_and(|due| due <= now) {
-            self.step(Input::Timer).await;
-        }
         if now >= self.counters_due {
             self.counters_due = now.plus_ms(COUNTERS_PERIOD_MS);
-            let counters = self.radio.counters(self.bus.overrun());
-            self.vehicle.tell(ToWorld::Radio(counters)).await;
+            self.count().await;
         }
     }
 
-    /// Gives the mind what has arrived through the air.
+    async fn count(&mut self) {
+        let overrun = self.around.transport.overrun();
+        let counters = self.radio.counters(self.outgoing.dropped(), overrun);
+        self.around.world.count(counters).await;
+    }
+
+    /// What the transport brought meets the air.
+    async fn hear(&mut self, event: Event) {
+        match event {
+            Event::Link { neighbour, up } => self.step(Input::LinkHint { neighbour, up }).await,
+            Event::Heard {
+                hop: Some(hop),
+                bytes,
+            } => {
+                let now = self.now();
+                self.radio.receive(now, hop, bytes);
+            }
+            Event::Heard { hop: None, .. } => self.radio.refuse(),
+        }
+    }
+
+    /// Gives the peer what has arrived through the air.
     async fn deliver(&mut self) {
         let now = self.now();
         while let Some(arrived) = self.radio.due(now) {
@@ -203,11 +310,31 @@ impl<M: Mind, V: Vehicle> Driver<M, V> {
         }
     }
 
+    /// Lets the peer look at its deadlines, if one is due.
+    async fn look(&mut self) {
+        let now = self.now();
+        if self.peer.next_timeout().is_some_and(|due| due <= now) {
+            self.step(Input::Timer).await;
+        }
+    }
+
+    /// Sends what the channel has room for.
+    async fn transmit(&mut self) {
+        let now = self.now();
+        while let Some(frame) = self.outgoing.pop(now) {
+            let hop = self.radio.transmit(frame.hops, frame.bytes.len());
+            self.around
+                .transport
+                .publish(&frame.key, frame.bytes, hop, frame.priority)
+                .await;
+        }
+    }
+
     /// One input, and everything that follows from it.
     async fn step(&mut self, input: Input) {
         let now = self.now();
-        self.mind.handle(now, input);
-        while let Some(output) = self.mind.poll() {
+        self.peer.handle(now, input);
+        while let Some(output) = self.peer.poll() {
             self.act(now, output).await;
         }
     }
@@ -219,39 +346,140 @@ impl<M: Mind, V: Vehicle> Driver<M, V> {
                 bytes,
                 hops,
                 priority,
-                lifetime_ms: _,
-            } => {
-                let hop = self.radio.transmit(hops, bytes.len());
-                self.bus.publish(&key, bytes, hop, priority).await;
-            }
-            Output::Setpoint(setpoint) => self.vehicle.tell(ToWorld::Setpoint(setpoint)).await,
+                lifetime_ms,
+            } => self.outgoing.push(
+                now,
+                Frame {
+                    key,
+                    bytes,
+                    hops,
+                    priority,
+                    lifetime_ms,
+                },
+            ),
+            Output::Setpoint(setpoint) => self.around.vehicle.fly(setpoint).await,
             Output::Store { token, record } => self.journal.store(token, record).await,
             Output::Compute { token, job } => self.compute(token, job),
             Output::Report(report) => {
                 tracing::info!(time_ms = now.0, ?report);
-                match cbor4ii::serde::to_vec(Vec::new(), &report) {
-                    Ok(bytes) => self.vehicle.tell(ToWorld::Report(bytes)).await,
-                    Err(cause) => tracing::error!(%cause, "a report was not sent"),
-                }
+                self.around.world.report(&report).await;
             }
         }
     }
 
+    /// Does a job beside the loop.
     fn compute(&self, token: u64, job: Job) {
-        let planner = self.planner.clone();
+        let workers = self.workers.clone();
         tokio::task::spawn_blocking(move || {
             let result = run(&job);
-            // A loop that has ended needs no answer.
-            let _ = planner.blocking_send((token, result));
+            // A loop that has ended needs no result.
+            let _ = workers.blocking_send((token, result));
         });
+    }
+
+    /// The operator wants something.
+    async fn asked(&mut self, asked: Asked<Request>) {
+        let Asked { request, answer } = asked;
+        let mission = match request {
+            Request::Order(order) => {
+                let told = self.order(order).await;
+                // Who asked may have gone away; likewise below.
+                let _ = answer.send(Ok(vec![told]));
+                return;
+            }
+            Request::Mission(mission) => Ok((*mission).clone()),
+            Request::Base(base) => match self.peer.mission() {
+                Some(newest) => Ok(Mission {
+                    base,
+                    ..(*newest).clone()
+                }),
+                None => Err("the ground station holds no mission whose base could move".to_owned()),
+            },
+        };
+        let fitting = mission.and_then(|m| {
+            fits(&m, self.peer.mission().as_deref())?;
+            if self.judging {
+                return Err("another mission is being judged; try again".to_owned());
+            }
+            Ok(m)
+        });
+        match fitting {
+            Ok(mission) => self.weigh(mission, answer),
+            Err(why) => drop(answer.send(Err(why))),
+        }
+    }
+
+    async fn order(&mut self, order: Order) -> String {
+        self.order = Some(order);
+        self.ordered_in = None;
+        self.repeat_order().await;
+        let name = order.name();
+        match self.ordered_in {
+            Some(_) => format!("the ground station says {name} to all"),
+            None => format!(
+                "the ground station will say {name} to all, as soon as it has listened long enough to speak"
+            ),
+        }
+    }
+
+    /// Speaks the standing order once in each life of the peer: what an earlier life
+    /// said is void.
+    async fn repeat_order(&mut self) {
+        let life = self.peer.speaks_in();
+        if let (Some(order), true) = (self.order, life.is_some() && life != self.ordered_in) {
+            self.ordered_in = life;
+            self.step(Input::Command(Command::Order(order))).await;
+        }
+    }
+
+    /// Has a mission judged beside the loop.
+    fn weigh(&mut self, mission: Mission, answer: oneshot::Sender<Answer>) {
+        self.judging = true;
+        let judge = self.judge.clone();
+        tokio::task::spawn_blocking(move || {
+            let mission = Arc::new(mission);
+            let verdict = can_be_flown(&mission);
+            let mission = Arc::unwrap_or_clone(mission);
+            let _ = judge.blocking_send(Judged {
+                mission,
+                verdict,
+                answer,
+            });
+        });
+    }
+
+    async fn judged(&mut self, judged: Judged) {
+        self.judging = false;
+        let Judged {
+            mission,
+            verdict,
+            answer,
+        } = judged;
+        let told = match verdict {
+            Err(why) => Err(format!("the mission cannot be flown: {why}")),
+            Ok(()) => {
+                let revision = self.peer.next_revision();
+                let mission = Arc::new(Mission {
+                    revision,
+                    ..mission
+                });
+                self.step(Input::Command(Command::Mission(mission))).await;
+                Ok(vec![format!(
+                    "the ground station speaks the mission as revision {revision}"
+                )])
+            }
+        };
+        let _ = answer.send(told);
     }
 
     /// Flushes what is under way and says goodbye.
     async fn leave(mut self) {
-        let counters = self.radio.counters(self.bus.overrun());
-        self.vehicle.tell(ToWorld::Radio(counters)).await;
-        self.vehicle.tell(ToWorld::Bye).await;
-        self.bus.close().await;
+        self.count().await;
+        self.around.world.leave().await;
+        self.around.transport.close().await;
         let _ = tokio::task::spawn_blocking(move || self.journal.close()).await;
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -2,10 +2,18 @@
 //! (D2.7 §1.5: the state of a mission survives the failure of a computer).
 //!
 //! An append-only file of records: length (4 bytes), CRC-32 of the body (4 bytes),
-//! both least significant first, body. What follows the last whole record was torn
-//! by a crash before anybody was told it was durable, and is cut off. One thread
-//! writes and syncs, so that the loop of the peer never waits for a disk. What the
-//! records mean is the peer's business.
+//! both least significant first, body. Reading ends at the first record that is not
+//! whole, and what follows is cut off. That is right for a tail that a crash tore
+//! before anybody was told it was durable; but nothing says where the next record
+//! begins, so **one flipped bit loses everything behind it, too**. What stands before
+//! it stays, and the peer takes a new life and hears the rest again from others.
+//!
+//! A record that cannot be written is answered so: a failed write, a full disk, a
+//! record beyond [`MAX_RECORD_BYTES`]. What a failed write left half done is cut off
+//! before anything else is written, or that fails as well.
+//!
+//! One thread writes and syncs, so that the loop of the peer never waits for a disk.
+//! What the records mean is the peer's business.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -99,24 +107,30 @@ impl Journal {
         }
         file.seek(SeekFrom::Start(end)).map_err(io)?;
 
+        let replayed = Replayed {
+            records,
+            torn_bytes,
+        };
+        Ok((Self::over(file, end).map_err(io)?, replayed))
+    }
+
+    /// A journal whose whole records end at `end` of a disk.
+    pub(crate) fn over(disk: impl Disk, end: u64) -> std::io::Result<Self> {
         let (orders, inbox) = mpsc::channel(MAX_OPEN_STORES);
         let (outbox, answers) = mpsc::channel(MAX_OPEN_STORES);
+        let tail = Tail {
+            disk,
+            end,
+            torn: false,
+        };
         let writer = std::thread::Builder::new()
             .name("journal".to_owned())
-            .spawn(move || write_all(Tail { file, end }, inbox, &outbox))
-            .map_err(io)?;
-        let journal = Self {
+            .spawn(move || write_all(tail, inbox, &outbox))?;
+        Ok(Self {
             orders: Some(orders),
             answers,
             writer: Some(writer),
-        };
-        Ok((
-            journal,
-            Replayed {
-                records,
-                torn_bytes,
-            },
-        ))
+        })
     }
 
     /// Asks for `record` to be made durable; [`Journal::answer`] tells when it is.
@@ -166,13 +180,35 @@ fn first_record(bytes: &[u8]) -> Option<(&[u8], usize)> {
     whole.then_some((body, HEADER_BYTES + length))
 }
 
-/// The file and the end of its last record that is known to be whole.
-struct Tail {
-    file: File,
-    end: u64,
+/// Where the writer writes. [`File`] is the one that lasts.
+pub(crate) trait Disk: Send + 'static {
+    /// Writes behind what is there, and returns when it is durable.
+    fn append(&mut self, bytes: &[u8]) -> std::io::Result<()>;
+    /// Forgets all but the first `end` bytes.
+    fn cut(&mut self, end: u64) -> std::io::Result<()>;
 }
 
-impl Tail {
+impl Disk for File {
+    fn append(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        self.write_all(bytes)?;
+        self.sync_data()
+    }
+
+    fn cut(&mut self, end: u64) -> std::io::Result<()> {
+        self.set_len(end)?;
+        self.seek(SeekFrom::Start(end)).map(drop)
+    }
+}
+
+/// The disk and the end of its last record that is known to be whole.
+struct Tail<D> {
+    disk: D,
+    end: u64,
+    /// A failed write may have left something behind the end.
+    torn: bool,
+}
+
+impl<D: Disk> Tail<D> {
     /// Appends the records and syncs once; on failure none of them is there.
     fn append(&mut self, batch: &[(u64, Vec<u8>)]) -> std::io::Result<()> {
         let mut bytes = Vec::new();
@@ -182,23 +218,31 @@ impl Tail {
             bytes.extend_from_slice(&crc32fast::hash(body).to_le_bytes());
             bytes.extend_from_slice(body);
         }
-        let written = self
-            .file
-            .write_all(&bytes)
-            .and_then(|()| self.file.sync_data());
-        if let Err(cause) = written {
-            self.file.set_len(self.end)?;
-            self.file.seek(SeekFrom::Start(self.end))?;
-            return Err(cause);
+        // Behind a torn record nothing would ever be read again.
+        self.mend()?;
+        self.torn = true;
+        let written = self.disk.append(&bytes);
+        if written.is_ok() {
+            self.torn = false;
+            self.end += bytes.len() as u64;
+        } else if let Err(cause) = self.mend() {
+            tracing::error!(%cause, "the journal's torn end cannot be cut off; it is tried again before the next record");
         }
-        self.end += bytes.len() as u64;
+        written
+    }
+
+    fn mend(&mut self) -> std::io::Result<()> {
+        if self.torn {
+            self.disk.cut(self.end)?;
+            self.torn = false;
+        }
         Ok(())
     }
 }
 
 /// The writer thread: one sync for all that waits.
-fn write_all(
-    mut tail: Tail,
+fn write_all<D: Disk>(
+    mut tail: Tail<D>,
     mut inbox: mpsc::Receiver<(u64, Vec<u8>)>,
     outbox: &mpsc::Sender<Stored>,
 ) {
@@ -210,11 +254,19 @@ fn write_all(
         let (writable, oversize): (Vec<_>, Vec<_>) = batch
             .into_iter()
             .partition(|(_, body)| (1..=MAX_RECORD_BYTES).contains(&body.len()));
-        let written = tail.append(&writable);
+        let written = if writable.is_empty() {
+            Ok(())
+        } else {
+            tail.append(&writable)
+        };
         if let Err(cause) = &written {
             tracing::error!(%cause, "the journal cannot be written; the promises it should hold are withheld");
         }
-        for (token, _) in oversize {
+        for (token, body) in oversize {
+            tracing::error!(
+                bytes = body.len(),
+                "a record that the journal cannot hold; what it was to promise is withheld"
+            );
             let _ = outbox.blocking_send(Stored { token, ok: false });
         }
         for (token, _) in writable {
@@ -275,9 +327,12 @@ mod tests {
     }
 
     #[test]
-    fn a_flipped_bit_ends_the_reading_and_never_yields_a_wrong_record() {
+    fn a_flipped_bit_loses_what_is_behind_it_and_keeps_what_is_before() {
+        let bodies = [b"alpha".as_slice(), b"beta", b"gamma"];
         let mut bytes = Vec::new();
-        for body in [b"alpha".as_slice(), b"beta"] {
+        let mut begins = Vec::new();
+        for body in bodies {
+            begins.push(bytes.len());
             bytes.extend_from_slice(&u32::try_from(body.len()).unwrap().to_le_bytes());
             bytes.extend_from_slice(&crc32fast::hash(body).to_le_bytes());
             bytes.extend_from_slice(body);
@@ -285,10 +340,80 @@ mod tests {
         for bit in 0..bytes.len() * 8 {
             let mut bad = bytes.clone();
             bad[bit / 8] ^= 1 << (bit % 8);
-            let (records, _) = replay(&bad);
-            assert!(records.len() < 2, "bit {bit}");
-            assert!(records.iter().all(|r| r == b"alpha"), "bit {bit}");
+            let hit = begins.iter().rposition(|b| *b <= bit / 8).unwrap();
+            let (records, whole) = replay(&bad);
+            assert_eq!(records, bodies[..hit], "bit {bit}");
+            assert_eq!(whole, begins[hit], "bit {bit}");
         }
+    }
+
+    /// A disk that does as its plan says: how many bytes of a write reach it, and
+    /// whether it can be cut.
+    struct Flaky {
+        file: File,
+        writes: Vec<Option<usize>>,
+        cuts: Vec<bool>,
+    }
+
+    impl Disk for Flaky {
+        fn append(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+            match self.writes.remove(0) {
+                None => Disk::append(&mut self.file, bytes),
+                Some(n) => {
+                    Disk::append(&mut self.file, &bytes[..n])?;
+                    Err(std::io::ErrorKind::StorageFull.into())
+                }
+            }
+        }
+
+        fn cut(&mut self, end: u64) -> std::io::Result<()> {
+            if self.cuts.remove(0) {
+                Disk::cut(&mut self.file, end)
+            } else {
+                Err(std::io::ErrorKind::Other.into())
+            }
+        }
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
+    async fn what_a_failed_write_left_harms_no_later_record() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("j");
+        let disk = Flaky {
+            file: File::create(&path).unwrap(),
+            writes: vec![None, Some(7), Some(8), None, None],
+            // After the second failure the half record can be cut only in the end.
+            cuts: vec![true, false, false, true],
+        };
+        let mut journal = Journal::over(disk, 0).unwrap();
+        let stores = [
+            ("a", true),
+            ("b", false),
+            ("c", false),
+            ("d", false),
+            ("e", true),
+            ("f", true),
+        ];
+        for (token, (body, ok)) in (0..).zip(stores) {
+            journal.store(token, body.as_bytes().to_vec()).await;
+            assert_eq!(journal.answer().await, Some(Stored { token, ok }), "{body}");
+        }
+        journal.close();
+        let (journal, replayed) = Journal::open(&path).unwrap();
+        journal.close();
+        assert_eq!(replayed.torn_bytes, 0);
+        assert_eq!(replayed.records, [b"a", b"e", b"f"]);
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
+    async fn on_a_full_disk_every_record_is_refused() {
+        let full = OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let mut journal = Journal::over(full, 0).unwrap();
+        for token in 0..3 {
+            journal.store(token, b"x".to_vec()).await;
+            assert_eq!(journal.answer().await, Some(Stored { token, ok: false }));
+        }
+        journal.close();
     }
 
     #[tokio::test(flavor = "multi_thread", worker_threads = 1)]

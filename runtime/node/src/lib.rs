@@ -1,15 +1,19 @@
-//! The body of one peer: the asynchronous shell around the mind, and the only user
+//! The body of one peer: the asynchronous shell around the pure core, and the only user
 //! of Zenoh.
 //!
 //! | module | what it does |
 //! |---|---|
 //! | [`config`] | reads the peer's file, naming every mistake |
-//! | [`bus`] | single-hop links to neighbours: the only `use zenoh` |
-//! | [`radio`] | what the air does to each message |
+//! | [`vehicle`] | trait: senses and flies |
+//! | [`world`] | trait: rules clock and radio; absent in flight |
+//! | [`console`] | trait: the operator of a ground station; and a port on 127.0.0.1 that is one |
+//! | [`transport`] | trait: single-hop links to neighbours |
+//! | [`simulator`] | a vehicle and a world, simulated: the only file that knows its frames |
+//! | [`bus`] | a transport over Zenoh: the only `use zenoh` |
+//! | [`radio`] | what the air does to each message that comes in |
+//! | [`outgoing`] | what waits for the channel to go out |
 //! | [`clock`] | scenario time |
 //! | [`journal`] | what must not be forgotten |
-//! | [`vehicle`] | percepts up, setpoints down |
-//! | [`simulator`] | a vehicle in a simulated world |
 //! | [`drive`] | waits for one thing, makes it one input, drains the outputs |
 //!
 //! The whole lifecycle is [`run`].
@@ -17,26 +21,31 @@
 pub mod bus;
 pub mod clock;
 pub mod config;
+pub mod console;
 pub mod drive;
 pub mod fields;
 pub mod journal;
+pub mod outgoing;
 pub mod radio;
 pub mod simulator;
+#[cfg(test)]
+mod testing;
+pub mod transport;
 pub mod vehicle;
+pub mod world;
 
-pub use config::{ConfigError, NodeConfig, VehicleConfig};
+pub use config::{ConfigError, NodeConfig};
 
 use bus::{Bus, BusError};
 use clock::Clock;
-use drive::Driver;
+use console::{ConsoleError, LocalConsole};
+use drive::{Driver, Equipment, Surroundings};
 use journal::{Journal, JournalError};
+use outgoing::Outgoing;
 use radio::Radio;
-use simulator::{Simulated, StreamError};
-use skein_link::frame::ToWorld;
+use simulator::{Hello, Joined, StreamError};
 use skein_peer::{Input, Peer};
-use std::net::SocketAddr;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
-use vehicle::NoVehicle;
 
 /// Why a node did not start.
 #[derive(Debug, thiserror::Error)]
@@ -47,12 +56,15 @@ pub enum NodeError {
     /// Its links cannot be opened.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// Its vehicle cannot be reached.
+    /// Its console cannot be opened.
     #[error(transparent)]
-    Vehicle(#[from] StreamError),
+    Console(#[from] ConsoleError),
+    /// Its world cannot be reached.
+    #[error(transparent)]
+    World(#[from] StreamError),
 }
 
-/// Runs one peer until its vehicle's stream ends or `stop` does.
+/// Runs one peer until its world ends or `stop` does.
 ///
 /// Needs a multi-threaded Tokio runtime; Zenoh refuses the other kind.
 ///
@@ -65,60 +77,61 @@ pub async fn run(config: NodeConfig, stop: impl Future<Output = ()>) -> Result<(
     if replayed.torn_bytes > 0 {
         tracing::warn!(
             bytes = replayed.torn_bytes,
-            "the journal's torn tail was cut off"
+            "the journal was cut off behind its last whole record"
         );
     }
     let bus = Bus::open(&config.bus).await?;
+    let console = match &config.console {
+        Some(config) => Some(LocalConsole::open(config).await?),
+        None => None,
+    };
     tracing::info!(
         id,
         locator = bus.locator(),
+        console = ?console.as_ref().map(LocalConsole::address),
         records = replayed.records.len(),
         "up"
     );
+    let mut radio = Radio::open(id, nonce);
+    let mut clock = Clock::free(Instant::now());
+    let (mut vehicle, mut world) = (None, None);
+    if let Some(simulator) = &config.simulator {
+        let hello = Hello {
+            id,
+            locator: bus.locator().to_owned(),
+            console: console.as_ref().map(LocalConsole::address),
+        };
+        let Joined {
+            vehicle: v,
+            world: w,
+            welcome,
+        } = simulator::join(simulator, hello).await?;
+        radio.join(welcome.seed);
+        clock = Clock::following(welcome.time_ms, welcome.scale, Instant::now());
+        (vehicle, world) = (Some(v), Some(w));
+    }
+    let outgoing = Outgoing::new(config.peer.rate_bps, config.queue_age_ms);
+    let around = Surroundings {
+        vehicle,
+        world,
+        console,
+        transport: bus,
+    };
+    let equipment = Equipment {
+        clock,
+        radio,
+        outgoing,
+        journal,
+    };
     let start = Input::Start {
         persisted: replayed.records,
         nonce,
     };
-    let mind = Peer::new(config.peer);
-    let mut radio = Radio::open(id, nonce);
-    match config.vehicle {
-        VehicleConfig::Simulator { address, token } => {
-            let (vehicle, clock) = join(address, token, &bus, &mut radio, id).await?;
-            Driver::new(mind, vehicle, clock, radio, bus, journal)
-                .run(start, stop)
-                .await;
-        }
-        VehicleConfig::None => {
-            let clock = Clock::free(Instant::now());
-            Driver::new(mind, NoVehicle, clock, radio, bus, journal)
-                .run(start, stop)
-                .await;
-        }
-    }
+    Driver::new(Peer::new(config.peer), around, equipment)
+        .run(start, stop)
+        .await;
     tracing::info!(id, "down");
     Ok(())
-}
-
-/// Joins a simulated world, which from then on rules clock and radio.
-async fn join(
-    address: SocketAddr,
-    token: String,
-    bus: &Bus,
-    radio: &mut Radio,
-    id: u16,
-) -> Result<(Simulated, Clock), StreamError> {
-    let hello = ToWorld::Hello {
-        id,
-        pid: std::process::id(),
-        token,
-        locator: bus.locator().to_owned(),
-    };
-    let (vehicle, welcome) = Simulated::join(address, hello).await?;
-    radio.join(welcome.seed);
-    Ok((
-        vehicle,
-        Clock::following(welcome.time_ms, welcome.scale, Instant::now()),
-    ))
 }
 
 /// Differs from boot to boot: the time of the boot and the process, mixed.

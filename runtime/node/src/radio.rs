@@ -6,8 +6,7 @@
 //! [`skein_link::fate()`] as in the simulator. In flight, without a world, the air
 //! does this itself and the shim lets everything pass. It also counts.
 
-use skein_link::RadioCounters;
-use skein_link::{Fate, LinkState, Reason, fate};
+use skein_link::{Fate, LinkState, RadioCounters, Reason, fate};
 use skein_peer::Time;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -162,12 +161,17 @@ impl Radio {
         self.in_flight.peek().map(|Reverse((at, _))| *at)
     }
 
-    /// What happened so far; `overrun` is what the bus had to drop.
+    /// What happened so far; `unsent` frames waited too long for the channel, `overrun`
+    /// is what the transport had to drop.
     #[must_use]
-    pub fn counters(&self, overrun: u64) -> RadioCounters {
+    pub fn counters(&self, unsent: u64, overrun: u64) -> RadioCounters {
+        let mut lost = self.lost.clone();
+        if unsent > 0 {
+            *lost.entry(Reason::QueueAge).or_default() += unsent;
+        }
         RadioCounters {
             relayed_by: self.relayed_by.iter().map(|(k, v)| (*k, *v)).collect(),
-            lost: self.lost.iter().map(|(k, v)| (*k, *v)).collect(),
+            lost: lost.into_iter().collect(),
             overrun,
             ..self.counters.clone()
         }
@@ -206,8 +210,8 @@ mod tests {
         let mut radio = Radio::open(1, 0);
         radio.receive(Time(5), hop(0, 3), vec![1]);
         assert_eq!(radio.due(Time(5)).unwrap().bytes, vec![1]);
-        assert_eq!(radio.counters(0).multi_hop, 1);
-        assert_eq!(radio.counters(0).relayed_by, [(2, 1)]);
+        assert_eq!(radio.counters(0, 0).multi_hop, 1);
+        assert_eq!(radio.counters(0, 0).relayed_by, [(2, 1)]);
     }
 
     #[test]
@@ -234,10 +238,15 @@ mod tests {
         radio.links(vec![]);
         radio.receive(Time(0), hop(2, 0), vec![1]);
         assert_eq!(radio.next_due(), None);
-        let lost = radio.counters(0).lost;
+        let lost = radio.counters(2, 0).lost;
         assert_eq!(
             lost,
-            [(Reason::Range, 1), (Reason::Sight, 1), (Reason::Cut, 1)]
+            [
+                (Reason::Range, 1),
+                (Reason::Sight, 1),
+                (Reason::Cut, 1),
+                (Reason::QueueAge, 2)
+            ]
         );
     }
 
@@ -262,7 +271,7 @@ mod tests {
         let mut radio = in_world(UP);
         radio.receive(Time(0), hop(0, MAX_HOPS + 1), vec![]);
         assert_eq!(radio.next_due(), None);
-        assert_eq!(radio.counters(0).refused, 1);
+        assert_eq!(radio.counters(0, 0).refused, 1);
     }
 
     #[test]

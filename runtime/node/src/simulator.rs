@@ -1,25 +1,47 @@
-//! A vehicle in a simulated world, at the other end of a loopback stream.
+//! A simulated vehicle in a simulated world, at the other end of one loopback stream:
+//! the only file that knows the simulator's frames.
 //!
 //! Frames are read as fast as they come and merged: after a pause of the process
-//! only the newest state of everything waits, never a backlog of old percepts.
+//! only the newest state of everything waits, never a backlog of old percepts. A
+//! percept is given to nobody before the time at which it was sensed.
 
-use crate::vehicle::{News, Tick, Vehicle};
-use skein_link::frame::{Decoder, FrameError, Order, ToPeer, ToWorld, encode};
-use std::collections::VecDeque;
+use crate::vehicle::Vehicle;
+use crate::world::{News, Tick, World};
+use skein_behaviors::{Percept, Setpoint};
+use skein_link::RadioCounters;
+use skein_link::frame::{Decoder, FrameError, ToPeer, ToWorld, encode};
+use skein_peer::Report;
 use std::net::SocketAddr;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::io::AsyncWriteExt;
 use tokio::net::TcpStream;
 use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::Notify;
 
+/// Where a simulated world takes peers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SimulatorConfig {
+    /// Where it listens.
+    pub address: SocketAddr,
+    /// Proves that this peer belongs to it.
+    pub token: String,
+}
+
+/// What a peer says of itself when it joins a world.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Hello {
+    /// Its number.
+    pub id: u16,
+    /// Where its transport listens.
+    pub locator: String,
+    /// Where it listens for an operator, if it does.
+    pub console: Option<SocketAddr>,
+}
+
 /// How long the world may take to welcome a peer. It is on the same machine, but
 /// may be starting dozens of processes on two cores.
 const WELCOME_TIMEOUT: Duration = Duration::from_secs(10);
-
-/// Orders that wait for the peer's loop; an operator does not type faster.
-const MAX_ORDERS: usize = 16;
 
 /// Why there is no stream.
 #[derive(Debug, thiserror::Error)]
@@ -53,23 +75,43 @@ pub struct Welcome {
     pub scale: f64,
 }
 
+/// What joining a world gives.
+#[derive(Debug)]
+pub struct Joined {
+    /// The vehicle in it.
+    pub vehicle: SimulatedVehicle,
+    /// The world itself.
+    pub world: SimulatedWorld,
+    /// What it said first.
+    pub welcome: Welcome,
+}
+
 /// A vehicle in a simulated world.
 #[derive(Debug)]
-pub struct Simulated {
-    waiting: Arc<Waiting>,
-    writer: OwnedWriteHalf,
+pub struct SimulatedVehicle {
+    shared: Arc<Shared>,
 }
 
-#[derive(Debug, Default)]
-struct Waiting {
+/// The world around it.
+#[derive(Debug)]
+pub struct SimulatedWorld {
+    shared: Arc<Shared>,
+}
+
+/// Both ends of the stream, as vehicle and world use them.
+#[derive(Debug)]
+struct Shared {
     state: Mutex<Merged>,
-    filled: Notify,
+    ticked: Notify,
+    sensed: Notify,
+    writer: tokio::sync::Mutex<OwnedWriteHalf>,
 }
 
+/// What was read and not taken yet.
 #[derive(Debug, Default)]
 struct Merged {
     tick: Option<Tick>,
-    orders: VecDeque<Order>,
+    percept: Option<Percept>,
     ended: bool,
 }
 
@@ -82,96 +124,139 @@ impl Merged {
                 percept,
                 links,
             } => {
-                let tick = self.tick.get_or_insert_default();
-                tick.time_ms = time_ms;
-                tick.scale = scale;
-                tick.percept = percept.or(tick.percept);
-                tick.links = links.or(tick.links.take());
-            }
-            ToPeer::Command(order) => {
-                if self.orders.len() >= MAX_ORDERS {
-                    self.orders.pop_front();
-                }
-                self.orders.push_back(order);
+                let untold = self.tick.take().and_then(|t| t.links);
+                let links = links.or(untold);
+                self.tick = Some(Tick {
+                    time_ms,
+                    scale,
+                    links,
+                });
+                self.percept = percept.or(self.percept);
             }
             ToPeer::End => self.ended = true,
             ToPeer::Welcome { .. } => {}
         }
     }
+}
 
-    fn pop(&mut self) -> Option<News> {
-        if let Some(order) = self.orders.pop_front() {
-            return Some(News::Command(order));
+impl Shared {
+    fn state(&self) -> MutexGuard<'_, Merged> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    async fn tell(&self, what: &ToWorld) {
+        match encode(what) {
+            // A broken stream ends the reader too, which then says so.
+            Ok(bytes) => drop(self.writer.lock().await.write_all(&bytes).await),
+            Err(cause) => tracing::error!(%cause, "a frame for the world was not sent"),
         }
-        // The end waits for nothing that was sensed before it.
-        if self.ended {
-            return Some(News::End);
-        }
-        self.tick.take().map(News::Tick)
     }
 }
 
-impl Simulated {
-    /// Connects, says hello and waits for the welcome.
-    ///
-    /// # Errors
-    /// When nobody is there, or answers otherwise.
-    pub async fn join(address: SocketAddr, hello: ToWorld) -> Result<(Self, Welcome), StreamError> {
-        let unreachable = |cause| StreamError::Unreachable { address, cause };
-        let unwelcome = |cause: String| StreamError::Unwelcome { address, cause };
-        let stream = TcpStream::connect(address).await.map_err(unreachable)?;
-        stream.set_nodelay(true).map_err(unreachable)?;
-        let (reader, mut writer) = stream.into_split();
-        let bytes = encode(&hello).map_err(|e| unwelcome(e.to_string()))?;
-        writer.write_all(&bytes).await.map_err(unreachable)?;
-        let mut decoder = Decoder::default();
-        let first = tokio::time::timeout(WELCOME_TIMEOUT, first_frame(&reader, &mut decoder))
-            .await
-            .map_err(|_| unwelcome("no answer in time".to_owned()))?
-            .map_err(unwelcome)?;
-        let ToPeer::Welcome {
+/// Connects, says hello and waits for the welcome.
+///
+/// # Errors
+/// When nobody is there, or answers otherwise.
+pub async fn join(config: &SimulatorConfig, hello: Hello) -> Result<Joined, StreamError> {
+    let address = config.address;
+    let unreachable = |cause| StreamError::Unreachable { address, cause };
+    let unwelcome = |cause: String| StreamError::Unwelcome { address, cause };
+    let stream = TcpStream::connect(address).await.map_err(unreachable)?;
+    stream.set_nodelay(true).map_err(unreachable)?;
+    let (reader, mut writer) = stream.into_split();
+    let hello = ToWorld::Hello {
+        id: hello.id,
+        pid: std::process::id(),
+        token: config.token.clone(),
+        locator: hello.locator,
+        console: hello.console.map(|at| at.to_string()),
+    };
+    let bytes = encode(&hello).map_err(|e| unwelcome(e.to_string()))?;
+    writer.write_all(&bytes).await.map_err(unreachable)?;
+    let mut decoder = Decoder::default();
+    let first = tokio::time::timeout(WELCOME_TIMEOUT, first_frame(&reader, &mut decoder))
+        .await
+        .map_err(|_| unwelcome("no answer in time".to_owned()))?
+        .map_err(unwelcome)?;
+    let ToPeer::Welcome {
+        seed,
+        time_ms,
+        scale,
+    } = first
+    else {
+        return Err(unwelcome("its first frame is no welcome".to_owned()));
+    };
+    let shared = Arc::new(Shared {
+        state: Mutex::default(),
+        ticked: Notify::new(),
+        sensed: Notify::new(),
+        writer: tokio::sync::Mutex::new(writer),
+    });
+    tokio::spawn(read_all(reader, decoder, Arc::clone(&shared)));
+    Ok(Joined {
+        vehicle: SimulatedVehicle {
+            shared: Arc::clone(&shared),
+        },
+        world: SimulatedWorld { shared },
+        welcome: Welcome {
             seed,
             time_ms,
             scale,
-        } = first
-        else {
-            return Err(unwelcome("its first frame is no welcome".to_owned()));
-        };
-        let waiting = Arc::new(Waiting::default());
-        tokio::spawn(read_all(reader, decoder, Arc::clone(&waiting)));
-        Ok((
-            Self { waiting, writer },
-            Welcome {
-                seed,
-                time_ms,
-                scale,
-            },
-        ))
+        },
+    })
+}
+
+impl Vehicle for SimulatedVehicle {
+    async fn sense(&mut self) -> Percept {
+        loop {
+            {
+                let mut state = self.shared.state();
+                if state.tick.is_none()
+                    && let Some(percept) = state.percept.take()
+                {
+                    return percept;
+                }
+            }
+            self.shared.sensed.notified().await;
+        }
+    }
+
+    async fn fly(&mut self, setpoint: Setpoint) {
+        self.shared.tell(&ToWorld::Setpoint(setpoint)).await;
     }
 }
 
-impl Vehicle for Simulated {
+impl World for SimulatedWorld {
     async fn next(&mut self) -> News {
         loop {
-            let news = self
-                .waiting
-                .state
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .pop();
-            if let Some(news) = news {
-                return news;
+            {
+                let mut state = self.shared.state();
+                // The end waits for nothing that was sensed before it.
+                if state.ended {
+                    return News::End;
+                }
+                if let Some(tick) = state.tick.take() {
+                    self.shared.sensed.notify_one();
+                    return News::Tick(tick);
+                }
             }
-            self.waiting.filled.notified().await;
+            self.shared.ticked.notified().await;
         }
     }
 
-    async fn tell(&mut self, what: ToWorld) {
-        match encode(&what) {
-            // A broken stream ends the reader too, which then says so.
-            Ok(bytes) => drop(self.writer.write_all(&bytes).await),
-            Err(cause) => tracing::error!(%cause, "a frame for the world was not sent"),
+    async fn report(&mut self, report: &Report) {
+        match cbor4ii::serde::to_vec(Vec::new(), report) {
+            Ok(bytes) => self.shared.tell(&ToWorld::Report(bytes)).await,
+            Err(cause) => tracing::error!(%cause, "a report was not sent"),
         }
+    }
+
+    async fn count(&mut self, counters: RadioCounters) {
+        self.shared.tell(&ToWorld::Radio(counters)).await;
+    }
+
+    async fn leave(&mut self) {
+        self.shared.tell(&ToWorld::Bye).await;
     }
 }
 
@@ -207,11 +292,11 @@ async fn fill(reader: &OwnedReadHalf, decoder: &mut Decoder) -> bool {
     }
 }
 
-/// Reads until the stream ends, merging what the loop has not taken yet.
-async fn read_all(reader: OwnedReadHalf, mut decoder: Decoder, waiting: Arc<Waiting>) {
+/// Reads until the stream ends, merging what was not taken yet.
+async fn read_all(reader: OwnedReadHalf, mut decoder: Decoder, shared: Arc<Shared>) {
     loop {
         let open = fill(&reader, &mut decoder).await;
-        let mut state = waiting.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut state = shared.state();
         loop {
             match decoder.pop() {
                 Ok(Some(frame)) => state.take(frame),
@@ -226,7 +311,7 @@ async fn read_all(reader: OwnedReadHalf, mut decoder: Decoder, waiting: Arc<Wait
         state.ended |= !open;
         let ended = state.ended;
         drop(state);
-        waiting.filled.notify_one();
+        shared.ticked.notify_one();
         if ended {
             return;
         }
@@ -236,24 +321,32 @@ async fn read_all(reader: OwnedReadHalf, mut decoder: Decoder, waiting: Arc<Wait
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::percept;
+    use skein_link::LinkState;
     use tokio::io::AsyncReadExt;
     use tokio::net::TcpListener;
 
-    fn tick(time_ms: u64, links: Option<Vec<(u16, skein_link::LinkState)>>) -> ToPeer {
+    fn tick(time_ms: u64, sensed: bool, links: Option<Vec<(u16, LinkState)>>) -> ToPeer {
         ToPeer::Tick {
             time_ms,
             scale: 2.0,
-            percept: None,
+            percept: sensed.then(|| percept(time_ms)),
             links,
         }
     }
 
-    fn hello() -> ToWorld {
-        ToWorld::Hello {
+    fn hello() -> Hello {
+        Hello {
             id: 1,
-            pid: 2,
-            token: "t".to_owned(),
             locator: "l".to_owned(),
+            console: None,
+        }
+    }
+
+    fn config(address: SocketAddr) -> SimulatorConfig {
+        SimulatorConfig {
+            address,
+            token: "t".to_owned(),
         }
     }
 
@@ -270,10 +363,9 @@ mod tests {
             };
             let mut bytes = encode(&welcome).unwrap();
             for frame in [
-                tick(100, Some(vec![])),
-                tick(200, None),
-                tick(300, None),
-                ToPeer::Command(Order::Hold),
+                tick(100, true, Some(vec![])),
+                tick(200, true, None),
+                tick(300, false, None),
             ] {
                 bytes.extend(encode(&frame).unwrap());
             }
@@ -282,32 +374,35 @@ mod tests {
             stream.read_exact(&mut answer).await.unwrap();
             stream
         });
-        let (mut vehicle, welcome) = Simulated::join(address, hello()).await.unwrap();
-        assert_eq!(
-            welcome,
-            Welcome {
-                seed: 5,
-                time_ms: 0,
-                scale: 2.0
-            }
-        );
+        let mut joined = join(&config(address), hello()).await.unwrap();
+        let welcome = Welcome {
+            seed: 5,
+            time_ms: 0,
+            scale: 2.0,
+        };
+        assert_eq!(joined.welcome, welcome);
         let stream = world.await.unwrap();
-        let mut times = Vec::new();
-        let mut links = None;
-        let mut ordered = false;
-        while times.last() != Some(&300) || !ordered {
-            match vehicle.next().await {
-                News::Tick(t) => {
-                    times.push(t.time_ms);
-                    links = t.links.or(links);
-                }
-                News::Command(order) => ordered = order == Order::Hold,
-                News::End => panic!("too early"),
+        let (mut times, mut links, mut sensed) = (Vec::new(), None, Vec::new());
+        while times.last() != Some(&300) || sensed.is_empty() {
+            tokio::select! {
+                biased;
+                sense = joined.vehicle.sense() => sensed.push((times.last().copied(), sense)),
+                news = joined.world.next() => match news {
+                    News::Tick(t) => {
+                        times.push(t.time_ms);
+                        links = t.links.or(links);
+                    }
+                    News::End => panic!("too early"),
+                },
             }
         }
         assert_eq!(links, Some(vec![]), "merging kept the only table");
+        for (told, sense) in sensed {
+            let at_ms = sense.time_ms;
+            assert!(told.is_some_and(|t| t >= at_ms), "{told:?} before {at_ms}");
+        }
         drop(stream);
-        assert_eq!(vehicle.next().await, News::End);
+        assert_eq!(joined.world.next().await, News::End);
     }
 
     #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
@@ -315,7 +410,7 @@ mod tests {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
         drop(listener);
-        let error = Simulated::join(address, hello()).await.unwrap_err();
+        let error = join(&config(address), hello()).await.unwrap_err();
         assert!(error.to_string().contains(&address.to_string()), "{error}");
     }
 }

@@ -79,7 +79,8 @@ pub enum Input {
 /// What an operator can want. Enters at a ground station and travels by radio.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Command {
-    /// Publish a new mission revision.
+    /// Publish a new mission; nobody takes one whose revision is not the highest, see
+    /// [`crate::Peer::next_revision`].
     Mission(Arc<Mission>),
     /// A new standing order for every UAV.
     Order(Order),

@@ -20,11 +20,12 @@ use crate::protocol::membership::Membership;
 use crate::protocol::relay::Relay;
 use crate::protocol::runs::PlannedCell;
 use crate::wire::message::{Epoch, Order};
-use crate::{Incarnation, PeerId, cooperation, inbound, outbound, protocol::life};
+use crate::{Incarnation, Mission, PeerId, cooperation, inbound, outbound, protocol::life};
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
 use skein_behaviors::Percept;
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 
 /// Most stores under way: one a kind of promise and a few unions. A driver that
 /// answers none of them is broken, and the peer goes silent rather than lie.
@@ -290,6 +291,36 @@ impl Peer {
 
     pub(crate) fn period_ms(&self) -> u64 {
         u64::from(self.config.beacon_period_ms.max(1))
+    }
+
+    /// The newest mission that it holds.
+    #[must_use]
+    pub fn mission(&self) -> Option<Arc<Mission>> {
+        self.library.newest()
+    }
+
+    /// The revision that the operator's next mission must have to be flown: above those
+    /// of all missions that this peer holds, or has heard that others follow.
+    #[must_use]
+    pub fn next_revision(&self) -> u32 {
+        let held = self.library.newest().map(|m| m.revision);
+        let heard = self
+            .membership
+            .all()
+            .filter_map(|(id, ..)| self.membership.info(id))
+            .map(|info| info.revision);
+        held.into_iter()
+            .chain(heard)
+            .max()
+            .unwrap_or(0)
+            .saturating_add(1)
+    }
+
+    /// The life in which it speaks at present; none while it only listens.
+    #[must_use]
+    pub fn speaks_in(&self) -> Option<Incarnation> {
+        let speaks = self.life.speaks(self.now) && !self.outbound.silenced;
+        speaks.then_some(self.life.incarnation)
     }
 
     /// A copy of what it believes.

@@ -7,12 +7,12 @@
 //! have been sending itself, or it may have heard two at once, from senders that did
 //! not hear each other (or began within the same moment).
 //!
-//! Each station has one queue: by priority, then by age; a newer value replaces an
-//! older one of the same key in its place; what has waited too long is dropped.
+//! Each station has one queue ([`skein_link::queue`]), as a live node has.
 
 use super::LinkTable;
 use crate::spec::RadioSpec;
 use skein_link::fate::mix;
+use skein_link::queue::{Queued, SendQueue, Waiting};
 use skein_link::{Fate, Reason, fate};
 use skein_peer::Priority;
 use std::collections::BTreeMap;
@@ -26,10 +26,6 @@ pub const BACKOFF_US: u64 = 16_000;
 /// A transmission is heard this long after it began, microseconds: the time a radio
 /// takes from receiving to sending. Two stations that begin within it collide.
 pub const SENSE_US: u64 = 200;
-
-/// Most frames in one queue: the default age of 2 s at 64 kbit/s lets 16,000 bytes out,
-/// and no record is smaller than 40 bytes.
-pub const MAX_QUEUE: usize = 400;
 
 /// What a station wants to send.
 #[derive(Clone, Debug)]
@@ -86,8 +82,10 @@ pub struct Tally {
 }
 
 impl Tally {
-    fn drop_one(&mut self, reason: Reason) {
-        *self.dropped.entry(reason).or_insert(0) += 1;
+    fn drop_many(&mut self, reason: Reason, n: u64) {
+        if n > 0 {
+            *self.dropped.entry(reason).or_insert(0) += n;
+        }
     }
 
     /// Adds another station's figures.
@@ -104,18 +102,9 @@ impl Tally {
 }
 
 #[derive(Clone, Debug)]
-struct Waiting {
-    frame: Frame,
-    /// When its place in the queue was taken.
-    place_us: u64,
-    /// When this value was handed over.
-    queued_us: u64,
-}
-
-#[derive(Clone, Debug)]
 struct Station {
     id: u16,
-    queue: Vec<Waiting>,
+    queue: SendQueue<Frame>,
     /// When it listens next; nothing while it sends or has nothing to send.
     listen_us: Option<u64>,
     sending: bool,
@@ -130,7 +119,7 @@ struct OnAir {
     from_us: u64,
     to_us: u64,
     number: u64,
-    waiting: Waiting,
+    waiting: Waiting<Frame>,
     over: bool,
 }
 
@@ -156,7 +145,7 @@ impl Medium {
     pub fn new(nodes: &[u16], radio: RadioSpec, seed: u64) -> Self {
         let stations = nodes.iter().map(|id| Station {
             id: *id,
-            queue: Vec::new(),
+            queue: SendQueue::default(),
             listen_us: None,
             sending: false,
             sent: 0,
@@ -281,9 +270,9 @@ impl Medium {
         let s = &mut self.stations[i];
         s.listen_us = None;
         s.expire(at_us, queue_age_ms);
-        if s.queue.is_empty() {
+        let Some(n_bytes) = s.queue.first().map(|f| f.bytes.len()) else {
             return;
-        }
+        };
         let id = s.id;
         let heard_until_us = self
             .air
@@ -297,10 +286,11 @@ impl Medium {
             self.stations[i].listen_us = Some(until_us + wait_us);
             return;
         }
-        let n_bytes = self.stations[i].queue[0].frame.bytes.len();
         let airtime_us = self.airtime_us(n_bytes);
         let s = &mut self.stations[i];
-        let waiting = s.queue.remove(0);
+        let Some(waiting) = s.queue.pop() else {
+            return;
+        };
         s.sending = true;
         s.tally.frames += 1;
         s.tally.bytes += u64::try_from(n_bytes).unwrap_or(u64::MAX);
@@ -339,7 +329,7 @@ impl Medium {
         let tally = &mut self.stations[i].tally;
         for (rx, f) in fates {
             match f {
-                Fate::Lost(reason) => tally.drop_one(reason),
+                Fate::Lost(reason) => tally.drop_many(reason, 1),
                 Fate::Delivered { delay_ms } => {
                     tally.delivered += 1;
                     out.push(Delivery {
@@ -383,39 +373,33 @@ impl Medium {
 
 impl Station {
     fn enqueue(&mut self, now_us: u64, frame: Frame) {
-        let old = self.queue.iter().position(|w| w.frame.key == frame.key);
-        let place_us = match old {
-            Some(k) => {
-                self.tally.replaced += 1;
-                self.queue.remove(k).place_us
-            }
-            None => now_us,
-        };
-        let waiting = Waiting {
-            frame,
-            place_us,
-            queued_us: now_us,
-        };
-        let rank = |w: &Waiting| (w.frame.priority, w.place_us);
-        let at = self.queue.partition_point(|w| rank(w) <= rank(&waiting));
-        self.queue.insert(at, waiting);
-        if self.queue.len() > MAX_QUEUE {
-            // The last in line would be the first to grow too old.
-            self.queue.pop();
-            self.tally.drop_one(Reason::QueueAge);
+        let pushed = self.queue.push(now_us, frame);
+        self.tally.replaced += u64::from(pushed.replaced);
+        if pushed.dropped {
+            self.tally.drop_many(Reason::QueueAge, 1);
         }
     }
 
     fn expire(&mut self, now_us: u64, queue_age_ms: u32) {
-        let tally = &mut self.tally;
-        self.queue.retain(|w| {
-            let limit_ms = w.frame.lifetime_ms.min(queue_age_ms);
-            let keep = now_us <= w.queued_us + u64::from(limit_ms) * 1000;
-            if !keep {
-                tally.drop_one(Reason::QueueAge);
-            }
-            keep
-        });
+        let n = self.queue.expire(now_us, queue_age_ms);
+        self.tally.drop_many(Reason::QueueAge, n as u64);
+    }
+}
+
+impl Queued for Frame {
+    type Key = u64;
+    type Priority = Priority;
+
+    fn key(&self) -> &u64 {
+        &self.key
+    }
+
+    fn priority(&self) -> Priority {
+        self.priority
+    }
+
+    fn lifetime_ms(&self) -> u32 {
+        self.lifetime_ms
     }
 }
 
@@ -427,6 +411,7 @@ mod tests {
     use crate::spec::Spec;
     use crate::world::World;
     use crate::world::fixture::square;
+    use skein_link::queue::MAX_QUEUE;
 
     fn spec(n: u16) -> Spec {
         let mut s = square(n);

@@ -1,0 +1,174 @@
+//! What this peer says, on its way to the transport: no faster than the channel, the
+//! urgent first, and nothing that is out of date.
+//!
+//! The rules of waiting are those of the simulated channel ([`skein_link::queue`]). A
+//! frame holds the channel for eight bits a byte at its rate; that others hold it too
+//! is left to the transport.
+
+use skein_link::SendQueue;
+use skein_link::queue::Queued;
+use skein_peer::{Priority, Time};
+
+/// What a peer wants to send.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// The natural key; a newer record of the same key replaces a waiting older one.
+    pub key: String,
+    /// The record.
+    pub bytes: Vec<u8>,
+    /// Hops the record has made before this transmission.
+    pub hops: u8,
+    /// Which frames go first.
+    pub priority: Priority,
+    /// Dropped when it could not be sent within this time, milliseconds.
+    pub lifetime_ms: u32,
+}
+
+impl Queued for Frame {
+    type Key = str;
+    type Priority = Priority;
+
+    fn key(&self) -> &str {
+        &self.key
+    }
+
+    fn priority(&self) -> Priority {
+        self.priority
+    }
+
+    fn lifetime_ms(&self) -> u32 {
+        self.lifetime_ms
+    }
+}
+
+/// The frames of one peer that wait for the channel.
+#[derive(Debug)]
+pub struct Outgoing {
+    queue: SendQueue<Frame>,
+    rate_bps: u64,
+    max_age_ms: u32,
+    /// The last frame has left by then, microseconds.
+    free_us: u64,
+    dropped: u64,
+}
+
+impl Outgoing {
+    /// Nothing waits. Frames leave at `rate_bps`; none waits longer than `max_age_ms`.
+    #[must_use]
+    pub fn new(rate_bps: u32, max_age_ms: u32) -> Self {
+        Self {
+            queue: SendQueue::default(),
+            rate_bps: u64::from(rate_bps.max(1)),
+            max_age_ms,
+            free_us: 0,
+            dropped: 0,
+        }
+    }
+
+    /// Takes what is to be sent.
+    pub fn push(&mut self, now: Time, frame: Frame) {
+        let pushed = self.queue.push(now.0.saturating_mul(1000), frame);
+        self.dropped += u64::from(pushed.dropped);
+    }
+
+    /// The next frame that may leave now.
+    pub fn pop(&mut self, now: Time) -> Option<Frame> {
+        let now_us = now.0.saturating_mul(1000);
+        self.dropped += self.queue.expire(now_us, self.max_age_ms) as u64;
+        if now_us < self.free_us {
+            return None;
+        }
+        let frame = self.queue.pop()?.frame;
+        let bits = (frame.bytes.len() as u64).saturating_mul(8);
+        let airtime_us = bits.saturating_mul(1_000_000).div_ceil(self.rate_bps);
+        // The clock counts whole milliseconds: of a queue that never ran empty the
+        // frames follow each other without a gap.
+        let begun_us = self.free_us.max(now_us.saturating_sub(999));
+        self.free_us = begun_us.saturating_add(airtime_us);
+        Some(frame)
+    }
+
+    /// When the next frame may leave; none while nothing waits.
+    #[must_use]
+    pub fn next_due(&self) -> Option<Time> {
+        (!self.queue.is_empty()).then(|| Time(self.free_us.div_ceil(1000)))
+    }
+
+    /// Frames that were never sent because they waited too long, so far.
+    #[must_use]
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(key: &str, priority: Priority, lifetime_ms: u32) -> Frame {
+        Frame {
+            key: key.to_owned(),
+            bytes: vec![0; 100],
+            hops: 0,
+            priority,
+            lifetime_ms,
+        }
+    }
+
+    /// Lets everything leave that may, second after second; keys and times.
+    fn sent(out: &mut Outgoing, from_ms: u64, to_ms: u64) -> Vec<(u64, String)> {
+        let mut sent = Vec::new();
+        for t in from_ms..to_ms {
+            while let Some(f) = out.pop(Time(t)) {
+                sent.push((t, f.key));
+            }
+        }
+        sent
+    }
+
+    #[test]
+    fn frames_leave_at_the_rate_of_the_channel_and_the_urgent_go_first() {
+        // 800 bits at 64 kbit/s are 12.5 ms.
+        let mut out = Outgoing::new(64_000, 2_000);
+        for (key, priority) in [
+            ("cover", Priority::Telemetry),
+            ("beacon", Priority::Beacon),
+            ("claim", Priority::Claim),
+        ] {
+            out.push(Time(100), frame(key, priority, 1_000));
+        }
+        assert_eq!(out.next_due(), Some(Time(0)));
+        let all = sent(&mut out, 100, 200);
+        let expected = [(100, "claim"), (112, "beacon"), (125, "cover")];
+        assert_eq!(all, expected.map(|(t, k)| (t, k.to_owned())));
+        assert_eq!((out.next_due(), out.dropped()), (None, 0));
+    }
+
+    #[test]
+    fn what_could_not_leave_within_its_lifetime_never_does() {
+        let mut out = Outgoing::new(64_000, 2_000);
+        out.push(Time(0), frame("first", Priority::Beacon, 5));
+        out.push(Time(0), frame("short", Priority::Beacon, 5));
+        out.push(Time(0), frame("long", Priority::Beacon, 5_000));
+        assert_eq!(sent(&mut out, 0, 1), [(0, "first".to_owned())]);
+        assert_eq!(sent(&mut out, 1, 50), [(13, "long".to_owned())]);
+        assert_eq!(out.dropped(), 1);
+        // After a pause of the process nothing old is left to be said.
+        out.push(Time(50), frame("old", Priority::Claim, 60_000));
+        assert_eq!(out.pop(Time(9_000)), None);
+        assert_eq!(out.dropped(), 2);
+    }
+
+    #[test]
+    fn a_newer_record_of_the_same_key_replaces_what_waits() {
+        let mut out = Outgoing::new(64_000, 2_000);
+        out.push(Time(0), frame("state", Priority::Telemetry, 1_000));
+        let newer = Frame {
+            hops: 7,
+            ..frame("state", Priority::Telemetry, 1_000)
+        };
+        out.push(Time(1), newer);
+        assert_eq!(out.pop(Time(1)).map(|f| f.hops), Some(7));
+        assert_eq!((out.pop(Time(50)), out.dropped()), (None, 0));
+    }
+}
