@@ -1,67 +1,91 @@
-//! The table of D2.7 names files and tests that exist.
+//! docs/d27.md names files that are there, and tests that are `#[test]` functions where
+//! the table says they stand.
 
 #![allow(
     clippy::unwrap_used,
     reason = "a test may; the lint's own exception does not reach helpers"
 )]
 
-use std::path::{Path, PathBuf};
+use crate::documents::{root, rows_under, ticked};
+use std::path::PathBuf;
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .unwrap()
-        .to_path_buf()
-}
-
-/// All Rust source of the workspace in one string.
-fn all_source() -> String {
-    let mut open: Vec<PathBuf> = [
-        "planning",
-        "behaviors",
-        "runtime",
-        "netsim",
-        "interop",
-        "bench",
-        "tests",
-        "src",
-    ]
-    .map(|f| root().join(f))
-    .to_vec();
-    let mut text = String::new();
+/// Where the tests of a file stand: in itself, and in the folder of its module.
+fn module_of(file: &str) -> Vec<PathBuf> {
+    let path = root().join(file);
+    let folder = if path
+        .file_name()
+        .is_some_and(|n| n == "mod.rs" || n == "lib.rs")
+    {
+        path.parent().unwrap().to_path_buf()
+    } else {
+        path.with_extension("")
+    };
+    let mut open = vec![folder];
+    let mut files = vec![path];
     while let Some(path) = open.pop() {
         if path.is_dir() {
             open.extend(std::fs::read_dir(path).unwrap().map(|e| e.unwrap().path()));
         } else if path.extension().is_some_and(|e| e == "rs") {
-            text.push_str(&std::fs::read_to_string(path).unwrap());
+            files.push(path);
         }
     }
-    text
+    files
+}
+
+/// Whether source has a function of this name that is run as a test: `#[test]`, or another
+/// attribute that ends so, stands above it, with only attributes between.
+fn tests(source: &str, name: &str) -> bool {
+    let head = format!("fn {name}(");
+    let lines: Vec<&str> = source.lines().map(str::trim).collect();
+    let at = lines.iter().position(|l| {
+        let rest = l.strip_prefix("async ").unwrap_or(l);
+        rest.starts_with(&head)
+    });
+    let Some(at) = at else {
+        return false;
+    };
+    let above = lines[..at].iter().rev();
+    above
+        .take_while(|l| !l.is_empty() && !l.ends_with(['}', '{']))
+        .any(|l| l.starts_with("#[test]") || l.starts_with("#[tokio::test"))
 }
 
 #[test]
-fn every_section_names_a_file_and_a_test_that_exist() {
+fn every_statement_names_a_file_and_a_test_that_notices() {
     let table = std::fs::read_to_string(root().join("docs/d27.md")).unwrap();
-    let source = all_source();
-    let mut sections = 0;
-    for line in table
-        .lines()
-        .filter(|l| l.starts_with("| ") && !l.starts_with("| section"))
-    {
-        let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
-        assert_eq!(cells.len(), 5, "{line}");
-        sections += 1;
-        let (file, test) = (cells[2].trim_matches('`'), cells[3].trim_matches('`'));
+    let mut built = 0;
+    let rows = rows_under(&table, "# D2.7, statement by statement");
+    for row in &rows {
+        let [section, statement, file, test, state] = row.as_slice() else {
+            panic!("{row:?} has not five cells");
+        };
+        let place = format!("{section} ({statement})");
         if file == "–" {
-            assert_eq!((test, cells[4]), ("–", "later"), "{line}");
+            assert_eq!(test, "–", "{place}");
+            assert!(state.starts_with("not built"), "{place}");
             continue;
         }
-        assert!(root().join(file).exists(), "{}: no file {file}", cells[0]);
-        assert!(
-            source.contains(&format!("fn {test}(")),
-            "{}: no test {test}",
-            cells[0]
-        );
+        built += 1;
+        let files = ticked(file);
+        assert!(root().join(&files[0]).exists(), "{place}: no file {file}");
+        let test = ticked(test);
+        let places = match test.as_slice() {
+            [_] => module_of(&files[0]),
+            [_, other] => vec![root().join(other)],
+            _ => panic!("{place}: `test` or `test` in `file` is wanted"),
+        };
+        let found = places
+            .iter()
+            .filter_map(|p| std::fs::read_to_string(p).ok())
+            .any(|source| tests(&source, &test[0]));
+        assert!(found, "{place}: no test {} in {places:?}", test[0]);
     }
-    assert!(sections >= 28, "only {sections} sections are traced");
+    assert!(built >= 70, "only {built} statements are built");
+}
+
+#[test]
+fn a_test_is_told_from_a_function_of_its_name() {
+    let source = "#[test]\nfn a() {}\n\n/// Not one.\nfn b() {}\n    #[test]\n    fn c(\n        x: u8,\n    ) {}";
+    let found = ["a", "b", "c", "d"].map(|name| tests(source, name));
+    assert_eq!(found, [true, false, true, false]);
 }
