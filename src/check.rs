@@ -8,8 +8,7 @@ use skein_netsim::spec::Spec;
 use skein_netsim::world::Survey;
 use skein_peer::CoverageTask;
 use skein_scenario::{
-    AreaPlanner, Forecast, Overrides, Scenario, ScenarioError, Summary, extent_m, forecast,
-    side_by_side, summary,
+    AreaPlanner, Forecast, Overrides, Scenario, ScenarioError, Summary, extent_m,
 };
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -69,18 +68,19 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
             return Ok(ExitCode::from(exit::CONFIG_INVALID));
         }
     };
-    let total = summary(&scenario.spec, &scenario.ground);
+    let total = &scenario.summary;
     let judged = Judged::new(&scenario);
     let forecasts = match args.planner.chosen() {
-        Some(planner) => forecast(&scenario)
+        Some(planner) => scenario
+            .forecast()
             .map(|f| (planner, Ok(f)))
             .into_iter()
             .collect(),
-        None => side_by_side(args.scenario.as_deref(), &over, &scenario),
+        None => scenario.side_by_side(),
     };
     match args.format {
-        Format::Text => print!("{}", text(&scenario, &total, &judged, &forecasts)),
-        Format::Json => println!("{}", json(&scenario, &total, &judged, &forecasts)),
+        Format::Text => print!("{}", text(&scenario, total, &judged, &forecasts)),
+        Format::Json => println!("{}", json(&scenario, total, &judged, &forecasts)),
     }
     Ok(ExitCode::from(exit::OK))
 }
@@ -97,7 +97,7 @@ struct Judged {
 impl Judged {
     fn new(scenario: &Scenario) -> Self {
         let survey = Survey::new(&scenario.spec);
-        let the_loop = &scenario.ground.coverage_loop;
+        let the_loop = &scenario.geometry.coverage_loop;
         let open = survey.cells().iter().filter(|c| c.uncoverable.is_none());
         Self {
             cells: survey.cells().len(),
@@ -161,13 +161,13 @@ fn area_lines(spec: &Spec, total: &Summary, judged: &Judged) -> Vec<Line> {
     let zones = format!(
         "{} no-fly, clearance {:.1} m; {} buildings block radio",
         spec.zones.len(),
-        f64::from(mission.clearance_mm) / 1000.0,
+        mission.clearance_m(),
         spec.buildings.len()
     );
     let cells = format!(
         "{} of {} m on the loop, {} of them seen by excursions",
         total.cells,
-        f64::from(mission.lane_spacing_mm) / 1000.0,
+        mission.lane_m(),
         total.excursions
     );
     let mut lines = vec![

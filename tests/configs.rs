@@ -105,7 +105,7 @@ fn helsinki_is_what_it_says() {
     roofs.sort_by(f64::total_cmp);
     assert_eq!(format!("{roofs:?}"), "[38.0, 39.0, 70.0]");
     assert_eq!(spec.zones.len(), 3);
-    let total = skein_scenario::summary(spec, &scenario.ground);
+    let total = skein_scenario::summary(spec, &scenario.geometry);
     assert!((total.area_m2 - 1_013_760.0).abs() < 1.0);
     assert!(
         total.coverable_share >= 0.97,
@@ -134,7 +134,7 @@ fn the_planner_misses_no_cell_that_the_world_calls_coverable() {
             survey.coverable_share()
         );
         let open = survey.cells().iter().filter(|c| c.uncoverable.is_none());
-        let the_loop = &scenario.ground.coverage_loop;
+        let the_loop = &scenario.geometry.coverage_loop;
         // The middles of the judge's own squares lie in the pieces of the passes, and its
         // pieces of lines in the stations.
         let planned = |c: &&skein_netsim::world::Cell| match the_loop.patches() {
@@ -176,9 +176,9 @@ fn targets_are_what_their_files_say() {
     let load = |name: &str| load_builtin(name, &Overrides::default()).unwrap();
     let points = load("points");
     assert_eq!(points.spec.mission.pieces().unwrap().len(), 48);
-    assert_eq!(points.ground.coverage_loop.len(), 48);
+    assert_eq!(points.geometry.coverage_loop.len(), 48);
     let roads = load("roads");
-    let total = skein_scenario::summary(&roads.spec, &roads.ground);
+    let total = skein_scenario::summary(&roads.spec, &roads.geometry);
     // Some 13.5 km of road, with the ways between and the turns of a fixed wing.
     assert!(
         total.loop_m > 14_000.0 && total.loop_m < 19_000.0,
@@ -199,7 +199,7 @@ fn a_field_is_covered_but_for_what_lies_at_its_zones() {
         .collect();
     let near = "nearer to a no-fly zone than the clearance".to_owned();
     assert_eq!(why, [near].into());
-    let total = skein_scenario::summary(&field.spec, &field.ground);
+    let total = skein_scenario::summary(&field.spec, &field.geometry);
     assert!(total.uncoverable.is_empty(), "{}", total.reasons());
     // One lane width for each metre, and the turns between.
     let bound_m = survey.coverable_share() * total.area_m2 / 48.0;

@@ -60,7 +60,7 @@ fn main() -> ExitCode {
     };
     match skein_scenario::open(name.as_deref(), &over) {
         Ok(scenario) => {
-            let loop_of = Arc::clone(&scenario.ground.coverage_loop);
+            let loop_of = Arc::clone(&scenario.geometry.coverage_loop);
             print!("{}", fly(&Prepared::new(scenario.spec), &loop_of));
             ExitCode::SUCCESS
         }

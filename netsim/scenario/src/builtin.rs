@@ -2,7 +2,8 @@
 
 use crate::error::ScenarioError;
 use crate::files::Files;
-use crate::resolve::{Overrides, Scenario, parse_with};
+use crate::request::Overrides;
+use crate::resolve::{Scenario, parse_with};
 
 /// The scenario that is run when none is named.
 pub const DEFAULT: &str = "helsinki";

@@ -1,24 +1,10 @@
 //! What is wrong with a scenario, and where: file, line, column, field.
 
 use core::fmt;
+use skein_interop::json;
 use thiserror::Error;
 
-/// A place in a text file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
-    /// The file, as it was named.
-    pub file: String,
-    /// Line, from 1.
-    pub line: usize,
-    /// Column in characters, from 1.
-    pub column: usize,
-}
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}", self.file, self.line, self.column)
-    }
-}
+pub use skein_interop::json::Place;
 
 /// Why a scenario cannot be used. Nothing of it was started.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -32,15 +18,8 @@ pub enum ScenarioError {
         problem: String,
     },
     /// A value in the file is wrong, in form or in meaning.
-    #[error("{place}: {field}: {problem}")]
-    Invalid {
-        /// Where the value stands.
-        place: Place,
-        /// Its path, such as `fleet.uavs[2].launch`.
-        field: String,
-        /// What is wrong and what would be right.
-        problem: String,
-    },
+    #[error(transparent)]
+    Invalid(#[from] json::Error),
 }
 
 /// How bad a finding is.

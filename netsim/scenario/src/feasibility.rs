@@ -3,26 +3,22 @@
 
 use crate::error::{Finding, Severity};
 use crate::flight_model::{Pace, return_s, too_windy};
-use crate::resolve::bounds;
 use skein_flight::coverage::area::backtracking::{Division, RingCell, Robot, divide};
 use skein_flight::coverage::area::patch::Patches;
-use skein_flight::coverage::area::{CellId, CoverageLoop, Direction, Grid};
+use skein_flight::coverage::area::{CellId, CoverageLoop, Direction, Grid, LoopError};
+use skein_flight::coverage::exact::ExactError;
 use skein_geometry::Polygon;
 use skein_geometry::frame::Point;
 use skein_netsim::fault::Fault;
 use skein_netsim::spec::{Spec, UavSpec};
-use skein_peer::Mission;
-use skein_peer::mission::point_m;
+use skein_peer::mission::GeometryError;
 use skein_peer::offload::MissionGeometry;
+use skein_peer::wire::limits::MEMBERS_MAX;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Endurance, in flights round the whole loop, below which the death of some UAVs
 /// may leave cells that nobody has the fuel for.
 const COMFORTABLE_LOOPS: f64 = 2.5;
-
-/// Turning round on the spot, in turn radii: the shortest curve from a pose to its
-/// reverse is 7/3 of a half circle.
-pub(crate) const TURN_ROUND_RADII: f64 = 7.0 / 3.0 * core::f64::consts::PI;
 
 /// Checks everything that can be told before a run.
 ///
@@ -31,12 +27,24 @@ pub(crate) const TURN_ROUND_RADII: f64 = 7.0 / 3.0 * core::f64::consts::PI;
 #[must_use]
 pub fn feasibility(spec: &Spec) -> Vec<Finding> {
     match spec.mission.geometry() {
-        Ok(ground) => with_ground(spec, Ok(&ground)),
-        Err(e) => with_ground(spec, Err(&e)),
+        Ok(geometry) => with_geometry(spec, &geometry).0,
+        Err(e) => {
+            let mut out = without_geometry(spec);
+            out.push(Finding::new(Severity::Error, blamed(&e), e.to_string()));
+            out
+        }
     }
 }
 
-pub(crate) fn with_ground(spec: &Spec, ground: Result<&MissionGeometry, &str>) -> Vec<Finding> {
+/// What was found, and what the scenario amounts to.
+pub(crate) fn with_geometry(spec: &Spec, geometry: &MissionGeometry) -> (Vec<Finding>, Summary) {
+    let mut out = without_geometry(spec);
+    let summary = summary(spec, geometry);
+    on_loop(spec, geometry, &summary, &mut out);
+    (out, summary)
+}
+
+fn without_geometry(spec: &Spec) -> Vec<Finding> {
     let mut out = Vec::new();
     fleet(spec, &mut out);
     faults(spec, &mut out);
@@ -44,30 +52,29 @@ pub(crate) fn with_ground(spec: &Spec, ground: Result<&MissionGeometry, &str>) -
         let text = "there is no ground station: nobody hears the swarm when it has finished; add ground: { east_m, north_m }";
         out.push(Finding::new(Severity::Warning, "ground", text));
     }
-    match ground {
-        Ok(g) => on_loop(spec, g, &mut out),
-        Err(e) => {
-            let (field, problem) = loop_trouble(&spec.mission, e);
-            out.push(Finding::new(Severity::Error, &field, problem));
-        }
-    }
     out
 }
 
-/// The field to blame and the words, when a mission has no coverage loop.
-pub(crate) fn loop_trouble(mission: &Mission, e: &str) -> (String, String) {
-    let field = if mission.turn_radius_mm > mission.lane_spacing_mm / 2 {
-        "lanes.spacing_m"
-    } else if e.contains("footprint") {
-        "airframes"
-    } else if e.contains("launch point") {
-        "base"
-    } else if e.contains("zone") {
-        "no_fly"
-    } else {
-        "lanes"
-    };
-    (field.to_owned(), e.to_owned())
+/// The field to change when a mission has no geometry.
+pub(crate) fn blamed(e: &GeometryError) -> &'static str {
+    match e {
+        GeometryError::Area(_) => "area",
+        GeometryError::Zone(..) => "no_fly",
+        GeometryError::Loop(e) => match e {
+            LoopError::TurnRadius { .. } | LoopError::TooManyCells(_) => "lanes.spacing_m",
+            LoopError::Footprint { .. } => "airframes",
+            LoopError::Nothing | LoopError::Zones => "no_fly",
+            LoopError::Extent => "area",
+            LoopError::Number(_) => "lanes",
+            LoopError::CutOff | LoopError::Launch => "base",
+            LoopError::Exact(e) => match e {
+                ExactError::TooMany => "lanes.spacing_m",
+                ExactError::Zones(_) | ExactError::Nothing => "no_fly",
+                ExactError::Launch => "base",
+                ExactError::Number(_) | ExactError::Team(_) => "lanes",
+            },
+        },
+    }
 }
 
 fn fleet(spec: &Spec, out: &mut Vec<Finding>) {
@@ -75,6 +82,13 @@ fn fleet(spec: &Spec, out: &mut Vec<Finding>) {
         |field: &str, text: String| out.push(Finding::new(Severity::Error, field, text));
     if spec.uavs.is_empty() {
         error("fleet", "there is no UAV; expected at least one".to_owned());
+    }
+    if spec.uavs.len() > MEMBERS_MAX {
+        let text = format!(
+            "{} UAVs are too many: a round of the swarm carries at most {MEMBERS_MAX} members",
+            spec.uavs.len()
+        );
+        error("fleet", text);
     }
     let mut ids = BTreeSet::new();
     for (i, id) in spec
@@ -167,8 +181,7 @@ fn faults(spec: &Spec, out: &mut Vec<Finding>) {
     }
 }
 
-fn on_loop(spec: &Spec, ground: &MissionGeometry, out: &mut Vec<Finding>) {
-    let summary = summary(spec, ground);
+fn on_loop(spec: &Spec, geometry: &MissionGeometry, summary: &Summary, out: &mut Vec<Finding>) {
     if summary.coverable_share < spec.min_coverable {
         let text = format!(
             "only {:.1} % of the area can be covered, {:.1} % are asked for: {}",
@@ -178,7 +191,7 @@ fn on_loop(spec: &Spec, ground: &MissionGeometry, out: &mut Vec<Finding>) {
         );
         out.push(Finding::new(Severity::Error, "checks.min_coverable", text));
     }
-    let reach_m = |u: &UavSpec| reach_m(u, spec, &ground.coverage_loop);
+    let reach_m = |u: &UavSpec| reach_m(u, spec, &geometry.coverage_loop);
     let usable_m: f64 = spec.uavs.iter().map(reach_m).sum();
     if usable_m < summary.loop_m {
         let text = format!(
@@ -212,13 +225,13 @@ fn on_loop(spec: &Spec, ground: &MissionGeometry, out: &mut Vec<Finding>) {
         );
         out.push(Finding::new(Severity::Error, "max_time_s", text));
     }
-    launches(spec, ground, out);
+    launches(spec, geometry, out);
 }
 
-fn launches(spec: &Spec, ground: &MissionGeometry, out: &mut Vec<Finding>) {
-    let clearance_m = f64::from(spec.mission.clearance_mm) / 1000.0;
+fn launches(spec: &Spec, geometry: &MissionGeometry, out: &mut Vec<Finding>) {
+    let clearance_m = spec.mission.clearance_m();
     for (i, u) in spec.uavs.iter().enumerate() {
-        let d = ground.router.zones().distance_m(u.launch.position());
+        let d = geometry.router.zones().distance_m(u.launch.position());
         // A launch pose on the loop keeps the clearance but for the last rounding.
         if d < clearance_m - 0.01 {
             let text = format!(
@@ -280,9 +293,9 @@ impl Summary {
 
 /// Adds up what a scenario amounts to.
 #[must_use]
-pub fn summary(spec: &Spec, ground: &MissionGeometry) -> Summary {
-    let the_loop = &ground.coverage_loop;
-    let area: Vec<Point> = spec.mission.area.iter().copied().map(point_m).collect();
+pub fn summary(spec: &Spec, geometry: &MissionGeometry) -> Summary {
+    let the_loop = &geometry.coverage_loop;
+    let area = spec.mission.area_m();
     // A mission for targets asks for their pieces.
     let area_m2 = match spec.mission.pieces() {
         Some(pieces) => pieces
@@ -431,9 +444,9 @@ fn overlap_m2(ring: &[Point], grid: &Grid, cell: CellId) -> f64 {
 /// Width and height of the area's bounding box, metres.
 #[must_use]
 pub fn extent_m(spec: &Spec) -> (f64, f64) {
-    match Polygon::new(spec.mission.area.iter().copied().map(point_m).collect()) {
+    match Polygon::new(spec.mission.area_m()) {
         Ok(p) => {
-            let (low, high) = bounds(&p);
+            let (low, high) = p.bounds();
             (high.x - low.x, high.y - low.y)
         }
         Err(_) => (0.0, 0.0),
@@ -487,8 +500,19 @@ mod tests {
 
     #[test]
     fn what_cannot_succeed_is_an_error() {
-        let cases: [Case; 11] = [
+        let cases: [Case; 12] = [
             (|s| s.uavs.clear(), "error: fleet: there is no UAV"),
+            (
+                |s| {
+                    s.uavs = (1..=65)
+                        .map(|id| UavSpec {
+                            id,
+                            ..s.uavs[0].clone()
+                        })
+                        .collect()
+                },
+                "error: fleet: 65 UAVs are too many",
+            ),
             (
                 |s| s.uavs[1].id = 1,
                 "error: fleet.uavs[1].id: the number 1 is taken twice",

@@ -1,7 +1,6 @@
 //! Files that a scenario names: on disk beside it, or built in.
 
-use crate::document::Node;
-use crate::error::ScenarioError;
+use skein_interop::json::{Error, Node};
 use std::path::PathBuf;
 
 /// The largest file that is read, bytes: a city of a hundred thousand buildings.
@@ -16,7 +15,7 @@ pub enum Files<'a> {
 }
 
 impl Files<'_> {
-    pub(crate) fn read(&self, node: &Node<'_>) -> Result<String, ScenarioError> {
+    pub(crate) fn read(&self, node: &Node<'_>) -> Result<String, Error> {
         let name = node.text()?;
         match self {
             Self::Directory(base) => {

@@ -1,41 +1,18 @@
-//! The wind of a scenario and what it does to flights: the radius of turns, the pace
-//! along the loop, who cannot fly at all (D2.7 §2.4.2).
+//! How UAVs fly in the wind of their mission: the radius of turns, what a crabbing camera
+//! sees, the pace along the loop, its energy, the way home, who cannot fly at all
+//! (D2.7 §2.4.2).
 //!
 //! Estimates for feasibility; what is flown is the executive's.
 
-use crate::document::Node;
-use crate::error::ScenarioError;
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::area::{CoverageLoop, Direction};
 use skein_flight::trajectory::Trajectory;
-use skein_flight::trajectory::timed::Objective;
 use skein_flight::trajectory::wind::{Performance, Wind, turn_round_s};
-use skein_geometry::math::sin_cos;
 use skein_netsim::spec::{Spec, UavSpec};
-use skein_peer::mission::point_m;
 
-/// The wind as forecasts tell it: where it comes from, and how fast.
-pub(crate) fn wind(node: &Node<'_>) -> Result<Wind, ScenarioError> {
-    let f = node.fields(&["from_deg", "speed_mps"])?;
-    let from_deg = f
-        .need("from_deg", "270")?
-        .number(0.0, 360.0, "degrees clockwise from north")?;
-    let speed_mps = f.need("speed_mps", "3")?.number(0.0, 50.0, "m/s")?;
-    let (s, c) = sin_cos(from_deg.to_radians());
-    Ok(Wind::new(-speed_mps * s, -speed_mps * c))
-}
-
-/// What legs off the loop should spend little of.
-pub(crate) fn objective(node: &Node<'_>) -> Result<Objective, ScenarioError> {
-    match node.text()? {
-        "time" => Ok(Objective::Time),
-        "distance" => Ok(Objective::Distance),
-        "energy" => Ok(Objective::Energy),
-        other => Err(node.wrong(format!(
-            "is \"{other}\"; expected \"time\", \"distance\" or \"energy\""
-        ))),
-    }
-}
+/// Turning round on the spot, in turn radii: the shortest curve from a pose to its
+/// reverse is 7/3 of a half circle.
+const TURN_ROUND_RADII: f64 = 7.0 / 3.0 * core::f64::consts::PI;
 
 /// The radius that turns over the ground should have for an airframe, metres: in calm
 /// air that of its cruise; in a wind wide enough to follow them downwind at cruise, or
@@ -59,7 +36,7 @@ pub(crate) fn turning_mps(airframe: &Airframe, wind_mps: f64, radius_m: f64) -> 
 }
 
 fn airspeed_mps(u: &UavSpec, spec: &Spec) -> f64 {
-    let radius_m = f64::from(spec.mission.turn_radius_mm) / 1000.0;
+    let radius_m = spec.mission.turn_radius_m();
     turning_mps(&u.airframe, spec.wind.speed_mps(), radius_m)
 }
 
@@ -96,7 +73,7 @@ pub(crate) struct Pace {
 
 /// The longest way home from the loop, with a turn at each end, seconds.
 pub(crate) fn return_s(pace: &Pace, spec: &Spec, the_loop: &CoverageLoop) -> f64 {
-    let base = point_m(spec.mission.base);
+    let base = spec.mission.base_m();
     let far_m = (0..the_loop.len())
         .map(|i| (the_loop.boundary(i).position() - base).norm())
         .fold(0.0, f64::max);
@@ -112,7 +89,7 @@ impl Pace {
             return Self {
                 loop_mps: v,
                 least_mps: v,
-                turn_s: crate::feasibility::TURN_ROUND_RADII * radius_m / v,
+                turn_s: TURN_ROUND_RADII * radius_m / v,
             };
         }
         let uav = Performance::of(&u.airframe, v);
@@ -139,6 +116,34 @@ fn loop_mps(the_loop: &CoverageLoop, airspeed_mps: f64, wind: Wind) -> f64 {
     way_m / time_s
 }
 
+/// Energy to fly a loop once, in seconds of level cruise, averaged over airframes and
+/// both ways round; `None` where the wind forbids a part of it.
+pub(crate) fn loop_energy_s(
+    the_loop: &CoverageLoop,
+    airframes: &[Airframe],
+    wind: Wind,
+    radius_m: f64,
+) -> Option<f64> {
+    let mut kinds: Vec<(Airframe, f64)> = Vec::new();
+    for a in airframes {
+        match kinds.iter_mut().find(|k| k.0 == *a) {
+            Some(kind) => kind.1 += 1.0,
+            None => kinds.push((*a, 1.0)),
+        }
+    }
+    let mut sum = 0.0;
+    for (airframe, count) in &kinds {
+        let airspeed_mps = turning_mps(airframe, wind.speed_mps(), radius_m);
+        for i in 0..the_loop.len() {
+            for way in [Direction::Forward, Direction::Backward] {
+                let flown = Trajectory::along(&the_loop.curve(i, way), airspeed_mps, wind).ok()?;
+                sum += count * flown.energy_s(airframe);
+            }
+        }
+    }
+    Some(sum / (2.0 * airframes.len().max(1) as f64))
+}
+
 /// What to say when the wind carries a UAV away, or out of the turns of the loop even
 /// at its slowest.
 pub(crate) fn too_windy(spec: &Spec) -> Option<String> {
@@ -154,7 +159,7 @@ pub(crate) fn too_windy(spec: &Spec) -> Option<String> {
             airspeed_mps(u, spec)
         ));
     }
-    let radius_m = f64::from(spec.mission.turn_radius_mm) / 1000.0;
+    let radius_m = spec.mission.turn_radius_m();
     let spare_mps = |u: &UavSpec| {
         let slowest_mps = u.airframe.least_airspeed_mps();
         u.airframe.airspeed_for_turns_mps(radius_m, wind_mps) - slowest_mps
@@ -179,6 +184,7 @@ pub(crate) fn too_windy(spec: &Spec) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use skein_geometry::math::sin_cos;
     use skein_netsim::world::fixture;
 
     fn with(wind: Wind) -> Spec {

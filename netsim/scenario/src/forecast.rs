@@ -3,16 +3,13 @@
 //!
 //! Leaves to others: laying the loop, and what is worth a warning (`feasibility`).
 
-use crate::choose_tree::loop_energy_s;
-use crate::error::ScenarioError;
-use crate::feasibility::summary;
-use crate::resolve::{Overrides, Scenario, bounds};
+use crate::feasibility::Summary;
+use crate::flight_model::loop_energy_s;
+use crate::request::AreaPlanner;
 use skein_flight::airframe::Airframe;
 use skein_geometry::Polygon;
 use skein_geometry::frame::Point;
 use skein_netsim::spec::Spec;
-use skein_peer::CoverageTask;
-use skein_peer::mission::point_m;
 use skein_peer::offload::MissionGeometry;
 
 /// Samples along one lane: a point in 36 of a cell decides a tenth of a percent of a
@@ -21,43 +18,6 @@ const SAMPLES_A_LANE: f64 = 6.0;
 
 /// Most samples along one side of the area, against missions of absurd proportions.
 const MAX_SAMPLES: f64 = 4000.0;
-
-/// How an area is covered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AreaPlanner {
-    /// A spanning-tree loop over a grid of lanes: approximate coverage.
-    Lanes,
-    /// Straight passes over the cells of a boustrophedon decomposition: exact coverage.
-    Exact,
-}
-
-impl AreaPlanner {
-    /// Both, in the order in which they are told.
-    pub const ALL: [Self; 2] = [Self::Lanes, Self::Exact];
-
-    /// Its name in a scenario file.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Lanes => "lanes",
-            Self::Exact => "exact",
-        }
-    }
-
-    /// What it makes of an area.
-    pub(crate) fn task(self) -> CoverageTask {
-        match self {
-            Self::Lanes => CoverageTask::Area,
-            Self::Exact => CoverageTask::Exact,
-        }
-    }
-
-    /// The planner of a task over an area; `None` for points and lines.
-    #[must_use]
-    pub fn of(task: &CoverageTask) -> Option<Self> {
-        Self::ALL.into_iter().find(|p| p.task() == *task)
-    }
-}
 
 /// What a planner is expected to make of an area.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,60 +35,34 @@ pub struct Forecast {
     pub energy_s: Option<f64>,
 }
 
-/// The forecast of a scenario over an area; `None` for points and lines.
-#[must_use]
-pub fn forecast(scenario: &Scenario) -> Option<Forecast> {
-    let (spec, ground) = (&scenario.spec, &*scenario.ground);
+/// The forecast of a mission over an area; `None` for points and lines.
+pub(crate) fn forecast(
+    spec: &Spec,
+    geometry: &MissionGeometry,
+    total: &Summary,
+) -> Option<Forecast> {
     let planner = AreaPlanner::of(&spec.mission.task)?;
-    let total = summary(spec, ground);
     let airframes: Vec<Airframe> = spec.uavs.iter().map(|u| u.airframe).collect();
-    let radius_m = f64::from(spec.mission.turn_radius_mm) / 1000.0;
-    let the_loop = &ground.coverage_loop;
+    let radius_m = spec.mission.turn_radius_m();
+    let the_loop = &geometry.coverage_loop;
     Some(Forecast {
         planner,
         makespan_s: total.makespan_s,
-        seen_share: seen_share(spec, ground),
+        seen_share: seen_share(spec, geometry),
         loop_m: total.loop_m,
         energy_s: loop_energy_s(the_loop, &airframes, spec.wind, radius_m),
     })
 }
 
-/// The forecast of both planners, or why one of them has none. Empty for points and
-/// lines.
-#[must_use]
-pub fn side_by_side(
-    target: Option<&str>,
-    over: &Overrides,
-    known: &Scenario,
-) -> Vec<(AreaPlanner, Result<Forecast, ScenarioError>)> {
-    let Some(own) = AreaPlanner::of(&known.spec.mission.task) else {
-        return Vec::new();
-    };
-    let told = AreaPlanner::ALL.map(|planner| {
-        let told = if planner == own {
-            Ok(forecast(known))
-        } else {
-            let over = Overrides {
-                planner: Some(planner),
-                ..*over
-            };
-            crate::open(target, &over).map(|s| forecast(&s))
-        };
-        told.transpose().map(|told| (planner, told))
-    });
-    told.into_iter().flatten().collect()
-}
-
 /// Share of the area's points that lie in a piece of the loop which the mission sees.
-fn seen_share(spec: &Spec, ground: &MissionGeometry) -> f64 {
-    let the_loop = &ground.coverage_loop;
-    let ring = spec.mission.area.iter().copied().map(point_m).collect();
-    let Ok(area) = Polygon::new(ring) else {
+fn seen_share(spec: &Spec, geometry: &MissionGeometry) -> f64 {
+    let the_loop = &geometry.coverage_loop;
+    let Ok(area) = Polygon::new(spec.mission.area_m()) else {
         return 0.0;
     };
-    let (low, high) = bounds(&area);
+    let (low, high) = area.bounds();
     let longest_m = (high.x - low.x).max(high.y - low.y);
-    let lane_m = f64::from(spec.mission.lane_spacing_mm) / 1000.0;
+    let lane_m = spec.mission.lane_m();
     let step_m = (lane_m / SAMPLES_A_LANE).max(longest_m / MAX_SAMPLES);
     let seen = the_loop.cells().iter().filter(|c| c.needed);
     let patches: Vec<[Point; 4]> = seen
@@ -213,43 +147,6 @@ fn count(x: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn both_planners_of_a_field_are_told_and_targets_have_none() {
-        let over = Overrides::default();
-        let field = crate::open(Some("field"), &over).unwrap();
-        let told = side_by_side(Some("field"), &over, &field);
-        assert_eq!(told.len(), 2);
-        let told: Vec<Forecast> = told.into_iter().map(|(_, f)| f.unwrap()).collect();
-        for f in &told {
-            assert!((0.85..=1.0).contains(&f.seen_share), "{f:?}");
-            // What 5 UAVs fly together is more than what the last one takes; turns make
-            // the energy more than the time at cruise.
-            assert!(
-                f.makespan_s > 0.0 && f.energy_s.unwrap() > f.makespan_s,
-                "{f:?}"
-            );
-            assert!(f.energy_s.unwrap() > f.loop_m / 20.0, "{f:?}");
-        }
-        assert!((told[0].loop_m - told[1].loop_m).abs() > 1.0);
-        let points = crate::open(Some("points"), &over).unwrap();
-        assert!(side_by_side(Some("points"), &over, &points).is_empty());
-    }
-
-    #[test]
-    fn a_planner_is_for_areas() {
-        let over = Overrides {
-            planner: Some(AreaPlanner::Exact),
-            ..Overrides::default()
-        };
-        let error = crate::open(Some("roads"), &over).unwrap_err().to_string();
-        assert!(
-            error.contains("points and lines have one planner each"),
-            "{error}"
-        );
-        let square = crate::open(Some("helsinki"), &over).unwrap();
-        assert_eq!(square.spec.mission.task, CoverageTask::Exact);
-    }
 
     #[test]
     fn a_patch_holds_the_samples_within() {

@@ -5,6 +5,19 @@
 //! narrow for the turn radius), is an error that names file, line, column and field
 //! and says what would be right. Fields are explained in `configs/trials/helsinki.json5`.
 //!
+//! A straight line, each module of the earlier ones only:
+//!
+//! | module | what it adds |
+//! |---|---|
+//! | `request` | what a command line may ask for |
+//! | `read` | the values that the text states, with their places |
+//! | `flight_model` | how its UAVs fly in its wind |
+//! | `mission` | the mission: metres become millimetres |
+//! | `choose_tree` | the spanning tree of the lanes, where it is left open |
+//! | `feasibility` | what cannot succeed, or may disappoint |
+//! | `forecast` | what it is expected to take |
+//! | `resolve` | all of it in order: a [`Scenario`] |
+//!
 //! ```
 //! let spec = skein_scenario::builtin(skein_scenario::DEFAULT).unwrap();
 //! assert_eq!(spec.uavs.len(), 8);
@@ -12,13 +25,14 @@
 
 mod builtin;
 mod choose_tree;
-mod document;
 mod error;
 mod feasibility;
 mod files;
 mod flight_model;
 mod forecast;
+mod mission;
 mod read;
+mod request;
 mod resolve;
 
 pub use builtin::{
@@ -27,9 +41,10 @@ pub use builtin::{
 pub use error::{Finding, Place, ScenarioError, Severity};
 pub use feasibility::{Summary, extent_m, feasibility, summary};
 pub use files::Files;
-pub use forecast::{AreaPlanner, Forecast, forecast, side_by_side};
+pub use forecast::Forecast;
 pub use read::faults::{chaos_plan, load_chaos_plan};
-pub use resolve::{Overrides, Scenario, parse_with};
+pub use request::{AreaPlanner, Overrides};
+pub use resolve::{Scenario, parse_with};
 
 use skein_netsim::spec::Spec;
 use std::path::Path;

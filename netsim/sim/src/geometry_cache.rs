@@ -2,6 +2,7 @@
 //! a pure function of it, so a thousand runs of one scenario build it once.
 
 use skein_peer::Mission;
+use skein_peer::mission::GeometryError;
 use skein_peer::offload::{Job, JobResult, MissionGeometry, run};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,12 +10,12 @@ use std::sync::Arc;
 /// Answers by [`Mission::content_hash`]. Cheap to clone: the ground is shared.
 #[derive(Clone, Debug, Default)]
 pub struct GeometryCache {
-    by_hash: BTreeMap<u64, Result<Arc<MissionGeometry>, String>>,
+    by_hash: BTreeMap<u64, Result<Arc<MissionGeometry>, GeometryError>>,
 }
 
 impl GeometryCache {
     /// The ground of a mission, derived on first use.
-    pub fn of(&mut self, mission: &Arc<Mission>) -> Result<Arc<MissionGeometry>, String> {
+    pub fn of(&mut self, mission: &Arc<Mission>) -> Result<Arc<MissionGeometry>, GeometryError> {
         self.by_hash
             .entry(mission.content_hash())
             .or_insert_with(|| mission.geometry())

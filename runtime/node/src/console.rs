@@ -166,7 +166,7 @@ pub fn fits(mission: &Mission, running: Option<&Mission>) -> Result<(), String> 
 /// # Errors
 /// A sentence that says why not.
 pub fn can_be_flown(mission: &Arc<Mission>) -> Result<(), String> {
-    let geometry = mission.geometry()?;
+    let geometry = mission.geometry().map_err(|e| e.to_string())?;
     let clearance_m = f64::from(mission.clearance_mm) / 1000.0;
     let base_m = geometry.router.zones().distance_m(point_m(mission.base));
     if base_m < clearance_m {

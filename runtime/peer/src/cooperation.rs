@@ -14,7 +14,6 @@ use crate::beliefs::Beliefs;
 use crate::cells::CellSet;
 use crate::config::Role;
 use crate::journal::Entry;
-use crate::mission::point_m;
 use crate::mission_state::MissionState;
 use crate::offload::Job;
 use crate::outbound;
@@ -493,7 +492,7 @@ fn steer(peer: &mut Peer) {
         return;
     };
     let sections = &mission_state.negotiation.sections;
-    let base = point_m(mission_state.geometry.mission.base);
+    let base = mission_state.geometry.mission.base_m();
     let goal = if order == Order::Hold {
         Goal::Hold
     } else if order == Order::ReturnToBase || mission_state.finished || mission_state.exhausted {

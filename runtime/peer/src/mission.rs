@@ -10,7 +10,7 @@ use skein_flight::coverage::exact::{self, ExactProblem};
 use skein_flight::coverage::stations::{self, StationsProblem};
 use skein_flight::path::{RouteLimits, Router};
 use skein_geometry::frame::Point;
-use skein_geometry::{NoFlyZones, Polygon};
+use skein_geometry::{NoFlyZones, Polygon, PolygonError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -91,6 +91,92 @@ pub fn point_m(p: PointMm) -> Point {
     Point::new(f64::from(p.0) / 1000.0, f64::from(p.1) / 1000.0)
 }
 
+/// A ring of the plane in whole millimetres.
+#[must_use]
+pub fn ring_mm(ring: &[Point]) -> Vec<PointMm> {
+    ring.iter().map(|p| (mm(p.x), mm(p.y))).collect()
+}
+
+fn ring_m(ring: &[PointMm]) -> Vec<Point> {
+    ring.iter().copied().map(point_m).collect()
+}
+
+/// Why a mission has no geometry. Nothing of it is flown.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GeometryError {
+    /// The area is no simple polygon.
+    #[error("area: {0}")]
+    Area(PolygonError),
+    /// A no-fly zone, by its index, is no simple polygon.
+    #[error("zone {0}: {1}")]
+    Zone(usize, PolygonError),
+    /// There is no loop over what is to be seen.
+    #[error(transparent)]
+    Loop(#[from] LoopError),
+}
+
+/// The mission's lengths and places, in metres.
+impl Mission {
+    /// The area to be seen.
+    #[must_use]
+    pub fn area_m(&self) -> Vec<Point> {
+        ring_m(&self.area)
+    }
+
+    /// The no-fly zones.
+    pub fn zones_m(&self) -> impl Iterator<Item = Vec<Point>> + '_ {
+        self.zones.iter().map(|zone| ring_m(zone))
+    }
+
+    /// Lane spacing.
+    #[must_use]
+    pub fn lane_m(&self) -> f64 {
+        metres(self.lane_spacing_mm)
+    }
+
+    /// Smallest turn radius that every UAV of the mission can fly at its cruise airspeed.
+    #[must_use]
+    pub fn turn_radius_m(&self) -> f64 {
+        metres(self.turn_radius_mm)
+    }
+
+    /// Distance every curve keeps from the zones.
+    #[must_use]
+    pub fn clearance_m(&self) -> f64 {
+        metres(self.clearance_mm)
+    }
+
+    /// Half the camera footprint across the track at the lowest level.
+    #[must_use]
+    pub fn footprint_across_m(&self) -> f64 {
+        metres(self.footprint_across_mm)
+    }
+
+    /// Half the camera footprint along the track at the lowest level.
+    #[must_use]
+    pub fn footprint_along_m(&self) -> f64 {
+        metres(self.footprint_along_mm)
+    }
+
+    /// How far a UAV may stray from its curve.
+    #[must_use]
+    pub fn tracking_error_m(&self) -> f64 {
+        metres(self.tracking_error_mm)
+    }
+
+    /// A launch point, which must reach the loop.
+    #[must_use]
+    pub fn launch_m(&self) -> Point {
+        point_m(self.launch)
+    }
+
+    /// Where UAVs loiter when all is done.
+    #[must_use]
+    pub fn base_m(&self) -> Point {
+        point_m(self.base)
+    }
+}
+
 impl Mission {
     /// Identifies the content: FNV-1a over all fields in order.
     #[must_use]
@@ -154,34 +240,33 @@ impl Mission {
     #[must_use]
     pub fn pieces(&self) -> Option<Vec<Corners>> {
         let targets = self.task.targets()?;
-        Some(targets.pieces(metres(self.lane_spacing_mm)))
+        Some(targets.pieces(self.lane_m()))
     }
 
     /// Derives the loop and the router.
     ///
     /// # Errors
-    /// A sentence that names what is wrong with the mission.
-    pub fn geometry(self: &Arc<Self>) -> Result<Arc<MissionGeometry>, String> {
-        let ring = |r: &[PointMm]| Polygon::new(r.iter().copied().map(point_m).collect());
-        let area = ring(&self.area).map_err(|e| format!("area: {e}"))?;
+    /// [`GeometryError`] names what is wrong with the mission.
+    pub fn geometry(self: &Arc<Self>) -> Result<Arc<MissionGeometry>, GeometryError> {
+        let area = Polygon::new(self.area_m()).map_err(GeometryError::Area)?;
         let mut zones = Vec::with_capacity(self.zones.len());
-        for (i, z) in self.zones.iter().enumerate() {
-            zones.push(ring(z).map_err(|e| format!("zone {i}: {e}"))?);
+        for (i, zone) in self.zones_m().enumerate() {
+            zones.push(Polygon::new(zone).map_err(|e| GeometryError::Zone(i, e))?);
         }
         let zones = Arc::new(NoFlyZones::new(zones));
         let problem = AreaProblem {
             area,
             zones: Arc::clone(&zones),
-            lane_spacing_m: metres(self.lane_spacing_mm),
-            turn_radius_m: metres(self.turn_radius_mm),
-            clearance_m: metres(self.clearance_mm),
-            footprint_across_m: metres(self.footprint_across_mm),
-            footprint_along_m: metres(self.footprint_along_mm),
-            tracking_error_m: metres(self.tracking_error_mm),
-            launch: point_m(self.launch),
+            lane_spacing_m: self.lane_m(),
+            turn_radius_m: self.turn_radius_m(),
+            clearance_m: self.clearance_m(),
+            footprint_across_m: self.footprint_across_m(),
+            footprint_along_m: self.footprint_along_m(),
+            tracking_error_m: self.tracking_error_m(),
+            launch: self.launch_m(),
             tree: self.tree,
         };
-        let coverage_loop = self.the_loop(&problem).map_err(|e| e.to_string())?;
+        let coverage_loop = self.the_loop(&problem)?;
         let limits = RouteLimits {
             turn_radius_m: problem.turn_radius_m,
             clearance_m: problem.clearance_m,

@@ -4,7 +4,7 @@
 //! What is done with it then is the cooperation manager's.
 
 use crate::cells::CellSet;
-use crate::mission::point_m;
+use crate::mission::GeometryError;
 use crate::offload::{Job, MissionGeometry};
 use crate::output::Report;
 use crate::peer::{Peer, PendingJob};
@@ -129,7 +129,7 @@ pub(crate) fn consider_mission(peer: &mut Peer) {
 pub(crate) fn geometry_arrived(
     peer: &mut Peer,
     hash: u64,
-    geometry: Result<Arc<MissionGeometry>, String>,
+    geometry: Result<Arc<MissionGeometry>, GeometryError>,
 ) {
     let geometry = match geometry {
         Ok(g) if g.mission.content_hash() == hash => g,
@@ -151,9 +151,9 @@ pub(crate) fn geometry_arrived(
             Arc::clone(&coverage_loop),
             router,
         )
-        .with_tracking_error_m(f64::from(geometry.mission.tracking_error_mm) / 1000.0)
+        .with_tracking_error_m(geometry.mission.tracking_error_m())
         .with_objective(peer.config.objective)
-        .with_home(point_m(geometry.mission.base))
+        .with_home(geometry.mission.base_m())
     });
     let old = peer.mission_state.take();
     // What is still being written was promised for the old ground: it is not installed.
@@ -202,7 +202,7 @@ fn keep_on(mission_state: &mut MissionState, old: MissionState) {
         && new.turn_radius_mm == before.turn_radius_mm
         && new.clearance_mm == before.clearance_mm;
     if flown_alike {
-        let base = point_m(new.base);
+        let base = new.base_m();
         mission_state.executive = old.executive.map(|e| e.with_home(base));
         mission_state.goal = old.goal;
         mission_state.replan = old.replan;

@@ -1,7 +1,7 @@
 //! Work that may take longer than a percept may wait: asked for by an output,
 //! computed by the driver with [`run`], answered by an input.
 
-use crate::mission::Mission;
+use crate::mission::{GeometryError, Mission};
 use skein_flight::coverage::area::CoverageLoop;
 use skein_flight::coverage::area::backtracking::{Division, RingCell, Robot, divide};
 use skein_flight::path::Router;
@@ -37,7 +37,7 @@ pub enum Job {
 #[derive(Clone, Debug)]
 pub enum JobResult {
     /// The common ground, or why there is none.
-    Geometry(Result<Arc<MissionGeometry>, String>),
+    Geometry(Result<Arc<MissionGeometry>, GeometryError>),
     /// The division.
     Divide(Division),
 }

@@ -1,7 +1,7 @@
 //! What a mission asks for within its area (D2.7 §3.2): all of it in lanes or in exact
 //! passes, points, or lines; and how often.
 
-use crate::mission::{PointMm, point_m};
+use crate::mission::{PointMm, mm, point_m, ring_mm};
 use crate::wire::Fnv;
 use serde::{Deserialize, Serialize};
 use skein_flight::coverage::stations::targets::{LineTarget, PointTarget, Targets};
@@ -68,6 +68,27 @@ impl CoverageTask {
                     width_m: metres(l.width_mm),
                 };
                 Some(Targets::Lines(lines.iter().map(target).collect()))
+            }
+        }
+    }
+
+    /// The task of these targets, in whole millimetres.
+    #[must_use]
+    pub fn of_targets(targets: &Targets) -> Self {
+        match targets {
+            Targets::Points(points) => {
+                let task = |p: &PointTarget| PointTask {
+                    at: (mm(p.at.x), mm(p.at.y)),
+                    radius_mm: mm(p.radius_m).unsigned_abs(),
+                };
+                Self::Points(points.iter().map(task).collect())
+            }
+            Targets::Lines(lines) => {
+                let task = |l: &LineTarget| LineTask {
+                    way: ring_mm(&l.way),
+                    width_mm: mm(l.width_m).unsigned_abs(),
+                };
+                Self::Lines(lines.iter().map(task).collect())
             }
         }
     }

@@ -1,9 +1,9 @@
 //! Faults of a scenario and of a chaos plan: a time, a kind, and perhaps `for_s`,
 //! which adds what ends the fault.
 
-use crate::document::{Document, Fields, Node, suggestion};
 use crate::error::{Finding, ScenarioError, Severity};
 use crate::files::read_text;
+use skein_interop::json::{Document, Error, Fields, Node, suggestion};
 use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::spec::StormSpec;
 use std::collections::BTreeSet;
@@ -37,7 +37,7 @@ pub(crate) struct Known<'a> {
 }
 
 impl Known<'_> {
-    fn peer(&self, node: &Node<'_>) -> Result<u16, ScenarioError> {
+    fn peer(&self, node: &Node<'_>) -> Result<u16, Error> {
         let id = node.small(0, u16::MAX, "a peer's number")?;
         if let Some(peers) = self.peers
             && !peers.contains(&id)
@@ -62,7 +62,7 @@ pub(crate) fn read(
     list: &Node<'_>,
     known: &Known<'_>,
     notes: &mut Vec<Finding>,
-) -> Result<Vec<TimedFault>, ScenarioError> {
+) -> Result<Vec<TimedFault>, Error> {
     let mut out = Vec::new();
     // Times at which cuts begin and end, to tell when one heal ends several.
     let mut cuts: Vec<(u64, u64)> = Vec::new();
@@ -71,7 +71,7 @@ pub(crate) fn read(
         if !names_known(&fault.fault, known) {
             let mut note = Finding::new(
                 Severity::Note,
-                item.path(),
+                &item.path(),
                 "left out: it names a peer that this fleet has not",
             );
             note.place = Some(item.place());
@@ -82,7 +82,7 @@ pub(crate) fn read(
             let span = (fault.at_ms, end.as_ref().map_or(u64::MAX, |e| e.at_ms));
             if cuts.iter().any(|c| c.0 < span.1 && span.0 < c.1) {
                 let text = "overlaps another cut or partition; the first heal ends both";
-                let mut note = Finding::new(Severity::Warning, item.path(), text);
+                let mut note = Finding::new(Severity::Warning, &item.path(), text);
                 note.place = Some(item.place());
                 notes.push(note);
             }
@@ -109,7 +109,7 @@ fn names_known(fault: &Fault, known: &Known<'_>) -> bool {
     }
 }
 
-fn at_ms(f: &Fields<'_>, name: &str, known: &Known<'_>) -> Result<u64, ScenarioError> {
+fn at_ms(f: &Fields<'_>, name: &str, known: &Known<'_>) -> Result<u64, Error> {
     let seconds = f.need(name, "70")?.number(
         0.0,
         f64::from(known.max_time_s),
@@ -123,7 +123,7 @@ fn at_ms(f: &Fields<'_>, name: &str, known: &Known<'_>) -> Result<u64, ScenarioE
     Ok((seconds * 1000.0).round() as u64)
 }
 
-fn groups(node: &Node<'_>, known: &Known<'_>) -> Result<Vec<Vec<u16>>, ScenarioError> {
+fn groups(node: &Node<'_>, known: &Known<'_>) -> Result<Vec<Vec<u16>>, Error> {
     let mut seen = BTreeSet::new();
     let mut groups = Vec::new();
     for group in node.items()? {
@@ -161,7 +161,7 @@ const ALL: [&str; 10] = [
 ];
 
 /// The kind of a fault, with no field that belongs to another kind.
-fn kind<'a>(f: &Fields<'a>) -> Result<&'a str, ScenarioError> {
+fn kind<'a>(f: &Fields<'a>) -> Result<&'a str, Error> {
     let node = f.need("kind", "\"kill\"")?;
     let kind = node.text()?;
     let names: Vec<&str> = KINDS.iter().map(|(n, _)| *n).collect();
@@ -184,15 +184,12 @@ fn kind<'a>(f: &Fields<'a>) -> Result<&'a str, ScenarioError> {
     Ok(kind)
 }
 
-fn flag(f: &Fields<'_>, name: &str) -> Result<bool, ScenarioError> {
+fn flag(f: &Fields<'_>, name: &str) -> Result<bool, Error> {
     f.get(name).map_or(Ok(false), Node::flag)
 }
 
 /// A fault and what ends it.
-fn one(
-    item: &Node<'_>,
-    known: &Known<'_>,
-) -> Result<(TimedFault, Option<TimedFault>), ScenarioError> {
+fn one(item: &Node<'_>, known: &Known<'_>) -> Result<(TimedFault, Option<TimedFault>), Error> {
     let f = item.fields(&ALL)?;
     let at_ms = at_ms(&f, "at_s", known)?;
     let kind = kind(&f)?;
@@ -229,7 +226,7 @@ fn one(
     Ok((TimedFault { at_ms, fault }, end))
 }
 
-fn cut(f: &Fields<'_>, known: &Known<'_>) -> Result<Fault, ScenarioError> {
+fn cut(f: &Fields<'_>, known: &Known<'_>) -> Result<Fault, Error> {
     let far = f.need("b", "2")?;
     let (a, b) = (known.peer(f.need("a", "1")?)?, known.peer(far)?);
     if a == b {
@@ -248,7 +245,7 @@ fn ending(
     fault: &Fault,
     fresh_disk: bool,
     known: &Known<'_>,
-) -> Result<TimedFault, ScenarioError> {
+) -> Result<TimedFault, Error> {
     let left_s = f64::from(known.max_time_s) - at_ms as f64 / 1000.0;
     let seconds = node.number(
         0.001,
@@ -280,7 +277,7 @@ fn ending(
 }
 
 /// Per cent as thousandths.
-pub(crate) fn permille(node: &Node<'_>) -> Result<u16, ScenarioError> {
+pub(crate) fn permille(node: &Node<'_>) -> Result<u16, Error> {
     let percent = node.number(0.0, 100.0, "per cent")?;
     #[allow(
         clippy::cast_possible_truncation,
@@ -295,7 +292,7 @@ pub(crate) fn storm(
     node: Option<&Node<'_>>,
     n_uavs: usize,
     over_peers: bool,
-) -> Result<StormSpec, ScenarioError> {
+) -> Result<StormSpec, Error> {
     let calm = StormSpec {
         max_kills: 0,
         until: 0.5,
@@ -353,9 +350,8 @@ pub fn chaos_plan(
     text: &str,
     peers: Option<&BTreeSet<u16>>,
 ) -> Result<Vec<TimedFault>, ScenarioError> {
-    let document = Document::new(file, text);
-    let value = document.parse()?;
-    let root = Node::root(&document, &value);
+    let document = Document::parse("chaos plan", file, text)?;
+    let root = document.root();
     let f = root.fields(&["name", "faults"])?;
     // A week is longer than any trial.
     let known = Known {
@@ -364,11 +360,8 @@ pub fn chaos_plan(
         loss_permille: 0,
         lenient: false,
     };
-    read(
-        f.need("faults", "[{ at_s: 10, kind: \"kill\", peer: 3 }]")?,
-        &known,
-        &mut Vec::new(),
-    )
+    let list = f.need("faults", "[{ at_s: 10, kind: \"kill\", peer: 3 }]")?;
+    Ok(read(list, &known, &mut Vec::new())?)
 }
 
 /// Reads a chaos plan from a file.

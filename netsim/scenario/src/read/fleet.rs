@@ -1,24 +1,25 @@
-//! Airframes and the UAVs that fly them. Leaves launch poses that are spread round
-//! the coverage loop to `resolve`, which has the loop.
+//! The UAVs of a scenario with their airframes, and its ground station. Leaves launch poses
+//! that are spread round the coverage loop to `resolve`, which has the loop.
 
-use crate::document::{Fields, Node, suggestion};
-use crate::error::ScenarioError;
-use crate::read::terrain::{MAX_HEIGHT_M, position};
-use crate::resolve::Overrides;
+use super::{MAX_HEIGHT_M, position};
+use crate::request::Overrides;
 use skein_flight::airframe::Airframe;
 use skein_geometry::frame::Pose;
-use skein_geometry::math::{FRAC_PI_2, tan, wrap_pi};
+use skein_geometry::math::{FRAC_PI_2, wrap_pi};
+use skein_interop::airframe;
+use skein_interop::json::{Error, Fields, Node, suggestion};
+use skein_netsim::spec::GroundStationSpec;
+use skein_peer::wire::limits::MEMBERS_MAX;
 
-/// Most UAVs of one scenario: peers are numbered in 16 bits and the simulator is
-/// built for thousands.
-const MAX_UAVS: u16 = 4000;
-
-/// Longest flight that is accepted, seconds: a week.
-const MAX_ENDURANCE_S: f64 = 604_800.0;
+/// Most UAVs of one scenario: a round of the swarm carries no more members.
+#[allow(clippy::cast_possible_truncation, reason = "64")]
+const MAX_UAVS: u16 = MEMBERS_MAX as u16;
 
 /// One UAV, perhaps without its launch pose yet.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Member {
+    /// Where the file states it, such as `fleet.uavs[2]`.
+    pub(crate) field: String,
     pub(crate) id: u16,
     pub(crate) airframe: Airframe,
     /// `None` when spread round the loop.
@@ -27,105 +28,27 @@ pub(crate) struct Member {
 }
 
 /// The flying peers of a scenario.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Fleet {
     pub(crate) key: String,
     pub(crate) members: Vec<Member>,
 }
 
 /// Airframes by name, in the order of the file.
-pub(crate) type Airframes = Vec<(String, Airframe)>;
+type Airframes = Vec<(String, Airframe)>;
 
-pub(crate) fn airframes(node: &Node<'_>, level_m: f64) -> Result<Airframes, ScenarioError> {
+fn airframes(node: &Node<'_>, level_m: f64) -> Result<Airframes, Error> {
     let members = node.members()?;
     if members.is_empty() {
         return Err(node.wrong("there is no airframe; name at least one"));
     }
     members
         .iter()
-        .map(|(name, n)| Ok(((*name).to_owned(), airframe(n, level_m)?)))
+        .map(|(name, n)| Ok(((*name).to_owned(), airframe::read(n, Some(level_m))?)))
         .collect()
 }
 
-fn airframe(node: &Node<'_>, level_m: f64) -> Result<Airframe, ScenarioError> {
-    let f = node.fields(&[
-        "stall_mps",
-        "cruise_mps",
-        "max_mps",
-        "bank_deg",
-        "endurance_s",
-        "reserve_s",
-        "camera",
-        "footprint",
-    ])?;
-    let speed = |name, example| f.need(name, example)?.number(1.0, 150.0, "m/s");
-    let (stall_mps, cruise_mps, max_mps) = (
-        speed("stall_mps", "9")?,
-        speed("cruise_mps", "14")?,
-        speed("max_mps", "18")?,
-    );
-    if stall_mps >= cruise_mps {
-        return Err(f.need("cruise_mps", "14")?.wrong(format!(
-            "{cruise_mps} m/s is not above the stall speed of {stall_mps} m/s: it would fall"
-        )));
-    }
-    if cruise_mps > max_mps {
-        return Err(f.need("max_mps", "18")?.wrong(format!(
-            "{max_mps} m/s is below the cruise speed of {cruise_mps} m/s"
-        )));
-    }
-    let endurance_s = f
-        .need("endurance_s", "5400")?
-        .number(1.0, MAX_ENDURANCE_S, "seconds")?;
-    let reserve_s = f.number_or("reserve_s", 0.0, 0.0, MAX_ENDURANCE_S, "seconds")?;
-    if reserve_s >= endurance_s {
-        let at = f.get("reserve_s").unwrap_or(node);
-        return Err(at.wrong(format!(
-            "a reserve of {reserve_s} s leaves nothing of an endurance of {endurance_s} s"
-        )));
-    }
-    let (across_m, along_m) = footprint(&f, level_m)?;
-    Ok(Airframe {
-        stall_mps,
-        cruise_mps,
-        max_mps,
-        max_bank_rad: f
-            .need("bank_deg", "45")?
-            .number(1.0, 80.0, "degrees")?
-            .to_radians(),
-        endurance_s,
-        reserve_s,
-        footprint_across_m: across_m,
-        footprint_along_m: along_m,
-    })
-}
-
-/// Half the footprint at the lowest flight level, across and along the track.
-fn footprint(f: &Fields<'_>, level_m: f64) -> Result<(f64, f64), ScenarioError> {
-    if let Some(node) = f.get("footprint") {
-        if f.get("camera").is_some() {
-            return Err(node.wrong("give either the camera or its footprint, not both"));
-        }
-        let g = node.fields(&["across_m", "along_m"])?;
-        let side = |name| {
-            g.need(name, "100")?
-                .number(1.0, 10_000.0, "metres, the whole side at level_m")
-        };
-        return Ok((side("across_m")? / 2.0, side("along_m")? / 2.0));
-    }
-    let g = f
-        .need("camera", "{ fov_across_deg: 100, fov_along_deg: 80 }")?
-        .fields(&["fov_across_deg", "fov_along_deg"])?;
-    let half = |name| -> Result<f64, ScenarioError> {
-        let fov_deg = g
-            .need(name, "90")?
-            .number(1.0, 160.0, "degrees, the whole angle")?;
-        Ok(level_m * tan(fov_deg.to_radians() / 2.0))
-    };
-    Ok((half("fov_across_deg")?, half("fov_along_deg")?))
-}
-
-fn airframe_named(node: &Node<'_>, airframes: &Airframes) -> Result<Airframe, ScenarioError> {
+fn airframe_named(node: &Node<'_>, airframes: &Airframes) -> Result<Airframe, Error> {
     let name = node.text()?;
     airframes
         .iter()
@@ -140,26 +63,30 @@ fn airframe_named(node: &Node<'_>, airframes: &Airframes) -> Result<Airframe, Sc
         })
 }
 
-/// A name that may stand in a key.
-pub(crate) fn word(node: &Node<'_>) -> Result<String, ScenarioError> {
-    let text = node.text()?;
-    let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if text.is_empty() || text.len() > 32 || !text.chars().all(fits) {
-        return Err(node.wrong("expected 1 to 32 letters, digits, - or _"));
-    }
-    Ok(text.to_owned())
+pub(crate) fn ground_station(node: &Node<'_>) -> Result<GroundStationSpec, Error> {
+    let f = node.fields(&["id", "east_m", "north_m", "height_m"])?;
+    Ok(GroundStationSpec {
+        id: f.small_or("id", 100, 1, u16::MAX, "a peer's number")?,
+        position: position(&f)?,
+        height_m: f.number_or("height_m", 2.0, 0.0, MAX_HEIGHT_M, "metres")?,
+    })
 }
 
+/// The airframes and the fleet that flies them.
 pub(crate) fn read(
-    node: &Node<'_>,
-    airframes: &Airframes,
+    f: &Fields<'_>,
     name: &str,
     level_m: f64,
     ground_id: Option<u16>,
     over: &Overrides,
-) -> Result<Fleet, ScenarioError> {
+) -> Result<Fleet, Error> {
+    let airframes = &airframes(f.need("airframes", "{ swift: { ... } }")?, level_m)?;
+    let node = f.need(
+        "fleet",
+        "{ count: 8, airframes: [\"swift\"], launch: \"spread\" }",
+    )?;
     let f = node.fields(&["key", "slot_step_m", "count", "airframes", "launch", "uavs"])?;
-    let key = f.get("key").map_or(Ok(name.to_owned()), word)?;
+    let key = f.get("key").map_or(Ok(name.to_owned()), Node::word)?;
     let step_m = f.number_or("slot_step_m", 5.0, 0.0, 500.0, "metres")?;
     let top_m = |n: usize| level_m + step_m * n.saturating_sub(1) as f64;
     let members = match f.get("uavs") {
@@ -189,12 +116,16 @@ fn generated(
     step_m: f64,
     ground_id: Option<u16>,
     over: &Overrides,
-) -> Result<Vec<Member>, ScenarioError> {
-    let in_file = f.need("count", "8")?.small(1, MAX_UAVS, "UAVs")?;
+) -> Result<Vec<Member>, Error> {
+    let in_file = f.need("count", "8")?.small(
+        1,
+        MAX_UAVS,
+        "the number of UAVs, of which a round of the swarm carries at most 64,",
+    )?;
     let count = over.peers.unwrap_or(in_file);
     if count == 0 || count > MAX_UAVS {
         return Err(f.node().wrong(format!(
-            "{count} UAVs were asked for; expected 1 to {MAX_UAVS}"
+            "{count} UAVs were asked for; expected 1 to {MAX_UAVS}, which is all that a round of the swarm carries"
         )));
     }
     let names = f.need("airframes", "[\"swift\"]")?;
@@ -220,6 +151,7 @@ fn generated(
         .enumerate();
     Ok(members
         .map(|(i, (id, airframe))| Member {
+            field: f.node().path(),
             id,
             airframe: *airframe,
             launch: None,
@@ -235,10 +167,16 @@ fn listed(
     step_m: f64,
     ground_id: Option<u16>,
     over: &Overrides,
-) -> Result<Vec<Member>, ScenarioError> {
+) -> Result<Vec<Member>, Error> {
     let items = list.items()?;
     if items.is_empty() {
         return Err(list.wrong("there is no UAV; list at least one"));
+    }
+    if items.len() > usize::from(MAX_UAVS) {
+        return Err(list.wrong(format!(
+            "{} UAVs are too many: a round of the swarm carries at most {MAX_UAVS}",
+            items.len()
+        )));
     }
     if let Some(n) = over.peers
         && usize::from(n) != items.len()
@@ -271,6 +209,7 @@ fn listed(
         };
         let airframe = airframe_named(f.need("airframe", "\"swift\"")?, airframes)?;
         members.push(Member {
+            field: item.path(),
             id,
             airframe,
             launch: Some(launch),

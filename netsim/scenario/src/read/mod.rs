@@ -1,7 +1,186 @@
-//! From the fields of a scenario file to values with units, one subject a file. Leaves what
-//! the values mean together (mission, loop, feasibility) to the modules that follow.
+//! From the text of a scenario to values with units, one subject a file. Leaves what the
+//! values mean together (mission, loop, feasibility) to the modules that follow.
 
 pub(crate) mod faults;
 pub(crate) mod fleet;
+pub(crate) mod lanes;
+pub(crate) mod radio;
+pub(crate) mod run;
 pub(crate) mod targets;
 pub(crate) mod terrain;
+pub(crate) mod wind;
+
+use crate::error::{Finding, Severity};
+use crate::files::Files;
+use crate::request::{AreaPlanner, Overrides};
+use faults::Known;
+use fleet::Fleet;
+use lanes::Lanes;
+use run::Run;
+use skein_flight::trajectory::timed::Objective;
+use skein_flight::trajectory::wind::Wind;
+use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Point};
+use skein_interop::airframe;
+use skein_interop::json::{Document, Error, Fields, Places};
+use skein_netsim::fault::TimedFault;
+use skein_netsim::spec::{GroundStationSpec, RadioSpec, StormSpec};
+use std::collections::BTreeSet;
+use targets::Asked;
+use terrain::Terrain;
+
+/// Highest flight level and roof that are accepted, metres: the service ceiling of
+/// small fixed wings with room to spare.
+pub(crate) const MAX_HEIGHT_M: f64 = 5000.0;
+
+/// All fields of a scenario.
+const FIELDS: &[&str] = &[
+    "name",
+    "seed",
+    "time_scale",
+    "max_time_s",
+    "origin",
+    "area",
+    "points",
+    "lines",
+    "planner",
+    "laps",
+    "level_m",
+    "vertical_margin_m",
+    "no_fly",
+    "buildings",
+    "lanes",
+    "base",
+    "airframes",
+    "fleet",
+    "ground",
+    "wind",
+    "objective",
+    "radio",
+    "beacon_period_s",
+    "percept_period_ms",
+    "faults",
+    "storm",
+    "checks",
+];
+
+/// A scenario as its text and the command line state it: values in metres and seconds,
+/// nothing derived from them, and the place of each.
+#[derive(Clone, Debug)]
+pub(crate) struct Stated {
+    pub(crate) name: String,
+    pub(crate) run: Run,
+    pub(crate) terrain: Terrain,
+    pub(crate) asked: Asked,
+    /// How often everything is to be seen.
+    pub(crate) laps: u16,
+    pub(crate) lanes: Lanes,
+    pub(crate) fleet: Fleet,
+    pub(crate) ground_station: Option<GroundStationSpec>,
+    /// Where UAVs loiter at the end, where the file says so.
+    pub(crate) base: Option<Point>,
+    pub(crate) wind: Wind,
+    pub(crate) objective: Objective,
+    pub(crate) radio: RadioSpec,
+    pub(crate) faults: Vec<TimedFault>,
+    pub(crate) storm: StormSpec,
+    /// What its files told besides what was asked, and faults that were left out.
+    pub(crate) findings: Vec<Finding>,
+    pub(crate) places: Places,
+}
+
+/// Reads everything that a scenario states.
+pub(crate) fn scenario(
+    file: &str,
+    text: &str,
+    files: &Files<'_>,
+    over: &Overrides,
+) -> Result<Stated, Error> {
+    let document = Document::parse("scenario", file, text)?;
+    let root = document.root();
+    let f = root.fields(FIELDS)?;
+    let places = document.places();
+    let name = f.need("name", "\"city\"")?.word()?;
+    let run = run::read(&f, over)?;
+    let mut notices = Notices::new();
+    let (terrain, asked) = terrain::read(&f, files, &mut notices)?;
+    let asked = planned_by(&f, asked, over.planner)?;
+    let mut findings: Vec<Finding> = notices
+        .into_iter()
+        .map(|(field, text)| Finding {
+            place: Some(places.locate(&field)),
+            ..Finding::new(Severity::Note, &field, text)
+        })
+        .collect();
+    let ground_station = f.get("ground").map(fleet::ground_station).transpose()?;
+    let ground_id = ground_station.as_ref().map(|g| g.id);
+    let fleet = fleet::read(&f, &name, terrain.level_m, ground_id, over)?;
+    let radio = radio::read(f.need("radio", "{ range_m: 500, rate_bps: 64000 }")?)?;
+    let peers: BTreeSet<u16> = fleet
+        .members
+        .iter()
+        .map(|m| m.id)
+        .chain(ground_id)
+        .collect();
+    let known = Known {
+        peers: Some(&peers),
+        max_time_s: run.max_time_s,
+        loss_permille: radio.loss_permille,
+        lenient: over.peers.is_some(),
+    };
+    let faults = match f.get("faults") {
+        Some(list) => faults::read(list, &known, &mut findings)?,
+        None => Vec::new(),
+    };
+    Ok(Stated {
+        storm: faults::storm(f.get("storm"), fleet.members.len(), over.peers.is_some())?,
+        laps: f.small_or("laps", 1, 1, 1000, "times")?,
+        lanes: lanes::read(&f)?,
+        base: f
+            .get("base")
+            .map(|node| position(&node.fields(&["east_m", "north_m"])?))
+            .transpose()?,
+        wind: f.get("wind").map_or(Ok(Wind::CALM), wind::read)?,
+        objective: f
+            .get("objective")
+            .map_or(Ok(Objective::Time), airframe::objective)?,
+        name,
+        run,
+        terrain,
+        asked,
+        fleet,
+        ground_station,
+        radio,
+        faults,
+        findings,
+        places,
+    })
+}
+
+/// What is asked for, by the planner that the command line names.
+fn planned_by(f: &Fields<'_>, asked: Asked, planner: Option<AreaPlanner>) -> Result<Asked, Error> {
+    match (planner, &asked) {
+        (None, _) => Ok(asked),
+        (Some(planner), Asked::Area(_)) => Ok(Asked::Area(planner)),
+        (Some(_), Asked::Targets(_)) => {
+            let node = f.get("points").or(f.get("lines")).unwrap_or(f.node());
+            Err(node.wrong(
+                "a planner can be chosen for an area; points and lines have one planner each",
+            ))
+        }
+    }
+}
+
+/// What a file told besides what was asked: field and text.
+pub(crate) type Notices = Vec<(String, String)>;
+
+/// A position typed as metres `east_m`, `north_m`.
+pub(crate) fn position(f: &Fields<'_>) -> Result<Point, Error> {
+    let coordinate = |name| {
+        f.need(name, "250")?.number(
+            -MAX_MISSION_RADIUS_M,
+            MAX_MISSION_RADIUS_M,
+            "metres from the origin",
+        )
+    };
+    Ok(Point::new(coordinate("east_m")?, coordinate("north_m")?))
+}

@@ -1,18 +1,24 @@
-//! Points and lines of a scenario file, in the plane (D2.7 §3.4, §3.5). Leaves areas,
-//! zones and buildings to `terrain`.
+//! What a scenario asks to see: an area, points or lines, in the plane (D2.7 §3.2, §3.4,
+//! §3.5). Leaves areas, zones and buildings themselves to `terrain`.
 
-use crate::document::{Fields, Node};
-use crate::error::ScenarioError;
+use super::{Notices, position};
 use crate::files::Files;
-use crate::forecast::AreaPlanner;
-use crate::read::terrain::{Notices, position};
+use crate::request::AreaPlanner;
+use skein_flight::coverage::stations::targets::{LineTarget, PointTarget, Targets};
 use skein_geometry::Polygon;
 use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Origin, Point, Vector};
+use skein_interop::json::{Error, Fields, Node};
 use skein_interop::place::{LatLon, to_plane};
 use skein_interop::targets;
-use skein_peer::CoverageTask;
-use skein_peer::mission::mm;
-use skein_peer::task::{LineTask, PointTask};
+
+/// What is to be seen, in metres.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Asked {
+    /// The whole area.
+    Area(AreaPlanner),
+    /// Points or lines within it.
+    Targets(Targets),
+}
 
 /// Most pieces that a mission for points or lines may ask for; more would not fit
 /// into what a mission may be spoken in.
@@ -32,7 +38,7 @@ pub(crate) fn read(
     origin: Origin,
     area: Option<&Polygon>,
     notices: &mut Notices,
-) -> Result<CoverageTask, ScenarioError> {
+) -> Result<Asked, Error> {
     let reader = Reader { origin, files };
     if let (Some(node), Some(_)) = (f.get("planner"), f.get("points").or(f.get("lines"))) {
         return Err(
@@ -49,30 +55,28 @@ pub(crate) fn read(
     }
 }
 
-/// How an area is covered, as its planner is named.
-fn area_task(f: &Fields<'_>) -> Result<CoverageTask, ScenarioError> {
+/// The planner of an area, by its name; lanes by default.
+fn area_task(f: &Fields<'_>) -> Result<Asked, Error> {
     let Some(node) = f.get("planner") else {
-        return Ok(CoverageTask::Area);
+        return Ok(Asked::Area(AreaPlanner::Lanes));
     };
     let name = node.text()?;
     match AreaPlanner::ALL.into_iter().find(|p| p.name() == name) {
-        Some(planner) => Ok(planner.task()),
+        Some(planner) => Ok(Asked::Area(planner)),
         None => Err(node.wrong(format!(
             "{name} is no planner of the swarm; expected \"lanes\" (spanning-tree loop over a lane grid) or \"exact\" (straight passes over the cells of a boustrophedon decomposition)"
         ))),
     }
 }
 
-/// The rectangle around all that the task asks for.
-pub(crate) fn extent(task: &CoverageTask, node: &Node<'_>) -> Result<Polygon, ScenarioError> {
-    let of = |p: skein_peer::mission::PointMm| skein_peer::mission::point_m(p);
-    let all: Vec<Point> = match task {
-        CoverageTask::Area | CoverageTask::Exact => Vec::new(),
-        CoverageTask::Points(points) => points.iter().map(|p| of(p.at)).collect(),
-        CoverageTask::Lines(lines) => lines
-            .iter()
-            .flat_map(|l| l.way.iter().map(|p| of(*p)))
-            .collect(),
+/// The rectangle around all targets, with room.
+pub(crate) fn extent(asked: &Asked, node: &Node<'_>) -> Result<Polygon, Error> {
+    let all: Vec<Point> = match asked {
+        Asked::Area(_) => Vec::new(),
+        Asked::Targets(Targets::Points(points)) => points.iter().map(|p| p.at).collect(),
+        Asked::Targets(Targets::Lines(lines)) => {
+            lines.iter().flat_map(|l| l.way.iter().copied()).collect()
+        }
     };
     let far = |pick: fn(f64, f64) -> f64, axis: usize, start: f64| {
         all.iter().map(|p| p[axis]).fold(start, pick)
@@ -95,22 +99,18 @@ struct Reader<'f> {
 }
 
 impl Reader<'_> {
-    fn file(
-        &self,
-        node: &Node<'_>,
-        notices: &mut Notices,
-    ) -> Result<targets::Targets, ScenarioError> {
+    fn file(&self, node: &Node<'_>, notices: &mut Notices) -> Result<targets::Targets, Error> {
         let name = node.text()?;
         let found = targets::read(&self.files.read(node)?)
-            .map_err(|e| node.wrong(format!("{name}: {e}")))?;
+            .map_err(|e| node.wrong(e.in_file(name).to_string()))?;
         notices.extend(found.notices.iter().map(|n| {
             let said = format!("{name}: at {}: {}", n.pointer, n.text);
-            (node.path().to_owned(), said)
+            (node.path(), said)
         }));
         Ok(found)
     }
 
-    fn plane(&self, at: LatLon, name: &str, node: &Node<'_>) -> Result<Point, ScenarioError> {
+    fn plane(&self, at: LatLon, name: &str, node: &Node<'_>) -> Result<Point, Error> {
         to_plane(self.origin, at).map_err(|e| node.wrong(format!("{name}: {e}")))
     }
 
@@ -119,10 +119,10 @@ impl Reader<'_> {
         node: &Node<'_>,
         area: Option<&Polygon>,
         notices: &mut Notices,
-    ) -> Result<CoverageTask, ScenarioError> {
+    ) -> Result<Asked, Error> {
         let mut points: Vec<(Point, f64)> = Vec::new();
-        if let Ok(items) = node.items() {
-            for item in items {
+        if node.is_list() {
+            for item in node.items()? {
                 let f = item.fields(&["east_m", "north_m", "radius_m"])?;
                 let radius_m = f.number_or("radius_m", 0.0, 0.0, WIDEST_M, "metres")?;
                 points.push((position(&f)?, radius_m));
@@ -141,11 +141,9 @@ impl Reader<'_> {
             points.retain(|(p, _)| area.contains(*p));
         }
         limited(node, found, points.len(), "point")?;
-        let task = |(p, radius_m): (Point, f64)| PointTask {
-            at: (mm(p.x), mm(p.y)),
-            radius_mm: mm(radius_m).unsigned_abs(),
-        };
-        Ok(CoverageTask::Points(points.into_iter().map(task).collect()))
+        let target = |(at, radius_m)| PointTarget { at, radius_m };
+        let points = points.into_iter().map(target).collect();
+        Ok(Asked::Targets(Targets::Points(points)))
     }
 
     fn lines(
@@ -153,7 +151,7 @@ impl Reader<'_> {
         node: &Node<'_>,
         area: Option<&Polygon>,
         notices: &mut Notices,
-    ) -> Result<CoverageTask, ScenarioError> {
+    ) -> Result<Asked, Error> {
         let f = node.fields(&["file", "ways_m", "width_m"])?;
         let width_m = f.number_or("width_m", 0.0, 0.0, WIDEST_M, "metres")?;
         let mut ways: Vec<(Vec<Point>, f64)> = Vec::new();
@@ -180,15 +178,13 @@ impl Reader<'_> {
         }
         let vertices: usize = ways.iter().map(|(w, _)| w.len()).sum();
         limited(node, found, ways.len().min(vertices), "line")?;
-        let task = |(way, width_m): (Vec<Point>, f64)| LineTask {
-            way: way.iter().map(|p| (mm(p.x), mm(p.y))).collect(),
-            width_mm: mm(width_m).unsigned_abs(),
-        };
-        Ok(CoverageTask::Lines(ways.into_iter().map(task).collect()))
+        let target = |(way, width_m)| LineTarget { way, width_m };
+        let lines = ways.into_iter().map(target).collect();
+        Ok(Asked::Targets(Targets::Lines(lines)))
     }
 }
 
-fn limited(node: &Node<'_>, found: usize, kept: usize, what: &str) -> Result<(), ScenarioError> {
+fn limited(node: &Node<'_>, found: usize, kept: usize, what: &str) -> Result<(), Error> {
     if kept == 0 {
         return Err(node.wrong(if found == 0 {
             format!("no {what} is given")
@@ -204,7 +200,7 @@ fn limited(node: &Node<'_>, found: usize, kept: usize, what: &str) -> Result<(),
     Ok(())
 }
 
-fn typed_way(node: &Node<'_>) -> Result<Vec<Point>, ScenarioError> {
+fn typed_way(node: &Node<'_>) -> Result<Vec<Point>, Error> {
     let items = node.items()?;
     if items.len() < 2 {
         return Err(node.wrong(format!(

@@ -1,48 +1,45 @@
 //! Origin, area, no-fly zones and buildings of a scenario file, in the plane
 //! (D2.7 §2.2, §2.3). Leaves lanes and fleet to its neighbours.
 
-use crate::document::{Fields, Node};
-use crate::error::ScenarioError;
+use super::targets::{self, Asked};
+use super::{MAX_HEIGHT_M, Notices, position};
 use crate::files::Files;
-use crate::read::targets;
 use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
 use skein_geometry::{Polygon, PolygonError};
 use skein_interop::geojson::{self, HeightRules};
+use skein_interop::json::{Error, Fields, Node};
 use skein_interop::place::{LatLon, Shape, Side, circle_ring, to_plane};
 use skein_interop::plan;
 use skein_netsim::spec::Building;
-use skein_peer::CoverageTask;
-
-/// Highest flight level and roof that are accepted, metres: the service ceiling of
-/// small fixed wings with room to spare.
-pub(crate) const MAX_HEIGHT_M: f64 = 5000.0;
+use std::collections::BTreeMap;
 
 /// What stands and lies on the ground.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Terrain {
     pub(crate) origin: Origin,
     pub(crate) level_m: f64,
     pub(crate) area: Polygon,
     pub(crate) zones: Vec<Polygon>,
     pub(crate) buildings: Vec<Building>,
-    pub(crate) task: CoverageTask,
 }
 
-/// What a file told besides what was asked.
-pub(crate) type Notices = Vec<(String, String)>;
-
+/// What stands and lies on the ground, and what is to be seen of it.
 pub(crate) fn read(
     f: &Fields<'_>,
     files: &Files<'_>,
     notices: &mut Notices,
-) -> Result<Terrain, ScenarioError> {
+) -> Result<(Terrain, Asked), Error> {
     let origin = origin(f.need("origin", "{ lat_deg: 60.1655, lon_deg: 24.9355 }")?)?;
     let level_m = f
         .need("level_m", "45")?
         .number(1.0, MAX_HEIGHT_M, "metres")?;
     let margin_m = f.number_or("vertical_margin_m", 10.0, 0.0, MAX_HEIGHT_M, "metres")?;
-    let reader = Reader { origin, files };
-    let (area, task) = reader.asked(f, notices)?;
+    let mut reader = Reader {
+        origin,
+        files,
+        shapes: BTreeMap::new(),
+    };
+    let (area, asked) = reader.asked(f, notices)?;
     let mut zones = Vec::new();
     if let Some(list) = f.get("no_fly") {
         for entry in list.items()? {
@@ -72,14 +69,14 @@ pub(crate) fn read(
             zones.push(b.footprint.clone());
         }
     }
-    Ok(Terrain {
+    let terrain = Terrain {
         origin,
         level_m,
         area,
         zones,
         buildings,
-        task,
-    })
+    };
+    Ok((terrain, asked))
 }
 
 /// Whether nothing of the area sticks out of the zone.
@@ -88,7 +85,7 @@ fn swallows(zone: &Polygon, area: &Polygon) -> bool {
         && !zone.vertices().iter().any(|p| area.contains(*p))
 }
 
-fn origin(node: &Node<'_>) -> Result<Origin, ScenarioError> {
+fn origin(node: &Node<'_>) -> Result<Origin, Error> {
     let f = node.fields(&["lat_deg", "lon_deg"])?;
     Ok(Origin {
         lat_deg: f
@@ -100,24 +97,12 @@ fn origin(node: &Node<'_>) -> Result<Origin, ScenarioError> {
     })
 }
 
-/// A position typed as metres `east_m`, `north_m`.
-pub(crate) fn position(f: &Fields<'_>) -> Result<Point, ScenarioError> {
-    let coordinate = |name| {
-        f.need(name, "250")?.number(
-            -MAX_MISSION_RADIUS_M,
-            MAX_MISSION_RADIUS_M,
-            "metres from the origin",
-        )
-    };
-    Ok(Point::new(coordinate("east_m")?, coordinate("north_m")?))
-}
-
 /// A polygon of typed points; what is wrong is named at the vertex.
 fn typed_polygon(
     node: &Node<'_>,
     items: &[Node<'_>],
     points: Vec<Point>,
-) -> Result<Polygon, ScenarioError> {
+) -> Result<Polygon, Error> {
     Polygon::new(points).map_err(|e| {
         let at = match e {
             PolygonError::SelfCrossing(i, j) => items.get(i.max(j)).unwrap_or(node),
@@ -130,35 +115,40 @@ fn typed_polygon(
     })
 }
 
+/// Shapes of a file: of an area, and of no-fly zones.
+#[derive(Clone)]
+struct FileShapes {
+    area: Vec<Shape>,
+    no_fly: Vec<Shape>,
+}
+
 struct Reader<'f> {
     origin: Origin,
     files: &'f Files<'f>,
+    /// Files that were read, by name: area and zones may come from one.
+    shapes: BTreeMap<String, FileShapes>,
 }
 
 impl Reader<'_> {
     /// The area, and what is to be seen in it. Targets need no area of their own.
-    fn asked(
-        &self,
-        f: &Fields<'_>,
-        notices: &mut Notices,
-    ) -> Result<(Polygon, CoverageTask), ScenarioError> {
-        let targets = f.get("points").or(f.get("lines"));
-        let area = match (f.get("area"), targets) {
+    fn asked(&mut self, f: &Fields<'_>, notices: &mut Notices) -> Result<(Polygon, Asked), Error> {
+        let listed = f.get("points").or(f.get("lines"));
+        let area = match (f.get("area"), listed) {
             (None, Some(_)) => None,
             _ => {
                 let example = "{ west_m: 0, south_m: 0, east_m: 960, north_m: 960 }";
                 Some(self.area(f.need("area", example)?, notices)?)
             }
         };
-        let task = targets::read(f, self.files, self.origin, area.as_ref(), notices)?;
-        let area = match (area, targets) {
+        let asked = targets::read(f, self.files, self.origin, area.as_ref(), notices)?;
+        let area = match (area, listed) {
             (Some(area), _) => area,
-            (None, node) => targets::extent(&task, node.unwrap_or(f.node()))?,
+            (None, node) => targets::extent(&asked, node.unwrap_or(f.node()))?,
         };
-        Ok((area, task))
+        Ok((area, asked))
     }
 
-    fn ring_m(&self, node: &Node<'_>) -> Result<Polygon, ScenarioError> {
+    fn ring_m(&self, node: &Node<'_>) -> Result<Polygon, Error> {
         let items = node.items()?;
         let mut points = Vec::with_capacity(items.len());
         for item in &items {
@@ -172,7 +162,7 @@ impl Reader<'_> {
         typed_polygon(node, &items, points)
     }
 
-    fn ring_deg(&self, node: &Node<'_>) -> Result<Polygon, ScenarioError> {
+    fn ring_deg(&self, node: &Node<'_>) -> Result<Polygon, Error> {
         let items = node.items()?;
         let mut points = Vec::with_capacity(items.len());
         for item in &items {
@@ -183,7 +173,7 @@ impl Reader<'_> {
         typed_polygon(node, &items, points)
     }
 
-    fn circle(&self, node: &Node<'_>) -> Result<Polygon, ScenarioError> {
+    fn circle(&self, node: &Node<'_>) -> Result<Polygon, Error> {
         let f = node.fields(&["east_m", "north_m", "radius_m"])?;
         let radius_m = f
             .need("radius_m", "50")?
@@ -192,55 +182,15 @@ impl Reader<'_> {
         Polygon::new(ring).map_err(|e| node.wrong(e.to_string()))
     }
 
-    /// Shapes of a file in the plane: `(area shapes, no-fly shapes)`.
-    fn file_shapes(
-        &self,
-        node: &Node<'_>,
-        notices: &mut Notices,
-    ) -> Result<(Vec<Shape>, Vec<Shape>), ScenarioError> {
+    /// The shapes of a file, which is read once; what it tells besides is noted then.
+    fn file_shapes(&mut self, node: &Node<'_>, notices: &mut Notices) -> Result<FileShapes, Error> {
         let name = node.text()?;
-        let text = self.files.read(node)?;
-        let told = |pointer: &str, text: &str| {
-            (
-                node.path().to_owned(),
-                format!("{name}: at {pointer}: {text}"),
-            )
-        };
-        if name.ends_with(".plan") {
-            let p = plan::read(&text).map_err(|e| node.wrong(format!("{name}: {e}")))?;
-            notices.extend(p.notices.iter().map(|n| told(&n.pointer, &n.text)));
-            if !p.waypoints.is_empty() {
-                let said = format!(
-                    "{} waypoint(s) are not flown: the area is covered instead",
-                    p.waypoints.len()
-                );
-                notices.push(told("/mission/items", &said));
-            }
-            if p.surveys.is_empty() && !p.keep_in.is_empty() {
-                let said = "the inclusion fence is the area to cover; UAVs turn outside of it";
-                notices.push(told("/geoFence", said));
-            }
-            // A survey says what to see; without one the fence that must not be left does.
-            let area = if p.surveys.is_empty() {
-                p.keep_in
-            } else {
-                p.surveys.into_iter().map(Shape::Ring).collect()
-            };
-            return Ok((area, p.keep_out));
+        if let Some(known) = self.shapes.get(name) {
+            return Ok(known.clone());
         }
-        if name.ends_with(".geojson") || name.ends_with(".json") {
-            let g = geojson::read(&text).map_err(|e| node.wrong(format!("{name}: {e}")))?;
-            notices.extend(g.notices.iter().map(|n| told(&n.pointer, &n.text)));
-            let shapes: Vec<Shape> = g
-                .polygons
-                .into_iter()
-                .map(|f| Shape::Ring(f.ring))
-                .collect();
-            return Ok((shapes.clone(), shapes));
-        }
-        Err(node.wrong(format!(
-            "{name} is of no known format; expected a name that ends in .plan or .geojson"
-        )))
+        let shapes = shapes_of(node, &self.files.read(node)?, notices)?;
+        self.shapes.insert(name.to_owned(), shapes.clone());
+        Ok(shapes)
     }
 
     fn file_polygons(
@@ -248,7 +198,7 @@ impl Reader<'_> {
         node: &Node<'_>,
         shapes: &[Shape],
         side: Side,
-    ) -> Result<Vec<Polygon>, ScenarioError> {
+    ) -> Result<Vec<Polygon>, Error> {
         let name = node.text()?;
         let one = |(i, shape): (usize, &Shape)| {
             let ring = shape
@@ -259,7 +209,7 @@ impl Reader<'_> {
         shapes.iter().enumerate().map(one).collect()
     }
 
-    fn area(&self, node: &Node<'_>, notices: &mut Notices) -> Result<Polygon, ScenarioError> {
+    fn area(&mut self, node: &Node<'_>, notices: &mut Notices) -> Result<Polygon, Error> {
         let f = node.fields(&[
             "west_m", "south_m", "east_m", "north_m", "ring_m", "ring_deg", "file",
         ])?;
@@ -270,7 +220,7 @@ impl Reader<'_> {
             return self.ring_deg(ring);
         }
         if let Some(file) = f.get("file") {
-            let (shapes, _) = self.file_shapes(file, notices)?;
+            let shapes = self.file_shapes(file, notices)?.area;
             let mut found = self.file_polygons(file, &shapes, Side::Inside)?;
             return match (found.pop(), found.len()) {
                 (Some(one), 0) => Ok(one),
@@ -308,7 +258,7 @@ impl Reader<'_> {
         Polygon::new(ring).map_err(|e| node.wrong(e.to_string()))
     }
 
-    fn zones(&self, node: &Node<'_>, notices: &mut Notices) -> Result<Vec<Polygon>, ScenarioError> {
+    fn zones(&mut self, node: &Node<'_>, notices: &mut Notices) -> Result<Vec<Polygon>, Error> {
         let f = node.fields(&["ring_m", "ring_deg", "circle", "file"])?;
         if let Some(ring) = f.get("ring_m") {
             return Ok(vec![self.ring_m(ring)?]);
@@ -320,25 +270,13 @@ impl Reader<'_> {
             return Ok(vec![self.circle(circle)?]);
         }
         if let Some(file) = f.get("file") {
-            // What the file says besides was already told where the area came from it.
-            let mut again = Notices::new();
-            let (_, shapes) = self.file_shapes(file, &mut again)?;
-            if !notices
-                .iter()
-                .any(|(_, said)| again.iter().any(|(_, a)| a == said))
-            {
-                notices.append(&mut again);
-            }
+            let shapes = self.file_shapes(file, notices)?.no_fly;
             return self.file_polygons(file, &shapes, Side::Outside);
         }
         Err(node.wrong("a no-fly zone is one of { ring_m: [...] }, { ring_deg: [...] }, { circle: {...} }, { file: \"...\" }"))
     }
 
-    fn buildings(
-        &self,
-        node: &Node<'_>,
-        notices: &mut Notices,
-    ) -> Result<Vec<Building>, ScenarioError> {
+    fn buildings(&self, node: &Node<'_>, notices: &mut Notices) -> Result<Vec<Building>, Error> {
         let f = node.fields(&["file", "storey_m", "default_storeys"])?;
         let rules = HeightRules {
             storey_m: f.number_or("storey_m", 3.0, 1.0, 10.0, "metres")?,
@@ -347,12 +285,9 @@ impl Reader<'_> {
         let file = f.need("file", "\"buildings.geojson\"")?;
         let name = file.text()?;
         let read = geojson::buildings(&self.files.read(file)?, &rules)
-            .map_err(|e| file.wrong(format!("{name}: {e}")))?;
+            .map_err(|e| file.wrong(e.in_file(name).to_string()))?;
         let mut tell = |pointer: &str, text: &str| {
-            notices.push((
-                file.path().to_owned(),
-                format!("{name}: at {pointer}: {text}"),
-            ));
+            notices.push((file.path(), format!("{name}: at {pointer}: {text}")));
         };
         for n in &read.notices {
             tell(&n.pointer, &n.text);
@@ -381,6 +316,53 @@ impl Reader<'_> {
         }
         Ok(buildings)
     }
+}
+
+/// Shapes of a file's text.
+fn shapes_of(node: &Node<'_>, text: &str, notices: &mut Notices) -> Result<FileShapes, Error> {
+    let name = node.text()?;
+    let told = |pointer: &str, text: &str| (node.path(), format!("{name}: at {pointer}: {text}"));
+    if name.ends_with(".plan") {
+        let p = plan::read(text).map_err(|e| node.wrong(e.in_file(name).to_string()))?;
+        notices.extend(p.notices.iter().map(|n| told(&n.pointer, &n.text)));
+        if !p.waypoints.is_empty() {
+            let said = format!(
+                "{} waypoint(s) are not flown: the area is covered instead",
+                p.waypoints.len()
+            );
+            notices.push(told("/mission/items", &said));
+        }
+        if p.surveys.is_empty() && !p.keep_in.is_empty() {
+            let said = "the inclusion fence is the area to cover; UAVs turn outside of it";
+            notices.push(told("/geoFence", said));
+        }
+        // A survey says what to see; without one the fence that must not be left does.
+        let area = if p.surveys.is_empty() {
+            p.keep_in
+        } else {
+            p.surveys.into_iter().map(Shape::Ring).collect()
+        };
+        return Ok(FileShapes {
+            area,
+            no_fly: p.keep_out,
+        });
+    }
+    if name.ends_with(".geojson") || name.ends_with(".json") {
+        let g = geojson::read(text).map_err(|e| node.wrong(e.in_file(name).to_string()))?;
+        notices.extend(g.notices.iter().map(|n| told(&n.pointer, &n.text)));
+        let shapes: Vec<Shape> = g
+            .polygons
+            .into_iter()
+            .map(|f| Shape::Ring(f.ring))
+            .collect();
+        return Ok(FileShapes {
+            area: shapes.clone(),
+            no_fly: shapes,
+        });
+    }
+    Err(node.wrong(format!(
+        "{name} is of no known format; expected a name that ends in .plan or .geojson"
+    )))
 }
 
 /// Convex hull by Andrew's monotone chain, counter-clockwise, in O(n log n).

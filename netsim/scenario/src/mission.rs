@@ -1,0 +1,170 @@
+//! From what a scenario states to the mission that is spoken to the swarm: metres become
+//! millimetres here. Leaves the loop to the mission itself, and whether it can succeed to
+//! `feasibility`.
+
+use crate::flight_model::{footprint_m, turn_radius_m};
+use crate::read::Stated;
+use crate::read::targets::Asked;
+use crate::request::AreaPlanner;
+use skein_flight::airframe::Airframe;
+use skein_geometry::frame::Point;
+use skein_geometry::{NoFlyZones, Polygon};
+use skein_interop::json::Error;
+use skein_peer::mission::{mm, ring_mm};
+use skein_peer::{CoverageTask, Mission};
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "saturates, and readers limit it"
+)]
+fn length_mm(mm: f64) -> u32 {
+    mm.round() as u32
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "at most 1.8e9")]
+fn e7(degrees: f64) -> i32 {
+    (degrees * 1e7).round() as i32
+}
+
+/// The mission of a scenario, with the tree that it states or else the default one.
+pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
+    let (lanes, terrain) = (&s.lanes, &s.terrain);
+    let airframes = || s.fleet.members.iter().map(|m| &m.airframe);
+    let turn_m = turning(s)?;
+    // An airframe without its computer circles where it is, within two radii.
+    let clearance_m = lanes
+        .clearance_m
+        .unwrap_or(2.0 * turn_m + lanes.tracking_error_m);
+    let station = s.ground_station.as_ref().map(|g| g.position);
+    let base = s.base.or(station).unwrap_or_else(|| centre(&terrain.area));
+    // A launch point that reaches the loop; UAVs that start on the loop do so anyway.
+    let first = s.fleet.members.first().and_then(|m| m.launch);
+    let launch = first.map_or(base, |l| l.position());
+    let seen = |side: fn((f64, f64)) -> f64| {
+        let each = airframes().map(|a| side(footprint_m(a, s.wind, turn_m)));
+        each.fold(f64::MAX, f64::min)
+    };
+    let mission = Mission {
+        revision: 1,
+        origin_lat_e7: e7(terrain.origin.lat_deg),
+        origin_lon_e7: e7(terrain.origin.lon_deg),
+        area: ring_mm(terrain.area.vertices()),
+        zones: terrain
+            .zones
+            .iter()
+            .map(|z| ring_mm(z.vertices()))
+            .collect(),
+        lane_spacing_mm: length_mm(lanes.spacing_m * 1000.0),
+        turn_radius_mm: length_mm((turn_m * 1000.0).ceil()),
+        clearance_mm: length_mm((clearance_m * 1000.0).ceil()),
+        footprint_across_mm: length_mm((seen(|m| m.0) * 1000.0).floor()),
+        footprint_along_mm: length_mm((seen(|m| m.1) * 1000.0).floor()),
+        tracking_error_mm: length_mm(lanes.tracking_error_m * 1000.0),
+        launch: (mm(launch.x), mm(launch.y)),
+        base: (mm(base.x), mm(base.y)),
+        task: match &s.asked {
+            Asked::Area(planner) => planner.task(),
+            Asked::Targets(targets) => CoverageTask::of_targets(targets),
+        },
+        lap: 0,
+        further_laps: laps(s)? - 1,
+        tree: lanes.tree.unwrap_or_default(),
+    };
+    check_size(s)?;
+    check_places(s, &mission)?;
+    Ok(mission)
+}
+
+/// The turn radius of the mission, metres: the widest of the fleet, which must fit the
+/// lanes.
+fn turning(s: &Stated) -> Result<f64, Error> {
+    let spacing_m = s.lanes.spacing_m;
+    let widest = |radius: &dyn Fn(&Airframe) -> f64| {
+        let all = s.fleet.members.iter().map(|m| radius(&m.airframe));
+        all.fold(0.0, f64::max)
+    };
+    let calm_m = widest(&Airframe::min_turn_radius_m);
+    if calm_m > spacing_m / 2.0 {
+        return Err(s.places.wrong("lanes.spacing_m", format!(
+            "lanes of {spacing_m} m are too narrow for a turn radius of {calm_m:.1} m at cruise; expected at least {:.1} m, or a lower cruise_mps, or a larger bank_deg",
+            2.0 * calm_m
+        )));
+    }
+    Ok(calm_m.max(widest(&|a| turn_radius_m(a, s.wind, spacing_m))))
+}
+
+/// How often everything is to be seen.
+fn laps(s: &Stated) -> Result<u16, Error> {
+    if s.laps > 1 && s.asked == Asked::Area(AreaPlanner::Exact) {
+        return Err(s.places.wrong(
+            "laps",
+            "exact passes are flown once; for several times round take planner \"lanes\"",
+        ));
+    }
+    Ok(s.laps)
+}
+
+fn centre(area: &Polygon) -> Point {
+    let (low, high) = area.bounds();
+    Point::new((low.x + high.x) / 2.0, (low.y + high.y) / 2.0)
+}
+
+/// Refuses missions of more cells than one may have before anything is built.
+fn check_size(s: &Stated) -> Result<(), Error> {
+    /// Cells of the bounding box: four times the 65,535 that a mission may have, so
+    /// that slanted and concave areas pass.
+    const MAX_BOX_CELLS: f64 = 262_140.0;
+    let spacing_m = s.lanes.spacing_m;
+    let (low, high) = s.terrain.area.bounds();
+    let cells = ((high.x - low.x) / spacing_m + 2.0) * ((high.y - low.y) / spacing_m + 2.0);
+    // Cells are named by 16-bit columns and rows.
+    let farthest = low.coords.abs().max().max(high.coords.abs().max()) / spacing_m;
+    if cells > MAX_BOX_CELLS || farthest > 32_000.0 {
+        return Err(s.places.wrong("lanes.spacing_m", format!(
+            "an area of {:.0} x {:.0} m has too many cells of {spacing_m} m; a mission may have 65,535: widen the lanes or shrink the area",
+            high.x - low.x,
+            high.y - low.y
+        )));
+    }
+    Ok(())
+}
+
+/// Launch points and the base must be clear of the zones.
+fn check_places(s: &Stated, mission: &Mission) -> Result<(), Error> {
+    let zones = NoFlyZones::new(s.terrain.zones.clone());
+    let clearance_m = mission.clearance_m();
+    let trouble = |p: Point| {
+        let d = zones.distance_m(p);
+        (d < clearance_m).then(|| {
+            if d <= 0.0 {
+                "lies inside a no-fly zone; move it out".to_owned()
+            } else {
+                format!("is {d:.1} m from a no-fly zone; expected at least the clearance of {clearance_m:.1} m")
+            }
+        })
+    };
+    for uav in &s.fleet.members {
+        if let Some(launch) = uav.launch
+            && let Some(problem) = trouble(launch.position())
+        {
+            let field = format!("{}.launch", uav.field);
+            let problem = format!("this launch point {problem}");
+            return Err(s.places.wrong(&field, problem));
+        }
+    }
+    if let Some(problem) = trouble(mission.base_m()) {
+        let field = match (s.base, &s.ground_station) {
+            (Some(_), _) => "base",
+            (None, Some(_)) => "ground",
+            (None, None) => "scenario",
+        };
+        return Err(s.places.wrong(
+            field,
+            format!(
+                "the base, where UAVs loiter at the end, {problem}; set base: {{ east_m, north_m }}"
+            ),
+        ));
+    }
+    Ok(())
+}
