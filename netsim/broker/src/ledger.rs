@@ -416,8 +416,8 @@ pub fn secs(ms: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_flight::coverage::area::Direction;
-    use skein_flight::coverage::area::backtracking::Leg;
+    use skein_flight::coverage::ring::Direction;
+    use skein_flight::coverage::ring::backtracking::Leg;
     use skein_peer::PeerId;
 
     fn claim(first: u16, count: u16) -> Report {

@@ -9,7 +9,7 @@ use crate::radio::{Delivery, Frame, LinkTable, Medium, Overlay};
 use crate::spec::RadioSpec;
 use crate::world::{Fact, World};
 use skein_behaviors::{Percept, Setpoint};
-use skein_flight::coverage::area::CellId;
+use skein_flight::coverage::ring::CellId;
 use skein_link::Reason;
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -2,7 +2,7 @@
 
 use super::judge::Approach;
 use super::motion::kinematic::Loss;
-use skein_flight::coverage::area::CellId;
+use skein_flight::coverage::ring::CellId;
 use skein_geometry::frame::Point;
 
 /// Something that truly happened.
