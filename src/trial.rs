@@ -16,7 +16,7 @@ use std::process::ExitCode;
 ///
 /// Each peer is a process of its own; they reach each other only through a simulated
 /// radio on 127.0.0.1. Faults of the scenario happen at their times, and others can
-/// be added from another terminal with `skein chaos`. Ends with a verdict: exit code
+/// be added from another terminal with `skein chaos`. Ends with a report: exit code
 /// 0 if everything that can be covered was covered, no no-fly zone was entered and
 /// every live peer knows that the mission is finished, else 1.
 #[derive(Debug, Args)]
@@ -35,16 +35,16 @@ pub struct TrialArgs {
     /// Seed of everything that is drawn.
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
-    /// Keeps configurations, journals, logs and the verdict in this directory. Without
+    /// Keeps configurations, journals, logs and the report in this directory. Without
     /// it they are kept only if the mission failed.
     #[arg(long, value_name = "DIR")]
     pub run_dir: Option<PathBuf>,
-    /// How the verdict is printed.
+    /// How the report is printed.
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
 }
 
-/// Runs the verb: progress on stderr, the verdict on stdout.
+/// Runs the verb: progress on stderr, the report on stdout.
 ///
 /// # Errors
 /// When the trial could not be run at all.
@@ -77,6 +77,7 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
     }
     let options = Options {
         seed: scenario.spec.seed,
+        geometry: scenario.geometry,
         spec: scenario.spec,
         run_dir: args.run_dir.clone(),
         program: std::env::current_exe().context("this program's own file")?,
@@ -87,12 +88,12 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
         cli::runtime()?.block_on(skein_broker::run(options, cli::asked_to_stop(), &mut tell));
     display.end();
     match ended {
-        Ok(verdict) => {
+        Ok(report) => {
             match args.format {
-                Format::Text => print!("{verdict}"),
-                Format::Json => println!("{}", serde_json::to_string_pretty(&verdict)?),
+                Format::Text => print!("{report}"),
+                Format::Json => println!("{}", serde_json::to_string_pretty(&report)?),
             }
-            Ok(ExitCode::from(if verdict.passed {
+            Ok(ExitCode::from(if report.passed {
                 exit::OK
             } else {
                 exit::MISSION_FAILED

@@ -3,7 +3,7 @@
 //! twice.
 
 use skein_netsim::Prepared;
-use skein_netsim::summary::failed;
+use skein_netsim::runs::{self, Wanted};
 use skein_netsim::world::fixture;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -57,16 +57,22 @@ fn seeds_that_once_failed_hold() {
                 .entry((*scenario).to_owned())
                 .or_insert_with(|| {
                     let prepared = prepared(scenario);
-                    let free_ms = prepared.failure_free_makespan_ms();
+                    let free_ms = runs::failure_free_makespan_ms(&prepared);
                     (prepared, free_ms)
                 });
             let run = || match flags {
-                ["storm"] => prepared.storm(seed, *free_ms, 0, false),
-                [] => prepared.planned(seed, 0, false),
+                ["storm"] => runs::storm(prepared, seed, *free_ms, Wanted::default()),
+                [] => runs::planned(prepared, seed, Wanted::default()),
                 other => panic!("{}: unknown flags {other:?}", file.display()),
             };
             let first = run();
-            assert!(!failed(&first), "skein sim {line}: {:#?}", first.violations);
+            let report = &first.report;
+            assert!(
+                report.passed,
+                "skein sim {line}: {:?} {:#?}",
+                report.reasons,
+                first.violations()
+            );
             // Once is enough to see that a run repeats itself; a run costs about a second.
             if replayed == 0 {
                 assert_eq!(first.history_hash, run().history_hash, "{line}");

@@ -1,10 +1,12 @@
-//! Faults, carried out: on processes, airframes and links; and what should follow.
+//! Faults of a trial: which are still to come, and what each does to processes,
+//! airframes and links, with what should follow.
 
-use crate::ledger::secs;
-use crate::member::{Computer, Member};
-use crate::trial::{Due, Trial};
-use nix::sys::signal::Signal;
+use crate::live_peer::LivePeer;
+use crate::live_world::LiveWorld;
+use crate::peers::Peers;
+use crate::registry::ConsoleEntry;
 use skein_console::{Answer, Command, Token, ask};
+use skein_netsim::account::{Account, Cause, secs};
 use skein_netsim::fault::{Fault, TimedFault};
 use std::time::Duration;
 
@@ -14,35 +16,49 @@ const MAX_DUE: usize = 1000;
 /// How long the ground station may take to judge a mission and speak it.
 const CONSOLE_TIMEOUT: Duration = Duration::from_secs(20);
 
-impl Trial<'_> {
-    /// Carries out what is due by now, in the order of the times.
-    pub(crate) async fn carry_out_due(&mut self) {
-        while let Some(at) = self
-            .faults
-            .iter()
-            .position(|f| f.timed.at_ms <= self.now_ms)
-        {
-            let Due { timed, scenario } = self.faults.remove(at);
-            if let Err(why) = self.inject(&timed.fault).await {
-                let text = format!("a fault could not be carried out: {:?}: {why}", timed.fault);
-                self.note(text.clone());
-                if scenario {
-                    self.ledger.failures.push(text);
-                }
-            }
+/// A fault that has not happened yet.
+#[derive(Clone, Debug)]
+struct Due {
+    timed: TimedFault,
+    /// Whether the scenario wants it, so that the trial fails without it.
+    scenario: bool,
+}
+
+/// The faults that are still to come.
+#[derive(Clone, Debug)]
+pub(crate) struct Schedule {
+    due: Vec<Due>,
+}
+
+impl Schedule {
+    /// Those of a scenario.
+    pub(crate) fn new(faults: &[TimedFault]) -> Self {
+        let due = |timed: &TimedFault| Due {
+            timed: timed.clone(),
+            scenario: true,
+        };
+        Self {
+            due: faults.iter().map(due).collect(),
         }
     }
 
-    /// Takes faults whose times count from now.
-    pub(crate) fn later(&mut self, faults: Vec<TimedFault>) -> Answer {
-        if self.faults.len() + faults.len() > MAX_DUE {
+    /// The next fault that is due by now, and whether the scenario wants it.
+    pub(crate) fn take_due(&mut self, now_ms: u64) -> Option<(Fault, bool)> {
+        let at = self.due.iter().position(|f| f.timed.at_ms <= now_ms)?;
+        let Due { timed, scenario } = self.due.remove(at);
+        Some((timed.fault, scenario))
+    }
+
+    /// Adds faults whose times count from now.
+    pub(crate) fn later(&mut self, now_ms: u64, faults: Vec<TimedFault>) -> Answer {
+        if self.due.len() + faults.len() > MAX_DUE {
             return Err(format!("more than {MAX_DUE} faults are waiting"));
         }
         let mut lines = Vec::new();
         for timed in faults {
-            let at_ms = timed.at_ms.saturating_add(self.now_ms);
+            let at_ms = timed.at_ms.saturating_add(now_ms);
             lines.push(format!("at {:.0} s: {:?}", secs(at_ms), timed.fault));
-            self.faults.push(Due {
+            self.due.push(Due {
                 timed: TimedFault {
                     at_ms,
                     fault: timed.fault,
@@ -50,65 +66,65 @@ impl Trial<'_> {
                 scenario: false,
             });
         }
-        self.faults.sort_by_key(|f| f.timed.at_ms);
+        self.due.sort_by_key(|f| f.timed.at_ms);
         Ok(lines)
     }
 
-    /// A scenario whose faults did not all happen did not show what it was to show.
-    pub(crate) fn name_missed(&mut self) {
-        for missed in self.faults.iter().filter(|f| f.scenario) {
-            let text = format!(
-                "over before the fault at {:.0} s: {:?}",
-                secs(missed.timed.at_ms),
-                missed.timed.fault
-            );
-            self.ledger.failures.push(text);
-        }
+    /// The scenario's faults for which the trial was over too soon: it did not show what
+    /// it was to show.
+    pub(crate) fn missed(&self) -> Vec<String> {
+        let missed = self.due.iter().filter(|f| f.scenario);
+        missed
+            .map(|f| {
+                format!(
+                    "over before the fault at {:.0} s: {:?}",
+                    secs(f.timed.at_ms),
+                    f.timed.fault
+                )
+            })
+            .collect()
     }
+}
 
+/// Carries faults out.
+pub(crate) struct Injector<'a> {
+    /// Whose processes are concerned.
+    pub(crate) peers: &'a mut Peers,
+    /// Whose airframes and links.
+    pub(crate) world: &'a mut LiveWorld,
+    /// What is told of them.
+    pub(crate) account: &'a mut Account,
+    /// The ground station and its console, once it is up.
+    pub(crate) console: Option<(u16, &'a ConsoleEntry)>,
+    /// Scenario time, milliseconds.
+    pub(crate) now_ms: u64,
+    /// Beacon period T, seconds.
+    pub(crate) period_s: f64,
+}
+
+impl Injector<'_> {
     /// Carries out a fault and says what should follow.
     pub(crate) async fn inject(&mut self, fault: &Fault) -> Answer {
-        let lines = match fault {
-            Fault::Kill { peer } => self.kill(*peer, false).await?,
-            Fault::KillComputer { peer } => self.kill(*peer, true).await?,
-            Fault::Terminate { peer } => self.terminate(*peer)?,
-            Fault::Pause { peer } => self.pause(*peer)?,
-            Fault::Resume { peer } => self.resume(*peer)?,
-            Fault::Restart { peer, fresh_disk } => self.restart(*peer, *fresh_disk).await?,
+        match fault {
+            Fault::Kill { peer } => self.kill(*peer, Cause::Killed).await,
+            Fault::KillComputer { peer } => self.kill(*peer, Cause::ComputerKilled).await,
+            Fault::Terminate { peer } => self.terminate(*peer),
+            Fault::Pause { peer } => self.pause(*peer),
+            Fault::Resume { peer } => self.resume(*peer),
+            Fault::Restart { peer, fresh_disk } => self.restart(*peer, *fresh_disk).await,
             Fault::Cut { .. } | Fault::Partition { .. } | Fault::Heal | Fault::Loss { .. } => {
-                self.links(fault)?
+                self.links(fault)
             }
             Fault::Rebase { east_mm, north_mm } => {
-                self.operate(&Command::Base((*east_mm, *north_mm))).await?
+                self.operate(&Command::Base((*east_mm, *north_mm))).await
             }
-        };
-        if let Some(text) = lines.first() {
-            self.note(text.clone());
         }
-        Ok(lines)
-    }
-
-    fn known(&mut self, peer: u16) -> Result<&mut Member, String> {
-        let known = self
-            .members
-            .keys()
-            .map(|id| format!("uav{id}"))
-            .collect::<Vec<_>>()
-            .join(" ");
-        self.members
-            .get_mut(&peer)
-            .ok_or_else(|| format!("there is no uav{peer}; there are {known}"))
     }
 
     /// Says something at the console of the ground station, as an operator does.
     async fn operate(&self, command: &Command) -> Answer {
-        let ground = self.spec.ground.as_ref().map(|g| g.id);
-        let runs = |m: &&Member| m.computer == Computer::Runs;
-        let console = ground
-            .and_then(|id| self.members.get(&id))
-            .filter(runs)
-            .and(self.registered.console())
-            .ok_or("there is no ground station to speak it")?;
+        let console = self.console.filter(|(id, _)| self.peers.on_air(*id));
+        let (_, console) = console.ok_or("there is no ground station to speak it")?;
         let token = Token::read(&console.token_file).map_err(|e| e.to_string())?;
         match tokio::time::timeout(CONSOLE_TIMEOUT, ask(console.at, &token, command)).await {
             Ok(said) => said.map_err(|e| e.to_string()),
@@ -116,139 +132,104 @@ impl Trial<'_> {
         }
     }
 
-    async fn kill(&mut self, peer: u16, computer_only: bool) -> Answer {
-        let now_ms = self.now_ms;
-        let member = self.known(peer)?;
-        if !matches!(member.computer, Computer::Runs | Computer::Paused)
-            && (computer_only || !member.airborne)
-        {
-            return Err(format!("uav{peer} does not run"));
+    async fn kill(&mut self, id: u16, cause: Cause) -> Answer {
+        let computer_only = !cause.takes_airframe();
+        let peer = self.peers.known(id)?;
+        if !peer.has_process() && (computer_only || !peer.airborne()) {
+            return Err(format!("uav{id} does not run"));
         }
-        member.computer = Computer::Off;
-        if let Some(process) = &mut member.process {
-            process.kill().await;
-        }
-        let flies = member.flies;
+        peer.kill().await;
         if !computer_only {
-            member.airborne = false;
+            peer.lose_airframe();
         }
-        if !flies {
-            return Ok(vec![format!("the ground station uav{peer} is gone")]);
+        let held = self.account.ended(self.now_ms, id, cause);
+        if !self.peers.known(id)?.flies() {
+            return Ok(vec![format!("the ground station uav{id} is gone")]);
         }
-        if !computer_only {
-            self.world.remove(peer);
+        if computer_only {
+            self.world.set_computer(id, false);
         } else {
-            self.world.set_computer(peer, false);
+            self.world.remove(id);
         }
-        let cells = self.ledger.killed(now_ms, peer, computer_only);
         let what = if computer_only {
             "the computer of uav"
         } else {
             "uav"
         };
         let mut lines = vec![format!(
-            "{what}{peer} is gone; it held {cells} uncovered cells"
+            "{what}{id} is gone; it held {} uncovered cells",
+            held.cells
         )];
-        lines.push(self.expect_down(peer));
-        if cells > 0 {
+        lines.push(self.expect_down(id));
+        if held.cells > 0 {
             lines.push(self.expect_takeover());
         }
         if computer_only {
-            lines.push(format!("expect: its airframe loiters by itself after 1 s; `skein chaos restart {peer}` revives it"));
+            lines.push(format!("expect: its airframe loiters by itself after 1 s; `skein chaos restart {id}` revives it"));
         }
         Ok(lines)
     }
 
-    fn terminate(&mut self, peer: u16) -> Answer {
-        let now_ms = self.now_ms;
-        let member = self.known(peer)?;
-        if member.computer != Computer::Runs {
-            return Err(format!("uav{peer} does not run"));
-        }
-        member.computer = Computer::Off;
-        member.left = true;
-        if let Some(process) = &mut member.process {
-            process.signal(Signal::SIGTERM);
-        }
-        let cells = if member.flies {
-            self.ledger.killed(now_ms, peer, true)
-        } else {
-            0
-        };
+    fn terminate(&mut self, id: u16) -> Answer {
+        self.running(id)?.terminate();
+        let held = self.account.ended(self.now_ms, id, Cause::Terminated);
         Ok(vec![
-            format!("uav{peer} is asked to end; it held {cells} uncovered cells"),
-            self.expect_down(peer),
+            format!(
+                "uav{id} is asked to end; it held {} uncovered cells",
+                held.cells
+            ),
+            self.expect_down(id),
         ])
     }
 
-    fn pause(&mut self, peer: u16) -> Answer {
-        let member = self.known(peer)?;
-        if member.computer != Computer::Runs {
-            return Err(format!("uav{peer} does not run"));
+    fn running(&mut self, id: u16) -> Result<&mut LivePeer, String> {
+        let peer = self.peers.known(id)?;
+        if peer.runs() {
+            Ok(peer)
+        } else {
+            Err(format!("uav{id} does not run"))
         }
-        member.computer = Computer::Paused;
-        if let Some(process) = &mut member.process {
-            process.signal(Signal::SIGSTOP);
-        }
-        let text = format!("uav{peer} stands still; its airframe loiters by itself after 1 s");
-        Ok(vec![text, self.expect_down(peer)])
     }
 
-    fn resume(&mut self, peer: u16) -> Answer {
-        let period_s = f64::from(self.spec.beacon_period_ms) / 1000.0;
-        let member = self.known(peer)?;
-        if member.computer != Computer::Paused {
-            return Err(format!("uav{peer} is not paused"));
+    fn pause(&mut self, id: u16) -> Answer {
+        self.running(id)?.pause();
+        self.account.paused(self.now_ms, id);
+        let text = format!("uav{id} stands still; its airframe loiters by itself after 1 s");
+        Ok(vec![text, self.expect_down(id)])
+    }
+
+    fn resume(&mut self, id: u16) -> Answer {
+        if !self.peers.known(id)?.resume() {
+            return Err(format!("uav{id} is not paused"));
         }
-        member.computer = Computer::Runs;
-        if let Some(process) = &mut member.process {
-            process.signal(Signal::SIGCONT);
-        }
+        self.account.resumed(self.now_ms, id);
         Ok(vec![
-            format!("uav{peer} goes on"),
+            format!("uav{id} goes on"),
             format!(
                 "expect: it speaks within {:.0} s, and yields cells that others have listed since",
-                2.0 * period_s
+                2.0 * self.period_s
             ),
         ])
     }
 
-    async fn restart(&mut self, peer: u16, fresh_disk: bool) -> Answer {
-        let now_ms = self.now_ms;
-        let period_s = f64::from(self.spec.beacon_period_ms) / 1000.0;
-        let member = self.known(peer)?;
-        let ran = matches!(member.computer, Computer::Runs | Computer::Paused);
-        member.computer = Computer::Off;
-        if let Some(process) = &mut member.process {
-            process.kill().await;
-        }
-        let (flies, airborne) = (member.flies, member.airborne);
+    async fn restart(&mut self, id: u16, fresh_disk: bool) -> Answer {
+        let peer = self.peers.known(id)?;
+        peer.kill().await;
+        let (flies, airborne) = (peer.flies(), peer.airborne());
         if fresh_disk {
-            member.wipe();
-        }
-        if ran && flies {
-            self.ledger.killed(now_ms, peer, true);
-        }
-        if flies && !airborne {
-            self.world.relaunch(peer);
-        } else {
-            self.world.set_computer(peer, true);
+            peer.wipe();
         }
         // Its last words must not be taken for the new life's.
-        let member = self.known(peer)?;
-        let radio = std::mem::take(&mut member.radio);
-        self.ledger.add_radio(&radio);
-        self.ledger.restarted(now_ms, peer, fresh_disk);
-        let Some(processes) = &self.processes else {
-            return Err("the trial is ending".to_owned());
-        };
-        let Some(member) = self.members.get_mut(&peer) else {
-            return Err("gone".to_owned());
-        };
-        member.airborne = flies;
-        member
-            .start(processes)
-            .map_err(|e| format!("uav{peer} did not start: {e}"))?;
+        let radio = peer.take_radio();
+        self.account.radio(&radio);
+        self.account.ended(self.now_ms, id, Cause::ComputerKilled);
+        if flies && !airborne {
+            self.world.relaunch(id);
+        } else {
+            self.world.set_computer(id, true);
+        }
+        self.peers.start(id)?;
+        self.account.restarted(self.now_ms, id, fresh_disk);
         let disk = if fresh_disk {
             "without its journal"
         } else {
@@ -260,11 +241,11 @@ impl Trial<'_> {
             "where it is"
         };
         Ok(vec![
-            format!("uav{peer} starts again {place}, {disk}"),
+            format!("uav{id} starts again {place}, {disk}"),
             format!(
                 "expect: a higher incarnation after {:.0} s of listening, and use within {:.0} s more",
-                3.0 * period_s,
-                20.0 * period_s
+                3.0 * self.period_s,
+                20.0 * self.period_s
             ),
         ])
     }
@@ -276,7 +257,7 @@ impl Trial<'_> {
             _ => Vec::new(),
         };
         for peer in named {
-            self.known(peer)?;
+            self.peers.known(peer)?;
         }
         self.world.fault(fault);
         let text = match fault {
@@ -309,8 +290,8 @@ impl Trial<'_> {
     /// When a silent peer is suspected and when it is known to be down everywhere in
     /// its component, seconds: (k1, k1 + k2 + D + 2) periods.
     fn bounds_s(&self) -> (f64, f64) {
-        let period_s = f64::from(self.spec.beacon_period_ms) / 1000.0;
-        let d = f64::from(self.world.diameter(|id| self.on_air(id)));
+        let (period_s, peers) = (self.period_s, &self.peers);
+        let d = f64::from(self.world.diameter(|id| peers.on_air(id)));
         let (k1, k2) = (4.0 + d / 4.0, 4.0 + d / 2.0);
         (k1 * period_s, (k1 + k2 + d + 2.0) * period_s)
     }
@@ -324,11 +305,45 @@ impl Trial<'_> {
 
     fn expect_takeover(&self) -> String {
         let live = self
+            .account
             .live_uavs()
             .iter()
             .map(|id| format!("uav{id}"))
             .collect::<Vec<_>>()
             .join(", ");
         format!("expect: its cells listed soon after by some of {live}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(at_ms: u64, peer: u16) -> TimedFault {
+        TimedFault {
+            at_ms,
+            fault: Fault::Kill { peer },
+        }
+    }
+
+    #[test]
+    fn faults_come_at_their_times_and_those_of_the_scenario_are_missed() {
+        let mut s = Schedule::new(&[at(2_000, 1), at(90_000, 2)]);
+        s.later(1_000, vec![at(500, 3), at(99_000, 4)]).unwrap();
+        assert_eq!(s.take_due(1_499), None);
+        assert_eq!(s.take_due(2_000), Some((Fault::Kill { peer: 3 }, false)));
+        assert_eq!(s.take_due(2_000), Some((Fault::Kill { peer: 1 }, true)));
+        assert_eq!(s.take_due(2_000), None);
+        assert_eq!(
+            s.missed(),
+            ["over before the fault at 90 s: Kill { peer: 2 }"]
+        );
+    }
+
+    #[test]
+    fn a_plan_of_a_person_has_an_end() {
+        let mut s = Schedule::new(&[]);
+        assert!(s.later(0, vec![at(1, 1); MAX_DUE]).is_ok());
+        assert!(s.later(0, vec![at(1, 1)]).is_err());
     }
 }

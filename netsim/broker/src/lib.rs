@@ -2,38 +2,40 @@
 //!
 //! A trial launches one process a peer, runs the same world as the simulator in real
 //! time times a factor, and lets peers reach each other only through loopback
-//! proxies.
+//! proxies. What it comes to is told by the simulator's own
+//! [account](skein_netsim::account).
 //!
 //! | module | what it does |
 //! |---|---|
 //! | [`trial`] | prepares, steps the world, ends |
-//! | `lifecycle` | starts and ends the peers |
-//! | `from_peers` | takes in what peers say |
-//! | `judge` | draws the verdict |
-//! | `faults` | carries out faults and says what should follow |
+//! | `peers` | starts and ends all peers, takes in what they say |
+//! | `live_peer` | one peer: process, files, the line to it |
+//! | `config` | the configuration that each peer's process reads |
+//! | `transports` | the proxies of all pairs, dark while their links are down |
+//! | `faults` | which faults are to come, what each does and what should follow |
 //! | [`live_world`] | the world and its radio links, as a trial uses them |
 //! | [`stream`] | percepts and setpoints, one loopback stream a peer |
-//! | [`proxy`] | the transports between each two peers, which can go dark |
+//! | [`proxy`] | one transport, which can go dark |
 //! | [`process`] | processes, and the guard that leaves none behind |
 //! | [`control`], [`registry`] | how other commands find a trial and talk to it |
-//! | [`ledger`], [`verdict`] | what was seen, and what it adds up to |
 //! | [`pacer`] | scenario time against wall time |
+//! | [`batch`] | many simulated runs at the same time |
 
+pub mod batch;
+mod config;
 pub mod control;
+mod error;
 mod faults;
-mod from_peers;
-mod judge;
-pub mod ledger;
-mod lifecycle;
+mod live_peer;
 pub mod live_world;
-pub mod member;
 pub mod pacer;
+mod peers;
 pub mod process;
 pub mod proxy;
 pub mod registry;
 pub mod stream;
+mod transports;
 pub mod trial;
-pub mod verdict;
 
-pub use trial::{Event, Options, Progress, TrialError, run};
-pub use verdict::Verdict;
+pub use error::TrialError;
+pub use trial::{Event, Options, Progress, run};

@@ -1,13 +1,11 @@
-//! The world and its radio links, as a trial uses them.
+//! The simulated world around live peers: airframes, radio links, the judge.
 
-use crate::verdict::{CoverageVerdict, Uncovered};
 use skein_behaviors::{Percept, Setpoint};
 use skein_link::LinkState;
 use skein_netsim::fault::Fault;
 use skein_netsim::radio::{LinkTable, Overlay};
 use skein_netsim::spec::Spec;
-use skein_netsim::world::{Fact, World};
-use std::collections::BTreeMap;
+use skein_netsim::world::{Fact, Judge, World};
 
 /// The world of one trial.
 #[derive(Debug)]
@@ -70,14 +68,10 @@ impl LiveWorld {
         self.links.diameter(counts).max(1)
     }
 
-    /// How often links went down, by reason.
+    /// How often links that were up went down: by range, by sight, by fault.
     #[must_use]
-    pub fn link_cuts(&self) -> BTreeMap<String, u64> {
-        let (range, sight, fault) = self.links.cuts();
-        let all = [("range", range), ("sight", sight), ("fault", fault)];
-        all.into_iter()
-            .map(|(reason, n)| (reason.to_owned(), n))
-            .collect()
+    pub fn link_cuts(&self) -> (u64, u64, u64) {
+        self.links.cuts()
     }
 
     /// Takes a fault of links.
@@ -104,63 +98,9 @@ impl LiveWorld {
         self.links.compute(&self.world, &self.faults);
     }
 
-    /// Share of the coverable cells that were seen.
+    /// What was seen and what went wrong.
     #[must_use]
-    pub fn covered_share(&self) -> f64 {
-        self.world.judge().covered_share()
-    }
-
-    /// Whether all of them were.
-    #[must_use]
-    pub fn is_covered(&self) -> bool {
-        self.world.judge().complete()
-    }
-
-    /// How often a UAV entered a no-fly zone.
-    #[must_use]
-    pub fn zone_entries(&self) -> usize {
-        self.world.judge().entries()
-    }
-
-    /// The closest approach of two airborne UAVs, metres.
-    #[must_use]
-    pub fn separation_m(&self) -> Option<f64> {
-        self.world.judge().closest().map(|a| a.distance_m)
-    }
-
-    /// What was seen and what cannot be, for the verdict.
-    #[must_use]
-    pub fn coverage(&self, needed_share: f64) -> CoverageVerdict {
-        let judge = self.world.judge();
-        let survey = judge.survey();
-        let mut uncoverable: BTreeMap<String, usize> = BTreeMap::new();
-        let mut uncoverable_cells = Vec::new();
-        for cell in survey.cells() {
-            if let Some(reason) = &cell.uncoverable {
-                let reason = reason.to_string();
-                *uncoverable.entry(reason.clone()).or_default() += 1;
-                uncoverable_cells.push(Uncovered {
-                    col: cell.id.col,
-                    row: cell.id.row,
-                    reason,
-                });
-            }
-        }
-        let missed = judge
-            .sightings()
-            .zip(survey.cells())
-            .filter(|((_, seen), cell)| seen.is_none() && cell.uncoverable.is_none())
-            .map(|((id, _), _)| (id.col, id.row))
-            .collect();
-        CoverageVerdict {
-            covered: judge.n_covered(),
-            coverable: survey.n_coverable(),
-            cells: survey.cells().len(),
-            coverable_share: survey.coverable_share(),
-            needed_share,
-            uncoverable,
-            uncoverable_cells,
-            missed,
-        }
+    pub fn judge(&self) -> &Judge {
+        self.world.judge()
     }
 }

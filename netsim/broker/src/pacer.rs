@@ -49,6 +49,7 @@ pub struct Pacer {
     lowest: f64,
     next: Instant,
     late: u32,
+    longest_delay_ms: u64,
 }
 
 impl Pacer {
@@ -63,6 +64,7 @@ impl Pacer {
             lowest: scale,
             next: now,
             late: 0,
+            longest_delay_ms: 0,
         }
     }
 
@@ -76,6 +78,12 @@ impl Pacer {
     #[must_use]
     pub fn lowest(&self) -> f64 {
         self.lowest
+    }
+
+    /// The longest delay of an answer so far, milliseconds of scenario time.
+    #[must_use]
+    pub fn longest_delay_ms(&self) -> u64 {
+        self.longest_delay_ms
     }
 
     /// When the next step is due.
@@ -112,6 +120,7 @@ impl Pacer {
 
     /// A peer answered a percept with that delay; tells whether the scale was lowered.
     pub fn answered(&mut self, delay_ms: u64) -> bool {
+        self.longest_delay_ms = self.longest_delay_ms.max(delay_ms);
         if delay_ms <= MAX_DELAY_MS {
             self.late = 0;
             return false;

@@ -1,29 +1,27 @@
 //! A trial: launch the peers, run the world around them, inject the faults, judge.
 
 use crate::control::{Control, Request};
-use crate::ledger::{Ledger, secs};
+use crate::error::{TrialError, io};
+use crate::faults::{Injector, Schedule};
 use crate::live_world::LiveWorld;
-use crate::member::{Computer, LEASE_MS, Member};
 use crate::pacer::{Pacer, STEP_MS};
-use crate::process::Processes;
-use crate::proxy::Proxy;
-use crate::registry::{Entry, Registered, RegistryError, private_dir, private_file, shared_dir};
-use crate::stream::Streams;
-use crate::verdict::Verdict;
-use nix::sys::signal::Signal;
-use skein_console::{Answer, Asked, Token, TokenError};
-use skein_link::LinkState;
-use skein_netsim::fault::TimedFault;
+use crate::peers::{Clock, Peers, Said};
+use crate::registry::{ConsoleEntry, Entry, Registered, private_dir, private_file, shared_dir};
+use skein_console::{Answer, Asked, Token};
+use skein_netsim::account::{Account, Cause, Details, Ending, Live, RunReport, Setting, secs};
+use skein_netsim::fault::Fault;
 use skein_netsim::spec::Spec;
 use skein_netsim::world::{Fact, Loss};
-use std::collections::BTreeMap;
+use skein_peer::offload::MissionGeometry;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 use tokio::time::Instant;
 
-/// A link that has been down this long goes dark for the transports too: two leases,
-/// so that a transport that loses a neighbour truly lost it.
-const DARK_AFTER: Duration = Duration::from_millis(2 * LEASE_MS as u64);
+/// How long UAVs may take to derive the loop of the mission before time begins
+/// without them: they share two cores, and a square kilometre takes a debug build
+/// some seconds each.
+const READY_TIMEOUT: Duration = Duration::from_secs(45);
 
 /// How often progress is told, milliseconds of scenario time.
 const PROGRESS_MS: u64 = 10_000;
@@ -38,6 +36,8 @@ const IDLE_MS: u64 = 30_000;
 pub struct Options {
     /// The scenario.
     pub spec: Spec,
+    /// What was derived from its mission.
+    pub geometry: Arc<MissionGeometry>,
     /// Seed of the run.
     pub seed: u64,
     /// Where to keep everything; a directory of its own if not given.
@@ -86,41 +86,6 @@ pub struct Progress {
     pub finished: usize,
 }
 
-/// Why a trial has no verdict.
-#[derive(Debug, thiserror::Error)]
-pub enum TrialError {
-    /// A file or a socket failed.
-    #[error("{what}: {cause}")]
-    Io {
-        /// Doing what.
-        what: String,
-        /// Why.
-        cause: std::io::Error,
-    },
-    /// The directory shared with other commands failed.
-    #[error(transparent)]
-    Registry(#[from] RegistryError),
-    /// There is no token for its ports.
-    #[error(transparent)]
-    Token(#[from] TokenError),
-    /// A peer did not come up.
-    #[error("uav{peer} did not start: {why}")]
-    Launch {
-        /// Which.
-        peer: u16,
-        /// Its last words.
-        why: String,
-    },
-    /// The person at the keyboard had enough.
-    #[error("interrupted; all peers are gone")]
-    Interrupted,
-}
-
-pub(crate) fn io(what: impl Into<String>) -> impl FnOnce(std::io::Error) -> TrialError {
-    let what = what.into();
-    move |cause| TrialError::Io { what, cause }
-}
-
 /// Runs a trial to its end, or until `stop` does. Every process it started is gone
 /// when it returns.
 ///
@@ -130,62 +95,41 @@ pub async fn run(
     options: Options,
     stop: impl Future<Output = ()>,
     tell: &mut (dyn FnMut(Event) + Send),
-) -> Result<Verdict, TrialError> {
+) -> Result<RunReport, TrialError> {
     let keep = options.run_dir.is_some();
     let mut trial = Trial::prepare(options, tell).await?;
     let flown = tokio::select! {
         flown = trial.fly() => flown,
         () = stop => Err(TrialError::Interrupted),
     };
-    trial.flown = trial.began.elapsed();
-    trial.end().await;
-    let result = flown.map(|()| trial.verdict());
-    if let Ok(verdict) = &result {
-        let json = serde_json::to_vec_pretty(verdict).map_err(|e| io("verdict")(e.into()))?;
-        private_file(&trial.run_dir.join("verdict.json"), &json)?;
+    let wall = trial.began.elapsed();
+    for radio in trial.peers.end().await {
+        trial.account.radio(&radio);
+    }
+    let result = flown.map(|()| trial.conclude(wall));
+    if let Ok(report) = &result {
+        let json = serde_json::to_vec_pretty(report).map_err(|e| io("the report")(e.into()))?;
+        private_file(&trial.run_dir.join("report.json"), &json)?;
     }
     trial
-        .close(keep || result.as_ref().is_ok_and(|v| !v.passed))
+        .close(keep || result.as_ref().is_ok_and(|r| !r.passed))
         .await;
     result
 }
 
-/// A fault that has not happened yet.
-#[derive(Clone, Debug)]
-pub(crate) struct Due {
-    /// What and when.
-    pub(crate) timed: TimedFault,
-    /// Whether the scenario wants it, so that the trial fails without it.
-    pub(crate) scenario: bool,
-}
-
-/// The proxy of a pair and the state of its link.
-#[derive(Debug)]
-pub(crate) struct Pair {
-    pub(crate) proxy: Proxy,
-    down_since: Option<Instant>,
-}
-
-pub(crate) struct Trial<'a> {
-    pub(crate) spec: Spec,
-    pub(crate) seed: u64,
-    pub(crate) world: LiveWorld,
-    pub(crate) members: BTreeMap<u16, Member>,
-    pub(crate) ledger: Ledger,
-    pub(crate) processes: Option<Processes>,
-    pub(crate) now_ms: u64,
-    pub(crate) components: Vec<Vec<u16>>,
-    pub(crate) pacer: Pacer,
-    pub(crate) began: Instant,
-    pub(crate) flown: Duration,
-    pub(crate) setpoint_delay_ms: u64,
-    pub(crate) pairs: BTreeMap<(u16, u16), Pair>,
-    pub(crate) streams: Streams,
-    pub(crate) control: Control,
-    pub(crate) registered: Registered,
-    pub(crate) run_dir: PathBuf,
-    pub(crate) faults: Vec<Due>,
-    pub(crate) progress_due_ms: u64,
+struct Trial<'a> {
+    spec: Spec,
+    run_dir: PathBuf,
+    peers: Peers,
+    world: LiveWorld,
+    faults: Schedule,
+    account: Account,
+    pacer: Pacer,
+    control: Control,
+    registered: Registered,
+    began: Instant,
+    now_ms: u64,
+    progress_due_ms: u64,
     all_finished_ms: Option<u64>,
     tell: &'a mut (dyn FnMut(Event) + Send),
 }
@@ -198,6 +142,7 @@ impl<'a> Trial<'a> {
     ) -> Result<Self, TrialError> {
         let Options {
             spec,
+            geometry,
             seed,
             run_dir,
             program,
@@ -212,14 +157,10 @@ impl<'a> Trial<'a> {
             .canonicalize()
             .map_err(io(run_dir.display().to_string()))?;
         let token = Token::draw()?;
-        let streams = Streams::listen(token.secret().to_owned())
-            .await
-            .map_err(io("the vehicle streams"))?;
         let control = Control::listen(0, token.clone())
             .await
             .map_err(io("the control port"))?;
-        let world = LiveWorld::new(&spec, seed);
-        let entry = Entry {
+        let registered = Registered::enter(Entry {
             id: id.clone(),
             pid: std::process::id(),
             control: control.address(),
@@ -228,52 +169,28 @@ impl<'a> Trial<'a> {
             observe: None,
             console: None,
             fleet: spec.fleet.clone(),
-        };
-        let registered = Registered::enter(entry)?;
-        let mut members: BTreeMap<u16, Member> = spec
-            .uavs
-            .iter()
-            .map(|u| (u.id, Member::new(&run_dir, u.id, true)))
-            .collect();
-        if let Some(g) = &spec.ground {
-            members.insert(g.id, Member::new(&run_dir, g.id, false));
-        }
-        let pairs = bind_pairs(&members).await.map_err(io("a link's proxy"))?;
-        let mut trial = Self {
-            ledger: Ledger::new(spec.uavs.len()),
+        })?;
+        let peers = Peers::prepare(&spec, seed, &run_dir, &program, token.secret()).await?;
+        tell(Event::Begun {
+            id,
+            run_dir: run_dir.clone(),
+        });
+        Ok(Self {
+            peers,
+            world: LiveWorld::new(&spec, seed),
+            faults: Schedule::new(&spec.faults),
+            account: Account::new(Setting::new(&spec, Some(&geometry), seed)),
             pacer: Pacer::new(spec.time_scale, Instant::now()),
-            began: Instant::now(),
-            flown: Duration::ZERO,
-            processes: None,
-            now_ms: 0,
-            components: Vec::new(),
-            setpoint_delay_ms: 0,
-            progress_due_ms: 0,
-            all_finished_ms: None,
-            faults: spec
-                .faults
-                .iter()
-                .map(|f| Due {
-                    timed: f.clone(),
-                    scenario: true,
-                })
-                .collect(),
-            spec,
-            seed,
-            world,
-            members,
-            pairs,
-            streams,
             control,
             registered,
-            run_dir: run_dir.clone(),
+            began: Instant::now(),
+            now_ms: 0,
+            progress_due_ms: 0,
+            all_finished_ms: None,
+            spec,
+            run_dir,
             tell,
-        };
-        trial.write_configs(token.secret())?;
-        trial.processes =
-            Some(Processes::start(&program).map_err(io(program.display().to_string()))?);
-        (trial.tell)(Event::Begun { id, run_dir });
-        Ok(trial)
+        })
     }
 
     /// Launches everybody, and runs the world until the mission is over.
@@ -283,13 +200,18 @@ impl<'a> Trial<'a> {
         self.pacer = Pacer::new(self.spec.time_scale, self.began);
         loop {
             tokio::select! {
-                Some(heard) = self.streams.next() => self.hear(heard),
+                Some(heard) = self.peers.next() => {
+                    let said = self.peers.take(heard, self.clock());
+                    self.take(said);
+                }
                 Some(asked) = self.control.next() => self.answer(asked).await,
                 () = tokio::time::sleep_until(self.pacer.next()) => {
                     self.carry_out_due().await;
                     self.step();
                     if self.is_over() {
-                        self.name_missed();
+                        for missed in self.faults.missed() {
+                            self.account.failed(missed);
+                        }
                         return Ok(());
                     }
                     if self.pacer.stepped(Instant::now()) {
@@ -300,100 +222,138 @@ impl<'a> Trial<'a> {
         }
     }
 
+    /// Starts everybody, and waits until all UAVs have derived the loop of their mission:
+    /// nobody launches an airframe whose computer is still busy starting, and here all
+    /// computers share one machine. Time stands still meanwhile.
+    async fn launch(&mut self) -> Result<(), TrialError> {
+        self.peers.start_all()?;
+        let uavs = self.spec.uavs.iter().map(|u| u.id);
+        for id in uavs.chain(self.spec.ground.iter().map(|g| g.id)) {
+            self.account.started(self.now_ms, id);
+        }
+        for said in self.peers.wait_for_all(self.clock()).await? {
+            self.take(Some(said));
+        }
+        let deadline = Instant::now() + READY_TIMEOUT;
+        let ready = |account: &Account| {
+            let live = account.live_uavs();
+            live.iter().all(|id| account.is_ready(*id))
+        };
+        while !ready(&self.account) {
+            match tokio::time::timeout_at(deadline, self.peers.next()).await {
+                Ok(Some(heard)) => {
+                    let said = self.peers.take(heard, self.clock());
+                    self.take(said);
+                }
+                Ok(None) | Err(_) => {
+                    let text = "not all UAVs are ready; time begins all the same";
+                    self.note(text.to_owned());
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn clock(&self) -> Clock {
+        Clock {
+            now_ms: self.now_ms,
+            scale: self.pacer.scale(),
+        }
+    }
+
+    /// Takes what a peer said.
+    fn take(&mut self, said: Option<Said>) {
+        match said {
+            None => {}
+            Some(Said::Up {
+                id,
+                locator,
+                console,
+            }) => {
+                self.observable(id, locator);
+                if let Some(console) = console {
+                    self.operable(console);
+                }
+            }
+            Some(Said::Setpoint { id, setpoint, runs }) => {
+                let delay_ms = self.now_ms.saturating_sub(setpoint.from_ms);
+                if runs && self.pacer.answered(delay_ms) {
+                    self.note_slow("peers answer late");
+                }
+                self.world.apply(id, setpoint);
+            }
+            Some(Said::Report { id, report }) => {
+                if let Some(line) = self.account.reported(self.now_ms, id, &report) {
+                    self.note(line);
+                }
+            }
+            Some(Said::Radio(radio)) => self.account.radio(&radio),
+            Some(Said::Crashed { id, radio, why }) => {
+                self.account.radio(&radio);
+                self.account.ended(self.now_ms, id, Cause::Crashed);
+                let text = format!("uav{id} ended by itself: {why}");
+                self.account.failed(text.clone());
+                self.note(text);
+            }
+            Some(Said::Wrong(text)) => self.account.failed(text),
+        }
+    }
+
+    /// Observers attach to the ground station, or to the first UAV where there is none.
+    fn observable(&mut self, id: u16, locator: String) {
+        let ground = self.spec.ground.as_ref().map(|g| g.id);
+        let observed = ground.or_else(|| self.spec.uavs.first().map(|u| u.id));
+        if observed == Some(id)
+            && let Err(cause) = self.registered.observe_at(locator)
+        {
+            tracing::warn!(%cause, "observers will not find this trial");
+        }
+    }
+
+    /// Orders and missions enter at the ground station's console.
+    fn operable(&mut self, console: ConsoleEntry) {
+        if let Err(cause) = self.registered.console_at(console) {
+            tracing::warn!(%cause, "orders will not find the ground station of this trial");
+        }
+    }
+
     /// One step of the world.
     fn step(&mut self) {
         self.now_ms += STEP_MS;
         for fact in self.world.advance(self.now_ms) {
             self.fact(&fact);
         }
-        self.follow_links();
-        let percepts_due = self
+        if self.world.judge().complete() {
+            self.account.covered(self.now_ms);
+        }
+        let components = self.world.components(|id| self.peers.on_air(id));
+        if let Some(text) = self.account.connected(&components) {
+            self.note(text);
+        }
+        let percepts = self
             .now_ms
             .is_multiple_of(u64::from(self.spec.percept_period_ms).max(STEP_MS));
-        let (now_ms, scale) = (self.now_ms, self.pacer.scale());
-        let ids: Vec<u16> = self.members.keys().copied().collect();
-        for id in &ids {
-            let row = self.row(*id, &ids);
-            let percept = if percepts_due {
-                self.world.percept(*id)
-            } else {
-                None
-            };
-            let Some(member) = self.members.get_mut(id) else {
-                continue;
-            };
-            let Some(line) = &member.line else { continue };
-            let links = (member.told.as_ref() != Some(&row)).then(|| row.clone());
-            line.tick(
-                now_ms,
-                scale,
-                percept.filter(|_| member.flies && member.airborne),
-                links,
-            );
-            member.told = Some(row);
-        }
-        if now_ms >= self.progress_due_ms {
-            self.progress_due_ms = now_ms + PROGRESS_MS;
+        self.peers.tell(self.clock(), &self.world, percepts);
+        if self.now_ms >= self.progress_due_ms {
+            self.progress_due_ms = self.now_ms + PROGRESS_MS;
             let progress = self.progress();
             (self.tell)(Event::Progress(progress));
         }
     }
 
-    /// The links into `rx`.
-    fn row(&self, rx: u16, ids: &[u16]) -> Vec<(u16, LinkState)> {
-        let on_air = |id: &u16| self.members.get(id).is_some_and(Member::on_air);
-        ids.iter()
-            .filter(|tx| **tx != rx && on_air(tx))
-            .map(|tx| (*tx, self.world.link(*tx, rx)))
-            .collect()
-    }
-
-    /// Follows the true links: darkens the proxies of what stays down, and finds the
-    /// components.
-    fn follow_links(&mut self) {
-        let now = Instant::now();
-        for ((low, high), pair) in &mut self.pairs {
-            let (there, back) = (self.world.link(*low, *high), self.world.link(*high, *low));
-            // One way up keeps the transport, which can only carry both.
-            if there.is_up() || back.is_up() {
-                pair.down_since = None;
-                pair.proxy.set_dark(false);
-            } else {
-                let since = *pair.down_since.get_or_insert(now);
-                pair.proxy.set_dark(now.duration_since(since) > DARK_AFTER);
-            }
-        }
-        self.components = self.world.components(|id| self.on_air(id));
-        if let Some(text) = self.ledger.components(self.now_ms, &self.components) {
-            self.note(text);
-        }
-    }
-
-    /// Whether the radio of a peer works.
-    pub(crate) fn on_air(&self, id: u16) -> bool {
-        self.members.get(&id).is_some_and(Member::on_air)
-    }
-
     /// What truly happened in the world.
     fn fact(&mut self, fact: &Fact) {
+        if let Some(text) = self.account.happened(self.now_ms, fact) {
+            self.note(text);
+        }
         match fact {
-            Fact::ZoneEntry { uav, zone, .. } => {
-                self.note(format!("uav{uav} entered no-fly zone {zone}"))
-            }
             Fact::Lost { uav, cause, .. } if *cause != Loss::Killed => {
-                let text = format!("uav{uav} is lost: {cause:?}");
-                self.ledger.failures.push(text.clone());
-                self.note(text);
-                self.ledger.killed(self.now_ms, *uav, false);
-                if let Some(member) = self.members.get_mut(uav) {
-                    member.airborne = false;
-                    member.computer = Computer::Off;
-                    if let Some(process) = &mut member.process {
-                        process.signal(Signal::SIGKILL);
-                    }
+                if let Ok(peer) = self.peers.known(*uav) {
+                    peer.lose_airframe();
                 }
             }
-            Fact::Failsafe { uav, on: true, .. } if self.on_air(*uav) => {
+            Fact::Failsafe { uav, on: true, .. } if self.peers.on_air(*uav) => {
                 self.note(format!(
                     "uav{uav} got no setpoint for too long and loiters by itself"
                 ));
@@ -401,18 +361,18 @@ impl<'a> Trial<'a> {
                     self.note_slow("computers are starved");
                 }
             }
-            Fact::Seen { .. } | Fact::TooClose(_) | Fact::Lost { .. } | Fact::Failsafe { .. } => {}
+            _ => {}
         }
     }
 
-    pub(crate) fn note(&mut self, text: String) {
+    fn note(&mut self, text: String) {
         (self.tell)(Event::Note {
             time_s: secs(self.now_ms),
             text,
         });
     }
 
-    pub(crate) fn note_slow(&mut self, why: &str) {
+    fn note_slow(&mut self, why: &str) {
         let scale = self.pacer.scale();
         self.note(format!(
             "the machine is too slow ({why}); time runs at x{scale:.1} for now"
@@ -420,61 +380,92 @@ impl<'a> Trial<'a> {
     }
 
     fn progress(&self) -> Progress {
+        let alive = self.account.live_uavs();
         Progress {
             time_s: secs(self.now_ms),
             scale: self.pacer.scale(),
-            covered: self.world.covered_share(),
-            alive: self.live_uavs(),
-            components: self.components.len(),
-            taken_over: self.ledger.taken_over(),
-            finished: self
-                .live_uavs()
+            covered: self.world.judge().covered_share(),
+            components: self.account.n_components(),
+            taken_over: self.account.taken_over(),
+            finished: alive
                 .iter()
-                .filter(|id| self.ledger.is_finished(**id))
+                .filter(|id| self.account.is_finished(**id))
                 .count(),
+            alive,
         }
     }
 
-    /// UAVs that fly with a computer that runs.
-    pub(crate) fn live_uavs(&self) -> Vec<u16> {
-        let live = |m: &&Member| m.flies && m.airborne && m.computer == Computer::Runs;
-        self.members.values().filter(live).map(|m| m.id).collect()
-    }
-
     fn is_over(&mut self) -> bool {
-        let live = self.live_uavs();
-        let finished = live.iter().all(|id| self.ledger.is_finished(*id));
+        let live = self.account.live_uavs();
+        let finished = live.iter().all(|id| self.account.is_finished(*id));
         self.all_finished_ms = finished.then(|| self.all_finished_ms.unwrap_or(self.now_ms));
         let idle = self
             .all_finished_ms
             .is_some_and(|since| self.now_ms - since >= IDLE_MS);
-        let done = finished && self.world.is_covered();
+        let done = finished && self.account.covered_ms().is_some();
         done || idle || live.is_empty() || self.now_ms >= u64::from(self.spec.max_time_s) * 1000
     }
 
     async fn answer(&mut self, asked: Asked<Request>) {
         let answer: Answer = match asked.request {
             Request::Fault(fault) => self.inject(&fault).await,
-            Request::Later(faults) => self.later(faults),
+            Request::Later(faults) => self.faults.later(self.now_ms, faults),
         };
         // Who asked may have gone away.
         let _ = asked.answer.send(answer);
     }
-}
 
-/// A proxy for each pair of peers.
-async fn bind_pairs(
-    members: &BTreeMap<u16, Member>,
-) -> std::io::Result<BTreeMap<(u16, u16), Pair>> {
-    let mut pairs = BTreeMap::new();
-    for low in members.keys() {
-        for high in members.keys().filter(|high| *high > low) {
-            let pair = Pair {
-                proxy: Proxy::bind().await?,
-                down_since: None,
-            };
-            pairs.insert((*low, *high), pair);
+    /// Carries out what is due by now, in the order of the times.
+    async fn carry_out_due(&mut self) {
+        while let Some((fault, scenario)) = self.faults.take_due(self.now_ms) {
+            if let Err(why) = self.inject(&fault).await {
+                let text = format!("a fault could not be carried out: {fault:?}: {why}");
+                self.note(text.clone());
+                if scenario {
+                    self.account.failed(text);
+                }
+            }
         }
     }
-    Ok(pairs)
+
+    async fn inject(&mut self, fault: &Fault) -> Answer {
+        let ground = self.spec.ground.as_ref().map(|g| g.id);
+        let mut injector = Injector {
+            peers: &mut self.peers,
+            world: &mut self.world,
+            account: &mut self.account,
+            console: ground.zip(self.registered.console()),
+            now_ms: self.now_ms,
+            period_s: f64::from(self.spec.beacon_period_ms) / 1000.0,
+        };
+        let lines = injector.inject(fault).await?;
+        if let Some(text) = lines.first() {
+            self.note(text.clone());
+        }
+        Ok(lines)
+    }
+
+    /// Draws up the report; call it when everybody is gone.
+    fn conclude(&self, wall: Duration) -> RunReport {
+        self.account.conclude(Ending {
+            now_ms: self.now_ms,
+            judge: self.world.judge(),
+            link_cuts: self.world.link_cuts(),
+            violations: None,
+            details: Details::Live(Live {
+                wall_s: wall.as_secs_f64(),
+                time_scale: self.spec.time_scale,
+                lowest_time_scale: self.pacer.lowest(),
+                setpoint_delay_ms: self.pacer.longest_delay_ms(),
+            }),
+        })
+    }
+
+    /// Ends the guard and removes what is not worth keeping.
+    async fn close(self, keep: bool) {
+        self.peers.close().await;
+        if !keep {
+            let _ = std::fs::remove_dir_all(&self.run_dir);
+        }
+    }
 }

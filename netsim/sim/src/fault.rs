@@ -1,6 +1,7 @@
 //! Faults: one enum, for simulated and live swarms.
 
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Something that goes wrong, or is put right. Peers are named by their numbers.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -69,6 +70,33 @@ pub enum Fault {
         /// Thousandths.
         permille: u16,
     },
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Kill { peer } => write!(f, "peer {peer} is killed"),
+            Self::KillComputer { peer } => write!(f, "the computer of peer {peer} is killed"),
+            Self::Terminate { peer } => write!(f, "peer {peer} is asked to end"),
+            Self::Pause { peer } => write!(f, "peer {peer} stands still"),
+            Self::Resume { peer } => write!(f, "peer {peer} goes on"),
+            Self::Restart { peer, fresh_disk } => {
+                let disk = if *fresh_disk { "without" } else { "with" };
+                write!(f, "peer {peer} is restarted {disk} its disk")
+            }
+            Self::Cut { a, b, one_way } => {
+                let and = if *one_way { "to" } else { "and" };
+                write!(f, "link {a} {and} {b} is cut")
+            }
+            Self::Partition { groups } => write!(f, "partition {groups:?}"),
+            Self::Heal => write!(f, "all links heal"),
+            Self::Rebase { .. } => write!(f, "the operator moves the base"),
+            Self::Loss { permille } => {
+                let percent = f64::from(*permille) / 10.0;
+                write!(f, "{percent:.1} % of transmissions are lost")
+            }
+        }
+    }
 }
 
 /// A fault and when it happens.

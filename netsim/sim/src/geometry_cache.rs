@@ -14,6 +14,14 @@ pub struct GeometryCache {
 }
 
 impl GeometryCache {
+    /// A cache that holds what was derived from this mission.
+    #[must_use]
+    pub fn holding(mission: &Mission, ground: Arc<MissionGeometry>) -> Self {
+        Self {
+            by_hash: BTreeMap::from([(mission.content_hash(), Ok(ground))]),
+        }
+    }
+
     /// The ground of a mission, derived on first use.
     pub fn of(&mut self, mission: &Arc<Mission>) -> Result<Arc<MissionGeometry>, GeometryError> {
         self.by_hash

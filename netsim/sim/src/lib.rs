@@ -9,13 +9,17 @@
 //! | [`fault_generator`] | random faults for one run |
 //! | [`disk`] | virtual disks |
 //! | [`prepared`] | what all runs of a scenario share |
+//! | [`runs`] | runs with the scenario's own faults, with drawn ones, without any |
 //! | [`swarm`] | peers, world and radio under one virtual clock |
+//! | [`account`] | who took over what, when, and the verdict: one judge for simulated and live runs |
 //! | [`check`] | what must hold, judged while a run goes on |
 //! | [`geometry_cache`] | loops and routers, derived once for all peers and runs |
 //! | [`history`] | what happened, hashed and replayable |
 //! | [`omniscient_baseline`] | how long it takes when everybody knows everything |
+//! | [`timeline`] | the kept events of a run for a person |
 //! | [`summary`] | what many runs come to |
 
+pub mod account;
 pub mod check;
 pub mod disk;
 pub mod fault;
@@ -25,9 +29,11 @@ pub mod history;
 pub mod omniscient_baseline;
 pub mod prepared;
 pub mod radio;
+pub mod runs;
 pub mod spec;
 pub mod summary;
 pub mod swarm;
+pub mod timeline;
 pub mod world;
 
 pub use prepared::Prepared;

@@ -9,7 +9,7 @@ use crate::fault::{Fault, TimedFault};
 use crate::prepared::Prepared;
 use crate::world::World;
 use skein_behaviors::{Event, Executive, Goal};
-use skein_flight::coverage::ring::backtracking::{Leg, RingCell, Uav, divide};
+use skein_flight::coverage::area::backtracking::{Leg, RingCell, Robot, divide};
 use skein_peer::offload::MissionGeometry;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -21,7 +21,11 @@ const RETRY_MS: u64 = 5_000;
 /// When all coverable cells are covered, milliseconds; `None` when they never are.
 #[must_use]
 pub fn makespan_ms(prepared: &Prepared, seed: u64, faults: &[TimedFault]) -> Option<u64> {
-    let ground = prepared.grounds.clone().of(&prepared.spec.mission).ok()?;
+    let ground = prepared
+        .geometry_cache
+        .clone()
+        .of(&prepared.spec.mission)
+        .ok()?;
     let mut r = Baseline::new(prepared, seed, ground);
     let end_ms = u64::from(prepared.spec.max_time_s) * 1000;
     let period_ms = u64::from(prepared.spec.percept_period_ms.max(1));
@@ -211,7 +215,7 @@ impl<'a> Baseline<'a> {
                 });
             }
             first.insert(u.id, legs);
-            robots.push(Uav {
+            robots.push(Robot {
                 anchor: forecast.anchor,
                 id: u.id,
                 heading: forecast.heading,

@@ -1,15 +1,12 @@
 //! What all runs of one scenario share, prepared once: the surveyed site and the
-//! common ground of its mission.
+//! geometry of its mission.
 
-use crate::fault::TimedFault;
+use crate::account::Setting;
+use crate::geometry_cache::GeometryCache;
 use crate::spec::Spec;
-use crate::swarm::{GeometryCache, Outcome, Swarm, outcome};
 use crate::world::Site;
+use skein_peer::offload::MissionGeometry;
 use std::sync::Arc;
-
-/// The seed of the run without faults: the same for every seed that is asked for, so
-/// that a seed draws the same storm alone and in a batch.
-const FAILURE_FREE_SEED: u64 = 0;
 
 /// A scenario, ready to run with any seed and any faults. Cheap to clone and to share.
 #[derive(Clone, Debug)]
@@ -18,77 +15,44 @@ pub struct Prepared {
     pub spec: Arc<Spec>,
     /// Its buildings and cells.
     pub site: Arc<Site>,
-    /// The common ground of its mission.
-    pub grounds: GeometryCache,
+    /// The loop and the router of its mission.
+    pub geometry_cache: GeometryCache,
+    setting: Setting,
 }
 
 impl Prepared {
     /// Surveys the site and derives the loop.
     #[must_use]
     pub fn new(spec: Spec) -> Self {
+        Self::on(spec, GeometryCache::default())
+    }
+
+    /// Surveys the site; the geometry of the mission has been derived before.
+    #[must_use]
+    pub fn with_geometry(spec: Spec, geometry: Arc<MissionGeometry>) -> Self {
+        let geometry_cache = GeometryCache::holding(&spec.mission, geometry);
+        Self::on(spec, geometry_cache)
+    }
+
+    fn on(spec: Spec, mut geometry_cache: GeometryCache) -> Self {
         let site = Arc::new(Site::new(&spec));
         let spec = Arc::new(spec);
-        let mut grounds = GeometryCache::default();
-        // A mission without a ground is found out by every run; here it is only remembered.
-        let _ = grounds.of(&spec.mission);
+        // A mission without a loop is found out by every run; here it is only remembered.
+        let geometry = geometry_cache.of(&spec.mission).ok();
         Self {
+            setting: Setting::new(&spec, geometry.as_ref(), spec.seed),
             spec,
             site,
-            grounds,
+            geometry_cache,
         }
     }
 
-    /// Runs once. `keep` keeps the main events for a timeline. A panic becomes a
-    /// violation of S12.
+    /// What the account of a run with this seed must know.
     #[must_use]
-    pub fn run(&self, seed: u64, faults: Vec<TimedFault>, keep: bool) -> Outcome {
-        outcome::run_guarded(self, seed, faults, keep)
-    }
-
-    /// Runs a seed with the scenario's own faults, and compares it with the reference
-    /// where at most `compare_up_to` UAVs were killed.
-    #[must_use]
-    pub fn planned(&self, seed: u64, compare_up_to: u32, keep: bool) -> Outcome {
-        self.compared(seed, self.spec.faults.clone(), compare_up_to, keep)
-    }
-
-    /// How long the mission takes without faults, milliseconds; the scenario's longest
-    /// time when it does not end.
-    #[must_use]
-    pub fn failure_free_makespan_ms(&self) -> u64 {
-        let longest_ms = u64::from(self.spec.max_time_s) * 1000;
-        Swarm::new(self, FAILURE_FREE_SEED, Vec::new(), false)
-            .run()
-            .makespan_ms
-            .unwrap_or(longest_ms)
-    }
-
-    /// Runs a seed with the faults its storm draws, and compares it with the reference
-    /// where at most `compare_up_to` UAVs were killed.
-    #[must_use]
-    pub fn storm(
-        &self,
-        seed: u64,
-        failure_free_ms: u64,
-        compare_up_to: u32,
-        keep: bool,
-    ) -> Outcome {
-        let faults = crate::fault_generator::draw(&self.spec, seed, failure_free_ms);
-        self.compared(seed, faults, compare_up_to, keep)
-    }
-
-    fn compared(
-        &self,
-        seed: u64,
-        faults: Vec<TimedFault>,
-        compare_up_to: u32,
-        keep: bool,
-    ) -> Outcome {
-        let compare = crate::fault_generator::kills(&faults) <= compare_up_to;
-        let mut outcome = self.run(seed, faults.clone(), keep);
-        if compare && outcome.makespan_ms.is_some() {
-            outcome.compare(crate::omniscient_baseline::makespan_ms(self, seed, &faults));
+    pub fn setting(&self, seed: u64) -> Setting {
+        Setting {
+            seed,
+            ..self.setting.clone()
         }
-        outcome
     }
 }

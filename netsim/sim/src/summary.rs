@@ -1,10 +1,12 @@
 //! What many runs come to: one set of figures, the same for any order of the runs.
 
+use crate::account::{RunReport, secs};
 use crate::check::{Grade, Violation};
 use crate::swarm::Outcome;
 use serde::Serialize;
 use skein_peer::wire::Fnv;
 use std::collections::BTreeMap;
+use std::fmt;
 
 /// Violations that a summary quotes.
 const QUOTED: usize = 20;
@@ -69,8 +71,10 @@ pub struct Summary {
     pub violations: BTreeMap<String, u64>,
     /// The least share of the coverable cells covered in any run.
     pub coverage_min: f64,
-    /// Makespan relative to the reference, over the runs where it was computed.
+    /// Makespan over that of the omniscient baseline, over the runs where it was computed.
     pub makespan_ratio: Spread,
+    /// Makespan over the work bound.
+    pub makespan_over_work_bound: Spread,
     /// From a death to its detection by each live peer, seconds.
     pub detect_s: Spread,
     /// From the detection of a death to the last of its cells being listed again, seconds.
@@ -100,39 +104,82 @@ pub struct Summary {
     pub history_hash: String,
 }
 
-/// Whether a run failed: it did not complete, was infeasible, or broke a rule.
-#[must_use]
-pub fn failed(o: &Outcome) -> bool {
-    !o.completed || o.infeasible || !o.violation_counts.is_empty()
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let spread = |v: &Spread| {
+            format!(
+                "p50 {:.2}  p95 {:.2}  max {:.2}  (n = {})",
+                v.p50, v.p95, v.max, v.n
+            )
+        };
+        writeln!(
+            f,
+            "runs {}, completed {}, infeasible {}",
+            self.runs, self.completed, self.infeasible
+        )?;
+        writeln!(f, "violations            {:?}", self.violations)?;
+        writeln!(
+            f,
+            "coverage min          {:.3} %",
+            self.coverage_min * 100.0
+        )?;
+        writeln!(f, "makespan / baseline   {}", spread(&self.makespan_ratio))?;
+        writeln!(
+            f,
+            "makespan / work bound {}",
+            spread(&self.makespan_over_work_bound)
+        )?;
+        writeln!(f, "detection, s          {}", spread(&self.detect_s))?;
+        writeln!(f, "takeover, s           {}", spread(&self.takeover_s))?;
+        writeln!(
+            f,
+            "false downs           {:.4} a peer-hour at light loss, {:.4} at any",
+            self.false_downs_per_peer_hour, self.false_downs_per_peer_hour_at_any_loss
+        )?;
+        writeln!(
+            f,
+            "bytes                 {:.0} a second and peer",
+            self.bytes_per_peer_s
+        )?;
+        writeln!(f, "killed for good       {:?}", self.dead)?;
+        writeln!(f, "hard places           {:?}", self.reached)?;
+        for (check, v) in &self.liveness_share {
+            writeln!(f, "{check} / bound            {}", spread(v))?;
+        }
+        writeln!(f, "real-time factor      {:.0}", self.real_time_factor)?;
+        writeln!(f, "history hash          {}", self.history_hash)?;
+        if !self.failed_seeds.is_empty() {
+            writeln!(f, "failed seeds          {:?}", self.failed_seeds)?;
+        }
+        Ok(())
+    }
 }
 
 /// Sums up runs in any order. `wall_s` is how long the batch took.
 #[must_use]
 pub fn summarise(mut runs: Vec<Outcome>, wall_s: f64) -> Summary {
-    runs.sort_by_key(|o| o.seed);
+    runs.sort_by_key(Outcome::seed);
     let mut s = Summary {
         runs: runs.len(),
-        completed: runs.iter().filter(|o| o.completed).count(),
-        infeasible: runs.iter().filter(|o| o.infeasible).count(),
-        coverage_min: runs.iter().map(|o| o.coverage).fold(1.0, f64::min),
-        makespan_ratio: Spread::of(runs.iter().filter_map(|o| o.makespan_ratio).collect()),
-        revisit_s: Spread::of(
-            runs.iter()
-                .filter_map(|o| o.revisit_ms)
-                .map(seconds)
-                .collect(),
-        ),
-        detect_s: Spread::of(
-            runs.iter()
-                .flat_map(|o| &o.detect_ms)
-                .map(|ms| seconds(*ms))
-                .collect(),
-        ),
+        completed: runs.iter().filter(|o| o.report.completed).count(),
+        infeasible: runs.iter().filter(|o| o.infeasible()).count(),
+        coverage_min: runs
+            .iter()
+            .map(|o| o.report.coverage.covered_share)
+            .fold(1.0, f64::min),
+        makespan_ratio: of(&runs, |r| r.makespan_over_baseline),
+        makespan_over_work_bound: of(&runs, |r| r.makespan_over_work_bound),
+        revisit_s: of(&runs, |r| r.revisit_ms.map(secs)),
+        detect_s: Spread::of(runs.iter().flat_map(detect_s).collect()),
         takeover_s: Spread::of(runs.iter().flat_map(takeover_s).collect()),
-        failed_seeds: runs.iter().filter(|o| failed(o)).map(|o| o.seed).collect(),
+        failed_seeds: runs
+            .iter()
+            .filter(|o| !o.report.passed)
+            .map(Outcome::seed)
+            .collect(),
         quoted: runs
             .iter()
-            .flat_map(|o| o.violations.iter().cloned())
+            .flat_map(|o| o.violations().iter().cloned())
             .take(QUOTED)
             .collect(),
         ..Summary::default()
@@ -141,7 +188,7 @@ pub fn summarise(mut runs: Vec<Outcome>, wall_s: f64) -> Summary {
     add_violations(&mut s, &runs);
     let mut hash = Fnv::new();
     for o in &runs {
-        hash.write(&o.seed.to_le_bytes());
+        hash.write(&o.seed().to_le_bytes());
         hash.write(&o.history_hash.to_le_bytes());
         *s.dead.entry(o.dead).or_default() += 1;
         s.reached.takeover_of_takeover += o.reached.takeover_of_takeover;
@@ -161,10 +208,10 @@ fn add_rates(s: &mut Summary, runs: &[Outcome], wall_s: f64) {
             .filter(|o| !light || Grade::of(o.loss_permille) != Grade::Reported);
         let (mut ms, mut downs) = (0, 0);
         for o in of {
-            ms += o.peer_ms;
-            downs += o.false_downs.len() as u64;
+            ms += o.report.peer_ms;
+            downs += o.false_downs().len() as u64;
         }
-        (seconds(ms), downs)
+        (secs(ms), downs)
     };
     #[allow(
         clippy::cast_precision_loss,
@@ -175,8 +222,8 @@ fn add_rates(s: &mut Summary, runs: &[Outcome], wall_s: f64) {
     let (all_s, all_downs) = peer_s(false);
     s.false_downs_per_peer_hour = per(light_downs, light_s / 3600.0);
     s.false_downs_per_peer_hour_at_any_loss = per(all_downs, all_s / 3600.0);
-    s.bytes_per_peer_s = per(runs.iter().map(|o| o.bytes).sum(), all_s);
-    let simulated_s: f64 = runs.iter().map(|o| seconds(o.end_ms)).sum();
+    s.bytes_per_peer_s = per(runs.iter().map(|o| o.report.radio.bytes_sent).sum(), all_s);
+    let simulated_s: f64 = runs.iter().map(|o| secs(o.report.end_ms)).sum();
     s.real_time_factor = if wall_s > 0.0 {
         simulated_s / wall_s
     } else {
@@ -189,8 +236,8 @@ fn add_rates(s: &mut Summary, runs: &[Outcome], wall_s: f64) {
 fn add_violations(s: &mut Summary, runs: &[Outcome]) {
     let mut shares: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for o in runs {
-        for (check, n) in &o.violation_counts {
-            *s.violations.entry((*check).to_owned()).or_default() += n;
+        for (check, n) in o.report.violations.iter().flat_map(|v| &v.counts) {
+            *s.violations.entry(check.clone()).or_default() += n;
         }
         for (check, values) in &o.ratios {
             shares.entry(check).or_default().extend(values);
@@ -205,22 +252,27 @@ fn add_violations(s: &mut Summary, runs: &[Outcome]) {
     }
 }
 
-fn takeover_s(o: &Outcome) -> Vec<f64> {
-    let times = o.takeovers.iter().filter(|t| t.cells > 0);
-    times
-        .filter_map(|t| t.taken_ms.zip(t.detected_ms))
-        .map(|(taken, detected)| seconds(taken.saturating_sub(detected)))
-        .collect()
+fn of(runs: &[Outcome], figure: impl Fn(&RunReport) -> Option<f64>) -> Spread {
+    Spread::of(runs.iter().filter_map(|o| figure(&o.report)).collect())
 }
 
-#[allow(clippy::cast_precision_loss, reason = "times stay below 2^52 ms")]
-fn seconds(ms: u64) -> f64 {
-    ms as f64 / 1000.0
+fn detect_s(o: &Outcome) -> Vec<f64> {
+    let all = o.report.kills.iter().flat_map(|k| k.detections_ms.values());
+    all.map(|ms| secs(*ms)).collect()
+}
+
+fn takeover_s(o: &Outcome) -> Vec<f64> {
+    let kills = o.report.kills.iter().filter(|k| k.cells_held > 0);
+    kills
+        .filter_map(|k| k.takeover_ms.zip(k.detection_ms))
+        .map(|(taken, detected)| secs(taken.saturating_sub(detected)))
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::account::report::Radio;
 
     #[test]
     fn percentiles_are_nearest_ranks() {
@@ -241,12 +293,17 @@ mod tests {
     #[test]
     fn the_order_of_the_runs_does_not_matter() {
         let run = |seed: u64| Outcome {
-            seed,
-            completed: true,
-            coverage: 1.0,
-            end_ms: 1000,
-            peer_ms: 9000,
-            bytes: 900,
+            report: RunReport {
+                seed,
+                completed: true,
+                end_ms: 1000,
+                peer_ms: 9000,
+                radio: Radio {
+                    bytes_sent: 900,
+                    ..Radio::default()
+                },
+                ..RunReport::default()
+            },
             history_hash: seed * 77,
             ..Outcome::default()
         };

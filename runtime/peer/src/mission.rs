@@ -4,12 +4,11 @@ use crate::offload::MissionGeometry;
 use crate::task::CoverageTask;
 use crate::wire::message::MissionChunk;
 use serde::{Deserialize, Serialize};
-use skein_flight::coverage::lanes;
-use skein_flight::coverage::passes::{self, PassesProblem};
-use skein_flight::coverage::ring::patch::Corners;
-use skein_flight::coverage::ring::{CoverageLoop, LoopError, LoopProblem, Tree};
+use skein_flight::coverage::area::patch::Corners;
+use skein_flight::coverage::area::{AreaProblem, CoverageLoop, LoopError, Tree};
+use skein_flight::coverage::exact::{self, ExactProblem};
 use skein_flight::coverage::stations::{self, StationsProblem};
-use skein_flight::route::{RouteLimits, Router};
+use skein_flight::path::{RouteLimits, Router};
 use skein_geometry::frame::Point;
 use skein_geometry::{NoFlyZones, Polygon, PolygonError};
 use std::collections::BTreeMap;
@@ -255,7 +254,7 @@ impl Mission {
             zones.push(Polygon::new(zone).map_err(|e| GeometryError::Zone(i, e))?);
         }
         let zones = Arc::new(NoFlyZones::new(zones));
-        let problem = LoopProblem {
+        let problem = AreaProblem {
             area,
             zones: Arc::clone(&zones),
             lane_spacing_m: self.lane_m(),
@@ -280,19 +279,19 @@ impl Mission {
         }))
     }
 
-    fn the_loop(&self, problem: &LoopProblem) -> Result<CoverageLoop, LoopError> {
+    fn the_loop(&self, problem: &AreaProblem) -> Result<CoverageLoop, LoopError> {
         if self.task.is_area() {
-            return lanes::build(problem);
+            return CoverageLoop::build(problem);
         }
         let stations = if let Some(targets) = self.task.targets() {
             StationsProblem::of_targets(problem, &targets)
         } else {
-            let passes = passes::plan(&PassesProblem {
+            let passes = exact::plan(&ExactProblem {
                 zones: Arc::clone(&problem.zones),
                 clearance_m: problem.clearance_m,
                 // What the camera sees beyond the ends of a pass is left for the turns.
                 look_ahead_m: 0.0,
-                ..PassesProblem::new(
+                ..ExactProblem::new(
                     problem.area.clone(),
                     problem.lane_spacing_m,
                     problem.turn_radius_m,

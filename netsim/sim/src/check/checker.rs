@@ -3,7 +3,7 @@
 
 use super::cover::CoverCheck;
 use super::graph::{Graph, Stability};
-use super::listing::{ListingCheck, Takeover};
+use super::listing::ListingCheck;
 use super::membership::Membership;
 use super::progress::ProgressCheck;
 use super::record::{RecordCheck, Said};
@@ -96,9 +96,7 @@ impl Checker {
 
     /// Another time round begins, with everything open.
     pub fn on_lap(&mut self) {
-        let takeovers = std::mem::take(&mut self.listing.takeovers);
         self.listing = ListingCheck::default();
-        self.listing.takeovers = takeovers;
         self.cover = CoverCheck::default();
         self.progress = ProgressCheck::default();
     }
@@ -108,15 +106,16 @@ impl Checker {
         self.members.on_running(id, false);
     }
 
-    /// A process ends (`death`) or stands still.
-    pub fn on_silent(&mut self, now_ms: u64, id: u16, death: bool, covered: &[bool]) {
+    /// A process ends (`death`) or stands still. `second_hand` says that it held cells
+    /// which it had itself taken over from the dead.
+    pub fn on_silent(&mut self, now_ms: u64, id: u16, death: bool, second_hand: bool) {
         if death && self.graph.is_articulation(id) {
             self.reached.articulation_lost += 1;
         }
         self.members
             .on_silent(now_ms, id, death, self.bounds.diameter);
-        self.listing.on_silent(now_ms, id, death, covered);
-        if death && self.listing.takeovers.last().is_some_and(|t| t.second_hand) {
+        self.listing.on_silent(id);
+        if death && second_hand {
             self.reached.takeover_of_takeover += 1;
         }
         self.progress.on_silent(id);
@@ -268,11 +267,5 @@ impl Checker {
         self.cover.on_snapshot(&snapshot, &mut self.found);
         self.progress
             .on_snapshot(&snapshot, &self.members, &mut self.found);
-    }
-
-    /// What became of the sections of the dead.
-    #[must_use]
-    pub fn takeovers(&self) -> &[Takeover] {
-        &self.listing.takeovers
     }
 }

@@ -1,32 +1,11 @@
-//! Who lists which cell: orphans (I1, L2), takeovers, and yielding to a higher
-//! stamp (S5).
+//! Which peer lists which cell: orphans (I1, L2), and yielding to a higher stamp (S5).
 
 use super::membership::Membership;
 use super::{Clocks, Findings, Snapshot, bounds::LIGHT_FACTOR};
-use serde::Serialize;
 use skein_peer::output::Status;
 use skein_peer::wire::message::{Claim, Firmness, ListedRun, Stamp};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// What became of the section of a peer that died.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Takeover {
-    /// Who died.
-    pub dead: u16,
-    /// When, milliseconds.
-    pub died_ms: u64,
-    /// When a live peer first knew, milliseconds.
-    pub detected_ms: Option<u64>,
-    /// When the last of its uncovered cells was listed by a live peer or covered, milliseconds.
-    pub taken_ms: Option<u64>,
-    /// How many of its cells each live peer listed first.
-    pub by: BTreeMap<u16, u32>,
-    /// Cells it listed and nobody had covered when it died.
-    pub cells: u32,
-    /// Whether some of them it had itself taken over from a peer that died.
-    pub second_hand: bool,
-}
 
 /// Life and number of a record.
 pub type Version = (u32, u32);
@@ -44,40 +23,17 @@ struct Orphan {
 pub struct ListingCheck {
     orphans: BTreeMap<u16, Orphan>,
     last_lister: BTreeMap<u16, u16>,
-    inherited: BTreeMap<u16, u16>,
     able_since_ms: Option<u64>,
     own: BTreeMap<u16, Arc<Claim>>,
     heard: BTreeMap<(u16, u16), (Arc<Claim>, Version)>,
     clashes: Clocks<(u16, u16, u16)>,
-    /// Sections of peers that died, in the order of their deaths.
-    pub takeovers: Vec<Takeover>,
 }
 
 impl ListingCheck {
-    /// A process ended; `death` is false when it only stands still.
-    pub fn on_silent(&mut self, now_ms: u64, id: u16, death: bool, covered: &[bool]) {
+    /// A process ended or stands still.
+    pub fn on_silent(&mut self, id: u16) {
         self.own.remove(&id);
         self.heard.retain(|(o, _), _| *o != id);
-        if !death {
-            return;
-        }
-        let open = |c: u16| !covered.get(usize::from(c)).copied().unwrap_or(false);
-        let cells: Vec<u16> = self
-            .last_lister
-            .iter()
-            .filter(|(c, l)| **l == id && open(**c))
-            .map(|(c, _)| *c)
-            .collect();
-        let second_hand = cells.iter().any(|c| self.inherited.get(c) == Some(&id));
-        self.takeovers.push(Takeover {
-            dead: id,
-            died_ms: now_ms,
-            detected_ms: None,
-            taken_ms: None,
-            by: BTreeMap::new(),
-            cells: u32::try_from(cells.len()).unwrap_or(u32::MAX),
-            second_hand,
-        });
     }
 
     /// A peer published its own section.
@@ -157,7 +113,6 @@ impl ListingCheck {
                 self.orphaned(snapshot, cell, members, counts_from_ms, found);
             }
         }
-        self.close_takeovers(snapshot, members, &lister, &settled);
     }
 
     fn settle(
@@ -180,19 +135,8 @@ impl ListingCheck {
                 snapshot.bounds.takeover_ms(),
             );
         }
-        let Some(by) = lister else {
-            return;
-        };
-        let before = self.last_lister.insert(cell, by);
-        if let Some(dead) =
-            before.filter(|b| *b != by && members.silence(*b).is_some_and(|s| s.death))
-        {
-            self.inherited.insert(cell, by);
-            if let Some(t) = self.takeovers.iter_mut().rev().find(|t| t.dead == dead) {
-                *t.by.entry(by).or_default() += 1;
-            }
-        } else if before != Some(by) {
-            self.inherited.remove(&cell);
+        if let Some(by) = lister {
+            self.last_lister.insert(cell, by);
         }
     }
 
@@ -230,27 +174,6 @@ impl ListingCheck {
                     "cell {cell} is listed by no live peer, for {gone_ms} ms ({took_ms} ms since the components last changed; bound {bound_ms} ms); its last owner was {owner:?}"
                 )
             });
-        }
-    }
-
-    fn close_takeovers(
-        &mut self,
-        snapshot: &Snapshot<'_>,
-        members: &Membership,
-        lister: &[Option<u16>],
-        settled: &[bool],
-    ) {
-        for t in self.takeovers.iter_mut().filter(|t| t.taken_ms.is_none()) {
-            t.detected_ms = t.detected_ms.or_else(|| members.detected_ms(t.dead));
-            let open = self.last_lister.iter().any(|(c, l)| {
-                let c = usize::from(*c);
-                *l == t.dead
-                    && !settled.get(c).copied().unwrap_or(true)
-                    && lister.get(c).is_some_and(Option::is_none)
-            });
-            if !open {
-                t.taken_ms = Some(snapshot.now_ms);
-            }
         }
     }
 
@@ -426,12 +349,12 @@ mod tests {
     }
 
     #[test]
-    fn a_takeover_names_who_took_how_many_cells_and_counts_from_detection() {
+    fn an_orphan_of_a_dead_peer_counts_from_the_detection_of_its_death() {
         let mut s = Story::new(0);
         s.members.on_life(0, 2, 1);
         s.snapshot(0, &[(1, &[0, 1]), (2, &[2, 3])]);
         s.members.on_silent(500, 2, true, 1);
-        s.check.on_silent(500, 2, true, &[false; 4]);
+        s.check.on_silent(2);
         for t in 1..40 {
             s.snapshot(t * 1000, &[(1, &[0, 1])]);
         }
@@ -444,13 +367,8 @@ mod tests {
             .on_belief(40_500, (1, 2), (1, Status::Down), &BOUNDS, None);
         s.snapshot(41_000, &[(1, &[0, 1])]);
         s.snapshot(42_000, &[(1, &[0, 1, 3, 2])]);
-        let t = &s.check.takeovers[0];
-        assert_eq!(
-            (t.cells, t.detected_ms, t.taken_ms),
-            (2, Some(40_500), Some(42_000))
-        );
-        assert_eq!(t.by, BTreeMap::from([(1, 2)]));
         assert!(s.found.counts.is_empty());
+        assert_eq!(s.check.orphans(), 0);
     }
 
     #[test]

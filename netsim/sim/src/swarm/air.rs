@@ -5,13 +5,11 @@ use super::stream::{Concern, Stream};
 use crate::check::Graph;
 use crate::fault::Fault;
 use crate::prepared::Prepared;
-use crate::radio::{Delivery, Frame, LinkTable, Medium, Overlay};
+use crate::radio::{Delivery, Frame, LinkTable, Medium, Overlay, Tally};
 use crate::spec::RadioSpec;
-use crate::world::{Fact, World};
+use crate::world::{Fact, Judge, World};
 use skein_behaviors::{Percept, Setpoint};
-use skein_flight::coverage::ring::CellId;
-use skein_link::Reason;
-use std::collections::BTreeMap;
+use skein_flight::coverage::area::CellId;
 use std::sync::Arc;
 
 /// World, links and channel of one run.
@@ -139,33 +137,21 @@ impl Air {
         self.world.judge().complete()
     }
 
-    /// Share of the coverable cells that are covered, 0 to 1.
+    /// The judge and its score.
     #[must_use]
-    pub fn coverage(&self) -> f64 {
-        self.world.judge().covered_share()
+    pub fn judge(&self) -> &Judge {
+        self.world.judge()
     }
 
-    /// Smallest distance between two airborne UAVs so far, metres.
+    /// How often links that were up went down: by range, by sight, by fault.
     #[must_use]
-    pub fn separation_m(&self) -> Option<f64> {
-        self.world.judge().closest().map(|a| a.distance_m)
+    pub fn link_cuts(&self) -> (u64, u64, u64) {
+        self.links.cuts()
     }
 
-    /// The longest time in which a cell was not seen again, milliseconds.
+    /// What all stations did to the channel, and what became of it.
     #[must_use]
-    pub fn longest_gap_ms(&self) -> Option<u64> {
-        self.world.judge().longest_gap_ms()
-    }
-
-    /// Bytes all peers transmitted.
-    #[must_use]
-    pub fn bytes(&self) -> u64 {
-        self.medium.total().bytes
-    }
-
-    /// Receptions that failed and frames never sent, by reason.
-    #[must_use]
-    pub fn lost(&self) -> BTreeMap<Reason, u64> {
-        self.medium.total().dropped
+    pub fn tally(&self) -> Tally {
+        self.medium.total()
     }
 }

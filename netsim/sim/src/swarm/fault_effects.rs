@@ -3,6 +3,7 @@
 
 use super::sim_peer::Process;
 use super::{Event, Kind, Phase, Swarm, What};
+use crate::account::Cause;
 use crate::fault::Fault;
 use skein_peer::input::Command;
 use skein_peer::{Input, Role};
@@ -16,13 +17,9 @@ impl Swarm {
         self.air.advance(self.now_ms);
         self.air.strike(fault);
         let subject = match fault {
-            Fault::Kill { peer } | Fault::KillComputer { peer } | Fault::Terminate { peer } => {
-                let airframe = matches!(fault, Fault::Kill { .. });
-                if let Some(idx) = self.peer_idx(*peer) {
-                    self.end_process(idx, airframe);
-                }
-                *peer
-            }
+            Fault::Kill { peer } => self.end(*peer, Cause::Killed),
+            Fault::KillComputer { peer } => self.end(*peer, Cause::ComputerKilled),
+            Fault::Terminate { peer } => self.end(*peer, Cause::Terminated),
             Fault::Pause { peer } => {
                 self.pause(*peer);
                 *peer
@@ -83,6 +80,11 @@ impl Swarm {
         let (id, boot) = (s.id(), s.boots);
         self.history.fold(now_ms, id, Kind::Boot, u64::from(boot));
         self.checker.on_boot(now_ms, id, again, fresh);
+        if again {
+            self.account.restarted(now_ms, id, fresh);
+        } else {
+            self.account.started(now_ms, id);
+        }
         self.feed(idx, start);
         if uav {
             let first_ms = self.first_percept_ms(idx);
@@ -91,9 +93,16 @@ impl Swarm {
         }
     }
 
+    fn end(&mut self, peer: u16, cause: Cause) -> u16 {
+        if let Some(idx) = self.peer_idx(peer) {
+            self.end_process(idx, cause);
+        }
+        peer
+    }
+
     /// The process ends, and the airframe with it or not.
-    fn end_process(&mut self, idx: usize, airframe: bool) {
-        let now_ms = self.now_ms;
+    fn end_process(&mut self, idx: usize, cause: Cause) {
+        let (now_ms, airframe) = (self.now_ms, cause.takes_airframe());
         let s = &mut self.peers[idx];
         let id = s.id();
         s.airframe &= !airframe;
@@ -101,19 +110,19 @@ impl Swarm {
         if s.process == Process::Stopped {
             return;
         }
-        self.kills += 1;
-        if let Some(peer) = s.stop(now_ms) {
+        if let Some(peer) = s.stop() {
             let believed = peer.durable();
             self.checker
                 .on_crash(now_ms, id, &believed, self.peers[idx].disk.records());
         }
         self.refresh_covered();
-        self.checker.on_silent(now_ms, id, true, &self.covered);
+        let held = self.account.ended(now_ms, id, cause);
+        self.checker.on_silent(now_ms, id, true, held.second_hand);
     }
 
     /// The world took the airframe: out of fuel, or flown into something.
     pub(super) fn airframe_lost(&mut self, idx: usize) {
-        self.end_process(idx, true);
+        self.end_process(idx, Cause::Lost);
         self.observe_graph();
     }
 
@@ -139,9 +148,9 @@ impl Swarm {
         if let Some(idx) = self.peer_idx(id)
             && self.peers[idx].process == Process::Running
         {
-            self.peers[idx].stand_still(self.now_ms);
-            self.checker
-                .on_silent(self.now_ms, id, false, &self.covered);
+            self.peers[idx].stand_still();
+            self.account.paused(self.now_ms, id);
+            self.checker.on_silent(self.now_ms, id, false, false);
         }
     }
 
@@ -154,10 +163,12 @@ impl Swarm {
         if s.process != Process::Paused {
             return;
         }
+        let now_ms = self.now_ms;
         s.process = Process::Running;
-        s.since_ms = self.now_ms;
+        s.since_ms = now_ms;
         s.timer_ms = None;
         let waiting: Vec<Input> = s.inbox.drain(..).collect();
+        self.account.resumed(now_ms, id);
         self.checker.on_resume(id);
         for input in waiting {
             self.feed(idx, input);

@@ -20,16 +20,17 @@ pub mod queue;
 pub mod sim_peer;
 pub mod stream;
 
-pub use crate::geometry_cache::GeometryCache;
 pub use outcome::Outcome;
 
 #[cfg(test)]
 mod tests;
 
+use crate::account::Account;
 use crate::check::listing::Version;
 use crate::check::record::Said;
 use crate::check::{Checker, PeerSnapshot};
 use crate::fault::TimedFault;
+use crate::geometry_cache::GeometryCache;
 use crate::history::{History, Kind, What, bytes_hash, report_hash};
 use crate::prepared::Prepared;
 use crate::radio::{Delivery, Frame};
@@ -84,28 +85,30 @@ enum Event {
 #[derive(Debug)]
 pub struct Swarm {
     spec: Arc<Spec>,
-    seed: u64,
     now_ms: u64,
     end_ms: u64,
     queue: Queue<Event>,
     peers: Vec<SimPeer>,
     air: Air,
-    grounds: GeometryCache,
+    geometry_cache: GeometryCache,
     /// The operator's newest.
     mission: Arc<Mission>,
     faults: Vec<TimedFault>,
     history: History,
     checker: Checker,
+    account: Account,
     covered: Vec<bool>,
     loop_hash: u64,
     /// The newest time round that any peer has begun, from 0.
     lap: u16,
-    covered_ms: Option<u64>,
     /// Sections spoken so far, by hash of their bytes: author, life, section.
     claims: BTreeMap<u64, (u16, Version, Arc<Claim>)>,
     done: bool,
     unassigned: bool,
-    kills: u32,
+    /// Inputs that arrived by radio.
+    received: u64,
+    /// Those whose record had been passed on before, by who transmitted it.
+    relayed_by: BTreeMap<u16, u64>,
     /// Which group of the last partition each peer was in.
     sides: BTreeMap<u16, usize>,
     loss_max_permille: u16,
@@ -116,32 +119,32 @@ impl Swarm {
     #[must_use]
     pub fn new(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, keep: bool) -> Self {
         let spec = &prepared.spec;
-        let mut grounds = prepared.grounds.clone();
-        let loop_of = grounds.of(&spec.mission);
+        let mut geometry_cache = prepared.geometry_cache.clone();
+        let loop_of = geometry_cache.of(&spec.mission);
         let (covered, loop_hash) = loop_of.map_or((Vec::new(), 0), |g| {
             (vec![false; g.coverage_loop.len()], g.coverage_loop.hash())
         });
         let mut swarm = Self {
             spec: Arc::clone(spec),
-            seed,
             now_ms: 0,
             end_ms: u64::from(spec.max_time_s) * 1000,
             queue: Queue::default(),
             peers: sim_peers(spec, seed),
             air: Air::new(prepared, seed),
-            grounds,
+            geometry_cache,
             mission: Arc::clone(&spec.mission),
             faults,
             history: History::new(keep),
             checker: Checker::new(seed, spec.beacon_period_ms),
+            account: Account::new(prepared.setting(seed)),
             covered,
             loop_hash,
             lap: 0,
-            covered_ms: None,
             claims: BTreeMap::new(),
             done: false,
             unassigned: false,
-            kills: 0,
+            received: 0,
+            relayed_by: BTreeMap::new(),
             sides: BTreeMap::new(),
             loss_max_permille: spec.radio.loss_permille,
         };
@@ -225,6 +228,12 @@ impl Swarm {
     #[must_use]
     pub fn checker(&self) -> &Checker {
         &self.checker
+    }
+
+    /// The account so far.
+    #[must_use]
+    pub fn account(&self) -> &Account {
+        &self.account
     }
 
     /// The history so far.
@@ -324,6 +333,7 @@ impl Swarm {
     /// Zone entries and the moment of completion, as the world's judge sees them.
     fn judge_world(&mut self) {
         for fact in self.air.facts() {
+            self.account.happened(self.now_ms, &fact);
             if let Fact::ZoneEntry {
                 at_ms, uav, zone, ..
             } = fact
@@ -331,8 +341,8 @@ impl Swarm {
                 self.checker.on_zone_entry(at_ms, uav, zone);
             }
         }
-        if self.covered_ms.is_none() && self.air.is_complete() {
-            self.covered_ms = Some(self.now_ms);
+        if self.account.covered_ms().is_none() && self.air.judge().complete() {
+            self.account.covered(self.now_ms);
             self.history.keep(self.now_ms, || What::Covered);
         }
     }
@@ -412,6 +422,10 @@ impl Swarm {
             };
             known = Some((d.bytes.as_ptr(), hash));
             self.fold(idx, Kind::Receive, hash);
+            self.received += 1;
+            if d.hops > 0 {
+                *self.relayed_by.entry(d.tx).or_default() += 1;
+            }
             if self.peers[idx].process == Process::Running
                 && let Some((author, version, claim)) = self.claims.get(&hash)
             {
@@ -490,7 +504,7 @@ impl Swarm {
                     Job::Geometry(_) => GROUND_MS,
                     Job::Divide { .. } => DIVIDE_MS,
                 };
-                let answer = self.grounds.answer(&job);
+                let answer = self.geometry_cache.answer(&job);
                 self.queue.push(
                     self.now_ms + takes_ms,
                     Phase::Answer,
@@ -530,6 +544,7 @@ impl Swarm {
         self.history
             .fold(self.now_ms, id, Kind::Report, report_hash(&report));
         self.checker.on_report(self.now_ms, id, &report);
+        self.account.reported(self.now_ms, id, &report);
         if let Report::Ready {
             revision,
             loop_hash,
@@ -566,7 +581,7 @@ impl Swarm {
             flying += 1;
             finished &= m.view.finished;
         }
-        self.done = self.covered_ms.is_some() && flying > 0 && finished;
+        self.done = self.account.covered_ms().is_some() && flying > 0 && finished;
         for v in self.checker.found.drain_fresh() {
             self.history.keep(v.time_ms, || What::Violation {
                 check: v.check,
@@ -587,6 +602,7 @@ impl Swarm {
         let graph = self.air.graph(ids);
         if self.checker.on_graph(self.now_ms, graph) {
             let components = self.checker.graph().components();
+            self.account.connected(&components);
             self.history
                 .keep(self.now_ms, || What::Components(components));
         }
@@ -608,7 +624,7 @@ impl Swarm {
     }
 
     fn refresh_covered(&mut self) {
-        if let Ok(ground) = self.grounds.of(&self.spec.mission) {
+        if let Ok(ground) = self.geometry_cache.of(&self.spec.mission) {
             for (flag, cell) in self.covered.iter_mut().zip(ground.coverage_loop.cells()) {
                 // A cell that nobody needs counts as covered from the start.
                 *flag = *flag || !cell.needed || self.air.is_covered(cell.id, self.lap + 1);

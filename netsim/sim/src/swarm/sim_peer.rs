@@ -40,8 +40,6 @@ pub struct SimPeer {
     pub offset_ms: u64,
     /// When its process last started or went on, milliseconds.
     pub since_ms: u64,
-    /// Milliseconds its processes have run, up to `since_ms`.
-    pub ran_ms: u64,
     /// Its disk.
     pub disk: Disk,
     /// Inputs that wait while it stands still.
@@ -69,7 +67,6 @@ impl SimPeer {
             boots: 0,
             offset_ms: 0,
             since_ms: 0,
-            ran_ms: 0,
             disk: Disk::new(Stream::new(seed, Concern::Disk(id))),
             inbox: VecDeque::new(),
             timer_ms: None,
@@ -113,8 +110,7 @@ impl SimPeer {
     }
 
     /// Ends the process; what it had not synced is gone.
-    pub fn stop(&mut self, now_ms: u64) -> Option<Peer> {
-        self.stand_still(now_ms);
+    pub fn stop(&mut self) -> Option<Peer> {
         self.process = Process::Stopped;
         self.inbox.clear();
         self.disk.crash();
@@ -123,9 +119,8 @@ impl SimPeer {
     }
 
     /// The process stands still.
-    pub fn stand_still(&mut self, now_ms: u64) {
+    pub fn stand_still(&mut self) {
         if self.process == Process::Running {
-            self.ran_ms += now_ms - self.since_ms;
             self.process = Process::Paused;
         }
     }
@@ -145,16 +140,5 @@ impl SimPeer {
             self.inbox.pop_front();
         }
         self.inbox.push_back(input);
-    }
-
-    /// Milliseconds its processes have run.
-    #[must_use]
-    pub fn ran_ms(&self, now_ms: u64) -> u64 {
-        self.ran_ms
-            + if self.process == Process::Running {
-                now_ms - self.since_ms
-            } else {
-                0
-            }
     }
 }

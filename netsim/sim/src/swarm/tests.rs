@@ -1,7 +1,9 @@
 //! Stories of whole swarms on the small fixture, with every check running.
 
 use super::*;
+use crate::account::Cause;
 use crate::fault::Fault;
+use crate::runs::{self, Wanted};
 use crate::world::fixture;
 use skein_flight::trajectory::wind::Wind;
 
@@ -15,24 +17,44 @@ fn prepared(n_uavs: u16) -> Prepared {
     Prepared::new(spec)
 }
 
+fn run(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, events: bool) -> Outcome {
+    let wanted = Wanted {
+        events,
+        baseline: false,
+    };
+    runs::run(prepared, seed, faults, wanted)
+}
+
 fn at(at_ms: u64, fault: Fault) -> TimedFault {
     TimedFault { at_ms, fault }
 }
 
 fn completed(o: &Outcome) {
+    let r = &o.report;
     assert!(
-        o.completed && o.coverage >= 1.0,
-        "seed {}: {:?}",
-        o.seed,
-        o.violations
+        r.completed && r.coverage.covered_share >= 1.0,
+        "seed {}: {:?} {:?}",
+        r.seed,
+        r.reasons,
+        o.violations()
+    );
+}
+
+/// Completed, and no rule broken.
+fn passed(o: &Outcome) {
+    completed(o);
+    assert!(
+        o.report.passed,
+        "{:?} {:?}",
+        o.report.reasons,
+        o.violations()
     );
 }
 
 #[test]
 fn three_peers_cover_the_square_and_all_know() {
-    let o = prepared(3).run(1, Vec::new(), true);
-    completed(&o);
-    assert!(o.violation_counts.is_empty(), "{:?}", o.violations);
+    let o = run(&prepared(3), 1, Vec::new(), true);
+    passed(&o);
     let finished = o.entries.iter().filter(|e| {
         matches!(
             &e.what,
@@ -43,19 +65,28 @@ fn three_peers_cover_the_square_and_all_know() {
         )
     });
     assert!(finished.count() >= 3);
-    assert!(o.bytes > 0 && o.peer_ms >= 3 * o.makespan_ms.unwrap());
+    let r = &o.report;
+    assert!(r.radio.bytes_sent > 0 && r.peer_ms >= 3 * r.makespan_ms.unwrap());
+    assert_eq!(r.finished, [1, 2, 3]);
+    // Nobody can be faster than the bound, and a calm swarm is not twice as slow.
+    let ratio = r.makespan_over_work_bound.unwrap();
+    assert!((1.0..2.0).contains(&ratio), "{ratio}");
 }
 
 #[test]
 fn a_wind_costs_time_and_nothing_else() {
-    let calm = prepared(3).run(1, Vec::new(), false);
+    let calm = run(&prepared(3), 1, Vec::new(), false);
     for wind in [Wind::new(2.0, 1.0), Wind::new(-1.5, 2.0)] {
         let mut spec = fixture::square(3);
         spec.wind = wind;
-        let o = Prepared::new(spec).run(1, vec![at(60_000, Fault::Kill { peer: 2 })], false);
-        assert!(o.completed, "{:?}", o.violations);
-        assert!(o.violation_counts.is_empty(), "{:?}", o.violations);
-        assert!(o.makespan_ms > calm.makespan_ms);
+        let o = run(
+            &Prepared::new(spec),
+            1,
+            vec![at(60_000, Fault::Kill { peer: 2 })],
+            false,
+        );
+        passed(&o);
+        assert!(o.report.makespan_ms > calm.report.makespan_ms);
     }
 }
 
@@ -66,32 +97,34 @@ fn the_same_seed_gives_the_same_history_and_another_seed_another() {
         at(30_000, Fault::Kill { peer: 2 }),
         at(0, Fault::Loss { permille: 200 }),
     ];
-    let run = |seed: u64| {
-        let o = prepared.run(seed, faults.clone(), false);
-        (o.history_hash, o.events)
+    let hash = |seed: u64| {
+        let o = run(&prepared, seed, faults.clone(), false);
+        (o.history_hash, o.report.simulated.unwrap().events)
     };
-    let first = run(7);
-    assert_eq!(first, run(7));
-    assert_ne!(first.0, run(8).0);
+    let first = hash(7);
+    assert_eq!(first, hash(7));
+    assert_ne!(first.0, hash(8).0);
 }
 
 #[test]
 fn the_section_of_a_killed_peer_is_taken_over_and_the_story_says_by_whom() {
-    let o = prepared(4).run(2, vec![at(40_000, Fault::Kill { peer: 3 })], false);
+    let o = run(
+        &prepared(4),
+        2,
+        vec![at(40_000, Fault::Kill { peer: 3 })],
+        false,
+    );
     completed(&o);
-    assert_eq!(o.takeovers.len(), 1);
-    let t = &o.takeovers[0];
-    assert_eq!((t.dead, t.died_ms), (3, 40_000));
-    assert!(
-        t.cells > 0 && t.by.values().sum::<u32>() >= t.cells,
-        "{t:?}"
-    );
-    assert!(t.detected_ms.unwrap() > 40_000 && t.taken_ms.unwrap() >= t.detected_ms.unwrap());
-    assert!(
-        !o.detect_ms.is_empty() && o.detect_ms.iter().all(|ms| *ms < 13_000),
-        "{:?}",
-        o.detect_ms
-    );
+    assert_eq!(o.report.kills.len(), 1);
+    let k = &o.report.kills[0];
+    assert_eq!((k.peer, k.at_ms, k.cause), (3, 40_000, Cause::Killed));
+    let taken: usize = k.taken_over_by.iter().map(|t| t.cells).sum();
+    assert!(k.cells_held > 0 && k.left == 0, "{k:?}");
+    assert_eq!(taken + k.listed_already + k.seen_in_passing, k.cells_held);
+    assert!(k.takeover_ms.unwrap() >= k.detection_ms.unwrap(), "{k:?}");
+    // Three UAVs and the ground station find out.
+    assert_eq!(k.detections_ms.len(), 4, "{k:?}");
+    assert!(k.detections_ms.values().all(|ms| *ms < 13_000), "{k:?}");
 }
 
 #[test]
@@ -107,7 +140,7 @@ fn a_paused_peer_goes_on_and_a_partition_heals() {
         at(45_000, Fault::Resume { peer: 4 }),
         at(50_000, Fault::Heal),
     ];
-    let o = prepared(4).run(3, faults, true);
+    let o = run(&prepared(4), 3, faults, true);
     completed(&o);
     let split = o
         .entries
@@ -154,16 +187,16 @@ fn faults_that_do_not_fit_change_nothing() {
         at(3_000, Fault::Kill { peer: 77 }),
         at(4_000, Fault::Heal),
     ];
-    let o = prepared(2).run(5, faults, false);
+    let o = run(&prepared(2), 5, faults, false);
     completed(&o);
-    assert_eq!((o.dead, o.kills), (0, 0));
+    assert_eq!((o.dead, o.report.kills.len()), (0, 0));
 }
 
 #[test]
 fn who_is_out_of_fuel_is_gone_and_an_impossible_mission_ends_at_its_longest_time() {
     let mut spec = fixture::square(2);
     spec.max_time_s = 60;
-    let o = Prepared::new(spec).run(1, Vec::new(), false);
-    assert!(!o.completed && o.end_ms <= 60_000);
-    assert_eq!(o.violation_counts.get("L5"), Some(&1));
+    let o = run(&Prepared::new(spec), 1, Vec::new(), false);
+    assert!(!o.report.completed && o.report.end_ms <= 60_000);
+    assert_eq!(o.report.violations.unwrap().counts.get("L5"), Some(&1));
 }

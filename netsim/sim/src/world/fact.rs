@@ -1,9 +1,21 @@
 //! What the world records: facts, not beliefs.
 
-use super::judge::Approach;
 use super::motion::kinematic::Loss;
-use skein_flight::coverage::ring::CellId;
+use skein_flight::coverage::area::CellId;
 use skein_geometry::frame::Point;
+
+/// The closest approach of two airborne UAVs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Approach {
+    /// When, milliseconds.
+    pub at_ms: u64,
+    /// One of them.
+    pub a: u16,
+    /// The other.
+    pub b: u16,
+    /// Distance in space, metres.
+    pub distance_m: f64,
+}
 
 /// Something that truly happened.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,14 +3,14 @@
 //! The judge follows the flown pieces themselves, not reports, and uses only the
 //! world's own geometry. The camera looks straight down and stays level in turns.
 
-use super::fact::Fact;
+use super::fact::{Approach, Fact};
 use super::flat::{Bounds, point_ring_m, segment_ring_m};
 use super::motion::Piece;
 use super::obstacles::Place;
 use super::pieces::Pieces;
 use super::survey::Survey;
 use skein_flight::airframe::Airframe;
-use skein_flight::coverage::ring::CellId;
+use skein_flight::coverage::area::CellId;
 use skein_geometry::frame::Pose;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -28,19 +28,6 @@ pub struct Sighting {
     pub at_ms: u64,
     /// Who.
     pub uav: u16,
-}
-
-/// The closest approach of two airborne UAVs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Approach {
-    /// When, milliseconds.
-    pub at_ms: u64,
-    /// One of them.
-    pub a: u16,
-    /// The other.
-    pub b: u16,
-    /// Distance in space, metres.
-    pub distance_m: f64,
 }
 
 /// Follows all airframes and keeps the score.

@@ -13,8 +13,8 @@ pub mod obstacles;
 pub mod pieces;
 pub mod survey;
 
-pub use fact::Fact;
-pub use judge::{Approach, Judge, Sighting};
+pub use fact::{Approach, Fact};
+pub use judge::{Judge, Sighting};
 pub use motion::kinematic::Loss;
 pub use obstacles::{Obstacles, Place};
 pub use survey::{Cell, Survey, Uncoverable};
@@ -22,7 +22,7 @@ pub use survey::{Cell, Survey, Uncoverable};
 use crate::spec::Spec;
 use motion::{Kinematic, Piece};
 use skein_behaviors::{Percept, Setpoint};
-use skein_flight::coverage::ring::patch::Patches;
+use skein_flight::coverage::area::patch::Patches;
 use skein_peer::CoverageTask;
 use std::sync::Arc;
 
@@ -327,7 +327,7 @@ fn place_of(body: &Kinematic) -> Place {
 mod tests {
     use super::*;
     use skein_behaviors::{Side, Steer};
-    use skein_flight::coverage::ring::CellId;
+    use skein_flight::coverage::area::CellId;
 
     fn straight(from_ms: u64) -> Setpoint {
         Setpoint {

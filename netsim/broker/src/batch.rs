@@ -1,0 +1,100 @@
+//! Many simulated runs at the same time, one thread each.
+
+use skein_netsim::Prepared;
+use skein_netsim::runs::{self, Wanted};
+use skein_netsim::summary::{self, Summary};
+use skein_netsim::swarm::Outcome;
+use std::num::NonZeroUsize;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+/// What a batch is to be.
+#[derive(Clone, Debug)]
+pub struct Batch {
+    /// The seeds of the runs.
+    pub seeds: Range<u64>,
+    /// Whether each run draws its faults from the scenario's storm.
+    pub storm: bool,
+    /// Runs at the same time; one a processor without it.
+    pub jobs: Option<NonZeroUsize>,
+}
+
+/// Runs a batch and sums it up: the same figures for any number of jobs. `failed` is told
+/// of each run that failed, as soon as it has.
+pub fn run(prepared: &Prepared, batch: &Batch, failed: &(dyn Fn(&Outcome) + Sync)) -> Summary {
+    let free_ms = batch
+        .storm
+        .then(|| runs::failure_free_makespan_ms(prepared));
+    let jobs = batch
+        .jobs
+        .or_else(|| std::thread::available_parallelism().ok())
+        .map_or(1, NonZeroUsize::get);
+    let wanted = Wanted {
+        events: false,
+        baseline: true,
+    };
+    let started = Instant::now();
+    let next = AtomicU64::new(batch.seeds.start);
+    let outcomes = Mutex::new(Vec::new());
+    let work = || {
+        loop {
+            let seed = next.fetch_add(1, Ordering::Relaxed);
+            if seed >= batch.seeds.end {
+                return;
+            }
+            let outcome = match free_ms {
+                Some(free_ms) => runs::storm(prepared, seed, free_ms, wanted),
+                None => runs::planned(prepared, seed, wanted),
+            };
+            if !outcome.report.passed {
+                failed(&outcome);
+            }
+            // A thread that panicked would have ended the scope; the data is whole.
+            outcomes
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .push(outcome);
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..jobs {
+            scope.spawn(work);
+        }
+    });
+    let outcomes = outcomes
+        .into_inner()
+        .unwrap_or_else(PoisonError::into_inner);
+    summary::summarise(outcomes, started.elapsed().as_secs_f64())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skein_netsim::world::fixture;
+
+    #[test]
+    fn any_number_of_jobs_gives_the_same_figures() {
+        let mut spec = fixture::square(3);
+        // Too short to end: every run fails, and is told of.
+        spec.max_time_s = 20;
+        let prepared = Prepared::new(spec);
+        let run = |jobs: usize| {
+            let told = AtomicU64::new(0);
+            let batch = Batch {
+                seeds: 3..7,
+                storm: true,
+                jobs: NonZeroUsize::new(jobs),
+            };
+            let mut summary = run(&prepared, &batch, &|o: &Outcome| {
+                told.fetch_add(o.report.seed, Ordering::Relaxed);
+            });
+            summary.real_time_factor = 0.0;
+            (summary, told.into_inner())
+        };
+        let (one, told) = run(1);
+        assert_eq!((one.runs, one.completed, told), (4, 0, 3 + 4 + 5 + 6));
+        assert_eq!((one, told), run(3));
+    }
+}

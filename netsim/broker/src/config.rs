@@ -1,0 +1,87 @@
+//! The configuration of each peer, as its process reads it.
+
+use skein_netsim::spec::{GroundStationSpec, Spec, UavSpec};
+use std::net::SocketAddr;
+
+/// After this much wall time without a byte a transport gives its neighbour up,
+/// milliseconds. Short, because a trial runs faster than life; below it, starved
+/// processes on two cores would lose their links.
+pub const LEASE_MS: u32 = 500;
+
+/// What a peer's configuration needs besides the scenario.
+#[derive(Debug)]
+pub struct Surroundings<'a> {
+    /// The scenario.
+    pub spec: &'a Spec,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Where the world listens.
+    pub world: SocketAddr,
+    /// Proves that the peer belongs to it.
+    pub token: &'a str,
+    /// The proxies that lead to peers of higher numbers.
+    pub links: Vec<SocketAddr>,
+}
+
+impl Surroundings<'_> {
+    /// The configuration of a UAV.
+    #[must_use]
+    pub fn uav(&self, uav: &UavSpec) -> serde_json::Value {
+        let a = &uav.airframe;
+        let airframe = serde_json::json!({
+            "stall_mps": a.stall_mps,
+            "cruise_mps": a.cruise_mps,
+            "max_mps": a.max_mps,
+            "max_bank_deg": a.max_bank_rad.to_degrees(),
+            "endurance_s": a.endurance_s,
+            "reserve_s": a.reserve_s,
+            "footprint_across_m": a.footprint_across_m,
+            "footprint_along_m": a.footprint_along_m,
+        });
+        self.config(uav.id, "uav", uav.height_m, airframe)
+    }
+
+    /// The configuration of the ground station.
+    #[must_use]
+    pub fn ground(&self, ground: &GroundStationSpec) -> serde_json::Value {
+        let mut config = self.config(
+            ground.id,
+            "ground",
+            ground.height_m,
+            serde_json::Value::Null,
+        );
+        config["console"] = serde_json::json!({
+            "listen": "127.0.0.1:0",
+            "token_file": format!("uav{}.token", ground.id),
+        });
+        config
+    }
+
+    fn config(
+        &self,
+        id: u16,
+        role: &str,
+        height_m: f64,
+        airframe: serde_json::Value,
+    ) -> serde_json::Value {
+        let links: Vec<String> = self.links.iter().map(|a| format!("tcp/{a}")).collect();
+        serde_json::json!({
+            "id": id,
+            "role": role,
+            "fleet": self.spec.fleet,
+            "beacon_period_ms": self.spec.beacon_period_ms,
+            "rate_bps": self.spec.radio.rate_bps,
+            "queue_age_ms": self.spec.radio.queue_age_ms,
+            "height_m": height_m,
+            "airframe": airframe,
+            "objective": self.spec.objective,
+            "mission": "mission.json",
+            "seed": skein_link::fate::mix(self.seed ^ (u64::from(id) << 40)),
+            "journal": format!("uav{id}.journal"),
+            "listen": "tcp/127.0.0.1:0",
+            "links": links,
+            "lease_ms": LEASE_MS,
+            "vehicle": { "simulator": self.world.to_string(), "token": self.token },
+        })
+    }
+}

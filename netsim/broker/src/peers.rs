@@ -1,0 +1,354 @@
+//! All peers of a trial: their processes, their files, the streams and transports that
+//! join them. What they say comes out as [`Said`].
+
+use crate::config::Surroundings;
+use crate::error::{TrialError, io};
+use crate::live_peer::LivePeer;
+use crate::live_world::LiveWorld;
+use crate::process::Processes;
+use crate::registry::{ConsoleEntry, private_file};
+use crate::stream::{Heard, Line, Streams};
+use crate::transports::Transports;
+use skein_behaviors::Setpoint;
+use skein_link::frame::ToWorld;
+use skein_link::{LinkState, RadioCounters};
+use skein_netsim::spec::Spec;
+use skein_peer::Report;
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+use std::path::Path;
+use std::time::Duration;
+use tokio::time::Instant;
+
+/// How long all peers together may take to say hello: debug builds, two cores, 64 of
+/// them.
+const LAUNCH_TIMEOUT: Duration = Duration::from_secs(60);
+
+/// How long peers may take to say goodbye.
+const GOODBYE_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Something that a peer said, or that became of it.
+#[derive(Debug)]
+pub(crate) enum Said {
+    /// Its process is up and listens there.
+    Up {
+        /// Which.
+        id: u16,
+        /// Where, as `tcp/127.0.0.1:PORT`.
+        locator: String,
+        /// Where it listens for an operator, if it does.
+        console: Option<ConsoleEntry>,
+    },
+    /// It flies on like this.
+    Setpoint {
+        /// Which.
+        id: u16,
+        /// How.
+        setpoint: Setpoint,
+        /// Whether its process runs; a paused one's last words may still arrive.
+        runs: bool,
+    },
+    /// It reports something.
+    Report {
+        /// Which.
+        id: u16,
+        /// What.
+        report: Report,
+    },
+    /// One life of it has ended: what its radio did.
+    Radio(RadioCounters),
+    /// Its process ended by itself.
+    Crashed {
+        /// Which.
+        id: u16,
+        /// What its radio did.
+        radio: RadioCounters,
+        /// Its last words.
+        why: String,
+    },
+    /// It does something that no peer may do.
+    Wrong(String),
+}
+
+/// When it is, for those who are welcomed or told.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Clock {
+    /// Scenario time, milliseconds.
+    pub(crate) now_ms: u64,
+    /// Scenario seconds per second.
+    pub(crate) scale: f64,
+}
+
+/// All peers of a trial.
+#[derive(Debug)]
+pub(crate) struct Peers {
+    by_id: BTreeMap<u16, LivePeer>,
+    streams: Streams,
+    transports: Transports,
+    processes: Processes,
+    seed: u64,
+}
+
+impl Peers {
+    /// Opens every port and writes every file; starts only the guard.
+    pub(crate) async fn prepare(
+        spec: &Spec,
+        seed: u64,
+        run_dir: &Path,
+        program: &Path,
+        token: &str,
+    ) -> Result<Self, TrialError> {
+        let streams = Streams::listen(token.to_owned())
+            .await
+            .map_err(io("the vehicle streams"))?;
+        let uavs = spec.uavs.iter().map(|u| (u.id, true));
+        let ground = spec.ground.iter().map(|g| (g.id, false));
+        let by_id: BTreeMap<u16, LivePeer> = uavs
+            .chain(ground)
+            .map(|(id, flies)| (id, LivePeer::new(run_dir, id, flies)))
+            .collect();
+        let ids: Vec<u16> = by_id.keys().copied().collect();
+        let transports = Transports::bind(&ids).await.map_err(io("a link's proxy"))?;
+        let mission =
+            serde_json::to_vec(&*spec.mission).map_err(|e| io("mission.json")(e.into()))?;
+        private_file(&run_dir.join("mission.json"), &mission)?;
+        let around = |id: u16| Surroundings {
+            spec,
+            seed,
+            world: streams.address(),
+            token,
+            links: transports.from(id),
+        };
+        let uavs = spec.uavs.iter().map(|u| (u.id, around(u.id).uav(u)));
+        let ground = spec.ground.iter().map(|g| (g.id, around(g.id).ground(g)));
+        for (id, config) in uavs.chain(ground) {
+            let json =
+                serde_json::to_vec_pretty(&config).map_err(|e| io("a configuration")(e.into()))?;
+            if let Some(peer) = by_id.get(&id) {
+                private_file(peer.config(), &json)?;
+            }
+        }
+        let processes = Processes::start(program).map_err(io(program.display().to_string()))?;
+        Ok(Self {
+            by_id,
+            streams,
+            transports,
+            processes,
+            seed,
+        })
+    }
+
+    /// Starts everybody.
+    pub(crate) fn start_all(&mut self) -> Result<(), TrialError> {
+        for peer in self.by_id.values_mut() {
+            peer.start(&self.processes)
+                .map_err(|e| TrialError::Launch {
+                    peer: peer.id(),
+                    why: e.to_string(),
+                })?;
+        }
+        Ok(())
+    }
+
+    /// Waits until all said hello; gives what else was said meanwhile.
+    pub(crate) async fn wait_for_all(&mut self, clock: Clock) -> Result<Vec<Said>, TrialError> {
+        let deadline = Instant::now() + LAUNCH_TIMEOUT;
+        let mut said = Vec::new();
+        while let Some(waiting) = self.by_id.values_mut().find(|p| !p.is_connected()) {
+            let peer = waiting.id();
+            if !waiting.is_there() {
+                let why = waiting.last_words();
+                return Err(TrialError::Launch { peer, why });
+            }
+            if Instant::now() > deadline {
+                let why = format!(
+                    "no hello within {} s; {}",
+                    LAUNCH_TIMEOUT.as_secs(),
+                    waiting.last_words()
+                );
+                return Err(TrialError::Launch { peer, why });
+            }
+            // The wait is short, so that a process that ended is noticed.
+            let heard = tokio::time::timeout(Duration::from_millis(100), self.streams.next()).await;
+            if let Ok(Some(heard)) = heard {
+                said.extend(self.take(heard, clock));
+            }
+        }
+        Ok(said)
+    }
+
+    /// The next frame of any peer, for [`Peers::take`]. Cancel-safe.
+    pub(crate) async fn next(&mut self) -> Option<Heard> {
+        self.streams.next().await
+    }
+
+    /// Takes a frame; gives what it means to the trial.
+    pub(crate) fn take(&mut self, heard: Heard, clock: Clock) -> Option<Said> {
+        match heard {
+            Heard::Hello {
+                id,
+                pid,
+                locator,
+                console,
+                line,
+            } => self.hello((id, pid), (locator, console), line, clock),
+            Heard::Frame { id, pid, frame } => self.frame((id, pid), frame),
+            Heard::Gone { id, pid } => {
+                let peer = self.by_id.get_mut(&id).filter(|p| p.is_process(pid))?;
+                let (radio, crashed) = peer.disconnect();
+                Some(if crashed {
+                    let why = peer.last_words();
+                    Said::Crashed { id, radio, why }
+                } else {
+                    Said::Radio(radio)
+                })
+            }
+        }
+    }
+
+    fn hello(
+        &mut self,
+        (id, pid): (u16, u32),
+        (locator, console): (String, Option<String>),
+        line: Line,
+        clock: Clock,
+    ) -> Option<Said> {
+        let address: Option<SocketAddr> = locator.strip_prefix("tcp/").and_then(|a| a.parse().ok());
+        let peer = self.by_id.get_mut(&id).filter(|p| p.is_process(pid))?;
+        let Some(address) = address.filter(|a| a.ip().is_loopback()) else {
+            let text = format!("uav{id} listens at {locator}, beyond this machine");
+            return Some(Said::Wrong(text));
+        };
+        line.welcome(self.seed, clock.now_ms, clock.scale);
+        peer.connect(line);
+        let console = console.and_then(|at| at.parse().ok());
+        let console = console.map(|at| ConsoleEntry {
+            at,
+            token_file: peer.console_token().to_owned(),
+        });
+        self.transports.lead_to(id, address);
+        Some(Said::Up {
+            id,
+            locator,
+            console,
+        })
+    }
+
+    fn frame(&mut self, (id, pid): (u16, u32), frame: ToWorld) -> Option<Said> {
+        let peer = self.by_id.get_mut(&id).filter(|p| p.is_process(pid))?;
+        // What was under way when a computer ended is not said any more.
+        let silent = !peer.has_process();
+        match frame {
+            ToWorld::Setpoint(setpoint) => (!silent).then(|| Said::Setpoint {
+                id,
+                setpoint,
+                runs: peer.runs(),
+            }),
+            ToWorld::Report(_) if silent => None,
+            ToWorld::Report(bytes) => match cbor4ii::serde::from_slice(&bytes) {
+                Ok(report) => Some(Said::Report { id, report }),
+                Err(cause) => {
+                    tracing::warn!(id, %cause, "a report cannot be read");
+                    None
+                }
+            },
+            ToWorld::Radio(counters) => {
+                peer.counted(counters);
+                None
+            }
+            ToWorld::Bye => {
+                peer.leaves();
+                None
+            }
+            ToWorld::Hello { .. } => None,
+        }
+    }
+
+    /// Follows the world: tells everybody the time and the links, and what it senses
+    /// where `percepts` says so.
+    pub(crate) fn tell(&mut self, clock: Clock, world: &LiveWorld, percepts: bool) {
+        self.transports.follow(world);
+        let on_air: Vec<u16> = self
+            .by_id
+            .values()
+            .filter(|p| p.on_air())
+            .map(LivePeer::id)
+            .collect();
+        for (id, peer) in &mut self.by_id {
+            let links: Vec<(u16, LinkState)> = on_air
+                .iter()
+                .filter(|tx| *tx != id)
+                .map(|tx| (*tx, world.link(*tx, *id)))
+                .collect();
+            if !peer.is_connected() {
+                continue;
+            }
+            let news = peer.news_of_links(links);
+            let percept = world
+                .percept(*id)
+                .filter(|_| percepts && peer.flies() && peer.airborne());
+            if let Some(line) = peer.line() {
+                line.tick(clock.now_ms, clock.scale, percept, news);
+            }
+        }
+    }
+
+    /// A peer by its number, or who there is instead.
+    pub(crate) fn known(&mut self, id: u16) -> Result<&mut LivePeer, String> {
+        let names: Vec<String> = self.by_id.keys().map(|id| format!("uav{id}")).collect();
+        self.by_id
+            .get_mut(&id)
+            .ok_or_else(|| format!("there is no uav{id}; there are {}", names.join(" ")))
+    }
+
+    /// Starts a peer's process again.
+    pub(crate) fn start(&mut self, id: u16) -> Result<(), String> {
+        let peer = self.by_id.get_mut(&id).ok_or("gone")?;
+        peer.start(&self.processes)
+            .map_err(|e| format!("uav{id} did not start: {e}"))
+    }
+
+    /// Whether the radio of a peer works.
+    pub(crate) fn on_air(&self, id: u16) -> bool {
+        self.by_id.get(&id).is_some_and(LivePeer::on_air)
+    }
+
+    /// Tells everybody to leave, and ends who does not; gives what their radios did.
+    pub(crate) async fn end(&mut self) -> Vec<RadioCounters> {
+        for peer in self.by_id.values_mut() {
+            peer.dismiss();
+        }
+        let mut radios = Vec::new();
+        let deadline = Instant::now() + GOODBYE_TIMEOUT;
+        while self.by_id.values().any(LivePeer::is_connected) {
+            match tokio::time::timeout_at(deadline, self.streams.next()).await {
+                Ok(Some(Heard::Frame {
+                    id,
+                    pid,
+                    frame: frame @ (ToWorld::Radio(_) | ToWorld::Bye),
+                })) => {
+                    self.frame((id, pid), frame);
+                }
+                Ok(Some(Heard::Gone { id, pid })) => {
+                    if let Some(peer) = self.by_id.get_mut(&id).filter(|p| p.is_process(pid)) {
+                        // Whoever leaves now leaves because it was told to.
+                        peer.leaves();
+                        radios.push(peer.disconnect().0);
+                    }
+                }
+                Ok(Some(_)) => {}
+                Ok(None) | Err(_) => break,
+            }
+        }
+        for peer in self.by_id.values_mut() {
+            radios.push(peer.take_radio());
+            peer.wait_or_kill().await;
+        }
+        radios
+    }
+
+    /// Ends the guard.
+    pub(crate) async fn close(self) {
+        self.processes.end().await;
+    }
+}

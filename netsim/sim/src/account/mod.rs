@@ -1,0 +1,357 @@
+//! The account of one run, live or simulated: who died, who found out and when, who took
+//! over the work, what was covered, and the verdict.
+//!
+//! A driver tells an [`Account`] what happens: processes that start and end, what peers
+//! report, what the world recorded, who can reach whom. At the end the account is
+//! [concluded](Account::conclude) and gives one [`RunReport`], with the same figures by
+//! the same rules for live processes and for virtual time. Facts about the world come
+//! from the world, facts about beliefs from the peers' reports; nothing here looks into a
+//! peer or listens to the radio. What only a simulator can see, the
+//! [checks](crate::check) over beliefs, joins the report as its violations.
+//!
+//! | module | what it accounts for |
+//! |---|---|
+//! | [`lifetimes`] | which process ran when, which UAV flew; the work bound |
+//! | [`detection`] | from a death to its detection by each live peer |
+//! | [`work`] | whose cells were open when a peer died, and who took them over |
+//! | [`restarts`] | when a restarted peer was of use again |
+//! | [`connectivity`] | how often the swarm fell apart and met again |
+//! | [`report`] | the report and its verdict, one JSON schema |
+//! | [`text`] | the same for a person |
+
+pub mod connectivity;
+pub mod detection;
+pub mod lifetimes;
+pub mod report;
+pub mod restarts;
+pub mod text;
+pub mod work;
+
+#[cfg(test)]
+mod tests;
+
+pub use lifetimes::{Cause, Setting};
+pub use report::{Details, Driver, FalseDown, Live, RunReport, Simulated, Violations};
+pub use work::Held;
+
+use crate::world::{Fact, Judge, Loss};
+use connectivity::Connectivity;
+use detection::Detection;
+use lifetimes::Lifetimes;
+use report::{Coverage, Radio, Swarm};
+use restarts::Restarts;
+use skein_link::RadioCounters;
+use skein_peer::Report;
+use skein_peer::output::Status;
+use std::collections::{BTreeMap, BTreeSet};
+use work::Work;
+
+/// Alarms and refusals that are kept; a peer that repeats itself must not fill the
+/// report.
+const MAX_ALARMS: usize = 50;
+
+/// What a driver adds when a run is over.
+#[derive(Clone, Debug)]
+pub struct Ending<'a> {
+    /// When, milliseconds of scenario time.
+    pub now_ms: u64,
+    /// What the world saw.
+    pub judge: &'a Judge,
+    /// How often links that were up went down: by range, by sight, by fault.
+    pub link_cuts: (u64, u64, u64),
+    /// Rules that the run broke, where somebody checked them.
+    pub violations: Option<Violations>,
+    /// What only one of the drivers can tell.
+    pub details: Details,
+}
+
+/// The account of one run.
+#[derive(Clone, Debug)]
+pub struct Account {
+    setting: Setting,
+    lifetimes: Lifetimes,
+    detection: Detection,
+    work: Work,
+    restarts: Restarts,
+    connectivity: Connectivity,
+    radio: RadioCounters,
+    covered_ms: Option<u64>,
+    ready: BTreeMap<u16, u32>,
+    finished: BTreeSet<u16>,
+    alarms: Vec<String>,
+    failures: Vec<String>,
+}
+
+impl Account {
+    /// The account of a run that has not begun.
+    #[must_use]
+    pub fn new(setting: Setting) -> Self {
+        Self {
+            lifetimes: Lifetimes::new(&setting),
+            detection: Detection::default(),
+            work: Work::new(setting.uavs.len()),
+            restarts: Restarts::default(),
+            connectivity: Connectivity::default(),
+            radio: RadioCounters::default(),
+            covered_ms: None,
+            ready: BTreeMap::new(),
+            finished: BTreeSet::new(),
+            alarms: Vec::new(),
+            failures: Vec::new(),
+            setting,
+        }
+    }
+
+    /// A process starts for the first time.
+    pub fn started(&mut self, now_ms: u64, peer: u16) {
+        self.lifetimes.started(now_ms, peer);
+        self.detection.started(peer);
+    }
+
+    /// A process starts again, with its journal or with a fresh disk.
+    pub fn restarted(&mut self, now_ms: u64, peer: u16, fresh_disk: bool) {
+        let before = self.detection.life(peer);
+        self.started(now_ms, peer);
+        self.work.restarted(peer);
+        self.restarts.restarted(now_ms, peer, fresh_disk, before);
+        self.finished.remove(&peer);
+    }
+
+    /// A process ends. Gives what the peer held; one that has ended before ends no more.
+    pub fn ended(&mut self, now_ms: u64, peer: u16, cause: Cause) -> Held {
+        if !self.lifetimes.ended(now_ms, peer) {
+            return Held::default();
+        }
+        self.detection.ended(now_ms, peer);
+        self.work.ended(now_ms, peer, cause)
+    }
+
+    /// A process stands still.
+    pub fn paused(&mut self, now_ms: u64, peer: u16) {
+        self.lifetimes.paused(now_ms, peer);
+    }
+
+    /// A process goes on after standing still.
+    pub fn resumed(&mut self, now_ms: u64, peer: u16) {
+        self.lifetimes.resumed(now_ms, peer);
+    }
+
+    /// A peer reports something; gives a line worth showing, if it is one.
+    pub fn reported(&mut self, now_ms: u64, peer: u16, report: &Report) -> Option<String> {
+        match report {
+            Report::Booted { incarnation } => {
+                self.detection.lives(peer, *incarnation);
+                self.restarts.booted(peer, *incarnation);
+                None
+            }
+            Report::Ready {
+                revision,
+                loop_hash,
+                cells,
+            } => {
+                // Whoever held an older revision finished is to finish this one again.
+                if self.ready.insert(peer, *revision) < Some(*revision) {
+                    self.finished.remove(&peer);
+                }
+                self.work.ready(peer, *revision, *loop_hash, *cells);
+                None
+            }
+            Report::Membership {
+                peer: of,
+                incarnation,
+                status,
+            } => {
+                self.detection
+                    .believed(now_ms, peer, of.0, (*incarnation, *status));
+                None
+            }
+            Report::Claim { legs, held, .. } => {
+                let flown = self.work.cells_of(legs);
+                if !flown.is_empty() {
+                    self.restarts.productive(now_ms, peer);
+                }
+                self.work.listed(now_ms, peer, &flown, held)
+            }
+            Report::Covered { cells } => {
+                self.restarts.productive(now_ms, peer);
+                self.work.saw(now_ms, peer, cells);
+                None
+            }
+            Report::Finished { .. } => {
+                self.restarts.productive(now_ms, peer);
+                self.finished
+                    .insert(peer)
+                    .then(|| format!("uav{peer} holds the mission finished"))
+            }
+            Report::Alarm { text } => {
+                self.alarm(format!("{:.1} s, uav{peer}: {text}", secs(now_ms)))
+            }
+            Report::Refused { reason } => self.alarm(format!(
+                "{:.1} s, uav{peer} refused bytes: {reason}",
+                secs(now_ms)
+            )),
+            Report::Round { .. } => None,
+        }
+    }
+
+    fn alarm(&mut self, text: String) -> Option<String> {
+        if self.alarms.len() < MAX_ALARMS {
+            self.alarms.push(text.clone());
+            return Some(text);
+        }
+        None
+    }
+
+    /// The world recorded something; gives a line worth showing, if it is one.
+    pub fn happened(&mut self, now_ms: u64, fact: &Fact) -> Option<String> {
+        match fact {
+            Fact::ZoneEntry { uav, zone, .. } => {
+                Some(format!("uav{uav} entered no-fly zone {zone}"))
+            }
+            Fact::Lost { uav, cause, .. } if *cause != Loss::Killed => {
+                self.ended(now_ms, *uav, Cause::Lost);
+                let text = format!("uav{uav} is lost: {cause:?}");
+                self.failures.push(text.clone());
+                Some(text)
+            }
+            Fact::Seen { .. } | Fact::TooClose(_) | Fact::Lost { .. } | Fact::Failsafe { .. } => {
+                None
+            }
+        }
+    }
+
+    /// Every coverable cell has been seen, as often as the mission asks for.
+    pub fn covered(&mut self, now_ms: u64) {
+        self.covered_ms.get_or_insert(now_ms);
+    }
+
+    /// The components of the true link graph at present; gives a line when one fell
+    /// apart or some met. Peers that come and go do neither.
+    pub fn connected(&mut self, components: &[Vec<u16>]) -> Option<String> {
+        self.connectivity.observe(components)
+    }
+
+    /// Adds what the radio of one life of a peer did.
+    pub fn radio(&mut self, of: &RadioCounters) {
+        let sum = &mut self.radio;
+        sum.sent += of.sent;
+        sum.sent_bytes += of.sent_bytes;
+        sum.received += of.received;
+        sum.multi_hop += of.multi_hop;
+        sum.refused += of.refused;
+        sum.overrun += of.overrun;
+        merge(&mut sum.relayed_by, &of.relayed_by);
+        merge(&mut sum.lost, &of.lost);
+    }
+
+    /// Something happened for which the run has failed, whatever else it shows.
+    pub fn failed(&mut self, why: String) {
+        self.failures.push(why);
+    }
+
+    /// Whether that peer has ever held a mission and derived its loop.
+    #[must_use]
+    pub fn is_ready(&self, peer: u16) -> bool {
+        self.ready.contains_key(&peer)
+    }
+
+    /// Whether that peer holds its newest mission finished.
+    #[must_use]
+    pub fn is_finished(&self, peer: u16) -> bool {
+        self.finished.contains(&peer)
+    }
+
+    /// When every coverable cell had been seen, milliseconds.
+    #[must_use]
+    pub fn covered_ms(&self) -> Option<u64> {
+        self.covered_ms
+    }
+
+    /// UAVs in the air whose computers run, ascending.
+    #[must_use]
+    pub fn live_uavs(&self) -> Vec<u16> {
+        self.lifetimes.live_uavs()
+    }
+
+    /// Parts of the swarm that cannot talk to each other, at present.
+    #[must_use]
+    pub fn n_components(&self) -> usize {
+        self.connectivity.n_components()
+    }
+
+    /// Cells of dead peers taken over so far.
+    #[must_use]
+    pub fn taken_over(&self) -> usize {
+        self.work.taken_over()
+    }
+
+    /// Draws up the report; call it when everybody is gone.
+    #[must_use]
+    pub fn conclude(&self, ending: Ending<'_>) -> RunReport {
+        let now_ms = ending.now_ms;
+        let coverage = Coverage::of(ending.judge, self.setting.needed_share);
+        let (finished, unfinished): (Vec<u16>, Vec<u16>) = self
+            .live_uavs()
+            .into_iter()
+            .partition(|id| self.is_finished(*id));
+        let completed = self.covered_ms.is_some() && unfinished.is_empty() && !finished.is_empty();
+        let work_bound_ms = self.lifetimes.work_bound_ms();
+        let (driver, simulated, live) = match ending.details {
+            Details::Simulated(s) => (Driver::Sim, Some(s), None),
+            Details::Live(l) => (Driver::Live, None, Some(l)),
+        };
+        let mut report = RunReport {
+            schema_version: report::SCHEMA_VERSION,
+            scenario: self.setting.scenario.clone(),
+            seed: self.setting.seed,
+            driver,
+            completed,
+            end_ms: now_ms,
+            peer_ms: self.lifetimes.ran_ms(now_ms),
+            makespan_ms: self.covered_ms,
+            work_bound_ms,
+            makespan_over_work_bound: report::ratio(self.covered_ms, work_bound_ms),
+            coverage,
+            zone_entries: ending.judge.entries(),
+            nearest_approach_m: ending.judge.closest().map(|a| a.distance_m),
+            revisit_ms: ending.judge.longest_gap_ms(),
+            kills: self.work.kills(&self.detection),
+            restarts: self.restarts.reports(),
+            finished,
+            unfinished,
+            swarm: Swarm {
+                splits: self.connectivity.splits,
+                merges: self.connectivity.merges,
+                most_components: self.connectivity.most,
+            },
+            radio: Radio::of(&self.radio, self.lifetimes.ran_ms(now_ms), ending.link_cuts),
+            alarms: self.alarms.clone(),
+            violations: ending.violations,
+            simulated,
+            live,
+            ..RunReport::default()
+        };
+        report.judge(&self.failures);
+        report
+    }
+}
+
+fn merge<K: Ord + Copy>(sum: &mut Vec<(K, u64)>, more: &[(K, u64)]) {
+    let mut all: BTreeMap<K, u64> = sum.iter().copied().collect();
+    for (k, v) in more {
+        *all.entry(*k).or_default() += v;
+    }
+    *sum = all.into_iter().collect();
+}
+
+/// Whether a status ends a life, in somebody's belief.
+fn is_down(status: Status) -> bool {
+    status == Status::Down
+}
+
+/// Seconds of milliseconds.
+#[must_use]
+#[allow(clippy::cast_precision_loss, reason = "a time to be shown")]
+pub fn secs(ms: u64) -> f64 {
+    ms as f64 / 1000.0
+}

@@ -1,0 +1,425 @@
+//! The report of one run: one JSON schema for a live trial and for a simulated run, so
+//! that the same scenario can be compared figure by figure.
+//!
+//! Times of a run are milliseconds of scenario time since it began, durations
+//! milliseconds of scenario time. What one driver cannot tell is `null`.
+
+use super::lifetimes::Cause;
+use crate::check::Violation;
+use crate::world::Judge;
+use serde::Serialize;
+use skein_link::{RadioCounters, Reason};
+use std::collections::BTreeMap;
+
+/// Counted up when a field changes its meaning or goes; new fields leave it as it is.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// What a run came to.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RunReport {
+    /// [`SCHEMA_VERSION`] of the program that wrote it.
+    pub schema_version: u32,
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Seed of the run.
+    pub seed: u64,
+    /// `sim` or `live`.
+    pub driver: Driver,
+    /// Whether the run is as it must be: completed, and nothing in `reasons`.
+    pub passed: bool,
+    /// Why not, if not, one sentence each.
+    pub reasons: Vec<String>,
+    /// Whether every coverable cell was seen and every live UAV, one at least, holds the
+    /// mission finished.
+    pub completed: bool,
+    /// When the run ended, ms.
+    pub end_ms: u64,
+    /// How long all processes ran, together, ms.
+    pub peer_ms: u64,
+    /// When the last coverable cell was seen, ms.
+    pub makespan_ms: Option<u64>,
+    /// When it would have been, had everybody known everything at once, ms: same seed,
+    /// world and faults, solved by the same rules. Simulated runs with few deaths only.
+    pub baseline_ms: Option<u64>,
+    /// `makespan_ms` over `baseline_ms`.
+    pub makespan_over_baseline: Option<f64>,
+    /// The least time by which all UAVs alive have flown the length of all cells at their
+    /// mean speed over the ground, ms.
+    pub work_bound_ms: Option<u64>,
+    /// `makespan_ms` over `work_bound_ms`.
+    pub makespan_over_work_bound: Option<f64>,
+    /// What was seen of the area, lines or points.
+    pub coverage: Coverage,
+    /// Flown segments that entered a no-fly zone.
+    pub zone_entries: usize,
+    /// Smallest distance of two airborne UAVs, m (recorded, S1).
+    pub nearest_approach_m: Option<f64>,
+    /// The longest time in which a cell was not seen again, ms, where everything is to be
+    /// seen several times.
+    pub revisit_ms: Option<u64>,
+    /// Each process that ended before the run did, in the order of the times.
+    pub kills: Vec<KillReport>,
+    /// Each restart, in the order of the times.
+    pub restarts: Vec<RestartReport>,
+    /// Live UAVs at the end that hold the mission finished.
+    pub finished: Vec<u16>,
+    /// Live UAVs at the end that do not.
+    pub unfinished: Vec<u16>,
+    /// How the swarm held together.
+    pub swarm: Swarm,
+    /// What the radios did.
+    pub radio: Radio,
+    /// What people should look at: the first alarms and refusals of peers.
+    pub alarms: Vec<String>,
+    /// Rules of the protocol that were broken; `null` where nobody looked into the peers.
+    pub violations: Option<Violations>,
+    /// What only a simulated run can tell.
+    pub simulated: Option<Simulated>,
+    /// What only a live trial can tell.
+    pub live: Option<Live>,
+}
+
+/// What moved the run on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Driver {
+    /// Virtual time, in one process.
+    #[default]
+    Sim,
+    /// Real processes, in real time times a factor.
+    Live,
+}
+
+/// What only a simulated run can tell.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Simulated {
+    /// Hash of the history, hexadecimal: the same seed gives the same on every machine.
+    pub history_hash: String,
+    /// Events in the history.
+    pub events: u64,
+    /// Whether cells were beyond anybody's endurance when it ended.
+    pub infeasible: bool,
+    /// Living peers in reach that were declared down.
+    pub false_downs: Vec<FalseDown>,
+}
+
+/// What only a live trial can tell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Live {
+    /// Wall time of the flight, s.
+    pub wall_s: f64,
+    /// Scenario seconds per second of wall time: asked for.
+    pub time_scale: f64,
+    /// The lowest to which it had to be lowered, because the machine was too slow.
+    pub lowest_time_scale: f64,
+    /// Largest delay of a setpoint behind its percept, ms.
+    pub setpoint_delay_ms: u64,
+}
+
+/// Which driver ran it, and what only that one can tell.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Details {
+    /// Virtual time.
+    Simulated(Simulated),
+    /// Real processes.
+    Live(Live),
+}
+
+/// A living peer in reach that was declared down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct FalseDown {
+    /// When, ms.
+    pub at_ms: u64,
+    /// By whom.
+    pub by: u16,
+    /// Whom.
+    pub of: u16,
+}
+
+/// Rules of the protocol that were broken.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Violations {
+    /// How often each rule was broken; empty when all held.
+    pub counts: BTreeMap<String, u64>,
+    /// The first violations of each rule.
+    pub first: Vec<Violation>,
+}
+
+/// What was seen.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Coverage {
+    /// Coverable cells that were seen whole.
+    pub covered_cells: usize,
+    /// Cells that some UAV can see whole on a straight pass.
+    pub coverable_cells: usize,
+    /// All cells of the mission.
+    pub cells: usize,
+    /// `covered_cells` over `coverable_cells`, 0 to 1.
+    pub covered_share: f64,
+    /// Share of the area that is coverable, 0 to 1.
+    pub coverable_share: f64,
+    /// The share of the area that the scenario asks for, 0 to 1.
+    pub needed_share: f64,
+    /// How many cells cannot be seen, by reason.
+    pub uncoverable: BTreeMap<String, usize>,
+    /// Which cells those are, by column and row of the lane grid.
+    pub uncoverable_cells: Vec<Uncovered>,
+    /// Coverable cells that were not seen, by column and row.
+    pub missed: Vec<(i16, i16)>,
+}
+
+/// A cell that cannot be seen.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Uncovered {
+    /// Column of the lane grid.
+    pub col: i16,
+    /// Row of the lane grid.
+    pub row: i16,
+    /// Why.
+    pub reason: String,
+}
+
+/// What became of a peer that ended, and of its work.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct KillReport {
+    /// Who.
+    pub peer: u16,
+    /// When, ms.
+    pub at_ms: u64,
+    /// Why.
+    pub cause: Cause,
+    /// Cells that it listed and nobody had seen.
+    pub cells_held: usize,
+    /// The same over an even share of the whole loop.
+    pub share_held: f64,
+    /// Who found out first.
+    pub detected_by: Option<u16>,
+    /// How long after the end, ms.
+    pub detection_ms: Option<u64>,
+    /// How long after the end each live peer found out, ms.
+    pub detections_ms: BTreeMap<u16, u64>,
+    /// Cells that somebody else listed already when it ended.
+    pub listed_already: usize,
+    /// Who listed its other cells.
+    pub taken_over_by: Vec<Taker>,
+    /// Cells that somebody saw without having listed them.
+    pub seen_in_passing: usize,
+    /// When the last of its cells was listed or seen, ms after the end.
+    pub takeover_ms: Option<u64>,
+    /// Cells of a loop that a newer mission replaced before anybody took them.
+    pub superseded: usize,
+    /// Cells that nobody listed or saw.
+    pub left: usize,
+    /// Who flew its cells in the end, and how many.
+    pub flown_by: BTreeMap<u16, usize>,
+}
+
+/// A peer that took over cells of another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Taker {
+    /// Who.
+    pub peer: u16,
+    /// How many cells.
+    pub cells: usize,
+    /// When the first of them, ms after the end.
+    pub first_ms: u64,
+}
+
+/// What became of a peer that was started again.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct RestartReport {
+    /// Who.
+    pub peer: u16,
+    /// When, ms.
+    pub at_ms: u64,
+    /// Whether its journal was taken away.
+    pub fresh_disk: bool,
+    /// Its life before.
+    pub incarnation_before: Option<u32>,
+    /// Its life after.
+    pub incarnation_after: Option<u32>,
+    /// When it listed or saw a cell or held the mission finished, ms after the restart.
+    pub productive_ms: Option<u64>,
+}
+
+/// How the swarm held together, by the true link graph.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Swarm {
+    /// How often one component became more.
+    pub splits: usize,
+    /// How often more became fewer.
+    pub merges: usize,
+    /// The largest number of components at once.
+    pub most_components: usize,
+}
+
+/// What the radios did.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Radio {
+    /// Transmissions of all peers.
+    pub sent: u64,
+    /// Their bytes.
+    pub bytes_sent: u64,
+    /// Bytes transmitted per second that a peer ran, ground station included.
+    pub bytes_per_peer_s: f64,
+    /// Receptions.
+    pub received: u64,
+    /// Receptions of records that had been passed on at least once.
+    pub multi_hop: u64,
+    /// Who passed those on, and how many.
+    pub relayed_by: BTreeMap<u16, u64>,
+    /// Receptions that failed and transmissions never begun, by reason.
+    pub lost: BTreeMap<String, u64>,
+    /// Links that were up and went down, by reason: `range`, `sight`, `fault`.
+    pub link_cuts: BTreeMap<String, u64>,
+    /// Messages dropped because a process was too slow to take them.
+    pub overrun: u64,
+}
+
+impl Radio {
+    /// Of what all radios did in `ran_ms` of all processes together.
+    #[must_use]
+    pub fn of(all: &RadioCounters, ran_ms: u64, cuts: (u64, u64, u64)) -> Self {
+        let cuts = [("range", cuts.0), ("sight", cuts.1), ("fault", cuts.2)];
+        let lost = all.lost.iter().map(|(r, n)| (reason(*r).to_owned(), *n));
+        #[allow(clippy::cast_precision_loss, reason = "far below 2^52 bytes")]
+        let bytes = all.sent_bytes as f64;
+        Self {
+            sent: all.sent,
+            bytes_sent: all.sent_bytes,
+            bytes_per_peer_s: if ran_ms > 0 {
+                bytes / super::secs(ran_ms)
+            } else {
+                0.0
+            },
+            received: all.received,
+            multi_hop: all.multi_hop,
+            relayed_by: all.relayed_by.iter().copied().collect(),
+            lost: lost.collect(),
+            link_cuts: cuts.map(|(r, n)| (r.to_owned(), n)).into(),
+            overrun: all.overrun,
+        }
+    }
+}
+
+fn reason(reason: Reason) -> &'static str {
+    match reason {
+        Reason::Range => "range",
+        Reason::Sight => "sight",
+        Reason::Cut => "fault",
+        Reason::Loss => "loss",
+        Reason::QueueAge => "queue age",
+        Reason::Collision => "collision",
+    }
+}
+
+impl Coverage {
+    /// What the world saw.
+    #[must_use]
+    pub fn of(judge: &Judge, needed_share: f64) -> Self {
+        let survey = judge.survey();
+        let mut uncoverable: BTreeMap<String, usize> = BTreeMap::new();
+        let mut uncoverable_cells = Vec::new();
+        for cell in survey.cells() {
+            if let Some(reason) = &cell.uncoverable {
+                let reason = reason.to_string();
+                *uncoverable.entry(reason.clone()).or_default() += 1;
+                uncoverable_cells.push(Uncovered {
+                    col: cell.id.col,
+                    row: cell.id.row,
+                    reason,
+                });
+            }
+        }
+        let missed = judge
+            .sightings()
+            .zip(survey.cells())
+            .filter(|((_, seen), cell)| seen.is_none() && cell.uncoverable.is_none())
+            .map(|((id, _), _)| (id.col, id.row))
+            .collect();
+        Self {
+            covered_cells: judge.n_covered(),
+            coverable_cells: survey.n_coverable(),
+            cells: survey.cells().len(),
+            covered_share: judge.covered_share(),
+            coverable_share: survey.coverable_share(),
+            needed_share,
+            uncoverable,
+            uncoverable_cells,
+            missed,
+        }
+    }
+}
+
+impl RunReport {
+    /// A run that a panic ended.
+    #[must_use]
+    pub fn of_a_panic(scenario: String, seed: u64, violation: Violation) -> Self {
+        let mut report = Self {
+            schema_version: SCHEMA_VERSION,
+            scenario,
+            seed,
+            violations: Some(Violations {
+                counts: BTreeMap::from([(violation.check.to_owned(), 1)]),
+                first: vec![violation],
+            }),
+            ..Self::default()
+        };
+        report.judge(&[]);
+        report
+    }
+
+    /// The verdict: every reason for which the run has failed. `failures` are those that
+    /// the driver names.
+    pub(super) fn judge(&mut self, failures: &[String]) {
+        let mut reasons = failures.to_vec();
+        let c = &self.coverage;
+        if c.covered_cells < c.coverable_cells {
+            let n = c.coverable_cells - c.covered_cells;
+            reasons.push(format!("{n} coverable cells were not seen"));
+        } else if self.makespan_ms.is_none() {
+            reasons.push("not everything was seen as often as it is to be".to_owned());
+        }
+        if c.coverable_share < c.needed_share {
+            reasons.push(format!(
+                "only {:.1} % of the area is coverable, {:.1} % are asked for",
+                c.coverable_share * 100.0,
+                c.needed_share * 100.0
+            ));
+        }
+        if self.zone_entries > 0 {
+            let n = self.zone_entries;
+            reasons.push(format!("no-fly zones were entered {n} times"));
+        }
+        if self.finished.is_empty() && self.unfinished.is_empty() {
+            reasons.push("no UAV is left".to_owned());
+        }
+        if !self.unfinished.is_empty() {
+            let n = self.unfinished.len();
+            reasons.push(format!("{n} live UAVs do not hold the mission finished"));
+        }
+        if self.simulated.as_ref().is_some_and(|s| s.infeasible) {
+            reasons.push("some cells are beyond anybody's endurance".to_owned());
+        }
+        if let Some(v) = &self.violations {
+            for (check, n) in &v.counts {
+                reasons.push(format!("rule {check} was broken {n} times"));
+            }
+        }
+        self.passed = reasons.is_empty();
+        self.reasons = reasons;
+    }
+
+    /// Sets the makespan against that of the omniscient baseline, where both have one.
+    pub fn compare(&mut self, baseline_ms: Option<u64>) {
+        self.baseline_ms = baseline_ms;
+        self.makespan_over_baseline = ratio(self.makespan_ms, baseline_ms);
+    }
+}
+
+/// The ratio of two times, where both are known.
+pub(super) fn ratio(a_ms: Option<u64>, b_ms: Option<u64>) -> Option<f64> {
+    #[allow(clippy::cast_precision_loss, reason = "runs last less than 2^52 ms")]
+    let ratio = |(a, b): (u64, u64)| a as f64 / b.max(1) as f64;
+    a_ms.zip(b_ms).map(ratio)
+}

@@ -1,0 +1,91 @@
+//! The runs of a prepared scenario: with its own faults, with drawn ones, without any.
+
+use crate::account::RunReport;
+use crate::check::Violation;
+use crate::fault::TimedFault;
+use crate::fault_generator;
+use crate::omniscient_baseline;
+use crate::prepared::Prepared;
+use crate::swarm::{Outcome, Swarm};
+
+/// The seed of the run without faults: the same for every seed that is asked for, so
+/// that a seed draws the same storm alone and in a batch.
+const FAILURE_FREE_SEED: u64 = 0;
+
+/// The makespan of a run is compared with the omniscient baseline where at most this many
+/// UAVs were killed for good: that is what the product promises a figure for.
+const COMPARED_KILLS: u32 = 3;
+
+/// What a run is asked for besides its seed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// The main events, for a timeline.
+    pub events: bool,
+    /// The makespan beside that of the omniscient baseline, which costs about as much as
+    /// the run itself.
+    pub baseline: bool,
+}
+
+/// Runs once with these faults. A panic becomes a violation of S12 that names the seed.
+#[must_use]
+pub fn run(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, wanted: Wanted) -> Outcome {
+    let compare = wanted.baseline && fault_generator::kills(&faults) <= COMPARED_KILLS;
+    let compared = compare.then(|| faults.clone());
+    let mut outcome = guarded(prepared, seed, faults, wanted.events);
+    if let Some(faults) = compared
+        && outcome.report.makespan_ms.is_some()
+    {
+        outcome
+            .report
+            .compare(omniscient_baseline::makespan_ms(prepared, seed, &faults));
+    }
+    outcome
+}
+
+/// Runs a seed with the scenario's own faults.
+#[must_use]
+pub fn planned(prepared: &Prepared, seed: u64, wanted: Wanted) -> Outcome {
+    run(prepared, seed, prepared.spec.faults.clone(), wanted)
+}
+
+/// Runs a seed with the faults its storm draws; `failure_free_ms` is the
+/// [makespan without faults](failure_free_makespan_ms).
+#[must_use]
+pub fn storm(prepared: &Prepared, seed: u64, failure_free_ms: u64, wanted: Wanted) -> Outcome {
+    let faults = fault_generator::draw(&prepared.spec, seed, failure_free_ms);
+    run(prepared, seed, faults, wanted)
+}
+
+/// How long the mission takes without faults, milliseconds; the scenario's longest
+/// time when it does not end.
+#[must_use]
+pub fn failure_free_makespan_ms(prepared: &Prepared) -> u64 {
+    let longest_ms = u64::from(prepared.spec.max_time_s) * 1000;
+    Swarm::new(prepared, FAILURE_FREE_SEED, Vec::new(), false)
+        .run()
+        .report
+        .makespan_ms
+        .unwrap_or(longest_ms)
+}
+
+fn guarded(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, keep: bool) -> Outcome {
+    let run = std::panic::AssertUnwindSafe(|| Swarm::new(prepared, seed, faults, keep).run());
+    std::panic::catch_unwind(run).unwrap_or_else(|payload| {
+        let text = payload
+            .downcast_ref::<&str>()
+            .map(ToString::to_string)
+            .or_else(|| payload.downcast_ref::<String>().cloned())
+            .unwrap_or_else(|| "a panic without words".to_owned());
+        let violation = Violation {
+            check: "S12",
+            seed,
+            time_ms: 0,
+            peer: None,
+            text,
+        };
+        Outcome {
+            report: RunReport::of_a_panic(prepared.spec.name.clone(), seed, violation),
+            ..Outcome::default()
+        }
+    })
+}
