@@ -187,3 +187,120 @@ fn words(p: &Progress) -> String {
         p.scale
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use skein_broker::config::Surroundings;
+    use skein_interop::airframe::{self, BANK_DEG, ENDURANCE_S, FOOTPRINT_M, SPEED_MPS};
+    use skein_interop::json::Document;
+    use skein_netsim::spec::Spec;
+    use skein_node::NodeConfig;
+    use skein_peer::config::Airframe;
+    use skein_scenario::{Overrides, builtin_files, builtin_names, builtin_text};
+    use std::path::Path;
+
+    fn resolved(name: &str, text: &str) -> Spec {
+        let scenario =
+            skein_scenario::parse_with(name, text, &builtin_files(), &Overrides::default());
+        scenario.unwrap_or_else(|e| panic!("{e}")).spec
+    }
+
+    /// Every peer reads back what the trial writes for it.
+    fn is_understood(spec: &Spec, seed: u64, dir: &Path) {
+        let mission = serde_json::to_string(&*spec.mission).unwrap();
+        std::fs::write(dir.join("mission.json"), mission).unwrap();
+        let around = Surroundings {
+            spec,
+            seed,
+            world: "127.0.0.1:65535".parse().unwrap(),
+            token: "a token",
+            links: vec!["127.0.0.1:1".parse().unwrap(); 3],
+        };
+        let file = dir.join("peer.json5");
+        let read = |text: String| {
+            std::fs::write(&file, &text).unwrap();
+            let config = NodeConfig::load(&file).unwrap_or_else(|e| panic!("{e}\n{text}"));
+            assert_eq!(config.peer.mission.as_deref(), Some(&*spec.mission));
+            assert_eq!(config.peer.fleet, spec.fleet);
+            assert_eq!(config.peer.beacon_period_ms, spec.beacon_period_ms);
+            assert_eq!(config.peer.rate_bps, spec.radio.rate_bps);
+            assert_eq!(config.queue_age_ms, spec.radio.queue_age_ms);
+            assert_eq!(config.peer.objective, spec.objective);
+            config.peer
+        };
+        for uav in &spec.uavs {
+            let peer = read(around.uav(uav).to_string());
+            // To the last bit: live and simulated peers plan with the same numbers.
+            assert_eq!(peer.airframe, Some(uav.airframe));
+            assert_eq!(peer.height_m.to_bits(), uav.height_m.to_bits());
+            assert_eq!(peer.id.0, uav.id);
+        }
+        if let Some(ground) = &spec.ground {
+            let peer = read(around.ground(ground).to_string());
+            assert_eq!((peer.airframe, peer.id.0), (None, ground.id));
+            assert_eq!(peer.height_m.to_bits(), ground.height_m.to_bits());
+        }
+    }
+
+    /// Airframes with every value at an end of its limits.
+    fn extremes() -> Vec<Airframe> {
+        let mut all = Vec::new();
+        for (stall_mps, cruise_mps) in [
+            (SPEED_MPS.0, SPEED_MPS.0.next_up()),
+            (SPEED_MPS.1.next_down(), SPEED_MPS.1),
+        ] {
+            for bank_deg in [BANK_DEG.0, BANK_DEG.1] {
+                for side_m in [FOOTPRINT_M.0, FOOTPRINT_M.1] {
+                    for endurance_s in [ENDURANCE_S.0, ENDURANCE_S.1] {
+                        let text = format!(
+                            "{{ stall_mps: {stall_mps}, cruise_mps: {cruise_mps}, max_mps: {cruise_mps},
+                                bank_deg: {bank_deg}, endurance_s: {endurance_s}, reserve_s: {},
+                                footprint: {{ across_m: {side_m}, along_m: {side_m} }} }}",
+                            endurance_s.next_down()
+                        );
+                        let document = Document::parse("airframe", "", &text).unwrap();
+                        all.push(airframe::read(&document.root(), None).unwrap());
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn every_peer_understands_what_a_trial_writes_for_it() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in builtin_names() {
+            let spec = resolved(name, builtin_text(name).unwrap());
+            is_understood(&spec, spec.seed, dir.path());
+        }
+        // The ends of what a scenario may say, where the whole still makes sense.
+        let text = builtin_text("helsinki").unwrap();
+        for (from, to) in [
+            ("bank_deg: 45", "bank_deg: 78"),
+            ("bank_deg: 45", "bank_deg: 80"),
+            ("level_m: 45", "level_m: 3700"),
+            ("beacon_period_s: 1,", "beacon_period_s: 60,"),
+            ("beacon_period_s: 1,", "beacon_period_s: 0.8,"),
+            ("rate_bps: 64000,", "rate_bps: 1200,"),
+            ("rate_bps: 64000,", "rate_bps: 1000000000,"),
+            ("queue_age_ms: 2000,", "queue_age_ms: 1,"),
+            ("queue_age_ms: 2000,", "queue_age_ms: 60000,"),
+            ("seed: 1,", "seed: 4294967295, objective: \"energy\","),
+            ("seed: 1,", "seed: 0, objective: \"distance\","),
+        ] {
+            assert!(text.contains(from), "{from}");
+            let spec = resolved(to, &text.replace(from, to));
+            is_understood(&spec, u64::MAX, dir.path());
+        }
+        let mut spec = resolved("extremes", text);
+        let uav = spec.uavs[0].clone();
+        let put = |airframe| skein_netsim::spec::UavSpec {
+            id: u16::MAX,
+            airframe,
+            ..uav.clone()
+        };
+        spec.uavs = extremes().into_iter().map(put).collect();
+        is_understood(&spec, 0, dir.path());
+    }
+}

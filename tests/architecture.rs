@@ -108,6 +108,7 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
     (
         "skein-node",
         &[
+            "skein-interop",
             "skein-link",
             "skein-console",
             "skein-peer",
@@ -123,6 +124,7 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
     (
         "skein-broker",
         &[
+            "skein-interop",
             "skein-scenario",
             "skein-netsim",
             "skein-link",

@@ -27,17 +27,7 @@ impl Surroundings<'_> {
     /// The configuration of a UAV.
     #[must_use]
     pub fn uav(&self, uav: &UavSpec) -> serde_json::Value {
-        let a = &uav.airframe;
-        let airframe = serde_json::json!({
-            "stall_mps": a.stall_mps,
-            "cruise_mps": a.cruise_mps,
-            "max_mps": a.max_mps,
-            "max_bank_deg": a.max_bank_rad.to_degrees(),
-            "endurance_s": a.endurance_s,
-            "reserve_s": a.reserve_s,
-            "footprint_across_m": a.footprint_across_m,
-            "footprint_along_m": a.footprint_along_m,
-        });
+        let airframe = skein_interop::airframe::to_json(&uav.airframe);
         self.config(uav.id, "uav", uav.height_m, airframe)
     }
 

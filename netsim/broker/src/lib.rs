@@ -10,7 +10,7 @@
 //! | [`trial`] | prepares, steps the world, ends |
 //! | `peers` | starts and ends all peers, takes in what they say |
 //! | `live_peer` | one peer: process, files, the line to it |
-//! | `config` | the configuration that each peer's process reads |
+//! | [`config`] | the configuration that each peer's process reads |
 //! | `transports` | the proxies of all pairs, dark while their links are down |
 //! | `faults` | which faults are to come, what each does and what should follow |
 //! | [`live_world`] | the world and its radio links, as a trial uses them |
@@ -22,7 +22,7 @@
 //! | [`batch`] | many simulated runs at the same time |
 
 pub mod batch;
-mod config;
+pub mod config;
 pub mod control;
 mod error;
 mod faults;

@@ -5,13 +5,35 @@
 
 use crate::bus::{BusConfig, loopback_address};
 use crate::console::ConsoleConfig;
-use crate::fields::{FieldError, Fields, Text};
 use crate::simulator::SimulatorConfig;
-use skein_peer::config::{Airframe, Objective};
+use skein_interop::airframe;
+use skein_interop::json::{Document, Error, Fields, Node, Place};
+use skein_peer::config::Objective;
 use skein_peer::{Mission, PeerConfig, PeerId, Role};
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// All fields of a peer's configuration.
+const FIELDS: &[&str] = &[
+    "id",
+    "role",
+    "fleet",
+    "beacon_period_ms",
+    "rate_bps",
+    "queue_age_ms",
+    "height_m",
+    "airframe",
+    "objective",
+    "mission",
+    "seed",
+    "journal",
+    "listen",
+    "links",
+    "lease_ms",
+    "vehicle",
+    "console",
+];
 
 /// Everything one node needs to know.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,7 +65,7 @@ pub enum ConfigError {
     },
     /// Its content is wrong.
     #[error(transparent)]
-    Field(#[from] FieldError),
+    Field(#[from] Error),
 }
 
 impl NodeConfig {
@@ -52,65 +74,77 @@ impl NodeConfig {
     /// # Errors
     /// With the place of the first mistake.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        let text = read(path)?;
         let base = path.parent().unwrap_or(Path::new("."));
-        Self::parse(Text { path, text: &text }, base)
+        Self::parse(&path.display().to_string(), &read(path)?, base)
     }
 
-    fn parse(text: Text<'_>, base: &Path) -> Result<Self, ConfigError> {
-        let mut f = text.object()?;
-        let id = small(f.integer("id", 0, u64::from(u16::MAX))?);
-        let role = role(&mut f)?;
-        let fleet = fleet(&mut f)?;
-        let airframe = f.optional_object("airframe")?.map(airframe).transpose()?;
+    fn parse(file: &str, text: &str, base: &Path) -> Result<Self, ConfigError> {
+        let document = Document::parse("peer", file, text)?;
+        let f = document.root().fields(FIELDS)?;
+        let id = f.need("id", "1")?.small(0, u16::MAX, "a peer's number")?;
+        let role = f
+            .need("role", "\"uav\"")?
+            .one_of(&[("uav", Role::Uav), ("ground", Role::GroundStation)])?;
+        let fleet = f.need("fleet", "\"skein\"")?.word()?;
+        let airframe = f
+            .given("airframe")
+            .map(|node| airframe::read(node, None))
+            .transpose()?;
         if role == Role::Uav && airframe.is_none() {
-            return Err(f.error("a peer of role \"uav\" needs an airframe").into());
+            return Err(f
+                .node()
+                .wrong("a peer of role \"uav\" needs an airframe")
+                .into());
         }
+        let milliseconds = |name, low, high| {
+            f.need(name, "1000")?
+                .whole(low, high, "a whole number of milliseconds")
+        };
         let peer = PeerConfig {
             id: PeerId(id),
             role,
             fleet: fleet.clone(),
-            beacon_period_ms: small(f.integer("beacon_period_ms", 100, 60_000)?),
-            rate_bps: small(f.integer("rate_bps", 300, 1_000_000_000)?),
+            beacon_period_ms: milliseconds("beacon_period_ms", 100, 60_000)?,
+            rate_bps: f
+                .need("rate_bps", "64000")?
+                .whole(300, 1_000_000_000, "bit/s")?,
             airframe,
-            objective: objective(&mut f)?,
-            height_m: f.number("height_m", -1_000.0, 20_000.0)?,
-            mission: mission(&mut f, base)?,
-            seed: f.integer("seed", 0, u64::MAX)?,
+            objective: f
+                .given("objective")
+                .map_or(Ok(Objective::Time), airframe::objective)?,
+            height_m: f
+                .need("height_m", "60")?
+                .number(-1_000.0, 20_000.0, "metres")?,
+            mission: mission(&f, base)?,
+            seed: f.need("seed", "1")?.count(0, u64::MAX, "any number")?,
         };
-        let queue_age_ms = small(f.integer("queue_age_ms", 1, 60_000)?);
+        let links = f.need("links", "[]")?.items()?;
         let bus = BusConfig {
             id,
             fleet,
-            listen: endpoint(f.string("listen")?)?,
-            links: f
-                .strings("links")?
-                .into_iter()
-                .map(endpoint)
-                .collect::<Result<_, _>>()?,
-            lease_ms: small(f.integer("lease_ms", 100, 60_000)?),
+            listen: endpoint(f.need("listen", "\"tcp/127.0.0.1:0\"")?)?,
+            links: links.iter().map(endpoint).collect::<Result<_, _>>()?,
+            lease_ms: milliseconds("lease_ms", 100, 60_000)?,
         };
-        let journal = base.join(f.string("journal")?.0);
-        let simulator = f.optional_object("vehicle")?.map(vehicle).transpose()?;
+        let simulator = f.given("vehicle").map(vehicle).transpose()?;
         if role == Role::Uav && simulator.is_none() {
-            return Err(f.error("a peer of role \"uav\" needs a vehicle").into());
+            return Err(f
+                .node()
+                .wrong("a peer of role \"uav\" needs a vehicle")
+                .into());
         }
-        let console = f
-            .optional_object("console")?
-            .map(|c| console(c, base))
-            .transpose()?;
-        if role == Role::Uav && console.is_some() {
+        let console = f.given("console");
+        if let (Role::Uav, Some(node)) = (role, console) {
             let why = "only a peer of role \"ground\" has a console; its operator speaks for all";
-            return Err(f.error(why).into());
+            return Err(node.wrong(why).into());
         }
-        f.done()?;
         Ok(Self {
             peer,
             bus,
-            journal,
+            journal: base.join(f.need("journal", "\"uav1.journal\"")?.text()?),
             simulator,
-            console,
-            queue_age_ms,
+            console: console.map(|node| console_at(node, base)).transpose()?,
+            queue_age_ms: milliseconds("queue_age_ms", 1, 60_000)?,
         })
     }
 }
@@ -122,112 +156,57 @@ fn read(path: &Path) -> Result<String, ConfigError> {
     })
 }
 
-/// Narrows what bounds already keep small.
-fn small<T: TryFrom<u64> + Default>(n: u64) -> T {
-    T::try_from(n).unwrap_or_default()
-}
-
-fn wrong(mut error: FieldError, expected: &str) -> FieldError {
-    error.what = format!("{}; expected {expected}", error.what);
-    error
-}
-
-fn role(f: &mut Fields<'_>) -> Result<Role, FieldError> {
-    let (text, at) = f.string("role")?;
-    match text.as_str() {
-        "uav" => Ok(Role::Uav),
-        "ground" => Ok(Role::GroundStation),
-        _ => Err(wrong(at, "\"uav\" or \"ground\"")),
-    }
-}
-
-/// What legs should spend little of; time unless it says otherwise.
-fn objective(f: &mut Fields<'_>) -> Result<Objective, FieldError> {
-    let Some((text, at)) = f.optional_string("objective")? else {
-        return Ok(Objective::Time);
-    };
-    match text.as_str() {
-        "time" => Ok(Objective::Time),
-        "distance" => Ok(Objective::Distance),
-        "energy" => Ok(Objective::Energy),
-        _ => Err(wrong(at, "\"time\", \"distance\" or \"energy\"")),
-    }
-}
-
-fn fleet(f: &mut Fields<'_>) -> Result<String, FieldError> {
-    let (text, at) = f.string("fleet")?;
-    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if !text.is_empty() && text.len() <= 32 && text.chars().all(plain) {
-        Ok(text)
-    } else {
-        Err(wrong(at, "1 to 32 letters, digits, '-' or '_'"))
-    }
-}
-
-fn endpoint((text, at): (String, FieldError)) -> Result<String, FieldError> {
-    match loopback_address(&text) {
-        Ok(_) => Ok(text),
-        Err(_) => Err(wrong(
-            at,
-            "tcp/127.0.0.1:PORT; nothing listens or connects beyond 127.0.0.1",
-        )),
-    }
-}
-
-fn airframe(mut f: Fields<'_>) -> Result<Airframe, FieldError> {
-    let stall_mps = f.number("stall_mps", 1.0, 300.0)?;
-    let cruise_mps = f.number("cruise_mps", stall_mps, 300.0)?;
-    let result = Airframe {
-        stall_mps,
-        cruise_mps,
-        max_mps: f.number("max_mps", cruise_mps, 300.0)?,
-        max_bank_rad: f.number("max_bank_deg", 5.0, 75.0)?.to_radians(),
-        endurance_s: f.number("endurance_s", 1.0, 1e6)?,
-        reserve_s: f.number("reserve_s", 0.0, 1e6)?,
-        footprint_across_m: f.number("footprint_across_m", 0.1, 10_000.0)?,
-        footprint_along_m: f.number("footprint_along_m", 0.1, 10_000.0)?,
-    };
-    if result.reserve_s >= result.endurance_s {
-        return Err(f.error("reserve_s leaves nothing of endurance_s to fly"));
-    }
-    f.done()?;
-    Ok(result)
+fn endpoint(node: &Node<'_>) -> Result<String, Error> {
+    let text = node.text()?;
+    loopback_address(text)
+        .map(|_| text.to_owned())
+        .map_err(|_| {
+            node.wrong(format!(
+                "is \"{text}\"; expected tcp/127.0.0.1:PORT; nothing listens or connects beyond 127.0.0.1"
+            ))
+        })
 }
 
 /// A port on this machine and no other.
-fn local(field: (String, FieldError)) -> Result<SocketAddr, FieldError> {
-    let (text, at) = field;
+fn local(node: &Node<'_>) -> Result<SocketAddr, Error> {
+    let text = node.text()?;
     match text.parse::<SocketAddr>() {
         Ok(a) if a.ip() == Ipv4Addr::LOCALHOST => Ok(a),
-        _ => Err(wrong(at, "127.0.0.1:PORT")),
+        _ => Err(node.wrong(format!("is \"{text}\"; expected 127.0.0.1:PORT"))),
     }
 }
 
-fn vehicle(mut f: Fields<'_>) -> Result<SimulatorConfig, FieldError> {
-    let address = local(f.string("simulator")?)?;
-    let token = f.string("token")?.0;
-    f.done()?;
-    Ok(SimulatorConfig { address, token })
+fn vehicle(node: &Node<'_>) -> Result<SimulatorConfig, Error> {
+    let f = node.fields(&["simulator", "token"])?;
+    Ok(SimulatorConfig {
+        address: local(f.need("simulator", "\"127.0.0.1:4000\"")?)?,
+        token: f.need("token", "\"...\"")?.text()?.to_owned(),
+    })
 }
 
-fn console(mut f: Fields<'_>, base: &Path) -> Result<ConsoleConfig, FieldError> {
-    let port = local(f.string("listen")?)?.port();
-    let token_file = base.join(f.string("token_file")?.0);
-    f.done()?;
-    Ok(ConsoleConfig { port, token_file })
+fn console_at(node: &Node<'_>, base: &Path) -> Result<ConsoleConfig, Error> {
+    let f = node.fields(&["listen", "token_file"])?;
+    Ok(ConsoleConfig {
+        port: local(f.need("listen", "\"127.0.0.1:0\"")?)?.port(),
+        token_file: base.join(f.need("token_file", "\"console.token\"")?.text()?),
+    })
 }
 
-fn mission(f: &mut Fields<'_>, base: &Path) -> Result<Option<Arc<Mission>>, ConfigError> {
-    let Some((name, _)) = f.optional_string("mission")? else {
+fn mission(f: &Fields<'_>, base: &Path) -> Result<Option<Arc<Mission>>, ConfigError> {
+    let Some(node) = f.given("mission") else {
         return Ok(None);
     };
-    let path = base.join(name);
+    let path = base.join(node.text()?);
     let text = read(&path)?;
-    let mission = serde_json::from_str(&text).map_err(|e| FieldError {
-        path,
-        line: e.line(),
-        column: e.column(),
-        what: e.to_string(),
+    // The record itself, as peers speak it: its form is the type's own.
+    let mission = serde_json::from_str(&text).map_err(|e| Error {
+        place: Place {
+            file: path.display().to_string(),
+            line: e.line(),
+            column: e.column(),
+        },
+        field: "mission".to_owned(),
+        problem: e.to_string(),
     })?;
     Ok(Some(Arc::new(mission)))
 }
@@ -239,13 +218,7 @@ mod tests {
     const EXAMPLE: &str = include_str!("../../../configs/peer.json5");
 
     fn parse(text: &str) -> Result<NodeConfig, ConfigError> {
-        NodeConfig::parse(
-            Text {
-                path: Path::new("peer.json5"),
-                text,
-            },
-            Path::new("/nowhere"),
-        )
+        NodeConfig::parse("peer.json5", text, Path::new("/nowhere"))
     }
 
     #[test]
@@ -268,17 +241,31 @@ mod tests {
                 "listen: \"tcp/0.0.0.0:0\"",
                 "beyond 127.0.0.1",
             ),
-            ("height_m:", "heigth_m:", "the field height_m is missing"),
+            ("height_m:", "heigth_m:", "did you mean height_m?"),
             (
                 "endurance_s: 2400",
                 "endurance_s: 0",
-                "expected a number from 1",
+                "airframe.endurance_s: 0 is out of range; expected seconds between 1",
             ),
-            ("cruise_mps: 13", "cruise_mps: NaN", "cruise_mps"),
+            (
+                "cruise_mps: 13",
+                "cruise_mps: NaN",
+                "airframe.cruise_mps: NaN is not",
+            ),
+            (
+                "bank_deg: 45",
+                "bank_deg: 81",
+                "airframe.bank_deg: 81 is out",
+            ),
+            (
+                "footprint: { across_m: 60,",
+                "footprint_across_m: 30, footprint: { across_m: 60,",
+                "airframe.footprint_across_m: unknown field",
+            ),
             (
                 "lease_ms: 500",
                 "lease_ms: 500, leas_ms: 1",
-                "unknown field leas_ms",
+                "leas_ms: unknown field; did you mean lease_ms?",
             ),
             (
                 "beacon_period_ms: 1000",
@@ -298,12 +285,10 @@ mod tests {
             let line = 1 + text[..text.find(wrong).unwrap()].matches('\n').count();
             let error = parse(&text).unwrap_err().to_string();
             assert!(error.contains(message), "{wrong}: {error}");
-            if !message.contains("missing") {
-                assert!(
-                    error.contains(&format!("peer.json5:{line}:")),
-                    "{wrong}: {error}"
-                );
-            }
+            assert!(
+                error.starts_with(&format!("peer.json5:{line}:")),
+                "{wrong}: {error}"
+            );
         }
     }
 
@@ -332,7 +317,7 @@ mod tests {
         for (right, wrong, message) in [
             ("127.0.0.1:4100", "0.0.0.0:4100", "expected 127.0.0.1:PORT"),
             ("127.0.0.1:4100", "127.0.0.1", "expected 127.0.0.1:PORT"),
-            ("token_file:", "file:", "token_file is missing"),
+            ("token_file:", "file:", "console.file: unknown field"),
         ] {
             let error = parse(&ground(&console.replace(right, wrong))).unwrap_err();
             assert!(error.to_string().contains(message), "{wrong}: {error}");

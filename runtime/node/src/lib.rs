@@ -23,7 +23,6 @@ pub mod clock;
 pub mod config;
 pub mod console;
 pub mod drive;
-pub mod fields;
 pub mod journal;
 pub mod outgoing;
 pub mod radio;
