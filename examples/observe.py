@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-# What the swarm publishes, in Python: pip install eclipse-zenoh cbor2
+# What the swarm publishes, in Python: pip install -r requirements.txt
 # Usage: observe.py tcp/127.0.0.1:PORT [SECONDS [KEYS]]
 import json, sys, time
 import cbor2, zenoh
@@ -12,8 +12,9 @@ shown = set()
 
 def show(sample):
     author, life, seq, kind, subject, body, *_ = cbor2.loads(bytes(sample.payload))
-    if (author, life, seq) not in shown:  # several peers may have passed it on
-        shown.add((author, life, seq))
+    version = (str(sample.key_expr), life, seq)
+    if version not in shown:  # several peers may have passed it on
+        shown.add(version)
         print(sample.key_expr, f"uav{author} life {life} #{seq}", cbor2.loads(body), flush=True)
 
 with zenoh.open(config) as session:

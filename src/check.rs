@@ -3,7 +3,7 @@
 use crate::exit;
 use crate::planner::PlannerArgs;
 use clap::{Args, ValueEnum};
-use skein_flight::coverage::area::CellId;
+use skein_flight::coverage::ring::CellId;
 use skein_netsim::spec::Spec;
 use skein_netsim::world::Survey;
 use skein_peer::CoverageTask;

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use proptest::prelude::*;
-use skein_flight::coverage::area::patch::Patches;
+use skein_flight::coverage::ring::patch::Patches;
 use skein_geometry::frame::{Point, Vector};
 use skein_peer::CoverageTask;
 use skein_scenario::{

@@ -1,7 +1,7 @@
 //! What the executive layer reports upwards.
 
 use serde::{Deserialize, Serialize};
-use skein_flight::coverage::area::CellId;
+use skein_flight::coverage::ring::CellId;
 
 /// Something happened that the cooperation layer should know.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

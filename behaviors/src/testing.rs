@@ -4,8 +4,9 @@ use crate::percept::Percept;
 use crate::reactive::follow::fly;
 use crate::setpoint::{Setpoint, Side};
 use skein_flight::airframe::Airframe;
-use skein_flight::coverage::area::{AreaProblem, CoverageLoop};
-use skein_flight::path::{RouteLimits, Router};
+use skein_flight::coverage::lanes;
+use skein_flight::coverage::ring::{CoverageLoop, LoopProblem};
+use skein_flight::route::{RouteLimits, Router};
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::PI;
 use skein_geometry::{NoFlyZones, Polygon};
@@ -61,7 +62,7 @@ pub fn rectangle(east_m: f64, north_m: f64, width_m: f64, height_m: f64) -> Poly
 /// A loop and a router over `cols` × `rows` cells around the given zones.
 pub fn ground(cols: u32, rows: u32, zones: Vec<Polygon>) -> (Arc<CoverageLoop>, Arc<Router>) {
     let zones = Arc::new(NoFlyZones::new(zones));
-    let problem = AreaProblem {
+    let problem = LoopProblem {
         area: rectangle(0.0, 0.0, f64::from(cols) * LANE_M, f64::from(rows) * LANE_M),
         zones: Arc::clone(&zones),
         lane_spacing_m: LANE_M,
@@ -71,9 +72,9 @@ pub fn ground(cols: u32, rows: u32, zones: Vec<Polygon>) -> (Arc<CoverageLoop>, 
         footprint_along_m: 36.0,
         tracking_error_m: 2.0,
         launch: Point::new(-30.0, -30.0),
-        tree: skein_flight::coverage::area::Tree::default(),
+        tree: skein_flight::coverage::ring::Tree::default(),
     };
-    let coverage_loop = CoverageLoop::build(&problem).unwrap();
+    let coverage_loop = lanes::build(&problem).unwrap();
     let limits = RouteLimits {
         turn_radius_m: 23.5,
         clearance_m: CLEARANCE_M,

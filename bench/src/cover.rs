@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use skein_lab::regions::boustrophedon;
-use skein_lab::regions::{forest, free, mstc, patrol};
+use skein_lab::regions::{forest, free_entry, mstc, patrol};
 use skein_survey::regions::improve::Improver;
 use skein_survey::regions::{Cell, LaneMap, Plan, Task, TaskError, bounds, improve};
 use std::collections::BTreeMap;
@@ -196,7 +196,7 @@ fn plan(task: &Task, args: &CoverArgs) -> Plan {
         Planner::Mstc => mstc::without_backtracking(task),
         Planner::Bmstc => mstc::with_backtracking(task),
         Planner::Mfc => forest::plan(task),
-        Planner::Free => free::free_entry(task),
+        Planner::Free => free_entry::free_entry(task),
         Planner::Patrol => patrol::first_period(task),
         Planner::Exact => boustrophedon::plan(task),
         Planner::Best => best(task, args.budget_ms),

@@ -8,12 +8,12 @@ use super::stream::Stream;
 use anyhow::{Context, Result, ensure};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use skein_flight::coverage::exact::{Directions, ExactPlan, ExactProblem, plan};
+use skein_flight::coverage::passes::{Directions, PassesPlan, PassesProblem, plan};
 use skein_geometry::frame::{Origin, Point};
 use skein_geometry::{NoFlyZones, Polygon};
 use skein_interop::geojson;
 use skein_interop::place::to_plane;
-use skein_survey::passes::{Member, plan_team};
+use skein_survey::passes::{Uav, plan_team};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -48,7 +48,7 @@ pub struct ExactArgs {
     #[arg(long, default_value_t = 1, value_name = "K")]
     pub k: usize,
     /// Steps of improvement.
-    #[arg(long, default_value_t = skein_flight::coverage::exact::DEFAULT_STEPS, value_name = "N")]
+    #[arg(long, default_value_t = skein_flight::coverage::passes::DEFAULT_STEPS, value_name = "N")]
     pub steps: usize,
     /// Steps of improvement of a team's plan.
     #[arg(long, default_value_t = 20_000, value_name = "N")]
@@ -97,7 +97,7 @@ struct Answer {
 }
 
 struct Instance {
-    problem: ExactProblem,
+    problem: PassesProblem,
     zones: Vec<Vec<Point>>,
     is_field: bool,
 }
@@ -131,7 +131,7 @@ pub fn run(args: &ExactArgs) -> Result<String> {
 }
 
 struct Row {
-    best: ExactPlan,
+    best: PassesPlan,
     /// The longest tour of the team over a fair share of the work, or over the farthest
     /// pass there and back, whichever is longer. The work is the tour of one UAV, with
     /// the way out and back to the nearest pass for each UAV more.
@@ -150,12 +150,12 @@ struct Row {
 fn measure(instance: &Instance, args: &ExactArgs, seed: u64) -> Result<Row> {
     let (best, plan_us) = timed(|| plan(&instance.problem));
     let best = best?;
-    let one = plan(&ExactProblem {
+    let one = plan(&PassesProblem {
         directions: Directions::Huang,
         ..instance.problem.clone()
     })?;
-    let team = vec![Member::at(instance.problem.launch); args.k];
-    let team_problem = ExactProblem {
+    let team = vec![Uav::at(instance.problem.launch); args.k];
+    let team_problem = PassesProblem {
         steps: args.team_steps,
         ..instance.problem.clone()
     };
@@ -287,11 +287,11 @@ fn instance(
     let spacing_m = size_m / args.lanes;
     let polygons = zones.iter().map(|z| Polygon::new(z.clone()));
     let launch = Point::new(low.x - size_m / 10.0, low.y - size_m / 10.0);
-    let problem = ExactProblem {
+    let problem = PassesProblem {
         zones: Arc::new(NoFlyZones::new(polygons.collect::<Result<_, _>>()?)),
         clearance_m: spacing_m / 4.0,
         steps: args.steps,
-        ..ExactProblem::new(area, spacing_m, args.turn_radius * spacing_m, launch)
+        ..PassesProblem::new(area, spacing_m, args.turn_radius * spacing_m, launch)
     };
     Ok(Instance {
         problem,
@@ -324,7 +324,7 @@ fn to_ring_m(p: Point, ring: &[Point]) -> f64 {
 
 /// The share of random points of the area, at least the clearance from all zones, that
 /// some pass sees.
-fn seen_share(instance: &Instance, plan: &ExactPlan, samples: usize, seed: u64) -> f64 {
+fn seen_share(instance: &Instance, plan: &PassesPlan, samples: usize, seed: u64) -> f64 {
     let problem = &instance.problem;
     let (low, high) = problem.area.bounds();
     let mut dice = Stream(seed);
@@ -359,7 +359,7 @@ fn seen_share(instance: &Instance, plan: &ExactPlan, samples: usize, seed: u64) 
 }
 
 /// The least distance of a point on a pass from a zone, by steps along each pass.
-fn nearest_m(instance: &Instance, plan: &ExactPlan) -> f64 {
+fn nearest_m(instance: &Instance, plan: &PassesPlan) -> f64 {
     let mut least = f64::INFINITY;
     for pass in &plan.passes {
         for i in 0..=50 {

@@ -6,7 +6,7 @@ use super::figures::{Times, timed};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use skein_lab::regions::ring::{Robot, divide};
+use skein_lab::regions::ring::{Uav, divide};
 use skein_survey::regions::map::Router;
 use skein_survey::regions::spanning::{Tree, closed_loop, lean_loop};
 use skein_survey::regions::{Cell, LaneMap};
@@ -138,8 +138,8 @@ fn measured(args: &CoverLoopArgs, map: &LaneMap, name: Option<String>) -> Result
         order = cells;
         let n = u32::try_from(order.len())?;
         // Unevenly spread, the same in every run.
-        let robots: Vec<Robot> = (0..args.k)
-            .map(|i| Robot {
+        let robots: Vec<Uav> = (0..args.k)
+            .map(|i| Uav {
                 place: i.wrapping_mul(0x9E37_79B1) % n,
                 speed: 1,
                 endurance: u32::MAX,

@@ -4,14 +4,14 @@
 //! cover gives each UAV a tree of whole cells; it flies them in preorder, each cell's
 //! lanes to and fro. Ways are Dubins curves that heed no zone, which favours it.
 
-use skein_flight::coverage::exact::{ExactPlan, ExactProblem, Pass};
+use skein_flight::coverage::passes::{Pass, PassesPlan, PassesProblem};
 use skein_flight::trajectory::dubins;
 use skein_geometry::frame::Point;
 use skein_lab::graph::Graph;
 use skein_lab::tree_cover;
 
 /// The longest of the tours of `k` UAVs over whole cells, metres; `None` without cells.
-pub(super) fn makespan_m(problem: &ExactProblem, plan: &ExactPlan, k: usize) -> Option<f64> {
+pub(super) fn makespan_m(problem: &PassesProblem, plan: &PassesPlan, k: usize) -> Option<f64> {
     let mut places: Vec<Point> = plan.cells.iter().map(|c| centroid(&c.ring)).collect();
     let cells = places.len();
     places.resize(cells + k, problem.launch);
@@ -52,7 +52,7 @@ fn centroid(ring: &[Point]) -> Point {
 }
 
 /// Each pass to the cell that holds its middle, or to the nearest centroid.
-fn lanes_of_cells(plan: &ExactPlan, centres: &[Point]) -> Vec<Vec<Pass>> {
+fn lanes_of_cells(plan: &PassesPlan, centres: &[Point]) -> Vec<Vec<Pass>> {
     let mut lanes = vec![Vec::new(); centres.len()];
     for pass in &plan.passes {
         let middle = pass.from + (pass.to - pass.from) * 0.5;
@@ -94,7 +94,7 @@ fn to_and_fro(mut lanes: Vec<Pass>, at: Point) -> Vec<Pass> {
 }
 
 /// A flight over passes from the launch point and back, with turns, metres.
-fn length_m(flight: &[Pass], problem: &ExactProblem) -> f64 {
+fn length_m(flight: &[Pass], problem: &PassesProblem) -> f64 {
     let (Some(first), Some(last)) = (flight.first(), flight.last()) else {
         return 0.0;
     };
@@ -109,16 +109,16 @@ fn length_m(flight: &[Pass], problem: &ExactProblem) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_flight::coverage::exact::{Directions, plan};
+    use skein_flight::coverage::passes::{Directions, plan};
     use skein_geometry::Polygon;
 
     #[test]
     fn one_cell_is_flown_by_one_uav_however_many_there_are() {
         let corners = [(0.0, 0.0), (400.0, 0.0), (400.0, 200.0), (0.0, 200.0)];
         let area = Polygon::new(corners.map(|(x, y)| Point::new(x, y)).to_vec()).unwrap();
-        let problem = ExactProblem {
+        let problem = PassesProblem {
             directions: Directions::Huang,
-            ..ExactProblem::new(area, 50.0, 20.0, Point::new(0.0, 0.0))
+            ..PassesProblem::new(area, 50.0, 20.0, Point::new(0.0, 0.0))
         };
         let found = plan(&problem).unwrap();
         let alone_m = makespan_m(&problem, &found, 1).unwrap();

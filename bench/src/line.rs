@@ -4,7 +4,7 @@ use super::figures::timed;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde::Serialize;
-use skein_flight::coverage::line::{Line, Surveyor, plan};
+use skein_flight::coverage::lines::{Line, Uav, plan};
 use skein_flight::coverage::metric::{Metric, Straight};
 use skein_geometry::frame::Point;
 use std::path::{Path, PathBuf};
@@ -119,7 +119,7 @@ pub fn run(args: &LineArgs) -> Result<String> {
         None => middle(&city.at),
     }
     .context("the depot is no node of the network")?;
-    let team = vec![Surveyor::at(depot); args.k];
+    let team = vec![Uav::at(depot); args.k];
     let metric = Straight(&city.at);
     let (plan, us) = timed(|| plan(&city.lines, &team, &metric, args.steps));
     let plan = plan?;

@@ -1,7 +1,7 @@
 //! Public instances of shortest-path problems: `.mesh` files, version 2, of the
 //! Polyanya programs, and lists of queries with the reference length of each.
 
-use skein_flight::path::mesh::{Mesh, MeshError};
+use skein_flight::route::mesh::{Mesh, MeshError};
 use skein_geometry::frame::Point;
 use std::str::FromStr;
 use thiserror::Error;
@@ -210,7 +210,7 @@ pub fn read_queries(text: &str) -> Result<Vec<Query>, InstanceError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_flight::path::two_point::Search;
+    use skein_flight::route::two_point::Search;
 
     const MESH: &str = include_str!("../data/arena/arena-merged.mesh");
     const QUERIES: &str = include_str!("../data/arena/arena.ref.txt");

@@ -4,8 +4,8 @@
 //! Leaves to others: curves, and what a file's zones are.
 
 use anyhow::{Context, Result};
-use skein_flight::path::mesh::Mesh;
-use skein_flight::path::two_point::Search;
+use skein_flight::route::mesh::Mesh;
+use skein_flight::route::two_point::Search;
 use skein_geometry::frame::Point;
 use skein_geometry::offset::{Grown, Growth, Region, Zone, grow};
 

@@ -8,7 +8,7 @@ use super::lanes::{Care, Desk};
 use super::objective::Objective;
 use anyhow::Result;
 use skein_survey::fleet::sections::alike;
-use skein_survey::fleet::who::{kinds, search};
+use skein_survey::fleet::team_selection::{kinds, search};
 
 /// Teams are compared with this part of the steps.
 const SEARCH_PART: usize = 8;

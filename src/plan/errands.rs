@@ -14,8 +14,8 @@ use super::tours::{Cost, Question, TURN_RADIUS_M, TourArgs, Way, Ways};
 use anyhow::{Result, ensure};
 use clap::Args;
 use serde_json::{Map, Value, json};
-use skein_flight::coverage::line::{Line, LineError, LinePlan, Pass, Surveyor};
-use skein_survey::fleet::who::{kinds, search};
+use skein_flight::coverage::lines::{self, Line, LineError, LinePlan, Traversal};
+use skein_survey::fleet::team_selection::{kinds, search};
 use std::collections::BTreeMap;
 
 /// Teams and groups are compared with this part of the steps.
@@ -52,7 +52,7 @@ impl Wishes {
 
 /// A planner of lines or points; the last is the steps of improvement.
 pub type Solver =
-    fn(&[Line], &[Surveyor], &Cost<'_>, usize) -> std::result::Result<LinePlan, LineError>;
+    fn(&[Line], &[lines::Uav], &Cost<'_>, usize) -> std::result::Result<LinePlan, LineError>;
 
 /// Plans and returns the text to print.
 ///
@@ -85,7 +85,7 @@ struct Desk<'a> {
 #[derive(Clone, Debug, Default)]
 struct Errands {
     /// Who was planned for, with the length through the air, and by whom which passes.
-    flights: Vec<(Flight, Vec<Pass>)>,
+    flights: Vec<(Flight, Vec<Traversal>)>,
     /// Lines that nobody has the endurance for.
     unserved: Vec<usize>,
     /// No plan is faster, seconds, where that is known.
@@ -301,17 +301,17 @@ impl Desk<'_> {
     fn fly(&self, lines: &[usize], uavs: &[usize], steps: usize) -> Result<Errands> {
         let question = self.question;
         let some: Vec<Line> = lines.iter().map(|i| question.lines[*i]).collect();
-        let team: Vec<Surveyor> = uavs.iter().map(|i| question.team[*i]).collect();
+        let team: Vec<lines::Uav> = uavs.iter().map(|i| question.team[*i]).collect();
         let plan = (self.solver)(&some, &team, question.metric, steps)?;
         let base_mps = question.ways.team[0].speed_mps;
         let flights = plan.tours.into_iter().zip(uavs).map(|(tour, uav)| {
             let member = &question.ways.team[*uav];
             let depot = question.ways.at[question.ways.depots[*uav]];
-            let whole = |p: &Pass| Pass {
+            let whole = |p: &Traversal| Traversal {
                 line: lines[p.line],
                 ..*p
             };
-            let passes: Vec<Pass> = tour.passes.iter().map(whole).collect();
+            let passes: Vec<Traversal> = tour.passes.iter().map(whole).collect();
             let mut track = question.ways.track(question.around, &passes, depot);
             if passes.is_empty() {
                 track.truncate(1);
@@ -379,7 +379,8 @@ impl Errands {
             told.remove("lane_m");
             told.insert("length_m".to_owned(), json!(length_m));
             told.insert("targets".to_owned(), json!(passes.len()));
-            let pass = |p: &Pass| json!({"target": ways.ways[p.line].name, "backward": p.backward});
+            let pass =
+                |p: &Traversal| json!({"target": ways.ways[p.line].name, "backward": p.backward});
             let details = ("passes".to_owned(), passes.iter().map(pass).collect());
             Printed {
                 name: member.name.clone(),

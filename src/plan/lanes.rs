@@ -12,7 +12,7 @@ use anyhow::Result;
 use clap::ValueEnum;
 use serde_json::{Map, Value, json};
 use skein_geometry::Polygon;
-use skein_survey::fleet::sections::{self, Crew, Mate, Outcome, alike, evened, styles};
+use skein_survey::fleet::sections::{self, Crew, Outcome, Uav, alike, evened, styles};
 
 /// Ways to cut an area that are planned; they are sorted by how much they promise.
 const STYLES: usize = 3;
@@ -124,7 +124,7 @@ impl Desk<'_> {
     fn sections(&self, team: &[Flyer], groups: &[Vec<usize>], care: Care) -> Option<Flights> {
         let site = self.ground.site;
         let blocked: Vec<&Polygon> = site.holes.iter().chain(site.zones.zones()).collect();
-        let ground = sections::Ground::new(&site.area, &blocked);
+        let ground = sections::OpenArea::new(&site.area, &blocked);
         let members: Vec<Vec<Flyer>> = groups
             .iter()
             .map(|g| g.iter().map(|i| team[*i].clone()).collect())
@@ -235,7 +235,7 @@ struct Cut {
 }
 
 fn crew(members: &[Flyer]) -> Crew {
-    let mate = |f: &Flyer| Mate {
+    let mate = |f: &Flyer| Uav {
         start: f.start,
         speed_mps: f.speed_mps,
         endurance_s: f.endurance_s,
@@ -246,7 +246,7 @@ fn crew(members: &[Flyer]) -> Crew {
             .map(|f| f.swath_m)
             .fold(f64::INFINITY, f64::min),
         turn_radius_m: members.iter().map(|f| f.turn_radius_m).fold(0.0, f64::max),
-        mates: members.iter().map(mate).collect(),
+        uavs: members.iter().map(mate).collect(),
     }
 }
 

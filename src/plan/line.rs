@@ -5,7 +5,7 @@ use super::errands::{self, Solver, Wishes};
 use super::tours::{TourArgs, Way, Ways};
 use anyhow::{Context, Result};
 use clap::Args;
-use skein_flight::coverage::line::{plan, strip};
+use skein_flight::coverage::lines::{plan, strip};
 use skein_geometry::frame::Point;
 use skein_interop::targets::{LineTarget, read};
 use std::collections::BTreeMap;

@@ -20,7 +20,7 @@ use super::visit::{self, VisitArgs};
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
-use skein_flight::coverage::line::{LinePlan, Surveyor, plan};
+use skein_flight::coverage::lines::{self, LinePlan, plan};
 use skein_flight::coverage::metric::{InWind, Metric};
 use skein_geometry::frame::{Origin, Point, Vector};
 use skein_interop::place::from_plane;
@@ -128,7 +128,7 @@ fn over_targets(args: &PatrolArgs) -> Result<Course> {
         ways.solve(&args.tours, |q| {
             let (lines, metric) = (q.lines, q.metric);
             let first = lines.first().context("the file holds nothing to patrol")?;
-            let one = [Surveyor::at(first.a)];
+            let one = [lines::Uav::at(first.a)];
             Ok(if points {
                 visits::visit(lines, &one, metric, steps)?
             } else {

@@ -10,7 +10,7 @@ use super::flyers::Flyer;
 use super::site::Site;
 use anyhow::{Result, ensure};
 use serde_json::{Map, Value, json};
-use skein_flight::coverage::exact::{self, Directions, ExactError, ExactProblem};
+use skein_flight::coverage::passes::{Directions, Pass, PassesError, PassesProblem};
 use skein_geometry::Polygon;
 use skein_geometry::frame::Point;
 use skein_geometry::offset::Zone;
@@ -88,7 +88,7 @@ enum Seen {
     #[default]
     Nothing,
     Passes {
-        passes: Vec<exact::Pass>,
+        passes: Vec<Pass>,
         across_m: f64,
         along_m: f64,
     },
@@ -161,30 +161,30 @@ impl<'a> Ground<'a> {
 
     fn exact(&self, job: Job<'_>) -> Result<Part> {
         let look_ahead_m = self.look_ahead_m.unwrap_or(job.lane_m / 2.0);
-        let problem = ExactProblem {
+        let problem = PassesProblem {
             holes: self.site.holes.clone(),
             zones: self.site.zones.clone(),
             clearance_m: self.clearance_m,
             look_ahead_m,
             steps: job.steps,
             directions: self.directions,
-            ..ExactProblem::new(
+            ..PassesProblem::new(
                 job.area.clone(),
                 job.lane_m,
                 job.turn_radius_m,
                 Point::origin(),
             )
         };
-        let member = |flyer: &Flyer| passes::Member {
+        let member = |flyer: &Flyer| passes::Uav {
             speed: flyer.speed_mps * flyer.pace,
             // In the time of that pace, so that the length is the same.
             endurance: flyer.endurance_s / flyer.pace,
-            ..passes::Member::at(flyer.start)
+            ..passes::Uav::at(flyer.start)
         };
-        let members: Vec<passes::Member> = job.crew.iter().map(member).collect();
+        let members: Vec<passes::Uav> = job.crew.iter().map(member).collect();
         let plan = match plan_team(&problem, &members) {
             // A section that zones and holes fill is no work.
-            Err(ExactError::Nothing) if job.area != &self.site.area => {
+            Err(PassesError::Nothing) if job.area != &self.site.area => {
                 return Ok(Part::at_home(&job));
             }
             plan => plan?,
@@ -204,8 +204,8 @@ impl<'a> Ground<'a> {
             let properties = json!({"cell": i + 1, "area_m2": cell.area_m2});
             (cell.ring.clone(), properties)
         });
-        let passes: Vec<exact::Pass> = plan.tours.into_iter().flatten().collect();
-        let length_m = |passes: &[exact::Pass]| passes.iter().map(exact::Pass::length_m).sum();
+        let passes: Vec<Pass> = plan.tours.into_iter().flatten().collect();
+        let length_m = |passes: &[Pass]| passes.iter().map(Pass::length_m).sum();
         let (flown_m, left_m): (f64, f64) = (length_m(&passes), length_m(&plan.unserved));
         Ok(Part {
             flights,
@@ -324,7 +324,7 @@ pub fn flight(flyer: &Flyer, job: &Job<'_>, track: &[Point], length_m: f64) -> F
 }
 
 /// What lies between the beginning of the first pass and the end of the last one.
-fn lap(track: &[Point], passes: &[exact::Pass]) -> Vec<Point> {
+fn lap(track: &[Point], passes: &[Pass]) -> Vec<Point> {
     let place = |p: Point| move |q: &Point| (q - p).norm() < 1e-9;
     let from = passes
         .first()

@@ -9,7 +9,7 @@ use super::{lat_lon, map};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use serde_json::Value;
-use skein_flight::coverage::line::{Line, Pass, Surveyor};
+use skein_flight::coverage::lines::{Line, Traversal, Uav};
 use skein_flight::coverage::metric::{InWind, Matrix, Metric};
 use skein_geometry::frame::{Origin, Point, Vector};
 use skein_geometry::math::sin_cos;
@@ -78,7 +78,7 @@ pub struct TourArgs {
     #[arg(long, default_value_t = 60.0, value_name = "M")]
     pub swath_m: f64,
     /// Steps of improvement; the same steps give the same plan everywhere.
-    #[arg(long, default_value_t = skein_flight::coverage::line::DEFAULT_STEPS, value_name = "N")]
+    #[arg(long, default_value_t = skein_flight::coverage::lines::DEFAULT_STEPS, value_name = "N")]
     pub steps: usize,
     /// The form of the result.
     #[command(flatten)]
@@ -112,7 +112,7 @@ pub struct Question<'a> {
     /// The lines.
     pub lines: &'a [Line],
     /// The team.
-    pub team: &'a [Surveyor],
+    pub team: &'a [Uav],
     /// What flights cost.
     pub metric: &'a Cost<'a>,
     /// The zones that ways lead round.
@@ -295,12 +295,12 @@ impl Ways {
         } else {
             Cost::Straight(straight)
         };
-        let uav = |(m, depot): (&Member, &usize)| Surveyor {
+        let uav = |(m, depot): (&Member, &usize)| Uav {
             depot: *depot,
             speed: m.speed_mps / base_mps,
             endurance: m.endurance_s.unwrap_or(f64::INFINITY),
         };
-        let team: Vec<Surveyor> = self.team.iter().zip(&self.depots).map(uav).collect();
+        let team: Vec<Uav> = self.team.iter().zip(&self.depots).map(uav).collect();
         let found = planner(&Question {
             ways: self,
             lines: &lines,
@@ -313,7 +313,7 @@ impl Ways {
 
     /// The points flown along some ways in order, from a place and back to it.
     #[must_use]
-    pub fn track(&self, around: &Around, passes: &[Pass], depot: Point) -> Vec<Point> {
+    pub fn track(&self, around: &Around, passes: &[Traversal], depot: Point) -> Vec<Point> {
         let mut asker = around.asker();
         let mut track = vec![depot];
         let go = |track: &mut Vec<Point>, asker: &mut Asker<'_>, to: Point| {

@@ -1,9 +1,12 @@
 //! Real processes over real Zenoh on 127.0.0.1: launch, kill and takeover, cut and
-//! heal, restart, observation from Rust and from Python, and nothing left behind.
+//! heal, restart, an operator, observation, and nothing left behind. Observation from
+//! Python is a test of its own, `python`.
 //!
 //! Each test has a deadline. Trials run one after the other, because each wants the
 //! whole machine; where two are to run side by side, one test starts both.
 
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod operator;
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod support;
 
@@ -31,7 +34,6 @@ fn a_killed_uav_is_taken_over_and_observers_see_the_swarm() {
     assert_eq!(code, 4, "{said}");
     assert!(said.contains("there is no uav9"), "{said}");
     observe(&place);
-    observe_from_python(&place);
 
     let verdict = trial.verdict(DEADLINE);
     assert_eq!(verdict["passed"], true, "{verdict:#}");
@@ -78,19 +80,6 @@ fn observe(place: &Place) {
     let (code, said) = place.skein(&["observe", "--endpoint", "tcp/127.0.0.1:9", "--timeout", "1"]);
     assert_eq!(code, 4);
     assert!(said.contains("0 peers"), "{said}");
-}
-
-/// The example does the same, where Python and its two packages are.
-fn observe_from_python(place: &Place) {
-    let Some(python) = support::python() else {
-        eprintln!("python3 with zenoh and cbor2 is not here; that part is left out");
-        return;
-    };
-    let said = place.observe_py(&python, "1.5");
-    assert!(
-        said.contains("live/v1/state/") && said.contains("uav1 life"),
-        "{said}"
-    );
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Trials as processes, and looking at what they leave.
 
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -57,6 +58,10 @@ impl Place {
         (out.status.code().unwrap_or(-1), text)
     }
 
+    pub fn path(&self, name: &str) -> String {
+        self.dir.path().join(name).to_str().unwrap().to_owned()
+    }
+
     pub fn file(&self, name: &str, text: &str) -> String {
         let path = self.dir.path().join(name);
         fs::write(&path, text).unwrap();
@@ -79,39 +84,63 @@ impl Place {
         pids
     }
 
-    /// Runs the Python example on the only trial.
-    pub fn observe_py(&self, python: &str, seconds: &str) -> String {
-        let shared = fs::read_dir(self.dir.path())
-            .unwrap()
-            .flatten()
-            .find(|e| e.file_name() != "peer.json5");
-        let entry = fs::read_dir(shared.unwrap().path())
-            .unwrap()
-            .flatten()
-            .find(|e| e.path().extension().is_some_and(|x| x == "json"))
-            .unwrap();
-        let entry: Value = serde_json::from_slice(&fs::read(entry.path()).unwrap()).unwrap();
-        let script = root().join("examples/observe.py");
-        let endpoint = entry["observe"].as_str().unwrap();
-        let out = Command::new(python)
-            .arg(script)
-            .args([endpoint, seconds])
-            .output()
-            .unwrap();
-        String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr)
+    /// What other commands are told of the only trial.
+    pub fn entry(&self) -> Value {
+        let files = |dir: &Path| fs::read_dir(dir).unwrap().flatten().map(|e| e.path());
+        let shared = files(self.dir.path()).find(|p| p.is_dir()).unwrap();
+        let entry = files(&shared).find(|p| p.extension().is_some_and(|x| x == "json"));
+        serde_json::from_slice(&fs::read(entry.unwrap()).unwrap()).unwrap()
+    }
+
+    /// Observes again and again, each time for some seconds, until what was heard last
+    /// of each author is as wanted.
+    pub fn observe_until(
+        &self,
+        args: &[&str],
+        limit: Duration,
+        mut wanted: impl FnMut(&BTreeMap<u64, Value>) -> bool,
+    ) {
+        let deadline = Instant::now() + limit;
+        let mut newest = BTreeMap::new();
+        loop {
+            let observe = ["observe", "--timeout", "3", "--format", "jsonl"];
+            let (_, said) = self.skein(&[&observe, args].concat());
+            for line in said.lines() {
+                if let Ok(record) = serde_json::from_str::<Value>(line)
+                    && let Some(author) = record["author"].as_u64()
+                {
+                    newest.insert(author, record["body"].clone());
+                }
+            }
+            if wanted(&newest) {
+                return;
+            }
+            assert!(Instant::now() < deadline, "not in time: {newest:#?}");
+        }
+    }
+
+    /// Starts a peer of its own, without a trial.
+    pub fn peer(&self, name: &str, config: &Value) -> Peer {
+        let file = self.file(name, &config.to_string());
+        let mut command = self.command(&["peer", "--config", &file]);
+        Peer(command.spawn().unwrap())
     }
 }
 
-/// A Python that has what the example needs.
-pub fn python() -> Option<String> {
-    let works = |p: &&str| {
-        let out = Command::new(p).args(["-c", "import zenoh, cbor2"]).output();
-        out.is_ok_and(|o| o.status.success())
-    };
-    ["python3", "python"]
-        .iter()
-        .find(|p| works(p))
-        .map(|p| (*p).to_owned())
+/// A running `skein peer`.
+pub struct Peer(Child);
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A port that was free a moment ago.
+pub fn free_port() -> u16 {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    listener.local_addr().unwrap().port()
 }
 
 /// A running `skein trial`.

@@ -8,8 +8,8 @@ use crate::percept::Percept;
 use crate::reactive::follow::fly;
 use crate::setpoint::Steer;
 use skein_flight::airframe::Airframe;
-use skein_flight::coverage::area::CoverageLoop;
-use skein_flight::coverage::area::patch::frame_holds;
+use skein_flight::coverage::ring::CoverageLoop;
+use skein_flight::coverage::ring::patch::frame_holds;
 use skein_geometry::frame::Pose;
 use skein_geometry::math::wrap_pi;
 

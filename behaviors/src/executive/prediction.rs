@@ -6,8 +6,8 @@
 use super::transit::{CellVisit, Move, Place};
 use super::{Executive, Forecast, Kind};
 use crate::percept::Percept;
-use skein_flight::coverage::area::Direction;
-use skein_flight::coverage::area::backtracking::Leg;
+use skein_flight::coverage::ring::Direction;
+use skein_flight::coverage::ring::backtracking::Leg;
 use skein_flight::trajectory::wind::Course;
 use skein_geometry::frame::Point;
 use skein_geometry::math::{PI, atan2};

@@ -5,7 +5,7 @@
 
 use super::transit::{CellVisit, Place};
 use super::{Aim, Executive, Goal, Kind, Stretch};
-use skein_flight::coverage::area::backtracking::Leg;
+use skein_flight::coverage::ring::backtracking::Leg;
 use std::collections::VecDeque;
 
 impl Executive {

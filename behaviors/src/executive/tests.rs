@@ -103,7 +103,7 @@ impl Story {
     }
 
     /// Some pose truly flown since the percept before had all of the cell in frame.
-    fn assert_truly_seen(&self, id: skein_flight::coverage::area::CellId) {
+    fn assert_truly_seen(&self, id: skein_flight::coverage::ring::CellId) {
         let (w, s) = (f64::from(id.col) * LANE_M, f64::from(id.row) * LANE_M);
         let corners = [
             (w, s),

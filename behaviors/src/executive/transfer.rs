@@ -11,8 +11,8 @@
 //! ground for distance, of cruise for energy.
 
 use super::transit::Transit;
-use skein_flight::coverage::area::Direction;
-use skein_flight::path::RouteError;
+use skein_flight::coverage::ring::Direction;
+use skein_flight::route::RouteError;
 use skein_flight::trajectory::Trajectory;
 use skein_flight::trajectory::timed::{Airspeeds, Flight, Objective};
 use skein_flight::trajectory::wind::{Course, Performance, turn_round_s};

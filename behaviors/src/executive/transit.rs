@@ -6,8 +6,8 @@
 
 use crate::reactive::air::Air;
 use skein_flight::airframe::Airframe;
-use skein_flight::coverage::area::{CoverageLoop, Direction};
-use skein_flight::path::{RouteError, Router};
+use skein_flight::coverage::ring::{CoverageLoop, Direction};
+use skein_flight::route::{RouteError, Router};
 use skein_flight::trajectory::timed::Objective;
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::TAU;

@@ -8,7 +8,7 @@
 //!
 //! After the scenario's name or file, a seed may follow.
 
-use skein_flight::coverage::area::CoverageLoop;
+use skein_flight::coverage::ring::CoverageLoop;
 use skein_geometry::Polygon;
 use skein_geometry::frame::Point;
 use skein_netsim::Prepared;

@@ -7,7 +7,7 @@
 
 use crate::flight_model::loop_energy_s;
 use skein_flight::airframe::Airframe;
-use skein_flight::coverage::area::{CoverageLoop, Tree};
+use skein_flight::coverage::ring::{CoverageLoop, Tree};
 use skein_flight::trajectory::wind::Wind;
 use skein_peer::Mission;
 use skein_peer::offload::MissionGeometry;

@@ -3,10 +3,10 @@
 
 use crate::error::{Finding, Severity};
 use crate::flight_model::{Pace, return_s, too_windy};
-use skein_flight::coverage::area::backtracking::{Division, RingCell, Robot, divide};
-use skein_flight::coverage::area::patch::Patches;
-use skein_flight::coverage::area::{CellId, CoverageLoop, Direction, Grid, LoopError};
-use skein_flight::coverage::exact::ExactError;
+use skein_flight::coverage::passes::PassesError;
+use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav, divide};
+use skein_flight::coverage::ring::patch::Patches;
+use skein_flight::coverage::ring::{CellId, CoverageLoop, Direction, Grid, LoopError};
 use skein_geometry::Polygon;
 use skein_geometry::frame::Point;
 use skein_netsim::fault::Fault;
@@ -67,11 +67,11 @@ pub(crate) fn blamed(e: &GeometryError) -> &'static str {
             LoopError::Extent => "area",
             LoopError::Number(_) => "lanes",
             LoopError::CutOff | LoopError::Launch => "base",
-            LoopError::Exact(e) => match e {
-                ExactError::TooMany => "lanes.spacing_m",
-                ExactError::Zones(_) | ExactError::Nothing => "no_fly",
-                ExactError::Launch => "base",
-                ExactError::Number(_) | ExactError::Team(_) => "lanes",
+            LoopError::Passes(e) => match e {
+                PassesError::TooMany => "lanes.spacing_m",
+                PassesError::Zones(_) | PassesError::Nothing => "no_fly",
+                PassesError::Launch => "base",
+                PassesError::Number(_) | PassesError::Team(_) => "lanes",
             },
         },
     }
@@ -361,11 +361,11 @@ fn failure_free(spec: &Spec, the_loop: &CoverageLoop) -> Division {
             open: c.needed,
         })
         .collect();
-    let robots: Vec<Robot> = spec.uavs.iter().map(|u| robot(u, spec, the_loop)).collect();
+    let robots: Vec<Uav> = spec.uavs.iter().map(|u| robot(u, spec, the_loop)).collect();
     divide(&ring, &robots)
 }
 
-fn robot(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Robot {
+fn robot(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Uav {
     let here = u.launch.position();
     let gap_m = |i: usize| (the_loop.boundary(i).position() - here).norm();
     let anchor = (0..the_loop.len())
@@ -380,7 +380,7 @@ fn robot(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Robot {
     let release_s = gap_m(anchor) / pace.least_mps.max(0.0);
     let kept_s = u.airframe.reserve_s + return_s(&pace, spec, the_loop);
     let usable_s = u.airframe.endurance_s - kept_s - release_s;
-    Robot {
+    Uav {
         anchor: u16::try_from(anchor).unwrap_or(0),
         id: u.id,
         heading: if ahead {

@@ -5,7 +5,7 @@
 //! Estimates for feasibility; what is flown is the executive's.
 
 use skein_flight::airframe::Airframe;
-use skein_flight::coverage::area::{CoverageLoop, Direction};
+use skein_flight::coverage::ring::{CoverageLoop, Direction};
 use skein_flight::trajectory::Trajectory;
 use skein_flight::trajectory::wind::{Performance, Wind, turn_round_s};
 use skein_netsim::spec::{Spec, UavSpec};

@@ -9,7 +9,7 @@ use crate::fault::{Fault, TimedFault};
 use crate::prepared::Prepared;
 use crate::world::World;
 use skein_behaviors::{Event, Executive, Goal};
-use skein_flight::coverage::area::backtracking::{Leg, RingCell, Robot, divide};
+use skein_flight::coverage::ring::backtracking::{Leg, RingCell, Uav, divide};
 use skein_peer::offload::MissionGeometry;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -215,7 +215,7 @@ impl<'a> Baseline<'a> {
                 });
             }
             first.insert(u.id, legs);
-            robots.push(Robot {
+            robots.push(Uav {
                 anchor: forecast.anchor,
                 id: u.id,
                 heading: forecast.heading,

@@ -10,9 +10,9 @@ use crate::frame::Point;
 
 /// Gathers words into 64 bits.
 #[derive(Clone, Copy, Debug)]
-pub struct Content(u64);
+pub struct Fingerprint(u64);
 
-impl Content {
+impl Fingerprint {
     /// Begins with the kind of the structure, so that no two kinds agree.
     #[must_use]
     pub fn of(kind: &str) -> Self {

@@ -10,7 +10,7 @@
 //! | [`math`] | the only source of transcendental functions | |
 //! | [`polygon`] | simple polygons, valid by construction; exact orientation | 2.3.1 |
 //! | [`curve`] | lines and arcs joined tangentially | 2.4 |
-//! | [`zones`] | exact clearance of points and curves from no-fly zones | 2.3.1 |
+//! | [`clearance`] | exact clearance of points and curves from no-fly zones | 2.3.1 |
 //! | [`offset`] | zones grown by a safety radius, with a certificate | 2.3.1 |
 //! | [`random`] | the seeded pseudo-random stream | |
 //! | [`fingerprint`] | a hash by which two processes compare what they have built | |
@@ -25,6 +25,7 @@
 //! # Ok::<(), skein_geometry::PolygonError>(())
 //! ```
 
+pub mod clearance;
 pub mod curve;
 mod distance;
 pub mod fingerprint;
@@ -33,8 +34,7 @@ pub mod math;
 pub mod offset;
 pub mod polygon;
 pub mod random;
-pub mod zones;
 
+pub use clearance::{NoFlyZones, contingency_clear};
 pub use curve::{Curve, Segment};
 pub use polygon::{Polygon, PolygonError};
-pub use zones::{NoFlyZones, contingency_clear};

@@ -5,7 +5,7 @@
 //! tangent polygons, so the outline is never nearer than the radius; a certificate
 //! checks that for every answer and nothing is handed out without it. [`grow_exact`]
 //! keeps the arcs, for routes that turn with the radius itself. Curves are
-//! measured against the zones as they are in [`super::zones`].
+//! measured against the zones as they are in [`super::clearance`].
 //!
 //! # Guarantees
 //! Every point nearer than `radius_m` to a zone is inside a region. No vertex of a

@@ -2,7 +2,7 @@
 //!
 //! Orientation tests are exact (adaptive predicates), so "simple" and "contains"
 //! mean the same on every machine and for every near-degenerate ring. Offsets
-//! and distances to curves are in [`super::zones`].
+//! and distances to curves are in [`super::clearance`].
 
 use crate::frame::Point;
 use robust::{Coord, orient2d};

@@ -3,9 +3,9 @@
 
 /// Weyl sequence with a mixing step.
 #[derive(Clone, Copy, Debug)]
-pub struct Dice(u64);
+pub struct SplitMix64(u64);
 
-impl Dice {
+impl SplitMix64 {
     /// The stream of a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {

@@ -2,7 +2,7 @@
 //! shortest ways, rooted trees.
 
 use core::cmp::Reverse;
-use skein_flight::coverage::line::Parts;
+use skein_flight::coverage::lines::Parts;
 use skein_flight::coverage::metric::Metric;
 use std::collections::BinaryHeap;
 

@@ -19,8 +19,8 @@ mod route_tests;
 
 #[cfg(test)]
 mod tests {
-    use skein_flight::path::continuous::PathMap;
-    use skein_flight::path::mesh::Mesh;
+    use skein_flight::route::continuous::PathMap;
+    use skein_flight::route::mesh::Mesh;
     use skein_geometry::frame::Point;
     use skein_survey::visibility::VisibilityGraph;
 

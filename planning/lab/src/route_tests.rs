@@ -1,7 +1,7 @@
 //! Routes against the visibility graph: an oracle that shares nothing with the router.
 
 use proptest::prelude::*;
-use skein_flight::path::{RouteLimits, Router};
+use skein_flight::route::{RouteLimits, Router};
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::TAU;
 use skein_geometry::offset::{Growth, Zone, grow};

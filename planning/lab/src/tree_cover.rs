@@ -368,14 +368,14 @@ pub fn around_tree(tree: &CoverTree, start: usize, metric: &impl Metric) -> Tour
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_geometry::random::Dice;
+    use skein_geometry::random::SplitMix64;
 
-    fn random_graph(dice: &mut Dice, n: usize, share: f64) -> Graph {
+    fn random_graph(random: &mut SplitMix64, n: usize, share: f64) -> Graph {
         let mut edges = Vec::new();
         for a in 0..n {
             for b in a + 1..n {
-                if dice.unit() < share {
-                    edges.push((a, b, 1.0 + dice.below(20) as f64));
+                if random.unit() < share {
+                    edges.push((a, b, 1.0 + random.below(20) as f64));
                 }
             }
         }
@@ -475,15 +475,15 @@ mod tests {
 
     #[test]
     fn rooted_covers_keep_their_factor_and_failures_prove_their_bound() {
-        let mut dice = Dice::new(21);
+        let mut random = SplitMix64::new(21);
         let (mut solved, mut failed, mut worst) = (0, 0, 0.0f64);
         for _ in 0..150 {
-            let n = 4 + dice.below(4);
-            let share = 0.35 + 0.6 * dice.unit();
-            let g = random_graph(&mut dice, n, share);
+            let n = 4 + random.below(4);
+            let share = 0.35 + 0.6 * random.unit();
+            let g = random_graph(&mut random, n, share);
             let mut all: Vec<usize> = (0..n).collect();
-            dice.shuffle(&mut all);
-            let roots = &all[..1 + dice.below(3)];
+            random.shuffle(&mut all);
+            let roots = &all[..1 + random.below(3)];
             let fixed: Vec<usize> = roots.iter().map(|&r| 1 << r).collect();
             let best = oracle(&g, &fixed);
             let Some(cover) = rooted(&g, roots) else {
@@ -517,13 +517,13 @@ mod tests {
 
     #[test]
     fn unrooted_covers_keep_their_factor_and_failures_prove_their_bound() {
-        let mut dice = Dice::new(22);
+        let mut random = SplitMix64::new(22);
         let (mut solved, mut failed) = (0, 0);
         for _ in 0..150 {
-            let n = 4 + dice.below(4);
-            let share = 0.25 + 0.6 * dice.unit();
-            let g = random_graph(&mut dice, n, share);
-            let k = 1 + dice.below(3);
+            let n = 4 + random.below(4);
+            let share = 0.25 + 0.6 * random.unit();
+            let g = random_graph(&mut random, n, share);
+            let k = 1 + random.below(3);
             let best = oracle(&g, &vec![0; k]);
             let Some(cover) = unrooted(&g, k) else {
                 assert!(best.is_infinite());

@@ -5,11 +5,11 @@
 //! UAV's fair share are cut. Each tour begins and ends at its UAV's launch point, and the
 //! longest time counts, at each UAV's own speed.
 
-use skein_flight::coverage::exact::{
-    CellPlan, ExactError, ExactProblem, Layout, NEAR_TURNS, Pass, Places, in_order, lines, track,
-};
-use skein_flight::coverage::line::{self, LineError, LineTour, Surveyor, tour_cost};
+use skein_flight::coverage::lines::{self, LineError, LineTour, tour_cost};
 use skein_flight::coverage::metric::{Matrix, Metric};
+use skein_flight::coverage::passes::{
+    CellPlan, Layout, NEAR_TURNS, Pass, PassesError, PassesProblem, Places, in_order, lines, track,
+};
 use skein_geometry::frame::Point;
 
 /// A pass is cut when it is longer than this share of what each UAV has to fly.
@@ -23,7 +23,7 @@ const MOST_UAVS: usize = 1_000;
 
 /// One UAV of the team.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Member {
+pub struct Uav {
     /// Where it begins and ends.
     pub launch: Point,
     /// Its speed, metres a unit of time; above zero.
@@ -32,7 +32,7 @@ pub struct Member {
     pub endurance: f64,
 }
 
-impl Member {
+impl Uav {
     /// A UAV of unit speed, so that times are lengths, without a limit.
     #[must_use]
     pub fn at(launch: Point) -> Self {
@@ -73,20 +73,20 @@ pub struct TeamPlan {
 /// short; `problem.launch` is not used.
 ///
 /// # Guarantees
-/// As [`skein_flight::coverage::exact::plan`]; every pass is in one tour or in `unserved`, and no tour is longer
+/// As [`skein_flight::coverage::passes::plan`]; every pass is in one tour or in `unserved`, and no tour is longer
 /// than its UAV's endurance.
 ///
 /// # Complexity
-/// As [`skein_flight::coverage::exact::plan`], with O(k) for each pass that is moved in a step of improvement.
+/// As [`skein_flight::coverage::passes::plan`], with O(k) for each pass that is moved in a step of improvement.
 ///
 /// # Errors
-/// [`ExactError`]; nothing is planned then.
-pub fn plan_team(problem: &ExactProblem, team: &[Member]) -> Result<TeamPlan, ExactError> {
+/// [`PassesError`]; nothing is planned then.
+pub fn plan_team(problem: &PassesProblem, team: &[Uav]) -> Result<TeamPlan, PassesError> {
     if team.is_empty() {
-        return Err(ExactError::Team(LineError::NoTeam));
+        return Err(PassesError::Team(LineError::NoTeam));
     }
     if team.len() > MOST_UAVS {
-        return Err(ExactError::Number("number of UAVs"));
+        return Err(PassesError::Number("number of UAVs"));
     }
     let mut launches: Vec<Point> = Vec::new();
     let mut from = Vec::with_capacity(team.len());
@@ -101,7 +101,7 @@ pub fn plan_team(problem: &ExactProblem, team: &[Member]) -> Result<TeamPlan, Ex
     }
     let finite = |p: &Point| p.x.is_finite() && p.y.is_finite();
     if !launches.iter().all(finite) {
-        return Err(ExactError::Number("launch point"));
+        return Err(PassesError::Number("launch point"));
     }
     let mut layout = Layout::new(problem)?;
     cut(&mut layout.passes, team.len(), problem.shortest_pass_m);
@@ -111,25 +111,25 @@ pub fn plan_team(problem: &ExactProblem, team: &[Member]) -> Result<TeamPlan, Ex
     let near_m = NEAR_TURNS * problem.turn_m();
     let guessed = Matrix::of(first + launches.len(), &|a, b| places.guess_m(a, b, near_m));
     let lines = lines(&layout.passes);
-    let uavs: Vec<Surveyor> = team
+    let uavs: Vec<lines::Uav> = team
         .iter()
         .zip(&from)
-        .map(|(m, launch)| Surveyor {
+        .map(|(m, launch)| lines::Uav {
             speed: m.speed,
             endurance: m.endurance,
-            ..Surveyor::at(first + launch)
+            ..lines::Uav::at(first + launch)
         })
         .collect();
-    let mut found = line::plan(&lines, &uavs, &guessed, problem.steps)?;
+    let mut found = lines::plan(&lines, &uavs, &guessed, problem.steps)?;
     let time =
-        |(t, u): (&LineTour, &Surveyor)| tour_cost(&t.passes, &lines, u.depot, &places) / u.speed;
-    let too_long = |(t, u): (&LineTour, &Surveyor)| time((t, u)) > u.endurance;
+        |(t, u): (&LineTour, &lines::Uav)| tour_cost(&t.passes, &lines, u.depot, &places) / u.speed;
+    let too_long = |(t, u): (&LineTour, &lines::Uav)| time((t, u)) > u.endurance;
     if found.tours.iter().zip(&uavs).any(too_long) {
         // A guess was too short where endurance is: here every way counts as it is.
         let costs = Matrix::of(first + launches.len(), &places);
-        found = line::plan(&lines, &uavs, &costs, problem.steps)?;
+        found = lines::plan(&lines, &uavs, &costs, problem.steps)?;
     }
-    let reach = |i: usize, uav: &Surveyor| {
+    let reach = |i: usize, uav: &lines::Uav| {
         let (a, b) = (2 * i, 2 * i + 1);
         // Ways from and to launch points are never guessed.
         let way = guessed.cost(uav.depot, a) + lines[i].cost[0] + guessed.cost(b, uav.depot);
@@ -139,7 +139,8 @@ pub fn plan_team(problem: &ExactProblem, team: &[Member]) -> Result<TeamPlan, Ex
         let times = uavs.iter().map(|u| reach(i, u));
         times.fold(f64::INFINITY, f64::min)
     };
-    let length_m = |(t, u): (&LineTour, &Surveyor)| tour_cost(&t.passes, &lines, u.depot, &places);
+    let length_m =
+        |(t, u): (&LineTour, &lines::Uav)| tour_cost(&t.passes, &lines, u.depot, &places);
     let passes = |t: &LineTour| in_order(&layout.passes, &t.passes);
     let tours: Vec<Vec<Pass>> = found.tours.iter().map(passes).collect();
     let flights = tours.iter().zip(team);
@@ -178,7 +179,7 @@ fn cut(passes: &mut Vec<Pass>, k: usize, shortest_m: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_flight::coverage::exact::plan;
+    use skein_flight::coverage::passes::plan;
     use skein_geometry::polygon::point_to_line_m;
     use skein_geometry::{NoFlyZones, Polygon};
     use std::sync::Arc;
@@ -196,17 +197,17 @@ mod tests {
         ])
     }
 
-    fn problem(area: Polygon, zones: Vec<Polygon>) -> ExactProblem {
-        ExactProblem {
+    fn problem(area: Polygon, zones: Vec<Polygon>) -> PassesProblem {
+        PassesProblem {
             zones: Arc::new(NoFlyZones::new(zones)),
             clearance_m: 5.0,
             steps: 200,
-            ..ExactProblem::new(area, 20.0, 10.0, Point::new(-400.0, -400.0))
+            ..PassesProblem::new(area, 20.0, 10.0, Point::new(-400.0, -400.0))
         }
     }
 
     /// The share of a grid of points, of those to be seen, that no pass sees.
-    fn unseen(problem: &ExactProblem, passes: &[Pass]) -> f64 {
+    fn unseen(problem: &PassesProblem, passes: &[Pass]) -> f64 {
         let (low, high) = problem.area.bounds();
         let (mut unseen, mut all) = (0u32, 0u32);
         for i in 0..150 {
@@ -245,7 +246,7 @@ mod tests {
         let alone = plan(&p).unwrap();
         let (mut before, mut farthest) = (f64::INFINITY, 0.0);
         for k in [1, 2, 3, 5, 8, 16, 40] {
-            let team = vec![Member::at(p.launch); k];
+            let team = vec![Uav::at(p.launch); k];
             let found = plan_team(&p, &team).unwrap();
             assert!(found.unserved.is_empty() && found.tours.len() == k);
             let flown: f64 = found.tours.iter().flatten().map(Pass::length_m).sum();
@@ -263,19 +264,19 @@ mod tests {
     fn a_faster_uav_gets_more_and_endurance_is_kept() {
         let mut p = problem(square(0.0, 0.0, 160.0), vec![square(0.0, 0.0, 25.0)]);
         p.steps = 2_000;
-        let slow = Member::at(p.launch);
-        let fast = Member { speed: 3.0, ..slow };
+        let slow = Uav::at(p.launch);
+        let fast = Uav { speed: 3.0, ..slow };
         let found = plan_team(&p, &[slow, fast]).unwrap();
         assert!(found.lengths_m[1] > 2.0 * found.lengths_m[0]);
-        let tired = Member {
+        let tired = Uav {
             endurance: 2_500.0,
             ..slow
         };
         let found = plan_team(&p, &[tired; 2]).unwrap();
         assert!(!found.unserved.is_empty() && found.makespan <= 2_500.0 + 1e-9);
         assert!(plan_team(&p, &[]).is_err());
-        let nowhere = Member::at(Point::new(f64::NAN, 0.0));
+        let nowhere = Uav::at(Point::new(f64::NAN, 0.0));
         assert!(plan_team(&p, &[nowhere]).is_err());
-        assert!(plan_team(&p, &[Member { speed: 0.0, ..slow }]).is_err());
+        assert!(plan_team(&p, &[Uav { speed: 0.0, ..slow }]).is_err());
     }
 }

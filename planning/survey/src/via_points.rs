@@ -4,7 +4,7 @@
 //! whole is made of shortest legs.
 
 use crate::visibility::VisibilityGraph;
-use skein_flight::path::two_point::Search;
+use skein_flight::route::two_point::Search;
 use skein_geometry::frame::Point;
 use thiserror::Error;
 
@@ -49,7 +49,7 @@ fn join(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_flight::path::mesh::Mesh;
+    use skein_flight::route::mesh::Mesh;
 
     fn square(x: f64, y: f64, side: f64) -> Vec<Point> {
         [(x, y), (x + side, y), (x + side, y + side), (x, y + side)]

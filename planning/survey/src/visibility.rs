@@ -15,7 +15,7 @@ mod tests;
 
 use obstacles::{Obstacles, index};
 use skein_geometry::Polygon;
-use skein_geometry::fingerprint::Content;
+use skein_geometry::fingerprint::Fingerprint;
 use skein_geometry::frame::Point;
 use skein_geometry::offset::Region;
 use skein_geometry::polygon::{MAX_COORDINATE_M, side};
@@ -114,7 +114,7 @@ impl VisibilityGraph {
     #[must_use]
     pub fn content_hash(&self) -> u64 {
         let corners = self.corners.iter().copied();
-        let mut content = Content::of("graph")
+        let mut content = Fingerprint::of("graph")
             .with_indices(corners)
             .with_indices(self.begins.iter().copied());
         for &p in &self.obstacles.vertices {

@@ -5,8 +5,8 @@
 //! coverage does the work. A point with a radius is a line too: one pass over it, or a
 //! small sweep.
 
-use skein_flight::coverage::line::{
-    Line, LineError, LinePlan, Pass, Surveyor, improved, shared_time,
+use skein_flight::coverage::lines::{
+    Line, LineError, LinePlan, Traversal, Uav, improved, shared_time,
 };
 use skein_flight::coverage::metric::Metric;
 use skein_flight::coverage::tour::{spanning_tree, tour};
@@ -21,7 +21,7 @@ const DISTANCES: usize = 8;
 ///
 /// A target is a [`Line`]: a place to fly over is `Line::new(p, p, 0.0)`, a small sweep
 /// goes from its first to its last point (see [`look_at`]). `metric` and `steps` as in
-/// [`skein_flight::coverage::line::plan`].
+/// [`skein_flight::coverage::lines::plan`].
 ///
 /// # Guarantees
 /// Each target in exactly one tour or in `unserved`, every tour within its UAV's
@@ -32,7 +32,7 @@ const DISTANCES: usize = 8;
 /// [`LineError`] when there is nobody to fly, or a figure is no sensible number.
 pub fn visit(
     targets: &[Line],
-    team: &[Surveyor],
+    team: &[Uav],
     metric: &impl Metric,
     steps: usize,
 ) -> Result<LinePlan, LineError> {
@@ -46,7 +46,7 @@ pub fn visit(
 }
 
 /// All targets in one tour from the first depot.
-fn giant(targets: &[Line], team: &[Surveyor], metric: &impl Metric) -> Vec<Pass> {
+fn giant(targets: &[Line], team: &[Uav], metric: &impl Metric) -> Vec<Traversal> {
     let Some(first) = team.first() else {
         return Vec::new();
     };
@@ -72,7 +72,7 @@ fn giant(targets: &[Line], team: &[Surveyor], metric: &impl Metric) -> Vec<Pass>
         let l = targets[i - 1];
         let backward = metric.cost(at, l.b) < metric.cost(at, l.a);
         at = if backward { l.a } else { l.b };
-        passes.push(Pass {
+        passes.push(Traversal {
             line: i - 1,
             backward,
         });
@@ -85,7 +85,7 @@ fn giant(targets: &[Line], team: &[Surveyor], metric: &impl Metric) -> Vec<Pass>
 /// Somebody flies to each target and back. And whoever works beyond `d` from the depots
 /// spends `2 d` on the way; the flights beyond `d` together with what lies within join
 /// all targets, so they are at least a spanning tree.
-fn bound(targets: &[Line], team: &[Surveyor], metric: &impl Metric) -> f64 {
+fn bound(targets: &[Line], team: &[Uav], metric: &impl Metric) -> f64 {
     let mut depots: Vec<usize> = team.iter().map(|u| u.depot).collect();
     depots.sort_unstable();
     depots.dedup();
@@ -182,10 +182,10 @@ pub fn look_at(centre: Point, radius_m: f64, swath_m: f64, heading_rad: f64) -> 
 mod tests {
     use super::*;
     use skein_flight::coverage::metric::Straight;
-    use skein_geometry::random::Dice;
+    use skein_geometry::random::SplitMix64;
 
     /// The least makespan of closed tours through all points.
-    fn oracle(n: usize, team: &[Surveyor], m: &impl Metric) -> f64 {
+    fn oracle(n: usize, team: &[Uav], m: &impl Metric) -> f64 {
         let full = 1usize << n;
         let tours = |depot: usize| {
             let mut best = vec![vec![f64::INFINITY; n]; full];
@@ -229,19 +229,19 @@ mod tests {
 
     #[test]
     fn teams_come_close_to_the_least_makespan() {
-        let mut dice = Dice::new(41);
+        let mut random = SplitMix64::new(41);
         let (mut sum, mut worst, rounds) = (0.0, 0.0f64, 60);
         for round in 0..rounds {
             let n = 7;
             let at: Vec<Point> = (0..n + 2)
-                .map(|_| Point::new(1000.0 * dice.unit(), 1000.0 * dice.unit()))
+                .map(|_| Point::new(1000.0 * random.unit(), 1000.0 * random.unit()))
                 .collect();
             let m = Straight(&at);
-            let k = 1 + dice.below(3);
-            let team: Vec<Surveyor> = (0..k)
-                .map(|i| Surveyor {
+            let k = 1 + random.below(3);
+            let team: Vec<Uav> = (0..k)
+                .map(|i| Uav {
                     speed: if round % 3 == 0 { 1.0 + i as f64 } else { 1.0 },
-                    ..Surveyor::at(n + if round % 2 == 0 { i % 2 } else { 0 })
+                    ..Uav::at(n + if round % 2 == 0 { i % 2 } else { 0 })
                 })
                 .collect();
             let targets: Vec<Line> = (0..n).map(|p| Line::new(p, p, 0.0)).collect();
@@ -300,7 +300,7 @@ mod tests {
         let at = [Point::origin()];
         let m = Straight(&at);
         assert_eq!(visit(&[], &[], &m, 10), Err(LineError::NoTeam));
-        let idle = visit(&[], &[Surveyor::at(0)], &m, 10).unwrap();
+        let idle = visit(&[], &[Uav::at(0)], &m, 10).unwrap();
         assert!(idle.makespan.abs() < 1e-12);
     }
 }

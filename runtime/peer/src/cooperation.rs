@@ -25,8 +25,8 @@ use crate::protocol::runs::PlannedCell;
 use crate::protocol::sections::LivePeers;
 use crate::wire::message::{Bid, Epoch, Member, Order};
 use skein_behaviors::{Event, Goal, Percept};
-use skein_flight::coverage::area::Direction;
-use skein_flight::coverage::area::backtracking::{Division, Leg};
+use skein_flight::coverage::ring::Direction;
+use skein_flight::coverage::ring::backtracking::{Division, Leg};
 use std::sync::Arc;
 
 /// Most bytes of the union in a bid: a bid must stay short on the air, and a

@@ -4,11 +4,12 @@ use crate::offload::MissionGeometry;
 use crate::task::CoverageTask;
 use crate::wire::message::MissionChunk;
 use serde::{Deserialize, Serialize};
-use skein_flight::coverage::area::patch::Corners;
-use skein_flight::coverage::area::{AreaProblem, CoverageLoop, LoopError, Tree};
-use skein_flight::coverage::exact::{self, ExactProblem};
+use skein_flight::coverage::lanes;
+use skein_flight::coverage::passes::{self, PassesProblem};
+use skein_flight::coverage::ring::patch::Corners;
+use skein_flight::coverage::ring::{CoverageLoop, LoopError, LoopProblem, Tree};
 use skein_flight::coverage::stations::{self, StationsProblem};
-use skein_flight::path::{RouteLimits, Router};
+use skein_flight::route::{RouteLimits, Router};
 use skein_geometry::frame::Point;
 use skein_geometry::{NoFlyZones, Polygon, PolygonError};
 use std::collections::BTreeMap;
@@ -254,7 +255,7 @@ impl Mission {
             zones.push(Polygon::new(zone).map_err(|e| GeometryError::Zone(i, e))?);
         }
         let zones = Arc::new(NoFlyZones::new(zones));
-        let problem = AreaProblem {
+        let problem = LoopProblem {
             area,
             zones: Arc::clone(&zones),
             lane_spacing_m: self.lane_m(),
@@ -279,19 +280,19 @@ impl Mission {
         }))
     }
 
-    fn the_loop(&self, problem: &AreaProblem) -> Result<CoverageLoop, LoopError> {
+    fn the_loop(&self, problem: &LoopProblem) -> Result<CoverageLoop, LoopError> {
         if self.task.is_area() {
-            return CoverageLoop::build(problem);
+            return lanes::build(problem);
         }
         let stations = if let Some(targets) = self.task.targets() {
             StationsProblem::of_targets(problem, &targets)
         } else {
-            let passes = exact::plan(&ExactProblem {
+            let passes = passes::plan(&PassesProblem {
                 zones: Arc::clone(&problem.zones),
                 clearance_m: problem.clearance_m,
                 // What the camera sees beyond the ends of a pass is left for the turns.
                 look_ahead_m: 0.0,
-                ..ExactProblem::new(
+                ..PassesProblem::new(
                     problem.area.clone(),
                     problem.lane_spacing_m,
                     problem.turn_radius_m,

@@ -13,7 +13,7 @@ use crate::protocol::life;
 use crate::protocol::sections::LivePeers;
 use crate::wire::message::{Behaviour, Claim, Member, MissionStatus};
 use skein_behaviors::{Executive, Goal, Percept};
-use skein_flight::coverage::area::CoverageLoop;
+use skein_flight::coverage::ring::CoverageLoop;
 use std::sync::Arc;
 
 /// What a peer has once it holds a mission and its common ground.

@@ -2,9 +2,9 @@
 //! computed by the driver with [`run`], answered by an input.
 
 use crate::mission::{GeometryError, Mission};
-use skein_flight::coverage::area::CoverageLoop;
-use skein_flight::coverage::area::backtracking::{Division, RingCell, Robot, divide};
-use skein_flight::path::Router;
+use skein_flight::coverage::ring::CoverageLoop;
+use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav, divide};
+use skein_flight::route::Router;
 use std::sync::Arc;
 
 /// What every UAV of a mission derives from it: the loop and the routes.
@@ -29,7 +29,7 @@ pub enum Job {
         /// The loop's cells.
         ring: Vec<RingCell>,
         /// The members of the round.
-        robots: Vec<Robot>,
+        robots: Vec<Uav>,
     },
 }
 

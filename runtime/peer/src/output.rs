@@ -4,7 +4,7 @@ use crate::offload::Job;
 use crate::{Incarnation, PeerId};
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Setpoint;
-use skein_flight::coverage::area::backtracking::Leg;
+use skein_flight::coverage::ring::backtracking::Leg;
 
 /// One thing to do. Drain them all after each input.
 #[derive(Clone, Debug)]

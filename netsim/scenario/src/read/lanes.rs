@@ -1,7 +1,7 @@
 //! The lanes of a scenario: how far apart, how clear of zones, and which spanning tree they
 //! follow. Leaves choosing a tree where none is stated to `choose_tree`.
 
-use skein_flight::coverage::area::Tree;
+use skein_flight::coverage::ring::Tree;
 use skein_interop::json::{Error, Fields, Node};
 
 /// What a scenario says of its lanes, in metres.

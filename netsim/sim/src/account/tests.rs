@@ -6,8 +6,8 @@ use crate::history::What;
 use crate::prepared::Prepared;
 use crate::runs::{self, Wanted};
 use crate::world::{World, fixture};
-use skein_flight::coverage::area::Direction;
-use skein_flight::coverage::area::backtracking::Leg;
+use skein_flight::coverage::ring::Direction;
+use skein_flight::coverage::ring::backtracking::Leg;
 use skein_peer::PeerId;
 
 /// Cells `first` to `first + count` of the ring, and what is held besides.

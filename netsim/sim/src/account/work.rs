@@ -10,7 +10,7 @@ use super::detection::Detection;
 use super::lifetimes::Cause;
 use super::report::{KillReport, Taker};
 use super::secs;
-use skein_flight::coverage::area::backtracking::Leg;
+use skein_flight::coverage::ring::backtracking::Leg;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What a peer held when it died.

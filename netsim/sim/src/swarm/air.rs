@@ -9,7 +9,7 @@ use crate::radio::{Delivery, Frame, LinkTable, Medium, Overlay, Tally};
 use crate::spec::RadioSpec;
 use crate::world::{Fact, Judge, World};
 use skein_behaviors::{Percept, Setpoint};
-use skein_flight::coverage::area::CellId;
+use skein_flight::coverage::ring::CellId;
 use std::sync::Arc;
 
 /// World, links and channel of one run.

@@ -1,7 +1,7 @@
 //! What the world records: facts, not beliefs.
 
 use super::motion::kinematic::Loss;
-use skein_flight::coverage::area::CellId;
+use skein_flight::coverage::ring::CellId;
 use skein_geometry::frame::Point;
 
 /// The closest approach of two airborne UAVs.

@@ -158,7 +158,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         task: skein_peer::CoverageTask::Area,
         lap: 0,
         further_laps: 0,
-        tree: skein_flight::coverage::area::Tree::default(),
+        tree: skein_flight::coverage::ring::Tree::default(),
     }
 }
 

@@ -10,7 +10,7 @@ use super::obstacles::Place;
 use super::pieces::Pieces;
 use super::survey::Survey;
 use skein_flight::airframe::Airframe;
-use skein_flight::coverage::area::CellId;
+use skein_flight::coverage::ring::CellId;
 use skein_geometry::frame::Pose;
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -22,7 +22,7 @@ pub use survey::{Cell, Survey, Uncoverable};
 use crate::spec::Spec;
 use motion::{Kinematic, Piece};
 use skein_behaviors::{Percept, Setpoint};
-use skein_flight::coverage::area::patch::Patches;
+use skein_flight::coverage::ring::patch::Patches;
 use skein_peer::CoverageTask;
 use std::sync::Arc;
 
@@ -327,7 +327,7 @@ fn place_of(body: &Kinematic) -> Place {
 mod tests {
     use super::*;
     use skein_behaviors::{Side, Steer};
-    use skein_flight::coverage::area::CellId;
+    use skein_flight::coverage::ring::CellId;
 
     fn straight(from_ms: u64) -> Setpoint {
         Setpoint {

@@ -17,7 +17,7 @@
 use super::flat::{Bounds, area_m2, circle_ring_m, clip, in_ring, point_ring_m, segment_ring_m};
 use super::pieces::Pieces;
 use crate::spec::Spec;
-use skein_flight::coverage::area::CellId;
+use skein_flight::coverage::ring::CellId;
 use skein_geometry::frame::{Point, Pose, Vector};
 use skein_geometry::math::{PI, sin_cos};
 use skein_peer::CoverageTask;

@@ -308,7 +308,7 @@ mod tests {
     use super::*;
     use crate::coverage::metric::{Matrix, Straight};
     use skein_geometry::frame::Point;
-    use skein_geometry::random::Dice;
+    use skein_geometry::random::SplitMix64;
 
     /// The shortest closed tour (Held and Karp).
     fn oracle(n: usize, m: &impl Metric) -> f64 {
@@ -339,15 +339,15 @@ mod tests {
 
     #[test]
     fn tours_keep_their_factor_on_any_metric() {
-        let mut dice = Dice::new(31);
+        let mut random = SplitMix64::new(31);
         let (mut sum, mut rounds) = (0.0, 0);
         for round in 0..80 {
-            let n = 3 + dice.below(7);
+            let n = 3 + random.below(7);
             let at: Vec<Point> = (0..n)
-                .map(|_| Point::new(dice.unit(), dice.unit()))
+                .map(|_| Point::new(random.unit(), random.unit()))
                 .collect();
             let plane = Matrix::of(n, &Straight(&at));
-            let costs: Vec<f64> = (0..n * n).map(|_| 1.0 + dice.unit() * 30.0).collect();
+            let costs: Vec<f64> = (0..n * n).map(|_| 1.0 + random.unit() * 30.0).collect();
             let any = |a: usize, b: usize| costs[a.min(b) * n + a.max(b)];
             let m = if round % 2 == 0 {
                 plane
@@ -373,9 +373,9 @@ mod tests {
 
     #[test]
     fn exchanges_take_most_of_the_excess_away_from_large_tours() {
-        let mut dice = Dice::new(32);
+        let mut random = SplitMix64::new(32);
         let at: Vec<Point> = (0..600)
-            .map(|_| Point::new(dice.unit(), dice.unit()))
+            .map(|_| Point::new(random.unit(), random.unit()))
             .collect();
         let places: Vec<usize> = (0..600).collect();
         let m = Straight(&at);

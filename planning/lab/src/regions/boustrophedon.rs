@@ -6,7 +6,7 @@
 //! corner of a cell that is not covered yet comes next; the closed walk is then divided
 //! as the loop of a spanning tree is.
 
-use super::free;
+use super::free_entry;
 use skein_survey::regions::map::{Cell, LaneMap, Router};
 use skein_survey::regions::{Plan, Task};
 
@@ -128,7 +128,7 @@ pub fn closed_walk(task: &Task) -> Vec<Cell> {
 /// Covers every cell that the first root reaches.
 #[must_use]
 pub fn plan(task: &Task) -> Plan {
-    free::along(task, &closed_walk(task))
+    free_entry::along(task, &closed_walk(task))
 }
 
 fn walk_of(lines: Lines<'_>, task: &Task) -> Vec<Cell> {

@@ -6,12 +6,12 @@
 //! | [`mstc`] | one loop divided without and with backtracking, from where the UAVs stand |
 //! | [`ring`] | the exact division with backtracking, mixed speeds and endurance |
 //! | [`forest`] | a tree cover with a proven factor |
-//! | [`free`] | the loop divided, each UAV flying straight to its arc |
+//! | [`free_entry`] | the loop divided, each UAV flying straight to its arc |
 //! | [`patrol`] | the first period of a loop flown again and again |
 
 pub mod boustrophedon;
 pub mod forest;
-pub mod free;
+pub mod free_entry;
 pub mod mstc;
 pub mod patrol;
 pub mod ring;

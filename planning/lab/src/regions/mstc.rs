@@ -5,7 +5,7 @@
 //! begin at one base: more of them hardly help, since the longest gap of the ring has
 //! only the two UAVs at its ends.
 
-use super::ring::{Robot, divide};
+use super::ring::{Uav, divide};
 use skein_survey::regions::map::{Cell, NOWHERE, Router};
 use skein_survey::regions::plan::{Plan, Task};
 use skein_survey::regions::spanning::{Tree, closed_loop, lean_loop};
@@ -77,14 +77,14 @@ pub fn with_backtracking(task: &Task) -> Plan {
 }
 
 /// Paths along the walk from cells before and after each root.
-fn on_the_ring(task: &Task, split: impl Fn(u32, &[Robot]) -> Vec<(u32, u32)>) -> Plan {
+fn on_the_ring(task: &Task, split: impl Fn(u32, &[Uav]) -> Vec<(u32, u32)>) -> Plan {
     let walk = closed_walk(task, Tree::DepthFirst);
     let n = walk.len();
     let places = places(task, &walk);
-    let robots: Vec<Robot> = places
+    let robots: Vec<Uav> = places
         .iter()
         .zip(task.speeds.iter().zip(&task.endurance))
-        .map(|(place, (speed, endurance))| Robot {
+        .map(|(place, (speed, endurance))| Uav {
             place: u32::try_from(*place).unwrap_or(0),
             speed: *speed,
             endurance: *endurance,

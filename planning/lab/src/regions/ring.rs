@@ -6,7 +6,7 @@
 
 /// A UAV that stands on the ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Robot {
+pub struct Uav {
     /// The place of its cell on the ring.
     pub place: u32,
     /// Cells it flies in a unit of time; zero counts as one.
@@ -52,7 +52,7 @@ pub struct RingDivision {
 /// O(k log k) to sort, then O(k) a sweep, O(log n) tried times for each distinct speed,
 /// each of usually one sweep and at most n / k.
 #[must_use]
-pub fn divide(n: u32, robots: &[Robot]) -> Option<RingDivision> {
+pub fn divide(n: u32, robots: &[Uav]) -> Option<RingDivision> {
     let mut order: Vec<usize> = (0..robots.len()).collect();
     order.sort_by_key(|i| (robots[*i].place % n.max(1), *i));
     if order.is_empty() || n == 0 {
@@ -91,7 +91,7 @@ pub fn divide(n: u32, robots: &[Robot]) -> Option<RingDivision> {
 struct Ring {
     /// Cells between each robot and the next.
     gaps: Vec<u32>,
-    robots: Vec<Robot>,
+    robots: Vec<Uav>,
 }
 
 impl Ring {
@@ -175,7 +175,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// The least time over all splits of all gaps, or `None`.
-    fn brute(n: u32, robots: &[Robot]) -> Option<f64> {
+    fn brute(n: u32, robots: &[Uav]) -> Option<f64> {
         let mut order = robots.to_vec();
         order.sort_by_key(|r| r.place);
         let k = order.len();
@@ -210,7 +210,7 @@ mod tests {
         }
     }
 
-    fn assert_covers(n: u32, robots: &[Robot], d: &RingDivision) {
+    fn assert_covers(n: u32, robots: &[Uav], d: &RingDivision) {
         let mut owners = vec![0; n as usize];
         for (r, s) in robots.iter().zip(&d.shares) {
             assert!(s.moves() <= r.endurance);
@@ -231,9 +231,9 @@ mod tests {
         assert!(owners.iter().all(|o| *o == 1), "{d:?}");
     }
 
-    fn robots(n: u32) -> impl Strategy<Value = Vec<Robot>> {
+    fn robots(n: u32) -> impl Strategy<Value = Vec<Uav>> {
         let robot = (0..n, 1u32..5, prop_oneof![Just(u32::MAX), 0u32..30]).prop_map(
-            |(place, speed, endurance)| Robot {
+            |(place, speed, endurance)| Uav {
                 place,
                 speed,
                 endurance,
@@ -277,8 +277,8 @@ mod tests {
     #[test]
     fn neighbours_on_the_ring_take_half_the_rest() {
         for k in 1..20u32 {
-            let robots: Vec<Robot> = (0..k)
-                .map(|place| Robot {
+            let robots: Vec<Uav> = (0..k)
+                .map(|place| Uav {
                     place,
                     speed: 1,
                     endurance: u32::MAX,

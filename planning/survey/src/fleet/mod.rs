@@ -4,11 +4,11 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`sections`] | an area divided into one connected section a crew of like swath |
-//! | [`who`] | the search for the UAVs of a team that fly at all |
+//! | [`team_selection`] | the search for the UAVs of a team that fly at all |
 //! | [`layers`] | heights for UAVs whose flights come near to each other |
 //!
 //! Left to others: the plan of a section (`exact`, `grid`), and what is best.
 
 pub mod layers;
 pub mod sections;
-pub mod who;
+pub mod team_selection;

@@ -6,7 +6,7 @@
 //! time, the ways out included, and are then evened by what the plans of the sections
 //! take. Leaves to the caller how a section is planned.
 
-use skein_flight::coverage::exact::sweep_directions;
+use skein_flight::coverage::passes::sweep_directions;
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::{PI, sin_cos};
@@ -46,7 +46,7 @@ const MOST_CHANGE: f64 = 2.0;
 
 /// A UAV of a crew.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mate {
+pub struct Uav {
     /// Where it starts and ends.
     pub start: Point,
     /// Its speed, m/s.
@@ -63,19 +63,19 @@ pub struct Crew {
     /// The widest turn, metres.
     pub turn_radius_m: f64,
     /// Its UAVs.
-    pub mates: Vec<Mate>,
+    pub uavs: Vec<Uav>,
 }
 
 impl Crew {
     /// When each UAV of the crew is at the area and has to be home again, seconds.
     fn ways_s(&self, area: &Polygon) -> Vec<f64> {
-        let way = |m: &Mate| 2.0 * area.distance_m(m.start) / m.speed_mps;
-        self.mates.iter().map(way).collect()
+        let way = |m: &Uav| 2.0 * area.distance_m(m.start) / m.speed_mps;
+        self.uavs.iter().map(way).collect()
     }
 
     /// What it sees in a time, square metres.
     fn sees_m2(&self, ways_s: &[f64], time_s: f64) -> f64 {
-        let each = self.mates.iter().zip(ways_s).map(|(m, way)| {
+        let each = self.uavs.iter().zip(ways_s).map(|(m, way)| {
             let work_s = time_s.min(m.endurance_s) - way;
             self.swath_m * m.speed_mps * work_s.max(0.0)
         });
@@ -84,7 +84,7 @@ impl Crew {
 
     /// About how long it takes for a section, seconds.
     fn guess_s(&self, section: &Polygon, open_m2: f64) -> f64 {
-        let speed: f64 = self.mates.iter().map(|m| m.speed_mps).sum();
+        let speed: f64 = self.uavs.iter().map(|m| m.speed_mps).sum();
         let ways = self.ways_s(section);
         let way_s = ways.iter().sum::<f64>() / ways.len().max(1) as f64;
         let ring = section.vertices();
@@ -122,7 +122,7 @@ pub fn alike(swaths_m: &[f64]) -> Vec<Vec<usize>> {
 
 /// An area of which parts need not, or cannot, be seen.
 #[derive(Clone, Debug)]
-pub struct Ground<'a> {
+pub struct OpenArea<'a> {
     area: &'a Polygon,
     /// Points of a lattice in holes and zones.
     blocked: Vec<Point>,
@@ -130,7 +130,7 @@ pub struct Ground<'a> {
     blocked_m2: f64,
 }
 
-impl<'a> Ground<'a> {
+impl<'a> OpenArea<'a> {
     /// The area without `blocked`: holes and zones, which may overlap.
     #[must_use]
     pub fn new(area: &'a Polygon, blocked: &[&Polygon]) -> Self {
@@ -209,8 +209,8 @@ pub struct Style {
 
 /// Ways to cut the area for crews with these shares, the most promising first.
 #[must_use]
-pub fn styles(ground: &Ground<'_>, crews: &[Crew], shares: &[f64]) -> Vec<Style> {
-    let ring = ground.area.vertices();
+pub fn styles(open_area: &OpenArea<'_>, crews: &[Crew], shares: &[f64]) -> Vec<Style> {
+    let ring = open_area.area.vertices();
     let lanes = sweep_directions(&[ring]);
     let mut headings: Vec<f64> = Vec::new();
     for (heading, _) in lanes.into_iter().take(HEADINGS) {
@@ -220,11 +220,11 @@ pub fn styles(ground: &Ground<'_>, crews: &[Crew], shares: &[f64]) -> Vec<Style>
     for heading_rad in headings {
         for order in orders(crews, shares, heading_rad) {
             let style = Style { heading_rad, order };
-            let Some(sections) = bands(ground, &style, shares) else {
+            let Some(sections) = bands(open_area, &style, shares) else {
                 continue;
             };
             let guess = |(section, crew): (&Option<Polygon>, &Crew)| match section {
-                Some(s) => crew.guess_s(s, ground.open_m2(s.vertices())),
+                Some(s) => crew.guess_s(s, open_area.open_m2(s.vertices())),
                 None => 0.0,
             };
             let longest = sections.iter().zip(crews).map(guess).fold(0.0, f64::max);
@@ -243,9 +243,9 @@ fn orders(crews: &[Crew], shares: &[f64], heading_rad: f64) -> Vec<Vec<usize>> {
     }
     let (s, c) = sin_cos(heading_rad);
     let across = |i: &usize| {
-        let mates = &crews[*i].mates;
-        let sum: f64 = mates.iter().map(|m| m.start.x * s - m.start.y * c).sum();
-        sum / mates.len().max(1) as f64
+        let uavs = &crews[*i].uavs;
+        let sum: f64 = uavs.iter().map(|m| m.start.x * s - m.start.y * c).sum();
+        sum / uavs.len().max(1) as f64
     };
     order.sort_by(|a, b| across(a).total_cmp(&across(b)).then(a.cmp(b)));
     let back = order.iter().rev().copied().collect();
@@ -273,14 +273,18 @@ fn permutations(items: &[usize]) -> Vec<Vec<usize>> {
 /// # Guarantees
 /// Sections are connected and share their borders exactly: together they are the area.
 #[must_use]
-pub fn bands(ground: &Ground<'_>, style: &Style, shares: &[f64]) -> Option<Vec<Option<Polygon>>> {
+pub fn bands(
+    open_area: &OpenArea<'_>,
+    style: &Style,
+    shares: &[f64],
+) -> Option<Vec<Option<Polygon>>> {
     let mut sections = vec![None; shares.len()];
-    let mut rest = ground.area.clone();
+    let mut rest = open_area.area.clone();
     let (last, first) = style.order.split_last()?;
-    let total_m2 = ground.open_m2(rest.vertices());
+    let total_m2 = open_area.open_m2(rest.vertices());
     for crew in first {
         let want_m2 = shares[*crew] * total_m2;
-        let (left, right) = cut(ground, &rest, style.heading_rad, want_m2)?;
+        let (left, right) = cut(open_area, &rest, style.heading_rad, want_m2)?;
         sections[*crew] = Some(left);
         rest = right;
     }
@@ -360,17 +364,17 @@ impl<'a> Turned<'a> {
 /// Cuts off a left part with `want_m2` to be seen, or what comes nearest to that; of cuts
 /// that do, the shortest.
 fn cut(
-    ground: &Ground<'_>,
+    open_area: &OpenArea<'_>,
     polygon: &Polygon,
     heading_rad: f64,
     want_m2: f64,
 ) -> Option<(Polygon, Polygon)> {
     let turned = Turned::new(polygon.vertices(), heading_rad);
-    let slack_m2 = SHARE_SLACK * ground.open_m2(polygon.vertices());
+    let slack_m2 = SHARE_SLACK * open_area.open_m2(polygon.vertices());
     let mut best: Option<(f64, f64, Chord)> = None;
     let mut look = |x: f64, nth: usize| -> Option<f64> {
         let chord = *turned.chords(x).get(nth)?;
-        let left_m2 = ground.open_m2(&turned.sides(&chord).0);
+        let left_m2 = open_area.open_m2(&turned.sides(&chord).0);
         let miss = ((left_m2 - want_m2).abs() - slack_m2).max(0.0);
         let length = (chord.high.1 - chord.low.1).norm();
         let first = best
@@ -439,7 +443,7 @@ pub struct Outcome<T> {
 /// `plan` may have nothing for some sections; `better(a, b)` tells whether `a` is strictly
 /// better.
 pub fn evened<T>(
-    ground: &Ground<'_>,
+    open_area: &OpenArea<'_>,
     crews: &[Crew],
     style: &Style,
     first: &[f64],
@@ -450,7 +454,7 @@ pub fn evened<T>(
     let mut shares = first.to_vec();
     let mut best: Option<T> = None;
     for _ in 0..=rounds {
-        let Some(sections) = bands(ground, style, &shares) else {
+        let Some(sections) = bands(open_area, style, &shares) else {
             break;
         };
         let Some(outcome) = plan(&sections) else {
@@ -522,7 +526,7 @@ mod tests {
     }
 
     fn crew(swath_m: f64, start: (f64, f64), n: usize) -> Crew {
-        let mate = Mate {
+        let mate = Uav {
             start: Point::new(start.0, start.1),
             speed_mps: 15.0,
             endurance_s: f64::INFINITY,
@@ -530,7 +534,7 @@ mod tests {
         Crew {
             swath_m,
             turn_radius_m: 20.0,
-            mates: vec![mate; n],
+            uavs: vec![mate; n],
         }
     }
 
@@ -547,9 +551,9 @@ mod tests {
     #[test]
     fn shares_follow_swath_way_and_endurance() {
         let area = rectangle(0.0, 0.0, 1000.0, 1000.0);
-        let ground = Ground::new(&area, &[]);
+        let open_area = OpenArea::new(&area, &[]);
         let near = |crews: &[Crew], shares: [f64; 2]| {
-            let found = ground.shares(crews);
+            let found = open_area.shares(crews);
             let close = found.iter().zip(shares).all(|(a, b)| (a - b).abs() < 1e-3);
             assert!(close, "{found:?}");
         };
@@ -565,9 +569,9 @@ mod tests {
         let far = crew(60.0, (-750.0, 500.0), 1);
         near(&[far, crew(60.0, (0.0, 0.0), 1)], [0.455, 0.545]);
         let mut tired = crew(60.0, (0.0, 0.0), 1);
-        tired.mates[0].endurance_s = 100.0;
+        tired.uavs[0].endurance_s = 100.0;
         near(&[tired.clone(), crew(60.0, (0.0, 0.0), 1)], [0.09, 0.91]);
-        tired.mates[0].endurance_s = 1.0;
+        tired.uavs[0].endurance_s = 1.0;
         near(&[tired, crew(60.0, (0.0, 0.0), 1)], [0.0, 1.0]);
     }
 
@@ -575,12 +579,12 @@ mod tests {
     fn blocked_ground_is_no_work() {
         let area = rectangle(0.0, 0.0, 1000.0, 300.0);
         let hole = rectangle(0.0, -50.0, 500.0, 400.0);
-        let ground = Ground::new(&area, &[&hole]);
+        let open_area = OpenArea::new(&area, &[&hole]);
         let style = Style {
             heading_rad: PI / 2.0,
             order: vec![1, 0],
         };
-        let sections = bands(&ground, &style, &[0.5, 0.5]).unwrap();
+        let sections = bands(&open_area, &style, &[0.5, 0.5]).unwrap();
         let (low, high) = sections[1].as_ref().unwrap().bounds();
         assert!(low.x < 1.0 && (high.x - 750.0).abs() < 20.0, "{high}");
     }
@@ -588,9 +592,9 @@ mod tests {
     #[test]
     fn sections_are_evened_by_what_they_take() {
         let area = rectangle(0.0, 0.0, 900.0, 300.0);
-        let ground = Ground::new(&area, &[]);
+        let open_area = OpenArea::new(&area, &[]);
         let crews = [crew(60.0, (0.0, 0.0), 1), crew(60.0, (0.0, 0.0), 1)];
-        let style = &styles(&ground, &crews, &[0.5, 0.5])[0];
+        let style = &styles(&open_area, &crews, &[0.5, 0.5])[0];
         // The second crew takes four times as long as was thought.
         let plan = |sections: &[Option<Polygon>]| {
             let area = |i: usize| sections[i].as_ref().unwrap().area_m2();
@@ -601,9 +605,15 @@ mod tests {
                 plan: longest,
             })
         };
-        let best = evened(&ground, &crews, style, &[0.5, 0.5], ROUNDS, plan, |a, b| {
-            a < b
-        })
+        let best = evened(
+            &open_area,
+            &crews,
+            style,
+            &[0.5, 0.5],
+            ROUNDS,
+            plan,
+            |a, b| a < b,
+        )
         .unwrap();
         let even = 0.8 * 270_000.0;
         assert!((best - even).abs() < 0.02 * even, "{best}");
@@ -625,10 +635,10 @@ mod tests {
             };
             let ring: Vec<Point> = radii.iter().enumerate().map(corner).collect();
             let Ok(area) = Polygon::new(ring) else { return Ok(()) };
-            let ground = Ground::new(&area, &[]);
+            let open_area = OpenArea::new(&area, &[]);
             let shares = normal(&parts);
             let style = Style { heading_rad, order: (0..parts.len()).collect() };
-            let Some(sections) = bands(&ground, &style, &shares) else { return Ok(()) };
+            let Some(sections) = bands(&open_area, &style, &shares) else { return Ok(()) };
             let all: f64 = sections.iter().flatten().map(Polygon::area_m2).sum();
             prop_assert!((all - area.area_m2()).abs() < 1e-6 * all);
             let (low, high) = area.bounds();
@@ -646,9 +656,9 @@ mod tests {
             w in 100.0..2000.0f64, h in 100.0..2000.0f64, share in 0.05..0.95f64, heading_rad in -3.0..3.0f64,
         ) {
             let area = rectangle(-50.0, 20.0, w, h);
-            let ground = Ground::new(&area, &[]);
+            let open_area = OpenArea::new(&area, &[]);
             let style = Style { heading_rad, order: vec![0, 1] };
-            let sections = bands(&ground, &style, &[share, 1.0 - share]).unwrap();
+            let sections = bands(&open_area, &style, &[share, 1.0 - share]).unwrap();
             let first = sections[0].as_ref().unwrap().area_m2() / area.area_m2();
             prop_assert!((first - share).abs() < 2.0 * SHARE_SLACK, "{first}");
         }

@@ -4,13 +4,13 @@
 //! It stops after a number of *steps*, not after a time, so that every peer computes the
 //! same plan byte for byte.
 
-use super::home::Home;
 use super::map::{Cell, NOWHERE};
 use super::partition::{Partition, Regions};
 use super::plan::{Plan, Task};
+use super::root_distances::Home;
 use super::search::{PACE, Search};
 use super::spanning::{Tree, best_offset, region_loops};
-use super::{bounds, peel};
+use super::{bounds, corridor_first};
 use std::sync::Arc;
 
 /// Steps in a round: between two of them the aim is set anew and the caller may stop.
@@ -162,7 +162,7 @@ fn peeled_orders(task: &Task, offset: (u32, u32)) -> Vec<Vec<Cell>> {
     let mut moves = low + low / 80;
     let mut best = None;
     for _ in 0..PEELS {
-        let (orders, left) = peel::orders(task, offset, moves);
+        let (orders, left) = corridor_first::orders(task, offset, moves);
         if left * FEW_LEFT > n_cells {
             low = moves;
             let more = u32::try_from(left).unwrap_or(u32::MAX) / n_uavs;

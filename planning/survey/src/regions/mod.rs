@@ -8,9 +8,9 @@
 //! | [`plan`] | a task, a plan, and what a plan costs |
 //! | [`bounds`] | how long any plan takes at least |
 //! | [`spanning`] | one closed loop over all cells, from a spanning tree over 2×2 blocks |
-//! | `mend` | cells that a loop leaves out, brought together so that they cost nothing |
+//! | `loop_repair` | cells that a loop leaves out, brought together so that they cost nothing |
 //! | [`partition`] | a connected region for each UAV |
-//! | [`peel`] | work for UAVs that begin close together, farthest first |
+//! | [`corridor_first`] | work for UAVs that begin close together, farthest first |
 //! | [`search`] | local search over the orders of cells |
 //! | [`improve`] | the default planner |
 //! | [`raster`] | which cells an area becomes |
@@ -19,14 +19,14 @@
 //! Left to others: exact curves, cameras and no-fly zones (`area`).
 
 pub mod bounds;
-mod home;
+pub mod corridor_first;
 pub mod improve;
+mod loop_repair;
 pub mod map;
-mod mend;
 pub mod partition;
-pub mod peel;
 pub mod plan;
 pub mod raster;
+mod root_distances;
 pub mod search;
 pub mod spanning;
 pub mod stream;

@@ -10,11 +10,11 @@
 //! balance of single cells.
 
 mod assign;
-mod pass;
+mod border_moves;
 
-use super::home::Home;
 use super::map::{Cell, LaneMap, NOWHERE, UNREACHED};
 use super::plan::Task;
+use super::root_distances::Home;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 

@@ -6,7 +6,7 @@
 //! contain the clearance, curves, and the plan itself.
 
 use super::map::{Cell, LaneMap, MapError};
-use skein_flight::coverage::exact::sweep_directions;
+use skein_flight::coverage::passes::sweep_directions;
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::sin_cos;

@@ -13,9 +13,9 @@
 mod link;
 mod shift;
 
-use super::home::Home;
 use super::map::{Cell, NOWHERE, Router};
 use super::plan::Task;
+use super::root_distances::Home;
 use super::stream::Stream;
 use std::sync::Arc;
 

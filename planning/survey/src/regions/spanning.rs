@@ -8,8 +8,8 @@
 //!
 //! Left to others: which tree turns least in which wind, and the curves.
 
+use super::loop_repair::Mender;
 use super::map::{Cell, LaneMap, NOWHERE};
-use super::mend::Mender;
 
 /// Which spanning tree connects the blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,17 +1,17 @@
 //! A stream of numbers that looks random and is the same on every machine: what a search
 //! draws its choices from, so that every peer computes the same plan byte for byte.
 
-use skein_geometry::random::Dice;
+use skein_geometry::random::SplitMix64;
 
 /// The stream; its seed is its whole state.
 #[derive(Clone, Copy, Debug)]
-pub struct Stream(Dice);
+pub struct Stream(SplitMix64);
 
 impl Stream {
     /// The stream of a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        Self(Dice::new(seed))
+        Self(SplitMix64::new(seed))
     }
 
     /// The next 64 bits.

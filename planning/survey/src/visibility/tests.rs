@@ -3,8 +3,8 @@
 
 use super::*;
 use proptest::prelude::*;
-use skein_flight::path::mesh::Mesh;
-use skein_flight::path::two_point::Search;
+use skein_flight::route::mesh::Mesh;
+use skein_flight::route::two_point::Search;
 use skein_geometry::math::atan2;
 use skein_geometry::offset::{Growth, Zone, grow};
 use skein_geometry::polygon::point_to_line_m;

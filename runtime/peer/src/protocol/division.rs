@@ -4,8 +4,8 @@ use super::rounds::OpenRound;
 use super::runs::cells_of;
 use crate::cells::CellSet;
 use crate::wire::message::{Bid, CellRun};
-use skein_flight::coverage::area::backtracking::{Division, RingCell, Robot};
-use skein_flight::coverage::area::{CoverageLoop, Direction};
+use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
+use skein_flight::coverage::ring::{CoverageLoop, Direction};
 
 /// A division without a loss is adopted only if it ends the work this much sooner:
 /// the new makespan is at most this many percent of the present one.
@@ -20,7 +20,7 @@ pub fn problem(
     open: &OpenRound,
     coverage_loop: &CoverageLoop,
     covered: &CellSet,
-) -> (Vec<RingCell>, Vec<Robot>) {
+) -> (Vec<RingCell>, Vec<Uav>) {
     let n = covered.capacity();
     let mut done = covered.clone();
     for s in open.bids.values() {
@@ -46,7 +46,7 @@ pub fn problem(
     let robots = open
         .bids
         .iter()
-        .map(|(id, s)| Robot {
+        .map(|(id, s)| Uav {
             anchor: s.anchor % n.max(1),
             id: *id,
             heading: if s.backward {

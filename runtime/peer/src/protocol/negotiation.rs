@@ -19,8 +19,8 @@ use super::sections::{LivePeers, Sections};
 use crate::Time;
 use crate::cells::CellSet;
 use crate::wire::message::{Bid, Epoch, Member};
-use skein_flight::coverage::area::CoverageLoop;
-use skein_flight::coverage::area::backtracking::{Division, RingCell, Robot};
+use skein_flight::coverage::ring::CoverageLoop;
+use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use std::collections::BTreeMap;
 
 /// What the rest of the peer knows that the negotiation needs.
@@ -66,7 +66,7 @@ pub enum Action {
         /// The loop's cells.
         ring: Vec<RingCell>,
         /// The members.
-        robots: Vec<Robot>,
+        robots: Vec<Uav>,
     },
     /// Make these takes durable, then call [`Negotiation::take`].
     Take(Vec<PlannedCell>),

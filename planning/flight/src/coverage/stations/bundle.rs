@@ -5,8 +5,8 @@
 //! of its pieces.
 
 use super::targets::along;
-use crate::coverage::area::AreaProblem;
-use crate::coverage::area::patch::{Corners, middle};
+use crate::coverage::ring::LoopProblem;
+use crate::coverage::ring::patch::{Corners, middle};
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::sin_cos;
 use std::collections::BTreeMap;
@@ -28,7 +28,7 @@ pub(super) struct Bundles {
 /// # Complexity
 /// O(n) for pieces that are spread over the plane, each looking at those within a lane
 /// or two of it.
-pub(super) fn bundle(pieces: &[Corners], flown: &AreaProblem) -> Bundles {
+pub(super) fn bundle(pieces: &[Corners], flown: &LoopProblem) -> Bundles {
     let squares = Squares::new(pieces, flown.lane_spacing_m);
     let mut of_piece = vec![usize::MAX; pieces.len()];
     let mut stations = Vec::new();
@@ -63,7 +63,7 @@ pub(super) fn bundle(pieces: &[Corners], flown: &AreaProblem) -> Bundles {
 }
 
 /// Whether a pass with room to turn keeps clear here.
-fn is_clear(at: Point, flown: &AreaProblem) -> bool {
+fn is_clear(at: Point, flown: &LoopProblem) -> bool {
     flown.zones.distance_m(at) >= flown.clearance_m + flown.turn_radius_m
 }
 

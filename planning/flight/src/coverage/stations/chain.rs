@@ -6,8 +6,8 @@
 //! answer is the shortest through that pose, not always the shortest of all.
 
 use super::Visit;
-use crate::coverage::area::AreaProblem;
-use crate::path::Router;
+use crate::coverage::ring::LoopProblem;
+use crate::route::Router;
 use crate::trajectory::dubins;
 use skein_geometry::Curve;
 use skein_geometry::frame::Pose;
@@ -45,7 +45,7 @@ impl Leg {
 
 /// Stations in order, with the poses they may be seen at.
 pub(super) struct Chain<'a> {
-    problem: &'a AreaProblem,
+    problem: &'a LoopProblem,
     router: &'a Router,
     stands: Vec<(usize, Vec<Pose>)>,
     /// By station of departure: poses of departure times poses of arrival.
@@ -71,7 +71,7 @@ struct Left {
 
 impl<'a> Chain<'a> {
     pub(super) fn new(
-        problem: &'a AreaProblem,
+        problem: &'a LoopProblem,
         router: &'a Router,
         stands: Vec<(usize, Vec<Pose>)>,
     ) -> Self {

@@ -20,12 +20,12 @@ pub mod targets;
 #[cfg(test)]
 mod tests;
 
-use super::area::patch::{Corners, Listed, Patches};
-use super::area::stc::{CoverageLoop, LoopCell, LoopError};
-use super::area::{
-    AreaProblem, CellId, check_figures, check_launch, hash_of, hash_words, millimetres,
+use super::ring::patch::{Corners, Listed, Patches};
+use super::ring::{
+    CellId, CoverageLoop, LoopCell, LoopError, LoopProblem, check_figures, check_launch, hash_of,
+    hash_words, millimetres,
 };
-use crate::path::{RouteLimits, Router};
+use crate::route::{RouteLimits, Router};
 use chain::Chain;
 use skein_geometry::Curve;
 use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Point, Pose};
@@ -36,7 +36,7 @@ use std::sync::Arc;
 pub struct StationsProblem<'a> {
     /// Zones, lengths and launch point of the mission; pieces of lines are as long as its
     /// lanes are wide.
-    pub flown: &'a AreaProblem,
+    pub flown: &'a LoopProblem,
     /// The pieces, each to be held by one frame; their numbers name the cells.
     pub stations: Vec<Corners>,
     /// The order in which they are flown: each number once.

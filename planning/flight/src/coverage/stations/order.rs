@@ -2,10 +2,10 @@
 //! the postman's of §3.5 (D2.7).
 
 use super::targets::{PointTarget, Stretch};
-use crate::coverage::area::AreaProblem;
-use crate::coverage::area::patch::{Corners, middle};
-use crate::coverage::line::{self, Line, Surveyor};
+use crate::coverage::lines::{self, Line, Uav};
 use crate::coverage::metric::Straight;
+use crate::coverage::ring::LoopProblem;
+use crate::coverage::ring::patch::{Corners, middle};
 use crate::coverage::tour;
 use skein_geometry::frame::Point;
 use skein_geometry::math::atan2;
@@ -43,7 +43,7 @@ pub(super) fn of_lines(stretches: &[Stretch], launch: Point) -> Vec<usize> {
         return Vec::new();
     };
     let metric = Straight(&names.at);
-    let plan = line::plan(&lines, &[Surveyor::at(depot)], &metric, line::DEFAULT_STEPS);
+    let plan = lines::plan(&lines, &[Uav::at(depot)], &metric, lines::DEFAULT_STEPS);
     let passes = plan.map(|p| {
         p.tours
             .into_iter()
@@ -68,7 +68,7 @@ pub(super) fn of_lines(stretches: &[Stretch], launch: Point) -> Vec<usize> {
 pub(super) fn of_bundles(
     stations: &[Corners],
     along: impl Iterator<Item = usize>,
-    flown: &AreaProblem,
+    flown: &LoopProblem,
 ) -> Vec<usize> {
     let mut seen = vec![false; stations.len()];
     let first = along.filter(|&n| !std::mem::replace(&mut seen[n], true));

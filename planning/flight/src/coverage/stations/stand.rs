@@ -5,7 +5,7 @@
 
 use super::StationsProblem;
 use super::targets::along;
-use crate::coverage::area::patch::{Corners, frame_holds, middle};
+use crate::coverage::ring::patch::{Corners, frame_holds, middle};
 use skein_geometry::Curve;
 use skein_geometry::frame::{Point, Pose, Vector};
 use skein_geometry::math::{TAU, sin_cos, wrap_pi};

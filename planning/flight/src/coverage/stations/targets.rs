@@ -6,10 +6,10 @@
 
 use super::bundle::{Bundles, bundle};
 use super::{StationsProblem, order};
-use crate::coverage::area::AreaProblem;
-use crate::coverage::area::patch::Corners;
-use crate::coverage::exact::Pass;
-use crate::coverage::line::strip;
+use crate::coverage::lines::strip;
+use crate::coverage::passes::Pass;
+use crate::coverage::ring::LoopProblem;
+use crate::coverage::ring::patch::Corners;
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::atan2;
 
@@ -98,7 +98,7 @@ impl<'a> StationsProblem<'a> {
     /// The pieces of targets, in the order in which one closed tour from the launch point
     /// sees them; pieces of lines that one frame holds together are one station.
     #[must_use]
-    pub fn of_targets(flown: &'a AreaProblem, targets: &Targets) -> Self {
+    pub fn of_targets(flown: &'a LoopProblem, targets: &Targets) -> Self {
         let longest_m = flown.lane_spacing_m;
         let (stations, order) = match targets {
             Targets::Points(points) => (
@@ -124,7 +124,7 @@ impl<'a> StationsProblem<'a> {
 
     /// Passes in their order, in pieces as long as a lane is wide.
     #[must_use]
-    pub fn of_passes(flown: &'a AreaProblem, passes: &[Pass]) -> Self {
+    pub fn of_passes(flown: &'a LoopProblem, passes: &[Pass]) -> Self {
         let stations = of_passes(passes, flown.lane_spacing_m, flown.lane_spacing_m);
         Self {
             flown,

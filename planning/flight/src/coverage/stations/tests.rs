@@ -2,7 +2,7 @@
 
 use super::targets::{LineTarget, PointTarget, Targets};
 use super::*;
-use crate::coverage::area::patch::frame_holds;
+use crate::coverage::ring::patch::frame_holds;
 use proptest::prelude::*;
 use skein_geometry::math::wrap_pi;
 use skein_geometry::{NoFlyZones, Polygon, contingency_clear};
@@ -13,8 +13,8 @@ fn rectangle(x0: f64, y0: f64, x1: f64, y1: f64) -> Polygon {
 }
 
 /// What a mission of these zones is flown with.
-fn flown(zones: Vec<Polygon>) -> AreaProblem {
-    AreaProblem {
+fn flown(zones: Vec<Polygon>) -> LoopProblem {
+    LoopProblem {
         area: rectangle(0.0, 0.0, 1000.0, 1000.0),
         zones: Arc::new(NoFlyZones::new(zones)),
         lane_spacing_m: 48.0,
@@ -24,7 +24,7 @@ fn flown(zones: Vec<Polygon>) -> AreaProblem {
         footprint_along_m: 45.0,
         tracking_error_m: 3.0,
         launch: Point::new(-200.0, -200.0),
-        tree: crate::coverage::area::Tree::default(),
+        tree: crate::coverage::ring::Tree::default(),
     }
 }
 
@@ -267,7 +267,7 @@ proptest! {
         for s in p.stations.iter().filter(|s| !pieces.contains(s)) {
             let (long, wide) = sides(s);
             prop_assert!(long.max(wide) <= flown.lane_spacing_m + 1e-6);
-            let middle = crate::coverage::area::patch::middle(s);
+            let middle = crate::coverage::ring::patch::middle(s);
             prop_assert!(flown.zones.distance_m(middle) >= flown.clearance_m);
         }
     }

@@ -1,0 +1,29 @@
+//! The ring of cells on which all UAVs of a mission work, and its division (D2.7 §3.6).
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`coverage_loop`] | the closed loop: its cells, their curves, its hash |
+//! | [`problem`] | what a loop is laid for |
+//! | [`error`] | why there is none |
+//! | [`grid`] | names of cells; the grid of lanes |
+//! | [`tree`] | which spanning tree a loop of lanes goes round |
+//! | [`patch`] | what a cell looks like from above |
+//! | [`backtracking`] | the division among UAVs: backtracking MSTC |
+//! | `endurance_limited` | the division when endurance does not suffice for all cells |
+
+pub mod backtracking;
+pub mod coverage_loop;
+mod endurance_limited;
+pub mod error;
+pub mod grid;
+pub mod patch;
+pub mod problem;
+pub mod tree;
+
+pub use coverage_loop::{CoverageLoop, Direction, LoopCell};
+pub(super) use coverage_loop::{hash_of, hash_words, millimetres};
+pub use error::LoopError;
+pub use grid::{CellId, Grid};
+pub use problem::LoopProblem;
+pub(super) use problem::{check_figures, check_launch};
+pub use tree::Tree;

@@ -1,0 +1,184 @@
+//! The operator: orders and missions at the console of a ground station, in a trial and
+//! without a simulated world.
+
+use crate::DEADLINE;
+use crate::support::{Place, Trial, alone, free_port, root};
+use serde_json::{Value, json};
+use std::io::{Read, Write};
+use std::net::{Shutdown, TcpStream};
+use std::time::Duration;
+
+/// The small scenario, two rows of cells larger and with the base in a corner.
+fn wide(place: &Place) -> String {
+    let text = std::fs::read_to_string(root().join("tests/live/square.json5")).unwrap();
+    let changes = [
+        ("north_m: 384 }", "north_m: 480 }"),
+        (
+            "base: { east_m: 240, north_m: 192 }",
+            "base: { east_m: 60, north_m: 420 }",
+        ),
+    ];
+    let wide = changes.iter().fold(text, |text, (old, new)| {
+        assert!(text.contains(old), "{old}");
+        text.replacen(old, new, 1)
+    });
+    place.file("wide.json5", &wide)
+}
+
+/// How far a state was written from a place, metres.
+fn distance_m(state: &Value, east_m: f64, north_m: f64) -> f64 {
+    let metres = |name: &str| state[name].as_f64().unwrap() / 1000.0;
+    (metres("east_mm") - east_m).hypot(metres("north_mm") - north_m)
+}
+
+#[test]
+fn the_operator_of_a_trial_revises_the_mission_and_calls_all_home() {
+    let _alone = alone();
+    let place = Place::new();
+    let mut trial = Trial::start(&place, "operator", &["--time-scale", "4"]);
+    trial.wait_for_time(6.0, DEADLINE);
+    strangers_are_refused(&place);
+
+    let (code, said) = place.skein(&["mission", &wide(&place)]);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("as revision 2"), "{said}");
+    let uavs = [1, 2, 3, 4];
+    place.observe_until(&["live/v1/state/**"], DEADLINE, |newest| {
+        uavs.iter()
+            .all(|id| newest.get(id).is_some_and(|s| s["cells"] == 100))
+    });
+
+    let (code, said) = place.skein(&["order", "return-to-base"]);
+    assert_eq!(
+        (code, said.trim()),
+        (0, "the ground station says return-to-base to all")
+    );
+    place.observe_until(&["live/v1/state/**"], DEADLINE, |newest| {
+        uavs.iter().all(|id| {
+            newest.get(id).is_some_and(|s| {
+                s["behaviour"] == "Loitering" && distance_m(s, 60.0, 420.0) < 120.0
+            })
+        })
+    });
+    let (code, said) = place.skein(&["mission", "--base", "240,192"]);
+    assert!(code == 0 && said.contains("as revision 3"), "{said}");
+    let (code, said) = place.skein(&["order", "resume"]);
+    assert_eq!(code, 0, "{said}");
+
+    let verdict = trial.verdict(DEADLINE);
+    assert_eq!(verdict["passed"], true, "{verdict:#}");
+    assert_eq!(
+        verdict["finished"].as_array().unwrap().len(),
+        4,
+        "{verdict:#}"
+    );
+}
+
+/// A wrong token, a mission that does not fit, garbage: nothing follows from them.
+fn strangers_are_refused(place: &Place) {
+    let console = place.entry()["console"].clone();
+    let at = console["at"].as_str().unwrap();
+    let token_file = console["token_file"].as_str().unwrap();
+    let token = std::fs::read_to_string(token_file).unwrap();
+    let guess = place.file("guess", &token.trim().chars().rev().collect::<String>());
+    let (code, said) = place.skein(&["order", "hold", "--at", at, "--token-file", &guess]);
+    assert!(code == 3 && said.contains("the token is wrong"), "{said}");
+
+    let text = std::fs::read_to_string(root().join("tests/live/square.json5")).unwrap();
+    for (right, wrong, message) in [
+        (
+            "lat_deg: 60.1655",
+            "lat_deg: 60.1755",
+            "its origin is not that of the swarm",
+        ),
+        ("bank_deg: 45", "bank_deg: 60", "the UAVs in the air need"),
+        ("spacing_m: 48", "spacing_m: 30", "unfit.json5:13:"),
+    ] {
+        assert!(text.contains(right), "{right}");
+        let file = place.file("unfit.json5", &text.replacen(right, wrong, 1));
+        let (code, said) = place.skein(&["mission", &file]);
+        assert!(code == 3 && said.contains(message), "{wrong}: {said}");
+    }
+
+    for bytes in [
+        b"\0\xff\n".to_vec(),
+        vec![b'x'; 100_000],
+        format!("{token}{{]\n").into_bytes(),
+    ] {
+        let mut stream = TcpStream::connect(at).unwrap();
+        stream
+            .set_read_timeout(Some(Duration::from_secs(20)))
+            .unwrap();
+        // The console may close before it was told everything.
+        let _ = stream.write_all(&bytes);
+        let _ = stream.shutdown(Shutdown::Write);
+        let mut said = String::new();
+        let _ = stream.read_to_string(&mut said);
+        assert!(said.is_empty() || said.contains("Err"), "{said}");
+    }
+}
+
+#[test]
+fn without_a_simulated_world_a_mission_and_an_order_reach_peers_over_the_radio() {
+    let place = Place::new();
+    let (at, first, second) = (free_port(), free_port(), free_port());
+    let config = |id: u16, port: u16, links: &[String]| {
+        json!({
+            "id": id,
+            "role": "ground",
+            "fleet": "field",
+            "beacon_period_ms": 200,
+            "rate_bps": 1_000_000,
+            "queue_age_ms": 2000,
+            "height_m": 2,
+            "mission": null,
+            "seed": 1,
+            "journal": format!("{id}.journal"),
+            "listen": format!("tcp/127.0.0.1:{port}"),
+            "links": links,
+            "lease_ms": 2000,
+        })
+    };
+    let mut operated = config(100, first, &[]);
+    operated["console"] = json!({ "listen": format!("127.0.0.1:{at}"), "token_file": "100.token" });
+    let link = format!("tcp/127.0.0.1:{first}");
+    let ground = place.peer("100.json5", &operated);
+    let _other = place.peer("101.json5", &config(101, second, &[link]));
+
+    let console = format!("127.0.0.1:{at}");
+    let token_file = place.path("100.token");
+    let flags = ["--at", &console, "--token-file", &token_file];
+    let say = |what: &[&str]| place.skein(&[what, &flags].concat());
+    crate::support::wait_until(DEADLINE, "the console is open", || {
+        say(&["order", "resume"]).0 == 0
+    });
+    let (code, said) = say(&["mission", "--base", "1,2"]);
+    assert!(code == 3 && said.contains("no mission"), "{said}");
+
+    let far = format!("tcp/127.0.0.1:{second}");
+    let observe = |key: &'static str| [key, "--endpoint", &far].map(str::to_owned);
+    let until = |key: &'static str, author: u64, wanted: &dyn Fn(&Value) -> bool| {
+        let args = observe(key);
+        let args: Vec<&str> = args.iter().map(String::as_str).collect();
+        place.observe_until(&args, DEADLINE, |newest| {
+            newest.get(&author).is_some_and(wanted)
+        });
+    };
+    let square = root().join("tests/live/square.json5");
+    let (code, said) = say(&["mission", square.to_str().unwrap()]);
+    assert!(code == 0 && said.contains("as revision 1"), "{said}");
+    until("field/v1/state/**", 101, &|state| state["cells"] == 80);
+    let (code, said) = say(&["mission", &wide(&place)]);
+    assert!(code == 0 && said.contains("as revision 2"), "{said}");
+    until("field/v1/state/**", 101, &|state| state["cells"] == 100);
+
+    let (code, said) = say(&["order", "hold"]);
+    assert_eq!(
+        (code, said.trim()),
+        (0, "the ground station says hold to all")
+    );
+    until("field/v1/operator/**", 100, &|order| *order == "hold");
+    drop(ground);
+    let (code, said) = say(&["order", "resume"]);
+    assert!(code == 4 && said.contains("no answer"), "{said}");
+}

@@ -1,0 +1,52 @@
+//! The Python example sees the swarm, with the Python that `SKEIN_PYTHON` names.
+//!
+//! `.ci/python` makes one with the packages that the example needs; `.ci/run` uses it.
+//! Without one this says that nothing was tested.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test may panic; the lint's own exception knows no test without a harness"
+)]
+
+#[allow(dead_code, reason = "this test needs not all that others do")]
+mod support;
+
+use std::time::Duration;
+use support::{Place, Trial};
+
+fn main() {
+    let filters: Vec<String> = std::env::args().skip(1).collect();
+    let mut named = filters.iter().filter(|f| !f.starts_with('-'));
+    if named.clone().count() > 0 && !named.any(|f| "python".contains(f.as_str())) {
+        println!("python: filtered out");
+        return;
+    }
+    let Ok(python) = std::env::var("SKEIN_PYTHON") else {
+        println!(
+            "python: SKIPPED, nothing was tested: SKEIN_PYTHON names no Python (.ci/python makes one)"
+        );
+        return;
+    };
+    let place = Place::new();
+    let mut trial = Trial::start(&place, "python", &["--time-scale", "4"]);
+    trial.wait_for_time(6.0, Duration::from_secs(120));
+    let entry = place.entry();
+    let out = std::process::Command::new(python)
+        .arg(support::root().join("examples/observe.py"))
+        .args([entry["observe"].as_str().unwrap(), "3"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&out.stdout) + String::from_utf8_lossy(&out.stderr);
+    for expected in [
+        "live/v1/state/",
+        "live/v1/beacon/",
+        "live/v1/cover/",
+        "uav1 life",
+    ] {
+        let begin: String = said.chars().take(1000).collect();
+        assert!(said.contains(expected), "no {expected:?} in: {begin}");
+    }
+    trial.interrupt();
+    trial.wait(Duration::from_secs(20));
+    println!("python: ok, {} records seen", said.lines().count());
+}
