@@ -118,6 +118,16 @@ impl Injector<'_> {
             Fault::Rebase { east_mm, north_mm } => {
                 self.operate(&Command::Base((*east_mm, *north_mm))).await
             }
+            Fault::Order { order } => self.operate(&Command::Order(*order)).await,
+            Fault::FailStores { .. }
+            | Fault::SlowStores { .. }
+            | Fault::HealStores { .. }
+            | Fault::SlowComputer { .. }
+            | Fault::ClockDrift { .. }
+            | Fault::ClockJump { .. } => Err(
+                "disks, slow computers and clocks go wrong in simulated runs only: `skein sim`"
+                    .to_owned(),
+            ),
         }
     }
 

@@ -119,21 +119,6 @@ fn fleet(spec: &Spec, out: &mut Vec<Finding>) {
     }
 }
 
-/// Peers that a fault names.
-fn named(fault: &Fault) -> Vec<u16> {
-    match fault {
-        Fault::Kill { peer }
-        | Fault::KillComputer { peer }
-        | Fault::Terminate { peer }
-        | Fault::Pause { peer }
-        | Fault::Resume { peer }
-        | Fault::Restart { peer, .. } => vec![*peer],
-        Fault::Cut { a, b, .. } => vec![*a, *b],
-        Fault::Partition { groups } => groups.concat(),
-        Fault::Heal | Fault::Loss { .. } | Fault::Rebase { .. } => Vec::new(),
-    }
-}
-
 fn faults(spec: &Spec, out: &mut Vec<Finding>) {
     let ids: BTreeSet<u16> = spec
         .uavs
@@ -153,7 +138,7 @@ fn faults(spec: &Spec, out: &mut Vec<Finding>) {
             );
             tell(Severity::Error, text);
         }
-        if let Some(id) = named(&f.fault).iter().find(|id| !ids.contains(id)) {
+        if let Some(id) = f.fault.peers().iter().find(|id| !ids.contains(id)) {
             tell(
                 Severity::Error,
                 format!("the fault at {at_s} s names a peer {id} that is not there"),
@@ -171,6 +156,10 @@ fn faults(spec: &Spec, out: &mut Vec<Finding>) {
                     "peer {peer} is neither down nor paused at {at_s} s: nothing will happen"
                 );
                 tell(Severity::Warning, text);
+            }
+            Fault::Order { .. } | Fault::Rebase { .. } if spec.ground.is_none() => {
+                let text = format!("at {at_s} s there is no ground station to speak it");
+                tell(Severity::Error, text);
             }
             _ => {}
         }

@@ -14,6 +14,19 @@ pub const SYNC_MS: (u64, u64) = (5, 20);
 struct Pending {
     token: u64,
     record: Vec<u8>,
+    fails: bool,
+}
+
+/// What is wrong with a disk.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Trouble {
+    /// Nothing.
+    #[default]
+    None,
+    /// Writes that begin now fail.
+    Fails,
+    /// Writes that begin now take this much longer, milliseconds.
+    Slow(u32),
 }
 
 /// The disk of one peer. It outlives the peer's process.
@@ -24,6 +37,7 @@ pub struct Disk {
     busy_until_ms: u64,
     stream: Stream,
     torn: u64,
+    trouble: Trouble,
 }
 
 impl Disk {
@@ -36,23 +50,41 @@ impl Disk {
             busy_until_ms: 0,
             stream,
             torn: 0,
+            trouble: Trouble::None,
         }
     }
 
     /// Begins to write a record and says when it will be durable. Writes end in the
     /// order in which they began, like appends to one file.
     pub fn write(&mut self, now_ms: u64, token: u64, record: Vec<u8>) -> u64 {
-        let takes_ms = self.stream.between(SYNC_MS.0, SYNC_MS.1);
+        let slower_ms = match self.trouble {
+            Trouble::Slow(ms) => u64::from(ms),
+            Trouble::None | Trouble::Fails => 0,
+        };
+        let takes_ms = self.stream.between(SYNC_MS.0, SYNC_MS.1) + slower_ms;
         self.busy_until_ms = self.busy_until_ms.max(now_ms) + takes_ms;
-        self.pending.push_back(Pending { token, record });
+        self.pending.push_back(Pending {
+            token,
+            record,
+            fails: self.trouble == Trouble::Fails,
+        });
         self.busy_until_ms
     }
 
-    /// Ends the oldest write under way: its record is durable now. Returns its token.
-    pub fn sync(&mut self) -> Option<u64> {
+    /// Ends the oldest write under way. Returns its token, and whether its record is
+    /// durable now.
+    pub fn sync(&mut self) -> Option<(u64, bool)> {
         let p = self.pending.pop_front()?;
-        self.synced.push(p.record);
-        Some(p.token)
+        if !p.fails {
+            self.synced.push(p.record);
+        }
+        Some((p.token, !p.fails))
+    }
+
+    /// Something is wrong with it from now on, or nothing any more; writes under way end
+    /// as they began.
+    pub fn set_trouble(&mut self, trouble: Trouble) {
+        self.trouble = trouble;
     }
 
     /// Power is lost: what was not synced is gone. The oldest write may have reached
@@ -106,10 +138,26 @@ mod tests {
         let first = d.write(100, 1, vec![1]);
         let second = d.write(100, 2, vec![2]);
         assert!((105..=120).contains(&first) && second >= first + 5 && second <= 140);
-        assert_eq!(d.sync(), Some(1));
+        assert_eq!(d.sync(), Some((1, true)));
         d.crash();
         assert_eq!(d.records(), [vec![1u8]]);
         assert_eq!(d.sync(), None);
+    }
+
+    #[test]
+    fn a_disk_in_trouble_keeps_nothing_or_takes_its_time() {
+        let mut d = disk();
+        d.set_trouble(Trouble::Fails);
+        d.write(0, 1, vec![1]);
+        d.set_trouble(Trouble::Slow(3_000));
+        let late_ms = d.write(1_000, 2, vec![2]);
+        d.set_trouble(Trouble::None);
+        d.write(9_000, 3, vec![3]);
+        assert!((4_005..=4_020).contains(&late_ms), "{late_ms}");
+        assert_eq!(d.sync(), Some((1, false)));
+        assert_eq!(d.sync(), Some((2, true)));
+        assert_eq!(d.sync(), Some((3, true)));
+        assert_eq!(d.records(), [vec![2u8], vec![3]]);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Faults: one enum, for simulated and live swarms.
 
 use serde::{Deserialize, Serialize};
+pub use skein_behaviors::Order;
 use std::fmt;
 
 /// Something that goes wrong, or is put right. Peers are named by their numbers.
@@ -65,11 +66,79 @@ pub enum Fault {
         /// North of it, mm.
         north_mm: i32,
     },
+    /// The operator wants something of all UAVs: the ground station speaks it.
+    Order {
+        /// What.
+        order: Order,
+    },
+    /// Every write to the peer's journal fails.
+    FailStores {
+        /// Which peer.
+        peer: u16,
+    },
+    /// Every write to the peer's journal takes this much longer.
+    SlowStores {
+        /// Which peer.
+        peer: u16,
+        /// How much, milliseconds.
+        delay_ms: u32,
+    },
+    /// The peer's disk works as it should again.
+    HealStores {
+        /// Which peer.
+        peer: u16,
+    },
+    /// The peer's computer is busy with something else: it gets round to what has
+    /// arrived only this long after the first of it did, and then to all at once.
+    SlowComputer {
+        /// Which peer.
+        peer: u16,
+        /// How long, milliseconds; 0 ends it.
+        delay_ms: u32,
+    },
+    /// From now on the peer's clock gains on scenario time, or loses.
+    ClockDrift {
+        /// Which peer.
+        peer: u16,
+        /// Millionths gained; at most half, either way. 0 ends it.
+        ppm: i32,
+    },
+    /// The peer's clock jumps ahead. No clock of a peer goes back.
+    ClockJump {
+        /// Which peer.
+        peer: u16,
+        /// How far, milliseconds.
+        ahead_ms: u32,
+    },
     /// The share of transmissions lost on every link, in thousandths.
     Loss {
         /// Thousandths.
         permille: u16,
     },
+}
+
+impl Fault {
+    /// The peers that it names.
+    #[must_use]
+    pub fn peers(&self) -> Vec<u16> {
+        match self {
+            Self::Kill { peer }
+            | Self::KillComputer { peer }
+            | Self::Terminate { peer }
+            | Self::Pause { peer }
+            | Self::Resume { peer }
+            | Self::Restart { peer, .. }
+            | Self::FailStores { peer }
+            | Self::SlowStores { peer, .. }
+            | Self::HealStores { peer }
+            | Self::SlowComputer { peer, .. }
+            | Self::ClockDrift { peer, .. }
+            | Self::ClockJump { peer, .. } => vec![*peer],
+            Self::Cut { a, b, .. } => vec![*a, *b],
+            Self::Partition { groups } => groups.concat(),
+            Self::Heal | Self::Rebase { .. } | Self::Order { .. } | Self::Loss { .. } => Vec::new(),
+        }
+    }
 }
 
 impl fmt::Display for Fault {
@@ -91,6 +160,24 @@ impl fmt::Display for Fault {
             Self::Partition { groups } => write!(f, "partition {groups:?}"),
             Self::Heal => write!(f, "all links heal"),
             Self::Rebase { .. } => write!(f, "the operator moves the base"),
+            Self::Order { order } => write!(f, "the operator says {}", order.name()),
+            Self::FailStores { peer } => write!(f, "the disk of peer {peer} takes no writes"),
+            Self::SlowStores { peer, delay_ms } => {
+                write!(f, "writes of peer {peer} take {delay_ms} ms longer")
+            }
+            Self::HealStores { peer } => write!(f, "the disk of peer {peer} works again"),
+            Self::SlowComputer { peer, delay_ms: 0 } => {
+                write!(f, "the computer of peer {peer} is quick again")
+            }
+            Self::SlowComputer { peer, delay_ms } => {
+                write!(f, "the computer of peer {peer} is {delay_ms} ms late")
+            }
+            Self::ClockDrift { peer, ppm } => {
+                write!(f, "the clock of peer {peer} gains {ppm} millionths")
+            }
+            Self::ClockJump { peer, ahead_ms } => {
+                write!(f, "the clock of peer {peer} jumps {ahead_ms} ms ahead")
+            }
             Self::Loss { permille } => {
                 let percent = f64::from(*permille) / 10.0;
                 write!(f, "{percent:.1} % of transmissions are lost")

@@ -119,7 +119,14 @@ impl<'a> Baseline<'a> {
             | Fault::Partition { .. }
             | Fault::Heal
             | Fault::Loss { .. }
-            | Fault::Rebase { .. } => {}
+            | Fault::Rebase { .. }
+            | Fault::Order { .. }
+            | Fault::FailStores { .. }
+            | Fault::SlowStores { .. }
+            | Fault::HealStores { .. }
+            | Fault::SlowComputer { .. }
+            | Fault::ClockDrift { .. }
+            | Fault::ClockJump { .. } => {}
         }
     }
 

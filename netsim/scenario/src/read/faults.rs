@@ -4,13 +4,13 @@
 use crate::error::{Finding, ScenarioError, Severity};
 use crate::files::read_text;
 use skein_interop::json::{Document, Error, Fields, Node, suggestion};
-use skein_netsim::fault::{Fault, TimedFault};
+use skein_netsim::fault::{Fault, Order, TimedFault};
 use skein_netsim::spec::StormSpec;
 use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Kinds of faults and the fields that each has besides `at_s` and `kind`.
-const KINDS: [(&str, &[&str]); 10] = [
+const KINDS: [(&str, &[&str]); 18] = [
     ("kill", &["peer", "for_s", "fresh_disk"]),
     ("kill-computer", &["peer", "for_s", "fresh_disk"]),
     ("terminate", &["peer", "for_s", "fresh_disk"]),
@@ -21,6 +21,14 @@ const KINDS: [(&str, &[&str]); 10] = [
     ("partition", &["groups", "for_s"]),
     ("heal", &[]),
     ("loss", &["percent", "for_s"]),
+    ("rebase", &["east_m", "north_m"]),
+    ("order", &["order"]),
+    ("fail-stores", &["peer", "for_s"]),
+    ("slow-stores", &["peer", "delay_s", "for_s"]),
+    ("heal-stores", &["peer"]),
+    ("slow-computer", &["peer", "delay_s", "for_s"]),
+    ("clock-drift", &["peer", "gain_percent", "for_s"]),
+    ("clock-jump", &["peer", "ahead_s"]),
 ];
 
 /// Who there is, until when, and what a loss goes back to.
@@ -96,16 +104,10 @@ pub(crate) fn read(
 }
 
 fn names_known(fault: &Fault, known: &Known<'_>) -> bool {
+    let peers = fault.peers();
     match fault {
-        Fault::Kill { peer }
-        | Fault::KillComputer { peer }
-        | Fault::Terminate { peer }
-        | Fault::Pause { peer }
-        | Fault::Resume { peer }
-        | Fault::Restart { peer, .. } => known.has(*peer),
-        Fault::Cut { a, b, .. } => known.has(*a) && known.has(*b),
-        Fault::Partition { groups } => groups.iter().flatten().any(|p| known.has(*p)),
-        Fault::Heal | Fault::Loss { .. } | Fault::Rebase { .. } => true,
+        Fault::Partition { .. } => peers.iter().any(|p| known.has(*p)),
+        _ => peers.iter().all(|p| known.has(*p)),
     }
 }
 
@@ -147,7 +149,7 @@ fn groups(node: &Node<'_>, known: &Known<'_>) -> Result<Vec<Vec<u16>>, Error> {
 }
 
 /// Every field that some kind of fault has.
-const ALL: [&str; 10] = [
+const ALL: [&str; 16] = [
     "at_s",
     "kind",
     "for_s",
@@ -158,6 +160,12 @@ const ALL: [&str; 10] = [
     "one_way",
     "groups",
     "percent",
+    "east_m",
+    "north_m",
+    "order",
+    "delay_s",
+    "gain_percent",
+    "ahead_s",
 ];
 
 /// The kind of a fault, with no field that belongs to another kind.
@@ -212,6 +220,31 @@ fn one(item: &Node<'_>, known: &Known<'_>) -> Result<(TimedFault, Option<TimedFa
         "loss" => Fault::Loss {
             permille: permille(f.need("percent", "10")?)?,
         },
+        "rebase" => Fault::Rebase {
+            east_mm: millimetres(f.need("east_m", "120")?)?,
+            north_mm: millimetres(f.need("north_m", "-40")?)?,
+        },
+        "order" => Fault::Order {
+            order: order(f.need("order", "\"hold\"")?)?,
+        },
+        "fail-stores" => Fault::FailStores { peer: peer()? },
+        "slow-stores" => Fault::SlowStores {
+            peer: peer()?,
+            delay_ms: delay_ms(f.need("delay_s", "0.5")?)?,
+        },
+        "heal-stores" => Fault::HealStores { peer: peer()? },
+        "slow-computer" => Fault::SlowComputer {
+            peer: peer()?,
+            delay_ms: delay_ms(f.need("delay_s", "0.5")?)?,
+        },
+        "clock-drift" => Fault::ClockDrift {
+            peer: peer()?,
+            ppm: ppm(f.need("gain_percent", "2")?)?,
+        },
+        "clock-jump" => Fault::ClockJump {
+            peer: peer()?,
+            ahead_ms: delay_ms(f.need("ahead_s", "20")?)?,
+        },
         _ => Fault::Heal,
     };
     let end = match f.get("for_s") {
@@ -224,6 +257,46 @@ fn one(item: &Node<'_>, known: &Known<'_>) -> Result<(TimedFault, Option<TimedFa
         return Err(node.wrong("says how the peer restarts, so it needs for_s"));
     }
     Ok((TimedFault { at_ms, fault }, end))
+}
+
+fn order(node: &Node<'_>) -> Result<Order, Error> {
+    let text = node.text()?;
+    let names = Order::ALL.map(Order::name);
+    let found = Order::ALL.into_iter().find(|o| o.name() == text);
+    found.ok_or_else(|| {
+        node.wrong(format!(
+            "\"{text}\" is no order; {}",
+            suggestion(text, &names)
+        ))
+    })
+}
+
+/// Metres of a mission's plane as millimetres.
+#[allow(clippy::cast_possible_truncation, reason = "at most 100 km")]
+fn millimetres(node: &Node<'_>) -> Result<i32, Error> {
+    let metres = node.number(-100_000.0, 100_000.0, "metres from the origin")?;
+    Ok((metres * 1000.0).round() as i32)
+}
+
+/// A time of at most an hour as milliseconds.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "between 0 and an hour"
+)]
+fn delay_ms(node: &Node<'_>) -> Result<u32, Error> {
+    let seconds = node.number(0.0, 3600.0, "seconds")?;
+    Ok((seconds * 1000.0).round() as u32)
+}
+
+/// Per cent as millionths.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "between -50 and 50 per cent"
+)]
+fn ppm(node: &Node<'_>) -> Result<i32, Error> {
+    let percent = node.number(-50.0, 50.0, "per cent")?;
+    Ok((percent * 10_000.0).round() as i32)
 }
 
 fn cut(f: &Fields<'_>, known: &Known<'_>) -> Result<Fault, Error> {
@@ -262,6 +335,17 @@ fn ending(
         Fault::Pause { peer } => Fault::Resume { peer: *peer },
         Fault::Loss { .. } => Fault::Loss {
             permille: known.loss_permille,
+        },
+        Fault::FailStores { peer } | Fault::SlowStores { peer, .. } => {
+            Fault::HealStores { peer: *peer }
+        }
+        Fault::SlowComputer { peer, .. } => Fault::SlowComputer {
+            peer: *peer,
+            delay_ms: 0,
+        },
+        Fault::ClockDrift { peer, .. } => Fault::ClockDrift {
+            peer: *peer,
+            ppm: 0,
         },
         _ => Fault::Heal,
     };
@@ -417,6 +501,25 @@ mod tests {
                 "{at_s:1, kind:'loss', percent:12.5, for_s:20}",
                 Fault::Loss { permille: 0 },
             ),
+            (
+                "{at_s:1, kind:'fail-stores', peer:2, for_s:20}",
+                Fault::HealStores { peer: 2 },
+            ),
+            (
+                "{at_s:1, kind:'slow-stores', peer:2, delay_s:3, for_s:20}",
+                Fault::HealStores { peer: 2 },
+            ),
+            (
+                "{at_s:1, kind:'slow-computer', peer:2, delay_s:0.4, for_s:20}",
+                Fault::SlowComputer {
+                    peer: 2,
+                    delay_ms: 0,
+                },
+            ),
+            (
+                "{at_s:1, kind:'clock-drift', peer:2, gain_percent:-3, for_s:20}",
+                Fault::ClockDrift { peer: 2, ppm: 0 },
+            ),
         ];
         for (text, end) in cases {
             let faults = plan(text).unwrap();
@@ -426,6 +529,56 @@ mod tests {
                 (21_000, &end),
                 "{text}"
             );
+        }
+    }
+
+    #[test]
+    fn units_of_a_file_become_those_of_a_run() {
+        let cases = [
+            (
+                "{at_s:1, kind:'rebase', east_m:12.5, north_m:-3}",
+                Fault::Rebase {
+                    east_mm: 12_500,
+                    north_mm: -3_000,
+                },
+            ),
+            (
+                "{at_s:1, kind:'order', order:'return-to-base'}",
+                Fault::Order {
+                    order: Order::ReturnToBase,
+                },
+            ),
+            (
+                "{at_s:1, kind:'slow-stores', peer:3, delay_s:0.25}",
+                Fault::SlowStores {
+                    peer: 3,
+                    delay_ms: 250,
+                },
+            ),
+            (
+                "{at_s:1, kind:'slow-computer', peer:3, delay_s:1.5}",
+                Fault::SlowComputer {
+                    peer: 3,
+                    delay_ms: 1500,
+                },
+            ),
+            (
+                "{at_s:1, kind:'clock-drift', peer:3, gain_percent:-2.5}",
+                Fault::ClockDrift {
+                    peer: 3,
+                    ppm: -25_000,
+                },
+            ),
+            (
+                "{at_s:1, kind:'clock-jump', peer:3, ahead_s:20}",
+                Fault::ClockJump {
+                    peer: 3,
+                    ahead_ms: 20_000,
+                },
+            ),
+        ];
+        for (text, want) in cases {
+            assert_eq!(plan(text).unwrap()[0].fault, want, "{text}");
         }
     }
 
@@ -469,6 +622,18 @@ mod tests {
                 "faults[0].groups: names no peer",
             ),
             ("{at_s:1, kind:'cut', a:1, b:1}", "faults[0].b: both ends"),
+            (
+                "{at_s:1, kind:'order', order:'land'}",
+                "faults[0].order: \"land\" is no order",
+            ),
+            (
+                "{at_s:1, kind:'clock-drift', peer:2, gain_percent:60}",
+                "faults[0].gain_percent: 60 is out of range",
+            ),
+            (
+                "{at_s:1, kind:'clock-jump', peer:2, ahead_s:-1}",
+                "faults[0].ahead_s: -1 is out of range",
+            ),
             (
                 "{at_s:1, kind:'kill', peer:1, fresh_disk:true}",
                 "faults[0].fresh_disk: says how",

@@ -1,9 +1,10 @@
 //! What each fault does to a simulated swarm. A fault that does not fit the state of
 //! its peer (restarting one that runs) changes nothing.
 
-use super::sim_peer::Process;
+use super::sim_peer::{Clock, Process};
 use super::{Event, Kind, Phase, Swarm, What};
 use crate::account::Cause;
+use crate::disk::Trouble;
 use crate::fault::Fault;
 use skein_peer::input::Command;
 use skein_peer::{Input, Role};
@@ -54,6 +55,25 @@ impl Swarm {
             Fault::Rebase { east_mm, north_mm } => {
                 self.revise((*east_mm, *north_mm));
                 0
+            }
+            Fault::Order { order } => {
+                self.operate(Command::Order(*order));
+                0
+            }
+            Fault::FailStores { peer } => self.trouble(*peer, Trouble::Fails),
+            Fault::SlowStores { peer, delay_ms } => self.trouble(*peer, Trouble::Slow(*delay_ms)),
+            Fault::HealStores { peer } => self.trouble(*peer, Trouble::None),
+            Fault::SlowComputer { peer, delay_ms } => {
+                self.slow(*peer, u64::from(*delay_ms));
+                *peer
+            }
+            Fault::ClockDrift { peer, ppm } => {
+                let now_ms = self.now_ms;
+                self.set_clock(*peer, |clock| clock.drift(now_ms, *ppm))
+            }
+            Fault::ClockJump { peer, ahead_ms } => {
+                let now_ms = self.now_ms;
+                self.set_clock(*peer, |clock| clock.jump(now_ms, u64::from(*ahead_ms)))
             }
             Fault::Loss { permille } => {
                 self.loss_max_permille = self.loss_max_permille.max(*permille);
@@ -132,16 +152,49 @@ impl Swarm {
         mission.revision += 1;
         mission.base = base;
         self.mission = Arc::new(mission);
+        self.operate(Command::Mission(Arc::clone(&self.mission)));
+    }
+
+    /// The operator says something at the ground station, if it runs.
+    fn operate(&mut self, command: Command) {
         let ground = self
             .peers
             .iter()
-            .position(|s| s.config.role == Role::GroundStation);
+            .position(|p| p.config.role == Role::GroundStation);
         if let Some(idx) = ground
             && self.peers[idx].process == Process::Running
         {
-            let command = Command::Mission(Arc::clone(&self.mission));
             self.feed(idx, Input::Command(command));
         }
+    }
+
+    fn trouble(&mut self, peer: u16, trouble: Trouble) -> u16 {
+        if let Some(idx) = self.peer_idx(peer) {
+            self.peers[idx].disk.set_trouble(trouble);
+        }
+        peer
+    }
+
+    /// A computer that becomes quicker gets round to what waits at once.
+    fn slow(&mut self, peer: u16, slow_ms: u64) {
+        if let Some(idx) = self.peer_idx(peer) {
+            let quicker = slow_ms < self.peers[idx].slow_ms;
+            self.peers[idx].slow_ms = slow_ms;
+            if quicker && self.peers[idx].process == Process::Running {
+                self.catch_up(idx);
+            }
+        }
+    }
+
+    /// The peer asks for its next timer anew: it comes at another time now.
+    fn set_clock(&mut self, peer: u16, change: impl FnOnce(&mut Clock)) -> u16 {
+        if let Some(idx) = self.peer_idx(peer) {
+            change(&mut self.peers[idx].clock);
+            if self.peers[idx].process == Process::Running {
+                self.schedule_timer(idx);
+            }
+        }
+        peer
     }
 
     fn pause(&mut self, id: u16) {

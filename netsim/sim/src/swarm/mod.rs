@@ -78,6 +78,11 @@ enum Event {
         answer: JobResult,
     },
     Receive(Vec<Delivery>),
+    /// A slow computer gets round to what has arrived.
+    CatchUp {
+        idx: usize,
+        boot: u32,
+    },
     Judge,
 }
 
@@ -266,10 +271,10 @@ impl Swarm {
             Event::Timer { idx, boot, due_ms } => self.timer(idx, boot, due_ms),
             Event::Stored { idx, boot } => {
                 if self.peers[idx].boots == boot
-                    && let Some(token) = self.peers[idx].disk.sync()
+                    && let Some((token, ok)) = self.peers[idx].disk.sync()
                 {
                     self.fold(idx, Kind::Stored, token);
-                    self.feed(idx, Input::Stored { token, ok: true });
+                    self.feed(idx, Input::Stored { token, ok });
                 }
             }
             Event::Planned {
@@ -290,6 +295,11 @@ impl Swarm {
                 }
             }
             Event::Receive(deliveries) => self.receive(deliveries),
+            Event::CatchUp { idx, boot } => {
+                if self.peers[idx].boots == boot && self.peers[idx].process == Process::Running {
+                    self.catch_up(idx);
+                }
+            }
             Event::Judge => self.judge(),
         }
     }
@@ -360,7 +370,7 @@ impl Swarm {
             .peer
             .as_ref()
             .and_then(skein_peer::Peer::next_timeout)
-            .map(|t| t.0.saturating_sub(s.offset_ms));
+            .map(|t| s.clock.when_ms(t));
         // The peer may want it later by now: then no input is spent.
         if wants_ms.is_some_and(|w| w <= self.now_ms) {
             self.fold(idx, Kind::Timer, 0);
@@ -377,7 +387,7 @@ impl Swarm {
             return;
         };
         // At least a millisecond ahead: a peer that wants "now" after its timer must not stop time.
-        let due_ms = wants.0.saturating_sub(s.offset_ms).max(now_ms + 1);
+        let due_ms = s.clock.when_ms(wants).max(now_ms + 1);
         if s.timer_ms.is_none_or(|t| due_ms < t || t <= now_ms) {
             s.timer_ms = Some(due_ms);
             let boot = s.boots;
@@ -444,19 +454,41 @@ impl Swarm {
         }
     }
 
-    /// Gives one input to a peer and does what it says.
+    /// Gives one input to a peer, now or when its process gets round to it.
     fn feed(&mut self, idx: usize, input: Input) {
         let now_ms = self.now_ms;
         let s = &mut self.peers[idx];
         match s.process {
-            Process::Stopped => return,
-            Process::Paused => return s.wait(input),
-            Process::Running => {}
+            Process::Stopped => {}
+            Process::Paused => s.wait(input),
+            Process::Running if s.slow_ms > 0 => {
+                if s.inbox.is_empty() {
+                    let (boot, at_ms) = (s.boots, now_ms + s.slow_ms);
+                    self.queue
+                        .push(at_ms, Phase::Decide, Event::CatchUp { idx, boot });
+                }
+                self.peers[idx].wait(input);
+            }
+            Process::Running => self.handle(idx, input),
         }
+    }
+
+    /// What has waited is handled at once, in order.
+    fn catch_up(&mut self, idx: usize) {
+        let waiting: Vec<Input> = self.peers[idx].inbox.drain(..).collect();
+        for input in waiting {
+            self.handle(idx, input);
+        }
+    }
+
+    /// Gives one input to a peer and does what it says.
+    fn handle(&mut self, idx: usize, input: Input) {
+        let now_ms = self.now_ms;
+        let s = &mut self.peers[idx];
         let Some(mut peer) = s.peer.take() else {
             return;
         };
-        peer.handle(s.clock(now_ms), input);
+        peer.handle(s.clock.reads(now_ms), input);
         while let Some(output) = peer.poll() {
             self.perform(idx, output);
         }

@@ -12,6 +12,56 @@ pub const INBOX_CAP: usize = 256;
 /// The largest difference between a peer's clock at its boot and scenario time, milliseconds.
 const MAX_OFFSET_MS: u64 = 60_000;
 
+/// The clock of a computer: set at every start, at a rate of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Clock {
+    set_ms: u64,
+    showed_ms: u64,
+    ppm: i32,
+}
+
+/// The largest drift that a clock may have, millionths.
+pub const MAX_DRIFT_PPM: i32 = 500_000;
+
+impl Clock {
+    const MILLION: u64 = 1_000_000;
+
+    fn rate(self) -> u64 {
+        Self::MILLION.saturating_add_signed(i64::from(self.ppm))
+    }
+
+    /// It shows `shows_ms` at `now_ms`.
+    fn set(&mut self, now_ms: u64, shows_ms: u64) {
+        self.set_ms = now_ms;
+        self.showed_ms = shows_ms;
+    }
+
+    /// What it shows at `now_ms`.
+    #[must_use]
+    pub fn reads(self, now_ms: u64) -> Time {
+        let since_ms = now_ms.saturating_sub(self.set_ms);
+        Time(self.showed_ms + since_ms * self.rate() / Self::MILLION)
+    }
+
+    /// The first scenario time at which it shows at least `time`, milliseconds.
+    #[must_use]
+    pub fn when_ms(self, time: Time) -> u64 {
+        let ahead_ms = time.0.saturating_sub(self.showed_ms);
+        self.set_ms + (ahead_ms * Self::MILLION).div_ceil(self.rate())
+    }
+
+    /// From now on it gains so many millionths, and goes on at what it shows.
+    pub fn drift(&mut self, now_ms: u64, ppm: i32) {
+        self.set(now_ms, self.reads(now_ms).0);
+        self.ppm = ppm.clamp(-MAX_DRIFT_PPM, MAX_DRIFT_PPM);
+    }
+
+    /// It jumps ahead.
+    pub fn jump(&mut self, now_ms: u64, ahead_ms: u64) {
+        self.set(now_ms, self.reads(now_ms).0 + ahead_ms);
+    }
+}
+
 /// What a process does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Process {
@@ -36,8 +86,10 @@ pub struct SimPeer {
     pub airframe: bool,
     /// How often it was started; answers to an earlier start are void.
     pub boots: u32,
-    /// Its clock less scenario time, milliseconds.
-    pub offset_ms: u64,
+    /// Its clock.
+    pub clock: Clock,
+    /// How long it takes to get round to what arrives, milliseconds; 0 for a quick one.
+    pub slow_ms: u64,
     /// When its process last started or went on, milliseconds.
     pub since_ms: u64,
     /// Its disk.
@@ -48,7 +100,7 @@ pub struct SimPeer {
     pub timer_ms: Option<u64>,
     /// Whether it held that the mission is finished when last judged.
     pub finished: bool,
-    clock: Stream,
+    clock_draws: Stream,
     nonce: Stream,
 }
 
@@ -57,21 +109,22 @@ impl SimPeer {
     #[must_use]
     pub fn new(seed: u64, mut config: PeerConfig) -> Self {
         let id = config.id.0;
-        let mut clock = Stream::new(seed, Concern::Peer(id));
-        config.seed = clock.any();
+        let mut clock_draws = Stream::new(seed, Concern::Peer(id));
+        config.seed = clock_draws.any();
         Self {
             config,
             peer: None,
             process: Process::Stopped,
             airframe: false,
             boots: 0,
-            offset_ms: 0,
+            clock: Clock::default(),
+            slow_ms: 0,
             since_ms: 0,
             disk: Disk::new(Stream::new(seed, Concern::Disk(id))),
             inbox: VecDeque::new(),
             timer_ms: None,
             finished: false,
-            clock,
+            clock_draws,
             nonce: Stream::new(seed, Concern::Nonce(id)),
         }
     }
@@ -85,13 +138,14 @@ impl SimPeer {
     /// When it is switched on for the first time, milliseconds: no two computers of a
     /// fleet start in the same instant, and peers that did would send in step for ever.
     pub fn first_boot_ms(&mut self, latest_ms: u64) -> u64 {
-        self.clock.between(0, latest_ms)
+        self.clock_draws.between(0, latest_ms)
     }
 
     /// Starts a process, with a clock of its own, and returns its first input.
     pub fn start(&mut self, now_ms: u64) -> Input {
         self.boots += 1;
-        self.offset_ms = self.clock.between(0, MAX_OFFSET_MS);
+        let offset_ms = self.clock_draws.between(0, MAX_OFFSET_MS);
+        self.clock.set(now_ms, now_ms + offset_ms);
         self.since_ms = now_ms;
         self.process = Process::Running;
         self.timer_ms = None;
@@ -125,20 +179,49 @@ impl SimPeer {
         }
     }
 
-    /// The time on its own clock.
-    #[must_use]
-    pub fn clock(&self, now_ms: u64) -> Time {
-        Time(now_ms + self.offset_ms)
-    }
-
-    /// Keeps an input for later. Of percepts only the newest counts.
+    /// Keeps an input for later. Of percepts only the newest counts, and only what came
+    /// by radio is ever dropped: answers of disk and planner are the process's own.
     pub fn wait(&mut self, input: Input) {
         if matches!(input, Input::Percept(_)) {
             self.inbox.retain(|i| !matches!(i, Input::Percept(_)));
         }
-        if self.inbox.len() >= INBOX_CAP {
-            self.inbox.pop_front();
+        let received = |i: &Input| matches!(i, Input::Received { .. });
+        if self.inbox.len() >= INBOX_CAP
+            && let Some(oldest) = self.inbox.iter().position(received)
+        {
+            self.inbox.remove(oldest);
         }
         self.inbox.push_back(input);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_never_goes_back_and_finds_the_instant_at_which_it_shows_a_time() {
+        let mut clock = Clock::default();
+        clock.set(1_000, 31_000);
+        let mut before = clock.reads(1_000);
+        for (from_ms, ppm, ahead_ms) in [
+            (1_000, 0, 0),
+            (5_000, 20_000, 0),
+            (9_000, -400_000, 700),
+            (12_000, 0, 0),
+        ] {
+            clock.drift(from_ms, ppm);
+            clock.jump(from_ms, ahead_ms);
+            for now_ms in from_ms..from_ms + 500 {
+                let shows = clock.reads(now_ms);
+                assert!(shows >= before);
+                before = shows;
+                let first_ms = clock.when_ms(shows);
+                assert!(first_ms <= now_ms && clock.reads(first_ms) >= shows);
+                assert!(first_ms == from_ms || clock.reads(first_ms - 1) < shows);
+            }
+        }
+        // 4 s true, 4 s with 2 % more, 3 s with 40 % less after a jump.
+        assert_eq!(clock.reads(12_000).0, 31_000 + 4_000 + 4_080 + 700 + 1_800);
     }
 }

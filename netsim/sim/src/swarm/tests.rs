@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::account::Cause;
-use crate::fault::Fault;
+use crate::fault::{Fault, Order};
 use crate::runs::{self, Wanted};
 use crate::world::fixture;
 use skein_flight::trajectory::wind::Wind;
@@ -199,4 +199,220 @@ fn who_is_out_of_fuel_is_gone_and_an_impossible_mission_ends_at_its_longest_time
     let o = run(&Prepared::new(spec), 1, Vec::new(), false);
     assert!(!o.report.completed && o.report.end_ms <= 60_000);
     assert_eq!(o.report.violations.unwrap().counts.get("L5"), Some(&1));
+}
+
+fn run_with(n_uavs: u16, seed: u64, faults: Vec<TimedFault>) -> Outcome {
+    run(&prepared(n_uavs), seed, faults, true)
+}
+
+/// Reports of one kind by one peer, as far as `wanted` takes them.
+fn reports(o: &Outcome, by: u16, wanted: impl Fn(&Report) -> bool) -> Vec<u64> {
+    let of = |e: &crate::history::Entry| match &e.what {
+        What::Report { peer, report } if *peer == by && wanted(report) => Some(e.time_ms),
+        _ => None,
+    };
+    o.entries.iter().filter_map(of).collect()
+}
+
+#[test]
+fn a_peer_whose_disk_takes_no_writes_says_so_and_is_of_use_again_when_it_does() {
+    let faults = vec![
+        at(20_000, Fault::FailStores { peer: 2 }),
+        at(50_000, Fault::HealStores { peer: 2 }),
+    ];
+    let o = run_with(3, 6, faults);
+    passed(&o);
+    let alarms = reports(
+        &o,
+        2,
+        |r| matches!(r, Report::Alarm { text } if text.contains("journal")),
+    );
+    assert!(!alarms.is_empty(), "a write failed and nobody was told");
+    assert!(
+        alarms.iter().all(|t| (20_000..51_000).contains(t)),
+        "{alarms:?}"
+    );
+}
+
+#[test]
+fn what_a_slow_disk_holds_up_is_spoken_late_and_breaks_no_rule() {
+    let slow = Fault::SlowStores {
+        peer: 2,
+        delay_ms: 3_000,
+    };
+    let claims = |o: &Outcome| {
+        reports(
+            o,
+            2,
+            |r| matches!(r, Report::Claim { legs, .. } if !legs.is_empty()),
+        )
+    };
+    let (quick, late) = (
+        run_with(3, 6, Vec::new()),
+        run_with(3, 6, vec![at(0, slow)]),
+    );
+    passed(&quick);
+    passed(&late);
+    let (quick, late) = (claims(&quick), claims(&late));
+    // Its bid and its section are written before they are spoken.
+    assert!(late[0] > quick[0] + 3_000, "{late:?} {quick:?}");
+}
+
+#[test]
+fn a_slow_computer_slows_the_swarm_and_breaks_no_rule() {
+    let slow = Fault::SlowComputer {
+        peer: 3,
+        delay_ms: 700,
+    };
+    let quick = Fault::SlowComputer {
+        peer: 3,
+        delay_ms: 0,
+    };
+    let o = run_with(3, 8, vec![at(15_000, slow.clone()), at(45_000, quick)]);
+    passed(&o);
+    // Late ends are late: with a computer that stays slow the last report comes later.
+    let ready = |o: &Outcome| reports(o, 3, |r| matches!(r, Report::Ready { .. }))[0];
+    let slow = run_with(3, 8, vec![at(0, slow)]);
+    completed(&slow);
+    assert!(
+        ready(&slow) >= ready(&o) + 500,
+        "{} {}",
+        ready(&slow),
+        ready(&o)
+    );
+}
+
+#[test]
+fn clocks_that_drift_and_jump_end_nobody() {
+    let faults = vec![
+        at(
+            5_000,
+            Fault::ClockDrift {
+                peer: 1,
+                ppm: 20_000,
+            },
+        ),
+        at(
+            5_000,
+            Fault::ClockDrift {
+                peer: 2,
+                ppm: -20_000,
+            },
+        ),
+        at(
+            30_000,
+            Fault::ClockJump {
+                peer: 3,
+                ahead_ms: 1_500,
+            },
+        ),
+    ];
+    let o = run_with(3, 9, faults);
+    passed(&o);
+    assert!(o.false_downs().is_empty(), "{:?}", o.false_downs());
+}
+
+#[test]
+fn a_peer_that_is_heard_and_hears_nobody_comes_back() {
+    let deaf = |tx: u16| {
+        at(
+            30_000,
+            Fault::Cut {
+                a: tx,
+                b: 3,
+                one_way: true,
+            },
+        )
+    };
+    let mut faults: Vec<TimedFault> = [1, 2, fixture::GROUND_ID].map(deaf).into();
+    faults.push(at(50_000, Fault::Heal));
+    let o = run_with(3, 10, faults);
+    completed(&o);
+    // It took the others for dead, and they knew it alive all the time.
+    let downs = |by: u16| reports(&o, by, is_down).len();
+    assert!(downs(3) >= 2, "{}", downs(3));
+    assert_eq!(downs(1) + downs(2), 0);
+}
+
+fn is_down(r: &Report) -> bool {
+    use skein_peer::output::Status;
+    matches!(
+        r,
+        Report::Membership {
+            status: Status::Down,
+            ..
+        }
+    )
+}
+
+#[test]
+fn an_order_to_hold_stops_the_work_until_it_is_to_go_on() {
+    let faults = vec![
+        at(30_000, Fault::Order { order: Order::Hold }),
+        at(
+            90_000,
+            Fault::Order {
+                order: Order::Resume,
+            },
+        ),
+    ];
+    let mut swarm = Swarm::new(&prepared(3), 11, faults, false);
+    let covered = |s: &mut Swarm, until_ms: u64| {
+        s.run_until(until_ms);
+        s.air.judge().n_covered()
+    };
+    let (early, held, late) = (
+        covered(&mut swarm, 29_000),
+        covered(&mut swarm, 45_000),
+        covered(&mut swarm, 89_000),
+    );
+    assert!(early > 0 && early <= held);
+    assert_eq!(held, late, "all UAVs circle");
+    let o = swarm.run();
+    completed(&o);
+    assert!(o.report.makespan_ms.unwrap() > 90_000);
+}
+
+#[test]
+fn an_order_to_return_brings_all_uavs_to_the_base() {
+    let order = Order::ReturnToBase;
+    let mut swarm = Swarm::new(
+        &prepared(3),
+        12,
+        vec![at(30_000, Fault::Order { order })],
+        false,
+    );
+    swarm.run_until(120_000);
+    let (east_mm, north_mm) = swarm.mission.base;
+    for id in [1, 2, 3] {
+        let pose = swarm.pose(id).unwrap();
+        let away_m = (pose.east_m - f64::from(east_mm) / 1000.0)
+            .hypot(pose.north_m - f64::from(north_mm) / 1000.0);
+        // Two turn radii of the fixture's airframe, and room for the way in.
+        assert!(away_m < 120.0, "uav{id} is {away_m:.0} m from the base");
+    }
+}
+
+#[test]
+fn a_ground_station_that_is_restarted_takes_part_again() {
+    for fresh_disk in [false, true] {
+        let station = fixture::GROUND_ID;
+        let faults = vec![
+            at(25_000, Fault::Kill { peer: station }),
+            at(
+                40_000,
+                Fault::Restart {
+                    peer: station,
+                    fresh_disk,
+                },
+            ),
+        ];
+        let o = run_with(3, 13, faults);
+        passed(&o);
+        let k = &o.report.kills[0];
+        assert_eq!((k.peer, k.cells_held), (station, 0));
+        assert_eq!(k.detections_ms.len(), 3, "{k:?}");
+        let ready = reports(&o, station, |r| matches!(r, Report::Ready { .. }));
+        assert!(ready.iter().any(|t| *t > 40_000), "{ready:?}");
+    }
 }
