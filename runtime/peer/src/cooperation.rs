@@ -7,567 +7,724 @@
 //! | the operator said return, or all is covered, or the fuel is due | loiter at base |
 //! | the plan has cells | fly them |
 //! | nothing to fly, others at work | loiter here, at the seam |
-
-pub(crate) use crate::mission_state::{consider_mission, geometry_arrived};
+//!
+//! | event | what follows |
+//! |---|---|
+//! | a newer mission is whole | its geometry is asked for, once |
+//! | the geometry arrives | the mission begins; claims and bids held are heard again |
+//! | there is no geometry | an alarm; the old mission stays |
+//! | a percept | a setpoint; what the camera saw is covered, told, and durable every 5 cells |
+//! | the fuel is due | an alarm; the plan is given up; home |
+//! | a claim or a bid of this loop | the negotiation ticks |
+//! | covered cells that are news | they are spoken |
+//! | a beacon of this loop with other coverage | the own is spoken |
+//! | a beacon of this revision and another loop | an alarm, once |
+//! | a tick | the negotiation ticks, the end is noticed, the goal follows |
+//! | a bid is durable | it is spoken, if its round is still open |
+//! | a division, a take is durable | it is flown and spoken, if nothing was written after it |
+//! | a store failed | what was promised does not happen |
 
 use crate::beliefs::Beliefs;
 use crate::cells::CellSet;
-use crate::config::Role;
-use crate::journal::Entry;
+use crate::config::{PeerConfig, Role};
+use crate::effect::{Effect, Effects, PendingJob, Promise};
+use crate::input::Time;
+use crate::journal::{Durable, Entry};
+use crate::mission::{GeometryError, Library, Mission};
 use crate::mission_state::MissionState;
-use crate::offload::Job;
-use crate::outbound;
+use crate::offload::{Job, MissionGeometry};
 use crate::output::Report;
-use crate::peer::{Peer, PendingJob, Promise};
 use crate::protocol::division;
+use crate::protocol::membership::Membership;
 use crate::protocol::negotiation::{Action, Adoption, Context};
-use crate::protocol::runs::PlannedCell;
+use crate::protocol::runs::{PlannedCell, legs_of};
 use crate::protocol::sections::LivePeers;
-use crate::wire::message::{Bid, Epoch, Member, Order};
+use crate::timers::{Timer, Timers};
+use crate::wire::codec::Body;
+use crate::wire::limits::BID_COVERED_MAX_BYTES;
+use crate::wire::message::{Beacon, Bid, Epoch, Member, Order, Record};
+use crate::{Incarnation, PeerId};
 use skein_behaviors::{Event, Goal, Percept};
 use skein_flight::coverage::ring::Direction;
-use skein_flight::coverage::ring::backtracking::{Division, Leg};
+use skein_flight::coverage::ring::backtracking::Division;
 use std::sync::Arc;
-
-/// Most bytes of the union in a bid: a bid must stay short on the air, and a
-/// forgotten run only means that somebody looks twice.
-pub const BID_COVERED_MAX_BYTES: usize = 256;
 
 /// Own coverage is made durable every so many cells: a crash costs at most these.
 pub const CELLS_PER_COVERED_RECORD: u16 = 5;
-
-/// A percept: fly, and note what the camera saw.
-pub(crate) fn fly(peer: &mut Peer, percept: &Percept) {
-    let Some(mission_state) = &mut peer.mission_state else {
-        return;
-    };
-    let sections = &mission_state.negotiation.sections;
-    let Some(executive) = &mut mission_state.executive else {
-        return;
-    };
-    let (setpoint, events) = executive.step(percept, &|c| !sections.covered().contains(c));
-    peer.outputs.push_back(crate::Output::Setpoint(setpoint));
-    for event in events {
-        on_event(peer, event);
-    }
-}
-
-fn on_event(peer: &mut Peer, event: Event) {
-    let Some(mission_state) = &mut peer.mission_state else {
-        return;
-    };
-    match event {
-        Event::Seen(ids) => {
-            let n = mission_state.covered().capacity();
-            let mut seen = CellSet::new(n);
-            for id in ids {
-                if let Some(i) = mission_state.geometry.coverage_loop.index_of(id) {
-                    seen.insert(i);
-                }
-            }
-            seen.subtract(mission_state.covered());
-            if seen.count() == 0 {
-                return;
-            }
-            mission_state.negotiation.sections.cover(&seen);
-            mission_state.negotiation.covered_myself(seen.count());
-            mission_state.unsaved_cells = mission_state.unsaved_cells.saturating_add(seen.count());
-            peer.report(Report::Covered {
-                cells: seen.iter().collect(),
-            });
-            peer.outbound.cover_changed = true;
-            save_covered(peer, false);
-        }
-        Event::PlanDone => {
-            mission_state.replan |= !mission_state.negotiation.sections.plan().is_empty()
-        }
-        Event::Arrived => {}
-        Event::Refused { cells } => {
-            mission_state.negotiation.sections.give_up(&cells);
-            mission_state.replan = true;
-            peer.outbound.claim_changed = true;
-            peer.alarm("a cell could not be reached clear of the zones; it was given up");
-        }
-    }
-}
-
-fn save_covered(peer: &mut Peer, now: bool) {
-    let Some(mission_state) = &mut peer.mission_state else {
-        return;
-    };
-    if mission_state.unsaved_cells >= CELLS_PER_COVERED_RECORD
-        || (now && mission_state.unsaved_cells > 0)
-    {
-        mission_state.unsaved_cells = 0;
-        let entry = Entry::Covered {
-            loop_hash: mission_state.loop_hash(),
-            cells: mission_state.covered().capacity(),
-            covered: mission_state.covered().encode_rle(None),
-        };
-        peer.store(Promise::Covered, entry);
-    }
-}
-
-/// Looks at everything that depends on time.
-pub(crate) fn tick(peer: &mut Peer) {
-    consider_mission(peer);
-    let able = can_plan(peer);
-    let live: LivePeers = peer.membership.live().collect();
-    let members = members(peer, able);
-    let diameter = peer.membership.diameter(peer.now);
-    let (now, period_ms) = (peer.now, peer.period_ms());
-    let Some(mission_state) = &mut peer.mission_state else {
-        return;
-    };
-    mission_state.able_since = if able {
-        mission_state.able_since.or(Some(now))
-    } else {
-        None
-    };
-    let lost = mission_state
-        .live
-        .iter()
-        .any(|(id, inc)| live.get(id) != Some(inc));
-    mission_state.live.clone_from(&live);
-    if lost {
-        mission_state.negotiation.note_loss();
-    }
-    let ctx = Context {
-        now,
-        period_ms,
-        live: &live,
-        members: &members,
-        diameter,
-        able_since: mission_state.able_since,
-        revision: mission_state.revision(),
-        loop_hash: mission_state.loop_hash(),
-    };
-    let coverage_loop = Arc::clone(&mission_state.geometry.coverage_loop);
-    let actions = mission_state.negotiation.tick(&ctx, &coverage_loop);
-    for action in actions {
-        on_action(peer, action);
-    }
-    finish(peer);
-    steer(peer);
-}
-
-/// Whether this peer can take part in planning now.
-fn can_plan(peer: &mut Peer) -> bool {
-    let speaks = peer.life.speaks(peer.now);
-    let resume = peer.order.order == Order::Resume;
-    let Some(mission_state) = &mut peer.mission_state else {
-        return false;
-    };
-    if peer.percept.is_some()
-        && !mission_state.exhausted
-        && mission_state.spendable_ms(peer.percept.as_ref()) == 0
-    {
-        mission_state.exhausted = true;
-        mission_state.negotiation.sections.keep(0);
-        mission_state.replan = true;
-        peer.outbound.claim_changed = true;
-        if mission_state.executive.is_some() {
-            peer.alarm("the fuel is due: returning to base");
-        }
-    }
-    peer.mission_state.as_ref().is_some_and(|c| {
-        peer.config.role == Role::Uav
-            && c.executive.is_some()
-            && peer.percept.is_some()
-            && !c.exhausted
-    }) && speaks
-        && resume
-}
-
-/// Live UAVs on our ground whose beacon says able, this peer included.
-fn members(peer: &Peer, able: bool) -> Vec<Member> {
-    let Some(mission_state) = &peer.mission_state else {
-        return Vec::new();
-    };
-    let mut members: Vec<Member> = peer
-        .membership
-        .live()
-        .filter(|(id, _)| {
-            peer.membership.info(*id).is_some_and(|i| {
-                i.able && !i.ground_station && i.loop_hash == mission_state.loop_hash()
-            })
-        })
-        .map(|(id, incarnation)| Member { id, incarnation })
-        .collect();
-    if able {
-        members.push(Member {
-            id: peer.config.id.0,
-            incarnation: peer.life.incarnation,
-        });
-    }
-    members.sort_unstable();
-    members
-}
-
-fn on_action(peer: &mut Peer, action: Action) {
-    match action {
-        Action::Bid => {
-            if let Some(bid) = bid(peer) {
-                let members = bid
-                    .round
-                    .members
-                    .iter()
-                    .map(|m| crate::PeerId(m.id))
-                    .collect();
-                peer.report(Report::Round {
-                    counter: bid.round.counter,
-                    members,
-                });
-                let entry = Entry::Bid(bid.clone());
-                peer.store(Promise::Bid(Box::new(bid)), entry);
-            }
-        }
-        Action::Divide {
-            epoch,
-            ring,
-            robots,
-        } => {
-            peer.ask(PendingJob::Division(epoch), Job::Divide { ring, robots });
-        }
-        Action::Take(mut taken) => {
-            let Some(mission_state) = &mut peer.mission_state else {
-                return;
-            };
-            if mission_state.answered < mission_state.written {
-                mission_state.negotiation.take(&[]);
-                return;
-            }
-            let sections = &mission_state.negotiation.sections;
-            let mut plan: Vec<PlannedCell> =
-                sections.plan().iter().chain(&taken).copied().collect();
-            plan.truncate(sections.fitting(&plan));
-            taken.truncate(plan.len().saturating_sub(sections.plan().len()));
-            if taken.is_empty() {
-                mission_state.negotiation.take(&[]);
-                return;
-            }
-            let claim = sections.claim_with(
-                sections.epoch(),
-                &plan,
-                mission_state.revision(),
-                mission_state.loop_hash(),
-            );
-            mission_state.written += 1;
-            let promise = Promise::Take(mission_state.written, taken);
-            if !peer.store(promise.clone(), Entry::Claim(claim)) {
-                broken(peer, &promise);
-            }
-        }
-        Action::Changed => changed(peer),
-    }
-}
-
-/// The own claim changed by a rule: speak of it, and fly by it.
-fn changed(peer: &mut Peer) {
-    peer.outbound.claim_changed = true;
-    if let Some(mission_state) = &mut peer.mission_state {
-        mission_state.replan = true;
-    }
-}
-
-/// This peer's bid in the open round.
-fn bid(peer: &Peer) -> Option<Bid> {
-    let mission_state = peer.mission_state.as_ref()?;
-    let open = mission_state.negotiation.rounds.open()?;
-    let executive = mission_state.executive.as_ref()?;
-    let sections = &mission_state.negotiation.sections;
-    let is_open = |c: u16| !sections.covered().contains(c);
-    let forecast = executive.forecast(open.round.wait_ms, &is_open);
-    let planned: Vec<u16> = forecast
-        .cells
-        .iter()
-        .copied()
-        .filter(|c| sections.plan().iter().any(|p| p.cell == *c))
-        .collect();
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "an airspeed is a small positive number"
-    )]
-    let speed_mmps = (executive.loop_speed_mps() * 1000.0) as u32;
-    let spendable = mission_state.spendable_ms(peer.percept.as_ref());
-    Some(Bid {
-        round: open.round.clone(),
-        anchor: forecast.anchor,
-        backward: forecast.heading == Direction::Backward,
-        release_ms: forecast.release_ms,
-        speed_mmps,
-        turn_ms: executive.turn_ms(),
-        endurance_ms: spendable.saturating_sub(forecast.release_ms),
-        covered: sections.covered().encode_rle(Some(BID_COVERED_MAX_BYTES)),
-        commits: division::runs_of(&planned, sections.cells()),
-        eta_ms: if sections.plan().is_empty() {
-            0
-        } else {
-            forecast.finish_ms
-        },
-        adopted_ago_ms: mission_state.negotiation.adopted_ago_ms(peer.now),
-        cells_since: mission_state.negotiation.cells_since(),
-        idle: sections.plan().is_empty(),
-    })
-}
-
-/// The bid is durable: it may be spoken.
-pub(crate) fn bid_is_durable(peer: &mut Peer, bid: Bid) {
-    let Some(mission_state) = &mut peer.mission_state else {
-        return;
-    };
-    if mission_state.negotiation.bid_is_durable(bid.clone()) {
-        outbound::speak_bid(peer, &bid);
-        tick(peer);
-    }
-}
-
-/// The planner divided the loop.
-pub(crate) fn divided(peer: &mut Peer, epoch: Epoch, division: &Division) {
-    let (now, period_ms) = (peer.now, peer.period_ms());
-    let Some(mission_state) = &mut peer.mission_state else {
-        return;
-    };
-    let Some(adoption) = mission_state
-        .negotiation
-        .divided(now, period_ms, epoch, division)
-    else {
-        return;
-    };
-    let sections = &mission_state.negotiation.sections;
-    let claim = sections.claim_with(
-        adoption.epoch,
-        &adoption.plan,
-        mission_state.revision(),
-        mission_state.loop_hash(),
-    );
-    mission_state.written += 1;
-    let promise = Promise::Adopt(mission_state.written, Box::new(adoption));
-    if !peer.store(promise.clone(), Entry::Claim(claim)) {
-        broken(peer, &promise);
-    }
-}
-
-/// The division is durable: it is flown from now on.
-pub(crate) fn adopt(peer: &mut Peer, written: u64, adoption: &Adoption) {
-    let now = peer.now;
-    let percept = peer.percept;
-    let Some(mission_state) = &mut peer.mission_state else {
-        return;
-    };
-    mission_state.answered = mission_state.answered.max(written);
-    if written < mission_state.written {
-        return;
-    }
-    mission_state.negotiation.adopt(now, adoption);
-    keep_within_endurance(mission_state, percept.as_ref());
-    if !adoption.unassigned.is_empty() {
-        let count = adoption.unassigned.len();
-        peer.alarm(&format!("{count} cells are beyond the endurance of all"));
-    }
-    changed(peer);
-    save_covered(peer, true);
-    steer(peer);
-    outbound::speak_claim(peer);
-}
-
-/// Cells taken without a round are durable: they are flown from now on.
-pub(crate) fn take(peer: &mut Peer, written: u64, taken: &[PlannedCell]) {
-    let percept = peer.percept;
-    let Some(mission_state) = &mut peer.mission_state else {
-        return;
-    };
-    mission_state.answered = mission_state.answered.max(written);
-    if written < mission_state.written {
-        mission_state.negotiation.take(&[]);
-        return;
-    }
-    mission_state.negotiation.take(taken);
-    keep_within_endurance(mission_state, percept.as_ref());
-    changed(peer);
-    steer(peer);
-    outbound::speak_claim(peer);
-}
-
-/// A promise could not be made durable, so what it was for does not happen.
-pub(crate) fn broken(peer: &mut Peer, promise: &Promise) {
-    match (&mut peer.mission_state, promise) {
-        (Some(mission_state), Promise::Take(written, _)) => {
-            mission_state.answered = mission_state.answered.max(*written);
-            mission_state.negotiation.take(&[]);
-        }
-        (Some(mission_state), Promise::Adopt(written, _)) => {
-            mission_state.answered = mission_state.answered.max(*written)
-        }
-        _ => {}
-    }
-}
-
-/// Lists only what can be flown (S10): the rest is orphaned, and that is a loss.
-fn keep_within_endurance(mission_state: &mut MissionState, percept: Option<&Percept>) {
-    let spendable = mission_state.spendable_ms(percept);
-    let sections = &mut mission_state.negotiation.sections;
-    let Some(executive) = &mission_state.executive else {
-        return;
-    };
-    let covered = sections.covered().clone();
-    let is_open = |c: u16| !covered.contains(c);
-    let fits = |count: usize| {
-        executive.leg_time_ms(
-            &legs_of(&sections.plan()[..count], covered.capacity()),
-            &is_open,
-        ) <= spendable
-    };
-    let total = sections.plan().len();
-    if total == 0 || fits(total) {
-        return;
-    }
-    let (mut good, mut bad) = (0, total);
-    while bad - good > 1 {
-        let middle = good.midpoint(bad);
-        if fits(middle) {
-            good = middle
-        } else {
-            bad = middle
-        }
-    }
-    sections.keep(good);
-}
 
 /// Beacon periods for which the last cells of a time round are told before the next
 /// begins: one to speak, two to be passed on. Who misses them looks at those cells
 /// again, and hears of the next time round from the ground station.
 const LAP_PERIODS: u64 = 3;
 
-/// Everything is covered and is to be covered again: begins the next time round, once
-/// the others had the time to hear of the last cells.
-fn next_lap(peer: &mut Peer) {
-    let (now, pause_ms) = (peer.now, LAP_PERIODS * peer.period_ms());
-    let Some(mission_state) = &mut peer.mission_state else {
-        return;
-    };
-    let Some(since) = mission_state.over_since else {
-        mission_state.over_since = Some(now);
-        peer.outbound.cover_changed = true;
-        save_covered(peer, true);
-        return;
-    };
-    if now.since_ms(since) >= pause_ms
-        && let Some(next) = mission_state.geometry.mission.next_lap()
-    {
-        peer.library.offer(Arc::new(next));
-    }
+/// What the rest of the peer knows at the moment of an event.
+#[derive(Debug)]
+pub(crate) struct Situation<'a> {
+    /// The peer's time.
+    pub now: Time,
+    /// Beacon period T, milliseconds.
+    pub period_ms: u64,
+    /// This peer in its present life.
+    pub me: Member,
+    /// What it is for.
+    pub role: Role,
+    /// Whether its life has begun and its probation is over.
+    pub has_voice: bool,
+    /// What it last sensed.
+    pub percept: Option<&'a Percept>,
+    /// Who else is there.
+    pub membership: &'a Membership,
 }
 
-/// Whether all that can be covered is covered.
-fn finish(peer: &mut Peer) {
-    let Some(mission_state) = &mut peer.mission_state else {
-        return;
-    };
-    let complete = mission_state.negotiation.sections.complete();
-    if complete && mission_state.geometry.mission.further_laps > 0 {
-        next_lap(peer);
-        return;
-    }
-    if complete == mission_state.finished {
-        return;
-    }
-    mission_state.finished = complete;
-    mission_state.replan = true;
-    let revision = mission_state.revision();
-    if complete && peer.config.role == Role::Uav {
-        peer.report(Report::Finished { revision });
-        peer.outbound.finished_due = true;
-        peer.outbound.claim_changed = true;
-        peer.outbound.cover_changed = true;
-        save_covered(peer, true);
-    }
+/// The operator's standing order and the version of the record that gave it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct StandingOrder {
+    order: Order,
+    /// (incarnation, seq, author) of the record; none yet when zero.
+    version: (Incarnation, u32, u16),
 }
 
-/// Gives the executive its goal, if that changed.
-fn steer(peer: &mut Peer) {
-    let order = peer.order.order;
-    let Some(mission_state) = &mut peer.mission_state else {
-        return;
-    };
-    let sections = &mission_state.negotiation.sections;
-    let base = mission_state.geometry.mission.base_m();
-    let goal = if order == Order::Hold {
-        Goal::Hold
-    } else if order == Order::ReturnToBase || mission_state.finished || mission_state.exhausted {
-        Goal::Point(base)
-    } else if sections.plan().is_empty() {
-        Goal::Hold
-    } else {
-        Goal::Legs(legs_of(sections.plan(), sections.cells()))
-    };
-    let same_kind = match (&mission_state.goal, &goal) {
-        (Some(Goal::Legs(_)), Goal::Legs(_)) => true,
-        (Some(a), b) => a == b,
-        (None, _) => false,
-    };
-    if same_kind && !core::mem::take(&mut mission_state.replan) {
-        return;
-    }
-    mission_state.replan = false;
-    if same_kind && !matches!(goal, Goal::Legs(_)) {
-        return;
-    }
-    if let Some(executive) = &mut mission_state.executive {
-        executive.set_goal(goal.clone(), &|c| !sections.covered().contains(c));
-    }
-    mission_state.goal = Some(goal);
+/// The cooperation manager of one peer.
+#[derive(Debug)]
+pub(crate) struct Cooperation {
+    library: Library,
+    order: StandingOrder,
+    state: Option<MissionState>,
+    mismatch_told: bool,
 }
 
-/// Planned cells as legs: runs of neighbouring cells flown the same way.
-#[must_use]
-pub fn legs_of(plan: &[PlannedCell], n: u16) -> Vec<Leg> {
-    let mut legs: Vec<Leg> = Vec::new();
-    let mut last = 0;
-    for p in plan {
-        let direction = if p.backward {
-            Direction::Backward
-        } else {
-            Direction::Forward
-        };
-        let next = if p.backward {
-            (last + n - 1) % n.max(1)
-        } else {
-            (last + 1) % n.max(1)
-        };
-        match legs.last_mut() {
-            Some(leg) if leg.direction == direction && next == p.cell => leg.count += 1,
-            _ => legs.push(Leg {
-                first: p.cell,
-                count: 1,
-                direction,
-            }),
+impl Cooperation {
+    /// A manager that begins with the mission found on disk, if any.
+    pub fn new(mission: Option<Arc<Mission>>) -> Self {
+        Self {
+            library: Library::new(mission),
+            order: StandingOrder::default(),
+            state: None,
+            mismatch_told: false,
         }
-        last = p.cell;
     }
-    legs
+
+    /// What it has of its mission, once there is one.
+    pub fn state(&self) -> Option<&MissionState> {
+        self.state.as_ref()
+    }
+
+    /// The newest whole mission, derived or not.
+    pub fn newest_mission(&self) -> Option<Arc<Mission>> {
+        self.library.newest()
+    }
+
+    /// A whole mission is on offer.
+    pub fn offer(&mut self, mission: Arc<Mission>) {
+        self.library.offer(mission);
+    }
+
+    /// An order, by the version of its record; only a later one counts.
+    pub fn hear_order(&mut self, order: Order, version: (Incarnation, u32, u16)) {
+        if version > self.order.version {
+            self.order = StandingOrder { order, version };
+        }
+    }
+
+    /// An order that this peer itself gives for its operator.
+    pub fn give_order(&mut self, order: Order, version: (Incarnation, u32, u16)) {
+        self.order = StandingOrder { order, version };
+    }
+
+    /// A life of this peer begins.
+    pub fn new_life(&mut self, me: Member, timers: &mut Timers) {
+        if let Some(state) = &mut self.state {
+            state.new_life(me, timers);
+        }
+    }
+
+    /// Asks for the geometry of the newest whole mission, unless it is held.
+    pub fn consider_mission(&self) -> Effects {
+        let newest = self.library.newest().filter(|newest| {
+            let held = self.state.as_ref().map(MissionState::revision);
+            held.is_none_or(|revision| revision < newest.revision)
+        });
+        let ask = |mission: Arc<Mission>| {
+            let pending = PendingJob::Geometry(mission.content_hash());
+            Effect::Compute(pending, Job::Geometry(mission))
+        };
+        newest.map(ask).into_iter().collect()
+    }
+
+    /// The geometry of the mission with this hash arrived: from now on it is the mission.
+    pub fn geometry_arrived(
+        &mut self,
+        hash: u64,
+        geometry: Result<Arc<MissionGeometry>, GeometryError>,
+        me: Member,
+        config: &PeerConfig,
+        durable: &Durable,
+        timers: &mut Timers,
+    ) -> Effects {
+        let geometry = match geometry {
+            Ok(g) if g.mission.content_hash() == hash => g,
+            Ok(_) => return Effects::new(),
+            Err(why) => {
+                let text = format!("the mission cannot be flown: {why}");
+                return vec![Effect::Alarm(text)];
+            }
+        };
+        if u16::try_from(geometry.coverage_loop.len()).is_err() {
+            return Effects::new();
+        }
+        let old = self.state.take();
+        self.state = MissionState::begun(geometry, old, me, config, durable, timers);
+        let Some(state) = &self.state else {
+            return Effects::new();
+        };
+        vec![
+            Effect::Report(Report::Ready {
+                revision: state.revision(),
+                loop_hash: state.loop_hash(),
+                cells: state.covered().capacity(),
+            }),
+            Effect::HearAgain,
+        ]
+    }
+
+    /// A percept: fly, and note what the camera saw.
+    pub fn on_percept(&mut self, percept: &Percept) -> Effects {
+        let Some(state) = &mut self.state else {
+            return Effects::new();
+        };
+        let sections = &state.negotiation.sections;
+        let Some(executive) = &mut state.executive else {
+            return Effects::new();
+        };
+        let (setpoint, events) = executive.step(percept, &|c| !sections.covered().contains(c));
+        let mut effects = vec![Effect::Fly(setpoint)];
+        for event in events {
+            effects.extend(state.on_event(event));
+        }
+        effects
+    }
+
+    /// A neighbour's beacon.
+    pub fn hear_beacon(&mut self, author: u16, beacon: &Beacon) -> Effects {
+        let Some(state) = &mut self.state else {
+            return Effects::new();
+        };
+        state.negotiation.rounds.hear_counter(beacon.counter);
+        if beacon.loop_hash == state.loop_hash() {
+            let differs = beacon.cover_digest != state.covered().digest();
+            return differs
+                .then_some(Effect::CoverageWanted)
+                .into_iter()
+                .collect();
+        }
+        let mismatch = beacon.revision == state.revision() && beacon.loop_hash != 0;
+        if mismatch && !core::mem::replace(&mut self.mismatch_told, true) {
+            let text = format!("uav{author} derived another loop from the same mission");
+            return vec![Effect::Alarm(text)];
+        }
+        Effects::new()
+    }
+
+    /// A record of another peer that is new here.
+    pub fn hear(&mut self, now: Time, record: &Record, body: Body) -> Effects {
+        let author = Member {
+            id: record.author,
+            incarnation: record.incarnation,
+        };
+        match body {
+            Body::Mission(chunk) => match self.library.chunk(record.subject, &chunk) {
+                Ok(true) => self.consider_mission(),
+                Ok(false) => Effects::new(),
+                Err(why) => vec![Effect::Alarm(why)],
+            },
+            Body::Operator(order) => {
+                self.hear_order(order, (record.incarnation, record.seq, record.author));
+                Effects::new()
+            }
+            body => match &mut self.state {
+                Some(state) => state.hear(now, author, record.seq, body),
+                None => Effects::new(),
+            },
+        }
+    }
+
+    /// Looks at everything that depends on time.
+    pub fn tick(&mut self, s: &Situation<'_>, timers: &mut Timers) -> Effects {
+        let mut effects = self.consider_mission();
+        let order = self.order.order;
+        let Some(state) = &mut self.state else {
+            return effects;
+        };
+        if state.fuel_is_due(s.percept) {
+            effects.extend(state.give_up_for_fuel());
+        }
+        let able = s.has_voice && order == Order::Resume && state.can_fly_plans(s);
+        effects.extend(state.negotiate(s, able, timers));
+        effects.extend(state.notice_end(s, timers));
+        state.steer(order);
+        assert!(
+            !effects.iter().any(|e| matches!(e, Effect::Negotiate)),
+            "a tick asks for no tick"
+        );
+        effects
+    }
+
+    /// A bid is durable: it may be spoken, if its round is still open.
+    pub fn bid_is_durable(&mut self, bid: Bid) -> Effects {
+        let spoken = self
+            .state
+            .as_mut()
+            .is_some_and(|s| s.negotiation.bid_is_durable(bid.clone()));
+        if spoken {
+            vec![Effect::Speak(0, Body::Bid(bid)), Effect::Negotiate]
+        } else {
+            Effects::new()
+        }
+    }
+
+    /// The planner divided the loop.
+    pub fn divided(&mut self, s: &Situation<'_>, epoch: Epoch, division: &Division) -> Effects {
+        match &mut self.state {
+            Some(state) => state.divided(s, epoch, division),
+            None => Effects::new(),
+        }
+    }
+
+    /// An adoption is durable: it is flown from now on.
+    pub fn adopt(
+        &mut self,
+        s: &Situation<'_>,
+        written: u64,
+        adoption: &Adoption,
+        timers: &mut Timers,
+    ) -> Effects {
+        let order = self.order.order;
+        let Some(state) = &mut self.state else {
+            return Effects::new();
+        };
+        if !state.claims.answer(written) {
+            return Effects::new();
+        }
+        if state.negotiation.adopt(s.now, adoption) {
+            let expiry = s.now.plus_ms(2 * u64::from(adoption.wait_ms));
+            timers.set(Timer::HeldCells, expiry);
+        }
+        state.keep_within_endurance(s.percept);
+        let mut effects = Effects::new();
+        if !adoption.unassigned.is_empty() {
+            let count = adoption.unassigned.len();
+            let text = format!("{count} cells are beyond the endurance of all");
+            effects.push(Effect::Alarm(text));
+        }
+        effects.push(state.claim_changed());
+        effects.extend(state.save_covered(true));
+        state.steer(order);
+        effects.push(Effect::ClaimNow);
+        effects
+    }
+
+    /// Cells taken without a round are durable: they are flown from now on.
+    pub fn take(&mut self, s: &Situation<'_>, written: u64, taken: &[PlannedCell]) -> Effects {
+        let order = self.order.order;
+        let Some(state) = &mut self.state else {
+            return Effects::new();
+        };
+        if !state.claims.answer(written) {
+            state.negotiation.cancel_take();
+            return Effects::new();
+        }
+        state.negotiation.take(taken);
+        state.keep_within_endurance(s.percept);
+        let changed = state.claim_changed();
+        state.steer(order);
+        vec![changed, Effect::ClaimNow]
+    }
+
+    /// A promise could not be made durable, so what it was for does not happen.
+    pub fn broken(&mut self, promise: &Promise) {
+        let Some(state) = &mut self.state else {
+            return;
+        };
+        match promise {
+            Promise::Take(written, _) => {
+                state.claims.answer(*written);
+                state.negotiation.cancel_take();
+            }
+            Promise::Adopt(written, _) => {
+                state.claims.answer(*written);
+            }
+            // The round is given up when its time is over; covered cells are written again.
+            Promise::Life(_) | Promise::Bid(_) | Promise::Covered => {}
+        }
+    }
+
+    /// Fills the mission's part of what the peer believes.
+    pub fn fill(&self, beliefs: &mut Beliefs, counter: u32, percept: Option<&Percept>) {
+        let Some(state) = &self.state else {
+            return;
+        };
+        let sections = &state.negotiation.sections;
+        beliefs.able = state.able();
+        beliefs.loop_hash = state.loop_hash();
+        beliefs.revision = state.revision();
+        beliefs.covered = sections.covered().flags();
+        beliefs.plan = sections.plan().iter().map(|p| p.cell).collect();
+        beliefs.held = sections.held().keys().copied().collect();
+        beliefs.unassigned = sections.unassigned().iter().collect();
+        beliefs.epoch = sections.epoch();
+        beliefs.counter = counter;
+        beliefs.adoptions = state.negotiation.adoptions;
+        beliefs.finished = state.finished;
+        beliefs.eta_ms = state.eta_ms();
+        beliefs.spendable_ms = state.spendable_ms(percept);
+    }
 }
 
-/// Fills the mission's part of a view.
-pub(crate) fn view(peer: &Peer, view: &mut Beliefs) {
-    let Some(mission_state) = &peer.mission_state else {
-        return;
-    };
-    let sections = &mission_state.negotiation.sections;
-    view.able = mission_state.able();
-    view.loop_hash = mission_state.loop_hash();
-    view.revision = mission_state.revision();
-    view.covered = (0..sections.cells())
-        .map(|c| sections.covered().contains(c))
-        .collect();
-    view.plan = sections.plan().iter().map(|p| p.cell).collect();
-    view.held = sections.held().keys().copied().collect();
-    view.unassigned = sections.unassigned().iter().collect();
-    view.epoch = sections.epoch();
-    view.counter = peer.durable.counter;
-    view.adoptions = mission_state.negotiation.adoptions;
-    view.finished = mission_state.finished;
-    view.eta_ms = mission_state.eta_ms();
-    view.spendable_ms = mission_state.spendable_ms(peer.percept.as_ref());
+impl MissionState {
+    fn on_event(&mut self, event: Event) -> Effects {
+        match event {
+            Event::Seen(ids) => {
+                let coverage_loop = &self.geometry.coverage_loop;
+                let cells = ids.into_iter().filter_map(|id| coverage_loop.index_of(id));
+                let mut seen = CellSet::of(self.covered().capacity(), cells);
+                seen.subtract(self.covered());
+                if seen.is_empty() {
+                    return Effects::new();
+                }
+                self.negotiation.sections.cover(&seen);
+                self.negotiation.covered_myself(seen.count());
+                self.unsaved_cells = self.unsaved_cells.saturating_add(seen.count());
+                let cells = seen.iter().collect();
+                let mut effects = vec![
+                    Effect::Report(Report::Covered { cells }),
+                    Effect::CoverageChanged,
+                ];
+                effects.extend(self.save_covered(false));
+                effects
+            }
+            Event::PlanDone => {
+                self.replan |= !self.negotiation.sections.plan().is_empty();
+                Effects::new()
+            }
+            Event::Arrived => Effects::new(),
+            Event::Refused { cells } => {
+                self.negotiation.sections.give_up(&cells);
+                let text = "a cell could not be reached clear of the zones; it was given up";
+                vec![self.claim_changed(), Effect::Alarm(text.into())]
+            }
+        }
+    }
+
+    /// A claim, a bid or covered cells of another peer.
+    fn hear(&mut self, now: Time, author: Member, seq: u32, body: Body) -> Effects {
+        let mine = self.loop_hash();
+        let capacity = self.covered().capacity();
+        let negotiation = &mut self.negotiation;
+        let effect = match body {
+            Body::Claim(claim) if claim.loop_hash == mine => negotiation
+                .sections
+                .hear(author.id, author.incarnation, seq, claim)
+                .then_some(Effect::Negotiate),
+            Body::Bid(bid) if bid.round.loop_hash == mine => {
+                if let Ok(covered) = CellSet::decode_rle(capacity, &bid.covered) {
+                    negotiation.sections.cover(&covered);
+                }
+                negotiation.hear_bid(now, author, &bid);
+                Some(Effect::Negotiate)
+            }
+            Body::Bid(bid) => {
+                negotiation.rounds.hear_counter(bid.round.counter);
+                None
+            }
+            Body::Cover(cover) if cover.loop_hash == mine => {
+                let covered = CellSet::decode_rle(capacity, &cover.covered);
+                let news = covered.is_ok_and(|c| negotiation.sections.cover(&c));
+                news.then_some(Effect::CoverageChanged)
+            }
+            _ => None,
+        };
+        effect.into_iter().collect()
+    }
+
+    /// The own claim changed: it is spoken, and flown by.
+    fn claim_changed(&mut self) -> Effect {
+        self.replan = true;
+        Effect::ClaimChanged
+    }
+
+    /// Covered cells, if enough are new to be made durable; `now` takes any.
+    fn save_covered(&mut self, now: bool) -> Option<Effect> {
+        let least = if now { 1 } else { CELLS_PER_COVERED_RECORD };
+        if self.unsaved_cells < least {
+            return None;
+        }
+        self.unsaved_cells = 0;
+        let entry = Entry::Covered {
+            loop_hash: self.loop_hash(),
+            cells: self.covered().capacity(),
+            covered: self.covered().encode_rle(None),
+        };
+        Some(Effect::Store(Promise::Covered, entry))
+    }
+
+    /// Whether the fuel has come due since it was last asked.
+    fn fuel_is_due(&self, percept: Option<&Percept>) -> bool {
+        percept.is_some() && !self.exhausted && self.spendable_ms(percept) == 0
+    }
+
+    /// The fuel is due: the plan is given up.
+    fn give_up_for_fuel(&mut self) -> Effects {
+        assert!(!self.exhausted, "the fuel comes due once");
+        self.exhausted = true;
+        self.negotiation.sections.keep(0);
+        let mut effects = vec![self.claim_changed()];
+        if self.executive.is_some() {
+            let text = "the fuel is due: returning to base";
+            effects.push(Effect::Alarm(text.into()));
+        }
+        effects
+    }
+
+    /// Whether this peer can fly what a division gives it.
+    fn can_fly_plans(&self, s: &Situation<'_>) -> bool {
+        let senses = s.percept.is_some() && self.executive.is_some();
+        s.role == Role::Uav && senses && !self.exhausted
+    }
+
+    /// Live UAVs on this loop whose beacon says able, this peer included if it is.
+    fn members(&self, s: &Situation<'_>, able: bool) -> Vec<Member> {
+        let on_this_loop = |id: u16| {
+            s.membership
+                .info(id)
+                .is_some_and(|i| i.able && !i.ground_station && i.loop_hash == self.loop_hash())
+        };
+        let others = s.membership.live().filter(|(id, _)| on_this_loop(*id));
+        let others = others.map(|(id, incarnation)| Member { id, incarnation });
+        let mut members: Vec<Member> = others.chain(able.then_some(s.me)).collect();
+        members.sort_unstable();
+        members
+    }
+
+    /// Lets the negotiation look at the time, and carries out what it wants.
+    fn negotiate(&mut self, s: &Situation<'_>, able: bool, timers: &mut Timers) -> Effects {
+        let live: LivePeers = s.membership.live().collect();
+        let members = self.members(s, able);
+        self.able_since = able.then(|| self.able_since.unwrap_or(s.now));
+        let lost = self.live.iter().any(|(id, inc)| live.get(id) != Some(inc));
+        self.live.clone_from(&live);
+        if lost {
+            self.negotiation.note_loss();
+        }
+        let ctx = Context {
+            now: s.now,
+            period_ms: s.period_ms,
+            live: &live,
+            members: &members,
+            diameter: s.membership.diameter(s.now),
+            able_since: self.able_since,
+            revision: self.revision(),
+            loop_hash: self.loop_hash(),
+            held_expired: timers.take_due(Timer::HeldCells, s.now),
+        };
+        let coverage_loop = Arc::clone(&self.geometry.coverage_loop);
+        let actions = self.negotiation.tick(&ctx, &coverage_loop);
+        let mut effects = Effects::new();
+        for action in actions {
+            match action {
+                Action::Bid => effects.extend(self.bid(s)),
+                Action::Divide {
+                    epoch,
+                    ring,
+                    robots,
+                } => {
+                    let job = Job::Divide { ring, robots };
+                    effects.push(Effect::Compute(PendingJob::Division(epoch), job));
+                }
+                Action::Take(taken) => effects.extend(self.write_take(taken)),
+                Action::Changed => effects.push(self.claim_changed()),
+            }
+        }
+        effects
+    }
+
+    /// This peer's bid in the open round, to be told and made durable.
+    fn bid(&self, s: &Situation<'_>) -> Effects {
+        let (Some(open), Some(executive)) = (self.negotiation.rounds.open(), &self.executive)
+        else {
+            return Effects::new();
+        };
+        let sections = &self.negotiation.sections;
+        let is_open = |c: u16| !sections.covered().contains(c);
+        let forecast = executive.forecast(open.round.wait_ms, &is_open);
+        let is_planned = |c: &u16| sections.plan().iter().any(|p| p.cell == *c);
+        let committed: Vec<u16> = forecast.cells.iter().copied().filter(is_planned).collect();
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "an airspeed is a small positive number"
+        )]
+        let speed_mmps = (executive.loop_speed_mps() * 1000.0) as u32;
+        let idle = sections.plan().is_empty();
+        let bid = Bid {
+            round: open.round.clone(),
+            anchor: forecast.anchor,
+            backward: forecast.heading == Direction::Backward,
+            release_ms: forecast.release_ms,
+            speed_mmps,
+            turn_ms: executive.turn_ms(),
+            endurance_ms: self
+                .spendable_ms(s.percept)
+                .saturating_sub(forecast.release_ms),
+            covered: sections.covered().encode_rle(Some(BID_COVERED_MAX_BYTES)),
+            commits: division::runs_of(&committed, sections.cells()),
+            eta_ms: if idle { 0 } else { forecast.finish_ms },
+            adopted_ago_ms: self.negotiation.adopted_ago_ms(s.now),
+            cells_since: self.negotiation.cells_since(),
+            idle,
+        };
+        let report = Report::Round {
+            counter: bid.round.counter,
+            members: bid.round.members.iter().map(|m| PeerId(m.id)).collect(),
+        };
+        let entry = Entry::Bid(bid.clone());
+        vec![
+            Effect::Report(report),
+            Effect::Store(Promise::Bid(Box::new(bid)), entry),
+        ]
+    }
+
+    /// Cells to be taken without a round are made durable, as many as a claim holds.
+    fn write_take(&mut self, mut taken: Vec<PlannedCell>) -> Option<Effect> {
+        let sections = &self.negotiation.sections;
+        let mut plan: Vec<PlannedCell> = sections.plan().iter().chain(&taken).copied().collect();
+        plan.truncate(sections.fitting(&plan));
+        taken.truncate(plan.len().saturating_sub(sections.plan().len()));
+        if self.claims.under_way() || taken.is_empty() {
+            self.negotiation.cancel_take();
+            return None;
+        }
+        let (revision, loop_hash) = (self.revision(), self.loop_hash());
+        let claim = sections.claim_with(sections.epoch(), &plan, revision, loop_hash);
+        let promise = Promise::Take(self.claims.next(), taken);
+        Some(Effect::Store(promise, Entry::Claim(claim)))
+    }
+
+    fn divided(&mut self, s: &Situation<'_>, epoch: Epoch, division: &Division) -> Effects {
+        let adoption = self
+            .negotiation
+            .divided(s.now, s.period_ms, epoch, division);
+        let Some(adoption) = adoption else {
+            return Effects::new();
+        };
+        let claim = self.negotiation.sections.claim_with(
+            adoption.epoch,
+            &adoption.plan,
+            self.revision(),
+            self.loop_hash(),
+        );
+        let promise = Promise::Adopt(self.claims.next(), Box::new(adoption));
+        vec![Effect::Store(promise, Entry::Claim(claim))]
+    }
+
+    /// Lists only what can be flown (S10): the rest is orphaned, and that is a loss.
+    fn keep_within_endurance(&mut self, percept: Option<&Percept>) {
+        let spendable = self.spendable_ms(percept);
+        let sections = &mut self.negotiation.sections;
+        let Some(executive) = &self.executive else {
+            return;
+        };
+        let covered = sections.covered().clone();
+        let is_open = |c: u16| !covered.contains(c);
+        let fits = |count: usize| {
+            let legs = legs_of(&sections.plan()[..count], covered.capacity());
+            executive.leg_time_ms(&legs, &is_open) <= spendable
+        };
+        let total = sections.plan().len();
+        if total == 0 || fits(total) {
+            return;
+        }
+        let (mut good, mut bad) = (0, total);
+        while bad - good > 1 {
+            let middle = good.midpoint(bad);
+            if fits(middle) {
+                good = middle
+            } else {
+                bad = middle
+            }
+        }
+        sections.keep(good);
+    }
+
+    /// All that can be covered is covered, or again not: the mission ends, the next time
+    /// round begins once the others had the time to hear of the last cells, or it goes on.
+    fn notice_end(&mut self, s: &Situation<'_>, timers: &mut Timers) -> Effects {
+        let complete = self.negotiation.sections.complete();
+        if complete && self.geometry.mission.further_laps > 0 {
+            return self.next_lap(s, timers);
+        }
+        if complete == self.finished {
+            return Effects::new();
+        }
+        self.finished = complete;
+        self.replan = true;
+        if !complete || s.role != Role::Uav {
+            return Effects::new();
+        }
+        let revision = self.revision();
+        let mut effects = vec![
+            Effect::Report(Report::Finished { revision }),
+            Effect::MissionFinished,
+            Effect::ClaimChanged,
+            Effect::CoverageChanged,
+        ];
+        effects.extend(self.save_covered(true));
+        effects
+    }
+
+    fn next_lap(&mut self, s: &Situation<'_>, timers: &mut Timers) -> Effects {
+        if timers.at(Timer::NextLap).is_none() {
+            timers.set(Timer::NextLap, s.now.plus_ms(LAP_PERIODS * s.period_ms));
+            let mut effects = vec![Effect::CoverageChanged];
+            effects.extend(self.save_covered(true));
+            return effects;
+        }
+        let next = timers
+            .is_due(Timer::NextLap, s.now)
+            .then(|| self.geometry.mission.next_lap())
+            .flatten();
+        next.map(|m| Effect::Offer(Arc::new(m)))
+            .into_iter()
+            .collect()
+    }
+
+    /// Gives the executive its goal, if that changed.
+    fn steer(&mut self, order: Order) {
+        let sections = &self.negotiation.sections;
+        let base = self.geometry.mission.base_m();
+        let goal = if order == Order::Hold {
+            Goal::Hold
+        } else if order == Order::ReturnToBase || self.finished || self.exhausted {
+            Goal::Point(base)
+        } else if sections.plan().is_empty() {
+            Goal::Hold
+        } else {
+            Goal::Legs(legs_of(sections.plan(), sections.cells()))
+        };
+        let same_kind = match (&self.goal, &goal) {
+            (Some(Goal::Legs(_)), Goal::Legs(_)) => true,
+            (Some(a), b) => a == b,
+            (None, _) => false,
+        };
+        if same_kind && !core::mem::take(&mut self.replan) {
+            return;
+        }
+        self.replan = false;
+        if same_kind && !matches!(goal, Goal::Legs(_)) {
+            return;
+        }
+        if let Some(executive) = &mut self.executive {
+            executive.set_goal(goal.clone(), &|c| !sections.covered().contains(c));
+        }
+        self.goal = Some(goal);
+    }
 }

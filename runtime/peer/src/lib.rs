@@ -24,6 +24,7 @@ pub mod beliefs;
 pub mod cells;
 pub mod config;
 mod cooperation;
+mod effect;
 mod inbound;
 pub mod input;
 pub mod journal;
@@ -35,6 +36,7 @@ pub mod output;
 pub mod peer;
 pub mod protocol;
 pub mod task;
+pub mod timers;
 pub mod wire;
 
 pub use beliefs::Beliefs;

@@ -1,45 +1,90 @@
-//! A mission arrives: its common ground is asked for, and what the peer has worked out
-//! on the last one is kept as far as it holds on the new one.
+//! What a peer has once it holds a mission and its geometry, and what of it is kept when
+//! another mission arrives.
 //!
-//! What is done with it then is the cooperation manager's.
+//! | the new mission has | kept |
+//! |---|---|
+//! | the same loop | sections, rounds, claims being written, since when it is able |
+//! | and the same zones, turn radius and clearance | the flight itself, with its goal |
+//! | another loop, the same lap | covered cells, by name |
+//! | another lap | nothing is covered |
+//! | any | the highest round counter; what the journal knows of that loop |
+//!
+//! What is done with a mission is the cooperation manager's.
 
 use crate::cells::CellSet;
-use crate::mission::GeometryError;
-use crate::offload::{Job, MissionGeometry};
-use crate::output::Report;
-use crate::peer::{Peer, PendingJob};
+use crate::config::PeerConfig;
+use crate::journal::Durable;
+use crate::offload::MissionGeometry;
 use crate::protocol::Negotiation;
-use crate::protocol::life;
 use crate::protocol::sections::LivePeers;
+use crate::timers::{Timer, Timers};
 use crate::wire::message::{Behaviour, Claim, Member, MissionStatus};
 use skein_behaviors::{Executive, Goal, Percept};
 use skein_flight::coverage::ring::CoverageLoop;
 use std::sync::Arc;
 
-/// What a peer has once it holds a mission and its common ground.
+/// Claims on their way to the journal, numbered in the order in which it gets them. Only
+/// the last of them may be installed, for it is the one that the journal ends with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct ClaimsWritten {
+    written: u64,
+    answered: u64,
+}
+
+impl ClaimsWritten {
+    /// All that was written so far is void: none of it is the last.
+    fn void(self) -> Self {
+        let written = self.written + 1;
+        Self {
+            written,
+            answered: written,
+        }
+    }
+
+    /// The number of one more.
+    pub fn next(&mut self) -> u64 {
+        self.written += 1;
+        self.written
+    }
+
+    /// The answer to one of them came. Returns whether it is the last.
+    pub fn answer(&mut self, number: u64) -> bool {
+        self.answered = self.answered.max(number);
+        assert!(self.answered <= self.written, "an answer to nothing");
+        number >= self.written
+    }
+
+    /// Whether one of them is still on its way.
+    pub fn under_way(self) -> bool {
+        self.answered < self.written
+    }
+}
+
+/// What a peer has once it holds a mission and its geometry.
 #[derive(Debug)]
 pub(crate) struct MissionState {
     pub geometry: Arc<MissionGeometry>,
     pub executive: Option<Executive>,
     pub negotiation: Negotiation,
     pub goal: Option<Goal>,
+    /// Whether the goal is to be given to the executive again.
     pub replan: bool,
+    /// Since when this peer can plan without a break.
     pub able_since: Option<crate::Time>,
+    /// The peers that were alive at the last tick.
     pub live: LivePeers,
     pub finished: bool,
-    /// Since when all is covered and another time round is to come.
-    pub over_since: Option<crate::Time>,
+    /// Whether its fuel was due once: from then on it flies home.
     pub exhausted: bool,
+    /// Cells covered by itself since the last entry of the journal.
     pub unsaved_cells: u16,
-    /// Counts the sections handed to the journal; only the last of them may be
-    /// installed, for it is the one that the journal ends with.
-    pub written: u64,
-    /// The last of them whose answer came.
-    pub answered: u64,
+    pub claims: ClaimsWritten,
 }
 
 impl MissionState {
-    pub fn new_life(&mut self, me: Member) {
+    /// A new life of this peer: ownership of the old one is void.
+    pub fn new_life(&mut self, me: Member, timers: &mut Timers) {
+        timers.stop(Timer::HeldCells);
         self.negotiation.new_life(me);
         self.able_since = None;
         self.replan = true;
@@ -107,166 +152,147 @@ impl MissionState {
             _ => 0,
         }
     }
-}
 
-/// Asks for the common ground of the newest whole mission, unless it is held.
-pub(crate) fn consider_mission(peer: &mut Peer) {
-    let Some(mission) = peer.library.newest() else {
-        return;
-    };
-    if peer
-        .mission_state
-        .as_ref()
-        .is_some_and(|c| c.geometry.mission.revision >= mission.revision)
-    {
-        return;
-    }
-    let hash = mission.content_hash();
-    peer.ask(PendingJob::Geometry(hash), Job::Geometry(mission));
-}
-
-/// The common ground arrived: from now on this is the mission.
-pub(crate) fn geometry_arrived(
-    peer: &mut Peer,
-    hash: u64,
-    geometry: Result<Arc<MissionGeometry>, GeometryError>,
-) {
-    let geometry = match geometry {
-        Ok(g) if g.mission.content_hash() == hash => g,
-        Ok(_) => return,
-        Err(why) => {
-            peer.alarm(&format!("the mission cannot be flown: {why}"));
-            return;
+    /// The state of a mission whose geometry has arrived, with what is kept of the last
+    /// one. None if its loop has more cells than can be numbered.
+    pub fn begun(
+        geometry: Arc<MissionGeometry>,
+        old: Option<Self>,
+        me: Member,
+        config: &PeerConfig,
+        durable: &Durable,
+        timers: &mut Timers,
+    ) -> Option<Self> {
+        let cells = u16::try_from(geometry.coverage_loop.len()).ok()?;
+        timers.stop(Timer::NextLap);
+        let mut new = Self {
+            negotiation: negotiation_begun(&geometry, old.as_ref(), me, durable, cells),
+            executive: executive_for(&geometry, config),
+            goal: None,
+            replan: true,
+            able_since: None,
+            live: LivePeers::new(),
+            finished: false,
+            exhausted: old.as_ref().is_some_and(|m| m.exhausted),
+            unsaved_cells: 0,
+            // What is still being written was promised for the old loop.
+            claims: old
+                .as_ref()
+                .map_or_else(Default::default, |m| m.claims.void()),
+            geometry,
+        };
+        match old {
+            Some(old) if old.loop_hash() == new.loop_hash() => new.keep_on(old),
+            _ => timers.stop(Timer::HeldCells),
         }
-    };
-    let coverage_loop = Arc::clone(&geometry.coverage_loop);
-    let Ok(n) = u16::try_from(coverage_loop.len()) else {
-        return;
-    };
-    let executive = peer.config.airframe.map(|airframe| {
-        let router = Arc::clone(&geometry.router);
-        Executive::new(
-            airframe,
-            peer.config.height_m,
-            Arc::clone(&coverage_loop),
-            router,
-        )
-        .with_tracking_error_m(geometry.mission.tracking_error_m())
-        .with_objective(peer.config.objective)
-        .with_home(geometry.mission.base_m())
-    });
-    let old = peer.mission_state.take();
-    // What is still being written was promised for the old ground: it is not installed.
-    let written = old.as_ref().map_or(0, |c| c.written + 1);
-    let mut mission_state = MissionState {
-        negotiation: begun(peer, old.as_ref(), &geometry, n),
-        geometry: Arc::clone(&geometry),
-        executive,
-        goal: None,
-        replan: true,
-        able_since: None,
-        live: LivePeers::new(),
-        finished: false,
-        over_since: None,
-        exhausted: old.as_ref().is_some_and(|c| c.exhausted),
-        unsaved_cells: 0,
-        written,
-        answered: written,
-    };
-    if let Some(old) = old {
-        keep_on(&mut mission_state, old);
+        Some(new)
     }
-    peer.mission_state = Some(mission_state);
-    peer.report(Report::Ready {
-        revision: geometry.mission.revision,
-        loop_hash: coverage_loop.hash(),
-        cells: n,
-    });
-    crate::inbound::hear_again(peer);
+
+    /// On the same loop sections and rounds stay what they are, so that a revision which
+    /// arrives at one peer after the other parts nobody; between the same zones a UAV
+    /// stays on its curve, too.
+    fn keep_on(&mut self, old: Self) {
+        self.negotiation = old.negotiation;
+        self.able_since = old.able_since;
+        self.live = old.live;
+        self.claims = old.claims;
+        self.unsaved_cells = old.unsaved_cells;
+        let (new, before) = (&self.geometry.mission, &old.geometry.mission);
+        let flown_alike = new.zones == before.zones
+            && new.turn_radius_mm == before.turn_radius_mm
+            && new.clearance_mm == before.clearance_mm;
+        if flown_alike {
+            let base = new.base_m();
+            self.executive = old.executive.map(|e| e.with_home(base));
+            self.goal = old.goal;
+            self.replan = old.replan;
+        }
+    }
 }
 
-/// On the same loop sections and rounds stay what they are, so that a revision which
-/// arrives at one peer after the other parts nobody; between the same zones a UAV stays
-/// on its curve, too.
-fn keep_on(mission_state: &mut MissionState, old: MissionState) {
-    if old.loop_hash() != mission_state.loop_hash() {
-        return;
-    }
-    mission_state.negotiation = old.negotiation;
-    mission_state.able_since = old.able_since;
-    mission_state.live = old.live;
-    (mission_state.written, mission_state.answered) = (old.written, old.answered);
-    mission_state.unsaved_cells = old.unsaved_cells;
-    let (new, before) = (&mission_state.geometry.mission, &old.geometry.mission);
-    let flown_alike = new.zones == before.zones
-        && new.turn_radius_mm == before.turn_radius_mm
-        && new.clearance_mm == before.clearance_mm;
-    if flown_alike {
-        let base = new.base_m();
-        mission_state.executive = old.executive.map(|e| e.with_home(base));
-        mission_state.goal = old.goal;
-        mission_state.replan = old.replan;
-    }
+fn executive_for(geometry: &MissionGeometry, config: &PeerConfig) -> Option<Executive> {
+    let (mission, airframe) = (&geometry.mission, config.airframe?);
+    let (coverage_loop, router) = (&geometry.coverage_loop, &geometry.router);
+    let executive = Executive::new(
+        airframe,
+        config.height_m,
+        Arc::clone(coverage_loop),
+        Arc::clone(router),
+    );
+    Some(
+        executive
+            .with_tracking_error_m(mission.tracking_error_m())
+            .with_objective(config.objective)
+            .with_home(mission.base_m()),
+    )
 }
 
 /// A negotiation on a new loop, with all that is known to be covered.
-fn begun(
-    peer: &Peer,
-    old: Option<&MissionState>,
+fn negotiation_begun(
     geometry: &MissionGeometry,
-    n: u16,
+    old: Option<&MissionState>,
+    me: Member,
+    durable: &Durable,
+    cells: u16,
 ) -> Negotiation {
     let coverage_loop = &geometry.coverage_loop;
-    let mut base = CellSet::new(n);
-    for (i, c) in coverage_loop.cells().iter().enumerate() {
-        if !c.needed {
-            base.insert(u16::try_from(i).unwrap_or(u16::MAX));
-        }
-    }
-    let me = Member {
-        id: peer.config.id.0,
-        incarnation: peer.life.incarnation,
-    };
-    let counter = peer
-        .durable
-        .counter
-        .max(old.as_ref().map_or(0, |c| c.negotiation.rounds.counter()));
-    let mut negotiation = Negotiation::new(me, base, counter);
+    let without_need = (0u16..)
+        .zip(coverage_loop.cells())
+        .filter(|(_, c)| !c.needed);
+    let base = CellSet::of(cells, without_need.map(|(i, _)| i));
+    let counter = old.map_or(0, |m| m.negotiation.rounds.counter());
+    let mut negotiation = Negotiation::new(me, base, counter.max(durable.counter));
     // Every time round begins with nothing covered.
     let same_lap = |old: &&MissionState| old.geometry.mission.lap == geometry.mission.lap;
     if let Some(old) = old.filter(same_lap) {
-        negotiation.sections.cover(&carried_over(
-            &old.geometry.coverage_loop,
-            old.covered(),
-            coverage_loop,
-        ));
-    }
-    if let Some(covered) = life::remembered(&peer.durable, coverage_loop.hash(), n) {
+        let before = &old.geometry.coverage_loop;
+        let covered = carried_over(before, old.covered(), coverage_loop);
         negotiation.sections.cover(&covered);
     }
-    if let Some(claim) = peer
-        .durable
-        .claim
-        .as_ref()
-        .filter(|r| r.loop_hash == coverage_loop.hash())
-    {
+    if let Some(covered) = remembered(durable, coverage_loop.hash(), cells) {
+        negotiation.sections.cover(&covered);
+    }
+    let of_this_loop = |claim: &&Claim| claim.loop_hash == coverage_loop.hash();
+    if let Some(claim) = durable.claim.as_ref().filter(of_this_loop) {
         negotiation.sections.restore_epoch(claim.epoch);
     }
     negotiation
 }
 
+/// Covered cells the journal held, if they are counted on this loop.
+fn remembered(durable: &Durable, loop_hash: u64, cells: u16) -> Option<CellSet> {
+    if durable.loop_hash == loop_hash && durable.cells == cells {
+        CellSet::decode_rle(cells, &durable.covered).ok()
+    } else {
+        None
+    }
+}
+
 /// Covered cells of one loop, found again by name on another.
 fn carried_over(old: &CoverageLoop, covered: &CellSet, new: &CoverageLoop) -> CellSet {
-    let mut out = CellSet::new(u16::try_from(new.len()).unwrap_or(u16::MAX));
-    for c in covered.iter() {
-        if let Some(i) = old
-            .cells()
-            .get(usize::from(c))
-            .filter(|c| c.needed)
-            .and_then(|c| new.index_of(c.id))
-        {
-            out.insert(i);
-        }
+    let before = |c: u16| old.cells().get(usize::from(c)).filter(|c| c.needed);
+    let found = covered
+        .iter()
+        .filter_map(|c| before(c).and_then(|c| new.index_of(c.id)));
+    CellSet::of(u16::try_from(new.len()).unwrap_or(u16::MAX), found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_last_claim_written_is_installed() {
+        let mut claims = ClaimsWritten::default();
+        let (first, second) = (claims.next(), claims.next());
+        assert!(!claims.answer(first) && claims.under_way());
+        assert!(claims.answer(second) && !claims.under_way());
+        let third = claims.next();
+        let mut on_a_new_loop = claims.void();
+        assert!(!on_a_new_loop.under_way());
+        assert!(
+            !on_a_new_loop.answer(third),
+            "it was written for the old loop"
+        );
     }
-    out
 }

@@ -1,96 +1,71 @@
-//! The peer: owns the parts, routes inputs, collects outputs. No policy.
+//! The peer: routes events to its parts and carries out their effects. No policy.
 //!
 //! | what happens | who decides |
 //! |---|---|
-//! | life, probation, silence | `life` |
-//! | records heard | `inbound` |
-//! | records spoken | `outbound` |
+//! | life, probation, silence | `protocol::life` |
+//! | what bytes are | `inbound` |
+//! | who is there | `protocol::membership` |
+//! | what is passed on | `protocol::relay` |
+//! | what is spoken, when | `outbound` |
 //! | mission, goal, sections | `cooperation` |
+//!
+//! Outputs, the journal's tokens and the relay belong to the peer alone.
 
 use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
+use crate::cooperation::{Cooperation, Situation};
+use crate::effect::{Effect, Effects, PendingJob, Promise};
+use crate::inbound::{self, Heard};
 use crate::input::{Command, Input, Time};
 use crate::journal::{Durable, Entry};
-use crate::mission::Library;
-use crate::mission_state::MissionState;
 use crate::offload::{Job, JobResult};
-use crate::outbound::Outbound;
-use crate::output::{Output, Report};
-use crate::protocol::membership::Membership;
-use crate::protocol::relay::Relay;
-use crate::protocol::runs::PlannedCell;
-use crate::wire::message::{Epoch, Order};
-use crate::{Incarnation, Mission, PeerId, cooperation, inbound, outbound, protocol::life};
+use crate::outbound::{self, Outbound, Sources};
+use crate::output::{Output, Priority, Report, Status};
+use crate::protocol::life::Life;
+use crate::protocol::membership::{Change, Membership};
+use crate::protocol::relay::{Offer, Relay};
+use crate::timers::{Timer, Timers};
+use crate::wire::codec::{self, Body};
+use crate::wire::key;
+use crate::wire::kinds::Kind;
+use crate::wire::limits::GOSSIP_MAX;
+use crate::wire::message::{Beacon, Member, Order, Record};
+use crate::{Incarnation, Mission, PeerId};
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
 use skein_behaviors::Percept;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-/// Most stores under way: one a kind of promise and a few unions. A driver that
-/// answers none of them is broken, and the peer goes silent rather than lie.
+/// Most stores under way: one a kind of promise and a few of covered cells. A driver
+/// that answers none of them is broken, and the peer goes silent rather than lie.
 pub const MAX_STORES: usize = 32;
 
-/// Most plans under way: one ground a mission revision, one division a round.
+/// Most jobs under way: one geometry a mission revision, one division a round.
 pub const MAX_JOBS: usize = 8;
 
 /// How often a peer looks at its deadlines, as a fraction of the beacon period.
 pub const CADENCE: u64 = 4;
 
-/// What waits for a store to become durable.
-#[derive(Clone, Debug)]
-pub(crate) enum Promise {
-    /// A life.
-    Life(Incarnation),
-    /// A bid.
-    Bid(Box<crate::wire::message::Bid>),
-    /// An adoption, and which of the sections written it is.
-    Adopt(u64, Box<crate::protocol::negotiation::Adoption>),
-    /// Cells taken without a round, likewise.
-    Take(u64, Vec<PlannedCell>),
-    /// Coverage; nothing waits for it.
-    Covered,
-}
-
-/// What waits for an answer of the planner.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PendingJob {
-    /// The common ground of the mission with this hash.
-    Geometry(u64),
-    /// A division of this epoch.
-    Division(Epoch),
-}
-
 /// The mind of one peer. The contract is at the top of the crate.
 #[derive(Debug)]
 pub struct Peer {
-    pub(crate) config: PeerConfig,
-    pub(crate) now: Time,
-    pub(crate) started: bool,
-    pub(crate) life: life::Life,
-    pub(crate) rng: ChaCha8Rng,
-    pub(crate) membership: Membership,
-    pub(crate) relay: Relay,
-    pub(crate) library: Library,
-    pub(crate) outbound: Outbound,
-    pub(crate) mission_state: Option<MissionState>,
-    pub(crate) order: StandingOrder,
-    pub(crate) percept: Option<Percept>,
-    pub(crate) durable: Durable,
-    pub(crate) outputs: VecDeque<Output>,
-    next_token: u64,
+    config: PeerConfig,
+    now: Time,
+    started: bool,
+    rng: ChaCha8Rng,
+    timers: Timers,
+    life: Life,
+    membership: Membership,
+    relay: Relay,
+    outbound: Outbound,
+    cooperation: Cooperation,
+    percept: Option<Percept>,
+    durable: Durable,
+    outputs: VecDeque<Output>,
+    last_token: u64,
     stores: BTreeMap<u64, (Promise, Entry)>,
     jobs: BTreeMap<u64, PendingJob>,
-    next_tick: Time,
-}
-
-/// The operator's standing order and the version of the record that gave it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct StandingOrder {
-    /// What is wanted.
-    pub order: Order,
-    /// (incarnation, seq, author) of the record; none yet when zero.
-    pub version: (Incarnation, u32, u16),
 }
 
 impl Peer {
@@ -101,27 +76,23 @@ impl Peer {
         let mut seed = [0u8; 32];
         seed[..8].copy_from_slice(&config.seed.to_le_bytes());
         seed[8..10].copy_from_slice(&config.id.0.to_le_bytes());
+        let mut timers = Timers::default();
         Self {
             membership: Membership::new(config.id.0, period),
             relay: Relay::new(config.id.0, &config.fleet, config.rate_bps, period),
-            library: Library::new(config.mission.clone()),
-            outbound: Outbound::default(),
-            mission_state: None,
-            order: StandingOrder {
-                order: Order::Resume,
-                version: (0, 0, 0),
-            },
+            outbound: Outbound::new(u64::from(period), &mut timers),
+            cooperation: Cooperation::new(config.mission.clone()),
             percept: None,
             durable: Durable::default(),
             outputs: VecDeque::new(),
-            next_token: 1,
+            last_token: 1,
             stores: BTreeMap::new(),
             jobs: BTreeMap::new(),
-            next_tick: Time(0),
             now: Time(0),
             started: false,
-            life: life::Life::default(),
+            life: Life::default(),
             rng: ChaCha8Rng::from_seed(seed),
+            timers,
             config,
         }
     }
@@ -129,29 +100,21 @@ impl Peer {
     /// Takes one input at the peer's own time. Time that runs backwards stands still.
     pub fn handle(&mut self, now: Time, input: Input) {
         self.now = self.now.max(now);
-        if !self.started {
-            if let Input::Start { persisted, nonce } = input {
-                self.started = true;
-                self.next_tick = self.now;
-                life::start(self, &persisted, nonce);
-            }
-            return;
-        }
         match input {
-            Input::Start { .. } => {}
+            Input::Start { persisted, nonce } if !self.started => {
+                return self.on_start(&persisted, nonce);
+            }
+            _ if !self.started => return,
+            Input::Start { .. } | Input::Timer => {}
             Input::Percept(percept) => self.on_percept(percept),
-            Input::Received {
-                transmitter,
-                hops,
-                bytes,
-            } => inbound::hear(self, transmitter, hops, &bytes),
-            Input::Timer => {}
+            // What is passed on is judged by the copies heard, whoever sent them.
+            Input::Received { hops, bytes, .. } => self.on_received(hops, &bytes),
             Input::LinkHint { neighbour, up } => self.membership.link(neighbour, up),
             Input::Stored { token, ok } => self.on_stored(token, ok),
             Input::Computed { token, result } => self.on_computed(token, result),
-            Input::Command(command) => self.on_command(&command),
+            Input::Command(command) => self.on_command(command),
         }
-        self.tick();
+        self.on_time();
     }
 
     /// The next output of the last input, if there is one left.
@@ -165,27 +128,53 @@ impl Peer {
         if !self.started {
             return None;
         }
-        let mut next = self.next_tick.min(self.outbound.next_beacon);
-        if let Some(t) = self.relay.next_timeout(self.now) {
-            next = next.min(t);
-        }
-        Some(next.max(self.now.plus_ms(1)))
+        let timers = self.timers.next_timeout();
+        let relay = self.relay.next_timeout(self.now);
+        let next = timers.into_iter().chain(relay).min();
+        next.map(|t| t.max(self.now.plus_ms(1)))
     }
 
-    /// The deadlines that are due, then whatever may be sent now.
-    fn tick(&mut self) {
-        if self.now >= self.next_tick {
-            self.next_tick = self.now.plus_ms(self.period_ms() / CADENCE);
-            life::tick(self);
+    // --- Events.
+
+    fn on_start(&mut self, persisted: &[Vec<u8>], nonce: u32) {
+        self.started = true;
+        self.timers.set(Timer::Tick, self.now);
+        let (durable, unread) = Durable::replay(persisted);
+        self.durable = durable;
+        if unread > 0 {
+            self.alarm(&format!(
+                "{unread} journal records of a later version were skipped"
+            ));
+        }
+        let (period_ms, last_life) = (self.period_ms(), self.durable.incarnation);
+        let effects = self
+            .life
+            .start(self.now, period_ms, &mut self.timers, nonce, last_life);
+        Outbound::start(&mut self.timers);
+        self.carry_out(effects);
+        let effects = self.cooperation.consider_mission();
+        self.carry_out(effects);
+    }
+
+    /// The timers that are due, then whatever may be sent now.
+    fn on_time(&mut self) {
+        if self.timers.is_due(Timer::Tick, self.now) {
+            let next = self.now.plus_ms(self.period_ms() / CADENCE);
+            self.timers.set(Timer::Tick, next);
+            let effects = self.life.tick(self.durable.incarnation);
+            self.carry_out(effects);
             let changes = self.membership.tick(self.now);
-            inbound::on_changes(self, changes);
-            cooperation::tick(self);
-            outbound::tick(self);
+            self.report_changes(changes);
+            self.negotiate();
+            if self.speaks() {
+                let effects = self.with_sources(Outbound::tick);
+                self.carry_out(effects);
+            }
         }
-        if self.now >= self.outbound.next_beacon {
-            outbound::beacon(self);
+        if self.timers.is_due(Timer::Beacon, self.now) {
+            self.beacon();
         }
-        outbound::send(self);
+        self.send();
     }
 
     fn on_percept(&mut self, percept: Percept) {
@@ -196,13 +185,61 @@ impl Peer {
             percept.endurance_s,
         ];
         if finite.iter().any(|v| !v.is_finite()) {
-            self.report(Report::Refused {
-                reason: "a percept that is not finite".into(),
-            });
-            return;
+            return self.refuse("a percept that is not finite".into());
         }
         self.percept = Some(percept);
-        cooperation::fly(self, &percept);
+        let effects = self.cooperation.on_percept(&percept);
+        self.carry_out(effects);
+    }
+
+    fn on_received(&mut self, hops: u8, bytes: &[u8]) {
+        match inbound::read(bytes, self.config.id.0, &self.life) {
+            Heard::Refused(why) => self.refuse(why),
+            Heard::Double(nonce) => {
+                let effects = self.life.hear_double(nonce);
+                self.carry_out(effects);
+            }
+            Heard::Myself(incarnation, heartbeat) => self.on_myself(incarnation, heartbeat),
+            Heard::Beacon(record, beacon) => self.on_beacon(&record, &beacon),
+            Heard::Record(kind, record, body) => {
+                if kind.relayed() && self.relay.offer(self.now, &record, bytes, hops) != Offer::New
+                {
+                    return;
+                }
+                let effects = self.cooperation.hear(self.now, &record, body);
+                self.carry_out(effects);
+            }
+        }
+    }
+
+    fn on_myself(&mut self, incarnation: Incarnation, heartbeat: u32) {
+        let sent = self.outbound.heartbeat();
+        let effects = self.life.hear_of_myself(incarnation, heartbeat, sent);
+        self.carry_out(effects);
+    }
+
+    fn on_beacon(&mut self, record: &Record, beacon: &Beacon) {
+        let (now, author, me) = (self.now, record.author, self.config.id.0);
+        let changes = self
+            .membership
+            .on_beacon(now, author, record.incarnation, beacon);
+        self.report_changes(changes);
+        for told in beacon.gossip.iter().filter(|g| g.id == me) {
+            self.on_myself(told.incarnation, told.heartbeat);
+            if told.incarnation == self.life.incarnation() {
+                match told.suspected_ds {
+                    Some(_) => {
+                        let until = now.plus_ms(self.membership.k2_ms(now));
+                        self.outbound
+                            .refute(now, until, &mut self.timers, &mut self.rng);
+                    }
+                    None => self.outbound.believed(now, &mut self.timers),
+                }
+            }
+        }
+        self.relay.on_beacon(now, author, beacon);
+        let effects = self.cooperation.hear_beacon(author, beacon);
+        self.carry_out(effects);
     }
 
     fn on_stored(&mut self, token: u64, ok: bool) {
@@ -211,99 +248,325 @@ impl Peer {
         };
         if !ok {
             self.alarm("the journal could not be written; what it was to promise is not spoken");
-            cooperation::broken(self, &promise);
-            return;
+            return self.broken(&promise);
         }
         self.durable.apply(&entry);
-        match promise {
-            Promise::Life(incarnation) => life::lives(self, incarnation),
-            Promise::Bid(bid) => cooperation::bid_is_durable(self, *bid),
-            Promise::Adopt(written, adoption) => cooperation::adopt(self, written, &adoption),
-            Promise::Take(written, cells) => cooperation::take(self, written, &cells),
-            Promise::Covered => {}
-        }
+        let effects = match promise {
+            Promise::Life(incarnation) => self.life.is_durable(incarnation),
+            Promise::Bid(bid) => self.cooperation.bid_is_durable(*bid),
+            Promise::Adopt(written, adoption) => {
+                let (situation, cooperation, timers) = self.situation();
+                cooperation.adopt(&situation, written, &adoption, timers)
+            }
+            Promise::Take(written, cells) => {
+                let (situation, cooperation, _) = self.situation();
+                cooperation.take(&situation, written, &cells)
+            }
+            Promise::Covered => Effects::new(),
+        };
+        self.carry_out(effects);
     }
 
     fn on_computed(&mut self, token: u64, result: JobResult) {
-        match (self.jobs.remove(&token), result) {
+        let effects = match (self.jobs.remove(&token), result) {
             (Some(PendingJob::Geometry(hash)), JobResult::Geometry(geometry)) => {
-                cooperation::geometry_arrived(self, hash, geometry)
+                let me = self.me();
+                self.cooperation.geometry_arrived(
+                    hash,
+                    geometry,
+                    me,
+                    &self.config,
+                    &self.durable,
+                    &mut self.timers,
+                )
             }
             (Some(PendingJob::Division(epoch)), JobResult::Divide(division)) => {
-                cooperation::divided(self, epoch, &division);
+                let (situation, cooperation, _) = self.situation();
+                cooperation.divided(&situation, epoch, &division)
             }
-            _ => {}
-        }
+            _ => Effects::new(),
+        };
+        self.carry_out(effects);
     }
 
-    fn on_command(&mut self, command: &Command) {
+    fn on_command(&mut self, command: Command) {
         if self.config.role != Role::GroundStation {
-            self.alarm("a command reached a peer that is no ground station; it was ignored");
-            return;
+            return self
+                .alarm("a command reached a peer that is no ground station; it was ignored");
         }
         match command {
             Command::Mission(mission) => {
-                self.library.offer(mission.clone());
-                outbound::speak_mission(self);
+                self.cooperation.offer(mission);
+                if self.speaks() {
+                    let effects = self.with_sources(|o, s, _, _| o.speak_mission(s));
+                    self.carry_out(effects);
+                }
             }
-            Command::Order(order) => outbound::speak_order(self, *order),
+            Command::Order(order) => self.give_order(order),
         }
     }
 
-    /// Asks for a record to be made durable; `promise` is kept once it is.
-    pub(crate) fn store(&mut self, promise: Promise, entry: Entry) -> bool {
+    fn give_order(&mut self, order: Order) {
+        self.carry_out(vec![Effect::Speak(0, Body::Operator(order))]);
+        let me = self.me();
+        let version = (me.incarnation, self.outbound.seq(), me.id);
+        self.cooperation.give_order(order, version);
+    }
+
+    // --- Effects.
+
+    /// Carries out effects in order, each with what follows from it before the next.
+    fn carry_out(&mut self, effects: Effects) {
+        for effect in effects {
+            self.carry_out_one(effect);
+        }
+    }
+
+    fn carry_out_one(&mut self, effect: Effect) {
+        match effect {
+            Effect::Speak(subject, body) => self.speak(subject, &body),
+            Effect::Store(promise, entry) => self.store(promise, entry),
+            Effect::Compute(pending, job) => self.compute(pending, job),
+            Effect::Fly(setpoint) => self.outputs.push_back(Output::Setpoint(setpoint)),
+            Effect::Report(report) => self.report(report),
+            Effect::Alarm(text) => self.alarm(&text),
+            Effect::Live(incarnation) => {
+                assert_eq!(incarnation, self.life.incarnation());
+                self.relay.new_life();
+                self.outbound.new_life(&mut self.timers);
+                let me = self.me();
+                self.cooperation.new_life(me, &mut self.timers);
+            }
+            Effect::Negotiate => self.negotiate(),
+            Effect::ClaimChanged => self.outbound.claim_changed(&mut self.timers),
+            Effect::ClaimNow => {
+                if self.speaks() {
+                    let effects = self.with_sources(Outbound::speak_claim);
+                    self.carry_out(effects);
+                }
+            }
+            Effect::CoverageChanged => self.outbound.coverage_changed(&mut self.timers),
+            Effect::CoverageWanted => self.outbound.coverage_wanted(&mut self.timers),
+            Effect::MissionFinished => self.timers.set(Timer::Finished, self.now),
+            Effect::Offer(mission) => self.cooperation.offer(mission),
+            Effect::HearAgain => self.hear_again(),
+        }
+    }
+
+    fn negotiate(&mut self) {
+        let (situation, cooperation, timers) = self.situation();
+        let effects = cooperation.tick(&situation, timers);
+        self.carry_out(effects);
+    }
+
+    /// After the geometry changed, claims and bids heard before it are looked at again.
+    fn hear_again(&mut self) {
+        for record in self.relay.records() {
+            let Some(kind) = Kind::of_number(record.kind) else {
+                continue;
+            };
+            if matches!(kind, Kind::Claim | Kind::Bid)
+                && record.author != self.config.id.0
+                && let Ok(body) = codec::decode_body(kind, &record.body)
+            {
+                let effects = self.cooperation.hear(self.now, &record, body);
+                self.carry_out(effects);
+            }
+        }
+        self.carry_out_one(Effect::ClaimNow);
+    }
+
+    /// Writes a record of this peer's own and hands it to the relay.
+    fn speak(&mut self, subject: u16, body: &Body) {
+        if !self.speaks() {
+            return;
+        }
+        let me = self.me();
+        let record = self.outbound.record(me.id, me.incarnation, subject, body);
+        let bytes = codec::encode_record(&record);
+        self.relay.own(self.now, &record, bytes);
+    }
+
+    /// "I am here", with gossip unless a suspicion is being answered.
+    fn beacon(&mut self) {
+        let full = self
+            .outbound
+            .beacon_due(self.now, &mut self.timers, &mut self.rng);
+        if !self.speaks() {
+            return;
+        }
+        let most = if full { GOSSIP_MAX } else { 0 };
+        let mut gossip = self.membership.gossip(self.now, most);
+        for g in &mut gossip {
+            (g.max_seq, g.digest) = self.relay.version(g.id, g.incarnation);
+        }
+        let beacon = Beacon {
+            nonce: self.life.nonce(),
+            eccentricity: self.membership.eccentricity(self.now),
+            gossip,
+            ..self.with_sources(|_, s, _, _| outbound::beacon_of(s))
+        };
+        let me = self.me();
+        let record = self
+            .outbound
+            .beacon(self.now, me.id, me.incarnation, beacon);
+        let bytes = codec::encode_record(&record);
+        self.relay.charge(self.now, bytes.len());
+        self.outputs.push_back(Output::Publish {
+            key: key::key(&self.config.fleet, Kind::Beacon, 0, me.id),
+            bytes,
+            hops: 0,
+            priority: Priority::Beacon,
+            lifetime_ms: self.config.beacon_period_ms,
+        });
+    }
+
+    /// Sends what the relay lets go.
+    fn send(&mut self) {
+        if !self.speaks() {
+            return;
+        }
+        while let Some(out) = self.relay.poll(self.now) {
+            self.outputs.push_back(Output::Publish {
+                key: out.key,
+                bytes: out.bytes,
+                hops: out.hops,
+                priority: out.priority,
+                lifetime_ms: out.lifetime_ms,
+            });
+        }
+    }
+
+    /// Asks for an entry to be made durable; what it promises is broken at once where
+    /// too many are under way.
+    fn store(&mut self, promise: Promise, entry: Entry) {
         if self.stores.len() >= MAX_STORES {
-            return false;
+            return self.broken(&promise);
         }
         let token = self.token();
         self.outputs.push_back(Output::Store {
             token,
             record: entry.encode(),
         });
-        self.stores.insert(token, (promise, entry));
-        true
+        let before = self.stores.insert(token, (promise, entry));
+        assert!(before.is_none(), "tokens are unique");
     }
 
-    /// Asks the planner.
-    pub(crate) fn ask(&mut self, pending: PendingJob, job: Job) {
+    /// What was promised does not happen.
+    fn broken(&mut self, promise: &Promise) {
+        match promise {
+            Promise::Life(incarnation) => self.life.is_broken(*incarnation),
+            other => self.cooperation.broken(other),
+        }
+    }
+
+    /// Asks for a job to be computed, unless it is under way.
+    fn compute(&mut self, pending: PendingJob, job: Job) {
         if self.jobs.len() < MAX_JOBS && !self.jobs.values().any(|p| *p == pending) {
             let token = self.token();
             self.outputs.push_back(Output::Compute { token, job });
-            self.jobs.insert(token, pending);
+            let before = self.jobs.insert(token, pending);
+            assert!(before.is_none(), "tokens are unique");
         }
     }
 
     fn token(&mut self) -> u64 {
-        self.next_token += 1;
-        self.next_token
+        self.last_token += 1;
+        self.last_token
     }
 
-    pub(crate) fn report(&mut self, report: Report) {
+    /// Reports what changed in the beliefs about others.
+    fn report_changes(&mut self, changes: Vec<Change>) {
+        for c in changes {
+            let (by, at_ms) = (self.config.id.0, self.now.0);
+            if c.status == Status::Down {
+                tracing::info!(peer = by, at_ms, down = c.peer, "believed down");
+            }
+            self.report(Report::Membership {
+                peer: PeerId(c.peer),
+                incarnation: c.incarnation,
+                status: c.status,
+            });
+        }
+    }
+
+    fn refuse(&mut self, reason: String) {
+        self.report(Report::Refused { reason });
+    }
+
+    fn report(&mut self, report: Report) {
         self.outputs.push_back(Output::Report(report));
     }
 
-    pub(crate) fn alarm(&mut self, text: &str) {
+    fn alarm(&mut self, text: &str) {
         tracing::warn!(peer = self.config.id.0, at_ms = self.now.0, "{text}");
         self.report(Report::Alarm {
             text: text.to_owned(),
         });
     }
 
-    pub(crate) fn period_ms(&self) -> u64 {
+    // --- What it knows.
+
+    fn period_ms(&self) -> u64 {
         u64::from(self.config.beacon_period_ms.max(1))
+    }
+
+    fn me(&self) -> Member {
+        Member {
+            id: self.config.id.0,
+            incarnation: self.life.incarnation(),
+        }
+    }
+
+    fn speaks(&self) -> bool {
+        self.life.speaks(self.now, &self.timers)
+    }
+
+    /// What the cooperation manager is told, and itself.
+    fn situation(&mut self) -> (Situation<'_>, &mut Cooperation, &mut Timers) {
+        let situation = Situation {
+            now: self.now,
+            period_ms: self.period_ms(),
+            me: self.me(),
+            role: self.config.role,
+            has_voice: self.life.has_voice(self.now, &self.timers),
+            percept: self.percept.as_ref(),
+            membership: &self.membership,
+        };
+        (situation, &mut self.cooperation, &mut self.timers)
+    }
+
+    /// Lets the outbound part look at what there is to say.
+    fn with_sources<T>(
+        &mut self,
+        ask: impl FnOnce(&mut Outbound, &Sources<'_>, &mut Timers, &mut ChaCha8Rng) -> T,
+    ) -> T {
+        let sources = Sources {
+            now: self.now,
+            config: &self.config,
+            mission_state: self.cooperation.state(),
+            mission: self.cooperation.newest_mission(),
+            percept: self.percept.as_ref(),
+        };
+        ask(
+            &mut self.outbound,
+            &sources,
+            &mut self.timers,
+            &mut self.rng,
+        )
     }
 
     /// The newest mission that it holds.
     #[must_use]
     pub fn mission(&self) -> Option<Arc<Mission>> {
-        self.library.newest()
+        self.cooperation.newest_mission()
     }
 
     /// The revision that the operator's next mission must have to be flown: above those
     /// of all missions that this peer holds, or has heard that others follow.
     #[must_use]
     pub fn next_revision(&self) -> u32 {
-        let held = self.library.newest().map(|m| m.revision);
+        let held = self.cooperation.newest_mission().map(|m| m.revision);
         let heard = self
             .membership
             .all()
@@ -319,27 +582,30 @@ impl Peer {
     /// The life in which it speaks at present; none while it only listens.
     #[must_use]
     pub fn speaks_in(&self) -> Option<Incarnation> {
-        let speaks = self.life.speaks(self.now) && !self.outbound.silenced;
-        speaks.then_some(self.life.incarnation)
+        self.speaks().then_some(self.life.incarnation())
     }
 
     /// A copy of what it believes.
     #[must_use]
     pub fn beliefs(&self) -> Beliefs {
-        let mut view = Beliefs {
-            incarnation: self.life.incarnation,
-            speaks: self.life.speaks(self.now),
+        let mut beliefs = Beliefs {
+            incarnation: self.life.incarnation(),
+            speaks: self.life.has_voice(self.now, &self.timers),
             diameter: self.membership.diameter(self.now),
             ..Beliefs::default()
         };
         for (id, incarnation, status) in self.membership.all() {
-            view.peers.insert(PeerId(id), (incarnation, status));
+            beliefs.peers.insert(PeerId(id), (incarnation, status));
         }
-        view.loads.push(("stores", self.stores.len(), MAX_STORES));
-        view.loads.push(("jobs", self.jobs.len(), MAX_JOBS));
-        view.loads.extend(self.relay.loads());
-        cooperation::view(self, &mut view);
-        view
+        beliefs.loads = vec![
+            ("stores", self.stores.len(), MAX_STORES),
+            ("jobs", self.jobs.len(), MAX_JOBS),
+        ];
+        beliefs.loads.extend(self.relay.loads());
+        let counter = self.durable.counter;
+        self.cooperation
+            .fill(&mut beliefs, counter, self.percept.as_ref());
+        beliefs
     }
 
     /// What it believes to be durable: a judge compares it with what replaying the

@@ -4,20 +4,22 @@
 //! | state | event | next state | output |
 //! |---|---|---|---|
 //! | born | start | promised | the journal's incarnation plus one is stored |
-//! | promised | stored | listening | probation of 3 T runs from the start |
+//! | promised | stored | listening | the life begins; probation of 3 T runs from the start |
+//! | promised | the store failed | as before the promise | stored again: at the next tick if there is no life yet, else when it hears of itself again |
 //! | listening | its own id at this or a higher life | promised | that plus one is stored |
 //! | listening | 3 T are over | speaking | beacons |
 //! | speaking | its own id at a higher life, or a heartbeat it never sent | promised | that plus one |
+//! | speaking | another boot nonce under its id and life, above its own | silenced | an alarm |
 //!
-//! Without the last row a peer that lost its disk would be a zombie nobody believes.
+//! Without the last but one row a peer that lost its disk would be a zombie nobody
+//! believes. A silenced peer flies its plan to the end.
 
-use crate::cells::CellSet;
+use crate::Incarnation;
+use crate::effect::{Effect, Effects, Promise};
 use crate::input::Time;
-use crate::journal::{Durable, Entry};
+use crate::journal::Entry;
 use crate::output::Report;
-use crate::peer::{Peer, Promise};
-use crate::wire::message::Member;
-use crate::{Incarnation, cooperation, outbound};
+use crate::timers::{Timer, Timers};
 
 /// A new life only listens for this many beacon periods: long enough to hear a
 /// neighbour's gossip about an earlier life at 30 % loss with 97 % certainty, and
@@ -26,93 +28,190 @@ pub const PROBATION_PERIODS: u64 = 3;
 
 /// Where a life stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Life {
-    /// The life that is durable; 0 before the first.
-    pub incarnation: Incarnation,
+pub(crate) struct Life {
+    incarnation: Incarnation,
     /// The life that is being made durable.
-    pub promised: Option<Incarnation>,
-    /// Probation ends then.
-    pub listens_until: Time,
-    /// Tells two peers under one id apart.
-    pub nonce: u32,
+    promised: Option<Incarnation>,
+    nonce: u32,
+    silenced: bool,
 }
 
 impl Life {
-    /// Whether the peer may speak.
-    #[must_use]
-    pub fn speaks(&self, now: Time) -> bool {
-        self.incarnation > 0 && self.promised.is_none() && now >= self.listens_until
+    /// The life that is durable; 0 before the first.
+    pub fn incarnation(&self) -> Incarnation {
+        self.incarnation
+    }
+
+    /// Tells two peers under one id apart.
+    pub fn nonce(&self) -> u32 {
+        self.nonce
+    }
+
+    /// Whether a life has begun and its probation is over.
+    pub fn has_voice(&self, now: Time, timers: &Timers) -> bool {
+        self.incarnation > 0 && self.promised.is_none() && timers.is_due(Timer::Probation, now)
+    }
+
+    /// Whether the peer may speak: it has a voice, and no double took it.
+    pub fn speaks(&self, now: Time, timers: &Timers) -> bool {
+        self.has_voice(now, timers) && !self.silenced
+    }
+
+    /// The first input: `durable` is the life that the journal ended with.
+    pub fn start(
+        &mut self,
+        now: Time,
+        period_ms: u64,
+        timers: &mut Timers,
+        nonce: u32,
+        durable: Incarnation,
+    ) -> Effects {
+        assert_eq!(self.promised, None, "a peer starts once");
+        self.nonce = nonce;
+        timers.set(Timer::Probation, now.plus_ms(PROBATION_PERIODS * period_ms));
+        self.promise(durable.saturating_add(1))
+    }
+
+    fn promise(&mut self, incarnation: Incarnation) -> Effects {
+        if self.promised.is_some_and(|p| p >= incarnation) {
+            return Effects::new();
+        }
+        assert!(incarnation >= self.incarnation, "lives only grow");
+        self.promised = Some(incarnation);
+        let entry = Entry::Life(incarnation);
+        vec![Effect::Store(Promise::Life(incarnation), entry)]
+    }
+
+    /// A promised life is durable and may be spoken of.
+    pub fn is_durable(&mut self, incarnation: Incarnation) -> Effects {
+        if self.promised != Some(incarnation) {
+            return Effects::new();
+        }
+        self.promised = None;
+        self.incarnation = incarnation;
+        vec![
+            Effect::Live(incarnation),
+            Effect::Report(Report::Booted { incarnation }),
+        ]
+    }
+
+    /// A promised life could not be made durable.
+    pub fn is_broken(&mut self, incarnation: Incarnation) {
+        self.promised = self.promised.filter(|p| *p != incarnation);
+    }
+
+    /// Somebody speaks of this peer's own id in the given life, with a heartbeat;
+    /// `sent` is the last heartbeat that this peer sent itself.
+    pub fn hear_of_myself(
+        &mut self,
+        incarnation: Incarnation,
+        heartbeat: u32,
+        sent: u32,
+    ) -> Effects {
+        let mine = self.promised.unwrap_or(0).max(self.incarnation);
+        let never_sent = incarnation == self.incarnation && heartbeat > sent;
+        if incarnation > mine
+            || (incarnation == mine && never_sent)
+            || (self.incarnation == 0 && incarnation >= mine)
+        {
+            self.promise(incarnation.saturating_add(1))
+        } else {
+            Effects::new()
+        }
+    }
+
+    /// Another peer beacons under this id and life, with another boot nonce: the one
+    /// with the lower nonce is silent from now on.
+    pub fn hear_double(&mut self, nonce: u32) -> Effects {
+        assert_ne!(nonce, self.nonce, "an echo is no double");
+        self.silenced |= nonce > self.nonce;
+        vec![Effect::Alarm("another peer speaks under this id".into())]
+    }
+
+    /// A first life that could not be stored is tried again.
+    pub fn tick(&mut self, durable: Incarnation) -> Effects {
+        if self.incarnation == 0 && self.promised.is_none() {
+            self.promise(durable.saturating_add(1))
+        } else {
+            Effects::new()
+        }
     }
 }
 
-pub(crate) fn start(peer: &mut Peer, persisted: &[Vec<u8>], nonce: u32) {
-    let (durable, unread) = Durable::replay(persisted);
-    peer.durable = durable;
-    if unread > 0 {
-        peer.alarm(&format!(
-            "{unread} journal records of a later version were skipped"
-        ));
-    }
-    peer.life.nonce = nonce;
-    peer.life.listens_until = peer.now.plus_ms(PROBATION_PERIODS * peer.period_ms());
-    outbound::first_beacon(peer);
-    promise(peer, peer.durable.incarnation.saturating_add(1));
-    cooperation::consider_mission(peer);
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-fn promise(peer: &mut Peer, incarnation: Incarnation) {
-    if peer.life.promised.is_some_and(|p| p >= incarnation) {
-        return;
+    fn stored(effects: &Effects) -> Vec<Incarnation> {
+        let life = |e: &Effect| match e {
+            Effect::Store(Promise::Life(i), _) => Some(*i),
+            _ => None,
+        };
+        effects.iter().filter_map(life).collect()
     }
-    if peer.store(Promise::Life(incarnation), Entry::Life(incarnation)) {
-        peer.life.promised = Some(incarnation);
-    }
-}
 
-/// The life is durable and may be spoken of.
-pub(crate) fn lives(peer: &mut Peer, incarnation: Incarnation) {
-    if peer.life.promised != Some(incarnation) {
-        return;
+    /// A life that was started and is durable.
+    fn living(incarnation: Incarnation) -> Life {
+        let mut life = Life::default();
+        let effects = life.start(Time(0), 1000, &mut Timers::default(), 7, incarnation - 1);
+        assert_eq!(stored(&effects), [incarnation]);
+        assert_eq!(life.is_durable(incarnation).len(), 2);
+        life
     }
-    peer.life.promised = None;
-    peer.life.incarnation = incarnation;
-    peer.membership.set_self(incarnation);
-    peer.relay.new_life();
-    outbound::new_life(peer);
-    let me = Member {
-        id: peer.config.id.0,
-        incarnation,
-    };
-    if let Some(mission_state) = &mut peer.mission_state {
-        mission_state.new_life(me);
-    }
-    peer.report(Report::Booted { incarnation });
-}
 
-/// Somebody speaks of this peer's own id in the given life, with a heartbeat.
-pub(crate) fn heard_of_myself(peer: &mut Peer, incarnation: Incarnation, heartbeat: u32) {
-    let mine = peer.life.promised.unwrap_or(0).max(peer.life.incarnation);
-    let never_sent = incarnation == peer.life.incarnation && heartbeat > peer.outbound.heartbeat;
-    if incarnation > mine
-        || (incarnation == mine && never_sent)
-        || (peer.life.incarnation == 0 && incarnation >= mine)
-    {
-        promise(peer, incarnation.saturating_add(1));
+    #[test]
+    fn a_life_speaks_once_it_is_durable_and_has_listened() {
+        let (mut life, mut timers) = (Life::default(), Timers::default());
+        life.start(Time(500), 1000, &mut timers, 7, 4);
+        assert!(!life.speaks(Time(9000), &timers), "not durable yet");
+        assert!(life.is_durable(4).is_empty(), "another life was promised");
+        life.is_durable(5);
+        assert!(!life.speaks(Time(3499), &timers));
+        assert!(life.speaks(Time(3500), &timers));
     }
-}
 
-/// A store of the life that failed is tried again.
-pub(crate) fn tick(peer: &mut Peer) {
-    if peer.life.incarnation == 0 && peer.life.promised.is_none() {
-        promise(peer, peer.durable.incarnation.saturating_add(1));
+    #[test]
+    fn a_peer_heard_of_in_a_later_life_takes_the_one_after() {
+        let mut life = living(2);
+        assert!(life.hear_of_myself(2, 9, 9).is_empty(), "an echo");
+        assert!(life.hear_of_myself(1, 99, 9).is_empty(), "an earlier life");
+        assert_eq!(
+            stored(&life.hear_of_myself(2, 10, 9)),
+            [3],
+            "a heartbeat never sent"
+        );
+        assert_eq!(stored(&life.hear_of_myself(6, 0, 9)), [7]);
+        assert!(life.hear_of_myself(5, 0, 9).is_empty(), "7 is promised");
+        assert!(
+            life.is_durable(3).is_empty(),
+            "an earlier promise is overtaken"
+        );
+        assert_eq!(life.is_durable(7).len(), 2);
+        assert_eq!(life.incarnation(), 7);
     }
-}
 
-/// Covered cells the journal held, if they are counted on this loop.
-pub(crate) fn remembered(durable: &Durable, loop_hash: u64, cells: u16) -> Option<CellSet> {
-    if durable.loop_hash == loop_hash && durable.cells == cells {
-        CellSet::decode_rle(cells, &durable.covered).ok()
-    } else {
-        None
+    #[test]
+    fn of_two_under_one_id_the_lower_nonce_is_silent() {
+        let timers = Timers::default();
+        let mut life = living(2);
+        let mut probation_over = timers.clone();
+        probation_over.set(Timer::Probation, Time(0));
+        life.hear_double(6);
+        assert!(life.speaks(Time(1), &probation_over));
+        assert_eq!(life.hear_double(8).len(), 1);
+        assert!(!life.speaks(Time(1), &probation_over));
+        assert!(
+            life.has_voice(Time(1), &probation_over),
+            "it goes on planning"
+        );
+    }
+
+    #[test]
+    fn a_first_life_that_was_not_stored_is_promised_again() {
+        let mut life = Life::default();
+        life.start(Time(0), 1000, &mut Timers::default(), 7, 4);
+        assert!(life.tick(4).is_empty());
+        life.is_broken(5);
+        assert_eq!(stored(&life.tick(4)), [5]);
     }
 }

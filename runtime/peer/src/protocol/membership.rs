@@ -53,10 +53,6 @@ const URGENT_PERIODS: u64 = 2;
 /// quarter period at most.
 const TICKS_PER_PERIOD: u64 = 4;
 
-/// Restarts of one peer that are remembered: waiting doubles with each, and eight
-/// doublings of ten periods are longer than any sortie.
-const MAX_RESTARTS: usize = 8;
-
 /// A belief that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Change {
@@ -93,24 +89,11 @@ pub struct Info {
     pub heard: Option<Time>,
 }
 
-/// What was heard of this peer itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Oneself {
-    /// A later life of this id was known: take that plus one.
-    Later(Incarnation),
-    /// A heartbeat of this very life that this peer never sent: somebody else has its
-    /// id. Its boot nonce, where it was heard itself.
-    Double(Option<u32>),
-}
-
 /// All that a peer believes of others.
 #[derive(Clone, Debug)]
 pub struct Membership {
     me: u16,
     period_ms: u64,
-    incarnation: Incarnation,
-    nonce: u32,
-    heartbeat: u32,
     known: BTreeMap<u16, Known>,
     next_gossip: u16,
     last_tick: Option<Time>,
@@ -126,27 +109,12 @@ impl Membership {
         Self {
             me,
             period_ms: u64::from(period_ms.max(1)),
-            incarnation: 0,
-            nonce: 0,
-            heartbeat: 0,
             known: BTreeMap::new(),
             next_gossip: 0,
             last_tick: None,
             doubt_until: Time(0),
             gone: BTreeSet::new(),
         }
-    }
-
-    /// A new life of this peer itself: what it knows of others stays.
-    pub fn set_self(&mut self, incarnation: Incarnation) {
-        self.incarnation = incarnation;
-        self.heartbeat = 0;
-    }
-
-    /// What this peer last spoke: its boot nonce and its heartbeat.
-    pub fn set_voice(&mut self, nonce: u32, heartbeat: u32) {
-        self.nonce = nonce;
-        self.heartbeat = heartbeat;
     }
 
     /// The transport believes that a neighbour came or went. A hint: it halves the
@@ -311,9 +279,6 @@ impl Membership {
         if new_life {
             known.info = Info::default();
             known.eccentricity = 0;
-            known.restarts.push(now);
-            let surplus = known.restarts.len().saturating_sub(MAX_RESTARTS);
-            known.restarts.drain(..surplus);
         }
         if new_life || known.status == Status::Down {
             known.info.steady_since = now;
@@ -419,13 +384,6 @@ impl Membership {
         changes
     }
 
-    /// When [`Membership::tick`] is wanted at the latest; at once before the first.
-    #[must_use]
-    pub fn next_timeout(&self, now: Time) -> Time {
-        let step = (self.period_ms / TICKS_PER_PERIOD).max(1);
-        self.last_tick.map_or(now, |last| last.plus_ms(step))
-    }
-
     /// What to say of others: at most `max` entries. Who began a life anew without
     /// knowing is reminded first (a quarter of the entries at most), then news (half of
     /// the rest at most), then all in rotation, so that nobody is left out for long. The
@@ -507,62 +465,6 @@ impl Membership {
     #[must_use]
     pub fn info(&self, id: u16) -> Option<Info> {
         self.known.get(&id).map(|k| k.info)
-    }
-
-    /// The ground a peer works on, learnt from a record of its own.
-    pub fn learn_ground(
-        &mut self,
-        id: u16,
-        incarnation: Incarnation,
-        revision: u32,
-        loop_hash: u64,
-    ) {
-        if let Some(known) = self.known.get_mut(&id)
-            && known.freshest.incarnation == incarnation
-        {
-            known.info.revision = revision;
-            known.info.loop_hash = loop_hash;
-        }
-    }
-
-    /// Restarts of a peer seen within the last `window_ms`, 8 at most.
-    #[must_use]
-    pub fn restarts(&self, id: u16, now: Time, window_ms: u64) -> usize {
-        let recent = |t: &&Time| now.since_ms(**t) <= window_ms;
-        self.known
-            .get(&id)
-            .map_or(0, |k| k.restarts.iter().filter(recent).count())
-    }
-
-    /// What a beacon says of this peer itself, if that is not what it said.
-    #[must_use]
-    pub fn heard_myself(
-        &self,
-        now: Time,
-        author: u16,
-        incarnation: Incarnation,
-        beacon: &Beacon,
-    ) -> Option<Oneself> {
-        if author == self.me {
-            return match incarnation.cmp(&self.incarnation) {
-                core::cmp::Ordering::Greater => Some(Oneself::Later(incarnation)),
-                core::cmp::Ordering::Equal if beacon.nonce != self.nonce => {
-                    Some(Oneself::Double(Some(beacon.nonce)))
-                }
-                _ => None,
-            };
-        }
-        let told = beacon
-            .gossip
-            .iter()
-            .filter(|g| g.id == self.me)
-            .max_by_key(|g| (g.incarnation, g.heartbeat))?;
-        if told.incarnation > self.incarnation {
-            return Some(Oneself::Later(told.incarnation));
-        }
-        let fresh = u64::from(told.age_ds) * 100 <= self.bound_ms(now);
-        let unsent = told.incarnation == self.incarnation && told.heartbeat > self.heartbeat;
-        (fresh && unsent).then_some(Oneself::Double(None))
     }
 
     /// How many are known, and the cap.

@@ -42,6 +42,8 @@ pub struct Context<'a> {
     pub revision: u32,
     /// The loop.
     pub loop_hash: u64,
+    /// Whether the cells held ran out of time just now.
+    pub held_expired: bool,
 }
 
 impl Context<'_> {
@@ -68,7 +70,8 @@ pub enum Action {
         /// The members.
         robots: Vec<Uav>,
     },
-    /// Make these takes durable, then call [`Negotiation::take`].
+    /// Make these takes durable, then call [`Negotiation::take`], or if they cannot be
+    /// [`Negotiation::cancel_take`].
     Take(Vec<PlannedCell>),
     /// The own claim changed: publish it and fly by it.
     Changed,
@@ -120,7 +123,6 @@ pub struct Negotiation {
     decided_at: Option<Time>,
     adopted_at: Option<Time>,
     cells_since: u16,
-    held_until: Option<Time>,
     take_pending: bool,
     idle_since: Option<Time>,
     progress: BTreeMap<u16, Progress>,
@@ -149,7 +151,6 @@ impl Negotiation {
             decided_at: None,
             adopted_at: None,
             cells_since: 0,
-            held_until: None,
             take_pending: false,
             idle_since: None,
             progress: BTreeMap::new(),
@@ -207,12 +208,9 @@ impl Negotiation {
         if self.sections.settle(ctx.live) {
             actions.push(Action::Changed);
         }
-        if self.held_until.is_some_and(|t| ctx.now >= t) {
-            self.held_until = None;
-            if !self.sections.held().is_empty() {
-                self.sections.expire_held();
-                actions.push(Action::Changed);
-            }
+        if ctx.held_expired && !self.sections.held().is_empty() {
+            self.sections.expire_held();
+            actions.push(Action::Changed);
         }
         let orphans = self.sections.orphans(ctx.live);
         self.watch_orphans(ctx, &orphans);
@@ -401,23 +399,29 @@ impl Negotiation {
         worthwhile.then_some(adoption)
     }
 
-    /// The adoption is durable: it is the plan from now on.
-    pub fn adopt(&mut self, now: Time, adoption: &Adoption) {
+    /// The adoption is durable: it is the plan from now on, and what was given away is
+    /// held for twice the round's waiting time. Returns false where a later one is known.
+    pub fn adopt(&mut self, now: Time, adoption: &Adoption) -> bool {
         if !self.sections.install(adoption.epoch, &adoption.plan) {
-            return;
+            return false;
         }
         self.sections.set_unassigned(&adoption.unassigned);
         self.adopted_at = Some(now);
         self.decided_at = Some(now);
         self.cells_since = 0;
         self.adoptions = self.adoptions.saturating_add(1);
-        self.held_until = Some(now.plus_ms(2 * u64::from(adoption.wait_ms)));
+        true
     }
 
     /// The takes are durable.
     pub fn take(&mut self, taken: &[PlannedCell]) -> usize {
         self.take_pending = false;
         self.sections.append(taken)
+    }
+
+    /// The takes were not made durable: they may be tried again.
+    pub fn cancel_take(&mut self) {
+        self.take_pending = false;
     }
 
     /// A new life: ownership of the old one is void, coverage stays.
@@ -427,7 +431,6 @@ impl Negotiation {
         self.dividing = None;
         self.bid_wanted = false;
         self.take_pending = false;
-        self.held_until = None;
     }
 
     /// Notes how other owners get on; the first ETA heard in an epoch bounds them.

@@ -1,7 +1,7 @@
 //! What a peer holds of everybody, and what it passes on.
 //!
 //! Records travel by two ways: a relayed record is passed on once when it is new
-//! (unless enough neighbours were heard doing so), and beacons tell neighbours which
+//! (unless enough copies were heard first), and beacons tell neighbours which
 //! versions a peer holds, so that whoever has newer ones puts them on the air again.
 //! So a record reaches everybody that a chain of meetings reaches, also long after
 //! its author died.
@@ -31,8 +31,9 @@ pub const MAX_QUEUE: usize = 128;
 /// A record passed on so many hops is not passed on again.
 pub const MAX_HOPS: u8 = 16;
 
-/// A copy is not passed on if so many neighbours were heard sending it first: one is
-/// not enough where three in ten are lost.
+/// A record is not passed on if so many copies of it were heard first: one is not enough
+/// where three in ten are lost. Copies count, not neighbours: of two from one neighbour
+/// the second has reached others too.
 const COPIES_HEARD: u8 = 2;
 
 /// Most neighbours counted: the largest fleet. Made-up ids must not take a peer's
@@ -188,14 +189,7 @@ impl Relay {
     }
 
     /// A record of somebody else's that was heard.
-    pub fn offer(
-        &mut self,
-        now: Time,
-        record: &Record,
-        bytes: &[u8],
-        transmitter: u16,
-        hops: u8,
-    ) -> Offer {
+    pub fn offer(&mut self, now: Time, record: &Record, bytes: &[u8], hops: u8) -> Offer {
         let key = key_of(record);
         let version = (record.incarnation, record.seq);
         let Some(kind) = Kind::of_number(record.kind) else {
@@ -234,7 +228,6 @@ impl Relay {
             let delay = RELAY_DELAY_MS + self.jitter(&key, version) % RELAY_SPREAD_MS;
             self.wait(now, key, kind, delay);
         }
-        let _ = transmitter;
         Offer::New
     }
 
@@ -521,20 +514,17 @@ mod tests {
     #[test]
     fn a_new_record_is_passed_on_once() {
         let mut r = relay(2);
-        assert_eq!(
-            r.offer(Time(5000), &record(1, 1), &[1; 40], 1, 0),
-            Offer::New
-        );
+        assert_eq!(r.offer(Time(5000), &record(1, 1), &[1; 40], 0), Offer::New);
         assert_eq!(r.poll(Time(5000)), None);
         let out = r.poll(Time(5500)).unwrap();
         assert_eq!((out.hops, out.bytes.len()), (1, 40));
         assert_eq!(r.poll(Time(6000)), None);
         assert_eq!(
-            r.offer(Time(6000), &record(1, 1), &[1; 40], 1, 0),
+            r.offer(Time(6000), &record(1, 1), &[1; 40], 0),
             Offer::Duplicate
         );
         assert_eq!(
-            r.offer(Time(6000), &record(1, 0), &[1; 40], 1, 0),
+            r.offer(Time(6000), &record(1, 0), &[1; 40], 0),
             Offer::Stale
         );
     }
@@ -542,15 +532,15 @@ mod tests {
     #[test]
     fn two_copies_heard_are_enough() {
         let mut r = relay(3);
-        r.offer(Time(5000), &record(1, 1), &[1; 40], 1, 0);
-        r.offer(Time(5001), &record(1, 1), &[1; 40], 2, 1);
+        r.offer(Time(5000), &record(1, 1), &[1; 40], 0);
+        r.offer(Time(5001), &record(1, 1), &[1; 40], 1);
         assert_eq!(r.poll(Time(5500)), None);
     }
 
     #[test]
     fn what_a_neighbour_lacks_is_sent_again() {
         let mut r = relay(2);
-        r.offer(Time(5000), &record(1, 7), &[1; 40], 1, 0);
+        r.offer(Time(5000), &record(1, 7), &[1; 40], 0);
         assert!(r.poll(Time(5500)).is_some());
         r.catch_up(Time(9000), 1, 1, 3, 0);
         assert!(r.poll(Time(9500)).is_some());

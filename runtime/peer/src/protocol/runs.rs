@@ -3,6 +3,8 @@
 
 use crate::cells::CellSet;
 use crate::wire::message::{CellRun, Firmness, ListedRun, Stamp};
+use skein_flight::coverage::ring::Direction;
+use skein_flight::coverage::ring::backtracking::Leg;
 
 /// A cell that this peer will fly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -119,6 +121,35 @@ pub fn unpack(listings: &[ListedRun], n: u16) -> Vec<PlannedCell> {
         }));
     }
     out
+}
+
+/// Planned cells as legs: runs of neighbouring cells flown the same way.
+#[must_use]
+pub fn legs_of(plan: &[PlannedCell], n: u16) -> Vec<Leg> {
+    let mut legs: Vec<Leg> = Vec::new();
+    let mut last = 0;
+    for p in plan {
+        let direction = if p.backward {
+            Direction::Backward
+        } else {
+            Direction::Forward
+        };
+        let next = if p.backward {
+            (last + n - 1) % n.max(1)
+        } else {
+            (last + 1) % n.max(1)
+        };
+        match legs.last_mut() {
+            Some(leg) if leg.direction == direction && next == p.cell => leg.count += 1,
+            _ => legs.push(Leg {
+                first: p.cell,
+                count: 1,
+                direction,
+            }),
+        }
+        last = p.cell;
+    }
+    legs
 }
 
 #[cfg(test)]

@@ -40,7 +40,6 @@ pub(super) struct Known {
     pub(super) hops: [(u64, u8); 10],
     pub(super) eccentricity: u8,
     pub(super) urgent_until: Time,
-    pub(super) restarts: Vec<Time>,
     /// An old heartbeat of this very life beyond the one that it now beats: it began the
     /// life anew without knowing, and has to be told.
     pub(super) beaten_before: Option<Heartbeat>,
@@ -66,7 +65,6 @@ impl Known {
             hops: NO_HOPS,
             eccentricity: 0,
             urgent_until,
-            restarts: Vec::new(),
             beaten_before: None,
         };
         known.note_hops(period, heard.hops);

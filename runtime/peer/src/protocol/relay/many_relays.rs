@@ -98,7 +98,7 @@ impl Net {
                             let now = Time(self.now);
                             self.nodes[j]
                                 .relay
-                                .offer(now, &record, &out.bytes, id(i), out.hops);
+                                .offer(now, &record, &out.bytes, out.hops);
                         }
                     }
                 }
@@ -302,9 +302,8 @@ fn a_later_life_voids_what_waits_of_the_earlier_one() {
         body: vec![0; 20],
         signature: Vec::new(),
     };
-    let offer = |relay: &mut Relay, now, r: &Record| {
-        relay.offer(Time(now), r, &codec::encode_record(r), r.author, 0)
-    };
+    let offer =
+        |relay: &mut Relay, now, r: &Record| relay.offer(Time(now), r, &codec::encode_record(r), 0);
     assert_eq!(offer(&mut relay, 5000, &record(1, 1, 3)), Offer::New);
     assert_eq!(offer(&mut relay, 5001, &record(1, 2, 1)), Offer::New);
     assert_eq!(offer(&mut relay, 5002, &record(2, 1, 1)), Offer::New);
@@ -334,13 +333,7 @@ fn a_flood_of_made_up_records_ends_at_the_caps() {
             body: vec![1; 30],
             signature: Vec::new(),
         };
-        relay.offer(
-            Time(5000 + t),
-            &record,
-            &codec::encode_record(&record),
-            author,
-            0,
-        );
+        relay.offer(Time(5000 + t), &record, &codec::encode_record(&record), 0);
         relay.on_beacon(Time(5000 + t), author, &empty_beacon());
         for (name, used, cap) in relay.loads() {
             assert!(used <= cap, "{name}: {used} of {cap}");
