@@ -291,6 +291,18 @@ fn sources(folders: &[&str]) -> Vec<PathBuf> {
     out
 }
 
+/// The loop of a mission takes up to seconds: whoever simulates, judges or shows it is
+/// given it, and a revised mission's is derived where geometry is remembered.
+#[test]
+fn the_loop_is_derived_in_one_place_of_the_simulator() {
+    for file in sources(&["netsim/sim/src", "netsim/broker/src", "src"]) {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let here = text.contains(".geometry()") || text.contains("CoverageLoop::build");
+        let allowed = file.ends_with("netsim/sim/src/geometry_cache.rs");
+        assert!(!here || allowed, "{} derives a loop", file.display());
+    }
+}
+
 #[test]
 fn the_core_asks_neither_clock_nor_chance() {
     let banned = [

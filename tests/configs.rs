@@ -6,11 +6,13 @@
 use proptest::prelude::*;
 use skein_flight::coverage::ring::patch::Patches;
 use skein_geometry::frame::{Point, Vector};
+use skein_netsim::Prepared;
 use skein_peer::CoverageTask;
 use skein_scenario::{
     Overrides, Severity, builtin_files, builtin_text, load_builtin, load_with, parse, parse_with,
 };
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 fn configs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs")
@@ -88,6 +90,22 @@ fn what_is_built_in_is_what_lies_in_configs() {
         file.spec.mission.content_hash(),
         built_in.spec.mission.content_hash()
     );
+}
+
+/// What resolving derived is what is flown: nothing derives it a second time.
+#[test]
+fn the_loop_is_derived_once_and_handed_on() {
+    for name in skein_scenario::builtin_names() {
+        let scenario = load_builtin(name, &Overrides::default()).unwrap();
+        assert!(Arc::ptr_eq(
+            &scenario.spec.mission,
+            &scenario.geometry.mission
+        ));
+        let geometry = Arc::clone(&scenario.geometry);
+        let mut prepared = Prepared::with_geometry(scenario.spec, geometry);
+        let flown = prepared.geometry_cache.of(&prepared.spec.mission).unwrap();
+        assert!(Arc::ptr_eq(&flown, &scenario.geometry), "{name}");
+    }
 }
 
 #[test]
@@ -463,6 +481,21 @@ const WRONG: &[(&str, &str, &str)] = &[
         "airframes: the camera footprint is too small",
     ),
     ("count: 8,", "count: 0,", "fleet.count: 0 is out of range"),
+    (
+        "count: 8,",
+        "count: 65,",
+        "fleet.count: 65 is out of range; expected the number of UAVs, of which a round of the swarm carries at most 64, between 1 and 64",
+    ),
+    (
+        "bank_deg: 45,",
+        "bank_deg: 81,",
+        "airframes.swift.bank_deg: 81 is out of range",
+    ),
+    (
+        "fov_across_deg: 106, fov_along_deg: 90 },\n    },\n    scout",
+        "fov_across_deg: 0.5, fov_along_deg: 90 },\n    },\n    scout",
+        "airframes.swift.camera.fov_across_deg: 0.5 is out of range",
+    ),
     (
         "count: 8,",
         "count: 2.5,",

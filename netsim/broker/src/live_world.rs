@@ -5,7 +5,9 @@ use skein_link::LinkState;
 use skein_netsim::fault::Fault;
 use skein_netsim::radio::{LinkTable, Overlay};
 use skein_netsim::spec::Spec;
-use skein_netsim::world::{Fact, Judge, World};
+use skein_netsim::world::{Fact, Judge, Site, World};
+use skein_peer::offload::MissionGeometry;
+use std::sync::Arc;
 
 /// The world of one trial.
 #[derive(Debug)]
@@ -18,8 +20,9 @@ pub struct LiveWorld {
 impl LiveWorld {
     /// The world of a scenario, before anybody moved.
     #[must_use]
-    pub fn new(spec: &Spec, seed: u64) -> Self {
-        let world = World::new(spec, seed);
+    pub fn new(spec: &Spec, geometry: &MissionGeometry, seed: u64) -> Self {
+        let site = Arc::new(Site::new(spec, Some(geometry)));
+        let world = World::on(site, spec, seed);
         let mut links = LinkTable::new(world.nodes(), spec.radio);
         let faults = Overlay::default();
         links.compute(&world, &faults);

@@ -177,7 +177,7 @@ impl<'a> Trial<'a> {
         });
         Ok(Self {
             peers,
-            world: LiveWorld::new(&spec, seed),
+            world: LiveWorld::new(&spec, &geometry, seed),
             faults: Schedule::new(&spec.faults),
             account: Account::new(Setting::new(&spec, Some(&geometry), seed)),
             pacer: Pacer::new(spec.time_scale, Instant::now()),

@@ -35,10 +35,10 @@ impl Prepared {
     }
 
     fn on(spec: Spec, mut geometry_cache: GeometryCache) -> Self {
-        let site = Arc::new(Site::new(&spec));
-        let spec = Arc::new(spec);
         // A mission without a loop is found out by every run; here it is only remembered.
         let geometry = geometry_cache.of(&spec.mission).ok();
+        let site = Arc::new(Site::new(&spec, geometry.as_deref()));
+        let spec = Arc::new(spec);
         Self {
             setting: Setting::new(&spec, geometry.as_ref(), spec.seed),
             spec,

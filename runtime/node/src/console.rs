@@ -12,7 +12,7 @@
 
 use skein_console::{Asked, Command, Port, Token, TokenError};
 use skein_peer::Mission;
-use skein_peer::mission::{chunks, point_m};
+use skein_peer::mission::chunks;
 use std::future::Future;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -167,8 +167,8 @@ pub fn fits(mission: &Mission, running: Option<&Mission>) -> Result<(), String> 
 /// A sentence that says why not.
 pub fn can_be_flown(mission: &Arc<Mission>) -> Result<(), String> {
     let geometry = mission.geometry().map_err(|e| e.to_string())?;
-    let clearance_m = f64::from(mission.clearance_mm) / 1000.0;
-    let base_m = geometry.router.zones().distance_m(point_m(mission.base));
+    let clearance_m = mission.clearance_m();
+    let base_m = geometry.router.zones().distance_m(mission.base_m());
     if base_m < clearance_m {
         return Err(format!(
             "its base is {base_m:.1} m from a no-fly zone; expected at least the clearance of {clearance_m:.1} m"

@@ -24,6 +24,7 @@ use motion::{Kinematic, Piece};
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::patch::Patches;
 use skein_peer::CoverageTask;
+use skein_peer::offload::MissionGeometry;
 use std::sync::Arc;
 
 /// The world moves in steps of at most this long, aligned to its multiples, so that
@@ -43,13 +44,14 @@ pub struct Site {
 }
 
 impl Site {
-    /// Prepares buildings and cells.
+    /// Prepares buildings and cells; the geometry is what the mission of the scenario gave,
+    /// if it gave any.
     #[must_use]
-    pub fn new(spec: &Spec) -> Self {
+    pub fn new(spec: &Spec, geometry: Option<&MissionGeometry>) -> Self {
         Self {
             obstacles: Obstacles::new(&spec.buildings),
             survey: Arc::new(Survey::new(spec)),
-            claims: claims(spec),
+            claims: claims(spec, geometry),
         }
     }
 }
@@ -67,13 +69,12 @@ struct Uav {
 /// The pieces in which peers see an area by exact passes, and lines by stations of
 /// several pieces: they come from the planner, and serve to check what peers say, not
 /// whether all was seen.
-fn claims(spec: &Spec) -> Option<Arc<pieces::Pieces>> {
+fn claims(spec: &Spec, geometry: Option<&MissionGeometry>) -> Option<Arc<pieces::Pieces>> {
     match spec.mission.task {
         CoverageTask::Exact | CoverageTask::Lines(_) => {}
         CoverageTask::Area | CoverageTask::Points(_) => return None,
     }
-    let ground = spec.mission.geometry().ok()?;
-    let corners = match ground.coverage_loop.patches() {
+    let corners = match geometry?.coverage_loop.patches() {
         Patches::Listed(list) => list.corners().to_vec(),
         Patches::Grid(_) => return None,
     };
@@ -97,13 +98,14 @@ pub struct World {
 }
 
 impl World {
-    /// The world of a scenario at time 0, all UAVs in the air at their launch poses.
-    #[must_use]
-    pub fn new(spec: &Spec, seed: u64) -> Self {
-        Self::on(Arc::new(Site::new(spec)), spec, seed)
+    /// The world of a scenario over a grid of lanes, with a site of its own.
+    #[cfg(test)]
+    pub(crate) fn new(spec: &Spec, seed: u64) -> Self {
+        Self::on(Arc::new(Site::new(spec, None)), spec, seed)
     }
 
-    /// The same on a site prepared before from the same scenario.
+    /// The world of a scenario at time 0, all UAVs in the air at their launch poses, on a
+    /// site prepared from the same scenario.
     #[must_use]
     pub fn on(site: Arc<Site>, spec: &Spec, seed: u64) -> Self {
         let mut uavs: Vec<Uav> = spec

@@ -21,7 +21,7 @@ use skein_flight::coverage::ring::CellId;
 use skein_geometry::frame::{Point, Pose, Vector};
 use skein_geometry::math::{PI, sin_cos};
 use skein_peer::CoverageTask;
-use skein_peer::mission::{Mission, point_m};
+use skein_peer::Mission;
 
 /// Headings tried, over half a turn: a pass flown backwards is the same pass.
 const HEADINGS: u32 = 24;
@@ -110,8 +110,8 @@ impl Survey {
                 bounds: Bounds::around(z.vertices()),
             })
             .collect();
-        let area: Vec<Point> = mission.area.iter().copied().map(point_m).collect();
-        let lane_m = f64::from(mission.lane_spacing_mm) / 1000.0;
+        let area = mission.area_m();
+        let lane_m = mission.lane_m();
         let (lane_m, extent_m) = if mission.task == CoverageTask::Exact {
             (lane_m / PARTS_OF_A_LANE, 0.0)
         } else {
@@ -288,7 +288,7 @@ impl Survey {
 
     /// Why a cell cannot be seen, or nothing.
     fn verdict(&self, mission: &Mission, free: &FreePlane, index: usize) -> Option<Uncoverable> {
-        let pass = Pass::of(mission, f64::from(mission.lane_spacing_mm) / 1000.0);
+        let pass = Pass::of(mission, mission.lane_m());
         let id = self.cells[index].id;
         let (bounds, poses): (Bounds, Box<dyn Iterator<Item = Pose> + '_>);
         if let Some(pieces) = &self.pieces {
@@ -480,22 +480,15 @@ impl FreePlane {
         if survey.zones.is_empty() {
             return none;
         }
-        let launch = point_m(mission.launch);
-        let mut b = Bounds::around(
-            &mission
-                .area
-                .iter()
-                .copied()
-                .map(point_m)
-                .collect::<Vec<_>>(),
-        );
+        let launch = mission.launch_m();
+        let mut b = Bounds::around(&mission.area_m());
         b.include(launch);
         for z in &survey.zones {
             b.include(z.bounds.min);
             b.include(z.bounds.max);
         }
         // Beyond all zones and their clearance the plane is free and one.
-        let clearance_m = f64::from(mission.clearance_mm) / 1000.0;
+        let clearance_m = mission.clearance_m();
         let b = b.grown(clearance_m + survey.lane_m + 4.0 * RASTER_M);
         let min = (floor_i32(b.min.x / RASTER_M), floor_i32(b.min.y / RASTER_M));
         let max = (floor_i32(b.max.x / RASTER_M), floor_i32(b.max.y / RASTER_M));
