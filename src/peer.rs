@@ -48,7 +48,7 @@ fn code(error: &NodeError) -> u8 {
         | NodeError::Bus(
             BusError::InUse(_) | BusError::NotLoopback(_) | BusError::Configuration { .. },
         ) => exit::CONFIG_INVALID,
-        NodeError::Console(_) => exit::CONFIG_INVALID,
+        NodeError::Console(_) | NodeError::Standing(_) => exit::CONFIG_INVALID,
         NodeError::World(_) | NodeError::Bus(BusError::NoPeer { .. }) => exit::NO_PEERS,
         NodeError::Bus(BusError::Open { .. }) => exit::INTERNAL,
     }

@@ -143,7 +143,10 @@ fn without_a_simulated_world_a_mission_and_an_order_reach_peers_over_the_radio()
     operated["console"] = json!({ "listen": format!("127.0.0.1:{at}"), "token_file": "100.token" });
     let link = format!("tcp/127.0.0.1:{first}");
     let ground = place.peer("100.json5", &operated);
-    let _other = place.peer("101.json5", &config(101, second, &[link]));
+    let _other = place.peer(
+        "101.json5",
+        &config(101, second, std::slice::from_ref(&link)),
+    );
 
     let console = format!("127.0.0.1:{at}");
     let token_file = place.path("100.token");
@@ -155,30 +158,38 @@ fn without_a_simulated_world_a_mission_and_an_order_reach_peers_over_the_radio()
     let (code, said) = say(&["mission", "--base", "1,2"]);
     assert!(code == 3 && said.contains("no mission"), "{said}");
 
-    let far = format!("tcp/127.0.0.1:{second}");
-    let observe = |key: &'static str| [key, "--endpoint", &far].map(str::to_owned);
-    let until = |key: &'static str, author: u64, wanted: &dyn Fn(&Value) -> bool| {
-        let args = observe(key);
-        let args: Vec<&str> = args.iter().map(String::as_str).collect();
-        place.observe_until(&args, DEADLINE, |newest| {
-            newest.get(&author).is_some_and(wanted)
-        });
+    // What is spoken once is seen only by an observer that is there already.
+    let watching = place.watch(&format!("tcp/127.0.0.1:{second}"));
+    watching.until("anything", DEADLINE, |_| true);
+    let cells = |of: u64, cells: u64| {
+        move |r: &Value| r["kind"] == "state" && r["author"] == of && r["body"]["cells"] == cells
+    };
+    let hold_in_life = |life: u64| {
+        move |r: &Value| r["kind"] == "operator" && r["incarnation"] == life && r["body"] == "hold"
     };
     let square = root().join("tests/live/square.json5");
     let (code, said) = say(&["mission", square.to_str().unwrap()]);
     assert!(code == 0 && said.contains("as revision 1"), "{said}");
-    until("field/v1/state/**", 101, &|state| state["cells"] == 80);
+    watching.until("the mission at 101", DEADLINE, cells(101, 80));
     let (code, said) = say(&["mission", &wide(&place)]);
     assert!(code == 0 && said.contains("as revision 2"), "{said}");
-    until("field/v1/state/**", 101, &|state| state["cells"] == 100);
+    watching.until("its revision at 101", DEADLINE, cells(101, 100));
 
     let (code, said) = say(&["order", "hold"]);
     assert_eq!(
         (code, said.trim()),
         (0, "the ground station says hold to all")
     );
-    until("field/v1/operator/**", 100, &|order| *order == "hold");
+    watching.until("the order at 101", DEADLINE, hold_in_life(1));
+
+    // A ground station that comes back says the same again, also to who was not there.
     drop(ground);
     let (code, said) = say(&["order", "resume"]);
     assert!(code == 4 && said.contains("no answer"), "{said}");
+    let _ground = place.peer("100.json5", &operated);
+    let late = free_port();
+    let _late = place.peer("102.json5", &config(102, late, &[link]));
+    watching.until("the order again", DEADLINE, hold_in_life(2));
+    let watching = place.watch(&format!("tcp/127.0.0.1:{late}"));
+    watching.until("the revision at 102", DEADLINE, cells(102, 100));
 }

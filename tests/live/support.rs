@@ -119,6 +119,25 @@ impl Place {
         }
     }
 
+    /// Observes all that is heard at a peer, as soon as it is there.
+    pub fn watch(&self, endpoint: &str) -> Watching {
+        wait_until(Duration::from_secs(30), "the peer is there", || {
+            let (code, _) = self.skein(&["observe", "--endpoint", endpoint, "--timeout", "2"]);
+            code == 0
+        });
+        let args = ["observe", "--endpoint", endpoint, "--format", "jsonl"];
+        let mut child = self.command(&args).stdout(Stdio::piped()).spawn().unwrap();
+        let records = Arc::new(Mutex::new(Vec::new()));
+        let (stdout, seen) = (child.stdout.take().unwrap(), Arc::clone(&records));
+        std::thread::spawn(move || {
+            for line in BufReader::new(stdout).lines().map_while(Result::ok) {
+                let record = serde_json::from_str(&line).unwrap_or(Value::Null);
+                seen.lock().unwrap().push(record);
+            }
+        });
+        Watching { child, records }
+    }
+
     /// Starts a peer of its own, without a trial.
     pub fn peer(&self, name: &str, config: &Value) -> Peer {
         let file = self.file(name, &config.to_string());
@@ -134,6 +153,28 @@ impl Drop for Peer {
     fn drop(&mut self) {
         let _ = self.0.kill();
         let _ = self.0.wait();
+    }
+}
+
+/// A running `skein observe`.
+pub struct Watching {
+    child: Child,
+    records: Arc<Mutex<Vec<Value>>>,
+}
+
+impl Watching {
+    /// Waits for a record.
+    pub fn until(&self, what: &str, limit: Duration, wanted: impl Fn(&Value) -> bool) {
+        wait_until(limit, what, || {
+            self.records.lock().unwrap().iter().any(&wanted)
+        });
+    }
+}
+
+impl Drop for Watching {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 

@@ -261,9 +261,10 @@ impl LivePeer {
         Some(row)
     }
 
-    /// Takes its journal away.
+    /// Takes its journal away, and what its operator said.
     pub(crate) fn wipe(&self) {
         let _ = std::fs::remove_file(&self.files.journal);
+        let _ = std::fs::remove_file(self.files.journal.with_extension("journal.operator"));
     }
 
     fn signal(&mut self, signal: Signal) {

@@ -6,6 +6,8 @@
 //! | a mission | it is judged, gets the next revision and is spoken |
 //! | another base | the newest mission, with that base, likewise |
 //!
+//! What was said is kept over restarts of the ground station ([`crate::standing`]).
+//!
 //! The [`LocalConsole`] is a port on 127.0.0.1 ([`skein_console`]) that asks for a
 //! token. A mission is refused here if it does not fit the swarm in the air or cannot
 //! be flown at all: by radio there is nobody to refuse it.

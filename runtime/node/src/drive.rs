@@ -13,6 +13,7 @@ use crate::console::{Console, can_be_flown, fits};
 use crate::journal::{Journal, Stored};
 use crate::outgoing::{Frame, Outgoing};
 use crate::radio::Radio;
+use crate::standing::{Standing, StandingError};
 use crate::transport::{Event, Transport};
 use crate::vehicle::Vehicle;
 use crate::world::{News, Tick, World};
@@ -101,6 +102,8 @@ pub struct Equipment {
     pub outgoing: Outgoing,
     /// What must not be forgotten.
     pub journal: Journal,
+    /// What the operator said last, where there is a console.
+    pub standing: Option<Standing>,
 }
 
 /// A peer and everything it acts through.
@@ -112,6 +115,7 @@ pub struct Driver<P, V, W, C, T> {
     radio: Radio,
     outgoing: Outgoing,
     journal: Journal,
+    standing: Option<Standing>,
     results: mpsc::Receiver<(u64, JobResult)>,
     workers: mpsc::Sender<(u64, JobResult)>,
     judged: mpsc::Receiver<Judged>,
@@ -162,6 +166,7 @@ where
             radio,
             outgoing,
             journal,
+            standing,
         } = equipment;
         Self {
             peer,
@@ -175,7 +180,8 @@ where
             judged,
             judge,
             judging: false,
-            order: None,
+            order: standing.as_ref().and_then(Standing::order),
+            standing,
             ordered_in: None,
             early: None,
             counters_due: Time(0),
@@ -384,8 +390,7 @@ where
             Request::Order(order) => {
                 let told = self.order(order).await;
                 // Who asked may have gone away; likewise below.
-                let _ = answer.send(Ok(vec![told]));
-                return;
+                return drop(answer.send(told));
             }
             Request::Mission(mission) => Ok((*mission).clone()),
             Request::Base(base) => match self.peer.mission() {
@@ -409,17 +414,22 @@ where
         }
     }
 
-    async fn order(&mut self, order: Order) -> String {
+    /// A new standing order: kept, then spoken. A ground station has no percept that
+    /// would wait for the disk.
+    async fn order(&mut self, order: Order) -> Answer {
+        if let Some(standing) = &mut self.standing {
+            standing.keep_order(order).map_err(unkept)?;
+        }
         self.order = Some(order);
         self.ordered_in = None;
         self.repeat_order().await;
         let name = order.name();
-        match self.ordered_in {
+        Ok(vec![match self.ordered_in {
             Some(_) => format!("the ground station says {name} to all"),
             None => format!(
                 "the ground station will say {name} to all, as soon as it has listened long enough to speak"
             ),
-        }
+        }])
     }
 
     /// Speaks the standing order once in each life of the peer: what an earlier life
@@ -457,19 +467,27 @@ where
         } = judged;
         let told = match verdict {
             Err(why) => Err(format!("the mission cannot be flown: {why}")),
-            Ok(()) => {
-                let revision = self.peer.next_revision();
-                let mission = Arc::new(Mission {
-                    revision,
-                    ..mission
-                });
-                self.step(Input::Command(Command::Mission(mission))).await;
-                Ok(vec![format!(
-                    "the ground station speaks the mission as revision {revision}"
-                )])
-            }
+            Ok(()) => self.revise(mission).await,
         };
         let _ = answer.send(told);
+    }
+
+    /// The next revision of the mission: kept, then spoken.
+    async fn revise(&mut self, mission: Mission) -> Answer {
+        let revision = self.peer.next_revision();
+        let mission = Arc::new(Mission {
+            revision,
+            ..mission
+        });
+        if let Some(standing) = &mut self.standing {
+            standing
+                .keep_mission(Arc::clone(&mission))
+                .map_err(unkept)?;
+        }
+        self.step(Input::Command(Command::Mission(mission))).await;
+        Ok(vec![format!(
+            "the ground station speaks the mission as revision {revision}"
+        )])
     }
 
     /// Flushes what is under way and says goodbye.
@@ -479,6 +497,10 @@ where
         self.around.transport.close().await;
         let _ = tokio::task::spawn_blocking(move || self.journal.close()).await;
     }
+}
+
+fn unkept(why: StandingError) -> String {
+    format!("it cannot be kept over a restart, so nothing was said: {why}")
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@
 //! | [`outgoing`] | what waits for the channel to go out |
 //! | [`clock`] | scenario time |
 //! | [`journal`] | what must not be forgotten |
+//! | [`standing`] | what the operator said last, kept over restarts |
 //! | [`drive`] | waits for one thing, makes it one input, drains the outputs |
 //!
 //! The whole lifecycle is [`run`].
@@ -27,6 +28,7 @@ pub mod journal;
 pub mod outgoing;
 pub mod radio;
 pub mod simulator;
+pub mod standing;
 #[cfg(test)]
 mod testing;
 pub mod transport;
@@ -44,6 +46,7 @@ use outgoing::Outgoing;
 use radio::Radio;
 use simulator::{Hello, Joined, StreamError};
 use skein_peer::{Input, Peer};
+use standing::{Standing, StandingError};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 /// Why a node did not start.
@@ -58,6 +61,9 @@ pub enum NodeError {
     /// Its console cannot be opened.
     #[error(transparent)]
     Console(#[from] ConsoleError),
+    /// What its operator said last cannot be read.
+    #[error(transparent)]
+    Standing(#[from] StandingError),
     /// Its world cannot be reached.
     #[error(transparent)]
     World(#[from] StreamError),
@@ -69,7 +75,7 @@ pub enum NodeError {
 ///
 /// # Errors
 /// When something it needs is not there; nothing has been said or flown then.
-pub async fn run(config: NodeConfig, stop: impl Future<Output = ()>) -> Result<(), NodeError> {
+pub async fn run(mut config: NodeConfig, stop: impl Future<Output = ()>) -> Result<(), NodeError> {
     let id = config.bus.id;
     let nonce = nonce();
     let (journal, replayed) = Journal::open(&config.journal)?;
@@ -79,6 +85,15 @@ pub async fn run(config: NodeConfig, stop: impl Future<Output = ()>) -> Result<(
             "the journal was cut off behind its last whole record"
         );
     }
+    let standing = match &config.console {
+        Some(_) => Some(Standing::open(
+            &config.journal,
+            config.peer.mission.as_deref(),
+        )?),
+        None => None,
+    };
+    let revised = standing.as_ref().and_then(Standing::mission);
+    config.peer.mission = revised.or(config.peer.mission);
     let bus = Bus::open(&config.bus).await?;
     let console = match &config.console {
         Some(config) => Some(LocalConsole::open(config).await?),
@@ -121,6 +136,7 @@ pub async fn run(config: NodeConfig, stop: impl Future<Output = ()>) -> Result<(
         radio,
         outgoing,
         journal,
+        standing,
     };
     let start = Input::Start {
         persisted: replayed.records,

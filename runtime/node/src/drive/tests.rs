@@ -208,7 +208,7 @@ struct Running {
     events: UnboundedSender<Event>,
     life: Arc<Mutex<Option<Incarnation>>>,
     driver: tokio::task::JoinHandle<()>,
-    _dir: tempfile::TempDir,
+    dir: tempfile::TempDir,
 }
 
 impl Running {
@@ -254,6 +254,7 @@ impl Running {
             // 100 bytes a second.
             outgoing: Outgoing::new(800, 60_000),
             journal,
+            standing: Some(Standing::open(&dir.path().join("j"), Some(&mission())).unwrap()),
         };
         let start = Input::Start {
             persisted: Vec::new(),
@@ -268,7 +269,7 @@ impl Running {
             console,
             events,
             life,
-            _dir: dir,
+            dir,
         }
     }
 
@@ -394,6 +395,25 @@ async fn an_order_is_spoken_in_each_life_until_the_next_order() {
     let told = running.ask(Request::Order(Order::Resume)).await.unwrap();
     assert_eq!(told, ["the ground station says resume to all"]);
     assert_eq!(running.log.orders().last(), Some(&Order::Resume));
+    let standing = Standing::open(&running.dir.path().join("j"), Some(&mission())).unwrap();
+    assert_eq!(standing.order(), Some(Order::Resume));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 1)]
+async fn what_cannot_be_kept_over_a_restart_is_not_said() {
+    let running = Running::start(silent);
+    std::fs::remove_dir_all(running.dir.path()).unwrap();
+    for request in [Request::Order(Order::Hold), Request::Base((1, 2))] {
+        let told = running.ask(request).await;
+        assert!(
+            told.as_ref().is_err_and(|e| e.contains("cannot be kept")),
+            "{told:?}"
+        );
+    }
+    assert_eq!(
+        (running.log.orders(), running.log.missions()),
+        (vec![], vec![])
+    );
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
@@ -473,7 +493,7 @@ async fn when_the_world_ends_everything_is_flushed_and_said_goodbye_to() {
         ],
         _ => Vec::new(),
     });
-    let path = running._dir.path().join("j");
+    let path = running.dir.path().join("j");
     drop(running.news);
     tokio::time::timeout(DEADLINE, running.driver)
         .await

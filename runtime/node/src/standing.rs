@@ -1,0 +1,190 @@
+//! What the operator of a ground station said last, kept over its restarts: the
+//! standing order, and the mission that replaced the configured one.
+//!
+//! A record of a later life voids those of earlier ones, at every peer. So a ground
+//! station that came back knowing only its configuration would silence the operator.
+//! The file lies beside the journal and is replaced as a whole, before anything of it
+//! is spoken. It counts only for the mission that was configured when it was written:
+//! whoever configures another one begins anew.
+
+use serde::{Deserialize, Serialize};
+use skein_behaviors::Order;
+use skein_peer::Mission;
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Why what the operator said cannot be kept or read back.
+#[derive(Debug, thiserror::Error)]
+pub enum StandingError {
+    /// The file cannot be written or read.
+    #[error("{path}: {cause}")]
+    Io {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        cause: std::io::Error,
+    },
+    /// The file is not what was written.
+    #[error("{path} cannot be read: {cause}; remove it to begin with the configured mission")]
+    Malformed {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        cause: serde_json::Error,
+    },
+}
+
+/// What the operator said last.
+#[derive(Debug)]
+pub struct Standing {
+    path: PathBuf,
+    kept: Kept,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Kept {
+    /// Content hash of the configured mission, 0 for none.
+    configured: u64,
+    order: Option<Order>,
+    mission: Option<Arc<Mission>>,
+}
+
+impl Standing {
+    /// Reads what stands beside the journal at `journal`, if anything does.
+    ///
+    /// # Errors
+    /// When there is a file that cannot be read.
+    pub fn open(journal: &Path, configured: Option<&Mission>) -> Result<Self, StandingError> {
+        let mut path = journal.as_os_str().to_owned();
+        path.push(".operator");
+        let path = PathBuf::from(path);
+        let configured = configured.map_or(0, Mission::content_hash);
+        let begun = Kept {
+            configured,
+            ..Kept::default()
+        };
+        let kept = match std::fs::read(&path) {
+            Err(cause) if cause.kind() == ErrorKind::NotFound => begun,
+            Err(cause) => return Err(StandingError::Io { path, cause }),
+            Ok(bytes) => match serde_json::from_slice::<Kept>(&bytes) {
+                Ok(kept) if kept.configured == configured => kept,
+                Ok(_) => {
+                    tracing::warn!(
+                        path = %path.display(),
+                        "another mission is configured than when the operator spoke last: what was said then does not stand any more"
+                    );
+                    begun
+                }
+                Err(cause) => return Err(StandingError::Malformed { path, cause }),
+            },
+        };
+        Ok(Self { path, kept })
+    }
+
+    /// The standing order.
+    #[must_use]
+    pub fn order(&self) -> Option<Order> {
+        self.kept.order
+    }
+
+    /// The mission that replaced the configured one.
+    #[must_use]
+    pub fn mission(&self) -> Option<Arc<Mission>> {
+        self.kept.mission.clone()
+    }
+
+    /// Keeps an order.
+    ///
+    /// # Errors
+    /// When it cannot be written; the one before stands.
+    pub fn keep_order(&mut self, order: Order) -> Result<(), StandingError> {
+        self.keep(Kept {
+            order: Some(order),
+            ..self.kept.clone()
+        })
+    }
+
+    /// Keeps a mission.
+    ///
+    /// # Errors
+    /// When it cannot be written; the one before stands.
+    pub fn keep_mission(&mut self, mission: Arc<Mission>) -> Result<(), StandingError> {
+        self.keep(Kept {
+            mission: Some(mission),
+            ..self.kept.clone()
+        })
+    }
+
+    fn keep(&mut self, kept: Kept) -> Result<(), StandingError> {
+        let io = |cause| StandingError::Io {
+            path: self.path.clone(),
+            cause,
+        };
+        let json = serde_json::to_vec(&kept).map_err(|e| io(e.into()))?;
+        let mut aside = self.path.as_os_str().to_owned();
+        aside.push(".new");
+        let written = OpenOptions::new()
+            .write(true)
+            .create(true)
+            .truncate(true)
+            .mode(0o600)
+            .open(&aside)
+            .and_then(|mut file| file.write_all(&json).and_then(|()| file.sync_all()));
+        written.map_err(io)?;
+        std::fs::rename(&aside, &self.path).map_err(io)?;
+        // The new name is durable when its directory is.
+        let parent = self.path.parent().filter(|p| !p.as_os_str().is_empty());
+        File::open(parent.unwrap_or(Path::new(".")))
+            .and_then(|directory| directory.sync_all())
+            .map_err(io)?;
+        self.kept = kept;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::mission;
+
+    #[test]
+    fn what_was_said_last_stands_until_another_mission_is_configured() {
+        let dir = tempfile::tempdir().unwrap();
+        let journal = dir.path().join("j");
+        let configured = mission();
+        let open = |mission: &Mission| Standing::open(&journal, Some(mission)).unwrap();
+        let mut standing = open(&configured);
+        assert_eq!((standing.order(), standing.mission()), (None, None));
+        let revised = Arc::new(Mission {
+            revision: 4,
+            ..mission()
+        });
+        standing.keep_order(Order::Hold).unwrap();
+        standing.keep_mission(Arc::clone(&revised)).unwrap();
+        standing.keep_order(Order::ReturnToBase).unwrap();
+        let again = open(&configured);
+        assert_eq!(again.order(), Some(Order::ReturnToBase));
+        assert_eq!(again.mission(), Some(revised));
+        let other = Mission {
+            base: (1, 1),
+            ..mission()
+        };
+        let anew = open(&other);
+        assert_eq!((anew.order(), anew.mission()), (None, None));
+    }
+
+    #[test]
+    fn what_cannot_be_kept_or_read_is_an_error_that_names_the_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut standing = Standing::open(&dir.path().join("gone/j"), None).unwrap();
+        let error = standing.keep_order(Order::Hold).unwrap_err().to_string();
+        assert!(error.contains("j.operator"), "{error}");
+        assert_eq!(standing.order(), None);
+        std::fs::write(dir.path().join("j.operator"), "{").unwrap();
+        let error = Standing::open(&dir.path().join("j"), None).unwrap_err();
+        assert!(matches!(error, StandingError::Malformed { .. }), "{error}");
+    }
+}
