@@ -5,10 +5,9 @@ use crate::planner::PlannerArgs;
 use clap::{Args, ValueEnum};
 use skein_flight::coverage::ring::CellId;
 use skein_netsim::spec::Spec;
-use skein_netsim::world::Survey;
 use skein_peer::CoverageTask;
 use skein_scenario::{
-    AreaPlanner, Forecast, Overrides, Scenario, ScenarioError, Summary, extent_m,
+    AreaPlanner, Coverable, Forecast, Overrides, Scenario, ScenarioError, Summary, extent_m,
 };
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -69,7 +68,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
         }
     };
     let total = &scenario.summary;
-    let judged = Judged::new(&scenario);
+    let judged = Coverable::of(&scenario);
     let forecasts = match args.planner.chosen() {
         Some(planner) => scenario
             .forecast()
@@ -83,36 +82,6 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
         Format::Json => println!("{}", json(&scenario, total, &judged, &forecasts)),
     }
     Ok(ExitCode::from(exit::OK))
-}
-
-/// What the world's own geometry says of the same area.
-struct Judged {
-    cells: usize,
-    coverable: usize,
-    share: f64,
-    /// Cells that could be seen and are not on the planner's loop.
-    missed: Vec<CellId>,
-}
-
-impl Judged {
-    fn new(scenario: &Scenario) -> Self {
-        let survey = Survey::new(&scenario.spec);
-        let the_loop = &scenario.geometry.coverage_loop;
-        let open = survey.cells().iter().filter(|c| c.uncoverable.is_none());
-        Self {
-            cells: survey.cells().len(),
-            coverable: survey.n_coverable(),
-            share: survey.coverable_share(),
-            // Squares and pieces of the judge's own have no names on the loop.
-            missed: match scenario.spec.mission.task {
-                CoverageTask::Area | CoverageTask::Points(_) => open
-                    .map(|c| c.id)
-                    .filter(|id| the_loop.index_of(*id).is_none())
-                    .collect(),
-                CoverageTask::Exact | CoverageTask::Lines(_) => Vec::new(),
-            },
-        }
-    }
 }
 
 /// Names of the first cells of a list.
@@ -130,7 +99,12 @@ fn names(cells: &[CellId]) -> String {
     format!("{}{more}", first.join(" "))
 }
 
-fn text(scenario: &Scenario, total: &Summary, judged: &Judged, forecasts: &[Forecasted]) -> String {
+fn text(
+    scenario: &Scenario,
+    total: &Summary,
+    judged: &Coverable,
+    forecasts: &[Forecasted],
+) -> String {
     let mut lines = area_lines(&scenario.spec, total, judged);
     lines.extend(fleet_lines(&scenario.spec, total));
     let own = AreaPlanner::of(&scenario.spec.mission.task);
@@ -148,14 +122,14 @@ fn text(scenario: &Scenario, total: &Summary, judged: &Judged, forecasts: &[Fore
 
 type Line = (&'static str, String);
 
-fn area_lines(spec: &Spec, total: &Summary, judged: &Judged) -> Vec<Line> {
+fn area_lines(spec: &Spec, total: &Summary, judged: &Coverable) -> Vec<Line> {
     let (width_m, height_m) = extent_m(spec);
     let mission = &spec.mission;
     let area = format!(
         "{:.3} km² in {width_m:.0} x {height_m:.0} m; {} of {} cells can be seen, {:.2} % of the area",
         total.area_m2 / 1e6,
-        judged.coverable,
-        judged.cells,
+        judged.n_coverable,
+        judged.n_cells,
         judged.share * 100.0
     );
     let zones = format!(
@@ -255,7 +229,7 @@ fn fleet_lines(spec: &Spec, total: &Summary) -> Vec<Line> {
 fn json(
     scenario: &Scenario,
     total: &Summary,
-    judged: &Judged,
+    judged: &Coverable,
     forecasts: &[Forecasted],
 ) -> serde_json::Value {
     let planners: Vec<serde_json::Value> = forecasts
@@ -303,7 +277,7 @@ fn json(
         "scenario": spec.name,
         "area_m2": total.area_m2,
         "coverable_share": judged.share,
-        "coverable_cells": judged.coverable,
+        "coverable_cells": judged.n_coverable,
         "planned_share": total.coverable_share,
         "missed": judged.missed.iter().map(|c| [c.col, c.row]).collect::<Vec<_>>(),
         "zones": spec.zones.len(),

@@ -17,6 +17,7 @@
 //! | `feasibility` | what cannot succeed, or may disappoint |
 //! | `forecast` | what it is expected to take |
 //! | `resolve` | all of it in order: a [`Scenario`] |
+//! | `coverable` | what the world's own geometry says of the same area |
 //!
 //! ```
 //! let spec = skein_scenario::builtin(skein_scenario::DEFAULT).unwrap();
@@ -25,6 +26,7 @@
 
 mod builtin;
 mod choose_tree;
+mod coverable;
 mod error;
 mod feasibility;
 mod files;
@@ -38,6 +40,7 @@ mod resolve;
 pub use builtin::{
     DEFAULT, files as builtin_files, load_builtin, names as builtin_names, text as builtin_text,
 };
+pub use coverable::Coverable;
 pub use error::{Finding, Place, ScenarioError, Severity};
 pub use feasibility::{Summary, extent_m, feasibility, summary};
 pub use files::Files;

@@ -345,3 +345,43 @@ fn an_account_of_the_reports_alone_agrees_with_the_simulators() {
         (first.swarm.splits, first.swarm.most_components)
     );
 }
+
+#[test]
+fn every_field_of_the_report_is_explained() {
+    let mut a = two();
+    a.ended(2_000, 1, Cause::Killed);
+    a.reported(2_500, 2, &claim(0, 20, &[]));
+    a.restarted(3_000, 1, true);
+    let report = RunReport {
+        simulated: Some(Simulated::default()),
+        violations: Some(Violations::default()),
+        ..concluded(&a, 5_000)
+    };
+    let text = serde_json::to_string(&report).unwrap();
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let explained = include_str!("../../../../docs/report.md");
+    let mut unexplained = Vec::new();
+    let names =
+        |v: &serde_json::Value| -> Vec<String> { v.as_object().unwrap().keys().cloned().collect() };
+    let objects = [
+        &value,
+        &value["coverage"],
+        &value["kills"][0],
+        &value["kills"][0]["taken_over_by"][0],
+        &value["restarts"][0],
+        &value["swarm"],
+        &value["radio"],
+        &value["violations"],
+        &value["simulated"],
+        &value["live"],
+    ];
+    for name in objects.into_iter().flat_map(names) {
+        if !explained.contains(&format!("`{name}`")) {
+            unexplained.push(name);
+        }
+    }
+    assert!(
+        unexplained.is_empty(),
+        "docs/report.md lacks {unexplained:?}"
+    );
+}
