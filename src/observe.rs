@@ -186,7 +186,6 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Mission(b) => serde_json::to_value(b),
         Body::Operator(b) => serde_json::to_value(b),
         Body::Finished(b) => serde_json::to_value(b),
-        Body::Event(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -250,7 +249,6 @@ fn words(body: &Body) -> String {
         Body::Mission(m) => format!("mission revision {} of {} pieces", m.revision, m.chunks),
         Body::Operator(order) => format!("{order:?}"),
         Body::Finished(f) => format!("revision {} is finished", f.revision),
-        Body::Event(e) => e.text.clone(),
     }
 }
 

@@ -1,13 +1,12 @@
 //! What the executive layer reports upwards.
 
 use serde::{Deserialize, Serialize};
-use skein_flight::coverage::ring::CellId;
 
 /// Something happened that the cooperation layer should know.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Event {
-    /// The camera has seen the whole of these cells.
-    Seen(Vec<CellId>),
+    /// The camera has seen the whole of these cells of the loop, by index.
+    Seen(Vec<u16>),
     /// All legs are flown.
     PlanDone,
     /// The goal point is reached; the UAV loiters there.

@@ -344,11 +344,7 @@ impl Executive {
         if seen.is_empty() {
             return;
         }
-        let cells = self.transit.coverage_loop.cells();
-        events.push(Event::Seen(
-            seen.iter().map(|i| cells[usize::from(*i)].id).collect(),
-        ));
-        for cell in seen {
+        for &cell in &seen {
             if !self.recent.contains(&cell) {
                 if self.recent.len() == RECENT {
                     self.recent.pop_front();
@@ -356,6 +352,7 @@ impl Executive {
                 self.recent.push_back(cell);
             }
         }
+        events.push(Event::Seen(seen));
     }
 
     /// Follows the UAV on its track; asks for a new one when it is lost.

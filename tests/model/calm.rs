@@ -2,6 +2,7 @@
 
 use super::Case;
 use super::world::{Node, World, hash_ownership};
+use skein_flight::coverage::ring::Direction;
 use skein_peer::cells::CellSet;
 use skein_peer::protocol::sections::LivePeers;
 use skein_peer::wire::message::{Claim, Member};
@@ -69,11 +70,11 @@ fn bring_to_the_end(case: &Case, w: &World) -> bool {
             }
             n.sections.cover(&flown);
             n.sections.expire_held();
-            let orphans: Vec<(u16, bool)> = n
+            let orphans: Vec<(u16, Direction)> = n
                 .sections
                 .orphans(&n.live)
                 .iter()
-                .map(|c| (c, false))
+                .map(|c| (c, Direction::Forward))
                 .collect();
             n.sections.take(&orphans);
         }

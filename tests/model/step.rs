@@ -3,6 +3,7 @@
 
 use super::world::{Node, World};
 use super::{Case, Event, MORTAL, PEERS};
+use skein_flight::coverage::ring::Direction;
 use skein_peer::cells::CellSet;
 use skein_peer::protocol::rounds::{HeardBid, order_of};
 use skein_peer::wire::message::{Bid, Claim, Member};
@@ -301,11 +302,11 @@ impl Case {
             Action::Take(i) => {
                 self.meet(Event::Taken);
                 w.act(i, |n| {
-                    let orphans: Vec<(u16, bool)> = n
+                    let orphans: Vec<(u16, Direction)> = n
                         .sections
                         .orphans(&n.live)
                         .iter()
-                        .map(|c| (c, false))
+                        .map(|c| (c, Direction::Forward))
                         .collect();
                     self.take(n, &orphans);
                 });
@@ -315,7 +316,7 @@ impl Case {
                 self.meet(Event::Halved);
                 w.act(i, |n| {
                     let plan = n.sections.plan_of(owner);
-                    let far: Vec<(u16, bool)> = plan
+                    let far: Vec<(u16, Direction)> = plan
                         .iter()
                         .skip(plan.len() / 2)
                         .map(|p| (p.cell, true))

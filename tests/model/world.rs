@@ -2,6 +2,7 @@
 //! which states are one. What may happen to it is in `step.rs`.
 
 use super::PEERS;
+use skein_flight::coverage::ring::Direction;
 use skein_peer::cells::CellSet;
 use skein_peer::protocol::division::commits_of;
 use skein_peer::protocol::rounds::{HeardBid, RoundOrder, Rounds, order_of};
@@ -160,11 +161,11 @@ impl Node {
         let mine = members.iter().position(|m| *m == self.me.id).unwrap();
         let place = (mine + open.round.counter as usize) % members.len();
         let share = usize::from(free.count()).div_ceil(members.len());
-        let section: Vec<(u16, bool)> = free
+        let section: Vec<(u16, Direction)> = free
             .iter()
             .skip(place * share)
             .take(share)
-            .map(|c| (c, false))
+            .map(|c| (c, Direction::Forward))
             .collect();
         let committed = commits_of(&open.bids[&self.me.id], n);
         let commits = self
@@ -172,7 +173,7 @@ impl Node {
             .plan()
             .iter()
             .filter(|p| committed.contains(p.cell));
-        let commits: Vec<(u16, bool)> = commits.map(|p| (p.cell, p.backward)).collect();
+        let commits: Vec<(u16, Direction)> = commits.map(|p| (p.cell, p.direction)).collect();
         self.rounds.close();
         self.sections.adopt(epoch, &commits, &section);
     }

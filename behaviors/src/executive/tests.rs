@@ -82,10 +82,10 @@ impl Story {
             .step(&self.wing.percept(), &|c| open[usize::from(c)]);
         for e in &events {
             if let Event::Seen(cells) = e {
-                for id in cells {
-                    self.assert_truly_seen(*id);
-                    let i = self.executive.transit.coverage_loop.index_of(*id).unwrap();
-                    self.open[usize::from(i)] = false;
+                for i in cells.iter().copied().map(usize::from) {
+                    let id = self.executive.transit.coverage_loop.cells()[i].id;
+                    self.assert_truly_seen(id);
+                    self.open[i] = false;
                 }
             }
         }

@@ -178,10 +178,7 @@ impl<'a> Baseline<'a> {
         for event in events {
             match event {
                 Event::Seen(cells) => {
-                    for c in cells
-                        .iter()
-                        .filter_map(|c| self.ground.coverage_loop.index_of(*c))
-                    {
+                    for c in cells {
                         self.covered[usize::from(c)] = true;
                     }
                 }

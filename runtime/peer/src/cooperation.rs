@@ -15,6 +15,7 @@
 //! | there is no geometry | an alarm; the old mission stays |
 //! | a percept | a setpoint; what the camera saw is covered, told, and durable every 5 cells |
 //! | the fuel is due | an alarm; the plan is given up; home |
+//! | half a minute of fuel is back | it takes part again |
 //! | a claim or a bid of this loop | the negotiation ticks |
 //! | covered cells that are news | they are spoken |
 //! | a beacon of this loop with other coverage | the own is spoken |
@@ -56,6 +57,10 @@ pub const CELLS_PER_COVERED_RECORD: u16 = 5;
 /// begins: one to speak, two to be passed on. Who misses them looks at those cells
 /// again, and hears of the next time round from the ground station.
 const LAP_PERIODS: u64 = 3;
+
+/// A UAV whose fuel was due works again when it may spend this much, milliseconds: less
+/// would be due again before the next round is decided.
+const FUEL_BACK_MS: u32 = 30_000;
 
 /// What the rest of the peer knows at the moment of an event.
 #[derive(Debug)]
@@ -257,6 +262,8 @@ impl Cooperation {
         };
         if state.fuel_is_due(s.percept) {
             effects.extend(state.give_up_for_fuel());
+        } else if state.fuel_is_back(s.percept) {
+            state.exhausted = false;
         }
         let able = s.has_voice && order == Order::Resume && state.can_fly_plans(s);
         effects.extend(state.negotiate(s, able, timers));
@@ -383,9 +390,7 @@ impl Cooperation {
 impl MissionState {
     fn on_event(&mut self, event: Event) -> Effects {
         match event {
-            Event::Seen(ids) => {
-                let coverage_loop = &self.geometry.coverage_loop;
-                let cells = ids.into_iter().filter_map(|id| coverage_loop.index_of(id));
+            Event::Seen(cells) => {
                 let mut seen = CellSet::of(self.covered().capacity(), cells);
                 seen.subtract(self.covered());
                 if seen.is_empty() {
@@ -472,9 +477,15 @@ impl MissionState {
         percept.is_some() && !self.exhausted && self.spendable_ms(percept) == 0
     }
 
+    /// Whether a UAV whose fuel was due has some to spend again: it was refuelled, or what
+    /// it had sensed was wrong.
+    fn fuel_is_back(&self, percept: Option<&Percept>) -> bool {
+        self.exhausted && self.spendable_ms(percept) >= FUEL_BACK_MS
+    }
+
     /// The fuel is due: the plan is given up.
     fn give_up_for_fuel(&mut self) -> Effects {
-        assert!(!self.exhausted, "the fuel comes due once");
+        assert!(!self.exhausted, "fuel that is due comes due once");
         self.exhausted = true;
         self.negotiation.sections.keep(0);
         let mut effects = vec![self.claim_changed()];

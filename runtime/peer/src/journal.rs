@@ -6,11 +6,12 @@
 
 use crate::Incarnation;
 use crate::cells::CellSet;
+use crate::wire::cbor::{In, Out, Wire};
+use crate::wire::codec::WireError;
 use crate::wire::message::{Bid, Claim};
-use serde::{Deserialize, Serialize};
 
 /// One journal record.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Entry {
     /// A life begins.
     Life(Incarnation),
@@ -25,27 +26,75 @@ pub enum Entry {
         /// Number of cells of that loop.
         cells: u16,
         /// Run-length encoded.
-        #[serde(with = "serde_bytes")]
         covered: Vec<u8>,
     },
 }
 
 impl Entry {
-    /// The bytes of the record.
+    /// The bytes of the record: the number of the kind of entry, then its body in the
+    /// encoding of the wire.
     #[must_use]
     pub fn encode(&self) -> Vec<u8> {
-        cbor4ii::serde::to_vec(Vec::with_capacity(128), self).unwrap_or_default()
+        let mut out = Out::new();
+        out.array(2);
+        match self {
+            Self::Life(incarnation) => {
+                0_u8.put(&mut out);
+                incarnation.put(&mut out);
+            }
+            Self::Bid(bid) => {
+                1_u8.put(&mut out);
+                bid.put(&mut out);
+            }
+            Self::Claim(claim) => {
+                2_u8.put(&mut out);
+                claim.put(&mut out);
+            }
+            Self::Covered {
+                loop_hash,
+                cells,
+                covered,
+            } => {
+                3_u8.put(&mut out);
+                out.array(3);
+                loop_hash.put(&mut out);
+                cells.put(&mut out);
+                covered.put(&mut out);
+            }
+        }
+        out.into_bytes()
     }
 
-    /// Reads a record back; `None` when it was written by a later version.
+    /// Reads a record back; `None` when it was written by another version.
     #[must_use]
     pub fn decode(bytes: &[u8]) -> Option<Self> {
-        cbor4ii::serde::from_slice(bytes).ok()
+        let mut input = In::new(bytes);
+        let entry = Self::read(&mut input).ok()?;
+        input.end().ok()?;
+        Some(entry)
+    }
+
+    fn read(input: &mut In<'_>) -> Result<Self, WireError> {
+        input.array("entry", 2)?;
+        match u8::get(input)? {
+            0 => Wire::get(input).map(Self::Life),
+            1 => Wire::get(input).map(Self::Bid),
+            2 => Wire::get(input).map(Self::Claim),
+            3 => {
+                input.array("covered", 3)?;
+                Ok(Self::Covered {
+                    loop_hash: Wire::get(input)?,
+                    cells: Wire::get(input)?,
+                    covered: Wire::get(input)?,
+                })
+            }
+            number => Err(WireError::Kind { number }),
+        }
     }
 }
 
 /// The state that a journal holds after all its records.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Durable {
     /// The latest life.
     pub incarnation: Incarnation,

@@ -9,12 +9,77 @@
 //!
 //! Same seed and same inputs give the same outputs, byte for byte.
 //!
-//! The canonical loop:
+//! # How it is built
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`input`], [`output`] | what can happen to a peer, and what it wants done |
+//! | [`peer`] | routes events to the parts and carries out their effects |
+//! | `inbound`, `outbound` | what bytes turn out to be; what is spoken, and when |
+//! | `cooperation`, `mission_state` | mission, goal, the peer's part in negotiations |
+//! | [`protocol`] | the machines and rules by which peers agree |
+//! | [`timers`] | every deadline, in one table |
+//! | [`journal`] | what is durable before it is spoken of |
+//! | [`offload`] | work that takes too long for a percept to wait |
+//! | [`wire`] | keys, kinds, messages, their bytes and limits |
+//! | [`mission`], [`task`], [`cells`] | what is to be seen, and what was |
+//!
+//! Each part takes events and returns effects; none touches another.
+//!
+//! # The canonical loop
 //!
 //! 1. build an [`Input`] from whatever happened,
 //! 2. call [`Peer::handle`] with the peer's own time,
 //! 3. call [`Peer::poll`] until it returns `None`, doing what each output says,
 //! 4. sleep until [`Peer::next_timeout`] or the next thing that happens.
+//!
+//! ```
+//! use skein_peer::config::Objective;
+//! use skein_peer::{Input, Output, Peer, PeerConfig, PeerId, Role, Time, offload};
+//! use std::collections::VecDeque;
+//!
+//! let mut peer = Peer::new(PeerConfig {
+//!     id: PeerId(1),
+//!     role: Role::GroundStation,
+//!     fleet: "demo".into(),
+//!     beacon_period_ms: 1000,
+//!     rate_bps: 64_000,
+//!     airframe: None,
+//!     objective: Objective::Time,
+//!     height_m: 0.0,
+//!     mission: None,
+//!     seed: 1,
+//! });
+//! let (mut now, mut journal, mut sent) = (Time(0), Vec::new(), 0);
+//! let persisted = journal.clone();
+//! let mut inputs = VecDeque::from([Input::Start { persisted, nonce: 7 }]);
+//! while now < Time(10_000) {
+//!     let input = inputs.pop_front().unwrap_or_else(|| {
+//!         // Nothing else happened: sleep until the next timeout.
+//!         now = peer.next_timeout().unwrap_or(now);
+//!         Input::Timer
+//!     });
+//!     peer.handle(now, input);
+//!     while let Some(output) = peer.poll() {
+//!         match output {
+//!             Output::Publish { .. } => sent += 1, // put `bytes` on the air under `key`
+//!             Output::Store { token, record } => {
+//!                 journal.push(record);
+//!                 inputs.push_back(Input::Stored { token, ok: true });
+//!             }
+//!             Output::Compute { token, job } => {
+//!                 let result = offload::run(&job);
+//!                 inputs.push_back(Input::Computed { token, result });
+//!             }
+//!             Output::Setpoint(_) => {} // tell the autopilot
+//!             Output::Report(_) => {}   // tell people
+//!         }
+//!     }
+//! }
+//! // It promised a life, listened for three periods, then beaconed once a period.
+//! assert_eq!(journal.len(), 1);
+//! assert!((6..=8).contains(&sent));
+//! ```
 //!
 //! `Publish` is a one-hop broadcast: there are no addressees. `Store` is answered by
 //! `Stored` when the record is durable, not before. `Compute` is answered by `Computed`
@@ -36,6 +101,10 @@ pub mod output;
 pub mod peer;
 pub mod protocol;
 pub mod task;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
+#[cfg(test)]
+mod tests;
 pub mod timers;
 pub mod wire;
 

@@ -2,6 +2,7 @@
 
 use crate::offload::MissionGeometry;
 use crate::task::CoverageTask;
+use crate::wire::limits::{CHUNK_MAX_BYTES, CHUNKS_MAX};
 use crate::wire::message::MissionChunk;
 use serde::{Deserialize, Serialize};
 use skein_flight::coverage::lanes;
@@ -306,35 +307,45 @@ impl Mission {
     }
 }
 
-/// Largest piece of a mission's body in one record: with its envelope it stays
-/// below a quarter of the record cap, so that a lost piece is cheap to repeat.
-pub const CHUNK_BYTES: usize = 1024;
-
-/// Most pieces of a mission: 64 KiB hold about 6,000 vertices.
-pub const MAX_CHUNKS: u16 = 64;
-
 /// Most revisions whose pieces are collected at one time; the oldest is forgotten.
 pub const MAX_PARTIAL: usize = 4;
 
-/// The body of a mission in pieces. Empty when it is too large to be spoken.
-#[must_use]
-pub fn chunks(mission: &Mission) -> Vec<MissionChunk> {
-    let bytes = cbor4ii::serde::to_vec(Vec::new(), mission).unwrap_or_default();
-    let pieces = bytes.chunks(CHUNK_BYTES);
-    let Ok(count) = u16::try_from(pieces.len()) else {
-        return Vec::new();
+/// The mission is too large to be spoken: nothing of it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the mission is too large to be spoken: {bytes} bytes, at most {most} fit")]
+pub struct TooLarge {
+    bytes: usize,
+    most: usize,
+}
+
+/// The body of a mission in pieces.
+///
+/// # Errors
+/// [`TooLarge`] where it takes more pieces than may be spoken.
+pub fn chunks(mission: &Mission) -> Result<Vec<MissionChunk>, TooLarge> {
+    let most = usize::from(CHUNKS_MAX) * CHUNK_MAX_BYTES;
+    // Nothing but a want of memory keeps a mission of integers from being encoded.
+    let bytes = cbor4ii::serde::to_vec(Vec::new(), mission).map_err(|_| TooLarge {
+        bytes: usize::MAX,
+        most,
+    })?;
+    let pieces = bytes.chunks(CHUNK_MAX_BYTES);
+    let too_large = TooLarge {
+        bytes: bytes.len(),
+        most,
     };
-    if count > MAX_CHUNKS {
-        return Vec::new();
+    let count = u16::try_from(pieces.len()).map_err(|_| too_large)?;
+    if count > CHUNKS_MAX {
+        return Err(too_large);
     }
-    pieces
-        .map(|piece| MissionChunk {
-            revision: mission.revision,
-            content_hash: mission.content_hash(),
-            chunks: count,
-            bytes: piece.to_vec(),
-        })
-        .collect()
+    let content_hash = mission.content_hash();
+    let chunk = |piece: &[u8]| MissionChunk {
+        revision: mission.revision,
+        content_hash,
+        chunks: count,
+        bytes: piece.to_vec(),
+    };
+    Ok(pieces.map(chunk).collect())
 }
 
 /// The missions a peer holds whole, and the pieces of those it does not.
@@ -382,7 +393,7 @@ impl Library {
         let known = self.whole.as_ref().map_or(0, |w| w.revision);
         if chunk.revision <= known
             || chunk.chunks == 0
-            || chunk.chunks > MAX_CHUNKS
+            || chunk.chunks > CHUNKS_MAX
             || index >= chunk.chunks
         {
             return Ok(false);
@@ -443,7 +454,7 @@ mod tests {
     #[test]
     fn a_mission_in_pieces_is_put_together_in_any_order() {
         let m = mission(2, 500);
-        let pieces = chunks(&m);
+        let pieces = chunks(&m).unwrap();
         assert!(pieces.len() > 2);
         let mut library = Library::new(Some(Arc::new(mission(1, 4))));
         for (i, piece) in pieces.iter().enumerate().rev() {
@@ -464,7 +475,7 @@ mod tests {
         );
         assert_ne!(second.content_hash(), m.content_hash());
         assert_eq!(second.next_lap().unwrap().next_lap(), None);
-        let pieces = chunks(&second);
+        let pieces = chunks(&second).unwrap();
         let mut library = Library::new(Some(Arc::new(m)));
         for (i, piece) in (0u16..).zip(&pieces) {
             library.chunk(i, piece).unwrap();
@@ -475,7 +486,7 @@ mod tests {
     #[test]
     fn a_forged_piece_is_refused_and_the_old_mission_stays() {
         let m = mission(2, 4);
-        let mut pieces = chunks(&m);
+        let mut pieces = chunks(&m).unwrap();
         pieces[0].content_hash ^= 1;
         let mut library = Library::new(Some(Arc::new(mission(1, 4))));
         assert!(library.chunk(0, &pieces[0]).is_err());

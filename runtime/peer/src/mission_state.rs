@@ -74,7 +74,7 @@ pub(crate) struct MissionState {
     /// The peers that were alive at the last tick.
     pub live: LivePeers,
     pub finished: bool,
-    /// Whether its fuel was due once: from then on it flies home.
+    /// Whether its fuel is due: it flies home until some is back.
     pub exhausted: bool,
     /// Cells covered by itself since the last entry of the journal.
     pub unsaved_cells: u16,

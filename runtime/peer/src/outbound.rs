@@ -205,9 +205,13 @@ impl Outbound {
             return Effects::new();
         }
         self.mission_said = Some(hash);
-        let pieces = (0u16..).zip(chunks(mission));
-        let speak = |(subject, chunk)| Effect::Speak(subject, Body::Mission(chunk));
-        pieces.map(speak).collect()
+        match chunks(mission) {
+            Ok(pieces) => (0u16..)
+                .zip(pieces)
+                .map(|(subject, chunk)| Effect::Speak(subject, Body::Mission(chunk)))
+                .collect(),
+            Err(too_large) => vec![Effect::Alarm(too_large.to_string())],
+        }
     }
 
     /// Now, and up to a quarter of a period: what recurs must not recur in step with

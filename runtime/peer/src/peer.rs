@@ -41,7 +41,8 @@ use std::sync::Arc;
 /// that answers none of them is broken, and the peer goes silent rather than lie.
 pub const MAX_STORES: usize = 32;
 
-/// Most jobs under way: one geometry a mission revision, one division a round.
+/// Most jobs under way: one geometry a mission revision, one division a round. Of more the
+/// oldest is given up: a driver that still works on it is too late.
 pub const MAX_JOBS: usize = 8;
 
 /// How often a peer looks at its deadlines, as a fraction of the beacon period.
@@ -462,12 +463,16 @@ impl Peer {
 
     /// Asks for a job to be computed, unless it is under way.
     fn compute(&mut self, pending: PendingJob, job: Job) {
-        if self.jobs.len() < MAX_JOBS && !self.jobs.values().any(|p| *p == pending) {
-            let token = self.token();
-            self.outputs.push_back(Output::Compute { token, job });
-            let before = self.jobs.insert(token, pending);
-            assert!(before.is_none(), "tokens are unique");
+        if self.jobs.values().any(|p| *p == pending) {
+            return;
         }
+        if self.jobs.len() >= MAX_JOBS {
+            self.jobs.pop_first();
+        }
+        let token = self.token();
+        self.outputs.push_back(Output::Compute { token, job });
+        let before = self.jobs.insert(token, pending);
+        assert!(before.is_none(), "tokens are unique");
     }
 
     fn token(&mut self) -> u64 {

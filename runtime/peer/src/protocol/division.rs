@@ -1,7 +1,7 @@
 //! What a complete round decides: a function of its bids alone.
 
 use super::rounds::OpenRound;
-use super::runs::cells_of;
+use super::runs::{cells_of, direction_of};
 use crate::cells::CellSet;
 use crate::wire::message::{Bid, CellRun};
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
@@ -43,23 +43,23 @@ pub fn problem(
             open: !done.contains(i),
         })
         .collect();
-    let robots = open
+    let robots: Vec<Uav> = open
         .bids
         .iter()
         .map(|(id, s)| Uav {
             anchor: s.anchor % n.max(1),
             id: *id,
-            heading: if s.backward {
-                Direction::Backward
-            } else {
-                Direction::Forward
-            },
+            heading: direction_of(s.backward),
             release_ms: s.release_ms,
             speed_mmps: s.speed_mmps.max(1),
             turn_ms: s.turn_ms,
             endurance_ms: s.endurance_ms,
         })
         .collect();
+    assert!(
+        robots.is_sorted_by(|a, b| a.id < b.id),
+        "all members solve the same problem"
+    );
     (ring, robots)
 }
 
@@ -78,9 +78,9 @@ pub fn worthwhile(open: &OpenRound, division: &Division, beacon_period_ms: u64) 
 }
 
 /// The cells of one member's section that are open in the round, in order of
-/// flight, each with whether it is flown backward.
+/// flight, each with the way it is flown.
 #[must_use]
-pub fn section_of(division: &Division, ring: &[RingCell], id: u16) -> Vec<(u16, bool)> {
+pub fn section_of(division: &Division, ring: &[RingCell], id: u16) -> Vec<(u16, Direction)> {
     let mut out = Vec::new();
     let Some(section) = division.sections.iter().find(|s| s.id == id) else {
         return out;
@@ -91,7 +91,7 @@ pub fn section_of(division: &Division, ring: &[RingCell], id: u16) -> Vec<(u16, 
             let i = usize::from(c);
             if ring.get(i).is_some_and(|r| r.open) && !seen[i] {
                 seen[i] = true;
-                out.push((c, leg.direction == Direction::Backward));
+                out.push((c, leg.direction));
             }
         }
     }

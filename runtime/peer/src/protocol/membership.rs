@@ -33,13 +33,14 @@ mod tests;
 use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Status;
-use crate::wire::limits::HOPS_MAX;
+use crate::wire::limits::{HOPS_MAX, MEMBERS_MAX};
 use crate::wire::message::{Beacon, Gossip};
 use known::{Age, Heartbeat, Known, NO_HOPS};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most peers known: the largest fleet. A flood of made-up ids must end somewhere.
-pub const MAX_KNOWN: usize = 64;
+/// Most other peers known: the largest fleet but this peer itself, so that a round of all
+/// that it knows has room for it. A flood of made-up ids must end somewhere.
+pub const MAX_KNOWN: usize = MEMBERS_MAX - 1;
 
 /// Hops and eccentricities count for so many periods after they were heard: long
 /// enough that each of a full fleet's entries, 20 a beacon, came round three times.
@@ -346,6 +347,10 @@ impl Membership {
             self.doubt_until = now.plus_ms(self.period_ms);
         }
         self.last_tick = Some(now);
+        assert!(
+            self.known.len() <= MAX_KNOWN,
+            "peers known keep to their cap"
+        );
         let (k1_ms, k2_ms, bound_ms) = (self.k1_ms(now), self.k2_ms(now), self.bound_ms(now));
         let oldest_period = (now.0 / self.period_ms).saturating_sub(HOP_PERIODS);
         let urgent_until = now.plus_ms(URGENT_PERIODS * self.period_ms);

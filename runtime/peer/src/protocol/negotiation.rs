@@ -7,21 +7,56 @@
 //! | orphans | 2 T (5 T after a decision) | a round with loss |
 //! | an open round with a member that is gone | at once | the next round |
 //! | an open round without all bids | W, doubling to 4 W0 | the next round |
+//! | a complete round without its division | 2 W | the next round |
 //! | orphans, and no round helped | 2 T + W0 + rank T/2 | the nearest are taken |
 //! | idle, others have much left | 10 T steady, 20 T calm | a round without loss |
 //! | idle, an owner makes no progress | its bound | the far half is taken |
 //! | cells held | 2 W | they expire |
 
 use super::division::{self, CALM_PERIODS};
-use super::rounds::{HeardBid, Rounds};
+use super::rounds::{HeardBid, OpenRound, Rounds};
 use super::runs::PlannedCell;
 use super::sections::{LivePeers, Sections};
 use crate::Time;
 use crate::cells::CellSet;
 use crate::wire::message::{Bid, Epoch, Member};
-use skein_flight::coverage::ring::CoverageLoop;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
+use skein_flight::coverage::ring::{CoverageLoop, Direction};
 use std::collections::BTreeMap;
+
+/// Time in which an owner at work covers two cells, milliseconds: at the slowest ground
+/// speed that missions are flown at, 8 m/s, two lanes of 48 m take 12 s. An owner that
+/// covers none for longer has stalled.
+const TWO_CELLS_MS: u64 = 12_000;
+
+/// Spreads peers without a plan over the loop, so that not all of them take the same
+/// orphans first: a prime above the cells of any loop flown yet, whose multiples by
+/// small ids lie far apart.
+const SPREAD: u64 = 7919;
+
+/// A swarm is steady when no member came or went for so many periods; as long must an
+/// orphan last before a round, and an idle plan before one is thought of: a beacon or a
+/// claim may be lost once.
+const STEADY_PERIODS: u64 = 2;
+
+/// After a decision orphans are believed after so many periods only: one to store, two
+/// to speak and be passed on, two for what is lost.
+const SETTLE_PERIODS: u64 = 5;
+
+/// A return, a join or an idle peer waits for so many periods: shorter absences are the
+/// rule on a lossy channel.
+const PATIENT_PERIODS: u64 = 10;
+
+/// The waiting time of a round doubles with each retry, up to this many doublings: a bid
+/// that four waiting times do not bring is not on its way.
+const MAX_DOUBLINGS: u32 = 2;
+
+/// Peers begin rounds one after the other by rank, this part of a period apart: the
+/// first one's bid is heard before the third would begin.
+const ROUND_STAGGER: u64 = 8;
+
+/// And take orphans this part of a period apart, for a take has to become durable first.
+const TAKE_STAGGER: u64 = 2;
 
 /// What the rest of the peer knows that the negotiation needs.
 #[derive(Clone, Debug)]
@@ -273,7 +308,7 @@ impl Negotiation {
             if gone {
                 self.rounds.give_up();
                 self.start(ctx, loss, 0);
-            } else if waited > u64::from(open.round.wait_ms) && self.rounds.complete().is_none() {
+            } else if waited > self.patience_ms(open) {
                 self.rounds.give_up();
                 self.start(ctx, loss, self.retries + 1);
             }
@@ -287,21 +322,32 @@ impl Negotiation {
         };
         // Before its first division a peer waits until nobody new was heard for a while:
         // a swarm that starts together begins with one round, not with many.
-        let steady = ctx.now.since_ms(self.members_since) >= 2 * ctx.period_ms;
-        if self.decided_at.is_none() && !steady && orphaned_ms < 10 * ctx.period_ms {
+        let steady = ctx.now.since_ms(self.members_since) >= STEADY_PERIODS * ctx.period_ms;
+        if self.decided_at.is_none() && !steady && orphaned_ms < PATIENT_PERIODS * ctx.period_ms {
             return;
         }
         let settled = self
             .decided_at
-            .is_none_or(|t| ctx.now.since_ms(t) >= 5 * ctx.period_ms);
+            .is_none_or(|t| ctx.now.since_ms(t) >= SETTLE_PERIODS * ctx.period_ms);
         let patience = if settled {
-            2 * ctx.period_ms
+            STEADY_PERIODS
         } else {
-            5 * ctx.period_ms
-        };
-        let stagger = self.rank(ctx) * ctx.period_ms / 8;
+            SETTLE_PERIODS
+        } * ctx.period_ms;
+        let stagger = self.rank(ctx) * ctx.period_ms / ROUND_STAGGER;
         if (self.loss_seen && settled) || orphaned_ms >= patience + stagger {
             self.start(ctx, true, 0);
+        }
+    }
+
+    /// How long an open round is waited for, milliseconds: for its bids, and if they are
+    /// all there as long again for the division.
+    fn patience_ms(&self, open: &OpenRound) -> u64 {
+        let wait_ms = u64::from(open.round.wait_ms);
+        if self.rounds.complete().is_some() {
+            2 * wait_ms
+        } else {
+            wait_ms
         }
     }
 
@@ -311,7 +357,7 @@ impl Negotiation {
         }
         self.retries = retries;
         let base = ctx.base_wait_ms();
-        let wait = (base << retries.min(2)).min(4 * base);
+        let wait = base << retries.min(MAX_DOUBLINGS);
         let wait = u32::try_from(wait).unwrap_or(u32::MAX);
         self.rounds.start(
             ctx.members.to_vec(),
@@ -327,12 +373,12 @@ impl Negotiation {
     fn gain_in_sight(&self, ctx: &Context<'_>) -> bool {
         let steady = ctx
             .able_since
-            .is_some_and(|t| ctx.now.since_ms(t) >= 10 * ctx.period_ms);
+            .is_some_and(|t| ctx.now.since_ms(t) >= PATIENT_PERIODS * ctx.period_ms);
         let idle = self
             .idle_since
-            .is_some_and(|t| ctx.now.since_ms(t) >= 2 * ctx.period_ms);
+            .is_some_and(|t| ctx.now.since_ms(t) >= STEADY_PERIODS * ctx.period_ms);
         let calm = CALM_PERIODS * ctx.period_ms;
-        let stagger = self.rank(ctx) * ctx.period_ms / 8;
+        let stagger = self.rank(ctx) * ctx.period_ms / ROUND_STAGGER;
         let last = self.decided_at.max(self.adopted_at);
         let rested = last.is_none_or(|t| ctx.now.since_ms(t) >= calm + stagger);
         let left: usize = ctx
@@ -385,7 +431,7 @@ impl Negotiation {
             .plan()
             .iter()
             .filter(|p| committed.contains(p.cell));
-        let commits: Vec<(u16, bool)> = commits.map(|p| (p.cell, p.backward)).collect();
+        let commits: Vec<(u16, Direction)> = commits.map(|p| (p.cell, p.direction)).collect();
         let section = division::section_of(division, &dividing.ring, self.me);
         let adoption = Adoption {
             epoch,
@@ -435,7 +481,7 @@ impl Negotiation {
 
     /// Notes how other owners get on; the first ETA heard in an epoch bounds them.
     fn watch_progress(&mut self, ctx: &Context<'_>) {
-        let cell_bound = 12_000 + 2 * u64::from(ctx.diameter) * ctx.period_ms;
+        let cell_bound = TWO_CELLS_MS + 2 * u64::from(ctx.diameter) * ctx.period_ms;
         let heard: Vec<(u16, Epoch, u32)> = self
             .sections
             .heard()
@@ -444,7 +490,7 @@ impl Negotiation {
             .collect();
         for (id, epoch, eta_ms) in heard {
             let left = self.sections.plan_of(id).len();
-            let slack = u64::from(eta_ms / 4) + 10 * ctx.period_ms + cell_bound;
+            let slack = u64::from(eta_ms / 4) + PATIENT_PERIODS * ctx.period_ms + cell_bound;
             let fresh = Progress {
                 left,
                 since: ctx.now,
@@ -467,22 +513,24 @@ impl Negotiation {
         ctx: &Context<'_>,
         orphans: &CellSet,
         lp: &CoverageLoop,
-    ) -> Option<Vec<(u16, bool)>> {
+    ) -> Option<Vec<(u16, Direction)>> {
         if self.take_pending {
             return None;
         }
-        let stagger = self.rank(ctx) * ctx.period_ms / 2;
+        let stagger = self.rank(ctx) * ctx.period_ms / TAKE_STAGGER;
         if let Some(since) = self.orphan_since {
-            let patience = 2 * ctx.period_ms + ctx.base_wait_ms() + stagger;
+            let patience = STEADY_PERIODS * ctx.period_ms + ctx.base_wait_ms() + stagger;
             return (ctx.now.since_ms(since) >= patience)
                 .then(|| self.nearest_run(orphans, lp))
                 .flatten();
         }
         let idle_ms = self.idle_since.map(|t| ctx.now.since_ms(t))?;
-        if idle_ms < 10 * ctx.period_ms + stagger || self.rounds.open().is_some() {
+        if idle_ms < PATIENT_PERIODS * ctx.period_ms + stagger || self.rounds.open().is_some() {
             return None;
         }
-        let stalled_ms = 12_000 + (10 + 2 * u64::from(ctx.diameter)) * ctx.period_ms + stagger;
+        let stalled_ms = TWO_CELLS_MS
+            + (PATIENT_PERIODS + 2 * u64::from(ctx.diameter)) * ctx.period_ms
+            + stagger;
         let (owner, _) = self.progress.iter().find(|(id, p)| {
             p.left > 0
                 && ctx.live.contains_key(id)
@@ -492,12 +540,12 @@ impl Negotiation {
     }
 
     /// The run of orphans nearest along the loop to where this peer works.
-    fn nearest_run(&self, orphans: &CellSet, lp: &CoverageLoop) -> Option<Vec<(u16, bool)>> {
+    fn nearest_run(&self, orphans: &CellSet, lp: &CoverageLoop) -> Option<Vec<(u16, Direction)>> {
         let n = i32::from(self.sections.cells());
         let here = self.sections.plan().last().map(|p| i32::from(p.cell));
         let here = here.unwrap_or_else(|| {
             let members = lp.len() as u64;
-            i32::try_from(u64::from(self.me) * 7919 % members.max(1)).unwrap_or(0)
+            i32::try_from(u64::from(self.me) * SPREAD % members.max(1)).unwrap_or(0)
         });
         let away = |c: u16| {
             let d = (i32::from(c) - here).rem_euclid(n);
@@ -514,20 +562,405 @@ impl Negotiation {
             })?;
         let last =
             u16::try_from((i32::from(first) + i32::from(count) - 1).rem_euclid(n)).unwrap_or(0);
-        let backward = away(last) < away(first);
-        let mut cells: Vec<(u16, bool)> = (first..=last).map(|c| (c, backward)).collect();
-        if backward {
-            cells.reverse();
+        if away(last) < away(first) {
+            let cells = (first..=last).rev();
+            Some(cells.map(|c| (c, Direction::Backward)).collect())
+        } else {
+            Some((first..=last).map(|c| (c, Direction::Forward)).collect())
         }
-        Some(cells)
     }
 }
 
 /// The second half of an owner's plan, from its far end.
-fn far_half(plan: &[PlannedCell]) -> Vec<(u16, bool)> {
+fn far_half(plan: &[PlannedCell]) -> Vec<(u16, Direction)> {
     plan.iter()
         .skip(plan.len() / 2)
         .rev()
-        .map(|p| (p.cell, !p.backward))
+        .map(|p| (p.cell, p.direction.opposite()))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::mission;
+    use crate::wire::message::{CellRun, Claim, Firmness, ListedRun, Round, Stamp};
+    use std::sync::Arc;
+
+    const T: u64 = 1000;
+
+    /// One peer's negotiation over 24 cells, with what it is told of the others.
+    struct Desk {
+        negotiation: Negotiation,
+        coverage_loop: Arc<CoverageLoop>,
+        now: Time,
+        live: LivePeers,
+        able_since: Option<Time>,
+        held_expired: bool,
+    }
+
+    fn member(id: u16) -> Member {
+        Member { id, incarnation: 1 }
+    }
+
+    impl Desk {
+        /// Peer 1 among `others`, able and steady since long ago.
+        fn new(others: &[u16]) -> Self {
+            let geometry = Arc::new(mission(1, 6, 4)).geometry().unwrap();
+            let cells = u16::try_from(geometry.coverage_loop.len()).unwrap();
+            let mut desk = Self {
+                negotiation: Negotiation::new(member(1), CellSet::new(cells), 0),
+                coverage_loop: Arc::clone(&geometry.coverage_loop),
+                now: Time(100 * T),
+                live: others.iter().map(|id| (*id, 1)).collect(),
+                able_since: Some(Time(0)),
+                held_expired: false,
+            };
+            assert_eq!(desk.cells(), 24);
+            assert!(desk.tick().is_empty());
+            desk
+        }
+
+        fn cells(&self) -> u16 {
+            self.negotiation.sections.cells()
+        }
+
+        fn tick(&mut self) -> Vec<Action> {
+            let mut members: Vec<Member> = self.live.keys().map(|id| member(*id)).collect();
+            members.extend(self.able_since.map(|_| member(1)));
+            members.sort_unstable();
+            let ctx = Context {
+                now: self.now,
+                period_ms: T,
+                live: &self.live,
+                members: &members,
+                diameter: 1,
+                able_since: self.able_since,
+                revision: 1,
+                loop_hash: 7,
+                held_expired: core::mem::take(&mut self.held_expired),
+            };
+            self.negotiation.tick(&ctx, &self.coverage_loop)
+        }
+
+        /// Ticks every quarter period; returns after how long an action came, and it.
+        fn wait(&mut self, most_ms: u64) -> Option<(u64, Action)> {
+            let from = self.now;
+            while self.now.since_ms(from) <= most_ms {
+                if let Some(action) = self.tick().into_iter().next() {
+                    return Some((self.now.since_ms(from), action));
+                }
+                self.now = self.now.plus_ms(T / 4);
+            }
+            None
+        }
+
+        fn bid_of(&self, id: u16, anchor: u16) -> Bid {
+            let round = self.negotiation.rounds.open().unwrap().round.clone();
+            Bid {
+                anchor,
+                ..bid(round, id)
+            }
+        }
+
+        /// Another peer's claim of some cells.
+        fn claim(&mut self, id: u16, seq: u32, first: u16, count: u16, eta_ms: u32) {
+            let epoch = Epoch {
+                counter: 1,
+                hash: 0,
+            };
+            let listed = ListedRun {
+                run: CellRun { first, count },
+                backward: false,
+                firmness: Firmness::Tentative,
+                stamp: Stamp { epoch, take: 0, id },
+            };
+            let claim = Claim {
+                epoch,
+                plan: vec![listed],
+                eta_ms,
+                ..Claim::default()
+            };
+            assert!(self.negotiation.sections.hear(id, 1, seq, claim));
+        }
+
+        /// Everything but some cells is covered.
+        fn leave_open(&mut self, open: core::ops::Range<u16>) {
+            let cells = self.cells();
+            let done = (0..cells).filter(|c| !open.contains(c));
+            self.negotiation.sections.cover(&CellSet::of(cells, done));
+        }
+
+        fn round(&self) -> &Round {
+            &self.negotiation.rounds.open().unwrap().round
+        }
+
+        /// A division was adopted just now: this peer has cells `0..count`.
+        fn adopt(&mut self, count: u16) {
+            let epoch = Epoch {
+                counter: 1,
+                hash: 1,
+            };
+            let section: Vec<_> = (0..count).map(|c| (c, Direction::Forward)).collect();
+            let plan = self.negotiation.sections.adopted(epoch, &[], &section);
+            let adoption = Adoption {
+                epoch,
+                plan,
+                unassigned: Vec::new(),
+                wait_ms: 5000,
+            };
+            assert!(self.negotiation.adopt(self.now, &adoption));
+        }
+    }
+
+    fn bid(round: Round, _id: u16) -> Bid {
+        Bid {
+            round,
+            anchor: 0,
+            backward: false,
+            release_ms: 0,
+            speed_mmps: 13_000,
+            turn_ms: 8000,
+            endurance_ms: 3_000_000,
+            covered: Vec::new(),
+            commits: Vec::new(),
+            eta_ms: 0,
+            adopted_ago_ms: u32::MAX,
+            cells_since: 0,
+            idle: true,
+        }
+    }
+
+    #[test]
+    fn orphans_of_two_periods_open_a_round_with_loss() {
+        let mut desk = Desk::new(&[2]);
+        let (after_ms, action) = desk.wait(10 * T).unwrap();
+        assert_eq!((after_ms, action), (2 * T, Action::Bid));
+        assert!(desk.round().loss && desk.round().counter == 1);
+        assert_eq!(desk.round().members, [member(1), member(2)]);
+        assert_eq!(desk.round().wait_ms, 5 * 1000);
+    }
+
+    #[test]
+    fn a_peer_of_higher_rank_begins_later() {
+        let mut desk = Desk::new(&[]);
+        desk.live = LivePeers::from([(0, 1)]);
+        desk.now = desk.now.plus_ms(T);
+        let (after_ms, _) = desk.wait(10 * T).unwrap();
+        assert!((2 * T..3 * T).contains(&after_ms), "{after_ms}");
+        assert_eq!(desk.round().members, [member(0), member(1)]);
+    }
+
+    #[test]
+    fn who_cannot_plan_opens_nothing_and_takes_nothing() {
+        let mut desk = Desk::new(&[2]);
+        desk.able_since = None;
+        assert_eq!(desk.wait(60 * T), None);
+    }
+
+    #[test]
+    fn after_a_decision_orphans_are_believed_later() {
+        let mut desk = Desk::new(&[2]);
+        desk.adopt(4);
+        let (after_ms, action) = desk.wait(20 * T).unwrap();
+        assert_eq!((after_ms, action), (5 * T, Action::Bid));
+    }
+
+    #[test]
+    fn a_lost_member_opens_a_round_at_once() {
+        let mut desk = Desk::new(&[2]);
+        desk.adopt(4);
+        desk.claim(2, 1, 4, 20, 60_000);
+        assert_eq!(desk.wait(8 * T), None, "nothing is orphaned");
+        desk.live.clear();
+        desk.negotiation.note_loss();
+        assert_eq!(desk.wait(T), Some((0, Action::Bid)));
+        assert!(desk.round().loss);
+        assert_eq!(desk.round().members, [member(1)]);
+    }
+
+    #[test]
+    fn a_round_whose_member_is_gone_is_followed_by_the_next_at_once() {
+        let mut desk = Desk::new(&[2, 3]);
+        desk.wait(5 * T).unwrap();
+        desk.live.remove(&3);
+        assert_eq!(desk.wait(T), Some((0, Action::Bid)));
+        assert_eq!(desk.round().counter, 2);
+        assert_eq!(desk.round().members, [member(1), member(2)]);
+    }
+
+    #[test]
+    fn a_round_without_all_bids_waits_longer_each_time_and_leaves_out_the_silent() {
+        let mut desk = Desk::new(&[2]);
+        desk.wait(5 * T).unwrap();
+        let own = desk.bid_of(1, 0);
+        assert!(desk.negotiation.bid_is_durable(own));
+        let mut waits = Vec::new();
+        for _ in 0..2 {
+            // Takes are made meanwhile; they are none of this test's business.
+            let counter = desk.round().counter;
+            let from = desk.now;
+            while desk.round().counter == counter {
+                desk.now = desk.now.plus_ms(T / 4);
+                desk.tick();
+            }
+            waits.push((desk.now.since_ms(from), desk.round().wait_ms));
+        }
+        assert!((5 * T..6 * T).contains(&waits[0].0) && waits[0].1 == 10_000);
+        assert!((10 * T..11 * T).contains(&waits[1].0) && waits[1].1 == 20_000);
+        assert_eq!(desk.round().members, [member(1)], "2 was silent twice");
+    }
+
+    #[test]
+    fn a_complete_round_is_divided_once_and_given_up_without_an_answer() {
+        let mut desk = Desk::new(&[2]);
+        desk.wait(5 * T).unwrap();
+        let (own, other) = (desk.bid_of(1, 0), desk.bid_of(2, 12));
+        assert!(desk.negotiation.bid_is_durable(own));
+        desk.negotiation.hear_bid(desk.now, member(2), &other);
+        let divides = desk.tick();
+        assert!(
+            matches!(&divides[..], [Action::Divide { robots, .. }] if robots.len() == 2),
+            "{divides:?}"
+        );
+        assert!(desk.tick().is_empty());
+        let counter = desk.round().counter;
+        let from = desk.now;
+        while desk.round().counter == counter {
+            desk.now = desk.now.plus_ms(T / 4);
+            desk.tick();
+        }
+        let waited_ms = desk.now.since_ms(from);
+        assert!((10 * T..11 * T).contains(&waited_ms), "{waited_ms}");
+    }
+
+    #[test]
+    fn a_division_gives_each_member_its_part_and_all_compute_the_same() {
+        let mut desk = Desk::new(&[2]);
+        desk.wait(5 * T).unwrap();
+        let (own, other) = (desk.bid_of(1, 0), desk.bid_of(2, 12));
+        desk.negotiation.bid_is_durable(own);
+        desk.negotiation.hear_bid(desk.now, member(2), &other);
+        let divides = desk.tick();
+        let [
+            Action::Divide {
+                epoch,
+                ring,
+                robots,
+            },
+        ] = &divides[..]
+        else {
+            panic!("{divides:?}")
+        };
+        let division = skein_flight::coverage::ring::backtracking::divide(ring, robots);
+        let adoption = desk
+            .negotiation
+            .divided(desk.now, T, *epoch, &division)
+            .unwrap();
+        let mine = adoption.plan.len();
+        assert!((10..=14).contains(&mine), "{mine} of 24");
+        assert!(desk.negotiation.adopt(desk.now, &adoption));
+        assert!(!desk.negotiation.adopt(desk.now, &adoption), "once");
+        assert_eq!(desk.negotiation.adoptions, 1);
+    }
+
+    #[test]
+    fn orphans_that_no_round_helps_are_taken_the_nearest_run_first() {
+        let mut desk = Desk::new(&[2]);
+        desk.adopt(4);
+        desk.claim(2, 1, 10, 10, 600_000);
+        let from = desk.now;
+        let mut taken = None;
+        while taken.is_none() && desk.now.since_ms(from) < 60 * T {
+            desk.now = desk.now.plus_ms(T / 4);
+            taken = desk.tick().into_iter().find_map(|a| match a {
+                Action::Take(cells) => Some(cells),
+                _ => None,
+            });
+        }
+        let cells: Vec<u16> = taken.unwrap().iter().map(|p| p.cell).collect();
+        assert_eq!(cells, [4, 5, 6, 7, 8, 9], "beside its own plan, in order");
+        // 2 T and W0 after the decision.
+        let after_ms = desk.now.since_ms(from);
+        assert!((7 * T..=8 * T).contains(&after_ms), "{after_ms}");
+        // Until that is durable or broken nothing more is taken.
+        desk.now = desk.now.plus_ms(20 * T);
+        let more = |actions: Vec<Action>| actions.iter().any(|a| matches!(a, Action::Take(_)));
+        assert!(!more(desk.tick()));
+        desk.negotiation.cancel_take();
+        assert!(more(desk.tick()));
+    }
+
+    #[test]
+    fn an_idle_peer_asks_for_a_share_of_what_others_have_left() {
+        let mut desk = Desk::new(&[2]);
+        desk.claim(2, 1, 0, 24, 600_000);
+        let (after_ms, action) = desk.wait(60 * T).unwrap();
+        assert_eq!(action, Action::Bid);
+        assert!(!desk.round().loss);
+        assert!(after_ms >= 2 * T, "{after_ms}");
+        // But not of an owner that has hardly more than there are members.
+        let mut desk = Desk::new(&[2]);
+        desk.leave_open(0..2);
+        desk.claim(2, 1, 0, 2, 60_000);
+        assert_eq!(desk.wait(20 * T), None);
+    }
+
+    #[test]
+    fn a_return_waits_until_it_is_steady() {
+        let mut desk = Desk::new(&[2]);
+        desk.claim(2, 1, 0, 24, 600_000);
+        desk.able_since = Some(desk.now);
+        let (after_ms, action) = desk.wait(60 * T).unwrap();
+        assert_eq!(action, Action::Bid);
+        assert!((10 * T..11 * T).contains(&after_ms), "{after_ms}");
+    }
+
+    #[test]
+    fn the_far_half_of_a_stalled_owner_is_taken_from_its_end() {
+        let mut desk = Desk::new(&[2]);
+        // So few cells that no round is worth it.
+        desk.leave_open(4..6);
+        desk.claim(2, 1, 4, 2, 10_000);
+        let (after_ms, action) = desk.wait(400 * T).unwrap();
+        let Action::Take(cells) = action else {
+            panic!("{action:?}")
+        };
+        let taken: Vec<_> = cells.iter().map(|p| (p.cell, p.direction)).collect();
+        assert_eq!(taken, [(5, Direction::Backward)]);
+        // Its ETA, a quarter more, ten periods, and two cells with 2 D T.
+        let bound_ms = 10_000 + 2_500 + 10 * T + TWO_CELLS_MS + 2 * T;
+        assert!((bound_ms..bound_ms + T).contains(&after_ms), "{after_ms}");
+    }
+
+    #[test]
+    fn cells_that_nobody_took_over_in_time_are_orphans() {
+        let mut desk = Desk::new(&[2]);
+        desk.adopt(4);
+        desk.claim(2, 1, 4, 20, 600_000);
+        let epoch = Epoch {
+            counter: 2,
+            hash: 0,
+        };
+        assert!(desk.negotiation.sections.adopt(epoch, &[], &[]));
+        assert_eq!(desk.negotiation.sections.held().len(), 4);
+        desk.held_expired = true;
+        assert_eq!(desk.tick(), [Action::Changed]);
+        assert!(desk.negotiation.sections.held().is_empty());
+        let live = desk.live.clone();
+        assert_eq!(desk.negotiation.sections.orphans(&live).count(), 4);
+    }
+
+    #[test]
+    fn a_new_life_owns_nothing_and_keeps_what_is_covered() {
+        let mut desk = Desk::new(&[2]);
+        desk.adopt(4);
+        desk.leave_open(2..24);
+        desk.negotiation.new_life(Member {
+            id: 1,
+            incarnation: 2,
+        });
+        assert!(desk.negotiation.sections.plan().is_empty());
+        assert_eq!(desk.negotiation.sections.covered().count(), 2);
+    }
 }

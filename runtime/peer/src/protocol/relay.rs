@@ -15,6 +15,7 @@ use crate::output::Priority;
 use crate::wire::Fnv;
 use crate::wire::key;
 use crate::wire::kinds::{Kind, RECORD_MAX_BYTES};
+use crate::wire::limits::{CHUNKS_MAX, HOPS_MAX, MEMBERS_MAX};
 use crate::wire::message::{Beacon, Record};
 #[cfg(test)]
 mod many_relays;
@@ -23,22 +24,15 @@ use std::collections::BTreeMap;
 
 /// Most records held: 64 peers with a state, a bid, a claim, an order, a finish and
 /// four events each, and one mission of 64 pieces.
-pub const MAX_RECORDS: usize = 64 * 9 + 64;
+pub const MAX_RECORDS: usize = MEMBERS_MAX * 9 + CHUNKS_MAX as usize;
 
 /// Most transmissions waiting: all records of one neighbourhood once.
 pub const MAX_QUEUE: usize = 128;
-
-/// A record passed on so many hops is not passed on again.
-pub const MAX_HOPS: u8 = 16;
 
 /// A record is not passed on if so many copies of it were heard first: one is not enough
 /// where three in ten are lost. Copies count, not neighbours: of two from one neighbour
 /// the second has reached others too.
 const COPIES_HEARD: u8 = 2;
-
-/// Most neighbours counted: the largest fleet. Made-up ids must not take a peer's
-/// share of the channel away for good.
-const MAX_NEIGHBOURS: usize = 64;
 
 /// A token bucket holds at least one of the largest records, or a small share would
 /// never let it through.
@@ -224,7 +218,7 @@ impl Relay {
             sent: now,
         };
         self.hold(key, held);
-        if kind.relayed() && hops < MAX_HOPS {
+        if kind.relayed() && hops < HOPS_MAX {
             let delay = RELAY_DELAY_MS + self.jitter(&key, version) % RELAY_SPREAD_MS;
             self.wait(now, key, kind, delay);
         }
@@ -281,6 +275,7 @@ impl Relay {
             }
         }
         self.held.insert(key, held);
+        assert!(self.held.len() <= MAX_RECORDS, "records keep to their cap");
     }
 
     fn wait(&mut self, now: Time, key: RecordKey, kind: Kind, delay_ms: u64) {
@@ -305,6 +300,7 @@ impl Relay {
                 priority: row.priority,
             },
         );
+        assert!(self.queue.len() <= MAX_QUEUE, "the queue keeps to its cap");
     }
 
     fn lifetime_ms(&self, kind: Kind) -> u32 {
@@ -315,7 +311,7 @@ impl Relay {
     pub fn on_beacon(&mut self, now: Time, author: u16, beacon: &Beacon) {
         let window = 4 * self.period_ms;
         self.neighbours.retain(|_, t| now.since_ms(*t) < window);
-        if self.neighbours.len() < MAX_NEIGHBOURS || self.neighbours.contains_key(&author) {
+        if self.neighbours.len() < MEMBERS_MAX || self.neighbours.contains_key(&author) {
             self.neighbours.insert(author, now);
         }
         self.answered.retain(|_, t| now.since_ms(*t) < window);
@@ -486,7 +482,7 @@ impl Relay {
         [
             ("records", self.held.len(), MAX_RECORDS),
             ("queue", self.queue.len(), MAX_QUEUE),
-            ("neighbours", self.neighbours.len(), MAX_NEIGHBOURS),
+            ("neighbours", self.neighbours.len(), MEMBERS_MAX),
         ]
     }
 }

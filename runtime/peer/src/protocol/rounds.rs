@@ -10,7 +10,7 @@
 //! | open | a bid of this round | open, or complete with the last one | |
 //! | open | a bid of a lower round | open | ignored: it is dead |
 //! | complete | decided | closed | the counter stays |
-//! | any | a round that does not name me | same | only its counter is remembered |
+//! | any | a round that does not name me, or is far above all counters | same | only its counter is remembered, in steps |
 //!
 //! Rounds are ordered by (counter, number of members, hash of members and ground);
 //! a higher one abandons a lower one, and bids of different rounds never mix.
@@ -89,9 +89,10 @@ impl Rounds {
         self.counter
     }
 
-    /// Remembers a counter heard of.
+    /// Remembers a counter heard of, in steps of at most [`COUNTER_STEP`].
     pub fn hear_counter(&mut self, counter: u32) {
-        self.counter = self.counter.max(counter);
+        let most = self.counter.saturating_add(COUNTER_STEP);
+        self.counter = self.counter.max(counter.min(most));
     }
 
     /// The open round, if there is one.
@@ -103,8 +104,9 @@ impl Rounds {
     /// A bid by its author, who speaks in the given life.
     pub fn hear(&mut self, author: Member, bid: &Bid) -> HeardBid {
         let round = &bid.round;
-        self.counter = self.counter.max(round.counter);
-        if !round.members.contains(&self.me)
+        self.hear_counter(round.counter);
+        if round.counter > self.counter
+            || !round.members.contains(&self.me)
             || !round.members.contains(&author)
             || author == self.me
         {
@@ -153,6 +155,7 @@ impl Rounds {
         members
             .retain(|m| *m == self.me || self.silent.get(m).copied().unwrap_or(0) < SILENT_ROUNDS);
         members.sort_unstable();
+        assert!(members.contains(&self.me), "a peer opens rounds of its own");
         self.counter = self.counter.saturating_add(1);
         let round = Round {
             counter: self.counter,
@@ -237,6 +240,11 @@ impl Rounds {
         self.open = None;
     }
 }
+
+/// A counter heard of raises one's own by so many at most, and a bid of a round beyond
+/// that opens nothing: a day of rounds, one each nine periods, are fewer; and a counter
+/// that was made up cannot use all of them up at once.
+pub const COUNTER_STEP: u32 = 10_000;
 
 /// A member that was silent in so many rounds running is left out of the next.
 pub const SILENT_ROUNDS: u8 = 2;

@@ -11,8 +11,8 @@ use skein_flight::coverage::ring::backtracking::Leg;
 pub struct PlannedCell {
     /// Which cell of the loop.
     pub cell: u16,
-    /// Whether it is flown against the order of the loop.
-    pub backward: bool,
+    /// Which way it is flown.
+    pub direction: Direction,
     /// Whether it was committed in a bid: it is flown whatever is decided.
     pub committed: bool,
     /// By what right it is listed.
@@ -43,19 +43,20 @@ impl Packer<'_> {
                 runs.push((*p, 1));
             }
         }
+        assert!(runs.len() <= max_runs, "runs keep to their cap");
         (runs.iter().map(|r| self.listing(r)).collect(), cells.len())
     }
 
     /// The length of the run `first, count` after `next` joins it, if it can.
     fn reach(&self, first: &PlannedCell, count: u16, next: &PlannedCell) -> Option<u16> {
-        if (first.backward, first.committed, first.stamp)
-            != (next.backward, next.committed, next.stamp)
+        if (first.direction, first.committed, first.stamp)
+            != (next.direction, next.committed, next.stamp)
         {
             return None;
         }
         let n = self.cells;
         let step = |from: u16, to: u16| if to >= from { to - from } else { n - from + to };
-        let offset = if first.backward {
+        let offset = if first.direction == Direction::Backward {
             step(next.cell, first.cell)
         } else {
             step(first.cell, next.cell)
@@ -64,7 +65,7 @@ impl Packer<'_> {
             return None;
         }
         let bridged = (count..offset).all(|k| {
-            let c = if first.backward {
+            let c = if first.direction == Direction::Backward {
                 step(k, first.cell)
             } else {
                 (first.cell + k) % n
@@ -76,7 +77,7 @@ impl Packer<'_> {
 
     fn listing(&self, (first, count): &(PlannedCell, u16)) -> ListedRun {
         let n = self.cells;
-        let start = if first.backward {
+        let start = if first.direction == Direction::Backward {
             (first.cell + n - (count - 1) % n) % n
         } else {
             first.cell
@@ -86,7 +87,7 @@ impl Packer<'_> {
                 first: start,
                 count: *count,
             },
-            backward: first.backward,
+            backward: first.direction == Direction::Backward,
             firmness: if first.committed {
                 Firmness::Committed
             } else {
@@ -104,18 +105,29 @@ pub fn cells_of(run: CellRun, n: u16) -> impl Iterator<Item = u16> {
         .map(move |k| u16::try_from((u32::from(run.first) + k) % n32).unwrap_or(0))
 }
 
+/// The direction that the wire writes as a flag.
+#[must_use]
+pub fn direction_of(backward: bool) -> Direction {
+    if backward {
+        Direction::Backward
+    } else {
+        Direction::Forward
+    }
+}
+
 /// The cells of listings in order of flight.
 #[must_use]
 pub fn unpack(listings: &[ListedRun], n: u16) -> Vec<PlannedCell> {
     let mut out = Vec::new();
     for l in listings {
         let mut cells: Vec<u16> = cells_of(l.run, n).collect();
+        let direction = direction_of(l.backward);
         if l.backward {
             cells.reverse();
         }
         out.extend(cells.into_iter().map(|cell| PlannedCell {
             cell,
-            backward: l.backward,
+            direction,
             committed: l.firmness == Firmness::Committed,
             stamp: l.stamp,
         }));
@@ -129,22 +141,16 @@ pub fn legs_of(plan: &[PlannedCell], n: u16) -> Vec<Leg> {
     let mut legs: Vec<Leg> = Vec::new();
     let mut last = 0;
     for p in plan {
-        let direction = if p.backward {
-            Direction::Backward
-        } else {
-            Direction::Forward
-        };
-        let next = if p.backward {
-            (last + n - 1) % n.max(1)
-        } else {
-            (last + 1) % n.max(1)
+        let next = match p.direction {
+            Direction::Backward => (last + n - 1) % n.max(1),
+            Direction::Forward => (last + 1) % n.max(1),
         };
         match legs.last_mut() {
-            Some(leg) if leg.direction == direction && next == p.cell => leg.count += 1,
+            Some(leg) if leg.direction == p.direction && next == p.cell => leg.count += 1,
             _ => legs.push(Leg {
                 first: p.cell,
                 count: 1,
-                direction,
+                direction: p.direction,
             }),
         }
         last = p.cell;
@@ -155,6 +161,7 @@ pub fn legs_of(plan: &[PlannedCell], n: u16) -> Vec<Leg> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use Direction::{Backward, Forward};
 
     #[test]
     fn packing_and_unpacking_keep_order_and_direction() {
@@ -163,19 +170,19 @@ mod tests {
             cells: 10,
             covered: &covered,
         };
-        let cell = |(cell, backward): &(u16, bool)| PlannedCell {
+        let cell = |(cell, direction): &(u16, Direction)| PlannedCell {
             cell: *cell,
-            backward: *backward,
+            direction: *direction,
             committed: false,
             stamp: Stamp::default(),
         };
         let flown = [
-            (8, false),
-            (9, false),
-            (0, false),
-            (4, true),
-            (3, true),
-            (6, false),
+            (8, Forward),
+            (9, Forward),
+            (0, Forward),
+            (4, Backward),
+            (3, Backward),
+            (6, Forward),
         ];
         let cells: Vec<PlannedCell> = flown.iter().map(cell).collect();
         let (listings, packed) = packer.pack(&cells, 16);
@@ -190,7 +197,7 @@ mod tests {
             cells: 10,
             covered: &covered,
         };
-        let gap: Vec<PlannedCell> = [(0, false), (2, false)].iter().map(cell).collect();
+        let gap: Vec<PlannedCell> = [(0, Forward), (2, Forward)].iter().map(cell).collect();
         assert_eq!(packer.pack(&gap, 16).0.len(), 1);
     }
 }

@@ -24,18 +24,10 @@
 use super::runs::{Packer, PlannedCell, cells_of, unpack};
 use crate::Incarnation;
 use crate::cells::CellSet;
+use crate::wire::limits::{DONE_MAX, HELD_MAX, PLAN_MAX};
 use crate::wire::message::{CellRun, Claim, Epoch, Stamp};
+use skein_flight::coverage::ring::Direction;
 use std::collections::BTreeMap;
-
-/// Most runs of cells in the plan of one claim. A section has at most two legs
-/// and the remains of a commitment; three takeovers add a leg each; the rest is room.
-pub const MAX_PLAN_RUNS: usize = 16;
-
-/// Most runs of held cells in one claim, for the same reason.
-pub const MAX_HELD_RUNS: usize = 16;
-
-/// Most runs of done cells in one claim; they inform people, nothing depends on them.
-pub const MAX_DONE_RUNS: usize = 8;
 
 /// The peers that are not believed dead, with the life in which they are alive.
 pub type LivePeers = BTreeMap<u16, Incarnation>;
@@ -242,8 +234,8 @@ impl Sections {
     pub fn adopted(
         &self,
         epoch: Epoch,
-        commits: &[(u16, bool)],
-        section: &[(u16, bool)],
+        commits: &[(u16, Direction)],
+        section: &[(u16, Direction)],
     ) -> Vec<PlannedCell> {
         let stamp = Stamp {
             epoch,
@@ -260,20 +252,20 @@ impl Sections {
         let mut seen = self.covered.clone();
         let mut plan = Vec::new();
         for (list, committed) in [(commits, true), (section, false)] {
-            for &(cell, backward) in list {
+            for &(cell, direction) in list {
                 if cell < self.cells && !seen.contains(cell) {
                     seen.insert(cell);
                     let stamp = listed.get(&cell).map_or(stamp, |s| stamp.max(*s));
                     plan.push(PlannedCell {
                         cell,
-                        backward,
+                        direction,
                         committed,
                         stamp,
                     });
                 }
             }
         }
-        let fits = self.packer().pack(&plan, MAX_PLAN_RUNS).1;
+        let fits = self.packer().pack(&plan, PLAN_MAX).1;
         plan.truncate(fits);
         plan
     }
@@ -303,6 +295,7 @@ impl Sections {
         self.epoch = epoch;
         self.done = CellSet::new(self.cells);
         self.trim();
+        self.check();
         true
     }
 
@@ -310,8 +303,8 @@ impl Sections {
     pub fn adopt(
         &mut self,
         epoch: Epoch,
-        commits: &[(u16, bool)],
-        section: &[(u16, bool)],
+        commits: &[(u16, Direction)],
+        section: &[(u16, Direction)],
     ) -> bool {
         let plan = self.adopted(epoch, commits, section);
         self.install(epoch, &plan)
@@ -321,9 +314,9 @@ impl Sections {
     /// cells and cells already planned are left out. Nothing changes yet: a take must
     /// be durable before it is flown, see [`Sections::append`].
     #[must_use]
-    pub fn taken(&self, cells: &[(u16, bool)]) -> Vec<PlannedCell> {
+    pub fn taken(&self, cells: &[(u16, Direction)]) -> Vec<PlannedCell> {
         let mut out: Vec<PlannedCell> = Vec::new();
-        for &(cell, backward) in cells {
+        for &(cell, direction) in cells {
             let planned = self.plan.iter().chain(&out).any(|p| p.cell == cell);
             if cell >= self.cells || self.covered.contains(cell) || planned {
                 continue;
@@ -350,7 +343,7 @@ impl Sections {
             };
             out.push(PlannedCell {
                 cell,
-                backward,
+                direction,
                 committed: false,
                 stamp,
             });
@@ -370,11 +363,12 @@ impl Sections {
             }
         }
         self.trim();
+        self.check();
         self.plan.len().saturating_sub(before)
     }
 
     /// Rules *take* and append in one step, for when nothing can come in between.
-    pub fn take(&mut self, cells: &[(u16, bool)]) -> usize {
+    pub fn take(&mut self, cells: &[(u16, Direction)]) -> usize {
         let taken = self.taken(cells);
         self.append(&taken)
     }
@@ -382,7 +376,7 @@ impl Sections {
     /// How many cells of a plan fit into one claim, from the first on.
     #[must_use]
     pub fn fitting(&self, plan: &[PlannedCell]) -> usize {
-        self.packer().pack(plan, MAX_PLAN_RUNS).1
+        self.packer().pack(plan, PLAN_MAX).1
     }
 
     /// The claim as it would be with another plan: what is made durable first.
@@ -394,7 +388,7 @@ impl Sections {
         revision: u32,
         loop_hash: u64,
     ) -> Claim {
-        let plan = self.packer().pack(plan, MAX_PLAN_RUNS).0;
+        let plan = self.packer().pack(plan, PLAN_MAX).0;
         Claim {
             revision,
             loop_hash,
@@ -444,13 +438,13 @@ impl Sections {
     pub fn claim(&self, revision: u32, loop_hash: u64, eta_ms: u32) -> Claim {
         let held = self.held_cells();
         let mut done: Vec<CellRun> = self.done.runs();
-        done.truncate(MAX_DONE_RUNS);
+        done.truncate(DONE_MAX);
         Claim {
             revision,
             loop_hash,
             epoch: self.epoch,
-            plan: self.packer().pack(&self.plan, MAX_PLAN_RUNS).0,
-            held: self.packer().pack(&held, MAX_HELD_RUNS).0,
+            plan: self.packer().pack(&self.plan, PLAN_MAX).0,
+            held: self.packer().pack(&held, HELD_MAX).0,
             done,
             eta_ms,
         }
@@ -469,19 +463,37 @@ impl Sections {
             .iter()
             .map(|(c, s)| PlannedCell {
                 cell: *c,
-                backward: false,
+                direction: Direction::Forward,
                 committed: false,
                 stamp: *s,
             })
             .collect()
     }
 
+    /// What holds whatever is heard: planned and held cells are open cells of the loop,
+    /// listed once.
+    fn check(&self) {
+        let planned = CellSet::of(self.cells, self.plan.iter().map(|p| p.cell));
+        let count = usize::from(planned.count());
+        assert_eq!(
+            count,
+            self.plan.len(),
+            "a cell is planned once, on the loop"
+        );
+        assert!(
+            !planned.intersects(&self.covered),
+            "what is planned is open"
+        );
+        let held = CellSet::of(self.cells, self.held.keys().copied());
+        assert!(!planned.intersects(&held), "what is planned is not held");
+    }
+
     /// What does not fit into a claim is not flown: it would be a secret.
     fn trim(&mut self) {
-        let fits = self.packer().pack(&self.plan, MAX_PLAN_RUNS).1;
+        let fits = self.packer().pack(&self.plan, PLAN_MAX).1;
         self.plan.truncate(fits);
         let held = self.held_cells();
-        let fits = self.packer().pack(&held, MAX_HELD_RUNS).1;
+        let fits = self.packer().pack(&held, HELD_MAX).1;
         for p in held.iter().skip(fits) {
             self.held.remove(&p.cell);
         }
@@ -523,8 +535,8 @@ mod tests {
         Sections::new(me, 10, CellSet::new(10))
     }
 
-    fn forward(cells: &[u16]) -> Vec<(u16, bool)> {
-        cells.iter().map(|c| (*c, false)).collect()
+    fn forward(cells: &[u16]) -> Vec<(u16, Direction)> {
+        cells.iter().map(|c| (*c, Direction::Forward)).collect()
     }
 
     #[test]
@@ -596,7 +608,7 @@ mod tests {
     fn an_adoption_below_a_take_does_not_lower_its_stamp() {
         let mut s = sections(1);
         s.hear(2, 1, 1, claim(&[(7, 1, stamp(2, 0, 2))]));
-        s.take(&[(7, false)]);
+        s.take(&[(7, Direction::Forward)]);
         // Peer 2 yields to this take; then a division that was decided before ends.
         s.adopt(
             Epoch {
@@ -620,7 +632,10 @@ mod tests {
     fn a_take_beats_every_stamp_heard() {
         let mut s = sections(1);
         s.hear(2, 1, 1, claim(&[(7, 1, stamp(5, 3, 2))]));
-        assert_eq!(s.take(&[(7, true), (7, true)]), 1);
+        assert_eq!(
+            s.take(&[(7, Direction::Backward), (7, Direction::Backward)]),
+            1
+        );
         assert_eq!(s.plan()[0].stamp, stamp(5, 4, 1));
     }
 
@@ -656,7 +671,8 @@ mod tests {
     fn what_does_not_fit_into_a_register_is_not_planned() {
         let n = 200;
         let mut s = Sections::new(1, n, CellSet::new(n));
-        let scattered: Vec<(u16, bool)> = (0..n).step_by(2).map(|c| (c, false)).collect();
+        let scattered: Vec<(u16, Direction)> =
+            (0..n).step_by(2).map(|c| (c, Direction::Forward)).collect();
         s.adopt(
             Epoch {
                 counter: 1,
@@ -665,7 +681,7 @@ mod tests {
             &[],
             &scattered,
         );
-        assert_eq!(s.plan().len(), MAX_PLAN_RUNS);
+        assert_eq!(s.plan().len(), PLAN_MAX);
         let listed: Vec<u16> = unpack(&s.claim(1, 1, 0).plan, n)
             .iter()
             .map(|p| p.cell)

@@ -230,17 +230,6 @@ impl Wire for Vec<u8> {
     }
 }
 
-impl Wire for String {
-    fn put(&self, out: &mut Out) {
-        out.write(self.as_str());
-    }
-
-    fn get(input: &mut In<'_>) -> Result<Self, WireError> {
-        let text = input.exact(<&str>::decode, |t| In::with_head(*t))?;
-        Ok(text.to_owned())
-    }
-}
-
 impl<T: Listed> Wire for Vec<T> {
     fn put(&self, out: &mut Out) {
         out.array(self.len());

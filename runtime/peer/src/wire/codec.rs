@@ -15,7 +15,7 @@ use super::kinds::{Kind, RECORD_MAX_BYTES};
 use super::limits::{self, COMMITS_MAX, GOSSIP_MAX, MEMBERS_MAX, PLAN_MAX, at_most, in_range};
 use super::message::{
     Beacon, Behaviour, Bid, CellRun, Claim, Cover, Epoch, Finished, Firmness, Gossip, ListedRun,
-    Member, MissionChunk, MissionStatus, Notice, Order, Record, Round, Stamp, State,
+    Member, MissionChunk, MissionStatus, Order, Record, Round, Stamp, State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
 
@@ -77,7 +77,6 @@ pub enum Body {
     Mission(MissionChunk),
     Operator(Order),
     Finished(Finished),
-    Event(Notice),
 }
 
 impl Body {
@@ -93,7 +92,6 @@ impl Body {
             Self::Mission(_) => Kind::Mission,
             Self::Operator(_) => Kind::Operator,
             Self::Finished(_) => Kind::Finished,
-            Self::Event(_) => Kind::Event,
         }
     }
 
@@ -123,7 +121,6 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
             b.put(&mut out);
         }
         Body::Finished(b) => b.put(&mut out),
-        Body::Event(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -152,8 +149,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
             Body::Operator(Wire::get(&mut input)?)
         }
         Kind::Finished => Body::Finished(Wire::get(&mut input)?),
-        Kind::Event => Body::Event(Wire::get(&mut input)?),
-        Kind::Task | Kind::Intent | Kind::Conflict => {
+        Kind::Event | Kind::Task | Kind::Intent | Kind::Conflict => {
             return Err(WireError::Kind {
                 number: kind.number(),
             });
@@ -330,7 +326,6 @@ array_of!(MissionChunk {
     bytes
 });
 array_of!(Finished { revision });
-array_of!(Notice { text });
 number_of!(Behaviour {
     Waiting,
     Covering,
@@ -506,12 +501,6 @@ mod tests {
         far.gossip.truncate(1);
         far.gossip[0].hops = 17;
         refused(Body::Beacon(far), "hops");
-        refused(
-            Body::Event(Notice {
-                text: "a\nb".into(),
-            }),
-            "text",
-        );
         let chunk = MissionChunk {
             revision: 1,
             content_hash: 0,
@@ -665,7 +654,7 @@ mod tests {
 
         #[test]
         fn mutated_bytes_are_refused_or_have_one_encoding(
-            which in 0_usize..9,
+            which in 0_usize..8,
             big: bool,
             edits in vec((any::<prop::sample::Index>(), any::<u8>(), 0_u8..3), 1..6),
         ) {
@@ -686,7 +675,7 @@ mod tests {
         }
 
         #[test]
-        fn bytes_cut_short_are_refused(which in 0_usize..9, at in any::<prop::sample::Index>()) {
+        fn bytes_cut_short_are_refused(which in 0_usize..8, at in any::<prop::sample::Index>()) {
             let bytes = encode_record(&record_of(&golden().remove(which).0));
             prop_assert!(decode_record(&bytes[..at.index(bytes.len())]).is_err());
         }

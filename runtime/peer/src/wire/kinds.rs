@@ -29,7 +29,7 @@ pub enum Kind {
     Operator = 6,
     /// "All that can be covered is covered."
     Finished = 7,
-    /// Something people should look at.
+    /// Reserved: something people should look at.
     Event = 8,
     /// Reserved: tasks other than coverage.
     Task = 9,
@@ -122,7 +122,7 @@ const TABLE: [KindRow; 12] = [
     row(
         Kind::Claim,
         "claim",
-        3584,
+        1024,
         Priority::Claim,
         Lifetime::Beacons(9),
     ),
@@ -163,6 +163,7 @@ const TABLE: [KindRow; 12] = [
     ),
     KindRow {
         subjects: 4,
+        spoken: false,
         ..row(
             Kind::Event,
             "event",

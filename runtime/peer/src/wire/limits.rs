@@ -9,26 +9,28 @@ use super::message::{Beacon, Bid, CellRun, Claim, Round, State};
 
 /// Gossip entries in a beacon: what a tenth of a second of a 64 kbit/s channel carries.
 pub const GOSSIP_MAX: usize = 20;
-/// Members of a round: the largest fleet.
+/// Members of a round, and peers of a fleet, ground stations included: with more, gossip
+/// of 20 entries a beacon would not come round within the window in which hops count.
 pub const MEMBERS_MAX: usize = 64;
-/// Listings in a register's plan: one a fragment; more than a UAV turns in a sortie.
-pub const PLAN_MAX: usize = 64;
-/// Listings a register still answers for: those of one earlier plan, less what merges.
-pub const HELD_MAX: usize = 48;
-/// Runs of the present section done: one a fragment flown, merged as they meet.
-pub const DONE_MAX: usize = 32;
+/// Runs in the plan of a claim: a section has at most two legs and the remains of a
+/// commitment, three takeovers add a leg each, and the rest is room.
+pub const PLAN_MAX: usize = 16;
+/// Runs of held cells in a claim: those of one earlier plan, less what merges.
+pub const HELD_MAX: usize = 16;
+/// Runs of done cells in a claim; they inform people, nothing depends on them.
+pub const DONE_MAX: usize = 8;
 /// Runs a bid commits to: the flight of one waiting time crosses few fragments.
 pub const COMMITS_MAX: usize = 32;
-/// Run-length bytes of the union in a bid (short runs are left out beyond).
+/// Run-length bytes of the covered cells in a bid (short runs are left out beyond): a bid
+/// must stay short on the air, and a forgotten run only means that somebody looks twice.
 pub const BID_COVERED_MAX_BYTES: usize = 256;
 /// Run-length bytes of the union in a cover record.
 pub const COVERED_MAX_BYTES: usize = 1000;
-/// Bytes of a mission in one piece.
+/// Bytes of a mission in one piece: with its envelope it stays near a quarter of the
+/// record cap, so that a lost piece is cheap to repeat.
 pub const CHUNK_MAX_BYTES: usize = 1024;
 /// Pieces of a mission: 64 KiB of rings are some 6,000 corners.
 pub const CHUNKS_MAX: u16 = 64;
-/// Bytes of a notice's text.
-pub const TEXT_MAX_BYTES: usize = 240;
 /// Farthest from the origin that the tangent plane is trusted, mm: 20 km.
 pub const POSITION_MAX_MM: i32 = 20_000_000;
 /// Heading, 1e-4 rad: a turn either way.
@@ -53,10 +55,6 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
             in_range("chunks", (1..=CHUNKS_MAX).contains(&m.chunks))
         }
         Body::Operator(_) | Body::Finished(_) => Ok(()),
-        Body::Event(n) => {
-            at_most("text", n.text.len(), TEXT_MAX_BYTES)?;
-            in_range("text", !n.text.chars().any(char::is_control))
-        }
     }
 }
 

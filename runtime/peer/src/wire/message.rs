@@ -302,10 +302,3 @@ pub struct Finished {
     /// Mission revision.
     pub revision: u32,
 }
-
-/// Something people should look at.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Notice {
-    /// What, in one sentence.
-    pub text: String,
-}

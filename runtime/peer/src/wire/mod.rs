@@ -1,6 +1,6 @@
 //! Keys, kinds, messages, their bytes and their signatures.
 
-mod cbor;
+pub(crate) mod cbor;
 pub mod codec;
 pub mod key;
 pub mod kinds;

@@ -151,12 +151,6 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         ),
         (Body::Operator(Order::ReturnToBase), "8102"),
         (Body::Finished(Finished { revision: 3 }), "8103"),
-        (
-            Body::Event(Notice {
-                text: "low fuel".into(),
-            }),
-            "81686c6f77206675656c",
-        ),
     ]
 }
 
@@ -271,8 +265,5 @@ pub fn largest() -> Vec<Body> {
         }),
         Body::Operator(Order::ReturnToBase),
         Body::Finished(Finished { revision: u32::MAX }),
-        Body::Event(Notice {
-            text: "x".repeat(TEXT_MAX_BYTES),
-        }),
     ]
 }

@@ -8,7 +8,7 @@ use super::kinds::Kind;
 use super::limits::{
     BID_COVERED_MAX_BYTES, CHUNK_MAX_BYTES, CHUNKS_MAX, COMMITS_MAX, COVERED_MAX_BYTES, DONE_MAX,
     DURATION_MAX_MS, GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX, HOPS_MAX, MEMBERS_MAX, PLAN_MAX,
-    POSITION_MAX_MM, SPEED_MAX_MMPS, TEXT_MAX_BYTES,
+    POSITION_MAX_MM, SPEED_MAX_MMPS,
 };
 use core::fmt::Write as _;
 
@@ -21,8 +21,6 @@ pub enum Shape {
     Flag,
     /// A byte string of at most so many bytes.
     Bytes(usize),
-    /// Text of at most so many bytes.
-    Text(usize),
     /// A number that stands for one of these.
     Choice(&'static [&'static str]),
     /// A number up to this, or null.
@@ -308,8 +306,6 @@ const OPERATOR: &[Place] = &[at(
 
 const FINISHED: &[Place] = &[REVISION];
 
-const EVENT: &[Place] = &[at("text", "one sentence", Shape::Text(TEXT_MAX_BYTES))];
-
 /// The places of a kind's body; `None` for a reserved kind.
 #[must_use]
 pub fn places(kind: Kind) -> Option<&'static [Place]> {
@@ -322,8 +318,7 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Mission => Some(MISSION),
         Kind::Operator => Some(OPERATOR),
         Kind::Finished => Some(FINISHED),
-        Kind::Event => Some(EVENT),
-        Kind::Task | Kind::Intent | Kind::Conflict => None,
+        Kind::Event | Kind::Task | Kind::Intent | Kind::Conflict => None,
     }
 }
 
@@ -408,7 +403,6 @@ fn shape(out: &mut String, shape: Shape) {
                 ),
             );
         }
-        Shape::Text(max) => put(out, format_args!("\"type\":\"string\",\"maxLength\":{max}")),
         Shape::Choice(names) => {
             let max = names.len().saturating_sub(1);
             put(
@@ -449,7 +443,6 @@ mod tests {
             (Shape::Number(min, max), Value::Integer(v)) => (min..=max).contains(v),
             (Shape::Flag, Value::Bool(_)) | (Shape::Maybe(_), Value::Null) => true,
             (Shape::Bytes(max), Value::Bytes(b)) => b.len() <= max,
-            (Shape::Text(max), Value::Text(t)) => t.len() <= max,
             (Shape::Choice(names), Value::Integer(v)) => {
                 usize::try_from(*v).is_ok_and(|v| v < names.len())
             }

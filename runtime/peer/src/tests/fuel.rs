@@ -1,0 +1,61 @@
+//! Fuel that ends.
+
+use super::covered;
+use crate::Input;
+use crate::output::Report;
+use crate::testing::{Harness, mission};
+
+const DUE: &str = "the fuel is due: returning to base";
+
+#[test]
+fn a_uav_whose_fuel_is_due_flies_home_and_the_other_finishes() {
+    let mut h = Harness::started(2, mission(1, 8, 6));
+    h.run_s(25);
+    assert!(!h.beliefs(1).plan.is_empty());
+    h.seat(1).fuel_s = 150.0;
+    assert!(h.run_until(120, |h| h.alarms(1).contains(&DUE.to_owned())));
+    let left_s = h.seat(1).fuel_s;
+    assert!(left_s > 60.0, "the reserve is not planned away: {left_s}");
+    h.run_s(1);
+    assert!(h.beliefs(1).plan.is_empty() && !h.beliefs(1).able);
+    assert!(h.run_until(60, |h| {
+        let pose = h.pose(1);
+        (pose.east_m + 60.0).hypot(pose.north_m + 60.0) < 100.0
+    }));
+    assert!(h.run_until(500, |h| h.beliefs(2).finished));
+}
+
+#[test]
+fn no_plan_is_longer_than_what_may_be_spent() {
+    let mut h = Harness::new(1, mission(1, 8, 6));
+    h.seat(1).fuel_s = 260.0;
+    h.start(1);
+    let mut longest = 0;
+    for _ in 0..120 {
+        h.run_s(1);
+        let b = h.beliefs(1);
+        longest = longest.max(b.plan.len());
+        assert!(
+            b.eta_ms <= b.spendable_ms + 2000,
+            "{} {}",
+            b.eta_ms,
+            b.spendable_ms
+        );
+    }
+    assert!(longest > 4);
+    let all = |(_, r): &(u64, Report)| matches!(r, Report::Alarm { text } if text.ends_with("beyond the endurance of all"));
+    assert!(h.seat(1).reports.iter().any(all));
+}
+
+#[test]
+fn one_percept_without_fuel_does_not_end_the_flight() {
+    let mut h = Harness::started(1, mission(1, 6, 4));
+    h.run_s(20);
+    let mut glitch = h.seat(1).percept_now();
+    glitch.endurance_s = 0.0;
+    h.feed(1, Input::Percept(glitch));
+    h.run_s(40);
+    assert!(h.beliefs(1).able);
+    assert!(covered(&h, 1) > 6);
+    assert!(h.run_until(250, |h| h.beliefs(1).finished));
+}

@@ -1,0 +1,153 @@
+//! Bytes that nobody should send: they are reported and change nothing.
+
+use super::{beacon, covered, record};
+use crate::testing::{Harness, mission};
+use crate::wire::codec::Body;
+use crate::wire::kinds::{Kind, RECORD_MAX_BYTES};
+use crate::wire::limits::MEMBERS_MAX;
+use crate::wire::message::{Finished, Gossip};
+use crate::{Input, PeerId, Report};
+use std::collections::BTreeMap;
+
+fn refused(h: &mut Harness, id: u16) -> usize {
+    let refused = |(_, r): &&(u64, Report)| matches!(r, Report::Refused { .. });
+    h.seat(id).reports.iter().filter(refused).count()
+}
+
+#[test]
+fn cut_oversize_and_unknown_bytes_are_refused_and_change_nothing() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(20);
+    let sample = record(9, 1, 1, 0, &Body::Finished(Finished { revision: 1 }));
+    let mut hostile: Vec<Vec<u8>> = (0..sample.len()).map(|n| sample[..n].to_vec()).collect();
+    hostile.push(vec![0x80; RECORD_MAX_BYTES + 1]);
+    let mut trailing = sample.clone();
+    trailing.push(0);
+    hostile.push(trailing);
+    for kind in 0..=u8::MAX {
+        let mut other = sample.clone();
+        // The fourth field is the kind; numbers from 24 on take a byte more.
+        other.splice(
+            4..5,
+            if kind < 24 {
+                vec![kind]
+            } else {
+                vec![0x18, kind]
+            },
+        );
+        if kind != Kind::Finished.number() && kind != Kind::Operator.number() {
+            hostile.push(other);
+        }
+    }
+    let before = h.beliefs(1);
+    let (count, already) = (hostile.len(), refused(&mut h, 1));
+    for bytes in hostile {
+        h.inject(1, bytes);
+    }
+    assert_eq!(refused(&mut h, 1) - already, count);
+    assert_eq!(h.beliefs(1), before);
+}
+
+#[test]
+fn a_percept_that_is_not_finite_is_refused() {
+    let mut h = Harness::started(1, mission(1, 6, 4));
+    h.run_s(10);
+    let already = refused(&mut h, 1);
+    let mut percept = h.seat(1).percept_now();
+    percept.endurance_s = f64::NAN;
+    h.feed(1, Input::Percept(percept));
+    percept.endurance_s = 10.0;
+    percept.pose.east_m = f64::INFINITY;
+    h.feed(1, Input::Percept(percept));
+    assert_eq!(refused(&mut h, 1) - already, 2);
+}
+
+#[test]
+fn a_rival_loop_is_an_alarm_once_and_its_peer_no_member() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(20);
+    for n in 1..10 {
+        let mut rival = beacon(n, 5);
+        (rival.able, rival.revision, rival.loop_hash) = (true, 1, 0xbad);
+        h.inject(1, record(9, 1, n, 0, &Body::Beacon(rival)));
+        h.run_s(1);
+    }
+    assert_eq!(
+        h.alarms(1),
+        ["uav9 derived another loop from the same mission"]
+    );
+    let named = |(_, r): &(u64, Report)| match r {
+        Report::Round { members, .. } => members.contains(&PeerId(9)),
+        _ => false,
+    };
+    assert!(!h.seat(1).reports.iter().any(named));
+}
+
+#[test]
+fn more_members_than_a_round_holds_do_not_stop_the_rounds() {
+    let mut h = Harness::new(1, mission(1, 6, 4));
+    h.start(1);
+    h.run_s(2);
+    let loop_hash = h.beliefs(1).loop_hash;
+    assert_ne!(loop_hash, 0);
+    for n in 1..12_u32 {
+        for id in 2..=70_u16 {
+            let mut other = beacon(n, 5);
+            (other.able, other.revision, other.loop_hash) = (true, 1, loop_hash);
+            h.inject(1, record(id, 1, n, 0, &Body::Beacon(other)));
+        }
+        h.run_s(1);
+    }
+    let bids = h.seat(1).said.iter().filter_map(|(_, _, b)| match b {
+        Body::Bid(bid) => Some(bid.clone()),
+        _ => None,
+    });
+    let bids: Vec<_> = bids.collect();
+    assert!(!bids.is_empty());
+    for bid in bids {
+        assert_eq!(bid.round.members.len(), MEMBERS_MAX);
+        assert_eq!(Body::Bid(bid).check(), Ok(()));
+    }
+}
+
+#[test]
+fn made_up_suspicions_of_others_bring_no_takeover_of_the_living() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(25);
+    let mut liar = beacon(1, 5);
+    liar.gossip.push(Gossip {
+        id: 2,
+        incarnation: 1,
+        heartbeat: 1,
+        age_ds: 0,
+        hops: 1,
+        suspected_ds: Some(u16::MAX),
+        able: true,
+        max_seq: 0,
+        digest: 0,
+    });
+    h.inject(1, record(9, 1, 1, 0, &Body::Beacon(liar)));
+    h.run_s(2);
+    let statuses: BTreeMap<_, _> = h.beliefs(1).peers;
+    assert_eq!(statuses[&PeerId(2)].1, crate::output::Status::Alive);
+    assert!(covered(&h, 1) > 0);
+}
+
+#[test]
+fn a_counter_that_was_made_up_stops_no_round() {
+    let mut h = Harness::started(3, mission(1, 8, 6));
+    h.run_s(25);
+    let epoch = h.beliefs(1).epoch;
+    for n in 1..=3 {
+        for id in 1..=3 {
+            let mut poison = beacon(n, 5);
+            poison.counter = u32::MAX;
+            h.inject(id, record(9, 1, n, 0, &Body::Beacon(poison)));
+        }
+    }
+    h.stop(3);
+    assert!(h.run_until(60, |h| h.beliefs(1).epoch > epoch
+        && h.beliefs(2).epoch > epoch));
+    h.stop(2);
+    assert!(h.run_until(400, |h| h.beliefs(1).finished));
+}

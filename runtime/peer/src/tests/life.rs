@@ -1,0 +1,136 @@
+//! Lives, doubles, probation.
+
+use super::{beacon, covered, record};
+use crate::cells::CellSet;
+use crate::journal::{Durable, Entry};
+use crate::output::Status;
+use crate::testing::{Harness, mission};
+use crate::wire::codec::Body;
+use crate::wire::kinds::Kind;
+use crate::wire::message::{Finished, Gossip};
+use crate::{PeerId, Report};
+
+#[test]
+fn a_peer_that_lost_its_disk_takes_a_life_above_the_one_others_know() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(12);
+    assert_eq!(h.beliefs(2).peers[&PeerId(1)], (1, Status::Alive));
+    h.stop(1);
+    h.seat(1).journal.clear();
+    h.run_s(2);
+    h.start(1);
+    assert!(h.run_until(12, |h| h.beliefs(2).peers[&PeerId(1)] == (2, Status::Alive)));
+    assert_eq!(h.beliefs(1).incarnation, 2);
+}
+
+#[test]
+fn a_restart_with_its_disk_goes_on_above_what_it_promised() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(40);
+    let (before, counter) = (covered(&h, 1), h.beliefs(1).counter);
+    assert!(before > 4 && counter > 0);
+    h.stop(1);
+    h.start(1);
+    h.run_s(1);
+    let restarted = h.beliefs(1);
+    assert_eq!((restarted.incarnation, restarted.counter), (2, counter));
+    let (journal, _) = Durable::replay(&h.seat(1).journal);
+    let remembered = CellSet::decode_rle(journal.cells, &journal.covered).unwrap();
+    assert!(covered(&h, 1) >= usize::from(remembered.count()));
+    h.run_s(5);
+    assert!(
+        covered(&h, 1) >= before,
+        "what it forgot it hears again: {} of {before}",
+        covered(&h, 1)
+    );
+}
+
+#[test]
+fn a_life_that_cannot_be_stored_is_silent_and_tried_again() {
+    let mut h = Harness::new(2, mission(1, 6, 4));
+    h.seat(1).store_fails = |e| matches!(e, Entry::Life(_));
+    h.start(1);
+    h.start(2);
+    h.run_s(8);
+    assert!(h.seat(1).said.is_empty() && !h.alarms(1).is_empty());
+    h.seat(1).store_fails = |_| false;
+    assert!(h.run_until(4, |h| h.count_said(1, Kind::Beacon) > 0));
+}
+
+#[test]
+fn a_later_life_that_cannot_be_stored_leaves_the_peer_speaking_in_the_old_one() {
+    let mut h = Harness::started(1, mission(1, 6, 4));
+    h.run_s(8);
+    h.seat(1).store_fails = |e| matches!(e, Entry::Life(_));
+    let echo = |life| record(1, life, 1, 0, &Body::Finished(Finished { revision: 1 }));
+    h.inject(1, echo(5));
+    h.run_s(2);
+    let said = h.count_said(1, Kind::Beacon);
+    h.run_s(3);
+    assert!(h.beliefs(1).incarnation == 1 && h.count_said(1, Kind::Beacon) > said);
+    h.seat(1).store_fails = |_| false;
+    h.inject(1, echo(5));
+    assert!(h.run_until(2, |h| h.beliefs(1).incarnation == 6));
+}
+
+#[test]
+fn of_a_double_id_the_lower_nonce_is_silent_and_flies_on() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(20);
+    let double = Body::Beacon(beacon(9999, u32::MAX));
+    h.inject(1, record(1, 1, 9999, 0, &double));
+    assert_eq!(h.alarms(1), ["another peer speaks under this id"]);
+    let (said, seen) = (h.seat(1).said.len(), covered(&h, 1));
+    h.run_s(15);
+    assert_eq!(h.seat(1).said.len(), said);
+    assert!(covered(&h, 1) > seen, "the UAV is not grounded");
+    // The one with the higher nonce goes on speaking.
+    let double = Body::Beacon(beacon(9999, 0));
+    h.inject(2, record(2, 1, 9999, 0, &double));
+    let said = h.seat(2).said.len();
+    h.run_s(5);
+    assert!(h.seat(2).said.len() > said);
+}
+
+#[test]
+fn a_suspicion_heard_is_refuted_at_once_without_gossip() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(20);
+    let before = h.count_said(1, Kind::Beacon);
+    let suspicion = Gossip {
+        id: 1,
+        incarnation: 1,
+        heartbeat: 1,
+        age_ds: 40,
+        hops: 1,
+        suspected_ds: Some(0),
+        able: true,
+        max_seq: 0,
+        digest: 0,
+    };
+    let mut told = beacon(1, 1);
+    told.gossip.push(suspicion);
+    h.inject(1, record(9, 1, 1, 0, &Body::Beacon(told)));
+    h.isolate(1, true);
+    h.run_s(2);
+    let spoken = h.count_said(1, Kind::Beacon) - before;
+    assert!(spoken >= 6, "four a period until it is believed: {spoken}");
+    let bare = h.seat(1).said.iter().rev().take(4);
+    let bare = bare.filter(|(_, _, b)| matches!(b, Body::Beacon(b) if b.gossip.is_empty()));
+    assert!(bare.count() >= 2);
+}
+
+#[test]
+fn nothing_is_said_in_the_first_three_periods() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(10);
+    for id in [1, 2] {
+        let first = h.seat(id).said.first().map(|(at, ..)| *at);
+        assert!(
+            first.is_some_and(|at| (3000..4500).contains(&at)),
+            "{first:?}"
+        );
+        let booted = |(_, r): &(u64, Report)| matches!(r, Report::Booted { incarnation: 1 });
+        assert!(h.seat(id).reports.iter().any(booted));
+    }
+}

@@ -1,0 +1,119 @@
+//! Missions over the radio.
+
+use super::{covered, record};
+use crate::input::Command;
+use crate::mission::{Mission, chunks};
+use crate::testing::{GROUND_STATION, Harness, mission};
+use crate::wire::codec::Body;
+use crate::wire::kinds::Kind;
+use crate::{Input, Role};
+use std::sync::Arc;
+
+fn command(h: &mut Harness, mission: Mission) {
+    let command = Command::Mission(Arc::new(mission));
+    h.feed(GROUND_STATION, Input::Command(command));
+}
+
+#[test]
+fn a_uav_without_a_mission_learns_it_by_radio() {
+    let mut h = Harness::new(1, mission(1, 6, 4));
+    h.add(2, Role::Uav, None);
+    h.add_ground_station(Some(mission(1, 6, 4)));
+    for id in [1, 2, GROUND_STATION] {
+        h.start(id);
+    }
+    assert!(h.run_until(15, |h| h.beliefs(2).revision == 1));
+    assert_eq!(h.beliefs(2).loop_hash, h.beliefs(1).loop_hash);
+    assert!(h.run_until(250, |h| h.beliefs(2).finished));
+}
+
+#[test]
+fn a_new_revision_is_taken_by_all_and_covered_cells_keep_their_names() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.add_ground_station(Some(mission(1, 6, 4)));
+    h.start(GROUND_STATION);
+    h.run_s(40);
+    let before = covered(&h, 1);
+    assert!(before > 4);
+    command(&mut h, mission(2, 8, 4));
+    assert!(h.run_until(10, |h| h.beliefs(1).revision == 2
+        && h.beliefs(2).revision == 2));
+    assert!(covered(&h, 1) >= before, "{} of {before}", covered(&h, 1));
+    assert!(h.run_until(300, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+    assert_eq!(h.beliefs(1).covered.len(), 32);
+}
+
+#[test]
+fn an_older_revision_changes_nothing() {
+    let mut h = Harness::started(1, mission(3, 6, 4));
+    h.add_ground_station(Some(mission(2, 4, 4)));
+    h.start(GROUND_STATION);
+    h.run_s(15);
+    assert_eq!(h.beliefs(1).revision, 3);
+}
+
+#[test]
+fn a_forged_piece_is_an_alarm_and_the_old_mission_stays() {
+    let mut h = Harness::started(1, mission(1, 6, 4));
+    h.run_s(10);
+    let pieces = chunks(&mission(2, 8, 4)).unwrap();
+    for (i, mut piece) in (0u16..).zip(pieces) {
+        piece.content_hash ^= 1;
+        h.inject(1, record(9, 1, u32::from(i) + 1, i, &Body::Mission(piece)));
+    }
+    h.run_s(5);
+    assert_eq!(h.beliefs(1).revision, 1);
+    assert_eq!(
+        h.alarms(1),
+        ["mission revision 2 is not what its hash says"]
+    );
+}
+
+#[test]
+fn a_mission_that_cannot_be_flown_is_an_alarm_and_the_old_one_stays() {
+    let mut h = Harness::started(1, mission(1, 6, 4));
+    h.add_ground_station(Some(mission(1, 6, 4)));
+    h.start(GROUND_STATION);
+    h.run_s(10);
+    let mut crossed = mission(2, 6, 4);
+    crossed.area.swap(1, 2);
+    command(&mut h, crossed);
+    h.run_s(10);
+    assert_eq!(h.beliefs(1).revision, 1);
+    assert!(
+        h.alarms(1)
+            .iter()
+            .all(|a| a.starts_with("the mission cannot be flown: "))
+    );
+    assert!(!h.alarms(1).is_empty());
+    assert!(h.run_until(250, |h| h.beliefs(1).finished));
+}
+
+#[test]
+fn a_mission_too_large_for_the_radio_is_an_alarm() {
+    let mut h = Harness::new(1, mission(1, 6, 4));
+    let mut large = mission(1, 6, 4);
+    large.zones = (0..4000)
+        .map(|i| vec![(i, 1_000_000), (i + 1, 1_000_000), (i, 1_000_001)])
+        .collect();
+    h.add_ground_station(Some(large));
+    h.start(GROUND_STATION);
+    h.run_s(6);
+    assert_eq!(h.count_said(GROUND_STATION, Kind::Mission), 0);
+    let alarm = "the mission is too large to be spoken";
+    assert!(
+        h.alarms(GROUND_STATION)
+            .iter()
+            .any(|a| a.starts_with(alarm))
+    );
+}
+
+#[test]
+fn laps_follow_each_other_in_all_peers() {
+    let mut patrol = mission(1, 4, 4);
+    patrol.further_laps = 1;
+    let mut h = Harness::started(2, patrol);
+    assert!(h.run_until(200, |h| h.beliefs(1).revision == 2));
+    assert!(h.run_until(10, |h| h.beliefs(2).revision == 2));
+    assert!(h.run_until(200, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+}

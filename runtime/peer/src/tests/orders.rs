@@ -1,0 +1,87 @@
+//! What the operator wants, from a ground station over the radio.
+
+use super::covered;
+use crate::testing::{GROUND_STATION, Harness, mission};
+use crate::wire::kinds::Kind;
+use skein_behaviors::Order;
+
+fn at_work() -> Harness {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.add_ground_station(Some(mission(1, 6, 4)));
+    h.start(GROUND_STATION);
+    h.run_s(25);
+    assert!(covered(&h, 1) > 0);
+    h
+}
+
+fn from_base_m(h: &mut Harness, id: u16) -> f64 {
+    let pose = h.seat(id).pose;
+    (pose.east_m + 60.0).hypot(pose.north_m + 60.0)
+}
+
+#[test]
+fn hold_loiters_where_it_is_and_resume_goes_on() {
+    let mut h = at_work();
+    h.order(GROUND_STATION, Order::Hold);
+    h.run_s(6);
+    assert!(!h.beliefs(1).able && !h.beliefs(2).able);
+    let (places, seen) = ([h.seat(1).pose, h.seat(2).pose], covered(&h, 1));
+    for _ in 0..6 {
+        h.run_s(5);
+        for (id, place) in [1, 2].into_iter().zip(places) {
+            let away_m = (h.seat(id).pose.position() - place.position()).norm();
+            assert!(away_m < 120.0, "{id} strays {away_m} m");
+        }
+    }
+    assert!(covered(&h, 1) <= seen + 2, "nothing is looked for on hold");
+    h.order(GROUND_STATION, Order::Resume);
+    assert!(h.run_until(200, |h| h.beliefs(1).finished));
+}
+
+#[test]
+fn return_flies_home_and_resume_finishes_the_mission() {
+    let mut h = at_work();
+    h.order(GROUND_STATION, Order::ReturnToBase);
+    h.run_s(60);
+    for id in [1, 2] {
+        let away_m = from_base_m(&mut h, id);
+        assert!(away_m < 100.0, "{id} is {away_m} m from base");
+    }
+    h.order(GROUND_STATION, Order::Resume);
+    assert!(h.run_until(250, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+}
+
+#[test]
+fn an_order_reaches_a_peer_that_was_out_of_reach_and_an_older_one_does_not_come_back() {
+    let mut h = at_work();
+    h.isolate(2, true);
+    h.order(GROUND_STATION, Order::Hold);
+    h.run_s(5);
+    assert!(!h.beliefs(1).able && h.beliefs(2).able);
+    h.order(GROUND_STATION, Order::ReturnToBase);
+    h.isolate(2, false);
+    assert!(h.run_until(15, |h| !h.beliefs(2).able));
+    h.run_s(60);
+    assert!(from_base_m(&mut h, 2) < 100.0);
+}
+
+#[test]
+fn finished_uavs_fly_home() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    assert!(h.run_until(250, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+    h.run_s(60);
+    for id in [1, 2] {
+        assert!(from_base_m(&mut h, id) < 100.0);
+        assert_eq!(h.count_said(id, Kind::Finished), 1);
+    }
+}
+
+#[test]
+fn a_command_at_a_uav_is_ignored_with_an_alarm() {
+    let mut h = at_work();
+    h.order(1, Order::Hold);
+    h.run_s(3);
+    assert!(h.beliefs(1).able);
+    let alarm = "a command reached a peer that is no ground station; it was ignored";
+    assert!(h.alarms(1).contains(&alarm.to_owned()));
+}

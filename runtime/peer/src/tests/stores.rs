@@ -1,0 +1,88 @@
+//! A disk that fails or is slow: nothing is spoken or flown that rests on what is not durable.
+
+use super::covered;
+use crate::journal::{Durable, Entry};
+use crate::testing::{Harness, mission};
+use crate::wire::codec::Body;
+use crate::wire::kinds::Kind;
+
+#[test]
+fn a_bid_that_is_not_durable_is_not_spoken_and_the_others_go_on() {
+    let mut h = Harness::new(3, mission(1, 6, 4));
+    h.seat(1).store_fails = |e| matches!(e, Entry::Bid(_));
+    for id in 1..=3 {
+        h.start(id);
+    }
+    assert!(h.run_until(400, |h| h.beliefs(2).finished));
+    assert_eq!(h.count_said(1, Kind::Bid), 0);
+    assert!(!h.alarms(1).is_empty());
+    assert!(h.run_until(30, |h| h.beliefs(1).finished), "it still hears");
+}
+
+#[test]
+fn an_adoption_that_is_not_durable_is_not_flown_and_its_cells_find_an_owner() {
+    let mut h = Harness::new(2, mission(1, 6, 4));
+    h.seat(1).store_fails = |e| matches!(e, Entry::Claim(_));
+    h.start(1);
+    h.start(2);
+    h.run_s(30);
+    assert!(h.beliefs(1).plan.is_empty() && !h.beliefs(2).plan.is_empty());
+    assert!(h.run_until(400, |h| h.beliefs(2).finished));
+}
+
+#[test]
+fn a_disk_that_recovers_lets_the_peer_work_again() {
+    let mut h = Harness::new(2, mission(1, 8, 6));
+    h.seat(1).store_fails = |e| matches!(e, Entry::Claim(_));
+    h.start(1);
+    h.start(2);
+    h.run_s(30);
+    h.seat(1).store_fails = |_| false;
+    assert!(h.run_until(60, |h| !h.beliefs(1).plan.is_empty()));
+}
+
+#[test]
+fn while_a_store_is_slow_nothing_of_it_is_on_the_air() {
+    let mut h = Harness::new(2, mission(1, 6, 4));
+    h.seat(1).store_ms = 1500;
+    h.start(1);
+    h.start(2);
+    h.run_s(40);
+    // Whatever was said of a round was in the journal first.
+    let (durable, unread) = Durable::replay(&h.seat(1).journal);
+    assert_eq!(unread, 0);
+    let bids = h.seat(1).said.iter().filter_map(|(_, _, b)| match b {
+        Body::Bid(b) => Some(b.round.counter),
+        _ => None,
+    });
+    assert!(bids.max().is_some_and(|c| c <= durable.counter));
+    assert!(h.run_until(300, |h| h.beliefs(1).finished));
+}
+
+#[test]
+fn a_take_that_is_not_durable_is_tried_again() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(25);
+    assert!(!h.beliefs(1).plan.is_empty());
+    // From now on UAV 1 works alone, and cannot write claims.
+    h.seat(1).store_fails = |e| matches!(e, Entry::Claim(_));
+    h.stop(2);
+    h.run_s(60);
+    let stuck = covered(&h, 1);
+    h.run_s(20);
+    assert!(
+        covered(&h, 1) <= stuck + 1,
+        "what it lists is flown, no more"
+    );
+    h.seat(1).store_fails = |_| false;
+    assert!(h.run_until(300, |h| h.beliefs(1).finished));
+}
+
+#[test]
+fn covered_cells_are_durable_while_flying() {
+    let mut h = Harness::started(1, mission(1, 6, 4));
+    assert!(h.run_until(120, |h| covered(h, 1) > 14));
+    let (durable, _) = Durable::replay(&h.seat(1).journal);
+    let cells = crate::cells::CellSet::decode_rle(durable.cells, &durable.covered).unwrap();
+    assert!(usize::from(cells.count()) + 5 >= covered(&h, 1));
+}

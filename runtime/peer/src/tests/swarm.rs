@@ -1,0 +1,192 @@
+//! How a few peers share, lose and take over.
+
+use super::covered;
+use crate::output::{Report, Status};
+use crate::testing::{Harness, mission};
+use crate::wire::codec::Body;
+use crate::{Input, PeerId};
+use std::collections::BTreeSet;
+
+/// Whether each open cell is in the plan of exactly one of these peers.
+fn divided(h: &Harness, ids: &[u16]) -> bool {
+    let plans = ids.iter().map(|id| h.beliefs(*id));
+    let plans: Vec<_> = plans.collect();
+    let open = plans[0].covered.iter().enumerate().filter(|(_, c)| !**c);
+    let lists = |c: usize| {
+        plans
+            .iter()
+            .filter(move |b| b.plan.iter().any(|p| usize::from(*p) == c))
+    };
+    open.clone().count() > 0 && open.clone().all(|(c, _)| lists(c).count() == 1)
+}
+
+#[test]
+fn two_share_an_area_in_one_round_and_finish_it() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    assert!(h.run_until(20, |h| divided(h, &[1, 2])));
+    assert_eq!(h.beliefs(1).epoch, h.beliefs(2).epoch);
+    assert_eq!(h.beliefs(1).epoch.counter, 1);
+    assert!(h.run_until(200, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+}
+
+#[test]
+fn the_dead_are_found_and_their_cells_taken_over() {
+    let mut h = Harness::started(3, mission(1, 8, 6));
+    assert!(h.run_until(30, |h| divided(h, &[1, 2, 3])));
+    h.stop(3);
+    let down = |h: &Harness, id| h.beliefs(id).peers[&PeerId(3)].1 == Status::Down;
+    assert!(h.run_until(13, |h| down(h, 1) && down(h, 2)));
+    assert!(h.run_until(20, |h| divided(h, &[1, 2])));
+    assert!(h.run_until(300, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+}
+
+#[test]
+fn the_last_of_three_finishes_alone() {
+    let mut h = Harness::started(3, mission(1, 6, 4));
+    h.run_s(25);
+    h.stop(2);
+    h.run_s(15);
+    h.stop(3);
+    assert!(h.run_until(300, |h| h.beliefs(1).finished));
+}
+
+#[test]
+fn a_partition_works_in_both_halves_and_knows_all_after_it() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    assert!(h.run_until(20, |h| divided(h, &[1, 2])));
+    h.isolate(2, true);
+    assert!(h.run_until(300, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+    h.isolate(2, false);
+    let alive =
+        |h: &Harness, of: u16, who: u16| h.beliefs(of).peers[&PeerId(who)].1 == Status::Alive;
+    assert!(h.run_until(15, |h| alive(h, 1, 2) && alive(h, 2, 1)));
+}
+
+#[test]
+fn a_returning_peer_gets_a_share_again() {
+    let mut h = Harness::started(2, mission(1, 10, 8));
+    assert!(h.run_until(20, |h| divided(h, &[1, 2])));
+    h.stop(2);
+    h.run_s(20);
+    h.start(2);
+    assert!(h.run_until(60, |h| !h.beliefs(2).plan.is_empty()));
+}
+
+#[test]
+fn at_thirty_percent_of_loss_all_is_covered() {
+    let mut h = Harness::new(3, mission(1, 6, 4));
+    for from in 1..=3 {
+        for to in 1..=3 {
+            h.link(from, to).loss_percent = 30;
+            h.link(from, to).delay_ms = 40;
+        }
+    }
+    for id in 1..=3 {
+        h.start(id);
+    }
+    assert!(h.run_until(400, |h| (1..=3).all(|id| h.beliefs(id).finished)));
+}
+
+#[test]
+fn a_planner_that_never_answers_costs_its_uav_and_not_the_mission() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(4);
+    h.seat(1).planner_withholds = true;
+    assert!(h.run_until(400, |h| h.beliefs(2).finished));
+}
+
+#[test]
+fn a_division_that_never_comes_back_is_asked_for_again() {
+    let mut h = Harness::started(2, mission(1, 8, 6));
+    h.run_s(4);
+    h.seat(1).planner_withholds = true;
+    h.run_s(20);
+    assert!(h.beliefs(1).adoptions == 0 && h.beliefs(2).adoptions > 0);
+    h.seat(1).planner_withholds = false;
+    assert!(h.run_until(90, |h| h.beliefs(1).adoptions > 0));
+}
+
+#[test]
+fn a_gone_link_halves_the_silence_before_a_suspicion() {
+    let detected_ms = |hint: bool| {
+        let mut h = Harness::started(2, mission(1, 6, 4));
+        h.run_s(12);
+        h.isolate(2, true);
+        let neighbour = 2;
+        if hint {
+            h.feed(
+                1,
+                Input::LinkHint {
+                    neighbour,
+                    up: false,
+                },
+            );
+        }
+        let from = h.now_ms();
+        h.run_s(15);
+        let suspect = |(at, r): &(u64, Report)| match r {
+            Report::Membership {
+                status: Status::Suspect,
+                ..
+            } => Some(*at - from),
+            _ => None,
+        };
+        h.seat(1).reports.iter().find_map(suspect).unwrap()
+    };
+    let (without, with) = (detected_ms(false), detected_ms(true));
+    assert!((3000..5500).contains(&without), "{without}");
+    assert!((1000..3200).contains(&with), "{with}");
+}
+
+#[test]
+fn a_hint_alone_is_no_verdict() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(12);
+    h.feed(
+        1,
+        Input::LinkHint {
+            neighbour: 2,
+            up: false,
+        },
+    );
+    h.run_s(20);
+    assert_eq!(h.beliefs(1).peers[&PeerId(2)].1, Status::Alive);
+}
+
+#[test]
+fn what_is_published_is_what_is_planned() {
+    let mut h = Harness::started(3, mission(1, 8, 6));
+    for _ in 0..100 {
+        h.run_s(1);
+        for id in 1..=3 {
+            let plan: BTreeSet<u16> = h.beliefs(id).plan.into_iter().collect();
+            let cells = u16::try_from(h.beliefs(id).covered.len()).unwrap_or(0);
+            let claim = h.seat(id).said.iter().rev().find_map(|(_, _, b)| match b {
+                Body::Claim(c) => Some(c.clone()),
+                _ => None,
+            });
+            let Some(claim) = claim else { continue };
+            let told: BTreeSet<u16> = crate::protocol::runs::unpack(&claim.plan, cells)
+                .into_iter()
+                .map(|p| p.cell)
+                .collect();
+            assert!(
+                plan.is_subset(&told),
+                "{id} flies {plan:?} and says {told:?}"
+            );
+        }
+    }
+    assert!(covered(&h, 1) > 12);
+}
+
+#[test]
+fn the_same_story_gives_the_same_bytes() {
+    let story = || {
+        let mut h = Harness::started(3, mission(1, 6, 4));
+        h.link(1, 2).loss_percent = 20;
+        h.run_s(40);
+        let said: Vec<_> = (1..=3).flat_map(|id| h.seat(id).said.clone()).collect();
+        said
+    };
+    assert_eq!(story(), story());
+}
