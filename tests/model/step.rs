@@ -149,7 +149,7 @@ impl Case {
         self.settle(n);
     }
 
-    fn take(&self, n: &mut Node, cells: &[(u16, bool)]) {
+    fn take(&self, n: &mut Node, cells: &[(u16, Direction)]) {
         n.sections.take(cells);
         self.settle(n);
     }
@@ -319,7 +319,7 @@ impl Case {
                     let far: Vec<(u16, Direction)> = plan
                         .iter()
                         .skip(plan.len() / 2)
-                        .map(|p| (p.cell, true))
+                        .map(|p| (p.cell, Direction::Backward))
                         .collect();
                     self.take(n, &far);
                 });

@@ -106,10 +106,7 @@ impl Console for LocalConsole {
 /// # Errors
 /// A sentence that says what does not fit.
 pub fn fits(mission: &Mission, running: Option<&Mission>) -> Result<(), String> {
-    let n_pieces = chunks(mission).len();
-    if n_pieces == 0 {
-        return Err("the mission is too large to be spoken: at most 64 KiB".to_owned());
-    }
+    chunks(mission).map_err(|too_large| too_large.to_string())?;
     let Some(running) = running else {
         return Ok(());
     };
