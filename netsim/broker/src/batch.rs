@@ -66,7 +66,11 @@ pub fn run(prepared: &Prepared, batch: &Batch, failed: &(dyn Fn(&Outcome) + Sync
     let outcomes = outcomes
         .into_inner()
         .unwrap_or_else(PoisonError::into_inner);
-    summary::summarise(outcomes, started.elapsed().as_secs_f64())
+    let mut total = summary::summarise(outcomes, started.elapsed().as_secs_f64());
+    if batch.storm {
+        total.judge_batch(&prepared.spec);
+    }
+    total
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use crate::account::{RunReport, secs};
 use crate::check::{Grade, Violation};
+use crate::spec::Spec;
 use crate::swarm::Outcome;
 use serde::Serialize;
 use skein_peer::wire::Fnv;
@@ -75,6 +76,8 @@ pub struct Summary {
     pub makespan_ratio: Spread,
     /// Makespan over the work bound.
     pub makespan_over_work_bound: Spread,
+    /// Share of the peers' time spent able and with nothing to fly while cells were open.
+    pub idle_share: Spread,
     /// From a death to its detection by each live peer, seconds.
     pub detect_s: Spread,
     /// From the detection of a death to the last of its cells being listed again, seconds.
@@ -129,6 +132,7 @@ impl fmt::Display for Summary {
             "makespan / work bound {}",
             spread(&self.makespan_over_work_bound)
         )?;
+        writeln!(f, "idle share            {}", spread(&self.idle_share))?;
         writeln!(f, "detection, s          {}", spread(&self.detect_s))?;
         writeln!(f, "takeover, s           {}", spread(&self.takeover_s))?;
         writeln!(
@@ -169,6 +173,7 @@ pub fn summarise(mut runs: Vec<Outcome>, wall_s: f64) -> Summary {
             .fold(1.0, f64::min),
         makespan_ratio: of(&runs, |r| r.makespan_over_baseline),
         makespan_over_work_bound: of(&runs, |r| r.makespan_over_work_bound),
+        idle_share: Spread::of(runs.iter().map(idle_share).collect()),
         revisit_s: of(&runs, |r| r.revisit_ms.map(secs)),
         detect_s: Spread::of(runs.iter().flat_map(detect_s).collect()),
         takeover_s: Spread::of(runs.iter().flat_map(takeover_s).collect()),
@@ -252,8 +257,69 @@ fn add_violations(s: &mut Summary, runs: &[Outcome]) {
     }
 }
 
+/// Storms from which on a batch is judged as a whole: each hard place that is reached in one
+/// storm of thirty is missed by all of them with a chance of one in a thousand.
+pub const JUDGED_BATCH: usize = 200;
+
+/// Half of the storms end within so many times the least time that all the work takes.
+/// The division keeps sections in one piece, ways lead there and back, and a storm kills
+/// in mid-section: measured 1.4, and 3 and more with anchors that say nothing.
+const PACE_P50: f64 = 2.0;
+
+/// And 95 of 100 within so many: measured 1.8.
+const PACE_P95: f64 = 3.0;
+
+/// False alarms of death in a peer-hour, at a loss of at most a tenth: each costs a round
+/// of half a minute, so that of eight peers less than one in a hundred is in one.
+const FALSE_DOWNS_LIGHT: f64 = 0.1;
+
+/// The same at any loss.
+const FALSE_DOWNS_ANY: f64 = 1.0;
+
+impl Summary {
+    /// Judges a batch of storms as a whole, if it is large enough: whether it reached the
+    /// hard places that its scenario can reach (`reached`), how fast it was (`pace`), how
+    /// often the living were taken for dead (`false-downs`).
+    pub fn judge_batch(&mut self, spec: &Spec) {
+        if self.runs < JUDGED_BATCH {
+            return;
+        }
+        let (storm, fleet) = (&spec.storm, spec.uavs.len());
+        let r = &self.reached;
+        let missed = [
+            (storm.max_kills > 1 && fleet > 2, r.takeover_of_takeover),
+            (storm.max_partitions > 0 && fleet > 3, r.both_halves_planned),
+            (storm.max_restarts > 0, r.restart_in_round),
+            (storm.max_kills > 0 && fleet > 3, r.articulation_lost),
+            (
+                storm.max_revisions > 0 && spec.ground.is_some(),
+                r.staggered_revision,
+            ),
+        ];
+        let missed = missed.iter().filter(|(can, n)| *can && *n == 0).count();
+        let slow = self.makespan_over_work_bound.p50 > PACE_P50
+            || self.makespan_over_work_bound.p95 > PACE_P95;
+        let jumpy = self.false_downs_per_peer_hour > FALSE_DOWNS_LIGHT
+            || self.false_downs_per_peer_hour_at_any_loss > FALSE_DOWNS_ANY;
+        for (name, n) in [
+            ("reached", missed as u64),
+            ("pace", u64::from(slow)),
+            ("false-downs", u64::from(jumpy)),
+        ] {
+            if n > 0 {
+                *self.violations.entry(name.to_owned()).or_default() += n;
+            }
+        }
+    }
+}
+
 fn of(runs: &[Outcome], figure: impl Fn(&RunReport) -> Option<f64>) -> Spread {
     Spread::of(runs.iter().filter_map(|o| figure(&o.report)).collect())
+}
+
+#[allow(clippy::cast_precision_loss, reason = "runs last less than 2^52 ms")]
+fn idle_share(o: &Outcome) -> f64 {
+    o.idle_ms as f64 / o.report.peer_ms.max(1) as f64
 }
 
 fn detect_s(o: &Outcome) -> Vec<f64> {
@@ -314,6 +380,39 @@ mod tests {
         assert!((forward.bytes_per_peer_s - 100.0).abs() < 1e-9);
         let other = summarise((1..10).map(run).collect(), 1.0);
         assert_ne!(forward.history_hash, other.history_hash);
+    }
+
+    #[test]
+    fn a_large_batch_that_is_slow_jumpy_or_met_nothing_hard_is_judged() {
+        let spec = crate::world::fixture::square(8);
+        let judged = |change: fn(&mut Summary)| {
+            let reached = Places {
+                takeover_of_takeover: 1,
+                both_halves_planned: 1,
+                restart_in_round: 1,
+                articulation_lost: 1,
+                staggered_revision: 1,
+            };
+            let mut s = Summary {
+                runs: JUDGED_BATCH,
+                reached,
+                ..Summary::default()
+            };
+            change(&mut s);
+            s.judge_batch(&spec);
+            s.violations.into_keys().collect::<Vec<_>>()
+        };
+        assert!(judged(|_| {}).is_empty());
+        assert_eq!(judged(|s| s.makespan_over_work_bound.p50 = 3.2), ["pace"]);
+        assert_eq!(judged(|s| s.makespan_over_work_bound.p95 = 6.0), ["pace"]);
+        assert_eq!(judged(|s| s.reached = Places::default()), ["reached"]);
+        let jumpy = |s: &mut Summary| s.false_downs_per_peer_hour = 3.0;
+        assert_eq!(judged(jumpy), ["false-downs"]);
+        let small = |s: &mut Summary| {
+            s.runs = 20;
+            s.reached = Places::default();
+        };
+        assert!(judged(small).is_empty());
     }
 
     #[test]

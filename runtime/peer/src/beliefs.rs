@@ -1,7 +1,7 @@
 //! What a judge may look at: a copy of what one peer believes.
 
 use crate::output::Status;
-use crate::wire::message::Epoch;
+use crate::wire::message::{Epoch, Order};
 use crate::{Incarnation, PeerId};
 use std::collections::BTreeMap;
 
@@ -38,6 +38,8 @@ pub struct Beliefs {
     pub diameter: u32,
     /// Whether it holds that the mission is finished.
     pub finished: bool,
+    /// The operator's standing order, as far as it has heard.
+    pub order: Order,
     /// Predicted end of its plan, milliseconds from now.
     pub eta_ms: u32,
     /// Flight time it may still spend, milliseconds (endurance less reserve).

@@ -5,7 +5,7 @@
 //! milliseconds of scenario time. What one driver cannot tell is `null`.
 
 use super::lifetimes::Cause;
-use crate::check::Violation;
+use crate::check::{Findings, Violation};
 use crate::world::Judge;
 use serde::Serialize;
 use skein_link::{RadioCounters, Reason};
@@ -408,6 +408,18 @@ impl RunReport {
         }
         self.passed = reasons.is_empty();
         self.reasons = reasons;
+    }
+
+    /// Rules broken after all else was over.
+    pub(crate) fn add_violations(&mut self, found: &Findings) {
+        let violations = self.violations.get_or_insert_default();
+        for (check, n) in &found.counts {
+            *violations.counts.entry((*check).to_owned()).or_default() += n;
+            self.reasons
+                .push(format!("rule {check} was broken {n} times on the way home"));
+        }
+        violations.first.extend(found.violations.iter().cloned());
+        self.passed &= found.counts.is_empty();
     }
 
     /// Sets the makespan against that of the omniscient baseline, where both have one.

@@ -7,10 +7,16 @@ use super::listing::ListingCheck;
 use super::membership::Membership;
 use super::progress::ProgressCheck;
 use super::record::{RecordCheck, Said};
+use super::rules::Rules;
 use super::{Bounds, Findings, PeerSnapshot, Snapshot};
-use skein_peer::Report;
+use crate::fault::Fault;
+use crate::spec::Spec;
+use skein_flight::coverage::ring::backtracking::{RingCell, Uav};
+use skein_geometry::frame::Point;
 use skein_peer::journal::Durable;
 use skein_peer::output::Status;
+use skein_peer::wire::message::Bid;
+use skein_peer::{Beliefs, Report};
 use std::collections::BTreeMap;
 
 /// Hard places that a batch of seeds must have reached to mean anything.
@@ -41,6 +47,8 @@ pub struct Checker {
     /// The hard places reached.
     pub reached: Reached,
     record: RecordCheck,
+    /// Rules of single peers: what they say and fly, and when.
+    pub rules: Rules,
     cover: CoverCheck,
     progress: ProgressCheck,
     graph: Graph,
@@ -50,13 +58,15 @@ pub struct Checker {
     adopted: BTreeMap<u16, u32>,
     split_at: Option<BTreeMap<u16, u32>>,
     ready_ms: BTreeMap<u32, u64>,
+    /// The loop on which cells are judged.
+    loop_hash: u64,
 }
 
 impl Checker {
-    /// The checks of the run with this seed, at beacon period T, on a loop of so many cells.
+    /// The checks of the run of a scenario with this seed.
     #[must_use]
-    pub fn new(seed: u64, period_ms: u32) -> Self {
-        let period_ms = u64::from(period_ms.max(1));
+    pub fn new(seed: u64, spec: &Spec) -> Self {
+        let period_ms = u64::from(spec.beacon_period_ms.max(1));
         Self {
             period_ms,
             found: Findings::new(seed),
@@ -64,6 +74,7 @@ impl Checker {
             listing: ListingCheck::default(),
             reached: Reached::default(),
             record: RecordCheck::default(),
+            rules: Rules::new(spec),
             cover: CoverCheck::default(),
             progress: ProgressCheck::default(),
             graph: Graph::default(),
@@ -76,6 +87,7 @@ impl Checker {
             adopted: BTreeMap::new(),
             split_at: None,
             ready_ms: BTreeMap::new(),
+            loop_hash: 0,
         }
     }
 
@@ -83,6 +95,8 @@ impl Checker {
     pub fn on_boot(&mut self, now_ms: u64, id: u16, again: bool, fresh: bool) {
         self.members.on_running(id, true);
         self.cover.on_boot(id);
+        self.record.on_boot(id);
+        self.rules.on_boot(now_ms, id);
         if fresh {
             self.record.on_erased(id);
         }
@@ -120,6 +134,7 @@ impl Checker {
         }
         self.progress.on_silent(id);
         self.progress.on_loss();
+        self.rules.on_silent(id);
         self.open_round.remove(&id);
         self.stability.forget(id);
     }
@@ -152,8 +167,15 @@ impl Checker {
         }
     }
 
-    /// A peer reports something.
-    pub fn on_report(&mut self, now_ms: u64, id: u16, report: &Report) {
+    /// A peer reports something, having adopted so many divisions in its present life.
+    pub fn on_report(&mut self, now_ms: u64, id: u16, report: &Report, adoptions: u32) {
+        self.rules.on_report(
+            now_ms,
+            id,
+            report,
+            (adoptions, self.bounds.diameter, &self.listing),
+            &mut self.found,
+        );
         match report {
             Report::Booted { incarnation } => {
                 self.members.on_life(now_ms, id, *incarnation);
@@ -185,8 +207,16 @@ impl Checker {
                 }
                 self.adopted.insert(id, *counter);
             }
-            Report::Covered { .. } => self.progress.on_covered(id),
-            Report::Ready { revision, .. } => {
+            Report::Covered { cells } => {
+                self.progress.on_covered(id);
+                self.record.on_covered(now_ms, id, cells);
+            }
+            Report::Ready {
+                revision,
+                loop_hash,
+                ..
+            } => {
+                self.record.on_loop(id, *loop_hash);
                 let first_ms = *self.ready_ms.entry(*revision).or_insert(now_ms);
                 if *revision > 1 && now_ms > first_ms + self.period_ms {
                     self.reached.staggered_revision += 1;
@@ -211,6 +241,61 @@ impl Checker {
         if let Some(claim) = &said.claim {
             self.listing.on_published(id, std::sync::Arc::clone(claim));
         }
+        let seen = (self.loop_hash, durable.1);
+        self.rules.on_said(now_ms, id, said, seen, &mut self.found);
+    }
+
+    /// A fault strikes: whoever is slow, or has a wrong clock or a broken disk, is late by
+    /// no doing of its own.
+    pub fn on_fault(&mut self, fault: &Fault) {
+        match fault {
+            Fault::ClockDrift { peer, .. } | Fault::ClockJump { peer, .. } => {
+                self.members.clocks_are_wrong();
+                self.rules.on_wrong_clock(*peer);
+            }
+            Fault::SlowComputer { peer, .. } => {
+                self.members.clocks_are_wrong();
+                self.rules.on_trouble(*peer);
+            }
+            Fault::FailStores { peer } | Fault::SlowStores { peer, .. } => {
+                self.rules.on_trouble(*peer);
+                self.record.on_trouble(*peer);
+            }
+            _ => {}
+        }
+    }
+
+    /// A peer puts bytes on the air, its own or another's.
+    pub fn on_transmission(&mut self, now_ms: u64, id: u16, bytes: usize) {
+        self.rules
+            .on_transmission(now_ms, id, bytes, &mut self.found);
+    }
+
+    /// A peer publishes its own beacon while it believes this.
+    pub fn on_beacon(&mut self, now_ms: u64, id: u16, said: &Said, view: &Beliefs) {
+        self.rules
+            .on_beacon(now_ms, id, said, view, &mut self.found);
+    }
+
+    /// A peer makes a bid durable while it believes this, at this place.
+    pub fn on_bid(&mut self, now_ms: u64, id: u16, bid: &Bid, of: (&Beliefs, Option<Point>)) {
+        self.rules.on_bid(now_ms, id, bid, of, &mut self.found);
+    }
+
+    /// A peer asks for a division.
+    pub fn on_divide(&mut self, now_ms: u64, id: u16, problem: (&[RingCell], &[Uav])) {
+        self.rules.on_divide(now_ms, id, problem, &mut self.found);
+    }
+
+    /// A running peer receives a record.
+    pub fn on_received(&mut self, now_ms: u64, id: u16, said: &Said) {
+        let life = self.members.life(id);
+        if let Some(claim) = &said.claim {
+            let r = &said.record;
+            self.listing
+                .on_heard((id, r.author), (r.incarnation, r.seq), claim);
+        }
+        self.rules.on_received(now_ms, (id, life), said);
     }
 
     /// A UAV flew into a zone.
@@ -246,6 +331,7 @@ impl Checker {
     ) {
         let held = peers.iter().map(|m| m.view.diameter).max().unwrap_or(1);
         self.bounds.diameter = u64::from(held.max(self.stability.diameter()));
+        self.loop_hash = loop_hash;
         let snapshot = Snapshot {
             now_ms,
             loss_permille,
@@ -264,8 +350,25 @@ impl Checker {
             self.progress.on_loss();
         }
         self.record.on_snapshot(&snapshot, &mut self.found);
+        self.rules.on_snapshot(&snapshot, &mut self.found);
         self.cover.on_snapshot(&snapshot, &mut self.found);
         self.progress
             .on_snapshot(&snapshot, &self.members, &mut self.found);
+    }
+
+    /// Judges how those who are finished get home, after all else is over.
+    pub fn on_way_home(&mut self, now_ms: u64, peers: &[PeerSnapshot], covered: &[bool]) -> bool {
+        let snapshot = Snapshot {
+            now_ms,
+            loss_permille: 0,
+            bounds: self.bounds,
+            graph: &self.graph,
+            stability: &self.stability,
+            peers,
+            covered,
+            loop_hash: self.loop_hash,
+        };
+        self.rules.on_way_home(&snapshot, &mut self.found);
+        self.rules.all_home(peers)
     }
 }

@@ -144,6 +144,7 @@ mod tests {
                 id: *id,
                 uav: true,
                 since_ms: 0,
+                at: None,
                 view: Beliefs {
                     speaks: true,
                     loop_hash: 3,

@@ -58,6 +58,13 @@ impl Findings {
         }
     }
 
+    /// What was found so far; from now on nothing has been.
+    #[must_use]
+    pub fn take(&mut self) -> Self {
+        let fresh = Self::new(self.seed);
+        std::mem::replace(self, fresh)
+    }
+
     /// A rule was broken.
     pub fn broken(
         &mut self,
@@ -106,6 +113,12 @@ impl<K: Ord + Copy> Clocks<K> {
     /// The thing goes on; returns since when.
     pub fn start(&mut self, key: K, now_ms: u64) -> u64 {
         self.running.entry(key).or_insert((now_ms, false)).0
+    }
+
+    /// Since when the thing has been going on, if it does.
+    #[must_use]
+    pub fn since(&self, key: K) -> Option<u64> {
+        self.running.get(&key).map(|(since, _)| *since)
     }
 
     /// The thing ended; returns since when it had been going on.

@@ -55,6 +55,13 @@ impl Graph {
         self.diameter.max(1)
     }
 
+    /// How many radios this one hears.
+    #[must_use]
+    pub fn neighbours(&self, a: u16) -> u32 {
+        let heard = self.ids.binary_search(&a).map(|i| self.adjacent[i]);
+        heard.unwrap_or(0).count_ones()
+    }
+
     /// Whether a path joins two radios.
     #[must_use]
     pub fn joined(&self, a: u16, b: u16) -> bool {
@@ -139,6 +146,7 @@ pub struct Stability {
     component: BTreeMap<u16, (Vec<(u16, u32)>, u64)>,
     joined: BTreeMap<(u16, u16), u64>,
     diameters: Vec<(u64, u32)>,
+    window_ms: u64,
 }
 
 impl Stability {
@@ -168,7 +176,10 @@ impl Stability {
             .retain(|id, _| graph.ids().binary_search(id).is_ok());
         changed |= before != self.component.len();
         self.join(now_ms, graph);
-        self.diameters.retain(|(t, _)| t + window_ms >= now_ms);
+        // What a peer reckons with was measured in a window, and told in the one after it.
+        self.window_ms = window_ms;
+        self.diameters
+            .retain(|(t, _)| t + 2 * window_ms + window_ms / 5 >= now_ms);
         self.diameters.push((now_ms, graph.diameter()));
         changed
     }
@@ -205,12 +216,19 @@ impl Stability {
     /// The largest true diameter within the window.
     #[must_use]
     pub fn diameter(&self) -> u32 {
-        self.diameters
-            .iter()
-            .map(|(_, d)| *d)
-            .max()
-            .unwrap_or(1)
-            .max(1)
+        let now_ms = self.diameters.last().map_or(0, |(t, _)| *t);
+        let recent = |(t, _): &&(u64, u32)| *t + self.window_ms >= now_ms;
+        let all = self.diameters.iter().filter(recent).map(|(_, d)| *d);
+        all.max().unwrap_or(1).max(1)
+    }
+
+    /// The largest true diameter that any peer may still reckon with: hops count for a
+    /// window after they were heard, and what was measured is told for one more, with a
+    /// fifth of a window for the way.
+    #[must_use]
+    pub fn lasting_diameter(&self) -> u32 {
+        let all = self.diameters.iter().map(|(_, d)| *d);
+        all.max().unwrap_or(1).max(1)
     }
 }
 

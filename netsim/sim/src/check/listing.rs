@@ -54,6 +54,13 @@ impl ListingCheck {
         }
     }
 
+    /// The newest section of one peer that another heard, and in which life it was said.
+    #[must_use]
+    pub fn heard(&self, by: u16, author: u16) -> Option<(&Arc<Claim>, u32)> {
+        let heard = self.heard.get(&(by, author));
+        heard.map(|(claim, version)| (claim, version.0))
+    }
+
     /// Judges everybody's plans.
     pub fn on_snapshot(
         &mut self,
@@ -307,6 +314,7 @@ mod tests {
                     id: *id,
                     uav: true,
                     since_ms: 0,
+                    at: None,
                     view: Beliefs {
                         able: true,
                         loop_hash: 9,

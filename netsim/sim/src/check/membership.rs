@@ -1,7 +1,7 @@
 //! Who knows of whose death, and how soon: detection at any loss, false downs, and
 //! agreement on the members of a component (L1).
 
-use super::{Bounds, Clocks, Findings, Snapshot};
+use super::{Bounds, Clocks, Findings, Grade, Snapshot};
 use skein_peer::output::Status;
 use std::collections::BTreeMap;
 
@@ -28,6 +28,10 @@ pub struct Membership {
     detected: BTreeMap<u16, u64>,
     late: Clocks<(u16, u16)>,
     disagreements: Clocks<(u16, u16)>,
+    misjudged: Clocks<u16>,
+    /// Somebody was slow or had a wrong clock: verdicts may be hasty from then on.
+    clocks_wrong: bool,
+    judged_downs: usize,
     /// Living peers declared Down although a path to them had existed for a whole bound:
     /// when, by whom, whom.
     pub false_downs: Vec<(u64, u16, u16)>,
@@ -120,6 +124,11 @@ impl Membership {
         }
     }
 
+    /// Somebody is slow from now on or has a wrong clock.
+    pub fn clocks_are_wrong(&mut self) {
+        self.clocks_wrong = true;
+    }
+
     /// Judges everybody's beliefs.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         for m in snapshot.peers {
@@ -129,15 +138,51 @@ impl Membership {
                 self.speaks_since.remove(&m.id);
             }
         }
+        self.look_for_false_downs(snapshot, found);
+        self.look_for_wrong_diameters(snapshot, found);
         self.look_for_late_detection(snapshot, found);
         self.look_for_disagreement(snapshot, found);
+    }
+
+    /// Without a loss nobody in reach is taken for dead while it lives. (With a loss a
+    /// batch of runs is judged by the rate.)
+    fn look_for_false_downs(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        for (at_ms, by, of) in &self.false_downs[self.judged_downs..] {
+            if snapshot.grade() == Grade::Hard && !self.clocks_wrong {
+                found.broken("false-down", *at_ms, Some(*by), || {
+                    format!("holds peer {of} for down, which lives and is in reach")
+                });
+            }
+        }
+        self.judged_downs = self.false_downs.len();
+    }
+
+    /// Nobody reckons with a larger diameter than there was lately: bounds that peers keep
+    /// would grow with it.
+    fn look_for_wrong_diameters(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        let most = true_diameter(snapshot);
+        for m in snapshot.peers {
+            if u64::from(m.view.diameter) <= most {
+                self.misjudged.stop(m.id);
+                continue;
+            }
+            let since_ms = self.misjudged.start(m.id, snapshot.now_ms);
+            if snapshot.now_ms > since_ms && self.misjudged.tell_once(m.id) {
+                found.broken("diameter", snapshot.now_ms, Some(m.id), || {
+                    format!(
+                        "reckons with a diameter of {}, it was at most {most}",
+                        m.view.diameter
+                    )
+                });
+            }
+        }
     }
 
     /// Everybody who runs since before a death knows of it within the bound, at any loss:
     /// the rule on the age of a heartbeat needs no message.
     fn look_for_late_detection(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         for (&subject, silence) in &mut self.silences {
-            silence.diameter = silence.diameter.max(snapshot.bounds.diameter);
+            silence.diameter = silence.diameter.max(true_diameter(snapshot));
             let bounds = Bounds {
                 diameter: silence.diameter,
                 ..snapshot.bounds
@@ -227,8 +272,15 @@ impl Membership {
     }
 }
 
+/// The largest diameter that anybody may reckon with: a true one, and two hops more, since
+/// collisions and losses send heartbeats the longer way for a whole window now and then.
+fn true_diameter(snapshot: &Snapshot<'_>) -> u64 {
+    u64::from(snapshot.stability.lasting_diameter()) + 2
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::testing::{Story, speaking};
     use super::super::{Graph, PeerSnapshot, Stability};
     use super::*;
     use skein_peer::{Beliefs, PeerId};
@@ -255,6 +307,7 @@ mod tests {
                 id: *id,
                 uav: true,
                 since_ms: 0,
+                at: None,
                 view: Beliefs {
                     speaks: true,
                     peers: believes
@@ -296,10 +349,10 @@ mod tests {
                 m.on_belief(59_000, (1, 2), (1, Status::Down), &BOUNDS, None);
                 assert_eq!(m.detected_ms(2), Some(59_000));
             }
-            look_at(&mut m, &mut found, 61_000, 300, &[(1, &[])], &mut s);
+            look_at(&mut m, &mut found, 65_000, 300, &[(1, &[])], &mut s);
             assert!(found.counts.is_empty());
-            look_at(&mut m, &mut found, 63_000, 300, &[(1, &[])], &mut s);
-            look_at(&mut m, &mut found, 64_000, 300, &[(1, &[])], &mut s);
+            look_at(&mut m, &mut found, 66_000, 300, &[(1, &[])], &mut s);
+            look_at(&mut m, &mut found, 67_000, 300, &[(1, &[])], &mut s);
             assert_eq!(
                 found.counts.get("detect").copied().unwrap_or(0),
                 u64::from(!found_out)
@@ -316,6 +369,46 @@ mod tests {
         assert!(m.false_downs.is_empty());
         m.on_belief(60_000, (1, 2), (1, Status::Down), &BOUNDS, Some(10_000));
         assert_eq!(m.false_downs, [(60_000, 1, 2)]);
+    }
+
+    #[test]
+    fn a_false_down_is_a_violation_where_nothing_is_lost() {
+        for (loss, broken) in [(0, true), (50, false), (300, false)] {
+            let (mut m, mut found) = (Membership::default(), Findings::new(1));
+            m.on_life(0, 2, 1);
+            m.on_belief(60_000, (1, 2), (1, Status::Down), &BOUNDS, Some(10_000));
+            let mut s = Stability::default();
+            look_at(&mut m, &mut found, 61_000, loss, &[(1, &[])], &mut s);
+            look_at(&mut m, &mut found, 62_000, loss, &[(1, &[])], &mut s);
+            let counted = found.counts.get("false-down").copied().unwrap_or(0);
+            assert_eq!(counted, u64::from(broken), "loss {loss}");
+        }
+    }
+
+    #[test]
+    fn a_peer_that_reckons_with_too_large_a_diameter_is_found() {
+        for (diameter, loss, broken) in [
+            (3, 0, false),
+            (3, 300, false),
+            (4, 0, true),
+            (16, 300, true),
+        ] {
+            let (mut m, mut found) = (Membership::default(), Findings::new(1));
+            let view = Beliefs {
+                diameter,
+                ..speaking()
+            };
+            let mut story = Story::new(loss);
+            let views = [(1, view.clone()), (2, view)];
+            for t in 1..3 {
+                story.snapshot(t * 1000, &views, |s| m.on_snapshot(s, &mut found));
+            }
+            assert_eq!(
+                found.counts.contains_key("diameter"),
+                broken,
+                "{diameter} {loss}"
+            );
+        }
     }
 
     #[test]

@@ -13,22 +13,40 @@
 //! | [`listing`] | I1, L2, S5: which peer lists which cell |
 //! | [`record`] | S3, S4, S7, S11: versions, speakers, promises |
 //! | [`cover`] | S3 (covered), S6, L4: what is marked covered |
+//! | [`rules`] | those of single peers, below, behind one door |
+//! | [`cadence`] | durations from below: probation, haste, refute, cadence |
+//! | [`patience`] | when rounds are opened: prompt, patience, waiting |
+//! | [`decision`] | what rounds decide, from the bids alone; the bids themselves |
+//! | [`spoken`] | what is published against what is held |
+//! | [`spread`] | L3, L4 of every record, agreement on revision and order |
+//! | [`airtime`] | S9: shares of the channel |
+//! | [`flight`] | what is flown against what is wanted: hold, home |
 //! | [`progress`] | S2, S9, S10, L6, L7: limits and restarts |
 //!
 //! S1 is recorded by the world, S12 caught by the driver, L5 decided at the end of a
 //! run, S8 tested in the peer's crate. Checks run incrementally on reports and
 //! transmissions, and once a beacon period on a copy of each peer's beliefs.
 
+pub mod airtime;
 pub mod bounds;
+pub mod cadence;
 pub mod checker;
 pub mod cover;
+pub mod decision;
 pub mod findings;
+pub mod flight;
 pub mod graph;
 pub mod listing;
 pub mod membership;
+pub mod patience;
 pub mod progress;
 pub mod record;
+pub mod rules;
 pub mod snapshot;
+pub mod spoken;
+pub mod spread;
+#[cfg(test)]
+mod testing;
 
 pub use bounds::{Bounds, Grade};
 pub use checker::{Checker, Reached};

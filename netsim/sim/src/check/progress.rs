@@ -202,6 +202,7 @@ mod tests {
                 id: 1,
                 uav: true,
                 since_ms: 0,
+                at: None,
                 view: view.clone(),
             }];
             let graph = Graph::new(vec![1], |_, _| false);

@@ -4,11 +4,12 @@
 
 use super::{Findings, Snapshot};
 use skein_peer::Beliefs;
-use skein_peer::journal::Durable;
+use skein_peer::cells::CellSet;
+use skein_peer::journal::{Durable, Entry};
 use skein_peer::wire::codec::{self, Body};
 use skein_peer::wire::kinds::Kind;
 use skein_peer::wire::message::{Claim, Epoch, Firmness, ListedRun, Record, Stamp};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// A transmission that a peer wrote itself, read back.
@@ -39,6 +40,12 @@ impl Said {
             claim,
         })
     }
+
+    /// Whether it says what is covered or who will fly what.
+    #[must_use]
+    pub fn tells_of_cells(&self) -> bool {
+        matches!(self.body, Body::Claim(_) | Body::Cover(_) | Body::Bid(_))
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -57,9 +64,53 @@ pub struct RecordCheck {
     spoken: BTreeMap<(u16, u8, u16), (u32, u32, u64)>,
     versions: BTreeMap<u16, Versions>,
     durable: BTreeMap<u16, (usize, Durable)>,
+    own: BTreeMap<u16, Own>,
+    /// Peers whose disks failed or were slow.
+    troubled: BTreeSet<u16>,
 }
 
+/// Cells that a process saw itself on its loop, with when.
+#[derive(Clone, Debug, Default)]
+struct Own {
+    loop_hash: u64,
+    seen: Vec<(u64, u16)>,
+}
+
+/// Own coverage is made durable every five cells: a crash costs at most the last four.
+const UNSAVED_CELLS: usize = 4;
+
+/// And what is being written, milliseconds: a sync takes at most 20 ms, and no more than
+/// one a kind of promise is under way.
+const WRITING_MS: u64 = 1_000;
+
 impl RecordCheck {
+    /// The disk of a peer fails or is slow: what it saw may be lost.
+    pub fn on_trouble(&mut self, id: u16) {
+        self.troubled.insert(id);
+    }
+
+    /// A process starts: it has seen nothing itself yet.
+    pub fn on_boot(&mut self, id: u16) {
+        self.own.remove(&id);
+    }
+
+    /// A peer works on this loop from now on.
+    pub fn on_loop(&mut self, id: u16, loop_hash: u64) {
+        let own = self.own.entry(id).or_default();
+        if own.loop_hash != loop_hash {
+            *own = Own {
+                loop_hash,
+                seen: Vec::new(),
+            };
+        }
+    }
+
+    /// A peer's camera saw cells.
+    pub fn on_covered(&mut self, now_ms: u64, id: u16, cells: &[u16]) {
+        let own = self.own.entry(id).or_default();
+        own.seen.extend(cells.iter().map(|c| (now_ms, *c)));
+    }
+
     /// The disk of a peer was erased: what it promised is forgotten, and unless somebody
     /// in reach remembers its last life it has no way to know that it had one.
     pub fn on_erased(&mut self, id: u16) {
@@ -155,7 +206,8 @@ impl RecordCheck {
                 }
             }
             Body::Claim(claim) => {
-                if let Some(text) = unpersisted(claim, durable.claim.as_ref(), covered) {
+                let promised = promised_in_life(journal);
+                if let Some(text) = unpersisted(claim, promised.as_ref(), covered) {
                     found.broken("S7", now_ms, Some(id), || text);
                 }
             }
@@ -176,6 +228,25 @@ impl RecordCheck {
         if replayed != *believed || unread > 0 {
             found.broken("S11", now_ms, Some(id), || {
                 format!("replaying {} records ({unread} unread) gives {replayed:?}, it believed {believed:?}", journal.len())
+            });
+        }
+        self.check_own_coverage(now_ms, id, &replayed, found);
+    }
+
+    /// What a process saw itself is in its journal, but for the last few cells.
+    fn check_own_coverage(&self, now_ms: u64, id: u16, durable: &Durable, found: &mut Findings) {
+        let Some(own) = self.own.get(&id).filter(|_| !self.troubled.contains(&id)) else {
+            return;
+        };
+        let known = CellSet::decode_rle(durable.cells, &durable.covered)
+            .ok()
+            .filter(|_| durable.loop_hash == own.loop_hash);
+        let written = |c: u16| known.as_ref().is_some_and(|k| k.contains(c));
+        let old = own.seen.iter().filter(|(t, _)| t + WRITING_MS < now_ms);
+        let lost = old.filter(|(_, c)| !written(*c)).count();
+        if lost > UNSAVED_CELLS {
+            found.broken("S11", now_ms, Some(id), || {
+                format!("saw {lost} cells that its journal does not hold (at most {UNSAVED_CELLS})")
             });
         }
     }
@@ -219,6 +290,19 @@ fn versions(v: &Beliefs) -> Versions {
         epoch: v.epoch,
         loop_hash: v.loop_hash,
     }
+}
+
+/// The section that a journal ends with, if it was promised in the journal's last life:
+/// a new life owns nothing of what an earlier one did.
+fn promised_in_life(journal: &[Vec<u8>]) -> Option<Claim> {
+    for record in journal.iter().rev() {
+        match Entry::decode(record) {
+            Some(Entry::Claim(claim)) => return Some(claim),
+            Some(Entry::Life(_)) => return None,
+            _ => {}
+        }
+    }
+    None
 }
 
 /// A listed cell that no durable section lists at that stamp, as a sentence.

@@ -2,6 +2,7 @@
 //! is true.
 
 use super::{Bounds, Grade, Graph, Stability};
+use skein_geometry::frame::Point;
 use skein_peer::Beliefs;
 
 /// One running peer at the moment of a snapshot.
@@ -13,6 +14,8 @@ pub struct PeerSnapshot {
     pub uav: bool,
     /// When its process last started or was resumed, milliseconds.
     pub since_ms: u64,
+    /// Where its airframe is, if it flies.
+    pub at: Option<Point>,
     /// What it believes.
     pub view: Beliefs,
 }

@@ -17,6 +17,7 @@ impl Swarm {
             .keep(self.now_ms, || What::Fault(fault.clone()));
         self.air.advance(self.now_ms);
         self.air.strike(fault);
+        self.checker.on_fault(fault);
         let subject = match fault {
             Fault::Kill { peer } => self.end(*peer, Cause::Killed),
             Fault::KillComputer { peer } => self.end(*peer, Cause::ComputerKilled),
@@ -152,6 +153,7 @@ impl Swarm {
         mission.revision += 1;
         mission.base = base;
         self.mission = Arc::new(mission);
+        self.checker.rules.on_mission(&self.mission);
         self.operate(Command::Mission(Arc::clone(&self.mission)));
     }
 

@@ -26,7 +26,6 @@ pub use outcome::Outcome;
 mod tests;
 
 use crate::account::Account;
-use crate::check::listing::Version;
 use crate::check::record::Said;
 use crate::check::{Checker, PeerSnapshot};
 use crate::fault::TimedFault;
@@ -41,9 +40,10 @@ use queue::{Phase, Queue};
 use sim_peer::{Process, SimPeer};
 use skein_behaviors::Setpoint;
 use skein_geometry::frame::Pose;
+use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
-use skein_peer::wire::message::Claim;
-use skein_peer::{Beliefs, Input, Mission, Output, PeerConfig, PeerId, Report, Role};
+use skein_peer::wire;
+use skein_peer::{Beliefs, Input, Mission, Output, Peer, PeerConfig, PeerId, Report, Role};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -52,6 +52,9 @@ use std::sync::Arc;
 const DIVIDE_MS: u64 = 50;
 /// How long deriving the loop is modelled to take, milliseconds.
 const GROUND_MS: u64 = 200;
+
+/// Nobody is on the way home for longer than this, milliseconds: a battery.
+const LONGEST_WAY_HOME_MS: u64 = 1_200_000;
 
 /// Something to come.
 #[derive(Debug)]
@@ -106,9 +109,11 @@ pub struct Swarm {
     loop_hash: u64,
     /// The newest time round that any peer has begun, from 0.
     lap: u16,
-    /// Sections spoken so far, by hash of their bytes: author, life, section.
-    claims: BTreeMap<u64, (u16, Version, Arc<Claim>)>,
+    /// Records spoken so far, by hash of their bytes.
+    spoken: BTreeMap<u64, Arc<Said>>,
     done: bool,
+    /// All is over but the way home of those who are finished.
+    homing: bool,
     unassigned: bool,
     /// Inputs that arrived by radio.
     received: u64,
@@ -140,13 +145,14 @@ impl Swarm {
             mission: Arc::clone(&spec.mission),
             faults,
             history: History::new(keep),
-            checker: Checker::new(seed, spec.beacon_period_ms),
+            checker: Checker::new(seed, spec),
             account: Account::new(prepared.setting(seed)),
             covered,
             loop_hash,
             lap: 0,
-            claims: BTreeMap::new(),
+            spoken: BTreeMap::new(),
             done: false,
+            homing: false,
             unassigned: false,
             received: 0,
             relayed_by: BTreeMap::new(),
@@ -171,7 +177,8 @@ impl Swarm {
     #[must_use]
     pub fn run(mut self) -> Outcome {
         while self.step() {}
-        self.outcome()
+        let outcome = self.outcome();
+        self.fly_home(outcome)
     }
 
     /// Runs until some scenario time, or the end; returns whether it goes on.
@@ -437,11 +444,9 @@ impl Swarm {
                 *self.relayed_by.entry(d.tx).or_default() += 1;
             }
             if self.peers[idx].process == Process::Running
-                && let Some((author, version, claim)) = self.claims.get(&hash)
+                && let Some(said) = self.spoken.get(&hash)
             {
-                self.checker
-                    .listing
-                    .on_heard((d.rx, *author), *version, claim);
+                self.checker.on_received(self.now_ms, d.rx, said);
             }
             self.feed(
                 idx,
@@ -490,13 +495,13 @@ impl Swarm {
         };
         peer.handle(s.clock.reads(now_ms), input);
         while let Some(output) = peer.poll() {
-            self.perform(idx, output);
+            self.perform(idx, &peer, output);
         }
         self.peers[idx].peer = Some(peer);
         self.schedule_timer(idx);
     }
 
-    fn perform(&mut self, idx: usize, output: Output) {
+    fn perform(&mut self, idx: usize, peer: &Peer, output: Output) {
         let id = self.peers[idx].id();
         let boot = self.peers[idx].boots;
         match output {
@@ -509,8 +514,9 @@ impl Swarm {
             } => {
                 let hash = bytes_hash(&bytes);
                 self.history.fold(self.now_ms, id, Kind::Publish, hash);
+                self.checker.on_transmission(self.now_ms, id, bytes.len());
                 if hops == 0 {
-                    self.said(idx, &bytes, hash);
+                    self.said(idx, peer, &bytes, hash);
                 }
                 let frame = Frame {
                     key: bytes_hash(key.as_bytes()),
@@ -527,6 +533,11 @@ impl Swarm {
                 self.air.apply(id, setpoint);
             }
             Output::Store { token, record } => {
+                if let Some(Entry::Bid(bid)) = Entry::decode(&record) {
+                    let at = self.air.percept(id).map(|p| p.pose.position());
+                    self.checker
+                        .on_bid(self.now_ms, id, &bid, (&peer.beliefs(), at));
+                }
                 let done_ms = self.peers[idx].disk.write(self.now_ms, token, record);
                 self.queue
                     .push(done_ms, Phase::Answer, Event::Stored { idx, boot });
@@ -537,6 +548,15 @@ impl Swarm {
                     Job::Divide { .. } => DIVIDE_MS,
                 };
                 let answer = self.geometry_cache.answer(&job);
+                match (&job, &answer) {
+                    (Job::Divide { ring, robots }, _) => {
+                        self.checker.on_divide(self.now_ms, id, (ring, robots));
+                    }
+                    (_, JobResult::Geometry(Ok(geometry))) => {
+                        self.checker.rules.on_loop(&geometry.coverage_loop);
+                    }
+                    _ => {}
+                }
                 self.queue.push(
                     self.now_ms + takes_ms,
                     Phase::Answer,
@@ -548,23 +568,23 @@ impl Swarm {
                     },
                 );
             }
-            Output::Report(report) => self.reported(id, report),
+            Output::Report(report) => self.reported(id, peer, report),
         }
     }
 
-    fn said(&mut self, idx: usize, bytes: &[u8], hash: u64) {
+    fn said(&mut self, idx: usize, peer: &Peer, bytes: &[u8], hash: u64) {
         let id = self.peers[idx].id();
         if let Some(said) = Said::read(bytes) {
-            if said.claim.is_some() {
+            if said.tells_of_cells() {
                 self.refresh_covered();
+            }
+            if said.record.kind == wire::kinds::Kind::Beacon.number() {
+                self.checker
+                    .on_beacon(self.now_ms, id, &said, &peer.beliefs());
             }
             let durable = (self.peers[idx].disk.records(), self.covered.as_slice());
             self.checker.on_said(self.now_ms, id, &said, hash, durable);
-            if let Some(claim) = said.claim {
-                let r = &said.record;
-                self.claims
-                    .insert(hash, (r.author, (r.incarnation, r.seq), claim));
-            }
+            self.spoken.insert(hash, Arc::new(said));
         } else {
             self.checker.found.broken("S8", self.now_ms, Some(id), || {
                 "published bytes nobody can read".to_owned()
@@ -572,10 +592,14 @@ impl Swarm {
         }
     }
 
-    fn reported(&mut self, id: u16, report: Report) {
+    fn reported(&mut self, id: u16, peer: &Peer, report: Report) {
         self.history
             .fold(self.now_ms, id, Kind::Report, report_hash(&report));
-        self.checker.on_report(self.now_ms, id, &report);
+        let adoptions = match &report {
+            Report::Claim { .. } => peer.beliefs().adoptions,
+            _ => 0,
+        };
+        self.checker.on_report(self.now_ms, id, &report, adoptions);
         self.account.reported(self.now_ms, id, &report);
         if let Report::Ready {
             revision,
@@ -597,7 +621,11 @@ impl Swarm {
         self.judge_world();
         self.observe_graph();
         self.refresh_covered();
-        let peers: Vec<PeerSnapshot> = self.peers.iter().filter_map(snapshot).collect();
+        let peers = self.snapshots();
+        if self.homing {
+            self.done = self.checker.on_way_home(self.now_ms, &peers, &self.covered);
+            return;
+        }
         let loss_permille = self.air.loss_permille();
         self.checker.on_snapshot(
             self.now_ms,
@@ -621,6 +649,24 @@ impl Swarm {
                 text: v.text,
             });
         }
+    }
+
+    /// What every running peer believes, and where it is.
+    fn snapshots(&self) -> Vec<PeerSnapshot> {
+        let air = &self.air;
+        self.peers.iter().filter_map(|s| snapshot(s, air)).collect()
+    }
+
+    /// After the end those who are finished fly home, which is judged and is no part of
+    /// the history.
+    fn fly_home(mut self, mut outcome: Outcome) -> Outcome {
+        if outcome.report.completed {
+            (self.done, self.homing) = (false, true);
+            self.end_ms = self.now_ms + LONGEST_WAY_HOME_MS;
+            while self.step() {}
+            outcome.report.add_violations(&self.checker.found);
+        }
+        outcome
     }
 
     fn observe_graph(&mut self) {
@@ -707,7 +753,7 @@ fn sim_peers(spec: &Spec, seed: u64) -> Vec<SimPeer> {
     peers
 }
 
-fn snapshot(of: &SimPeer) -> Option<PeerSnapshot> {
+fn snapshot(of: &SimPeer, air: &Air) -> Option<PeerSnapshot> {
     let peer = of
         .peer
         .as_ref()
@@ -716,6 +762,7 @@ fn snapshot(of: &SimPeer) -> Option<PeerSnapshot> {
         id: of.id(),
         uav: of.config.role == Role::Uav,
         since_ms: of.since_ms,
+        at: air.percept(of.id()).map(|p| p.pose.position()),
         view: peer.beliefs(),
     })
 }

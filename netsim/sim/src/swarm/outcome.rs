@@ -16,6 +16,8 @@ pub struct Outcome {
     pub ratios: BTreeMap<&'static str, Vec<f64>>,
     /// UAVs that were gone at the end.
     pub dead: u32,
+    /// UAV milliseconds spent able and with nothing to fly while cells were open.
+    pub idle_ms: u64,
     /// The largest loss that was set, thousandths.
     pub loss_permille: u16,
     /// Hard places reached.
@@ -54,8 +56,8 @@ impl Outcome {
 }
 
 impl Swarm {
-    /// Ends the run and sums it up.
-    pub(super) fn outcome(mut self) -> Outcome {
+    /// Sums the run up.
+    pub(super) fn outcome(&mut self) -> Outcome {
         self.air.advance(self.now_ms);
         self.check_the_end();
         for p in &self.peers {
@@ -65,7 +67,7 @@ impl Swarm {
             }
         }
         self.account.radio(&self.radio_counters());
-        let found = std::mem::take(&mut self.checker.found);
+        let found = self.checker.found.take();
         let false_downs = std::mem::take(&mut self.checker.members.false_downs);
         let history_hash = self.history.hash();
         let report = self.account.conclude(Ending {
@@ -95,6 +97,7 @@ impl Swarm {
             ratios: found.ratios,
             dead: u32::try_from(self.peers.iter().filter(|p| is_gone(p)).count())
                 .unwrap_or(u32::MAX),
+            idle_ms: self.checker.rules.flight.idle_ms,
             loss_permille: self.loss_max_permille,
             reached: self.checker.reached,
             history_hash,

@@ -1,0 +1,330 @@
+//! Durations bounded from below or from both sides: a new life listens first (`probation`),
+//! nobody is suspected or given up too soon (`haste`), a suspicion is answered at once
+//! (`refute`), claims are repeated (`cadence`).
+
+use super::{Clocks, Findings, Snapshot};
+use skein_peer::Incarnation;
+use skein_peer::output::Status;
+use skein_peer::wire::message::Beacon;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A clock that is wrong by this much, in percent, breaks no rule: drift is a fault that
+/// peers are to live with.
+const DRIFT_PERCENT: u64 = 1;
+
+/// A claim is spoken again after 10 periods, up to a quarter of one later so as not to be
+/// in step with others; the peer looks four times a period. In quarters of a period.
+const CLAIM_QUARTERS: u64 = 4 * 10 + 1 + 1;
+
+/// k1 = 4 + D/4 at the least diameter 1, in quarters of a period.
+const LEAST_K1_QUARTERS: u64 = 16 + 1;
+
+/// k2 = 4 + D/2 at the least diameter 1, in quarters of a period.
+const LEAST_K2_QUARTERS: u64 = 16 + 2;
+
+/// A heartbeat as a neighbour received it from its author.
+#[derive(Clone, Copy, Debug)]
+struct Heard {
+    incarnation: Incarnation,
+    at_ms: u64,
+}
+
+/// What the durations of one run were found to be.
+#[derive(Clone, Debug)]
+pub struct CadenceCheck {
+    period_ms: u64,
+    booted_ms: BTreeMap<u16, u64>,
+    heard: BTreeMap<(u16, u16), Heard>,
+    accused: Clocks<u16>,
+    claims: Clocks<u16>,
+    /// Peers that are late by no doing of their own.
+    troubled: BTreeSet<u16>,
+    /// Somebody's clock is wrong, and what it says of ages is passed on.
+    clocks_wrong: bool,
+}
+
+impl CadenceCheck {
+    /// The checks at beacon period T.
+    #[must_use]
+    pub fn new(period_ms: u64) -> Self {
+        Self {
+            period_ms,
+            booted_ms: BTreeMap::new(),
+            heard: BTreeMap::new(),
+            accused: Clocks::default(),
+            claims: Clocks::default(),
+            troubled: BTreeSet::new(),
+            clocks_wrong: false,
+        }
+    }
+
+    /// A peer is late from now on by no doing of its own: slow, or with a bad disk.
+    pub fn on_trouble(&mut self, id: u16) {
+        self.troubled.insert(id);
+    }
+
+    /// A peer's clock is wrong from now on.
+    pub fn on_wrong_clock(&mut self, id: u16) {
+        self.troubled.insert(id);
+        self.clocks_wrong = true;
+    }
+
+    /// A process starts.
+    pub fn on_boot(&mut self, now_ms: u64, id: u16) {
+        self.on_silent(id);
+        self.booted_ms.insert(id, now_ms);
+    }
+
+    /// A process ends, stands still, or goes on with another clock: what it heard before
+    /// says nothing about its patience any more.
+    pub fn on_silent(&mut self, id: u16) {
+        self.heard.retain(|(rx, _), _| *rx != id);
+        self.accused.stop(id);
+        self.claims.stop(id);
+    }
+
+    /// A peer puts something on the air, its own or another's: not before it has listened
+    /// for 3 T.
+    pub fn on_transmission(&mut self, now_ms: u64, id: u16, found: &mut Findings) {
+        let timed = self
+            .booted_ms
+            .get(&id)
+            .filter(|_| !self.troubled.contains(&id));
+        let Some(&booted_ms) = timed else {
+            return;
+        };
+        let listens_ms = 3 * self.period_ms;
+        let listened_ms = now_ms - booted_ms;
+        if listened_ms + listens_ms * DRIFT_PERCENT / 100 < listens_ms {
+            found.broken("probation", now_ms, Some(id), || {
+                format!(
+                    "speaks {listened_ms} ms after its start, it is to listen for {listens_ms} ms"
+                )
+            });
+        }
+        // Once is told once: what follows in this life is no further news.
+        if listened_ms > listens_ms {
+            self.booted_ms.remove(&id);
+        }
+    }
+
+    /// A peer puts its own beacon on the air: whoever suspects it is answered.
+    pub fn on_beacon_spoken(&mut self, id: u16) {
+        self.accused.stop(id);
+    }
+
+    /// A peer says its claim again.
+    pub fn on_claim(&mut self, now_ms: u64, id: u16) {
+        self.claims.stop(id);
+        self.claims.start(id, now_ms);
+    }
+
+    /// A running peer receives a beacon from its author; `life` is the receiver's own.
+    pub fn on_beacon_heard(
+        &mut self,
+        now_ms: u64,
+        (by, life): (u16, Incarnation),
+        (author, incarnation): (u16, Incarnation),
+        beacon: &Beacon,
+    ) {
+        let heard = Heard {
+            incarnation,
+            at_ms: now_ms,
+        };
+        self.heard.insert((by, author), heard);
+        let of_me = beacon.gossip.iter().filter(|g| g.id == by);
+        for told in of_me.filter(|g| g.incarnation == life) {
+            if told.suspected_ds.is_some() {
+                self.accused.start(by, now_ms);
+            } else {
+                // Somebody believes it again: there is nothing to answer any more.
+                self.accused.stop(by);
+            }
+        }
+    }
+
+    /// A belief changed. Whoever was heard is not suspected before k1 T and not given up
+    /// before (k1 + k2) T, whoever says so: a suspicion counts from a heartbeat that is
+    /// no older than the last one heard from its author. Ages are rounded up to 100 ms
+    /// whenever they are passed on, and that of a suspicion is, by one peer after the other:
+    /// a quarter of k2 is room for eleven times, six were seen.
+    pub fn on_belief(
+        &mut self,
+        now_ms: u64,
+        (observer, subject): (u16, u16),
+        (incarnation, status): (Incarnation, Status),
+        diameter: u64,
+        found: &mut Findings,
+    ) {
+        let quarters = match status {
+            Status::Alive => return,
+            Status::Suspect => LEAST_K1_QUARTERS,
+            Status::Down => LEAST_K1_QUARTERS + LEAST_K2_QUARTERS,
+        };
+        if self.clocks_wrong {
+            return;
+        }
+        let heard = self.heard.get(&(observer, subject));
+        let Some(heard) = heard.filter(|h| h.incarnation == incarnation) else {
+            return;
+        };
+        let patience_ms = quarters * self.period_ms / 4;
+        let rounding_ms = match status {
+            Status::Down => LEAST_K2_QUARTERS * self.period_ms / 16,
+            _ => 0,
+        };
+        let slack_ms = 100 * (diameter + 1) + rounding_ms + patience_ms * DRIFT_PERCENT / 100;
+        let silent_ms = now_ms - heard.at_ms;
+        if silent_ms + slack_ms < patience_ms {
+            found.broken("haste", now_ms, Some(observer), || {
+                format!(
+                    "holds peer {subject} for {status:?} {silent_ms} ms after it heard it, it is to wait {patience_ms} ms"
+                )
+            });
+        }
+    }
+
+    /// Judges what is overdue.
+    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        let now_ms = snapshot.now_ms;
+        for m in snapshot.peers {
+            if !m.view.speaks || self.troubled.contains(&m.id) {
+                self.accused.stop(m.id);
+                self.claims.stop(m.id);
+                continue;
+            }
+            // The answer waits a random T/8, and T/4 after the last beacon; then the peer
+            // looks when it said it would. Twice that is T/2.
+            let late_ms = self.accused.since(m.id).map(|t| now_ms - t);
+            if late_ms.is_some_and(|l| l > self.period_ms / 2) && self.accused.tell_once(m.id) {
+                found.broken("refute", now_ms, Some(m.id), || {
+                    "heard that it is suspected and did not answer within T/2".to_owned()
+                });
+            }
+            if !m.uav || m.view.loop_hash == 0 {
+                self.claims.stop(m.id);
+                continue;
+            }
+            let bound_ms = CLAIM_QUARTERS * self.period_ms / 4;
+            let slack_ms = bound_ms * DRIFT_PERCENT / 100;
+            let since_ms = self.claims.start(m.id, now_ms).max(m.since_ms);
+            if now_ms - since_ms > bound_ms + slack_ms && self.claims.tell_once(m.id) {
+                found.broken("cadence", now_ms, Some(m.id), || {
+                    format!(
+                        "has not said its claim for {} ms (bound {bound_ms} ms)",
+                        now_ms - since_ms
+                    )
+                });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Story, speaking};
+    use super::*;
+    use skein_peer::wire::message::Gossip;
+
+    fn check() -> (CadenceCheck, Findings) {
+        (CadenceCheck::new(1000), Findings::new(1))
+    }
+
+    fn beacon(suspects: Option<u16>) -> Beacon {
+        let gossip = suspects.map(|id| Gossip {
+            id,
+            incarnation: 1,
+            heartbeat: 9,
+            age_ds: 40,
+            hops: 1,
+            suspected_ds: Some(1),
+            able: true,
+            max_seq: 0,
+            digest: 0,
+        });
+        Beacon {
+            heartbeat: 3,
+            east_mm: 0,
+            north_mm: 0,
+            heading_e4: 0,
+            able: true,
+            ground_station: false,
+            finished: false,
+            nonce: 7,
+            counter: 0,
+            eccentricity: 1,
+            revision: 1,
+            loop_hash: 3,
+            cover_digest: 0,
+            gossip: gossip.into_iter().collect(),
+        }
+    }
+
+    #[test]
+    fn speaking_before_the_end_of_the_probation_is_found() {
+        for (at_ms, broken) in [(2_900, true), (3_000, false)] {
+            let (mut c, mut found) = check();
+            c.on_boot(10_000, 1);
+            c.on_transmission(10_000 + at_ms, 1, &mut found);
+            assert_eq!(found.counts.contains_key("probation"), broken, "{at_ms}");
+        }
+    }
+
+    #[test]
+    fn a_suspicion_or_a_death_too_soon_after_a_heartbeat_is_found() {
+        for (status, after_ms, broken) in [
+            (Status::Suspect, 3_900, true),
+            (Status::Suspect, 4_250, false),
+            (Status::Down, 7_200, true),
+            (Status::Down, 8_750, false),
+            (Status::Alive, 1, false),
+        ] {
+            let (mut c, mut found) = check();
+            c.on_beacon_heard(50_000, (1, 1), (2, 4), &beacon(None));
+            let now_ms = 50_000 + after_ms;
+            c.on_belief(now_ms, (1, 2), (3, Status::Down), 1, &mut found);
+            assert!(found.counts.is_empty(), "another life");
+            c.on_belief(now_ms, (1, 2), (4, status), 1, &mut found);
+            assert_eq!(
+                found.counts.contains_key("haste"),
+                broken,
+                "{status:?} {after_ms}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_suspicion_that_its_subject_leaves_unanswered_is_found() {
+        for answers in [false, true] {
+            let (mut c, mut found) = check();
+            let mut story = Story::new(0);
+            c.on_beacon_heard(10_100, (1, 1), (2, 1), &beacon(Some(1)));
+            if answers {
+                c.on_beacon_spoken(1);
+            }
+            let views = [(1, speaking())];
+            story.snapshot(11_000, &views, |s| c.on_snapshot(s, &mut found));
+            assert_eq!(found.counts.contains_key("refute"), !answers);
+        }
+    }
+
+    #[test]
+    fn a_claim_that_is_not_said_again_is_found() {
+        for again_ms in [Some(9_000), None] {
+            let (mut c, mut found) = check();
+            let mut story = Story::new(0);
+            let views = [(1, speaking())];
+            for t in 0..14 {
+                if again_ms == Some(t * 1000) {
+                    c.on_claim(t * 1000, 1);
+                }
+                story.snapshot(t * 1000, &views, |s| c.on_snapshot(s, &mut found));
+            }
+            assert_eq!(
+                found.counts.contains_key("cadence"),
+                again_ms.is_none(),
+                "{again_ms:?}"
+            );
+        }
+    }
+}

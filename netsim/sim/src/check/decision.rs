@@ -1,0 +1,606 @@
+//! Rounds judged from the bids alone (`decision`): whoever divides, divides what the bids
+//! of one complete round say and nothing else; an adopted division is the one of its
+//! epoch; nobody takes what another has committed; without a loss only a gain is adopted.
+//! And the bids themselves against what their authors did (`bid`).
+
+use super::Findings;
+use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav, divide};
+use skein_flight::coverage::ring::{CoverageLoop, Direction};
+use skein_geometry::frame::Point;
+use skein_peer::cells::CellSet;
+use skein_peer::protocol::rounds::{OpenRound, RoundOrder, epoch_of, order_of};
+use skein_peer::protocol::runs::cells_of;
+use skein_peer::wire::message::{Bid, Claim, Epoch, Firmness};
+use skein_peer::{Beliefs, PeerId};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// Without a loss the new makespan is at most this many percent of the present one.
+const GAIN_PERCENT: u64 = 90;
+
+/// Divisions without a loss are at least this many beacon periods apart.
+const CALM_PERIODS: u64 = 20;
+
+/// A bid may put its author nearer than it can fly by this much, metres: a frame sees a
+/// cell from short of its boundary.
+const REACH_SLACK_M: f64 = 100.0;
+
+/// Where a bidder is and how fast it can get over the ground.
+#[derive(Clone, Copy, Debug)]
+pub struct Mover {
+    /// Where.
+    pub at: Point,
+    /// How fast at most, the wind behind it, m/s.
+    pub fastest_mps: f64,
+}
+
+/// What the rounds of one run were found to be.
+#[derive(Clone, Debug, Default)]
+pub struct DecisionCheck {
+    period_ms: u64,
+    loops: BTreeMap<u64, Arc<CoverageLoop>>,
+    rounds: BTreeMap<RoundOrder, OpenRound>,
+    divisions: BTreeMap<Epoch, Option<(Vec<RingCell>, Division)>>,
+    judged: BTreeMap<u16, Epoch>,
+    /// Peers whose clocks are wrong.
+    troubled: BTreeSet<u16>,
+    adopted: BTreeMap<u16, Adopted>,
+}
+
+/// What a peer did since it last adopted a division.
+#[derive(Clone, Copy, Debug, Default)]
+struct Adopted {
+    /// Divisions adopted in this life.
+    count: u32,
+    /// When the last one was.
+    at_ms: u64,
+    /// Cells covered since.
+    cells: u16,
+}
+
+impl DecisionCheck {
+    /// The checks at beacon period T.
+    #[must_use]
+    pub fn new(period_ms: u64) -> Self {
+        Self {
+            period_ms,
+            ..Self::default()
+        }
+    }
+
+    /// A peer's clock is wrong from now on, or it is late.
+    pub fn on_trouble(&mut self, id: u16) {
+        self.troubled.insert(id);
+    }
+
+    /// A loop was derived.
+    pub fn on_loop(&mut self, coverage_loop: &Arc<CoverageLoop>) {
+        self.loops
+            .entry(coverage_loop.hash())
+            .or_insert_with(|| Arc::clone(coverage_loop));
+    }
+
+    /// A process starts, or begins to work on another loop: it has adopted nothing yet.
+    pub fn on_anew(&mut self, id: u16) {
+        self.adopted.remove(&id);
+        self.judged.remove(&id);
+    }
+
+    /// A peer's camera saw so many cells that it did not know to be covered.
+    pub fn on_covered(&mut self, id: u16, count: usize) {
+        let adopted = self.adopted.entry(id).or_default();
+        let count = u16::try_from(count).unwrap_or(u16::MAX);
+        adopted.cells = adopted.cells.saturating_add(count);
+    }
+
+    /// A peer tells what it will fly, having adopted so many divisions.
+    pub fn on_told(&mut self, now_ms: u64, id: u16, adoptions: u32) {
+        let adopted = self.adopted.entry(id).or_default();
+        if adopted.count != adoptions {
+            *adopted = Adopted {
+                count: adoptions,
+                at_ms: now_ms,
+                cells: 0,
+            };
+        }
+    }
+
+    /// A peer makes a bid durable while it believes `view`; `mover` says where it is.
+    pub fn on_bid(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        bid: &Bid,
+        (view, mover): (&Beliefs, Option<Mover>),
+        found: &mut Findings,
+    ) {
+        for text in self.lies(now_ms, id, bid, view, mover) {
+            found.broken("bid", now_ms, Some(id), || text);
+        }
+        let order = order_of(&bid.round);
+        let open = self.rounds.entry(order).or_insert_with(|| OpenRound {
+            round: bid.round.clone(),
+            bids: BTreeMap::new(),
+        });
+        open.bids.insert(id, bid.clone());
+    }
+
+    /// How a bid differs from what its author did and is.
+    fn lies(
+        &self,
+        now_ms: u64,
+        id: u16,
+        bid: &Bid,
+        view: &Beliefs,
+        mover: Option<Mover>,
+    ) -> Vec<String> {
+        let mut lies = Vec::new();
+        let adopted = self.adopted.get(&id).copied().unwrap_or_default();
+        let told = adopted.count == view.adoptions;
+        if told && bid.cells_since != adopted.cells {
+            lies.push(format!(
+                "says that it covered {} cells since its last adoption, it covered {}",
+                bid.cells_since, adopted.cells
+            ));
+        }
+        if bid.idle != view.plan.is_empty() {
+            lies.push(format!(
+                "says idle {} with {} cells to fly",
+                bid.idle,
+                view.plan.len()
+            ));
+        }
+        let budget_ms = u64::from(bid.release_ms) + u64::from(bid.endurance_ms);
+        // A bid that cannot be flown at all offers nothing, whenever it is released.
+        if bid.endurance_ms > 0 && budget_ms > u64::from(view.spendable_ms) + 1_000 {
+            lies.push(format!(
+                "offers {} ms of flight from {} ms on, it may spend {} ms",
+                bid.endurance_ms, bid.release_ms, view.spendable_ms
+            ));
+        }
+        if told && adopted.count > 0 && !self.troubled.contains(&id) {
+            let ago_ms = now_ms.saturating_sub(adopted.at_ms);
+            if u64::from(bid.adopted_ago_ms).abs_diff(ago_ms) > self.period_ms {
+                lies.push(format!(
+                    "says that it adopted {} ms ago, it was {ago_ms} ms ago",
+                    bid.adopted_ago_ms
+                ));
+            }
+        }
+        if let (Some(mover), Some(lp)) = (mover, self.loops.get(&bid.round.loop_hash)) {
+            let anchor = lp.boundary(usize::from(bid.anchor)).position();
+            let away_m = (anchor - mover.at).norm();
+            let reach_m = mover.fastest_mps * f64::from(bid.release_ms) / 1000.0 + REACH_SLACK_M;
+            if away_m > reach_m {
+                lies.push(format!(
+                    "says that it will be at boundary {} in {} ms, which is {away_m:.0} m away",
+                    bid.anchor, bid.release_ms
+                ));
+            }
+        }
+        lies
+    }
+
+    /// A peer asks for a division: some complete round's bids say exactly this.
+    pub fn on_divide(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        (ring, uavs): (&[RingCell], &[Uav]),
+        found: &mut Findings,
+    ) {
+        let same_members = |o: &OpenRound| {
+            o.bids.len() == uavs.len() && o.bids.keys().eq(uavs.iter().map(|r| &r.id))
+        };
+        let rounds = self.rounds.values().rev().filter(|o| is_complete(o));
+        let says = rounds.filter(|o| same_members(o)).any(|o| {
+            self.problem_of(o)
+                .is_some_and(|p| p.0 == ring && p.1 == uavs)
+        });
+        if !says {
+            let members: Vec<PeerId> = uavs.iter().map(|r| PeerId(r.id)).collect();
+            found.broken("decision", now_ms, Some(id), || {
+                format!("divides among {members:?} what no complete round's bids say")
+            });
+        }
+    }
+
+    /// What the bids of a round ask for: cells that no bid knows to be covered and no bid
+    /// commits to are open.
+    fn problem_of(&self, open: &OpenRound) -> Option<(Vec<RingCell>, Vec<Uav>)> {
+        let lp = self.loops.get(&open.round.loop_hash)?;
+        let n = u16::try_from(lp.len()).unwrap_or(u16::MAX);
+        let mut done = vec![false; lp.len()];
+        for (cell, flag) in lp.cells().iter().zip(&mut done) {
+            *flag = !cell.needed;
+        }
+        for bid in open.bids.values() {
+            let known = CellSet::decode_rle(n, &bid.covered).ok();
+            let known = known.iter().flat_map(CellSet::iter);
+            let commits = bid.commits.iter().flat_map(|run| cells_of(*run, n));
+            known
+                .chain(commits)
+                .for_each(|c| done[usize::from(c)] = true);
+        }
+        let ring = lp.cells().iter().zip(&done).map(|(cell, done)| RingCell {
+            service_mm: cell.service_mm,
+            travel_mm: cell.travel_mm,
+            open: !done,
+        });
+        let uavs = open.bids.iter().map(|(id, bid)| Uav {
+            anchor: bid.anchor % n.max(1),
+            id: *id,
+            heading: if bid.backward {
+                Direction::Backward
+            } else {
+                Direction::Forward
+            },
+            release_ms: bid.release_ms,
+            speed_mmps: bid.speed_mmps.max(1),
+            turn_ms: bid.turn_ms,
+            endurance_ms: bid.endurance_ms,
+        });
+        Some((ring.collect(), uavs.collect()))
+    }
+
+    /// A peer publishes its claim; `seen` tells what cameras saw of the first loop.
+    pub fn on_claim(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        claim: &Claim,
+        seen: &[bool],
+        found: &mut Findings,
+    ) {
+        let epoch = claim.epoch;
+        if epoch == Epoch::default() || self.judged.get(&id).is_some_and(|e| *e >= epoch) {
+            return;
+        }
+        self.judged.insert(id, epoch);
+        let Some(open) = self.round_of(epoch) else {
+            found.broken("decision", now_ms, Some(id), || {
+                format!("adopted {epoch:?}, which is no round in which all members bid")
+            });
+            return;
+        };
+        let open = open.clone();
+        self.judge_section(now_ms, id, (claim, &open), seen, found);
+        self.judge_gain(now_ms, id, &open, epoch, found);
+    }
+
+    fn round_of(&self, epoch: Epoch) -> Option<&OpenRound> {
+        let of_counter = (epoch.counter, 0, 0)..=(epoch.counter, usize::MAX, u32::MAX);
+        self.rounds
+            .range(of_counter)
+            .map(|(_, o)| o)
+            .find(|o| is_complete(o) && epoch_of(o) == epoch)
+    }
+
+    fn division_of(
+        &mut self,
+        epoch: Epoch,
+        open: &OpenRound,
+    ) -> Option<&(Vec<RingCell>, Division)> {
+        if !self.divisions.contains_key(&epoch) {
+            let divided = self.problem_of(open).map(|(ring, uavs)| {
+                let division = divide(&ring, &uavs);
+                (ring, division)
+            });
+            self.divisions.insert(epoch, divided);
+        }
+        self.divisions.get(&epoch).and_then(Option::as_ref)
+    }
+
+    /// What is newly listed by this round is in the author's section of it, and no other
+    /// member has committed to it.
+    fn judge_section(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        (claim, open): (&Claim, &OpenRound),
+        seen: &[bool],
+        found: &mut Findings,
+    ) {
+        let Some((ring, division)) = self.division_of(claim.epoch, open) else {
+            return;
+        };
+        let n = u16::try_from(ring.len()).unwrap_or(u16::MAX);
+        let mut mine = vec![false; ring.len()];
+        let section = division.sections.iter().find(|s| s.id == id);
+        for leg in section.iter().flat_map(|s| &s.legs) {
+            leg.cells(ring.len())
+                .for_each(|c| mine[usize::from(c)] = true);
+        }
+        let commits = |of: u16| {
+            let bid = open.bids.get(&of);
+            let runs = bid.into_iter().flat_map(|b| b.commits.iter());
+            runs.flat_map(|run| cells_of(*run, n)).collect::<Vec<u16>>()
+        };
+        let own = commits(id);
+        let others = open.bids.keys().filter(|o| **o != id);
+        let others: Vec<u16> = others.flat_map(|o| commits(*o)).collect();
+        let listed = claim
+            .plan
+            .iter()
+            .filter(|l| l.firmness != Firmness::Done)
+            .filter(|l| l.stamp.epoch == claim.epoch && l.stamp.take == 0 && l.stamp.id == id);
+        for cell in listed.flat_map(|l| cells_of(l.run, n)) {
+            let c = usize::from(cell);
+            // Runs bridge what is covered; cells already committed are the author's own.
+            if seen.get(c).copied().unwrap_or(true) || own.contains(&cell) {
+                continue;
+            }
+            if others.contains(&cell) {
+                found.broken("decision", now_ms, Some(id), || {
+                    format!("lists cell {cell}, to which another member of the round committed")
+                });
+            } else if ring[c].open && !mine[c] {
+                found.broken("decision", now_ms, Some(id), || {
+                    format!("lists cell {cell}, which is in another's section of its epoch")
+                });
+            }
+        }
+    }
+
+    /// Without a loss: a gain of a tenth, calm for 20 T, something covered since.
+    fn judge_gain(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        open: &OpenRound,
+        epoch: Epoch,
+        found: &mut Findings,
+    ) {
+        if open.round.loss {
+            return;
+        }
+        let calm_ms = CALM_PERIODS * self.period_ms;
+        let Some((_, division)) = self.division_of(epoch, open) else {
+            return;
+        };
+        let all = || open.bids.values();
+        let present_ms = all().map(|b| u64::from(b.eta_ms)).max().unwrap_or(0);
+        let new_ms = u64::from(division.makespan_ms);
+        let calm = all().all(|b| u64::from(b.adopted_ago_ms) >= calm_ms);
+        let progress = all().any(|b| b.cells_since > 0);
+        if new_ms * 100 > present_ms * GAIN_PERCENT || !calm || !progress {
+            found.broken("decision", now_ms, Some(id), || {
+                format!("adopted without a loss what takes {new_ms} ms instead of {present_ms} ms (calm {calm}, progress {progress})")
+            });
+        }
+    }
+}
+
+fn is_complete(open: &OpenRound) -> bool {
+    let members = open.round.members.iter();
+    members.len() == open.bids.len() && members.zip(open.bids.keys()).all(|(m, id)| m.id == *id)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::fixture;
+    use skein_geometry::frame::Point;
+    use skein_peer::wire::message::{CellRun, ListedRun, Member, Round, Stamp};
+
+    /// Two members on the fixture's loop, with their bids.
+    struct Case {
+        check: DecisionCheck,
+        found: Findings,
+        lp: Arc<CoverageLoop>,
+        bids: [Bid; 2],
+    }
+
+    fn view() -> Beliefs {
+        Beliefs {
+            spendable_ms: 2_000_000,
+            ..Beliefs::default()
+        }
+    }
+
+    impl Case {
+        fn new(loss: bool) -> Self {
+            let spec = fixture::square(2);
+            let lp = Arc::clone(&spec.mission.geometry().unwrap().coverage_loop);
+            let round = Round {
+                counter: 1,
+                members: [1, 2].map(|id| Member { id, incarnation: 1 }).to_vec(),
+                revision: 1,
+                loop_hash: lp.hash(),
+                loss,
+                wait_ms: 5000,
+            };
+            let bid = |anchor: usize| Bid {
+                round: round.clone(),
+                anchor: u16::try_from(anchor).unwrap(),
+                backward: false,
+                release_ms: 0,
+                speed_mmps: 12_000,
+                turn_ms: 10_000,
+                endurance_ms: 1_000_000,
+                covered: Vec::new(),
+                commits: Vec::new(),
+                eta_ms: 0,
+                adopted_ago_ms: u32::MAX,
+                cells_since: 0,
+                idle: true,
+            };
+            let mut check = DecisionCheck::new(1000);
+            check.on_loop(&lp);
+            Self {
+                check,
+                found: Findings::new(1),
+                bids: [bid(0), bid(lp.len() / 2)],
+                lp,
+            }
+        }
+
+        fn bid(&mut self) {
+            for (id, bid) in [(1, self.bids[0].clone()), (2, self.bids[1].clone())] {
+                let view = Beliefs {
+                    plan: if bid.idle { Vec::new() } else { vec![0] },
+                    ..view()
+                };
+                self.check
+                    .on_bid(9, id, &bid, (&view, None), &mut self.found);
+            }
+        }
+
+        fn problem(&self) -> (Vec<RingCell>, Vec<Uav>) {
+            let open = self.check.rounds.values().next().unwrap();
+            self.check.problem_of(open).unwrap()
+        }
+
+        fn epoch(&self) -> Epoch {
+            epoch_of(self.check.rounds.values().next().unwrap())
+        }
+
+        /// Peer 1 claims these cells in the epoch of the round.
+        fn claims(&mut self, epoch: Epoch, first: u16, count: u16) {
+            let claim = Claim {
+                loop_hash: self.lp.hash(),
+                epoch,
+                plan: vec![ListedRun {
+                    run: CellRun { first, count },
+                    backward: false,
+                    firmness: Firmness::Tentative,
+                    stamp: Stamp {
+                        epoch,
+                        take: 0,
+                        id: 1,
+                    },
+                }],
+                ..Claim::default()
+            };
+            let seen = vec![false; self.lp.len()];
+            self.check.on_claim(9, 1, &claim, &seen, &mut self.found);
+        }
+
+        fn broken(&self, name: &str) -> bool {
+            self.found.counts.contains_key(name)
+        }
+    }
+
+    #[test]
+    fn dividing_anything_but_what_all_bids_say_is_found() {
+        let mut c = Case::new(true);
+        c.bid();
+        let (ring, uavs) = c.problem();
+        c.check.on_divide(9, 1, (&ring, &uavs), &mut c.found);
+        assert!(!c.broken("decision"), "{:?}", c.found.violations);
+        let mut own_view = ring.clone();
+        let open = own_view.iter().position(|r| r.open).unwrap();
+        own_view[open].open = false;
+        let mut alone = uavs.clone();
+        alone.pop();
+        let mut faster = uavs.clone();
+        faster[1].speed_mmps += 1;
+        for (n, (ring, uavs)) in [(&own_view, &uavs), (&ring, &alone), (&ring, &faster)]
+            .into_iter()
+            .enumerate()
+        {
+            c.check.on_divide(9, 1, (ring, uavs), &mut c.found);
+            assert_eq!(c.found.counts.get("decision"), Some(&(n as u64 + 1)));
+        }
+    }
+
+    #[test]
+    fn adopting_before_all_have_bid_is_found() {
+        let mut c = Case::new(true);
+        c.bid();
+        let epoch = c.epoch();
+        let mut early = Case::new(true);
+        let bid = early.bids[0].clone();
+        let view = view();
+        early
+            .check
+            .on_bid(9, 1, &bid, (&view, None), &mut early.found);
+        early.claims(epoch, 0, 1);
+        assert!(early.broken("decision"));
+    }
+
+    #[test]
+    fn listing_what_is_anothers_or_committed_is_found() {
+        let mut c = Case::new(true);
+        c.bid();
+        let (ring, uavs) = c.problem();
+        let division = divide(&ring, &uavs);
+        let of = |id: u16| {
+            let section = division.sections.iter().find(|s| s.id == id).unwrap();
+            let mut cells = section.legs.iter().flat_map(|l| l.cells(ring.len()));
+            cells.find(|c| ring[usize::from(*c)].open).unwrap()
+        };
+        for (cell, broken) in [(of(1), false), (of(2), true)] {
+            let mut c = Case::new(true);
+            c.bid();
+            let epoch = c.epoch();
+            c.claims(epoch, cell, 1);
+            assert_eq!(c.broken("decision"), broken, "{:?}", c.found.violations);
+        }
+        let mut c = Case::new(true);
+        c.bids[1].commits = vec![CellRun {
+            first: of(1),
+            count: 1,
+        }];
+        c.bid();
+        let epoch = c.epoch();
+        c.claims(epoch, of(1), 1);
+        assert!(c.broken("decision"));
+    }
+
+    #[test]
+    fn a_division_without_a_loss_needs_gain_calm_and_progress() {
+        for (eta_ms, ago_ms, cells, broken) in [
+            (900_000_000, 60_000, 1, false),
+            (1_000, 60_000, 1, true),
+            (900_000_000, 1_000, 1, true),
+            (900_000_000, 60_000, 0, true),
+        ] {
+            let mut c = Case::new(false);
+            for bid in &mut c.bids {
+                (bid.eta_ms, bid.adopted_ago_ms, bid.cells_since) = (eta_ms, ago_ms, cells);
+            }
+            c.bid();
+            let epoch = c.epoch();
+            c.claims(epoch, 0, 0);
+            assert_eq!(
+                c.broken("decision"),
+                broken,
+                "{eta_ms} {ago_ms} {cells}: {:?}",
+                c.found.violations
+            );
+        }
+    }
+
+    #[test]
+    fn a_bid_that_differs_from_what_its_author_did_is_found() {
+        let mover = |east_m| Mover {
+            at: Point::new(east_m, 0.0),
+            fastest_mps: 20.0,
+        };
+        type Lie = fn(&mut Bid);
+        let lies: [(Lie, f64, bool); 6] = [
+            (|_| {}, 0.0, false),
+            (|b| b.cells_since = 2, 0.0, true),
+            (|b| b.adopted_ago_ms = 500_000, 0.0, true),
+            (|b| b.idle = false, 0.0, true),
+            (|b| b.endurance_ms = 3_000_000, 0.0, true),
+            (|_| {}, 5_000.0, true),
+        ];
+        for (n, (lie, east_m, broken)) in lies.into_iter().enumerate() {
+            let mut c = Case::new(true);
+            c.check.on_told(0, 1, 1);
+            c.check.on_covered(1, 3);
+            let mut bid = c.bids[0].clone();
+            (bid.adopted_ago_ms, bid.cells_since) = (40_000, 3);
+            lie(&mut bid);
+            let view = Beliefs {
+                adoptions: 1,
+                ..view()
+            };
+            let at = Some(mover(east_m));
+            c.check.on_bid(40_000, 1, &bid, (&view, at), &mut c.found);
+            assert_eq!(c.broken("bid"), broken, "{n}: {:?}", c.found.violations);
+        }
+    }
+}

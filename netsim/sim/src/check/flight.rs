@@ -1,0 +1,245 @@
+//! What is flown against what is wanted: who holds or waits stays where it is (`hold`);
+//! who is finished, ordered home or out of fuel flies home (`home`).
+
+use super::{Clocks, Findings, PeerSnapshot, Snapshot};
+use skein_geometry::frame::Point;
+use skein_peer::wire::message::Order;
+use std::collections::BTreeMap;
+
+/// Turning into a circle from any heading takes less than one turn and a half: so long a
+/// peer that begins to hold may still drift, in turns at its least radius.
+const SETTLE_TURNS: f64 = 1.5;
+
+/// A circle at the least radius is no wider than two radii; a second circle lies beside it
+/// when the side was changed for the sake of a zone, and half of one is room for the wind.
+const HOLD_RADII: f64 = 5.0;
+
+/// The way home round zones is at most so many times the straight one, in the scenarios
+/// flown here: no zone is as wide as it is far.
+const DETOUR: f64 = 2.0;
+
+/// And before it begins a peer turns round, and looks four times a period, seconds.
+const HOME_SLACK_S: f64 = 30.0;
+
+/// What a UAV can do over the ground.
+#[derive(Clone, Copy, Debug)]
+pub struct Flyer {
+    /// The least radius of a turn, at cruise and over the ground, metres.
+    pub turn_radius_m: f64,
+    /// Its speed at cruise against the wind, m/s.
+    pub slowest_mps: f64,
+    /// Its speed at cruise with the wind, m/s.
+    pub fastest_mps: f64,
+}
+
+/// Somebody who is to be home by then.
+#[derive(Clone, Copy, Debug)]
+struct Homing {
+    due_ms: u64,
+    base: Point,
+    told: bool,
+}
+
+/// What the flights of one run were found to be.
+#[derive(Clone, Debug)]
+pub struct FlightCheck {
+    flyers: BTreeMap<u16, Flyer>,
+    homing: BTreeMap<u16, Homing>,
+    holding: BTreeMap<u16, (u64, Option<Point>)>,
+    told: Clocks<u16>,
+    /// UAV milliseconds spent able and without anything to fly, while cells were open.
+    pub idle_ms: u64,
+}
+
+impl FlightCheck {
+    /// The checks of these UAVs.
+    #[must_use]
+    pub fn new(flyers: BTreeMap<u16, Flyer>) -> Self {
+        Self {
+            flyers,
+            homing: BTreeMap::new(),
+            holding: BTreeMap::new(),
+            told: Clocks::default(),
+            idle_ms: 0,
+        }
+    }
+
+    /// A process ends or stands still: its airframe loiters where it is.
+    pub fn on_silent(&mut self, id: u16) {
+        self.homing.remove(&id);
+        self.holding.remove(&id);
+        self.told.stop(id);
+    }
+
+    /// Whether everybody who is to be home is.
+    #[must_use]
+    pub fn all_home(&self, snapshot_peers: &[PeerSnapshot]) -> bool {
+        snapshot_peers.iter().filter(|m| m.uav).all(|m| {
+            let homing = self.homing.get(&m.id);
+            homing.is_none_or(|h| h.told || self.is_home(m, h))
+        })
+    }
+
+    fn is_home(&self, m: &PeerSnapshot, homing: &Homing) -> bool {
+        let (Some(at), Some(flyer)) = (m.at, self.flyers.get(&m.id)) else {
+            return true;
+        };
+        (at - homing.base).norm() <= HOLD_RADII * flyer.turn_radius_m
+    }
+
+    /// Judges where everybody is; `base` tells where the mission of a revision ends.
+    pub fn on_snapshot(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        base: impl Fn(u32) -> Option<Point>,
+        found: &mut Findings,
+    ) {
+        let open = snapshot.covered.iter().any(|c| !c);
+        for m in snapshot.peers.iter().filter(|m| m.uav) {
+            if open && m.view.able && m.view.plan.is_empty() {
+                self.idle_ms += snapshot.bounds.period_ms;
+            }
+            let Some((at, flyer)) = m.at.zip(self.flyers.get(&m.id).copied()) else {
+                continue;
+            };
+            let returns = m.view.order == Order::ReturnToBase;
+            let spent = m.view.loop_hash != 0 && m.view.spendable_ms == 0 && !m.view.able;
+            let goes = m.view.order != Order::Hold && (returns || m.view.finished || spent);
+            match base(m.view.revision).filter(|_| goes && m.view.speaks) {
+                Some(base) => self.judge_homing(snapshot.now_ms, m, (at, base), flyer, found),
+                None => {
+                    self.homing.remove(&m.id);
+                }
+            }
+            if m.view.order == Order::Hold && m.view.loop_hash != 0 {
+                self.judge_holding(snapshot.now_ms, m.id, at, flyer, found);
+            } else {
+                self.holding.remove(&m.id);
+            }
+        }
+    }
+
+    fn judge_homing(
+        &mut self,
+        now_ms: u64,
+        m: &PeerSnapshot,
+        (at, base): (Point, Point),
+        flyer: Flyer,
+        found: &mut Findings,
+    ) {
+        let away_m = (at - base).norm();
+        let takes_s = DETOUR * away_m / flyer.slowest_mps.max(0.1) + HOME_SLACK_S;
+        let fresh = Homing {
+            due_ms: now_ms.saturating_add(milliseconds(takes_s)),
+            base,
+            told: false,
+        };
+        let homing = self.homing.entry(m.id).or_insert(fresh);
+        if homing.base != base {
+            *homing = fresh;
+        }
+        let homing = *homing;
+        if now_ms > homing.due_ms && !self.is_home(m, &homing) && !homing.told {
+            if let Some(h) = self.homing.get_mut(&m.id) {
+                h.told = true;
+            }
+            found.broken("home", now_ms, Some(m.id), || {
+                format!("is to fly home and is still {away_m:.0} m away from it")
+            });
+        }
+    }
+
+    fn judge_holding(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        at: Point,
+        flyer: Flyer,
+        found: &mut Findings,
+    ) {
+        let (since_ms, place) = self.holding.entry(id).or_insert((now_ms, None));
+        let settle_s = SETTLE_TURNS * core::f64::consts::TAU * flyer.turn_radius_m
+            / flyer.slowest_mps.max(0.1);
+        if now_ms < *since_ms + milliseconds(settle_s) {
+            return;
+        }
+        let place = *place.get_or_insert(at);
+        let away_m = (at - place).norm();
+        let most_m = HOLD_RADII * flyer.turn_radius_m;
+        if away_m <= most_m {
+            self.told.stop(id);
+            return;
+        }
+        self.told.start(id, now_ms);
+        if self.told.tell_once(id) {
+            found.broken("hold", now_ms, Some(id), || {
+                format!("is to hold and is {away_m:.0} m from where it held (bound {most_m:.0} m)")
+            });
+        }
+    }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "casts from floats saturate, and a flight is not negative"
+)]
+fn milliseconds(s: f64) -> u64 {
+    (s * 1000.0) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Story, speaking};
+    use super::*;
+    use skein_peer::Beliefs;
+
+    /// Peer 1 at so many metres from base after each second; what is broken.
+    fn flown(
+        change: impl Fn(&mut Beliefs),
+        away_m: impl Fn(u64) -> f64,
+    ) -> BTreeMap<&'static str, u64> {
+        let flyer = Flyer {
+            turn_radius_m: 20.0,
+            slowest_mps: 10.0,
+            fastest_mps: 14.0,
+        };
+        let mut check = FlightCheck::new(BTreeMap::from([(1, flyer)]));
+        let (mut story, mut found) = (Story::new(300), Findings::new(1));
+        let mut view = speaking();
+        change(&mut view);
+        for t in 0..200 {
+            story.place(1, Point::new(away_m(t), 0.0));
+            let views = [(1, view.clone())];
+            story.snapshot(t * 1000, &views, |s| {
+                check.on_snapshot(s, |_| Some(Point::new(0.0, 0.0)), &mut found);
+            });
+        }
+        found.counts
+    }
+
+    #[test]
+    fn whoever_is_to_fly_home_and_does_not_is_found() {
+        let wanted: [fn(&mut Beliefs); 3] = [
+            |b| b.finished = true,
+            |b| b.order = Order::ReturnToBase,
+            |b| (b.spendable_ms, b.able) = (0, false),
+        ];
+        let arrives = |t: u64| 600.0 - 10.0 * f64::from(u8::try_from(t.min(55)).unwrap());
+        for change in wanted {
+            assert!(flown(change, arrives).is_empty());
+            assert!(flown(change, |_| 600.0).contains_key("home"));
+        }
+        assert!(flown(|_| {}, |_| 600.0).is_empty());
+    }
+
+    #[test]
+    fn whoever_is_to_hold_and_flies_on_is_found() {
+        let hold = |b: &mut Beliefs| b.order = Order::Hold;
+        let circles = |t: u64| if t.is_multiple_of(2) { 500.0 } else { 540.0 };
+        assert!(flown(hold, circles).is_empty());
+        let flies_on = |t: u64| 10.0 * f64::from(u8::try_from(t).unwrap());
+        assert!(flown(hold, flies_on).contains_key("hold"));
+        assert!(flown(|_| {}, flies_on).is_empty());
+    }
+}

@@ -1,0 +1,410 @@
+//! When rounds are opened: a loss opens one at once (`prompt`); without a loss only a peer
+//! that has been able for 10 T opens one, 20 T after it last adopted a division
+//! (`patience`); a round that ran out of time is followed by one that waits twice as long
+//! (`waiting`).
+
+use super::{Clocks, Findings, Snapshot};
+use skein_peer::output::Status;
+use skein_peer::protocol::rounds::{RoundOrder, order_of};
+use skein_peer::protocol::runs::cells_of;
+use skein_peer::wire::message::{Bid, Claim, Member};
+use skein_peer::{Beliefs, Incarnation, PeerId};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// After a decision losses are given so many periods to be heard of: they open no round at once.
+const SETTLED_PERIODS: u64 = 5;
+
+/// A peer is able for so long before it opens a round without a loss.
+const STEADY_PERIODS: u64 = 10;
+
+/// Divisions without a loss are so far apart.
+const CALM_PERIODS: u64 = 20;
+
+/// After so long no peer waits for the bids of an earlier round: four times its first
+/// waiting time at the largest diameter, 16.
+const FORGOTTEN_PERIODS: u64 = 4 * (2 * 16 + 3);
+
+/// Beliefs are copied once a period, so what changed in the last one is not known: this
+/// many cells are orphans whatever was covered meanwhile (a cell takes more than a second).
+const SURELY_ORPHANED: usize = 4;
+
+/// A round that a peer bid in.
+#[derive(Clone, Debug)]
+struct Joined {
+    at_ms: u64,
+    order: RoundOrder,
+    wait_ms: u32,
+    members: Vec<Member>,
+    loss: bool,
+}
+
+/// One peer's part.
+#[derive(Clone, Debug, Default)]
+struct Part {
+    able_since_ms: Option<u64>,
+    adoptions: u32,
+    adopted_ms: Option<u64>,
+    joined: Option<Joined>,
+    /// When it last heard a bid in a round that names it and that it has not bid in: if a
+    /// member of that is gone, it opens the next round at once.
+    heard_ms: Option<u64>,
+    /// Whether the round joined last ended in an adoption of this peer.
+    decided: bool,
+    /// The least diameter it reckoned with lately: at this snapshot and the one before.
+    diameters: [u32; 2],
+    view: Option<Beliefs>,
+}
+
+/// When the rounds of one run were opened.
+#[derive(Clone, Debug)]
+pub struct PatienceCheck {
+    period_ms: u64,
+    parts: BTreeMap<u16, Part>,
+    spoken: BTreeSet<RoundOrder>,
+    owed: Clocks<u16>,
+    /// Peers that are late by no doing of their own, or whose clocks are wrong.
+    troubled: BTreeSet<u16>,
+}
+
+impl PatienceCheck {
+    /// The checks at beacon period T.
+    #[must_use]
+    pub fn new(period_ms: u64) -> Self {
+        Self {
+            period_ms,
+            parts: BTreeMap::new(),
+            spoken: BTreeSet::new(),
+            owed: Clocks::default(),
+            troubled: BTreeSet::new(),
+        }
+    }
+
+    /// A peer is late from now on, or its clock is wrong.
+    pub fn on_trouble(&mut self, id: u16) {
+        self.troubled.insert(id);
+    }
+
+    /// A process starts, ends, stands still, or works on another loop.
+    pub fn on_anew(&mut self, id: u16) {
+        self.parts.remove(&id);
+        self.owed.stop(id);
+    }
+
+    /// A peer tells what it will fly, having adopted so many divisions, the last one in
+    /// the round with this counter.
+    pub fn on_told(&mut self, now_ms: u64, id: u16, (adoptions, counter): (u32, u32)) {
+        let part = self.parts.entry(id).or_default();
+        if part.adoptions != adoptions {
+            part.adoptions = adoptions;
+            part.adopted_ms = Some(now_ms);
+            // What was decided before may become durable after the next round is open.
+            part.decided = part.joined.as_ref().is_none_or(|j| counter >= j.order.0);
+        }
+    }
+
+    /// A peer makes a bid durable: the round of a loss is open.
+    pub fn on_bid(&mut self, now_ms: u64, id: u16, bid: &Bid, found: &mut Findings) {
+        self.owed.stop(id);
+        let order = order_of(&bid.round);
+        let first = self.spoken.insert(order) && !self.troubled.contains(&id);
+        let part = self.parts.entry(id).or_default();
+        if first {
+            judge_patience(self.period_ms, now_ms, (id, part), bid, found);
+            judge_waiting(self.period_ms, now_ms, (id, part), bid, found);
+        }
+        part.joined = Some(Joined {
+            at_ms: now_ms,
+            order,
+            wait_ms: bid.round.wait_ms,
+            members: bid.round.members.clone(),
+            loss: bid.round.loss,
+        });
+        part.decided = false;
+    }
+
+    /// A running peer receives a bid.
+    pub fn on_bid_heard(&mut self, now_ms: u64, by: u16, bid: &Bid) {
+        let order = order_of(&bid.round);
+        let part = self.parts.entry(by).or_default();
+        let named = bid.round.members.iter().any(|m| m.id == by);
+        if named && part.joined.as_ref().is_none_or(|j| j.order < order) {
+            part.heard_ms = Some(now_ms);
+        }
+    }
+
+    /// A peer gives another up. `heard` are the newest claims it has heard, by author, with
+    /// the life in which they were said.
+    pub fn on_down<'a>(
+        &mut self,
+        now_ms: u64,
+        (observer, subject): (u16, u16),
+        incarnation: Incarnation,
+        heard: impl Fn(u16) -> Option<(&'a Arc<Claim>, Incarnation)>,
+    ) {
+        let Some(part) = self.parts.get(&observer) else {
+            return;
+        };
+        let Some(view) = &part.view else {
+            return;
+        };
+        let period_ms = self.period_ms;
+        let settled = part
+            .adopted_ms
+            .is_some_and(|t| now_ms > t + SETTLED_PERIODS * period_ms);
+        let believed = view.peers.get(&PeerId(subject));
+        let was_alive = believed.is_some_and(|(i, s)| *i == incarnation && *s != Status::Down);
+        if !view.able || !settled || !part.decided || !was_alive {
+            return;
+        }
+        let n = u16::try_from(view.covered.len()).unwrap_or(u16::MAX);
+        let Some((claim, life)) = heard(subject) else {
+            return;
+        };
+        if life != incarnation || claim.loop_hash != view.loop_hash {
+            return;
+        }
+        let mut orphans: BTreeSet<u16> = listed(claim, n)
+            .filter(|c| !view.covered.get(usize::from(*c)).copied().unwrap_or(true))
+            .collect();
+        let mine = [&view.plan, &view.held, &view.unassigned];
+        for c in mine.into_iter().flatten() {
+            orphans.remove(c);
+        }
+        for (other, (life, _)) in view.peers.iter().filter(|(o, _)| o.0 != subject) {
+            if let Some((claim, said_in)) = heard(other.0)
+                && said_in == *life
+            {
+                listed(claim, n).for_each(|c| {
+                    orphans.remove(&c);
+                });
+            }
+        }
+        if orphans.len() >= SURELY_ORPHANED {
+            self.owed.start(observer, now_ms);
+        }
+    }
+
+    /// Judges what is overdue, and remembers what everybody believes now.
+    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        let now_ms = snapshot.now_ms;
+        for m in snapshot.peers.iter().filter(|m| m.uav) {
+            let part = self.parts.entry(m.id).or_default();
+            if m.view.able {
+                part.able_since_ms.get_or_insert(now_ms);
+            } else {
+                part.able_since_ms = None;
+                self.owed.stop(m.id);
+            }
+            part.diameters = [m.view.diameter, part.diameters[0]];
+            part.view = Some(m.view.clone());
+            // The peer looks four times a period, and its bid is written in 20 ms.
+            let late_ms = self.owed.since(m.id).map(|t| now_ms - t);
+            let late_ms = late_ms.filter(|_| !self.troubled.contains(&m.id));
+            if late_ms.is_some_and(|l| l > self.period_ms / 2) && self.owed.tell_once(m.id) {
+                found.broken("prompt", now_ms, Some(m.id), || {
+                    "gave up a peer whose cells nobody lists and opened no round within T/2"
+                        .to_owned()
+                });
+            }
+        }
+    }
+}
+
+/// A round without a loss, opened by the first who bids in it, unless it may follow one
+/// that ran out of time.
+fn judge_patience(
+    period_ms: u64,
+    now_ms: u64,
+    (id, part): (u16, &Part),
+    bid: &Bid,
+    found: &mut Findings,
+) {
+    let heard = part.heard_ms.is_some_and(|t| now_ms <= t + period_ms);
+    let follows = heard
+        || part
+            .joined
+            .as_ref()
+            .is_some_and(|j| !part.decided && now_ms < j.at_ms + FORGOTTEN_PERIODS * period_ms);
+    if bid.round.loss || follows {
+        return;
+    }
+    // Since the snapshot in which it was able first; it may have been so for T before.
+    let able_ms = part.able_since_ms.map_or(0, |t| now_ms - t) + period_ms;
+    let calm_ms = part.adopted_ms.map(|t| now_ms - t);
+    let hasty = able_ms < STEADY_PERIODS * period_ms;
+    let restless = calm_ms.is_some_and(|c| c < CALM_PERIODS * period_ms);
+    if hasty || restless {
+        found.broken("patience", now_ms, Some(id), || {
+            format!(
+                "opens a round without a loss, able for {able_ms} ms, {calm_ms:?} ms after its last adoption"
+            )
+        });
+    }
+}
+
+/// A round that ran out of time, with all its members still there, is followed by one that
+/// waits at least twice the first waiting time.
+fn judge_waiting(
+    period_ms: u64,
+    now_ms: u64,
+    (id, part): (u16, &Part),
+    bid: &Bid,
+    found: &mut Findings,
+) {
+    let Some(before) = part.joined.as_ref().filter(|j| {
+        let later = bid.round.counter == j.order.0 + 1;
+        let out_of_time = now_ms > j.at_ms + u64::from(j.wait_ms);
+        // Without a loss a decision may be one not to adopt, which nobody can see.
+        later && out_of_time && j.loss && !part.decided && j.members == bid.round.members
+    }) else {
+        return;
+    };
+    // It may reckon with a hop less than at either snapshot.
+    let least_diameter = part.diameters[0].min(part.diameters[1]);
+    let diameter = least_diameter.saturating_sub(1).max(1);
+    let least_ms = 2 * (2 * u64::from(diameter) + 3) * period_ms;
+    if u64::from(bid.round.wait_ms) < least_ms {
+        found.broken("waiting", now_ms, Some(id), || {
+            format!(
+                "opens round {} that waits {} ms after one that waited {} ms in vain (at least {least_ms} ms)",
+                bid.round.counter, bid.round.wait_ms, before.wait_ms
+            )
+        });
+    }
+}
+
+/// The cells that a claim lists, given away or not.
+fn listed(claim: &Claim, n: u16) -> impl Iterator<Item = u16> {
+    let runs = claim.plan.iter().chain(&claim.held);
+    runs.flat_map(move |l| cells_of(l.run, n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{LOOP, Story, speaking};
+    use super::*;
+    use skein_peer::wire::message::{CellRun, Firmness, ListedRun, Round, Stamp};
+
+    fn bid(counter: u32, loss: bool, wait_ms: u32) -> Bid {
+        Bid {
+            round: Round {
+                counter,
+                members: vec![Member {
+                    id: 1,
+                    incarnation: 1,
+                }],
+                revision: 1,
+                loop_hash: LOOP,
+                loss,
+                wait_ms,
+            },
+            anchor: 0,
+            backward: false,
+            release_ms: 0,
+            speed_mmps: 1,
+            turn_ms: 0,
+            endurance_ms: 0,
+            covered: Vec::new(),
+            commits: Vec::new(),
+            eta_ms: 0,
+            adopted_ago_ms: 0,
+            cells_since: 0,
+            idle: true,
+        }
+    }
+
+    /// Peer 1 able from second 0 to second `until`.
+    fn able_until(check: &mut PatienceCheck, until_s: u64, found: &mut Findings) {
+        let mut story = Story::new(300);
+        let mut view = speaking();
+        view.peers.insert(PeerId(2), (1, Status::Alive));
+        for t in 0..=until_s {
+            let views = [(1, view.clone())];
+            story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, found));
+        }
+    }
+
+    #[test]
+    fn a_round_without_a_loss_too_soon_is_found() {
+        for (adopted_s, able_s, loss, broken) in [
+            (None, 3, false, true),
+            (None, 12, false, false),
+            (None, 3, true, false),
+            (Some(20), 30, false, true),
+            (Some(5), 30, false, false),
+        ] {
+            let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
+            if let Some(t) = adopted_s {
+                check.on_told(t * 1000, 1, (1, 1));
+            }
+            able_until(&mut check, able_s, &mut found);
+            check.on_bid(able_s * 1000, 1, &bid(4, loss, 5000), &mut found);
+            assert_eq!(
+                found.counts.contains_key("patience"),
+                broken,
+                "{adopted_s:?} {able_s} {loss}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_waiting_time_that_is_not_doubled_is_found() {
+        for (wait_ms, after_ms, broken) in [
+            (5000, 5100, true),
+            (10_000, 5100, false),
+            (5000, 900, false),
+        ] {
+            let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
+            able_until(&mut check, 30, &mut found);
+            check.on_bid(30_000, 1, &bid(4, true, 5000), &mut found);
+            check.on_bid(30_000 + after_ms, 1, &bid(5, true, wait_ms), &mut found);
+            assert_eq!(
+                found.counts.contains_key("waiting"),
+                broken,
+                "{wait_ms} {after_ms}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_loss_that_opens_no_round_at_once_is_found() {
+        let claim = |count| {
+            Arc::new(Claim {
+                loop_hash: LOOP,
+                plan: vec![ListedRun {
+                    run: CellRun { first: 0, count },
+                    backward: false,
+                    firmness: Firmness::Tentative,
+                    stamp: Stamp::default(),
+                }],
+                ..Claim::default()
+            })
+        };
+        for (cells, opens, adopted_s, broken) in [
+            (4, false, 2, true),
+            (4, true, 2, false),
+            (0, false, 2, false),
+            (4, false, 28, false),
+        ] {
+            let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
+            check.on_told(adopted_s * 1000, 1, (1, 1));
+            able_until(&mut check, 30, &mut found);
+            let dead = claim(cells);
+            let heard = |id| (id == 2).then_some((&dead, 1));
+            check.on_down(30_100, (1, 2), 1, heard);
+            if opens {
+                check.on_bid(30_300, 1, &bid(7, true, 5000), &mut found);
+            }
+            let mut story = Story::new(300);
+            story.snapshot(31_000, &[(1, speaking())], |s| {
+                check.on_snapshot(s, &mut found);
+            });
+            assert_eq!(
+                found.counts.contains_key("prompt"),
+                broken,
+                "{cells} {opens} {adopted_s}"
+            );
+        }
+    }
+}

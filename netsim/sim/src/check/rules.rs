@@ -1,0 +1,272 @@
+//! The rules of single peers behind one door: what they say and fly, and when.
+
+use super::airtime::AirtimeCheck;
+use super::cadence::CadenceCheck;
+use super::decision::{DecisionCheck, Mover};
+use super::flight::{FlightCheck, Flyer};
+use super::listing::ListingCheck;
+use super::patience::PatienceCheck;
+use super::record::Said;
+use super::spoken::SpokenCheck;
+use super::spread::SpreadCheck;
+use super::{Findings, PeerSnapshot, Snapshot};
+use crate::spec::{Spec, UavSpec};
+use skein_flight::coverage::ring::CoverageLoop;
+use skein_flight::coverage::ring::backtracking::{RingCell, Uav};
+use skein_geometry::frame::Point;
+use skein_peer::mission::{Mission, chunks, point_m};
+use skein_peer::output::Status;
+use skein_peer::wire::codec::Body;
+use skein_peer::wire::message::Bid;
+use skein_peer::{Beliefs, Incarnation, Report};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The rules of single peers in one run.
+#[derive(Clone, Debug)]
+pub struct Rules {
+    /// What is flown.
+    pub flight: FlightCheck,
+    flyers: BTreeMap<u16, Flyer>,
+    airtime: AirtimeCheck,
+    cadence: CadenceCheck,
+    decision: DecisionCheck,
+    patience: PatienceCheck,
+    spoken: SpokenCheck,
+    spread: SpreadCheck,
+    loops: BTreeMap<u16, u64>,
+    /// Where missions end, by the first revision that says so.
+    bases: BTreeMap<u32, Point>,
+}
+
+impl Rules {
+    /// The rules of a scenario.
+    #[must_use]
+    pub fn new(spec: &Spec) -> Self {
+        let period_ms = u64::from(spec.beacon_period_ms.max(1));
+        let flyers: BTreeMap<u16, Flyer> =
+            spec.uavs.iter().map(|u| (u.id, flyer(u, spec))).collect();
+        let mut rules = Self {
+            flight: FlightCheck::new(flyers.clone()),
+            flyers,
+            airtime: AirtimeCheck::new(spec.radio.rate_bps),
+            cadence: CadenceCheck::new(period_ms),
+            decision: DecisionCheck::new(period_ms),
+            patience: PatienceCheck::new(period_ms),
+            spoken: SpokenCheck::default(),
+            spread: SpreadCheck::default(),
+            loops: BTreeMap::new(),
+            bases: BTreeMap::new(),
+        };
+        rules.on_mission(&spec.mission);
+        rules
+    }
+
+    /// The operator has a mission.
+    pub fn on_mission(&mut self, mission: &Mission) {
+        self.bases.insert(mission.revision, point_m(mission.base));
+        self.spread.on_mission(chunks(mission).len());
+    }
+
+    /// A peer is late from now on by no doing of its own.
+    pub fn on_trouble(&mut self, id: u16) {
+        self.cadence.on_trouble(id);
+        self.patience.on_trouble(id);
+        self.spoken.on_trouble(id);
+        self.decision.on_trouble(id);
+    }
+
+    /// A peer's clock is wrong from now on.
+    pub fn on_wrong_clock(&mut self, id: u16) {
+        self.on_trouble(id);
+        self.cadence.on_wrong_clock(id);
+    }
+
+    /// A loop was derived.
+    pub fn on_loop(&mut self, coverage_loop: &Arc<CoverageLoop>) {
+        self.decision.on_loop(coverage_loop);
+    }
+
+    /// A process starts.
+    pub fn on_boot(&mut self, now_ms: u64, id: u16) {
+        self.on_silent(id);
+        self.decision.on_anew(id);
+        self.loops.remove(&id);
+        self.cadence.on_boot(now_ms, id);
+    }
+
+    /// A process ends or stands still.
+    pub fn on_silent(&mut self, id: u16) {
+        self.cadence.on_silent(id);
+        self.patience.on_anew(id);
+        self.spoken.on_silent(id);
+        self.spread.on_silent(id);
+        self.flight.on_silent(id);
+    }
+
+    /// A peer reports something; beside it the divisions it adopted in this life, the
+    /// diameter that bounds reckon with, and who heard which claims.
+    pub fn on_report(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        report: &Report,
+        (adoptions, diameter, listing): (u32, u64, &ListingCheck),
+        found: &mut Findings,
+    ) {
+        match report {
+            Report::Membership {
+                peer,
+                incarnation,
+                status,
+            } => {
+                let about = (id, peer.0);
+                self.cadence
+                    .on_belief(now_ms, about, (*incarnation, *status), diameter, found);
+                if *status == Status::Down {
+                    let heard = |author| listing.heard(id, author);
+                    self.patience.on_down(now_ms, about, *incarnation, heard);
+                }
+            }
+            Report::Claim { counter, .. } => {
+                self.cadence.on_claim(now_ms, id);
+                self.decision.on_told(now_ms, id, adoptions);
+                self.patience.on_told(now_ms, id, (adoptions, *counter));
+            }
+            Report::Covered { cells } => self.decision.on_covered(id, cells.len()),
+            Report::Ready { loop_hash, .. } => {
+                let before = self.loops.insert(id, *loop_hash);
+                self.on_loop_of(id, before, *loop_hash);
+            }
+            _ => {}
+        }
+    }
+
+    fn on_loop_of(&mut self, id: u16, before: Option<u64>, now: u64) {
+        if before != Some(now) {
+            self.decision.on_anew(id);
+            self.patience.on_anew(id);
+        }
+    }
+
+    /// A peer puts bytes on the air, its own or another's.
+    pub fn on_transmission(&mut self, now_ms: u64, id: u16, bytes: usize, found: &mut Findings) {
+        self.airtime.on_transmission(now_ms, id, bytes);
+        self.cadence.on_transmission(now_ms, id, found);
+    }
+
+    /// A peer puts its own beacon on the air while it believes this.
+    pub fn on_beacon(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        said: &Said,
+        view: &Beliefs,
+        found: &mut Findings,
+    ) {
+        if let Body::Beacon(beacon) = &said.body {
+            let author = (id, said.record.incarnation);
+            self.spoken.on_beacon(now_ms, author, beacon, view, found);
+            self.cadence.on_beacon_spoken(id);
+        }
+    }
+
+    /// A peer publishes a record of its own; `seen` tells what cameras saw of which loop.
+    pub fn on_said(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        said: &Said,
+        seen: (u64, &[bool]),
+        found: &mut Findings,
+    ) {
+        let author = (id, said.record.incarnation);
+        self.spread.on_held(id, &said.record);
+        self.spoken.on_said(now_ms, author, &said.body, seen, found);
+        if let Some(claim) = &said.claim {
+            self.spoken.on_claim(id, author.1, Arc::clone(claim));
+            let covered = if claim.loop_hash == seen.0 {
+                seen.1
+            } else {
+                &[]
+            };
+            self.decision.on_claim(now_ms, id, claim, covered, found);
+        }
+    }
+
+    /// A running peer of this life receives a record.
+    pub fn on_received(&mut self, now_ms: u64, (id, life): (u16, Incarnation), said: &Said) {
+        self.spread.on_held(id, &said.record);
+        if let Body::Beacon(beacon) = &said.body {
+            let author = (said.record.author, said.record.incarnation);
+            self.cadence
+                .on_beacon_heard(now_ms, (id, life), author, beacon);
+        }
+        if let Body::Bid(bid) = &said.body {
+            self.patience.on_bid_heard(now_ms, id, bid);
+        }
+    }
+
+    /// A peer makes a bid durable while it believes this, at this place.
+    pub fn on_bid(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        bid: &Bid,
+        (view, at): (&Beliefs, Option<Point>),
+        found: &mut Findings,
+    ) {
+        let mover = at.zip(self.flyers.get(&id)).map(|(at, flyer)| Mover {
+            at,
+            fastest_mps: flyer.fastest_mps,
+        });
+        self.decision.on_bid(now_ms, id, bid, (view, mover), found);
+        self.patience.on_bid(now_ms, id, bid, found);
+    }
+
+    /// A peer asks for a division.
+    pub fn on_divide(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        problem: (&[RingCell], &[Uav]),
+        found: &mut Findings,
+    ) {
+        self.decision.on_divide(now_ms, id, problem, found);
+    }
+
+    /// Judges everybody, once a beacon period.
+    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        self.cadence.on_snapshot(snapshot, found);
+        self.patience.on_snapshot(snapshot, found);
+        self.spoken.on_snapshot(snapshot, found);
+        self.spread.on_snapshot(snapshot, found);
+        self.airtime.on_snapshot(snapshot, found);
+        let bases = &self.bases;
+        let base = |revision| bases.range(..=revision).next_back().map(|(_, b)| *b);
+        self.flight.on_snapshot(snapshot, base, found);
+    }
+
+    /// Judges only what is flown: all else is over.
+    pub fn on_way_home(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        let bases = &self.bases;
+        let base = |revision| bases.range(..=revision).next_back().map(|(_, b)| *b);
+        self.flight.on_snapshot(snapshot, base, found);
+    }
+
+    /// Whether everybody who is to be home is.
+    #[must_use]
+    pub fn all_home(&self, peers: &[PeerSnapshot]) -> bool {
+        self.flight.all_home(peers)
+    }
+}
+
+fn flyer(uav: &UavSpec, spec: &Spec) -> Flyer {
+    let wind_mps = spec.wind.speed_mps();
+    let airframe = &uav.airframe;
+    Flyer {
+        turn_radius_m: airframe.ground_turn_radius_m(airframe.cruise_mps, wind_mps),
+        slowest_mps: airframe.cruise_mps - wind_mps,
+        fastest_mps: airframe.max_mps + wind_mps,
+    }
+}

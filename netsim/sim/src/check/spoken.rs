@@ -1,0 +1,343 @@
+//! What is published against what is held: a beacon says at once what its author
+//! believes, a claim lists soon what its author flies, and whoever holds the mission for
+//! finished says so (`spoken`). What is published as covered was seen (S6).
+
+use super::{Clocks, Findings, Snapshot};
+use skein_peer::cells::CellSet;
+use skein_peer::protocol::runs::unpack;
+use skein_peer::wire::codec::Body;
+use skein_peer::wire::message::{Beacon, Claim};
+use skein_peer::{Beliefs, Incarnation};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// What is changed by a rule is spoken within T, up to T/4 later so as not to be in step
+/// with others; the peer looks four times a period; the share of the air lets a claim go
+/// within T; snapshots come once a T.
+const CLAIM_PERIODS: u64 = 4;
+
+/// "Finished" is the least urgent record of few bytes: it waits behind a bid, a claim and
+/// a state for a share of the air that lets one of them go in a period.
+const FINISHED_PERIODS: u64 = 10;
+
+/// A claim as it was put on the air.
+#[derive(Clone, Debug)]
+struct Published {
+    incarnation: Incarnation,
+    claim: Arc<Claim>,
+}
+
+/// What the records of one run were found to say.
+#[derive(Clone, Debug, Default)]
+pub struct SpokenCheck {
+    claims: BTreeMap<u16, Published>,
+    finished: BTreeSet<(u16, Incarnation, u32)>,
+    unspoken: Clocks<(u16, bool)>,
+    /// Cells published as covered that the world had not seen yet: when, by whom, of which
+    /// loop. A frame may be judged a moment after its peer has looked at it.
+    unseen: Vec<(u64, u16, u64, u16)>,
+    /// Peers that are late by no doing of their own.
+    troubled: BTreeSet<u16>,
+}
+
+impl SpokenCheck {
+    /// A peer is late from now on by no doing of its own.
+    pub fn on_trouble(&mut self, id: u16) {
+        self.troubled.insert(id);
+    }
+
+    /// A process ends: what it said is no promise of the next one.
+    pub fn on_silent(&mut self, id: u16) {
+        self.claims.remove(&id);
+        self.unspoken.retain(|(p, _)| *p != id);
+    }
+
+    /// A peer puts its own beacon on the air while it believes `view`: they agree.
+    pub fn on_beacon(
+        &mut self,
+        now_ms: u64,
+        (id, incarnation): (u16, Incarnation),
+        beacon: &Beacon,
+        view: &Beliefs,
+        found: &mut Findings,
+    ) {
+        let digest = covered(view).digest();
+        let says = [
+            (
+                "its life",
+                u64::from(incarnation),
+                u64::from(view.incarnation),
+            ),
+            ("able", beacon.able.into(), view.able.into()),
+            ("finished", beacon.finished.into(), view.finished.into()),
+            ("its revision", beacon.revision.into(), view.revision.into()),
+            ("its loop", beacon.loop_hash, view.loop_hash),
+        ];
+        for (what, said, held) in says {
+            if said != held {
+                found.broken("spoken", now_ms, Some(id), || {
+                    format!("its beacon says {said} of {what}, it believes {held}")
+                });
+            }
+        }
+        if view.loop_hash != 0 && beacon.cover_digest != digest {
+            found.broken("spoken", now_ms, Some(id), || {
+                "its beacon has another digest of what is covered than its own".to_owned()
+            });
+        }
+        if beacon.counter < view.counter {
+            found.broken("spoken", now_ms, Some(id), || {
+                format!(
+                    "its beacon says round {}, it promised {}",
+                    beacon.counter, view.counter
+                )
+            });
+        }
+    }
+
+    /// A peer publishes something else of its own; `seen` tells what cameras saw of the
+    /// loop with this hash.
+    pub fn on_said(
+        &mut self,
+        now_ms: u64,
+        (id, incarnation): (u16, Incarnation),
+        body: &Body,
+        (loop_hash, seen): (u64, &[bool]),
+        found: &mut Findings,
+    ) {
+        let marks = match body {
+            Body::Claim(_) | Body::Beacon(_) => None,
+            Body::Finished(f) => {
+                self.finished.insert((id, incarnation, f.revision));
+                None
+            }
+            Body::Cover(c) => Some((c.loop_hash, &c.covered)),
+            Body::Bid(b) => Some((b.round.loop_hash, &b.covered)),
+            _ => None,
+        };
+        let Some((_, runs)) = marks.filter(|(hash, _)| *hash == loop_hash && loop_hash != 0) else {
+            return;
+        };
+        let n = u16::try_from(seen.len()).unwrap_or(u16::MAX);
+        let unseen = CellSet::decode_rle(n, runs).map(|set| {
+            set.iter()
+                .find(|c| !seen.get(usize::from(*c)).copied().unwrap_or(false))
+        });
+        match unseen {
+            Ok(None) => {}
+            Ok(Some(cell)) => self.unseen.push((now_ms, id, loop_hash, cell)),
+            Err(e) => found.broken("S8", now_ms, Some(id), || {
+                format!("publishes covered cells that do not fit its loop: {e}")
+            }),
+        }
+    }
+
+    /// A peer publishes its claim.
+    pub fn on_claim(&mut self, id: u16, incarnation: Incarnation, claim: Arc<Claim>) {
+        self.claims.insert(id, Published { incarnation, claim });
+    }
+
+    /// Compares what is held with what was published last.
+    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        for (at_ms, id, loop_hash, cell) in std::mem::take(&mut self.unseen) {
+            let seen = snapshot.covered.get(usize::from(cell)).copied();
+            if loop_hash == snapshot.loop_hash && seen == Some(false) {
+                found.broken("S6", at_ms, Some(id), || {
+                    format!("publishes cell {cell} as covered, no camera has seen it")
+                });
+            }
+        }
+        for m in snapshot.peers {
+            let late = self.troubled.contains(&m.id);
+            if late || !m.view.speaks || !m.uav || m.view.loop_hash == 0 {
+                self.unspoken.retain(|(p, _)| *p != m.id);
+                continue;
+            }
+            let differs = self.difference(m.id, &m.view);
+            self.judge(snapshot, (m.id, false), CLAIM_PERIODS, differs, found);
+            let key = (m.id, m.view.incarnation, m.view.revision);
+            let kept_back = (m.view.finished && !self.finished.contains(&key))
+                .then(|| "has not said that the mission is finished".to_owned());
+            self.judge(snapshot, (m.id, true), FINISHED_PERIODS, kept_back, found);
+        }
+    }
+
+    fn judge(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        key: (u16, bool),
+        periods: u64,
+        differs: Option<String>,
+        found: &mut Findings,
+    ) {
+        let Some(text) = differs else {
+            self.unspoken.stop(key);
+            return;
+        };
+        let took_ms = snapshot.now_ms - self.unspoken.start(key, snapshot.now_ms);
+        let bound_ms = periods * snapshot.bounds.period_ms;
+        if took_ms > bound_ms && self.unspoken.tell_once(key) {
+            found.broken("spoken", snapshot.now_ms, Some(key.0), || {
+                format!("{text}, for {took_ms} ms (bound {bound_ms} ms)")
+            });
+        }
+    }
+
+    /// How the open cells of the claim published last differ from those of the plan held.
+    fn difference(&self, id: u16, view: &Beliefs) -> Option<String> {
+        let n = u16::try_from(view.covered.len()).unwrap_or(u16::MAX);
+        let open = |c: &u16| !view.covered.get(usize::from(*c)).copied().unwrap_or(true);
+        let held: BTreeSet<u16> = view.plan.iter().copied().filter(|c| open(c)).collect();
+        let published = self
+            .claims
+            .get(&id)
+            .filter(|p| p.incarnation == view.incarnation && p.claim.loop_hash == view.loop_hash);
+        let said: BTreeSet<u16> = published.map_or_else(BTreeSet::new, |p| {
+            let cells = unpack(&p.claim.plan, n).into_iter().map(|p| p.cell);
+            cells.filter(|c| open(c)).collect()
+        });
+        let (secret, vain) = (
+            held.difference(&said).count(),
+            said.difference(&held).count(),
+        );
+        (secret + vain > 0).then(|| {
+            format!("plans {secret} open cells that it has not claimed, claims {vain} that it does not plan")
+        })
+    }
+}
+
+fn covered(view: &Beliefs) -> CellSet {
+    let mut set = CellSet::new(u16::try_from(view.covered.len()).unwrap_or(u16::MAX));
+    for (c, _) in view.covered.iter().enumerate().filter(|(_, is)| **is) {
+        set.insert(u16::try_from(c).unwrap_or(u16::MAX));
+    }
+    set
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{LOOP, Story, speaking};
+    use super::*;
+    use skein_peer::wire::message::{CellRun, Cover, Finished, Firmness, ListedRun, Stamp};
+
+    fn beacon_of(view: &Beliefs) -> Beacon {
+        Beacon {
+            heartbeat: 3,
+            east_mm: 0,
+            north_mm: 0,
+            heading_e4: 0,
+            able: view.able,
+            ground_station: false,
+            finished: view.finished,
+            nonce: 7,
+            counter: view.counter,
+            eccentricity: 1,
+            revision: view.revision,
+            loop_hash: view.loop_hash,
+            cover_digest: covered(view).digest(),
+            gossip: Vec::new(),
+        }
+    }
+
+    fn claim_of(first: u16, count: u16) -> Arc<Claim> {
+        Arc::new(Claim {
+            loop_hash: LOOP,
+            plan: vec![ListedRun {
+                run: CellRun { first, count },
+                backward: false,
+                firmness: Firmness::Tentative,
+                stamp: Stamp::default(),
+            }],
+            ..Claim::default()
+        })
+    }
+
+    #[test]
+    fn a_beacon_that_says_anything_but_its_authors_beliefs_is_found() {
+        let mut view = speaking();
+        view.counter = 4;
+        let lies: [fn(&mut Beacon); 6] = [
+            |b| b.able = !b.able,
+            |b| b.finished = !b.finished,
+            |b| b.revision += 1,
+            |b| b.loop_hash += 1,
+            |b| b.cover_digest += 1,
+            |b| b.counter -= 1,
+        ];
+        let (mut check, mut found) = (SpokenCheck::default(), Findings::new(1));
+        check.on_beacon(9, (1, 1), &beacon_of(&view), &view, &mut found);
+        assert!(found.counts.is_empty(), "{:?}", found.violations);
+        for (n, lie) in lies.iter().enumerate() {
+            let mut beacon = beacon_of(&view);
+            lie(&mut beacon);
+            check.on_beacon(9, (1, 1), &beacon, &view, &mut found);
+            assert_eq!(found.counts.get("spoken"), Some(&(n as u64 + 1)));
+        }
+    }
+
+    #[test]
+    fn a_secret_plan_a_vain_claim_and_one_of_an_earlier_life_are_found() {
+        let planned = |plan: &[u16], incarnation| Beliefs {
+            plan: plan.to_vec(),
+            incarnation,
+            ..speaking()
+        };
+        for (view, broken) in [
+            (planned(&[0, 1], 1), false),
+            (planned(&[0, 1, 2], 1), true),
+            (planned(&[0], 1), true),
+            (planned(&[0, 1], 2), true),
+        ] {
+            let (mut check, mut found) = (SpokenCheck::default(), Findings::new(1));
+            let mut story = Story::new(300);
+            check.on_claim(1, 1, claim_of(0, 2));
+            for t in 0..7 {
+                let views = [(1, view.clone())];
+                story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
+            }
+            assert_eq!(found.counts.contains_key("spoken"), broken, "{view:?}");
+        }
+    }
+
+    #[test]
+    fn an_end_that_is_kept_back_is_found() {
+        for says in [true, false] {
+            let (mut check, mut found) = (SpokenCheck::default(), Findings::new(1));
+            let mut story = Story::new(0);
+            let body = Body::Finished(Finished { revision: 1 });
+            if says {
+                check.on_said(1, (1, 1), &body, (LOOP, &[false; 4]), &mut found);
+            }
+            let view = Beliefs {
+                finished: true,
+                ..speaking()
+            };
+            for t in 0..13 {
+                let views = [(1, view.clone())];
+                story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
+            }
+            assert_eq!(found.counts.contains_key("spoken"), !says);
+        }
+    }
+
+    #[test]
+    fn coverage_that_is_published_and_was_not_seen_is_found() {
+        let mut set = CellSet::new(4);
+        set.insert(2);
+        let cover = Body::Cover(Cover {
+            revision: 1,
+            loop_hash: LOOP,
+            covered: set.encode_rle(None),
+        });
+        for (seen, broken) in [([false, false, true, false], false), ([true; 4], false)]
+            .into_iter()
+            .chain([([true, true, false, true], true)])
+        {
+            let (mut check, mut found) = (SpokenCheck::default(), Findings::new(1));
+            check.on_said(9, (1, 1), &cover, (LOOP, &seen), &mut found);
+            let mut story = Story::new(0);
+            story.snapshot(1000, &[], |s| check.on_snapshot(s, &mut found));
+            assert_eq!(found.counts.contains_key("S6"), broken, "{seen:?}");
+        }
+    }
+}

@@ -1,0 +1,374 @@
+//! What all of a component hold soon: every record that is passed on (L4), the mission's
+//! revision and the operator's order (`agree`), and each open cell in one plan only (L3).
+
+use super::bounds::LIGHT_FACTOR;
+use super::{Bounds, Clocks, Findings, Grade, PeerSnapshot, Snapshot};
+use skein_peer::Incarnation;
+use skein_peer::wire::kinds::Kind;
+use skein_peer::wire::message::Record;
+use std::collections::BTreeMap;
+
+/// Author, kind, subject.
+type Key = (u16, u8, u16);
+
+/// Life and number of a record.
+type Version = (Incarnation, u32);
+
+/// A record that a peer lacks: which version at least, and since when.
+#[derive(Clone, Copy, Debug)]
+struct Lack {
+    version: Version,
+    since_ms: u64,
+    /// How long it had gone on at the last snapshot, and how long it may.
+    took_ms: u64,
+    bound_ms: u64,
+    told: bool,
+}
+
+/// What came to whom in one run.
+#[derive(Clone, Debug, Default)]
+pub struct SpreadCheck {
+    held: BTreeMap<u16, BTreeMap<Key, Version>>,
+    lacks: BTreeMap<(u16, Key), Lack>,
+    apart: Clocks<(u16, u16, bool)>,
+    doubles: Clocks<(u16, u16, u16)>,
+    /// Pieces of the longest mission that the operator gave.
+    pieces: u64,
+}
+
+/// A piece of a mission is a kibibyte of the least urgent kind: at a share of a ninth of
+/// 45 % of 64 kbit/s it takes three periods of a peer's air on every hop.
+const PIECE_PERIODS: u64 = 3;
+
+/// Beyond the time that a record takes to all: deriving the loop of a revision is
+/// modelled to take 200 ms, and a peer looks four times a period.
+const LOOK_PERIODS: u64 = 1;
+
+/// Whether a record reaches everybody: passed on, and worth it for longer than the two
+/// periods of a state, which is for people and is said again soon.
+fn spreads(kind: u8) -> bool {
+    Kind::of_number(kind).is_some_and(|k| k.relayed() && k != Kind::State)
+}
+
+impl SpreadCheck {
+    /// The operator has a mission of so many pieces.
+    pub fn on_mission(&mut self, pieces: usize) {
+        self.pieces = self.pieces.max(pieces as u64);
+    }
+
+    /// How long a record of some kind may take to all.
+    fn bound_ms(&self, bounds: &Bounds, kind: u8) -> u64 {
+        if kind == Kind::Mission.number() {
+            bounds.spread_ms() + self.pieces * bounds.diameter * PIECE_PERIODS * bounds.period_ms
+        } else {
+            bounds.spread_ms()
+        }
+    }
+
+    /// A process starts or ends: it holds nothing.
+    pub fn on_silent(&mut self, id: u16) {
+        self.held.remove(&id);
+        self.lacks.retain(|(p, _), _| *p != id);
+        self.apart.retain(|(a, b, _)| *a != id && *b != id);
+    }
+
+    /// A running peer receives a record, or says one of its own.
+    pub fn on_held(&mut self, by: u16, record: &Record) {
+        if !spreads(record.kind) {
+            return;
+        }
+        let key = (record.author, record.kind, record.subject);
+        let version = (record.incarnation, record.seq);
+        let held = self.held.entry(by).or_default();
+        let known = held.entry(key).or_insert(version);
+        *known = (*known).max(version);
+    }
+
+    /// Judges what each member of a component lacks.
+    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        let mut lacking: Vec<(u16, Key)> = Vec::new();
+        for component in snapshot.graph.components() {
+            let peers: Vec<&PeerSnapshot> = component
+                .iter()
+                .filter_map(|id| snapshot.peer(*id))
+                .filter(|m| m.view.speaks)
+                .collect();
+            let since_ms = component
+                .first()
+                .and_then(|id| snapshot.stability.component_since_ms(*id))
+                .unwrap_or(snapshot.now_ms);
+            self.look_for_lacks(snapshot, &peers, since_ms, &mut lacking, found);
+            self.look_for_dissent(snapshot, &peers, since_ms, found);
+            self.look_for_doubles(snapshot, &peers, since_ms, found);
+        }
+        lacking.sort_unstable();
+        self.lacks.retain(|key, lack| {
+            let goes_on = lacking.binary_search(key).is_ok();
+            if !goes_on {
+                found.took("L4", snapshot.grade(), lack.took_ms, lack.bound_ms);
+            }
+            goes_on
+        });
+    }
+
+    /// The newest version of each record that any of these holds, of its author's newest life.
+    fn newest(&self, peers: &[&PeerSnapshot]) -> BTreeMap<Key, Version> {
+        let mut lives: BTreeMap<u16, Incarnation> = BTreeMap::new();
+        let mut newest: BTreeMap<Key, Version> = BTreeMap::new();
+        for (key, version) in peers.iter().filter_map(|m| self.held.get(&m.id)).flatten() {
+            let life = lives.entry(key.0).or_default();
+            *life = (*life).max(version.0);
+            let known = newest.entry(*key).or_insert(*version);
+            *known = (*known).max(*version);
+        }
+        // A later life voids all that earlier ones said; an author knows its own.
+        for m in peers {
+            let life = lives.entry(m.id).or_default();
+            *life = (*life).max(m.view.incarnation);
+        }
+        newest.retain(|key, version| lives.get(&key.0) == Some(&version.0));
+        newest
+    }
+
+    fn look_for_lacks(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        peers: &[&PeerSnapshot],
+        since_ms: u64,
+        lacking: &mut Vec<(u16, Key)>,
+        found: &mut Findings,
+    ) {
+        let newest = self.newest(peers);
+        let graded = snapshot.grade() != Grade::Reported;
+        for m in peers {
+            for (key, wanted) in newest.iter().filter(|(key, _)| key.0 != m.id) {
+                let bound_ms = self.bound_ms(&snapshot.bounds, key.1);
+                let held = self.held.get(&m.id).and_then(|h| h.get(key));
+                let held = held.copied().unwrap_or_default();
+                if held >= *wanted {
+                    continue;
+                }
+                let fresh = Lack {
+                    version: *wanted,
+                    since_ms: snapshot.now_ms,
+                    took_ms: 0,
+                    bound_ms,
+                    told: false,
+                };
+                let lack = self.lacks.entry((m.id, *key)).or_insert(fresh);
+                // Whoever got what it lacked and lacks something newer lacks it since now.
+                if held >= lack.version || wanted.0 > lack.version.0 {
+                    *lack = fresh;
+                }
+                lacking.push((m.id, *key));
+                let from_ms = lack.since_ms.max(since_ms).max(m.since_ms);
+                let took_ms = snapshot.now_ms - from_ms;
+                lack.took_ms = took_ms;
+                // Collisions lose records also where the links lose none.
+                let late = graded && took_ms > bound_ms * LIGHT_FACTOR;
+                if late && !std::mem::replace(&mut lack.told, true) {
+                    found.broken("L4", snapshot.now_ms, Some(m.id), || {
+                        let kind = Kind::of_number(key.1).map_or("record", Kind::name);
+                        format!(
+                            "lacks {kind} {} of peer {} in version {:?}, {took_ms} ms after a peer of its component held it (bound {bound_ms} ms)",
+                            key.2, key.0, lack.version
+                        )
+                    });
+                }
+            }
+        }
+    }
+
+    fn look_for_dissent(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        peers: &[&PeerSnapshot],
+        since_ms: u64,
+        found: &mut Findings,
+    ) {
+        let mission_ms = self.bound_ms(&snapshot.bounds, Kind::Mission.number());
+        let bound_ms = mission_ms + LOOK_PERIODS * snapshot.bounds.period_ms;
+        let limit_ms = snapshot.grade().limit_ms(bound_ms);
+        for (i, a) in peers.iter().enumerate() {
+            for b in &peers[i + 1..] {
+                let differ = [
+                    (
+                        false,
+                        a.view.revision != b.view.revision
+                            && a.view.revision.min(b.view.revision) > 0,
+                    ),
+                    (true, a.view.order != b.view.order),
+                ];
+                for (of_order, differs) in differ {
+                    let key = (a.id, b.id, of_order);
+                    if !differs {
+                        self.apart.stop(key);
+                        continue;
+                    }
+                    let began_ms = self.apart.start(key, snapshot.now_ms);
+                    let from_ms = began_ms.max(since_ms).max(a.since_ms).max(b.since_ms);
+                    let took_ms = snapshot.now_ms - from_ms;
+                    if limit_ms.is_some_and(|l| took_ms > l) && self.apart.tell_once(key) {
+                        found.broken("agree", snapshot.now_ms, Some(b.id), || {
+                            let what = if of_order { "order" } else { "revision" };
+                            format!(
+                                "follows another {what} than peer {} in its component, for {took_ms} ms (bound {bound_ms} ms): {} {:?}, {} {:?}",
+                                a.id, b.view.revision, b.view.order, a.view.revision, a.view.order
+                            )
+                        });
+                    }
+                }
+            }
+        }
+    }
+
+    /// L3: an open cell that two plan is given up by one of them: the claims reach both, and
+    /// the one with the lower stamp yields within 2 T.
+    fn look_for_doubles(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        peers: &[&PeerSnapshot],
+        since_ms: u64,
+        found: &mut Findings,
+    ) {
+        let bound_ms = snapshot.bounds.spread_ms() + snapshot.bounds.yield_ms();
+        let limit_ms = snapshot.grade().limit_ms(bound_ms);
+        let mut planners: BTreeMap<u16, Vec<&PeerSnapshot>> = BTreeMap::new();
+        for m in peers
+            .iter()
+            .filter(|m| m.view.loop_hash == snapshot.loop_hash)
+        {
+            for c in m.view.plan.iter().filter(|c| {
+                !snapshot
+                    .covered
+                    .get(usize::from(**c))
+                    .copied()
+                    .unwrap_or(true)
+            }) {
+                planners.entry(*c).or_default().push(m);
+            }
+        }
+        let in_both = |(a, b, c): &(u16, u16, u16)| {
+            planners
+                .get(c)
+                .is_some_and(|p| p.iter().any(|m| m.id == *a) && p.iter().any(|m| m.id == *b))
+        };
+        let here: Vec<u16> = peers.iter().map(|m| m.id).collect();
+        self.doubles
+            .retain(|k| !here.contains(&k.0) && !here.contains(&k.1) || in_both(k));
+        for (cell, by) in planners.iter().filter(|(_, by)| by.len() > 1) {
+            let (a, b) = (by[0], by[1]);
+            let key = (a.id, b.id, *cell);
+            let began_ms = self.doubles.start(key, snapshot.now_ms);
+            let from_ms = began_ms.max(since_ms).max(a.since_ms).max(b.since_ms);
+            let took_ms = snapshot.now_ms - from_ms;
+            if limit_ms.is_some_and(|l| took_ms > l) && self.doubles.tell_once(key) {
+                found.broken("L3", snapshot.now_ms, Some(b.id), || {
+                    format!(
+                        "plans cell {cell} as peer {} in its component does, for {took_ms} ms (bound {bound_ms} ms)",
+                        a.id
+                    )
+                });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Story, speaking};
+    use super::*;
+    use skein_peer::Beliefs;
+    use skein_peer::wire::message::Order;
+
+    fn record(kind: Kind, incarnation: u32, seq: u32) -> Record {
+        Record {
+            author: 9,
+            incarnation,
+            seq,
+            kind: kind.number(),
+            subject: 0,
+            body: Vec::new(),
+            signature: Vec::new(),
+        }
+    }
+
+    /// Peers 1 and 2 for so many seconds; what is broken then.
+    fn after(
+        check: &mut SpreadCheck,
+        seconds: u64,
+        loss: u16,
+        change: impl Fn(&mut Beliefs),
+    ) -> BTreeMap<&'static str, u64> {
+        let (mut story, mut found) = (Story::new(loss), Findings::new(1));
+        let mut other = speaking();
+        change(&mut other);
+        for t in 0..seconds {
+            let views = [(1, speaking()), (2, other.clone())];
+            story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
+        }
+        found.counts
+    }
+
+    #[test]
+    fn a_record_of_the_dead_that_one_member_never_gets_breaks_l4() {
+        for (kind, loss, has, broken) in [
+            (Kind::Claim, 0, (1, 4), true),
+            (Kind::Claim, 0, (1, 5), false),
+            (Kind::Operator, 0, (1, 4), true),
+            (Kind::Mission, 0, (1, 4), true),
+            (Kind::Claim, 300, (1, 4), false),
+            (Kind::State, 0, (1, 4), false),
+        ] {
+            let mut check = SpreadCheck::default();
+            check.on_held(1, &record(kind, 1, 5));
+            check.on_held(2, &record(kind, has.0, has.1));
+            assert!(after(&mut check.clone(), 50, loss, |_| {}).is_empty());
+            let counts = after(&mut check, 60, loss, |_| {});
+            assert_eq!(counts.contains_key("L4"), broken, "{kind:?} {has:?} {loss}");
+        }
+    }
+
+    #[test]
+    fn what_an_earlier_life_said_is_not_owed() {
+        let mut check = SpreadCheck::default();
+        check.on_held(1, &record(Kind::Claim, 1, 5));
+        check.on_held(2, &record(Kind::Bid, 2, 1));
+        check.on_held(1, &record(Kind::Bid, 2, 1));
+        assert!(after(&mut check, 20, 0, |_| {}).is_empty());
+    }
+
+    #[test]
+    fn different_revisions_or_orders_in_one_component_are_found() {
+        type Change = fn(&mut Beliefs);
+        let changes: [(Change, bool); 4] = [
+            (|_| {}, false),
+            (|b| b.revision = 2, true),
+            (|b| b.order = Order::Hold, true),
+            (|b| b.revision = 0, false),
+        ];
+        for (n, (change, broken)) in changes.into_iter().enumerate() {
+            let counts = after(&mut SpreadCheck::default(), 12, 0, change);
+            assert_eq!(counts.contains_key("agree"), broken, "{n}");
+            assert!(after(&mut SpreadCheck::default(), 12, 300, change).is_empty());
+        }
+    }
+
+    #[test]
+    fn a_cell_that_two_go_on_planning_breaks_l3() {
+        let plans: [(&[u16], bool); 3] = [(&[0, 1], true), (&[2], false), (&[], false)];
+        for (plan, broken) in plans {
+            let (mut story, mut found) = (Story::new(0), Findings::new(1));
+            let mut check = SpreadCheck::default();
+            let planning = |plan: &[u16]| Beliefs {
+                plan: plan.to_vec(),
+                ..speaking()
+            };
+            for t in 0..14 {
+                let views = [(1, planning(&[1])), (2, planning(plan))];
+                story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
+            }
+            assert_eq!(found.counts.contains_key("L3"), broken, "{plan:?}");
+        }
+    }
+}
