@@ -4,12 +4,12 @@
 
 use super::cover_trees;
 use super::figures::{Times, timed};
-use super::stream::Stream;
 use anyhow::{Context, Result, ensure};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use skein_flight::coverage::passes::{Directions, PassesPlan, PassesProblem, plan};
 use skein_geometry::frame::{Origin, Point};
+use skein_geometry::random::SplitMix64;
 use skein_geometry::{NoFlyZones, Polygon};
 use skein_interop::geojson;
 use skein_interop::place::to_plane;
@@ -219,11 +219,17 @@ fn sum_up(args: &ExactArgs, instances: &[Instance], rows: &[Row]) -> Answer {
 }
 
 /// A star with this many spokes round a point.
-fn star(at: Point, spokes: usize, least_m: f64, most_m: f64, dice: &mut Stream) -> Vec<Point> {
-    let turn = dice.unit();
+fn star(
+    at: Point,
+    spokes: usize,
+    least_m: f64,
+    most_m: f64,
+    random: &mut SplitMix64,
+) -> Vec<Point> {
+    let turn = random.unit();
     (0..spokes)
         .map(|i| {
-            let r = least_m + (most_m - least_m) * dice.unit();
+            let r = least_m + (most_m - least_m) * random.unit();
             let a = std::f64::consts::TAU * (i as f64 + turn) / spokes as f64;
             Point::new(at.x + r * a.cos(), at.y + r * a.sin())
         })
@@ -231,12 +237,12 @@ fn star(at: Point, spokes: usize, least_m: f64, most_m: f64, dice: &mut Stream) 
 }
 
 fn instances(args: &ExactArgs) -> Result<Vec<Instance>> {
-    let mut dice = Stream(2_016);
+    let mut random = SplitMix64::new(2_016);
     let mut all = Vec::new();
     for _ in 0..args.n {
-        let spokes = 6 + (dice.unit() * 9.0) as usize;
-        let ring = star(Point::new(0.0, 0.0), spokes, 350.0, 650.0, &mut dice);
-        all.push(instance(ring, args.holes, args, &mut dice)?);
+        let spokes = 6 + (random.unit() * 9.0) as usize;
+        let ring = star(Point::new(0.0, 0.0), spokes, 350.0, 650.0, &mut random);
+        all.push(instance(ring, args.holes, args, &mut random)?);
     }
     let Some(file) = &args.fields else {
         return Ok(all);
@@ -254,7 +260,7 @@ fn instances(args: &ExactArgs) -> Result<Vec<Instance>> {
         let points = field.ring.iter().map(|p| to_plane(origin, *p));
         let ring = points.collect::<Result<Vec<_>, _>>().with_context(place)?;
         for holes in [0, args.holes] {
-            let mut one = instance(ring.clone(), holes, args, &mut dice).with_context(place)?;
+            let mut one = instance(ring.clone(), holes, args, &mut random).with_context(place)?;
             one.is_field = true;
             all.push(one);
         }
@@ -266,7 +272,7 @@ fn instance(
     ring: Vec<Point>,
     holes: usize,
     args: &ExactArgs,
-    dice: &mut Stream,
+    random: &mut SplitMix64,
 ) -> Result<Instance> {
     let area = Polygon::new(ring)?;
     let size_m = area.area_m2().sqrt();
@@ -276,12 +282,12 @@ fn instance(
     let mut zones = Vec::new();
     while zones.len() < holes {
         let at = Point::new(
-            low.x + (high.x - low.x) * dice.unit(),
-            low.y + (high.y - low.y) * dice.unit(),
+            low.x + (high.x - low.x) * random.unit(),
+            low.y + (high.y - low.y) * random.unit(),
         );
         if is_inside(at, area.vertices()) {
-            let spokes = 4 + (dice.unit() * 5.0) as usize;
-            zones.push(star(at, spokes, 0.02 * scale_m, 0.06 * scale_m, dice));
+            let spokes = 4 + (random.unit() * 5.0) as usize;
+            zones.push(star(at, spokes, 0.02 * scale_m, 0.06 * scale_m, random));
         }
     }
     let spacing_m = size_m / args.lanes;
@@ -327,12 +333,12 @@ fn to_ring_m(p: Point, ring: &[Point]) -> f64 {
 fn seen_share(instance: &Instance, plan: &PassesPlan, samples: usize, seed: u64) -> f64 {
     let problem = &instance.problem;
     let (low, high) = problem.area.bounds();
-    let mut dice = Stream(seed);
+    let mut random = SplitMix64::new(seed);
     let (mut seen, mut all) = (0usize, 0usize);
     while all < samples {
         let p = Point::new(
-            low.x + (high.x - low.x) * dice.unit(),
-            low.y + (high.y - low.y) * dice.unit(),
+            low.x + (high.x - low.x) * random.unit(),
+            low.y + (high.y - low.y) * random.unit(),
         );
         let needed = is_inside(p, problem.area.vertices())
             && instance

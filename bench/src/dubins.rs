@@ -4,7 +4,6 @@
 //! arc tangents, ends with the goal by flying the curve.
 
 use super::figures::{Times, timed};
-use super::stream::Stream;
 use anyhow::Result;
 use clap::Args;
 #[cfg(feature = "rivals")]
@@ -13,6 +12,7 @@ use serde::Serialize;
 use skein_flight::trajectory::dubins;
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::{TAU, acos, atan2, cos, sin, wrap_pi, wrap_tau};
+use skein_geometry::random::SplitMix64;
 use std::hint::black_box;
 
 /// Goals solved between two looks at the clock: one solve is shorter than a look.
@@ -127,8 +127,8 @@ pub fn run(args: &DubinsArgs) -> Result<String> {
 
 /// Starts at the origin and goals about it, the same in every run.
 fn draw(args: &DubinsArgs) -> Vec<(Pose, Pose)> {
-    let mut stream = Stream(1);
-    let mut unit = || stream.unit();
+    let mut random = SplitMix64::new(1);
+    let mut unit = || random.unit();
     (0..args.n)
         .map(|_| {
             let from = Pose::new(Point::new(0.0, 0.0), TAU * unit());

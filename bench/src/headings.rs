@@ -4,13 +4,13 @@
 //! neighbour, so the more there are the nearer they lie.
 
 use super::figures::{Times, timed};
-use super::stream::Stream;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::Point;
 use skein_geometry::math::{TAU, cos, sin};
+use skein_geometry::random::SplitMix64;
 use skein_lab::headings::{Chain, HeadingsError, Request, choose, choose_in_wind};
 
 /// Random waypoints in a square, in the order of the nearest neighbour.
@@ -69,7 +69,7 @@ struct Answer {
 /// # Errors
 /// When the request is malformed.
 pub fn run(args: &HeadingsArgs) -> Result<String> {
-    let mut stream = Stream(args.seed);
+    let mut random = SplitMix64::new(args.seed);
     let mut answer = Answer {
         n: args.n,
         instances: args.instances,
@@ -84,7 +84,7 @@ pub fn run(args: &HeadingsArgs) -> Result<String> {
     };
     let mut each_us = Vec::with_capacity(args.instances);
     for _ in 0..args.instances {
-        let waypoints = draw(args, &mut stream);
+        let waypoints = draw(args, &mut random);
         let chain = if args.closed {
             Chain::Closed
         } else {
@@ -100,7 +100,7 @@ pub fn run(args: &HeadingsArgs) -> Result<String> {
             gap: args.gap,
         };
         let course = if args.wind_ratio > 0.0 {
-            TAU * stream.unit()
+            TAU * random.unit()
         } else {
             0.0
         };
@@ -145,9 +145,9 @@ fn solve(args: &HeadingsArgs, request: &Request, course_rad: f64) -> Result<Foun
 }
 
 /// Uniform waypoints, each followed by the nearest not yet visited.
-fn draw(args: &HeadingsArgs, stream: &mut Stream) -> Vec<Point> {
+fn draw(args: &HeadingsArgs, random: &mut SplitMix64) -> Vec<Point> {
     let side_m = args.side * args.radius_m;
-    let mut unit = || stream.unit();
+    let mut unit = || random.unit();
     let mut left: Vec<Point> = (0..args.n)
         .map(|_| Point::new(side_m * unit(), side_m * unit()))
         .collect();

@@ -19,7 +19,6 @@ pub mod route_clearance;
 pub mod route_graph;
 pub mod route_maps;
 pub mod route_polygons;
-pub mod stream;
 pub mod wind;
 
 use clap::{Args, Subcommand};

@@ -2,7 +2,6 @@
 //! against its zone by a check of its own (D2.7 §2.3.1).
 
 use super::figures::{Times, timed};
-use super::stream::Stream;
 use crate::measure::to_piece_m;
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
@@ -10,6 +9,7 @@ use serde::Serialize;
 use skein_geometry::frame::Point;
 use skein_geometry::math::{PI, TAU, sin_cos};
 use skein_geometry::offset::{Growth, Piece, Zone, grow, grow_exact};
+use skein_geometry::random::SplitMix64;
 
 /// An outline is a violation from this share of the radius below it, so that nobody
 /// is blamed for the last bits of a distance.
@@ -106,7 +106,7 @@ pub fn run(args: &OffsetArgs) -> Result<String> {
     let (mut repairs, mut max_margin_m) = (0, 0.0f64);
     #[cfg(feature = "rivals")]
     let mut rival = args.against.map(|_| Tally::new(args));
-    let mut random = Stream(args.seed);
+    let mut random = SplitMix64::new(args.seed);
     for _ in 0..args.n {
         let zone = [draw(args, &mut random)];
         let answer = if args.arcs {
@@ -267,7 +267,7 @@ fn winding(ring: &[Point], p: Point) -> i32 {
     count
 }
 
-fn draw(args: &OffsetArgs, random: &mut Stream) -> Zone {
+fn draw(args: &OffsetArgs, random: &mut SplitMix64) -> Zone {
     let n = args.vertices;
     let outer = (0..n)
         .map(|i| match args.kind {

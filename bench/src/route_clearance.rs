@@ -2,7 +2,6 @@
 //! of most distance, that along the Voronoi edges (D2.7 §2.3.1).
 
 use super::figures::{Times, timed};
-use super::stream::Stream;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use serde::Serialize;
@@ -10,6 +9,7 @@ use skein_flight::route::mesh::{Mesh, delaunay};
 use skein_flight::route::two_point::Search;
 use skein_geometry::frame::Point;
 use skein_geometry::offset::{Growth, Region, Zone, grow};
+use skein_geometry::random::SplitMix64;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
@@ -143,16 +143,16 @@ pub fn run(args: &ClearanceArgs) -> Result<String> {
 
 /// The border, and octagons of one size, turned and shifted at random.
 fn field(side: usize, density: f64) -> (Vec<Point>, Vec<Vec<Point>>) {
-    let mut stream = Stream(4);
+    let mut random = SplitMix64::new(4);
     // An octagon in a circle of radius r covers 2 √2 r².
     let radius = PITCH_M * (density / (2.0 * core::f64::consts::SQRT_2)).sqrt();
     let radius = radius.min((PITCH_M - GAP_M) / 2.0);
     let room = (PITCH_M - GAP_M) / 2.0 - radius;
     let octagon = |i: usize| {
-        let mut shift = || (2.0 * stream.unit() - 1.0) * room;
+        let mut shift = || (2.0 * random.unit() - 1.0) * room;
         let x = ((i % side) as f64 + 0.5) * PITCH_M + shift();
         let y = ((i / side) as f64 + 0.5) * PITCH_M + shift();
-        let turn = stream.unit();
+        let turn = random.unit();
         let corner = |k: u32| {
             let a = core::f64::consts::TAU * (f64::from(k) + turn) / 8.0;
             Point::new(x + radius * a.cos(), y + radius * a.sin())
@@ -235,7 +235,7 @@ impl Voronoi {
     /// Corners with room for all distances, near random places; ends of routes of
     /// either kind, so that both answer the same question.
     fn pairs(&self, n: usize, size_m: f64) -> Vec<[u32; 2]> {
-        let mut stream = Stream(5);
+        let mut random = SplitMix64::new(5);
         let widest_m = OFFSETS_M.iter().copied().fold(0.0, f64::max);
         let fit: Vec<u32> = (0..)
             .zip(&self.nodes)
@@ -243,7 +243,7 @@ impl Voronoi {
             .map(|(i, _)| i)
             .collect();
         let mut near = || {
-            let p = Point::new(size_m * stream.unit(), size_m * stream.unit());
+            let p = Point::new(size_m * random.unit(), size_m * random.unit());
             let away = |i: &u32| (self.nodes[*i as usize].at - p).norm_squared();
             fit.iter()
                 .copied()

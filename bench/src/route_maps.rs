@@ -1,8 +1,8 @@
 //! Maps made up for `bench route`: a field of octagons, and a hard case for windows.
 
-use super::stream::Stream;
 use crate::navmesh::Query;
 use skein_geometry::frame::Point;
+use skein_geometry::random::SplitMix64;
 
 fn rectangle(low: Point, high: Point) -> Vec<Point> {
     vec![
@@ -18,16 +18,16 @@ fn rectangle(low: Point, high: Point) -> Vec<Point> {
 #[must_use]
 pub fn octagons(n: usize) -> Vec<Vec<Point>> {
     const PITCH_M: f64 = 10.0;
-    let mut stream = Stream(1);
+    let mut random = SplitMix64::new(1);
     let size = n as f64 * PITCH_M;
     let mut rings = vec![rectangle(Point::origin(), Point::new(size, size))];
     for i in 0..n * n {
-        let radius = 2.0 + stream.unit();
+        let radius = 2.0 + random.unit();
         let room = PITCH_M / 2.0 - radius - 0.5;
-        let mut shift = || (2.0 * stream.unit() - 1.0) * room;
+        let mut shift = || (2.0 * random.unit() - 1.0) * room;
         let x = ((i % n) as f64 + 0.5) * PITCH_M + shift();
         let y = ((i / n) as f64 + 0.5) * PITCH_M + shift();
-        let turn = stream.unit();
+        let turn = random.unit();
         rings.push(
             (0..8)
                 .map(|k| {
@@ -43,9 +43,9 @@ pub fn octagons(n: usize) -> Vec<Vec<Point>> {
 /// Random ends in the field of octagons; those inside an octagon have no path.
 #[must_use]
 pub fn octagon_queries(n: usize, count: usize) -> Vec<Query> {
-    let mut stream = Stream(2);
+    let mut random = SplitMix64::new(2);
     let size = n as f64 * 10.0;
-    let mut point = || Point::new(size * stream.unit(), size * stream.unit());
+    let mut point = || Point::new(size * random.unit(), size * random.unit());
     (0..count)
         .map(|_| Query {
             from: point(),
@@ -88,14 +88,14 @@ pub fn comb(n: usize) -> Vec<Vec<Point>> {
 /// From below the row of diamonds to places in the shaft.
 #[must_use]
 pub fn comb_queries(n: usize, count: usize) -> Vec<Query> {
-    let mut stream = Stream(3);
+    let mut random = SplitMix64::new(3);
     let from = Point::new(n as f64, 1.0 - n as f64);
     (0..count)
         .map(|_| Query {
             from,
             to: Point::new(
-                2.0 * n as f64 * stream.unit(),
-                2.0 + n as f64 * stream.unit(),
+                2.0 * n as f64 * random.unit(),
+                2.0 + n as f64 * random.unit(),
             ),
             length_m: f64::NAN,
         })

@@ -2,7 +2,6 @@
 //! against a dense oracle.
 
 use super::figures::{Times, timed};
-use super::stream::Stream;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -11,6 +10,7 @@ use skein_flight::trajectory::wind::{
 };
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::{TAU, sin_cos};
+use skein_geometry::random::SplitMix64;
 use std::hint::black_box;
 use std::path::PathBuf;
 
@@ -232,8 +232,8 @@ fn read_reference(path: &PathBuf) -> Result<Vec<f64>> {
 }
 
 fn random_cases(args: &WindArgs) -> Vec<Case> {
-    let mut stream = Stream(args.seed);
-    let mut between = |low: f64, high: f64| low + (high - low) * stream.unit();
+    let mut random = SplitMix64::new(args.seed);
+    let mut between = |low: f64, high: f64| low + (high - low) * random.unit();
     let (distance, strength) = match args.kind {
         Kind::Near => ((0.0, 4.0), (0.02, 0.5)),
         Kind::Far => ((4.0, 20.0), (0.02, 0.5)),

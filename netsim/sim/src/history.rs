@@ -6,9 +6,9 @@
 
 use crate::fault::Fault;
 use serde::Serialize;
+use skein_geometry::hash::Fnv;
 use skein_peer::Report;
 use skein_peer::output::Status;
-use skein_peer::wire::Fnv;
 
 /// One kept event.
 #[derive(Clone, Debug, PartialEq, Serialize)]

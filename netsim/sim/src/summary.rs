@@ -5,7 +5,7 @@ use crate::check::{Grade, Violation};
 use crate::spec::Spec;
 use crate::swarm::Outcome;
 use serde::Serialize;
-use skein_peer::wire::Fnv;
+use skein_geometry::hash::Fnv;
 use std::collections::BTreeMap;
 use std::fmt;
 

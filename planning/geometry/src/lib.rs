@@ -12,8 +12,8 @@
 //! | [`curve`] | lines and arcs joined tangentially | 2.4 |
 //! | [`clearance`] | exact clearance of points and curves from no-fly zones | 2.3.1 |
 //! | [`offset`] | zones grown by a safety radius, with a certificate | 2.3.1 |
-//! | [`random`] | the seeded pseudo-random stream | |
-//! | [`fingerprint`] | a hash by which two processes compare what they have built | |
+//! | [`random`] | the seeded pseudo-random generator | |
+//! | [`hash`] | FNV-1a, and the fingerprint by which two processes compare what they have built | |
 //!
 //! ```
 //! use skein_geometry::frame::Point;
@@ -28,8 +28,8 @@
 pub mod clearance;
 pub mod curve;
 mod distance;
-pub mod fingerprint;
 pub mod frame;
+pub mod hash;
 pub mod math;
 pub mod offset;
 pub mod polygon;

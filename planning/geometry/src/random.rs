@@ -1,7 +1,29 @@
-//! A stream of numbers that is the same on every machine, for searches that try moves
-//! in no particular order. No randomness: the seed is part of the problem.
+//! A seeded pseudo-random generator, the same on every machine: SplitMix64.
+//!
+//! For searches that try moves in no particular order, for instances of tests and
+//! measurements, and for draws of the simulated radio. It asks no entropy: the seed is
+//! part of the problem. Steele, Lea and Flood, "Fast splittable pseudorandom number
+//! generators", OOPSLA 2014, <https://doi.org/10.1145/2660193.2660195>.
 
-/// Weyl sequence with a mixing step.
+/// What the state grows by at each draw: 2⁶⁴ over the golden ratio, odd.
+const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+
+/// The first number of the stream of seed `x`: a hash of `x` with full avalanche.
+#[must_use]
+pub fn mix(x: u64) -> u64 {
+    let mut z = x.wrapping_add(GOLDEN);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
+/// The upper 53 of 64 bits as a number in [0, 1).
+#[must_use]
+pub fn unit(bits: u64) -> f64 {
+    (bits >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// The generator; its seed is its whole state.
 #[derive(Clone, Copy, Debug)]
 pub struct SplitMix64(u64);
 
@@ -14,11 +36,9 @@ impl SplitMix64 {
 
     /// The next 64 bits.
     pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
+        let bits = mix(self.0);
+        self.0 = self.0.wrapping_add(GOLDEN);
+        bits
     }
 
     /// A number below `n`; 0 for `n` = 0.
@@ -28,14 +48,46 @@ impl SplitMix64 {
 
     /// A number in [0, 1).
     pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+        unit(self.bits())
     }
 
-    /// Puts a list into some order.
+    /// Puts a list into some order (Fisher and Yates).
     pub fn shuffle<T>(&mut self, list: &mut [T]) {
         for i in (1..list.len()).rev() {
             let j = self.below(i + 1);
             list.swap(i, j);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_stream_is_the_published_one() {
+        // Java's SplittableRandom and Vigna's splitmix64.c with seed 1234567.
+        let mut random = SplitMix64::new(1_234_567);
+        let expected = [
+            6_457_827_717_110_365_317,
+            3_203_168_211_198_807_973,
+            9_817_491_932_198_370_423,
+            4_593_380_528_125_082_431,
+            16_408_922_859_458_223_821,
+        ];
+        assert_eq!(expected.map(|_| random.bits()), expected);
+        assert_eq!(SplitMix64::new(1).below(0), 0);
+    }
+
+    #[test]
+    fn shuffles_keep_all_and_draws_stay_below() {
+        let mut random = SplitMix64::new(3);
+        let mut list: Vec<usize> = (0..50).collect();
+        random.shuffle(&mut list);
+        assert!(list.iter().enumerate().any(|(i, x)| i != *x));
+        list.sort_unstable();
+        assert_eq!(list, (0..50).collect::<Vec<_>>());
+        assert!((0..200).all(|_| random.below(7) < 7));
+        assert!((0..200).all(|_| (0.0..1.0).contains(&random.unit())));
     }
 }

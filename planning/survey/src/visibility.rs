@@ -15,8 +15,8 @@ mod tests;
 
 use obstacles::{Obstacles, index};
 use skein_geometry::Polygon;
-use skein_geometry::fingerprint::Fingerprint;
 use skein_geometry::frame::Point;
+use skein_geometry::hash::Fingerprint;
 use skein_geometry::offset::Region;
 use skein_geometry::polygon::{MAX_COORDINATE_M, side};
 use std::cmp::{Ordering, Reverse};

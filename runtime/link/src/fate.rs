@@ -1,6 +1,7 @@
 //! What becomes of one transmission at one receiver.
 
 use serde::{Deserialize, Serialize};
+pub use skein_geometry::random::mix;
 
 /// The state of the radio link from one transmitter to one receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -77,15 +78,6 @@ pub fn fate(seed: u64, tx: u16, rx: u16, number: u64, link: &LinkState) -> Fate 
     Fate::Delivered {
         delay_ms: link.delay_ms,
     }
-}
-
-/// A 64-bit finaliser with full avalanche (the constants of SplitMix64).
-#[must_use]
-pub fn mix(x: u64) -> u64 {
-    let mut z = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }
 
 #[cfg(test)]

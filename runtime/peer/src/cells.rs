@@ -5,8 +5,8 @@
 //! duplication and relaying cannot harm it. What the cells mean, and which loop they
 //! are counted on, is left to the callers.
 
-use crate::wire::Fnv;
 use crate::wire::message::CellRun;
+use skein_geometry::hash::Fnv;
 
 /// Bytes of the longest run length: a `u16` in groups of seven bits.
 const VARINT_MAX_BYTES: usize = 3;

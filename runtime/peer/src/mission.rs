@@ -183,12 +183,12 @@ impl Mission {
     /// Identifies the content: FNV-1a over all fields in order.
     #[must_use]
     pub fn content_hash(&self) -> u64 {
-        let mut h = crate::wire::Fnv::new();
+        let mut h = skein_geometry::hash::Fnv::new();
         for v in [self.origin_lat_e7, self.origin_lon_e7] {
             h.write_i64(i64::from(v));
         }
         h.write_i64(i64::from(self.revision));
-        let ring = |h: &mut crate::wire::Fnv, r: &[PointMm]| {
+        let ring = |h: &mut skein_geometry::hash::Fnv, r: &[PointMm]| {
             h.write_i64(i64::try_from(r.len()).unwrap_or(i64::MAX));
             for p in r {
                 h.write_i64(i64::from(p.0));

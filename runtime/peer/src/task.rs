@@ -2,9 +2,9 @@
 //! passes, points, or lines; and how often.
 
 use crate::mission::{PointMm, mm, point_m, ring_mm};
-use crate::wire::Fnv;
 use serde::{Deserialize, Serialize};
 use skein_flight::coverage::stations::targets::{LineTarget, PointTarget, Targets};
+use skein_geometry::hash::Fnv;
 
 /// What is to be seen.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -20,8 +20,8 @@ mod front;
 use super::mesh::{Mesh, NONE};
 use super::visibility_step::{self, SOURCE};
 use front::Front;
-use skein_geometry::fingerprint::Fingerprint;
 use skein_geometry::frame::Point;
+use skein_geometry::hash::Fingerprint;
 
 /// The shortest way to a vertex so far.
 #[derive(Clone, Copy, Debug)]

@@ -15,8 +15,8 @@ mod repair;
 mod triangles;
 
 use robust::{Coord, orient2d};
-use skein_geometry::fingerprint::Fingerprint;
 use skein_geometry::frame::Point;
+use skein_geometry::hash::Fingerprint;
 use thiserror::Error;
 
 use blocks::Blocks;

@@ -9,6 +9,7 @@
 use super::shape::Ring;
 use crate::frame::{Point, Vector};
 use crate::math::{PI, atan2, sin_cos};
+use crate::random;
 
 /// Cosine of a turn beyond which an inward corner is not mitred: near a full
 /// reversal the mitre would lie far from the corner.
@@ -56,12 +57,9 @@ impl Reach {
 
 /// A number in [0, 1) that depends on the place and the attempt only.
 fn unit(s: Source, attempt: u32) -> f64 {
-    let mut z = (u64::from(s.zone) << 32 | u64::from(s.vertex))
+    let place = (u64::from(s.zone) << 32 | u64::from(s.vertex))
         ^ (u64::from(s.ring) << 24 | u64::from(attempt) << 56);
-    z = z.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    random::unit(random::mix(place))
 }
 
 /// Closed polylines, one after the other.

@@ -14,7 +14,6 @@
 //! | [`search`] | local search over the orders of cells |
 //! | [`improve`] | the default planner |
 //! | [`raster`] | which cells an area becomes |
-//! | [`stream`] | numbers that look random and are the same everywhere |
 //!
 //! Left to others: exact curves, cameras and no-fly zones (`area`).
 
@@ -29,7 +28,6 @@ pub mod raster;
 mod root_distances;
 pub mod search;
 pub mod spanning;
-pub mod stream;
 
 pub use map::{Cell, LaneMap, MapError, NOWHERE};
 pub use plan::{Plan, Task, TaskError};

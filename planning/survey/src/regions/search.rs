@@ -16,7 +16,7 @@ mod shift;
 use super::map::{Cell, NOWHERE, Router};
 use super::plan::Task;
 use super::root_distances::Home;
-use super::stream::Stream;
+use skein_geometry::random::SplitMix64;
 use std::sync::Arc;
 
 /// New links longer by this than all links that they replace are not considered: the
@@ -66,7 +66,7 @@ pub struct Search<'a> {
     /// Cells that may be at a border between two UAVs, and whether a cell is listed.
     borders: Vec<Cell>,
     bordering: Vec<bool>,
-    stream: Stream,
+    random: SplitMix64,
     remembered: Vec<(Cell, Cell, u32)>,
     /// Moves between the roots and every cell, when UAVs return.
     home: Arc<Home>,
@@ -116,7 +116,7 @@ impl<'a> Search<'a> {
                 all[c as usize] = true;
                 all
             }),
-            stream: Stream::new(n as u64),
+            random: SplitMix64::new(n as u64),
             remembered: vec![(NOWHERE, NOWHERE, 0); REMEMBERED],
             home,
             target: 0,
@@ -305,14 +305,14 @@ impl<'a> Search<'a> {
             return 0;
         }
         // A geometric draw: each further unit of heat is half as likely.
-        let bits = self.stream.bits();
+        let bits = self.random.bits();
         i64::from(bits.trailing_zeros().min(12)) * self.heat * ((bits >> 40) & 255) as i64 / 256_000
     }
 
     /// Tries `steps` changes.
     pub fn run(&mut self, steps: usize) {
         for _ in 0..steps {
-            match self.stream.below(32) {
+            match self.random.below(32) {
                 0..=11 => self.try_hop(),
                 12 => self.try_end(),
                 _ => self.try_border(),
@@ -322,7 +322,7 @@ impl<'a> Search<'a> {
 
     /// Lengthens the order of any UAV at its end: an idle one gets work by this alone.
     fn try_end(&mut self) {
-        let uav = self.stream.below(self.orders.len());
+        let uav = self.random.below(self.orders.len());
         let index = self.orders[uav].len();
         if !self.task.closed || index == 0 {
             self.try_fill(Spot { uav, index });
@@ -334,14 +334,14 @@ impl<'a> Search<'a> {
         if self.hops.is_empty() {
             return;
         }
-        let pick = self.stream.below(self.hops.len());
+        let pick = self.random.below(self.hops.len());
         let cell = self.hops[pick];
         let Some(spot) = self.hop_at(cell) else {
             self.listed[cell as usize] = false;
             self.hops.swap_remove(pick);
             return;
         };
-        match self.stream.below(4) {
+        match self.random.below(4) {
             0 | 1 => self.try_reversal(spot),
             2 => self.try_fill(spot),
             _ => self.try_move_from(spot),
@@ -362,7 +362,7 @@ impl<'a> Search<'a> {
                 index: index + 1,
             },
         );
-        let flip = self.stream.bits() & 1 == 0;
+        let flip = self.random.bits() & 1 == 0;
         for spot in if flip {
             [before, after]
         } else {
@@ -378,7 +378,7 @@ impl<'a> Search<'a> {
     }
 
     fn random_near(&mut self, cell: Cell) -> Option<Cell> {
-        let side = self.stream.below(4);
+        let side = self.random.below(4);
         let near = self.task.map.around(cell)[side];
         self.task.map.is_free(near).then_some(near)
     }

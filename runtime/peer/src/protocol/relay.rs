@@ -12,11 +12,11 @@
 use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Priority;
-use crate::wire::Fnv;
 use crate::wire::key;
 use crate::wire::kinds::{Kind, RECORD_MAX_BYTES};
 use crate::wire::limits::{CHUNKS_MAX, HOPS_MAX, MEMBERS_MAX};
 use crate::wire::message::{Beacon, Record};
+use skein_geometry::hash::Fnv;
 #[cfg(test)]
 mod many_relays;
 

@@ -15,8 +15,8 @@
 //! Rounds are ordered by (counter, number of members, hash of members and ground);
 //! a higher one abandons a lower one, and bids of different rounds never mix.
 
-use crate::wire::Fnv;
 use crate::wire::message::{Bid, Epoch, Member, Round};
+use skein_geometry::hash::Fnv;
 use std::collections::BTreeMap;
 use std::hash::Hash;
 

@@ -10,6 +10,7 @@ use super::patch::Patches;
 use serde::{Deserialize, Serialize};
 use skein_geometry::Curve;
 use skein_geometry::frame::{Point, Pose};
+use skein_geometry::hash::Fnv;
 use std::collections::BTreeMap;
 
 /// Which way round the loop.
@@ -194,14 +195,13 @@ pub(in crate::coverage) fn millimetres(curve: &Curve) -> u32 {
     mm
 }
 
-/// FNV-1a over whole numbers: the same on every machine, and cheap.
+/// FNV-1a over whole numbers.
 pub(in crate::coverage) fn hash_words(words: impl IntoIterator<Item = u64>) -> u64 {
-    words
-        .into_iter()
-        .flat_map(u64::to_le_bytes)
-        .fold(0xcbf2_9ce4_8422_2325, |h, byte| {
-            (h ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        })
+    let mut hash = Fnv::new();
+    for word in words {
+        hash.write(&word.to_le_bytes());
+    }
+    hash.finish()
 }
 
 /// Identifies a loop; `patches` stands for what the cells look like.

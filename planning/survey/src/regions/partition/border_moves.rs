@@ -7,9 +7,9 @@
 //!
 //! Left to others: what a way out costs, and which UAV flies which region.
 
-use super::super::stream::Stream;
 use super::{NOBODY, PACE, Partition};
 use core::ops::Range;
+use skein_geometry::random::SplitMix64;
 
 /// Sweeps over all pieces at most: a piece passes one border a sweep, and a region is
 /// reached over fewer borders than this on all maps tried.
@@ -61,7 +61,7 @@ impl Partition<'_> {
         if n == 0 {
             return;
         }
-        let mut stream = Stream::new(n as u64);
+        let mut random = SplitMix64::new(n as u64);
         // A stride that is coprime to most n spreads the order over the map.
         let stride = (7919 % n).max(1);
         for sweep in 1..=SWEEPS {
@@ -69,7 +69,7 @@ impl Partition<'_> {
                 break;
             }
             let mut passed = 0;
-            let mut at = stream.below(n);
+            let mut at = random.below(n);
             for _ in 0..n {
                 passed += usize::from(self.pass(u32::try_from(at).unwrap_or(0)));
                 at = (at + stride) % n;
@@ -121,12 +121,12 @@ impl Partition<'_> {
     /// Passes pieces across borders as chance has it, less and less against the grain.
     pub(super) fn anneal(&mut self) {
         let n = self.pieces.len();
-        let mut stream = Stream::new(n as u64);
+        let mut random = SplitMix64::new(n as u64);
         let tries = (n * TRIES).min(MOST_TRIES);
         for left in (0..tries).rev() {
-            let piece = u32::try_from(stream.below(n)).unwrap_or(0);
+            let piece = u32::try_from(random.below(n)).unwrap_or(0);
             let links = self.near(piece);
-            let link = links.start + stream.below(links.len());
+            let link = links.start + random.below(links.len());
             let Some(near) = self.links[links].first().map(|_| self.links[link]) else {
                 continue;
             };
@@ -135,7 +135,7 @@ impl Partition<'_> {
                 continue;
             }
             // A geometric draw: each further unit is half as likely.
-            let bits = stream.bits();
+            let bits = random.bits();
             let draw = i64::from(bits.trailing_zeros().min(12)) * 256 + ((bits >> 40) & 255) as i64;
             let heat = HOT * left as i64 / tries as i64;
             self.try_pass(piece, (from as usize, to as usize), heat * draw / 512);

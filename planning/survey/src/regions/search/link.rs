@@ -15,13 +15,13 @@ impl Search<'_> {
         let uav = spot.uav;
         let (a, b) = (self.before(spot), self.after(spot));
         let from_a =
-            b == NOWHERE || spot.index == self.orders[uav].len() || self.stream.bits() & 1 == 0;
+            b == NOWHERE || spot.index == self.orders[uav].len() || self.random.bits() & 1 == 0;
         let Some(x) = self.random_near(if from_a { a } else { b }) else {
             return;
         };
         let (owner, at) = self.at[x as usize];
         if owner as usize != uav {
-            if self.stream.below(TAILS) == 0 {
+            if self.random.below(TAILS) == 0 {
                 self.try_tails(spot, x, from_a);
             }
             return;

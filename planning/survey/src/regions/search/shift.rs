@@ -11,7 +11,7 @@ impl Search<'_> {
     /// Fills a hop with a few cells from elsewhere that begin beside it.
     pub(super) fn try_fill(&mut self, spot: Spot) {
         let (a, b) = (self.before(spot), self.after(spot));
-        let beside = if b == NOWHERE || self.stream.bits() & 1 == 0 {
+        let beside = if b == NOWHERE || self.random.bits() & 1 == 0 {
             a
         } else {
             b
@@ -20,8 +20,8 @@ impl Search<'_> {
             return;
         };
         let (uav, at) = self.at[x as usize];
-        let len = 1 + self.stream.below(SEGMENT);
-        let ahead = self.stream.bits() & 1 == 0;
+        let len = 1 + self.random.below(SEGMENT);
+        let ahead = self.random.bits() & 1 == 0;
         let at = at as usize;
         let low = if ahead {
             at
@@ -33,8 +33,8 @@ impl Search<'_> {
 
     /// Moves a few cells beside a hop to elsewhere.
     pub(super) fn try_move_from(&mut self, spot: Spot) {
-        let len = 1 + self.stream.below(SEGMENT);
-        let low = if self.stream.bits() & 1 == 0 {
+        let len = 1 + self.random.below(SEGMENT);
+        let low = if self.random.bits() & 1 == 0 {
             spot.index
         } else {
             spot.index.saturating_sub(len)
@@ -47,9 +47,9 @@ impl Search<'_> {
         if self.borders.is_empty() {
             return;
         }
-        let pick = self.stream.below(self.borders.len());
+        let pick = self.random.below(self.borders.len());
         let cell = self.borders[pick];
-        let first = self.stream.below(4);
+        let first = self.random.below(4);
         let around = self.task.map.around(cell);
         let own = self.at[cell as usize].0;
         let other = (0..4)
@@ -68,8 +68,8 @@ impl Search<'_> {
         };
         let (uav, low) = self.at[x as usize];
         let low = low as usize;
-        let len = 1 + self.stream.below(SEGMENT);
-        let low = if self.stream.bits() & 1 == 0 {
+        let len = 1 + self.random.below(SEGMENT);
+        let low = if self.random.bits() & 1 == 0 {
             low
         } else {
             (low + 1).saturating_sub(len)
@@ -91,7 +91,7 @@ impl Search<'_> {
         if low >= high {
             return;
         }
-        let end = if self.stream.bits() & 1 == 0 {
+        let end = if self.random.bits() & 1 == 0 {
             low
         } else {
             high - 1
@@ -104,7 +104,7 @@ impl Search<'_> {
 
     fn try_beside(&mut self, uav: usize, low: usize, len: usize, near: Cell) {
         let (owner, at) = self.at[near as usize];
-        let index = at as usize + usize::from(self.stream.bits() & 1 == 0);
+        let index = at as usize + usize::from(self.random.bits() & 1 == 0);
         self.try_shift(
             uav,
             low,

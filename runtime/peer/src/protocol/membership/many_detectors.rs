@@ -5,21 +5,22 @@ use crate::output::Status;
 use crate::protocol::membership::{Change, Membership};
 use crate::wire::message::Beacon;
 use proptest::prelude::*;
+use skein_geometry::random::SplitMix64;
 
 const T_MS: u64 = 1000;
 const STEP_MS: u64 = 25;
 const TICK_MS: u64 = 250;
 
-/// A small generator (splitmix): the tests choose its seed.
-pub(crate) struct Dice(pub u64);
+/// Draws of a test, which chooses the seed.
+pub(crate) struct Dice(SplitMix64);
 
 impl Dice {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(SplitMix64::new(seed))
+    }
+
     pub(crate) fn below(&mut self, n: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) % n
+        self.0.bits() % n
     }
 }
 
@@ -72,7 +73,7 @@ fn beacon(heartbeat: u32, eccentricity: u8) -> Beacon {
 
 impl Net {
     fn new(n: usize, seed: u64, loss_percent: u64) -> Self {
-        let mut dice = Dice(seed);
+        let mut dice = Dice::new(seed);
         let period = u32::try_from(T_MS).unwrap();
         let nodes = (0..n)
             .map(|i| Node {

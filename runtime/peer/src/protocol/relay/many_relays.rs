@@ -39,7 +39,7 @@ fn id(i: usize) -> u16 {
 
 impl Net {
     fn new(n: usize, seed: u64, loss_percent: u64) -> Self {
-        let mut dice = Dice(seed);
+        let mut dice = Dice::new(seed);
         let period = u32::try_from(T_MS).unwrap();
         let nodes = (0..n)
             .map(|i| Node {
@@ -321,7 +321,7 @@ fn a_later_life_voids_what_waits_of_the_earlier_one() {
 #[test]
 fn a_flood_of_made_up_records_ends_at_the_caps() {
     let mut relay = Relay::new(0, "f", RATE_BPS, 1000);
-    let mut dice = Dice(1);
+    let mut dice = Dice::new(1);
     for t in 0..4000_u64 {
         let author = u16::try_from(1 + dice.below(3000)).unwrap();
         let record = Record {

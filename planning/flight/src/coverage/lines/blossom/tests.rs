@@ -2,16 +2,10 @@
 
 use super::*;
 
-struct SplitMix64(u64);
+use skein_geometry::random::SplitMix64;
 
-impl SplitMix64 {
-    fn below(&mut self, n: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        (z ^ (z >> 31)) % n
-    }
+fn below(random: &mut SplitMix64, n: u64) -> u64 {
+    random.bits() % n
 }
 
 /// Least cost over all perfect matchings, by subsets.
@@ -62,17 +56,17 @@ fn total(m: &Matching, edges: &[(u32, u32, i64)]) -> i64 {
 
 #[test]
 fn as_cheap_as_every_other_perfect_matching_of_small_graphs() {
-    let mut random = SplitMix64(7);
+    let mut random = SplitMix64::new(7);
     let (mut solved, mut refused) = (0, 0);
     for _ in 0..20_000 {
-        let n = 2 * (1 + random.below(6) as usize);
-        let dense = 1 + random.below(4);
-        let range = 1 + random.below(30);
+        let n = 2 * (1 + below(&mut random, 6) as usize);
+        let dense = 1 + below(&mut random, 4);
+        let range = 1 + below(&mut random, 30);
         let mut edges = Vec::new();
         for a in 0..n as u32 {
             for b in a + 1..n as u32 {
-                if random.below(4) < dense {
-                    edges.push((a, b, 2 * random.below(range) as i64));
+                if below(&mut random, 4) < dense {
+                    edges.push((a, b, 2 * below(&mut random, range) as i64));
                 }
             }
         }
@@ -93,10 +87,15 @@ fn as_cheap_as_every_other_perfect_matching_of_small_graphs() {
 
 #[test]
 fn the_dual_solution_proves_large_matchings() {
-    let mut random = SplitMix64(3);
+    let mut random = SplitMix64::new(3);
     for n in [40u32, 120, 300] {
         let at: Vec<(i64, i64)> = (0..n)
-            .map(|_| (random.below(1000) as i64, random.below(1000) as i64))
+            .map(|_| {
+                (
+                    below(&mut random, 1000) as i64,
+                    below(&mut random, 1000) as i64,
+                )
+            })
             .collect();
         let mut edges = Vec::new();
         for a in 0..n {
