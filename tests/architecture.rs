@@ -47,7 +47,7 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
     ),
     (
         "skein-link",
-        &["skein-geometry", "skein-flight", "skein-behaviors"],
+        &["skein-geometry", "skein-behaviors"],
         &[
             "tokio",
             "zenoh",

@@ -8,11 +8,11 @@ use crate::navmesh::{self, Query};
 use anyhow::{Context, Result, ensure};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use skein_flight::route::continuous::{Effort, PathMap};
-use skein_flight::route::landmarks::Landmarks;
 use skein_flight::route::mesh::Mesh;
 use skein_flight::route::two_point::Search;
 use skein_geometry::frame::Point;
+use skein_lab::route::continuous::{Effort, PathMap};
+use skein_lab::route::landmarks::Landmarks;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 

@@ -6,11 +6,12 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use skein_flight::trajectory::wind::{
-    Answer, Families, Performance, Wind, scan, time_optimal, time_optimal_over,
+    Answer, Families, Performance, Wind, time_optimal, time_optimal_over,
 };
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::{TAU, sin_cos};
 use skein_geometry::random::SplitMix64;
+use skein_lab::wind_scan;
 use std::hint::black_box;
 use std::path::PathBuf;
 
@@ -145,7 +146,7 @@ fn missed(case: &Case, answer: &Answer, looks: u32) -> bool {
     let until_s = answer
         .path()
         .map_or(PATIENCE * unit_s, |p| p.time_s() * (1.0 - EARLIER));
-    scan::earliest_s(
+    wind_scan::earliest_s(
         case.from,
         case.to,
         case.performance,

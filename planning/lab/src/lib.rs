@@ -7,19 +7,23 @@
 //! |---|---|---|
 //! | [`headings`] | headings at waypoints for the shortest chain, with a certified gap | 2.4.3 |
 //! | [`graph`], [`tree_cover`] | min-max tree covers of weighted graphs | 3.4.2 |
+//! | [`route`] | continuous Dijkstra, landmarks, cuts | 2.3.2–2.3.3 |
+//! | [`wind_scan`] | a dense oracle of the fastest flight in wind | 2.4.2 |
 //! | [`regions`] | other planners of lane cells: forest, MSTC, divided rings | 3.6.1–3.6.6 |
 
 pub mod graph;
 pub mod headings;
 pub mod regions;
+pub mod route;
 pub mod tree_cover;
+pub mod wind_scan;
 
 #[cfg(test)]
 mod route_tests;
 
 #[cfg(test)]
 mod tests {
-    use skein_flight::route::continuous::PathMap;
+    use crate::route::continuous::PathMap;
     use skein_flight::route::mesh::Mesh;
     use skein_geometry::frame::Point;
     use skein_survey::visibility::VisibilityGraph;

@@ -133,8 +133,8 @@ impl Matrix {
     ///
     /// # Complexity
     /// O(n³).
-    #[must_use]
-    pub fn closure(mut self) -> Self {
+    #[cfg(test)]
+    pub(crate) fn closure(mut self) -> Self {
         let n = self.n;
         for via in 0..n {
             let row: Vec<f64> = self.costs[via * n..(via + 1) * n].to_vec();

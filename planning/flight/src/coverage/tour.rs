@@ -62,7 +62,7 @@ pub fn spanning_tree(places: &[usize], metric: &impl Metric) -> (Vec<usize>, f64
 ///
 /// # Guarantees
 /// Every place once; at most twice the spanning tree and so twice the optimum, where the
-/// costs obey the triangle inequality (see [`crate::coverage::metric::Matrix::closure`]).
+/// costs obey the triangle inequality.
 ///
 /// # Complexity
 /// O(n²).

@@ -1,14 +1,13 @@
 //! Free space as convex cells that meet edge to edge (D2.7 §2.3.3).
 //!
 //! Both engines of the mesh stand on this structure: the two-point search
-//! ([`super::two_point`]) and the shortest path map ([`super::continuous`]).
+//! ([`super::two_point`]) and the shortest path map (in `skein-lab`).
 //! It is made from ready cells, checked one by one, or by triangulating an area
 //! with holes. Union and offset of the zones happen before, in
 //! [`skein_geometry`].
 
 mod blocks;
 mod build;
-mod cut;
 mod lines;
 mod locate;
 mod repair;
@@ -21,18 +20,17 @@ use thiserror::Error;
 
 use blocks::Blocks;
 pub use build::delaunay;
-pub use cut::Cut;
 use locate::Buckets;
 
 /// No vertex, no half-edge, no cell.
-pub(crate) const NONE: u32 = u32::MAX;
+pub const NONE: u32 = u32::MAX;
 
 /// The largest coordinate a mesh may have, metres: a planet, with room to square it.
 pub const MAX_MESH_COORDINATE_M: f64 = 1.0e8;
 
 /// One side of a cell, in the direction that has the cell on its left.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct HalfEdge {
+pub struct HalfEdge {
     /// Where it starts.
     pub origin: Point,
     /// The vertex there.
@@ -50,7 +48,7 @@ pub(crate) struct HalfEdge {
 /// Where zones touch in a point, that point is several vertices, one for each
 /// fan: nothing flies through a gap without width.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Vertex {
+pub struct Vertex {
     /// Where it is.
     pub at: Point,
     /// The end of the wall that bounds the fan on its right.
@@ -68,13 +66,15 @@ pub(crate) struct Vertex {
 /// Convex cells of free space, their neighbours, and where to find a point.
 #[derive(Clone, Debug)]
 pub struct Mesh {
-    pub(crate) vertices: Vec<Vertex>,
+    /// The vertices.
+    pub vertices: Vec<Vertex>,
     /// The first vertices are all places; those behind them stand where an earlier one
     /// does, and this is which.
     twice: Vec<u32>,
-    pub(crate) edges: Vec<HalfEdge>,
+    /// The half-edges, cell by cell.
+    pub edges: Vec<HalfEdge>,
     /// Where each cell's half-edges begin; one entry more than cells.
-    pub(crate) starts: Vec<u32>,
+    pub starts: Vec<u32>,
     pub(crate) blocks: Blocks,
     buckets: Buckets,
 }
@@ -220,7 +220,7 @@ impl Mesh {
     }
 
     /// All cells that contain `p`: several, if it lies on an edge or a vertex.
-    pub(crate) fn cells_at(&self, p: Point, into: &mut Vec<u32>) {
+    pub fn cells_at(&self, p: Point, into: &mut Vec<u32>) {
         into.clear();
         into.extend(
             self.buckets
@@ -231,12 +231,20 @@ impl Mesh {
     }
 
     /// A point inside the part of the mesh that has the most cells.
-    pub(crate) fn middle_of_largest_part(&self) -> Point {
+    #[must_use]
+    pub fn middle_of_largest_part(&self) -> Point {
         self.middle_of(self.blocks.largest_part())
     }
 
+    /// Whether two cells are joined by free space.
+    #[must_use]
+    pub fn joined(&self, a: u32, b: u32) -> bool {
+        self.blocks.joined(a, b)
+    }
+
     /// A point inside a cell.
-    fn middle_of(&self, cell: u32) -> Point {
+    #[must_use]
+    pub fn middle_of(&self, cell: u32) -> Point {
         let ring = self.cell(cell as usize).collect::<Vec<_>>();
         let sum = ring
             .iter()
@@ -246,7 +254,7 @@ impl Mesh {
 
     /// Calls `visit` with every cell that contains `p`.
     #[inline]
-    pub(crate) fn for_cells_at(&self, p: Point, mut visit: impl FnMut(u32)) {
+    pub fn for_cells_at(&self, p: Point, mut visit: impl FnMut(u32)) {
         for &cell in self.buckets.at(p) {
             if self.cell_contains(cell, p) {
                 visit(cell);
@@ -275,8 +283,9 @@ impl Mesh {
     }
 
     /// The next half-edge round the same cell.
+    #[must_use]
     #[inline]
-    pub(crate) fn next(&self, edge: u32) -> u32 {
+    pub fn next(&self, edge: u32) -> u32 {
         let cell = self.edges[edge as usize].cell as usize;
         if edge + 1 == self.starts[cell + 1] {
             self.starts[cell]
@@ -286,8 +295,9 @@ impl Mesh {
     }
 
     /// The half-edge before, round the same cell.
+    #[must_use]
     #[inline]
-    pub(crate) fn previous(&self, edge: u32) -> u32 {
+    pub fn previous(&self, edge: u32) -> u32 {
         let cell = self.edges[edge as usize].cell as usize;
         if edge == self.starts[cell] {
             self.starts[cell + 1] - 1
@@ -389,8 +399,9 @@ impl Vertex {
 }
 
 /// Twice the area of a → b → c with its exact sign: above zero for a left turn.
+#[must_use]
 #[inline]
-pub(crate) fn turn(a: Point, b: Point, c: Point) -> f64 {
+pub fn turn(a: Point, b: Point, c: Point) -> f64 {
     // The error bound of the plain expression (Shewchuk 1997); most calls end here.
     const BOUND: f64 = 3.330_669_073_875_471_6e-16;
     let left = (a.x - c.x) * (b.y - c.y);

@@ -6,10 +6,9 @@
 //! them where no Dubins word is clear. A curve that fails its check is refused,
 //! never clipped.
 
-pub mod continuous;
 #[cfg(test)]
 mod degenerate_maps;
-pub mod landmarks;
+pub mod lower_bounds;
 pub mod mesh;
 #[cfg(test)]
 mod mesh_properties;
@@ -19,7 +18,7 @@ mod tangent_circles;
 #[cfg(test)]
 mod tests;
 pub mod two_point;
-mod visibility_step;
+pub mod visibility_step;
 
 use crate::trajectory::dubins;
 use search::Search;
@@ -165,56 +164,6 @@ impl Router {
             .ok_or(RouteError::NoRoute)
     }
 
-    /// As [`Router::route`], over points in their order; the headings there are
-    /// chosen together, among eleven each, for the shortest whole.
-    ///
-    /// # Errors
-    /// [`RouteError`]; a point inside a clearance counts as a goal there.
-    pub fn route_through(&self, from: Pose, vias: &[Point], to: Pose) -> Result<Curve, RouteError> {
-        self.check_ends(from.position(), to.position())?;
-        for &via in vias {
-            self.check_ends(from.position(), via)?;
-        }
-        let mut layer = vec![(from, Curve::empty())];
-        for (i, &via) in vias.iter().enumerate() {
-            let before = i.checked_sub(1).map_or(from.position(), |j| vias[j]);
-            let after = vias.get(i + 1).copied().unwrap_or(to.position());
-            let next = headings_through(before, via, after)
-                .into_iter()
-                .map(|h| Pose::new(via, h));
-            layer = next
-                .filter_map(|pose| Some((pose, self.extend(&layer, pose)?)))
-                .collect();
-        }
-        self.extend(&layer, to).ok_or(RouteError::NoRoute)
-    }
-
-    /// The shortest way on from one of several ends of ways to `to`.
-    fn extend(&self, layer: &[(Pose, Curve)], to: Pose) -> Option<Curve> {
-        let bound_m = |(pose, way): &(Pose, Curve)| {
-            way.length_m() + dubins::length_m(*pose, to, self.limits.turn_radius_m)
-        };
-        let mut order: Vec<(f64, usize)> = layer.iter().map(bound_m).zip(0..).collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let mut best: Option<(f64, usize, Curve)> = None;
-        for (bound_m, i) in order {
-            if best.as_ref().is_some_and(|(m, ..)| bound_m >= *m) {
-                break;
-            }
-            if let Some(rest) = self.find(layer[i].0, Goal::Pose(to)) {
-                let length_m = layer[i].1.length_m() + rest.length_m();
-                if best.as_ref().is_none_or(|(m, ..)| length_m < *m) {
-                    best = Some((length_m, i, rest));
-                }
-            }
-        }
-        best.map(|(_, i, rest)| {
-            let mut whole = layer[i].1.clone();
-            whole.extend(&rest);
-            whole
-        })
-    }
-
     fn check_ends(&self, from: Point, to: Point) -> Result<(), RouteError> {
         // A distance that is no number fails both comparisons' negations.
         let clear = |p: Point| {
@@ -295,16 +244,4 @@ impl Router {
 
 fn all_around() -> impl Iterator<Item = f64> {
     (0..POINT_HEADINGS).map(|i| TAU * f64::from(i) / f64::from(POINT_HEADINGS))
-}
-
-/// Headings worth trying at a point between two others: as one arrives, as one
-/// leaves, half way between, and all around.
-fn headings_through(before: Point, at: Point, after: Point) -> Vec<f64> {
-    let unit = |v: skein_geometry::frame::Vector| v / v.norm().max(f64::MIN_POSITIVE);
-    let (a, b) = (unit(at - before), unit(after - at));
-    [a, b, a + b]
-        .into_iter()
-        .map(|v| atan2(v.y, v.x))
-        .chain(all_around())
-        .collect()
 }

@@ -121,31 +121,6 @@ fn no_way_through_a_closed_wall() {
 }
 
 #[test]
-fn ordered_points_are_visited_in_order() {
-    let router = router(vec![rectangle(100.0, -50.0, 100.0, 100.0)], 15.0);
-    let (from, to) = (pose(0.0, 0.0, 0.0), pose(300.0, 0.0, 0.0));
-    let vias = [Point::new(150.0, 120.0), Point::new(150.0, -120.0)];
-    let curve = router.route_through(from, &vias, to).unwrap();
-    judge(&router, from, to.position(), Some(0.0), &curve);
-    let mut at_m = Vec::new();
-    for via in vias {
-        let steps = (curve.length_m() / 0.5) as u32;
-        let near = (0..=steps)
-            .map(|i| f64::from(i) * 0.5)
-            .find(|&s| (curve.pose_at(s).unwrap().position() - via).norm() < 0.6);
-        at_m.push(near.unwrap());
-    }
-    assert!(at_m[0] < at_m[1], "{at_m:?}");
-    let direct = router.route_through(from, &[], to).unwrap();
-    assert_eq!(direct, router.route(from, to).unwrap());
-    assert!(direct.length_m() < curve.length_m());
-    assert_eq!(
-        router.route_through(from, &[Point::new(150.0, 0.0)], to),
-        Err(RouteError::GoalInZone)
-    );
-}
-
-#[test]
 fn a_launch_behind_a_large_zone_is_not_cut_off() {
     // No Dubins word leads from the launch point round either end of the zone.
     let zones = Arc::new(NoFlyZones::new(vec![rectangle(

@@ -11,7 +11,7 @@
 //!
 //! One source with many goals is the business of [`super::continuous`].
 
-use super::landmarks::{self, Landmarks, Lengths};
+use super::lower_bounds::{self, Lengths, LowerBounds};
 use super::mesh::{Mesh, NONE};
 use super::visibility_step::{self, Ray, SOURCE, View, Watcher};
 use skein_geometry::frame::Point;
@@ -89,7 +89,7 @@ pub struct Search<'m> {
     /// The node being opened.
     opened: Node,
     n_opened: u32,
-    landmarks: Option<&'m Landmarks<'m>>,
+    landmarks: Option<&'m dyn LowerBounds>,
     from_lengths: Lengths,
     to_lengths: Lengths,
 }
@@ -130,7 +130,7 @@ impl<'m> Search<'m> {
     /// Memory for queries that are guided by landmarks of the same mesh: the same
     /// lengths, sooner.
     #[must_use]
-    pub fn with_landmarks(mesh: &'m Mesh, landmarks: &'m Landmarks<'m>) -> Self {
+    pub fn with_landmarks(mesh: &'m Mesh, landmarks: &'m dyn LowerBounds) -> Self {
         Self {
             landmarks: Some(landmarks),
             ..Self::new(mesh)
@@ -223,7 +223,7 @@ impl<'m> Search<'m> {
     }
 
     /// Puts a node back with what the landmarks say about it.
-    fn sharpen(&mut self, node: Node, landmarks: &Landmarks) {
+    fn sharpen(&mut self, node: Node, landmarks: &dyn LowerBounds) {
         if self.n_opened == BEFORE_LANDMARKS {
             self.n_opened += 1;
             self.from_lengths = landmarks.at_point(self.from);
@@ -234,7 +234,7 @@ impl<'m> Search<'m> {
         } else {
             landmarks.at_vertex(node.root)
         };
-        let mut rest_m = landmarks::between_m(root, &self.to_lengths);
+        let mut rest_m = lower_bounds::between_m(root, &self.to_lengths);
         if node.edge != NONE {
             let a = &self.mesh.edges[node.edge as usize];
             let b = &self.mesh.edges[self.mesh.next(node.edge) as usize];
@@ -243,7 +243,7 @@ impl<'m> Search<'m> {
             let square = along.norm_squared();
             let d = self.at(node.root) - a.origin;
             let nearest = along * (d.dot(&along) / square).clamp(0.0, 1.0);
-            let beyond_m = landmarks::to_side_m(&self.to_lengths, l, r, square.sqrt());
+            let beyond_m = lower_bounds::to_side_m(&self.to_lengths, l, r, square.sqrt());
             rest_m = rest_m.max((d - nearest).norm() + beyond_m);
         }
         self.push(Node {

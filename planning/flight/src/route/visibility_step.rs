@@ -9,21 +9,23 @@ use super::mesh::{Mesh, NONE, turn};
 use skein_geometry::frame::Point;
 
 /// The start of the paths, as the root of a sight.
-pub(crate) const SOURCE: u32 = NONE - 2;
+pub const SOURCE: u32 = NONE - 2;
 
 /// A straight line through two points, for exact side tests.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ray(pub Point, pub Point);
+pub struct Ray(pub Point, pub Point);
 
 impl Ray {
     /// Above zero if `p` lies left of the line.
     #[inline]
+    #[must_use]
     pub fn side(self, p: Point) -> f64 {
         turn(self.0, self.1, p)
     }
 
     /// Where the line meets the line through `a` and `b`, kept between them.
     /// Rounded: good for lengths, not for decisions.
+    #[must_use]
     pub fn crossing(self, a: Point, b: Point) -> Point {
         let d = self.1 - self.0;
         let to_a = d.perp(&(a - self.0));
@@ -39,7 +41,7 @@ impl Ray {
 
 /// A sight on its way into a cell.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct View<B> {
+pub struct View<B> {
     /// The vertex that sees, or [`SOURCE`].
     pub root: u32,
     /// The side that is looked through, seen from the cell beyond.
@@ -51,7 +53,7 @@ pub(crate) struct View<B> {
 }
 
 /// Who follows sights, and what it does with what they meet.
-pub(crate) trait Watcher {
+pub trait Watcher {
     /// How it remembers the ray that bounds a sight.
     type Bound: Copy;
 
@@ -76,7 +78,7 @@ pub(crate) trait Watcher {
 }
 
 /// Everything the start sees in a cell that contains it.
-pub(crate) fn look_from_start<W: Watcher>(watcher: &mut W, mesh: &Mesh, cell: u32) {
+pub fn look_from_start<W: Watcher>(watcher: &mut W, mesh: &Mesh, cell: u32) {
     let from = watcher.at(SOURCE);
     for j in mesh.starts[cell as usize]..mesh.starts[cell as usize + 1] {
         let a = mesh.edges[j as usize];
@@ -91,7 +93,7 @@ pub(crate) fn look_from_start<W: Watcher>(watcher: &mut W, mesh: &Mesh, cell: u3
 
 /// Carries a sight through a cell to its other sides.
 #[inline]
-pub(crate) fn look_through<W: Watcher>(watcher: &mut W, mesh: &Mesh, view: View<W::Bound>) {
+pub fn look_through<W: Watcher>(watcher: &mut W, mesh: &Mesh, view: View<W::Bound>) {
     let root = view.root;
     let right = watcher.ray(root, view.right);
     let left = watcher.ray(root, view.left);
@@ -146,7 +148,8 @@ pub(crate) fn look_through<W: Watcher>(watcher: &mut W, mesh: &Mesh, view: View<
 /// Whether a path from `from` over this vertex may bend there, right and left:
 /// its wall must lie all on that side, or the bend could be pulled straight.
 #[inline]
-pub(crate) fn bends(mesh: &Mesh, from: Point, vertex: u32) -> (bool, bool) {
+#[must_use]
+pub fn bends(mesh: &Mesh, from: Point, vertex: u32) -> (bool, bool) {
     let v = &mesh.vertices[vertex as usize];
     if !v.corner {
         return (false, false);
@@ -157,7 +160,7 @@ pub(crate) fn bends(mesh: &Mesh, from: Point, vertex: u32) -> (bool, bool) {
 }
 
 /// Opens a corner: what it sees between its wall and the straight way on.
-pub(crate) fn look_round<W: Watcher>(watcher: &mut W, mesh: &Mesh, root: u32) {
+pub fn look_round<W: Watcher>(watcher: &mut W, mesh: &Mesh, root: u32) {
     let on = watcher.ray(root, watcher.straight_on());
     let (right, left) = bends(mesh, on.0, root);
     let v = &mesh.vertices[root as usize];

@@ -46,7 +46,6 @@
 
 mod cross;
 mod problem;
-pub mod scan;
 #[cfg(test)]
 mod tests;
 mod triple;
@@ -293,14 +292,6 @@ impl WindPath {
     pub fn end(&self) -> Pose {
         self.pose_at(self.time_s())
     }
-
-    /// Velocity over the ground after `t_s` seconds, m/s.
-    #[must_use]
-    pub fn ground_velocity_at(&self, t_s: f64) -> Vector {
-        let heading = Heading(self.pose_at(t_s).heading_rad);
-        self.wind
-            .ground_velocity(heading, self.performance.airspeed_mps)
-    }
 }
 
 /// What the search for a path found.
@@ -381,30 +372,6 @@ pub fn time_optimal_over(
             wind,
         })
     }))
-}
-
-/// The fastest flight from one course over the ground to another.
-///
-/// [`Answer::Unreachable`] also when the wind forbids one of the two courses.
-///
-/// # Errors
-/// [`WindError`] when a number is none or not in its range.
-pub fn time_optimal_on_courses(
-    from: (skein_geometry::frame::Point, Course),
-    to: (skein_geometry::frame::Point, Course),
-    performance: Performance,
-    wind: Wind,
-) -> Result<Answer, WindError> {
-    let heading = |course| wind.heading_for_course(course, performance.airspeed_mps);
-    match (heading(from.1), heading(to.1)) {
-        (Some(a), Some(b)) => time_optimal(
-            Pose::new(from.0, a.0),
-            Pose::new(to.0, b.0),
-            performance,
-            wind,
-        ),
-        _ => Ok(Answer::Unreachable),
-    }
 }
 
 /// Duration of [`time_optimal`], seconds, infinite when unreachable, without the path.

@@ -6,37 +6,24 @@
 
 use super::triangles::{FRAME, Triangles, WALL, next, previous};
 use super::{HalfEdge, MAX_MESH_COORDINATE_M, Mesh, MeshError, NONE, turn};
-use skein_geometry::Polygon;
 use skein_geometry::frame::Point;
 
 /// Coordinates below this are zero: the triangulation squares them without underflow.
 const SMALLEST_M: f64 = 1e-30;
 
 impl Mesh {
-    /// The inside of `outer` without the insides of `holes`.
+    /// What lies inside an odd number of rings; each ring may run either way.
     ///
     /// Holes may touch each other and the border, in points or along lines; they
-    /// must not cross. A polygon inside a hole is free space again, and so on.
+    /// must not cross. A ring inside a hole is free space again, and so on.
     ///
     /// # Complexity
     /// O(n log n) in the number of vertices.
     ///
     /// # Errors
     /// [`MeshError::Crossing`] names the line that crosses another one,
-    /// [`MeshError::Empty`] says that nothing is left.
-    pub fn from_polygons(outer: &Polygon, holes: &[Polygon]) -> Result<Self, MeshError> {
-        let rings: Vec<&[Point]> = std::iter::once(outer)
-            .chain(holes)
-            .map(Polygon::vertices)
-            .collect();
-        Self::from_rings(&rings)
-    }
-
-    /// What lies inside an odd number of rings; each ring may run either way.
-    ///
-    /// # Errors
-    /// As [`Mesh::from_polygons`], and [`MeshError::BadCoordinate`], counted over
-    /// all rings.
+    /// [`MeshError::Empty`] says that nothing is left, [`MeshError::BadCoordinate`]
+    /// counts over all rings.
     pub fn from_rings(rings: &[&[Point]]) -> Result<Self, MeshError> {
         let points = checked(rings)?;
         let mut first = 0;

@@ -220,34 +220,6 @@ proptest! {
     }
 
     #[test]
-    fn the_dense_oracle_sees_nothing_faster(
-        x in -200.0f64..200.0, y in -200.0f64..200.0, b in -4.0f64..4.0,
-        share in 0.0f64..1.4, towards in 0.0f64..TAU,
-    ) {
-        let (from, to, w) = (pose(0.0, 0.0, 0.3), pose(x, y, b), wind(share, towards));
-        let t = time_s(from, to, UAV, w).unwrap();
-        let until_s = if t.is_finite() { t * (1.0 - 1e-7) } else { 120.0 };
-        let seen = scan::earliest_s(from, to, UAV, w, until_s, 400);
-        prop_assert!(seen.is_none(), "{seen:?} before {t}");
-    }
-
-    #[test]
-    fn the_oracle_sees_what_straight_middles_miss(
-        x in -120.0f64..120.0, y in -120.0f64..120.0, b in -4.0f64..4.0,
-        share in 0.0f64..0.5, towards in 0.0f64..TAU,
-    ) {
-        let (from, to, w) = (pose(0.0, 0.0, 0.3), pose(x, y, b), wind(share, towards));
-        let over = |f| time_optimal_over(f, from, to, UAV, w).unwrap().path().unwrap().time_s();
-        let (best, straight) = (over(Families::All), over(Families::StraightMiddle));
-        if best > straight * (1.0 - 1e-4) {
-            // Three goals in four: the straight middle is best.
-            return Ok(());
-        }
-        let seen = scan::earliest_s(from, to, UAV, w, straight * (1.0 - 1e-6), 400);
-        prop_assert!(seen.is_some_and(|t| (t - best).abs() < 1e-6 * best), "{seen:?} {best} {straight}");
-    }
-
-    #[test]
     fn course_and_heading_invert_each_other(
         heading in -3.1f64..3.1, share in 0.0f64..0.99, towards in 0.0f64..TAU,
     ) {

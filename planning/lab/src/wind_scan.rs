@@ -3,7 +3,7 @@
 //! Slow on purpose and written from the circles' centres alone, so that it shares no
 //! formula with the solver that it judges. For tests and measurements.
 
-use super::{Performance, Wind};
+use skein_flight::trajectory::wind::{Performance, Wind};
 use skein_geometry::frame::{Point, Pose, Vector};
 use skein_geometry::math::{PI, TAU, atan2, sin_cos, wrap_tau};
 
@@ -197,4 +197,60 @@ fn dip(f: &dyn Fn(f64) -> Option<f64>, a: (f64, f64), m: (f64, f64), b: (f64, f6
         }
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use skein_flight::trajectory::wind::{Families, time_optimal_over, time_s};
+    use skein_geometry::math::{cos, sin};
+
+    const UAV: Performance = Performance {
+        airspeed_mps: 20.0,
+        turn_radius_m: 50.0,
+    };
+
+    fn pose(east_m: f64, north_m: f64, heading_rad: f64) -> Pose {
+        Pose {
+            east_m,
+            north_m,
+            heading_rad,
+        }
+    }
+
+    fn wind(share: f64, towards: f64) -> Wind {
+        let speed = share * UAV.airspeed_mps;
+        Wind::new(speed * cos(towards), speed * sin(towards))
+    }
+
+    proptest! {
+        #[test]
+        fn the_dense_oracle_sees_nothing_faster(
+            x in -200.0f64..200.0, y in -200.0f64..200.0, b in -4.0f64..4.0,
+            share in 0.0f64..1.4, towards in 0.0f64..TAU,
+        ) {
+            let (from, to, w) = (pose(0.0, 0.0, 0.3), pose(x, y, b), wind(share, towards));
+            let t = time_s(from, to, UAV, w).unwrap();
+            let until_s = if t.is_finite() { t * (1.0 - 1e-7) } else { 120.0 };
+            let seen = earliest_s(from, to, UAV, w, until_s, 400);
+            prop_assert!(seen.is_none(), "{seen:?} before {t}");
+        }
+
+        #[test]
+        fn the_oracle_sees_what_straight_middles_miss(
+            x in -120.0f64..120.0, y in -120.0f64..120.0, b in -4.0f64..4.0,
+            share in 0.0f64..0.5, towards in 0.0f64..TAU,
+        ) {
+            let (from, to, w) = (pose(0.0, 0.0, 0.3), pose(x, y, b), wind(share, towards));
+            let over = |f| time_optimal_over(f, from, to, UAV, w).unwrap().path().unwrap().time_s();
+            let (best, straight) = (over(Families::All), over(Families::StraightMiddle));
+            if best > straight * (1.0 - 1e-4) {
+                // Three goals in four: the straight middle is best.
+                return Ok(());
+            }
+            let seen = earliest_s(from, to, UAV, w, straight * (1.0 - 1e-6), 400);
+            prop_assert!(seen.is_some_and(|t| (t - best).abs() < 1e-6 * best), "{seen:?} {best} {straight}");
+        }
+    }
 }

@@ -3,7 +3,7 @@
 //! That a search found nothing is hard to check. That a chain of zone edges runs round
 //! one end and not round the other is easy, and needs neither the mesh nor the search.
 
-use super::{Mesh, NONE, turn};
+use skein_flight::route::mesh::{Mesh, NONE, turn};
 use skein_geometry::frame::Point;
 
 /// A closed chain of walls that parts two places.
@@ -39,65 +39,63 @@ fn is_round(ring: &[Point], p: Point) -> bool {
     })
 }
 
-impl Mesh {
-    /// What parts two places between which there is no path. None if there is one, if
-    /// neither of them is in free space, or if one is no place. An end on a wall
-    /// between several parts of free space stands for the first of them.
-    #[must_use]
-    pub fn cut_between(&self, from: Point, to: Point) -> Option<Cut> {
-        let mut cells = [Vec::new(), Vec::new()];
-        self.cells_at(from, &mut cells[0]);
-        self.cells_at(to, &mut cells[1]);
-        let joined = |&a: &u32| cells[1].iter().any(|&b| self.blocks.joined(a, b));
-        let finite = |p: Point| p.x.is_finite() && p.y.is_finite();
-        if cells[0].iter().any(joined) || !finite(from) || !finite(to) {
-            return None;
-        }
-        let beside = |cells: &[u32], p| cells.first().map_or(p, |&c| self.middle_of(c));
-        let beside = [beside(&cells[0], from), beside(&cells[1], to)];
-        let part = *cells[0].first().or(cells[1].first())?;
-        // The walls of a part are its border: all chains together are round its inside
-        // once and round everything else an even number of times, so one of them parts.
-        let mut seen = vec![false; self.edges.len()];
-        for first in 0..self.edges.len() as u32 {
-            let e = &self.edges[first as usize];
-            let is_new = e.twin == NONE && !seen[first as usize];
-            if !is_new || !self.blocks.joined(e.cell, part) {
-                continue;
-            }
-            let cut = Cut {
-                ring: self.chain_of_walls(first, &mut seen),
-                beside,
-            };
-            if cut.parts() {
-                return Some(cut);
-            }
-        }
-        None
+/// What parts two places between which there is no path. None if there is one, if
+/// neither of them is in free space, or if one is no place. An end on a wall
+/// between several parts of free space stands for the first of them.
+#[must_use]
+pub fn cut_between(mesh: &Mesh, from: Point, to: Point) -> Option<Cut> {
+    let mut cells = [Vec::new(), Vec::new()];
+    mesh.cells_at(from, &mut cells[0]);
+    mesh.cells_at(to, &mut cells[1]);
+    let joined = |&a: &u32| cells[1].iter().any(|&b| mesh.joined(a, b));
+    let finite = |p: Point| p.x.is_finite() && p.y.is_finite();
+    if cells[0].iter().any(joined) || !finite(from) || !finite(to) {
+        return None;
     }
+    let beside = |cells: &[u32], p| cells.first().map_or(p, |&c| mesh.middle_of(c));
+    let beside = [beside(&cells[0], from), beside(&cells[1], to)];
+    let part = *cells[0].first().or(cells[1].first())?;
+    // The walls of a part are its border: all chains together are round its inside
+    // once and round everything else an even number of times, so one of them parts.
+    let mut seen = vec![false; mesh.edges.len()];
+    for first in 0..mesh.edges.len() as u32 {
+        let e = &mesh.edges[first as usize];
+        let is_new = e.twin == NONE && !seen[first as usize];
+        if !is_new || !mesh.joined(e.cell, part) {
+            continue;
+        }
+        let cut = Cut {
+            ring: chain_of_walls(mesh, first, &mut seen),
+            beside,
+        };
+        if cut.parts() {
+            return Some(cut);
+        }
+    }
+    None
+}
 
-    /// From wall to wall with free space on the left, until the chain closes.
-    fn chain_of_walls(&self, first: u32, seen: &mut [bool]) -> Vec<Point> {
-        let mut ring = Vec::new();
-        let mut wall = first;
-        while !seen[wall as usize] {
-            seen[wall as usize] = true;
-            ring.push(self.edges[wall as usize].origin);
-            wall = self.next(wall);
-            while self.edges[wall as usize].twin != NONE {
-                wall = self.next(self.edges[wall as usize].twin);
-            }
+/// From wall to wall with free space on the left, until the chain closes.
+fn chain_of_walls(mesh: &Mesh, first: u32, seen: &mut [bool]) -> Vec<Point> {
+    let mut ring = Vec::new();
+    let mut wall = first;
+    while !seen[wall as usize] {
+        seen[wall as usize] = true;
+        ring.push(mesh.edges[wall as usize].origin);
+        wall = mesh.next(wall);
+        while mesh.edges[wall as usize].twin != NONE {
+            wall = mesh.next(mesh.edges[wall as usize].twin);
         }
-        ring
     }
+    ring
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::route::degenerate_maps::{Rings, crowded, mesh_of, square};
-    use crate::route::two_point::Search;
     use proptest::prelude::*;
+    use skein_flight::route::two_point::Search;
 
     /// Whether the line between two points lies on edges of the rings.
     fn lies_on_edges(rings: &Rings, a: Point, b: Point) -> bool {
@@ -120,7 +118,7 @@ mod tests {
         ];
         let mesh = mesh_of(&rings);
         let (yard, outside, wall) = (20.0, 5.0, 12.0);
-        let cut = |a: f64, b: f64| mesh.cut_between(Point::new(a, a), Point::new(b, b));
+        let cut = |a: f64, b: f64| cut_between(&mesh, Point::new(a, a), Point::new(b, b));
         assert_eq!(cut(yard, outside).unwrap().ring.len(), 4);
         assert!(cut(yard, wall).unwrap().parts());
         assert!(cut(wall, outside).unwrap().parts());
@@ -144,7 +142,7 @@ mod tests {
             let at = |i: usize| Point::new(f64::from(ends[i]) / 2.0, f64::from(ends[i + 1]) / 2.0);
             let (a, b) = (at(0), at(2));
             let path = Search::new(&mesh).shortest(a, b);
-            let cut = mesh.cut_between(a, b);
+            let cut = cut_between(&mesh, a, b);
             let blind = !mesh.contains(a) && !mesh.contains(b);
             prop_assert_eq!(cut.is_some(), path.is_none() && !blind);
             if let Some(cut) = cut {

@@ -1,19 +1,17 @@
 //! Lower bounds of distances from a few shortest path maps (landmarks, "ALT").
 //!
+//! Goldberg and Harrelson, "Computing the shortest path: A* search meets graph theory",
+//! SODA 2005.
+//!
 //! For a landmark L, d(L, a) and d(L, b) differ by no more than d(a, b). Eight maps
 //! far from each other know how far everything is round the obstacles, where the
 //! straight line does not. A two-point search with them opens a fraction of the
 //! nodes and finds the same lengths.
 
 use super::continuous::PathMap;
-use super::mesh::Mesh;
+use skein_flight::route::lower_bounds::{COUNT, Lengths, LowerBounds};
+use skein_flight::route::mesh::Mesh;
 use skein_geometry::frame::Point;
-
-/// Maps: one cache line of lengths a vertex.
-const COUNT: usize = 8;
-
-/// Length from each landmark, metres.
-pub(crate) type Lengths = [f64; COUNT];
 
 /// Distances from a few far corners of a mesh to all of its vertices.
 #[derive(Clone, Debug)]
@@ -45,15 +43,14 @@ impl<'m> Landmarks<'m> {
         let vertices = (0..mesh.n_vertices()).map(of).collect();
         Self { maps, vertices }
     }
+}
 
-    /// Lengths to a vertex.
-    #[inline]
-    pub(crate) fn at_vertex(&self, vertex: u32) -> &Lengths {
+impl LowerBounds for Landmarks<'_> {
+    fn at_vertex(&self, vertex: u32) -> &Lengths {
         &self.vertices[vertex as usize]
     }
 
-    /// Lengths to any point.
-    pub(crate) fn at_point(&self, p: Point) -> Lengths {
+    fn at_point(&self, p: Point) -> Lengths {
         std::array::from_fn(|i| self.maps[i].distance_m(p).unwrap_or(f64::INFINITY))
     }
 }
@@ -64,28 +61,4 @@ fn farthest(map: &PathMap, length_m: impl Fn(usize) -> f64, n: usize) -> Point {
         .filter(|&v| length_m(v).is_finite())
         .max_by(|&a, &b| length_m(a).total_cmp(&length_m(b)).then(b.cmp(&a)))
         .map_or(map.source(), |v| map.vertex(v))
-}
-
-/// The least distance between two points with these lengths from the landmarks.
-/// Where a landmark reaches neither, its difference is no number and drops out.
-#[inline]
-pub(crate) fn between_m(a: &Lengths, b: &Lengths) -> f64 {
-    let mut best = 0.0f64;
-    for i in 0..COUNT {
-        best = best.max((a[i] - b[i]).abs());
-    }
-    best
-}
-
-/// The least distance between a point and any point of the side between two vertices.
-#[inline]
-pub(crate) fn to_side_m(goal: &Lengths, a: &Lengths, b: &Lengths, side_m: f64) -> f64 {
-    let mut best = 0.0f64;
-    for i in 0..COUNT {
-        // From either end a length changes by no more than the way along the side;
-        // together: nowhere by more than half the side from the mean of the ends.
-        let middle = 0.5 * (a[i] + b[i]);
-        best = best.max((goal[i] - middle).abs() - 0.5 * side_m);
-    }
-    best
 }

@@ -17,9 +17,9 @@
 mod envelope;
 mod front;
 
-use super::mesh::{Mesh, NONE};
-use super::visibility_step::{self, SOURCE};
 use front::Front;
+use skein_flight::route::mesh::{Mesh, NONE};
+use skein_flight::route::visibility_step::{self, SOURCE};
 use skein_geometry::frame::Point;
 use skein_geometry::hash::Fingerprint;
 
@@ -131,12 +131,12 @@ impl<'m> PathMap<'m> {
     }
 
     /// Length to each vertex, metres, infinite where none leads.
-    pub(crate) fn vertex_length_m(&self, vertex: usize) -> f64 {
+    pub fn vertex_length_m(&self, vertex: usize) -> f64 {
         self.labels[vertex].length_m
     }
 
     /// Where a vertex of the mesh is.
-    pub(crate) fn vertex(&self, vertex: usize) -> Point {
+    pub fn vertex(&self, vertex: usize) -> Point {
         self.mesh.vertices[vertex].at
     }
 
@@ -229,8 +229,8 @@ mod tests {
     use super::*;
     use crate::route::degenerate_maps::{Rings, crowded, mesh_of, square};
     use crate::route::landmarks::Landmarks;
-    use crate::route::two_point::Search;
     use proptest::prelude::*;
+    use skein_flight::route::two_point::Search;
 
     fn compare(rings: &Rings, source: Point, goals: &[Point]) -> Result<(), TestCaseError> {
         let mesh = mesh_of(rings);

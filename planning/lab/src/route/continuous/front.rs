@@ -2,8 +2,8 @@
 
 use super::envelope::{Run, Runs, Wave};
 use super::{Effort, Label, PathMap, Reach};
-use crate::route::mesh::{Mesh, NONE};
-use crate::route::visibility_step::{self, Ray, SOURCE, View, Watcher};
+use skein_flight::route::mesh::{Mesh, NONE};
+use skein_flight::route::visibility_step::{self, Ray, SOURCE, View, Watcher};
 use skein_geometry::frame::Point;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
