@@ -4,6 +4,7 @@
 
 use super::cover_trees;
 use super::figures::{Times, timed};
+use super::measure::is_inside;
 use anyhow::{Context, Result, ensure};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -304,18 +305,6 @@ fn instance(
         zones,
         is_field: false,
     })
-}
-
-/// Crossing parity of a ray to the right.
-pub(super) fn is_inside(p: Point, ring: &[Point]) -> bool {
-    let mut inside = false;
-    for (i, a) in ring.iter().enumerate() {
-        let b = ring[(i + 1) % ring.len()];
-        if (a.y > p.y) != (b.y > p.y) && p.x < a.x + (b.x - a.x) * (p.y - a.y) / (b.y - a.y) {
-            inside = !inside;
-        }
-    }
-    inside
 }
 
 fn to_ring_m(p: Point, ring: &[Point]) -> f64 {

@@ -56,7 +56,7 @@ fn lanes_of_cells(plan: &PassesPlan, centres: &[Point]) -> Vec<Vec<Pass>> {
     let mut lanes = vec![Vec::new(); centres.len()];
     for pass in &plan.passes {
         let middle = pass.from + (pass.to - pass.from) * 0.5;
-        let holds = |c: &usize| super::cover_exact::is_inside(middle, &plan.cells[*c].ring);
+        let holds = |c: &usize| super::measure::is_inside(middle, &plan.cells[*c].ring);
         let near = |a: &usize, b: &usize| {
             let to = |c: usize| (centres[c] - middle).norm();
             to(*a).total_cmp(&to(*b))

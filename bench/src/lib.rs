@@ -1,7 +1,27 @@
 //! Measurements of the planners: one planner, one set of instances, one JSON object with
 //! errors and times.
 //!
-//! Rival libraries run in the same process under the feature `rivals`.
+//! Rival libraries run in the same process under the feature `rivals`. Uses every other
+//! crate; nothing uses it.
+//!
+//! | module | what is measured |
+//! |---|---|
+//! | [`cover`], [`cover_loop`] | regions and loops of lane cells |
+//! | [`cover_exact`] | straight passes over areas with zones |
+//! | [`dubins`], [`wind`], [`headings`] | curves, flights in wind, chains of waypoints |
+//! | [`offset`] | zones grown by a radius |
+//! | [`route`], [`route_polygons`], [`route_clearance`], [`route_graph`], [`route_maps`] | shortest paths and routes |
+//! | [`mod@line`] | tours along roads |
+//! | [`navmesh`] | public instances of shortest-path problems |
+//! | [`measure`] | distances measured again, for checks |
+//! | [`figures`] | times and errors |
+//!
+//! ```
+//! use skein_bench::measure::to_piece_m;
+//! use skein_geometry::frame::Point;
+//! let at = |x, y| Point::new(x, y);
+//! assert!((to_piece_m(at(5.0, 3.0), at(0.0, 0.0), at(10.0, 0.0)) - 3.0).abs() < 1e-12);
+//! ```
 
 pub mod cover;
 pub mod cover_exact;

@@ -14,3 +14,16 @@ pub fn to_piece_m(p: Point, a: Point, b: Point) -> f64 {
     };
     (p - (a + along * t)).norm()
 }
+
+/// Crossing parity of a ray to the right.
+#[must_use]
+pub fn is_inside(p: Point, ring: &[Point]) -> bool {
+    let mut inside = false;
+    for (i, a) in ring.iter().enumerate() {
+        let b = ring[(i + 1) % ring.len()];
+        if (a.y > p.y) != (b.y > p.y) && p.x < a.x + (b.x - a.x) * (p.y - a.y) / (b.y - a.y) {
+            inside = !inside;
+        }
+    }
+    inside
+}

@@ -9,6 +9,52 @@
 //! | [`route`] | the shortest route with clearance | 2.3.2 |
 //! | [`trajectory`] | Dubins words, flights in wind, timed trajectories | 2.4 |
 //! | [`coverage`] | closed loops over areas, points and lines, and their division among UAVs | 3.4–3.6 |
+//!
+//! ```
+//! use skein_flight::coverage::lanes;
+//! use skein_flight::coverage::ring::backtracking::{RingCell, Uav, divide};
+//! use skein_flight::coverage::ring::{Direction, LoopProblem, Tree};
+//! use skein_geometry::frame::Point;
+//! use skein_geometry::{NoFlyZones, Polygon};
+//! use std::sync::Arc;
+//!
+//! let corners = [(0.0, 0.0), (384.0, 0.0), (384.0, 192.0), (0.0, 192.0)];
+//! let problem = LoopProblem {
+//!     area: Polygon::new(corners.map(|(x, y)| Point::new(x, y)).to_vec())?,
+//!     zones: Arc::new(NoFlyZones::new(Vec::new())),
+//!     lane_spacing_m: 48.0,
+//!     turn_radius_m: 23.0,
+//!     clearance_m: 8.0,
+//!     footprint_across_m: 46.0,
+//!     footprint_along_m: 36.0,
+//!     tracking_error_m: 2.0,
+//!     launch: Point::new(-20.0, -20.0),
+//!     tree: Tree::default(),
+//! };
+//! // The loop that every peer derives for itself: eight columns and four rows of cells.
+//! let coverage_loop = lanes::build(&problem)?;
+//! assert_eq!(coverage_loop.len(), 32);
+//!
+//! // The division that every peer computes from the same bids.
+//! let ring: Vec<RingCell> = coverage_loop
+//!     .cells()
+//!     .iter()
+//!     .map(|c| RingCell { service_mm: c.service_mm, travel_mm: c.travel_mm, open: true })
+//!     .collect();
+//! let uav = |id, anchor| Uav {
+//!     anchor,
+//!     id,
+//!     heading: Direction::Forward,
+//!     release_ms: 0,
+//!     speed_mmps: 20_000,
+//!     turn_ms: 8_000,
+//!     endurance_ms: 3_600_000,
+//! };
+//! let division = divide(&ring, &[uav(1, 0), uav(2, 16)]);
+//! assert_eq!(division.sections.len(), 2);
+//! assert!(division.unassigned.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod airframe;
 pub mod coverage;

@@ -10,6 +10,24 @@
 //! | [`route`] | continuous Dijkstra, landmarks, cuts | 2.3.2–2.3.3 |
 //! | [`wind_scan`] | a dense oracle of the fastest flight in wind | 2.4.2 |
 //! | [`regions`] | other planners of lane cells: forest, MSTC, divided rings | 3.6.1–3.6.6 |
+//!
+//! ```
+//! use skein_flight::route::mesh::Mesh;
+//! use skein_flight::route::two_point::Search;
+//! use skein_geometry::frame::Point;
+//! use skein_lab::route::continuous::PathMap;
+//!
+//! let square = |low: f64, side: f64| {
+//!     [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)]
+//!         .map(|(x, y)| Point::new(low + x, low + y))
+//! };
+//! // A yard of 30 m with a house of 10 m in its middle.
+//! let mesh = Mesh::from_rings(&[&square(0.0, 30.0), &square(10.0, 10.0)])?;
+//! let (from, to) = (Point::new(5.0, 15.0), Point::new(25.0, 16.0));
+//! let oracle_m = PathMap::new(&mesh, from).distance_m(to).unwrap();
+//! assert!((Search::new(&mesh).distance_m(from, to).unwrap() - oracle_m).abs() < 1e-9);
+//! # Ok::<(), skein_flight::route::mesh::MeshError>(())
+//! ```
 
 pub mod graph;
 pub mod headings;

@@ -1,6 +1,9 @@
 //! Min-max tree covers: rooted at given places, or anywhere (D2.7 §3.4.2, algorithm 4,
 //! after Even et al.).
 //!
+//! Even, Garg, Könemann, Ravi and Sinha, "Min-max tree covers of graphs", 2004,
+//! <https://doi.org/10.1016/j.orl.2003.11.010>.
+//!
 //! D2.7's listing omits that a place out of reach of all roots once edges above `B` are
 //! gone proves failure too; and a tree is matched to a root by its distance to the root.
 

@@ -13,6 +13,21 @@
 //! | [`fleet`] | teams whose UAVs differ: sections, selection, heights | 3.1, 3.6 |
 //! | [`visibility`] | shortest paths by the visibility graph | 2.3.2 |
 //! | [`via_points`] | shortest paths over places in a given order | 2.3.2 |
+//!
+//! ```
+//! use skein_flight::coverage::passes::PassesProblem;
+//! use skein_geometry::Polygon;
+//! use skein_geometry::frame::Point;
+//! use skein_survey::passes::{Uav, plan_team};
+//!
+//! let corners = [(0.0, 0.0), (400.0, 0.0), (400.0, 200.0), (0.0, 200.0)];
+//! let area = Polygon::new(corners.map(|(x, y)| Point::new(x, y)).to_vec())?;
+//! let base = Point::new(0.0, 0.0);
+//! let plan = plan_team(&PassesProblem::new(area, 50.0, 20.0, base), &[Uav::at(base); 2])?;
+//! assert_eq!(plan.tours.len(), 2);
+//! assert!(plan.unserved.is_empty() && plan.makespan >= plan.lower_bound);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod fleet;
 pub mod passes;

@@ -6,7 +6,7 @@
 //! without entering them when prolonged: a shortest path has no others between its
 //! bends. Orientation is exact, so the answer does not depend on how obstacles
 //! touch, on collinear or repeated vertices, or on where the origin is. What a UAV
-//! can fly of it is [`super::Router`]'s question.
+//! can fly of it is [`skein_flight::route::Router`]'s question.
 
 mod obstacles;
 mod sweep;

@@ -10,7 +10,7 @@ use thiserror::Error;
 /// The symmetric cost of flying from one of a set of numbered places to another.
 ///
 /// Costs are finite, not negative, and zero from a place to itself; the guarantees of
-/// the planners hold when they obey the triangle inequality (see [`Matrix::closure`]).
+/// the planners hold when they obey the triangle inequality.
 /// Any `Fn(usize, usize) -> f64` is a metric.
 pub trait Metric {
     /// The cost between places `a` and `b`, metres (or whatever unit the caller plans in).

@@ -1,7 +1,7 @@
 //! The shortest path between two points of a mesh, exact (D2.7 §2.3.2, §2.3.3).
 //!
 //! A best-first search in the manner of Polyanya (Cui, Harabor and Grastien,
-//! IJCAI 2017): what a point sees through a side of a cell is one node, carried
+//! IJCAI 2017, <https://doi.org/10.24963/ijcai.2017/70>): what a point sees through a side of a cell is one node, carried
 //! from cell to cell and split where corners cut it. Here the sight is bounded
 //! by rays through mesh vertices, not by computed points, so every decision is
 //! an exact orientation test of input coordinates and no error builds up. A
@@ -9,7 +9,7 @@
 //! and only if the path bends round its wall. Cells that no simple path between
 //! the ends can enter are skipped ([`super::mesh`]).
 //!
-//! One source with many goals is the business of [`super::continuous`].
+//! One source with many goals is the business of continuous Dijkstra (in `skein-lab`).
 
 use super::lower_bounds::{self, Lengths, LowerBounds};
 use super::mesh::{Mesh, NONE};

@@ -3,6 +3,9 @@
 //! A word is three pieces out of L (left), R (right) and S (straight): LSL, RSR,
 //! LSR, RSL, LRL, RLR. Each is built from the centres of its turning circles, so
 //! the formulas are those of tangent lines and of a circle touching two others.
+//!
+//! Dubins, "On curves of minimal length with a constraint on average curvature", 1957,
+//! <https://doi.org/10.2307/2372560>.
 
 pub mod length;
 

@@ -4,7 +4,12 @@
 //! Trees share blocks, and what they share is flown more than once: the default planner
 //! is shorter. This one has a proven factor, and proves a bound of its own.
 //!
-//! Left to others: weighted graphs (`pinpoint`), where the same cover serves points.
+//! Even, Garg, Könemann, Ravi and Sinha, "Min-max tree covers of graphs", 2004,
+//! <https://doi.org/10.1016/j.orl.2003.11.010>; for robots Zheng, Jain, Koenig and Kempe,
+//! "Multi-robot forest coverage", IROS 2005.
+//!
+//! Left to others: weighted graphs ([`crate::tree_cover`]), where the same cover serves
+//! points.
 
 use skein_survey::regions::map::{Cell, UNREACHED};
 use skein_survey::regions::partition::cut;

@@ -1,5 +1,5 @@
-//! One loop divided into arcs to which each UAV flies straight (after the "MSTC*" family;
-//! D2.7 §3.6.5 lets UAVs only follow the loop). The simple planner that the default has
+//! One loop divided into arcs to which each UAV flies straight (after "MSTC*", Tang, Sun
+//! and Zhang, ICRA 2021; D2.7 §3.6.5 lets UAVs only follow the loop). The simple planner that the default has
 //! to beat, and where only one loop makes sense.
 
 use super::mstc::{closed_walk, places};

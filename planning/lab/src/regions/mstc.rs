@@ -51,15 +51,15 @@ pub(super) fn places(task: &Task, walk: &[Cell]) -> Vec<usize> {
 /// Each UAV flies the walk from its root up to the next UAV's.
 #[must_use]
 pub fn without_backtracking(task: &Task) -> Plan {
-    on_the_ring(task, |n, robots| {
-        let mut order: Vec<usize> = (0..robots.len()).collect();
-        order.sort_by_key(|i| (robots[*i].place, *i));
-        let mut legs = vec![(0, 0); robots.len()];
+    on_the_ring(task, |n, uavs| {
+        let mut order: Vec<usize> = (0..uavs.len()).collect();
+        order.sort_by_key(|i| (uavs[*i].place, *i));
+        let mut legs = vec![(0, 0); uavs.len()];
         for (i, uav) in order.iter().enumerate() {
-            let here = robots[*uav].place;
+            let here = uavs[*uav].place;
             let next = order
                 .get(i + 1)
-                .map_or(robots[order[0]].place + n, |o| robots[*o].place);
+                .map_or(uavs[order[0]].place + n, |o| uavs[*o].place);
             legs[*uav] = (0, next.saturating_sub(here + 1));
         }
         legs
@@ -70,8 +70,8 @@ pub fn without_backtracking(task: &Task) -> Plan {
 /// so that the last is done as soon as possible; mixed speeds count.
 #[must_use]
 pub fn with_backtracking(task: &Task) -> Plan {
-    on_the_ring(task, |n, robots| {
-        let shares = divide(n, robots).map(|d| d.shares).unwrap_or_default();
+    on_the_ring(task, |n, uavs| {
+        let shares = divide(n, uavs).map(|d| d.shares).unwrap_or_default();
         shares.iter().map(|s| (s.before, s.after)).collect()
     })
 }
@@ -81,7 +81,7 @@ fn on_the_ring(task: &Task, split: impl Fn(u32, &[Uav]) -> Vec<(u32, u32)>) -> P
     let walk = closed_walk(task, Tree::DepthFirst);
     let n = walk.len();
     let places = places(task, &walk);
-    let robots: Vec<Uav> = places
+    let uavs: Vec<Uav> = places
         .iter()
         .zip(task.speeds.iter().zip(&task.endurance))
         .map(|(place, (speed, endurance))| Uav {
@@ -90,7 +90,7 @@ fn on_the_ring(task: &Task, split: impl Fn(u32, &[Uav]) -> Vec<(u32, u32)>) -> P
             endurance: *endurance,
         })
         .collect();
-    let shares = split(u32::try_from(n).unwrap_or(u32::MAX), &robots);
+    let shares = split(u32::try_from(n).unwrap_or(u32::MAX), &uavs);
     let mut router = Router::new(&task.map);
     let paths = (0..task.n_uavs()).map(|uav| {
         let (before, after) = shares.get(uav).copied().unwrap_or((0, 0));

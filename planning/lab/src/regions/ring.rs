@@ -2,7 +2,8 @@
 //! (D2.7 §3.6.5, algorithm 7, after Hazon & Kaminka) in its plain form of counted cells,
 //! with mixed speeds and endurance, at the scale of thousands of UAVs.
 //!
-//! Left to `area::backtracking`: cells of unlike length, turns, cells already seen.
+//! Left to [`skein_flight::coverage::ring::backtracking`], which the swarm flies: cells of
+//! unlike length, turns, cells already seen.
 
 /// A UAV that stands on the ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +36,7 @@ impl Share {
 /// A division.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RingDivision {
-    /// The shares, in the order of the robots given.
+    /// The shares, in the order of the UAVs given.
     pub shares: Vec<Share>,
     /// When all is covered: `moves / speed` of the slowest share, as that fraction.
     pub finish: (u32, u32),
@@ -44,25 +45,25 @@ pub struct RingDivision {
 /// Divides a ring of `n` cells in the least time.
 ///
 /// # Guarantees
-/// Each cell is in exactly one share (or is a robot's own), no share is beyond its
-/// robot's endurance, and no such division finishes sooner. `None` when there is no
-/// such division, or no robot.
+/// Each cell is in exactly one share (or is a UAV's own), no share is beyond its
+/// UAV's endurance, and no such division finishes sooner. `None` when there is no
+/// such division, or no UAV.
 ///
 /// # Complexity
 /// O(k log k) to sort, then O(k) a sweep, O(log n) tried times for each distinct speed,
 /// each of usually one sweep and at most n / k.
 #[must_use]
-pub fn divide(n: u32, robots: &[Uav]) -> Option<RingDivision> {
-    let mut order: Vec<usize> = (0..robots.len()).collect();
-    order.sort_by_key(|i| (robots[*i].place % n.max(1), *i));
+pub fn divide(n: u32, uavs: &[Uav]) -> Option<RingDivision> {
+    let mut order: Vec<usize> = (0..uavs.len()).collect();
+    order.sort_by_key(|i| (uavs[*i].place % n.max(1), *i));
     if order.is_empty() || n == 0 {
         return None;
     }
     let gap = |i: usize| {
-        let here = robots[order[i]].place % n;
-        let next = robots[order[(i + 1) % order.len()]].place % n;
+        let here = uavs[order[i]].place % n;
+        let next = uavs[order[(i + 1) % order.len()]].place % n;
         let last = i + 1 == order.len();
-        // The last gap goes once round; robots on one cell have nothing between.
+        // The last gap goes once round; UAVs on one cell have nothing between.
         (next + if last { n } else { 0 }).saturating_sub(here + 1)
     };
     let gaps: Vec<u32> = (0..order.len()).map(gap).collect();
@@ -74,13 +75,13 @@ pub fn divide(n: u32, robots: &[Uav]) -> Option<RingDivision> {
         gaps: (0..gaps.len())
             .map(|i| gaps[(i + turn) % gaps.len()])
             .collect(),
-        robots: order.iter().map(|i| robots[*i]).collect(),
+        uavs: order.iter().map(|i| uavs[*i]).collect(),
     };
     let (finish, befores) = ring.least()?;
-    let mut shares = vec![Share::default(); robots.len()];
-    for (i, robot) in order.iter().enumerate() {
+    let mut shares = vec![Share::default(); uavs.len()];
+    for (i, uav) in order.iter().enumerate() {
         let next = befores[(i + 1) % befores.len()];
-        shares[*robot] = Share {
+        shares[*uav] = Share {
             before: befores[i],
             after: ring.gaps[i] - next,
         };
@@ -89,16 +90,16 @@ pub fn divide(n: u32, robots: &[Uav]) -> Option<RingDivision> {
 }
 
 struct Ring {
-    /// Cells between each robot and the next.
+    /// Cells between each UAV and the next.
     gaps: Vec<u32>,
-    robots: Vec<Uav>,
+    uavs: Vec<Uav>,
 }
 
 impl Ring {
-    /// The least time, as moves of a robot over its speed, and what each covers against
+    /// The least time, as moves of a UAV over its speed, and what each covers against
     /// the order.
     fn least(&self) -> Option<((u32, u32), Vec<u32>)> {
-        let mut speeds: Vec<u32> = self.robots.iter().map(|r| r.speed.max(1)).collect();
+        let mut speeds: Vec<u32> = self.uavs.iter().map(|r| r.speed.max(1)).collect();
         speeds.sort_unstable();
         speeds.dedup();
         // Nobody flies further than once round and back.
@@ -133,7 +134,7 @@ impl Ring {
     /// The least shares against the order with which all is covered in `moves / speed`.
     fn feasible(&self, moves: u32, speed: u32) -> Option<Vec<u32>> {
         let limits: Vec<u32> = self
-            .robots
+            .uavs
             .iter()
             .map(|r| {
                 let reach = u64::from(moves) * u64::from(r.speed.max(1)) / u64::from(speed);
@@ -157,7 +158,7 @@ impl Ring {
                 };
                 before = self.gaps[i].saturating_sub(after);
             }
-            // The first robot's share only ever has to grow: the least fixpoint.
+            // The first UAV's share only ever has to grow: the least fixpoint.
             if before <= befores[0] {
                 return Some(befores);
             }
@@ -175,8 +176,8 @@ mod tests {
     use proptest::prelude::*;
 
     /// The least time over all splits of all gaps, or `None`.
-    fn brute(n: u32, robots: &[Uav]) -> Option<f64> {
-        let mut order = robots.to_vec();
+    fn brute(n: u32, uavs: &[Uav]) -> Option<f64> {
+        let mut order = uavs.to_vec();
         order.sort_by_key(|r| r.place);
         let k = order.len();
         let gap = |i: usize| {
@@ -210,9 +211,9 @@ mod tests {
         }
     }
 
-    fn assert_covers(n: u32, robots: &[Uav], d: &RingDivision) {
+    fn assert_covers(n: u32, uavs: &[Uav], d: &RingDivision) {
         let mut owners = vec![0; n as usize];
-        for (r, s) in robots.iter().zip(&d.shares) {
+        for (r, s) in uavs.iter().zip(&d.shares) {
             assert!(s.moves() <= r.endurance);
             assert!(
                 u64::from(s.moves()) * u64::from(d.finish.1)
@@ -225,44 +226,44 @@ mod tests {
                 owners[((r.place + n - i) % n) as usize] += 1;
             }
         }
-        for r in robots {
+        for r in uavs {
             owners[r.place as usize] = 1;
         }
         assert!(owners.iter().all(|o| *o == 1), "{d:?}");
     }
 
-    fn robots(n: u32) -> impl Strategy<Value = Vec<Uav>> {
-        let robot = (0..n, 1u32..5, prop_oneof![Just(u32::MAX), 0u32..30]).prop_map(
+    fn uavs(n: u32) -> impl Strategy<Value = Vec<Uav>> {
+        let uav = (0..n, 1u32..5, prop_oneof![Just(u32::MAX), 0u32..30]).prop_map(
             |(place, speed, endurance)| Uav {
                 place,
                 speed,
                 endurance,
             },
         );
-        prop::collection::vec(robot, 1..5)
+        prop::collection::vec(uav, 1..5)
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(3000))]
 
         #[test]
-        fn no_split_is_faster((n, robots) in (1u32..15).prop_flat_map(|n| (Just(n), robots(n)))) {
-            let d = divide(n, &robots);
-            let best = brute(n, &robots);
+        fn no_split_is_faster((n, uavs) in (1u32..15).prop_flat_map(|n| (Just(n), uavs(n)))) {
+            let d = divide(n, &uavs);
+            let best = brute(n, &uavs);
             prop_assert_eq!(d.is_some(), best.is_some());
             if let (Some(d), Some(best)) = (d, best) {
-                assert_covers(n, &robots, &d);
+                assert_covers(n, &uavs, &d);
                 let finish = f64::from(d.finish.0) / f64::from(d.finish.1);
                 prop_assert!((finish - best).abs() < 1e-9, "{} {} {:?}", finish, best, d);
             }
         }
 
         #[test]
-        fn more_speed_never_hurts((n, robots, who) in (1u32..60).prop_flat_map(|n| {
-            (Just(n), robots(n), any::<prop::sample::Index>())
+        fn more_speed_never_hurts((n, uavs, who) in (1u32..60).prop_flat_map(|n| {
+            (Just(n), uavs(n), any::<prop::sample::Index>())
         })) {
-            let Some(slow) = divide(n, &robots) else { return Ok(()) };
-            let mut faster = robots;
+            let Some(slow) = divide(n, &uavs) else { return Ok(()) };
+            let mut faster = uavs;
             let i = who.index(faster.len());
             faster[i].speed += 1;
             faster[i].endurance = faster[i].endurance.saturating_add(3);
@@ -277,14 +278,14 @@ mod tests {
     #[test]
     fn neighbours_on_the_ring_take_half_the_rest() {
         for k in 1..20u32 {
-            let robots: Vec<Uav> = (0..k)
+            let uavs: Vec<Uav> = (0..k)
                 .map(|place| Uav {
                     place,
                     speed: 1,
                     endurance: u32::MAX,
                 })
                 .collect();
-            let d = divide(1000, &robots).unwrap();
+            let d = divide(1000, &uavs).unwrap();
             let expect = if k == 1 { 999 } else { (1000 - k).div_ceil(2) };
             assert_eq!(d.finish, (expect, 1), "{k}");
         }

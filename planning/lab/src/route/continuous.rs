@@ -7,8 +7,9 @@
 //! distance query finds the cell and takes the best of the few roots that reach
 //! into it.
 //!
-//! The structure is that of Mitchell, Mount and Papadimitriou (1987), in the
-//! plane with obstacles. Hershberger and Suri (1999) bound the worst case by
+//! The structure is that of Mitchell, Mount and Papadimitriou (1987,
+//! <https://doi.org/10.1137/0216045>), in the plane with obstacles. Hershberger and Suri
+//! (1999, <https://doi.org/10.1137/S0097539795289604>) bound the worst case by
 //! O(n log n); here it is quadratic in theory, `docs/continuous-dijkstra.md` has
 //! measured counts. Decisions whether a vertex is seen are exact; boundaries
 //! between windows are rounded, and windows overlap a little there, so that

@@ -1,13 +1,13 @@
-//! Work for UAVs that begin close together: farthest first. Each UAV in turn flies out to
-//! the farthest cells that are left, over a corridor one cell wide that it covers on the
-//! way and that no other UAV then needs, and takes what lies round there.
+//! Co-located depots: assign the farthest cells first. Each UAV in turn flies out to the
+//! farthest cells that are left, over a corridor one cell wide that it covers on the way
+//! and that no other UAV then needs, and takes the cells round there.
 //!
 //! From one base this is what makes more UAVs pay: a loop divided into arcs wastes every
 //! way out (D2.7 §3.6.5), a corridor wastes nothing.
 //!
 //! Left to others: evening the times, and cells flown twice inside a region.
 
-use super::improve::insert_missing;
+use super::insertion::insert_missing;
 use super::map::{Cell, LaneMap, NOWHERE};
 use super::partition::NOBODY;
 use super::plan::Task;

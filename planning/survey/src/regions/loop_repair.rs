@@ -1,5 +1,5 @@
-//! Cells that a closed loop leaves out are shifted along it until two of them meet
-//! (D2.7 §3.6.2): two neighbours beside the loop join it for nothing, where a single cell
+//! Repair of a closed loop: cells that it leaves out are shifted along it until two of
+//! them meet (D2.7 §3.6.2): two neighbours beside the loop join it for nothing, where a single cell
 //! costs a step aside and back.
 //!
 //! A loop on a grid passes as many cells of one colour of the chessboard as of the other,
@@ -10,7 +10,6 @@
 //! Left to others: the loop ([`super::spanning`]), and the cells that find no other.
 
 use super::map::{Cell, LaneMap, NOWHERE};
-use super::spanning::detour;
 
 /// Places that one cell is shifted to before it is given up: most that find another do so
 /// within twenty, and a search costs a few microseconds.
@@ -210,5 +209,21 @@ impl<'a, F: Fn(Cell, Cell) -> bool> Mender<'a, F> {
                 self.prev[cell as usize] = prev;
             }
         }
+    }
+}
+
+/// The loop's edge between `u` and `v`, whichever way it is flown, led over `x` beside
+/// `u` and `y` beside `v`: the four cells in order of flight, if there is that edge.
+pub(super) fn detour(
+    next: &[Cell],
+    (u, v): (Cell, Cell),
+    (x, y): (Cell, Cell),
+) -> Option<[Cell; 4]> {
+    if next[u as usize] == v {
+        Some([u, x, y, v])
+    } else if next[v as usize] == u {
+        Some([v, y, x, u])
+    } else {
+        None
     }
 }

@@ -20,6 +20,7 @@
 pub mod bounds;
 pub mod corridor_first;
 pub mod improve;
+mod insertion;
 mod loop_repair;
 pub mod map;
 pub mod partition;

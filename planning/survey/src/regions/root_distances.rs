@@ -1,5 +1,5 @@
-//! Moves between the roots and every cell (D2.7 §3.6): the ways out and home are asked for
-//! at nearly every step of the search, and by whoever says which region suits which UAV.
+//! Distances in moves between the roots and every cell (D2.7 §3.6): the search asks for the
+//! ways out and home at nearly every step, and so does the choice of a UAV for a region.
 //!
 //! Left to others: ways between other cells ([`Router`](super::map::Router)).
 

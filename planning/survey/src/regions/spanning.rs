@@ -6,9 +6,18 @@
 //! neighbour the loop *hops*: it flies over cells that it has already seen. Several
 //! loops are made at once when the cells carry labels (one region a UAV).
 //!
+//! `skein-flight` has another spanning-tree loop (`coverage::lanes`), and both are wanted.
+//! That one is made of curves: whole blocks, whose quarter arcs a fixed wing flies, and
+//! excursions, each proved clear of the zones. This one counts moves: it holds every cell,
+//! hops, makes several loops at once, and takes milliseconds for a million cells. A walk
+//! round a tree is all that they share.
+//!
+//! Gabriely and Rimon, "Spanning-tree based coverage of continuous areas by a mobile
+//! robot", 2001, <https://doi.org/10.1023/A:1016610507833>.
+//!
 //! Left to others: which tree turns least in which wind, and the curves.
 
-use super::loop_repair::Mender;
+use super::loop_repair::{Mender, detour};
 use super::map::{Cell, LaneMap, NOWHERE};
 
 /// Which spanning tree connects the blocks.
@@ -137,22 +146,6 @@ pub fn best_offset(map: &LaneMap) -> (u32, u32) {
     }
     let best = (0..4).max_by_key(|i| (counts[*i], 4 - i)).unwrap_or(0);
     OFFSETS[best]
-}
-
-/// The loop's edge between `u` and `v`, whichever way it is flown, led over `x` beside
-/// `u` and `y` beside `v`: the four cells in order of flight, if there is that edge.
-pub(super) fn detour(
-    next: &[Cell],
-    (u, v): (Cell, Cell),
-    (x, y): (Cell, Cell),
-) -> Option<[Cell; 4]> {
-    if next[u as usize] == v {
-        Some([u, x, y, v])
-    } else if next[v as usize] == u {
-        Some([v, y, x, u])
-    } else {
-        None
-    }
 }
 
 /// Tree edges of a block, one bit a side.

@@ -8,6 +8,14 @@
 //! closed curve that leaves the loop at a boundary, looks at the cell, and comes
 //! back to the same boundary pose; skipping it costs nothing.
 //!
+//! `skein-survey` has another spanning-tree loop (`regions::spanning`), and both are
+//! wanted. That one counts moves: it hops over cells, makes several loops at once and
+//! takes maps of a million cells. This one is made of curves that are proved clear of the
+//! zones. A walk round a tree is all that they share.
+//!
+//! Gabriely and Rimon, "Spanning-tree based coverage of continuous areas by a mobile
+//! robot", 2001, <https://doi.org/10.1023/A:1016610507833>.
+//!
 //! | file | what it holds |
 //! |---|---|
 //! | `assembly` | what is refused, which cells touch the area, the whole put together |

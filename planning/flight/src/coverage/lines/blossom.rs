@@ -1,6 +1,8 @@
 //! Minimum-cost perfect matching in a sparse graph: Edmonds' blossom algorithm, one
 //! alternating tree at a time (a tool of D2.7 §3.5; the section itself has none).
 //!
+//! Edmonds, "Paths, trees, and flowers", 1965, <https://doi.org/10.4153/CJM-1965-045-4>.
+//!
 //! Leaves to `matching` which edges of a complete graph are worth looking at.
 
 use core::cmp::Reverse;

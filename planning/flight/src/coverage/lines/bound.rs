@@ -1,7 +1,7 @@
-//! What no plan for lines can beat (D2.7 §3.5 has no bound).
+//! Lower bound of the makespan of plans for lines (D2.7 §3.5 has none).
 //!
-//! Somebody flies to each line, along it and back. All tours together pair up the places
-//! where an odd number of lines end and join all parts (`postman`). And whoever works
+//! Some UAV flies to each line, along it and back. All tours together pair up the places
+//! where an odd number of lines end and join all parts (`postman`). And a UAV that works
 //! farther than `d` from the depots crosses every circle up to `d` twice: what a team
 //! flies is at least those crossings, and of lines and pairing what they do not need for
 //! themselves to get on outwards or inwards. How many UAVs must work beyond each `d`

@@ -1,5 +1,10 @@
-//! Local search over tours of a team: lines are taken out in runs and put back where
-//! they cost least, until the longest tour stops shrinking (D2.7 §3.5).
+//! Ruin and recreate over tours of a team, with annealing: lines are taken out in runs and
+//! put back where they cost least, until the longest tour stops shrinking (D2.7 §3.5).
+//!
+//! Schrimpf, Schneider, Stamm-Wilbrandt and Dueck, "Record breaking optimization results
+//! using the ruin and recreate principle", 2000, <https://doi.org/10.1006/jcph.1999.6413>;
+//! Kirkpatrick, Gelatt and Vecchi, "Optimization by simulated annealing", 1983,
+//! <https://doi.org/10.1126/science.220.4598.671>.
 //!
 //! The search is a fixed number of steps of a fixed stream of choices: the same plan on
 //! every machine. Leaves the first plan to `postman` and `split`.

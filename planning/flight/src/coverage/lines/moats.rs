@@ -1,5 +1,5 @@
-//! What it costs at least to join parts that are apart, and tours that join them
-//! cheaply (D2.7 §3.5 has neither): moats round parts.
+//! Lower bound of joining parts that are apart, and tours that join them cheaply (D2.7
+//! §3.5 has neither): moats round parts.
 //!
 //! A closed tour along all lines crosses the border of every set of parts twice. A moat
 //! round such a set takes its width off every deadhead across and pays twice its width
@@ -8,10 +8,14 @@
 //! fall where it crosses more than twice (a subgradient ascent); each pairing on the
 //! way, joined up, is a tour to choose from.
 //!
+//! The ascent is that of Held and Karp, "The traveling-salesman problem and minimum
+//! spanning trees", 1970, <https://doi.org/10.1287/opre.18.6.1138>, with a pairing in the
+//! place of the tree.
+//!
 //! Leaves the pairing itself to `matching`, joining and walking to `postman`.
 
 use super::matching::pair_up;
-use super::network::Parts;
+use super::parts::Parts;
 use super::postman::{Deadheads, Graph};
 use crate::coverage::metric::Metric;
 use core::cmp::Reverse;

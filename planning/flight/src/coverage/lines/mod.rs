@@ -8,6 +8,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `network` | lines, team, tours |
+//! | `parts` | union-find over places |
 //! | `blossom`, `matching` | the cheapest pairing of places, exact |
 //! | `postman` | one tour along all lines |
 //! | `moats` | parts that are apart: what joining them costs, and how |
@@ -41,13 +42,15 @@ mod improve;
 mod matching;
 mod moats;
 mod network;
+mod parts;
 mod postman;
 mod split;
 pub mod strip;
 mod trim;
 
 pub use bound::shared as shared_time;
-pub use network::{Line, LineError, LinePlan, LineTour, Parts, Traversal, Uav, tour_cost};
+pub use network::{Line, LineError, LinePlan, LineTour, Traversal, Uav, tour_cost};
+pub use parts::Parts;
 
 use crate::coverage::metric::Metric;
 use moats::Joining;

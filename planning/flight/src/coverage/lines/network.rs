@@ -192,35 +192,3 @@ pub(super) fn check(lines: &[Line], team: &[Uav]) -> Result<(), LineError> {
     }
     Ok(())
 }
-
-/// Places that are joined, as a forest of references to the root.
-#[derive(Clone, Debug)]
-pub struct Parts {
-    up: Vec<usize>,
-}
-
-impl Parts {
-    /// `n` places, none of them joined.
-    #[must_use]
-    pub fn new(n: usize) -> Self {
-        Self {
-            up: (0..n).collect(),
-        }
-    }
-
-    /// The place that stands for the part of `x`.
-    pub fn find(&mut self, mut x: usize) -> usize {
-        while self.up[x] != x {
-            self.up[x] = self.up[self.up[x]];
-            x = self.up[x];
-        }
-        x
-    }
-
-    /// Joins two parts; `false` when they were one already.
-    pub fn join(&mut self, a: usize, b: usize) -> bool {
-        let (a, b) = (self.find(a), self.find(b));
-        self.up[a.max(b)] = a.min(b);
-        a != b
-    }
-}

@@ -5,7 +5,8 @@
 
 use super::matching::pair_up;
 use super::moats::{self, Joining};
-use super::network::{Line, Parts, Traversal};
+use super::network::{Line, Traversal};
+use super::parts::Parts;
 use crate::coverage::metric::Metric;
 use skein_geometry::random::SplitMix64;
 

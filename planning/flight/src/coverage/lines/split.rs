@@ -1,5 +1,8 @@
 //! One tour cut into as many as there are UAVs (D2.7 §3.5; route first, cluster second).
 //!
+//! Beasley, "Route first–cluster second methods for vehicle routing", 1983,
+//! <https://doi.org/10.1016/0305-0483(83)90033-6>.
+//!
 //! Leaves to `improve` to move lines between the tours.
 
 use super::network::{Line, Traversal, Uav};

@@ -1,4 +1,4 @@
-//! When endurance does not reach for all lines: which are left out (D2.7 §3.5 with the
+//! Endurance too short for all lines: which of them are left out (D2.7 §3.5 with the
 //! limits of §2.2).
 
 use super::network::{Line, Traversal, Uav, tour_cost};

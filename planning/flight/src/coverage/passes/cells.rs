@@ -1,5 +1,7 @@
 //! Exact cell decompositions of an area with holes (D2.7 §3.6.1): the classical one into
-//! trapezoids, and the boustrophedon one.
+//! trapezoids, and the boustrophedon one (Choset and Pignon, "Coverage path planning: the
+//! boustrophedon cellular decomposition", 1998,
+//! <https://doi.org/10.1007/978-1-4471-1273-0_32>).
 //!
 //! A line sweeps the turned frame from left to right. Between two neighbouring events
 //! (vertices, crossings of borders) the free parts of the line are trapezoids; at an

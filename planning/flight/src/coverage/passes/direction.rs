@@ -4,6 +4,9 @@
 //! a sweep with one direction meets, in all, the altitude of the border and that of every
 //! hole: S(θ) = d_B(θ) + Σ d_Hi(θ). Between two directions in which some hull has an edge
 //! the sum is a sum of arcs of sines, concave, so that its minimum is at such an edge.
+//!
+//! Huang, "Optimal line-sweep-based decompositions for coverage algorithms", 2001,
+//! <https://doi.org/10.1109/ROBOT.2001.932525>.
 
 use super::frame::Axes;
 use skein_geometry::frame::Point;

@@ -2,6 +2,11 @@
 //! algorithm 7, after Hazon & Kaminka), generalised to what a swarm needs after a
 //! failure: covered gaps, release times, turn-round cost, mixed speeds, endurance.
 //!
+//! Hazon and Kaminka, "Redundancy, efficiency and robustness in multi-robot coverage",
+//! 2005, <https://doi.org/10.1109/ROBOT.2005.1570205>, and "On redundancy, efficiency, and
+//! robustness in coverage for multiple robots", 2008,
+//! <https://doi.org/10.1016/j.robot.2008.01.006>.
+//!
 //! Left to `endurance_limited`: which cells are served when not all can be.
 
 use super::coverage_loop::Direction;
@@ -84,7 +89,7 @@ pub struct Section {
 /// A division of the ring.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Division {
-    /// One section a robot, in ascending order of id.
+    /// One section a UAV, in ascending order of id.
     pub sections: Vec<Section>,
     /// When the last section is done, milliseconds from now.
     pub makespan_ms: u32,
@@ -92,15 +97,15 @@ pub struct Division {
     pub unassigned: Vec<u16>,
 }
 
-/// Divides the open cells of `ring` among `robots` in the least time.
+/// Divides the open cells of `ring` among `uavs` in the least time.
 ///
-/// Each robot serves a stretch of the ring around its anchor, up to the stretches
+/// Each UAV serves a stretch of the ring around its anchor, up to the stretches
 /// of its neighbours; it turns round at most once.
 ///
 /// # Guarantees
 /// The makespan is the least possible for that shape of plan, in integer
 /// milliseconds. With too little endurance, the plan that serves the most cells.
-/// Each open cell is in exactly one section or in `unassigned`. A robot with nothing
+/// Each open cell is in exactly one section or in `unassigned`. A UAV with nothing
 /// to do has no legs and finishes at 0. An anchor beyond the ring is taken modulo its
 /// length; cells beyond the 65,535th are ignored.
 ///
@@ -109,11 +114,11 @@ pub struct Division {
 /// round the ring are few. With too little endurance O(N g) for each, g the smallest
 /// gap between two anchors.
 #[must_use]
-pub fn divide(ring: &[RingCell], robots: &[Uav]) -> Division {
+pub fn divide(ring: &[RingCell], uavs: &[Uav]) -> Division {
     // Boundaries are numbered by `u16`, and a ring is cyclic.
     let ring = &ring[..ring.len().min(usize::from(u16::MAX))];
     let n = u16::try_from(ring.len()).unwrap_or(u16::MAX);
-    let mut order: Vec<Uav> = robots.to_vec();
+    let mut order: Vec<Uav> = uavs.to_vec();
     for r in &mut order {
         r.anchor %= n.max(1);
     }
@@ -149,7 +154,7 @@ pub fn divide(ring: &[RingCell], robots: &[Uav]) -> Division {
 /// The ring unrolled three times, with prefix sums of what is flown.
 pub(super) struct Solver<'a> {
     pub ring: &'a [RingCell],
-    pub robots: &'a [Uav],
+    pub uavs: &'a [Uav],
     serve_mm: Vec<u64>,
     travel_mm: Vec<u64>,
     /// Cells from a place back to the last open one before it, by place.
@@ -158,7 +163,7 @@ pub(super) struct Solver<'a> {
 }
 
 impl<'a> Solver<'a> {
-    fn new(ring: &'a [RingCell], robots: &'a [Uav]) -> Self {
+    fn new(ring: &'a [RingCell], uavs: &'a [Uav]) -> Self {
         let n = ring.len();
         let (mut serve_mm, mut travel_mm) = (vec![0], vec![0]);
         let (mut last_open, mut next_open) = (vec![0], vec![3 * n; 3 * n + 1]);
@@ -178,7 +183,7 @@ impl<'a> Solver<'a> {
         }
         Self {
             ring,
-            robots,
+            uavs,
             serve_mm,
             travel_mm,
             last_open,
@@ -186,13 +191,13 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Cells between this robot's anchor and the next one's.
+    /// Cells between this UAV's anchor and the next one's.
     pub fn gap(&self, i: usize) -> usize {
         let n = self.ring.len();
-        let k = self.robots.len();
+        let k = self.uavs.len();
         let (a, b) = (
-            usize::from(self.robots[i].anchor),
-            usize::from(self.robots[(i + 1) % k].anchor),
+            usize::from(self.uavs[i].anchor),
+            usize::from(self.uavs[(i + 1) % k].anchor),
         );
         if i + 1 == k { n - (a - b) } else { b - a }
     }
@@ -200,7 +205,7 @@ impl<'a> Solver<'a> {
     /// How far a share of `extent` cells really reaches, and what that costs:
     /// (cells, mm served going out, mm travelled coming back).
     fn reach(&self, i: usize, extent: usize, right: bool) -> (usize, u64, u64) {
-        let at = self.ring.len() + usize::from(self.robots[i].anchor);
+        let at = self.ring.len() + usize::from(self.uavs[i].anchor);
         let (from, to) = if right {
             (at, self.last_open[at + extent].max(at))
         } else {
@@ -213,10 +218,10 @@ impl<'a> Solver<'a> {
         )
     }
 
-    /// The least time after its release in which robot `i` serves both shares, and
+    /// The least time after its release in which UAV `i` serves both shares, and
     /// whether it goes right first.
     fn time_ms(&self, i: usize, left: usize, right: usize) -> (u64, bool) {
-        let r = &self.robots[i];
+        let r = &self.uavs[i];
         let ms = |mm: u64| (mm * 1000).div_ceil(u64::from(r.speed_mmps.max(1)));
         let (l, l_out, l_back) = self.reach(i, left, false);
         let (g, r_out, r_back) = self.reach(i, right, true);
@@ -247,7 +252,7 @@ impl<'a> Solver<'a> {
     }
 
     pub fn fits(&self, i: usize, left: usize, right: usize, limit_ms: u64) -> bool {
-        let r = &self.robots[i];
+        let r = &self.uavs[i];
         let t = self.time_ms(i, left, right).0;
         t == 0 || (t <= u64::from(r.endurance_ms) && t + u64::from(r.release_ms) <= limit_ms)
     }
@@ -267,7 +272,7 @@ impl<'a> Solver<'a> {
 
     /// The least left shares with which everything is served in time, if any.
     fn feasible(&self, limit_ms: u64) -> Option<Vec<(usize, usize)>> {
-        let k = self.robots.len();
+        let k = self.uavs.len();
         let mut first_left = 0;
         loop {
             let mut left = first_left;
@@ -304,11 +309,11 @@ impl<'a> Solver<'a> {
             .filter(|(_, c)| c.open)
             .map(|(i, _)| i)
             .collect();
-        if self.robots.is_empty() {
+        if self.uavs.is_empty() {
             return (Vec::new(), open);
         }
         if open.is_empty() {
-            return (vec![(0, 0); self.robots.len()], Vec::new());
+            return (vec![(0, 0); self.uavs.len()], Vec::new());
         }
         const FOREVER_MS: u64 = 1 << 40;
         if self.feasible(FOREVER_MS).is_none() {
@@ -330,7 +335,7 @@ impl<'a> Solver<'a> {
     /// in which so many can be served, and the cells that nobody serves.
     fn most_cells(&self, open: &[u16]) -> (Vec<(usize, usize)>, Vec<u16>) {
         let longest = |r: &Uav| u64::from(r.release_ms) + u64::from(r.endurance_ms);
-        let (mut bad, mut good) = (0, self.robots.iter().map(longest).max().unwrap_or(0));
+        let (mut bad, mut good) = (0, self.uavs.iter().map(longest).max().unwrap_or(0));
         let most = Shares::new(self, good).best().0;
         while good - bad > 1 {
             let middle = good.midpoint(bad);
@@ -343,8 +348,8 @@ impl<'a> Solver<'a> {
         let extents = Shares::new(self, good).best().1;
         let n = self.ring.len();
         let mut served = vec![false; n];
-        for (robot, (left, right)) in self.robots.iter().zip(&extents) {
-            let at = n + usize::from(robot.anchor);
+        for (uav, (left, right)) in self.uavs.iter().zip(&extents) {
+            let at = n + usize::from(uav.anchor);
             for c in at - left..at + right {
                 served[c % n] = true;
             }
@@ -359,7 +364,7 @@ impl<'a> Solver<'a> {
 
     fn legs(&self, i: usize, left: usize, right: usize) -> (Vec<Leg>, u32) {
         let n = self.ring.len();
-        let r = &self.robots[i];
+        let r = &self.uavs[i];
         let at = n + usize::from(r.anchor);
         let (l, g) = (self.reach(i, left, false).0, self.reach(i, right, true).0);
         let (t, right_first) = self.time_ms(i, left, right);
@@ -412,7 +417,7 @@ mod tests {
         ]
     }
 
-    fn robot(id: u16, anchor: u16) -> Uav {
+    fn uav(id: u16, anchor: u16) -> Uav {
         Uav {
             anchor,
             id,
@@ -427,8 +432,8 @@ mod tests {
     #[test]
     fn contiguous_starts_take_half_the_rest() {
         for k in 1..5u16 {
-            let robots: Vec<Uav> = (0..k).map(|i| robot(i, i)).collect();
-            let d = divide(&ring(40), &robots);
+            let uavs: Vec<Uav> = (0..k).map(|i| uav(i, i)).collect();
+            let d = divide(&ring(40), &uavs);
             let mut seen = [0; 40];
             for s in &d.sections {
                 for l in &s.legs {
@@ -444,8 +449,8 @@ mod tests {
 
     /// The least makespan over all splits of all gaps, by trying each, or `None` when
     /// no split is within the endurance.
-    fn brute(ring: &[RingCell], robots: &[Uav]) -> Option<u64> {
-        let mut order = robots.to_vec();
+    fn brute(ring: &[RingCell], uavs: &[Uav]) -> Option<u64> {
+        let mut order = uavs.to_vec();
         order.sort_unstable_by_key(|r| (r.anchor, r.id));
         let k = order.len();
         let n = ring.len();
@@ -475,7 +480,7 @@ mod tests {
         }
     }
 
-    /// When a robot is done with `left` cells behind and `right` cells ahead of its
+    /// When a UAV is done with `left` cells behind and `right` cells ahead of its
     /// anchor, flying cell by cell; `None` beyond its endurance.
     fn flown(ring: &[RingCell], r: &Uav, left: usize, right: usize) -> Option<u64> {
         let n = ring.len();
@@ -521,8 +526,8 @@ mod tests {
         prop::collection::vec(cell, 1..9)
     }
 
-    fn robots(n: u16, endurance_s: core::ops::Range<u32>) -> impl Strategy<Value = Vec<Uav>> {
-        let robot = (0..n, any::<bool>(), 0u32..6, 1u32..4, 0u32..4, endurance_s).prop_map(
+    fn uavs(n: u16, endurance_s: core::ops::Range<u32>) -> impl Strategy<Value = Vec<Uav>> {
+        let uav = (0..n, any::<bool>(), 0u32..6, 1u32..4, 0u32..4, endurance_s).prop_map(
             |(anchor, forward, release, speed, turn, endurance)| Uav {
                 anchor,
                 id: 0,
@@ -537,17 +542,17 @@ mod tests {
                 endurance_ms: endurance * 1000,
             },
         );
-        prop::collection::vec(robot, 1..4).prop_map(|mut robots| {
-            for (id, r) in (0u16..).zip(&mut robots) {
+        prop::collection::vec(uav, 1..4).prop_map(|mut uavs| {
+            for (id, r) in (0u16..).zip(&mut uavs) {
                 r.id = id;
             }
-            robots
+            uavs
         })
     }
 
     /// Every open cell is in exactly one section or unassigned, and no section is
-    /// beyond its robot's endurance.
-    fn assert_sound(ring: &[RingCell], robots: &[Uav], d: &Division) {
+    /// beyond its UAV's endurance.
+    fn assert_sound(ring: &[RingCell], uavs: &[Uav], d: &Division) {
         let mut owners = vec![0; ring.len()];
         for s in &d.sections {
             let mut mine = vec![false; ring.len()];
@@ -559,7 +564,7 @@ mod tests {
             for (o, m) in owners.iter_mut().zip(mine) {
                 *o += u32::from(m);
             }
-            let r = robots.iter().find(|r| r.id == s.id).unwrap();
+            let r = uavs.iter().find(|r| r.id == s.id).unwrap();
             let spent = s.finish_ms.saturating_sub(r.release_ms);
             assert!(
                 s.legs.is_empty() || spent <= r.endurance_ms,
@@ -578,24 +583,24 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
         #[test]
-        fn no_split_is_faster((ring, robots) in cells().prop_flat_map(|r| {
+        fn no_split_is_faster((ring, uavs) in cells().prop_flat_map(|r| {
             let n = u16::try_from(r.len()).unwrap();
-            (Just(r), robots(n, 900..1000))
+            (Just(r), uavs(n, 900..1000))
         })) {
-            let d = divide(&ring, &robots);
-            assert_sound(&ring, &robots, &d);
+            let d = divide(&ring, &uavs);
+            assert_sound(&ring, &uavs, &d);
             prop_assert!(d.unassigned.is_empty());
-            prop_assert_eq!(Some(u64::from(d.makespan_ms)), brute(&ring, &robots), "{:?}", d);
+            prop_assert_eq!(Some(u64::from(d.makespan_ms)), brute(&ring, &uavs), "{:?}", d);
         }
 
         #[test]
-        fn short_endurance_is_kept_and_a_feasible_split_is_found((ring, robots) in cells().prop_flat_map(|r| {
+        fn short_endurance_is_kept_and_a_feasible_split_is_found((ring, uavs) in cells().prop_flat_map(|r| {
             let n = u16::try_from(r.len()).unwrap();
-            (Just(r), robots(n, 1..25))
+            (Just(r), uavs(n, 1..25))
         })) {
-            let d = divide(&ring, &robots);
-            assert_sound(&ring, &robots, &d);
-            if let Some(best) = brute(&ring, &robots) {
+            let d = divide(&ring, &uavs);
+            assert_sound(&ring, &uavs, &d);
+            if let Some(best) = brute(&ring, &uavs) {
                 prop_assert!(d.unassigned.is_empty(), "{:?}", d);
                 prop_assert_eq!(u64::from(d.makespan_ms), best, "{:?}", d);
             }
@@ -603,24 +608,24 @@ mod tests {
 
         #[test]
         fn with_too_little_endurance_no_plan_serves_more_or_as_many_sooner(
-            (ring, robots) in cells().prop_flat_map(|r| {
+            (ring, uavs) in cells().prop_flat_map(|r| {
                 let n = u16::try_from(r.len()).unwrap();
-                (Just(r), robots(n, 0..14))
+                (Just(r), uavs(n, 0..14))
             })
         ) {
-            let d = divide(&ring, &robots);
-            assert_sound(&ring, &robots, &d);
+            let d = divide(&ring, &uavs);
+            assert_sound(&ring, &uavs, &d);
             let open = ring.iter().filter(|c| c.open).count();
-            let (most, least_ms) = brute_most(&ring, &robots);
+            let (most, least_ms) = brute_most(&ring, &uavs);
             prop_assert_eq!(open - d.unassigned.len(), most, "{:?}", d);
             prop_assert_eq!(u64::from(d.makespan_ms), least_ms, "{:?}", d);
         }
     }
 
     /// The most cells that any shares serve, and the least makespan of those, by trying
-    /// every left and right share of every robot.
-    fn brute_most(ring: &[RingCell], robots: &[Uav]) -> (usize, u64) {
-        let mut order = robots.to_vec();
+    /// every left and right share of every UAV.
+    fn brute_most(ring: &[RingCell], uavs: &[Uav]) -> (usize, u64) {
+        let mut order = uavs.to_vec();
         order.sort_unstable_by_key(|r| (r.anchor, r.id));
         let (k, n) = (order.len(), ring.len());
         let gap = |i: usize| {
@@ -631,7 +636,7 @@ mod tests {
             let at = n + usize::from(r.anchor);
             (at - left..at + right).filter(|c| ring[c % n].open).count()
         };
-        // One choice a gap: how much of it the robots on both sides take.
+        // One choice a gap: how much of it the UAVs on both sides take.
         let choices: Vec<Vec<(usize, usize)>> = (0..k)
             .map(|i| {
                 let all = (0..=gap(i)).flat_map(|x| (0..=gap(i) - x).map(move |y| (x, y)));
@@ -673,7 +678,7 @@ mod tests {
         let far = Uav {
             anchor: 60_000,
             speed_mmps: 0,
-            ..robot(1, 0)
+            ..uav(1, 0)
         };
         let late = Uav {
             id: 2,
@@ -683,7 +688,7 @@ mod tests {
         assert_eq!(divide(&[], &[far]).makespan_ms, 0);
         assert_eq!(divide(&ring(3), &[]).unassigned, vec![0, 1, 2]);
         assert_sound(&ring(7), &[far, late], &divide(&ring(7), &[far, late]));
-        let d = divide(&ring(7), &[robot(0, 7 * 9 + 3), robot(1, 5)]);
+        let d = divide(&ring(7), &[uav(0, 7 * 9 + 3), uav(1, 5)]);
         assert!(d.unassigned.is_empty());
     }
 }

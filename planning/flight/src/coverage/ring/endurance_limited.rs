@@ -1,24 +1,24 @@
 //! The division that serves the most cells when endurance does not suffice for all
 //! (D2.7 §3.6.5, which leaves this case open).
 //!
-//! Exact, by one pass round the ring for each share of one robot. The times come
+//! Exact, by one pass round the ring for each share of one UAV. The times come
 //! from [`super::backtracking`], whose tests compare the result with every choice.
 
 use super::backtracking::Solver;
 
-/// Which shares each robot can serve within a limit, for the plan that serves the
+/// Which shares each UAV can serve within a limit, for the plan that serves the
 /// most cells when not all can be served.
 ///
 /// With a share to the left given, the largest to the right is never worse: a cell
-/// left to the next robot costs that robot at least as much of its own right. So a
-/// robot's state is its left share alone, and one pass over the gaps finds the best
-/// for each left share of the first robot.
+/// left to the next UAV costs that UAV at least as much of its own right. So a
+/// UAV's state is its left share alone, and one pass over the gaps finds the best
+/// for each left share of the first UAV.
 pub(super) struct Shares<'a> {
     solver: &'a Solver<'a>,
-    /// Largest share to the right by robot and share to the left; a left share beyond
+    /// Largest share to the right by UAV and share to the left; a left share beyond
     /// the list cannot be served.
     rights: Vec<Vec<usize>>,
-    /// The robot after the smallest gap: there the fewest shares have to be tried.
+    /// The UAV after the smallest gap: there the fewest shares have to be tried.
     first: usize,
     /// Open cells before each place of the unrolled ring.
     open_before: Vec<usize>,
@@ -26,7 +26,7 @@ pub(super) struct Shares<'a> {
 
 impl<'a> Shares<'a> {
     pub fn new(solver: &'a Solver<'a>, limit_ms: u64) -> Self {
-        let k = solver.robots.len();
+        let k = solver.uavs.len();
         let rights = (0..k)
             .map(|i| {
                 (0..=solver.gap((i + k - 1) % k))
@@ -49,16 +49,16 @@ impl<'a> Shares<'a> {
         }
     }
 
-    /// Open cells in the shares of robot `i`.
+    /// Open cells in the shares of UAV `i`.
     fn open(&self, i: usize, left: usize, right: usize) -> usize {
-        let at = self.solver.ring.len() + usize::from(self.solver.robots[i].anchor);
+        let at = self.solver.ring.len() + usize::from(self.solver.uavs[i].anchor);
         self.open_before[at + right] - self.open_before[at - left]
     }
 
     /// The most cells that can be served, and by which shares: ties go to the smallest
-    /// share to the left of the first robot, then of the others.
+    /// share to the left of the first UAV, then of the others.
     pub fn best(&self) -> (usize, Vec<(usize, usize)>) {
-        let k = self.solver.robots.len();
+        let k = self.solver.uavs.len();
         let mut best: (usize, Vec<usize>) = (0, vec![0; k]);
         for first_left in 0..self.rights[self.first].len() {
             let (count, lefts) = self.sweep(first_left);
@@ -76,10 +76,10 @@ impl<'a> Shares<'a> {
         (best.0, extents)
     }
 
-    /// The best for one left share of the first robot: cells served, and the left
+    /// The best for one left share of the first UAV: cells served, and the left
     /// shares in the order of the sweep.
     fn sweep(&self, first_left: usize) -> (usize, Vec<usize>) {
-        let k = self.solver.robots.len();
+        let k = self.solver.uavs.len();
         // By left share: cells served so far, or none when it cannot come to that.
         let mut served: Vec<Option<usize>> = vec![None; first_left + 1];
         served[first_left] = Some(self.open(self.first, first_left, 0));
@@ -99,7 +99,7 @@ impl<'a> Shares<'a> {
                     *slot = Some((total, left));
                 }
             }
-            // A robot may take less than what is left over.
+            // A UAV may take less than what is left over.
             for x in (0..gap).rev() {
                 if left_over[x + 1].is_some_and(|(c, _)| left_over[x].is_none_or(|(d, _)| c > d)) {
                     left_over[x] = left_over[x + 1];
