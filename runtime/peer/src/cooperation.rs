@@ -131,6 +131,11 @@ impl Cooperation {
         }
     }
 
+    /// What the operator wants, as far as it was heard.
+    pub fn order(&self) -> Order {
+        self.order.order
+    }
+
     /// An order that this peer itself gives for its operator.
     pub fn give_order(&mut self, order: Order, version: (Incarnation, u32, u16)) {
         self.order = StandingOrder { order, version };

@@ -597,7 +597,7 @@ impl Peer {
             incarnation: self.life.incarnation(),
             speaks: self.life.has_voice(self.now, &self.timers),
             diameter: self.membership.diameter(self.now),
-            order: self.order.order,
+            order: self.cooperation.order(),
             ..Beliefs::default()
         };
         for (id, incarnation, status) in self.membership.all() {

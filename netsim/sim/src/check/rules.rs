@@ -65,7 +65,8 @@ impl Rules {
     /// The operator has a mission.
     pub fn on_mission(&mut self, mission: &Mission) {
         self.bases.insert(mission.revision, point_m(mission.base));
-        self.spread.on_mission(chunks(mission).len());
+        self.spread
+            .on_mission(chunks(mission).map_or(0, |pieces| pieces.len()));
     }
 
     /// A peer is late from now on by no doing of its own.
