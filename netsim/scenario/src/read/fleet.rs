@@ -1,7 +1,7 @@
 //! The UAVs of a scenario with their airframes, and its ground station. Leaves launch poses
 //! that are spread round the coverage loop to `resolve`, which has the loop.
 
-use super::{MAX_HEIGHT_M, position};
+use super::shared::{MAX_HEIGHT_M, position};
 use crate::request::Overrides;
 use skein_flight::airframe::Airframe;
 use skein_geometry::frame::Pose;

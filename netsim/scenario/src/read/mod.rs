@@ -6,6 +6,7 @@ pub(crate) mod fleet;
 pub(crate) mod lanes;
 pub(crate) mod radio;
 pub(crate) mod run;
+mod shared;
 pub(crate) mod targets;
 pub(crate) mod terrain;
 pub(crate) mod wind;
@@ -17,9 +18,10 @@ use faults::Known;
 use fleet::Fleet;
 use lanes::Lanes;
 use run::Run;
+use shared::{Notices, position};
 use skein_flight::trajectory::timed::Objective;
 use skein_flight::trajectory::wind::Wind;
-use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Point};
+use skein_geometry::frame::Point;
 use skein_interop::airframe;
 use skein_interop::json::{Document, Error, Fields, Places};
 use skein_netsim::fault::TimedFault;
@@ -27,10 +29,6 @@ use skein_netsim::spec::{GroundStationSpec, RadioSpec, StormSpec};
 use std::collections::BTreeSet;
 use targets::Asked;
 use terrain::Terrain;
-
-/// Highest flight level and roof that are accepted, metres: the service ceiling of
-/// small fixed wings with room to spare.
-pub(crate) const MAX_HEIGHT_M: f64 = 5000.0;
 
 /// All fields of a scenario.
 const FIELDS: &[&str] = &[
@@ -168,19 +166,4 @@ fn planned_by(f: &Fields<'_>, asked: Asked, planner: Option<AreaPlanner>) -> Res
             ))
         }
     }
-}
-
-/// What a file told besides what was asked: field and text.
-pub(crate) type Notices = Vec<(String, String)>;
-
-/// A position typed as metres `east_m`, `north_m`.
-pub(crate) fn position(f: &Fields<'_>) -> Result<Point, Error> {
-    let coordinate = |name| {
-        f.need(name, "250")?.number(
-            -MAX_MISSION_RADIUS_M,
-            MAX_MISSION_RADIUS_M,
-            "metres from the origin",
-        )
-    };
-    Ok(Point::new(coordinate("east_m")?, coordinate("north_m")?))
 }

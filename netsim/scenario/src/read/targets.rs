@@ -1,7 +1,7 @@
 //! What a scenario asks to see: an area, points or lines, in the plane (D2.7 §3.2, §3.4,
 //! §3.5). Leaves areas, zones and buildings themselves to `terrain`.
 
-use super::{Notices, position};
+use super::shared::{Notices, position};
 use crate::files::Files;
 use crate::request::AreaPlanner;
 use skein_flight::coverage::stations::targets::{LineTarget, PointTarget, Targets};

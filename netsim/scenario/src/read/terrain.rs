@@ -1,8 +1,8 @@
 //! Origin, area, no-fly zones and buildings of a scenario file, in the plane
 //! (D2.7 §2.2, §2.3). Leaves lanes and fleet to its neighbours.
 
+use super::shared::{MAX_HEIGHT_M, Notices, position};
 use super::targets::{self, Asked};
-use super::{MAX_HEIGHT_M, Notices, position};
 use crate::files::Files;
 use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
 use skein_geometry::{Polygon, PolygonError};
