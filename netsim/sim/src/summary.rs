@@ -328,7 +328,9 @@ fn detect_s(o: &Outcome) -> Vec<f64> {
 }
 
 fn takeover_s(o: &Outcome) -> Vec<f64> {
-    let kills = o.report.kills.iter().filter(|k| k.cells_held > 0);
+    let kills = o.report.kills.iter();
+    // What others list already, or nobody held, is not taken over.
+    let kills = kills.filter(|k| k.cells_held > k.listed_already);
     kills
         .filter_map(|k| k.takeover_ms.zip(k.detection_ms))
         .map(|(taken, detected)| secs(taken.saturating_sub(detected)))

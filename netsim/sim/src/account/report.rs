@@ -202,6 +202,8 @@ pub struct KillReport {
     pub listed_already: usize,
     /// Who listed its other cells.
     pub taken_over_by: Vec<Taker>,
+    /// Cells that it listed again itself, after a restart.
+    pub taken_back: usize,
     /// Cells that somebody saw without having listed them.
     pub seen_in_passing: usize,
     /// When the last of its cells was listed or seen, ms after the end.

@@ -172,6 +172,19 @@ fn a_restart_counts_as_useful_only_in_its_new_life() {
 }
 
 #[test]
+fn a_peer_that_comes_back_takes_its_own_cells_back() {
+    let mut a = two();
+    a.ended(1_000, 1, Cause::ComputerKilled);
+    a.restarted(2_000, 1, false);
+    a.reported(2_500, 1, &ready(1, 9));
+    a.reported(3_000, 1, &claim(0, 6, &[]));
+    a.reported(9_000, 2, &claim(6, 14, &[]));
+    let k = &concluded(&a, 9_000).kills[0];
+    assert_eq!((k.taken_back, k.taken_over_by[0].cells), (6, 4));
+    assert_eq!((k.left, k.takeover_ms), (0, Some(8_000)));
+}
+
+#[test]
 fn another_time_round_begins_with_everything_open() {
     let mut a = two();
     a.reported(

@@ -180,6 +180,9 @@ fn write_kill(k: &KillReport, f: &mut fmt::Formatter<'_>) -> fmt::Result {
             secs(t.first_ms)
         )?;
     }
+    if k.taken_back > 0 {
+        write!(f, "; {} taken back by itself", k.taken_back)?;
+    }
     if k.seen_in_passing > 0 {
         write!(f, "; {} seen in passing", k.seen_in_passing)?;
     }

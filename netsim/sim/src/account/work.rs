@@ -39,6 +39,7 @@ struct Death {
     unseen: BTreeSet<u16>,
     seen_by: BTreeMap<u16, usize>,
     seen_unlisted: usize,
+    taken_back: usize,
     superseded: usize,
     over_ms: Option<u64>,
 }
@@ -134,12 +135,17 @@ impl Work {
         self.inherited
             .retain(|cell, taker| *taker == by || !flown.contains(cell));
         let mut line = None;
-        for d in self.deaths.iter_mut().filter(|d| d.peer != by) {
+        for d in &mut self.deaths {
             let taken: Vec<u16> = d.pending.intersection(flown).copied().collect();
             if taken.is_empty() {
                 continue;
             }
             d.pending.retain(|c| !flown.contains(c));
+            if d.peer == by {
+                d.taken_back += taken.len();
+                d.close(now_ms);
+                continue;
+            }
             let taking = d.takers.entry(by).or_insert(Taking {
                 cells: 0,
                 first_ms: now_ms,
@@ -206,6 +212,7 @@ impl Work {
             unseen,
             seen_by: BTreeMap::new(),
             seen_unlisted: 0,
+            taken_back: 0,
             superseded: 0,
             over_ms: None,
         };
@@ -255,6 +262,7 @@ impl Work {
                         first_ms: after(t.first_ms),
                     })
                     .collect(),
+                taken_back: d.taken_back,
                 seen_in_passing: d.seen_unlisted,
                 takeover_ms: d.over_ms.map(after),
                 superseded: d.superseded,
