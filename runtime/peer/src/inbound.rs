@@ -3,6 +3,7 @@
 //! | bytes | what follows |
 //! |---|---|
 //! | too many, malformed, out of range, an unknown kind | a report; nothing else |
+//! | a signature, where nobody signs | likewise: it would be passed on for nothing |
 //! | a beacon under this peer's own id and life with another boot nonce | a double: `life` |
 //! | anything else under its own id | an echo, or news of another life: `life` |
 //! | a beacon | `membership`, `relay`, `cooperation` |
@@ -11,9 +12,10 @@
 
 use crate::Incarnation;
 use crate::protocol::life::Life;
-use crate::wire::codec::{self, Body};
+use crate::wire::codec::{self, Body, WireError};
 use crate::wire::kinds::Kind;
 use crate::wire::message::{Beacon, Record};
+use crate::wire::signature::{Off, Verifier};
 
 /// What was heard.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +38,9 @@ pub(crate) fn read(bytes: &[u8], me: u16, life: &Life) -> Heard {
         Ok(record) => record,
         Err(why) => return Heard::Refused(why.to_string()),
     };
+    if !Off.verify(record.author, record.incarnation, bytes, &record.signature) {
+        return Heard::Refused(WireError::Signature.to_string());
+    }
     let Some(kind) = Kind::of_number(record.kind) else {
         return Heard::Refused("a kind of a later version".into());
     };
@@ -54,5 +59,37 @@ pub(crate) fn read(bytes: &[u8], me: u16, life: &Life) -> Heard {
         _ if record.author == me => Heard::Myself(record.incarnation, 0),
         Body::Beacon(beacon) => Heard::Beacon(record, beacon),
         body => Heard::Record(kind, record, body),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::message::Finished;
+    use crate::wire::signature::SIGNATURE_MAX_BYTES;
+
+    #[test]
+    fn a_record_that_carries_a_signature_is_refused_where_nobody_signs() {
+        let record = Record {
+            author: 2,
+            incarnation: 1,
+            seq: 1,
+            kind: Kind::Finished.number(),
+            subject: 0,
+            body: codec::encode_body(&Body::Finished(Finished { revision: 1 })),
+            signature: Vec::new(),
+        };
+        let heard = |record: &Record| read(&codec::encode_record(record), 1, &Life::default());
+        assert!(matches!(heard(&record), Heard::Record(..)));
+        for n_bytes in [1, SIGNATURE_MAX_BYTES] {
+            let signed = Record {
+                signature: vec![7; n_bytes],
+                ..record.clone()
+            };
+            let Heard::Refused(why) = heard(&signed) else {
+                panic!("{n_bytes} bytes of signature are accepted")
+            };
+            assert!(why.contains("signature"), "{why}");
+        }
     }
 }
