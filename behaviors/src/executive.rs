@@ -35,7 +35,7 @@ use crate::reactive::envelope::{Envelope, is_finite};
 use crate::reactive::follow::{HORIZON_S, Offset, Track};
 use crate::setpoint::{Setpoint, Side};
 use camera::{Played, look};
-pub use prediction::{UNREACHABLE_MS, View};
+pub use prediction::UNREACHABLE_MS;
 use serde::{Deserialize, Serialize};
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::backtracking::Leg;

@@ -20,7 +20,7 @@ pub mod setpoint;
 mod testing;
 
 pub use event::Event;
-pub use executive::{Executive, Forecast, Goal, View};
+pub use executive::{Executive, Forecast, Goal};
 pub use order::Order;
 pub use percept::Percept;
 pub use setpoint::{Setpoint, Side, Steer};

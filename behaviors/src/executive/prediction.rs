@@ -35,38 +35,7 @@ struct Item {
     end: Place,
 }
 
-/// What a UAV is at, for reports.
-#[derive(Clone, Debug, PartialEq)]
-pub struct View {
-    /// The cell being flown, to serve it or on the way.
-    pub current: Option<(u16, Direction)>,
-    /// Cells still to be served, in order, with the one being served.
-    pub queue: Vec<(u16, Direction)>,
-    /// The last percept.
-    pub percept: Option<Percept>,
-}
-
 impl Executive {
-    /// What the UAV is at.
-    #[must_use]
-    pub fn view(&self) -> View {
-        let current = self
-            .stretches
-            .front()
-            .filter(|_| !self.replan)
-            .and_then(|s| s.kind.cell());
-        let under_way = self.stretches.iter().filter_map(|s| s.kind.visit());
-        let queue = under_way
-            .chain(self.queue.iter().copied())
-            .map(|h| (h.cell, h.direction))
-            .collect();
-        View {
-            current,
-            queue,
-            percept: self.played.as_ref().map(|p| p.percept),
-        }
-    }
-
     /// Where the UAV will be `window_ms` from its last percept, at the end of a cell.
     ///
     /// The cell that it is in is always finished first. A UAV without legs is

@@ -1,6 +1,6 @@
-//! Stories of one UAV on a real loop, flown by an exact airframe.
+//! One UAV on a real loop, flown by an exact airframe.
 //!
-//! Every story checks on the way what must always hold: what is reported seen was in
+//! Every flight checks on the way what must always hold: what is reported seen was in
 //! a true frame, and the flown path keeps its distance from the zones.
 
 use super::*;
@@ -9,7 +9,7 @@ use Direction::{Backward, Forward};
 use proptest::prelude::*;
 use skein_geometry::Polygon;
 
-struct Story {
+struct Flight {
     executive: Executive,
     wing: Wing,
     open: Vec<bool>,
@@ -18,7 +18,7 @@ struct Story {
     looked: usize,
 }
 
-impl Story {
+impl Flight {
     fn new(cols: u32, rows: u32, zones: Vec<Polygon>, start: Pose) -> Self {
         let (coverage_loop, router) = ground(cols, rows, zones.clone());
         let open = vec![true; coverage_loop.len()];
@@ -31,6 +31,14 @@ impl Story {
             zones,
             looked: 0,
         }
+    }
+
+    /// The cell being flown, to serve it or on the way.
+    fn under_way(&self) -> Option<(u16, Direction)> {
+        let front = self.executive.stretches.front();
+        front
+            .filter(|_| !self.executive.replan)
+            .and_then(|s| s.kind.cell())
     }
 
     fn n(&self) -> u16 {
@@ -133,8 +141,9 @@ impl Story {
         for i in 0.. {
             assert!(
                 self.wing.time_ms < most_s * 1000,
-                "no end: {:?}",
-                self.executive.view()
+                "no end: {:?}, {:?}",
+                self.executive.stretches.front(),
+                self.executive.queue
             );
             let events = self.step_late(periods_ms[i % periods_ms.len()], late_ms);
             if events.iter().any(&end) {
@@ -182,44 +191,44 @@ fn block() -> Vec<Polygon> {
 #[test]
 fn one_uav_sees_the_whole_loop_in_either_direction() {
     for direction in [Forward, Backward] {
-        let mut story = Story::new(10, 8, block(), outside());
-        let n = story.n();
+        let mut flight = Flight::new(10, 8, block(), outside());
+        let n = flight.n();
         assert!(n > 60);
-        story.step(200);
-        let foretold_s = u64::from(story.leg_time_ms(&[(3, n, direction)])) / 1000;
-        story.legs(&[(3, n, direction)]);
-        story.until_done(foretold_s + 60);
-        assert!(story.open.iter().all(|o| !o));
-        assert_eq!(story.told, [Event::PlanDone]);
+        flight.step(200);
+        let foretold_s = u64::from(flight.leg_time_ms(&[(3, n, direction)])) / 1000;
+        flight.legs(&[(3, n, direction)]);
+        flight.until_done(foretold_s + 60);
+        assert!(flight.open.iter().all(|o| !o));
+        assert_eq!(flight.told, [Event::PlanDone]);
         // It is never late; cells seen in passing make it early, for their excursions
         // are not flown.
-        let flown_s = story.wing.time_ms / 1000;
+        let flown_s = flight.wing.time_ms / 1000;
         assert!(flown_s * 10 > foretold_s * 6, "{flown_s} {foretold_s}");
         assert!(
-            story.least_distance_m() > CLEARANCE_M - 0.3,
+            flight.least_distance_m() > CLEARANCE_M - 0.3,
             "{}",
-            story.least_distance_m()
+            flight.least_distance_m()
         );
         // Afterwards it loiters where it is, and says nothing more.
-        let there = story.wing.pose.position();
+        let there = flight.wing.pose.position();
         for _ in 0..400 {
-            assert!(story.step(200).is_empty());
-            assert!((story.wing.pose.position() - there).norm() < 120.0);
+            assert!(flight.step(200).is_empty());
+            assert!((flight.wing.pose.position() - there).norm() < 120.0);
         }
-        assert!(story.least_distance_m() > CLEARANCE_M - 0.3);
+        assert!(flight.least_distance_m() > CLEARANCE_M - 0.3);
     }
 }
 
 #[test]
 fn a_flight_that_is_set_up_once_is_on_time_to_the_second() {
-    let mut story = Story::new(10, 8, vec![], outside());
-    story.step(200);
+    let mut flight = Flight::new(10, 8, vec![], outside());
+    flight.step(200);
     let legs = [(0, 30, Forward), (70, 8, Backward)];
-    let foretold_ms = u64::from(story.leg_time_ms(&legs));
-    let from_ms = story.wing.time_ms - 200;
-    story.legs(&legs);
-    story.until_done(1000);
-    let flown_ms = story.wing.time_ms - from_ms;
+    let foretold_ms = u64::from(flight.leg_time_ms(&legs));
+    let from_ms = flight.wing.time_ms - 200;
+    flight.legs(&legs);
+    flight.until_done(1000);
+    let flown_ms = flight.wing.time_ms - from_ms;
     assert!(
         flown_ms.abs_diff(foretold_ms) < 2000,
         "{flown_ms} {foretold_ms}"
@@ -233,24 +242,24 @@ fn a_wind_hides_no_cell_and_brings_nobody_nearer_to_a_zone() {
         (Backward, (-1.2, 1.6)),
         (Forward, (0.0, 2.4)),
     ] {
-        let mut story = Story::new(10, 8, block(), outside());
-        story.wing.wind_mps = wind;
-        let n = story.n();
-        story.step(200);
-        let foretold_s = u64::from(story.leg_time_ms(&[(3, n, direction)])) / 1000;
-        story.legs(&[(3, n, direction)]);
-        story.until_done(foretold_s + 60);
-        assert!(story.open.iter().all(|o| !o));
-        assert_eq!(story.told, [Event::PlanDone]);
-        let least_m = story.least_distance_m();
+        let mut flight = Flight::new(10, 8, block(), outside());
+        flight.wing.wind_mps = wind;
+        let n = flight.n();
+        flight.step(200);
+        let foretold_s = u64::from(flight.leg_time_ms(&[(3, n, direction)])) / 1000;
+        flight.legs(&[(3, n, direction)]);
+        flight.until_done(foretold_s + 60);
+        assert!(flight.open.iter().all(|o| !o));
+        assert_eq!(flight.told, [Event::PlanDone]);
+        let least_m = flight.least_distance_m();
         assert!(least_m > CLEARANCE_M - 0.6, "{wind:?}: {least_m}");
         // Its loiter stands over the ground.
-        let there = story.wing.pose.position();
+        let there = flight.wing.pose.position();
         for _ in 0..400 {
-            assert!(story.step(200).is_empty());
-            assert!((story.wing.pose.position() - there).norm() < 120.0);
+            assert!(flight.step(200).is_empty());
+            assert!((flight.wing.pose.position() - there).norm() < 120.0);
         }
-        assert!(story.least_distance_m() > CLEARANCE_M - 0.6);
+        assert!(flight.least_distance_m() > CLEARANCE_M - 0.6);
     }
 }
 
@@ -258,15 +267,15 @@ fn a_wind_hides_no_cell_and_brings_nobody_nearer_to_a_zone() {
 fn in_a_wind_it_is_on_time_too() {
     let mut times_ms = Vec::new();
     for wind in [(0.0, 0.0), (2.0, 0.0), (-1.0, -1.5)] {
-        let mut story = Story::new(10, 8, vec![], outside());
-        story.wing.wind_mps = wind;
-        story.step(200);
+        let mut flight = Flight::new(10, 8, vec![], outside());
+        flight.wing.wind_mps = wind;
+        flight.step(200);
         let legs = [(0, 30, Forward), (70, 8, Backward)];
-        let foretold_ms = u64::from(story.leg_time_ms(&legs));
-        let from_ms = story.wing.time_ms - 200;
-        story.legs(&legs);
-        story.until_done(1000);
-        let flown_ms = story.wing.time_ms - from_ms;
+        let foretold_ms = u64::from(flight.leg_time_ms(&legs));
+        let from_ms = flight.wing.time_ms - 200;
+        flight.legs(&legs);
+        flight.until_done(1000);
+        let flown_ms = flight.wing.time_ms - from_ms;
         let late_ms = flown_ms.abs_diff(foretold_ms);
         assert!(late_ms < 2500, "{wind:?}: {flown_ms} {foretold_ms}");
         times_ms.push(foretold_ms);
@@ -279,71 +288,71 @@ fn in_a_wind_it_is_on_time_too() {
 
 #[test]
 fn a_wind_that_turns_on_the_way_is_followed() {
-    let mut story = Story::new(10, 8, block(), outside());
-    story.step(200);
-    story.legs(&[(0, story.n(), Forward)]);
+    let mut flight = Flight::new(10, 8, block(), outside());
+    flight.step(200);
+    flight.legs(&[(0, flight.n(), Forward)]);
     for (i, wind) in [(0.0, 2.0), (2.0, 0.4), (0.0, 0.0), (-1.4, -1.4)]
         .into_iter()
         .enumerate()
     {
-        story.wing.wind_mps = wind;
+        flight.wing.wind_mps = wind;
         for _ in 0..200 + i {
-            story.step(200);
+            flight.step(200);
         }
     }
-    story.until_done(1500);
-    assert!(story.open.iter().all(|o| !o));
-    assert!(story.least_distance_m() > CLEARANCE_M - 1.0);
+    flight.until_done(1500);
+    assert!(flight.open.iter().all(|o| !o));
+    assert!(flight.least_distance_m() > CLEARANCE_M - 1.0);
 }
 
 #[test]
 fn a_cell_without_its_proof_is_refused_and_not_flown() {
     // The loop knows nothing of the zone: the certificate alone keeps the UAV out of it.
-    let mut story = Story::new(10, 8, vec![], outside());
+    let mut flight = Flight::new(10, 8, vec![], outside());
     let zones = vec![square(186.0, 138.0, 60.0)];
     let (_, router) = ground(10, 8, zones.clone());
-    let blind = Arc::clone(&story.executive.transit.coverage_loop);
-    story.executive = Executive::new(airframe(), 90.0, blind, router);
-    story.zones = zones;
-    story.step(200);
-    story.legs(&[(0, story.n(), Forward)]);
-    story.until_done(1500);
-    let refused = story.told.iter().filter_map(|e| match e {
+    let blind = Arc::clone(&flight.executive.transit.coverage_loop);
+    flight.executive = Executive::new(airframe(), 90.0, blind, router);
+    flight.zones = zones;
+    flight.step(200);
+    flight.legs(&[(0, flight.n(), Forward)]);
+    flight.until_done(1500);
+    let refused = flight.told.iter().filter_map(|e| match e {
         Event::Refused { cells } => Some(cells.len()),
         _ => None,
     });
     let refused: usize = refused.sum();
-    let open = story.open.iter().filter(|o| **o).count();
-    assert!(refused > 0 && refused < 12, "{:?}", story.told);
+    let open = flight.open.iter().filter(|o| **o).count();
+    assert!(refused > 0 && refused < 12, "{:?}", flight.told);
     assert!(open <= refused, "{open} {refused}");
-    let least_m = story.least_distance_m();
+    let least_m = flight.least_distance_m();
     assert!(least_m > DEFAULT_TRACKING_ERROR_M, "{least_m}");
 }
 
 #[test]
 fn gaps_in_a_plan_are_passed_or_cut_short() {
-    let mut story = Story::new(10, 8, block(), outside());
+    let mut flight = Flight::new(10, 8, block(), outside());
     for i in (10..30).chain(33..50) {
-        story.open[i] = false;
+        flight.open[i] = false;
     }
-    story.step(200);
-    let whole_ms = u64::from(story.n()) * 3700;
-    story.legs(&[(5, 50, Forward)]);
-    story.until_done(400);
-    let left: Vec<usize> = (5..55).filter(|i| story.open[*i]).collect();
+    flight.step(200);
+    let whole_ms = u64::from(flight.n()) * 3700;
+    flight.legs(&[(5, 50, Forward)]);
+    flight.until_done(400);
+    let left: Vec<usize> = (5..55).filter(|i| flight.open[*i]).collect();
     assert!(left.is_empty(), "{left:?}");
-    assert!(story.wing.time_ms < whole_ms, "{}", story.wing.time_ms);
-    assert!(story.least_distance_m() > CLEARANCE_M - 0.3);
+    assert!(flight.wing.time_ms < whole_ms, "{}", flight.wing.time_ms);
+    assert!(flight.least_distance_m() > CLEARANCE_M - 0.3);
 }
 
 #[test]
 fn it_turns_round_for_a_second_leg() {
-    let mut story = Story::new(10, 8, vec![], outside());
-    story.step(200);
-    story.legs(&[(10, 6, Forward), (9, 6, Backward)]);
-    story.until_done(300);
-    assert!((4..16).all(|i| !story.open[i]));
-    assert_eq!(story.told, [Event::PlanDone]);
+    let mut flight = Flight::new(10, 8, vec![], outside());
+    flight.step(200);
+    flight.legs(&[(10, 6, Forward), (9, 6, Backward)]);
+    flight.until_done(300);
+    assert!((4..16).all(|i| !flight.open[i]));
+    assert_eq!(flight.told, [Event::PlanDone]);
 }
 
 #[test]
@@ -354,16 +363,16 @@ fn late_and_missing_percepts_leave_no_gap() {
         (&[200, 200, 900][..], 50),
         (&[[200; 150].as_slice(), &[3500]].concat()[..], 30),
     ] {
-        let mut story = Story::new(10, 8, block(), outside());
-        story.step(200);
-        story.legs(&[(0, 40, Forward)]);
-        story.until(periods, late, 900, |e| *e == Event::PlanDone);
-        assert!((0..40).all(|i| !story.open[i]), "{periods:?}");
-        assert_eq!(story.told, [Event::PlanDone]);
+        let mut flight = Flight::new(10, 8, block(), outside());
+        flight.step(200);
+        flight.legs(&[(0, 40, Forward)]);
+        flight.until(periods, late, 900, |e| *e == Event::PlanDone);
+        assert!((0..40).all(|i| !flight.open[i]), "{periods:?}");
+        assert_eq!(flight.told, [Event::PlanDone]);
         assert!(
-            story.least_distance_m() > CLEARANCE_M - 2.0,
+            flight.least_distance_m() > CLEARANCE_M - 2.0,
             "{periods:?}: {}",
-            story.least_distance_m()
+            flight.least_distance_m()
         );
     }
 }
@@ -378,7 +387,7 @@ fn a_cell_that_cannot_be_reached_is_refused_and_the_rest_flown() {
         wall(-140.0, -120.0, 20.0, 620.0),
         wall(520.0, -120.0, 20.0, 620.0),
     ];
-    let mut story = Story::new(
+    let mut flight = Flight::new(
         8,
         8,
         zones,
@@ -388,11 +397,11 @@ fn a_cell_that_cannot_be_reached_is_refused_and_the_rest_flown() {
             heading_rad: 1.0,
         },
     );
-    story.step(200);
-    assert_eq!(story.forecast(5000).release_ms, UNREACHABLE_MS);
-    story.legs(&[(0, 5, Forward)]);
-    story.until_done(20);
-    let refused: Vec<u16> = story
+    flight.step(200);
+    assert_eq!(flight.forecast(5000).release_ms, UNREACHABLE_MS);
+    flight.legs(&[(0, 5, Forward)]);
+    flight.until_done(20);
+    let refused: Vec<u16> = flight
         .told
         .iter()
         .flat_map(|e| {
@@ -408,31 +417,31 @@ fn a_cell_that_cannot_be_reached_is_refused_and_the_rest_flown() {
 
 #[test]
 fn a_cell_that_the_camera_never_sees_is_refused_after_three_tries() {
-    let mut story = Story::new(6, 6, vec![], outside());
-    story.executive.transit.airframe.footprint_along_m = 20.0;
-    story.step(200);
-    story.legs(&[(3, 1, Forward)]);
-    story.until_done(300);
+    let mut flight = Flight::new(6, 6, vec![], outside());
+    flight.executive.transit.airframe.footprint_along_m = 20.0;
+    flight.step(200);
+    flight.legs(&[(3, 1, Forward)]);
+    flight.until_done(300);
     assert_eq!(
-        story.told,
+        flight.told,
         [Event::Refused { cells: vec![3] }, Event::PlanDone]
     );
-    assert!(story.wing.time_ms > 30_000);
+    assert!(flight.wing.time_ms > 30_000);
 }
 
 #[test]
 fn new_legs_that_begin_where_it_is_change_nothing_on_the_way() {
-    let mut plain = Story::new(10, 8, vec![], outside());
+    let mut plain = Flight::new(10, 8, vec![], outside());
     plain.step(200);
     plain.legs(&[(0, 20, Forward)]);
-    let mut again = Story::new(10, 8, vec![], outside());
+    let mut again = Flight::new(10, 8, vec![], outside());
     again.step(200);
     again.legs(&[(0, 20, Forward)]);
     let mut last = 0;
     while again.open[15] {
         plain.step(200);
         again.step(200);
-        if let Some((cell, Forward)) = again.executive.view().current
+        if let Some((cell, Forward)) = again.under_way()
             && cell < 15
         {
             // The cell under way may be seen already: the plan then begins after it.
@@ -445,35 +454,35 @@ fn new_legs_that_begin_where_it_is_change_nothing_on_the_way() {
             last = cell;
         }
         let off_m = (plain.wing.pose.position() - again.wing.pose.position()).norm();
-        assert!(off_m < 0.05, "{off_m} {:?}", again.executive.view());
+        assert!(off_m < 0.05, "{off_m} {:?}", again.under_way());
     }
     assert!(last >= 13);
 }
 
 #[test]
 fn forecasts_come_true() {
-    let mut story = Story::new(10, 8, block(), outside());
-    story.step(200);
-    let first = story.forecast(1000);
+    let mut flight = Flight::new(10, 8, block(), outside());
+    flight.step(200);
+    let first = flight.forecast(1000);
     assert!(first.cells.is_empty() && first.release_ms > 0 && first.release_ms < 60_000);
-    story.legs(&[(0, 40, Forward)]);
-    story.step(200);
-    while story.open[6] {
-        story.step(200);
+    flight.legs(&[(0, 40, Forward)]);
+    flight.step(200);
+    while flight.open[6] {
+        flight.step(200);
     }
     for window_ms in [0, 3_000, 15_000] {
-        story.step(200);
-        let f = story.forecast(window_ms);
+        flight.step(200);
+        let f = flight.forecast(window_ms);
         assert_eq!(f.heading, Forward);
         // The cell under way is finished, and an excursion takes up to 15 s.
         assert!(f.release_ms <= window_ms + 15_000, "{f:?}");
-        let mut later = Story {
-            executive: story.executive.clone(),
-            wing: story.wing.clone(),
-            open: story.open.clone(),
+        let mut later = Flight {
+            executive: flight.executive.clone(),
+            wing: flight.wing.clone(),
+            open: flight.open.clone(),
             told: vec![],
             zones: vec![],
-            looked: story.looked,
+            looked: flight.looked,
         };
         // The forecast was made 200 ms ago, at the last percept.
         for _ in 0..f.release_ms.saturating_sub(200) / 10 {
@@ -494,85 +503,85 @@ fn forecasts_come_true() {
 
 #[test]
 fn it_arrives_at_a_point_once_and_stays_there() {
-    let mut story = Story::new(10, 8, block(), outside());
+    let mut flight = Flight::new(10, 8, block(), outside());
     let goal = Point::new(420.0, 330.0);
-    story.step(200);
-    story.executive.set_goal(Goal::Point(goal), &|_| false);
+    flight.step(200);
+    flight.executive.set_goal(Goal::Point(goal), &|_| false);
     // A block stands in the way, so it may have to follow the loop for a while.
-    story.until(&[200], 0, 600, |e| *e == Event::Arrived);
+    flight.until(&[200], 0, 600, |e| *e == Event::Arrived);
     for _ in 0..300 {
-        story.step(200);
-        story.executive.set_goal(Goal::Point(goal), &|_| false);
-        assert!((story.wing.pose.position() - goal).norm() < 130.0);
+        flight.step(200);
+        flight.executive.set_goal(Goal::Point(goal), &|_| false);
+        assert!((flight.wing.pose.position() - goal).norm() < 130.0);
     }
-    assert_eq!(story.told, [Event::Arrived]);
+    assert_eq!(flight.told, [Event::Arrived]);
 }
 
 #[test]
 fn without_a_goal_it_holds_where_it_is() {
-    let mut story = Story::new(10, 8, block(), outside());
+    let mut flight = Flight::new(10, 8, block(), outside());
     for _ in 0..500 {
-        story.step(200);
-        assert!((story.wing.pose.position() - outside().position()).norm() < 70.0);
+        flight.step(200);
+        assert!((flight.wing.pose.position() - outside().position()).norm() < 70.0);
     }
-    assert!(story.told.is_empty());
+    assert!(flight.told.is_empty());
 }
 
 #[test]
 fn it_comes_back_from_its_failsafe() {
-    let mut story = Story::new(10, 8, block(), outside());
-    story.step(200);
-    story.legs(&[(0, 30, Forward)]);
+    let mut flight = Flight::new(10, 8, block(), outside());
+    flight.step(200);
+    flight.legs(&[(0, 30, Forward)]);
     for i in 0..200 {
-        story.step(if i % 60 == 59 { 20_000 } else { 200 });
+        flight.step(if i % 60 == 59 { 20_000 } else { 200 });
     }
-    story.until_done(900);
-    assert!((0..30).all(|i| !story.open[i]));
-    assert!(story.least_distance_m() > 0.5);
+    flight.until_done(900);
+    assert!((0..30).all(|i| !flight.open[i]));
+    assert!(flight.least_distance_m() > 0.5);
 }
 
 #[test]
 fn a_percept_without_numbers_is_answered_safely() {
-    let mut story = Story::new(6, 6, vec![], outside());
-    let mut percept = story.wing.percept();
+    let mut flight = Flight::new(6, 6, vec![], outside());
+    let mut percept = flight.wing.percept();
     percept.pose.heading_rad = f64::NAN;
-    let (setpoint, events) = story.executive.step(&percept, &|_| true);
+    let (setpoint, events) = flight.executive.step(&percept, &|_| true);
     assert!(events.is_empty() && setpoint.steps.iter().all(|s| s.turn_rate_radps.is_finite()));
 }
 
 #[test]
 fn leg_times_grow_with_the_legs() {
-    let mut story = Story::new(10, 8, block(), outside());
-    assert_eq!(story.leg_time_ms(&[(0, 1, Forward)]), UNREACHABLE_MS);
-    story.step(200);
+    let mut flight = Flight::new(10, 8, block(), outside());
+    assert_eq!(flight.leg_time_ms(&[(0, 1, Forward)]), UNREACHABLE_MS);
+    flight.step(200);
     let times: Vec<u32> = (0..20)
-        .map(|k| story.leg_time_ms(&[(0, k, Forward)]))
+        .map(|k| flight.leg_time_ms(&[(0, k, Forward)]))
         .collect();
     assert!(times[0] == 0 && times.windows(2).all(|w| w[0] < w[1]));
-    let p = story.wing.percept();
-    assert_eq!(story.executive.spendable_ms(&p), 2_880_000);
+    let p = flight.wing.percept();
+    assert_eq!(flight.executive.spendable_ms(&p), 2_880_000);
     assert_eq!(
-        story.executive.spendable_ms(&Percept {
+        flight.executive.spendable_ms(&Percept {
             endurance_s: 5.0,
             ..p
         }),
         0
     );
-    assert!((12_000..17_000).contains(&story.executive.turn_ms()));
+    assert!((12_000..17_000).contains(&flight.executive.turn_ms()));
 }
 
 /// The track is lengthened cell by cell and never made anew while all goes well.
 #[test]
 fn a_steady_flight_plans_nothing() {
-    let mut story = Story::new(10, 8, vec![square(100.0, 900.0, 50.0)], outside());
-    story.step(200);
-    story.legs(&[(0, 60, Forward)]);
-    while story.open[5] {
-        story.step(200);
+    let mut flight = Flight::new(10, 8, vec![square(100.0, 900.0, 50.0)], outside());
+    flight.step(200);
+    flight.legs(&[(0, 60, Forward)]);
+    while flight.open[5] {
+        flight.step(200);
     }
     for _ in 0..300 {
-        story.step(200);
-        assert!(story.executive.stretches.len() <= 4 && !story.executive.replan);
+        flight.step(200);
+        assert!(flight.executive.stretches.len() <= 4 && !flight.executive.replan);
     }
 }
 
@@ -587,23 +596,23 @@ proptest! {
         heading in -3.0..3.0f64,
     ) {
         let start = Pose { east_m: east, north_m: -60.0, heading_rad: heading };
-        let mut story = Story::new(10, 8, block(), start);
+        let mut flight = Flight::new(10, 8, block(), start);
         for c in closed {
-            story.open[c] = false;
+            flight.open[c] = false;
         }
-        story.step(200);
-        let n = story.n();
+        flight.step(200);
+        let n = flight.n();
         let legs: Vec<_> = legs.into_iter()
             .map(|(f, c, b)| (f % n, c, if b { Backward } else { Forward }))
             .collect();
-        story.legs(&legs);
-        story.until(&[period * 10], 0, 1200, |e| *e == Event::PlanDone);
+        flight.legs(&legs);
+        flight.until(&[period * 10], 0, 1200, |e| *e == Event::PlanDone);
         for (first, count, direction) in legs {
             for cell in (Leg { first, count, direction }).cells(usize::from(n)) {
-                prop_assert!(!story.open[usize::from(cell)], "cell {cell} was skipped: {:?}", story.told);
+                prop_assert!(!flight.open[usize::from(cell)], "cell {cell} was skipped: {:?}", flight.told);
             }
         }
-        prop_assert!(story.least_distance_m() > CLEARANCE_M - 2.0);
+        prop_assert!(flight.least_distance_m() > CLEARANCE_M - 2.0);
     }
 
     #[test]
@@ -616,28 +625,28 @@ proptest! {
         let at = |cell: u32, side_m: f64| f64::from(cell) * LANE_M + 30.0 - side_m / 2.0;
         let zones = blocks.iter().map(|&(x, y, w, h)| rectangle(at(x, w), at(y, h), w, h));
         let start = Pose { east_m: -30.0, north_m: -30.0, heading_rad: heading };
-        let mut story = Story::new(10, 8, zones.collect(), start);
-        story.wing.wind_mps = (speed * towards.cos(), speed * towards.sin());
-        let n = story.n();
+        let mut flight = Flight::new(10, 8, zones.collect(), start);
+        flight.wing.wind_mps = (speed * towards.cos(), speed * towards.sin());
+        let n = flight.n();
         for (kind, first, east, north) in goals {
             match kind {
-                0 => story.executive.set_goal(Goal::Hold, &|_| true),
-                1 => story.legs(&[(first % n, 6, if first % 2 == 0 { Forward } else { Backward })]),
-                _ => story.executive.set_goal(Goal::Point(Point::new(east, north)), &|_| true),
+                0 => flight.executive.set_goal(Goal::Hold, &|_| true),
+                1 => flight.legs(&[(first % n, 6, if first % 2 == 0 { Forward } else { Backward })]),
+                _ => flight.executive.set_goal(Goal::Point(Point::new(east, north)), &|_| true),
             }
             for _ in 0..150 {
-                story.step(200);
-                let ahead = story.executive.track.ahead(1e9);
+                flight.step(200);
+                let ahead = flight.executive.track.ahead(1e9);
                 let mut at_m = 0.0;
                 while at_m < ahead.length_m() {
                     let p = ahead.pose_at(at_m).unwrap().position();
-                    let near = story.zones.iter().map(|z| z.distance_m(p));
+                    let near = flight.zones.iter().map(|z| z.distance_m(p));
                     let least_m = near.fold(f64::INFINITY, f64::min);
                     prop_assert!(least_m > DEFAULT_TRACKING_ERROR_M - 1e-3, "{least_m} at {p}");
                     at_m += 0.5;
                 }
             }
         }
-        prop_assert!(story.least_distance_m() > CLEARANCE_M - 2.0, "{}", story.least_distance_m());
+        prop_assert!(flight.least_distance_m() > CLEARANCE_M - 2.0, "{}", flight.least_distance_m());
     }
 }

@@ -608,3 +608,143 @@ impl Transit {
         ))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{CLEARANCE_M, LANE_M, airframe, ground, square};
+    use Direction::{Backward, Forward};
+    use skein_geometry::Polygon;
+    use skein_geometry::math::PI;
+
+    fn transit(cols: u32, rows: u32, zones: Vec<Polygon>) -> Transit {
+        let (coverage_loop, router) = ground(cols, rows, zones);
+        Transit::new(coverage_loop, router, airframe())
+    }
+
+    fn visit(cell: u16) -> CellVisit {
+        CellVisit {
+            cell,
+            direction: Forward,
+            tries: 0,
+        }
+    }
+
+    /// The moves follow each other without a gap, and end at a boundary looking a way.
+    fn assert_leads_to(t: &Transit, from: &Place, moves: &[Move], to: u16, direction: Direction) {
+        let end = moves.iter().fold(*from, |at, step| {
+            let start = match step {
+                Move::Route(curve) => curve.start(),
+                _ => None,
+            };
+            let gap_m = start.map_or(0.0, |s| (s.position() - at.pose.position()).norm());
+            assert!(gap_m < 1e-6, "a gap of {gap_m} m");
+            t.end_of(&at, step)
+        });
+        let goal = t.place(to, direction).pose;
+        let off_m = (end.pose.position() - goal.position()).norm();
+        assert!(off_m < 1e-3, "ends {off_m} m beside");
+        let turn_rad = skein_geometry::math::wrap_pi(end.pose.heading_rad - goal.heading_rad);
+        assert!(turn_rad.abs() < 1e-3, "looks {turn_rad} rad aside");
+    }
+
+    #[test]
+    fn a_cell_is_left_where_the_next_one_is_entered() {
+        let t = transit(6, 4, vec![]);
+        let n = u16::try_from(t.coverage_loop.len()).unwrap();
+        for cell in 0..n {
+            let next = (cell + 1) % n;
+            assert_eq!(t.exit(cell, Forward), t.entry(next, Forward));
+            assert_eq!(t.entry(cell, Forward), t.exit(cell, Backward));
+        }
+    }
+
+    #[test]
+    fn neighbours_on_the_loop_need_no_way_between_them() {
+        let t = transit(6, 4, vec![]);
+        let from = t.place(t.exit(3, Forward), Forward);
+        let moves = t.connect(&from, t.entry(4, Forward), Forward).unwrap();
+        assert!(moves.is_empty(), "{moves:?}");
+    }
+
+    #[test]
+    fn every_boundary_is_reached_from_every_other_one() {
+        let t = transit(6, 4, vec![square(118.0, 70.0, 20.0)]);
+        let n = u16::try_from(t.coverage_loop.len()).unwrap();
+        for from in (0..n).step_by(3) {
+            for to in (0..n).step_by(5) {
+                for (d, e) in [(Forward, Forward), (Forward, Backward), (Backward, Forward)] {
+                    let place = t.place(from, d);
+                    let moves = t.connect(&place, to, e).expect("a way");
+                    assert_leads_to(&t, &place, &moves, to, e);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_way_along_the_loop_is_taken_only_where_it_is_not_longer() {
+        let t = transit(6, 4, vec![]);
+        let from = t.place(0, Forward);
+        let near = t.connect(&from, 2, Forward).unwrap();
+        assert!(near.iter().all(|m| matches!(m, Move::Pass(..))), "{near:?}");
+        // Back where it came from it has to turn.
+        let back = t.connect(&from, 0, Backward).unwrap();
+        assert!(back.iter().any(|m| matches!(m, Move::Route(_))));
+    }
+
+    #[test]
+    fn cells_that_are_closed_are_left_out_and_the_next_open_one_is_served() {
+        let t = transit(6, 4, vec![]);
+        let from = t.place(0, Forward);
+        let mut queue: VecDeque<CellVisit> = (0..4).map(visit).collect();
+        let mut refused = Vec::new();
+        let moves = t
+            .next(&from, &mut queue, &|c| c >= 2, &mut refused)
+            .unwrap();
+        assert_eq!(moves.last(), Some(&Move::Serve(visit(2))));
+        assert_eq!(queue, [visit(3)]);
+        assert!(refused.is_empty());
+        queue.clear();
+        assert!(t.next(&from, &mut queue, &|_| true, &mut refused).is_none());
+    }
+
+    #[test]
+    fn a_place_to_hold_keeps_clear_of_the_zones() {
+        let t = transit(6, 4, vec![square(118.0, 70.0, 20.0)]);
+        for boundary in 0..u16::try_from(t.coverage_loop.len()).unwrap() {
+            let moves = t.hold(&t.place(boundary, Forward));
+            let Some(Move::Loiter(circle)) = moves.last() else {
+                panic!("no circle at {boundary}: {moves:?}")
+            };
+            let piece = (circle.curvature_per_m, 0.5 * circle.length_m);
+            let circle = Curve::from_pieces(circle.start, &[piece, piece]);
+            assert!(t.router.zones().is_clear(&circle, CLEARANCE_M - 1e-6));
+        }
+    }
+
+    #[test]
+    fn the_nearest_boundaries_come_in_order() {
+        let t = transit(6, 4, vec![]);
+        let p = Point::new(2.2 * LANE_M, 1.7 * LANE_M);
+        let away_m = |b: &u16| (t.place(*b, Forward).pose.position() - p).norm();
+        let nearest: Vec<f64> = t.nearest(p, 24).iter().map(away_m).collect();
+        assert_eq!(nearest.len(), 24);
+        assert!(nearest.is_sorted());
+    }
+
+    #[test]
+    fn a_pose_beside_the_loop_is_led_onto_it() {
+        let t = transit(6, 4, vec![]);
+        let pose = Pose::new(Point::new(-120.0, 60.0), 0.25 * PI);
+        let (boundary, direction, way_m) = t.way_on(pose).unwrap();
+        let from = Place {
+            pose,
+            boundary: None,
+        };
+        let moves = t.connect(&from, boundary, direction).unwrap();
+        assert_leads_to(&t, &from, &moves, boundary, direction);
+        let length_m: f64 = moves.iter().map(|m| t.length_m(m)).sum();
+        assert!((length_m - way_m).abs() < 1.0, "{length_m} {way_m}");
+    }
+}

@@ -72,18 +72,10 @@ pub struct Info {
     pub able: bool,
     /// Whether it is a ground station.
     pub ground_station: bool,
-    /// Whether it holds that the mission is finished.
-    pub finished: bool,
     /// Mission revision it follows; of whoever told of it, until it is heard itself.
     pub revision: u32,
     /// The loop it derived, likewise.
     pub loop_hash: u64,
-    /// The highest round counter it knew.
-    pub counter: u32,
-    /// Digest of its union of covered cells.
-    pub cover_digest: u32,
-    /// Where it was, mm east and north and 1e-4 rad, once heard itself.
-    pub pose: Option<(i32, i32, i32)>,
     /// Since when this life was never taken for down.
     pub steady_since: Time,
     /// When its own beacon was last heard, without a relay.
@@ -483,12 +475,8 @@ fn info_of(beacon: &Beacon, steady_since: Time, now: Time) -> Info {
     Info {
         able: beacon.able,
         ground_station: beacon.ground_station,
-        finished: beacon.finished,
         revision: beacon.revision,
         loop_hash: beacon.loop_hash,
-        counter: beacon.counter,
-        cover_digest: beacon.cover_digest,
-        pose: Some((beacon.east_mm, beacon.north_mm, beacon.heading_e4)),
         steady_since,
         heard: Some(now),
     }

@@ -6,6 +6,16 @@
 //! So a record reaches everybody that a chain of meetings reaches, also long after
 //! its author died.
 //!
+//! | record | event | what follows |
+//! |---|---|---|
+//! | unknown, or of an older version | it is heard | held; passed on after 20 to 260 ms, if it made fewer than 16 hops |
+//! | held in this version | a copy is heard | with the second copy it is not passed on any more |
+//! | held in a newer version, or of an earlier life | it is heard | nothing |
+//! | any of an author | a later life of the author is heard | void: neither held nor sent |
+//! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
+//! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
+//! | waiting | its lifetime is over, or the queue is full of what is more urgent | not sent |
+//!
 //! Everything a peer sends goes through one token bucket: its fair share of the
 //! channel it hears. Newer values replace older ones of the same key in the queue.
 
