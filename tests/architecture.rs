@@ -22,7 +22,15 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
     (
         "skein-survey",
         &["skein-geometry", "skein-flight"],
-        &["tokio", "zenoh", "rand_core"],
+        // Values in, values out: flags, files and formats are the command's.
+        &[
+            "tokio",
+            "zenoh",
+            "rand_core",
+            "clap",
+            "serde_json",
+            "anyhow",
+        ],
     ),
     (
         "skein-lab",

@@ -1,14 +1,10 @@
 //! `plan line`: tours of a team along all lines of a file; wide strips in lanes
 //! (D2.7 §3.5).
 
-use super::errands::{self, Solver, Wishes};
-use super::tours::{TourArgs, Way, Ways};
-use anyhow::{Context, Result};
+use super::target_input::Kind;
+use super::tour_args::{self, TourArgs, Wishes};
+use anyhow::Result;
 use clap::Args;
-use skein_flight::coverage::lines::{plan, strip};
-use skein_geometry::frame::Point;
-use skein_interop::targets::{LineTarget, read};
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Tours of a team along all lines of a file, the longest as short as can be found.
@@ -33,95 +29,7 @@ pub struct LineArgs {
 /// # Errors
 /// When the file or a flag is wrong; the error names the place.
 pub fn run(args: &LineArgs) -> Result<String> {
-    let solver: Solver = |lines, team, metric, steps| plan(lines, team, metric, steps);
-    errands::run(ways(args)?, &args.tours, &args.wishes, solver)
-}
-
-/// What there is to fly along.
-pub(super) fn ways(args: &LineArgs) -> Result<Ways> {
-    let text = std::fs::read_to_string(&args.file)
-        .with_context(|| format!("cannot read {}", args.file.display()))?;
-    let targets = read(&text).with_context(|| args.file.display().to_string())?;
-    let mut notices: Vec<String> = targets.notices.iter().map(ToString::to_string).collect();
-    if !targets.points.is_empty() {
-        let n = targets.points.len();
-        notices.push(format!(
-            "{n} point(s) ignored: `plan visit` plans for points"
-        ));
-    }
-    let first = targets.lines.first().map(|l| l.way[0]);
-    let mut ways = Ways::new(&args.tours, targets.home.or(first), notices, &args.file)?;
-    let mut narrow: Vec<&LineTarget> = Vec::new();
-    for line in &targets.lines {
-        let sensor = args.wishes.sensor_for(line.sensor.as_ref());
-        let swath_m = ways.swath_m(&args.tours, sensor, &line.pointer)?;
-        if line.width_m <= swath_m {
-            narrow.push(line);
-            continue;
-        }
-        let centre = plane(&ways, line)?;
-        let lanes = strip::lanes(&centre, line.width_m, swath_m).with_context(|| {
-            format!(
-                "{}: a strip {} m wide has no lanes of --swath-m {}",
-                line.pointer, line.width_m, swath_m
-            )
-        })?;
-        for lane in lanes {
-            ways.push(&lane, &line.pointer, sensor);
-        }
-    }
-    network(&mut ways, &narrow, &args.wishes)?;
-    Ok(ways)
-}
-
-fn plane(ways: &Ways, line: &LineTarget) -> Result<Vec<Point>> {
-    let points = line.way.iter().map(|&p| ways.point(p, &line.pointer));
-    points.collect()
-}
-
-/// Adds lines that hang together where they share a point: each is cut there.
-fn network(ways: &mut Ways, lines: &[&LineTarget], wishes: &Wishes) -> Result<()> {
-    // Coordinates are told apart at the seventh decimal, a centimetre.
-    #[allow(clippy::cast_possible_truncation, reason = "at most 1.8e9")]
-    let key = |deg: f64| (deg * 1e7).round() as i64;
-    let mut places: BTreeMap<(i64, i64), (usize, usize)> = BTreeMap::new();
-    let mut numbered = Vec::new();
-    for line in lines {
-        let mut way = Vec::new();
-        for &p in &line.way {
-            let at = (key(p.lat_deg), key(p.lon_deg));
-            let known = places.get(&at).map(|k| k.0);
-            let place = match known {
-                Some(place) => place,
-                None => ways.place(ways.point(p, &line.pointer)?),
-            };
-            if way.last() == Some(&place) {
-                continue;
-            }
-            places.entry(at).or_insert((place, 0)).1 += 1;
-            way.push(place);
-        }
-        numbered.push((way, *line));
-    }
-    let mut uses = vec![0; ways.at.len()];
-    for (place, count) in places.into_values() {
-        uses[place] = count;
-    }
-    for (way, line) in numbered {
-        let mut piece = Vec::new();
-        for (i, &p) in way.iter().enumerate() {
-            piece.push(p);
-            let last = i + 1 == way.len();
-            if piece.len() > 1 && (last || uses[p] > 1) {
-                ways.ways.push(Way {
-                    places: std::mem::replace(&mut piece, vec![p]),
-                    name: line.pointer.clone(),
-                    sensor: wishes.sensor_for(line.sensor.as_ref()).map(str::to_owned),
-                });
-            }
-        }
-    }
-    Ok(())
+    tour_args::run(Kind::Lines, &args.file, &args.tours, &args.wishes)
 }
 
 #[cfg(test)]

@@ -1,26 +1,19 @@
 //! `plan`: a plan for a person, from files as other programs write them.
+//!
+//! Arguments in, a request to [`skein_survey`], text out: the planning is there.
 
-pub mod approximate;
-pub mod around;
-pub mod choice;
+mod area_input;
+mod args;
 pub mod cover;
-pub mod errands;
-pub mod fleet;
-pub mod flights;
-pub mod flyers;
-pub mod heights;
-pub mod lanes;
 pub mod line;
-mod map;
-mod measure;
-pub mod objective;
-pub mod output;
+mod output;
 pub mod patrol;
-pub mod planners;
 pub mod route;
-pub mod site;
-pub mod tours;
+mod target_input;
+mod team_input;
+mod tour_args;
 pub mod visit;
+mod zone_input;
 
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand};

@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 use skein_geometry::frame::{Origin, Point};
 use skein_interop::place::from_plane;
 use skein_interop::plan::{PlanFile, Waypoint, write};
+use skein_survey::flight::UavFlight;
 use std::path::{Path, PathBuf};
 
 /// Points nearer to each other than this are one in the track, metres.
@@ -104,6 +105,34 @@ pub struct Printed {
 }
 
 impl Printed {
+    /// A flight of a plan.
+    #[must_use]
+    pub fn new(flight: &UavFlight) -> Self {
+        let mut told = Map::new();
+        for (key, value) in [
+            ("time_s", Some(flight.time_s)),
+            ("length_m", Some(flight.length_m)),
+            ("energy_s", Some(flight.energy_s)),
+            ("energy_wh", flight.energy_wh),
+            ("lane_m", flight.lane_m),
+        ] {
+            if let Some(value) = value {
+                told.insert(key.to_owned(), json!(value));
+            }
+        }
+        if let Some(passes) = flight.passes {
+            told.insert("passes".to_owned(), json!(passes));
+        }
+        Self {
+            name: flight.name.clone(),
+            track: flight.path.clone(),
+            altitude_m: flight.altitude_m,
+            speed_mps: flight.speed_mps,
+            told,
+            details: Map::new(),
+        }
+    }
+
     /// The corners, none twice in a row: different places may coincide, a target with the
     /// depot for example.
     fn points(&self) -> Vec<Point> {

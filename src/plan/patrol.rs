@@ -1,37 +1,22 @@
-//! `plan patrol`: points, lines or an area seen again and again by a team: one closed tour
-//! planned as if for one UAV, and the team spaced on it (D2.7 §3.6.6).
-//!
-//! Leaves to others: the tour (`visit`, `line`, `cover`) and what spacing is best
-//! (`planning::coverage::patrol`).
+//! `plan patrol`: points, lines or an area seen again and again by a team (D2.7 §3.6.6).
+//! Planned by [`skein_survey::patrol`].
 
-use super::around::{Around, Asker};
-use super::cover::{self, CoverArgs};
-use super::errands::Wishes;
-use super::fleet::Member;
-use super::flyers::{Defaults, swath_m};
-use super::heights::LayerArgs;
-use super::lanes::Lanes;
-use super::line::{self, LineArgs};
-use super::objective::Objective;
+use super::args::{area_error, detour_error, planners, positive, tours_error};
 use super::output::{Printed, Sheet};
-use super::planners;
-use super::tours::{TourArgs, Ways};
-use super::visit::{self, VisitArgs};
-use anyhow::{Context, Result, bail, ensure};
+use super::target_input::{Kind, TargetInput};
+use super::tour_args::TourArgs;
+use super::{area_input, cover, team_input};
+use anyhow::{Error, Result, anyhow, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
-use skein_flight::coverage::lines::{self, LinePlan, plan};
-use skein_flight::coverage::metric::{InWind, Metric};
-use skein_geometry::frame::{Origin, Point, Vector};
+use skein_geometry::frame::Origin;
 use skein_interop::place::from_plane;
 use skein_survey::patrol::{
-    Change, Patrol, Pattern, Station, Tour, Uav, after_losses, patrol_within, revisit_bound, spread,
+    self, AfterLosses, GoesOn, Losses, PatrolError, PatrolFlight, PatrolPlan, PatrolRequest,
+    Pattern, TourKind,
 };
-use skein_survey::visits;
+use skein_survey::team::Uav;
 use std::path::PathBuf;
-
-/// Speeds that differ by less than this are the same, m/s.
-const SAME_SPEED_MPS: f64 = 1e-9;
 
 /// What is patrolled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -89,446 +74,203 @@ pub fn run(args: &PatrolArgs) -> Result<String> {
         "--lost-after-s must be a time, found {}",
         args.lost_after_s
     );
-    let course = match args.over {
+    let input = match args.over {
         Over::Area => over_area(args),
-        Over::Points | Over::Lines => over_targets(args),
+        Over::Points => over_targets(args, Kind::Points),
+        Over::Lines => over_targets(args, Kind::Lines),
+    }?;
+    let losses = Losses {
+        names: args.lost.clone(),
+        after_s: args.lost_after_s,
     };
-    let watch = Watch::new(course?, args.tours.wind())?;
-    let flown = watch.flown()?;
-    let sheet = watch.sheet(args, &flown)?;
-    args.tours.output.print(&sheet)
+    let plan = patrol::plan(&PatrolRequest {
+        over: input.over,
+        team: input.team,
+        clearance_m: args.tours.clearance_m,
+        wind_mps: args.tours.wind(),
+        altitude_m: args.tours.output.altitude_m,
+        steps: args.tours.steps,
+        losses: (!args.lost.is_empty()).then_some(losses),
+    });
+    let plan = plan.map_err(|error| patrol_error(error, args))?;
+    args.tours
+        .output
+        .print(&sheet(&plan, input.origin, &input.notices))
 }
 
-/// What is flown again and again, and by whom.
-struct Course {
+/// What is patrolled, by whom.
+struct Input {
     origin: Origin,
-    /// Which planner, where there are several.
-    planner: &'static str,
-    /// Corners; the last leads to the first.
-    lap: Vec<Point>,
-    /// What a leg takes for each metre of it: turns add to its length.
-    stretch: f64,
-    team: Vec<Member>,
-    /// By UAV: its launch point.
-    starts: Vec<Point>,
-    around: Around,
+    over: patrol::Over,
+    team: Vec<Uav>,
     notices: Vec<String>,
 }
 
-/// One tour over points or lines, without a depot on it.
-fn over_targets(args: &PatrolArgs) -> Result<Course> {
+fn over_targets(args: &PatrolArgs, kind: Kind) -> Result<Input> {
     ensure!(
         !args.exact && !args.approximate,
         "--exact and --approximate are for --over area"
     );
-    let (file, tours) = (args.file.clone(), args.tours.clone());
-    let wishes = Wishes::default();
-    let steps = tours.steps;
-    let alone = |ways: &mut Ways, points: bool| -> Result<(LinePlan, Around)> {
-        ways.solve(&args.tours, |q| {
-            let (lines, metric) = (q.lines, q.metric);
-            let first = lines.first().context("the file holds nothing to patrol")?;
-            let one = [lines::Uav::at(first.a)];
-            Ok(if points {
-                visits::visit(lines, &one, metric, steps)?
-            } else {
-                plan(lines, &one, metric, steps)?
-            })
-        })
-    };
-    let points = args.over == Over::Points;
-    let mut ways = if points {
-        visit::ways(&VisitArgs {
-            file,
-            tours,
-            wishes,
-        })?
-    } else {
-        line::ways(&LineArgs {
-            file,
-            tours,
-            wishes,
-        })?
-    };
-    let (plan, around) = alone(&mut ways, points)?;
-    ways.ignore_sensors();
-    let first = ways.ways.first().and_then(|w| w.places.first());
-    let first = first.context("the file holds nothing to patrol")?;
-    let mut lap = ways.track(&around, &plan.tours[0].passes, ways.at[*first]);
-    lap.pop();
-    Ok(Course {
-        origin: ways.origin,
-        planner: if points { "points" } else { "lines" },
-        lap,
-        stretch: 1.0,
-        starts: ways.depots.iter().map(|d| ways.at[*d]).collect(),
-        team: ways.team,
-        around,
-        notices: ways.notices,
+    let input = TargetInput::read(kind, &args.file, &args.tours, args.turn_radius_m)?;
+    Ok(Input {
+        origin: input.origin,
+        over: patrol::Over::Targets {
+            targets: input.targets,
+            zones: input.zones,
+        },
+        team: input.team,
+        notices: input.notices,
     })
 }
 
-/// One tour over an area: of the planner that is asked for, or the better one.
-fn over_area(args: &PatrolArgs) -> Result<Course> {
+fn over_area(args: &PatrolArgs) -> Result<Input> {
     let tours = &args.tours;
     ensure!(
         tours.zones.is_none(),
         "--zones is for --over points and lines: an area's file holds its zones"
     );
-    let team = super::fleet::team(
+    let team = team_input::team(
         tours.fleet.as_deref(),
         tours.k,
         tours.speed_mps,
         tours.endurance_s,
     )?;
     tours.output.check(team.len())?;
-    let defaults = Defaults {
+    positive(tours.speed_mps, args.turn_radius_m, tours.swath_m)?;
+    let mut site = area_input::read(&args.file, tours.depot.as_deref())?;
+    if let Some(sensor) = site.sensor.take() {
+        let text = format!("sensor {sensor:?} of the area ignored: all fly the same tour");
+        site.notices.push(text);
+    }
+    let defaults = team_input::Defaults {
         swath_m: tours.swath_m,
         turn_radius_m: args.turn_radius_m,
-        sensor: None,
     };
-    let height_m = tours.output.altitude_m;
-    let swath = |m: &Member| swath_m(m, defaults, height_m).unwrap_or(tours.swath_m);
-    let radius = |m: &Member| m.turn_radius_m.unwrap_or(args.turn_radius_m);
-    let alone = CoverArgs {
-        file: args.file.clone(),
-        exact: args.exact,
-        approximate: args.approximate,
-        k: 1,
-        fleet: None,
-        launch: tours.depot.clone(),
-        swath_m: team.iter().map(swath).fold(f64::INFINITY, f64::min),
-        look_ahead_m: None,
-        turn_radius_m: team.iter().map(radius).fold(0.0, f64::max),
-        clearance_m: tours.clearance_m,
-        speed_mps: tours.speed_mps,
-        endurance_s: None,
-        course_deg: None,
-        sensor: None,
-        objective: Objective::Time,
-        lanes: Lanes::Common,
-        layers: LayerArgs::FLAT,
-        steps: tours.steps,
-        output: tours.output.clone(),
-    };
-    let (site, best) = cover::planned(&alone)?;
-    let flight = best.flights.first().context("nothing is flown")?;
-    let starts = team.iter().map(|m| m.start_in(site.origin));
-    let starts: Vec<Point> = starts.collect::<Result<_, _>>()?;
-    let around = planners::around(&site, tours.clearance_m, starts.iter().copied())?;
-    for (member, start) in team.iter().zip(&starts) {
-        planners::check_start(&around, &member.name, *start)?;
-    }
-    let mut lap = flight.lap.clone();
-    if let (Some(first), Some(last)) = (lap.first().copied(), lap.last().copied()) {
-        let home = around.asker().way(last, first).unwrap_or_default();
-        let between = home.len().saturating_sub(2);
-        lap.extend(home.into_iter().skip(1).take(between));
-    }
-    let drawn_m = super::approximate::length_m(&flight.track);
-    Ok(Course {
+    Ok(Input {
         origin: site.origin,
-        planner: best.planner,
-        lap,
-        stretch: (flight.length_m / drawn_m.max(f64::MIN_POSITIVE)).max(1.0),
-        team,
-        starts,
-        around,
+        team: team_input::in_plane(&team, site.origin, defaults)?,
+        over: patrol::Over::Area {
+            area: site.area,
+            holes: site.holes,
+            zones: site.zones,
+            planners: planners(args.exact, args.approximate),
+        },
         notices: site.notices,
     })
 }
 
-/// The tour in millimetres with the team beside it.
-struct Watch {
-    course: Course,
-    tour: Tour,
-    wind: Vector,
-    /// By UAV, millimetres a second.
-    speeds: Vec<u32>,
-    /// By UAV: its nearest place on the tour, and the way there.
-    nearest: Vec<(u32, f64)>,
-    uavs: Vec<Uav>,
-}
-
-/// A patrol from its beginning on.
-struct Flown {
-    patrol: Patrol,
-    stations: Vec<Station>,
-    /// By UAV: the way to its station; none for one that rests.
-    ways: Vec<Option<(Vec<Point>, f64)>>,
-    /// When all are there, seconds.
-    steady_s: f64,
-}
-
-impl Watch {
-    fn new(course: Course, wind: Vector) -> Result<Self> {
-        let base_mps = course.team[0].speed_mps;
-        let alike = |m: &Member| (m.speed_mps - base_mps).abs() < SAME_SPEED_MPS;
-        ensure!(
-            wind.norm() < SAME_SPEED_MPS || course.team.iter().all(alike),
-            "--wind-mps: in a wind, UAVs of unlike speeds cannot be planned together"
-        );
-        InWind::new(&[], base_mps, wind).context("--wind-mps")?;
-        let leg = |a: Point, b: Point| course.stretch * air_m(&[a, b], base_mps, wind);
-        let tour = Tour::new(course.lap.clone(), leg)?;
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a cast of a float saturates"
-        )]
-        let whole = |m: &Member| ((m.speed_mps * 1000.0).round() as u32).max(1);
-        let speeds = course.team.iter().map(whole).collect();
-        let mut watch = Self {
-            nearest: Vec::new(),
-            uavs: Vec::new(),
-            tour,
-            wind,
-            speeds,
-            course,
-        };
-        let mut asker = watch.course.around.asker();
-        let mut nearest = Vec::new();
-        for (uav, start) in watch.course.starts.iter().enumerate() {
-            let place = watch.tour.nearest(*start);
-            let (_, way_s) = watch.way(&mut asker, uav, place)?;
-            nearest.push((place, way_s));
+fn patrol_error(error: PatrolError, args: &PatrolArgs) -> Error {
+    match error {
+        PatrolError::Area(error) => area_error(error, &args.file),
+        PatrolError::Targets(error) => tours_error(error),
+        PatrolError::Zones(error) => detour_error(error),
+        PatrolError::Nothing => anyhow!("the file holds nothing to patrol"),
+        PatrolError::UnlikeInWind | PatrolError::TooWindy(_) => {
+            Error::new(error).context("--wind-mps")
         }
-        let able = |(uav, (_, way_s)): (usize, &(u32, f64))| {
-            let endurance_s = watch.course.team[uav].endurance_s;
-            Uav {
-                speed: watch.speeds[uav],
-                longest_s: endurance_s.unwrap_or(f64::INFINITY) - 2.0 * way_s,
-            }
-        };
-        let uavs = nearest.iter().enumerate().map(able).collect();
-        drop(asker);
-        (watch.nearest, watch.uavs) = (nearest, uavs);
-        Ok(watch)
-    }
-
-    fn name(&self, uav: usize) -> &str {
-        &self.course.team[uav].name
-    }
-
-    /// The way from a UAV's launch point to a place of the tour, and what it takes.
-    fn way(&self, asker: &mut Asker<'_>, uav: usize, place: u32) -> Result<(Vec<Point>, f64)> {
-        let to = self.tour.point(place);
-        let way = asker
-            .way(self.course.starts[uav], to)
-            .with_context(|| format!("{} has no way from its start to the tour", self.name(uav)))?;
-        let v = self.course.team[uav].speed_mps;
-        let way_s = air_m(&way, v, self.wind) / v;
-        Ok((way, way_s))
-    }
-
-    /// The pattern, and how it begins.
-    fn flown(&self) -> Result<Flown> {
-        let n = self.tour.len_mm();
-        let Some(patrol) = patrol_within(n, &self.uavs) else {
-            let fastest = self.speeds.iter().max().copied().unwrap_or(1);
-            let longest = self.uavs.iter().map(|u| u.longest_s).fold(0.0, f64::max);
-            bail!(
-                "nobody can fly this patrol: once round takes {:.0} s, to and fro on an arc {:.0} s, and the longest endurance leaves {:.0} s besides the ways there and back",
-                f64::from(n) / f64::from(fastest),
-                2.0 * revisit_bound(n, &self.speeds),
-                longest
-            );
-        };
-        let straight_s = |uav: usize, place: u32| {
-            let way_m = (self.tour.point(place) - self.course.starts[uav]).norm();
-            way_m / self.course.team[uav].speed_mps
-        };
-        let (patrol, stations) = spread(n, &patrol, straight_s);
-        let mut ways = vec![None; self.uavs.len()];
-        let mut asker = self.course.around.asker();
-        for s in &stations {
-            ways[s.uav] = Some(self.way(&mut asker, s.uav, s.place)?);
-        }
-        let steady_s = ways.iter().flatten().map(|w| w.1).fold(0.0, f64::max);
-        Ok(Flown {
-            patrol,
-            stations,
-            ways,
-            steady_s,
-        })
-    }
-
-    /// What is told about everybody together.
-    fn sheet(&self, args: &PatrolArgs, flown: &Flown) -> Result<Sheet> {
-        let n = self.tour.len_mm();
-        let bound_s = revisit_bound(n, &self.speeds);
-        let mut notices = self.course.notices.clone();
-        notices.extend(self.too_short(&flown.patrol));
-        let mut summary = json!({
-            "over": self.course.planner,
-            "tour_m": f64::from(n) / 1000.0,
-            "pattern": pattern(&flown.patrol),
-            "flying": flown.stations.len(),
-            "revisit_s": flown.patrol.revisit_s,
-            "revisit_bound_s": bound_s,
-            "ratio": flown.patrol.revisit_s / bound_s,
-            "steady_s": flown.steady_s,
-            "notices": notices,
-        });
-        if !args.lost.is_empty() {
-            summary["after_losses"] = self.after(args, flown)?;
-        }
-        let uavs = 0..self.uavs.len();
-        Ok(Sheet {
-            origin: self.course.origin,
-            summary,
-            flights: uavs.map(|uav| self.printed(args, flown, uav)).collect(),
-            shapes: Vec::new(),
-        })
-    }
-
-    /// Who rests because its endurance is short.
-    fn too_short(&self, patrol: &Patrol) -> Vec<String> {
-        let n = self.tour.len_mm();
-        let round_s = |uav: usize| match patrol.pattern {
-            Pattern::Round { speed, .. } if self.speeds[uav] < speed => None,
-            Pattern::Round { speed, .. } => Some(f64::from(n) / f64::from(speed)),
-            Pattern::Arcs { .. } => Some(2.0 * revisit_bound(n, &self.speeds)),
-        };
-        let short = (0..self.uavs.len()).filter_map(|uav| {
-            let (needs_s, has_s) = (round_s(uav)?, self.uavs[uav].longest_s);
-            (!patrol.pattern.flies(uav) && needs_s > has_s).then(|| {
-                format!(
-                    "{} rests: one period takes {needs_s:.0} s, its endurance leaves {:.0} s besides the ways there and back",
-                    self.name(uav),
-                    has_s.max(0.0)
-                )
-            })
-        });
-        short.collect()
-    }
-
-    /// One UAV: its station, and the first period.
-    fn printed(&self, args: &PatrolArgs, flown: &Flown, uav: usize) -> Printed {
-        let n = self.tour.len_mm();
-        let station = flown.stations.iter().find(|s| s.uav == uav);
-        let mut told = Map::new();
-        let mut track = vec![self.course.starts[uav]];
-        if let (Some(station), Some((way, way_s))) = (station, &flown.ways[uav]) {
-            let period_s = flown.patrol.period_s(n, uav, &self.speeds);
-            told = fields(json!({
-                "place_m": f64::from(station.place) / 1000.0,
-                "phase": f64::from(station.place) / f64::from(n),
-                "way_s": way_s,
-                "wait_s": flown.steady_s - way_s,
-                "period_s": period_s,
-                "time_s": period_s + 2.0 * way_s,
-            }));
-            track = way.clone();
-            match &flown.patrol.pattern {
-                Pattern::Round { .. } => track.extend(self.tour.stretch(station.place, n)),
-                Pattern::Arcs { arcs } => {
-                    let (from, len) = arcs[uav];
-                    told.insert("arc_m".to_owned(), json!(f64::from(len) / 1000.0));
-                    let forth = self.tour.stretch(from, len);
-                    track.extend(forth.iter().chain(forth.iter().rev()));
-                }
-            }
-            track.extend(way.iter().rev());
-        }
-        told.insert("rests".to_owned(), json!(station.is_none()));
-        Printed {
-            name: self.name(uav).to_owned(),
-            track,
-            altitude_m: args.tours.output.altitude_m,
-            speed_mps: self.course.team[uav].speed_mps,
-            told,
-            details: Map::new(),
-        }
-    }
-
-    /// How the others go on.
-    fn after(&self, args: &PatrolArgs, flown: &Flown) -> Result<Value> {
-        let named = |name: &String| {
-            let known = self.course.team.iter().position(|m| m.name == *name);
-            known.with_context(|| format!("--lost: no UAV is called {name:?}"))
-        };
-        let lost: Vec<usize> = args.lost.iter().map(named).collect::<Result<_>>()?;
-        let n = self.tour.len_mm();
-        let before = flown.patrol.courses(&self.speeds, &flown.stations);
-        let joins = |uav: usize| self.nearest[uav];
-        let change = after_losses(n, &self.uavs, &before, args.lost_after_s, &lost, joins)
-            .context("--lost: nobody is left who can fly one period")?;
-        let left: Vec<u32> = (0..self.speeds.len())
-            .map(|i| if lost.contains(&i) { 0 } else { self.speeds[i] })
-            .collect();
-        let bound_s = revisit_bound(n, &left);
-        let flies = |uav: &usize| change.stands[*uav].is_some();
-        let uavs: Vec<Value> = (0..self.uavs.len())
-            .filter(flies)
-            .map(|uav| self.goes_on(flown, &change, uav))
-            .collect();
-        Ok(json!({
-            "lost": lost.iter().map(|i| self.name(*i)).collect::<Vec<_>>(),
-            "pattern": pattern(&change.patrol),
-            "flying": uavs.len(),
-            "revisit_s": change.patrol.revisit_s,
-            "revisit_bound_s": bound_s,
-            "ratio": change.patrol.revisit_s / bound_s,
-            "steady_s": change.steady_s,
-            "gap_s": change.gap_s,
-            "uavs": uavs,
-        }))
-    }
-
-    /// What one of those who are left does.
-    fn goes_on(&self, flown: &Flown, change: &Change, uav: usize) -> Value {
-        let n = self.tour.len_mm();
-        let stand = change.stands[uav];
-        let place = stand.map_or(0.0, |s| s.place);
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a place on the tour"
-        )]
-        let at = from_plane(self.course.origin, self.tour.point(place as u32));
-        let since_s = change.courses[uav].since_s().unwrap_or(0.0);
-        let mut out = json!({
-            "name": self.name(uav),
-            "place_m": place / 1000.0,
-            "at": {"lat_deg": at.lat_deg, "lon_deg": at.lon_deg},
-            "joins": flown.ways[uav].is_none(),
-            "way_s": since_s - change.loiter_s[uav],
-            "loiter_s": change.loiter_s[uav],
-            "period_s": change.patrol.period_s(n, uav, &self.speeds),
-        });
-        if let Pattern::Arcs { arcs } = &change.patrol.pattern {
-            let (from, len) = arcs[uav];
-            out["arc_from_m"] = json!(f64::from(from) / 1000.0);
-            out["arc_m"] = json!(f64::from(len) / 1000.0);
-        }
-        out
+        PatrolError::Unknown(_) | PatrolError::NobodyLeft => Error::new(error).context("--lost"),
+        other => other.into(),
     }
 }
 
-fn pattern(patrol: &Patrol) -> &'static str {
-    match patrol.pattern {
+/// What is told about everybody together.
+fn sheet(plan: &PatrolPlan, origin: Origin, notices: &[String]) -> Sheet {
+    let mut summary = json!({
+        "over": match plan.over {
+            TourKind::Points => "points",
+            TourKind::Lines => "lines",
+            TourKind::Area(planner) => cover::planner_name(planner),
+        },
+        "tour_m": plan.tour_m,
+        "pattern": pattern(&plan.pattern),
+        "flying": plan.uavs_flying(),
+        "revisit_s": plan.revisit_s,
+        "revisit_bound_s": plan.revisit_bound_s,
+        "ratio": plan.revisit_s / plan.revisit_bound_s,
+        "steady_s": plan.steady_s,
+        "notices": ([notices, &plan.notices].concat()),
+    });
+    if let Some(after) = &plan.after_losses {
+        summary["after_losses"] = after_losses(after, origin);
+    }
+    Sheet {
+        origin,
+        summary,
+        flights: plan.uavs.iter().map(printed).collect(),
+        shapes: Vec::new(),
+    }
+}
+
+fn pattern(pattern: &Pattern) -> &'static str {
+    match pattern {
         Pattern::Round { .. } => "round",
         Pattern::Arcs { .. } => "arcs",
     }
 }
 
-/// The length of a way through the air, metres: in a wind, up to what vanishes on a closed
-/// flight.
-fn air_m(way: &[Point], airspeed_mps: f64, wind: Vector) -> f64 {
-    let legs = way.windows(2).map(|leg| {
-        let leg = InWind::new(leg, airspeed_mps, wind);
-        leg.map_or(f64::MAX, |l| l.cost(0, 1) * airspeed_mps)
-    });
-    legs.sum()
+/// One UAV: its station, and the first period.
+fn printed(flight: &PatrolFlight) -> Printed {
+    let mut told = Map::new();
+    if let Some(station) = &flight.station {
+        for (key, value) in [
+            ("place_m", station.place_m),
+            ("phase", station.phase),
+            ("way_s", station.way_s),
+            ("wait_s", station.wait_s),
+            ("period_s", station.period_s),
+            ("time_s", station.time_s),
+        ] {
+            told.insert(key.to_owned(), json!(value));
+        }
+        if let Some(arc_m) = station.arc_m {
+            told.insert("arc_m".to_owned(), json!(arc_m));
+        }
+    }
+    told.insert("rests".to_owned(), json!(flight.station.is_none()));
+    Printed {
+        name: flight.name.clone(),
+        track: flight.path.clone(),
+        altitude_m: flight.altitude_m,
+        speed_mps: flight.speed_mps,
+        told,
+        details: Map::new(),
+    }
 }
 
-/// The fields of an object.
-fn fields(object: Value) -> Map<String, Value> {
-    match object {
-        Value::Object(fields) => fields,
-        _ => Map::new(),
+/// How the others go on.
+fn after_losses(after: &AfterLosses, origin: Origin) -> Value {
+    let uav = |uav: &GoesOn| goes_on(uav, origin);
+    let uavs: Vec<Value> = after.uavs.iter().map(uav).collect();
+    json!({
+        "lost": after.lost,
+        "pattern": pattern(&after.pattern),
+        "flying": uavs.len(),
+        "revisit_s": after.revisit_s,
+        "revisit_bound_s": after.revisit_bound_s,
+        "ratio": after.revisit_s / after.revisit_bound_s,
+        "steady_s": after.steady_s,
+        "gap_s": after.gap_s,
+        "uavs": uavs,
+    })
+}
+
+/// What one of those who are left does.
+fn goes_on(uav: &GoesOn, origin: Origin) -> Value {
+    let at = from_plane(origin, uav.at);
+    let mut out = json!({
+        "name": uav.name,
+        "place_m": uav.place_m,
+        "at": {"lat_deg": at.lat_deg, "lon_deg": at.lon_deg},
+        "joins": uav.joins,
+        "way_s": uav.way_s,
+        "loiter_s": uav.loiter_s,
+        "period_s": uav.period_s,
+    });
+    if let Some((from_m, arc_m)) = uav.arc_m {
+        out["arc_from_m"] = json!(from_m);
+        out["arc_m"] = json!(arc_m);
     }
+    out
 }
 
 #[cfg(test)]

@@ -1,27 +1,16 @@
 //! `plan route`: the shortest way round the zones of a file with clearance (D2.7 §2.3).
-//!
-//! Zones are grown by the clearance, the path is the shortest among what they become,
-//! and its distance from the zones as drawn is measured again before it is printed.
-//! Turns are left to the UAV: D2.7 §2.4 is the business of trajectories.
+//! Planned by [`skein_survey::route`].
 
 use super::lat_lon;
-use super::map::{self, Level, Map};
-use super::measure::to_piece_m;
-use anyhow::{Context, Result, bail, ensure};
+use super::zone_input::{self, Heights, ZoneInput};
+use anyhow::{Context, Error, Result, anyhow, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use skein_flight::route::mesh::Mesh;
-use skein_flight::route::two_point::Search;
 use skein_geometry::frame::{Origin, Point};
-use skein_geometry::offset::{Grown, Growth, OffsetError, Place, Region, Zone, grow};
 use skein_interop::place::{LatLon, from_plane, to_plane};
-use skein_survey::via_points::{NoLeg, shortest_through};
-use skein_survey::visibility::VisibilityGraph;
+use skein_survey::route::{self, NamedRepair, RouteError, RoutePlace, RoutePlan, RouteRequest};
+use skein_survey::zones::Level;
 use std::path::PathBuf;
-
-/// A path is refused if it comes this much nearer to a zone than the clearance, metres:
-/// outlines keep the clearance to the nanometre, so only a defect can cause that.
-const SLACK_M: f64 = 1e-6;
 
 /// The shortest way from one place to another that keeps a clearance from all zones.
 ///
@@ -82,60 +71,49 @@ pub enum Format {
 /// When the file or a flag is wrong, an end is too near to a zone, or there is no way.
 pub fn run(args: &RouteArgs) -> Result<String> {
     let from = lat_lon(&args.from).context("--from")?;
-    let to = lat_lon(&args.to).context("--to")?;
-    let growth = Growth::new(args.clearance_m).context("--clearance-m")?;
-    let level = level(args)?;
     let origin = Origin {
         lat_deg: from.lat_deg,
         lon_deg: from.lon_deg,
     };
-    let mut places = vec![(
-        "--from".to_owned(),
-        to_plane(origin, from).context("--from")?,
-    )];
-    for text in &args.via {
-        let flag = format!("--via {text}");
+    let place = |text: &str, flag: String| -> Result<RoutePlace> {
         let at = lat_lon(text).and_then(|p| Ok(to_plane(origin, p)?));
-        let at = at.with_context(|| flag.clone())?;
-        places.push((flag, at));
-    }
-    places.push(("--to".to_owned(), to_plane(origin, to).context("--to")?));
-    let (flags, places): (Vec<String>, Vec<Point>) = places.into_iter().unzip();
-    let mut map = map::read(&args.file, origin, &places, level)?;
-    map.widen(args.clearance_m)?;
-    let grown = grow(&map.zones, &growth).map_err(|e| named(&e, &map))?;
-    for (flag, p) in flags.iter().zip(&places) {
-        check_place(*p, flag, &grown, &map, args.clearance_m)?;
-    }
-    let (path, hash) = shortest(args.engine, &places, &grown, &map)?;
-    let path = path.map_err(|NoLeg { leg }| {
-        let names: Vec<&String> = std::iter::once(&args.from)
-            .chain(&args.via)
-            .chain(std::iter::once(&args.to))
-            .collect();
-        anyhow::anyhow!(
-            "there is no way from {} to {} that keeps {} m from every zone",
-            names[leg],
-            names[leg + 1],
-            args.clearance_m
-        )
-    })?;
-    let least_m = least_distance_m(&path, &map.zones);
-    ensure!(
-        least_m >= args.clearance_m - SLACK_M,
-        "the route found comes within {least_m} m of a zone: refused"
-    );
-    let route = Route {
-        origin,
-        path,
-        hash,
-        least_m,
-        grown,
-        map,
+        Ok(RoutePlace {
+            at: at.with_context(|| flag.clone())?,
+            name: flag,
+        })
     };
+    let mut places = vec![place(&args.from, "--from".to_owned())?];
+    for text in &args.via {
+        places.push(place(text, format!("--via {text}"))?);
+    }
+    places.push(place(&args.to, "--to".to_owned())?);
+    let level = level(args)?;
+    let heights = if level.is_some() {
+        Heights::Read
+    } else {
+        Heights::Ignored
+    };
+    let ZoneInput {
+        keep_out,
+        keep_in,
+        mut notices,
+    } = zone_input::read(&args.file, origin, heights)?;
+    let plan = route::plan(&RouteRequest {
+        places,
+        keep_out,
+        keep_in,
+        clearance_m: args.clearance_m,
+        level,
+        engine: match args.engine {
+            Engine::Mesh => route::Engine::Mesh,
+            Engine::Graph => route::Engine::Graph,
+        },
+    });
+    let plan = plan.map_err(|error| route_error(error, args))?;
+    notices.extend(plan.notices.iter().cloned());
     Ok(match args.format {
-        Format::Json => route.json(args).to_string(),
-        Format::Geojson => route.geojson().to_string(),
+        Format::Json => json(&plan, origin, args.clearance_m, &notices).to_string(),
+        Format::Geojson => geojson(&plan, origin).to_string(),
     })
 }
 
@@ -155,190 +133,74 @@ fn level(args: &RouteArgs) -> Result<Option<Level>> {
     Ok(Some(Level { level_m, margin_m }))
 }
 
-/// The error with the name that the zone has in the file.
-fn named(error: &OffsetError, map: &Map) -> anyhow::Error {
-    let zone = match *error {
-        OffsetError::NotFinite(p) | OffsetError::TooFar(p) | OffsetError::Unproven(p) => p.zone,
-        OffsetError::TooFewVertices { zone, .. } => zone,
-        OffsetError::Radius(_) | OffsetError::Overshoot(_) => usize::MAX,
-    };
-    match map.names.get(zone) {
-        Some(name) => anyhow::anyhow!("{name}: {error}"),
-        None => anyhow::anyhow!("{error}"),
-    }
-}
-
-fn check_place(p: Point, flag: &str, grown: &Grown, map: &Map, clearance_m: f64) -> Result<()> {
-    if !grown.contains(p) {
-        return Ok(());
-    }
-    let nearest = map
-        .zones
-        .iter()
-        .zip(&map.names)
-        .map(|(z, name)| (distance_m(p, z), name))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    match nearest {
-        Some((d, name)) if d <= 0.0 => bail!("{flag} lies in a zone: {name}"),
-        Some((d, name)) => bail!(
-            "{flag} lies {d:.1} m from {name}, nearer than the clearance of {clearance_m} m \
-             (outlines are up to half a percent wider)"
-        ),
-        None => bail!("{flag} lies in a zone"),
-    }
-}
-
-/// The path, and the number by which the structure it was found on is compared.
-fn shortest(
-    engine: Engine,
-    places: &[Point],
-    grown: &Grown,
-    map: &Map,
-) -> Result<(Result<Vec<Point>, NoLeg>, u64)> {
-    match engine {
-        Engine::Mesh => {
-            let rings = grown.regions.iter().flat_map(Region::rings);
-            let all: Vec<&[Point]> = std::iter::once(map.border.as_slice())
-                .chain(rings)
-                .collect();
-            let mesh = Mesh::from_rings(&all).context("the grown zones have no mesh")?;
-            let path = shortest_through(&mut Search::new(&mesh), places);
-            Ok((path, mesh.content_hash()))
+fn route_error(error: RouteError, args: &RouteArgs) -> Error {
+    match error {
+        RouteError::Clearance(cause) => Error::new(cause).context("--clearance-m"),
+        RouteError::NoWay { leg, .. } => {
+            let ends = |i: usize| match i.checked_sub(1) {
+                None => &args.from,
+                Some(i) => args.via.get(i).unwrap_or(&args.to),
+            };
+            anyhow!(
+                "there is no way from {} to {} that keeps {} m from every zone",
+                ends(leg),
+                ends(leg + 1),
+                args.clearance_m
+            )
         }
-        Engine::Graph => {
-            let graph = VisibilityGraph::round(&grown.regions);
-            Ok((graph.shortest_through(places), graph.content_hash()))
-        }
+        other => other.into(),
     }
 }
 
-/// A route with all that is worth telling about it.
-struct Route {
-    origin: Origin,
-    path: Vec<Point>,
-    hash: u64,
-    least_m: f64,
-    grown: Grown,
-    map: Map,
-}
-
-impl Route {
-    fn length_m(&self) -> f64 {
-        self.path.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
-    }
-
-    fn summary(&self) -> Value {
-        let ends = self.path.first().zip(self.path.last());
-        let least_m = self.least_m.is_finite().then_some(self.least_m);
-        json!({
-            "length_m": self.length_m(),
-            "straight_m": ends.map_or(0.0, |(a, b)| (b - a).norm()),
-            "bends": self.path.len().saturating_sub(2),
-            "least_distance_m": least_m,
-            "structure_hash": format!("{:016x}", self.hash),
-        })
-    }
-
-    fn json(&self, args: &RouteArgs) -> Value {
-        let points: Vec<Value> = self
-            .path
-            .iter()
-            .map(|p| {
-                let LatLon { lat_deg, lon_deg } = from_plane(self.origin, *p);
-                json!({"lat_deg": lat_deg, "lon_deg": lon_deg, "east_m": p.x, "north_m": p.y})
-            })
-            .collect();
-        let repairs: Vec<String> = self
-            .grown
-            .repairs
-            .iter()
-            .map(|r| self.repair(r.place, r.kind))
-            .collect();
-        let mut out = self.summary();
-        out["clearance_m"] = json!(args.clearance_m);
-        out["zones"] = json!(self.map.zones.len());
-        out["regions"] = json!(self.grown.regions.len());
-        out["points"] = json!(points);
-        out["repairs"] = json!(repairs);
-        out["notices"] = json!(self.map.notices);
-        out
-    }
-
-    fn repair(&self, at: Place, kind: impl core::fmt::Debug) -> String {
-        let name = self.map.names.get(at.zone).map_or("?", String::as_str);
-        format!("{name}, vertex {}: {kind:?}", at.vertex)
-    }
-
-    fn geojson(&self) -> Value {
-        let position = |p: &Point| {
-            let at = from_plane(self.origin, *p);
-            json!([at.lon_deg, at.lat_deg])
-        };
-        let closed =
-            |ring: &[Point]| -> Value { ring.iter().chain(ring.first()).map(position).collect() };
-        let line: Vec<Value> = self.path.iter().map(position).collect();
-        let mut features = vec![json!({
-            "type": "Feature", "properties": self.summary(),
-            "geometry": {"type": "LineString", "coordinates": line},
-        })];
-        for r in &self.grown.regions {
-            let rings: Vec<Value> = r.rings().map(closed).collect();
-            features.push(json!({
-                "type": "Feature", "properties": {"zone": "grown by the clearance"},
-                "geometry": {"type": "Polygon", "coordinates": rings},
-            }));
-        }
-        json!({"type": "FeatureCollection", "features": features})
-    }
-}
-
-fn rings(zone: &Zone) -> impl Iterator<Item = &Vec<Point>> {
-    std::iter::once(&zone.outer).chain(&zone.holes)
-}
-
-fn edges(zone: &Zone) -> impl Iterator<Item = (Point, Point)> + '_ {
-    rings(zone).flat_map(|r| (0..r.len()).map(move |i| (r[i], r[(i + 1) % r.len()])))
-}
-
-/// Distance from `p` to a zone, 0 inside, metres.
-fn distance_m(p: Point, zone: &Zone) -> f64 {
-    // Odd crossings in the outer ring or in a hole change sides once each.
-    let inside = rings(zone).fold(false, |inside, r| inside ^ crosses_oddly(r, p));
-    if inside {
-        return 0.0;
-    }
-    edges(zone)
-        .map(|(a, b)| to_piece_m(p, a, b))
-        .fold(f64::INFINITY, f64::min)
-}
-
-fn crosses_oddly(ring: &[Point], p: Point) -> bool {
-    let n = ring.len();
-    (0..n).fold(false, |odd, i| {
-        let (a, b) = (ring[i], ring[(i + 1) % n]);
-        let spans = (a.y <= p.y) != (b.y <= p.y);
-        let west = a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
-        odd ^ (spans && p.x < west)
+fn summary(plan: &RoutePlan) -> Value {
+    let ends = plan.path.first().zip(plan.path.last());
+    let least_m = plan.least_distance_m;
+    json!({
+        "length_m": plan.length_m(),
+        "straight_m": ends.map_or(0.0, |(a, b)| (b - a).norm()),
+        "bends": plan.path.len().saturating_sub(2),
+        "least_distance_m": least_m.is_finite().then_some(least_m),
+        "structure_hash": format!("{:016x}", plan.structure_hash),
     })
 }
 
-/// Distance from a path to the edges of zones, 0 when it crosses one, metres.
-fn least_distance_m(path: &[Point], zones: &[Zone]) -> f64 {
-    let mut least = f64::INFINITY;
-    for w in path.windows(2) {
-        for (a, b) in zones.iter().flat_map(edges) {
-            let left = |p: Point, q: Point, x: Point| (q - p).perp(&(x - p)) > 0.0;
-            let crosses =
-                left(a, b, w[0]) != left(a, b, w[1]) && left(w[0], w[1], a) != left(w[0], w[1], b);
-            least = least
-                .min(if crosses { 0.0 } else { f64::INFINITY })
-                .min(to_piece_m(w[0], a, b))
-                .min(to_piece_m(w[1], a, b))
-                .min(to_piece_m(a, w[0], w[1]))
-                .min(to_piece_m(b, w[0], w[1]));
-        }
+fn json(plan: &RoutePlan, origin: Origin, clearance_m: f64, notices: &[String]) -> Value {
+    let points = plan.path.iter().map(|p| {
+        let LatLon { lat_deg, lon_deg } = from_plane(origin, *p);
+        json!({"lat_deg": lat_deg, "lon_deg": lon_deg, "east_m": p.x, "north_m": p.y})
+    });
+    let repair = |r: &NamedRepair| format!("{}, vertex {}: {:?}", r.zone, r.vertex, r.kind);
+    let repairs: Vec<String> = plan.repairs.iter().map(repair).collect();
+    let mut out = summary(plan);
+    out["clearance_m"] = json!(clearance_m);
+    out["zones"] = json!(plan.n_zones);
+    out["regions"] = json!(plan.regions.len());
+    out["points"] = points.collect();
+    out["repairs"] = json!(repairs);
+    out["notices"] = json!(notices);
+    out
+}
+
+fn geojson(plan: &RoutePlan, origin: Origin) -> Value {
+    let position = |p: &Point| {
+        let at = from_plane(origin, *p);
+        json!([at.lon_deg, at.lat_deg])
+    };
+    let closed =
+        |ring: &[Point]| -> Value { ring.iter().chain(ring.first()).map(position).collect() };
+    let line: Vec<Value> = plan.path.iter().map(position).collect();
+    let mut features = vec![json!({
+        "type": "Feature", "properties": summary(plan),
+        "geometry": {"type": "LineString", "coordinates": line},
+    })];
+    for r in &plan.regions {
+        let rings: Vec<Value> = r.rings().map(closed).collect();
+        features.push(json!({
+            "type": "Feature", "properties": {"zone": "grown by the clearance"},
+            "geometry": {"type": "Polygon", "coordinates": rings},
+        }));
     }
-    least
+    json!({"type": "FeatureCollection", "features": features})
 }
 
 #[cfg(test)]

@@ -1,12 +1,9 @@
 //! `plan visit`: tours of a team over all points of a file (D2.7 §3.4).
 
-use super::errands::{self, Solver, Wishes};
-use super::tours::{TourArgs, Ways};
-use anyhow::{Context, Result};
+use super::target_input::Kind;
+use super::tour_args::{self, TourArgs, Wishes};
+use anyhow::Result;
 use clap::Args;
-use skein_geometry::math::atan2;
-use skein_interop::targets::read;
-use skein_survey::visits::{look_at, visit};
 use std::path::PathBuf;
 
 /// Tours of a team over all points of a file, the longest as short as can be found.
@@ -31,37 +28,7 @@ pub struct VisitArgs {
 /// # Errors
 /// When the file or a flag is wrong; the error names the place.
 pub fn run(args: &VisitArgs) -> Result<String> {
-    let solver: Solver = |lines, team, metric, steps| visit(lines, team, metric, steps);
-    errands::run(ways(args)?, &args.tours, &args.wishes, solver)
-}
-
-/// What there is to visit.
-pub(super) fn ways(args: &VisitArgs) -> Result<Ways> {
-    let text = std::fs::read_to_string(&args.file)
-        .with_context(|| format!("cannot read {}", args.file.display()))?;
-    let targets = read(&text).with_context(|| args.file.display().to_string())?;
-    let mut notices: Vec<String> = targets.notices.iter().map(ToString::to_string).collect();
-    if !targets.lines.is_empty() {
-        let n = targets.lines.len();
-        notices.push(format!("{n} line(s) ignored: `plan line` plans for lines"));
-    }
-    let first = targets.points.first().map(|p| p.at);
-    let mut ways = Ways::new(&args.tours, targets.home.or(first), notices, &args.file)?;
-    for point in &targets.points {
-        let sensor = args.wishes.sensor_for(point.sensor.as_ref());
-        let swath_m = ways.swath_m(&args.tours, sensor, &point.pointer)?;
-        let centre = ways.point(point.at, &point.pointer)?;
-        // Lanes along the way out from the depot: the sweep starts without a turn.
-        let heading_rad = atan2(centre.y, centre.x);
-        let way = look_at(centre, point.radius_m, swath_m, heading_rad).with_context(|| {
-            format!(
-                "{}: no sweep of radius {} m with --swath-m {}",
-                point.pointer, point.radius_m, swath_m
-            )
-        })?;
-        ways.push(&way, &point.pointer, sensor);
-    }
-    Ok(ways)
+    tour_args::run(Kind::Points, &args.file, &args.tours, &args.wishes)
 }
 
 #[cfg(test)]

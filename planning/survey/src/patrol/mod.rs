@@ -13,13 +13,14 @@
 //! | `course` | where a UAV is, and when it sees a place |
 //! | `change` | the beginning, and what follows a failure |
 //! | `tour` | a closed way over points, by length |
+//! | `team_patrol` | all of it for a team over points, lines or an area: [`plan`] |
 //!
 //! Lengths are whole units of any kind: millimetres, cells, or flight times at the common
 //! speed. Speeds are units a second. In a constant wind, lengths by the symmetric cost of
 //! [`InWind`](skein_flight::coverage::metric::InWind) keep every promise: what it leaves out is the same
 //! for all who pass a place, so the time between them stays.
 //!
-//! Left to others: the tour, who is alive, and the ways there.
+//! Left to others by all but `team_patrol`: the tour, who is alive, and the ways there.
 //!
 //! ```
 //! use skein_survey::patrol::{Pattern, patrol, revisit_bound};
@@ -34,6 +35,7 @@
 mod change;
 mod course;
 mod pattern;
+mod team_patrol;
 #[cfg(test)]
 mod tests;
 mod tour;
@@ -42,5 +44,9 @@ pub use change::{Change, Stand, Station, after_losses, spread};
 pub use course::Course;
 pub use pattern::{
     Patrol, Pattern, Uav, patrol, patrol_within, proportional, respace, revisit_bound,
+};
+pub use team_patrol::{
+    AfterLosses, GoesOn, Losses, Over, PatrolError, PatrolFlight, PatrolPlan, PatrolRequest,
+    PatrolStation, TourKind, plan,
 };
 pub use tour::{Tour, TourError};

@@ -2,24 +2,19 @@
 //!
 //! Leaves to the planners which plans there are to choose from.
 
-use super::fleet::Member;
-use anyhow::{Result, bail};
-use clap::ValueEnum;
-use serde::Serialize;
+use crate::team::{TeamError, Uav};
 
 /// Shares of the work that differ by less than this are the same to a person: samples
 /// are no finer.
-pub const SAME_SHARE: f64 = 0.002;
+pub(crate) const SAME_SHARE: f64 = 0.002;
 
 /// Figures that differ by less than this share are the same.
 const SAME: f64 = 1e-9;
 
 /// What is to be least.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ValueEnum)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Objective {
     /// The time until the last UAV is back.
-    #[default]
     Time,
     /// The length of all flights together: one UAV may fly alone.
     Distance,
@@ -30,7 +25,7 @@ pub enum Objective {
 
 /// What a plan comes to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Worth {
+pub(crate) struct Worth {
     /// The share of the work that is done.
     pub share: f64,
     /// The longest flight, seconds.
@@ -43,8 +38,7 @@ pub struct Worth {
 
 impl Worth {
     /// The figure of an objective.
-    #[must_use]
-    pub fn figure(&self, objective: Objective) -> f64 {
+    fn figure(&self, objective: Objective) -> f64 {
         match objective {
             Objective::Time => self.makespan_s,
             Objective::Distance => self.total_m,
@@ -54,8 +48,7 @@ impl Worth {
 
     /// Whether this plan does more than the other, or as much for less; for as much, what
     /// is sooner and then shorter.
-    #[must_use]
-    pub fn beats(&self, other: &Self, objective: Objective) -> bool {
+    pub(crate) fn beats(&self, other: &Self, objective: Objective) -> bool {
         let more = self.share - other.share;
         if more.abs() > SAME_SHARE {
             return more > 0.0;
@@ -74,15 +67,14 @@ impl Worth {
 ///
 /// # Errors
 /// When energy is asked for and only some of the team state their power.
-pub fn in_watt_hours(team: &[Member], objective: Objective) -> Result<bool> {
-    let without = team.iter().find(|m| m.cruise_power_w.is_none());
-    let with = team.iter().find(|m| m.cruise_power_w.is_some());
+pub(crate) fn in_watt_hours(team: &[Uav], objective: Objective) -> Result<bool, TeamError> {
+    let without = team.iter().find(|u| u.cruise_power_w.is_none());
+    let with = team.iter().find(|u| u.cruise_power_w.is_some());
     if let (Objective::Energy, Some(without), Some(with)) = (objective, without, with) {
-        bail!(
-            "--objective energy: {} has no cruise_power_w, but {} has: state it for all UAVs or for none",
-            without.name,
-            with.name
-        );
+        return Err(TeamError::Power {
+            without: without.name.clone(),
+            with: with.name.clone(),
+        });
     }
     Ok(without.is_none())
 }

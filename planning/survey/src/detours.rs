@@ -3,29 +3,43 @@
 //!
 //! Leaves to others: curves, and what a file's zones are.
 
-use anyhow::{Context, Result};
-use skein_flight::route::mesh::Mesh;
+use skein_flight::route::mesh::{Mesh, MeshError};
 use skein_flight::route::two_point::Search;
 use skein_geometry::frame::Point;
-use skein_geometry::offset::{Grown, Growth, Region, Zone, grow};
+use skein_geometry::offset::{Grown, Growth, OffsetError, Region, Zone, grow};
+use thiserror::Error;
 
 /// How far beyond all zones and places the mesh ends, metres: there is room to pass.
 const OUTSKIRTS_M: f64 = 1_000.0;
 
+/// Why there are no ways round the zones. Nothing was planned.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum DetourError {
+    /// The clearance is no length.
+    #[error("the clearance")]
+    Clearance(#[source] OffsetError),
+    /// The zones cannot be grown by it.
+    #[error("the no-fly zones cannot be grown")]
+    Zones(#[source] OffsetError),
+    /// What they leave free cannot be cut into a mesh.
+    #[error("the grown zones have no mesh")]
+    Mesh(#[source] MeshError),
+}
+
 /// Grown zones and the mesh of what they leave free.
-pub struct Around {
+pub struct Detours {
     grown: Grown,
     mesh: Option<Mesh>,
 }
 
-impl Around {
+impl Detours {
     /// Zones to keep `clearance_m` from, and the places that ways will lead to.
     ///
     /// # Errors
     /// When the clearance is no length or the zones cannot be grown.
-    pub fn new(zones: &[Zone], clearance_m: f64, places: &[Point]) -> Result<Self> {
-        let growth = Growth::new(clearance_m).context("--clearance-m")?;
-        let grown = grow(zones, &growth).context("the no-fly zones cannot be grown")?;
+    pub fn new(zones: &[Zone], clearance_m: f64, places: &[Point]) -> Result<Self, DetourError> {
+        let growth = Growth::new(clearance_m).map_err(DetourError::Clearance)?;
+        let grown = grow(zones, &growth).map_err(DetourError::Zones)?;
         let rings: Vec<&[Point]> = grown.regions.iter().flat_map(Region::rings).collect();
         if rings.is_empty() {
             return Ok(Self { grown, mesh: None });
@@ -36,7 +50,7 @@ impl Around {
         let border = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
             .map(|(x, y)| Point::new(x * half_m, y * half_m));
         let all: Vec<&[Point]> = std::iter::once(border.as_slice()).chain(rings).collect();
-        let mesh = Mesh::from_rings(&all).context("the grown zones have no mesh")?;
+        let mesh = Mesh::from_rings(&all).map_err(DetourError::Mesh)?;
         Ok(Self {
             grown,
             mesh: Some(mesh),
@@ -63,19 +77,19 @@ impl Around {
 
     /// Memory for many questions.
     #[must_use]
-    pub fn asker(&self) -> Asker<'_> {
-        Asker {
+    pub fn search(&self) -> DetourSearch<'_> {
+        DetourSearch {
             search: self.mesh.as_ref().map(Search::new),
         }
     }
 }
 
 /// Answers questions about ways.
-pub struct Asker<'a> {
+pub struct DetourSearch<'a> {
     search: Option<Search<'a>>,
 }
 
-impl Asker<'_> {
+impl DetourSearch<'_> {
     /// The shortest way, both ends included; `None` when there is none.
     pub fn way(&mut self, from: Point, to: Point) -> Option<Vec<Point>> {
         match &mut self.search {
@@ -106,16 +120,16 @@ mod tests {
             holes: Vec::new(),
         };
         let (a, b) = (Point::new(-200.0, 0.0), Point::new(200.0, 0.0));
-        let around = Around::new(&[zone], 10.0, &[a, b]).unwrap();
-        assert!(around.is_needed() && around.forbids(Point::new(55.0, 0.0)));
-        let mut asker = around.asker();
-        let way = asker.way(a, b).unwrap();
-        assert!(way.len() > 2 && !asker.is_straight(a, b));
-        assert!(asker.is_straight(a, Point::new(-200.0, 300.0)));
-        assert_eq!(asker.way(a, Point::new(0.0, 0.0)), None);
-        let free = Around::new(&[], 10.0, &[a, b]).unwrap();
+        let detours = Detours::new(&[zone], 10.0, &[a, b]).unwrap();
+        assert!(detours.is_needed() && detours.forbids(Point::new(55.0, 0.0)));
+        let mut search = detours.search();
+        let way = search.way(a, b).unwrap();
+        assert!(way.len() > 2 && !search.is_straight(a, b));
+        assert!(search.is_straight(a, Point::new(-200.0, 300.0)));
+        assert_eq!(search.way(a, Point::new(0.0, 0.0)), None);
+        let free = Detours::new(&[], 10.0, &[a, b]).unwrap();
         assert!(!free.is_needed());
-        assert_eq!(free.asker().way(a, b), Some(vec![a, b]));
-        assert!(Around::new(&[], f64::NAN, &[]).is_err());
+        assert_eq!(free.search().way(a, b), Some(vec![a, b]));
+        assert!(Detours::new(&[], f64::NAN, &[]).is_err());
     }
 }

@@ -1,76 +1,51 @@
-//! Tours of a team whose UAVs differ in sensors, for `plan line` and `plan visit`: who
-//! flies which targets, and what is told about it (D2.7 §3.1, §3.4, §3.5).
+//! Tours of a team whose UAVs differ in sensors: who flies which targets (D2.7 §3.1, §3.4,
+//! §3.5).
 //!
 //! Targets that ask for different sensors are planned apart: each UAV flies those of some
 //! sensors that it carries, and every way to group the sensors is tried. Leaves to others:
 //! which ways there are, and the planners of lines and points.
 
-use super::fleet::Member;
-use super::flights::Flight;
-use super::heights::LayerArgs;
-use super::objective::{Objective, Worth, in_watt_hours};
-use super::output::{Printed, Sheet};
-use super::tours::{Cost, Question, TURN_RADIUS_M, TourArgs, Way, Ways};
-use anyhow::{Result, ensure};
-use clap::Args;
-use serde_json::{Map, Value, json};
+use super::tour_problem::{Cost, Question, TourProblem, Way};
+use super::{MOST_SENSORS, Targets, TourPlan, TourRequest, ToursError, UavTour, Visit};
+use crate::fleet::team_selection::{kinds, search};
+use crate::flight::{Flight, Stays, UavFlight, length_m};
+use crate::objective::{Objective, Worth, in_watt_hours};
+use crate::team::Uav;
+use crate::visits::visit;
 use skein_flight::coverage::lines::{self, Line, LineError, LinePlan, Traversal};
-use skein_survey::fleet::team_selection::{kinds, search};
 use std::collections::BTreeMap;
 
 /// Teams and groups are compared with this part of the steps.
 const SEARCH_PART: usize = 8;
 
-/// Sensors that one file may ask for: five can be grouped in 52 ways.
-const MOST_SENSORS: usize = 5;
-
 /// Times that a UAV is moved to the group that takes longest.
 const MOST_MOVES: usize = 12;
 
-/// What is asked beside the team.
-#[derive(Clone, Debug, Default, Args)]
-pub struct Wishes {
-    /// The sensor for targets that do not ask for one themselves: UAVs without it fly
-    /// none of these, and its swath counts.
-    #[arg(long, value_name = "NAME")]
-    pub sensor: Option<String>,
-    /// What is to be least. Distance and energy choose which UAVs fly at all.
-    #[arg(long, value_enum, default_value_t = Objective::Time)]
-    pub objective: Objective,
-    /// How flights are kept apart.
-    #[command(flatten)]
-    pub layers: LayerArgs,
-}
-
-impl Wishes {
-    /// The sensor for a target that asks for `own`.
-    #[must_use]
-    pub fn sensor_for<'a>(&'a self, own: Option<&'a String>) -> Option<&'a str> {
-        own.or(self.sensor.as_ref()).map(String::as_str)
-    }
-}
-
 /// A planner of lines or points; the last is the steps of improvement.
-pub type Solver =
-    fn(&[Line], &[lines::Uav], &Cost<'_>, usize) -> std::result::Result<LinePlan, LineError>;
+pub(super) type Solver =
+    fn(&[Line], &[lines::Uav], &Cost<'_>, usize) -> Result<LinePlan, LineError>;
 
-/// Plans and returns the text to print.
-///
-/// # Errors
-/// When a flag is wrong, or a file cannot be written.
-pub fn run(mut ways: Ways, args: &TourArgs, wishes: &Wishes, solver: Solver) -> Result<String> {
-    wishes.layers.check()?;
-    let in_watt_hours = in_watt_hours(&ways.team, wishes.objective)?;
-    let (errands, _) = ways.solve(args, |question| {
+/// Plans the tours of a problem.
+pub(super) fn plan(
+    mut problem: TourProblem,
+    request: &TourRequest,
+) -> Result<TourPlan, ToursError> {
+    request.separation.check()?;
+    let in_watt_hours = in_watt_hours(&problem.team, request.objective)?;
+    let solver: Solver = match request.targets {
+        Targets::Points(_) => |lines, team, metric, steps| visit(lines, team, metric, steps),
+        Targets::Lines(_) => |lines, team, metric, steps| lines::plan(lines, team, metric, steps),
+    };
+    let (tours, _) = problem.solve(|question| {
         Desk {
             question,
             solver,
-            objective: wishes.objective,
+            objective: request.objective,
             in_watt_hours,
         }
-        .best(args.steps)
+        .best(request.steps)
     })?;
-    args.output.print(&errands.sheet(&ways, args, wishes))
+    Ok(tours.told(problem, request))
 }
 
 /// What tours are planned from.
@@ -83,7 +58,7 @@ struct Desk<'a> {
 
 /// Tours of some UAVs.
 #[derive(Clone, Debug, Default)]
-struct Errands {
+struct Tours {
     /// Who was planned for, with the length through the air, and by whom which passes.
     flights: Vec<(Flight, Vec<Traversal>)>,
     /// Lines that nobody has the endurance for.
@@ -92,7 +67,7 @@ struct Errands {
     lower_bound_s: Option<f64>,
 }
 
-impl Errands {
+impl Tours {
     /// What they are compared by; the share is a count of lines.
     fn worth(&self, in_watt_hours: bool) -> Worth {
         let flights = || self.flights.iter().map(|(f, _)| f);
@@ -125,28 +100,26 @@ struct Group {
 }
 
 impl Desk<'_> {
-    fn beats(&self, a: &Errands, b: &Errands) -> bool {
-        let worth = |e: &Errands| e.worth(self.in_watt_hours);
+    fn beats(&self, a: &Tours, b: &Tours) -> bool {
+        let worth = |e: &Tours| e.worth(self.in_watt_hours);
         worth(a).beats(&worth(b), self.objective)
     }
 
     /// The best tours found.
-    fn best(&self, steps: usize) -> Result<Errands> {
+    fn best(&self, steps: usize) -> Result<Tours, ToursError> {
         let mut sensors: BTreeMap<Option<&str>, Vec<usize>> = BTreeMap::new();
-        for (line, way) in self.question.ways.ways.iter().enumerate() {
+        for (line, way) in self.question.problem.ways.iter().enumerate() {
             sensors.entry(way.sensor.as_deref()).or_default().push(line);
         }
-        ensure!(
-            sensors.len() <= MOST_SENSORS,
-            "the targets ask for {} kinds of sensors, {MOST_SENSORS} are possible",
-            sensors.len()
-        );
+        if sensors.len() > MOST_SENSORS {
+            return Err(ToursError::TooManySensors(sensors.len()));
+        }
         let sensors: Vec<(Option<&str>, Vec<usize>)> = sensors.into_iter().collect();
         if sensors.is_empty() {
             let all: Vec<usize> = (0..self.question.team.len()).collect();
             return self.fly(&[], &all, steps);
         }
-        let mut best: Option<(Errands, Vec<Group>)> = None;
+        let mut best: Option<(Tours, Vec<Group>)> = None;
         for parts in partitions(sensors.len()) {
             let Some(groups) = self.groups(&sensors, &parts) else {
                 continue;
@@ -162,7 +135,7 @@ impl Desk<'_> {
         }
         // One carrier for each sensor makes groups that can be flown, so there are some.
         let groups = best.map(|b| b.1).unwrap_or_default();
-        let mut all = Errands::default();
+        let mut all = Tours::default();
         for (i, group) in groups.iter().enumerate() {
             let flown = self.group(group, steps)?;
             all = if i == 0 { flown } else { all.and(flown) };
@@ -170,8 +143,8 @@ impl Desk<'_> {
         Ok(all)
     }
 
-    fn all(&self, groups: &[Group], steps: usize) -> Result<Errands> {
-        let mut all = Errands::default();
+    fn all(&self, groups: &[Group], steps: usize) -> Result<Tours, ToursError> {
+        let mut all = Tours::default();
         for group in groups {
             all = all.and(self.fly(&group.lines, &group.uavs, steps)?);
         }
@@ -184,7 +157,7 @@ impl Desk<'_> {
         sensors: &[(Option<&str>, Vec<usize>)],
         parts: &[usize],
     ) -> Option<Vec<Group>> {
-        let team = &self.question.ways.team;
+        let team = &self.question.problem.team;
         let n = parts.iter().max().map_or(0, |p| p + 1);
         let mut groups: Vec<Group> = (0..n)
             .map(|part| {
@@ -225,7 +198,11 @@ impl Desk<'_> {
     }
 
     /// Moves UAVs to the group that takes longest while that helps.
-    fn moved(&self, mut groups: Vec<Group>, steps: usize) -> Result<(Errands, Vec<Group>)> {
+    fn moved(
+        &self,
+        mut groups: Vec<Group>,
+        steps: usize,
+    ) -> Result<(Tours, Vec<Group>), ToursError> {
         let mut best = self.all(&groups, steps)?;
         for _ in 0..MOST_MOVES {
             let mut times = Vec::new();
@@ -243,7 +220,7 @@ impl Desk<'_> {
             let Some(to) = longest else {
                 break;
             };
-            let mut next: Option<(Errands, Vec<Group>)> = None;
+            let mut next: Option<(Tours, Vec<Group>)> = None;
             for from in (0..groups.len()).filter(|i| *i != to && groups[*i].uavs.len() > 1) {
                 let Some(uav) = groups[from]
                     .uavs
@@ -271,15 +248,17 @@ impl Desk<'_> {
     }
 
     /// The tours of a group, of those of its UAVs that are best.
-    fn group(&self, group: &Group, steps: usize) -> Result<Errands> {
+    fn group(&self, group: &Group, steps: usize) -> Result<Tours, ToursError> {
         let whole = self.fly(&group.lines, &group.uavs, steps)?;
         if self.objective == Objective::Time || group.uavs.len() < 2 {
             return Ok(whole);
         }
-        let of = |uav: usize| (&self.question.team[uav], &self.question.ways.team[uav]);
+        let of = |uav: usize| (&self.question.team[uav], &self.question.problem.team[uav]);
         let same = |a: &usize, b: &usize| {
             let ((s, m), (t, n)) = (of(*a), of(*b));
-            s == t && m.turn_radius_m == n.turn_radius_m && m.cruise_power_w == n.cruise_power_w
+            s == t
+                && m.turn_radius_m.total_cmp(&n.turn_radius_m).is_eq()
+                && m.cruise_power_w == n.cruise_power_w
         };
         let found = search(
             &kinds(&group.uavs, same),
@@ -298,37 +277,36 @@ impl Desk<'_> {
     }
 
     /// The tours of some UAVs along some lines.
-    fn fly(&self, lines: &[usize], uavs: &[usize], steps: usize) -> Result<Errands> {
+    fn fly(&self, lines: &[usize], uavs: &[usize], steps: usize) -> Result<Tours, ToursError> {
         let question = self.question;
         let some: Vec<Line> = lines.iter().map(|i| question.lines[*i]).collect();
         let team: Vec<lines::Uav> = uavs.iter().map(|i| question.team[*i]).collect();
         let plan = (self.solver)(&some, &team, question.metric, steps)?;
-        let base_mps = question.ways.team[0].speed_mps;
-        let flights = plan.tours.into_iter().zip(uavs).map(|(tour, uav)| {
-            let member = &question.ways.team[*uav];
-            let depot = question.ways.at[question.ways.depots[*uav]];
+        let base_mps = question.problem.team[0].speed_mps;
+        let flights = plan.tours.into_iter().zip(uavs).map(|(tour, i)| {
+            let uav = &question.problem.team[*i];
             let whole = |p: &Traversal| Traversal {
                 line: lines[p.line],
                 ..*p
             };
             let passes: Vec<Traversal> = tour.passes.iter().map(whole).collect();
-            let mut track = question.ways.track(question.around, &passes, depot);
+            let mut track = question.problem.track(question.detours, &passes, uav.start);
             if passes.is_empty() {
                 track.truncate(1);
             }
             let flight = Flight {
-                uav: *uav,
-                name: member.name.clone(),
+                uav: *i,
+                name: uav.name.clone(),
                 track,
                 length_m: tour.cost * base_mps,
-                speed_mps: member.speed_mps,
-                turn_radius_m: member.turn_radius_m.unwrap_or(TURN_RADIUS_M),
-                cruise_power_w: member.cruise_power_w,
+                speed_mps: uav.speed_mps,
+                turn_radius_m: uav.turn_radius_m,
+                cruise_power_w: uav.cruise_power_w,
                 ..Flight::default()
             };
             (flight, passes)
         });
-        Ok(Errands {
+        Ok(Tours {
             flights: flights.collect(),
             unserved: plan.unserved.iter().map(|i| lines[*i]).collect(),
             // Of the team that flies: without a meaning where that is a choice.
@@ -352,88 +330,76 @@ fn partitions(n: usize) -> Vec<Vec<usize>> {
     all
 }
 
-impl Errands {
-    fn sheet(&self, ways: &Ways, args: &TourArgs, wishes: &Wishes) -> Sheet {
+impl Tours {
+    /// The same for the caller.
+    fn told(&self, problem: TourProblem, request: &TourRequest) -> TourPlan {
         let of = |uav: usize| self.flights.iter().find(|(f, _)| f.uav == uav);
-        let uavs = 0..ways.team.len();
-        let home = |uav: usize| vec![ways.at[ways.depots[uav]]];
-        let tracks = uavs
-            .clone()
-            .map(|uav| of(uav).map_or_else(|| home(uav), |f| f.0.track.clone()));
-        let tracks: Vec<_> = tracks.collect();
-        let layers = &wishes.layers;
-        let separation_m = layers.separation_m(&ways.team, TURN_RADIUS_M, args.clearance_m);
-        let heights_m = layers.heights_m(&tracks, separation_m, args.output.altitude_m);
-        let printed = uavs.zip(tracks).map(|(uav, track)| {
-            let member = &ways.team[uav];
-            let (mut told, mut passes) = (Map::new(), Vec::new());
-            for key in ["time_s", "energy_s"] {
-                told.insert(key.to_owned(), json!(0.0));
-            }
-            if let Some((flight, own)) = of(uav) {
-                told = flight.printed(0.0).told;
-                passes.clone_from(own);
-            }
+        let team = &problem.team;
+        let track = |(i, uav): (usize, &Uav)| match of(i) {
+            Some((flight, _)) => flight.track.clone(),
+            None => vec![uav.start],
+        };
+        let tracks: Vec<_> = team.iter().enumerate().map(track).collect();
+        let (separation, clearance_m) = (&request.separation, request.clearance_m);
+        let heights_m = separation.heights_m(team, clearance_m, &tracks, request.altitude_m);
+        let tours = team.iter().zip(heights_m).enumerate();
+        let uavs = tours.map(|(i, (uav, altitude_m))| {
+            let visit = |p: &Traversal| Visit {
+                target: problem.ways[p.line].name.clone(),
+                backward: p.backward,
+            };
+            let sees = |way: &Way| {
+                let own = way.sensor.as_ref();
+                own.is_none_or(|s| uav.sensors.contains_key(s))
+            };
+            let (mut flight, visits) = match of(i) {
+                Some((flight, passes)) => {
+                    (flight.told(altitude_m), passes.iter().map(visit).collect())
+                }
+                None => (
+                    UavFlight::stays(uav, altitude_m, Stays::NotNeeded),
+                    Vec::new(),
+                ),
+            };
             // Over the ground: through the air it differs in a wind.
-            let length_m: f64 = track.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
-            told.remove("lane_m");
-            told.insert("length_m".to_owned(), json!(length_m));
-            told.insert("targets".to_owned(), json!(passes.len()));
-            let pass =
-                |p: &Traversal| json!({"target": ways.ways[p.line].name, "backward": p.backward});
-            let details = ("passes".to_owned(), passes.iter().map(pass).collect());
-            Printed {
-                name: member.name.clone(),
-                track,
-                altitude_m: heights_m[uav],
-                speed_mps: member.speed_mps,
-                told,
-                details: Map::from_iter([details]),
+            flight.length_m = length_m(&flight.path);
+            flight.lane_m = None;
+            if !flight.flies() && !problem.ways.iter().any(sees) {
+                flight.stays = Some(Stays::NoSensor);
             }
+            UavTour { flight, visits }
         });
-        Sheet {
-            origin: ways.origin,
-            summary: self.summary(ways, wishes),
-            flights: printed.collect(),
-            shapes: Vec::new(),
-        }
-    }
-
-    fn summary(&self, ways: &Ways, wishes: &Wishes) -> Value {
         let mut unserved = self.unserved.clone();
         unserved.sort_unstable();
-        let unserved: Vec<&str> = unserved
-            .iter()
-            .map(|i| ways.ways[*i].name.as_str())
-            .collect();
         let flights = || self.flights.iter().map(|(f, _)| f).filter(|f| f.flies());
-        let sees = |member: &Member, way: &Way| {
-            let own = way.sensor.as_ref();
-            own.is_none_or(|s| member.sensors.contains_key(s))
-        };
-        let rests = |uav: &usize| !flights().any(|f| f.uav == *uav);
-        let at_home = (0..ways.team.len()).filter(rests).map(|uav| {
-            let member = &ways.team[uav];
-            let why = if ways.ways.iter().any(|w| sees(member, w)) {
-                super::NOT_NEEDED
-            } else {
-                "has none of the sensors that are asked for"
-            };
-            json!({"name": member.name, "why": why})
-        });
-        let at_home: Vec<Value> = at_home.collect();
         let worth = self.worth(false);
-        let energy_wh: Option<f64> = flights().map(Flight::energy_wh).sum();
-        json!({
-            "makespan_s": worth.makespan_s, "lower_bound_s": self.lower_bound_s,
-            "total_s": flights().map(Flight::time_s).sum::<f64>(),
-            "total_m": worth.total_m, "energy_s": worth.energy, "energy_wh": energy_wh,
-            "objective": wishes.objective, "sensor": wishes.sensor,
-            "uavs_flying": flights().count(), "at_home": at_home,
-            "targets": ways.ways.len(), "unserved": unserved, "notices": ways.notices,
-        })
+        TourPlan {
+            uavs: uavs.collect(),
+            makespan_s: worth.makespan_s,
+            lower_bound_s: self.lower_bound_s,
+            total_s: flights().map(Flight::time_s).sum(),
+            total_m: worth.total_m,
+            energy_s: worth.energy,
+            energy_wh: flights().map(Flight::energy_wh).sum(),
+            targets: problem.ways.len(),
+            unserved: unserved
+                .iter()
+                .map(|i| problem.ways[*i].name.clone())
+                .collect(),
+            notices: problem.notices.clone(),
+        }
     }
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::partitions;
+
+    #[test]
+    fn things_are_grouped_in_all_ways() {
+        assert_eq!(partitions(1), [[0]]);
+        assert_eq!(partitions(3).len(), 5);
+        assert_eq!(partitions(5).len(), 52);
+        assert_eq!(partitions(3)[0], [0, 0, 0]);
+    }
+}

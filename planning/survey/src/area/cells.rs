@@ -1,16 +1,17 @@
-//! The approximate half of `plan cover`: the area as lane cells, a region of cells for
-//! each UAV (D2.7 §3.6.2, 3.6.4–3.6.6).
+//! The approximate planner of an area for a team: the area as lane cells, a region of
+//! cells for each UAV (D2.7 §3.6.2, 3.6.4–3.6.6).
 //!
-//! Leaves to others: reading files, printing, and the exact planner.
+//! Leaves to others: the cells' planner ([`crate::regions`]), and straight passes.
 
-use super::around::{Around, Asker};
-use super::flyers::Flyer;
-use anyhow::{Context, Result};
+use super::PlannerError;
+use crate::detours::{DetourSearch, Detours};
+use crate::flight::length_m;
+use crate::regions::improve::Improver;
+use crate::regions::raster::Raster;
+use crate::regions::{Cell, Task, TaskError, bounds};
+use crate::team::PlannedUav;
 use skein_geometry::Polygon;
 use skein_geometry::frame::Point;
-use skein_survey::regions::improve::Improver;
-use skein_survey::regions::raster::Raster;
-use skein_survey::regions::{Cell, Task, bounds};
 
 /// Speeds are counted in whole hundredths of a metre a second.
 const SPEED_UNITS: f64 = 100.0;
@@ -19,15 +20,15 @@ const SPEED_UNITS: f64 = 100.0;
 const STRAIGHT: f64 = 1e-9;
 
 /// What is asked for.
-pub struct Request<'a> {
+pub(crate) struct CellProblem<'a> {
     /// The area.
     pub area: &'a Polygon,
     /// Parts of it that need not be seen.
     pub holes: &'a [Polygon],
     /// Zones with clearance.
-    pub around: &'a Around,
+    pub detours: &'a Detours,
     /// The team.
-    pub team: &'a [Flyer],
+    pub team: &'a [PlannedUav],
     /// Width of a lane: of the narrowest swath, metres.
     pub lane_m: f64,
     /// Steps of improvement.
@@ -35,7 +36,7 @@ pub struct Request<'a> {
 }
 
 /// A plan of cells.
-pub struct Flights {
+pub(crate) struct CellFlights {
     /// The grid.
     pub raster: Raster,
     /// By UAV: corners of its flight, from its start and back to it.
@@ -52,10 +53,9 @@ pub struct Flights {
     pub least_s: Option<f64>,
 }
 
-impl Flights {
+impl CellFlights {
     /// Whether a point of the area is seen.
-    #[must_use]
-    pub fn sees(&self, p: Point) -> bool {
+    pub(crate) fn sees(&self, p: Point) -> bool {
         let cell = self.raster.cell_at(p);
         cell.is_some_and(|c| self.covered[c as usize])
     }
@@ -65,20 +65,18 @@ impl Flights {
 ///
 /// # Errors
 /// When the area has no cell that can be flown, or a UAV has no way to it.
-pub fn plan(request: &Request<'_>) -> Result<Flights> {
-    let rings = request.around.rings();
+pub(crate) fn plan(request: &CellProblem<'_>) -> Result<CellFlights, PlannerError> {
+    let rings = request.detours.rings();
     let area = std::slice::from_ref(request.area);
     let raster = Raster::fit(area, request.holes, &rings, request.lane_m)?;
-    let mut asker = request.around.asker();
+    let mut search = request.detours.search();
     let mut roots = Vec::new();
     let mut ways = Vec::new();
-    for flyer in request.team {
-        let root = raster
-            .nearest(flyer.start)
-            .context("no cell of the area keeps the clearance from the zones")?;
-        let way = asker
-            .way(flyer.start, raster.middle(root))
-            .with_context(|| format!("{} has no way from its start to the area", flyer.name))?;
+    for uav in request.team {
+        let root = raster.nearest(uav.start).ok_or(PlannerError::NoCell)?;
+        let way = search
+            .way(uav.start, raster.middle(root))
+            .ok_or_else(|| PlannerError::NoWay(uav.name.clone()))?;
         roots.push(root);
         ways.push(way);
     }
@@ -92,7 +90,7 @@ pub fn plan(request: &Request<'_>) -> Result<Flights> {
         .paths
         .iter()
         .zip(&ways)
-        .map(|(path, way)| track(&middles(path), way, &mut asker))
+        .map(|(path, way)| track(&middles(path), way, &mut search))
         .collect();
     let laps = plan.paths.iter().map(|path| corners(middles(path)));
     let laps = laps.collect();
@@ -111,7 +109,7 @@ pub fn plan(request: &Request<'_>) -> Result<Flights> {
         (m.speed_mps - first.speed_mps).abs() < 1e-9 && (m.pace - first.pace).abs() < 1e-9
     });
     let least_m = f64::from(bounds::least_moves(&task)) * raster.side_m();
-    Ok(Flights {
+    Ok(CellFlights {
         lengths_m: tracks.iter().map(|t| length_m(t)).collect(),
         tracks,
         laps,
@@ -124,11 +122,11 @@ pub fn plan(request: &Request<'_>) -> Result<Flights> {
 
 /// The task in cells: speeds, and what endurance leaves for the cells.
 fn task(
-    request: &Request<'_>,
+    request: &CellProblem<'_>,
     raster: &Raster,
     roots: &[Cell],
     ways: &[Vec<Point>],
-) -> Result<Task> {
+) -> Result<Task, TaskError> {
     let mut task = Task::new(&raster.map, roots, true)?;
     #[allow(
         clippy::cast_possible_truncation,
@@ -136,18 +134,18 @@ fn task(
         reason = "a cast of a float saturates"
     )]
     let whole = |x: f64| x.max(0.0) as u32;
-    for (uav, flyer) in request.team.iter().enumerate() {
-        task.speeds[uav] = whole((flyer.speed_mps * flyer.pace * SPEED_UNITS).round()).max(1);
-        if flyer.endurance_s.is_finite() {
-            let left_m = flyer.endurance_s * flyer.speed_mps - 2.0 * length_m(&ways[uav]);
-            task.endurance[uav] = whole((left_m / raster.side_m()).floor());
+    for (i, uav) in request.team.iter().enumerate() {
+        task.speeds[i] = whole((uav.speed_mps * uav.pace * SPEED_UNITS).round()).max(1);
+        if uav.endurance_s.is_finite() {
+            let left_m = uav.endurance_s * uav.speed_mps - 2.0 * length_m(&ways[i]);
+            task.endurance[i] = whole((left_m / raster.side_m()).floor());
         }
     }
     Ok(task)
 }
 
 /// The corners of a flight; a UAV without cells stays where it is.
-fn track(path: &[Point], way: &[Point], asker: &mut Asker<'_>) -> Vec<Point> {
+fn track(path: &[Point], way: &[Point], search: &mut DetourSearch<'_>) -> Vec<Point> {
     let (Some(start), Some(last)) = (way.first(), path.last()) else {
         return Vec::new();
     };
@@ -156,7 +154,7 @@ fn track(path: &[Point], way: &[Point], asker: &mut Asker<'_>) -> Vec<Point> {
     }
     let mut track = way.to_vec();
     track.extend(path.iter().skip(1));
-    let home = asker.way(*last, *start).unwrap_or_default();
+    let home = search.way(*last, *start).unwrap_or_default();
     track.extend(home.iter().skip(1));
     corners(track)
 }
@@ -178,12 +176,6 @@ fn corners(track: Vec<Point>) -> Vec<Point> {
     kept
 }
 
-/// Length of a flight, metres.
-#[must_use]
-pub fn length_m(track: &[Point]) -> f64 {
-    track.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -194,8 +186,8 @@ mod tests {
         Polygon::new(corners.map(at).to_vec()).unwrap()
     }
 
-    fn team(speeds: &[f64], endurance_s: f64, start: Point) -> Vec<Flyer> {
-        let flyer = |(uav, v): (usize, &f64)| Flyer {
+    fn team(speeds: &[f64], endurance_s: f64, start: Point) -> Vec<PlannedUav> {
+        let flyer = |(uav, v): (usize, &f64)| PlannedUav {
             uav,
             name: String::new(),
             start,
@@ -209,12 +201,12 @@ mod tests {
         speeds.iter().enumerate().map(flyer).collect()
     }
 
-    fn planned(team: &[Flyer]) -> Flights {
-        let around = Around::new(&[], 0.0, &[]).unwrap();
-        plan(&Request {
+    fn planned(team: &[PlannedUav]) -> CellFlights {
+        let detours = Detours::new(&[], 0.0, &[]).unwrap();
+        plan(&CellProblem {
             area: &square(300.0),
             holes: &[],
-            around: &around,
+            detours: &detours,
             team,
             lane_m: 30.0,
             steps: 60_000,

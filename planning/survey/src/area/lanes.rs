@@ -4,15 +4,14 @@
 //! Leaves to [`super::planners`] the flights over a part, and to the caller which UAVs
 //! there are.
 
-use super::flights::{Flight, Flights, Laid, MOST_SAMPLES, covered_share};
-use super::flyers::Flyer;
-use super::objective::Objective;
-use super::planners::{Ground, Job, Part, Planner};
-use anyhow::Result;
-use clap::ValueEnum;
-use serde_json::{Map, Value, json};
+use super::flights::{Flights, MOST_SAMPLES, covered_share};
+use super::planners::{Job, OpenArea, Part};
+use super::{Facts, Laid, Lanes, Planner, PlannerError, Shape, ShapeKind};
+use crate::fleet::sections::{self, Crew, Outcome, Uav, alike, evened, styles};
+use crate::flight::Flight;
+use crate::objective::Objective;
+use crate::team::PlannedUav;
 use skein_geometry::Polygon;
-use skein_survey::fleet::sections::{self, Crew, Outcome, Uav, alike, evened, styles};
 
 /// Ways to cut an area that are planned; they are sorted by how much they promise.
 const STYLES: usize = 3;
@@ -26,21 +25,9 @@ const FEW_SAMPLES: f64 = 4_000.0;
 /// A section of which next to nothing can be flown counts as if this were done of it.
 const LEAST_DONE: f64 = 0.05;
 
-/// Which lanes are planned.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Lanes {
-    /// One width for all: that of the narrowest swath, with the widest turn.
-    Common,
-    /// A section of the area for the UAVs of like swath, with lanes of their own.
-    Sections,
-    /// Both, and the better one is flown.
-    #[default]
-    Best,
-}
-
 /// How thoroughly a plan is made.
 #[derive(Clone, Copy, Debug)]
-pub struct Care {
+pub(crate) struct Care {
     /// Steps of improvement.
     pub steps: usize,
     /// Whether it is only compared with others.
@@ -49,9 +36,9 @@ pub struct Care {
 
 /// What plans of a team are asked.
 #[derive(Clone, Copy)]
-pub struct Desk<'a> {
+pub(crate) struct Desk<'a> {
     /// The area.
-    pub ground: &'a Ground<'a>,
+    pub ground: &'a OpenArea<'a>,
     /// The planner.
     pub planner: Planner,
     /// Which lanes.
@@ -64,8 +51,7 @@ pub struct Desk<'a> {
 
 impl Desk<'_> {
     /// The same question for each kind of lanes alone.
-    #[must_use]
-    pub fn kinds(&self) -> Vec<Self> {
+    pub(crate) fn kinds(&self) -> Vec<Self> {
         match self.lanes {
             Lanes::Best => [Lanes::Common, Lanes::Sections]
                 .map(|lanes| Self { lanes, ..*self })
@@ -75,8 +61,7 @@ impl Desk<'_> {
     }
 
     /// Whether one plan is better than another.
-    #[must_use]
-    pub fn beats(&self, a: &Flights, b: &Flights) -> bool {
+    pub(crate) fn beats(&self, a: &Flights, b: &Flights) -> bool {
         let worth = |f: &Flights| f.worth(self.in_watt_hours);
         worth(a).beats(&worth(b), self.objective)
     }
@@ -85,7 +70,11 @@ impl Desk<'_> {
     ///
     /// # Errors
     /// When there is no plan.
-    pub fn plans(&self, team: &[Flyer], care: Care) -> Result<Vec<Flights>> {
+    pub(crate) fn plans(
+        &self,
+        team: &[PlannedUav],
+        care: Care,
+    ) -> Result<Vec<Flights>, PlannerError> {
         let swaths: Vec<f64> = team.iter().map(|f| f.swath_m).collect();
         let groups = alike(&swaths);
         let mut plans = Vec::new();
@@ -102,12 +91,17 @@ impl Desk<'_> {
     }
 
     /// One width for all.
-    fn common(&self, team: &[Flyer], care: Care) -> Result<Flights> {
-        let part = self.part(&self.ground.site.area, team, care.steps)?;
+    fn common(&self, team: &[PlannedUav], care: Care) -> Result<Flights, PlannerError> {
+        let part = self.part(&self.ground.request.area, team, care.steps)?;
         Ok(self.joined(Laid::Common, vec![part], care))
     }
 
-    fn part(&self, area: &Polygon, crew: &[Flyer], steps: usize) -> Result<Part> {
+    fn part(
+        &self,
+        area: &Polygon,
+        crew: &[PlannedUav],
+        steps: usize,
+    ) -> Result<Part, PlannerError> {
         let lane_m = crew.iter().map(|f| f.swath_m).fold(f64::INFINITY, f64::min);
         let turn_radius_m = crew.iter().map(|f| f.turn_radius_m).fold(0.0, f64::max);
         let job = Job {
@@ -121,11 +115,11 @@ impl Desk<'_> {
     }
 
     /// A section for each group; nothing when the area cannot be cut for them.
-    fn sections(&self, team: &[Flyer], groups: &[Vec<usize>], care: Care) -> Option<Flights> {
-        let site = self.ground.site;
-        let blocked: Vec<&Polygon> = site.holes.iter().chain(site.zones.zones()).collect();
-        let ground = sections::OpenArea::new(&site.area, &blocked);
-        let members: Vec<Vec<Flyer>> = groups
+    fn sections(&self, team: &[PlannedUav], groups: &[Vec<usize>], care: Care) -> Option<Flights> {
+        let request = self.ground.request;
+        let blocked: Vec<&Polygon> = request.holes.iter().chain(request.zones.zones()).collect();
+        let ground = sections::OpenArea::new(&request.area, &blocked);
+        let members: Vec<Vec<PlannedUav>> = groups
             .iter()
             .map(|g| g.iter().map(|i| team[*i].clone()).collect())
             .collect();
@@ -163,7 +157,7 @@ impl Desk<'_> {
     fn outcome(
         &self,
         sections: &[Option<Polygon>],
-        members: &[Vec<Flyer>],
+        members: &[Vec<PlannedUav>],
         care: Care,
     ) -> Option<Outcome<Cut>> {
         let mut parts = Vec::new();
@@ -175,10 +169,13 @@ impl Desk<'_> {
             };
             let mut part = self.part(section, crew, care.steps).ok()?;
             times_s.push(part.makespan_s() / part.done_share.max(LEAST_DONE));
-            let names: Vec<&str> = crew.iter().map(|f| f.name.as_str()).collect();
-            let lane_m = part.flights.first().map_or(0.0, |f| f.lane_m);
-            let told = json!({"section": parts.len() + 1, "uavs": names, "lane_m": lane_m});
-            part.shapes.push((section.vertices().to_vec(), told));
+            let kind = ShapeKind::Section {
+                number: parts.len() + 1,
+                uavs: crew.iter().map(|f| f.name.clone()).collect(),
+                lane_m: part.flights.first().map_or(0.0, |f| f.lane_m),
+            };
+            let ring = section.vertices().to_vec();
+            part.shapes.push(Shape { ring, kind });
             parts.push(part);
         }
         Some(Outcome {
@@ -201,28 +198,28 @@ impl Desk<'_> {
         };
         let sees = |p| parts.iter().any(|part| part.sees(p));
         let wanted = |p| self.ground.wants(p);
-        let share = covered_share(&self.ground.site.area, wanted, lane_m, most, sees);
-        let mut more = Map::new();
+        let share = covered_share(&self.ground.request.area, wanted, lane_m, most, sees);
+        let mut facts: Option<Facts> = None;
         let (mut flights, mut shapes): (Vec<Flight>, Vec<_>) = (Vec::new(), Vec::new());
         for part in parts {
             flights.extend(part.flights);
             shapes.extend(part.shapes);
-            for (key, value) in part.more {
-                let sum = more.remove(&key).map_or(value.clone(), |v| sum(&v, &value));
-                more.insert(key, sum);
-            }
+            facts = match (facts, part.facts) {
+                (Some(all), Some(own)) => Some(all.and(own)),
+                (all, own) => all.or(own),
+            };
         }
         flights.sort_by_key(|f| f.uav);
-        if laid == Laid::Sections {
+        if let (Laid::Sections, Some(Facts::Cells { lower_bound_s, .. })) = (laid, &mut facts) {
             // What bounds one section says nothing about all.
-            more.remove("lower_bound_s");
+            *lower_bound_s = None;
         }
         Flights {
-            planner: self.planner.name(),
+            planner: self.planner,
             laid,
             flights,
             covered_share: share,
-            more,
+            facts,
             shapes,
         }
     }
@@ -234,8 +231,8 @@ struct Cut {
     flights: Flights,
 }
 
-fn crew(members: &[Flyer]) -> Crew {
-    let mate = |f: &Flyer| Uav {
+fn crew(members: &[PlannedUav]) -> Crew {
+    let uav = |f: &PlannedUav| Uav {
         start: f.start,
         speed_mps: f.speed_mps,
         endurance_s: f.endurance_s,
@@ -246,19 +243,6 @@ fn crew(members: &[Flyer]) -> Crew {
             .map(|f| f.swath_m)
             .fold(f64::INFINITY, f64::min),
         turn_radius_m: members.iter().map(|f| f.turn_radius_m).fold(0.0, f64::max),
-        uavs: members.iter().map(mate).collect(),
-    }
-}
-
-/// What two parts tell under one name: numbers add up, facts hold for both; what is not
-/// known of one is not known of both.
-fn sum(a: &Value, b: &Value) -> Value {
-    match (a, b) {
-        (Value::Bool(a), Value::Bool(b)) => json!(*a && *b),
-        (Value::Number(a), Value::Number(b)) => match (a.as_u64(), b.as_u64()) {
-            (Some(a), Some(b)) => json!(a + b),
-            _ => json!(a.as_f64().zip(b.as_f64()).map(|(a, b)| a + b)),
-        },
-        _ => Value::Null,
+        uavs: members.iter().map(uav).collect(),
     }
 }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// What is to be covered, in the plane of the launch point.
 #[derive(Debug)]
-pub struct Site {
+pub struct AreaInput {
     /// The launch point: the origin of the plane.
     pub origin: Origin,
     /// The area.
@@ -56,7 +56,7 @@ struct Sheet {
 /// # Errors
 /// When the file cannot be read, has no area or more than one, or something of it is
 /// wrong; names the place.
-pub fn read(file: &Path, launch: Option<&str>) -> Result<Site> {
+pub fn read(file: &Path, launch: Option<&str>) -> Result<AreaInput> {
     let shown = || file.display().to_string();
     let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", shown()))?;
     let is_plan = file.extension().is_some_and(|e| e == "plan");
@@ -65,7 +65,7 @@ pub fn read(file: &Path, launch: Option<&str>) -> Result<Site> {
     } else {
         of_geojson(&text)
     };
-    site(sheet.with_context(shown)?, launch).with_context(shown)
+    in_plane(sheet.with_context(shown)?, launch).with_context(shown)
 }
 
 fn of_plan(text: &str) -> Result<Sheet> {
@@ -132,7 +132,7 @@ fn of_geojson(text: &str) -> Result<Sheet> {
     Ok(sheet)
 }
 
-fn site(sheet: Sheet, launch: Option<&str>) -> Result<Site> {
+fn in_plane(sheet: Sheet, launch: Option<&str>) -> Result<AreaInput> {
     let [
         Drawn {
             name,
@@ -175,7 +175,7 @@ fn site(sheet: Sheet, launch: Option<&str>) -> Result<Site> {
             .with_context(|| name.clone())?;
         Polygon::new(ring).with_context(|| name.clone())
     });
-    Ok(Site {
+    Ok(AreaInput {
         origin,
         area: polygon(ring, name)?,
         holes: holes.collect::<Result<_>>()?,

@@ -2,13 +2,13 @@
 //!
 //! Leaves to [`super::lanes`] the plans of a team.
 
+use super::PlannerError;
 use super::flights::Flights;
-use super::flyers::Flyer;
 use super::lanes::{Care, Desk};
-use super::objective::Objective;
-use anyhow::Result;
-use skein_survey::fleet::sections::alike;
-use skein_survey::fleet::team_selection::{kinds, search};
+use crate::fleet::sections::alike;
+use crate::fleet::team_selection::{kinds, search};
+use crate::objective::Objective;
+use crate::team::PlannedUav;
 
 /// Teams are compared with this part of the steps.
 const SEARCH_PART: usize = 8;
@@ -23,19 +23,23 @@ const MOST_PACED: usize = 6;
 ///
 /// # Errors
 /// When there is no plan for any team.
-pub fn choose(desk: &Desk<'_>, flyers: &[Flyer], steps: usize) -> Result<Vec<Flights>> {
+pub(crate) fn choose(
+    desk: &Desk<'_>,
+    uavs: &[PlannedUav],
+    steps: usize,
+) -> Result<Vec<Flights>, PlannerError> {
     let care = Care {
         steps,
         rough: false,
     };
-    let whole = desk.plans(flyers, care);
+    let whole = desk.plans(uavs, care);
     let mut found: Vec<Flights> = Vec::new();
     // Apart for each kind, so that asking for both is never worse than asking for one.
     for desk in desk.kinds() {
-        if let Some(team) = who(&desk, flyers, steps / SEARCH_PART)
-            && team.len() < flyers.len()
+        if let Some(team) = who(&desk, uavs, steps / SEARCH_PART)
+            && team.len() < uavs.len()
         {
-            found.extend(desk.plans(&members(flyers, &team), care)?);
+            found.extend(desk.plans(&members(uavs, &team), care)?);
         }
     }
     match whole {
@@ -48,7 +52,7 @@ pub fn choose(desk: &Desk<'_>, flyers: &[Flyer], steps: usize) -> Result<Vec<Fli
         && let Some(first) = found
             .iter()
             .reduce(|a, b| if desk.beats(b, a) { b } else { a })
-        && let Some(paced) = paced(desk, flyers, first, steps / SEARCH_PART)
+        && let Some(paced) = paced(desk, uavs, first, steps / SEARCH_PART)
     {
         found.extend(desk.plans(&paced, care).unwrap_or_default());
     }
@@ -68,19 +72,24 @@ pub fn choose(desk: &Desk<'_>, flyers: &[Flyer], steps: usize) -> Result<Vec<Fli
     Ok(best)
 }
 
-fn members(flyers: &[Flyer], team: &[usize]) -> Vec<Flyer> {
-    team.iter().map(|i| flyers[*i].clone()).collect()
+fn members(uavs: &[PlannedUav], team: &[usize]) -> Vec<PlannedUav> {
+    team.iter().map(|i| uavs[*i].clone()).collect()
 }
 
 /// Those who fly in a plan, with less work for whom others do it better, if that helps:
 /// a UAV that costs less flies as long as it can.
-fn paced(desk: &Desk<'_>, flyers: &[Flyer], plan: &Flights, steps: usize) -> Option<Vec<Flyer>> {
-    let flies = |f: &&Flyer| {
+fn paced(
+    desk: &Desk<'_>,
+    uavs: &[PlannedUav],
+    plan: &Flights,
+    steps: usize,
+) -> Option<Vec<PlannedUav>> {
+    let flies = |f: &&PlannedUav| {
         plan.flights
             .iter()
             .any(|own| own.uav == f.uav && own.flies())
     };
-    let mut team: Vec<Flyer> = flyers.iter().filter(flies).cloned().collect();
+    let mut team: Vec<PlannedUav> = uavs.iter().filter(flies).cloned().collect();
     if !(2..=MOST_PACED).contains(&team.len()) {
         return None;
     }
@@ -101,24 +110,24 @@ fn paced(desk: &Desk<'_>, flyers: &[Flyer], plan: &Flights, steps: usize) -> Opt
     changed.then_some(team)
 }
 
-fn best_of(desk: &Desk<'_>, team: &[Flyer], care: Care) -> Option<Flights> {
+fn best_of(desk: &Desk<'_>, team: &[PlannedUav], care: Care) -> Option<Flights> {
     let plans = desk.plans(team, care).ok()?.into_iter();
     plans.reduce(|a, b| if desk.beats(&b, &a) { b } else { a })
 }
 
 /// The team that promises the best plan.
-fn who(desk: &Desk<'_>, flyers: &[Flyer], steps: usize) -> Option<Vec<usize>> {
+fn who(desk: &Desk<'_>, uavs: &[PlannedUav], steps: usize) -> Option<Vec<usize>> {
     let evaluate = |team: &[usize]| -> Option<Flights> {
         let rough = Care { steps, rough: true };
-        best_of(desk, &members(flyers, team), rough)
+        best_of(desk, &members(uavs, team), rough)
     };
     let better = |a: &Flights, b: &Flights| desk.beats(a, b);
     if desk.objective != Objective::Time {
-        let found = search(&kinds(flyers, Flyer::is_like), evaluate, better);
+        let found = search(&kinds(uavs, PlannedUav::is_like), evaluate, better);
         return found.map(|(team, _)| team);
     }
     // More UAVs are sooner, but for those with so narrow a swath that all get their lanes.
-    let swaths: Vec<f64> = flyers.iter().map(|f| f.swath_m).collect();
+    let swaths: Vec<f64> = uavs.iter().map(|f| f.swath_m).collect();
     let groups = alike(&swaths);
     if groups.len() < 2 {
         return None;

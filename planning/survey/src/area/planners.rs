@@ -3,63 +3,35 @@
 //!
 //! Leaves to [`super::lanes`] which UAVs work on which part.
 
-use super::approximate::{self, Request};
-use super::around::Around;
-use super::flights::Flight;
-use super::flyers::Flyer;
-use super::site::Site;
-use anyhow::{Result, ensure};
-use serde_json::{Map, Value, json};
+use super::cells::{self, CellProblem};
+use super::{AreaRequest, Facts, Planner, PlannerError, Shape, ShapeKind};
+use crate::detours::{DetourError, Detours};
+use crate::flight::Flight;
+use crate::passes::{self, plan_team};
+use crate::team::PlannedUav;
 use skein_flight::coverage::passes::{Directions, Pass, PassesError, PassesProblem};
-use skein_geometry::Polygon;
 use skein_geometry::frame::Point;
 use skein_geometry::offset::Zone;
-use skein_survey::passes::{self, plan_team};
+use skein_geometry::{NoFlyZones, Polygon};
 
 /// Steps of improvement of the approximate planner for each of the exact one's: its steps
 /// are smaller.
 const CELL_STEPS: usize = 50;
 
-/// The planners.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Planner {
-    /// Straight passes over the area as it is drawn.
-    Exact,
-    /// Lane cells.
-    Approximate,
-}
-
-impl Planner {
-    /// What it is called.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Exact => "exact",
-            Self::Approximate => "approximate",
-        }
-    }
-}
-
-/// What all plans of one area share.
-pub struct Ground<'a> {
-    /// The area.
-    pub site: &'a Site,
-    /// Distance kept from every zone, metres.
-    pub clearance_m: f64,
-    /// How far the camera sees before and behind, metres; half a lane if not said.
-    pub look_ahead_m: Option<f64>,
-    /// Headings of lanes.
-    pub directions: Directions,
-    around: Around,
+/// What all plans of one area share: the request, and the zones grown by the clearance.
+pub(crate) struct OpenArea<'a> {
+    /// What is asked.
+    pub request: &'a AreaRequest,
+    detours: Detours,
 }
 
 /// A part of the area, and who sees it.
 #[derive(Clone, Copy)]
-pub struct Job<'a> {
+pub(crate) struct Job<'a> {
     /// The part.
     pub area: &'a Polygon,
     /// Who flies.
-    pub crew: &'a [Flyer],
+    pub crew: &'a [PlannedUav],
     /// Width of the lanes, metres.
     pub lane_m: f64,
     /// Turn radius that lanes are ordered for, metres.
@@ -70,15 +42,15 @@ pub struct Job<'a> {
 
 /// The flights over a part.
 #[derive(Default)]
-pub struct Part {
+pub(crate) struct Part {
     /// In the order of the crew.
     pub flights: Vec<Flight>,
     /// The share of its lanes that endurance lets it fly.
     pub done_share: f64,
-    /// What else is worth telling.
-    pub more: Map<String, Value>,
-    /// Rings with properties for a map.
-    pub shapes: Vec<(Vec<Point>, Value)>,
+    /// What the planner tells of its own.
+    pub facts: Option<Facts>,
+    /// Rings for a map.
+    pub shapes: Vec<Shape>,
     seen: Seen,
 }
 
@@ -92,13 +64,12 @@ enum Seen {
         across_m: f64,
         along_m: f64,
     },
-    Cells(Box<approximate::Flights>),
+    Cells(Box<cells::CellFlights>),
 }
 
 impl Part {
     /// Whether a point is seen.
-    #[must_use]
-    pub fn sees(&self, p: Point) -> bool {
+    pub(crate) fn sees(&self, p: Point) -> bool {
         match &self.seen {
             Seen::Nothing => false,
             Seen::Passes {
@@ -111,63 +82,55 @@ impl Part {
     }
 
     /// When its last UAV is back, seconds.
-    #[must_use]
-    pub fn makespan_s(&self) -> f64 {
+    pub(crate) fn makespan_s(&self) -> f64 {
         self.flights.iter().map(Flight::time_s).fold(0.0, f64::max)
     }
 }
 
-impl<'a> Ground<'a> {
+impl<'a> OpenArea<'a> {
     /// The area with its zones grown by the clearance; `starts` are the UAVs'.
     ///
     /// # Errors
     /// When the clearance is no length.
-    pub fn new(
-        site: &'a Site,
-        clearance_m: f64,
-        look_ahead_m: Option<f64>,
-        course_deg: Option<f64>,
+    pub(crate) fn new(
+        request: &'a AreaRequest,
         starts: impl Iterator<Item = Point>,
-    ) -> Result<Self> {
+    ) -> Result<Self, DetourError> {
         Ok(Self {
-            site,
-            clearance_m,
-            look_ahead_m,
-            directions: match course_deg {
-                Some(course) => Directions::Fixed((90.0 - course).to_radians()),
-                None => Directions::Best,
-            },
-            around: around(site, clearance_m, starts)?,
+            request,
+            detours: detours(&request.area, &request.zones, request.clearance_m, starts)?,
         })
     }
 
     /// Whether a point of the area is to be seen: not in a hole, and not nearer to a zone
     /// than the clearance.
-    #[must_use]
-    pub fn wants(&self, p: Point) -> bool {
-        !self.around.forbids(p) && !self.site.holes.iter().any(|h| h.contains(p))
+    pub(crate) fn wants(&self, p: Point) -> bool {
+        !self.detours.forbids(p) && !self.request.holes.iter().any(|h| h.contains(p))
     }
 
     /// Plans a part.
     ///
     /// # Errors
     /// When there is no plan.
-    pub fn plan(&self, planner: Planner, job: Job<'_>) -> Result<Part> {
+    pub(crate) fn plan(&self, planner: Planner, job: Job<'_>) -> Result<Part, PlannerError> {
         match planner {
             Planner::Exact => self.exact(job),
             Planner::Approximate => self.approximate(job),
         }
     }
 
-    fn exact(&self, job: Job<'_>) -> Result<Part> {
-        let look_ahead_m = self.look_ahead_m.unwrap_or(job.lane_m / 2.0);
+    fn exact(&self, job: Job<'_>) -> Result<Part, PlannerError> {
+        let look_ahead_m = self.request.look_ahead_m.unwrap_or(job.lane_m / 2.0);
         let problem = PassesProblem {
-            holes: self.site.holes.clone(),
-            zones: self.site.zones.clone(),
-            clearance_m: self.clearance_m,
+            holes: self.request.holes.clone(),
+            zones: self.request.zones.clone(),
+            clearance_m: self.request.clearance_m,
             look_ahead_m,
             steps: job.steps,
-            directions: self.directions,
+            directions: match self.request.heading_rad {
+                Some(heading) => Directions::Fixed(heading),
+                None => Directions::Best,
+            },
             ..PassesProblem::new(
                 job.area.clone(),
                 job.lane_m,
@@ -175,25 +138,25 @@ impl<'a> Ground<'a> {
                 Point::origin(),
             )
         };
-        let member = |flyer: &Flyer| passes::Uav {
-            speed: flyer.speed_mps * flyer.pace,
+        let uav = |uav: &PlannedUav| passes::Uav {
+            speed: uav.speed_mps * uav.pace,
             // In the time of that pace, so that the length is the same.
-            endurance: flyer.endurance_s / flyer.pace,
-            ..passes::Uav::at(flyer.start)
+            endurance: uav.endurance_s / uav.pace,
+            ..passes::Uav::at(uav.start)
         };
-        let members: Vec<passes::Uav> = job.crew.iter().map(member).collect();
-        let plan = match plan_team(&problem, &members) {
+        let team: Vec<passes::Uav> = job.crew.iter().map(uav).collect();
+        let plan = match plan_team(&problem, &team) {
             // A section that zones and holes fill is no work.
-            Err(PassesError::Nothing) if job.area != &self.site.area => {
+            Err(PassesError::Nothing) if job.area != &self.request.area => {
                 return Ok(Part::at_home(&job));
             }
             plan => plan?,
         };
-        let flights = job.crew.iter().enumerate().map(|(i, flyer)| {
-            let mut flight = flight(flyer, &job, &plan.tracks[i], plan.lengths_m[i]);
+        let flights = job.crew.iter().enumerate().map(|(i, uav)| {
+            let mut flight = flight(uav, &job, &plan.tracks[i], plan.lengths_m[i]);
             let passes = plan.tours[i].len();
             flight.lap = lap(&plan.tracks[i], &plan.tours[i]);
-            flight.more.insert("passes".to_owned(), json!(passes));
+            flight.passes = Some(passes);
             if passes == 0 {
                 flight.track.truncate(1);
             }
@@ -201,8 +164,12 @@ impl<'a> Ground<'a> {
         });
         let flights = flights.collect();
         let shapes = plan.cells.iter().enumerate().map(|(i, cell)| {
-            let properties = json!({"cell": i + 1, "area_m2": cell.area_m2});
-            (cell.ring.clone(), properties)
+            let kind = ShapeKind::Cell {
+                number: i + 1,
+                area_m2: cell.area_m2,
+            };
+            let ring = cell.ring.clone();
+            Shape { ring, kind }
         });
         let passes: Vec<Pass> = plan.tours.into_iter().flatten().collect();
         let length_m = |passes: &[Pass]| passes.iter().map(Pass::length_m).sum();
@@ -210,12 +177,12 @@ impl<'a> Ground<'a> {
         Ok(Part {
             flights,
             done_share: flown_m / (flown_m + left_m).max(f64::MIN_POSITIVE),
-            more: fields(json!({
-                "area_m2": plan.cells.iter().map(|c| c.area_m2).sum::<f64>(),
-                "cells": plan.cells.len(),
-                "passes": passes.len(),
-                "unserved_passes": plan.unserved.len(),
-            })),
+            facts: Some(Facts::Passes {
+                area_m2: plan.cells.iter().map(|c| c.area_m2).sum(),
+                cells: plan.cells.len(),
+                passes: passes.len(),
+                unserved_passes: plan.unserved.len(),
+            }),
             shapes: shapes.collect(),
             seen: Seen::Passes {
                 passes,
@@ -225,37 +192,40 @@ impl<'a> Ground<'a> {
         })
     }
 
-    fn approximate(&self, job: Job<'_>) -> Result<Part> {
-        for flyer in job.crew {
-            check_start(&self.around, &flyer.name, flyer.start)?;
+    fn approximate(&self, job: Job<'_>) -> Result<Part, PlannerError> {
+        for uav in job.crew {
+            check_start(&self.detours, &uav.name, uav.start)?;
         }
-        let plan = approximate::plan(&Request {
+        let plan = cells::plan(&CellProblem {
             area: job.area,
-            holes: &self.site.holes,
-            around: &self.around,
+            holes: &self.request.holes,
+            detours: &self.detours,
             team: job.crew,
             lane_m: job.lane_m,
             steps: job.steps.saturating_mul(CELL_STEPS),
         })?;
         let flights = job.crew.iter().enumerate();
-        let flights = flights.map(|(i, flyer)| Flight {
+        let flights = flights.map(|(i, uav)| Flight {
             lap: plan.laps[i].clone(),
-            ..flight(flyer, &job, &plan.tracks[i], plan.lengths_m[i])
+            ..flight(uav, &job, &plan.tracks[i], plan.lengths_m[i])
         });
         let cells = plan.raster.map.n_free();
         let left = plan.left.iter();
         Ok(Part {
             flights: flights.collect(),
             done_share: 1.0 - plan.left.len() as f64 / cells.max(1) as f64,
-            more: fields(json!({
-                "lower_bound_s": plan.least_s,
-                "cells": cells,
-                "cells_blocked": plan.raster.n_blocked,
-                "cells_left": plan.left.len(),
-                "turns_fit": 2.0 * job.turn_radius_m <= job.lane_m,
-            })),
+            facts: Some(Facts::Cells {
+                lower_bound_s: plan.least_s,
+                cells,
+                cells_blocked: plan.raster.n_blocked,
+                cells_left: plan.left.len(),
+                turns_fit: 2.0 * job.turn_radius_m <= job.lane_m,
+            }),
             shapes: left
-                .map(|p| (square(*p, job.lane_m), json!({"left": true})))
+                .map(|p| Shape {
+                    ring: square(*p, job.lane_m),
+                    kind: ShapeKind::LeftCell,
+                })
                 .collect(),
             seen: Seen::Cells(Box::new(plan)),
         })
@@ -265,7 +235,7 @@ impl<'a> Ground<'a> {
 impl Part {
     /// Nothing to see: all stay.
     fn at_home(job: &Job<'_>) -> Self {
-        let stay = |flyer| flight(flyer, job, &[], 0.0);
+        let stay = |uav| flight(uav, job, &[], 0.0);
         Self {
             flights: job.crew.iter().map(stay).collect(),
             done_share: 1.0,
@@ -274,52 +244,52 @@ impl Part {
     }
 }
 
-/// The zones of a site to fly round, from these starts too.
+/// The zones of an area to fly round, from these starts too.
 ///
 /// # Errors
 /// When the clearance is no length.
-pub fn around(
-    site: &Site,
+pub(crate) fn detours(
+    area: &Polygon,
+    zones: &NoFlyZones,
     clearance_m: f64,
     starts: impl Iterator<Item = Point>,
-) -> Result<Around> {
-    let zones = site.zones.zones().iter().map(|zone| Zone {
+) -> Result<Detours, DetourError> {
+    let zones = zones.zones().iter().map(|zone| Zone {
         outer: zone.vertices().to_vec(),
         holes: Vec::new(),
     });
     let zones: Vec<Zone> = zones.collect();
-    let places: Vec<Point> = starts.chain(site.area.vertices().iter().copied()).collect();
-    Around::new(&zones, clearance_m, &places)
+    let places: Vec<Point> = starts.chain(area.vertices().iter().copied()).collect();
+    Detours::new(&zones, clearance_m, &places)
 }
 
 /// Refuses a start in a zone.
 ///
 /// # Errors
 /// Names the UAV.
-pub fn check_start(around: &Around, name: &str, start: Point) -> Result<()> {
-    ensure!(
-        !around.forbids(start),
-        "the launch point of {name} lies in a zone or nearer to one than the clearance"
-    );
+pub(crate) fn check_start(detours: &Detours, name: &str, start: Point) -> Result<(), PlannerError> {
+    if detours.forbids(start) {
+        return Err(PlannerError::LaunchInZone(name.to_owned()));
+    }
     Ok(())
 }
 
 /// One UAV's flight; without a track it stays at its start.
-pub fn flight(flyer: &Flyer, job: &Job<'_>, track: &[Point], length_m: f64) -> Flight {
+fn flight(uav: &PlannedUav, job: &Job<'_>, track: &[Point], length_m: f64) -> Flight {
     Flight {
-        uav: flyer.uav,
-        name: flyer.name.clone(),
+        uav: uav.uav,
+        name: uav.name.clone(),
         track: match track {
-            [] => vec![flyer.start],
+            [] => vec![uav.start],
             track => track.to_vec(),
         },
         lap: Vec::new(),
         length_m,
-        speed_mps: flyer.speed_mps,
-        turn_radius_m: flyer.turn_radius_m,
+        speed_mps: uav.speed_mps,
+        turn_radius_m: uav.turn_radius_m,
         lane_m: job.lane_m,
-        cruise_power_w: flyer.cruise_power_w,
-        more: Map::new(),
+        cruise_power_w: uav.cruise_power_w,
+        passes: None,
     }
 }
 
@@ -334,14 +304,6 @@ fn lap(track: &[Point], passes: &[Pass]) -> Vec<Point> {
         .and_then(|p| track.iter().rposition(place(p.to)));
     let ends = from.zip(to).filter(|(from, to)| from <= to);
     ends.map_or_else(|| track.to_vec(), |(from, to)| track[from..=to].to_vec())
-}
-
-/// The fields of an object.
-fn fields(object: Value) -> Map<String, Value> {
-    match object {
-        Value::Object(fields) => fields,
-        _ => Map::new(),
-    }
 }
 
 /// A square round a point, to show a cell.

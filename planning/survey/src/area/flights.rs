@@ -1,0 +1,134 @@
+//! Flights of a team over an area while plans are compared, and the share that they see.
+
+use super::{Facts, Figures, Laid, Planner, Shape};
+use crate::flight::Flight;
+use crate::objective::Worth;
+use skein_geometry::Polygon;
+use skein_geometry::frame::Point;
+
+/// Points of the area that are looked at to tell the share that is seen: a tenth of a
+/// percent is one in a thousand.
+pub(crate) const MOST_SAMPLES: f64 = 40_000.0;
+
+/// Samples along a swath at least.
+const SAMPLES_A_SWATH: f64 = 8.0;
+
+/// What a planner made.
+#[derive(Clone, Debug)]
+pub(crate) struct Flights {
+    /// Which planner.
+    pub planner: Planner,
+    /// How the lanes are laid.
+    pub laid: Laid,
+    /// Of the UAVs that were planned for; some may stay at their start.
+    pub flights: Vec<Flight>,
+    /// The share of the area that is seen.
+    pub covered_share: f64,
+    /// What the planner tells of its own; none where nothing was to be planned.
+    pub facts: Option<Facts>,
+    /// Rings for a map.
+    pub shapes: Vec<Shape>,
+}
+
+impl Flights {
+    /// When the last UAV is back, seconds.
+    pub(crate) fn makespan_s(&self) -> f64 {
+        self.flights.iter().map(Flight::time_s).fold(0.0, f64::max)
+    }
+
+    fn energy_wh(&self) -> Option<f64> {
+        self.flights
+            .iter()
+            .filter(|f| f.flies())
+            .map(Flight::energy_wh)
+            .sum()
+    }
+
+    /// What it is compared by; energies in watt-hours or in seconds of cruise.
+    pub(crate) fn worth(&self, in_watt_hours: bool) -> Worth {
+        let cruise_s = || self.flights.iter().map(Flight::energy_s).sum();
+        Worth {
+            share: self.covered_share,
+            makespan_s: self.makespan_s(),
+            total_m: self.flights.iter().map(|f| f.length_m).sum(),
+            energy: match self.energy_wh() {
+                Some(energy_wh) if in_watt_hours => energy_wh,
+                _ => cruise_s(),
+            },
+        }
+    }
+
+    /// What a person compares.
+    pub(crate) fn figures(&self) -> Figures {
+        let worth = self.worth(false);
+        Figures {
+            planner: self.planner,
+            laid: self.laid,
+            makespan_s: worth.makespan_s,
+            covered_share: worth.share,
+            total_m: worth.total_m,
+            energy_s: worth.energy,
+            energy_wh: self.energy_wh(),
+            uavs_flying: self.flights.iter().filter(|f| f.flies()).count(),
+        }
+    }
+}
+
+/// The share of the wanted ground of an area that is seen, by samples.
+pub(crate) fn covered_share(
+    area: &Polygon,
+    wanted: impl Fn(Point) -> bool,
+    swath_m: f64,
+    most_samples: f64,
+    sees: impl Fn(Point) -> bool,
+) -> f64 {
+    let (low, high) = area.bounds();
+    let size = high - low;
+    let pitch_m = (swath_m / SAMPLES_A_SWATH).max((size.x * size.y / most_samples).sqrt());
+    let (mut all, mut seen) = (0u32, 0u32);
+    let mut y = low.y + pitch_m / 2.0;
+    while y < high.y {
+        let mut x = low.x + pitch_m / 2.0;
+        while x < high.x {
+            let p = Point::new(x, y);
+            if area.contains(p) && wanted(p) {
+                all += 1;
+                seen += u32::from(sees(p));
+            }
+            x += pitch_m;
+        }
+        y += pitch_m;
+    }
+    f64::from(seen) / f64::from(all.max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_measured() {
+        let at = |x: f64, y: f64| Point::new(x, y);
+        let square = |half: f64| {
+            Polygon::new(vec![
+                at(-half, -half),
+                at(half, -half),
+                at(half, half),
+                at(-half, half),
+            ])
+            .unwrap()
+        };
+        let (area, hole) = (square(100.0), square(50.0));
+        let half = covered_share(&area, |_| true, 40.0, MOST_SAMPLES, |p| p.x > 0.0);
+        assert!((half - 0.5).abs() < 0.01);
+        let rest = covered_share(
+            &area,
+            |p| !hole.contains(p),
+            40.0,
+            MOST_SAMPLES,
+            |p| p.x.abs() > 50.0,
+        );
+        // 2 × 50 × 200 of 30,000 square metres.
+        assert!((rest - 2.0 / 3.0).abs() < 0.01, "{rest}");
+    }
+}

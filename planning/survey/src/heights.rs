@@ -1,0 +1,125 @@
+//! Heights of flights that come near to each other: a layer for all that stay apart
+//! (D2.7 §3.6).
+//!
+//! Leaves the colouring to [`crate::fleet::layers`].
+
+use crate::fleet::layers::layers;
+use crate::team::Uav;
+use skein_geometry::frame::Point;
+use thiserror::Error;
+
+/// Height between two layers unless said otherwise, metres: twice what a barometer errs.
+pub const LAYER_STEP_M: f64 = 20.0;
+
+/// How flights are kept apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Separation {
+    /// Distance below which two flights get different heights, metres; `None` for twice
+    /// the widest turn or twice the clearance, whichever is more. Within two such
+    /// distances of a common start it does not count; 0 leaves all at one height.
+    pub distance_m: Option<f64>,
+    /// Height between two layers, metres; 0 leaves all at one height.
+    pub layer_step_m: f64,
+}
+
+/// A separation is no distance. Nothing was planned.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum NoSeparation {
+    /// `distance_m`.
+    #[error("the separation must be 0 or more, found {0}")]
+    Distance(f64),
+    /// `layer_step_m`.
+    #[error("the step between layers must be 0 or more, found {0}")]
+    LayerStep(f64),
+}
+
+impl Separation {
+    /// What turns and clearance ask for, in layers of [`LAYER_STEP_M`].
+    pub const BY_TURNS: Self = Self {
+        distance_m: None,
+        layer_step_m: LAYER_STEP_M,
+    };
+
+    /// All at one height.
+    pub const FLAT: Self = Self {
+        distance_m: None,
+        layer_step_m: 0.0,
+    };
+
+    pub(crate) fn check(&self) -> Result<(), NoSeparation> {
+        let distance = |x: f64| x.is_finite() && x >= 0.0;
+        match self.distance_m {
+            Some(x) if !distance(x) => return Err(NoSeparation::Distance(x)),
+            _ => {}
+        }
+        if !distance(self.layer_step_m) {
+            return Err(NoSeparation::LayerStep(self.layer_step_m));
+        }
+        Ok(())
+    }
+
+    fn distance_m(&self, team: &[Uav], clearance_m: f64) -> f64 {
+        let turns = team.iter().map(|u| u.turn_radius_m);
+        let widest_m = turns.fold(clearance_m, f64::max);
+        self.distance_m.unwrap_or(2.0 * widest_m)
+    }
+
+    /// By UAV: its height above home, metres; `lowest_m` for the lowest layer.
+    pub(crate) fn heights_m(
+        &self,
+        team: &[Uav],
+        clearance_m: f64,
+        tracks: &[Vec<Point>],
+        lowest_m: f64,
+    ) -> Vec<f64> {
+        if self.layer_step_m <= 0.0 {
+            return vec![lowest_m; tracks.len()];
+        }
+        let layers = layers(tracks, self.distance_m(team, clearance_m));
+        let height = |layer: &usize| lowest_m + self.layer_step_m * *layer as f64;
+        layers.iter().map(height).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::team::Sensor;
+
+    #[test]
+    fn flights_that_cross_have_heights_of_their_own() {
+        let by_turns = Separation {
+            distance_m: None,
+            layer_step_m: 25.0,
+        };
+        by_turns.check().unwrap();
+        let camera = Sensor::Swath { width_m: 50.0 };
+        let mut team = vec![Uav::new("a", Point::origin(), 15.0, 30.0, camera); 3];
+        assert!((by_turns.distance_m(&team, 10.0) - 60.0).abs() < 1e-9);
+        assert!((by_turns.distance_m(&team, 40.0) - 80.0).abs() < 1e-9);
+        let track =
+            |from: (f64, f64), to: (f64, f64)| [from, to].map(|(x, y)| Point::new(x, y)).to_vec();
+        let tracks = [
+            track((0.0, -500.0), (0.0, 500.0)),
+            track((-500.0, 0.0), (500.0, 0.0)),
+            track((0.0, 900.0), (500.0, 900.0)),
+        ];
+        let close = |heights: &[f64], expected: [f64; 3]| {
+            let near = |(a, b): (&f64, f64)| (a - b).abs() < 1e-9;
+            assert!(heights.iter().zip(expected).all(near), "{heights:?}");
+        };
+        let heights = by_turns.heights_m(&team, 10.0, &tracks, 100.0);
+        close(&heights, [100.0, 125.0, 100.0]);
+        let flat = Separation::FLAT.heights_m(&team, 10.0, &tracks, 100.0);
+        close(&flat, [100.0; 3]);
+        team[1].turn_radius_m = 50.0;
+        assert!((by_turns.distance_m(&team, 10.0) - 100.0).abs() < 1e-9);
+        for (distance_m, layer_step_m) in [(Some(-1.0), 20.0), (None, f64::NAN)] {
+            let wrong = Separation {
+                distance_m,
+                layer_step_m,
+            };
+            assert!(wrong.check().is_err());
+        }
+    }
+}

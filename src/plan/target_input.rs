@@ -1,0 +1,175 @@
+//! Points or lines of a file with the team that is to see them, in the plane of the depot.
+
+use super::tour_args::TourArgs;
+use super::zone_input::{self, Heights};
+use super::{lat_lon, team_input};
+use anyhow::{Context, Result};
+use serde_json::Value;
+use skein_geometry::frame::{Origin, Point};
+use skein_geometry::offset::Zone;
+use skein_interop::place::{LatLon, to_plane};
+use skein_interop::targets::{self, read};
+use skein_interop::{geojson, plan};
+use skein_survey::team::Uav;
+use skein_survey::tours::{LineTarget, PointTarget, Targets};
+use skein_survey::zones::flight_zones;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// What of a file is to be seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Its points.
+    Points,
+    /// Its lines.
+    Lines,
+}
+
+/// What a file asks for, and who flies.
+pub struct TargetInput {
+    /// The depot: the origin of the plane.
+    pub origin: Origin,
+    /// What is to be seen.
+    pub targets: Targets,
+    /// The zones of the file and of the flag.
+    pub zones: Vec<Zone>,
+    /// The UAVs.
+    pub team: Vec<Uav>,
+    /// What of the file was left out.
+    pub notices: Vec<String>,
+}
+
+impl TargetInput {
+    /// Reads a file; the depot is the flag's, or the file's home position, or its first
+    /// target.
+    ///
+    /// # Errors
+    /// When a file or a flag is wrong; names the place.
+    pub fn read(kind: Kind, file: &Path, args: &TourArgs, turn_radius_m: f64) -> Result<Self> {
+        let shown = || file.display().to_string();
+        let text =
+            std::fs::read_to_string(file).with_context(|| format!("cannot read {}", shown()))?;
+        let found = read(&text).with_context(shown)?;
+        let mut notices: Vec<String> = found.notices.iter().map(ToString::to_string).collect();
+        let (first, others) = match kind {
+            Kind::Points => (found.points.first().map(|p| p.at), found.lines.len()),
+            Kind::Lines => {
+                let first = found.lines.first().and_then(|l| l.way.first());
+                (first.copied(), found.points.len())
+            }
+        };
+        if others > 0 {
+            notices.push(match kind {
+                Kind::Points => format!("{others} line(s) ignored: `plan line` plans for lines"),
+                Kind::Lines => format!("{others} point(s) ignored: `plan visit` plans for points"),
+            });
+        }
+        let depot = match &args.depot {
+            Some(text) => lat_lon(text).context("--depot")?,
+            None => found
+                .home
+                .or(first)
+                .context("the file holds nothing to plan")?,
+        };
+        let origin = Origin {
+            lat_deg: depot.lat_deg,
+            lon_deg: depot.lon_deg,
+        };
+        let team = team_input::team(
+            args.fleet.as_deref(),
+            args.k,
+            args.speed_mps,
+            args.endurance_s,
+        )?;
+        args.output.check(team.len())?;
+        let mut zones = zones_inside(file, &text, origin)?;
+        if let Some(file) = &args.zones {
+            zones.extend(zones_of(file, origin).context("--zones")?);
+        }
+        let defaults = team_input::Defaults {
+            swath_m: args.swath_m,
+            turn_radius_m,
+        };
+        let team = team_input::in_plane(&team, origin, defaults)?;
+        let targets = match kind {
+            Kind::Points => Targets::Points(points(&found.points, origin)?),
+            Kind::Lines => Targets::Lines(lines(&found.lines, origin)?),
+        };
+        Ok(Self {
+            origin,
+            targets,
+            zones,
+            team,
+            notices,
+        })
+    }
+}
+
+fn points(found: &[targets::PointTarget], origin: Origin) -> Result<Vec<PointTarget>> {
+    let point = |p: &targets::PointTarget| -> Result<PointTarget> {
+        Ok(PointTarget {
+            name: p.pointer.clone(),
+            at: to_plane(origin, p.at).with_context(|| p.pointer.clone())?,
+            radius_m: p.radius_m,
+            sensor: p.sensor.clone(),
+        })
+    };
+    found.iter().map(point).collect()
+}
+
+/// Lines whose points are the same where their coordinates are to the seventh decimal, a
+/// centimetre.
+fn lines(found: &[targets::LineTarget], origin: Origin) -> Result<Vec<LineTarget>> {
+    #[allow(clippy::cast_possible_truncation, reason = "at most 1.8e9")]
+    let key = |deg: f64| (deg * 1e7).round() as i64;
+    let mut known: BTreeMap<(i64, i64), Point> = BTreeMap::new();
+    let mut all = Vec::new();
+    for line in found {
+        let mut way = Vec::new();
+        for p in &line.way {
+            let at = to_plane(origin, *p).with_context(|| line.pointer.clone())?;
+            let first = known.entry((key(p.lat_deg), key(p.lon_deg))).or_insert(at);
+            way.push(*first);
+        }
+        all.push(LineTarget {
+            name: line.pointer.clone(),
+            way,
+            width_m: line.width_m,
+            sensor: line.sensor.clone(),
+        });
+    }
+    Ok(all)
+}
+
+/// All zones and fences of a file.
+fn zones_of(file: &Path, origin: Origin) -> Result<Vec<Zone>> {
+    let input = zone_input::read(file, origin, Heights::Ignored)?;
+    Ok(flight_zones(&input.keep_out, &input.keep_in, &[], None).zones)
+}
+
+/// Zones that a file of targets holds itself: fences of a `.plan`, polygons of GeoJSON
+/// with the property `"no_fly": true`.
+fn zones_inside(file: &Path, text: &str, origin: Origin) -> Result<Vec<Zone>> {
+    let named = || file.display().to_string();
+    if file.extension().is_some_and(|e| e == "plan") {
+        // Without a fence there is nothing to read twice.
+        let fences = plan::read(text).with_context(named)?;
+        if fences.keep_in.is_empty() && fences.keep_out.is_empty() {
+            return Ok(Vec::new());
+        }
+        return zones_of(file, origin);
+    }
+    let mut zones = Vec::new();
+    for f in geojson::read(text).with_context(named)?.polygons {
+        if f.properties.get("no_fly").and_then(Value::as_bool) == Some(true) {
+            let ring = f.ring.iter().map(|p: &LatLon| to_plane(origin, *p));
+            zones.push(Zone {
+                outer: ring
+                    .collect::<Result<_, _>>()
+                    .with_context(|| f.pointer.clone())?,
+                holes: Vec::new(),
+            });
+        }
+    }
+    Ok(zones)
+}
