@@ -24,7 +24,7 @@ use std::process::ExitCode;
 /// --storm the faults are drawn from the scenario's storm. With --seeds many runs are
 /// summed up. The same seed gives the same history on every machine, for any --jobs.
 /// A single run ends with the same report as a trial. Exit code 1 if a run did not
-/// complete or broke a rule.
+/// complete or broke a rule; docs/protocol.md §8 says what each rule means.
 #[derive(Debug, Args)]
 pub struct SimArgs {
     /// A scenario file or the name of a built-in scenario; without it the default one.
