@@ -305,7 +305,7 @@ fn sources(folders: &[&str]) -> Vec<PathBuf> {
 fn the_loop_is_derived_in_one_place_of_the_simulator() {
     for file in sources(&["netsim/sim/src", "netsim/broker/src", "src"]) {
         let text = std::fs::read_to_string(&file).unwrap();
-        let here = text.contains(".geometry()") || text.contains("CoverageLoop::build");
+        let here = text.contains(".geometry()") || text.contains("lanes::build(");
         let allowed = file.ends_with("netsim/sim/src/geometry_cache.rs");
         assert!(!here || allowed, "{} derives a loop", file.display());
     }

@@ -379,6 +379,7 @@ fn is_complete(open: &OpenRound) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry_cache::GeometryCache;
     use crate::world::fixture;
     use skein_geometry::frame::Point;
     use skein_peer::wire::message::{CellRun, ListedRun, Member, Round, Stamp};
@@ -401,7 +402,8 @@ mod tests {
     impl Case {
         fn new(loss: bool) -> Self {
             let spec = fixture::square(2);
-            let lp = Arc::clone(&spec.mission.geometry().unwrap().coverage_loop);
+            let geometry = GeometryCache::default().of(&spec.mission).unwrap();
+            let lp = Arc::clone(&geometry.coverage_loop);
             let round = Round {
                 counter: 1,
                 members: [1, 2].map(|id| Member { id, incarnation: 1 }).to_vec(),
