@@ -685,11 +685,27 @@ mod tests {
     #[test]
     fn a_way_along_the_loop_is_taken_only_where_it_is_not_longer() {
         let t = transit(6, 4, vec![]);
-        let from = t.place(0, Forward);
-        let near = t.connect(&from, 2, Forward).unwrap();
-        assert!(near.iter().all(|m| matches!(m, Move::Pass(..))), "{near:?}");
+        let n = u16::try_from(t.coverage_loop.len()).unwrap();
+        let length_m = |moves: &[Move]| moves.iter().map(|m| t.length_m(m)).sum::<f64>();
+        let (mut along, mut direct) = (0, 0);
+        for first in 0..n {
+            for count in [1, 2, 5, n / 2] {
+                let from = t.place(first, Forward);
+                let moves = t.connect(&from, (first + count) % n, Forward).unwrap();
+                let cells = (0..count).map(|k| (first + k) % n);
+                let around: Vec<Move> = cells.map(|c| Move::Pass(c, Forward)).collect();
+                let (way_m, around_m) = (length_m(&moves), length_m(&around));
+                assert!(
+                    way_m <= around_m + 1e-6,
+                    "{first} {count}: {way_m} {around_m}"
+                );
+                let passes = moves.iter().all(|m| matches!(m, Move::Pass(..)));
+                *(if passes { &mut along } else { &mut direct }) += 1;
+            }
+        }
+        assert!(along > 0 && direct > 0, "{along} {direct}");
         // Back where it came from it has to turn.
-        let back = t.connect(&from, 0, Backward).unwrap();
+        let back = t.connect(&t.place(0, Forward), 0, Backward).unwrap();
         assert!(back.iter().any(|m| matches!(m, Move::Route(_))));
     }
 
