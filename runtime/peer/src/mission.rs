@@ -492,4 +492,13 @@ mod tests {
         assert!(library.chunk(0, &pieces[0]).is_err());
         assert_eq!(library.newest().unwrap().revision, 1);
     }
+
+    #[test]
+    fn only_a_newer_mission_replaces_the_one_held() {
+        let mut library = Library::new(Some(Arc::new(mission(3, 4))));
+        for (revision, held) in [(2, 3), (3, 3), (5, 5), (4, 5)] {
+            library.offer(Arc::new(mission(revision, 5)));
+            assert_eq!(library.newest().unwrap().revision, held);
+        }
+    }
 }

@@ -295,4 +295,21 @@ mod tests {
             "it was written for the old loop"
         );
     }
+
+    #[test]
+    fn covered_cells_are_carried_to_another_loop_by_name() {
+        let of = |cols| crate::testing::mission(1, cols, 4).geometry().unwrap();
+        let (before, after) = (of(6), of(8));
+        let (old, new) = (&before.coverage_loop, &after.coverage_loop);
+        let mut renumbered = 0;
+        for (i, cell) in (0u16..).zip(old.cells()) {
+            let n = u16::try_from(old.len()).unwrap();
+            let carried = carried_over(old, &CellSet::of(n, [i]), new);
+            let found: Vec<u16> = carried.iter().collect();
+            let wanted = new.index_of(cell.id).filter(|_| cell.needed);
+            assert_eq!(found, wanted.into_iter().collect::<Vec<_>>());
+            renumbered += u32::from(wanted.is_some_and(|w| w != i));
+        }
+        assert!(renumbered > 0, "no cell has another number");
+    }
 }

@@ -416,3 +416,22 @@ fn a_ground_station_that_is_restarted_takes_part_again() {
         assert!(ready.iter().any(|t| *t > 40_000), "{ready:?}");
     }
 }
+
+#[test]
+fn a_peer_that_stands_still_is_silent_and_is_missed() {
+    let faults = vec![
+        at(30_000, Fault::Pause { peer: 4 }),
+        at(60_000, Fault::Resume { peer: 4 }),
+    ];
+    let o = run(&prepared(4), 3, faults, true);
+    completed(&o);
+    let missed = o.entries.iter().any(|e| {
+        let told = match &e.what {
+            What::Report { report, .. } => report,
+            _ => return false,
+        };
+        matches!(told, Report::Membership { peer, status, .. }
+            if peer.0 == 4 && *status == skein_peer::output::Status::Down)
+    });
+    assert!(missed, "nobody missed it");
+}

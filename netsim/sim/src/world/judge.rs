@@ -637,4 +637,20 @@ mod tests {
         assert_eq!((c.at_ms, c.a, c.b), (200, 1, 2));
         assert!((c.distance_m - 6.0).abs() < 1e-12);
     }
+
+    #[test]
+    fn all_is_covered_with_the_very_last_cell_and_not_before() {
+        let mut judge = judge_with(&[]);
+        let survey = Arc::clone(&judge.survey);
+        let cells = survey.cells();
+        let mut left = cells.iter().filter(|c| c.uncoverable.is_none()).count();
+        assert!(left > 5);
+        for (i, _) in cells.iter().enumerate() {
+            assert_eq!(judge.complete(), left == 0, "{left} cells are left");
+            let sighting = Sighting { at_ms: 9, uav: 1 };
+            judge.see(i, sighting, &mut Vec::new());
+            left -= usize::from(cells[i].uncoverable.is_none());
+        }
+        assert!(left == 0 && judge.complete());
+    }
 }

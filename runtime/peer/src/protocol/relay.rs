@@ -568,4 +568,27 @@ mod tests {
         assert!(bytes <= 64_000 / 8 * 10, "{bytes}");
         assert!(bytes >= 64_000 / 8 * 10 * 4 / 10, "{bytes}");
     }
+
+    #[test]
+    fn a_full_store_lets_telemetry_go_before_claims() {
+        let of_kind = |author: u16, kind: Kind| Record {
+            kind: kind.number(),
+            ..record(author, 1)
+        };
+        let mut r = relay(2);
+        let half = u16::try_from(MAX_RECORDS / 2).unwrap();
+        // The claims were on the air longest ago.
+        for author in 0..half {
+            let claim = of_kind(1000 + author, Kind::Claim);
+            r.offer(Time(1000), &claim, &[1; 40], 0);
+        }
+        for author in 0..2 * half {
+            let state = of_kind(5000 + author, Kind::State);
+            r.offer(Time(2000), &state, &[1; 40], 0);
+        }
+        let held = r.records();
+        let claims = held.iter().filter(|h| h.kind == Kind::Claim.number());
+        assert_eq!(held.len(), MAX_RECORDS);
+        assert_eq!(claims.count(), usize::from(half));
+    }
 }

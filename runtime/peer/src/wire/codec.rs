@@ -680,4 +680,18 @@ mod tests {
             prop_assert!(decode_record(&bytes[..at.index(bytes.len())]).is_err());
         }
     }
+
+    #[test]
+    fn a_round_that_asks_to_wait_for_longer_than_a_day_is_refused() {
+        for (wait_ms, refused) in [(DURATION_MAX_MS, false), (DURATION_MAX_MS + 1, true)] {
+            let bid = largest().into_iter().find_map(|body| match body {
+                Body::Bid(bid) => Some(bid),
+                _ => None,
+            });
+            let mut bid = bid.unwrap();
+            bid.round.wait_ms = wait_ms;
+            let read = decode_body(Kind::Bid, &encode_body(&Body::Bid(bid)));
+            assert_eq!(read.is_err(), refused, "{wait_ms} ms");
+        }
+    }
 }

@@ -264,3 +264,62 @@ fn made_up_ids_do_not_displace_the_living() {
     m.on_beacon(Time(20_000), 499, 1, &beacon(1, Vec::new()));
     assert_eq!((m.all().count(), m.live().count()), (MAX_KNOWN, 1));
 }
+
+/// A heartbeat of peer 2 that peer 3 has suspected for so long, tenths of a second.
+fn told_suspicion(suspected_ds: u16) -> Gossip {
+    Gossip {
+        id: 2,
+        incarnation: 1,
+        heartbeat: 1,
+        age_ds: 50,
+        hops: 1,
+        suspected_ds: Some(suspected_ds),
+        able: true,
+        max_seq: 0,
+        digest: 0,
+    }
+}
+
+#[test]
+fn of_two_suspicions_of_a_heartbeat_the_older_one_counts() {
+    // Its own suspicion begins at 4.25 s; k2 is 4.5 s.
+    for (told_ds, down_at_ms) in [(30, 6_500), (1, 8_750)] {
+        let mut m = Membership::new(1, 1000);
+        m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
+        let mut down = None;
+        for t in 0..60 {
+            let now = Time(t * 250);
+            if t == 20 {
+                m.on_beacon(now, 3, 1, &beacon(1, vec![told_suspicion(told_ds)]));
+            }
+            let changes = m.tick(now);
+            if changes
+                .iter()
+                .any(|c| (c.peer, c.status) == (2, Status::Down))
+            {
+                down = down.or(Some(now.0));
+            }
+        }
+        assert_eq!(down, Some(down_at_ms), "told {told_ds} tenths");
+    }
+}
+
+#[test]
+fn a_loop_that_ran_late_doubts_its_verdicts_for_a_period() {
+    for (late, suspects_at_ms) in [(false, 4_250), (true, 5_500)] {
+        let mut m = Membership::new(1, 1000);
+        m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
+        let mut suspected = None;
+        for t in 0..40 {
+            // The loop stands still for two and a half seconds.
+            if late && (9..18).contains(&t) {
+                continue;
+            }
+            let now = Time(t * 250);
+            if m.tick(now).iter().any(|c| c.status == Status::Suspect) {
+                suspected = suspected.or(Some(now.0));
+            }
+        }
+        assert_eq!(suspected, Some(suspects_at_ms), "late {late}");
+    }
+}
