@@ -298,7 +298,11 @@ mod tests {
 
     #[test]
     fn covered_cells_are_carried_to_another_loop_by_name() {
-        let of = |cols| crate::testing::mission(1, cols, 4).geometry().unwrap();
+        let of = |cols| {
+            Arc::new(crate::testing::mission(1, cols, 4))
+                .geometry()
+                .unwrap()
+        };
         let (before, after) = (of(6), of(8));
         let (old, new) = (&before.coverage_loop, &after.coverage_loop);
         let mut renumbered = 0;
