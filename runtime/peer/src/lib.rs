@@ -83,7 +83,7 @@
 //!
 //! `Publish` is a one-hop broadcast: there are no addressees. `Store` is answered by
 //! `Stored` when the record is durable, not before. `Compute` is answered by `Computed`
-//! with what [`plan::solve`] returned, computed wherever the driver likes.
+//! with what [`offload::run`] returned, computed wherever the driver likes.
 
 pub mod beliefs;
 pub mod cells;
