@@ -2,18 +2,7 @@
 
 use skein_geometry::frame::Point;
 
-/// From a point to the piece of a line between two others, metres.
-#[must_use]
-pub fn to_piece_m(p: Point, a: Point, b: Point) -> f64 {
-    let along = b - a;
-    let square = along.norm_squared();
-    let t = if square > 0.0 {
-        ((p - a).dot(&along) / square).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    (p - (a + along * t)).norm()
-}
+pub use skein_survey::measure::to_piece_m;
 
 /// Crossing parity of a ray to the right.
 #[must_use]

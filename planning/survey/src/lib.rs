@@ -57,7 +57,7 @@ pub mod detours;
 pub mod fleet;
 pub mod flight;
 pub mod heights;
-mod measure;
+pub mod measure;
 pub mod objective;
 pub mod passes;
 pub mod patrol;

@@ -3,7 +3,8 @@
 use skein_geometry::frame::Point;
 
 /// From a point to the piece of a line between two others, metres.
-pub(crate) fn to_piece_m(p: Point, a: Point, b: Point) -> f64 {
+#[must_use]
+pub fn to_piece_m(p: Point, a: Point, b: Point) -> f64 {
     let along = b - a;
     let square = along.norm_squared();
     let t = if square > 0.0 {

@@ -4,6 +4,7 @@
 //! What counts is where flights lead, not when: UAVs that wait, or that are blown off
 //! their times, are still apart. Leaves to the caller what a layer is in metres.
 
+use crate::measure::to_piece_m;
 use skein_geometry::frame::Point;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -186,19 +187,14 @@ fn apart_m(one: [Point; 2], other: [Point; 2]) -> f64 {
     if parts(one, other) && parts(other, one) {
         return 0.0;
     }
+    let ([a, b], [c, d]) = (one, other);
     let ends = [
-        to_piece_m(one[0], other),
-        to_piece_m(one[1], other),
-        to_piece_m(other[0], one),
-        to_piece_m(other[1], one),
+        to_piece_m(one[0], c, d),
+        to_piece_m(one[1], c, d),
+        to_piece_m(other[0], a, b),
+        to_piece_m(other[1], a, b),
     ];
     ends.into_iter().fold(f64::INFINITY, f64::min)
-}
-
-fn to_piece_m(p: Point, [a, b]: [Point; 2]) -> f64 {
-    let d = b - a;
-    let t = (p - a).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE);
-    (p - (a + d * t.clamp(0.0, 1.0))).norm()
 }
 
 #[cfg(test)]

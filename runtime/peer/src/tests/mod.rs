@@ -11,6 +11,7 @@ mod swarm;
 use crate::testing::Harness;
 use crate::wire::codec::{self, Body};
 use crate::wire::message::{Beacon, Record};
+use crate::wire::samples;
 
 /// The bytes of a record.
 fn record(author: u16, incarnation: u32, seq: u32, subject: u16, body: &Body) -> Vec<u8> {
@@ -28,20 +29,11 @@ fn record(author: u16, incarnation: u32, seq: u32, subject: u16, body: &Body) ->
 /// A beacon that says nothing but that somebody is there.
 fn beacon(heartbeat: u32, nonce: u32) -> Beacon {
     Beacon {
-        heartbeat,
-        east_mm: 0,
-        north_mm: 0,
-        heading_e4: 0,
         able: false,
-        ground_station: false,
-        finished: false,
         nonce,
-        counter: 0,
-        eccentricity: 1,
         revision: 0,
         loop_hash: 0,
-        cover_digest: 0,
-        gossip: Vec::new(),
+        ..samples::beacon(heartbeat)
     }
 }
 

@@ -7,6 +7,6 @@ pub mod kinds;
 pub mod limits;
 pub mod message;
 #[cfg(test)]
-mod samples;
+pub(crate) mod samples;
 pub mod schema;
 pub mod signature;

@@ -19,6 +19,26 @@ pub fn gossip(id: u16) -> Gossip {
     }
 }
 
+/// A beacon of an able UAV on loop 1 of revision 1, which gossips about nobody.
+pub fn beacon(heartbeat: u32) -> Beacon {
+    Beacon {
+        heartbeat,
+        east_mm: 0,
+        north_mm: 0,
+        heading_e4: 0,
+        able: true,
+        ground_station: false,
+        finished: false,
+        nonce: 1,
+        counter: 0,
+        eccentricity: 1,
+        revision: 1,
+        loop_hash: 1,
+        cover_digest: 0,
+        gossip: Vec::new(),
+    }
+}
+
 /// A run of twelve cells, listed typically.
 pub fn listing(first: u16) -> ListedRun {
     ListedRun {

@@ -4,6 +4,7 @@ use crate::input::Time;
 use crate::output::Status;
 use crate::protocol::membership::{Change, Membership};
 use crate::wire::message::Beacon;
+use crate::wire::samples;
 use proptest::prelude::*;
 use skein_geometry::random::SplitMix64;
 
@@ -54,20 +55,8 @@ struct Net {
 
 fn beacon(heartbeat: u32, eccentricity: u8) -> Beacon {
     Beacon {
-        heartbeat,
-        east_mm: 0,
-        north_mm: 0,
-        heading_e4: 0,
-        able: true,
-        ground_station: false,
-        finished: false,
-        nonce: 1,
-        counter: 0,
         eccentricity,
-        revision: 1,
-        loop_hash: 1,
-        cover_digest: 0,
-        gossip: Vec::new(),
+        ..samples::beacon(heartbeat)
     }
 }
 

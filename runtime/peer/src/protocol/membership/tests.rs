@@ -1,23 +1,12 @@
 //! One failure detector, step by step.
 
 use super::*;
+use crate::wire::samples;
 
 fn beacon(heartbeat: u32, gossip: Vec<Gossip>) -> Beacon {
     Beacon {
-        heartbeat,
-        east_mm: 0,
-        north_mm: 0,
-        heading_e4: 0,
-        able: true,
-        ground_station: false,
-        finished: false,
-        nonce: 1,
-        counter: 0,
-        eccentricity: 1,
-        revision: 1,
-        loop_hash: 1,
-        cover_digest: 0,
         gossip,
+        ..samples::beacon(heartbeat)
     }
 }
 

@@ -6,6 +6,7 @@ use crate::protocol::membership::many_detectors::Dice;
 use crate::protocol::relay::{Offer, Relay};
 use crate::wire::codec;
 use crate::wire::message::{Beacon, Record};
+use crate::wire::samples;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
@@ -125,20 +126,9 @@ impl Net {
             (g.max_seq, g.digest) = node.relay.version(g.id, g.incarnation);
         }
         let said = Beacon {
-            heartbeat: node.heartbeat,
-            east_mm: 0,
-            north_mm: 0,
-            heading_e4: 0,
-            able: true,
-            ground_station: false,
-            finished: false,
-            nonce: 1,
-            counter: 0,
             eccentricity: node.membership.eccentricity(now),
-            revision: 1,
-            loop_hash: 1,
-            cover_digest: 0,
             gossip,
+            ..samples::beacon(node.heartbeat)
         };
         node.relay.charge(now, BEACON_BYTES);
         for j in 0..self.nodes.len() {
@@ -280,7 +270,7 @@ fn a_large_record_gets_through_on_a_small_share() {
     for t in 0..200 {
         let now = Time(t * 100);
         for i in 1..=30 {
-            relay.on_beacon(now, i, &empty_beacon());
+            relay.on_beacon(now, i, &samples::beacon(1));
         }
         if t == 50 {
             relay.own(now, &record, codec::encode_record(&record));
@@ -334,7 +324,7 @@ fn a_flood_of_made_up_records_ends_at_the_caps() {
             signature: Vec::new(),
         };
         relay.offer(Time(5000 + t), &record, &codec::encode_record(&record), 0);
-        relay.on_beacon(Time(5000 + t), author, &empty_beacon());
+        relay.on_beacon(Time(5000 + t), author, &samples::beacon(1));
         for (name, used, cap) in relay.loads() {
             assert!(used <= cap, "{name}: {used} of {cap}");
         }
@@ -342,23 +332,4 @@ fn a_flood_of_made_up_records_ends_at_the_caps() {
         relay.poll(Time(5000 + t));
     }
     assert!(relay.next_timeout(Time(9000)).is_some());
-}
-
-fn empty_beacon() -> Beacon {
-    Beacon {
-        heartbeat: 1,
-        east_mm: 0,
-        north_mm: 0,
-        heading_e4: 0,
-        able: true,
-        ground_station: false,
-        finished: false,
-        nonce: 1,
-        counter: 0,
-        eccentricity: 1,
-        revision: 1,
-        loop_hash: 1,
-        cover_digest: 0,
-        gossip: Vec::new(),
-    }
 }
