@@ -4,6 +4,7 @@
 //! whose control port does not answer belongs to a trial that is gone.
 
 use serde::{Deserialize, Serialize};
+use skein_console::replace_private_file;
 use std::net::SocketAddr;
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
@@ -152,17 +153,12 @@ impl Registered {
     }
 
     fn write(&self) -> Result<(), RegistryError> {
-        let json = serde_json::to_vec_pretty(&self.entry).map_err(|e| RegistryError::Io {
-            path: self.path.clone(),
-            cause: e.into(),
-        })?;
-        // Written aside and moved into place, so that no reader sees half of it.
-        let aside = self.path.with_extension("new");
-        private_file(&aside, &json)?;
-        std::fs::rename(&aside, &self.path).map_err(|cause| RegistryError::Io {
+        let io = |cause| RegistryError::Io {
             path: self.path.clone(),
             cause,
-        })
+        };
+        let json = serde_json::to_vec_pretty(&self.entry).map_err(|e| io(e.into()))?;
+        replace_private_file(&self.path, &json).map_err(io)
     }
 }
 

@@ -13,11 +13,14 @@
 //! Nothing of a request is read before its token is known to be right. Lines have a
 //! longest length, connections a number and a time. A trial's control port speaks it,
 //! and the console of a ground station; what that may be asked for is [`Command`].
+//! Tokens, and what else only this user may read, are written by [`replace_private_file`].
 
 mod command;
 mod port;
+mod private_file;
 mod token;
 
 pub use command::Command;
 pub use port::{Answer, AskError, Asked, MAX_LINE_BYTES, Port, ask};
+pub use private_file::replace_private_file;
 pub use token::{Token, TokenError};

@@ -1,7 +1,7 @@
 //! A secret that only this user can read.
 
-use std::io::{ErrorKind, Write};
-use std::os::unix::fs::OpenOptionsExt;
+use crate::private_file::replace_private_file;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Bytes drawn for a token: nobody guesses 256 bits.
@@ -69,25 +69,11 @@ impl Token {
     /// # Errors
     /// When the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), TokenError> {
-        let file = |cause| TokenError::File {
+        let line = format!("{}\n", self.0);
+        replace_private_file(path, line.as_bytes()).map_err(|cause| TokenError::File {
             path: path.to_owned(),
             cause,
-        };
-        // Written aside and moved into place: what was there keeps neither its content
-        // nor its permissions.
-        let aside = path.with_extension("new");
-        match std::fs::remove_file(&aside) {
-            Err(cause) if cause.kind() != ErrorKind::NotFound => return Err(file(cause)),
-            _ => {}
-        }
-        let mut new = std::fs::OpenOptions::new()
-            .write(true)
-            .create_new(true)
-            .mode(0o600)
-            .open(&aside)
-            .map_err(file)?;
-        writeln!(new, "{}", self.0).map_err(file)?;
-        std::fs::rename(&aside, path).map_err(file)
+        })
     }
 
     /// Reads it from a file.

@@ -9,10 +9,9 @@
 
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Order;
+use skein_console::replace_private_file;
 use skein_peer::Mission;
-use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Write};
-use std::os::unix::fs::OpenOptionsExt;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -124,22 +123,7 @@ impl Standing {
             cause,
         };
         let json = serde_json::to_vec(&kept).map_err(|e| io(e.into()))?;
-        let mut aside = self.path.as_os_str().to_owned();
-        aside.push(".new");
-        let written = OpenOptions::new()
-            .write(true)
-            .create(true)
-            .truncate(true)
-            .mode(0o600)
-            .open(&aside)
-            .and_then(|mut file| file.write_all(&json).and_then(|()| file.sync_all()));
-        written.map_err(io)?;
-        std::fs::rename(&aside, &self.path).map_err(io)?;
-        // The new name is durable when its directory is.
-        let parent = self.path.parent().filter(|p| !p.as_os_str().is_empty());
-        File::open(parent.unwrap_or(Path::new(".")))
-            .and_then(|directory| directory.sync_all())
-            .map_err(io)?;
+        replace_private_file(&self.path, &json).map_err(io)?;
         self.kept = kept;
         Ok(())
     }

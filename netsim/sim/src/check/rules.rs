@@ -243,9 +243,7 @@ impl Rules {
         self.spoken.on_snapshot(snapshot, found);
         self.spread.on_snapshot(snapshot, found);
         self.airtime.on_snapshot(snapshot, found);
-        let bases = &self.bases;
-        let base = |revision| bases.range(..=revision).next_back().map(|(_, b)| *b);
-        self.flight.on_snapshot(snapshot, base, found);
+        self.on_way_home(snapshot, found);
     }
 
     /// Judges only what is flown: all else is over.
