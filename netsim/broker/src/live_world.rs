@@ -2,6 +2,7 @@
 
 use skein_behaviors::{Percept, Setpoint};
 use skein_link::LinkState;
+use skein_link::medium::Links as _;
 use skein_netsim::fault::Fault;
 use skein_netsim::radio::{LinkTable, Overlay};
 use skein_netsim::spec::Spec;

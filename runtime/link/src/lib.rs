@@ -1,15 +1,17 @@
-//! What a node and a world share: the queue before the channel, the link table, the
-//! fate of a transmission, counters, the frames of the vehicle stream.
+//! What a node and a world share: the radio channel with the queues before it, the fate
+//! of a transmission, counters, the frames of the vehicle stream.
 //!
-//! The radio is judged per message, at the receiver, by [`fate()`]: a pure function
-//! of the seed, the two ends, the number of the transmission and the state of the
-//! link. The simulator and a live node call the same one.
+//! There is one radio: [`Medium`] decides when a frame is on the air and who receives
+//! it. The simulator has one for all stations; in a trial each live node has one for
+//! the stations around it.
 
 pub mod counters;
 pub mod fate;
 pub mod frame;
+pub mod medium;
 pub mod queue;
 
 pub use counters::RadioCounters;
 pub use fate::{Fate, LinkState, Reason, fate};
+pub use medium::Medium;
 pub use queue::SendQueue;

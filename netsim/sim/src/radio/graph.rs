@@ -2,6 +2,7 @@
 //! (D2.7 §1.5.1).
 
 use super::LinkTable;
+use skein_link::medium::Links as _;
 use std::collections::VecDeque;
 
 impl LinkTable {

@@ -6,6 +6,7 @@
 use crate::fault::Fault;
 use crate::spec::RadioSpec;
 use crate::world::{Place, World};
+use skein_link::medium::Links;
 use skein_link::{LinkState, Reason};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -234,27 +235,25 @@ impl LinkTable {
         self.nodes.binary_search(&node).ok()
     }
 
-    /// Whether a node has a working radio.
+    /// Whether two nodes hear each other both ways.
     #[must_use]
-    pub fn present(&self, node: u16) -> bool {
-        self.index_of(node)
-            .is_some_and(|i| self.places[i].is_some())
+    pub fn joined(&self, a: u16, b: u16) -> bool {
+        self.state(a, b).is_up() && self.state(b, a).is_up()
     }
+}
 
-    /// The link from `tx` to `rx`; down for a node that is absent or unknown, and to
-    /// itself.
-    #[must_use]
-    pub fn state(&self, tx: u16, rx: u16) -> LinkState {
+impl Links for LinkTable {
+    /// Down for a node that is absent or unknown, and to itself.
+    fn state(&self, tx: u16, rx: u16) -> LinkState {
         match (self.index_of(tx), self.index_of(rx)) {
             (Some(i), Some(j)) => self.states[i * self.nodes.len() + j],
             _ => DOWN,
         }
     }
 
-    /// Whether two nodes hear each other both ways.
-    #[must_use]
-    pub fn joined(&self, a: u16, b: u16) -> bool {
-        self.state(a, b).is_up() && self.state(b, a).is_up()
+    fn present(&self, node: u16) -> bool {
+        self.index_of(node)
+            .is_some_and(|i| self.places[i].is_some())
     }
 }
 

@@ -5,11 +5,12 @@
 //! |---|---|
 //! | [`link`] | the state of every link, from range, sight and faults |
 //! | [`graph`] | who is connected with whom over how many hops |
-//! | [`medium`] | the half-duplex channel: queues, airtime, collisions |
+//!
+//! The half-duplex channel itself, with its queues, airtime and collisions, is
+//! [`skein_link::medium`].
 
 pub mod graph;
 pub mod link;
-pub mod medium;
 
 pub use link::{Change, LinkTable, Overlay};
-pub use medium::{Delivery, Frame, Medium, Tally};
+pub use skein_link::medium::{Channel, Delivery, Frame, Medium, Tally};

@@ -5,7 +5,7 @@ use super::stream::{Concern, Stream};
 use crate::check::Graph;
 use crate::fault::Fault;
 use crate::prepared::Prepared;
-use crate::radio::{Delivery, Frame, LinkTable, Medium, Overlay, Tally};
+use crate::radio::{Channel, Delivery, Frame, LinkTable, Medium, Overlay, Tally};
 use crate::spec::RadioSpec;
 use crate::world::{Fact, Judge, World};
 use skein_behaviors::{Percept, Setpoint};
@@ -33,7 +33,14 @@ impl Air {
         let radio = prepared.spec.radio;
         Self {
             links: LinkTable::new(world.nodes(), radio),
-            medium: Medium::new(world.nodes(), radio, radio_seed),
+            medium: Medium::new(
+                world.nodes(),
+                Channel {
+                    rate_bps: radio.rate_bps,
+                    queue_age_ms: radio.queue_age_ms,
+                },
+                radio_seed,
+            ),
             overlay: Overlay::default(),
             world,
             radio,

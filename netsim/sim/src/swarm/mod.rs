@@ -522,7 +522,7 @@ impl Swarm {
                     key: bytes_hash(key.as_bytes()),
                     bytes: bytes.into(),
                     hops,
-                    priority,
+                    priority: priority as u8,
                     lifetime_ms,
                 };
                 self.air.transmit(self.now_ms, id, frame);

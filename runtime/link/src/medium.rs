@@ -3,18 +3,15 @@
 //! A station listens before it sends: it starts when it hears nobody, else it waits for
 //! the end of what it hears plus a short random time. A transmission lasts eight bits a
 //! byte at the channel's rate. At its end every other station either gets it or not:
-//! the link may be down, the draw of [`skein_link::fate()`] may lose it, the station may
+//! the link may be down, the draw of [`fate()`] may lose it, the station may
 //! have been sending itself, or it may have heard two at once, from senders that did
 //! not hear each other (or began within the same moment).
 //!
-//! Each station has one queue ([`skein_link::queue`]), as a live node has.
+//! Each station has one queue ([`crate::queue`]).
 
-use super::LinkTable;
-use crate::spec::RadioSpec;
-use skein_link::fate::mix;
-use skein_link::queue::{Queued, SendQueue, Waiting};
-use skein_link::{Fate, Reason, fate};
-use skein_peer::Priority;
+use crate::fate::mix;
+use crate::queue::{Queued, SendQueue, Waiting};
+use crate::{Fate, LinkState, Reason, fate};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -27,6 +24,23 @@ pub const BACKOFF_US: u64 = 16_000;
 /// takes from receiving to sending. Two stations that begin within it collide.
 pub const SENSE_US: u64 = 200;
 
+/// The channel itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Channel {
+    /// Its bit rate, bit/s.
+    pub rate_bps: u32,
+    /// Frames that waited longer than this are dropped, milliseconds.
+    pub queue_age_ms: u32,
+}
+
+/// Who hears whom at the moment.
+pub trait Links {
+    /// The link from `tx` to `rx`.
+    fn state(&self, tx: u16, rx: u16) -> LinkState;
+    /// Whether a station has a working radio.
+    fn present(&self, station: u16) -> bool;
+}
+
 /// What a station wants to send.
 #[derive(Clone, Debug)]
 pub struct Frame {
@@ -36,8 +50,8 @@ pub struct Frame {
     pub bytes: Arc<[u8]>,
     /// Hops the record has made before this transmission.
     pub hops: u8,
-    /// Which frames go first.
-    pub priority: Priority,
+    /// Which frames go first: the lower.
+    pub priority: u8,
     /// Dropped when it has not begun within this time, milliseconds.
     pub lifetime_ms: u32,
 }
@@ -126,7 +140,7 @@ struct OnAir {
 /// The channel and its stations.
 #[derive(Clone, Debug)]
 pub struct Medium {
-    radio: RadioSpec,
+    channel: Channel,
     seed: u64,
     stations: Vec<Station>,
     air: Vec<OnAir>,
@@ -142,8 +156,8 @@ enum Next {
 impl Medium {
     /// A silent channel with some stations.
     #[must_use]
-    pub fn new(nodes: &[u16], radio: RadioSpec, seed: u64) -> Self {
-        let stations = nodes.iter().map(|id| Station {
+    pub fn new(stations: &[u16], channel: Channel, seed: u64) -> Self {
+        let stations = stations.iter().map(|id| Station {
             id: *id,
             queue: SendQueue::default(),
             listen_us: None,
@@ -155,7 +169,7 @@ impl Medium {
         let mut stations: Vec<Station> = stations.collect();
         stations.sort_by_key(|s| s.id);
         Self {
-            radio,
+            channel,
             seed,
             stations,
             air: Vec::new(),
@@ -167,7 +181,7 @@ impl Medium {
     pub fn airtime_us(&self, n_bytes: usize) -> u64 {
         let bits = u64::try_from(n_bytes).unwrap_or(u64::MAX).saturating_mul(8);
         bits.saturating_mul(1_000_000)
-            .div_ceil(u64::from(self.radio.rate_bps.max(1)))
+            .div_ceil(u64::from(self.channel.rate_bps.max(1)))
             .max(1)
     }
 
@@ -246,7 +260,7 @@ impl Medium {
     /// Lets everything happen that is due up to now, under the links as they are, and
     /// returns what got through, in order of the transmissions' ends. The receptions
     /// may lie as far after now as the link's delay.
-    pub fn advance(&mut self, now_us: u64, links: &LinkTable) -> Vec<Delivery> {
+    pub fn advance(&mut self, now_us: u64, links: &impl Links) -> Vec<Delivery> {
         let mut out = Vec::new();
         while let Some((at_us, what)) = self.next().filter(|(at_us, _)| *at_us <= now_us) {
             match what {
@@ -265,8 +279,8 @@ impl Medium {
     }
 
     /// A station with something to send listens, and begins or waits.
-    fn listen(&mut self, at_us: u64, i: usize, links: &LinkTable) {
-        let queue_age_ms = self.radio.queue_age_ms;
+    fn listen(&mut self, at_us: u64, i: usize, links: &impl Links) {
+        let queue_age_ms = self.channel.queue_age_ms;
         let s = &mut self.stations[i];
         s.listen_us = None;
         s.expire(at_us, queue_age_ms);
@@ -309,7 +323,7 @@ impl Medium {
     }
 
     /// A transmission ends: every other station gets it or not.
-    fn end(&mut self, k: usize, links: &LinkTable, out: &mut Vec<Delivery>) {
+    fn end(&mut self, k: usize, links: &impl Links, out: &mut Vec<Delivery>) {
         self.air[k].over = true;
         let a = &self.air[k];
         let (i, tx, to_us) = (a.station, self.stations[a.station].id, a.to_us);
@@ -358,7 +372,7 @@ impl Medium {
 
     /// Whether something else was on the air at a receiver during a transmission: its
     /// own sending, or another one that it heard.
-    fn collides(&self, k: usize, rx: u16, links: &LinkTable) -> bool {
+    fn collides(&self, k: usize, rx: u16, links: &impl Links) -> bool {
         let a = &self.air[k];
         self.air.iter().enumerate().any(|(o, b)| {
             let other = self.stations[b.station].id;
@@ -388,13 +402,13 @@ impl Station {
 
 impl Queued for Frame {
     type Key = u64;
-    type Priority = Priority;
+    type Priority = u8;
 
     fn key(&self) -> &u64 {
         &self.key
     }
 
-    fn priority(&self) -> Priority {
+    fn priority(&self) -> u8 {
         self.priority
     }
 
@@ -406,36 +420,55 @@ impl Queued for Frame {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fault::Fault;
-    use crate::radio::Overlay;
-    use crate::spec::Spec;
-    use crate::world::World;
-    use crate::world::fixture::square;
-    use skein_link::queue::MAX_QUEUE;
+    use crate::queue::MAX_QUEUE;
 
-    fn spec(n: u16) -> Spec {
-        let mut s = square(n);
-        s.buildings.clear();
-        s.ground = None;
-        s
+    const CONFLICT: u8 = 0;
+    const CLAIM: u8 = 1;
+    const BEACON: u8 = 3;
+    const TELEMETRY: u8 = 4;
+
+    /// All hear each other, but for some that do not hear some.
+    #[derive(Default)]
+    struct Table {
+        /// From the first to the second.
+        cuts: Vec<(u16, u16)>,
+        loss_permille: u16,
     }
 
-    fn setup(spec: &Spec, cuts: &[(u16, u16)]) -> (LinkTable, Medium) {
-        let w = World::new(spec, 5);
-        let mut o = Overlay::default();
-        for (a, b) in cuts {
-            o.apply(&Fault::Cut {
-                a: *a,
-                b: *b,
-                one_way: false,
-            });
+    impl Links for Table {
+        fn state(&self, tx: u16, rx: u16) -> LinkState {
+            LinkState {
+                in_range: true,
+                in_sight: true,
+                cut: self.cuts.contains(&(tx, rx)),
+                loss_permille: self.loss_permille,
+                delay_ms: 5,
+            }
         }
-        let mut links = LinkTable::new(w.nodes(), spec.radio);
-        links.compute(&w, &o);
-        (links, Medium::new(w.nodes(), spec.radio, 5))
+
+        fn present(&self, _station: u16) -> bool {
+            true
+        }
     }
 
-    fn frame(key: u64, n_bytes: usize, priority: Priority) -> Frame {
+    /// So many stations at 64 kbit/s, with links cut both ways.
+    fn setup(n: u16, cuts: &[(u16, u16)]) -> (Table, Medium) {
+        let stations: Vec<u16> = (1..=n).collect();
+        let channel = Channel {
+            rate_bps: 64_000,
+            queue_age_ms: 2_000,
+        };
+        let links = Table {
+            cuts: cuts
+                .iter()
+                .flat_map(|(a, b)| [(*a, *b), (*b, *a)])
+                .collect(),
+            loss_permille: 0,
+        };
+        (links, Medium::new(&stations, channel, 5))
+    }
+
+    fn frame(key: u64, n_bytes: usize, priority: u8) -> Frame {
         Frame {
             key,
             bytes: vec![0u8; n_bytes].into(),
@@ -445,7 +478,7 @@ mod tests {
         }
     }
 
-    fn drain(m: &mut Medium, links: &LinkTable) -> Vec<Delivery> {
+    fn drain(m: &mut Medium, links: &impl Links) -> Vec<Delivery> {
         let mut all = Vec::new();
         while let Some(t) = m.next_event() {
             all.extend(m.advance(t, links));
@@ -455,8 +488,8 @@ mod tests {
 
     #[test]
     fn one_frame_takes_its_airtime_and_reaches_all() {
-        let (links, mut m) = setup(&spec(4), &[]);
-        m.submit(1_000_000, 2, frame(1, 100, Priority::Beacon));
+        let (links, mut m) = setup(4, &[]);
+        m.submit(1_000_000, 2, frame(1, 100, BEACON));
         let d = drain(&mut m, &links);
         assert_eq!(d.iter().map(|d| d.rx).collect::<Vec<_>>(), [1, 3, 4]);
         // 800 bits at 64 kbit/s are 12.5 ms; 5 ms delay; the rest is the wait.
@@ -472,12 +505,11 @@ mod tests {
 
     #[test]
     fn loss_is_as_stated_and_counted() {
-        let mut s = spec(3);
-        s.radio.loss_permille = 250;
-        let (links, mut m) = setup(&s, &[]);
+        let (mut links, mut m) = setup(3, &[]);
+        links.loss_permille = 250;
         let mut got = 0;
         for k in 0..4000u64 {
-            m.submit(k * 50_000, 1, frame(k, 20, Priority::Beacon));
+            m.submit(k * 50_000, 1, frame(k, 20, BEACON));
             got += drain(&mut m, &links).len();
         }
         let t = m.tally(1).unwrap();
@@ -489,12 +521,12 @@ mod tests {
 
     #[test]
     fn stations_in_earshot_take_turns() {
-        let (links, mut m) = setup(&spec(8), &[]);
+        let (links, mut m) = setup(8, &[]);
         let mut d = Vec::new();
         for k in 0..200u64 {
             d.extend(m.advance(k * 400_000, &links));
             for tx in 1..=8 {
-                m.submit(k * 400_000, tx, frame(u64::from(tx), 150, Priority::Beacon));
+                m.submit(k * 400_000, tx, frame(u64::from(tx), 150, BEACON));
             }
         }
         d.extend(drain(&mut m, &links));
@@ -511,18 +543,18 @@ mod tests {
     #[test]
     fn hidden_senders_collide_at_the_one_between() {
         // 1 and 3 hear 2, but not each other; 4 hears 3 alone.
-        let (links, mut m) = setup(&spec(4), &[(1, 3), (1, 4), (2, 4)]);
-        m.submit(0, 1, frame(1, 400, Priority::Beacon));
-        m.submit(0, 3, frame(2, 400, Priority::Beacon));
+        let (links, mut m) = setup(4, &[(1, 3), (1, 4), (2, 4)]);
+        m.submit(0, 1, frame(1, 400, BEACON));
+        m.submit(0, 3, frame(2, 400, BEACON));
         let d = drain(&mut m, &links);
         assert_eq!(d.iter().map(|d| (d.tx, d.rx)).collect::<Vec<_>>(), [(3, 4)]);
         let total = m.total();
         assert_eq!(total.dropped[&Reason::Collision], 2);
         assert_eq!(total.dropped[&Reason::Cut], 3);
         // One after the other both are heard.
-        m.submit(1_000_000, 1, frame(1, 400, Priority::Beacon));
+        m.submit(1_000_000, 1, frame(1, 400, BEACON));
         let mut d = drain(&mut m, &links);
-        m.submit(2_000_000, 3, frame(2, 400, Priority::Beacon));
+        m.submit(2_000_000, 3, frame(2, 400, BEACON));
         d.extend(drain(&mut m, &links));
         assert_eq!(
             d.iter().map(|d| (d.tx, d.rx)).collect::<Vec<_>>(),
@@ -533,20 +565,11 @@ mod tests {
     #[test]
     fn who_sends_hears_nothing() {
         // 2 does not hear 1, but 1 hears 2: 1 waits, 2 does not.
-        let s = spec(2);
-        let w = World::new(&s, 5);
-        let mut o = Overlay::default();
-        o.apply(&Fault::Cut {
-            a: 1,
-            b: 2,
-            one_way: true,
-        });
-        let mut links = LinkTable::new(w.nodes(), s.radio);
-        links.compute(&w, &o);
-        let mut m = Medium::new(w.nodes(), s.radio, 5);
+        let (mut links, mut m) = setup(2, &[]);
+        links.cuts.push((1, 2));
         // 1 sends a long frame; 2 begins in the middle of it and is not heard by 1.
-        m.submit(0, 1, frame(1, 1000, Priority::Beacon));
-        m.submit(40_000, 2, frame(2, 50, Priority::Beacon));
+        m.submit(0, 1, frame(1, 1000, BEACON));
+        m.submit(40_000, 2, frame(2, 50, BEACON));
         let d = drain(&mut m, &links);
         assert!(d.is_empty());
         assert_eq!(m.tally(2).unwrap().dropped[&Reason::Collision], 1);
@@ -555,15 +578,15 @@ mod tests {
 
     #[test]
     fn urgent_first_and_newest_value_in_the_old_place() {
-        let (links, mut m) = setup(&spec(2), &[]);
+        let (links, mut m) = setup(2, &[]);
         // The first one occupies the air while the others queue up.
-        m.submit(0, 1, frame(100, 200, Priority::Telemetry));
+        m.submit(0, 1, frame(100, 200, TELEMETRY));
         assert!(m.advance(BACKOFF_US, &links).is_empty());
-        m.submit(17_000, 1, frame(1, 50, Priority::Telemetry));
-        m.submit(17_001, 1, frame(2, 50, Priority::Telemetry));
-        m.submit(17_002, 1, frame(3, 50, Priority::Claim));
-        m.submit(17_003, 1, frame(4, 50, Priority::Conflict));
-        m.submit(17_004, 1, frame(1, 60, Priority::Telemetry));
+        m.submit(17_000, 1, frame(1, 50, TELEMETRY));
+        m.submit(17_001, 1, frame(2, 50, TELEMETRY));
+        m.submit(17_002, 1, frame(3, 50, CLAIM));
+        m.submit(17_003, 1, frame(4, 50, CONFLICT));
+        m.submit(17_004, 1, frame(1, 60, TELEMETRY));
         assert_eq!(m.n_waiting(1), 4);
         let d = drain(&mut m, &links);
         assert_eq!(
@@ -580,18 +603,18 @@ mod tests {
 
     #[test]
     fn what_waits_too_long_is_dropped() {
-        let (links, mut m) = setup(&spec(2), &[]);
+        let (links, mut m) = setup(2, &[]);
         // 20,000 bytes take 2.5 s; the age limit is 2 s, one frame's lifetime 100 ms.
-        m.submit(0, 1, frame(1, 20_000, Priority::Telemetry));
+        m.submit(0, 1, frame(1, 20_000, TELEMETRY));
         m.advance(BACKOFF_US, &links);
-        m.submit(17_000, 1, frame(2, 50, Priority::Conflict));
-        m.submit(2_000_000, 1, frame(3, 50, Priority::Beacon));
+        m.submit(17_000, 1, frame(2, 50, CONFLICT));
+        m.submit(2_000_000, 1, frame(3, 50, BEACON));
         m.submit(
             2_000_000,
             1,
             Frame {
                 lifetime_ms: 100,
-                ..frame(4, 50, Priority::Beacon)
+                ..frame(4, 50, BEACON)
             },
         );
         let d = drain(&mut m, &links);
@@ -599,7 +622,7 @@ mod tests {
         assert_eq!(m.tally(1).unwrap().dropped[&Reason::QueueAge], 2);
         // A queue has a cap.
         for k in 0..500 {
-            m.submit(9_000_000, 1, frame(k, 1, Priority::Beacon));
+            m.submit(9_000_000, 1, frame(k, 1, BEACON));
         }
         assert_eq!(m.n_waiting(1), MAX_QUEUE);
         m.silence(1);
@@ -608,34 +631,29 @@ mod tests {
 
     #[test]
     fn a_station_that_dies_while_sending_is_not_heard() {
-        let (links, mut m) = setup(&spec(3), &[]);
-        m.submit(0, 1, frame(1, 1000, Priority::Beacon));
+        let (links, mut m) = setup(3, &[]);
+        m.submit(0, 1, frame(1, 1000, BEACON));
         m.advance(20_000, &links);
         m.silence(1);
-        m.submit(20_000, 2, frame(2, 50, Priority::Beacon));
+        m.submit(20_000, 2, frame(2, 50, BEACON));
         let d = drain(&mut m, &links);
         assert_eq!(
             d.iter().map(|d| (d.tx, d.rx)).collect::<Vec<_>>(),
             [(2, 1), (2, 3)]
         );
-        m.submit(900_000, 1, frame(3, 10, Priority::Beacon));
+        m.submit(900_000, 1, frame(3, 10, BEACON));
         assert_eq!(drain(&mut m, &links).len(), 2, "and it can come back");
     }
 
     #[test]
     fn the_same_seed_gives_the_same_air() {
-        let mut s = spec(6);
-        s.radio.loss_permille = 100;
         let run = || {
-            let (links, mut m) = setup(&s, &[(1, 4), (2, 5)]);
+            let (mut links, mut m) = setup(6, &[(1, 4), (2, 5)]);
+            links.loss_permille = 100;
             let mut d = Vec::new();
             for k in 0..300u64 {
                 d.extend(m.advance(k * 17_000, &links));
-                m.submit(
-                    k * 17_000,
-                    (k % 6 + 1) as u16,
-                    frame(k % 11, 90, Priority::Beacon),
-                );
+                m.submit(k * 17_000, (k % 6 + 1) as u16, frame(k % 11, 90, BEACON));
             }
             d.extend(drain(&mut m, &links));
             d.iter()
