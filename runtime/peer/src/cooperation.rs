@@ -148,6 +148,16 @@ impl Cooperation {
         }
     }
 
+    /// For so long this peer did not listen: it waits that much longer for others.
+    pub fn was_late(&mut self, late_ms: u64, timers: &mut Timers) {
+        if let Some(state) = &mut self.state {
+            state.negotiation.was_late(late_ms);
+        }
+        if let Some(at) = timers.at(Timer::HeldCells) {
+            timers.set(Timer::HeldCells, at.plus_ms(late_ms));
+        }
+    }
+
     /// Asks for the geometry of the newest whole mission, unless it is held.
     pub fn consider_mission(&self) -> Effects {
         let newest = self.library.newest().filter(|newest| {

@@ -101,6 +101,7 @@ impl Peer {
     /// Takes one input at the peer's own time. Time that runs backwards stands still.
     pub fn handle(&mut self, now: Time, input: Input) {
         self.now = self.now.max(now);
+        self.notice_lateness();
         match input {
             Input::Start { persisted, nonce } if !self.started => {
                 return self.on_start(&persisted, nonce);
@@ -155,6 +156,17 @@ impl Peer {
         self.carry_out(effects);
         let effects = self.cooperation.consider_mission();
         self.carry_out(effects);
+    }
+
+    /// Whoever stood still, or whose clock jumped, was deaf meanwhile: what it waits for
+    /// from others it waits for in the time in which it listens.
+    fn notice_lateness(&mut self) {
+        let due = self.timers.at(Timer::Tick).unwrap_or(self.now);
+        let late_ms = self.now.since_ms(due);
+        if late_ms > self.period_ms() / 2 {
+            self.membership.was_late(self.now, late_ms);
+            self.cooperation.was_late(late_ms, &mut self.timers);
+        }
     }
 
     /// The timers that are due, then whatever may be sent now.

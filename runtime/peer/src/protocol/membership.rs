@@ -50,10 +50,6 @@ const HOP_PERIODS: u64 = 10;
 /// lost, two hardly are.
 const URGENT_PERIODS: u64 = 2;
 
-/// [`Membership::tick`] is wanted so often in a period: verdicts are late by a
-/// quarter period at most.
-const TICKS_PER_PERIOD: u64 = 4;
-
 /// A belief that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Change {
@@ -89,7 +85,6 @@ pub struct Membership {
     period_ms: u64,
     known: BTreeMap<u16, Known>,
     next_gossip: u16,
-    last_tick: Option<Time>,
     doubt_until: Time,
     /// Neighbours whose link the transport holds for gone.
     gone: BTreeSet<u16>,
@@ -104,7 +99,6 @@ impl Membership {
             period_ms: u64::from(period_ms.max(1)),
             known: BTreeMap::new(),
             next_gossip: 0,
-            last_tick: None,
             doubt_until: Time(0),
             gone: BTreeSet::new(),
         }
@@ -277,6 +271,7 @@ impl Membership {
             known.info.steady_since = now;
         }
         known.freshest = heard;
+        known.excused_ms = 0;
         if new_life || known.beaten_before.is_some_and(|h| h.count <= heard.count) {
             known.beaten_before = None;
         }
@@ -329,16 +324,20 @@ impl Membership {
         })
     }
 
-    /// Looks at the time: raises suspicions and passes verdicts. Returns what changed.
-    pub fn tick(&mut self, now: Time) -> Vec<Change> {
-        let late = self.last_tick.is_some_and(|last| {
-            now.since_ms(last) > self.period_ms / TICKS_PER_PERIOD + self.period_ms / 2
-        });
-        if late {
-            // What arrived meanwhile is heard within a period.
-            self.doubt_until = now.plus_ms(self.period_ms);
+    /// This peer came so late that it did not listen for a time, or its clock jumped: that
+    /// time is no silence of others, so no verdict counts it. What is told of ages does:
+    /// a heartbeat is as old as it is, whoever slept. What arrived meanwhile is heard
+    /// within a period; until then verdicts are doubted.
+    pub fn was_late(&mut self, now: Time, late_ms: u64) {
+        self.doubt_until = now.plus_ms(self.period_ms);
+        for known in self.known.values_mut() {
+            known.excuse(now, late_ms);
         }
-        self.last_tick = Some(now);
+    }
+
+    /// Looks at the time, wanted four times a period: raises suspicions and passes
+    /// verdicts. Returns what changed.
+    pub fn tick(&mut self, now: Time) -> Vec<Change> {
         assert!(
             self.known.len() <= MAX_KNOWN,
             "peers known keep to their cap"
@@ -348,7 +347,7 @@ impl Membership {
         let urgent_until = now.plus_ms(URGENT_PERIODS * self.period_ms);
         let mut changes = Vec::new();
         for known in self.known.values_mut().filter(|k| k.status != Status::Down) {
-            let silent_ms = known.freshest.age.ms(now);
+            let silent_ms = known.silent_ms(now);
             let neighbour = known.fewest_hops(oldest_period) == Some(1);
             let patience_ms = if self.gone.contains(&known.freshest.id) {
                 k1_ms / 2

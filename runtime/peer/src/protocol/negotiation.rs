@@ -200,6 +200,20 @@ impl Negotiation {
         self.loss_seen = true;
     }
 
+    /// For so long this peer did not listen: bids, claims and progress that it did not hear
+    /// meanwhile may have been said.
+    pub fn was_late(&mut self, late_ms: u64) {
+        let waits = [&mut self.orphan_since, &mut self.idle_since];
+        for since in waits.into_iter().flatten() {
+            *since = since.plus_ms(late_ms);
+        }
+        self.opened_at = self.opened_at.plus_ms(late_ms);
+        for progress in self.progress.values_mut() {
+            progress.since = progress.since.plus_ms(late_ms);
+            progress.bound = progress.bound.plus_ms(late_ms);
+        }
+    }
+
     /// Cells newly covered by this peer itself.
     pub fn covered_myself(&mut self, count: u16) {
         self.cells_since = self.cells_since.saturating_add(count);
@@ -931,6 +945,18 @@ mod tests {
         // Its ETA, a quarter more, ten periods, and two cells with 2 D T.
         let bound_ms = 10_000 + 2_500 + 10 * T + TWO_CELLS_MS + 2 * T;
         assert!((bound_ms..bound_ms + T).contains(&after_ms), "{after_ms}");
+    }
+
+    #[test]
+    fn who_stood_still_waits_as_long_again_as_if_it_had_not() {
+        let mut desk = Desk::new(&[2]);
+        desk.wait(5 * T).unwrap();
+        let counter = desk.round().counter;
+        desk.now = desk.now.plus_ms(T + 600 * T);
+        desk.negotiation.was_late(600 * T);
+        assert_eq!(desk.wait(3 * T), None, "neither a round nor a take");
+        assert_eq!(desk.round().counter, counter);
+        assert!(desk.wait(10 * T).is_some());
     }
 
     #[test]

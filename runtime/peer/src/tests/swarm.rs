@@ -190,3 +190,29 @@ fn the_same_story_gives_the_same_bytes() {
     };
     assert_eq!(story(), story());
 }
+
+#[test]
+fn a_clock_that_jumps_takes_nobody_for_dead_and_takes_over_nothing() {
+    let mut h = Harness::started(3, mission(1, 8, 6));
+    assert!(h.run_until(30, |h| divided(h, &[1, 2, 3])));
+    h.run_s(5);
+    h.isolate(3, true);
+    h.run_s(3);
+    h.seat(1).clock_ms += 3_600_000;
+    h.isolate(3, false);
+    let epoch = h.beliefs(1).epoch;
+    h.run_s(15);
+    assert_eq!(h.beliefs(1).epoch, epoch);
+    for id in 1..=3 {
+        let down = |(_, r): &(u64, Report)| {
+            matches!(
+                r,
+                Report::Membership {
+                    status: Status::Down,
+                    ..
+                }
+            )
+        };
+        assert!(!h.seat(id).reports.iter().any(down), "of {id}");
+    }
+}

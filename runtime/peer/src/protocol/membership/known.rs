@@ -34,6 +34,8 @@ pub(super) struct Heartbeat {
 #[derive(Clone, Debug)]
 pub(super) struct Known {
     pub(super) freshest: Heartbeat,
+    /// Of the time since the freshest heartbeat so much was no silence: nobody listened.
+    pub(super) excused_ms: u64,
     pub(super) status: Status,
     pub(super) info: Info,
     /// Fewest hops by period, for the last ten: (period, hops).
@@ -57,6 +59,7 @@ impl Known {
         };
         let mut known = Self {
             freshest: heard,
+            excused_ms: 0,
             status,
             info: Info {
                 steady_since: now,
@@ -69,6 +72,19 @@ impl Known {
         };
         known.note_hops(period, heard.hops);
         known
+    }
+
+    /// How long the peer was silent while this one listened.
+    pub(super) fn silent_ms(&self, now: Time) -> u64 {
+        self.freshest.age.ms(now).saturating_sub(self.excused_ms)
+    }
+
+    /// For so long nobody listened here: a refutation may have been missed.
+    pub(super) fn excuse(&mut self, now: Time, late_ms: u64) {
+        self.excused_ms = self.excused_ms.saturating_add(late_ms);
+        if let Some(suspected) = &mut self.freshest.suspected {
+            suspected.at = suspected.at.plus_ms(late_ms).min(now);
+        }
     }
 
     /// The heartbeat known, heard once more. Its age stays as first heard: taking the

@@ -74,11 +74,26 @@ fn an_old_heartbeat_does_not_raise_the_dead() {
 }
 
 #[test]
-fn a_late_loop_doubts_itself() {
+fn one_s_own_lateness_is_nobody_s_silence_but_the_age_that_is_told_is_true() {
     let mut m = Membership::new(1, 1000);
     m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
-    m.tick(Time(0));
-    assert!(m.tick(Time(9_000)).iter().all(|c| c.status != Status::Down));
+    m.tick(Time(1_000));
+    let mut now = Time(3_601_000);
+    m.was_late(now, 3_600_000);
+    assert_eq!(m.tick(now), []);
+    assert_eq!(m.gossip(now, 1)[0].age_ds, 36_010);
+    // From then on it is silent, and known to be down within what is left of the bound;
+    // more lateness puts that off.
+    m.was_late(now.plus_ms(60_000), 60_000);
+    now = now.plus_ms(60_000);
+    let woke = now;
+    while m.status(2) != Some((1, Status::Down)) {
+        now = now.plus_ms(250);
+        m.tick(now);
+        assert!(now.since_ms(woke) <= 20_000, "the excuse ends");
+    }
+    let silent_ms = 1_000 + now.since_ms(woke);
+    assert!((11_750..=12_000).contains(&silent_ms), "{silent_ms}");
 }
 
 fn entry(id: u16, heartbeat: u32, age_ds: u16, suspected_ds: Option<u16>) -> Gossip {
@@ -295,7 +310,7 @@ fn of_two_suspicions_of_a_heartbeat_the_older_one_counts() {
 
 #[test]
 fn a_loop_that_ran_late_doubts_its_verdicts_for_a_period() {
-    for (late, suspects_at_ms) in [(false, 4_250), (true, 5_500)] {
+    for (late, suspects_at_ms) in [(false, 4_250), (true, 6_500)] {
         let mut m = Membership::new(1, 1000);
         m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
         let mut suspected = None;
@@ -305,6 +320,9 @@ fn a_loop_that_ran_late_doubts_its_verdicts_for_a_period() {
                 continue;
             }
             let now = Time(t * 250);
+            if late && t == 18 {
+                m.was_late(now, 2_250);
+            }
             if m.tick(now).iter().any(|c| c.status == Status::Suspect) {
                 suspected = suspected.or(Some(now.0));
             }
