@@ -106,6 +106,9 @@ pub struct Forecast {
     pub heading: Direction,
     /// When it is there, milliseconds from now.
     pub release_ms: u32,
+    /// Where it is, if nothing keeps it from leaving for anywhere at once: it is in no cell,
+    /// and will serve none that soon.
+    pub off_loop: Option<Pose>,
     /// When all legs are flown, milliseconds from now.
     pub finish_ms: u32,
 }

@@ -119,6 +119,7 @@ impl Node {
             endurance_ms: 0,
             covered: self.sections.covered().encode_rle(None),
             commits: commits.collect(),
+            off_loop: Vec::new(),
             eta_ms: 0,
             adopted_ago_ms: 0,
             cells_since: 0,

@@ -39,7 +39,7 @@ impl Executive {
     /// Where the UAV will be `window_ms` from its last percept, at the end of a cell.
     ///
     /// The cell that it is in is always finished first. A UAV without legs is
-    /// foretold at the boundary that it reaches soonest. Where there is no way at
+    /// foretold at the boundary that it reaches soonest, and where it is. Where there is no way at
     /// all, or no percept yet, the release is [`UNREACHABLE_MS`].
     #[must_use]
     pub fn forecast(&self, window_ms: u32, is_open: &dyn Fn(u16) -> bool) -> Forecast {
@@ -81,6 +81,8 @@ impl Executive {
             before_m = item.end_m;
         }
         let on_loop = anchor.and_then(|(place, m)| place.boundary.map(|b| (b, m)));
+        let is_in_a_cell = kept > 0 && items.first().is_some_and(|i| i.cell.is_some());
+        let off_loop = (cells.is_empty() && !is_in_a_cell).then_some(from.pose);
         let found = on_loop.or_else(|| self.transit.way_on(from.pose).map(|(b, d, m)| ((b, d), m)));
         match found {
             Some(((anchor, heading), m)) => Forecast {
@@ -88,6 +90,7 @@ impl Executive {
                 anchor,
                 heading,
                 release_ms: self.ms(m),
+                off_loop,
                 finish_ms,
             },
             None => Self::nowhere(),
@@ -100,6 +103,7 @@ impl Executive {
             anchor: 0,
             heading: Direction::Forward,
             release_ms: UNREACHABLE_MS,
+            off_loop: None,
             finish_ms: 0,
         }
     }

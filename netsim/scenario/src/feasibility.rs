@@ -381,6 +381,7 @@ fn robot(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Uav {
         speed_mmps: whole(pace.loop_mps * 1000.0).max(1),
         turn_ms: whole(pace.turn_s * 1000.0),
         endurance_ms: whole(usable_s.max(0.0) * 1000.0),
+        off_loop: None,
     }
 }
 

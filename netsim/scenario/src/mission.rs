@@ -70,6 +70,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
         lap: 0,
         further_laps: laps(s)? - 1,
         tree: lanes.tree.unwrap_or_default(),
+        division: s.division,
     };
     check_size(s)?;
     check_places(s, &mission)?;

@@ -1,16 +1,31 @@
 //! Common ground derived once for many peers and many runs: the loop of a mission is
-//! a pure function of it, so a thousand runs of one scenario build it once.
+//! a pure function of it, so a thousand runs of one scenario build it once. So is a
+//! division of its problem, and all members of a round solve the same one.
 
+use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_peer::Mission;
 use skein_peer::mission::GeometryError;
-use skein_peer::offload::{Job, JobResult, MissionGeometry, run};
-use std::collections::BTreeMap;
+use skein_peer::offload::{Job, JobResult, MissionGeometry};
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 /// Answers by [`Mission::content_hash`]. Cheap to clone: the ground is shared.
 #[derive(Clone, Debug, Default)]
 pub struct GeometryCache {
     by_hash: BTreeMap<u64, Result<Arc<MissionGeometry>, GeometryError>>,
+    /// The newest divisions: all members of a round ask for the same.
+    divided: VecDeque<Divided>,
+}
+
+/// Divisions remembered: the parts of a swarm that is split negotiate at the same time.
+const DIVISIONS_KEPT: usize = 4;
+
+#[derive(Clone, Debug)]
+struct Divided {
+    loop_hash: u64,
+    ring: Vec<RingCell>,
+    robots: Vec<Uav>,
+    division: Division,
 }
 
 impl GeometryCache {
@@ -19,6 +34,7 @@ impl GeometryCache {
     pub fn holding(mission: &Mission, ground: Arc<MissionGeometry>) -> Self {
         Self {
             by_hash: BTreeMap::from([(mission.content_hash(), Ok(ground))]),
+            ..Self::default()
         }
     }
 
@@ -30,11 +46,32 @@ impl GeometryCache {
             .clone()
     }
 
-    /// Solves a problem, ground from memory.
+    /// Solves a problem, from memory if it was solved before.
     pub fn answer(&mut self, job: &Job) -> JobResult {
         match job {
             Job::Geometry(mission) => JobResult::Geometry(self.of(mission)),
-            Job::Divide { .. } => run(job),
+            Job::Divide {
+                geometry,
+                ring,
+                robots,
+            } => {
+                let loop_hash = geometry.coverage_loop.hash();
+                let is_same = |d: &&Divided| {
+                    d.loop_hash == loop_hash && d.ring == *ring && d.robots == *robots
+                };
+                if let Some(known) = self.divided.iter().find(is_same) {
+                    return JobResult::Divide(known.division.clone());
+                }
+                let division = geometry.divide(ring, robots);
+                self.divided.truncate(DIVISIONS_KEPT - 1);
+                self.divided.push_front(Divided {
+                    loop_hash,
+                    ring: ring.clone(),
+                    robots: robots.clone(),
+                    division: division.clone(),
+                });
+                JobResult::Divide(division)
+            }
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::fault::{Fault, TimedFault};
 use crate::prepared::Prepared;
 use crate::world::World;
 use skein_behaviors::{Event, Executive, Goal};
-use skein_flight::coverage::ring::backtracking::{Leg, RingCell, Uav, divide};
+use skein_flight::coverage::ring::backtracking::{Leg, OffLoop, RingCell, Uav};
 use skein_peer::offload::MissionGeometry;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -228,6 +228,7 @@ impl<'a> Baseline<'a> {
                 turn_ms: mind.turn_ms(),
                 endurance_ms: rounded((percept.endurance_s - u.airframe.reserve_s) * 1000.0)
                     .saturating_sub(forecast.release_ms),
+                off_loop: forecast.off_loop.map(OffLoop::of),
             });
         }
         let cells = self.ground.coverage_loop.cells().iter().zip(&promised);
@@ -238,7 +239,7 @@ impl<'a> Baseline<'a> {
                 open: !p,
             })
             .collect();
-        for section in divide(&ring, &robots).sections {
+        for section in self.ground.divide(&ring, &robots).sections {
             let mut legs = first.remove(&section.id).unwrap_or_default();
             legs.extend(section.legs);
             self.busy.insert(section.id, !legs.is_empty());

@@ -49,6 +49,7 @@
 //!     speed_mmps: 20_000,
 //!     turn_ms: 8_000,
 //!     endurance_ms: 3_600_000,
+//!     off_loop: None,
 //! };
 //! let division = divide(&ring, &[uav(1, 0), uav(2, 16)]);
 //! assert_eq!(division.sections.len(), 2);

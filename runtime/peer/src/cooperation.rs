@@ -43,7 +43,7 @@ use crate::protocol::sections::LivePeers;
 use crate::timers::{Timer, Timers};
 use crate::wire::codec::Body;
 use crate::wire::limits::BID_COVERED_MAX_BYTES;
-use crate::wire::message::{Beacon, Bid, Epoch, Member, Order, Record};
+use crate::wire::message::{Beacon, Bid, Epoch, Member, OffLoop, Order, Record};
 use crate::{Incarnation, PeerId};
 use skein_behaviors::{Event, Goal, Percept};
 use skein_flight::coverage::ring::Direction;
@@ -563,7 +563,12 @@ impl MissionState {
                     ring,
                     robots,
                 } => {
-                    let job = Job::Divide { ring, robots };
+                    let geometry = Arc::clone(&self.geometry);
+                    let job = Job::Divide {
+                        geometry,
+                        ring,
+                        robots,
+                    };
                     effects.push(Effect::Compute(PendingJob::Division(epoch), job));
                 }
                 Action::Take(taken) => effects.extend(self.write_take(taken)),
@@ -603,6 +608,7 @@ impl MissionState {
                 .saturating_sub(forecast.release_ms),
             covered: sections.covered().encode_rle(Some(BID_COVERED_MAX_BYTES)),
             commits: division::runs_of(&committed, sections.cells()),
+            off_loop: forecast.off_loop.map(OffLoop::of).into_iter().collect(),
             eta_ms: if idle { 0 } else { forecast.finish_ms },
             adopted_ago_ms: self.negotiation.adopted_ago_ms(s.now),
             cells_since: self.negotiation.cells_since(),

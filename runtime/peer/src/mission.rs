@@ -7,6 +7,7 @@ use crate::wire::message::MissionChunk;
 use serde::{Deserialize, Serialize};
 use skein_flight::coverage::lanes;
 use skein_flight::coverage::passes::{self, PassesProblem};
+use skein_flight::coverage::ring::division::Rule;
 use skein_flight::coverage::ring::patch::Corners;
 use skein_flight::coverage::ring::{CoverageLoop, LoopError, LoopProblem, Tree};
 use skein_flight::coverage::stations::{self, StationsProblem};
@@ -62,6 +63,9 @@ pub struct Mission {
     /// the wind and chooses.
     #[serde(default, skip_serializing_if = "Tree::is_default")]
     pub tree: Tree,
+    /// By what rule the loop is divided.
+    #[serde(default, skip_serializing_if = "Rule::is_default")]
+    pub division: Rule,
 }
 
 #[allow(
@@ -216,6 +220,9 @@ impl Mission {
             for letter in self.tree.name().bytes() {
                 h.write_i64(i64::from(letter));
             }
+        }
+        if !self.division.is_default() {
+            h.write_i64(1);
         }
         if self.lap > 0 || self.further_laps > 0 {
             h.write_i64(i64::from(self.lap));
@@ -448,6 +455,7 @@ mod tests {
             lap: 0,
             further_laps: 0,
             tree: Tree::default(),
+            division: Rule::default(),
         }
     }
 

@@ -3,7 +3,8 @@
 
 use crate::mission::{GeometryError, Mission};
 use skein_flight::coverage::ring::CoverageLoop;
-use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav, divide};
+use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
+use skein_flight::coverage::ring::division::{Ground, divide};
 use skein_flight::route::Router;
 use std::sync::Arc;
 
@@ -18,14 +19,28 @@ pub struct MissionGeometry {
     pub router: Arc<Router>,
 }
 
+impl MissionGeometry {
+    /// Divides the open cells of its loop by the rule of its mission.
+    #[must_use]
+    pub fn divide(&self, ring: &[RingCell], uavs: &[Uav]) -> Division {
+        let ground = Ground {
+            coverage_loop: &self.coverage_loop,
+            router: &self.router,
+        };
+        divide(ring, uavs, ground, self.mission.division)
+    }
+}
+
 /// A problem to be solved beside the loop.
 #[derive(Clone, Debug)]
 pub enum Job {
     /// Derive the common ground of a mission. Drivers of many peers may remember
     /// the answer by [`Mission::content_hash`].
     Geometry(Arc<Mission>),
-    /// Divide the open cells of the loop.
+    /// Divide the open cells of the loop by the rule of its mission.
     Divide {
+        /// On what they fly.
+        geometry: Arc<MissionGeometry>,
         /// The loop's cells.
         ring: Vec<RingCell>,
         /// The members of the round.
@@ -47,6 +62,10 @@ pub enum JobResult {
 pub fn run(job: &Job) -> JobResult {
     match job {
         Job::Geometry(mission) => JobResult::Geometry(mission.geometry()),
-        Job::Divide { ring, robots } => JobResult::Divide(divide(ring, robots)),
+        Job::Divide {
+            geometry,
+            ring,
+            robots,
+        } => JobResult::Divide(geometry.divide(ring, robots)),
     }
 }

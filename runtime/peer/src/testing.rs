@@ -19,6 +19,7 @@ use skein_behaviors::reactive::follow::fly;
 use skein_behaviors::{Order, Percept, Setpoint, Steer};
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::Tree;
+use skein_flight::coverage::ring::division::Rule;
 use skein_flight::trajectory::timed::Objective;
 use skein_geometry::frame::Pose;
 use skein_geometry::math::PI;
@@ -61,6 +62,7 @@ pub fn mission(revision: u32, cols: i32, rows: i32) -> Mission {
         lap: 0,
         further_laps: 0,
         tree: Tree::default(),
+        division: Rule::default(),
     }
 }
 

@@ -19,11 +19,12 @@ use fleet::Fleet;
 use lanes::Lanes;
 use run::Run;
 use shared::{Notices, position};
+use skein_flight::coverage::ring::division::Rule;
 use skein_flight::trajectory::timed::Objective;
 use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::Point;
 use skein_interop::airframe;
-use skein_interop::json::{Document, Error, Fields, Places};
+use skein_interop::json::{Document, Error, Fields, Node, Places};
 use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{GroundStationSpec, RadioSpec, StormSpec};
 use std::collections::BTreeSet;
@@ -42,6 +43,7 @@ const FIELDS: &[&str] = &[
     "lines",
     "planner",
     "laps",
+    "division",
     "level_m",
     "vertical_margin_m",
     "no_fly",
@@ -71,6 +73,8 @@ pub(crate) struct Stated {
     pub(crate) asked: Asked,
     /// How often everything is to be seen.
     pub(crate) laps: u16,
+    /// By what rule the loop is divided.
+    pub(crate) division: Rule,
     pub(crate) lanes: Lanes,
     pub(crate) fleet: Fleet,
     pub(crate) ground_station: Option<GroundStationSpec>,
@@ -132,6 +136,7 @@ pub(crate) fn scenario(
     Ok(Stated {
         storm: faults::storm(f.get("storm"), fleet.members.len(), over.peers.is_some())?,
         laps: f.small_or("laps", 1, 1, 1000, "times")?,
+        division: f.get("division").map_or(Ok(Rule::Best), division)?,
         lanes: lanes::read(&f)?,
         base: f
             .get("base")
@@ -152,6 +157,10 @@ pub(crate) fn scenario(
         findings,
         places,
     })
+}
+
+fn division(node: &Node<'_>) -> Result<Rule, Error> {
+    node.one_of(&[("best", Rule::Best), ("backtracking", Rule::Backtracking)])
 }
 
 /// What is asked for, by the planner that the command line names.

@@ -4,13 +4,14 @@
 //! And the bids themselves against what their authors did (`bid`).
 
 use super::Findings;
-use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav, divide};
+use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;
+use skein_peer::offload::MissionGeometry;
 use skein_peer::protocol::rounds::{OpenRound, RoundOrder, epoch_of, order_of};
 use skein_peer::protocol::runs::cells_of;
-use skein_peer::wire::message::{Bid, Claim, Epoch, Firmness};
+use skein_peer::wire::message::{Bid, Claim, Epoch, Firmness, Round};
 use skein_peer::{Beliefs, PeerId};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -38,7 +39,7 @@ pub struct Mover {
 #[derive(Clone, Debug, Default)]
 pub struct DecisionCheck {
     period_ms: u64,
-    loops: BTreeMap<u64, Arc<CoverageLoop>>,
+    grounds: BTreeMap<u64, Arc<MissionGeometry>>,
     rounds: BTreeMap<RoundOrder, OpenRound>,
     divisions: BTreeMap<Epoch, Option<(Vec<RingCell>, Division)>>,
     judged: BTreeMap<u16, Epoch>,
@@ -74,10 +75,15 @@ impl DecisionCheck {
     }
 
     /// A loop was derived.
-    pub fn on_loop(&mut self, coverage_loop: &Arc<CoverageLoop>) {
-        self.loops
-            .entry(coverage_loop.hash())
-            .or_insert_with(|| Arc::clone(coverage_loop));
+    pub fn on_loop(&mut self, geometry: &Arc<MissionGeometry>) {
+        self.grounds
+            .entry(geometry.coverage_loop.hash())
+            .or_insert_with(|| Arc::clone(geometry));
+    }
+
+    fn loop_of(&self, round: &Round) -> Option<&CoverageLoop> {
+        let ground = self.grounds.get(&round.loop_hash);
+        ground.map(|g| g.coverage_loop.as_ref())
     }
 
     /// A process starts, or begins to work on another loop: it has adopted nothing yet.
@@ -167,10 +173,17 @@ impl DecisionCheck {
                 ));
             }
         }
-        if let (Some(mover), Some(lp)) = (mover, self.loops.get(&bid.round.loop_hash)) {
+        if let (Some(mover), Some(lp)) = (mover, self.loop_of(&bid.round)) {
             let anchor = lp.boundary(usize::from(bid.anchor)).position();
             let away_m = (anchor - mover.at).norm();
             let reach_m = mover.fastest_mps * f64::from(bid.release_ms) / 1000.0 + REACH_SLACK_M;
+            let strayed = bid.off_loop.iter().any(|off| {
+                let off_m = (off.pose().position() - mover.at).norm();
+                off_m > REACH_SLACK_M
+            });
+            if strayed {
+                lies.push("says that it is where it is not".to_owned());
+            }
             if away_m > reach_m {
                 lies.push(format!(
                     "says that it will be at boundary {} in {} ms, which is {away_m:.0} m away",
@@ -208,7 +221,7 @@ impl DecisionCheck {
     /// What the bids of a round ask for: cells that no bid knows to be covered and no bid
     /// commits to are open.
     fn problem_of(&self, open: &OpenRound) -> Option<(Vec<RingCell>, Vec<Uav>)> {
-        let lp = self.loops.get(&open.round.loop_hash)?;
+        let lp = self.loop_of(&open.round)?;
         let n = u16::try_from(lp.len()).unwrap_or(u16::MAX);
         let mut done = vec![false; lp.len()];
         for (cell, flag) in lp.cells().iter().zip(&mut done) {
@@ -239,6 +252,7 @@ impl DecisionCheck {
             speed_mmps: bid.speed_mmps.max(1),
             turn_ms: bid.turn_ms,
             endurance_ms: bid.endurance_ms,
+            off_loop: bid.off_loop.first().copied(),
         });
         Some((ring.collect(), uavs.collect()))
     }
@@ -282,8 +296,10 @@ impl DecisionCheck {
         open: &OpenRound,
     ) -> Option<&(Vec<RingCell>, Division)> {
         if !self.divisions.contains_key(&epoch) {
-            let divided = self.problem_of(open).map(|(ring, uavs)| {
-                let division = divide(&ring, &uavs);
+            let ground = self.grounds.get(&open.round.loop_hash);
+            let problem = self.problem_of(open);
+            let divided = problem.zip(ground).map(|((ring, uavs), ground)| {
+                let division = ground.divide(&ring, &uavs);
                 (ring, division)
             });
             self.divisions.insert(epoch, divided);
@@ -382,7 +398,7 @@ mod tests {
     use crate::geometry_cache::GeometryCache;
     use crate::world::fixture;
     use skein_geometry::frame::Point;
-    use skein_peer::wire::message::{CellRun, ListedRun, Member, Round, Stamp};
+    use skein_peer::wire::message::{CellRun, ListedRun, Member, Stamp};
 
     /// Two members on the fixture's loop, with their bids.
     struct Case {
@@ -422,13 +438,14 @@ mod tests {
                 endurance_ms: 1_000_000,
                 covered: Vec::new(),
                 commits: Vec::new(),
+                off_loop: Vec::new(),
                 eta_ms: 0,
                 adopted_ago_ms: u32::MAX,
                 cells_since: 0,
                 idle: true,
             };
             let mut check = DecisionCheck::new(1000);
-            check.on_loop(&lp);
+            check.on_loop(&geometry);
             Self {
                 check,
                 found: Findings::new(1),
@@ -526,7 +543,7 @@ mod tests {
         let mut c = Case::new(true);
         c.bid();
         let (ring, uavs) = c.problem();
-        let division = divide(&ring, &uavs);
+        let division = c.check.grounds[&c.lp.hash()].divide(&ring, &uavs);
         let of = |id: u16| {
             let section = division.sections.iter().find(|s| s.id == id).unwrap();
             let mut cells = section.legs.iter().flat_map(|l| l.cells(ring.len()));

@@ -307,6 +307,7 @@ mod tests {
             endurance_ms: 0,
             covered: Vec::new(),
             commits: Vec::new(),
+            off_loop: Vec::new(),
             eta_ms: 0,
             adopted_ago_ms: 0,
             cells_since: 0,

@@ -11,10 +11,10 @@ use super::spoken::SpokenCheck;
 use super::spread::SpreadCheck;
 use super::{Findings, PeerSnapshot, Snapshot};
 use crate::spec::{Spec, UavSpec};
-use skein_flight::coverage::ring::CoverageLoop;
 use skein_flight::coverage::ring::backtracking::{RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::mission::{Mission, chunks, point_m};
+use skein_peer::offload::MissionGeometry;
 use skein_peer::output::Status;
 use skein_peer::wire::codec::Body;
 use skein_peer::wire::message::Bid;
@@ -84,8 +84,8 @@ impl Rules {
     }
 
     /// A loop was derived.
-    pub fn on_loop(&mut self, coverage_loop: &Arc<CoverageLoop>) {
-        self.decision.on_loop(coverage_loop);
+    pub fn on_loop(&mut self, geometry: &Arc<MissionGeometry>) {
+        self.decision.on_loop(geometry);
     }
 
     /// A process starts.

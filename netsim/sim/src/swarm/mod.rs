@@ -549,11 +549,11 @@ impl Swarm {
                 };
                 let answer = self.geometry_cache.answer(&job);
                 match (&job, &answer) {
-                    (Job::Divide { ring, robots }, _) => {
+                    (Job::Divide { ring, robots, .. }, _) => {
                         self.checker.on_divide(self.now_ms, id, (ring, robots));
                     }
                     (_, JobResult::Geometry(Ok(geometry))) => {
-                        self.checker.rules.on_loop(&geometry.coverage_loop);
+                        self.checker.rules.on_loop(geometry);
                     }
                     _ => {}
                 }

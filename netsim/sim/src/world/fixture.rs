@@ -159,6 +159,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         lap: 0,
         further_laps: 0,
         tree: skein_flight::coverage::ring::Tree::default(),
+        division: Default::default(),
     }
 }
 

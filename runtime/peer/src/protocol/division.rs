@@ -54,6 +54,7 @@ pub fn problem(
             speed_mmps: s.speed_mmps.max(1),
             turn_ms: s.turn_ms,
             endurance_ms: s.endurance_ms,
+            off_loop: s.off_loop.first().copied(),
         })
         .collect();
     assert!(

@@ -738,6 +738,7 @@ mod tests {
             endurance_ms: 3_000_000,
             covered: Vec::new(),
             commits: Vec::new(),
+            off_loop: Vec::new(),
             eta_ms: 0,
             adopted_ago_ms: u32::MAX,
             cells_since: 0,

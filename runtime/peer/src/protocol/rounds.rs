@@ -269,6 +269,7 @@ pub fn epoch_of(open: &OpenRound) -> Epoch {
         (
             &s.covered,
             &s.commits,
+            &s.off_loop,
             s.eta_ms,
             s.adopted_ago_ms,
             s.cells_since,
@@ -301,6 +302,7 @@ mod tests {
             endurance_ms: 1_000_000,
             covered: Vec::new(),
             commits: Vec::new(),
+            off_loop: Vec::new(),
             eta_ms: 0,
             adopted_ago_ms: 0,
             cells_since: 0,

@@ -15,7 +15,7 @@ use super::kinds::{Kind, RECORD_MAX_BYTES};
 use super::limits::{self, COMMITS_MAX, GOSSIP_MAX, MEMBERS_MAX, PLAN_MAX, at_most, in_range};
 use super::message::{
     Beacon, Behaviour, Bid, CellRun, Claim, Cover, Epoch, Finished, Firmness, Gossip, ListedRun,
-    Member, MissionChunk, MissionStatus, Order, Record, Round, Stamp, State,
+    Member, MissionChunk, MissionStatus, OffLoop, Order, Record, Round, Stamp, State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
 
@@ -290,6 +290,11 @@ array_of!(Round {
     loss,
     wait_ms
 });
+array_of!(OffLoop {
+    east_mm,
+    north_mm,
+    course_e4
+});
 array_of!(Bid {
     round,
     anchor,
@@ -300,6 +305,7 @@ array_of!(Bid {
     endurance_ms,
     covered,
     commits,
+    off_loop,
     eta_ms,
     adopted_ago_ms,
     cells_since,
@@ -351,6 +357,9 @@ number_of!(Order {
 
 impl Listed for Gossip {
     const MAX: usize = GOSSIP_MAX;
+}
+impl Listed for OffLoop {
+    const MAX: usize = 1;
 }
 impl Listed for Member {
     const MAX: usize = MEMBERS_MAX;

@@ -118,7 +118,11 @@ fn check_bid(s: &Bid) -> Result<(), WireError> {
     }
     in_range("speed_mmps", s.speed_mmps <= SPEED_MAX_MMPS)?;
     at_most("covered", s.covered.len(), BID_COVERED_MAX_BYTES)?;
-    check_runs("commits", &s.commits, COMMITS_MAX)
+    check_runs("commits", &s.commits, COMMITS_MAX)?;
+    at_most("off_loop", s.off_loop.len(), 1)?;
+    s.off_loop
+        .iter()
+        .try_for_each(|o| check_pose(o.east_mm, o.north_mm, o.course_e4))
 }
 
 fn check_claim(r: &Claim) -> Result<(), WireError> {

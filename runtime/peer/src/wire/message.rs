@@ -6,6 +6,7 @@
 use crate::Incarnation;
 use serde::{Deserialize, Serialize};
 pub use skein_behaviors::Order;
+pub use skein_flight::coverage::ring::backtracking::OffLoop;
 
 /// The envelope around every body. Relays pass it on unchanged.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -260,6 +261,8 @@ pub struct Bid {
     pub covered: Vec<u8>,
     /// Cells it will finish whatever is decided.
     pub commits: Vec<CellRun>,
+    /// Where it is, if it can leave for anywhere at once; at most one place.
+    pub off_loop: Vec<OffLoop>,
     /// Expected end of its present plan, milliseconds from now.
     pub eta_ms: u32,
     /// Time since it last adopted a division, milliseconds.

@@ -130,12 +130,17 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                     first: 16,
                     count: 2,
                 }],
+                off_loop: vec![OffLoop {
+                    east_mm: 120_000,
+                    north_mm: -31_415,
+                    course_e4: 15_708,
+                }],
                 eta_ms: 600_000,
                 adopted_ago_ms: 70_000,
                 cells_since: 5,
                 idle: false,
             }),
-            "8d860782820101820302011b0123456789abcdeff519138811f4190fa01946501923281a00124f8044000c0304818210021a000927c01a0001117005f4",
+            "8e860782820101820302011b0123456789abcdeff519138811f4190fa01946501923281a00124f8044000c03048182100281831a0001d4c0397ab6193d5c1a000927c01a0001117005f4",
         ),
         (
             Body::Claim(Claim {
@@ -258,6 +263,11 @@ pub fn largest() -> Vec<Body> {
             endurance_ms: DURATION_MAX_MS,
             covered: vec![255; BID_COVERED_MAX_BYTES],
             commits: vec![run; COMMITS_MAX],
+            off_loop: vec![OffLoop {
+                east_mm: -POSITION_MAX_MM,
+                north_mm: POSITION_MAX_MM,
+                course_e4: -HEADING_MAX_E4,
+            }],
             eta_ms: DURATION_MAX_MS,
             adopted_ago_ms: u32::MAX,
             cells_since: u16::MAX,

@@ -195,6 +195,12 @@ const ROUND: &[Place] = &[
     at("wait_ms", "how long to wait for all bids, ms", MS),
 ];
 
+const OFF_LOOP: &[Place] = &[
+    at("east_mm", "east, mm", MM),
+    at("north_mm", "north, mm", MM),
+    at("course_e4", "course over the ground, 1e-4 rad", E4),
+];
+
 const BID: &[Place] = &[
     at("round", "the round it belongs to", Shape::Row(ROUND)),
     at("anchor", "boundary of the loop where it will be", U16),
@@ -220,6 +226,11 @@ const BID: &[Place] = &[
         "commits",
         "cells it will finish whatever is decided",
         Shape::Rows(RUN, COMMITS_MAX),
+    ),
+    at(
+        "off_loop",
+        "where it is, if it can leave for anywhere at once",
+        Shape::Rows(OFF_LOOP, 1),
     ),
     ETA,
     at(

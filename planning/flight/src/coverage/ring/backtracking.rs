@@ -12,6 +12,7 @@
 use super::coverage_loop::Direction;
 use super::endurance_limited::Shares;
 use serde::{Deserialize, Serialize};
+use skein_geometry::frame::Pose;
 
 /// One cell of the ring to be divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,6 +42,47 @@ pub struct Uav {
     pub turn_ms: u32,
     /// Flight time it may still spend after its release, milliseconds.
     pub endurance_ms: u32,
+    /// Where it is now, if nothing keeps it from leaving for anywhere at once; otherwise
+    /// it begins at its anchor.
+    pub off_loop: Option<OffLoop>,
+}
+
+/// Where a UAV is that has nothing to fly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct OffLoop {
+    /// East, mm.
+    pub east_mm: i32,
+    /// North, mm.
+    pub north_mm: i32,
+    /// Course over the ground, 1e-4 rad.
+    pub course_e4: i32,
+}
+
+impl OffLoop {
+    /// The nearest to a pose; beyond what fits it saturates.
+    #[must_use]
+    pub fn of(pose: Pose) -> Self {
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "a cast of a float saturates"
+        )]
+        let whole = |v: f64| v.round() as i32;
+        Self {
+            east_mm: whole(pose.east_m * 1000.0),
+            north_mm: whole(pose.north_m * 1000.0),
+            course_e4: whole(pose.heading_rad * 1e4),
+        }
+    }
+
+    /// The pose.
+    #[must_use]
+    pub fn pose(self) -> Pose {
+        Pose {
+            east_m: f64::from(self.east_mm) / 1000.0,
+            north_m: f64::from(self.north_mm) / 1000.0,
+            heading_rad: f64::from(self.course_e4) / 1e4,
+        }
+    }
 }
 
 /// A run of cells flown in one direction.
@@ -74,8 +116,8 @@ impl Leg {
     }
 }
 
-/// What one UAV is to do: at most two legs, the second after turning round.
-/// Legs begin and end at an open cell; the way between is travel.
+/// What one UAV is to do, in backtracking MSTC at most two legs, the second after turning
+/// round. Legs begin and end at an open cell; the way between is travel.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Section {
     /// Who.
@@ -426,6 +468,7 @@ mod tests {
             speed_mmps: 1000,
             turn_ms: 0,
             endurance_ms: 1_000_000,
+            off_loop: None,
         }
     }
 
@@ -540,6 +583,7 @@ mod tests {
                 speed_mmps: speed * 1000,
                 turn_ms: turn * 1000,
                 endurance_ms: endurance * 1000,
+                off_loop: None,
             },
         );
         prop::collection::vec(uav, 1..4).prop_map(|mut uavs| {

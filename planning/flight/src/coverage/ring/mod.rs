@@ -8,16 +8,22 @@
 //! | [`grid`] | names of cells; the grid of lanes |
 //! | [`tree`] | which spanning tree a loop of lanes goes round |
 //! | [`patch`] | what a cell looks like from above |
+//! | [`division`] | the division among UAVs that is flown: the best of those below |
 //! | [`backtracking`] | the division among UAVs: backtracking MSTC |
+//! | `free_entry` | the division without ties to where UAVs are |
+//! | `transfers` | how long the ways between its runs are |
 //! | `endurance_limited` | the division when endurance does not suffice for all cells |
 
 pub mod backtracking;
 pub mod coverage_loop;
+pub mod division;
 mod endurance_limited;
 pub mod error;
+mod free_entry;
 pub mod grid;
 pub mod patch;
 pub mod problem;
+mod transfers;
 pub mod tree;
 
 pub use coverage_loop::{CoverageLoop, Direction, LoopCell};
