@@ -15,7 +15,7 @@ def show(sample):
     version = (str(sample.key_expr), life, seq)
     if version not in shown:  # several peers may have passed it on
         shown.add(version)
-        print(sample.key_expr, f"uav{author} life {life} #{seq}", cbor2.loads(body), flush=True)
+        print(sample.key_expr, f"peer {author} life {life} #{seq}", cbor2.loads(body), flush=True)
 
 with zenoh.open(config) as session:
     subscriber = session.declare_subscriber(keys, show)

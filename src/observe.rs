@@ -166,7 +166,7 @@ fn show(format: Format, newest: &mut Newest, seen: &Observed) -> std::io::Result
             let (author, life, seq) = (record.author, record.incarnation, record.seq);
             writeln!(
                 out,
-                "{}  uav{author} life {life} #{seq}  {}",
+                "{}  peer {author} life {life} #{seq}  {}",
                 seen.key,
                 words(&body)
             )?;
@@ -213,7 +213,7 @@ fn words(body: &Body) -> String {
         ),
         Body::State(s) => format!(
             "{:?} at ({:.0}, {:.0}, {:.0}) m, {:.1} m/s, {} s of fuel, mission {:?}, {} of {} cells",
-            s.behaviour,
+            s.activity,
             metres(s.east_mm),
             metres(s.north_mm),
             metres(s.height_mm),

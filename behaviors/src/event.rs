@@ -9,8 +9,6 @@ pub enum Event {
     Seen(Vec<u16>),
     /// All legs are flown.
     PlanDone,
-    /// The goal point is reached; the UAV loiters there.
-    Arrived,
     /// No clear route exists to the next leg; its cells are given up.
     Refused {
         /// The cells of the loop, by index, that this UAV cannot reach.

@@ -4,14 +4,14 @@
 //! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
 //! it cell by cell. Ways between cells come from [`transit`], what the camera saw from
 //! [`camera`], expectations for the peer from [`prediction`], what stays of a flight when the
-//! goal changes from `change`; following the track and the
-//! safety of every setpoint are the reactive layer's.
+//! goal changes from `goal_change`, the proof of each stretch from `clearance_check`;
+//! following the track and the safety of every setpoint are the reactive layer's.
 //!
 //! | goal | track | events |
 //! |---|---|---|
 //! | hold | the nearest circle with room | none |
 //! | legs | open cells in order, then a circle | `Seen`, `Refused`, `PlanDone` once |
-//! | point | a route, then a circle | `Arrived` once, `Refused` without cells if there is no route |
+//! | point | a route, then a circle | `Refused` without cells if there is no route |
 //!
 //! # Guarantees
 //! An open cell of the legs is flown until it is seen or refused. Equal inputs give
@@ -23,8 +23,8 @@
 
 pub mod camera;
 mod clearance_check;
+mod goal_change;
 pub mod prediction;
-mod replan;
 mod transfer;
 pub mod transit;
 
@@ -59,8 +59,8 @@ const LOST_M: f64 = 6.0;
 /// The same for its heading, radians.
 const LOST_RAD: f64 = 0.8;
 
-/// Within these of its track a UAV plans anew from the track and not from its own
-/// pose: a millimetre beside a lane must not cost a circle to get back onto it.
+/// Nearer to its track than this a UAV plans anew from the track, not from its own pose:
+/// a Dubins curve that corrects a millimetre costs a full circle.
 const ON_TRACK_M: f64 = 0.5;
 const ON_TRACK_RAD: f64 = 0.1;
 
@@ -81,9 +81,6 @@ const WINDOW_S: f64 = 3.0;
 /// Cells remembered as reported: the peer may close a cell a few percepts later.
 const RECENT: usize = 16;
 
-/// A point counts as reached within so many turn radii.
-const ARRIVAL_RADII: f64 = 2.0;
-
 /// What a UAV is doing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Goal {
@@ -98,11 +95,11 @@ pub enum Goal {
 /// Where the UAV will be when it has flown for a while under its present goal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Forecast {
-    /// Cells it will have served by then, in order.
+    /// Cells it will have flown by then, in order.
     pub cells: Vec<u16>,
     /// The boundary of the loop where it will be, or which it can next reach.
     pub anchor: u16,
-    /// Which way it looks there.
+    /// Which way along the loop it flies there.
     pub heading: Direction,
     /// When it is there, milliseconds from now.
     pub release_ms: u32,
@@ -133,15 +130,15 @@ enum Kind {
 impl Kind {
     fn visit(&self) -> Option<CellVisit> {
         match self {
-            Self::Serve(h) => Some(*h),
+            Self::Serve(visit) => Some(*visit),
             _ => None,
         }
     }
 
     fn cell(&self) -> Option<(u16, Direction)> {
         match self {
-            Self::Serve(h) => Some((h.cell, h.direction)),
-            Self::Pass(c, d) => Some((*c, *d)),
+            Self::Serve(visit) => Some((visit.cell, visit.direction)),
+            Self::Pass(cell, direction) => Some((*cell, *direction)),
             _ => None,
         }
     }
@@ -169,7 +166,7 @@ pub struct Executive {
     stretches: VecDeque<Stretch>,
     /// Whether the track is to be given up at the next step.
     replan: bool,
-    /// Whether the end of the goal has been reported.
+    /// Whether the end of the legs has been reported.
     end_reported: bool,
     played: Option<Played>,
     recent: VecDeque<u16>,
@@ -209,7 +206,7 @@ impl Executive {
         }
     }
 
-    /// The same with an objective for its legs off the loop and its airspeed.
+    /// The same with an objective for its transfers off the loop and its airspeed.
     #[must_use]
     pub fn with_objective(mut self, objective: Objective) -> Self {
         self.transit = self.transit.with_objective(objective);
@@ -268,7 +265,7 @@ impl Executive {
         }
         let start = self.start(percept, offset);
         self.lengthen(start, is_open, &mut events);
-        self.report_end(percept, &mut events);
+        self.report_end(&mut events);
         let offset = if self.replan {
             self.restart(percept)
         } else {
@@ -335,10 +332,10 @@ impl Executive {
         events: &mut Vec<Event>,
     ) {
         let mut seen = Vec::new();
-        let c = &self.transit;
+        let transit = &self.transit;
         look(
-            &c.coverage_loop,
-            &c.airframe,
+            &transit.coverage_loop,
+            &transit.airframe,
             self.played.as_ref(),
             percept,
             is_open,
@@ -389,7 +386,7 @@ impl Executive {
             missed = front
                 .kind
                 .visit()
-                .filter(|h| is_open(h.cell) && !self.recent.contains(&h.cell));
+                .filter(|visit| is_open(visit.cell) && !self.recent.contains(&visit.cell));
         }
         let Some(visit) = missed else { return };
         let tries = visit.tries + 1;
@@ -422,7 +419,7 @@ impl Executive {
             return;
         }
         let target = self.stretches.iter().find_map(|s| s.kind.visit());
-        if target.is_some_and(|h| !is_open(h.cell)) {
+        if target.is_some_and(|visit| !is_open(visit.cell)) {
             if front.kind == Kind::Route {
                 self.replan = true;
             } else {
@@ -498,27 +495,29 @@ impl Executive {
                     let end = moves
                         .iter()
                         .fold(*at, |place, step| self.transit.end_of(&place, step));
-                    moves.extend(self.transit.hold(&end));
+                    moves.extend(self.transit.way_to_loiter(&end));
                     return moves;
                 }
                 None => events.push(Event::Refused { cells: Vec::new() }),
             }
         }
-        self.transit.hold(at)
+        self.transit.way_to_loiter(at)
     }
 
     /// Appends a move to the track.
     fn push(&mut self, at: &Place, step: Move) -> Place {
         let end = self.transit.end_of(at, &step);
-        let c = &self.transit.coverage_loop;
+        let coverage_loop = &self.transit.coverage_loop;
         let kind = match step {
-            Move::Serve(h) => {
+            Move::Serve(visit) => {
+                let cell = usize::from(visit.cell);
                 self.track
-                    .extend(&c.curve(usize::from(h.cell), h.direction));
-                Kind::Serve(h)
+                    .extend(&coverage_loop.curve(cell, visit.direction));
+                Kind::Serve(visit)
             }
             Move::Pass(cell, direction) => {
-                self.track.extend(&c.curve(usize::from(cell), direction));
+                self.track
+                    .extend(&coverage_loop.curve(usize::from(cell), direction));
                 Kind::Pass(cell, direction)
             }
             Move::Route(curve) => {
@@ -547,31 +546,14 @@ impl Executive {
         self.track.advance(&pose, WINDOW_M)
     }
 
-    /// Reports the end of the goal, once.
-    fn report_end(&mut self, percept: &Percept, events: &mut Vec<Event>) {
-        if self.end_reported {
-            return;
-        }
-        let done = match self.aim {
-            Aim::Hold => return,
-            Aim::Legs => {
-                self.queue.is_empty() && !self.stretches.iter().any(|s| s.kind.visit().is_some())
-            }
-            Aim::Point(p) => self.is_near(&percept.pose, p),
-        };
-        if done {
+    /// Reports the end of the legs, once.
+    fn report_end(&mut self, events: &mut Vec<Event>) {
+        let is_left = |s: &Stretch| s.kind.visit().is_some();
+        let are_flown = self.queue.is_empty() && !self.stretches.iter().any(is_left);
+        if self.aim == Aim::Legs && are_flown && !self.end_reported {
             self.end_reported = true;
-            events.push(if self.aim == Aim::Legs {
-                Event::PlanDone
-            } else {
-                Event::Arrived
-            });
+            events.push(Event::PlanDone);
         }
-    }
-
-    fn is_near(&self, pose: &Pose, p: Point) -> bool {
-        let radius_m = self.transit.turn_radius_m();
-        (pose.position() - p).norm() <= ARRIVAL_RADII * radius_m
     }
 
     /// When all legs are flown, milliseconds from the last percept.

@@ -32,7 +32,7 @@ fn a_killed_uav_is_taken_over_and_observers_see_the_swarm() {
     );
     let (code, said) = place.skein(&["chaos", "kill", "9"]);
     assert_eq!(code, 4, "{said}");
-    assert!(said.contains("there is no uav9"), "{said}");
+    assert!(said.contains("there is no peer 9"), "{said}");
     observe(&place);
 
     let verdict = trial.verdict(DEADLINE);

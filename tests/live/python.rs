@@ -41,7 +41,7 @@ fn main() {
         "live/v1/state/",
         "live/v1/beacon/",
         "live/v1/cover/",
-        "uav1 life",
+        "peer 1 life",
     ] {
         let begin: String = said.chars().take(1000).collect();
         assert!(said.contains(expected), "no {expected:?} in: {begin}");

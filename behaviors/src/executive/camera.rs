@@ -13,12 +13,11 @@ use skein_flight::coverage::ring::patch::frame_holds;
 use skein_geometry::frame::Pose;
 use skein_geometry::math::wrap_pi;
 
-/// Taken off the footprint for rounding, for what a percept's pose may be off, and so
-/// that a cell is in the picture for a stretch of flight, not for an instant only: a
-/// witness that looks every quarter of a metre sees it too. Metres.
+/// Margin taken off the footprint, metres: what a percept's pose may be off and rounding,
+/// and so much more that a judge who samples the flight every 0.25 m sees the cell too.
 pub const POSE_ERROR_M: f64 = 0.4;
 
-/// Taken off besides for poses between percepts, metres.
+/// Taken off besides where the pose is played between two percepts, metres.
 const BETWEEN_M: f64 = 0.1;
 
 /// Longest time between two percepts that is filled, milliseconds: after it the
@@ -113,12 +112,12 @@ struct Lens<'a> {
 }
 
 impl Lens<'_> {
-    /// Cells that the frame at `pose`, less `slack_m` on all sides, contains.
+    /// Cells that the footprint at `pose` contains, its sides shortened by `slack_m`.
     fn look(&self, pose: &Pose, slack_m: f64, seen: &mut Vec<u16>) {
         let across_m = self.airframe.footprint_across_m - slack_m;
         let along_m = self.airframe.footprint_along_m - slack_m;
         let p = pose.position();
-        let mut held = |cell: u16, corners: &_| {
+        let mut contained = |cell: u16, corners: &_| {
             if (self.is_open)(cell)
                 && !seen.contains(&cell)
                 && frame_holds(corners, *pose, across_m, along_m)
@@ -127,6 +126,6 @@ impl Lens<'_> {
             }
         };
         self.coverage_loop
-            .cells_near(p, across_m, along_m, &mut held);
+            .cells_near(p, across_m, along_m, &mut contained);
     }
 }

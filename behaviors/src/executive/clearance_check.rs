@@ -26,7 +26,9 @@ impl Transit {
         let (zones, margin_m) = (self.router.zones(), self.margin_m(&from.pose));
         let c = &self.coverage_loop;
         match step {
-            Move::Serve(h) => zones.is_clear(&c.curve(usize::from(h.cell), h.direction), margin_m),
+            Move::Serve(visit) => {
+                zones.is_clear(&c.curve(usize::from(visit.cell), visit.direction), margin_m)
+            }
             Move::Pass(cell, d) => zones.is_clear(&c.curve(usize::from(*cell), *d), margin_m),
             Move::Route(curve) => zones.is_clear(curve, margin_m),
             Move::Loiter(circle) => zones.is_clear(&halves(circle), margin_m),
@@ -61,7 +63,7 @@ impl Executive {
         let cells: Vec<u16> = moves
             .iter()
             .filter_map(|step| match step {
-                Move::Serve(h) => Some(h.cell),
+                Move::Serve(visit) => Some(visit.cell),
                 _ => None,
             })
             .collect();

@@ -1,13 +1,13 @@
-//! Legs off the loop, by what the mission wants to spend little of (D2.7 §2.4.2).
+//! Transfers off the loop, by what the mission wants to spend little of (D2.7 §2.4.2).
 //!
-//! In calm air a leg is the router's curve, unless turns are to be spared. In a wind the fastest flight between two
-//! poses is made of trochoids, which turn with the air and not against it; so the
-//! best flight of [`Flight`] competes with the router's curve, flown with the nose held
-//! into the wind, and the cheaper one is flown. Both are curves over the ground when
+//! In calm air a transfer is the router's curve, unless turns are to be spared. In a
+//! wind the fastest flight between two poses is made of trochoids, which turn with the
+//! air and not against it; so the best flight of [`Flight`] competes with the router's
+//! curve, flown with the nose held into the wind, and the cheaper one is flown. Both are curves over the ground when
 //! they leave here, proved to keep the clearance from the zones as they are; what has
 //! no proof is not emitted.
 //!
-//! What a leg costs is told in metres: of the way through the air for time, over the
+//! What a transfer costs is told in metres: of the way through the air for time, over the
 //! ground for distance, of cruise for energy.
 
 use super::transit::Transit;
@@ -24,7 +24,7 @@ use skein_geometry::math::{TAU, atan2, wrap_pi};
 /// hundredth of the least tracking error.
 const FIT_M: f64 = 0.02;
 
-/// Share of the fastest turn that legs through the air plan: the rest takes errors away.
+/// Share of the fastest turn that transfers through the air plan: the rest takes errors away.
 const TURNING: f64 = 0.9;
 
 /// Courses tried at a point where any will do: every 22.5°, so that the best one is
@@ -32,7 +32,7 @@ const TURNING: f64 = 0.9;
 const COURSES: u8 = 16;
 
 impl Transit {
-    /// A clear way between two poses that look along their courses, the cheapest found.
+    /// A clear way between two poses that face along their courses, the cheapest found.
     pub(super) fn transfer(&self, from: Pose, to: Pose) -> Result<Curve, RouteError> {
         let over_ground = self.router.route(from, to);
         if self.is_shortest_best() {
@@ -221,7 +221,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(96))]
 
         #[test]
-        fn every_leg_keeps_clear_and_is_followed(
+        fn every_transfer_keeps_clear_and_is_followed(
             share in 0.0f64..1.0, towards in 0.0f64..TAU, objective in objectives(),
             blocks in prop::collection::vec((20.0f64..340.0, 20.0f64..240.0, 8.0f64..70.0, 8.0f64..70.0), 0..4),
             from in (0.0f64..380.0, 0.0f64..280.0, -3.1f64..3.1), to in (0.0f64..380.0, 0.0f64..280.0, -3.1f64..3.1),
@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn turning_with_the_air_saves_time_and_each_objective_gets_its_own() {
-        let charts = [Objective::Time, Objective::Distance, Objective::Energy]
+        let transits = [Objective::Time, Objective::Distance, Objective::Energy]
             .map(|objective| transit(Vec::new(), 1.0, PI / 3.0, objective));
         let from = Pose::new(Point::new(0.0, 0.0), 0.0);
         let mut sums = [[0.0; 3]; 4];
@@ -260,10 +260,10 @@ mod tests {
             let away_m = 30.0 + f64::from(i % 20) * 12.0;
             let at = Point::new(away_m * cos(angle_rad), away_m * sin(angle_rad));
             let to = Pose::new(at, wrap_pi(heading_rad));
-            let legs = charts.each_ref().map(|c| c.transfer(from, to).unwrap());
-            let plain = charts[0].router.route(from, to).unwrap();
+            let legs = transits.each_ref().map(|t| t.transfer(from, to).unwrap());
+            let plain = transits[0].router.route(from, to).unwrap();
             for (sum, leg) in sums.iter_mut().zip(legs.iter().chain([&plain])) {
-                for (total, c) in sum.iter_mut().zip(&charts) {
+                for (total, c) in sum.iter_mut().zip(&transits) {
                     *total += c.cost_m(leg);
                 }
             }

@@ -1,4 +1,4 @@
-//! How to get from here to the next cell, or to a place to hold: the moves that the
+//! How to get from here to the next cell, or to a place to loiter: the moves that the
 //! executive strings together (D2.7 §1.2.3, executive layer; routes are §2.3, §2.4).
 //!
 //! Pure questions about the loop, the zones and a pose; what is flown and when is
@@ -15,12 +15,15 @@ use skein_geometry::{Curve, Segment};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Boundaries tried when no direct route leads to a cell. Zones that cut off one
-/// boundary cut off its neighbours too, so more than a block's worth is waste.
-const DETOURS: usize = 8;
+/// Boundaries ahead on the loop at which a UAV tries to turn round or to loiter. Zones
+/// that cut off one boundary cut off its neighbours too, so more are not worth it.
+const MAX_TRIES_AHEAD: usize = 8;
 
-/// Boundaries tried when the way onto the loop is asked for. Three blocks' worth.
-const NEAREST: usize = 6;
+/// Nearest boundaries to which a way onto the loop is tried.
+const MAX_JOIN_TRIES: usize = 8;
+
+/// Nearest boundaries from which a way to a point is tried, and at which a loiter is.
+const MAX_NEAREST_TRIES: usize = 6;
 
 /// Lengths of the piece flown to get out of a zone's clearance, metres: from what a
 /// tracking error needs to a half turn.
@@ -53,14 +56,14 @@ pub struct CellVisit {
 pub struct Place {
     /// The pose.
     pub pose: Pose,
-    /// The boundary of the loop this is, and which way it looks, if it is one.
+    /// The boundary of the loop this is, and which way along the loop it faces, if it is one.
     pub boundary: Option<(u16, Direction)>,
 }
 
 /// One stretch to fly.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Move {
-    /// A cell, to serve it.
+    /// A cell, to see it.
     Serve(CellVisit),
     /// A cell, because it is on the way.
     Pass(u16, Direction),
@@ -84,7 +87,7 @@ pub struct Transit {
     /// Distances through the air along each cell, forward and backward, metres;
     /// empty in calm air, where they are the lengths.
     cells_air_m: Vec<[f64; 2]>,
-    /// What legs should spend little of.
+    /// What transfers off the loop should spend little of.
     pub(super) objective: Objective,
     /// How far a UAV may stray from a curve, metres.
     pub(super) tracking_error_m: f64,
@@ -150,8 +153,8 @@ impl Transit {
         f64::from(self.coverage_loop.cells()[usize::from(cell)].travel_mm) / 1000.0
     }
 
-    /// Length of the whole loop over the ground as a share of that through the air,
-    /// both ways; 0 where the wind forbids a part of it.
+    /// Length of the whole loop over the ground over that through the air, both ways; 0
+    /// where the wind forbids a part of it.
     #[must_use]
     pub fn loop_share(&self) -> f64 {
         if self.cells_air_m.is_empty() {
@@ -159,8 +162,8 @@ impl Transit {
         }
         let air_m: f64 = self.cells_air_m.iter().map(|both| both[0] + both[1]).sum();
         let cells = self.coverage_loop.cells();
-        let ground_m: f64 = cells.iter().map(|c| f64::from(c.service_mm) / 500.0).sum();
-        ground_m / air_m
+        let ground_m: f64 = cells.iter().map(|c| f64::from(c.service_mm) / 1000.0).sum();
+        2.0 * ground_m / air_m
     }
 
     /// Distance through the air along a cell, if there is a wind, metres.
@@ -220,7 +223,9 @@ impl Transit {
     #[must_use]
     pub fn end_of(&self, from: &Place, step: &Move) -> Place {
         match step {
-            Move::Serve(h) => self.place(self.exit(h.cell, h.direction), h.direction),
+            Move::Serve(visit) => {
+                self.place(self.exit(visit.cell, visit.direction), visit.direction)
+            }
             Move::Pass(cell, direction) => self.place(self.exit(*cell, *direction), *direction),
             Move::Route(curve) => Place {
                 pose: curve.end().unwrap_or(from.pose),
@@ -238,9 +243,9 @@ impl Transit {
     pub fn length_m(&self, step: &Move) -> f64 {
         let cells = self.coverage_loop.cells();
         match step {
-            Move::Serve(h) => self
-                .cell_air_m(h.cell, h.direction)
-                .unwrap_or_else(|| f64::from(cells[usize::from(h.cell)].service_mm) / 1000.0),
+            Move::Serve(visit) => self
+                .cell_air_m(visit.cell, visit.direction)
+                .unwrap_or_else(|| f64::from(cells[usize::from(visit.cell)].service_mm) / 1000.0),
             Move::Pass(cell, direction) => self
                 .cell_air_m(*cell, *direction)
                 .unwrap_or_else(|| self.travel_m(*cell)),
@@ -295,7 +300,7 @@ impl Transit {
         }
         if let Ok(curve) = self.route(from.pose, goal.pose) {
             let most_m = self.cost_m(&curve) + 1e-3;
-            let along = ahead.and_then(|b| self.not_dearer(b, direction, to, most_m));
+            let along = ahead.and_then(|b| self.unless_costlier(b, direction, to, most_m));
             return Some(along.unwrap_or_else(|| vec![Move::Route(curve)]));
         }
         if let Some(moves) = ahead.and_then(|b| self.along(b, direction, to, f64::INFINITY)) {
@@ -314,7 +319,7 @@ impl Transit {
     }
 
     /// The same, unless they cost more than `most_m`.
-    fn not_dearer(
+    fn unless_costlier(
         &self,
         from: u16,
         direction: Direction,
@@ -369,7 +374,7 @@ impl Transit {
         }
         let mut moves = Vec::new();
         let mut b = at;
-        for _ in 0..DETOURS.min(self.len()) {
+        for _ in 0..MAX_TRIES_AHEAD.min(self.len()) {
             let back = self.place(b, direction);
             if let Ok(turn) = self.route(self.place(b, looking).pose, back.pose) {
                 moves.push(Move::Route(turn));
@@ -397,7 +402,7 @@ impl Transit {
     /// The shortest of the routes to the nearest boundaries.
     fn join(&self, from: Pose, directions: &[Direction]) -> Option<((u16, Direction), Curve)> {
         let mut best: Option<((u16, Direction), Curve, f64)> = None;
-        for b in self.nearest(from.position(), DETOURS) {
+        for b in self.nearest(from.position(), MAX_JOIN_TRIES) {
             for d in directions {
                 if let Ok(curve) = self.route(from, self.place(b, *d).pose) {
                     let m = self.cost_m(&curve);
@@ -455,7 +460,7 @@ impl Transit {
         if let Some(curve) = direct {
             return Some(vec![Move::Route(curve)]);
         }
-        for b in self.nearest(to, NEAREST) {
+        for b in self.nearest(to, MAX_NEAREST_TRIES) {
             for d in [Direction::Forward, Direction::Backward] {
                 if let Ok(last) = self.transfer_to_point(self.place(b, d).pose, to)
                     && let Some(mut moves) = self.connect(from, b, d)
@@ -508,7 +513,7 @@ impl Transit {
     /// on along the loop, else at the nearest boundary with room. Where there is no
     /// such place, the circle here that keeps farthest.
     #[must_use]
-    pub fn hold(&self, from: &Place) -> Vec<Move> {
+    pub fn way_to_loiter(&self, from: &Place) -> Vec<Move> {
         let clearance_m = self.router.limits().clearance_m;
         let (here, room_m) = self.circle(&from.pose);
         if room_m >= clearance_m - ROUNDING_M {
@@ -516,7 +521,7 @@ impl Transit {
         }
         let mut moves = Vec::new();
         let mut at = from.boundary;
-        while let Some((b, d)) = at.filter(|_| moves.len() < DETOURS) {
+        while let Some((b, d)) = at.filter(|_| moves.len() < MAX_TRIES_AHEAD) {
             let next = match d {
                 Direction::Forward => self.after(b),
                 Direction::Backward => self.before(b),
@@ -529,7 +534,7 @@ impl Transit {
             }
             at = Some((next, d)).filter(|_| next != b);
         }
-        for b in self.nearest(from.pose.position(), NEAREST) {
+        for b in self.nearest(from.pose.position(), MAX_NEAREST_TRIES) {
             for d in [Direction::Forward, Direction::Backward] {
                 let (circle, room_m) = self.circle(&self.place(b, d).pose);
                 if room_m >= clearance_m - ROUNDING_M
@@ -729,7 +734,7 @@ mod tests {
     fn a_place_to_hold_keeps_clear_of_the_zones() {
         let t = transit(6, 4, vec![square(118.0, 70.0, 20.0)]);
         for boundary in 0..u16::try_from(t.coverage_loop.len()).unwrap() {
-            let moves = t.hold(&t.place(boundary, Forward));
+            let moves = t.way_to_loiter(&t.place(boundary, Forward));
             let Some(Move::Loiter(circle)) = moves.last() else {
                 panic!("no circle at {boundary}: {moves:?}")
             };

@@ -21,7 +21,7 @@ pub enum TrialError {
     #[error(transparent)]
     Token(#[from] TokenError),
     /// A peer did not come up.
-    #[error("uav{peer} did not start: {why}")]
+    #[error("peer {peer} did not start: {why}")]
     Launch {
         /// Which.
         peer: u16,

@@ -146,7 +146,7 @@ impl Injector<'_> {
         let computer_only = !cause.takes_airframe();
         let peer = self.peers.known(id)?;
         if !peer.has_process() && (computer_only || !peer.airborne()) {
-            return Err(format!("uav{id} does not run"));
+            return Err(format!("{} does not run", peer.name()));
         }
         peer.kill().await;
         if !computer_only {
@@ -154,7 +154,7 @@ impl Injector<'_> {
         }
         let held = self.account.ended(self.now_ms, id, cause);
         if !self.peers.known(id)?.flies() {
-            return Ok(vec![format!("the ground station uav{id} is gone")]);
+            return Ok(vec![format!("{} is gone", self.peers.name(id))]);
         }
         if computer_only {
             self.world.set_computer(id, false);
@@ -185,7 +185,8 @@ impl Injector<'_> {
         let held = self.account.ended(self.now_ms, id, Cause::Terminated);
         Ok(vec![
             format!(
-                "uav{id} is asked to end; it held {} uncovered cells",
+                "{} is asked to end; it held {} uncovered cells",
+                self.peers.name(id),
                 held.cells
             ),
             self.expect_down(id),
@@ -197,24 +198,30 @@ impl Injector<'_> {
         if peer.runs() {
             Ok(peer)
         } else {
-            Err(format!("uav{id} does not run"))
+            Err(format!("{} does not run", peer.name()))
         }
     }
 
     fn pause(&mut self, id: u16) -> Answer {
         self.running(id)?.pause();
         self.account.paused(self.now_ms, id);
-        let text = format!("uav{id} stands still; its airframe loiters by itself after 1 s");
+        let (name, flies) = (self.peers.name(id), self.peers.known(id)?.flies());
+        let loiters = if flies {
+            "; its airframe loiters by itself after 1 s"
+        } else {
+            ""
+        };
+        let text = format!("{name} stands still{loiters}");
         Ok(vec![text, self.expect_down(id)])
     }
 
     fn resume(&mut self, id: u16) -> Answer {
         if !self.peers.known(id)?.resume() {
-            return Err(format!("uav{id} is not paused"));
+            return Err(format!("{} is not paused", self.peers.name(id)));
         }
         self.account.resumed(self.now_ms, id);
         Ok(vec![
-            format!("uav{id} goes on"),
+            format!("{} goes on", self.peers.name(id)),
             format!(
                 "expect: it speaks within {:.0} s, and yields cells that others have listed since",
                 2.0 * self.period_s
@@ -251,7 +258,7 @@ impl Injector<'_> {
             "where it is"
         };
         Ok(vec![
-            format!("uav{id} starts again {place}, {disk}"),
+            format!("{} starts again {place}, {disk}", self.peers.name(id)),
             format!(
                 "expect: a higher incarnation after {:.0} s of listening, and use within {:.0} s more",
                 3.0 * self.period_s,
@@ -270,13 +277,16 @@ impl Injector<'_> {
             self.peers.known(peer)?;
         }
         self.world.fault(fault);
+        let name = |id| self.peers.name(id);
         let text = match fault {
             Fault::Cut {
                 a,
                 b,
                 one_way: true,
-            } => format!("the link from uav{a} to uav{b} is cut"),
-            Fault::Cut { a, b, .. } => format!("the link between uav{a} and uav{b} is cut"),
+            } => format!("the link from {} to {} is cut", name(*a), name(*b)),
+            Fault::Cut { a, b, .. } => {
+                format!("the link between {} and {} is cut", name(*a), name(*b))
+            }
             Fault::Partition { groups } => format!("the swarm is cut into {groups:?} and the rest"),
             Fault::Heal => "all cuts are healed".to_owned(),
             Fault::Loss { permille } => format!(
@@ -309,7 +319,8 @@ impl Injector<'_> {
     fn expect_down(&self, peer: u16) -> String {
         let (suspect_s, down_s) = self.bounds_s();
         format!(
-            "expect: uav{peer} suspected within {suspect_s:.0} s, down everywhere within {down_s:.0} s of scenario time"
+            "expect: {} suspected within {suspect_s:.0} s, down everywhere within {down_s:.0} s of scenario time",
+            self.peers.name(peer)
         )
     }
 

@@ -71,6 +71,15 @@ impl LivePeer {
         }
     }
 
+    /// What people call it.
+    pub(crate) fn name(&self) -> String {
+        if self.flies {
+            format!("uav{}", self.id)
+        } else {
+            "the ground station".to_owned()
+        }
+    }
+
     /// Whether it is a UAV.
     pub(crate) fn flies(&self) -> bool {
         self.flies

@@ -216,7 +216,7 @@ impl Peers {
         let address: Option<SocketAddr> = locator.strip_prefix("tcp/").and_then(|a| a.parse().ok());
         let peer = self.by_id.get_mut(&id).filter(|p| p.is_process(pid))?;
         let Some(address) = address.filter(|a| a.ip().is_loopback()) else {
-            let text = format!("uav{id} listens at {locator}, beyond this machine");
+            let text = format!("{} listens at {locator}, beyond this machine", peer.name());
             return Some(Said::Wrong(text));
         };
         line.welcome(self.seed, clock.now_ms, clock.scale);
@@ -293,19 +293,27 @@ impl Peers {
         }
     }
 
+    /// What people call a peer.
+    pub(crate) fn name(&self, id: u16) -> String {
+        self.by_id
+            .get(&id)
+            .map_or_else(|| format!("peer {id}"), LivePeer::name)
+    }
+
     /// A peer by its number, or who there is instead.
     pub(crate) fn known(&mut self, id: u16) -> Result<&mut LivePeer, String> {
-        let names: Vec<String> = self.by_id.keys().map(|id| format!("uav{id}")).collect();
+        let named = |(id, peer): (&u16, &LivePeer)| format!("{id} ({})", peer.name());
+        let names: Vec<String> = self.by_id.iter().map(named).collect();
         self.by_id
             .get_mut(&id)
-            .ok_or_else(|| format!("there is no uav{id}; there are {}", names.join(" ")))
+            .ok_or_else(|| format!("there is no peer {id}; there are {}", names.join(", ")))
     }
 
     /// Starts a peer's process again.
     pub(crate) fn start(&mut self, id: u16) -> Result<(), String> {
         let peer = self.by_id.get_mut(&id).ok_or("gone")?;
         peer.start(&self.processes)
-            .map_err(|e| format!("uav{id} did not start: {e}"))
+            .map_err(|e| format!("{} did not start: {e}", peer.name()))
     }
 
     /// Whether the radio of a peer works.

@@ -26,7 +26,7 @@ const READY_TIMEOUT: Duration = Duration::from_secs(45);
 /// How often progress is told, milliseconds of scenario time.
 const PROGRESS_MS: u64 = 10_000;
 
-/// Once all live UAVs hold the mission finished nobody looks for more; after this
+/// Once all live UAVs believe the mission finished nobody looks for more; after this
 /// long, milliseconds of scenario time, what was not seen by then never will be. Long
 /// enough for somebody to learn that it was wrong.
 const IDLE_MS: u64 = 30_000;
@@ -82,7 +82,7 @@ pub struct Progress {
     pub components: usize,
     /// Cells of dead peers taken over so far.
     pub taken_over: usize,
-    /// UAVs that hold the mission finished.
+    /// UAVs that believe the mission finished.
     pub finished: usize,
 }
 
@@ -292,7 +292,7 @@ impl<'a> Trial<'a> {
             Some(Said::Crashed { id, radio, why }) => {
                 self.account.radio(&radio);
                 self.account.ended(self.now_ms, id, Cause::Crashed);
-                let text = format!("uav{id} ended by itself: {why}");
+                let text = format!("{} ended by itself: {why}", self.peers.name(id));
                 self.account.failed(text.clone());
                 self.note(text);
             }

@@ -185,7 +185,7 @@ impl<'a> Baseline<'a> {
                 Event::PlanDone => {
                     self.busy.insert(id, false);
                 }
-                Event::Arrived | Event::Refused { .. } => {}
+                Event::Refused { .. } => {}
             }
         }
         true

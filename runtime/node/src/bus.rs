@@ -453,7 +453,6 @@ fn zenoh_priority(priority: Priority) -> zenoh::qos::Priority {
     match priority {
         Priority::Conflict => zenoh::qos::Priority::RealTime,
         Priority::Claim => zenoh::qos::Priority::InteractiveHigh,
-        Priority::Suspicion => zenoh::qos::Priority::InteractiveLow,
         Priority::Beacon => zenoh::qos::Priority::DataHigh,
         Priority::Telemetry => zenoh::qos::Priority::DataLow,
     }

@@ -1,4 +1,4 @@
-//! What a judge may look at: a copy of what one peer believes.
+//! What checks may look at: a copy of what one peer believes.
 
 use crate::output::Status;
 use crate::wire::message::{Epoch, Order};
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 pub struct Beliefs {
     /// Its life.
     pub incarnation: Incarnation,
-    /// Whether its probation is over and it speaks.
+    /// Whether it speaks: its probation is over and no double has silenced it.
     pub speaks: bool,
     /// Whether it can take part in planning.
     pub able: bool,
@@ -18,7 +18,7 @@ pub struct Beliefs {
     pub loop_hash: u64,
     /// Mission revision it follows; 0 before it has one.
     pub revision: u32,
-    /// Covered cells it knows of, one flag a cell of the loop.
+    /// Covered cells it knows of, one flag per cell of the loop.
     pub covered: Vec<bool>,
     /// Cells it lists as its own future, in order of flight, uncovered or not.
     pub plan: Vec<u16>,
@@ -36,7 +36,7 @@ pub struct Beliefs {
     pub peers: BTreeMap<PeerId, (Incarnation, Status)>,
     /// The diameter it reckons with.
     pub diameter: u32,
-    /// Whether it holds that the mission is finished.
+    /// Whether it believes that the mission is finished.
     pub finished: bool,
     /// The operator's standing order, as far as it has heard.
     pub order: Order,

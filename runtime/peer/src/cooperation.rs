@@ -53,9 +53,9 @@ use std::sync::Arc;
 /// Own coverage is made durable every so many cells: a crash costs at most these.
 pub const CELLS_PER_COVERED_RECORD: u16 = 5;
 
-/// Beacon periods for which the last cells of a time round are told before the next
-/// begins: one to speak, two to be passed on. Who misses them looks at those cells
-/// again, and hears of the next time round from the ground station.
+/// Beacon periods for which the last cells of a lap are told before the next lap begins:
+/// one to speak, two to be passed on. Who misses them flies those cells again, and hears
+/// of the next lap from the ground station.
 const LAP_PERIODS: u64 = 3;
 
 /// A UAV whose fuel was due works again when it may spend this much, milliseconds: less
@@ -189,22 +189,15 @@ impl Cooperation {
                 return vec![Effect::Alarm(text)];
             }
         };
-        if u16::try_from(geometry.coverage_loop.len()).is_err() {
-            return Effects::new();
-        }
         let old = self.state.take();
-        self.state = MissionState::begun(geometry, old, me, config, durable, timers);
-        let Some(state) = &self.state else {
-            return Effects::new();
+        let state = MissionState::begun(geometry, old, me, config, durable, timers);
+        let ready = Report::Ready {
+            revision: state.revision(),
+            loop_hash: state.loop_hash(),
+            cells: state.covered().capacity(),
         };
-        vec![
-            Effect::Report(Report::Ready {
-                revision: state.revision(),
-                loop_hash: state.loop_hash(),
-                cells: state.covered().capacity(),
-            }),
-            Effect::HearAgain,
-        ]
+        self.state = Some(state);
+        vec![Effect::Report(ready), Effect::HearAgain]
     }
 
     /// A percept: fly, and note what the camera saw.
@@ -239,7 +232,7 @@ impl Cooperation {
         }
         let mismatch = beacon.revision == state.revision() && beacon.loop_hash != 0;
         if mismatch && !core::mem::replace(&mut self.mismatch_told, true) {
-            let text = format!("uav{author} derived another loop from the same mission");
+            let text = format!("peer {author} derived another loop from the same mission");
             return vec![Effect::Alarm(text)];
         }
         Effects::new()
@@ -426,7 +419,6 @@ impl MissionState {
                 self.replan |= !self.negotiation.sections.plan().is_empty();
                 Effects::new()
             }
-            Event::Arrived => Effects::new(),
             Event::Refused { cells } => {
                 self.negotiation.sections.give_up(&cells);
                 let text = "a cell could not be reached clear of the zones; it was given up";
@@ -687,8 +679,8 @@ impl MissionState {
         sections.keep(good);
     }
 
-    /// All that can be covered is covered, or again not: the mission ends, the next time
-    /// round begins once the others had the time to hear of the last cells, or it goes on.
+    /// All that can be covered is covered, or again not: the mission ends, the next lap
+    /// begins once the others had the time to hear of the last cells, or it goes on.
     fn notice_end(&mut self, s: &Situation<'_>, timers: &mut Timers) -> Effects {
         let complete = self.negotiation.sections.complete();
         if complete && self.geometry.mission.further_laps > 0 {

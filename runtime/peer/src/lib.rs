@@ -127,6 +127,6 @@ pub type Incarnation = u32;
 
 impl core::fmt::Display for PeerId {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "uav{}", self.0)
+        write!(f, "peer {}", self.0)
     }
 }

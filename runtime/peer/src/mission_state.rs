@@ -18,7 +18,7 @@ use crate::offload::MissionGeometry;
 use crate::protocol::Negotiation;
 use crate::protocol::sections::LivePeers;
 use crate::timers::{Timer, Timers};
-use crate::wire::message::{Behaviour, Claim, Member, MissionStatus};
+use crate::wire::message::{Activity, Claim, Member, MissionStatus};
 use skein_behaviors::{Executive, Goal, Percept};
 use skein_flight::coverage::ring::CoverageLoop;
 use std::sync::Arc;
@@ -110,11 +110,12 @@ impl MissionState {
         self.negotiation.sections.covered()
     }
 
-    pub fn behaviour(&self) -> Behaviour {
+    pub fn activity(&self) -> Activity {
         match &self.goal {
-            Some(Goal::Legs(_)) => Behaviour::Covering,
-            Some(Goal::Point(_) | Goal::Hold) => Behaviour::Loitering,
-            None => Behaviour::Waiting,
+            Some(Goal::Legs(_)) => Activity::Covering,
+            Some(Goal::Hold) => Activity::Holding,
+            Some(Goal::Point(_)) => Activity::Returning,
+            None => Activity::Waiting,
         }
     }
 
@@ -154,7 +155,7 @@ impl MissionState {
     }
 
     /// The state of a mission whose geometry has arrived, with what is kept of the last
-    /// one. None if its loop has more cells than can be numbered.
+    /// one.
     pub fn begun(
         geometry: Arc<MissionGeometry>,
         old: Option<Self>,
@@ -162,8 +163,9 @@ impl MissionState {
         config: &PeerConfig,
         durable: &Durable,
         timers: &mut Timers,
-    ) -> Option<Self> {
-        let cells = u16::try_from(geometry.coverage_loop.len()).ok()?;
+    ) -> Self {
+        // A loop of more cells is no geometry: `LoopError::TooManyCells`.
+        let cells = u16::try_from(geometry.coverage_loop.len()).unwrap_or(u16::MAX);
         timers.stop(Timer::NextLap);
         let mut new = Self {
             negotiation: negotiation_begun(&geometry, old.as_ref(), me, durable, cells),
@@ -185,7 +187,7 @@ impl MissionState {
             Some(old) if old.loop_hash() == new.loop_hash() => new.keep_on(old),
             _ => timers.stop(Timer::HeldCells),
         }
-        Some(new)
+        new
     }
 
     /// On the same loop sections and rounds stay what they are, so that a revision which
@@ -242,7 +244,7 @@ fn negotiation_begun(
     let base = CellSet::of(cells, without_need.map(|(i, _)| i));
     let counter = old.map_or(0, |m| m.negotiation.rounds.counter());
     let mut negotiation = Negotiation::new(me, base, counter.max(durable.counter));
-    // Every time round begins with nothing covered.
+    // Every lap begins with nothing covered.
     let same_lap = |old: &&MissionState| old.geometry.mission.lap == geometry.mission.lap;
     if let Some(old) = old.filter(same_lap) {
         let before = &old.geometry.coverage_loop;

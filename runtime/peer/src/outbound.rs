@@ -21,7 +21,7 @@ use crate::timers::{Timer, Timers};
 use crate::wire::codec::{self, Body};
 use crate::wire::kinds::Kind;
 use crate::wire::limits::COVERED_MAX_BYTES;
-use crate::wire::message::{Beacon, Behaviour, Cover, Finished, Record, State};
+use crate::wire::message::{Activity, Beacon, Cover, Finished, Record, State};
 use crate::{Incarnation, PeerConfig};
 use rand_chacha::ChaCha8Rng;
 use rand_core::Rng;
@@ -333,9 +333,9 @@ pub(crate) fn beacon_of(s: &Sources<'_>) -> Beacon {
 
 fn state_of(s: &Sources<'_>, state: &MissionState) -> State {
     let p = s.percept;
-    let behaviour = match s.config.role {
-        Role::GroundStation => Behaviour::Ground,
-        Role::Uav => state.behaviour(),
+    let activity = match s.config.role {
+        Role::GroundStation => Activity::GroundStation,
+        Role::Uav => state.activity(),
     };
     State {
         east_mm: p.map_or(0, |p| mm(p.pose.east_m)),
@@ -344,7 +344,7 @@ fn state_of(s: &Sources<'_>, state: &MissionState) -> State {
         heading_e4: p.map_or(0, |p| e4(p.pose.heading_rad)),
         airspeed_mmps: p.map_or(0, |p| mm(p.airspeed_mps).unsigned_abs()),
         endurance_s: p.map_or(0, |p| mm(p.endurance_s / 1000.0).unsigned_abs()),
-        behaviour,
+        activity,
         mission: state.status(),
         covered: state.covered().count(),
         cells: state.covered().capacity(),

@@ -47,13 +47,11 @@ pub enum Output {
 pub enum Priority {
     /// Approach conflicts.
     Conflict,
-    /// Claims, rounds, takeovers.
+    /// Claims, bids, orders.
     Claim,
-    /// Suspicions.
-    Suspicion,
-    /// Beacons.
+    /// Beacons and coverage.
     Beacon,
-    /// Coverage, state, missions and all else.
+    /// States, missions and all else.
     Telemetry,
 }
 
@@ -64,7 +62,7 @@ pub enum Status {
     Alive,
     /// Silent for too long; may be refuted.
     Suspect,
-    /// Taken for dead or out of reach; its work may be taken over.
+    /// Believed dead or out of reach; its work may be taken over.
     Down,
 }
 

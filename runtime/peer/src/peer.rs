@@ -37,8 +37,8 @@ use skein_behaviors::Percept;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-/// Most stores under way: one a kind of promise and a few of covered cells. A driver
-/// that answers none of them is broken, and the peer goes silent rather than lie.
+/// Most stores under way: one per kind of promise and a few of covered cells. A driver
+/// that answers none of them is broken: the peer promises nothing more.
 pub const MAX_STORES: usize = 32;
 
 /// Most jobs under way: one geometry a mission revision, one division a round. Of more the
@@ -607,7 +607,7 @@ impl Peer {
     pub fn beliefs(&self) -> Beliefs {
         let mut beliefs = Beliefs {
             incarnation: self.life.incarnation(),
-            speaks: self.life.has_voice(self.now, &self.timers),
+            speaks: self.speaks(),
             diameter: self.membership.diameter(self.now),
             order: self.cooperation.order(),
             ..Beliefs::default()

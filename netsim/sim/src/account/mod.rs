@@ -149,7 +149,7 @@ impl Account {
                 loop_hash,
                 cells,
             } => {
-                // Whoever held an older revision finished is to finish this one again.
+                // Whoever believed an older revision finished is to finish this one again.
                 if self.ready.insert(peer, *revision) < Some(*revision) {
                     self.finished.remove(&peer);
                 }
@@ -181,17 +181,25 @@ impl Account {
                 self.restarts.productive(now_ms, peer);
                 self.finished
                     .insert(peer)
-                    .then(|| format!("uav{peer} holds the mission finished"))
+                    .then(|| format!("{} believes the mission finished", self.name(peer)))
             }
-            Report::Alarm { text } => {
-                self.alarm(format!("{:.1} s, uav{peer}: {text}", secs(now_ms)))
-            }
+            Report::Alarm { text } => self.alarm(format!(
+                "{:.1} s, {}: {text}",
+                secs(now_ms),
+                self.name(peer)
+            )),
             Report::Refused { reason } => self.alarm(format!(
-                "{:.1} s, uav{peer} refused bytes: {reason}",
-                secs(now_ms)
+                "{:.1} s, {} refused bytes: {reason}",
+                secs(now_ms),
+                self.name(peer)
             )),
             Report::Round { .. } => None,
         }
+    }
+
+    /// What people call a peer.
+    fn name(&self, peer: u16) -> String {
+        text::name(peer, self.setting.uavs.contains_key(&peer))
     }
 
     fn alarm(&mut self, text: String) -> Option<String> {
@@ -255,7 +263,7 @@ impl Account {
         self.ready.contains_key(&peer)
     }
 
-    /// Whether that peer holds its newest mission finished.
+    /// Whether that peer believes its newest mission finished.
     #[must_use]
     pub fn is_finished(&self, peer: u16) -> bool {
         self.finished.contains(&peer)
@@ -304,6 +312,7 @@ impl Account {
             schema_version: report::SCHEMA_VERSION,
             scenario: self.setting.scenario.clone(),
             seed: self.setting.seed,
+            uavs: self.setting.uavs.keys().copied().collect(),
             driver,
             completed,
             end_ms: now_ms,

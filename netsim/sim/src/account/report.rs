@@ -23,13 +23,15 @@ pub struct RunReport {
     pub scenario: String,
     /// Seed of the run.
     pub seed: u64,
+    /// The UAVs; any other peer is the ground station.
+    pub uavs: Vec<u16>,
     /// `sim` or `live`.
     pub driver: Driver,
     /// Whether the run is as it must be: completed, and nothing in `reasons`.
     pub passed: bool,
     /// Why not, if not, one sentence each.
     pub reasons: Vec<String>,
-    /// Whether every coverable cell was seen and every live UAV, one at least, holds the
+    /// Whether every coverable cell was seen and every live UAV, one at least, believes the
     /// mission finished.
     pub completed: bool,
     /// When the run ended, ms.
@@ -61,7 +63,7 @@ pub struct RunReport {
     pub kills: Vec<KillReport>,
     /// Each restart, in the order of the times.
     pub restarts: Vec<RestartReport>,
-    /// Live UAVs at the end that hold the mission finished.
+    /// Live UAVs at the end that believe the mission finished.
     pub finished: Vec<u16>,
     /// Live UAVs at the end that do not.
     pub unfinished: Vec<u16>,
@@ -240,7 +242,7 @@ pub struct RestartReport {
     pub incarnation_before: Option<u32>,
     /// Its life after.
     pub incarnation_after: Option<u32>,
-    /// When it listed or saw a cell or held the mission finished, ms after the restart.
+    /// When it listed or saw a cell or believed the mission finished, ms after the restart.
     pub productive_ms: Option<u64>,
 }
 
@@ -398,7 +400,7 @@ impl RunReport {
         }
         if !self.unfinished.is_empty() {
             let n = self.unfinished.len();
-            reasons.push(format!("{n} live UAVs do not hold the mission finished"));
+            reasons.push(format!("{n} live UAVs do not believe the mission finished"));
         }
         if self.simulated.as_ref().is_some_and(|s| s.infeasible) {
             reasons.push("some cells are beyond anybody's endurance".to_owned());

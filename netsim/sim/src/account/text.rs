@@ -20,10 +20,10 @@ impl fmt::Display for RunReport {
         self.write_times(f)?;
         self.write_world(f)?;
         for kill in &self.kills {
-            write_kill(kill, f)?;
+            self.write_kill(kill, f)?;
         }
         for restart in &self.restarts {
-            write_restart(restart, f)?;
+            self.write_restart(restart, f)?;
         }
         self.write_radio(f)?;
         self.write_checks(f)?;
@@ -89,9 +89,9 @@ impl RunReport {
         if let Some(ms) = self.revisit_ms {
             writeln!(f, "  revisit    {:.1} s at most", secs(ms))?;
         }
-        writeln!(f, "  finished   {}", named(&self.finished))?;
+        writeln!(f, "  finished   {}", self.names(&self.finished))?;
         if !self.unfinished.is_empty() {
-            writeln!(f, "  unfinished {}", named(&self.unfinished))?;
+            writeln!(f, "  unfinished {}", self.names(&self.unfinished))?;
         }
         Ok(())
     }
@@ -114,7 +114,7 @@ impl RunReport {
             r.bytes_per_peer_s,
             r.received,
             r.multi_hop,
-            named(&relays)
+            self.names(&relays)
         )
     }
 
@@ -133,9 +133,9 @@ impl RunReport {
             for d in &simulated.false_downs {
                 writeln!(
                     f,
-                    "  false down of uav{} by uav{} at {:.1} s",
-                    d.of,
-                    d.by,
+                    "  false down of {} by {} at {:.1} s",
+                    self.name(d.of),
+                    self.name(d.by),
                     secs(d.at_ms)
                 )?;
             }
@@ -147,90 +147,104 @@ impl RunReport {
         }
         Ok(())
     }
-}
 
-fn write_kill(k: &KillReport, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    let (word, whose) = match k.cause {
-        Cause::Killed => ("killed    ", ""),
-        Cause::ComputerKilled => ("killed    ", "the computer of "),
-        Cause::Terminated => ("terminated", ""),
-        Cause::Crashed => ("crashed   ", ""),
-        Cause::Lost => ("lost      ", ""),
-    };
-    write!(
-        f,
-        "  {word} {whose}uav{} at {:.1} s with {} cells uncovered ({:.0} % of an even share)",
-        k.peer,
-        secs(k.at_ms),
-        k.cells_held,
-        k.share_held * 100.0
-    )?;
-    if let (Some(by), Some(ms)) = (k.detected_by, k.detection_ms) {
-        write!(f, "; noticed by uav{by} after {:.1} s", secs(ms))?;
-    }
-    if k.listed_already > 0 {
-        write!(f, "; {} listed by others already", k.listed_already)?;
-    }
-    for t in &k.taken_over_by {
+    fn write_kill(&self, k: &KillReport, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (word, whose) = match k.cause {
+            Cause::Killed => ("killed    ", ""),
+            Cause::ComputerKilled => ("killed    ", "the computer of "),
+            Cause::Terminated => ("terminated", ""),
+            Cause::Crashed => ("crashed   ", ""),
+            Cause::Lost => ("lost      ", ""),
+        };
         write!(
             f,
-            "; uav{} took over {} after {:.1} s",
-            t.peer,
-            t.cells,
-            secs(t.first_ms)
+            "  {word} {whose}{} at {:.1} s with {} cells uncovered ({:.0} % of an even share)",
+            self.name(k.peer),
+            secs(k.at_ms),
+            k.cells_held,
+            k.share_held * 100.0
         )?;
+        if let (Some(by), Some(ms)) = (k.detected_by, k.detection_ms) {
+            write!(f, "; noticed by {} after {:.1} s", self.name(by), secs(ms))?;
+        }
+        if k.listed_already > 0 {
+            write!(f, "; {} listed by others already", k.listed_already)?;
+        }
+        for t in &k.taken_over_by {
+            write!(
+                f,
+                "; uav{} took over {} after {:.1} s",
+                t.peer,
+                t.cells,
+                secs(t.first_ms)
+            )?;
+        }
+        if k.taken_back > 0 {
+            write!(f, "; {} taken back by itself", k.taken_back)?;
+        }
+        if k.seen_in_passing > 0 {
+            write!(f, "; {} seen in passing", k.seen_in_passing)?;
+        }
+        if let Some(ms) = k.takeover_ms.filter(|_| !k.taken_over_by.is_empty()) {
+            write!(f, "; all taken over after {:.1} s", secs(ms))?;
+        }
+        if k.superseded > 0 {
+            write!(f, "; {} superseded by a new mission", k.superseded)?;
+        }
+        if k.left > 0 {
+            write!(f, "; {} left", k.left)?;
+        }
+        let flown = k.flown_by.iter().map(|(id, n)| format!("{n} by uav{id}"));
+        let flown = flown.collect::<Vec<_>>().join(", ");
+        if flown.is_empty() {
+            writeln!(f)
+        } else {
+            writeln!(f, "; flown: {flown}")
+        }
     }
-    if k.taken_back > 0 {
-        write!(f, "; {} taken back by itself", k.taken_back)?;
+
+    fn write_restart(&self, r: &RestartReport, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let disk = if r.fresh_disk {
+            "without its disk"
+        } else {
+            "with its disk"
+        };
+        write!(
+            f,
+            "  restarted  {} at {:.1} s {disk}",
+            self.name(r.peer),
+            secs(r.at_ms)
+        )?;
+        if let Some(life) = r.incarnation_after {
+            write!(f, ", life {life}")?;
+        }
+        match r.productive_ms {
+            Some(ms) => writeln!(f, ", productive after {:.1} s", secs(ms)),
+            None => writeln!(f, ", not productive again"),
+        }
     }
-    if k.seen_in_passing > 0 {
-        write!(f, "; {} seen in passing", k.seen_in_passing)?;
+
+    /// What people call a peer.
+    fn name(&self, peer: u16) -> String {
+        name(peer, self.uavs.contains(&peer))
     }
-    if let Some(ms) = k.takeover_ms.filter(|_| !k.taken_over_by.is_empty()) {
-        write!(f, "; all taken over after {:.1} s", secs(ms))?;
-    }
-    if k.superseded > 0 {
-        write!(f, "; {} superseded by a new mission", k.superseded)?;
-    }
-    if k.left > 0 {
-        write!(f, "; {} left", k.left)?;
-    }
-    let flown = k.flown_by.iter().map(|(id, n)| format!("{n} by uav{id}"));
-    let flown = flown.collect::<Vec<_>>().join(", ");
-    if flown.is_empty() {
-        writeln!(f)
-    } else {
-        writeln!(f, "; flown: {flown}")
+
+    fn names(&self, peers: &[u16]) -> String {
+        if peers.is_empty() {
+            return "nobody".to_owned();
+        }
+        let names: Vec<String> = peers.iter().map(|p| self.name(*p)).collect();
+        names.join(", ")
     }
 }
 
-fn write_restart(r: &RestartReport, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    let disk = if r.fresh_disk {
-        "without its disk"
+/// What people call a peer.
+pub(super) fn name(peer: u16, flies: bool) -> String {
+    if flies {
+        format!("uav{peer}")
     } else {
-        "with its disk"
-    };
-    write!(
-        f,
-        "  restarted  uav{} at {:.1} s {disk}",
-        r.peer,
-        secs(r.at_ms)
-    )?;
-    if let Some(life) = r.incarnation_after {
-        write!(f, ", life {life}")?;
+        "the ground station".to_owned()
     }
-    match r.productive_ms {
-        Some(ms) => writeln!(f, ", productive after {:.1} s", secs(ms)),
-        None => writeln!(f, ", not productive again"),
-    }
-}
-
-fn named(peers: &[u16]) -> String {
-    if peers.is_empty() {
-        return "nobody".to_owned();
-    }
-    let names: Vec<String> = peers.iter().map(|p| format!("uav{p}")).collect();
-    names.join(" ")
 }
 
 fn counted(by: &BTreeMap<String, u64>) -> String {

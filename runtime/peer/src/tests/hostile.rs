@@ -74,7 +74,7 @@ fn a_rival_loop_is_an_alarm_once_and_its_peer_no_member() {
     }
     assert_eq!(
         h.alarms(1),
-        ["uav9 derived another loop from the same mission"]
+        ["peer 9 derived another loop from the same mission"]
     );
     let named = |(_, r): &(u64, Report)| match r {
         Report::Round { members, .. } => members.contains(&PeerId(9)),

@@ -84,6 +84,7 @@ fn of_a_double_id_the_lower_nonce_is_silent_and_flies_on() {
     h.run_s(15);
     assert_eq!(h.seat(1).said.len(), said);
     assert!(covered(&h, 1) > seen, "the UAV is not grounded");
+    assert!(!h.beliefs(1).speaks);
     // The one with the higher nonce goes on speaking.
     let double = Body::Beacon(beacon(9999, 0));
     h.inject(2, record(2, 1, 9999, 0, &double));

@@ -14,7 +14,7 @@ use super::cbor::{In, Listed, Out, Wire, array_of, number_of};
 use super::kinds::{Kind, RECORD_MAX_BYTES};
 use super::limits::{self, COMMITS_MAX, GOSSIP_MAX, MEMBERS_MAX, PLAN_MAX, at_most, in_range};
 use super::message::{
-    Beacon, Behaviour, Bid, CellRun, Claim, Cover, Epoch, Finished, Firmness, Gossip, ListedRun,
+    Activity, Beacon, Bid, CellRun, Claim, Cover, Epoch, Finished, Firmness, Gossip, ListedRun,
     Member, MissionChunk, MissionStatus, OffLoop, Order, Record, Round, Stamp, State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
@@ -274,7 +274,7 @@ array_of!(State {
     heading_e4,
     airspeed_mmps,
     endurance_s,
-    behaviour,
+    activity,
     mission,
     covered,
     cells
@@ -332,14 +332,14 @@ array_of!(MissionChunk {
     bytes
 });
 array_of!(Finished { revision });
-number_of!(Behaviour {
+number_of!(Activity {
     Waiting,
     Covering,
-    Loitering,
-    Ground
+    Holding,
+    Returning,
+    GroundStation
 });
 number_of!(MissionStatus {
-    None,
     Active,
     Accomplished,
     Failed

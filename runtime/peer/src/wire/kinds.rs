@@ -15,7 +15,7 @@ pub const RECORD_MAX_BYTES: usize = 4096;
 pub enum Kind {
     /// "I am here", with gossip.
     Beacon = 0,
-    /// Pose, fuel, behaviour, mission status.
+    /// Pose, fuel, activity, mission status.
     State = 1,
     /// A bid in a round of negotiation.
     Bid = 2,

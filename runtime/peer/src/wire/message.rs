@@ -1,4 +1,4 @@
-//! What peers say: one type a kind, integers only.
+//! What peers say: one type per kind, integers only.
 //!
 //! Every type is encoded as a CBOR array (short on the air); the JSON Schemas and
 //! the table of kinds name the places of the arrays.
@@ -44,7 +44,7 @@ pub struct Beacon {
     pub able: bool,
     /// Whether it is a ground station.
     pub ground_station: bool,
-    /// Whether it holds that the mission is finished.
+    /// Whether it believes that the mission is finished.
     pub finished: bool,
     /// Boot nonce: tells two peers under one id apart.
     pub nonce: u32,
@@ -85,33 +85,34 @@ pub struct Gossip {
     pub digest: u16,
 }
 
-/// What a peer does, for people and the ground.
+/// What a peer does at present, for people.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Behaviour {
+pub enum Activity {
     /// Waits for a mission or for its own probation to end.
     Waiting,
     /// Flies its section.
     Covering,
-    /// Flies to or loiters at base, or where it was told to hold.
-    Loitering,
-    /// Stands on the ground.
-    Ground,
+    /// Loiters where it is: it was told to hold, or has nothing to fly.
+    Holding,
+    /// Flies to the base, or loiters above it.
+    Returning,
+    /// Stands on the ground: a ground station.
+    GroundStation,
 }
 
 /// How the mission stands, as far as one peer knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MissionStatus {
-    /// No mission, or its body is incomplete.
-    None,
     /// Under way.
     Active,
     /// All that can be covered is covered.
     Accomplished,
-    /// Cells remain that nobody has the endurance for.
+    /// Cells remain that nobody has the endurance for, and this peer has nothing to fly;
+    /// others may.
     Failed,
 }
 
-/// Pose, fuel, behaviour and mission status, for all.
+/// Pose, fuel, activity and mission status, for people.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct State {
     /// East, mm.
@@ -127,7 +128,7 @@ pub struct State {
     /// Flight time left, seconds.
     pub endurance_s: u32,
     /// What it does.
-    pub behaviour: Behaviour,
+    pub activity: Activity,
     /// How the mission stands.
     pub mission: MissionStatus,
     /// Cells of the loop it knows to be covered.
@@ -221,7 +222,7 @@ pub struct Member {
     pub incarnation: Incarnation,
 }
 
-/// A round of negotiation: which members, on which ground.
+/// A round of negotiation: which members, on which loop.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Round {
     /// One more than any counter seen by the starter.

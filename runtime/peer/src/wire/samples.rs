@@ -56,7 +56,8 @@ pub fn listing(first: u16) -> ListedRun {
     }
 }
 
-/// A typical body of each kind and its bytes, which must never change within v1.
+/// A typical body of each kind and its bytes: who changes them changes the format, which
+/// from the first release on is another version.
 pub fn golden() -> Vec<(Body, &'static str)> {
     let round = Round {
         counter: 7,
@@ -109,12 +110,12 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                 heading_e4: -31_416,
                 airspeed_mmps: 18_000,
                 endurance_s: 2400,
-                behaviour: Behaviour::Covering,
+                activity: Activity::Covering,
                 mission: MissionStatus::Active,
                 covered: 100,
                 cells: 480,
             }),
-            "8a01201a0001d4c0397ab7194650190960010118641901e0",
+            "8a01201a0001d4c0397ab7194650190960010018641901e0",
         ),
         (
             Body::Bid(Bid {
@@ -241,7 +242,7 @@ pub fn largest() -> Vec<Body> {
             heading_e4: -HEADING_MAX_E4,
             airspeed_mmps: SPEED_MAX_MMPS,
             endurance_s: DURATION_MAX_MS / 1000,
-            behaviour: Behaviour::Ground,
+            activity: Activity::GroundStation,
             mission: MissionStatus::Failed,
             covered: u16::MAX,
             cells: u16::MAX,

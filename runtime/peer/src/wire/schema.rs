@@ -147,14 +147,20 @@ const STATE: &[Place] = &[
         Shape::Number(0, DURATION_MAX_MS as i128 / 1000),
     ),
     at(
-        "behaviour",
+        "activity",
         "what it does",
-        Shape::Choice(&["waiting", "covering", "loitering", "ground"]),
+        Shape::Choice(&[
+            "waiting",
+            "covering",
+            "holding",
+            "returning",
+            "ground-station",
+        ]),
     ),
     at(
         "mission",
         "how the mission stands",
-        Shape::Choice(&["none", "active", "accomplished", "failed"]),
+        Shape::Choice(&["active", "accomplished", "failed"]),
     ),
     at(
         "covered",

@@ -19,7 +19,7 @@ impl Executive {
         let (aim, kept, queue) = match goal {
             Goal::Legs(legs) => {
                 let visits = self.visits(&legs);
-                begins_with = visits.iter().find(|h| is_open(h.cell)).copied();
+                begins_with = visits.iter().find(|visit| is_open(visit.cell)).copied();
                 let (kept, queue) = self.continued(visits, is_open);
                 (Aim::Legs, kept, queue)
             }
@@ -37,7 +37,7 @@ impl Executive {
                 )
             }
         };
-        self.end_reported = self.end_reported && aim == self.aim && aim != Aim::Legs;
+        self.end_reported = false;
         self.aim = aim;
         self.replan = self.replan || kept == 0;
         if kept > 0 {
@@ -48,8 +48,8 @@ impl Executive {
         } else {
             // What is on the track is no longer wanted; it is flown until the next step.
             for s in &mut self.stretches {
-                if let Kind::Serve(h) = s.kind {
-                    s.kind = Kind::Pass(h.cell, h.direction);
+                if let Kind::Serve(visit) = s.kind {
+                    s.kind = Kind::Pass(visit.cell, visit.direction);
                 }
             }
             self.queue = queue;
@@ -109,8 +109,8 @@ impl Executive {
         mut visits: VecDeque<CellVisit>,
         is_open: &dyn Fn(u16) -> bool,
     ) -> (usize, VecDeque<CellVisit>) {
-        let first = visits.front().map(|h| (h.cell, h.direction));
-        visits.retain(|h| is_open(h.cell));
+        let first = visits.front().map(|visit| (visit.cell, visit.direction));
+        visits.retain(|visit| is_open(visit.cell));
         let Some(next) = visits.front().copied() else {
             return (self.loitering(true), visits);
         };
@@ -146,7 +146,7 @@ impl Executive {
             };
             if visits
                 .front()
-                .is_none_or(|h| (h.cell, h.direction) != (visit.cell, visit.direction))
+                .is_none_or(|next| (next.cell, next.direction) != (visit.cell, visit.direction))
             {
                 break;
             }
