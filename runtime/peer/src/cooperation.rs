@@ -274,6 +274,7 @@ impl Cooperation {
             state.exhausted = false;
         }
         let able = s.has_voice && order == Order::Resume && state.can_fly_plans(s);
+        let able = able && !s.membership.is_deaf(s.now);
         effects.extend(state.negotiate(s, able, timers));
         effects.extend(state.notice_end(s, timers));
         state.steer(order);
@@ -509,15 +510,31 @@ impl MissionState {
         s.role == Role::Uav && senses && !self.exhausted
     }
 
-    /// Live UAVs on this loop whose beacon says able, this peer included if it is.
-    fn members(&self, s: &Situation<'_>, able: bool) -> Vec<Member> {
+    /// The peers that are alive and hear somebody. Whose claim says that it holds all others
+    /// for down hears no round and yields to nobody, so it counts as if it were out of reach
+    /// both ways: each side plans as if the other were dead.
+    fn reachable(&self, membership: &Membership) -> LivePeers {
+        let heard = self.negotiation.sections.heard();
+        let alone = |id, incarnation| {
+            let claim = heard.get(&id).filter(|h| h.incarnation == incarnation);
+            claim.is_some_and(|h| h.claim.alone)
+        };
+        let live = membership.live();
+        live.filter(|(id, life)| !alone(*id, *life)).collect()
+    }
+
+    /// Reachable UAVs on this loop whose beacon says able, this peer included if it is.
+    fn members(&self, s: &Situation<'_>, live: &LivePeers, able: bool) -> Vec<Member> {
         let on_this_loop = |id: u16| {
             s.membership
                 .info(id)
                 .is_some_and(|i| i.able && !i.ground_station && i.loop_hash == self.loop_hash())
         };
-        let others = s.membership.live().filter(|(id, _)| on_this_loop(*id));
-        let others = others.map(|(id, incarnation)| Member { id, incarnation });
+        let others = live.iter().filter(|(id, _)| on_this_loop(**id));
+        let others = others.map(|(id, incarnation)| Member {
+            id: *id,
+            incarnation: *incarnation,
+        });
         let mut members: Vec<Member> = others.chain(able.then_some(s.me)).collect();
         members.sort_unstable();
         members
@@ -525,8 +542,8 @@ impl MissionState {
 
     /// Lets the negotiation look at the time, and carries out what it wants.
     fn negotiate(&mut self, s: &Situation<'_>, able: bool, timers: &mut Timers) -> Effects {
-        let live: LivePeers = s.membership.live().collect();
-        let members = self.members(s, able);
+        let live = self.reachable(s.membership);
+        let members = self.members(s, &live, able);
         self.able_since = able.then(|| self.able_since.unwrap_or(s.now));
         let lost = self.live.iter().any(|(id, inc)| live.get(id) != Some(inc));
         self.live.clone_from(&live);
@@ -547,6 +564,10 @@ impl MissionState {
         let coverage_loop = Arc::clone(&self.geometry.coverage_loop);
         let actions = self.negotiation.tick(&ctx, &coverage_loop);
         let mut effects = Effects::new();
+        let alone = s.membership.live().next().is_none();
+        if core::mem::replace(&mut self.alone, alone) != alone && self.lists() {
+            effects.push(Effect::ClaimChanged);
+        }
         for action in actions {
             match action {
                 Action::Bid => effects.extend(self.bid(s)),

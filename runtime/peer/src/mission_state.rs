@@ -71,8 +71,10 @@ pub(crate) struct MissionState {
     pub replan: bool,
     /// Since when this peer can plan without a break.
     pub able_since: Option<crate::Time>,
-    /// The peers that were alive at the last tick.
+    /// The peers that were alive at the last tick and heard somebody.
     pub live: LivePeers,
+    /// Whether all others were held for down at the last tick.
+    pub alone: bool,
     pub finished: bool,
     /// Whether its fuel is due: it flies home until some is back.
     pub exhausted: bool,
@@ -132,9 +134,18 @@ impl MissionState {
 
     /// The own claim, with the expected end of the plan.
     pub fn claim(&self) -> Claim {
-        self.negotiation
-            .sections
-            .claim(self.revision(), self.loop_hash(), self.eta_ms())
+        let sections = &self.negotiation.sections;
+        Claim {
+            // Who lists nothing takes nothing from anybody, and may be asked for a bid.
+            alone: self.alone && self.lists(),
+            ..sections.claim(self.revision(), self.loop_hash(), self.eta_ms())
+        }
+    }
+
+    /// Whether its claim lists any cell.
+    pub fn lists(&self) -> bool {
+        let sections = &self.negotiation.sections;
+        !sections.plan().is_empty() || !sections.held().is_empty()
     }
 
     pub fn eta_ms(&self) -> u32 {
@@ -174,6 +185,7 @@ impl MissionState {
             replan: true,
             able_since: None,
             live: LivePeers::new(),
+            alone: false,
             finished: false,
             exhausted: old.as_ref().is_some_and(|m| m.exhausted),
             unsaved_cells: 0,
@@ -197,6 +209,7 @@ impl MissionState {
         self.negotiation = old.negotiation;
         self.able_since = old.able_since;
         self.live = old.live;
+        self.alone = old.alone;
         self.claims = old.claims;
         self.unsaved_cells = old.unsaved_cells;
         let (new, before) = (&self.geometry.mission, &old.geometry.mission);

@@ -2,6 +2,7 @@
 
 use super::membership::Membership;
 use super::{Clocks, Findings, Snapshot, bounds::LIGHT_FACTOR};
+use skein_peer::Beliefs;
 use skein_peer::output::Status;
 use skein_peer::wire::message::{Claim, Firmness, ListedRun, Stamp};
 use std::collections::BTreeMap;
@@ -98,6 +99,10 @@ impl ListingCheck {
                 if let Some(s) = settled.get_mut(usize::from(*c)) {
                     *s = true;
                 }
+            }
+            // Who holds all others for down lists nothing for them.
+            if is_alone(&m.view) && snapshot.able().any(|o| o.id != m.id && !is_alone(&o.view)) {
+                continue;
             }
             for c in m.view.held.iter().chain(&m.view.plan) {
                 if let Some(l) = lister.get_mut(usize::from(*c)) {
@@ -220,7 +225,8 @@ impl ListingCheck {
             for (&(_, author), (claim, (life, _))) in self.heard.range((m.id, 0)..=(m.id, u16::MAX))
             {
                 let alive = members.belief(m.id, author) == Some((*life, Status::Alive));
-                if !alive || claim.loop_hash != snapshot.loop_hash {
+                // Who holds all others for down is no part of their component.
+                if !alive || claim.alone || claim.loop_hash != snapshot.loop_hash {
                     continue;
                 }
                 for l in &claim.plan {
@@ -254,6 +260,11 @@ impl ListingCheck {
     }
 }
 
+/// Whether a peer holds all others for down.
+fn is_alone(view: &Beliefs) -> bool {
+    view.peers.values().all(|(_, s)| *s == Status::Down)
+}
+
 /// From when an orphan counts: from the detection of its owner's death where it has
 /// one; `None` while nobody knows, which the check of detection bounds.
 fn counted_from(o: &Orphan, members: &Membership) -> Option<u64> {
@@ -279,7 +290,7 @@ fn each_cell(l: &ListedRun, n: usize, mut f: impl FnMut(usize)) {
 mod tests {
     use super::super::{Bounds, Graph, PeerSnapshot, Stability};
     use super::*;
-    use skein_peer::Beliefs;
+    use skein_peer::PeerId;
     use skein_peer::wire::message::{CellRun, Epoch};
 
     const BOUNDS: Bounds = Bounds {
@@ -293,6 +304,8 @@ mod tests {
         found: Findings,
         stability: Stability,
         loss: u16,
+        /// Who holds all others for down.
+        alone: Option<u16>,
     }
 
     impl Story {
@@ -303,6 +316,15 @@ mod tests {
                 found: Findings::new(1),
                 stability: Stability::default(),
                 loss,
+                alone: None,
+            }
+        }
+
+        fn believed(&self, by: u16) -> Status {
+            if self.alone == Some(by) {
+                Status::Down
+            } else {
+                Status::Alive
             }
         }
 
@@ -320,6 +342,7 @@ mod tests {
                         loop_hash: 9,
                         covered: vec![false; 4],
                         plan: plan.to_vec(),
+                        peers: [(PeerId(99), (1, self.believed(*id)))].into(),
                         ..Beliefs::default()
                     },
                 })
@@ -353,6 +376,21 @@ mod tests {
                 s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
             }
             assert_eq!(s.found.counts.values().sum::<u64>(), at_90, "loss {loss}");
+        }
+    }
+
+    #[test]
+    fn what_only_a_deaf_peer_lists_is_without_an_owner_while_others_can_plan() {
+        for (plans, broken) in [
+            (&[(1, &[0u16, 1][..]), (2, &[2, 3])][..], true),
+            (&[(2, &[0, 1, 2, 3])], false),
+        ] {
+            let mut s = Story::new(0);
+            s.alone = Some(2);
+            for t in 0..14 {
+                s.snapshot(t * 1000, plans);
+            }
+            assert_eq!(s.found.counts.contains_key("L2"), broken, "{plans:?}");
         }
     }
 
@@ -397,12 +435,18 @@ mod tests {
                 ..Claim::default()
             })
         };
-        for (other, broken) in [(7, true), (2, false)] {
+        let deaf = |claim: Arc<Claim>, alone| {
+            let mut claim = (*claim).clone();
+            claim.alone = alone;
+            Arc::new(claim)
+        };
+        for (other, alone, broken) in [(7, false, true), (7, true, false), (2, false, false)] {
             let mut s = Story::new(300);
             s.members
                 .on_belief(0, (1, 2), (1, Status::Alive), &BOUNDS, None);
             s.check.on_published(1, claim(5, 1));
-            s.check.on_heard((1, 2), (1, 8), &claim(other, 2));
+            s.check
+                .on_heard((1, 2), (1, 8), &deaf(claim(other, 2), alone));
             s.check.on_heard((1, 2), (1, 7), &claim(9, 2));
             for t in 1..6 {
                 s.snapshot(t * 1000, &[(1, &[3, 0, 1, 2]), (2, &[])]);

@@ -4,6 +4,7 @@
 
 use super::{Clocks, Findings, Snapshot};
 use skein_peer::cells::CellSet;
+use skein_peer::output::Status;
 use skein_peer::protocol::runs::unpack;
 use skein_peer::wire::codec::Body;
 use skein_peer::wire::message::{Beacon, Claim};
@@ -196,6 +197,15 @@ impl SpokenCheck {
             let cells = unpack(&p.claim.plan, n).into_iter().map(|p| p.cell);
             cells.filter(|c| open(c)).collect()
         });
+        let down = |(_, s): &(Incarnation, Status)| *s == Status::Down;
+        let alone =
+            view.peers.values().all(down) && !(view.plan.is_empty() && view.held.is_empty());
+        let said_alone = published.is_some_and(|p| p.claim.alone);
+        if published.is_some() && said_alone != alone {
+            return Some(format!(
+                "its claim says {said_alone} of hearing nobody, it believes {alone}"
+            ));
+        }
         let (secret, vain) = (
             held.difference(&said).count(),
             said.difference(&held).count(),
@@ -218,6 +228,7 @@ fn covered(view: &Beliefs) -> CellSet {
 mod tests {
     use super::super::testing::{LOOP, Story, speaking};
     use super::*;
+    use skein_peer::PeerId;
     use skein_peer::wire::message::{CellRun, Cover, Finished, Firmness, ListedRun, Stamp};
 
     fn beacon_of(view: &Beliefs) -> Beacon {
@@ -248,6 +259,8 @@ mod tests {
                 firmness: Firmness::Tentative,
                 stamp: Stamp::default(),
             }],
+            // Peers that know nobody hear nobody.
+            alone: true,
             ..Claim::default()
         })
     }
@@ -282,11 +295,16 @@ mod tests {
             incarnation,
             ..speaking()
         };
+        let hears = |mut view: Beliefs| {
+            view.peers.insert(PeerId(2), (1, Status::Alive));
+            view
+        };
         for (view, broken) in [
             (planned(&[0, 1], 1), false),
             (planned(&[0, 1, 2], 1), true),
             (planned(&[0], 1), true),
             (planned(&[0, 1], 2), true),
+            (hears(planned(&[0, 1], 1)), true),
         ] {
             let (mut check, mut found) = (SpokenCheck::default(), Findings::new(1));
             let mut story = Story::new(300);

@@ -86,6 +86,8 @@ pub struct Membership {
     known: BTreeMap<u16, Known>,
     next_gossip: u16,
     doubt_until: Time,
+    /// When a beacon was last heard, of anybody.
+    last_heard: Option<Time>,
     /// Neighbours whose link the transport holds for gone.
     gone: BTreeSet<u16>,
 }
@@ -100,6 +102,7 @@ impl Membership {
             known: BTreeMap::new(),
             next_gossip: 0,
             doubt_until: Time(0),
+            last_heard: None,
             gone: BTreeSet::new(),
         }
     }
@@ -151,6 +154,7 @@ impl Membership {
         if author == self.me {
             return changes;
         }
+        self.last_heard = Some(now);
         let limits = (self.bound_ms(now), self.k2_ms(now));
         let age = Age {
             told_ms: 0,
@@ -330,6 +334,7 @@ impl Membership {
     /// within a period; until then verdicts are doubted.
     pub fn was_late(&mut self, now: Time, late_ms: u64) {
         self.doubt_until = now.plus_ms(self.period_ms);
+        self.last_heard = self.last_heard.map(|t| t.plus_ms(late_ms).min(now));
         for known in self.known.values_mut() {
             known.excuse(now, late_ms);
         }
@@ -447,6 +452,15 @@ impl Membership {
         self.all()
             .filter(|(_, _, s)| *s != Status::Down)
             .map(|(id, i, _)| (id, i))
+    }
+
+    /// Whether nobody was heard for k1 T although some are not held for down yet. That
+    /// many die at once is less likely than that this peer is deaf, so it suspects itself
+    /// until it has heard somebody, or holds all for down.
+    #[must_use]
+    pub fn is_deaf(&self, now: Time) -> bool {
+        let silent = |heard: Time| now.since_ms(heard) >= self.k1_ms(now);
+        self.last_heard.is_some_and(silent) && self.live().next().is_some()
     }
 
     /// What is believed of a peer, if it is known.

@@ -274,7 +274,8 @@ impl Negotiation {
                 }
             }
         }
-        self.loss_seen = false;
+        // Who suspects itself of being deaf acts on a loss once it does no more.
+        self.loss_seen &= ctx.able_since.is_none();
         if core::mem::take(&mut self.bid_wanted) && ctx.able_since.is_some() {
             actions.push(Action::Bid);
         }

@@ -447,6 +447,7 @@ impl Sections {
             held: self.packer().pack(&held, HELD_MAX).0,
             done,
             eta_ms,
+            alone: false,
         }
     }
 

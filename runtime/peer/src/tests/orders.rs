@@ -56,7 +56,7 @@ fn an_order_reaches_a_peer_that_was_out_of_reach_and_an_older_one_does_not_come_
     let mut h = at_work();
     h.isolate(2, true);
     h.order(GROUND_STATION, Order::Hold);
-    h.run_s(5);
+    h.run_s(3);
     assert!(!h.beliefs(1).able && h.beliefs(2).able);
     h.order(GROUND_STATION, Order::ReturnToBase);
     h.isolate(2, false);

@@ -216,3 +216,37 @@ fn a_clock_that_jumps_takes_nobody_for_dead_and_takes_over_nothing() {
         assert!(!h.seat(id).reports.iter().any(down), "of {id}");
     }
 }
+
+/// UAV 3 hears nobody from now on, and is heard.
+fn deafen(h: &mut Harness, cut: bool) {
+    for from in [1, 2] {
+        h.link(from, 3).cut = cut;
+    }
+}
+
+#[test]
+fn who_hears_nobody_flies_for_itself_and_takes_nothing_from_those_who_hear_it() {
+    let mut h = Harness::started(3, mission(1, 10, 8));
+    assert!(h.run_until(30, |h| divided(h, &[1, 2, 3])));
+    deafen(&mut h, true);
+    // It suspects itself before it gives up anybody.
+    assert!(h.run_until(6, |h| !h.beliefs(3).able));
+    let believed = |h: &Harness| h.beliefs(3).peers.values().all(|(_, s)| *s != Status::Down);
+    assert!(believed(&h) && h.beliefs(3).adoptions == 1);
+    // Then it works alone, on everything, and says so; the others do likewise without it.
+    let all_open = |h: &Harness, id: u16| {
+        let open = h.beliefs(id).covered.iter().filter(|c| !**c).count();
+        h.beliefs(id).plan.len() >= open
+    };
+    assert!(h.run_until(20, |h| all_open(h, 3)));
+    assert!(h.run_until(20, |h| divided(h, &[1, 2])));
+    for _ in 0..40 {
+        h.run_s(1);
+        let done = h.beliefs(1).finished;
+        assert!(done || !h.beliefs(1).plan.is_empty() || !h.beliefs(2).plan.is_empty());
+    }
+    // Once it hears again it is one of them.
+    deafen(&mut h, false);
+    assert!(h.run_until(10, |h| h.beliefs(3).able));
+    assert!(h.run_until(300, |h| (1..=3).all(|id| h.beliefs(id).finished)));
+}

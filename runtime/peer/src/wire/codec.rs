@@ -318,7 +318,8 @@ array_of!(Claim {
     plan,
     held,
     done,
-    eta_ms
+    eta_ms,
+    alone
 });
 array_of!(Cover {
     revision,

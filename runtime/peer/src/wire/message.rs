@@ -211,6 +211,8 @@ pub struct Claim {
     pub done: Vec<CellRun>,
     /// Expected end of the plan, milliseconds from this record's writing.
     pub eta_ms: u32,
+    /// Whether its author hears nobody: it holds all others for down.
+    pub alone: bool,
 }
 
 /// A member of a round.

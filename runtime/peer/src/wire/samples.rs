@@ -155,8 +155,9 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                 held: vec![listing(60)],
                 done: vec![CellRun { first: 1, count: 3 }],
                 eta_ms: 600_000,
+                alone: true,
             }),
-            "87011b0123456789abcdef82071adeadbeef8288140cf501071adeadbeef01038818280cf501071adeadbeef01038188183c0cf501071adeadbeef0103818201031a000927c0",
+            "88011b0123456789abcdef82071adeadbeef8288140cf501071adeadbeef01038818280cf501071adeadbeef01038188183c0cf501071adeadbeef0103818201031a000927c0f5",
         ),
         (
             Body::Cover(Cover {
@@ -282,6 +283,7 @@ pub fn largest() -> Vec<Body> {
             held: vec![listing; HELD_MAX],
             done: vec![run; DONE_MAX],
             eta_ms: DURATION_MAX_MS,
+            alone: true,
         }),
         Body::Cover(Cover {
             revision: u32::MAX,

@@ -292,6 +292,7 @@ const CLAIM: &[Place] = &[
         Shape::Rows(RUN, DONE_MAX),
     ),
     ETA,
+    at("alone", "whether its author hears nobody", Shape::Flag),
 ];
 
 const COVER: &[Place] = &[
