@@ -63,6 +63,7 @@ fn main() -> ExitCode {
         summary.makespan_over_work_bound, summary.idle_share
     );
     println!("reached {:?}", summary.reached);
+    println!("struck {:?}", summary.struck);
     println!("liveness {:?}", summary.liveness_share);
     println!(
         "false downs {:.3} {:.3}",

@@ -23,8 +23,8 @@ pub enum Trouble {
     /// Nothing.
     #[default]
     None,
-    /// Writes that begin now fail.
-    Fails,
+    /// Of the writes that begin now one in so many fails; all of them at 1.
+    Fails(u32),
     /// Writes that begin now take this much longer, milliseconds.
     Slow(u32),
 }
@@ -59,14 +59,18 @@ impl Disk {
     pub fn write(&mut self, now_ms: u64, token: u64, record: Vec<u8>) -> u64 {
         let slower_ms = match self.trouble {
             Trouble::Slow(ms) => u64::from(ms),
-            Trouble::None | Trouble::Fails => 0,
+            Trouble::None | Trouble::Fails(_) => 0,
         };
         let takes_ms = self.stream.between(SYNC_MS.0, SYNC_MS.1) + slower_ms;
+        let fails = match self.trouble {
+            Trouble::Fails(one_in) => one_in <= 1 || self.stream.one_in(u64::from(one_in)),
+            Trouble::None | Trouble::Slow(_) => false,
+        };
         self.busy_until_ms = self.busy_until_ms.max(now_ms) + takes_ms;
         self.pending.push_back(Pending {
             token,
             record,
-            fails: self.trouble == Trouble::Fails,
+            fails,
         });
         self.busy_until_ms
     }
@@ -147,7 +151,7 @@ mod tests {
     #[test]
     fn a_disk_in_trouble_keeps_nothing_or_takes_its_time() {
         let mut d = disk();
-        d.set_trouble(Trouble::Fails);
+        d.set_trouble(Trouble::Fails(1));
         d.write(0, 1, vec![1]);
         d.set_trouble(Trouble::Slow(3_000));
         let late_ms = d.write(1_000, 2, vec![2]);
@@ -158,6 +162,18 @@ mod tests {
         assert_eq!(d.sync(), Some((2, true)));
         assert_eq!(d.sync(), Some((3, true)));
         assert_eq!(d.records(), [vec![2u8], vec![3]]);
+    }
+
+    #[test]
+    fn of_many_writes_about_one_in_so_many_fails() {
+        let mut d = disk();
+        d.set_trouble(Trouble::Fails(5));
+        let fails = |d: &mut Disk| {
+            d.write(0, 1, vec![1]);
+            d.sync() == Some((1, false))
+        };
+        let failed = (0..1000).filter(|_| fails(&mut d)).count();
+        assert!((150..250).contains(&failed), "{failed}");
     }
 
     #[test]

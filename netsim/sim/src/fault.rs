@@ -71,10 +71,13 @@ pub enum Fault {
         /// What.
         order: Order,
     },
-    /// Every write to the peer's journal fails.
+    /// Writes to the peer's journal fail: every one, or one in so many.
     FailStores {
         /// Which peer.
         peer: u16,
+        /// Of so many writes one fails, by chance.
+        #[serde(default = "every_one")]
+        one_in: u32,
     },
     /// Every write to the peer's journal takes this much longer.
     SlowStores {
@@ -128,7 +131,7 @@ impl Fault {
             | Self::Pause { peer }
             | Self::Resume { peer }
             | Self::Restart { peer, .. }
-            | Self::FailStores { peer }
+            | Self::FailStores { peer, .. }
             | Self::SlowStores { peer, .. }
             | Self::HealStores { peer }
             | Self::SlowComputer { peer, .. }
@@ -161,7 +164,15 @@ impl fmt::Display for Fault {
             Self::Heal => write!(f, "all links heal"),
             Self::Rebase { .. } => write!(f, "the operator moves the base"),
             Self::Order { order } => write!(f, "the operator says {}", order.name()),
-            Self::FailStores { peer } => write!(f, "the disk of peer {peer} takes no writes"),
+            Self::FailStores {
+                peer,
+                one_in: 0 | 1,
+            } => {
+                write!(f, "the disk of peer {peer} takes no writes")
+            }
+            Self::FailStores { peer, one_in } => {
+                write!(f, "the disk of peer {peer} loses one write in {one_in}")
+            }
             Self::SlowStores { peer, delay_ms } => {
                 write!(f, "writes of peer {peer} take {delay_ms} ms longer")
             }
@@ -184,6 +195,10 @@ impl fmt::Display for Fault {
             }
         }
     }
+}
+
+fn every_one() -> u32 {
+    1
 }
 
 /// A fault and when it happens.

@@ -1,5 +1,6 @@
 //! Random faults for one run, drawn from a scenario's storm: kills, loss, partitions
-//! that heal, restarts with and without disk.
+//! that heal, restarts with and without disk, moved bases, and a few of the other
+//! [kinds of trouble](crate::troubles), which are drawn on their own.
 //!
 //! The number of kills is drawn first and evenly from none to the most allowed, so
 //! that a batch of seeds meets each of them equally often; all else fits round it.
@@ -7,6 +8,7 @@
 use crate::fault::{Fault, TimedFault};
 use crate::spec::Spec;
 use crate::swarm::stream::{Concern, Stream};
+use crate::troubles::{self, Struck};
 use skein_peer::mission::mm;
 
 /// No fault happens before this time: peers listen for three beacon periods, then
@@ -19,11 +21,20 @@ const DOWN_MS: (u64, u64) = (2_000, 60_000);
 /// Loss that still counts as light, thousandths: the bounds are graded there.
 const LIGHT_LOSS_PERMILLE: u64 = 100;
 
-/// Draws the faults of the run with this seed, ascending by time.
+/// The faults of one run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Storm {
+    /// The faults, ascending by time.
+    pub faults: Vec<TimedFault>,
+    /// The kinds of trouble among them.
+    pub struck: Vec<Struck>,
+}
+
+/// Draws the storm of the run with this seed.
 ///
 /// `makespan_ms` is how long the mission takes without faults.
 #[must_use]
-pub fn draw(spec: &Spec, seed: u64, makespan_ms: u64) -> Vec<TimedFault> {
+pub fn draw(spec: &Spec, seed: u64, makespan_ms: u64) -> Storm {
     let mut s = Stream::new(seed, Concern::Storm);
     let ids: Vec<u16> = spec.uavs.iter().map(|u| u.id).collect();
     let end_ms = until_ms(spec, makespan_ms);
@@ -43,8 +54,18 @@ pub fn draw(spec: &Spec, seed: u64, makespan_ms: u64) -> Vec<TimedFault> {
     restarts(&mut s, spec, others, end_ms, &mut faults);
     partitions(&mut s, spec, &ids, end_ms, &mut faults);
     revisions(&mut s, spec, end_ms, &mut faults);
+    let mut peers: Vec<u16> = ids
+        .iter()
+        .copied()
+        .chain(spec.ground.iter().map(|g| g.id))
+        .collect();
+    peers.sort_unstable();
+    let mut s = Stream::new(seed, Concern::Troubles);
+    let end_ms = makespan_ms.max(QUIET_START_MS + 1);
+    let (struck, troubles) = troubles::draw(&mut s, spec, &peers, end_ms);
+    faults.extend(troubles);
     faults.sort_by_key(|f| f.at_ms);
-    faults
+    Storm { faults, struck }
 }
 
 /// How many UAVs these faults kill and do not restart.
@@ -169,7 +190,9 @@ mod tests {
     use std::collections::BTreeMap;
 
     /// What may be said of any storm.
-    fn check(spec: &Spec, faults: &[TimedFault]) -> usize {
+    fn check(spec: &Spec, storm: &Storm) -> usize {
+        let Storm { faults, struck } = storm;
+        assert!(struck.len() <= usize::from(spec.storm.troubles.max_kinds));
         let mut dead = std::collections::BTreeSet::new();
         let mut split = false;
         for f in faults {
@@ -188,7 +211,8 @@ mod tests {
                 }
                 Fault::Loss { permille } => assert!(*permille <= spec.storm.max_loss_permille),
                 Fault::Rebase { .. } => assert!(spec.ground.is_some()),
-                other => panic!("{other:?} is no storm fault"),
+                // Those of troubles, which have tests of their own.
+                _ => {}
             }
         }
         assert!(!split, "a partition never healed");

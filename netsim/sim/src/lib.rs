@@ -7,6 +7,7 @@
 //! | [`radio`] | links, the graph they form, the shared channel |
 //! | [`fault`] | one enum of faults, for simulated and live swarms |
 //! | [`fault_generator`] | random faults for one run |
+//! | [`troubles`] | the kinds of trouble among them |
 //! | [`disk`] | virtual disks |
 //! | [`prepared`] | what all runs of a scenario share |
 //! | [`runs`] | runs with the scenario's own faults, with drawn ones, without any |
@@ -34,6 +35,7 @@ pub mod spec;
 pub mod summary;
 pub mod swarm;
 pub mod timeline;
+pub mod troubles;
 pub mod world;
 
 pub use prepared::Prepared;

@@ -7,6 +7,7 @@ use crate::fault_generator;
 use crate::omniscient_baseline;
 use crate::prepared::Prepared;
 use crate::swarm::{Outcome, Swarm};
+use crate::troubles::Struck;
 
 /// The seed of the run without faults: the same for every seed that is asked for, so
 /// that a seed draws the same storm alone and in a batch.
@@ -52,8 +53,11 @@ pub fn planned(prepared: &Prepared, seed: u64, wanted: Wanted) -> Outcome {
 /// [makespan without faults](failure_free_makespan_ms).
 #[must_use]
 pub fn storm(prepared: &Prepared, seed: u64, failure_free_ms: u64, wanted: Wanted) -> Outcome {
-    let faults = fault_generator::draw(&prepared.spec, seed, failure_free_ms);
-    run(prepared, seed, faults, wanted)
+    let storm = fault_generator::draw(&prepared.spec, seed, failure_free_ms);
+    let mut outcome = run(prepared, seed, storm.faults, wanted);
+    let ran = |s: &&Struck| s.at_ms < outcome.report.end_ms;
+    outcome.struck = storm.struck.iter().filter(ran).map(|s| s.name).collect();
+    outcome
 }
 
 /// How long the mission takes without faults, milliseconds; the scenario's longest

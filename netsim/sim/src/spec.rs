@@ -119,4 +119,51 @@ pub struct StormSpec {
     pub max_restarts: u16,
     /// Most revisions of the mission in one run, each of which moves the base.
     pub max_revisions: u16,
+    /// What else goes wrong.
+    pub troubles: TroubleSpec,
+}
+
+/// How bad the [kinds of trouble](crate::troubles) of a storm are at worst. A kind whose
+/// limit is 0 is not drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TroubleSpec {
+    /// Most kinds that one run meets.
+    pub max_kinds: u16,
+    /// Longest time for which something is wrong, seconds.
+    pub max_s: u32,
+    /// Longest time for which a process stands still, seconds.
+    pub max_pause_s: u32,
+    /// Longest time by which a disk is late with each write, milliseconds.
+    pub max_store_delay_ms: u32,
+    /// Longest time by which a computer is late, milliseconds.
+    pub max_computer_delay_ms: u32,
+    /// Largest drift of a clock, millionths.
+    pub max_clock_drift_ppm: u32,
+    /// Largest jump of a clock, milliseconds.
+    pub max_clock_jump_ms: u32,
+}
+
+impl TroubleSpec {
+    /// Nothing else goes wrong.
+    pub const NONE: Self = Self {
+        max_kinds: 0,
+        max_s: 0,
+        max_pause_s: 0,
+        max_store_delay_ms: 0,
+        max_computer_delay_ms: 0,
+        max_clock_drift_ppm: 0,
+        max_clock_jump_ms: 0,
+    };
+
+    /// What a storm brings where its scenario says nothing else: what a small flight
+    /// computer may meet and its peers are to live with.
+    pub const USUAL: Self = Self {
+        max_kinds: 3,
+        max_s: 60,
+        max_pause_s: 60,
+        max_store_delay_ms: 1_000,
+        max_computer_delay_ms: 400,
+        max_clock_drift_ppm: 20_000,
+        max_clock_jump_ms: 0,
+    };
 }

@@ -4,6 +4,7 @@ use crate::account::{RunReport, secs};
 use crate::check::{Grade, Violation};
 use crate::spec::Spec;
 use crate::swarm::Outcome;
+use crate::troubles::{KINDS, Kind};
 use serde::Serialize;
 use skein_geometry::hash::Fnv;
 use std::collections::BTreeMap;
@@ -99,6 +100,8 @@ pub struct Summary {
     pub dead: BTreeMap<u32, usize>,
     /// How often the hard places were reached.
     pub reached: Places,
+    /// In how many runs each kind of trouble struck.
+    pub struck: BTreeMap<String, usize>,
     /// Seeds that failed.
     pub failed_seeds: Vec<u64>,
     /// The first violations, in the order of seeds.
@@ -147,6 +150,7 @@ impl fmt::Display for Summary {
         )?;
         writeln!(f, "killed for good       {:?}", self.dead)?;
         writeln!(f, "hard places           {:?}", self.reached)?;
+        writeln!(f, "troubles              {:?}", self.struck)?;
         for (check, v) in &self.liveness_share {
             writeln!(f, "{check} / bound            {}", spread(v))?;
         }
@@ -196,6 +200,9 @@ pub fn summarise(mut runs: Vec<Outcome>, wall_s: f64) -> Summary {
         hash.write(&o.seed().to_le_bytes());
         hash.write(&o.history_hash.to_le_bytes());
         *s.dead.entry(o.dead).or_default() += 1;
+        for kind in &o.struck {
+            *s.struck.entry((*kind).to_owned()).or_default() += 1;
+        }
         s.reached.takeover_of_takeover += o.reached.takeover_of_takeover;
         s.reached.both_halves_planned += o.reached.both_halves_planned;
         s.reached.restart_in_round += o.reached.restart_in_round;
@@ -297,6 +304,9 @@ impl Summary {
             ),
         ];
         let missed = missed.iter().filter(|(can, n)| *can && *n == 0).count();
+        let troubled = |kind: &&Kind| storm.troubles.max_kinds > 0 && (kind.can)(spec);
+        let unmet = |kind: &&Kind| !self.struck.contains_key(kind.name);
+        let missed = missed + KINDS.iter().filter(troubled).filter(unmet).count();
         let slow = self.makespan_over_work_bound.p50 > PACE_P50
             || self.makespan_over_work_bound.p95 > PACE_P95;
         let jumpy = self.false_downs_per_peer_hour > FALSE_DOWNS_LIGHT
@@ -398,6 +408,7 @@ mod tests {
             let mut s = Summary {
                 runs: JUDGED_BATCH,
                 reached,
+                struck: KINDS.iter().map(|k| (k.name.to_owned(), 1)).collect(),
                 ..Summary::default()
             };
             change(&mut s);
@@ -408,6 +419,8 @@ mod tests {
         assert_eq!(judged(|s| s.makespan_over_work_bound.p50 = 3.2), ["pace"]);
         assert_eq!(judged(|s| s.makespan_over_work_bound.p95 = 6.0), ["pace"]);
         assert_eq!(judged(|s| s.reached = Places::default()), ["reached"]);
+        let calm = |s: &mut Summary| s.struck.retain(|kind, _| kind != "pause");
+        assert_eq!(judged(calm), ["reached"]);
         let jumpy = |s: &mut Summary| s.false_downs_per_peer_hour = 3.0;
         assert_eq!(judged(jumpy), ["false-downs"]);
         let small = |s: &mut Summary| {

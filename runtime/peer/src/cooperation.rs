@@ -369,8 +369,12 @@ impl Cooperation {
             Promise::Adopt(written, _) => {
                 state.claims.answer(*written);
             }
-            // The round is given up when its time is over; covered cells are written again.
-            Promise::Life(_) | Promise::Bid(_) | Promise::Covered => {}
+            // They are written with the next cell that is seen.
+            Promise::Covered(cells) => {
+                state.unsaved_cells = state.unsaved_cells.saturating_add(*cells);
+            }
+            // The round is given up when its time is over.
+            Promise::Life(_) | Promise::Bid(_) => {}
         }
     }
 
@@ -471,13 +475,13 @@ impl MissionState {
         if self.unsaved_cells < least {
             return None;
         }
-        self.unsaved_cells = 0;
+        let cells = core::mem::take(&mut self.unsaved_cells);
         let entry = Entry::Covered {
             loop_hash: self.loop_hash(),
             cells: self.covered().capacity(),
             covered: self.covered().encode_rle(None),
         };
-        Some(Effect::Store(Promise::Covered, entry))
+        Some(Effect::Store(Promise::Covered(cells), entry))
     }
 
     /// Whether the fuel has come due since it was last asked.

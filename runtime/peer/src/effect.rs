@@ -65,8 +65,8 @@ pub(crate) enum Promise {
     Adopt(u64, Box<Adoption>),
     /// Cells taken without a round, likewise.
     Take(u64, Vec<PlannedCell>),
-    /// Coverage; nothing waits for it.
-    Covered,
+    /// Coverage, with so many cells that the journal does not hold yet; nothing waits for it.
+    Covered(u16),
 }
 
 /// What waits for the result of a job.

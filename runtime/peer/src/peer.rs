@@ -275,7 +275,7 @@ impl Peer {
                 let (situation, cooperation, _) = self.situation();
                 cooperation.take(&situation, written, &cells)
             }
-            Promise::Covered => Effects::new(),
+            Promise::Covered(_) => Effects::new(),
         };
         self.carry_out(effects);
     }

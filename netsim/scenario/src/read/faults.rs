@@ -5,7 +5,7 @@ use crate::error::{Finding, ScenarioError, Severity};
 use crate::files::read_text;
 use skein_interop::json::{Document, Error, Fields, Node, suggestion};
 use skein_netsim::fault::{Fault, Order, TimedFault};
-use skein_netsim::spec::StormSpec;
+use skein_netsim::spec::{StormSpec, TroubleSpec};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -23,7 +23,7 @@ const KINDS: [(&str, &[&str]); 18] = [
     ("loss", &["percent", "for_s"]),
     ("rebase", &["east_m", "north_m"]),
     ("order", &["order"]),
-    ("fail-stores", &["peer", "for_s"]),
+    ("fail-stores", &["peer", "one_in", "for_s"]),
     ("slow-stores", &["peer", "delay_s", "for_s"]),
     ("heal-stores", &["peer"]),
     ("slow-computer", &["peer", "delay_s", "for_s"]),
@@ -149,7 +149,7 @@ fn groups(node: &Node<'_>, known: &Known<'_>) -> Result<Vec<Vec<u16>>, Error> {
 }
 
 /// Every field that some kind of fault has.
-const ALL: [&str; 16] = [
+const ALL: [&str; 17] = [
     "at_s",
     "kind",
     "for_s",
@@ -166,6 +166,7 @@ const ALL: [&str; 16] = [
     "delay_s",
     "gain_percent",
     "ahead_s",
+    "one_in",
 ];
 
 /// The kind of a fault, with no field that belongs to another kind.
@@ -227,7 +228,10 @@ fn one(item: &Node<'_>, known: &Known<'_>) -> Result<(TimedFault, Option<TimedFa
         "order" => Fault::Order {
             order: order(f.need("order", "\"hold\"")?)?,
         },
-        "fail-stores" => Fault::FailStores { peer: peer()? },
+        "fail-stores" => Fault::FailStores {
+            peer: peer()?,
+            one_in: f.whole_or("one_in", 1, 1, 1_000_000, "writes of which one fails")?,
+        },
         "slow-stores" => Fault::SlowStores {
             peer: peer()?,
             delay_ms: delay_ms(f.need("delay_s", "0.5")?)?,
@@ -336,7 +340,7 @@ fn ending(
         Fault::Loss { .. } => Fault::Loss {
             permille: known.loss_permille,
         },
-        Fault::FailStores { peer } | Fault::SlowStores { peer, .. } => {
+        Fault::FailStores { peer, .. } | Fault::SlowStores { peer, .. } => {
             Fault::HealStores { peer: *peer }
         }
         Fault::SlowComputer { peer, .. } => Fault::SlowComputer {
@@ -385,6 +389,7 @@ pub(crate) fn storm(
         max_partition_s: 0,
         max_restarts: 0,
         max_revisions: 0,
+        troubles: TroubleSpec::NONE,
     };
     let Some(node) = node else { return Ok(calm) };
     let f = node.fields(&[
@@ -395,6 +400,13 @@ pub(crate) fn storm(
         "max_partition_s",
         "max_restarts",
         "max_revisions",
+        "max_kinds",
+        "max_trouble_s",
+        "max_pause_s",
+        "max_store_delay_s",
+        "max_computer_delay_s",
+        "max_clock_drift_percent",
+        "max_clock_jump_s",
     ])?;
     let mut max_kills = f.small_or("max_kills", 0, 0, u16::MAX, "UAVs")?;
     if usize::from(max_kills) >= n_uavs {
@@ -421,6 +433,23 @@ pub(crate) fn storm(
         max_partition_s: f.whole_or("max_partition_s", 30, 1, 86_400, "seconds")?,
         max_restarts: f.small_or("max_restarts", 0, 0, 100, "restarts")?,
         max_revisions: f.small_or("max_revisions", 0, 0, 10, "revisions")?,
+        troubles: troubles(&f)?,
+    })
+}
+
+/// How bad the other kinds of trouble are, where the file says so.
+fn troubles(f: &Fields<'_>) -> Result<TroubleSpec, Error> {
+    let usual = TroubleSpec::USUAL;
+    let delay = |name, usual_ms| f.get(name).map_or(Ok(usual_ms), delay_ms);
+    let drift_ppm = f.get("max_clock_drift_percent").map(ppm).transpose()?;
+    Ok(TroubleSpec {
+        max_kinds: f.small_or("max_kinds", usual.max_kinds, 0, 100, "kinds of trouble")?,
+        max_s: f.whole_or("max_trouble_s", usual.max_s, 2, 3600, "seconds")?,
+        max_pause_s: f.whole_or("max_pause_s", usual.max_pause_s, 0, 3600, "seconds")?,
+        max_store_delay_ms: delay("max_store_delay_s", usual.max_store_delay_ms)?,
+        max_computer_delay_ms: delay("max_computer_delay_s", usual.max_computer_delay_ms)?,
+        max_clock_drift_ppm: drift_ppm.map_or(usual.max_clock_drift_ppm, i32::unsigned_abs),
+        max_clock_jump_ms: delay("max_clock_jump_s", usual.max_clock_jump_ms)?,
     })
 }
 
@@ -546,6 +575,13 @@ mod tests {
                 "{at_s:1, kind:'order', order:'return-to-base'}",
                 Fault::Order {
                     order: Order::ReturnToBase,
+                },
+            ),
+            (
+                "{at_s:1, kind:'fail-stores', peer:3, one_in:50}",
+                Fault::FailStores {
+                    peer: 3,
+                    one_in: 50,
                 },
             ),
             (

@@ -16,6 +16,9 @@ const SHARE_PERCENT: u64 = 45;
 /// the largest records.
 const BURST_MIN_BYTES: u64 = 4_096 + OVERHEAD_BYTES as u64;
 
+/// A beacon a period, of which one collides: so long a radio is not counted.
+const COUNTED_PERIODS: u64 = 2;
+
 /// Judged up to so many radios: from 13 in one earshot on, beacons with all their gossip
 /// alone exceed the share at 64 kbit/s (docs/protocol.md §9).
 const MAX_RADIOS: usize = 13;
@@ -57,7 +60,11 @@ impl AirtimeCheck {
             let heard = u64::from(snapshot.graph.neighbours(*id)) + 1;
             let sharers = self.sharers.entry(*id).or_default();
             sharers.push_back((now_ms, heard));
-            while sharers.front().is_some_and(old) {
+            // Whoever came into earshot lately is counted once a beacon of its got through.
+            let before = |t: &(u64, u64)| {
+                t.0 + WINDOW_MS + COUNTED_PERIODS * snapshot.bounds.period_ms < now_ms
+            };
+            while sharers.front().is_some_and(before) {
                 sharers.pop_front();
             }
             let fewest = sharers.iter().map(|s| s.1).min().unwrap_or(1);

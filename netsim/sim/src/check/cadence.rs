@@ -2,19 +2,18 @@
 //! nobody is suspected or given up too soon (`haste`), a suspicion is answered at once
 //! (`refute`), claims are repeated (`cadence`).
 
-use super::{Clocks, Findings, Snapshot};
+use super::{Clocks, Findings, Handicaps, Snapshot};
 use skein_peer::Incarnation;
 use skein_peer::output::Status;
 use skein_peer::wire::message::Beacon;
-use std::collections::{BTreeMap, BTreeSet};
-
-/// A clock that is wrong by this much, in percent, breaks no rule: drift is a fault that
-/// peers are to live with.
-const DRIFT_PERCENT: u64 = 1;
+use std::collections::BTreeMap;
 
 /// A claim is spoken again after 10 periods, up to a quarter of one later so as not to be
 /// in step with others; the peer looks four times a period. In quarters of a period.
 const CLAIM_QUARTERS: u64 = 4 * 10 + 1 + 1;
+
+/// Clocks count whole milliseconds, and a timer is set a few times in a duration.
+const ROUNDING_MS: u64 = 5;
 
 /// k1 = 4 + D/4 at the least diameter 1, in quarters of a period.
 const LEAST_K1_QUARTERS: u64 = 16 + 1;
@@ -37,10 +36,6 @@ pub struct CadenceCheck {
     heard: BTreeMap<(u16, u16), Heard>,
     accused: Clocks<u16>,
     claims: Clocks<u16>,
-    /// Peers that are late by no doing of their own.
-    troubled: BTreeSet<u16>,
-    /// Somebody's clock is wrong, and what it says of ages is passed on.
-    clocks_wrong: bool,
 }
 
 impl CadenceCheck {
@@ -53,20 +48,7 @@ impl CadenceCheck {
             heard: BTreeMap::new(),
             accused: Clocks::default(),
             claims: Clocks::default(),
-            troubled: BTreeSet::new(),
-            clocks_wrong: false,
         }
-    }
-
-    /// A peer is late from now on by no doing of its own: slow, or with a bad disk.
-    pub fn on_trouble(&mut self, id: u16) {
-        self.troubled.insert(id);
-    }
-
-    /// A peer's clock is wrong from now on.
-    pub fn on_wrong_clock(&mut self, id: u16) {
-        self.troubled.insert(id);
-        self.clocks_wrong = true;
     }
 
     /// A process starts.
@@ -84,18 +66,20 @@ impl CadenceCheck {
     }
 
     /// A peer puts something on the air, its own or another's: not before it has listened
-    /// for 3 T.
-    pub fn on_transmission(&mut self, now_ms: u64, id: u16, found: &mut Findings) {
-        let timed = self
-            .booted_ms
-            .get(&id)
-            .filter(|_| !self.troubled.contains(&id));
-        let Some(&booted_ms) = timed else {
+    /// for 3 T by its clock.
+    pub fn on_transmission(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        handicaps: &Handicaps,
+        found: &mut Findings,
+    ) {
+        let Some(&booted_ms) = self.booted_ms.get(&id) else {
             return;
         };
         let listens_ms = 3 * self.period_ms;
-        let listened_ms = now_ms - booted_ms;
-        if listened_ms + listens_ms * DRIFT_PERCENT / 100 < listens_ms {
+        let listened_ms = handicaps.shown_ms(id, booted_ms, now_ms);
+        if listened_ms + ROUNDING_MS < listens_ms {
             found.broken("probation", now_ms, Some(id), || {
                 format!(
                     "speaks {listened_ms} ms after its start, it is to listen for {listens_ms} ms"
@@ -119,17 +103,18 @@ impl CadenceCheck {
         self.claims.start(id, now_ms);
     }
 
-    /// A running peer receives a beacon from its author; `life` is the receiver's own.
+    /// A running peer receives a beacon from its author, that arrived then; `life` is the
+    /// receiver's own.
     pub fn on_beacon_heard(
         &mut self,
-        now_ms: u64,
+        (now_ms, arrived_ms): (u64, u64),
         (by, life): (u16, Incarnation),
         (author, incarnation): (u16, Incarnation),
         beacon: &Beacon,
     ) {
         let heard = Heard {
             incarnation,
-            at_ms: now_ms,
+            at_ms: arrived_ms,
         };
         self.heard.insert((by, author), heard);
         let of_me = beacon.gossip.iter().filter(|g| g.id == by);
@@ -147,13 +132,15 @@ impl CadenceCheck {
     /// before (k1 + k2) T, whoever says so: a suspicion counts from a heartbeat that is
     /// no older than the last one heard from its author. Ages are rounded up to 100 ms
     /// whenever they are passed on, and that of a suspicion is, by one peer after the other:
-    /// a quarter of k2 is room for eleven times, six were seen.
+    /// a quarter of k2 is room for eleven times, six were seen. Each waits by its own clock;
+    /// what is passed on was measured by others', which drift, and a late computer suspects
+    /// somebody whose heartbeat waits for it.
     pub fn on_belief(
         &mut self,
         now_ms: u64,
         (observer, subject): (u16, u16),
         (incarnation, status): (Incarnation, Status),
-        diameter: u64,
+        (diameter, handicaps): (u64, &Handicaps),
         found: &mut Findings,
     ) {
         let quarters = match status {
@@ -161,9 +148,6 @@ impl CadenceCheck {
             Status::Suspect => LEAST_K1_QUARTERS,
             Status::Down => LEAST_K1_QUARTERS + LEAST_K2_QUARTERS,
         };
-        if self.clocks_wrong {
-            return;
-        }
         let heard = self.heard.get(&(observer, subject));
         let Some(heard) = heard.filter(|h| h.incarnation == incarnation) else {
             return;
@@ -173,8 +157,9 @@ impl CadenceCheck {
             Status::Down => LEAST_K2_QUARTERS * self.period_ms / 16,
             _ => 0,
         };
-        let slack_ms = 100 * (diameter + 1) + rounding_ms + patience_ms * DRIFT_PERCENT / 100;
-        let silent_ms = now_ms - heard.at_ms;
+        let passed_on_ms = handicaps.grown_ms(patience_ms, heard.at_ms, now_ms) - patience_ms;
+        let slack_ms = 100 * (diameter + 1) + rounding_ms + passed_on_ms;
+        let silent_ms = handicaps.lived_ms(observer, heard.at_ms, now_ms);
         if silent_ms + slack_ms < patience_ms {
             found.broken("haste", now_ms, Some(observer), || {
                 format!(
@@ -188,15 +173,17 @@ impl CadenceCheck {
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let now_ms = snapshot.now_ms;
         for m in snapshot.peers {
-            if !m.view.speaks || self.troubled.contains(&m.id) {
+            if !m.view.speaks {
                 self.accused.stop(m.id);
                 self.claims.stop(m.id);
                 continue;
             }
             // The answer waits a random T/8, and T/4 after the last beacon; then the peer
             // looks when it said it would. Twice that is T/2.
-            let late_ms = self.accused.since(m.id).map(|t| now_ms - t);
-            if late_ms.is_some_and(|l| l > self.period_ms / 2) && self.accused.tell_once(m.id) {
+            let late = self.accused.since(m.id).is_some_and(|t| {
+                snapshot.lived_ms(m.id, t) > self.period_ms / 2 + snapshot.late_ms(m.id, t)
+            });
+            if late && self.accused.tell_once(m.id) {
                 found.broken("refute", now_ms, Some(m.id), || {
                     "heard that it is suspected and did not answer within T/2".to_owned()
                 });
@@ -205,15 +192,12 @@ impl CadenceCheck {
                 self.claims.stop(m.id);
                 continue;
             }
-            let bound_ms = CLAIM_QUARTERS * self.period_ms / 4;
-            let slack_ms = bound_ms * DRIFT_PERCENT / 100;
             let since_ms = self.claims.start(m.id, now_ms).max(m.since_ms);
-            if now_ms - since_ms > bound_ms + slack_ms && self.claims.tell_once(m.id) {
+            let bound_ms = CLAIM_QUARTERS * self.period_ms / 4 + snapshot.late_ms(m.id, since_ms);
+            let silent_ms = snapshot.lived_ms(m.id, since_ms);
+            if silent_ms > bound_ms + ROUNDING_MS && self.claims.tell_once(m.id) {
                 found.broken("cadence", now_ms, Some(m.id), || {
-                    format!(
-                        "has not said its claim for {} ms (bound {bound_ms} ms)",
-                        now_ms - since_ms
-                    )
+                    format!("has not said its claim for {silent_ms} ms (bound {bound_ms} ms)")
                 });
             }
         }
@@ -265,7 +249,7 @@ mod tests {
         for (at_ms, broken) in [(2_900, true), (3_000, false)] {
             let (mut c, mut found) = check();
             c.on_boot(10_000, 1);
-            c.on_transmission(10_000 + at_ms, 1, &mut found);
+            c.on_transmission(10_000 + at_ms, 1, &Handicaps::default(), &mut found);
             assert_eq!(found.counts.contains_key("probation"), broken, "{at_ms}");
         }
     }
@@ -280,11 +264,12 @@ mod tests {
             (Status::Alive, 1, false),
         ] {
             let (mut c, mut found) = check();
-            c.on_beacon_heard(50_000, (1, 1), (2, 4), &beacon(None));
+            c.on_beacon_heard((50_000, 50_000), (1, 1), (2, 4), &beacon(None));
             let now_ms = 50_000 + after_ms;
-            c.on_belief(now_ms, (1, 2), (3, Status::Down), 1, &mut found);
+            let healthy = Handicaps::default();
+            c.on_belief(now_ms, (1, 2), (3, Status::Down), (1, &healthy), &mut found);
             assert!(found.counts.is_empty(), "another life");
-            c.on_belief(now_ms, (1, 2), (4, status), 1, &mut found);
+            c.on_belief(now_ms, (1, 2), (4, status), (1, &healthy), &mut found);
             assert_eq!(
                 found.counts.contains_key("haste"),
                 broken,
@@ -298,7 +283,7 @@ mod tests {
         for answers in [false, true] {
             let (mut c, mut found) = check();
             let mut story = Story::new(0);
-            c.on_beacon_heard(10_100, (1, 1), (2, 1), &beacon(Some(1)));
+            c.on_beacon_heard((10_100, 10_100), (1, 1), (2, 1), &beacon(Some(1)));
             if answers {
                 c.on_beacon_spoken(1);
             }

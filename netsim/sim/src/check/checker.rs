@@ -8,7 +8,7 @@ use super::membership::Membership;
 use super::progress::ProgressCheck;
 use super::record::{RecordCheck, Said};
 use super::rules::Rules;
-use super::{Bounds, Findings, PeerSnapshot, Snapshot};
+use super::{Bounds, Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::fault::Fault;
 use crate::spec::Spec;
 use skein_flight::coverage::ring::backtracking::{RingCell, Uav};
@@ -53,6 +53,7 @@ pub struct Checker {
     progress: ProgressCheck,
     graph: Graph,
     stability: Stability,
+    handicaps: Handicaps,
     bounds: Bounds,
     open_round: BTreeMap<u16, u32>,
     adopted: BTreeMap<u16, u32>,
@@ -79,6 +80,7 @@ impl Checker {
             progress: ProgressCheck::default(),
             graph: Graph::default(),
             stability: Stability::default(),
+            handicaps: Handicaps::default(),
             bounds: Bounds {
                 period_ms,
                 diameter: 1,
@@ -128,21 +130,24 @@ impl Checker {
         }
         self.members
             .on_silent(now_ms, id, death, self.bounds.diameter);
-        self.listing.on_silent(id);
+        if death {
+            self.listing.on_death(id);
+        }
         if death && second_hand {
             self.reached.takeover_of_takeover += 1;
         }
         self.progress.on_silent(id);
         self.progress.on_loss();
-        self.rules.on_silent(id);
+        self.rules.on_silent(id, death);
         self.open_round.remove(&id);
         self.stability.forget(id);
     }
 
     /// A process ends: what it believes durable, and what its disk holds.
     pub fn on_crash(&mut self, now_ms: u64, id: u16, believed: &Durable, journal: &[Vec<u8>]) {
+        let handicaps = &self.handicaps;
         self.record
-            .on_crash(now_ms, id, believed, journal, &mut self.found);
+            .on_crash(now_ms, id, (believed, journal), handicaps, &mut self.found);
     }
 
     /// The links were cut into groups, or healed.
@@ -174,6 +179,7 @@ impl Checker {
             id,
             report,
             (adoptions, self.bounds.diameter, &self.listing),
+            &self.handicaps,
             &mut self.found,
         );
         match report {
@@ -191,7 +197,7 @@ impl Checker {
                     now_ms,
                     (id, peer.0),
                     (*incarnation, *status),
-                    &self.bounds,
+                    (&self.bounds, &self.handicaps),
                     joined_ms,
                 );
                 if *status != Status::Suspect {
@@ -247,28 +253,14 @@ impl Checker {
 
     /// A fault strikes: whoever is slow, or has a wrong clock or a broken disk, is late by
     /// no doing of its own.
-    pub fn on_fault(&mut self, fault: &Fault) {
-        match fault {
-            Fault::ClockDrift { peer, .. } | Fault::ClockJump { peer, .. } => {
-                self.members.clocks_are_wrong();
-                self.rules.on_wrong_clock(*peer);
-            }
-            Fault::SlowComputer { peer, .. } => {
-                self.members.clocks_are_wrong();
-                self.rules.on_trouble(*peer);
-            }
-            Fault::FailStores { peer } | Fault::SlowStores { peer, .. } => {
-                self.rules.on_trouble(*peer);
-                self.record.on_trouble(*peer);
-            }
-            _ => {}
-        }
+    pub fn on_fault(&mut self, now_ms: u64, fault: &Fault) {
+        self.handicaps.on_fault(now_ms, fault);
     }
 
     /// A peer puts bytes on the air, its own or another's.
     pub fn on_transmission(&mut self, now_ms: u64, id: u16, bytes: usize) {
         self.rules
-            .on_transmission(now_ms, id, bytes, &mut self.found);
+            .on_transmission(now_ms, id, bytes, &self.handicaps, &mut self.found);
     }
 
     /// A peer publishes its own beacon while it believes this.
@@ -279,7 +271,8 @@ impl Checker {
 
     /// A peer makes a bid durable while it believes this, at this place.
     pub fn on_bid(&mut self, now_ms: u64, id: u16, bid: &Bid, of: (&Beliefs, Option<Point>)) {
-        self.rules.on_bid(now_ms, id, bid, of, &mut self.found);
+        self.rules
+            .on_bid(now_ms, id, bid, of, &self.handicaps, &mut self.found);
     }
 
     /// A peer asks for a division.
@@ -287,15 +280,15 @@ impl Checker {
         self.rules.on_divide(now_ms, id, problem, &mut self.found);
     }
 
-    /// A running peer receives a record.
-    pub fn on_received(&mut self, now_ms: u64, id: u16, said: &Said) {
+    /// A running peer receives a record: now, of one that arrived while it stood still.
+    pub fn on_received(&mut self, at_ms: (u64, u64), id: u16, said: &Said) {
         let life = self.members.life(id);
         if let Some(claim) = &said.claim {
             let r = &said.record;
             self.listing
                 .on_heard((id, r.author), (r.incarnation, r.seq), claim);
         }
-        self.rules.on_received(now_ms, (id, life), said);
+        self.rules.on_received(at_ms, (id, life), said);
     }
 
     /// A UAV flew into a zone.
@@ -338,6 +331,7 @@ impl Checker {
             bounds: self.bounds,
             graph: &self.graph,
             stability: &self.stability,
+            handicaps: &self.handicaps,
             peers,
             covered,
             loop_hash,
@@ -364,6 +358,7 @@ impl Checker {
             bounds: self.bounds,
             graph: &self.graph,
             stability: &self.stability,
+            handicaps: &self.handicaps,
             peers,
             covered,
             loop_hash: self.loop_hash,

@@ -109,7 +109,7 @@ impl CoverCheck {
             let took_ms = snapshot.now_ms - since_ms;
             if snapshot
                 .grade()
-                .limit_ms(bound_ms)
+                .limit_ms(snapshot.grown_ms(bound_ms, since_ms))
                 .is_some_and(|l| took_ms > l)
                 && self.lacking.tell_once((id, cell))
             {
@@ -127,7 +127,7 @@ impl CoverCheck {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Bounds, Graph, PeerSnapshot, Stability};
+    use super::super::{Bounds, Graph, Handicaps, PeerSnapshot, Stability};
     use super::*;
     use skein_peer::Beliefs;
 
@@ -164,6 +164,7 @@ mod tests {
             },
             graph: &graph,
             stability: s,
+            handicaps: &Handicaps::default(),
             peers: &peers,
             covered: &[true, false],
             loop_hash: 3,

@@ -3,7 +3,8 @@
 //! epoch; nobody takes what another has committed; without a loss only a gain is adopted.
 //! And the bids themselves against what their authors did (`bid`).
 
-use super::Findings;
+use super::{Findings, Handicaps};
+use crate::account::secs;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
 use skein_geometry::frame::Point;
@@ -13,7 +14,7 @@ use skein_peer::protocol::rounds::{OpenRound, RoundOrder, epoch_of, order_of};
 use skein_peer::protocol::runs::cells_of;
 use skein_peer::wire::message::{Bid, Claim, Epoch, Firmness, Round};
 use skein_peer::{Beliefs, PeerId};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Without a loss the new makespan is at most this many percent of the present one.
@@ -43,8 +44,6 @@ pub struct DecisionCheck {
     rounds: BTreeMap<RoundOrder, OpenRound>,
     divisions: BTreeMap<Epoch, Option<(Vec<RingCell>, Division)>>,
     judged: BTreeMap<u16, Epoch>,
-    /// Peers whose clocks are wrong.
-    troubled: BTreeSet<u16>,
     adopted: BTreeMap<u16, Adopted>,
 }
 
@@ -67,11 +66,6 @@ impl DecisionCheck {
             period_ms,
             ..Self::default()
         }
-    }
-
-    /// A peer's clock is wrong from now on, or it is late.
-    pub fn on_trouble(&mut self, id: u16) {
-        self.troubled.insert(id);
     }
 
     /// A loop was derived.
@@ -118,9 +112,10 @@ impl DecisionCheck {
         id: u16,
         bid: &Bid,
         (view, mover): (&Beliefs, Option<Mover>),
+        handicaps: &Handicaps,
         found: &mut Findings,
     ) {
-        for text in self.lies(now_ms, id, bid, view, mover) {
+        for text in self.lies(now_ms, id, bid, (view, mover), handicaps) {
             found.broken("bid", now_ms, Some(id), || text);
         }
         let order = order_of(&bid.round);
@@ -137,8 +132,8 @@ impl DecisionCheck {
         now_ms: u64,
         id: u16,
         bid: &Bid,
-        view: &Beliefs,
-        mover: Option<Mover>,
+        (view, mover): (&Beliefs, Option<Mover>),
+        handicaps: &Handicaps,
     ) -> Vec<String> {
         let mut lies = Vec::new();
         let adopted = self.adopted.get(&id).copied().unwrap_or_default();
@@ -164,8 +159,8 @@ impl DecisionCheck {
                 bid.endurance_ms, bid.release_ms, view.spendable_ms
             ));
         }
-        if told && adopted.count > 0 && !self.troubled.contains(&id) {
-            let ago_ms = now_ms.saturating_sub(adopted.at_ms);
+        if told && adopted.count > 0 {
+            let ago_ms = handicaps.shown_ms(id, adopted.at_ms, now_ms);
             if u64::from(bid.adopted_ago_ms).abs_diff(ago_ms) > self.period_ms {
                 lies.push(format!(
                     "says that it adopted {} ms ago, it was {ago_ms} ms ago",
@@ -176,10 +171,13 @@ impl DecisionCheck {
         if let (Some(mover), Some(lp)) = (mover, self.loop_of(&bid.round)) {
             let anchor = lp.boundary(usize::from(bid.anchor)).position();
             let away_m = (anchor - mover.at).norm();
-            let reach_m = mover.fastest_mps * f64::from(bid.release_ms) / 1000.0 + REACH_SLACK_M;
+            // A late computer knows only where it was.
+            let late_m = mover.fastest_mps * secs(handicaps.late_ms(id, now_ms, now_ms));
+            let slack_m = REACH_SLACK_M + late_m;
+            let reach_m = mover.fastest_mps * f64::from(bid.release_ms) / 1000.0 + slack_m;
             let strayed = bid.off_loop.iter().any(|off| {
                 let off_m = (off.pose().position() - mover.at).norm();
-                off_m > REACH_SLACK_M
+                off_m > slack_m
             });
             if strayed {
                 lies.push("says that it is where it is not".to_owned());
@@ -460,8 +458,14 @@ mod tests {
                     plan: if bid.idle { Vec::new() } else { vec![0] },
                     ..view()
                 };
-                self.check
-                    .on_bid(9, id, &bid, (&view, None), &mut self.found);
+                self.check.on_bid(
+                    9,
+                    id,
+                    &bid,
+                    (&view, None),
+                    &Handicaps::default(),
+                    &mut self.found,
+                );
             }
         }
 
@@ -531,9 +535,14 @@ mod tests {
         let mut early = Case::new(true);
         let bid = early.bids[0].clone();
         let view = view();
-        early
-            .check
-            .on_bid(9, 1, &bid, (&view, None), &mut early.found);
+        early.check.on_bid(
+            9,
+            1,
+            &bid,
+            (&view, None),
+            &Handicaps::default(),
+            &mut early.found,
+        );
         early.claims(epoch, 0, 1);
         assert!(early.broken("decision"));
     }
@@ -618,7 +627,14 @@ mod tests {
                 ..view()
             };
             let at = Some(mover(east_m));
-            c.check.on_bid(40_000, 1, &bid, (&view, at), &mut c.found);
+            c.check.on_bid(
+                40_000,
+                1,
+                &bid,
+                (&view, at),
+                &Handicaps::default(),
+                &mut c.found,
+            );
             assert_eq!(c.broken("bid"), broken, "{n}: {:?}", c.found.violations);
         }
     }

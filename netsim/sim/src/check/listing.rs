@@ -1,7 +1,7 @@
 //! Which peer lists which cell: orphans (I1, L2), and yielding to a higher stamp (S5).
 
 use super::membership::Membership;
-use super::{Clocks, Findings, Snapshot, bounds::LIGHT_FACTOR};
+use super::{Clocks, Findings, PeerSnapshot, Snapshot, bounds::LIGHT_FACTOR};
 use skein_peer::Beliefs;
 use skein_peer::output::Status;
 use skein_peer::wire::message::{Claim, Firmness, ListedRun, Stamp};
@@ -31,8 +31,8 @@ pub struct ListingCheck {
 }
 
 impl ListingCheck {
-    /// A process ended or stands still.
-    pub fn on_silent(&mut self, id: u16) {
+    /// A process ended.
+    pub fn on_death(&mut self, id: u16) {
         self.own.remove(&id);
         self.heard.retain(|(o, _), _| *o != id);
     }
@@ -80,10 +80,19 @@ impl ListingCheck {
         found: &mut Findings,
     ) {
         let n = snapshot.covered.len();
-        if n == 0 || snapshot.able().next().is_none() {
+        // Whose disk takes no writes can promise nothing, so it lists nothing new.
+        let since_ms = |m: &PeerSnapshot| {
+            let writes_ms = snapshot.handicaps.writes_since_ms(m.id, snapshot.now_ms)?;
+            let component_ms = snapshot.stability.component_since_ms(m.id)?;
+            Some(writes_ms.max(component_ms))
+        };
+        // An orphan is to be listed in every component with an able peer, so the one that
+        // has been stable for longest is the one that counts.
+        let stable_ms = snapshot.able().filter_map(since_ms).min();
+        let Some(stable_ms) = stable_ms.filter(|_| n > 0) else {
             self.able_since_ms = None;
             return;
-        }
+        };
         let able_since_ms = *self.able_since_ms.get_or_insert(snapshot.now_ms);
         let mut lister: Vec<Option<u16>> = vec![None; n];
         let mut settled = snapshot.covered.to_vec();
@@ -110,13 +119,7 @@ impl ListingCheck {
                 }
             }
         }
-        // An orphan is to be listed in every component with an able peer, so the one that
-        // has been stable for longest is the one that counts.
-        let stable_ms = snapshot
-            .able()
-            .filter_map(|m| snapshot.stability.component_since_ms(m.id))
-            .min();
-        let counts_from_ms = stable_ms.unwrap_or(snapshot.now_ms).max(able_since_ms);
+        let counts_from_ms = stable_ms.max(able_since_ms);
         for c in 0..n {
             let cell = u16::try_from(c).unwrap_or(u16::MAX);
             if settled[c] || lister[c].is_some() {
@@ -144,7 +147,7 @@ impl ListingCheck {
                 "L2",
                 snapshot.grade(),
                 snapshot.now_ms.saturating_sub(from_ms),
-                snapshot.bounds.takeover_ms(),
+                snapshot.takeover_ms(from_ms),
             );
         }
         if let Some(by) = lister {
@@ -166,11 +169,12 @@ impl ListingCheck {
             owner,
             told: false,
         });
-        let bound_ms = snapshot.bounds.takeover_ms();
         let Some(from_ms) = counted_from(o, members) else {
             return;
         };
-        let took_ms = snapshot.now_ms.saturating_sub(from_ms.max(counts_from_ms));
+        let counts_from_ms = from_ms.max(counts_from_ms);
+        let took_ms = snapshot.now_ms.saturating_sub(counts_from_ms);
+        let bound_ms = snapshot.takeover_ms(counts_from_ms);
         let graded = snapshot
             .grade()
             .limit_ms(bound_ms)
@@ -243,7 +247,8 @@ impl ListingCheck {
         for key in seen {
             let since_ms = self.clashes.start(key, snapshot.now_ms);
             // A snapshot comes once a period, so what two of them show lasted at least one less.
-            let took_ms = snapshot.now_ms - since_ms;
+            let took_ms = snapshot.lived_ms(key.0, since_ms);
+            let bound_ms = bound_ms + snapshot.late_ms(key.0, since_ms);
             if took_ms > bound_ms && self.clashes.tell_once(key) {
                 let (id, author, cell) = key;
                 found.broken("S5", snapshot.now_ms, Some(id), || {
@@ -288,7 +293,7 @@ fn each_cell(l: &ListedRun, n: usize, mut f: impl FnMut(usize)) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Bounds, Graph, PeerSnapshot, Stability};
+    use super::super::{Bounds, Graph, Handicaps, Stability};
     use super::*;
     use skein_peer::PeerId;
     use skein_peer::wire::message::{CellRun, Epoch};
@@ -355,6 +360,7 @@ mod tests {
                 bounds: BOUNDS,
                 graph: &graph,
                 stability: &self.stability,
+                handicaps: &Handicaps::default(),
                 peers: &peers,
                 covered: &[false; 4],
                 loop_hash: 9,
@@ -400,7 +406,7 @@ mod tests {
         s.members.on_life(0, 2, 1);
         s.snapshot(0, &[(1, &[0, 1]), (2, &[2, 3])]);
         s.members.on_silent(500, 2, true, 1);
-        s.check.on_silent(2);
+        s.check.on_death(2);
         for t in 1..40 {
             s.snapshot(t * 1000, &[(1, &[0, 1])]);
         }
@@ -409,8 +415,13 @@ mod tests {
             "nobody knows yet: {:?}",
             s.found.violations
         );
-        s.members
-            .on_belief(40_500, (1, 2), (1, Status::Down), &BOUNDS, None);
+        s.members.on_belief(
+            40_500,
+            (1, 2),
+            (1, Status::Down),
+            (&BOUNDS, &Handicaps::default()),
+            None,
+        );
         s.snapshot(41_000, &[(1, &[0, 1])]);
         s.snapshot(42_000, &[(1, &[0, 1, 3, 2])]);
         assert!(s.found.counts.is_empty());
@@ -442,8 +453,13 @@ mod tests {
         };
         for (other, alone, broken) in [(7, false, true), (7, true, false), (2, false, false)] {
             let mut s = Story::new(300);
-            s.members
-                .on_belief(0, (1, 2), (1, Status::Alive), &BOUNDS, None);
+            s.members.on_belief(
+                0,
+                (1, 2),
+                (1, Status::Alive),
+                (&BOUNDS, &Handicaps::default()),
+                None,
+            );
             s.check.on_published(1, claim(5, 1));
             s.check
                 .on_heard((1, 2), (1, 8), &deaf(claim(other, 2), alone));

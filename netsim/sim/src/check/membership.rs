@@ -1,7 +1,7 @@
 //! Who knows of whose death, and how soon: detection at any loss, false downs, and
 //! agreement on the members of a component (L1).
 
-use super::{Bounds, Clocks, Findings, Grade, Snapshot};
+use super::{Bounds, Clocks, Findings, Grade, Handicaps, PeerSnapshot, Snapshot};
 use skein_peer::output::Status;
 use std::collections::BTreeMap;
 
@@ -29,8 +29,6 @@ pub struct Membership {
     late: Clocks<(u16, u16)>,
     disagreements: Clocks<(u16, u16)>,
     misjudged: Clocks<u16>,
-    /// Somebody was slow or had a wrong clock: verdicts may be hasty from then on.
-    clocks_wrong: bool,
     judged_downs: usize,
     /// Living peers declared Down although a path to them had existed for a whole bound:
     /// when, by whom, whom.
@@ -101,7 +99,7 @@ impl Membership {
         now_ms: u64,
         (observer, subject): (u16, u16),
         (incarnation, status): (u32, Status),
-        bounds: &Bounds,
+        (bounds, handicaps): (&Bounds, &Handicaps),
         joined_since_ms: Option<u64>,
     ) {
         self.beliefs
@@ -117,16 +115,12 @@ impl Membership {
             return;
         };
         let bound_ms = bounds.detection_ms();
+        let bound_ms = handicaps.grown_ms(bound_ms, now_ms.saturating_sub(bound_ms), now_ms);
         let heard_ms = began_ms + bounds.probation_ms() + bound_ms;
         let joined = joined_since_ms.is_some_and(|t| t + bound_ms <= now_ms);
         if life == incarnation && joined && heard_ms <= now_ms {
             self.false_downs.push((now_ms, observer, subject));
         }
-    }
-
-    /// Somebody is slow from now on or has a wrong clock.
-    pub fn clocks_are_wrong(&mut self) {
-        self.clocks_wrong = true;
     }
 
     /// Judges everybody's beliefs.
@@ -148,7 +142,7 @@ impl Membership {
     /// batch of runs is judged by the rate.)
     fn look_for_false_downs(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         for (at_ms, by, of) in &self.false_downs[self.judged_downs..] {
-            if snapshot.grade() == Grade::Hard && !self.clocks_wrong {
+            if snapshot.grade() == Grade::Hard {
                 found.broken("false-down", *at_ms, Some(*by), || {
                     format!("holds peer {of} for down, which lives and is in reach")
                 });
@@ -187,15 +181,11 @@ impl Membership {
                 diameter: silence.diameter,
                 ..snapshot.bounds
             };
-            let due_ms = silence.since_ms + bounds.detection_ms();
-            if snapshot.now_ms <= due_ms {
-                continue;
-            }
-            for m in snapshot
-                .peers
-                .iter()
-                .filter(|m| m.since_ms < silence.since_ms && m.id != subject)
-            {
+            let bound_ms = snapshot.grown_ms(bounds.detection_ms(), silence.since_ms);
+            let silent_ms = |id| snapshot.lived_ms(id, silence.since_ms);
+            let knew = |m: &&PeerSnapshot| m.since_ms < silence.since_ms && m.id != subject;
+            let overdue = |m: &&PeerSnapshot| silent_ms(m.id) > bound_ms;
+            for m in snapshot.peers.iter().filter(knew).filter(overdue) {
                 let Some((_, status)) = self.beliefs.get(&(m.id, subject)) else {
                     continue;
                 };
@@ -208,9 +198,8 @@ impl Membership {
                 if self.late.tell_once(key) {
                     found.broken("detect", snapshot.now_ms, Some(m.id), || {
                         format!(
-                            "still holds peer {subject} for {status:?}, {} ms after it fell silent (bound {} ms, D = {})",
-                            snapshot.now_ms - silence.since_ms,
-                            bounds.detection_ms(),
+                            "still holds peer {subject} for {status:?}, {} ms after it fell silent (bound {bound_ms} ms, D = {})",
+                            silent_ms(m.id),
                             silence.diameter
                         )
                     });
@@ -245,7 +234,7 @@ impl Membership {
                 let took_ms = snapshot.now_ms.saturating_sub(since_ms);
                 if snapshot
                     .grade()
-                    .limit_ms(bound_ms)
+                    .limit_ms(snapshot.grown_ms(bound_ms, since_ms))
                     .is_some_and(|l| took_ms > l)
                     && self.disagreements.tell_once(key)
                 {
@@ -281,7 +270,7 @@ fn true_diameter(snapshot: &Snapshot<'_>) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::super::testing::{Story, speaking};
-    use super::super::{Graph, PeerSnapshot, Stability};
+    use super::super::{Graph, Stability};
     use super::*;
     use skein_peer::{Beliefs, PeerId};
 
@@ -326,6 +315,7 @@ mod tests {
             bounds: BOUNDS,
             graph: &graph,
             stability,
+            handicaps: &Handicaps::default(),
             peers: &peers,
             covered: &[],
             loop_hash: 0,
@@ -343,10 +333,22 @@ mod tests {
             );
             m.on_life(0, 1, 1);
             m.on_life(0, 2, 1);
-            m.on_belief(3000, (1, 2), (1, Status::Alive), &BOUNDS, Some(0));
+            m.on_belief(
+                3000,
+                (1, 2),
+                (1, Status::Alive),
+                (&BOUNDS, &Handicaps::default()),
+                Some(0),
+            );
             m.on_silent(50_000, 2, true, 1);
             if found_out {
-                m.on_belief(59_000, (1, 2), (1, Status::Down), &BOUNDS, None);
+                m.on_belief(
+                    59_000,
+                    (1, 2),
+                    (1, Status::Down),
+                    (&BOUNDS, &Handicaps::default()),
+                    None,
+                );
                 assert_eq!(m.detected_ms(2), Some(59_000));
             }
             look_at(&mut m, &mut found, 65_000, 300, &[(1, &[])], &mut s);
@@ -365,9 +367,21 @@ mod tests {
         let mut m = Membership::default();
         m.on_life(0, 1, 1);
         m.on_life(0, 2, 1);
-        m.on_belief(60_000, (1, 2), (1, Status::Down), &BOUNDS, Some(55_000));
+        m.on_belief(
+            60_000,
+            (1, 2),
+            (1, Status::Down),
+            (&BOUNDS, &Handicaps::default()),
+            Some(55_000),
+        );
         assert!(m.false_downs.is_empty());
-        m.on_belief(60_000, (1, 2), (1, Status::Down), &BOUNDS, Some(10_000));
+        m.on_belief(
+            60_000,
+            (1, 2),
+            (1, Status::Down),
+            (&BOUNDS, &Handicaps::default()),
+            Some(10_000),
+        );
         assert_eq!(m.false_downs, [(60_000, 1, 2)]);
     }
 
@@ -376,7 +390,13 @@ mod tests {
         for (loss, broken) in [(0, true), (50, false), (300, false)] {
             let (mut m, mut found) = (Membership::default(), Findings::new(1));
             m.on_life(0, 2, 1);
-            m.on_belief(60_000, (1, 2), (1, Status::Down), &BOUNDS, Some(10_000));
+            m.on_belief(
+                60_000,
+                (1, 2),
+                (1, Status::Down),
+                (&BOUNDS, &Handicaps::default()),
+                Some(10_000),
+            );
             let mut s = Stability::default();
             look_at(&mut m, &mut found, 61_000, loss, &[(1, &[])], &mut s);
             look_at(&mut m, &mut found, 62_000, loss, &[(1, &[])], &mut s);

@@ -7,6 +7,7 @@
 //! | [`findings`] | violations, and where the checks put them |
 //! | [`snapshot`] | what all peers believe at one moment, beside what is true |
 //! | [`checker`] | all of them behind one door |
+//! | [`handicaps`] | whose clock, computer or disk is how late |
 //! | [`graph`] | the true components, from which liveness is counted |
 //! | [`bounds`] | how long things may take, and how loss grades that |
 //! | [`membership`] | detection of deaths, false downs, L1 |
@@ -36,6 +37,7 @@ pub mod decision;
 pub mod findings;
 pub mod flight;
 pub mod graph;
+pub mod handicaps;
 pub mod listing;
 pub mod membership;
 pub mod patience;
@@ -52,4 +54,5 @@ pub use bounds::{Bounds, Grade};
 pub use checker::{Checker, Reached};
 pub use findings::{Clocks, Findings, Violation};
 pub use graph::{Graph, Stability};
+pub use handicaps::Handicaps;
 pub use snapshot::{PeerSnapshot, Snapshot};

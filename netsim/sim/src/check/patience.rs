@@ -3,7 +3,7 @@
 //! (`patience`); a round that ran out of time is followed by one that waits twice as long
 //! (`waiting`).
 
-use super::{Clocks, Findings, Snapshot};
+use super::{Clocks, Findings, Handicaps, Snapshot};
 use skein_peer::output::Status;
 use skein_peer::protocol::rounds::{RoundOrder, order_of};
 use skein_peer::protocol::runs::cells_of;
@@ -63,8 +63,6 @@ pub struct PatienceCheck {
     parts: BTreeMap<u16, Part>,
     spoken: BTreeSet<RoundOrder>,
     owed: Clocks<u16>,
-    /// Peers that are late by no doing of their own, or whose clocks are wrong.
-    troubled: BTreeSet<u16>,
 }
 
 impl PatienceCheck {
@@ -76,18 +74,17 @@ impl PatienceCheck {
             parts: BTreeMap::new(),
             spoken: BTreeSet::new(),
             owed: Clocks::default(),
-            troubled: BTreeSet::new(),
         }
     }
 
-    /// A peer is late from now on, or its clock is wrong.
-    pub fn on_trouble(&mut self, id: u16) {
-        self.troubled.insert(id);
-    }
-
-    /// A process starts, ends, stands still, or works on another loop.
+    /// A process starts, ends, or works on another loop.
     pub fn on_anew(&mut self, id: u16) {
         self.parts.remove(&id);
+        self.owed.stop(id);
+    }
+
+    /// A process ends or stands still: it owes nothing meanwhile.
+    pub fn on_silent(&mut self, id: u16) {
         self.owed.stop(id);
     }
 
@@ -104,14 +101,21 @@ impl PatienceCheck {
     }
 
     /// A peer makes a bid durable: the round of a loss is open.
-    pub fn on_bid(&mut self, now_ms: u64, id: u16, bid: &Bid, found: &mut Findings) {
+    pub fn on_bid(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        bid: &Bid,
+        handicaps: &Handicaps,
+        found: &mut Findings,
+    ) {
         self.owed.stop(id);
         let order = order_of(&bid.round);
-        let first = self.spoken.insert(order) && !self.troubled.contains(&id);
         let part = self.parts.entry(id).or_default();
-        if first {
-            judge_patience(self.period_ms, now_ms, (id, part), bid, found);
-            judge_waiting(self.period_ms, now_ms, (id, part), bid, found);
+        if self.spoken.insert(order) {
+            let ago_ms = |t| handicaps.shown_ms(id, t, now_ms);
+            judge_patience(self.period_ms, now_ms, (id, part), bid, ago_ms, found);
+            judge_waiting(self.period_ms, now_ms, (id, part), bid, ago_ms, found);
         }
         part.joined = Some(Joined {
             at_ms: now_ms,
@@ -199,9 +203,10 @@ impl PatienceCheck {
             part.diameters = [m.view.diameter, part.diameters[0]];
             part.view = Some(m.view.clone());
             // The peer looks four times a period, and its bid is written in 20 ms.
-            let late_ms = self.owed.since(m.id).map(|t| now_ms - t);
-            let late_ms = late_ms.filter(|_| !self.troubled.contains(&m.id));
-            if late_ms.is_some_and(|l| l > self.period_ms / 2) && self.owed.tell_once(m.id) {
+            let late = self.owed.since(m.id).is_some_and(|t| {
+                snapshot.lived_ms(m.id, t) > self.period_ms / 2 + snapshot.late_ms(m.id, t)
+            });
+            if late && self.owed.tell_once(m.id) {
                 found.broken("prompt", now_ms, Some(m.id), || {
                     "gave up a peer whose cells nobody lists and opened no round within T/2"
                         .to_owned()
@@ -218,6 +223,7 @@ fn judge_patience(
     now_ms: u64,
     (id, part): (u16, &Part),
     bid: &Bid,
+    ago_ms: impl Fn(u64) -> u64,
     found: &mut Findings,
 ) {
     let heard = part.heard_ms.is_some_and(|t| now_ms <= t + period_ms);
@@ -230,8 +236,8 @@ fn judge_patience(
         return;
     }
     // Since the snapshot in which it was able first; it may have been so for T before.
-    let able_ms = part.able_since_ms.map_or(0, |t| now_ms - t) + period_ms;
-    let calm_ms = part.adopted_ms.map(|t| now_ms - t);
+    let able_ms = part.able_since_ms.map_or(0, &ago_ms) + period_ms;
+    let calm_ms = part.adopted_ms.map(&ago_ms);
     let hasty = able_ms < STEADY_PERIODS * period_ms;
     let restless = calm_ms.is_some_and(|c| c < CALM_PERIODS * period_ms);
     if hasty || restless {
@@ -250,11 +256,12 @@ fn judge_waiting(
     now_ms: u64,
     (id, part): (u16, &Part),
     bid: &Bid,
+    ago_ms: impl Fn(u64) -> u64,
     found: &mut Findings,
 ) {
     let Some(before) = part.joined.as_ref().filter(|j| {
         let later = bid.round.counter == j.order.0 + 1;
-        let out_of_time = now_ms > j.at_ms + u64::from(j.wait_ms);
+        let out_of_time = ago_ms(j.at_ms) > u64::from(j.wait_ms);
         // Without a loss a decision may be one not to adopt, which nobody can see.
         later && out_of_time && j.loss && !part.decided && j.members == bid.round.members
     }) else {
@@ -340,7 +347,13 @@ mod tests {
                 check.on_told(t * 1000, 1, (1, 1));
             }
             able_until(&mut check, able_s, &mut found);
-            check.on_bid(able_s * 1000, 1, &bid(4, loss, 5000), &mut found);
+            check.on_bid(
+                able_s * 1000,
+                1,
+                &bid(4, loss, 5000),
+                &Handicaps::default(),
+                &mut found,
+            );
             assert_eq!(
                 found.counts.contains_key("patience"),
                 broken,
@@ -358,8 +371,20 @@ mod tests {
         ] {
             let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
             able_until(&mut check, 30, &mut found);
-            check.on_bid(30_000, 1, &bid(4, true, 5000), &mut found);
-            check.on_bid(30_000 + after_ms, 1, &bid(5, true, wait_ms), &mut found);
+            check.on_bid(
+                30_000,
+                1,
+                &bid(4, true, 5000),
+                &Handicaps::default(),
+                &mut found,
+            );
+            check.on_bid(
+                30_000 + after_ms,
+                1,
+                &bid(5, true, wait_ms),
+                &Handicaps::default(),
+                &mut found,
+            );
             assert_eq!(
                 found.counts.contains_key("waiting"),
                 broken,
@@ -395,7 +420,13 @@ mod tests {
             let heard = |id| (id == 2).then_some((&dead, 1));
             check.on_down(30_100, (1, 2), 1, heard);
             if opens {
-                check.on_bid(30_300, 1, &bid(7, true, 5000), &mut found);
+                check.on_bid(
+                    30_300,
+                    1,
+                    &bid(7, true, 5000),
+                    &Handicaps::default(),
+                    &mut found,
+                );
             }
             let mut story = Story::new(300);
             story.snapshot(31_000, &[(1, speaking())], |s| {

@@ -6,7 +6,8 @@ use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use std::collections::BTreeMap;
 
 /// A plan may be longer than the fuel by this much, milliseconds: ETA and fuel are
-/// rounded to a millisecond and taken at two percepts half a second apart.
+/// rounded to a millisecond and taken at two percepts half a second apart; a late
+/// computer has its percepts later.
 const ETA_ROUNDING_MS: u32 = 1_000;
 
 /// What progress found out in one run.
@@ -69,13 +70,14 @@ impl ProgressCheck {
         found: &mut Findings,
     ) {
         for m in snapshot.peers {
-            self.check_limits(snapshot.now_ms, m, found);
+            self.check_limits(snapshot, m, found);
             self.check_adoptions(snapshot, m, found);
         }
         self.check_restarted(snapshot, members, found);
     }
 
-    fn check_limits(&mut self, now_ms: u64, m: &PeerSnapshot, found: &mut Findings) {
+    fn check_limits(&mut self, snapshot: &Snapshot<'_>, m: &PeerSnapshot, found: &mut Findings) {
+        let now_ms = snapshot.now_ms;
         for (name, used, cap) in &m.view.loads {
             if self.exceeds((m.id, name), *used > *cap, now_ms) {
                 found.broken("S9", now_ms, Some(m.id), || {
@@ -84,7 +86,9 @@ impl ProgressCheck {
             }
         }
         let v = &m.view;
-        let short = !v.plan.is_empty() && v.eta_ms > v.spendable_ms.saturating_add(ETA_ROUNDING_MS);
+        let late_ms = snapshot.late_ms(m.id, now_ms);
+        let slack_ms = ETA_ROUNDING_MS.saturating_add(u32::try_from(late_ms).unwrap_or(u32::MAX));
+        let short = !v.plan.is_empty() && v.eta_ms > v.spendable_ms.saturating_add(slack_ms);
         if self.exceeds((m.id, "plan"), short, now_ms) {
             found.broken("S10", now_ms, Some(m.id), || {
                 format!("plans {} ms with {} ms to spend", v.eta_ms, v.spendable_ms)
@@ -137,11 +141,19 @@ impl ProgressCheck {
                 .stability
                 .component_since_ms(*id)
                 .unwrap_or(snapshot.now_ms);
-            let from_ms = (r.boot_ms + bounds.probation_ms()).max(stable_ms);
+            let writes_ms = snapshot.handicaps.writes_since_ms(*id, snapshot.now_ms);
+            let from_ms = (r.boot_ms + bounds.probation_ms())
+                .max(stable_ms)
+                .max(writes_ms.unwrap_or(snapshot.now_ms));
             let took_ms = snapshot.now_ms.saturating_sub(from_ms);
-            if snapshot
-                .grade()
-                .limit_ms(bounds.productive_ms())
+            // What it is to fly it must be able to write down.
+            let bound_ms = snapshot.grown_ms(bounds.productive_ms(), from_ms);
+            let bound_ms = snapshot
+                .handicaps
+                .write_ms(*id, from_ms, snapshot.now_ms)
+                .map(|w| bound_ms + 2 * w);
+            if bound_ms
+                .and_then(|b| snapshot.grade().limit_ms(b))
                 .is_some_and(|l| took_ms > l)
                 && !r.told
             {
@@ -184,7 +196,7 @@ fn all_listed(snapshot: &Snapshot<'_>) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Bounds, Graph, Stability};
+    use super::super::{Bounds, Graph, Handicaps, Stability};
     use super::*;
     use skein_peer::Beliefs;
 
@@ -216,6 +228,7 @@ mod tests {
                 },
                 graph: &graph,
                 stability: &s,
+                handicaps: &Handicaps::default(),
                 peers: &peers,
                 covered: &[false, false],
                 loop_hash: 3,

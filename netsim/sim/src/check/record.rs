@@ -2,14 +2,14 @@
 //! speaker a key (S4), no promise before it is durable (S7), and a journal that gives
 //! back the state it was written from (S11).
 
-use super::{Findings, Snapshot};
+use super::{Findings, Handicaps, Snapshot};
 use skein_peer::Beliefs;
 use skein_peer::cells::CellSet;
 use skein_peer::journal::{Durable, Entry};
 use skein_peer::wire::codec::{self, Body};
 use skein_peer::wire::kinds::Kind;
-use skein_peer::wire::message::{Claim, Epoch, Firmness, ListedRun, Record, Stamp};
-use std::collections::{BTreeMap, BTreeSet};
+use skein_peer::wire::message::{Bid, Claim, Epoch, Firmness, ListedRun, Record, Stamp};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A transmission that a peer wrote itself, read back.
@@ -65,8 +65,6 @@ pub struct RecordCheck {
     versions: BTreeMap<u16, Versions>,
     durable: BTreeMap<u16, (usize, Durable)>,
     own: BTreeMap<u16, Own>,
-    /// Peers whose disks failed or were slow.
-    troubled: BTreeSet<u16>,
 }
 
 /// Cells that a process saw itself on its loop, with when.
@@ -84,11 +82,6 @@ const UNSAVED_CELLS: usize = 4;
 const WRITING_MS: u64 = 1_000;
 
 impl RecordCheck {
-    /// The disk of a peer fails or is slow: what it saw may be lost.
-    pub fn on_trouble(&mut self, id: u16) {
-        self.troubled.insert(id);
-    }
-
     /// A process starts: it has seen nothing itself yet.
     pub fn on_boot(&mut self, id: u16) {
         self.own.remove(&id);
@@ -191,19 +184,13 @@ impl RecordCheck {
             });
         }
         match &said.body {
-            Body::Bid(bid) => {
-                let kept = durable
-                    .bid
-                    .as_ref()
-                    .is_some_and(|b| b == bid || b.round.counter > bid.round.counter);
-                if !kept {
-                    found.broken("S7", now_ms, Some(id), || {
-                        format!(
-                            "bids in round {}, which its disk does not hold",
-                            bid.round.counter
-                        )
-                    });
-                }
+            Body::Bid(bid) if !promised_bid(journal, bid) => {
+                found.broken("S7", now_ms, Some(id), || {
+                    format!(
+                        "bids in round {}, which its disk does not hold",
+                        bid.round.counter
+                    )
+                });
             }
             Body::Claim(claim) => {
                 let promised = promised_in_life(journal);
@@ -220,8 +207,8 @@ impl RecordCheck {
         &mut self,
         now_ms: u64,
         id: u16,
-        believed: &Durable,
-        journal: &[Vec<u8>],
+        (believed, journal): (&Durable, &[Vec<u8>]),
+        handicaps: &Handicaps,
         found: &mut Findings,
     ) {
         let (replayed, unread) = Durable::replay(journal);
@@ -230,19 +217,40 @@ impl RecordCheck {
                 format!("replaying {} records ({unread} unread) gives {replayed:?}, it believed {believed:?}", journal.len())
             });
         }
-        self.check_own_coverage(now_ms, id, &replayed, found);
+        self.check_own_coverage(now_ms, id, &replayed, handicaps, found);
     }
 
-    /// What a process saw itself is in its journal, but for the last few cells.
-    fn check_own_coverage(&self, now_ms: u64, id: u16, durable: &Durable, found: &mut Findings) {
-        let Some(own) = self.own.get(&id).filter(|_| !self.troubled.contains(&id)) else {
+    /// What a process saw itself is in its journal, but for the last few cells. Cells that
+    /// it saw while one write was under way come with the next one; those that could not be
+    /// written come with the first cell that is seen once the disk works.
+    fn check_own_coverage(
+        &self,
+        now_ms: u64,
+        id: u16,
+        durable: &Durable,
+        handicaps: &Handicaps,
+        found: &mut Findings,
+    ) {
+        let Some(own) = self.own.get(&id) else {
             return;
+        };
+        let Some(works_ms) = handicaps.writes_since_ms(id, now_ms) else {
+            return;
+        };
+        let is_old = |seen_ms: u64| {
+            let mut times = own.seen.iter().map(|(t, _)| *t);
+            let Some(seen_ms) = times.find(|t| *t >= seen_ms.max(works_ms)) else {
+                return false;
+            };
+            let write_ms = handicaps.write_ms(id, seen_ms, now_ms);
+            let late_ms = handicaps.late_ms(id, seen_ms, now_ms);
+            write_ms.is_some_and(|w| seen_ms + WRITING_MS + 2 * w + late_ms < now_ms)
         };
         let known = CellSet::decode_rle(durable.cells, &durable.covered)
             .ok()
             .filter(|_| durable.loop_hash == own.loop_hash);
         let written = |c: u16| known.as_ref().is_some_and(|k| k.contains(c));
-        let old = own.seen.iter().filter(|(t, _)| t + WRITING_MS < now_ms);
+        let old = own.seen.iter().filter(|(t, _)| is_old(*t));
         let lost = old.filter(|(_, c)| !written(*c)).count();
         if lost > UNSAVED_CELLS {
             found.broken("S11", now_ms, Some(id), || {
@@ -303,6 +311,19 @@ fn promised_in_life(journal: &[Vec<u8>]) -> Option<Claim> {
         }
     }
     None
+}
+
+/// Whether a journal holds this bid, promised in the journal's last life. A later one may
+/// follow it, while it waits for its turn on the air.
+fn promised_bid(journal: &[Vec<u8>], bid: &Bid) -> bool {
+    for record in journal.iter().rev() {
+        match Entry::decode(record) {
+            Some(Entry::Bid(kept)) if kept == *bid => return true,
+            Some(Entry::Life(_)) => return false,
+            _ => {}
+        }
+    }
+    false
 }
 
 /// A listed cell that no durable section lists at that stamp, as a sentence.

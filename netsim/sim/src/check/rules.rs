@@ -9,7 +9,7 @@ use super::patience::PatienceCheck;
 use super::record::Said;
 use super::spoken::SpokenCheck;
 use super::spread::SpreadCheck;
-use super::{Findings, PeerSnapshot, Snapshot};
+use super::{Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::spec::{Spec, UavSpec};
 use skein_flight::coverage::ring::backtracking::{RingCell, Uav};
 use skein_geometry::frame::Point;
@@ -69,20 +69,6 @@ impl Rules {
             .on_mission(chunks(mission).map_or(0, |pieces| pieces.len()));
     }
 
-    /// A peer is late from now on by no doing of its own.
-    pub fn on_trouble(&mut self, id: u16) {
-        self.cadence.on_trouble(id);
-        self.patience.on_trouble(id);
-        self.spoken.on_trouble(id);
-        self.decision.on_trouble(id);
-    }
-
-    /// A peer's clock is wrong from now on.
-    pub fn on_wrong_clock(&mut self, id: u16) {
-        self.on_trouble(id);
-        self.cadence.on_wrong_clock(id);
-    }
-
     /// A loop was derived.
     pub fn on_loop(&mut self, geometry: &Arc<MissionGeometry>) {
         self.decision.on_loop(geometry);
@@ -90,19 +76,23 @@ impl Rules {
 
     /// A process starts.
     pub fn on_boot(&mut self, now_ms: u64, id: u16) {
-        self.on_silent(id);
+        self.on_silent(id, true);
         self.decision.on_anew(id);
         self.loops.remove(&id);
         self.cadence.on_boot(now_ms, id);
     }
 
-    /// A process ends or stands still.
-    pub fn on_silent(&mut self, id: u16) {
+    /// A process ends, with all that it knew, or stands still (`death` is false).
+    pub fn on_silent(&mut self, id: u16, death: bool) {
         self.cadence.on_silent(id);
-        self.patience.on_anew(id);
-        self.spoken.on_silent(id);
-        self.spread.on_silent(id);
+        self.patience.on_silent(id);
         self.flight.on_silent(id);
+        self.spread.on_silent(id);
+        if death {
+            self.patience.on_anew(id);
+            self.spoken.on_death(id);
+            self.spread.on_death(id);
+        }
     }
 
     /// A peer reports something; beside it the divisions it adopted in this life, the
@@ -113,6 +103,7 @@ impl Rules {
         id: u16,
         report: &Report,
         (adoptions, diameter, listing): (u32, u64, &ListingCheck),
+        handicaps: &Handicaps,
         found: &mut Findings,
     ) {
         match report {
@@ -122,8 +113,9 @@ impl Rules {
                 status,
             } => {
                 let about = (id, peer.0);
+                let belief = (*incarnation, *status);
                 self.cadence
-                    .on_belief(now_ms, about, (*incarnation, *status), diameter, found);
+                    .on_belief(now_ms, about, belief, (diameter, handicaps), found);
                 if *status == Status::Down {
                     let heard = |author| listing.heard(id, author);
                     self.patience.on_down(now_ms, about, *incarnation, heard);
@@ -151,9 +143,16 @@ impl Rules {
     }
 
     /// A peer puts bytes on the air, its own or another's.
-    pub fn on_transmission(&mut self, now_ms: u64, id: u16, bytes: usize, found: &mut Findings) {
+    pub fn on_transmission(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        bytes: usize,
+        handicaps: &Handicaps,
+        found: &mut Findings,
+    ) {
         self.airtime.on_transmission(now_ms, id, bytes);
-        self.cadence.on_transmission(now_ms, id, found);
+        self.cadence.on_transmission(now_ms, id, handicaps, found);
     }
 
     /// A peer puts its own beacon on the air while it believes this.
@@ -195,13 +194,18 @@ impl Rules {
         }
     }
 
-    /// A running peer of this life receives a record.
-    pub fn on_received(&mut self, now_ms: u64, (id, life): (u16, Incarnation), said: &Said) {
+    /// A running peer of this life receives a record: now, of one that arrived then.
+    pub fn on_received(
+        &mut self,
+        (now_ms, arrived_ms): (u64, u64),
+        (id, life): (u16, Incarnation),
+        said: &Said,
+    ) {
         self.spread.on_held(id, &said.record);
         if let Body::Beacon(beacon) = &said.body {
             let author = (said.record.author, said.record.incarnation);
             self.cadence
-                .on_beacon_heard(now_ms, (id, life), author, beacon);
+                .on_beacon_heard((now_ms, arrived_ms), (id, life), author, beacon);
         }
         if let Body::Bid(bid) = &said.body {
             self.patience.on_bid_heard(now_ms, id, bid);
@@ -215,14 +219,16 @@ impl Rules {
         id: u16,
         bid: &Bid,
         (view, at): (&Beliefs, Option<Point>),
+        handicaps: &Handicaps,
         found: &mut Findings,
     ) {
         let mover = at.zip(self.flyers.get(&id)).map(|(at, flyer)| Mover {
             at,
             fastest_mps: flyer.fastest_mps,
         });
-        self.decision.on_bid(now_ms, id, bid, (view, mover), found);
-        self.patience.on_bid(now_ms, id, bid, found);
+        self.decision
+            .on_bid(now_ms, id, bid, (view, mover), handicaps, found);
+        self.patience.on_bid(now_ms, id, bid, handicaps, found);
     }
 
     /// A peer asks for a division.

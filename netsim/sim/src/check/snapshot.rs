@@ -1,7 +1,7 @@
 //! What a check may look at: what each running peer believes at one moment, beside what
 //! is true.
 
-use super::{Bounds, Grade, Graph, Stability};
+use super::{Bounds, Grade, Graph, Handicaps, Stability};
 use skein_geometry::frame::Point;
 use skein_peer::Beliefs;
 
@@ -33,6 +33,8 @@ pub struct Snapshot<'a> {
     pub graph: &'a Graph,
     /// Since when it has been so.
     pub stability: &'a Stability,
+    /// Whose clock, computer or disk is how late.
+    pub handicaps: &'a Handicaps,
     /// The running peers, ascending by id.
     pub peers: &'a [PeerSnapshot],
     /// What the world saw, by index on the loop; empty before any peer has a loop.
@@ -46,6 +48,43 @@ impl Snapshot<'_> {
     #[must_use]
     pub fn grade(&self) -> Grade {
         Grade::of(self.loss_permille)
+    }
+
+    /// How long something may take by now that all do together, that began at `from_ms`
+    /// and takes `bound_ms` among healthy peers.
+    #[must_use]
+    pub fn grown_ms(&self, bound_ms: u64, from_ms: u64) -> u64 {
+        self.handicaps.grown_ms(bound_ms, from_ms, self.now_ms)
+    }
+
+    /// How long an orphan may remain one that counts from then: beside the bound each
+    /// disk makes a bid and a section late, and a member whose disk takes no writes spoils
+    /// a round and the next, which waits twice as long, before it is left out.
+    #[must_use]
+    pub fn takeover_ms(&self, from_ms: u64) -> u64 {
+        let h = self.handicaps;
+        let write_ms = |m: &PeerSnapshot| h.write_ms(m.id, from_ms, self.now_ms);
+        let writes: Vec<Option<u64>> = self.peers.iter().map(write_ms).collect();
+        let late_ms: u64 = writes.iter().flatten().map(|w| 2 * w).sum();
+        let spoiled = writes.iter().any(Option::is_none);
+        let spoiled_ms = if spoiled {
+            3 * self.bounds.first_wait_ms()
+        } else {
+            0
+        };
+        self.grown_ms(self.bounds.takeover_ms(), from_ms) + late_ms + spoiled_ms
+    }
+
+    /// How long ago a time is by the clock of a peer, jumps left out.
+    #[must_use]
+    pub fn lived_ms(&self, id: u16, from_ms: u64) -> u64 {
+        self.handicaps.lived_ms(id, from_ms, self.now_ms)
+    }
+
+    /// How much later a peer may be with what it was to do since then.
+    #[must_use]
+    pub fn late_ms(&self, id: u16, from_ms: u64) -> u64 {
+        self.handicaps.late_ms(id, from_ms, self.now_ms)
     }
 
     /// A running peer by its number.

@@ -37,18 +37,11 @@ pub struct SpokenCheck {
     /// Cells published as covered that the world had not seen yet: when, by whom, of which
     /// loop. A frame may be judged a moment after its peer has looked at it.
     unseen: Vec<(u64, u16, u64, u16)>,
-    /// Peers that are late by no doing of their own.
-    troubled: BTreeSet<u16>,
 }
 
 impl SpokenCheck {
-    /// A peer is late from now on by no doing of its own.
-    pub fn on_trouble(&mut self, id: u16) {
-        self.troubled.insert(id);
-    }
-
     /// A process ends: what it said is no promise of the next one.
-    pub fn on_silent(&mut self, id: u16) {
+    pub fn on_death(&mut self, id: u16) {
         self.claims.remove(&id);
         self.unspoken.retain(|(p, _)| *p != id);
     }
@@ -149,8 +142,7 @@ impl SpokenCheck {
             }
         }
         for m in snapshot.peers {
-            let late = self.troubled.contains(&m.id);
-            if late || !m.view.speaks || !m.uav || m.view.loop_hash == 0 {
+            if !m.view.speaks || !m.uav || m.view.loop_hash == 0 {
                 self.unspoken.retain(|(p, _)| *p != m.id);
                 continue;
             }
@@ -175,8 +167,9 @@ impl SpokenCheck {
             self.unspoken.stop(key);
             return;
         };
-        let took_ms = snapshot.now_ms - self.unspoken.start(key, snapshot.now_ms);
-        let bound_ms = periods * snapshot.bounds.period_ms;
+        let since_ms = self.unspoken.start(key, snapshot.now_ms);
+        let took_ms = snapshot.lived_ms(key.0, since_ms);
+        let bound_ms = periods * snapshot.bounds.period_ms + snapshot.late_ms(key.0, since_ms);
         if took_ms > bound_ms && self.unspoken.tell_once(key) {
             found.broken("spoken", snapshot.now_ms, Some(key.0), || {
                 format!("{text}, for {took_ms} ms (bound {bound_ms} ms)")

@@ -65,11 +65,15 @@ impl SpreadCheck {
         }
     }
 
-    /// A process starts or ends: it holds nothing.
+    /// A process starts, ends or stands still.
     pub fn on_silent(&mut self, id: u16) {
-        self.held.remove(&id);
         self.lacks.retain(|(p, _), _| *p != id);
         self.apart.retain(|(a, b, _)| *a != id && *b != id);
+    }
+
+    /// A process starts or ends: it holds nothing.
+    pub fn on_death(&mut self, id: u16) {
+        self.held.remove(&id);
     }
 
     /// A running peer receives a record, or says one of its own.
@@ -165,7 +169,8 @@ impl SpreadCheck {
                 let took_ms = snapshot.now_ms - from_ms;
                 lack.took_ms = took_ms;
                 // Collisions lose records also where the links lose none.
-                let late = graded && took_ms > bound_ms * LIGHT_FACTOR;
+                let limit_ms = snapshot.grown_ms(bound_ms, from_ms) * LIGHT_FACTOR;
+                let late = graded && took_ms > limit_ms;
                 if late && !std::mem::replace(&mut lack.told, true) {
                     found.broken("L4", snapshot.now_ms, Some(m.id), || {
                         let kind = Kind::of_number(key.1).map_or("record", Kind::name);
@@ -188,7 +193,6 @@ impl SpreadCheck {
     ) {
         let mission_ms = self.bound_ms(&snapshot.bounds, Kind::Mission.number());
         let bound_ms = mission_ms + LOOK_PERIODS * snapshot.bounds.period_ms;
-        let limit_ms = snapshot.grade().limit_ms(bound_ms);
         for (i, a) in peers.iter().enumerate() {
             for b in &peers[i + 1..] {
                 let differ = [
@@ -208,6 +212,8 @@ impl SpreadCheck {
                     let began_ms = self.apart.start(key, snapshot.now_ms);
                     let from_ms = began_ms.max(since_ms).max(a.since_ms).max(b.since_ms);
                     let took_ms = snapshot.now_ms - from_ms;
+                    let grown_ms = snapshot.grown_ms(bound_ms, from_ms);
+                    let limit_ms = snapshot.grade().limit_ms(grown_ms);
                     if limit_ms.is_some_and(|l| took_ms > l) && self.apart.tell_once(key) {
                         found.broken("agree", snapshot.now_ms, Some(b.id), || {
                             let what = if of_order { "order" } else { "revision" };
@@ -232,7 +238,6 @@ impl SpreadCheck {
         found: &mut Findings,
     ) {
         let bound_ms = snapshot.bounds.spread_ms() + snapshot.bounds.yield_ms();
-        let limit_ms = snapshot.grade().limit_ms(bound_ms);
         let mut planners: BTreeMap<u16, Vec<&PeerSnapshot>> = BTreeMap::new();
         for m in peers
             .iter()
@@ -262,6 +267,8 @@ impl SpreadCheck {
             let began_ms = self.doubles.start(key, snapshot.now_ms);
             let from_ms = began_ms.max(since_ms).max(a.since_ms).max(b.since_ms);
             let took_ms = snapshot.now_ms - from_ms;
+            let grown_ms = snapshot.grown_ms(bound_ms, from_ms);
+            let limit_ms = snapshot.grade().limit_ms(grown_ms);
             if limit_ms.is_some_and(|l| took_ms > l) && self.doubles.tell_once(key) {
                 found.broken("L3", snapshot.now_ms, Some(b.id), || {
                     format!(

@@ -1,6 +1,6 @@
 //! Snapshots for the tests of checks: so many peers that all hear each other.
 
-use super::{Bounds, Graph, PeerSnapshot, Snapshot, Stability};
+use super::{Bounds, Graph, Handicaps, PeerSnapshot, Snapshot, Stability};
 use skein_geometry::frame::Point;
 use skein_peer::Beliefs;
 use std::collections::BTreeMap;
@@ -78,6 +78,7 @@ impl Story {
             bounds: BOUNDS,
             graph: &graph,
             stability: &self.stability,
+            handicaps: &Handicaps::default(),
             peers: &peers,
             covered: &self.covered,
             loop_hash: LOOP,

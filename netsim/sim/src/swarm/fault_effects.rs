@@ -6,6 +6,7 @@ use super::{Event, Kind, Phase, Swarm, What};
 use crate::account::Cause;
 use crate::disk::Trouble;
 use crate::fault::Fault;
+use crate::history::bytes_hash;
 use skein_peer::input::Command;
 use skein_peer::{Input, Role};
 use std::sync::Arc;
@@ -17,7 +18,7 @@ impl Swarm {
             .keep(self.now_ms, || What::Fault(fault.clone()));
         self.air.advance(self.now_ms);
         self.air.strike(fault);
-        self.checker.on_fault(fault);
+        self.checker.on_fault(self.now_ms, fault);
         let subject = match fault {
             Fault::Kill { peer } => self.end(*peer, Cause::Killed),
             Fault::KillComputer { peer } => self.end(*peer, Cause::ComputerKilled),
@@ -61,7 +62,7 @@ impl Swarm {
                 self.operate(Command::Order(*order));
                 0
             }
-            Fault::FailStores { peer } => self.trouble(*peer, Trouble::Fails),
+            Fault::FailStores { peer, one_in } => self.trouble(*peer, Trouble::Fails(*one_in)),
             Fault::SlowStores { peer, delay_ms } => self.trouble(*peer, Trouble::Slow(*delay_ms)),
             Fault::HealStores { peer } => self.trouble(*peer, Trouble::None),
             Fault::SlowComputer { peer, delay_ms } => {
@@ -222,10 +223,13 @@ impl Swarm {
         s.process = Process::Running;
         s.since_ms = now_ms;
         s.timer_ms = None;
-        let waiting: Vec<Input> = s.inbox.drain(..).collect();
+        let waiting: Vec<(u64, Input)> = s.inbox.drain(..).collect();
         self.account.resumed(now_ms, id);
         self.checker.on_resume(id);
-        for input in waiting {
+        for (arrived_ms, input) in waiting {
+            if let Input::Received { bytes, .. } = &input {
+                self.heard(arrived_ms, id, bytes_hash(bytes));
+            }
             self.feed(idx, input);
         }
         self.feed(idx, Input::Timer);

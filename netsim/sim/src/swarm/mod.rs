@@ -443,10 +443,8 @@ impl Swarm {
             if d.hops > 0 {
                 *self.relayed_by.entry(d.tx).or_default() += 1;
             }
-            if self.peers[idx].process == Process::Running
-                && let Some(said) = self.spoken.get(&hash)
-            {
-                self.checker.on_received(self.now_ms, d.rx, said);
+            if self.peers[idx].process == Process::Running {
+                self.heard(self.now_ms, d.rx, hash);
             }
             self.feed(
                 idx,
@@ -459,20 +457,28 @@ impl Swarm {
         }
     }
 
+    /// A running peer is given a record with this hash, which arrived then.
+    fn heard(&mut self, arrived_ms: u64, id: u16, hash: u64) {
+        if let Some(said) = self.spoken.get(&hash) {
+            self.checker
+                .on_received((self.now_ms, arrived_ms), id, said);
+        }
+    }
+
     /// Gives one input to a peer, now or when its process gets round to it.
     fn feed(&mut self, idx: usize, input: Input) {
         let now_ms = self.now_ms;
         let s = &mut self.peers[idx];
         match s.process {
             Process::Stopped => {}
-            Process::Paused => s.wait(input),
+            Process::Paused => s.wait(now_ms, input),
             Process::Running if s.slow_ms > 0 => {
                 if s.inbox.is_empty() {
                     let (boot, at_ms) = (s.boots, now_ms + s.slow_ms);
                     self.queue
                         .push(at_ms, Phase::Decide, Event::CatchUp { idx, boot });
                 }
-                self.peers[idx].wait(input);
+                self.peers[idx].wait(now_ms, input);
             }
             Process::Running => self.handle(idx, input),
         }
@@ -480,8 +486,8 @@ impl Swarm {
 
     /// What has waited is handled at once, in order.
     fn catch_up(&mut self, idx: usize) {
-        let waiting: Vec<Input> = self.peers[idx].inbox.drain(..).collect();
-        for input in waiting {
+        let waiting: Vec<(u64, Input)> = self.peers[idx].inbox.drain(..).collect();
+        for (_, input) in waiting {
             self.handle(idx, input);
         }
     }

@@ -22,6 +22,8 @@ pub struct Outcome {
     pub loss_permille: u16,
     /// Hard places reached.
     pub reached: Reached,
+    /// The kinds of trouble that struck.
+    pub struck: Vec<&'static str>,
     /// Hash of the history.
     pub history_hash: u64,
     /// The main events, where they were kept.
@@ -100,6 +102,7 @@ impl Swarm {
             idle_ms: self.checker.rules.flight.idle_ms,
             loss_permille: self.loss_max_permille,
             reached: self.checker.reached,
+            struck: Vec::new(),
             history_hash,
             entries: self.history.entries().to_vec(),
         }

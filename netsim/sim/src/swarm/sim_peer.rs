@@ -94,8 +94,8 @@ pub struct SimPeer {
     pub since_ms: u64,
     /// Its disk.
     pub disk: Disk,
-    /// Inputs that wait while it stands still.
-    pub inbox: VecDeque<Input>,
+    /// Inputs that wait while it stands still, each with when it arrived.
+    pub inbox: VecDeque<(u64, Input)>,
     /// For when the earliest timer event in the queue is, scenario time.
     pub timer_ms: Option<u64>,
     /// Whether it held that the mission is finished when last judged.
@@ -181,17 +181,17 @@ impl SimPeer {
 
     /// Keeps an input for later. Of percepts only the newest counts, and only what came
     /// by radio is ever dropped: answers of disk and planner are the process's own.
-    pub fn wait(&mut self, input: Input) {
+    pub fn wait(&mut self, now_ms: u64, input: Input) {
         if matches!(input, Input::Percept(_)) {
-            self.inbox.retain(|i| !matches!(i, Input::Percept(_)));
+            self.inbox.retain(|(_, i)| !matches!(i, Input::Percept(_)));
         }
-        let received = |i: &Input| matches!(i, Input::Received { .. });
+        let received = |(_, i): &(u64, Input)| matches!(i, Input::Received { .. });
         if self.inbox.len() >= INBOX_CAP
             && let Some(oldest) = self.inbox.iter().position(received)
         {
             self.inbox.remove(oldest);
         }
-        self.inbox.push_back(input);
+        self.inbox.push_back((now_ms, input));
     }
 }
 

@@ -9,6 +9,8 @@ use rand_core::{Rng, SeedableRng};
 pub enum Concern {
     /// The faults of a storm.
     Storm,
+    /// What else goes wrong in it.
+    Troubles,
     /// How long the disk of a peer takes to sync.
     Disk(u16),
     /// The seed a peer is configured with, and the offset of its clock.
@@ -27,6 +29,7 @@ impl Concern {
             Self::Peer(p) => (3, p),
             Self::Nonce(p) => (4, p),
             Self::Radio => (5, 0),
+            Self::Troubles => (6, 0),
         };
         (kind << 16) | u64::from(who)
     }

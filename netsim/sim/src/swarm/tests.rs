@@ -217,7 +217,7 @@ fn reports(o: &Outcome, by: u16, wanted: impl Fn(&Report) -> bool) -> Vec<u64> {
 #[test]
 fn a_peer_whose_disk_takes_no_writes_says_so_and_is_of_use_again_when_it_does() {
     let faults = vec![
-        at(20_000, Fault::FailStores { peer: 2 }),
+        at(20_000, Fault::FailStores { peer: 2, one_in: 1 }),
         at(50_000, Fault::HealStores { peer: 2 }),
     ];
     let o = run_with(3, 6, faults);

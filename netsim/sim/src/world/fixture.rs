@@ -2,7 +2,7 @@
 //! buildings (D2.7 §2.2). Every field is public, so a test starts from it and changes
 //! what it is about. Scenario files are read elsewhere.
 
-use crate::spec::{Building, GroundStationSpec, RadioSpec, Spec, StormSpec, UavSpec};
+use crate::spec::{Building, GroundStationSpec, RadioSpec, Spec, StormSpec, TroubleSpec, UavSpec};
 use skein_flight::airframe::Airframe;
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Pose};
@@ -59,6 +59,7 @@ pub fn storm(n_uavs: u16) -> StormSpec {
         max_partition_s: 60,
         max_restarts: 2,
         max_revisions: 1,
+        troubles: TroubleSpec::USUAL,
     }
 }
 

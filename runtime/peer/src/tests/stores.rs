@@ -86,3 +86,17 @@ fn covered_cells_are_durable_while_flying() {
     let cells = crate::cells::CellSet::decode_rle(durable.cells, &durable.covered).unwrap();
     assert!(usize::from(cells.count()) + 5 >= covered(&h, 1));
 }
+
+#[test]
+fn covered_cells_that_could_not_be_written_are_written_with_the_next_one() {
+    let mut h = Harness::started(1, mission(1, 6, 4));
+    h.seat(1).store_fails = |e| matches!(e, Entry::Covered { .. });
+    assert!(h.run_until(120, |h| covered(h, 1) > 5));
+    h.seat(1).store_fails = |_| false;
+    let before = covered(&h, 1);
+    assert!(h.run_until(60, |h| covered(h, 1) > before));
+    h.run_s(1);
+    let (durable, _) = Durable::replay(&h.seat(1).journal);
+    let cells = crate::cells::CellSet::decode_rle(durable.cells, &durable.covered).unwrap();
+    assert!(usize::from(cells.count()) > before, "{}", cells.count());
+}
