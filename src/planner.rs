@@ -1,4 +1,5 @@
-//! `--exact` and `--approximate`: who plans the area of a scenario.
+//! `--exact` and `--approximate` of `check`, `sim` and `trial`: who plans the area of a
+//! scenario. `plan cover` has flags of the same names for planners of its own.
 
 use clap::Args;
 use skein_scenario::AreaPlanner;
@@ -9,7 +10,8 @@ pub struct PlannerArgs {
     /// Covers the area exactly: straight passes over the cells of a decomposition.
     #[arg(long, conflicts_with = "approximate")]
     pub exact: bool,
-    /// Covers the area approximately: a loop over a grid of lanes.
+    /// Covers the area approximately: a loop over a grid of lanes, which is not the planner
+    /// of `plan cover --approximate`.
     #[arg(long)]
     pub approximate: bool,
 }

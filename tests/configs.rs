@@ -583,7 +583,7 @@ fn listed(uavs: &str) -> String {
     let find = |piece: &str| text.find(piece).unwrap();
     let (before, after) = (
         &text[..find("count: 8,")],
-        &text[find("// The n-th UAV")..find("  faults: [")],
+        &text[find("slot_step_m: 5")..find("  faults: [")],
     );
     format!(
         "{before}uavs: [{uavs}],\n{after}{}",

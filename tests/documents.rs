@@ -231,7 +231,7 @@ fn defines(source: &str, name: &str) -> bool {
         .map(str::trim_start)
         .filter(|l| !l.starts_with("//"));
     code.into_iter().any(|line| {
-        let line = ["pub(crate) ", "pub(super) ", "pub ", "const "]
+        let line = ["pub(crate) ", "pub(super) ", "pub ", "const ", "async "]
             .iter()
             .fold(line, |l, word| l.strip_prefix(word).unwrap_or(l));
         let defined = ["struct ", "enum ", "trait ", "fn ", "type ", "static "]

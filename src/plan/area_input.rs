@@ -2,11 +2,12 @@
 //! `.plan`, polygons of GeoJSON (D2.7 §3.6).
 
 use super::lat_lon;
+use super::zone_input::{self, Polygons, is_no_fly, is_plan};
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 use skein_geometry::frame::{Origin, Point};
 use skein_geometry::{NoFlyZones, Polygon};
-use skein_interop::place::{LatLon, Shape, Side, to_plane};
+use skein_interop::place::{LatLon, to_plane};
 use skein_interop::{geojson, plan};
 use std::path::Path;
 use std::sync::Arc;
@@ -36,11 +37,10 @@ struct Drawn {
     sensor: Option<String>,
 }
 
-/// The rings of a file with their names.
+/// What a file holds beside its zones.
 #[derive(Default)]
-struct Sheet {
+struct FileShapes {
     areas: Vec<Drawn>,
-    zones: Vec<(String, Shape)>,
     home: Option<LatLon>,
     notices: Vec<String>,
 }
@@ -59,80 +59,81 @@ struct Sheet {
 pub fn read(file: &Path, launch: Option<&str>) -> Result<AreaInput> {
     let shown = || file.display().to_string();
     let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", shown()))?;
-    let is_plan = file.extension().is_some_and(|e| e == "plan");
-    let sheet = if is_plan {
+    let shapes = if is_plan(file) {
         of_plan(&text)
     } else {
         of_geojson(&text)
     };
-    in_plane(sheet.with_context(shown)?, launch).with_context(shown)
+    let zones = |origin| -> Result<Vec<Polygon>> {
+        let input = zone_input::of_text(file, &text, origin, Polygons::NoFly)?;
+        let polygons = input.keep_out.into_iter();
+        polygons
+            .map(|z| Polygon::new(z.zone.zone.outer).context(z.name))
+            .collect()
+    };
+    in_plane(shapes.with_context(shown)?, launch, zones).with_context(shown)
 }
 
-fn of_plan(text: &str) -> Result<Sheet> {
+fn of_plan(text: &str) -> Result<FileShapes> {
     let file = plan::read(text)?;
-    let mut sheet = Sheet {
+    let mut shapes = FileShapes {
         home: file.home,
         notices: file.notices.iter().map(ToString::to_string).collect(),
-        ..Sheet::default()
+        ..FileShapes::default()
     };
-    let named = |what: &str, i: usize| format!("{what} {}", i + 1);
     for (i, ring) in file.surveys.into_iter().enumerate() {
-        sheet.areas.push(Drawn {
-            name: named("survey", i),
+        shapes.areas.push(Drawn {
+            name: format!("survey {}", i + 1),
             ring,
             holes: Vec::new(),
             sensor: None,
         });
     }
-    for (i, shape) in file.keep_out.into_iter().enumerate() {
-        sheet.zones.push((named("exclusion fence", i), shape));
-    }
     if !file.keep_in.is_empty() {
         let n = file.keep_in.len();
-        sheet.notices.push(format!(
+        shapes.notices.push(format!(
             "{n} inclusion fence(s) ignored: passes and turns reach beyond the survey"
         ));
     }
-    Ok(sheet)
+    Ok(shapes)
 }
 
-fn of_geojson(text: &str) -> Result<Sheet> {
+fn of_geojson(text: &str) -> Result<FileShapes> {
     let read = geojson::read(text)?;
     // Holes are used here, whatever the reader says to those who ask for rings alone.
     let notices = read.notices.iter().map(ToString::to_string);
-    let mut sheet = Sheet {
+    let mut shapes = FileShapes {
         notices: notices.filter(|n| !n.contains("hole(s)")).collect(),
-        ..Sheet::default()
+        ..FileShapes::default()
     };
-    for f in read.polygons {
-        let no_fly = f.properties.get("no_fly").and_then(|v| v.as_bool());
-        if no_fly == Some(true) {
-            sheet.zones.push((f.pointer, Shape::Ring(f.ring)));
-        } else {
-            if f.hole_rings.len() < f.holes {
-                let text = format!("at {}: a hole without an area was filled", f.pointer);
-                sheet.notices.push(text);
-            }
-            let sensor = match f.properties.get("sensor") {
-                None | Some(Value::Null) => None,
-                Some(Value::String(name)) => Some(name.clone()),
-                Some(other) => bail!(
-                    "at {}/properties/sensor: expected the name of a sensor, found {other}",
-                    f.pointer
-                ),
-            };
-            sheet.areas.push(Drawn {
-                name: f.pointer,
-                ring: f.ring,
-                holes: f.hole_rings,
-                sensor,
-            });
+    for f in read.polygons.into_iter().filter(|f| !is_no_fly(f)) {
+        if f.hole_rings.len() < f.holes {
+            let text = format!("at {}: a hole without an area was filled", f.pointer);
+            shapes.notices.push(text);
         }
+        let sensor = match f.properties.get("sensor") {
+            None | Some(Value::Null) => None,
+            Some(Value::String(name)) => Some(name.clone()),
+            Some(other) => bail!(
+                "at {}/properties/sensor: expected the name of a sensor, found {other}",
+                f.pointer
+            ),
+        };
+        shapes.areas.push(Drawn {
+            name: f.pointer,
+            ring: f.ring,
+            holes: f.hole_rings,
+            sensor,
+        });
     }
-    Ok(sheet)
+    Ok(shapes)
 }
 
-fn in_plane(sheet: Sheet, launch: Option<&str>) -> Result<AreaInput> {
+fn in_plane(
+    shapes: FileShapes,
+    launch: Option<&str>,
+    zones: impl FnOnce(Origin) -> Result<Vec<Polygon>>,
+) -> Result<AreaInput> {
     let [
         Drawn {
             name,
@@ -140,16 +141,16 @@ fn in_plane(sheet: Sheet, launch: Option<&str>) -> Result<AreaInput> {
             holes,
             sensor,
         },
-    ] = sheet.areas.as_slice()
+    ] = shapes.areas.as_slice()
     else {
         bail!(
             "one area is planned at a time, found {}: a survey of a .plan, or a polygon of GeoJSON without \"no_fly\": true",
-            sheet.areas.len()
+            shapes.areas.len()
         );
     };
     let launch = match launch {
         Some(text) => lat_lon(text).context("--launch")?,
-        None => match sheet.home.or(ring.first().copied()) {
+        None => match shapes.home.or(ring.first().copied()) {
             Some(at) => at,
             None => bail!("{name}: the area has no corner"),
         },
@@ -169,18 +170,12 @@ fn in_plane(sheet: Sheet, launch: Option<&str>) -> Result<AreaInput> {
         .iter()
         .enumerate()
         .map(|(i, hole)| polygon(hole, &format!("{name}, hole {}", i + 1)));
-    let zones = sheet.zones.iter().map(|(name, shape)| {
-        let ring = shape
-            .to_plane(origin, Side::Outside)
-            .with_context(|| name.clone())?;
-        Polygon::new(ring).with_context(|| name.clone())
-    });
     Ok(AreaInput {
         origin,
         area: polygon(ring, name)?,
         holes: holes.collect::<Result<_>>()?,
-        zones: Arc::new(NoFlyZones::new(zones.collect::<Result<_>>()?)),
+        zones: Arc::new(NoFlyZones::new(zones(origin)?)),
         sensor: sensor.clone(),
-        notices: sheet.notices,
+        notices: shapes.notices,
     })
 }

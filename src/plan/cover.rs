@@ -42,7 +42,12 @@ pub struct CoverArgs {
     pub fleet: Option<PathBuf>,
     /// Where all UAVs start and end, degrees; by default the file's home position, or the
     /// area's first corner.
-    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        visible_alias = "depot",
+        value_name = "LAT,LON",
+        allow_hyphen_values = true
+    )]
     pub launch: Option<String>,
     /// Width of the ground that a pass sees, metres.
     #[arg(long, default_value_t = 60.0, value_name = "M")]

@@ -2,7 +2,7 @@
 //! Planned by [`skein_survey::route`].
 
 use super::lat_lon;
-use super::zone_input::{self, Heights, ZoneInput};
+use super::zone_input::{self, Polygons, ZoneInput};
 use anyhow::{Context, Error, Result, anyhow, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -88,16 +88,16 @@ pub fn run(args: &RouteArgs) -> Result<String> {
     }
     places.push(place(&args.to, "--to".to_owned())?);
     let level = level(args)?;
-    let heights = if level.is_some() {
-        Heights::Read
+    let polygons = if level.is_some() {
+        Polygons::Buildings
     } else {
-        Heights::Ignored
+        Polygons::All
     };
     let ZoneInput {
         keep_out,
         keep_in,
         mut notices,
-    } = zone_input::read(&args.file, origin, heights)?;
+    } = zone_input::read(&args.file, origin, polygons)?;
     let plan = route::plan(&RouteRequest {
         places,
         keep_out,
@@ -276,7 +276,7 @@ mod tests {
         a.clearance_m = 21.0;
         assert_ne!(answer(&a)["structure_hash"], straight["structure_hash"]);
         a.via = vec!["47.3953,8.5429".to_owned()];
-        assert!(error(&a).starts_with("--via 47.3953,8.5429 lies in a zone: exclusion fence 1"));
+        assert!(error(&a).starts_with("--via 47.3953,8.5429 lies in a zone: exclusion fence 2"));
         a.via = vec!["47.3953".to_owned()];
         assert!(error(&a).starts_with("--via 47.3953: "));
     }
@@ -307,11 +307,11 @@ mod tests {
             (args(PLAN, HERE, THERE, f64::NAN), "--clearance-m"),
             (
                 args(PLAN, "47.3953,8.5429", THERE, 5.0),
-                "--from lies in a zone: exclusion fence 1",
+                "--from lies in a zone: exclusion fence 2",
             ),
             (
                 args(PLAN, HERE, "47.5,8.54", 5.0),
-                "--to lies in a zone: inclusion fence 0",
+                "--to lies in a zone: inclusion fence 1",
             ),
             (
                 args(PLAN, HERE, THERE, 400.0),

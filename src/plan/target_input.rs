@@ -1,15 +1,13 @@
 //! Points or lines of a file with the team that is to see them, in the plane of the depot.
 
 use super::tour_args::TourArgs;
-use super::zone_input::{self, Heights};
+use super::zone_input::{self, Polygons, ZoneInput};
 use super::{lat_lon, team_input};
 use anyhow::{Context, Result};
-use serde_json::Value;
 use skein_geometry::frame::{Origin, Point};
 use skein_geometry::offset::Zone;
-use skein_interop::place::{LatLon, to_plane};
+use skein_interop::place::to_plane;
 use skein_interop::targets::{self, read};
-use skein_interop::{geojson, plan};
 use skein_survey::team::Uav;
 use skein_survey::tours::{LineTarget, PointTarget, Targets};
 use skein_survey::zones::flight_zones;
@@ -82,9 +80,11 @@ impl TargetInput {
             args.endurance_s,
         )?;
         args.output.check(team.len())?;
-        let mut zones = zones_inside(file, &text, origin)?;
+        let inside = zone_input::of_text(file, &text, origin, Polygons::NoFly);
+        let mut zones = zones_of(&inside.with_context(shown)?);
         if let Some(file) = &args.zones {
-            zones.extend(zones_of(file, origin).context("--zones")?);
+            let more = zone_input::read(file, origin, Polygons::All);
+            zones.extend(zones_of(&more.context("--zones")?));
         }
         let defaults = team_input::Defaults {
             swath_m: args.swath_m,
@@ -141,35 +141,7 @@ fn lines(found: &[targets::LineTarget], origin: Origin) -> Result<Vec<LineTarget
     Ok(all)
 }
 
-/// All zones and fences of a file.
-fn zones_of(file: &Path, origin: Origin) -> Result<Vec<Zone>> {
-    let input = zone_input::read(file, origin, Heights::Ignored)?;
-    Ok(flight_zones(&input.keep_out, &input.keep_in, &[], None).zones)
-}
-
-/// Zones that a file of targets holds itself: fences of a `.plan`, polygons of GeoJSON
-/// with the property `"no_fly": true`.
-fn zones_inside(file: &Path, text: &str, origin: Origin) -> Result<Vec<Zone>> {
-    let named = || file.display().to_string();
-    if file.extension().is_some_and(|e| e == "plan") {
-        // Without a fence there is nothing to read twice.
-        let fences = plan::read(text).with_context(named)?;
-        if fences.keep_in.is_empty() && fences.keep_out.is_empty() {
-            return Ok(Vec::new());
-        }
-        return zones_of(file, origin);
-    }
-    let mut zones = Vec::new();
-    for f in geojson::read(text).with_context(named)?.polygons {
-        if f.properties.get("no_fly").and_then(Value::as_bool) == Some(true) {
-            let ring = f.ring.iter().map(|p: &LatLon| to_plane(origin, *p));
-            zones.push(Zone {
-                outer: ring
-                    .collect::<Result<_, _>>()
-                    .with_context(|| f.pointer.clone())?,
-                holes: Vec::new(),
-            });
-        }
-    }
-    Ok(zones)
+/// Zones and fences as zones.
+fn zones_of(input: &ZoneInput) -> Vec<Zone> {
+    flight_zones(&input.keep_out, &input.keep_in, &[], None).zones
 }

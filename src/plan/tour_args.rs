@@ -39,7 +39,12 @@ pub struct TourArgs {
     pub clearance_m: f64,
     /// Where all UAVs start and end, degrees; by default the file's home position, or
     /// its first target.
-    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        visible_alias = "launch",
+        value_name = "LAT,LON",
+        allow_hyphen_values = true
+    )]
     pub depot: Option<String>,
     /// Airspeed, m/s.
     #[arg(long, default_value_t = 15.0, value_name = "V")]

@@ -1,6 +1,7 @@
 //! Zones and fences of a file in the plane of a plan (D2.7 §2.3.1).
 
 use anyhow::{Context, Result};
+use serde_json::Value;
 use skein_geometry::frame::{Origin, Point};
 use skein_geometry::offset::{LayeredZone, Zone};
 use skein_interop::geojson::{self, HeightRules};
@@ -20,28 +21,51 @@ pub(super) struct ZoneInput {
     pub(super) notices: Vec<String>,
 }
 
-/// Whether heights of zones are read.
+/// Which polygons of GeoJSON are zones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Heights {
-    /// Every polygon is a zone from the ground to the sky.
-    Ignored,
-    /// Buildings end at their height.
-    Read,
+pub(super) enum Polygons {
+    /// All, from the ground to the sky: a file of zones.
+    All,
+    /// All, up to their height: a file of buildings.
+    Buildings,
+    /// Those with the property `"no_fly": true`: a file of something else.
+    NoFly,
 }
 
 /// Reads a `.plan` or GeoJSON file.
 ///
 /// # Errors
 /// When the file cannot be read or something of it is wrong; names the place.
-pub(super) fn read(file: &Path, origin: Origin, heights: Heights) -> Result<ZoneInput> {
+pub(super) fn read(file: &Path, origin: Origin, polygons: Polygons) -> Result<ZoneInput> {
     let text = std::fs::read_to_string(file).with_context(|| format!("{}", file.display()))?;
-    let is_plan = file.extension().is_some_and(|e| e == "plan");
-    let input = if is_plan {
-        of_plan(&text, origin)
+    of_text(file, &text, origin, polygons).with_context(|| format!("{}", file.display()))
+}
+
+/// The same of a file that was read already.
+///
+/// # Errors
+/// When something of it is wrong; names the place in the file.
+pub(super) fn of_text(
+    file: &Path,
+    text: &str,
+    origin: Origin,
+    polygons: Polygons,
+) -> Result<ZoneInput> {
+    if is_plan(file) {
+        of_plan(text, origin)
     } else {
-        of_geojson(&text, origin, heights)
-    };
-    input.with_context(|| format!("{}", file.display()))
+        of_geojson(text, origin, polygons)
+    }
+}
+
+/// Whether a file is one of QGroundControl, by its name.
+pub(super) fn is_plan(file: &Path) -> bool {
+    file.extension().is_some_and(|e| e == "plan")
+}
+
+/// Whether a polygon says that it is a zone.
+pub(super) fn is_no_fly(polygon: &geojson::Feature) -> bool {
+    polygon.properties.get("no_fly").and_then(Value::as_bool) == Some(true)
 }
 
 fn named(name: String, ring: Vec<Point>, ceiling_m: f64) -> NamedZone {
@@ -67,19 +91,19 @@ fn of_plan(text: &str, origin: Origin) -> Result<ZoneInput> {
         ring.with_context(|| name.to_owned())
     };
     for (i, s) in file.keep_out.iter().enumerate() {
-        let name = format!("exclusion fence {i}");
+        let name = format!("exclusion fence {}", i + 1);
         let ring = drawn(s, &name, Side::Outside)?;
         input.keep_out.push(named(name, ring, f64::INFINITY));
     }
     for (i, s) in file.keep_in.iter().enumerate() {
-        let name = format!("inclusion fence {i}");
+        let name = format!("inclusion fence {}", i + 1);
         let ring = drawn(s, &name, Side::Inside)?;
         input.keep_in.push(Fence { name, ring });
     }
     Ok(input)
 }
 
-fn of_geojson(text: &str, origin: Origin, heights: Heights) -> Result<ZoneInput> {
+fn of_geojson(text: &str, origin: Origin, polygons: Polygons) -> Result<ZoneInput> {
     let mut input = ZoneInput::default();
     let mut add = |pointer: &str, ring: &[LatLon], ceiling_m: f64| -> Result<()> {
         let name = format!("zone at {pointer}");
@@ -91,7 +115,7 @@ fn of_geojson(text: &str, origin: Origin, heights: Heights) -> Result<ZoneInput>
         input.keep_out.push(named(name, ring, ceiling_m));
         Ok(())
     };
-    let notices = if heights == Heights::Read {
+    let notices = if polygons == Polygons::Buildings {
         let read = geojson::buildings(text, &HeightRules::default())?;
         for b in &read.buildings {
             add(&b.pointer, &b.ring, b.height_m)?;
@@ -99,7 +123,8 @@ fn of_geojson(text: &str, origin: Origin, heights: Heights) -> Result<ZoneInput>
         read.notices
     } else {
         let read = geojson::read(text)?;
-        for f in &read.polygons {
+        let counts = |f: &&_| polygons == Polygons::All || is_no_fly(f);
+        for f in read.polygons.iter().filter(counts) {
             add(&f.pointer, &f.ring, f64::INFINITY)?;
         }
         read.notices

@@ -71,7 +71,9 @@ pub(crate) struct Pace {
     pub(crate) turn_s: f64,
 }
 
-/// The longest way home from the loop, with a turn at each end, seconds.
+/// The straight way home from the farthest boundary of the loop with a turn at each end,
+/// seconds; detours round zones are not in it. The executive reckons likewise, course by
+/// course (`Executive::return_ms`).
 pub(crate) fn return_s(pace: &Pace, spec: &Spec, the_loop: &CoverageLoop) -> f64 {
     let base = spec.mission.base_m();
     let far_m = (0..the_loop.len())

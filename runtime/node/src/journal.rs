@@ -25,9 +25,9 @@ use tokio::sync::mpsc;
 /// length beyond this is noise, not a record.
 pub const MAX_RECORD_BYTES: usize = 64 * 1024;
 
-/// Stores under way at once. A peer has a handful; more means that the disk hangs,
-/// and then the loop must wait rather than run out of memory.
-const MAX_OPEN_STORES: usize = 64;
+/// Stores under way at once: twice what a peer asks for before it promises nothing more
+/// ([`skein_peer::peer::MAX_STORES`]), so the loop never waits for the disk.
+const MAX_OPEN_STORES: usize = 2 * skein_peer::peer::MAX_STORES;
 
 const HEADER_BYTES: usize = 8;
 

@@ -1,7 +1,10 @@
 //! The vehicle under the peer: percepts up, setpoints down (D2.7 §1.1).
 //!
-//! [`crate::simulator`] has one; an autopilot's would be another file. A ground
-//! station has none.
+//! [`crate::simulator`] has one; an autopilot's (PX4, `ArduPilot`) would be another file: it
+//! turns telemetry into percepts, five a second in the scenarios, and flies setpoints, an
+//! airspeed, a height and up to eight timed turn rates. It owes the failsafe: without a
+//! setpoint for a second the airframe loiters by itself, on the side that the last one
+//! named. A ground station has no vehicle.
 
 use skein_behaviors::{Percept, Setpoint};
 use std::future::Future;

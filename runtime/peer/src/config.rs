@@ -32,7 +32,7 @@ pub struct PeerConfig {
     pub rate_bps: u32,
     /// The airframe, for a UAV.
     pub airframe: Option<Airframe>,
-    /// What legs off the loop, and the airspeed, should spend little of. Peers of one
+    /// What transfers off the loop, and the airspeed, should spend little of. Peers of one
     /// mission may differ in it.
     pub objective: Objective,
     /// Height slot above the origin, metres, for a UAV.
