@@ -3,7 +3,7 @@
 use crate::process::{Process, Processes};
 use crate::stream::Line;
 use nix::sys::signal::Signal;
-use skein_link::{LinkState, RadioCounters};
+use skein_link::{LinkNews, RadioCounters};
 use std::path::{Path, PathBuf};
 
 /// What has become of a peer's computer.
@@ -31,7 +31,7 @@ pub(crate) struct LivePeer {
     /// The way to it, once it said hello.
     line: Option<Line>,
     /// The links it was told last.
-    told: Option<Vec<(u16, LinkState)>>,
+    told: Option<LinkNews>,
     /// What its radio did in this life.
     radio: RadioCounters,
     /// Whether it was asked to leave or said goodbye.
@@ -258,16 +258,13 @@ impl LivePeer {
         }
     }
 
-    /// The links into it, if they are not those it was told last.
-    pub(crate) fn news_of_links(
-        &mut self,
-        row: Vec<(u16, LinkState)>,
-    ) -> Option<Vec<(u16, LinkState)>> {
-        if self.told.as_ref() == Some(&row) {
+    /// The links, if they are not those it was told last.
+    pub(crate) fn news_of_links(&mut self, links: LinkNews) -> Option<LinkNews> {
+        if self.told.as_ref() == Some(&links) {
             return None;
         }
-        self.told = Some(row.clone());
-        Some(row)
+        self.told = Some(links.clone());
+        Some(links)
     }
 
     /// Takes its journal away, and what its operator said.

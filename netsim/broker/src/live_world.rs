@@ -1,8 +1,8 @@
 //! The simulated world around live peers: airframes, radio links, the judge.
 
 use skein_behaviors::{Percept, Setpoint};
-use skein_link::LinkState;
 use skein_link::medium::Links as _;
+use skein_link::{Hearing, LinkState};
 use skein_netsim::fault::Fault;
 use skein_netsim::radio::{LinkTable, Overlay};
 use skein_netsim::spec::Spec;
@@ -58,6 +58,12 @@ impl LiveWorld {
     #[must_use]
     pub fn link(&self, tx: u16, rx: u16) -> LinkState {
         self.links.state(tx, rx)
+    }
+
+    /// Who of these stations hears whom; ascending.
+    #[must_use]
+    pub fn hearing(&self, stations: Vec<u16>) -> Hearing {
+        Hearing::of(stations, |tx, rx| self.links.state(tx, rx).is_up())
     }
 
     /// The components of the true link graph of the peers that `counts` accepts.

@@ -11,7 +11,7 @@ use crate::stream::{Heard, Line, Streams};
 use crate::transports::Transports;
 use skein_behaviors::Setpoint;
 use skein_link::frame::ToWorld;
-use skein_link::{LinkState, RadioCounters};
+use skein_link::{LinkNews, RadioCounters};
 use skein_netsim::spec::Spec;
 use skein_peer::Report;
 use std::collections::BTreeMap;
@@ -274,16 +274,16 @@ impl Peers {
             .filter(|p| p.on_air())
             .map(LivePeer::id)
             .collect();
+        let hearing = world.hearing(on_air);
         for (id, peer) in &mut self.by_id {
-            let links: Vec<(u16, LinkState)> = on_air
-                .iter()
-                .filter(|tx| *tx != id)
-                .map(|tx| (*tx, world.link(*tx, *id)))
-                .collect();
             if !peer.is_connected() {
                 continue;
             }
-            let news = peer.news_of_links(links);
+            let others = hearing.stations.iter().filter(|tx| *tx != id);
+            let news = peer.news_of_links(LinkNews {
+                row: others.map(|tx| (*tx, world.link(*tx, *id))).collect(),
+                hearing: hearing.clone(),
+            });
             let percept = world
                 .percept(*id)
                 .filter(|_| percepts && peer.flies() && peer.airborne());

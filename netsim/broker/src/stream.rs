@@ -5,7 +5,7 @@
 //! say comes to the trial through one bounded queue.
 
 use skein_behaviors::Percept;
-use skein_link::LinkState;
+use skein_link::LinkNews;
 use skein_link::frame::{Decoder, Frame, ToPeer, ToWorld, encode};
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -126,7 +126,7 @@ struct Unsaid {
     welcome: Option<ToPeer>,
     tick: Option<(u64, f64)>,
     percept: Option<Percept>,
-    links: Option<Vec<(u16, LinkState)>>,
+    links: Option<LinkNews>,
     end: bool,
 }
 
@@ -177,7 +177,7 @@ impl Line {
         time_ms: u64,
         scale: f64,
         percept: Option<Percept>,
-        links: Option<Vec<(u16, LinkState)>>,
+        links: Option<LinkNews>,
     ) {
         self.change(|u| {
             u.tick = Some((time_ms, scale));

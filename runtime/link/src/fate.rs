@@ -19,6 +19,15 @@ pub struct LinkState {
 }
 
 impl LinkState {
+    /// Nothing gets through.
+    pub const DOWN: Self = Self {
+        in_range: false,
+        in_sight: false,
+        cut: false,
+        loss_permille: 0,
+        delay_ms: 0,
+    };
+
     /// Whether anything can get through at all.
     #[must_use]
     pub fn is_up(&self) -> bool {

@@ -5,7 +5,7 @@
 //! [`encode`] and [`Decoder`] know no socket; who moves the bytes is up to both ends.
 //! Bytes of a [`ToWorld::Report`] stay bytes here: this crate does not know the peer.
 
-use crate::{LinkState, RadioCounters};
+use crate::{LinkNews, RadioCounters};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use skein_behaviors::Percept;
 use skein_behaviors::Setpoint;
@@ -38,8 +38,8 @@ pub enum ToPeer {
         scale: f64,
         /// What the vehicle senses, when it is due and there is a vehicle.
         percept: Option<Percept>,
-        /// Links into this peer from each transmitter, when one of them changed.
-        links: Option<Vec<(u16, LinkState)>>,
+        /// The links, when one of them changed.
+        links: Option<LinkNews>,
     },
     /// The trial is over: flush and leave.
     End,
@@ -262,7 +262,10 @@ mod tests {
             time_ms: 5_000,
             scale: 8.0,
             percept: None,
-            links: Some(vec![(3, link)]),
+            links: Some(LinkNews {
+                row: vec![(3, link)],
+                hearing: Hearing::of(vec![1, 3], |_, _| true),
+            }),
         }
     }
 

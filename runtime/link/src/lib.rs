@@ -9,9 +9,11 @@ pub mod counters;
 pub mod fate;
 pub mod frame;
 pub mod medium;
+pub mod neighbourhood;
 pub mod queue;
 
 pub use counters::RadioCounters;
 pub use fate::{Fate, LinkState, Reason, fate};
 pub use medium::Medium;
+pub use neighbourhood::{Hearing, LinkNews, Neighbourhood};
 pub use queue::SendQueue;

@@ -12,6 +12,7 @@
 use crate::fate::mix;
 use crate::queue::{Queued, SendQueue, Waiting};
 use crate::{Fate, LinkState, Reason, fate};
+use skein_geometry::hash::Fnv;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -41,10 +42,18 @@ pub trait Links {
     fn present(&self, station: u16) -> bool;
 }
 
+/// What stands for a record's key on the channel.
+#[must_use]
+pub fn key_hash(key: &str) -> u64 {
+    let mut hash = Fnv::new();
+    hash.write(key.as_bytes());
+    hash.finish()
+}
+
 /// What a station wants to send.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Hash of the key; a newer frame of the same key replaces a waiting older one.
+    /// [`key_hash`] of the key; a newer frame of the same key replaces a waiting older one.
     pub key: u64,
     /// The record.
     pub bytes: Arc<[u8]>,
@@ -69,7 +78,7 @@ pub struct Delivery {
     pub rx: u16,
     /// The sender's count of transmissions.
     pub number: u64,
-    /// Hash of the key.
+    /// [`key_hash`] of the key.
     pub key: u64,
     /// Hops the record had made before this transmission.
     pub hops: u8,
@@ -157,22 +166,20 @@ impl Medium {
     /// A silent channel with some stations.
     #[must_use]
     pub fn new(stations: &[u16], channel: Channel, seed: u64) -> Self {
-        let stations = stations.iter().map(|id| Station {
-            id: *id,
-            queue: SendQueue::default(),
-            listen_us: None,
-            sending: false,
-            sent: 0,
-            draws: 0,
-            tally: Tally::default(),
-        });
-        let mut stations: Vec<Station> = stations.collect();
+        let mut stations: Vec<Station> = stations.iter().map(|id| Station::new(*id)).collect();
         stations.sort_by_key(|s| s.id);
         Self {
             channel,
             seed,
             stations,
             air: Vec::new(),
+        }
+    }
+
+    /// Takes a station in, unless it is one.
+    pub fn join(&mut self, station: u16) {
+        if self.stations.iter().all(|s| s.id != station) {
+            self.stations.push(Station::new(station));
         }
     }
 
@@ -192,6 +199,11 @@ impl Medium {
             .iter()
             .find(|s| s.id == node)
             .map(|s| &s.tally)
+    }
+
+    /// The figures of each station.
+    pub fn tallies(&self) -> impl Iterator<Item = (u16, &Tally)> {
+        self.stations.iter().map(|s| (s.id, &s.tally))
     }
 
     /// The figures of all stations together.
@@ -386,6 +398,18 @@ impl Medium {
 }
 
 impl Station {
+    fn new(id: u16) -> Self {
+        Self {
+            id,
+            queue: SendQueue::default(),
+            listen_us: None,
+            sending: false,
+            sent: 0,
+            draws: 0,
+            tally: Tally::default(),
+        }
+    }
+
     fn enqueue(&mut self, now_us: u64, frame: Frame) {
         let pushed = self.queue.push(now_us, frame);
         self.tally.replaced += u64::from(pushed.replaced);

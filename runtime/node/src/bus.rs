@@ -9,6 +9,7 @@
 
 use crate::radio::Hop;
 use crate::transport::{Event, Transport};
+use skein_link::medium::key_hash;
 use skein_peer::Priority;
 use std::collections::VecDeque;
 use std::net::{IpAddr, SocketAddr};
@@ -458,26 +459,41 @@ fn zenoh_priority(priority: Priority) -> zenoh::qos::Priority {
     }
 }
 
-/// The attachment: a CBOR array of transmitter, transmission number, hops.
+/// What the attachment holds, as a CBOR array: transmitter, transmission number, hops,
+/// time of handing over in milliseconds, priority, lifetime in milliseconds.
+type Attached = (u16, u64, u8, u64, u8, u32);
+
 fn attachment(hop: Hop) -> Vec<u8> {
-    let parts = (hop.transmitter, hop.number, hop.hops);
-    // Writing three integers to memory cannot fail; an empty attachment is refused by all.
-    cbor4ii::serde::to_vec(Vec::with_capacity(16), &parts).unwrap_or_default()
+    let parts: Attached = (
+        hop.transmitter,
+        hop.number,
+        hop.hops,
+        hop.at_ms,
+        hop.priority,
+        hop.lifetime_ms,
+    );
+    // Writing integers to memory cannot fail; an empty attachment is refused by all.
+    cbor4ii::serde::to_vec(Vec::with_capacity(32), &parts).unwrap_or_default()
 }
 
 fn hop_of(sample: &Sample) -> Option<Hop> {
     let bytes = sample.attachment()?.to_bytes();
-    let (transmitter, number, hops) = cbor4ii::serde::from_slice::<(u16, u64, u8)>(&bytes).ok()?;
+    let (transmitter, number, hops, at_ms, priority, lifetime_ms) =
+        cbor4ii::serde::from_slice::<Attached>(&bytes).ok()?;
     Some(Hop {
         transmitter,
         number,
         hops,
+        at_ms,
+        priority,
+        lifetime_ms,
     })
 }
 
 fn event_of(sample: &Sample) -> Event {
     Event::Heard {
         hop: hop_of(sample),
+        key: key_hash(sample.key_expr().as_str()),
         bytes: sample.payload().to_bytes().into_owned(),
     }
 }
@@ -609,6 +625,9 @@ mod tests {
             transmitter: 1,
             number: 77,
             hops: 3,
+            at_ms: 1_234,
+            priority: 2,
+            lifetime_ms: 500,
         };
         let speak = async {
             loop {
@@ -619,7 +638,7 @@ mod tests {
         };
         let hear = async {
             loop {
-                if let Event::Heard { hop, bytes } = b.next().await {
+                if let Event::Heard { hop, bytes, .. } = b.next().await {
                     return (hop, bytes);
                 }
             }

@@ -11,7 +11,7 @@
 use crate::clock::Clock;
 use crate::console::{Console, can_be_flown, fits};
 use crate::journal::{Journal, Stored};
-use crate::outgoing::{Frame, Outgoing};
+use crate::outgoing::Frame;
 use crate::radio::Radio;
 use crate::standing::{Standing, StandingError};
 use crate::transport::{Event, Transport};
@@ -98,8 +98,6 @@ pub struct Equipment {
     pub clock: Clock,
     /// What the air does to each message.
     pub radio: Radio,
-    /// What waits to be sent.
-    pub outgoing: Outgoing,
     /// What must not be forgotten.
     pub journal: Journal,
     /// What the operator said last, where there is a console.
@@ -113,7 +111,6 @@ pub struct Driver<P, V, W, C, T> {
     around: Surroundings<V, W, C, T>,
     clock: Clock,
     radio: Radio,
-    outgoing: Outgoing,
     journal: Journal,
     standing: Option<Standing>,
     results: mpsc::Receiver<(u64, JobResult)>,
@@ -164,7 +161,6 @@ where
         let Equipment {
             clock,
             radio,
-            outgoing,
             journal,
             standing,
         } = equipment;
@@ -173,7 +169,6 @@ where
             around,
             clock,
             radio,
-            outgoing,
             journal,
             results,
             workers,
@@ -228,11 +223,7 @@ where
 
     /// How long nothing but the passing of time can be due.
     fn wait(&mut self) -> Duration {
-        let due = [
-            self.peer.next_timeout(),
-            self.radio.next_due(),
-            self.outgoing.next_due(),
-        ];
+        let due = [self.peer.next_timeout(), self.radio.next_due()];
         let due = due.into_iter().flatten().min();
         let at = Instant::now();
         // Where only a frame of the world can bring the time, the frame will wake us.
@@ -268,9 +259,7 @@ where
 
     async fn tick(&mut self, tick: Tick) {
         self.clock.tick(tick.time_ms, tick.scale, Instant::now());
-        if let Some(table) = tick.links {
-            self.radio.links(table);
-        }
+        self.radio.tick(tick.scale, tick.links);
         if let Some(event) = self.early.take() {
             self.hear(event).await;
         }
@@ -283,7 +272,7 @@ where
 
     async fn count(&mut self) {
         let overrun = self.around.transport.overrun();
-        let counters = self.radio.counters(self.outgoing.dropped(), overrun);
+        let counters = self.radio.counters(overrun);
         self.around.world.count(counters).await;
     }
 
@@ -293,10 +282,11 @@ where
             Event::Link { neighbour, up } => self.step(Input::LinkHint { neighbour, up }).await,
             Event::Heard {
                 hop: Some(hop),
+                key,
                 bytes,
             } => {
                 let now = self.now();
-                self.radio.receive(now, hop, bytes);
+                self.radio.receive(now, hop, key, bytes);
             }
             Event::Heard { hop: None, .. } => self.radio.refuse(),
         }
@@ -306,10 +296,9 @@ where
     async fn deliver(&mut self) {
         let now = self.now();
         while let Some(arrived) = self.radio.due(now) {
-            let (transmitter, hops) = (arrived.hop.transmitter, arrived.hop.hops);
             self.step(Input::Received {
-                transmitter,
-                hops,
+                transmitter: arrived.transmitter,
+                hops: arrived.hops,
                 bytes: arrived.bytes,
             })
             .await;
@@ -324,11 +313,10 @@ where
         }
     }
 
-    /// Sends what the channel has room for.
+    /// Sends what may be sent.
     async fn transmit(&mut self) {
         let now = self.now();
-        while let Some(frame) = self.outgoing.pop(now) {
-            let hop = self.radio.transmit(frame.hops, frame.bytes.len());
+        while let Some((hop, frame)) = self.radio.to_send(now) {
             self.around
                 .transport
                 .publish(&frame.key, frame.bytes, hop, frame.priority)
@@ -353,7 +341,7 @@ where
                 hops,
                 priority,
                 lifetime_ms,
-            } => self.outgoing.push(
+            } => self.radio.say(
                 now,
                 Frame {
                     key,

@@ -42,9 +42,9 @@ use clock::Clock;
 use console::{ConsoleError, LocalConsole};
 use drive::{Driver, Equipment, Surroundings};
 use journal::{Journal, JournalError};
-use outgoing::Outgoing;
 use radio::Radio;
 use simulator::{Hello, Joined, StreamError};
+use skein_link::medium::Channel;
 use skein_peer::{Input, Peer};
 use standing::{Standing, StandingError};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -106,7 +106,11 @@ pub async fn run(mut config: NodeConfig, stop: impl Future<Output = ()>) -> Resu
         records = replayed.records.len(),
         "up"
     );
-    let mut radio = Radio::open(id, nonce);
+    let channel = Channel {
+        rate_bps: config.peer.rate_bps,
+        queue_age_ms: config.queue_age_ms,
+    };
+    let mut radio = Radio::open(id, nonce, channel);
     let mut clock = Clock::free(Instant::now());
     let (mut vehicle, mut world) = (None, None);
     if let Some(simulator) = &config.simulator {
@@ -120,11 +124,10 @@ pub async fn run(mut config: NodeConfig, stop: impl Future<Output = ()>) -> Resu
             world: w,
             welcome,
         } = simulator::join(simulator, hello).await?;
-        radio.join(welcome.seed);
+        radio = Radio::in_world(id, nonce, channel, welcome.seed);
         clock = Clock::following(welcome.time_ms, welcome.scale, Instant::now());
         (vehicle, world) = (Some(v), Some(w));
     }
-    let outgoing = Outgoing::new(config.peer.rate_bps, config.queue_age_ms);
     let around = Surroundings {
         vehicle,
         world,
@@ -134,7 +137,6 @@ pub async fn run(mut config: NodeConfig, stop: impl Future<Output = ()>) -> Resu
     let equipment = Equipment {
         clock,
         radio,
-        outgoing,
         journal,
         standing,
     };

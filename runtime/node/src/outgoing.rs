@@ -3,9 +3,10 @@
 //!
 //! The rules of waiting are those of the simulated channel ([`skein_link::queue`]). A
 //! frame holds the channel for eight bits a byte at its rate; that others hold it too
-//! is left to the transport.
+//! is left to the air.
 
 use skein_link::SendQueue;
+use skein_link::medium::Channel;
 use skein_link::queue::Queued;
 use skein_peer::{Priority, Time};
 
@@ -53,13 +54,13 @@ pub struct Outgoing {
 }
 
 impl Outgoing {
-    /// Nothing waits. Frames leave at `rate_bps`; none waits longer than `max_age_ms`.
+    /// Nothing waits.
     #[must_use]
-    pub fn new(rate_bps: u32, max_age_ms: u32) -> Self {
+    pub fn new(channel: Channel) -> Self {
         Self {
             queue: SendQueue::default(),
-            rate_bps: u64::from(rate_bps.max(1)),
-            max_age_ms,
+            rate_bps: u64::from(channel.rate_bps.max(1)),
+            max_age_ms: channel.queue_age_ms,
             free_us: 0,
             dropped: 0,
         }
@@ -105,6 +106,13 @@ impl Outgoing {
 mod tests {
     use super::*;
 
+    fn outgoing(rate_bps: u32, queue_age_ms: u32) -> Outgoing {
+        Outgoing::new(Channel {
+            rate_bps,
+            queue_age_ms,
+        })
+    }
+
     fn frame(key: &str, priority: Priority, lifetime_ms: u32) -> Frame {
         Frame {
             key: key.to_owned(),
@@ -129,7 +137,7 @@ mod tests {
     #[test]
     fn frames_leave_at_the_rate_of_the_channel_and_the_urgent_go_first() {
         // 800 bits at 64 kbit/s are 12.5 ms.
-        let mut out = Outgoing::new(64_000, 2_000);
+        let mut out = outgoing(64_000, 2_000);
         for (key, priority) in [
             ("cover", Priority::Telemetry),
             ("beacon", Priority::Beacon),
@@ -146,7 +154,7 @@ mod tests {
 
     #[test]
     fn what_could_not_leave_within_its_lifetime_never_does() {
-        let mut out = Outgoing::new(64_000, 2_000);
+        let mut out = outgoing(64_000, 2_000);
         out.push(Time(0), frame("first", Priority::Beacon, 5));
         out.push(Time(0), frame("short", Priority::Beacon, 5));
         out.push(Time(0), frame("long", Priority::Beacon, 5_000));
@@ -161,7 +169,7 @@ mod tests {
 
     #[test]
     fn a_newer_record_of_the_same_key_replaces_what_waits() {
-        let mut out = Outgoing::new(64_000, 2_000);
+        let mut out = outgoing(64_000, 2_000);
         out.push(Time(0), frame("state", Priority::Telemetry, 1_000));
         let newer = Frame {
             hops: 7,

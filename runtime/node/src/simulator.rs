@@ -322,11 +322,11 @@ async fn read_all(reader: OwnedReadHalf, mut decoder: Decoder, shared: Arc<Share
 mod tests {
     use super::*;
     use crate::testing::percept;
-    use skein_link::LinkState;
+    use skein_link::LinkNews;
     use tokio::io::AsyncReadExt;
     use tokio::net::TcpListener;
 
-    fn tick(time_ms: u64, sensed: bool, links: Option<Vec<(u16, LinkState)>>) -> ToPeer {
+    fn tick(time_ms: u64, sensed: bool, links: Option<LinkNews>) -> ToPeer {
         ToPeer::Tick {
             time_ms,
             scale: 2.0,
@@ -363,7 +363,7 @@ mod tests {
             };
             let mut bytes = encode(&welcome).unwrap();
             for frame in [
-                tick(100, true, Some(vec![])),
+                tick(100, true, Some(LinkNews::default())),
                 tick(200, true, None),
                 tick(300, false, None),
             ] {
@@ -396,7 +396,11 @@ mod tests {
                 },
             }
         }
-        assert_eq!(links, Some(vec![]), "merging kept the only table");
+        assert_eq!(
+            links,
+            Some(LinkNews::default()),
+            "merging kept the only table"
+        );
         for (told, sense) in sensed {
             let at_ms = sense.time_ms;
             assert!(told.is_some_and(|t| t >= at_ms), "{told:?} before {at_ms}");

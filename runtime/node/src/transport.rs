@@ -12,8 +12,10 @@ use std::future::Future;
 pub enum Event {
     /// A transmission of a neighbour.
     Heard {
-        /// What changes at each hop; `None` where it cannot be read.
+        /// What travels beside the record; `None` where it cannot be read.
         hop: Option<Hop>,
+        /// The hash of its key ([`skein_link::medium::key_hash`]).
+        key: u64,
         /// The record.
         bytes: Vec<u8>,
     },

@@ -1,7 +1,7 @@
 //! A world around the peer, which rules its clock and its radio and watches it. In
 //! flight there is none: the clock is the machine's, the air does what it does.
 
-use skein_link::{LinkState, RadioCounters};
+use skein_link::{LinkNews, RadioCounters};
 use skein_peer::Report;
 use std::future::Future;
 
@@ -21,8 +21,8 @@ pub struct Tick {
     pub time_ms: u64,
     /// Scenario seconds per second of wall time.
     pub scale: f64,
-    /// Links into this peer, when they changed.
-    pub links: Option<Vec<(u16, LinkState)>>,
+    /// The links, when they changed.
+    pub links: Option<LinkNews>,
 }
 
 /// What the driver needs of a world. What cannot be told to it is dropped:

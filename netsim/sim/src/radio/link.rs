@@ -102,14 +102,6 @@ pub struct LinkTable {
     cut_by_fault: u64,
 }
 
-const DOWN: LinkState = LinkState {
-    in_range: false,
-    in_sight: false,
-    cut: false,
-    loss_permille: 0,
-    delay_ms: 0,
-};
-
 impl LinkTable {
     /// A table for some nodes, ascending by number, everything down until the first
     /// computation.
@@ -121,7 +113,7 @@ impl LinkTable {
             radio,
             computed_ms: None,
             places: vec![None; n],
-            states: vec![DOWN; n * n],
+            states: vec![LinkState::DOWN; n * n],
             looks: vec![None; n * n],
             up: vec![None; n * n],
             changes: Vec::new(),
@@ -161,7 +153,8 @@ impl LinkTable {
             for j in i + 1..n {
                 let (there, back, pair) = (i * n + j, j * n + i, i * n + j);
                 let (Some(a), Some(b)) = (self.places[i], self.places[j]) else {
-                    (self.states[there], self.states[back], self.up[pair]) = (DOWN, DOWN, None);
+                    (self.states[there], self.states[back], self.up[pair]) =
+                        (LinkState::DOWN, LinkState::DOWN, None);
                     continue;
                 };
                 let in_range = a.distance_m(&b) <= self.radio.range_m;
@@ -247,7 +240,7 @@ impl Links for LinkTable {
     fn state(&self, tx: u16, rx: u16) -> LinkState {
         match (self.index_of(tx), self.index_of(rx)) {
             (Some(i), Some(j)) => self.states[i * self.nodes.len() + j],
-            _ => DOWN,
+            _ => LinkState::DOWN,
         }
     }
 

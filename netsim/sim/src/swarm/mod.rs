@@ -40,6 +40,7 @@ use queue::{Phase, Queue};
 use sim_peer::{Process, SimPeer};
 use skein_behaviors::Setpoint;
 use skein_geometry::frame::Pose;
+use skein_link::medium::key_hash;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
 use skein_peer::wire;
@@ -525,7 +526,7 @@ impl Swarm {
                     self.said(idx, peer, &bytes, hash);
                 }
                 let frame = Frame {
-                    key: bytes_hash(key.as_bytes()),
+                    key: key_hash(&key),
                     bytes: bytes.into(),
                     hops,
                     priority: priority as u8,

@@ -6,6 +6,7 @@ use crate::radio::Hop;
 use crate::testing::{mission, percept};
 use skein_behaviors::Setpoint;
 use skein_behaviors::setpoint::Side;
+use skein_link::medium::Channel;
 use skein_link::{RadioCounters, Reason};
 use skein_peer::{Priority, Report};
 use std::sync::{Mutex, MutexGuard};
@@ -250,9 +251,15 @@ impl Running {
         };
         let equipment = Equipment {
             clock,
-            radio: Radio::open(1, 0),
             // 100 bytes a second.
-            outgoing: Outgoing::new(800, 60_000),
+            radio: Radio::open(
+                1,
+                0,
+                Channel {
+                    rate_bps: 800,
+                    queue_age_ms: 60_000,
+                },
+            ),
             journal,
             standing: Some(Standing::open(&dir.path().join("j"), Some(&mission())).unwrap()),
         };
