@@ -301,7 +301,7 @@ mod tests {
         let line = Line {
             waiting: Arc::new(Waiting::default()),
         };
-        line.tick(100, 1.0, None, Some(vec![]));
+        line.tick(100, 1.0, None, Some(LinkNews::default()));
         line.tick(200, 1.0, None, None);
         line.end();
         line.welcome(1, 0, 1.0);
@@ -315,7 +315,7 @@ mod tests {
         else {
             panic!()
         };
-        assert!(links.is_empty());
+        assert_eq!(links, LinkNews::default());
         assert_eq!(unsaid.pop(), Some(ToPeer::End));
         assert_eq!(unsaid.pop(), None);
     }

@@ -232,6 +232,7 @@ fn decode_exact<T: DeserializeOwned>(body: &[u8]) -> Result<T, FrameError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Hearing, LinkState};
     use skein_behaviors::setpoint::{Side, Steer};
 
     fn setpoint(rate: f64, steps: usize) -> ToWorld {

@@ -646,7 +646,7 @@ mod tests {
     /// second of 60 to 187 bytes, which is two thirds of the channel for all six.
     fn chatter(t: u64, tx: u16) -> Option<Frame> {
         let draw = mix(mix(t) ^ u64::from(tx));
-        (draw % 140 == 0 && t % 8_000 < 4_000).then(|| {
+        (draw.is_multiple_of(140) && t % 8_000 < 4_000).then(|| {
             let mut bytes = vec![0; 60 + usize::try_from(draw >> 40 & 127).unwrap()];
             bytes[..8].copy_from_slice(&t.to_le_bytes());
             let priority = if draw >> 30 & 1 == 0 {
