@@ -45,9 +45,10 @@ use crate::wire::codec::Body;
 use crate::wire::limits::BID_COVERED_MAX_BYTES;
 use crate::wire::message::{Beacon, Bid, Epoch, Member, OffLoop, Order, Record};
 use crate::{Incarnation, PeerId};
-use skein_behaviors::{Event, Goal, Percept};
+use skein_behaviors::executive::UNREACHABLE_MS;
+use skein_behaviors::{Event, Executive, Goal, Percept};
 use skein_flight::coverage::ring::Direction;
-use skein_flight::coverage::ring::backtracking::Division;
+use skein_flight::coverage::ring::backtracking::{Division, Uav};
 use std::sync::Arc;
 
 /// Own coverage is made durable every so many cells: a crash costs at most these.
@@ -554,7 +555,7 @@ impl MissionState {
         if lost {
             self.negotiation.note_loss();
         }
-        let ctx = Context {
+        let mut ctx = Context {
             now: s.now,
             period_ms: s.period_ms,
             live: &live,
@@ -564,7 +565,11 @@ impl MissionState {
             revision: self.revision(),
             loop_hash: self.loop_hash(),
             held_expired: timers.take_due(Timer::HeldCells, s.now),
+            gain_in_sight: false,
         };
+        if self.negotiation.wants_foresight(&ctx) {
+            ctx.gain_in_sight = self.foresees_gain(&ctx);
+        }
         let coverage_loop = Arc::clone(&self.geometry.coverage_loop);
         let actions = self.negotiation.tick(&ctx, &coverage_loop);
         let mut effects = Effects::new();
@@ -595,6 +600,36 @@ impl MissionState {
         effects
     }
 
+    /// Whether this peer, with nothing to fly, would be of use in a new division of what
+    /// the claims of others list.
+    fn foresees_gain(&self, ctx: &Context<'_>) -> bool {
+        let sections = &self.negotiation.sections;
+        let Some(executive) = &self.executive else {
+            return false;
+        };
+        let forecast = executive.forecast(0, &|c| !sections.covered().contains(c));
+        let me = Uav {
+            anchor: forecast.anchor,
+            id: self.negotiation.me(),
+            heading: forecast.heading,
+            release_ms: forecast.release_ms,
+            speed_mmps: speed_mmps(executive),
+            turn_ms: executive.turn_ms(),
+            endurance_ms: UNREACHABLE_MS,
+            off_loop: forecast.off_loop.map(OffLoop::of),
+        };
+        let present_ms = self.negotiation.present_end_ms(ctx);
+        // The round takes a waiting time.
+        let delay_ms = ctx.base_wait_ms();
+        division::gain_in_sight(
+            &self.geometry,
+            (sections, ctx.live),
+            me,
+            present_ms,
+            delay_ms,
+        )
+    }
+
     /// This peer's bid in the open round, to be told and made durable.
     fn bid(&self, s: &Situation<'_>) -> Effects {
         let (Some(open), Some(executive)) = (self.negotiation.rounds.open(), &self.executive)
@@ -606,19 +641,13 @@ impl MissionState {
         let forecast = executive.forecast(open.round.wait_ms, &is_open);
         let is_planned = |c: &u16| sections.plan().iter().any(|p| p.cell == *c);
         let committed: Vec<u16> = forecast.cells.iter().copied().filter(is_planned).collect();
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "an airspeed is a small positive number"
-        )]
-        let speed_mmps = (executive.loop_speed_mps() * 1000.0) as u32;
         let idle = sections.plan().is_empty();
         let bid = Bid {
             round: open.round.clone(),
             anchor: forecast.anchor,
             backward: forecast.heading == Direction::Backward,
             release_ms: forecast.release_ms,
-            speed_mmps,
+            speed_mmps: speed_mmps(executive),
             turn_ms: executive.turn_ms(),
             endurance_ms: self
                 .spendable_ms(s.percept)
@@ -776,4 +805,15 @@ impl MissionState {
         }
         self.goal = Some(goal);
     }
+}
+
+/// How fast a UAV gets on along the loop, mm/s.
+fn speed_mmps(executive: &Executive) -> u32 {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "an airspeed is a small positive number"
+    )]
+    let speed_mmps = (executive.loop_speed_mps() * 1000.0) as u32;
+    speed_mmps
 }

@@ -41,7 +41,9 @@ pub struct RunReport {
     /// When the last coverable cell was seen, ms.
     pub makespan_ms: Option<u64>,
     /// When it would have been, had everybody known everything at once, ms: same seed,
-    /// world and faults, solved by the same rules. Simulated runs with few deaths only.
+    /// world and faults, divided by the same rule at each loss and return, or as the swarm
+    /// itself did where that was sooner, for a coordinator could have flown so too.
+    /// Simulated runs with few deaths only.
     pub baseline_ms: Option<u64>,
     /// `makespan_ms` over `baseline_ms`.
     pub makespan_over_baseline: Option<f64>,
@@ -428,8 +430,8 @@ impl RunReport {
 
     /// Sets the makespan against that of the omniscient baseline, where both have one.
     pub fn compare(&mut self, baseline_ms: Option<u64>) {
-        self.baseline_ms = baseline_ms;
-        self.makespan_over_baseline = ratio(self.makespan_ms, baseline_ms);
+        self.baseline_ms = baseline_ms.map(|ms| ms.min(self.makespan_ms.unwrap_or(ms)));
+        self.makespan_over_baseline = ratio(self.makespan_ms, self.baseline_ms);
     }
 }
 

@@ -6,6 +6,7 @@
 use super::{Findings, Handicaps};
 use crate::account::secs;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
+use skein_flight::coverage::ring::division::Rule;
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;
@@ -22,6 +23,9 @@ const GAIN_PERCENT: u64 = 90;
 
 /// Divisions without a loss are at least this many beacon periods apart.
 const CALM_PERIODS: u64 = 20;
+
+/// Most legs of a section.
+const LEGS_MAX: usize = 6;
 
 /// A bid may put its author nearer than it can fly by this much, metres: a frame sees a
 /// cell from short of its boundary.
@@ -278,6 +282,33 @@ impl DecisionCheck {
         let open = open.clone();
         self.judge_section(now_ms, id, (claim, &open), seen, found);
         self.judge_gain(now_ms, id, &open, epoch, found);
+        self.judge_shares(now_ms, id, &open, epoch, found);
+    }
+
+    /// Nobody is given more than twice an even share of the remaining time, unless nobody
+    /// else could serve its last cell sooner.
+    fn judge_shares(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        open: &OpenRound,
+        epoch: Epoch,
+        found: &mut Findings,
+    ) {
+        let (Some(ground), Some((_, uavs))) = (
+            self.grounds.get(&open.round.loop_hash).cloned(),
+            self.problem_of(open),
+        ) else {
+            return;
+        };
+        let Some((ring, division)) = self.division_of(epoch, open) else {
+            return;
+        };
+        if ground.mission.division == Rule::Best
+            && let Some(text) = overburdened(&ground, ring, &uavs, division)
+        {
+            found.broken("decision", now_ms, Some(id), || text);
+        }
     }
 
     fn round_of(&self, epoch: Epoch) -> Option<&OpenRound> {
@@ -383,6 +414,65 @@ impl DecisionCheck {
             });
         }
     }
+}
+
+/// Who of a division has more than twice an even share of the remaining time while another,
+/// after its own section, could serve its last cell a tenth sooner.
+fn overburdened(
+    ground: &MissionGeometry,
+    ring: &[RingCell],
+    uavs: &[Uav],
+    division: &Division,
+) -> Option<String> {
+    let work_mm: u64 = ring
+        .iter()
+        .filter(|c| c.open)
+        .map(|c| u64::from(c.service_mm))
+        .sum();
+    let speed_mmps: u64 = uavs.iter().map(|u| u64::from(u.speed_mmps)).sum();
+    let even_ms = work_mm * 1000 / speed_mmps.max(1);
+    let n = ring.len();
+    let pose = |boundary: u16, way| {
+        ground
+            .coverage_loop
+            .boundary_towards(usize::from(boundary), way)
+    };
+    let into = |cell: u16, way| pose(cell + u16::from(way == Direction::Backward), way);
+    let out_of = |cell: u16, way| pose(cell + u16::from(way == Direction::Forward), way);
+    let of = |id: u16| division.sections.iter().find(|s| s.id == id);
+    let begins_ms = |u: &Uav| u.off_loop.map_or(u.release_ms, |_| 0);
+    uavs.iter().find_map(|late| {
+        let section = of(late.id)?;
+        let given_ms = u64::from(section.finish_ms.saturating_sub(begins_ms(late)));
+        let (last, _) = section.legs.last().and_then(|l| Some((l.cells(n).last()?, l)))?;
+        if given_ms <= 2 * even_ms {
+            return None;
+        }
+        let helper = uavs.iter().filter(|u| u.id != late.id).find(|u| {
+            let Some(own) = of(u.id).filter(|s| s.legs.len() < LEGS_MAX) else {
+                return false;
+            };
+            let ended = own.legs.last().and_then(|l| Some((l.cells(n).last()?, l.direction)));
+            let (from, at_ms) = match (ended, u.off_loop) {
+                (Some((cell, way)), _) => (out_of(cell, way), own.finish_ms),
+                (None, Some(off)) => (off.pose(), 0),
+                (None, None) => (pose(u.anchor, u.heading), u.release_ms),
+            };
+            let ways = [Direction::Forward, Direction::Backward];
+            let routes = ways.map(|way| ground.router.route(from, into(last, way)));
+            let way_m = routes.into_iter().flatten().map(|c| c.length_m()).reduce(f64::min);
+            way_m.is_some_and(|way_m| {
+                let flown_m = way_m + f64::from(ring[usize::from(last)].service_mm) / 1000.0;
+                let ms = f64::from(at_ms) + flown_m * 1e6 / f64::from(u.speed_mmps.max(1));
+                let until_ms = u64::from(u.release_ms) + u64::from(u.endurance_ms);
+                ms * 1.1 < f64::from(section.finish_ms) && ms <= until_ms as f64
+            })
+        })?;
+        Some(format!(
+            "gives uav{} {given_ms} ms of flight, an even share being {even_ms} ms, though uav{} could serve its cell {last} sooner",
+            late.id, helper.id
+        ))
+    })
 }
 
 fn is_complete(open: &OpenRound) -> bool {
@@ -574,6 +664,32 @@ mod tests {
         let epoch = c.epoch();
         c.claims(epoch, of(1), 1);
         assert!(c.broken("decision"));
+    }
+
+    #[test]
+    fn who_is_given_what_others_could_do_sooner_is_found() {
+        let mut c = Case::new(true);
+        c.bid();
+        let (ring, uavs) = c.problem();
+        let ground = Arc::clone(&c.check.grounds[&c.lp.hash()]);
+        let fair = ground.divide(&ring, &uavs);
+        assert_eq!(overburdened(&ground, &ring, &uavs, &fair), None);
+        // All of it for the first, nothing for the second.
+        let mut unfair = fair.clone();
+        let first = &mut unfair.sections[0];
+        first.legs = vec![skein_flight::coverage::ring::backtracking::Leg {
+            first: 0,
+            count: u16::try_from(ring.len()).unwrap(),
+            direction: Direction::Forward,
+        }];
+        first.finish_ms *= 3;
+        unfair.sections[1].legs.clear();
+        unfair.sections[1].finish_ms = 0;
+        let told = overburdened(&ground, &ring, &uavs, &unfair).unwrap();
+        assert!(
+            told.contains("gives uav1") && told.contains("uav2 could"),
+            "{told}"
+        );
     }
 
     #[test]

@@ -2,7 +2,9 @@
 
 use super::rounds::OpenRound;
 use super::runs::{cells_of, direction_of};
+use super::sections::{LivePeers, Sections};
 use crate::cells::CellSet;
+use crate::offload::MissionGeometry;
 use crate::wire::message::{Bid, CellRun};
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
@@ -33,16 +35,7 @@ pub fn problem(
             }
         }
     }
-    let ring = coverage_loop
-        .cells()
-        .iter()
-        .zip(0..n)
-        .map(|(cell, i)| RingCell {
-            service_mm: cell.service_mm,
-            travel_mm: cell.travel_mm,
-            open: !done.contains(i),
-        })
-        .collect();
+    let ring = ring_of(coverage_loop, n, |i| !done.contains(i));
     let robots: Vec<Uav> = open
         .bids
         .iter()
@@ -76,6 +69,55 @@ pub fn worthwhile(open: &OpenRound, division: &Division, beacon_period_ms: u64) 
     let calm = all().all(|s| u64::from(s.adopted_ago_ms) >= CALM_PERIODS * beacon_period_ms);
     let progress = all().any(|s| s.cells_since > 0);
     calm && progress && u64::from(division.makespan_ms) * 100 <= present * GAIN_PERCENT
+}
+
+/// Whether a division of what live claims list, among their owners and one UAV that has
+/// nothing to fly, would be adopted: from what is held, so without asking anybody. Owners
+/// are taken to be as fast as that UAV, and at the next cell of their plans; who else is
+/// idle is left out.
+#[must_use]
+pub fn gain_in_sight(
+    geometry: &MissionGeometry,
+    (sections, live): (&Sections, &LivePeers),
+    idle: Uav,
+    present_ms: u64,
+    delay_ms: u64,
+) -> bool {
+    let n = sections.cells();
+    let mut listed = CellSet::new(n);
+    let mut uavs = vec![idle];
+    for id in live.keys().filter(|id| **id != idle.id) {
+        let plan = sections.plan_of(*id);
+        let Some(next) = plan.first() else { continue };
+        let behind = u16::from(next.direction == Direction::Backward);
+        uavs.push(Uav {
+            anchor: (next.cell + behind) % n.max(1),
+            id: *id,
+            heading: next.direction,
+            release_ms: 0,
+            off_loop: None,
+            ..idle
+        });
+        for p in &plan {
+            listed.insert(p.cell);
+        }
+    }
+    uavs.sort_unstable_by_key(|u| u.id);
+    let ring = ring_of(&geometry.coverage_loop, n, |c| listed.contains(c));
+    let division = geometry.divide(&ring, &uavs);
+    let new_ms = u64::from(division.makespan_ms) + delay_ms;
+    uavs.len() > 1 && new_ms * 100 <= present_ms * GAIN_PERCENT
+}
+
+fn ring_of(coverage_loop: &CoverageLoop, n: u16, is_open: impl Fn(u16) -> bool) -> Vec<RingCell> {
+    let cells = coverage_loop.cells().iter().zip(0..n);
+    cells
+        .map(|(cell, i)| RingCell {
+            service_mm: cell.service_mm,
+            travel_mm: cell.travel_mm,
+            open: is_open(i),
+        })
+        .collect()
 }
 
 /// The cells of one member's section that are open in the round, in order of

@@ -9,7 +9,7 @@
 //! | an open round without all bids | W, doubling to 4 W0 | the next round |
 //! | a complete round without its division | 2 W | the next round |
 //! | orphans, and no round helped | 2 T + W0 + rank T/2 | the nearest are taken |
-//! | idle, others have much left | 10 T steady, 20 T calm | a round without loss |
+//! | idle, and a gain was computed from what is held | 10 T steady, 20 T calm | a round without loss |
 //! | idle, an owner makes no progress | its bound | the far half is taken |
 //! | cells held | 2 W | they expire |
 
@@ -79,6 +79,9 @@ pub struct Context<'a> {
     pub loop_hash: u64,
     /// Whether the cells held ran out of time just now.
     pub held_expired: bool,
+    /// Whether a division of what claims list would end the work sooner; asked for by
+    /// [`Negotiation::wants_foresight`].
+    pub gain_in_sight: bool,
 }
 
 impl Context<'_> {
@@ -138,6 +141,9 @@ struct Progress {
     since: Time,
     bound: Time,
     epoch: Epoch,
+    /// The claim heard last, and when its author expects to be done.
+    seq: u32,
+    end: Time,
 }
 
 /// One peer's part in all negotiations of one mission.
@@ -163,6 +169,7 @@ pub struct Negotiation {
     progress: BTreeMap<u16, Progress>,
     members: Vec<Member>,
     members_since: Time,
+    foreseen_at: Option<Time>,
     /// Divisions adopted in this life.
     pub adoptions: u32,
 }
@@ -191,6 +198,7 @@ impl Negotiation {
             progress: BTreeMap::new(),
             members: Vec::new(),
             members_since: Time(0),
+            foreseen_at: None,
             adoptions: 0,
         }
     }
@@ -231,6 +239,12 @@ impl Negotiation {
     #[must_use]
     pub fn cells_since(&self) -> u16 {
         self.cells_since
+    }
+
+    /// Who this peer is.
+    #[must_use]
+    pub fn me(&self) -> u16 {
+        self.me
     }
 
     /// A bid was heard.
@@ -330,7 +344,7 @@ impl Negotiation {
             return;
         }
         let Some(orphaned_ms) = orphaned_ms else {
-            if self.gain_in_sight(ctx) {
+            if ctx.gain_in_sight && self.may_gain(ctx) {
                 self.start(ctx, false, 0);
             }
             return;
@@ -384,8 +398,35 @@ impl Negotiation {
         self.opened(ctx.now);
     }
 
-    /// Idle while others have much left: a new division may end the work sooner.
-    fn gain_in_sight(&self, ctx: &Context<'_>) -> bool {
+    /// Whether it is worth to compute if a round without a loss would gain anything: idle,
+    /// calm, and not computed lately.
+    pub fn wants_foresight(&mut self, ctx: &Context<'_>) -> bool {
+        let patient = PATIENT_PERIODS * ctx.period_ms;
+        let rested = |t| ctx.now.since_ms(t) >= patient;
+        let wants = self.rounds.open().is_none()
+            && self.orphan_since.is_none()
+            && self.foreseen_at.is_none_or(rested)
+            && self.may_gain(ctx);
+        if wants {
+            self.foreseen_at = Some(ctx.now);
+        }
+        wants
+    }
+
+    /// When the last of the live owners expects to be done, milliseconds from now.
+    #[must_use]
+    pub fn present_end_ms(&self, ctx: &Context<'_>) -> u64 {
+        let at_work =
+            |id: &u16| ctx.live.contains_key(id) && !self.sections.plan_of(*id).is_empty();
+        let owners = self.progress.iter().filter(|(id, _)| at_work(id));
+        owners
+            .map(|(_, p)| p.end.since_ms(ctx.now))
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// Idle while others have something left, and it is long since anything was decided.
+    fn may_gain(&self, ctx: &Context<'_>) -> bool {
         let steady = ctx
             .able_since
             .is_some_and(|t| ctx.now.since_ms(t) >= PATIENT_PERIODS * ctx.period_ms);
@@ -396,13 +437,8 @@ impl Negotiation {
         let stagger = self.rank(ctx) * ctx.period_ms / ROUND_STAGGER;
         let last = self.decided_at.max(self.adopted_at);
         let rested = last.is_none_or(|t| ctx.now.since_ms(t) >= calm + stagger);
-        let left: usize = ctx
-            .live
-            .keys()
-            .map(|id| self.sections.plan_of(*id).len())
-            .max()
-            .unwrap_or(0);
-        steady && idle && rested && left > ctx.members.len()
+        let mut owners = ctx.live.keys();
+        steady && idle && rested && owners.any(|id| !self.sections.plan_of(*id).is_empty())
     }
 
     /// Asks for the division of a complete round, once.
@@ -497,13 +533,13 @@ impl Negotiation {
     /// Notes how other owners get on; the first ETA heard in an epoch bounds them.
     fn watch_progress(&mut self, ctx: &Context<'_>) {
         let cell_bound = TWO_CELLS_MS + 2 * u64::from(ctx.diameter) * ctx.period_ms;
-        let heard: Vec<(u16, Epoch, u32)> = self
+        let heard: Vec<(u16, Epoch, u32, u32)> = self
             .sections
             .heard()
             .iter()
-            .map(|(id, h)| (*id, h.claim.epoch, h.claim.eta_ms))
+            .map(|(id, h)| (*id, h.claim.epoch, h.claim.eta_ms, h.seq))
             .collect();
-        for (id, epoch, eta_ms) in heard {
+        for (id, epoch, eta_ms, seq) in heard {
             let left = self.sections.plan_of(id).len();
             let slack = u64::from(eta_ms / 4) + PATIENT_PERIODS * ctx.period_ms + cell_bound;
             let fresh = Progress {
@@ -511,8 +547,14 @@ impl Negotiation {
                 since: ctx.now,
                 bound: ctx.now.plus_ms(u64::from(eta_ms) + slack),
                 epoch,
+                seq,
+                end: ctx.now.plus_ms(u64::from(eta_ms)),
             };
             let p = self.progress.entry(id).or_insert(fresh);
+            if p.seq != seq {
+                p.seq = seq;
+                p.end = fresh.end;
+            }
             if p.epoch != epoch || left > p.left {
                 *p = fresh;
             } else if left < p.left {
@@ -612,6 +654,7 @@ mod tests {
         live: LivePeers,
         able_since: Option<Time>,
         held_expired: bool,
+        gain_in_sight: bool,
     }
 
     fn member(id: u16) -> Member {
@@ -630,6 +673,7 @@ mod tests {
                 live: others.iter().map(|id| (*id, 1)).collect(),
                 able_since: Some(Time(0)),
                 held_expired: false,
+                gain_in_sight: true,
             };
             assert_eq!(desk.cells(), 24);
             assert!(desk.tick().is_empty());
@@ -654,6 +698,7 @@ mod tests {
                 revision: 1,
                 loop_hash: 7,
                 held_expired: core::mem::take(&mut self.held_expired),
+                gain_in_sight: self.gain_in_sight,
             };
             self.negotiation.tick(&ctx, &self.coverage_loop)
         }
@@ -915,10 +960,10 @@ mod tests {
         assert_eq!(action, Action::Bid);
         assert!(!desk.round().loss);
         assert!(after_ms >= 2 * T, "{after_ms}");
-        // But not of an owner that has hardly more than there are members.
+        // But not where nothing would be gained.
         let mut desk = Desk::new(&[2]);
-        desk.leave_open(0..2);
-        desk.claim(2, 1, 0, 2, 60_000);
+        desk.gain_in_sight = false;
+        desk.claim(2, 1, 0, 24, 600_000);
         assert_eq!(desk.wait(20 * T), None);
     }
 
@@ -936,6 +981,7 @@ mod tests {
     fn the_far_half_of_a_stalled_owner_is_taken_from_its_end() {
         let mut desk = Desk::new(&[2]);
         // So few cells that no round is worth it.
+        desk.gain_in_sight = false;
         desk.leave_open(4..6);
         desk.claim(2, 1, 4, 2, 10_000);
         let (after_ms, action) = desk.wait(400 * T).unwrap();

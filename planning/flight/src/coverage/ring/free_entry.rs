@@ -24,12 +24,21 @@ use skein_geometry::random::SplitMix64;
 /// committed.
 const RUNS_MAX: usize = 6;
 
-/// Potentials are sums of this power of the durations: near the largest one, yet what is
-/// not the largest still counts.
-const POWER: u32 = 8;
+/// Weights of durations double with each of so many parts of the first makespan. At first
+/// what is not the longest still counts; then only what is near the longest does, so that
+/// whoever can shorten it does, however long that takes itself.
+const SOFT: u64 = 12;
+/// See [`SOFT`].
+const SHARP: u64 = 64;
 
-/// Durations are compared in parts of the first makespan, this many bits of it.
-const SCALE_BITS: u32 = 13;
+/// And with each of so many parts of that, by this table: 128 times the powers of the 16th
+/// root of two.
+const ROOTS: [u128; 16] = [
+    128, 134, 140, 146, 152, 159, 166, 173, 181, 189, 197, 206, 215, 225, 235, 245,
+];
+
+/// No duration weighs more than if it were so many doublings long, so that sums fit.
+const DOUBLINGS_MAX: u64 = 110;
 
 /// Open cells, by their place among the open ones, flown one after the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -521,18 +530,23 @@ impl<'a> Search<'a> {
     /// after parts of it were made anew, within so many steps.
     pub fn improved_within(&mut self, steps: u64, tours: Tours) -> Tours {
         self.last_step = self.transfers.asked() + steps;
-        let scale = Scale::new(tours.cost().1);
-        let mut best = self.descended(tours, scale);
+        let makespan_ms = tours.cost().1.max(1);
+        let [soft, sharp] = [SOFT, SHARP].map(|doublings| Scale {
+            makespan_ms,
+            doublings,
+        });
+        let settled = |plan| self.descended(self.descended(plan, soft), sharp);
+        let mut best = settled(tours);
         let mut random = SplitMix64::new(best.cost().1);
         let mut fruitless = 0;
         while !self.is_over() && fruitless < FRUITLESS_MAX {
             fruitless += 1;
             let ruined = self.ruined(&best, &mut random);
-            let Some(made) = self.recreated(ruined, scale, &mut random) else {
+            let Some(made) = self.recreated(ruined, soft, &mut random) else {
                 continue;
             };
-            let next = self.descended(made, scale);
-            let rank = |t: &Tours| (t.cost().0, scale.potential(t));
+            let next = settled(made);
+            let rank = |t: &Tours| (t.cost().0, sharp.potential(t));
             if rank(&next) < rank(&best) {
                 best = next;
                 fruitless = 0;
@@ -821,19 +835,19 @@ const FRUITLESS_MAX: u32 = 60;
 #[derive(Clone, Copy, Debug)]
 struct Scale {
     makespan_ms: u64,
+    doublings: u64,
 }
 
 impl Scale {
-    fn new(makespan_ms: u64) -> Self {
-        Self {
-            makespan_ms: makespan_ms.max(1),
-        }
-    }
-
     fn weight(self, ms: u64) -> u128 {
-        // Twice the first makespan is as bad as anything: 2^(8·14) fits 256 times.
-        let share = (u128::from(ms) << SCALE_BITS) / u128::from(self.makespan_ms);
-        share.min(1 << (SCALE_BITS + 1)).pow(POWER)
+        if ms == 0 {
+            return 0;
+        }
+        let roots = ROOTS.len() as u64;
+        let parts = ms.saturating_mul(self.doublings * roots) / self.makespan_ms;
+        let parts = parts.min(DOUBLINGS_MAX * roots);
+        let root = usize::try_from(parts % roots).unwrap_or(0);
+        ROOTS[root] << (parts / roots)
     }
 
     fn potential(self, tours: &Tours) -> u128 {
