@@ -460,4 +460,17 @@ mod tests {
         assert!(wrapped.insert_run(CellRun { first: 8, count: 4 }));
         assert_eq!(wrapped.iter().collect::<Vec<_>>(), [0, 1, 8, 9]);
     }
+
+    #[test]
+    fn a_digest_is_the_folded_hash_of_size_and_words() {
+        let set = CellSet::of(70, [0, 3, 64, 69]);
+        let mut hash = Fnv::new();
+        hash.write(&70_u16.to_le_bytes());
+        hash.write(&0b1001_u64.to_le_bytes());
+        hash.write(&0b10_0001_u64.to_le_bytes());
+        let (high, low) = (hash.finish() >> 32, hash.finish() & 0xffff_ffff);
+        // Bits that both halves have in common tell an exclusive fold from any other.
+        assert_ne!(high & low, 0);
+        assert_eq!(u64::from(set.digest()), high ^ low);
+    }
 }

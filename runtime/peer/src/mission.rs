@@ -509,4 +509,14 @@ mod tests {
             assert_eq!(library.newest().unwrap().revision, held);
         }
     }
+
+    #[test]
+    fn the_last_lap_is_another_mission_than_one_flown_once() {
+        let once = mission(1, 4);
+        let last = Mission {
+            lap: 2,
+            ..once.clone()
+        };
+        assert_ne!(last.content_hash(), once.content_hash());
+    }
 }

@@ -591,4 +591,83 @@ mod tests {
         assert_eq!(held.len(), MAX_RECORDS);
         assert_eq!(claims.count(), usize::from(half));
     }
+
+    #[test]
+    fn a_digest_tells_which_records_are_held_and_not_only_the_newest() {
+        let mut whole = relay(2);
+        let mut hole = relay(3);
+        for seq in 1..=6 {
+            let record = Record {
+                subject: u16::try_from(seq).unwrap(),
+                ..record(1, seq)
+            };
+            whole.offer(Time(5000), &record, &[1; 40], 0);
+            if seq != 3 {
+                hole.offer(Time(5000), &record, &[1; 40], 0);
+            }
+        }
+        let ((seq, digest), (other_seq, other)) = (whole.version(1, 1), hole.version(1, 1));
+        assert_eq!((seq, other_seq), (6, 6));
+        assert_ne!(digest, other);
+        // As it is told on the wire: FNV-1a of kind, subject and sequence number, folded.
+        let mut hash = Fnv::new();
+        for seq in 1..=6_u32 {
+            hash.write(&[1]);
+            hash.write(&u16::try_from(seq).unwrap().to_le_bytes());
+            hash.write(&seq.to_le_bytes());
+        }
+        let parts = hash.finish().to_le_bytes();
+        let parts = parts.chunks(2).map(|p| u16::from_le_bytes([p[0], p[1]]));
+        assert_eq!(digest, parts.fold(0, |a, b| a ^ b));
+    }
+
+    #[test]
+    fn only_what_a_neighbour_lacks_is_sent_again_and_nothing_twice_in_two_periods() {
+        let of = |subject: u16, seq: u32| Record {
+            subject,
+            ..record(1, seq)
+        };
+        let mut r = relay(2);
+        for seq in 1..=4 {
+            let subject = u16::try_from(seq).unwrap();
+            r.offer(Time(5000), &of(subject, seq), &[1; 40], 0);
+        }
+        let drain = |r: &mut Relay, from: u64| {
+            let mut n = 0;
+            for t in from..from + 1_000 {
+                n += usize::from(r.poll(Time(t)).is_some());
+            }
+            n
+        };
+        assert_eq!(drain(&mut r, 5_000), 4);
+        // A neighbour has what came up to the second one.
+        r.catch_up(Time(9_000), 1, 1, 2, 0);
+        assert_eq!(drain(&mut r, 9_000), 2);
+        // They were on the air a moment ago: another neighbour has to wait.
+        r.catch_up(Time(11_000), 1, 1, 2, 0);
+        assert_eq!(drain(&mut r, 11_000), 0);
+        // Who has the newest but not all of it gets all.
+        r.catch_up(Time(20_000), 1, 1, 4, 0xdead);
+        assert_eq!(drain(&mut r, 20_000), 4);
+    }
+
+    #[test]
+    fn a_relay_with_nothing_to_send_asks_for_no_time_and_tells_what_it_holds() {
+        let mut r = relay(2);
+        assert_eq!(r.next_timeout(Time(1_000)), None);
+        r.offer(Time(5_000), &record(1, 1), &[1; 40], 0);
+        let due = r.next_timeout(Time(5_000)).unwrap();
+        assert!(due > Time(5_000), "{due:?}");
+        assert_eq!(r.poll(Time(due.0 - 1)), None);
+        assert!(r.poll(due).is_some());
+        assert_eq!(r.next_timeout(due), None);
+        assert_eq!(
+            r.loads(),
+            [
+                ("records", 1, MAX_RECORDS),
+                ("queue", 0, MAX_QUEUE),
+                ("neighbours", 0, MEMBERS_MAX)
+            ]
+        );
+    }
 }

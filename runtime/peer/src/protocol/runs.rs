@@ -200,4 +200,29 @@ mod tests {
         let gap: Vec<PlannedCell> = [(0, Forward), (2, Forward)].iter().map(cell).collect();
         assert_eq!(packer.pack(&gap, 16).0.len(), 1);
     }
+
+    #[test]
+    fn neighbouring_cells_flown_alike_are_one_leg_across_the_seam_too() {
+        let plan = |cells: &[u16], direction| -> Vec<PlannedCell> {
+            let planned = |cell: &u16| PlannedCell {
+                cell: *cell,
+                direction,
+                committed: false,
+                stamp: Stamp::default(),
+            };
+            cells.iter().map(planned).collect()
+        };
+        let leg = |first, count, direction| Leg {
+            first,
+            count,
+            direction,
+        };
+        let back = plan(&[7, 6, 2, 1, 0, 9, 8], Backward);
+        assert_eq!(
+            legs_of(&back, 10),
+            [leg(7, 2, Backward), leg(2, 5, Backward)]
+        );
+        let on = plan(&[8, 9, 0, 2], Forward);
+        assert_eq!(legs_of(&on, 10), [leg(8, 3, Forward), leg(2, 1, Forward)]);
+    }
 }

@@ -5,7 +5,8 @@ use crate::testing::{Harness, mission};
 use crate::wire::codec::Body;
 use crate::wire::kinds::{Kind, RECORD_MAX_BYTES};
 use crate::wire::limits::MEMBERS_MAX;
-use crate::wire::message::{Finished, Gossip};
+use crate::wire::message::CellRun;
+use crate::wire::message::{Claim, Epoch, Finished, Firmness, Gossip, ListedRun, Stamp};
 use crate::{Input, PeerId, Report};
 use std::collections::BTreeMap;
 
@@ -81,6 +82,45 @@ fn a_rival_loop_is_an_alarm_once_and_its_peer_no_member() {
         _ => false,
     };
     assert!(!h.seat(1).reports.iter().any(named));
+}
+
+/// A claim that names other cells than its reader has in mind would take cells that
+/// nobody flies.
+#[test]
+fn a_claim_of_another_loop_takes_nothing() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(25);
+    let plan = h.beliefs(1).plan;
+    let mine = h.beliefs(1).loop_hash;
+    let all = ListedRun {
+        run: CellRun {
+            first: 0,
+            count: 24,
+        },
+        backward: false,
+        firmness: Firmness::Tentative,
+        stamp: Stamp {
+            epoch: Epoch {
+                counter: 99,
+                hash: 0,
+            },
+            take: 0,
+            id: 2,
+        },
+    };
+    let claim = |loop_hash| Claim {
+        loop_hash,
+        plan: vec![all],
+        ..Claim::default()
+    };
+    assert!(plan.len() > 4);
+    h.inject(1, record(2, 1, 5_000, 0, &Body::Claim(claim(mine ^ 1))));
+    let left = h.beliefs(1).plan.len();
+    assert!(plan.len() - left <= 1, "{left} of {}", plan.len());
+    // The same on its own loop takes all that it is not committed to.
+    h.inject(1, record(2, 1, 6_000, 0, &Body::Claim(claim(mine))));
+    h.run_s(1);
+    assert!(h.beliefs(1).plan.len() <= 2);
 }
 
 #[test]
