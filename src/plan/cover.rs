@@ -33,7 +33,7 @@ pub struct CoverArgs {
     #[arg(long)]
     pub approximate: bool,
     /// How many UAVs.
-    #[arg(long, default_value_t = 1, value_name = "K")]
+    #[arg(long, visible_alias = "uavs", default_value_t = 1, value_name = "N")]
     pub k: usize,
     /// The UAVs, one by one, instead of `--k`: JSON5, a list of `{name, speed_mps,
     /// endurance_s?, start?: [lat, lon], swath_m? or fov_across_deg?, turn_radius_m?,
@@ -66,7 +66,7 @@ pub struct CoverArgs {
         allow_hyphen_values = true
     )]
     pub clearance_m: f64,
-    /// Ground speed, m/s.
+    /// Speed, m/s: there is no wind, so over the ground as through the air.
     #[arg(long, default_value_t = 15.0, value_name = "V")]
     pub speed_mps: f64,
     /// The longest time that a UAV flies, seconds; passes beyond that are left out and

@@ -64,7 +64,7 @@ mod tests {
         let told: serde_json::Value = serde_json::from_str(&run(&one).unwrap()).unwrap();
         // Four arms of the cross and three lanes.
         assert_eq!(told["targets"], 7);
-        assert_eq!(told["tours"][0]["passes"].as_array().unwrap().len(), 7);
+        assert_eq!(told["flights"][0]["passes"].as_array().unwrap().len(), 7);
         let team = args(
             &dir,
             CROSS,

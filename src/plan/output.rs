@@ -170,7 +170,7 @@ impl Sheet {
     }
 
     fn json(&self) -> Value {
-        let tours = self.flights.iter().enumerate().map(|(uav, flight)| {
+        let flights = self.flights.iter().enumerate().map(|(uav, flight)| {
             let points = flight.points().into_iter().map(|p| {
                 let at = from_plane(self.origin, p);
                 json!({"lat_deg": at.lat_deg, "lon_deg": at.lon_deg})
@@ -181,7 +181,7 @@ impl Sheet {
             Value::Object(tour)
         });
         let mut out = self.summary.clone();
-        out["tours"] = tours.collect();
+        out["flights"] = flights.collect();
         out
     }
 
@@ -279,8 +279,8 @@ mod tests {
     fn each_form_tells_the_height_and_no_point_twice() {
         let told = args(Format::Json, None).print(&sheet(&["a"])).unwrap();
         let told: Value = serde_json::from_str(&told).unwrap();
-        assert_eq!(told["tours"][0]["points"].as_array().unwrap().len(), 3);
-        assert_eq!(told["tours"][0]["passes"], 2);
+        assert_eq!(told["flights"][0]["points"].as_array().unwrap().len(), 3);
+        assert_eq!(told["flights"][0]["passes"], 2);
         let map = args(Format::Geojson, None).print(&sheet(&["a"])).unwrap();
         assert!(map.contains("\"altitude_m\":80.0") && !map.contains("passes"));
         let plan = args(Format::Plan, None).print(&sheet(&["a"])).unwrap();

@@ -183,7 +183,7 @@ fn sheet(plan: &PatrolPlan, origin: Origin, notices: &[String]) -> Sheet {
         },
         "tour_m": plan.tour_m,
         "pattern": pattern(&plan.pattern),
-        "flying": plan.uavs_flying(),
+        "uavs_flying": plan.uavs_flying(),
         "revisit_s": plan.revisit_s,
         "revisit_bound_s": plan.revisit_bound_s,
         "ratio": plan.revisit_s / plan.revisit_bound_s,
@@ -226,7 +226,7 @@ fn printed(flight: &PatrolFlight) -> Printed {
             told.insert("arc_m".to_owned(), json!(arc_m));
         }
     }
-    told.insert("rests".to_owned(), json!(flight.station.is_none()));
+    told.insert("at_home".to_owned(), json!(flight.station.is_none()));
     Printed {
         name: flight.name.clone(),
         track: flight.path.clone(),
@@ -244,7 +244,7 @@ fn after_losses(after: &AfterLosses, origin: Origin) -> Value {
     json!({
         "lost": after.lost,
         "pattern": pattern(&after.pattern),
-        "flying": uavs.len(),
+        "uavs_flying": uavs.len(),
         "revisit_s": after.revisit_s,
         "revisit_bound_s": after.revisit_bound_s,
         "ratio": after.revisit_s / after.revisit_bound_s,
@@ -348,14 +348,14 @@ mod tests {
             assert!((ratio - 1.0).abs() < 1e-4, "{over:?}: {ratio}");
             let tour_m = told["tour_m"].as_f64().unwrap();
             let places: Vec<f64> = (0..3)
-                .map(|i| told["tours"][i]["place_m"].as_f64().unwrap())
+                .map(|i| told["flights"][i]["place_m"].as_f64().unwrap())
                 .collect();
             let apart = (places[1] - places[0]).rem_euclid(tour_m / 3.0);
             assert!(apart.min(tour_m / 3.0 - apart) < 0.01, "{places:?}");
-            let waits = (0..3).map(|i| told["tours"][i]["wait_s"].as_f64().unwrap());
+            let waits = (0..3).map(|i| told["flights"][i]["wait_s"].as_f64().unwrap());
             assert!(waits.fold(f64::INFINITY, f64::min).abs() < 1e-9);
             // A point is a place to be: the flight ends where it began.
-            let points = told["tours"][0]["points"].as_array().unwrap();
+            let points = told["flights"][0]["points"].as_array().unwrap();
             assert_eq!(points.first(), points.last());
         }
     }
@@ -376,7 +376,7 @@ mod tests {
         assert!(uavs.iter().any(|u| u["loiter_s"].as_f64().unwrap() < 1e-3));
         let two = ["--lost", "uav-1", "--lost-after-s", "33"];
         let flags: Vec<&str> = flags.iter().copied().chain(two).collect();
-        assert_eq!(dir.told(&flags).unwrap()["after_losses"]["flying"], 2);
+        assert_eq!(dir.told(&flags).unwrap()["after_losses"]["uavs_flying"], 2);
     }
 
     #[test]
@@ -390,12 +390,12 @@ mod tests {
         let told = dir.told(&flags).unwrap();
         // 28 alone is 28; two at 10 and 9 are less; to and fro is 23.5.
         assert_eq!(
-            (told["pattern"].as_str(), &told["flying"]),
+            (told["pattern"].as_str(), &told["uavs_flying"]),
             (Some("round"), &json!(1))
         );
-        assert_eq!(told["tours"][1]["rests"], true);
+        assert_eq!(told["flights"][1]["at_home"], true);
         let after = &told["after_losses"];
-        assert_eq!(after["flying"], 2);
+        assert_eq!(after["uavs_flying"], 2);
         assert!(after["uavs"][0]["joins"].as_bool().unwrap());
         let fleet = dir.file(
             "arcs.json5",

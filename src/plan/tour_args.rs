@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Args)]
 pub struct TourArgs {
     /// How many UAVs.
-    #[arg(long, default_value_t = 1, value_name = "K")]
+    #[arg(long, visible_alias = "uavs", default_value_t = 1, value_name = "N")]
     pub k: usize,
     /// The UAVs, one by one, instead of `--k`: JSON5, a list of `{name, speed_mps,
     /// endurance_s?, start?: [lat, lon], swath_m? or fov_across_deg?, turn_radius_m?,

@@ -61,7 +61,7 @@ mod tests {
         let one = told(&[]).unwrap();
         assert_eq!(one["targets"], 4);
         // The depot and four lanes for the disc of 200 m, two other points.
-        assert_eq!(one["tours"][0]["points"].as_array().unwrap().len(), 12);
+        assert_eq!(one["flights"][0]["points"].as_array().unwrap().len(), 12);
         let two = told(&["--k", "2", "--depot", "47.405,8.55"]).unwrap();
         assert!(two["makespan_s"].as_f64() < one["makespan_s"].as_f64());
         assert!(two["unserved"].as_array().unwrap().is_empty());
@@ -84,7 +84,7 @@ mod tests {
         let round = told(&["--zones", &wall]).unwrap();
         assert!(round["makespan_s"].as_f64() > one["makespan_s"].as_f64());
         assert!(round["unserved"].as_array().unwrap().is_empty() && round["targets"] == 4);
-        let length = |told: &serde_json::Value| told["tours"][0]["length_m"].as_f64().unwrap();
+        let length = |told: &serde_json::Value| told["flights"][0]["length_m"].as_f64().unwrap();
         let (flown_m, time_s) = (length(&round), round["makespan_s"].as_f64().unwrap());
         assert!(
             (flown_m / 15.0 - time_s).abs() < 1e-6 * time_s,
@@ -98,8 +98,10 @@ mod tests {
             "[{name: 'slow', speed_mps: 10}, {name: 'fast', speed_mps: 20, start: [47.42, 8.56]}]";
         let fleet = write("fleet.json5", fleet);
         let pair = told(&["--fleet", &fleet]).unwrap();
-        assert_eq!(pair["tours"][1]["name"], "fast");
-        assert!((pair["tours"][1]["points"][0]["lat_deg"].as_f64().unwrap() - 47.42).abs() < 1e-9);
+        assert_eq!(pair["flights"][1]["name"], "fast");
+        assert!(
+            (pair["flights"][1]["points"][0]["lat_deg"].as_f64().unwrap() - 47.42).abs() < 1e-9
+        );
         assert!(told(&["--fleet", &fleet, "--wind-mps", "3"]).is_err());
         assert!(told(&["--zones", &wall, "--clearance-m", "-1"]).is_err());
         std::fs::remove_dir_all(&dir).unwrap();

@@ -3,7 +3,7 @@
 //! | the operator says | what follows |
 //! |---|---|
 //! | an order | it is spoken in this life of the peer and in every later one, until the next |
-//! | a mission | it is judged, gets the next revision and is spoken |
+//! | a mission | it is checked, gets the next revision and is spoken |
 //! | another base | the newest mission, with that base, likewise |
 //!
 //! What was said is kept over restarts of the ground station ([`crate::standing`]).

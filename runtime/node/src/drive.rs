@@ -115,9 +115,9 @@ pub struct Driver<P, V, W, C, T> {
     standing: Option<Standing>,
     results: mpsc::Receiver<(u64, JobResult)>,
     workers: mpsc::Sender<(u64, JobResult)>,
-    judged: mpsc::Receiver<Judged>,
-    judge: mpsc::Sender<Judged>,
-    judging: bool,
+    verdicts: mpsc::Receiver<Feasibility>,
+    checkers: mpsc::Sender<Feasibility>,
+    checking: bool,
     order: Option<Order>,
     /// The life in which the order was spoken.
     ordered_in: Option<Incarnation>,
@@ -126,9 +126,9 @@ pub struct Driver<P, V, W, C, T> {
     counters_due: Time,
 }
 
-/// A mission of the operator, judged.
+/// Whether a mission of the operator can be flown.
 #[derive(Debug)]
-struct Judged {
+struct Feasibility {
     mission: Mission,
     verdict: Result<(), String>,
     answer: oneshot::Sender<Answer>,
@@ -141,7 +141,7 @@ enum Happened {
     Stored(Stored),
     Computed(u64, JobResult),
     Asked(Asked<Request>),
-    Judged(Judged),
+    Checked(Feasibility),
     Transport(Event),
     Time,
 }
@@ -157,7 +157,7 @@ where
     /// Puts the parts together.
     pub fn new(peer: P, around: Surroundings<V, W, C, T>, equipment: Equipment) -> Self {
         let (workers, results) = mpsc::channel(MAX_OPEN_JOBS);
-        let (judge, judged) = mpsc::channel(1);
+        let (checkers, verdicts) = mpsc::channel(1);
         let Equipment {
             clock,
             radio,
@@ -172,9 +172,9 @@ where
             journal,
             results,
             workers,
-            judged,
-            judge,
-            judging: false,
+            verdicts,
+            checkers,
+            checking: false,
             order: standing.as_ref().and_then(Standing::order),
             standing,
             ordered_in: None,
@@ -206,7 +206,7 @@ where
                 Some(stored) = self.journal.answer() => Happened::Stored(stored),
                 Some((token, result)) = self.results.recv() => Happened::Computed(token, result),
                 asked = console.next() => Happened::Asked(asked),
-                Some(judged) = self.judged.recv() => Happened::Judged(judged),
+                Some(found) = self.verdicts.recv() => Happened::Checked(found),
                 event = transport.next(), if hears => Happened::Transport(event),
                 () = tokio::time::sleep(wait) => Happened::Time,
             };
@@ -215,7 +215,7 @@ where
             }
             self.deliver().await;
             self.repeat_order().await;
-            self.look().await;
+            self.fire_timers().await;
             self.transmit().await;
         }
         self.leave().await;
@@ -244,7 +244,7 @@ where
             Happened::Stored(Stored { token, ok }) => self.step(Input::Stored { token, ok }).await,
             Happened::Computed(token, result) => self.step(Input::Computed { token, result }).await,
             Happened::Asked(asked) => self.asked(asked).await,
-            Happened::Judged(judged) => self.judged(judged).await,
+            Happened::Checked(found) => self.mission_checked(found).await,
             Happened::Transport(event) => {
                 if self.clock.stands_still(Instant::now()) {
                     self.early = Some(event);
@@ -306,7 +306,7 @@ where
     }
 
     /// Lets the peer look at its deadlines, if one is due.
-    async fn look(&mut self) {
+    async fn fire_timers(&mut self) {
         let now = self.now();
         if self.peer.next_timeout().is_some_and(|due| due <= now) {
             self.step(Input::Timer).await;
@@ -391,13 +391,13 @@ where
         };
         let fitting = mission.and_then(|m| {
             fits(&m, self.peer.mission().as_deref())?;
-            if self.judging {
-                return Err("another mission is being judged; try again".to_owned());
+            if self.checking {
+                return Err("another mission is being checked; try again".to_owned());
             }
             Ok(m)
         });
         match fitting {
-            Ok(mission) => self.weigh(mission, answer),
+            Ok(mission) => self.check_mission(mission, answer),
             Err(why) => drop(answer.send(Err(why))),
         }
     }
@@ -430,15 +430,15 @@ where
         }
     }
 
-    /// Has a mission judged beside the loop.
-    fn weigh(&mut self, mission: Mission, answer: oneshot::Sender<Answer>) {
-        self.judging = true;
-        let judge = self.judge.clone();
+    /// Asks beside the loop whether a mission can be flown.
+    fn check_mission(&mut self, mission: Mission, answer: oneshot::Sender<Answer>) {
+        self.checking = true;
+        let checkers = self.checkers.clone();
         tokio::task::spawn_blocking(move || {
             let mission = Arc::new(mission);
             let verdict = can_be_flown(&mission);
             let mission = Arc::unwrap_or_clone(mission);
-            let _ = judge.blocking_send(Judged {
+            let _ = checkers.blocking_send(Feasibility {
                 mission,
                 verdict,
                 answer,
@@ -446,13 +446,13 @@ where
         });
     }
 
-    async fn judged(&mut self, judged: Judged) {
-        self.judging = false;
-        let Judged {
+    async fn mission_checked(&mut self, found: Feasibility) {
+        self.checking = false;
+        let Feasibility {
             mission,
             verdict,
             answer,
-        } = judged;
+        } = found;
         let told = match verdict {
             Err(why) => Err(format!("the mission cannot be flown: {why}")),
             Ok(()) => self.revise(mission).await,

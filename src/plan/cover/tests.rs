@@ -30,7 +30,7 @@ fn a_field_with_a_hole_and_a_zone_is_planned_in_every_form() {
     let dir = std::env::temp_dir().join(format!("skein-plan-cover-{}", std::process::id()));
     std::fs::create_dir_all(&dir).unwrap();
     let alone: Value = serde_json::from_str(&told(&dir, FIELD, &["--exact"]).unwrap()).unwrap();
-    assert_eq!(alone["tours"].as_array().unwrap().len(), 1);
+    assert_eq!(alone["flights"].as_array().unwrap().len(), 1);
     assert!(alone["cells"].as_u64().unwrap() >= 4);
     let three = ["--exact", "--k", "3", "--format", "geojson"];
     let map: Value = serde_json::from_str(&told(&dir, FIELD, &three).unwrap()).unwrap();
@@ -87,7 +87,7 @@ fn both_planners_are_told_side_by_side() {
         let turn = ["--turn-radius-m", "15", "--lanes", "common"];
         let flags = [&[planner, "--fleet", &fleet][..], &turn].concat();
         let told: Value = serde_json::from_str(&told(&dir, FIELD, &flags).unwrap()).unwrap();
-        let fast = &told["tours"][1];
+        let fast = &told["flights"][1];
         assert_eq!(fast["name"], "fast");
         assert!(fast["time_s"].as_f64().unwrap() <= 400.0 + 1e-6, "{fast}");
         assert!((fast["points"][0]["lon_deg"].as_f64().unwrap() - 8.55).abs() < 1e-9);
