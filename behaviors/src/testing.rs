@@ -60,7 +60,11 @@ pub fn rectangle(east_m: f64, north_m: f64, width_m: f64, height_m: f64) -> Poly
 }
 
 /// A loop and a router over `cols` × `rows` cells around the given zones.
-pub fn ground(cols: u32, rows: u32, zones: Vec<Polygon>) -> (Arc<CoverageLoop>, Arc<Router>) {
+pub fn loop_and_router(
+    cols: u32,
+    rows: u32,
+    zones: Vec<Polygon>,
+) -> (Arc<CoverageLoop>, Arc<Router>) {
     let zones = Arc::new(NoFlyZones::new(zones));
     let problem = LoopProblem {
         area: rectangle(0.0, 0.0, f64::from(cols) * LANE_M, f64::from(rows) * LANE_M),

@@ -4,7 +4,7 @@
 //! a true frame, and the flown path keeps its distance from the zones.
 
 use super::*;
-use crate::testing::{CLEARANCE_M, LANE_M, Wing, airframe, ground, rectangle, square};
+use crate::testing::{CLEARANCE_M, LANE_M, Wing, airframe, loop_and_router, rectangle, square};
 use Direction::{Backward, Forward};
 use proptest::prelude::*;
 use skein_geometry::Polygon;
@@ -20,7 +20,7 @@ struct Flight {
 
 impl Flight {
     fn new(cols: u32, rows: u32, zones: Vec<Polygon>, start: Pose) -> Self {
-        let (coverage_loop, router) = ground(cols, rows, zones.clone());
+        let (coverage_loop, router) = loop_and_router(cols, rows, zones.clone());
         let open = vec![true; coverage_loop.len()];
         let executive = Executive::new(airframe(), 90.0, coverage_loop, router);
         Self {
@@ -310,7 +310,7 @@ fn a_cell_without_its_proof_is_refused_and_not_flown() {
     // The loop knows nothing of the zone: the certificate alone keeps the UAV out of it.
     let mut flight = Flight::new(10, 8, vec![], outside());
     let zones = vec![square(186.0, 138.0, 60.0)];
-    let (_, router) = ground(10, 8, zones.clone());
+    let (_, router) = loop_and_router(10, 8, zones.clone());
     let blind = Arc::clone(&flight.executive.transit.coverage_loop);
     flight.executive = Executive::new(airframe(), 90.0, blind, router);
     flight.zones = zones;

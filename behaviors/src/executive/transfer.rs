@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use crate::reactive::air::{self, Air};
     use crate::reactive::follow::{Track, fly};
-    use crate::testing::{CLEARANCE_M, airframe, ground, rectangle};
+    use crate::testing::{CLEARANCE_M, airframe, loop_and_router, rectangle};
     use proptest::prelude::*;
     use skein_flight::trajectory::wind::Wind;
     use skein_geometry::Polygon;
@@ -160,7 +160,7 @@ mod tests {
 
     /// A transit in a wind of `share` of what the turns of the mission allow.
     fn transit(zones: Vec<Polygon>, share: f64, towards_rad: f64, objective: Objective) -> Transit {
-        let (coverage_loop, router) = ground(8, 6, zones);
+        let (coverage_loop, router) = loop_and_router(8, 6, zones);
         let a = airframe();
         let radius_m = router.limits().turn_radius_m;
         let most_mps = a.airspeed_for_turns_mps(radius_m, 0.0).min(a.cruise_mps);

@@ -617,13 +617,13 @@ impl Transit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{CLEARANCE_M, LANE_M, airframe, ground, square};
+    use crate::testing::{CLEARANCE_M, LANE_M, airframe, loop_and_router, square};
     use Direction::{Backward, Forward};
     use skein_geometry::Polygon;
     use skein_geometry::math::PI;
 
     fn transit(cols: u32, rows: u32, zones: Vec<Polygon>) -> Transit {
-        let (coverage_loop, router) = ground(cols, rows, zones);
+        let (coverage_loop, router) = loop_and_router(cols, rows, zones);
         Transit::new(coverage_loop, router, airframe())
     }
 

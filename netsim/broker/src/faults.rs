@@ -299,7 +299,7 @@ impl Injector<'_> {
             Fault::Cut { .. } => "expect: records go round by other peers; nobody is declared down while a way round exists".to_owned(),
             Fault::Partition { .. } => {
                 let (_, down_s) = self.bounds_s();
-                format!("expect: each side takes the other for gone within {down_s:.0} s and plans alone; nothing is left out")
+                format!("expect: each side believes the other gone within {down_s:.0} s and plans alone; nothing is left out")
             }
             Fault::Heal => "expect: the sides know of each other within a few beacons, and duplicates are yielded".to_owned(),
             _ => "expect: the same, later; detection keeps its bound".to_owned(),

@@ -100,7 +100,7 @@ fn laps(s: &Stated) -> Result<u16, Error> {
     if s.laps > 1 && s.asked == Asked::Area(AreaPlanner::Exact) {
         return Err(s.places.wrong(
             "laps",
-            "exact passes are flown once; for several times round take planner \"lanes\"",
+            "exact passes are flown once; for several laps take planner \"lanes\"",
         ));
     }
     Ok(s.laps)

@@ -1,4 +1,4 @@
-//! Common ground derived once for many peers and many runs: the loop of a mission is
+//! Geometry derived once for many peers and many runs: the loop of a mission is
 //! a pure function of it, so a thousand runs of one scenario build it once. So is a
 //! division of its problem, and all members of a round solve the same one.
 
@@ -9,7 +9,7 @@ use skein_peer::offload::{Job, JobResult, MissionGeometry};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-/// Answers by [`Mission::content_hash`]. Cheap to clone: the ground is shared.
+/// Answers by [`Mission::content_hash`]. Cheap to clone: what was derived is shared.
 #[derive(Clone, Debug, Default)]
 pub struct GeometryCache {
     by_hash: BTreeMap<u64, Result<Arc<MissionGeometry>, GeometryError>>,
@@ -31,14 +31,14 @@ struct Divided {
 impl GeometryCache {
     /// A cache that holds what was derived from this mission.
     #[must_use]
-    pub fn holding(mission: &Mission, ground: Arc<MissionGeometry>) -> Self {
+    pub fn holding(mission: &Mission, geometry: Arc<MissionGeometry>) -> Self {
         Self {
-            by_hash: BTreeMap::from([(mission.content_hash(), Ok(ground))]),
+            by_hash: BTreeMap::from([(mission.content_hash(), Ok(geometry))]),
             ..Self::default()
         }
     }
 
-    /// The ground of a mission, derived on first use.
+    /// The geometry of a mission, derived on first use.
     pub fn of(&mut self, mission: &Arc<Mission>) -> Result<Arc<MissionGeometry>, GeometryError> {
         self.by_hash
             .entry(mission.content_hash())

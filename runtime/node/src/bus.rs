@@ -46,7 +46,7 @@ pub struct BusConfig {
     pub listen: String,
     /// Where to connect to, as `tcp/127.0.0.1:PORT` each, again and again until it works.
     pub links: Vec<String>,
-    /// A neighbour silent for this long is taken for gone by the transport, milliseconds.
+    /// A neighbour silent for this long is believed gone by the transport, milliseconds.
     pub lease_ms: u32,
 }
 

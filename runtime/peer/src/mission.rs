@@ -53,7 +53,7 @@ pub struct Mission {
     /// What is to be seen.
     #[serde(default, skip_serializing_if = "CoverageTask::is_area")]
     pub task: CoverageTask,
-    /// Which time round it is, from 0 (D2.7 §3.6.6: continuous coverage).
+    /// Which lap it is, from 0 (D2.7 §3.6.6: continuous coverage).
     #[serde(default, skip_serializing_if = "is_zero")]
     pub lap: u16,
     /// How many more times everything is to be seen after this one.
@@ -231,7 +231,7 @@ impl Mission {
         h.finish()
     }
 
-    /// The mission of the next time round, the same for whoever derives it; none after
+    /// The mission of the next lap, the same for whoever derives it; none after
     /// the last.
     #[must_use]
     pub fn next_lap(&self) -> Option<Self> {

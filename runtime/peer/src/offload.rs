@@ -34,8 +34,7 @@ impl MissionGeometry {
 /// A problem to be solved beside the loop.
 #[derive(Clone, Debug)]
 pub enum Job {
-    /// Derive the common ground of a mission. Drivers of many peers may remember
-    /// the answer by [`Mission::content_hash`].
+    /// Derive the geometry of a mission. Drivers of many peers may remember the answer by [`Mission::content_hash`].
     Geometry(Arc<Mission>),
     /// Divide the open cells of the loop by the rule of its mission.
     Divide {
@@ -51,7 +50,7 @@ pub enum Job {
 /// The answer to a [`Job`] of the same name.
 #[derive(Clone, Debug)]
 pub enum JobResult {
-    /// The common ground, or why there is none.
+    /// The geometry, or why there is none.
     Geometry(Result<Arc<MissionGeometry>, GeometryError>),
     /// The division.
     Divide(Division),

@@ -31,7 +31,7 @@ pub enum Timer {
     Finished,
     /// Cells given away and not taken over expire.
     HeldCells,
-    /// All is covered; the next time round begins.
+    /// All is covered; the next lap begins.
     NextLap,
 }
 

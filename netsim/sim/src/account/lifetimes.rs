@@ -17,7 +17,7 @@ pub struct Setting {
     pub seed: u64,
     /// Mean speed over the ground along the whole loop, by UAV, m/s.
     pub uavs: BTreeMap<u16, f64>,
-    /// Length of all cells that are needed, over all times round, metres.
+    /// Length of all cells that are needed, over all laps, metres.
     pub work_m: f64,
     /// Share of the area that must be coverable, 0 to 1.
     pub needed_share: f64,

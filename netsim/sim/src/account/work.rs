@@ -85,7 +85,7 @@ impl Work {
         }
     }
 
-    /// A peer has derived the loop of a mission. A new loop, another time round among
+    /// A peer has derived the loop of a mission. A new loop, that of another lap among
     /// them, begins with everything open.
     pub fn ready(&mut self, peer: u16, revision: u32, loop_hash: u64, cells: u16) {
         if self.loop_of.insert(peer, loop_hash) != Some(loop_hash) {

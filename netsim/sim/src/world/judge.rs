@@ -77,15 +77,14 @@ impl Judge {
         }
     }
 
-    /// Wants everything to be seen so many times, one time round after the other.
+    /// Wants everything to be seen so many times, one lap after the other.
     #[must_use]
     pub fn with_laps(mut self, laps: u16) -> Self {
         self.laps = laps.max(1);
         self
     }
 
-    /// The longest time between the first sightings of a cell in one time round and the
-    /// next, milliseconds; none where everything is seen once.
+    /// The longest time between the first sightings of a cell in one lap and the next, milliseconds; none where everything is seen once.
     #[must_use]
     pub fn longest_gap_ms(&self) -> Option<u64> {
         (self.laps > 1).then_some(self.longest_gap_ms)
@@ -102,7 +101,7 @@ impl Judge {
         self
     }
 
-    /// Whether a camera saw what peers call this cell, in that many times round.
+    /// Whether a camera saw what peers call this cell, in that many laps.
     #[must_use]
     pub fn saw(&self, cell: CellId, laps: u16) -> bool {
         match &self.claims {

@@ -154,7 +154,7 @@ const STATE: &[Place] = &[
             "covering",
             "holding",
             "returning",
-            "ground-station",
+            "ground station",
         ]),
     ),
     at(

@@ -169,7 +169,7 @@ impl CoverageLoop {
         &self.uncoverable
     }
 
-    /// The same loop another time round: what was covered before does not count on it.
+    /// The same loop in another lap: what was covered before does not count on it.
     #[must_use]
     pub fn of_lap(mut self, lap: u16) -> Self {
         // The golden ratio's odd multiple spreads small numbers over all bits.
