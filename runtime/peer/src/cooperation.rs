@@ -438,6 +438,21 @@ impl MissionState {
         let mine = self.loop_hash();
         let capacity = self.covered().capacity();
         let negotiation = &mut self.negotiation;
+        let refused = match &body {
+            Body::Claim(claim) => {
+                let listed = claim.plan.iter().chain(&claim.held);
+                let counters = listed.map(|l| l.stamp.epoch.counter);
+                let latest = counters.fold(claim.epoch.counter, u32::max);
+                let believed = negotiation.rounds.hear_counter(latest);
+                (!believed).then_some("a claim of a round that is far ahead of all heard of")
+            }
+            Body::Bid(bid) => negotiation.rounds.refuse(&bid.round),
+            _ => None,
+        };
+        if let Some(why) = refused {
+            let reason = why.to_owned();
+            return vec![Effect::Report(Report::Refused { reason })];
+        }
         let effect = match body {
             Body::Claim(claim) if claim.loop_hash == mine => negotiation
                 .sections
@@ -449,10 +464,6 @@ impl MissionState {
                 }
                 negotiation.hear_bid(now, author, &bid);
                 Some(Effect::Negotiate)
-            }
-            Body::Bid(bid) => {
-                negotiation.rounds.hear_counter(bid.round.counter);
-                None
             }
             Body::Cover(cover) if cover.loop_hash == mine => {
                 let covered = CellSet::decode_rle(capacity, &cover.covered);

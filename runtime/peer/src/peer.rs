@@ -206,7 +206,15 @@ impl Peer {
     }
 
     fn on_received(&mut self, hops: u8, bytes: &[u8]) {
-        match inbound::read(bytes, self.config.id.0, &self.life) {
+        let heard = inbound::read(bytes, self.config.id.0, &self.life);
+        if let Heard::Beacon(record, _) | Heard::Record(_, record, _) = &heard
+            && !self
+                .membership
+                .may_live_in(record.author, record.incarnation)
+        {
+            return self.refuse("a life far ahead of the one that is known".into());
+        }
+        match heard {
             Heard::Refused(why) => self.refuse(why),
             Heard::Double(nonce) => {
                 let effects = self.life.hear_double(nonce);

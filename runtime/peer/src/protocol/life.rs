@@ -5,7 +5,7 @@
 //! |---|---|---|---|
 //! | born | start | promised | the journal's incarnation plus one is stored |
 //! | promised | stored | listening | the life begins; probation of 3 T runs from the start |
-//! | promised | the store failed | as before the promise | stored again: at the next tick if there is no life yet, else when it hears of itself again |
+//! | promised | the store failed | as before the promise | stored again: if there is no life yet after one tick, two, four, up to 64, else when it hears of itself again |
 //! | listening | its own id at this or a higher life | promised | that plus one is stored |
 //! | listening | 3 T are over | speaking | beacons |
 //! | speaking | its own id at a higher life, or a heartbeat it never sent | promised | that plus one |
@@ -26,6 +26,14 @@ use crate::timers::{Timer, Timers};
 /// what it missed is caught by the rule that works at any time.
 pub const PROBATION_PERIODS: u64 = 3;
 
+/// A life heard of that is further ahead than this is no life of a peer: at one restart an
+/// hour it takes a year to get there.
+pub const LIFE_STEP: Incarnation = 10_000;
+
+/// After a life could not be stored for the n-th time it is tried again 2^n ticks later,
+/// but no later than so many: each time is an alarm.
+const RETRY_MAX_TICKS: u32 = 64;
+
 /// Where a life stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Life {
@@ -34,6 +42,11 @@ pub(crate) struct Life {
     promised: Option<Incarnation>,
     nonce: u32,
     silenced: bool,
+    /// Whether a life heard of was promised since the last tick.
+    raised: bool,
+    /// Ticks until a first life that could not be stored is tried again, and how many there
+    /// were the last time.
+    retry: (u32, u32),
 }
 
 impl Life {
@@ -98,10 +111,14 @@ impl Life {
     /// A promised life could not be made durable.
     pub fn is_broken(&mut self, incarnation: Incarnation) {
         self.promised = self.promised.filter(|p| *p != incarnation);
+        let ticks = (2 * self.retry.1).clamp(1, RETRY_MAX_TICKS);
+        self.retry = (ticks, ticks);
     }
 
     /// Somebody speaks of this peer's own id in the given life, with a heartbeat;
-    /// `sent` is the last heartbeat that this peer sent itself.
+    /// `sent` is the last heartbeat that this peer sent itself. A life far ahead of its own
+    /// is not believed, and one is taken between two ticks: lives that were made up cannot
+    /// use all of them up.
     pub fn hear_of_myself(
         &mut self,
         incarnation: Incarnation,
@@ -114,6 +131,10 @@ impl Life {
             || (incarnation == mine && never_sent)
             || (self.incarnation == 0 && incarnation >= mine)
         {
+            if incarnation - mine.min(incarnation) > LIFE_STEP || self.raised {
+                return Effects::new();
+            }
+            self.raised = true;
             self.promise(incarnation.saturating_add(1))
         } else {
             Effects::new()
@@ -130,7 +151,12 @@ impl Life {
 
     /// A first life that could not be stored is tried again.
     pub fn tick(&mut self, durable: Incarnation) -> Effects {
+        self.raised = false;
         if self.incarnation == 0 && self.promised.is_none() {
+            self.retry.0 = self.retry.0.saturating_sub(1);
+            if self.retry.0 > 0 {
+                return Effects::new();
+            }
             self.promise(durable.saturating_add(1))
         } else {
             Effects::new()
@@ -180,6 +206,8 @@ mod tests {
             [3],
             "a heartbeat never sent"
         );
+        assert!(life.hear_of_myself(6, 0, 9).is_empty(), "one a tick");
+        life.tick(2);
         assert_eq!(stored(&life.hear_of_myself(6, 0, 9)), [7]);
         assert!(life.hear_of_myself(5, 0, 9).is_empty(), "7 is promised");
         assert!(
@@ -188,6 +216,8 @@ mod tests {
         );
         assert_eq!(life.is_durable(7).len(), 2);
         assert_eq!(life.incarnation(), 7);
+        life.tick(7);
+        assert!(life.hear_of_myself(u32::MAX, 0, 9).is_empty(), "made up");
     }
 
     #[test]

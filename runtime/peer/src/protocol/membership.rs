@@ -30,6 +30,7 @@ pub(crate) mod many_detectors;
 #[cfg(test)]
 mod tests;
 
+use super::life::LIFE_STEP;
 use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Status;
@@ -230,7 +231,7 @@ impl Membership {
         changes: &mut Vec<Change>,
     ) -> bool {
         let (bound_ms, k2_ms) = limits;
-        if heard.hops > HOPS_MAX {
+        if heard.hops > HOPS_MAX || !self.may_live_in(heard.id, heard.incarnation) {
             return false;
         }
         let condemned = heard.suspected.is_some_and(|age| age.ms(now) >= k2_ms);
@@ -469,6 +470,14 @@ impl Membership {
         self.known
             .get(&id)
             .map(|k| (k.freshest.incarnation, k.status))
+    }
+
+    /// Whether a peer may be in this life: not far ahead of the one in which it is known.
+    /// A life that was made up would outrank the peer's own for ever.
+    #[must_use]
+    pub fn may_live_in(&self, id: u16, incarnation: Incarnation) -> bool {
+        let known = self.known.get(&id).map_or(0, |k| k.freshest.incarnation);
+        incarnation.saturating_sub(known) <= LIFE_STEP
     }
 
     /// What a peer last said of itself.

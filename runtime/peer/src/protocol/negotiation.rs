@@ -19,6 +19,7 @@ use super::runs::PlannedCell;
 use super::sections::{LivePeers, Sections};
 use crate::Time;
 use crate::cells::CellSet;
+use crate::wire::limits::HOPS_MAX;
 use crate::wire::message::{Bid, Epoch, Member};
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
@@ -89,8 +90,12 @@ impl Context<'_> {
     /// comes back, and three periods for what is lost on the way.
     #[must_use]
     pub fn base_wait_ms(&self) -> u64 {
-        (2 * u64::from(self.diameter) + 3) * self.period_ms
+        wait_ms(self.diameter, self.period_ms)
     }
+}
+
+fn wait_ms(diameter: u32, period_ms: u64) -> u64 {
+    (2 * u64::from(diameter) + 3) * period_ms
 }
 
 /// What the negotiation wants done.
@@ -170,6 +175,8 @@ pub struct Negotiation {
     members: Vec<Member>,
     members_since: Time,
     foreseen_at: Option<Time>,
+    /// When the period began in which counters rise by a step.
+    period_since: Option<Time>,
     /// Divisions adopted in this life.
     pub adoptions: u32,
 }
@@ -199,6 +206,7 @@ impl Negotiation {
             members: Vec::new(),
             members_since: Time(0),
             foreseen_at: None,
+            period_since: None,
             adoptions: 0,
         }
     }
@@ -267,6 +275,7 @@ impl Negotiation {
 
     /// Looks at the time and at what is known, and says what is to be done.
     pub fn tick(&mut self, ctx: &Context<'_>, coverage_loop: &CoverageLoop) -> Vec<Action> {
+        self.watch_period(ctx);
         let mut actions = Vec::new();
         if self.sections.settle(ctx.live) {
             actions.push(Action::Changed);
@@ -297,6 +306,16 @@ impl Negotiation {
             actions.push(divide);
         }
         actions
+    }
+
+    fn watch_period(&mut self, ctx: &Context<'_>) {
+        let since = self.period_since;
+        if since.is_none_or(|t| ctx.now.since_ms(t) >= ctx.period_ms) {
+            self.period_since = Some(ctx.now);
+            let wait_ms = wait_ms(u32::from(HOPS_MAX), ctx.period_ms) << MAX_DOUBLINGS;
+            let wait_ms = u32::try_from(wait_ms).unwrap_or(u32::MAX);
+            self.rounds.new_period(wait_ms);
+        }
     }
 
     fn watch_orphans(&mut self, ctx: &Context<'_>, orphans: &CellSet) {
@@ -350,8 +369,11 @@ impl Negotiation {
             return;
         };
         // Before its first division a peer waits until nobody new was heard for a while:
-        // a swarm that starts together begins with one round, not with many.
-        let steady = ctx.now.since_ms(self.members_since) >= STEADY_PERIODS * ctx.period_ms;
+        // a swarm that starts together begins with one round, not with many. Whoever knows
+        // only itself may not have been heard yet.
+        let company = ctx.members.len() > 1;
+        let steady =
+            company && ctx.now.since_ms(self.members_since) >= STEADY_PERIODS * ctx.period_ms;
         if self.decided_at.is_none() && !steady && orphaned_ms < PATIENT_PERIODS * ctx.period_ms {
             return;
         }

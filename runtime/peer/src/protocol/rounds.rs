@@ -15,6 +15,7 @@
 //! Rounds are ordered by (counter, number of members, hash of members and ground);
 //! a higher one abandons a lower one, and bids of different rounds never mix.
 
+use crate::wire::limits::DURATION_MAX_MS;
 use crate::wire::message::{Bid, Epoch, Member, Round};
 use skein_geometry::hash::Fnv;
 use std::collections::BTreeMap;
@@ -68,6 +69,9 @@ pub struct Rounds {
     open: Option<OpenRound>,
     closed: Option<RoundOrder>,
     silent: BTreeMap<Member, u8>,
+    /// By so much what is heard may still raise the counter in this period.
+    may_rise: u32,
+    longest_wait_ms: u32,
 }
 
 impl Rounds {
@@ -80,7 +84,15 @@ impl Rounds {
             open: None,
             closed: None,
             silent: BTreeMap::new(),
+            may_rise: COUNTER_STEP,
+            longest_wait_ms: DURATION_MAX_MS,
         }
+    }
+
+    /// A period begins, in which no honest round waits for longer than this.
+    pub fn new_period(&mut self, longest_wait_ms: u32) {
+        self.may_rise = COUNTER_STEP;
+        self.longest_wait_ms = longest_wait_ms;
     }
 
     /// The highest counter seen anywhere.
@@ -89,10 +101,24 @@ impl Rounds {
         self.counter
     }
 
-    /// Remembers a counter heard of, in steps of at most [`COUNTER_STEP`].
-    pub fn hear_counter(&mut self, counter: u32) {
-        let most = self.counter.saturating_add(COUNTER_STEP);
-        self.counter = self.counter.max(counter.min(most));
+    /// Remembers a counter heard of; in one period at most [`COUNTER_STEP`] above what was
+    /// known. Returns whether it is believed.
+    pub fn hear_counter(&mut self, counter: u32) -> bool {
+        let rise = counter.saturating_sub(self.counter).min(self.may_rise);
+        self.may_rise -= rise;
+        self.counter += rise;
+        counter <= self.counter
+    }
+
+    /// Why a round is none that an honest peer opens, if it is not.
+    pub fn refuse(&mut self, round: &Round) -> Option<&'static str> {
+        if !self.hear_counter(round.counter) {
+            Some("a round that is far ahead of all that was heard of")
+        } else if round.wait_ms > self.longest_wait_ms {
+            Some("a round that waits for longer than any diameter needs")
+        } else {
+            None
+        }
     }
 
     /// The open round, if there is one.
@@ -104,8 +130,7 @@ impl Rounds {
     /// A bid by its author, who speaks in the given life.
     pub fn hear(&mut self, author: Member, bid: &Bid) -> HeardBid {
         let round = &bid.round;
-        self.hear_counter(round.counter);
-        if round.counter > self.counter
+        if self.refuse(round).is_some()
             || !round.members.contains(&self.me)
             || !round.members.contains(&author)
             || author == self.me
@@ -241,10 +266,12 @@ impl Rounds {
     }
 }
 
-/// A counter heard of raises one's own by so many at most, and a bid of a round beyond
-/// that opens nothing: a day of rounds, one each nine periods, are fewer; and a counter
-/// that was made up cannot use all of them up at once.
-pub const COUNTER_STEP: u32 = 10_000;
+/// What is heard in one period raises one's own counter by so many at most, and a bid of
+/// a round beyond that is refused. A peer opens four rounds a period at most, so whoever
+/// comes back from a partition, or begins on an empty disk, catches up 250 times as fast
+/// as a swarm can run ahead; and counters that were made up use all of them up in seven
+/// weeks of periods of a second, not at once.
+pub const COUNTER_STEP: u32 = 1_000;
 
 /// A member that was silent in so many rounds running is left out of the next.
 pub const SILENT_ROUNDS: u8 = 2;
@@ -389,5 +416,27 @@ mod tests {
         assert_eq!(a.hear(member(2), &bid(&r, 0)), HeardBid::Nothing);
         assert!(a.open().is_none());
         assert_eq!(a.counter(), 9);
+    }
+
+    #[test]
+    fn a_made_up_counter_raises_the_own_in_steps_and_its_round_is_refused() {
+        let mut a = Rounds::new(member(1), 5);
+        let far = bid(&round(u32::MAX, &[1, 2]), 0);
+        for _ in 0..50 {
+            assert_eq!(a.hear(member(2), &far), HeardBid::Nothing);
+            assert!(!a.hear_counter(u32::MAX));
+        }
+        assert_eq!(a.counter(), 5 + COUNTER_STEP);
+        a.new_period(9000);
+        a.start(vec![member(1), member(2)], 1, 7, true, 5000);
+        let mine = a.open().unwrap().round.clone();
+        a.bid(bid(&mine, 1));
+        assert_eq!(a.hear(member(2), &bid(&mine, 2)), HeardBid::Added);
+        a.close();
+        let mut slow = round(mine.counter + 1, &[1, 2]);
+        slow.wait_ms = 9001;
+        assert_eq!(a.hear(member(2), &bid(&slow, 2)), HeardBid::Nothing);
+        slow.wait_ms = 9000;
+        assert_eq!(a.hear(member(2), &bid(&slow, 2)), HeardBid::BidWanted);
     }
 }

@@ -191,3 +191,41 @@ fn a_counter_that_was_made_up_stops_no_round() {
     h.stop(2);
     assert!(h.run_until(400, |h| h.beliefs(1).finished));
 }
+
+#[test]
+fn counters_and_lives_that_were_made_up_block_nobody() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(4);
+    let life = |id| Gossip {
+        id,
+        incarnation: u32::MAX,
+        heartbeat: 1,
+        age_ds: 0,
+        hops: 1,
+        suspected_ds: None,
+        able: true,
+        max_seq: 0,
+        digest: 0,
+    };
+    let mut poison = beacon(1, 1);
+    poison.counter = u32::MAX;
+    poison.gossip = vec![life(1), life(2)];
+    for id in [1, 2] {
+        h.inject(id, record(9, 1, 1, 0, &Body::Beacon(poison.clone())));
+        let already = refused(&mut h, id);
+        h.inject(
+            id,
+            record(3 - id, u32::MAX, 1, 0, &Body::Beacon(beacon(1, 1))),
+        );
+        let finished = Body::Finished(Finished { revision: 1 });
+        h.inject(id, record(3 - id, u32::MAX, 1, 0, &finished));
+        assert_eq!(refused(&mut h, id) - already, 2);
+    }
+    assert!(h.run_until(250, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+    for id in [1, 2] {
+        let b = h.beliefs(id);
+        assert!(b.incarnation == 1 && b.adoptions > 0, "{b:?}");
+        assert!((1..5000).contains(&b.epoch.counter), "{:?}", b.epoch);
+        assert_eq!(b.peers[&PeerId(3 - id)].0, 1);
+    }
+}
