@@ -352,9 +352,11 @@ impl Cooperation {
         }
         state.negotiation.take(taken);
         state.keep_within_endurance(s.percept);
+        // Runs of orphans are taken one after the other, several in a period: the claim
+        // tells of all of them at once.
         let changed = state.claim_changed();
         state.steer(order);
-        vec![changed, Effect::ClaimNow]
+        vec![changed]
     }
 
     /// A promise could not be made durable, so what it was for does not happen.

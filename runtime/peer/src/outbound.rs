@@ -3,7 +3,7 @@
 //! | record | when |
 //! |---|---|
 //! | beacon | every T, ±10 %; at once, and four times a period, when this peer hears that it is suspected |
-//! | claim | at once when a section was adopted or taken, within T when it shrank by a rule; every 10 T for its ETA |
+//! | claim | at once when a section was adopted, within T when cells were taken or it shrank by a rule; every 10 T for its ETA |
 //! | cover | own or heard coverage is news, at most every 2 T; at most every T when a neighbour's beacon shows other coverage |
 //! | state | every 10 T |
 //! | bid | once it is durable |

@@ -223,6 +223,7 @@ impl Peer {
             Heard::Myself(incarnation, heartbeat) => self.on_myself(incarnation, heartbeat),
             Heard::Beacon(record, beacon) => self.on_beacon(&record, &beacon),
             Heard::Record(kind, record, body) => {
+                self.membership.hears(self.now);
                 if kind.relayed() && self.relay.offer(self.now, &record, bytes, hops) != Offer::New
                 {
                     return;

@@ -28,12 +28,24 @@ struct Published {
     claim: Arc<Claim>,
 }
 
+/// What a peer has to say.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+enum Owed {
+    /// That it plans this cell, or no more.
+    Cell(u16),
+    /// Whether it hears anybody.
+    Alone,
+    /// That the mission is finished.
+    #[default]
+    Finished,
+}
+
 /// What the records of one run were found to say.
 #[derive(Clone, Debug, Default)]
 pub struct SpokenCheck {
     claims: BTreeMap<u16, Published>,
     finished: BTreeSet<(u16, Incarnation, u32)>,
-    unspoken: Clocks<(u16, bool)>,
+    unspoken: Clocks<(u16, Owed)>,
     /// Cells published as covered that the world had not seen yet: when, by whom, of which
     /// loop. A frame may be judged a moment after its peer has looked at it.
     unseen: Vec<(u64, u16, u64, u16)>,
@@ -146,26 +158,33 @@ impl SpokenCheck {
                 self.unspoken.retain(|(p, _)| *p != m.id);
                 continue;
             }
-            let differs = self.difference(m.id, &m.view);
-            self.judge(snapshot, (m.id, false), CLAIM_PERIODS, differs, found);
+            let mut owed = self.claim_owed(m.id, &m.view);
             let key = (m.id, m.view.incarnation, m.view.revision);
-            let kept_back = (m.view.finished && !self.finished.contains(&key))
-                .then(|| "has not said that the mission is finished".to_owned());
-            self.judge(snapshot, (m.id, true), FINISHED_PERIODS, kept_back, found);
+            if m.view.finished && !self.finished.contains(&key) {
+                owed.insert(Owed::Finished);
+            }
+            self.unspoken
+                .retain(|(p, what)| *p != m.id || owed.contains(what));
+            for what in owed {
+                self.judge(snapshot, (m.id, what), found);
+            }
         }
     }
 
-    fn judge(
-        &mut self,
-        snapshot: &Snapshot<'_>,
-        key: (u16, bool),
-        periods: u64,
-        differs: Option<String>,
-        found: &mut Findings,
-    ) {
-        let Some(text) = differs else {
-            self.unspoken.stop(key);
-            return;
+    fn judge(&mut self, snapshot: &Snapshot<'_>, key: (u16, Owed), found: &mut Findings) {
+        let (text, periods) = match key.1 {
+            Owed::Cell(c) => (
+                format!("its claim and its plan differ in cell {c}"),
+                CLAIM_PERIODS,
+            ),
+            Owed::Alone => (
+                "its claim and its belief differ in whether it hears anybody".to_owned(),
+                CLAIM_PERIODS,
+            ),
+            Owed::Finished => (
+                "has not said that the mission is finished".to_owned(),
+                FINISHED_PERIODS,
+            ),
         };
         let since_ms = self.unspoken.start(key, snapshot.now_ms);
         let took_ms = snapshot.lived_ms(key.0, since_ms);
@@ -177,8 +196,9 @@ impl SpokenCheck {
         }
     }
 
-    /// How the open cells of the claim published last differ from those of the plan held.
-    fn difference(&self, id: u16, view: &Beliefs) -> Option<String> {
+    /// In what the claim published last differs from what is held: open cells of the plan,
+    /// and whether its author hears anybody.
+    fn claim_owed(&self, id: u16, view: &Beliefs) -> BTreeSet<Owed> {
         let n = u16::try_from(view.covered.len()).unwrap_or(u16::MAX);
         let open = |c: &u16| !view.covered.get(usize::from(*c)).copied().unwrap_or(true);
         let held: BTreeSet<u16> = view.plan.iter().copied().filter(|c| open(c)).collect();
@@ -190,22 +210,14 @@ impl SpokenCheck {
             let cells = unpack(&p.claim.plan, n).into_iter().map(|p| p.cell);
             cells.filter(|c| open(c)).collect()
         });
-        let down = |(_, s): &(Incarnation, Status)| *s == Status::Down;
-        let alone =
-            view.peers.values().all(down) && !(view.plan.is_empty() && view.held.is_empty());
-        let said_alone = published.is_some_and(|p| p.claim.alone);
-        if published.is_some() && said_alone != alone {
-            return Some(format!(
-                "its claim says {said_alone} of hearing nobody, it believes {alone}"
-            ));
+        let cells = held.symmetric_difference(&said);
+        let mut owed: BTreeSet<Owed> = cells.map(|c| Owed::Cell(*c)).collect();
+        let lists = !view.plan.is_empty() || !view.held.is_empty();
+        let alone = lists && view.peers.values().all(|(_, s)| *s == Status::Down);
+        if published.is_some_and(|p| p.claim.alone != alone) {
+            owed.insert(Owed::Alone);
         }
-        let (secret, vain) = (
-            held.difference(&said).count(),
-            said.difference(&held).count(),
-        );
-        (secret + vain > 0).then(|| {
-            format!("plans {secret} open cells that it has not claimed, claims {vain} that it does not plan")
-        })
+        owed
     }
 }
 

@@ -87,7 +87,7 @@ pub struct Membership {
     known: BTreeMap<u16, Known>,
     next_gossip: u16,
     doubt_until: Time,
-    /// When a beacon was last heard, of anybody.
+    /// When anything of another peer was last heard.
     last_heard: Option<Time>,
     /// Neighbours whose link the transport holds for gone.
     gone: BTreeSet<u16>,
@@ -155,7 +155,7 @@ impl Membership {
         if author == self.me {
             return changes;
         }
-        self.last_heard = Some(now);
+        self.hears(now);
         let limits = (self.bound_ms(now), self.k2_ms(now));
         let age = Age {
             told_ms: 0,
@@ -453,6 +453,11 @@ impl Membership {
         self.all()
             .filter(|(_, _, s)| *s != Status::Down)
             .map(|(id, i, _)| (id, i))
+    }
+
+    /// Something that another peer wrote is heard, by whatever way.
+    pub fn hears(&mut self, now: Time) {
+        self.last_heard = Some(now);
     }
 
     /// Whether nobody was heard for k1 T although some are not held for down yet. That

@@ -100,3 +100,20 @@ fn covered_cells_that_could_not_be_written_are_written_with_the_next_one() {
     let cells = crate::cells::CellSet::decode_rle(durable.cells, &durable.covered).unwrap();
     assert!(usize::from(cells.count()) > before, "{}", cells.count());
 }
+
+#[test]
+fn runs_that_are_taken_one_after_the_other_are_told_at_once() {
+    // UAV 1 can take part in no round, so it takes what it finds without an owner.
+    let mut h = Harness::new(1, mission(1, 10, 8));
+    h.seat(1).store_fails = |e| matches!(e, Entry::Bid(_));
+    h.start(1);
+    assert!(h.run_until(60, |h| h.beliefs(1).plan.len() > 10));
+    h.run_s(20);
+    let said = &h.seat(1).said;
+    let claims = said.iter().filter(|(_, _, b)| b.kind() == Kind::Claim);
+    let at: Vec<u64> = claims.map(|(at, ..)| *at).collect();
+    assert!(
+        at.len() > 2 && at.windows(2).all(|w| w[1] - w[0] >= 750),
+        "{at:?}"
+    );
+}
