@@ -98,8 +98,6 @@ pub struct RadioSpec {
     pub delay_ms: u16,
     /// Transmissions that waited longer than this for the channel are dropped, milliseconds.
     pub queue_age_ms: u32,
-    /// Largest share of the channel that all peers together may use on average, 0 to 1.
-    pub share: f64,
 }
 
 /// From what the faults of one storm are drawn.

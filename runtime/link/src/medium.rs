@@ -2,7 +2,7 @@
 //!
 //! A station listens before it sends: it starts when it hears nobody, else it waits for
 //! the end of what it hears plus a short random time. A transmission lasts eight bits a
-//! byte at the channel's rate. At its end every other station either gets it or not:
+//! byte of the record and its headers at the channel's rate. At its end every other station either gets it or not:
 //! the link may be down, the draw of [`fate()`] may lose it, the station may
 //! have been sending itself, or it may have heard two at once, from senders that did
 //! not hear each other (or began within the same moment).
@@ -30,6 +30,8 @@ pub const SENSE_US: u64 = 200;
 pub struct Channel {
     /// Its bit rate, bit/s.
     pub rate_bps: u32,
+    /// Bytes that headers add to each record.
+    pub overhead_bytes: usize,
     /// Frames that waited longer than this are dropped, milliseconds.
     pub queue_age_ms: u32,
 }
@@ -183,9 +185,10 @@ impl Medium {
         }
     }
 
-    /// How long a frame is on the air, microseconds, at least one.
+    /// How long a frame with its headers is on the air, microseconds, at least one.
     #[must_use]
     pub fn airtime_us(&self, n_bytes: usize) -> u64 {
+        let n_bytes = n_bytes.saturating_add(self.channel.overhead_bytes);
         let bits = u64::try_from(n_bytes).unwrap_or(u64::MAX).saturating_mul(8);
         bits.saturating_mul(1_000_000)
             .div_ceil(u64::from(self.channel.rate_bps.max(1)))
@@ -480,6 +483,7 @@ mod tests {
         let stations: Vec<u16> = (1..=n).collect();
         let channel = Channel {
             rate_bps: 64_000,
+            overhead_bytes: 0,
             queue_age_ms: 2_000,
         };
         let links = Table {

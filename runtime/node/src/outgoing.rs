@@ -109,6 +109,7 @@ mod tests {
     fn outgoing(rate_bps: u32, queue_age_ms: u32) -> Outgoing {
         Outgoing::new(Channel {
             rate_bps,
+            overhead_bytes: 0,
             queue_age_ms,
         })
     }

@@ -405,6 +405,7 @@ mod tests {
 
     const CHANNEL: Channel = Channel {
         rate_bps: 64_000,
+        overhead_bytes: 0,
         queue_age_ms: 2_000,
     };
 

@@ -36,6 +36,8 @@ pub struct Beliefs {
     pub peers: BTreeMap<PeerId, (Incarnation, Status)>,
     /// The diameter it reckons with.
     pub diameter: u32,
+    /// The interval that its beacons announce, milliseconds.
+    pub interval_ms: u64,
     /// Whether it believes that the mission is finished.
     pub finished: bool,
     /// The operator's standing order, as far as it has heard.

@@ -570,7 +570,7 @@ impl MissionState {
         }
         let mut ctx = Context {
             now: s.now,
-            period_ms: s.period_ms,
+            period_ms: s.membership.interval_ms(),
             live: &live,
             members: &members,
             diameter: s.membership.diameter(s.now),

@@ -2,14 +2,16 @@
 //!
 //! | record | when |
 //! |---|---|
-//! | beacon | every T, ±10 %; at once, and four times a period, when this peer hears that it is suspected |
-//! | claim | at once when a section was adopted, within T when cells were taken or it shrank by a rule; every 10 T for its ETA |
-//! | cover | own or heard coverage is news, at most every 2 T; at most every T when a neighbour's beacon shows other coverage |
-//! | state | every 10 T |
+//! | beacon | every I, ±10 %; at once, and four times in I, when this peer hears that it is suspected |
+//! | claim | at once when a section was adopted, within I when cells were taken or it shrank by a rule; every 10 I for its ETA |
+//! | cover | own or heard coverage is news, at most every 2 I; at most every I when a neighbour's beacon shows other coverage |
+//! | state | every 10 I |
 //! | bid | once it is durable |
 //! | finished | once a mission revision |
 //! | mission | all pieces, once a revision and life, by a ground station |
 //! | operator | when the operator gives an order, by a ground station |
+//!
+//! I is the interval that this peer's beacons announce, a period T where there is room.
 
 use crate::config::Role;
 use crate::effect::{Effect, Effects};
@@ -28,15 +30,15 @@ use rand_core::Rng;
 use skein_behaviors::Percept;
 use std::sync::Arc;
 
-/// A claim is spoken again after this many beacon periods, for its ETA.
-pub const CLAIM_PERIODS: u64 = 10;
+/// A claim is spoken again after this many intervals, for its ETA.
+pub const CLAIM_INTERVALS: u64 = 10;
 
-/// Coverage is spoken at most every so many beacon periods: a cell takes three to
+/// Coverage is spoken at most every so many intervals: a cell takes three to
 /// four seconds to fly, so more would repeat what is known.
-pub const COVER_PERIODS: u64 = 2;
+pub const COVER_INTERVALS: u64 = 2;
 
 /// State is for people: they read no faster.
-pub const STATE_PERIODS: u64 = 10;
+pub const STATE_INTERVALS: u64 = 10;
 
 /// What the peer knows that its records tell.
 #[derive(Debug)]
@@ -56,7 +58,8 @@ pub(crate) struct Sources<'a> {
 /// What was said, and counted.
 #[derive(Clone, Debug)]
 pub(crate) struct Outbound {
-    period_ms: u64,
+    /// Until the next beacon, as announced.
+    interval_ms: u64,
     heartbeat: u32,
     seq: u32,
     last_beacon: Time,
@@ -68,10 +71,10 @@ pub(crate) struct Outbound {
 impl Outbound {
     /// Nothing was said yet.
     pub fn new(period_ms: u64, timers: &mut Timers) -> Self {
-        timers.set(Timer::Claim, Time(CLAIM_PERIODS * period_ms));
-        timers.set(Timer::State, Time(STATE_PERIODS * period_ms));
+        timers.set(Timer::Claim, Time(CLAIM_INTERVALS * period_ms));
+        timers.set(Timer::State, Time(STATE_INTERVALS * period_ms));
         Self {
-            period_ms,
+            interval_ms: period_ms,
             heartbeat: 0,
             seq: 0,
             last_beacon: Time(0),
@@ -110,18 +113,18 @@ impl Outbound {
 
     /// The own claim changed by a rule.
     pub fn claim_changed(&self, timers: &mut Timers) {
-        timers.set_earlier(Timer::Claim, self.last_claim.plus_ms(self.period_ms));
+        timers.set_earlier(Timer::Claim, self.last_claim.plus_ms(self.interval_ms));
     }
 
     /// Own or heard coverage is news.
     pub fn coverage_changed(&self, timers: &mut Timers) {
-        let soonest = self.last_cover.plus_ms(COVER_PERIODS * self.period_ms);
+        let soonest = self.last_cover.plus_ms(COVER_INTERVALS * self.interval_ms);
         timers.set_earlier(Timer::Cover, soonest);
     }
 
     /// A neighbour's beacon shows other coverage.
     pub fn coverage_wanted(&self, timers: &mut Timers) {
-        timers.set_earlier(Timer::Cover, self.last_cover.plus_ms(self.period_ms));
+        timers.set_earlier(Timer::Cover, self.last_cover.plus_ms(self.interval_ms));
     }
 
     /// Says whatever is due, of a peer that may speak.
@@ -141,7 +144,10 @@ impl Outbound {
         }
         if timers.is_due(Timer::State, s.now) {
             let last = self.jittered(s.now, rng);
-            timers.set(Timer::State, last.plus_ms(STATE_PERIODS * self.period_ms));
+            timers.set(
+                Timer::State,
+                last.plus_ms(STATE_INTERVALS * self.interval_ms),
+            );
             effects.push(Effect::Speak(0, Body::State(state_of(s, state))));
         }
         if timers.take_due(Timer::Finished, s.now) {
@@ -173,7 +179,7 @@ impl Outbound {
             eta_ms: claim.eta_ms,
         };
         self.last_claim = self.jittered(s.now, rng);
-        let again = self.last_claim.plus_ms(CLAIM_PERIODS * self.period_ms);
+        let again = self.last_claim.plus_ms(CLAIM_INTERVALS * self.interval_ms);
         timers.set(Timer::Claim, again);
         vec![Effect::Speak(0, Body::Claim(claim)), Effect::Report(report)]
     }
@@ -217,7 +223,7 @@ impl Outbound {
     /// Now, and up to a quarter of a period: what recurs must not recur in step with
     /// others, or it collides for ever.
     fn jittered(&self, now: Time, rng: &mut ChaCha8Rng) -> Time {
-        let spread = self.period_ms / 4 + 1;
+        let spread = self.interval_ms / 4 + 1;
         now.plus_ms(u64::from(rng.next_u32()) % spread)
     }
 
@@ -243,11 +249,16 @@ impl Outbound {
         }
     }
 
-    /// Somebody suspects this peer: it says that it lives, four times a period, until it
+    /// The interval that is announced from now on.
+    pub fn announce(&mut self, interval_ms: u64) {
+        self.interval_ms = interval_ms;
+    }
+
+    /// Somebody suspects this peer: it says that it lives, four times an interval, until it
     /// is believed or the verdict is passed at `until`. The suspicion tells that its
     /// beacons collide, so these carry no gossip: what is short collides rarely.
     pub fn refute(&self, now: Time, until: Time, timers: &mut Timers, rng: &mut ChaCha8Rng) {
-        let t = self.period_ms;
+        let t = self.interval_ms;
         timers.set(Timer::Refutation, until);
         let spread = u64::from(rng.next_u32()) % (t / 8 + 1);
         let soonest = self.last_beacon.plus_ms(t / 4);
@@ -264,11 +275,10 @@ impl Outbound {
         }
     }
 
-    /// A beacon is due: sets the time of the next and returns whether this one carries
-    /// gossip. Between two full ones a suspicion is answered by bare ones.
-    pub fn beacon_due(&self, now: Time, timers: &mut Timers, rng: &mut ChaCha8Rng) -> bool {
-        let t = self.period_ms;
-        let full = !timers.is_running(Timer::FullBeacon, now);
+    /// A beacon is due, full or bare: sets the time of the next. Between two full ones a
+    /// suspicion is answered by bare ones.
+    pub fn beacon_due(&self, now: Time, full: bool, timers: &mut Timers, rng: &mut ChaCha8Rng) {
+        let t = self.interval_ms;
         let jitter = u64::from(rng.next_u32()) % (t / 5 + 1);
         if full {
             timers.set(Timer::FullBeacon, now.plus_ms(t - t / 10 + jitter));
@@ -279,7 +289,6 @@ impl Outbound {
         if timers.is_running(Timer::Refutation, now) {
             timers.set_earlier(Timer::Beacon, now.plus_ms(t / 4 + jitter / 2));
         }
-        full
     }
 
     /// The record of a beacon, which counts one heartbeat more.
@@ -324,6 +333,8 @@ pub(crate) fn beacon_of(s: &Sources<'_>) -> Beacon {
         nonce: 0,
         counter: state.map_or(0, |m| m.negotiation.rounds.counter()),
         eccentricity: 0,
+        interval: 0,
+        sharers: 0,
         revision: state.map_or(0, MissionState::revision),
         loop_hash: state.map_or(0, MissionState::loop_hash),
         cover_digest: state.map_or(0, |m| m.covered().digest()),

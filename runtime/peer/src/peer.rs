@@ -28,7 +28,6 @@ use crate::timers::{Timer, Timers};
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
-use crate::wire::limits::GOSSIP_MAX;
 use crate::wire::message::{Beacon, Member, Order, Record};
 use crate::{Incarnation, Mission, PeerId};
 use rand_chacha::ChaCha8Rng;
@@ -411,13 +410,18 @@ impl Peer {
 
     /// "I am here", with gossip unless a suspicion is being answered.
     fn beacon(&mut self) {
-        let full = self
-            .outbound
-            .beacon_due(self.now, &mut self.timers, &mut self.rng);
+        let full = !self.timers.is_running(Timer::FullBeacon, self.now);
+        let plan = full.then(|| self.relay.air.plan_beacon(self.now));
+        if let Some(plan) = plan {
+            self.membership.announce(plan.interval);
+            self.outbound.announce(self.relay.air.interval_ms());
+        }
+        self.outbound
+            .beacon_due(self.now, full, &mut self.timers, &mut self.rng);
         if !self.speaks() {
             return;
         }
-        let most = if full { GOSSIP_MAX } else { 0 };
+        let most = plan.map_or(0, |p| p.entries);
         let mut gossip = self.membership.gossip(self.now, most);
         for g in &mut gossip {
             (g.max_seq, g.digest) = self.relay.version(g.id, g.incarnation);
@@ -425,6 +429,8 @@ impl Peer {
         let beacon = Beacon {
             nonce: self.life.nonce(),
             eccentricity: self.membership.eccentricity(self.now),
+            interval: self.relay.air.interval(),
+            sharers: self.relay.air.counted(),
             gossip,
             ..self.with_sources(|_, s, _, _| outbound::beacon_of(s))
         };
@@ -433,13 +439,17 @@ impl Peer {
             .outbound
             .beacon(self.now, me.id, me.incarnation, beacon);
         let bytes = codec::encode_record(&record);
-        self.relay.charge(self.now, bytes.len());
+        if full {
+            self.relay.air.charge(self.now, bytes.len());
+        } else {
+            self.relay.air.charge_answer(self.now, bytes.len());
+        }
         self.outputs.push_back(Output::Publish {
             key: key::key(&self.config.fleet, Kind::Beacon, 0, me.id),
             bytes,
             hops: 0,
             priority: Priority::Beacon,
-            lifetime_ms: self.config.beacon_period_ms,
+            lifetime_ms: u32::try_from(self.relay.air.interval_ms()).unwrap_or(u32::MAX),
         });
     }
 
@@ -618,6 +628,7 @@ impl Peer {
             incarnation: self.life.incarnation(),
             speaks: self.speaks(),
             diameter: self.membership.diameter(self.now),
+            interval_ms: self.relay.air.interval_ms(),
             order: self.cooperation.order(),
             ..Beliefs::default()
         };

@@ -11,7 +11,6 @@ pub(crate) fn read(node: &Node<'_>) -> Result<RadioSpec, Error> {
         "loss_percent",
         "delay_ms",
         "queue_age_ms",
-        "share",
     ])?;
     Ok(RadioSpec {
         range_m: f.need("range_m", "500")?.number(1.0, 1e6, "metres")?,
@@ -19,6 +18,5 @@ pub(crate) fn read(node: &Node<'_>) -> Result<RadioSpec, Error> {
         loss_permille: f.get("loss_percent").map_or(Ok(0), permille)?,
         delay_ms: f.small_or("delay_ms", 5, 0, 10_000, "milliseconds")?,
         queue_age_ms: f.whole_or("queue_age_ms", 2000, 1, 60_000, "milliseconds")?,
-        share: f.number_or("share", 0.5, 0.01, 1.0, "as a share of the channel")?,
     })
 }

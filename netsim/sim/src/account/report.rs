@@ -105,6 +105,8 @@ pub struct Simulated {
     pub infeasible: bool,
     /// Living peers in reach that were declared down.
     pub false_downs: Vec<FalseDown>,
+    /// Bytes handed to the radios with their headers, by kind of record.
+    pub bytes_by_kind: BTreeMap<String, u64>,
 }
 
 /// What only a live trial can tell.

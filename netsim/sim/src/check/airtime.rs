@@ -1,43 +1,34 @@
 //! Bytes on the air: over 10 s no peer transmits more than its share of the channel it is
-//! in (S9), beacons included.
+//! in (S9), beacons included, at any number of radios.
 
 use super::{Clocks, Findings, Snapshot};
-use skein_peer::protocol::relay::OVERHEAD_BYTES;
+use skein_peer::protocol::airtime::{BURST_PERIODS, OVERHEAD_BYTES, SHARE_PERCENT};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Over so long a time a share is kept.
 const WINDOW_MS: u64 = 10_000;
 
-/// The part of the fair share that a peer may use, percent: beyond half of the air, most of
-/// it is collisions between those who do not hear each other.
-const SHARE_PERCENT: u64 = 45;
-
-/// A bucket that was full when the window began: two seconds of the share, at least one of
-/// the largest records.
-const BURST_MIN_BYTES: u64 = 4_096 + OVERHEAD_BYTES as u64;
-
-/// A beacon a period, of which one collides: so long a radio is not counted.
-const COUNTED_PERIODS: u64 = 2;
-
-/// Judged up to so many radios: from 13 in one earshot on, beacons with all their gossip
-/// alone exceed the share at 64 kbit/s (docs/protocol.md §9).
-const MAX_RADIOS: usize = 13;
+/// The bucket that was full when the window began was filled among those of so long before:
+/// whoever comes into earshot is heard within the longest interval.
+const BEFORE_MS: u64 = 16_000;
 
 /// What the peers of one run transmitted.
 #[derive(Clone, Debug)]
 pub struct AirtimeCheck {
     rate_bps: u64,
+    burst_ms: u64,
     sent: BTreeMap<u16, VecDeque<(u64, u64)>>,
     sharers: BTreeMap<u16, VecDeque<(u64, u64)>>,
     over: Clocks<u16>,
 }
 
 impl AirtimeCheck {
-    /// The checks on a channel of this bit rate.
+    /// The checks on a channel of this bit rate, at beacon period T.
     #[must_use]
-    pub fn new(rate_bps: u32) -> Self {
+    pub fn new(rate_bps: u32, period_ms: u64) -> Self {
         Self {
             rate_bps: u64::from(rate_bps),
+            burst_ms: BURST_PERIODS * period_ms,
             sent: BTreeMap::new(),
             sharers: BTreeMap::new(),
             over: Clocks::default(),
@@ -50,32 +41,42 @@ impl AirtimeCheck {
         self.sent.entry(id).or_default().push_back((now_ms, cost));
     }
 
+    /// What it sent last was a beacon without gossip: the answer to a suspicion, which has
+    /// a reserve of its own.
+    pub fn on_answer(&mut self, id: u16) {
+        self.sent.entry(id).or_default().pop_back();
+    }
+
     /// Judges what everybody sent within the window, by the fewest radios in its earshot
-    /// (itself included) meanwhile. One of them it may miss: it counts those whose beacons
-    /// it heard in the last four periods.
+    /// (itself included) meanwhile, of which it may miss one. To the share of that time
+    /// comes what a full bucket held when it began, by the fewest of the time before, and
+    /// one record: the largest goes when
+    /// the bucket is full, and what it lacked is owed.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let now_ms = snapshot.now_ms;
         let old = |t: &(u64, u64)| t.0 + WINDOW_MS < now_ms;
+        let older = |t: &(u64, u64)| t.0 + WINDOW_MS + BEFORE_MS < now_ms;
         for id in snapshot.graph.ids() {
             let heard = u64::from(snapshot.graph.neighbours(*id)) + 1;
             let sharers = self.sharers.entry(*id).or_default();
             sharers.push_back((now_ms, heard));
-            // Whoever came into earshot lately is counted once a beacon of its got through.
-            let before = |t: &(u64, u64)| {
-                t.0 + WINDOW_MS + COUNTED_PERIODS * snapshot.bounds.period_ms < now_ms
-            };
-            while sharers.front().is_some_and(before) {
+            while sharers.front().is_some_and(older) {
                 sharers.pop_front();
             }
-            let fewest = sharers.iter().map(|s| s.1).min().unwrap_or(1);
+            let before = sharers.iter().map(|s| s.1).min().unwrap_or(1);
+            let lately = sharers.iter().filter(|s| !old(s));
+            let fewest = lately.map(|s| s.1).min().unwrap_or(1);
             let sent = self.sent.entry(*id).or_default();
             while sent.front().is_some_and(old) {
                 sent.pop_front();
             }
             let bytes: u64 = sent.iter().map(|s| s.1).sum();
-            let share_ps = self.rate_bps / 8 * SHARE_PERCENT / 100 / (fewest - 1).max(1);
-            let most = share_ps * WINDOW_MS / 1000 + (2 * share_ps).max(BURST_MIN_BYTES);
-            if bytes <= most || snapshot.graph.ids().len() > MAX_RADIOS {
+            let largest = sent.iter().map(|s| s.1).max().unwrap_or(0);
+            let share_ps =
+                |radios: u64| self.rate_bps / 8 * SHARE_PERCENT / 100 / (radios - 1).max(1);
+            let burst = share_ps(before) * self.burst_ms / 1000;
+            let most = share_ps(fewest) * WINDOW_MS / 1000 + burst + largest;
+            if bytes <= most {
                 self.over.stop(*id);
                 continue;
             }
@@ -98,14 +99,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_peer_that_sends_more_than_its_share_is_found() {
-        for (bytes_ps, radios, broken) in [(1_500, 3, false), (2_500, 3, true), (2_500, 14, false)]
-        {
-            let mut check = AirtimeCheck::new(64_000);
+    fn a_peer_that_sends_more_than_its_share_is_found_at_any_number() {
+        for (bytes_ps, radios, broken) in [
+            (1_800, 3, false),
+            (3_000, 3, true),
+            (200, 14, false),
+            (400, 14, true),
+            (40, 50, false),
+            (120, 50, true),
+        ] {
+            let mut check = AirtimeCheck::new(64_000, 1000);
             let (mut story, mut found) = (Story::new(0), Findings::new(1));
             let views: Vec<_> = (1..=radios).map(|id| (id, speaking())).collect();
             for t in 0..15 {
-                check.on_transmission(t * 1000, 1, bytes_ps);
+                check.on_transmission(t * 1000, 1, bytes_ps - OVERHEAD_BYTES);
                 story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
             }
             assert_eq!(
@@ -114,5 +121,18 @@ mod tests {
                 "{bytes_ps} among {radios}"
             );
         }
+    }
+
+    #[test]
+    fn answers_to_a_suspicion_are_not_counted() {
+        let mut check = AirtimeCheck::new(64_000, 1000);
+        let (mut story, mut found) = (Story::new(0), Findings::new(1));
+        let views: Vec<_> = (1..=50).map(|id| (id, speaking())).collect();
+        for t in 0..60 {
+            check.on_transmission(t * 250, 1, 50);
+            check.on_answer(1);
+            story.snapshot(t * 250, &views, |s| check.on_snapshot(s, &mut found));
+        }
+        assert!(found.counts.is_empty());
     }
 }

@@ -5,6 +5,8 @@
 pub struct Bounds {
     /// Beacon period T.
     pub period_ms: u64,
+    /// The longest interval I that a running peer's beacons announced lately, at least T.
+    pub interval_ms: u64,
     /// Hop diameter D: the larger of the true one within the last 10·T and the one
     /// that any live peer reckons with, because peers must act on the latter.
     pub diameter: u64,
@@ -14,30 +16,30 @@ pub struct Bounds {
 pub const LIGHT_FACTOR: u64 = 7;
 
 impl Bounds {
-    /// Everybody in a component knows of a death: (k1 + k2 + D + 2)·T with
+    /// Everybody in a component knows of a death: (k1 + k2 + D + 2)·I with
     /// k1 = 4 + D/4 and k2 = 4 + D/2, plus the rounding of an age, 100 ms a hop.
     #[must_use]
     pub fn detection_ms(&self) -> u64 {
         let quarters = 4 * (4 + 4 + 2) + (1 + 2 + 4) * self.diameter;
-        (quarters * self.period_ms).div_ceil(4) + 100 * (self.diameter + 1)
+        (quarters * self.interval_ms).div_ceil(4) + 100 * (self.diameter + 1)
     }
 
-    /// W0 = (2D + 3)·T: how long a round waits for its snapshots at first.
+    /// W0 = (2D + 3)·I: how long a round waits for its snapshots at first.
     #[must_use]
     pub fn first_wait_ms(&self) -> u64 {
-        (2 * self.diameter + 3) * self.period_ms
+        (2 * self.diameter + 3) * self.interval_ms
     }
 
-    /// L2: an orphan is listed by a live peer within 2·T + 2·W0.
+    /// L2: an orphan is listed by a live peer within 2·I + 2·W0.
     #[must_use]
     pub fn takeover_ms(&self) -> u64 {
-        2 * self.period_ms + 2 * self.first_wait_ms()
+        2 * self.interval_ms + 2 * self.first_wait_ms()
     }
 
-    /// L4: every record older than (3D + 5)·T is held by all.
+    /// L4: every record older than (3D + 5)·I is held by all.
     #[must_use]
     pub fn spread_ms(&self) -> u64 {
-        (3 * self.diameter + 5) * self.period_ms
+        (3 * self.diameter + 5) * self.interval_ms
     }
 
     /// S5: a peer yields what it hears listed at a higher stamp within 2·T.
@@ -52,10 +54,10 @@ impl Bounds {
         3 * self.period_ms
     }
 
-    /// L6: a restarted peer is productive within 20·T of the end of its probation.
+    /// L6: a restarted peer is productive within 20·I of the end of its probation.
     #[must_use]
     pub fn productive_ms(&self) -> u64 {
-        20 * self.period_ms
+        20 * self.interval_ms
     }
 }
 
@@ -100,12 +102,19 @@ mod tests {
     fn the_bounds_are_those_of_the_protocol() {
         let b = Bounds {
             period_ms: 1000,
+            interval_ms: 1000,
             diameter: 4,
         };
         assert_eq!(b.detection_ms(), (5 + 6 + 4 + 2) * 1000 + 500);
         assert_eq!(b.first_wait_ms(), 11_000);
         assert_eq!(b.takeover_ms(), 24_000);
         assert_eq!(b.spread_ms(), 17_000);
+        let crowded = Bounds {
+            interval_ms: 2500,
+            ..b
+        };
+        assert_eq!(crowded.detection_ms(), 17 * 2500 + 500);
+        assert_eq!(crowded.probation_ms(), 3000);
     }
 
     #[test]

@@ -5,20 +5,21 @@
 use super::{Clocks, Findings, Handicaps, Snapshot};
 use skein_peer::Incarnation;
 use skein_peer::output::Status;
+use skein_peer::protocol::airtime::ms_of;
 use skein_peer::wire::message::Beacon;
 use std::collections::BTreeMap;
 
-/// A claim is spoken again after 10 periods, up to a quarter of one later so as not to be
-/// in step with others; the peer looks four times a period. In quarters of a period.
+/// A claim is spoken again after 10 intervals, up to a quarter of one later so as not to be
+/// in step with others; the peer looks four times a period. In quarters of an interval.
 const CLAIM_QUARTERS: u64 = 4 * 10 + 1 + 1;
 
 /// Clocks count whole milliseconds, and a timer is set a few times in a duration.
 const ROUNDING_MS: u64 = 5;
 
-/// k1 = 4 + D/4 at the least diameter 1, in quarters of a period.
+/// k1 = 4 + D/4 at the least diameter 1, in quarters of an interval.
 const LEAST_K1_QUARTERS: u64 = 16 + 1;
 
-/// k2 = 4 + D/2 at the least diameter 1, in quarters of a period.
+/// k2 = 4 + D/2 at the least diameter 1, in quarters of an interval.
 const LEAST_K2_QUARTERS: u64 = 16 + 2;
 
 /// A heartbeat as a neighbour received it from its author.
@@ -26,6 +27,8 @@ const LEAST_K2_QUARTERS: u64 = 16 + 2;
 struct Heard {
     incarnation: Incarnation,
     at_ms: u64,
+    /// The shortest interval that its author announced since, milliseconds.
+    interval_ms: u64,
 }
 
 /// What the durations of one run were found to be.
@@ -33,7 +36,12 @@ struct Heard {
 pub struct CadenceCheck {
     period_ms: u64,
     booted_ms: BTreeMap<u16, u64>,
+    /// By author and receiver.
     heard: BTreeMap<(u16, u16), Heard>,
+    /// What each peer's last beacon announced, milliseconds.
+    announced: BTreeMap<u16, u64>,
+    /// The longest since its last claim.
+    slowest: BTreeMap<u16, u64>,
     accused: Clocks<u16>,
     claims: Clocks<u16>,
 }
@@ -46,6 +54,8 @@ impl CadenceCheck {
             period_ms,
             booted_ms: BTreeMap::new(),
             heard: BTreeMap::new(),
+            announced: BTreeMap::new(),
+            slowest: BTreeMap::new(),
             accused: Clocks::default(),
             claims: Clocks::default(),
         }
@@ -60,7 +70,7 @@ impl CadenceCheck {
     /// A process ends, stands still, or goes on with another clock: what it heard before
     /// says nothing about its patience any more.
     pub fn on_silent(&mut self, id: u16) {
-        self.heard.retain(|(rx, _), _| *rx != id);
+        self.heard.retain(|(_, rx), _| *rx != id);
         self.accused.stop(id);
         self.claims.stop(id);
     }
@@ -93,14 +103,26 @@ impl CadenceCheck {
     }
 
     /// A peer puts its own beacon on the air: whoever suspects it is answered.
-    pub fn on_beacon_spoken(&mut self, id: u16) {
+    pub fn on_beacon_spoken(&mut self, id: u16, interval: u8) {
         self.accused.stop(id);
+        let interval_ms = ms_of(interval, self.period_ms);
+        self.announced.insert(id, interval_ms);
+        let slowest = self.slowest.entry(id).or_default();
+        *slowest = interval_ms.max(*slowest);
+        for (_, heard) in self.heard.range_mut((id, 0)..=(id, u16::MAX)) {
+            heard.interval_ms = heard.interval_ms.min(interval_ms);
+        }
     }
 
     /// A peer says its claim again.
     pub fn on_claim(&mut self, now_ms: u64, id: u16) {
         self.claims.stop(id);
         self.claims.start(id, now_ms);
+        self.slowest.insert(id, self.interval_ms(id));
+    }
+
+    fn interval_ms(&self, id: u16) -> u64 {
+        self.announced.get(&id).copied().unwrap_or(self.period_ms)
     }
 
     /// A running peer receives a beacon from its author, that arrived then; `life` is the
@@ -115,8 +137,9 @@ impl CadenceCheck {
         let heard = Heard {
             incarnation,
             at_ms: arrived_ms,
+            interval_ms: ms_of(beacon.interval, self.period_ms),
         };
-        self.heard.insert((by, author), heard);
+        self.heard.insert((author, by), heard);
         let of_me = beacon.gossip.iter().filter(|g| g.id == by);
         for told in of_me.filter(|g| g.incarnation == life) {
             if told.suspected_ds.is_some() {
@@ -128,8 +151,8 @@ impl CadenceCheck {
         }
     }
 
-    /// A belief changed. Whoever was heard is not suspected before k1 T and not given up
-    /// before (k1 + k2) T, whoever says so: a suspicion counts from a heartbeat that is
+    /// A belief changed. Whoever was heard is not suspected before k1 and not given up
+    /// before k1 + k2 of its intervals, whoever says so: a suspicion counts from a heartbeat that is
     /// no older than the last one heard from its author. Ages are rounded up to 100 ms
     /// whenever they are passed on, and that of a suspicion is, by one peer after the other:
     /// a quarter of k2 is room for eleven times, six were seen. Each waits by its own clock;
@@ -148,13 +171,13 @@ impl CadenceCheck {
             Status::Suspect => LEAST_K1_QUARTERS,
             Status::Down => LEAST_K1_QUARTERS + LEAST_K2_QUARTERS,
         };
-        let heard = self.heard.get(&(observer, subject));
+        let heard = self.heard.get(&(subject, observer));
         let Some(heard) = heard.filter(|h| h.incarnation == incarnation) else {
             return;
         };
-        let patience_ms = quarters * self.period_ms / 4;
+        let patience_ms = quarters * heard.interval_ms / 4;
         let rounding_ms = match status {
-            Status::Down => LEAST_K2_QUARTERS * self.period_ms / 16,
+            Status::Down => LEAST_K2_QUARTERS * heard.interval_ms / 16,
             _ => 0,
         };
         let passed_on_ms = handicaps.grown_ms(patience_ms, heard.at_ms, now_ms) - patience_ms;
@@ -178,22 +201,26 @@ impl CadenceCheck {
                 self.claims.stop(m.id);
                 continue;
             }
-            // The answer waits a random T/8, and T/4 after the last beacon; then the peer
-            // looks when it said it would. Twice that is T/2.
+            // The answer waits a random eighth of the interval, and a quarter after the
+            // last beacon; then the peer looks when it said it would. Twice that is a half.
+            let answers_ms = self.interval_ms(m.id) / 2;
             let late = self.accused.since(m.id).is_some_and(|t| {
-                snapshot.lived_ms(m.id, t) > self.period_ms / 2 + snapshot.late_ms(m.id, t)
+                snapshot.lived_ms(m.id, t) > answers_ms + snapshot.late_ms(m.id, t)
             });
             if late && self.accused.tell_once(m.id) {
                 found.broken("refute", now_ms, Some(m.id), || {
-                    "heard that it is suspected and did not answer within T/2".to_owned()
+                    "heard that it is suspected and did not answer within half of its interval"
+                        .to_owned()
                 });
             }
             if !m.uav || m.view.loop_hash == 0 {
                 self.claims.stop(m.id);
                 continue;
             }
+            let slowest_ms = self.slowest.get(&m.id).copied().unwrap_or(0);
             let since_ms = self.claims.start(m.id, now_ms).max(m.since_ms);
-            let bound_ms = CLAIM_QUARTERS * self.period_ms / 4 + snapshot.late_ms(m.id, since_ms);
+            let interval_ms = slowest_ms.max(self.period_ms);
+            let bound_ms = CLAIM_QUARTERS * interval_ms / 4 + snapshot.late_ms(m.id, since_ms);
             let silent_ms = snapshot.lived_ms(m.id, since_ms);
             if silent_ms > bound_ms + ROUNDING_MS && self.claims.tell_once(m.id) {
                 found.broken("cadence", now_ms, Some(m.id), || {
@@ -221,6 +248,7 @@ mod tests {
             heartbeat: 9,
             age_ds: 40,
             hops: 1,
+            interval: 4,
             suspected_ds: Some(1),
             able: true,
             max_seq: 0,
@@ -237,6 +265,8 @@ mod tests {
             nonce: 7,
             counter: 0,
             eccentricity: 1,
+            interval: 4,
+            sharers: 2,
             revision: 1,
             loop_hash: 3,
             cover_digest: 0,
@@ -285,7 +315,7 @@ mod tests {
             let mut story = Story::new(0);
             c.on_beacon_heard((10_100, 10_100), (1, 1), (2, 1), &beacon(Some(1)));
             if answers {
-                c.on_beacon_spoken(1);
+                c.on_beacon_spoken(1, 4);
             }
             let views = [(1, speaking())];
             story.snapshot(11_000, &views, |s| c.on_snapshot(s, &mut found));

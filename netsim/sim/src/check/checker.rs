@@ -55,6 +55,8 @@ pub struct Checker {
     stability: Stability,
     handicaps: Handicaps,
     bounds: Bounds,
+    /// When which interval was the longest announced.
+    intervals: Vec<(u64, u64)>,
     open_round: BTreeMap<u16, u32>,
     adopted: BTreeMap<u16, u32>,
     split_at: Option<BTreeMap<u16, u32>>,
@@ -83,8 +85,10 @@ impl Checker {
             handicaps: Handicaps::default(),
             bounds: Bounds {
                 period_ms,
+                interval_ms: period_ms,
                 diameter: 1,
             },
+            intervals: Vec::new(),
             open_round: BTreeMap::new(),
             adopted: BTreeMap::new(),
             split_at: None,
@@ -128,8 +132,7 @@ impl Checker {
         if death && self.graph.is_articulation(id) {
             self.reached.articulation_lost += 1;
         }
-        self.members
-            .on_silent(now_ms, id, death, self.bounds.diameter);
+        self.members.on_silent(now_ms, id, death, &self.bounds);
         if death {
             self.listing.on_death(id);
         }
@@ -298,7 +301,7 @@ impl Checker {
 
     /// The true graph at this moment. Returns whether a component changed.
     pub fn on_graph(&mut self, now_ms: u64, graph: Graph) -> bool {
-        let window_ms = 10 * self.period_ms;
+        let window_ms = 10 * self.bounds.interval_ms;
         let members = &self.members;
         let changed = self
             .stability
@@ -322,6 +325,7 @@ impl Checker {
         covered: &[bool],
         loop_hash: u64,
     ) {
+        self.note_interval(now_ms, peers);
         let held = peers.iter().map(|m| m.view.diameter).max().unwrap_or(1);
         self.bounds.diameter = u64::from(held.max(self.stability.diameter()));
         self.loop_hash = loop_hash;
@@ -348,6 +352,18 @@ impl Checker {
         self.cover.on_snapshot(&snapshot, &mut self.found);
         self.progress
             .on_snapshot(&snapshot, &self.members, &mut self.found);
+    }
+
+    /// An interval counts for twenty of its own: what was announced is told for a while, and
+    /// whoever fell silent is waited for in it.
+    fn note_interval(&mut self, now_ms: u64, peers: &[PeerSnapshot]) {
+        let speaking = peers.iter().filter(|m| m.view.speaks);
+        let longest_ms = speaking.map(|m| m.view.interval_ms).max().unwrap_or(0);
+        self.intervals.retain(|(t, ms)| t + 20 * ms >= now_ms);
+        self.intervals
+            .push((now_ms, longest_ms.max(self.period_ms)));
+        let longest_ms = self.intervals.iter().map(|(_, ms)| *ms).max();
+        self.bounds.interval_ms = longest_ms.unwrap_or(self.period_ms);
     }
 
     /// Judges how those who are finished get home, after all else is over.

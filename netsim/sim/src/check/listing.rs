@@ -300,6 +300,7 @@ mod tests {
 
     const BOUNDS: Bounds = Bounds {
         period_ms: 1000,
+        interval_ms: 1000,
         diameter: 1,
     };
 
@@ -405,7 +406,7 @@ mod tests {
         let mut s = Story::new(0);
         s.members.on_life(0, 2, 1);
         s.snapshot(0, &[(1, &[0, 1]), (2, &[2, 3])]);
-        s.members.on_silent(500, 2, true, 1);
+        s.members.on_silent(500, 2, true, &BOUNDS);
         s.check.on_death(2);
         for t in 1..40 {
             s.snapshot(t * 1000, &[(1, &[0, 1])]);

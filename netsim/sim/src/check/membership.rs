@@ -16,6 +16,8 @@ pub struct Silence {
     pub death: bool,
     /// The largest diameter that mattered since.
     diameter: u64,
+    /// And the longest interval.
+    interval_ms: u64,
 }
 
 /// What membership found out in one run.
@@ -54,7 +56,7 @@ impl Membership {
     }
 
     /// A process ended or stands still.
-    pub fn on_silent(&mut self, now_ms: u64, id: u16, death: bool, diameter: u64) {
+    pub fn on_silent(&mut self, now_ms: u64, id: u16, death: bool, bounds: &Bounds) {
         let incarnation = self.lives.get(&id).map_or(0, |l| l.0);
         self.silences.insert(
             id,
@@ -62,7 +64,8 @@ impl Membership {
                 since_ms: now_ms,
                 incarnation,
                 death,
-                diameter,
+                diameter: bounds.diameter,
+                interval_ms: bounds.interval_ms,
             },
         );
         self.detected.remove(&id);
@@ -177,8 +180,10 @@ impl Membership {
     fn look_for_late_detection(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         for (&subject, silence) in &mut self.silences {
             silence.diameter = silence.diameter.max(true_diameter(snapshot));
+            silence.interval_ms = silence.interval_ms.max(snapshot.bounds.interval_ms);
             let bounds = Bounds {
                 diameter: silence.diameter,
+                interval_ms: silence.interval_ms,
                 ..snapshot.bounds
             };
             let bound_ms = snapshot.grown_ms(bounds.detection_ms(), silence.since_ms);
@@ -261,10 +266,11 @@ impl Membership {
     }
 }
 
-/// The largest diameter that anybody may reckon with: a true one, and two hops more, since
-/// collisions and losses send heartbeats the longer way for a whole window now and then.
+/// The largest diameter that anybody may reckon with: a true one, and four hops more:
+/// collisions and losses send heartbeats the longer way for a whole window now and then, and
+/// beacons have room for some of the others only.
 fn true_diameter(snapshot: &Snapshot<'_>) -> u64 {
-    u64::from(snapshot.stability.lasting_diameter()) + 2
+    u64::from(snapshot.stability.lasting_diameter()) + 4
 }
 
 #[cfg(test)]
@@ -279,6 +285,7 @@ mod tests {
 
     const BOUNDS: Bounds = Bounds {
         period_ms: 1000,
+        interval_ms: 1000,
         diameter: 1,
     };
 
@@ -340,7 +347,7 @@ mod tests {
                 (&BOUNDS, &Handicaps::default()),
                 Some(0),
             );
-            m.on_silent(50_000, 2, true, 1);
+            m.on_silent(50_000, 2, true, &BOUNDS);
             if found_out {
                 m.on_belief(
                     59_000,
@@ -351,10 +358,10 @@ mod tests {
                 );
                 assert_eq!(m.detected_ms(2), Some(59_000));
             }
-            look_at(&mut m, &mut found, 65_000, 300, &[(1, &[])], &mut s);
+            look_at(&mut m, &mut found, 69_000, 300, &[(1, &[])], &mut s);
             assert!(found.counts.is_empty());
-            look_at(&mut m, &mut found, 66_000, 300, &[(1, &[])], &mut s);
-            look_at(&mut m, &mut found, 67_000, 300, &[(1, &[])], &mut s);
+            look_at(&mut m, &mut found, 70_000, 300, &[(1, &[])], &mut s);
+            look_at(&mut m, &mut found, 71_000, 300, &[(1, &[])], &mut s);
             assert_eq!(
                 found.counts.get("detect").copied().unwrap_or(0),
                 u64::from(!found_out)
@@ -408,9 +415,9 @@ mod tests {
     #[test]
     fn a_peer_that_reckons_with_too_large_a_diameter_is_found() {
         for (diameter, loss, broken) in [
-            (3, 0, false),
-            (3, 300, false),
-            (4, 0, true),
+            (5, 0, false),
+            (5, 300, false),
+            (6, 0, true),
             (16, 300, true),
         ] {
             let (mut m, mut found) = (Membership::default(), Findings::new(1));

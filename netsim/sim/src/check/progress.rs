@@ -224,6 +224,7 @@ mod tests {
                 loss_permille: 0,
                 bounds: Bounds {
                     period_ms: 1000,
+                    interval_ms: 1000,
                     diameter: 1,
                 },
                 graph: &graph,

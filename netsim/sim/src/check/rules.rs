@@ -49,7 +49,7 @@ impl Rules {
         let mut rules = Self {
             flight: FlightCheck::new(flyers.clone()),
             flyers,
-            airtime: AirtimeCheck::new(spec.radio.rate_bps),
+            airtime: AirtimeCheck::new(spec.radio.rate_bps, period_ms),
             cadence: CadenceCheck::new(period_ms),
             decision: DecisionCheck::new(period_ms),
             patience: PatienceCheck::new(period_ms),
@@ -167,7 +167,10 @@ impl Rules {
         if let Body::Beacon(beacon) = &said.body {
             let author = (id, said.record.incarnation);
             self.spoken.on_beacon(now_ms, author, beacon, view, found);
-            self.cadence.on_beacon_spoken(id);
+            self.cadence.on_beacon_spoken(id, beacon.interval);
+            if beacon.gossip.is_empty() {
+                self.airtime.on_answer(id);
+            }
         }
     }
 

@@ -17,6 +17,10 @@ use std::sync::Arc;
 /// within T; snapshots come once a T.
 const CLAIM_PERIODS: u64 = 4;
 
+/// And where half of the share is less than a beacon in a period: a large claim has to wait
+/// for its share.
+const CROWDED_CLAIM_PERIODS: u64 = 6;
+
 /// "Finished" is the least urgent record of few bytes: it waits behind a bid, a claim and
 /// a state for a share of the air that lets one of them go in a period.
 const FINISHED_PERIODS: u64 = 10;
@@ -172,14 +176,20 @@ impl SpokenCheck {
     }
 
     fn judge(&mut self, snapshot: &Snapshot<'_>, key: (u16, Owed), found: &mut Findings) {
+        let crowded = snapshot.bounds.interval_ms > snapshot.bounds.period_ms;
+        let claimed = if crowded {
+            CROWDED_CLAIM_PERIODS
+        } else {
+            CLAIM_PERIODS
+        };
         let (text, periods) = match key.1 {
             Owed::Cell(c) => (
                 format!("its claim and its plan differ in cell {c}"),
-                CLAIM_PERIODS,
+                claimed,
             ),
             Owed::Alone => (
                 "its claim and its belief differ in whether it hears anybody".to_owned(),
-                CLAIM_PERIODS,
+                claimed,
             ),
             Owed::Finished => (
                 "has not said that the mission is finished".to_owned(),
@@ -188,7 +198,7 @@ impl SpokenCheck {
         };
         let since_ms = self.unspoken.start(key, snapshot.now_ms);
         let took_ms = snapshot.lived_ms(key.0, since_ms);
-        let bound_ms = periods * snapshot.bounds.period_ms + snapshot.late_ms(key.0, since_ms);
+        let bound_ms = periods * snapshot.bounds.interval_ms + snapshot.late_ms(key.0, since_ms);
         if took_ms > bound_ms && self.unspoken.tell_once(key) {
             found.broken("spoken", snapshot.now_ms, Some(key.0), || {
                 format!("{text}, for {took_ms} ms (bound {bound_ms} ms)")
@@ -248,6 +258,8 @@ mod tests {
             nonce: 7,
             counter: view.counter,
             eccentricity: 1,
+            interval: 4,
+            sharers: 2,
             revision: view.revision,
             loop_hash: view.loop_hash,
             cover_digest: covered(view).digest(),

@@ -59,7 +59,7 @@ impl SpreadCheck {
     /// How long a record of some kind may take to all.
     fn bound_ms(&self, bounds: &Bounds, kind: u8) -> u64 {
         if kind == Kind::Mission.number() {
-            bounds.spread_ms() + self.pieces * bounds.diameter * PIECE_PERIODS * bounds.period_ms
+            bounds.spread_ms() + self.pieces * bounds.diameter * PIECE_PERIODS * bounds.interval_ms
         } else {
             bounds.spread_ms()
         }

@@ -11,6 +11,7 @@ pub(super) const LOOP: u64 = 3;
 /// Bounds at T = 1 s in one hop.
 pub(super) const BOUNDS: Bounds = Bounds {
     period_ms: 1000,
+    interval_ms: 1000,
     diameter: 1,
 };
 

@@ -10,6 +10,7 @@ use crate::spec::RadioSpec;
 use crate::world::{Fact, Judge, World};
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::CellId;
+use skein_peer::protocol::airtime::OVERHEAD_BYTES;
 use std::sync::Arc;
 
 /// World, links and channel of one run.
@@ -37,6 +38,7 @@ impl Air {
                 world.nodes(),
                 Channel {
                     rate_bps: radio.rate_bps,
+                    overhead_bytes: OVERHEAD_BYTES,
                     queue_age_ms: radio.queue_age_ms,
                 },
                 radio_seed,

@@ -43,6 +43,7 @@ use skein_geometry::frame::Pose;
 use skein_link::medium::key_hash;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
+use skein_peer::protocol::airtime::OVERHEAD_BYTES;
 use skein_peer::wire;
 use skein_peer::{Beliefs, Input, Mission, Output, Peer, PeerConfig, PeerId, Report, Role};
 use std::collections::BTreeMap;
@@ -123,6 +124,8 @@ pub struct Swarm {
     /// Which group of the last partition each peer was in.
     sides: BTreeMap<u16, usize>,
     loss_max_permille: u16,
+    /// Bytes handed to the radios, by kind of record.
+    bytes_by_kind: BTreeMap<String, u64>,
 }
 
 impl Swarm {
@@ -159,6 +162,7 @@ impl Swarm {
             relayed_by: BTreeMap::new(),
             sides: BTreeMap::new(),
             loss_max_permille: spec.radio.loss_permille,
+            bytes_by_kind: BTreeMap::new(),
         };
         for (i, f) in swarm.faults.iter().enumerate() {
             swarm.queue.push(f.at_ms, Phase::Act, Event::Fault(i));
@@ -522,6 +526,7 @@ impl Swarm {
                 let hash = bytes_hash(&bytes);
                 self.history.fold(self.now_ms, id, Kind::Publish, hash);
                 self.checker.on_transmission(self.now_ms, id, bytes.len());
+                self.count_bytes(&key, bytes.len());
                 if hops == 0 {
                     self.said(idx, peer, &bytes, hash);
                 }
@@ -576,6 +581,15 @@ impl Swarm {
                 );
             }
             Output::Report(report) => self.reported(id, peer, report),
+        }
+    }
+
+    fn count_bytes(&mut self, key: &str, bytes: usize) {
+        let kind = key.split('/').nth(2).unwrap_or_default();
+        let bytes = (bytes + OVERHEAD_BYTES) as u64;
+        match self.bytes_by_kind.get_mut(kind) {
+            Some(sum) => *sum += bytes,
+            None => drop(self.bytes_by_kind.insert(kind.to_owned(), bytes)),
         }
     }
 

@@ -92,6 +92,7 @@ impl Swarm {
                     .into_iter()
                     .map(|(at_ms, by, of)| FalseDown { at_ms, by, of })
                     .collect(),
+                bytes_by_kind: std::mem::take(&mut self.bytes_by_kind),
             }),
         });
         Outcome {

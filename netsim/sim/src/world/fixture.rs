@@ -44,7 +44,6 @@ pub fn radio() -> RadioSpec {
         loss_permille: 0,
         delay_ms: 5,
         queue_age_ms: 2000,
-        share: 0.5,
     }
 }
 

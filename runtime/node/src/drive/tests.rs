@@ -257,6 +257,7 @@ impl Running {
                 0,
                 Channel {
                     rate_bps: 800,
+                    overhead_bytes: 0,
                     queue_age_ms: 60_000,
                 },
             ),

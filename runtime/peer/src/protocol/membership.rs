@@ -2,19 +2,20 @@
 //! a bound that holds at any loss.
 //!
 //! Carries out the fault detection of D2.7 §3.6: who is lost is found without a
-//! leader, and everybody in a component knows within one bound. With the beacon
-//! period T and the hop diameter D, k1 = 4 + D/4 and k2 = 4 + D/2:
+//! leader, and everybody in a component knows within one bound. With the interval I
+//! that an author announced with its heartbeat, the longest interval T' that anybody alive
+//! announced (a period T at least), and the hop diameter D, k1 = 4 + D/4 and k2 = 4 + D/2:
 //!
 //! | state | event | next state |
 //! |---|---|---|
 //! | unknown | a heartbeat younger than the bound, not condemned | alive or suspect |
 //! | unknown | a heartbeat older than the bound, or condemned | down: its records are asked for |
-//! | alive | k1 T silent, and it used to be heard directly | suspect |
+//! | alive | k1 I silent, and it used to be heard directly | suspect |
 //! | alive | half of that, and the transport says that the link is gone | suspect |
 //! | alive | a suspicion against this very heartbeat is heard | suspect |
 //! | suspect | a fresher heartbeat from anybody, younger than the bound | alive |
-//! | suspect | k2 T unrefuted | down |
-//! | alive, suspect | heartbeat older than (k1 + k2 + D + 2) T | down |
+//! | suspect | k2 T' unrefuted | down |
+//! | alive, suspect | heartbeat older than (k1 + k2 + D + 2) T' | down |
 //! | down | a fresher heartbeat from anybody, younger than the bound | alive |
 //! | any | a heartbeat of a later life, younger than the bound | alive, in that life |
 //! | alive | an old heartbeat of the same life with a higher count | alive; gossip says it, until its author takes a new life |
@@ -30,26 +31,28 @@ pub(crate) mod many_detectors;
 #[cfg(test)]
 mod tests;
 
+use super::airtime::ms_of;
 use super::life::LIFE_STEP;
 use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Status;
+use crate::wire::limits::INTERVAL_LEAST;
 use crate::wire::limits::{HOPS_MAX, MEMBERS_MAX};
 use crate::wire::message::{Beacon, Gossip};
-use known::{Age, Heartbeat, Known, NO_HOPS};
+use known::{Age, Heartbeat, Known};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most other peers known: the largest fleet but this peer itself, so that a round of all
 /// that it knows has room for it. A flood of made-up ids must end somewhere.
 pub const MAX_KNOWN: usize = MEMBERS_MAX - 1;
 
-/// Hops and eccentricities count for so many periods after they were heard: long
-/// enough that each of a full fleet's entries, 20 a beacon, came round three times.
-const HOP_PERIODS: u64 = 10;
+/// Hops and eccentricities count for so many of the longest intervals after they were
+/// heard: what a neighbour says of others comes round, and what is lost comes again.
+const HOP_INTERVALS: u64 = 10;
 
-/// News about a peer goes first in gossip for so many periods: one beacon may be
+/// News about a peer goes first in gossip for so many intervals: one beacon may be
 /// lost, two hardly are.
-const URGENT_PERIODS: u64 = 2;
+const URGENT_INTERVALS: u64 = 2;
 
 /// A belief that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +63,19 @@ pub struct Change {
     pub incarnation: Incarnation,
     /// The new belief; `Alive` for a peer or a life not known before.
     pub status: Status,
+}
+
+/// How long a peer waits before it believes what, at one moment.
+#[derive(Clone, Copy, Debug)]
+struct Patience {
+    /// The longest interval announced, T'.
+    interval_ms: u64,
+    /// k1, quarters.
+    k1_quarters: u64,
+    /// Time to refute a suspicion: k2 T'.
+    k2_ms: u64,
+    /// No living peer's heartbeat is older: (k1 + k2 + D + 2) T'.
+    bound_ms: u64,
 }
 
 /// What a peer last said of itself in its present life.
@@ -86,6 +102,8 @@ pub struct Membership {
     period_ms: u64,
     known: BTreeMap<u16, Known>,
     next_gossip: u16,
+    /// What this peer announced itself, quarters of T.
+    interval: u8,
     doubt_until: Time,
     /// When anything of another peer was last heard.
     last_heard: Option<Time>,
@@ -101,7 +119,9 @@ impl Membership {
             me,
             period_ms: u64::from(period_ms.max(1)),
             known: BTreeMap::new(),
-            next_gossip: 0,
+            // Neighbours tell of different peers.
+            next_gossip: me,
+            interval: INTERVAL_LEAST,
             doubt_until: Time(0),
             last_heard: None,
             gone: BTreeSet::new(),
@@ -118,29 +138,40 @@ impl Membership {
         }
     }
 
-    /// Silence before a direct neighbour suspects, milliseconds: k1 T.
-    #[must_use]
-    pub fn k1_ms(&self, now: Time) -> u64 {
-        self.doubt(now) * self.period_ms * (16 + u64::from(self.diameter(now))) / 4
+    /// What this peer's own beacons announce, quarters of T.
+    pub fn announce(&mut self, interval: u8) {
+        self.interval = interval;
     }
 
-    /// Time to refute a suspicion, milliseconds: k2 T.
+    /// The longest interval that anybody alive announced, this peer included: in it the
+    /// swarm's patience is counted, milliseconds.
     #[must_use]
-    pub fn k2_ms(&self, now: Time) -> u64 {
-        self.doubt(now) * self.period_ms * (8 + u64::from(self.diameter(now))) / 2
+    pub fn interval_ms(&self) -> u64 {
+        let live = self.known.values().filter(|k| k.status != Status::Down);
+        let told = live.map(|k| k.freshest.interval).max();
+        ms_of(told.unwrap_or(0).max(self.interval), self.period_ms)
     }
 
     /// A peer whose own loop ran late doubts its verdicts first: both factors double.
-    fn doubt(&self, now: Time) -> u64 {
-        if now < self.doubt_until { 2 } else { 1 }
+    fn patience(&self, now: Time) -> Patience {
+        let doubt = if now < self.doubt_until { 2 } else { 1 };
+        let diameter = u64::from(self.diameter(now));
+        let interval_ms = self.interval_ms();
+        let k1_quarters = doubt * (16 + diameter);
+        let k2_ms = doubt * interval_ms * (8 + diameter) / 2;
+        let travel_ms = (diameter + 2) * interval_ms;
+        Patience {
+            interval_ms,
+            k1_quarters,
+            k2_ms,
+            bound_ms: interval_ms * k1_quarters / 4 + k2_ms + travel_ms,
+        }
     }
 
-    /// Everybody in the component knows of a death within this time, milliseconds:
-    /// (k1 + k2 + D + 2) T.
+    /// Time to refute a suspicion, milliseconds: k2 T'.
     #[must_use]
-    pub fn bound_ms(&self, now: Time) -> u64 {
-        let travel = (u64::from(self.diameter(now)) + 2) * self.period_ms;
-        self.k1_ms(now) + self.k2_ms(now) + travel
+    pub fn k2_ms(&self, now: Time) -> u64 {
+        self.patience(now).k2_ms
     }
 
     /// A beacon, heard from its author directly. Returns what changed.
@@ -156,7 +187,7 @@ impl Membership {
             return changes;
         }
         self.hears(now);
-        let limits = (self.bound_ms(now), self.k2_ms(now));
+        let limits = self.patience(now);
         let age = Age {
             told_ms: 0,
             at: now,
@@ -168,6 +199,7 @@ impl Membership {
             count,
             age,
             hops: 1,
+            interval: beacon.interval,
             suspected: None,
         };
         self.hear(now, own, limits, &mut changes);
@@ -192,7 +224,7 @@ impl Membership {
         now: Time,
         told: &Gossip,
         teller: &Beacon,
-        limits: (u64, u64),
+        limits: Patience,
         changes: &mut Vec<Change>,
     ) {
         let age = |ds: u16| Age {
@@ -205,6 +237,7 @@ impl Membership {
             count: told.heartbeat,
             age: age(told.age_ds),
             hops: told.hops.saturating_add(1),
+            interval: told.interval,
             suspected: told.suspected_ds.map(age),
         };
         if !self.hear(now, heartbeat, limits, changes) {
@@ -221,16 +254,20 @@ impl Membership {
         }
     }
 
-    /// Merges one heartbeat; `limits` are the bound and k2 T. Returns whether it was
-    /// fresher than what was known.
+    /// Merges one heartbeat. Returns whether it was fresher than what was known.
     fn hear(
         &mut self,
         now: Time,
         heard: Heartbeat,
-        limits: (u64, u64),
+        limits: Patience,
         changes: &mut Vec<Change>,
     ) -> bool {
-        let (bound_ms, k2_ms) = limits;
+        let Patience {
+            interval_ms,
+            bound_ms,
+            k2_ms,
+            ..
+        } = limits;
         if heard.hops > HOPS_MAX || !self.may_live_in(heard.id, heard.incarnation) {
             return false;
         }
@@ -248,13 +285,13 @@ impl Membership {
             }
             return false;
         }
-        let period = now.0 / self.period_ms;
-        let urgent_until = now.plus_ms(URGENT_PERIODS * self.period_ms);
+        let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
         let Some(known) = self.known.get_mut(&heard.id) else {
             if !self.make_room(now) {
                 return false;
             }
-            let known = Known::new(now, heard, period, urgent_until);
+            let mut known = Known::new(now, heard, urgent_until);
+            known.note_hops(now, heard.hops, interval_ms);
             changes.push(known.change());
             self.known.insert(heard.id, known);
             return true;
@@ -264,7 +301,7 @@ impl Membership {
             return false;
         }
         if version(&heard) == version(&known.freshest) {
-            known.merge_same(now, heard, period, urgent_until, changes);
+            known.merge_same(now, heard, interval_ms, urgent_until, changes);
             return false;
         }
         let new_life = heard.incarnation > known.freshest.incarnation;
@@ -280,7 +317,7 @@ impl Membership {
         if new_life || known.beaten_before.is_some_and(|h| h.count <= heard.count) {
             known.beaten_before = None;
         }
-        known.note_hops(period, heard.hops);
+        known.note_hops(now, heard.hops, interval_ms);
         let status = if heard.suspected.is_some() {
             Status::Suspect
         } else {
@@ -303,9 +340,8 @@ impl Membership {
             return;
         }
         let believed = before.is_some_and(|k| k.status != Status::Down);
-        let mut dead = Known::new(now, heard, 0, now);
+        let mut dead = Known::new(now, heard, now);
         dead.status = Status::Down;
-        dead.hops = NO_HOPS;
         if believed {
             changes.push(dead.change());
         }
@@ -348,13 +384,19 @@ impl Membership {
             self.known.len() <= MAX_KNOWN,
             "peers known keep to their cap"
         );
-        let (k1_ms, k2_ms, bound_ms) = (self.k1_ms(now), self.k2_ms(now), self.bound_ms(now));
-        let oldest_period = (now.0 / self.period_ms).saturating_sub(HOP_PERIODS);
-        let urgent_until = now.plus_ms(URGENT_PERIODS * self.period_ms);
+        let Patience {
+            interval_ms,
+            k1_quarters,
+            k2_ms,
+            bound_ms,
+        } = self.patience(now);
+        let window_ms = HOP_INTERVALS * interval_ms;
+        let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
         let mut changes = Vec::new();
         for known in self.known.values_mut().filter(|k| k.status != Status::Down) {
             let silent_ms = known.silent_ms(now);
-            let neighbour = known.fewest_hops(oldest_period) == Some(1);
+            let neighbour = known.fewest_hops(now, window_ms) == Some(1);
+            let k1_ms = ms_of(known.freshest.interval, self.period_ms) * k1_quarters / 4;
             let patience_ms = if self.gone.contains(&known.freshest.id) {
                 k1_ms / 2
             } else {
@@ -417,20 +459,24 @@ impl Membership {
         told
     }
 
-    /// Fewest hops to the farthest live author of the last 10 T.
+    /// Fewest hops to the farthest live author of the last 10 T'.
     #[must_use]
     pub fn eccentricity(&self, now: Time) -> u8 {
-        let oldest = (now.0 / self.period_ms).saturating_sub(HOP_PERIODS);
+        let window_ms = HOP_INTERVALS * self.interval_ms();
         let live = self.known.values().filter(|k| k.status != Status::Down);
-        live.filter_map(|k| k.fewest_hops(oldest))
+        live.filter_map(|k| k.fewest_hops(now, window_ms))
             .max()
             .unwrap_or(0)
     }
 
-    /// The largest eccentricity heard from live peers within 10 T, at least 1.
+    fn own_interval_ms(&self) -> u64 {
+        ms_of(self.interval, self.period_ms)
+    }
+
+    /// The largest eccentricity heard from live peers within 10 T', at least 1.
     #[must_use]
     pub fn diameter(&self, now: Time) -> u32 {
-        let window = HOP_PERIODS * self.period_ms;
+        let window = HOP_INTERVALS * self.interval_ms();
         let recent = |k: &&Known| k.info.heard.is_some_and(|t| now.since_ms(t) < window);
         let live = self.known.values().filter(|k| k.status != Status::Down);
         let heard = live
@@ -465,7 +511,12 @@ impl Membership {
     /// until it has heard somebody, or holds all for down.
     #[must_use]
     pub fn is_deaf(&self, now: Time) -> bool {
-        let silent = |heard: Time| now.since_ms(heard) >= self.k1_ms(now);
+        let Patience {
+            interval_ms,
+            k1_quarters,
+            ..
+        } = self.patience(now);
+        let silent = |heard: Time| now.since_ms(heard) >= interval_ms * k1_quarters / 4;
         self.last_heard.is_some_and(silent) && self.live().next().is_some()
     }
 

@@ -3,8 +3,10 @@
 //!
 //! [`sections`] holds the rules by which cells change hands, [`runs`] how they are
 //! written into a claim, [`rounds`] the exchange of bids, [`negotiation`] when each
-//! is used, [`division`] what a complete round decides.
+//! is used, [`division`] what a complete round decides. What travels is [`relay`]'s, and
+//! how much of it [`airtime`]'s.
 
+pub mod airtime;
 pub mod division;
 pub(crate) mod life;
 pub mod membership;

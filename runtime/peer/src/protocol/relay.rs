@@ -14,16 +14,17 @@
 //! | any of an author | a later life of the author is heard | void: neither held nor sent |
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
 //! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
+//! | waiting | the share allows it, it is this peer's own bid or claim, or nothing is due earlier | sent |
 //! | waiting | its lifetime is over, or the queue is full of what is more urgent | not sent |
 //!
-//! Everything a peer sends goes through one token bucket: its fair share of the
-//! channel it hears. Newer values replace older ones of the same key in the queue.
+//! Everything a peer sends is paid for from its share of the channel, [`Airtime`]. Newer values replace older ones of the same key in the queue.
 
 use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Priority;
+use crate::protocol::airtime::Airtime;
 use crate::wire::key;
-use crate::wire::kinds::{Kind, RECORD_MAX_BYTES};
+use crate::wire::kinds::Kind;
 use crate::wire::limits::{CHUNKS_MAX, HOPS_MAX, MEMBERS_MAX};
 use crate::wire::message::{Beacon, Record};
 use skein_geometry::hash::Fnv;
@@ -33,7 +34,7 @@ mod many_relays;
 use std::collections::BTreeMap;
 
 /// Most records held: 64 peers with a state, a bid, a claim, an order, a finish and
-/// four events each, and one mission of 64 pieces.
+/// four events each, and one mission of 256 pieces.
 pub const MAX_RECORDS: usize = MEMBERS_MAX * 9 + CHUNKS_MAX as usize;
 
 /// Most transmissions waiting: all records of one neighbourhood once.
@@ -44,32 +45,24 @@ pub const MAX_QUEUE: usize = 128;
 /// the second has reached others too.
 const COPIES_HEARD: u8 = 2;
 
-/// A token bucket holds at least one of the largest records, or a small share would
-/// never let it through.
-const BUCKET_MIN_BYTES: usize = RECORD_MAX_BYTES + OVERHEAD_BYTES;
-
-/// Share of the fair share that a peer may use. Peers that do not hear each other send
-/// at once at whoever is between them: beyond half of the air most of it is collisions.
-const SHARE_PERCENT: u64 = 45;
-
-/// Bytes that Zenoh, the attachment and the radio add to a record.
-pub const OVERHEAD_BYTES: usize = 26;
-
 /// A passed-on record waits at least this long, milliseconds, so that its first copies
 /// are heard before the next one is sent.
 const RELAY_DELAY_MS: u64 = 20;
 
-/// And a random time up to this longer, milliseconds: eight neighbours that pass on a
-/// bid of 110 bytes need 15 ms of air each.
-const RELAY_SPREAD_MS: u64 = 240;
+/// And a random time up to this longer for each who shares the channel, milliseconds: a
+/// neighbour that passes on a bid of 110 bytes needs 15 ms of air.
+const RELAY_SPREAD_MS: u64 = 30;
 
 /// What a neighbour lacks is not urgent: the random time before it is sent is up to
-/// this long, milliseconds.
-const REPAIR_SPREAD_MS: u64 = 320;
+/// this long for each who shares the channel, milliseconds.
+const REPAIR_SPREAD_MS: u64 = 40;
 
 /// A round is opened by one bid that all the others answer: each waits a random time
-/// up to this long, milliseconds.
-const BID_SPREAD_MS: u64 = 200;
+/// up to this long for each who shares the channel, milliseconds.
+const BID_SPREAD_MS: u64 = 25;
+
+/// Even in small swarms the random times are those of so many.
+const LEAST_SPREAD: u64 = 8;
 
 /// What became of a record that was heard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,6 +116,8 @@ struct Held {
 struct Waiting {
     from: Time,
     until: Time,
+    /// By when it is to be sent.
+    due: Time,
     priority: Priority,
 }
 
@@ -130,15 +125,12 @@ struct Waiting {
 #[derive(Clone, Debug)]
 pub struct Relay {
     me: u16,
-    period_ms: u64,
-    rate_bps: u64,
+    /// What this peer may send.
+    pub air: Airtime,
     fleet: String,
     held: BTreeMap<RecordKey, Held>,
     queue: BTreeMap<RecordKey, Waiting>,
-    neighbours: BTreeMap<u16, Time>,
     answered: BTreeMap<u16, Time>,
-    tokens_millibytes: u64,
-    filled: Time,
     salt: u64,
 }
 
@@ -149,14 +141,10 @@ impl Relay {
         Self {
             me,
             fleet: fleet.to_owned(),
-            period_ms: u64::from(period_ms.max(1)),
-            rate_bps: u64::from(rate_bps.max(1)),
+            air: Airtime::new(rate_bps, period_ms),
             held: BTreeMap::new(),
             queue: BTreeMap::new(),
-            neighbours: BTreeMap::new(),
             answered: BTreeMap::new(),
-            tokens_millibytes: 0,
-            filled: Time(0),
             salt: u64::from(me).wrapping_mul(0x9E37_79B9_7F4A_7C15),
         }
     }
@@ -185,7 +173,7 @@ impl Relay {
             },
         );
         let delay = if kind == Kind::Bid {
-            self.jitter(&key, (record.incarnation, record.seq)) % BID_SPREAD_MS
+            self.jitter(&key, (record.incarnation, record.seq)) % self.spread_ms(BID_SPREAD_MS)
         } else {
             0
         };
@@ -229,7 +217,8 @@ impl Relay {
         };
         self.hold(key, held);
         if kind.relayed() && hops < HOPS_MAX {
-            let delay = RELAY_DELAY_MS + self.jitter(&key, version) % RELAY_SPREAD_MS;
+            let delay =
+                RELAY_DELAY_MS + self.jitter(&key, version) % self.spread_ms(RELAY_SPREAD_MS);
             self.wait(now, key, kind, delay);
         }
         Offer::New
@@ -255,6 +244,28 @@ impl Relay {
             self.held.remove(&key);
             self.queue.remove(&key);
         }
+    }
+
+    fn spread_ms(&self, each_ms: u64) -> u64 {
+        each_ms * self.air.sharers().max(LEAST_SPREAD)
+    }
+
+    /// By when a record is to be sent: what others wrote may wait an interval, telemetry
+    /// one or two more. Where all are late, each class gets its part: nothing waits for
+    /// ever behind what is more urgent.
+    fn due(&self, key: &RecordKey, from: Time, priority: Priority) -> Time {
+        let telemetry = priority == Priority::Telemetry;
+        let intervals = match (key.0 == self.me, telemetry) {
+            (true, false) => 0,
+            (true, true) | (false, false) => 1,
+            (false, true) => 3,
+        };
+        from.plus_ms(intervals * self.air.interval_ms())
+    }
+
+    /// What this peer bids and claims itself goes before all else: nobody else can say it.
+    fn is_own_promise(&self, key: &RecordKey, priority: Priority) -> bool {
+        key.0 == self.me && priority <= Priority::Claim
     }
 
     fn jitter(&self, key: &RecordKey, version: (Incarnation, u32)) -> u64 {
@@ -307,6 +318,7 @@ impl Relay {
             Waiting {
                 from,
                 until,
+                due: self.due(&key, from, row.priority),
                 priority: row.priority,
             },
         );
@@ -314,16 +326,13 @@ impl Relay {
     }
 
     fn lifetime_ms(&self, kind: Kind) -> u32 {
-        kind.lifetime_ms(u32::try_from(self.period_ms).unwrap_or(u32::MAX))
+        kind.lifetime_ms(u32::try_from(self.air.interval_ms()).unwrap_or(u32::MAX))
     }
 
     /// A neighbour's beacon: what it lacks is queued for it.
     pub fn on_beacon(&mut self, now: Time, author: u16, beacon: &Beacon) {
-        let window = 4 * self.period_ms;
-        self.neighbours.retain(|_, t| now.since_ms(*t) < window);
-        if self.neighbours.len() < MEMBERS_MAX || self.neighbours.contains_key(&author) {
-            self.neighbours.insert(author, now);
-        }
+        self.air.hear(now, author, beacon);
+        let window = 2 * self.air.interval_ms();
         self.answered.retain(|_, t| now.since_ms(*t) < window);
         let mut theirs: BTreeMap<u16, (Incarnation, u32, u16)> = BTreeMap::new();
         for g in &beacon.gossip {
@@ -356,7 +365,7 @@ impl Relay {
         if (life, mine_seq, mine_digest) == (incarnation, max_seq, digest) {
             return;
         }
-        let quiet = 2 * self.period_ms;
+        let quiet = 2 * self.air.interval_ms();
         if self
             .answered
             .get(&author)
@@ -380,7 +389,8 @@ impl Relay {
         for (key, kind) in lacking {
             if !self.queue.contains_key(&key) {
                 let version = (life, u32::try_from(now.0 & 0xffff_ffff).unwrap_or(0));
-                let delay = RELAY_DELAY_MS + self.jitter(&key, version) % REPAIR_SPREAD_MS;
+                let delay =
+                    RELAY_DELAY_MS + self.jitter(&key, version) % self.spread_ms(REPAIR_SPREAD_MS);
                 if let Some(h) = self.held.get_mut(&key) {
                     h.copies = 0;
                 }
@@ -418,40 +428,16 @@ impl Relay {
         self.held.values().map(|h| h.record.clone()).collect()
     }
 
-    /// Bytes per second this peer may send.
-    fn rate_bytes_ps(&self) -> u64 {
-        let sharers = self.neighbours.len() as u64 + 1;
-        (self.rate_bps / 8 * SHARE_PERCENT / 100 / sharers).max(1)
-    }
-
-    fn refill(&mut self, now: Time) {
-        let rate = self.rate_bytes_ps();
-        let most = (2 * rate).max(BUCKET_MIN_BYTES as u64) * 1000;
-        self.tokens_millibytes =
-            (self.tokens_millibytes + now.since_ms(self.filled) * rate).min(most);
-        self.filled = now;
-    }
-
-    /// A transmission that did not go through the queue, in bytes.
-    pub fn charge(&mut self, now: Time, bytes: usize) {
-        self.refill(now);
-        self.tokens_millibytes = self
-            .tokens_millibytes
-            .saturating_sub((bytes + OVERHEAD_BYTES) as u64 * 1000);
-    }
-
     /// What may go out now, the most urgent first; `None` when nothing may.
     pub fn poll(&mut self, now: Time) -> Option<Out> {
         self.queue.retain(|_, w| w.until >= now);
         let (key, priority) = self.first(now)?;
-        self.refill(now);
+        let kind = Kind::of_number(key.1)?;
+        let lifetime_ms = self.lifetime_ms(kind);
         let held = self.held.get_mut(&key)?;
-        let cost = (held.bytes.len() + OVERHEAD_BYTES) as u64 * 1000;
-        if self.tokens_millibytes < cost {
+        if !self.air.pay(now, held.bytes.len()) {
             return None;
         }
-        let kind = Kind::of_number(key.1)?;
-        self.tokens_millibytes -= cost;
         self.queue.remove(&key);
         held.sent = now;
         held.copies = held.copies.saturating_add(1);
@@ -460,7 +446,7 @@ impl Relay {
             bytes: held.bytes.clone(),
             hops: held.hops,
             priority,
-            lifetime_ms: kind.lifetime_ms(u32::try_from(self.period_ms).unwrap_or(u32::MAX)),
+            lifetime_ms,
         })
     }
 
@@ -468,7 +454,7 @@ impl Relay {
         self.queue
             .iter()
             .filter(|(_, w)| w.from <= now)
-            .min_by_key(|(k, w)| (w.priority, w.from, **k))
+            .min_by_key(|(k, w)| (!self.is_own_promise(k, w.priority), w.due, **k))
             .map(|(k, w)| (*k, w.priority))
     }
 
@@ -480,10 +466,8 @@ impl Relay {
             return Some(due);
         }
         let (key, _) = self.first(now)?;
-        let cost = (self.held.get(&key)?.bytes.len() + OVERHEAD_BYTES) as u64 * 1000;
-        let rate = self.rate_bytes_ps();
-        let have = self.tokens_millibytes + now.since_ms(self.filled) * rate;
-        Some(now.plus_ms(cost.saturating_sub(have).div_ceil(rate).max(1)))
+        let bytes = self.held.get(&key)?.bytes.len();
+        Some(now.plus_ms(self.air.wait_ms(now, bytes)))
     }
 
     /// What is held and what waits, each with its cap.
@@ -492,7 +476,7 @@ impl Relay {
         [
             ("records", self.held.len(), MAX_RECORDS),
             ("queue", self.queue.len(), MAX_QUEUE),
-            ("neighbours", self.neighbours.len(), MEMBERS_MAX),
+            self.air.load(),
         ]
     }
 }
@@ -500,6 +484,7 @@ impl Relay {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::protocol::airtime::OVERHEAD_BYTES;
 
     fn record(author: u16, seq: u32) -> Record {
         Record {
@@ -558,6 +543,10 @@ mod tests {
     #[test]
     fn the_bucket_bounds_what_is_sent() {
         let mut r = relay(2);
+        // It has begun: it knows that it is alone.
+        for t in 0..3 {
+            r.air.plan_beacon(Time(t));
+        }
         let mut bytes = 0;
         for t in 0..10_000u64 {
             r.own(Time(t), &record(2, u32::try_from(t).unwrap()), vec![0; 200]);

@@ -108,6 +108,7 @@ fn a_suspicion_heard_is_refuted_at_once_without_gossip() {
         heartbeat: 1,
         age_ds: 40,
         hops: 1,
+        interval: 4,
         suspected_ds: Some(0),
         able: true,
         max_seq: 0,

@@ -251,6 +251,8 @@ array_of!(Beacon {
     nonce,
     counter,
     eccentricity,
+    interval,
+    sharers,
     revision,
     loop_hash,
     cover_digest,
@@ -262,6 +264,7 @@ array_of!(Gossip {
     heartbeat,
     age_ds,
     hops,
+    interval,
     suspected_ds,
     able,
     max_seq,
@@ -281,7 +284,11 @@ array_of!(State {
 });
 array_of!(Epoch { counter, hash });
 array_of!(CellRun { first, count });
-array_of!(Member { id, incarnation });
+array_of!(MemberRun {
+    first,
+    count,
+    incarnation
+});
 array_of!(Round {
     counter,
     members,
@@ -362,8 +369,69 @@ impl Listed for Gossip {
 impl Listed for OffLoop {
     const MAX: usize = 1;
 }
-impl Listed for Member {
+impl Listed for MemberRun {
     const MAX: usize = MEMBERS_MAX;
+}
+
+/// Members by runs of ids in the same life: a whole swarm in its first life is one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct MemberRun {
+    first: u16,
+    count: u16,
+    incarnation: u32,
+}
+
+impl Wire for Vec<Member> {
+    fn put(&self, out: &mut Out) {
+        member_runs(self).put(out);
+    }
+
+    fn get(input: &mut In<'_>) -> Result<Self, WireError> {
+        let runs: Vec<MemberRun> = Wire::get(input)?;
+        let range = WireError::Range { field: "members" };
+        let many = runs.iter().map(|r| usize::from(r.count)).sum::<usize>();
+        if many > MEMBERS_MAX {
+            return Err(range);
+        }
+        let mut members = Self::with_capacity(many);
+        for run in &runs {
+            let last = run
+                .count
+                .checked_sub(1)
+                .and_then(|n| run.first.checked_add(n));
+            let last = last.ok_or(range)?;
+            members.extend((run.first..=last).map(|id| Member {
+                id,
+                incarnation: run.incarnation,
+            }));
+        }
+        // One encoding a value: runs are as long as they can be.
+        if member_runs(&members) == runs {
+            Ok(members)
+        } else {
+            Err(range)
+        }
+    }
+}
+
+fn member_runs(members: &[Member]) -> Vec<MemberRun> {
+    let mut runs: Vec<MemberRun> = Vec::new();
+    for m in members {
+        match runs.last_mut() {
+            Some(run)
+                if run.incarnation == m.incarnation
+                    && run.first.checked_add(run.count) == Some(m.id) =>
+            {
+                run.count += 1;
+            }
+            _ => runs.push(MemberRun {
+                first: m.id,
+                count: 1,
+                incarnation: m.incarnation,
+            }),
+        }
+    }
+    runs
 }
 impl Listed for CellRun {
     const MAX: usize = COMMITS_MAX;

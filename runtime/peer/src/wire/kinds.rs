@@ -138,11 +138,11 @@ const TABLE: [KindRow; 12] = [
         )
     },
     KindRow {
-        subjects: 64,
+        subjects: 256,
         ..row(
             Kind::Mission,
             "mission",
-            1056,
+            288,
             Priority::Telemetry,
             Lifetime::Ms(60_000),
         )
@@ -287,7 +287,7 @@ pub fn docs_table() -> String {
     );
     for row in &TABLE {
         let lifetime = match row.lifetime {
-            Lifetime::Beacons(n) => format!("{n} T"),
+            Lifetime::Beacons(n) => format!("{n} I"),
             Lifetime::Ms(ms) => format!("{} s", ms / 1000),
         };
         let passed_on = match (row.spoken, row.relayed) {
@@ -330,6 +330,6 @@ mod tests {
     fn the_table_has_a_line_a_kind() {
         let table = docs_table();
         assert_eq!(table.lines().count(), Kind::ALL.len() + 2);
-        assert!(table.contains("| 4 | `cover` | 1 | 1024 | Beacon | 4 T | no |"));
+        assert!(table.contains("| 4 | `cover` | 1 | 1024 | Beacon | 4 I | no |"));
     }
 }

@@ -9,6 +9,10 @@ use super::message::{Beacon, Bid, CellRun, Claim, Round, State};
 
 /// Gossip entries in a beacon: what a tenth of a second of a 64 kbit/s channel carries.
 pub const GOSSIP_MAX: usize = 20;
+/// Shortest interval that a beacon announces, quarters of T: one period.
+pub const INTERVAL_LEAST: u8 = 4;
+/// And the longest: sixteen periods. Whoever needs more air than that is out of reach.
+pub const INTERVAL_MOST: u8 = 64;
 /// Members of a round, and peers of a fleet, ground stations included: with more, gossip
 /// of 20 entries a beacon would not come round within the window in which hops count.
 pub const MEMBERS_MAX: usize = 64;
@@ -26,11 +30,11 @@ pub const COMMITS_MAX: usize = 32;
 pub const BID_COVERED_MAX_BYTES: usize = 256;
 /// Run-length bytes of the union in a cover record.
 pub const COVERED_MAX_BYTES: usize = 1000;
-/// Bytes of a mission in one piece: with its envelope it stays near a quarter of the
-/// record cap, so that a lost piece is cheap to repeat.
-pub const CHUNK_MAX_BYTES: usize = 1024;
+/// Bytes of a mission in one piece: about two beacons' time on the air. A piece of 1 KiB
+/// lasts 0.14 s at 64 kbit/s, and somebody hidden sends meanwhile nearly always.
+pub const CHUNK_MAX_BYTES: usize = 256;
 /// Pieces of a mission: 64 KiB of rings are some 6,000 corners.
-pub const CHUNKS_MAX: u16 = 64;
+pub const CHUNKS_MAX: u16 = 256;
 /// Farthest from the origin that the tangent plane is trusted, mm: 20 km.
 pub const POSITION_MAX_MM: i32 = 20_000_000;
 /// Heading, 1e-4 rad: a turn either way.
@@ -80,8 +84,15 @@ fn check_pose(east_mm: i32, north_mm: i32, heading_e4: i32) -> Result<(), WireEr
 fn check_beacon(b: &Beacon) -> Result<(), WireError> {
     check_pose(b.east_mm, b.north_mm, b.heading_e4)?;
     in_range("eccentricity", b.eccentricity <= HOPS_MAX)?;
+    in_range("interval", is_interval(b.interval))?;
+    in_range("sharers", usize::from(b.sharers) <= MEMBERS_MAX + 1)?;
     at_most("gossip", b.gossip.len(), GOSSIP_MAX)?;
-    in_range("hops", b.gossip.iter().all(|g| g.hops <= HOPS_MAX))
+    in_range("hops", b.gossip.iter().all(|g| g.hops <= HOPS_MAX))?;
+    in_range("interval", b.gossip.iter().all(|g| is_interval(g.interval)))
+}
+
+fn is_interval(quarters: u8) -> bool {
+    (INTERVAL_LEAST..=INTERVAL_MOST).contains(&quarters)
 }
 
 fn check_state(s: &State) -> Result<(), WireError> {

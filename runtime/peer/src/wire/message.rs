@@ -52,6 +52,10 @@ pub struct Beacon {
     pub counter: u32,
     /// Fewest hops to its farthest live author.
     pub eccentricity: u8,
+    /// Until its next beacon, quarters of T.
+    pub interval: u8,
+    /// How many it counts in its earshot, itself included.
+    pub sharers: u16,
     /// Mission revision it follows.
     pub revision: u32,
     /// The loop it derived; 0 when none.
@@ -75,6 +79,8 @@ pub struct Gossip {
     pub age_ds: u16,
     /// Hops it took.
     pub hops: u8,
+    /// The interval its author announced with it, quarters of T.
+    pub interval: u8,
     /// Age of a suspicion against that heartbeat, 100 ms units, if there is one.
     pub suspected_ds: Option<u16>,
     /// Whether it said it can plan.

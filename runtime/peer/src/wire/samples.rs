@@ -12,6 +12,7 @@ pub fn gossip(id: u16) -> Gossip {
         heartbeat: 300,
         age_ds: 15,
         hops: 2,
+        interval: 4,
         suspected_ds: Some(4),
         able: true,
         max_seq: 70_000,
@@ -32,6 +33,8 @@ pub fn beacon(heartbeat: u32) -> Beacon {
         nonce: 1,
         counter: 0,
         eccentricity: 1,
+        interval: 4,
+        sharers: 2,
         revision: 1,
         loop_hash: 1,
         cover_digest: 0,
@@ -89,6 +92,8 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                 nonce: 0xcafe_f00d,
                 counter: 7,
                 eccentricity: 2,
+                interval: 4,
+                sharers: 3,
                 revision: 1,
                 loop_hash: 0x0123_4567_89ab_cdef,
                 cover_digest: 99,
@@ -100,7 +105,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                     },
                 ],
             }),
-            "8e182a3a0012d6861a000d950b193d5cf5f4f41acafef00d0702011b0123456789abcdef18638289040219012c0f0204f51a0001117019beef89050219012c0f02f6f51a0001117019beef",
+            "90182a3a0012d6861a000d950b193d5cf5f4f41acafef00d07020403011b0123456789abcdef1863828a040219012c0f020404f51a0001117019beef8a050219012c0f0204f6f51a0001117019beef",
         ),
         (
             Body::State(State {
@@ -141,7 +146,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                 cells_since: 5,
                 idle: false,
             }),
-            "8e860782820101820302011b0123456789abcdeff519138811f4190fa01946501923281a00124f8044000c03048182100281831a0001d4c0397ab6193d5c1a000927c01a0001117005f4",
+            "8e8607828301010183030102011b0123456789abcdeff519138811f4190fa01946501923281a00124f8044000c03048182100281831a0001d4c0397ab6193d5c1a000927c01a0001117005f4",
         ),
         (
             Body::Claim(Claim {
@@ -189,6 +194,7 @@ pub fn largest() -> Vec<Body> {
         heartbeat: u32::MAX,
         age_ds: u16::MAX,
         hops: HOPS_MAX,
+        interval: INTERVAL_MOST,
         suspected_ds: Some(u16::MAX),
         able: true,
         max_seq: u32::MAX,
@@ -216,7 +222,7 @@ pub fn largest() -> Vec<Body> {
     let members = (u16::MAX - 63..=u16::MAX)
         .map(|id| Member {
             id,
-            incarnation: u32::MAX,
+            incarnation: u32::MAX - u32::from(id % 2),
         })
         .collect();
     vec![
@@ -231,6 +237,8 @@ pub fn largest() -> Vec<Body> {
             nonce: u32::MAX,
             counter: u32::MAX,
             eccentricity: HOPS_MAX,
+            interval: INTERVAL_MOST,
+            sharers: u16::try_from(MEMBERS_MAX + 1).unwrap_or(u16::MAX),
             revision: u32::MAX,
             loop_hash: u64::MAX,
             cover_digest: u32::MAX,

@@ -7,8 +7,8 @@
 use super::kinds::Kind;
 use super::limits::{
     BID_COVERED_MAX_BYTES, CHUNK_MAX_BYTES, CHUNKS_MAX, COMMITS_MAX, COVERED_MAX_BYTES, DONE_MAX,
-    DURATION_MAX_MS, GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX, HOPS_MAX, MEMBERS_MAX, PLAN_MAX,
-    POSITION_MAX_MM, SPEED_MAX_MMPS,
+    DURATION_MAX_MS, GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX, HOPS_MAX, INTERVAL_LEAST, INTERVAL_MOST,
+    MEMBERS_MAX, PLAN_MAX, POSITION_MAX_MM, SPEED_MAX_MMPS,
 };
 use core::fmt::Write as _;
 
@@ -51,6 +51,7 @@ const U16: Shape = Shape::Number(0, u16::MAX as i128);
 const COUNT: Shape = Shape::Number(1, u16::MAX as i128);
 const U32: Shape = Shape::Number(0, u32::MAX as i128);
 const U64: Shape = Shape::Number(0, u64::MAX as i128);
+const INTERVAL: Shape = Shape::Number(INTERVAL_LEAST as i128, INTERVAL_MOST as i128);
 const HOPS: Shape = Shape::Number(0, HOPS_MAX as i128);
 const MM: Shape = Shape::Number(-(POSITION_MAX_MM as i128), POSITION_MAX_MM as i128);
 const E4: Shape = Shape::Number(-(HEADING_MAX_E4 as i128), HEADING_MAX_E4 as i128);
@@ -93,6 +94,11 @@ const GOSSIP: &[Place] = &[
     at("age_ds", "its age, sum of holding times, 100 ms", U16),
     at("hops", "hops it took", HOPS),
     at(
+        "interval",
+        "what its author announced, quarters of T",
+        INTERVAL,
+    ),
+    at(
         "suspected_ds",
         "age of a suspicion against it, 100 ms, or null",
         Shape::Maybe(u16::MAX as i128),
@@ -124,6 +130,12 @@ const BEACON: &[Place] = &[
         "eccentricity",
         "fewest hops to its farthest live author",
         HOPS,
+    ),
+    at("interval", "until its next beacon, quarters of T", INTERVAL),
+    at(
+        "sharers",
+        "how many it counts in its earshot, itself included",
+        Shape::Number(0, MEMBERS_MAX as i128 + 1),
     ),
     REVISION,
     LOOP_HASH,
@@ -175,8 +187,9 @@ const RUN: &[Place] = &[
     at("count", "how many, cyclic", COUNT),
 ];
 
-const MEMBER: &[Place] = &[
-    at("id", "who, ascending", U16),
+const MEMBERS: &[Place] = &[
+    at("first", "the first of them, ascending", U16),
+    at("count", "how many ids in a row", COUNT),
     at("incarnation", "in which life", U32),
 ];
 
@@ -188,8 +201,8 @@ const ROUND: &[Place] = &[
     ),
     at(
         "members",
-        "who takes part",
-        Shape::Rows(MEMBER, MEMBERS_MAX),
+        "who takes part, in runs of ids in the same life",
+        Shape::Rows(MEMBERS, MEMBERS_MAX),
     ),
     REVISION,
     LOOP_HASH,

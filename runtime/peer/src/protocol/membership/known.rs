@@ -1,7 +1,7 @@
 //! One peer as another knows it: its freshest heartbeat, how old that is, by how many
 //! hops it came.
 
-use super::{Change, HOP_PERIODS, Info};
+use super::{Change, Info};
 use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Status;
@@ -28,6 +28,8 @@ pub(super) struct Heartbeat {
     pub(super) count: u32,
     pub(super) age: Age,
     pub(super) hops: u8,
+    /// What its author announced with it, quarters of T.
+    pub(super) interval: u8,
     pub(super) suspected: Option<Age>,
 }
 
@@ -38,8 +40,10 @@ pub(super) struct Known {
     pub(super) excused_ms: u64,
     pub(super) status: Status,
     pub(super) info: Info,
-    /// Fewest hops by period, for the last ten: (period, hops).
-    pub(super) hops: [(u64, u8); 10],
+    /// Fewest hops by interval, for the last ten: since when, how many.
+    hops: [(Time, u8); 10],
+    /// Which of them is the latest.
+    latest: usize,
     pub(super) eccentricity: u8,
     pub(super) urgent_until: Time,
     /// An old heartbeat of this very life beyond the one that it now beats: it began the
@@ -47,17 +51,17 @@ pub(super) struct Known {
     pub(super) beaten_before: Option<Heartbeat>,
 }
 
-/// Hops of somebody who was not heard in the last ten periods.
-pub(super) const NO_HOPS: [(u64, u8); 10] = [(0, u8::MAX); 10];
+/// Hops of somebody who was not heard in the last ten intervals.
+const NO_HOPS: [(Time, u8); 10] = [(Time(0), u8::MAX); 10];
 
 impl Known {
-    pub(super) fn new(now: Time, heard: Heartbeat, period: u64, urgent_until: Time) -> Self {
+    pub(super) fn new(now: Time, heard: Heartbeat, urgent_until: Time) -> Self {
         let status = if heard.suspected.is_some() {
             Status::Suspect
         } else {
             Status::Alive
         };
-        let mut known = Self {
+        Self {
             freshest: heard,
             excused_ms: 0,
             status,
@@ -66,12 +70,11 @@ impl Known {
                 ..Info::default()
             },
             hops: NO_HOPS,
+            latest: 0,
             eccentricity: 0,
             urgent_until,
             beaten_before: None,
-        };
-        known.note_hops(period, heard.hops);
-        known
+        }
     }
 
     /// How long the peer was silent while this one listened.
@@ -94,13 +97,13 @@ impl Known {
         &mut self,
         now: Time,
         heard: Heartbeat,
-        period: u64,
+        interval_ms: u64,
         urgent_until: Time,
         changes: &mut Vec<Change>,
     ) {
         if heard.hops < self.freshest.hops {
             self.freshest.hops = heard.hops;
-            self.note_hops(period, heard.hops);
+            self.note_hops(now, heard.hops, interval_ms);
         }
         let Some(told) = heard.suspected else {
             return;
@@ -119,22 +122,22 @@ impl Known {
         }
     }
 
-    pub(super) fn note_hops(&mut self, period: u64, hops: u8) {
-        let place = usize::try_from(period % HOP_PERIODS).unwrap_or(0);
-        let slot = &mut self.hops[place];
-        *slot = if slot.0 == period {
-            (period, slot.1.min(hops))
+    pub(super) fn note_hops(&mut self, now: Time, hops: u8, interval_ms: u64) {
+        let (since, fewest) = self.hops[self.latest];
+        if fewest != u8::MAX && now.since_ms(since) < interval_ms {
+            self.hops[self.latest].1 = fewest.min(hops);
         } else {
-            (period, hops)
-        };
+            self.latest = (self.latest + 1) % self.hops.len();
+            self.hops[self.latest] = (now, hops);
+        }
     }
 
-    /// Fewest hops in the periods after `oldest`.
-    pub(super) fn fewest_hops(&self, oldest: u64) -> Option<u8> {
+    /// Fewest hops within a time.
+    pub(super) fn fewest_hops(&self, now: Time, window_ms: u64) -> Option<u8> {
         let recent = self
             .hops
             .iter()
-            .filter(|(p, h)| *h != u8::MAX && (*p > oldest || oldest == 0));
+            .filter(|(since, hops)| *hops != u8::MAX && now.since_ms(*since) < window_ms);
         recent.map(|(_, hops)| *hops).min()
     }
 
@@ -166,6 +169,7 @@ impl Known {
             heartbeat: heard.count,
             age_ds: ds(heard.age),
             hops: heard.hops,
+            interval: heard.interval,
             suspected_ds: heard.suspected.map(ds),
             able: self.info.able,
             max_seq: 0,

@@ -21,7 +21,7 @@ fn silence_leads_to_suspicion_and_then_to_a_verdict() {
         }
     }
     assert_eq!(seen, [(4250, Status::Suspect), (8750, Status::Down)]);
-    assert!(8750 <= m.bound_ms(Time(20_000)));
+    assert!(8750 <= m.patience(Time(20_000)).bound_ms);
 }
 
 #[test]
@@ -57,6 +57,7 @@ fn an_old_heartbeat_does_not_raise_the_dead() {
         heartbeat: 6,
         age_ds: 190,
         hops: 1,
+        interval: 4,
         suspected_ds: None,
         able: true,
         max_seq: 0,
@@ -103,6 +104,7 @@ fn entry(id: u16, heartbeat: u32, age_ds: u16, suspected_ds: Option<u16>) -> Gos
         heartbeat,
         age_ds,
         hops: 1,
+        interval: 4,
         suspected_ds,
         able: true,
         max_seq: 0,
@@ -277,6 +279,7 @@ fn told_suspicion(suspected_ds: u16) -> Gossip {
         heartbeat: 1,
         age_ds: 50,
         hops: 1,
+        interval: 4,
         suspected_ds: Some(suspected_ds),
         able: true,
         max_seq: 0,

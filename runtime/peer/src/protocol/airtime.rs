@@ -1,0 +1,375 @@
+//! The share of the air: how many bytes a peer may send, how often it beacons, and with
+//! how much gossip.
+//!
+//! | event | what follows |
+//! |---|---|
+//! | a beacon is heard | its author shares the channel for ten of its intervals; so do as many as it says that it shares with |
+//! | a record is sent | it is paid for; one that is larger than the bucket goes when the bucket is full, and the rest is owed |
+//! | a beacon is sent | it is paid for, if need be later: what is owed makes everything else wait |
+//! | a suspicion is answered | it is paid from a reserve, and from the share when the reserve is empty |
+//! | a full beacon is due | its interval is the shortest in which half of the share carries it, 16 T at most |
+//!
+//! Who shares a channel is the most that this peer or a neighbour counts: a station hears
+//! nothing of those behind its neighbours, and its neighbours hear them all. Counting for
+//! ten intervals makes loss hide nobody: where the count fell with each beacon that
+//! collided, everybody's share would grow as the channel fills.
+
+use crate::input::Time;
+use crate::wire::limits::{GOSSIP_MAX, INTERVAL_LEAST, INTERVAL_MOST, MEMBERS_MAX};
+use crate::wire::message::Beacon;
+use std::collections::BTreeMap;
+
+/// Share of the channel that all in one earshot may use together. Peers that do not hear
+/// each other send at once at whoever is between them: beyond half of the air most of it
+/// is collisions.
+pub const SHARE_PERCENT: u64 = 45;
+
+/// Bytes that Zenoh, the attachment and the radio add to a record.
+pub const OVERHEAD_BYTES: usize = 26;
+
+/// A bucket holds the share of so many periods: what a round asks of a peer at once.
+pub const BURST_PERIODS: u64 = 3;
+
+/// A neighbour counts for so many of the intervals it announced: at three beacons in ten
+/// lost it is missed once in 170,000 times.
+const LASTING_INTERVALS: u64 = 10;
+
+/// A peer that has sent fewer than three beacons shares with so many, itself included: a
+/// whole swarm may have been started at once.
+const FIRST_SHARERS: u64 = 64;
+const FIRST_BEACONS: u8 = 3;
+
+/// A beacon without gossip, in its envelope, at most as long as this but for counters that
+/// ran for hours.
+const BARE_BYTES: usize = 58;
+
+/// And an entry of gossip.
+const ENTRY_BYTES: usize = 17;
+
+/// A beacon that carries gossip carries so many entries: one for news, two for the rotation.
+const LEAST_ENTRIES: usize = 3;
+
+/// What a suspicion is answered from: so many bare beacons, refilled by a quarter of the
+/// share. At four an interval that is a whole k2 at D = 1.
+const RESERVE_BEACONS: usize = 16;
+
+/// Longer pauses refill nothing more, milliseconds.
+const REFILL_MAX_MS: u64 = 600_000;
+
+#[derive(Clone, Copy, Debug)]
+struct Neighbour {
+    until: Time,
+    sharers: u16,
+}
+
+/// When the next beacon follows, and what this one carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BeaconPlan {
+    /// Until the next one, quarters of T.
+    pub interval: u8,
+    /// Most entries of gossip.
+    pub entries: usize,
+}
+
+/// What one peer may send.
+#[derive(Clone, Debug)]
+pub struct Airtime {
+    period_ms: u64,
+    rate_bps: u64,
+    neighbours: BTreeMap<u16, Neighbour>,
+    /// What may be sent; below zero, what is owed.
+    tokens_millibytes: i64,
+    reserve_millibytes: i64,
+    filled: Time,
+    interval: u8,
+    /// Full beacons planned so far, as far as it matters.
+    planned: u8,
+}
+
+impl Airtime {
+    /// A channel of `rate_bps` on which nobody was heard yet.
+    #[must_use]
+    pub fn new(rate_bps: u32, period_ms: u32) -> Self {
+        Self {
+            period_ms: u64::from(period_ms.max(1)),
+            rate_bps: u64::from(rate_bps.max(1)),
+            neighbours: BTreeMap::new(),
+            tokens_millibytes: 0,
+            reserve_millibytes: millibytes(RESERVE_BEACONS * (BARE_BYTES + OVERHEAD_BYTES)),
+            filled: Time(0),
+            interval: INTERVAL_LEAST,
+            planned: 0,
+        }
+    }
+
+    /// A neighbour's beacon.
+    pub fn hear(&mut self, now: Time, author: u16, beacon: &Beacon) {
+        self.neighbours.retain(|_, n| n.until > now);
+        if self.neighbours.len() < MEMBERS_MAX || self.neighbours.contains_key(&author) {
+            let lasts_ms = LASTING_INTERVALS * ms_of(beacon.interval, self.period_ms);
+            let heard = Neighbour {
+                until: now.plus_ms(lasts_ms),
+                sharers: beacon.sharers,
+            };
+            self.neighbours.insert(author, heard);
+        }
+    }
+
+    /// How many this peer counts in its own earshot, itself included.
+    #[must_use]
+    pub fn counted(&self) -> u16 {
+        u16::try_from(self.neighbours.len() + 1).unwrap_or(u16::MAX)
+    }
+
+    /// How many share the channel: as many as whoever hears most of them counts.
+    #[must_use]
+    pub fn sharers(&self) -> u64 {
+        let told = self.neighbours.values().map(|n| n.sharers).max();
+        u64::from(told.unwrap_or(0).max(self.counted()))
+    }
+
+    /// Bytes a second that this peer may send among so many.
+    fn share_bytes_ps(&self, sharers: u64) -> u64 {
+        (self.rate_bps * SHARE_PERCENT / 800 / sharers.max(1)).max(1)
+    }
+
+    fn rate_bytes_ps(&self) -> u64 {
+        let begins = self.planned < FIRST_BEACONS;
+        let least = if begins { FIRST_SHARERS } else { 1 };
+        self.share_bytes_ps(self.sharers().max(least))
+    }
+
+    /// Milliseconds between two beacons as last announced.
+    #[must_use]
+    pub fn interval_ms(&self) -> u64 {
+        ms_of(self.interval, self.period_ms)
+    }
+
+    /// The same in quarters of T.
+    #[must_use]
+    pub fn interval(&self) -> u8 {
+        self.interval
+    }
+
+    /// A beacon with gossip is due. The interval at most doubles from one to the next: who
+    /// misses the one that announces it is not to be alarmed by the silence.
+    pub fn plan_beacon(&mut self, now: Time) -> BeaconPlan {
+        self.neighbours.retain(|_, n| n.until > now);
+        self.refill(now);
+        self.planned = self.planned.saturating_add(1).min(FIRST_BEACONS);
+        let share = self.share_bytes_ps(self.sharers());
+        let half = (share * self.period_ms / 2000).max(1);
+        let bare = (BARE_BYTES + OVERHEAD_BYTES) as u64;
+        let least = bare + (LEAST_ENTRIES * ENTRY_BYTES) as u64;
+        let most = INTERVAL_MOST.min(self.interval.saturating_mul(2));
+        let interval = u8::try_from((4 * least).div_ceil(half)).unwrap_or(INTERVAL_MOST);
+        self.interval = interval.clamp(INTERVAL_LEAST, most.max(INTERVAL_LEAST));
+        // What nothing else has used is there for gossip.
+        let unused = u64::try_from(self.tokens_millibytes / 2000).unwrap_or(0);
+        let room = (half * u64::from(self.interval) / 4).max(unused);
+        let entries = usize::try_from(room.saturating_sub(bare)).unwrap_or(0) / ENTRY_BYTES;
+        BeaconPlan {
+            interval: self.interval,
+            entries: entries.clamp(LEAST_ENTRIES, GOSSIP_MAX),
+        }
+    }
+
+    fn depth_millibytes(&self) -> i64 {
+        let depth = self.rate_bytes_ps() * BURST_PERIODS * self.period_ms;
+        i64::try_from(depth).unwrap_or(i64::MAX / 2)
+    }
+
+    fn refill(&mut self, now: Time) {
+        let passed_ms = now.since_ms(self.filled).min(REFILL_MAX_MS);
+        let gained = i64::try_from(passed_ms * self.rate_bytes_ps()).unwrap_or(i64::MAX / 2);
+        self.tokens_millibytes =
+            (self.tokens_millibytes.saturating_add(gained)).min(self.depth_millibytes());
+        let most = millibytes(RESERVE_BEACONS * (BARE_BYTES + OVERHEAD_BYTES));
+        self.reserve_millibytes = self.reserve_millibytes.saturating_add(gained / 4).min(most);
+        self.filled = now;
+    }
+
+    /// Pays for a transmission that cannot wait. What is lacking is owed.
+    pub fn charge(&mut self, now: Time, bytes: usize) {
+        self.refill(now);
+        self.tokens_millibytes = self.tokens_millibytes.saturating_sub(cost(bytes));
+    }
+
+    /// Pays for an answer to a suspicion.
+    pub fn charge_answer(&mut self, now: Time, bytes: usize) {
+        self.refill(now);
+        let reserved = self.reserve_millibytes.min(cost(bytes));
+        self.reserve_millibytes -= reserved;
+        self.tokens_millibytes = self
+            .tokens_millibytes
+            .saturating_sub(cost(bytes) - reserved);
+    }
+
+    /// Pays for a transmission if it may go now.
+    pub fn pay(&mut self, now: Time, bytes: usize) -> bool {
+        self.refill(now);
+        let goes = self.tokens_millibytes >= self.asked(bytes);
+        if goes {
+            self.tokens_millibytes -= cost(bytes);
+        }
+        goes
+    }
+
+    /// How long a transmission has to wait yet, milliseconds, at least one.
+    #[must_use]
+    pub fn wait_ms(&self, now: Time, bytes: usize) -> u64 {
+        let rate = self.rate_bytes_ps();
+        let lacking = self.asked(bytes).saturating_sub(self.tokens_millibytes);
+        let lacking = u64::try_from(lacking).unwrap_or(0);
+        let passed_ms = now.since_ms(self.filled);
+        lacking.div_ceil(rate).saturating_sub(passed_ms).max(1)
+    }
+
+    /// What the bucket must hold for a transmission: its cost, or all that it can hold.
+    fn asked(&self, bytes: usize) -> i64 {
+        cost(bytes).min(self.depth_millibytes())
+    }
+
+    /// How many neighbours are counted, and the cap.
+    #[must_use]
+    pub fn load(&self) -> (&'static str, usize, usize) {
+        ("neighbours", self.neighbours.len(), MEMBERS_MAX)
+    }
+}
+
+/// An interval in milliseconds.
+#[must_use]
+pub fn ms_of(interval: u8, period_ms: u64) -> u64 {
+    u64::from(interval.clamp(INTERVAL_LEAST, INTERVAL_MOST)) * period_ms / 4
+}
+
+fn cost(bytes: usize) -> i64 {
+    millibytes(bytes.saturating_add(OVERHEAD_BYTES))
+}
+
+fn millibytes(bytes: usize) -> i64 {
+    i64::try_from(bytes)
+        .unwrap_or(i64::MAX / 2000)
+        .saturating_mul(1000)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::codec::{self, Body};
+    use crate::wire::message::Record;
+    use crate::wire::samples;
+
+    fn air(rate_bps: u32, neighbours: u16) -> Airtime {
+        let mut air = Airtime::new(rate_bps, 1000);
+        air.planned = FIRST_BEACONS;
+        for author in 1..=neighbours {
+            air.hear(Time(0), author, &samples::beacon(1));
+        }
+        air
+    }
+
+    /// Bytes on the air of a beacon with so many entries of gossip.
+    fn beacon_bytes(entries: usize) -> usize {
+        let beacon = Beacon {
+            heartbeat: 3000,
+            east_mm: -1_000_000,
+            north_mm: 1_000_000,
+            heading_e4: 31_000,
+            nonce: u32::MAX,
+            loop_hash: u64::MAX,
+            cover_digest: u32::MAX,
+            gossip: vec![samples::gossip(99); entries],
+            ..samples::beacon(1)
+        };
+        let record = Record {
+            author: 100,
+            incarnation: 2,
+            seq: 3000,
+            kind: 0,
+            subject: 0,
+            body: codec::encode_body(&Body::Beacon(beacon)),
+            signature: Vec::new(),
+        };
+        codec::encode_record(&record).len()
+    }
+
+    #[test]
+    fn the_sizes_of_beacons_are_those_that_are_reckoned_with() {
+        assert!(beacon_bytes(0) <= BARE_BYTES, "{}", beacon_bytes(0));
+        let entry = beacon_bytes(11) - beacon_bytes(1);
+        // Counters of this sample have run for a day.
+        assert!(entry <= 10 * (ENTRY_BYTES + 4), "{entry}");
+    }
+
+    #[test]
+    fn beacons_take_half_of_the_share_at_most() {
+        for (rate_bps, neighbours) in [
+            (64_000, 0),
+            (64_000, 7),
+            (64_000, 19),
+            (64_000, 49),
+            (64_000, 62),
+            (20_000, 7),
+            (20_000, 30),
+            (1_000_000, 50),
+        ] {
+            let mut air = air(rate_bps, neighbours);
+            let share = u64::from(rate_bps) / 8 * 45 / 100 / (u64::from(neighbours) + 1);
+            let mut plan = air.plan_beacon(Time(100));
+            for t in 1..6 {
+                plan = air.plan_beacon(Time(100 + t));
+            }
+            let bytes = (BARE_BYTES + OVERHEAD_BYTES + plan.entries * ENTRY_BYTES) as u64;
+            let per_s = bytes * 4 / u64::from(plan.interval);
+            assert!(per_s * 2 <= share + 2, "{rate_bps} {neighbours}: {plan:?}");
+            assert!(
+                plan.interval == 4 || plan.entries == LEAST_ENTRIES,
+                "{plan:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_overdraft_is_owed() {
+        let mut air = air(64_000, 8);
+        // 3,600 bytes a second among nine are 400 a second, and a bucket of 1,200.
+        assert!(!air.pay(Time(0), 100));
+        air.charge(Time(3000), 1_974);
+        assert!(!air.pay(Time(4_900), 100));
+        assert_eq!(air.wait_ms(Time(4_900), 374), 1_100);
+        assert!(air.pay(Time(6_000), 374));
+        // What is larger than the bucket goes when that is full.
+        assert!(!air.pay(Time(8_999), 3_000));
+        assert!(air.pay(Time(9_000), 3_000));
+        assert!(!air.pay(Time(13_500), 1));
+    }
+
+    #[test]
+    fn whoever_hears_most_of_a_channel_says_among_how_many_it_is_shared() {
+        let mut air = air(64_000, 3);
+        assert_eq!((air.counted(), air.sharers()), (4, 4));
+        let crowded = Beacon {
+            sharers: 12,
+            ..samples::beacon(2)
+        };
+        air.hear(Time(500), 3, &crowded);
+        assert_eq!((air.counted(), air.sharers()), (4, 12));
+        air.plan_beacon(Time(10_200));
+        assert_eq!((air.counted(), air.sharers()), (2, 12));
+        air.plan_beacon(Time(10_600));
+        assert_eq!((air.counted(), air.sharers()), (1, 1));
+    }
+
+    #[test]
+    fn answers_to_a_suspicion_have_a_reserve_of_their_own() {
+        let mut air = air(64_000, 8);
+        air.refill(Time(3000));
+        for _ in 0..RESERVE_BEACONS {
+            air.charge_answer(Time(3000), BARE_BYTES);
+        }
+        assert_eq!(air.tokens_millibytes, 1_200_000);
+        air.charge_answer(Time(3000), BARE_BYTES);
+        assert_eq!(air.tokens_millibytes, 1_200_000 - cost(BARE_BYTES));
+    }
+}
