@@ -498,8 +498,13 @@ mod tests {
         }
     }
 
+    /// A relay that has begun: it knows that it is alone.
     fn relay(me: u16) -> Relay {
-        Relay::new(me, "f", 64_000, 1000)
+        let mut relay = Relay::new(me, "f", 64_000, 1000);
+        for t in 0..3 {
+            relay.air.plan_beacon(Time(t));
+        }
+        relay
     }
 
     #[test]
@@ -543,10 +548,6 @@ mod tests {
     #[test]
     fn the_bucket_bounds_what_is_sent() {
         let mut r = relay(2);
-        // It has begun: it knows that it is alone.
-        for t in 0..3 {
-            r.air.plan_beacon(Time(t));
-        }
         let mut bytes = 0;
         for t in 0..10_000u64 {
             r.own(Time(t), &record(2, u32::try_from(t).unwrap()), vec![0; 200]);
