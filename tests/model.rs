@@ -28,7 +28,9 @@
 //! And these bounds are real: a round may start at any time but only while its
 //! counter is within the case's; only peer 2 crashes or is wrongly suspected; of an
 //! author's claims the newest, or the two newest, can still arrive; some cases
-//! stop at a depth.
+//! stop at a depth. There is no journal: a section that is adopted or taken is listed in
+//! the same step, so what happens between a decision and its durability is not searched
+//! (the stories in `runtime/peer/src/tests/stores.rs` and the storms' disks do that).
 
 mod calm;
 mod step;
