@@ -19,7 +19,8 @@ pub const UNREACHABLE_MS: u32 = 86_400_000;
 /// Time added to a turn, milliseconds: a setpoint and its corrections.
 const TURN_MARGIN_MS: f64 = 1000.0;
 
-/// A turn at each end of the way home, seconds: two full circles of 30 m at 13 m/s.
+/// The least time for a turn at each end of the way home, seconds: two full circles of
+/// 30 m at 13 m/s; in a wind more where turning round takes longer.
 const TURNS_S: f64 = 30.0;
 
 /// One stretch of the flight to come.
@@ -143,8 +144,9 @@ impl Executive {
             .saturating_sub(home_ms)
     }
 
-    /// The longest way home from the loop, at cruise, in a wind at what it leaves of the
-    /// airspeed on that course, with a turn at each end, milliseconds.
+    /// The straight way home from the farthest boundary of the loop, at cruise, in a wind at
+    /// what it leaves of the airspeed on that course, with a turn at each end, milliseconds.
+    /// Detours round zones are not in it: the airframe's reserve has to pay for them.
     pub(super) fn return_ms(&self, home: Point) -> u32 {
         let (transit, air) = (&self.transit, self.transit.air());
         let cruise_mps = transit.airframe.cruise_mps.max(1.0);

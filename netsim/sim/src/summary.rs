@@ -286,7 +286,7 @@ const FALSE_DOWNS_ANY: f64 = 1.0;
 impl Summary {
     /// Judges a batch of storms as a whole, if it is large enough: whether it reached the
     /// hard places that its scenario can reach (`reached`), how fast it was (`pace`), how
-    /// often the living were taken for dead (`false-downs`).
+    /// often the living were believed dead (`false-downs`).
     pub fn judge_batch(&mut self, spec: &Spec) {
         if self.runs < JUDGED_BATCH {
             return;

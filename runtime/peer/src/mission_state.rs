@@ -73,7 +73,7 @@ pub(crate) struct MissionState {
     pub able_since: Option<crate::Time>,
     /// The peers that were alive at the last tick and heard somebody.
     pub live: LivePeers,
-    /// Whether all others were held for down at the last tick.
+    /// Whether all others were believed down at the last tick.
     pub alone: bool,
     pub finished: bool,
     /// Whether its fuel is due: it flies home until some is back.

@@ -114,7 +114,7 @@ impl Checker {
         }
     }
 
-    /// Another time round begins, with everything open.
+    /// Another lap begins, with everything open.
     pub fn on_lap(&mut self) {
         self.listing = ListingCheck::default();
         self.cover = CoverCheck::default();

@@ -109,7 +109,7 @@ impl ListingCheck {
                     *s = true;
                 }
             }
-            // Who holds all others for down lists nothing for them.
+            // Who believes all others down lists nothing for them.
             if is_alone(&m.view) && snapshot.able().any(|o| o.id != m.id && !is_alone(&o.view)) {
                 continue;
             }
@@ -229,7 +229,7 @@ impl ListingCheck {
             for (&(_, author), (claim, (life, _))) in self.heard.range((m.id, 0)..=(m.id, u16::MAX))
             {
                 let alive = members.belief(m.id, author) == Some((*life, Status::Alive));
-                // Who holds all others for down is no part of their component.
+                // Who believes all others down is no part of their component.
                 if !alive || claim.alone || claim.loop_hash != snapshot.loop_hash {
                     continue;
                 }
@@ -265,7 +265,7 @@ impl ListingCheck {
     }
 }
 
-/// Whether a peer holds all others for down.
+/// Whether a peer believes all others down.
 fn is_alone(view: &Beliefs) -> bool {
     view.peers.values().all(|(_, s)| *s == Status::Down)
 }
@@ -310,7 +310,7 @@ mod tests {
         found: Findings,
         stability: Stability,
         loss: u16,
-        /// Who holds all others for down.
+        /// Who believes all others down.
         alone: Option<u16>,
     }
 

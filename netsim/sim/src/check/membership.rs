@@ -141,7 +141,7 @@ impl Membership {
         self.look_for_disagreement(snapshot, found);
     }
 
-    /// Without a loss nobody in reach is taken for dead while it lives. (With a loss a
+    /// Without a loss nobody in reach is believed dead while it lives. (With a loss a
     /// batch of runs is judged by the rate.)
     fn look_for_false_downs(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         for (at_ms, by, of) in &self.false_downs[self.judged_downs..] {
@@ -213,7 +213,7 @@ impl Membership {
         }
     }
 
-    /// L1: the members of a component hold each other for alive, in their present lives.
+    /// L1: the members of a component believe each other alive, in their present lives.
     fn look_for_disagreement(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let bound_ms = snapshot.bounds.detection_ms();
         for m in snapshot.peers {

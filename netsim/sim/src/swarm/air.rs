@@ -134,7 +134,7 @@ impl Air {
         Graph::new(ids, |a, b| self.links.joined(a, b))
     }
 
-    /// Whether the judge saw a camera cover this cell, in that many times round.
+    /// Whether the judge saw a camera cover this cell, in that many laps.
     #[must_use]
     pub fn is_covered(&self, cell: CellId, laps: u16) -> bool {
         self.world.judge().saw(cell, laps)

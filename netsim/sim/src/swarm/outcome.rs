@@ -122,7 +122,7 @@ impl Swarm {
             let unfinished: Vec<u16> = self.unfinished();
             self.checker.found.broken("finish", self.now_ms, None, || {
                 format!(
-                    "all is covered, but peers {unfinished:?} do not hold the mission for finished"
+                    "all is covered, but peers {unfinished:?} do not believe the mission finished"
                 )
             });
         }

@@ -107,7 +107,7 @@ pub struct Membership {
     doubt_until: Time,
     /// When anything of another peer was last heard.
     last_heard: Option<Time>,
-    /// Neighbours whose link the transport holds for gone.
+    /// Neighbours whose link is gone, as the transport says.
     gone: BTreeSet<u16>,
 }
 
@@ -245,8 +245,8 @@ impl Membership {
         }
         if let Some(known) = self.known.get_mut(&told.id) {
             known.info.able = told.able;
-            // Members work on one ground: who is said to be able by a peer is on that
-            // peer's ground, until its own beacon or register says otherwise.
+            // Members work on one loop: who is said to be able by a peer is on that peer's
+            // loop, until its own beacon says otherwise.
             if known.info.heard.is_none() && told.able {
                 known.info.revision = teller.revision;
                 known.info.loop_hash = teller.loop_hash;
@@ -506,9 +506,9 @@ impl Membership {
         self.last_heard = Some(now);
     }
 
-    /// Whether nobody was heard for k1 T although some are not held for down yet. That
+    /// Whether nobody was heard for k1 T although some are not believed down yet. That
     /// many die at once is less likely than that this peer is deaf, so it suspects itself
-    /// until it has heard somebody, or holds all for down.
+    /// until it has heard somebody, or believes all down.
     #[must_use]
     pub fn is_deaf(&self, now: Time) -> bool {
         let Patience {

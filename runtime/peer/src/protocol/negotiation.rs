@@ -26,8 +26,8 @@ use skein_flight::coverage::ring::{CoverageLoop, Direction};
 use std::collections::BTreeMap;
 
 /// Time in which an owner at work covers two cells, milliseconds: at the slowest ground
-/// speed that missions are flown at, 8 m/s, two lanes of 48 m take 12 s. An owner that
-/// covers none for longer has stalled.
+/// speed that missions are flown at, 8 m/s, two cells of 48 m take 12 s. An owner that
+/// covers none for thrice what the bound makes of it has stalled.
 const TWO_CELLS_MS: u64 = 12_000;
 
 /// Spreads peers without a plan over the loop, so that not all of them take the same
@@ -35,13 +35,14 @@ const TWO_CELLS_MS: u64 = 12_000;
 /// small ids lie far apart.
 const SPREAD: u64 = 7919;
 
-/// A swarm is steady when no member came or went for so many periods; as long must an
-/// orphan last before a round, and an idle plan before one is thought of: a beacon or a
-/// claim may be lost once.
+/// Three waits, in periods: for members that stay the same before the first division, for
+/// orphans before a round that answers a loss, for an empty plan before one that does
+/// not. Two, so that one lost beacon or claim changes nothing.
 const STEADY_PERIODS: u64 = 2;
 
-/// After a decision orphans are believed after so many periods only: one to store, two
-/// to speak and be passed on, two for what is lost.
+/// After a decision cells count as orphans only after so many periods: the new owner's
+/// claim takes one to be stored, two to be spoken and passed on, and two more if it is
+/// lost once.
 const SETTLE_PERIODS: u64 = 5;
 
 /// A return, a join or an idle peer waits for so many periods: shorter absences are the
@@ -56,7 +57,8 @@ const MAX_DOUBLINGS: u32 = 2;
 /// first one's bid is heard before the third would begin.
 const ROUND_STAGGER: u64 = 8;
 
-/// And take orphans this part of a period apart, for a take has to become durable first.
+/// Peers take orphans one after the other by rank, this part of a period apart: a take has
+/// to be durable before others can hear of it.
 const TAKE_STAGGER: u64 = 2;
 
 /// What the rest of the peer knows that the negotiation needs.
@@ -320,10 +322,12 @@ impl Negotiation {
 
     fn watch_orphans(&mut self, ctx: &Context<'_>, orphans: &CellSet) {
         if orphans.count() == 0 || ctx.able_since.is_none() {
-            // Who cannot plan yet does not count: it would act on what it has not heard.
+            // Who is not able takes no note of orphans: it may not have heard the claims that
+            // list them.
             self.orphan_since = None;
         } else {
-            // What a decision gave to others is an orphan until they speak of it.
+            // Cells given to others look orphaned until their claims arrive, so the time
+            // counts from the decision.
             self.orphan_since = self.orphan_since.or(Some(ctx.now)).max(self.decided_at);
         }
         if self.members != ctx.members {
@@ -623,8 +627,8 @@ impl Negotiation {
         let n = i32::from(self.sections.cells());
         let here = self.sections.plan().last().map(|p| i32::from(p.cell));
         let here = here.unwrap_or_else(|| {
-            let members = lp.len() as u64;
-            i32::try_from(u64::from(self.me) * SPREAD % members.max(1)).unwrap_or(0)
+            let n_cells = lp.len() as u64;
+            i32::try_from(u64::from(self.me) * SPREAD % n_cells.max(1)).unwrap_or(0)
         });
         let away = |c: u16| {
             let d = (i32::from(c) - here).rem_euclid(n);

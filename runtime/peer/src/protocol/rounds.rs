@@ -12,7 +12,7 @@
 //! | complete | decided | closed | the counter stays |
 //! | any | a round that does not name me, or is far above all counters | same | only its counter is remembered, in steps |
 //!
-//! Rounds are ordered by (counter, number of members, hash of members and ground);
+//! Rounds are ordered by (counter, number of members, hash of members and loop);
 //! a higher one abandons a lower one, and bids of different rounds never mix.
 
 use crate::wire::limits::DURATION_MAX_MS;

@@ -217,7 +217,7 @@ pub struct Claim {
     pub done: Vec<CellRun>,
     /// Expected end of the plan, milliseconds from this record's writing.
     pub eta_ms: u32,
-    /// Whether its author hears nobody: it holds all others for down.
+    /// Whether its author hears nobody: it believes all others down.
     pub alone: bool,
 }
 
