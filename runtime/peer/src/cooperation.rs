@@ -584,7 +584,11 @@ impl MissionState {
             ctx.gain_in_sight = self.foresees_gain(&ctx);
         }
         let coverage_loop = Arc::clone(&self.geometry.coverage_loop);
-        let actions = self.negotiation.tick(&ctx, &coverage_loop);
+        let mut actions = self.negotiation.tick(&ctx, &coverage_loop);
+        let left_over = self.negotiation.left_over(&ctx);
+        let within_reach = self.within_reach(&left_over, s.percept);
+        let taken = within_reach.and_then(|cells| self.negotiation.begin_take(&cells));
+        actions.extend(taken.map(Action::Take));
         let mut effects = Effects::new();
         let alone = s.membership.live().next().is_none();
         if core::mem::replace(&mut self.alone, alone) != alone && self.lists() {
@@ -715,6 +719,35 @@ impl MissionState {
         );
         let promise = Promise::Adopt(self.claims.next(), Box::new(adoption));
         vec![Effect::Store(promise, Entry::Claim(claim))]
+    }
+
+    /// Of the runs of some cells the part that can be flown with the fuel that is left, from
+    /// one end on: the longest.
+    fn within_reach(
+        &self,
+        cells: &CellSet,
+        percept: Option<&Percept>,
+    ) -> Option<Vec<(u16, Direction)>> {
+        let executive = self.executive.as_ref()?;
+        let (spendable, n) = (self.spendable_ms(percept), cells.capacity());
+        let forward = |first: u16, count: u16| first..first.saturating_add(count);
+        let runs = cells.runs().into_iter().flat_map(|r| {
+            let ahead = forward(r.first, r.count).map(|c| (c, Direction::Forward));
+            let back = forward(r.first, r.count).rev();
+            let back = back.map(|c| (c, Direction::Backward));
+            [ahead.collect::<Vec<_>>(), back.collect()]
+        });
+        let reach = runs.map(|mut run| {
+            let planned = self.negotiation.sections.taken(&run);
+            let counts: Vec<usize> = (1..=planned.len()).collect();
+            let fits = counts.partition_point(|count| {
+                let legs = legs_of(&planned[..*count], n);
+                executive.leg_time_ms(&legs, &|c| cells.contains(c)) <= spendable
+            });
+            run.truncate(fits);
+            run
+        });
+        reach.max_by_key(Vec::len).filter(|run| !run.is_empty())
     }
 
     /// Lists only what can be flown (S10): the rest is orphaned, and that is a loss.

@@ -11,6 +11,7 @@
 //! | orphans, and no round helped | 2 T + W0 + rank T/2 | the nearest are taken |
 //! | idle, and a gain was computed from what is held | 10 T steady, 20 T calm | a round without loss |
 //! | idle, an owner makes no progress | its bound | the far half is taken |
+//! | idle, cells were beyond everybody | 10 T + rank T/2 | what the fuel allows of one run is taken |
 //! | cells held | 2 W | they expire |
 
 use super::division::{self, CALM_PERIODS};
@@ -177,6 +178,8 @@ pub struct Negotiation {
     members: Vec<Member>,
     members_since: Time,
     foreseen_at: Option<Time>,
+    /// When cells that were beyond everybody were last looked at.
+    left_over_at: Option<Time>,
     /// When the period began in which counters rise by a step.
     period_since: Option<Time>,
     /// Divisions adopted in this life.
@@ -208,6 +211,7 @@ impl Negotiation {
             members: Vec::new(),
             members_since: Time(0),
             foreseen_at: None,
+            left_over_at: None,
             period_since: None,
             adoptions: 0,
         }
@@ -291,12 +295,10 @@ impl Negotiation {
         self.watch_progress(ctx);
         if ctx.able_since.is_some() && !self.sections.complete() {
             self.run_rounds(ctx, &orphans);
-            if let Some(take) = self.inherit(ctx, &orphans, coverage_loop) {
-                let taken = self.sections.taken(&take);
-                self.take_pending = !taken.is_empty();
-                if self.take_pending {
-                    actions.push(Action::Take(taken));
-                }
+            if let Some(take) = self.inherit(ctx, &orphans, coverage_loop)
+                && let Some(taken) = self.begin_take(&take)
+            {
+                actions.push(Action::Take(taken));
             }
         }
         // Who suspects itself of being deaf acts on a loss once it does no more.
@@ -620,6 +622,29 @@ impl Negotiation {
                 && (ctx.now.since_ms(p.since) >= 3 * stalled_ms || ctx.now >= p.bound)
         })?;
         Some(far_half(&self.sections.plan_of(*owner)))
+    }
+
+    /// Cells to be taken: nothing more is until they are durable or cannot be.
+    pub fn begin_take(&mut self, cells: &[(u16, Direction)]) -> Option<Vec<PlannedCell>> {
+        let taken = self.sections.taken(cells);
+        self.take_pending = !taken.is_empty();
+        self.take_pending.then_some(taken)
+    }
+
+    /// What an idle peer may try to fly although no division could give it to anybody: fuel
+    /// that others were to need may be left, or be back. Looked at once in ten periods.
+    pub fn left_over(&mut self, ctx: &Context<'_>) -> CellSet {
+        let stagger = self.rank(ctx) * ctx.period_ms / TAKE_STAGGER;
+        let patience = PATIENT_PERIODS * ctx.period_ms;
+        let for_long = |since: Option<Time>, ms| since.is_some_and(|t| ctx.now.since_ms(t) >= ms);
+        let idle = ctx.able_since.is_some() && for_long(self.idle_since, patience + stagger);
+        let busy = self.take_pending || self.orphan_since.is_some() || self.rounds.open().is_some();
+        let rested = self.left_over_at.is_none() || for_long(self.left_over_at, patience);
+        if !idle || busy || !rested {
+            return CellSet::new(self.sections.cells());
+        }
+        self.left_over_at = Some(ctx.now);
+        self.sections.left_over(ctx.live)
     }
 
     /// The run of orphans nearest along the loop to where this peer works.

@@ -196,9 +196,23 @@ impl Sections {
     /// that are not known to be beyond anybody's endurance.
     #[must_use]
     pub fn orphans(&self, live: &LivePeers) -> CellSet {
+        let mut orphans = self.unlisted(live);
+        orphans.subtract(&self.unassigned);
+        orphans
+    }
+
+    /// Cells that were beyond everybody's endurance when they were last divided, and that
+    /// no live claim lists.
+    #[must_use]
+    pub fn left_over(&self, live: &LivePeers) -> CellSet {
+        let mut left_over = self.unlisted(live);
+        left_over.subtract(&self.orphans(live));
+        left_over
+    }
+
+    fn unlisted(&self, live: &LivePeers) -> CellSet {
         let mut free = CellSet::full(self.cells);
         free.subtract(&self.covered);
-        free.subtract(&self.unassigned);
         for p in &self.plan {
             free.remove(p.cell);
         }

@@ -59,3 +59,24 @@ fn one_percept_without_fuel_does_not_end_the_flight() {
     assert!(covered(&h, 1) > 6);
     assert!(h.run_until(250, |h| h.beliefs(1).finished));
 }
+
+#[test]
+fn cells_beyond_everybody_are_taken_once_somebody_has_the_fuel() {
+    let mut h = Harness::new(2, mission(1, 8, 6));
+    for id in [1, 2] {
+        h.seat(id).fuel_s = 200.0;
+        h.start(id);
+    }
+    let idle = |h: &Harness| [1, 2].iter().all(|id| h.beliefs(*id).plan.is_empty());
+    assert!(h.run_until(60, |h| !h.beliefs(1).unassigned.is_empty()));
+    assert!(h.run_until(300, idle));
+    h.run_s(20);
+    let before = covered(&h, 1);
+    assert!(idle(&h) && before < 48, "{before}");
+    h.seat(2).fuel_s = 3600.0;
+    assert!(
+        h.run_until(400, |h| h.beliefs(1).finished),
+        "{}",
+        covered(&h, 1)
+    );
+}
