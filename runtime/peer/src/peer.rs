@@ -317,6 +317,17 @@ impl Peer {
         }
         match command {
             Command::Mission(mission) => {
+                let overtaken =
+                    |held: &Arc<Mission>| held.revision >= mission.revision && **held != *mission;
+                if self
+                    .cooperation
+                    .newest_mission()
+                    .as_ref()
+                    .is_some_and(overtaken)
+                {
+                    return self
+                        .alarm("a mission is no newer than the one that is held; it was ignored");
+                }
                 self.cooperation.offer(mission);
                 if self.speaks() {
                     let effects = self.with_sources(|o, s, _, _| o.speak_mission(s));
@@ -599,7 +610,9 @@ impl Peer {
     }
 
     /// The revision that the operator's next mission must have to be flown: above those
-    /// of all missions that this peer holds, or has heard that others follow.
+    /// of all missions that this peer holds, or has heard that others follow. Laps count
+    /// revisions, too, also where nobody hears the operator: during a patrol the low half
+    /// of the number is theirs, and the operator counts the high half.
     #[must_use]
     pub fn next_revision(&self) -> u32 {
         let held = self.cooperation.newest_mission().map(|m| m.revision);
@@ -608,11 +621,19 @@ impl Peer {
             .all()
             .filter_map(|(id, ..)| self.membership.info(id))
             .map(|info| info.revision);
-        held.into_iter()
-            .chain(heard)
-            .max()
-            .unwrap_or(0)
-            .saturating_add(1)
+        let newest = held.into_iter().chain(heard).max().unwrap_or(0);
+        let patrol = |m: &Arc<Mission>| m.lap > 0 || m.further_laps > 0;
+        let laps = if self
+            .cooperation
+            .newest_mission()
+            .as_ref()
+            .is_some_and(patrol)
+        {
+            newest | u32::from(u16::MAX)
+        } else {
+            newest
+        };
+        laps.saturating_add(1)
     }
 
     /// The life in which it speaks at present; none while it only listens.

@@ -117,3 +117,33 @@ fn laps_follow_each_other_in_all_peers() {
     assert!(h.run_until(10, |h| h.beliefs(2).revision == 2));
     assert!(h.run_until(200, |h| h.beliefs(1).finished && h.beliefs(2).finished));
 }
+
+#[test]
+fn an_operator_s_mission_outranks_the_laps_that_a_peer_began_out_of_reach() {
+    let mut patrol = mission(1, 4, 4);
+    patrol.further_laps = 9;
+    let mut h = Harness::started(2, patrol.clone());
+    h.add_ground_station(Some(patrol.clone()));
+    h.start(GROUND_STATION);
+    assert!(h.run_until(200, |h| h.beliefs(GROUND_STATION).revision == 2));
+    h.isolate(2, true);
+    let mut revised = patrol;
+    revised.revision = h.next_revision(GROUND_STATION);
+    revised.base.0 -= 50_000;
+    assert!(h.run_until(600, |h| h.beliefs(2).revision > 3));
+    let newest = revised.revision;
+    command(&mut h, revised.clone());
+    h.isolate(2, false);
+    assert!(h.run_until(60, |h| {
+        [1, 2].iter().all(|id| h.beliefs(*id).revision == newest)
+    }));
+    assert!(
+        h.run_until(300, |h| h.beliefs(2).revision == newest + 1),
+        "laps go on"
+    );
+    // What is no newer is ignored, and the operator hears of it.
+    revised.base.0 -= 50_000;
+    command(&mut h, revised);
+    let alarm = "a mission is no newer than the one that is held; it was ignored";
+    assert!(h.alarms(GROUND_STATION).contains(&alarm.to_owned()));
+}
