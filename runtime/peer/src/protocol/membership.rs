@@ -281,7 +281,7 @@ impl Membership {
                 && known.freshest.incarnation == heard.incarnation
                 && known.status == Status::Alive
             {
-                known.note_beaten(heard);
+                known.note_higher_count(heard);
             }
             return false;
         }
@@ -314,8 +314,12 @@ impl Membership {
         }
         known.freshest = heard;
         known.excused_ms = 0;
-        if new_life || known.beaten_before.is_some_and(|h| h.count <= heard.count) {
-            known.beaten_before = None;
+        if new_life
+            || known
+                .higher_count_heard
+                .is_some_and(|h| h.count <= heard.count)
+        {
+            known.higher_count_heard = None;
         }
         known.note_hops(now, heard.hops, interval_ms);
         let status = if heard.suspected.is_some() {

@@ -46,9 +46,9 @@ pub(super) struct Known {
     latest: usize,
     pub(super) eccentricity: u8,
     pub(super) urgent_until: Time,
-    /// An old heartbeat of this very life beyond the one that it now beats: it began the
-    /// life anew without knowing, and has to be told.
-    pub(super) beaten_before: Option<Heartbeat>,
+    /// An old heartbeat of this very life with a higher count than it now sends: it lost
+    /// its disk and uses an incarnation twice. It is told, so that it takes a new one.
+    pub(super) higher_count_heard: Option<Heartbeat>,
 }
 
 /// Hops of somebody who was not heard in the last ten intervals.
@@ -73,7 +73,7 @@ impl Known {
             latest: 0,
             eccentricity: 0,
             urgent_until,
-            beaten_before: None,
+            higher_count_heard: None,
         }
     }
 
@@ -158,7 +158,7 @@ impl Known {
 
     /// What the peer itself has to hear, if it began a life anew without knowing.
     pub(super) fn reminder(&self, now: Time) -> Option<Gossip> {
-        self.beaten_before.as_ref().map(|h| self.told(h, now))
+        self.higher_count_heard.as_ref().map(|h| self.told(h, now))
     }
 
     fn told(&self, heard: &Heartbeat, now: Time) -> Gossip {
@@ -177,13 +177,15 @@ impl Known {
         }
     }
 
-    /// An old heartbeat of this life that goes beyond a fresh one: nobody's heart counts
-    /// backwards, so the life was begun anew.
-    pub(super) fn note_beaten(&mut self, heard: Heartbeat) {
+    /// An old heartbeat of this life with a higher count than a fresh one: nobody counts
+    /// backwards, so the incarnation is used twice.
+    pub(super) fn note_higher_count(&mut self, heard: Heartbeat) {
         // What was noted before goes beyond the fresh one itself.
-        let most = self.beaten_before.map_or(self.freshest.count, |h| h.count);
+        let most = self
+            .higher_count_heard
+            .map_or(self.freshest.count, |h| h.count);
         if heard.count > most {
-            self.beaten_before = Some(heard);
+            self.higher_count_heard = Some(heard);
         }
     }
 }
