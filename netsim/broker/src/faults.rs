@@ -124,8 +124,10 @@ impl Injector<'_> {
             | Fault::HealStores { .. }
             | Fault::SlowComputer { .. }
             | Fault::ClockDrift { .. }
-            | Fault::ClockJump { .. } => Err(
-                "disks, slow computers and clocks go wrong in simulated runs only: `skein sim`"
+            | Fault::ClockJump { .. }
+            | Fault::ShortFuel { .. }
+            | Fault::SpoiltRecord { .. } => Err(
+                "disks, slow computers, clocks, batteries and records go wrong in simulated runs only: `skein sim`"
                     .to_owned(),
             ),
         }

@@ -50,7 +50,7 @@ fn main() -> ExitCode {
             }
         }
         if !run.report.passed && run.violations().is_empty() {
-            println!("seed {seed} did not complete");
+            println!("seed {seed} failed: {:?}", run.report.reasons);
         }
         runs.push(run);
     }

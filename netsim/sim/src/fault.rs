@@ -113,6 +113,19 @@ pub enum Fault {
         /// How far, milliseconds.
         ahead_ms: u32,
     },
+    /// The battery of a UAV lasts no longer than this from now on.
+    ShortFuel {
+        /// Which peer.
+        peer: u16,
+        /// How long, milliseconds.
+        lasts_ms: u32,
+    },
+    /// An outsider repeats the last record on the air to a peer with bits wrong, so that
+    /// nobody can read it.
+    SpoiltRecord {
+        /// Which peer.
+        peer: u16,
+    },
     /// The share of transmissions lost on every link, in thousandths.
     Loss {
         /// Thousandths.
@@ -136,7 +149,9 @@ impl Fault {
             | Self::HealStores { peer }
             | Self::SlowComputer { peer, .. }
             | Self::ClockDrift { peer, .. }
-            | Self::ClockJump { peer, .. } => vec![*peer],
+            | Self::ClockJump { peer, .. }
+            | Self::ShortFuel { peer, .. }
+            | Self::SpoiltRecord { peer } => vec![*peer],
             Self::Cut { a, b, .. } => vec![*a, *b],
             Self::Partition { groups } => groups.concat(),
             Self::Heal | Self::Rebase { .. } | Self::Order { .. } | Self::Loss { .. } => Vec::new(),
@@ -189,6 +204,10 @@ impl fmt::Display for Fault {
             Self::ClockJump { peer, ahead_ms } => {
                 write!(f, "the clock of peer {peer} jumps {ahead_ms} ms ahead")
             }
+            Self::ShortFuel { peer, lasts_ms } => {
+                write!(f, "the battery of peer {peer} lasts {lasts_ms} ms more")
+            }
+            Self::SpoiltRecord { peer } => write!(f, "peer {peer} is sent a spoilt record"),
             Self::Loss { permille } => {
                 let percent = f64::from(*permille) / 10.0;
                 write!(f, "{percent:.1} % of transmissions are lost")

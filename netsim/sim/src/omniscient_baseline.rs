@@ -115,6 +115,9 @@ impl<'a> Baseline<'a> {
                     self.start(*peer);
                 }
             }
+            Fault::ShortFuel { peer, lasts_ms } => {
+                self.world.limit_fuel(*peer, u64::from(*lasts_ms));
+            }
             Fault::Cut { .. }
             | Fault::Partition { .. }
             | Fault::Heal
@@ -126,7 +129,8 @@ impl<'a> Baseline<'a> {
             | Fault::HealStores { .. }
             | Fault::SlowComputer { .. }
             | Fault::ClockDrift { .. }
-            | Fault::ClockJump { .. } => {}
+            | Fault::ClockJump { .. }
+            | Fault::SpoiltRecord { .. } => {}
         }
     }
 

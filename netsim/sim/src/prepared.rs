@@ -3,7 +3,7 @@
 
 use crate::account::Setting;
 use crate::geometry_cache::GeometryCache;
-use crate::spec::Spec;
+use crate::spec::{Spec, UavSpec};
 use crate::world::Site;
 use skein_peer::offload::MissionGeometry;
 use std::sync::Arc;
@@ -44,6 +44,25 @@ impl Prepared {
             spec,
             site,
             geometry_cache,
+        }
+    }
+
+    /// The same with other UAVs.
+    #[must_use]
+    pub fn with_uavs(&self, uavs: Vec<UavSpec>) -> Self {
+        let ids = |uavs: &[UavSpec]| uavs.iter().map(|u| u.id).collect::<Vec<_>>();
+        if ids(&uavs) == ids(&self.spec.uavs) {
+            return self.clone();
+        }
+        let spec = Spec {
+            uavs,
+            ..(*self.spec).clone()
+        };
+        let geometry = self.geometry_cache.clone().of(&spec.mission).ok();
+        Self {
+            setting: Setting::new(&spec, geometry.as_ref(), spec.seed),
+            spec: Arc::new(spec),
+            ..self.clone()
         }
     }
 

@@ -54,7 +54,8 @@ pub fn planned(prepared: &Prepared, seed: u64, wanted: Wanted) -> Outcome {
 #[must_use]
 pub fn storm(prepared: &Prepared, seed: u64, failure_free_ms: u64, wanted: Wanted) -> Outcome {
     let storm = fault_generator::draw(&prepared.spec, seed, failure_free_ms);
-    let mut outcome = run(prepared, seed, storm.faults, wanted);
+    let prepared = prepared.with_uavs(storm.uavs);
+    let mut outcome = run(&prepared, seed, storm.faults, wanted);
     let ran = |s: &&Struck| s.at_ms < outcome.report.end_ms;
     outcome.struck = storm.struck.iter().filter(ran).map(|s| s.name).collect();
     outcome

@@ -62,7 +62,7 @@ pub struct Building {
 }
 
 /// One flying peer.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct UavSpec {
     /// Its number.
     pub id: u16,
@@ -139,6 +139,8 @@ pub struct TroubleSpec {
     pub max_clock_drift_ppm: u32,
     /// Largest jump of a clock, milliseconds.
     pub max_clock_jump_ms: u32,
+    /// Largest fleet; 0 leaves the scenario's.
+    pub max_uavs: u16,
 }
 
 impl TroubleSpec {
@@ -151,6 +153,7 @@ impl TroubleSpec {
         max_computer_delay_ms: 0,
         max_clock_drift_ppm: 0,
         max_clock_jump_ms: 0,
+        max_uavs: 0,
     };
 
     /// What a storm brings where its scenario says nothing else: what a small flight
@@ -162,6 +165,7 @@ impl TroubleSpec {
         max_store_delay_ms: 1_000,
         max_computer_delay_ms: 400,
         max_clock_drift_ppm: 20_000,
-        max_clock_jump_ms: 0,
+        max_clock_jump_ms: 60_000,
+        max_uavs: 12,
     };
 }

@@ -3,8 +3,8 @@
 //! few at once, so that what goes wrong can be told from its cause, and each in many runs
 //! of a batch.
 
-use crate::fault::{Fault, TimedFault};
-use crate::spec::Spec;
+use crate::fault::{Fault, Order, TimedFault};
+use crate::spec::{Spec, UavSpec};
 use crate::swarm::stream::Stream;
 
 /// Shortest time for which something is wrong, milliseconds: two beacon periods.
@@ -17,6 +17,12 @@ const ONE_WRITE_IN: (u64, u64) = (2, 20);
 /// healthy one may be.
 const LEAST_DELAY_MS: u64 = 50;
 
+/// The most records that an outsider spoils in a run.
+const MOST_SPOILT: u64 = 20;
+
+/// Height slots of further UAVs are so far apart, metres.
+const SLOT_M: f64 = 5.0;
+
 /// A kind of trouble.
 #[derive(Clone, Copy, Debug)]
 pub struct Kind {
@@ -25,40 +31,63 @@ pub struct Kind {
     /// Whether this scenario can meet it.
     pub can: fn(&Spec) -> bool,
     /// Draws it.
-    draw: fn(&mut Draw<'_>),
+    how: How,
+}
+
+/// How a kind of trouble comes into a run.
+#[derive(Clone, Copy, Debug)]
+enum How {
+    /// By faults of its own.
+    Faults(fn(&mut Draw<'_>)),
+    /// By another scenario, from which all else is drawn; given the failure-free makespan.
+    Scenario(fn(&mut Stream, &mut Spec, u64)),
+}
+
+impl Kind {
+    const fn new(name: &'static str, can: fn(&Spec) -> bool, draw: fn(&mut Draw<'_>)) -> Self {
+        let how = How::Faults(draw);
+        Self { name, can, how }
+    }
 }
 
 /// All of them.
 pub const KINDS: &[Kind] = &[
+    Kind::new("failing-stores", |_| true, failing_stores),
+    Kind::new(
+        "slow-stores",
+        |s| s.storm.troubles.max_store_delay_ms > 0,
+        slow_stores,
+    ),
+    Kind::new("pause", |s| s.storm.troubles.max_pause_s > 0, pause),
+    Kind::new(
+        "slow-computer",
+        |s| s.storm.troubles.max_computer_delay_ms > 0,
+        slow_computer,
+    ),
+    Kind::new(
+        "clock-drift",
+        |s| s.storm.troubles.max_clock_drift_ppm > 0,
+        clock_drift,
+    ),
+    Kind::new(
+        "clock-jump",
+        |s| s.storm.troubles.max_clock_jump_ms > 0,
+        clock_jump,
+    ),
+    Kind::new("one-way", |s| s.uavs.len() > 1, one_way),
+    Kind::new("order", |s| s.ground.is_some(), order),
+    Kind::new("ground-down", can_lose_ground, ground_down),
+    Kind::new("spoilt-records", |_| true, spoilt_records),
+    Kind::new("short-fuel", |s| s.uavs.len() > 1, short_fuel),
     Kind {
-        name: "failing-stores",
-        can: |_| true,
-        draw: failing_stores,
+        name: "late-faults",
+        can: |s| s.storm.until < 1.0,
+        how: How::Scenario(|_, spec, _| spec.storm.until = 1.0),
     },
     Kind {
-        name: "slow-stores",
-        can: |spec| spec.storm.troubles.max_store_delay_ms > 0,
-        draw: slow_stores,
-    },
-    Kind {
-        name: "pause",
-        can: |spec| spec.storm.troubles.max_pause_s > 0,
-        draw: pause,
-    },
-    Kind {
-        name: "slow-computer",
-        can: |spec| spec.storm.troubles.max_computer_delay_ms > 0,
-        draw: slow_computer,
-    },
-    Kind {
-        name: "clock-drift",
-        can: |spec| spec.storm.troubles.max_clock_drift_ppm > 0,
-        draw: clock_drift,
-    },
-    Kind {
-        name: "clock-jump",
-        can: |spec| spec.storm.troubles.max_clock_jump_ms > 0,
-        draw: clock_jump,
+        name: "fleet",
+        can: |s| s.storm.troubles.max_uavs > 0,
+        how: How::Scenario(fleet),
     },
 ];
 
@@ -77,36 +106,64 @@ struct Draw<'a> {
     spec: &'a Spec,
     /// All peers, in the order of their numbers.
     peers: &'a [u16],
+    /// UAVs that are not killed for good.
+    survivors: &'a [u16],
     end_ms: u64,
     out: Vec<TimedFault>,
 }
 
-/// Draws the kinds of trouble of one run and their faults, until `end_ms`.
-pub fn draw(
-    s: &mut Stream,
-    spec: &Spec,
-    peers: &[u16],
-    end_ms: u64,
-) -> (Vec<Struck>, Vec<TimedFault>) {
-    let able: Vec<u16> = (0..)
+/// Draws the kinds that one run meets.
+pub fn choose(s: &mut Stream, spec: &Spec) -> Vec<Kind> {
+    let numbers: Vec<u16> = (0..)
         .zip(KINDS)
         .filter(|(_, kind)| (kind.can)(spec))
         .map(|(i, _)| i)
         .collect();
-    let most = usize::from(spec.storm.troubles.max_kinds).min(able.len());
+    let most = usize::from(spec.storm.troubles.max_kinds).min(numbers.len());
     let n_kinds = usize::try_from(s.between(0, most as u64)).unwrap_or(0);
+    let drawn = s.shuffled(&numbers).into_iter().take(n_kinds);
+    drawn.map(|i| KINDS[usize::from(i)]).collect()
+}
+
+/// The scenario from which the faults of these kinds are drawn, and its failure-free
+/// makespan, milliseconds.
+#[must_use]
+pub fn prepare(s: &mut Stream, kinds: &[Kind], spec: &Spec, makespan_ms: u64) -> (Spec, u64) {
+    let mut changed = spec.clone();
+    for kind in kinds {
+        if let How::Scenario(change) = kind.how {
+            change(s, &mut changed, makespan_ms);
+        }
+    }
+    let (before, after) = (spec.uavs.len() as u64, changed.uavs.len() as u64);
+    (changed, makespan_ms * before / after.max(1))
+}
+
+/// Draws the faults of these kinds until `end_ms`, on all peers and UAVs that survive.
+pub fn draw(
+    s: &mut Stream,
+    kinds: &[Kind],
+    spec: &Spec,
+    (peers, survivors): (&[u16], &[u16]),
+    end_ms: u64,
+) -> (Vec<Struck>, Vec<TimedFault>) {
     let (mut struck, mut faults) = (Vec::new(), Vec::new());
-    for i in s.shuffled(&able).into_iter().take(n_kinds) {
-        let kind = &KINDS[usize::from(i)];
+    for kind in kinds {
         let mut draw = Draw {
             s,
             spec,
             peers,
+            survivors,
             end_ms,
             out: Vec::new(),
         };
-        (kind.draw)(&mut draw);
-        let first_ms = draw.out.iter().map(|f| f.at_ms).min();
+        let first_ms = match kind.how {
+            How::Faults(of) => {
+                of(&mut draw);
+                draw.out.iter().map(|f| f.at_ms).min()
+            }
+            How::Scenario(_) => Some(0),
+        };
         struck.extend(first_ms.map(|at_ms| Struck {
             name: kind.name,
             at_ms,
@@ -210,6 +267,129 @@ fn clock_jump(d: &mut Draw<'_>) {
     }
 }
 
+/// One UAV hears nobody, or nobody hears it, or a few links are up one way only.
+fn one_way(d: &mut Draw<'_>) {
+    let (from_ms, to_ms) = d.span_ms(d.spec.storm.troubles.max_s);
+    let order = d.s.shuffled(d.peers);
+    let Some((&one, others)) = order.split_first() else {
+        return;
+    };
+    let links: Vec<(u16, u16)> = match d.s.between(0, 2) {
+        0 => others.iter().map(|o| (*o, one)).collect(),
+        1 => others.iter().map(|o| (one, *o)).collect(),
+        _ => order.chunks_exact(2).map(|p| (p[0], p[1])).collect(),
+    };
+    for (a, b) in links {
+        let one_way = true;
+        d.push(from_ms, Fault::Cut { a, b, one_way });
+    }
+    d.push(to_ms, Fault::Heal);
+}
+
+/// All are to hold, or to come back, and then to go on.
+fn order(d: &mut Draw<'_>) {
+    let (from_ms, to_ms) = d.span_ms(d.spec.storm.troubles.max_s);
+    let order = match d.s.one_in(2) {
+        true => Order::Hold,
+        false => Order::ReturnToBase,
+    };
+    d.push(from_ms, Fault::Order { order });
+    let order = Order::Resume;
+    d.push(to_ms, Fault::Order { order });
+}
+
+/// Not where there are laps: a ground station that comes back in a later one does not learn
+/// of it.
+fn can_lose_ground(spec: &Spec) -> bool {
+    spec.ground.is_some() && spec.mission.further_laps == 0
+}
+
+/// The ground station is down for a while.
+fn ground_down(d: &mut Draw<'_>) {
+    let (from_ms, to_ms) = d.span_ms(d.spec.storm.troubles.max_s);
+    let Some(peer) = d.spec.ground.as_ref().map(|g| g.id) else {
+        return;
+    };
+    let fresh_disk = d.s.one_in(2);
+    d.push(from_ms, Fault::KillComputer { peer });
+    d.push(to_ms, Fault::Restart { peer, fresh_disk });
+}
+
+/// An outsider now and then repeats a record with bits wrong, so that nobody can read it.
+fn spoilt_records(d: &mut Draw<'_>) {
+    for _ in 0..d.s.between(1, MOST_SPOILT) {
+        let n = d.peers.len() as u64;
+        let which = usize::try_from(d.s.between(0, n.saturating_sub(1))).unwrap_or(0);
+        let at_ms = d.s.between(0, d.end_ms);
+        if let Some(&peer) = d.peers.get(which) {
+            d.push(at_ms, Fault::SpoiltRecord { peer });
+        }
+    }
+}
+
+/// Some batteries last about as long as they are needed; a UAV that survives has a good one.
+fn short_fuel(d: &mut Draw<'_>) {
+    let Some((_, others)) = d.survivors.split_first() else {
+        return;
+    };
+    let reserve_s = d.spec.uavs.iter().map(|u| u.airframe.reserve_s);
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "casts from floats saturate, and a reserve is not negative"
+    )]
+    let reserve_ms = reserve_s.fold(0.0, f64::max) as u64 * 1000;
+    let n = d.s.between(1, others.len() as u64);
+    for &peer in others.iter().take(usize::try_from(n).unwrap_or(0)) {
+        let lasts_ms = reserve_ms + d.s.between(d.end_ms / 3, d.end_ms + d.end_ms / 3);
+        let lasts_ms = u32::try_from(lasts_ms).unwrap_or(u32::MAX);
+        d.push(0, Fault::ShortFuel { peer, lasts_ms });
+    }
+}
+
+/// Another number of UAVs: fewer, but enough for the work, or some more like those there
+/// are, above them.
+fn fleet(s: &mut Stream, spec: &mut Spec, makespan_ms: u64) {
+    let there = spec.uavs.len();
+    let longest_s = spec
+        .uavs
+        .iter()
+        .map(|u| u.airframe.endurance_s - u.airframe.reserve_s);
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "casts from floats saturate"
+    )]
+    let longest_ms = longest_s.fold(f64::from(spec.max_time_s), f64::min) as u64 * 1000;
+    let work_ms = makespan_ms * there as u64;
+    let least = (work_ms * 3 / 2).div_ceil(longest_ms.max(1)).max(1);
+    let n = s.between(least, u64::from(spec.storm.troubles.max_uavs).max(least));
+    let n = usize::try_from(n).unwrap_or(there);
+    let top_m = spec.uavs.iter().map(|u| u.height_m).fold(0.0, f64::max);
+    let taken: Vec<u16> = spec
+        .uavs
+        .iter()
+        .map(|u| u.id)
+        .chain(spec.ground.iter().map(|g| g.id))
+        .collect();
+    let more = (1..=u16::MAX).filter(|id| !taken.contains(id));
+    let like = spec.uavs.clone();
+    let above_m = (1..).map(|k: u16| top_m + SLOT_M * f64::from(k));
+    let more = more.zip(like.iter().cycle()).zip(above_m);
+    let more = more.map(|((id, like), height_m)| UavSpec {
+        id,
+        height_m,
+        ..like.clone()
+    });
+    let all: Vec<UavSpec> = like
+        .iter()
+        .cloned()
+        .chain(more.take(n.saturating_sub(there)))
+        .collect();
+    spec.uavs = all.into_iter().take(n).collect();
+    spec.uavs.sort_by_key(|u| u.id);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -230,11 +410,13 @@ mod tests {
         let (mut numbers, mut kinds) = (BTreeMap::new(), BTreeMap::new());
         for seed in 0..2000 {
             let mut s = Stream::new(seed, Concern::Troubles);
-            let (struck, faults) = draw(&mut s, &spec, &[1, 2, 3, 100], 300_000);
+            let kinds_drawn = choose(&mut s, &spec);
+            let who: (&[u16], &[u16]) = (&[1, 2, 3, 100], &[1, 3]);
+            let (struck, faults) = draw(&mut s, &kinds_drawn, &spec, who, 300_000);
             *numbers.entry(struck.len()).or_insert(0) += 1;
             for kind in &struck {
                 *kinds.entry(kind.name).or_insert(0) += 1;
-                assert!(faults.iter().any(|f| f.at_ms == kind.at_ms));
+                assert!(kind.at_ms == 0 || faults.iter().any(|f| f.at_ms == kind.at_ms));
             }
         }
         assert_eq!(numbers.len(), 4);
@@ -249,10 +431,30 @@ mod tests {
     }
 
     #[test]
+    fn fleets_have_every_size_that_can_do_the_work_and_ids_of_their_own() {
+        let spec = spec();
+        let mut sizes = std::collections::BTreeSet::new();
+        for seed in 0..200 {
+            let mut s = Stream::new(seed, Concern::Troubles);
+            let mut other = spec.clone();
+            // A third of what all batteries hold: two are needed at least.
+            fleet(&mut s, &mut other, 300_000);
+            let ids: Vec<u16> = other.uavs.iter().map(|u| u.id).collect();
+            assert!(ids.windows(2).all(|w| w[0] < w[1]) && !ids.contains(&fixture::GROUND_ID));
+            sizes.insert(ids.len());
+        }
+        let most = usize::from(spec.storm.troubles.max_uavs);
+        assert_eq!(sizes, (3..=most).collect());
+    }
+
+    #[test]
     fn what_begins_also_ends_and_limits_are_kept() {
         let spec = spec();
         let limits = spec.storm.troubles;
         for kind in KINDS {
+            let How::Faults(draw) = kind.how else {
+                continue;
+            };
             let mut seen = 0;
             for seed in 0..200 {
                 let mut s = Stream::new(seed, Concern::Troubles);
@@ -260,10 +462,11 @@ mod tests {
                     s: &mut s,
                     spec: &spec,
                     peers: &[1, 2, 100],
+                    survivors: &[1, 2],
                     end_ms: 300_000,
                     out: Vec::new(),
                 };
-                (kind.draw)(&mut d);
+                draw(&mut d);
                 let mut open: BTreeMap<(&str, u16), i32> = BTreeMap::new();
                 let mut count = |what, peer, n| *open.entry((what, peer)).or_default() += n;
                 for f in &d.out {
@@ -285,6 +488,17 @@ mod tests {
                         }
                         Fault::ClockJump { ahead_ms, .. } => {
                             assert!(ahead_ms <= limits.max_clock_jump_ms);
+                        }
+                        Fault::Cut { one_way, .. } => assert!(one_way),
+                        Fault::Order { order } => {
+                            count("order", 0, if order == Order::Resume { -1 } else { 1 });
+                        }
+                        Fault::KillComputer { peer } => count("down", peer, 1),
+                        Fault::Restart { peer, .. } => count("down", peer, -1),
+                        Fault::Heal => assert!(d.out[0].at_ms < f.at_ms),
+                        Fault::SpoiltRecord { .. } => {}
+                        Fault::ShortFuel { peer, lasts_ms } => {
+                            assert!(peer != 1 && lasts_ms > 100_000);
                         }
                         ref other => panic!("{other:?} is no such trouble"),
                     }

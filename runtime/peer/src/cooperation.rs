@@ -153,6 +153,7 @@ impl Cooperation {
     pub fn was_late(&mut self, late_ms: u64, timers: &mut Timers) {
         if let Some(state) = &mut self.state {
             state.negotiation.was_late(late_ms);
+            state.able_since = state.able_since.map(|t| t.plus_ms(late_ms));
         }
         if let Some(at) = timers.at(Timer::HeldCells) {
             timers.set(Timer::HeldCells, at.plus_ms(late_ms));
@@ -199,6 +200,13 @@ impl Cooperation {
         };
         self.state = Some(state);
         vec![Effect::Report(ready), Effect::HearAgain]
+    }
+
+    /// Lists only what can be flown, by what the UAV has left.
+    pub fn keep_within_endurance(&mut self, percept: Option<&Percept>) {
+        if let Some(state) = &mut self.state {
+            state.keep_within_endurance(percept);
+        }
     }
 
     /// A percept: fly, and note what the camera saw.

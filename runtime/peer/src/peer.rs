@@ -292,14 +292,18 @@ impl Peer {
         let effects = match (self.jobs.remove(&token), result) {
             (Some(PendingJob::Geometry(hash)), JobResult::Geometry(geometry)) => {
                 let me = self.me();
-                self.cooperation.geometry_arrived(
+                let effects = self.cooperation.geometry_arrived(
                     hash,
                     geometry,
                     me,
                     &self.config,
                     &self.durable,
                     &mut self.timers,
-                )
+                );
+                // The way home may be another one.
+                self.cooperation
+                    .keep_within_endurance(self.percept.as_ref());
+                effects
             }
             (Some(PendingJob::Division(epoch)), JobResult::Divide(division)) => {
                 let (situation, cooperation, _) = self.situation();

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Kinds of faults and the fields that each has besides `at_s` and `kind`.
-const KINDS: [(&str, &[&str]); 18] = [
+const KINDS: [(&str, &[&str]); 20] = [
     ("kill", &["peer", "for_s", "fresh_disk"]),
     ("kill-computer", &["peer", "for_s", "fresh_disk"]),
     ("terminate", &["peer", "for_s", "fresh_disk"]),
@@ -29,6 +29,8 @@ const KINDS: [(&str, &[&str]); 18] = [
     ("slow-computer", &["peer", "delay_s", "for_s"]),
     ("clock-drift", &["peer", "gain_percent", "for_s"]),
     ("clock-jump", &["peer", "ahead_s"]),
+    ("short-fuel", &["peer", "lasts_s"]),
+    ("spoilt-record", &["peer"]),
 ];
 
 /// Who there is, until when, and what a loss goes back to.
@@ -149,7 +151,7 @@ fn groups(node: &Node<'_>, known: &Known<'_>) -> Result<Vec<Vec<u16>>, Error> {
 }
 
 /// Every field that some kind of fault has.
-const ALL: [&str; 17] = [
+const ALL: [&str; 18] = [
     "at_s",
     "kind",
     "for_s",
@@ -167,6 +169,7 @@ const ALL: [&str; 17] = [
     "gain_percent",
     "ahead_s",
     "one_in",
+    "lasts_s",
 ];
 
 /// The kind of a fault, with no field that belongs to another kind.
@@ -249,6 +252,11 @@ fn one(item: &Node<'_>, known: &Known<'_>) -> Result<(TimedFault, Option<TimedFa
             peer: peer()?,
             ahead_ms: delay_ms(f.need("ahead_s", "20")?)?,
         },
+        "short-fuel" => Fault::ShortFuel {
+            peer: peer()?,
+            lasts_ms: delay_ms(f.need("lasts_s", "300")?)?,
+        },
+        "spoilt-record" => Fault::SpoiltRecord { peer: peer()? },
         _ => Fault::Heal,
     };
     let end = match f.get("for_s") {
@@ -407,6 +415,7 @@ pub(crate) fn storm(
         "max_computer_delay_s",
         "max_clock_drift_percent",
         "max_clock_jump_s",
+        "max_uavs",
     ])?;
     let mut max_kills = f.small_or("max_kills", 0, 0, u16::MAX, "UAVs")?;
     if usize::from(max_kills) >= n_uavs {
@@ -450,6 +459,7 @@ fn troubles(f: &Fields<'_>) -> Result<TroubleSpec, Error> {
         max_computer_delay_ms: delay("max_computer_delay_s", usual.max_computer_delay_ms)?,
         max_clock_drift_ppm: drift_ppm.map_or(usual.max_clock_drift_ppm, i32::unsigned_abs),
         max_clock_jump_ms: delay("max_clock_jump_s", usual.max_clock_jump_ms)?,
+        max_uavs: f.small_or("max_uavs", usual.max_uavs, 0, 60, "UAVs")?,
     })
 }
 
@@ -603,6 +613,13 @@ mod tests {
                 Fault::ClockDrift {
                     peer: 3,
                     ppm: -25_000,
+                },
+            ),
+            (
+                "{at_s:1, kind:'short-fuel', peer:3, lasts_s:90.5}",
+                Fault::ShortFuel {
+                    peer: 3,
+                    lasts_ms: 90_500,
                 },
             ),
             (

@@ -63,13 +63,15 @@ pub enum Cause {
     Crashed,
     /// The world took the airframe, and the process with it.
     Lost,
+    /// It had come home when its fuel ended.
+    Landed,
 }
 
 impl Cause {
     /// Whether the airframe is gone too.
     #[must_use]
     pub fn takes_airframe(self) -> bool {
-        matches!(self, Self::Killed | Self::Lost)
+        matches!(self, Self::Killed | Self::Lost | Self::Landed)
     }
 }
 

@@ -155,6 +155,7 @@ impl RunReport {
             Cause::Terminated => ("terminated", ""),
             Cause::Crashed => ("crashed   ", ""),
             Cause::Lost => ("lost      ", ""),
+            Cause::Landed => ("landed    ", ""),
         };
         write!(
             f,

@@ -84,7 +84,7 @@ impl FlightCheck {
         let (Some(at), Some(flyer)) = (m.at, self.flyers.get(&m.id)) else {
             return true;
         };
-        (at - homing.base).norm() <= HOLD_RADII * flyer.turn_radius_m
+        at_base(at, homing.base, *flyer)
     }
 
     /// Judges where everybody is; `base` tells where the mission of a revision ends.
@@ -177,6 +177,12 @@ impl FlightCheck {
             });
         }
     }
+}
+
+/// Whether somebody who loiters at a base may be here.
+#[must_use]
+pub fn at_base(at: Point, base: Point, flyer: Flyer) -> bool {
+    (at - base).norm() <= HOLD_RADII * flyer.turn_radius_m
 }
 
 #[allow(

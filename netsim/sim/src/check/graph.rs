@@ -12,6 +12,8 @@ pub struct Graph {
     ids: Vec<u16>,
     /// Bit `j` of entry `i`: radio `i` and radio `j` hear each other.
     adjacent: Vec<u64>,
+    /// Bit `j` of entry `i`: radio `i` hears radio `j`.
+    hears: Vec<u64>,
     /// Bit `j` of entry `i`: some path joins them (a radio reaches itself).
     reach: Vec<u64>,
     diameter: u32,
@@ -19,25 +21,29 @@ pub struct Graph {
 
 impl Graph {
     /// The graph of the radios `ids` (ascending, at most [`MAX_NODES`] are taken)
-    /// where `linked(i, j)` tells whether both directions between two of them are up.
+    /// where `heard(i, j)` tells whether the first hears the second.
     #[must_use]
-    pub fn new(ids: Vec<u16>, mut linked: impl FnMut(u16, u16) -> bool) -> Self {
+    pub fn new(ids: Vec<u16>, mut heard: impl FnMut(u16, u16) -> bool) -> Self {
         let mut ids = ids;
         ids.truncate(MAX_NODES);
         let n = ids.len();
-        let mut adjacent = vec![0u64; n];
+        let mut hears = vec![0u64; n];
         for i in 0..n {
-            for j in i + 1..n {
-                if linked(ids[i], ids[j]) {
-                    adjacent[i] |= 1 << j;
-                    adjacent[j] |= 1 << i;
-                }
+            for j in (0..n).filter(|j| *j != i) {
+                hears[i] |= u64::from(heard(ids[i], ids[j])) << j;
             }
         }
-        let (reach, diameter) = close(&adjacent);
+        let both = |i: usize| {
+            let other = (0..n).filter(|j| hears[*j] >> i & 1 == 1);
+            hears[i] & other.fold(0, |bits, j| bits | 1 << j)
+        };
+        let adjacent: Vec<u64> = (0..n).map(both).collect();
+        // What is heard goes further than components, along links that are up one way.
+        let ((reach, _), (_, diameter)) = (close(&adjacent), close(&hears));
         Self {
             ids,
             adjacent,
+            hears,
             reach,
             diameter,
         }
@@ -49,7 +55,7 @@ impl Graph {
         &self.ids
     }
 
-    /// The largest hop diameter of any component, at least 1.
+    /// The most hops that anything takes which reaches anybody, at least 1.
     #[must_use]
     pub fn diameter(&self) -> u32 {
         self.diameter.max(1)
@@ -58,7 +64,7 @@ impl Graph {
     /// How many radios this one hears.
     #[must_use]
     pub fn neighbours(&self, a: u16) -> u32 {
-        let heard = self.ids.binary_search(&a).map(|i| self.adjacent[i]);
+        let heard = self.ids.binary_search(&a).map(|i| self.hears[i]);
         heard.unwrap_or(0).count_ones()
     }
 
@@ -240,6 +246,15 @@ mod tests {
         Graph::new(ids.to_vec(), |a, b| {
             edges.contains(&(a, b)) || edges.contains(&(b, a))
         })
+    }
+
+    #[test]
+    fn a_link_that_is_up_one_way_joins_nobody_and_carries_what_is_heard() {
+        // 2 and 3 hear each other; 1 is deaf and is heard by 2 alone.
+        let heard = [(2, 1), (2, 3), (3, 2)];
+        let g = Graph::new(vec![1, 2, 3], |a, b| heard.contains(&(a, b)));
+        assert_eq!(g.components(), [vec![1], vec![2, 3]]);
+        assert_eq!((g.diameter(), g.neighbours(1), g.neighbours(2)), (2, 0, 2));
     }
 
     #[test]

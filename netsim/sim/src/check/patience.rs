@@ -46,9 +46,9 @@ struct Part {
     adoptions: u32,
     adopted_ms: Option<u64>,
     joined: Option<Joined>,
-    /// When it last heard a bid in a round that names it and that it has not bid in: if a
-    /// member of that is gone, it opens the next round at once.
-    heard_ms: Option<u64>,
+    /// The round that names it in which it heard a bid and has made none, and when: if a
+    /// member of that is gone, or its time is over, it opens the next one.
+    heard: Option<(RoundOrder, u64)>,
     /// Whether the round joined last ended in an adoption of this peer.
     decided: bool,
     /// The least diameter it reckoned with lately: at this snapshot and the one before.
@@ -117,6 +117,7 @@ impl PatienceCheck {
             judge_patience(self.period_ms, now_ms, (id, part), bid, ago_ms, found);
             judge_waiting(self.period_ms, now_ms, (id, part), bid, ago_ms, found);
         }
+        part.heard = part.heard.filter(|(heard, _)| *heard > order);
         part.joined = Some(Joined {
             at_ms: now_ms,
             order,
@@ -133,7 +134,7 @@ impl PatienceCheck {
         let part = self.parts.entry(by).or_default();
         let named = bid.round.members.iter().any(|m| m.id == by);
         if named && part.joined.as_ref().is_none_or(|j| j.order < order) {
-            part.heard_ms = Some(now_ms);
+            part.heard = Some((order, now_ms));
         }
     }
 
@@ -226,12 +227,9 @@ fn judge_patience(
     ago_ms: impl Fn(u64) -> u64,
     found: &mut Findings,
 ) {
-    let heard = part.heard_ms.is_some_and(|t| now_ms <= t + period_ms);
-    let follows = heard
-        || part
-            .joined
-            .as_ref()
-            .is_some_and(|j| !part.decided && now_ms < j.at_ms + FORGOTTEN_PERIODS * period_ms);
+    let joined = part.joined.as_ref().filter(|_| !part.decided);
+    let before = joined.map(|j| j.at_ms).max(part.heard.map(|(_, t)| t));
+    let follows = before.is_some_and(|t| now_ms < t + FORGOTTEN_PERIODS * period_ms);
     if bid.round.loss || follows {
         return;
     }

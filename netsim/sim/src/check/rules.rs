@@ -3,7 +3,7 @@
 use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
 use super::decision::{DecisionCheck, Mover};
-use super::flight::{FlightCheck, Flyer};
+use super::flight::{FlightCheck, Flyer, at_base};
 use super::listing::ListingCheck;
 use super::patience::PatienceCheck;
 use super::record::Said;
@@ -260,6 +260,13 @@ impl Rules {
         let bases = &self.bases;
         let base = |revision| bases.range(..=revision).next_back().map(|(_, b)| *b);
         self.flight.on_snapshot(snapshot, base, found);
+    }
+
+    /// Whether a UAV at this place is at a base that some revision gave.
+    #[must_use]
+    pub fn is_home(&self, id: u16, at: Point) -> bool {
+        let flyer = self.flyers.get(&id);
+        flyer.is_some_and(|f| self.bases.values().any(|base| at_base(at, *base, *f)))
     }
 
     /// Whether everybody who is to be home is.

@@ -10,6 +10,7 @@ use crate::spec::RadioSpec;
 use crate::world::{Fact, Judge, World};
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::CellId;
+use skein_link::medium::Links;
 use skein_peer::protocol::airtime::OVERHEAD_BYTES;
 use std::sync::Arc;
 
@@ -96,6 +97,11 @@ impl Air {
         self.stale = true;
     }
 
+    /// The fuel of a UAV lasts no longer than this from now on, milliseconds.
+    pub fn limit_fuel(&mut self, id: u16, lasts_ms: u64) {
+        self.world.limit_fuel(id, lasts_ms);
+    }
+
     /// Takes a fault that concerns the radio.
     pub fn strike(&mut self, fault: &Fault) {
         if self.overlay.apply(fault) {
@@ -131,7 +137,7 @@ impl Air {
     /// The true graph among some radios.
     pub fn graph(&mut self, ids: Vec<u16>) -> Graph {
         self.refresh();
-        Graph::new(ids, |a, b| self.links.joined(a, b))
+        Graph::new(ids, |rx, tx| self.links.state(tx, rx).is_up())
     }
 
     /// Whether the judge saw a camera cover this cell, in that many laps.

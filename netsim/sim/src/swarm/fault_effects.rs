@@ -4,12 +4,19 @@
 use super::sim_peer::{Clock, Process};
 use super::{Event, Kind, Phase, Swarm, What};
 use crate::account::Cause;
+use crate::check::record::Said;
 use crate::disk::Trouble;
 use crate::fault::Fault;
-use crate::history::bytes_hash;
+use skein_peer::Beliefs;
 use skein_peer::input::Command;
 use skein_peer::{Input, Role};
 use std::sync::Arc;
+
+/// The number of a radio that belongs to nobody.
+const OUTSIDER: u16 = u16::MAX;
+
+/// After so many wrong bits a record that can still be read is let be.
+const MOST_FLIPS: u32 = 64;
 
 impl Swarm {
     /// Applies a fault now.
@@ -59,7 +66,8 @@ impl Swarm {
                 0
             }
             Fault::Order { order } => {
-                self.operate(Command::Order(*order));
+                self.order = Some((*order, None));
+                self.repeat_order();
                 0
             }
             Fault::FailStores { peer, one_in } => self.trouble(*peer, Trouble::Fails(*one_in)),
@@ -77,6 +85,11 @@ impl Swarm {
                 let now_ms = self.now_ms;
                 self.set_clock(*peer, |clock| clock.jump(now_ms, u64::from(*ahead_ms)))
             }
+            Fault::ShortFuel { peer, lasts_ms } => {
+                self.air.limit_fuel(*peer, u64::from(*lasts_ms));
+                *peer
+            }
+            Fault::SpoiltRecord { peer } => self.send_spoilt(*peer),
             Fault::Loss { permille } => {
                 self.loss_max_permille = self.loss_max_permille.max(*permille);
                 *permille
@@ -155,20 +168,65 @@ impl Swarm {
         mission.base = base;
         self.mission = Arc::new(mission);
         self.checker.rules.on_mission(&self.mission);
-        self.operate(Command::Mission(Arc::clone(&self.mission)));
-    }
-
-    /// The operator says something at the ground station, if it runs.
-    fn operate(&mut self, command: Command) {
-        let ground = self
-            .peers
-            .iter()
-            .position(|p| p.config.role == Role::GroundStation);
-        if let Some(idx) = ground
-            && self.peers[idx].process == Process::Running
-        {
+        if let Some(idx) = self.ground_station() {
+            // What the operator said last is what the next life begins with.
+            self.peers[idx].config.mission = Some(Arc::clone(&self.mission));
+            let command = Command::Mission(Arc::clone(&self.mission));
             self.feed(idx, Input::Command(command));
         }
+    }
+
+    /// A peer is sent the last record on the air with bits wrong, so that nobody can read
+    /// it: it is refused and changes nothing. (What can be read is no worse than any record,
+    /// as long as nobody signs.)
+    fn send_spoilt(&mut self, id: u16) -> u16 {
+        let running = |idx: &usize| {
+            let s = &self.peers[*idx];
+            s.process == Process::Running && s.slow_ms == 0
+        };
+        let Some(idx) = self.peer_idx(id).filter(running) else {
+            return id;
+        };
+        let mut bytes = self.last_said.clone();
+        let last = (bytes.len() as u64).saturating_sub(1);
+        for _ in 0..MOST_FLIPS {
+            let at = usize::try_from(self.outsider.between(0, last)).unwrap_or(0);
+            if let Some(byte) = bytes.get_mut(at) {
+                *byte ^= 1 << self.outsider.between(0, 7);
+            }
+            if Said::read(&bytes).is_none() {
+                break;
+            }
+        }
+        if bytes.is_empty() || Said::read(&bytes).is_some() {
+            return id;
+        }
+        let believes = |swarm: &Self| {
+            let view = swarm.view(id);
+            // What depends on time alone is left out.
+            view.map(|v| Beliefs {
+                loads: Vec::new(),
+                diameter: 0,
+                speaks: false,
+                ..v
+            })
+        };
+        let before = believes(self);
+        self.spoilt = true;
+        let input = Input::Received {
+            transmitter: OUTSIDER,
+            hops: 0,
+            bytes,
+        };
+        self.feed(idx, input);
+        let taken = std::mem::take(&mut self.spoilt);
+        if taken || before != believes(self) {
+            let found = &mut self.checker.found;
+            found.broken("S8", self.now_ms, Some(id), || {
+                "took bytes that nobody can read".to_owned()
+            });
+        }
+        id
     }
 
     fn trouble(&mut self, peer: u16, trouble: Trouble) -> u16 {
@@ -227,8 +285,8 @@ impl Swarm {
         self.account.resumed(now_ms, id);
         self.checker.on_resume(id);
         for (arrived_ms, input) in waiting {
-            if let Input::Received { bytes, .. } = &input {
-                self.heard(arrived_ms, id, bytes_hash(bytes));
+            if self.peers[idx].slow_ms == 0 {
+                self.hear_late(idx, arrived_ms, &input);
             }
             self.feed(idx, input);
         }

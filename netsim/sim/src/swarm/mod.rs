@@ -25,7 +25,7 @@ pub use outcome::Outcome;
 #[cfg(test)]
 mod tests;
 
-use crate::account::Account;
+use crate::account::{Account, Cause};
 use crate::check::record::Said;
 use crate::check::{Checker, PeerSnapshot};
 use crate::fault::TimedFault;
@@ -34,26 +34,32 @@ use crate::history::{History, Kind, What, bytes_hash, report_hash};
 use crate::prepared::Prepared;
 use crate::radio::{Delivery, Frame};
 use crate::spec::Spec;
-use crate::world::Fact;
+use crate::world::{Fact, Loss};
 use air::Air;
 use queue::{Phase, Queue};
 use sim_peer::{Process, SimPeer};
-use skein_behaviors::Setpoint;
+use skein_behaviors::{Order, Setpoint};
 use skein_geometry::frame::Pose;
 use skein_link::medium::key_hash;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
 use skein_peer::protocol::airtime::OVERHEAD_BYTES;
 use skein_peer::wire;
-use skein_peer::{Beliefs, Input, Mission, Output, Peer, PeerConfig, PeerId, Report, Role};
+use skein_peer::{
+    Beliefs, Command, Incarnation, Input, Mission, Output, Peer, PeerConfig, PeerId, Report, Role,
+};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use stream::{Concern, Stream};
 
 /// How long a division is modelled to take, milliseconds: ten times what a desktop
 /// needs for the largest ring, about what a flight computer does.
 const DIVIDE_MS: u64 = 50;
 /// How long deriving the loop is modelled to take, milliseconds.
 const GROUND_MS: u64 = 200;
+
+/// So long it takes to carry an order to where no radio brings it, milliseconds.
+const COURIER_MS: u64 = 60_000;
 
 /// Nobody is on the way home for longer than this, milliseconds: a battery.
 const LONGEST_WAY_HOME_MS: u64 = 1_200_000;
@@ -103,6 +109,12 @@ pub struct Swarm {
     geometry_cache: GeometryCache,
     /// The operator's newest.
     mission: Arc<Mission>,
+    /// The operator's standing order, and in which life the ground station spoke it.
+    order: Option<(Order, Option<Incarnation>)>,
+    /// The record in which the ground station spoke it.
+    order_said: Vec<u8>,
+    /// Since when somebody waits who cannot be told to go on, milliseconds.
+    stranded_ms: Option<u64>,
     faults: Vec<TimedFault>,
     history: History,
     checker: Checker,
@@ -121,6 +133,11 @@ pub struct Swarm {
     received: u64,
     /// Those whose record had been passed on before, by who transmitted it.
     relayed_by: BTreeMap<u16, u64>,
+    /// The bytes that a peer said last, for an outsider to spoil.
+    last_said: Vec<u8>,
+    outsider: Stream,
+    /// A spoilt record is with a peer that has not refused it yet.
+    spoilt: bool,
     /// Which group of the last partition each peer was in.
     sides: BTreeMap<u16, usize>,
     loss_max_permille: u16,
@@ -147,6 +164,9 @@ impl Swarm {
             air: Air::new(prepared, seed),
             geometry_cache,
             mission: Arc::clone(&spec.mission),
+            order: None,
+            order_said: Vec::new(),
+            stranded_ms: None,
             faults,
             history: History::new(keep),
             checker: Checker::new(seed, spec),
@@ -160,6 +180,9 @@ impl Swarm {
             unassigned: false,
             received: 0,
             relayed_by: BTreeMap::new(),
+            last_said: Vec::new(),
+            outsider: Stream::new(seed, Concern::Outsider),
+            spoilt: false,
             sides: BTreeMap::new(),
             loss_max_permille: spec.radio.loss_permille,
             bytes_by_kind: BTreeMap::new(),
@@ -355,7 +378,17 @@ impl Swarm {
     /// Zone entries and the moment of completion, as the world's judge sees them.
     fn judge_world(&mut self) {
         for fact in self.air.facts() {
-            self.account.happened(self.now_ms, &fact);
+            match &fact {
+                Fact::Lost {
+                    uav,
+                    cause: Loss::Fuel,
+                    place,
+                    ..
+                } if self.checker.rules.is_home(*uav, *place) => {
+                    self.account.ended(self.now_ms, *uav, Cause::Landed);
+                }
+                _ => drop(self.account.happened(self.now_ms, &fact)),
+            }
             if let Fact::ZoneEntry {
                 at_ms, uav, zone, ..
             } = fact
@@ -448,7 +481,8 @@ impl Swarm {
             if d.hops > 0 {
                 *self.relayed_by.entry(d.tx).or_default() += 1;
             }
-            if self.peers[idx].process == Process::Running {
+            let s = &self.peers[idx];
+            if s.process == Process::Running && s.slow_ms == 0 {
                 self.heard(self.now_ms, d.rx, hash);
             }
             self.feed(
@@ -467,6 +501,13 @@ impl Swarm {
         if let Some(said) = self.spoken.get(&hash) {
             self.checker
                 .on_received((self.now_ms, arrived_ms), id, said);
+        }
+    }
+
+    /// A peer gets round to an input that arrived then.
+    fn hear_late(&mut self, idx: usize, arrived_ms: u64, input: &Input) {
+        if let Input::Received { bytes, .. } = input {
+            self.heard(arrived_ms, self.peers[idx].id(), bytes_hash(bytes));
         }
     }
 
@@ -492,7 +533,8 @@ impl Swarm {
     /// What has waited is handled at once, in order.
     fn catch_up(&mut self, idx: usize) {
         let waiting: Vec<(u64, Input)> = self.peers[idx].inbox.drain(..).collect();
-        for (_, input) in waiting {
+        for (arrived_ms, input) in waiting {
+            self.hear_late(idx, arrived_ms, &input);
             self.handle(idx, input);
         }
     }
@@ -529,6 +571,7 @@ impl Swarm {
                 self.count_bytes(&key, bytes.len());
                 if hops == 0 {
                     self.said(idx, peer, &bytes, hash);
+                    self.last_said.clone_from(&bytes);
                 }
                 let frame = Frame {
                     key: key_hash(&key),
@@ -599,6 +642,9 @@ impl Swarm {
             if said.tells_of_cells() {
                 self.refresh_covered();
             }
+            if said.record.kind == wire::kinds::Kind::Operator.number() {
+                self.order_said = bytes.to_vec();
+            }
             if said.record.kind == wire::kinds::Kind::Beacon.number() {
                 self.checker
                     .on_beacon(self.now_ms, id, &said, &peer.beliefs());
@@ -622,6 +668,13 @@ impl Swarm {
         };
         self.checker.on_report(self.now_ms, id, &report, adoptions);
         self.account.reported(self.now_ms, id, &report);
+        if let Report::Refused { reason } = &report
+            && !std::mem::take(&mut self.spoilt)
+        {
+            self.checker.found.broken("S8", self.now_ms, Some(id), || {
+                format!("refused what another peer said: {reason}")
+            });
+        }
         if let Report::Ready {
             revision,
             loop_hash,
@@ -642,7 +695,9 @@ impl Swarm {
         self.judge_world();
         self.observe_graph();
         self.refresh_covered();
+        self.repeat_order();
         let peers = self.snapshots();
+        self.carry_order(&peers);
         if self.homing {
             self.done = self.checker.on_way_home(self.now_ms, &peers, &self.covered);
             return;
@@ -670,6 +725,56 @@ impl Swarm {
                 text: v.text,
             });
         }
+    }
+
+    /// The ground station says the standing order once in each life, as a live one does.
+    fn repeat_order(&mut self) {
+        let station = self.ground_station();
+        let speaks_in = station.and_then(|idx| self.peers[idx].peer.as_ref()?.speaks_in());
+        if let (Some(idx), Some((order, said_in))) = (station, &mut self.order)
+            && speaks_in.is_some()
+            && *said_in != speaks_in
+        {
+            *said_in = speaks_in;
+            let order = *order;
+            self.feed(idx, Input::Command(Command::Order(order)));
+        }
+    }
+
+    /// Whoever waits for the operator out of reach of the ground station is told to go on
+    /// by somebody who goes there with the record.
+    fn carry_order(&mut self, peers: &[PeerSnapshot]) {
+        let station = self.spec.ground.as_ref().map_or(0, |g| g.id);
+        let waits = |m: &&PeerSnapshot| m.uav && m.view.order != Order::Resume;
+        let out_of_reach = |m: &&PeerSnapshot| !self.checker.graph().joined(m.id, station);
+        let stranded = peers.iter().filter(waits).find(out_of_reach).map(|m| m.id);
+        let goes_on = matches!(self.order, Some((Order::Resume, Some(_))));
+        let Some(id) = stranded.filter(|_| goes_on) else {
+            self.stranded_ms = None;
+            return;
+        };
+        let since_ms = *self.stranded_ms.get_or_insert(self.now_ms);
+        if self.now_ms >= since_ms + COURIER_MS
+            && let Some(idx) = self.peer_idx(id)
+        {
+            self.stranded_ms = None;
+            let bytes = self.order_said.clone();
+            self.heard(self.now_ms, id, bytes_hash(&bytes));
+            let (transmitter, hops) = (station, 0);
+            self.feed(
+                idx,
+                Input::Received {
+                    transmitter,
+                    hops,
+                    bytes,
+                },
+            );
+        }
+    }
+
+    fn ground_station(&self) -> Option<usize> {
+        let mut peers = self.peers.iter();
+        peers.position(|p| p.config.role == Role::GroundStation)
     }
 
     /// What every running peer believes, and where it is.

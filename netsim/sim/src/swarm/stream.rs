@@ -17,6 +17,8 @@ pub enum Concern {
     Peer(u16),
     /// The boot nonces of a peer.
     Nonce(u16),
+    /// What an outsider sends.
+    Outsider,
     /// The radio: fates of transmissions.
     Radio,
 }
@@ -30,6 +32,7 @@ impl Concern {
             Self::Nonce(p) => (4, p),
             Self::Radio => (5, 0),
             Self::Troubles => (6, 0),
+            Self::Outsider => (7, 0),
         };
         (kind << 16) | u64::from(who)
     }

@@ -254,6 +254,13 @@ impl World {
         }
     }
 
+    /// The fuel of a UAV lasts no longer than this from now on, milliseconds.
+    pub fn limit_fuel(&mut self, uav: u16, lasts_ms: u64) {
+        if let Some(u) = self.uav_mut(uav) {
+            u.body.limit_fuel(lasts_ms);
+        }
+    }
+
     /// Puts a lost UAV back: a new airframe at the launch point, its computer working.
     /// An airframe that still flies is left alone.
     pub fn respawn(&mut self, uav: u16) {

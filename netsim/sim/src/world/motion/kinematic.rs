@@ -275,6 +275,11 @@ impl Kinematic {
         true
     }
 
+    /// The fuel lasts no longer than this from now on, milliseconds.
+    pub fn limit_fuel(&mut self, lasts_ms: u64) {
+        self.fuel_ms = self.fuel_ms.min(lasts_ms);
+    }
+
     /// Flies on to a time and appends what was flown. An airframe out of fuel stops
     /// there and is lost.
     pub fn advance(&mut self, to_ms: u64, flown: &mut Vec<Piece>) {
