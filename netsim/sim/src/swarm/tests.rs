@@ -193,12 +193,61 @@ fn faults_that_do_not_fit_change_nothing() {
 }
 
 #[test]
-fn who_is_out_of_fuel_is_gone_and_an_impossible_mission_ends_at_its_longest_time() {
+fn an_impossible_mission_ends_at_its_longest_time() {
     let mut spec = fixture::square(2);
     spec.max_time_s = 60;
     let o = run(&Prepared::new(spec), 1, Vec::new(), false);
     assert!(!o.report.completed && o.report.end_ms <= 60_000);
     assert_eq!(o.report.violations.unwrap().counts.get("L5"), Some(&1));
+}
+
+#[test]
+fn whoever_flies_home_in_time_has_landed_when_its_fuel_ends_and_the_others_finish() {
+    let short = Fault::ShortFuel {
+        peer: 2,
+        lasts_ms: 130_000,
+    };
+    let o = run_with(3, 1, vec![at(0, short)]);
+    passed(&o);
+    assert!(o.report.end_ms > 130_000);
+    let k = &o.report.kills[0];
+    assert_eq!((k.peer, k.cause), (2, Cause::Landed), "{k:?}");
+    assert!(
+        (129_000..131_000).contains(&k.at_ms) && k.left == 0,
+        "{k:?}"
+    );
+}
+
+#[test]
+fn whoever_runs_out_of_fuel_on_its_way_is_lost_and_the_run_has_failed() {
+    let short = Fault::ShortFuel {
+        peer: 2,
+        lasts_ms: 60_000,
+    };
+    let faults = vec![at(0, short), at(20_000, Fault::KillComputer { peer: 2 })];
+    let o = run_with(3, 1, faults);
+    completed(&o);
+    let lost = |r: &String| r.contains("uav2 is lost");
+    assert!(o.report.reasons.iter().any(lost), "{:?}", o.report.reasons);
+}
+
+#[test]
+fn storms_of_every_kind_of_trouble_break_no_rule() {
+    let prepared = prepared(5);
+    let free_ms = runs::failure_free_makespan_ms(&prepared);
+    let mut struck = std::collections::BTreeSet::new();
+    for seed in 4..64 {
+        let o = runs::storm(&prepared, seed, free_ms, Wanted::default());
+        assert!(
+            o.report.passed,
+            "{seed}: {:?} {:?}",
+            o.report.reasons,
+            o.violations()
+        );
+        struck.extend(o.struck);
+    }
+    let all = crate::troubles::KINDS.iter().map(|k| k.name);
+    assert_eq!(struck, all.collect());
 }
 
 fn run_with(n_uavs: u16, seed: u64, faults: Vec<TimedFault>) -> Outcome {
