@@ -193,8 +193,7 @@ impl RecordCheck {
                 });
             }
             Body::Claim(claim) => {
-                let promised = promised_in_life(journal);
-                if let Some(text) = unpersisted(claim, promised.as_ref(), covered) {
+                if let Some(text) = unpromised(claim, journal, covered) {
                     found.broken("S7", now_ms, Some(id), || text);
                 }
             }
@@ -300,17 +299,21 @@ fn versions(v: &Beliefs) -> Versions {
     }
 }
 
-/// The section that a journal ends with, if it was promised in the journal's last life:
-/// a new life owns nothing of what an earlier one did.
-fn promised_in_life(journal: &[Vec<u8>]) -> Option<Claim> {
+/// What a claim lists that no section of the journal's last life does, as a sentence about
+/// the newest. A later one may be durable while a claim waits for its turn on the air.
+fn unpromised(said: &Claim, journal: &[Vec<u8>], covered: &[bool]) -> Option<String> {
+    let mut newest = None;
     for record in journal.iter().rev() {
         match Entry::decode(record) {
-            Some(Entry::Claim(claim)) => return Some(claim),
-            Some(Entry::Life(_)) => return None,
+            Some(Entry::Claim(claim)) => {
+                let text = unpersisted(said, Some(&claim), covered)?;
+                newest.get_or_insert(text);
+            }
+            Some(Entry::Life(_)) => break,
             _ => {}
         }
     }
-    None
+    newest.or_else(|| unpersisted(said, None, covered))
 }
 
 /// Whether a journal holds this bid, promised in the journal's last life. A later one may
@@ -378,6 +381,27 @@ mod tests {
             }],
             ..Claim::default()
         }
+    }
+
+    #[test]
+    fn a_claim_may_have_waited_for_its_turn_while_a_later_one_became_durable() {
+        let open = [false; 20];
+        let entry = |c: Claim| Entry::Claim(c).encode();
+        let life = Entry::Life(2).encode();
+        let journal = [
+            entry(claim(9, 9)),
+            life,
+            entry(claim(4, 5)),
+            entry(claim(5, 2)),
+        ];
+        assert_eq!(unpromised(&claim(4, 5), &journal, &open), None);
+        assert_eq!(unpromised(&claim(5, 2), &journal, &open), None);
+        assert!(unpromised(&claim(4, 6), &journal, &open).is_some());
+        assert!(
+            unpromised(&claim(9, 9), &journal, &open).is_some(),
+            "an earlier life"
+        );
+        assert!(unpromised(&claim(4, 5), &journal[..2], &open).is_some());
     }
 
     #[test]

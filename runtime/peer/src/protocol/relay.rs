@@ -14,7 +14,7 @@
 //! | any of an author | a later life of the author is heard | void: neither held nor sent |
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
 //! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
-//! | waiting | the share allows it, it is this peer's own bid or claim, or nothing is due earlier | sent |
+//! | waiting | the share allows it, it is this peer's own bid, claim or cover, or nothing is due earlier | sent |
 //! | waiting | its lifetime is over, or the queue is full of what is more urgent | not sent |
 //!
 //! Everything a peer sends is paid for from its share of the channel, [`Airtime`]. Newer values replace older ones of the same key in the queue.
@@ -263,9 +263,10 @@ impl Relay {
         from.plus_ms(intervals * self.air.interval_ms())
     }
 
-    /// What this peer bids and claims itself goes before all else: nobody else can say it.
-    fn is_own_promise(&self, key: &RecordKey, priority: Priority) -> bool {
-        key.0 == self.me && priority <= Priority::Claim
+    /// What this peer bids, claims and covers itself goes before all else: nobody else can
+    /// say it.
+    fn is_its_own_to_say(&self, key: &RecordKey, priority: Priority) -> bool {
+        key.0 == self.me && priority <= Priority::Beacon
     }
 
     fn jitter(&self, key: &RecordKey, version: (Incarnation, u32)) -> u64 {
@@ -454,7 +455,7 @@ impl Relay {
         self.queue
             .iter()
             .filter(|(_, w)| w.from <= now)
-            .min_by_key(|(k, w)| (!self.is_own_promise(k, w.priority), w.due, **k))
+            .min_by_key(|(k, w)| (!self.is_its_own_to_say(k, w.priority), w.due, **k))
             .map(|(k, w)| (*k, w.priority))
     }
 
