@@ -1,7 +1,7 @@
 //! A swarm in virtual time: N peers, one world, one radio, one seed, one clock.
 //!
-//! The order of a tick is fixed: act → move → radio → sense → decide (see
-//! [`queue::Phase`]). One run is single-threaded and owes everything to its seed, its
+//! The order within a millisecond is fixed: act → radio → answer → sense → decide →
+//! judge (see [`queue::Phase`]). One run is single-threaded and owes everything to its seed, its
 //! scenario and its faults: the same three give the same history, event for event.
 //!
 //! | module | what it holds |
@@ -56,12 +56,13 @@ use stream::{Concern, Stream};
 /// needs for the largest ring, about what a flight computer does.
 const DIVIDE_MS: u64 = 50;
 /// How long deriving the loop is modelled to take, milliseconds.
-const GROUND_MS: u64 = 200;
+const GEOMETRY_MS: u64 = 200;
 
 /// So long it takes to carry an order to where no radio brings it, milliseconds.
 const COURIER_MS: u64 = 60_000;
 
-/// Nobody is on the way home for longer than this, milliseconds: a battery.
+/// The longest time in which those who are finished may fly home, milliseconds: longer
+/// than the endurance that any of them has left.
 const LONGEST_WAY_HOME_MS: u64 = 1_200_000;
 
 /// Something to come.
@@ -107,7 +108,7 @@ pub struct Swarm {
     peers: Vec<SimPeer>,
     air: Air,
     geometry_cache: GeometryCache,
-    /// The operator's newest.
+    /// The newest mission that the operator gave.
     mission: Arc<Mission>,
     /// The operator's standing order, and in which life the ground station spoke it.
     order: Option<(Order, Option<Incarnation>)>,
@@ -121,7 +122,7 @@ pub struct Swarm {
     account: Account,
     covered: Vec<bool>,
     loop_hash: u64,
-    /// The newest time round that any peer has begun, from 0.
+    /// The newest lap that any peer has begun, from 0.
     lap: u16,
     /// Records spoken so far, by hash of their bytes.
     spoken: BTreeMap<u64, Arc<Said>>,
@@ -599,7 +600,7 @@ impl Swarm {
             }
             Output::Compute { token, job } => {
                 let takes_ms = match job {
-                    Job::Geometry(_) => GROUND_MS,
+                    Job::Geometry(_) => GEOMETRY_MS,
                     Job::Divide { .. } => DIVIDE_MS,
                 };
                 let answer = self.geometry_cache.answer(&job);
@@ -783,8 +784,8 @@ impl Swarm {
         self.peers.iter().filter_map(|s| snapshot(s, air)).collect()
     }
 
-    /// After the end those who are finished fly home, which is judged and is no part of
-    /// the history.
+    /// After the end those who are finished fly home: that is checked, and is no part of the
+    /// history.
     fn fly_home(mut self, mut outcome: Outcome) -> Outcome {
         if outcome.report.completed {
             (self.done, self.homing) = (false, true);
@@ -812,7 +813,7 @@ impl Swarm {
         }
     }
 
-    /// A peer begins a time round that nobody has begun before.
+    /// A peer begins a lap that nobody has begun before.
     fn lap_begun(&mut self, revision: u32, loop_hash: u64) {
         let lap = u16::try_from(revision.saturating_sub(self.spec.mission.revision));
         if let Ok(lap) = lap
