@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn bits_say_who_hears_whom() {
         let stations: Vec<u16> = (1..=9).map(|i| i * 7).collect();
-        let up = |tx: u16, rx: u16| (tx + 2 * rx) % 3 == 0;
+        let up = |tx: u16, rx: u16| (tx + 2 * rx).is_multiple_of(3);
         let hearing = Hearing::of(stations.clone(), up);
         for tx in &stations {
             for rx in &stations {
