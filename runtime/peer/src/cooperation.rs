@@ -785,6 +785,7 @@ impl MissionState {
             }
         }
         sections.keep(good);
+        self.replan = true;
     }
 
     /// All that can be covered is covered, or again not: the mission ends, the next lap

@@ -43,6 +43,36 @@ fn a_new_revision_is_taken_by_all_and_covered_cells_keep_their_names() {
     assert_eq!(h.beliefs(1).covered.len(), 32);
 }
 
+/// The way home from a base that has moved away costs fuel that was planned: what is cut
+/// from the plan is cut from the flight.
+#[test]
+fn a_base_that_moves_away_shortens_plan_and_flight() {
+    let mut h = Harness::started(1, mission(1, 8, 6));
+    h.add_ground_station(Some(mission(1, 8, 6)));
+    h.start(GROUND_STATION);
+    h.run_s(30);
+    let before = h.beliefs(1);
+    let spare_s = f64::from(before.spendable_ms - before.eta_ms) / 1000.0;
+    h.seat(1).fuel_s -= spare_s - 5.0;
+    h.run_s(1);
+    let moved = Mission {
+        base: (-600_000, -60_000),
+        ..mission(2, 8, 6)
+    };
+    command(&mut h, moved);
+    assert!(h.run_until(10, |h| h.beliefs(1).revision == 2));
+    h.run_s(1);
+    let after = h.beliefs(1);
+    assert!(after.plan.len() + 4 < before.plan.len());
+    assert!(!after.plan.is_empty());
+    assert!(
+        after.eta_ms <= after.spendable_ms,
+        "{} of {}",
+        after.eta_ms,
+        after.spendable_ms
+    );
+}
+
 #[test]
 fn an_older_revision_changes_nothing() {
     let mut h = Harness::started(1, mission(3, 6, 4));
