@@ -219,7 +219,7 @@ impl Peer {
                 let effects = self.life.hear_double(nonce);
                 self.carry_out(effects);
             }
-            Heard::Myself(incarnation, heartbeat) => self.on_myself(incarnation, heartbeat),
+            Heard::Myself(incarnation, heartbeat) => self.on_myself(incarnation, heartbeat, 0),
             Heard::Beacon(record, beacon) => self.on_beacon(&record, &beacon),
             Heard::Record(kind, record, body) => {
                 self.membership.hears(self.now);
@@ -233,9 +233,10 @@ impl Peer {
         }
     }
 
-    fn on_myself(&mut self, incarnation: Incarnation, heartbeat: u32) {
-        let sent = self.outbound.heartbeat();
-        let effects = self.life.hear_of_myself(incarnation, heartbeat, sent);
+    /// Of this peer's own id, in a life: a heartbeat, and the number of a record.
+    fn on_myself(&mut self, incarnation: Incarnation, heartbeat: u32, seq: u32) {
+        let never_said = heartbeat > self.outbound.heartbeat() || seq > self.outbound.seq();
+        let effects = self.life.hear_of_myself(incarnation, never_said);
         self.carry_out(effects);
     }
 
@@ -246,7 +247,7 @@ impl Peer {
             .on_beacon(now, author, record.incarnation, beacon);
         self.report_changes(changes);
         for told in beacon.gossip.iter().filter(|g| g.id == me) {
-            self.on_myself(told.incarnation, told.heartbeat);
+            self.on_myself(told.incarnation, told.heartbeat, told.max_seq);
             if told.incarnation == self.life.incarnation() {
                 match told.suspected_ds {
                     Some(_) => {

@@ -8,7 +8,7 @@
 //! | promised | the store failed | as before the promise | stored again: if there is no life yet after one tick, two, four, up to 64, else when it hears of itself again |
 //! | listening | its own id at this or a higher life | promised | that plus one is stored |
 //! | listening | 3 T are over | speaking | beacons |
-//! | speaking | its own id at a higher life, or a heartbeat it never sent | promised | that plus one |
+//! | speaking | its own id at a higher life, or a heartbeat or a record of this life that it never sent | promised | that plus one |
 //! | speaking | another boot nonce under its id and life, above its own | silenced | an alarm |
 //!
 //! Without the last but one row a peer that lost its disk would be a zombie nobody
@@ -115,20 +115,15 @@ impl Life {
         self.retry = (ticks, ticks);
     }
 
-    /// Somebody speaks of this peer's own id in the given life, with a heartbeat;
-    /// `sent` is the last heartbeat that this peer sent itself. A life far ahead of its own
+    /// Somebody speaks of this peer's own id in the given life, perhaps with a heartbeat or
+    /// a record that this peer never said in it. A life far ahead of its own
     /// is not believed, and one is taken between two ticks: lives that were made up cannot
     /// use all of them up.
-    pub fn hear_of_myself(
-        &mut self,
-        incarnation: Incarnation,
-        heartbeat: u32,
-        sent: u32,
-    ) -> Effects {
+    pub fn hear_of_myself(&mut self, incarnation: Incarnation, never_said: bool) -> Effects {
         let mine = self.promised.unwrap_or(0).max(self.incarnation);
-        let never_sent = incarnation == self.incarnation && heartbeat > sent;
+        let used_twice = incarnation == self.incarnation && never_said;
         if incarnation > mine
-            || (incarnation == mine && never_sent)
+            || (incarnation == mine && used_twice)
             || (self.incarnation == 0 && incarnation >= mine)
         {
             if incarnation - mine.min(incarnation) > LIFE_STEP || self.raised {
@@ -199,17 +194,17 @@ mod tests {
     #[test]
     fn a_peer_heard_of_in_a_later_life_takes_the_one_after() {
         let mut life = living(2);
-        assert!(life.hear_of_myself(2, 9, 9).is_empty(), "an echo");
-        assert!(life.hear_of_myself(1, 99, 9).is_empty(), "an earlier life");
+        assert!(life.hear_of_myself(2, false).is_empty(), "an echo");
+        assert!(life.hear_of_myself(1, true).is_empty(), "an earlier life");
         assert_eq!(
-            stored(&life.hear_of_myself(2, 10, 9)),
+            stored(&life.hear_of_myself(2, true)),
             [3],
-            "a heartbeat never sent"
+            "a heartbeat or a record never sent"
         );
-        assert!(life.hear_of_myself(6, 0, 9).is_empty(), "one a tick");
+        assert!(life.hear_of_myself(6, false).is_empty(), "one a tick");
         life.tick(2);
-        assert_eq!(stored(&life.hear_of_myself(6, 0, 9)), [7]);
-        assert!(life.hear_of_myself(5, 0, 9).is_empty(), "7 is promised");
+        assert_eq!(stored(&life.hear_of_myself(6, false)), [7]);
+        assert!(life.hear_of_myself(5, false).is_empty(), "7 is promised");
         assert!(
             life.is_durable(3).is_empty(),
             "an earlier promise is overtaken"
@@ -217,7 +212,7 @@ mod tests {
         assert_eq!(life.is_durable(7).len(), 2);
         assert_eq!(life.incarnation(), 7);
         life.tick(7);
-        assert!(life.hear_of_myself(u32::MAX, 0, 9).is_empty(), "made up");
+        assert!(life.hear_of_myself(u32::MAX, false).is_empty(), "made up");
     }
 
     #[test]

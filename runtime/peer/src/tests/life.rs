@@ -9,6 +9,7 @@ use crate::wire::codec::Body;
 use crate::wire::kinds::Kind;
 use crate::wire::message::{Finished, Gossip};
 use crate::{PeerId, Report};
+use std::collections::BTreeSet;
 
 #[test]
 fn a_peer_that_lost_its_disk_takes_a_life_above_the_one_others_know() {
@@ -21,6 +22,39 @@ fn a_peer_that_lost_its_disk_takes_a_life_above_the_one_others_know() {
     h.start(1);
     assert!(h.run_until(12, |h| h.beliefs(2).peers[&PeerId(1)] == (2, Status::Alive)));
     assert_eq!(h.beliefs(1).incarnation, 2);
+}
+
+#[test]
+fn a_life_begun_anew_that_outlasted_the_first_is_known_by_the_records_of_the_first() {
+    let mut h = Harness::started(2, mission(1, 12, 10));
+    h.run_s(40);
+    let records = |h: &mut Harness| h.seat(1).said.len();
+    let heartbeats = |h: &Harness| h.count_said(1, Kind::Beacon);
+    let (first_records, first_heartbeats) = (records(&mut h), heartbeats(&h));
+    h.isolate(1, true);
+    h.stop(1);
+    h.seat(1).journal.clear();
+    // Its disk takes neither bids nor sections at first, so that it says little.
+    h.seat(1).store_fails = |e| matches!(e, Entry::Bid(_) | Entry::Claim(_));
+    h.start(1);
+    h.run_s(50);
+    let second_heartbeats = heartbeats(&h) - first_heartbeats;
+    let second_records = records(&mut h) - first_records - second_heartbeats;
+    assert!(second_heartbeats > first_heartbeats, "{second_heartbeats}");
+    assert!(
+        second_records + 10 < first_records - first_heartbeats,
+        "{second_records} records"
+    );
+    h.seat(1).store_fails = |_| false;
+    h.run_s(10);
+    let plans = |h: &Harness, id: u16| h.beliefs(id).plan.into_iter().collect::<BTreeSet<_>>();
+    let both = |h: &Harness| plans(h, 1).intersection(&plans(h, 2)).count();
+    assert_eq!(h.beliefs(1).incarnation, 1);
+    assert!(both(&h) > 20, "each plans all that is open");
+    h.isolate(1, false);
+    assert!(h.run_until(4, |h| h.beliefs(2).peers[&PeerId(1)] == (2, Status::Alive)));
+    // As L3 wants it: (3D + 5) T for both claims to arrive, 2 T to yield.
+    assert!(h.run_until(6, |h| both(h) == 0), "{}", both(&h));
 }
 
 #[test]
