@@ -14,7 +14,7 @@
 //! | any of an author | a later life of the author is heard | void: neither held nor sent |
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
 //! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
-//! | waiting | the share allows it, it is this peer's own bid, claim or cover, or nothing has waited for more of the time that it may wait | sent |
+//! | waiting | the share allows it, it is this peer's own bid, claim or cover, or nothing is due earlier | sent |
 //! | waiting | its lifetime is over, or the queue is full of what is more urgent | not sent |
 //!
 //! Everything a peer sends is paid for from its share of the channel, [`Airtime`]. Newer values replace older ones of the same key in the queue.
@@ -31,7 +31,6 @@ use skein_geometry::hash::Fnv;
 #[cfg(test)]
 mod many_relays;
 
-use core::cmp::Reverse;
 use std::collections::BTreeMap;
 
 /// Most records held: 64 peers with a state, a bid, a claim, an order, a finish and
@@ -251,17 +250,14 @@ impl Relay {
         each_ms * self.air.sharers().max(LEAST_SPREAD)
     }
 
-    /// By when a record is to be sent: what others wrote may wait an interval, their
-    /// telemetry three, the many pieces of a mission six. Where all are late, what waited
-    /// for the most of these times goes first, so each class gets its part: nothing waits
-    /// for ever behind what is more urgent, and no claim until it is out of date behind a
-    /// whole mission.
+    /// By when a record is to be sent: what others wrote may wait an interval, telemetry
+    /// one or two more. Where all are late, each class gets its part: nothing waits for
+    /// ever behind what is more urgent.
     fn due(&self, key: &RecordKey, from: Time, priority: Priority) -> Time {
         let telemetry = priority == Priority::Telemetry;
         let intervals = match (key.0 == self.me, telemetry) {
             (true, false) => 0,
             (true, true) | (false, false) => 1,
-            (false, true) if key.1 == Kind::Mission.number() => 6,
             (false, true) => 3,
         };
         from.plus_ms(intervals * self.air.interval_ms())
@@ -294,7 +290,7 @@ impl Relay {
             let me = self.me;
             let urgency = |k: &RecordKey| Kind::of_number(k.1).map(Kind::priority);
             let others = self.held.iter().filter(|(k, _)| k.0 != me);
-            let oldest = others.min_by_key(|(k, h)| (Reverse(urgency(k)), h.sent, **k));
+            let oldest = others.min_by_key(|(k, h)| (core::cmp::Reverse(urgency(k)), h.sent, **k));
             if let Some(k) = oldest.map(|(k, _)| *k) {
                 self.held.remove(&k);
                 self.queue.remove(&k);
@@ -459,12 +455,7 @@ impl Relay {
         self.queue
             .iter()
             .filter(|(_, w)| w.from <= now)
-            .min_by_key(|(k, w)| {
-                let others = !self.is_its_own_to_say(k, w.priority);
-                let may_wait_ms = w.due.since_ms(w.from).max(1);
-                let waited_permille = 1000 * now.since_ms(w.from) / may_wait_ms;
-                (others, Reverse(waited_permille), w.due, **k)
-            })
+            .min_by_key(|(k, w)| (!self.is_its_own_to_say(k, w.priority), w.due, **k))
             .map(|(k, w)| (*k, w.priority))
     }
 
@@ -567,44 +558,6 @@ mod tests {
         }
         assert!(bytes <= 64_000 / 8 * 10, "{bytes}");
         assert!(bytes >= 64_000 / 8 * 10 * 4 / 10, "{bytes}");
-    }
-
-    #[test]
-    fn a_claim_does_not_wait_for_a_whole_mission_nor_the_mission_for_all_claims() {
-        const PIECES: u16 = 40;
-        // Some 500 bytes a second: the pieces alone take 25 s.
-        let mut r = Relay::new(2, "f", 9_000, 1000);
-        for t in 0..3 {
-            r.air.plan_beacon(Time(t));
-        }
-        for subject in 0..PIECES {
-            let piece = Record {
-                subject,
-                kind: Kind::Mission.number(),
-                ..record(1, 1 + u32::from(subject))
-            };
-            r.offer(Time(5_000), &piece, &[1; 285], 0);
-        }
-        let (mut claims, mut pieces) = (Vec::new(), 0);
-        for t in 5_000..55_000 {
-            // Then somebody else claims something every two seconds.
-            if t >= 20_000 && t % 2_000 == 0 {
-                let claim = Record {
-                    kind: Kind::Claim.number(),
-                    ..record(u16::try_from(t / 2_000).unwrap(), 1)
-                };
-                r.offer(Time(t), &claim, &[1; 80], 0);
-            }
-            while let Some(out) = r.poll(Time(t)) {
-                match out.priority {
-                    Priority::Claim => claims.push(t),
-                    _ => pieces += 1,
-                }
-            }
-        }
-        assert!(claims.first().is_some_and(|t| *t < 24_000), "{claims:?}");
-        assert!(claims.len() > 12, "{claims:?}");
-        assert_eq!(pieces, PIECES);
     }
 
     #[test]
