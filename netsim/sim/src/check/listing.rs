@@ -86,9 +86,13 @@ impl ListingCheck {
             let component_ms = snapshot.stability.component_since_ms(m.id)?;
             Some(writes_ms.max(component_ms))
         };
-        // An orphan is to be listed in every component with an able peer, so the one that
-        // has been stable for longest is the one that counts.
-        let stable_ms = snapshot.able().filter_map(since_ms).min();
+        // Who believes all others down lists nothing for them.
+        let in_company = snapshot.able().any(|o| !is_alone(&o.view));
+        let lists = |m: &PeerSnapshot| !(in_company && is_alone(&m.view));
+        // An orphan is to be listed in every other component with an able peer, so the one
+        // that has been stable for longest is the one that counts.
+        let listers = snapshot.able().filter(|m| lists(m));
+        let stable_ms = listers.filter_map(since_ms).min();
         let Some(stable_ms) = stable_ms.filter(|_| n > 0) else {
             self.able_since_ms = None;
             return;
@@ -109,8 +113,7 @@ impl ListingCheck {
                     *s = true;
                 }
             }
-            // Who believes all others down lists nothing for them.
-            if is_alone(&m.view) && snapshot.able().any(|o| o.id != m.id && !is_alone(&o.view)) {
+            if !lists(m) {
                 continue;
             }
             for c in m.view.held.iter().chain(&m.view.plan) {

@@ -41,8 +41,8 @@ pub struct SpreadCheck {
 const PIECE_PERIODS: u64 = 3;
 
 /// Beyond the time that a record takes to all: deriving the loop of a revision is
-/// modelled to take 200 ms, and a peer looks four times a period.
-const LOOK_PERIODS: u64 = 1;
+/// modelled to take 200 ms, and a peer looks four times a period; the check looks once.
+const LOOK_PERIODS: u64 = 2;
 
 /// Whether a record reaches everybody: passed on, and worth it for longer than the two
 /// periods of a state, which is for people and is said again soon.
