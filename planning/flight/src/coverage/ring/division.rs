@@ -49,7 +49,7 @@ const STEPS_PER_CELL: u64 = 10;
 
 /// How often at most ways round zones are asked for and the plan is improved with what they
 /// are: measured, three times suffice where zones are few.
-const PROOFS: u64 = 12;
+const PROOFS: u64 = 24;
 
 /// Divides the open cells of a loop among UAVs by a rule.
 ///
@@ -97,20 +97,21 @@ fn best(search: &mut Search<'_>, around: &Tours, steps: u64) -> Tours {
     if packed.cost() < best.cost() {
         best = packed;
     }
-    let mut proved: Option<Tours> = None;
+    search.prove(&best);
+    let mut proved = search.reckoned(&best);
     for _ in 0..PROOFS {
-        let was_longer = search.prove(&best);
-        let reckoned = search.reckoned(&best);
-        let is_better = |known: &Tours| reckoned.cost() < search.reckoned(known).cost();
-        if proved.as_ref().is_none_or(is_better) {
-            proved = Some(reckoned.clone());
-        }
-        if !was_longer {
+        let next = search.improved_within(steps / 4, proved.clone());
+        let was_longer = search.prove(&next);
+        let next = search.reckoned(&next);
+        proved = search.reckoned(&proved);
+        let is_better = next.cost() < proved.cost();
+        if is_better {
+            proved = next;
+        } else if !was_longer {
             break;
         }
-        best = search.improved_within(steps / 4, reckoned);
     }
-    proved.unwrap_or(best)
+    proved
 }
 
 fn division_of(search: &Search<'_>, uavs: &[Uav], tours: &Tours) -> Division {

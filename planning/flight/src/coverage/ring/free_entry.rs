@@ -24,7 +24,7 @@ use skein_geometry::random::SplitMix64;
 /// committed.
 const RUNS_MAX: usize = 6;
 
-/// Weights of durations double with each of so many parts of the first makespan. At first
+/// Weights of durations double with each of so many parts of a makespan. At first
 /// what is not the longest still counts; then only what is near the longest does, so that
 /// whoever can shorten it does, however long that takes itself.
 const SOFT: u64 = 12;
@@ -72,13 +72,17 @@ impl Tours {
         self.tours.iter().map(|t| t.done_ms)
     }
 
-    /// What decides between plans: cells left, the makespan, all durations.
-    pub fn cost(&self) -> (usize, u64, u64) {
-        (
-            self.left.iter().map(|r| r.count).sum(),
-            self.done_ms().max().unwrap_or(0),
-            self.done_ms().sum(),
-        )
+    /// What decides between plans: cells left, then the durations, the longest first. So of
+    /// two plans with one makespan, which a far cell may set, the fairer one is taken.
+    pub fn cost(&self) -> (usize, Vec<u64>) {
+        let mut done_ms: Vec<u64> = self.done_ms().collect();
+        done_ms.sort_unstable_by_key(|ms| Reverse(*ms));
+        (self.left.iter().map(|r| r.count).sum(), done_ms)
+    }
+
+    /// When the last is done, milliseconds from now.
+    pub fn makespan_ms(&self) -> u64 {
+        self.done_ms().max().unwrap_or(0)
     }
 }
 
@@ -530,14 +534,19 @@ impl<'a> Search<'a> {
     /// after parts of it were made anew, within so many steps.
     pub fn improved_within(&mut self, steps: u64, tours: Tours) -> Tours {
         self.last_step = self.transfers.asked() + steps;
-        let makespan_ms = tours.cost().1.max(1);
-        let [soft, sharp] = [SOFT, SHARP].map(|doublings| Scale {
-            makespan_ms,
+        let scale = |plan: &Tours, doublings| Scale {
+            makespan_ms: plan.makespan_ms().max(1),
             doublings,
-        });
+        };
+        // A makespan that became much shorter is no longer the measure of what is late.
+        let soft = scale(&tours, SOFT);
+        let coarse = self.descended(tours, soft);
+        let soft = scale(&coarse, SOFT);
+        let coarse = self.descended(coarse, soft);
+        let sharp = scale(&coarse, SHARP);
         let settled = |plan| self.descended(self.descended(plan, soft), sharp);
-        let mut best = settled(tours);
-        let mut random = SplitMix64::new(best.cost().1);
+        let mut best = self.descended(coarse, sharp);
+        let mut random = SplitMix64::new(best.makespan_ms());
         let mut fruitless = 0;
         while !self.is_over() && fruitless < FRUITLESS_MAX {
             fruitless += 1;
