@@ -60,6 +60,7 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
         seed: args.seed,
         time_scale: args.time_scale,
         planner: args.planner.chosen(),
+        launch: None,
     };
     let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {
         Ok(scenario) => scenario,

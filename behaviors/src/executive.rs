@@ -38,12 +38,12 @@ use camera::{Played, look};
 pub use prediction::UNREACHABLE_MS;
 use serde::{Deserialize, Serialize};
 use skein_flight::airframe::Airframe;
-use skein_flight::coverage::ring::backtracking::Leg;
+use skein_flight::coverage::ring::backtracking::{Leg, OffLoop};
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
 use skein_flight::route::Router;
 use skein_flight::trajectory::timed::Objective;
 use skein_flight::trajectory::wind::Wind;
-use skein_geometry::frame::{Point, Pose};
+use skein_geometry::frame::Point;
 use skein_geometry::{Curve, Segment};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -103,9 +103,9 @@ pub struct Forecast {
     pub heading: Direction,
     /// When it is there, milliseconds from now.
     pub release_ms: u32,
-    /// Where it is, if nothing keeps it from leaving for anywhere at once: it is in no cell,
-    /// and will serve none that soon.
-    pub off_loop: Option<Pose>,
+    /// Where it is, if nothing keeps it from leaving for anywhere, at once or when it takes
+    /// off: it is in no cell, and will serve none that soon.
+    pub off_loop: Option<OffLoop>,
     /// When all legs are flown, milliseconds from now.
     pub finish_ms: u32,
 }
@@ -255,6 +255,9 @@ impl Executive {
             );
         }
         self.note_wind(percept);
+        if percept.takes_off_in_ms > 0 {
+            return (self.on_ground(percept), events);
+        }
         self.report_seen(percept, is_open, &mut events);
         let offset = self.progress(percept);
         self.count_misses(is_open, &mut events);
@@ -287,6 +290,21 @@ impl Executive {
             airspeed_mps: setpoint.airspeed_mps,
         });
         (setpoint, events)
+    }
+
+    /// Before it takes off: it sees nothing, and plans from where it stands once it flies.
+    fn on_ground(&mut self, percept: &Percept) -> Setpoint {
+        self.replan = true;
+        self.requeue();
+        let setpoint = self
+            .envelope
+            .check(percept, self.setpoint(percept, Vec::new()));
+        self.played = Some(Played {
+            percept: *percept,
+            steps: Vec::new(),
+            airspeed_mps: setpoint.airspeed_mps,
+        });
+        setpoint
     }
 
     fn setpoint(&self, percept: &Percept, steps: Vec<crate::setpoint::Steer>) -> Setpoint {

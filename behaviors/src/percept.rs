@@ -20,6 +20,9 @@ pub struct Percept {
     pub wind_north_mps: f64,
     /// Flight time left at cruise, seconds.
     pub endurance_s: f64,
+    /// Time until it takes off, milliseconds; 0 in the air.
+    #[serde(default)]
+    pub takes_off_in_ms: u32,
     /// Whether the airframe flies its own failsafe loiter for want of setpoints.
     pub failsafe: bool,
 }

@@ -40,6 +40,7 @@ pub fn percept_at(pose: Pose, time_ms: u64) -> Percept {
         wind_east_mps: 0.0,
         wind_north_mps: 0.0,
         endurance_s: 3000.0,
+        takes_off_in_ms: 0,
         failsafe: false,
     }
 }

@@ -7,7 +7,7 @@ use super::transit::{CellVisit, Move, Place};
 use super::{Executive, Forecast, Kind};
 use crate::percept::Percept;
 use skein_flight::coverage::ring::Direction;
-use skein_flight::coverage::ring::backtracking::Leg;
+use skein_flight::coverage::ring::backtracking::{Leg, OffLoop};
 use skein_flight::trajectory::wind::Course;
 use skein_geometry::frame::Point;
 use skein_geometry::math::{PI, atan2};
@@ -53,13 +53,13 @@ impl Executive {
             .iter()
             .rev()
             .find(|i| i.visit.is_some())
-            .map_or(0, |i| self.ms(i.end_m));
+            .map_or(0, |i| self.when_ms(i.end_m));
         let mut cells = Vec::new();
         let mut anchor: Option<(Place, f64)> = None;
         let mut before_m = 0.0;
         for (i, item) in items.iter().enumerate() {
             let in_it = i == 0 && kept > 0;
-            let fits = self.ms(item.end_m) <= window_ms;
+            let fits = self.when_ms(item.end_m) <= window_ms;
             match (item.visit, item.cell) {
                 (Some(visit), _) if in_it || fits => {
                     if is_open(visit.cell) {
@@ -83,14 +83,15 @@ impl Executive {
         }
         let on_loop = anchor.and_then(|(place, m)| place.boundary.map(|b| (b, m)));
         let is_in_a_cell = kept > 0 && items.first().is_some_and(|i| i.cell.is_some());
-        let off_loop = (cells.is_empty() && !is_in_a_cell).then_some(from.pose);
+        let off_loop =
+            (cells.is_empty() && !is_in_a_cell).then(|| OffLoop::of(from.pose, self.when_ms(0.0)));
         let found = on_loop.or_else(|| self.transit.way_on(from.pose).map(|(b, d, m)| ((b, d), m)));
         match found {
             Some(((anchor, heading), m)) => Forecast {
                 cells,
                 anchor,
                 heading,
-                release_ms: self.ms(m),
+                release_ms: self.when_ms(m),
                 off_loop,
                 finish_ms,
             },
@@ -121,7 +122,7 @@ impl Executive {
         let items = self.items(&from, kept, queue, is_open);
         items
             .iter()
-            .filter_map(|i| i.visit.map(|h| (h.cell, self.ms(i.end_m))))
+            .filter_map(|i| i.visit.map(|h| (h.cell, self.when_ms(i.end_m))))
             .collect()
     }
 
@@ -277,6 +278,17 @@ impl Executive {
         } else {
             air.air_length_m(&self.track.ahead(ground_m))
         }
+    }
+
+    /// When it has flown so many metres through the air, milliseconds from the last percept.
+    fn when_ms(&self, length_m: f64) -> u32 {
+        let ground_ms = self
+            .played
+            .as_ref()
+            .map_or(0, |p| p.percept.takes_off_in_ms);
+        self.ms(length_m)
+            .saturating_add(ground_ms)
+            .min(UNREACHABLE_MS)
     }
 
     /// Time to fly so many metres through the air, milliseconds, rounded up.

@@ -8,6 +8,7 @@ use crate::testing::{CLEARANCE_M, LANE_M, Wing, airframe, loop_and_router, recta
 use Direction::{Backward, Forward};
 use proptest::prelude::*;
 use skein_geometry::Polygon;
+use skein_geometry::frame::Pose;
 
 struct Flight {
     executive: Executive,
@@ -653,4 +654,33 @@ proptest! {
         }
         prop_assert!(flight.least_distance_m() > CLEARANCE_M - 2.0, "{}", flight.least_distance_m());
     }
+}
+
+#[test]
+fn who_has_not_taken_off_sees_nothing_and_is_foretold_from_where_it_stands() {
+    let mut f = Flight::new(6, 4, Vec::new(), outside());
+    f.legs(&[(0, 24, Forward)]);
+    // It stands in the middle of a cell that a frame there would hold.
+    let cell = f.executive.transit.coverage_loop.cells()[2].clone();
+    let on_cell = cell.curve.pose_at(cell.view_m).unwrap();
+    let percept = |pose, time_ms, takes_off_in_ms| Percept {
+        takes_off_in_ms,
+        ..crate::testing::percept_at(pose, time_ms)
+    };
+    let is_open = |_| true;
+    for t in 0..5 {
+        let ground = percept(on_cell, 200 * t, 9_000 - 200 * u32::try_from(t).unwrap());
+        let (_, events) = f.executive.step(&ground, &is_open);
+        assert!(events.is_empty(), "{events:?}");
+    }
+    let forecast = f.executive.forecast(5_000, &is_open);
+    let off = forecast.off_loop.unwrap();
+    assert_eq!(
+        (off, forecast.cells.len()),
+        (OffLoop::of(on_cell, 8_200), 0)
+    );
+    assert!(forecast.release_ms >= 8_200 && forecast.finish_ms > forecast.release_ms);
+    // In the air it sees the cell.
+    let (_, events) = f.executive.step(&percept(on_cell, 9_000, 0), &is_open);
+    assert!(matches!(&events[..], [Event::Seen(_)]), "{events:?}");
 }

@@ -3,14 +3,15 @@
 //!
 //! The third argument is `none` (no faults), `kills` (three UAVs lost for good as in the
 //! `helsinki` trial, nothing else), `planned` (the scenario's own faults) or `storm`.
-//! `--rate BPS` changes the radio; `--backtracking` the division.
+//! `--base` has all take off at the base; `--rate BPS` changes the radio; `--backtracking`
+//! the division.
 
 use skein_flight::coverage::ring::division::Rule;
 use skein_netsim::fault::Fault;
 use skein_netsim::prepared::Prepared;
 use skein_netsim::runs::{Wanted, failure_free_makespan_ms, run, storm};
 use skein_netsim::summary::Spread;
-use skein_scenario::{Overrides, open};
+use skein_scenario::{Launch, Overrides, open};
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -35,6 +36,7 @@ fn told() -> Result<(), String> {
     };
     let over = Overrides {
         peers: number("--peers").and_then(|n| u16::try_from(n).ok()),
+        launch: args.iter().any(|a| a == "--base").then_some(Launch::Base),
         ..Overrides::default()
     };
     let scenario = open(Some(name), &over).map_err(|e| e.to_string())?;

@@ -366,7 +366,8 @@ fn robot(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Uav {
         .dot(&u.launch.direction())
         >= 0.0;
     let pace = Pace::of(u, spec, the_loop);
-    let release_s = gap_m(anchor) / pace.least_mps.max(0.0);
+    let takeoff_s = f64::from(u.takeoff_ms) / 1000.0;
+    let release_s = takeoff_s + gap_m(anchor) / pace.least_mps.max(0.0);
     let kept_s = u.airframe.reserve_s + return_s(&pace, spec, the_loop);
     let usable_s = u.airframe.endurance_s - kept_s - release_s;
     Uav {

@@ -40,6 +40,15 @@ impl AreaPlanner {
     }
 }
 
+/// Where the UAVs of a generated fleet begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Launch {
+    /// In the air, evenly round the coverage loop.
+    Spread,
+    /// At the base, taking off one after the other.
+    Base,
+}
+
 /// What a command line changes in a scenario.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Overrides {
@@ -51,4 +60,6 @@ pub struct Overrides {
     pub time_scale: Option<f64>,
     /// Who plans an area, instead of whom the scenario names.
     pub planner: Option<AreaPlanner>,
+    /// Where the UAVs of a generated fleet begin, instead of where the scenario says.
+    pub launch: Option<Launch>,
 }

@@ -135,15 +135,21 @@ fn spec(s: &Stated, geometry: &MissionGeometry) -> Spec {
     }
 }
 
-/// Gives every UAV its launch pose: its own, or evenly spread round the loop.
+/// Gives every UAV its launch pose: its own, at the base, or evenly spread round the loop.
 fn launch(fleet: &Fleet, geometry: &MissionGeometry) -> Vec<UavSpec> {
     let n = geometry.coverage_loop.len();
     let k = fleet.members.len();
     let on_loop = |i: usize| -> Pose { geometry.coverage_loop.boundary(i * n / k) };
+    let at_base = Pose::new(geometry.mission.base_m(), 0.0);
     let uav = |(i, m): (usize, &Member)| UavSpec {
         id: m.id,
         airframe: m.airframe,
-        launch: m.launch.unwrap_or_else(|| on_loop(i)),
+        launch: match (m.launch, m.takeoff_ms) {
+            (Some(pose), _) => pose,
+            (None, Some(_)) => at_base,
+            (None, None) => on_loop(i),
+        },
+        takeoff_ms: m.takeoff_ms.unwrap_or(0),
         height_m: m.height_m,
     };
     fleet.members.iter().enumerate().map(uav).collect()

@@ -9,7 +9,7 @@ use crate::fault::{Fault, TimedFault};
 use crate::prepared::Prepared;
 use crate::world::World;
 use skein_behaviors::{Event, Executive, Goal};
-use skein_flight::coverage::ring::backtracking::{Leg, OffLoop, RingCell, Uav};
+use skein_flight::coverage::ring::backtracking::{Leg, RingCell, Uav};
 use skein_peer::offload::MissionGeometry;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -232,7 +232,7 @@ impl<'a> Baseline<'a> {
                 turn_ms: mind.turn_ms(),
                 endurance_ms: rounded((percept.endurance_s - u.airframe.reserve_s) * 1000.0)
                     .saturating_sub(forecast.release_ms),
-                off_loop: forecast.off_loop.map(OffLoop::of),
+                off_loop: forecast.off_loop,
             });
         }
         let cells = self.ground.coverage_loop.cells().iter().zip(&promised);

@@ -68,8 +68,11 @@ pub struct UavSpec {
     pub id: u16,
     /// What it can fly.
     pub airframe: Airframe,
-    /// Where it starts, in the air.
+    /// Where it starts.
     pub launch: Pose,
+    /// When it takes off, milliseconds; until then it stands there, its peer at work and
+    /// its antenna as high as it will fly.
+    pub takeoff_ms: u32,
     /// Its height slot above the origin, metres.
     pub height_m: f64,
 }

@@ -43,7 +43,7 @@ use crate::protocol::sections::LivePeers;
 use crate::timers::{Timer, Timers};
 use crate::wire::codec::Body;
 use crate::wire::limits::BID_COVERED_MAX_BYTES;
-use crate::wire::message::{Beacon, Bid, Epoch, Member, OffLoop, Order, Record};
+use crate::wire::message::{Beacon, Bid, Epoch, Member, Order, Record};
 use crate::{Incarnation, PeerId};
 use skein_behaviors::executive::UNREACHABLE_MS;
 use skein_behaviors::{Event, Executive, Goal, Percept};
@@ -641,7 +641,7 @@ impl MissionState {
             speed_mmps: speed_mmps(executive),
             turn_ms: executive.turn_ms(),
             endurance_ms: UNREACHABLE_MS,
-            off_loop: forecast.off_loop.map(OffLoop::of),
+            off_loop: forecast.off_loop,
         };
         let present_ms = self.negotiation.present_end_ms(ctx);
         // The round takes a waiting time.
@@ -679,7 +679,7 @@ impl MissionState {
                 .saturating_sub(forecast.release_ms),
             covered: sections.covered().encode_rle(Some(BID_COVERED_MAX_BYTES)),
             commits: division::runs_of(&committed, sections.cells()),
-            off_loop: forecast.off_loop.map(OffLoop::of).into_iter().collect(),
+            off_loop: forecast.off_loop.into_iter().collect(),
             eta_ms: if idle { 0 } else { forecast.finish_ms },
             adopted_ago_ms: self.negotiation.adopted_ago_ms(s.now),
             cells_since: self.negotiation.cells_since(),

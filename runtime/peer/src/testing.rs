@@ -152,6 +152,7 @@ impl Seat {
             wind_east_mps: 0.0,
             wind_north_mps: 0.0,
             endurance_s: self.fuel_s,
+            takes_off_in_ms: 0,
             failsafe: false,
         }
     }

@@ -2,7 +2,7 @@
 //! that are spread round the coverage loop to `resolve`, which has the loop.
 
 use super::shared::{MAX_HEIGHT_M, position};
-use crate::request::Overrides;
+use crate::request::{Launch, Overrides};
 use skein_flight::airframe::Airframe;
 use skein_geometry::frame::Pose;
 use skein_geometry::math::{FRAC_PI_2, wrap_pi};
@@ -15,6 +15,9 @@ use skein_peer::wire::limits::MEMBERS_MAX;
 #[allow(clippy::cast_possible_truncation, reason = "64")]
 const MAX_UAVS: u16 = MEMBERS_MAX as u16;
 
+/// Time between two take-offs where none is stated, seconds: a crew of two with a catapult.
+const TAKEOFF_INTERVAL_S: f64 = 2.0;
+
 /// One UAV, perhaps without its launch pose yet.
 #[derive(Clone, Debug)]
 pub(crate) struct Member {
@@ -22,8 +25,10 @@ pub(crate) struct Member {
     pub(crate) field: String,
     pub(crate) id: u16,
     pub(crate) airframe: Airframe,
-    /// `None` when spread round the loop.
+    /// `None` when spread round the loop, or at the base.
     pub(crate) launch: Option<Pose>,
+    /// When it takes off at the base, milliseconds, if it does.
+    pub(crate) takeoff_ms: Option<u32>,
     pub(crate) height_m: f64,
 }
 
@@ -85,13 +90,21 @@ pub(crate) fn read(
         "fleet",
         "{ count: 8, airframes: [\"swift\"], launch: \"spread\" }",
     )?;
-    let f = node.fields(&["key", "slot_step_m", "count", "airframes", "launch", "uavs"])?;
+    let f = node.fields(&[
+        "key",
+        "slot_step_m",
+        "count",
+        "airframes",
+        "launch",
+        "takeoff_interval_s",
+        "uavs",
+    ])?;
     let key = f.get("key").map_or(Ok(name.to_owned()), Node::word)?;
     let step_m = f.number_or("slot_step_m", 5.0, 0.0, 500.0, "metres")?;
     let top_m = |n: usize| level_m + step_m * n.saturating_sub(1) as f64;
     let members = match f.get("uavs") {
         Some(list) => {
-            for other in ["count", "airframes", "launch"] {
+            for other in ["count", "airframes", "launch", "takeoff_interval_s"] {
                 if let Some(n) = f.get(other) {
                     return Err(n.wrong("belongs to a generated fleet; a fleet with a list of uavs has no such field"));
                 }
@@ -107,6 +120,35 @@ pub(crate) fn read(
         )));
     }
     Ok(Fleet { key, members })
+}
+
+/// The time between two take-offs at the base, milliseconds; `None` where UAVs begin spread
+/// round the loop.
+fn takeoffs(f: &Fields<'_>, over: Option<Launch>) -> Result<Option<u32>, Error> {
+    let in_file = match f.get("launch").map(Node::text).transpose()? {
+        None | Some("spread") => Launch::Spread,
+        Some("base") => Launch::Base,
+        Some(_) => {
+            return Err(f.need("launch", "\"spread\"")?.wrong(
+                "expected \"spread\" (evenly round the coverage loop) or \"base\" (one after the other at the base); for chosen places list the uavs",
+            ));
+        }
+    };
+    let interval_s = f.number_or(
+        "takeoff_interval_s",
+        TAKEOFF_INTERVAL_S,
+        0.0,
+        600.0,
+        "seconds",
+    )?;
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "at most 600,000"
+    )]
+    let interval_ms = (interval_s * 1000.0).round() as u32;
+    let launch = over.unwrap_or(in_file);
+    Ok((launch == Launch::Base).then_some(interval_ms))
 }
 
 fn generated(
@@ -137,13 +179,7 @@ fn generated(
     if kinds.is_empty() {
         return Err(names.wrong("the list is empty; name at least one airframe"));
     }
-    if let Some(launch) = f.get("launch")
-        && launch.text()? != "spread"
-    {
-        return Err(launch.wrong(
-            "expected \"spread\" (evenly round the coverage loop); for chosen places list the uavs",
-        ));
-    }
+    let interval_ms = takeoffs(f, over.launch)?;
     let ids = (1..=u16::MAX).filter(|id| Some(*id) != ground_id);
     let members = ids
         .zip(kinds.iter().cycle())
@@ -155,6 +191,8 @@ fn generated(
             id,
             airframe: *airframe,
             launch: None,
+            takeoff_ms: interval_ms
+                .map(|ms| ms.saturating_mul(u32::try_from(i).unwrap_or(u32::MAX))),
             height_m: level_m + step_m * i as f64,
         })
         .collect())
@@ -213,6 +251,7 @@ fn listed(
             id,
             airframe,
             launch: Some(launch),
+            takeoff_ms: None,
             height_m,
         });
     }

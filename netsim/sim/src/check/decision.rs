@@ -440,7 +440,7 @@ fn overburdened(
     let into = |cell: u16, way| pose(cell + u16::from(way == Direction::Backward), way);
     let out_of = |cell: u16, way| pose(cell + u16::from(way == Direction::Forward), way);
     let of = |id: u16| division.sections.iter().find(|s| s.id == id);
-    let begins_ms = |u: &Uav| u.off_loop.map_or(u.release_ms, |_| 0);
+    let begins_ms = |u: &Uav| u.off_loop.map_or(u.release_ms, |off| off.ready_ms);
     uavs.iter().find_map(|late| {
         let section = of(late.id)?;
         let given_ms = u64::from(section.finish_ms.saturating_sub(begins_ms(late)));
@@ -455,7 +455,7 @@ fn overburdened(
             let ended = own.legs.last().and_then(|l| Some((l.cells(n).last()?, l.direction)));
             let (from, at_ms) = match (ended, u.off_loop) {
                 (Some((cell, way)), _) => (out_of(cell, way), own.finish_ms),
-                (None, Some(off)) => (off.pose(), 0),
+                (None, Some(off)) => (off.pose(), off.ready_ms),
                 (None, None) => (pose(u.anchor, u.heading), u.release_ms),
             };
             let ways = [Direction::Forward, Direction::Backward];

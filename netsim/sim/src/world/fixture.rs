@@ -90,6 +90,7 @@ pub fn square(n_uavs: u16) -> Spec {
             id: i + 1,
             airframe: airframe(),
             launch: ring_pose(f64::from(i) / f64::from(n_uavs.max(1))),
+            takeoff_ms: 0,
             height_m: 45.0 + 5.0 * f64::from(i),
         })
         .collect();

@@ -104,7 +104,7 @@ impl World {
         Self::on(Arc::new(Site::new(spec, None)), spec, seed)
     }
 
-    /// The world of a scenario at time 0, all UAVs in the air at their launch poses, on a
+    /// The world of a scenario at time 0, all UAVs at their launch poses, on a
     /// site prepared from the same scenario.
     #[must_use]
     pub fn on(site: Arc<Site>, spec: &Spec, seed: u64) -> Self {
@@ -113,7 +113,9 @@ impl World {
             .iter()
             .map(|u| Uav {
                 id: u.id,
-                body: Kinematic::new(u.airframe, u.launch, u.height_m, 0).in_wind(spec.wind),
+                body: Kinematic::new(u.airframe, u.launch, u.height_m, 0)
+                    .in_wind(spec.wind)
+                    .taking_off_at(u64::from(u.takeoff_ms)),
                 computer: true,
                 failsafe: false,
             })
@@ -226,7 +228,13 @@ impl World {
     /// What a UAV senses now; nothing once it is lost.
     #[must_use]
     pub fn percept(&self, uav: u16) -> Option<Percept> {
-        self.body(uav)?.percept()
+        let body = self.body(uav)?;
+        let ground_ms = body.takes_off_in_ms(self.now_ms);
+        Some(Percept {
+            time_ms: self.now_ms,
+            takes_off_in_ms: u32::try_from(ground_ms).unwrap_or(u32::MAX),
+            ..body.percept()?
+        })
     }
 
     /// Takes an airframe out of the air.
@@ -312,7 +320,7 @@ impl World {
                     cause,
                     place: u.body.position(),
                 });
-            } else {
+            } else if u.body.takes_off_in_ms(to_ms) == 0 {
                 self.airborne.push((u.id, place_of(&u.body)));
             }
         }
@@ -399,6 +407,26 @@ mod tests {
         let place = w.body(4).unwrap().position();
         w.advance(200_000);
         assert!((w.body(4).unwrap().position() - place).norm() < 40.0);
+    }
+
+    #[test]
+    fn who_has_not_taken_off_stands_where_it_is() {
+        let mut spec = fixture::square(2);
+        spec.uavs[1].takeoff_ms = 3_000;
+        let mut w = World::new(&spec, 1);
+        w.advance(1_200);
+        let ground = w.percept(2).unwrap();
+        assert_eq!((ground.time_ms, ground.takes_off_in_ms), (1_200, 1_800));
+        assert_eq!(ground.pose, spec.uavs[1].launch);
+        assert!(!w.apply(2, straight(1_200)), "it flies nothing yet");
+        assert_eq!(w.percept(1).unwrap().takes_off_in_ms, 0);
+        w.advance(3_000);
+        assert!(w.apply(2, straight(3_000)));
+        w.advance(3_500);
+        let air = w.percept(2).unwrap();
+        assert!(!air.failsafe && air.takes_off_in_ms == 0);
+        assert!((air.pose.position() - ground.pose.position()).norm() > 5.0);
+        assert!((air.endurance_s - ground.endurance_s + 0.5).abs() < 1e-9);
     }
 
     #[test]

@@ -300,7 +300,8 @@ array_of!(Round {
 array_of!(OffLoop {
     east_mm,
     north_mm,
-    course_e4
+    course_e4,
+    ready_ms
 });
 array_of!(Bid {
     round,

@@ -131,9 +131,10 @@ fn check_bid(s: &Bid) -> Result<(), WireError> {
     at_most("covered", s.covered.len(), BID_COVERED_MAX_BYTES)?;
     check_runs("commits", &s.commits, COMMITS_MAX)?;
     at_most("off_loop", s.off_loop.len(), 1)?;
-    s.off_loop
-        .iter()
-        .try_for_each(|o| check_pose(o.east_mm, o.north_mm, o.course_e4))
+    s.off_loop.iter().try_for_each(|o| {
+        check_pose(o.east_mm, o.north_mm, o.course_e4)?;
+        in_range("ready_ms", o.ready_ms <= DURATION_MAX_MS)
+    })
 }
 
 fn check_claim(r: &Claim) -> Result<(), WireError> {

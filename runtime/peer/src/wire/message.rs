@@ -270,7 +270,8 @@ pub struct Bid {
     pub covered: Vec<u8>,
     /// Cells it will finish whatever is decided.
     pub commits: Vec<CellRun>,
-    /// Where it is, if it can leave for anywhere at once; at most one place.
+    /// Where it is, if it can leave for anywhere, at once or when it takes off; at most one
+    /// place.
     pub off_loop: Vec<OffLoop>,
     /// Expected end of its present plan, milliseconds from now.
     pub eta_ms: u32,

@@ -140,13 +140,14 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                     east_mm: 120_000,
                     north_mm: -31_415,
                     course_e4: 15_708,
+                    ready_ms: 2_000,
                 }],
                 eta_ms: 600_000,
                 adopted_ago_ms: 70_000,
                 cells_since: 5,
                 idle: false,
             }),
-            "8e8607828301010183030102011b0123456789abcdeff519138811f4190fa01946501923281a00124f8044000c03048182100281831a0001d4c0397ab6193d5c1a000927c01a0001117005f4",
+            "8e8607828301010183030102011b0123456789abcdeff519138811f4190fa01946501923281a00124f8044000c03048182100281841a0001d4c0397ab6193d5c1907d01a000927c01a0001117005f4",
         ),
         (
             Body::Claim(Claim {
@@ -277,6 +278,7 @@ pub fn largest() -> Vec<Body> {
                 east_mm: -POSITION_MAX_MM,
                 north_mm: POSITION_MAX_MM,
                 course_e4: -HEADING_MAX_E4,
+                ready_ms: DURATION_MAX_MS,
             }],
             eta_ms: DURATION_MAX_MS,
             adopted_ago_ms: u32::MAX,

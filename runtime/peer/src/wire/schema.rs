@@ -218,6 +218,7 @@ const OFF_LOOP: &[Place] = &[
     at("east_mm", "east, mm", MM),
     at("north_mm", "north, mm", MM),
     at("course_e4", "course over the ground, 1e-4 rad", E4),
+    at("ready_ms", "when it can leave, ms from writing", MS),
 ];
 
 const BID: &[Place] = &[
@@ -248,7 +249,7 @@ const BID: &[Place] = &[
     ),
     at(
         "off_loop",
-        "where it is, if it can leave for anywhere at once",
+        "where it is, if it can leave for anywhere",
         Shape::Rows(OFF_LOOP, 1),
     ),
     ETA,

@@ -176,6 +176,22 @@ impl Kinematic {
         }
     }
 
+    /// The same, on the ground until it takes off.
+    #[must_use]
+    pub fn taking_off_at(mut self, takeoff_ms: u64) -> Self {
+        self.now_ms = self.now_ms.max(takeoff_ms);
+        self.leg.from_ms = self.now_ms;
+        self.leg.to_ms = self.now_ms;
+        self.fresh_until_ms = self.now_ms + FAILSAFE_MS;
+        self
+    }
+
+    /// Time until it takes off, milliseconds; 0 in the air.
+    #[must_use]
+    pub fn takes_off_in_ms(&self, now_ms: u64) -> u64 {
+        self.now_ms.saturating_sub(now_ms)
+    }
+
     /// The same in a wind.
     #[must_use]
     pub fn in_wind(mut self, wind: Wind) -> Self {
@@ -247,6 +263,7 @@ impl Kinematic {
             wind_east_mps: self.leg.wind.east_mps,
             wind_north_mps: self.leg.wind.north_mps,
             endurance_s: seconds(self.fuel_ms),
+            takes_off_in_ms: 0,
             failsafe: self.failsafe,
         })
     }

@@ -42,8 +42,8 @@ pub struct Uav {
     pub turn_ms: u32,
     /// Flight time it may still spend after its release, milliseconds.
     pub endurance_ms: u32,
-    /// Where it is now, if nothing keeps it from leaving for anywhere at once; otherwise
-    /// it begins at its anchor.
+    /// Where it is now, if nothing keeps it from leaving for anywhere; otherwise it begins
+    /// at its anchor.
     pub off_loop: Option<OffLoop>,
 }
 
@@ -56,12 +56,14 @@ pub struct OffLoop {
     pub north_mm: i32,
     /// Course over the ground, 1e-4 rad.
     pub course_e4: i32,
+    /// When it can leave, milliseconds from now.
+    pub ready_ms: u32,
 }
 
 impl OffLoop {
     /// The nearest to a pose; beyond what fits it saturates.
     #[must_use]
-    pub fn of(pose: Pose) -> Self {
+    pub fn of(pose: Pose, ready_ms: u32) -> Self {
         #[allow(
             clippy::cast_possible_truncation,
             reason = "a cast of a float saturates"
@@ -71,6 +73,7 @@ impl OffLoop {
             east_mm: whole(pose.east_m * 1000.0),
             north_mm: whole(pose.north_m * 1000.0),
             course_e4: whole(pose.heading_rad * 1e4),
+            ready_ms,
         }
     }
 

@@ -261,13 +261,16 @@ mod tests {
         /// The same UAV with nothing to fly: anywhere, a way from its anchor.
         fn strayed(&self, uav: Uav, draw: &mut SplitMix64) -> Uav {
             let at = Point::new(draw.unit() * 800.0 - 100.0, draw.unit() * 600.0 - 100.0);
-            let off = OffLoop::of(Pose::new(at, draw.unit() * 6.0 - 3.0));
+            let ready_ms = 500 * u32::try_from(draw.below(20)).unwrap();
+            let off = OffLoop::of(Pose::new(at, draw.unit() * 6.0 - 3.0), ready_ms);
             let to = self
                 .coverage_loop
                 .boundary_towards(usize::from(uav.anchor), uav.heading);
             match self.router.route(off.pose(), to) {
                 Ok(way) => Uav {
-                    release_ms: (way.length_m() * 1e6 / f64::from(uav.speed_mmps)) as u32 + 1,
+                    release_ms: (way.length_m() * 1e6 / f64::from(uav.speed_mmps)) as u32
+                        + 1
+                        + ready_ms,
                     off_loop: Some(off),
                     ..uav
                 },
@@ -318,11 +321,7 @@ mod tests {
                 let out = entry(c, d.opposite()) % n;
                 at = (pose(out, d), Some((out, d)));
             }
-            let ready_ms = if uav.off_loop.is_some() {
-                0.0
-            } else {
-                f64::from(uav.release_ms)
-            };
+            let ready_ms = f64::from(uav.off_loop.map_or(uav.release_ms, |off| off.ready_ms));
             Some(ready_ms + flown_m * 1e6 / f64::from(uav.speed_mmps))
         }
     }
@@ -379,7 +378,7 @@ mod tests {
             let uav = |i: u16| Uav {
                 speed_mmps: if i.is_multiple_of(2) { 14_500 } else { 12_000 },
                 off_loop: at.map(|(east, north)| {
-                    OffLoop::of(Pose::new(Point::new(east, north + f64::from(i)), 1.0))
+                    OffLoop::of(Pose::new(Point::new(east, north + f64::from(i)), 1.0), 0)
                 }),
                 ..site.uav(i, u16::try_from(usize::from(i) * n / 8).unwrap())
             };

@@ -186,11 +186,7 @@ impl<'a> Search<'a> {
 
     fn ready_ms(&self, uav: usize) -> u64 {
         let u = &self.uavs[uav];
-        if u.off_loop.is_some() {
-            0
-        } else {
-            u64::from(u.release_ms)
-        }
+        u64::from(u.off_loop.map_or(u.release_ms, |off| off.ready_ms))
     }
 
     fn until_ms(&self, uav: usize) -> u64 {
