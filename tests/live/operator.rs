@@ -55,9 +55,9 @@ fn the_operator_of_a_trial_revises_the_mission_and_calls_all_home() {
     );
     place.observe_until(&["live/v1/state/**"], DEADLINE, |newest| {
         uavs.iter().all(|id| {
-            newest.get(id).is_some_and(|s| {
-                s["activity"] == "Returning" && distance_m(s, 60.0, 420.0) < 120.0
-            })
+            newest
+                .get(id)
+                .is_some_and(|s| s["activity"] == "Returning" && distance_m(s, 60.0, 420.0) < 120.0)
         })
     });
     let (code, said) = place.skein(&["mission", "--base", "240,192"]);
