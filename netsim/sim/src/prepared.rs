@@ -50,8 +50,7 @@ impl Prepared {
     /// The same with other UAVs.
     #[must_use]
     pub fn with_uavs(&self, uavs: Vec<UavSpec>) -> Self {
-        let ids = |uavs: &[UavSpec]| uavs.iter().map(|u| u.id).collect::<Vec<_>>();
-        if ids(&uavs) == ids(&self.spec.uavs) {
+        if uavs == self.spec.uavs {
             return self.clone();
         }
         let spec = Spec {

@@ -197,6 +197,16 @@ impl Draw<'_> {
         self.out.push(TimedFault { at_ms, fault });
     }
 
+    /// For some peers, each in its own span, something goes wrong and is put right.
+    fn for_a_while(&mut self, longest_s: u32, wrong: impl Fn(&mut Self, u16) -> (Fault, Fault)) {
+        for peer in self.some_peers() {
+            let (from_ms, to_ms) = self.span_ms(longest_s);
+            let (begins, ends) = wrong(self, peer);
+            self.push(from_ms, begins);
+            self.push(to_ms, ends);
+        }
+    }
+
     fn delay_ms(&mut self, most_ms: u32) -> u32 {
         let most_ms = u64::from(most_ms).max(LEAST_DELAY_MS);
         u32::try_from(self.s.between(LEAST_DELAY_MS, most_ms)).unwrap_or(u32::MAX)
@@ -205,45 +215,46 @@ impl Draw<'_> {
 
 /// A disk takes no writes for a while, or loses one in so many.
 fn failing_stores(d: &mut Draw<'_>) {
-    for peer in d.some_peers() {
-        let (from_ms, to_ms) = d.span_ms(d.spec.storm.troubles.max_s);
+    d.for_a_while(d.spec.storm.troubles.max_s, |d, peer| {
         let one_in = match d.s.one_in(2) {
             true => 1,
             false => d.s.between(ONE_WRITE_IN.0, ONE_WRITE_IN.1),
         };
         let one_in = u32::try_from(one_in).unwrap_or(1);
-        d.push(from_ms, Fault::FailStores { peer, one_in });
-        d.push(to_ms, Fault::HealStores { peer });
-    }
+        (
+            Fault::FailStores { peer, one_in },
+            Fault::HealStores { peer },
+        )
+    });
 }
 
 /// A disk takes long for each write.
 fn slow_stores(d: &mut Draw<'_>) {
-    for peer in d.some_peers() {
-        let (from_ms, to_ms) = d.span_ms(d.spec.storm.troubles.max_s);
+    d.for_a_while(d.spec.storm.troubles.max_s, |d, peer| {
         let delay_ms = d.delay_ms(d.spec.storm.troubles.max_store_delay_ms);
-        d.push(from_ms, Fault::SlowStores { peer, delay_ms });
-        d.push(to_ms, Fault::HealStores { peer });
-    }
+        (
+            Fault::SlowStores { peer, delay_ms },
+            Fault::HealStores { peer },
+        )
+    });
 }
 
 /// A process stands still and goes on.
 fn pause(d: &mut Draw<'_>) {
-    for peer in d.some_peers() {
-        let (from_ms, to_ms) = d.span_ms(d.spec.storm.troubles.max_pause_s);
-        d.push(from_ms, Fault::Pause { peer });
-        d.push(to_ms, Fault::Resume { peer });
-    }
+    d.for_a_while(d.spec.storm.troubles.max_pause_s, |_, peer| {
+        (Fault::Pause { peer }, Fault::Resume { peer })
+    });
 }
 
 /// A computer gets round to everything late.
 fn slow_computer(d: &mut Draw<'_>) {
-    for peer in d.some_peers() {
-        let (from_ms, to_ms) = d.span_ms(d.spec.storm.troubles.max_s);
+    d.for_a_while(d.spec.storm.troubles.max_s, |d, peer| {
         let delay_ms = d.delay_ms(d.spec.storm.troubles.max_computer_delay_ms);
-        d.push(from_ms, Fault::SlowComputer { peer, delay_ms });
-        d.push(to_ms, Fault::SlowComputer { peer, delay_ms: 0 });
-    }
+        (
+            Fault::SlowComputer { peer, delay_ms },
+            Fault::SlowComputer { peer, delay_ms: 0 },
+        )
+    });
 }
 
 /// Clocks go too fast or too slowly, all of them by another rate, to the end.
@@ -258,7 +269,7 @@ fn clock_drift(d: &mut Draw<'_>) {
     }
 }
 
-/// A clock is set ahead, once or twice.
+/// The clocks of one or two are set ahead, once each.
 fn clock_jump(d: &mut Draw<'_>) {
     for peer in d.some_peers() {
         let at_ms = d.s.between(0, d.end_ms);

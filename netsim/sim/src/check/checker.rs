@@ -11,7 +11,7 @@ use super::rules::Rules;
 use super::{Bounds, Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::fault::Fault;
 use crate::spec::Spec;
-use skein_flight::coverage::ring::backtracking::{RingCell, Uav};
+use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::journal::Durable;
 use skein_peer::output::Status;
@@ -278,12 +278,12 @@ impl Checker {
             .on_bid(now_ms, id, bid, of, &self.handicaps, &mut self.found);
     }
 
-    /// A peer asks for a division.
-    pub fn on_divide(&mut self, now_ms: u64, id: u16, problem: (&[RingCell], &[Uav])) {
-        self.rules.on_divide(now_ms, id, problem, &mut self.found);
+    /// A peer asks for a division, and gets it.
+    pub fn on_divide(&mut self, now_ms: u64, id: u16, divided: (&[RingCell], &[Uav], &Division)) {
+        self.rules.on_divide(now_ms, id, divided, &mut self.found);
     }
 
-    /// A running peer receives a record: now, of one that arrived while it stood still.
+    /// A running peer receives a record: when it is handled, and when it arrived.
     pub fn on_received(&mut self, at_ms: (u64, u64), id: u16, said: &Said) {
         let life = self.members.life(id);
         if let Some(claim) = &said.claim {

@@ -15,6 +15,7 @@ use skein_peer::protocol::rounds::{OpenRound, RoundOrder, epoch_of, order_of};
 use skein_peer::protocol::runs::cells_of;
 use skein_peer::wire::message::{Bid, Claim, Epoch, Firmness, Round};
 use skein_peer::{Beliefs, PeerId};
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -46,9 +47,30 @@ pub struct DecisionCheck {
     period_ms: u64,
     grounds: BTreeMap<u64, Arc<MissionGeometry>>,
     rounds: BTreeMap<RoundOrder, OpenRound>,
-    divisions: BTreeMap<Epoch, Option<(Vec<RingCell>, Division)>>,
+    divisions: BTreeMap<Epoch, Option<Divided>>,
     judged: BTreeMap<u16, Epoch>,
     adopted: BTreeMap<u16, Adopted>,
+}
+
+/// The problem of a round, and what comes out.
+#[derive(Clone, Debug)]
+struct Divided {
+    ring: Vec<RingCell>,
+    uavs: Vec<Uav>,
+    division: Division,
+    /// Who was given too much, once somebody asked.
+    unfair: OnceCell<Option<String>>,
+}
+
+impl Divided {
+    fn new(ring: Vec<RingCell>, uavs: Vec<Uav>, division: Division) -> Self {
+        Self {
+            ring,
+            uavs,
+            division,
+            unfair: OnceCell::new(),
+        }
+    }
 }
 
 /// What a peer did since it last adopted a division.
@@ -196,23 +218,27 @@ impl DecisionCheck {
         lies
     }
 
-    /// A peer asks for a division: some complete round's bids say exactly this.
+    /// A peer asks for a division, and gets it: some complete round's bids say exactly this.
     pub fn on_divide(
         &mut self,
         now_ms: u64,
         id: u16,
-        (ring, uavs): (&[RingCell], &[Uav]),
+        (ring, uavs, division): (&[RingCell], &[Uav], &Division),
         found: &mut Findings,
     ) {
         let same_members = |o: &OpenRound| {
             o.bids.len() == uavs.len() && o.bids.keys().eq(uavs.iter().map(|r| &r.id))
         };
         let rounds = self.rounds.values().rev().filter(|o| is_complete(o));
-        let says = rounds.filter(|o| same_members(o)).any(|o| {
+        let says = rounds.filter(|o| same_members(o)).find(|o| {
             self.problem_of(o)
                 .is_some_and(|p| p.0 == ring && p.1 == uavs)
         });
-        if !says {
+        if let Some(epoch) = says.map(epoch_of) {
+            self.divisions.entry(epoch).or_insert_with(|| {
+                Some(Divided::new(ring.to_vec(), uavs.to_vec(), division.clone()))
+            });
+        } else {
             let members: Vec<PeerId> = uavs.iter().map(|r| PeerId(r.id)).collect();
             found.broken("decision", now_ms, Some(id), || {
                 format!("divides among {members:?} what no complete round's bids say")
@@ -295,19 +321,18 @@ impl DecisionCheck {
         epoch: Epoch,
         found: &mut Findings,
     ) {
-        let (Some(ground), Some((_, uavs))) = (
-            self.grounds.get(&open.round.loop_hash).cloned(),
-            self.problem_of(open),
-        ) else {
+        let Some(ground) = self.grounds.get(&open.round.loop_hash).cloned() else {
             return;
         };
-        let Some((ring, division)) = self.division_of(epoch, open) else {
+        let Some(d) = self.division_of(epoch, open) else {
             return;
         };
-        if ground.mission.division == Rule::Best
-            && let Some(text) = overburdened(&ground, ring, &uavs, division)
-        {
-            found.broken("decision", now_ms, Some(id), || text);
+        if ground.mission.division != Rule::Best {
+            return;
+        }
+        let unfair = d.unfair.get_or_init(|| overburdened(&ground, d));
+        if let Some(text) = unfair {
+            found.broken("decision", now_ms, Some(id), || text.clone());
         }
     }
 
@@ -319,17 +344,14 @@ impl DecisionCheck {
             .find(|o| is_complete(o) && epoch_of(o) == epoch)
     }
 
-    fn division_of(
-        &mut self,
-        epoch: Epoch,
-        open: &OpenRound,
-    ) -> Option<&(Vec<RingCell>, Division)> {
+    /// The division of a round; solved here only where nobody asked for it.
+    fn division_of(&mut self, epoch: Epoch, open: &OpenRound) -> Option<&Divided> {
         if !self.divisions.contains_key(&epoch) {
             let ground = self.grounds.get(&open.round.loop_hash);
             let problem = self.problem_of(open);
             let divided = problem.zip(ground).map(|((ring, uavs), ground)| {
                 let division = ground.divide(&ring, &uavs);
-                (ring, division)
+                Divided::new(ring, uavs, division)
             });
             self.divisions.insert(epoch, divided);
         }
@@ -346,7 +368,7 @@ impl DecisionCheck {
         seen: &[bool],
         found: &mut Findings,
     ) {
-        let Some((ring, division)) = self.division_of(claim.epoch, open) else {
+        let Some(Divided { ring, division, .. }) = self.division_of(claim.epoch, open) else {
             return;
         };
         let n = u16::try_from(ring.len()).unwrap_or(u16::MAX);
@@ -400,7 +422,7 @@ impl DecisionCheck {
             return;
         }
         let calm_ms = CALM_PERIODS * self.period_ms;
-        let Some((_, division)) = self.division_of(epoch, open) else {
+        let Some(Divided { division, .. }) = self.division_of(epoch, open) else {
             return;
         };
         let all = || open.bids.values();
@@ -418,12 +440,13 @@ impl DecisionCheck {
 
 /// Who of a division has more than twice an even share of the remaining time while another,
 /// after its own section, could serve its last cell a tenth sooner.
-fn overburdened(
-    ground: &MissionGeometry,
-    ring: &[RingCell],
-    uavs: &[Uav],
-    division: &Division,
-) -> Option<String> {
+fn overburdened(ground: &MissionGeometry, divided: &Divided) -> Option<String> {
+    let Divided {
+        ring,
+        uavs,
+        division,
+        ..
+    } = divided;
     let work_mm: u64 = ring
         .iter()
         .filter(|c| c.open)
@@ -444,7 +467,7 @@ fn overburdened(
     uavs.iter().find_map(|late| {
         let section = of(late.id)?;
         let given_ms = u64::from(section.finish_ms.saturating_sub(begins_ms(late)));
-        let (last, _) = section.legs.last().and_then(|l| Some((l.cells(n).last()?, l)))?;
+        let last = section.legs.last()?.cells(n).last()?;
         if given_ms <= 2 * even_ms {
             return None;
         }
@@ -599,7 +622,10 @@ mod tests {
         let mut c = Case::new(true);
         c.bid();
         let (ring, uavs) = c.problem();
-        c.check.on_divide(9, 1, (&ring, &uavs), &mut c.found);
+        let ground = Arc::clone(&c.check.grounds[&c.lp.hash()]);
+        let division = ground.divide(&ring, &uavs);
+        let asked = (&ring[..], &uavs[..], &division);
+        c.check.on_divide(9, 1, asked, &mut c.found);
         assert!(!c.broken("decision"), "{:?}", c.found.violations);
         let mut own_view = ring.clone();
         let open = own_view.iter().position(|r| r.open).unwrap();
@@ -612,7 +638,8 @@ mod tests {
             .into_iter()
             .enumerate()
         {
-            c.check.on_divide(9, 1, (ring, uavs), &mut c.found);
+            let asked = (&ring[..], &uavs[..], &division);
+            c.check.on_divide(9, 1, asked, &mut c.found);
             assert_eq!(c.found.counts.get("decision"), Some(&(n as u64 + 1)));
         }
     }
@@ -673,7 +700,11 @@ mod tests {
         let (ring, uavs) = c.problem();
         let ground = Arc::clone(&c.check.grounds[&c.lp.hash()]);
         let fair = ground.divide(&ring, &uavs);
-        assert_eq!(overburdened(&ground, &ring, &uavs, &fair), None);
+        let judged = |division: &Division| {
+            let divided = Divided::new(ring.clone(), uavs.clone(), division.clone());
+            overburdened(&ground, &divided)
+        };
+        assert_eq!(judged(&fair), None);
         // All of it for the first, nothing for the second.
         let mut unfair = fair.clone();
         let first = &mut unfair.sections[0];
@@ -685,7 +716,7 @@ mod tests {
         first.finish_ms *= 3;
         unfair.sections[1].legs.clear();
         unfair.sections[1].finish_ms = 0;
-        let told = overburdened(&ground, &ring, &uavs, &unfair).unwrap();
+        let told = judged(&unfair).unwrap();
         assert!(
             told.contains("gives uav1") && told.contains("uav2 could"),
             "{told}"

@@ -104,9 +104,17 @@ impl Findings {
 }
 
 /// Things that go on for longer than they may are told once: remembers since when.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Clocks<K: Ord + Copy> {
     running: BTreeMap<K, (u64, bool)>,
+}
+
+impl<K: Ord + Copy> Default for Clocks<K> {
+    fn default() -> Self {
+        Self {
+            running: BTreeMap::new(),
+        }
+    }
 }
 
 impl<K: Ord + Copy> Clocks<K> {

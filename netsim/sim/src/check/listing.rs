@@ -1,8 +1,8 @@
 //! Which peer lists which cell: orphans (I1, L2), and yielding to a higher stamp (S5).
 
 use super::membership::Membership;
+use super::snapshot::is_alone;
 use super::{Clocks, Findings, PeerSnapshot, Snapshot, bounds::LIGHT_FACTOR};
-use skein_peer::Beliefs;
 use skein_peer::output::Status;
 use skein_peer::wire::message::{Claim, Firmness, ListedRun, Stamp};
 use std::collections::BTreeMap;
@@ -268,11 +268,6 @@ impl ListingCheck {
     }
 }
 
-/// Whether a peer believes all others down.
-fn is_alone(view: &Beliefs) -> bool {
-    view.peers.values().all(|(_, s)| *s == Status::Down)
-}
-
 /// From when an orphan counts: from the detection of its owner's death where it has
 /// one; `None` while nobody knows, which the check of detection bounds.
 fn counted_from(o: &Orphan, members: &Membership) -> Option<u64> {
@@ -298,8 +293,8 @@ fn each_cell(l: &ListedRun, n: usize, mut f: impl FnMut(usize)) {
 mod tests {
     use super::super::{Bounds, Graph, Handicaps, Stability};
     use super::*;
-    use skein_peer::PeerId;
     use skein_peer::wire::message::{CellRun, Epoch};
+    use skein_peer::{Beliefs, PeerId};
 
     const BOUNDS: Bounds = Bounds {
         period_ms: 1000,

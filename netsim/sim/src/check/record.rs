@@ -303,14 +303,10 @@ fn versions(v: &Beliefs) -> Versions {
 /// the newest. A later one may be durable while a claim waits for its turn on the air.
 fn unpromised(said: &Claim, journal: &[Vec<u8>], covered: &[bool]) -> Option<String> {
     let mut newest = None;
-    for record in journal.iter().rev() {
-        match Entry::decode(record) {
-            Some(Entry::Claim(claim)) => {
-                let text = unpersisted(said, Some(&claim), covered)?;
-                newest.get_or_insert(text);
-            }
-            Some(Entry::Life(_)) => break,
-            _ => {}
+    for entry in of_last_life(journal) {
+        if let Entry::Claim(claim) = entry {
+            let text = unpersisted(said, Some(&claim), covered)?;
+            newest.get_or_insert(text);
         }
     }
     newest.or_else(|| unpersisted(said, None, covered))
@@ -319,14 +315,13 @@ fn unpromised(said: &Claim, journal: &[Vec<u8>], covered: &[bool]) -> Option<Str
 /// Whether a journal holds this bid, promised in the journal's last life. A later one may
 /// follow it, while it waits for its turn on the air.
 fn promised_bid(journal: &[Vec<u8>], bid: &Bid) -> bool {
-    for record in journal.iter().rev() {
-        match Entry::decode(record) {
-            Some(Entry::Bid(kept)) if kept == *bid => return true,
-            Some(Entry::Life(_)) => return false,
-            _ => {}
-        }
-    }
-    false
+    of_last_life(journal).any(|entry| matches!(&entry, Entry::Bid(kept) if kept == bid))
+}
+
+/// What a journal's last life wrote, the newest first.
+fn of_last_life(journal: &[Vec<u8>]) -> impl Iterator<Item = Entry> {
+    let entries = journal.iter().rev().filter_map(|r| Entry::decode(r));
+    entries.take_while(|entry| !matches!(entry, Entry::Life(_)))
 }
 
 /// A listed cell that no durable section lists at that stamp, as a sentence.

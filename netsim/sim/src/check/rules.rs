@@ -11,7 +11,7 @@ use super::spoken::SpokenCheck;
 use super::spread::SpreadCheck;
 use super::{Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::spec::{Spec, UavSpec};
-use skein_flight::coverage::ring::backtracking::{RingCell, Uav};
+use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::mission::{Mission, chunks, point_m};
 use skein_peer::offload::MissionGeometry;
@@ -234,15 +234,15 @@ impl Rules {
         self.patience.on_bid(now_ms, id, bid, handicaps, found);
     }
 
-    /// A peer asks for a division.
+    /// A peer asks for a division, and gets it.
     pub fn on_divide(
         &mut self,
         now_ms: u64,
         id: u16,
-        problem: (&[RingCell], &[Uav]),
+        divided: (&[RingCell], &[Uav], &Division),
         found: &mut Findings,
     ) {
-        self.decision.on_divide(now_ms, id, problem, found);
+        self.decision.on_divide(now_ms, id, divided, found);
     }
 
     /// Judges everybody, once a beacon period.

@@ -4,6 +4,7 @@
 use super::{Bounds, Grade, Graph, Handicaps, Stability};
 use skein_geometry::frame::Point;
 use skein_peer::Beliefs;
+use skein_peer::output::Status;
 
 /// One running peer at the moment of a snapshot.
 #[derive(Clone, Debug)]
@@ -102,4 +103,9 @@ impl Snapshot<'_> {
             .iter()
             .filter(|m| m.uav && m.view.able && m.view.loop_hash == self.loop_hash)
     }
+}
+
+/// Whether a peer believes all others down.
+pub(super) fn is_alone(view: &Beliefs) -> bool {
+    view.peers.values().all(|(_, s)| *s == Status::Down)
 }

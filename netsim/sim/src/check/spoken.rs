@@ -2,9 +2,9 @@
 //! believes, a claim lists soon what its author flies, and whoever holds the mission for
 //! finished says so (`spoken`). What is published as covered was seen (S6).
 
+use super::snapshot::is_alone;
 use super::{Clocks, Findings, Snapshot};
 use skein_peer::cells::CellSet;
-use skein_peer::output::Status;
 use skein_peer::protocol::runs::unpack;
 use skein_peer::wire::codec::Body;
 use skein_peer::wire::message::{Beacon, Claim};
@@ -33,14 +33,13 @@ struct Published {
 }
 
 /// What a peer has to say.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Owed {
     /// That it plans this cell, or no more.
     Cell(u16),
     /// Whether it hears anybody.
     Alone,
     /// That the mission is finished.
-    #[default]
     Finished,
 }
 
@@ -182,25 +181,22 @@ impl SpokenCheck {
         } else {
             CLAIM_PERIODS
         };
-        let (text, periods) = match key.1 {
-            Owed::Cell(c) => (
-                format!("its claim and its plan differ in cell {c}"),
-                claimed,
-            ),
-            Owed::Alone => (
-                "its claim and its belief differ in whether it hears anybody".to_owned(),
-                claimed,
-            ),
-            Owed::Finished => (
-                "has not said that the mission is finished".to_owned(),
-                FINISHED_PERIODS,
-            ),
+        let periods = match key.1 {
+            Owed::Cell(_) | Owed::Alone => claimed,
+            Owed::Finished => FINISHED_PERIODS,
         };
         let since_ms = self.unspoken.start(key, snapshot.now_ms);
         let took_ms = snapshot.lived_ms(key.0, since_ms);
         let bound_ms = periods * snapshot.bounds.interval_ms + snapshot.late_ms(key.0, since_ms);
         if took_ms > bound_ms && self.unspoken.tell_once(key) {
             found.broken("spoken", snapshot.now_ms, Some(key.0), || {
+                let text = match key.1 {
+                    Owed::Cell(c) => format!("its claim and its plan differ in cell {c}"),
+                    Owed::Alone => {
+                        "its claim and its belief differ in whether it hears anybody".to_owned()
+                    }
+                    Owed::Finished => "has not said that the mission is finished".to_owned(),
+                };
                 format!("{text}, for {took_ms} ms (bound {bound_ms} ms)")
             });
         }
@@ -223,7 +219,7 @@ impl SpokenCheck {
         let cells = held.symmetric_difference(&said);
         let mut owed: BTreeSet<Owed> = cells.map(|c| Owed::Cell(*c)).collect();
         let lists = !view.plan.is_empty() || !view.held.is_empty();
-        let alone = lists && view.peers.values().all(|(_, s)| *s == Status::Down);
+        let alone = lists && is_alone(view);
         if published.is_some_and(|p| p.claim.alone != alone) {
             owed.insert(Owed::Alone);
         }
@@ -244,6 +240,7 @@ mod tests {
     use super::super::testing::{LOOP, Story, speaking};
     use super::*;
     use skein_peer::PeerId;
+    use skein_peer::output::Status;
     use skein_peer::wire::message::{CellRun, Cover, Finished, Firmness, ListedRun, Stamp};
 
     fn beacon_of(view: &Beliefs) -> Beacon {

@@ -605,8 +605,9 @@ impl Swarm {
                 };
                 let answer = self.geometry_cache.answer(&job);
                 match (&job, &answer) {
-                    (Job::Divide { ring, robots, .. }, _) => {
-                        self.checker.on_divide(self.now_ms, id, (ring, robots));
+                    (Job::Divide { ring, robots, .. }, JobResult::Divide(division)) => {
+                        let divided = (&ring[..], &robots[..], division);
+                        self.checker.on_divide(self.now_ms, id, divided);
                     }
                     (_, JobResult::Geometry(Ok(geometry))) => {
                         self.checker.rules.on_loop(geometry);
