@@ -43,12 +43,12 @@ use crate::protocol::sections::LivePeers;
 use crate::timers::{Timer, Timers};
 use crate::wire::codec::Body;
 use crate::wire::limits::BID_COVERED_MAX_BYTES;
-use crate::wire::message::{Beacon, Bid, Epoch, Member, Order, Record};
+use crate::wire::message::{Beacon, Bid, CellRun, Epoch, Member, Order, Record};
 use crate::{Incarnation, PeerId};
 use skein_behaviors::executive::UNREACHABLE_MS;
 use skein_behaviors::{Event, Executive, Goal, Percept};
 use skein_flight::coverage::ring::Direction;
-use skein_flight::coverage::ring::backtracking::{Division, Uav};
+use skein_flight::coverage::ring::backtracking::{Division, Leg, Uav};
 use std::sync::Arc;
 
 /// Own coverage is made durable every so many cells: a crash costs at most these.
@@ -594,7 +594,7 @@ impl MissionState {
         let coverage_loop = Arc::clone(&self.geometry.coverage_loop);
         let mut actions = self.negotiation.tick(&ctx, &coverage_loop);
         let left_over = self.negotiation.left_over(&ctx);
-        let within_reach = self.within_reach(&left_over, s.percept);
+        let within_reach = left_over.and_then(|cells| self.within_reach(&cells, s.percept));
         let taken = within_reach.and_then(|cells| self.negotiation.begin_take(&cells));
         actions.extend(taken.map(Action::Take));
         let mut effects = Effects::new();
@@ -737,54 +737,42 @@ impl MissionState {
         percept: Option<&Percept>,
     ) -> Option<Vec<(u16, Direction)>> {
         let executive = self.executive.as_ref()?;
-        let (spendable, n) = (self.spendable_ms(percept), cells.capacity());
-        let forward = |first: u16, count: u16| first..first.saturating_add(count);
-        let runs = cells.runs().into_iter().flat_map(|r| {
-            let ahead = forward(r.first, r.count).map(|c| (c, Direction::Forward));
-            let back = forward(r.first, r.count).rev();
-            let back = back.map(|c| (c, Direction::Backward));
-            [ahead.collect::<Vec<_>>(), back.collect()]
-        });
-        let reach = runs.map(|mut run| {
-            let planned = self.negotiation.sections.taken(&run);
-            let counts: Vec<usize> = (1..=planned.len()).collect();
-            let fits = counts.partition_point(|count| {
-                let legs = legs_of(&planned[..*count], n);
-                executive.leg_time_ms(&legs, &|c| cells.contains(c)) <= spendable
-            });
-            run.truncate(fits);
-            run
-        });
+        let spendable = self.spendable_ms(percept);
+        let both_ways = |run: CellRun| {
+            let leg = |first: u16, direction: Direction| Leg {
+                first,
+                count: run.count,
+                direction,
+            };
+            let last = run.first + (run.count - 1);
+            [
+                leg(run.first, Direction::Forward),
+                leg(last, Direction::Backward),
+            ]
+        };
+        let flown = |leg: Leg| -> Vec<(u16, Direction)> {
+            let times = executive.schedule(&[leg], &|c| cells.contains(c));
+            let within = times.into_iter().take_while(|(_, ms)| *ms <= spendable);
+            within.map(|(cell, _)| (cell, leg.direction)).collect()
+        };
+        let reach = cells.runs().into_iter().flat_map(both_ways).map(flown);
         reach.max_by_key(Vec::len).filter(|run| !run.is_empty())
     }
 
     /// Lists only what can be flown (S10): the rest is orphaned, and that is a loss.
     fn keep_within_endurance(&mut self, percept: Option<&Percept>) {
         let spendable = self.spendable_ms(percept);
-        let sections = &mut self.negotiation.sections;
         let Some(executive) = &self.executive else {
             return;
         };
-        let covered = sections.covered().clone();
-        let is_open = |c: u16| !covered.contains(c);
-        let fits = |count: usize| {
-            let legs = legs_of(&sections.plan()[..count], covered.capacity());
-            executive.leg_time_ms(&legs, &is_open) <= spendable
-        };
-        let total = sections.plan().len();
-        if total == 0 || fits(total) {
+        let sections = &self.negotiation.sections;
+        let legs = legs_of(sections.plan(), sections.cells());
+        let times = executive.schedule(&legs, &|c| !sections.covered().contains(c));
+        let Some((late, _)) = times.iter().find(|(_, ms)| *ms > spendable) else {
             return;
-        }
-        let (mut good, mut bad) = (0, total);
-        while bad - good > 1 {
-            let middle = good.midpoint(bad);
-            if fits(middle) {
-                good = middle
-            } else {
-                bad = middle
-            }
-        }
-        sections.keep(good);
+        };
+        let good = sections.plan().iter().position(|p| p.cell == *late);
+        self.negotiation.sections.keep(good.unwrap_or(0));
         self.replan = true;
     }
 

@@ -224,11 +224,17 @@ impl Mission {
         if !self.division.is_default() {
             h.write_i64(1);
         }
-        if self.lap > 0 || self.further_laps > 0 {
+        if self.is_patrol() {
             h.write_i64(i64::from(self.lap));
             h.write_i64(i64::from(self.further_laps));
         }
         h.finish()
+    }
+
+    /// Whether everything is to be seen more than once.
+    #[must_use]
+    pub fn is_patrol(&self) -> bool {
+        self.lap > 0 || self.further_laps > 0
     }
 
     /// The mission of the next lap, the same for whoever derives it; none after

@@ -73,6 +73,36 @@ fn a_base_that_moves_away_shortens_plan_and_flight() {
     );
 }
 
+/// A zone beside the area leaves the loop as it is: who flies between other zones knows no
+/// way yet, which is no reason to give up its plan.
+#[test]
+fn a_zone_beside_the_area_takes_no_cell_from_anybody() {
+    let mut h = Harness::started(1, mission(1, 8, 6));
+    h.add_ground_station(Some(mission(1, 8, 6)));
+    h.start(GROUND_STATION);
+    h.run_s(30);
+    let before = h.beliefs(1);
+    let zoned = Mission {
+        zones: vec![vec![
+            (1_000_000, 0),
+            (1_050_000, 0),
+            (1_050_000, 50_000),
+            (1_000_000, 50_000),
+        ]],
+        ..mission(2, 8, 6)
+    };
+    command(&mut h, zoned);
+    assert!(h.run_until(10, |h| h.beliefs(1).revision == 2));
+    let after = h.beliefs(1);
+    assert_eq!(after.loop_hash, before.loop_hash);
+    assert!(
+        after.plan.len() + 4 > before.plan.len(),
+        "{} of {}",
+        after.plan.len(),
+        before.plan.len()
+    );
+}
+
 #[test]
 fn an_older_revision_changes_nothing() {
     let mut h = Harness::started(1, mission(3, 6, 4));
