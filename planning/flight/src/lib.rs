@@ -35,7 +35,7 @@
 //! let coverage_loop = lanes::build(&problem)?;
 //! assert_eq!(coverage_loop.len(), 32);
 //!
-//! // The division that every peer computes from the same bids.
+//! // One of the two divisions of which every peer computes the better from the same bids.
 //! let ring: Vec<RingCell> = coverage_loop
 //!     .cells()
 //!     .iter()

@@ -4,8 +4,8 @@
 //! What counts is where flights lead, not when: UAVs that wait, or that are blown off
 //! their times, are still apart. Leaves to the caller what a layer is in metres.
 
-use crate::measure::to_piece_m;
 use skein_geometry::frame::Point;
+use skein_geometry::polygon::line_to_line_m;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// UAVs that start from one place are not told apart within so many separations of it:
@@ -140,6 +140,7 @@ fn pieces(track: &[Point], most_m: f64) -> Vec<(Point, Point)> {
 
 /// Whether two pieces come nearer than the separation outside of the discs.
 fn comes_near(one: [Point; 2], other: [Point; 2], discs: &Discs, separation_m: f64) -> bool {
+    let apart_m = |[a, b]: [Point; 2], [c, d]: [Point; 2]| line_to_line_m(a, b, c, d);
     if apart_m(one, other) >= separation_m {
         return false;
     }
@@ -178,23 +179,6 @@ fn outside(piece: [Point; 2], discs: &Discs) -> Vec<[Point; 2]> {
     kept.into_iter()
         .map(|(from, to)| [at(from), at(to)])
         .collect()
-}
-
-/// Distance of two straight pieces, 0 when they cross.
-fn apart_m(one: [Point; 2], other: [Point; 2]) -> f64 {
-    let left = |a: Point, b: Point, p: Point| (b - a).perp(&(p - a)) > 0.0;
-    let parts = |a: [Point; 2], b: [Point; 2]| left(a[0], a[1], b[0]) != left(a[0], a[1], b[1]);
-    if parts(one, other) && parts(other, one) {
-        return 0.0;
-    }
-    let ([a, b], [c, d]) = (one, other);
-    let ends = [
-        to_piece_m(one[0], c, d),
-        to_piece_m(one[1], c, d),
-        to_piece_m(other[0], a, b),
-        to_piece_m(other[1], a, b),
-    ];
-    ends.into_iter().fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

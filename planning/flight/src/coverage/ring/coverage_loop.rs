@@ -3,7 +3,7 @@
 //! Whatever is asked for, an area in lanes, points, lines or passes, becomes cells on one
 //! closed curve; a cell is what one frame sees. Left to others: how the loop is laid
 //! ([`crate::coverage::lanes`], [`crate::coverage::stations`]) and who flies which cells
-//! ([`super::backtracking`]).
+//! ([`super::division`]).
 
 use super::grid::{CellId, Grid};
 use super::patch::Patches;

@@ -60,7 +60,8 @@ const PROOFS: u64 = 24;
 /// equal answers on every machine. A section has at most six legs.
 ///
 /// # Complexity
-/// A fixed number of steps for each UAV and each open cell, and a few routes a UAV.
+/// A fixed number of steps for each UAV and each open cell, and the ways of at most 27 plans
+/// asked of the router.
 #[must_use]
 pub fn divide(ring: &[RingCell], uavs: &[Uav], ground: Ground<'_>, rule: Rule) -> Division {
     let plain = backtracking::divide(ring, uavs);
@@ -78,8 +79,7 @@ pub fn divide(ring: &[RingCell], uavs: &[Uav], ground: Ground<'_>, rule: Rule) -
     let steps = STEPS_PER_UAV * uavs.len() as u64 + STEPS_PER_CELL * open as u64;
     let free = best(&mut search, &around, steps);
     search.prove(&around);
-    search.prove(&free);
-    let (around, free) = (search.reckoned(&around), search.reckoned(&free));
+    let around = search.reckoned(&around);
     let sooner = free.cost() < around.cost() || !search.is_flyable(&around);
     let chosen = if sooner && search.is_flyable(&free) {
         free
@@ -103,9 +103,7 @@ fn best(search: &mut Search<'_>, around: &Tours, steps: u64) -> Tours {
         let next = search.improved_within(steps / 4, proved.clone());
         let was_longer = search.prove(&next);
         let next = search.reckoned(&next);
-        proved = search.reckoned(&proved);
-        let is_better = next.cost() < proved.cost();
-        if is_better {
+        if next.cost() < proved.cost() {
             proved = next;
         } else if !was_longer {
             break;

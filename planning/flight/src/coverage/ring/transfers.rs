@@ -92,12 +92,8 @@ impl<'a> Transfers<'a> {
     /// The length of the way, millimetres.
     pub fn mm(&self, from: Place, to: Place) -> u64 {
         self.asked.set(self.asked.get().saturating_add(1));
-        if !self.proved.is_empty()
-            && let Some(mm) = self.proved.get(&(from, to))
-        {
-            return *mm;
-        }
-        self.dubins_mm(from, to)
+        let proved = self.proved.get(&(from, to)).copied();
+        proved.unwrap_or_else(|| self.dubins_mm(from, to))
     }
 
     fn dubins_mm(&self, from: Place, to: Place) -> u64 {
@@ -108,10 +104,10 @@ impl<'a> Transfers<'a> {
     /// Finds out the length of a way round the zones. Returns whether it is longer than
     /// what was reckoned with.
     pub fn prove(&mut self, from: Place, to: Place) -> bool {
-        let reckoned_mm = self.mm(from, to);
         if self.proved.contains_key(&(from, to)) {
             return false;
         }
+        let reckoned_mm = self.dubins_mm(from, to);
         let along_mm = self.along_mm(from, to);
         let proved_mm = match self.router.route(self.pose(from), self.pose(to)) {
             Ok(curve) => whole_mm(curve.length_m()).min(along_mm.unwrap_or(u64::MAX)),
