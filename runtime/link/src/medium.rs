@@ -36,6 +36,18 @@ pub struct Channel {
     pub queue_age_ms: u32,
 }
 
+impl Channel {
+    /// How long a frame with its headers is on the air, microseconds, at least one.
+    #[must_use]
+    pub fn airtime_us(&self, n_bytes: usize) -> u64 {
+        let n_bytes = n_bytes.saturating_add(self.overhead_bytes);
+        let bits = u64::try_from(n_bytes).unwrap_or(u64::MAX).saturating_mul(8);
+        bits.saturating_mul(1_000_000)
+            .div_ceil(u64::from(self.rate_bps.max(1)))
+            .max(1)
+    }
+}
+
 /// Who hears whom at the moment.
 pub trait Links {
     /// The link from `tx` to `rx`.
@@ -185,16 +197,6 @@ impl Medium {
         }
     }
 
-    /// How long a frame with its headers is on the air, microseconds, at least one.
-    #[must_use]
-    pub fn airtime_us(&self, n_bytes: usize) -> u64 {
-        let n_bytes = n_bytes.saturating_add(self.channel.overhead_bytes);
-        let bits = u64::try_from(n_bytes).unwrap_or(u64::MAX).saturating_mul(8);
-        bits.saturating_mul(1_000_000)
-            .div_ceil(u64::from(self.channel.rate_bps.max(1)))
-            .max(1)
-    }
-
     /// The figures of one station.
     #[must_use]
     pub fn tally(&self, node: u16) -> Option<&Tally> {
@@ -315,7 +317,7 @@ impl Medium {
             self.stations[i].listen_us = Some(until_us + wait_us);
             return;
         }
-        let airtime_us = self.airtime_us(n_bytes);
+        let airtime_us = self.channel.airtime_us(n_bytes);
         let s = &mut self.stations[i];
         let Some(waiting) = s.queue.pop() else {
             return;

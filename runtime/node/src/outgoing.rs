@@ -2,8 +2,8 @@
 //! urgent first, and nothing that is out of date.
 //!
 //! The rules of waiting are those of the simulated channel ([`skein_link::queue`]). A
-//! frame holds the channel for eight bits a byte at its rate; that others hold it too
-//! is left to the air.
+//! frame holds the channel as long as there, headers included; that others hold it too is
+//! left to the air.
 
 use skein_link::SendQueue;
 use skein_link::medium::Channel;
@@ -46,8 +46,7 @@ impl Queued for Frame {
 #[derive(Debug)]
 pub struct Outgoing {
     queue: SendQueue<Frame>,
-    rate_bps: u64,
-    max_age_ms: u32,
+    channel: Channel,
     /// The last frame has left by then, microseconds.
     free_us: u64,
     dropped: u64,
@@ -59,8 +58,7 @@ impl Outgoing {
     pub fn new(channel: Channel) -> Self {
         Self {
             queue: SendQueue::default(),
-            rate_bps: u64::from(channel.rate_bps.max(1)),
-            max_age_ms: channel.queue_age_ms,
+            channel,
             free_us: 0,
             dropped: 0,
         }
@@ -75,13 +73,12 @@ impl Outgoing {
     /// The next frame that may leave now.
     pub fn pop(&mut self, now: Time) -> Option<Frame> {
         let now_us = now.0.saturating_mul(1000);
-        self.dropped += self.queue.expire(now_us, self.max_age_ms) as u64;
+        self.dropped += self.queue.expire(now_us, self.channel.queue_age_ms) as u64;
         if now_us < self.free_us {
             return None;
         }
         let frame = self.queue.pop()?.frame;
-        let bits = (frame.bytes.len() as u64).saturating_mul(8);
-        let airtime_us = bits.saturating_mul(1_000_000).div_ceil(self.rate_bps);
+        let airtime_us = self.channel.airtime_us(frame.bytes.len());
         // The clock counts whole milliseconds: of a queue that never ran empty the
         // frames follow each other without a gap.
         let begun_us = self.free_us.max(now_us.saturating_sub(999));
