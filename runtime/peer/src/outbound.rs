@@ -220,7 +220,7 @@ impl Outbound {
         }
     }
 
-    /// Now, and up to a quarter of a period: what recurs must not recur in step with
+    /// Now, and up to a quarter of an interval: what recurs must not recur in step with
     /// others, or it collides for ever.
     fn jittered(&self, now: Time, rng: &mut ChaCha8Rng) -> Time {
         let spread = self.interval_ms / 4 + 1;

@@ -322,14 +322,8 @@ impl Peer {
         }
         match command {
             Command::Mission(mission) => {
-                let overtaken =
-                    |held: &Arc<Mission>| held.revision >= mission.revision && **held != *mission;
-                if self
-                    .cooperation
-                    .newest_mission()
-                    .as_ref()
-                    .is_some_and(overtaken)
-                {
+                let held = self.cooperation.newest_mission();
+                if held.is_some_and(|m| m.revision >= mission.revision && *m != *mission) {
                     return self
                         .alarm("a mission is no newer than the one that is held; it was ignored");
                 }
@@ -465,7 +459,7 @@ impl Peer {
             bytes,
             hops: 0,
             priority: Priority::Beacon,
-            lifetime_ms: u32::try_from(self.relay.air.interval_ms()).unwrap_or(u32::MAX),
+            lifetime_ms: self.relay.lifetime_ms(Kind::Beacon),
         });
     }
 
@@ -620,20 +614,15 @@ impl Peer {
     /// of the number is theirs, and the operator counts the high half.
     #[must_use]
     pub fn next_revision(&self) -> u32 {
-        let held = self.cooperation.newest_mission().map(|m| m.revision);
+        let held = self.cooperation.newest_mission();
         let heard = self
             .membership
             .all()
             .filter_map(|(id, ..)| self.membership.info(id))
             .map(|info| info.revision);
-        let newest = held.into_iter().chain(heard).max().unwrap_or(0);
-        let patrol = |m: &Arc<Mission>| m.lap > 0 || m.further_laps > 0;
-        let laps = if self
-            .cooperation
-            .newest_mission()
-            .as_ref()
-            .is_some_and(patrol)
-        {
+        let revisions = held.iter().map(|m| m.revision).chain(heard);
+        let newest = revisions.max().unwrap_or(0);
+        let laps = if held.is_some_and(|m| m.is_patrol()) {
             newest | u32::from(u16::MAX)
         } else {
             newest

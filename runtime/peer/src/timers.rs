@@ -15,7 +15,7 @@ pub enum Timer {
     Tick,
     /// The next beacon, with or without gossip. Wakes the peer.
     Beacon,
-    /// The next beacon with gossip: one period after the last, ±10 %.
+    /// The next beacon with gossip: one interval after the last, ±10 %.
     FullBeacon,
     /// While it runs, a suspicion against this peer is answered.
     Refutation,

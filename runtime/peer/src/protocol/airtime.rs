@@ -51,7 +51,7 @@ const LEAST_ENTRIES: usize = 3;
 
 /// What a suspicion is answered from: so many bare beacons, refilled by a quarter of the
 /// share. At four an interval that is a whole k2 at D = 1.
-const RESERVE_BEACONS: usize = 16;
+const RESERVE_BEACONS: i64 = 16;
 
 /// Longer pauses refill nothing more, milliseconds.
 const REFILL_MAX_MS: u64 = 600_000;
@@ -95,7 +95,7 @@ impl Airtime {
             rate_bps: u64::from(rate_bps.max(1)),
             neighbours: BTreeMap::new(),
             tokens_millibytes: 0,
-            reserve_millibytes: millibytes(RESERVE_BEACONS * (BARE_BYTES + OVERHEAD_BYTES)),
+            reserve_millibytes: full_reserve(),
             filled: Time(0),
             interval: INTERVAL_LEAST,
             planned: 0,
@@ -163,7 +163,7 @@ impl Airtime {
         let least = bare + (LEAST_ENTRIES * ENTRY_BYTES) as u64;
         let most = INTERVAL_MOST.min(self.interval.saturating_mul(2));
         let interval = u8::try_from((4 * least).div_ceil(half)).unwrap_or(INTERVAL_MOST);
-        self.interval = interval.clamp(INTERVAL_LEAST, most.max(INTERVAL_LEAST));
+        self.interval = interval.clamp(INTERVAL_LEAST, most);
         // What nothing else has used is there for gossip.
         let unused = u64::try_from(self.tokens_millibytes / 2000).unwrap_or(0);
         let room = (half * u64::from(self.interval) / 4).max(unused);
@@ -184,8 +184,8 @@ impl Airtime {
         let gained = i64::try_from(passed_ms * self.rate_bytes_ps()).unwrap_or(i64::MAX / 2);
         self.tokens_millibytes =
             (self.tokens_millibytes.saturating_add(gained)).min(self.depth_millibytes());
-        let most = millibytes(RESERVE_BEACONS * (BARE_BYTES + OVERHEAD_BYTES));
-        self.reserve_millibytes = self.reserve_millibytes.saturating_add(gained / 4).min(most);
+        let refilled = self.reserve_millibytes.saturating_add(gained / 4);
+        self.reserve_millibytes = refilled.min(full_reserve());
         self.filled = now;
     }
 
@@ -245,6 +245,10 @@ pub fn ms_of(interval: u8, period_ms: u64) -> u64 {
 
 fn cost(bytes: usize) -> i64 {
     millibytes(bytes.saturating_add(OVERHEAD_BYTES))
+}
+
+fn full_reserve() -> i64 {
+    RESERVE_BEACONS * cost(BARE_BYTES)
 }
 
 fn millibytes(bytes: usize) -> i64 {

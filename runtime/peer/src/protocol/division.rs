@@ -68,7 +68,7 @@ pub fn worthwhile(open: &OpenRound, division: &Division, beacon_period_ms: u64) 
     let present = all().map(|s| u64::from(s.eta_ms)).max().unwrap_or(0);
     let calm = all().all(|s| u64::from(s.adopted_ago_ms) >= CALM_PERIODS * beacon_period_ms);
     let progress = all().any(|s| s.cells_since > 0);
-    calm && progress && u64::from(division.makespan_ms) * 100 <= present * GAIN_PERCENT
+    calm && progress && gains(u64::from(division.makespan_ms), present)
 }
 
 /// Whether a division of what live claims list, among their owners and one UAV that has
@@ -102,11 +102,18 @@ pub fn gain_in_sight(
             listed.insert(p.cell);
         }
     }
+    if uavs.len() == 1 {
+        return false;
+    }
     uavs.sort_unstable_by_key(|u| u.id);
     let ring = ring_of(&geometry.coverage_loop, n, |c| listed.contains(c));
     let division = geometry.divide(&ring, &uavs);
-    let new_ms = u64::from(division.makespan_ms) + delay_ms;
-    uavs.len() > 1 && new_ms * 100 <= present_ms * GAIN_PERCENT
+    gains(u64::from(division.makespan_ms) + delay_ms, present_ms)
+}
+
+/// Whether one makespan is shorter than another by what makes a division worthwhile.
+fn gains(new_ms: u64, present_ms: u64) -> bool {
+    new_ms * 100 <= present_ms * GAIN_PERCENT
 }
 
 fn ring_of(coverage_loop: &CoverageLoop, n: u16, is_open: impl Fn(u16) -> bool) -> Vec<RingCell> {

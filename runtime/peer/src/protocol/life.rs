@@ -30,7 +30,7 @@ pub const PROBATION_PERIODS: u64 = 3;
 /// hour it takes a year to get there.
 pub const LIFE_STEP: Incarnation = 10_000;
 
-/// After a life could not be stored for the n-th time it is tried again 2^n ticks later,
+/// After a life could not be stored for the n-th time it is tried again 2^(n-1) ticks later,
 /// but no later than so many: each time is an alarm.
 const RETRY_MAX_TICKS: u32 = 64;
 

@@ -510,7 +510,7 @@ impl Membership {
         self.last_heard = Some(now);
     }
 
-    /// Whether nobody was heard for k1 T although some are not believed down yet. That
+    /// Whether nobody was heard for k1 T' although some are not believed down yet. That
     /// many die at once is less likely than that this peer is deaf, so it suspects itself
     /// until it has heard somebody, or believes all down.
     #[must_use]

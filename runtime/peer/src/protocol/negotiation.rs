@@ -633,7 +633,7 @@ impl Negotiation {
 
     /// What an idle peer may try to fly although no division could give it to anybody: fuel
     /// that others were to need may be left, or be back. Looked at once in ten periods.
-    pub fn left_over(&mut self, ctx: &Context<'_>) -> CellSet {
+    pub fn left_over(&mut self, ctx: &Context<'_>) -> Option<CellSet> {
         let stagger = self.rank(ctx) * ctx.period_ms / TAKE_STAGGER;
         let patience = PATIENT_PERIODS * ctx.period_ms;
         let for_long = |since: Option<Time>, ms| since.is_some_and(|t| ctx.now.since_ms(t) >= ms);
@@ -641,10 +641,10 @@ impl Negotiation {
         let busy = self.take_pending || self.orphan_since.is_some() || self.rounds.open().is_some();
         let rested = self.left_over_at.is_none() || for_long(self.left_over_at, patience);
         if !idle || busy || !rested {
-            return CellSet::new(self.sections.cells());
+            return None;
         }
         self.left_over_at = Some(ctx.now);
-        self.sections.left_over(ctx.live)
+        Some(self.sections.left_over(ctx.live))
     }
 
     /// The run of orphans nearest along the loop to where this peer works.

@@ -326,7 +326,9 @@ impl Relay {
         assert!(self.queue.len() <= MAX_QUEUE, "the queue keeps to its cap");
     }
 
-    fn lifetime_ms(&self, kind: Kind) -> u32 {
+    /// How long a record of this kind is worth sending, milliseconds.
+    #[must_use]
+    pub fn lifetime_ms(&self, kind: Kind) -> u32 {
         kind.lifetime_ms(u32::try_from(self.air.interval_ms()).unwrap_or(u32::MAX))
     }
 

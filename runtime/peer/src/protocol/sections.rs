@@ -196,22 +196,20 @@ impl Sections {
     /// that are not known to be beyond anybody's endurance.
     #[must_use]
     pub fn orphans(&self, live: &LivePeers) -> CellSet {
-        let mut orphans = self.unlisted(live);
-        orphans.subtract(&self.unassigned);
-        orphans
+        let mut wanted = CellSet::full(self.cells);
+        wanted.subtract(&self.unassigned);
+        self.unlisted(wanted, live)
     }
 
     /// Cells that were beyond everybody's endurance when they were last divided, and that
     /// no live claim lists.
     #[must_use]
     pub fn left_over(&self, live: &LivePeers) -> CellSet {
-        let mut left_over = self.unlisted(live);
-        left_over.subtract(&self.orphans(live));
-        left_over
+        self.unlisted(self.unassigned.clone(), live)
     }
 
-    fn unlisted(&self, live: &LivePeers) -> CellSet {
-        let mut free = CellSet::full(self.cells);
+    /// Those of some cells that are not covered and that no live claim lists.
+    fn unlisted(&self, mut free: CellSet, live: &LivePeers) -> CellSet {
         free.subtract(&self.covered);
         for p in &self.plan {
             free.remove(p.cell);

@@ -42,7 +42,7 @@ pub enum Kind {
 /// How long a record waiting to be sent matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lifetime {
-    /// So many beacon periods.
+    /// So many announced intervals.
     Beacons(u32),
     /// So many milliseconds.
     Ms(u32),

@@ -14,10 +14,10 @@ pub const INTERVAL_LEAST: u8 = 4;
 /// And the longest: sixteen periods. Whoever needs more air than that is out of reach.
 pub const INTERVAL_MOST: u8 = 64;
 /// Members of a round, and peers of a fleet, ground stations included: with more, gossip
-/// of 20 entries a beacon would not come round within the window in which hops count.
+/// would not come round within the window in which hops count.
 pub const MEMBERS_MAX: usize = 64;
-/// Runs in the plan of a claim: a section has at most two legs and the remains of a
-/// commitment, three takeovers add a leg each, and the rest is room.
+/// Runs in the plan of a claim: a section has at most six legs and the remains of a
+/// commitment, takeovers add a leg each; what does not fit is not flown.
 pub const PLAN_MAX: usize = 16;
 /// Runs of held cells in a claim: those of one earlier plan, less what merges.
 pub const HELD_MAX: usize = 16;
