@@ -7,7 +7,7 @@ use skein_flight::coverage::ring::CellId;
 use skein_netsim::spec::Spec;
 use skein_peer::CoverageTask;
 use skein_scenario::{
-    AreaPlanner, Coverable, Forecast, Overrides, Scenario, ScenarioError, Summary, extent_m,
+    AreaPlanner, Coverable, Forecast, Launch, Overrides, Scenario, ScenarioError, Summary, extent_m,
 };
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -30,6 +30,10 @@ pub struct CheckArgs {
     /// Who plans an area; without a flag both are told side by side.
     #[command(flatten)]
     pub planner: PlannerArgs,
+    /// Where the UAVs of a generated fleet begin: `base`, one after the other, or `spread`
+    /// round the coverage loop.
+    #[arg(long, value_name = "WHERE")]
+    pub launch: Option<Launch>,
     /// How the result is printed.
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
@@ -52,6 +56,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     let over = Overrides {
         peers: args.peers,
         planner: args.planner.chosen(),
+        launch: args.launch,
         ..Overrides::default()
     };
     let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {

@@ -10,7 +10,7 @@ use skein_broker::batch::{self, Batch};
 use skein_netsim::Prepared;
 use skein_netsim::runs::{self, Wanted};
 use skein_netsim::timeline::timeline;
-use skein_scenario::Overrides;
+use skein_scenario::{Launch, Overrides};
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write as _};
 use std::num::NonZeroUsize;
@@ -35,6 +35,10 @@ pub struct SimArgs {
     /// Who plans an area.
     #[command(flatten)]
     pub planner: PlannerArgs,
+    /// Where the UAVs of a generated fleet begin: `base`, one after the other, or `spread`
+    /// round the coverage loop.
+    #[arg(long, value_name = "WHERE")]
+    pub launch: Option<Launch>,
     /// The seed of one run; without it the scenario's.
     #[arg(long, value_name = "S", conflicts_with = "seeds")]
     pub seed: Option<u64>,
@@ -90,6 +94,7 @@ pub fn run(args: &SimArgs) -> anyhow::Result<ExitCode> {
         peers: args.peers,
         seed: args.seed,
         planner: args.planner.chosen(),
+        launch: args.launch,
         ..Overrides::default()
     };
     let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {

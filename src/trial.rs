@@ -7,7 +7,7 @@ use anyhow::Context;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use skein_broker::{Event, Options, Progress, TrialError};
-use skein_scenario::{Overrides, Severity};
+use skein_scenario::{Launch, Overrides, Severity};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -29,6 +29,10 @@ pub struct TrialArgs {
     /// Who plans an area.
     #[command(flatten)]
     pub planner: PlannerArgs,
+    /// Where the UAVs of a generated fleet begin: `base`, one after the other, or `spread`
+    /// round the coverage loop.
+    #[arg(long, value_name = "WHERE")]
+    pub launch: Option<Launch>,
     /// Scenario seconds per second, at most 10.
     #[arg(long, value_name = "X")]
     pub time_scale: Option<f64>,
@@ -60,7 +64,7 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
         seed: args.seed,
         time_scale: args.time_scale,
         planner: args.planner.chosen(),
-        launch: None,
+        launch: args.launch,
     };
     let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {
         Ok(scenario) => scenario,

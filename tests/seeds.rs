@@ -1,10 +1,11 @@
-//! Replays the seeds that once failed (`tests/seeds/*.txt`: scenario, seed, flags, one
-//! a line). Each must complete and break no rule, and the first must give the same history
+//! Replays the seeds that once failed (`tests/seeds/*.txt`: scenario, seed, `storm` if its
+//! faults are drawn, where the UAVs begin, one a line). Each must complete and break no rule, and the first must give the same history
 //! twice.
 
 use skein_netsim::Prepared;
 use skein_netsim::runs::{self, Wanted};
 use skein_netsim::world::fixture;
+use skein_scenario::{Launch, Overrides, open};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -12,7 +13,7 @@ use std::sync::Arc;
 /// UAVs of the small scenarios.
 const N_UAVS: u16 = 8;
 
-fn prepared(scenario: &str) -> Prepared {
+fn prepared(scenario: &str, launch: Launch) -> Prepared {
     Prepared::new(match scenario {
         "square" => fixture::square(N_UAVS),
         "open" => {
@@ -24,9 +25,11 @@ fn prepared(scenario: &str) -> Prepared {
             spec
         }
         name => {
-            skein_scenario::open(Some(name), &skein_scenario::Overrides::default())
-                .expect("a built-in scenario")
-                .spec
+            let over = Overrides {
+                launch: Some(launch),
+                ..Overrides::default()
+            };
+            open(Some(name), &over).expect("a built-in scenario").spec
         }
     })
 }
@@ -49,18 +52,22 @@ fn seeds_that_once_failed_hold() {
             .filter(|l| !l.is_empty() && !l.starts_with('#'))
         {
             let words: Vec<&str> = line.split_whitespace().collect();
-            let [scenario, seed, flags @ ..] = words.as_slice() else {
-                panic!("{}: {line:?} needs a scenario and a seed", file.display());
+            let [scenario, seed, storm @ .., launch] = words.as_slice() else {
+                panic!(
+                    "{}: {line:?} needs a scenario, a seed and a launch",
+                    file.display()
+                );
             };
+            let launch: Launch = launch.parse().unwrap();
             let seed: u64 = seed.parse().unwrap();
             let (prepared, free_ms) = prepared_by_name
-                .entry((*scenario).to_owned())
+                .entry(format!("{scenario} {launch:?}"))
                 .or_insert_with(|| {
-                    let prepared = prepared(scenario);
+                    let prepared = prepared(scenario, launch);
                     let free_ms = runs::failure_free_makespan_ms(&prepared);
                     (prepared, free_ms)
                 });
-            let run = || match flags {
+            let run = || match storm {
                 ["storm"] => runs::storm(prepared, seed, *free_ms, Wanted::default()),
                 [] => runs::planned(prepared, seed, Wanted::default()),
                 other => panic!("{}: unknown flags {other:?}", file.display()),
@@ -69,7 +76,7 @@ fn seeds_that_once_failed_hold() {
             let report = &first.report;
             if !report.passed {
                 failed.push(format!(
-                    "skein sim {line}: {:?} {:#?}",
+                    "{line}: {:?} {:#?}",
                     report.reasons,
                     first.violations().iter().take(3).collect::<Vec<_>>()
                 ));

@@ -3,7 +3,7 @@
 //!
 //! The third argument is `none` (no faults), `kills` (three UAVs lost for good as in the
 //! `helsinki` trial, nothing else), `planned` (the scenario's own faults) or `storm`.
-//! `--base` has all take off at the base; `--rate BPS` changes the radio; `--backtracking`
+//! `--spread` has all begin round the loop; `--rate BPS` changes the radio; `--backtracking`
 //! the division.
 
 use skein_flight::coverage::ring::division::Rule;
@@ -36,7 +36,10 @@ fn told() -> Result<(), String> {
     };
     let over = Overrides {
         peers: number("--peers").and_then(|n| u16::try_from(n).ok()),
-        launch: args.iter().any(|a| a == "--base").then_some(Launch::Base),
+        launch: args
+            .iter()
+            .any(|a| a == "--spread")
+            .then_some(Launch::Spread),
         ..Overrides::default()
     };
     let scenario = open(Some(name), &over).map_err(|e| e.to_string())?;

@@ -4,7 +4,7 @@
 use crate::error::{Finding, Severity};
 use crate::flight_model::{Pace, return_s, too_windy};
 use skein_flight::coverage::passes::PassesError;
-use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav, divide};
+use skein_flight::coverage::ring::backtracking::{Division, OffLoop, RingCell, Uav};
 use skein_flight::coverage::ring::patch::Patches;
 use skein_flight::coverage::ring::{CellId, CoverageLoop, Direction, Grid, LoopError};
 use skein_geometry::Polygon;
@@ -312,7 +312,7 @@ pub fn summary(spec: &Spec, geometry: &MissionGeometry) -> Summary {
             .sum(),
         Patches::Grid(_) => area_m2,
     };
-    let division = failure_free(spec, the_loop);
+    let division = failure_free(spec, geometry);
     Summary {
         area_m2,
         cells: the_loop.cells().iter().filter(|c| c.needed).count(),
@@ -339,8 +339,10 @@ fn whole(x: f64) -> u32 {
     x.round() as u32
 }
 
-/// The division that the swarm would find with everybody alive and in contact.
-fn failure_free(spec: &Spec, the_loop: &CoverageLoop) -> Division {
+/// The division that the swarm would find with everybody alive and in contact, by the
+/// rule of its mission.
+fn failure_free(spec: &Spec, geometry: &MissionGeometry) -> Division {
+    let the_loop = &geometry.coverage_loop;
     let ring: Vec<RingCell> = the_loop
         .cells()
         .iter()
@@ -351,7 +353,7 @@ fn failure_free(spec: &Spec, the_loop: &CoverageLoop) -> Division {
         })
         .collect();
     let robots: Vec<Uav> = spec.uavs.iter().map(|u| robot(u, spec, the_loop)).collect();
-    divide(&ring, &robots)
+    geometry.divide(&ring, &robots)
 }
 
 fn robot(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Uav {
@@ -382,7 +384,7 @@ fn robot(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Uav {
         speed_mmps: whole(pace.loop_mps * 1000.0).max(1),
         turn_ms: whole(pace.turn_s * 1000.0),
         endurance_ms: whole(usable_s.max(0.0) * 1000.0),
-        off_loop: None,
+        off_loop: Some(OffLoop::of(u.launch, u.takeoff_ms)),
     }
 }
 

@@ -2,6 +2,7 @@
 //! name, and what a command line changes.
 
 use skein_peer::CoverageTask;
+use std::str::FromStr;
 
 /// How an area is covered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +48,18 @@ pub enum Launch {
     Spread,
     /// At the base, taking off one after the other.
     Base,
+}
+
+impl FromStr for Launch {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "spread" => Ok(Self::Spread),
+            "base" => Ok(Self::Base),
+            _ => Err("expected \"spread\" (evenly round the coverage loop) or \"base\" (one after the other at the base)".to_owned()),
+        }
+    }
 }
 
 /// What a command line changes in a scenario.

@@ -125,14 +125,12 @@ pub(crate) fn read(
 /// The time between two take-offs at the base, milliseconds; `None` where UAVs begin spread
 /// round the loop.
 fn takeoffs(f: &Fields<'_>, over: Option<Launch>) -> Result<Option<u32>, Error> {
-    let in_file = match f.get("launch").map(Node::text).transpose()? {
-        None | Some("spread") => Launch::Spread,
-        Some("base") => Launch::Base,
-        Some(_) => {
-            return Err(f.need("launch", "\"spread\"")?.wrong(
-                "expected \"spread\" (evenly round the coverage loop) or \"base\" (one after the other at the base); for chosen places list the uavs",
-            ));
-        }
+    let in_file = match f.get("launch") {
+        None => Launch::Base,
+        Some(node) => node
+            .text()?
+            .parse()
+            .map_err(|e| node.wrong(format!("{e}; for chosen places list the uavs")))?,
     };
     let interval_s = f.number_or(
         "takeoff_interval_s",
