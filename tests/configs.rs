@@ -507,8 +507,8 @@ const WRONG: &[(&str, &str, &str)] = &[
         "fleet.airframes[1]: no airframe is named \"scot\"; did you mean scout?",
     ),
     (
-        "launch: \"spread\",",
-        "launch: \"here\",",
+        "    launch: \"base\",",
+        "    launch: \"here\",",
         "fleet.launch: expected \"spread\"",
     ),
     (
