@@ -488,6 +488,7 @@ mod tests {
             (2, 1, 1)
         );
         assert_ne!(second.content_hash(), m.content_hash());
+        assert_ne!(m.content_hash(), mission(1, 4).content_hash());
         assert_eq!(second.next_lap().unwrap().next_lap(), None);
         let pieces = chunks(&second).unwrap();
         let mut library = Library::new(Some(Arc::new(m)));
@@ -510,9 +511,10 @@ mod tests {
     #[test]
     fn only_a_newer_mission_replaces_the_one_held() {
         let mut library = Library::new(Some(Arc::new(mission(3, 4))));
-        for (revision, held) in [(2, 3), (3, 3), (5, 5), (4, 5)] {
+        for (revision, held) in [(2, (3, 4)), (3, (3, 4)), (5, (5, 5)), (4, (5, 5))] {
             library.offer(Arc::new(mission(revision, 5)));
-            assert_eq!(library.newest().unwrap().revision, held);
+            let newest = library.newest().unwrap();
+            assert_eq!((newest.revision, newest.area.len()), held);
         }
     }
 
@@ -524,5 +526,38 @@ mod tests {
             ..once.clone()
         };
         assert_ne!(last.content_hash(), once.content_hash());
+    }
+
+    #[test]
+    fn exact_passes_keep_clear_of_the_zones() {
+        let square = |low: i32, high: i32| vec![(low, low), (high, low), (high, high), (low, high)];
+        let cells = |zones: Vec<Vec<PointMm>>| {
+            let of = Mission {
+                area: square(0, 600_000),
+                zones,
+                task: CoverageTask::Exact,
+                launch: (-30_000, -30_000),
+                ..mission(1, 4)
+            };
+            let geometry = Arc::new(of).geometry().unwrap();
+            let coverage_loop = &geometry.coverage_loop;
+            let needed = coverage_loop.cells().iter().filter(|c| c.needed);
+            needed
+                .map(|c| coverage_loop.patches().corners(c.id).unwrap())
+                .collect::<Vec<_>>()
+        };
+        let middle = |corners: &[Point; 4]| {
+            corners
+                .iter()
+                .fold((0.0, 0.0), |(x, y), p| (x + p.x / 4.0, y + p.y / 4.0))
+        };
+        let deep = |corners: &&[Point; 4]| {
+            let (x, y) = middle(corners);
+            (230.0..370.0).contains(&x) && (230.0..370.0).contains(&y)
+        };
+        assert!(cells(Vec::new()).iter().filter(deep).count() > 0);
+        let around = cells(vec![square(200_000, 400_000)]);
+        assert_eq!(around.iter().filter(deep).count(), 0);
+        assert!(!around.is_empty());
     }
 }

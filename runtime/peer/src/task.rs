@@ -124,3 +124,37 @@ impl CoverageTask {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn targets_come_back_in_metres() {
+        let points = CoverageTask::Points(vec![PointTask {
+            at: (12_500, -2_250),
+            radius_mm: 7_500,
+        }]);
+        let lines = CoverageTask::Lines(vec![LineTask {
+            way: vec![(0, 1_000), (40_000, 1_500)],
+            width_mm: 8_250,
+        }]);
+        let Some(Targets::Points(told)) = points.targets() else {
+            panic!("points are targets");
+        };
+        assert_eq!(
+            (told[0].at.x, told[0].at.y, told[0].radius_m),
+            (12.5, -2.25, 7.5)
+        );
+        let Some(Targets::Lines(told)) = lines.targets() else {
+            panic!("lines are targets");
+        };
+        assert_eq!(
+            (told[0].way[1].x, told[0].way[1].y, told[0].width_m),
+            (40.0, 1.5, 8.25)
+        );
+        for task in [points, lines] {
+            assert_eq!(CoverageTask::of_targets(&task.targets().unwrap()), task);
+        }
+    }
+}
