@@ -98,11 +98,11 @@ fn best(search: &mut Search<'_>, around: &Tours, steps: u64) -> Tours {
         best = packed;
     }
     search.prove(&best);
-    let mut proved = search.reckoned(&best);
+    let mut proved = search.within_endurance(&search.reckoned(&best));
     for _ in 0..PROOFS {
         let next = search.improved_within(steps / 4, proved.clone());
         let was_longer = search.prove(&next);
-        let next = search.reckoned(&next);
+        let next = search.within_endurance(&search.reckoned(&next));
         if next.cost() < proved.cost() {
             proved = next;
         } else if !was_longer {
@@ -395,6 +395,37 @@ mod tests {
                 ratio <= most,
                 "{ratio} from {at:?}, three gone: {three_are_gone}"
             );
+        }
+    }
+
+    #[test]
+    fn what_short_batteries_cannot_fly_falls_to_who_has_fuel() {
+        let site = Site::with_a_block(22, 20);
+        let n = site.coverage_loop.len();
+        let draw = &mut SplitMix64::new(3);
+        for _ in 0..8 {
+            let ring = site.ring(|_| true);
+            let uav = |i: u16| Uav {
+                endurance_ms: if i < 3 {
+                    130_000 + 20_000 * u32::from(i)
+                } else {
+                    5_000_000
+                },
+                ..site.uav(i, 0)
+            };
+            let mut uavs: Vec<Uav> = (0..6).map(uav).collect();
+            for uav in &mut uavs {
+                uav.anchor = u16::try_from(draw.below(n)).unwrap();
+                *uav = site.strayed(*uav, draw);
+            }
+            let d = divide(&ring, &uavs, site.ground(), Rule::Best);
+            assert_sound(&ring, &uavs, &d);
+            assert!(d.unassigned.is_empty(), "{} cells", d.unassigned.len());
+            let work_mm: f64 = ring.iter().map(|c| f64::from(c.service_mm)).sum();
+            let flown_mm: u64 = 150_000 * 3 * 13;
+            let least_ms = (work_mm - flown_mm as f64) / (3.0 * 13.0);
+            let ratio = f64::from(d.makespan_ms) / least_ms;
+            assert!(ratio < 1.5, "{ratio}");
         }
     }
 

@@ -245,6 +245,34 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// The plan that is left when every UAV turns back before its endurance is over: once
+    /// ways were proved, what was thought to be within it may be beyond.
+    pub fn within_endurance(&self, tours: &Tours) -> Tours {
+        let cut = |(uav, tour): (usize, &Tour)| {
+            let mut tour = tour.clone();
+            while !self.is_within(uav, &tour) {
+                tour = self.tour(uav, self.without_last(tour.runs));
+            }
+            tour.runs
+        };
+        let runs = tours.tours.iter().enumerate().map(cut).collect();
+        self.plan(runs)
+    }
+
+    /// These runs without the open cell that is flown last.
+    fn without_last(&self, mut runs: Vec<Run>) -> Vec<Run> {
+        if let Some(mut last) = runs.pop()
+            && last.count > 1
+        {
+            last.count -= 1;
+            if !last.forward {
+                last.first = (last.first + 1) % self.open.len();
+            }
+            runs.push(last);
+        }
+        runs
+    }
+
     /// Whether every section is within its UAV's endurance.
     pub fn is_flyable(&self, tours: &Tours) -> bool {
         let mut each = tours.tours.iter().enumerate();
