@@ -282,6 +282,9 @@ impl Cooperation {
         } else if state.fuel_is_back(s.percept) {
             state.exhausted = false;
         }
+        if order == Order::Resume {
+            effects.extend(state.check_endurance(s));
+        }
         let able = s.has_voice && order == Order::Resume && state.can_fly_plans(s);
         let able = able && !s.membership.is_deaf(s.now);
         effects.extend(state.negotiate(s, able, timers));
@@ -760,20 +763,36 @@ impl MissionState {
     }
 
     /// Lists only what can be flown (S10): the rest is orphaned, and that is a loss.
-    fn keep_within_endurance(&mut self, percept: Option<&Percept>) {
+    /// Returns whether anything was given up.
+    fn keep_within_endurance(&mut self, percept: Option<&Percept>) -> bool {
         let spendable = self.spendable_ms(percept);
         let Some(executive) = &self.executive else {
-            return;
+            return false;
         };
         let sections = &self.negotiation.sections;
         let legs = legs_of(sections.plan(), sections.cells());
         let times = executive.schedule(&legs, &|c| !sections.covered().contains(c));
         let Some((late, _)) = times.iter().find(|(_, ms)| *ms > spendable) else {
-            return;
+            return false;
         };
         let good = sections.plan().iter().position(|p| p.cell == *late);
         self.negotiation.sections.keep(good.unwrap_or(0));
         self.replan = true;
+        true
+    }
+
+    /// A plan takes longer than when it was adopted if its first turn is begun from another
+    /// pose, or if the UAV waited elsewhere meanwhile: what the fuel allows is looked at
+    /// once a period.
+    fn check_endurance(&mut self, s: &Situation<'_>) -> Option<Effect> {
+        let looked_ago_ms = self.fuel_looked_at.map(|t| s.now.since_ms(t));
+        let planned = !self.negotiation.sections.plan().is_empty();
+        if !planned || looked_ago_ms.is_some_and(|ms| ms < s.period_ms) {
+            return None;
+        }
+        self.fuel_looked_at = Some(s.now);
+        self.keep_within_endurance(s.percept)
+            .then(|| self.claim_changed())
     }
 
     /// All that can be covered is covered, or again not: the mission ends, the next lap

@@ -78,6 +78,8 @@ pub(crate) struct MissionState {
     pub finished: bool,
     /// Whether its fuel is due: it flies home until some is back.
     pub exhausted: bool,
+    /// When its plan was last compared with what the fuel allows.
+    pub fuel_looked_at: Option<crate::Time>,
     /// Cells covered by itself since the last entry of the journal.
     pub unsaved_cells: u16,
     pub claims: ClaimsWritten,
@@ -188,6 +190,7 @@ impl MissionState {
             alone: false,
             finished: false,
             exhausted: old.as_ref().is_some_and(|m| m.exhausted),
+            fuel_looked_at: None,
             unsaved_cells: 0,
             // What is still being written was promised for the old loop.
             claims: old

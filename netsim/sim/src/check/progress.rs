@@ -15,6 +15,8 @@ const ETA_ROUNDING_MS: u32 = 1_000;
 pub struct ProgressCheck {
     restarted: BTreeMap<u16, Restarted>,
     over: Clocks<(u16, &'static str)>,
+    /// Since when a plan has been longer than the fuel.
+    short_since_ms: BTreeMap<u16, u64>,
     losses: u64,
 }
 
@@ -42,6 +44,7 @@ impl ProgressCheck {
     pub fn on_silent(&mut self, id: u16) {
         self.restarted.remove(&id);
         self.over.retain(|(p, _)| *p != id);
+        self.short_since_ms.remove(&id);
     }
 
     /// A peer saw cells that nobody had covered.
@@ -89,7 +92,16 @@ impl ProgressCheck {
         let late_ms = snapshot.late_ms(m.id, now_ms);
         let slack_ms = ETA_ROUNDING_MS.saturating_add(u32::try_from(late_ms).unwrap_or(u32::MAX));
         let short = !v.plan.is_empty() && v.eta_ms > v.spendable_ms.saturating_add(slack_ms);
-        if self.exceeds((m.id, "plan"), short, now_ms) {
+        // A plan may become too long while it is flown; its peer looks once a period.
+        if !short {
+            self.short_since_ms.remove(&m.id);
+            self.over.stop((m.id, "plan"));
+            return;
+        }
+        let since_ms = *self.short_since_ms.entry(m.id).or_insert(now_ms);
+        let took_ms = snapshot.lived_ms(m.id, since_ms);
+        let lasts = took_ms > snapshot.bounds.period_ms + late_ms;
+        if self.exceeds((m.id, "plan"), lasts, now_ms) {
             found.broken("S10", now_ms, Some(m.id), || {
                 format!("plans {} ms with {} ms to spend", v.eta_ms, v.spendable_ms)
             });
@@ -257,6 +269,8 @@ mod tests {
             loads: vec![("queue", 5, 4)],
             ..good
         };
+        // A plan that has become too long is to be cut within a period.
+        assert!(!run(&bad, 2, false).contains_key("S10"));
         assert_eq!(
             run(&bad, 3, false),
             BTreeMap::from([("L7", 1), ("S10", 1), ("S9", 1)])

@@ -123,7 +123,8 @@ impl Sections {
         self.covered.is_full()
     }
 
-    /// Adds covered cells; covered cells leave the plan. Returns whether any was new.
+    /// Adds covered cells; they leave the plan, and are beyond nobody's endurance. Returns
+    /// whether any was new.
     pub fn cover(&mut self, covered: &CellSet) -> bool {
         if !self.covered.union_with(covered) {
             return false;
@@ -138,6 +139,7 @@ impl Sections {
             open
         });
         self.held.retain(|c, _| !covered.contains(*c));
+        self.unassigned.subtract(covered);
         true
     }
 
@@ -431,6 +433,7 @@ impl Sections {
         for c in cells {
             self.unassigned.insert(*c);
         }
+        self.unassigned.subtract(&self.covered);
     }
 
     /// The division that an earlier life adopted: what is taken from now on counts as
@@ -568,6 +571,16 @@ mod tests {
         assert!(s.settle(&LivePeers::from([(2, 1)])));
         assert_eq!(s.plan().iter().map(|p| p.cell).collect::<Vec<_>>(), [2, 3]);
         assert!(!s.settle(&LivePeers::from([(2, 1)])));
+    }
+
+    #[test]
+    fn what_is_covered_is_beyond_nobodys_endurance() {
+        let mut s = sections(1);
+        s.set_unassigned(&[2, 3, 4]);
+        s.cover(&CellSet::of(10, [3]));
+        assert_eq!(s.unassigned().iter().collect::<Vec<_>>(), [2, 4]);
+        s.set_unassigned(&[3, 4]);
+        assert_eq!(s.unassigned().iter().collect::<Vec<_>>(), [4]);
     }
 
     #[test]

@@ -48,6 +48,20 @@ fn no_plan_is_longer_than_what_may_be_spent() {
 }
 
 #[test]
+fn a_plan_that_became_longer_than_the_fuel_is_cut_while_it_is_flown() {
+    let mut h = Harness::started(2, mission(1, 8, 6));
+    h.run_s(25);
+    let before = h.beliefs(1);
+    let spent_ms = before.spendable_ms - before.eta_ms / 2;
+    h.seat(1).fuel_s -= f64::from(spent_ms) / 1000.0;
+    h.run_s(2);
+    let after = h.beliefs(1);
+    assert!(!after.plan.is_empty() && after.plan.len() < before.plan.len());
+    assert!(after.eta_ms <= after.spendable_ms, "{after:?}");
+    assert!(h.run_until(500, |h| h.beliefs(2).finished));
+}
+
+#[test]
 fn one_percept_without_fuel_does_not_end_the_flight() {
     let mut h = Harness::started(1, mission(1, 6, 4));
     h.run_s(20);
