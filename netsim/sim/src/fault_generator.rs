@@ -38,7 +38,8 @@ pub struct Storm {
 #[must_use]
 pub fn draw(spec: &Spec, seed: u64, makespan_ms: u64) -> Storm {
     let mut t = Stream::new(seed, Concern::Troubles);
-    let kinds = troubles::choose(&mut t, spec);
+    let mut kinds = troubles::choose(&mut t, spec);
+    kinds.extend(troubles::choose_rare(seed, spec));
     let (spec, makespan_ms) = &troubles::prepare(&mut t, &kinds, spec, makespan_ms);
     let mut s = Stream::new(seed, Concern::Storm);
     let ids: Vec<u16> = spec.uavs.iter().map(|u| u.id).collect();
@@ -207,7 +208,8 @@ mod tests {
             struck,
             uavs,
         } = storm;
-        assert!(struck.len() <= usize::from(spec.storm.troubles.max_kinds));
+        let most = usize::from(spec.storm.troubles.max_kinds) + troubles::RARE.len();
+        assert!(struck.len() <= most);
         let mut dead = std::collections::BTreeSet::new();
         let mut split = false;
         for f in faults {

@@ -144,6 +144,8 @@ pub struct TroubleSpec {
     pub max_clock_jump_ms: u32,
     /// Largest fleet; 0 leaves the scenario's.
     pub max_uavs: u16,
+    /// Largest crowd, a fleet of more than that.
+    pub max_crowd: u16,
 }
 
 impl TroubleSpec {
@@ -157,6 +159,7 @@ impl TroubleSpec {
         max_clock_drift_ppm: 0,
         max_clock_jump_ms: 0,
         max_uavs: 0,
+        max_crowd: 0,
     };
 
     /// What a storm brings where its scenario says nothing else: what a small flight
@@ -170,5 +173,6 @@ impl TroubleSpec {
         max_clock_drift_ppm: 20_000,
         max_clock_jump_ms: 60_000,
         max_uavs: 12,
+        max_crowd: 30,
     };
 }

@@ -4,7 +4,7 @@ use crate::account::{RunReport, secs};
 use crate::check::{Grade, Violation};
 use crate::spec::Spec;
 use crate::swarm::Outcome;
-use crate::troubles::{KINDS, Kind};
+use crate::troubles::{KINDS, Kind, RARE};
 use serde::Serialize;
 use skein_geometry::hash::Fnv;
 use std::collections::BTreeMap;
@@ -306,7 +306,8 @@ impl Summary {
         let missed = missed.iter().filter(|(can, n)| *can && *n == 0).count();
         let troubled = |kind: &&Kind| storm.troubles.max_kinds > 0 && (kind.can)(spec);
         let unmet = |kind: &&Kind| !self.struck.contains_key(kind.name);
-        let missed = missed + KINDS.iter().filter(troubled).filter(unmet).count();
+        let kinds = KINDS.iter().chain(RARE).filter(troubled);
+        let missed = missed + kinds.filter(unmet).count();
         let slow = self.makespan_over_work_bound.p50 > PACE_P50
             || self.makespan_over_work_bound.p95 > PACE_P95;
         let jumpy = self.false_downs_per_peer_hour > FALSE_DOWNS_LIGHT
@@ -408,7 +409,11 @@ mod tests {
             let mut s = Summary {
                 runs: JUDGED_BATCH,
                 reached,
-                struck: KINDS.iter().map(|k| (k.name.to_owned(), 1)).collect(),
+                struck: KINDS
+                    .iter()
+                    .chain(RARE)
+                    .map(|k| (k.name.to_owned(), 1))
+                    .collect(),
                 ..Summary::default()
             };
             change(&mut s);

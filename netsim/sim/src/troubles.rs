@@ -1,11 +1,11 @@
 //! The kinds of trouble that storms draw beside loss, kills, restarts, partitions and
 //! moved bases, and how each is drawn. A run draws how many kinds it meets, then which:
 //! few at once, so that what goes wrong can be told from its cause, and each in many runs
-//! of a batch.
+//! of a batch. A few rare kinds are drawn each for itself.
 
 use crate::fault::{Fault, Order, TimedFault};
 use crate::spec::{Spec, UavSpec};
-use crate::swarm::stream::Stream;
+use crate::swarm::stream::{Concern, Stream};
 
 /// Shortest time for which something is wrong, milliseconds: two beacon periods.
 const SHORTEST_MS: u64 = 2_000;
@@ -91,6 +91,17 @@ pub const KINDS: &[Kind] = &[
     },
 ];
 
+/// Kinds that are drawn each for itself and seldom, beside the others: a crowd is slow, and
+/// what comes in the middle of a mission changes all that follows.
+pub const RARE: &[Kind] = &[Kind {
+    name: "crowd",
+    can: |s| s.storm.troubles.max_crowd > s.storm.troubles.max_uavs,
+    how: How::Scenario(crowd),
+}];
+
+/// Each of the rare kinds strikes in one run of so many.
+const RARE_ONE_IN: u64 = 12;
+
 /// A kind that a run drew, and when it strikes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Struck {
@@ -110,6 +121,16 @@ struct Draw<'a> {
     survivors: &'a [u16],
     end_ms: u64,
     out: Vec<TimedFault>,
+}
+
+/// The rare kinds that the run with this seed meets, each by a draw of its own: one more of
+/// them changes no other storm.
+#[must_use]
+pub fn choose_rare(seed: u64, spec: &Spec) -> Vec<Kind> {
+    let met = |n: u16| Stream::new(seed, Concern::Rare(n)).one_in(RARE_ONE_IN);
+    let some = spec.storm.troubles.max_kinds > 0;
+    let numbered = (0..).zip(RARE).filter(|(_, kind)| some && (kind.can)(spec));
+    numbered.filter(|(n, _)| met(*n)).map(|(_, k)| *k).collect()
 }
 
 /// Draws the kinds that one run meets.
@@ -358,8 +379,7 @@ fn short_fuel(d: &mut Draw<'_>) {
     }
 }
 
-/// Another number of UAVs: fewer, but enough for the work, or some more like those there
-/// are, above them.
+/// Another number of UAVs: fewer, but enough for the work, or some more.
 fn fleet(s: &mut Stream, spec: &mut Spec, makespan_ms: u64) {
     let there = spec.uavs.len();
     let longest_s = spec
@@ -375,7 +395,19 @@ fn fleet(s: &mut Stream, spec: &mut Spec, makespan_ms: u64) {
     let work_ms = makespan_ms * there as u64;
     let least = (work_ms * 3 / 2).div_ceil(longest_ms.max(1)).max(1);
     let n = s.between(least, u64::from(spec.storm.troubles.max_uavs).max(least));
-    let n = usize::try_from(n).unwrap_or(there);
+    resize(spec, usize::try_from(n).unwrap_or(there));
+}
+
+/// More UAVs than any other fleet has.
+fn crowd(s: &mut Stream, spec: &mut Spec, _: u64) {
+    let troubles = spec.storm.troubles;
+    let n = s.between(u64::from(troubles.max_uavs) + 1, troubles.max_crowd.into());
+    resize(spec, usize::try_from(n).unwrap_or(0));
+}
+
+/// The first UAVs, or all and some more like those that there are, above them.
+fn resize(spec: &mut Spec, n: usize) {
+    let there = spec.uavs.len();
     let top_m = spec.uavs.iter().map(|u| u.height_m).fold(0.0, f64::max);
     let taken: Vec<u16> = spec
         .uavs
@@ -456,6 +488,30 @@ mod tests {
         }
         let most = usize::from(spec.storm.troubles.max_uavs);
         assert_eq!(sizes, (2..=most).collect());
+    }
+
+    #[test]
+    fn one_storm_in_twelve_is_a_crowd_and_all_others_stay_what_they_were() {
+        let spec = spec();
+        let limits = spec.storm.troubles;
+        let mut sizes = std::collections::BTreeSet::new();
+        let storms = 1200;
+        let crowded = (0..storms).filter(|seed| {
+            let rare = choose_rare(*seed, &spec);
+            let mut s = Stream::new(*seed, Concern::Troubles);
+            let (changed, _) = prepare(&mut s, &rare, &spec, 300_000);
+            let n = u16::try_from(changed.uavs.len()).unwrap();
+            if rare.is_empty() {
+                assert_eq!(changed.uavs, spec.uavs);
+            } else {
+                assert!((limits.max_uavs + 1..=limits.max_crowd).contains(&n));
+                sizes.insert(n);
+            }
+            !rare.is_empty()
+        });
+        let n = crowded.count();
+        assert!((70..130).contains(&n), "{n}");
+        assert!(sizes.len() > 12, "{sizes:?}");
     }
 
     #[test]

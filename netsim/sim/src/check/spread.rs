@@ -40,6 +40,13 @@ pub struct SpreadCheck {
 /// 45 % of 64 kbit/s it takes three periods of a peer's air on every hop.
 const PIECE_PERIODS: u64 = 3;
 
+/// A record that was lost in the flood comes once its receiver has shown that it lacks it:
+/// a beacon of a crowd gossips about so many at least, and about all of them in turn.
+const GOSSIP_LEAST: u64 = 3;
+
+/// Turns, in intervals, that the bound of L4 allows on a hop as it is: those of eight.
+const SMALL_ROTATION: u64 = 3;
+
 /// Beyond the time that a record takes to all: deriving the loop of a revision is
 /// modelled to take 200 ms, and a peer looks four times a period; the check looks once.
 const LOOK_PERIODS: u64 = 2;
@@ -56,13 +63,16 @@ impl SpreadCheck {
         self.pieces = self.pieces.max(pieces as u64);
     }
 
-    /// How long a record of some kind may take to all.
-    fn bound_ms(&self, bounds: &Bounds, kind: u8) -> u64 {
-        if kind == Kind::Mission.number() {
-            bounds.spread_ms() + self.pieces * bounds.diameter * PIECE_PERIODS * bounds.interval_ms
+    /// How long a record of some kind may take to all of so many.
+    fn bound_ms(&self, bounds: &Bounds, kind: u8, peers: usize) -> u64 {
+        let rotation = (peers as u64).saturating_sub(1).div_ceil(GOSSIP_LEAST);
+        let crowd = rotation.saturating_sub(SMALL_ROTATION) * bounds.diameter;
+        let pieces = if kind == Kind::Mission.number() {
+            self.pieces * bounds.diameter * PIECE_PERIODS
         } else {
-            bounds.spread_ms()
-        }
+            0
+        };
+        bounds.spread_ms() + (crowd + pieces) * bounds.interval_ms
     }
 
     /// A process starts, ends or stands still.
@@ -146,7 +156,7 @@ impl SpreadCheck {
         let graded = snapshot.grade() != Grade::Reported;
         for m in peers {
             for (key, wanted) in newest.iter().filter(|(key, _)| key.0 != m.id) {
-                let bound_ms = self.bound_ms(&snapshot.bounds, key.1);
+                let bound_ms = self.bound_ms(&snapshot.bounds, key.1, peers.len());
                 let held = self.held.get(&m.id).and_then(|h| h.get(key));
                 let held = held.copied().unwrap_or_default();
                 if held >= *wanted {
@@ -191,7 +201,7 @@ impl SpreadCheck {
         since_ms: u64,
         found: &mut Findings,
     ) {
-        let mission_ms = self.bound_ms(&snapshot.bounds, Kind::Mission.number());
+        let mission_ms = self.bound_ms(&snapshot.bounds, Kind::Mission.number(), peers.len());
         let bound_ms = mission_ms + LOOK_PERIODS * snapshot.bounds.period_ms;
         for (i, a) in peers.iter().enumerate() {
             for b in &peers[i + 1..] {

@@ -21,6 +21,8 @@ pub enum Concern {
     Outsider,
     /// The radio: fates of transmissions.
     Radio,
+    /// One of the kinds of trouble that are drawn each for itself.
+    Rare(u16),
 }
 
 impl Concern {
@@ -33,6 +35,7 @@ impl Concern {
             Self::Radio => (5, 0),
             Self::Troubles => (6, 0),
             Self::Outsider => (7, 0),
+            Self::Rare(n) => (8, n),
         };
         (kind << 16) | u64::from(who)
     }
