@@ -49,6 +49,9 @@ fn main() -> ExitCode {
                 );
             }
         }
+        for down in run.false_downs() {
+            println!("seed {seed} {down:?}");
+        }
         if !run.report.passed && run.violations().is_empty() {
             println!("seed {seed} failed: {:?}", run.report.reasons);
         }

@@ -1,8 +1,9 @@
 //! The narrow-band half-duplex channel that all peers share (D2.7 §2.2).
 //!
 //! A station listens before it sends: it starts when it hears nobody, else it waits for
-//! the end of what it hears plus a short random time. A transmission lasts eight bits a
-//! byte of the record and its headers at the channel's rate. At its end every other station either gets it or not:
+//! the end of what it hears plus a short random time. A transmission carries as many of
+//! the waiting records as one frame holds and lasts eight bits a byte of them and their
+//! headers at the channel's rate. At its end every other station either gets it or not:
 //! the link may be down, the draw of [`fate()`] may lose it, the station may
 //! have been sending itself, or it may have heard two at once, from senders that did
 //! not hear each other (or began within the same moment).
@@ -30,13 +31,27 @@ pub const SENSE_US: u64 = 200;
 pub struct Channel {
     /// Its bit rate, bit/s.
     pub rate_bps: u32,
-    /// Bytes that headers add to each record.
+    /// Bytes that headers add to each transmission.
     pub overhead_bytes: usize,
+    /// Bytes that tell a further record in the same transmission from those before it.
+    pub part_bytes: usize,
+    /// A transmission takes further records up to so many bytes; one record may be longer.
+    pub frame_bytes: usize,
     /// Frames that waited longer than this are dropped, milliseconds.
     pub queue_age_ms: u32,
 }
 
 impl Channel {
+    /// The length that a transmission of so many bytes has with one more record, headers
+    /// left out; none where a frame does not hold both.
+    #[must_use]
+    pub fn joined_bytes(&self, filled: usize, n_bytes: usize) -> Option<usize> {
+        let joined = filled
+            .saturating_add(self.part_bytes)
+            .saturating_add(n_bytes);
+        (joined <= self.frame_bytes).then_some(joined)
+    }
+
     /// How long a frame with its headers is on the air, microseconds, at least one.
     #[must_use]
     pub fn airtime_us(&self, n_bytes: usize) -> u64 {
@@ -79,7 +94,7 @@ pub struct Frame {
     pub lifetime_ms: u32,
 }
 
-/// A frame that got through.
+/// A record of a frame that got through.
 #[derive(Clone, Debug)]
 pub struct Delivery {
     /// When it is received: the end of the transmission plus the delay of the link, µs.
@@ -105,7 +120,7 @@ pub struct Delivery {
 pub struct Tally {
     /// Transmissions begun.
     pub frames: u64,
-    /// Bytes sent.
+    /// Bytes sent, headers left out.
     pub bytes: u64,
     /// Time on the air, microseconds.
     pub airtime_us: u64,
@@ -156,7 +171,7 @@ struct OnAir {
     from_us: u64,
     to_us: u64,
     number: u64,
-    waiting: Waiting<Frame>,
+    waiting: Vec<Waiting<Frame>>,
     over: bool,
 }
 
@@ -301,9 +316,9 @@ impl Medium {
         let s = &mut self.stations[i];
         s.listen_us = None;
         s.expire(at_us, queue_age_ms);
-        let Some(n_bytes) = s.queue.first().map(|f| f.bytes.len()) else {
+        if s.queue.is_empty() {
             return;
-        };
+        }
         let id = s.id;
         let heard_until_us = self
             .air
@@ -317,11 +332,19 @@ impl Medium {
             self.stations[i].listen_us = Some(until_us + wait_us);
             return;
         }
-        let airtime_us = self.channel.airtime_us(n_bytes);
+        let channel = self.channel;
         let s = &mut self.stations[i];
-        let Some(waiting) = s.queue.pop() else {
+        let Some(first) = s.queue.pop() else {
             return;
         };
+        let mut n_bytes = first.frame.bytes.len();
+        let mut waiting = vec![first];
+        waiting.extend(s.queue.take_fitting(|frame| {
+            let joined = channel.joined_bytes(n_bytes, frame.bytes.len());
+            n_bytes = joined.unwrap_or(n_bytes);
+            joined.is_some()
+        }));
+        let airtime_us = channel.airtime_us(n_bytes);
         s.sending = true;
         s.tally.frames += 1;
         s.tally.bytes += u64::try_from(n_bytes).unwrap_or(u64::MAX);
@@ -356,18 +379,24 @@ impl Medium {
             }
             fates.push((r.id, f));
         }
-        let (frame, queued_us) = (&a.waiting.frame, a.waiting.queued_us);
         let tally = &mut self.stations[i].tally;
-        for (rx, f) in fates {
+        for (_, f) in &fates {
             match f {
-                Fate::Lost(reason) => tally.drop_many(reason, 1),
-                Fate::Delivered { delay_ms } => {
-                    tally.delivered += 1;
+                Fate::Lost(reason) => tally.drop_many(*reason, 1),
+                Fate::Delivered { .. } => tally.delivered += 1,
+            }
+        }
+        for Waiting {
+            frame, queued_us, ..
+        } in &a.waiting
+        {
+            for (rx, f) in &fates {
+                if let Fate::Delivered { delay_ms } = f {
                     out.push(Delivery {
-                        at_us: to_us + u64::from(delay_ms) * 1000,
-                        queued_us,
+                        at_us: to_us + u64::from(*delay_ms) * 1000,
+                        queued_us: *queued_us,
                         tx,
-                        rx,
+                        rx: *rx,
                         number: a.number,
                         key: frame.key,
                         hops: frame.hops,
@@ -486,6 +515,8 @@ mod tests {
         let channel = Channel {
             rate_bps: 64_000,
             overhead_bytes: 0,
+            part_bytes: 0,
+            frame_bytes: 0,
             queue_age_ms: 2_000,
         };
         let links = Table {
@@ -629,6 +660,42 @@ mod tests {
             d.iter().map(|d| d.number).collect::<Vec<_>>(),
             [0, 1, 2, 3, 4]
         );
+    }
+
+    #[test]
+    fn a_transmission_carries_what_waits_up_to_the_length_of_a_frame() {
+        let channel = Channel {
+            rate_bps: 64_000,
+            overhead_bytes: 26,
+            part_bytes: 4,
+            frame_bytes: 200,
+            queue_age_ms: 2_000,
+        };
+        let links = Table::default();
+        let mut m = Medium::new(&[1, 2, 3], channel, 5);
+        for (key, n_bytes, priority) in [
+            (1, 100, TELEMETRY),
+            (2, 60, BEACON),
+            (3, 300, CLAIM),
+            (4, 50, CONFLICT),
+            (5, 60, BEACON),
+            (6, 20, TELEMETRY),
+        ] {
+            m.submit(0, 1, frame(key, n_bytes, priority));
+        }
+        let d = drain(&mut m, &links);
+        // The order stays, but for what no longer fits.
+        let to_2 = d.iter().filter(|d| d.rx == 2);
+        assert_eq!(
+            to_2.map(|d| (d.number, d.key)).collect::<Vec<_>>(),
+            [(0, 4), (0, 2), (0, 5), (1, 3), (2, 1), (2, 6)]
+        );
+        // All of one arrives at once: 178, 300 and 124 bytes, and headers.
+        let t = m.tally(1).unwrap();
+        assert_eq!((t.frames, t.bytes, t.delivered), (3, 602, 6));
+        assert_eq!(t.airtime_us, (602 + 3 * 26) * 125);
+        assert_eq!(d[0].at_us, d[5].at_us);
+        assert!(d[6].at_us >= d[0].at_us + 326 * 125);
     }
 
     #[test]

@@ -108,6 +108,11 @@ impl<F: Queued> SendQueue<F> {
         (!self.waiting.is_empty()).then(|| self.waiting.remove(0))
     }
 
+    /// Takes in their order those that `fits` takes.
+    pub fn take_fitting(&mut self, mut fits: impl FnMut(&F) -> bool) -> Vec<Waiting<F>> {
+        self.waiting.extract_if(.., |w| fits(&w.frame)).collect()
+    }
+
     /// Drops everything.
     pub fn clear(&mut self) {
         self.waiting.clear();

@@ -45,7 +45,7 @@ use journal::{Journal, JournalError};
 use radio::Radio;
 use simulator::{Hello, Joined, StreamError};
 use skein_link::medium::Channel;
-use skein_peer::protocol::airtime::OVERHEAD_BYTES;
+use skein_peer::protocol::airtime::{FRAME_BYTES, OVERHEAD_BYTES, PART_BYTES};
 use skein_peer::{Input, Peer};
 use standing::{Standing, StandingError};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -110,6 +110,8 @@ pub async fn run(mut config: NodeConfig, stop: impl Future<Output = ()>) -> Resu
     let channel = Channel {
         rate_bps: config.peer.rate_bps,
         overhead_bytes: OVERHEAD_BYTES,
+        part_bytes: PART_BYTES,
+        frame_bytes: FRAME_BYTES,
         queue_age_ms: config.queue_age_ms,
     };
     let mut radio = Radio::open(id, nonce, channel);

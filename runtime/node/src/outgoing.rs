@@ -1,14 +1,15 @@
 //! What this peer says, on its way to the transport: no faster than the channel, the
 //! urgent first, and nothing that is out of date.
 //!
-//! The rules of waiting are those of the simulated channel ([`skein_link::queue`]). A
-//! frame holds the channel as long as there, headers included; that others hold it too is
-//! left to the air.
+//! The rules of waiting are those of the simulated channel ([`skein_link::queue`]). What
+//! leaves at once shares headers as there, and holds the channel as long; that others hold
+//! it too is left to the air.
 
 use skein_link::SendQueue;
 use skein_link::medium::Channel;
 use skein_link::queue::Queued;
 use skein_peer::{Priority, Time};
+use std::collections::VecDeque;
 
 /// What a peer wants to send.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,6 +50,8 @@ pub struct Outgoing {
     channel: Channel,
     /// The last frame has left by then, microseconds.
     free_us: u64,
+    /// What shares the transmission of the frame that left last.
+    leaving: VecDeque<Frame>,
     dropped: u64,
 }
 
@@ -60,6 +63,7 @@ impl Outgoing {
             queue: SendQueue::default(),
             channel,
             free_us: 0,
+            leaving: VecDeque::new(),
             dropped: 0,
         }
     }
@@ -70,15 +74,25 @@ impl Outgoing {
         self.dropped += u64::from(pushed.dropped);
     }
 
-    /// The next frame that may leave now.
+    /// The next frame that may leave now, with what shares its transmission right after it.
     pub fn pop(&mut self, now: Time) -> Option<Frame> {
+        if let Some(frame) = self.leaving.pop_front() {
+            return Some(frame);
+        }
         let now_us = now.0.saturating_mul(1000);
         self.dropped += self.queue.expire(now_us, self.channel.queue_age_ms) as u64;
         if now_us < self.free_us {
             return None;
         }
         let frame = self.queue.pop()?.frame;
-        let airtime_us = self.channel.airtime_us(frame.bytes.len());
+        let mut n_bytes = frame.bytes.len();
+        let others = self.queue.take_fitting(|other| {
+            let joined = self.channel.joined_bytes(n_bytes, other.bytes.len());
+            n_bytes = joined.unwrap_or(n_bytes);
+            joined.is_some()
+        });
+        self.leaving.extend(others.into_iter().map(|w| w.frame));
+        let airtime_us = self.channel.airtime_us(n_bytes);
         // The clock counts whole milliseconds: of a queue that never ran empty the
         // frames follow each other without a gap.
         let begun_us = self.free_us.max(now_us.saturating_sub(999));
@@ -89,6 +103,9 @@ impl Outgoing {
     /// When the next frame may leave; none while nothing waits.
     #[must_use]
     pub fn next_due(&self) -> Option<Time> {
+        if !self.leaving.is_empty() {
+            return Some(Time(0));
+        }
         (!self.queue.is_empty()).then(|| Time(self.free_us.div_ceil(1000)))
     }
 
@@ -107,6 +124,8 @@ mod tests {
         Outgoing::new(Channel {
             rate_bps,
             overhead_bytes: 0,
+            part_bytes: 4,
+            frame_bytes: 150,
             queue_age_ms,
         })
     }
@@ -148,6 +167,22 @@ mod tests {
         let expected = [(100, "claim"), (112, "beacon"), (125, "cover")];
         assert_eq!(all, expected.map(|(t, k)| (t, k.to_owned())));
         assert_eq!((out.next_due(), out.dropped()), (None, 0));
+    }
+
+    #[test]
+    fn what_fits_into_one_transmission_leaves_at_once() {
+        let mut out = outgoing(64_000, 2_000);
+        let of = |key: &str, n_bytes: usize| Frame {
+            bytes: vec![0; n_bytes],
+            ..frame(key, Priority::Claim, 1_000)
+        };
+        for (key, n_bytes) in [("first", 100), ("long", 80), ("short", 40), ("none", 4)] {
+            out.push(Time(0), of(key, n_bytes));
+        }
+        // 144 bytes take 18 ms: what is left does not fit.
+        let all = sent(&mut out, 0, 100);
+        let expected = [(0, "first"), (0, "short"), (18, "long"), (18, "none")];
+        assert_eq!(all, expected.map(|(t, k)| (t, k.to_owned())));
     }
 
     #[test]

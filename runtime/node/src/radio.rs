@@ -359,8 +359,13 @@ impl Shared {
         self.ran_us = to_us;
         let later = self.pending.split_off(&(to_us.saturating_add(1), 0, 0));
         let mut delivered = Vec::new();
+        let mut reached_us = None;
         for ((at_us, tx, _), frame) in std::mem::replace(&mut self.pending, later) {
-            delivered.extend(self.medium.advance(at_us, &self.links));
+            // What is handed over in one instant can share a transmission.
+            if reached_us != Some(at_us) {
+                delivered.extend(self.medium.advance(at_us, &self.links));
+                reached_us = Some(at_us);
+            }
             self.medium.submit(at_us, tx, frame);
         }
         delivered.extend(self.medium.advance(to_us, &self.links));
@@ -406,7 +411,17 @@ mod tests {
     const CHANNEL: Channel = Channel {
         rate_bps: 64_000,
         overhead_bytes: 0,
+        part_bytes: 0,
+        frame_bytes: 0,
         queue_age_ms: 2_000,
+    };
+
+    /// On which a transmission carries more than one record.
+    const FRAMES: Channel = Channel {
+        overhead_bytes: 26,
+        part_bytes: 4,
+        frame_bytes: 320,
+        ..CHANNEL
     };
 
     const UP: LinkState = LinkState {
@@ -631,7 +646,7 @@ mod tests {
     fn six_nodes() -> BTreeMap<u16, Radio> {
         let hearing = Hearing::of(STATIONS.to_vec(), |tx, rx| Table.state(tx, rx).is_up());
         let node = |id: u16| {
-            let mut node = Radio::in_world(id, u32::from(id), CHANNEL, 7);
+            let mut node = Radio::in_world(id, u32::from(id), FRAMES, 7);
             let others = STATIONS.iter().filter(|tx| **tx != id);
             let news = LinkNews {
                 row: others.map(|tx| (*tx, Table.state(*tx, id))).collect(),
@@ -666,7 +681,7 @@ mod tests {
     /// late and out of order, agree on every single reception.
     #[test]
     fn nodes_see_the_channel_that_the_simulator_has() {
-        let mut one = Medium::new(&STATIONS, CHANNEL, 7);
+        let mut one = Medium::new(&STATIONS, FRAMES, 7);
         let mut nodes = six_nodes();
         let (mut expected, mut seen) = (Receptions::new(), Receptions::new());
         let mut under_way: BTreeMap<u64, Vec<(u16, Hop, Frame)>> = BTreeMap::new();

@@ -5,7 +5,7 @@
 //! | too many, malformed, out of range, an unknown kind | a report; nothing else |
 //! | a signature, where nobody signs | likewise: it would be passed on for nothing |
 //! | a beacon under this peer's own id and life with another boot nonce | a double: `life` |
-//! | anything else under its own id | an echo, or news of another life: `life` |
+//! | anything else under its own id | an echo: `relay`; or news of another life: `life` |
 //! | a beacon | `membership`, `relay`, `cooperation` |
 //! | a relayed record that is held already, or older than what is held | nothing |
 //! | any other record | `cooperation` |
@@ -26,6 +26,8 @@ pub(crate) enum Heard {
     Double(u32),
     /// This peer's own id, in a life, with a heartbeat.
     Myself(Incarnation, u32),
+    /// What was said under this peer's own id is passed on.
+    Echo(Record),
     /// A neighbour's beacon.
     Beacon(Record, Beacon),
     /// A record of another peer.
@@ -56,7 +58,7 @@ pub(crate) fn read(bytes: &[u8], me: u16, life: &Life) -> Heard {
                 Heard::Myself(record.incarnation, b.heartbeat)
             }
         }
-        _ if record.author == me => Heard::Myself(record.incarnation, 0),
+        _ if record.author == me => Heard::Echo(record),
         Body::Beacon(beacon) => Heard::Beacon(record, beacon),
         body => Heard::Record(kind, record, body),
     }

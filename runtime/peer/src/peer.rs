@@ -220,6 +220,10 @@ impl Peer {
                 self.carry_out(effects);
             }
             Heard::Myself(incarnation, heartbeat) => self.on_myself(incarnation, heartbeat, 0),
+            Heard::Echo(record) => {
+                self.relay.echo(&record);
+                self.on_myself(record.incarnation, 0, 0);
+            }
             Heard::Beacon(record, beacon) => self.on_beacon(&record, &beacon),
             Heard::Record(kind, record, body) => {
                 self.membership.hears(self.now);

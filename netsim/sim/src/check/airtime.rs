@@ -2,7 +2,7 @@
 //! in (S9), beacons included, at any number of radios.
 
 use super::{Clocks, Findings, Snapshot};
-use skein_peer::protocol::airtime::{BURST_PERIODS, OVERHEAD_BYTES, SHARE_PERCENT};
+use skein_peer::protocol::airtime::{BURST_PERIODS, Filling, SHARE_PERCENT};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Over so long a time a share is kept.
@@ -18,6 +18,7 @@ pub struct AirtimeCheck {
     rate_bps: u64,
     burst_ms: u64,
     sent: BTreeMap<u16, VecDeque<(u64, u64)>>,
+    frames: BTreeMap<u16, Filling>,
     sharers: BTreeMap<u16, VecDeque<(u64, u64)>>,
     over: Clocks<u16>,
 }
@@ -30,14 +31,16 @@ impl AirtimeCheck {
             rate_bps: u64::from(rate_bps),
             burst_ms: BURST_PERIODS * period_ms,
             sent: BTreeMap::new(),
+            frames: BTreeMap::new(),
             sharers: BTreeMap::new(),
             over: Clocks::default(),
         }
     }
 
-    /// A peer puts so many bytes on the air, its own or another's.
+    /// A peer puts so many bytes on the air, its own or another's. What it puts there in
+    /// one instant shares headers.
     pub fn on_transmission(&mut self, now_ms: u64, id: u16, bytes: usize) {
-        let cost = (bytes + OVERHEAD_BYTES) as u64;
+        let cost = self.frames.entry(id).or_default().add(now_ms, bytes) as u64;
         self.sent.entry(id).or_default().push_back((now_ms, cost));
     }
 
@@ -97,6 +100,7 @@ impl AirtimeCheck {
 mod tests {
     use super::super::testing::{Story, speaking};
     use super::*;
+    use skein_peer::protocol::airtime::OVERHEAD_BYTES;
 
     #[test]
     fn a_peer_that_sends_more_than_its_share_is_found_at_any_number() {

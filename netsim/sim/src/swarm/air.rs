@@ -11,7 +11,7 @@ use crate::world::{Fact, Judge, World};
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::CellId;
 use skein_link::medium::Links;
-use skein_peer::protocol::airtime::OVERHEAD_BYTES;
+use skein_peer::protocol::airtime::{FRAME_BYTES, OVERHEAD_BYTES, PART_BYTES};
 use std::sync::Arc;
 
 /// World, links and channel of one run.
@@ -40,6 +40,8 @@ impl Air {
                 Channel {
                     rate_bps: radio.rate_bps,
                     overhead_bytes: OVERHEAD_BYTES,
+                    part_bytes: PART_BYTES,
+                    frame_bytes: FRAME_BYTES,
                     queue_age_ms: radio.queue_age_ms,
                 },
                 radio_seed,

@@ -43,7 +43,6 @@ use skein_geometry::frame::Pose;
 use skein_link::medium::key_hash;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
-use skein_peer::protocol::airtime::OVERHEAD_BYTES;
 use skein_peer::wire;
 use skein_peer::{
     Beliefs, Command, Incarnation, Input, Mission, Output, Peer, PeerConfig, PeerId, Report, Role,
@@ -569,7 +568,8 @@ impl Swarm {
                 let hash = bytes_hash(&bytes);
                 self.history.fold(self.now_ms, id, Kind::Publish, hash);
                 self.checker.on_transmission(self.now_ms, id, bytes.len());
-                self.count_bytes(&key, bytes.len());
+                let cost = self.peers[idx].frame.add(self.now_ms, bytes.len());
+                self.count_bytes(&key, cost as u64);
                 if hops == 0 {
                     self.said(idx, peer, &bytes, hash);
                     self.last_said.clone_from(&bytes);
@@ -629,9 +629,8 @@ impl Swarm {
         }
     }
 
-    fn count_bytes(&mut self, key: &str, bytes: usize) {
+    fn count_bytes(&mut self, key: &str, bytes: u64) {
         let kind = key.split('/').nth(2).unwrap_or_default();
-        let bytes = (bytes + OVERHEAD_BYTES) as u64;
         match self.bytes_by_kind.get_mut(kind) {
             Some(sum) => *sum += bytes,
             None => drop(self.bytes_by_kind.insert(kind.to_owned(), bytes)),

@@ -2,6 +2,7 @@
 
 use super::stream::{Concern, Stream};
 use crate::disk::Disk;
+use skein_peer::protocol::airtime::Filling;
 use skein_peer::{Input, Peer, PeerConfig, Time};
 use std::collections::VecDeque;
 
@@ -98,6 +99,8 @@ pub struct SimPeer {
     pub inbox: VecDeque<(u64, Input)>,
     /// For when the earliest timer event in the queue is, scenario time.
     pub timer_ms: Option<u64>,
+    /// What it handed to its radio last.
+    pub frame: Filling,
     /// Whether it held that the mission is finished when last judged.
     pub finished: bool,
     clock_draws: Stream,
@@ -123,6 +126,7 @@ impl SimPeer {
             disk: Disk::new(Stream::new(seed, Concern::Disk(id))),
             inbox: VecDeque::new(),
             timer_ms: None,
+            frame: Filling::default(),
             finished: false,
             clock_draws,
             nonce: Stream::new(seed, Concern::Nonce(id)),

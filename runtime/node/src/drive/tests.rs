@@ -258,6 +258,8 @@ impl Running {
                 Channel {
                     rate_bps: 800,
                     overhead_bytes: 0,
+                    part_bytes: 0,
+                    frame_bytes: 0,
                     queue_age_ms: 60_000,
                 },
             ),

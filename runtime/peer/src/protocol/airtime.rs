@@ -5,6 +5,7 @@
 //! |---|---|
 //! | a beacon is heard | its author shares the channel for ten of its intervals; so do as many as it says that it shares with |
 //! | a record is sent | it is paid for; one that is larger than the bucket goes when the bucket is full, and the rest is owed |
+//! | another follows in the same instant | it shares the headers of the first while one transmission holds both |
 //! | a beacon is sent | it is paid for, if need be later: what is owed makes everything else wait |
 //! | a suspicion is answered | it is paid from a reserve, and from the share when the reserve is empty |
 //! | a full beacon is due | its interval is the shortest in which half of the share carries it, 16 T at most |
@@ -24,8 +25,45 @@ use std::collections::BTreeMap;
 /// is collisions.
 pub const SHARE_PERCENT: u64 = 45;
 
-/// Bytes that Zenoh, the attachment and the radio add to a record.
+/// Bytes that Zenoh, the attachment and the radio add to a transmission.
 pub const OVERHEAD_BYTES: usize = 26;
+
+/// Bytes that a further record in the same transmission adds: its length and hops.
+pub const PART_BYTES: usize = 4;
+
+/// A transmission takes further records up to so many bytes, 40 ms of a 64 kbit/s channel
+/// like a piece of a mission: in a longer one somebody hidden sends nearly always.
+pub const FRAME_BYTES: usize = 320;
+
+/// What a peer hands to its radio in one instant, in transmissions.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Filling {
+    at: u64,
+    filled: usize,
+}
+
+impl Filling {
+    /// What one more record costs, headers included, when it is handed over now.
+    #[must_use]
+    pub fn cost_bytes(&self, now_ms: u64, bytes: usize) -> usize {
+        let joined = self.filled.saturating_add(PART_BYTES).saturating_add(bytes);
+        let joins = self.filled > 0 && self.at == now_ms && joined <= FRAME_BYTES;
+        bytes.saturating_add(if joins { PART_BYTES } else { OVERHEAD_BYTES })
+    }
+
+    /// A record is handed over. Returns what it costs, headers included.
+    pub fn add(&mut self, now_ms: u64, bytes: usize) -> usize {
+        let cost = self.cost_bytes(now_ms, bytes);
+        let joins = cost < bytes.saturating_add(OVERHEAD_BYTES);
+        self.filled = if joins {
+            self.filled.saturating_add(cost)
+        } else {
+            bytes
+        };
+        self.at = now_ms;
+        cost
+    }
+}
 
 /// A bucket holds the share of so many periods: what a round asks of a peer at once.
 pub const BURST_PERIODS: u64 = 3;
@@ -81,6 +119,7 @@ pub struct Airtime {
     tokens_millibytes: i64,
     reserve_millibytes: i64,
     filled: Time,
+    frame: Filling,
     interval: u8,
     /// Full beacons planned so far, as far as it matters.
     planned: u8,
@@ -97,6 +136,7 @@ impl Airtime {
             tokens_millibytes: 0,
             reserve_millibytes: full_reserve(),
             filled: Time(0),
+            frame: Filling::default(),
             interval: INTERVAL_LEAST,
             planned: 0,
         }
@@ -189,45 +229,55 @@ impl Airtime {
         self.filled = now;
     }
 
-    /// Pays for a transmission that cannot wait. What is lacking is owed.
+    /// Pays for a record that cannot wait. What is lacking is owed.
     pub fn charge(&mut self, now: Time, bytes: usize) {
         self.refill(now);
-        self.tokens_millibytes = self.tokens_millibytes.saturating_sub(cost(bytes));
+        let cost = millibytes(self.frame.add(now.0, bytes));
+        self.tokens_millibytes = self.tokens_millibytes.saturating_sub(cost);
     }
 
     /// Pays for an answer to a suspicion.
     pub fn charge_answer(&mut self, now: Time, bytes: usize) {
         self.refill(now);
-        let reserved = self.reserve_millibytes.min(cost(bytes));
+        let cost = millibytes(self.frame.add(now.0, bytes));
+        let reserved = self.reserve_millibytes.min(cost);
         self.reserve_millibytes -= reserved;
-        self.tokens_millibytes = self
-            .tokens_millibytes
-            .saturating_sub(cost(bytes) - reserved);
+        self.tokens_millibytes = self.tokens_millibytes.saturating_sub(cost - reserved);
     }
 
-    /// Pays for a transmission if it may go now.
+    /// Pays for a record if it may go now.
     pub fn pay(&mut self, now: Time, bytes: usize) -> bool {
         self.refill(now);
-        let goes = self.tokens_millibytes >= self.asked(bytes);
+        let goes = self.tokens_millibytes >= self.asked(now, bytes);
         if goes {
-            self.tokens_millibytes -= cost(bytes);
+            let cost = millibytes(self.frame.add(now.0, bytes));
+            self.tokens_millibytes -= cost;
         }
         goes
     }
 
-    /// How long a transmission has to wait yet, milliseconds, at least one.
+    /// Whether a record would share the transmission of what was just sent.
+    #[must_use]
+    pub fn joins(&self, now: Time, bytes: usize) -> bool {
+        self.frame.cost_bytes(now.0, bytes) < bytes.saturating_add(OVERHEAD_BYTES)
+    }
+
+    /// How long a record has to wait yet, milliseconds, at least one.
     #[must_use]
     pub fn wait_ms(&self, now: Time, bytes: usize) -> u64 {
         let rate = self.rate_bytes_ps();
-        let lacking = self.asked(bytes).saturating_sub(self.tokens_millibytes);
+        let later = now.plus_ms(1);
+        let lacking = self
+            .asked(later, bytes)
+            .saturating_sub(self.tokens_millibytes);
         let lacking = u64::try_from(lacking).unwrap_or(0);
         let passed_ms = now.since_ms(self.filled);
         lacking.div_ceil(rate).saturating_sub(passed_ms).max(1)
     }
 
-    /// What the bucket must hold for a transmission: its cost, or all that it can hold.
-    fn asked(&self, bytes: usize) -> i64 {
-        cost(bytes).min(self.depth_millibytes())
+    /// What the bucket must hold for a record: its cost, or all that it can hold.
+    fn asked(&self, now: Time, bytes: usize) -> i64 {
+        millibytes(self.frame.cost_bytes(now.0, bytes)).min(self.depth_millibytes())
     }
 
     /// How many neighbours are counted, and the cap.
@@ -243,12 +293,8 @@ pub fn ms_of(interval: u8, period_ms: u64) -> u64 {
     u64::from(interval.clamp(INTERVAL_LEAST, INTERVAL_MOST)) * period_ms / 4
 }
 
-fn cost(bytes: usize) -> i64 {
-    millibytes(bytes.saturating_add(OVERHEAD_BYTES))
-}
-
 fn full_reserve() -> i64 {
-    RESERVE_BEACONS * cost(BARE_BYTES)
+    RESERVE_BEACONS * millibytes(BARE_BYTES + OVERHEAD_BYTES)
 }
 
 fn millibytes(bytes: usize) -> i64 {
@@ -369,11 +415,30 @@ mod tests {
     fn answers_to_a_suspicion_have_a_reserve_of_their_own() {
         let mut air = air(64_000, 8);
         air.refill(Time(3000));
-        for _ in 0..RESERVE_BEACONS {
-            air.charge_answer(Time(3000), BARE_BYTES);
+        // The bucket is full, and stays so.
+        for t in 0..RESERVE_BEACONS.unsigned_abs() {
+            air.charge_answer(Time(3000 + t), BARE_BYTES);
         }
         assert_eq!(air.tokens_millibytes, 1_200_000);
-        air.charge_answer(Time(3000), BARE_BYTES);
-        assert_eq!(air.tokens_millibytes, 1_200_000 - cost(BARE_BYTES));
+        air.charge_answer(Time(3000 + 16), BARE_BYTES);
+        assert!(air.tokens_millibytes < 1_200_000);
+    }
+
+    #[test]
+    fn what_goes_in_one_instant_shares_its_headers() {
+        let mut air = air(64_000, 8);
+        air.refill(Time(3_000));
+        let spent = |air: &Airtime| (1_200_000 - air.tokens_millibytes) / 1000;
+        air.charge(Time(3_000), 58);
+        assert_eq!(spent(&air), 84);
+        assert!(air.joins(Time(3_000), 100) && !air.joins(Time(3_001), 100));
+        assert!(air.pay(Time(3_000), 100));
+        assert_eq!(spent(&air), 84 + 104);
+        // A frame ends at 320 bytes: the next one has headers of its own.
+        assert!(!air.joins(Time(3_000), 160));
+        assert!(air.pay(Time(3_000), 160));
+        assert_eq!(spent(&air), 84 + 104 + 186);
+        assert!(air.pay(Time(3_000), 156));
+        assert_eq!(spent(&air), 84 + 104 + 186 + 160);
     }
 }

@@ -14,7 +14,9 @@
 //! | any of an author | a later life of the author is heard | void: neither held nor sent |
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
 //! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
+//! | this peer's own bid, claim or order | it was sent, and nobody is heard passing it on | sent again, twice at most |
 //! | waiting | the share allows it, it is this peer's own bid, claim or cover, or nothing is due earlier | sent |
+//! | waiting for its random time | something is sent, one transmission holds both, and more than twelve share the channel | sent with it |
 //! | waiting | its lifetime is over, or the queue is full of what is more urgent | not sent |
 //!
 //! Everything a peer sends is paid for from its share of the channel, [`Airtime`]. Newer values replace older ones of the same key in the queue.
@@ -60,6 +62,16 @@ const REPAIR_SPREAD_MS: u64 = 40;
 /// A round is opened by one bid that all the others answer: each waits a random time
 /// up to this long for each who shares the channel, milliseconds.
 const BID_SPREAD_MS: u64 = 25;
+
+/// This peer's own bid, claim or order is sent again so often while nobody is heard passing
+/// it on: what hidden stations spoil would else wait for a beacon that shows the lack.
+const REPEATS: u8 = 2;
+
+/// Neighbours pass a record on within the time of one relay, and their own transmissions.
+const REPEAT_DELAYS: u64 = 2;
+
+/// Where more than so many share the channel, headers are dearer than random times.
+const CROWD: u64 = 12;
 
 /// Even in small swarms the random times are those of so many.
 const LEAST_SPREAD: u64 = 8;
@@ -108,6 +120,8 @@ struct Held {
     bytes: Vec<u8>,
     hops: u8,
     copies: u8,
+    /// How often this peer's own record may be sent again yet.
+    repeats: u8,
     /// When somebody, this peer included, was last heard sending this version.
     sent: Time,
 }
@@ -162,6 +176,7 @@ impl Relay {
         let Some(kind) = Kind::of_number(record.kind) else {
             return;
         };
+        let vital = kind.priority() <= Priority::Claim;
         self.hold(
             key,
             Held {
@@ -169,6 +184,7 @@ impl Relay {
                 bytes,
                 hops: 0,
                 copies: 0,
+                repeats: if vital { REPEATS } else { 0 },
                 sent: now,
             },
         );
@@ -213,6 +229,7 @@ impl Relay {
             bytes: bytes.to_vec(),
             hops,
             copies: 1,
+            repeats: 0,
             sent: now,
         };
         self.hold(key, held);
@@ -222,6 +239,20 @@ impl Relay {
             self.wait(now, key, kind, delay);
         }
         Offer::New
+    }
+
+    /// This peer's own record is heard: a neighbour passes it on, so it was received.
+    pub fn echo(&mut self, record: &Record) {
+        let key = key_of(record);
+        let version = (record.incarnation, record.seq);
+        if let Some(held) = self.held.get_mut(&key)
+            && (held.record.incarnation, held.record.seq) == version
+            && held.copies > 0
+        {
+            held.copies = held.copies.saturating_add(1);
+            held.repeats = 0;
+            self.queue.remove(&key);
+        }
     }
 
     fn newest_life(&self, author: u16) -> Incarnation {
@@ -444,20 +475,40 @@ impl Relay {
         self.queue.remove(&key);
         held.sent = now;
         held.copies = held.copies.saturating_add(1);
-        Some(Out {
+        let out = Out {
             key: key::key(&self.fleet, kind, key.2, key.0),
             bytes: held.bytes.clone(),
             hops: held.hops,
             priority,
             lifetime_ms,
-        })
+        };
+        if held.repeats > 0 && self.air.counted() > 1 {
+            held.repeats -= 1;
+            let version = (
+                held.record.incarnation,
+                u32::try_from(now.0 & 0xffff_ffff).unwrap_or(0),
+            );
+            let spread_ms = self.spread_ms(RELAY_SPREAD_MS);
+            let delay_ms = REPEAT_DELAYS * spread_ms + self.jitter(&key, version) % spread_ms;
+            self.wait(now, key, kind, delay_ms);
+        }
+        Some(out)
     }
 
+    /// What goes next: it is its turn, or it can share the headers of what goes now.
     fn first(&self, now: Time) -> Option<(RecordKey, Priority)> {
+        let crowded = self.air.sharers() > CROWD;
+        let rides = |k: &RecordKey| {
+            let held = self.held.get(k).filter(|_| crowded);
+            held.is_some_and(|h| self.air.joins(now, h.bytes.len()))
+        };
         self.queue
             .iter()
-            .filter(|(_, w)| w.from <= now)
-            .min_by_key(|(k, w)| (!self.is_its_own_to_say(k, w.priority), w.due, **k))
+            .filter(|(k, w)| w.from <= now || rides(k))
+            .min_by_key(|(k, w)| {
+                let own = self.is_its_own_to_say(k, w.priority);
+                (w.from > now, !own, w.due, **k)
+            })
             .map(|(k, w)| (*k, w.priority))
     }
 
@@ -487,7 +538,8 @@ impl Relay {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::protocol::airtime::OVERHEAD_BYTES;
+    use crate::protocol::airtime::Filling;
+    use crate::wire::samples;
 
     fn record(author: u16, seq: u32) -> Record {
         Record {
@@ -551,15 +603,73 @@ mod tests {
     #[test]
     fn the_bucket_bounds_what_is_sent() {
         let mut r = relay(2);
-        let mut bytes = 0;
+        let (mut bytes, mut frame) = (0, Filling::default());
         for t in 0..10_000u64 {
             r.own(Time(t), &record(2, u32::try_from(t).unwrap()), vec![0; 200]);
             while let Some(out) = r.poll(Time(t)) {
-                bytes += out.bytes.len() + OVERHEAD_BYTES;
+                bytes += frame.add(t, out.bytes.len());
             }
         }
         assert!(bytes <= 64_000 / 8 * 10, "{bytes}");
         assert!(bytes >= 64_000 / 8 * 10 * 4 / 10, "{bytes}");
+    }
+
+    #[test]
+    fn what_waits_for_its_random_time_goes_with_what_is_sent_meanwhile() {
+        let together = |sharers: u16| {
+            let mut r = relay(2);
+            let crowd = Beacon {
+                sharers,
+                ..samples::beacon(1)
+            };
+            r.air.hear(Time(5_000), 9, &crowd);
+            for author in [1, 3, 4, 5] {
+                r.offer(Time(5_000), &record(author, 1), &[1; 100], 0);
+            }
+            let due = r.next_timeout(Time(5_000)).unwrap();
+            let sent = std::iter::from_fn(|| r.poll(due)).count();
+            assert!(r.next_timeout(due).unwrap() > due);
+            sent
+        };
+        // Three are 308 bytes; the fourth waits for its own time.
+        assert_eq!(together(13), 3);
+        assert_eq!(together(12), 1, "each waits for its own time");
+    }
+
+    #[test]
+    fn an_own_claim_that_nobody_passes_on_is_sent_again_twice() {
+        let claim = |seq: u32| Record {
+            kind: Kind::Claim.number(),
+            ..record(2, seq)
+        };
+        let sent = |r: &mut Relay, from: u64, echo: Option<&Record>| {
+            let mut sent = Vec::new();
+            for t in from..from + 5_000 {
+                while r.poll(Time(t)).is_some() {
+                    sent.push(t - from);
+                    echo.iter().for_each(|e| r.echo(e));
+                }
+            }
+            sent
+        };
+        let mut r = relay(2);
+        r.own(Time(5_000), &claim(1), vec![1; 60]);
+        assert_eq!(sent(&mut r, 5_000, None), [0], "nobody is there to hear it");
+        r.air.hear(Time(10_000), 1, &samples::beacon(1));
+        r.own(Time(10_000), &claim(2), vec![1; 60]);
+        let times = sent(&mut r, 10_000, None);
+        assert_eq!((times.len(), times[0]), (3, 0), "{times:?}");
+        assert!((480..720).contains(&times[1]), "{times:?}");
+        r.air.hear(Time(15_000), 1, &samples::beacon(2));
+        r.own(Time(15_000), &claim(3), vec![1; 60]);
+        assert_eq!(
+            sent(&mut r, 15_000, Some(&claim(2))).len(),
+            3,
+            "an older one"
+        );
+        r.air.hear(Time(20_000), 1, &samples::beacon(3));
+        r.own(Time(20_000), &claim(4), vec![1; 60]);
+        assert_eq!(sent(&mut r, 20_000, Some(&claim(4))), [0]);
     }
 
     #[test]

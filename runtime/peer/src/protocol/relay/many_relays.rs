@@ -1,7 +1,7 @@
 //! Many relays on a lossy channel: eventual delivery, suppression, bytes, partitions.
 
 use crate::input::Time;
-use crate::protocol::airtime::OVERHEAD_BYTES;
+use crate::protocol::airtime::Filling;
 use crate::protocol::membership::Membership;
 use crate::protocol::membership::many_detectors::Dice;
 use crate::protocol::relay::{Offer, Relay};
@@ -26,6 +26,7 @@ struct Node {
     next_beacon: u64,
     sent: usize,
     bytes: usize,
+    frame: Filling,
 }
 
 struct Net {
@@ -53,6 +54,7 @@ impl Net {
                 next_beacon: dice.below(T_MS),
                 sent: 0,
                 bytes: 0,
+                frame: Filling::default(),
             })
             .collect();
         Self {
@@ -93,7 +95,8 @@ impl Net {
                 }
                 while let Some(out) = self.nodes[i].relay.poll(Time(self.now)) {
                     self.nodes[i].sent += 1;
-                    self.nodes[i].bytes += out.bytes.len() + OVERHEAD_BYTES;
+                    let cost = self.nodes[i].frame.add(self.now, out.bytes.len());
+                    self.nodes[i].bytes += cost;
                     let record = codec::decode_record(&out.bytes).unwrap();
                     for j in 0..self.nodes.len() {
                         if self.hears(i, j, &links) && record.author != id(j) {
@@ -138,7 +141,7 @@ impl Net {
         };
         let bytes = codec::encode_body(&Body::Beacon(said.clone())).len();
         node.relay.air.charge(now, ENVELOPE_BYTES + bytes);
-        node.bytes += ENVELOPE_BYTES + bytes + OVERHEAD_BYTES;
+        node.bytes += node.frame.add(self.now, ENVELOPE_BYTES + bytes);
         for j in 0..self.nodes.len() {
             if self.hears(i, j, links) {
                 self.nodes[j].membership.on_beacon(now, id(i), 1, &said);
