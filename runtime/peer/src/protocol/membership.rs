@@ -304,6 +304,14 @@ impl Membership {
             known.merge_same(now, heard, interval_ms, urgent_until, changes);
             return false;
         }
+        let mut heard = heard;
+        if known.freshest.age.ms(now) < heard.age.ms(now) {
+            // It was sent after the one that is known: who says that it is older had a
+            // clock that jumped.
+            heard.age = known.freshest.age;
+        } else {
+            known.excused_ms = 0;
+        }
         let new_life = heard.incarnation > known.freshest.incarnation;
         if new_life {
             known.info = Info::default();
@@ -313,7 +321,6 @@ impl Membership {
             known.info.steady_since = now;
         }
         known.freshest = heard;
-        known.excused_ms = 0;
         if new_life
             || known
                 .higher_count_heard

@@ -219,6 +219,23 @@ fn who_is_already_condemned_is_not_met_as_alive() {
     );
 }
 
+/// Whoever tells of a heartbeat with a clock that jumped meanwhile makes it too old.
+#[test]
+fn a_later_heartbeat_is_no_older_than_an_earlier_one() {
+    let mut m = Membership::new(1, 1000);
+    m.on_beacon(Time(10_000), 2, 1, &beacon(5, Vec::new()));
+    m.on_beacon(Time(10_000), 3, 1, &beacon(5, Vec::new()));
+    let told = beacon(6, vec![entry(2, 6, 105, None)]);
+    let changes = m.on_beacon(Time(12_000), 3, 1, &told);
+    assert!(changes.is_empty(), "{changes:?}");
+    assert!(m.tick(Time(12_100)).is_empty());
+    assert_eq!(m.status(2), Some((1, Status::Alive)));
+    // It is as young as is known for sure: two seconds.
+    let entries = m.gossip(Time(12_100), 9);
+    let of_2 = entries.iter().find(|g| g.id == 2).unwrap();
+    assert_eq!((of_2.heartbeat, of_2.age_ds), (6, 21));
+}
+
 #[test]
 fn a_later_life_counts_as_a_restart() {
     let mut m = Membership::new(1, 1000);
