@@ -110,8 +110,10 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-survey",
             "skein-lab",
             "skein-interop",
+            "skein-netsim",
+            "skein-scenario",
         ],
-        &["tokio", "zenoh", "skein-netsim"],
+        &["tokio", "zenoh", "skein-node", "skein-broker"],
     ),
     (
         "skein-node",

@@ -512,6 +512,26 @@ const WRONG: &[(&str, &str, &str)] = &[
         "fleet.launch: expected \"spread\"",
     ),
     (
+        "    launch: \"base\",",
+        "    launch: [],",
+        "fleet.launch: the list is empty; name at least one place",
+    ),
+    (
+        "    launch: \"base\",",
+        "    launch: [{ east_m: 1, north: 2 }],",
+        "fleet.launch[0].north: unknown field; did you mean north_m?",
+    ),
+    (
+        "    launch: \"base\",",
+        "    launch: [{ east_m: 528, north_m: 480 }, { east_m: 360, north_m: 300 }],",
+        "fleet.launch[1]: this launch point",
+    ),
+    (
+        "    count: 8,\n    airframes: [\"swift\", \"scout\"],\n    launch: \"base\",",
+        "    count: 1, airframes: [\"swift\"], launch: [{ east_m: 528, north_m: 480 }, { east_m: 528, north_m: 580 }],",
+        "fleet.launch: 1 UAVs cannot take off at 2 places",
+    ),
+    (
         "east_m: 480, north_m: 420, height_m: 2.5 },",
         "east_m: 480, height_m: 2.5 },",
         "ground: the field ground.north_m is missing",
@@ -632,6 +652,65 @@ fn listed_uavs_are_checked_one_by_one() {
             e.contains(want),
             "{uavs}\n  says     {e}\n  expected {want}"
         );
+    }
+}
+
+/// Each place has an even part of the fleet, which takes off there one after the other.
+#[test]
+fn a_fleet_takes_off_at_several_places() {
+    let places = [(528.0, 480.0), (24.0, 24.0), (528.0, 900.0)];
+    let list = places.map(|(e, n)| format!("{{ east_m: {e}, north_m: {n} }}"));
+    let text = helsinki().replacen(
+        "    launch: \"base\",",
+        &format!("    launch: [{}], takeoff_interval_s: 4,", list.join(", ")),
+        1,
+    );
+    let over = |launch| Overrides {
+        launch,
+        ..Overrides::default()
+    };
+    let parsed = |launch| {
+        let over = over(launch);
+        parse_with("l.json5", &text, &builtin_files(), &over).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let begins: Vec<(f64, f64, u32)> = parsed(None)
+        .spec
+        .uavs
+        .iter()
+        .map(|u| (u.launch.east_m, u.launch.north_m, u.takeoff_ms))
+        .collect();
+    let (a, b, c) = (places[0], places[1], places[2]);
+    let expected = [
+        (a, 0),
+        (a, 4_000),
+        (a, 8_000),
+        (b, 0),
+        (b, 4_000),
+        (b, 8_000),
+        (c, 0),
+        (c, 4_000),
+    ];
+    assert_eq!(begins, expected.map(|((e, n), t)| (e, n, t)));
+    // The command line may ask for another way.
+    let at_base = parsed(Some(skein_scenario::Launch::Base)).spec.uavs;
+    assert_eq!(
+        (at_base[7].takeoff_ms, at_base[7].launch.north_m),
+        (28_000, 480.0)
+    );
+}
+
+#[test]
+fn swarm_20_is_what_it_says() {
+    let scenario = load_builtin("swarm_20", &Overrides::default()).unwrap();
+    let spec = &scenario.spec;
+    assert_eq!((spec.uavs.len(), spec.radio.rate_bps), (20, 64_000));
+    assert_eq!(skein_netsim::fault_generator::kills(&spec.faults), 5);
+    let total = skein_scenario::summary(spec, &scenario.geometry);
+    assert!(total.area_m2 > 1.7e6, "{}", total.area_m2);
+    let at = |place: usize| spec.uavs.iter().skip(10 * place).take(10);
+    for (place, north_m) in [(0, -120.0), (1, 1440.0)] {
+        assert!(at(place).all(|u| (u.launch.north_m - north_m).abs() < 1e-9));
+        assert_eq!(at(place).map(|u| u.takeoff_ms).max(), Some(27_000));
     }
 }
 

@@ -1,5 +1,5 @@
-//! Measurements of the planners: one planner, one set of instances, one JSON object with
-//! errors and times.
+//! Measurements: of the planners, one planner, one set of instances, one JSON object with
+//! errors and times; and of whole swarms.
 //!
 //! Rival libraries run in the same process under the feature `rivals`. Uses every other
 //! crate; nothing uses it.
@@ -13,6 +13,7 @@
 //! | [`route`], [`route_polygons`], [`route_clearance`], [`route_graph`], [`route_maps`] | shortest paths and routes |
 //! | [`mod@line`] | tours along roads |
 //! | [`navmesh`] | public instances of shortest-path problems |
+//! | [`sim`] | swarms in virtual time |
 //! | [`measure`] | distances measured again, for checks |
 //! | [`figures`] | times and errors |
 //!
@@ -39,6 +40,7 @@ pub mod route_clearance;
 pub mod route_graph;
 pub mod route_maps;
 pub mod route_polygons;
+pub mod sim;
 pub mod wind;
 
 use clap::{Args, Subcommand};
@@ -46,12 +48,12 @@ use clap::{Args, Subcommand};
 /// What to measure.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
-    /// The planner to measure.
+    /// The planner or driver to measure.
     #[command(subcommand)]
     pub subject: Subject,
 }
 
-/// The planners.
+/// Planners, and drivers of swarms.
 #[derive(Debug, Subcommand)]
 pub enum Subject {
     /// Coverage plans for a team on public grid maps.
@@ -74,6 +76,8 @@ pub enum Subject {
     Route(route::RouteArgs),
     /// Tours of a team along all roads of a network.
     Line(line::LineArgs),
+    /// A swarm in virtual time: how fast, and what keeps the computer busy.
+    Sim(sim::SimArgs),
 }
 
 /// Measures, and returns the JSON text to print.
@@ -92,5 +96,6 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
         Subject::Clearance(args) => route_clearance::run(args),
         Subject::Route(args) => route::run(args),
         Subject::Line(args) => line::run(args),
+        Subject::Sim(args) => sim::run(args),
     }
 }

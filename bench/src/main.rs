@@ -1,10 +1,10 @@
-//! `skein-bench`: measures a planner and prints one JSON object.
+//! `skein-bench`: measures a planner or a swarm and prints one JSON object.
 
 use clap::Parser;
 use skein_bench::BenchArgs;
 use std::process::ExitCode;
 
-/// Measurements of the planners.
+/// Measurements of planners and swarms.
 #[derive(Debug, Parser)]
 #[command(version, max_term_width = 100)]
 struct Cli {

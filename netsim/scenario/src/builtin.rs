@@ -45,6 +45,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         "roads.json5",
         include_str!("../../../configs/trials/roads.json5"),
     ),
+    (
+        "swarm_20",
+        "swarm_20.json5",
+        include_str!("../../../configs/trials/swarm_20.json5"),
+    ),
 ];
 
 /// Files that the built-in scenarios name.

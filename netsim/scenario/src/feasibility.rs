@@ -10,6 +10,7 @@ use skein_flight::coverage::ring::{CellId, CoverageLoop, Direction, Grid, LoopEr
 use skein_geometry::Polygon;
 use skein_geometry::frame::Point;
 use skein_netsim::fault::Fault;
+use skein_netsim::fault_generator::kills;
 use skein_netsim::spec::{Spec, UavSpec};
 use skein_peer::mission::GeometryError;
 use skein_peer::offload::MissionGeometry;
@@ -170,6 +171,13 @@ fn faults(spec: &Spec, out: &mut Vec<Finding>) {
     }
 }
 
+/// How many UAVs are left when as many are lost as the scenario or its storm may take.
+fn survivors(spec: &Spec) -> usize {
+    let killed = usize::try_from(kills(&spec.faults)).unwrap_or(usize::MAX);
+    let losses = killed.max(usize::from(spec.storm.max_kills));
+    spec.uavs.len().saturating_sub(losses).max(1)
+}
+
 fn on_loop(spec: &Spec, geometry: &MissionGeometry, summary: &Summary, out: &mut Vec<Finding>) {
     if summary.coverable_share < spec.min_coverable {
         let text = format!(
@@ -196,14 +204,17 @@ fn on_loop(spec: &Spec, geometry: &MissionGeometry, summary: &Summary, out: &mut
         );
         out.push(Finding::new(Severity::Error, "airframes", text));
     }
-    let weakest = spec
-        .uavs
-        .iter()
-        .map(|u| reach_m(u) / summary.loop_m)
-        .fold(f64::INFINITY, f64::min);
-    if weakest < COMFORTABLE_LOOPS {
+    let mut weakest_m: Vec<f64> = spec.uavs.iter().map(reach_m).collect();
+    weakest_m.sort_by(f64::total_cmp);
+    let n_left = survivors(spec);
+    let loops = weakest_m.iter().take(n_left).sum::<f64>() / summary.loop_m;
+    if loops < COMFORTABLE_LOOPS {
+        let who = match n_left {
+            1 => "the weakest UAV flies".to_owned(),
+            n => format!("the weakest {n} UAVs together fly"),
+        };
         let text = format!(
-            "the weakest UAV flies {weakest:.1} times the loop; with less than {COMFORTABLE_LOOPS} the last survivor may be unable to finish"
+            "{who} {loops:.1} times the loop; with less than {COMFORTABLE_LOOPS} those who are left after the losses of the storm may be unable to finish"
         );
         out.push(Finding::new(Severity::Warning, "airframes", text));
     }

@@ -149,9 +149,8 @@ fn check_places(s: &Stated, mission: &Mission) -> Result<(), Error> {
         if let Some(launch) = uav.launch
             && let Some(problem) = trouble(launch.position())
         {
-            let field = format!("{}.launch", uav.field);
             let problem = format!("this launch point {problem}");
-            return Err(s.places.wrong(&field, problem));
+            return Err(s.places.wrong(&uav.field, problem));
         }
     }
     if let Some(problem) = trouble(mission.base_m()) {

@@ -59,11 +59,13 @@ impl CellSet {
     /// All cells of a loop of `n` cells.
     #[must_use]
     pub fn full(n: u16) -> Self {
-        let mut set = Self::new(n);
-        for cell in 0..n {
-            set.insert(cell);
+        let mut words = vec![u64::MAX; usize::from(n).div_ceil(64)];
+        if let Some(last) = words.last_mut()
+            && !n.is_multiple_of(64)
+        {
+            *last = (1 << (n % 64)) - 1;
         }
-        set
+        Self { n, words }
     }
 
     /// The set of these cells; those beyond the loop are left out.

@@ -21,13 +21,14 @@ const TAKEOFF_INTERVAL_S: f64 = 2.0;
 /// One UAV, perhaps without its launch pose yet.
 #[derive(Clone, Debug)]
 pub(crate) struct Member {
-    /// Where the file states it, such as `fleet.uavs[2]`.
+    /// Where the file states where it begins, such as `fleet.uavs[2].launch`.
     pub(crate) field: String,
     pub(crate) id: u16,
     pub(crate) airframe: Airframe,
     /// `None` when spread round the loop, or at the base.
     pub(crate) launch: Option<Pose>,
-    /// When it takes off at the base, milliseconds, if it does.
+    /// When it takes off at its place, or at the base where it has none, milliseconds, if
+    /// it does.
     pub(crate) takeoff_ms: Option<u32>,
     pub(crate) height_m: f64,
 }
@@ -122,16 +123,53 @@ pub(crate) fn read(
     Ok(Fleet { key, members })
 }
 
-/// The time between two take-offs at the base, milliseconds; `None` where UAVs begin spread
-/// round the loop.
-fn takeoffs(f: &Fields<'_>, over: Option<Launch>) -> Result<Option<u32>, Error> {
-    let in_file = match f.get("launch") {
-        None => Launch::Base,
-        Some(node) => node
-            .text()?
-            .parse()
-            .map_err(|e| node.wrong(format!("{e}; for chosen places list the uavs")))?,
+/// How a generated fleet gets into the air.
+enum Takeoffs {
+    /// It is there, evenly round the loop.
+    Spread,
+    /// One after the other at the base.
+    Base,
+    /// Likewise at several places, a part of the fleet at each.
+    Places(Vec<(String, Pose)>),
+}
+
+impl From<Launch> for Takeoffs {
+    fn from(launch: Launch) -> Self {
+        match launch {
+            Launch::Spread => Self::Spread,
+            Launch::Base => Self::Base,
+        }
+    }
+}
+
+fn takeoffs(f: &Fields<'_>, over: Option<Launch>) -> Result<Takeoffs, Error> {
+    let node = match (over, f.get("launch")) {
+        (Some(asked), _) => return Ok(asked.into()),
+        (None, None) => return Ok(Takeoffs::Base),
+        (None, Some(node)) => node,
     };
+    if let Ok(items) = node.items() {
+        if items.is_empty() {
+            return Err(node.wrong("the list is empty; name at least one place"));
+        }
+        let place = |n: &Node<'_>| {
+            let at = position(&n.fields(&["east_m", "north_m"])?)?;
+            Ok((n.path(), Pose::new(at, 0.0)))
+        };
+        return Ok(Takeoffs::Places(
+            items.iter().map(place).collect::<Result<_, Error>>()?,
+        ));
+    }
+    let launch: Result<Launch, _> = node.text()?.parse();
+    launch.map(Takeoffs::from).map_err(|e| {
+        node.wrong(format!(
+            "{e}, or a list of places as [{{ east_m: 0, north_m: 0 }}, ...]; for a place of each UAV list the uavs"
+        ))
+    })
+}
+
+/// The time between two take-offs at one place, milliseconds.
+fn takeoff_interval_ms(f: &Fields<'_>) -> Result<u32, Error> {
     let interval_s = f.number_or(
         "takeoff_interval_s",
         TAKEOFF_INTERVAL_S,
@@ -145,8 +183,25 @@ fn takeoffs(f: &Fields<'_>, over: Option<Launch>) -> Result<Option<u32>, Error> 
         reason = "at most 600,000"
     )]
     let interval_ms = (interval_s * 1000.0).round() as u32;
-    let launch = over.unwrap_or(in_file);
-    Ok((launch == Launch::Base).then_some(interval_ms))
+    Ok(interval_ms)
+}
+
+impl Takeoffs {
+    /// Of the `i`-th of `n` UAVs: where it is stated, the place if it has one, and which
+    /// take-off there is its own.
+    fn of(&self, i: usize, n: usize) -> (Option<String>, Option<Pose>, Option<usize>) {
+        match self {
+            Self::Spread => (None, None, None),
+            Self::Base => (None, None, Some(i)),
+            Self::Places(places) => {
+                // Parts as even as can be: the first of each is the least i whose place it is.
+                let place = i * places.len() / n;
+                let first = (place * n).div_ceil(places.len());
+                let (field, pose) = &places[place];
+                (Some(field.clone()), Some(*pose), Some(i - first))
+            }
+        }
+    }
 }
 
 fn generated(
@@ -177,23 +232,34 @@ fn generated(
     if kinds.is_empty() {
         return Err(names.wrong("the list is empty; name at least one airframe"));
     }
-    let interval_ms = takeoffs(f, over.launch)?;
+    let takeoffs = takeoffs(f, over.launch)?;
+    let interval_ms = takeoff_interval_ms(f)?;
+    if let Takeoffs::Places(places) = &takeoffs
+        && places.len() > usize::from(count)
+    {
+        return Err(f.need("launch", "\"base\"")?.wrong(format!(
+            "{count} UAVs cannot take off at {} places; list as many places as UAVs at most",
+            places.len()
+        )));
+    }
     let ids = (1..=u16::MAX).filter(|id| Some(*id) != ground_id);
     let members = ids
         .zip(kinds.iter().cycle())
         .take(usize::from(count))
         .enumerate();
-    Ok(members
-        .map(|(i, (id, airframe))| Member {
-            field: f.node().path(),
+    let member = |(i, (id, airframe)): (usize, (u16, &Airframe))| {
+        let (place, launch, nth) = takeoffs.of(i, usize::from(count));
+        let nth = nth.map(|n| u32::try_from(n).unwrap_or(u32::MAX));
+        Member {
+            field: place.unwrap_or_else(|| f.node().path()),
             id,
             airframe: *airframe,
-            launch: None,
-            takeoff_ms: interval_ms
-                .map(|ms| ms.saturating_mul(u32::try_from(i).unwrap_or(u32::MAX))),
+            launch,
+            takeoff_ms: nth.map(|n| interval_ms.saturating_mul(n)),
             height_m: level_m + step_m * i as f64,
-        })
-        .collect())
+        }
+    };
+    Ok(members.map(member).collect())
 }
 
 fn listed(
@@ -245,7 +311,7 @@ fn listed(
         };
         let airframe = airframe_named(f.need("airframe", "\"swift\"")?, airframes)?;
         members.push(Member {
-            field: item.path(),
+            field: format!("{}.launch", item.path()),
             id,
             airframe,
             launch: Some(launch),

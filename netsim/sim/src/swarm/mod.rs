@@ -12,9 +12,11 @@
 //! | [`air`] | the world and the medium as the driver uses them |
 //! | [`fault_effects`] | what each fault does |
 //! | [`outcome`] | what a run came to |
+//! | [`meter`] | how long its parts take |
 
 pub mod air;
 pub mod fault_effects;
+pub mod meter;
 pub mod outcome;
 pub mod queue;
 pub mod sim_peer;
@@ -36,6 +38,7 @@ use crate::radio::{Delivery, Frame};
 use crate::spec::Spec;
 use crate::world::{Fact, Loss};
 use air::Air;
+use meter::{Meter, Part};
 use queue::{Phase, Queue};
 use sim_peer::{Process, SimPeer};
 use skein_behaviors::{Order, Setpoint};
@@ -143,6 +146,7 @@ pub struct Swarm {
     loss_max_permille: u16,
     /// Bytes handed to the radios, by kind of record.
     bytes_by_kind: BTreeMap<String, u64>,
+    meter: Meter,
 }
 
 impl Swarm {
@@ -186,6 +190,7 @@ impl Swarm {
             sides: BTreeMap::new(),
             loss_max_permille: spec.radio.loss_permille,
             bytes_by_kind: BTreeMap::new(),
+            meter: Meter::default(),
         };
         for (i, f) in swarm.faults.iter().enumerate() {
             swarm.queue.push(f.at_ms, Phase::Act, Event::Fault(i));
@@ -199,6 +204,27 @@ impl Swarm {
             .queue
             .push(swarm.period_ms(), Phase::Judge, Event::Judge);
         swarm
+    }
+
+    /// Measures what its parts take from now on.
+    #[must_use]
+    pub fn measured(mut self, meter: Meter) -> Self {
+        self.meter = meter;
+        self
+    }
+
+    /// What its parts took so far.
+    #[must_use]
+    pub fn meter(&self) -> &Meter {
+        &self.meter
+    }
+
+    /// Does something on behalf of a part.
+    fn metered<T>(&mut self, part: Part, work: impl FnOnce(&mut Self) -> T) -> T {
+        let before = self.meter.enter(part);
+        let done = work(self);
+        self.meter.enter(before);
+        done
     }
 
     /// Runs to the end: mission complete and every live UAV finished, or out of time.
@@ -262,6 +288,12 @@ impl Swarm {
     #[must_use]
     pub fn pose(&self, id: u16) -> Option<Pose> {
         self.air.percept(id).map(|p| p.pose)
+    }
+
+    /// The share of the coverable cells that was seen, 0 to 1.
+    #[must_use]
+    pub fn covered_share(&self) -> f64 {
+        self.air.judge().covered_share()
     }
 
     /// The checks so far.
@@ -335,7 +367,7 @@ impl Swarm {
                     self.catch_up(idx);
                 }
             }
-            Event::Judge => self.judge(),
+            Event::Judge => self.metered(Part::Checks, Self::judge),
         }
     }
 
@@ -361,8 +393,7 @@ impl Swarm {
             return;
         }
         let id = s.id();
-        self.air.advance(self.now_ms);
-        self.judge_world();
+        self.advance_world();
         let Some(percept) = self.air.percept(id) else {
             self.airframe_lost(idx);
             return;
@@ -373,6 +404,13 @@ impl Swarm {
         self.queue
             .push(again_ms, Phase::Sense, Event::Percept { idx, boot });
         self.feed(idx, Input::Percept(percept));
+    }
+
+    fn advance_world(&mut self) {
+        self.metered(Part::World, |swarm| {
+            swarm.air.advance(swarm.now_ms);
+            swarm.judge_world();
+        });
     }
 
     /// Zone entries and the moment of completion, as the world's judge sees them.
@@ -445,7 +483,7 @@ impl Swarm {
     /// that ends at the same instant is one event.
     fn carry(&mut self) {
         let mut batch: Vec<Delivery> = Vec::new();
-        for d in self.air.carry(self.now_ms) {
+        for d in self.metered(Part::Medium, |swarm| swarm.air.carry(swarm.now_ms)) {
             if batch.first().is_some_and(|b| b.at_us != d.at_us) {
                 self.receive_later(std::mem::take(&mut batch));
             }
@@ -498,10 +536,12 @@ impl Swarm {
 
     /// A running peer is given a record with this hash, which arrived then.
     fn heard(&mut self, arrived_ms: u64, id: u16, hash: u64) {
+        let before = self.meter.enter(Part::Checks);
         if let Some(said) = self.spoken.get(&hash) {
             self.checker
                 .on_received((self.now_ms, arrived_ms), id, said);
         }
+        self.meter.enter(before);
     }
 
     /// A peer gets round to an input that arrived then.
@@ -546,7 +586,10 @@ impl Swarm {
         let Some(mut peer) = s.peer.take() else {
             return;
         };
+        self.meter.input();
+        let before = self.meter.enter(Part::Peer);
         peer.handle(s.clock.reads(now_ms), input);
+        self.meter.enter(before);
         while let Some(output) = peer.poll() {
             self.perform(idx, &peer, output);
         }
@@ -567,11 +610,13 @@ impl Swarm {
             } => {
                 let hash = bytes_hash(&bytes);
                 self.history.fold(self.now_ms, id, Kind::Publish, hash);
+                let before = self.meter.enter(Part::Checks);
                 self.checker.on_transmission(self.now_ms, id, bytes.len());
+                self.meter.enter(before);
                 let cost = self.peers[idx].frame.add(self.now_ms, bytes.len());
                 self.count_bytes(&key, cost as u64);
                 if hops == 0 {
-                    self.said(idx, peer, &bytes, hash);
+                    self.metered(Part::Checks, |swarm| swarm.said(idx, peer, &bytes, hash));
                     self.last_said.clone_from(&bytes);
                 }
                 let frame = Frame {
@@ -581,7 +626,9 @@ impl Swarm {
                     priority: priority as u8,
                     lifetime_ms,
                 };
+                let before = self.meter.enter(Part::Medium);
                 self.air.transmit(self.now_ms, id, frame);
+                self.meter.enter(before);
             }
             Output::Setpoint(setpoint) => {
                 self.history
@@ -603,7 +650,9 @@ impl Swarm {
                     Job::Geometry(_) => GEOMETRY_MS,
                     Job::Divide { .. } => DIVIDE_MS,
                 };
+                let before = self.meter.enter(Part::Planning);
                 let answer = self.geometry_cache.answer(&job);
+                self.meter.enter(Part::Checks);
                 match (&job, &answer) {
                     (Job::Divide { ring, robots, .. }, JobResult::Divide(division)) => {
                         let divided = (&ring[..], &robots[..], division);
@@ -614,6 +663,7 @@ impl Swarm {
                     }
                     _ => {}
                 }
+                self.meter.enter(before);
                 self.queue.push(
                     self.now_ms + takes_ms,
                     Phase::Answer,
@@ -667,7 +717,9 @@ impl Swarm {
             Report::Claim { .. } => peer.beliefs().adoptions,
             _ => 0,
         };
+        let before = self.meter.enter(Part::Checks);
         self.checker.on_report(self.now_ms, id, &report, adoptions);
+        self.meter.enter(before);
         self.account.reported(self.now_ms, id, &report);
         if let Report::Refused { reason } = &report
             && !std::mem::take(&mut self.spoilt)
@@ -692,8 +744,7 @@ impl Swarm {
     fn judge(&mut self) {
         self.queue
             .push(self.now_ms + self.period_ms(), Phase::Judge, Event::Judge);
-        self.air.advance(self.now_ms);
-        self.judge_world();
+        self.advance_world();
         self.observe_graph();
         self.refresh_covered();
         self.repeat_order();

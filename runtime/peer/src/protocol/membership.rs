@@ -155,8 +155,8 @@ impl Membership {
     /// A peer whose own loop ran late doubts its verdicts first: both factors double.
     fn patience(&self, now: Time) -> Patience {
         let doubt = if now < self.doubt_until { 2 } else { 1 };
-        let diameter = u64::from(self.diameter(now));
         let interval_ms = self.interval_ms();
+        let diameter = u64::from(self.diameter_within(now, HOP_INTERVALS * interval_ms));
         let k1_quarters = doubt * (16 + diameter);
         let k2_ms = doubt * interval_ms * (8 + diameter) / 2;
         let travel_ms = (diameter + 2) * interval_ms;
@@ -473,7 +473,10 @@ impl Membership {
     /// Fewest hops to the farthest live author of the last 10 T'.
     #[must_use]
     pub fn eccentricity(&self, now: Time) -> u8 {
-        let window_ms = HOP_INTERVALS * self.interval_ms();
+        self.eccentricity_within(now, HOP_INTERVALS * self.interval_ms())
+    }
+
+    fn eccentricity_within(&self, now: Time, window_ms: u64) -> u8 {
         let live = self.known.values().filter(|k| k.status != Status::Down);
         live.filter_map(|k| k.fewest_hops(now, window_ms))
             .max()
@@ -487,15 +490,22 @@ impl Membership {
     /// The largest eccentricity heard from live peers within 10 T', at least 1.
     #[must_use]
     pub fn diameter(&self, now: Time) -> u32 {
-        let window = HOP_INTERVALS * self.interval_ms();
-        let recent = |k: &&Known| k.info.heard.is_some_and(|t| now.since_ms(t) < window);
+        self.diameter_within(now, HOP_INTERVALS * self.interval_ms())
+    }
+
+    fn diameter_within(&self, now: Time, window_ms: u64) -> u32 {
+        let recent = |k: &&Known| k.info.heard.is_some_and(|t| now.since_ms(t) < window_ms);
         let live = self.known.values().filter(|k| k.status != Status::Down);
         let heard = live
             .filter(recent)
             .map(|k| k.eccentricity)
             .max()
             .unwrap_or(0);
-        u32::from(heard.max(self.eccentricity(now)).clamp(1, HOPS_MAX))
+        u32::from(
+            heard
+                .max(self.eccentricity_within(now, window_ms))
+                .clamp(1, HOPS_MAX),
+        )
     }
 
     /// Everybody known: id, life, belief.

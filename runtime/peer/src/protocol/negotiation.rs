@@ -444,8 +444,7 @@ impl Negotiation {
     /// When the last of the live owners expects to be done, milliseconds from now.
     #[must_use]
     pub fn present_end_ms(&self, ctx: &Context<'_>) -> u64 {
-        let at_work =
-            |id: &u16| ctx.live.contains_key(id) && !self.sections.plan_of(*id).is_empty();
+        let at_work = |id: &u16| ctx.live.contains_key(id) && self.sections.n_left(*id) > 0;
         let owners = self.progress.iter().filter(|(id, _)| at_work(id));
         owners
             .map(|(_, p)| p.end.since_ms(ctx.now))
@@ -466,7 +465,7 @@ impl Negotiation {
         let last = self.decided_at.max(self.adopted_at);
         let rested = last.is_none_or(|t| ctx.now.since_ms(t) >= calm + stagger);
         let mut owners = ctx.live.keys();
-        steady && idle && rested && owners.any(|id| !self.sections.plan_of(*id).is_empty())
+        steady && idle && rested && owners.any(|id| self.sections.n_left(*id) > 0)
     }
 
     /// Asks for the division of a complete round, once.
@@ -568,7 +567,7 @@ impl Negotiation {
             .map(|(id, h)| (*id, h.claim.epoch, h.claim.eta_ms, h.seq))
             .collect();
         for (id, epoch, eta_ms, seq) in heard {
-            let left = self.sections.plan_of(id).len();
+            let left = self.sections.n_left(id);
             let slack = u64::from(eta_ms / 4) + PATIENT_PERIODS * ctx.period_ms + cell_bound;
             let fresh = Progress {
                 left,

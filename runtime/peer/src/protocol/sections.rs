@@ -175,13 +175,16 @@ impl Sections {
     /// Rules *yield* and *release*, against every live claim. Returns whether
     /// this peer's own claim changed.
     pub fn settle(&mut self, live: &LivePeers) -> bool {
+        let planned = self.plan.iter().map(|p| p.cell);
+        let mine = CellSet::of(self.cells, planned.chain(self.held.keys().copied()));
         let mut theirs: BTreeMap<u16, Stamp> = BTreeMap::new();
         for (author, h) in &self.heard {
-            if live.get(author) != Some(&h.incarnation) {
+            // Of most others no cell is listed here, too.
+            if live.get(author) != Some(&h.incarnation) || !h.listed.intersects(&mine) {
                 continue;
             }
             for l in &h.claim.plan {
-                for c in cells_of(l.run, self.cells) {
+                for c in cells_of(l.run, self.cells).filter(|c| mine.contains(*c)) {
                     let s = theirs.entry(c).or_default();
                     *s = (*s).max(l.stamp);
                 }
@@ -237,6 +240,17 @@ impl Sections {
             .into_iter()
             .filter(|p| !self.covered.contains(p.cell))
             .collect()
+    }
+
+    /// How many cells [`Sections::plan_of`] has.
+    #[must_use]
+    pub fn n_left(&self, author: u16) -> usize {
+        let plan = self.heard.get(&author).map(|h| &h.claim.plan[..]);
+        let cells = plan.unwrap_or_default().iter();
+        cells
+            .flat_map(|l| cells_of(l.run, self.cells))
+            .filter(|c| !self.covered.contains(*c))
+            .count()
     }
 
     /// Rule *adopt*: what the plan becomes with `commits`, then `section`, in order of

@@ -134,11 +134,13 @@ impl Known {
 
     /// Fewest hops within a time.
     pub(super) fn fewest_hops(&self, now: Time, window_ms: u64) -> Option<u8> {
-        let recent = self
-            .hops
-            .iter()
-            .filter(|(since, hops)| *hops != u8::MAX && now.since_ms(*since) < window_ms);
-        recent.map(|(_, hops)| *hops).min()
+        let mut fewest = u8::MAX;
+        for (since, hops) in &self.hops {
+            if *hops < fewest && now.since_ms(*since) < window_ms {
+                fewest = *hops;
+            }
+        }
+        (fewest != u8::MAX).then_some(fewest)
     }
 
     pub(super) fn change(&self) -> Change {
