@@ -115,7 +115,12 @@ impl PatienceCheck {
         if self.spoken.insert(order) {
             let ago_ms = |t| handicaps.shown_ms(id, t, now_ms);
             judge_patience(self.period_ms, now_ms, (id, part), bid, ago_ms, found);
-            judge_waiting(self.period_ms, now_ms, (id, part), bid, ago_ms, found);
+            // A decision that the disk did not take is one that nobody can see.
+            let joined = part.joined.as_ref();
+            let fails = |j: &Joined| handicaps.write_ms(id, j.at_ms, now_ms).is_none();
+            if !joined.is_some_and(fails) {
+                judge_waiting(self.period_ms, now_ms, (id, part), bid, ago_ms, found);
+            }
         }
         part.heard = part.heard.filter(|(heard, _)| *heard > order);
         part.joined = Some(Joined {
@@ -362,12 +367,18 @@ mod tests {
 
     #[test]
     fn a_waiting_time_that_is_not_doubled_is_found() {
-        for (wait_ms, after_ms, broken) in [
-            (5000, 5100, true),
-            (10_000, 5100, false),
-            (5000, 900, false),
+        for (wait_ms, after_ms, disk_fails, broken) in [
+            (5000, 5100, false, true),
+            (10_000, 5100, false, false),
+            (5000, 900, false, false),
+            (5000, 5100, true, false),
         ] {
             let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
+            let mut handicaps = Handicaps::default();
+            if disk_fails {
+                let fault = crate::fault::Fault::FailStores { peer: 1, one_in: 5 };
+                handicaps.on_fault(29_000, &fault);
+            }
             able_until(&mut check, 30, &mut found);
             check.on_bid(
                 30_000,
@@ -380,7 +391,7 @@ mod tests {
                 30_000 + after_ms,
                 1,
                 &bid(5, true, wait_ms),
-                &Handicaps::default(),
+                &handicaps,
                 &mut found,
             );
             assert_eq!(

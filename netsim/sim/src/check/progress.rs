@@ -145,6 +145,8 @@ impl ProgressCheck {
                 continue;
             };
             let waits = m.view.able && all_listed(snapshot);
+            // Whose fuel is due is to fly home.
+            let waits = waits || m.view.loop_hash != 0 && m.view.spendable_ms == 0;
             if m.view.finished || !m.view.plan.is_empty() || waits {
                 r.productive = true;
                 continue;
@@ -282,13 +284,19 @@ mod tests {
         let idle = Beliefs {
             loop_hash: 3,
             able: true,
+            spendable_ms: 9,
             ..Beliefs::default()
         };
+        let out_of_fuel = Beliefs {
+            able: false,
+            spendable_ms: 0,
+            ..idle.clone()
+        };
+        assert!(run(&out_of_fuel, 60, true).is_empty());
         assert!(run(&idle, 23, true).is_empty());
         assert_eq!(run(&idle, 26, true), BTreeMap::from([("L6", 1)]));
         let busy = Beliefs {
             plan: vec![1],
-            spendable_ms: 9,
             ..idle.clone()
         };
         assert!(run(&busy, 60, true).is_empty());
