@@ -119,6 +119,9 @@ impl Injector<'_> {
                 self.operate(&Command::Base((*east_mm, *north_mm))).await
             }
             Fault::Order { order } => self.operate(&Command::Order(*order)).await,
+            Fault::Revise { .. } => {
+                Err("another mission is given by `skein mission`".to_owned())
+            }
             Fault::FailStores { .. }
             | Fault::SlowStores { .. }
             | Fault::HealStores { .. }

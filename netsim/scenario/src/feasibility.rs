@@ -158,7 +158,9 @@ fn faults(spec: &Spec, out: &mut Vec<Finding>) {
                 );
                 tell(Severity::Warning, text);
             }
-            Fault::Order { .. } | Fault::Rebase { .. } if spec.ground.is_none() => {
+            Fault::Order { .. } | Fault::Rebase { .. } | Fault::Revise { .. }
+                if spec.ground.is_none() =>
+            {
                 let text = format!("at {at_s} s there is no ground station to speak it");
                 tell(Severity::Error, text);
             }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 pub use skein_behaviors::Order;
+use skein_peer::mission::PointMm;
 use std::fmt;
 
 /// Something that goes wrong, or is put right. Peers are named by their numbers.
@@ -65,6 +66,14 @@ pub enum Fault {
         east_mm: i32,
         /// North of it, mm.
         north_mm: i32,
+    },
+    /// The operator gives another mission: the ground station speaks a revision with another
+    /// area and other no-fly zones, rings in millimetres from the mission's origin.
+    Revise {
+        /// The area.
+        area: Vec<PointMm>,
+        /// All zones.
+        zones: Vec<Vec<PointMm>>,
     },
     /// The operator wants something of all UAVs: the ground station speaks it.
     Order {
@@ -154,7 +163,11 @@ impl Fault {
             | Self::SpoiltRecord { peer } => vec![*peer],
             Self::Cut { a, b, .. } => vec![*a, *b],
             Self::Partition { groups } => groups.concat(),
-            Self::Heal | Self::Rebase { .. } | Self::Order { .. } | Self::Loss { .. } => Vec::new(),
+            Self::Heal
+            | Self::Rebase { .. }
+            | Self::Revise { .. }
+            | Self::Order { .. }
+            | Self::Loss { .. } => Vec::new(),
         }
     }
 }
@@ -178,6 +191,13 @@ impl fmt::Display for Fault {
             Self::Partition { groups } => write!(f, "partition {groups:?}"),
             Self::Heal => write!(f, "all links heal"),
             Self::Rebase { .. } => write!(f, "the operator moves the base"),
+            Self::Revise { zones, .. } => {
+                let n = zones.len();
+                write!(
+                    f,
+                    "the operator gives another mission, with {n} no-fly zones"
+                )
+            }
             Self::Order { order } => write!(f, "the operator says {}", order.name()),
             Self::FailStores {
                 peer,

@@ -123,6 +123,7 @@ impl<'a> Baseline<'a> {
             | Fault::Heal
             | Fault::Loss { .. }
             | Fault::Rebase { .. }
+            | Fault::Revise { .. }
             | Fault::Order { .. }
             | Fault::FailStores { .. }
             | Fault::SlowStores { .. }

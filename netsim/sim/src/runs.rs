@@ -2,7 +2,7 @@
 
 use crate::account::RunReport;
 use crate::check::Violation;
-use crate::fault::TimedFault;
+use crate::fault::{Fault, TimedFault};
 use crate::fault_generator;
 use crate::omniscient_baseline;
 use crate::prepared::Prepared;
@@ -30,7 +30,10 @@ pub struct Wanted {
 /// Runs once with these faults. A panic becomes a violation of S12 that names the seed.
 #[must_use]
 pub fn run(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, wanted: Wanted) -> Outcome {
-    let compare = wanted.baseline && fault_generator::kills(&faults) <= COMPARED_KILLS;
+    let replaced = |f: &TimedFault| matches!(f.fault, Fault::Revise { .. });
+    let compare = wanted.baseline
+        && fault_generator::kills(&faults) <= COMPARED_KILLS
+        && !faults.iter().any(replaced);
     let compared = compare.then(|| faults.clone());
     let mut outcome = guarded(prepared, seed, faults, wanted.events);
     if let Some(faults) = compared

@@ -146,6 +146,8 @@ pub struct TroubleSpec {
     pub max_uavs: u16,
     /// Largest crowd, a fleet of more than that.
     pub max_crowd: u16,
+    /// Most missions that the operator gives in place of the first one.
+    pub max_missions: u16,
 }
 
 impl TroubleSpec {
@@ -160,6 +162,7 @@ impl TroubleSpec {
         max_clock_jump_ms: 0,
         max_uavs: 0,
         max_crowd: 0,
+        max_missions: 0,
     };
 
     /// What a storm brings where its scenario says nothing else: what a small flight
@@ -174,5 +177,6 @@ impl TroubleSpec {
         max_clock_jump_ms: 60_000,
         max_uavs: 12,
         max_crowd: 30,
+        max_missions: 2,
     };
 }

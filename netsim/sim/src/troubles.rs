@@ -6,6 +6,10 @@
 use crate::fault::{Fault, Order, TimedFault};
 use crate::spec::{Spec, UavSpec};
 use crate::swarm::stream::{Concern, Stream};
+use crate::world::flat::{Bounds, clip};
+use skein_geometry::frame::{Point, Vector};
+use skein_geometry::math::{PI, sin_cos};
+use skein_peer::mission::{PointMm, ring_mm};
 
 /// Shortest time for which something is wrong, milliseconds: two beacon periods.
 const SHORTEST_MS: u64 = 2_000;
@@ -22,6 +26,17 @@ const MOST_SPOILT: u64 = 20;
 
 /// Height slots of further UAVs are so far apart, metres.
 const SLOT_M: f64 = 5.0;
+
+/// What the operator takes off an area, thousandths of its width or height.
+const LEAST_CUT_PERMILLE: u64 = 100;
+/// See [`LEAST_CUT_PERMILLE`].
+const MOST_CUT_PERMILLE: u64 = 400;
+
+/// So often a place for a new zone is drawn at most.
+const ZONE_TRIES: u32 = 16;
+
+/// A new zone leaves so much room round where UAVs start and loiter at last, metres.
+const ZONE_APART_M: f64 = 80.0;
 
 /// A kind of trouble.
 #[derive(Clone, Copy, Debug)]
@@ -93,11 +108,14 @@ pub const KINDS: &[Kind] = &[
 
 /// Kinds that are drawn each for itself and seldom, beside the others: a crowd is slow, and
 /// what comes in the middle of a mission changes all that follows.
-pub const RARE: &[Kind] = &[Kind {
-    name: "crowd",
-    can: |s| s.storm.troubles.max_crowd > s.storm.troubles.max_uavs,
-    how: How::Scenario(crowd),
-}];
+pub const RARE: &[Kind] = &[
+    Kind {
+        name: "crowd",
+        can: |s| s.storm.troubles.max_crowd > s.storm.troubles.max_uavs,
+        how: How::Scenario(crowd),
+    },
+    Kind::new("mission", can_be_given, missions),
+];
 
 /// Each of the rare kinds strikes in one run of so many.
 const RARE_ONE_IN: u64 = 12;
@@ -379,6 +397,80 @@ fn short_fuel(d: &mut Draw<'_>) {
     }
 }
 
+/// The judge knows what may come of an area in lanes; a patrol begins anew with each lap.
+fn can_be_given(spec: &Spec) -> bool {
+    let mission = &spec.mission;
+    let area = mission.task.is_area() && mission.further_laps == 0;
+    area && spec.ground.is_some() && spec.storm.troubles.max_missions > 0
+}
+
+/// The operator gives another mission, or two, each one a change of the first: a part of
+/// its area, a zone less, a zone more, or all of that.
+fn missions(d: &mut Draw<'_>) {
+    let mission = &d.spec.mission;
+    for _ in 0..d.s.between(1, d.spec.storm.troubles.max_missions.into()) {
+        let (mut area, mut zones) = (mission.area.clone(), mission.zones.clone());
+        let what = d.s.between(0, 3);
+        if (what == 1 || what == 3) && !zones.is_empty() {
+            let which = d.s.between(0, zones.len() as u64 - 1);
+            zones.remove(usize::try_from(which).unwrap_or(0));
+        }
+        if what >= 2 {
+            zones.extend(new_zone(d, &mission.area_m()));
+        }
+        if what == 0 || what == 3 || zones == mission.zones {
+            area = part_of(d, &mission.area_m());
+        }
+        let at_ms = d.s.between(0, d.end_ms);
+        d.push(at_ms, Fault::Revise { area, zones });
+    }
+}
+
+/// A number from 0 to 1, in thousandths.
+fn share(s: &mut Stream, least_permille: u64, most_permille: u64) -> f64 {
+    let drawn = s.between(least_permille, most_permille);
+    f64::from(u16::try_from(drawn).unwrap_or(0)) / 1000.0
+}
+
+/// An area without what lies beyond some line, north and south or east and west.
+fn part_of(d: &mut Draw<'_>, area: &[Point]) -> Vec<PointMm> {
+    let mut kept = Bounds::around(area);
+    let size = kept.max - kept.min;
+    let side = d.s.between(0, 3);
+    let off = size * share(d.s, LEAST_CUT_PERMILLE, MOST_CUT_PERMILLE);
+    match side {
+        0 => kept.min.x += off.x,
+        1 => kept.max.x -= off.x,
+        2 => kept.min.y += off.y,
+        _ => kept.max.y -= off.y,
+    }
+    ring_mm(&clip(area, &kept))
+}
+
+/// An octagon somewhere in the box around an area, away from where UAVs start and land.
+fn new_zone(d: &mut Draw<'_>, area: &[Point]) -> Option<Vec<PointMm>> {
+    let within = Bounds::around(area);
+    let size = within.max - within.min;
+    let launches = d.spec.uavs.iter().map(|u| u.launch.position());
+    let places: Vec<Point> = launches.chain([d.spec.mission.base_m()]).collect();
+    let radius_m = share(d.s, 100, 400) * 100.0;
+    let mut drawn = (0..ZONE_TRIES).map(|_| {
+        let (east, north) = (share(d.s, 0, 1000), share(d.s, 0, 1000));
+        within.min + Vector::new(size.x * east, size.y * north)
+    });
+    let is_clear = |c: &Point| {
+        places
+            .iter()
+            .all(|p| (*c - *p).norm() > radius_m + ZONE_APART_M)
+    };
+    let centre = drawn.find(is_clear)?;
+    let corner = |k: u8| {
+        let (sin, cos) = sin_cos(f64::from(k) * PI / 4.0);
+        centre + Vector::new(radius_m * cos, radius_m * sin)
+    };
+    Some(ring_mm(&(0..8).map(corner).collect::<Vec<_>>()))
+}
+
 /// Another number of UAVs: fewer, but enough for the work, or some more.
 fn fleet(s: &mut Stream, spec: &mut Spec, makespan_ms: u64) {
     let there = spec.uavs.len();
@@ -497,7 +589,8 @@ mod tests {
         let mut sizes = std::collections::BTreeSet::new();
         let storms = 1200;
         let crowded = (0..storms).filter(|seed| {
-            let rare = choose_rare(*seed, &spec);
+            let mut rare = choose_rare(*seed, &spec);
+            rare.retain(|k| k.name == "crowd");
             let mut s = Stream::new(*seed, Concern::Troubles);
             let (changed, _) = prepare(&mut s, &rare, &spec, 300_000);
             let n = u16::try_from(changed.uavs.len()).unwrap();
@@ -518,7 +611,7 @@ mod tests {
     fn what_begins_also_ends_and_limits_are_kept() {
         let spec = spec();
         let limits = spec.storm.troubles;
-        for kind in KINDS {
+        for kind in KINDS.iter().chain(RARE) {
             let How::Faults(draw) = kind.how else {
                 continue;
             };
@@ -564,6 +657,14 @@ mod tests {
                         Fault::Restart { peer, .. } => count("down", peer, -1),
                         Fault::Heal => assert!(d.out[0].at_ms < f.at_ms),
                         Fault::SpoiltRecord { .. } => {}
+                        Fault::Revise {
+                            ref area,
+                            ref zones,
+                        } => {
+                            let first = &spec.mission;
+                            assert!(*area != first.area || *zones != first.zones);
+                            assert!(area.len() > 2 && zones.len() <= first.zones.len() + 1);
+                        }
                         Fault::ShortFuel { peer, lasts_ms } => {
                             assert!(peer != 1 && lasts_ms > 100_000);
                         }

@@ -417,6 +417,7 @@ pub(crate) fn storm(
         "max_clock_jump_s",
         "max_uavs",
         "max_crowd",
+        "max_missions",
     ])?;
     let mut max_kills = f.small_or("max_kills", 0, 0, u16::MAX, "UAVs")?;
     if usize::from(max_kills) >= n_uavs {
@@ -462,6 +463,7 @@ fn troubles(f: &Fields<'_>) -> Result<TroubleSpec, Error> {
         max_clock_jump_ms: delay("max_clock_jump_s", usual.max_clock_jump_ms)?,
         max_uavs: f.small_or("max_uavs", usual.max_uavs, 0, 60, "UAVs")?,
         max_crowd: f.small_or("max_crowd", usual.max_crowd, 0, 60, "UAVs")?,
+        max_missions: f.small_or("max_missions", usual.max_missions, 0, 10, "missions")?,
     })
 }
 

@@ -125,6 +125,11 @@ impl Lifetimes {
         }
     }
 
+    /// The mission became another one: the work has no bound.
+    pub fn revised(&mut self) {
+        self.work_m = 0.0;
+    }
+
     /// A process starts.
     pub fn started(&mut self, now_ms: u64, peer: u16) {
         self.by_peer.entry(peer).or_default().go(now_ms);

@@ -233,6 +233,13 @@ impl Account {
         self.covered_ms.get_or_insert(now_ms);
     }
 
+    /// The operator gave another mission: what was covered of the one before says nothing,
+    /// and there is no bound on the work of two.
+    pub fn revised(&mut self) {
+        self.covered_ms = None;
+        self.lifetimes.revised();
+    }
+
     /// The components of the true link graph at present; gives a line when one fell
     /// apart or some met. Peers that come and go do neither.
     pub fn connected(&mut self, components: &[Vec<u16>]) -> Option<String> {

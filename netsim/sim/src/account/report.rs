@@ -339,11 +339,11 @@ impl Coverage {
                 });
             }
         }
-        let missed = judge
-            .sightings()
-            .zip(survey.cells())
-            .filter(|((_, seen), cell)| seen.is_none() && cell.uncoverable.is_none())
-            .map(|((id, _), _)| (id.col, id.row))
+        let missed = survey
+            .cells()
+            .iter()
+            .filter(|cell| cell.uncoverable.is_none() && judge.sighting(cell.id).is_none())
+            .map(|cell| (cell.id.col, cell.id.row))
             .collect();
         Self {
             covered_cells: judge.n_covered(),

@@ -114,8 +114,9 @@ impl Checker {
         }
     }
 
-    /// Another lap begins, with everything open.
-    pub fn on_lap(&mut self) {
+    /// Cells are counted on another loop from now on: another lap begins, or another mission.
+    pub fn on_new_loop(&mut self, loop_hash: u64) {
+        self.loop_hash = loop_hash;
         self.listing = ListingCheck::default();
         self.cover = CoverCheck::default();
         self.progress = ProgressCheck::default();

@@ -7,10 +7,11 @@ use crate::fault::Fault;
 use crate::prepared::Prepared;
 use crate::radio::{Channel, Delivery, Frame, LinkTable, Medium, Overlay, Tally};
 use crate::spec::RadioSpec;
-use crate::world::{Fact, Judge, World};
+use crate::world::{Fact, Judge, Survey, World};
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::CellId;
 use skein_link::medium::Links;
+use skein_peer::Mission;
 use skein_peer::protocol::airtime::{FRAME_BYTES, OVERHEAD_BYTES, PART_BYTES};
 use std::sync::Arc;
 
@@ -102,6 +103,16 @@ impl Air {
     /// The fuel of a UAV lasts no longer than this from now on, milliseconds.
     pub fn limit_fuel(&mut self, id: u16, lasts_ms: u64) {
         self.world.limit_fuel(id, lasts_ms);
+    }
+
+    /// A revision of the mission is judged by from now on.
+    pub fn revise(&mut self, survey: Arc<Survey>, mission: &Mission) {
+        self.world.revise(survey, mission);
+    }
+
+    /// A UAV follows this revision of the mission.
+    pub fn follows(&mut self, id: u16, revision: u32) {
+        self.world.follows(id, revision);
     }
 
     /// Takes a fault that concerns the radio.

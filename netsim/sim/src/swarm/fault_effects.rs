@@ -7,9 +7,11 @@ use crate::account::Cause;
 use crate::check::record::Said;
 use crate::disk::Trouble;
 use crate::fault::Fault;
-use skein_peer::Beliefs;
+use crate::spec::Spec;
+use crate::world::Survey;
+use skein_geometry::Polygon;
 use skein_peer::input::Command;
-use skein_peer::{Input, Role};
+use skein_peer::{Beliefs, Input, Mission, Role};
 use std::sync::Arc;
 
 /// The number of a radio that belongs to nobody.
@@ -62,7 +64,19 @@ impl Swarm {
                 0
             }
             Fault::Rebase { east_mm, north_mm } => {
-                self.revise((*east_mm, *north_mm));
+                let base = (*east_mm, *north_mm);
+                self.revise(Mission {
+                    base,
+                    ..(*self.mission).clone()
+                });
+                0
+            }
+            Fault::Revise { area, zones } => {
+                self.give_mission(Mission {
+                    area: area.clone(),
+                    zones: zones.clone(),
+                    ..(*self.mission).clone()
+                });
                 0
             }
             Fault::Order { order } => {
@@ -161,11 +175,39 @@ impl Swarm {
         self.observe_graph();
     }
 
+    /// The operator gives another mission. A console refuses one that cannot be flown; no
+    /// operator wants one of which the planner leaves out what could be seen.
+    fn give_mission(&mut self, mission: Mission) {
+        let next = Arc::new(Mission {
+            revision: self.mission.revision + 1,
+            ..mission.clone()
+        });
+        let zones: Result<Vec<Polygon>, _> = next.zones_m().map(Polygon::new).collect();
+        let (Ok(geometry), Ok(zones)) = (self.geometry_cache.of(&next), zones) else {
+            return;
+        };
+        let survey = Survey::new(&Spec {
+            mission: Arc::clone(&next),
+            zones,
+            ..(*self.spec).clone()
+        });
+        let coverage_loop = &geometry.coverage_loop;
+        let is_planned = |id| {
+            let cell = coverage_loop.index_of(id);
+            cell.is_some_and(|c| coverage_loop.cells()[usize::from(c)].needed)
+        };
+        let mut coverable = survey.cells().iter().filter(|c| c.uncoverable.is_none());
+        let enough = survey.coverable_share() >= self.spec.min_coverable;
+        if enough && coverable.all(|c| is_planned(c.id)) {
+            self.air.revise(Arc::new(survey), &next);
+            self.account.revised();
+            self.revise(mission);
+        }
+    }
+
     /// The operator's next revision enters at the ground station.
-    fn revise(&mut self, base: skein_peer::mission::PointMm) {
-        let mut mission = (*self.mission).clone();
-        mission.revision += 1;
-        mission.base = base;
+    fn revise(&mut self, mut mission: Mission) {
+        mission.revision = self.mission.revision + 1;
         self.mission = Arc::new(mission);
         self.checker.rules.on_mission(&self.mission);
         if let Some(idx) = self.ground_station() {

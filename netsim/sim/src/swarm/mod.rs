@@ -112,6 +112,8 @@ pub struct Swarm {
     geometry_cache: GeometryCache,
     /// The newest mission that the operator gave.
     mission: Arc<Mission>,
+    /// The mission on whose loop cells are counted.
+    judged: Arc<Mission>,
     /// The operator's standing order, and in which life the ground station spoke it.
     order: Option<(Order, Option<Incarnation>)>,
     /// The record in which the ground station spoke it.
@@ -168,6 +170,7 @@ impl Swarm {
             air: Air::new(prepared, seed),
             geometry_cache,
             mission: Arc::clone(&spec.mission),
+            judged: Arc::clone(&spec.mission),
             order: None,
             order_said: Vec::new(),
             stranded_ms: None,
@@ -700,7 +703,13 @@ impl Swarm {
                 self.checker
                     .on_beacon(self.now_ms, id, &said, &peer.beliefs());
             }
-            let durable = (self.peers[idx].disk.records(), self.covered.as_slice());
+            // Of another loop than the one that cells are counted on only its peer knows what
+            // its runs bridge.
+            let other = said.claim.as_ref().map(|c| c.loop_hash);
+            let other = other.filter(|hash| *hash != self.loop_hash);
+            let covered = other.map(|_| peer.beliefs().covered);
+            let covered = covered.as_deref().unwrap_or(&self.covered);
+            let durable = (self.peers[idx].disk.records(), covered);
             self.checker.on_said(self.now_ms, id, &said, hash, durable);
             self.spoken.insert(hash, Arc::new(said));
         } else {
@@ -734,7 +743,9 @@ impl Swarm {
             ..
         } = &report
         {
+            self.air.follows(id, *revision);
             self.lap_begun(*revision, *loop_hash);
+            self.mission_begun(*revision, *loop_hash);
         }
         self.history
             .keep(self.now_ms, || What::Report { peer: id, report });
@@ -875,12 +886,25 @@ impl Swarm {
             self.loop_hash = loop_hash;
             self.covered.fill(false);
             self.refresh_covered();
-            self.checker.on_lap();
+            self.checker.on_new_loop(loop_hash);
+        }
+    }
+
+    /// The first peer follows the newest mission, and it has another loop.
+    fn mission_begun(&mut self, revision: u32, loop_hash: u64) {
+        let newest = revision == self.mission.revision && self.spec.mission.further_laps == 0;
+        if newest && loop_hash != self.loop_hash {
+            self.judged = Arc::clone(&self.mission);
+            self.loop_hash = loop_hash;
+            let geometry = self.geometry_cache.of(&self.judged);
+            self.covered = vec![false; geometry.map_or(0, |g| g.coverage_loop.len())];
+            self.refresh_covered();
+            self.checker.on_new_loop(loop_hash);
         }
     }
 
     fn refresh_covered(&mut self) {
-        if let Ok(ground) = self.geometry_cache.of(&self.spec.mission) {
+        if let Ok(ground) = self.geometry_cache.of(&self.judged) {
             for (flag, cell) in self.covered.iter_mut().zip(ground.coverage_loop.cells()) {
                 // A cell that nobody needs counts as covered from the start.
                 *flag = *flag || !cell.needed || self.air.is_covered(cell.id, self.lap + 1);

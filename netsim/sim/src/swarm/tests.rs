@@ -251,6 +251,37 @@ fn storms_of_every_kind_of_trouble_break_no_rule() {
     assert!(missing.is_empty(), "{missing:?}");
 }
 
+#[test]
+fn another_mission_in_flight_is_covered_and_checked_to_the_end() {
+    let half = vec![(0, 0), (240_000, 0), (240_000, 384_000), (0, 384_000)];
+    let block = vec![
+        (96_000, 144_000),
+        (126_000, 144_000),
+        (126_000, 174_000),
+        (96_000, 174_000),
+    ];
+    let whole = fixture::square(5).mission.area.clone();
+    for (area, zones, cells) in [(half, Vec::new(), 40), (whole, vec![block], 80)] {
+        let fault = Fault::Revise { area, zones };
+        let o = run_with(
+            5,
+            3,
+            vec![at(30_000, fault), at(60_000, Fault::Kill { peer: 2 })],
+        );
+        passed(&o);
+        assert_eq!(o.report.coverage.cells, cells);
+        assert_eq!(o.report.work_bound_ms, None);
+    }
+    // What cannot be flown an operator's console refuses.
+    let nowhere = Fault::Revise {
+        area: vec![(0, 0), (10, 0), (0, 10)],
+        zones: Vec::new(),
+    };
+    let o = run_with(5, 3, vec![at(30_000, nowhere)]);
+    passed(&o);
+    assert_eq!(o.report.coverage.cells, 80);
+}
+
 fn run_with(n_uavs: u16, seed: u64, faults: Vec<TimedFault>) -> Outcome {
     run(&prepared(n_uavs), seed, faults, true)
 }

@@ -8,11 +8,12 @@ use super::flat::{Bounds, point_ring_m, segment_ring_m};
 use super::motion::Piece;
 use super::obstacles::Place;
 use super::pieces::Pieces;
-use super::survey::Survey;
+use super::survey::{Cell, Survey, Zone};
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::CellId;
 use skein_geometry::frame::Pose;
-use std::collections::BTreeMap;
+use skein_peer::mission::ring_mm;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// The camera looks at least once per this length of flight, metres.
@@ -30,10 +31,30 @@ pub struct Sighting {
     pub uav: u16,
 }
 
+/// A no-fly zone that a revision added.
+#[derive(Clone, Debug)]
+struct Added {
+    revision: u32,
+    zone: Zone,
+    /// Who has been told of it and was clear of it since.
+    binds: BTreeSet<u16>,
+}
+
 /// Follows all airframes and keeps the score.
 #[derive(Clone, Debug)]
 pub struct Judge {
     survey: Arc<Survey>,
+    /// What is to be seen since a revision changed it: a part of the survey.
+    wanted: Option<Arc<Survey>>,
+    /// By cell of the survey: whether it is to be seen and can be.
+    coverable: Vec<bool>,
+    /// By zone of the survey: whether a revision lifted it.
+    lifted: Vec<bool>,
+    added: Vec<Added>,
+    /// Which revision each UAV follows.
+    told: BTreeMap<u16, u32>,
+    /// Farther from a new zone than this a UAV has room to stay clear of it, metres.
+    room_m: f64,
     seen: Vec<Option<Sighting>>,
     n_covered: usize,
     n_coverable: usize,
@@ -55,11 +76,21 @@ pub struct Judge {
     too_close: BTreeMap<(u16, u16), bool>,
 }
 
+fn is_coverable(cell: &Cell) -> bool {
+    cell.uncoverable.is_none()
+}
+
 impl Judge {
     /// A judge who has seen nothing yet.
     #[must_use]
     pub fn new(survey: Arc<Survey>) -> Self {
         Self {
+            wanted: None,
+            coverable: survey.cells().iter().map(is_coverable).collect(),
+            lifted: vec![false; survey.zones().len()],
+            added: Vec::new(),
+            told: BTreeMap::new(),
+            room_m: 0.0,
             seen: vec![None; survey.cells().len()],
             n_covered: 0,
             n_coverable: survey.n_coverable(),
@@ -101,6 +132,48 @@ impl Judge {
         self
     }
 
+    /// From now on what another revision of the mission asks for is to be seen, within what
+    /// was surveyed first, and its zones are to be kept clear of. A zone that is new binds
+    /// a UAV once it follows the revision and has been farther than `room_m` from it.
+    pub fn revise(&mut self, wanted: Arc<Survey>, revision: u32, room_m: f64) {
+        let (survey, zones) = (Arc::clone(&self.survey), wanted.zones());
+        let same = |a: &Zone, b: &Zone| ring_mm(&a.ring) == ring_mm(&b.ring);
+        let cells = survey.cells().iter().map(|c| wanted.index_of(c.id));
+        self.coverable = cells
+            .map(|i| i.is_some_and(|i| is_coverable(&wanted.cells()[i])))
+            .collect();
+        self.n_coverable = self.coverable.iter().filter(|c| **c).count();
+        let seen = self.coverable.iter().zip(&self.seen);
+        self.n_covered = seen.filter(|(c, seen)| **c && seen.is_some()).count();
+        let surveyed = survey.zones().iter();
+        self.lifted = surveyed
+            .map(|old| !zones.iter().any(|new| same(old, new)))
+            .collect();
+        self.added
+            .retain(|a| zones.iter().any(|new| same(&a.zone, new)));
+        for zone in zones {
+            let known = survey.zones().iter().any(|old| same(old, zone));
+            if !known && !self.added.iter().any(|a| same(&a.zone, zone)) {
+                self.added.push(Added {
+                    revision,
+                    zone: zone.clone(),
+                    binds: BTreeSet::new(),
+                });
+            }
+        }
+        self.inside.clear();
+        self.room_m = room_m;
+        self.wanted = Some(wanted);
+    }
+
+    /// A UAV follows this revision of the mission.
+    pub fn follows(&mut self, uav: u16, revision: u32) {
+        self.told.insert(uav, revision);
+        for added in self.added.iter_mut().filter(|a| a.revision > revision) {
+            added.binds.remove(&uav);
+        }
+    }
+
     /// Whether a camera saw what peers call this cell, in that many laps.
     #[must_use]
     pub fn saw(&self, cell: CellId, laps: u16) -> bool {
@@ -119,7 +192,7 @@ impl Judge {
     /// The cells and which of them can be seen.
     #[must_use]
     pub fn survey(&self) -> &Survey {
-        &self.survey
+        self.wanted.as_ref().unwrap_or(&self.survey)
     }
 
     /// Who saw a cell first and when, if anybody did.
@@ -250,7 +323,7 @@ impl Judge {
     fn see(&mut self, i: usize, sighting: Sighting, facts: &mut Vec<Fact>) {
         self.seen[i] = Some(sighting);
         let cell = self.survey.cells()[i];
-        self.n_covered += usize::from(cell.uncoverable.is_none());
+        self.n_covered += usize::from(self.coverable[i]);
         facts.push(Fact::Seen {
             at_ms: sighting.at_ms,
             uav: sighting.uav,
@@ -358,10 +431,20 @@ impl Judge {
     /// so far cannot change anything and costs one comparison of boxes.
     fn fence(&mut self, uav: u16, piece: &Piece, facts: &mut Vec<Fact>) {
         let survey = Arc::clone(&self.survey);
-        let n_zones = survey.zones().len();
+        let n_zones = survey.zones().len() + self.added.len();
         if n_zones == 0 {
             return;
         }
+        let told = self.told.get(&uav).copied().unwrap_or(0);
+        let room_m = self.room_m + piece.length_m();
+        for added in self.added.iter_mut().filter(|a| a.revision <= told) {
+            if point_ring_m(piece.start.position(), &added.zone.ring) > room_m {
+                added.binds.insert(uav);
+            }
+        }
+        let surveyed = survey.zones().iter().zip(&self.lifted);
+        let surveyed = surveyed.map(|(zone, lifted)| (zone, !lifted));
+        let added = self.added.iter().map(|a| (&a.zone, a.binds.contains(&uav)));
         let inside = self
             .inside
             .entry(uav)
@@ -372,7 +455,8 @@ impl Judge {
             max: piece.start.position(),
         }
         .grown(piece.length_m());
-        for (i, zone) in survey.zones().iter().enumerate() {
+        let zones = surveyed.chain(added).enumerate();
+        for (i, (zone, _)) in zones.filter(|(_, (_, binds))| *binds) {
             let apart_m = zone.bounds.distance_m(&reach);
             if apart_m > 0.0 && apart_m >= *near_m {
                 inside[i] = false;
@@ -478,6 +562,82 @@ mod tests {
     }
 
     /// All corners of a cell in the turned rectangle, looked at every 2 cm.
+    /// The fixture's scenario with an area of fewer lanes and one zone instead of its own.
+    fn revised(east_mm: i32, zone: &[(i32, i32)]) -> Arc<Survey> {
+        let mut spec = square(1);
+        let mut mission = (*spec.mission).clone();
+        mission.area = vec![(0, 0), (east_mm, 0), (east_mm, 384_000), (0, 384_000)];
+        mission.zones = vec![zone.to_vec()];
+        spec.zones = vec![polygon(zone)];
+        spec.mission = Arc::new(mission);
+        Arc::new(Survey::new(&spec))
+    }
+
+    #[test]
+    fn a_revision_changes_what_is_to_be_seen_and_forgets_no_sighting() {
+        let mut judge = judge_with(&[]);
+        let mut facts = Vec::new();
+        // Along the lowest lane, over cells inside the new area and beyond it.
+        judge.look(
+            1,
+            &airframe(),
+            &piece(20.0, 24.0, 0.0, 30_000, 0.0),
+            &mut facts,
+        );
+        let before = judge.n_covered();
+        let far = (5_000_000, 5_000_000);
+        let zone = [far, (far.0 + 9_000, far.1), (far.0, far.1 + 9_000)];
+        judge.revise(revised(240_000, &zone), 2, 80.0);
+        assert_eq!(judge.survey().cells().len(), 40);
+        assert!(judge.n_covered() >= 4 && judge.n_covered() < before);
+        assert!(judge.saw(CellId { col: 7, row: 0 }, 1), "seen before");
+        judge.look(
+            1,
+            &airframe(),
+            &piece(20.0, 72.0, 0.0, 30_000, 0.0),
+            &mut facts,
+        );
+        assert!(
+            judge.saw(CellId { col: 7, row: 1 }, 1),
+            "peers may not know yet"
+        );
+        assert_eq!(judge.n_covered(), 10);
+        assert!(!judge.complete());
+    }
+
+    #[test]
+    fn a_new_zone_binds_whoever_knows_of_it_and_has_room_to_turn_away() {
+        let block = [
+            (225_000, 225_000),
+            (255_000, 225_000),
+            (255_000, 255_000),
+            (225_000, 255_000),
+        ];
+        let over = piece(40.0, 240.0, 0.0, 20_000, 0.0);
+        for (told, from_m, entries) in [(true, 40.0, 1), (false, 40.0, 0), (true, 200.0, 0)] {
+            let mut judge = judge_with(&[]);
+            judge.revise(revised(480_000, &block), 2, 80.0);
+            judge.follows(1, if told { 2 } else { 1 });
+            let mut facts = Vec::new();
+            let steps = (0..20).map(|k| Piece {
+                start: Pose {
+                    east_m: from_m + 13.0 * f64::from(k),
+                    ..over.start
+                },
+                to_ms: over.from_ms + 1000,
+                ..over
+            });
+            steps.for_each(|p| judge.fence(1, &p, &mut facts));
+            assert_eq!(judge.entries(), entries, "told {told}, from {from_m} m");
+        }
+        // What was lifted binds nobody.
+        let mut judge = judge_with(&[&block]);
+        let elsewhere = [(0, 0), (9_000, 0), (0, 9_000)];
+        judge.revise(revised(480_000, &elsewhere), 2, 80.0);
+        judge.fence(1, &over, &mut Vec::new());
+        assert_eq!(judge.entries(), 0);
+    }
+
     fn oracle(p: &Piece, ids: &[CellId]) -> Vec<bool> {
         let mut seen = vec![false; ids.len()];
         let n = (p.length_m() / 0.02).ceil() as u32;

@@ -23,13 +23,16 @@ use crate::spec::Spec;
 use motion::{Kinematic, Piece};
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::patch::Patches;
-use skein_peer::CoverageTask;
 use skein_peer::offload::MissionGeometry;
+use skein_peer::{CoverageTask, Mission};
 use std::sync::Arc;
 
 /// The world moves in steps of at most this long, aligned to its multiples, so that
 /// separation is looked at this often however seldom the driver asks.
 pub const STEP_MS: u64 = 100;
+
+/// So many turn radii from a zone that it did not know a UAV still turns away from it.
+const TURNS_TO_STAY_CLEAR: f64 = 3.0;
 
 /// What does not change during a run and can be shared by many: a storm of a thousand
 /// seeds surveys the area once.
@@ -210,6 +213,18 @@ impl World {
     #[must_use]
     pub fn judge(&self) -> &Judge {
         &self.judge
+    }
+
+    /// From now on a revision of the mission is judged by, for an area in lanes: its area
+    /// lies within the first one.
+    pub fn revise(&mut self, survey: Arc<Survey>, mission: &Mission) {
+        let room_m = mission.clearance_m() + TURNS_TO_STAY_CLEAR * mission.turn_radius_m();
+        self.judge.revise(survey, mission.revision, room_m);
+    }
+
+    /// A UAV follows this revision of the mission.
+    pub fn follows(&mut self, uav: u16, revision: u32) {
+        self.judge.follows(uav, revision);
     }
 
     /// The facts recorded since the last call, in order of time per UAV.
