@@ -9,7 +9,7 @@ use crate::percept::Percept;
 use skein_flight::coverage::ring::Direction;
 use skein_flight::coverage::ring::backtracking::{Leg, OffLoop};
 use skein_flight::trajectory::wind::Course;
-use skein_geometry::frame::Point;
+use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::{PI, atan2};
 use std::collections::VecDeque;
 
@@ -108,6 +108,12 @@ impl Executive {
             off_loop: None,
             finish_ms: 0,
         }
+    }
+
+    /// The boundary of the loop that is reached soonest from somewhere.
+    #[must_use]
+    pub fn anchor_from(&self, pose: Pose) -> Option<u16> {
+        self.transit.way_on(pose).map(|(boundary, ..)| boundary)
     }
 
     /// When each open cell of `legs` would be done if they became the goal now, in

@@ -14,7 +14,7 @@ use skein_netsim::fault_generator::kills;
 use skein_netsim::spec::{Spec, UavSpec};
 use skein_peer::mission::GeometryError;
 use skein_peer::offload::MissionGeometry;
-use skein_peer::wire::limits::MEMBERS_MAX;
+use skein_peer::wire::limits::PEERS_MAX;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Endurance, in flights round the whole loop, below which the death of some UAVs
@@ -84,9 +84,10 @@ fn fleet(spec: &Spec, out: &mut Vec<Finding>) {
     if spec.uavs.is_empty() {
         error("fleet", "there is no UAV; expected at least one".to_owned());
     }
-    if spec.uavs.len() > MEMBERS_MAX {
+    let peers = spec.uavs.len() + usize::from(spec.ground.is_some());
+    if peers > PEERS_MAX {
         let text = format!(
-            "{} UAVs are too many: a round of the swarm carries at most {MEMBERS_MAX} members",
+            "{} UAVs are too many: a fleet is of {PEERS_MAX} peers at most, the ground station included",
             spec.uavs.len()
         );
         error("fleet", text);

@@ -1,7 +1,7 @@
 //! What checks may look at: a copy of what one peer believes.
 
 use crate::output::Status;
-use crate::wire::message::{Epoch, Order};
+use crate::wire::message::{Epoch, Order, Stamp};
 use crate::{Incarnation, PeerId};
 use std::collections::BTreeMap;
 
@@ -22,6 +22,8 @@ pub struct Beliefs {
     pub covered: Vec<bool>,
     /// Cells it lists as its own future, in order of flight, uncovered or not.
     pub plan: Vec<u16>,
+    /// By what right it lists each of them.
+    pub stamps: Vec<Stamp>,
     /// Cells it gave away and still answers for.
     pub held: Vec<u16>,
     /// Cells alarmed as beyond anybody's endurance.

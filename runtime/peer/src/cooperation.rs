@@ -37,9 +37,10 @@ use crate::offload::{Job, MissionGeometry};
 use crate::output::Report;
 use crate::protocol::division;
 use crate::protocol::membership::Membership;
-use crate::protocol::negotiation::{Action, Adoption, Context};
-use crate::protocol::runs::{PlannedCell, legs_of};
+use crate::protocol::negotiation::{Action, Adoption, Context, SETTLE_PERIODS};
+use crate::protocol::runs::{PlannedCell, cells_of, legs_of};
 use crate::protocol::sections::LivePeers;
+use crate::protocol::sharing::{self, Hand, Pace, Site};
 use crate::timers::{Timer, Timers};
 use crate::wire::codec::Body;
 use crate::wire::limits::BID_COVERED_MAX_BYTES;
@@ -49,6 +50,7 @@ use skein_behaviors::executive::UNREACHABLE_MS;
 use skein_behaviors::{Event, Executive, Goal, Percept};
 use skein_flight::coverage::ring::Direction;
 use skein_flight::coverage::ring::backtracking::{Division, Leg, Uav};
+use skein_geometry::frame::Pose;
 use std::sync::Arc;
 
 /// Own coverage is made durable every so many cells: a crash costs at most these.
@@ -403,6 +405,7 @@ impl Cooperation {
         beliefs.revision = state.revision();
         beliefs.covered = sections.covered().flags();
         beliefs.plan = sections.plan().iter().map(|p| p.cell).collect();
+        beliefs.stamps = sections.plan().iter().map(|p| p.stamp).collect();
         beliefs.held = sections.held().keys().copied().collect();
         beliefs.unassigned = sections.unassigned().iter().collect();
         beliefs.epoch = sections.epoch();
@@ -598,7 +601,11 @@ impl MissionState {
         let mut actions = self.negotiation.tick(&ctx, &coverage_loop);
         let left_over = self.negotiation.left_over(&ctx);
         let within_reach = left_over.and_then(|cells| self.within_reach(&cells, s.percept));
-        let taken = within_reach.and_then(|cells| self.negotiation.begin_take(&cells));
+        let wanted = within_reach.or_else(|| {
+            let cells = self.wanted_without_a_round(s, &ctx)?;
+            Some(self.flyable_besides(cells, s.percept)).filter(|cells| !cells.is_empty())
+        });
+        let taken = wanted.and_then(|cells| self.negotiation.begin_take(&cells));
         actions.extend(taken.map(Action::Take));
         let mut effects = Effects::new();
         let alone = s.membership.live().next().is_none();
@@ -656,6 +663,101 @@ impl MissionState {
             present_ms,
             delay_ms,
         )
+    }
+
+    /// What this peer takes without a round: its first section, or among many orphans and a
+    /// part of what a slower one has left.
+    fn wanted_without_a_round(
+        &mut self,
+        s: &Situation<'_>,
+        ctx: &Context<'_>,
+    ) -> Option<Vec<(u16, Direction)>> {
+        if self.negotiation.begins(ctx) {
+            return self.first_section(s, ctx);
+        }
+        if let Some((orphaned_ms, orphans)) = self.negotiation.orphans_among_many(ctx) {
+            let (me, share) = (self.hand(s)?, self.even_share(ctx));
+            let nearest = sharing::nearest_orphans(&orphans.runs(), &me, share, self.pace()?);
+            return nearest
+                .filter(|(way_ms, _)| self.negotiation.is_my_turn(ctx, orphaned_ms, *way_ms))
+                .map(|(_, cells)| cells);
+        }
+        let me = self.hand(s)?;
+        if !self.negotiation.may_relieve(ctx, me.free_ms) {
+            return None;
+        }
+        let owners = self.negotiation.owners(ctx);
+        let is_owner = |id: u16| owners.iter().any(|o| o.id == id && o.left_ms > 0);
+        let idle = ctx.members.iter().map(|m| m.id);
+        let idle = idle.filter(|id| *id != me.id && !is_owner(*id));
+        let others = idle.filter_map(|id| {
+            let at = pose_of(s.membership.info(id)?.pose?).position();
+            Some(Hand { id, at, free_ms: 0 })
+        });
+        let hands: Vec<Hand> = others.chain([me]).collect();
+        // A claim is stored, spoken, and heard even if it is lost once.
+        let least_ms = SETTLE_PERIODS * ctx.period_ms;
+        sharing::relief(&owners, &hands, me.id, self.pace()?, least_ms)
+    }
+
+    /// An even share of the loop near this peer, judged from where its neighbours are. Whoever
+    /// is there counts: at its first beacon nobody is able yet.
+    fn first_section(&self, s: &Situation<'_>, ctx: &Context<'_>) -> Option<Vec<(u16, Direction)>> {
+        let executive = self.executive.as_ref()?;
+        let info = |id: &u16| s.membership.info(*id).filter(|i| !i.ground_station);
+        let others: Vec<u16> = ctx
+            .live
+            .keys()
+            .copied()
+            .filter(|id| info(id).is_some())
+            .collect();
+        let site = |id, pose| {
+            let anchor = executive.anchor_from(pose)?;
+            Some(Site { anchor, id })
+        };
+        let sites = others.iter().filter_map(|id| {
+            let heard = info(id).filter(|i| i.loop_hash == self.loop_hash())?;
+            site(*id, pose_of(heard.pose?))
+        });
+        let sites = sites.chain(site(s.me.id, s.percept?.pose)).collect();
+        let sections = &self.negotiation.sections;
+        let n = sections.cells();
+        let run = sharing::first_section(sites, others.len() + 1, n, s.me.id)?;
+        let orphans = sections.orphans(ctx.live);
+        let mine = cells_of(run, n).filter(|c| orphans.contains(*c));
+        Some(mine.map(|c| (c, Direction::Forward)).collect())
+    }
+
+    /// This peer as one that will have nothing to fly, where its plan ends.
+    fn hand(&self, s: &Situation<'_>) -> Option<Hand> {
+        let plan = self.negotiation.sections.plan();
+        let end = |cell: u16| self.geometry.coverage_loop.boundary(usize::from(cell));
+        let here = || s.percept.map(|p| p.pose);
+        Some(Hand {
+            id: s.me.id,
+            at: plan
+                .last()
+                .map_or_else(here, |p| Some(end(p.cell)))?
+                .position(),
+            free_ms: u64::from(self.eta_ms()),
+        })
+    }
+
+    fn pace(&self) -> Option<Pace<'_>> {
+        let executive = self.executive.as_ref()?;
+        Some(Pace {
+            coverage_loop: &self.geometry.coverage_loop,
+            speed_mmps: speed_mmps(executive),
+            turn_ms: executive.turn_ms(),
+        })
+    }
+
+    /// How many cells each has to fly yet, if all have as many.
+    fn even_share(&self, ctx: &Context<'_>) -> u16 {
+        let covered = self.covered();
+        let open = covered.capacity().saturating_sub(covered.count());
+        let members = u16::try_from(ctx.members.len()).unwrap_or(u16::MAX);
+        open.div_ceil(members.max(1))
     }
 
     /// This peer's bid in the open round, to be told and made durable.
@@ -762,6 +864,27 @@ impl MissionState {
         reach.max_by_key(Vec::len).filter(|run| !run.is_empty())
     }
 
+    /// Of cells that are to be flown after the plan those for which the endurance suffices.
+    fn flyable_besides(
+        &self,
+        mut cells: Vec<(u16, Direction)>,
+        percept: Option<&Percept>,
+    ) -> Vec<(u16, Direction)> {
+        let Some(executive) = &self.executive else {
+            return Vec::new();
+        };
+        let sections = &self.negotiation.sections;
+        let mut plan = sections.plan().to_vec();
+        plan.extend(sections.taken(&cells));
+        let legs = legs_of(&plan, sections.cells());
+        let times = executive.schedule(&legs, &|c| !sections.covered().contains(c));
+        let spendable_ms = self.spendable_ms(percept);
+        let in_time = times.iter().take_while(|(_, ms)| *ms <= spendable_ms);
+        let in_time = CellSet::of(sections.cells(), in_time.map(|(c, _)| *c));
+        cells.retain(|(c, _)| in_time.contains(*c));
+        cells
+    }
+
     /// Lists only what can be flown (S10): the rest is orphaned, and that is a loss.
     /// Returns whether anything was given up.
     fn keep_within_endurance(&mut self, percept: Option<&Percept>) -> bool {
@@ -866,6 +989,15 @@ impl MissionState {
             executive.set_goal(goal.clone(), &|c| !sections.covered().contains(c));
         }
         self.goal = Some(goal);
+    }
+}
+
+/// Where a beacon says that its author is.
+fn pose_of((east_mm, north_mm, heading_e4): (i32, i32, i32)) -> Pose {
+    Pose {
+        east_m: f64::from(east_mm) / 1000.0,
+        north_m: f64::from(north_mm) / 1000.0,
+        heading_rad: f64::from(heading_e4) / 10_000.0,
     }
 }
 

@@ -9,11 +9,11 @@ use skein_geometry::math::{FRAC_PI_2, wrap_pi};
 use skein_interop::airframe;
 use skein_interop::json::{Error, Fields, Node, suggestion};
 use skein_netsim::spec::GroundStationSpec;
-use skein_peer::wire::limits::MEMBERS_MAX;
+use skein_peer::wire::limits::PEERS_MAX;
 
-/// Most UAVs of one scenario: a round of the swarm carries no more members.
-#[allow(clippy::cast_possible_truncation, reason = "64")]
-const MAX_UAVS: u16 = MEMBERS_MAX as u16;
+/// Most UAVs of one scenario: a peer knows no more others.
+#[allow(clippy::cast_possible_truncation, reason = "256")]
+const MAX_UAVS: u16 = PEERS_MAX as u16;
 
 /// Time between two take-offs where none is stated, seconds: a crew of two with a catapult.
 const TAKEOFF_INTERVAL_S: f64 = 2.0;
@@ -220,7 +220,7 @@ fn generated(
     let count = over.peers.unwrap_or(in_file);
     if count == 0 || count > MAX_UAVS {
         return Err(f.node().wrong(format!(
-            "{count} UAVs were asked for; expected 1 to {MAX_UAVS}, which is all that a round of the swarm carries"
+            "{count} UAVs were asked for; expected 1 to {MAX_UAVS}, the most that one peer knows of"
         )));
     }
     let names = f.need("airframes", "[\"swift\"]")?;
@@ -276,7 +276,7 @@ fn listed(
     }
     if items.len() > usize::from(MAX_UAVS) {
         return Err(list.wrong(format!(
-            "{} UAVs are too many: a round of the swarm carries at most {MAX_UAVS}",
+            "{} UAVs are too many: one peer knows of at most {MAX_UAVS}",
             items.len()
         )));
     }

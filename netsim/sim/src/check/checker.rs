@@ -248,9 +248,6 @@ impl Checker {
     ) {
         self.record
             .on_said(now_ms, id, said, bytes_hash, durable, &mut self.found);
-        if let Some(claim) = &said.claim {
-            self.listing.on_published(id, std::sync::Arc::clone(claim));
-        }
         let seen = (self.loop_hash, durable.1);
         self.rules.on_said(now_ms, id, said, seen, &mut self.found);
     }

@@ -25,7 +25,6 @@ pub struct ListingCheck {
     orphans: BTreeMap<u16, Orphan>,
     last_lister: BTreeMap<u16, u16>,
     able_since_ms: Option<u64>,
-    own: BTreeMap<u16, Arc<Claim>>,
     heard: BTreeMap<(u16, u16), (Arc<Claim>, Version)>,
     clashes: Clocks<(u16, u16, u16)>,
 }
@@ -33,13 +32,7 @@ pub struct ListingCheck {
 impl ListingCheck {
     /// A process ended.
     pub fn on_death(&mut self, id: u16) {
-        self.own.remove(&id);
         self.heard.retain(|(o, _), _| *o != id);
-    }
-
-    /// A peer published its own section.
-    pub fn on_published(&mut self, id: u16, claim: Arc<Claim>) {
-        self.own.insert(id, claim);
     }
 
     /// A peer was given another's section. What was written earlier than what it has
@@ -211,22 +204,12 @@ impl ListingCheck {
             .iter()
             .filter(|m| m.uav && m.view.loop_hash == snapshot.loop_hash)
         {
-            let Some(own) = self
-                .own
-                .get(&m.id)
-                .filter(|r| r.loop_hash == snapshot.loop_hash)
-            else {
-                continue;
-            };
+            // By the stamps that it goes by: what it takes anew it may not have said yet.
             let mut stamps: Vec<Option<Stamp>> = vec![None; n];
-            own.plan
-                .iter()
-                .for_each(|l| each_cell(l, n, |c| stamps[c] = Some(l.stamp)));
-            let mut flies = vec![false; n];
-            for c in &m.view.plan {
+            for (c, stamp) in m.view.plan.iter().zip(&m.view.stamps) {
                 let c = usize::from(*c);
                 if c < n && !m.view.covered.get(c).copied().unwrap_or(false) {
-                    flies[c] = true;
+                    stamps[c] = Some(*stamp);
                 }
             }
             for (&(_, author), (claim, (life, _))) in self.heard.range((m.id, 0)..=(m.id, u16::MAX))
@@ -238,7 +221,7 @@ impl ListingCheck {
                 }
                 for l in &claim.plan {
                     each_cell(l, n, |c| {
-                        if flies[c] && stamps[c].is_some_and(|s| s < l.stamp) {
+                        if stamps[c].is_some_and(|s| s < l.stamp) {
                             seen.push((m.id, author, u16::try_from(c).unwrap_or(u16::MAX)));
                         }
                     });
@@ -302,6 +285,14 @@ mod tests {
         diameter: 1,
     };
 
+    fn stamp(counter: u32, id: u16) -> Stamp {
+        Stamp {
+            epoch: Epoch { counter, hash: 0 },
+            take: 0,
+            id,
+        }
+    }
+
     struct Story {
         check: ListingCheck,
         members: Membership,
@@ -346,6 +337,7 @@ mod tests {
                         loop_hash: 9,
                         covered: vec![false; 4],
                         plan: plan.to_vec(),
+                        stamps: vec![stamp(5, *id); plan.len()],
                         peers: [(PeerId(99), (1, self.believed(*id)))].into(),
                         ..Beliefs::default()
                     },
@@ -436,11 +428,7 @@ mod tests {
                     run: CellRun { first: 3, count: 2 },
                     backward: false,
                     firmness: Firmness::Tentative,
-                    stamp: Stamp {
-                        epoch: Epoch { counter, hash: 0 },
-                        take: 0,
-                        id,
-                    },
+                    stamp: stamp(counter, id),
                 }],
                 ..Claim::default()
             })
@@ -459,7 +447,6 @@ mod tests {
                 (&BOUNDS, &Handicaps::default()),
                 None,
             );
-            s.check.on_published(1, claim(5, 1));
             s.check
                 .on_heard((1, 2), (1, 8), &deaf(claim(other, 2), alone));
             s.check.on_heard((1, 2), (1, 7), &claim(9, 2));

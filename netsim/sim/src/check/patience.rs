@@ -7,6 +7,7 @@ use super::{Clocks, Findings, Handicaps, Snapshot};
 use skein_peer::output::Status;
 use skein_peer::protocol::rounds::{RoundOrder, order_of};
 use skein_peer::protocol::runs::cells_of;
+use skein_peer::wire::limits::MEMBERS_MAX;
 use skein_peer::wire::message::{Bid, Claim, Member};
 use skein_peer::{Beliefs, Incarnation, PeerId};
 use std::collections::{BTreeMap, BTreeSet};
@@ -54,6 +55,8 @@ struct Part {
     /// The least diameter it reckoned with lately: at this snapshot and the one before.
     diameters: [u32; 2],
     view: Option<Beliefs>,
+    /// The cells for which it owes a round.
+    orphans: BTreeSet<u16>,
 }
 
 /// When the rounds of one run were opened.
@@ -63,6 +66,8 @@ pub struct PatienceCheck {
     parts: BTreeMap<u16, Part>,
     spoken: BTreeSet<RoundOrder>,
     owed: Clocks<u16>,
+    /// Who ever flew.
+    uavs: BTreeSet<u16>,
 }
 
 impl PatienceCheck {
@@ -74,6 +79,7 @@ impl PatienceCheck {
             parts: BTreeMap::new(),
             spoken: BTreeSet::new(),
             owed: Clocks::default(),
+            uavs: BTreeSet::new(),
         }
     }
 
@@ -164,7 +170,13 @@ impl PatienceCheck {
             .is_some_and(|t| now_ms > t + SETTLED_PERIODS * period_ms);
         let believed = view.peers.get(&PeerId(subject));
         let was_alive = believed.is_some_and(|(i, s)| *i == incarnation && *s != Status::Down);
-        if !view.able || !settled || !part.decided || !was_alive {
+        let lives = |(id, (_, s)): (&PeerId, &(Incarnation, Status))| {
+            *s != Status::Down && self.uavs.contains(&id.0)
+        };
+        // Among more, orphans are taken without a round.
+        let uavs = 1 + view.peers.iter().filter(|p| lives(*p)).count();
+        let few = uavs <= MEMBERS_MAX;
+        if !view.able || !settled || !part.decided || !was_alive || !few {
             return;
         }
         let n = u16::try_from(view.covered.len()).unwrap_or(u16::MAX);
@@ -192,6 +204,9 @@ impl PatienceCheck {
         }
         if orphans.len() >= SURELY_ORPHANED {
             self.owed.start(observer, now_ms);
+            if let Some(part) = self.parts.get_mut(&observer) {
+                part.orphans = orphans;
+            }
         }
     }
 
@@ -199,6 +214,7 @@ impl PatienceCheck {
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let now_ms = snapshot.now_ms;
         for m in snapshot.peers.iter().filter(|m| m.uav) {
+            self.uavs.insert(m.id);
             let part = self.parts.entry(m.id).or_default();
             if m.view.able {
                 part.able_since_ms.get_or_insert(now_ms);
@@ -208,6 +224,12 @@ impl PatienceCheck {
             }
             part.diameters = [m.view.diameter, part.diameters[0]];
             part.view = Some(m.view.clone());
+            // Who stood still hears all at once, when it wakes, what was covered meanwhile.
+            let covered = |c: &u16| m.view.covered.get(usize::from(*c)) == Some(&true);
+            part.orphans.retain(|c| !covered(c));
+            if part.orphans.len() < SURELY_ORPHANED {
+                self.owed.stop(m.id);
+            }
             // The peer looks four times a period, and its bid is written in 20 ms.
             let late = self.owed.since(m.id).is_some_and(|t| {
                 snapshot.lived_ms(m.id, t) > self.period_ms / 2 + snapshot.late_ms(m.id, t)

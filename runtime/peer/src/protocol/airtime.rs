@@ -16,7 +16,7 @@
 //! collided, everybody's share would grow as the channel fills.
 
 use crate::input::Time;
-use crate::wire::limits::{GOSSIP_MAX, INTERVAL_LEAST, INTERVAL_MOST, MEMBERS_MAX};
+use crate::wire::limits::{GOSSIP_MAX, INTERVAL_LEAST, INTERVAL_MOST, PEERS_MAX};
 use crate::wire::message::Beacon;
 use std::collections::BTreeMap;
 
@@ -145,7 +145,7 @@ impl Airtime {
     /// A neighbour's beacon.
     pub fn hear(&mut self, now: Time, author: u16, beacon: &Beacon) {
         self.neighbours.retain(|_, n| n.until > now);
-        if self.neighbours.len() < MEMBERS_MAX || self.neighbours.contains_key(&author) {
+        if self.neighbours.len() < PEERS_MAX || self.neighbours.contains_key(&author) {
             let lasts_ms = LASTING_INTERVALS * ms_of(beacon.interval, self.period_ms);
             let heard = Neighbour {
                 until: now.plus_ms(lasts_ms),
@@ -283,7 +283,7 @@ impl Airtime {
     /// How many neighbours are counted, and the cap.
     #[must_use]
     pub fn load(&self) -> (&'static str, usize, usize) {
-        ("neighbours", self.neighbours.len(), MEMBERS_MAX)
+        ("neighbours", self.neighbours.len(), PEERS_MAX)
     }
 }
 

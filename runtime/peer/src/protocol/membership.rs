@@ -37,14 +37,13 @@ use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Status;
 use crate::wire::limits::INTERVAL_LEAST;
-use crate::wire::limits::{HOPS_MAX, MEMBERS_MAX};
+use crate::wire::limits::{HOPS_MAX, PEERS_MAX};
 use crate::wire::message::{Beacon, Gossip};
 use known::{Age, Heartbeat, Known};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most other peers known: the largest fleet but this peer itself, so that a round of all
-/// that it knows has room for it. A flood of made-up ids must end somewhere.
-pub const MAX_KNOWN: usize = MEMBERS_MAX - 1;
+/// Most other peers known: the largest fleet but this peer itself. A flood of made-up ids must end somewhere.
+pub const MAX_KNOWN: usize = PEERS_MAX - 1;
 
 /// Hops and eccentricities count for so many of the longest intervals after they were
 /// heard: what a neighbour says of others comes round, and what is lost comes again.
@@ -93,6 +92,8 @@ pub struct Info {
     pub steady_since: Time,
     /// When its own beacon was last heard, without a relay.
     pub heard: Option<Time>,
+    /// Where it was by then: east and north, mm, and its heading, 1e-4 rad.
+    pub pose: Option<(i32, i32, i32)>,
 }
 
 /// All that a peer believes of others.
@@ -578,5 +579,6 @@ fn info_of(beacon: &Beacon, steady_since: Time, now: Time) -> Info {
         loop_hash: beacon.loop_hash,
         steady_since,
         heard: Some(now),
+        pose: Some((beacon.east_mm, beacon.north_mm, beacon.heading_e4)),
     }
 }

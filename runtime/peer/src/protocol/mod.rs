@@ -3,8 +3,8 @@
 //!
 //! [`sections`] holds the rules by which cells change hands, [`runs`] how they are
 //! written into a claim, [`rounds`] the exchange of bids, [`negotiation`] when each
-//! is used, [`division`] what a complete round decides. What travels is [`relay`]'s, and
-//! how much of it [`airtime`]'s.
+//! is used, [`division`] what a complete round decides, [`sharing`] what is taken without
+//! one. What travels is [`relay`]'s, and how much of it [`airtime`]'s.
 
 pub mod airtime;
 pub mod division;
@@ -15,6 +15,7 @@ pub mod relay;
 pub mod rounds;
 pub mod runs;
 pub mod sections;
+pub mod sharing;
 
 pub use negotiation::Negotiation;
 pub use sections::{LivePeers, Sections};

@@ -8,7 +8,11 @@
 //! | an open round with a member that is gone | at once | the next round |
 //! | an open round without all bids | W, doubling to 4 W0 | the next round |
 //! | a complete round without its division | 2 W | the next round |
+//! | nothing divided yet | 1.5 T of listening | a first section is taken |
+//! | only first sections, among few | 2 T | a round with loss |
 //! | orphans, and no round helped | 2 T + W0 + rank T/2 | the nearest are taken |
+//! | orphans, among many | 2 T, and an eighth of the way there (W0 at most) | the nearest are taken |
+//! | less than 2 T to fly, among many | once a T | the far part of a slower one's plan is taken |
 //! | idle, and a gain was computed from what is held | 10 T steady, 20 T calm | a round without loss |
 //! | idle, an owner makes no progress | its bound | the far half is taken |
 //! | idle, cells were beyond everybody | 10 T + rank T/2 | what the fuel allows of one run is taken |
@@ -18,9 +22,10 @@ use super::division::{self, CALM_PERIODS};
 use super::rounds::{HeardBid, OpenRound, Rounds};
 use super::runs::PlannedCell;
 use super::sections::{LivePeers, Sections};
+use super::sharing::Owner;
 use crate::Time;
 use crate::cells::CellSet;
-use crate::wire::limits::HOPS_MAX;
+use crate::wire::limits::{HOPS_MAX, MEMBERS_MAX};
 use crate::wire::message::{Bid, Epoch, Member};
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
@@ -41,10 +46,18 @@ const SPREAD: u64 = 7919;
 /// not. Two, so that one lost beacon or claim changes nothing.
 const STEADY_PERIODS: u64 = 2;
 
+/// A peer takes its first section after so many quarters of a period of listening: who began
+/// with it has said twice by then where it is.
+const FIRST_SECTION_QUARTERS: u64 = 6;
+
+/// Among many a peer waits for others to take orphans for this part of the time until it
+/// would be there: the nearest one first.
+const NEARNESS_PART: u64 = 8;
+
 /// After a decision cells count as orphans only after so many periods: the new owner's
 /// claim takes one to be stored, two to be spoken and passed on, and two more if it is
 /// lost once.
-const SETTLE_PERIODS: u64 = 5;
+pub const SETTLE_PERIODS: u64 = 5;
 
 /// A return, a join or an idle peer waits for so many periods: shorter absences are the
 /// rule on a lossy channel.
@@ -178,6 +191,12 @@ pub struct Negotiation {
     members: Vec<Member>,
     members_since: Time,
     foreseen_at: Option<Time>,
+    /// Whether this peer looked for a first section.
+    began: bool,
+    /// Whether what it lists is one that no round has divided yet.
+    provisional: bool,
+    /// When it last looked for whom to relieve.
+    relieved_at: Option<Time>,
     /// When cells that were beyond everybody were last looked at.
     left_over_at: Option<Time>,
     /// When the period began in which counters rise by a step.
@@ -211,6 +230,9 @@ impl Negotiation {
             members: Vec::new(),
             members_since: Time(0),
             foreseen_at: None,
+            began: false,
+            provisional: false,
+            relieved_at: None,
             left_over_at: None,
             period_since: None,
             adoptions: 0,
@@ -368,7 +390,10 @@ impl Negotiation {
             }
             return;
         }
-        let Some(orphaned_ms) = orphaned_ms else {
+        // What everybody took at first was divided by nobody.
+        let begun_ms = ctx.able_since.filter(|_| self.provisional);
+        let begun_ms = begun_ms.map(|t| ctx.now.since_ms(t));
+        let Some(orphaned_ms) = orphaned_ms.or(begun_ms) else {
             if ctx.gain_in_sight && self.may_gain(ctx) {
                 self.start(ctx, false, 0);
             }
@@ -409,7 +434,7 @@ impl Negotiation {
     }
 
     fn start(&mut self, ctx: &Context<'_>, loss: bool, retries: u32) {
-        if !ctx.members.iter().any(|m| m.id == self.me) {
+        if !ctx.members.iter().any(|m| m.id == self.me) || is_many(ctx) {
             return;
         }
         self.retries = retries;
@@ -432,6 +457,7 @@ impl Negotiation {
         let patient = PATIENT_PERIODS * ctx.period_ms;
         let rested = |t| ctx.now.since_ms(t) >= patient;
         let wants = self.rounds.open().is_none()
+            && !is_many(ctx)
             && self.orphan_since.is_none()
             && self.foreseen_at.is_none_or(rested)
             && self.may_gain(ctx);
@@ -519,6 +545,7 @@ impl Negotiation {
         };
         self.rounds.close();
         self.retries = 0;
+        self.provisional = false;
         self.decided_at = Some(now);
         worthwhile.then_some(adoption)
     }
@@ -535,6 +562,84 @@ impl Negotiation {
         self.cells_since = 0;
         self.adoptions = self.adoptions.saturating_add(1);
         true
+    }
+
+    /// Whether this peer is to take a first section: it listened for a while, and as far as
+    /// it knows nothing was divided yet. Asked once.
+    pub fn begins(&mut self, ctx: &Context<'_>) -> bool {
+        let listened_ms = FIRST_SECTION_QUARTERS * ctx.period_ms / 4;
+        let listened = ctx
+            .able_since
+            .is_some_and(|t| ctx.now.since_ms(t) >= listened_ms);
+        if self.began || !listened {
+            return false;
+        }
+        self.began = true;
+        let untouched = self.rounds.counter() == 0
+            && self.sections.epoch() == Epoch::default()
+            && self.sections.plan().is_empty();
+        self.provisional = untouched && ctx.members.len() > 1;
+        self.provisional
+    }
+
+    /// Among many: the orphans that this peer may take, and for how long there are some.
+    #[must_use]
+    pub fn orphans_among_many(&self, ctx: &Context<'_>) -> Option<(u64, CellSet)> {
+        let since = self
+            .orphan_since
+            .filter(|_| is_many(ctx) && !self.take_pending)?;
+        let orphaned_ms = ctx.now.since_ms(since);
+        (orphaned_ms >= STEADY_PERIODS * ctx.period_ms)
+            .then(|| (orphaned_ms, self.sections.orphans(ctx.live)))
+    }
+
+    /// Whether orphans have waited for long enough for those who would be there sooner.
+    #[must_use]
+    pub fn is_my_turn(&self, ctx: &Context<'_>, orphaned_ms: u64, way_ms: u64) -> bool {
+        let for_others_ms = (way_ms / NEARNESS_PART).min(ctx.base_wait_ms());
+        orphaned_ms >= STEADY_PERIODS * ctx.period_ms + for_others_ms
+    }
+
+    /// Whether this peer, among many, is to look whom it could relieve: it will have nothing
+    /// to fly before others have heard what it takes. Once a period.
+    pub fn may_relieve(&mut self, ctx: &Context<'_>, free_ms: u64) -> bool {
+        let rested = |t| ctx.now.since_ms(t) >= ctx.period_ms;
+        let may = is_many(ctx)
+            && ctx.able_since.is_some()
+            && !self.sections.complete()
+            && !self.take_pending
+            && self.orphan_since.is_none()
+            && self.rounds.open().is_none()
+            && free_ms <= STEADY_PERIODS * ctx.period_ms
+            && self.relieved_at.is_none_or(rested);
+        if may {
+            self.relieved_at = Some(ctx.now);
+        }
+        may
+    }
+
+    /// The live owners with what they have left, but for what others took of it since.
+    #[must_use]
+    pub fn owners(&self, ctx: &Context<'_>) -> Vec<Owner> {
+        let at_work = self
+            .progress
+            .iter()
+            .filter(|(id, _)| ctx.live.contains_key(id));
+        at_work
+            .filter_map(|(id, p)| {
+                let plan = self.sections.plan_of(*id);
+                let listed = u64::try_from(plan.len()).ok().filter(|n| *n > 0)?;
+                let kept = plan.iter().filter(|c| !self.sections.is_taken(ctx.live, c));
+                let plan: Vec<_> = kept.map(|c| (c.cell, c.direction)).collect();
+                let many = u64::try_from(plan.len()).unwrap_or(0);
+                let left_ms = p.end.since_ms(ctx.now) * many / listed;
+                Some(Owner {
+                    id: *id,
+                    plan,
+                    left_ms,
+                })
+            })
+            .collect()
     }
 
     /// The takes are durable.
@@ -555,6 +660,7 @@ impl Negotiation {
         self.dividing = None;
         self.bid_wanted = false;
         self.take_pending = false;
+        self.provisional = false;
     }
 
     /// Notes how other owners get on; the first ETA heard in an epoch bounds them.
@@ -603,6 +709,9 @@ impl Negotiation {
         }
         let stagger = self.rank(ctx) * ctx.period_ms / TAKE_STAGGER;
         if let Some(since) = self.orphan_since {
+            if is_many(ctx) {
+                return None;
+            }
             let patience = STEADY_PERIODS * ctx.period_ms + ctx.base_wait_ms() + stagger;
             return (ctx.now.since_ms(since) >= patience)
                 .then(|| self.nearest_run(orphans, lp))
@@ -676,6 +785,11 @@ impl Negotiation {
             Some((first..=last).map(|c| (c, Direction::Forward)).collect())
         }
     }
+}
+
+/// Whether there are too many for rounds.
+fn is_many(ctx: &Context<'_>) -> bool {
+    ctx.members.len() > MEMBERS_MAX
 }
 
 /// The second half of an owner's plan, from its far end.

@@ -27,7 +27,7 @@ use crate::output::Priority;
 use crate::protocol::airtime::Airtime;
 use crate::wire::key;
 use crate::wire::kinds::Kind;
-use crate::wire::limits::{CHUNKS_MAX, HOPS_MAX, MEMBERS_MAX};
+use crate::wire::limits::{CHUNKS_MAX, HOPS_MAX, PEERS_MAX};
 use crate::wire::message::{Beacon, Record};
 use skein_geometry::hash::Fnv;
 #[cfg(test)]
@@ -35,9 +35,9 @@ mod many_relays;
 
 use std::collections::BTreeMap;
 
-/// Most records held: 64 peers with a state, a bid, a claim, an order, a finish and
+/// Most records held: 256 peers with a state, a bid, a claim, an order, a finish and
 /// four events each, and one mission of 256 pieces.
-pub const MAX_RECORDS: usize = MEMBERS_MAX * 9 + CHUNKS_MAX as usize;
+pub const MAX_RECORDS: usize = PEERS_MAX * 9 + CHUNKS_MAX as usize;
 
 /// Most transmissions waiting: all records of one neighbourhood once.
 pub const MAX_QUEUE: usize = 128;
@@ -769,7 +769,7 @@ mod tests {
             [
                 ("records", 1, MAX_RECORDS),
                 ("queue", 0, MAX_QUEUE),
-                ("neighbours", 0, MEMBERS_MAX)
+                ("neighbours", 0, PEERS_MAX)
             ]
         );
     }

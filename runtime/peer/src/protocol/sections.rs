@@ -230,6 +230,22 @@ impl Sections {
         free
     }
 
+    /// Whether a live claim other than its owner's plans a cell at a higher stamp.
+    #[must_use]
+    pub fn is_taken(&self, live: &LivePeers, cell: &PlannedCell) -> bool {
+        let mine = self.plan.iter();
+        let outbids = |stamp: Stamp| stamp > cell.stamp;
+        mine.filter(|p| p.cell == cell.cell)
+            .any(|p| outbids(p.stamp))
+            || self.heard.iter().any(|(author, h)| {
+                live.get(author) == Some(&h.incarnation)
+                    && h.listed.contains(cell.cell)
+                    && h.claim.plan.iter().any(|l| {
+                        outbids(l.stamp) && cells_of(l.run, self.cells).any(|c| c == cell.cell)
+                    })
+            })
+    }
+
     /// Uncovered cells of another peer's newest plan, in its order of flight.
     #[must_use]
     pub fn plan_of(&self, author: u16) -> Vec<PlannedCell> {

@@ -4,7 +4,6 @@ use super::{beacon, covered, record};
 use crate::testing::{Harness, mission};
 use crate::wire::codec::Body;
 use crate::wire::kinds::{Kind, RECORD_MAX_BYTES};
-use crate::wire::limits::MEMBERS_MAX;
 use crate::wire::message::CellRun;
 use crate::wire::message::{Claim, Epoch, Finished, Firmness, Gossip, ListedRun, Stamp};
 use crate::{Input, PeerId, Report};
@@ -89,7 +88,7 @@ fn a_rival_loop_is_an_alarm_once_and_its_peer_no_member() {
 #[test]
 fn a_claim_of_another_loop_takes_nothing() {
     let mut h = Harness::started(2, mission(1, 6, 4));
-    h.run_s(25);
+    h.run_s(12);
     let plan = h.beliefs(1).plan;
     let mine = h.beliefs(1).loop_hash;
     let all = ListedRun {
@@ -124,7 +123,7 @@ fn a_claim_of_another_loop_takes_nothing() {
 }
 
 #[test]
-fn more_members_than_a_round_holds_do_not_stop_the_rounds() {
+fn among_more_than_a_round_holds_cells_are_taken_without_one() {
     let mut h = Harness::new(1, mission(1, 6, 4));
     h.start(1);
     h.run_s(2);
@@ -138,16 +137,10 @@ fn more_members_than_a_round_holds_do_not_stop_the_rounds() {
         }
         h.run_s(1);
     }
-    let bids = h.seat(1).said.iter().filter_map(|(_, _, b)| match b {
-        Body::Bid(bid) => Some(bid.clone()),
-        _ => None,
-    });
-    let bids: Vec<_> = bids.collect();
-    assert!(!bids.is_empty());
-    for bid in bids {
-        assert_eq!(bid.round.members.len(), MEMBERS_MAX);
-        assert_eq!(Body::Bid(bid).check(), Ok(()));
-    }
+    let bids = h.seat(1).said.iter();
+    let bids = bids.filter(|(_, _, b)| matches!(b, Body::Bid(_)));
+    assert_eq!(bids.count(), 0);
+    assert!(!h.beliefs(1).plan.is_empty());
 }
 
 #[test]

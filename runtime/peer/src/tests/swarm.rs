@@ -4,6 +4,7 @@ use super::covered;
 use crate::output::{Report, Status};
 use crate::testing::{Harness, mission};
 use crate::wire::codec::Body;
+use crate::wire::kinds::Kind;
 use crate::{Input, PeerId};
 use std::collections::BTreeSet;
 
@@ -27,6 +28,43 @@ fn two_share_an_area_in_one_round_and_finish_it() {
     assert_eq!(h.beliefs(1).epoch, h.beliefs(2).epoch);
     assert_eq!(h.beliefs(1).epoch.counter, 1);
     assert!(h.run_until(200, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+}
+
+#[test]
+fn everybody_flies_a_section_within_five_seconds_before_any_round() {
+    let mut h = Harness::started(5, mission(1, 10, 8));
+    assert!(h.run_until(5, |h| (1..=5).all(|id| !h.beliefs(id).plan.is_empty())));
+    let bids: usize = (1..=5).map(|id| h.count_said(id, Kind::Bid)).sum();
+    assert_eq!(bids, 0);
+    assert!(divided(&h, &[1, 2, 3, 4, 5]));
+    // A round divides anew what everybody took.
+    assert!(h.run_until(15, |h| h.beliefs(1).epoch.counter == 1));
+}
+
+#[test]
+fn twelve_share_an_area_and_take_over_without_a_round() {
+    let mut h = Harness::started(12, mission(1, 16, 12));
+    let all: Vec<u16> = (1..=12).collect();
+    assert!(h.run_until(15, |h| divided(h, &all)));
+    h.stop(5);
+    let left: Vec<u16> = all.into_iter().filter(|id| *id != 5).collect();
+    assert!(h.run_until(40, |h| divided(h, &left)));
+    assert!(h.run_until(300, |h| left.iter().all(|id| h.beliefs(*id).finished)));
+    let bids: usize = left.iter().map(|id| h.count_said(*id, Kind::Bid)).sum();
+    assert_eq!(bids, 0);
+}
+
+#[test]
+fn who_comes_late_to_many_relieves_somebody() {
+    let mut h = Harness::new(12, mission(1, 16, 12));
+    let first: Vec<u16> = (1..=11).collect();
+    first.iter().for_each(|id| h.start(*id));
+    assert!(h.run_until(20, |h| divided(h, &first)));
+    h.run_s(10);
+    h.start(12);
+    assert!(h.run_until(12, |h| h.beliefs(12).plan.len() > 2));
+    let all: Vec<u16> = (1..=12).collect();
+    assert!(h.run_until(10, |h| divided(h, &all)), "the owner yields");
 }
 
 #[test]

@@ -13,9 +13,12 @@ pub const GOSSIP_MAX: usize = 20;
 pub const INTERVAL_LEAST: u8 = 4;
 /// And the longest: sixteen periods. Whoever needs more air than that is out of reach.
 pub const INTERVAL_MOST: u8 = 64;
-/// Members of a round, and peers of a fleet, ground stations included: with more, gossip
-/// would not come round within the window in which hops count.
-pub const MEMBERS_MAX: usize = 64;
+/// Peers of a fleet, ground stations included: with more, gossip would not come round within
+/// the window in which hops count.
+pub const PEERS_MAX: usize = 256;
+/// Members of a round. Each bid crosses the whole component, so that beyond about ten UAVs
+/// the work is done sooner without rounds (decision 41).
+pub const MEMBERS_MAX: usize = 8;
 /// Runs in the plan of a claim: a section has at most six legs and the remains of a
 /// commitment, takeovers add a leg each; what does not fit is not flown.
 pub const PLAN_MAX: usize = 16;
@@ -85,7 +88,7 @@ fn check_beacon(b: &Beacon) -> Result<(), WireError> {
     check_pose(b.east_mm, b.north_mm, b.heading_e4)?;
     in_range("eccentricity", b.eccentricity <= HOPS_MAX)?;
     in_range("interval", is_interval(b.interval))?;
-    in_range("sharers", usize::from(b.sharers) <= MEMBERS_MAX + 1)?;
+    in_range("sharers", usize::from(b.sharers) <= PEERS_MAX + 1)?;
     at_most("gossip", b.gossip.len(), GOSSIP_MAX)?;
     in_range("hops", b.gossip.iter().all(|g| g.hops <= HOPS_MAX))?;
     in_range("interval", b.gossip.iter().all(|g| is_interval(g.interval)))

@@ -220,7 +220,7 @@ pub fn largest() -> Vec<Body> {
         firmness: Firmness::Done,
         stamp,
     };
-    let members = (u16::MAX - 63..=u16::MAX)
+    let members = (u16::MAX - 7..=u16::MAX)
         .map(|id| Member {
             id,
             incarnation: u32::MAX - u32::from(id % 2),
@@ -239,7 +239,7 @@ pub fn largest() -> Vec<Body> {
             counter: u32::MAX,
             eccentricity: HOPS_MAX,
             interval: INTERVAL_MOST,
-            sharers: u16::try_from(MEMBERS_MAX + 1).unwrap_or(u16::MAX),
+            sharers: u16::try_from(PEERS_MAX + 1).unwrap_or(u16::MAX),
             revision: u32::MAX,
             loop_hash: u64::MAX,
             cover_digest: u32::MAX,

@@ -8,7 +8,7 @@ use super::kinds::Kind;
 use super::limits::{
     BID_COVERED_MAX_BYTES, CHUNK_MAX_BYTES, CHUNKS_MAX, COMMITS_MAX, COVERED_MAX_BYTES, DONE_MAX,
     DURATION_MAX_MS, GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX, HOPS_MAX, INTERVAL_LEAST, INTERVAL_MOST,
-    MEMBERS_MAX, PLAN_MAX, POSITION_MAX_MM, SPEED_MAX_MMPS,
+    MEMBERS_MAX, PEERS_MAX, PLAN_MAX, POSITION_MAX_MM, SPEED_MAX_MMPS,
 };
 use core::fmt::Write as _;
 
@@ -135,7 +135,7 @@ const BEACON: &[Place] = &[
     at(
         "sharers",
         "how many it counts in its earshot, itself included",
-        Shape::Number(0, MEMBERS_MAX as i128 + 1),
+        Shape::Number(0, PEERS_MAX as i128 + 1),
     ),
     REVISION,
     LOOP_HASH,

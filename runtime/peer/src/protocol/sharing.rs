@@ -1,0 +1,361 @@
+//! What a peer takes without a round: its first section, orphans among many, and a part of
+//! what a slower one has left (D2.7 §3.6.5).
+//!
+//! A round asks every member for a bid, and a bid crosses the whole component; among many
+//! that takes longer than the work that it would save. What is here asks nobody: a peer
+//! computes from beacons and claims what it is to take, and a claim tells it. Views differ, so
+//! two may take the same cells: of two listings the lower stamp yields
+//! ([`super::sections`]). So what is computed here need not be the same everywhere, only
+//! nearly; nothing but the time of flight depends on it.
+
+use crate::wire::message::CellRun;
+use skein_flight::coverage::ring::{CoverageLoop, Direction};
+use skein_geometry::frame::Point;
+
+/// A part of a plan is taken over only if the work of the two then ends this much sooner: at
+/// most this many percent of the time that the owner alone needs.
+const RELIEF_PERCENT: u64 = 90;
+
+/// Where a peer that has no section yet would come onto the loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Site {
+    /// The boundary.
+    pub anchor: u16,
+    /// Who.
+    pub id: u16,
+}
+
+/// The section with which a peer begins: an even share of the loop near its site, in the
+/// order of all sites along the loop. Where sites are closer to each other than a share they
+/// are spread as little as possible: the squares of the shifts are least. `swarm` is how many
+/// are known to be there, `sites` where some of them are, this peer included.
+///
+/// Those who know the same sites compute disjoint sections, but perhaps where the loop is cut;
+/// those who know the sites of all, sections that cover the loop.
+#[must_use]
+pub fn first_section(mut sites: Vec<Site>, swarm: usize, cells: u16, me: u16) -> Option<CellRun> {
+    sites.sort_unstable();
+    let count = sites.len();
+    let swarm = i64::try_from(swarm.max(count)).ok()?;
+    let n = i64::from(cells);
+    let anchor = |i: usize| sites.get(i).map(|s| i64::from(s.anchor));
+    let gap = |i: &usize| match (anchor(*i), anchor(i + 1)) {
+        (Some(here), Some(next)) => next - here,
+        (here, _) => n + anchor(0).unwrap_or(0) - here.unwrap_or(0),
+    };
+    // The loop is cut where the widest gap ends.
+    let cut = (0..count).max_by_key(gap)? + 1;
+    sites.rotate_left(cut % count);
+    let first = i64::from(sites.first()?.anchor);
+    // In parts of a cell, so many to a cell as there are peers: a share is `n` of them.
+    let shifted = (0i64..).zip(&sites).map(|(i, site)| {
+        let along = (i64::from(site.anchor) - first).rem_euclid(n);
+        along * swarm - i * n
+    });
+    let shifted: Vec<i64> = shifted.collect();
+    let all_known = i64::try_from(count).is_ok_and(|k| k == swarm);
+    let spread = pooled(&shifted, all_known);
+    let mine = sites.iter().position(|s| s.id == me)?;
+    let start = spread.get(mine)? + i64::try_from(mine).ok()? * n;
+    let (from, to) = (start.div_euclid(swarm), (start + n).div_euclid(swarm));
+    let run = CellRun {
+        first: u16::try_from((first + from).rem_euclid(n)).ok()?,
+        count: u16::try_from(to - from).ok()?,
+    };
+    (run.count > 0).then_some(run)
+}
+
+/// The nearest sequence that never falls, by least squares; or, if all are to be one pool,
+/// their mean. (Pool adjacent violators: Ayer and others 1955.)
+fn pooled(values: &[i64], all: bool) -> Vec<i64> {
+    let mut pools: Vec<(i64, i64)> = Vec::new();
+    for value in values {
+        let mut pool = (*value, 1);
+        while let Some((sum, many)) = pools.last().copied()
+            && (all || sum.div_euclid(many) >= pool.0.div_euclid(pool.1))
+        {
+            pool = (pool.0 + sum, pool.1 + many);
+            pools.pop();
+        }
+        pools.push(pool);
+    }
+    let level = |(sum, many): (i64, i64)| (0..many).map(move |_| sum.div_euclid(many));
+    pools.into_iter().flat_map(level).collect()
+}
+
+/// A peer at work, as far as its claim tells.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Owner {
+    /// Who.
+    pub id: u16,
+    /// What it has left to fly, in order, but for what others took of it since.
+    pub plan: Vec<(u16, Direction)>,
+    /// When it will be done with that, milliseconds from now.
+    pub left_ms: u64,
+}
+
+/// A peer that will soon have nothing to fly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hand {
+    /// Who.
+    pub id: u16,
+    /// Where it will be then.
+    pub at: Point,
+    /// When, milliseconds from now.
+    pub free_ms: u64,
+}
+
+/// How this peer flies; it takes others to fly alike.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace<'a> {
+    /// The loop.
+    pub coverage_loop: &'a CoverageLoop,
+    /// Speed along the loop, mm/s.
+    pub speed_mmps: u32,
+    /// Time to turn round, milliseconds.
+    pub turn_ms: u32,
+}
+
+impl Pace<'_> {
+    /// The straight way from somewhere to a cell, and a turn, milliseconds.
+    #[must_use]
+    pub fn way_ms(&self, from: Point, cell: u16) -> u64 {
+        let to = self.coverage_loop.boundary(usize::from(cell)).position();
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a distance on the plane is small and positive"
+        )]
+        let way_mm = ((to - from).norm() * 1000.0) as u64;
+        way_mm * 1000 / u64::from(self.speed_mmps.max(1)) + u64::from(self.turn_ms)
+    }
+
+    /// How many of the last cells of an owner's plan a hand takes over so that both are done
+    /// at once, and when that is; `None` where it gains too little.
+    fn relieved(&self, owner: &Owner, hand: &Hand, least_ms: u64) -> Option<(usize, u64)> {
+        let many = u64::try_from(owner.plan.len()).ok().filter(|n| *n > 0)?;
+        let begins_ms = hand.free_ms + self.way_ms(hand.at, owner.plan.last()?.0);
+        let both_ms = owner.left_ms.checked_sub(begins_ms)?;
+        let taken = both_ms * many / (2 * owner.left_ms.max(1));
+        let after_ms = owner.left_ms * (many - taken) / many;
+        let done_ms = after_ms.max(begins_ms + owner.left_ms * taken / many);
+        // What is left to the owner has to last until it has heard of it.
+        let gains = done_ms * 100 <= owner.left_ms * RELIEF_PERCENT && after_ms >= least_ms;
+        let taken = usize::try_from(taken).ok().filter(|t| *t > 0 && gains)?;
+        Some((taken, done_ms))
+    }
+}
+
+/// What one of the hands takes over of whom: the last cells of a plan, from its end on. Each
+/// pair of an owner and a hand is judged by how much sooner the two are done together; the
+/// best pair goes first, and nobody is in two.
+#[must_use]
+pub fn relief(
+    owners: &[Owner],
+    hands: &[Hand],
+    me: u16,
+    pace: Pace<'_>,
+    least_ms: u64,
+) -> Option<Vec<(u16, Direction)>> {
+    let mut pairs: Vec<(u64, u16, u16, usize)> = Vec::new();
+    for owner in owners {
+        for hand in hands {
+            if let Some((taken, done_ms)) = pace.relieved(owner, hand, least_ms) {
+                let gain_ms = owner.left_ms - done_ms;
+                pairs.push((gain_ms, owner.id, hand.id, taken));
+            }
+        }
+    }
+    pairs.sort_unstable_by(|a, b| b.0.cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let mut met: Vec<(u16, u16)> = Vec::new();
+    for (_, owner, hand, taken) in pairs {
+        if met.iter().any(|(o, h)| *o == owner || *h == hand) {
+            continue;
+        }
+        if hand == me {
+            let plan = &owners.iter().find(|o| o.id == owner)?.plan;
+            let taken = plan.iter().rev().take(taken);
+            return Some(taken.map(|(cell, way)| (*cell, way.opposite())).collect());
+        }
+        met.push((owner, hand));
+    }
+    None
+}
+
+/// Of some orphaned cells the run that this peer reaches soonest from where it will be free,
+/// at most `most` cells from its nearer end on, and how long the way is, milliseconds.
+#[must_use]
+pub fn nearest_orphans(
+    runs: &[CellRun],
+    hand: &Hand,
+    most: u16,
+    pace: Pace<'_>,
+) -> Option<(u64, Vec<(u16, Direction)>)> {
+    let cells = u16::try_from(pace.coverage_loop.len()).ok()?;
+    let at = |run: &CellRun, k: u16| {
+        let c = (u32::from(run.first) + u32::from(k)) % u32::from(cells.max(1));
+        u16::try_from(c).unwrap_or(0)
+    };
+    let ends = runs.iter().filter(|r| r.count > 0).flat_map(|run| {
+        let (first, last) = (at(run, 0), at(run, run.count - 1));
+        let way = |cell| hand.free_ms + pace.way_ms(hand.at, cell);
+        [
+            (way(first), *run, Direction::Forward),
+            (way(last), *run, Direction::Backward),
+        ]
+    });
+    let (way_ms, run, direction) = ends.min_by_key(|(ms, run, d)| (*ms, run.first, *d))?;
+    let taken = run.count.min(most.max(1));
+    let cell = |k: u16| match direction {
+        Direction::Forward => at(&run, k),
+        Direction::Backward => at(&run, run.count - 1 - k),
+    };
+    Some((way_ms, (0..taken).map(|k| (cell(k), direction)).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::mission;
+    use std::sync::Arc;
+
+    fn sites(anchors: &[u16]) -> Vec<Site> {
+        let site = |(anchor, id): (&u16, u16)| Site {
+            anchor: *anchor,
+            id,
+        };
+        anchors.iter().zip(1..).map(site).collect()
+    }
+
+    fn sections(anchors: &[u16], swarm: usize, cells: u16) -> Vec<(u16, u16)> {
+        let ids = 1..=u16::try_from(anchors.len()).unwrap();
+        let run = |id| first_section(sites(anchors), swarm, cells, id);
+        ids.map(|id| run(id).map_or((0, 0), |r| (r.first, r.count)))
+            .collect()
+    }
+
+    #[test]
+    fn whoever_knows_all_sites_takes_an_even_part_of_the_loop() {
+        for anchors in [
+            vec![0, 25, 50, 75],
+            vec![3, 20, 61, 77],
+            vec![90, 91, 91, 92],
+            vec![7, 7, 7, 7, 7, 7, 7],
+            vec![99, 0, 1],
+            vec![42],
+        ] {
+            let mut times = vec![0; 100];
+            for (first, count) in sections(&anchors, anchors.len(), 100) {
+                let even = 100 / u16::try_from(anchors.len()).unwrap();
+                assert!(count == even || count == even + 1, "{anchors:?} {count}");
+                (0..count).for_each(|k| times[usize::from((first + k) % 100)] += 1);
+            }
+            assert!(times.iter().all(|t| *t == 1), "{anchors:?} {times:?}");
+        }
+    }
+
+    #[test]
+    fn sections_begin_near_where_their_owners_are() {
+        assert_eq!(
+            sections(&[10, 36, 60, 84], 4, 100),
+            [(10, 25), (35, 25), (60, 25), (85, 25)]
+        );
+        // Two bunches of a larger swarm: each spreads round its own place.
+        assert_eq!(
+            sections(&[20, 20, 70, 70], 10, 100),
+            [(15, 10), (25, 10), (65, 10), (75, 10)]
+        );
+        // And apart from others nobody is moved.
+        assert_eq!(
+            sections(&[5, 40, 90], 10, 100),
+            [(5, 10), (40, 10), (90, 10)]
+        );
+    }
+
+    #[test]
+    fn sections_of_known_sites_are_disjoint() {
+        for swarm in 3..9 {
+            let mut times = [0; 60];
+            for (first, count) in sections(&[50, 51, 3], swarm, 60) {
+                (0..count).for_each(|k| times[usize::from((first + k) % 60)] += 1);
+            }
+            assert!(times.iter().all(|t| *t <= 1), "{swarm} {times:?}");
+        }
+    }
+
+    fn with_loop(check: impl Fn(Pace<'_>)) {
+        let geometry = Arc::new(mission(1, 6, 4)).geometry().unwrap();
+        check(Pace {
+            coverage_loop: &geometry.coverage_loop,
+            speed_mmps: 12_000,
+            turn_ms: 8000,
+        });
+    }
+
+    fn hand(pace: Pace<'_>, id: u16, cell: usize) -> Hand {
+        let at = pace.coverage_loop.boundary(cell).position();
+        Hand { id, at, free_ms: 0 }
+    }
+
+    fn forward(cells: core::ops::Range<u16>) -> Vec<(u16, Direction)> {
+        cells.map(|c| (c, Direction::Forward)).collect()
+    }
+
+    #[test]
+    fn a_hand_takes_what_makes_both_end_at_once() {
+        with_loop(|pace| {
+            let owner = |left_ms| Owner {
+                id: 2,
+                plan: forward(0..20),
+                left_ms,
+            };
+            let me = hand(pace, 1, 19);
+            // 100 s of work, 8 s until the hand begins: 46 s each.
+            let taken = relief(&[owner(100_000)], &[me], 1, pace, 5000).unwrap();
+            let wanted = (11..20).rev().map(|c| (c, Direction::Backward));
+            assert_eq!(taken, wanted.collect::<Vec<_>>());
+            // The owner would be done with its part before it has heard of it.
+            assert_eq!(relief(&[owner(100_000)], &[me], 1, pace, 60_000), None);
+            // Nothing is gained where the way is as long as the work.
+            assert_eq!(relief(&[owner(9000)], &[me], 1, pace, 0), None);
+        });
+    }
+
+    #[test]
+    fn each_hand_relieves_another_owner_the_best_pair_first() {
+        with_loop(|pace| {
+            let owner = |id, cells: core::ops::Range<u16>, left_ms| Owner {
+                id,
+                plan: forward(cells),
+                left_ms,
+            };
+            let owners = [owner(3, 0..10, 100_000), owner(4, 10..20, 80_000)];
+            let (near, far) = (hand(pace, 1, 9), hand(pace, 2, 20));
+            let of = |me| relief(&owners, &[near, far], me, pace, 0).unwrap();
+            assert!(of(1).iter().all(|(c, _)| (0..10).contains(c)));
+            assert!(of(2).iter().all(|(c, _)| (10..20).contains(c)));
+            assert_eq!(relief(&owners, &[near, far], 7, pace, 0), None);
+        });
+    }
+
+    #[test]
+    fn orphans_are_taken_from_their_nearer_end() {
+        with_loop(|pace| {
+            let runs = [
+                CellRun { first: 4, count: 5 },
+                CellRun {
+                    first: 22,
+                    count: 4,
+                },
+            ];
+            let me = hand(pace, 1, 8);
+            let (way_ms, cells) = nearest_orphans(&runs, &me, 3, pace).unwrap();
+            let wanted = [8, 7, 6].map(|c| (c, Direction::Backward));
+            assert_eq!((way_ms, cells), (8000, wanted.to_vec()));
+            let me = hand(pace, 1, 22);
+            let (_, cells) = nearest_orphans(&runs, &me, 9, pace).unwrap();
+            assert_eq!(cells, [22, 23, 0, 1].map(|c| (c, Direction::Forward)));
+            assert_eq!(nearest_orphans(&[], &me, 9, pace), None);
+        });
+    }
+}
