@@ -483,8 +483,8 @@ const WRONG: &[(&str, &str, &str)] = &[
     ("count: 8,", "count: 0,", "fleet.count: 0 is out of range"),
     (
         "count: 8,",
-        "count: 65,",
-        "fleet.count: 65 is out of range; expected the number of UAVs, of which a round of the swarm carries at most 64, between 1 and 64",
+        "count: 257,",
+        "fleet.count: 257 is out of range; expected the number of UAVs, of which one peer knows at most 256, between 1 and 256",
     ),
     (
         "bank_deg: 45,",

@@ -511,14 +511,14 @@ mod tests {
             (|s| s.uavs.clear(), "error: fleet: there is no UAV"),
             (
                 |s| {
-                    s.uavs = (1..=65)
+                    s.uavs = (1..=257)
                         .map(|id| UavSpec {
                             id,
                             ..s.uavs[0].clone()
                         })
                         .collect()
                 },
-                "error: fleet: 65 UAVs are too many",
+                "error: fleet: 257 UAVs are too many",
             ),
             (
                 |s| s.uavs[1].id = 1,

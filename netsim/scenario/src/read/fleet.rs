@@ -215,7 +215,7 @@ fn generated(
     let in_file = f.need("count", "8")?.small(
         1,
         MAX_UAVS,
-        "the number of UAVs, of which a round of the swarm carries at most 64,",
+        "the number of UAVs, of which one peer knows at most 256,",
     )?;
     let count = over.peers.unwrap_or(in_file);
     if count == 0 || count > MAX_UAVS {
