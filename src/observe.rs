@@ -186,6 +186,7 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Mission(b) => serde_json::to_value(b),
         Body::Operator(b) => serde_json::to_value(b),
         Body::Finished(b) => serde_json::to_value(b),
+        Body::Heartbeat(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -249,6 +250,11 @@ fn words(body: &Body) -> String {
         Body::Mission(m) => format!("mission revision {} of {} pieces", m.revision, m.chunks),
         Body::Operator(order) => format!("{order:?}"),
         Body::Finished(f) => format!("revision {} is finished", f.revision),
+        Body::Heartbeat(h) => format!(
+            "at ({:.0}, {:.0}) m",
+            f64::from(h.east_dm) / 10.0,
+            f64::from(h.north_dm) / 10.0
+        ),
     }
 }
 

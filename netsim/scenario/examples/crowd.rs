@@ -114,6 +114,9 @@ fn tell(n: u32, rate_bps: u32, outcome: &Outcome, wall_s: f64) {
         report.violations.as_ref().map(|v| &v.counts),
         report.end_ms as f64 / 1000.0 / wall_s,
     );
+    for down in outcome.false_downs().iter().take(12) {
+        println!("    {down:?}");
+    }
     for v in outcome.violations().iter().take(6) {
         println!(
             "    {} at {} ms, peer {:?}: {}",

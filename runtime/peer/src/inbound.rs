@@ -6,6 +6,7 @@
 //! | a signature, where nobody signs | likewise: it would be passed on for nothing |
 //! | a beacon under this peer's own id and life with another boot nonce | a double: `life` |
 //! | anything else under its own id | an echo: `relay`; or news of another life: `life` |
+//! | a heartbeat | `membership`, `relay` |
 //! | a beacon | `membership`, `relay`, `cooperation` |
 //! | a relayed record that is held already, or older than what is held | nothing |
 //! | any other record | `cooperation` |
@@ -14,7 +15,7 @@ use crate::Incarnation;
 use crate::protocol::life::Life;
 use crate::wire::codec::{self, Body, WireError};
 use crate::wire::kinds::Kind;
-use crate::wire::message::{Beacon, Record};
+use crate::wire::message::{Beacon, Heartbeat, Record};
 use crate::wire::signature::{Off, Verifier};
 
 /// What was heard.
@@ -30,6 +31,8 @@ pub(crate) enum Heard {
     Echo(Record),
     /// A neighbour's beacon.
     Beacon(Record, Beacon),
+    /// A neighbour's heartbeat.
+    Heartbeat(Record, Heartbeat),
     /// A record of another peer.
     Record(Kind, Record, Body),
 }
@@ -58,8 +61,11 @@ pub(crate) fn read(bytes: &[u8], me: u16, life: &Life) -> Heard {
                 Heard::Myself(record.incarnation, b.heartbeat)
             }
         }
+        // Of a double its next beacon tells, with a nonce.
+        Body::Heartbeat(_) if record.author == me => Heard::Myself(record.incarnation, 0),
         _ if record.author == me => Heard::Echo(record),
         Body::Beacon(beacon) => Heard::Beacon(record, beacon),
+        Body::Heartbeat(heartbeat) => Heard::Heartbeat(record, heartbeat),
         body => Heard::Record(kind, record, body),
     }
 }

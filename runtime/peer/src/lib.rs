@@ -89,6 +89,7 @@ pub mod beliefs;
 pub mod cells;
 pub mod config;
 mod cooperation;
+mod coverage_told;
 mod effect;
 mod inbound;
 pub mod input;

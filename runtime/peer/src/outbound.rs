@@ -2,9 +2,10 @@
 //!
 //! | record | when |
 //! |---|---|
-//! | beacon | every I, ±10 %; at once, and four times in I, when this peer hears that it is suspected |
+//! | beacon | every I, ±10 % |
+//! | heartbeat | half-way between two beacons; at once, and four times in I, when this peer hears that it is suspected |
 //! | claim | at once when a section was adopted, within I when cells were taken or it shrank by a rule; every 10 I for its ETA |
-//! | cover | own or heard coverage is news, at most every 2 I; at most every I when a neighbour's beacon shows other coverage |
+//! | cover | own or heard coverage is news, at most every 2 I; at most every I when a neighbour's beacon shows other coverage. What is news is said twice; all of it every 6 I where a neighbour still knows other cells, at the end, and to who was not there lately |
 //! | state | every 10 I |
 //! | bid | once it is durable |
 //! | finished | once a mission revision |
@@ -14,6 +15,7 @@
 //! I is the interval that this peer's beacons announce, a period T where there is room.
 
 use crate::config::Role;
+use crate::coverage_told::CoverageTold;
 use crate::effect::{Effect, Effects};
 use crate::input::Time;
 use crate::mission::{Mission, chunks, mm};
@@ -23,7 +25,7 @@ use crate::timers::{Timer, Timers};
 use crate::wire::codec::{self, Body};
 use crate::wire::kinds::Kind;
 use crate::wire::limits::COVERED_MAX_BYTES;
-use crate::wire::message::{Activity, Beacon, Cover, Finished, Record, State};
+use crate::wire::message::{Activity, Beacon, Cover, Finished, Heartbeat, Record, State};
 use crate::{Incarnation, PeerConfig};
 use rand_chacha::ChaCha8Rng;
 use rand_core::Rng;
@@ -53,6 +55,8 @@ pub(crate) struct Sources<'a> {
     pub mission: Option<Arc<Mission>>,
     /// What it last sensed.
     pub percept: Option<&'a Percept>,
+    /// What it said last of coverage is not on the air yet: a later part would replace it.
+    pub cover_waits: bool,
 }
 
 /// What was said, and counted.
@@ -65,6 +69,7 @@ pub(crate) struct Outbound {
     last_beacon: Time,
     last_claim: Time,
     last_cover: Time,
+    coverage_told: CoverageTold,
     mission_said: Option<u64>,
 }
 
@@ -80,6 +85,7 @@ impl Outbound {
             last_beacon: Time(0),
             last_claim: Time(0),
             last_cover: Time(0),
+            coverage_told: CoverageTold::default(),
             mission_said: None,
         }
     }
@@ -107,6 +113,7 @@ impl Outbound {
         self.seq = 0;
         self.heartbeat = 0;
         self.mission_said = None;
+        self.coverage_told = CoverageTold::default();
         self.claim_changed(timers);
         self.coverage_changed(timers);
     }
@@ -120,6 +127,11 @@ impl Outbound {
     pub fn coverage_changed(&self, timers: &mut Timers) {
         let soonest = self.last_cover.plus_ms(COVER_INTERVALS * self.interval_ms);
         timers.set_earlier(Timer::Cover, soonest);
+    }
+
+    /// Somebody is heard who was not there lately.
+    pub fn meet(&mut self) {
+        self.coverage_told.meet();
     }
 
     /// A neighbour's beacon shows other coverage.
@@ -139,8 +151,8 @@ impl Outbound {
         if timers.is_due(Timer::Claim, s.now) {
             effects.extend(self.speak_claim(s, timers, rng));
         }
-        if timers.is_due(Timer::Cover, s.now) {
-            effects.push(self.speak_cover(s.now, state, timers, rng));
+        if timers.is_due(Timer::Cover, s.now) && !s.cover_waits {
+            effects.extend(self.speak_cover(s.now, state, timers, rng));
         }
         if timers.is_due(Timer::State, s.now) {
             let last = self.jittered(s.now, rng);
@@ -190,15 +202,24 @@ impl Outbound {
         state: &MissionState,
         timers: &mut Timers,
         rng: &mut ChaCha8Rng,
-    ) -> Effect {
+    ) -> Option<Effect> {
         timers.stop(Timer::Cover);
+        let loop_hash = state.loop_hash();
+        let told = &mut self.coverage_told;
+        let said = match told.next(now, loop_hash, state.covered(), self.interval_ms) {
+            Ok(said) => said,
+            Err(again) => {
+                timers.set(Timer::Cover, again);
+                return None;
+            }
+        };
         self.last_cover = self.jittered(now, rng);
         let cover = Cover {
             revision: state.revision(),
-            loop_hash: state.loop_hash(),
-            covered: state.covered().encode_rle(Some(COVERED_MAX_BYTES)),
+            loop_hash,
+            covered: said.encode_rle(Some(COVERED_MAX_BYTES)),
         };
-        Effect::Speak(0, Body::Cover(cover))
+        Some(Effect::Speak(0, Body::Cover(cover)))
     }
 
     /// The mission's body in pieces, once a revision and life.
@@ -235,7 +256,8 @@ impl Outbound {
         subject: u16,
         body: &Body,
     ) -> Record {
-        assert_ne!(body.kind(), Kind::Beacon, "beacons count for themselves");
+        let beats = matches!(body.kind(), Kind::Beacon | Kind::Heartbeat);
+        assert!(!beats, "beacons and heartbeats count for themselves");
         assert!(incarnation > 0, "nothing is spoken before the first life");
         self.seq = self.seq.saturating_add(1);
         Record {
@@ -256,7 +278,7 @@ impl Outbound {
 
     /// Somebody suspects this peer: it says that it lives, four times an interval, until it
     /// is believed or the verdict is passed at `until`. The suspicion tells that its
-    /// beacons collide, so these carry no gossip: what is short collides rarely.
+    /// beacons collide, so these are heartbeats: what is short collides rarely.
     pub fn refute(&self, now: Time, until: Time, timers: &mut Timers, rng: &mut ChaCha8Rng) {
         let t = self.interval_ms;
         timers.set(Timer::Refutation, until);
@@ -275,15 +297,16 @@ impl Outbound {
         }
     }
 
-    /// A beacon is due, full or bare: sets the time of the next. Between two full ones a
-    /// suspicion is answered by bare ones.
+    /// A beacon is due, or a heartbeat: sets the time of the next. Between two beacons
+    /// there is one heartbeat, and those that answer a suspicion.
     pub fn beacon_due(&self, now: Time, full: bool, timers: &mut Timers, rng: &mut ChaCha8Rng) {
         let t = self.interval_ms;
         let jitter = u64::from(rng.next_u32()) % (t / 5 + 1);
         if full {
-            timers.set(Timer::FullBeacon, now.plus_ms(t - t / 10 + jitter));
-        }
-        if let Some(next) = timers.at(Timer::FullBeacon) {
+            let next_ms = t - t / 10 + jitter;
+            timers.set(Timer::FullBeacon, now.plus_ms(next_ms));
+            timers.set(Timer::Beacon, now.plus_ms(next_ms / 2));
+        } else if let Some(next) = timers.at(Timer::FullBeacon) {
             timers.set(Timer::Beacon, next);
         }
         if timers.is_running(Timer::Refutation, now) {
@@ -291,30 +314,37 @@ impl Outbound {
         }
     }
 
-    /// The record of a beacon, which counts one heartbeat more.
-    pub fn beacon(
+    /// The record of a beacon or a heartbeat, which counts one heartbeat more.
+    pub fn beat(
         &mut self,
         now: Time,
         author: u16,
         incarnation: Incarnation,
-        beacon: Beacon,
+        body: &Body,
     ) -> Record {
         assert!(incarnation > 0, "nothing is spoken before the first life");
         self.heartbeat = self.heartbeat.saturating_add(1);
         self.last_beacon = now;
-        let beacon = Beacon {
-            heartbeat: self.heartbeat,
-            ..beacon
-        };
         Record {
             author,
             incarnation,
             seq: self.heartbeat,
-            kind: Kind::Beacon.number(),
+            kind: body.kind().number(),
             subject: 0,
-            body: codec::encode_body(&Body::Beacon(beacon)),
+            body: codec::encode_body(body),
             signature: Vec::new(),
         }
+    }
+}
+
+/// "I am here", without what the relay knows.
+pub(crate) fn heartbeat_of(s: &Sources<'_>) -> Heartbeat {
+    let pose = s.percept.map(|p| p.pose);
+    Heartbeat {
+        interval: 0,
+        sharers: 0,
+        east_dm: pose.map_or(0, |p| mm(p.east_m) / 100),
+        north_dm: pose.map_or(0, |p| mm(p.north_m) / 100),
     }
 }
 

@@ -28,7 +28,7 @@ use crate::timers::{Timer, Timers};
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
-use crate::wire::message::{Beacon, Member, Order, Record};
+use crate::wire::message::{Beacon, Heartbeat, Member, Order, Record};
 use crate::{Incarnation, Mission, PeerId};
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
@@ -43,6 +43,9 @@ pub const MAX_STORES: usize = 32;
 /// Most jobs under way: one geometry a mission revision, one division a round. Of more the
 /// oldest is given up: a driver that still works on it is too late.
 pub const MAX_JOBS: usize = 8;
+
+/// Whoever was not heard for so many intervals may have missed what was said meanwhile.
+const STRANGE_INTERVALS: u64 = 4;
 
 /// How often a peer looks at its deadlines, as a fraction of the beacon period.
 pub const CADENCE: u64 = 4;
@@ -206,7 +209,8 @@ impl Peer {
 
     fn on_received(&mut self, hops: u8, bytes: &[u8]) {
         let heard = inbound::read(bytes, self.config.id.0, &self.life);
-        if let Heard::Beacon(record, _) | Heard::Record(_, record, _) = &heard
+        if let Heard::Beacon(record, _) | Heard::Heartbeat(record, _) | Heard::Record(_, record, _) =
+            &heard
             && !self
                 .membership
                 .may_live_in(record.author, record.incarnation)
@@ -225,6 +229,13 @@ impl Peer {
                 self.on_myself(record.incarnation, 0, 0);
             }
             Heard::Beacon(record, beacon) => self.on_beacon(&record, &beacon),
+            Heard::Heartbeat(record, h) => {
+                let (now, author, life) = (self.now, record.author, record.incarnation);
+                let heartbeat = (record.seq, h.interval);
+                let changes = self.membership.on_heartbeat(now, author, life, heartbeat);
+                self.report_changes(changes);
+                self.relay.air.hear(now, author, (h.interval, h.sharers));
+            }
             Heard::Record(kind, record, body) => {
                 self.membership.hears(self.now);
                 if kind.relayed() && self.relay.offer(self.now, &record, bytes, hops) != Offer::New
@@ -246,6 +257,11 @@ impl Peer {
 
     fn on_beacon(&mut self, record: &Record, beacon: &Beacon) {
         let (now, author, me) = (self.now, record.author, self.config.id.0);
+        let lately_ms = STRANGE_INTERVALS * self.membership.interval_ms();
+        let heard = self.membership.info(author).and_then(|info| info.heard);
+        if heard.is_none_or(|t| now.since_ms(t) > lately_ms) {
+            self.outbound.meet();
+        }
         let changes = self
             .membership
             .on_beacon(now, author, record.incarnation, beacon);
@@ -422,48 +438,56 @@ impl Peer {
         self.relay.own(self.now, &record, bytes);
     }
 
-    /// "I am here", with gossip unless a suspicion is being answered.
+    /// "I am here": a beacon when one is due, else a heartbeat.
     fn beacon(&mut self) {
         let full = !self.timers.is_running(Timer::FullBeacon, self.now);
-        let plan = full.then(|| self.relay.air.plan_beacon(self.now));
-        if let Some(plan) = plan {
+        let entries = full.then(|| {
+            let plan = self.relay.air.plan_beacon(self.now);
             self.membership.announce(plan.interval);
             self.outbound.announce(self.relay.air.interval_ms());
-        }
+            plan.entries
+        });
         self.outbound
             .beacon_due(self.now, full, &mut self.timers, &mut self.rng);
         if !self.speaks() {
             return;
         }
-        let most = plan.map_or(0, |p| p.entries);
-        let mut gossip = self.membership.gossip(self.now, most);
-        for g in &mut gossip {
-            (g.max_seq, g.digest) = self.relay.version(g.id, g.incarnation);
-        }
-        let beacon = Beacon {
-            nonce: self.life.nonce(),
-            eccentricity: self.membership.eccentricity(self.now),
-            interval: self.relay.air.interval(),
-            sharers: self.relay.air.counted(),
-            gossip,
-            ..self.with_sources(|_, s, _, _| outbound::beacon_of(s))
-        };
         let me = self.me();
-        let record = self
-            .outbound
-            .beacon(self.now, me.id, me.incarnation, beacon);
-        let bytes = codec::encode_record(&record);
-        if full {
-            self.relay.air.charge(self.now, bytes.len());
+        let (interval, sharers) = (self.relay.air.interval(), self.relay.air.counted());
+        let body = if let Some(entries) = entries {
+            let mut gossip = self.membership.gossip(self.now, entries);
+            for g in &mut gossip {
+                (g.max_seq, g.digest) = self.relay.version(g.id, g.incarnation);
+            }
+            Body::Beacon(Beacon {
+                heartbeat: self.outbound.heartbeat().saturating_add(1),
+                nonce: self.life.nonce(),
+                eccentricity: self.membership.eccentricity(self.now),
+                interval,
+                sharers,
+                gossip,
+                ..self.with_sources(|_, s, _, _| outbound::beacon_of(s))
+            })
         } else {
+            Body::Heartbeat(Heartbeat {
+                interval,
+                sharers,
+                ..self.with_sources(|_, s, _, _| outbound::heartbeat_of(s))
+            })
+        };
+        let record = self.outbound.beat(self.now, me.id, me.incarnation, &body);
+        let bytes = codec::encode_record(&record);
+        if !full && self.timers.is_running(Timer::Refutation, self.now) {
             self.relay.air.charge_answer(self.now, bytes.len());
+        } else {
+            self.relay.air.charge(self.now, bytes.len());
         }
         self.outputs.push_back(Output::Publish {
-            key: key::key(&self.config.fleet, Kind::Beacon, 0, me.id),
+            key: key::key(&self.config.fleet, body.kind(), 0, me.id),
             bytes,
             hops: 0,
             priority: Priority::Beacon,
-            lifetime_ms: self.relay.lifetime_ms(Kind::Beacon),
+            lifetime_ms: self.relay.lifetime_ms(body.kind()),
         });
     }
 
@@ -597,6 +621,7 @@ impl Peer {
             mission_state: self.cooperation.state(),
             mission: self.cooperation.newest_mission(),
             percept: self.percept.as_ref(),
+            cover_waits: self.relay.waits(Kind::Cover),
         };
         ask(
             &mut self.outbound,

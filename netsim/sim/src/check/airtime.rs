@@ -2,7 +2,7 @@
 //! in (S9), beacons included, at any number of radios.
 
 use super::{Clocks, Findings, Snapshot};
-use skein_peer::protocol::airtime::{BURST_PERIODS, Filling, SHARE_PERCENT};
+use skein_peer::protocol::airtime::{BURST_PERIODS, Filling, SHARE_PERCENT, ms_of};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Over so long a time a share is kept.
@@ -16,9 +16,12 @@ const BEFORE_MS: u64 = 16_000;
 #[derive(Clone, Debug)]
 pub struct AirtimeCheck {
     rate_bps: u64,
+    period_ms: u64,
     burst_ms: u64,
     sent: BTreeMap<u16, VecDeque<(u64, u64)>>,
     frames: BTreeMap<u16, Filling>,
+    /// When each last sent a beacon or a heartbeat.
+    beats: BTreeMap<u16, u64>,
     sharers: BTreeMap<u16, VecDeque<(u64, u64)>>,
     over: Clocks<u16>,
 }
@@ -29,9 +32,11 @@ impl AirtimeCheck {
     pub fn new(rate_bps: u32, period_ms: u64) -> Self {
         Self {
             rate_bps: u64::from(rate_bps),
+            period_ms,
             burst_ms: BURST_PERIODS * period_ms,
             sent: BTreeMap::new(),
             frames: BTreeMap::new(),
+            beats: BTreeMap::new(),
             sharers: BTreeMap::new(),
             over: Clocks::default(),
         }
@@ -44,10 +49,15 @@ impl AirtimeCheck {
         self.sent.entry(id).or_default().push_back((now_ms, cost));
     }
 
-    /// What it sent last was a beacon without gossip: the answer to a suspicion, which has
-    /// a reserve of its own.
-    pub fn on_answer(&mut self, id: u16) {
-        self.sent.entry(id).or_default().pop_back();
+    /// What it sent last was a beacon or a heartbeat of this interval. A heartbeat that
+    /// comes less than two fifths of it after the last one answers a suspicion, which has a
+    /// reserve of its own: others come half-way, ±10 %.
+    pub fn on_beat(&mut self, now_ms: u64, id: u16, interval: u8, heartbeat: bool) {
+        let before = self.beats.insert(id, now_ms);
+        let early_ms = 2 * ms_of(interval, self.period_ms) / 5;
+        if heartbeat && before.is_some_and(|t| now_ms < t + early_ms) {
+            self.sent.entry(id).or_default().pop_back();
+        }
     }
 
     /// Judges what everybody sent within the window, by the fewest radios in its earshot
@@ -134,7 +144,7 @@ mod tests {
         let views: Vec<_> = (1..=50).map(|id| (id, speaking())).collect();
         for t in 0..60 {
             check.on_transmission(t * 250, 1, 50);
-            check.on_answer(1);
+            check.on_beat(t * 250, 1, 4, true);
             story.snapshot(t * 250, &views, |s| check.on_snapshot(s, &mut found));
         }
         assert!(found.counts.is_empty());

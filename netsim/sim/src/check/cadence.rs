@@ -16,11 +16,11 @@ const CLAIM_QUARTERS: u64 = 4 * 10 + 1 + 1;
 /// Clocks count whole milliseconds, and a timer is set a few times in a duration.
 const ROUNDING_MS: u64 = 5;
 
-/// k1 = 4 + D/4 at the least diameter 1, in quarters of an interval.
-const LEAST_K1_QUARTERS: u64 = 16 + 1;
+/// k1 = 3 + D/4 at the least diameter 1, in quarters of an interval.
+const LEAST_K1_QUARTERS: u64 = 12 + 1;
 
-/// k2 = 4 + D/2 at the least diameter 1, in quarters of an interval.
-const LEAST_K2_QUARTERS: u64 = 16 + 2;
+/// k2 = 3 + D/2 at the least diameter 1, in quarters of an interval.
+const LEAST_K2_QUARTERS: u64 = 12 + 2;
 
 /// A heartbeat as a neighbour received it from its author.
 #[derive(Clone, Copy, Debug)]
@@ -102,7 +102,7 @@ impl CadenceCheck {
         }
     }
 
-    /// A peer puts its own beacon on the air: whoever suspects it is answered.
+    /// A peer puts its own beacon or heartbeat on the air: whoever suspects it is answered.
     pub fn on_beacon_spoken(&mut self, id: u16, interval: u8) {
         self.accused.stop(id);
         let interval_ms = ms_of(interval, self.period_ms);
@@ -125,6 +125,23 @@ impl CadenceCheck {
         self.announced.get(&id).copied().unwrap_or(self.period_ms)
     }
 
+    /// A running peer receives a heartbeat from its author, that arrived then, with what
+    /// its author announced.
+    pub fn on_heartbeat_heard(
+        &mut self,
+        arrived_ms: u64,
+        by: u16,
+        (author, incarnation): (u16, Incarnation),
+        interval: u8,
+    ) {
+        let heard = Heard {
+            incarnation,
+            at_ms: arrived_ms,
+            interval_ms: ms_of(interval, self.period_ms),
+        };
+        self.heard.insert((author, by), heard);
+    }
+
     /// A running peer receives a beacon from its author, that arrived then; `life` is the
     /// receiver's own.
     pub fn on_beacon_heard(
@@ -134,12 +151,7 @@ impl CadenceCheck {
         (author, incarnation): (u16, Incarnation),
         beacon: &Beacon,
     ) {
-        let heard = Heard {
-            incarnation,
-            at_ms: arrived_ms,
-            interval_ms: ms_of(beacon.interval, self.period_ms),
-        };
-        self.heard.insert((author, by), heard);
+        self.on_heartbeat_heard(arrived_ms, by, (author, incarnation), beacon.interval);
         let of_me = beacon.gossip.iter().filter(|g| g.id == by);
         for told in of_me.filter(|g| g.incarnation == life) {
             if told.suspected_ds.is_some() {
@@ -287,10 +299,10 @@ mod tests {
     #[test]
     fn a_suspicion_or_a_death_too_soon_after_a_heartbeat_is_found() {
         for (status, after_ms, broken) in [
-            (Status::Suspect, 3_900, true),
-            (Status::Suspect, 4_250, false),
-            (Status::Down, 7_200, true),
-            (Status::Down, 8_750, false),
+            (Status::Suspect, 2_900, true),
+            (Status::Suspect, 3_250, false),
+            (Status::Down, 5_500, true),
+            (Status::Down, 6_750, false),
             (Status::Alive, 1, false),
         ] {
             let (mut c, mut found) = check();

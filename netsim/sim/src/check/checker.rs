@@ -15,7 +15,7 @@ use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::journal::Durable;
 use skein_peer::output::Status;
-use skein_peer::wire::message::Bid;
+use skein_peer::wire::message::{Bid, Heartbeat};
 use skein_peer::{Beliefs, Report};
 use std::collections::BTreeMap;
 
@@ -262,6 +262,11 @@ impl Checker {
     pub fn on_transmission(&mut self, now_ms: u64, id: u16, bytes: usize) {
         self.rules
             .on_transmission(now_ms, id, bytes, &self.handicaps, &mut self.found);
+    }
+
+    /// A peer publishes its own heartbeat.
+    pub fn on_heartbeat(&mut self, now_ms: u64, id: u16, heartbeat: &Heartbeat) {
+        self.rules.on_heartbeat(now_ms, id, heartbeat);
     }
 
     /// A peer publishes its own beacon while it believes this.

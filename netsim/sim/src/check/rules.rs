@@ -17,7 +17,7 @@ use skein_peer::mission::{Mission, chunks, point_m};
 use skein_peer::offload::MissionGeometry;
 use skein_peer::output::Status;
 use skein_peer::wire::codec::Body;
-use skein_peer::wire::message::Bid;
+use skein_peer::wire::message::{Bid, Heartbeat};
 use skein_peer::{Beliefs, Incarnation, Report};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -168,10 +168,14 @@ impl Rules {
             let author = (id, said.record.incarnation);
             self.spoken.on_beacon(now_ms, author, beacon, view, found);
             self.cadence.on_beacon_spoken(id, beacon.interval);
-            if beacon.gossip.is_empty() {
-                self.airtime.on_answer(id);
-            }
+            self.airtime.on_beat(now_ms, id, beacon.interval, false);
         }
+    }
+
+    /// A peer puts its own heartbeat on the air.
+    pub fn on_heartbeat(&mut self, now_ms: u64, id: u16, heartbeat: &Heartbeat) {
+        self.cadence.on_beacon_spoken(id, heartbeat.interval);
+        self.airtime.on_beat(now_ms, id, heartbeat.interval, true);
     }
 
     /// A peer publishes a record of its own; `seen` tells what cameras saw of which loop.
@@ -209,6 +213,11 @@ impl Rules {
             let author = (said.record.author, said.record.incarnation);
             self.cadence
                 .on_beacon_heard((now_ms, arrived_ms), (id, life), author, beacon);
+        }
+        if let Body::Heartbeat(heartbeat) = &said.body {
+            let author = (said.record.author, said.record.incarnation);
+            self.cadence
+                .on_heartbeat_heard(arrived_ms, id, author, heartbeat.interval);
         }
         if let Body::Bid(bid) = &said.body {
             self.patience.on_bid_heard(now_ms, id, bid);

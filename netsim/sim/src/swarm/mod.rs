@@ -703,6 +703,9 @@ impl Swarm {
                 self.checker
                     .on_beacon(self.now_ms, id, &said, &peer.beliefs());
             }
+            if let wire::codec::Body::Heartbeat(heartbeat) = &said.body {
+                self.checker.on_heartbeat(self.now_ms, id, heartbeat);
+            }
             // Of another loop than the one that cells are counted on only its peer knows what
             // its runs bridge.
             let other = said.claim.as_ref().map(|c| c.loop_hash);

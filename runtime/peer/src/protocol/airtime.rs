@@ -3,12 +3,12 @@
 //!
 //! | event | what follows |
 //! |---|---|
-//! | a beacon is heard | its author shares the channel for ten of its intervals; so do as many as it says that it shares with |
+//! | a beacon or a heartbeat is heard | its author shares the channel for ten of its intervals; so do as many as it says that it shares with |
 //! | a record is sent | it is paid for; one that is larger than the bucket goes when the bucket is full, and the rest is owed |
 //! | another follows in the same instant | it shares the headers of the first while one transmission holds both |
-//! | a beacon is sent | it is paid for, if need be later: what is owed makes everything else wait |
+//! | a beacon or a heartbeat is sent | it is paid for, if need be later: what is owed makes everything else wait |
 //! | a suspicion is answered | it is paid from a reserve, and from the share when the reserve is empty |
-//! | a full beacon is due | its interval is the shortest in which half of the share carries it, 16 T at most |
+//! | a beacon is due | its interval is the shortest in which three fifths of the share carry it and a heartbeat, 16 T at most |
 //!
 //! Who shares a channel is the most that this peer or a neighbour counts: a station hears
 //! nothing of those behind its neighbours, and its neighbours hear them all. Counting for
@@ -17,7 +17,6 @@
 
 use crate::input::Time;
 use crate::wire::limits::{GOSSIP_MAX, INTERVAL_LEAST, INTERVAL_MOST, PEERS_MAX};
-use crate::wire::message::Beacon;
 use std::collections::BTreeMap;
 
 /// Share of the channel that all in one earshot may use together. Peers that do not hear
@@ -81,14 +80,21 @@ const FIRST_BEACONS: u8 = 3;
 /// ran for hours.
 const BARE_BYTES: usize = 58;
 
+/// A heartbeat, likewise.
+const HEARTBEAT_BYTES: usize = 31;
+
+/// Of a share beacons and heartbeats take so much at most, percent.
+const BEACON_PERCENT: u64 = 60;
+
 /// And an entry of gossip.
 const ENTRY_BYTES: usize = 17;
 
-/// A beacon that carries gossip carries so many entries: one for news, two for the rotation.
-const LEAST_ENTRIES: usize = 3;
+/// A beacon carries so many entries at least: one for news, three for those who are far and
+/// for the rotation.
+const LEAST_ENTRIES: usize = 4;
 
-/// What a suspicion is answered from: so many bare beacons, refilled by a quarter of the
-/// share. At four an interval that is a whole k2 at D = 1.
+/// What a suspicion is answered from: so many heartbeats, refilled by a quarter of the
+/// share. At four an interval that is more than a whole k2 at D = 1.
 const RESERVE_BEACONS: i64 = 16;
 
 /// Longer pauses refill nothing more, milliseconds.
@@ -142,14 +148,15 @@ impl Airtime {
         }
     }
 
-    /// A neighbour's beacon.
-    pub fn hear(&mut self, now: Time, author: u16, beacon: &Beacon) {
+    /// A neighbour's beacon or heartbeat: its interval in quarters of T, and among how many
+    /// it counts itself.
+    pub fn hear(&mut self, now: Time, author: u16, (interval, sharers): (u8, u16)) {
         self.neighbours.retain(|_, n| n.until > now);
         if self.neighbours.len() < PEERS_MAX || self.neighbours.contains_key(&author) {
-            let lasts_ms = LASTING_INTERVALS * ms_of(beacon.interval, self.period_ms);
+            let lasts_ms = LASTING_INTERVALS * ms_of(interval, self.period_ms);
             let heard = Neighbour {
                 until: now.plus_ms(lasts_ms),
-                sharers: beacon.sharers,
+                sharers,
             };
             self.neighbours.insert(author, heard);
         }
@@ -198,15 +205,15 @@ impl Airtime {
         self.refill(now);
         self.planned = self.planned.saturating_add(1).min(FIRST_BEACONS);
         let share = self.share_bytes_ps(self.sharers());
-        let half = (share * self.period_ms / 2000).max(1);
-        let bare = (BARE_BYTES + OVERHEAD_BYTES) as u64;
+        let part = (share * self.period_ms * BEACON_PERCENT / 100_000).max(1);
+        let bare = (BARE_BYTES + HEARTBEAT_BYTES + 2 * OVERHEAD_BYTES) as u64;
         let least = bare + (LEAST_ENTRIES * ENTRY_BYTES) as u64;
         let most = INTERVAL_MOST.min(self.interval.saturating_mul(2));
-        let interval = u8::try_from((4 * least).div_ceil(half)).unwrap_or(INTERVAL_MOST);
+        let interval = u8::try_from((4 * least).div_ceil(part)).unwrap_or(INTERVAL_MOST);
         self.interval = interval.clamp(INTERVAL_LEAST, most);
         // What nothing else has used is there for gossip.
         let unused = u64::try_from(self.tokens_millibytes / 2000).unwrap_or(0);
-        let room = (half * u64::from(self.interval) / 4).max(unused);
+        let room = (part * u64::from(self.interval) / 4).max(unused);
         let entries = usize::try_from(room.saturating_sub(bare)).unwrap_or(0) / ENTRY_BYTES;
         BeaconPlan {
             interval: self.interval,
@@ -294,7 +301,7 @@ pub fn ms_of(interval: u8, period_ms: u64) -> u64 {
 }
 
 fn full_reserve() -> i64 {
-    RESERVE_BEACONS * millibytes(BARE_BYTES + OVERHEAD_BYTES)
+    RESERVE_BEACONS * millibytes(HEARTBEAT_BYTES + OVERHEAD_BYTES)
 }
 
 fn millibytes(bytes: usize) -> i64 {
@@ -307,14 +314,15 @@ fn millibytes(bytes: usize) -> i64 {
 mod tests {
     use super::*;
     use crate::wire::codec::{self, Body};
-    use crate::wire::message::Record;
+    use crate::wire::limits::POSITION_MAX_MM;
+    use crate::wire::message::{Beacon, Heartbeat, Record};
     use crate::wire::samples;
 
     fn air(rate_bps: u32, neighbours: u16) -> Airtime {
         let mut air = Airtime::new(rate_bps, 1000);
         air.planned = FIRST_BEACONS;
         for author in 1..=neighbours {
-            air.hear(Time(0), author, &samples::beacon(1));
+            air.hear(Time(0), author, (4, 3));
         }
         air
     }
@@ -350,10 +358,26 @@ mod tests {
         let entry = beacon_bytes(11) - beacon_bytes(1);
         // Counters of this sample have run for a day.
         assert!(entry <= 10 * (ENTRY_BYTES + 4), "{entry}");
+        let heartbeat = Record {
+            author: 100,
+            incarnation: 2,
+            seq: 30_000,
+            kind: 12,
+            subject: 0,
+            body: codec::encode_body(&Body::Heartbeat(Heartbeat {
+                interval: 64,
+                sharers: 65,
+                east_dm: -POSITION_MAX_MM / 100,
+                north_dm: -POSITION_MAX_MM / 100,
+            })),
+            signature: Vec::new(),
+        };
+        let bytes = codec::encode_record(&heartbeat).len();
+        assert!(bytes <= HEARTBEAT_BYTES, "{bytes}");
     }
 
     #[test]
-    fn beacons_take_half_of_the_share_at_most() {
+    fn beacons_and_heartbeats_take_three_fifths_of_the_share_at_most() {
         for (rate_bps, neighbours) in [
             (64_000, 0),
             (64_000, 7),
@@ -370,9 +394,13 @@ mod tests {
             for t in 1..6 {
                 plan = air.plan_beacon(Time(100 + t));
             }
-            let bytes = (BARE_BYTES + OVERHEAD_BYTES + plan.entries * ENTRY_BYTES) as u64;
+            let bytes = BARE_BYTES + HEARTBEAT_BYTES + 2 * OVERHEAD_BYTES;
+            let bytes = (bytes + plan.entries * ENTRY_BYTES) as u64;
             let per_s = bytes * 4 / u64::from(plan.interval);
-            assert!(per_s * 2 <= share + 2, "{rate_bps} {neighbours}: {plan:?}");
+            assert!(
+                per_s * 5 <= (share + 2) * 3,
+                "{rate_bps} {neighbours}: {plan:?}"
+            );
             assert!(
                 plan.interval == 4 || plan.entries == LEAST_ENTRIES,
                 "{plan:?}"
@@ -399,11 +427,7 @@ mod tests {
     fn whoever_hears_most_of_a_channel_says_among_how_many_it_is_shared() {
         let mut air = air(64_000, 3);
         assert_eq!((air.counted(), air.sharers()), (4, 4));
-        let crowded = Beacon {
-            sharers: 12,
-            ..samples::beacon(2)
-        };
-        air.hear(Time(500), 3, &crowded);
+        air.hear(Time(500), 3, (4, 12));
         assert_eq!((air.counted(), air.sharers()), (4, 12));
         air.plan_beacon(Time(10_200));
         assert_eq!((air.counted(), air.sharers()), (2, 12));
@@ -417,10 +441,10 @@ mod tests {
         air.refill(Time(3000));
         // The bucket is full, and stays so.
         for t in 0..RESERVE_BEACONS.unsigned_abs() {
-            air.charge_answer(Time(3000 + t), BARE_BYTES);
+            air.charge_answer(Time(3000 + t), HEARTBEAT_BYTES);
         }
         assert_eq!(air.tokens_millibytes, 1_200_000);
-        air.charge_answer(Time(3000 + 16), BARE_BYTES);
+        air.charge_answer(Time(3000 + 16), HEARTBEAT_BYTES);
         assert!(air.tokens_millibytes < 1_200_000);
     }
 

@@ -1,10 +1,10 @@
-//! Who is there: one-hop beacons, gossiped heartbeats with their ages, suspicion, and
+//! Who is there: one-hop heartbeats, gossiped with their ages, suspicion, and
 //! a bound that holds at any loss.
 //!
 //! Carries out the fault detection of D2.7 §3.6: who is lost is found without a
 //! leader, and everybody in a component knows within one bound. With the interval I
 //! that an author announced with its heartbeat, the longest interval T' that anybody alive
-//! announced (a period T at least), and the hop diameter D, k1 = 4 + D/4 and k2 = 4 + D/2:
+//! announced (a period T at least), and the hop diameter D, k1 = 3 + D/4 and k2 = 3 + D/2:
 //!
 //! | state | event | next state |
 //! |---|---|---|
@@ -158,8 +158,8 @@ impl Membership {
         let doubt = if now < self.doubt_until { 2 } else { 1 };
         let interval_ms = self.interval_ms();
         let diameter = u64::from(self.diameter_within(now, HOP_INTERVALS * interval_ms));
-        let k1_quarters = doubt * (16 + diameter);
-        let k2_ms = doubt * interval_ms * (8 + diameter) / 2;
+        let k1_quarters = doubt * (12 + diameter);
+        let k2_ms = doubt * interval_ms * (6 + diameter) / 2;
         let travel_ms = (diameter + 2) * interval_ms;
         Patience {
             interval_ms,
@@ -183,27 +183,13 @@ impl Membership {
         incarnation: Incarnation,
         beacon: &Beacon,
     ) -> Vec<Change> {
-        let mut changes = Vec::new();
+        let count = beacon.heartbeat;
+        let heartbeat = (count, beacon.interval);
+        let mut changes = self.on_heartbeat(now, author, incarnation, heartbeat);
+        let limits = self.patience(now);
         if author == self.me {
             return changes;
         }
-        self.hears(now);
-        let limits = self.patience(now);
-        let age = Age {
-            told_ms: 0,
-            at: now,
-        };
-        let count = beacon.heartbeat;
-        let own = Heartbeat {
-            id: author,
-            incarnation,
-            count,
-            age,
-            hops: 1,
-            interval: beacon.interval,
-            suspected: None,
-        };
-        self.hear(now, own, limits, &mut changes);
         let Some(teller) = self.known.get_mut(&author) else {
             return changes;
         };
@@ -217,6 +203,37 @@ impl Membership {
                 self.on_gossip(now, told, beacon, limits, &mut changes);
             }
         }
+        changes
+    }
+
+    /// A heartbeat, heard from its author directly. Returns what changed.
+    pub fn on_heartbeat(
+        &mut self,
+        now: Time,
+        author: u16,
+        incarnation: Incarnation,
+        (count, interval): (u32, u8),
+    ) -> Vec<Change> {
+        let mut changes = Vec::new();
+        if author == self.me {
+            return changes;
+        }
+        self.hears(now);
+        let limits = self.patience(now);
+        let age = Age {
+            told_ms: 0,
+            at: now,
+        };
+        let own = Heartbeat {
+            id: author,
+            incarnation,
+            count,
+            age,
+            hops: 1,
+            interval,
+            suspected: None,
+        };
+        self.hear(now, own, limits, &mut changes);
         changes
     }
 
@@ -241,10 +258,12 @@ impl Membership {
             interval: told.interval,
             suspected: told.suspected_ds.map(age),
         };
-        if !self.hear(now, heartbeat, limits, changes) {
-            return;
-        }
+        let fresher = self.hear(now, heartbeat, limits, changes);
         if let Some(known) = self.known.get_mut(&told.id) {
+            known.note_told(now, told, limits.interval_ms);
+            if !fresher {
+                return;
+            }
             known.info.able = told.able;
             // Members work on one loop: who is said to be able by a peer is on that peer's
             // loop, until its own beacon says otherwise.
@@ -442,7 +461,8 @@ impl Membership {
 
     /// What to say of others: at most `max` entries. Who began a life anew without
     /// knowing is reminded first (a quarter of the entries at most), then news (half of
-    /// the rest at most), then all in rotation, so that nobody is left out for long. The
+    /// the rest at most), then those whom a neighbour is farther from than this peer (two
+    /// thirds of the rest), then all in rotation, so that nobody is left out for long. The
     /// relay fills in the versions of records.
     pub fn gossip(&mut self, now: Time, max: usize) -> Vec<Gossip> {
         let reminders = self.known.values().filter_map(|k| k.reminder(now));
@@ -453,6 +473,17 @@ impl Membership {
         // The latest news first: a flood of them must not starve the last one.
         ids.sort_by_key(|id| core::cmp::Reverse(self.known.get(id).map(|k| k.urgent_until)));
         ids.truncate(max / 2);
+        let others = self.known.iter().filter(|(id, _)| !ids.contains(id));
+        let wanted = others.filter(|(_, k)| k.wanted_until > now);
+        let mut wanted: Vec<(Time, u16)> = wanted.map(|(id, k)| (k.told, *id)).collect();
+        wanted.sort_unstable();
+        let room = max - ids.len();
+        ids.extend(
+            wanted
+                .iter()
+                .take(room - room.div_ceil(3))
+                .map(|(_, id)| *id),
+        );
         let rotation = self
             .known
             .range(self.next_gossip..)
@@ -466,6 +497,11 @@ impl Membership {
             self.next_gossip = last.wrapping_add(1);
         }
         ids.extend(rest);
+        for id in &ids {
+            if let Some(known) = self.known.get_mut(id) {
+                known.told = now;
+            }
+        }
         let entries = ids.iter().filter_map(|id| self.known.get(id));
         told.extend(entries.map(|k| k.gossip(now)));
         told

@@ -15,7 +15,7 @@
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
 //! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
 //! | this peer's own bid, claim or order | it was sent, and nobody is heard passing it on | sent again, twice at most |
-//! | waiting | the share allows it, it is this peer's own bid, claim or cover, or nothing is due earlier | sent |
+//! | waiting | the share allows it, it is this peer's own bid or claim, or nothing is due earlier | sent |
 //! | waiting for its random time | something is sent, one transmission holds both, and more than twelve share the channel | sent with it |
 //! | waiting | its lifetime is over, or the queue is full of what is more urgent | not sent |
 //!
@@ -281,9 +281,9 @@ impl Relay {
         each_ms * self.air.sharers().max(LEAST_SPREAD)
     }
 
-    /// By when a record is to be sent: what others wrote may wait an interval, telemetry
-    /// one or two more. Where all are late, each class gets its part: nothing waits for
-    /// ever behind what is more urgent.
+    /// By when a record is to be sent: own coverage at once, what others wrote may wait an
+    /// interval, telemetry one or two more. Where all are late, each class gets its part:
+    /// nothing waits for ever behind what is more urgent.
     fn due(&self, key: &RecordKey, from: Time, priority: Priority) -> Time {
         let telemetry = priority == Priority::Telemetry;
         let intervals = match (key.0 == self.me, telemetry) {
@@ -294,10 +294,9 @@ impl Relay {
         from.plus_ms(intervals * self.air.interval_ms())
     }
 
-    /// What this peer bids, claims and covers itself goes before all else: nobody else can
-    /// say it.
+    /// What this peer bids and claims itself goes before all else: nobody else can say it.
     fn is_its_own_to_say(&self, key: &RecordKey, priority: Priority) -> bool {
-        key.0 == self.me && priority <= Priority::Beacon
+        key.0 == self.me && priority <= Priority::Claim
     }
 
     fn jitter(&self, key: &RecordKey, version: (Incarnation, u32)) -> u64 {
@@ -357,6 +356,12 @@ impl Relay {
         assert!(self.queue.len() <= MAX_QUEUE, "the queue keeps to its cap");
     }
 
+    /// Whether a record of this peer's own waits to be sent.
+    #[must_use]
+    pub fn waits(&self, kind: Kind) -> bool {
+        self.queue.contains_key(&(self.me, kind.number(), 0))
+    }
+
     /// How long a record of this kind is worth sending, milliseconds.
     #[must_use]
     pub fn lifetime_ms(&self, kind: Kind) -> u32 {
@@ -365,7 +370,8 @@ impl Relay {
 
     /// A neighbour's beacon: what it lacks is queued for it.
     pub fn on_beacon(&mut self, now: Time, author: u16, beacon: &Beacon) {
-        self.air.hear(now, author, beacon);
+        self.air
+            .hear(now, author, (beacon.interval, beacon.sharers));
         let window = 2 * self.air.interval_ms();
         self.answered.retain(|_, t| now.since_ms(*t) < window);
         let mut theirs: BTreeMap<u16, (Incarnation, u32, u16)> = BTreeMap::new();
@@ -539,7 +545,6 @@ impl Relay {
 mod tests {
     use super::*;
     use crate::protocol::airtime::Filling;
-    use crate::wire::samples;
 
     fn record(author: u16, seq: u32) -> Record {
         Record {
@@ -618,11 +623,7 @@ mod tests {
     fn what_waits_for_its_random_time_goes_with_what_is_sent_meanwhile() {
         let together = |sharers: u16| {
             let mut r = relay(2);
-            let crowd = Beacon {
-                sharers,
-                ..samples::beacon(1)
-            };
-            r.air.hear(Time(5_000), 9, &crowd);
+            r.air.hear(Time(5_000), 9, (4, sharers));
             for author in [1, 3, 4, 5] {
                 r.offer(Time(5_000), &record(author, 1), &[1; 100], 0);
             }
@@ -655,19 +656,19 @@ mod tests {
         let mut r = relay(2);
         r.own(Time(5_000), &claim(1), vec![1; 60]);
         assert_eq!(sent(&mut r, 5_000, None), [0], "nobody is there to hear it");
-        r.air.hear(Time(10_000), 1, &samples::beacon(1));
+        r.air.hear(Time(10_000), 1, (4, 2));
         r.own(Time(10_000), &claim(2), vec![1; 60]);
         let times = sent(&mut r, 10_000, None);
         assert_eq!((times.len(), times[0]), (3, 0), "{times:?}");
         assert!((480..720).contains(&times[1]), "{times:?}");
-        r.air.hear(Time(15_000), 1, &samples::beacon(2));
+        r.air.hear(Time(15_000), 1, (4, 2));
         r.own(Time(15_000), &claim(3), vec![1; 60]);
         assert_eq!(
             sent(&mut r, 15_000, Some(&claim(2))).len(),
             3,
             "an older one"
         );
-        r.air.hear(Time(20_000), 1, &samples::beacon(3));
+        r.air.hear(Time(20_000), 1, (4, 2));
         r.own(Time(20_000), &claim(4), vec![1; 60]);
         assert_eq!(sent(&mut r, 20_000, Some(&claim(4))), [0]);
     }

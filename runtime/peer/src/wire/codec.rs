@@ -14,8 +14,8 @@ use super::cbor::{In, Listed, Out, Wire, array_of, number_of};
 use super::kinds::{Kind, RECORD_MAX_BYTES};
 use super::limits::{self, COMMITS_MAX, GOSSIP_MAX, MEMBERS_MAX, PLAN_MAX, at_most, in_range};
 use super::message::{
-    Activity, Beacon, Bid, CellRun, Claim, Cover, Epoch, Finished, Firmness, Gossip, ListedRun,
-    Member, MissionChunk, MissionStatus, OffLoop, Order, Record, Round, Stamp, State,
+    Activity, Beacon, Bid, CellRun, Claim, Cover, Epoch, Finished, Firmness, Gossip, Heartbeat,
+    ListedRun, Member, MissionChunk, MissionStatus, OffLoop, Order, Record, Round, Stamp, State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
 
@@ -77,6 +77,7 @@ pub enum Body {
     Mission(MissionChunk),
     Operator(Order),
     Finished(Finished),
+    Heartbeat(Heartbeat),
 }
 
 impl Body {
@@ -92,6 +93,7 @@ impl Body {
             Self::Mission(_) => Kind::Mission,
             Self::Operator(_) => Kind::Operator,
             Self::Finished(_) => Kind::Finished,
+            Self::Heartbeat(_) => Kind::Heartbeat,
         }
     }
 
@@ -121,6 +123,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
             b.put(&mut out);
         }
         Body::Finished(b) => b.put(&mut out),
+        Body::Heartbeat(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -149,6 +152,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
             Body::Operator(Wire::get(&mut input)?)
         }
         Kind::Finished => Body::Finished(Wire::get(&mut input)?),
+        Kind::Heartbeat => Body::Heartbeat(Wire::get(&mut input)?),
         Kind::Event | Kind::Task | Kind::Intent | Kind::Conflict => {
             return Err(WireError::Kind {
                 number: kind.number(),
@@ -257,6 +261,12 @@ array_of!(Beacon {
     loop_hash,
     cover_digest,
     gossip
+});
+array_of!(Heartbeat {
+    interval,
+    sharers,
+    east_dm,
+    north_dm
 });
 array_of!(Gossip {
     id,
@@ -670,7 +680,7 @@ mod tests {
         };
         assert!(of(|_| ()).is_ok());
         assert_eq!(of(|r| r.kind = 9), Err(WireError::Kind { number: 9 }));
-        assert_eq!(of(|r| r.kind = 12), Err(WireError::Kind { number: 12 }));
+        assert_eq!(of(|r| r.kind = 13), Err(WireError::Kind { number: 13 }));
         assert_eq!(
             of(|r| r.subject = 1),
             Err(WireError::Range { field: "subject" })

@@ -37,6 +37,8 @@ pub enum Kind {
     Intent = 10,
     /// Reserved: approach conflicts.
     Conflict = 11,
+    /// "I am here", without gossip.
+    Heartbeat = 12,
 }
 
 /// How long a record waiting to be sent matters.
@@ -94,7 +96,7 @@ const fn row(
 // matters until the longest partition a mission tolerates, and is repaired by
 // anti-entropy afterwards.
 // Caps: the largest valid body, which a test of `codec` computes, rounded up.
-const TABLE: [KindRow; 12] = [
+const TABLE: [KindRow; 13] = [
     KindRow {
         relayed: false,
         ..row(
@@ -202,11 +204,21 @@ const TABLE: [KindRow; 12] = [
             Lifetime::Beacons(1),
         )
     },
+    KindRow {
+        relayed: false,
+        ..row(
+            Kind::Heartbeat,
+            "heartbeat",
+            16,
+            Priority::Beacon,
+            Lifetime::Beacons(1),
+        )
+    },
 ];
 
 impl Kind {
     /// All kinds, by number.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Beacon,
         Self::State,
         Self::Bid,
@@ -219,6 +231,7 @@ impl Kind {
         Self::Task,
         Self::Intent,
         Self::Conflict,
+        Self::Heartbeat,
     ];
 
     /// Its number on the wire.
@@ -322,7 +335,7 @@ mod tests {
             assert_eq!(Kind::of_name(kind.name()), Some(kind));
             assert!(kind.cap_bytes() + super::super::codec::ENVELOPE_MAX_BYTES <= RECORD_MAX_BYTES);
         }
-        assert_eq!(Kind::of_number(12), None);
+        assert_eq!(Kind::of_number(13), None);
         assert_eq!(Kind::of_name("rumour"), None);
     }
 

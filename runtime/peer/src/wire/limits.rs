@@ -5,11 +5,11 @@
 //! author never said.
 
 use super::codec::{Body, WireError};
-use super::message::{Beacon, Bid, CellRun, Claim, Round, State};
+use super::message::{Beacon, Bid, CellRun, Claim, Heartbeat, Round, State};
 
 /// Gossip entries in a beacon: what a tenth of a second of a 64 kbit/s channel carries.
 pub const GOSSIP_MAX: usize = 20;
-/// Shortest interval that a beacon announces, quarters of T: one period.
+/// Shortest interval that is announced between two beacons, quarters of T: one period.
 pub const INTERVAL_LEAST: u8 = 4;
 /// And the longest: sixteen periods. Whoever needs more air than that is out of reach.
 pub const INTERVAL_MOST: u8 = 64;
@@ -62,6 +62,7 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
             in_range("chunks", (1..=CHUNKS_MAX).contains(&m.chunks))
         }
         Body::Operator(_) | Body::Finished(_) => Ok(()),
+        Body::Heartbeat(h) => check_heartbeat(h),
     }
 }
 
@@ -92,6 +93,14 @@ fn check_beacon(b: &Beacon) -> Result<(), WireError> {
     at_most("gossip", b.gossip.len(), GOSSIP_MAX)?;
     in_range("hops", b.gossip.iter().all(|g| g.hops <= HOPS_MAX))?;
     in_range("interval", b.gossip.iter().all(|g| is_interval(g.interval)))
+}
+
+fn check_heartbeat(h: &Heartbeat) -> Result<(), WireError> {
+    let near = |v: i32| v.unsigned_abs() <= POSITION_MAX_MM.unsigned_abs() / 100;
+    in_range("interval", is_interval(h.interval))?;
+    in_range("sharers", usize::from(h.sharers) <= PEERS_MAX + 1)?;
+    in_range("east_dm", near(h.east_dm))?;
+    in_range("north_dm", near(h.north_dm))
 }
 
 fn is_interval(quarters: u8) -> bool {

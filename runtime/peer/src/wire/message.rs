@@ -29,7 +29,21 @@ pub struct Record {
     pub signature: Vec<u8>,
 }
 
-/// "I am here": one hop, every T.
+/// "I am here": one hop, between two beacons. Its number in the envelope counts on from
+/// that of the last beacon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Heartbeat {
+    /// Until its next beacon, from the last one, quarters of T.
+    pub interval: u8,
+    /// How many it counts in its earshot, itself included.
+    pub sharers: u16,
+    /// East, dm.
+    pub east_dm: i32,
+    /// North, dm.
+    pub north_dm: i32,
+}
+
+/// "I am here", and what its author knows: one hop.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Beacon {
     /// Counts the beacons of this life.

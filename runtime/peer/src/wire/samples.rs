@@ -184,6 +184,15 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         ),
         (Body::Operator(Order::ReturnToBase), "8102"),
         (Body::Finished(Finished { revision: 3 }), "8103"),
+        (
+            Body::Heartbeat(Heartbeat {
+                interval: 4,
+                sharers: 3,
+                east_dm: -12_346,
+                north_dm: 8_901,
+            }),
+            "8404033930391922c5",
+        ),
     ]
 }
 
@@ -308,5 +317,11 @@ pub fn largest() -> Vec<Body> {
         }),
         Body::Operator(Order::ReturnToBase),
         Body::Finished(Finished { revision: u32::MAX }),
+        Body::Heartbeat(Heartbeat {
+            interval: INTERVAL_MOST,
+            sharers: u16::try_from(PEERS_MAX + 1).unwrap_or(u16::MAX),
+            east_dm: -POSITION_MAX_MM / 100,
+            north_dm: -POSITION_MAX_MM / 100,
+        }),
     ]
 }

@@ -65,12 +65,18 @@ const NORTH: Place = at("north_mm", "mm north of the mission's origin", MM);
 const HEADING: Place = at("heading_e4", "1e-4 rad counter-clockwise from east", E4);
 const ETA: Place = at("eta_ms", "expected end of the plan, ms from writing", MS);
 
+const SHARERS: Place = at(
+    "sharers",
+    "how many it counts in its earshot, itself included",
+    Shape::Number(0, PEERS_MAX as i128 + 1),
+);
+
 const ENVELOPE: &[Place] = &[
     at("author", "who wrote it", U16),
     at("incarnation", "in which life", U32),
     at(
         "seq",
-        "counts what the author wrote in this life; beacons count for themselves",
+        "counts what the author wrote in this life; beacons and heartbeats count for themselves",
         U32,
     ),
     at("kind", "number of the kind", U8),
@@ -132,11 +138,7 @@ const BEACON: &[Place] = &[
         HOPS,
     ),
     at("interval", "until its next beacon, quarters of T", INTERVAL),
-    at(
-        "sharers",
-        "how many it counts in its earshot, itself included",
-        Shape::Number(0, PEERS_MAX as i128 + 1),
-    ),
+    SHARERS,
     REVISION,
     LOOP_HASH,
     at("cover_digest", "digest of its union of covered cells", U32),
@@ -145,6 +147,22 @@ const BEACON: &[Place] = &[
         "what it knows of others",
         Shape::Rows(GOSSIP, GOSSIP_MAX),
     ),
+];
+
+const DM: Shape = Shape::Number(
+    -(POSITION_MAX_MM as i128) / 100,
+    POSITION_MAX_MM as i128 / 100,
+);
+
+const HEARTBEAT: &[Place] = &[
+    at(
+        "interval",
+        "until its next beacon from the last one, quarters of T",
+        INTERVAL,
+    ),
+    SHARERS,
+    at("east_dm", "dm east of the mission's origin", DM),
+    at("north_dm", "dm north of the mission's origin", DM),
 ];
 
 const STATE: &[Place] = &[
@@ -350,6 +368,7 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Mission => Some(MISSION),
         Kind::Operator => Some(OPERATOR),
         Kind::Finished => Some(FINISHED),
+        Kind::Heartbeat => Some(HEARTBEAT),
         Kind::Event | Kind::Task | Kind::Intent | Kind::Conflict => None,
     }
 }

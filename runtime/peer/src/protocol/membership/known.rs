@@ -46,6 +46,10 @@ pub(super) struct Known {
     latest: usize,
     pub(super) eccentricity: u8,
     pub(super) urgent_until: Time,
+    /// Until then a neighbour may depend on what this peer tells of it.
+    pub(super) wanted_until: Time,
+    /// When it was last told of, by this peer or by a neighbour who is as near.
+    pub(super) told: Time,
     /// An old heartbeat of this very life with a higher count than it now sends: it lost
     /// its disk and uses an incarnation twice. It is told, so that it takes a new one.
     pub(super) higher_count_heard: Option<Heartbeat>,
@@ -73,6 +77,8 @@ impl Known {
             latest: 0,
             eccentricity: 0,
             urgent_until,
+            wanted_until: Time(0),
+            told: Time(0),
             higher_count_heard: None,
         }
     }
@@ -119,6 +125,19 @@ impl Known {
             self.status = Status::Suspect;
             self.urgent_until = urgent_until;
             changes.push(self.change());
+        }
+    }
+
+    /// A neighbour tells of it: it heard of it by more hops than this peer and depends on
+    /// whoever is nearer, or it is as near and has just told.
+    pub(super) fn note_told(&mut self, now: Time, told: &Gossip, interval_ms: u64) {
+        if told.incarnation != self.freshest.incarnation {
+            return;
+        }
+        if told.hops > self.freshest.hops {
+            self.wanted_until = now.plus_ms(super::HOP_INTERVALS * interval_ms);
+        } else if told.heartbeat.saturating_add(1) >= self.freshest.count {
+            self.told = now;
         }
     }
 

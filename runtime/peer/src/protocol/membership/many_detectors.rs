@@ -3,6 +3,7 @@
 use crate::input::Time;
 use crate::output::Status;
 use crate::protocol::membership::{Change, Membership};
+use crate::wire::limits::INTERVAL_LEAST;
 use crate::wire::message::Beacon;
 use crate::wire::samples;
 use proptest::prelude::*;
@@ -41,6 +42,7 @@ struct Node {
     heartbeat: u32,
     alive: bool,
     next_beacon: u64,
+    next_heartbeat: u64,
     next_tick: u64,
 }
 
@@ -71,6 +73,7 @@ impl Net {
                 heartbeat: 0,
                 alive: true,
                 next_beacon: dice.below(T_MS),
+                next_heartbeat: u64::MAX,
                 next_tick: dice.below(TICK_MS),
             })
             .collect();
@@ -90,6 +93,9 @@ impl Net {
                 if self.nodes[i].alive && self.now >= self.nodes[i].next_beacon {
                     self.speak(i, &links);
                 }
+                if self.nodes[i].alive && self.now >= self.nodes[i].next_heartbeat {
+                    self.beat(i, &links);
+                }
                 let node = &mut self.nodes[i];
                 if node.alive && self.now >= node.next_tick {
                     node.next_tick += TICK_MS;
@@ -105,6 +111,7 @@ impl Net {
         let now = Time(self.now);
         let node = &mut self.nodes[i];
         node.next_beacon = self.now + T_MS - T_MS / 10 + self.dice.below(T_MS / 5);
+        node.next_heartbeat = u64::midpoint(self.now, node.next_beacon);
         node.heartbeat += 1;
         let mut said = beacon(node.heartbeat, node.membership.eccentricity(now));
         said.gossip = node.membership.gossip(now, 20);
@@ -116,6 +123,24 @@ impl Net {
                 let changes = self.nodes[j]
                     .membership
                     .on_beacon(now, author, incarnation, &said);
+                self.seen
+                    .extend(changes.into_iter().map(|c| (self.now, j, c)));
+            }
+        }
+    }
+
+    /// Half-way between two beacons.
+    fn beat(&mut self, i: usize, links: &impl Fn(usize, usize) -> bool) {
+        let (now, author) = (Time(self.now), u16::try_from(i).unwrap());
+        let node = &mut self.nodes[i];
+        node.next_heartbeat = u64::MAX;
+        node.heartbeat += 1;
+        let (incarnation, heartbeat) = (node.incarnation, (node.heartbeat, INTERVAL_LEAST));
+        for j in 0..self.nodes.len() {
+            let lost = self.dice.below(100) < self.loss_percent;
+            if links(i, j) && self.nodes[j].alive && !lost {
+                let membership = &mut self.nodes[j].membership;
+                let changes = membership.on_heartbeat(now, author, incarnation, heartbeat);
                 self.seen
                     .extend(changes.into_iter().map(|c| (self.now, j, c)));
             }
@@ -173,7 +198,7 @@ fn hops(n: usize, links: impl Fn(usize, usize) -> bool) -> u64 {
 /// (k1 + k2 + D + 2) T in milliseconds.
 fn bound_ms(diameter: u64) -> u64 {
     let d = diameter.max(1);
-    T_MS * (16 + d) / 4 + T_MS * (8 + d) / 2 + (d + 2) * T_MS
+    T_MS * (12 + d) / 4 + T_MS * (6 + d) / 2 + (d + 2) * T_MS
 }
 
 proptest! {
@@ -243,7 +268,7 @@ proptest! {
         let period = u32::try_from(T_MS).unwrap();
         net.nodes[1] = Node {
             membership: Membership::new(1, period), incarnation: 2, heartbeat: 0, alive: true,
-            next_beacon: net.now, next_tick: net.now,
+            next_beacon: net.now, next_heartbeat: u64::MAX, next_tick: net.now,
         };
         net.run(net.now + 30 * T_MS, links);
         for i in (0..n).filter(|i| *i != 1) {
