@@ -4,7 +4,7 @@
 //! |---|---|
 //! | too many, malformed, out of range, an unknown kind | a report; nothing else |
 //! | a signature, where nobody signs | likewise: it would be passed on for nothing |
-//! | a beacon under this peer's own id and life with another boot nonce | a double: `life` |
+//! | a beacon under this peer's own id, in this life or a later one, with another boot nonce | a double: `life` |
 //! | anything else under its own id | an echo: `relay`; or news of another life: `life` |
 //! | a heartbeat | `membership`, `relay` |
 //! | a beacon | `membership`, `relay`, `cooperation` |
@@ -23,8 +23,8 @@ use crate::wire::signature::{Off, Verifier};
 pub(crate) enum Heard {
     /// Bytes that are refused, and why.
     Refused(String),
-    /// Another peer under this peer's id and life, with its boot nonce.
-    Double(u32),
+    /// Another process under this peer's id, in this life or a later one, with its boot nonce.
+    Double(u32, Incarnation),
     /// This peer's own id, in a life, with a heartbeat.
     Myself(Incarnation, u32),
     /// What was said under this peer's own id is passed on.
@@ -55,8 +55,9 @@ pub(crate) fn read(bytes: &[u8], me: u16, life: &Life) -> Heard {
     };
     match body {
         Body::Beacon(b) if record.author == me => {
-            if record.incarnation == life.incarnation() && b.nonce != life.nonce() {
-                Heard::Double(b.nonce)
+            // Beacons are passed on by nobody, so whoever says one is there.
+            if record.incarnation >= life.incarnation() && b.nonce != life.nonce() {
+                Heard::Double(b.nonce, record.incarnation)
             } else {
                 Heard::Myself(record.incarnation, b.heartbeat)
             }

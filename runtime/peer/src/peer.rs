@@ -219,8 +219,8 @@ impl Peer {
         }
         match heard {
             Heard::Refused(why) => self.refuse(why),
-            Heard::Double(nonce) => {
-                let effects = self.life.hear_double(nonce);
+            Heard::Double(nonce, incarnation) => {
+                let effects = self.life.hear_double(nonce, incarnation);
                 self.carry_out(effects);
             }
             Heard::Myself(incarnation, heartbeat) => self.on_myself(incarnation, heartbeat, 0),

@@ -9,7 +9,8 @@
 //! | listening | its own id at this or a higher life | promised | that plus one is stored |
 //! | listening | 3 T are over | speaking | beacons |
 //! | speaking | its own id at a higher life, or a heartbeat or a record of this life that it never sent | promised | that plus one |
-//! | speaking | another boot nonce under its id and life, above its own | silenced | an alarm |
+//! | speaking | another boot nonce under its id in this life or a later one, above its own | silenced | an alarm |
+//! | speaking | the same, below its own | as for its own id in that life | an alarm |
 //!
 //! Without the last but one row a peer that lost its disk would be a zombie nobody
 //! believes. A silenced peer flies its plan to the end.
@@ -42,6 +43,7 @@ pub(crate) struct Life {
     promised: Option<Incarnation>,
     nonce: u32,
     silenced: bool,
+    double_told: bool,
     /// Whether a life heard of was promised since the last tick.
     raised: bool,
     /// Ticks until a first life that could not be stored is tried again, and how many there
@@ -122,6 +124,9 @@ impl Life {
     pub fn hear_of_myself(&mut self, incarnation: Incarnation, never_said: bool) -> Effects {
         let mine = self.promised.unwrap_or(0).max(self.incarnation);
         let used_twice = incarnation == self.incarnation && never_said;
+        if self.silenced {
+            return Effects::new();
+        }
         if incarnation > mine
             || (incarnation == mine && used_twice)
             || (self.incarnation == 0 && incarnation >= mine)
@@ -136,12 +141,18 @@ impl Life {
         }
     }
 
-    /// Another peer beacons under this id and life, with another boot nonce: the one
-    /// with the lower nonce is silent from now on.
-    pub fn hear_double(&mut self, nonce: u32) -> Effects {
+    /// Another process beacons under this id, in this life or a later one, with another boot
+    /// nonce: the one with the lower nonce is silent from now on, and the other takes a life
+    /// above both. If each took one above the other's they would do so for ever.
+    pub fn hear_double(&mut self, nonce: u32, incarnation: Incarnation) -> Effects {
         assert_ne!(nonce, self.nonce, "an echo is no double");
         self.silenced |= nonce > self.nonce;
-        vec![Effect::Alarm("another peer speaks under this id".into())]
+        let mut effects = self.hear_of_myself(incarnation, false);
+        if !core::mem::replace(&mut self.double_told, true) {
+            let text = "another peer speaks under this id";
+            effects.push(Effect::Alarm(text.into()));
+        }
+        effects
     }
 
     /// A first life that could not be stored is tried again.
@@ -221,14 +232,31 @@ mod tests {
         let mut life = living(2);
         let mut probation_over = timers.clone();
         probation_over.set(Timer::Probation, Time(0));
-        life.hear_double(6);
+        life.hear_double(6, 2);
         assert!(life.speaks(Time(1), &probation_over));
-        assert_eq!(life.hear_double(8).len(), 1);
+        life.hear_double(8, 2);
         assert!(!life.speaks(Time(1), &probation_over));
         assert!(
             life.has_voice(Time(1), &probation_over),
             "it goes on planning"
         );
+    }
+
+    #[test]
+    fn of_two_in_different_lives_only_one_takes_another_life() {
+        let (mut low, mut high) = (living(1), living(2));
+        low.nonce = 3;
+        assert!(stored(&low.hear_double(7, 2)).is_empty() && low.silenced);
+        low.tick(1);
+        assert!(
+            stored(&low.hear_of_myself(5, true)).is_empty(),
+            "others speak of the one that is heard"
+        );
+        let effects = high.hear_double(3, 4);
+        assert_eq!((stored(&effects), effects.len()), (vec![5], 2));
+        high.is_durable(5);
+        high.tick(5);
+        assert!(high.hear_double(3, 4).is_empty(), "told once");
     }
 
     #[test]

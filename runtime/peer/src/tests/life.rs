@@ -132,6 +132,31 @@ fn of_a_double_id_the_lower_nonce_is_silent_and_flies_on() {
 }
 
 #[test]
+fn of_doubles_in_different_lives_one_falls_silent_and_lives_end_to_grow() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(20);
+    let planned = h.beliefs(1).plan;
+    // A second process was started later and has taken a life above the first one's.
+    for heartbeat in 1..5 {
+        let double = Body::Beacon(beacon(heartbeat, u32::MAX));
+        h.inject(1, record(1, 2, heartbeat, 0, &double));
+        h.run_s(1);
+    }
+    let b = h.beliefs(1);
+    assert!(!b.speaks && b.incarnation == 1, "life {}", b.incarnation);
+    assert!(!b.plan.is_empty() && planned.ends_with(&b.plan));
+    // The one with the higher nonce takes one life above, not one for each beacon.
+    for heartbeat in 1..5 {
+        let double = Body::Beacon(beacon(heartbeat, 0));
+        h.inject(2, record(2, 4, heartbeat, 0, &double));
+        h.run_s(1);
+    }
+    assert_eq!(h.beliefs(2).incarnation, 5);
+    h.run_s(5);
+    assert!(h.beliefs(2).speaks);
+}
+
+#[test]
 fn a_suspicion_heard_is_refuted_at_once_without_gossip() {
     let mut h = Harness::started(2, mission(1, 6, 4));
     h.run_s(20);
