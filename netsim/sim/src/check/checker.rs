@@ -147,11 +147,17 @@ impl Checker {
         self.stability.forget(id);
     }
 
-    /// A process ends: what it believes durable, and what its disk holds.
-    pub fn on_crash(&mut self, now_ms: u64, id: u16, believed: &Durable, journal: &[Vec<u8>]) {
-        let handicaps = &self.handicaps;
+    /// A process ends: what it believes durable, what its disk holds, and of how many of the
+    /// last writes it had not been told yet.
+    pub fn on_crash(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        (believed, journal, untold): (&Durable, &[Vec<u8>], usize),
+    ) {
+        let kept = (believed, journal, untold);
         self.record
-            .on_crash(now_ms, id, (believed, journal), handicaps, &mut self.found);
+            .on_crash(now_ms, id, kept, &self.handicaps, &mut self.found);
     }
 
     /// The links were cut into groups, or healed.

@@ -159,7 +159,18 @@ impl ListingCheck {
         counts_from_ms: u64,
         found: &mut Findings,
     ) {
-        let owner = self.last_lister.get(&cell).copied();
+        let mut owner = self.last_lister.get(&cell).copied();
+        if !self.orphans.contains_key(&cell) {
+            // Whoever listed it may have yielded it to one who is dead by now.
+            let n = snapshot.covered.len();
+            let heard = owner.map(|by| self.heard.range((by, 0)..=(by, u16::MAX)));
+            let silent = heard
+                .into_iter()
+                .flatten()
+                .filter(|((_, author), _)| members.silence(*author).is_some());
+            let mut yielded = silent.filter(|(_, (claim, _))| plans(claim, cell, n));
+            owner = yielded.next().map(|((_, author), _)| *author).or(owner);
+        }
         let o = self.orphans.entry(cell).or_insert(Orphan {
             since_ms: snapshot.now_ms,
             owner,
@@ -260,6 +271,15 @@ fn counted_from(o: &Orphan, members: &Membership) -> Option<u64> {
         }
         _ => Some(o.since_ms),
     }
+}
+
+/// Whether a claim plans a cell that is still to be flown.
+fn plans(claim: &Claim, cell: u16, n: usize) -> bool {
+    let mut found = false;
+    for l in &claim.plan {
+        each_cell(l, n, |c| found |= c == usize::from(cell));
+    }
+    found
 }
 
 /// Calls `f` with each cell of a listing that is still to be flown.
@@ -417,6 +437,40 @@ mod tests {
         s.snapshot(42_000, &[(1, &[0, 1, 3, 2])]);
         assert!(s.found.counts.is_empty());
         assert_eq!(s.check.orphans(), 0);
+    }
+
+    #[test]
+    fn a_cell_yielded_to_one_who_is_dead_counts_from_the_detection_of_that_death() {
+        let mut s = Story::new(0);
+        for id in [1, 2] {
+            s.members.on_life(0, id, 1);
+        }
+        s.snapshot(0, &[(1, &[0, 1, 2, 3])]);
+        let run = ListedRun {
+            run: CellRun { first: 2, count: 2 },
+            backward: false,
+            firmness: Firmness::Tentative,
+            stamp: Stamp::default(),
+        };
+        let claim = Claim {
+            loop_hash: 9,
+            plan: vec![run],
+            ..Claim::default()
+        };
+        s.members.on_silent(500, 2, true, &BOUNDS);
+        s.check.on_death(2);
+        // The claim reaches the other after its author's death.
+        s.check.on_heard((1, 2), (1, 1), &Arc::new(claim));
+        s.snapshot(1000, &[(1, &[0, 1, 2, 3])]);
+        for t in 2..20 {
+            s.snapshot(t * 1000, &[(1, &[0, 1])]);
+        }
+        assert!(s.found.counts.is_empty(), "{:?}", s.found.violations);
+        // What nobody has claimed is without an owner at once.
+        for t in 20..40 {
+            s.snapshot(t * 1000, &[(1, &[0])]);
+        }
+        assert_eq!(s.found.counts.get("L2"), Some(&1));
     }
 
     #[test]

@@ -88,9 +88,9 @@ impl Rules {
         self.patience.on_silent(id);
         self.flight.on_silent(id);
         self.spread.on_silent(id);
+        self.spoken.on_silent(id, death);
         if death {
             self.patience.on_anew(id);
-            self.spoken.on_death(id);
             self.spread.on_death(id);
         }
     }

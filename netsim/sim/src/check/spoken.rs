@@ -55,9 +55,12 @@ pub struct SpokenCheck {
 }
 
 impl SpokenCheck {
-    /// A process ends: what it said is no promise of the next one.
-    pub fn on_death(&mut self, id: u16) {
-        self.claims.remove(&id);
+    /// A process ends: what it said is no promise of the next one. Or it stands still and
+    /// can say nothing (`death` is false).
+    pub fn on_silent(&mut self, id: u16, death: bool) {
+        if death {
+            self.claims.remove(&id);
+        }
         self.unspoken.retain(|(p, _)| *p != id);
     }
 
@@ -328,6 +331,27 @@ mod tests {
                 story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
             }
             assert_eq!(found.counts.contains_key("spoken"), broken, "{view:?}");
+        }
+    }
+
+    #[test]
+    fn whoever_stands_still_owes_nothing_meanwhile() {
+        let view = Beliefs {
+            plan: vec![0, 1, 2],
+            ..speaking()
+        };
+        for (stood_still, broken) in [(false, true), (true, false)] {
+            let (mut check, mut found) = (SpokenCheck::default(), Findings::new(1));
+            let mut story = Story::new(300);
+            check.on_claim(1, 1, claim_of(0, 2));
+            for t in [0, 1, 20] {
+                if stood_still && t == 20 {
+                    check.on_silent(1, false);
+                }
+                let views = [(1, view.clone())];
+                story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
+            }
+            assert_eq!(found.counts.contains_key("spoken"), broken);
         }
     }
 

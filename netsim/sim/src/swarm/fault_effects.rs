@@ -159,10 +159,10 @@ impl Swarm {
         if s.process == Process::Stopped {
             return;
         }
+        let untold = s.untold_writes();
         if let Some(peer) = s.stop() {
-            let believed = peer.durable();
-            self.checker
-                .on_crash(now_ms, id, &believed, self.peers[idx].disk.records());
+            let kept = (&peer.durable(), self.peers[idx].disk.records(), untold);
+            self.checker.on_crash(now_ms, id, kept);
         }
         self.refresh_covered();
         let held = self.account.ended(now_ms, id, cause);

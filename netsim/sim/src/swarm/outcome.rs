@@ -64,8 +64,8 @@ impl Swarm {
         self.check_the_end();
         for p in &self.peers {
             if let Some(peer) = &p.peer {
-                self.checker
-                    .on_crash(self.now_ms, p.id(), &peer.durable(), p.disk.records());
+                let kept = (&peer.durable(), p.disk.records(), p.untold_writes());
+                self.checker.on_crash(self.now_ms, p.id(), kept);
             }
         }
         self.account.radio(&self.radio_counters());

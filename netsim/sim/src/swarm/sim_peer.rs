@@ -183,6 +183,13 @@ impl SimPeer {
         }
     }
 
+    /// How many writes are durable of which it has not been told yet.
+    #[must_use]
+    pub fn untold_writes(&self) -> usize {
+        let told = |(_, i): &&(u64, Input)| matches!(i, Input::Stored { ok: true, .. });
+        self.inbox.iter().filter(told).count()
+    }
+
     /// Keeps an input for later. Of percepts only the newest counts, and only what came
     /// by radio is ever dropped: answers of disk and planner are the process's own.
     pub fn wait(&mut self, now_ms: u64, input: Input) {
