@@ -39,6 +39,9 @@ pub struct TrialArgs {
     /// Seed of everything that is drawn.
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
+    /// Stops after so many scenario seconds if the mission is not over by then.
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_time: Option<u32>,
     /// Keeps configurations, journals, logs and the report in this directory. Without
     /// it they are kept only if the mission failed.
     #[arg(long, value_name = "DIR")]
@@ -66,7 +69,7 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
         planner: args.planner.chosen(),
         launch: args.launch,
     };
-    let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {
+    let mut scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {
         Ok(scenario) => scenario,
         Err(error) => {
             eprintln!("error: {error}");
@@ -79,6 +82,12 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
         .filter(|f| f.severity == Severity::Warning)
     {
         eprintln!("{finding}");
+    }
+    if let Some(longest_s) = args.max_time {
+        let spec = &mut scenario.spec;
+        spec.max_time_s = spec.max_time_s.min(longest_s);
+        spec.faults
+            .retain(|f| f.at_ms < u64::from(longest_s) * 1000);
     }
     let options = Options {
         seed: scenario.spec.seed,

@@ -13,7 +13,7 @@
 //! | [`route`], [`route_polygons`], [`route_clearance`], [`route_graph`], [`route_maps`] | shortest paths and routes |
 //! | [`mod@line`] | tours along roads |
 //! | [`navmesh`] | public instances of shortest-path problems |
-//! | [`sim`] | swarms in virtual time |
+//! | [`sim`], [`live`] | swarms in virtual time, swarms of processes |
 //! | [`measure`] | distances measured again, for checks |
 //! | [`figures`] | times and errors |
 //!
@@ -32,6 +32,7 @@ pub mod dubins;
 pub mod figures;
 pub mod headings;
 pub mod line;
+pub mod live;
 pub mod measure;
 pub mod navmesh;
 pub mod offset;
@@ -78,6 +79,8 @@ pub enum Subject {
     Line(line::LineArgs),
     /// A swarm in virtual time: how fast, and what keeps the computer busy.
     Sim(sim::SimArgs),
+    /// A swarm of processes on this machine: the pace held, and what a process needs.
+    Live(live::LiveArgs),
 }
 
 /// Measures, and returns the JSON text to print.
@@ -97,5 +100,6 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
         Subject::Route(args) => route::run(args),
         Subject::Line(args) => line::run(args),
         Subject::Sim(args) => sim::run(args),
+        Subject::Live(args) => live::run(args),
     }
 }

@@ -1,9 +1,10 @@
 //! One peer of a trial, as the trial sees it: process, files, the line to it.
 
-use crate::process::{Process, Processes};
+use crate::process::{Process, Processes, Used};
 use crate::stream::Line;
 use nix::sys::signal::Signal;
 use skein_link::{LinkNews, RadioCounters};
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 /// What has become of a peer's computer.
@@ -17,6 +18,39 @@ enum Computer {
     Off,
     /// Its process ended by itself.
     Crashed,
+}
+
+/// The percepts that a peer was told and has not answered. A percept that was told before
+/// the first answer of a life counts for nothing: who starts is not ready to fly yet.
+#[derive(Clone, Debug, Default)]
+struct Owed {
+    answers: bool,
+    /// When they were told, ascending, milliseconds of scenario time.
+    told_ms: VecDeque<u64>,
+}
+
+/// Percepts remembered: more than any time in which an answer is waited for has.
+const MAX_OWED: usize = 64;
+
+impl Owed {
+    fn told(&mut self, at_ms: u64) {
+        if self.answers && self.told_ms.len() < MAX_OWED {
+            self.told_ms.push_back(at_ms);
+        }
+    }
+
+    fn answered(&mut self, from_ms: u64) {
+        self.answers = true;
+        while self.told_ms.front().is_some_and(|t| *t <= from_ms) {
+            self.told_ms.pop_front();
+        }
+    }
+
+    fn owed_ms(&self, now_ms: u64) -> u64 {
+        self.told_ms
+            .front()
+            .map_or(0, |t| now_ms.saturating_sub(*t))
+    }
 }
 
 /// One peer.
@@ -34,6 +68,8 @@ pub(crate) struct LivePeer {
     told: Option<LinkNews>,
     /// What its radio did in this life.
     radio: RadioCounters,
+    /// The percepts that it was told and has not answered.
+    owed: Owed,
     /// Whether it was asked to leave or said goodbye.
     left: bool,
     files: Files,
@@ -61,6 +97,7 @@ impl LivePeer {
             line: None,
             told: None,
             radio: RadioCounters::default(),
+            owed: Owed::default(),
             left: false,
             files: Files {
                 config: file("json5"),
@@ -164,6 +201,7 @@ impl LivePeer {
     pub(crate) fn start(&mut self, processes: &Processes) -> std::io::Result<()> {
         self.line = None;
         self.told = None;
+        self.owed = Owed::default();
         self.left = false;
         self.airborne = self.flies;
         self.process = Some(processes.launch(&self.files.config, &self.files.log)?);
@@ -187,9 +225,47 @@ impl LivePeer {
         (std::mem::take(&mut self.radio), crashed)
     }
 
-    /// What its radio has done so far in this life.
-    pub(crate) fn counted(&mut self, radio: RadioCounters) {
-        self.radio = radio;
+    /// What its radio has done so far in this life; gives how many transmissions arrived
+    /// since the last time, and how many of them late.
+    pub(crate) fn counted(&mut self, radio: RadioCounters) -> (u64, u64) {
+        let before = std::mem::replace(&mut self.radio, radio);
+        (
+            self.radio.arrived.saturating_sub(before.arrived),
+            self.radio.late.saturating_sub(before.late),
+        )
+    }
+
+    /// It is told a percept.
+    pub(crate) fn told_percept(&mut self, now_ms: u64) {
+        self.owed.told(now_ms);
+    }
+
+    /// It answers the percept of `from_ms`, and with it all earlier ones.
+    pub(crate) fn answers(&mut self, from_ms: u64) {
+        self.owed.answered(from_ms);
+    }
+
+    /// How long it has owed an answer to a percept, milliseconds of scenario time; nothing
+    /// where no answer can come.
+    pub(crate) fn owed_ms(&self, now_ms: u64) -> u64 {
+        if self.on_air() && self.airborne {
+            self.owed.owed_ms(now_ms)
+        } else {
+            0
+        }
+    }
+
+    /// It is waited for no longer, until it answers again; says whether it owed anything.
+    pub(crate) fn excuse(&mut self) -> bool {
+        let owed = !self.owed.told_ms.is_empty();
+        self.owed = Owed::default();
+        owed
+    }
+
+    /// What its process has used so far.
+    pub(crate) fn used(&self) -> Option<Used> {
+        let process = self.process.as_ref().filter(|_| self.has_process())?;
+        Used::of(process.pid())
     }
 
     /// Takes what its radio did.
@@ -234,6 +310,8 @@ impl LivePeer {
     pub(crate) fn resume(&mut self) -> bool {
         let paused = self.computer == Computer::Paused;
         if paused {
+            // What it was told meanwhile it answers when it gets round to it.
+            self.owed = Owed::default();
             self.computer = Computer::Runs;
             self.signal(Signal::SIGCONT);
         }
@@ -282,5 +360,26 @@ impl LivePeer {
     /// Its number.
     pub(crate) fn id(&self) -> u16 {
         self.id
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_settles_all_earlier_percepts() {
+        let mut owed = Owed::default();
+        owed.told(100);
+        assert_eq!(owed.owed_ms(900), 0, "it has not begun to answer");
+        owed.answered(100);
+        for t in [600, 1_100, 1_600] {
+            owed.told(t);
+        }
+        assert_eq!(owed.owed_ms(1_700), 1_100);
+        owed.answered(1_100);
+        assert_eq!(owed.owed_ms(1_700), 100);
+        owed.answered(1_600);
+        assert_eq!(owed.owed_ms(9_000), 0);
     }
 }

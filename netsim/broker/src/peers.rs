@@ -5,7 +5,7 @@ use crate::config::Surroundings;
 use crate::error::{TrialError, io};
 use crate::live_peer::LivePeer;
 use crate::live_world::LiveWorld;
-use crate::process::Processes;
+use crate::process::{Processes, Used};
 use crate::registry::{ConsoleEntry, private_file};
 use crate::stream::{Heard, Line, Streams};
 use crate::transports::Transports;
@@ -47,6 +47,13 @@ pub(crate) enum Said {
         setpoint: Setpoint,
         /// Whether its process runs; a paused one's last words may still arrive.
         runs: bool,
+    },
+    /// Of so many transmissions that reached it in the last second so many came late.
+    Heard {
+        /// How many came.
+        arrived: u64,
+        /// Late ones among them.
+        late: u64,
     },
     /// It reports something.
     Report {
@@ -239,11 +246,14 @@ impl Peers {
         // What was under way when a computer ended is not said any more.
         let silent = !peer.has_process();
         match frame {
-            ToWorld::Setpoint(setpoint) => (!silent).then(|| Said::Setpoint {
-                id,
-                setpoint,
-                runs: peer.runs(),
-            }),
+            ToWorld::Setpoint(setpoint) => {
+                peer.answers(setpoint.from_ms);
+                (!silent).then(|| Said::Setpoint {
+                    id,
+                    setpoint,
+                    runs: peer.runs(),
+                })
+            }
             ToWorld::Report(_) if silent => None,
             ToWorld::Report(bytes) => match cbor4ii::serde::from_slice(&bytes) {
                 Ok(report) => Some(Said::Report { id, report }),
@@ -253,8 +263,8 @@ impl Peers {
                 }
             },
             ToWorld::Radio(counters) => {
-                peer.counted(counters);
-                None
+                let (arrived, late) = peer.counted(counters);
+                (!silent).then_some(Said::Heard { arrived, late })
             }
             ToWorld::Bye => {
                 peer.leaves();
@@ -287,10 +297,33 @@ impl Peers {
             let percept = world
                 .percept(*id)
                 .filter(|_| percepts && peer.flies() && peer.airborne());
+            if percept.is_some() {
+                peer.told_percept(clock.now_ms);
+            }
             if let Some(line) = peer.line() {
                 line.tick(clock.now_ms, clock.scale, percept, news);
             }
         }
+    }
+
+    /// How long anybody has owed the answer to a percept, milliseconds of scenario time.
+    pub(crate) fn owed_ms(&self, now_ms: u64) -> u64 {
+        let owed = self.by_id.values().map(|p| p.owed_ms(now_ms));
+        owed.max().unwrap_or(0)
+    }
+
+    /// Nobody is waited for any longer; gives who was.
+    pub(crate) fn excuse_all(&mut self) -> Vec<u16> {
+        let owing = self
+            .by_id
+            .iter_mut()
+            .filter_map(|(id, p)| p.excuse().then_some(*id));
+        owing.collect()
+    }
+
+    /// What the processes that are there have used so far.
+    pub(crate) fn used(&self) -> Vec<Used> {
+        self.by_id.values().filter_map(LivePeer::used).collect()
     }
 
     /// What people call a peer.

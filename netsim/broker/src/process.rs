@@ -40,6 +40,38 @@ pub fn guard() {
     }
 }
 
+/// Ticks of the clock in which Linux counts the time of processors, a second.
+const TICKS_PS: f64 = 100.0;
+
+/// What a process has used so far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Used {
+    /// Time of processors, seconds.
+    pub cpu_s: f64,
+    /// The most memory that it held at once, MB.
+    pub peak_mb: f64,
+}
+
+impl Used {
+    /// Of a process, where the system tells it.
+    #[must_use]
+    pub fn of(pid: u32) -> Option<Self> {
+        let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+        let status = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+        // The name before it may hold spaces and brackets. Of the fields after it, counted
+        // from 0, 11 and 12 are the times in the program and in the system.
+        let fields: Vec<&str> = stat.rsplit(") ").next()?.split_whitespace().collect();
+        let ticks: f64 =
+            fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?;
+        let peak = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+        let kb: f64 = peak.split_whitespace().next()?.parse().ok()?;
+        Some(Self {
+            cpu_s: ticks / TICKS_PS,
+            peak_mb: kb / 1000.0,
+        })
+    }
+}
+
 /// All processes of a trial.
 #[derive(Debug)]
 pub struct Processes {
@@ -151,5 +183,20 @@ impl Process {
         {
             self.kill().await;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_this_process_used_is_told_and_of_no_process_nothing() {
+        let used = Used::of(std::process::id()).unwrap();
+        assert!(
+            used.cpu_s >= 0.0 && used.peak_mb > 1.0 && used.peak_mb < 1e5,
+            "{used:?}"
+        );
+        assert_eq!(Used::of(u32::MAX), None);
     }
 }

@@ -4,11 +4,14 @@ use crate::control::{Control, Request};
 use crate::error::{TrialError, io};
 use crate::faults::{Injector, Schedule};
 use crate::live_world::LiveWorld;
-use crate::pacer::{Pacer, STEP_MS};
+use crate::pacer::{Due, Pacer, STEP_MS};
 use crate::peers::{Clock, Peers, Said};
+use crate::process::Used;
 use crate::registry::{ConsoleEntry, Entry, Registered, private_dir, private_file, shared_dir};
 use skein_console::{Answer, Asked, Token};
-use skein_netsim::account::{Account, Cause, Details, Ending, Live, RunReport, Setting, secs};
+use skein_netsim::account::{
+    Account, Cause, Details, Ending, Live, Processes, RunReport, Setting, secs,
+};
 use skein_netsim::fault::Fault;
 use skein_netsim::spec::Spec;
 use skein_netsim::world::{Fact, Loss};
@@ -25,6 +28,10 @@ const READY_TIMEOUT: Duration = Duration::from_secs(45);
 
 /// How often progress is told, milliseconds of scenario time.
 const PROGRESS_MS: u64 = 10_000;
+
+/// How often it is looked at how late transmissions come, milliseconds of scenario time: as
+/// often as nodes tell.
+const LOOK_MS: u64 = 1_000;
 
 /// Once all live UAVs believe the mission finished nobody looks for more; after this
 /// long, milliseconds of scenario time, what was not seen by then never will be. Long
@@ -103,10 +110,11 @@ pub async fn run(
         () = stop => Err(TrialError::Interrupted),
     };
     let wall = trial.began.elapsed();
+    let used = trial.peers.used();
     for radio in trial.peers.end().await {
         trial.account.radio(&radio);
     }
-    let result = flown.map(|()| trial.conclude(wall));
+    let result = flown.map(|()| trial.conclude(wall, &used));
     if let Ok(report) = &result {
         let json = serde_json::to_vec_pretty(report).map_err(|e| io("the report")(e.into()))?;
         private_file(&trial.run_dir.join("report.json"), &json)?;
@@ -131,6 +139,12 @@ struct Trial<'a> {
     now_ms: u64,
     progress_due_ms: u64,
     all_finished_ms: Option<u64>,
+    /// Transmissions that reached a node since it was last looked at, and late ones.
+    transmissions: (u64, u64),
+    /// Setpoints that arrived.
+    setpoints: u64,
+    /// How often an airframe loitered by itself although its computer ran.
+    starved: u64,
     tell: &'a mut (dyn FnMut(Event) + Send),
 }
 
@@ -187,6 +201,9 @@ impl<'a> Trial<'a> {
             now_ms: 0,
             progress_due_ms: 0,
             all_finished_ms: None,
+            transmissions: (0, 0),
+            setpoints: 0,
+            starved: 0,
             spec,
             run_dir,
             tell,
@@ -206,6 +223,9 @@ impl<'a> Trial<'a> {
                 }
                 Some(asked) = self.control.next() => self.answer(asked).await,
                 () = tokio::time::sleep_until(self.pacer.next()) => {
+                    if !self.may_step() {
+                        continue;
+                    }
                     self.carry_out_due().await;
                     self.step();
                     if self.is_over() {
@@ -277,11 +297,16 @@ impl<'a> Trial<'a> {
                 }
             }
             Some(Said::Setpoint { id, setpoint, runs }) => {
-                let delay_ms = self.now_ms.saturating_sub(setpoint.from_ms);
-                if runs && self.pacer.answered(delay_ms) {
-                    self.note_slow("peers answer late");
+                if runs {
+                    self.setpoints += 1;
+                    let delay_ms = self.now_ms.saturating_sub(setpoint.from_ms);
+                    self.pacer.answered(delay_ms);
                 }
                 self.world.apply(id, setpoint);
+            }
+            Some(Said::Heard { arrived, late }) => {
+                self.transmissions.0 += arrived;
+                self.transmissions.1 += late;
             }
             Some(Said::Report { id, report }) => {
                 if let Some(line) = self.account.reported(self.now_ms, id, &report) {
@@ -318,6 +343,26 @@ impl<'a> Trial<'a> {
         }
     }
 
+    /// Whether the world may move on: it stands still while UAVs owe answers, so that a slow
+    /// machine flies the same mission slower.
+    fn may_step(&mut self) -> bool {
+        let owed_ms = self.peers.owed_ms(self.now_ms);
+        match self.pacer.due(Instant::now(), owed_ms) {
+            Due::Step => true,
+            Due::Hold => {
+                if self.pacer.starved() {
+                    self.note_slow("peers answer late");
+                }
+                false
+            }
+            Due::Abandon => {
+                let who = self.peers.excuse_all();
+                self.note(format!("time goes on without an answer of {who:?}"));
+                self.pacer.due(Instant::now(), 0) == Due::Step
+            }
+        }
+    }
+
     /// One step of the world.
     fn step(&mut self) {
         self.now_ms += STEP_MS;
@@ -335,6 +380,12 @@ impl<'a> Trial<'a> {
             .now_ms
             .is_multiple_of(u64::from(self.spec.percept_period_ms).max(STEP_MS));
         self.peers.tell(self.clock(), &self.world, percepts);
+        if self.now_ms.is_multiple_of(LOOK_MS) {
+            let (arrived, late) = std::mem::take(&mut self.transmissions);
+            if self.pacer.heard(arrived, late) {
+                self.note_slow("transmissions come late");
+            }
+        }
         if self.now_ms >= self.progress_due_ms {
             self.progress_due_ms = self.now_ms + PROGRESS_MS;
             let progress = self.progress();
@@ -354,6 +405,7 @@ impl<'a> Trial<'a> {
                 }
             }
             Fact::Failsafe { uav, on: true, .. } if self.peers.on_air(*uav) => {
+                self.starved += 1;
                 self.note(format!(
                     "uav{uav} got no setpoint for too long and loiters by itself"
                 ));
@@ -446,7 +498,7 @@ impl<'a> Trial<'a> {
     }
 
     /// Draws up the report; call it when everybody is gone.
-    fn conclude(&self, wall: Duration) -> RunReport {
+    fn conclude(&self, wall: Duration, used: &[Used]) -> RunReport {
         self.account.conclude(Ending {
             now_ms: self.now_ms,
             judge: self.world.judge(),
@@ -455,8 +507,13 @@ impl<'a> Trial<'a> {
             details: Details::Live(Live {
                 wall_s: wall.as_secs_f64(),
                 time_scale: self.spec.time_scale,
+                mean_time_scale: secs(self.now_ms) / wall.as_secs_f64().max(1e-3),
                 lowest_time_scale: self.pacer.lowest(),
+                held_s: self.pacer.held().as_secs_f64(),
                 setpoint_delay_ms: self.pacer.longest_delay_ms(),
+                setpoints: self.setpoints,
+                starved: self.starved,
+                processes: used_by(used),
             }),
         })
     }
@@ -467,5 +524,20 @@ impl<'a> Trial<'a> {
         if !keep {
             let _ = std::fs::remove_dir_all(&self.run_dir);
         }
+    }
+}
+
+/// What the peers' processes used, and this one.
+fn used_by(peers: &[Used]) -> Processes {
+    let n = peers.len().max(1) as f64;
+    let mean = |of: fn(&Used) -> f64| peers.iter().map(of).sum::<f64>() / n;
+    let max = |of: fn(&Used) -> f64| peers.iter().map(of).fold(0.0, f64::max);
+    Processes {
+        counted: peers.len(),
+        cpu_s_mean: mean(|u| u.cpu_s),
+        cpu_s_max: max(|u| u.cpu_s),
+        peak_mb_mean: mean(|u| u.peak_mb),
+        peak_mb_max: max(|u| u.peak_mb),
+        trial_cpu_s: Used::of(std::process::id()).map_or(0.0, |u| u.cpu_s),
     }
 }

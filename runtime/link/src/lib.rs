@@ -12,7 +12,7 @@ pub mod medium;
 pub mod neighbourhood;
 pub mod queue;
 
-pub use counters::RadioCounters;
+pub use counters::{Ages, RadioCounters};
 pub use fate::{Fate, LinkState, Reason, fate};
 pub use medium::Medium;
 pub use neighbourhood::{Hearing, LinkNews, Neighbourhood};

@@ -12,6 +12,7 @@
 //! and sends no faster than the channel ([`Outgoing`]). It also counts.
 
 use crate::outgoing::{Frame, Outgoing};
+use skein_link::counters::LATE_MS;
 use skein_link::medium::{self, Channel, Medium, key_hash};
 use skein_link::{LinkNews, Neighbourhood, RadioCounters, Reason};
 use skein_peer::Time;
@@ -212,7 +213,12 @@ impl Radio {
                 };
                 self.arrives(now.0.saturating_mul(1000), arrived);
             }
-            Air::Shared(air) => air.hear(self.me, now, &hop, key, &bytes),
+            Air::Shared(air) => {
+                let on_way_ms = now.0.saturating_sub(hop.at_ms);
+                self.counters.arrived += 1;
+                self.counters.late += u64::from(on_way_ms >= LATE_MS);
+                air.hear(self.me, now, &hop, key, &bytes);
+            }
         }
     }
 
@@ -239,6 +245,9 @@ impl Radio {
             Air::Shared(air) => air.run(now),
         };
         for d in delivered {
+            let given_us = now.0.saturating_mul(1000).max(d.at_us);
+            let age_ms = given_us.saturating_sub(d.queued_us) / 1000;
+            self.counters.ages.note(age_ms);
             let arrived = Arrived {
                 transmitter: d.tx,
                 hops: d.hops,

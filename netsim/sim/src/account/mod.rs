@@ -31,7 +31,7 @@ pub mod work;
 mod tests;
 
 pub use lifetimes::{Cause, Setting};
-pub use report::{Details, Driver, FalseDown, Live, RunReport, Simulated, Violations};
+pub use report::{Details, Driver, FalseDown, Live, Processes, RunReport, Simulated, Violations};
 pub use work::Held;
 
 use crate::world::{Fact, Judge, Loss};
@@ -255,6 +255,9 @@ impl Account {
         sum.multi_hop += of.multi_hop;
         sum.refused += of.refused;
         sum.overrun += of.overrun;
+        sum.arrived += of.arrived;
+        sum.late += of.late;
+        sum.ages.add(&of.ages);
         merge(&mut sum.relayed_by, &of.relayed_by);
         merge(&mut sum.lost, &of.lost);
     }

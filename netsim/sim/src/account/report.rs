@@ -116,10 +116,37 @@ pub struct Live {
     pub wall_s: f64,
     /// Scenario seconds per second of wall time: asked for.
     pub time_scale: f64,
+    /// What was reached: scenario time over wall time of the whole flight.
+    pub mean_time_scale: f64,
     /// The lowest to which it had to be lowered, because the machine was too slow.
     pub lowest_time_scale: f64,
+    /// How long time stood still for UAVs that owed the answer to a percept, s.
+    pub held_s: f64,
     /// Largest delay of a setpoint behind its percept, ms.
     pub setpoint_delay_ms: u64,
+    /// Setpoints that arrived, of all UAVs.
+    pub setpoints: u64,
+    /// How often an airframe loitered by itself although its computer ran.
+    pub starved: u64,
+    /// What the peers' processes used that were there at the end.
+    pub processes: Processes,
+}
+
+/// What the processes of a trial used; zeros where the system does not tell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Processes {
+    /// Of how many it is told.
+    pub counted: usize,
+    /// Time of processors of one of them, s: the mean.
+    pub cpu_s_mean: f64,
+    /// And the largest.
+    pub cpu_s_max: f64,
+    /// The most memory that one of them held at once, MB: the mean.
+    pub peak_mb_mean: f64,
+    /// And the largest.
+    pub peak_mb_max: f64,
+    /// Time of processors of the trial itself, s.
+    pub trial_cpu_s: f64,
 }
 
 /// Which driver ran it, and what only that one can tell.
@@ -282,6 +309,13 @@ pub struct Radio {
     pub link_cuts: BTreeMap<String, u64>,
     /// Messages dropped because a process was too slow to take them.
     pub overrun: u64,
+    /// From when a record was handed to a radio until another peer was given it, ms of
+    /// scenario time: half of them took no longer. Trials only.
+    pub age_ms_p50: Option<u64>,
+    /// And 99 of 100.
+    pub age_ms_p99: Option<u64>,
+    /// Share of what the transport brought half a second late or later, 0 to 1. Trials only.
+    pub late_share: Option<f64>,
 }
 
 impl Radio {
@@ -306,6 +340,10 @@ impl Radio {
             lost: lost.collect(),
             link_cuts: cuts.map(|(r, n)| (r.to_owned(), n)).into(),
             overrun: all.overrun,
+            age_ms_p50: all.ages.quantile_ms(0.5),
+            age_ms_p99: all.ages.quantile_ms(0.99),
+            #[allow(clippy::cast_precision_loss, reason = "far below 2^52 records")]
+            late_share: (all.arrived > 0).then(|| all.late as f64 / all.arrived as f64),
         }
     }
 }

@@ -387,6 +387,7 @@ fn every_field_of_the_report_is_explained() {
         &value["violations"],
         &value["simulated"],
         &value["live"],
+        &value["live"]["processes"],
     ];
     for name in objects.into_iter().flat_map(names) {
         if !explained.contains(&format!("`{name}`")) {

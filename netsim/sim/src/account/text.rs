@@ -38,12 +38,12 @@ impl RunReport {
     fn write_times(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "  time       {:.1} s of flight", secs(self.end_ms))?;
         if let Some(live) = &self.live {
-            write!(f, " in {:.1} s (x{:.1})", live.wall_s, live.time_scale)?;
+            write!(f, " in {:.1} s (x{:.1})", live.wall_s, live.mean_time_scale)?;
             if live.lowest_time_scale < live.time_scale {
                 write!(
                     f,
-                    ", slowed down to x{:.1}: the machine was too slow",
-                    live.lowest_time_scale
+                    " instead of x{:.1}, at times x{:.1}: the machine was too slow",
+                    live.time_scale, live.lowest_time_scale
                 )?;
             }
         }

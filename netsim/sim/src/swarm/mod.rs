@@ -284,7 +284,7 @@ impl Swarm {
     #[must_use]
     pub fn view(&self, id: u16) -> Option<Beliefs> {
         let sim_peer = &self.peers[self.peer_idx(id)?];
-        sim_peer.peer.as_ref().map(skein_peer::Peer::beliefs)
+        sim_peer.peer.as_deref().map(skein_peer::Peer::beliefs)
     }
 
     /// Where a UAV is; nothing once its airframe is gone.
@@ -454,7 +454,7 @@ impl Swarm {
         }
         let wants_ms = s
             .peer
-            .as_ref()
+            .as_deref()
             .and_then(skein_peer::Peer::next_timeout)
             .map(|t| s.clock.when_ms(t));
         // The peer may want it later by now: then no input is spent.
@@ -469,7 +469,8 @@ impl Swarm {
     fn schedule_timer(&mut self, idx: usize) {
         let now_ms = self.now_ms;
         let s = &mut self.peers[idx];
-        let Some(wants) = s.peer.as_ref().and_then(skein_peer::Peer::next_timeout) else {
+        let wants = s.peer.as_deref().and_then(skein_peer::Peer::next_timeout);
+        let Some(wants) = wants else {
             return;
         };
         // At least a millisecond ahead: a peer that wants "now" after its timer must not stop time.

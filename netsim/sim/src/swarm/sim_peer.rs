@@ -79,8 +79,8 @@ pub enum Process {
 pub struct SimPeer {
     /// What it is told before it starts.
     pub config: PeerConfig,
-    /// The mind, while there is a process.
-    pub peer: Option<Peer>,
+    /// The mind, while there is a process; boxed, since it changes hands with every input.
+    pub peer: Option<Box<Peer>>,
     /// What the process does.
     pub process: Process,
     /// Whether its airframe is in the air.
@@ -155,7 +155,7 @@ impl SimPeer {
         self.timer_ms = None;
         self.finished = false;
         self.inbox.clear();
-        self.peer = Some(Peer::new(self.config.clone()));
+        self.peer = Some(Box::new(Peer::new(self.config.clone())));
         #[allow(
             clippy::cast_possible_truncation,
             reason = "the low half of a random number is one"
@@ -168,7 +168,7 @@ impl SimPeer {
     }
 
     /// Ends the process; what it had not synced is gone.
-    pub fn stop(&mut self) -> Option<Peer> {
+    pub fn stop(&mut self) -> Option<Box<Peer>> {
         self.process = Process::Stopped;
         self.inbox.clear();
         self.disk.crash();
