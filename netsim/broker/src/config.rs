@@ -6,7 +6,20 @@ use std::net::SocketAddr;
 /// After this much wall time without a byte a transport gives its neighbour up,
 /// milliseconds. Short, because a trial runs faster than life; below it, starved
 /// processes on two cores would lose their links.
-pub const LEASE_MS: u32 = 500;
+const LEAST_LEASE_MS: u32 = 500;
+
+/// The same for each peer of a large swarm, milliseconds: each two of them have a link that
+/// is kept alive four times in a lease. Fifty peers on leases of half a second spend a
+/// processor on it, and lose their links when they are late.
+const LEASE_MS_PER_PEER: u32 = 50;
+
+/// The lease of each link in a trial.
+#[must_use]
+pub fn lease_ms(spec: &Spec) -> u32 {
+    let n = spec.uavs.len() + usize::from(spec.ground.is_some());
+    let n = u32::try_from(n).unwrap_or(u32::MAX);
+    LEASE_MS_PER_PEER.saturating_mul(n).max(LEAST_LEASE_MS)
+}
 
 /// What a peer's configuration needs besides the scenario.
 #[derive(Debug)]
@@ -70,7 +83,7 @@ impl Surroundings<'_> {
             "journal": format!("uav{id}.journal"),
             "listen": "tcp/127.0.0.1:0",
             "links": links,
-            "lease_ms": LEASE_MS,
+            "lease_ms": lease_ms(self.spec),
             "vehicle": { "simulator": self.world.to_string(), "token": self.token },
         })
     }

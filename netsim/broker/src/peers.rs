@@ -1,7 +1,7 @@
 //! All peers of a trial: their processes, their files, the streams and transports that
 //! join them. What they say comes out as [`Said`].
 
-use crate::config::Surroundings;
+use crate::config::{Surroundings, lease_ms};
 use crate::error::{TrialError, io};
 use crate::live_peer::LivePeer;
 use crate::live_world::LiveWorld;
@@ -115,7 +115,8 @@ impl Peers {
             .map(|(id, flies)| (id, LivePeer::new(run_dir, id, flies)))
             .collect();
         let ids: Vec<u16> = by_id.keys().copied().collect();
-        let transports = Transports::bind(&ids).await.map_err(io("a link's proxy"))?;
+        let transports = Transports::bind(&ids, lease_ms(spec)).await;
+        let transports = transports.map_err(io("a link's proxy"))?;
         let mission =
             serde_json::to_vec(&*spec.mission).map_err(|e| io("mission.json")(e.into()))?;
         private_file(&run_dir.join("mission.json"), &mission)?;
@@ -310,6 +311,13 @@ impl Peers {
     pub(crate) fn owed_ms(&self, now_ms: u64) -> u64 {
         let owed = self.by_id.values().map(|p| p.owed_ms(now_ms));
         owed.max().unwrap_or(0)
+    }
+
+    /// Everybody is ready to fly: whoever is told a percept from now on owes an answer.
+    pub(crate) fn all_answer(&mut self) {
+        for peer in self.by_id.values_mut().filter(|p| p.on_air()) {
+            peer.answers(0);
+        }
     }
 
     /// Nobody is waited for any longer; gives who was.

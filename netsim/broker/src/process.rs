@@ -112,6 +112,8 @@ impl Processes {
             .arg("--config")
             .arg(config)
             .env("ZENOH_RUNTIME", ZENOH_RUNTIME)
+            // A dial into the dark is an error, and it is no news; a panic still tells where.
+            .env("RUST_LIB_BACKTRACE", "0")
             .stdin(Stdio::null())
             .stdout(log.try_clone()?)
             .stderr(log)

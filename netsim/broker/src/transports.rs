@@ -1,7 +1,6 @@
 //! The loopback transports between each two peers: a proxy a pair, dark while their link
 //! is down.
 
-use crate::config::LEASE_MS;
 use crate::live_world::LiveWorld;
 use crate::proxy::Proxy;
 use std::collections::BTreeMap;
@@ -9,9 +8,9 @@ use std::net::SocketAddr;
 use std::time::Duration;
 use tokio::time::Instant;
 
-/// A link that has been down this long goes dark for the transports too: two leases,
-/// so that a transport that loses a neighbour truly lost it.
-const DARK_AFTER: Duration = Duration::from_millis(2 * LEASE_MS as u64);
+/// A link that has been down for so many leases goes dark for the transports too, so that a
+/// transport that loses a neighbour truly lost it.
+const DARK_LEASES: u32 = 2;
 
 /// The proxy of a pair and the state of its link.
 #[derive(Debug)]
@@ -24,14 +23,15 @@ struct Pair {
 #[derive(Debug)]
 pub(crate) struct Transports {
     pairs: BTreeMap<(u16, u16), Pair>,
+    dark_after: Duration,
 }
 
 impl Transports {
-    /// A proxy for each two of `ids`.
+    /// A proxy for each two of `ids`, whose transports have this lease.
     ///
     /// # Errors
     /// When no port can be had.
-    pub(crate) async fn bind(ids: &[u16]) -> std::io::Result<Self> {
+    pub(crate) async fn bind(ids: &[u16], lease_ms: u32) -> std::io::Result<Self> {
         let mut pairs = BTreeMap::new();
         for low in ids {
             for high in ids.iter().filter(|high| *high > low) {
@@ -42,7 +42,10 @@ impl Transports {
                 pairs.insert((*low, *high), pair);
             }
         }
-        Ok(Self { pairs })
+        Ok(Self {
+            pairs,
+            dark_after: DARK_LEASES * Duration::from_millis(u64::from(lease_ms)),
+        })
     }
 
     /// The proxies that lead from `id` to peers of higher numbers.
@@ -69,7 +72,8 @@ impl Transports {
                 pair.proxy.set_dark(false);
             } else {
                 let since = *pair.down_since.get_or_insert(now);
-                pair.proxy.set_dark(now.duration_since(since) > DARK_AFTER);
+                pair.proxy
+                    .set_dark(now.duration_since(since) > self.dark_after);
             }
         }
     }

@@ -268,10 +268,11 @@ impl<'a> Trial<'a> {
                 Ok(None) | Err(_) => {
                     let text = "not all UAVs are ready; time begins all the same";
                     self.note(text.to_owned());
-                    break;
+                    return Ok(());
                 }
             }
         }
+        self.peers.all_answer();
         Ok(())
     }
 

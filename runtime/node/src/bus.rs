@@ -316,7 +316,10 @@ pub fn effective_config(config: &BusConfig) -> Result<zenoh::Config, BusError> {
         ("connect/exit_on_failure", "false".to_owned()),
         (
             "connect/retry",
-            "{period_init_ms: 100, period_max_ms: 500, period_increase_factor: 1.5}".to_owned(),
+            // Whoever is patient with a link that is there is patient with one that is not.
+            format!(
+                "{{period_init_ms: 100, period_max_ms: {lease_ms}, period_increase_factor: 1.5}}"
+            ),
         ),
         ("scouting/multicast/enabled", "false".to_owned()),
         ("scouting/gossip/enabled", "true".to_owned()),

@@ -51,6 +51,21 @@ fn passed(o: &Outcome) {
     );
 }
 
+/// Where all share one channel the last claims and covered cells wait for long. Everybody
+/// must hear all the same that all is seen, and soon.
+#[test]
+fn a_crowd_in_one_earshot_ends_its_mission_and_says_so() {
+    let crowd = prepared(48);
+    let o = run(&crowd, 1, Vec::new(), false);
+    completed(&o);
+    let (seen_ms, end_ms) = (o.report.makespan_ms.unwrap(), o.report.end_ms);
+    assert_eq!(o.report.finished.len(), 48);
+    assert!(
+        end_ms <= seen_ms + 90_000,
+        "seen after {seen_ms} ms, said after {end_ms} ms"
+    );
+}
+
 #[test]
 fn three_peers_cover_the_square_and_all_know() {
     let o = run(&prepared(3), 1, Vec::new(), true);

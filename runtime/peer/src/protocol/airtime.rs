@@ -46,8 +46,13 @@ impl Filling {
     #[must_use]
     pub fn cost_bytes(&self, now_ms: u64, bytes: usize) -> usize {
         let joined = self.filled.saturating_add(PART_BYTES).saturating_add(bytes);
-        let joins = self.filled > 0 && self.at == now_ms && joined <= FRAME_BYTES;
+        let joins = self.is_open(now_ms) && joined <= FRAME_BYTES;
         bytes.saturating_add(if joins { PART_BYTES } else { OVERHEAD_BYTES })
+    }
+
+    /// Whether a transmission is under way that could take more.
+    fn is_open(&self, now_ms: u64) -> bool {
+        self.filled > 0 && self.at == now_ms
     }
 
     /// A record is handed over. Returns what it costs, headers included.
@@ -121,6 +126,8 @@ pub struct Airtime {
     period_ms: u64,
     rate_bps: u64,
     neighbours: BTreeMap<u16, Neighbour>,
+    /// The most that any of them counts: asked for with every input.
+    most_told: u16,
     /// What may be sent; below zero, what is owed.
     tokens_millibytes: i64,
     reserve_millibytes: i64,
@@ -139,6 +146,7 @@ impl Airtime {
             period_ms: u64::from(period_ms.max(1)),
             rate_bps: u64::from(rate_bps.max(1)),
             neighbours: BTreeMap::new(),
+            most_told: 0,
             tokens_millibytes: 0,
             reserve_millibytes: full_reserve(),
             filled: Time(0),
@@ -151,7 +159,7 @@ impl Airtime {
     /// A neighbour's beacon or heartbeat: its interval in quarters of T, and among how many
     /// it counts itself.
     pub fn hear(&mut self, now: Time, author: u16, (interval, sharers): (u8, u16)) {
-        self.neighbours.retain(|_, n| n.until > now);
+        self.forget(now);
         if self.neighbours.len() < PEERS_MAX || self.neighbours.contains_key(&author) {
             let lasts_ms = LASTING_INTERVALS * ms_of(interval, self.period_ms);
             let heard = Neighbour {
@@ -159,7 +167,19 @@ impl Airtime {
                 sharers,
             };
             self.neighbours.insert(author, heard);
+            self.count();
         }
+    }
+
+    /// Who was not heard for so long shares no more.
+    fn forget(&mut self, now: Time) {
+        self.neighbours.retain(|_, n| n.until > now);
+        self.count();
+    }
+
+    fn count(&mut self) {
+        let told = self.neighbours.values().map(|n| n.sharers).max();
+        self.most_told = told.unwrap_or(0);
     }
 
     /// How many this peer counts in its own earshot, itself included.
@@ -171,8 +191,7 @@ impl Airtime {
     /// How many share the channel: as many as whoever hears most of them counts.
     #[must_use]
     pub fn sharers(&self) -> u64 {
-        let told = self.neighbours.values().map(|n| n.sharers).max();
-        u64::from(told.unwrap_or(0).max(self.counted()))
+        u64::from(self.most_told.max(self.counted()))
     }
 
     /// Bytes a second that this peer may send among so many.
@@ -201,7 +220,7 @@ impl Airtime {
     /// A beacon with gossip is due. The interval at most doubles from one to the next: who
     /// misses the one that announces it is not to be alarmed by the silence.
     pub fn plan_beacon(&mut self, now: Time) -> BeaconPlan {
-        self.neighbours.retain(|_, n| n.until > now);
+        self.forget(now);
         self.refill(now);
         self.planned = self.planned.saturating_add(1).min(FIRST_BEACONS);
         let share = self.share_bytes_ps(self.sharers());
@@ -261,6 +280,12 @@ impl Airtime {
             self.tokens_millibytes -= cost;
         }
         goes
+    }
+
+    /// Whether something was just sent whose transmission others could share.
+    #[must_use]
+    pub fn is_filling(&self, now: Time) -> bool {
+        self.frame.is_open(now.0)
     }
 
     /// Whether a record would share the transmission of what was just sent.

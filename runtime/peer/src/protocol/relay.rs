@@ -503,7 +503,7 @@ impl Relay {
 
     /// What goes next: it is its turn, or it can share the headers of what goes now.
     fn first(&self, now: Time) -> Option<(RecordKey, Priority)> {
-        let crowded = self.air.sharers() > CROWD;
+        let crowded = self.air.is_filling(now) && self.air.sharers() > CROWD;
         let rides = |k: &RecordKey| {
             let held = self.held.get(k).filter(|_| crowded);
             held.is_some_and(|h| self.air.joins(now, h.bytes.len()))
