@@ -715,6 +715,21 @@ fn swarm_20_is_what_it_says() {
 }
 
 #[test]
+fn swarm_100_is_what_it_says() {
+    let scenario = load_builtin("swarm_100", &Overrides::default()).unwrap();
+    let spec = &scenario.spec;
+    assert_eq!((spec.uavs.len(), spec.radio.rate_bps), (100, 64_000));
+    assert_eq!(skein_netsim::fault_generator::kills(&spec.faults), 20);
+    let total = skein_scenario::summary(spec, &scenario.geometry);
+    assert!(total.area_m2 > 8e6, "{}", total.area_m2);
+    let place = |u: &skein_netsim::spec::UavSpec| format!("{:?}", u.launch.position());
+    let places: std::collections::BTreeSet<String> = spec.uavs.iter().map(place).collect();
+    assert_eq!(places.len(), 4);
+    let last_ms = spec.uavs.iter().map(|u| u.takeoff_ms).max();
+    assert_eq!(last_ms, Some(72_000), "25 at each place, every 3 s");
+}
+
+#[test]
 fn a_missing_scenario_is_named() {
     let e = skein_scenario::open(Some("nowhere.json5"), &Overrides::default())
         .unwrap_err()

@@ -50,6 +50,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         "swarm_20.json5",
         include_str!("../../../configs/trials/swarm_20.json5"),
     ),
+    (
+        "swarm_100",
+        "swarm_100.json5",
+        include_str!("../../../configs/trials/swarm_100.json5"),
+    ),
 ];
 
 /// Files that the built-in scenarios name.
