@@ -48,7 +48,8 @@ use crate::wire::message::{Beacon, Bid, CellRun, Epoch, Member, Order, Record};
 use crate::{Incarnation, PeerId};
 use skein_behaviors::executive::UNREACHABLE_MS;
 use skein_behaviors::{Event, Executive, Goal, Percept};
-use skein_flight::coverage::ring::Direction;
+use skein_flight::coverage::ring::{Direction, LoopCell};
+
 use skein_flight::coverage::ring::backtracking::{Division, Leg, Uav};
 use skein_geometry::frame::Pose;
 use std::sync::Arc;
@@ -601,12 +602,10 @@ impl MissionState {
         let mut actions = self.negotiation.tick(&ctx, &coverage_loop);
         let left_over = self.negotiation.left_over(&ctx);
         let within_reach = left_over.and_then(|cells| self.within_reach(&cells, s.percept));
-        let wanted = within_reach.or_else(|| {
-            let cells = self.wanted_without_a_round(s, &ctx)?;
-            Some(self.flyable_besides(cells, s.percept)).filter(|cells| !cells.is_empty())
-        });
+        let wanted = within_reach.or_else(|| self.wanted_without_a_round(s, &ctx));
         let taken = wanted.and_then(|cells| self.negotiation.begin_take(&cells));
-        actions.extend(taken.map(Action::Take));
+        let first = self.first_section(s, &ctx);
+        actions.extend(taken.or(first).map(Action::Take));
         let mut effects = Effects::new();
         let alone = s.membership.live().next().is_none();
         if core::mem::replace(&mut self.alone, alone) != alone && self.lists() {
@@ -665,24 +664,26 @@ impl MissionState {
         )
     }
 
-    /// What this peer takes without a round: its first section, or among many orphans and a
-    /// part of what a slower one has left.
+    /// What this peer, among many, takes without a round: orphans, or a part of what a slower
+    /// one has left.
     fn wanted_without_a_round(
         &mut self,
         s: &Situation<'_>,
         ctx: &Context<'_>,
     ) -> Option<Vec<(u16, Direction)>> {
-        if self.negotiation.begins(ctx) {
-            return self.first_section(s, ctx);
+        if !self.negotiation.looks_around(ctx) {
+            return None;
         }
-        if let Some((orphaned_ms, orphans)) = self.negotiation.orphans_among_many(ctx) {
-            let (me, share) = (self.hand(s)?, self.even_share(ctx));
+        let me = self.hand(s)?;
+        let spendable_ms = u64::from(self.spendable_ms(s.percept));
+        if let Some(orphaned_ms) = self.negotiation.orphaned_ms(ctx) {
+            let share = self.even_share(ctx);
+            let orphans = self.negotiation.sections.orphans(ctx.live);
             let nearest = sharing::nearest_orphans(&orphans.runs(), &me, share, self.pace()?);
             return nearest
                 .filter(|(way_ms, _)| self.negotiation.is_my_turn(ctx, orphaned_ms, *way_ms))
-                .map(|(_, cells)| cells);
+                .and_then(|(_, cells)| self.flown_besides(cells, spendable_ms));
         }
-        let me = self.hand(s)?;
         if !self.negotiation.may_relieve(ctx, me.free_ms) {
             return None;
         }
@@ -697,20 +698,20 @@ impl MissionState {
         let hands: Vec<Hand> = others.chain([me]).collect();
         // A claim is stored, spoken, and heard even if it is lost once.
         let least_ms = SETTLE_PERIODS * ctx.period_ms;
-        sharing::relief(&owners, &hands, me.id, self.pace()?, least_ms)
+        let (cells, by_ms) = sharing::relief(&owners, &hands, me.id, self.pace()?, least_ms)?;
+        self.flown_besides(cells, by_ms.min(spendable_ms))
     }
 
     /// An even share of the loop near this peer, judged from where its neighbours are. Whoever
     /// is there counts: at its first beacon nobody is able yet.
-    fn first_section(&self, s: &Situation<'_>, ctx: &Context<'_>) -> Option<Vec<(u16, Direction)>> {
+    fn first_section(&mut self, s: &Situation<'_>, ctx: &Context<'_>) -> Option<Vec<PlannedCell>> {
+        if !self.negotiation.begins(ctx) {
+            return None;
+        }
         let executive = self.executive.as_ref()?;
         let info = |id: &u16| s.membership.info(*id).filter(|i| !i.ground_station);
-        let others: Vec<u16> = ctx
-            .live
-            .keys()
-            .copied()
-            .filter(|id| info(id).is_some())
-            .collect();
+        let others = ctx.live.keys().copied();
+        let others: Vec<u16> = others.filter(|id| info(id).is_some()).collect();
         let site = |id, pose| {
             let anchor = executive.anchor_from(pose)?;
             Some(Site { anchor, id })
@@ -722,10 +723,34 @@ impl MissionState {
         let sites = sites.chain(site(s.me.id, s.percept?.pose)).collect();
         let sections = &self.negotiation.sections;
         let n = sections.cells();
-        let run = sharing::first_section(sites, others.len() + 1, n, s.me.id)?;
+        let cells = self.geometry.coverage_loop.cells().iter();
+        let length_mm = |c: &LoopCell| if c.needed { c.service_mm } else { c.travel_mm };
+        let lengths_mm: Vec<u32> = cells.map(length_mm).collect();
+        let run = sharing::first_section(sites, others.len() + 1, &lengths_mm, s.me.id)?;
         let orphans = sections.orphans(ctx.live);
         let mine = cells_of(run, n).filter(|c| orphans.contains(*c));
-        Some(mine.map(|c| (c, Direction::Forward)).collect())
+        let mine: Vec<_> = mine.map(|c| (c, Direction::Forward)).collect();
+        let way_ms = self.pace()?.way_ms(self.hand(s)?.at, run.first);
+        let mine = self.flown_besides(mine, u64::from(self.spendable_ms(s.percept)))?;
+        self.negotiation.begin_first(&mine, way_ms)
+    }
+
+    /// Of cells that are to be flown after the plan those that are flown by then, if any are.
+    fn flown_besides(
+        &self,
+        mut cells: Vec<(u16, Direction)>,
+        by_ms: u64,
+    ) -> Option<Vec<(u16, Direction)>> {
+        let sections = &self.negotiation.sections;
+        let mut plan = sections.plan().to_vec();
+        plan.extend(sections.taken(&cells));
+        let legs = legs_of(&plan, sections.cells());
+        let is_open = |c: u16| !sections.covered().contains(c);
+        let times = self.executive.as_ref()?.schedule(&legs, &is_open);
+        let in_time = times.iter().take_while(|(_, ms)| u64::from(*ms) <= by_ms);
+        let in_time = CellSet::of(sections.cells(), in_time.map(|(c, _)| *c));
+        cells.retain(|(c, _)| in_time.contains(*c));
+        (!cells.is_empty()).then_some(cells)
     }
 
     /// This peer as one that will have nothing to fly, where its plan ends.
@@ -862,27 +887,6 @@ impl MissionState {
         };
         let reach = cells.runs().into_iter().flat_map(both_ways).map(flown);
         reach.max_by_key(Vec::len).filter(|run| !run.is_empty())
-    }
-
-    /// Of cells that are to be flown after the plan those for which the endurance suffices.
-    fn flyable_besides(
-        &self,
-        mut cells: Vec<(u16, Direction)>,
-        percept: Option<&Percept>,
-    ) -> Vec<(u16, Direction)> {
-        let Some(executive) = &self.executive else {
-            return Vec::new();
-        };
-        let sections = &self.negotiation.sections;
-        let mut plan = sections.plan().to_vec();
-        plan.extend(sections.taken(&cells));
-        let legs = legs_of(&plan, sections.cells());
-        let times = executive.schedule(&legs, &|c| !sections.covered().contains(c));
-        let spendable_ms = self.spendable_ms(percept);
-        let in_time = times.iter().take_while(|(_, ms)| *ms <= spendable_ms);
-        let in_time = CellSet::of(sections.cells(), in_time.map(|(c, _)| *c));
-        cells.retain(|(c, _)| in_time.contains(*c));
-        cells
     }
 
     /// Lists only what can be flown (S10): the rest is orphaned, and that is a loss.

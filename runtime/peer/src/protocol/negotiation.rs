@@ -12,7 +12,7 @@
 //! | only first sections, among few | 2 T | a round with loss |
 //! | orphans, and no round helped | 2 T + W0 + rank T/2 | the nearest are taken |
 //! | orphans, among many | 2 T, and an eighth of the way there (W0 at most) | the nearest are taken |
-//! | less than 2 T to fly, among many | once a T | the far part of a slower one's plan is taken |
+//! | less than 2 T to fly, among many | twice a T | the far part of a slower one's plan is taken |
 //! | idle, and a gain was computed from what is held | 10 T steady, 20 T calm | a round without loss |
 //! | idle, an owner makes no progress | its bound | the far half is taken |
 //! | idle, cells were beyond everybody | 10 T + rank T/2 | what the fuel allows of one run is taken |
@@ -49,6 +49,14 @@ const STEADY_PERIODS: u64 = 2;
 /// A peer takes its first section after so many quarters of a period of listening: who began
 /// with it has said twice by then where it is.
 const FIRST_SECTION_QUARTERS: u64 = 6;
+
+/// How near the begin of a first section is counts in its stamps as takes: from this many,
+/// one less for each four seconds of flight, in which a UAV passes a cell.
+const NEARNESS_MAX: u64 = 60;
+const NEARNESS_STEP_MS: u64 = 4000;
+
+/// Among many a peer looks this often in a period for what it could take.
+const LOOKS_A_PERIOD: u64 = 2;
 
 /// Among many a peer waits for others to take orphans for this part of the time until it
 /// would be there: the nearest one first.
@@ -195,8 +203,8 @@ pub struct Negotiation {
     began: bool,
     /// Whether what it lists is one that no round has divided yet.
     provisional: bool,
-    /// When it last looked for whom to relieve.
-    relieved_at: Option<Time>,
+    /// When it last looked for what to take without a round.
+    looked_at: Option<Time>,
     /// When cells that were beyond everybody were last looked at.
     left_over_at: Option<Time>,
     /// When the period began in which counters rise by a step.
@@ -232,7 +240,7 @@ impl Negotiation {
             foreseen_at: None,
             began: false,
             provisional: false,
-            relieved_at: None,
+            looked_at: None,
             left_over_at: None,
             period_since: None,
             adoptions: 0,
@@ -582,15 +590,26 @@ impl Negotiation {
         self.provisional
     }
 
-    /// Among many: the orphans that this peer may take, and for how long there are some.
+    /// Whether this peer, among many, is to look for what it could take: half a period after
+    /// it looked last.
+    pub fn looks_around(&mut self, ctx: &Context<'_>) -> bool {
+        let rested = |t| ctx.now.since_ms(t) >= ctx.period_ms / LOOKS_A_PERIOD;
+        let looks = is_many(ctx)
+            && ctx.able_since.is_some()
+            && !self.sections.complete()
+            && !self.take_pending
+            && self.rounds.open().is_none()
+            && self.looked_at.is_none_or(rested);
+        if looks {
+            self.looked_at = Some(ctx.now);
+        }
+        looks
+    }
+
+    /// For how long there are orphans, if there are any.
     #[must_use]
-    pub fn orphans_among_many(&self, ctx: &Context<'_>) -> Option<(u64, CellSet)> {
-        let since = self
-            .orphan_since
-            .filter(|_| is_many(ctx) && !self.take_pending)?;
-        let orphaned_ms = ctx.now.since_ms(since);
-        (orphaned_ms >= STEADY_PERIODS * ctx.period_ms)
-            .then(|| (orphaned_ms, self.sections.orphans(ctx.live)))
+    pub fn orphaned_ms(&self, ctx: &Context<'_>) -> Option<u64> {
+        self.orphan_since.map(|t| ctx.now.since_ms(t))
     }
 
     /// Whether orphans have waited for long enough for those who would be there sooner.
@@ -600,22 +619,10 @@ impl Negotiation {
         orphaned_ms >= STEADY_PERIODS * ctx.period_ms + for_others_ms
     }
 
-    /// Whether this peer, among many, is to look whom it could relieve: it will have nothing
-    /// to fly before others have heard what it takes. Once a period.
-    pub fn may_relieve(&mut self, ctx: &Context<'_>, free_ms: u64) -> bool {
-        let rested = |t| ctx.now.since_ms(t) >= ctx.period_ms;
-        let may = is_many(ctx)
-            && ctx.able_since.is_some()
-            && !self.sections.complete()
-            && !self.take_pending
-            && self.orphan_since.is_none()
-            && self.rounds.open().is_none()
-            && free_ms <= STEADY_PERIODS * ctx.period_ms
-            && self.relieved_at.is_none_or(rested);
-        if may {
-            self.relieved_at = Some(ctx.now);
-        }
-        may
+    /// Whether this peer will have nothing to fly before others have heard what it takes.
+    #[must_use]
+    pub fn may_relieve(&self, ctx: &Context<'_>, free_ms: u64) -> bool {
+        free_ms <= STEADY_PERIODS * ctx.period_ms
     }
 
     /// The live owners with what they have left, but for what others took of it since.
@@ -737,6 +744,22 @@ impl Negotiation {
         let taken = self.sections.taken(cells);
         self.take_pending = !taken.is_empty();
         self.take_pending.then_some(taken)
+    }
+
+    /// As [`Negotiation::begin_take`], of the first section, whose begin is so far away: of two
+    /// first sections that overlap, the one that is begun sooner outranks the other.
+    pub fn begin_first(
+        &mut self,
+        cells: &[(u16, Direction)],
+        way_ms: u64,
+    ) -> Option<Vec<PlannedCell>> {
+        let away = (way_ms / NEARNESS_STEP_MS).min(NEARNESS_MAX);
+        let nearness = u16::try_from(NEARNESS_MAX - away).unwrap_or(0);
+        let mut taken = self.begin_take(cells)?;
+        for p in &mut taken {
+            p.stamp.take = p.stamp.take.saturating_add(nearness);
+        }
+        Some(taken)
     }
 
     /// What an idle peer may try to fly although no division could give it to anybody: fuel

@@ -25,31 +25,42 @@ pub struct Site {
     pub id: u16,
 }
 
-/// The section with which a peer begins: an even share of the loop near its site, in the
-/// order of all sites along the loop. Where sites are closer to each other than a share they
-/// are spread as little as possible: the squares of the shifts are least. `swarm` is how many
-/// are known to be there, `sites` where some of them are, this peer included.
+/// The section with which a peer begins: an even share of the loop's length near its site, in
+/// the order of all sites along the loop. Where sites are closer to each other than a share
+/// they are spread as little as possible: the squares of the shifts are least. `lengths_mm` are
+/// those of the cells, `swarm` is how many are known to be there, `sites` where some of them
+/// are, this peer included.
 ///
 /// Those who know the same sites compute disjoint sections, but perhaps where the loop is cut;
 /// those who know the sites of all, sections that cover the loop.
 #[must_use]
-pub fn first_section(mut sites: Vec<Site>, swarm: usize, cells: u16, me: u16) -> Option<CellRun> {
+pub fn first_section(
+    mut sites: Vec<Site>,
+    swarm: usize,
+    lengths_mm: &[u32],
+    me: u16,
+) -> Option<CellRun> {
     sites.sort_unstable();
     let count = sites.len();
     let swarm = i64::try_from(swarm.max(count)).ok()?;
-    let n = i64::from(cells);
-    let anchor = |i: usize| sites.get(i).map(|s| i64::from(s.anchor));
-    let gap = |i: &usize| match (anchor(*i), anchor(i + 1)) {
-        (Some(here), Some(next)) => next - here,
-        (here, _) => n + anchor(0).unwrap_or(0) - here.unwrap_or(0),
-    };
+    let mut n = 0;
+    let begins = lengths_mm.iter().map(|mm| {
+        n += i64::from(*mm);
+        n - i64::from(*mm)
+    });
+    let begins: Vec<i64> = begins.collect();
+    let place = |site: &Site| begins.get(usize::from(site.anchor)).copied();
+    let places: Vec<i64> = sites.iter().map(place).collect::<Option<_>>()?;
+    let (first, last) = (*places.first()?, *places.last()?);
+    let gaps = places.windows(2).map(|w| w[1] - w[0]);
     // The loop is cut where the widest gap ends.
-    let cut = (0..count).max_by_key(gap)? + 1;
-    sites.rotate_left(cut % count);
-    let first = i64::from(sites.first()?.anchor);
-    // In parts of a cell, so many to a cell as there are peers: a share is `n` of them.
+    let widest = gaps.chain([n + first - last]).enumerate();
+    let cut = (widest.max_by_key(|(_, gap)| *gap)?.0 + 1) % count;
+    sites.rotate_left(cut);
+    let origin = *places.get(cut)?;
+    // In so many parts of a millimetre as there are peers: a share is `n` of them.
     let shifted = (0i64..).zip(&sites).map(|(i, site)| {
-        let along = (i64::from(site.anchor) - first).rem_euclid(n);
+        let along = (place(site).unwrap_or(origin) - origin).rem_euclid(n.max(1));
         along * swarm - i * n
     });
     let shifted: Vec<i64> = shifted.collect();
@@ -57,10 +68,19 @@ pub fn first_section(mut sites: Vec<Site>, swarm: usize, cells: u16, me: u16) ->
     let spread = pooled(&shifted, all_known);
     let mine = sites.iter().position(|s| s.id == me)?;
     let start = spread.get(mine)? + i64::try_from(mine).ok()? * n;
-    let (from, to) = (start.div_euclid(swarm), (start + n).div_euclid(swarm));
+    let cell_at = |part: i64| {
+        let at = (origin + part.div_euclid(swarm)).rem_euclid(n.max(1));
+        begins.partition_point(|b| *b < at) % begins.len().max(1)
+    };
+    let (from, to) = (cell_at(start), cell_at(start + n));
+    let many = if swarm == 1 {
+        begins.len()
+    } else {
+        (to + begins.len() - from) % begins.len().max(1)
+    };
     let run = CellRun {
-        first: u16::try_from((first + from).rem_euclid(n)).ok()?,
-        count: u16::try_from(to - from).ok()?,
+        first: u16::try_from(from).ok()?,
+        count: u16::try_from(many).ok()?,
     };
     (run.count > 0).then_some(run)
 }
@@ -146,7 +166,8 @@ impl Pace<'_> {
     }
 }
 
-/// What one of the hands takes over of whom: the last cells of a plan, from its end on. Each
+/// What one of the hands takes over of whom: the last cells of a plan, from its end on, and
+/// by when they have to be done for a gain, milliseconds from now. Each
 /// pair of an owner and a hand is judged by how much sooner the two are done together; the
 /// best pair goes first, and nobody is in two.
 #[must_use]
@@ -156,7 +177,7 @@ pub fn relief(
     me: u16,
     pace: Pace<'_>,
     least_ms: u64,
-) -> Option<Vec<(u16, Direction)>> {
+) -> Option<(Vec<(u16, Direction)>, u64)> {
     let mut pairs: Vec<(u64, u16, u16, usize)> = Vec::new();
     for owner in owners {
         for hand in hands {
@@ -173,9 +194,10 @@ pub fn relief(
             continue;
         }
         if hand == me {
-            let plan = &owners.iter().find(|o| o.id == owner)?.plan;
-            let taken = plan.iter().rev().take(taken);
-            return Some(taken.map(|(cell, way)| (*cell, way.opposite())).collect());
+            let owner = owners.iter().find(|o| o.id == owner)?;
+            let taken = owner.plan.iter().rev().take(taken);
+            let taken = taken.map(|(cell, way)| (*cell, way.opposite())).collect();
+            return Some((taken, owner.left_ms * RELIEF_PERCENT / 100));
         }
         met.push((owner, hand));
     }
@@ -229,7 +251,8 @@ mod tests {
 
     fn sections(anchors: &[u16], swarm: usize, cells: u16) -> Vec<(u16, u16)> {
         let ids = 1..=u16::try_from(anchors.len()).unwrap();
-        let run = |id| first_section(sites(anchors), swarm, cells, id);
+        let lengths = vec![48_000; usize::from(cells)];
+        let run = |id| first_section(sites(anchors), swarm, &lengths, id);
         ids.map(|id| run(id).map_or((0, 0), |r| (r.first, r.count)))
             .collect()
     }
@@ -273,6 +296,14 @@ mod tests {
     }
 
     #[test]
+    fn shares_are_even_by_length() {
+        let mut lengths = vec![30_000; 40];
+        lengths.extend([60_000; 20]);
+        let run = |id| first_section(sites(&[0, 40]), 2, &lengths, id).unwrap();
+        assert_eq!((run(1).count, run(2).count), (40, 20));
+    }
+
+    #[test]
     fn sections_of_known_sites_are_disjoint() {
         for swarm in 3..9 {
             let mut times = [0; 60];
@@ -311,7 +342,8 @@ mod tests {
             };
             let me = hand(pace, 1, 19);
             // 100 s of work, 8 s until the hand begins: 46 s each.
-            let taken = relief(&[owner(100_000)], &[me], 1, pace, 5000).unwrap();
+            let (taken, by_ms) = relief(&[owner(100_000)], &[me], 1, pace, 5000).unwrap();
+            assert_eq!(by_ms, 90_000);
             let wanted = (11..20).rev().map(|c| (c, Direction::Backward));
             assert_eq!(taken, wanted.collect::<Vec<_>>());
             // The owner would be done with its part before it has heard of it.
@@ -331,7 +363,7 @@ mod tests {
             };
             let owners = [owner(3, 0..10, 100_000), owner(4, 10..20, 80_000)];
             let (near, far) = (hand(pace, 1, 9), hand(pace, 2, 20));
-            let of = |me| relief(&owners, &[near, far], me, pace, 0).unwrap();
+            let of = |me| relief(&owners, &[near, far], me, pace, 0).unwrap().0;
             assert!(of(1).iter().all(|(c, _)| (0..10).contains(c)));
             assert!(of(2).iter().all(|(c, _)| (10..20).contains(c)));
             assert_eq!(relief(&owners, &[near, far], 7, pace, 0), None);

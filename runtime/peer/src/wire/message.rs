@@ -175,7 +175,8 @@ pub struct Epoch {
 pub struct Stamp {
     /// The round it goes back to.
     pub epoch: Epoch,
-    /// How often the cell was taken without a round since.
+    /// How often the cell was taken without a round since; of a first section by up to 60
+    /// more, the nearer its begin is.
     pub take: u16,
     /// Who lists it.
     pub id: u16,
