@@ -118,8 +118,7 @@ fn a_claim_of_another_loop_takes_nothing() {
     assert!(plan.len() - left <= 1, "{left} of {}", plan.len());
     // The same on its own loop takes all that it is not committed to.
     h.inject(1, record(2, 1, 6_000, 0, &Body::Claim(claim(mine))));
-    h.run_s(1);
-    assert!(h.beliefs(1).plan.len() <= 2);
+    assert!(h.run_until(3, |h| h.beliefs(1).plan.len() <= 2));
 }
 
 #[test]
