@@ -317,7 +317,7 @@ impl Injector<'_> {
     fn bounds_s(&self) -> (f64, f64) {
         let (period_s, peers) = (self.period_s, &self.peers);
         let d = f64::from(self.world.diameter(|id| peers.on_air(id)));
-        let (k1, k2) = (3.0 + d / 4.0, 3.0 + d / 2.0);
+        let (k1, k2) = (4.0 + d / 4.0, 4.0 + d / 2.0);
         (k1 * period_s, (k1 + k2 + d + 2.0) * period_s)
     }
 

@@ -2,7 +2,7 @@
 //!
 //! | record | when |
 //! |---|---|
-//! | beacon | every I, ±10 % |
+//! | beacon | every I, ±10 %; within I/8 when somebody is heard who was suspected, at most every I/2 and if nothing is owed |
 //! | heartbeat | half-way between two beacons; at once, and four times in I, when this peer hears that it is suspected |
 //! | claim | at once when a section was adopted, within I when cells were taken or it shrank by a rule; every 10 I for its ETA |
 //! | cover | own or heard coverage is news, at most every 2 I; at most every I when a neighbour's beacon shows other coverage. What is news is said twice; all of it every 6 I where a neighbour still knows other cells, at the end, and to who was not there lately |
@@ -67,6 +67,8 @@ pub(crate) struct Outbound {
     heartbeat: u32,
     seq: u32,
     last_beacon: Time,
+    /// The last beacon with gossip.
+    last_full: Time,
     last_claim: Time,
     last_cover: Time,
     coverage_told: CoverageTold,
@@ -83,6 +85,7 @@ impl Outbound {
             heartbeat: 0,
             seq: 0,
             last_beacon: Time(0),
+            last_full: Time(0),
             last_claim: Time(0),
             last_cover: Time(0),
             coverage_told: CoverageTold::default(),
@@ -276,6 +279,17 @@ impl Outbound {
         self.interval_ms = interval_ms;
     }
 
+    /// Somebody who was suspected is heard: the next beacon comes soon, half an interval
+    /// after the last one at the earliest, and brings the news one hop on.
+    pub fn hasten(&self, now: Time, timers: &mut Timers, rng: &mut ChaCha8Rng) {
+        let t = self.interval_ms;
+        let spread = u64::from(rng.next_u32()) % (t / 8 + 1);
+        let soonest = self.last_full.plus_ms(t / 2);
+        let at = now.plus_ms(spread).max(soonest);
+        timers.set_earlier(Timer::FullBeacon, at);
+        timers.set_earlier(Timer::Beacon, at);
+    }
+
     /// Somebody suspects this peer: it says that it lives, four times an interval, until it
     /// is believed or the verdict is passed at `until`. The suspicion tells that its
     /// beacons collide, so these are heartbeats: what is short collides rarely.
@@ -325,6 +339,9 @@ impl Outbound {
         assert!(incarnation > 0, "nothing is spoken before the first life");
         self.heartbeat = self.heartbeat.saturating_add(1);
         self.last_beacon = now;
+        if body.kind() == Kind::Beacon {
+            self.last_full = now;
+        }
         Record {
             author,
             incarnation,

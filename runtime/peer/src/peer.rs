@@ -551,6 +551,10 @@ impl Peer {
 
     /// Reports what changed in the beliefs about others.
     fn report_changes(&mut self, changes: Vec<Change>) {
+        if self.membership.take_refuted() && self.speaks() && self.relay.air.is_in_credit() {
+            self.outbound
+                .hasten(self.now, &mut self.timers, &mut self.rng);
+        }
         for c in changes {
             let (by, at_ms) = (self.config.id.0, self.now.0);
             if c.status == Status::Down {

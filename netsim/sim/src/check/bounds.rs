@@ -17,10 +17,10 @@ pub const LIGHT_FACTOR: u64 = 7;
 
 impl Bounds {
     /// Everybody in a component knows of a death: (k1 + k2 + D + 2)·I with
-    /// k1 = 3 + D/4 and k2 = 3 + D/2, plus the rounding of an age, 100 ms a hop.
+    /// k1 = 4 + D/4 and k2 = 4 + D/2, plus the rounding of an age, 100 ms a hop.
     #[must_use]
     pub fn detection_ms(&self) -> u64 {
-        let quarters = 4 * (3 + 3 + 2) + (1 + 2 + 4) * self.diameter;
+        let quarters = 4 * (4 + 4 + 2) + (1 + 2 + 4) * self.diameter;
         (quarters * self.interval_ms).div_ceil(4) + 100 * (self.diameter + 1)
     }
 
@@ -105,7 +105,7 @@ mod tests {
             interval_ms: 1000,
             diameter: 4,
         };
-        assert_eq!(b.detection_ms(), (4 + 5 + 4 + 2) * 1000 + 500);
+        assert_eq!(b.detection_ms(), (5 + 6 + 4 + 2) * 1000 + 500);
         assert_eq!(b.first_wait_ms(), 11_000);
         assert_eq!(b.takeover_ms(), 24_000);
         assert_eq!(b.spread_ms(), 17_000);
@@ -113,7 +113,7 @@ mod tests {
             interval_ms: 2500,
             ..b
         };
-        assert_eq!(crowded.detection_ms(), 15 * 2500 + 500);
+        assert_eq!(crowded.detection_ms(), 17 * 2500 + 500);
         assert_eq!(crowded.probation_ms(), 3000);
     }
 

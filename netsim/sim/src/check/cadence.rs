@@ -16,11 +16,11 @@ const CLAIM_QUARTERS: u64 = 4 * 10 + 1 + 1;
 /// Clocks count whole milliseconds, and a timer is set a few times in a duration.
 const ROUNDING_MS: u64 = 5;
 
-/// k1 = 3 + D/4 at the least diameter 1, in quarters of an interval.
-const LEAST_K1_QUARTERS: u64 = 12 + 1;
+/// k1 = 4 + D/4 at the least diameter 1, in quarters of an interval.
+const LEAST_K1_QUARTERS: u64 = 16 + 1;
 
-/// k2 = 3 + D/2 at the least diameter 1, in quarters of an interval.
-const LEAST_K2_QUARTERS: u64 = 12 + 2;
+/// k2 = 4 + D/2 at the least diameter 1, in quarters of an interval.
+const LEAST_K2_QUARTERS: u64 = 16 + 2;
 
 /// A heartbeat as a neighbour received it from its author.
 #[derive(Clone, Copy, Debug)]
@@ -299,10 +299,10 @@ mod tests {
     #[test]
     fn a_suspicion_or_a_death_too_soon_after_a_heartbeat_is_found() {
         for (status, after_ms, broken) in [
-            (Status::Suspect, 2_900, true),
-            (Status::Suspect, 3_250, false),
-            (Status::Down, 5_500, true),
-            (Status::Down, 6_750, false),
+            (Status::Suspect, 3_900, true),
+            (Status::Suspect, 4_250, false),
+            (Status::Down, 7_200, true),
+            (Status::Down, 8_750, false),
             (Status::Alive, 1, false),
         ] {
             let (mut c, mut found) = check();

@@ -358,10 +358,10 @@ mod tests {
                 );
                 assert_eq!(m.detected_ms(2), Some(59_000));
             }
-            look_at(&mut m, &mut found, 67_000, 300, &[(1, &[])], &mut s);
-            assert!(found.counts.is_empty());
-            look_at(&mut m, &mut found, 68_000, 300, &[(1, &[])], &mut s);
             look_at(&mut m, &mut found, 69_000, 300, &[(1, &[])], &mut s);
+            assert!(found.counts.is_empty());
+            look_at(&mut m, &mut found, 70_000, 300, &[(1, &[])], &mut s);
+            look_at(&mut m, &mut found, 71_000, 300, &[(1, &[])], &mut s);
             assert_eq!(
                 found.counts.get("detect").copied().unwrap_or(0),
                 u64::from(!found_out)

@@ -85,8 +85,8 @@ const FIRST_BEACONS: u8 = 3;
 /// ran for hours.
 const BARE_BYTES: usize = 58;
 
-/// A heartbeat, likewise.
-const HEARTBEAT_BYTES: usize = 31;
+/// A heartbeat, likewise, three kilometres from the origin at most.
+const HEARTBEAT_BYTES: usize = 24;
 
 /// Of a share beacons and heartbeats take so much at most, percent.
 const BEACON_PERCENT: u64 = 60;
@@ -294,6 +294,12 @@ impl Airtime {
         self.frame.cost_bytes(now.0, bytes) < bytes.saturating_add(OVERHEAD_BYTES)
     }
 
+    /// Whether nothing is owed.
+    #[must_use]
+    pub fn is_in_credit(&self) -> bool {
+        self.tokens_millibytes >= 0
+    }
+
     /// How long a record has to wait yet, milliseconds, at least one.
     #[must_use]
     pub fn wait_ms(&self, now: Time, bytes: usize) -> u64 {
@@ -339,7 +345,6 @@ fn millibytes(bytes: usize) -> i64 {
 mod tests {
     use super::*;
     use crate::wire::codec::{self, Body};
-    use crate::wire::limits::POSITION_MAX_MM;
     use crate::wire::message::{Beacon, Heartbeat, Record};
     use crate::wire::samples;
 
@@ -392,8 +397,8 @@ mod tests {
             body: codec::encode_body(&Body::Heartbeat(Heartbeat {
                 interval: 64,
                 sharers: 65,
-                east_dm: -POSITION_MAX_MM / 100,
-                north_dm: -POSITION_MAX_MM / 100,
+                east_dm: -30_000,
+                north_dm: -30_000,
             })),
             signature: Vec::new(),
         };

@@ -4,7 +4,7 @@
 //! Carries out the fault detection of D2.7 §3.6: who is lost is found without a
 //! leader, and everybody in a component knows within one bound. With the interval I
 //! that an author announced with its heartbeat, the longest interval T' that anybody alive
-//! announced (a period T at least), and the hop diameter D, k1 = 3 + D/4 and k2 = 3 + D/2:
+//! announced (a period T at least), and the hop diameter D, k1 = 4 + D/4 and k2 = 4 + D/2:
 //!
 //! | state | event | next state |
 //! |---|---|---|
@@ -106,6 +106,8 @@ pub struct Membership {
     /// What this peer announced itself, quarters of T.
     interval: u8,
     doubt_until: Time,
+    /// Somebody who was suspected or believed down is heard, and nobody was told yet.
+    refuted: bool,
     /// When anything of another peer was last heard.
     last_heard: Option<Time>,
     /// Neighbours whose link is gone, as the transport says.
@@ -124,6 +126,7 @@ impl Membership {
             next_gossip: me,
             interval: INTERVAL_LEAST,
             doubt_until: Time(0),
+            refuted: false,
             last_heard: None,
             gone: BTreeSet::new(),
         }
@@ -158,8 +161,8 @@ impl Membership {
         let doubt = if now < self.doubt_until { 2 } else { 1 };
         let interval_ms = self.interval_ms();
         let diameter = u64::from(self.diameter_within(now, HOP_INTERVALS * interval_ms));
-        let k1_quarters = doubt * (12 + diameter);
-        let k2_ms = doubt * interval_ms * (6 + diameter) / 2;
+        let k1_quarters = doubt * (16 + diameter);
+        let k2_ms = doubt * interval_ms * (8 + diameter) / 2;
         let travel_ms = (diameter + 2) * interval_ms;
         Patience {
             interval_ms,
@@ -355,6 +358,7 @@ impl Membership {
             Status::Alive
         };
         if new_life || status != known.status {
+            self.refuted |= status == Status::Alive;
             known.status = status;
             known.urgent_until = urgent_until;
             changes.push(known.change());
@@ -406,6 +410,12 @@ impl Membership {
         for known in self.known.values_mut() {
             known.excuse(now, late_ms);
         }
+    }
+
+    /// Whether somebody was heard since this was last asked who had been suspected or
+    /// believed down: others who still do are to be told soon.
+    pub fn take_refuted(&mut self) -> bool {
+        std::mem::take(&mut self.refuted)
     }
 
     /// Looks at the time, wanted four times a period: raises suspicions and passes

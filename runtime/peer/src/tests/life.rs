@@ -187,6 +187,40 @@ fn a_suspicion_heard_is_refuted_at_once_without_gossip() {
 }
 
 #[test]
+fn who_hears_again_whom_others_suspect_tells_them_soon() {
+    for seed_s in 20..26 {
+        let mut h = Harness::started(3, mission(1, 12, 10));
+        h.run_s(seed_s);
+        let status = |h: &Harness, of: u16| h.beliefs(of).peers[&PeerId(1)].1;
+        h.isolate(1, true);
+        assert!(h.run_until(6, |h| (2..=3).all(|id| status(h, id) == Status::Suspect)));
+        h.isolate(1, false);
+        // Of the two others only one hears it.
+        h.link(1, 3).cut = true;
+        h.link(3, 1).cut = true;
+        assert!(h.run_until(2, |h| status(h, 2) == Status::Alive));
+        let heard_ms = h.now_ms();
+        let beacons = |h: &mut Harness| -> Vec<u64> {
+            let said = h.seat(2).said.iter();
+            let full = said.filter(|(.., b)| matches!(b, Body::Beacon(_)));
+            full.map(|(at, ..)| *at).collect()
+        };
+        // It was heard within the last quarter of a period.
+        let before = beacons(&mut h)
+            .into_iter()
+            .filter(|at| at + 250 < heard_ms)
+            .max();
+        h.run_s(2);
+        let next = beacons(&mut h)
+            .into_iter()
+            .find(|at| at + 250 >= heard_ms)
+            .unwrap();
+        let latest = (heard_ms + 125).max(before.unwrap() + 500) + 20;
+        assert!(next <= latest, "{next} {latest}");
+    }
+}
+
+#[test]
 fn nothing_is_said_in_the_first_three_periods() {
     let mut h = Harness::started(2, mission(1, 6, 4));
     h.run_s(10);

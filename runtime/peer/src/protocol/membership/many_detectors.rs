@@ -198,7 +198,7 @@ fn hops(n: usize, links: impl Fn(usize, usize) -> bool) -> u64 {
 /// (k1 + k2 + D + 2) T in milliseconds.
 fn bound_ms(diameter: u64) -> u64 {
     let d = diameter.max(1);
-    T_MS * (12 + d) / 4 + T_MS * (6 + d) / 2 + (d + 2) * T_MS
+    T_MS * (16 + d) / 4 + T_MS * (8 + d) / 2 + (d + 2) * T_MS
 }
 
 proptest! {

@@ -20,8 +20,8 @@ fn silence_leads_to_suspicion_and_then_to_a_verdict() {
             seen.push((t * 250, c.status));
         }
     }
-    assert_eq!(seen, [(3250, Status::Suspect), (6750, Status::Down)]);
-    assert!(6750 <= m.patience(Time(20_000)).bound_ms);
+    assert_eq!(seen, [(4250, Status::Suspect), (8750, Status::Down)]);
+    assert!(8750 <= m.patience(Time(20_000)).bound_ms);
 }
 
 #[test]
@@ -31,7 +31,7 @@ fn a_link_that_is_gone_halves_the_patience_and_passes_no_verdict() {
     m.link(2, false);
     m.link(77, false);
     let mut seen = Vec::new();
-    for t in 0..38 {
+    for t in 0..40 {
         for c in m.tick(Time(t * 250)) {
             seen.push((t * 250, c.status));
         }
@@ -40,7 +40,7 @@ fn a_link_that_is_gone_halves_the_patience_and_passes_no_verdict() {
             m.link(2, true);
         }
     }
-    assert_eq!(seen, [(1750, Status::Suspect), (6250, Status::Suspect)]);
+    assert_eq!(seen, [(2250, Status::Suspect), (7250, Status::Suspect)]);
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn one_s_own_lateness_is_nobody_s_silence_but_the_age_that_is_told_is_true() {
         assert!(now.since_ms(woke) <= 20_000, "the excuse ends");
     }
     let silent_ms = 1_000 + now.since_ms(woke);
-    assert!((9_750..=10_000).contains(&silent_ms), "{silent_ms}");
+    assert!((11_750..=12_000).contains(&silent_ms), "{silent_ms}");
 }
 
 fn entry(id: u16, heartbeat: u32, age_ds: u16, suspected_ds: Option<u16>) -> Gossip {
@@ -162,11 +162,11 @@ fn a_suspicion_is_taken_over_and_refuted() {
         .flat_map(|i| m.tick(Time(i * 250)).into_iter().map(move |c| (i * 250, c)))
         .filter(|(_, c)| c.peer == 2 && c.status == Status::Down)
         .collect();
-    // D is 2 here: told at 3.5 s, and k2 is 4 periods.
+    // D is 2 here: told at 3.5 s, and k2 is 5 periods.
     assert_eq!(
         down,
         [(
-            7500,
+            8500,
             Change {
                 peer: 2,
                 incarnation: 1,
@@ -225,7 +225,7 @@ fn a_later_heartbeat_is_no_older_than_an_earlier_one() {
     let mut m = Membership::new(1, 1000);
     m.on_beacon(Time(10_000), 2, 1, &beacon(5, Vec::new()));
     m.on_beacon(Time(10_000), 3, 1, &beacon(5, Vec::new()));
-    let told = beacon(6, vec![entry(2, 6, 95, None)]);
+    let told = beacon(6, vec![entry(2, 6, 105, None)]);
     let changes = m.on_beacon(Time(12_000), 3, 1, &told);
     assert!(changes.is_empty(), "{changes:?}");
     assert!(m.tick(Time(12_100)).is_empty());
@@ -337,8 +337,8 @@ fn told_suspicion(suspected_ds: u16) -> Gossip {
 
 #[test]
 fn of_two_suspicions_of_a_heartbeat_the_older_one_counts() {
-    // Its own suspicion begins at 3.25 s; k2 is 3.5 s.
-    for (told_ds, down_at_ms) in [(30, 5_500), (1, 6_750)] {
+    // Its own suspicion begins at 4.25 s; k2 is 4.5 s.
+    for (told_ds, down_at_ms) in [(30, 6_500), (1, 8_750)] {
         let mut m = Membership::new(1, 1000);
         m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
         let mut down = None;
@@ -361,7 +361,7 @@ fn of_two_suspicions_of_a_heartbeat_the_older_one_counts() {
 
 #[test]
 fn a_loop_that_ran_late_doubts_its_verdicts_for_a_period() {
-    for (late, suspects_at_ms) in [(false, 3_250), (true, 5_500)] {
+    for (late, suspects_at_ms) in [(false, 4_250), (true, 6_500)] {
         let mut m = Membership::new(1, 1000);
         m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
         let mut suspected = None;
