@@ -4,6 +4,11 @@
 use super::{Clocks, Findings, Snapshot};
 use std::collections::BTreeMap;
 
+/// What is news of coverage is said twice, two intervals apart; what collided both times comes
+/// with all of it, six intervals after that was said last: four more than where all of it is
+/// said every two.
+const WHOLE_PERIODS: u64 = 4;
+
 /// What the marks of one run were found to be.
 #[derive(Clone, Debug, Default)]
 pub struct CoverCheck {
@@ -67,7 +72,8 @@ impl CoverCheck {
     /// L4: what one member of an unchanged component knows, all know soon.
     fn check_spread(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let n = snapshot.covered.len();
-        let bound_ms = snapshot.bounds.spread_ms();
+        let bounds = snapshot.bounds;
+        let bound_ms = bounds.spread_ms() + WHOLE_PERIODS * bounds.interval_ms;
         let mut lacks: Vec<(u16, u16, u64)> = Vec::new();
         for component in snapshot.graph.components() {
             let peers: Vec<_> = component
@@ -180,7 +186,7 @@ mod tests {
             Findings::new(1),
             Stability::default(),
         );
-        for t in 0..9 {
+        for t in 0..13 {
             look_at(
                 &mut c,
                 &mut found,
@@ -194,7 +200,7 @@ mod tests {
             &mut c,
             &mut found,
             &mut s,
-            9000,
+            13_000,
             &[(1, [true, true]), (2, [false, false])],
         );
         assert_eq!(
@@ -205,7 +211,7 @@ mod tests {
             &mut c,
             &mut found,
             &mut s,
-            10_000,
+            14_000,
             &[(1, [false, true]), (2, [false, false])],
         );
         assert_eq!(found.counts.get("S3"), Some(&1));
