@@ -138,14 +138,14 @@ fn measured(args: &CoverLoopArgs, map: &LaneMap, name: Option<String>) -> Result
         order = cells;
         let n = u32::try_from(order.len())?;
         // Unevenly spread, the same in every run.
-        let robots: Vec<Uav> = (0..args.k)
+        let uavs: Vec<Uav> = (0..args.k)
             .map(|i| Uav {
                 place: i.wrapping_mul(0x9E37_79B1) % n,
                 speed: 1,
                 endurance: u32::MAX,
             })
             .collect();
-        let (division, us) = timed(|| black_box(divide(n, &robots)));
+        let (division, us) = timed(|| black_box(divide(n, &uavs)));
         divide_us.push(us);
         makespan_moves = division.map_or(0, |d| d.finish.0);
     }

@@ -366,11 +366,15 @@ fn failure_free(spec: &Spec, geometry: &MissionGeometry) -> Division {
             open: c.needed,
         })
         .collect();
-    let robots: Vec<Uav> = spec.uavs.iter().map(|u| robot(u, spec, the_loop)).collect();
-    geometry.divide(&ring, &robots)
+    let uavs: Vec<Uav> = spec
+        .uavs
+        .iter()
+        .map(|u| division_uav(u, spec, the_loop))
+        .collect();
+    geometry.divide(&ring, &uavs)
 }
 
-fn robot(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Uav {
+fn division_uav(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Uav {
     let here = u.launch.position();
     let gap_m = |i: usize| (the_loop.boundary(i).position() - here).norm();
     let anchor = (0..the_loop.len())

@@ -24,7 +24,7 @@ const DIVISIONS_KEPT: usize = 4;
 struct Divided {
     loop_hash: u64,
     ring: Vec<RingCell>,
-    robots: Vec<Uav>,
+    uavs: Vec<Uav>,
     division: Division,
 }
 
@@ -53,21 +53,20 @@ impl GeometryCache {
             Job::Divide {
                 geometry,
                 ring,
-                robots,
+                uavs,
             } => {
                 let loop_hash = geometry.coverage_loop.hash();
-                let is_same = |d: &&Divided| {
-                    d.loop_hash == loop_hash && d.ring == *ring && d.robots == *robots
-                };
+                let is_same =
+                    |d: &&Divided| d.loop_hash == loop_hash && d.ring == *ring && d.uavs == *uavs;
                 if let Some(known) = self.divided.iter().find(is_same) {
                     return JobResult::Divide(known.division.clone());
                 }
-                let division = geometry.divide(ring, robots);
+                let division = geometry.divide(ring, uavs);
                 self.divided.truncate(DIVISIONS_KEPT - 1);
                 self.divided.push_front(Divided {
                     loop_hash,
                     ring: ring.clone(),
-                    robots: robots.clone(),
+                    uavs: uavs.clone(),
                     division: division.clone(),
                 });
                 JobResult::Divide(division)

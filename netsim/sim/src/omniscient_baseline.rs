@@ -199,7 +199,7 @@ impl<'a> Baseline<'a> {
     fn divide(&mut self) {
         let covered = &self.covered;
         let mut promised = covered.clone();
-        let mut robots = Vec::with_capacity(self.minds.len());
+        let mut uavs = Vec::with_capacity(self.minds.len());
         let mut first: BTreeMap<u16, Vec<Leg>> = BTreeMap::new();
         for u in self
             .prepared
@@ -224,7 +224,7 @@ impl<'a> Baseline<'a> {
                 });
             }
             first.insert(u.id, legs);
-            robots.push(Uav {
+            uavs.push(Uav {
                 anchor: forecast.anchor,
                 id: u.id,
                 heading: forecast.heading,
@@ -244,7 +244,7 @@ impl<'a> Baseline<'a> {
                 open: !p,
             })
             .collect();
-        for section in self.ground.divide(&ring, &robots).sections {
+        for section in self.ground.divide(&ring, &uavs).sections {
             let mut legs = first.remove(&section.id).unwrap_or_default();
             legs.extend(section.legs);
             self.busy.insert(section.id, !legs.is_empty());

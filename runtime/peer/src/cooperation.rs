@@ -614,16 +614,12 @@ impl MissionState {
         for action in actions {
             match action {
                 Action::Bid => effects.extend(self.bid(s)),
-                Action::Divide {
-                    epoch,
-                    ring,
-                    robots,
-                } => {
+                Action::Divide { epoch, ring, uavs } => {
                     let geometry = Arc::clone(&self.geometry);
                     let job = Job::Divide {
                         geometry,
                         ring,
-                        robots,
+                        uavs,
                     };
                     effects.push(Effect::Compute(PendingJob::Division(epoch), job));
                 }

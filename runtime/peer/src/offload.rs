@@ -43,7 +43,7 @@ pub enum Job {
         /// The loop's cells.
         ring: Vec<RingCell>,
         /// The members of the round.
-        robots: Vec<Uav>,
+        uavs: Vec<Uav>,
     },
 }
 
@@ -64,7 +64,7 @@ pub fn run(job: &Job) -> JobResult {
         Job::Divide {
             geometry,
             ring,
-            robots,
-        } => JobResult::Divide(geometry.divide(ring, robots)),
+            uavs,
+        } => JobResult::Divide(geometry.divide(ring, uavs)),
     }
 }

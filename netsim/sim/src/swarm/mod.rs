@@ -658,8 +658,8 @@ impl Swarm {
                 let answer = self.geometry_cache.answer(&job);
                 self.meter.enter(Part::Checks);
                 match (&job, &answer) {
-                    (Job::Divide { ring, robots, .. }, JobResult::Divide(division)) => {
-                        let divided = (&ring[..], &robots[..], division);
+                    (Job::Divide { ring, uavs, .. }, JobResult::Divide(division)) => {
+                        let divided = (&ring[..], &uavs[..], division);
                         self.checker.on_divide(self.now_ms, id, divided);
                     }
                     (_, JobResult::Geometry(Ok(geometry))) => {

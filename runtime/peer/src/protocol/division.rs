@@ -36,7 +36,7 @@ pub fn problem(
         }
     }
     let ring = ring_of(coverage_loop, n, |i| !done.contains(i));
-    let robots: Vec<Uav> = open
+    let uavs: Vec<Uav> = open
         .bids
         .iter()
         .map(|(id, s)| Uav {
@@ -51,10 +51,10 @@ pub fn problem(
         })
         .collect();
     assert!(
-        robots.is_sorted_by(|a, b| a.id < b.id),
+        uavs.is_sorted_by(|a, b| a.id < b.id),
         "all members solve the same problem"
     );
-    (ring, robots)
+    (ring, uavs)
 }
 
 /// Whether the division of a complete round is adopted. All members judge alike:

@@ -135,7 +135,7 @@ pub enum Action {
         /// The loop's cells.
         ring: Vec<RingCell>,
         /// The members.
-        robots: Vec<Uav>,
+        uavs: Vec<Uav>,
     },
     /// Make these takes durable, then call [`Negotiation::take`], or if they cannot be
     /// [`Negotiation::cancel_take`].
@@ -508,16 +508,12 @@ impl Negotiation {
         if self.dividing.as_ref().is_some_and(|d| d.epoch == epoch) {
             return None;
         }
-        let (ring, robots) = division::problem(open, coverage_loop, &self.base);
+        let (ring, uavs) = division::problem(open, coverage_loop, &self.base);
         self.dividing = Some(Dividing {
             epoch,
             ring: ring.clone(),
         });
-        Some(Action::Divide {
-            epoch,
-            ring,
-            robots,
-        })
+        Some(Action::Divide { epoch, ring, uavs })
     }
 
     /// The answer to [`Action::Divide`]. Returns what is to be made durable and then
@@ -1068,7 +1064,7 @@ mod tests {
         desk.negotiation.hear_bid(desk.now, member(2), &other);
         let divides = desk.tick();
         assert!(
-            matches!(&divides[..], [Action::Divide { robots, .. }] if robots.len() == 2),
+            matches!(&divides[..], [Action::Divide { uavs, .. }] if uavs.len() == 2),
             "{divides:?}"
         );
         assert!(desk.tick().is_empty());
@@ -1090,17 +1086,10 @@ mod tests {
         desk.negotiation.bid_is_durable(own);
         desk.negotiation.hear_bid(desk.now, member(2), &other);
         let divides = desk.tick();
-        let [
-            Action::Divide {
-                epoch,
-                ring,
-                robots,
-            },
-        ] = &divides[..]
-        else {
+        let [Action::Divide { epoch, ring, uavs }] = &divides[..] else {
             panic!("{divides:?}")
         };
-        let division = skein_flight::coverage::ring::backtracking::divide(ring, robots);
+        let division = skein_flight::coverage::ring::backtracking::divide(ring, uavs);
         let adoption = desk
             .negotiation
             .divided(desk.now, T, *epoch, &division)
