@@ -370,7 +370,7 @@ impl Sections {
                 take: 0,
                 id: self.me,
             };
-            for h in self.heard.values() {
+            for h in self.heard.values().filter(|h| h.listed.contains(cell)) {
                 for l in h.claim.plan.iter().chain(&h.claim.held) {
                     if cells_of(l.run, self.cells).any(|c| c == cell) {
                         top = top.max(l.stamp);
