@@ -694,7 +694,7 @@ mod tests {
         let mut nodes = six_nodes();
         let (mut expected, mut seen) = (Receptions::new(), Receptions::new());
         let mut under_way: BTreeMap<u64, Vec<(u16, Hop, Frame)>> = BTreeMap::new();
-        for t in 0..60_000u64 {
+        for t in 0..64_000u64 {
             for d in one.advance(t * 1000, &Table) {
                 let entry = expected.entry(d.rx).or_default();
                 entry.push((d.at_us, d.tx, d.bytes.to_vec()));
