@@ -76,9 +76,10 @@
 //!         }
 //!     }
 //! }
-//! // It promised a life, listened for three periods, then beaconed once a period.
+//! // It promised a life, listened for three periods, then beaconed once a period, with a
+//! // heartbeat between two beacons.
 //! assert_eq!(journal.len(), 1);
-//! assert!((6..=8).contains(&sent));
+//! assert!((12..=16).contains(&sent));
 //! ```
 //!
 //! `Publish` is a one-hop broadcast: there are no addressees. `Store` is answered by
