@@ -5,8 +5,8 @@ use super::{Clocks, Findings, Snapshot};
 use std::collections::BTreeMap;
 
 /// What is news of coverage is said twice, two intervals apart; what collided both times comes
-/// with all of it, four intervals after that was said last, and may collide, too: four more than where all of it is
-/// said every two.
+/// with all of it, four intervals after that was said last, and may collide, too: four more
+/// than where all of it is said every two.
 const WHOLE_PERIODS: u64 = 4;
 
 /// What the marks of one run were found to be.
