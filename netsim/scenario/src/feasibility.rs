@@ -4,7 +4,7 @@
 use crate::error::{Finding, Severity};
 use crate::flight_model::{Pace, return_s, too_windy};
 use skein_flight::coverage::passes::PassesError;
-use skein_flight::coverage::ring::backtracking::{Division, OffLoop, RingCell, Uav};
+use skein_flight::coverage::ring::backtracking::{Division, OffLoop, Uav};
 use skein_flight::coverage::ring::patch::Patches;
 use skein_flight::coverage::ring::{CellId, CoverageLoop, Direction, Grid, LoopError};
 use skein_geometry::Polygon;
@@ -337,7 +337,7 @@ pub fn summary(spec: &Spec, geometry: &MissionGeometry) -> Summary {
         loop_m: the_loop
             .cells()
             .iter()
-            .map(|c| f64::from(if c.needed { c.service_mm } else { c.travel_mm }) / 1000.0)
+            .map(|c| f64::from(c.flown_mm()) / 1000.0)
             .sum(),
         makespan_s: f64::from(division.makespan_ms) / 1000.0,
         unassigned_cells: division.unassigned,
@@ -357,15 +357,7 @@ fn whole(x: f64) -> u32 {
 /// rule of its mission.
 fn failure_free(spec: &Spec, geometry: &MissionGeometry) -> Division {
     let the_loop = &geometry.coverage_loop;
-    let ring: Vec<RingCell> = the_loop
-        .cells()
-        .iter()
-        .map(|c| RingCell {
-            service_mm: c.service_mm,
-            travel_mm: c.travel_mm,
-            open: c.needed,
-        })
-        .collect();
+    let ring = the_loop.ring(|_, c| c.needed);
     let uavs: Vec<Uav> = spec
         .uavs
         .iter()

@@ -9,7 +9,7 @@ use crate::fault::{Fault, TimedFault};
 use crate::prepared::Prepared;
 use crate::world::World;
 use skein_behaviors::{Event, Executive, Goal};
-use skein_flight::coverage::ring::backtracking::{Leg, RingCell, Uav};
+use skein_flight::coverage::ring::backtracking::{Leg, Uav};
 use skein_peer::offload::MissionGeometry;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -236,14 +236,8 @@ impl<'a> Baseline<'a> {
                 off_loop: forecast.off_loop,
             });
         }
-        let cells = self.ground.coverage_loop.cells().iter().zip(&promised);
-        let ring: Vec<RingCell> = cells
-            .map(|(c, p)| RingCell {
-                service_mm: c.service_mm,
-                travel_mm: c.travel_mm,
-                open: !p,
-            })
-            .collect();
+        let coverage_loop = &self.ground.coverage_loop;
+        let ring = coverage_loop.ring(|c, _| is_open(&promised, c));
         for section in self.ground.divide(&ring, &uavs).sections {
             let mut legs = first.remove(&section.id).unwrap_or_default();
             legs.extend(section.legs);

@@ -334,16 +334,10 @@ impl Medium {
         }
         let channel = self.channel;
         let s = &mut self.stations[i];
-        let Some(first) = s.queue.pop() else {
+        let joined_bytes = |filled, n_bytes| channel.joined_bytes(filled, n_bytes);
+        let Some((waiting, n_bytes)) = s.queue.pop_transmission(joined_bytes) else {
             return;
         };
-        let mut n_bytes = first.frame.bytes.len();
-        let mut waiting = vec![first];
-        waiting.extend(s.queue.take_fitting(|frame| {
-            let joined = channel.joined_bytes(n_bytes, frame.bytes.len());
-            n_bytes = joined.unwrap_or(n_bytes);
-            joined.is_some()
-        }));
         let airtime_us = channel.airtime_us(n_bytes);
         s.sending = true;
         s.tally.frames += 1;
@@ -472,6 +466,10 @@ impl Queued for Frame {
 
     fn lifetime_ms(&self) -> u32 {
         self.lifetime_ms
+    }
+
+    fn n_bytes(&self) -> usize {
+        self.bytes.len()
     }
 }
 

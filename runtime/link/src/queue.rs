@@ -21,6 +21,8 @@ pub trait Queued {
     fn priority(&self) -> Self::Priority;
     /// Worth sending for this long, milliseconds.
     fn lifetime_ms(&self) -> u32;
+    /// Its bytes, headers left out.
+    fn n_bytes(&self) -> usize;
 }
 
 /// A frame that waits.
@@ -108,9 +110,23 @@ impl<F: Queued> SendQueue<F> {
         (!self.waiting.is_empty()).then(|| self.waiting.remove(0))
     }
 
-    /// Takes in their order those that `fits` takes.
-    pub fn take_fitting(&mut self, mut fits: impl FnMut(&F) -> bool) -> Vec<Waiting<F>> {
-        self.waiting.extract_if(.., |w| fits(&w.frame)).collect()
+    /// Takes the frame that goes first and, in their order, those that share its
+    /// transmission; gives the bytes of all, headers left out. `joined_bytes` tells them for
+    /// so many and one more frame of so many, if both can go together.
+    pub fn pop_transmission(
+        &mut self,
+        joined_bytes: impl Fn(usize, usize) -> Option<usize>,
+    ) -> Option<(Vec<Waiting<F>>, usize)> {
+        let first = self.pop()?;
+        let mut n_bytes = first.frame.n_bytes();
+        let joins = |w: &mut Waiting<F>| {
+            let joined = joined_bytes(n_bytes, w.frame.n_bytes());
+            n_bytes = joined.unwrap_or(n_bytes);
+            joined.is_some()
+        };
+        let mut all = vec![first];
+        all.extend(self.waiting.extract_if(.., joins));
+        Some((all, n_bytes))
     }
 
     /// Drops everything.
@@ -152,6 +168,10 @@ mod tests {
 
         fn lifetime_ms(&self) -> u32 {
             self.2
+        }
+
+        fn n_bytes(&self) -> usize {
+            self.0.len()
         }
     }
 

@@ -41,6 +41,10 @@ impl Queued for Frame {
     fn lifetime_ms(&self) -> u32 {
         self.lifetime_ms
     }
+
+    fn n_bytes(&self) -> usize {
+        self.bytes.len()
+    }
 }
 
 /// The frames of one peer that wait for the channel.
@@ -84,20 +88,15 @@ impl Outgoing {
         if now_us < self.free_us {
             return None;
         }
-        let frame = self.queue.pop()?.frame;
-        let mut n_bytes = frame.bytes.len();
-        let others = self.queue.take_fitting(|other| {
-            let joined = self.channel.joined_bytes(n_bytes, other.bytes.len());
-            n_bytes = joined.unwrap_or(n_bytes);
-            joined.is_some()
-        });
-        self.leaving.extend(others.into_iter().map(|w| w.frame));
+        let joined_bytes = |filled, n_bytes| self.channel.joined_bytes(filled, n_bytes);
+        let (all, n_bytes) = self.queue.pop_transmission(joined_bytes)?;
+        self.leaving.extend(all.into_iter().map(|w| w.frame));
         let airtime_us = self.channel.airtime_us(n_bytes);
         // The clock counts whole milliseconds: of a queue that never ran empty the
         // frames follow each other without a gap.
         let begun_us = self.free_us.max(now_us.saturating_sub(999));
         self.free_us = begun_us.saturating_add(airtime_us);
-        Some(frame)
+        self.leaving.pop_front()
     }
 
     /// When the next frame may leave; none while nothing waits.

@@ -48,10 +48,8 @@ use crate::wire::message::{Beacon, Bid, CellRun, Epoch, Member, Order, Record};
 use crate::{Incarnation, PeerId};
 use skein_behaviors::executive::UNREACHABLE_MS;
 use skein_behaviors::{Event, Executive, Goal, Percept};
-use skein_flight::coverage::ring::{Direction, LoopCell};
-
 use skein_flight::coverage::ring::backtracking::{Division, Leg, Uav};
-use skein_geometry::frame::Pose;
+use skein_flight::coverage::ring::{Direction, LoopCell};
 use std::sync::Arc;
 
 /// Own coverage is made durable every so many cells: a crash costs at most these.
@@ -688,7 +686,7 @@ impl MissionState {
         let idle = ctx.members.iter().map(|m| m.id);
         let idle = idle.filter(|id| *id != me.id && !is_owner(*id));
         let others = idle.filter_map(|id| {
-            let at = pose_of(s.membership.info(id)?.pose?).position();
+            let at = s.membership.info(id)?.place?.pose().position();
             Some(Hand { id, at, free_ms: 0 })
         });
         let hands: Vec<Hand> = others.chain([me]).collect();
@@ -714,14 +712,13 @@ impl MissionState {
         };
         let sites = others.iter().filter_map(|id| {
             let heard = info(id).filter(|i| i.loop_hash == self.loop_hash())?;
-            site(*id, pose_of(heard.pose?))
+            site(*id, heard.place?.pose())
         });
         let sites = sites.chain(site(s.me.id, s.percept?.pose)).collect();
         let sections = &self.negotiation.sections;
         let n = sections.cells();
         let cells = self.geometry.coverage_loop.cells().iter();
-        let length_mm = |c: &LoopCell| if c.needed { c.service_mm } else { c.travel_mm };
-        let lengths_mm: Vec<u32> = cells.map(length_mm).collect();
+        let lengths_mm: Vec<u32> = cells.map(LoopCell::flown_mm).collect();
         let run = sharing::first_section(sites, others.len() + 1, &lengths_mm, s.me.id)?;
         let orphans = sections.orphans(ctx.live);
         let mine = cells_of(run, n).filter(|c| orphans.contains(*c));
@@ -989,15 +986,6 @@ impl MissionState {
             executive.set_goal(goal.clone(), &|c| !sections.covered().contains(c));
         }
         self.goal = Some(goal);
-    }
-}
-
-/// Where a beacon says that its author is.
-fn pose_of((east_mm, north_mm, heading_e4): (i32, i32, i32)) -> Pose {
-    Pose {
-        east_m: f64::from(east_mm) / 1000.0,
-        north_m: f64::from(north_mm) / 1000.0,
-        heading_rad: f64::from(heading_e4) / 10_000.0,
     }
 }
 

@@ -561,7 +561,6 @@ mod tests {
         Judge::new(Arc::new(Survey::new(&spec)))
     }
 
-    /// All corners of a cell in the turned rectangle, looked at every 2 cm.
     /// The fixture's scenario with an area of fewer lanes and one zone instead of its own.
     fn revised(east_mm: i32, zone: &[(i32, i32)]) -> Arc<Survey> {
         let mut spec = square(1);
@@ -638,6 +637,7 @@ mod tests {
         assert_eq!(judge.entries(), 0);
     }
 
+    /// All corners of a cell in the turned rectangle, looked at every 2 cm.
     fn oracle(p: &Piece, ids: &[CellId]) -> Vec<bool> {
         let mut seen = vec![false; ids.len()];
         let n = (p.length_m() / 0.02).ceil() as u32;

@@ -167,14 +167,13 @@ impl Airtime {
                 sharers,
             };
             self.neighbours.insert(author, heard);
-            self.count();
         }
+        self.count();
     }
 
     /// Who was not heard for so long shares no more.
     fn forget(&mut self, now: Time) {
         self.neighbours.retain(|_, n| n.until > now);
-        self.count();
     }
 
     fn count(&mut self) {
@@ -221,6 +220,7 @@ impl Airtime {
     /// misses the one that announces it is not to be alarmed by the silence.
     pub fn plan_beacon(&mut self, now: Time) -> BeaconPlan {
         self.forget(now);
+        self.count();
         self.refill(now);
         self.planned = self.planned.saturating_add(1).min(FIRST_BEACONS);
         let share = self.share_bytes_ps(self.sharers());

@@ -35,7 +35,7 @@ pub fn problem(
             }
         }
     }
-    let ring = ring_of(coverage_loop, n, |i| !done.contains(i));
+    let ring = coverage_loop.ring(|i, _| !done.contains(i));
     let uavs: Vec<Uav> = open
         .bids
         .iter()
@@ -106,7 +106,7 @@ pub fn gain_in_sight(
         return false;
     }
     uavs.sort_unstable_by_key(|u| u.id);
-    let ring = ring_of(&geometry.coverage_loop, n, |c| listed.contains(c));
+    let ring = geometry.coverage_loop.ring(|c, _| listed.contains(c));
     let division = geometry.divide(&ring, &uavs);
     gains(u64::from(division.makespan_ms) + delay_ms, present_ms)
 }
@@ -114,17 +114,6 @@ pub fn gain_in_sight(
 /// Whether one makespan is shorter than another by what makes a division worthwhile.
 fn gains(new_ms: u64, present_ms: u64) -> bool {
     new_ms * 100 <= present_ms * GAIN_PERCENT
-}
-
-fn ring_of(coverage_loop: &CoverageLoop, n: u16, is_open: impl Fn(u16) -> bool) -> Vec<RingCell> {
-    let cells = coverage_loop.cells().iter().zip(0..n);
-    cells
-        .map(|(cell, i)| RingCell {
-            service_mm: cell.service_mm,
-            travel_mm: cell.travel_mm,
-            open: is_open(i),
-        })
-        .collect()
 }
 
 /// The cells of one member's section that are open in the round, in order of

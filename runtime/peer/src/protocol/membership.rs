@@ -38,11 +38,12 @@ use crate::input::Time;
 use crate::output::Status;
 use crate::wire::limits::INTERVAL_LEAST;
 use crate::wire::limits::{HOPS_MAX, PEERS_MAX};
-use crate::wire::message::{Beacon, Gossip};
+use crate::wire::message::{Beacon, Gossip, OffLoop};
 use known::{Age, Heartbeat, Known};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most other peers known: the largest fleet but this peer itself. A flood of made-up ids must end somewhere.
+/// Most other peers known: the largest fleet but this peer itself. A flood of made-up ids
+/// must end somewhere.
 pub const MAX_KNOWN: usize = PEERS_MAX - 1;
 
 /// Hops and eccentricities count for so many of the longest intervals after they were
@@ -92,8 +93,8 @@ pub struct Info {
     pub steady_since: Time,
     /// When its own beacon was last heard, without a relay.
     pub heard: Option<Time>,
-    /// Where it was by then: east and north, mm, and its heading, 1e-4 rad.
-    pub pose: Option<(i32, i32, i32)>,
+    /// Where it was by then.
+    pub place: Option<OffLoop>,
 }
 
 /// All that a peer believes of others.
@@ -625,6 +626,11 @@ fn info_of(beacon: &Beacon, steady_since: Time, now: Time) -> Info {
         loop_hash: beacon.loop_hash,
         steady_since,
         heard: Some(now),
-        pose: Some((beacon.east_mm, beacon.north_mm, beacon.heading_e4)),
+        place: Some(OffLoop {
+            east_mm: beacon.east_mm,
+            north_mm: beacon.north_mm,
+            course_e4: beacon.heading_e4,
+            ready_ms: 0,
+        }),
     }
 }

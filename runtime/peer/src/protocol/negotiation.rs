@@ -624,6 +624,8 @@ impl Negotiation {
     /// The live owners with what they have left, but for what others took of it since.
     #[must_use]
     pub fn owners(&self, ctx: &Context<'_>) -> Vec<Owner> {
+        let highest = self.sections.highest_stamps(ctx.live);
+        let is_taken = |c: &PlannedCell| highest.get(&c.cell).is_some_and(|s| *s > c.stamp);
         let at_work = self
             .progress
             .iter()
@@ -632,7 +634,7 @@ impl Negotiation {
             .filter_map(|(id, p)| {
                 let plan = self.sections.plan_of(*id);
                 let listed = u64::try_from(plan.len()).ok().filter(|n| *n > 0)?;
-                let kept = plan.iter().filter(|c| !self.sections.is_taken(ctx.live, c));
+                let kept = plan.iter().filter(|c| !is_taken(c));
                 let plan: Vec<_> = kept.map(|c| (c.cell, c.direction)).collect();
                 let many = u64::try_from(plan.len()).unwrap_or(0);
                 let left_ms = p.end.since_ms(ctx.now) * many / listed;

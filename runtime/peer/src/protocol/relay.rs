@@ -313,6 +313,11 @@ impl Relay {
         h.finish() >> 16
     }
 
+    /// Another draw for a version that was sent before.
+    fn jitter_again(&self, now: Time, key: &RecordKey) -> u64 {
+        self.jitter(key, (0, u32::try_from(now.0 & 0xffff_ffff).unwrap_or(0)))
+    }
+
     /// Holds a record, if need be in place of another's: telemetry goes before what
     /// the living and the dead claimed, and what was on the air longest ago first.
     fn hold(&mut self, key: RecordKey, held: Held) {
@@ -428,9 +433,8 @@ impl Relay {
             .collect();
         for (key, kind) in lacking {
             if !self.queue.contains_key(&key) {
-                let version = (life, u32::try_from(now.0 & 0xffff_ffff).unwrap_or(0));
-                let delay =
-                    RELAY_DELAY_MS + self.jitter(&key, version) % self.spread_ms(REPAIR_SPREAD_MS);
+                let delay = RELAY_DELAY_MS
+                    + self.jitter_again(now, &key) % self.spread_ms(REPAIR_SPREAD_MS);
                 if let Some(h) = self.held.get_mut(&key) {
                     h.copies = 0;
                 }
@@ -490,12 +494,8 @@ impl Relay {
         };
         if held.repeats > 0 && self.air.counted() > 1 {
             held.repeats -= 1;
-            let version = (
-                held.record.incarnation,
-                u32::try_from(now.0 & 0xffff_ffff).unwrap_or(0),
-            );
             let spread_ms = self.spread_ms(RELAY_SPREAD_MS);
-            let delay_ms = REPEAT_DELAYS * spread_ms + self.jitter(&key, version) % spread_ms;
+            let delay_ms = REPEAT_DELAYS * spread_ms + self.jitter_again(now, &key) % spread_ms;
             self.wait(now, key, kind, delay_ms);
         }
         Some(out)

@@ -177,24 +177,30 @@ impl Sections {
     pub fn settle(&mut self, live: &LivePeers) -> bool {
         let planned = self.plan.iter().map(|p| p.cell);
         let mine = CellSet::of(self.cells, planned.chain(self.held.keys().copied()));
-        let mut theirs: BTreeMap<u16, Stamp> = BTreeMap::new();
-        for (author, h) in &self.heard {
-            // Of most others no cell is listed here, too.
-            if live.get(author) != Some(&h.incarnation) || !h.listed.intersects(&mine) {
-                continue;
-            }
-            for l in &h.claim.plan {
-                for c in cells_of(l.run, self.cells).filter(|c| mine.contains(*c)) {
-                    let s = theirs.entry(c).or_default();
-                    *s = (*s).max(l.stamp);
-                }
-            }
-        }
+        let theirs = self.planned_by_others(live, &mine);
         let before = (self.plan.len(), self.held.len());
         let outbid = |cell: u16, mine: Stamp| theirs.get(&cell).is_some_and(|s| *s > mine);
         self.plan.retain(|p| !outbid(p.cell, p.stamp));
         self.held.retain(|c, s| !outbid(*c, *s));
         before != (self.plan.len(), self.held.len())
+    }
+
+    /// Of some cells those that live claims of others plan, each with the highest stamp.
+    fn planned_by_others(&self, live: &LivePeers, cells: &CellSet) -> BTreeMap<u16, Stamp> {
+        let mut theirs: BTreeMap<u16, Stamp> = BTreeMap::new();
+        for (author, h) in &self.heard {
+            // Most claims list none of a few cells.
+            if live.get(author) != Some(&h.incarnation) || !h.listed.intersects(cells) {
+                continue;
+            }
+            for l in &h.claim.plan {
+                for c in cells_of(l.run, self.cells).filter(|c| cells.contains(*c)) {
+                    let s = theirs.entry(c).or_default();
+                    *s = (*s).max(l.stamp);
+                }
+            }
+        }
+        theirs
     }
 
     /// Uncovered cells that no live claim lists, this peer's own included, and
@@ -230,20 +236,15 @@ impl Sections {
         free
     }
 
-    /// Whether a live claim other than its owner's plans a cell at a higher stamp.
+    /// The highest stamp at which a live claim, this peer's own included, plans each cell.
     #[must_use]
-    pub fn is_taken(&self, live: &LivePeers, cell: &PlannedCell) -> bool {
-        let mine = self.plan.iter();
-        let outbids = |stamp: Stamp| stamp > cell.stamp;
-        mine.filter(|p| p.cell == cell.cell)
-            .any(|p| outbids(p.stamp))
-            || self.heard.iter().any(|(author, h)| {
-                live.get(author) == Some(&h.incarnation)
-                    && h.listed.contains(cell.cell)
-                    && h.claim.plan.iter().any(|l| {
-                        outbids(l.stamp) && cells_of(l.run, self.cells).any(|c| c == cell.cell)
-                    })
-            })
+    pub fn highest_stamps(&self, live: &LivePeers) -> BTreeMap<u16, Stamp> {
+        let mut highest = self.planned_by_others(live, &CellSet::full(self.cells));
+        for p in &self.plan {
+            let s = highest.entry(p.cell).or_default();
+            *s = (*s).max(p.stamp);
+        }
+        highest
     }
 
     /// Uncovered cells of another peer's newest plan, in its order of flight.

@@ -8,6 +8,7 @@
 //! ([`super::sections`]). So what is computed here need not be the same everywhere, only
 //! nearly; nothing but the time of flight depends on it.
 
+use super::runs::cells_of;
 use crate::wire::message::CellRun;
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
 use skein_geometry::frame::Point;
@@ -214,25 +215,23 @@ pub fn nearest_orphans(
     pace: Pace<'_>,
 ) -> Option<(u64, Vec<(u16, Direction)>)> {
     let cells = u16::try_from(pace.coverage_loop.len()).ok()?;
-    let at = |run: &CellRun, k: u16| {
-        let c = (u32::from(run.first) + u32::from(k)) % u32::from(cells.max(1));
-        u16::try_from(c).unwrap_or(0)
-    };
-    let ends = runs.iter().filter(|r| r.count > 0).flat_map(|run| {
-        let (first, last) = (at(run, 0), at(run, run.count - 1));
-        let way = |cell| hand.free_ms + pace.way_ms(hand.at, cell);
+    let both_ways = |run: &CellRun| {
+        let ahead: Vec<u16> = cells_of(*run, cells).collect();
+        let back = ahead.iter().rev().copied().collect();
+        let first = run.first;
         [
-            (way(first), *run, Direction::Forward),
-            (way(last), *run, Direction::Backward),
+            (first, Direction::Forward, ahead),
+            (first, Direction::Backward, back),
         ]
-    });
-    let (way_ms, run, direction) = ends.min_by_key(|(ms, run, d)| (*ms, run.first, *d))?;
-    let taken = run.count.min(most.max(1));
-    let cell = |k: u16| match direction {
-        Direction::Forward => at(&run, k),
-        Direction::Backward => at(&run, run.count - 1 - k),
     };
-    Some((way_ms, (0..taken).map(|k| (cell(k), direction)).collect()))
+    let with_way = |(first, direction, flown): (u16, Direction, Vec<u16>)| {
+        let way_ms = hand.free_ms + pace.way_ms(hand.at, *flown.first()?);
+        Some((way_ms, first, direction, flown))
+    };
+    let ways = runs.iter().flat_map(both_ways).filter_map(with_way);
+    let (way_ms, _, direction, flown) = ways.min_by_key(|(ms, first, d, _)| (*ms, *first, *d))?;
+    let taken = flown.into_iter().take(usize::from(most.max(1)));
+    Some((way_ms, taken.map(|cell| (cell, direction)).collect()))
 }
 
 #[cfg(test)]

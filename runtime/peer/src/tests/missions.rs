@@ -1,6 +1,6 @@
 //! Missions over the radio.
 
-use super::{covered, record};
+use super::{covered, record, with_operator};
 use crate::input::Command;
 use crate::mission::{Mission, chunks};
 use crate::testing::{GROUND_STATION, Harness, mission};
@@ -29,9 +29,7 @@ fn a_uav_without_a_mission_learns_it_by_radio() {
 
 #[test]
 fn a_new_revision_is_taken_by_all_and_covered_cells_keep_their_names() {
-    let mut h = Harness::started(2, mission(1, 6, 4));
-    h.add_ground_station(Some(mission(1, 6, 4)));
-    h.start(GROUND_STATION);
+    let mut h = with_operator(2, mission(1, 6, 4));
     h.run_s(40);
     let before = covered(&h, 1);
     assert!(before > 4);
@@ -47,9 +45,7 @@ fn a_new_revision_is_taken_by_all_and_covered_cells_keep_their_names() {
 /// from the plan is cut from the flight.
 #[test]
 fn a_base_that_moves_away_shortens_plan_and_flight() {
-    let mut h = Harness::started(1, mission(1, 8, 6));
-    h.add_ground_station(Some(mission(1, 8, 6)));
-    h.start(GROUND_STATION);
+    let mut h = with_operator(1, mission(1, 8, 6));
     h.run_s(30);
     let before = h.beliefs(1);
     let spare_s = f64::from(before.spendable_ms - before.eta_ms) / 1000.0;
@@ -77,9 +73,7 @@ fn a_base_that_moves_away_shortens_plan_and_flight() {
 /// way yet, which is no reason to give up its plan.
 #[test]
 fn a_zone_beside_the_area_takes_no_cell_from_anybody() {
-    let mut h = Harness::started(1, mission(1, 8, 6));
-    h.add_ground_station(Some(mission(1, 8, 6)));
-    h.start(GROUND_STATION);
+    let mut h = with_operator(1, mission(1, 8, 6));
     h.run_s(30);
     let before = h.beliefs(1);
     let zoned = Mission {
@@ -131,9 +125,7 @@ fn a_forged_piece_is_an_alarm_and_the_old_mission_stays() {
 
 #[test]
 fn a_mission_that_cannot_be_flown_is_an_alarm_and_the_old_one_stays() {
-    let mut h = Harness::started(1, mission(1, 6, 4));
-    h.add_ground_station(Some(mission(1, 6, 4)));
-    h.start(GROUND_STATION);
+    let mut h = with_operator(1, mission(1, 6, 4));
     h.run_s(10);
     let mut crossed = mission(2, 6, 4);
     crossed.area.swap(1, 2);
@@ -182,9 +174,7 @@ fn laps_follow_each_other_in_all_peers() {
 fn an_operator_s_mission_outranks_the_laps_that_a_peer_began_out_of_reach() {
     let mut patrol = mission(1, 4, 4);
     patrol.further_laps = 9;
-    let mut h = Harness::started(2, patrol.clone());
-    h.add_ground_station(Some(patrol.clone()));
-    h.start(GROUND_STATION);
+    let mut h = with_operator(2, patrol.clone());
     assert!(h.run_until(200, |h| h.beliefs(GROUND_STATION).revision == 2));
     h.isolate(2, true);
     let mut revised = patrol;

@@ -8,7 +8,8 @@ mod orders;
 mod stores;
 mod swarm;
 
-use crate::testing::Harness;
+use crate::mission::Mission;
+use crate::testing::{GROUND_STATION, Harness};
 use crate::wire::codec::{self, Body};
 use crate::wire::message::{Beacon, Record};
 use crate::wire::samples;
@@ -35,6 +36,14 @@ fn beacon(heartbeat: u32, nonce: u32) -> Beacon {
         loop_hash: 0,
         ..samples::beacon(heartbeat)
     }
+}
+
+/// So many UAVs that begin a mission, and a ground station that holds it, too.
+fn with_operator(n: u16, mission: Mission) -> Harness {
+    let mut h = Harness::started(n, mission.clone());
+    h.add_ground_station(Some(mission));
+    h.start(GROUND_STATION);
+    h
 }
 
 /// Cells that a peer knows to be covered.

@@ -1,14 +1,12 @@
 //! What the operator wants, from a ground station over the radio.
 
-use super::covered;
+use super::{covered, with_operator};
 use crate::testing::{GROUND_STATION, Harness, mission};
 use crate::wire::kinds::Kind;
 use skein_behaviors::Order;
 
 fn at_work() -> Harness {
-    let mut h = Harness::started(2, mission(1, 6, 4));
-    h.add_ground_station(Some(mission(1, 6, 4)));
-    h.start(GROUND_STATION);
+    let mut h = with_operator(2, mission(1, 6, 4));
     h.run_s(25);
     assert!(covered(&h, 1) > 0);
     h

@@ -5,6 +5,7 @@
 //! ([`crate::coverage::lanes`], [`crate::coverage::stations`]) and who flies which cells
 //! ([`super::division`]).
 
+use super::backtracking::RingCell;
 use super::grid::{CellId, Grid};
 use super::patch::Patches;
 use serde::{Deserialize, Serialize};
@@ -50,6 +51,18 @@ pub struct LoopCell {
     pub travel_mm: u32,
     /// Where along `curve` one frame holds the whole cell, metres.
     pub view_m: f64,
+}
+
+impl LoopCell {
+    /// Length flown along the loop when nothing is covered, millimetres.
+    #[must_use]
+    pub fn flown_mm(&self) -> u32 {
+        if self.needed {
+            self.service_mm
+        } else {
+            self.travel_mm
+        }
+    }
 }
 
 /// The loop on which all UAVs work. Cell `i` lies between boundary `i` and
@@ -131,6 +144,19 @@ impl CoverageLoop {
     #[must_use]
     pub fn cells(&self) -> &[LoopCell] {
         &self.cells
+    }
+
+    /// The cells as a division sees them, those open that `is_open` tells.
+    #[must_use]
+    pub fn ring(&self, is_open: impl Fn(u16, &LoopCell) -> bool) -> Vec<RingCell> {
+        let cells = self.cells.iter().zip(0..=u16::MAX);
+        cells
+            .map(|(cell, i)| RingCell {
+                service_mm: cell.service_mm,
+                travel_mm: cell.travel_mm,
+                open: is_open(i, cell),
+            })
+            .collect()
     }
 
     /// The pose at a boundary, looking forward; `index` is taken modulo the length.

@@ -196,14 +196,7 @@ mod tests {
         }
 
         fn ring(&self, is_open: impl Fn(usize) -> bool) -> Vec<RingCell> {
-            let cells = self.coverage_loop.cells().iter().enumerate();
-            cells
-                .map(|(i, c)| RingCell {
-                    service_mm: c.service_mm,
-                    travel_mm: c.travel_mm,
-                    open: is_open(i),
-                })
-                .collect()
+            self.coverage_loop.ring(|i, _| is_open(usize::from(i)))
         }
 
         fn uav(&self, id: u16, anchor: u16) -> Uav {
