@@ -1,13 +1,13 @@
 //! `skein check`: what is wrong with a scenario before it is flown, and what it amounts to.
 
 use crate::exit;
-use crate::planner::PlannerArgs;
+use crate::scenario_args::ScenarioArgs;
 use clap::{Args, ValueEnum};
 use skein_flight::coverage::ring::CellId;
 use skein_netsim::spec::Spec;
 use skein_peer::CoverageTask;
 use skein_scenario::{
-    AreaPlanner, Coverable, Forecast, Launch, Overrides, Scenario, ScenarioError, Summary, extent_m,
+    AreaPlanner, Coverable, Forecast, Scenario, ScenarioError, Summary, extent_m,
 };
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -22,18 +22,9 @@ const LISTED_CELLS: usize = 12;
 /// time to cover it, and everything worth a warning.
 #[derive(Debug, Args)]
 pub struct CheckArgs {
-    /// A scenario file or the name of a built-in scenario; without it the default one.
-    pub scenario: Option<String>,
-    /// Checks with this many UAVs instead of the scenario's number.
-    #[arg(long, value_name = "N")]
-    pub peers: Option<u16>,
-    /// Who plans an area; without a flag both are told side by side.
+    /// What is to be flown; without a planner's flag both planners are told side by side.
     #[command(flatten)]
-    pub planner: PlannerArgs,
-    /// Where the UAVs of a generated fleet begin: `base`, one after the other, or `spread`
-    /// round the coverage loop.
-    #[arg(long, value_name = "WHERE")]
-    pub launch: Option<Launch>,
+    pub scenario: ScenarioArgs,
     /// How the result is printed.
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
@@ -53,13 +44,7 @@ pub enum Format {
 /// # Errors
 /// Only when stdout cannot be written.
 pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
-    let over = Overrides {
-        peers: args.peers,
-        planner: args.planner.chosen(),
-        launch: args.launch,
-        ..Overrides::default()
-    };
-    let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {
+    let scenario = match args.scenario.open(None, None) {
         Ok(s) => s,
         Err(e) => {
             match args.format {
@@ -74,7 +59,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     };
     let total = &scenario.summary;
     let judged = Coverable::of(&scenario);
-    let forecasts = match args.planner.chosen() {
+    let forecasts = match args.scenario.planner.chosen() {
         Some(planner) => scenario
             .forecast()
             .map(|f| (planner, Ok(f)))

@@ -1,7 +1,7 @@
 //! `skein order` and `skein mission`: what an operator says at the console of a ground
 //! station, in a trial or in the field.
 
-use crate::planner::PlannerArgs;
+use crate::scenario_args::PlannerArgs;
 use crate::{cli, exit};
 use clap::Args;
 use skein_behaviors::Order;

@@ -8,7 +8,7 @@ mod exit;
 mod observe;
 mod peer;
 mod plan;
-mod planner;
+mod scenario_args;
 mod sim;
 mod trial;
 

@@ -3,14 +3,14 @@
 
 use crate::check::Format;
 use crate::exit;
-use crate::planner::PlannerArgs;
+use crate::scenario_args::ScenarioArgs;
 use anyhow::Context;
 use clap::Args;
 use skein_broker::batch::{self, Batch};
 use skein_netsim::Prepared;
 use skein_netsim::runs::{self, Wanted};
 use skein_netsim::timeline::timeline;
-use skein_scenario::{Launch, Overrides};
+use skein_scenario::Seeds;
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write as _};
 use std::num::NonZeroUsize;
@@ -27,23 +27,14 @@ use std::process::ExitCode;
 /// complete or broke a rule; docs/protocol.md §8 says what each rule means.
 #[derive(Debug, Args)]
 pub struct SimArgs {
-    /// A scenario file or the name of a built-in scenario; without it the default one.
-    pub scenario: Option<String>,
-    /// Flies with this many UAVs instead of the scenario's number.
-    #[arg(long, value_name = "N")]
-    pub peers: Option<u16>,
-    /// Who plans an area.
+    /// What is flown.
     #[command(flatten)]
-    pub planner: PlannerArgs,
-    /// Where the UAVs of a generated fleet begin: `base`, one after the other, or `spread`
-    /// round the coverage loop.
-    #[arg(long, value_name = "WHERE")]
-    pub launch: Option<Launch>,
+    pub scenario: ScenarioArgs,
     /// The seed of one run; without it the scenario's.
     #[arg(long, value_name = "S", conflicts_with = "seeds")]
     pub seed: Option<u64>,
     /// The seeds of many runs: from A up to but not including B.
-    #[arg(long, value_name = "A..B", value_parser = seeds)]
+    #[arg(long, value_name = "A..B")]
     pub seeds: Option<Seeds>,
     /// Draws the faults of each run from the scenario's storm.
     #[arg(long)]
@@ -59,45 +50,12 @@ pub struct SimArgs {
     pub format: Format,
 }
 
-/// A range of seeds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Seeds {
-    /// The first.
-    pub from: u64,
-    /// The one after the last.
-    pub to: u64,
-}
-
-fn seeds(text: &str) -> Result<Seeds, String> {
-    let (from, to) = text
-        .split_once("..")
-        .ok_or("expected two numbers with two dots between, for example 0..1000")?;
-    let number = |s: &str| s.trim().parse::<u64>().map_err(|e| format!("{s:?}: {e}"));
-    let seeds = Seeds {
-        from: number(from)?,
-        to: number(to)?,
-    };
-    if seeds.from >= seeds.to {
-        return Err(format!(
-            "{text} holds no seed; the second number is not included"
-        ));
-    }
-    Ok(seeds)
-}
-
 /// Runs the verb: the result on stdout, progress on stderr.
 ///
 /// # Errors
 /// When stdout or the history cannot be written.
 pub fn run(args: &SimArgs) -> anyhow::Result<ExitCode> {
-    let over = Overrides {
-        peers: args.peers,
-        seed: args.seed,
-        planner: args.planner.chosen(),
-        launch: args.launch,
-        ..Overrides::default()
-    };
-    let scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {
+    let scenario = match args.scenario.open(args.seed, None) {
         Ok(s) => s,
         Err(e) => {
             eprintln!("error: {e}");
@@ -179,18 +137,7 @@ fn many(args: &SimArgs, prepared: &Prepared, seeds: Seeds) -> anyhow::Result<boo
 /// The command that replays a seed.
 fn replay(args: &SimArgs, seed: u64) -> String {
     let mut s = "skein sim".to_owned();
-    if let Some(scenario) = &args.scenario {
-        let _ = write!(s, " {scenario}");
-    }
-    if let Some(n) = args.peers {
-        let _ = write!(s, " --peers {n}");
-    }
-    if args.planner.exact {
-        s.push_str(" --exact");
-    }
-    if args.planner.approximate {
-        s.push_str(" --approximate");
-    }
+    s.push_str(&args.scenario.as_typed());
     let _ = write!(s, " --seed {seed}");
     if args.storm {
         s.push_str(" --storm");
@@ -203,21 +150,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_of_seeds_are_read_or_refused_with_a_reason() {
-        assert_eq!(seeds("0..1000"), Ok(Seeds { from: 0, to: 1000 }));
-        for wrong in ["7", "5..5", "9..2", "a..b", "-1..4"] {
-            assert!(seeds(wrong).is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
     fn the_command_that_replays_a_seed_names_all_that_made_the_run() {
         #[derive(clap::Parser)]
         struct Cli {
             #[command(flatten)]
             sim: SimArgs,
         }
-        for flags in ["--exact", "--approximate", "--peers 4 --storm", ""] {
+        for flags in [
+            "--exact",
+            "--approximate",
+            "--peers 4 --storm",
+            "--launch spread",
+            "",
+        ] {
             let command = format!("skein helsinki --seeds 0..9 {flags}");
             let args = <Cli as clap::Parser>::parse_from(command.split_whitespace()).sim;
             let again = replay(&args, 7);

@@ -1,13 +1,13 @@
 //! `skein trial`: a scenario with real processes, a display, and a verdict.
 
 use crate::check::Format;
-use crate::planner::PlannerArgs;
+use crate::scenario_args::ScenarioArgs;
 use crate::{cli, exit};
 use anyhow::Context;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use skein_broker::{Event, Options, Progress, TrialError};
-use skein_scenario::{Launch, Overrides, Severity};
+use skein_scenario::Severity;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -21,18 +21,9 @@ use std::process::ExitCode;
 /// every live peer knows that the mission is finished, else 1.
 #[derive(Debug, Args)]
 pub struct TrialArgs {
-    /// A scenario file or the name of a built-in scenario; without it the default one.
-    pub scenario: Option<String>,
-    /// Flies with this many UAVs instead of the scenario's number.
-    #[arg(long, value_name = "N")]
-    pub peers: Option<u16>,
-    /// Who plans an area.
+    /// What is flown.
     #[command(flatten)]
-    pub planner: PlannerArgs,
-    /// Where the UAVs of a generated fleet begin: `base`, one after the other, or `spread`
-    /// round the coverage loop.
-    #[arg(long, value_name = "WHERE")]
-    pub launch: Option<Launch>,
+    pub scenario: ScenarioArgs,
     /// Scenario seconds per second, at most 10.
     #[arg(long, value_name = "X")]
     pub time_scale: Option<f64>,
@@ -62,14 +53,7 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
         );
         return Ok(ExitCode::from(exit::USAGE));
     }
-    let over = Overrides {
-        peers: args.peers,
-        seed: args.seed,
-        time_scale: args.time_scale,
-        planner: args.planner.chosen(),
-        launch: args.launch,
-    };
-    let mut scenario = match skein_scenario::open(args.scenario.as_deref(), &over) {
+    let mut scenario = match args.scenario.open(args.seed, args.time_scale) {
         Ok(scenario) => scenario,
         Err(error) => {
             eprintln!("error: {error}");

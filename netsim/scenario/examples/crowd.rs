@@ -11,7 +11,7 @@ use skein_netsim::prepared::Prepared;
 use skein_netsim::runs::{Wanted, run};
 use skein_netsim::swarm::Outcome;
 use skein_peer::Report;
-use skein_scenario::{Overrides, open};
+use skein_scenario::{Overrides, Seeds, open};
 use std::collections::BTreeSet;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -23,10 +23,12 @@ fn main() -> ExitCode {
         |text: &str| -> Vec<u32> { text.split(',').filter_map(|n| n.parse().ok()).collect() };
     let (peers, rates) = (numbers(&arg(1, "8")), numbers(&arg(2, "64000")));
     let (seeds, kills) = (arg(3, "1..2"), arg(4, "0").parse().unwrap_or(0));
-    let mut ends = seeds.splitn(2, "..").map(|n| n.parse::<u64>().ok());
-    let (Some(Some(from)), Some(Some(to))) = (ends.next(), ends.next()) else {
-        eprintln!("expected seeds as 0..200, not {seeds}");
-        return ExitCode::from(2);
+    let seeds = match seeds.parse::<Seeds>() {
+        Ok(seeds) => seeds,
+        Err(e) => {
+            eprintln!("{e}");
+            return ExitCode::from(2);
+        }
     };
     for n in &peers {
         for rate_bps in &rates {
@@ -44,7 +46,7 @@ fn main() -> ExitCode {
             spec.radio.rate_bps = *rate_bps;
             let faults = deaths(kills, spec.uavs.iter().map(|u| u.id));
             let prepared = Prepared::new(spec);
-            for seed in from..to {
+            for seed in seeds.from..seeds.to {
                 let wanted = Wanted {
                     events: true,
                     ..Wanted::default()

@@ -11,7 +11,7 @@ use skein_netsim::fault::Fault;
 use skein_netsim::prepared::Prepared;
 use skein_netsim::runs::{Wanted, failure_free_makespan_ms, run, storm};
 use skein_netsim::summary::Spread;
-use skein_scenario::{Launch, Overrides, open};
+use skein_scenario::{Launch, Overrides, Seeds, open};
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -50,8 +50,7 @@ fn told() -> Result<(), String> {
     if args.iter().any(|a| a == "--backtracking") {
         Arc::make_mut(&mut spec.mission).division = Rule::Backtracking;
     }
-    let (from, to) = seeds.split_once("..").ok_or("expected seeds as 0..20")?;
-    let bound = |n: &str| n.parse::<u64>().map_err(|e| e.to_string());
+    let seeds: Seeds = seeds.parse()?;
     let prepared = Prepared::new(spec);
     let free_ms = failure_free_makespan_ms(&prepared);
     let wanted = Wanted {
@@ -66,7 +65,7 @@ fn told() -> Result<(), String> {
     planned.retain(|f| kept(&f.fault));
     let (mut over_bound, mut over_baseline, mut failed) = (Vec::new(), Vec::new(), Vec::new());
     let mut false_downs = 0;
-    for seed in bound(from)?..bound(to)? {
+    for seed in seeds.from..seeds.to {
         let o = if faults == "storm" {
             storm(&prepared, seed, free_ms, wanted)
         } else {

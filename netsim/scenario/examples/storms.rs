@@ -7,7 +7,7 @@
 use skein_netsim::prepared::Prepared;
 use skein_netsim::runs::{Wanted, failure_free_makespan_ms, storm};
 use skein_netsim::summary::summarise;
-use skein_scenario::{Overrides, open};
+use skein_scenario::{Overrides, Seeds, open};
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 
@@ -15,9 +15,12 @@ fn main() -> ExitCode {
     let mut args = std::env::args().skip(1);
     let name = args.next().unwrap_or_else(|| "helsinki".to_owned());
     let seeds = args.next().unwrap_or_else(|| "0..20".to_owned());
-    let (Some(from), Some(to)) = bounds(&seeds) else {
-        eprintln!("expected seeds as 0..200, not {seeds}");
-        return ExitCode::from(2);
+    let Seeds { from, to } = match seeds.parse() {
+        Ok(seeds) => seeds,
+        Err(e) => {
+            eprintln!("{e}");
+            return ExitCode::from(2);
+        }
     };
     let scenario = match open(Some(&name), &Overrides::default()) {
         Ok(scenario) => scenario,
@@ -78,9 +81,4 @@ fn main() -> ExitCode {
     } else {
         ExitCode::FAILURE
     }
-}
-
-fn bounds(text: &str) -> (Option<u64>, Option<u64>) {
-    let mut ends = text.splitn(2, "..").map(|n| n.parse().ok());
-    (ends.next().flatten(), ends.next().flatten())
 }

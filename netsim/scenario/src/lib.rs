@@ -46,7 +46,7 @@ pub use feasibility::{Summary, extent_m, feasibility, summary};
 pub use files::Files;
 pub use forecast::Forecast;
 pub use read::faults::{chaos_plan, load_chaos_plan};
-pub use request::{AreaPlanner, Launch, Overrides};
+pub use request::{AreaPlanner, Launch, Overrides, Seeds};
 pub use resolve::{Scenario, parse_with};
 
 use skein_netsim::spec::Spec;

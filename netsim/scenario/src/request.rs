@@ -50,6 +50,17 @@ pub enum Launch {
     Base,
 }
 
+impl Launch {
+    /// Its word in a file and on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Spread => "spread",
+            Self::Base => "base",
+        }
+    }
+}
+
 impl FromStr for Launch {
     type Err = String;
 
@@ -59,6 +70,33 @@ impl FromStr for Launch {
             "base" => Ok(Self::Base),
             _ => Err("expected \"spread\" (evenly round the coverage loop) or \"base\" (one after the other at the base)".to_owned()),
         }
+    }
+}
+
+/// The seeds of many runs, written as `0..1000`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seeds {
+    /// The first.
+    pub from: u64,
+    /// The one after the last, above the first.
+    pub to: u64,
+}
+
+impl FromStr for Seeds {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (from, to) = text
+            .split_once("..")
+            .ok_or("expected two numbers with two dots between, for example 0..1000")?;
+        let number = |s: &str| s.trim().parse::<u64>().map_err(|e| format!("{s:?}: {e}"));
+        let (from, to) = (number(from)?, number(to)?);
+        if from >= to {
+            return Err(format!(
+                "{text} holds no seed; the second number is not included"
+            ));
+        }
+        Ok(Self { from, to })
     }
 }
 
@@ -75,4 +113,17 @@ pub struct Overrides {
     pub planner: Option<AreaPlanner>,
     /// Where the UAVs of a generated fleet begin, instead of where the scenario says.
     pub launch: Option<Launch>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_of_seeds_are_read_or_refused_with_a_reason() {
+        assert_eq!("0..1000".parse(), Ok(Seeds { from: 0, to: 1000 }));
+        for wrong in ["7", "5..5", "9..2", "a..b", "-1..4"] {
+            assert!(wrong.parse::<Seeds>().is_err(), "{wrong}");
+        }
+    }
 }
