@@ -4,7 +4,7 @@
 use crate::mission::{GeometryError, Mission};
 use skein_flight::coverage::ring::CoverageLoop;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
-use skein_flight::coverage::ring::division::{Ground, divide};
+use skein_flight::coverage::ring::division::{RouteNetwork, divide};
 use skein_flight::route::Router;
 use std::sync::Arc;
 
@@ -23,11 +23,11 @@ impl MissionGeometry {
     /// Divides the open cells of its loop by the rule of its mission.
     #[must_use]
     pub fn divide(&self, ring: &[RingCell], uavs: &[Uav]) -> Division {
-        let ground = Ground {
+        let network = RouteNetwork {
             coverage_loop: &self.coverage_loop,
             router: &self.router,
         };
-        divide(ring, uavs, ground, self.mission.division)
+        divide(ring, uavs, network, self.mission.division)
     }
 }
 

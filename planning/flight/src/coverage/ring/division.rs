@@ -32,9 +32,9 @@ impl Rule {
     }
 }
 
-/// On what a division flies: the loop, and the ways off it.
+/// What a division is flown on: the loop, and the ways off it.
 #[derive(Clone, Copy, Debug)]
-pub struct Ground<'a> {
+pub struct RouteNetwork<'a> {
     /// The loop that is divided.
     pub coverage_loop: &'a CoverageLoop,
     /// Ways that keep clear of the zones.
@@ -63,16 +63,17 @@ const PROOFS: u64 = 24;
 /// A fixed number of steps for each UAV and each open cell, and the ways of at most 27 plans
 /// asked of the router.
 #[must_use]
-pub fn divide(ring: &[RingCell], uavs: &[Uav], ground: Ground<'_>, rule: Rule) -> Division {
+pub fn divide(ring: &[RingCell], uavs: &[Uav], network: RouteNetwork<'_>, rule: Rule) -> Division {
     let plain = backtracking::divide(ring, uavs);
     let open = ring.iter().filter(|c| c.open).count();
-    let is_of_loop = ring.len() == ground.coverage_loop.len() && ring.len() < usize::from(u16::MAX);
+    let is_of_loop =
+        ring.len() == network.coverage_loop.len() && ring.len() < usize::from(u16::MAX);
     if rule == Rule::Backtracking || uavs.is_empty() || open == 0 || !is_of_loop {
         return plain;
     }
     let mut uavs = uavs.to_vec();
     uavs.sort_by_key(|u| u.id);
-    let transfers = Transfers::new(ground, ring, &uavs);
+    let transfers = Transfers::new(network, ring, &uavs);
     let mut search = Search::new(transfers, ring, &uavs);
     let legs: Vec<Vec<Leg>> = plain.sections.iter().map(|s| s.legs.clone()).collect();
     let around = search.tours_of(&legs);
@@ -188,8 +189,8 @@ mod tests {
             Self::new(columns, rows, vec![Polygon::new(block).unwrap()])
         }
 
-        fn ground(&self) -> Ground<'_> {
-            Ground {
+        fn network(&self) -> RouteNetwork<'_> {
+            RouteNetwork {
                 coverage_loop: &self.coverage_loop,
                 router: &self.router,
             }
@@ -377,7 +378,7 @@ mod tests {
             let (k, half) = if three_are_gone { (5, n / 16) } else { (8, 0) };
             let ring = site.ring(|i| i % (n / 8) >= half);
             let uavs: Vec<Uav> = (0..k).map(uav).collect();
-            let d = divide(&ring, &uavs, site.ground(), Rule::Best);
+            let d = divide(&ring, &uavs, site.network(), Rule::Best);
             assert_sound(&ring, &uavs, &d);
             let speed_mmps: u32 = uavs.iter().map(|u| u.speed_mmps).sum();
             let open = ring.iter().filter(|c| c.open);
@@ -411,7 +412,7 @@ mod tests {
                 uav.anchor = u16::try_from(draw.below(n)).unwrap();
                 *uav = site.strayed(*uav, draw);
             }
-            let d = divide(&ring, &uavs, site.ground(), Rule::Best);
+            let d = divide(&ring, &uavs, site.network(), Rule::Best);
             assert_sound(&ring, &uavs, &d);
             assert!(d.unassigned.is_empty(), "{} cells", d.unassigned.len());
             let work_mm: f64 = ring.iter().map(|c| f64::from(c.service_mm)).sum();
@@ -426,9 +427,9 @@ mod tests {
     fn a_mission_may_ask_for_backtracking_alone() {
         let site = Site::new(10, 8, Vec::new());
         let (ring, uavs) = site.drawn(&mut SplitMix64::new(7));
-        let asked = divide(&ring, &uavs, site.ground(), Rule::Backtracking);
+        let asked = divide(&ring, &uavs, site.network(), Rule::Backtracking);
         assert_eq!(asked, backtracking::divide(&ring, &uavs));
-        assert_ne!(asked, divide(&ring, &uavs, site.ground(), Rule::Best));
+        assert_ne!(asked, divide(&ring, &uavs, site.network(), Rule::Best));
     }
 
     proptest! {
@@ -440,7 +441,7 @@ mod tests {
             let draw = &mut SplitMix64::new(seed);
             for _ in 0..4 {
                 let (ring, uavs) = site.drawn(draw);
-                let d = divide(&ring, &uavs, site.ground(), Rule::Best);
+                let d = divide(&ring, &uavs, site.network(), Rule::Best);
                 assert_sound(&ring, &uavs, &d);
                 let oracle = backtracking::divide(&ring, &uavs);
                 prop_assert!(d.unassigned.len() <= oracle.unassigned.len());
@@ -455,7 +456,7 @@ mod tests {
                 }
                 let mut shuffled = uavs.clone();
                 draw.shuffle(&mut shuffled);
-                prop_assert_eq!(&d, &divide(&ring, &shuffled, site.ground(), Rule::Best));
+                prop_assert_eq!(&d, &divide(&ring, &shuffled, site.network(), Rule::Best));
             }
         }
     }

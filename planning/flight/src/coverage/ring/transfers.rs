@@ -6,7 +6,7 @@
 
 use super::backtracking::{RingCell, Uav};
 use super::coverage_loop::Direction;
-use super::division::Ground;
+use super::division::RouteNetwork;
 use crate::route::{RouteError, Router};
 use crate::trajectory::dubins::length_m;
 use core::cell::Cell;
@@ -38,8 +38,8 @@ pub(super) struct Transfers<'a> {
 
 impl<'a> Transfers<'a> {
     /// The places of a loop and of UAVs.
-    pub fn new(ground: Ground<'a>, ring: &[RingCell], uavs: &[Uav]) -> Self {
-        let coverage_loop = ground.coverage_loop;
+    pub fn new(network: RouteNetwork<'a>, ring: &[RingCell], uavs: &[Uav]) -> Self {
+        let coverage_loop = network.coverage_loop;
         let ways = [Direction::Forward, Direction::Backward];
         let boundaries = 0..ring.len();
         let mut poses: Vec<Pose> = boundaries
@@ -56,7 +56,7 @@ impl<'a> Transfers<'a> {
             travel_mm.push(before + u64::from(cell.travel_mm));
         }
         Self {
-            router: ground.router,
+            router: network.router,
             poses,
             travel_mm,
             proved: BTreeMap::new(),
