@@ -10,7 +10,7 @@
 //! |---|---|---|
 //! | unknown | a heartbeat younger than the bound, not condemned | alive or suspect |
 //! | unknown | a heartbeat older than the bound, or condemned | down: its records are asked for |
-//! | alive | k1 I silent, and it used to be heard directly | suspect |
+//! | alive | its freshest heartbeat was heard directly, k1 I ago | suspect |
 //! | alive | half of that, and the transport says that the link is gone | suspect |
 //! | alive | a suspicion against this very heartbeat is heard | suspect |
 //! | suspect | a fresher heartbeat from anybody, younger than the bound | alive |
@@ -107,7 +107,8 @@ pub struct Membership {
     /// What this peer announced itself, quarters of T.
     interval: u8,
     doubt_until: Time,
-    /// Somebody who was suspected or believed down is heard, and nobody was told yet.
+    /// Somebody who was suspected or believed down is heard, or a neighbour suspects
+    /// somebody who was heard since, and nobody was told yet.
     refuted: bool,
     /// When anything of another peer was last heard.
     last_heard: Option<Time>,
@@ -262,9 +263,14 @@ impl Membership {
             interval: told.interval,
             suspected: told.suspected_ds.map(age),
         };
+        let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
         let fresher = self.hear(now, heartbeat, limits, changes);
         if let Some(known) = self.known.get_mut(&told.id) {
             known.note_told(now, told, limits.interval_ms);
+            if known.disputes(told) {
+                known.urgent_until = urgent_until;
+                self.refuted = true;
+            }
             if !fresher {
                 return;
             }
@@ -414,7 +420,7 @@ impl Membership {
     }
 
     /// Whether somebody was heard since this was last asked who had been suspected or
-    /// believed down: others who still do are to be told soon.
+    /// believed down, or is suspected by a neighbour: others who do are to be told soon.
     pub fn take_refuted(&mut self) -> bool {
         std::mem::take(&mut self.refuted)
     }
@@ -427,24 +433,24 @@ impl Membership {
             "peers known keep to their cap"
         );
         let Patience {
-            interval_ms,
             k1_quarters,
             k2_ms,
             bound_ms,
+            ..
         } = self.patience(now);
-        let window_ms = HOP_INTERVALS * interval_ms;
         let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
         let mut changes = Vec::new();
         for known in self.known.values_mut().filter(|k| k.status != Status::Down) {
             let silent_ms = known.silent_ms(now);
-            let neighbour = known.fewest_hops(now, window_ms) == Some(1);
+            // Who heard it from others since its link ended knows that the link ended.
+            let answers_for_it = known.freshest.hops == 1;
             let k1_ms = ms_of(known.freshest.interval, self.period_ms) * k1_quarters / 4;
             let patience_ms = if self.gone.contains(&known.freshest.id) {
                 k1_ms / 2
             } else {
                 k1_ms
             };
-            if known.freshest.suspected.is_none() && neighbour && silent_ms >= patience_ms {
+            if known.freshest.suspected.is_none() && answers_for_it && silent_ms >= patience_ms {
                 known.freshest.suspected = Some(Age {
                     told_ms: 0,
                     at: now,

@@ -141,6 +141,14 @@ impl Known {
         }
     }
 
+    /// Whether somebody is told to be suspected who was heard since.
+    pub(super) fn disputes(&self, told: &Gossip) -> bool {
+        self.status == Status::Alive
+            && told.suspected_ds.is_some()
+            && told.incarnation == self.freshest.incarnation
+            && told.heartbeat < self.freshest.count
+    }
+
     pub(super) fn note_hops(&mut self, now: Time, hops: u8, interval_ms: u64) {
         let (since, fewest) = self.hops[self.latest];
         if fewest != u8::MAX && now.since_ms(since) < interval_ms {

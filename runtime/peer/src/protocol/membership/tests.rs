@@ -94,7 +94,70 @@ fn one_s_own_lateness_is_nobody_s_silence_but_the_age_that_is_told_is_true() {
         assert!(now.since_ms(woke) <= 20_000, "the excuse ends");
     }
     let silent_ms = 1_000 + now.since_ms(woke);
-    assert!((11_750..=12_000).contains(&silent_ms), "{silent_ms}");
+    assert!((8_750..=9_000).contains(&silent_ms), "{silent_ms}");
+}
+
+/// A neighbour that flew out of sight lives on by what others tell of it: who heard its
+/// freshest heartbeat answers for it, not who heard an earlier one.
+#[test]
+fn only_who_heard_the_freshest_heartbeat_itself_suspects() {
+    let mut m = Membership::new(1, 1000);
+    m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
+    let told = vec![entry(2, 3, 1, None)];
+    m.on_beacon(Time(1_000), 3, 1, &beacon(1, told));
+    let mut seen = Vec::new();
+    for t in 4..80 {
+        let changes = m.tick(Time(t * 250)).into_iter();
+        seen.extend(changes.filter(|c| c.peer == 2).map(|c| (t * 250, c.status)));
+    }
+    // k1, k2 and D are 4.5, 5 and 2 there, then 4.25, 4.5 and 1: no suspicion, the bound.
+    assert_eq!(seen, [(12_750, Status::Down)]);
+    // Heard itself again, it is answered for again.
+    m.on_beacon(Time(21_000), 2, 1, &beacon(9, Vec::new()));
+    for t in 84..120 {
+        m.tick(Time(t * 250));
+        if m.status(2) == Some((1, Status::Suspect)) {
+            return assert_eq!(t * 250, 25_250);
+        }
+    }
+    panic!("it is suspected");
+}
+
+/// Three neighbours suspect or have given up what this peer heard since: it says so first,
+/// and as long as they go on.
+#[test]
+fn who_is_suspected_elsewhere_and_heard_here_is_told_of_first() {
+    let mut m = Membership::new(1, 1000);
+    for id in 2..=20 {
+        m.on_beacon(Time(0), id, 1, &beacon(5, Vec::new()));
+    }
+    m.take_refuted();
+    let first = |m: &mut Membership, now_ms| m.gossip(Time(now_ms), 4)[0].id;
+    assert_ne!(first(&mut m, 3_000), 15);
+    m.on_beacon(Time(3_100), 3, 1, &beacon(6, vec![entry(15, 4, 50, None)]));
+    assert!(!m.take_refuted(), "it is old there, not suspected");
+    let disputed = vec![entry(15, 4, 50, Some(3))];
+    m.on_beacon(Time(3_200), 3, 1, &beacon(7, disputed.clone()));
+    assert!(m.take_refuted());
+    assert_eq!([first(&mut m, 3_300), first(&mut m, 4_300)], [15, 15]);
+    assert_ne!(first(&mut m, 5_300), 15, "nobody says it any more");
+    m.on_beacon(Time(5_400), 3, 1, &beacon(8, disputed));
+    assert_eq!(first(&mut m, 5_500), 15);
+    // What is suspected here as well is none to speak up for.
+    m.take_refuted();
+    m.on_beacon(
+        Time(5_600),
+        4,
+        1,
+        &beacon(6, vec![entry(16, 5, 56, Some(1))]),
+    );
+    m.on_beacon(
+        Time(5_700),
+        3,
+        1,
+        &beacon(9, vec![entry(16, 4, 60, Some(9))]),
+    );
+    assert!(!m.take_refuted());
 }
 
 fn entry(id: u16, heartbeat: u32, age_ds: u16, suspected_ds: Option<u16>) -> Gossip {
