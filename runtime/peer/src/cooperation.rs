@@ -594,7 +594,7 @@ impl MissionState {
             gain_in_sight: false,
         };
         if self.negotiation.wants_foresight(&ctx) {
-            ctx.gain_in_sight = self.foresees_gain(&ctx);
+            ctx.gain_in_sight = self.foresees_gain(s.me.id, &ctx);
         }
         let coverage_loop = Arc::clone(&self.geometry.coverage_loop);
         let mut actions = self.negotiation.tick(&ctx, &coverage_loop);
@@ -630,7 +630,7 @@ impl MissionState {
 
     /// Whether this peer, with nothing to fly, would be of use in a new division of what
     /// the claims of others list.
-    fn foresees_gain(&self, ctx: &Context<'_>) -> bool {
+    fn foresees_gain(&self, id: u16, ctx: &Context<'_>) -> bool {
         let sections = &self.negotiation.sections;
         let Some(executive) = &self.executive else {
             return false;
@@ -638,7 +638,7 @@ impl MissionState {
         let forecast = executive.forecast(0, &|c| !sections.covered().contains(c));
         let me = Uav {
             anchor: forecast.anchor,
-            id: self.negotiation.me(),
+            id,
             heading: forecast.heading,
             release_ms: forecast.release_ms,
             speed_mmps: speed_mmps(executive),

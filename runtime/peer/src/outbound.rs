@@ -413,3 +413,154 @@ fn state_of(s: &Sources<'_>, state: &MissionState) -> State {
 fn e4(rad: f64) -> i32 {
     (rad * 10_000.0).round() as i32
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_core::SeedableRng;
+
+    /// The interval that is announced.
+    const I: u64 = 2_000;
+
+    fn outbound() -> (Outbound, Timers, ChaCha8Rng) {
+        let mut timers = Timers::default();
+        let mut outbound = Outbound::new(1_000, &mut timers);
+        outbound.announce(I);
+        (outbound, timers, ChaCha8Rng::seed_from_u64(1))
+    }
+
+    /// The least and the most of what is drawn many times.
+    fn extremes(mut draw: impl FnMut() -> u64) -> (u64, u64) {
+        let drawn: Vec<u64> = (0..2_000).map(|_| draw()).collect();
+        let least = drawn.iter().copied().min();
+        (least.unwrap(), drawn.into_iter().max().unwrap())
+    }
+
+    #[test]
+    fn beacons_are_an_interval_apart_and_a_heartbeat_is_half_way() {
+        let (o, mut timers, mut rng) = outbound();
+        let mut now = Time(10_000);
+        let next_ms = extremes(|| {
+            o.beacon_due(now, true, &mut timers, &mut rng);
+            let full = timers.at(Timer::FullBeacon).unwrap();
+            let beat = timers.at(Timer::Beacon).unwrap();
+            let next_ms = full.since_ms(now);
+            assert_eq!(beat.since_ms(now), next_ms / 2);
+            o.beacon_due(beat, false, &mut timers, &mut rng);
+            assert_eq!(timers.at(Timer::Beacon), Some(full));
+            now = full;
+            next_ms
+        });
+        assert_eq!(next_ms, (1_800, 2_200), "10 % more or less");
+    }
+
+    #[test]
+    fn a_suspicion_is_answered_at_once_and_about_four_times_an_interval_until_the_verdict() {
+        let (mut o, mut timers, mut rng) = outbound();
+        o.last_beacon = Time(10_000);
+        let until = Time(30_000);
+        let mut answer_ms = |now: Time| {
+            extremes(|| {
+                timers.stop(Timer::Beacon);
+                o.refute(now, until, &mut timers, &mut rng);
+                timers.at(Timer::Beacon).unwrap().since_ms(now)
+            })
+        };
+        assert_eq!(
+            answer_ms(Time(12_000)),
+            (0, 250),
+            "an eighth of an interval"
+        );
+        assert_eq!(
+            answer_ms(Time(10_000)),
+            (500, 500),
+            "a quarter after the last"
+        );
+        // A beacon that was to come sooner stays.
+        timers.set(Timer::Beacon, Time(12_001));
+        o.refute(Time(12_001), until, &mut timers, &mut rng);
+        assert_eq!(timers.at(Timer::Beacon), Some(Time(12_001)));
+        let mut next_ms = |now: Time| {
+            extremes(|| {
+                timers.set(Timer::FullBeacon, Time(90_000));
+                o.beacon_due(now, false, &mut timers, &mut rng);
+                timers.at(Timer::Beacon).unwrap().since_ms(now)
+            })
+        };
+        assert_eq!(next_ms(Time(20_000)), (500, 700));
+        assert_eq!(next_ms(until), (60_000, 60_000), "the verdict is passed");
+        o.refute(Time(40_000), Time(50_000), &mut timers, &mut rng);
+        o.believed(Time(41_000), &mut timers);
+        assert!(!timers.is_running(Timer::Refutation, Time(41_000)));
+        assert_eq!(timers.at(Timer::Beacon), timers.at(Timer::FullBeacon));
+    }
+
+    #[test]
+    fn news_of_who_was_suspected_come_with_a_beacon_soon_but_half_an_interval_apart() {
+        let (mut o, mut timers, mut rng) = outbound();
+        o.last_full = Time(10_000);
+        let mut after_ms = |now: Time| {
+            extremes(|| {
+                timers.stop(Timer::Beacon);
+                timers.stop(Timer::FullBeacon);
+                o.hasten(now, &mut timers, &mut rng);
+                assert_eq!(timers.at(Timer::Beacon), timers.at(Timer::FullBeacon));
+                timers.at(Timer::FullBeacon).unwrap().since_ms(now)
+            })
+        };
+        assert_eq!(after_ms(Time(11_500)), (0, 250), "an eighth of an interval");
+        assert_eq!(after_ms(Time(10_100)), (900, 900));
+    }
+
+    #[test]
+    fn a_claim_that_changed_waits_an_interval_and_coverage_two_or_one_if_it_is_wanted() {
+        let (mut o, mut timers, _) = outbound();
+        (o.last_claim, o.last_cover) = (Time(40_000), Time(50_000));
+        timers.set(Timer::Claim, Time(60_000));
+        o.claim_changed(&mut timers);
+        assert_eq!(timers.at(Timer::Claim), Some(Time(42_000)));
+        o.coverage_changed(&mut timers);
+        assert_eq!(timers.at(Timer::Cover), Some(Time(54_000)));
+        o.coverage_wanted(&mut timers);
+        assert_eq!(timers.at(Timer::Cover), Some(Time(52_000)));
+        o.coverage_changed(&mut timers);
+        assert_eq!(
+            timers.at(Timer::Cover),
+            Some(Time(52_000)),
+            "not later again"
+        );
+    }
+
+    #[test]
+    fn what_recurs_is_up_to_a_quarter_of_an_interval_late() {
+        let (o, _, mut rng) = outbound();
+        let late_ms = extremes(|| o.jittered(Time(5_000), &mut rng).since_ms(Time(5_000)));
+        assert_eq!(late_ms, (0, 500));
+    }
+
+    #[test]
+    fn a_new_life_counts_from_one_and_says_all_again() {
+        let (mut o, mut timers, _) = outbound();
+        let beat = |o: &mut Outbound, body: &Body| o.beat(Time(7_000), 3, 2, body);
+        let heartbeat = Body::Heartbeat(Heartbeat {
+            interval: 4,
+            sharers: 2,
+            east_dm: 0,
+            north_dm: 0,
+        });
+        let beacon = Body::Beacon(crate::wire::samples::beacon(1));
+        assert_eq!(beat(&mut o, &beacon).seq, 1);
+        assert_eq!((o.last_beacon, o.last_full), (Time(7_000), Time(7_000)));
+        let second = o.beat(Time(8_000), 3, 2, &heartbeat);
+        assert_eq!((second.seq, second.incarnation, o.heartbeat()), (2, 2, 2));
+        assert_eq!((o.last_beacon, o.last_full), (Time(8_000), Time(7_000)));
+        let finished = Body::Finished(Finished { revision: 1 });
+        assert_eq!(o.record(3, 2, 0, &finished).seq, 1);
+        assert_eq!(o.record(3, 2, 0, &finished).seq, 2);
+        timers.stop(Timer::Claim);
+        o.new_life(&mut timers);
+        assert_eq!((o.seq(), o.heartbeat()), (0, 0));
+        assert_eq!(timers.at(Timer::Claim), Some(Time(I)));
+        assert_eq!(timers.at(Timer::Cover), Some(Time(2 * I)));
+    }
+}

@@ -158,3 +158,183 @@ pub fn runs_of(cells: &[u16], n: u16) -> Vec<CellRun> {
     }
     set.runs()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::mission;
+    use crate::wire::message::{Claim, Epoch, Firmness, ListedRun, Member, OffLoop, Round, Stamp};
+    use crate::wire::samples;
+    use std::sync::Arc;
+
+    fn uav(id: u16, anchor: u16, heading: Direction) -> Uav {
+        Uav {
+            anchor,
+            id,
+            heading,
+            release_ms: 0,
+            speed_mmps: 12_000,
+            turn_ms: 8_000,
+            endurance_ms: 3_000_000,
+            off_loop: None,
+        }
+    }
+
+    /// Peer 2 claims cells 4 to 19, this way; so does 3 what is left, but it is dead.
+    fn claimed(backward: bool) -> (Sections, LivePeers) {
+        let mut sections = Sections::new(1, 24, CellSet::new(24));
+        for (id, run) in [
+            (
+                2,
+                CellRun {
+                    first: 4,
+                    count: 16,
+                },
+            ),
+            (
+                3,
+                CellRun {
+                    first: 20,
+                    count: 8,
+                },
+            ),
+        ] {
+            let epoch = Epoch::default();
+            let plan = vec![ListedRun {
+                run,
+                backward,
+                firmness: Firmness::Tentative,
+                stamp: Stamp { epoch, take: 0, id },
+            }];
+            let claim = Claim {
+                plan,
+                ..Claim::default()
+            };
+            assert!(sections.hear(id, 1, 1, claim));
+        }
+        (sections, LivePeers::from([(1, 1), (2, 1), (4, 1)]))
+    }
+
+    /// As §4.4 wants it: owners are at the next cell of their plans, as fast as the idle one
+    /// and at work at once; W0 passes before anything changes, and a tenth is to be gained.
+    #[test]
+    fn a_gain_is_foreseen_where_a_division_and_the_wait_end_a_tenth_sooner() {
+        let geometry = Arc::new(mission(1, 6, 4)).geometry().unwrap();
+        let place = |id: u16| geometry.coverage_loop.boundary(usize::from(id));
+        let mut idle = uav(1, 12, Direction::Forward);
+        idle.release_ms = 3_000;
+        idle.off_loop = Some(OffLoop {
+            east_mm: (place(12).east_m * 1000.0) as i32 + 40_000,
+            north_mm: (place(12).north_m * 1000.0) as i32,
+            course_e4: 0,
+            ready_ms: 2_000,
+        });
+        for (backward, owner) in [
+            (false, uav(2, 4, Direction::Forward)),
+            (true, uav(2, 20, Direction::Backward)),
+        ] {
+            let (sections, live) = claimed(backward);
+            let ring = geometry.coverage_loop.ring(|c, _| (4..20).contains(&c));
+            let division = geometry.divide(&ring, &[idle, owner]);
+            let ends_ms = u64::from(division.makespan_ms) + 5_000;
+            let least_ms = (ends_ms * 100).div_ceil(90);
+            let sees =
+                |present_ms| gain_in_sight(&geometry, (&sections, &live), idle, present_ms, 5_000);
+            assert!(
+                sees(least_ms) && !sees(least_ms - 1),
+                "{backward} {least_ms}"
+            );
+        }
+        // Nobody alive has anything to share.
+        let (sections, _) = claimed(false);
+        let live = LivePeers::from([(1, 1), (4, 1)]);
+        assert!(!gain_in_sight(
+            &geometry,
+            (&sections, &live),
+            idle,
+            u64::MAX / 1000,
+            0
+        ));
+    }
+
+    fn bid(eta_ms: u32, adopted_ago_ms: u32, cells_since: u16) -> Bid {
+        let round = Round {
+            counter: 1,
+            members: [1, 2].map(|id| Member { id, incarnation: 1 }).to_vec(),
+            revision: 1,
+            loop_hash: 7,
+            loss: false,
+            wait_ms: 5_000,
+        };
+        Bid {
+            eta_ms,
+            adopted_ago_ms,
+            cells_since,
+            speed_mmps: 12_000,
+            ..samples::bid(round)
+        }
+    }
+
+    fn round_of(bids: [Bid; 2]) -> OpenRound {
+        OpenRound {
+            round: bids[0].round.clone(),
+            bids: (1..).zip(bids).collect(),
+        }
+    }
+
+    /// §4.3: at most 90 % of the present makespan, 20 T after every member's last adoption,
+    /// and with some cell covered since.
+    #[test]
+    fn a_division_without_a_loss_is_adopted_for_a_tenth_after_calm_and_with_progress() {
+        let worth = |makespan_ms: u32, bids: [Bid; 2]| {
+            let division = Division {
+                sections: Vec::new(),
+                unassigned: Vec::new(),
+                makespan_ms,
+            };
+            worthwhile(&round_of(bids), &division, 1_000)
+        };
+        let calm = || [bid(100_000, 20_000, 0), bid(60_000, u32::MAX, 1)];
+        assert!(worth(90_000, calm()) && !worth(90_001, calm()));
+        let [a, b] = calm();
+        assert!(
+            !worth(1, [bid(100_000, 19_999, 0), b]),
+            "one adopted lately"
+        );
+        assert!(
+            !worth(1, [a, bid(60_000, u32::MAX, 0)]),
+            "nothing was covered"
+        );
+        // After a loss it always is.
+        let mut loss = calm();
+        loss.iter_mut().for_each(|b| b.round.loss = true);
+        assert!(worth(u32::MAX, loss));
+    }
+
+    #[test]
+    fn what_is_divided_is_open_in_all_bids_and_committed_in_none() {
+        let geometry = Arc::new(mission(1, 6, 4)).geometry().unwrap();
+        let mut bids = [bid(0, 0, 0), bid(0, 0, 0)];
+        bids[0].covered = CellSet::of(24, [0, 1]).encode_rle(None);
+        bids[0].commits = vec![CellRun {
+            first: 23,
+            count: 1,
+        }];
+        bids[1].covered = CellSet::of(24, [1, 9]).encode_rle(None);
+        bids[1].commits = vec![CellRun {
+            first: 10,
+            count: 2,
+        }];
+        (bids[1].anchor, bids[1].backward, bids[1].release_ms) = (12, true, 4_000);
+        let base = CellSet::of(24, [15]);
+        let (ring, uavs) = problem(&round_of(bids), &geometry.coverage_loop, &base);
+        let open: Vec<usize> = (0..24).filter(|i| !ring[*i].open).collect();
+        assert_eq!(open, [0, 1, 9, 10, 11, 15, 23]);
+        assert_eq!(uavs[0], uav(1, 0, Direction::Forward));
+        let second = Uav {
+            release_ms: 4_000,
+            ..uav(2, 12, Direction::Backward)
+        };
+        assert_eq!(uavs[1], second);
+    }
+}

@@ -285,12 +285,6 @@ impl Negotiation {
         self.cells_since
     }
 
-    /// Who this peer is.
-    #[must_use]
-    pub fn me(&self) -> u16 {
-        self.me
-    }
-
     /// A bid was heard.
     pub fn hear_bid(&mut self, now: Time, author: Member, bid: &Bid) {
         if self.rounds.hear(author, bid) == HeardBid::BidWanted {
@@ -788,17 +782,11 @@ impl Negotiation {
             let d = (i32::from(c) - here).rem_euclid(n);
             d.min(n - d)
         };
-        let (first, count) = orphans
-            .runs()
-            .into_iter()
-            .map(|r| (r.first, r.count))
-            .min_by_key(|(first, count)| {
-                let last = u16::try_from((i32::from(*first) + i32::from(*count) - 1).rem_euclid(n))
-                    .unwrap_or(0);
-                (away(*first).min(away(last)), *first)
-            })?;
-        let last =
-            u16::try_from((i32::from(first) + i32::from(count) - 1).rem_euclid(n)).unwrap_or(0);
+        // No run crosses the seam.
+        let ends = orphans.runs().into_iter();
+        let ends = ends.map(|r| (r.first, r.first + (r.count - 1)));
+        let (first, last) =
+            ends.min_by_key(|(first, last)| (away(*first).min(away(*last)), *first))?;
         if away(last) < away(first) {
             let cells = (first..=last).rev();
             Some(cells.map(|c| (c, Direction::Backward)).collect())
@@ -827,6 +815,7 @@ mod tests {
     use super::*;
     use crate::testing::mission;
     use crate::wire::message::{CellRun, Claim, Firmness, ListedRun, Round, Stamp};
+    use crate::wire::samples;
     use std::sync::Arc;
 
     const T: u64 = 1000;
@@ -870,6 +859,12 @@ mod tests {
         }
 
         fn tick(&mut self) -> Vec<Action> {
+            let coverage_loop = Arc::clone(&self.coverage_loop);
+            self.ask(|negotiation, ctx| negotiation.tick(ctx, &coverage_loop))
+        }
+
+        /// Asks the negotiation something, now.
+        fn ask<R>(&mut self, what: impl FnOnce(&mut Negotiation, &Context<'_>) -> R) -> R {
             let mut members: Vec<Member> = self.live.keys().map(|id| member(*id)).collect();
             members.extend(self.able_since.map(|_| member(1)));
             members.sort_unstable();
@@ -885,7 +880,41 @@ mod tests {
                 held_expired: core::mem::take(&mut self.held_expired),
                 gain_in_sight: self.gain_in_sight,
             };
-            self.negotiation.tick(&ctx, &self.coverage_loop)
+            what(&mut self.negotiation, &ctx)
+        }
+
+        /// After how long, in steps of a quarter period with a tick each, something holds.
+        fn until(
+            &mut self,
+            most_ms: u64,
+            holds: impl Fn(&mut Negotiation, &Context<'_>) -> bool,
+        ) -> Option<u64> {
+            let from = self.now;
+            while self.now.since_ms(from) <= most_ms {
+                self.tick();
+                if self.ask(&holds) {
+                    return Some(self.now.since_ms(from));
+                }
+                self.now = self.now.plus_ms(T / 4);
+            }
+            None
+        }
+
+        /// After how long cells are to be taken, and which.
+        fn take(&mut self, most_ms: u64) -> Option<(u64, Vec<(u16, Direction)>)> {
+            let from = self.now;
+            while self.now.since_ms(from) <= most_ms {
+                let taken = self.tick().into_iter().find_map(|a| match a {
+                    Action::Take(cells) => Some(cells),
+                    _ => None,
+                });
+                if let Some(taken) = taken {
+                    let cells = taken.iter().map(|p| (p.cell, p.direction));
+                    return Some((self.now.since_ms(from), cells.collect()));
+                }
+                self.now = self.now.plus_ms(T / 4);
+            }
+            None
         }
 
         /// Ticks every quarter period; returns after how long an action came, and it.
@@ -900,11 +929,10 @@ mod tests {
             None
         }
 
-        fn bid_of(&self, id: u16, anchor: u16) -> Bid {
-            let round = self.negotiation.rounds.open().unwrap().round.clone();
+        fn bid_from(&self, anchor: u16) -> Bid {
             Bid {
                 anchor,
-                ..bid(round, id)
+                ..samples::bid(self.round().clone())
             }
         }
 
@@ -955,25 +983,6 @@ mod tests {
                 wait_ms: 5000,
             };
             assert!(self.negotiation.adopt(self.now, &adoption));
-        }
-    }
-
-    fn bid(round: Round, _id: u16) -> Bid {
-        Bid {
-            round,
-            anchor: 0,
-            backward: false,
-            release_ms: 0,
-            speed_mmps: 13_000,
-            turn_ms: 8000,
-            endurance_ms: 3_000_000,
-            covered: Vec::new(),
-            commits: Vec::new(),
-            off_loop: Vec::new(),
-            eta_ms: 0,
-            adopted_ago_ms: u32::MAX,
-            cells_since: 0,
-            idle: true,
         }
     }
 
@@ -1039,7 +1048,7 @@ mod tests {
     fn a_round_without_all_bids_waits_longer_each_time_and_leaves_out_the_silent() {
         let mut desk = Desk::new(&[2]);
         desk.wait(5 * T).unwrap();
-        let own = desk.bid_of(1, 0);
+        let own = desk.bid_from(0);
         assert!(desk.negotiation.bid_is_durable(own));
         let mut waits = Vec::new();
         for _ in 0..2 {
@@ -1061,7 +1070,7 @@ mod tests {
     fn a_complete_round_is_divided_once_and_given_up_without_an_answer() {
         let mut desk = Desk::new(&[2]);
         desk.wait(5 * T).unwrap();
-        let (own, other) = (desk.bid_of(1, 0), desk.bid_of(2, 12));
+        let (own, other) = (desk.bid_from(0), desk.bid_from(12));
         assert!(desk.negotiation.bid_is_durable(own));
         desk.negotiation.hear_bid(desk.now, member(2), &other);
         let divides = desk.tick();
@@ -1084,7 +1093,7 @@ mod tests {
     fn a_division_gives_each_member_its_part_and_all_compute_the_same() {
         let mut desk = Desk::new(&[2]);
         desk.wait(5 * T).unwrap();
-        let (own, other) = (desk.bid_of(1, 0), desk.bid_of(2, 12));
+        let (own, other) = (desk.bid_from(0), desk.bid_from(12));
         desk.negotiation.bid_is_durable(own);
         desk.negotiation.hear_bid(desk.now, member(2), &other);
         let divides = desk.tick();
@@ -1214,5 +1223,339 @@ mod tests {
         });
         assert!(desk.negotiation.sections.plan().is_empty());
         assert_eq!(desk.negotiation.sections.covered().count(), 2);
+    }
+
+    #[test]
+    fn a_round_may_wait_for_four_times_what_the_largest_diameter_needs_and_no_longer() {
+        let mut desk = Desk::new(&[2]);
+        let mut refuse = |wait_ms| {
+            let round = Round {
+                counter: 1,
+                members: vec![member(1), member(2)],
+                revision: 1,
+                loop_hash: 7,
+                loss: true,
+                wait_ms,
+            };
+            desk.negotiation.rounds.refuse(&round)
+        };
+        // (2 · 16 + 3) T, doubled twice.
+        assert_eq!(refuse(140_000), None);
+        assert!(refuse(140_001).is_some());
+    }
+
+    #[test]
+    fn in_each_period_what_is_heard_raises_the_counter_anew() {
+        let mut desk = Desk::new(&[2]);
+        for after_periods in 0..3 {
+            desk.negotiation.rounds.hear_counter(u32::MAX);
+            assert_eq!(
+                desk.negotiation.rounds.counter(),
+                1000 * (after_periods + 1)
+            );
+            desk.now = desk.now.plus_ms(T - 1);
+            desk.ask(|n, ctx| n.watch_period(ctx));
+            assert!(!desk.negotiation.rounds.hear_counter(u32::MAX));
+            desk.now = desk.now.plus_ms(1);
+            desk.ask(|n, ctx| n.watch_period(ctx));
+        }
+    }
+
+    #[test]
+    fn before_its_first_division_a_peer_waits_until_the_members_stay_the_same() {
+        let opened = |n: &mut Negotiation, _: &Context<'_>| n.rounds.open().is_some();
+        let mut desk = Desk::new(&[2]);
+        for others in [[3], [4], [5]] {
+            assert_eq!(desk.until(3 * T / 2, opened), None);
+            desk.live = others.iter().map(|id| (*id, 1)).collect();
+        }
+        assert_eq!(desk.until(20 * T, opened), Some(2 * T));
+        // One that knows only itself waits for ten.
+        let mut alone = Desk::new(&[]);
+        assert_eq!(alone.until(20 * T, opened), Some(10 * T));
+        // As does one whose company never stays the same.
+        let mut desk = Desk::new(&[2]);
+        let from = desk.now;
+        while desk.until(T, opened).is_none() {
+            let other = if desk.live.contains_key(&2) { 3 } else { 2 };
+            desk.live = LivePeers::from([(other, 1)]);
+        }
+        assert_eq!(desk.now.since_ms(from), 10 * T);
+    }
+
+    #[test]
+    fn after_a_division_a_loss_waits_until_the_new_claims_have_come() {
+        for (waited, answered) in [(4 * T, false), (5 * T, true)] {
+            let mut desk = Desk::new(&[2, 3]);
+            desk.adopt(4);
+            desk.claim(2, 1, 4, 20, 600_000);
+            desk.now = desk.now.plus_ms(waited - T / 4);
+            assert!(desk.tick().is_empty());
+            desk.now = desk.now.plus_ms(T / 4);
+            desk.live.remove(&2);
+            desk.negotiation.note_loss();
+            assert_eq!(desk.tick() == [Action::Bid], answered, "{waited} ms");
+        }
+    }
+
+    #[test]
+    fn whether_a_round_would_gain_is_computed_once_in_ten_periods() {
+        let mut desk = Desk::new(&[2]);
+        desk.gain_in_sight = false;
+        desk.claim(2, 1, 0, 24, 600_000);
+        let wants = |n: &mut Negotiation, ctx: &Context<'_>| n.wants_foresight(ctx);
+        assert_eq!(
+            desk.until(9 * T, wants),
+            Some(2 * T),
+            "idle for two periods"
+        );
+        for _ in 0..3 {
+            desk.now = desk.now.plus_ms(T / 4);
+            assert_eq!(desk.until(20 * T, wants), Some(10 * T - T / 4));
+        }
+        // Not while a round is open, nor among many, nor with nothing left to share.
+        desk.now = desk.now.plus_ms(20 * T);
+        desk.ask(|n, ctx| n.start(ctx, false, 0));
+        assert!(!desk.ask(wants));
+        desk.negotiation.rounds.give_up();
+        assert!(desk.ask(wants));
+        desk.now = desk.now.plus_ms(20 * T);
+        desk.live.extend((3..=9).map(|id| (id, 1)));
+        assert!(!desk.ask(wants), "nine are many");
+        desk.live = LivePeers::from([(2, 1)]);
+        desk.leave_open(0..0);
+        assert!(!desk.ask(wants));
+    }
+
+    #[test]
+    fn a_round_without_a_loss_comes_twenty_periods_after_the_last_division() {
+        for (others, rank) in [([2], 0), ([0], 1)] {
+            let mut desk = Desk::new(&[]);
+            desk.live = others.iter().map(|id| (*id, 1)).collect();
+            desk.adopt(0);
+            desk.claim(others[0], 1, 0, 24, 600_000);
+            let (after_ms, action) = desk.wait(60 * T).unwrap();
+            assert_eq!(action, Action::Bid);
+            // An eighth of a period a rank, looked at four times a period.
+            assert_eq!(after_ms, 20 * T + rank * T / 4, "rank {rank}");
+        }
+    }
+
+    #[test]
+    fn orphans_are_left_to_those_who_are_nearer_for_an_eighth_of_the_way() {
+        let mut desk = Desk::new(&[2]);
+        let mut turn =
+            |orphaned_ms, way_ms| desk.ask(|n, ctx| n.is_my_turn(ctx, orphaned_ms, way_ms));
+        assert!(turn(2 * T, 0) && !turn(2 * T - 1, 0));
+        assert!(turn(3 * T, 8 * T) && !turn(3 * T - 1, 8 * T));
+        // W0 at most, which is 5 T here.
+        assert!(turn(7 * T, 600 * T) && !turn(7 * T - 1, 600 * T));
+    }
+
+    #[test]
+    fn among_many_who_flies_for_two_more_periods_relieves_nobody() {
+        let mut desk = Desk::new(&[2]);
+        let mut may = |free_ms| desk.ask(|n, ctx| n.may_relieve(ctx, free_ms));
+        assert!(may(0) && may(2 * T) && !may(2 * T + 1));
+    }
+
+    #[test]
+    fn what_an_owner_has_left_is_less_what_others_took_and_the_time_in_proportion() {
+        let mut desk = Desk::new(&[2, 3, 4]);
+        desk.claim(2, 1, 0, 20, 100_000);
+        // Peer 3 took a quarter of it, at a higher stamp; peer 4 lists nothing.
+        desk.claim(3, 1, 15, 5, 40_000);
+        desk.claim(4, 1, 0, 0, 40_000);
+        desk.tick();
+        desk.now = desk.now.plus_ms(20_000);
+        let owners = desk.ask(|n, ctx| n.owners(ctx));
+        let seen: Vec<_> = owners
+            .iter()
+            .map(|o| (o.id, o.plan.len(), o.left_ms))
+            .collect();
+        assert_eq!(seen, [(2, 15, 60_000), (3, 5, 20_000)]);
+        assert_eq!(desk.ask(|n, ctx| n.present_end_ms(ctx)), 80_000);
+        // Of the dead nothing is known.
+        desk.live.remove(&2);
+        let owners = desk.ask(|n, ctx| n.owners(ctx));
+        assert_eq!(owners.iter().map(|o| o.id).collect::<Vec<_>>(), [3]);
+        assert_eq!(desk.ask(|n, ctx| n.present_end_ms(ctx)), 20_000);
+    }
+
+    #[test]
+    fn an_owner_that_covers_nothing_has_stalled_after_thrice_its_time() {
+        // Of rank 1: the two cells' 12 s, (10 + 2D) T, and half a period for the rank.
+        let stalled_ms = 3 * (12_000 + 12 * T + T / 2);
+        let mut desk = Desk::new(&[]);
+        desk.live = LivePeers::from([(0, 1)]);
+        desk.gain_in_sight = false;
+        // It expects to be done long after that.
+        desk.claim(0, 1, 0, 24, 3_000_000);
+        desk.now = desk.now.plus_ms(20_000);
+        desk.tick();
+        // A cell is covered now: its time begins anew.
+        desk.leave_open(1..24);
+        desk.tick();
+        let (after_ms, cells) = desk.take(200 * T).unwrap();
+        assert!(
+            (stalled_ms..stalled_ms + T).contains(&after_ms),
+            "{after_ms}"
+        );
+        let far_half: Vec<_> = (12..24).rev().map(|c| (c, Direction::Backward)).collect();
+        assert_eq!(cells, far_half);
+    }
+
+    #[test]
+    fn the_nearest_orphans_are_those_along_the_loop_whichever_way() {
+        let nearest = |planned: &[u16], open: &[u16]| -> Vec<(u16, Direction)> {
+            let mut desk = Desk::new(&[2]);
+            let section: Vec<_> = planned.iter().map(|c| (*c, Direction::Forward)).collect();
+            let epoch = Epoch {
+                counter: 1,
+                hash: 1,
+            };
+            desk.negotiation.sections.adopt(epoch, &[], &section);
+            let orphans = CellSet::of(24, open.iter().copied());
+            let coverage_loop = Arc::clone(&desk.coverage_loop);
+            desk.ask(|n, _| n.nearest_run(&orphans, &coverage_loop))
+                .unwrap()
+        };
+        let forward =
+            |cells: &[u16]| -> Vec<_> { cells.iter().map(|c| (*c, Direction::Forward)).collect() };
+        let backward =
+            |cells: &[u16]| -> Vec<_> { cells.iter().map(|c| (*c, Direction::Backward)).collect() };
+        // Its plan ends at cell 8; of a run the nearer end comes first.
+        assert_eq!(nearest(&[7, 8], &[3, 4, 5, 20, 21]), backward(&[5, 4, 3]));
+        assert_eq!(nearest(&[7, 8], &[1, 2, 11, 12]), forward(&[11, 12]));
+        // Across the seam.
+        assert_eq!(nearest(&[1], &[6, 7, 20, 21, 22]), backward(&[22, 21, 20]));
+        assert_eq!(nearest(&[22], &[0, 1, 2, 15, 16]), forward(&[0, 1, 2]));
+        // A long run whose far end is beside it.
+        assert_eq!(
+            nearest(&[12], &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 15, 16])[0],
+            (10, Direction::Backward)
+        );
+        // As far both ways: the lower number, flown forward.
+        assert_eq!(nearest(&[8], &[4, 12]), forward(&[4]));
+    }
+
+    #[test]
+    fn who_has_no_plan_looks_for_orphans_from_a_place_of_its_own() {
+        // 7919 times its number, on 24 cells: 23 for peer 1, 15 for peer 9.
+        for (me, taken) in [(1, 23), (9, 15)] {
+            let desk = Desk::new(&[]);
+            let alone = Negotiation::new(member(me), CellSet::new(24), 0);
+            let orphans = CellSet::of(24, [7, 15, 23]);
+            let run = alone.nearest_run(&orphans, &desk.coverage_loop);
+            assert_eq!(run, Some(vec![(taken, Direction::Forward)]));
+        }
+    }
+
+    #[test]
+    fn cells_beyond_everybody_are_looked_at_by_the_idle_once_in_ten_periods() {
+        for (others, rank) in [([2], 0), ([0], 1)] {
+            let mut desk = Desk::new(&[]);
+            desk.live = others.iter().map(|id| (*id, 1)).collect();
+            desk.gain_in_sight = false;
+            desk.negotiation.sections.set_unassigned(&[5, 6, 7]);
+            desk.claim(others[0], 1, 8, 20, 3_000_000);
+            desk.negotiation.sections.cover(&CellSet::of(24, 0..5));
+            let cells = |n: &mut Negotiation, ctx: &Context<'_>| n.left_over(ctx).is_some();
+            assert_eq!(desk.until(30 * T, cells), Some(10 * T + rank * T / 2));
+            for _ in 0..2 {
+                desk.now = desk.now.plus_ms(T / 4);
+                assert_eq!(desk.until(30 * T, cells), Some(10 * T - T / 4));
+            }
+            // Not while a take is under way, with orphans, in a round, or when not able.
+            desk.now = desk.now.plus_ms(20 * T);
+            assert!(
+                desk.negotiation
+                    .begin_take(&[(5, Direction::Forward)])
+                    .is_some()
+            );
+            assert!(!desk.ask(cells));
+            desk.negotiation.cancel_take();
+            desk.ask(|n, ctx| n.start(ctx, false, 0));
+            assert!(!desk.ask(cells));
+            desk.negotiation.rounds.give_up();
+            desk.negotiation.orphan_since = Some(desk.now);
+            assert!(!desk.ask(cells));
+            desk.negotiation.orphan_since = None;
+            let able_since = desk.able_since.take();
+            assert!(!desk.ask(cells));
+            desk.able_since = able_since;
+            assert!(desk.ask(cells));
+        }
+    }
+
+    #[test]
+    fn orphans_are_taken_one_rank_after_the_other() {
+        let mut after = Vec::new();
+        for others in [[2, 3], [0, 3]] {
+            let mut desk = Desk::new(&[]);
+            desk.live = others.iter().map(|id| (*id, 1)).collect();
+            desk.adopt(4);
+            desk.claim(others[0], 1, 10, 10, 600_000);
+            after.push(desk.take(60 * T).unwrap().0);
+        }
+        assert_eq!(after, [7 * T, 7 * T + T / 2]);
+    }
+
+    #[test]
+    fn a_first_section_is_looked_for_once_and_only_where_nothing_was_divided() {
+        let begins = |n: &mut Negotiation, ctx: &Context<'_>| n.begins(ctx);
+        let mut desk = Desk::new(&[2]);
+        desk.able_since = Some(desk.now);
+        assert_eq!(desk.until(10 * T, begins), Some(3 * T / 2));
+        assert!(!desk.ask(begins), "once");
+        let mut alone = Desk::new(&[]);
+        assert!(!alone.ask(begins), "who is alone opens a round with itself");
+        let mut heard = Desk::new(&[2]);
+        heard.negotiation.rounds.hear_counter(1);
+        assert!(!heard.ask(begins), "others have had a round");
+        let mut divided = Desk::new(&[2]);
+        divided.adopt(0);
+        assert!(!divided.ask(begins), "this peer has had one");
+        let mut took = Desk::new(&[2]);
+        took.negotiation.sections.take(&[(3, Direction::Forward)]);
+        assert!(!took.ask(begins), "it has something to fly");
+    }
+
+    #[test]
+    fn of_first_sections_the_one_that_is_nearer_outranks_the_other() {
+        let takes = |way_ms| {
+            let mut desk = Desk::new(&[2]);
+            let taken = desk
+                .negotiation
+                .begin_first(&[(3, Direction::Forward)], way_ms);
+            taken.unwrap()[0].stamp.take
+        };
+        assert_eq!([0, 3_999, 4_000, 40_000].map(takes), [61, 61, 60, 51]);
+        assert_eq!([240_000, 3_000_000].map(takes), [1, 1]);
+    }
+
+    #[test]
+    fn among_many_a_peer_looks_twice_a_period_for_what_it_could_take() {
+        let looks = |n: &mut Negotiation, ctx: &Context<'_>| n.looks_around(ctx);
+        let mut desk = Desk::new(&[2, 3, 4, 5, 6, 7, 8]);
+        assert!(!desk.ask(looks), "eight are few");
+        desk.live.insert(9, 1);
+        assert!(desk.ask(looks));
+        desk.now = desk.now.plus_ms(T / 2 - 1);
+        assert!(!desk.ask(looks));
+        desk.now = desk.now.plus_ms(1);
+        assert!(desk.ask(looks));
+        desk.now = desk.now.plus_ms(T);
+        assert!(
+            desk.negotiation
+                .begin_take(&[(5, Direction::Forward)])
+                .is_some()
+        );
+        assert!(!desk.ask(looks), "while a take is being written");
+        desk.negotiation.cancel_take();
+        assert!(desk.ask(looks));
+        desk.now = desk.now.plus_ms(T);
+        desk.leave_open(0..0);
+        assert!(!desk.ask(looks), "with nothing left");
     }
 }

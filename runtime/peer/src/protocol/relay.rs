@@ -774,4 +774,22 @@ mod tests {
             ]
         );
     }
+
+    #[test]
+    fn who_knows_an_earlier_life_lacks_all_of_the_later_one_and_who_knows_a_later_one_nothing() {
+        for (told_life, sent) in [(1, 1), (2, 0), (3, 0)] {
+            let mut r = relay(2);
+            let of_life_2 = Record {
+                incarnation: 2,
+                ..record(1, 7)
+            };
+            r.offer(Time(5_000), &of_life_2, &[1; 40], 0);
+            assert!(r.poll(Time(5_500)).is_some());
+            let (seq, digest) = r.version(1, 2);
+            // In an earlier life the same numbers mean other records.
+            r.catch_up(Time(9_000), 1, told_life, seq, digest);
+            let again = (9_000..10_000).filter(|t| r.poll(Time(*t)).is_some());
+            assert_eq!(again.count(), sent, "life {told_life}");
+        }
+    }
 }

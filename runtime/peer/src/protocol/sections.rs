@@ -745,4 +745,25 @@ mod tests {
             .collect();
         assert_eq!(listed, s.plan().iter().map(|p| p.cell).collect::<Vec<_>>());
     }
+
+    #[test]
+    fn what_another_has_left_are_the_open_cells_of_its_newest_plan() {
+        let mut sections = Sections::new(1, 10, CellSet::of(10, [4]));
+        assert_eq!((sections.n_left(2), sections.plan_of(2)), (0, Vec::new()));
+        let listed = |first, count| ListedRun {
+            run: CellRun { first, count },
+            backward: true,
+            firmness: Firmness::Tentative,
+            stamp: stamp(1, 0, 2),
+        };
+        let claim = Claim {
+            plan: vec![listed(8, 4), listed(3, 3)],
+            held: vec![listed(6, 1)],
+            ..Claim::default()
+        };
+        assert!(sections.hear(2, 1, 1, claim));
+        let cells: Vec<u16> = sections.plan_of(2).iter().map(|p| p.cell).collect();
+        assert_eq!(cells, [1, 0, 9, 8, 5, 3]);
+        assert_eq!(sections.n_left(2), 6);
+    }
 }

@@ -4,8 +4,9 @@ use super::{beacon, covered, record};
 use crate::testing::{Harness, mission};
 use crate::wire::codec::Body;
 use crate::wire::kinds::{Kind, RECORD_MAX_BYTES};
-use crate::wire::message::CellRun;
-use crate::wire::message::{Claim, Epoch, Finished, Firmness, Gossip, ListedRun, Stamp};
+use crate::wire::message::{CellRun, Claim, Epoch, Finished, Firmness, Gossip};
+use crate::wire::message::{ListedRun, Member, Round, Stamp};
+use crate::wire::samples;
 use crate::{Input, PeerId, Report};
 use std::collections::BTreeMap;
 
@@ -222,4 +223,68 @@ fn counters_and_lives_that_were_made_up_block_nobody() {
         assert!((1..5000).contains(&b.epoch.counter), "{:?}", b.epoch);
         assert_eq!(b.peers[&PeerId(3 - id)].0, 1);
     }
+}
+
+#[test]
+fn bids_and_claims_far_ahead_of_all_that_was_heard_of_are_refused() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(20);
+    let loop_hash = h.beliefs(1).loop_hash;
+    let far = 1_000_000;
+    let ahead = Epoch {
+        counter: far,
+        hash: 0,
+    };
+    let own = Claim {
+        loop_hash,
+        epoch: ahead,
+        ..Claim::default()
+    };
+    let listed = |stamp_epoch| Claim {
+        loop_hash,
+        plan: vec![ListedRun {
+            run: CellRun { first: 0, count: 4 },
+            backward: false,
+            firmness: Firmness::Tentative,
+            stamp: Stamp {
+                epoch: stamp_epoch,
+                take: 0,
+                id: 2,
+            },
+        }],
+        ..Claim::default()
+    };
+    let held = Claim {
+        held: listed(ahead).plan,
+        plan: Vec::new(),
+        ..listed(ahead)
+    };
+    let mut round = Round {
+        counter: far,
+        members: [1, 2].map(|id| Member { id, incarnation: 1 }).to_vec(),
+        revision: 1,
+        loop_hash,
+        loss: true,
+        wait_ms: 5_000,
+    };
+    let bid = |round: &Round| Body::Bid(samples::bid(round.clone()));
+    let ahead_bid = bid(&round);
+    (round.counter, round.wait_ms) = (1, 140_001);
+    let patient_bid = bid(&round);
+    let bodies = [own, listed(ahead), held].map(Body::Claim).into_iter();
+    for (seq, body) in (5_000..).zip(bodies.chain([ahead_bid, patient_bid])) {
+        let already = refused(&mut h, 1);
+        h.inject(1, record(2, 1, seq, 0, &body));
+        assert_eq!(refused(&mut h, 1) - already, 1, "{body:?}");
+    }
+    // One that is not far ahead is heard.
+    let already = refused(&mut h, 1);
+    let near = Epoch {
+        counter: 2,
+        hash: 0,
+    };
+    h.run_s(2);
+    h.inject(1, record(2, 1, 6_000, 0, &Body::Claim(listed(near))));
+    assert_eq!(refused(&mut h, 1), already);
+    assert!(h.run_until(200, |h| h.beliefs(1).finished));
 }

@@ -197,3 +197,17 @@ fn an_operator_s_mission_outranks_the_laps_that_a_peer_began_out_of_reach() {
     let alarm = "a mission is no newer than the one that is held; it was ignored";
     assert!(h.alarms(GROUND_STATION).contains(&alarm.to_owned()));
 }
+
+#[test]
+fn a_lap_begins_three_periods_after_the_last_cell_of_the_one_before() {
+    let mut patrol = mission(1, 4, 4);
+    patrol.further_laps = 1;
+    let mut h = Harness::started(1, patrol);
+    assert!(h.run_until(200, |h| covered(h, 1) == 16));
+    let complete_ms = h.now_ms();
+    assert!(h.run_until(10, |h| h.beliefs(1).revision == 2));
+    // Both are looked at every quarter period, by the peer and here.
+    let after_ms = h.now_ms() - complete_ms;
+    assert!((2_750..=3_750).contains(&after_ms), "{after_ms}");
+    assert_eq!(covered(&h, 1), 0);
+}

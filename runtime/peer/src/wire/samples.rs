@@ -42,6 +42,26 @@ pub fn beacon(heartbeat: u32) -> Beacon {
     }
 }
 
+/// A bid of a UAV with nothing to fly, at the begin of the loop.
+pub fn bid(round: Round) -> Bid {
+    Bid {
+        round,
+        anchor: 0,
+        backward: false,
+        release_ms: 0,
+        speed_mmps: 13_000,
+        turn_ms: 8000,
+        endurance_ms: 3_000_000,
+        covered: Vec::new(),
+        commits: Vec::new(),
+        off_loop: Vec::new(),
+        eta_ms: 0,
+        adopted_ago_ms: u32::MAX,
+        cells_since: 0,
+        idle: true,
+    }
+}
+
 /// A run of twelve cells, listed typically.
 pub fn listing(first: u16) -> ListedRun {
     ListedRun {

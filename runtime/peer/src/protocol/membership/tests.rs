@@ -362,7 +362,7 @@ fn those_whom_a_neighbour_is_farther_from_are_told_of_first() {
         assert_eq!(ids[2..], others);
     }
     // After ten intervals nobody is known to depend on it any more.
-    let later = m.gossip(Time(12_000), 4);
+    let later = m.gossip(Time(11_000), 4);
     let ids: Vec<u16> = later.iter().map(|g| g.id).collect();
     assert_eq!(ids, [12, 13, 14, 15]);
 }
@@ -443,4 +443,113 @@ fn a_loop_that_ran_late_doubts_its_verdicts_for_a_period() {
         }
         assert_eq!(suspected, Some(suspects_at_ms), "late {late}");
     }
+}
+
+#[test]
+fn the_diameter_is_the_largest_eccentricity_heard_of_in_ten_intervals() {
+    let mut m = Membership::new(1, 1000);
+    assert_eq!((m.diameter(Time(0)), m.eccentricity(Time(0))), (1, 0));
+    let far = |eccentricity| Beacon {
+        eccentricity,
+        ..beacon(1, Vec::new())
+    };
+    m.on_beacon(Time(0), 2, 1, &far(3));
+    assert_eq!(
+        (m.diameter(Time(9_999)), m.eccentricity(Time(9_999))),
+        (3, 1)
+    );
+    assert_eq!(
+        (m.diameter(Time(10_000)), m.eccentricity(Time(10_000))),
+        (1, 0)
+    );
+    // Its own counts, too: by way of peer 3 it hears of 4 over six hops.
+    let told = Gossip {
+        hops: 5,
+        ..entry(4, 7, 10, None)
+    };
+    m.on_beacon(Time(20_000), 3, 1, &beacon(1, vec![told]));
+    assert_eq!(
+        (m.diameter(Time(20_000)), m.eccentricity(Time(20_000))),
+        (6, 6)
+    );
+    // Both patiences grow with it: k1 = 4 + 6/4, k2 = 4 + 6/2 of the longest interval.
+    let patience = m.patience(Time(20_000));
+    assert_eq!((patience.k1_quarters, patience.k2_ms), (22, 7_000));
+    assert_eq!(patience.bound_ms, 5_500 + 7_000 + 8_000);
+}
+
+#[test]
+fn the_longest_interval_that_anybody_alive_announced_counts() {
+    let mut m = Membership::new(1, 1000);
+    assert_eq!(m.interval_ms(), 1_000);
+    let slow = Beacon {
+        interval: 16,
+        ..beacon(1, Vec::new())
+    };
+    m.on_beacon(Time(0), 2, 1, &slow);
+    assert_eq!(m.interval_ms(), 4_000);
+    m.announce(20);
+    assert_eq!(m.interval_ms(), 5_000);
+    m.announce(4);
+    // Of the dead none does.
+    for t in 0..200 {
+        m.tick(Time(t * 250));
+    }
+    assert_eq!(
+        (m.status(2), m.interval_ms()),
+        (Some((1, Status::Down)), 1_000)
+    );
+}
+
+#[test]
+fn who_hears_nobody_for_k1_suspects_itself_until_it_believes_all_others_down() {
+    let mut m = Membership::new(1, 1000);
+    assert!(!m.is_deaf(Time(60_000)), "it never heard anybody");
+    m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
+    assert!(!m.is_deaf(Time(4_249)) && m.is_deaf(Time(4_250)));
+    m.hears(Time(4_300));
+    assert!(!m.is_deaf(Time(8_549)) && m.is_deaf(Time(8_550)));
+    for t in 0..80 {
+        m.tick(Time(t * 250));
+    }
+    assert!(!m.is_deaf(Time(20_000)), "there is nobody left");
+}
+
+#[test]
+fn a_life_far_ahead_of_the_one_that_is_known_is_none() {
+    let mut m = Membership::new(1, 1000);
+    assert!(m.may_live_in(2, 10_000) && !m.may_live_in(2, 10_001));
+    m.on_beacon(Time(0), 2, 5, &beacon(1, Vec::new()));
+    assert!(m.may_live_in(2, 10_005) && !m.may_live_in(2, 10_006));
+    assert!(
+        m.on_beacon(Time(1), 2, 10_006, &beacon(1, Vec::new()))
+            .is_empty()
+    );
+    assert_eq!(m.status(2), Some((5, Status::Alive)));
+}
+
+#[test]
+fn what_made_more_hops_than_the_largest_diameter_is_not_heard() {
+    for (hops, heard) in [(HOPS_MAX - 1, true), (HOPS_MAX, false)] {
+        let mut m = Membership::new(1, 1000);
+        let told = Gossip {
+            hops,
+            ..entry(4, 7, 10, None)
+        };
+        m.on_beacon(Time(0), 3, 1, &beacon(1, vec![told]));
+        assert_eq!(m.status(4).is_some(), heard, "{hops}");
+    }
+}
+
+#[test]
+fn nobody_is_told_of_himself_and_nobody_hears_of_himself() {
+    let mut m = Membership::new(1, 1000);
+    assert!(
+        m.on_beacon(Time(0), 1, 1, &beacon(1, Vec::new()))
+            .is_empty()
+    );
+    let told = vec![entry(1, 7, 10, None), entry(3, 9, 10, None)];
+    m.on_beacon(Time(0), 3, 1, &beacon(1, told));
+    assert_eq!(m.all().collect::<Vec<_>>(), [(3, 1, Status::Alive)]);
+    assert_eq!(m.gossip(Time(10), 4)[0].heartbeat, 1, "by its own word");
 }
