@@ -441,6 +441,7 @@ impl Library {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::task::PointTask;
 
     fn mission(revision: u32, vertices: i32) -> Mission {
         Mission {
@@ -559,5 +560,141 @@ mod tests {
         let around = cells(vec![square(200_000, 400_000)]);
         assert_eq!(around.iter().filter(deep).count(), 0);
         assert!(!around.is_empty());
+    }
+
+    fn points(n: i32) -> CoverageTask {
+        let point = |i| PointTask {
+            at: (i * 1000, i),
+            radius_mm: 20_000,
+        };
+        CoverageTask::Points((0..n).map(point).collect())
+    }
+
+    #[test]
+    fn missions_that_differ_in_anything_differ_in_their_hash() {
+        let changes: [fn(&mut Mission); 26] = [
+            |_| {},
+            |m| m.revision = 2,
+            |m| m.origin_lat_e7 += 1,
+            |m| m.origin_lon_e7 += 1,
+            |m| m.area[0].0 += 1,
+            |m| m.area[3].1 += 1,
+            |m| m.zones.clear(),
+            |m| m.zones[0][2].0 += 1,
+            |m| m.lane_spacing_mm += 1,
+            |m| m.turn_radius_mm += 1,
+            |m| m.clearance_mm += 1,
+            |m| m.footprint_across_mm += 1,
+            |m| m.footprint_along_mm += 1,
+            |m| m.tracking_error_mm += 1,
+            |m| m.launch.1 += 1,
+            |m| m.base.0 += 1,
+            |m| m.task = CoverageTask::Exact,
+            |m| m.task = points(3),
+            |m| m.task = points(4),
+            |m| m.tree = Tree::East,
+            |m| m.tree = Tree::North,
+            |m| m.tree = Tree::DepthFirst,
+            |m| m.division = Rule::Backtracking,
+            |m| m.lap = 1,
+            |m| m.further_laps = 1,
+            |m| (m.lap, m.further_laps) = (1, 1),
+        ];
+        let hashes = changes.map(|change| {
+            let mut m = mission(1, 4);
+            change(&mut m);
+            m.content_hash()
+        });
+        let distinct: std::collections::BTreeSet<u64> = hashes.into();
+        assert_eq!(distinct.len(), hashes.len());
+        // They are on the wire: other numbers are another version of the format.
+        let told = [0, 16, 17, 19, 22, 23].map(|i: usize| hashes[i]);
+        let wanted = [
+            0x3118_f901_789b_4735,
+            0xe3d4_aab3_0603_c9f6,
+            0xd0f1_aeca_70e1_2c6e,
+            0x36c3_1d75_0f36_17d6,
+            0xa5df_1ca0_f025_35b4,
+            0xcb80_ac53_e15d_f434,
+        ];
+        assert_eq!(told, wanted);
+    }
+
+    #[test]
+    fn the_largest_mission_that_can_be_spoken_is_heard_and_a_larger_one_is_not_said() {
+        let pieces = |vertices: i32| chunks(&mission(2, vertices)).map(|p| p.len());
+        let (mut fits, mut too_large) = (100_i32, 40_000);
+        while too_large - fits > 1 {
+            let tried = fits.midpoint(too_large);
+            match pieces(tried) {
+                Ok(_) => fits = tried,
+                Err(_) => too_large = tried,
+            }
+        }
+        assert_eq!(pieces(fits), Ok(usize::from(CHUNKS_MAX)));
+        let why = pieces(too_large).unwrap_err();
+        assert!(why.bytes > 65_536 && why.bytes < 65_600, "{why}");
+        assert!(why.to_string().ends_with("at most 65536 fit"), "{why}");
+        let m = mission(2, fits);
+        let mut library = Library::new(None);
+        for (i, piece) in (0u16..).zip(&chunks(&m).unwrap()) {
+            assert_eq!(library.chunk(i, piece), Ok(i + 1 == CHUNKS_MAX));
+        }
+        assert_eq!(*library.newest().unwrap(), m);
+    }
+
+    #[test]
+    fn pieces_that_belong_to_no_mission_are_not_kept() {
+        let piece = chunks(&mission(7, 500)).unwrap().remove(0);
+        assert!(piece.chunks > 2);
+        let mut library = Library::new(Some(Arc::new(mission(6, 4))));
+        let of = |revision, chunks| MissionChunk {
+            revision,
+            chunks,
+            ..piece.clone()
+        };
+        for (index, piece) in [
+            (0, of(6, 3)),
+            (0, of(7, 0)),
+            (0, of(7, CHUNKS_MAX + 1)),
+            (3, of(7, 3)),
+        ] {
+            assert_eq!(library.chunk(index, &piece), Ok(false));
+            assert!(library.partial.is_empty(), "{index} {piece:?}");
+        }
+        // Of unfinished missions those of the newest revisions are kept.
+        for revision in 7..20 {
+            assert_eq!(library.chunk(0, &of(revision, 3)), Ok(false));
+        }
+        let kept: Vec<u32> = library.partial.keys().map(|k| k.0).collect();
+        assert_eq!(kept, [16, 17, 18, 19]);
+        library.offer(Arc::new(mission(17, 4)));
+        let kept: Vec<u32> = library.partial.keys().map(|k| k.0).collect();
+        assert_eq!(
+            kept,
+            [18, 19],
+            "what is older than a whole one is forgotten"
+        );
+    }
+
+    #[test]
+    fn a_mission_without_laps_says_nothing_of_them_and_one_of_points_has_a_piece_each() {
+        let bytes = |m: &Mission| -> Vec<u8> {
+            let pieces = chunks(m).unwrap();
+            pieces.into_iter().flat_map(|p| p.bytes).collect()
+        };
+        let tells = |m: &Mission| bytes(m).windows(3).any(|w| w == b"lap");
+        let once = mission(1, 4);
+        let patrol = Mission {
+            further_laps: 2,
+            ..once.clone()
+        };
+        assert!(!tells(&once) && tells(&patrol));
+        assert_eq!(once.pieces(), None);
+        let of_points = Mission {
+            task: points(5),
+            ..once
+        };
+        assert_eq!(of_points.pieces().map(|p| p.len()), Some(5));
     }
 }

@@ -4,6 +4,8 @@ use super::covered;
 use crate::Input;
 use crate::output::Report;
 use crate::testing::{Harness, mission};
+use crate::wire::codec::Body;
+use crate::wire::message::MissionStatus;
 
 const DUE: &str = "the fuel is due: returning to base";
 
@@ -23,6 +25,8 @@ fn a_uav_whose_fuel_is_due_flies_home_and_the_other_finishes() {
         (pose.east_m + 60.0).hypot(pose.north_m + 60.0) < 100.0
     }));
     assert!(h.run_until(500, |h| h.beliefs(2).finished));
+    let due = h.alarms(1).into_iter().filter(|a| a == DUE);
+    assert_eq!(due.count(), 1, "it comes due once");
 }
 
 #[test]
@@ -87,10 +91,48 @@ fn cells_beyond_everybody_are_taken_once_somebody_has_the_fuel() {
     h.run_s(20);
     let before = covered(&h, 1);
     assert!(idle(&h) && before < 48, "{before}");
+    let status = |h: &mut Harness| {
+        let said = h.seat(1).said.iter().rev();
+        let status = said.filter_map(|(_, _, b)| match b {
+            Body::State(state) => Some(state.mission),
+            _ => None,
+        });
+        status.collect::<Vec<_>>()
+    };
+    let told = status(&mut h);
+    assert_eq!(told.first(), Some(&MissionStatus::Failed));
+    assert_eq!(told.last(), Some(&MissionStatus::Active));
     h.seat(2).fuel_s = 3600.0;
     assert!(
         h.run_until(400, |h| h.beliefs(1).finished),
         "{}",
         covered(&h, 1)
     );
+    h.run_s(12);
+    assert_eq!(status(&mut h)[0], MissionStatus::Accomplished);
+}
+
+#[test]
+fn who_was_refuelled_a_little_works_again_with_half_a_minute_to_spend() {
+    let mut h = Harness::started(1, mission(1, 8, 6));
+    h.run_s(20);
+    h.seat(1).fuel_s = 100.0;
+    assert!(h.run_until(60, |h| h.alarms(1).contains(&DUE.to_owned())));
+    h.run_s(30);
+    // It loiters above its base: what may be spent is what is beyond the reserve and home.
+    let spendable_ms = |h: &mut Harness, fuel_s: f64| {
+        h.seat(1).fuel_s = fuel_s;
+        h.run_s(1);
+        h.beliefs(1).spendable_ms
+    };
+    let mut fuel_s = 60.0;
+    while spendable_ms(&mut h, fuel_s) < 20_000 {
+        fuel_s += 5.0;
+    }
+    assert!(!h.beliefs(1).able && spendable_ms(&mut h, fuel_s) < 30_000);
+    while spendable_ms(&mut h, fuel_s) < 31_000 {
+        fuel_s += 1.0;
+    }
+    h.run_s(1);
+    assert!(h.beliefs(1).able);
 }

@@ -67,6 +67,13 @@ fn a_percept_that_is_not_finite_is_refused() {
 fn a_rival_loop_is_an_alarm_once_and_its_peer_no_member() {
     let mut h = Harness::started(2, mission(1, 6, 4));
     h.run_s(20);
+    // Who follows another revision, or has derived nothing yet, is no rival.
+    for (n, revision, loop_hash) in [(1, 7, 0xbad), (2, 1, 0)] {
+        let mut other = beacon(n, 5);
+        (other.able, other.revision, other.loop_hash) = (true, revision, loop_hash);
+        h.inject(1, record(8, 1, n, 0, &Body::Beacon(other)));
+    }
+    assert!(h.alarms(1).is_empty());
     for n in 1..10 {
         let mut rival = beacon(n, 5);
         (rival.able, rival.revision, rival.loop_hash) = (true, 1, 0xbad);

@@ -117,3 +117,40 @@ fn runs_that_are_taken_one_after_the_other_are_told_at_once() {
         "{at:?}"
     );
 }
+
+/// Cells that a division gave away are answered for during two waiting times of its round, and
+/// a peer that stands still answers for them that much longer: it hears no claim meanwhile.
+#[test]
+fn cells_that_nobody_takes_over_are_held_for_two_waiting_times_of_listening() {
+    for stands_still_ms in [0, 60_000] {
+        let mut h = Harness::new(2, mission(1, 8, 6));
+        // UAV 2 bids, and can write no section.
+        h.seat(2).store_fails = |e| matches!(e, Entry::Claim(_));
+        h.start(1);
+        h.run_s(25);
+        h.start(2);
+        assert!(h.run_until(60, |h| !h.beliefs(1).held.is_empty()));
+        let held_from_ms = h.now_ms();
+        h.run_s(3);
+        h.seat(1).clock_ms += stands_still_ms;
+        assert!(h.run_until(30, |h| h.beliefs(1).held.is_empty()));
+        let held_ms = h.now_ms() - held_from_ms;
+        // W is W0, which is 5 T; both ends are looked at every quarter period.
+        assert!((9_500..=10_500).contains(&held_ms), "{held_ms}");
+    }
+}
+
+#[test]
+fn records_of_a_later_version_are_skipped_with_an_alarm() {
+    let mut h = Harness::new(2, mission(1, 6, 4));
+    h.seat(1).journal = vec![Entry::Life(4).encode(), vec![0xff, 0x00]];
+    h.start(1);
+    h.start(2);
+    h.run_s(1);
+    assert_eq!(
+        h.alarms(1),
+        ["1 journal records of a later version were skipped"]
+    );
+    assert_eq!(h.beliefs(1).incarnation, 5, "what could be read counts");
+    assert!(h.alarms(2).is_empty());
+}

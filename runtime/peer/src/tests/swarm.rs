@@ -1,11 +1,13 @@
 //! How a few peers share, lose and take over.
 
-use super::covered;
+use super::{covered, with_operator};
 use crate::output::{Report, Status};
-use crate::testing::{Harness, mission};
+use crate::testing::{GROUND_STATION, Harness, mission};
 use crate::wire::codec::Body;
 use crate::wire::kinds::Kind;
+use crate::wire::message::{Activity, MissionStatus};
 use crate::{Input, PeerId};
+use skein_behaviors::Order;
 use std::collections::BTreeSet;
 
 /// Whether each open cell is in the plan of exactly one of these peers.
@@ -286,4 +288,114 @@ fn who_hears_nobody_flies_for_itself_and_takes_nothing_from_those_who_hear_it() 
     deafen(&mut h, false);
     assert!(h.run_until(10, |h| h.beliefs(3).able));
     assert!(h.run_until(300, |h| (1..=3).all(|id| h.beliefs(id).finished)));
+}
+
+/// A UAV whose sensors stand still, so that all it says is of one place.
+#[test]
+fn what_is_said_of_a_uav_is_what_it_senses() {
+    let mut h = with_operator(2, mission(1, 8, 6));
+    h.run_s(30);
+    let mut percept = h.seat(1).percept_now();
+    h.seat(1).senses = false;
+    percept.pose.east_m = 123.456;
+    percept.pose.north_m = -78.9;
+    percept.pose.heading_rad = 1.2345;
+    percept.height_m = 65.4;
+    percept.airspeed_mps = 13.2;
+    percept.endurance_s = 2222.0;
+    h.feed(1, Input::Percept(percept));
+    let from_ms = h.now_ms();
+    h.run_s(25);
+    let last = |h: &mut Harness, id: u16, kind: Kind| {
+        let said = h.seat(id).said.iter().rev();
+        let mut bodies = said.filter(|(at, _, b)| *at > from_ms && b.kind() == kind);
+        bodies.next().map(|(_, _, b)| b.clone()).unwrap()
+    };
+    let Body::Beacon(beacon) = last(&mut h, 1, Kind::Beacon) else {
+        unreachable!()
+    };
+    assert_eq!((beacon.east_mm, beacon.north_mm), (123_456, -78_900));
+    assert_eq!(beacon.heading_e4, 12_345);
+    assert!(beacon.able && !beacon.finished && !beacon.ground_station);
+    assert_eq!((beacon.eccentricity, beacon.sharers), (1, 3));
+    let Body::Heartbeat(heartbeat) = last(&mut h, 1, Kind::Heartbeat) else {
+        unreachable!()
+    };
+    assert_eq!((heartbeat.east_dm, heartbeat.north_dm), (1_234, -789));
+    assert_eq!((heartbeat.interval, heartbeat.sharers), (4, 3));
+    let state = |h: &mut Harness, id| match last(h, id, Kind::State) {
+        Body::State(state) => state,
+        other => unreachable!("{other:?}"),
+    };
+    let (said, b) = (state(&mut h, 1), h.beliefs(1));
+    assert_eq!((said.east_mm, said.north_mm), (123_456, -78_900));
+    assert_eq!((said.height_mm, said.heading_e4), (65_400, 12_345));
+    assert_eq!((said.airspeed_mmps, said.endurance_s), (13_200, 2_222));
+    assert_eq!(said.mission, MissionStatus::Active);
+    assert_eq!(usize::from(said.cells), b.covered.len());
+    assert!(said.covered > 0 && usize::from(said.covered) <= covered(&h, 1));
+    let activity = |h: &mut Harness| {
+        h.run_s(12);
+        [1, 2, GROUND_STATION].map(|id| state(h, id).activity)
+    };
+    let all = |flying| [flying, flying, Activity::GroundStation];
+    assert_eq!(activity(&mut h), all(Activity::Covering));
+    h.order(GROUND_STATION, Order::Hold);
+    assert_eq!(activity(&mut h), all(Activity::Holding));
+    h.order(GROUND_STATION, Order::ReturnToBase);
+    assert_eq!(activity(&mut h), all(Activity::Returning));
+    assert!(
+        matches!(last(&mut h, GROUND_STATION, Kind::Beacon), Body::Beacon(b) if b.ground_station && !b.able)
+    );
+}
+
+/// §7: claims and states are said again every ten intervals, and up to a quarter of one more.
+#[test]
+fn claims_and_states_are_said_again_every_ten_intervals() {
+    let mut h = Harness::started(2, mission(1, 12, 10));
+    h.run_s(30);
+    let from_ms = h.now_ms();
+    h.run_s(120);
+    for kind in [Kind::Claim, Kind::State] {
+        let said = h.seat(1).said.iter();
+        let said = said.filter(|(at, _, b)| *at > from_ms && b.kind() == kind);
+        let at: Vec<u64> = said.map(|(at, ..)| *at).collect();
+        assert!(at.len() >= 11, "{kind:?} {at:?}");
+        let apart = at.windows(2).map(|w| w[1] - w[0]);
+        // What is due is looked at four times a period.
+        assert!(apart.clone().all(|ms| ms <= 10_750), "{kind:?} {at:?}");
+        if kind == Kind::State {
+            assert!(apart.clone().all(|ms| ms >= 9_750), "{at:?}");
+        }
+    }
+}
+
+/// A bid says which way its author will be flying: who has to turn round needs longer.
+#[test]
+fn a_bid_says_which_way_its_author_flies() {
+    let mut ways = BTreeSet::new();
+    for stopped in 1..=3 {
+        let mut h = Harness::started(4, mission(1, 10, 8));
+        assert!(h.run_until(30, |h| divided(h, &[1, 2, 3, 4])));
+        h.run_s(10);
+        h.stop(stopped);
+        h.run_s(40);
+        for id in (1..=4).filter(|id| *id != stopped) {
+            let mut plan = Vec::new();
+            for (_, _, body) in &h.seat(id).said {
+                match body {
+                    Body::Claim(claim) => plan.clone_from(&claim.plan),
+                    Body::Bid(bid) if bid.off_loop.is_empty() && !bid.idle => {
+                        let backward = plan.first().is_some_and(|l| l.backward);
+                        if plan.iter().all(|l| l.backward == backward) {
+                            assert_eq!(bid.backward, backward, "{id}: {bid:?}");
+                            ways.insert(backward);
+                        }
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+    assert_eq!(ways.len(), 2, "both ways are met");
 }
