@@ -150,7 +150,7 @@ pub fn run(args: &ChaosArgs) -> anyhow::Result<ExitCode> {
     let runtime = cli::runtime()?;
     for request in requests {
         match runtime.block_on(command(&trial, &request)) {
-            Ok(lines) => lines.iter().for_each(|line| println!("{line}")),
+            Ok(lines) => lines.iter().try_for_each(exit::print)?,
             Err(error) => {
                 eprintln!("error: {error}");
                 return Ok(ExitCode::from(exit::NO_PEERS));

@@ -49,10 +49,9 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
         Err(e) => {
             match args.format {
                 Format::Text => eprintln!("error: {e}"),
-                Format::Json => println!(
-                    "{}",
-                    serde_json::json!({ "ok": false, "error": e.to_string() })
-                ),
+                Format::Json => {
+                    exit::print(serde_json::json!({ "ok": false, "error": e.to_string() }))?;
+                }
             }
             return Ok(ExitCode::from(exit::CONFIG_INVALID));
         }
@@ -68,8 +67,8 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
         None => scenario.side_by_side(),
     };
     match args.format {
-        Format::Text => print!("{}", text(&scenario, total, &judged, &forecasts)),
-        Format::Json => println!("{}", json(&scenario, total, &judged, &forecasts)),
+        Format::Text => exit::print(text(&scenario, total, &judged, &forecasts))?,
+        Format::Json => exit::print(json(&scenario, total, &judged, &forecasts))?,
     }
     Ok(ExitCode::from(exit::OK))
 }

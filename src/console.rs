@@ -131,7 +131,7 @@ fn say(at: &AtArgs, command: &Command) -> anyhow::Result<ExitCode> {
     Ok(
         match cli::runtime()?.block_on(ask(address, &token, command)) {
             Ok(lines) => {
-                lines.iter().for_each(|line| println!("{line}"));
+                lines.iter().try_for_each(exit::print)?;
                 ExitCode::from(exit::OK)
             }
             Err(error) => {

@@ -1,5 +1,8 @@
 //! The `skein` command: arguments in, text out, no logic of its own.
 
+// What a verb tells goes through `exit::print`: a closed pipe is no defect.
+#![deny(clippy::print_stdout)]
+
 mod chaos;
 mod check;
 mod cli;

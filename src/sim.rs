@@ -104,8 +104,8 @@ fn one(args: &SimArgs, prepared: &Prepared) -> anyhow::Result<bool> {
     }
     let report = &outcome.report;
     match args.format {
-        Format::Json => println!("{}", serde_json::to_string_pretty(report)?),
-        Format::Text => print!("{}\n{report}", timeline(&outcome.entries)),
+        Format::Json => exit::print(serde_json::to_string_pretty(report)?)?,
+        Format::Text => exit::print(format!("{}\n{report}", timeline(&outcome.entries)))?,
     }
     if !report.passed {
         eprintln!("replay: {}", replay(args, seed));
@@ -128,8 +128,8 @@ fn many(args: &SimArgs, prepared: &Prepared, seeds: Seeds) -> anyhow::Result<boo
         eprintln!("replay: {}", replay(args, report.seed));
     });
     match args.format {
-        Format::Json => println!("{}", serde_json::to_string(&total)?),
-        Format::Text => print!("{total}"),
+        Format::Json => exit::print(serde_json::to_string(&total)?)?,
+        Format::Text => exit::print(&total)?,
     }
     Ok(total.failed_seeds.is_empty() && total.violations.is_empty())
 }

@@ -88,8 +88,8 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
     match ended {
         Ok(report) => {
             match args.format {
-                Format::Text => print!("{report}"),
-                Format::Json => println!("{}", serde_json::to_string_pretty(&report)?),
+                Format::Text => exit::print(&report)?,
+                Format::Json => exit::print(serde_json::to_string_pretty(&report)?)?,
             }
             Ok(ExitCode::from(if report.passed {
                 exit::OK

@@ -188,6 +188,15 @@ fn a_starved_swarm_flies_slower_and_ends_its_mission() {
 }
 
 #[test]
+fn whoever_stops_reading_is_no_error() {
+    let place = Place::new();
+    let square = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/live/square.json5");
+    for args in [["check", square], ["sim", square]] {
+        assert_eq!(place.unread(&args), (0, String::new()), "{args:?}");
+    }
+}
+
+#[test]
 fn wrong_configurations_are_named_with_their_place() {
     let place = Place::new();
     let example = std::fs::read_to_string(support::root().join("configs/peer.json5")).unwrap();

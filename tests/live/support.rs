@@ -58,6 +58,17 @@ impl Place {
         (out.status.code().unwrap_or(-1), text)
     }
 
+    /// Runs a verb whose reader has gone before it prints: exit code and stderr.
+    pub fn unread(&self, args: &[&str]) -> (i32, String) {
+        let mut command = self.command(args);
+        let piped = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = piped.spawn().unwrap();
+        drop(child.stdout.take());
+        let out = child.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        (out.status.code().unwrap_or(-1), said)
+    }
+
     pub fn path(&self, name: &str) -> String {
         self.dir.path().join(name).to_str().unwrap().to_owned()
     }
