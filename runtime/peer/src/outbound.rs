@@ -9,7 +9,7 @@
 //! | state | every 10 I |
 //! | bid | once it is durable |
 //! | finished | once a mission revision |
-//! | mission | all pieces, once a revision and life, by a ground station |
+//! | mission | all pieces, by a ground station and to whom its neighbours' beacons show that they follow an older revision |
 //! | operator | when the operator gives an order, by a ground station |
 //!
 //! I is the interval that this peer's beacons announce, a period T where there is room.
@@ -225,7 +225,8 @@ impl Outbound {
         Some(Effect::Speak(0, Body::Cover(cover)))
     }
 
-    /// The mission's body in pieces, once a revision and life.
+    /// The mission's body in pieces, once a revision and life: the relay brings them to who
+    /// lacks them.
     pub fn speak_mission(&mut self, s: &Sources<'_>) -> Effects {
         let Some(mission) = &s.mission else {
             return Effects::new();

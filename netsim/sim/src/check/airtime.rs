@@ -88,7 +88,12 @@ impl AirtimeCheck {
             let share_ps =
                 |radios: u64| self.rate_bps / 8 * SHARE_PERCENT / 100 / (radios - 1).max(1);
             let burst = share_ps(before) * self.burst_ms / 1000;
-            let most = share_ps(fewest) * WINDOW_MS / 1000 + burst + largest;
+            // A clock that jumps within the window fills the bucket once more.
+            let from_ms = now_ms.saturating_sub(WINDOW_MS);
+            let shown_ms = snapshot.handicaps.shown_ms(*id, from_ms, now_ms);
+            let jumped_ms = shown_ms.saturating_sub(WINDOW_MS);
+            let jumped = (share_ps(fewest) * jumped_ms / 1000).min(burst);
+            let most = share_ps(fewest) * WINDOW_MS / 1000 + burst + jumped + largest;
             if bytes <= most {
                 self.over.stop(*id);
                 continue;
@@ -110,6 +115,7 @@ impl AirtimeCheck {
 mod tests {
     use super::super::testing::{Story, speaking};
     use super::*;
+    use crate::fault::Fault;
     use skein_peer::protocol::airtime::OVERHEAD_BYTES;
 
     #[test]
@@ -134,6 +140,28 @@ mod tests {
                 broken,
                 "{bytes_ps} among {radios}"
             );
+        }
+    }
+
+    #[test]
+    fn a_clock_that_jumps_fills_the_bucket_once_more() {
+        for (jump_ms, broken) in [(0, true), (30_000, false)] {
+            let mut check = AirtimeCheck::new(64_000, 1000);
+            let (mut story, mut found) = (Story::new(0), Findings::new(1));
+            if jump_ms > 0 {
+                let (peer, ahead_ms) = (1, jump_ms);
+                let fault = Fault::ClockJump { peer, ahead_ms };
+                story.handicaps.on_fault(13_000, &fault);
+            }
+            let views: Vec<_> = (1..=5).map(|id| (id, speaking())).collect();
+            for t in 0..20 {
+                // A share is 900 bytes a second, a bucket three seconds of it.
+                for _ in 0..if t == 14 { 7 } else { 1 } {
+                    check.on_transmission(t * 1000, 1, 900 - OVERHEAD_BYTES);
+                }
+                story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
+            }
+            assert_eq!(found.counts.contains_key("S9"), broken, "{jump_ms}");
         }
     }
 

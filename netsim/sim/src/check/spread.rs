@@ -36,8 +36,9 @@ pub struct SpreadCheck {
     pieces: u64,
 }
 
-/// A piece of a mission is a kibibyte of the least urgent kind: at a share of a ninth of
-/// 45 % of 64 kbit/s it takes three periods of a peer's air on every hop.
+/// A piece of a mission is 308 bytes of the least urgent kind: at a share of a ninth of
+/// 45 % of 64 kbit/s, half of it for beacons, it is due three periods after the one before,
+/// on every hop.
 const PIECE_PERIODS: u64 = 3;
 
 /// A record that was lost in the flood comes once its receiver has shown that it lacks it:
@@ -58,10 +59,19 @@ fn limit_ms(snapshot: &Snapshot<'_>, bound_ms: u64, from_ms: u64) -> Option<u64>
     graded.then(|| snapshot.grown_ms(bound_ms, from_ms) * LIGHT_FACTOR)
 }
 
+/// How long a record may take to all of so many.
+fn record_ms(bounds: &Bounds, peers: usize) -> u64 {
+    let rotation = (peers as u64).saturating_sub(1).div_ceil(GOSSIP_LEAST);
+    let crowd = rotation.saturating_sub(SMALL_ROTATION) * bounds.diameter;
+    bounds.spread_ms() + crowd * bounds.interval_ms
+}
+
 /// Whether a record reaches everybody: passed on, and worth it for longer than the two
-/// periods of a state, which is for people and is said again soon.
+/// periods of a state, which is for people and is said again soon. Pieces of a mission reach
+/// who follows an older one: that is `agree`.
 fn spreads(kind: u8) -> bool {
-    Kind::of_number(kind).is_some_and(|k| k.relayed() && k != Kind::State)
+    let some = [Kind::State, Kind::Mission];
+    Kind::of_number(kind).is_some_and(|k| k.relayed() && !some.contains(&k))
 }
 
 impl SpreadCheck {
@@ -70,16 +80,10 @@ impl SpreadCheck {
         self.pieces = self.pieces.max(pieces as u64);
     }
 
-    /// How long a record of some kind may take to all of so many.
-    fn bound_ms(&self, bounds: &Bounds, kind: u8, peers: usize) -> u64 {
-        let rotation = (peers as u64).saturating_sub(1).div_ceil(GOSSIP_LEAST);
-        let crowd = rotation.saturating_sub(SMALL_ROTATION) * bounds.diameter;
-        let pieces = if kind == Kind::Mission.number() {
-            self.pieces * bounds.diameter * PIECE_PERIODS
-        } else {
-            0
-        };
-        bounds.spread_ms() + (crowd + pieces) * bounds.interval_ms
+    /// How long a mission may take to all.
+    fn mission_ms(&self, bounds: &Bounds) -> u64 {
+        let pieces = self.pieces * bounds.diameter * PIECE_PERIODS;
+        bounds.spread_ms() + pieces * bounds.interval_ms
     }
 
     /// A process starts, ends or stands still.
@@ -162,7 +166,7 @@ impl SpreadCheck {
         let newest = self.newest(peers);
         for m in peers {
             for (key, wanted) in newest.iter().filter(|(key, _)| key.0 != m.id) {
-                let bound_ms = self.bound_ms(&snapshot.bounds, key.1, peers.len());
+                let bound_ms = record_ms(&snapshot.bounds, peers.len());
                 let held = self.held.get(&m.id).and_then(|h| h.get(key));
                 let held = held.copied().unwrap_or_default();
                 if held >= *wanted {
@@ -205,8 +209,9 @@ impl SpreadCheck {
         since_ms: u64,
         found: &mut Findings,
     ) {
-        let mission_ms = self.bound_ms(&snapshot.bounds, Kind::Mission.number(), peers.len());
-        let bound_ms = mission_ms + LOOK_PERIODS * snapshot.bounds.period_ms;
+        let mission_ms = self.mission_ms(&snapshot.bounds);
+        let order_ms = record_ms(&snapshot.bounds, peers.len());
+        let look_ms = LOOK_PERIODS * snapshot.bounds.period_ms;
         for (i, a) in peers.iter().enumerate() {
             for b in &peers[i + 1..] {
                 let differ = [
@@ -218,6 +223,7 @@ impl SpreadCheck {
                     (true, a.view.order != b.view.order),
                 ];
                 for (of_order, differs) in differ {
+                    let bound_ms = look_ms + if of_order { order_ms } else { mission_ms };
                     let key = (a.id, b.id, of_order);
                     if !differs {
                         self.apart.stop(key);
@@ -335,7 +341,7 @@ mod tests {
             (Kind::Claim, 0, (1, 4), true),
             (Kind::Claim, 0, (1, 5), false),
             (Kind::Operator, 0, (1, 4), true),
-            (Kind::Mission, 0, (1, 4), true),
+            (Kind::Mission, 0, (1, 4), false),
             (Kind::Claim, 300, (1, 4), false),
             (Kind::State, 0, (1, 4), false),
         ] {

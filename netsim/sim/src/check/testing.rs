@@ -36,6 +36,8 @@ pub(super) struct Story {
     loss_permille: u16,
     covered: [bool; 4],
     places: BTreeMap<u16, Point>,
+    /// Whose clock, computer or disk is how late.
+    pub(super) handicaps: Handicaps,
 }
 
 impl Story {
@@ -46,6 +48,7 @@ impl Story {
             loss_permille,
             covered: [false; 4],
             places: BTreeMap::new(),
+            handicaps: Handicaps::default(),
         }
     }
 
@@ -79,7 +82,7 @@ impl Story {
             bounds: BOUNDS,
             graph: &graph,
             stability: &self.stability,
-            handicaps: &Handicaps::default(),
+            handicaps: &self.handicaps,
             peers: &peers,
             covered: &self.covered,
             loop_hash: LOOP,

@@ -74,7 +74,7 @@ pub const BURST_PERIODS: u64 = 3;
 
 /// A neighbour counts for so many of the intervals it announced: at three beacons in ten
 /// lost it is missed once in 170,000 times.
-const LASTING_INTERVALS: u64 = 10;
+pub const LASTING_INTERVALS: u64 = 10;
 
 /// A peer that has sent fewer than three beacons shares with so many, itself included: a
 /// whole swarm may have been started at once.
@@ -161,7 +161,7 @@ impl Airtime {
     pub fn hear(&mut self, now: Time, author: u16, (interval, sharers): (u8, u16)) {
         self.forget(now);
         if self.neighbours.len() < PEERS_MAX || self.neighbours.contains_key(&author) {
-            let lasts_ms = LASTING_INTERVALS * ms_of(interval, self.period_ms);
+            let lasts_ms = LASTING_INTERVALS * self.told_ms(interval);
             let heard = Neighbour {
                 until: now.plus_ms(lasts_ms),
                 sharers,
@@ -204,10 +204,16 @@ impl Airtime {
         self.share_bytes_ps(self.sharers().max(least))
     }
 
+    /// An interval that a beacon announces, in milliseconds.
+    #[must_use]
+    pub fn told_ms(&self, interval: u8) -> u64 {
+        ms_of(interval, self.period_ms)
+    }
+
     /// Milliseconds between two beacons as last announced.
     #[must_use]
     pub fn interval_ms(&self) -> u64 {
-        ms_of(self.interval, self.period_ms)
+        self.told_ms(self.interval)
     }
 
     /// The same in quarters of T.

@@ -13,18 +13,24 @@
 //! | held in a newer version, or of an earlier life | it is heard | nothing |
 //! | any of an author | a later life of the author is heard | void: neither held nor sent |
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
+//! | a piece of a mission | a neighbour's beacon, the last ten intervals considered, shows an older revision; else it only is held | passed on, or sent again as to who lacks it |
 //! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
 //! | this peer's own bid, claim or order | it was sent, and nobody is heard passing it on | sent again, twice at most |
-//! | waiting | the share allows it, it is this peer's own bid or claim, or nothing is due earlier | sent |
+//! | waiting | the share allows it, it is this peer's own bid or claim and was not sent yet, or nothing is due earlier | sent |
 //! | waiting for its random time | something is sent, one transmission holds both, and more than twelve share the channel | sent with it |
 //! | waiting | its lifetime is over, or the queue is full of what is more urgent | not sent |
 //!
 //! Everything a peer sends is paid for from its share of the channel, [`Airtime`]. Newer values replace older ones of the same key in the queue.
+//!
+//! Pieces of missions are most of what there is to say, and all know the first mission before
+//! they start: they are no part of what a beacon tells of an author's records, so that one
+//! other record lacked does not bring them all again.
 
 use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Priority;
-use crate::protocol::airtime::Airtime;
+use crate::protocol::airtime::{Airtime, LASTING_INTERVALS};
+use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
 use crate::wire::limits::{CHUNKS_MAX, HOPS_MAX, PEERS_MAX};
@@ -76,6 +82,10 @@ const CROWD: u64 = 12;
 /// Even in small swarms the random times are those of so many.
 const LEAST_SPREAD: u64 = 8;
 
+/// A piece of a mission takes as long as this of a peer's share, in intervals: each one that
+/// waits is due so much later, and what is said meanwhile goes before it.
+const PIECE_INTERVALS: u64 = 3;
+
 /// What became of a record that was heard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Offer {
@@ -109,6 +119,19 @@ fn key_of(record: &Record) -> RecordKey {
     (record.author, record.kind, record.subject)
 }
 
+/// Whether a record is part of what a beacon tells of its author's records.
+fn is_counted(kind: Kind) -> bool {
+    kind.relayed() && kind != Kind::Mission
+}
+
+/// Of which mission a record is a piece.
+fn revision_of(kind: Kind, record: &Record) -> Option<u32> {
+    match codec::decode_body(kind, &record.body) {
+        Ok(Body::Mission(piece)) if kind == Kind::Mission => Some(piece.revision),
+        _ => None,
+    }
+}
+
 /// All keys of one author.
 fn keys_of(author: u16) -> core::ops::RangeInclusive<RecordKey> {
     (author, 0, 0)..=(author, u8::MAX, u16::MAX)
@@ -122,6 +145,8 @@ struct Held {
     copies: u8,
     /// How often this peer's own record may be sent again yet.
     repeats: u8,
+    /// Of which mission it is a piece.
+    revision: Option<u32>,
     /// When somebody, this peer included, was last heard sending this version.
     sent: Time,
 }
@@ -145,6 +170,10 @@ pub struct Relay {
     held: BTreeMap<RecordKey, Held>,
     queue: BTreeMap<RecordKey, Waiting>,
     answered: BTreeMap<u16, Time>,
+    /// Which revision the last beacon of each neighbour showed, and until when that counts.
+    follow: BTreeMap<u16, (u32, Time)>,
+    /// The newest revision of which a piece was held.
+    newest_piece: u32,
     salt: u64,
 }
 
@@ -159,6 +188,8 @@ impl Relay {
             held: BTreeMap::new(),
             queue: BTreeMap::new(),
             answered: BTreeMap::new(),
+            follow: BTreeMap::new(),
+            newest_piece: 0,
             salt: u64::from(me).wrapping_mul(0x9E37_79B9_7F4A_7C15),
         }
     }
@@ -185,9 +216,13 @@ impl Relay {
                 hops: 0,
                 copies: 0,
                 repeats: if vital { REPEATS } else { 0 },
+                revision: revision_of(kind, record),
                 sent: now,
             },
         );
+        if !self.is_wanted(now, &key) {
+            return;
+        }
         let delay = if kind == Kind::Bid {
             self.jitter(&key, (record.incarnation, record.seq)) % self.spread_ms(BID_SPREAD_MS)
         } else {
@@ -230,10 +265,11 @@ impl Relay {
             hops,
             copies: 1,
             repeats: 0,
+            revision: revision_of(kind, record),
             sent: now,
         };
         self.hold(key, held);
-        if kind.relayed() && hops < HOPS_MAX {
+        if kind.relayed() && hops < HOPS_MAX && self.is_wanted(now, &key) {
             let delay =
                 RELAY_DELAY_MS + self.jitter(&key, version) % self.spread_ms(RELAY_SPREAD_MS);
             self.wait(now, key, kind, delay);
@@ -253,6 +289,14 @@ impl Relay {
             held.repeats = 0;
             self.queue.remove(&key);
         }
+    }
+
+    /// Whether some neighbour may need a record: a piece of a mission only if it follows an
+    /// older one.
+    fn is_wanted(&self, now: Time, key: &RecordKey) -> bool {
+        let revision = self.held.get(key).and_then(|h| h.revision);
+        let mut follow = self.follow.values().filter(|(_, until)| *until > now);
+        revision.is_none_or(|piece| follow.any(|(follows, _)| *follows < piece))
     }
 
     fn newest_life(&self, author: u16) -> Incarnation {
@@ -286,7 +330,11 @@ impl Relay {
     /// nothing waits for ever behind what is more urgent.
     fn due(&self, key: &RecordKey, from: Time, priority: Priority) -> Time {
         let telemetry = priority == Priority::Telemetry;
+        let is_piece = |k: &&RecordKey| k.1 == Kind::Mission.number();
         let intervals = match (key.0 == self.me, telemetry) {
+            _ if is_piece(&key) => {
+                PIECE_INTERVALS * (1 + self.queue.keys().filter(is_piece).count() as u64)
+            }
             (true, false) => 0,
             (true, true) | (false, false) => 1,
             (false, true) => 3,
@@ -294,9 +342,11 @@ impl Relay {
         from.plus_ms(intervals * self.air.interval_ms())
     }
 
-    /// What this peer bids and claims itself goes before all else: nobody else can say it.
+    /// What this peer bids and claims itself goes before all else, once: nobody else can say
+    /// it. Sent again it waits its turn, or what this peer has seen would never be said.
     fn is_its_own_to_say(&self, key: &RecordKey, priority: Priority) -> bool {
-        key.0 == self.me && priority <= Priority::Claim
+        let unsaid = || self.held.get(key).is_some_and(|h| h.copies == 0);
+        key.0 == self.me && priority <= Priority::Claim && unsaid()
     }
 
     fn jitter(&self, key: &RecordKey, version: (Incarnation, u32)) -> u64 {
@@ -331,6 +381,7 @@ impl Relay {
                 self.queue.remove(&k);
             }
         }
+        self.newest_piece = self.newest_piece.max(held.revision.unwrap_or(0));
         self.held.insert(key, held);
         assert!(self.held.len() <= MAX_RECORDS, "records keep to their cap");
     }
@@ -379,6 +430,7 @@ impl Relay {
             .hear(now, author, (beacon.interval, beacon.sharers));
         let window = 2 * self.air.interval_ms();
         self.answered.retain(|_, t| now.since_ms(*t) < window);
+        self.bring_mission(now, author, beacon);
         let mut theirs: BTreeMap<u16, (Incarnation, u32, u16)> = BTreeMap::new();
         for g in &beacon.gossip {
             theirs.insert(g.id, (g.incarnation, g.max_seq, g.digest));
@@ -391,6 +443,47 @@ impl Relay {
             let (incarnation, max_seq, digest) = theirs[&subject];
             self.catch_up(now, subject, incarnation, max_seq, digest);
         }
+    }
+
+    /// Queues the pieces of missions that a neighbour may lack, and takes out those that
+    /// nobody lacks any more.
+    fn bring_mission(&mut self, now: Time, author: u16, beacon: &Beacon) {
+        self.follow.retain(|_, (_, until)| *until > now);
+        if self.follow.len() < PEERS_MAX || self.follow.contains_key(&author) {
+            let lasts_ms = LASTING_INTERVALS * self.air.told_ms(beacon.interval);
+            let follows = (beacon.revision, now.plus_ms(lasts_ms));
+            self.follow.insert(author, follows);
+        }
+        let is_piece = |k: &&RecordKey| k.1 == Kind::Mission.number();
+        let waiting: Vec<RecordKey> = self.queue.keys().filter(is_piece).copied().collect();
+        for key in waiting {
+            if !self.is_wanted(now, &key) {
+                self.queue.remove(&key);
+            }
+        }
+        if beacon.revision >= self.newest_piece {
+            return;
+        }
+        let quiet = 2 * self.air.interval_ms();
+        let pieces = self.held.iter().filter(|(k, h)| {
+            h.revision.is_some_and(|piece| beacon.revision < piece)
+                && (now.since_ms(h.sent) >= quiet || h.copies == 0)
+                && !self.queue.contains_key(k)
+        });
+        let lacking: Vec<RecordKey> = pieces.map(|(k, _)| *k).collect();
+        for key in lacking {
+            self.send_again(now, key, Kind::Mission);
+        }
+    }
+
+    /// Queues a record that a neighbour lacks.
+    fn send_again(&mut self, now: Time, key: RecordKey, kind: Kind) {
+        let delay =
+            RELAY_DELAY_MS + self.jitter_again(now, &key) % self.spread_ms(REPAIR_SPREAD_MS);
+        if let Some(h) = self.held.get_mut(&key) {
+            h.copies = 0;
+        }
+        self.wait(now, key, kind, delay);
     }
 
     /// Queues what a neighbour lacks of one author's records.
@@ -429,28 +522,24 @@ impl Relay {
                     && (now.since_ms(h.sent) >= quiet || h.copies == 0)
             })
             .filter_map(|(k, _)| Kind::of_number(k.1).map(|kind| (*k, kind)))
-            .filter(|(_, kind)| kind.relayed())
+            .filter(|(_, kind)| is_counted(*kind))
             .collect();
         for (key, kind) in lacking {
             if !self.queue.contains_key(&key) {
-                let delay = RELAY_DELAY_MS
-                    + self.jitter_again(now, &key) % self.spread_ms(REPAIR_SPREAD_MS);
-                if let Some(h) = self.held.get_mut(&key) {
-                    h.copies = 0;
-                }
-                self.wait(now, key, kind, delay);
+                self.send_again(now, key, kind);
             }
         }
     }
 
-    /// The versions held of an author's records of one life: highest `seq`, digest.
+    /// The versions held of an author's records of one life, pieces of missions left out:
+    /// highest `seq`, digest.
     #[must_use]
     pub fn version(&self, author: u16, incarnation: Incarnation) -> (u32, u16) {
         let mut max = 0;
         let mut h = Fnv::new();
         for (k, held) in self.held.range(keys_of(author)) {
-            let relayed = Kind::of_number(k.1).is_some_and(Kind::relayed);
-            if held.record.incarnation == incarnation && relayed {
+            let counted = Kind::of_number(k.1).is_some_and(is_counted);
+            if held.record.incarnation == incarnation && counted {
                 max = max.max(held.record.seq);
                 h.write(&[k.1]);
                 h.write(&k.2.to_le_bytes());
@@ -545,6 +634,8 @@ impl Relay {
 mod tests {
     use super::*;
     use crate::protocol::airtime::Filling;
+    use crate::wire::message::MissionChunk;
+    use crate::wire::samples;
 
     fn record(author: u16, seq: u32) -> Record {
         Record {
@@ -603,6 +694,83 @@ mod tests {
         let (seq, digest) = r.version(1, 1);
         r.catch_up(Time(20_000), 1, 1, seq, digest);
         assert_eq!(r.poll(Time(20_500)), None, "nothing is lacking");
+    }
+
+    #[test]
+    fn a_mission_goes_to_who_lacks_it_and_what_is_due_before_its_next_piece_goes_first() {
+        let mut r = relay(2);
+        let neighbour = |revision| Beacon {
+            revision,
+            sharers: 60,
+            gossip: Vec::new(),
+            ..samples::beacon(1)
+        };
+        r.on_beacon(Time(5_000), 7, &neighbour(2));
+        for subject in 0..6 {
+            let piece = MissionChunk {
+                revision: 2,
+                content_hash: 6,
+                chunks: 6,
+                bytes: vec![0; 180],
+            };
+            let record = Record {
+                kind: Kind::Mission.number(),
+                subject,
+                body: codec::encode_body(&Body::Mission(piece)),
+                ..record(9, 1)
+            };
+            r.offer(Time(5_000), &record, &[1; 200], 0);
+        }
+        assert_eq!(r.version(9, 1).0, 0, "pieces are not counted");
+        assert_eq!(r.poll(Time(7_900)), None, "nobody lacks them");
+        r.on_beacon(Time(8_000), 7, &neighbour(1));
+        let mut sent = Vec::new();
+        for t in 8_000..50_000 {
+            if t == 9_000 {
+                // Due within 14 s; of the pieces the third is due after 17 s.
+                let said = Record {
+                    kind: Kind::Finished.number(),
+                    ..record(3, 1)
+                };
+                r.offer(Time(t), &said, &[3; 200], 0);
+            }
+            sent.extend(r.poll(Time(t)).map(|out| out.bytes[0]));
+        }
+        assert_eq!(sent.len(), 7, "{sent:?}");
+        assert!(sent[..3].contains(&3), "{sent:?}");
+        r.on_beacon(Time(50_000), 7, &neighbour(1));
+        r.on_beacon(Time(50_010), 7, &neighbour(2));
+        assert_eq!(r.poll(Time(60_000)), None, "nobody lacks them any more");
+    }
+
+    #[test]
+    fn own_coverage_waits_for_own_bids_and_claims_and_not_for_their_repetition() {
+        let mut r = relay(2);
+        r.air.hear(Time(5_000), 9, (4, 30));
+        let mut sent = Vec::new();
+        for t in 5_000..40_000 {
+            let kind = match t {
+                5_000 => Some(Kind::Claim),
+                5_001 => Some(Kind::Cover),
+                5_002 => Some(Kind::Bid),
+                _ => None,
+            };
+            if let Some(kind) = kind {
+                let kind = kind.number();
+                r.own(
+                    Time(t),
+                    &Record {
+                        kind,
+                        ..record(2, 1)
+                    },
+                    vec![kind; 200],
+                );
+            }
+            sent.extend(r.poll(Time(t)).map(|out| out.bytes[0]));
+        }
+        let kinds = [Kind::Claim, Kind::Bid, Kind::Cover].map(Kind::number);
+        assert_eq!(sent[..3], kinds, "{sent:?}");
+        assert_eq!(sent[3..].iter().filter(|k| **k == kinds[0]).count(), 2);
     }
 
     #[test]

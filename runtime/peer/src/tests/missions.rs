@@ -27,6 +27,26 @@ fn a_uav_without_a_mission_learns_it_by_radio() {
     assert!(h.run_until(250, |h| h.beliefs(2).finished));
 }
 
+/// All know the first mission before they start; what is newer is told until all follow it.
+#[test]
+fn a_mission_is_said_while_somebody_follows_an_older_one() {
+    let mut h = with_operator(3, mission(1, 6, 4));
+    let said = |h: &Harness| [1, 2, 3, GROUND_STATION].map(|id| h.count_said(id, Kind::Mission));
+    h.run_s(40);
+    assert_eq!(said(&h), [0; 4]);
+    command(&mut h, mission(2, 8, 4));
+    assert!(h.run_until(15, |h| (1..=3).all(|id| h.beliefs(id).revision == 2)));
+    h.run_s(5);
+    let told = said(&h);
+    assert!(told[3] > 0);
+    // A newer record of the ground station, and one that somebody lacks, bring no piece.
+    h.isolate(2, true);
+    h.run_s(15);
+    h.isolate(2, false);
+    h.run_s(30);
+    assert_eq!(said(&h), told);
+}
+
 #[test]
 fn a_new_revision_is_taken_by_all_and_covered_cells_keep_their_names() {
     let mut h = with_operator(2, mission(1, 6, 4));
