@@ -606,7 +606,8 @@ impl MissionState {
         actions.extend(taken.or(first).map(Action::Take));
         let mut effects = Effects::new();
         let alone = s.membership.live().next().is_none();
-        if core::mem::replace(&mut self.alone, alone) != alone && self.lists() {
+        // What was said of being alone is taken back even where nothing is listed any more.
+        if core::mem::replace(&mut self.alone, alone) != alone && (self.lists() || !alone) {
             effects.push(Effect::ClaimChanged);
         }
         for action in actions {

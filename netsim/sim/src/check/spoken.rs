@@ -221,9 +221,16 @@ impl SpokenCheck {
         });
         let cells = held.symmetric_difference(&said);
         let mut owed: BTreeSet<Owed> = cells.map(|c| Owed::Cell(*c)).collect();
+        // Who lists nothing need not say that it is alone, and may have said so before.
         let lists = !view.plan.is_empty() || !view.held.is_empty();
-        let alone = lists && is_alone(view);
-        if published.is_some_and(|p| p.claim.alone != alone) {
+        let owes = |says: bool| {
+            if says {
+                !is_alone(view)
+            } else {
+                lists && is_alone(view)
+            }
+        };
+        if published.is_some_and(|p| owes(p.claim.alone)) {
             owed.insert(Owed::Alone);
         }
         owed
@@ -352,6 +359,44 @@ mod tests {
                 story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
             }
             assert_eq!(found.counts.contains_key("spoken"), broken);
+        }
+    }
+
+    #[test]
+    fn being_alone_is_said_with_what_is_listed_and_taken_back_also_without() {
+        let company = BTreeMap::from([(PeerId(2), (1, Status::Alive))]);
+        for (says, hears, lists, broken) in [
+            (true, false, true, false),
+            (true, false, false, false),
+            (true, true, true, true),
+            (true, true, false, true),
+            (false, false, true, true),
+            (false, false, false, false),
+            (false, true, true, false),
+        ] {
+            let (mut check, mut found) = (SpokenCheck::default(), Findings::new(1));
+            let claim = Claim {
+                alone: says,
+                ..(*claim_of(0, 1)).clone()
+            };
+            check.on_claim(1, 1, Arc::new(claim));
+            let view = Beliefs {
+                plan: if lists { vec![0] } else { Vec::new() },
+                covered: vec![!lists, false, false, false],
+                peers: if hears {
+                    company.clone()
+                } else {
+                    BTreeMap::new()
+                },
+                ..speaking()
+            };
+            let mut story = Story::new(0);
+            for t in 0..7 {
+                let views = [(1, view.clone())];
+                story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
+            }
+            let case = (says, hears, lists);
+            assert_eq!(found.counts.contains_key("spoken"), broken, "{case:?}");
         }
     }
 
