@@ -387,6 +387,7 @@ pub(crate) fn beacon_of(s: &Sources<'_>) -> Beacon {
         loop_hash: state.map_or(0, MissionState::loop_hash),
         cover_digest: state.map_or(0, |m| m.covered().digest()),
         gossip: Vec::new(),
+        fresh: Vec::new(),
     }
 }
 

@@ -455,7 +455,7 @@ impl Peer {
         let me = self.me();
         let (interval, sharers) = (self.relay.air.interval(), self.relay.air.counted());
         let body = if let Some(entries) = entries {
-            let mut gossip = self.membership.gossip(self.now, entries);
+            let (mut gossip, fresh) = self.membership.tell(self.now, entries);
             for g in &mut gossip {
                 (g.max_seq, g.digest) = self.relay.version(g.id, g.incarnation);
             }
@@ -466,6 +466,7 @@ impl Peer {
                 interval,
                 sharers,
                 gossip,
+                fresh,
                 ..self.with_sources(|_, s, _, _| outbound::beacon_of(s))
             })
         } else {

@@ -283,6 +283,7 @@ mod tests {
             loop_hash: 3,
             cover_digest: 0,
             gossip: gossip.into_iter().collect(),
+            fresh: Vec::new(),
         }
     }
 

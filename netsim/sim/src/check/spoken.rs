@@ -271,6 +271,7 @@ mod tests {
             loop_hash: view.loop_hash,
             cover_digest: covered(view).digest(),
             gossip: Vec::new(),
+            fresh: Vec::new(),
         }
     }
 

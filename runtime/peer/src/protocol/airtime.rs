@@ -92,10 +92,13 @@ const HEARTBEAT_BYTES: usize = 24;
 const BEACON_PERCENT: u64 = 60;
 
 /// And an entry of gossip.
-const ENTRY_BYTES: usize = 17;
+pub const ENTRY_BYTES: usize = 17;
 
-/// A beacon carries so many entries at least: one for news, three for those who are far and
-/// for the rotation.
+/// And a heartbeat of somebody else alone.
+pub const FRESH_BYTES: usize = 7;
+
+/// A beacon has room for so many entries at least: two, for news and for the rotation, and
+/// four heartbeats of those who are far.
 const LEAST_ENTRIES: usize = 4;
 
 /// What a suspicion is answered from: so many heartbeats, refilled by a quarter of the

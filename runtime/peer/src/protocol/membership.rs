@@ -31,14 +31,15 @@ pub(crate) mod many_detectors;
 #[cfg(test)]
 mod tests;
 
-use super::airtime::ms_of;
+use super::airtime::{ENTRY_BYTES, FRESH_BYTES, ms_of};
 use super::life::LIFE_STEP;
 use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Status;
 use crate::wire::limits::INTERVAL_LEAST;
 use crate::wire::limits::{HOPS_MAX, PEERS_MAX};
-use crate::wire::message::{Beacon, Gossip, OffLoop};
+use crate::wire::message::{Beacon, Fresh, Gossip, OffLoop};
+use core::cmp::Reverse;
 use known::{Age, Heartbeat, Known};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -205,7 +206,12 @@ impl Membership {
         }
         for told in &beacon.gossip {
             if told.id != self.me && told.id != author {
-                self.on_gossip(now, told, beacon, limits, &mut changes);
+                self.on_gossip(now, told, (author, beacon), limits, &mut changes);
+            }
+        }
+        for told in &beacon.fresh {
+            if told.id != self.me && told.id != author {
+                self.on_fresh(now, told, author, limits, &mut changes);
             }
         }
         changes
@@ -246,7 +252,7 @@ impl Membership {
         &mut self,
         now: Time,
         told: &Gossip,
-        teller: &Beacon,
+        (teller, said): (u16, &Beacon),
         limits: Patience,
         changes: &mut Vec<Change>,
     ) {
@@ -266,7 +272,7 @@ impl Membership {
         let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
         let fresher = self.hear(now, heartbeat, limits, changes);
         if let Some(known) = self.known.get_mut(&told.id) {
-            known.note_told(now, told, limits.interval_ms);
+            known.note_told(now, teller, &heartbeat, limits.interval_ms);
             if known.disputes(told) {
                 known.urgent_until = urgent_until;
                 self.refuted = true;
@@ -278,8 +284,42 @@ impl Membership {
             // Members work on one loop: who is said to be able by a peer is on that peer's
             // loop, until its own beacon says otherwise.
             if known.info.heard.is_none() && told.able {
-                known.info.revision = teller.revision;
-                known.info.loop_hash = teller.loop_hash;
+                known.info.revision = said.revision;
+                known.info.loop_hash = said.loop_hash;
+            }
+        }
+    }
+
+    /// A heartbeat without anything else: of a life that is known here, or it says nothing.
+    fn on_fresh(
+        &mut self,
+        now: Time,
+        told: &Fresh,
+        teller: u16,
+        limits: Patience,
+        changes: &mut Vec<Change>,
+    ) {
+        let life = self.known.get(&told.id).map(|k| k.freshest.incarnation);
+        let Some(incarnation) = life.filter(|life| Fresh::life_of(*life) == told.life) else {
+            return;
+        };
+        let heartbeat = Heartbeat {
+            id: told.id,
+            incarnation,
+            count: told.heartbeat,
+            age: Age {
+                told_ms: u64::from(told.age_ds) * 100,
+                at: now,
+            },
+            hops: told.hops.saturating_add(1),
+            interval: told.interval,
+            suspected: None,
+        };
+        let fresher = self.hear(now, heartbeat, limits, changes);
+        if let Some(known) = self.known.get_mut(&told.id) {
+            known.note_told(now, teller, &heartbeat, limits.interval_ms);
+            if fresher {
+                known.info.able = told.able;
             }
         }
     }
@@ -476,7 +516,46 @@ impl Membership {
         changes
     }
 
-    /// What to say of others: at most `max` entries. Who began a life anew without
+    /// What to say of others in the room of so many entries. Where not everybody fits, half
+    /// of the room is for heartbeats alone, of those who are news and of those whom a
+    /// neighbour is farther from.
+    pub fn tell(&mut self, now: Time, entries: usize) -> (Vec<Gossip>, Vec<Fresh>) {
+        if self.known.len() <= entries {
+            return (self.gossip(now, entries), Vec::new());
+        }
+        let full = entries.div_ceil(2);
+        let told = self.gossip(now, full);
+        let room = (entries - full) * ENTRY_BYTES / FRESH_BYTES;
+        let fresh = self.fresh(now, &told, room);
+        (told, fresh)
+    }
+
+    fn fresh(&mut self, now: Time, told: &[Gossip], max: usize) -> Vec<Fresh> {
+        let others = self
+            .known
+            .iter_mut()
+            .filter(|(_, k)| k.is_worth_telling(now));
+        let mut wanted: Vec<&mut Known> = others
+            .filter(|(id, _)| told.iter().all(|g| g.id != **id))
+            .map(|(_, k)| k)
+            .collect();
+        wanted.sort_by_key(|k| {
+            (
+                k.urgent_until <= now,
+                Reverse(k.want_ms(now)),
+                k.freshest.id,
+            )
+        });
+        wanted.truncate(max);
+        wanted.sort_by_key(|k| k.freshest.id);
+        let say = |known: &mut Known| {
+            known.told = now;
+            known.fresh(now)
+        };
+        wanted.into_iter().map(say).collect()
+    }
+
+    /// Whole entries of others: at most `max`. Who began a life anew without
     /// knowing is reminded first (a quarter of the entries at most), then news (half of
     /// the rest at most), then those whom a neighbour is farther from than this peer (two
     /// thirds of the rest), then all in rotation, so that nobody is left out for long. The
@@ -488,11 +567,13 @@ impl Membership {
         let urgent = self.known.iter().filter(|(_, k)| k.urgent_until > now);
         let mut ids: Vec<u16> = urgent.map(|(id, _)| *id).collect();
         // The latest news first: a flood of them must not starve the last one.
-        ids.sort_by_key(|id| core::cmp::Reverse(self.known.get(id).map(|k| k.urgent_until)));
+        ids.sort_by_key(|id| Reverse(self.known.get(id).map(|k| k.urgent_until)));
         ids.truncate(max / 2);
         let others = self.known.iter().filter(|(id, _)| !ids.contains(id));
-        let wanted = others.filter(|(_, k)| k.wanted_until > now);
-        let mut wanted: Vec<(Time, u16)> = wanted.map(|(id, k)| (k.told, *id)).collect();
+        let wanted = others.filter(|(_, k)| k.is_wanted(now));
+        let mut wanted: Vec<(Reverse<u64>, u16)> = wanted
+            .map(|(id, k)| (Reverse(k.want_ms(now)), *id))
+            .collect();
         wanted.sort_unstable();
         let room = max - ids.len();
         ids.extend(

@@ -12,10 +12,13 @@
 
 use super::cbor::{In, Listed, Out, Wire, array_of, number_of};
 use super::kinds::{Kind, RECORD_MAX_BYTES};
-use super::limits::{self, COMMITS_MAX, GOSSIP_MAX, MEMBERS_MAX, PLAN_MAX, at_most, in_range};
+use super::limits::{
+    self, COMMITS_MAX, FRESH_MAX_BYTES, GOSSIP_MAX, MEMBERS_MAX, PLAN_MAX, at_most, in_range,
+};
 use super::message::{
-    Activity, Beacon, Bid, CellRun, Claim, Cover, Epoch, Finished, Firmness, Gossip, Heartbeat,
-    ListedRun, Member, MissionChunk, MissionStatus, OffLoop, Order, Record, Round, Stamp, State,
+    Activity, Beacon, Bid, CellRun, Claim, Cover, Epoch, Finished, Firmness, Fresh, Gossip,
+    Heartbeat, ListedRun, Member, MissionChunk, MissionStatus, OffLoop, Order, Record, Round,
+    Stamp, State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
 
@@ -260,7 +263,8 @@ array_of!(Beacon {
     revision,
     loop_hash,
     cover_digest,
-    gossip
+    gossip,
+    fresh
 });
 array_of!(Heartbeat {
     interval,
@@ -384,6 +388,79 @@ impl Listed for MemberRun {
     const MAX: usize = MEMBERS_MAX;
 }
 
+/// Heartbeats as one byte string: id, count and age by seven bits a byte, the lowest first,
+/// then in two bytes three bits of the life, one of `able`, five of hops, seven of the
+/// interval. An array each would take twice as much.
+impl Wire for Vec<Fresh> {
+    fn put(&self, out: &mut Out) {
+        fresh_bytes(self).put(out);
+    }
+
+    fn get(input: &mut In<'_>) -> Result<Self, WireError> {
+        let bytes = <Vec<u8> as Wire>::get(input)?;
+        at_most("fresh", bytes.len(), FRESH_MAX_BYTES)?;
+        let malformed = WireError::Malformed { field: "fresh" };
+        let mut rest = bytes.as_slice();
+        let mut list = Self::new();
+        while !rest.is_empty() {
+            let mut number = || sevens(&mut rest).ok_or(malformed);
+            let (id, heartbeat, age) = (number()?, number()?, number()?);
+            let [high, low, ..] = *rest else {
+                return Err(malformed);
+            };
+            rest = &rest[2..];
+            let mark = u16::from_be_bytes([high, low]);
+            list.push(Fresh {
+                id: u16::try_from(id).map_err(|_| malformed)?,
+                life: high >> 5,
+                heartbeat,
+                age_ds: u16::try_from(age).map_err(|_| malformed)?,
+                hops: (mark >> 7 & 31) as u8,
+                interval: low & 127,
+                able: high >> 4 & 1 == 1,
+            });
+        }
+        // One encoding a value: no number is written longer than it is.
+        if fresh_bytes(&list) == bytes {
+            Ok(list)
+        } else {
+            Err(malformed)
+        }
+    }
+}
+
+fn fresh_bytes(list: &[Fresh]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(8 * list.len());
+    for f in list {
+        for number in [u32::from(f.id), f.heartbeat, u32::from(f.age_ds)] {
+            let mut left = number;
+            while left > 127 {
+                bytes.push((left & 127) as u8 | 128);
+                left >>= 7;
+            }
+            bytes.push(left as u8);
+        }
+        let life_able = u16::from(f.life & 7) << 13 | u16::from(f.able) << 12;
+        let mark = life_able | u16::from(f.hops & 31) << 7 | u16::from(f.interval & 127);
+        bytes.extend(mark.to_be_bytes());
+    }
+    bytes
+}
+
+/// A number of seven bits a byte, all but the last marked.
+fn sevens(rest: &mut &[u8]) -> Option<u32> {
+    let mut number = 0u64;
+    for shift in (0..35).step_by(7) {
+        let (byte, others) = rest.split_first()?;
+        *rest = others;
+        number |= u64::from(byte & 127) << shift;
+        if byte & 128 == 0 {
+            return u32::try_from(number).ok();
+        }
+    }
+    None
+}
+
 /// Members by runs of ids in the same life: a whole swarm in its first life is one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct MemberRun {
@@ -493,7 +570,7 @@ impl Wire for ListedRun {
 #[cfg(test)]
 mod tests {
     use super::super::limits::*;
-    use super::super::samples::{golden, gossip, largest, listing};
+    use super::super::samples::{fresh, golden, gossip, largest, listing};
     use super::super::signature::Off;
     use super::*;
     use proptest::collection::vec;
@@ -535,6 +612,56 @@ mod tests {
             hex(&encode_record(&record)),
             "8703021901f40700428103".to_owned() + "40"
         );
+    }
+
+    #[test]
+    fn heartbeats_in_one_byte_string_have_one_encoding_and_ascend() {
+        let read = |bytes: &[u8]| {
+            let mut out = Out::new();
+            bytes.to_vec().put(&mut out);
+            <Vec<Fresh> as Wire>::get(&mut In::new(&out.into_bytes()))
+        };
+        let good = [6, 0xac, 2, 15, 0x51, 4];
+        assert_eq!(read(&good), Ok(vec![fresh(6)]));
+        assert_eq!(read(&[]), Ok(Vec::new()));
+        let long = [0x86, 0, 0xac, 2, 15, 0x51, 4];
+        let over = [6, 0xff, 0xff, 0xff, 0xff, 0x1f, 15, 0x51, 4];
+        let endless = [0xff; 12];
+        let far_id = [0x80, 0x80, 4, 0xac, 2, 15, 0x51, 4];
+        for bad in [&long[..], &over, &endless, &far_id, &good[..5], &good[..1]] {
+            assert_eq!(
+                read(bad),
+                Err(WireError::Malformed { field: "fresh" }),
+                "{bad:?}"
+            );
+        }
+        let too_many = [0u8; FRESH_MAX_BYTES + 1];
+        assert_eq!(read(&too_many), Err(WireError::Range { field: "fresh" }));
+        let said = |fresh| {
+            Body::Beacon(Beacon {
+                fresh,
+                ..super::super::samples::beacon(1)
+            })
+        };
+        assert_eq!(said(vec![fresh(6), fresh(7)]).check(), Ok(()));
+        for wrong in [
+            vec![fresh(7), fresh(6)],
+            vec![fresh(6), fresh(6)],
+            vec![Fresh {
+                hops: 17,
+                ..fresh(6)
+            }],
+            vec![Fresh {
+                interval: 3,
+                ..fresh(6)
+            }],
+            vec![Fresh {
+                interval: 65,
+                ..fresh(6)
+            }],
+        ] {
+            assert!(said(wrong).check().is_err());
+        }
     }
 
     #[test]

@@ -102,7 +102,7 @@ const TABLE: [KindRow; 13] = [
         ..row(
             Kind::Beacon,
             "beacon",
-            768,
+            1024,
             Priority::Beacon,
             Lifetime::Beacons(1),
         )

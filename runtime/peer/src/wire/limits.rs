@@ -9,6 +9,8 @@ use super::message::{Beacon, Bid, CellRun, Claim, Heartbeat, Round, State};
 
 /// Gossip entries in a beacon: what a tenth of a second of a 64 kbit/s channel carries.
 pub const GOSSIP_MAX: usize = 20;
+/// Bytes of further heartbeats in a beacon, six or seven each.
+pub const FRESH_MAX_BYTES: usize = 256;
 /// Shortest interval that is announced between two beacons, quarters of T: one period.
 pub const INTERVAL_LEAST: u8 = 4;
 /// And the longest: sixteen periods. Whoever needs more air than that is out of reach.
@@ -92,7 +94,10 @@ fn check_beacon(b: &Beacon) -> Result<(), WireError> {
     in_range("sharers", usize::from(b.sharers) <= PEERS_MAX + 1)?;
     at_most("gossip", b.gossip.len(), GOSSIP_MAX)?;
     in_range("hops", b.gossip.iter().all(|g| g.hops <= HOPS_MAX))?;
-    in_range("interval", b.gossip.iter().all(|g| is_interval(g.interval)))
+    in_range("interval", b.gossip.iter().all(|g| is_interval(g.interval)))?;
+    in_range("fresh", b.fresh.is_sorted_by(|a, b| a.id < b.id))?;
+    in_range("hops", b.fresh.iter().all(|f| f.hops <= HOPS_MAX))?;
+    in_range("interval", b.fresh.iter().all(|f| is_interval(f.interval)))
 }
 
 fn check_heartbeat(h: &Heartbeat) -> Result<(), WireError> {

@@ -78,6 +78,8 @@ pub struct Beacon {
     pub cover_digest: u32,
     /// What it knows of others.
     pub gossip: Vec<Gossip>,
+    /// The heartbeats of more of them, for those who hear them by more hops; ascending.
+    pub fresh: Vec<Fresh>,
 }
 
 /// What one peer knows of another.
@@ -103,6 +105,33 @@ pub struct Gossip {
     pub max_seq: u32,
     /// Digest of the versions held of that author.
     pub digest: u16,
+}
+
+/// A heartbeat that one peer knows of another, of whom nothing else is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fresh {
+    /// Whose it is.
+    pub id: u16,
+    /// The last three bits of the life it counts.
+    pub life: u8,
+    /// Its count.
+    pub heartbeat: u32,
+    /// Its age, sum of holding times, 100 ms units.
+    pub age_ds: u16,
+    /// Hops it took.
+    pub hops: u8,
+    /// The interval its author announced with it, quarters of T.
+    pub interval: u8,
+    /// Whether its author said it can plan.
+    pub able: bool,
+}
+
+impl Fresh {
+    /// What is told of a life: consecutive ones differ.
+    #[must_use]
+    pub fn life_of(incarnation: Incarnation) -> u8 {
+        u8::try_from(incarnation & 7).unwrap_or(0)
+    }
 }
 
 /// What a peer does at present, for people.

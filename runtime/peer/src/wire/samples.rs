@@ -20,6 +20,19 @@ pub fn gossip(id: u16) -> Gossip {
     }
 }
 
+/// A heartbeat of a peer, typically.
+pub fn fresh(id: u16) -> Fresh {
+    Fresh {
+        id,
+        life: 2,
+        heartbeat: 300,
+        age_ds: 15,
+        hops: 2,
+        interval: 4,
+        able: true,
+    }
+}
+
 /// A beacon of an able UAV on loop 1 of revision 1, which gossips about nobody.
 pub fn beacon(heartbeat: u32) -> Beacon {
     Beacon {
@@ -39,6 +52,7 @@ pub fn beacon(heartbeat: u32) -> Beacon {
         loop_hash: 1,
         cover_digest: 0,
         gossip: Vec::new(),
+        fresh: Vec::new(),
     }
 }
 
@@ -124,8 +138,9 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                         ..gossip(5)
                     },
                 ],
+                fresh: vec![fresh(6)],
             }),
-            "90182a3a0012d6861a000d950b193d5cf5f4f41acafef00d07020403011b0123456789abcdef1863828a040219012c0f020404f51a0001117019beef8a050219012c0f0204f6f51a0001117019beef",
+            "91182a3a0012d6861a000d950b193d5cf5f4f41acafef00d07020403011b0123456789abcdef1863828a040219012c0f020404f51a0001117019beef8a050219012c0f0204f6f51a0001117019beef4606ac020f5104",
         ),
         (
             Body::State(State {
@@ -273,6 +288,17 @@ pub fn largest() -> Vec<Body> {
             loop_hash: u64::MAX,
             cover_digest: u32::MAX,
             gossip: vec![gossip; GOSSIP_MAX],
+            fresh: (u16::MAX - 18..u16::MAX)
+                .map(|id| Fresh {
+                    id,
+                    life: 7,
+                    heartbeat: u32::MAX,
+                    age_ds: u16::MAX,
+                    hops: HOPS_MAX,
+                    interval: INTERVAL_MOST,
+                    able: true,
+                })
+                .collect(),
         }),
         Body::State(State {
             east_mm: -POSITION_MAX_MM,

@@ -7,8 +7,9 @@
 use super::kinds::Kind;
 use super::limits::{
     BID_COVERED_MAX_BYTES, CHUNK_MAX_BYTES, CHUNKS_MAX, COMMITS_MAX, COVERED_MAX_BYTES, DONE_MAX,
-    DURATION_MAX_MS, GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX, HOPS_MAX, INTERVAL_LEAST, INTERVAL_MOST,
-    MEMBERS_MAX, PEERS_MAX, PLAN_MAX, POSITION_MAX_MM, SPEED_MAX_MMPS,
+    DURATION_MAX_MS, FRESH_MAX_BYTES, GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX, HOPS_MAX,
+    INTERVAL_LEAST, INTERVAL_MOST, MEMBERS_MAX, PEERS_MAX, PLAN_MAX, POSITION_MAX_MM,
+    SPEED_MAX_MMPS,
 };
 use core::fmt::Write as _;
 
@@ -146,6 +147,11 @@ const BEACON: &[Place] = &[
         "gossip",
         "what it knows of others",
         Shape::Rows(GOSSIP, GOSSIP_MAX),
+    ),
+    at(
+        "fresh",
+        "heartbeats of more of them, ascending by id; of each: id, count and age (100 ms), seven bits a byte, the lowest first; then in two bytes three bits of the life, one whether it can plan, five of the hops, seven of the interval",
+        Shape::Bytes(FRESH_MAX_BYTES),
     ),
 ];
 

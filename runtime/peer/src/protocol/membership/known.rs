@@ -5,7 +5,7 @@ use super::{Change, Info};
 use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Status;
-use crate::wire::message::Gossip;
+use crate::wire::message::{Fresh, Gossip};
 
 /// An age that grows: so much when it was heard, and the time since.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +17,11 @@ pub(super) struct Age {
 impl Age {
     pub(super) fn ms(self, now: Time) -> u64 {
         self.told_ms.saturating_add(now.since_ms(self.at))
+    }
+
+    /// As it is told: 100 ms units, rounded up.
+    fn ds(self, now: Time) -> u16 {
+        u16::try_from(self.ms(now).div_ceil(100)).unwrap_or(u16::MAX)
     }
 }
 
@@ -46,14 +51,33 @@ pub(super) struct Known {
     latest: usize,
     pub(super) eccentricity: u8,
     pub(super) urgent_until: Time,
-    /// Until then a neighbour may depend on what this peer tells of it.
-    pub(super) wanted_until: Time,
-    /// When it was last told of, by this peer or by a neighbour who is as near.
+    /// A neighbour that depends on what this peer tells of it.
+    lag: Option<Lag>,
+    /// When this peer last told of it.
     pub(super) told: Time,
     /// An old heartbeat of this very life with a higher count than it now sends: it lost
     /// its disk and uses an incarnation twice. It is told, so that it takes a new one.
     pub(super) higher_count_heard: Option<Heartbeat>,
 }
+
+/// A neighbour that hears somebody by more hops than this peer, or less: of several the one
+/// that knows least.
+#[derive(Clone, Copy, Debug)]
+struct Lag {
+    teller: u16,
+    /// When its freshest heartbeat was sent.
+    since: Time,
+    /// When it told so.
+    at: Time,
+    until: Time,
+}
+
+/// A heartbeat that is so many behind is two intervals older.
+const BEHIND: u32 = 4;
+
+/// What a neighbour told of what it knows is outdated after so many intervals, whoever knew
+/// more meanwhile.
+const LAG_INTERVALS: u64 = 4;
 
 /// Hops of somebody who was not heard in the last ten intervals.
 const NO_HOPS: [(Time, u8); 10] = [(Time(0), u8::MAX); 10];
@@ -77,7 +101,7 @@ impl Known {
             latest: 0,
             eccentricity: 0,
             urgent_until,
-            wanted_until: Time(0),
+            lag: None,
             told: Time(0),
             higher_count_heard: None,
         }
@@ -128,17 +152,46 @@ impl Known {
         }
     }
 
-    /// A neighbour tells of it: it heard of it by more hops than this peer and depends on
-    /// whoever is nearer, or it is as near and has just told.
-    pub(super) fn note_told(&mut self, now: Time, told: &Gossip, interval_ms: u64) {
-        if told.incarnation != self.freshest.incarnation {
+    /// A neighbour tells of it: if it hears of it by more hops than this peer, or not any
+    /// more, it depends on whoever is nearer.
+    pub(super) fn note_told(&mut self, now: Time, teller: u16, told: &Heartbeat, interval_ms: u64) {
+        let mine = &self.freshest;
+        if told.incarnation != mine.incarnation {
             return;
         }
-        if told.hops > self.freshest.hops {
-            self.wanted_until = now.plus_ms(super::HOP_INTERVALS * interval_ms);
-        } else if told.heartbeat.saturating_add(1) >= self.freshest.count {
-            self.told = now;
+        // One hop is that from the neighbour.
+        let farther = told.hops > mine.hops.saturating_add(1);
+        let behind = told.count.saturating_add(BEHIND) <= mine.count;
+        let told = Lag {
+            teller,
+            since: Time(now.0.saturating_sub(told.age.ms(now))),
+            at: now,
+            until: now.plus_ms(super::HOP_INTERVALS * interval_ms),
+        };
+        let outdated =
+            |lag: Lag| lag.teller == teller || now.since_ms(lag.at) > LAG_INTERVALS * interval_ms;
+        let replaces = self
+            .lag
+            .is_none_or(|lag| outdated(lag) || told.since < lag.since);
+        if (farther || behind) && replaces {
+            self.lag = Some(told);
+        } else if let Some(lag) = &mut self.lag
+            && (farther || behind)
+        {
+            lag.until = lag.until.max(told.until);
         }
+    }
+
+    /// Whether a neighbour depends on what this peer tells of it.
+    pub(super) fn is_wanted(&self, now: Time) -> bool {
+        self.lag.is_some_and(|lag| lag.until > now)
+    }
+
+    /// How much it is wanted: how old its heartbeat is where it is oldest, if what this peer
+    /// told last did not arrive, and if it did. One in two does not.
+    pub(super) fn want_ms(&self, now: Time) -> u64 {
+        let there_ms = self.lag.map_or(0, |lag| now.since_ms(lag.since));
+        there_ms.saturating_add(now.since_ms(self.told))
     }
 
     /// Whether somebody is told to be suspected who was heard since.
@@ -185,21 +238,47 @@ impl Known {
         self.told(&self.freshest, now)
     }
 
+    /// Whether its heartbeat alone is worth telling: news, or a neighbour may depend on it.
+    pub(super) fn is_worth_telling(&self, now: Time) -> bool {
+        let asked = self.urgent_until > now || self.is_wanted(now);
+        asked && self.status == Status::Alive && self.freshest.suspected.is_none()
+    }
+
+    pub(super) fn fresh(&self, now: Time) -> Fresh {
+        let Heartbeat {
+            id,
+            incarnation,
+            count,
+            age,
+            hops,
+            interval,
+            ..
+        } = self.freshest;
+        Fresh {
+            id,
+            life: Fresh::life_of(incarnation),
+            heartbeat: count,
+            age_ds: age.ds(now),
+            hops,
+            interval,
+            able: self.info.able,
+        }
+    }
+
     /// What the peer itself has to hear, if it began a life anew without knowing.
     pub(super) fn reminder(&self, now: Time) -> Option<Gossip> {
         self.higher_count_heard.as_ref().map(|h| self.told(h, now))
     }
 
     fn told(&self, heard: &Heartbeat, now: Time) -> Gossip {
-        let ds = |age: Age| u16::try_from(age.ms(now).div_ceil(100)).unwrap_or(u16::MAX);
         Gossip {
             id: heard.id,
             incarnation: heard.incarnation,
             heartbeat: heard.count,
-            age_ds: ds(heard.age),
+            age_ds: heard.age.ds(now),
             hops: heard.hops,
             interval: heard.interval,
-            suspected_ds: heard.suspected.map(ds),
+            suspected_ds: heard.suspected.map(|age| age.ds(now)),
             able: self.info.able,
             max_seq: 0,
             digest: 0,

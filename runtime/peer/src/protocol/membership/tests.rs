@@ -367,6 +367,101 @@ fn those_whom_a_neighbour_is_farther_from_are_told_of_first() {
     assert_eq!(ids, [12, 13, 14, 15]);
 }
 
+/// Peers 2 to 20 are neighbours, heard at 0 s and with later heartbeats at 2.5 s.
+fn among_nineteen() -> Membership {
+    let mut m = Membership::new(1, 1000);
+    for (now, count) in [(Time(0), 5), (Time(2_500), 10)] {
+        for id in 2..=20 {
+            m.on_beacon(now, id, 1, &beacon(count, Vec::new()));
+        }
+    }
+    m
+}
+
+/// Peer 3 hears 6 and 7 by others, and has not heard of 6 for long. That peers as near to 6
+/// as this one tell of it as well is of no use to 3, which does not hear them.
+#[test]
+fn who_is_heard_of_least_elsewhere_is_told_of_first_whoever_else_tells_of_it() {
+    let mut m = among_nineteen();
+    let far = |id, heartbeat, age_ds| Gossip {
+        hops: 2,
+        ..entry(id, heartbeat, age_ds, None)
+    };
+    let entries = vec![far(6, 5, 60), far(7, 9, 5)];
+    m.on_beacon(Time(3_000), 3, 1, &beacon(11, entries));
+    for (now, teller) in [(Time(4_000), 4), (Time(4_900), 5)] {
+        m.on_beacon(now, teller, 1, &beacon(11, vec![entry(6, 10, 9, None)]));
+    }
+    let mut first = |now_ms| m.gossip(Time(now_ms), 2)[0].id;
+    assert_eq!(first(5_000), 6);
+    // It was told just now; but as likely as not that was lost.
+    assert_eq!(first(5_100), 7);
+    assert_eq!(first(6_000), 6);
+    let heard = vec![far(6, 10, 10), far(7, 5, 70)];
+    m.on_beacon(Time(6_100), 3, 1, &beacon(12, heard));
+    assert_eq!(m.gossip(Time(7_000), 2)[0].id, 7);
+}
+
+#[test]
+fn who_does_not_hear_a_neighbour_any_more_is_told_of_it_though_it_was_as_near() {
+    let mut m = among_nineteen();
+    let stale = beacon(11, vec![entry(9, 6, 25, None), entry(10, 7, 20, None)]);
+    m.on_beacon(Time(3_000), 3, 1, &stale);
+    let ids: Vec<u16> = m.gossip(Time(5_000), 3).iter().map(|g| g.id).collect();
+    assert_eq!(ids, [9, 2, 3], "10 is less than two intervals behind");
+}
+
+#[test]
+fn where_not_all_fit_half_of_the_room_is_for_heartbeats_alone() {
+    let mut m = among_nineteen();
+    let far = |id| Gossip {
+        hops: 2,
+        ..entry(id, 9, 10, None)
+    };
+    m.on_beacon(Time(3_000), 3, 1, &beacon(11, (4..14).map(far).collect()));
+    let ids = |fresh: &[Fresh]| -> Vec<u16> { fresh.iter().map(|f| f.id).collect() };
+    let (told, fresh) = m.tell(Time(5_000), 4);
+    assert_eq!(told.iter().map(|g| g.id).collect::<Vec<_>>(), [4, 2]);
+    assert_eq!(ids(&fresh), [5, 6, 7, 8]);
+    let (told, fresh) = m.tell(Time(6_000), 4);
+    assert_eq!(told.iter().map(|g| g.id).collect::<Vec<_>>(), [9, 3]);
+    assert_eq!(ids(&fresh), [10, 11, 12, 13]);
+    let (told, fresh) = m.tell(Time(7_000), 19);
+    assert_eq!((told.len(), fresh.len()), (19, 0));
+}
+
+#[test]
+fn a_heartbeat_alone_counts_for_the_life_that_is_known() {
+    let mut m = Membership::new(1, 1000);
+    m.on_beacon(Time(0), 2, 9, &beacon(5, Vec::new()));
+    let fresh = Fresh {
+        id: 2,
+        life: 1,
+        heartbeat: 40,
+        age_ds: 10,
+        hops: 1,
+        interval: 8,
+        able: false,
+    };
+    let say = |fresh| Beacon {
+        fresh: vec![fresh, Fresh { id: 7, ..fresh }],
+        ..samples::beacon(6)
+    };
+    m.on_beacon(Time(10_000), 3, 1, &say(Fresh { life: 0, ..fresh }));
+    let of_2 = |m: &mut Membership| {
+        *m.gossip(Time(10_000), 9)
+            .iter()
+            .find(|g| g.id == 2)
+            .unwrap()
+    };
+    assert_eq!(of_2(&mut m).heartbeat, 5);
+    m.on_beacon(Time(10_000), 3, 1, &say(fresh));
+    let told = of_2(&mut m);
+    assert_eq!((told.incarnation, told.heartbeat, told.age_ds), (9, 40, 10));
+    assert_eq!((told.hops, told.interval, told.able), (2, 8, false));
+    assert_eq!(m.status(7), None, "nothing else is known of it");
+}
+
 #[test]
 fn made_up_ids_do_not_displace_the_living() {
     let mut m = Membership::new(1, 1000);

@@ -128,7 +128,7 @@ impl Net {
         node.next_beacon = self.now + interval_ms * 9 / 10 + self.dice.below(interval_ms / 5);
         node.heartbeat += 1;
         node.membership.tick(now);
-        let mut gossip = node.membership.gossip(now, plan.entries);
+        let (mut gossip, fresh) = node.membership.tell(now, plan.entries);
         for g in &mut gossip {
             (g.max_seq, g.digest) = node.relay.version(g.id, g.incarnation);
         }
@@ -137,6 +137,7 @@ impl Net {
             interval: plan.interval,
             sharers: node.relay.air.counted(),
             gossip,
+            fresh,
             ..samples::beacon(node.heartbeat)
         };
         let bytes = codec::encode_body(&Body::Beacon(said.clone())).len();
