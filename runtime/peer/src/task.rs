@@ -153,7 +153,9 @@ mod tests {
             (told[0].way[1].x, told[0].way[1].y, told[0].width_m),
             (40.0, 1.5, 8.25)
         );
+        assert!(CoverageTask::Area.is_area() && !CoverageTask::Exact.is_area());
         for task in [points, lines] {
+            assert!(!task.is_area());
             assert_eq!(CoverageTask::of_targets(&task.targets().unwrap()), task);
         }
     }

@@ -452,7 +452,9 @@ mod tests {
         let mut air = air(64_000, 8);
         // 3,600 bytes a second among nine are 400 a second, and a bucket of 1,200.
         assert!(!air.pay(Time(0), 100));
+        assert!(air.is_in_credit());
         air.charge(Time(3000), 1_974);
+        assert!(!air.is_in_credit());
         assert!(!air.pay(Time(4_900), 100));
         assert_eq!(air.wait_ms(Time(4_900), 374), 1_100);
         assert!(air.pay(Time(6_000), 374));
@@ -503,5 +505,35 @@ mod tests {
         assert_eq!(spent(&air), 84 + 104 + 186);
         assert!(air.pay(Time(3_000), 156));
         assert_eq!(spent(&air), 84 + 104 + 186 + 160);
+    }
+
+    #[test]
+    fn a_beacon_carries_as_much_gossip_as_its_part_of_the_share_and_what_nobody_used() {
+        // Of 3,600 bytes a second, three fifths among all, less 134 of a beacon and a
+        // heartbeat without gossip; 17 an entry.
+        for (neighbours, entries) in [(3, 20), (4, 17), (5, 13), (7, 8), (9, 4), (19, 4)] {
+            let mut air = air(64_000, neighbours);
+            assert_eq!(air.plan_beacon(Time(0)).entries, entries, "{neighbours}");
+        }
+        let mut quiet = air(64_000, 7);
+        assert_eq!(quiet.plan_beacon(Time(3_000)).entries, 20);
+        // Half of what the bucket holds: of 450 bytes after a second, 225.
+        quiet.tokens_millibytes = 330_000;
+        quiet.filled = Time(3_000);
+        assert_eq!(quiet.plan_beacon(Time(3_000)).entries, 8);
+        quiet.tokens_millibytes = 700_000;
+        assert_eq!(quiet.plan_beacon(Time(3_000)).entries, 12);
+    }
+
+    #[test]
+    fn the_interval_at_most_doubles_from_one_beacon_to_the_next() {
+        let mut air = air(64_000, 99);
+        let intervals = [0; 6].map(|_| air.plan_beacon(Time(100)).interval);
+        // 4 · 202 bytes of 21 a second.
+        assert_eq!(intervals, [8, 16, 32, 39, 39, 39]);
+        assert_eq!(air.interval_ms(), 9_750);
+        let mut crowded = super::tests::air(20_000, 200);
+        let intervals = [0; 6].map(|_| crowded.plan_beacon(Time(100)).interval);
+        assert_eq!(intervals, [8, 16, 32, 64, 64, 64]);
     }
 }

@@ -439,4 +439,72 @@ mod tests {
         slow.wait_ms = 9000;
         assert_eq!(a.hear(member(2), &bid(&slow, 2)), HeardBid::BidWanted);
     }
+
+    /// A round that is complete in the eyes of its first member.
+    fn complete(round: &Round, anchor: u16) -> Epoch {
+        let mut rounds = Rounds::new(round.members[0], 0);
+        for member in &round.members[1..] {
+            rounds.hear(*member, &bid(round, anchor));
+        }
+        assert!(rounds.bid(bid(round, anchor)));
+        rounds.complete().unwrap().0
+    }
+
+    #[test]
+    fn of_two_rounds_with_one_counter_the_higher_one_has_the_higher_epoch() {
+        let mut rounds: Vec<Round> = Vec::new();
+        for loop_hash in 0..60 {
+            for ids in [&[1, 2][..], &[1, 2, 3], &[1, 3]] {
+                rounds.push(Round {
+                    loop_hash,
+                    ..round(5, ids)
+                });
+            }
+        }
+        rounds.sort_by_key(order_of);
+        // Of the order's hash twelve bits are left in an epoch.
+        let coarse = |r: &Round| {
+            let (counter, members, hash) = order_of(r);
+            (counter, members, hash >> 20)
+        };
+        let apart = rounds.windows(2).filter(|w| coarse(&w[0]) < coarse(&w[1]));
+        let mut compared = 0;
+        for pair in apart {
+            assert!(complete(&pair[0], 0) < complete(&pair[1], 0), "{pair:?}");
+            compared += 1;
+        }
+        assert!(compared > 150, "{compared}");
+        assert!(complete(&round(6, &[1, 2]), 0) > complete(&round(5, &[1, 2, 3]), 0));
+    }
+
+    /// All members have to compute the same, and journals keep it: other numbers are another
+    /// version of the format.
+    #[test]
+    fn the_epoch_of_a_round_is_a_hash_of_its_bids() {
+        let r = round(5, &[1, 2]);
+        let epochs = [0, 1, 2].map(|anchor| complete(&r, anchor).hash);
+        assert_eq!(order_of(&r), (5, 2, 3_341_732_236));
+        assert_eq!(epochs, [46_605_128, 46_606_571, 46_605_917]);
+    }
+
+    #[test]
+    fn a_bid_of_somebody_who_is_no_member_or_of_this_peer_itself_counts_for_nothing() {
+        let r = round(3, &[1, 2]);
+        for author in [1, 3] {
+            let mut rounds = Rounds::new(member(1), 0);
+            assert_eq!(rounds.hear(member(author), &bid(&r, 0)), HeardBid::Nothing);
+            assert!(rounds.open().is_none());
+        }
+        // A second bid of the same author changes nothing: the first is the one.
+        let mut rounds = Rounds::new(member(1), 0);
+        assert_eq!(rounds.hear(member(2), &bid(&r, 4)), HeardBid::BidWanted);
+        assert_eq!(rounds.hear(member(2), &bid(&r, 9)), HeardBid::Nothing);
+        assert_eq!(rounds.open().unwrap().bids[&2].anchor, 4);
+        assert_eq!(rounds.missing(), [member(1)]);
+        // What is closed does not open again.
+        assert!(rounds.bid(bid(&r, 1)) && rounds.missing().is_empty());
+        rounds.close();
+        assert_eq!(rounds.hear(member(2), &bid(&r, 4)), HeardBid::Nothing);
+        assert!(rounds.open().is_none());
+    }
 }

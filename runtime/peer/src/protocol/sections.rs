@@ -766,4 +766,44 @@ mod tests {
         assert_eq!(cells, [1, 0, 9, 8, 5, 3]);
         assert_eq!(sections.n_left(2), 6);
     }
+
+    #[test]
+    fn what_is_covered_planned_or_beyond_the_loop_is_not_taken() {
+        let mut s = Sections::new(1, 10, CellSet::of(10, [4]));
+        assert_eq!(s.take(&forward(&[2])), 1);
+        let taken = s.taken(&forward(&[2, 4, 10, 3, 3]));
+        assert_eq!(taken.iter().map(|p| p.cell).collect::<Vec<_>>(), [3]);
+        // Between the promise and the answer of the disk a cell may be covered or planned.
+        let both = s.taken(&forward(&[5, 6, 7]));
+        s.cover(&CellSet::of(10, [5]));
+        assert_eq!(s.take(&forward(&[6])), 1);
+        assert_eq!(s.append(&both), 1);
+        let plan: Vec<u16> = s.plan().iter().map(|p| p.cell).collect();
+        assert_eq!(plan, [2, 6, 7]);
+    }
+
+    #[test]
+    fn what_is_made_durable_of_a_plan_is_the_claim_that_tells_it() {
+        let mut s = sections(1);
+        let epoch = Epoch {
+            counter: 3,
+            hash: 9,
+        };
+        assert!(s.adopt(epoch, &[], &forward(&[1, 2, 3])));
+        let written = s.claim_with(epoch, s.plan(), 7, 11);
+        assert_eq!(written, s.claim(7, 11, 0));
+        assert_eq!(s.fitting(s.plan()), 3);
+    }
+
+    #[test]
+    fn takes_of_a_new_life_outrank_what_the_one_before_adopted() {
+        let epoch = |counter| Epoch { counter, hash: 0 };
+        let mut s = sections(1);
+        s.restore_epoch(epoch(4));
+        s.restore_epoch(epoch(2));
+        assert_eq!(s.epoch(), epoch(4));
+        assert_eq!(s.taken(&forward(&[2]))[0].stamp, stamp(4, 1, 1));
+        assert!(!s.adopt(epoch(4), &[], &forward(&[2])));
+        assert!(s.adopt(epoch(5), &[], &forward(&[2])));
+    }
 }

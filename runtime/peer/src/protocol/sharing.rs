@@ -366,6 +366,10 @@ mod tests {
             assert!(of(1).iter().all(|(c, _)| (0..10).contains(c)));
             assert!(of(2).iter().all(|(c, _)| (10..20).contains(c)));
             assert_eq!(relief(&owners, &[near, far], 7, pace, 0), None);
+            // Whatever their numbers: of two owners the one who gains more is relieved.
+            let owners = [owner(3, 10..20, 60_000), owner(4, 0..10, 100_000)];
+            let (taken, _) = relief(&owners, &[hand(pace, 1, 9)], 1, pace, 0).unwrap();
+            assert!(taken.iter().all(|(c, _)| (0..10).contains(c)));
         });
     }
 

@@ -332,6 +332,8 @@ fn what_is_said_of_a_uav_is_what_it_senses() {
     assert_eq!((said.height_mm, said.heading_e4), (65_400, 12_345));
     assert_eq!((said.airspeed_mmps, said.endurance_s), (13_200, 2_222));
     assert_eq!(said.mission, MissionStatus::Active);
+    let of_station = state(&mut h, GROUND_STATION);
+    assert_eq!(of_station.mission, MissionStatus::Active);
     assert_eq!(usize::from(said.cells), b.covered.len());
     assert!(said.covered > 0 && usize::from(said.covered) <= covered(&h, 1));
     let activity = |h: &mut Harness| {

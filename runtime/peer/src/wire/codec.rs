@@ -754,6 +754,120 @@ mod tests {
         );
     }
 
+    /// One more than what the largest valid body of a kind holds is refused, and so is one less
+    /// than the least.
+    #[test]
+    fn every_limit_is_sharp() {
+        let refused = |body: &Body, field| {
+            assert_eq!(body.check(), Err(WireError::Range { field }), "{body:?}");
+        };
+        let mut kinds = 0;
+        for body in largest() {
+            assert_eq!(body.check(), Ok(()), "{body:?}");
+            match body {
+                Body::Beacon(b) => {
+                    kinds += 1;
+                    let with = |change: &dyn Fn(&mut Beacon), field| {
+                        let mut b = b.clone();
+                        change(&mut b);
+                        refused(&Body::Beacon(b), field);
+                    };
+                    with(&|b| b.east_mm -= 1, "east_mm");
+                    with(&|b| b.east_mm = 1 - b.east_mm, "east_mm");
+                    with(&|b| b.north_mm -= 1, "north_mm");
+                    with(&|b| b.heading_e4 -= 1, "heading_e4");
+                    with(&|b| b.eccentricity += 1, "eccentricity");
+                    with(&|b| b.interval += 1, "interval");
+                    with(&|b| b.interval = INTERVAL_LEAST - 1, "interval");
+                    with(&|b| b.sharers += 1, "sharers");
+                    with(&|b| b.gossip.push(gossip(1)), "gossip");
+                    with(&|b| b.gossip[3].hops += 1, "hops");
+                    with(&|b| b.gossip[3].interval += 1, "interval");
+                }
+                Body::Heartbeat(h) => {
+                    kinds += 1;
+                    let with = |change: &dyn Fn(&mut Heartbeat), field| {
+                        let mut h = h;
+                        change(&mut h);
+                        refused(&Body::Heartbeat(h), field);
+                    };
+                    with(&|h| h.interval = INTERVAL_MOST + 1, "interval");
+                    with(&|h| h.interval = INTERVAL_LEAST - 1, "interval");
+                    with(&|h| h.sharers = 258, "sharers");
+                    with(&|h| h.east_dm = 200_001, "east_dm");
+                    with(&|h| h.north_dm = -200_001, "north_dm");
+                }
+                Body::State(s) => {
+                    kinds += 1;
+                    let with = |change: &dyn Fn(&mut State), field| {
+                        let mut s = s.clone();
+                        change(&mut s);
+                        refused(&Body::State(s), field);
+                    };
+                    with(&|s| s.east_mm -= 1, "east_mm");
+                    with(&|s| s.height_mm -= 1, "height_mm");
+                    with(&|s| s.airspeed_mmps += 1, "airspeed_mmps");
+                    with(&|s| s.endurance_s += 1, "endurance_s");
+                    with(&|s| s.cells -= 1, "covered");
+                }
+                Body::Bid(s) => {
+                    kinds += 1;
+                    let with = |change: &dyn Fn(&mut Bid), field| {
+                        let mut s = s.clone();
+                        change(&mut s);
+                        refused(&Body::Bid(s), field);
+                    };
+                    with(&|s| s.round.wait_ms += 1, "wait_ms");
+                    with(
+                        &|s| s.round.members[1].id = s.round.members[0].id,
+                        "members",
+                    );
+                    with(&|s| s.release_ms += 1, "release_ms");
+                    with(&|s| s.turn_ms += 1, "turn_ms");
+                    with(&|s| s.endurance_ms += 1, "endurance_ms");
+                    with(&|s| s.eta_ms += 1, "eta_ms");
+                    with(&|s| s.speed_mmps += 1, "speed_mmps");
+                    with(&|s| s.covered.push(0), "covered");
+                    with(&|s| s.commits.push(s.commits[0]), "commits");
+                    with(&|s| s.commits[0].count = 0, "commits");
+                    with(&|s| s.off_loop.push(s.off_loop[0]), "off_loop");
+                    with(&|s| s.off_loop[0].ready_ms += 1, "ready_ms");
+                    with(&|s| s.off_loop[0].north_mm = i32::MAX, "north_mm");
+                }
+                Body::Claim(r) => {
+                    kinds += 1;
+                    let with = |change: &dyn Fn(&mut Claim), field| {
+                        let mut r = r.clone();
+                        change(&mut r);
+                        refused(&Body::Claim(r), field);
+                    };
+                    with(&|r| r.plan.push(listing(1)), "plan");
+                    with(&|r| r.plan[2].run.count = 0, "plan");
+                    with(&|r| r.held.push(listing(1)), "held");
+                    with(&|r| r.held[2].run.count = 0, "held");
+                    with(&|r| r.done.push(r.done[0]), "done");
+                    with(&|r| r.done[2].count = 0, "done");
+                    with(&|r| r.eta_ms += 1, "eta_ms");
+                }
+                Body::Cover(mut c) => {
+                    kinds += 1;
+                    c.covered.push(0);
+                    refused(&Body::Cover(c), "covered");
+                }
+                Body::Mission(m) => {
+                    kinds += 1;
+                    let mut long = m.clone();
+                    long.bytes.push(0);
+                    refused(&Body::Mission(long), "bytes");
+                    let chunks = CHUNKS_MAX + 1;
+                    refused(&Body::Mission(MissionChunk { chunks, ..m }), "chunks");
+                }
+                Body::Operator(_) | Body::Finished(_) => {}
+            }
+        }
+        assert_eq!(kinds, 7);
+    }
+
     #[test]
     fn longer_forms_nesting_and_trailing_bytes_are_refused() {
         let finished = |bytes: &[u8]| decode_body(Kind::Finished, bytes);

@@ -648,3 +648,10 @@ fn nobody_is_told_of_himself_and_nobody_hears_of_himself() {
     assert_eq!(m.all().collect::<Vec<_>>(), [(3, 1, Status::Alive)]);
     assert_eq!(m.gossip(Time(10), 4)[0].heartbeat, 1, "by its own word");
 }
+
+#[test]
+fn how_many_are_known_is_told_with_the_cap() {
+    let mut m = Membership::new(1, 1000);
+    m.on_beacon(Time(0), 2, 1, &beacon(1, vec![entry(4, 7, 10, None)]));
+    assert_eq!(m.loads(), [("peers known", 2, 255)]);
+}
