@@ -8,7 +8,7 @@ use crate::wire::kinds::Kind;
 use crate::wire::message::{Activity, MissionStatus};
 use crate::{Input, PeerId};
 use skein_behaviors::Order;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Whether each open cell is in the plan of exactly one of these peers.
 fn divided(h: &Harness, ids: &[u16]) -> bool {
@@ -192,13 +192,19 @@ fn a_hint_alone_is_no_verdict() {
     assert_eq!(h.beliefs(1).peers[&PeerId(2)].1, Status::Alive);
 }
 
+/// §7: a claim follows within an interval of what was taken, a quarter of one more at most.
 #[test]
 fn what_is_published_is_what_is_planned() {
     let mut h = Harness::started(3, mission(1, 8, 6));
+    let mut before: BTreeMap<u16, [BTreeSet<u16>; 2]> = BTreeMap::new();
     for _ in 0..100 {
         h.run_s(1);
         for id in 1..=3 {
             let plan: BTreeSet<u16> = h.beliefs(id).plan.into_iter().collect();
+            let [first, second] = before.entry(id).or_default();
+            let of_two_seconds_ago = core::mem::replace(first, second.clone());
+            second.clone_from(&plan);
+            let plan: BTreeSet<u16> = plan.intersection(&of_two_seconds_ago).copied().collect();
             let cells = u16::try_from(h.beliefs(id).covered.len()).unwrap_or(0);
             let claim = h.seat(id).said.iter().rev().find_map(|(_, _, b)| match b {
                 Body::Claim(c) => Some(c.clone()),
