@@ -102,7 +102,8 @@ mod outbound;
 pub mod output;
 pub mod peer;
 pub mod protocol;
-pub mod task;
+mod taking;
+mod task;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 #[cfg(test)]

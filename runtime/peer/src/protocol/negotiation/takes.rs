@@ -1,0 +1,237 @@
+//! What a peer takes without a round: when, and what of it the claims that it heard decide.
+//! What is worth taking is [`crate::protocol::sharing`]'s and
+//! [`crate::mission_state::MissionState`]'s.
+
+use super::{Context, Negotiation, PATIENT_PERIODS, STEADY_PERIODS, TWO_CELLS_MS, is_many};
+use crate::Time;
+use crate::cells::CellSet;
+use crate::protocol::runs::PlannedCell;
+use crate::protocol::sharing::Owner;
+use crate::wire::message::Epoch;
+use skein_flight::coverage::ring::{CoverageLoop, Direction};
+
+/// Spreads peers without a plan over the loop, so that not all of them take the same
+/// orphans first: a prime above the cells of any loop flown yet, whose multiples by
+/// small ids lie far apart.
+const SPREAD: u64 = 7919;
+
+/// A peer takes its first section after so many quarters of a period of listening: who began
+/// with it has said twice by then where it is.
+const FIRST_SECTION_QUARTERS: u64 = 6;
+
+/// How near the begin of a first section is counts in its stamps as takes: from this many,
+/// one less for each four seconds of flight, in which a UAV passes a cell.
+const NEARNESS_MAX: u64 = 60;
+
+const NEARNESS_STEP_MS: u64 = 4000;
+
+/// Among many a peer looks this often in a period for what it could take.
+const LOOKS_A_PERIOD: u64 = 2;
+
+/// Among many a peer waits for others to take orphans for this part of the time until it
+/// would be there: the nearest one first.
+const NEARNESS_PART: u64 = 8;
+
+/// Peers take orphans one after the other by rank, this part of a period apart: a take has
+/// to be durable before others can hear of it.
+const TAKE_STAGGER: u64 = 2;
+
+impl Negotiation {
+    /// Whether this peer is to take a first section: it listened for a while, and as far as
+    /// it knows nothing was divided yet. Asked once.
+    pub fn begins(&mut self, ctx: &Context<'_>) -> bool {
+        let listened_ms = FIRST_SECTION_QUARTERS * ctx.period_ms / 4;
+        let listened = ctx
+            .able_since
+            .is_some_and(|t| ctx.now.since_ms(t) >= listened_ms);
+        if self.began || !listened {
+            return false;
+        }
+        self.began = true;
+        let untouched = self.rounds.counter() == 0
+            && self.sections.epoch() == Epoch::default()
+            && self.sections.plan().is_empty();
+        self.provisional = untouched && ctx.members.len() > 1;
+        self.provisional
+    }
+
+    /// Whether this peer, among many, is to look for what it could take: half a period after
+    /// it looked last.
+    pub fn looks_around(&mut self, ctx: &Context<'_>) -> bool {
+        let rested = |t| ctx.now.since_ms(t) >= ctx.period_ms / LOOKS_A_PERIOD;
+        let looks = is_many(ctx)
+            && ctx.able_since.is_some()
+            && !self.sections.complete()
+            && !self.take_pending
+            && self.rounds.open().is_none()
+            && self.looked_at.is_none_or(rested);
+        if looks {
+            self.looked_at = Some(ctx.now);
+        }
+        looks
+    }
+
+    /// For how long there are orphans, if there are any.
+    #[must_use]
+    pub fn orphaned_ms(&self, ctx: &Context<'_>) -> Option<u64> {
+        self.orphan_since.map(|t| ctx.now.since_ms(t))
+    }
+
+    /// Whether orphans have waited for long enough for those who would be there sooner.
+    #[must_use]
+    pub fn is_my_turn(&self, ctx: &Context<'_>, orphaned_ms: u64, way_ms: u64) -> bool {
+        let for_others_ms = (way_ms / NEARNESS_PART).min(ctx.base_wait_ms());
+        orphaned_ms >= STEADY_PERIODS * ctx.period_ms + for_others_ms
+    }
+
+    /// Whether this peer will have nothing to fly before others have heard what it takes.
+    #[must_use]
+    pub fn may_relieve(&self, ctx: &Context<'_>, free_ms: u64) -> bool {
+        free_ms <= STEADY_PERIODS * ctx.period_ms
+    }
+
+    /// The live owners with what they have left, but for what others took of it since.
+    #[must_use]
+    pub fn owners(&self, ctx: &Context<'_>) -> Vec<Owner> {
+        let highest = self.sections.highest_stamps(ctx.live);
+        let is_taken = |c: &PlannedCell| highest.get(&c.cell).is_some_and(|s| *s > c.stamp);
+        let at_work = self
+            .progress
+            .iter()
+            .filter(|(id, _)| ctx.live.contains_key(id));
+        at_work
+            .filter_map(|(id, p)| {
+                let plan = self.sections.plan_of(*id);
+                let listed = u64::try_from(plan.len()).ok().filter(|n| *n > 0)?;
+                let kept = plan.iter().filter(|c| !is_taken(c));
+                let plan: Vec<_> = kept.map(|c| (c.cell, c.direction)).collect();
+                let many = u64::try_from(plan.len()).unwrap_or(0);
+                let left_ms = p.end.since_ms(ctx.now) * many / listed;
+                Some(Owner {
+                    id: *id,
+                    plan,
+                    left_ms,
+                })
+            })
+            .collect()
+    }
+
+    /// The takes are durable.
+    pub fn take(&mut self, taken: &[PlannedCell]) -> usize {
+        self.take_pending = false;
+        self.sections.append(taken)
+    }
+
+    /// The takes were not made durable: they may be tried again.
+    pub fn cancel_take(&mut self) {
+        self.take_pending = false;
+    }
+
+    /// Inheritance: what to take without a round, if anything.
+    pub(super) fn inherit(
+        &self,
+        ctx: &Context<'_>,
+        orphans: &CellSet,
+        lp: &CoverageLoop,
+    ) -> Option<Vec<(u16, Direction)>> {
+        if self.take_pending {
+            return None;
+        }
+        let stagger = self.rank(ctx) * ctx.period_ms / TAKE_STAGGER;
+        if let Some(since) = self.orphan_since {
+            if is_many(ctx) {
+                return None;
+            }
+            let patience = STEADY_PERIODS * ctx.period_ms + ctx.base_wait_ms() + stagger;
+            return (ctx.now.since_ms(since) >= patience)
+                .then(|| self.nearest_run(orphans, lp))
+                .flatten();
+        }
+        let idle_ms = self.idle_since.map(|t| ctx.now.since_ms(t))?;
+        if idle_ms < PATIENT_PERIODS * ctx.period_ms + stagger || self.rounds.open().is_some() {
+            return None;
+        }
+        let stalled_ms = TWO_CELLS_MS
+            + (PATIENT_PERIODS + 2 * u64::from(ctx.diameter)) * ctx.period_ms
+            + stagger;
+        let (owner, _) = self.progress.iter().find(|(id, p)| {
+            p.left > 0
+                && ctx.live.contains_key(id)
+                && (ctx.now.since_ms(p.since) >= 3 * stalled_ms || ctx.now >= p.bound)
+        })?;
+        Some(far_half(&self.sections.plan_of(*owner)))
+    }
+
+    /// Cells to be taken: nothing more is until they are durable or cannot be.
+    pub fn begin_take(&mut self, cells: &[(u16, Direction)]) -> Option<Vec<PlannedCell>> {
+        let taken = self.sections.taken(cells);
+        self.take_pending = !taken.is_empty();
+        self.take_pending.then_some(taken)
+    }
+
+    /// As [`Negotiation::begin_take`], of the first section, whose begin is so far away: of two
+    /// first sections that overlap, the one that is begun sooner outranks the other.
+    pub fn begin_first(
+        &mut self,
+        cells: &[(u16, Direction)],
+        way_ms: u64,
+    ) -> Option<Vec<PlannedCell>> {
+        let away = (way_ms / NEARNESS_STEP_MS).min(NEARNESS_MAX);
+        let nearness = u16::try_from(NEARNESS_MAX - away).unwrap_or(0);
+        let mut taken = self.begin_take(cells)?;
+        for p in &mut taken {
+            p.stamp.take = p.stamp.take.saturating_add(nearness);
+        }
+        Some(taken)
+    }
+
+    /// What an idle peer may try to fly although no division could give it to anybody: fuel
+    /// that others were to need may be left, or be back. Looked at once in ten periods.
+    pub fn left_over(&mut self, ctx: &Context<'_>) -> Option<CellSet> {
+        let stagger = self.rank(ctx) * ctx.period_ms / TAKE_STAGGER;
+        let patience = PATIENT_PERIODS * ctx.period_ms;
+        let for_long = |since: Option<Time>, ms| since.is_some_and(|t| ctx.now.since_ms(t) >= ms);
+        let idle = ctx.able_since.is_some() && for_long(self.idle_since, patience + stagger);
+        let busy = self.take_pending || self.orphan_since.is_some() || self.rounds.open().is_some();
+        let rested = self.left_over_at.is_none() || for_long(self.left_over_at, patience);
+        if !idle || busy || !rested {
+            return None;
+        }
+        self.left_over_at = Some(ctx.now);
+        Some(self.sections.left_over(ctx.live))
+    }
+
+    /// The run of orphans nearest along the loop to where this peer works.
+    pub(super) fn nearest_run(&self, orphans: &CellSet, lp: &CoverageLoop) -> Option<Vec<(u16, Direction)>> {
+        let n = i32::from(self.sections.cells());
+        let here = self.sections.plan().last().map(|p| i32::from(p.cell));
+        let here = here.unwrap_or_else(|| {
+            let n_cells = lp.len() as u64;
+            i32::try_from(u64::from(self.me) * SPREAD % n_cells.max(1)).unwrap_or(0)
+        });
+        let away = |c: u16| {
+            let d = (i32::from(c) - here).rem_euclid(n);
+            d.min(n - d)
+        };
+        // No run crosses the seam.
+        let ends = orphans.runs().into_iter();
+        let ends = ends.map(|r| (r.first, r.first + (r.count - 1)));
+        let (first, last) =
+            ends.min_by_key(|(first, last)| (away(*first).min(away(*last)), *first))?;
+        if away(last) < away(first) {
+            let cells = (first..=last).rev();
+            Some(cells.map(|c| (c, Direction::Backward)).collect())
+        } else {
+            Some((first..=last).map(|c| (c, Direction::Forward)).collect())
+        }
+    }
+}
+
+/// The second half of an owner's plan, from its far end.
+fn far_half(plan: &[PlannedCell]) -> Vec<(u16, Direction)> {
+    plan.iter()
+        .skip(plan.len() / 2)
+        .rev()
+        .map(|p| (p.cell, p.direction.opposite()))
+        .collect()
+}
