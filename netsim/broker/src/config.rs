@@ -79,6 +79,7 @@ impl Surroundings<'_> {
             "airframe": airframe,
             "objective": self.spec.objective,
             "mission": "mission.json",
+            "launches": &self.spec.launches()[..],
             "seed": skein_link::fate::mix(self.seed ^ (u64::from(id) << 40)),
             "journal": format!("uav{id}.journal"),
             "listen": "tcp/127.0.0.1:0",

@@ -7,6 +7,8 @@ use skein_flight::trajectory::wind::Wind;
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Pose};
 use skein_peer::Mission;
+use skein_peer::config::Launch;
+use skein_peer::mission::mm;
 use std::sync::Arc;
 
 /// Everything a run needs, besides a seed.
@@ -50,6 +52,21 @@ pub struct Spec {
     pub storm: StormSpec,
     /// The default seed.
     pub seed: u64,
+}
+
+impl Spec {
+    /// Who is launched where and when, as every peer of the fleet is told.
+    #[must_use]
+    pub fn launches(&self) -> Arc<[Launch]> {
+        let launch = |u: &UavSpec| Launch {
+            id: u.id,
+            east_mm: mm(u.launch.east_m),
+            north_mm: mm(u.launch.north_m),
+            takeoff_ms: u.takeoff_ms,
+            speed_mmps: mm(u.airframe.cruise_mps).unsigned_abs(),
+        };
+        self.uavs.iter().map(launch).collect()
+    }
 }
 
 /// A prism that blocks radio.

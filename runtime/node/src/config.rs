@@ -8,7 +8,7 @@ use crate::console::ConsoleConfig;
 use crate::simulator::SimulatorConfig;
 use skein_interop::airframe;
 use skein_interop::json::{Document, Error, Fields, Node, Place};
-use skein_peer::config::Objective;
+use skein_peer::config::{Launch, Objective};
 use skein_peer::{Mission, PeerConfig, PeerId, Role};
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -26,6 +26,7 @@ const FIELDS: &[&str] = &[
     "airframe",
     "objective",
     "mission",
+    "launches",
     "seed",
     "journal",
     "listen",
@@ -116,6 +117,9 @@ impl NodeConfig {
                 .need("height_m", "60")?
                 .number(-1_000.0, 20_000.0, "metres")?,
             mission: mission(&f, base)?,
+            launches: f
+                .given("launches")
+                .map_or_else(|| Ok(Arc::from([])), launches)?,
             seed: f.need("seed", "1")?.count(0, u64::MAX, "any number")?,
         };
         let links = f.need("links", "[]")?.items()?;
@@ -147,6 +151,35 @@ impl NodeConfig {
             queue_age_ms: milliseconds("queue_age_ms", 1, 60_000)?,
         })
     }
+}
+
+/// Who is launched where and when.
+fn launches(node: &Node<'_>) -> Result<Arc<[Launch]>, Error> {
+    let fields = ["id", "east_mm", "north_mm", "takeoff_ms", "speed_mmps"];
+    let launch = |item: &Node<'_>| {
+        let f = item.fields(&fields)?;
+        let mm = |name| {
+            let mm = f.need(name, "0")?.number(-20e6, 20e6, "millimetres")?;
+            #[allow(
+                clippy::cast_possible_truncation,
+                reason = "twenty kilometres in millimetres fit"
+            )]
+            let mm = mm.round() as i32;
+            Ok::<i32, Error>(mm)
+        };
+        Ok(Launch {
+            id: f.need("id", "1")?.small(0, u16::MAX, "a peer's number")?,
+            east_mm: mm("east_mm")?,
+            north_mm: mm("north_mm")?,
+            takeoff_ms: f
+                .need("takeoff_ms", "0")?
+                .whole(0, 86_400_000, "milliseconds")?,
+            speed_mmps: f
+                .need("speed_mmps", "13000")?
+                .whole(1, 200_000, "millimetres a second")?,
+        })
+    };
+    node.items()?.iter().map(launch).collect()
 }
 
 fn read(path: &Path) -> Result<String, ConfigError> {

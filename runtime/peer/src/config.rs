@@ -17,6 +17,21 @@ pub enum Role {
     GroundStation,
 }
 
+/// Where and when a UAV of the fleet is launched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Launch {
+    /// Who.
+    pub id: u16,
+    /// East of the mission's origin, millimetres.
+    pub east_mm: i32,
+    /// North of it, millimetres.
+    pub north_mm: i32,
+    /// From the start of the fleet on, milliseconds.
+    pub takeoff_ms: u32,
+    /// Its cruise speed, mm/s.
+    pub speed_mmps: u32,
+}
+
 /// The configuration of one peer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PeerConfig {
@@ -39,6 +54,9 @@ pub struct PeerConfig {
     pub height_m: f64,
     /// The mission it was launched with, if any; a ground station speaks it.
     pub mission: Option<Arc<Mission>>,
+    /// Who is launched where and when, as planned; empty where nobody planned it. The same for
+    /// the whole fleet.
+    pub launches: Arc<[Launch]>,
     /// Seed of the peer's own random stream (beacon jitter, boot nonce).
     pub seed: u64,
 }

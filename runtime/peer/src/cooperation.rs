@@ -7,6 +7,7 @@
 //! | the operator said return, or all is covered, or the fuel is due | loiter at base |
 //! | the plan has cells | fly them |
 //! | nothing to fly, others at work | loiter here, at the seam |
+//! | and among many nobody is heard | loiter at base |
 //!
 //! | event | what follows |
 //! |---|---|
@@ -42,7 +43,7 @@ use crate::protocol::runs::{PlannedCell, legs_of};
 use crate::protocol::sections::LivePeers;
 use crate::timers::{Timer, Timers};
 use crate::wire::codec::Body;
-use crate::wire::limits::BID_COVERED_MAX_BYTES;
+use crate::wire::limits::{BID_COVERED_MAX_BYTES, MEMBERS_MAX};
 use crate::wire::message::{Beacon, Bid, Epoch, Member, Order, Record};
 use crate::{Incarnation, PeerId};
 use skein_behaviors::executive::UNREACHABLE_MS;
@@ -289,6 +290,7 @@ impl Cooperation {
         let able = able && !s.membership.is_deaf(s.now);
         effects.extend(state.negotiate(s, able, timers));
         effects.extend(state.notice_end(s, timers));
+        state.astray = s.membership.known() > MEMBERS_MAX && s.membership.hears_nobody(s.now);
         state.steer(order);
         assert!(
             !effects.iter().any(|e| matches!(e, Effect::Negotiate)),
@@ -467,6 +469,7 @@ impl MissionState {
             let reason = why.to_owned();
             return vec![Effect::Report(Report::Refused { reason })];
         }
+        let mut heard = None;
         let effect = match body {
             Body::Claim(claim) if claim.loop_hash == mine => negotiation
                 .sections
@@ -480,13 +483,16 @@ impl MissionState {
                 Some(Effect::Negotiate)
             }
             Body::Cover(cover) if cover.loop_hash == mine => {
-                let covered = CellSet::decode_rle(capacity, &cover.covered);
-                let news = covered.is_ok_and(|c| negotiation.sections.cover(&c));
+                let Ok(covered) = CellSet::decode_rle(capacity, &cover.covered) else {
+                    return Effects::new();
+                };
+                let news = negotiation.sections.cover(&covered);
+                heard = Some(Effect::CoverageHeard(mine, covered));
                 news.then_some(Effect::CoverageChanged)
             }
             _ => None,
         };
-        effect.into_iter().collect()
+        effect.into_iter().chain(heard).collect()
     }
 
     /// The own claim changed: it is spoken, and flown by.
@@ -572,8 +578,9 @@ impl MissionState {
 
     /// Lets the negotiation look at the time, and carries out what it wants.
     fn negotiate(&mut self, s: &Situation<'_>, able: bool, timers: &mut Timers) -> Effects {
-        let live = self.reachable(s.membership);
+        let mut live = self.reachable(s.membership);
         let members = self.members(s, &live, able);
+        let unheard = self.expect(s, &mut live);
         self.able_since = able.then(|| self.able_since.unwrap_or(s.now));
         let lost = self.live.iter().any(|(id, inc)| live.get(id) != Some(inc));
         self.live.clone_from(&live);
@@ -585,6 +592,7 @@ impl MissionState {
             period_ms: s.membership.interval_ms(),
             live: &live,
             members: &members,
+            unheard,
             diameter: s.membership.diameter(s.now),
             able_since: self.able_since,
             revision: self.revision(),
@@ -814,6 +822,9 @@ impl MissionState {
         let goal = if order == Order::Hold {
             Goal::Hold
         } else if order == Order::ReturnToBase || self.finished || self.exhausted {
+            Goal::Point(base)
+        } else if sections.plan().is_empty() && self.astray {
+            // Where the ground station is and whoever is finished, somebody is heard.
             Goal::Point(base)
         } else if sections.plan().is_empty() {
             Goal::Hold

@@ -5,6 +5,7 @@
 //! another one, an output, the journal or the relay.
 
 use crate::Incarnation;
+use crate::cells::CellSet;
 use crate::journal::Entry;
 use crate::mission::Mission;
 use crate::offload::Job;
@@ -44,6 +45,8 @@ pub(crate) enum Effect {
     ClaimNow,
     /// Covered cells are news: they are spoken soon.
     CoverageChanged,
+    /// A neighbour said that these cells of the loop are covered.
+    CoverageHeard(u64, CellSet),
     /// A neighbour knows of other covered cells: they are spoken sooner.
     CoverageWanted,
     /// All is covered: that is spoken.

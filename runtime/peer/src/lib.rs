@@ -48,6 +48,7 @@
 //!     objective: Objective::Time,
 //!     height_m: 0.0,
 //!     mission: None,
+//!     launches: [].into(),
 //!     seed: 1,
 //! });
 //! let (mut now, mut journal, mut sent) = (Time(0), Vec::new(), 0);

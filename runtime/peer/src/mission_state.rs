@@ -12,15 +12,18 @@
 //! What is done with a mission is the cooperation manager's.
 
 use crate::cells::CellSet;
-use crate::config::PeerConfig;
+use crate::config::{Launch, PeerConfig};
+use crate::input::Time;
 use crate::journal::Durable;
 use crate::offload::MissionGeometry;
 use crate::protocol::Negotiation;
-use crate::protocol::sections::LivePeers;
+use crate::protocol::sections::{FIRST_LIFE, LivePeers};
 use crate::timers::{Timer, Timers};
+use crate::wire::limits::MEMBERS_MAX;
 use crate::wire::message::{Activity, Claim, Member, MissionStatus};
 use skein_behaviors::{Executive, Goal, Percept};
 use skein_flight::coverage::ring::CoverageLoop;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Claims on their way to the journal, numbered in the order in which it gets them. Only
@@ -76,6 +79,8 @@ pub(crate) struct MissionState {
     /// Whether all others were believed down at the last tick.
     pub alone: bool,
     pub finished: bool,
+    /// Whether it heard of many and hears nobody now.
+    pub astray: bool,
     /// Whether its fuel is due: it flies home until some is back.
     pub exhausted: bool,
     /// When its plan was last compared with what the fuel allows.
@@ -83,6 +88,10 @@ pub(crate) struct MissionState {
     /// Cells covered by itself since the last entry of the journal.
     pub unsaved_cells: u16,
     pub claims: ClaimsWritten,
+    /// The roster, until it was used.
+    pub launches: Arc<[Launch]>,
+    /// Who of it was not heard of yet, and until when it is taken to be there.
+    pub expected: BTreeMap<u16, Time>,
 }
 
 impl MissionState {
@@ -90,6 +99,10 @@ impl MissionState {
     pub fn new_life(&mut self, me: Member, timers: &mut Timers) {
         timers.stop(Timer::HeldCells);
         self.negotiation.new_life(me);
+        if me.incarnation > FIRST_LIFE {
+            self.launches = Arc::from([]);
+            self.expected.clear();
+        }
         self.able_since = None;
         self.replan = true;
     }
@@ -150,6 +163,12 @@ impl MissionState {
         !sections.plan().is_empty() || !sections.held().is_empty()
     }
 
+    /// How many times eight peers are heard of and live, at least one.
+    pub fn eights(&self) -> u64 {
+        let heard_of = self.live.len().saturating_sub(self.expected.len());
+        (heard_of / MEMBERS_MAX).max(1) as u64
+    }
+
     pub fn eta_ms(&self) -> u32 {
         let sections = &self.negotiation.sections;
         match &self.executive {
@@ -180,7 +199,11 @@ impl MissionState {
         // A loop of more cells is no geometry: `LoopError::TooManyCells`.
         let cells = u16::try_from(geometry.coverage_loop.len()).unwrap_or(u16::MAX);
         timers.stop(Timer::NextLap);
+        let launches = roster(old.as_ref(), me, config, durable);
+        let others = launches.iter().map(|l| l.id).filter(|id| *id != me.id);
         let mut new = Self {
+            expected: others.map(|id| (id, Time(u64::MAX))).collect(),
+            launches,
             negotiation: negotiation_begun(&geometry, old.as_ref(), me, durable, cells),
             executive: executive_for(&geometry, config),
             goal: None,
@@ -189,6 +212,7 @@ impl MissionState {
             live: LivePeers::new(),
             alone: false,
             finished: false,
+            astray: false,
             exhausted: old.as_ref().is_some_and(|m| m.exhausted),
             fuel_looked_at: None,
             unsaved_cells: 0,
@@ -215,6 +239,8 @@ impl MissionState {
         self.alone = old.alone;
         self.claims = old.claims;
         self.unsaved_cells = old.unsaved_cells;
+        self.launches = old.launches;
+        self.expected = old.expected;
         let (new, before) = (&self.geometry.mission, &old.geometry.mission);
         let flown_alike = new.zones == before.zones
             && new.turn_radius_mm == before.turn_radius_mm
@@ -225,6 +251,23 @@ impl MissionState {
             self.goal = old.goal;
             self.replan = old.replan;
         }
+    }
+}
+
+/// The roster, where it says how things are: of a large fleet, at its first mission and in the
+/// first life.
+fn roster(
+    old: Option<&MissionState>,
+    me: Member,
+    config: &PeerConfig,
+    durable: &Durable,
+) -> Arc<[Launch]> {
+    let first = old.is_none() && me.incarnation.max(durable.incarnation) <= FIRST_LIFE;
+    let many = config.launches.len() > MEMBERS_MAX;
+    if first && many && config.launches.iter().any(|l| l.id == me.id) {
+        Arc::clone(&config.launches)
+    } else {
+        Arc::from([])
     }
 }
 

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | beacon | every I, ±10 %; within I/8 when somebody is heard who was suspected, or is suspected by a neighbour and was heard since, at most every I/2 and if nothing is owed |
 //! | heartbeat | half-way between two beacons; at once, and four times in I, when this peer hears that it is suspected |
-//! | claim | at once when a section was adopted, within I when cells were taken or it shrank by a rule; every 10 I for its ETA |
+//! | claim | at once when a section was adopted, within I when cells were taken or it shrank by a rule; every 10 I for its ETA, for each eight that are known to live |
 //! | cover | own or heard coverage is news, at most every 2 I; at most every I when a neighbour's beacon shows other coverage. What is news is said twice; all of it every 4 I where a neighbour still knows other cells, at the end, and to who was not there lately |
 //! | state | every 10 I |
 //! | bid | once it is durable |
@@ -14,6 +14,7 @@
 //!
 //! I is the interval that this peer's beacons announce, a period T where there is room.
 
+use crate::cells::CellSet;
 use crate::config::Role;
 use crate::coverage_told::CoverageTold;
 use crate::effect::{Effect, Effects};
@@ -32,7 +33,8 @@ use rand_core::Rng;
 use skein_behaviors::Percept;
 use std::sync::Arc;
 
-/// A claim is spoken again after this many intervals, for its ETA.
+/// A claim is spoken again after this many intervals, for its ETA, and among many after as many
+/// more: each is passed on by everybody, and those of a hundred would take all of the air.
 pub const CLAIM_INTERVALS: u64 = 10;
 
 /// Coverage is spoken at most every so many intervals: a cell takes three to
@@ -137,6 +139,11 @@ impl Outbound {
         self.coverage_told.meet();
     }
 
+    /// A neighbour among many said that these cells are covered.
+    pub fn coverage_heard(&mut self, loop_hash: u64, cells: &CellSet) {
+        self.coverage_told.heard(loop_hash, cells);
+    }
+
     /// A neighbour's beacon shows other coverage.
     pub fn coverage_wanted(&self, timers: &mut Timers) {
         timers.set_earlier(Timer::Cover, self.last_cover.plus_ms(self.interval_ms));
@@ -194,8 +201,8 @@ impl Outbound {
             eta_ms: claim.eta_ms,
         };
         self.last_claim = self.jittered(s.now, rng);
-        let again = self.last_claim.plus_ms(CLAIM_INTERVALS * self.interval_ms);
-        timers.set(Timer::Claim, again);
+        let again_ms = CLAIM_INTERVALS * state.eights() * self.interval_ms;
+        timers.set(Timer::Claim, self.last_claim.plus_ms(again_ms));
         vec![Effect::Speak(0, Body::Claim(claim)), Effect::Report(report)]
     }
 

@@ -397,6 +397,11 @@ impl Peer {
                 }
             }
             Effect::CoverageChanged => self.outbound.coverage_changed(&mut self.timers),
+            Effect::CoverageHeard(loop_hash, cells) => {
+                if self.relay.air.is_crowded() {
+                    self.outbound.coverage_heard(loop_hash, &cells);
+                }
+            }
             Effect::CoverageWanted => self.outbound.coverage_wanted(&mut self.timers),
             Effect::MissionFinished => self.timers.set(Timer::Finished, self.now),
             Effect::Offer(mission) => self.cooperation.offer(mission),

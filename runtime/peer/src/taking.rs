@@ -6,13 +6,18 @@
 use crate::cells::CellSet;
 use crate::cooperation::{Situation, speed_mmps};
 use crate::mission_state::MissionState;
+use crate::protocol::launches;
 use crate::protocol::negotiation::{Context, SETTLE_PERIODS};
 use crate::protocol::runs::{PlannedCell, cells_of, legs_of};
-use crate::protocol::sharing::{self, Hand, Pace, Site};
+use crate::protocol::sections::{FIRST_LIFE, LivePeers};
+use crate::protocol::sharing::{self, Hand, Owner, Pace, Site};
 use crate::wire::message::CellRun;
 use skein_behaviors::Percept;
 use skein_flight::coverage::ring::backtracking::Leg;
 use skein_flight::coverage::ring::{Direction, LoopCell};
+
+/// Turning round and coming onto a stretch is reckoned as so many turn radii: 7π/3.
+const TURN_RADII: u32 = 7;
 
 impl MissionState {
     /// What this peer, among many, takes without a round: orphans, or a part of what a slower
@@ -27,30 +32,85 @@ impl MissionState {
         }
         let me = self.hand(s)?;
         let spendable_ms = u64::from(self.spendable_ms(s.percept));
-        if let Some(orphaned_ms) = self.negotiation.orphaned_ms(ctx) {
+        let orphans = self.negotiation.ripe_orphans(ctx);
+        if !orphans.is_empty() {
             let share = self.even_share(ctx);
-            let orphans = self.negotiation.sections.orphans(ctx.live);
-            let nearest = sharing::nearest_orphans(&orphans.runs(), &me, share, self.pace()?);
-            return nearest
-                .filter(|(way_ms, _)| self.negotiation.is_my_turn(ctx, orphaned_ms, *way_ms))
-                .and_then(|(_, cells)| self.flown_besides(cells, spendable_ms));
+            let pace = self.pace()?;
+            let (_, cells) = sharing::nearest_orphans(&orphans.runs(), &me, share, pace)?;
+            let first = cells.first()?.0;
+            let others = self.hands(s, ctx, &self.negotiation.owners(ctx));
+            let sooner = pace.how_many_sooner(&me, &others, first);
+            return self
+                .negotiation
+                .is_my_turn(ctx, first, sooner)
+                .then(|| self.flown_besides(cells, spendable_ms))?;
         }
         if !self.negotiation.may_relieve(ctx, me.free_ms) {
             return None;
         }
         let owners = self.negotiation.owners(ctx);
-        let is_owner = |id: u16| owners.iter().any(|o| o.id == id && o.left_ms > 0);
-        let idle = ctx.members.iter().map(|m| m.id);
-        let idle = idle.filter(|id| *id != me.id && !is_owner(*id));
-        let others = idle.filter_map(|id| {
-            let at = s.membership.info(id)?.place?.pose().position();
-            Some(Hand { id, at, free_ms: 0 })
-        });
-        let hands: Vec<Hand> = others.chain([me]).collect();
+        let others = self.hands(s, ctx, &owners);
+        let hands = others.into_iter().filter(|h| h.free_ms == 0);
+        let hands: Vec<Hand> = hands.chain([me]).collect();
         // A claim is stored, spoken, and heard even if it is lost once.
         let least_ms = SETTLE_PERIODS * ctx.period_ms;
         let (cells, by_ms) = sharing::relief(&owners, &hands, me.id, self.pace()?, least_ms)?;
         self.flown_besides(cells, by_ms.min(spendable_ms))
+    }
+
+    /// The other members, where and when each has nothing to fly any more, as far as is known:
+    /// at the end of its plan, or where it was last heard.
+    fn hands(&self, s: &Situation<'_>, ctx: &Context<'_>, owners: &[Owner]) -> Vec<Hand> {
+        let others = ctx.members.iter().map(|m| m.id).filter(|id| *id != s.me.id);
+        let hand = |id: u16| {
+            let owner = owners.iter().find(|o| o.id == id && o.left_ms > 0);
+            let last = owner.and_then(|o| Some((o.plan.last()?.0, o.left_ms)));
+            if let Some((cell, free_ms)) = last {
+                let at = self.geometry.coverage_loop.boundary(usize::from(cell));
+                let at = at.position();
+                return Some(Hand { id, at, free_ms });
+            }
+            let at = s.membership.info(id)?.place?.pose().position();
+            Some(Hand { id, at, free_ms: 0 })
+        };
+        others.filter_map(hand).collect()
+    }
+
+    /// The section that the roster gives to this peer, where there is one; and until their own
+    /// claims are heard the others are taken to have theirs.
+    fn launched(&mut self, s: &Situation<'_>) -> Option<Vec<PlannedCell>> {
+        let lp = &self.geometry.coverage_loop;
+        let mission = &self.geometry.mission;
+        let turn_mm = mission.turn_radius_mm.saturating_mul(TURN_RADII);
+        let planned = launches::first_division(&self.launches, lp, turn_mm);
+        let mut mine = Vec::new();
+        self.expected.clear();
+        for p in planned {
+            if p.id == s.me.id {
+                let flown = cells_of(p.run, self.negotiation.sections.cells());
+                mine = flown.map(|c| (c, p.direction)).collect();
+                if p.direction == Direction::Backward {
+                    mine.reverse();
+                }
+                continue;
+            }
+            let eta_ms = u32::try_from(p.end_ms).unwrap_or(u32::MAX);
+            self.expected.insert(p.id, s.now.plus_ms(p.end_ms));
+            let sections = &mut self.negotiation.sections;
+            sections.presume(p.id, p.run, p.direction, eta_ms);
+        }
+        let mine = self.flown_besides(mine, u64::from(self.spendable_ms(s.percept)))?;
+        self.negotiation.begin_take(&mine)
+    }
+
+    /// Who was to be launched and was not heard of yet is taken to be there until its section
+    /// would be flown. Returns how many that are.
+    pub(crate) fn expect(&mut self, s: &Situation<'_>, live: &mut LivePeers) -> usize {
+        let unheard = |id: u16| s.membership.status(id).is_none();
+        self.expected
+            .retain(|id, until| s.now < *until && unheard(*id));
+        live.extend(self.expected.keys().map(|id| (*id, FIRST_LIFE)));
+        self.expected.len()
     }
 
     /// An even share of the loop near this peer, judged from where its neighbours are. Whoever
@@ -62,6 +122,9 @@ impl MissionState {
     ) -> Option<Vec<PlannedCell>> {
         if !self.negotiation.begins(ctx) {
             return None;
+        }
+        if self.launches.iter().any(|l| l.id == s.me.id) {
+            return self.launched(s);
         }
         let executive = self.executive.as_ref()?;
         let info = |id: &u16| s.membership.info(*id).filter(|i| !i.ground_station);

@@ -7,8 +7,9 @@
 //! every run. What a world adds (wind, bodies, radio range, airtime) is left to the
 //! simulator.
 
+use crate::config::Launch;
 use crate::journal::Entry;
-use crate::mission::Mission;
+use crate::mission::{Mission, mm};
 use crate::offload::{self, Job, JobResult};
 use crate::wire::codec::{self, Body};
 use crate::wire::kinds::Kind;
@@ -222,6 +223,27 @@ impl Harness {
         harness
     }
 
+    /// The same, each told where and when all of them are launched.
+    #[must_use]
+    pub fn with_roster(n: u16, mission: Mission) -> Self {
+        let mut harness = Self::new(n, mission);
+        let launch = |id: u16| {
+            let pose = harness.pose(id);
+            Launch {
+                id,
+                east_mm: mm(pose.east_m),
+                north_mm: mm(pose.north_m),
+                takeoff_ms: 0,
+                speed_mmps: mm(airframe().cruise_mps).unsigned_abs(),
+            }
+        };
+        let launches: Arc<[Launch]> = (1..=n).map(launch).collect();
+        for id in 1..=n {
+            harness.seat(id).config.launches = Arc::clone(&launches);
+        }
+        harness
+    }
+
     /// The same, started, and a period apart from a common step.
     #[must_use]
     pub fn started(n: u16, mission: Mission) -> Self {
@@ -245,6 +267,7 @@ impl Harness {
             objective: Objective::Time,
             height_m: 60.0 + 5.0 * f64::from(id),
             mission,
+            launches: Arc::from([]),
             seed: 1,
         };
         let seat = Seat {

@@ -9,8 +9,9 @@ use skein_peer::protocol::airtime::ms_of;
 use skein_peer::wire::message::Beacon;
 use std::collections::BTreeMap;
 
-/// A claim is spoken again after 10 intervals, up to a quarter of one later so as not to be
-/// in step with others; the peer looks four times a period. In quarters of an interval.
+/// A claim is spoken again after 10 intervals for each eight that its author knows, up to a
+/// quarter of one later so as not to be in step with others; the peer looks four times a
+/// period. In quarters of an interval.
 const CLAIM_QUARTERS: u64 = 4 * 10 + 1 + 1;
 
 /// Clocks count whole milliseconds, and a timer is set a few times in a duration.
@@ -232,7 +233,9 @@ impl CadenceCheck {
             let slowest_ms = self.slowest.get(&m.id).copied().unwrap_or(0);
             let since_ms = self.claims.start(m.id, now_ms).max(m.since_ms);
             let interval_ms = slowest_ms.max(self.period_ms);
-            let bound_ms = CLAIM_QUARTERS * interval_ms / 4 + snapshot.late_ms(m.id, since_ms);
+            let eights = (m.view.peers.len() as u64 / 8).max(1);
+            let bound_ms =
+                CLAIM_QUARTERS * eights * interval_ms / 4 + snapshot.late_ms(m.id, since_ms);
             let silent_ms = snapshot.lived_ms(m.id, since_ms);
             if silent_ms > bound_ms + ROUNDING_MS && self.claims.tell_once(m.id) {
                 found.broken("cadence", now_ms, Some(m.id), || {

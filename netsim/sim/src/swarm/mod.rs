@@ -919,6 +919,7 @@ impl Swarm {
 
 /// The peers of a scenario, ascending by number.
 fn sim_peers(spec: &Spec, seed: u64) -> Vec<SimPeer> {
+    let launches = spec.launches();
     let config = |id: u16| PeerConfig {
         id: PeerId(id),
         role: Role::Uav,
@@ -929,6 +930,7 @@ fn sim_peers(spec: &Spec, seed: u64) -> Vec<SimPeer> {
         objective: spec.objective,
         height_m: 0.0,
         mission: Some(Arc::clone(&spec.mission)),
+        launches: Arc::clone(&launches),
         seed: 0,
     };
     let mut peers: Vec<SimPeer> = spec

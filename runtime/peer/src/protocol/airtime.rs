@@ -69,6 +69,9 @@ impl Filling {
     }
 }
 
+/// More than so many in one earshot are a crowd.
+const CROWD: u64 = 12;
+
 /// A bucket holds the share of so many periods: what a round asks of a peer at once.
 pub const BURST_PERIODS: u64 = 3;
 
@@ -194,6 +197,13 @@ impl Airtime {
     #[must_use]
     pub fn sharers(&self) -> u64 {
         u64::from(self.most_told.max(self.counted()))
+    }
+
+    /// Whether so many share it that headers are dearer than random times, and what neighbours
+    /// say need not be said again.
+    #[must_use]
+    pub fn is_crowded(&self) -> bool {
+        self.sharers() > CROWD
     }
 
     /// Bytes a second that this peer may send among so many.

@@ -667,13 +667,25 @@ impl Membership {
     /// until it has heard somebody, or believes all down.
     #[must_use]
     pub fn is_deaf(&self, now: Time) -> bool {
+        self.hears_nobody(now) && self.live().next().is_some()
+    }
+
+    /// Whether nobody was heard for k1 T', who was heard before.
+    #[must_use]
+    pub fn hears_nobody(&self, now: Time) -> bool {
         let Patience {
             interval_ms,
             k1_quarters,
             ..
         } = self.patience(now);
         let silent = |heard: Time| now.since_ms(heard) >= interval_ms * k1_quarters / 4;
-        self.last_heard.is_some_and(silent) && self.live().next().is_some()
+        self.last_heard.is_some_and(silent)
+    }
+
+    /// How many others were ever heard of.
+    #[must_use]
+    pub fn known(&self) -> usize {
+        self.known.len()
     }
 
     /// What is believed of a peer, if it is known.

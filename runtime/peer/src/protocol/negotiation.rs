@@ -11,7 +11,7 @@
 //! | nothing divided yet | 1.5 T of listening | a first section is taken |
 //! | only first sections, among few | 2 T | a round with loss |
 //! | orphans, and no round helped | 2 T + W0 + rank T/2 | the nearest are taken |
-//! | orphans, among many | 2 T, and an eighth of the way there (W0 at most) | the nearest are taken |
+//! | orphans, among many | 2 T each, and 2 T for each who would be there sooner (W0 at most) | the nearest are taken |
 //! | less than 2 T to fly, among many | twice a T | the far part of a slower one's plan is taken |
 //! | idle, and a gain was computed from what is held | 10 T steady, 20 T calm | a round without loss |
 //! | idle, an owner makes no progress | its bound | the far half is taken |
@@ -70,6 +70,8 @@ pub struct Context<'a> {
     pub live: &'a LivePeers,
     /// Planning members, this peer included if it is able; ascending.
     pub members: &'a [Member],
+    /// How many more are taken for live because they were to be launched, and not heard of.
+    pub unheard: usize,
     /// Hop diameter of the component.
     pub diameter: u32,
     /// Since when this peer is able without a break.
@@ -165,6 +167,8 @@ pub struct Negotiation {
     bid_wanted: bool,
     dividing: Option<Dividing>,
     orphan_since: Option<Time>,
+    /// Among many, since when each of them is one.
+    orphaned_at: BTreeMap<u16, Time>,
     loss_seen: bool,
     decided_at: Option<Time>,
     adopted_at: Option<Time>,
@@ -204,6 +208,7 @@ impl Negotiation {
             bid_wanted: false,
             dividing: None,
             orphan_since: None,
+            orphaned_at: BTreeMap::new(),
             loss_seen: false,
             decided_at: None,
             adopted_at: None,
@@ -236,6 +241,9 @@ impl Negotiation {
             *since = since.plus_ms(late_ms);
         }
         self.opened_at = self.opened_at.plus_ms(late_ms);
+        for since in self.orphaned_at.values_mut() {
+            *since = since.plus_ms(late_ms);
+        }
         for progress in self.progress.values_mut() {
             progress.since = progress.since.plus_ms(late_ms);
             progress.bound = progress.bound.plus_ms(late_ms);
@@ -331,6 +339,12 @@ impl Negotiation {
             // Cells given to others look orphaned until their claims arrive, so the time
             // counts from the decision.
             self.orphan_since = self.orphan_since.or(Some(ctx.now)).max(self.decided_at);
+        }
+        self.orphaned_at.retain(|c, _| orphans.contains(*c));
+        if is_many(ctx) && ctx.able_since.is_some() {
+            for cell in orphans.iter() {
+                self.orphaned_at.entry(cell).or_insert(ctx.now);
+            }
         }
         if self.members != ctx.members {
             self.members = ctx.members.to_vec();
@@ -542,6 +556,7 @@ impl Negotiation {
     pub fn new_life(&mut self, me: Member) {
         self.rounds.set_me(me);
         self.sections.reset_ownership();
+        self.sections.forget_presumed();
         self.dividing = None;
         self.bid_wanted = false;
         self.take_pending = false;
@@ -585,7 +600,7 @@ impl Negotiation {
 
 /// Whether there are too many for rounds.
 fn is_many(ctx: &Context<'_>) -> bool {
-    ctx.members.len() > MEMBERS_MAX
+    ctx.members.len() + ctx.unheard > MEMBERS_MAX
 }
 
 #[cfg(test)]
@@ -651,6 +666,7 @@ mod tests {
                 period_ms: T,
                 live: &self.live,
                 members: &members,
+                unheard: 0,
                 diameter: 1,
                 able_since: self.able_since,
                 revision: 1,
@@ -1120,14 +1136,60 @@ mod tests {
     }
 
     #[test]
-    fn orphans_are_left_to_those_who_are_nearer_for_an_eighth_of_the_way() {
-        let mut desk = Desk::new(&[2]);
-        let mut turn =
-            |orphaned_ms, way_ms| desk.ask(|n, ctx| n.is_my_turn(ctx, orphaned_ms, way_ms));
-        assert!(turn(2 * T, 0) && !turn(2 * T - 1, 0));
-        assert!(turn(3 * T, 8 * T) && !turn(3 * T - 1, 8 * T));
-        // W0 at most, which is 5 T here.
-        assert!(turn(7 * T, 600 * T) && !turn(7 * T - 1, 600 * T));
+    fn orphans_are_left_to_those_who_would_be_there_sooner_each_for_two_periods() {
+        let mut desk = Desk::new(&[2, 3, 4, 5, 6, 7, 8, 9]);
+        desk.claim(2, 1, 0, 20, 600_000);
+        desk.tick();
+        // Two more are orphaned later: each cell has its own time.
+        let turn =
+            |desk: &mut Desk, cell, sooner| desk.ask(|n, ctx| n.is_my_turn(ctx, cell, sooner));
+        let ripe =
+            |desk: &mut Desk| desk.ask(|n, ctx| n.ripe_orphans(ctx).iter().collect::<Vec<_>>());
+        let from = desk.now;
+        desk.now = from.plus_ms(T);
+        desk.claim(2, 2, 2, 18, 600_000);
+        desk.tick();
+        for (after, ripe_now, of_22, of_0) in [
+            (2 * T - 1, vec![], [false; 3], [false; 3]),
+            (
+                2 * T,
+                vec![20, 21, 22, 23],
+                [true, false, false],
+                [false; 3],
+            ),
+            (
+                3 * T,
+                vec![0, 1, 20, 21, 22, 23],
+                [true, false, false],
+                [true, false, false],
+            ),
+            (
+                4 * T,
+                vec![0, 1, 20, 21, 22, 23],
+                [true, true, false],
+                [true, false, false],
+            ),
+            // W0 at most, which is 5 T here.
+            (
+                7 * T,
+                vec![0, 1, 20, 21, 22, 23],
+                [true; 3],
+                [true, true, false],
+            ),
+        ] {
+            desk.now = from.plus_ms(after);
+            assert_eq!(ripe(&mut desk), ripe_now, "after {after} ms");
+            assert_eq!(
+                [0, 1, 40].map(|n| turn(&mut desk, 22, n)),
+                of_22,
+                "after {after} ms"
+            );
+            assert_eq!(
+                [0, 1, 40].map(|n| turn(&mut desk, 0, n)),
+                of_0,
+                "after {after} ms"
+            );
+        }
     }
 
     #[test]

@@ -76,9 +76,6 @@ const REPEATS: u8 = 2;
 /// Neighbours pass a record on within the time of one relay, and their own transmissions.
 const REPEAT_DELAYS: u64 = 2;
 
-/// Where more than so many share the channel, headers are dearer than random times.
-const CROWD: u64 = 12;
-
 /// Even in small swarms the random times are those of so many.
 const LEAST_SPREAD: u64 = 8;
 
@@ -344,9 +341,16 @@ impl Relay {
 
     /// What this peer bids and claims itself goes before all else, once: nobody else can say
     /// it. Sent again it waits its turn, or what this peer has seen would never be said.
-    fn is_its_own_to_say(&self, key: &RecordKey, priority: Priority) -> bool {
+    /// Where many share the channel its coverage goes next: claims that others wrote and that
+    /// wait for longer than coverage lives would never let it go.
+    fn standing(&self, key: &RecordKey, priority: Priority) -> u8 {
         let unsaid = || self.held.get(key).is_some_and(|h| h.copies == 0);
-        key.0 == self.me && priority <= Priority::Claim && unsaid()
+        match priority {
+            _ if key.0 != self.me => 2,
+            Priority::Conflict | Priority::Claim if unsaid() => 0,
+            Priority::Beacon if self.air.is_crowded() => 1,
+            _ => 2,
+        }
     }
 
     fn jitter(&self, key: &RecordKey, version: (Incarnation, u32)) -> u64 {
@@ -592,7 +596,7 @@ impl Relay {
 
     /// What goes next: it is its turn, or it can share the headers of what goes now.
     fn first(&self, now: Time) -> Option<(RecordKey, Priority)> {
-        let crowded = self.air.is_filling(now) && self.air.sharers() > CROWD;
+        let crowded = self.air.is_filling(now) && self.air.is_crowded();
         let rides = |k: &RecordKey| {
             let held = self.held.get(k).filter(|_| crowded);
             held.is_some_and(|h| self.air.joins(now, h.bytes.len()))
@@ -601,8 +605,8 @@ impl Relay {
             .iter()
             .filter(|(k, w)| w.from <= now || rides(k))
             .min_by_key(|(k, w)| {
-                let own = self.is_its_own_to_say(k, w.priority);
-                (w.from > now, !own, w.due, **k)
+                let standing = self.standing(k, w.priority);
+                (w.from > now, standing, w.due, **k)
             })
             .map(|(k, w)| (*k, w.priority))
     }

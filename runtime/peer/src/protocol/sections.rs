@@ -25,9 +25,18 @@ use super::runs::{Packer, PlannedCell, cells_of, unpack};
 use crate::Incarnation;
 use crate::cells::CellSet;
 use crate::wire::limits::{DONE_MAX, HELD_MAX, PLAN_MAX};
-use crate::wire::message::{CellRun, Claim, Epoch, Stamp};
+use crate::wire::message::{CellRun, Claim, Epoch, Firmness, ListedRun, Stamp};
 use skein_flight::coverage::ring::Direction;
 use std::collections::BTreeMap;
+
+/// The life in which a UAV is launched, if its disk knows of none.
+pub const FIRST_LIFE: Incarnation = 1;
+
+/// No record has this number: what a peer writes is counted from 1.
+const PRESUMED_SEQ: u32 = 0;
+
+/// How often the cells of a first section were taken without a round: nobody took them before.
+const FIRST_TAKE: u16 = 1;
 
 /// The peers that are not believed dead, with the life in which they are alive.
 pub type LivePeers = BTreeMap<u16, Incarnation>;
@@ -170,6 +179,39 @@ impl Sections {
             },
         );
         true
+    }
+
+    /// What everybody computed alike from the roster, that a peer of which no claim was heard
+    /// begins with. Its first claim, which says what it lists, takes the place of this.
+    pub fn presume(&mut self, of: u16, run: CellRun, direction: Direction, eta_ms: u32) {
+        let stamp = Stamp {
+            epoch: Epoch::default(),
+            take: FIRST_TAKE,
+            id: of,
+        };
+        let listed = ListedRun {
+            run,
+            backward: direction == Direction::Backward,
+            firmness: Firmness::Tentative,
+            stamp,
+        };
+        let claim = Claim {
+            plan: vec![listed],
+            eta_ms,
+            ..Claim::default()
+        };
+        self.hear(of, FIRST_LIFE, PRESUMED_SEQ, claim);
+    }
+
+    /// Whether a peer's cells are only presumed to be listed by it.
+    #[must_use]
+    pub fn is_presumed(&self, of: u16) -> bool {
+        self.heard.get(&of).is_some_and(|h| h.seq == PRESUMED_SEQ)
+    }
+
+    /// Nothing is presumed any more.
+    pub fn forget_presumed(&mut self) {
+        self.heard.retain(|_, h| h.seq != PRESUMED_SEQ);
     }
 
     /// Rules *yield* and *release*, against every live claim. Returns whether

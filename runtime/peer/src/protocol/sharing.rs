@@ -151,6 +151,14 @@ impl Pace<'_> {
         way_mm * 1000 / u64::from(self.speed_mmps.max(1)) + u64::from(self.turn_ms)
     }
 
+    /// How many of some others would be at a cell before this peer.
+    #[must_use]
+    pub fn how_many_sooner(&self, me: &Hand, others: &[Hand], cell: u16) -> usize {
+        let there = |hand: &Hand| (hand.free_ms + self.way_ms(hand.at, cell), hand.id);
+        let mine = there(me);
+        others.iter().filter(|other| there(other) < mine).count()
+    }
+
     /// How many of the last cells of an owner's plan a hand takes over so that both are done
     /// at once, and when that is; `None` where it gains too little.
     fn relieved(&self, owner: &Owner, hand: &Hand, least_ms: u64) -> Option<(usize, u64)> {

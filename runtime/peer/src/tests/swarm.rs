@@ -8,6 +8,7 @@ use crate::wire::kinds::Kind;
 use crate::wire::message::{Activity, MissionStatus};
 use crate::{Input, PeerId};
 use skein_behaviors::Order;
+use skein_geometry::frame::Point;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Whether each open cell is in the plan of exactly one of these peers.
@@ -53,6 +54,56 @@ fn twelve_share_an_area_and_take_over_without_a_round() {
     assert!(h.run_until(300, |h| left.iter().all(|id| h.beliefs(*id).finished)));
     let bids: usize = left.iter().map(|id| h.count_said(*id, Kind::Bid)).sum();
     assert_eq!(bids, 0);
+}
+
+#[test]
+fn who_hears_only_a_part_of_a_roster_takes_only_its_own_part_of_the_loop() {
+    let mut h = Harness::with_roster(12, mission(1, 16, 12));
+    // Two halves that do not hear each other.
+    for a in 1..=6 {
+        for b in 7..=12 {
+            h.link(a, b).cut = true;
+            h.link(b, a).cut = true;
+        }
+    }
+    let all: Vec<u16> = (1..=12).collect();
+    all.iter().for_each(|id| h.start(*id));
+    assert!(h.run_until(6, |h| divided(h, &all)));
+    h.run_s(15);
+    let plans: Vec<u16> = all.iter().flat_map(|id| h.beliefs(*id).plan).collect();
+    let distinct: BTreeSet<u16> = plans.iter().copied().collect();
+    // Nobody takes what others fly out of earshot.
+    assert_eq!(plans.len(), distinct.len());
+    // Whom nobody hears until its part would be flown is not there.
+    assert!(h.run_until(600, |h| (1..=6).all(|id| h.beliefs(id).finished)));
+}
+
+#[test]
+fn of_a_roster_who_never_came_is_replaced() {
+    let mut h = Harness::with_roster(12, mission(1, 16, 12));
+    let there: Vec<u16> = (1..=11).collect();
+    there.iter().for_each(|id| h.start(*id));
+    assert!(h.run_until(600, |h| there.iter().all(|id| h.beliefs(*id).finished)));
+}
+
+#[test]
+fn who_hears_nobody_of_many_and_has_nothing_to_fly_goes_home() {
+    // Far more UAVs than there is work for.
+    let mut h = Harness::with_roster(14, mission(1, 6, 4));
+    (1..=14).for_each(|id| h.start(id));
+    let idle = |h: &Harness, id: u16| h.beliefs(id).plan.is_empty() && !h.beliefs(id).finished;
+    assert!(h.run_until(12, |h| h.beliefs(14).peers.len() == 13 && idle(h, 14)));
+    h.isolate(14, true);
+    h.run_s(4);
+    let base = Point::new(-60.0, -60.0);
+    let before_m = (h.pose(14).position() - base).norm();
+    h.run_s(7);
+    assert!(idle(&h, 14));
+    let after_m = (h.pose(14).position() - base).norm();
+    assert!(
+        after_m < before_m - 50.0,
+        "{before_m:.0} m, then {after_m:.0} m"
+    );
 }
 
 #[test]

@@ -28,9 +28,9 @@ const NEARNESS_STEP_MS: u64 = 4000;
 /// Among many a peer looks this often in a period for what it could take.
 const LOOKS_A_PERIOD: u64 = 2;
 
-/// Among many a peer waits for others to take orphans for this part of the time until it
-/// would be there: the nearest one first.
-const NEARNESS_PART: u64 = 8;
+/// Among many a peer waits so many periods for each who would be at an orphan sooner: a claim
+/// is stored, waits for its turn on the air, and is heard.
+const SOONER_PERIODS: u64 = 2;
 
 /// Peers take orphans one after the other by rank, this part of a period apart: a take has
 /// to be durable before others can hear of it.
@@ -51,7 +51,7 @@ impl Negotiation {
         let untouched = self.rounds.counter() == 0
             && self.sections.epoch() == Epoch::default()
             && self.sections.plan().is_empty();
-        self.provisional = untouched && ctx.members.len() > 1;
+        self.provisional = untouched && ctx.members.len() + ctx.unheard > 1;
         self.provisional
     }
 
@@ -71,17 +71,23 @@ impl Negotiation {
         looks
     }
 
-    /// For how long there are orphans, if there are any.
+    /// Orphans that others had the time to claim.
     #[must_use]
-    pub fn orphaned_ms(&self, ctx: &Context<'_>) -> Option<u64> {
-        self.orphan_since.map(|t| ctx.now.since_ms(t))
+    pub fn ripe_orphans(&self, ctx: &Context<'_>) -> CellSet {
+        let patience_ms = STEADY_PERIODS * ctx.period_ms;
+        let ripe = self.orphaned_at.iter();
+        let ripe = ripe.filter(|(_, since)| ctx.now.since_ms(**since) >= patience_ms);
+        CellSet::of(self.sections.cells(), ripe.map(|(cell, _)| *cell))
     }
 
-    /// Whether orphans have waited for long enough for those who would be there sooner.
+    /// Whether an orphan has waited for long enough for so many who would be there sooner.
     #[must_use]
-    pub fn is_my_turn(&self, ctx: &Context<'_>, orphaned_ms: u64, way_ms: u64) -> bool {
-        let for_others_ms = (way_ms / NEARNESS_PART).min(ctx.base_wait_ms());
-        orphaned_ms >= STEADY_PERIODS * ctx.period_ms + for_others_ms
+    pub fn is_my_turn(&self, ctx: &Context<'_>, orphan: u16, sooner: usize) -> bool {
+        let for_others_ms = sooner as u64 * SOONER_PERIODS * ctx.period_ms;
+        let for_others_ms = for_others_ms.min(ctx.base_wait_ms());
+        let since = self.orphaned_at.get(&orphan);
+        since
+            .is_some_and(|t| ctx.now.since_ms(*t) >= STEADY_PERIODS * ctx.period_ms + for_others_ms)
     }
 
     /// Whether this peer will have nothing to fly before others have heard what it takes.
@@ -202,7 +208,11 @@ impl Negotiation {
     }
 
     /// The run of orphans nearest along the loop to where this peer works.
-    pub(super) fn nearest_run(&self, orphans: &CellSet, lp: &CoverageLoop) -> Option<Vec<(u16, Direction)>> {
+    pub(super) fn nearest_run(
+        &self,
+        orphans: &CellSet,
+        lp: &CoverageLoop,
+    ) -> Option<Vec<(u16, Direction)>> {
         let n = i32::from(self.sections.cells());
         let here = self.sections.plan().last().map(|p| i32::from(p.cell));
         let here = here.unwrap_or_else(|| {
