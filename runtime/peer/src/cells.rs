@@ -475,4 +475,22 @@ mod tests {
         assert_ne!(high & low, 0);
         assert_eq!(u64::from(set.digest()), high ^ low);
     }
+
+    #[test]
+    fn no_more_runs_are_left_out_than_the_bytes_ask_for_and_the_shortest_first() {
+        let set = CellSet::of(40, [3, 10, 11, 20, 21, 22, 30]);
+        let left = |max_bytes| {
+            let bytes = set.encode_rle(Some(max_bytes));
+            assert!(bytes.len() <= max_bytes);
+            let left = CellSet::decode_rle(40, &bytes).unwrap();
+            left.runs().iter().map(|r| r.first).collect::<Vec<_>>()
+        };
+        // Two bytes a run; of runs as long the first goes first.
+        assert_eq!(left(8), [3, 10, 20, 30]);
+        assert_eq!(left(7), [10, 20, 30]);
+        assert_eq!(left(6), [10, 20, 30]);
+        assert_eq!(left(4), [10, 20]);
+        assert_eq!(left(2), [20]);
+        assert!(left(1).is_empty());
+    }
 }

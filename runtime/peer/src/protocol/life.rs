@@ -267,4 +267,16 @@ mod tests {
         life.is_broken(5);
         assert_eq!(stored(&life.tick(4)), [5]);
     }
+
+    #[test]
+    fn a_life_far_above_its_own_is_not_believed_of_itself() {
+        for (heard, taken) in [
+            (5 + LIFE_STEP, vec![6 + LIFE_STEP]),
+            (6 + LIFE_STEP, vec![]),
+            (u32::MAX, vec![]),
+        ] {
+            let mut life = living(5);
+            assert_eq!(stored(&life.hear_of_myself(heard, false)), taken);
+        }
+    }
 }

@@ -188,6 +188,15 @@ mod tests {
         let (listings, packed) = packer.pack(&cells, 16);
         assert_eq!((listings.len(), packed), (3, 6));
         assert_eq!(unpack(&listings, 10), cells);
+        // Backward across the seam, too.
+        let back: Vec<PlannedCell> = [(1, Backward), (0, Backward), (9, Backward)]
+            .iter()
+            .map(cell)
+            .collect();
+        let (listings, packed) = packer.pack(&back, 16);
+        assert_eq!((listings.len(), packed), (1, 3));
+        assert_eq!((listings[0].run.first, listings[0].run.count), (9, 3));
+        assert_eq!(unpack(&listings, 10), back);
         // What does not fit is left out from its first run on.
         assert_eq!(packer.pack(&cells, 2).1, 5);
         // A covered cell between two others is bridged.

@@ -655,3 +655,31 @@ fn how_many_are_known_is_told_with_the_cap() {
     m.on_beacon(Time(0), 2, 1, &beacon(1, vec![entry(4, 7, 10, None)]));
     assert_eq!(m.loads(), [("peers known", 2, 255)]);
 }
+
+#[test]
+fn news_of_somebody_goes_first_for_two_intervals() {
+    let mut m = Membership::new(1, 1000);
+    m.announce(16);
+    for id in 2..=20 {
+        m.on_beacon(Time(0), id, 1, &beacon(1, Vec::new()));
+    }
+    // Peer 14 alone falls silent, in its interval of a period.
+    let mut suspected = None;
+    for t in 1..=20 {
+        let now = Time(t * 1_000);
+        for id in (2..=20).filter(|id| *id != 14) {
+            let count = u32::try_from(t).unwrap() + 1;
+            m.on_heartbeat(now, id, 1, (count, 4));
+        }
+        let changes = m.tick(now);
+        if changes.iter().any(|c| c.peer == 14) {
+            suspected = Some(now);
+            break;
+        }
+    }
+    let suspected = suspected.unwrap();
+    for (after_ms, goes_first) in [(0, true), (4_000, true), (7_999, true), (8_000, false)] {
+        let told = m.clone().gossip(suspected.plus_ms(after_ms), 4);
+        assert_eq!(told[0].id == 14, goes_first, "after {after_ms} ms");
+    }
+}
