@@ -52,6 +52,9 @@ fn main() -> ExitCode {
                 );
             }
         }
+        for kill in run.report.kills.iter().filter(|_| to == from + 1) {
+            println!("{kill:?}");
+        }
         for down in run.false_downs() {
             println!("seed {seed} {down:?}");
         }
@@ -68,6 +71,7 @@ fn main() -> ExitCode {
         "pace {:?}\nidle {:?}",
         summary.makespan_over_work_bound, summary.idle_share
     );
+    println!("takeover {:?}", summary.takeover_s);
     println!("reached {:?}", summary.reached);
     println!("struck {:?}", summary.struck);
     println!("liveness {:?}", summary.liveness_share);

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 pub use skein_behaviors::Order;
+use skein_peer::CoverageTask;
 use skein_peer::mission::PointMm;
 use std::fmt;
 
@@ -68,12 +69,15 @@ pub enum Fault {
         north_mm: i32,
     },
     /// The operator gives another mission: the ground station speaks a revision with another
-    /// area and other no-fly zones, rings in millimetres from the mission's origin.
+    /// area, other no-fly zones and other targets, in millimetres from the mission's origin.
     Revise {
         /// The area.
         area: Vec<PointMm>,
         /// All zones.
         zones: Vec<Vec<PointMm>>,
+        /// What is to be seen there; none leaves it.
+        #[serde(default)]
+        task: Option<CoverageTask>,
     },
     /// The operator wants something of all UAVs: the ground station speaks it.
     Order {

@@ -10,6 +10,7 @@ use crate::world::flat::{Bounds, clip};
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::{PI, sin_cos};
 use skein_peer::mission::{PointMm, ring_mm};
+use skein_peer::{CoverageTask, LineTask, PointTask};
 
 /// Shortest time for which something is wrong, milliseconds: two beacon periods.
 const SHORTEST_MS: u64 = 2_000;
@@ -31,6 +32,11 @@ const SLOT_M: f64 = 5.0;
 const LEAST_CUT_PERMILLE: u64 = 100;
 /// See [`LEAST_CUT_PERMILLE`].
 const MOST_CUT_PERMILLE: u64 = 400;
+
+/// One target in so many is moved, and no farther than this either way, mm.
+const MOVED_ONE_IN: u64 = 4;
+/// See [`MOVED_ONE_IN`].
+const FARTHEST_MM: i32 = 40_000;
 
 /// So often a place for a new zone is drawn at most.
 const ZONE_TRIES: u32 = 16;
@@ -115,6 +121,7 @@ pub const RARE: &[Kind] = &[
         how: How::Scenario(crowd),
     },
     Kind::new("mission", can_be_given, missions),
+    Kind::new("mission-elsewhere", can_be_elsewhere, missions_elsewhere),
 ];
 
 /// Each of the rare kinds strikes in one run of so many.
@@ -397,17 +404,90 @@ fn short_fuel(d: &mut Draw<'_>) {
     }
 }
 
-/// The judge knows what may come of an area in lanes; a patrol begins anew with each lap.
+/// Where an operator has a ground station.
 fn can_be_given(spec: &Spec) -> bool {
-    let mission = &spec.mission;
-    let area = mission.task.is_area() && mission.further_laps == 0;
-    area && spec.ground.is_some() && spec.storm.troubles.max_missions > 0
+    spec.ground.is_some() && spec.storm.troubles.max_missions > 0
+}
+
+/// Targets have their places; an area can be anywhere.
+fn can_be_elsewhere(spec: &Spec) -> bool {
+    can_be_given(spec) && spec.mission.task.targets().is_none()
+}
+
+/// The operator wants an area that lies partly beyond the first one, or two.
+fn missions_elsewhere(d: &mut Draw<'_>) {
+    let mission = &d.spec.mission;
+    let area = mission.area_m();
+    let within = Bounds::around(&area);
+    let size = within.max - within.min;
+    for _ in 0..d.s.between(1, d.spec.storm.troubles.max_missions.into()) {
+        let by = size * share(d.s, LEAST_CUT_PERMILLE, MOST_CUT_PERMILLE);
+        let moved = match d.s.between(0, 3) {
+            0 => Vector::new(by.x, 0.0),
+            1 => Vector::new(-by.x, 0.0),
+            2 => Vector::new(0.0, by.y),
+            _ => Vector::new(0.0, -by.y),
+        };
+        let area: Vec<Point> = area.iter().map(|p| *p + moved).collect();
+        let (area, zones) = (ring_mm(&area), mission.zones.clone());
+        let at_ms = d.s.between(0, d.end_ms);
+        let task = None;
+        d.push(at_ms, Fault::Revise { area, zones, task });
+    }
+}
+
+/// The operator wants some of the first targets, and of these some a little way off.
+fn missions_of_targets(d: &mut Draw<'_>) {
+    let mission = &d.spec.mission;
+    for _ in 0..d.s.between(1, d.spec.storm.troubles.max_missions.into()) {
+        let kept_permille = d.s.between(MOST_CUT_PERMILLE, 1000 - LEAST_CUT_PERMILLE);
+        let task = match &mission.task {
+            CoverageTask::Points(points) => {
+                let kept = points.iter().filter_map(|p| {
+                    let by = kept_at(d.s, kept_permille)?;
+                    let at = moved(p.at, by);
+                    Some(PointTask { at, ..*p })
+                });
+                CoverageTask::Points(kept.collect())
+            }
+            CoverageTask::Lines(lines) => {
+                let kept = lines.iter().filter_map(|l| {
+                    let by = kept_at(d.s, kept_permille)?;
+                    let way = l.way.iter().map(|p| moved(*p, by)).collect();
+                    Some(LineTask { way, ..l.clone() })
+                });
+                CoverageTask::Lines(kept.collect())
+            }
+            CoverageTask::Area | CoverageTask::Exact => return,
+        };
+        let (area, zones) = (mission.area.clone(), mission.zones.clone());
+        let at_ms = d.s.between(0, d.end_ms);
+        let task = Some(task);
+        d.push(at_ms, Fault::Revise { area, zones, task });
+    }
+}
+
+/// By how much a target that is kept is moved, millimetres; nothing for one that is not kept.
+fn kept_at(s: &mut Stream, kept_permille: u64) -> Option<PointMm> {
+    let kept = s.between(0, 999) < kept_permille;
+    let moves = s.one_in(MOVED_ONE_IN);
+    let most = u64::from(FARTHEST_MM.unsigned_abs());
+    let mut way = || i32::try_from(s.between(0, 2 * most)).unwrap_or(0) - FARTHEST_MM;
+    let by = (way(), way());
+    kept.then_some(if moves { by } else { (0, 0) })
+}
+
+fn moved(at: PointMm, by: PointMm) -> PointMm {
+    (at.0.saturating_add(by.0), at.1.saturating_add(by.1))
 }
 
 /// The operator gives another mission, or two, each one a change of the first: a part of
-/// its area, a zone less, a zone more, or all of that.
+/// its area, a zone less, a zone more, or all of that; or other targets.
 fn missions(d: &mut Draw<'_>) {
     let mission = &d.spec.mission;
+    if mission.task.targets().is_some() {
+        return missions_of_targets(d);
+    }
     for _ in 0..d.s.between(1, d.spec.storm.troubles.max_missions.into()) {
         let (mut area, mut zones) = (mission.area.clone(), mission.zones.clone());
         let what = d.s.between(0, 3);
@@ -422,7 +502,8 @@ fn missions(d: &mut Draw<'_>) {
             area = part_of(d, &mission.area_m());
         }
         let at_ms = d.s.between(0, d.end_ms);
-        d.push(at_ms, Fault::Revise { area, zones });
+        let task = None;
+        d.push(at_ms, Fault::Revise { area, zones, task });
     }
 }
 
@@ -660,6 +741,7 @@ mod tests {
                         Fault::Revise {
                             ref area,
                             ref zones,
+                            ..
                         } => {
                             let first = &spec.mission;
                             assert!(*area != first.area || *zones != first.zones);

@@ -118,7 +118,7 @@ pub use input::{Command, Input, Time};
 pub use mission::Mission;
 pub use output::{Output, Priority, Report};
 pub use peer::Peer;
-pub use task::CoverageTask;
+pub use task::{CoverageTask, LineTask, PointTask};
 
 use serde::{Deserialize, Serialize};
 

@@ -5,7 +5,7 @@
 //! |---|---|
 //! | the same loop | sections, rounds, claims being written, since when it is able |
 //! | and the same zones, turn radius and clearance | the flight itself, with its goal |
-//! | another loop, the same lap | covered cells, by name |
+//! | another loop, the same lap | covered cells of the same places |
 //! | another lap | nothing is covered |
 //! | any | the highest round counter; what the journal knows of that loop |
 //!
@@ -15,6 +15,7 @@ use crate::cells::CellSet;
 use crate::config::{Launch, PeerConfig};
 use crate::input::Time;
 use crate::journal::Durable;
+use crate::mission::{PointMm, ring_mm};
 use crate::offload::MissionGeometry;
 use crate::protocol::Negotiation;
 use crate::protocol::sections::{FIRST_LIFE, LivePeers};
@@ -22,8 +23,9 @@ use crate::timers::{Timer, Timers};
 use crate::wire::limits::MEMBERS_MAX;
 use crate::wire::message::{Activity, Claim, Member, MissionStatus};
 use skein_behaviors::{Executive, Goal, Percept};
-use skein_flight::coverage::ring::CoverageLoop;
-use std::collections::BTreeMap;
+use skein_flight::coverage::ring::patch::Patches;
+use skein_flight::coverage::ring::{CellId, CoverageLoop};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Claims on their way to the journal, numbered in the order in which it gets them. Only
@@ -329,18 +331,31 @@ fn remembered(durable: &Durable, loop_hash: u64, cells: u16) -> Option<CellSet> 
     }
 }
 
-/// Covered cells of one loop, found again by name on another.
+/// Covered cells of one loop, found again at the same places of another: by name on one grid;
+/// pieces, whose names are mere numbers, by their corners.
 fn carried_over(old: &CoverageLoop, covered: &CellSet, new: &CoverageLoop) -> CellSet {
     let before = |c: u16| old.cells().get(usize::from(c)).filter(|c| c.needed);
-    let found = covered
-        .iter()
-        .filter_map(|c| before(c).and_then(|c| new.index_of(c.id)));
+    let seen = covered.iter().filter_map(before).map(|c| c.id);
+    let found: Vec<CellId> = match (old.patches(), new.patches()) {
+        (Patches::Grid(a), Patches::Grid(b)) if a == b => seen.collect(),
+        (Patches::Listed(a), Patches::Listed(b)) => {
+            let place = |n: u16| a.corners().get(usize::from(n)).map(|c| ring_mm(c));
+            let places: BTreeSet<Vec<PointMm>> =
+                seen.filter_map(|id| place(id.number()?)).collect();
+            let pieces = (0_u16..).zip(b.corners());
+            let same = pieces.filter(|(_, c)| places.contains(&ring_mm(&c[..])));
+            same.map(|(n, _)| CellId::numbered(n)).collect()
+        }
+        _ => Vec::new(),
+    };
+    let found = found.into_iter().filter_map(|id| new.index_of(id));
     CellSet::of(u16::try_from(new.len()).unwrap_or(u16::MAX), found)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{CoverageTask, Mission, PointTask};
 
     #[test]
     fn only_the_last_claim_written_is_installed() {
@@ -376,5 +391,40 @@ mod tests {
             renumbered += u32::from(wanted.is_some_and(|w| w != i));
         }
         assert!(renumbered > 0, "no cell has another number");
+    }
+
+    /// Of other targets the third is what the second was: not the number counts.
+    #[test]
+    fn covered_points_are_carried_to_another_loop_by_their_places() {
+        let points = |at: &[PointMm]| {
+            let point = |at: &PointMm| PointTask {
+                at: *at,
+                radius_mm: 1_000,
+            };
+            let task = CoverageTask::Points(at.iter().map(point).collect());
+            let mission = Mission {
+                task,
+                ..crate::testing::mission(1, 6, 4)
+            };
+            Arc::new(mission).geometry().unwrap()
+        };
+        let (a, b, c) = ((20_000, 30_000), (150_000, 40_000), (80_000, 120_000));
+        let (before, after) = (points(&[a, b]), points(&[c, a, b]));
+        let (old, new) = (&before.coverage_loop, &after.coverage_loop);
+        for n in 0..2 {
+            let seen = old.index_of(CellId::numbered(n)).unwrap();
+            let carried = carried_over(old, &CellSet::of(2, [seen]), new);
+            let wanted = new.index_of(CellId::numbered(n + 1));
+            assert_eq!(carried.iter().next(), wanted);
+            assert_eq!(carried.count(), 1);
+        }
+        // A lane's name says nothing of a point, nor a point's number of a lane.
+        let lanes = Arc::new(crate::testing::mission(1, 6, 4))
+            .geometry()
+            .unwrap();
+        let (old, new) = (&lanes.coverage_loop, &after.coverage_loop);
+        let all = |l: &CoverageLoop| CellSet::full(u16::try_from(l.len()).unwrap());
+        assert!(carried_over(old, &all(old), new).is_empty());
+        assert!(carried_over(new, &all(new), old).is_empty());
     }
 }

@@ -11,7 +11,7 @@ use crate::world::{Fact, Judge, Survey, World};
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::CellId;
 use skein_link::medium::Links;
-use skein_peer::Mission;
+use skein_peer::offload::MissionGeometry;
 use skein_peer::protocol::airtime::{FRAME_BYTES, OVERHEAD_BYTES, PART_BYTES};
 use std::sync::Arc;
 
@@ -106,8 +106,8 @@ impl Air {
     }
 
     /// A revision of the mission is judged by from now on.
-    pub fn revise(&mut self, survey: Arc<Survey>, mission: &Mission) {
-        self.world.revise(survey, mission);
+    pub fn revise(&mut self, survey: Arc<Survey>, geometry: &MissionGeometry) {
+        self.world.revise(survey, geometry);
     }
 
     /// A UAV follows this revision of the mission.
@@ -153,10 +153,11 @@ impl Air {
         Graph::new(ids, |rx, tx| self.links.state(tx, rx).is_up())
     }
 
-    /// Whether the judge saw a camera cover this cell, in that many laps.
+    /// Whether the judge saw a camera cover this cell of the mission with this revision, in
+    /// that many laps.
     #[must_use]
-    pub fn is_covered(&self, cell: CellId, laps: u16) -> bool {
-        self.world.judge().saw(cell, laps)
+    pub fn is_covered(&self, revision: u32, cell: CellId, laps: u16) -> bool {
+        self.world.judge().saw(revision, cell, laps)
     }
 
     /// Whether every coverable cell is covered.

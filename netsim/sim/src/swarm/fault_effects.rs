@@ -71,11 +71,13 @@ impl Swarm {
                 });
                 0
             }
-            Fault::Revise { area, zones } => {
+            Fault::Revise { area, zones, task } => {
+                let before = (*self.mission).clone();
                 self.give_mission(Mission {
                     area: area.clone(),
                     zones: zones.clone(),
-                    ..(*self.mission).clone()
+                    task: task.clone().unwrap_or_else(|| before.task.clone()),
+                    ..before
                 });
                 0
             }
@@ -179,7 +181,7 @@ impl Swarm {
     /// operator wants one of which the planner leaves out what could be seen.
     fn give_mission(&mut self, mission: Mission) {
         let next = Arc::new(Mission {
-            revision: self.mission.revision + 1,
+            revision: self.next_revision(),
             ..mission.clone()
         });
         let zones: Result<Vec<Polygon>, _> = next.zones_m().map(Polygon::new).collect();
@@ -192,22 +194,36 @@ impl Swarm {
             ..(*self.spec).clone()
         });
         let coverage_loop = &geometry.coverage_loop;
+        // Elsewhere the judge has squares or pieces of its own.
         let is_planned = |id| {
             let cell = coverage_loop.index_of(id);
-            cell.is_some_and(|c| coverage_loop.cells()[usize::from(c)].needed)
+            !next.task.is_area()
+                || cell.is_some_and(|c| coverage_loop.cells()[usize::from(c)].needed)
         };
         let mut coverable = survey.cells().iter().filter(|c| c.uncoverable.is_none());
         let enough = survey.coverable_share() >= self.spec.min_coverable;
         if enough && coverable.all(|c| is_planned(c.id)) {
-            self.air.revise(Arc::new(survey), &next);
+            self.air.revise(Arc::new(survey), &geometry);
             self.account.revised();
             self.revise(mission);
         }
     }
 
+    /// The revision that the operator counts next: during a patrol the low half of the number
+    /// counts laps, as at the console.
+    fn next_revision(&self) -> u32 {
+        let newest = self.mission.revision;
+        let laps = if self.mission.is_patrol() {
+            newest | u32::from(u16::MAX)
+        } else {
+            newest
+        };
+        laps.saturating_add(1)
+    }
+
     /// The operator's next revision enters at the ground station.
     fn revise(&mut self, mut mission: Mission) {
-        mission.revision = self.mission.revision + 1;
+        mission.revision = self.next_revision();
         self.mission = Arc::new(mission);
         self.checker.rules.on_mission(&self.mission);
         if let Some(idx) = self.ground_station() {

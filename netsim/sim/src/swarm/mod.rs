@@ -748,7 +748,6 @@ impl Swarm {
         } = &report
         {
             self.air.follows(id, *revision);
-            self.lap_begun(*revision, *loop_hash);
             self.mission_begun(*revision, *loop_hash);
         }
         self.history
@@ -879,26 +878,20 @@ impl Swarm {
         }
     }
 
-    /// A peer begins a lap that nobody has begun before.
-    fn lap_begun(&mut self, revision: u32, loop_hash: u64) {
-        let lap = u16::try_from(revision.saturating_sub(self.spec.mission.revision));
-        if let Ok(lap) = lap
-            && self.spec.mission.further_laps > 0
-            && lap > self.lap
-        {
-            self.lap = lap;
-            self.loop_hash = loop_hash;
-            self.covered.fill(false);
-            self.refresh_covered();
-            self.checker.on_new_loop(loop_hash);
-        }
-    }
-
-    /// The first peer follows the newest mission, and it has another loop.
+    /// A peer begins a mission, or a lap of one, that nobody has begun before: cells are
+    /// counted on its loop from now on.
     fn mission_begun(&mut self, revision: u32, loop_hash: u64) {
-        let newest = revision == self.mission.revision && self.spec.mission.further_laps == 0;
-        if newest && loop_hash != self.loop_hash {
-            self.judged = Arc::clone(&self.mission);
+        let lap = revision.checked_sub(self.mission.revision);
+        let lap = lap.and_then(|lap| u16::try_from(lap).ok());
+        let Some(lap) = lap.filter(|lap| *lap <= self.mission.further_laps) else {
+            return;
+        };
+        if (self.mission.revision, lap) <= (self.judged.revision, self.lap) {
+            return;
+        }
+        self.judged = Arc::clone(&self.mission);
+        self.lap = lap;
+        if loop_hash != self.loop_hash {
             self.loop_hash = loop_hash;
             let geometry = self.geometry_cache.of(&self.judged);
             self.covered = vec![false; geometry.map_or(0, |g| g.coverage_loop.len())];
@@ -911,7 +904,8 @@ impl Swarm {
         if let Ok(ground) = self.geometry_cache.of(&self.judged) {
             for (flag, cell) in self.covered.iter_mut().zip(ground.coverage_loop.cells()) {
                 // A cell that nobody needs counts as covered from the start.
-                *flag = *flag || !cell.needed || self.air.is_covered(cell.id, self.lap + 1);
+                let (revision, laps) = (self.judged.revision, self.lap + 1);
+                *flag = *flag || !cell.needed || self.air.is_covered(revision, cell.id, laps);
             }
         }
     }

@@ -6,6 +6,7 @@ use crate::fault::{Fault, Order};
 use crate::runs::{self, Wanted};
 use crate::world::fixture;
 use skein_flight::trajectory::wind::Wind;
+use skein_peer::{CoverageTask, PointTask};
 
 /// The fixture without its zone: every cell of it is on the loop.
 fn prepared(n_uavs: u16) -> Prepared {
@@ -277,7 +278,8 @@ fn another_mission_in_flight_is_covered_and_checked_to_the_end() {
     ];
     let whole = fixture::square(5).mission.area.clone();
     for (area, zones, cells) in [(half, Vec::new(), 40), (whole, vec![block], 80)] {
-        let fault = Fault::Revise { area, zones };
+        let task = None;
+        let fault = Fault::Revise { area, zones, task };
         let o = run_with(
             5,
             3,
@@ -287,10 +289,31 @@ fn another_mission_in_flight_is_covered_and_checked_to_the_end() {
         assert_eq!(o.report.coverage.cells, cells);
         assert_eq!(o.report.work_bound_ms, None);
     }
+    // Beyond the first area, and targets in place of it.
+    let beyond = vec![
+        (240_000, 0),
+        (720_000, 0),
+        (720_000, 384_000),
+        (240_000, 384_000),
+    ];
+    let point = |at| PointTask {
+        at,
+        radius_mm: 2_000,
+    };
+    let points = [(50_000, 60_000), (300_000, 90_000), (600_000, 200_000)].map(point);
+    let points = CoverageTask::Points(points.to_vec());
+    for (task, cells) in [(None, 80), (Some(points), 3)] {
+        let (area, zones) = (beyond.clone(), Vec::new());
+        let fault = Fault::Revise { area, zones, task };
+        let o = run_with(5, 3, vec![at(30_000, fault)]);
+        passed(&o);
+        assert_eq!(o.report.coverage.cells, cells);
+    }
     // What cannot be flown an operator's console refuses.
     let nowhere = Fault::Revise {
         area: vec![(0, 0), (10, 0), (0, 10)],
         zones: Vec::new(),
+        task: None,
     };
     let o = run_with(5, 3, vec![at(30_000, nowhere)]);
     passed(&o);

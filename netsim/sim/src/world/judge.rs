@@ -11,8 +11,8 @@ use super::pieces::Pieces;
 use super::survey::{Cell, Survey, Zone};
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::CellId;
-use skein_geometry::frame::Pose;
-use skein_peer::mission::ring_mm;
+use skein_geometry::frame::{Point, Pose};
+use skein_peer::mission::{PointMm, ring_mm};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -40,29 +40,15 @@ struct Added {
     binds: BTreeSet<u16>,
 }
 
-/// Follows all airframes and keeps the score.
+/// What one mission asks for, and what of it was seen.
 #[derive(Clone, Debug)]
-pub struct Judge {
+struct Board {
+    /// From which revision on it is asked for.
+    revision: u32,
     survey: Arc<Survey>,
-    /// What is to be seen since a revision changed it: a part of the survey.
-    wanted: Option<Arc<Survey>>,
-    /// By cell of the survey: whether it is to be seen and can be.
-    coverable: Vec<bool>,
-    /// By zone of the survey: whether a revision lifted it.
-    lifted: Vec<bool>,
-    added: Vec<Added>,
-    /// Which revision each UAV follows.
-    told: BTreeMap<u16, u32>,
-    /// Farther from a new zone than this a UAV has room to stay clear of it, metres.
-    room_m: f64,
     seen: Vec<Option<Sighting>>,
     n_covered: usize,
     n_coverable: usize,
-    entries: usize,
-    /// By UAV: for every zone whether the UAV was inside it at the end of its last piece.
-    inside: BTreeMap<u16, Vec<bool>>,
-    /// By UAV: the least distance to any zone so far.
-    near_m: BTreeMap<u16, f64>,
     /// What peers name cells, where the survey knows other ones; and which were seen.
     claims: Option<(Arc<Pieces>, Vec<bool>)>,
     /// How often everything is to be seen, and which time it is.
@@ -72,6 +58,27 @@ pub struct Judge {
     times: Vec<(u16, u64)>,
     /// Longest time from one first sighting of a cell to that of the next lap.
     longest_gap_ms: u64,
+}
+
+/// Follows all airframes and keeps the score.
+#[derive(Clone, Debug)]
+pub struct Judge {
+    /// One for each mission so far: who follows an older one yet is judged by it.
+    boards: Vec<Board>,
+    /// The zones of the first mission.
+    zones: Vec<Zone>,
+    /// By zone of the first mission: whether a revision lifted it.
+    lifted: Vec<bool>,
+    added: Vec<Added>,
+    /// Which revision each UAV follows.
+    told: BTreeMap<u16, u32>,
+    /// Farther from a new zone than this a UAV has room to stay clear of it, metres.
+    room_m: f64,
+    entries: usize,
+    /// By UAV: for every zone whether the UAV was inside it at the end of its last piece.
+    inside: BTreeMap<u16, Vec<bool>>,
+    /// By UAV: the least distance to any zone so far.
+    near_m: BTreeMap<u16, f64>,
     closest: Option<Approach>,
     too_close: BTreeMap<(u16, u16), bool>,
 }
@@ -80,25 +87,18 @@ fn is_coverable(cell: &Cell) -> bool {
     cell.uncoverable.is_none()
 }
 
-impl Judge {
-    /// A judge who has seen nothing yet.
-    #[must_use]
-    pub fn new(survey: Arc<Survey>) -> Self {
+/// A piece in whole millimetres: its place.
+fn place_mm(ring: &[Point]) -> Vec<PointMm> {
+    ring_mm(ring)
+}
+
+impl Board {
+    fn new(revision: u32, survey: Arc<Survey>) -> Self {
         Self {
-            wanted: None,
-            coverable: survey.cells().iter().map(is_coverable).collect(),
-            lifted: vec![false; survey.zones().len()],
-            added: Vec::new(),
-            told: BTreeMap::new(),
-            room_m: 0.0,
+            revision,
             seen: vec![None; survey.cells().len()],
             n_covered: 0,
             n_coverable: survey.n_coverable(),
-            entries: 0,
-            inside: BTreeMap::new(),
-            near_m: BTreeMap::new(),
-            closest: None,
-            too_close: BTreeMap::new(),
             claims: None,
             laps: 1,
             lap: 1,
@@ -108,23 +108,7 @@ impl Judge {
         }
     }
 
-    /// Wants everything to be seen so many times, one lap after the other.
-    #[must_use]
-    pub fn with_laps(mut self, laps: u16) -> Self {
-        self.laps = laps.max(1);
-        self
-    }
-
-    /// The longest time between the first sightings of a cell in one lap and the next, milliseconds; none where everything is seen once.
-    #[must_use]
-    pub fn longest_gap_ms(&self) -> Option<u64> {
-        (self.laps > 1).then_some(self.longest_gap_ms)
-    }
-
-    /// Watches these pieces besides, so that what peers claim to have seen can be
-    /// checked where the survey knows other cells than they do.
-    #[must_use]
-    pub fn with_claims(mut self, pieces: Option<Arc<Pieces>>) -> Self {
+    fn watching(mut self, pieces: Option<Arc<Pieces>>) -> Self {
         self.claims = pieces.map(|p| {
             let seen = vec![false; p.rings().len()];
             (p, seen)
@@ -132,51 +116,53 @@ impl Judge {
         self
     }
 
-    /// From now on what another revision of the mission asks for is to be seen, within what
-    /// was surveyed first, and its zones are to be kept clear of. A zone that is new binds
-    /// a UAV once it follows the revision and has been farther than `room_m` from it.
-    pub fn revise(&mut self, wanted: Arc<Survey>, revision: u32, room_m: f64) {
-        let (survey, zones) = (Arc::clone(&self.survey), wanted.zones());
-        let same = |a: &Zone, b: &Zone| ring_mm(&a.ring) == ring_mm(&b.ring);
-        let cells = survey.cells().iter().map(|c| wanted.index_of(c.id));
-        self.coverable = cells
-            .map(|i| i.is_some_and(|i| is_coverable(&wanted.cells()[i])))
-            .collect();
-        self.n_coverable = self.coverable.iter().filter(|c| **c).count();
-        let seen = self.coverable.iter().zip(&self.seen);
-        self.n_covered = seen.filter(|(c, seen)| **c && seen.is_some()).count();
-        let surveyed = survey.zones().iter();
-        self.lifted = surveyed
-            .map(|old| !zones.iter().any(|new| same(old, new)))
-            .collect();
-        self.added
-            .retain(|a| zones.iter().any(|new| same(&a.zone, new)));
-        for zone in zones {
-            let known = survey.zones().iter().any(|old| same(old, zone));
-            if !known && !self.added.iter().any(|a| same(&a.zone, zone)) {
-                self.added.push(Added {
-                    revision,
-                    zone: zone.clone(),
-                    binds: BTreeSet::new(),
-                });
+    /// Takes over what another board saw of the same places: squares of one grid, or pieces
+    /// with the same corners.
+    fn remember(&mut self, other: &Self) {
+        for i in 0..self.seen.len() {
+            let Some(j) = self.same_place(other, i) else {
+                continue;
+            };
+            if let (None, (1.., at_ms), Some(sighting)) =
+                (self.seen[i], other.times[j], other.last_sighting(j))
+            {
+                self.seen[i] = Some(sighting);
+                self.times[i] = (1, at_ms);
+                let cell = self.survey.cells()[i];
+                self.n_covered += usize::from(is_coverable(&cell));
             }
         }
-        self.inside.clear();
-        self.room_m = room_m;
-        self.wanted = Some(wanted);
-    }
-
-    /// A UAV follows this revision of the mission.
-    pub fn follows(&mut self, uav: u16, revision: u32) {
-        self.told.insert(uav, revision);
-        for added in self.added.iter_mut().filter(|a| a.revision > revision) {
-            added.binds.remove(&uav);
+        let (Some((mine, seen)), Some((theirs, saw))) = (&mut self.claims, &other.claims) else {
+            return;
+        };
+        let places = theirs.rings().iter().map(|r| place_mm(r)).zip(saw);
+        let known: BTreeSet<Vec<PointMm>> = places.filter(|(_, s)| **s).map(|(p, _)| p).collect();
+        for (ring, seen) in mine.rings().iter().zip(seen) {
+            *seen = *seen || known.contains(&place_mm(ring));
         }
     }
 
-    /// Whether a camera saw what peers call this cell, in that many laps.
-    #[must_use]
-    pub fn saw(&self, cell: CellId, laps: u16) -> bool {
+    /// Who saw a cell last, in whichever lap.
+    fn last_sighting(&self, i: usize) -> Option<Sighting> {
+        let (times, at_ms) = self.times[i];
+        let earlier = Sighting { at_ms, uav: 0 };
+        self.seen[i].or((times > 0).then_some(earlier))
+    }
+
+    /// Which cell of another board is where this one is.
+    fn same_place(&self, other: &Self, i: usize) -> Option<usize> {
+        let (mine, theirs) = (&self.survey, &other.survey);
+        match (mine.pieces(), theirs.pieces()) {
+            (Some(a), Some(b)) => {
+                let place = place_mm(&a.rings()[i]);
+                b.rings().iter().position(|ring| place_mm(ring) == place)
+            }
+            (None, None) if mine.has_grid_of(theirs) => theirs.index_of(mine.cells()[i].id),
+            _ => None,
+        }
+    }
+
+    fn saw(&self, cell: CellId, laps: u16) -> bool {
         match &self.claims {
             Some((_, seen)) => cell
                 .number()
@@ -189,70 +175,17 @@ impl Judge {
         }
     }
 
-    /// The cells and which of them can be seen.
-    #[must_use]
-    pub fn survey(&self) -> &Survey {
-        self.wanted.as_ref().unwrap_or(&self.survey)
-    }
-
-    /// Who saw a cell first and when, if anybody did.
-    #[must_use]
-    pub fn sighting(&self, cell: CellId) -> Option<Sighting> {
-        self.seen[self.survey.index_of(cell)?]
-    }
-
-    /// All cells of the mission with their first sightings, in the survey's order.
-    pub fn sightings(&self) -> impl Iterator<Item = (CellId, Option<Sighting>)> + '_ {
-        self.survey
-            .cells()
-            .iter()
-            .zip(&self.seen)
-            .map(|(c, s)| (c.id, *s))
-    }
-
-    /// Number of coverable cells seen.
-    #[must_use]
-    pub fn n_covered(&self) -> usize {
-        self.n_covered
-    }
-
-    /// Share of the coverable cells that were seen, 0 to 1; 1 when there are none.
-    #[must_use]
-    pub fn covered_share(&self) -> f64 {
-        #[allow(clippy::cast_precision_loss, reason = "cells are counted in thousands")]
-        let share = self.n_covered as f64 / self.n_coverable.max(1) as f64;
-        if self.n_coverable == 0 { 1.0 } else { share }
-    }
-
-    /// Whether every coverable cell was seen.
-    #[must_use]
-    pub fn complete(&self) -> bool {
+    fn complete(&self) -> bool {
         self.n_covered == self.n_coverable && self.lap == self.laps
     }
 
-    /// How often a UAV entered a no-fly zone.
-    #[must_use]
-    pub fn entries(&self) -> usize {
-        self.entries
-    }
-
-    /// The least distance a UAV ever had to a zone, metres; infinite without zones.
-    /// Exact to a centimetre up to the first entry, where it is zero.
-    #[must_use]
-    pub fn least_zone_distance_m(&self, uav: u16) -> f64 {
-        self.near_m.get(&uav).copied().unwrap_or(f64::INFINITY)
-    }
-
-    /// The closest approach so far.
-    #[must_use]
-    pub fn closest(&self) -> Option<Approach> {
-        self.closest
-    }
-
-    /// Judges one flown piece of a UAV.
-    pub fn watch(&mut self, uav: u16, airframe: &Airframe, piece: &Piece, facts: &mut Vec<Fact>) {
-        self.look(uav, airframe, piece, facts);
-        self.fence(uav, piece, facts);
+    /// Everything is to be seen once more.
+    fn next_lap(&mut self) {
+        if self.n_covered == self.n_coverable && self.lap < self.laps {
+            self.lap += 1;
+            self.n_covered = 0;
+            self.seen.fill(None);
+        }
     }
 
     fn look(&mut self, uav: u16, airframe: &Airframe, piece: &Piece, facts: &mut Vec<Fact>) {
@@ -323,7 +256,7 @@ impl Judge {
     fn see(&mut self, i: usize, sighting: Sighting, facts: &mut Vec<Fact>) {
         self.seen[i] = Some(sighting);
         let cell = self.survey.cells()[i];
-        self.n_covered += usize::from(self.coverable[i]);
+        self.n_covered += usize::from(is_coverable(&cell));
         facts.push(Fact::Seen {
             at_ms: sighting.at_ms,
             uav: sighting.uav,
@@ -335,11 +268,7 @@ impl Judge {
             self.longest_gap_ms = self.longest_gap_ms.max(gap_ms);
         }
         self.times[i] = (times + 1, sighting.at_ms);
-        if self.n_covered == self.n_coverable && self.lap < self.laps {
-            self.lap += 1;
-            self.n_covered = 0;
-            self.seen.fill(None);
-        }
+        self.next_lap();
     }
 
     /// How far from the camera the centre of a cell in its picture can be.
@@ -426,12 +355,192 @@ impl Judge {
             }
         }
     }
+}
+
+impl Judge {
+    /// A judge who has seen nothing yet.
+    #[must_use]
+    pub fn new(survey: Arc<Survey>) -> Self {
+        Self {
+            zones: survey.zones().to_vec(),
+            lifted: vec![false; survey.zones().len()],
+            added: Vec::new(),
+            told: BTreeMap::new(),
+            room_m: 0.0,
+            entries: 0,
+            inside: BTreeMap::new(),
+            near_m: BTreeMap::new(),
+            closest: None,
+            too_close: BTreeMap::new(),
+            boards: vec![Board::new(0, survey)],
+        }
+    }
+
+    /// Wants everything to be seen so many times, one lap after the other.
+    #[must_use]
+    pub fn with_laps(mut self, laps: u16) -> Self {
+        self.board_mut().laps = laps.max(1);
+        self
+    }
+
+    fn board(&self) -> &Board {
+        &self.boards[self.boards.len() - 1]
+    }
+
+    fn board_mut(&mut self) -> &mut Board {
+        let last = self.boards.len() - 1;
+        &mut self.boards[last]
+    }
+
+    /// The longest time between the first sightings of a cell in one lap and the next, milliseconds; none where everything is seen once.
+    #[must_use]
+    pub fn longest_gap_ms(&self) -> Option<u64> {
+        let board = self.board();
+        (board.laps > 1).then_some(board.longest_gap_ms)
+    }
+
+    /// Watches these pieces besides, so that what peers claim to have seen can be
+    /// checked where the survey knows other cells than they do.
+    #[must_use]
+    pub fn with_claims(mut self, pieces: Option<Arc<Pieces>>) -> Self {
+        let board = self.board_mut();
+        *board = board.clone().watching(pieces);
+        self
+    }
+
+    /// From now on what another revision of the mission asks for is to be seen, so many
+    /// times, and its zones are to be kept clear of. What was seen of the same places counts.
+    /// A zone that is new binds a UAV once it follows the revision and has been farther than
+    /// `room_m` from it. Peers that follow an older revision yet are judged by that.
+    pub fn revise(
+        &mut self,
+        wanted: Arc<Survey>,
+        (claims, laps): (Option<Arc<Pieces>>, u16),
+        revision: u32,
+        room_m: f64,
+    ) {
+        let zones = wanted.zones();
+        let same = |a: &Zone, b: &Zone| ring_mm(&a.ring) == ring_mm(&b.ring);
+        let is_wanted = |old: &Zone| zones.iter().any(|new| same(old, new));
+        self.lifted = self.zones.iter().map(|old| !is_wanted(old)).collect();
+        self.added.retain(|a| is_wanted(&a.zone));
+        for zone in zones {
+            let known = self.zones.iter().any(|old| same(old, zone));
+            if !known && !self.added.iter().any(|a| same(&a.zone, zone)) {
+                self.added.push(Added {
+                    revision,
+                    zone: zone.clone(),
+                    binds: BTreeSet::new(),
+                });
+            }
+        }
+        self.inside.clear();
+        self.room_m = room_m;
+        let mut board = Board::new(revision, wanted).watching(claims);
+        board.laps = laps.max(1);
+        for old in self.boards.iter().rev() {
+            board.remember(old);
+        }
+        board.next_lap();
+        self.boards.push(board);
+    }
+
+    /// A UAV follows this revision of the mission.
+    pub fn follows(&mut self, uav: u16, revision: u32) {
+        self.told.insert(uav, revision);
+        for added in self.added.iter_mut().filter(|a| a.revision > revision) {
+            added.binds.remove(&uav);
+        }
+    }
+
+    /// Whether a camera saw what peers that follow this revision call this cell, in that
+    /// many laps.
+    #[must_use]
+    pub fn saw(&self, revision: u32, cell: CellId, laps: u16) -> bool {
+        let mut boards = self.boards.iter().rev();
+        let board = boards.find(|b| b.revision <= revision);
+        board.is_some_and(|b| b.saw(cell, laps))
+    }
+
+    /// The cells and which of them can be seen.
+    #[must_use]
+    pub fn survey(&self) -> &Survey {
+        &self.board().survey
+    }
+
+    /// Who saw a cell first and when, if anybody did.
+    #[must_use]
+    pub fn sighting(&self, cell: CellId) -> Option<Sighting> {
+        let board = self.board();
+        board.seen[board.survey.index_of(cell)?]
+    }
+
+    /// All cells of the mission with their first sightings, in the survey's order.
+    pub fn sightings(&self) -> impl Iterator<Item = (CellId, Option<Sighting>)> + '_ {
+        let board = self.board();
+        let cells = board.survey.cells().iter();
+        cells.zip(&board.seen).map(|(c, s)| (c.id, *s))
+    }
+
+    /// Number of coverable cells seen.
+    #[must_use]
+    pub fn n_covered(&self) -> usize {
+        self.board().n_covered
+    }
+
+    /// Share of the coverable cells that were seen, 0 to 1; 1 when there are none.
+    #[must_use]
+    pub fn covered_share(&self) -> f64 {
+        #[allow(clippy::cast_precision_loss, reason = "cells are counted in thousands")]
+        let share = self.n_covered() as f64 / self.board().n_coverable.max(1) as f64;
+        if self.board().n_coverable == 0 {
+            1.0
+        } else {
+            share
+        }
+    }
+
+    /// Whether every coverable cell was seen.
+    #[must_use]
+    pub fn complete(&self) -> bool {
+        self.board().complete()
+    }
+
+    /// How often a UAV entered a no-fly zone.
+    #[must_use]
+    pub fn entries(&self) -> usize {
+        self.entries
+    }
+
+    /// The least distance a UAV ever had to a zone, metres; infinite without zones.
+    /// Exact to a centimetre up to the first entry, where it is zero.
+    #[must_use]
+    pub fn least_zone_distance_m(&self, uav: u16) -> f64 {
+        self.near_m.get(&uav).copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// The closest approach so far.
+    #[must_use]
+    pub fn closest(&self) -> Option<Approach> {
+        self.closest
+    }
+
+    /// Judges one flown piece of a UAV.
+    pub fn watch(&mut self, uav: u16, airframe: &Airframe, piece: &Piece, facts: &mut Vec<Fact>) {
+        let last = self.boards.len() - 1;
+        for (i, board) in self.boards.iter_mut().enumerate() {
+            // What of an older mission is seen is no news.
+            let mut old = Vec::new();
+            let told = if i == last { &mut *facts } else { &mut old };
+            board.look(uav, airframe, piece, told);
+        }
+        self.fence(uav, piece, facts);
+    }
 
     /// Distances to the zones, and entries. A zone farther away than the least distance
     /// so far cannot change anything and costs one comparison of boxes.
     fn fence(&mut self, uav: u16, piece: &Piece, facts: &mut Vec<Fact>) {
-        let survey = Arc::clone(&self.survey);
-        let n_zones = survey.zones().len() + self.added.len();
+        let n_zones = self.zones.len() + self.added.len();
         if n_zones == 0 {
             return;
         }
@@ -442,7 +551,7 @@ impl Judge {
                 added.binds.insert(uav);
             }
         }
-        let surveyed = survey.zones().iter().zip(&self.lifted);
+        let surveyed = self.zones.iter().zip(&self.lifted);
         let surveyed = surveyed.map(|(zone, lifted)| (zone, !lifted));
         let added = self.added.iter().map(|a| (&a.zone, a.binds.contains(&uav)));
         let inside = self
@@ -538,7 +647,7 @@ impl Judge {
 mod tests {
     use super::*;
     use crate::world::fixture::{airframe, polygon, square};
-    use skein_geometry::frame::Point;
+    use skein_peer::{CoverageTask, PointTask};
 
     fn piece(x: f64, y: f64, heading: f64, ms: u64, rate: f64) -> Piece {
         Piece {
@@ -577,7 +686,7 @@ mod tests {
         let mut judge = judge_with(&[]);
         let mut facts = Vec::new();
         // Along the lowest lane, over cells inside the new area and beyond it.
-        judge.look(
+        judge.watch(
             1,
             &airframe(),
             &piece(20.0, 24.0, 0.0, 30_000, 0.0),
@@ -586,22 +695,86 @@ mod tests {
         let before = judge.n_covered();
         let far = (5_000_000, 5_000_000);
         let zone = [far, (far.0 + 9_000, far.1), (far.0, far.1 + 9_000)];
-        judge.revise(revised(240_000, &zone), 2, 80.0);
+        judge.revise(revised(240_000, &zone), (None, 1), 2, 80.0);
         assert_eq!(judge.survey().cells().len(), 40);
         assert!(judge.n_covered() >= 4 && judge.n_covered() < before);
-        assert!(judge.saw(CellId { col: 7, row: 0 }, 1), "seen before");
-        judge.look(
+        assert!(judge.saw(1, CellId { col: 7, row: 0 }, 1), "seen before");
+        judge.watch(
             1,
             &airframe(),
             &piece(20.0, 72.0, 0.0, 30_000, 0.0),
             &mut facts,
         );
         assert!(
-            judge.saw(CellId { col: 7, row: 1 }, 1),
+            judge.saw(1, CellId { col: 7, row: 1 }, 1),
             "peers may not know yet"
         );
         assert_eq!(judge.n_covered(), 10);
         assert!(!judge.complete());
+    }
+
+    #[test]
+    fn an_area_beyond_the_first_one_is_judged_and_so_are_those_who_fly_the_first() {
+        let mut judge = judge_with(&[]);
+        let mut spec = square(1);
+        let mut mission = (*spec.mission).clone();
+        mission.area = vec![
+            (240_000, 0),
+            (720_000, 0),
+            (720_000, 384_000),
+            (240_000, 384_000),
+        ];
+        spec.mission = Arc::new(mission);
+        let row = piece(20.0, 24.0, 0.0, 54_000, 0.0);
+        let (first, both, new) = ((2, 0), (7, 0), (12, 0));
+        let id = |(col, row)| CellId { col, row };
+        judge.watch(
+            1,
+            &airframe(),
+            &piece(320.0, 24.0, 0.0, 4_000, 0.0),
+            &mut Vec::new(),
+        );
+        judge.revise(Arc::new(Survey::new(&spec)), (None, 1), 2, 80.0);
+        let before = judge.n_covered();
+        assert!(before > 0 && judge.saw(2, id(both), 1) && !judge.saw(2, id(new), 1));
+        let mut facts = Vec::new();
+        judge.watch(1, &airframe(), &row, &mut facts);
+        assert!(judge.saw(1, id(first), 1) && judge.saw(2, id(new), 1));
+        assert!(!judge.saw(1, id(new), 1) && !judge.saw(2, id(first), 1));
+        assert_eq!(judge.n_covered(), 10);
+        assert_eq!(
+            facts.len(),
+            10 - before,
+            "news of the mission of today alone"
+        );
+    }
+
+    #[test]
+    fn of_other_targets_what_was_seen_of_the_same_places_counts_whatever_their_numbers() {
+        let survey = |points: &[PointMm]| {
+            let mut spec = square(1);
+            let mut mission = (*spec.mission).clone();
+            let point = |at: &PointMm| PointTask {
+                at: *at,
+                radius_mm: 1_000,
+            };
+            mission.task = CoverageTask::Points(points.iter().map(point).collect());
+            spec.mission = Arc::new(mission);
+            Arc::new(Survey::new(&spec))
+        };
+        let (a, b, c) = ((100_000, 24_000), (200_000, 240_000), (300_000, 240_000));
+        let mut judge = Judge::new(survey(&[a, b]));
+        let over_a = piece(40.0, 24.0, 0.0, 10_000, 0.0);
+        judge.watch(1, &airframe(), &over_a, &mut Vec::new());
+        let saw = |j: &Judge, revision, n| j.saw(revision, CellId::numbered(n), 1);
+        assert!(saw(&judge, 1, 0) && !saw(&judge, 1, 1));
+        judge.revise(survey(&[c, a]), (None, 1), 2, 80.0);
+        assert!(!saw(&judge, 2, 0) && saw(&judge, 2, 1) && saw(&judge, 1, 0));
+        // Of laps the first is over for what was seen in any.
+        judge.revise(survey(&[a]), (None, 2), 3, 80.0);
+        assert!(!judge.complete());
+        judge.watch(1, &airframe(), &over_a, &mut Vec::new());
+        assert!(judge.complete());
     }
 
     #[test]
@@ -615,7 +788,7 @@ mod tests {
         let over = piece(40.0, 240.0, 0.0, 20_000, 0.0);
         for (told, from_m, entries) in [(true, 40.0, 1), (false, 40.0, 0), (true, 200.0, 0)] {
             let mut judge = judge_with(&[]);
-            judge.revise(revised(480_000, &block), 2, 80.0);
+            judge.revise(revised(480_000, &block), (None, 1), 2, 80.0);
             judge.follows(1, if told { 2 } else { 1 });
             let mut facts = Vec::new();
             let steps = (0..20).map(|k| Piece {
@@ -632,7 +805,7 @@ mod tests {
         // What was lifted binds nobody.
         let mut judge = judge_with(&[&block]);
         let elsewhere = [(0, 0), (9_000, 0), (0, 9_000)];
-        judge.revise(revised(480_000, &elsewhere), 2, 80.0);
+        judge.revise(revised(480_000, &elsewhere), (None, 1), 2, 80.0);
         judge.fence(1, &over, &mut Vec::new());
         assert_eq!(judge.entries(), 0);
     }
@@ -800,14 +973,14 @@ mod tests {
     #[test]
     fn all_is_covered_with_the_very_last_cell_and_not_before() {
         let mut judge = judge_with(&[]);
-        let survey = Arc::clone(&judge.survey);
+        let survey = Arc::clone(&judge.board().survey);
         let cells = survey.cells();
         let mut left = cells.iter().filter(|c| c.uncoverable.is_none()).count();
         assert!(left > 5);
         for (i, _) in cells.iter().enumerate() {
             assert_eq!(judge.complete(), left == 0, "{left} cells are left");
             let sighting = Sighting { at_ms: 9, uav: 1 };
-            judge.see(i, sighting, &mut Vec::new());
+            judge.board_mut().see(i, sighting, &mut Vec::new());
             left -= usize::from(cells[i].uncoverable.is_none());
         }
         assert!(left == 0 && judge.complete());

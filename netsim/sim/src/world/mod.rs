@@ -54,7 +54,7 @@ impl Site {
         Self {
             obstacles: Obstacles::new(&spec.buildings),
             survey: Arc::new(Survey::new(spec)),
-            claims: claims(spec, geometry),
+            claims: claims(&spec.mission, geometry),
         }
     }
 }
@@ -72,8 +72,8 @@ struct Uav {
 /// The pieces in which peers see an area by exact passes, and lines by stations of
 /// several pieces: they come from the planner, and serve to check what peers say, not
 /// whether all was seen.
-fn claims(spec: &Spec, geometry: Option<&MissionGeometry>) -> Option<Arc<pieces::Pieces>> {
-    match spec.mission.task {
+fn claims(mission: &Mission, geometry: Option<&MissionGeometry>) -> Option<Arc<pieces::Pieces>> {
+    match mission.task {
         CoverageTask::Exact | CoverageTask::Lines(_) => {}
         CoverageTask::Area | CoverageTask::Points(_) => return None,
     }
@@ -215,11 +215,14 @@ impl World {
         &self.judge
     }
 
-    /// From now on a revision of the mission is judged by, for an area in lanes: its area
-    /// lies within the first one.
-    pub fn revise(&mut self, survey: Arc<Survey>, mission: &Mission) {
+    /// From now on a revision of the mission with this geometry is judged by.
+    pub fn revise(&mut self, survey: Arc<Survey>, geometry: &MissionGeometry) {
+        let mission = &*geometry.mission;
         let room_m = mission.clearance_m() + TURNS_TO_STAY_CLEAR * mission.turn_radius_m();
-        self.judge.revise(survey, mission.revision, room_m);
+        let laps = mission.further_laps.saturating_add(1);
+        let claims = claims(mission, Some(geometry));
+        self.judge
+            .revise(survey, (claims, laps), mission.revision, room_m);
     }
 
     /// A UAV follows this revision of the mission.

@@ -174,6 +174,13 @@ impl Survey {
         self.extent_m
     }
 
+    /// Whether two surveys name squares of one grid alike.
+    #[must_use]
+    pub fn has_grid_of(&self, other: &Self) -> bool {
+        let bits = |s: &Self| (s.lane_m.to_bits(), s.extent_m.to_bits());
+        bits(self) == bits(other)
+    }
+
     /// Number of cells that can be seen.
     #[must_use]
     pub fn n_coverable(&self) -> usize {
