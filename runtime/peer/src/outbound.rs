@@ -370,6 +370,7 @@ pub(crate) fn heartbeat_of(s: &Sources<'_>) -> Heartbeat {
         sharers: 0,
         east_dm: pose.map_or(0, |p| mm(p.east_m) / 100),
         north_dm: pose.map_or(0, |p| mm(p.north_m) / 100),
+        fresh: Vec::new(),
     }
 }
 
@@ -556,6 +557,7 @@ mod tests {
             sharers: 2,
             east_dm: 0,
             north_dm: 0,
+            fresh: Vec::new(),
         });
         let beacon = Body::Beacon(crate::wire::samples::beacon(1));
         assert_eq!(beat(&mut o, &beacon).seq, 1);

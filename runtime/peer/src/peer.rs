@@ -232,7 +232,8 @@ impl Peer {
             Heard::Heartbeat(record, h) => {
                 let (now, author, life) = (self.now, record.author, record.incarnation);
                 let heartbeat = (record.seq, h.interval);
-                let changes = self.membership.on_heartbeat(now, author, life, heartbeat);
+                let mut changes = self.membership.on_heartbeat(now, author, life, heartbeat);
+                changes.extend(self.membership.on_others(now, author, &h.fresh));
                 self.report_changes(changes);
                 self.relay.air.hear(now, author, (h.interval, h.sharers));
             }
@@ -475,9 +476,13 @@ impl Peer {
                 ..self.with_sources(|_, s, _, _| outbound::beacon_of(s))
             })
         } else {
+            // An answer to a suspicion is as short as can be.
+            let answers = self.timers.is_running(Timer::Refutation, self.now);
+            let fresh = (!answers).then(|| self.membership.tell_between(self.now));
             Body::Heartbeat(Heartbeat {
                 interval,
                 sharers,
+                fresh: fresh.unwrap_or_default(),
                 ..self.with_sources(|_, s, _, _| outbound::heartbeat_of(s))
             })
         };

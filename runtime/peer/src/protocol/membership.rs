@@ -55,6 +55,9 @@ const HOP_INTERVALS: u64 = 10;
 /// lost, two hardly are.
 const URGENT_INTERVALS: u64 = 2;
 
+/// A heartbeat carries so many of others at most: then it is half as long as a beacon.
+const BETWEEN_MAX: usize = 8;
+
 /// A belief that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Change {
@@ -105,6 +108,8 @@ pub struct Membership {
     period_ms: u64,
     known: BTreeMap<u16, Known>,
     next_gossip: u16,
+    /// So many heartbeats of others the next own one carries.
+    between: usize,
     /// What this peer announced itself, quarters of T.
     interval: u8,
     doubt_until: Time,
@@ -127,6 +132,7 @@ impl Membership {
             known: BTreeMap::new(),
             // Neighbours tell of different peers.
             next_gossip: me,
+            between: 0,
             interval: INTERVAL_LEAST,
             doubt_until: Time(0),
             refuted: false,
@@ -209,7 +215,15 @@ impl Membership {
                 self.on_gossip(now, told, (author, beacon), limits, &mut changes);
             }
         }
-        for told in &beacon.fresh {
+        changes.extend(self.on_others(now, author, &beacon.fresh));
+        changes
+    }
+
+    /// What a neighbour says with its heartbeat of those of others. Returns what changed.
+    pub fn on_others(&mut self, now: Time, author: u16, others: &[Fresh]) -> Vec<Change> {
+        let mut changes = Vec::new();
+        let limits = self.patience(now);
+        for told in others {
             if told.id != self.me && told.id != author {
                 self.on_fresh(now, told, author, limits, &mut changes);
             }
@@ -516,17 +530,20 @@ impl Membership {
         changes
     }
 
-    /// What to say of others in the room of so many entries. Where not everybody fits, half
-    /// of the room is for heartbeats alone, of those who are news and of those whom a
-    /// neighbour is farther from.
+    /// What to say of others in the room of so many entries, half of which is for heartbeats
+    /// alone where not everybody fits: of those who are news and of those whom a neighbour is
+    /// farther from. The first of these go with the heartbeat between this beacon and the
+    /// next ([`Membership::tell_between`]).
     pub fn tell(&mut self, now: Time, entries: usize) -> (Vec<Gossip>, Vec<Fresh>) {
         if self.known.len() <= entries {
+            self.between = 0;
             return (self.gossip(now, entries), Vec::new());
         }
         let full = entries.div_ceil(2);
         let told = self.gossip(now, full);
         let room = (entries - full) * ENTRY_BYTES / FRESH_BYTES;
-        let fresh = self.fresh(now, &told, room);
+        self.between = room.min(BETWEEN_MAX);
+        let fresh = self.fresh(now, &told, room - self.between);
         (told, fresh)
     }
 
@@ -553,6 +570,13 @@ impl Membership {
             known.fresh(now)
         };
         wanted.into_iter().map(say).collect()
+    }
+
+    /// What the next heartbeat says of others: those that the last beacon had no room for.
+    /// It is short, so it often arrives where a beacon does not.
+    pub fn tell_between(&mut self, now: Time) -> Vec<Fresh> {
+        let room = std::mem::take(&mut self.between);
+        self.fresh(now, &[], room)
     }
 
     /// Whole entries of others: at most `max`. Who began a life anew without

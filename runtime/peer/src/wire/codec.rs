@@ -270,7 +270,8 @@ array_of!(Heartbeat {
     interval,
     sharers,
     east_dm,
-    north_dm
+    north_dm,
+    fresh
 });
 array_of!(Gossip {
     id,
@@ -787,7 +788,7 @@ mod tests {
                 Body::Heartbeat(h) => {
                     kinds += 1;
                     let with = |change: &dyn Fn(&mut Heartbeat), field| {
-                        let mut h = h;
+                        let mut h = h.clone();
                         change(&mut h);
                         refused(&Body::Heartbeat(h), field);
                     };

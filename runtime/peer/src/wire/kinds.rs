@@ -37,7 +37,7 @@ pub enum Kind {
     Intent = 10,
     /// Reserved: approach conflicts.
     Conflict = 11,
-    /// "I am here", without gossip.
+    /// "I am here", with heartbeats of others at most.
     Heartbeat = 12,
 }
 
@@ -209,7 +209,7 @@ const TABLE: [KindRow; 13] = [
         ..row(
             Kind::Heartbeat,
             "heartbeat",
-            16,
+            288,
             Priority::Beacon,
             Lifetime::Beacons(1),
         )

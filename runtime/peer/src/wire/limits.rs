@@ -5,11 +5,11 @@
 //! author never said.
 
 use super::codec::{Body, WireError};
-use super::message::{Beacon, Bid, CellRun, Claim, Heartbeat, Round, State};
+use super::message::{Beacon, Bid, CellRun, Claim, Fresh, Heartbeat, Round, State};
 
 /// Gossip entries in a beacon: what a tenth of a second of a 64 kbit/s channel carries.
 pub const GOSSIP_MAX: usize = 20;
-/// Bytes of further heartbeats in a beacon, six or seven each.
+/// Bytes of others' heartbeats in a beacon or a heartbeat, six or seven each.
 pub const FRESH_MAX_BYTES: usize = 256;
 /// Shortest interval that is announced between two beacons, quarters of T: one period.
 pub const INTERVAL_LEAST: u8 = 4;
@@ -95,9 +95,13 @@ fn check_beacon(b: &Beacon) -> Result<(), WireError> {
     at_most("gossip", b.gossip.len(), GOSSIP_MAX)?;
     in_range("hops", b.gossip.iter().all(|g| g.hops <= HOPS_MAX))?;
     in_range("interval", b.gossip.iter().all(|g| is_interval(g.interval)))?;
-    in_range("fresh", b.fresh.is_sorted_by(|a, b| a.id < b.id))?;
-    in_range("hops", b.fresh.iter().all(|f| f.hops <= HOPS_MAX))?;
-    in_range("interval", b.fresh.iter().all(|f| is_interval(f.interval)))
+    check_fresh(&b.fresh)
+}
+
+fn check_fresh(fresh: &[Fresh]) -> Result<(), WireError> {
+    in_range("fresh", fresh.is_sorted_by(|a, b| a.id < b.id))?;
+    in_range("hops", fresh.iter().all(|f| f.hops <= HOPS_MAX))?;
+    in_range("interval", fresh.iter().all(|f| is_interval(f.interval)))
 }
 
 fn check_heartbeat(h: &Heartbeat) -> Result<(), WireError> {
@@ -105,7 +109,8 @@ fn check_heartbeat(h: &Heartbeat) -> Result<(), WireError> {
     in_range("interval", is_interval(h.interval))?;
     in_range("sharers", usize::from(h.sharers) <= PEERS_MAX + 1)?;
     in_range("east_dm", near(h.east_dm))?;
-    in_range("north_dm", near(h.north_dm))
+    in_range("north_dm", near(h.north_dm))?;
+    check_fresh(&h.fresh)
 }
 
 fn is_interval(quarters: u8) -> bool {

@@ -31,7 +31,7 @@ pub struct Record {
 
 /// "I am here": one hop, between two beacons. Its number in the envelope counts on from
 /// that of the last beacon.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Heartbeat {
     /// Until its next beacon, from the last one, quarters of T.
     pub interval: u8,
@@ -41,6 +41,8 @@ pub struct Heartbeat {
     pub east_dm: i32,
     /// North, dm.
     pub north_dm: i32,
+    /// Heartbeats of those whom a neighbour hears by more hops, ascending.
+    pub fresh: Vec<Fresh>,
 }
 
 /// "I am here", and what its author knows: one hop.

@@ -225,8 +225,9 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                 sharers: 3,
                 east_dm: -12_346,
                 north_dm: 8_901,
+                fresh: vec![fresh(6)],
             }),
-            "8404033930391922c5",
+            "8504033930391922c54606ac020f5104",
         ),
     ]
 }
@@ -245,6 +246,17 @@ pub fn largest() -> Vec<Body> {
         max_seq: u32::MAX,
         digest: u16::MAX,
     };
+    let fresh: Vec<Fresh> = (u16::MAX - 18..u16::MAX)
+        .map(|id| Fresh {
+            id,
+            life: 7,
+            heartbeat: u32::MAX,
+            age_ds: u16::MAX,
+            hops: HOPS_MAX,
+            interval: INTERVAL_MOST,
+            able: true,
+        })
+        .collect();
     let epoch = Epoch {
         counter: u32::MAX,
         hash: u32::MAX,
@@ -288,17 +300,7 @@ pub fn largest() -> Vec<Body> {
             loop_hash: u64::MAX,
             cover_digest: u32::MAX,
             gossip: vec![gossip; GOSSIP_MAX],
-            fresh: (u16::MAX - 18..u16::MAX)
-                .map(|id| Fresh {
-                    id,
-                    life: 7,
-                    heartbeat: u32::MAX,
-                    age_ds: u16::MAX,
-                    hops: HOPS_MAX,
-                    interval: INTERVAL_MOST,
-                    able: true,
-                })
-                .collect(),
+            fresh: fresh.clone(),
         }),
         Body::State(State {
             east_mm: -POSITION_MAX_MM,
@@ -368,6 +370,7 @@ pub fn largest() -> Vec<Body> {
             sharers: u16::try_from(PEERS_MAX + 1).unwrap_or(u16::MAX),
             east_dm: -POSITION_MAX_MM / 100,
             north_dm: -POSITION_MAX_MM / 100,
+            fresh,
         }),
     ]
 }

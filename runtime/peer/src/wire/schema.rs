@@ -72,6 +72,12 @@ const SHARERS: Place = at(
     Shape::Number(0, PEERS_MAX as i128 + 1),
 );
 
+const FRESH: Place = at(
+    "fresh",
+    "heartbeats of others, ascending by id; of each: id, count and age (100 ms), seven bits a byte, the lowest first; then in two bytes three bits of the life, one whether it can plan, five of the hops, seven of the interval",
+    Shape::Bytes(FRESH_MAX_BYTES),
+);
+
 const ENVELOPE: &[Place] = &[
     at("author", "who wrote it", U16),
     at("incarnation", "in which life", U32),
@@ -148,11 +154,7 @@ const BEACON: &[Place] = &[
         "what it knows of others",
         Shape::Rows(GOSSIP, GOSSIP_MAX),
     ),
-    at(
-        "fresh",
-        "heartbeats of more of them, ascending by id; of each: id, count and age (100 ms), seven bits a byte, the lowest first; then in two bytes three bits of the life, one whether it can plan, five of the hops, seven of the interval",
-        Shape::Bytes(FRESH_MAX_BYTES),
-    ),
+    FRESH,
 ];
 
 const DM: Shape = Shape::Number(
@@ -169,6 +171,7 @@ const HEARTBEAT: &[Place] = &[
     SHARERS,
     at("east_dm", "dm east of the mission's origin", DM),
     at("north_dm", "dm north of the mission's origin", DM),
+    FRESH,
 ];
 
 const STATE: &[Place] = &[

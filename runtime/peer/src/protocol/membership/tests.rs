@@ -422,12 +422,24 @@ fn where_not_all_fit_half_of_the_room_is_for_heartbeats_alone() {
     let ids = |fresh: &[Fresh]| -> Vec<u16> { fresh.iter().map(|f| f.id).collect() };
     let (told, fresh) = m.tell(Time(5_000), 4);
     assert_eq!(told.iter().map(|g| g.id).collect::<Vec<_>>(), [4, 2]);
-    assert_eq!(ids(&fresh), [5, 6, 7, 8]);
+    assert_eq!(ids(&fresh), [0; 0]);
+    assert_eq!(ids(&m.tell_between(Time(5_500))), [5, 6, 7, 8]);
+    assert_eq!(m.tell_between(Time(5_600)).len(), 0, "once a beacon");
     let (told, fresh) = m.tell(Time(6_000), 4);
     assert_eq!(told.iter().map(|g| g.id).collect::<Vec<_>>(), [9, 3]);
-    assert_eq!(ids(&fresh), [10, 11, 12, 13]);
-    let (told, fresh) = m.tell(Time(7_000), 19);
+    assert_eq!(fresh.len(), 0);
+    assert_eq!(ids(&m.tell_between(Time(6_500))), [10, 11, 12, 13]);
+    let (told, fresh) = m.tell(Time(7_000), 8);
+    assert_eq!(
+        (told.len(), fresh.len()),
+        (4, 1),
+        "the beacon has what is left"
+    );
+    assert_eq!(m.tell_between(Time(7_500)).len(), 8);
+    m.tell(Time(8_000), 8);
+    let (told, fresh) = m.tell(Time(9_000), 19);
     assert_eq!((told.len(), fresh.len()), (19, 0));
+    assert_eq!(m.tell_between(Time(9_500)).len(), 0);
 }
 
 #[test]

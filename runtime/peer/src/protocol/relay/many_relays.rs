@@ -128,7 +128,11 @@ impl Net {
         node.next_beacon = self.now + interval_ms * 9 / 10 + self.dice.below(interval_ms / 5);
         node.heartbeat += 1;
         node.membership.tick(now);
-        let (mut gossip, fresh) = node.membership.tell(now, plan.entries);
+        let (mut gossip, mut fresh) = node.membership.tell(now, plan.entries);
+        // There are no heartbeats here.
+        fresh.extend(node.membership.tell_between(now));
+        fresh.sort_by_key(|f| f.id);
+        fresh.dedup_by_key(|f| f.id);
         for g in &mut gossip {
             (g.max_seq, g.digest) = node.relay.version(g.id, g.incarnation);
         }
