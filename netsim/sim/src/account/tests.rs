@@ -185,6 +185,16 @@ fn a_peer_that_comes_back_takes_its_own_cells_back() {
 }
 
 #[test]
+fn what_a_newer_mission_replaced_nobody_took_over() {
+    let mut a = two();
+    a.ended(1_000, 1, Cause::Killed);
+    a.reported(2_000, 2, &ready(2, 10));
+    a.reported(3_000, 2, &Report::Covered { cells: vec![0] });
+    let k = &concluded(&a, 9_000).kills[0];
+    assert_eq!((k.superseded, k.takeover_ms), (10, None));
+}
+
+#[test]
 fn another_time_round_begins_with_everything_open() {
     let mut a = two();
     a.reported(

@@ -51,8 +51,9 @@ struct Taking {
 }
 
 impl Death {
+    /// What a newer mission replaced nobody took over.
     fn close(&mut self, now_ms: u64) {
-        if self.pending.is_empty() {
+        if self.pending.is_empty() && self.superseded == 0 {
             self.over_ms.get_or_insert(now_ms);
         }
     }
