@@ -32,18 +32,8 @@ impl MissionState {
         }
         let me = self.hand(s)?;
         let spendable_ms = u64::from(self.spendable_ms(s.percept));
-        let orphans = self.negotiation.ripe_orphans(ctx);
-        if !orphans.is_empty() {
-            let share = self.even_share(ctx);
-            let pace = self.pace()?;
-            let (_, cells) = sharing::nearest_orphans(&orphans.runs(), &me, share, pace)?;
-            let first = cells.first()?.0;
-            let others = self.hands(s, ctx, &self.negotiation.owners(ctx));
-            let sooner = pace.how_many_sooner(&me, &others, first);
-            return self
-                .negotiation
-                .is_my_turn(ctx, first, sooner)
-                .then(|| self.flown_besides(cells, spendable_ms))?;
+        if let Some(cells) = self.wanted_orphans(s, ctx, &me, spendable_ms) {
+            return Some(cells);
         }
         if !self.negotiation.may_relieve(ctx, me.free_ms) {
             return None;
@@ -56,6 +46,30 @@ impl MissionState {
         let least_ms = SETTLE_PERIODS * ctx.period_ms;
         let (cells, by_ms) = sharing::relief(&owners, &hands, me.id, self.pace()?, least_ms)?;
         self.flown_besides(cells, by_ms.min(spendable_ms))
+    }
+
+    /// Orphans that it is this peer's turn to take: the nearest, and if it can fly none of them
+    /// with nothing else to fly, of any what it can.
+    fn wanted_orphans(
+        &self,
+        s: &Situation<'_>,
+        ctx: &Context<'_>,
+        me: &Hand,
+        spendable_ms: u64,
+    ) -> Option<Vec<(u16, Direction)>> {
+        let orphans = self.negotiation.ripe_orphans(ctx);
+        let pace = self.pace()?;
+        let share = self.even_share(ctx);
+        let (_, cells) = sharing::nearest_orphans(&orphans.runs(), me, share, pace)?;
+        let first = cells.first()?.0;
+        let others = self.hands(s, ctx, &self.negotiation.owners(ctx));
+        let sooner = pace.how_many_sooner(me, &others, first);
+        if !self.negotiation.is_my_turn(ctx, first, sooner) {
+            return None;
+        }
+        let idle = self.negotiation.sections.plan().is_empty();
+        let any = || self.within_reach(&orphans, s.percept).filter(|_| idle);
+        self.flown_besides(cells, spendable_ms).or_else(any)
     }
 
     /// The other members, where and when each has nothing to fly any more, as far as is known:

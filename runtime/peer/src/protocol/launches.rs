@@ -316,6 +316,14 @@ mod tests {
     }
 
     #[test]
+    fn rosters_of_up_to_256_divide_the_loop() {
+        for n in [65, 128, 256] {
+            let roster: Vec<Launch> = (1..=n).map(|id| launch(id, 380, 290, 0)).collect();
+            assert!(divided(&roster).len() <= usize::from(n));
+        }
+    }
+
+    #[test]
     fn who_would_come_too_late_gets_nothing() {
         let mut roster: Vec<Launch> = (1..10).map(|id| launch(id, 380, 290, 0)).collect();
         roster.push(launch(10, 380, 290, 600));

@@ -10,7 +10,7 @@
 
 use super::runs::cells_of;
 use crate::wire::message::CellRun;
-use skein_flight::coverage::ring::{CoverageLoop, Direction};
+use skein_flight::coverage::ring::{CoverageLoop, Direction, LoopCell};
 use skein_geometry::frame::Point;
 
 /// A part of a plan is taken over only if the work of the two then ends this much sooner: at
@@ -160,18 +160,45 @@ impl Pace<'_> {
     }
 
     /// How many of the last cells of an owner's plan a hand takes over so that both are done
-    /// at once, and when that is; `None` where it gains too little.
+    /// soonest, and when that is; `None` where it gains too little. What the owner has left may
+    /// be mostly the way to a few cells, which a hand beside them takes over whole.
     fn relieved(&self, owner: &Owner, hand: &Hand, least_ms: u64) -> Option<(usize, u64)> {
-        let many = u64::try_from(owner.plan.len()).ok().filter(|n| *n > 0)?;
         let begins_ms = hand.free_ms + self.way_ms(hand.at, owner.plan.last()?.0);
-        let both_ms = owner.left_ms.checked_sub(begins_ms)?;
-        let taken = both_ms * many / (2 * owner.left_ms.max(1));
-        let after_ms = owner.left_ms * (many - taken) / many;
-        let done_ms = after_ms.max(begins_ms + owner.left_ms * taken / many);
-        // What is left to the owner has to last until it has heard of it.
-        let gains = done_ms * 100 <= owner.left_ms * RELIEF_PERCENT && after_ms >= least_ms;
-        let taken = usize::try_from(taken).ok().filter(|t| *t > 0 && gains)?;
-        Some((taken, done_ms))
+        let mut tail_ms = 0;
+        let mut best: Option<(u64, usize)> = None;
+        let mut after: Option<u16> = None;
+        for (taken, (cell, _)) in (1..).zip(owner.plan.iter().rev()) {
+            tail_ms += self.cell_ms(*cell) + after.map_or(0, |a| self.gap_ms(*cell, a));
+            after = Some(*cell);
+            // What is left to the owner has to last until it has heard of it.
+            let before_ms = owner.left_ms.saturating_sub(tail_ms);
+            if before_ms < least_ms {
+                break;
+            }
+            let all = taken == owner.plan.len();
+            let done_ms = (begins_ms + tail_ms).max(if all { 0 } else { before_ms });
+            if best.is_none_or(|(ms, _)| done_ms < ms) {
+                best = Some((done_ms, taken));
+            }
+        }
+        let (done_ms, taken) = best?;
+        (done_ms * 100 <= owner.left_ms * RELIEF_PERCENT).then_some((taken, done_ms))
+    }
+
+    /// How long a cell is flown, milliseconds.
+    fn cell_ms(&self, cell: u16) -> u64 {
+        let cells = self.coverage_loop.cells();
+        let mm = cells.get(usize::from(cell)).map_or(0, LoopCell::flown_mm);
+        u64::from(mm) * 1000 / u64::from(self.speed_mmps.max(1))
+    }
+
+    /// How long the way between two cells of a plan is, milliseconds: none between neighbours.
+    fn gap_ms(&self, from: u16, to: u16) -> u64 {
+        if from.abs_diff(to) <= 1 {
+            return 0;
+        }
+        let from = self.coverage_loop.boundary(usize::from(from));
+        self.way_ms(from.position(), to)
     }
 }
 
@@ -348,13 +375,20 @@ mod tests {
                 left_ms,
             };
             let me = hand(pace, 1, 19);
-            // 100 s of work, 8 s until the hand begins: 46 s each.
+            // 20 cells of 4 s and a way of 20 s, 8 s until the hand begins: 56 and 52 s.
             let (taken, by_ms) = relief(&[owner(100_000)], &[me], 1, pace, 5000).unwrap();
             assert_eq!(by_ms, 90_000);
-            let wanted = (11..20).rev().map(|c| (c, Direction::Backward));
+            let wanted = (8..20).rev().map(|c| (c, Direction::Backward));
             assert_eq!(taken, wanted.collect::<Vec<_>>());
             // The owner would be done with its part before it has heard of it.
-            assert_eq!(relief(&[owner(100_000)], &[me], 1, pace, 60_000), None);
+            assert_eq!(relief(&[owner(100_000)], &[me], 1, pace, 97_000), None);
+            // Of a few cells far away from their owner a hand beside them takes all.
+            let far = Owner {
+                plan: forward(17..20),
+                ..owner(100_000)
+            };
+            let (taken, _) = relief(&[far], &[me], 1, pace, 5000).unwrap();
+            assert_eq!(taken.len(), 3);
             // Nothing is gained where the way is as long as the work.
             assert_eq!(relief(&[owner(9000)], &[me], 1, pace, 0), None);
         });

@@ -107,6 +107,15 @@ fn who_hears_nobody_of_many_and_has_nothing_to_fly_goes_home() {
 }
 
 #[test]
+fn sixty_five_finish_a_small_mission_without_a_round() {
+    let mut h = Harness::with_roster(65, mission(1, 12, 8));
+    (1..=65).for_each(|id| h.start(id));
+    assert!(h.run_until(120, |h| (1..=65).all(|id| h.beliefs(id).finished)));
+    let bids: usize = (1..=65).map(|id| h.count_said(id, Kind::Bid)).sum();
+    assert_eq!(bids, 0);
+}
+
+#[test]
 fn who_comes_late_to_many_relieves_somebody() {
     let mut h = Harness::new(12, mission(1, 16, 12));
     let first: Vec<u16> = (1..=11).collect();
