@@ -1398,4 +1398,21 @@ mod tests {
         desk.leave_open(0..0);
         assert!(!desk.ask(looks), "with nothing left");
     }
+
+    #[test]
+    fn what_is_divided_are_the_bids_whatever_a_member_knows_besides() {
+        let mut desk = Desk::new(&[2]);
+        desk.wait(5 * T).unwrap();
+        let (own, other) = (desk.bid_from(0), desk.bid_from(12));
+        assert!(desk.negotiation.bid_is_durable(own));
+        desk.negotiation.hear_bid(desk.now, member(2), &other);
+        // It hears of covered cells after it bid, and others may not have heard of them.
+        desk.leave_open(6..24);
+        let divides = desk.tick();
+        let ring = divides.iter().find_map(|a| match a {
+            Action::Divide { ring, .. } => Some(ring),
+            _ => None,
+        });
+        assert!(ring.unwrap().iter().all(|c| c.open));
+    }
 }

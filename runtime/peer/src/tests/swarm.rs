@@ -2,6 +2,7 @@
 
 use super::{covered, with_operator};
 use crate::output::{Report, Status};
+use crate::protocol::runs::unpack;
 use crate::testing::{GROUND_STATION, Harness, mission};
 use crate::wire::codec::Body;
 use crate::wire::kinds::Kind;
@@ -271,7 +272,7 @@ fn what_is_published_is_what_is_planned() {
                 _ => None,
             });
             let Some(claim) = claim else { continue };
-            let told: BTreeSet<u16> = crate::protocol::runs::unpack(&claim.plan, cells)
+            let told: BTreeSet<u16> = unpack(&claim.plan, cells)
                 .into_iter()
                 .map(|p| p.cell)
                 .collect();
@@ -438,9 +439,10 @@ fn claims_and_states_are_said_again_every_ten_intervals() {
     }
 }
 
-/// A bid says which way its author will be flying: who has to turn round needs longer.
+/// A bid says where its author will be, and which way it flies: who has to turn round needs
+/// longer.
 #[test]
-fn a_bid_says_which_way_its_author_flies() {
+fn a_bid_says_where_its_author_will_be_and_which_way_it_flies() {
     let mut ways = BTreeSet::new();
     for stopped in 1..=3 {
         let mut h = Harness::started(4, mission(1, 10, 8));
@@ -448,6 +450,7 @@ fn a_bid_says_which_way_its_author_flies() {
         h.run_s(10);
         h.stop(stopped);
         h.run_s(40);
+        let n = u16::try_from(h.beliefs(4).covered.len().max(h.beliefs(1).covered.len())).unwrap();
         for id in (1..=4).filter(|id| *id != stopped) {
             let mut plan = Vec::new();
             for (_, _, body) in &h.seat(id).said {
@@ -457,6 +460,10 @@ fn a_bid_says_which_way_its_author_flies() {
                         let backward = plan.first().is_some_and(|l| l.backward);
                         if plan.iter().all(|l| l.backward == backward) {
                             assert_eq!(bid.backward, backward, "{id}: {bid:?}");
+                            // It begins at a boundary of a cell that it told to fly.
+                            let beside = [bid.anchor, (bid.anchor + n - 1) % n];
+                            let mut told = unpack(&plan, n).into_iter();
+                            assert!(told.any(|p| beside.contains(&p.cell)), "{id}: {bid:?}");
                             ways.insert(backward);
                         }
                     }

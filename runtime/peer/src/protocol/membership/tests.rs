@@ -695,3 +695,17 @@ fn news_of_somebody_goes_first_for_two_intervals() {
         assert_eq!(told[0].id == 14, goes_first, "after {after_ms} ms");
     }
 }
+
+/// A peer that stood still when another had been silent for four periods: what arrived meanwhile
+/// is heard within one, so it raises no suspicion before.
+#[test]
+fn who_was_late_raises_no_suspicion_for_a_period() {
+    let mut m = Membership::new(1, 1000);
+    m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
+    assert!((0..=16).all(|t| m.tick(Time(t * 250)).is_empty()));
+    m.was_late(Time(7_000), 3_000);
+    let mut ticks = (28..60).map(|t| (t * 250, m.tick(Time(t * 250))));
+    let suspected = ticks.find(|(_, changes)| !changes.is_empty()).unwrap();
+    // Four and a quarter periods of silence would be over at 7.25 s.
+    assert_eq!(suspected.0, 8_000);
+}
