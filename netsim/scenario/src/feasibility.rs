@@ -64,7 +64,7 @@ pub(crate) fn blamed(e: &GeometryError) -> &'static str {
         GeometryError::Loop(e) => match e {
             LoopError::TurnRadius { .. } | LoopError::TooManyCells(_) => "lanes.spacing_m",
             LoopError::Footprint { .. } => "airframes",
-            LoopError::Nothing | LoopError::Zones => "no_fly",
+            LoopError::Nothing => "no_fly",
             LoopError::Extent => "area",
             LoopError::Number(_) => "lanes",
             LoopError::CutOff | LoopError::Launch => "base",

@@ -1,13 +1,15 @@
 //! From a problem to the cells of a loop: what is refused, which cells touch the
 //! area, and how the closed part and the excursions are put together (D2.7 §3.6.2).
 //!
-//! Left to others: the closed part ([`super::blocks`]) and single excursions
-//! ([`super::excursion`]).
+//! Left to others: the closed parts ([`super::blocks`]), how they hang together
+//! ([`super::islands`]) and single excursions ([`super::excursion`]).
 
 use super::excursion::{Excursion, Finder};
+use super::islands::{self, Crossed};
 use crate::coverage::ring::{
     CellId, Grid, LoopCell, LoopError, LoopProblem, check_figures, check_launch, millimetres,
 };
+use crate::route::{RouteLimits, Router};
 use skein_geometry::Curve;
 use skein_geometry::Polygon;
 use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Point, Pose};
@@ -142,11 +144,19 @@ impl Assembly {
         problem: &LoopProblem,
         grid: Grid,
         needed: &BTreeSet<CellId>,
-        ring: Vec<(CellId, Curve)>,
+        loops: Vec<Vec<(CellId, Curve)>>,
     ) -> Result<Self, LoopError> {
-        let gates: Vec<Pose> = ring.iter().filter_map(|(_, curve)| curve.start()).collect();
-        let on_ring: BTreeSet<CellId> = ring.iter().map(|(id, _)| *id).collect();
-        let finder = Finder::new(problem, grid, &gates).ok_or(LoopError::Zones)?;
+        let router = Router::new(
+            problem.zones.clone(),
+            RouteLimits {
+                turn_radius_m: problem.turn_radius_m,
+                clearance_m: problem.clearance_m,
+            },
+        );
+        let ring = islands::joined(problem, grid, &router, loops);
+        let gates: Vec<Pose> = ring.iter().filter_map(|c| c.curve.start()).collect();
+        let on_ring: BTreeSet<CellId> = ring.iter().map(|c| c.id).collect();
+        let finder = Finder::new(problem, grid, &gates, router);
         if !finder.launch_reaches_some() {
             return Err(LoopError::CutOff);
         }
@@ -175,10 +185,10 @@ impl Assembly {
             }
         }
         let mut cells = Vec::with_capacity(needed.len());
-        for (i, (id, curve)) in ring.into_iter().enumerate() {
+        for (i, crossed) in ring.into_iter().enumerate() {
             cells.append(&mut beside.remove(&i).unwrap_or_default());
-            let length_mm = millimetres(&curve);
-            let (view_m, needed) = (curve.length_m() / 2.0, needed.contains(&id));
+            let Crossed { id, curve, view_m } = crossed;
+            let (length_mm, needed) = (millimetres(&curve), needed.contains(&id));
             cells.push(LoopCell {
                 id,
                 curve,
@@ -322,6 +332,35 @@ mod tests {
         // 1,056 m from west to east, 960 m from south to north.
         assert_eq!(turns[0], turns[1]);
         assert!(turns[0] < turns[2], "{turns:?}");
+    }
+
+    #[test]
+    fn parts_behind_a_wall_hang_on_the_loop_by_one_way_there_and_back() {
+        // A gate of 60 m in a wall across the area: no block fits through it.
+        let halves = vec![
+            rectangle(480.0, -50.0, 520.0, 440.0),
+            rectangle(480.0, 500.0, 520.0, 1010.0),
+        ];
+        // A room with a door, with a house in it.
+        let room = vec![
+            rectangle(300.0, 300.0, 310.0, 700.0),
+            rectangle(310.0, 690.0, 700.0, 700.0),
+            rectangle(690.0, 300.0, 700.0, 690.0),
+            rectangle(310.0, 300.0, 480.0, 310.0),
+            rectangle(540.0, 300.0, 690.0, 310.0),
+        ];
+        for zones in [halves, room] {
+            let area = rectangle(0.0, 0.0, 1056.0, 960.0);
+            let p = problem(area, zones);
+            let l = lanes::build(&p).unwrap();
+            judge(&p, &l);
+            let length_mm: u64 = l.cells().iter().map(|c| u64::from(c.service_mm)).sum();
+            let (n, excursions) = (l.len(), l.cells().iter().filter(|c| c.excursion).count());
+            assert!(n >= 370 && excursions * 4 < n, "{excursions} of {n}");
+            // Cells are 48 m wide; the others are seen by turning once or twice.
+            let most_mm = 1000 * (48 * n + 300 * excursions + 1000) as u64;
+            assert!(length_mm < most_mm, "{length_mm} mm, {n}, {excursions}");
+        }
     }
 
     #[test]

@@ -95,14 +95,14 @@ impl Block {
     }
 }
 
-/// The closed loop through all cells of the best component of blocks: each cell
-/// with its curve, in order of flight, counter-clockwise round the tree. Empty
-/// if no block is free.
-pub(super) fn closed_loop(
+/// A closed loop through all cells of each component of blocks: each cell with its curve,
+/// in order of flight, counter-clockwise round the tree. The component with the most needed
+/// cells comes first; none, if no block is free.
+pub(super) fn closed_loops(
     problem: &LoopProblem,
     grid: Grid,
     needed: &BTreeSet<CellId>,
-) -> Vec<(CellId, Curve)> {
+) -> Vec<Vec<(CellId, Curve)>> {
     let blocks: Vec<Block> = needed
         .iter()
         .map(|&c| Block::of(c))
@@ -113,9 +113,11 @@ pub(super) fn closed_loop(
         .into_iter()
         .filter(|&b| is_free(problem, grid, b))
         .collect();
-    let component = best_component(&free, needed);
-    let links = spanning_tree(&component, problem.tree);
-    circumnavigate(&component, &links, grid)
+    let laid = |component: BTreeSet<Block>| {
+        let links = spanning_tree(&component, problem.tree);
+        circumnavigate(&component, &links, grid)
+    };
+    components(&free, needed).into_iter().map(laid).collect()
 }
 
 /// Whether every piece that any tree could lay through the block keeps clear.
@@ -189,8 +191,9 @@ fn gate(grid: Grid, cell: CellId, towards: Side, side: Side) -> Pose {
     )
 }
 
-/// The connected blocks that hold the most needed cells (ties: the first block).
-fn best_component(free: &[Block], needed: &BTreeSet<CellId>) -> BTreeSet<Block> {
+/// The blocks that hang together, those with the most needed cells first (ties: the first
+/// block).
+fn components(free: &[Block], needed: &BTreeSet<CellId>) -> Vec<BTreeSet<Block>> {
     let place: BTreeMap<Block, usize> = free.iter().enumerate().map(|(i, &b)| (b, i)).collect();
     let mut groups = UnionFind::<usize>::new(free.len());
     for (i, b) in free.iter().enumerate() {
@@ -204,22 +207,17 @@ fn best_component(free: &[Block], needed: &BTreeSet<CellId>) -> BTreeSet<Block> 
         b.cells()
             .map_or(0, |c| c.iter().filter(|c| needed.contains(c)).count())
     };
-    // Group → (needed cells, first block).
-    let mut totals: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
+    // Group → needed cells, blocks in order.
+    let mut found: BTreeMap<usize, (usize, Vec<usize>)> = BTreeMap::new();
     for (i, b) in free.iter().enumerate() {
-        totals.entry(groups.find(i)).or_insert((0, i)).0 += weight(b);
+        let group = found.entry(groups.find(i)).or_default();
+        group.0 += weight(b);
+        group.1.push(i);
     }
-    let best = totals
-        .iter()
-        .max_by_key(|(_, (count, first))| (*count, std::cmp::Reverse(*first)));
-    let Some((&root, _)) = best else {
-        return BTreeSet::new();
-    };
-    free.iter()
-        .enumerate()
-        .filter(|&(i, _)| groups.find(i) == root)
-        .map(|(_, &b)| b)
-        .collect()
+    let mut found: Vec<(usize, Vec<usize>)> = found.into_values().collect();
+    found.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+    let blocks = |(_, members): (usize, Vec<usize>)| members.iter().map(|i| free[*i]).collect();
+    found.into_iter().map(blocks).collect()
 }
 
 /// Links of a spanning tree, as (block, side) from both ends.

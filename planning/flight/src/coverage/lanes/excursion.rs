@@ -5,7 +5,7 @@
 //! are sampled, coarsely first; every curve made from them is checked exactly.
 
 use crate::coverage::ring::{CellId, Grid, LoopProblem};
-use crate::route::{RouteLimits, Router};
+use crate::route::Router;
 use crate::trajectory::dubins;
 use skein_geometry::Curve;
 use skein_geometry::frame::{Point, Pose, Vector};
@@ -99,19 +99,19 @@ pub(super) struct Finder<'a> {
 }
 
 impl<'a> Finder<'a> {
-    /// Prepares the search; `None` if the zones cannot be offset.
-    pub(super) fn new(problem: &'a LoopProblem, grid: Grid, gates: &'a [Pose]) -> Option<Self> {
-        let limits = RouteLimits {
-            turn_radius_m: problem.turn_radius_m,
-            clearance_m: problem.clearance_m,
-        };
-        let router = Router::new(problem.zones.clone(), limits);
-        Some(Self {
+    /// Prepares the search.
+    pub(super) fn new(
+        problem: &'a LoopProblem,
+        grid: Grid,
+        gates: &'a [Pose],
+        router: Router,
+    ) -> Self {
+        Self {
             problem,
             grid,
             gates,
             router,
-        })
+        }
     }
 
     /// Whether the loop can be reached from the launch point.

@@ -19,17 +19,19 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `assembly` | what is refused, which cells touch the area, the whole put together |
-//! | `blocks` | the closed part: blocks, a spanning tree, the way round it |
+//! | `blocks` | the closed parts: blocks, spanning trees, the ways round them |
+//! | `islands` | closed parts that hang on the first one by a way there and back |
 //! | `excursion` | cells that no block holds |
 
 mod assembly;
 mod blocks;
 mod excursion;
+mod islands;
 
 use super::ring::patch::Patches;
 use super::ring::{CoverageLoop, Grid, LoopError, LoopProblem, hash_of};
 use assembly::{Assembly, cells_of, check};
-use blocks::closed_loop;
+use blocks::closed_loops;
 
 /// Lays the loop of an area in lanes.
 ///
@@ -48,11 +50,11 @@ pub fn build(problem: &LoopProblem) -> Result<CoverageLoop, LoopError> {
         lane_spacing_m: problem.lane_spacing_m,
     };
     let needed = cells_of(&problem.area, grid)?;
-    let ring = closed_loop(problem, grid, &needed);
-    if ring.is_empty() {
+    let loops = closed_loops(problem, grid, &needed);
+    if loops.is_empty() {
         return Err(LoopError::Nothing);
     }
-    let Assembly { cells, uncoverable } = Assembly::new(problem, grid, &needed, ring)?;
+    let Assembly { cells, uncoverable } = Assembly::new(problem, grid, &needed, loops)?;
     let hash = hash_of(grid.lane_spacing_m.to_bits(), &cells);
     Ok(CoverageLoop::assembled(
         Patches::Grid(grid),

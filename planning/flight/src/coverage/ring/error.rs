@@ -40,9 +40,6 @@ pub enum LoopError {
     /// A length is no number, negative or too small.
     #[error("the {0} is not a usable length")]
     Number(&'static str),
-    /// The zones could not be grown by the clearance.
-    #[error("the no-fly zones could not be grown safely")]
-    Zones,
     /// No route leads from the launch point to the loop.
     #[error("no flyable route leads from the launch point to the area: no-fly zones part them")]
     CutOff,
