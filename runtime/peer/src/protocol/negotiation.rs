@@ -34,7 +34,7 @@ use std::collections::BTreeMap;
 
 /// Time in which an owner at work covers two cells, milliseconds: at the slowest ground
 /// speed that missions are flown at, 8 m/s, two cells of 48 m take 12 s. An owner that
-/// covers none for thrice what the bound makes of it has stalled.
+/// covers none for thrice what the bound makes of it, and comes no nearer, has stalled.
 const TWO_CELLS_MS: u64 = 12_000;
 
 /// Three waits, in periods: for members that stay the same before the first division, for
@@ -145,7 +145,10 @@ struct Dividing {
 #[derive(Clone, Copy, Debug)]
 struct Progress {
     left: usize,
+    /// When a cell was covered, or the owner was seen to come nearer, and what it had left to
+    /// fly then.
     since: Time,
+    eta_ms: u64,
     bound: Time,
     epoch: Epoch,
     /// The claim heard last, and when its author expects to be done.
@@ -563,7 +566,9 @@ impl Negotiation {
         self.provisional = false;
     }
 
-    /// Notes how other owners get on; the first ETA heard in an epoch bounds them.
+    /// Notes how other owners get on; the first ETA heard in an epoch bounds them. A cell far
+    /// from all others is long in coming: an owner whose ETA falls at half the pace of the
+    /// clock at least is on its way.
     fn watch_progress(&mut self, ctx: &Context<'_>) {
         let cell_bound = TWO_CELLS_MS + 2 * u64::from(ctx.diameter) * ctx.period_ms;
         let heard: Vec<(u16, Epoch, u32, u32)> = self
@@ -574,25 +579,30 @@ impl Negotiation {
             .collect();
         for (id, epoch, eta_ms, seq) in heard {
             let left = self.sections.n_left(id);
-            let slack = u64::from(eta_ms / 4) + PATIENT_PERIODS * ctx.period_ms + cell_bound;
+            let eta_ms = u64::from(eta_ms);
+            let slack = eta_ms / 4 + PATIENT_PERIODS * ctx.period_ms + cell_bound;
             let fresh = Progress {
                 left,
                 since: ctx.now,
-                bound: ctx.now.plus_ms(u64::from(eta_ms) + slack),
+                eta_ms,
+                bound: ctx.now.plus_ms(eta_ms + slack),
                 epoch,
                 seq,
-                end: ctx.now.plus_ms(u64::from(eta_ms)),
+                end: ctx.now.plus_ms(eta_ms),
             };
             let p = self.progress.entry(id).or_insert(fresh);
+            let mut comes_nearer = false;
             if p.seq != seq {
                 p.seq = seq;
                 p.end = fresh.end;
+                comes_nearer = eta_ms + ctx.now.since_ms(p.since) / 2 <= p.eta_ms;
             }
             if p.epoch != epoch || left > p.left {
                 *p = fresh;
-            } else if left < p.left {
+            } else if left < p.left || comes_nearer {
                 p.left = left;
                 p.since = ctx.now;
+                p.eta_ms = eta_ms;
             }
         }
     }
@@ -1220,6 +1230,32 @@ mod tests {
         let owners = desk.ask(|n, ctx| n.owners(ctx));
         assert_eq!(owners.iter().map(|o| o.id).collect::<Vec<_>>(), [3]);
         assert_eq!(desk.ask(|n, ctx| n.present_end_ms(ctx)), 20_000);
+    }
+
+    #[test]
+    fn an_owner_that_comes_nearer_to_a_far_cell_has_not_stalled() {
+        let stalled_ms = 3 * (12_000 + 12 * T + T / 2);
+        // It says every ten periods how long its one cell will take yet; for the second time
+        // it flies in circles.
+        for (falls, its_time_ms) in [(10 * T, 1_000_000 + stalled_ms), (0, stalled_ms)] {
+            let mut desk = Desk::new(&[]);
+            desk.live = LivePeers::from([(0, 1)]);
+            desk.gain_in_sight = false;
+            desk.leave_open(7..8);
+            let (mut eta_ms, mut waited_ms) = (1_000_000u64, 0);
+            let taken_ms = (1..).find_map(|seq| {
+                desk.claim(0, seq, 7, 1, u32::try_from(eta_ms).unwrap());
+                eta_ms = eta_ms.saturating_sub(falls);
+                let taken = desk.wait(10 * T);
+                waited_ms += taken.as_ref().map_or(10 * T, |(ms, _)| *ms);
+                taken.map(|_| waited_ms)
+            });
+            let in_time = its_time_ms - 10 * T..=its_time_ms + 20 * T;
+            assert!(
+                in_time.contains(&taken_ms.unwrap()),
+                "{falls}: {taken_ms:?}"
+            );
+        }
     }
 
     #[test]
