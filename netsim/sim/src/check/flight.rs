@@ -2,6 +2,8 @@
 //! who is finished, ordered home or out of fuel flies home (`home`).
 
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
+use crate::world::flat::{self, segment_ring_m};
+use skein_geometry::Polygon;
 use skein_geometry::frame::Point;
 use skein_peer::wire::message::Order;
 use std::collections::BTreeMap;
@@ -14,8 +16,8 @@ const SETTLE_TURNS: f64 = 1.5;
 /// when the side was changed for the sake of a zone, and half of one is room for the wind.
 const HOLD_RADII: f64 = 5.0;
 
-/// The way home round zones is at most so many times the straight one, in the scenarios
-/// flown here: no zone is as wide as it is far.
+/// The way home is at most so many times the straight one, where no zone lies across that:
+/// turns, and the curve at the end.
 const DETOUR: f64 = 2.0;
 
 /// And before it begins a peer turns round, and looks four times a period, seconds.
@@ -44,6 +46,8 @@ struct Homing {
 #[derive(Clone, Debug)]
 pub struct FlightCheck {
     flyers: BTreeMap<u16, Flyer>,
+    zones: Vec<Polygon>,
+    clearance_m: f64,
     homing: BTreeMap<u16, Homing>,
     holding: BTreeMap<u16, (u64, Option<Point>)>,
     told: Clocks<u16>,
@@ -52,11 +56,13 @@ pub struct FlightCheck {
 }
 
 impl FlightCheck {
-    /// The checks of these UAVs.
+    /// The checks of these UAVs, that keep a clearance from zones.
     #[must_use]
-    pub fn new(flyers: BTreeMap<u16, Flyer>) -> Self {
+    pub fn new(flyers: BTreeMap<u16, Flyer>, zones: Vec<Polygon>, clearance_m: f64) -> Self {
         Self {
             flyers,
+            zones,
+            clearance_m,
             homing: BTreeMap::new(),
             holding: BTreeMap::new(),
             told: Clocks::default(),
@@ -119,6 +125,20 @@ impl FlightCheck {
         }
     }
 
+    /// How long a way between two places is at most, metres: a zone across the straight one
+    /// may be part of a wall of all of them, so it leads along all of their edges.
+    fn longest_way_m(&self, from: Point, to: Point) -> f64 {
+        let edges = self.zones.iter().map(Polygon::vertices);
+        let across = edges
+            .clone()
+            .any(|z| segment_ring_m(from, to, z) < self.clearance_m);
+        let round_m = |ring: &[Point]| flat::edges(ring).map(|(a, b)| (b - a).norm()).sum::<f64>();
+        let along_m: f64 = edges
+            .map(|z| round_m(z) + core::f64::consts::TAU * self.clearance_m)
+            .sum();
+        DETOUR * (to - from).norm() + if across { along_m } else { 0.0 }
+    }
+
     fn judge_homing(
         &mut self,
         now_ms: u64,
@@ -128,7 +148,7 @@ impl FlightCheck {
         found: &mut Findings,
     ) {
         let away_m = (at - base).norm();
-        let takes_s = DETOUR * away_m / flyer.slowest_mps.max(0.1) + HOME_SLACK_S;
+        let takes_s = self.longest_way_m(at, base) / flyer.slowest_mps.max(0.1) + HOME_SLACK_S;
         let fresh = Homing {
             due_ms: now_ms.saturating_add(milliseconds(takes_s)),
             base,
@@ -205,12 +225,20 @@ mod tests {
         change: impl Fn(&mut Beliefs),
         away_m: impl Fn(u64) -> f64,
     ) -> BTreeMap<&'static str, u64> {
+        flown_round(Vec::new(), change, away_m)
+    }
+
+    fn flown_round(
+        zones: Vec<Polygon>,
+        change: impl Fn(&mut Beliefs),
+        away_m: impl Fn(u64) -> f64,
+    ) -> BTreeMap<&'static str, u64> {
         let flyer = Flyer {
             turn_radius_m: 20.0,
             slowest_mps: 10.0,
             fastest_mps: 14.0,
         };
-        let mut check = FlightCheck::new(BTreeMap::from([(1, flyer)]));
+        let mut check = FlightCheck::new(BTreeMap::from([(1, flyer)]), zones, 10.0);
         let (mut story, mut found) = (Story::new(300), Findings::new(1));
         let mut view = speaking();
         change(&mut view);
@@ -237,6 +265,21 @@ mod tests {
             assert!(flown(change, |_| 600.0).contains_key("home"));
         }
         assert!(flown(|_| {}, |_| 600.0).is_empty());
+    }
+
+    #[test]
+    fn a_wall_across_the_way_home_gives_time_to_fly_round_it() {
+        let wall = |x: f64| {
+            let corner = |dx: f64, y: f64| Point::new(x + dx, y);
+            let ring = [(0.0, -100.0), (10.0, -100.0), (10.0, 100.0), (0.0, 100.0)];
+            Polygon::new(ring.map(|(dx, y)| corner(dx, y)).to_vec()).unwrap()
+        };
+        let late = |t: u64| if t < 170 { 600.0 } else { 0.0 };
+        let finished = |b: &mut Beliefs| b.finished = true;
+        assert!(flown_round(vec![wall(300.0)], finished, late).is_empty());
+        for zones in [Vec::new(), vec![wall(900.0)]] {
+            assert!(flown_round(zones, finished, late).contains_key("home"));
+        }
     }
 
     #[test]

@@ -47,7 +47,11 @@ impl Rules {
         let flyers: BTreeMap<u16, Flyer> =
             spec.uavs.iter().map(|u| (u.id, flyer(u, spec))).collect();
         let mut rules = Self {
-            flight: FlightCheck::new(flyers.clone()),
+            flight: FlightCheck::new(
+                flyers.clone(),
+                spec.zones.clone(),
+                spec.mission.clearance_m(),
+            ),
             flyers,
             airtime: AirtimeCheck::new(spec.radio.rate_bps, period_ms),
             cadence: CadenceCheck::new(period_ms),
