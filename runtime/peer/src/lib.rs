@@ -22,7 +22,7 @@
 //! | [`journal`] | what is durable before it is spoken of |
 //! | [`offload`] | work that takes too long for a percept to wait |
 //! | [`wire`] | keys, kinds, messages, their bytes and limits |
-//! | [`mission`], [`task`], [`cells`] | what is to be seen, and what was |
+//! | [`mission`], `task`, [`cells`] | what is to be seen, and what was |
 //!
 //! Each part takes events and returns effects; none touches another.
 //!

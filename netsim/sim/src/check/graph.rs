@@ -1,43 +1,41 @@
 //! The true radio graph: components, diameter, articulation peers, and since when
 //! each pair has been joined. Built from the links of the world, never from beliefs.
 
+use fixedbitset::FixedBitSet;
 use std::collections::BTreeMap;
-
-/// The most radios a graph may hold: one bit each.
-pub const MAX_NODES: usize = 64;
 
 /// Who can reach whom at one moment.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Graph {
     ids: Vec<u16>,
     /// Bit `j` of entry `i`: radio `i` and radio `j` hear each other.
-    adjacent: Vec<u64>,
+    adjacent: Vec<FixedBitSet>,
     /// Bit `j` of entry `i`: radio `i` hears radio `j`.
-    hears: Vec<u64>,
+    hears: Vec<FixedBitSet>,
     /// Bit `j` of entry `i`: some path joins them (a radio reaches itself).
-    reach: Vec<u64>,
+    reach: Vec<FixedBitSet>,
     diameter: u32,
 }
 
 impl Graph {
-    /// The graph of the radios `ids` (ascending, at most [`MAX_NODES`] are taken)
-    /// where `heard(i, j)` tells whether the first hears the second.
+    /// The graph of the radios `ids` (ascending) where `heard(i, j)` tells whether the first
+    /// hears the second.
     #[must_use]
     pub fn new(ids: Vec<u16>, mut heard: impl FnMut(u16, u16) -> bool) -> Self {
-        let mut ids = ids;
-        ids.truncate(MAX_NODES);
         let n = ids.len();
-        let mut hears = vec![0u64; n];
-        for i in 0..n {
-            for j in (0..n).filter(|j| *j != i) {
-                hears[i] |= u64::from(heard(ids[i], ids[j])) << j;
-            }
-        }
-        let both = |i: usize| {
-            let other = (0..n).filter(|j| hears[*j] >> i & 1 == 1);
-            hears[i] & other.fold(0, |bits, j| bits | 1 << j)
+        let mut row = |i: usize| {
+            let mut bits = FixedBitSet::with_capacity(n);
+            let others = (0..n).filter(|j| *j != i);
+            bits.extend(others.filter(|j| heard(ids[i], ids[*j])));
+            bits
         };
-        let adjacent: Vec<u64> = (0..n).map(both).collect();
+        let hears: Vec<FixedBitSet> = (0..n).map(&mut row).collect();
+        let both = |i: usize| {
+            let mut bits = FixedBitSet::with_capacity(n);
+            bits.extend(hears[i].ones().filter(|j| hears[*j].contains(i)));
+            bits
+        };
+        let adjacent: Vec<FixedBitSet> = (0..n).map(both).collect();
         // What is heard goes further than components, along links that are up one way.
         let ((reach, _), (_, diameter)) = (close(&adjacent), close(&hears));
         Self {
@@ -64,15 +62,18 @@ impl Graph {
     /// How many radios this one hears.
     #[must_use]
     pub fn neighbours(&self, a: u16) -> u32 {
-        let heard = self.ids.binary_search(&a).map(|i| self.hears[i]);
-        heard.unwrap_or(0).count_ones()
+        let heard = self
+            .ids
+            .binary_search(&a)
+            .map(|i| self.hears[i].count_ones(..));
+        heard.map_or(0, |n| u32::try_from(n).unwrap_or(u32::MAX))
     }
 
     /// Whether a path joins two radios.
     #[must_use]
     pub fn joined(&self, a: u16, b: u16) -> bool {
         match (self.ids.binary_search(&a), self.ids.binary_search(&b)) {
-            (Ok(i), Ok(j)) => self.reach[i] >> j & 1 == 1,
+            (Ok(i), Ok(j)) => self.reach[i].contains(j),
             _ => false,
         }
     }
@@ -83,10 +84,7 @@ impl Graph {
         let Ok(i) = self.ids.binary_search(&a) else {
             return Vec::new();
         };
-        (0..self.ids.len())
-            .filter(|j| self.reach[i] >> j & 1 == 1)
-            .map(|j| self.ids[j])
-            .collect()
+        self.reach[i].ones().map(|j| self.ids[j]).collect()
     }
 
     /// The components, each ascending, in the order of their least members.
@@ -94,7 +92,7 @@ impl Graph {
     pub fn components(&self) -> Vec<Vec<u16>> {
         let mut out = Vec::new();
         for (i, &id) in self.ids.iter().enumerate() {
-            if self.reach[i].trailing_zeros() as usize == i {
+            if self.reach[i].ones().next() == Some(i) {
                 out.push(self.component(id));
             }
         }
@@ -107,43 +105,45 @@ impl Graph {
         let Ok(i) = self.ids.binary_search(&a) else {
             return false;
         };
-        let rest: Vec<u64> = self
-            .adjacent
-            .iter()
-            .enumerate()
-            .map(|(k, bits)| if k == i { 0 } else { bits & !(1 << i) })
-            .collect();
+        let mut rest = self.adjacent.clone();
+        rest[i].clear();
+        for bits in &mut rest {
+            bits.remove(i);
+        }
         let (reach, _) = close(&rest);
-        let others = self.reach[i] & !(1 << i);
-        others != 0 && reach[others.trailing_zeros() as usize] & others != others
+        let mut others = self.reach[i].clone();
+        others.remove(i);
+        let first = others.ones().next();
+        first.is_some_and(|k| !others.is_subset(&reach[k]))
     }
 }
 
 /// Reachability of every node and the longest of all shortest paths.
-fn close(adjacent: &[u64]) -> (Vec<u64>, u32) {
+fn close(adjacent: &[FixedBitSet]) -> (Vec<FixedBitSet>, u32) {
+    let n = adjacent.len();
     let mut diameter = 0;
-    let reach = (0..adjacent.len())
-        .map(|i| {
-            let (mut seen, mut front, mut hops) = (1u64 << i, 1u64 << i, 0);
-            loop {
-                let mut next = 0;
-                let mut bits = front;
-                while bits != 0 {
-                    next |= adjacent[bits.trailing_zeros() as usize];
-                    bits &= bits - 1;
-                }
-                front = next & !seen;
-                if front == 0 {
-                    break;
-                }
-                seen |= front;
-                hops += 1;
+    let mut next = FixedBitSet::with_capacity(n);
+    let reach = (0..n).map(|i| {
+        let mut seen = FixedBitSet::with_capacity(n);
+        seen.insert(i);
+        let (mut front, mut hops) = (seen.clone(), 0);
+        loop {
+            next.clear();
+            for j in front.ones() {
+                next.union_with(&adjacent[j]);
             }
-            diameter = diameter.max(hops);
-            seen
-        })
-        .collect();
-    (reach, diameter)
+            next.difference_with(&seen);
+            if next.is_clear() {
+                break;
+            }
+            seen.union_with(&next);
+            core::mem::swap(&mut front, &mut next);
+            hops += 1;
+        }
+        diameter = diameter.max(hops);
+        seen
+    });
+    (reach.collect(), diameter)
 }
 
 /// Since when each radio's component has been what it is, and each pair joined.
@@ -272,6 +272,17 @@ mod tests {
         assert_eq!(g.components(), [vec![1, 3], vec![2, 4]]);
         assert!(g.joined(1, 3) && !g.joined(1, 2) && g.joined(2, 2));
         assert!(!g.is_articulation(1));
+    }
+
+    #[test]
+    fn more_radios_than_a_word_has_bits_are_all_there() {
+        let ids: Vec<u16> = (1..=257).collect();
+        let chain: Vec<(u16, u16)> = ids.windows(2).map(|w| (w[0], w[1])).collect();
+        let g = graph(&ids, &chain[..255]);
+        assert_eq!((g.ids().len(), g.diameter()), (257, 255));
+        assert_eq!(g.components().len(), 2);
+        assert!(g.joined(1, 256) && !g.joined(256, 257) && g.is_articulation(200));
+        assert_eq!((g.neighbours(1), g.neighbours(200)), (1, 2));
     }
 
     #[test]

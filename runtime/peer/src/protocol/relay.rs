@@ -598,7 +598,9 @@ impl Relay {
     fn first(&self, now: Time) -> Option<(RecordKey, Priority)> {
         let crowded = self.air.is_filling(now) && self.air.is_crowded();
         let rides = |k: &RecordKey| {
-            let held = self.held.get(k).filter(|_| crowded);
+            // What was sent a moment ago is sent again only for being later.
+            let again = |h: &Held| k.0 == self.me && h.copies > 0;
+            let held = self.held.get(k).filter(|h| crowded && !again(h));
             held.is_some_and(|h| self.air.joins(now, h.bytes.len()))
         };
         self.queue
@@ -843,6 +845,12 @@ mod tests {
         r.air.hear(Time(20_000), 1, (4, 2));
         r.own(Time(20_000), &claim(4), vec![1; 60]);
         assert_eq!(sent(&mut r, 20_000, Some(&claim(4))), [0]);
+        // Nor does it go along with itself where many share the channel.
+        r.air.hear(Time(25_000), 1, (4, 40));
+        r.own(Time(25_000), &claim(5), vec![1; 60]);
+        let times = sent(&mut r, 25_000, None);
+        let apart = times.windows(2).all(|w| w[1] - w[0] >= 2 * 30 * 40);
+        assert!(times.len() == 2 && apart, "{times:?}");
     }
 
     #[test]

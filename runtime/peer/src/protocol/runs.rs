@@ -55,7 +55,7 @@ impl Packer<'_> {
             return None;
         }
         let n = self.cells;
-        let step = |from: u16, to: u16| if to >= from { to - from } else { n - from + to };
+        let step = |from: u16, to: u16| along(to, n - from, n);
         let offset = if first.direction == Direction::Backward {
             step(next.cell, first.cell)
         } else {
@@ -68,7 +68,7 @@ impl Packer<'_> {
             let c = if first.direction == Direction::Backward {
                 step(k, first.cell)
             } else {
-                (first.cell + k) % n
+                along(first.cell, k, n)
             };
             self.covered.contains(c)
         });
@@ -78,7 +78,7 @@ impl Packer<'_> {
     fn listing(&self, (first, count): &(PlannedCell, u16)) -> ListedRun {
         let n = self.cells;
         let start = if first.direction == Direction::Backward {
-            (first.cell + n - (count - 1) % n) % n
+            along(first.cell, n - (count - 1) % n, n)
         } else {
             first.cell
         };
@@ -103,6 +103,12 @@ pub fn cells_of(run: CellRun, n: u16) -> impl Iterator<Item = u16> {
     let n32 = u32::from(n.max(1));
     (0..u32::from(run.count.min(n)))
         .map(move |k| u16::try_from((u32::from(run.first) + k) % n32).unwrap_or(0))
+}
+
+/// The cell so many cells after another, on a loop of `n`.
+fn along(from: u16, by: u16, n: u16) -> u16 {
+    let to = (u32::from(from) + u32::from(by)) % u32::from(n.max(1));
+    u16::try_from(to).unwrap_or(0)
 }
 
 /// The direction that the wire writes as a flag.
@@ -142,8 +148,8 @@ pub fn legs_of(plan: &[PlannedCell], n: u16) -> Vec<Leg> {
     let mut last = 0;
     for p in plan {
         let next = match p.direction {
-            Direction::Backward => (last + n - 1) % n.max(1),
-            Direction::Forward => (last + 1) % n.max(1),
+            Direction::Backward => along(last, n.saturating_sub(1), n),
+            Direction::Forward => along(last, 1, n),
         };
         match legs.last_mut() {
             Some(leg) if leg.direction == p.direction && next == p.cell => leg.count += 1,
@@ -162,6 +168,15 @@ pub fn legs_of(plan: &[PlannedCell], n: u16) -> Vec<Leg> {
 mod tests {
     use super::*;
     use Direction::{Backward, Forward};
+
+    #[test]
+    fn the_largest_loops_are_gone_round_as_small_ones() {
+        for n in [2, 40_000, u16::MAX] {
+            assert_eq!(along(n - 1, 1, n), 0);
+            assert_eq!(along(0, n - 1, n), n - 1);
+            assert_eq!(along(n - 1, n - 1, n), n - 2);
+        }
+    }
 
     #[test]
     fn packing_and_unpacking_keep_order_and_direction() {
