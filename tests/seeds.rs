@@ -4,8 +4,9 @@
 
 use skein_netsim::Prepared;
 use skein_netsim::runs::{self, Wanted};
+use skein_netsim::spec::Spec;
 use skein_netsim::world::fixture;
-use skein_scenario::{Launch, Overrides, open};
+use skein_scenario::{Launch, Overrides, builtin_files, builtin_text, open, parse_with};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -24,6 +25,7 @@ fn prepared(scenario: &str, launch: Launch) -> Prepared {
             spec.mission = Arc::new(mission);
             spec
         }
+        "walls" => walls(),
         name => {
             let over = Overrides {
                 launch: Some(launch),
@@ -32,6 +34,19 @@ fn prepared(scenario: &str, launch: Launch) -> Prepared {
             open(Some(name), &over).expect("a built-in scenario").spec
         }
     })
+}
+
+/// Helsinki with a room of three walls around the base, and a round zone.
+fn walls() -> Spec {
+    let room = "{ ring_m: [[300, 300], [760, 300], [760, 340], [340, 340], \
+                [340, 620], [760, 620], [760, 660], [300, 660]] }";
+    let round = "{ circle: { east_m: 900, north_m: 150, radius_m: 70 } }";
+    let text = builtin_text("helsinki").expect("a built-in scenario");
+    let text = text
+        .replacen("no_fly: []", &format!("no_fly: [{room}, {round}]"), 1)
+        .replacen("min_coverable: 0.97", "min_coverable: 0.85", 1);
+    let scenario = parse_with("walls", &text, &builtin_files(), &Overrides::default());
+    scenario.expect("it can be flown").spec
 }
 
 #[test]

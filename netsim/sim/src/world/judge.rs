@@ -422,10 +422,16 @@ impl Judge {
         let zones = wanted.zones();
         let same = |a: &Zone, b: &Zone| ring_mm(&a.ring) == ring_mm(&b.ring);
         let is_wanted = |old: &Zone| zones.iter().any(|new| same(old, new));
-        self.lifted = self.zones.iter().map(|old| !is_wanted(old)).collect();
+        // A zone that was lifted and comes back is new to whoever flew without it.
+        for (old, lifted) in self.zones.iter().zip(&mut self.lifted) {
+            *lifted |= !is_wanted(old);
+        }
         self.added.retain(|a| is_wanted(&a.zone));
         for zone in zones {
-            let known = self.zones.iter().any(|old| same(old, zone));
+            let surveyed = self.zones.iter().zip(&self.lifted);
+            let known = surveyed
+                .filter(|(_, lifted)| !**lifted)
+                .any(|(old, _)| same(old, zone));
             if !known && !self.added.iter().any(|a| same(&a.zone, zone)) {
                 self.added.push(Added {
                     revision,
@@ -808,6 +814,23 @@ mod tests {
         judge.revise(revised(480_000, &elsewhere), (None, 1), 2, 80.0);
         judge.fence(1, &over, &mut Vec::new());
         assert_eq!(judge.entries(), 0);
+        // Nor does it when it comes back, before it is known again.
+        judge.follows(1, 2);
+        judge.revise(revised(480_000, &block), (None, 1), 3, 80.0);
+        judge.fence(1, &over, &mut Vec::new());
+        assert_eq!(judge.entries(), 0);
+        judge.follows(1, 3);
+        let far = Piece {
+            start: Pose {
+                east_m: -500.0,
+                ..over.start
+            },
+            to_ms: over.from_ms + 1000,
+            ..over
+        };
+        judge.fence(1, &far, &mut Vec::new());
+        judge.fence(1, &over, &mut Vec::new());
+        assert_eq!(judge.entries(), 1);
     }
 
     /// All corners of a cell in the turned rectangle, looked at every 2 cm.
