@@ -1,7 +1,7 @@
 //! Many storms of one scenario, without the rest of the program:
 //! `cargo run -p skein-scenario --example storms -- helsinki 0..200`.
 //!
-//! Prints each run that failed and the rules it broke. Exit code 1 if any did, so that a
+//! A third argument, `base` or `spread`, says where the UAVs begin. Prints each run that failed and the rules it broke. Exit code 1 if any did, so that a
 //! mistake put into the code on purpose is noticed or not.
 
 use skein_netsim::prepared::Prepared;
@@ -22,7 +22,18 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    let scenario = match open(Some(&name), &Overrides::default()) {
+    let launch = match args.next().map(|word| word.parse()).transpose() {
+        Ok(launch) => launch,
+        Err(e) => {
+            eprintln!("{e}");
+            return ExitCode::from(2);
+        }
+    };
+    let over = Overrides {
+        launch,
+        ..Overrides::default()
+    };
+    let scenario = match open(Some(&name), &over) {
         Ok(scenario) => scenario,
         Err(e) => {
             eprintln!("{e}");

@@ -188,7 +188,7 @@ fn on_loop(spec: &Spec, geometry: &MissionGeometry, summary: &Summary, out: &mut
     let share = judged_share.min(summary.coverable_share);
     if share < spec.min_coverable {
         let text = format!(
-            "only {:.1} % of the area can be covered, {:.1} % are asked for: {}",
+            "only {:.1} % of the area can be covered, {:.1} % are asked for{}",
             share * 100.0,
             spec.min_coverable * 100.0,
             summary.reasons()
@@ -285,7 +285,8 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// The reasons for uncoverable cells in one line.
+    /// The reasons for uncoverable cells in one line, each after a mark; nothing if there are
+    /// none.
     #[must_use]
     pub fn reasons(&self) -> String {
         let one =
@@ -293,8 +294,9 @@ impl Summary {
         self.uncoverable
             .iter()
             .map(one)
-            .collect::<Vec<_>>()
-            .join("; ")
+            .enumerate()
+            .map(|(i, text)| format!("{} {text}", if i == 0 { ":" } else { ";" }))
+            .collect()
     }
 }
 

@@ -474,8 +474,11 @@ impl Relay {
                 && (now.since_ms(h.sent) >= quiet || h.copies == 0)
                 && !self.queue.contains_key(k)
         });
-        let lacking: Vec<RecordKey> = pieces.map(|(k, _)| *k).collect();
-        for key in lacking {
+        // What was on the air longest ago goes first: pieces that waited in vain till their
+        // lifetime was over would else wait behind the same ones again, for ever.
+        let mut lacking: Vec<(Time, RecordKey)> = pieces.map(|(k, h)| (h.sent, *k)).collect();
+        lacking.sort_unstable();
+        for (_, key) in lacking {
             self.send_again(now, key, Kind::Mission);
         }
     }
@@ -702,6 +705,50 @@ mod tests {
         assert_eq!(r.poll(Time(20_500)), None, "nothing is lacking");
     }
 
+    fn piece(subject: u16, chunks: u16) -> Record {
+        let piece = MissionChunk {
+            revision: 2,
+            content_hash: 6,
+            chunks,
+            bytes: vec![0; 180],
+        };
+        Record {
+            kind: Kind::Mission.number(),
+            subject,
+            body: codec::encode_body(&Body::Mission(piece)),
+            ..record(9, 1)
+        }
+    }
+
+    #[test]
+    fn all_pieces_of_a_mission_are_sent_in_turn_though_few_go_within_their_lifetime() {
+        let mut r = relay(2);
+        for subject in 0..40 {
+            let byte = u8::try_from(subject).unwrap();
+            r.offer(Time(5_000), &piece(subject, 40), &[byte; 200], 0);
+        }
+        let mut times = [0; 40];
+        for t in 8_000..1_200_000 {
+            if t % 2000 == 0 {
+                let lacks = Beacon {
+                    revision: 1,
+                    sharers: 60,
+                    gossip: Vec::new(),
+                    ..samples::beacon(1)
+                };
+                r.on_beacon(Time(t), 7, &lacks);
+            }
+            if let Some(out) = r.poll(Time(t)) {
+                times[usize::from(out.bytes[0])] += 1;
+            }
+        }
+        let (least, most) = (times.iter().min(), times.iter().max());
+        assert!(
+            least >= Some(&2) && most <= Some(&(times[0] + 3)),
+            "{times:?}"
+        );
+    }
+
     #[test]
     fn a_mission_goes_to_who_lacks_it_and_what_is_due_before_its_next_piece_goes_first() {
         let mut r = relay(2);
@@ -713,19 +760,7 @@ mod tests {
         };
         r.on_beacon(Time(5_000), 7, &neighbour(2));
         for subject in 0..6 {
-            let piece = MissionChunk {
-                revision: 2,
-                content_hash: 6,
-                chunks: 6,
-                bytes: vec![0; 180],
-            };
-            let record = Record {
-                kind: Kind::Mission.number(),
-                subject,
-                body: codec::encode_body(&Body::Mission(piece)),
-                ..record(9, 1)
-            };
-            r.offer(Time(5_000), &record, &[1; 200], 0);
+            r.offer(Time(5_000), &piece(subject, 6), &[1; 200], 0);
         }
         assert_eq!(r.version(9, 1).0, 0, "pieces are not counted");
         assert_eq!(r.poll(Time(7_900)), None, "nobody lacks them");
