@@ -314,12 +314,11 @@ proptest! {
         let (start, end) = (t.start().unwrap(), t.end().unwrap());
         prop_assert!((curve.start().unwrap().position() - start.position).norm() < 1e-3);
         prop_assert!((curve.end().unwrap().position() - end.position).norm() < 1e-3);
-        // A curve beside another at the tolerance is longer by it times what it turns; arcs
-        // lie on both sides, which leaves a tenth of that.
+        // A curve beside another at the tolerance is longer by it times what it turns.
         let (drawn_m, flown_m) = (curve.length_m(), t.ground_length_m());
         let turned_rad: f64 = curve.segments().iter().map(|s| s.curvature_per_m.abs() * s.length_m).sum();
         prop_assert!(
-            (drawn_m - flown_m).abs() < 1e-3 * (10.0 + flown_m) + 0.1 * tolerance_m * turned_rad,
+            (drawn_m - flown_m).abs() < 1e-3 * (10.0 + flown_m) + tolerance_m * turned_rad,
             "{drawn_m} m drawn, {flown_m} m flown in {} pieces", curve.segments().len()
         );
         // Places on the trochoid, by distance flown over the ground, lie on the curve.
