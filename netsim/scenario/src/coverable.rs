@@ -3,7 +3,6 @@
 
 use crate::resolve::Scenario;
 use skein_flight::coverage::ring::CellId;
-use skein_netsim::world::Survey;
 use skein_peer::CoverageTask;
 
 /// What can be seen of a scenario's area, by the world's own geometry.
@@ -20,10 +19,10 @@ pub struct Coverable {
 }
 
 impl Coverable {
-    /// Surveys the area of a scenario and compares it with the loop of its mission.
+    /// Compares what can be seen of a scenario's area with the loop of its mission.
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
-        let survey = Survey::new(&scenario.spec);
+        let survey = &scenario.survey;
         let the_loop = &scenario.geometry.coverage_loop;
         let open = survey.cells().iter().filter(|c| c.uncoverable.is_none());
         Self {

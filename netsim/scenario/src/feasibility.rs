@@ -29,7 +29,7 @@ const COMFORTABLE_LOOPS: f64 = 2.5;
 #[must_use]
 pub fn feasibility(spec: &Spec) -> Vec<Finding> {
     match spec.mission.geometry() {
-        Ok(geometry) => with_geometry(spec, &geometry).0,
+        Ok(geometry) => with_geometry(spec, &geometry, &Survey::new(spec)).0,
         Err(e) => {
             let mut out = without_geometry(spec);
             out.push(Finding::new(Severity::Error, blamed(&e), e.to_string()));
@@ -39,9 +39,14 @@ pub fn feasibility(spec: &Spec) -> Vec<Finding> {
 }
 
 /// What was found, and what the scenario amounts to.
-pub(crate) fn with_geometry(spec: &Spec, geometry: &MissionGeometry) -> (Vec<Finding>, Summary) {
+pub(crate) fn with_geometry(
+    spec: &Spec,
+    geometry: &MissionGeometry,
+    survey: &Survey,
+) -> (Vec<Finding>, Summary) {
     let mut out = without_geometry(spec);
     let summary = summary(spec, geometry);
+    enough_is_coverable(spec, &summary, survey, &mut out);
     on_loop(spec, geometry, &summary, &mut out);
     (out, summary)
 }
@@ -182,10 +187,9 @@ fn survivors(spec: &Spec) -> usize {
     spec.uavs.len().saturating_sub(losses).max(1)
 }
 
-fn on_loop(spec: &Spec, geometry: &MissionGeometry, summary: &Summary, out: &mut Vec<Finding>) {
-    // What the loop reaches, and what the judge of a run will count.
-    let judged_share = Survey::new(spec).coverable_share();
-    let share = judged_share.min(summary.coverable_share);
+/// What the loop reaches, and what the judge of a run will count.
+fn enough_is_coverable(spec: &Spec, summary: &Summary, survey: &Survey, out: &mut Vec<Finding>) {
+    let share = survey.coverable_share().min(summary.coverable_share);
     if share < spec.min_coverable {
         let text = format!(
             "only {:.1} % of the area can be covered, {:.1} % are asked for{}",
@@ -195,6 +199,9 @@ fn on_loop(spec: &Spec, geometry: &MissionGeometry, summary: &Summary, out: &mut
         );
         out.push(Finding::new(Severity::Error, "checks.min_coverable", text));
     }
+}
+
+fn on_loop(spec: &Spec, geometry: &MissionGeometry, summary: &Summary, out: &mut Vec<Finding>) {
     let reach_m = |u: &UavSpec| reach_m(u, spec, &geometry.coverage_loop);
     let usable_m: f64 = spec.uavs.iter().map(reach_m).sum();
     if usable_m < summary.loop_m {

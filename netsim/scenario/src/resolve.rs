@@ -13,6 +13,7 @@ use crate::read::{self, Stated};
 use crate::request::{AreaPlanner, Overrides};
 use skein_geometry::frame::Pose;
 use skein_netsim::spec::{Spec, UavSpec};
+use skein_netsim::world::Survey;
 use skein_peer::offload::MissionGeometry;
 use std::sync::Arc;
 
@@ -23,6 +24,8 @@ pub struct Scenario {
     pub spec: Spec,
     /// The coverage loop and the routes that follow from the mission.
     pub geometry: Arc<MissionGeometry>,
+    /// What can be seen of its area, by the world's own geometry.
+    pub survey: Survey,
     /// What it amounts to.
     pub summary: Summary,
     /// Notes and warnings, with their places; no errors.
@@ -57,7 +60,8 @@ impl Scenario {
             geometry
         };
         let spec = spec(&stated, &geometry);
-        let (found, summary) = feasibility::with_geometry(&spec, &geometry);
+        let survey = Survey::new(&spec);
+        let (found, summary) = feasibility::with_geometry(&spec, &geometry, &survey);
         let mut findings = stated.findings.clone();
         for finding in found {
             if finding.severity == Severity::Error {
@@ -72,6 +76,7 @@ impl Scenario {
         Ok(Self {
             spec,
             geometry,
+            survey,
             summary,
             findings,
             stated,

@@ -5,11 +5,9 @@
 //! duplication and relaying cannot harm it. What the cells mean, and which loop they
 //! are counted on, is left to the callers.
 
+use crate::varint;
 use crate::wire::message::CellRun;
 use skein_geometry::hash::Fnv;
-
-/// Bytes of the longest run length: a `u16` in groups of seven bits.
-const VARINT_MAX_BYTES: usize = 3;
 
 /// Why run lengths were refused; nothing was decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -295,7 +293,9 @@ impl CellSet {
         let mut set = Self::new(n);
         let (mut at, mut cells, mut run) = (0_usize, 0_u32, 0_usize);
         while at < bytes.len() {
-            let (length, used) = read_varint(&bytes[at..]).ok_or(CellsError::Length { at })?;
+            let read = varint::read(&bytes[at..]);
+            let read = read.and_then(|(value, used)| Some((u16::try_from(value).ok()?, used)));
+            let (length, used) = read.ok_or(CellsError::Length { at })?;
             at += used;
             if length == 0 && run > 0 {
                 return Err(CellsError::Empty { run });
@@ -325,36 +325,12 @@ fn encode_runs(runs: impl Iterator<Item = CellRun>) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut end = 0_u16;
     for run in runs {
-        write_varint(&mut bytes, run.first - end);
-        write_varint(&mut bytes, run.count);
+        varint::write(&mut bytes, u32::from(run.first - end));
+        varint::write(&mut bytes, u32::from(run.count));
         // A run ends at the loop's last cell at most, so the sum fits.
         end = run.first.saturating_add(run.count);
     }
     bytes
-}
-
-fn write_varint(bytes: &mut Vec<u8>, mut value: u16) {
-    while value >= 0x80 {
-        bytes.push(0x80 | (value & 0x7f).to_le_bytes()[0]);
-        value >>= 7;
-    }
-    bytes.push(value.to_le_bytes()[0]);
-}
-
-fn read_varint(bytes: &[u8]) -> Option<(u16, usize)> {
-    let mut value = 0_u32;
-    for (i, byte) in bytes.iter().take(VARINT_MAX_BYTES).enumerate() {
-        value |= u32::from(byte & 0x7f) << (7 * i);
-        if byte & 0x80 == 0 {
-            // A last group of zero could have been left out.
-            let shortest = *byte != 0 || i == 0;
-            return u16::try_from(value)
-                .ok()
-                .filter(|_| shortest)
-                .map(|v| (v, i + 1));
-        }
-    }
-    None
 }
 
 #[cfg(test)]
@@ -363,6 +339,9 @@ mod tests {
     use proptest::collection::vec;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
+
+    /// Bytes of the longest run length: a `u16` in groups of seven bits.
+    const VARINT_MAX_BYTES: usize = 3;
 
     fn sets() -> impl Strategy<Value = (u16, BTreeSet<u16>)> {
         (0_u16..700)

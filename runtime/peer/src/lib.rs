@@ -110,6 +110,7 @@ pub mod testing;
 #[cfg(test)]
 mod tests;
 pub mod timers;
+mod varint;
 pub mod wire;
 
 pub use beliefs::Beliefs;

@@ -250,6 +250,19 @@ impl Mission {
         })
     }
 
+    /// The revision that the operator counts after the newest one, while this mission is held.
+    /// Laps count revisions, too, also where nobody hears the operator: during a patrol the
+    /// low half of the number is theirs, and the operator counts the high half.
+    #[must_use]
+    pub fn revision_after(&self, newest: u32) -> u32 {
+        let laps = if self.is_patrol() {
+            u32::from(u16::MAX)
+        } else {
+            0
+        };
+        (newest | laps).saturating_add(1)
+    }
+
     /// The pieces that have to be seen, each by one frame; none where the mission asks
     /// for the cells of its area. Lines are cut to the lane spacing at most.
     #[must_use]

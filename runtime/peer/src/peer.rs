@@ -653,9 +653,8 @@ impl Peer {
     }
 
     /// The revision that the operator's next mission must have to be flown: above those
-    /// of all missions that this peer holds, or has heard that others follow. Laps count
-    /// revisions, too, also where nobody hears the operator: during a patrol the low half
-    /// of the number is theirs, and the operator counts the high half.
+    /// of all missions that this peer holds, or has heard that others follow
+    /// ([`Mission::revision_after`]).
     #[must_use]
     pub fn next_revision(&self) -> u32 {
         let held = self.cooperation.newest_mission();
@@ -666,12 +665,7 @@ impl Peer {
             .map(|info| info.revision);
         let revisions = held.iter().map(|m| m.revision).chain(heard);
         let newest = revisions.max().unwrap_or(0);
-        let laps = if held.is_some_and(|m| m.is_patrol()) {
-            newest | u32::from(u16::MAX)
-        } else {
-            newest
-        };
-        laps.saturating_add(1)
+        held.map_or(newest.saturating_add(1), |m| m.revision_after(newest))
     }
 
     /// The life in which it speaks at present; none while it only listens.

@@ -32,14 +32,17 @@ impl MissionState {
         }
         let me = self.hand(s)?;
         let spendable_ms = u64::from(self.spendable_ms(s.percept));
-        if let Some(cells) = self.wanted_orphans(s, ctx, &me, spendable_ms) {
-            return Some(cells);
-        }
-        if !self.negotiation.may_relieve(ctx, me.free_ms) {
+        let orphans = self.negotiation.ripe_orphans(ctx);
+        let may_relieve = self.negotiation.may_relieve(ctx, me.free_ms);
+        if orphans.is_empty() && !may_relieve {
             return None;
         }
         let owners = self.negotiation.owners(ctx);
         let others = self.hands(s, ctx, &owners);
+        let wanted = self.wanted_orphans((s, ctx), &orphans, (&me, &others), spendable_ms);
+        if wanted.is_some() || !may_relieve {
+            return wanted;
+        }
         let hands = others.into_iter().filter(|h| h.free_ms == 0);
         let hands: Vec<Hand> = hands.chain([me]).collect();
         // A claim is stored, spoken, and heard even if it is lost once.
@@ -52,23 +55,21 @@ impl MissionState {
     /// with nothing else to fly, of any what it can.
     fn wanted_orphans(
         &self,
-        s: &Situation<'_>,
-        ctx: &Context<'_>,
-        me: &Hand,
+        (s, ctx): (&Situation<'_>, &Context<'_>),
+        orphans: &CellSet,
+        (me, others): (&Hand, &[Hand]),
         spendable_ms: u64,
     ) -> Option<Vec<(u16, Direction)>> {
-        let orphans = self.negotiation.ripe_orphans(ctx);
         let pace = self.pace()?;
         let share = self.even_share(ctx);
         let (_, cells) = sharing::nearest_orphans(&orphans.runs(), me, share, pace)?;
         let first = cells.first()?.0;
-        let others = self.hands(s, ctx, &self.negotiation.owners(ctx));
-        let sooner = pace.how_many_sooner(me, &others, first);
+        let sooner = pace.how_many_sooner(me, others, first);
         if !self.negotiation.is_my_turn(ctx, first, sooner) {
             return None;
         }
         let idle = self.negotiation.sections.plan().is_empty();
-        let any = || self.within_reach(&orphans, s.percept).filter(|_| idle);
+        let any = || self.within_reach(orphans, s.percept).filter(|_| idle);
         self.flown_besides(cells, spendable_ms).or_else(any)
     }
 

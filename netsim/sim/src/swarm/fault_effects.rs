@@ -181,7 +181,7 @@ impl Swarm {
     /// operator wants one of which the planner leaves out what could be seen.
     fn give_mission(&mut self, mission: Mission) {
         let next = Arc::new(Mission {
-            revision: self.next_revision(),
+            revision: self.mission.revision_after(self.mission.revision),
             ..mission.clone()
         });
         let zones: Result<Vec<Polygon>, _> = next.zones_m().map(Polygon::new).collect();
@@ -209,21 +209,9 @@ impl Swarm {
         }
     }
 
-    /// The revision that the operator counts next: during a patrol the low half of the number
-    /// counts laps, as at the console.
-    fn next_revision(&self) -> u32 {
-        let newest = self.mission.revision;
-        let laps = if self.mission.is_patrol() {
-            newest | u32::from(u16::MAX)
-        } else {
-            newest
-        };
-        laps.saturating_add(1)
-    }
-
     /// The operator's next revision enters at the ground station.
     fn revise(&mut self, mut mission: Mission) {
-        mission.revision = self.next_revision();
+        mission.revision = self.mission.revision_after(self.mission.revision);
         self.mission = Arc::new(mission);
         self.checker.rules.on_mission(&self.mission);
         if let Some(idx) = self.ground_station() {

@@ -11,7 +11,7 @@ use super::pieces::Pieces;
 use super::survey::{Cell, Survey, Zone};
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::CellId;
-use skein_geometry::frame::{Point, Pose};
+use skein_geometry::frame::Pose;
 use skein_peer::mission::{PointMm, ring_mm};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -87,11 +87,6 @@ fn is_coverable(cell: &Cell) -> bool {
     cell.uncoverable.is_none()
 }
 
-/// A piece in whole millimetres: its place.
-fn place_mm(ring: &[Point]) -> Vec<PointMm> {
-    ring_mm(ring)
-}
-
 impl Board {
     fn new(revision: u32, survey: Arc<Survey>) -> Self {
         Self {
@@ -108,12 +103,11 @@ impl Board {
         }
     }
 
-    fn watching(mut self, pieces: Option<Arc<Pieces>>) -> Self {
+    fn watch_claims(&mut self, pieces: Option<Arc<Pieces>>) {
         self.claims = pieces.map(|p| {
             let seen = vec![false; p.rings().len()];
             (p, seen)
         });
-        self
     }
 
     /// Takes over what another board saw of the same places: squares of one grid, or pieces
@@ -135,10 +129,10 @@ impl Board {
         let (Some((mine, seen)), Some((theirs, saw))) = (&mut self.claims, &other.claims) else {
             return;
         };
-        let places = theirs.rings().iter().map(|r| place_mm(r)).zip(saw);
+        let places = theirs.rings().iter().map(|r| ring_mm(r)).zip(saw);
         let known: BTreeSet<Vec<PointMm>> = places.filter(|(_, s)| **s).map(|(p, _)| p).collect();
         for (ring, seen) in mine.rings().iter().zip(seen) {
-            *seen = *seen || known.contains(&place_mm(ring));
+            *seen = *seen || known.contains(&ring_mm(ring));
         }
     }
 
@@ -154,8 +148,8 @@ impl Board {
         let (mine, theirs) = (&self.survey, &other.survey);
         match (mine.pieces(), theirs.pieces()) {
             (Some(a), Some(b)) => {
-                let place = place_mm(&a.rings()[i]);
-                b.rings().iter().position(|ring| place_mm(ring) == place)
+                let place = ring_mm(&a.rings()[i]);
+                b.rings().iter().position(|ring| ring_mm(ring) == place)
             }
             (None, None) if mine.has_grid_of(theirs) => theirs.index_of(mine.cells()[i].id),
             _ => None,
@@ -403,8 +397,7 @@ impl Judge {
     /// checked where the survey knows other cells than they do.
     #[must_use]
     pub fn with_claims(mut self, pieces: Option<Arc<Pieces>>) -> Self {
-        let board = self.board_mut();
-        *board = board.clone().watching(pieces);
+        self.board_mut().watch_claims(pieces);
         self
     }
 
@@ -442,7 +435,8 @@ impl Judge {
         }
         self.inside.clear();
         self.room_m = room_m;
-        let mut board = Board::new(revision, wanted).watching(claims);
+        let mut board = Board::new(revision, wanted);
+        board.watch_claims(claims);
         board.laps = laps.max(1);
         for old in self.boards.iter().rev() {
             board.remember(old);

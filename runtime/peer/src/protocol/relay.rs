@@ -123,10 +123,18 @@ fn is_counted(kind: Kind) -> bool {
 
 /// Of which mission a record is a piece.
 fn revision_of(kind: Kind, record: &Record) -> Option<u32> {
+    // Most records are none: only a piece is decoded a second time.
+    if kind != Kind::Mission {
+        return None;
+    }
     match codec::decode_body(kind, &record.body) {
-        Ok(Body::Mission(piece)) if kind == Kind::Mission => Some(piece.revision),
+        Ok(Body::Mission(piece)) => Some(piece.revision),
         _ => None,
     }
+}
+
+fn is_piece(key: &RecordKey) -> bool {
+    key.1 == Kind::Mission.number()
 }
 
 /// All keys of one author.
@@ -327,10 +335,10 @@ impl Relay {
     /// nothing waits for ever behind what is more urgent.
     fn due(&self, key: &RecordKey, from: Time, priority: Priority) -> Time {
         let telemetry = priority == Priority::Telemetry;
-        let is_piece = |k: &&RecordKey| k.1 == Kind::Mission.number();
         let intervals = match (key.0 == self.me, telemetry) {
-            _ if is_piece(&key) => {
-                PIECE_INTERVALS * (1 + self.queue.keys().filter(is_piece).count() as u64)
+            _ if is_piece(key) => {
+                let waiting = self.queue.keys().filter(|k| is_piece(k)).count();
+                PIECE_INTERVALS * (1 + waiting as u64)
             }
             (true, false) => 0,
             (true, true) | (false, false) => 1,
@@ -458,8 +466,8 @@ impl Relay {
             let follows = (beacon.revision, now.plus_ms(lasts_ms));
             self.follow.insert(author, follows);
         }
-        let is_piece = |k: &&RecordKey| k.1 == Kind::Mission.number();
-        let waiting: Vec<RecordKey> = self.queue.keys().filter(is_piece).copied().collect();
+        let waiting = self.queue.keys().filter(|k| is_piece(k));
+        let waiting: Vec<RecordKey> = waiting.copied().collect();
         for key in waiting {
             if !self.is_wanted(now, &key) {
                 self.queue.remove(&key);

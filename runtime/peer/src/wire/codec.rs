@@ -21,6 +21,7 @@ use super::message::{
     Stamp, State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
+use crate::varint;
 
 /// Largest envelope around a body: heads and numbers at their longest, 23 bytes, and
 /// a signature with its head.
@@ -404,7 +405,11 @@ impl Wire for Vec<Fresh> {
         let mut rest = bytes.as_slice();
         let mut list = Self::new();
         while !rest.is_empty() {
-            let mut number = || sevens(&mut rest).ok_or(malformed);
+            let mut number = || {
+                let (value, used) = varint::read(rest).ok_or(malformed)?;
+                rest = &rest[used..];
+                Ok::<u32, WireError>(value)
+            };
             let (id, heartbeat, age) = (number()?, number()?, number()?);
             let [high, low, ..] = *rest else {
                 return Err(malformed);
@@ -421,12 +426,7 @@ impl Wire for Vec<Fresh> {
                 able: high >> 4 & 1 == 1,
             });
         }
-        // One encoding a value: no number is written longer than it is.
-        if fresh_bytes(&list) == bytes {
-            Ok(list)
-        } else {
-            Err(malformed)
-        }
+        Ok(list)
     }
 }
 
@@ -434,32 +434,13 @@ fn fresh_bytes(list: &[Fresh]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(8 * list.len());
     for f in list {
         for number in [u32::from(f.id), f.heartbeat, u32::from(f.age_ds)] {
-            let mut left = number;
-            while left > 127 {
-                bytes.push((left & 127) as u8 | 128);
-                left >>= 7;
-            }
-            bytes.push(left as u8);
+            varint::write(&mut bytes, number);
         }
         let life_able = u16::from(f.life & 7) << 13 | u16::from(f.able) << 12;
         let mark = life_able | u16::from(f.hops & 31) << 7 | u16::from(f.interval & 127);
         bytes.extend(mark.to_be_bytes());
     }
     bytes
-}
-
-/// A number of seven bits a byte, all but the last marked.
-fn sevens(rest: &mut &[u8]) -> Option<u32> {
-    let mut number = 0u64;
-    for shift in (0..35).step_by(7) {
-        let (byte, others) = rest.split_first()?;
-        *rest = others;
-        number |= u64::from(byte & 127) << shift;
-        if byte & 128 == 0 {
-            return u32::try_from(number).ok();
-        }
-    }
-    None
 }
 
 /// Members by runs of ids in the same life: a whole swarm in its first life is one.

@@ -247,12 +247,7 @@ impl<'a> Finder<'a> {
         let stride = passes.len().div_ceil(ROUTED_PASSES).max(1);
         for pass in passes.iter().step_by(stride) {
             for &g in gates.iter().take(ROUTED_GATES) {
-                let route = |from: Pose, to: Pose| {
-                    self.router
-                        .route(from, to)
-                        .ok()
-                        .filter(|c| self.problem.contingency_clear(c))
-                };
+                let route = |from: Pose, to: Pose| self.problem.routed(&self.router, from, to);
                 if let Some(e) = self.joined(g, pass, route) {
                     return Some(e);
                 }

@@ -111,10 +111,7 @@ fn shortest_bridge(
         pairs.extend(nearest.map(|(bound_m, gate)| (bound_m, gate, entry)));
     }
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    let way = |from: Pose, to: Pose| {
-        let curve = router.route(from, to).ok()?;
-        problem.contingency_clear(&curve).then_some(curve)
-    };
+    let way = |from: Pose, to: Pose| problem.routed(router, from, to);
     let mut best: Option<Bridge> = None;
     for (bound_m, gate, entry) in pairs {
         if best.as_ref().is_some_and(|b| b.length_m() <= bound_m) {

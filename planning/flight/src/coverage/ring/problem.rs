@@ -61,6 +61,17 @@ impl LoopProblem {
             })
     }
 
+    /// A way round the zones on which a UAV may have to loiter anywhere.
+    pub(in crate::coverage) fn routed(
+        &self,
+        router: &Router,
+        from: Pose,
+        to: Pose,
+    ) -> Option<Curve> {
+        let way = router.route(from, to).ok();
+        way.filter(|curve| self.contingency_clear(curve))
+    }
+
     /// Whether a UAV that has to loiter anywhere on the curve stays out of the zones.
     pub(in crate::coverage) fn contingency_clear(&self, curve: &Curve) -> bool {
         // Farther out than a loiter is wide, no circle reaches a zone.
