@@ -647,6 +647,7 @@ impl Judge {
 mod tests {
     use super::*;
     use crate::world::fixture::{airframe, polygon, square};
+    use skein_geometry::frame::Point;
     use skein_peer::{CoverageTask, PointTask};
 
     fn piece(x: f64, y: f64, heading: f64, ms: u64, rate: f64) -> Piece {
