@@ -132,6 +132,8 @@ pub struct Airtime {
     period_ms: u64,
     rate_bps: u64,
     neighbours: BTreeMap<u16, Neighbour>,
+    /// Before this none of them is to be forgotten.
+    first_until: Time,
     /// The most that any of them counts: asked for with every input.
     most_told: u16,
     /// What may be sent; below zero, what is owed.
@@ -152,6 +154,7 @@ impl Airtime {
             period_ms: u64::from(period_ms.max(1)),
             rate_bps: u64::from(rate_bps.max(1)),
             neighbours: BTreeMap::new(),
+            first_until: Time(u64::MAX),
             most_told: 0,
             tokens_millibytes: 0,
             reserve_millibytes: full_reserve(),
@@ -166,20 +169,29 @@ impl Airtime {
     /// it counts itself.
     pub fn hear(&mut self, now: Time, author: u16, (interval, sharers): (u8, u16)) {
         self.forget(now);
-        if self.neighbours.len() < PEERS_MAX || self.neighbours.contains_key(&author) {
-            let lasts_ms = LASTING_INTERVALS * self.told_ms(interval);
-            let heard = Neighbour {
-                until: now.plus_ms(lasts_ms),
-                sharers,
-            };
-            self.neighbours.insert(author, heard);
+        if self.neighbours.len() >= PEERS_MAX && !self.neighbours.contains_key(&author) {
+            return;
         }
-        self.count();
+        let until = now.plus_ms(LASTING_INTERVALS * self.told_ms(interval));
+        self.first_until = self.first_until.min(until);
+        let before = self.neighbours.insert(author, Neighbour { until, sharers });
+        // Whoever told the most may have been the only one.
+        if before.is_some_and(|n| n.sharers == self.most_told && n.sharers > sharers) {
+            self.count();
+        } else {
+            self.most_told = self.most_told.max(sharers);
+        }
     }
 
     /// Who was not heard for so long shares no more.
     fn forget(&mut self, now: Time) {
+        if now < self.first_until {
+            return;
+        }
         self.neighbours.retain(|_, n| n.until > now);
+        let untils = self.neighbours.values().map(|n| n.until);
+        self.first_until = untils.min().unwrap_or(Time(u64::MAX));
+        self.count();
     }
 
     fn count(&mut self) {
@@ -239,7 +251,6 @@ impl Airtime {
     /// misses the one that announces it is not to be alarmed by the silence.
     pub fn plan_beacon(&mut self, now: Time) -> BeaconPlan {
         self.forget(now);
-        self.count();
         self.refill(now);
         self.planned = self.planned.saturating_add(1).min(FIRST_BEACONS);
         let share = self.share_bytes_ps(self.sharers());

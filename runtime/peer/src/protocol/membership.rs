@@ -39,8 +39,9 @@ use crate::output::Status;
 use crate::wire::limits::INTERVAL_LEAST;
 use crate::wire::limits::{HOPS_MAX, PEERS_MAX};
 use crate::wire::message::{Beacon, Fresh, Gossip, OffLoop};
+use core::cell::Cell;
 use core::cmp::Reverse;
-use known::{Age, Heartbeat, Known};
+use known::{Age, Heartbeat, Known, Weight};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most other peers known: the largest fleet but this peer itself. A flood of made-up ids
@@ -82,6 +83,17 @@ struct Patience {
     bound_ms: u64,
 }
 
+/// How slow and how wide the swarm is, as far as this peer knows.
+#[derive(Clone, Copy, Debug)]
+struct Extent {
+    /// The longest interval that anybody alive announced, T', quarters of T.
+    interval: u8,
+    /// The most hops that anybody alive is away, or says that somebody is.
+    hops: u8,
+    /// Unless something else is heard it is so until then.
+    until: Time,
+}
+
 /// What a peer last said of itself in its present life.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Info {
@@ -120,6 +132,8 @@ pub struct Membership {
     last_heard: Option<Time>,
     /// Neighbours whose link is gone, as the transport says.
     gone: BTreeSet<u16>,
+    /// As it was last asked for; nothing where what it follows from changed since.
+    extent: Cell<Option<Extent>>,
 }
 
 impl Membership {
@@ -138,6 +152,7 @@ impl Membership {
             refuted: false,
             last_heard: None,
             gone: BTreeSet::new(),
+            extent: Cell::new(None),
         }
     }
 
@@ -153,23 +168,100 @@ impl Membership {
 
     /// What this peer's own beacons announce, quarters of T.
     pub fn announce(&mut self, interval: u8) {
-        self.interval = interval;
+        if interval != self.interval {
+            self.interval = interval;
+            self.extent.set(None);
+        }
     }
 
     /// The longest interval that anybody alive announced, this peer included: in it the
     /// swarm's patience is counted, milliseconds.
     #[must_use]
     pub fn interval_ms(&self) -> u64 {
-        let live = self.known.values().filter(|k| k.status != Status::Down);
-        let told = live.map(|k| k.freshest.interval).max();
-        ms_of(told.unwrap_or(0).max(self.interval), self.period_ms)
+        let known = self.extent.get().map(|e| e.interval);
+        ms_of(
+            known.unwrap_or_else(|| self.longest_interval()),
+            self.period_ms,
+        )
+    }
+
+    fn longest_interval(&self) -> u8 {
+        let told = self.living().map(|k| k.freshest.interval).max();
+        told.unwrap_or(0).max(self.interval)
+    }
+
+    fn living(&self) -> impl Iterator<Item = &Known> {
+        self.known.values().filter(|k| k.status != Status::Down)
+    }
+
+    /// Asked for with every input, and measured only after it changed.
+    fn extent(&self, now: Time) -> Extent {
+        let known = self.extent.get().filter(|e| now < e.until);
+        let extent = known.unwrap_or_else(|| self.measured(now));
+        self.extent.set(Some(extent));
+        extent
+    }
+
+    fn measured(&self, now: Time) -> Extent {
+        let interval = self.longest_interval();
+        let window_ms = self.window_ms(interval);
+        let each = || self.living().map(|k| k.weight(now, window_ms));
+        let hops = each().map(|w| w.hops.max(w.eccentricity)).max();
+        let hops = hops.unwrap_or(0);
+        // Until then nobody is farther, and somebody is as far.
+        let (mut nearer, mut as_far) = (Time(u64::MAX), Time(0));
+        for (known, weight) in self.living().zip(each()) {
+            if weight.hops > 0 {
+                let last = known.last_within(hops);
+                nearer = nearer.min(last);
+                as_far = as_far.max(if weight.hops == hops { last } else { Time(0) });
+            }
+            if weight.eccentricity == hops {
+                as_far = as_far.max(known.info.heard.unwrap_or_default());
+            }
+        }
+        let until = if hops > 0 { nearer.min(as_far) } else { nearer };
+        Extent {
+            interval,
+            hops,
+            until: until.plus_ms(window_ms),
+        }
+    }
+
+    /// Hops and eccentricities count for so long.
+    fn window_ms(&self, interval: u8) -> u64 {
+        HOP_INTERVALS * ms_of(interval, self.period_ms)
+    }
+
+    /// What the extent owes to a peer.
+    fn weight(&self, now: Time, id: u16) -> Weight {
+        let known = self.known.get(&id).zip(self.extent.get());
+        known.map_or(Weight::default(), |(known, extent)| {
+            known.weight(now, self.window_ms(extent.interval))
+        })
+    }
+
+    /// A peer weighs something else now: the extent stays what it is unless this was, or is,
+    /// the most. Of who comes back what was heard before it went counts again.
+    fn weighed(&mut self, before: Weight, after: Weight) {
+        let Some(extent) = self.extent.get() else {
+            return;
+        };
+        let is_most = |before: u8, after: u8, most| before != after && before.max(after) >= most;
+        if before == Weight::default()
+            || is_most(before.interval, after.interval, extent.interval)
+            || is_most(before.hops, after.hops, extent.hops)
+            || is_most(before.eccentricity, after.eccentricity, extent.hops)
+        {
+            self.extent.set(None);
+        }
     }
 
     /// A peer whose own loop ran late doubts its verdicts first: both factors double.
     fn patience(&self, now: Time) -> Patience {
         let doubt = if now < self.doubt_until { 2 } else { 1 };
+        let diameter = u64::from(self.diameter(now));
         let interval_ms = self.interval_ms();
-        let diameter = u64::from(self.diameter_within(now, HOP_INTERVALS * interval_ms));
         let k1_quarters = doubt * (16 + diameter);
         let k2_ms = doubt * interval_ms * (8 + diameter) / 2;
         let travel_ms = (diameter + 2) * interval_ms;
@@ -202,6 +294,7 @@ impl Membership {
         if author == self.me {
             return changes;
         }
+        let before = self.weight(now, author);
         let Some(teller) = self.known.get_mut(&author) else {
             return changes;
         };
@@ -210,6 +303,7 @@ impl Membership {
             teller.info = info_of(beacon, steady_since, now);
             teller.eccentricity = beacon.eccentricity.min(HOPS_MAX);
         }
+        self.weighed(before, self.weight(now, author));
         for told in &beacon.gossip {
             if told.id != self.me && told.id != author {
                 self.on_gossip(now, told, (author, beacon), limits, &mut changes);
@@ -340,6 +434,19 @@ impl Membership {
 
     /// Merges one heartbeat. Returns whether it was fresher than what was known.
     fn hear(
+        &mut self,
+        now: Time,
+        heard: Heartbeat,
+        limits: Patience,
+        changes: &mut Vec<Change>,
+    ) -> bool {
+        let before = self.weight(now, heard.id);
+        let fresher = self.merge(now, heard, limits, changes);
+        self.weighed(before, self.weight(now, heard.id));
+        fresher
+    }
+
+    fn merge(
         &mut self,
         now: Time,
         heard: Heartbeat,
@@ -527,6 +634,9 @@ impl Membership {
                 changes.push(known.change());
             }
         }
+        if !changes.is_empty() {
+            self.extent.set(None);
+        }
         changes
     }
 
@@ -632,14 +742,9 @@ impl Membership {
     /// Fewest hops to the farthest live author of the last 10 T'.
     #[must_use]
     pub fn eccentricity(&self, now: Time) -> u8 {
-        self.eccentricity_within(now, HOP_INTERVALS * self.interval_ms())
-    }
-
-    fn eccentricity_within(&self, now: Time, window_ms: u64) -> u8 {
-        let live = self.known.values().filter(|k| k.status != Status::Down);
-        live.filter_map(|k| k.fewest_hops(now, window_ms))
-            .max()
-            .unwrap_or(0)
+        let window_ms = self.window_ms(self.extent(now).interval);
+        let hops = self.living().map(|k| k.weight(now, window_ms).hops);
+        hops.max().unwrap_or(0)
     }
 
     fn own_interval_ms(&self) -> u64 {
@@ -649,22 +754,7 @@ impl Membership {
     /// The largest eccentricity heard from live peers within 10 T', at least 1.
     #[must_use]
     pub fn diameter(&self, now: Time) -> u32 {
-        self.diameter_within(now, HOP_INTERVALS * self.interval_ms())
-    }
-
-    fn diameter_within(&self, now: Time, window_ms: u64) -> u32 {
-        let recent = |k: &&Known| k.info.heard.is_some_and(|t| now.since_ms(t) < window_ms);
-        let live = self.known.values().filter(|k| k.status != Status::Down);
-        let heard = live
-            .filter(recent)
-            .map(|k| k.eccentricity)
-            .max()
-            .unwrap_or(0);
-        u32::from(
-            heard
-                .max(self.eccentricity_within(now, window_ms))
-                .clamp(1, HOPS_MAX),
-        )
+        u32::from(self.extent(now).hops.clamp(1, HOPS_MAX))
     }
 
     /// Everybody known: id, life, belief.

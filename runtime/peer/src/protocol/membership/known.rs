@@ -60,6 +60,17 @@ pub(super) struct Known {
     pub(super) higher_count_heard: Option<Heartbeat>,
 }
 
+/// What the patience of others owes to a peer; nothing of who is down or was not heard.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Weight {
+    /// The interval that it announced.
+    pub(super) interval: u8,
+    /// The fewest hops to it of late.
+    pub(super) hops: u8,
+    /// The hops to whoever is farthest from it, as it said of late.
+    pub(super) eccentricity: u8,
+}
+
 /// A neighbour that hears somebody by more hops than this peer, or less: of several the one
 /// that knows least.
 #[derive(Clone, Copy, Debug)]
@@ -212,15 +223,28 @@ impl Known {
         }
     }
 
-    /// Fewest hops within a time.
-    pub(super) fn fewest_hops(&self, now: Time, window_ms: u64) -> Option<u8> {
-        let mut fewest = u8::MAX;
-        for (since, hops) in &self.hops {
-            if *hops < fewest && now.since_ms(*since) < window_ms {
-                fewest = *hops;
-            }
+    /// What counts of it at a moment.
+    pub(super) fn weight(&self, now: Time, window_ms: u64) -> Weight {
+        if self.status == Status::Down {
+            return Weight::default();
         }
-        (fewest != u8::MAX).then_some(fewest)
+        let recent = self
+            .hops
+            .iter()
+            .filter(|(t, _)| now.since_ms(*t) < window_ms);
+        let fewest = recent.map(|(_, hops)| *hops).min().unwrap_or(u8::MAX);
+        let said = self.info.heard.is_some_and(|t| now.since_ms(t) < window_ms);
+        Weight {
+            interval: self.freshest.interval,
+            hops: if fewest < u8::MAX { fewest } else { 0 },
+            eccentricity: if said { self.eccentricity } else { 0 },
+        }
+    }
+
+    /// Since when it was last heard by so many hops at most.
+    pub(super) fn last_within(&self, hops: u8) -> Time {
+        let within = self.hops.iter().filter(|(_, by)| *by <= hops);
+        within.map(|(since, _)| *since).max().unwrap_or_default()
     }
 
     pub(super) fn change(&self) -> Change {

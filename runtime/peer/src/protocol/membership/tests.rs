@@ -709,3 +709,57 @@ fn who_was_late_raises_no_suspicion_for_a_period() {
     // Four and a quarter periods of silence would be over at 7.25 s.
     assert_eq!(suspected.0, 8_000);
 }
+
+#[test]
+fn the_extent_that_is_kept_is_the_one_that_is_measured() {
+    let mut kept = 0;
+    for seed in 0..400 {
+        let mut dice = many_detectors::Dice::new(seed);
+        let mut m = Membership::new(1, 1000);
+        let mut now = Time(0);
+        let mut counts = [0; 9];
+        for _ in 0..1_500 {
+            now = now.plus_ms([1, 40, 400, 3_000][dice.below(4) as usize]);
+            let author = 2 + dice.below(6) as u16;
+            let mut heard = |id: u16| {
+                counts[usize::from(id)] += dice.below(3) as u32;
+                Gossip {
+                    heartbeat: 1 + counts[usize::from(id)],
+                    hops: 1 + dice.below(5) as u8,
+                    interval: 4 << (dice.below(20) / 9),
+                    age_ds: dice.below(100) as u16,
+                    suspected_ds: (dice.below(9) == 0).then_some(0),
+                    ..entry(id, 1, 0, None)
+                }
+            };
+            let (own, other) = (heard(author), heard(2 + (author + 1) % 7));
+            let incarnation = 1 + (now.0 / 200_000) as u32;
+            match dice.below(4) {
+                0 => {
+                    let said = Beacon {
+                        eccentricity: dice.below(5) as u8,
+                        interval: own.interval,
+                        ..beacon(own.heartbeat, vec![other])
+                    };
+                    m.on_beacon(now, author, incarnation, &said);
+                }
+                1 => {
+                    let heartbeat = (own.heartbeat, own.interval);
+                    m.on_heartbeat(now, author, incarnation, heartbeat);
+                }
+                2 => drop(m.tick(now)),
+                _ => m.announce(4 << dice.below(2)),
+            }
+            let before = m.extent.get().filter(|e| now < e.until);
+            kept += u32::from(before.is_some());
+            let (kept, measured) = (m.extent(now), m.measured(now));
+            assert_eq!(
+                (kept.interval, kept.hops),
+                (measured.interval, measured.hops),
+                "seed {seed} at {now:?}"
+            );
+            assert_eq!(m.interval_ms(), ms_of(measured.interval, 1000));
+        }
+    }
+    assert!((50_000..550_000).contains(&kept), "{kept}");
+}
