@@ -91,6 +91,7 @@ fn reported(peer: u16, report: &Report, told: &mut BTreeSet<String>) -> Option<S
                 )
             });
         }
+        Report::Silenced => format!("peer {peer} is silent: another process speaks under its id"),
         Report::Finished { .. } => format!("peer {peer} knows that the mission is finished"),
         Report::Alarm { text } => format!("peer {peer} alarm: {text}"),
         Report::Refused { reason } => format!("peer {peer} refused bytes: {reason}"),

@@ -10,8 +10,10 @@ use std::collections::BTreeMap;
 pub struct Beliefs {
     /// Its life.
     pub incarnation: Incarnation,
-    /// Whether it speaks: its probation is over and no double has silenced it.
+    /// Whether it speaks: its probation is over and no twin has silenced it.
     pub speaks: bool,
+    /// Whether a twin has silenced it.
+    pub is_silent: bool,
     /// Whether it can take part in planning.
     pub able: bool,
     /// Identifies its loop; 0 before it has one.

@@ -4,7 +4,7 @@
 //! | what holds | goal |
 //! |---|---|
 //! | the operator said hold | loiter here |
-//! | the operator said return, or all is covered, or the fuel is due | loiter at base |
+//! | the operator said return, or all is covered, or the fuel is due, or another process speaks under its id | loiter at base |
 //! | the plan has cells | fly them |
 //! | nothing to fly, others at work | loiter here, at the seam |
 //! | and among many nobody is heard | loiter at base |
@@ -75,8 +75,10 @@ pub(crate) struct Situation<'a> {
     pub me: Member,
     /// What it is for.
     pub role: Role,
-    /// Whether its life has begun and its probation is over.
-    pub has_voice: bool,
+    /// Whether it speaks.
+    pub speaks: bool,
+    /// Whether another process under its id has silenced it.
+    pub is_silent: bool,
     /// What it last sensed.
     pub percept: Option<&'a Percept>,
     /// Who else is there.
@@ -286,11 +288,12 @@ impl Cooperation {
         if order == Order::Resume {
             effects.extend(state.check_endurance(s));
         }
-        let able = s.has_voice && order == Order::Resume && state.can_fly_plans(s);
+        let able = s.speaks && order == Order::Resume && state.can_fly_plans(s);
         let able = able && !s.membership.is_deaf(s.now);
         effects.extend(state.negotiate(s, able, timers));
         effects.extend(state.notice_end(s, timers));
         state.astray = s.membership.known() > MEMBERS_MAX && s.membership.hears_nobody(s.now);
+        state.silent = s.is_silent;
         state.steer(order);
         assert!(
             !effects.iter().any(|e| matches!(e, Effect::Negotiate)),
@@ -821,7 +824,7 @@ impl MissionState {
         let base = self.geometry.mission.base_m();
         let goal = if order == Order::Hold {
             Goal::Hold
-        } else if order == Order::ReturnToBase || self.finished || self.exhausted {
+        } else if order == Order::ReturnToBase || self.finished || self.exhausted || self.silent {
             Goal::Point(base)
         } else if sections.plan().is_empty() && self.astray {
             // Where the ground station is and whoever is finished, somebody is heard.

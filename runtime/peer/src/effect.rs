@@ -37,6 +37,8 @@ pub(crate) enum Effect {
     Alarm(String),
     /// A life of this peer is durable: all parts begin it.
     Live(Incarnation),
+    /// A twin speaks: what this peer lists is void, and it plans no more.
+    Silent,
     /// What was heard may change the negotiation: look at it now.
     Negotiate,
     /// The own claim changed: it is spoken soon.

@@ -4,29 +4,30 @@
 //! |---|---|
 //! | too many, malformed, out of range, an unknown kind | a report; nothing else |
 //! | a signature, where nobody signs | likewise: it would be passed on for nothing |
-//! | a beacon under this peer's own id, in this life or a later one, with another boot nonce | a double: `life` |
+//! | a beacon or a heartbeat under this peer's own id, a beacon with another boot nonce | a twin: `life` |
 //! | anything else under its own id | an echo: `relay`; or news of another life: `life` |
 //! | a heartbeat | `membership`, `relay` |
 //! | a beacon | `membership`, `relay`, `cooperation` |
 //! | a relayed record that is held already, or older than what is held | nothing |
 //! | any other record | `cooperation` |
 
-use crate::Incarnation;
-use crate::protocol::life::Life;
+use crate::mission::point_m;
+use crate::protocol::life::{Life, Twin};
 use crate::wire::codec::{self, Body, WireError};
 use crate::wire::kinds::Kind;
 use crate::wire::message::{Beacon, Heartbeat, Record};
 use crate::wire::signature::{Off, Verifier};
+use skein_geometry::frame::Point;
 
 /// What was heard.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Heard {
     /// Bytes that are refused, and why.
     Refused(String),
-    /// Another process under this peer's id, in this life or a later one, with its boot nonce.
-    Double(u32, Incarnation),
-    /// This peer's own id, in a life, with a heartbeat.
-    Myself(Incarnation, u32),
+    /// Another process under this peer's id, and where it is.
+    Twin(Twin, Point),
+    /// This peer's own beacon.
+    Myself,
     /// What was said under this peer's own id is passed on.
     Echo(Record),
     /// A neighbour's beacon.
@@ -54,16 +55,28 @@ pub(crate) fn read(bytes: &[u8], me: u16, life: &Life) -> Heard {
         Err(why) => return Heard::Refused(why.to_string()),
     };
     match body {
+        // Beacons and heartbeats are passed on by nobody, so whoever says one is there.
         Body::Beacon(b) if record.author == me => {
-            // Beacons are passed on by nobody, so whoever says one is there.
-            if record.incarnation >= life.incarnation() && b.nonce != life.nonce() {
-                Heard::Double(b.nonce, record.incarnation)
+            let twin = Twin {
+                incarnation: record.incarnation,
+                heartbeat: b.heartbeat,
+                nonce: Some(b.nonce),
+            };
+            if b.nonce == life.nonce() {
+                Heard::Myself
             } else {
-                Heard::Myself(record.incarnation, b.heartbeat)
+                Heard::Twin(twin, point_m((b.east_mm, b.north_mm)))
             }
         }
-        // Of a double its next beacon tells, with a nonce.
-        Body::Heartbeat(_) if record.author == me => Heard::Myself(record.incarnation, 0),
+        Body::Heartbeat(h) if record.author == me => {
+            let twin = Twin {
+                incarnation: record.incarnation,
+                heartbeat: record.seq,
+                nonce: None,
+            };
+            let at = Point::new(f64::from(h.east_dm) / 10.0, f64::from(h.north_dm) / 10.0);
+            Heard::Twin(twin, at)
+        }
         _ if record.author == me => Heard::Echo(record),
         Body::Beacon(beacon) => Heard::Beacon(record, beacon),
         Body::Heartbeat(heartbeat) => Heard::Heartbeat(record, heartbeat),

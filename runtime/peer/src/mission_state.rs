@@ -83,6 +83,8 @@ pub(crate) struct MissionState {
     pub finished: bool,
     /// Whether it heard of many and hears nobody now.
     pub astray: bool,
+    /// Whether another process under its id has silenced this peer.
+    pub silent: bool,
     /// Whether its fuel is due: it flies home until some is back.
     pub exhausted: bool,
     /// When its plan was last compared with what the fuel allows.
@@ -215,6 +217,7 @@ impl MissionState {
             alone: false,
             finished: false,
             astray: false,
+            silent: false,
             exhausted: old.as_ref().is_some_and(|m| m.exhausted),
             fuel_looked_at: None,
             unsaved_cells: 0,

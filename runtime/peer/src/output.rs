@@ -124,6 +124,9 @@ pub enum Report {
         /// Mission revision.
         revision: u32,
     },
+    /// Another process speaks under this id: this one is silent from now on, until it
+    /// reports that it runs under another incarnation.
+    Silenced,
     /// Something a person should look at.
     Alarm {
         /// What.

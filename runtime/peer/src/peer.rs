@@ -28,7 +28,7 @@ use crate::timers::{Timer, Timers};
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
-use crate::wire::message::{Beacon, Heartbeat, Member, Order, Record};
+use crate::wire::message::{Beacon, Gossip, Heartbeat, Member, Order, Record};
 use crate::{Incarnation, Mission, PeerId};
 use rand_chacha::ChaCha8Rng;
 use rand_core::SeedableRng;
@@ -46,6 +46,10 @@ pub const MAX_JOBS: usize = 8;
 
 /// Whoever was not heard for so many intervals may have missed what was said meanwhile.
 const STRANGE_INTERVALS: u64 = 4;
+
+/// Two programs in one airframe sense one place: what one of them tells of it is at most a
+/// second old when the other hears it, and a position is known to some metres.
+const SAME_PLACE_M: f64 = 60.0;
 
 /// How often a peer looks at its deadlines, as a fraction of the beacon period.
 pub const CADENCE: u64 = 4;
@@ -167,6 +171,7 @@ impl Peer {
         let late_ms = self.now.since_ms(due);
         if late_ms > self.period_ms() / 2 {
             self.membership.was_late(self.now, late_ms);
+            self.life.was_late(late_ms);
             self.cooperation.was_late(late_ms, &mut self.timers);
         }
     }
@@ -176,7 +181,11 @@ impl Peer {
         if self.timers.is_due(Timer::Tick, self.now) {
             let next = self.now.plus_ms(self.period_ms() / CADENCE);
             self.timers.set(Timer::Tick, next);
-            let effects = self.life.tick(self.durable.incarnation);
+            let durations_ms = (self.period_ms(), self.membership.bound_ms(self.now));
+            let durable = self.durable.incarnation;
+            let effects = self
+                .life
+                .tick(self.now, durations_ms, &mut self.timers, durable);
             self.carry_out(effects);
             let changes = self.membership.tick(self.now);
             self.report_changes(changes);
@@ -203,7 +212,11 @@ impl Peer {
             return self.refuse("a percept that is not finite".into());
         }
         self.percept = Some(percept);
-        let effects = self.cooperation.on_percept(&percept);
+        let mut effects = self.cooperation.on_percept(&percept);
+        // One airframe is not flown by two.
+        if self.life.shares_airframe() {
+            effects.retain(|e| !matches!(e, Effect::Fly(_)));
+        }
         self.carry_out(effects);
     }
 
@@ -219,14 +232,18 @@ impl Peer {
         }
         match heard {
             Heard::Refused(why) => self.refuse(why),
-            Heard::Double(nonce, incarnation) => {
-                let effects = self.life.hear_double(nonce, incarnation);
+            Heard::Twin(twin, at) => {
+                let mine = self.percept.map(|p| p.pose.position());
+                let here = mine.is_some_and(|mine| (at - mine).norm() < SAME_PLACE_M);
+                let (now, sent) = (self.now, self.outbound.heartbeat());
+                let effects = self.life.hear_twin((now, &self.timers), twin, sent, here);
                 self.carry_out(effects);
             }
-            Heard::Myself(incarnation, heartbeat) => self.on_myself(incarnation, heartbeat, 0),
+            Heard::Myself => {}
             Heard::Echo(record) => {
                 self.relay.echo(&record);
-                self.on_myself(record.incarnation, 0, 0);
+                let effects = self.life.hear_of_myself(record.incarnation, false);
+                self.carry_out(effects);
             }
             Heard::Beacon(record, beacon) => self.on_beacon(&record, &beacon),
             Heard::Heartbeat(record, h) => {
@@ -249,10 +266,14 @@ impl Peer {
         }
     }
 
-    /// Of this peer's own id, in a life: a heartbeat, and the number of a record.
-    fn on_myself(&mut self, incarnation: Incarnation, heartbeat: u32, seq: u32) {
-        let never_said = heartbeat > self.outbound.heartbeat() || seq > self.outbound.seq();
-        let effects = self.life.hear_of_myself(incarnation, never_said);
+    /// What a neighbour knows of this peer's own id.
+    fn on_gossip_of_me(&mut self, told: &Gossip) {
+        let heartbeat = (told.incarnation, told.heartbeat);
+        let age_ms = u64::from(told.age_ds) * 100;
+        let never_said = told.max_seq > self.outbound.seq();
+        let sent = (self.outbound.heartbeat(), never_said);
+        let now = (self.now, &self.timers);
+        let effects = self.life.hear_of_heartbeat(now, heartbeat, age_ms, sent);
         self.carry_out(effects);
     }
 
@@ -268,7 +289,7 @@ impl Peer {
             .on_beacon(now, author, record.incarnation, beacon);
         self.report_changes(changes);
         for told in beacon.gossip.iter().filter(|g| g.id == me) {
-            self.on_myself(told.incarnation, told.heartbeat, told.max_seq);
+            self.on_gossip_of_me(told);
             if told.incarnation == self.life.incarnation() {
                 match told.suspected_ds {
                     Some(_) => {
@@ -294,6 +315,10 @@ impl Peer {
             return self.broken(&promise);
         }
         self.durable.apply(&entry);
+        let plans = matches!(promise, Promise::Adopt(..) | Promise::Take(..));
+        if plans && self.life.is_silent() {
+            return self.broken(&promise);
+        }
         let effects = match promise {
             Promise::Life(incarnation) => self.life.is_durable(incarnation),
             Promise::Bid(bid) => self.cooperation.bid_is_durable(*bid),
@@ -388,6 +413,11 @@ impl Peer {
                 self.outbound.new_life(&mut self.timers);
                 let me = self.me();
                 self.cooperation.new_life(me, &mut self.timers);
+            }
+            Effect::Silent => {
+                let me = self.me();
+                self.cooperation.new_life(me, &mut self.timers);
+                self.negotiate();
             }
             Effect::Negotiate => self.negotiate(),
             Effect::ClaimChanged => self.outbound.claim_changed(&mut self.timers),
@@ -618,7 +648,8 @@ impl Peer {
             period_ms: self.period_ms(),
             me: self.me(),
             role: self.config.role,
-            has_voice: self.life.has_voice(self.now, &self.timers),
+            speaks: self.life.speaks(self.now, &self.timers),
+            is_silent: self.life.is_silent(),
             percept: self.percept.as_ref(),
             membership: &self.membership,
         };
@@ -680,6 +711,7 @@ impl Peer {
         let mut beliefs = Beliefs {
             incarnation: self.life.incarnation(),
             speaks: self.speaks(),
+            is_silent: self.life.is_silent(),
             diameter: self.membership.diameter(self.now),
             interval_ms: self.relay.air.interval_ms(),
             order: self.cooperation.order(),

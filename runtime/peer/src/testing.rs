@@ -126,6 +126,8 @@ pub struct Seat {
     /// Where it is.
     pub pose: Pose,
     setpoint: Option<Setpoint>,
+    /// How many setpoints it was given.
+    pub setpoints: usize,
     sensed_ms: u64,
     /// What it reported, with the true time, milliseconds.
     pub reports: Vec<(u64, Report)>,
@@ -287,11 +289,22 @@ impl Harness {
                 heading_rad: 0.5 * PI,
             },
             setpoint: None,
+            setpoints: 0,
             sensed_ms: 0,
             reports: Vec::new(),
             said: Vec::new(),
         };
         self.seats.insert(id, seat);
+    }
+
+    /// One more peer, not started, that was configured as another one: it has the same id and
+    /// height, and a seat of its own under another number, beside that of the other.
+    pub fn add_twin(&mut self, number: u16, of: u16) {
+        let (config, pose) = (self.seat(of).config.clone(), self.seat(of).pose);
+        self.add(number, config.role, config.mission.clone());
+        let seat = self.seat(number);
+        seat.config = config;
+        seat.pose.east_m = pose.east_m - 200.0;
     }
 
     /// A ground station with a mission of its own, not started.
@@ -521,7 +534,11 @@ impl Harness {
         let now_ms = self.now_ms;
         match output {
             Output::Publish { bytes, hops, .. } => self.publish(id, hops, &bytes),
-            Output::Setpoint(setpoint) => self.seat(id).setpoint = Some(setpoint),
+            Output::Setpoint(setpoint) => {
+                let seat = self.seat(id);
+                seat.setpoint = Some(setpoint);
+                seat.setpoints += 1;
+            }
             Output::Store { token, record } => {
                 let seat = self.seat(id);
                 let fails = Entry::decode(&record).is_some_and(|e| (seat.store_fails)(&e));

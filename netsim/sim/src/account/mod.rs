@@ -142,6 +142,8 @@ impl Account {
             Report::Booted { incarnation } => {
                 self.detection.lives(peer, *incarnation);
                 self.restarts.booted(peer, *incarnation);
+                // Whoever was silent speaks again.
+                self.lifetimes.resumed(now_ms, peer);
                 None
             }
             Report::Ready {
@@ -193,6 +195,11 @@ impl Account {
                 secs(now_ms),
                 self.name(peer)
             )),
+            // It is of no use while its twin speaks.
+            Report::Silenced => {
+                self.lifetimes.paused(now_ms, peer);
+                None
+            }
             Report::Round { .. } => None,
         }
     }

@@ -273,6 +273,12 @@ impl Membership {
         }
     }
 
+    /// The longest time by which all know of a death, milliseconds.
+    #[must_use]
+    pub fn bound_ms(&self, now: Time) -> u64 {
+        self.patience(now).bound_ms
+    }
+
     /// Time to refute a suspicion, milliseconds: k2 T'.
     #[must_use]
     pub fn k2_ms(&self, now: Time) -> u64 {

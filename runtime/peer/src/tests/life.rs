@@ -1,4 +1,4 @@
-//! Lives, doubles, probation.
+//! Lives and probation.
 
 use super::{beacon, covered, record};
 use crate::cells::CellSet;
@@ -109,51 +109,6 @@ fn a_later_life_that_cannot_be_stored_leaves_the_peer_speaking_in_the_old_one() 
     h.seat(1).store_fails = |_| false;
     h.inject(1, echo(5));
     assert!(h.run_until(2, |h| h.beliefs(1).incarnation == 6));
-}
-
-#[test]
-fn of_a_double_id_the_lower_nonce_is_silent_and_flies_on() {
-    let mut h = Harness::started(2, mission(1, 6, 4));
-    h.run_s(20);
-    let double = Body::Beacon(beacon(9999, u32::MAX));
-    h.inject(1, record(1, 1, 9999, 0, &double));
-    assert_eq!(h.alarms(1), ["another peer speaks under this id"]);
-    let (said, seen) = (h.seat(1).said.len(), covered(&h, 1));
-    h.run_s(15);
-    assert_eq!(h.seat(1).said.len(), said);
-    assert!(covered(&h, 1) > seen, "the UAV is not grounded");
-    assert!(!h.beliefs(1).speaks);
-    // The one with the higher nonce goes on speaking.
-    let double = Body::Beacon(beacon(9999, 0));
-    h.inject(2, record(2, 1, 9999, 0, &double));
-    let said = h.seat(2).said.len();
-    h.run_s(5);
-    assert!(h.seat(2).said.len() > said);
-}
-
-#[test]
-fn of_doubles_in_different_lives_one_falls_silent_and_lives_end_to_grow() {
-    let mut h = Harness::started(2, mission(1, 6, 4));
-    h.run_s(20);
-    let planned = h.beliefs(1).plan;
-    // A second process was started later and has taken a life above the first one's.
-    for heartbeat in 1..5 {
-        let double = Body::Beacon(beacon(heartbeat, u32::MAX));
-        h.inject(1, record(1, 2, heartbeat, 0, &double));
-        h.run_s(1);
-    }
-    let b = h.beliefs(1);
-    assert!(!b.speaks && b.incarnation == 1, "life {}", b.incarnation);
-    assert!(!b.plan.is_empty() && planned.ends_with(&b.plan));
-    // The one with the higher nonce takes one life above, not one for each beacon.
-    for heartbeat in 1..5 {
-        let double = Body::Beacon(beacon(heartbeat, 0));
-        h.inject(2, record(2, 4, heartbeat, 0, &double));
-        h.run_s(1);
-    }
-    assert_eq!(h.beliefs(2).incarnation, 5);
-    h.run_s(5);
-    assert!(h.beliefs(2).speaks);
 }
 
 #[test]

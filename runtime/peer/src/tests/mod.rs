@@ -7,6 +7,7 @@ mod missions;
 mod orders;
 mod stores;
 mod swarm;
+mod twins;
 
 use crate::mission::Mission;
 use crate::testing::{GROUND_STATION, Harness};
