@@ -61,6 +61,12 @@ impl Proxy {
             .send_if_modified(|s| s.target.replace(target) != Some(target));
     }
 
+    /// Whether it is dark.
+    #[must_use]
+    pub fn is_dark(&self) -> bool {
+        self.state.borrow().dark
+    }
+
     /// Goes dark, or carries again.
     pub fn set_dark(&self, dark: bool) {
         self.state
