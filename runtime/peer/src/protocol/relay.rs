@@ -38,15 +38,15 @@ use crate::wire::message::{Beacon, Record};
 use skein_geometry::hash::Fnv;
 #[cfg(test)]
 mod many_relays;
+mod queue;
 
+pub use queue::MAX_QUEUE;
+use queue::{Queue, Standing, Waiting};
 use std::collections::BTreeMap;
 
 /// Most records held: 256 peers with a state, a bid, a claim, an order, a finish and
 /// four events each, and one mission of 256 pieces.
 pub const MAX_RECORDS: usize = PEERS_MAX * 9 + CHUNKS_MAX as usize;
-
-/// Most transmissions waiting: all records of one neighbourhood once.
-pub const MAX_QUEUE: usize = 128;
 
 /// A record is not passed on if so many copies of it were heard first: one is not enough
 /// where three in ten are lost. Copies count, not neighbours: of two from one neighbour
@@ -156,15 +156,6 @@ struct Held {
     sent: Time,
 }
 
-#[derive(Clone, Debug)]
-struct Waiting {
-    from: Time,
-    until: Time,
-    /// By when it is to be sent.
-    due: Time,
-    priority: Priority,
-}
-
 /// The relay of one peer.
 #[derive(Clone, Debug)]
 pub struct Relay {
@@ -173,7 +164,7 @@ pub struct Relay {
     pub air: Airtime,
     fleet: String,
     held: BTreeMap<RecordKey, Held>,
-    queue: BTreeMap<RecordKey, Waiting>,
+    queue: Queue,
     answered: BTreeMap<u16, Time>,
     /// Which revision the last beacon of each neighbour showed, and until when that counts.
     follow: BTreeMap<u16, (u32, Time)>,
@@ -191,7 +182,7 @@ impl Relay {
             fleet: fleet.to_owned(),
             air: Airtime::new(rate_bps, period_ms),
             held: BTreeMap::new(),
-            queue: BTreeMap::new(),
+            queue: Queue::new(),
             answered: BTreeMap::new(),
             follow: BTreeMap::new(),
             newest_piece: 0,
@@ -203,7 +194,7 @@ impl Relay {
     pub fn new_life(&mut self) {
         let me = self.me;
         self.held.retain(|k, _| k.0 != me);
-        self.queue.retain(|k, _| k.0 != me);
+        self.queue.remove_author(me);
     }
 
     /// A record of this peer's own: held, and queued at once.
@@ -336,10 +327,7 @@ impl Relay {
     fn due(&self, key: &RecordKey, from: Time, priority: Priority) -> Time {
         let telemetry = priority == Priority::Telemetry;
         let intervals = match (key.0 == self.me, telemetry) {
-            _ if is_piece(key) => {
-                let waiting = self.queue.keys().filter(|k| is_piece(k)).count();
-                PIECE_INTERVALS * (1 + waiting as u64)
-            }
+            _ if is_piece(key) => PIECE_INTERVALS * (1 + self.queue.n_pieces() as u64),
             (true, false) => 0,
             (true, true) | (false, false) => 1,
             (false, true) => 3,
@@ -351,13 +339,13 @@ impl Relay {
     /// it. Sent again it waits its turn, or what this peer has seen would never be said.
     /// Where many share the channel its coverage goes next: claims that others wrote and that
     /// wait for longer than coverage lives would never let it go.
-    fn standing(&self, key: &RecordKey, priority: Priority) -> u8 {
+    fn standing(&self, key: &RecordKey, priority: Priority) -> Standing {
         let unsaid = || self.held.get(key).is_some_and(|h| h.copies == 0);
         match priority {
-            _ if key.0 != self.me => 2,
-            Priority::Conflict | Priority::Claim if unsaid() => 0,
-            Priority::Beacon if self.air.is_crowded() => 1,
-            _ => 2,
+            _ if key.0 != self.me => Standing::Due,
+            Priority::Conflict | Priority::Claim if unsaid() => Standing::First,
+            Priority::Beacon => Standing::Coverage,
+            _ => Standing::Due,
         }
     }
 
@@ -399,16 +387,7 @@ impl Relay {
     }
 
     fn wait(&mut self, now: Time, key: RecordKey, kind: Kind, delay_ms: u64) {
-        if self.queue.len() >= MAX_QUEUE && !self.queue.contains_key(&key) {
-            let last = self
-                .queue
-                .iter()
-                .max_by_key(|(k, w)| (w.priority, w.from, **k))
-                .map(|(k, _)| *k);
-            if let Some(k) = last {
-                self.queue.remove(&k);
-            }
-        }
+        self.queue.make_room(&key);
         let row = kind.row();
         let from = now.plus_ms(delay_ms);
         let until = from.plus_ms(u64::from(self.lifetime_ms(kind)));
@@ -419,15 +398,15 @@ impl Relay {
                 until,
                 due: self.due(&key, from, row.priority),
                 priority: row.priority,
+                standing: self.standing(&key, row.priority),
             },
         );
-        assert!(self.queue.len() <= MAX_QUEUE, "the queue keeps to its cap");
     }
 
     /// Whether a record of this peer's own waits to be sent.
     #[must_use]
     pub fn waits(&self, kind: Kind) -> bool {
-        self.queue.contains_key(&(self.me, kind.number(), 0))
+        self.queue.contains(&(self.me, kind.number(), 0))
     }
 
     /// How long a record of this kind is worth sending, milliseconds.
@@ -460,15 +439,15 @@ impl Relay {
     /// Queues the pieces of missions that a neighbour may lack, and takes out those that
     /// nobody lacks any more.
     fn bring_mission(&mut self, now: Time, author: u16, beacon: &Beacon) {
-        self.follow.retain(|_, (_, until)| *until > now);
+        if self.follow.len() >= PEERS_MAX {
+            self.follow.retain(|_, (_, until)| *until > now);
+        }
         if self.follow.len() < PEERS_MAX || self.follow.contains_key(&author) {
             let lasts_ms = LASTING_INTERVALS * self.air.told_ms(beacon.interval);
             let follows = (beacon.revision, now.plus_ms(lasts_ms));
             self.follow.insert(author, follows);
         }
-        let waiting = self.queue.keys().filter(|k| is_piece(k));
-        let waiting: Vec<RecordKey> = waiting.copied().collect();
-        for key in waiting {
+        for key in self.queue.pieces() {
             if !self.is_wanted(now, &key) {
                 self.queue.remove(&key);
             }
@@ -480,7 +459,7 @@ impl Relay {
         let pieces = self.held.iter().filter(|(k, h)| {
             h.revision.is_some_and(|piece| beacon.revision < piece)
                 && (now.since_ms(h.sent) >= quiet || h.copies == 0)
-                && !self.queue.contains_key(k)
+                && !self.queue.contains(k)
         });
         // What was on the air longest ago goes first: pieces that waited in vain till their
         // lifetime was over would else wait behind the same ones again, for ever.
@@ -540,7 +519,7 @@ impl Relay {
             .filter(|(_, kind)| is_counted(*kind))
             .collect();
         for (key, kind) in lacking {
-            if !self.queue.contains_key(&key) {
+            if !self.queue.contains(&key) {
                 self.send_again(now, key, kind);
             }
         }
@@ -578,7 +557,7 @@ impl Relay {
 
     /// What may go out now, the most urgent first; `None` when nothing may.
     pub fn poll(&mut self, now: Time) -> Option<Out> {
-        self.queue.retain(|_, w| w.until >= now);
+        self.queue.expire(now);
         let (key, priority) = self.first(now)?;
         let kind = Kind::of_number(key.1)?;
         let lifetime_ms = self.lifetime_ms(kind);
@@ -607,29 +586,24 @@ impl Relay {
 
     /// What goes next: it is its turn, or it can share the headers of what goes now.
     fn first(&self, now: Time) -> Option<(RecordKey, Priority)> {
-        let crowded = self.air.is_filling(now) && self.air.is_crowded();
-        let rides = |k: &RecordKey| {
-            // What was sent a moment ago is sent again only for being later.
-            let again = |h: &Held| k.0 == self.me && h.copies > 0;
-            let held = self.held.get(k).filter(|h| crowded && !again(h));
+        let crowded = self.air.is_crowded();
+        if !crowded || !self.air.is_filling(now) {
+            return self.queue.turn(now, crowded).first;
+        }
+        // What was sent a moment ago is sent again only for being later.
+        let again = |k: &RecordKey, h: &Held| k.0 == self.me && h.copies > 0;
+        self.queue.first(now, crowded, |k| {
+            let held = self.held.get(k).filter(|h| !again(k, h));
             held.is_some_and(|h| self.air.joins(now, h.bytes.len()))
-        };
-        self.queue
-            .iter()
-            .filter(|(k, w)| w.from <= now || rides(k))
-            .min_by_key(|(k, w)| {
-                let standing = self.standing(k, w.priority);
-                (w.from > now, standing, w.due, **k)
-            })
-            .map(|(k, w)| (*k, w.priority))
+        })
     }
 
     /// When [`Relay::poll`] may have something, if it ever will.
     #[must_use]
     pub fn next_timeout(&self, now: Time) -> Option<Time> {
-        let due = self.queue.values().map(|w| w.from).min()?;
-        if due > now {
-            return Some(due);
+        let turn = self.queue.turn(now, self.air.is_crowded());
+        if turn.first.is_none() {
+            return (self.queue.len() > 0).then_some(turn.next);
         }
         let (key, _) = self.first(now)?;
         let bytes = self.held.get(&key)?.bytes.len();

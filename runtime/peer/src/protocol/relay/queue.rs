@@ -1,0 +1,223 @@
+//! What waits to be sent, and whose turn it is.
+
+use super::{RecordKey, is_piece};
+use crate::input::Time;
+use crate::output::Priority;
+use core::cell::Cell;
+use std::collections::BTreeMap;
+
+/// Most transmissions waiting: all records of one neighbourhood once.
+pub const MAX_QUEUE: usize = 128;
+
+/// Whether a record goes before what is due sooner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Standing {
+    /// Nobody else can say it, and it was not said yet.
+    First,
+    /// This peer's coverage: it goes before the rest where many share the channel.
+    Coverage,
+    /// Its turn comes when it is due.
+    Due,
+}
+
+impl Standing {
+    fn rank(self, crowded: bool) -> u8 {
+        match self {
+            Self::First => 0,
+            Self::Coverage if crowded => 1,
+            Self::Coverage | Self::Due => 2,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Waiting {
+    pub(super) from: Time,
+    pub(super) until: Time,
+    /// By when it is to be sent.
+    pub(super) due: Time,
+    pub(super) priority: Priority,
+    pub(super) standing: Standing,
+}
+
+/// Whose turn it is among those that have waited for their random time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Turn {
+    /// None where all still wait.
+    pub(super) first: Option<(RecordKey, Priority)>,
+    /// When the random time of another one is over.
+    pub(super) next: Time,
+    crowded: bool,
+}
+
+/// The queue of a relay: one entry per key.
+#[derive(Clone, Debug)]
+pub(super) struct Queue {
+    waiting: BTreeMap<RecordKey, Waiting>,
+    /// Before this no lifetime is over.
+    first_until: Time,
+    pieces: usize,
+    /// As it was last asked for; nothing where the queue changed since.
+    turn: Cell<Option<Turn>>,
+}
+
+impl Queue {
+    pub(super) fn new() -> Self {
+        Self {
+            waiting: BTreeMap::new(),
+            first_until: Time(u64::MAX),
+            pieces: 0,
+            turn: Cell::new(None),
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.waiting.len()
+    }
+
+    pub(super) fn contains(&self, key: &RecordKey) -> bool {
+        self.waiting.contains_key(key)
+    }
+
+    /// Makes room for one more, if need be in place of the least urgent.
+    pub(super) fn make_room(&mut self, key: &RecordKey) {
+        if self.len() >= MAX_QUEUE && !self.contains(key) {
+            let last = self
+                .waiting
+                .iter()
+                .max_by_key(|(k, w)| (w.priority, w.from, **k))
+                .map(|(k, _)| *k);
+            if let Some(k) = last {
+                self.remove(&k);
+            }
+        }
+    }
+
+    pub(super) fn insert(&mut self, key: RecordKey, waiting: Waiting) {
+        self.first_until = self.first_until.min(waiting.until);
+        let before = self.waiting.insert(key, waiting);
+        self.pieces += usize::from(is_piece(&key) && before.is_none());
+        self.turn.set(None);
+        assert!(self.len() <= MAX_QUEUE, "the queue keeps to its cap");
+    }
+
+    pub(super) fn remove(&mut self, key: &RecordKey) {
+        if self.waiting.remove(key).is_some() {
+            self.pieces -= usize::from(is_piece(key));
+            self.turn.set(None);
+        }
+    }
+
+    /// All of one author are void.
+    pub(super) fn remove_author(&mut self, author: u16) {
+        let keys = self.waiting.keys().filter(|k| k.0 == author);
+        let keys: Vec<RecordKey> = keys.copied().collect();
+        for key in keys {
+            self.remove(&key);
+        }
+    }
+
+    /// Drops those whose lifetime is over.
+    pub(super) fn expire(&mut self, now: Time) {
+        if now <= self.first_until {
+            return;
+        }
+        let over = self.waiting.iter().filter(|(_, w)| w.until < now);
+        let over: Vec<RecordKey> = over.map(|(k, _)| *k).collect();
+        for key in over {
+            self.remove(&key);
+        }
+        let untils = self.waiting.values().map(|w| w.until);
+        self.first_until = untils.min().unwrap_or(Time(u64::MAX));
+    }
+
+    /// The pieces of missions among them.
+    pub(super) fn pieces(&self) -> Vec<RecordKey> {
+        if self.pieces == 0 {
+            return Vec::new();
+        }
+        let keys = self.waiting.keys().filter(|k| is_piece(k));
+        keys.copied().collect()
+    }
+
+    pub(super) fn n_pieces(&self) -> usize {
+        self.pieces
+    }
+
+    /// Asked for with every input, and looked up among all only after something changed.
+    pub(super) fn turn(&self, now: Time, crowded: bool) -> Turn {
+        let known = self.turn.get();
+        let known = known.filter(|t| now < t.next && t.crowded == crowded);
+        let turn = known.unwrap_or_else(|| {
+            let later = self.waiting.values().map(|w| w.from).filter(|t| *t > now);
+            Turn {
+                first: self.first(now, crowded, |_| false),
+                next: later.min().unwrap_or(Time(u64::MAX)),
+                crowded,
+            }
+        });
+        self.turn.set(Some(turn));
+        turn
+    }
+
+    /// What goes next: it is its turn, or it rides with what goes now.
+    pub(super) fn first(
+        &self,
+        now: Time,
+        crowded: bool,
+        rides: impl Fn(&RecordKey) -> bool,
+    ) -> Option<(RecordKey, Priority)> {
+        let may_go = |(k, w): &(&RecordKey, &Waiting)| w.from <= now || rides(k);
+        let goes = self.waiting.iter().filter(may_go);
+        goes.min_by_key(|(k, w)| (w.from > now, w.standing.rank(crowded), w.due, **k))
+            .map(|(k, w)| (*k, w.priority))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::kinds::Kind;
+    use skein_geometry::random::SplitMix64;
+
+    #[test]
+    fn the_turn_that_is_kept_is_the_one_that_is_looked_up() {
+        let mut bits = SplitMix64::new(1);
+        let mut below = |n: u64| bits.bits() % n;
+        let mut queue = Queue::new();
+        let (mut kept, mut full) = (0, 0);
+        for now in (0..60_000).map(|step| Time(step * 7)) {
+            let kind = [Kind::Claim, Kind::Cover, Kind::Mission][below(3) as usize];
+            let key = (below(20) as u16, kind.number(), below(4) as u16);
+            let from = now.plus_ms(below(2_000));
+            let waiting = Waiting {
+                from,
+                until: from.plus_ms(below(9_000)),
+                due: from.plus_ms(below(3) * 500),
+                priority: kind.priority(),
+                standing: [Standing::First, Standing::Coverage, Standing::Due][below(3) as usize],
+            };
+            match below(16) {
+                0..4 => {
+                    queue.make_room(&key);
+                    queue.insert(key, waiting);
+                }
+                4 => queue.remove(&key),
+                5 if below(100) == 0 => queue.remove_author(key.0),
+                _ => queue.expire(now),
+            }
+            full += usize::from(queue.len() == MAX_QUEUE);
+            let crowded = below(50) == 0;
+            kept += u32::from(queue.turn.get().is_some());
+            let turn = queue.turn(now, crowded);
+            assert_eq!(turn.first, queue.first(now, crowded, |_| false));
+            let later = queue.waiting.values().map(|w| w.from);
+            let next = later.filter(|from| *from > now).min();
+            assert_eq!(turn.next, next.unwrap_or(Time(u64::MAX)));
+            assert_eq!(queue.n_pieces(), queue.pieces().len());
+            let least = queue.waiting.values().map(|w| w.until).min();
+            assert!(least.is_none_or(|until| queue.first_until <= until));
+        }
+        assert!(kept > 20_000 && full > 100, "{kept} {full}");
+    }
+}
