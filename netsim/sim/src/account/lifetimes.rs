@@ -17,6 +17,8 @@ pub struct Setting {
     pub seed: u64,
     /// Mean speed over the ground along the whole loop, by UAV, m/s.
     pub uavs: BTreeMap<u16, f64>,
+    /// When each takes off, milliseconds; whoever is not named, at once.
+    pub takeoffs_ms: BTreeMap<u16, u64>,
     /// Length of all cells that are needed, over all laps, metres.
     pub work_m: f64,
     /// Share of the area that must be coverable, 0 to 1.
@@ -42,6 +44,9 @@ impl Setting {
             scenario: spec.name.clone(),
             seed,
             uavs: spec.uavs.iter().map(|u| (u.id, speed_mps(u))).collect(),
+            takeoffs_ms: (spec.uavs.iter())
+                .map(|u| (u.id, u64::from(u.takeoff_ms)))
+                .collect(),
             work_m: once_m * (f64::from(spec.mission.further_laps) + 1.0),
             needed_share: spec.min_coverable,
         }
@@ -110,6 +115,7 @@ impl Lifetime {
 #[derive(Clone, Debug)]
 pub struct Lifetimes {
     speeds_mps: BTreeMap<u16, f64>,
+    takeoffs_ms: BTreeMap<u16, u64>,
     work_m: f64,
     by_peer: BTreeMap<u16, Lifetime>,
 }
@@ -120,6 +126,7 @@ impl Lifetimes {
     pub fn new(setting: &Setting) -> Self {
         Self {
             speeds_mps: setting.uavs.clone(),
+            takeoffs_ms: setting.takeoffs_ms.clone(),
             work_m: setting.work_m,
             by_peer: BTreeMap::new(),
         }
@@ -194,13 +201,23 @@ impl Lifetimes {
     /// way to the first cell, none between sections and none flown twice. UAVs that run at
     /// the end are taken to run on; `None` when those that there are never get so far.
     #[must_use]
+    pub fn work_bound_ms(&self) -> Option<u64> {
+        self.bound_ms(|_| 0)
+    }
+
+    /// The same where nobody flies before it takes off.
+    #[must_use]
+    pub fn launch_bound_ms(&self) -> Option<u64> {
+        self.bound_ms(|id| self.takeoffs_ms.get(&id).copied().unwrap_or(0))
+    }
+
     #[allow(
         clippy::cast_precision_loss,
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "times of a run stay below 2^52 ms, and casts from floats saturate"
     )]
-    pub fn work_bound_ms(&self) -> Option<u64> {
+    fn bound_ms(&self, flies_ms: impl Fn(u16) -> u64) -> Option<u64> {
         if self.work_m <= 0.0 {
             return None;
         }
@@ -210,12 +227,13 @@ impl Lifetimes {
             let Some(v) = self.speeds_mps.get(id) else {
                 continue;
             };
-            for (from, to) in &l.ran {
-                *changes.entry(*from).or_default() += v;
+            let flies_ms = flies_ms(*id);
+            for (from, to) in l.ran.iter().filter(|(_, to)| *to > flies_ms) {
+                *changes.entry((*from).max(flies_ms)).or_default() += v;
                 *changes.entry(*to).or_default() -= v;
             }
             if l.process == Process::Runs {
-                *changes.entry(l.since_ms).or_default() += v;
+                *changes.entry(l.since_ms.max(flies_ms)).or_default() += v;
             }
         }
         let (mut left_m, mut speed_mps, mut since_ms) = (self.work_m, 0.0, 0);
@@ -273,6 +291,26 @@ mod tests {
         all_die.ended(10_000, 2);
         assert_eq!(all_die.work_bound_ms(), None);
         assert_eq!(two_at_ten_mps(0.0).work_bound_ms(), None);
+    }
+
+    #[test]
+    fn the_bound_from_the_take_offs_on_counts_uavs_from_then_on() {
+        let launched = |takeoffs_ms: [u64; 2]| {
+            let mut l = two_at_ten_mps(2_000.0);
+            l.takeoffs_ms = (1..).zip(takeoffs_ms).collect();
+            l
+        };
+        assert_eq!(launched([0, 0]).launch_bound_ms(), Some(100_000));
+        let calm = launched([10_000, 50_000]);
+        assert_eq!(calm.launch_bound_ms(), Some(130_000));
+        assert_eq!(calm.work_bound_ms(), Some(100_000));
+        // Who dies before it takes off has done nothing.
+        let mut one_dies = launched([10_000, 50_000]);
+        one_dies.ended(40_000, 2);
+        assert_eq!(one_dies.launch_bound_ms(), Some(210_000));
+        let mut later = launched([10_000, 50_000]);
+        later.ended(60_000, 2);
+        assert_eq!(later.launch_bound_ms(), Some(200_000));
     }
 
     #[test]

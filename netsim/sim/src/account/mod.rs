@@ -321,6 +321,7 @@ impl Account {
             .partition(|id| self.is_finished(*id));
         let completed = self.covered_ms.is_some() && unfinished.is_empty() && !finished.is_empty();
         let work_bound_ms = self.lifetimes.work_bound_ms();
+        let launch_bound_ms = self.lifetimes.launch_bound_ms();
         let (driver, simulated, live) = match ending.details {
             Details::Simulated(s) => (Driver::Sim, Some(s), None),
             Details::Live(l) => (Driver::Live, None, Some(l)),
@@ -337,6 +338,8 @@ impl Account {
             makespan_ms: self.covered_ms,
             work_bound_ms,
             makespan_over_work_bound: report::ratio(self.covered_ms, work_bound_ms),
+            launch_bound_ms,
+            makespan_over_launch_bound: report::ratio(self.covered_ms, launch_bound_ms),
             coverage,
             zone_entries: ending.judge.entries(),
             nearest_approach_m: ending.judge.closest().map(|a| a.distance_m),

@@ -52,6 +52,10 @@ pub struct RunReport {
     pub work_bound_ms: Option<u64>,
     /// `makespan_ms` over `work_bound_ms`.
     pub makespan_over_work_bound: Option<f64>,
+    /// The work bound where each UAV flies from its take-off on, ms.
+    pub launch_bound_ms: Option<u64>,
+    /// `makespan_ms` over `launch_bound_ms`.
+    pub makespan_over_launch_bound: Option<f64>,
     /// What was seen of the area, lines or points.
     pub coverage: Coverage,
     /// Flown segments that entered a no-fly zone.

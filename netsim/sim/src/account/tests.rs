@@ -48,6 +48,7 @@ fn two() -> Account {
         scenario: "two".to_owned(),
         seed: 7,
         uavs: BTreeMap::from([(1, 10.0), (2, 10.0)]),
+        takeoffs_ms: BTreeMap::new(),
         work_m: 2_000.0,
         needed_share: 0.0,
     });

@@ -62,6 +62,17 @@ impl RunReport {
                 secs(bound_ms)
             )?;
         }
+        let later = |ms: &u64| Some(*ms) > self.work_bound_ms;
+        if let (Some(ratio), Some(bound_ms)) = (
+            self.makespan_over_launch_bound,
+            self.launch_bound_ms.filter(later),
+        ) {
+            write!(
+                f,
+                ", {ratio:.2} times that from the take-offs on ({:.1} s)",
+                secs(bound_ms)
+            )?;
+        }
         writeln!(f)
     }
 
