@@ -610,8 +610,8 @@ impl MissionState {
         let mut actions = self.negotiation.tick(&ctx, &coverage_loop);
         let left_over = self.negotiation.left_over(&ctx);
         let within_reach = left_over.and_then(|cells| self.within_reach(&cells, s.percept));
-        let wanted = within_reach.or_else(|| self.wanted_without_a_round(s, &ctx));
-        let taken = wanted.and_then(|cells| self.negotiation.begin_take(&cells));
+        let taken = within_reach.and_then(|cells| self.negotiation.begin_take(&cells));
+        let taken = taken.or_else(|| self.taken_without_a_round(s, &ctx));
         let first = self.first_section(s, &ctx);
         actions.extend(taken.or(first).map(Action::Take));
         let mut effects = Effects::new();

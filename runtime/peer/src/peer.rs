@@ -28,6 +28,7 @@ use crate::timers::{Timer, Timers};
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
+use crate::wire::limits::MEMBERS_MAX;
 use crate::wire::message::{Beacon, Gossip, Heartbeat, Member, Order, Record};
 use crate::{Incarnation, Mission, PeerId};
 use rand_chacha::ChaCha8Rng;
@@ -84,9 +85,13 @@ impl Peer {
         seed[..8].copy_from_slice(&config.seed.to_le_bytes());
         seed[8..10].copy_from_slice(&config.id.0.to_le_bytes());
         let mut timers = Timers::default();
+        let mut relay = Relay::new(config.id.0, &config.fleet, config.rate_bps, period);
+        if config.launches.len() > MEMBERS_MAX {
+            relay.air.expect(config.launches.len());
+        }
         Self {
             membership: Membership::new(config.id.0, period),
-            relay: Relay::new(config.id.0, &config.fleet, config.rate_bps, period),
+            relay,
             outbound: Outbound::new(u64::from(period), &mut timers),
             cooperation: Cooperation::new(config.mission.clone()),
             percept: None,

@@ -6,6 +6,7 @@
 use crate::cells::CellSet;
 use crate::cooperation::{Situation, speed_mmps};
 use crate::mission_state::MissionState;
+use crate::protocol::airtime::LASTING_INTERVALS;
 use crate::protocol::launches;
 use crate::protocol::negotiation::{Context, SETTLE_PERIODS};
 use crate::protocol::runs::{PlannedCell, cells_of, legs_of};
@@ -19,19 +20,21 @@ use skein_flight::coverage::ring::{Direction, LoopCell};
 /// Turning round and coming onto a stretch is reckoned as so many turn radii: 7π/3.
 const TURN_RADII: u32 = 7;
 
+/// A cell is flown in about so long, milliseconds.
+const CELL_MS: u64 = 4000;
+
 impl MissionState {
     /// What this peer, among many, takes without a round: orphans, or a part of what a slower
     /// one has left.
-    pub(crate) fn wanted_without_a_round(
+    pub(crate) fn taken_without_a_round(
         &mut self,
         s: &Situation<'_>,
         ctx: &Context<'_>,
-    ) -> Option<Vec<(u16, Direction)>> {
+    ) -> Option<Vec<PlannedCell>> {
         if !self.negotiation.looks_around(ctx) {
             return None;
         }
         let me = self.hand(s)?;
-        let spendable_ms = u64::from(self.spendable_ms(s.percept));
         let orphans = self.negotiation.ripe_orphans(ctx);
         let may_relieve = self.negotiation.may_relieve(ctx, me.free_ms);
         if orphans.is_empty() && !may_relieve {
@@ -39,38 +42,57 @@ impl MissionState {
         }
         let owners = self.negotiation.owners(ctx);
         let others = self.hands(s, ctx, &owners);
-        let wanted = self.wanted_orphans((s, ctx), &orphans, (&me, &others), spendable_ms);
-        if wanted.is_some() || !may_relieve {
-            return wanted;
+        let pace = self.pace()?;
+        let among = ctx.members.len() + ctx.unheard;
+        let by_ms = if may_relieve {
+            u64::MAX
+        } else {
+            pace.in_time_ms(&owners, me.free_ms, &orphans, among)
+        };
+        let wanted = self.wanted_orphans((s, ctx), &orphans, (&me, &others), by_ms);
+        if let Some((begins_ms, cells)) = wanted {
+            return self.negotiation.begin_nearest(&cells, begins_ms);
+        }
+        if !may_relieve {
+            return None;
         }
         let hands = others.into_iter().filter(|h| h.free_ms == 0);
         let hands: Vec<Hand> = hands.chain([me]).collect();
         // A claim is stored, spoken, and heard even if it is lost once.
         let least_ms = SETTLE_PERIODS * ctx.period_ms;
-        let (cells, by_ms) = sharing::relief(&owners, &hands, me.id, self.pace()?, least_ms)?;
-        self.flown_besides(cells, by_ms.min(spendable_ms))
+        let (cells, by_ms) = sharing::relief(&owners, &hands, me.id, pace, least_ms)?;
+        let spendable_ms = u64::from(self.spendable_ms(s.percept));
+        let cells = self.flown_besides(cells, by_ms.min(spendable_ms))?;
+        self.negotiation.begin_take(&cells)
     }
 
-    /// Orphans that it is this peer's turn to take: the nearest, and if it can fly none of them
-    /// with nothing else to fly, of any what it can.
+    /// Orphans that it is this peer's turn to take, and when it would begin with them: the
+    /// nearest, and if it can fly none of them with nothing else to fly, of any what it can.
+    /// It takes only what it would have flown by a time; those who have less to fly are to take
+    /// the rest.
     fn wanted_orphans(
         &self,
         (s, ctx): (&Situation<'_>, &Context<'_>),
         orphans: &CellSet,
         (me, others): (&Hand, &[Hand]),
-        spendable_ms: u64,
-    ) -> Option<Vec<(u16, Direction)>> {
+        by_ms: u64,
+    ) -> Option<(u64, Vec<(u16, Direction)>)> {
         let pace = self.pace()?;
-        let share = self.even_share(ctx);
-        let (_, cells) = sharing::nearest_orphans(&orphans.runs(), me, share, pace)?;
+        let share = self.share_at_once(ctx);
+        let (begins_ms, cells) = sharing::nearest_orphans(&orphans.runs(), me, share, pace)?;
         let first = cells.first()?.0;
-        let sooner = pace.how_many_sooner(me, others, first);
+        let elsewhere = ctx.members.len().saturating_sub(others.len() + 1);
+        let sooner = pace.how_many_sooner(me, (others, elsewhere), first);
         if !self.negotiation.is_my_turn(ctx, first, sooner) {
             return None;
         }
         let idle = self.negotiation.sections.plan().is_empty();
         let any = || self.within_reach(orphans, s.percept).filter(|_| idle);
-        self.flown_besides(cells, spendable_ms).or_else(any)
+        let spendable_ms = u64::from(self.spendable_ms(s.percept));
+        let cells = self
+            .flown_besides(cells, by_ms.min(spendable_ms))
+            .or_else(any)?;
+        Some((begins_ms, cells))
     }
 
     /// The other members, where and when each has nothing to fly any more, as far as is known:
@@ -85,7 +107,10 @@ impl MissionState {
                 let at = at.position();
                 return Some(Hand { id, at, free_ms });
             }
-            let at = s.membership.info(id)?.place?.pose().position();
+            let info = s.membership.info(id)?;
+            let lately = |t| s.now.since_ms(t) < LASTING_INTERVALS * ctx.period_ms;
+            let place = info.place.filter(|_| info.heard.is_some_and(lately))?;
+            let at = place.pose().position();
             Some(Hand { id, at, free_ms: 0 })
         };
         others.filter_map(hand).collect()
@@ -135,10 +160,11 @@ impl MissionState {
         s: &Situation<'_>,
         ctx: &Context<'_>,
     ) -> Option<Vec<PlannedCell>> {
-        if !self.negotiation.begins(ctx) {
+        let is_launched = self.launches.iter().any(|l| l.id == s.me.id);
+        if !self.negotiation.begins(ctx, is_launched) {
             return None;
         }
-        if self.launches.iter().any(|l| l.id == s.me.id) {
+        if is_launched {
             return self.launched(s);
         }
         let executive = self.executive.as_ref()?;
@@ -164,7 +190,7 @@ impl MissionState {
         let mine: Vec<_> = mine.map(|c| (c, Direction::Forward)).collect();
         let way_ms = self.pace()?.way_ms(self.hand(s)?.at, run.first);
         let mine = self.flown_besides(mine, u64::from(self.spendable_ms(s.percept)))?;
-        self.negotiation.begin_first(&mine, way_ms)
+        self.negotiation.begin_nearest(&mine, way_ms)
     }
 
     /// Of cells that are to be flown after the plan those that are flown by then, if any are.
@@ -209,12 +235,15 @@ impl MissionState {
         })
     }
 
-    /// How many cells each has to fly yet, if all have as many.
-    fn even_share(&self, ctx: &Context<'_>) -> u16 {
+    /// How many orphans are taken at once: as many as each has to fly yet if all have as many,
+    /// and no fewer than are flown until others have heard of it.
+    fn share_at_once(&self, ctx: &Context<'_>) -> u16 {
         let covered = self.covered();
         let open = covered.capacity().saturating_sub(covered.count());
         let members = u16::try_from(ctx.members.len()).unwrap_or(u16::MAX);
-        open.div_ceil(members.max(1))
+        let heard_ms = SETTLE_PERIODS * ctx.period_ms;
+        let meanwhile = u16::try_from(heard_ms / CELL_MS).unwrap_or(u16::MAX);
+        open.div_ceil(members.max(1)).max(meanwhile)
     }
 
     /// Of the runs of some cells the part that can be flown with the fuel that is left, from

@@ -84,6 +84,10 @@ pub const LASTING_INTERVALS: u64 = 10;
 const FIRST_SHARERS: u64 = 64;
 const FIRST_BEACONS: u8 = 3;
 
+/// Whoever knows how many were launched counts on all of them until it plans so many beacons:
+/// in the first interval each of them is heard twice.
+const EXPECTING_BEACONS: u8 = 2;
+
 /// A beacon without gossip, in its envelope, at most as long as this but for counters that
 /// ran for hours.
 const BARE_BYTES: usize = 58;
@@ -144,6 +148,8 @@ pub struct Airtime {
     interval: u8,
     /// Full beacons planned so far, as far as it matters.
     planned: u8,
+    /// How many were to be launched, where that is known.
+    fleet: u64,
 }
 
 impl Airtime {
@@ -162,7 +168,14 @@ impl Airtime {
             frame: Filling::default(),
             interval: INTERVAL_LEAST,
             planned: 0,
+            fleet: 0,
         }
+    }
+
+    /// So many were to be launched, this peer included: until its second beacon it takes all of
+    /// them to share the channel with it, and a ground station.
+    pub fn expect(&mut self, fleet: usize) {
+        self.fleet = fleet as u64 + 1;
     }
 
     /// A neighbour's beacon or heartbeat: its interval in quarters of T, and among how many
@@ -224,9 +237,18 @@ impl Airtime {
     }
 
     fn rate_bytes_ps(&self) -> u64 {
-        let begins = self.planned < FIRST_BEACONS;
-        let least = if begins { FIRST_SHARERS } else { 1 };
+        let least = if self.expects() {
+            self.fleet
+        } else if self.fleet == 0 && self.planned < FIRST_BEACONS {
+            FIRST_SHARERS
+        } else {
+            1
+        };
         self.share_bytes_ps(self.sharers().max(least))
+    }
+
+    fn expects(&self) -> bool {
+        self.fleet > 0 && self.planned < EXPECTING_BEACONS
     }
 
     /// An interval that a beacon announces, in milliseconds.
@@ -248,16 +270,21 @@ impl Airtime {
     }
 
     /// A beacon with gossip is due. The interval at most doubles from one to the next: who
-    /// misses the one that announces it is not to be alarmed by the silence.
+    /// misses the one that announces it is not to be alarmed by the silence. The first is no
+    /// next one: it is long enough for all that are expected.
     pub fn plan_beacon(&mut self, now: Time) -> BeaconPlan {
         self.forget(now);
         self.refill(now);
         self.planned = self.planned.saturating_add(1).min(FIRST_BEACONS);
-        let share = self.share_bytes_ps(self.sharers());
+        let (expected, most) = if self.expects() {
+            (self.fleet, INTERVAL_MOST)
+        } else {
+            (1, self.interval.saturating_mul(2).min(INTERVAL_MOST))
+        };
+        let share = self.share_bytes_ps(self.sharers().max(expected));
         let part = (share * self.period_ms * BEACON_PERCENT / 100_000).max(1);
         let bare = (BARE_BYTES + HEARTBEAT_BYTES + 2 * OVERHEAD_BYTES) as u64;
         let least = bare + (LEAST_ENTRIES * ENTRY_BYTES) as u64;
-        let most = INTERVAL_MOST.min(self.interval.saturating_mul(2));
         let interval = u8::try_from((4 * least).div_ceil(part)).unwrap_or(INTERVAL_MOST);
         self.interval = interval.clamp(INTERVAL_LEAST, most);
         // What nothing else has used is there for gossip.
@@ -545,6 +572,22 @@ mod tests {
         assert_eq!(quiet.plan_beacon(Time(3_000)).entries, 7);
         quiet.tokens_millibytes = 700_000;
         assert_eq!(quiet.plan_beacon(Time(3_000)).entries, 12);
+    }
+
+    #[test]
+    fn who_knows_how_many_were_launched_counts_on_them_until_its_second_beacon() {
+        for (fleet, first, later) in [(20, 8, 4), (100, 39, 4), (255, 64, 4)] {
+            let mut air = Airtime::new(64_000, 1000);
+            air.expect(fleet);
+            air.refill(Time(3_000));
+            let bucket = 3_600 / (fleet as i64 + 1) * 3_000;
+            assert_eq!(air.tokens_millibytes, bucket, "{fleet}");
+            assert_eq!(air.plan_beacon(Time(3_000)).interval, first, "{fleet}");
+            assert_eq!(air.rate_bytes_ps(), 3_600 / (fleet as u64 + 1));
+            // Nobody else was heard.
+            assert_eq!(air.plan_beacon(Time(19_000)).interval, later, "{fleet}");
+            assert_eq!(air.rate_bytes_ps(), 3_600);
+        }
     }
 
     #[test]

@@ -8,10 +8,10 @@
 //! | an open round with a member that is gone | at once | the next round |
 //! | an open round without all bids | W, doubling to 4 W0 | the next round |
 //! | a complete round without its division | 2 W | the next round |
-//! | nothing divided yet | 1.5 T of listening | a first section is taken |
+//! | nothing divided yet | 1.5 T of listening, with a roster at once | a first section is taken |
 //! | only first sections, among few | 2 T | a round with loss |
 //! | orphans, and no round helped | 2 T + W0 + rank T/2 | the nearest are taken |
-//! | orphans, among many | 2 T each, and 2 T for each who would be there sooner (W0 at most) | the nearest are taken |
+//! | orphans, among many | 2 T each; 2 T for each who would be there sooner (W0 at most), and no less than the first of them would be there sooner | the nearest are taken |
 //! | less than 2 T to fly, among many | twice a T | the far part of a slower one's plan is taken |
 //! | idle, and a gain was computed from what is held | 10 T steady, 20 T calm | a round without loss |
 //! | idle, an owner makes no progress | its bound | the far half is taken |
@@ -1152,7 +1152,7 @@ mod tests {
         desk.tick();
         // Two more are orphaned later: each cell has its own time.
         let turn =
-            |desk: &mut Desk, cell, sooner| desk.ask(|n, ctx| n.is_my_turn(ctx, cell, sooner));
+            |desk: &mut Desk, cell, sooner| desk.ask(|n, ctx| n.is_my_turn(ctx, cell, (sooner, 0)));
         let ripe =
             |desk: &mut Desk| desk.ask(|n, ctx| n.ripe_orphans(ctx).iter().collect::<Vec<_>>());
         let from = desk.now;
@@ -1199,6 +1199,25 @@ mod tests {
                 of_0,
                 "after {after} ms"
             );
+        }
+    }
+
+    #[test]
+    fn an_orphan_is_left_to_who_is_near_for_as_long_as_the_way_takes_longer() {
+        let mut desk = Desk::new(&[2, 3, 4, 5, 6, 7, 8, 9]);
+        desk.claim(2, 1, 0, 20, 600_000);
+        desk.tick();
+        let from = desk.now;
+        for (after, turns) in [
+            (2 * T, [true, false, false]),
+            (7 * T, [true, false, false]),
+            (11 * T - 1, [true, false, false]),
+            (11 * T, [true, true, false]),
+            (92 * T, [true, true, true]),
+        ] {
+            desk.now = from.plus_ms(after);
+            let turn = |later_ms| desk.ask(|n, ctx| n.is_my_turn(ctx, 22, (0, later_ms)));
+            assert_eq!([0, 9 * T, 90 * T].map(turn), turns, "after {after} ms");
         }
     }
 
@@ -1379,7 +1398,10 @@ mod tests {
 
     #[test]
     fn a_first_section_is_looked_for_once_and_only_where_nothing_was_divided() {
-        let begins = |n: &mut Negotiation, ctx: &Context<'_>| n.begins(ctx);
+        let begins = |n: &mut Negotiation, ctx: &Context<'_>| n.begins(ctx, false);
+        let mut told = Desk::new(&[2]);
+        told.able_since = Some(told.now);
+        assert!(told.ask(|n, ctx| n.begins(ctx, true)), "at once");
         let mut desk = Desk::new(&[2]);
         desk.able_since = Some(desk.now);
         assert_eq!(desk.until(10 * T, begins), Some(3 * T / 2));
@@ -1398,12 +1420,12 @@ mod tests {
     }
 
     #[test]
-    fn of_first_sections_the_one_that_is_nearer_outranks_the_other() {
+    fn of_two_who_take_what_nobody_lists_the_one_that_is_nearer_outranks_the_other() {
         let takes = |way_ms| {
             let mut desk = Desk::new(&[2]);
             let taken = desk
                 .negotiation
-                .begin_first(&[(3, Direction::Forward)], way_ms);
+                .begin_nearest(&[(3, Direction::Forward)], way_ms);
             taken.unwrap()[0].stamp.take
         };
         assert_eq!([0, 3_999, 4_000, 40_000].map(takes), [61, 61, 60, 51]);

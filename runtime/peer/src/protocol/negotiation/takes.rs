@@ -37,10 +37,15 @@ const SOONER_PERIODS: u64 = 2;
 const TAKE_STAGGER: u64 = 2;
 
 impl Negotiation {
-    /// Whether this peer is to take a first section: it listened for a while, and as far as
-    /// it knows nothing was divided yet. Asked once.
-    pub fn begins(&mut self, ctx: &Context<'_>) -> bool {
-        let listened_ms = FIRST_SECTION_QUARTERS * ctx.period_ms / 4;
+    /// Whether this peer is to take a first section: it listened for a while, unless it knows who
+    /// begins where, and as far as it knows nothing was divided yet. Asked once.
+    pub fn begins(&mut self, ctx: &Context<'_>, knows_where: bool) -> bool {
+        let quarters = if knows_where {
+            0
+        } else {
+            FIRST_SECTION_QUARTERS
+        };
+        let listened_ms = quarters * ctx.period_ms / 4;
         let listened = ctx
             .able_since
             .is_some_and(|t| ctx.now.since_ms(t) >= listened_ms);
@@ -80,14 +85,20 @@ impl Negotiation {
         CellSet::of(self.sections.cells(), ripe.map(|(cell, _)| *cell))
     }
 
-    /// Whether an orphan has waited for long enough for so many who would be there sooner.
+    /// Whether an orphan has waited for long enough for so many who would be there sooner, the
+    /// first of them by so much.
     #[must_use]
-    pub fn is_my_turn(&self, ctx: &Context<'_>, orphan: u16, sooner: usize) -> bool {
-        let for_others_ms = sooner as u64 * SOONER_PERIODS * ctx.period_ms;
-        let for_others_ms = for_others_ms.min(ctx.base_wait_ms());
+    pub fn is_my_turn(
+        &self,
+        ctx: &Context<'_>,
+        orphan: u16,
+        (sooner, later_ms): (usize, u64),
+    ) -> bool {
+        let patience_ms = STEADY_PERIODS * ctx.period_ms;
+        let sooner_ms = sooner as u64 * SOONER_PERIODS * ctx.period_ms;
+        let for_others_ms = sooner_ms.min(ctx.base_wait_ms()).max(later_ms);
         let since = self.orphaned_at.get(&orphan);
-        since
-            .is_some_and(|t| ctx.now.since_ms(*t) >= STEADY_PERIODS * ctx.period_ms + for_others_ms)
+        since.is_some_and(|t| ctx.now.since_ms(*t) >= patience_ms + for_others_ms)
     }
 
     /// Whether this peer will have nothing to fly before others have heard what it takes.
@@ -175,14 +186,14 @@ impl Negotiation {
         self.take_pending.then_some(taken)
     }
 
-    /// As [`Negotiation::begin_take`], of the first section, whose begin is so far away: of two
-    /// first sections that overlap, the one that is begun sooner outranks the other.
-    pub fn begin_first(
+    /// As [`Negotiation::begin_take`], of cells that nobody is known to list, the first of which
+    /// is flown so soon: of two who take the same, the one that begins sooner outranks the other.
+    pub fn begin_nearest(
         &mut self,
         cells: &[(u16, Direction)],
-        way_ms: u64,
+        begins_ms: u64,
     ) -> Option<Vec<PlannedCell>> {
-        let away = (way_ms / NEARNESS_STEP_MS).min(NEARNESS_MAX);
+        let away = (begins_ms / NEARNESS_STEP_MS).min(NEARNESS_MAX);
         let nearness = u16::try_from(NEARNESS_MAX - away).unwrap_or(0);
         let mut taken = self.begin_take(cells)?;
         for p in &mut taken {
