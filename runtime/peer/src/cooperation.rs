@@ -33,7 +33,7 @@ use crate::effect::{Effect, Effects, PendingJob, Promise};
 use crate::input::Time;
 use crate::journal::{Durable, Entry};
 use crate::mission::{GeometryError, Library, Mission};
-use crate::mission_state::MissionState;
+use crate::mission_state::{Company, MissionState};
 use crate::offload::{Job, MissionGeometry};
 use crate::output::Report;
 use crate::protocol::division;
@@ -50,6 +50,7 @@ use skein_behaviors::executive::UNREACHABLE_MS;
 use skein_behaviors::{Event, Executive, Goal, Percept};
 use skein_flight::coverage::ring::Direction;
 use skein_flight::coverage::ring::backtracking::{Division, Uav};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Own coverage is made durable every so many cells: a crash costs at most these.
@@ -549,17 +550,28 @@ impl MissionState {
         s.role == Role::Uav && senses && !self.exhausted
     }
 
-    /// The peers that are alive and hear somebody. Whose claim says that it holds all others
-    /// for down hears no round and yields to nobody, so it counts as if it were out of reach
-    /// both ways: each side plans as if the other were dead.
-    fn reachable(&self, membership: &Membership) -> LivePeers {
-        let heard = self.negotiation.sections.heard();
-        let alone = |id, incarnation| {
-            let claim = heard.get(&id).filter(|h| h.incarnation == incarnation);
-            claim.is_some_and(|h| h.claim.alone)
-        };
-        let live = membership.live();
-        live.filter(|(id, life)| !alone(*id, *life)).collect()
+    /// Looks up who is there to share the work, where that changed. Returns whether it did.
+    fn gather(&mut self, s: &Situation<'_>, able: bool) -> bool {
+        let of = Some((s.membership.changes(), s.me, able));
+        let alone = self.negotiation.sections.alone();
+        let company = &self.company;
+        if company.of == of && company.alone == *alone && s.now < company.until {
+            return false;
+        }
+        let alone = alone.clone();
+        let mut live = reachable(s.membership, &alone);
+        let members = self.members(s, &live, able);
+        let unheard = self.expect(s, &mut live);
+        let until = self.expected.values().min().copied();
+        self.company = Arc::new(Company {
+            live,
+            members,
+            unheard,
+            of,
+            alone,
+            until: until.unwrap_or(Time(u64::MAX)),
+        });
+        true
     }
 
     /// Reachable UAVs on this loop whose beacon says able, this peer included if it is.
@@ -581,21 +593,21 @@ impl MissionState {
 
     /// Lets the negotiation look at the time, and carries out what it wants.
     fn negotiate(&mut self, s: &Situation<'_>, able: bool, timers: &mut Timers) -> Effects {
-        let mut live = self.reachable(s.membership);
-        let members = self.members(s, &live, able);
-        let unheard = self.expect(s, &mut live);
+        let before = Arc::clone(&self.company);
+        let live_changed = self.gather(s, able);
+        let company = Arc::clone(&self.company);
         self.able_since = able.then(|| self.able_since.unwrap_or(s.now));
-        let lost = self.live.iter().any(|(id, inc)| live.get(id) != Some(inc));
-        self.live.clone_from(&live);
-        if lost {
+        let is_lost = |(id, life)| company.live.get(id) != Some(life);
+        if live_changed && before.live.iter().any(is_lost) {
             self.negotiation.note_loss();
         }
         let mut ctx = Context {
             now: s.now,
             period_ms: s.membership.interval_ms(),
-            live: &live,
-            members: &members,
-            unheard,
+            live: &company.live,
+            live_changed,
+            members: &company.members,
+            unheard: company.unheard,
             diameter: s.membership.diameter(s.now),
             able_since: self.able_since,
             revision: self.revision(),
@@ -851,6 +863,15 @@ impl MissionState {
         }
         self.goal = Some(goal);
     }
+}
+
+/// The peers that are alive and hear somebody. Whose claim says that it holds all others
+/// for down hears no round and yields to nobody, so it counts as if it were out of reach
+/// both ways: each side plans as if the other were dead.
+fn reachable(membership: &Membership, alone: &BTreeMap<u16, Incarnation>) -> LivePeers {
+    let live = membership.live();
+    live.filter(|(id, life)| alone.get(id) != Some(life))
+        .collect()
 }
 
 /// How fast a UAV gets on along the loop, mm/s.

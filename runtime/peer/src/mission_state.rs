@@ -11,6 +11,7 @@
 //!
 //! What is done with a mission is the cooperation manager's.
 
+use crate::Incarnation;
 use crate::cells::CellSet;
 use crate::config::{Launch, PeerConfig};
 use crate::input::Time;
@@ -65,6 +66,24 @@ impl ClaimsWritten {
     }
 }
 
+/// Who is there to share the work, and what this was computed from.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Company {
+    /// The peers that are alive and hear somebody.
+    pub live: LivePeers,
+    /// Of them those that can plan on this loop, this peer included if it can.
+    pub members: Vec<Member>,
+    /// How many of the living were never heard of.
+    pub unheard: usize,
+    /// As it was numbered by the membership, for this peer, able or not; none where it is to
+    /// be looked up again.
+    pub of: Option<(u64, Member, bool)>,
+    /// The lives in which peers said that they are alone.
+    pub alone: BTreeMap<u16, Incarnation>,
+    /// When somebody is not expected any more.
+    pub until: Time,
+}
+
 /// What a peer has once it holds a mission and its geometry.
 #[derive(Debug)]
 pub(crate) struct MissionState {
@@ -76,8 +95,8 @@ pub(crate) struct MissionState {
     pub replan: bool,
     /// Since when this peer can plan without a break.
     pub able_since: Option<crate::Time>,
-    /// The peers that were alive at the last tick and heard somebody.
-    pub live: LivePeers,
+    /// Who shared the work at the last tick.
+    pub company: Arc<Company>,
     /// Whether all others were believed down at the last tick.
     pub alone: bool,
     pub finished: bool,
@@ -169,7 +188,8 @@ impl MissionState {
 
     /// How many times eight peers are heard of and live, at least one.
     pub fn eights(&self) -> u64 {
-        let heard_of = self.live.len().saturating_sub(self.expected.len());
+        let heard_of = self.company.live.len();
+        let heard_of = heard_of.saturating_sub(self.expected.len());
         (heard_of / MEMBERS_MAX).max(1) as u64
     }
 
@@ -213,7 +233,7 @@ impl MissionState {
             goal: None,
             replan: true,
             able_since: None,
-            live: LivePeers::new(),
+            company: Arc::default(),
             alone: false,
             finished: false,
             astray: false,
@@ -240,7 +260,7 @@ impl MissionState {
     fn keep_on(&mut self, old: Self) {
         self.negotiation = old.negotiation;
         self.able_since = old.able_since;
-        self.live = old.live;
+        self.company = old.company;
         self.alone = old.alone;
         self.claims = old.claims;
         self.unsaved_cells = old.unsaved_cells;

@@ -16,6 +16,7 @@ use crate::wire::message::CellRun;
 use skein_behaviors::Percept;
 use skein_flight::coverage::ring::backtracking::Leg;
 use skein_flight::coverage::ring::{Direction, LoopCell};
+use std::sync::Arc;
 
 /// Turning round and coming onto a stretch is reckoned as so many turn radii: 7π/3.
 const TURN_RADII: u32 = 7;
@@ -125,6 +126,7 @@ impl MissionState {
         let planned = launches::first_division(&self.launches, lp, turn_mm);
         let mut mine = Vec::new();
         self.expected.clear();
+        Arc::make_mut(&mut self.company).of = None;
         for p in planned {
             if p.id == s.me.id {
                 let flown = cells_of(p.run, self.negotiation.sections.cells());

@@ -132,6 +132,8 @@ pub struct Membership {
     last_heard: Option<Time>,
     /// Neighbours whose link is gone, as the transport says.
     gone: BTreeSet<u16>,
+    /// How often it changed who is known, who of them lives, or who can plan on which loop.
+    changes: u64,
     /// As it was last asked for; nothing where what it follows from changed since.
     extent: Cell<Option<Extent>>,
 }
@@ -152,8 +154,31 @@ impl Membership {
             refuted: false,
             last_heard: None,
             gone: BTreeSet::new(),
+            changes: 0,
             extent: Cell::new(None),
         }
+    }
+
+    /// Another number than before where somebody else is known or lives, or can plan on
+    /// another loop.
+    #[must_use]
+    pub fn changes(&self) -> u64 {
+        self.changes
+    }
+
+    /// In which life a peer is believed to be what.
+    fn seat(&self, id: u16) -> Option<(Incarnation, bool, [bool; 2], u64)> {
+        self.known.get(&id).map(|k| {
+            let Info {
+                able,
+                ground_station,
+                loop_hash,
+                ..
+            } = k.info;
+            let lives = k.status != Status::Down;
+            let roles = [able, ground_station];
+            (k.freshest.incarnation, lives, roles, loop_hash)
+        })
     }
 
     /// The transport believes that a neighbour came or went. A hint: it halves the
@@ -300,7 +325,7 @@ impl Membership {
         if author == self.me {
             return changes;
         }
-        let before = self.weight(now, author);
+        let before = (self.weight(now, author), self.seat(author));
         let Some(teller) = self.known.get_mut(&author) else {
             return changes;
         };
@@ -309,7 +334,8 @@ impl Membership {
             teller.info = info_of(beacon, steady_since, now);
             teller.eccentricity = beacon.eccentricity.min(HOPS_MAX);
         }
-        self.weighed(before, self.weight(now, author));
+        self.weighed(before.0, self.weight(now, author));
+        self.changes += u64::from(before.1 != self.seat(author));
         for told in &beacon.gossip {
             if told.id != self.me && told.id != author {
                 self.on_gossip(now, told, (author, beacon), limits, &mut changes);
@@ -385,6 +411,7 @@ impl Membership {
         };
         let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
         let fresher = self.hear(now, heartbeat, limits, changes);
+        let before = self.seat(told.id);
         if let Some(known) = self.known.get_mut(&told.id) {
             known.note_told(now, teller, &heartbeat, limits.interval_ms);
             if known.disputes(told) {
@@ -402,6 +429,7 @@ impl Membership {
                 known.info.loop_hash = said.loop_hash;
             }
         }
+        self.changes += u64::from(before != self.seat(told.id));
     }
 
     /// A heartbeat without anything else: of a life that is known here, or it says nothing.
@@ -433,6 +461,7 @@ impl Membership {
         if let Some(known) = self.known.get_mut(&told.id) {
             known.note_told(now, teller, &heartbeat, limits.interval_ms);
             if fresher {
+                self.changes += u64::from(known.info.able != told.able);
                 known.info.able = told.able;
             }
         }
@@ -446,9 +475,10 @@ impl Membership {
         limits: Patience,
         changes: &mut Vec<Change>,
     ) -> bool {
-        let before = self.weight(now, heard.id);
+        let before = (self.weight(now, heard.id), self.seat(heard.id));
         let fresher = self.merge(now, heard, limits, changes);
-        self.weighed(before, self.weight(now, heard.id));
+        self.weighed(before.0, self.weight(now, heard.id));
+        self.changes += u64::from(before.1 != self.seat(heard.id));
         fresher
     }
 
@@ -642,6 +672,7 @@ impl Membership {
         }
         if !changes.is_empty() {
             self.extent.set(None);
+            self.changes += 1;
         }
         changes
     }

@@ -30,7 +30,7 @@ use crate::wire::limits::{HOPS_MAX, MEMBERS_MAX};
 use crate::wire::message::{Bid, Epoch, Member};
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Time in which an owner at work covers two cells, milliseconds: at the slowest ground
 /// speed that missions are flown at, 8 m/s, two cells of 48 m take 12 s. An owner that
@@ -68,6 +68,8 @@ pub struct Context<'a> {
     pub period_ms: u64,
     /// Peers not believed dead.
     pub live: &'a LivePeers,
+    /// Whether they may be others than at the last tick.
+    pub live_changed: bool,
     /// Planning members, this peer included if it is able; ascending.
     pub members: &'a [Member],
     /// How many more are taken for live because they were to be launched, and not heard of.
@@ -169,6 +171,8 @@ pub struct Negotiation {
     retries: u32,
     bid_wanted: bool,
     dividing: Option<Dividing>,
+    /// Cells that nobody lists, as of the last tick.
+    orphans: CellSet,
     orphan_since: Option<Time>,
     /// Among many, since when each of them is one.
     orphaned_at: BTreeMap<u16, Time>,
@@ -210,6 +214,7 @@ impl Negotiation {
             retries: 0,
             bid_wanted: false,
             dividing: None,
+            orphans: CellSet::new(cells),
             orphan_since: None,
             orphaned_at: BTreeMap::new(),
             loss_seen: false,
@@ -294,16 +299,25 @@ impl Negotiation {
     pub fn tick(&mut self, ctx: &Context<'_>, coverage_loop: &CoverageLoop) -> Vec<Action> {
         self.watch_period(ctx);
         let mut actions = Vec::new();
-        if self.sections.settle(ctx.live) {
+        let heard = self.sections.take_owners();
+        let settled = if self.sections.take_gained() || ctx.live_changed {
+            self.sections.settle(ctx.live)
+        } else {
+            self.sections.settle_with(&heard, ctx.live)
+        };
+        if settled {
             actions.push(Action::Changed);
         }
         if ctx.held_expired && !self.sections.held().is_empty() {
             self.sections.expire_held();
             actions.push(Action::Changed);
         }
-        let orphans = self.sections.orphans(ctx.live);
+        if self.sections.take_listing() || ctx.live_changed {
+            self.orphans = self.sections.orphans(ctx.live);
+        }
+        let orphans = core::mem::take(&mut self.orphans);
         self.watch_orphans(ctx, &orphans);
-        self.watch_progress(ctx);
+        self.watch_progress(ctx, &heard);
         if ctx.able_since.is_some() && !self.sections.complete() {
             self.run_rounds(ctx, &orphans);
             if let Some(take) = self.inherit(ctx, &orphans, coverage_loop)
@@ -312,6 +326,7 @@ impl Negotiation {
                 actions.push(Action::Take(taken));
             }
         }
+        self.orphans = orphans;
         // Who suspects itself of being deaf acts on a loss once it does no more.
         self.loss_seen &= ctx.able_since.is_none();
         if core::mem::take(&mut self.bid_wanted) && ctx.able_since.is_some() {
@@ -569,15 +584,13 @@ impl Negotiation {
     /// Notes how other owners get on; the first ETA heard in an epoch bounds them. A cell far
     /// from all others is long in coming: an owner whose ETA falls at half the pace of the
     /// clock at least is on its way.
-    fn watch_progress(&mut self, ctx: &Context<'_>) {
+    fn watch_progress(&mut self, ctx: &Context<'_>, changed: &BTreeSet<u16>) {
         let cell_bound = TWO_CELLS_MS + 2 * u64::from(ctx.diameter) * ctx.period_ms;
-        let heard: Vec<(u16, Epoch, u32, u32)> = self
-            .sections
-            .heard()
-            .iter()
-            .map(|(id, h)| (*id, h.claim.epoch, h.claim.eta_ms, h.seq))
-            .collect();
-        for (id, epoch, eta_ms, seq) in heard {
+        for id in changed.iter().copied() {
+            let Some(heard) = self.sections.heard().get(&id) else {
+                continue;
+            };
+            let (epoch, eta_ms, seq) = (heard.claim.epoch, heard.claim.eta_ms, heard.seq);
             let left = self.sections.n_left(id);
             let eta_ms = u64::from(eta_ms);
             let slack = eta_ms / 4 + PATIENT_PERIODS * ctx.period_ms + cell_bound;
@@ -675,6 +688,7 @@ mod tests {
                 now: self.now,
                 period_ms: T,
                 live: &self.live,
+                live_changed: true,
                 members: &members,
                 unheard: 0,
                 diameter: 1,

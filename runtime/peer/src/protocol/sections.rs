@@ -27,7 +27,8 @@ use crate::cells::CellSet;
 use crate::wire::limits::{DONE_MAX, HELD_MAX, PLAN_MAX};
 use crate::wire::message::{CellRun, Claim, Epoch, Firmness, ListedRun, Stamp};
 use skein_flight::coverage::ring::Direction;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::hash::{Hash, Hasher};
 
 /// The life in which a UAV is launched, if its disk knows of none.
 pub const FIRST_LIFE: Incarnation = 1;
@@ -51,6 +52,32 @@ pub struct Heard {
     /// What it says.
     pub claim: Claim,
     listed: CellSet,
+    /// How many of the cells that it plans are not covered.
+    left: usize,
+}
+
+/// What changed since it was last looked at. It follows from what happened and not from what
+/// is, so it makes no two sections different.
+#[derive(Clone, Debug, Default)]
+struct News {
+    /// Whose claim is new, or who has less left than before.
+    owners: BTreeSet<u16>,
+    /// Whether this peer lists more than before.
+    gained: bool,
+    /// Whether anything changed of what is covered, listed by anybody, or beyond all.
+    listing: bool,
+}
+
+impl PartialEq for News {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl Eq for News {}
+
+impl Hash for News {
+    fn hash<H: Hasher>(&self, _: &mut H) {}
 }
 
 /// The state that the rules work on.
@@ -65,6 +92,9 @@ pub struct Sections {
     covered: CellSet,
     unassigned: CellSet,
     heard: BTreeMap<u16, Heard>,
+    /// The lives in which peers said with their newest claims that they are alone.
+    alone: BTreeMap<u16, Incarnation>,
+    news: News,
 }
 
 impl Sections {
@@ -81,7 +111,30 @@ impl Sections {
             covered,
             unassigned: CellSet::new(cells),
             heard: BTreeMap::new(),
+            alone: BTreeMap::new(),
+            news: News::default(),
         }
+    }
+
+    /// Those whose claim is new since this was last asked, or who have less left.
+    pub(crate) fn take_owners(&mut self) -> BTreeSet<u16> {
+        core::mem::take(&mut self.news.owners)
+    }
+
+    /// Whether this peer listed more cells since this was last asked.
+    pub(crate) fn take_gained(&mut self) -> bool {
+        core::mem::take(&mut self.news.gained)
+    }
+
+    /// Whether orphans may be others since this was last asked, if the same peers are alive.
+    pub(crate) fn take_listing(&mut self) -> bool {
+        core::mem::take(&mut self.news.listing)
+    }
+
+    /// The lives in which peers said with their newest claims that they are alone.
+    #[must_use]
+    pub fn alone(&self) -> &BTreeMap<u16, Incarnation> {
+        &self.alone
     }
 
     /// Number of cells of the loop.
@@ -135,10 +188,19 @@ impl Sections {
     /// Adds covered cells; they leave the plan, and are beyond nobody's endurance. Returns
     /// whether any was new.
     pub fn cover(&mut self, covered: &CellSet) -> bool {
+        let mut fresh = covered.clone();
+        fresh.subtract(&self.covered);
         if !self.covered.union_with(covered) {
             return false;
         }
+        self.news.listing = true;
         let covered = &self.covered;
+        for (author, h) in &mut self.heard {
+            if h.listed.intersects(&fresh) {
+                h.left = n_open(&h.claim, covered);
+                self.news.owners.insert(*author);
+            }
+        }
         let done = &mut self.done;
         self.plan.retain(|p| {
             let open = !covered.contains(p.cell);
@@ -169,15 +231,21 @@ impl Sections {
                 listed.insert(c);
             }
         }
-        self.heard.insert(
-            author,
-            Heard {
-                incarnation,
-                seq,
-                claim,
-                listed,
-            },
-        );
+        if claim.alone {
+            self.alone.insert(author, incarnation);
+        } else {
+            self.alone.remove(&author);
+        }
+        self.news.listing = true;
+        self.news.owners.insert(author);
+        let heard = Heard {
+            incarnation,
+            seq,
+            left: n_open(&claim, &self.covered),
+            claim,
+            listed,
+        };
+        self.heard.insert(author, heard);
         true
     }
 
@@ -212,25 +280,40 @@ impl Sections {
     /// Nothing is presumed any more.
     pub fn forget_presumed(&mut self) {
         self.heard.retain(|_, h| h.seq != PRESUMED_SEQ);
+        self.news.listing = true;
     }
 
     /// Rules *yield* and *release*, against every live claim. Returns whether
     /// this peer's own claim changed.
     pub fn settle(&mut self, live: &LivePeers) -> bool {
+        let all: BTreeSet<u16> = self.heard.keys().copied().collect();
+        self.settle_with(&all, live)
+    }
+
+    /// The same against the live claims of some.
+    pub(crate) fn settle_with(&mut self, authors: &BTreeSet<u16>, live: &LivePeers) -> bool {
         let planned = self.plan.iter().map(|p| p.cell);
         let mine = CellSet::of(self.cells, planned.chain(self.held.keys().copied()));
-        let theirs = self.planned_by_others(live, &mine);
+        let heard = authors.iter().filter_map(|id| self.heard.get_key_value(id));
+        let theirs = self.planned_by(heard, live, &mine);
         let before = (self.plan.len(), self.held.len());
         let outbid = |cell: u16, mine: Stamp| theirs.get(&cell).is_some_and(|s| *s > mine);
         self.plan.retain(|p| !outbid(p.cell, p.stamp));
         self.held.retain(|c, s| !outbid(*c, *s));
-        before != (self.plan.len(), self.held.len())
+        let changed = before != (self.plan.len(), self.held.len());
+        self.news.listing |= changed;
+        changed
     }
 
-    /// Of some cells those that live claims of others plan, each with the highest stamp.
-    fn planned_by_others(&self, live: &LivePeers, cells: &CellSet) -> BTreeMap<u16, Stamp> {
+    /// Of some cells those that live claims of some others plan, each with the highest stamp.
+    fn planned_by<'a>(
+        &self,
+        heard: impl Iterator<Item = (&'a u16, &'a Heard)>,
+        live: &LivePeers,
+        cells: &CellSet,
+    ) -> BTreeMap<u16, Stamp> {
         let mut theirs: BTreeMap<u16, Stamp> = BTreeMap::new();
-        for (author, h) in &self.heard {
+        for (author, h) in heard {
             // Most claims list none of a few cells.
             if live.get(author) != Some(&h.incarnation) || !h.listed.intersects(cells) {
                 continue;
@@ -281,7 +364,7 @@ impl Sections {
     /// The highest stamp at which a live claim, this peer's own included, plans each cell.
     #[must_use]
     pub fn highest_stamps(&self, live: &LivePeers) -> BTreeMap<u16, Stamp> {
-        let mut highest = self.planned_by_others(live, &CellSet::full(self.cells));
+        let mut highest = self.planned_by(self.heard.iter(), live, &CellSet::full(self.cells));
         for p in &self.plan {
             let s = highest.entry(p.cell).or_default();
             *s = (*s).max(p.stamp);
@@ -304,12 +387,7 @@ impl Sections {
     /// How many cells [`Sections::plan_of`] has.
     #[must_use]
     pub fn n_left(&self, author: u16) -> usize {
-        let plan = self.heard.get(&author).map(|h| &h.claim.plan[..]);
-        let cells = plan.unwrap_or_default().iter();
-        cells
-            .flat_map(|l| cells_of(l.run, self.cells))
-            .filter(|c| !self.covered.contains(*c))
-            .count()
+        self.heard.get(&author).map_or(0, |h| h.left)
     }
 
     /// Rule *adopt*: what the plan becomes with `commits`, then `section`, in order of
@@ -381,6 +459,7 @@ impl Sections {
             .collect();
         self.epoch = epoch;
         self.done = CellSet::new(self.cells);
+        (self.news.gained, self.news.listing) = (true, true);
         self.trim();
         self.check();
         true
@@ -449,6 +528,7 @@ impl Sections {
                 self.unassigned.remove(p.cell);
             }
         }
+        (self.news.gained, self.news.listing) = (true, true);
         self.trim();
         self.check();
         self.plan.len().saturating_sub(before)
@@ -488,16 +568,19 @@ impl Sections {
     /// Rule *expire*: nobody took over what was given away; it becomes orphaned.
     pub fn expire_held(&mut self) {
         self.held.clear();
+        self.news.listing = true;
     }
 
     /// Gives up planned cells that cannot be flown; they become orphans.
     pub fn give_up(&mut self, cells: &[u16]) {
         self.plan.retain(|p| !cells.contains(&p.cell));
+        self.news.listing = true;
     }
 
     /// Keeps only the first `count` planned cells; the others become orphans.
     pub fn keep(&mut self, count: usize) {
         self.plan.truncate(count);
+        self.news.listing = true;
     }
 
     /// Notes which cells are beyond anybody's endurance.
@@ -507,6 +590,7 @@ impl Sections {
             self.unassigned.insert(*c);
         }
         self.unassigned.subtract(&self.covered);
+        self.news.listing = true;
     }
 
     /// The division that an earlier life adopted: what is taken from now on counts as
@@ -519,6 +603,7 @@ impl Sections {
     pub fn reset_ownership(&mut self) {
         self.plan.clear();
         self.held.clear();
+        self.news.listing = true;
     }
 
     /// The claim to be published.
@@ -587,6 +672,13 @@ impl Sections {
             self.held.remove(&p.cell);
         }
     }
+}
+
+/// How many cells of a claim's plan are not covered.
+fn n_open(claim: &Claim, covered: &CellSet) -> usize {
+    let cells = claim.plan.iter();
+    let cells = cells.flat_map(|l| cells_of(l.run, covered.capacity()));
+    cells.filter(|c| !covered.contains(*c)).count()
 }
 
 #[cfg(test)]
