@@ -271,7 +271,7 @@ class Trial:
     def programs(self, numbers):
         made, steps = {}, [("test", "--no-run", "--lib", "-p", p) for p in self.wanted(numbers)]
         if self.asked.kept:
-            steps.append(("test", "--no-run", "--test", "seeds", "-p", "skein-tests"))
+            steps.append(("test", "--no-run", "--test", "swarm", "-p", "skein-tests"))
         if self.asked.storms:
             steps.append(("build", "-p", "skein-scenario", "--example", "storms"))
         for step in steps:
@@ -297,7 +297,7 @@ class Trial:
             if wrong:
                 return wrong
         if self.asked.kept:
-            return run([made["seeds"]], number, tree / "tests", 1800)[1]
+            return run([made["swarm"], "seeds::"], number, tree / "tests", 1800)[1]
         return None
 
     def noticed(self, number, made):

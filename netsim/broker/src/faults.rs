@@ -129,8 +129,9 @@ impl Injector<'_> {
             | Fault::ClockDrift { .. }
             | Fault::ClockJump { .. }
             | Fault::ShortFuel { .. }
-            | Fault::SpoiltRecord { .. } => Err(
-                "disks, slow computers, clocks, batteries and records go wrong in simulated runs only: `skein sim`"
+            | Fault::SpoiltRecord { .. }
+            | Fault::Twin { .. } => Err(
+                "disks, slow computers, clocks, batteries, records and ids go wrong in simulated runs only: `skein sim`"
                     .to_owned(),
             ),
         }

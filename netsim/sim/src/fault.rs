@@ -139,6 +139,13 @@ pub enum Fault {
         /// Which peer.
         peer: u16,
     },
+    /// A second UAV is switched on at the launch point of this one, whose computer was
+    /// configured as that of this one: two processes speak under one id. A partition puts it
+    /// on one of its sides, or aside.
+    Twin {
+        /// Whose id it has.
+        peer: u16,
+    },
     /// The share of transmissions lost on every link, in thousandths.
     Loss {
         /// Thousandths.
@@ -164,7 +171,8 @@ impl Fault {
             | Self::ClockDrift { peer, .. }
             | Self::ClockJump { peer, .. }
             | Self::ShortFuel { peer, .. }
-            | Self::SpoiltRecord { peer } => vec![*peer],
+            | Self::SpoiltRecord { peer }
+            | Self::Twin { peer } => vec![*peer],
             Self::Cut { a, b, .. } => vec![*a, *b],
             Self::Partition { groups } => groups.concat(),
             Self::Heal
@@ -232,6 +240,7 @@ impl fmt::Display for Fault {
                 write!(f, "the battery of peer {peer} lasts {lasts_ms} ms more")
             }
             Self::SpoiltRecord { peer } => write!(f, "peer {peer} is sent a spoilt record"),
+            Self::Twin { peer } => write!(f, "a second UAV is switched on as peer {peer}"),
             Self::Loss { permille } => {
                 let percent = f64::from(*permille) / 10.0;
                 write!(f, "{percent:.1} % of transmissions are lost")

@@ -131,7 +131,8 @@ impl<'a> Baseline<'a> {
             | Fault::SlowComputer { .. }
             | Fault::ClockDrift { .. }
             | Fault::ClockJump { .. }
-            | Fault::SpoiltRecord { .. } => {}
+            | Fault::SpoiltRecord { .. }
+            | Fault::Twin { .. } => {}
         }
     }
 

@@ -2,10 +2,12 @@
 //! geometry of its mission.
 
 use crate::account::Setting;
+use crate::fault::{Fault, TimedFault};
 use crate::geometry_cache::GeometryCache;
 use crate::spec::{Spec, UavSpec};
 use crate::world::Site;
 use skein_peer::offload::MissionGeometry;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// A scenario, ready to run with any seed and any faults. Cheap to clone and to share.
@@ -63,6 +65,33 @@ impl Prepared {
             spec: Arc::new(spec),
             ..self.clone()
         }
+    }
+
+    /// The same with a body for each twin that these faults switch on: like the UAV as which
+    /// it was configured, under a number that is free.
+    #[must_use]
+    pub fn with_twins(&self, faults: &[TimedFault]) -> Self {
+        let mut uavs = self.spec.uavs.clone();
+        let mut taken: BTreeSet<u16> = uavs.iter().map(|u| u.id).collect();
+        taken.extend(self.spec.ground.iter().map(|g| g.id));
+        for fault in faults {
+            let Fault::Twin { peer } = fault.fault else {
+                continue;
+            };
+            let like = uavs.iter().find(|u| u.id == peer && u.twin_of.is_none());
+            let free = (1..=u16::MAX).find(|id| !taken.contains(id));
+            if let (Some(like), Some(id)) = (like.cloned(), free) {
+                taken.insert(id);
+                uavs.push(UavSpec {
+                    id,
+                    twin_of: Some(peer),
+                    takeoff_ms: 0,
+                    ..like
+                });
+            }
+        }
+        uavs.sort_by_key(|u| u.id);
+        self.with_uavs(uavs)
     }
 
     /// What the account of a run with this seed must know.

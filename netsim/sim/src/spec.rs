@@ -9,6 +9,7 @@ use skein_geometry::frame::{Point, Pose};
 use skein_peer::Mission;
 use skein_peer::config::Launch;
 use skein_peer::mission::mm;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Everything a run needs, besides a seed.
@@ -65,7 +66,15 @@ impl Spec {
             takeoff_ms: u.takeoff_ms,
             speed_mmps: mm(u.airframe.cruise_mps).unsigned_abs(),
         };
-        self.uavs.iter().map(launch).collect()
+        let own = self.uavs.iter().filter(|u| u.twin_of.is_none());
+        own.map(launch).collect()
+    }
+
+    /// The numbers of twins, each with the id under which its peer speaks.
+    #[must_use]
+    pub fn twins(&self) -> BTreeMap<u16, u16> {
+        let twin = |u: &UavSpec| Some((u.id, u.twin_of?));
+        self.uavs.iter().filter_map(twin).collect()
     }
 }
 
@@ -92,6 +101,9 @@ pub struct UavSpec {
     pub takeoff_ms: u32,
     /// Its height slot above the origin, metres.
     pub height_m: f64,
+    /// As which other one it was configured by mistake: its peer speaks under that id. It is
+    /// switched on by a fault, and its number is that of its airframe and radio.
+    pub twin_of: Option<u16>,
 }
 
 /// The ground station.

@@ -122,6 +122,7 @@ pub const RARE: &[Kind] = &[
     },
     Kind::new("mission", can_be_given, missions),
     Kind::new("mission-elsewhere", can_be_elsewhere, missions_elsewhere),
+    Kind::new("twin", |s| s.uavs.len() > 1, twin),
 ];
 
 /// Each of the rare kinds strikes in one run of so many.
@@ -401,6 +402,15 @@ fn short_fuel(d: &mut Draw<'_>) {
         let lasts_ms = reserve_ms + d.s.between(d.end_ms / 3, d.end_ms + d.end_ms / 3);
         let lasts_ms = u32::try_from(lasts_ms).unwrap_or(u32::MAX);
         d.push(0, Fault::ShortFuel { peer, lasts_ms });
+    }
+}
+
+/// A second UAV is switched on with the id of one.
+fn twin(d: &mut Draw<'_>) {
+    let (from_ms, _) = d.span_ms(0);
+    let ids: Vec<u16> = d.spec.uavs.iter().map(|u| u.id).collect();
+    if let Some(&peer) = d.s.shuffled(&ids).first() {
+        d.push(from_ms, Fault::Twin { peer });
     }
 }
 
@@ -738,6 +748,7 @@ mod tests {
                         Fault::Restart { peer, .. } => count("down", peer, -1),
                         Fault::Heal => assert!(d.out[0].at_ms < f.at_ms),
                         Fault::SpoiltRecord { .. } => {}
+                        Fault::Twin { peer } => assert!((1..=8).contains(&peer)),
                         Fault::Revise {
                             ref area,
                             ref zones,

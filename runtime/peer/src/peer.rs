@@ -278,7 +278,8 @@ impl Peer {
         let never_said = told.max_seq > self.outbound.seq();
         let sent = (self.outbound.heartbeat(), never_said);
         let now = (self.now, &self.timers);
-        let effects = self.life.hear_of_heartbeat(now, heartbeat, age_ms, sent);
+        let ages_ms = (age_ms, self.membership.k1_ms(self.now));
+        let effects = self.life.hear_of_heartbeat(now, heartbeat, ages_ms, sent);
         self.carry_out(effects);
     }
 

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Kinds of faults and the fields that each has besides `at_s` and `kind`.
-const KINDS: [(&str, &[&str]); 20] = [
+const KINDS: [(&str, &[&str]); 21] = [
     ("kill", &["peer", "for_s", "fresh_disk"]),
     ("kill-computer", &["peer", "for_s", "fresh_disk"]),
     ("terminate", &["peer", "for_s", "fresh_disk"]),
@@ -31,6 +31,7 @@ const KINDS: [(&str, &[&str]); 20] = [
     ("clock-jump", &["peer", "ahead_s"]),
     ("short-fuel", &["peer", "lasts_s"]),
     ("spoilt-record", &["peer"]),
+    ("twin", &["peer"]),
 ];
 
 /// Who there is, until when, and what a loss goes back to.
@@ -257,6 +258,7 @@ fn one(item: &Node<'_>, known: &Known<'_>) -> Result<(TimedFault, Option<TimedFa
             lasts_ms: delay_ms(f.need("lasts_s", "300")?)?,
         },
         "spoilt-record" => Fault::SpoiltRecord { peer: peer()? },
+        "twin" => Fault::Twin { peer: peer()? },
         _ => Fault::Heal,
     };
     let end = match f.get("for_s") {

@@ -148,12 +148,12 @@ impl CadenceCheck {
     pub fn on_beacon_heard(
         &mut self,
         (now_ms, arrived_ms): (u64, u64),
-        (by, life): (u16, Incarnation),
+        (by, speaks_as, life): (u16, u16, Incarnation),
         (author, incarnation): (u16, Incarnation),
         beacon: &Beacon,
     ) {
         self.on_heartbeat_heard(arrived_ms, by, (author, incarnation), beacon.interval);
-        let of_me = beacon.gossip.iter().filter(|g| g.id == by);
+        let of_me = beacon.gossip.iter().filter(|g| g.id == speaks_as);
         for told in of_me.filter(|g| g.incarnation == life) {
             if told.suspected_ds.is_some() {
                 self.accused.start(by, now_ms);
@@ -310,7 +310,7 @@ mod tests {
             (Status::Alive, 1, false),
         ] {
             let (mut c, mut found) = check();
-            c.on_beacon_heard((50_000, 50_000), (1, 1), (2, 4), &beacon(None));
+            c.on_beacon_heard((50_000, 50_000), (1, 1, 1), (2, 4), &beacon(None));
             let now_ms = 50_000 + after_ms;
             let healthy = Handicaps::default();
             c.on_belief(now_ms, (1, 2), (3, Status::Down), (1, &healthy), &mut found);
@@ -329,7 +329,7 @@ mod tests {
         for answers in [false, true] {
             let (mut c, mut found) = check();
             let mut story = Story::new(0);
-            c.on_beacon_heard((10_100, 10_100), (1, 1), (2, 1), &beacon(Some(1)));
+            c.on_beacon_heard((10_100, 10_100), (1, 1, 1), (2, 1), &beacon(Some(1)));
             if answers {
                 c.on_beacon_spoken(1, 4);
             }

@@ -8,6 +8,7 @@ use super::membership::Membership;
 use super::progress::ProgressCheck;
 use super::record::{RecordCheck, Said};
 use super::rules::Rules;
+use super::twins::TwinCheck;
 use super::{Bounds, Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::fault::Fault;
 use crate::spec::Spec;
@@ -51,6 +52,7 @@ pub struct Checker {
     pub rules: Rules,
     cover: CoverCheck,
     progress: ProgressCheck,
+    twins: TwinCheck,
     graph: Graph,
     stability: Stability,
     handicaps: Handicaps,
@@ -80,6 +82,7 @@ impl Checker {
             rules: Rules::new(spec),
             cover: CoverCheck::default(),
             progress: ProgressCheck::default(),
+            twins: TwinCheck::new(spec.twins()),
             graph: Graph::default(),
             stability: Stability::default(),
             handicaps: Handicaps::default(),
@@ -100,6 +103,7 @@ impl Checker {
     /// A process starts. `again` unless it is the first time; `fresh` without its disk.
     pub fn on_boot(&mut self, now_ms: u64, id: u16, again: bool, fresh: bool) {
         self.members.on_running(id, true);
+        self.twins.on_voice(id);
         self.cover.on_boot(id);
         self.record.on_boot(id);
         self.rules.on_boot(now_ms, id);
@@ -122,6 +126,20 @@ impl Checker {
         self.progress = ProgressCheck::default();
     }
 
+    /// A process falls silent since another one speaks under its id: for all others it is
+    /// gone, as one that stands still.
+    pub fn on_silenced(&mut self, now_ms: u64, id: u16) {
+        self.on_silent(now_ms, id, false, false);
+        self.twins.on_silenced(id);
+    }
+
+    /// A process begins a life after it was silent.
+    pub fn on_voice(&mut self, id: u16) {
+        self.on_resume(id);
+        self.rules.on_silent(id, false);
+        self.twins.on_voice(id);
+    }
+
     /// A process goes on after standing still.
     pub fn on_resume(&mut self, id: u16) {
         self.members.on_running(id, false);
@@ -136,6 +154,7 @@ impl Checker {
         self.members.on_silent(now_ms, id, death, &self.bounds);
         if death {
             self.listing.on_death(id);
+            self.twins.on_voice(id);
         }
         if death && second_hand {
             self.reached.takeover_of_takeover += 1;
@@ -202,6 +221,9 @@ impl Checker {
                 incarnation,
                 status,
             } => {
+                for other in self.twins.others(peer.0) {
+                    self.members.on_another_meant(now_ms, id, other);
+                }
                 let joined_ms = self.stability.joined_since_ms(id, peer.0);
                 self.members.on_belief(
                     now_ms,
@@ -266,6 +288,7 @@ impl Checker {
 
     /// A peer puts bytes on the air, its own or another's.
     pub fn on_transmission(&mut self, now_ms: u64, id: u16, bytes: usize) {
+        self.twins.on_transmission(now_ms, id, &mut self.found);
         self.rules
             .on_transmission(now_ms, id, bytes, &self.handicaps, &mut self.found);
     }
@@ -300,7 +323,11 @@ impl Checker {
             self.listing
                 .on_heard((id, r.author), (r.incarnation, r.seq), claim);
         }
-        self.rules.on_received(at_ms, (id, life), said);
+        if self.twins.is_silent(id) {
+            self.rules.on_held(id, said);
+        } else {
+            self.rules.on_received(at_ms, (id, life), said);
+        }
     }
 
     /// A UAV flew into a zone.
@@ -325,12 +352,13 @@ impl Checker {
         &self.graph
     }
 
-    /// Judges everybody's beliefs, once a beacon period.
+    /// Judges everybody's beliefs, once a beacon period: of those who may speak, and of those
+    /// who are silent since a twin speaks.
     pub fn on_snapshot(
         &mut self,
         now_ms: u64,
         loss_permille: u16,
-        peers: &[PeerSnapshot],
+        (peers, silent): (&[PeerSnapshot], &[PeerSnapshot]),
         covered: &[bool],
         loop_hash: u64,
     ) {
@@ -361,6 +389,10 @@ impl Checker {
         self.cover.on_snapshot(&snapshot, &mut self.found);
         self.progress
             .on_snapshot(&snapshot, &self.members, &mut self.found);
+        self.twins.on_snapshot(&snapshot, silent, &mut self.found);
+        let steered = self.twins.steered(peers, silent);
+        self.rules
+            .on_silent_home(&snapshot, &steered, &mut self.found);
     }
 
     /// An interval counts for twenty of its own: what was announced is told for a while, and

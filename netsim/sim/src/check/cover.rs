@@ -148,6 +148,7 @@ mod tests {
             .iter()
             .map(|(id, covered)| PeerSnapshot {
                 id: *id,
+                speaks_as: *id,
                 uav: true,
                 since_ms: 0,
                 at: None,

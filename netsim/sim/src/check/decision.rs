@@ -45,6 +45,8 @@ pub struct Mover {
 #[derive(Clone, Debug, Default)]
 pub struct DecisionCheck {
     period_ms: u64,
+    /// The id of each twin, by number.
+    twins: BTreeMap<u16, u16>,
     grounds: BTreeMap<u64, Arc<MissionGeometry>>,
     rounds: BTreeMap<RoundOrder, OpenRound>,
     divisions: BTreeMap<Epoch, Option<Divided>>,
@@ -85,11 +87,12 @@ struct Adopted {
 }
 
 impl DecisionCheck {
-    /// The checks at beacon period T.
+    /// The checks at beacon period T; of twins by number, each with its id.
     #[must_use]
-    pub fn new(period_ms: u64) -> Self {
+    pub fn new(period_ms: u64, twins: BTreeMap<u16, u16>) -> Self {
         Self {
             period_ms,
+            twins,
             ..Self::default()
         }
     }
@@ -144,12 +147,17 @@ impl DecisionCheck {
         for text in self.lies(now_ms, id, bid, (view, mover), handicaps) {
             found.broken("bid", now_ms, Some(id), || text);
         }
-        let order = order_of(&bid.round);
+        let (order, member) = (order_of(&bid.round), self.member(id));
         let open = self.rounds.entry(order).or_insert_with(|| OpenRound {
             round: bid.round.clone(),
             bids: BTreeMap::new(),
         });
-        open.bids.insert(id, bid.clone());
+        open.bids.insert(member, bid.clone());
+    }
+
+    /// As whom a peer takes part in rounds.
+    fn member(&self, id: u16) -> u16 {
+        self.twins.get(&id).copied().unwrap_or(id)
     }
 
     /// How a bid differs from what its author did and is.
@@ -306,6 +314,7 @@ impl DecisionCheck {
             return;
         };
         let open = open.clone();
+        let id = self.member(id);
         self.judge_section(now_ms, id, (claim, &open), seen, found);
         self.judge_gain(now_ms, id, &open, epoch, found);
         self.judge_shares(now_ms, id, &open, epoch, found);
@@ -555,7 +564,7 @@ mod tests {
                 cells_since: 0,
                 idle: true,
             };
-            let mut check = DecisionCheck::new(1000);
+            let mut check = DecisionCheck::new(1000, BTreeMap::new());
             check.on_loop(&geometry);
             Self {
                 check,

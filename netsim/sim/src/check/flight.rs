@@ -1,5 +1,5 @@
 //! What is flown against what is wanted: who holds or waits stays where it is (`hold`);
-//! who is finished, ordered home or out of fuel flies home (`home`).
+//! who is finished, ordered home, out of fuel or silent for a twin flies home (`home`).
 
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use crate::world::flat::{self, segment_ring_m};
@@ -110,8 +110,10 @@ impl FlightCheck {
             };
             let returns = m.view.order == Order::ReturnToBase;
             let spent = m.view.loop_hash != 0 && m.view.spendable_ms == 0 && !m.view.able;
-            let goes = m.view.order != Order::Hold && (returns || m.view.finished || spent);
-            match base(m.view.revision).filter(|_| goes && m.view.speaks) {
+            let silent = m.view.is_silent;
+            let goes = returns || m.view.finished || spent || silent;
+            let goes = goes && m.view.order != Order::Hold;
+            match base(m.view.revision).filter(|_| goes && (m.view.speaks || silent)) {
                 Some(base) => self.judge_homing(snapshot.now_ms, m, (at, base), flyer, found),
                 None => {
                     self.homing.remove(&m.id);
@@ -254,10 +256,11 @@ mod tests {
 
     #[test]
     fn whoever_is_to_fly_home_and_does_not_is_found() {
-        let wanted: [fn(&mut Beliefs); 3] = [
+        let wanted: [fn(&mut Beliefs); 4] = [
             |b| b.finished = true,
             |b| b.order = Order::ReturnToBase,
             |b| (b.spendable_ms, b.able) = (0, false),
+            |b| (b.is_silent, b.speaks) = (true, false),
         ];
         let arrives = |t: u64| 600.0 - 10.0 * f64::from(u8::try_from(t.min(55)).unwrap());
         for change in wanted {

@@ -349,6 +349,7 @@ mod tests {
                 .iter()
                 .map(|(id, plan)| PeerSnapshot {
                     id: *id,
+                    speaks_as: *id,
                     uav: true,
                     since_ms: 0,
                     at: None,

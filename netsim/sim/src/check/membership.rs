@@ -72,6 +72,15 @@ impl Membership {
         self.late.retain(|(o, _)| *o != id);
     }
 
+    /// One peer means another one by the id of this one: for it this one is gone.
+    pub fn on_another_meant(&mut self, now_ms: u64, observer: u16, subject: u16) {
+        let known = self.beliefs.remove(&(observer, subject)).is_some();
+        self.late.stop((observer, subject));
+        if known && self.silences.contains_key(&subject) {
+            self.detected.entry(subject).or_insert(now_ms);
+        }
+    }
+
     /// The present incarnation of a peer, 0 before its first boot.
     #[must_use]
     pub fn life(&self, id: u16) -> u32 {
@@ -217,7 +226,7 @@ impl Membership {
     fn look_for_disagreement(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let bound_ms = snapshot.bounds.detection_ms();
         for m in snapshot.peers {
-            for x in snapshot.peers.iter().filter(|x| x.id != m.id) {
+            for x in snapshot.peers.iter().filter(|x| x.speaks_as != m.speaks_as) {
                 let key = (m.id, x.id);
                 let since_ms = self.countable_since_ms(snapshot, m.id, x.id);
                 let agreed = match (since_ms, m.view.peers.get(&skein_peer::PeerId(x.id))) {
@@ -301,6 +310,7 @@ mod tests {
             .iter()
             .map(|(id, believes)| PeerSnapshot {
                 id: *id,
+                speaks_as: *id,
                 uav: true,
                 since_ms: 0,
                 at: None,

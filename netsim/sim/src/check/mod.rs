@@ -49,6 +49,7 @@ pub mod spoken;
 pub mod spread;
 #[cfg(test)]
 mod testing;
+pub mod twins;
 
 pub use bounds::{Bounds, Grade};
 pub use checker::{Checker, Reached};

@@ -140,10 +140,10 @@ impl PatienceCheck {
     }
 
     /// A running peer receives a bid.
-    pub fn on_bid_heard(&mut self, now_ms: u64, by: u16, bid: &Bid) {
+    pub fn on_bid_heard(&mut self, now_ms: u64, (by, speaks_as): (u16, u16), bid: &Bid) {
         let order = order_of(&bid.round);
         let part = self.parts.entry(by).or_default();
-        let named = bid.round.members.iter().any(|m| m.id == by);
+        let named = bid.round.members.iter().any(|m| m.id == speaks_as);
         if named && part.joined.as_ref().is_none_or(|j| j.order < order) {
             part.heard = Some((order, now_ms));
         }

@@ -226,6 +226,7 @@ mod tests {
         for t in 0..seconds {
             let peers = [PeerSnapshot {
                 id: 1,
+                speaks_as: 1,
                 uav: true,
                 since_ms: 0,
                 at: None,

@@ -35,6 +35,8 @@ pub struct Rules {
     spoken: SpokenCheck,
     spread: SpreadCheck,
     loops: BTreeMap<u16, u64>,
+    /// The ids of twins, by number.
+    twins: BTreeMap<u16, u16>,
     /// Where missions end, by the first revision that says so.
     bases: BTreeMap<u32, Point>,
 }
@@ -55,11 +57,12 @@ impl Rules {
             flyers,
             airtime: AirtimeCheck::new(spec.radio.rate_bps, period_ms),
             cadence: CadenceCheck::new(period_ms),
-            decision: DecisionCheck::new(period_ms),
+            decision: DecisionCheck::new(period_ms, spec.twins()),
             patience: PatienceCheck::new(period_ms),
             spoken: SpokenCheck::default(),
-            spread: SpreadCheck::default(),
+            spread: SpreadCheck::new(spec.twins()),
             loops: BTreeMap::new(),
+            twins: spec.twins(),
             bases: BTreeMap::new(),
         };
         rules.on_mission(&spec.mission);
@@ -205,6 +208,11 @@ impl Rules {
         }
     }
 
+    /// A peer hears a record.
+    pub fn on_held(&mut self, id: u16, said: &Said) {
+        self.spread.on_held(id, &said.record);
+    }
+
     /// A running peer of this life receives a record: now, of one that arrived then.
     pub fn on_received(
         &mut self,
@@ -212,11 +220,13 @@ impl Rules {
         (id, life): (u16, Incarnation),
         said: &Said,
     ) {
-        self.spread.on_held(id, &said.record);
+        self.on_held(id, said);
+        let speaks_as = self.twins.get(&id).copied().unwrap_or(id);
         if let Body::Beacon(beacon) = &said.body {
             let author = (said.record.author, said.record.incarnation);
+            let by = (id, speaks_as, life);
             self.cadence
-                .on_beacon_heard((now_ms, arrived_ms), (id, life), author, beacon);
+                .on_beacon_heard((now_ms, arrived_ms), by, author, beacon);
         }
         if let Body::Heartbeat(heartbeat) = &said.body {
             let author = (said.record.author, said.record.incarnation);
@@ -224,7 +234,7 @@ impl Rules {
                 .on_heartbeat_heard(arrived_ms, id, author, heartbeat.interval);
         }
         if let Body::Bid(bid) = &said.body {
-            self.patience.on_bid_heard(now_ms, id, bid);
+            self.patience.on_bid_heard(now_ms, (id, speaks_as), bid);
         }
     }
 
@@ -273,6 +283,20 @@ impl Rules {
         let bases = &self.bases;
         let base = |revision| bases.range(..=revision).next_back().map(|(_, b)| *b);
         self.flight.on_snapshot(snapshot, base, found);
+    }
+
+    /// Judges how these fly home, who are silent.
+    pub fn on_silent_home(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        silent: &[PeerSnapshot],
+        found: &mut Findings,
+    ) {
+        let of_silent = Snapshot {
+            peers: silent,
+            ..*snapshot
+        };
+        self.on_way_home(&of_silent, found);
     }
 
     /// Whether a UAV at this place is at a base that some revision gave.

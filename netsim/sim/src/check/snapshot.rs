@@ -9,8 +9,10 @@ use skein_peer::output::Status;
 /// One running peer at the moment of a snapshot.
 #[derive(Clone, Debug)]
 pub struct PeerSnapshot {
-    /// Which peer.
+    /// Which peer: the number of its radio.
     pub id: u16,
+    /// Its id; that of another one where it is a twin.
+    pub speaks_as: u16,
     /// Whether it flies.
     pub uav: bool,
     /// When its process last started or was resumed, milliseconds.

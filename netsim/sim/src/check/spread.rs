@@ -32,6 +32,8 @@ pub struct SpreadCheck {
     lacks: BTreeMap<(u16, Key), Lack>,
     apart: Clocks<(u16, u16, bool)>,
     doubles: Clocks<(u16, u16, u16)>,
+    /// The id of each twin, by number.
+    twins: BTreeMap<u16, u16>,
     /// Pieces of the longest mission that the operator gave.
     pieces: u64,
 }
@@ -75,6 +77,19 @@ fn spreads(kind: u8) -> bool {
 }
 
 impl SpreadCheck {
+    /// Of twins by number, each with its id.
+    #[must_use]
+    pub fn new(twins: BTreeMap<u16, u16>) -> Self {
+        Self {
+            twins,
+            ..Self::default()
+        }
+    }
+
+    fn id_of(&self, number: u16) -> u16 {
+        self.twins.get(&number).copied().unwrap_or(number)
+    }
+
     /// The operator has a mission of so many pieces.
     pub fn on_mission(&mut self, pieces: usize) {
         self.pieces = self.pieces.max(pieces as u64);
@@ -141,17 +156,17 @@ impl SpreadCheck {
         let mut lives: BTreeMap<u16, Incarnation> = BTreeMap::new();
         let mut newest: BTreeMap<Key, Version> = BTreeMap::new();
         for (key, version) in peers.iter().filter_map(|m| self.held.get(&m.id)).flatten() {
-            let life = lives.entry(key.0).or_default();
+            let life = lives.entry(self.id_of(key.0)).or_default();
             *life = (*life).max(version.0);
             let known = newest.entry(*key).or_insert(*version);
             *known = (*known).max(*version);
         }
         // A later life voids all that earlier ones said; an author knows its own.
         for m in peers {
-            let life = lives.entry(m.id).or_default();
+            let life = lives.entry(m.speaks_as).or_default();
             *life = (*life).max(m.view.incarnation);
         }
-        newest.retain(|key, version| lives.get(&key.0) == Some(&version.0));
+        newest.retain(|key, version| lives.get(&self.id_of(key.0)) == Some(&version.0));
         newest
     }
 
@@ -165,7 +180,10 @@ impl SpreadCheck {
     ) {
         let newest = self.newest(peers);
         for m in peers {
-            for (key, wanted) in newest.iter().filter(|(key, _)| key.0 != m.id) {
+            let others = newest
+                .iter()
+                .filter(|(key, _)| self.twins.get(&key.0).copied().unwrap_or(key.0) != m.speaks_as);
+            for (key, wanted) in others {
                 let bound_ms = record_ms(&snapshot.bounds, peers.len());
                 let held = self.held.get(&m.id).and_then(|h| h.get(key));
                 let held = held.copied().unwrap_or_default();

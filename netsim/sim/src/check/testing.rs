@@ -36,6 +36,8 @@ pub(super) struct Story {
     loss_permille: u16,
     covered: [bool; 4],
     places: BTreeMap<u16, Point>,
+    /// Of twins by number, each with its id.
+    pub(super) twins: BTreeMap<u16, u16>,
     /// Whose clock, computer or disk is how late.
     pub(super) handicaps: Handicaps,
 }
@@ -48,6 +50,7 @@ impl Story {
             loss_permille,
             covered: [false; 4],
             places: BTreeMap::new(),
+            twins: BTreeMap::new(),
             handicaps: Handicaps::default(),
         }
     }
@@ -68,6 +71,7 @@ impl Story {
             .iter()
             .map(|(id, view)| PeerSnapshot {
                 id: *id,
+                speaks_as: self.twins.get(id).copied().unwrap_or(*id),
                 uav: true,
                 since_ms: 0,
                 at: self.places.get(id).copied(),

@@ -1,7 +1,7 @@
 //! What each fault does to a simulated swarm. A fault that does not fit the state of
 //! its peer (restarting one that runs) changes nothing.
 
-use super::sim_peer::{Clock, Process};
+use super::sim_peer::{Clock, Process, SimPeer};
 use super::{Event, Kind, Phase, Swarm, What};
 use crate::account::Cause;
 use crate::check::record::Said;
@@ -23,6 +23,7 @@ const MOST_FLIPS: u32 = 64;
 impl Swarm {
     /// Applies a fault now.
     pub fn strike(&mut self, fault: &Fault) {
+        let fault = &self.with_twins_aside(fault);
         self.history
             .keep(self.now_ms, || What::Fault(fault.clone()));
         self.air.advance(self.now_ms);
@@ -106,6 +107,13 @@ impl Swarm {
                 *peer
             }
             Fault::SpoiltRecord { peer } => self.send_spoilt(*peer),
+            Fault::Twin { peer } => {
+                let of = |s: &SimPeer| s.is_twin() && s.config.id.0 == *peer && s.boots == 0;
+                if let Some(idx) = self.peers.iter().position(of) {
+                    self.boot(idx, false, false);
+                }
+                *peer
+            }
             Fault::Loss { permille } => {
                 self.loss_max_permille = self.loss_max_permille.max(*permille);
                 *permille
@@ -113,6 +121,23 @@ impl Swarm {
         };
         self.history.fold(self.now_ms, subject, Kind::Fault, 0);
         self.observe_graph();
+    }
+
+    /// A twin that a partition does not name is in one of its groups or in none, by the time
+    /// at which it begins.
+    fn with_twins_aside(&self, fault: &Fault) -> Fault {
+        let mut fault = fault.clone();
+        if let Fault::Partition { groups } = &mut fault {
+            for twin in self.peers.iter().filter(|s| s.is_twin()) {
+                let aside = self.now_ms % (groups.len() as u64 + 1);
+                let named = groups.iter().any(|g| g.contains(&twin.id()));
+                let group = usize::try_from(aside).ok().and_then(|i| groups.get_mut(i));
+                if let Some(group) = group.filter(|_| !named) {
+                    group.push(twin.id());
+                }
+            }
+        }
+        fault
     }
 
     /// Starts a process, with a new airframe where the old one is gone.
@@ -328,8 +353,10 @@ impl Swarm {
         s.since_ms = now_ms;
         s.timer_ms = None;
         let waiting: Vec<(u64, Input)> = s.inbox.drain(..).collect();
-        self.account.resumed(now_ms, id);
-        self.checker.on_resume(id);
+        if !self.peers[idx].silent {
+            self.account.resumed(now_ms, id);
+            self.checker.on_resume(id);
+        }
         for (arrived_ms, input) in waiting {
             if self.peers[idx].slow_ms == 0 {
                 self.hear_late(idx, arrived_ms, &input);

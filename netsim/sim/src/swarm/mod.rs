@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`queue`] | the event queue |
 //! | [`stream`] | independent random streams |
+//! | [`names`] | whom peers mean by an id that two processes have |
 //! | [`sim_peer`] | one peer: process, clock, disk, inbox |
 //! | [`air`] | the world and the medium as the driver uses them |
 //! | [`fault_effects`] | what each fault does |
@@ -17,6 +18,7 @@
 pub mod air;
 pub mod fault_effects;
 pub mod meter;
+pub mod names;
 pub mod outcome;
 pub mod queue;
 pub mod sim_peer;
@@ -39,6 +41,7 @@ use crate::spec::Spec;
 use crate::world::{Fact, Loss};
 use air::Air;
 use meter::{Meter, Part};
+use names::Names;
 use queue::{Phase, Queue};
 use sim_peer::{Process, SimPeer};
 use skein_behaviors::{Order, Setpoint};
@@ -108,6 +111,7 @@ pub struct Swarm {
     end_ms: u64,
     queue: Queue<Event>,
     peers: Vec<SimPeer>,
+    names: Names,
     air: Air,
     geometry_cache: GeometryCache,
     /// The newest mission that the operator gave.
@@ -155,6 +159,7 @@ impl Swarm {
     /// A swarm before its first event. `keep` keeps the main events for a timeline.
     #[must_use]
     pub fn new(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, keep: bool) -> Self {
+        let prepared = &prepared.with_twins(&faults);
         let spec = &prepared.spec;
         let mut geometry_cache = prepared.geometry_cache.clone();
         let loop_of = geometry_cache.of(&spec.mission);
@@ -167,6 +172,7 @@ impl Swarm {
             end_ms: u64::from(spec.max_time_s) * 1000,
             queue: Queue::default(),
             peers: sim_peers(spec, seed),
+            names: Names::new(spec.twins()),
             air: Air::new(prepared, seed),
             geometry_cache,
             mission: Arc::clone(&spec.mission),
@@ -200,6 +206,10 @@ impl Swarm {
         }
         let latest_ms = swarm.period_ms() / 2;
         for idx in 0..swarm.peers.len() {
+            if swarm.peers[idx].is_twin() {
+                swarm.air.stop(swarm.peers[idx].id(), true);
+                continue;
+            }
             let first_ms = swarm.peers[idx].first_boot_ms(latest_ms);
             swarm.queue.push(first_ms, Phase::Act, Event::Boot(idx));
         }
@@ -693,7 +703,12 @@ impl Swarm {
 
     fn said(&mut self, idx: usize, peer: &Peer, bytes: &[u8], hash: u64) {
         let id = self.peers[idx].id();
-        if let Some(said) = Said::read(bytes) {
+        if let Some(mut said) = Said::read(bytes) {
+            // Checks know whoever speaks by the number of its radio.
+            if said.record.author == self.peers[idx].config.id.0 {
+                said.record.author = id;
+                self.names.speaks(id, said.record.incarnation);
+            }
             if said.tells_of_cells() {
                 self.refresh_covered();
             }
@@ -731,9 +746,11 @@ impl Swarm {
             _ => 0,
         };
         let before = self.meter.enter(Part::Checks);
-        self.checker.on_report(self.now_ms, id, &report, adoptions);
+        let meant = self.meant_in(id, &report);
+        self.checker.on_report(self.now_ms, id, &meant, adoptions);
         self.meter.enter(before);
-        self.account.reported(self.now_ms, id, &report);
+        self.account.reported(self.now_ms, id, &meant);
+        self.note_voice(id, &report);
         if let Report::Refused { reason } = &report
             && !std::mem::take(&mut self.spoilt)
         {
@@ -762,7 +779,8 @@ impl Swarm {
         self.observe_graph();
         self.refresh_covered();
         self.repeat_order();
-        let peers = self.snapshots();
+        let (silent, peers): (Vec<PeerSnapshot>, Vec<PeerSnapshot>) =
+            self.snapshots().into_iter().partition(|m| m.view.is_silent);
         self.carry_order(&peers);
         if self.homing {
             self.done = self.checker.on_way_home(self.now_ms, &peers, &self.covered);
@@ -772,7 +790,7 @@ impl Swarm {
         self.checker.on_snapshot(
             self.now_ms,
             loss_permille,
-            &peers,
+            (&peers, &silent),
             &self.covered,
             self.loop_hash,
         );
@@ -846,7 +864,66 @@ impl Swarm {
     /// What every running peer believes, and where it is.
     fn snapshots(&self) -> Vec<PeerSnapshot> {
         let air = &self.air;
-        self.peers.iter().filter_map(|s| snapshot(s, air)).collect()
+        let of = |s: &SimPeer| {
+            let mut m = snapshot(s, air)?;
+            self.rename(m.id, &mut m.view);
+            Some(m)
+        };
+        self.peers.iter().filter_map(of).collect()
+    }
+
+    /// Whom a peer means by an id, in this life: of several that live there one in its
+    /// component that speaks.
+    fn meant(&self, by: u16, id: u16, life: Incarnation) -> u16 {
+        let graph = self.checker.graph();
+        self.names
+            .meant(id, life, |number| graph.joined(by, number))
+    }
+
+    /// A report with the numbers of those whom it means.
+    fn meant_in(&self, by: u16, report: &Report) -> Report {
+        match *report {
+            Report::Membership {
+                peer,
+                incarnation,
+                status,
+            } if self.names.is_ambiguous(peer.0) => Report::Membership {
+                peer: PeerId(self.meant(by, peer.0, incarnation)),
+                incarnation,
+                status,
+            },
+            ref other => other.clone(),
+        }
+    }
+
+    /// What a peer believes, of those whom it means.
+    fn rename(&self, by: u16, view: &mut Beliefs) {
+        for id in self.names.ambiguous() {
+            if let Some((life, status)) = view.peers.remove(&PeerId(id)) {
+                let meant = PeerId(self.meant(by, id, life));
+                view.peers.insert(meant, (life, status));
+            }
+        }
+    }
+
+    /// A peer begins a life, or falls silent since a twin speaks.
+    fn note_voice(&mut self, id: u16, report: &Report) {
+        let Some(idx) = self.peer_idx(id) else {
+            return;
+        };
+        let now_ms = self.now_ms;
+        match report {
+            Report::Booted { .. } if self.peers[idx].silent => {
+                self.peers[idx].silent = false;
+                self.peers[idx].since_ms = now_ms;
+                self.checker.on_voice(id);
+            }
+            Report::Silenced => {
+                self.peers[idx].silent = true;
+                self.checker.on_silenced(now_ms, id);
+            }
+            _ => {}
+        }
     }
 
     /// After the end those who are finished fly home: that is checked, and is no part of the
@@ -865,7 +942,7 @@ impl Swarm {
         let running = self
             .peers
             .iter()
-            .filter(|s| s.process == Process::Running)
+            .filter(|s| s.process == Process::Running && !s.silent)
             .map(SimPeer::id);
         let mut ids: Vec<u16> = running.collect();
         ids.sort_unstable();
@@ -933,10 +1010,11 @@ fn sim_peers(spec: &Spec, seed: u64) -> Vec<SimPeer> {
         .map(|u| {
             SimPeer::new(
                 seed,
+                u.id,
                 PeerConfig {
                     airframe: Some(u.airframe),
                     height_m: u.height_m,
-                    ..config(u.id)
+                    ..config(u.twin_of.unwrap_or(u.id))
                 },
             )
         })
@@ -944,6 +1022,7 @@ fn sim_peers(spec: &Spec, seed: u64) -> Vec<SimPeer> {
     if let Some(g) = &spec.ground {
         peers.push(SimPeer::new(
             seed,
+            g.id,
             PeerConfig {
                 role: Role::GroundStation,
                 height_m: g.height_m,
@@ -962,6 +1041,7 @@ fn snapshot(of: &SimPeer, air: &Air) -> Option<PeerSnapshot> {
         .filter(|_| of.process == Process::Running)?;
     Some(PeerSnapshot {
         id: of.id(),
+        speaks_as: of.config.id.0,
         uav: of.config.role == Role::Uav,
         since_ms: of.since_ms,
         at: air.percept(of.id()).map(|p| p.pose.position()),

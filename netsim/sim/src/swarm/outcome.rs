@@ -151,5 +151,5 @@ impl Swarm {
 }
 
 fn is_gone(p: &SimPeer) -> bool {
-    p.config.airframe.is_some() && p.peer.is_none()
+    p.config.airframe.is_some() && p.peer.is_none() && p.boots > 0
 }

@@ -77,6 +77,8 @@ pub enum Process {
 /// One peer.
 #[derive(Debug)]
 pub struct SimPeer {
+    /// The number of its radio and airframe; its id, unless it is a twin.
+    number: u16,
     /// What it is told before it starts.
     pub config: PeerConfig,
     /// The mind, while there is a process; boxed, since it changes hands with every input.
@@ -103,18 +105,20 @@ pub struct SimPeer {
     pub frame: Filling,
     /// Whether it held that the mission is finished when last judged.
     pub finished: bool,
+    /// Whether it is silent since a twin speaks.
+    pub silent: bool,
     clock_draws: Stream,
     nonce: Stream,
 }
 
 impl SimPeer {
-    /// A peer whose process has not been started.
+    /// A peer whose process has not been started, in the airframe with this number.
     #[must_use]
-    pub fn new(seed: u64, mut config: PeerConfig) -> Self {
-        let id = config.id.0;
+    pub fn new(seed: u64, id: u16, mut config: PeerConfig) -> Self {
         let mut clock_draws = Stream::new(seed, Concern::Peer(id));
         config.seed = clock_draws.any();
         Self {
+            number: id,
             config,
             peer: None,
             process: Process::Stopped,
@@ -128,6 +132,7 @@ impl SimPeer {
             timer_ms: None,
             frame: Filling::default(),
             finished: false,
+            silent: false,
             clock_draws,
             nonce: Stream::new(seed, Concern::Nonce(id)),
         }
@@ -136,7 +141,13 @@ impl SimPeer {
     /// Its number.
     #[must_use]
     pub fn id(&self) -> u16 {
-        self.config.id.0
+        self.number
+    }
+
+    /// Whether another UAV has its id.
+    #[must_use]
+    pub fn is_twin(&self) -> bool {
+        self.number != self.config.id.0
     }
 
     /// When it is switched on for the first time, milliseconds: no two computers of a
@@ -154,6 +165,7 @@ impl SimPeer {
         self.process = Process::Running;
         self.timer_ms = None;
         self.finished = false;
+        self.silent = false;
         self.inbox.clear();
         self.peer = Some(Box::new(Peer::new(self.config.clone())));
         #[allow(
@@ -173,6 +185,7 @@ impl SimPeer {
         self.inbox.clear();
         self.disk.crash();
         self.finished = false;
+        self.silent = false;
         self.peer.take()
     }
 

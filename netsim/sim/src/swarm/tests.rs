@@ -554,3 +554,85 @@ fn a_peer_that_stands_still_is_silent_and_is_missed() {
     });
     assert!(missed, "nobody missed it");
 }
+
+/// Who is silent since a twin speaks, and who speaks again after it, by number.
+fn voices(o: &Outcome) -> Vec<(u16, bool)> {
+    let told = o.entries.iter().filter_map(|e| match &e.what {
+        What::Report { peer, report } => match report {
+            Report::Silenced => Some((*peer, false)),
+            Report::Booted { .. } => Some((*peer, true)),
+            _ => None,
+        },
+        _ => None,
+    });
+    // A life that begins before is no news.
+    let mut silent = std::collections::BTreeSet::new();
+    told.filter(|(peer, voice)| {
+        if *voice {
+            silent.remove(peer)
+        } else {
+            silent.insert(*peer)
+        }
+    })
+    .collect()
+}
+
+#[test]
+fn a_second_uav_under_one_id_is_silent_and_the_mission_goes_on() {
+    for seed in 1..4 {
+        let o = run(
+            &prepared(4),
+            seed,
+            vec![at(40_000, Fault::Twin { peer: 2 })],
+            true,
+        );
+        passed(&o);
+        // The number of the twin is the first one that is free.
+        assert_eq!(voices(&o), [(5, false)], "seed {seed}");
+        let reports = |e: &&crate::history::Entry| {
+            matches!(
+                &e.what,
+                What::Report {
+                    peer: 5,
+                    report: Report::Claim { .. }
+                }
+            )
+        };
+        assert!(!o.entries.iter().any(|e| reports(&e)));
+    }
+}
+
+#[test]
+fn a_twin_takes_the_place_of_one_that_is_lost() {
+    let faults = vec![
+        at(30_000, Fault::Twin { peer: 2 }),
+        at(60_000, Fault::Kill { peer: 2 }),
+    ];
+    let o = run(&prepared(3), 2, faults, true);
+    passed(&o);
+    assert_eq!(voices(&o), [(4, false), (4, true)]);
+    let covers = |e: &crate::history::Entry| {
+        matches!(
+            &e.what,
+            What::Report {
+                peer: 4,
+                report: Report::Covered { .. }
+            }
+        )
+    };
+    assert!(o.entries.iter().any(covers), "it works under the id");
+}
+
+#[test]
+fn twins_on_two_sides_of_a_partition_both_speak_until_it_heals() {
+    let split = |groups: Vec<Vec<u16>>| Fault::Partition { groups };
+    let faults = vec![
+        at(20_000, split(vec![vec![1, 2, 100], vec![3, 4, 5]])),
+        at(21_000, Fault::Twin { peer: 2 }),
+        at(80_000, Fault::Heal),
+    ];
+    let o = run(&prepared(4), 5, faults, true);
+    passed(&o);
+    let silenced: Vec<(u16, bool)> = voices(&o).into_iter().filter(|v| !v.1).collect();
+    assert_eq!(silenced.len(), 1, "{:?}", voices(&o));
+}

@@ -17,7 +17,8 @@
 //! Without the last but one row a peer that lost its disk would be a zombie nobody
 //! believes. A twin *lives* if its beacon or heartbeat is heard, or if gossip tells of a
 //! heartbeat that this process cannot have sent: its age is less than half of the time for
-//! which this process has been there, or, where it does not speak, has been quiet.
+//! which this process has been there, or, where it does not speak, has been quiet;
+//! and who was silent for k1 T' may be out of reach.
 //! Half, since ages are summed by clocks of others.
 
 use crate::Incarnation;
@@ -147,10 +148,12 @@ impl Life {
         }
         self.promised = None;
         self.incarnation = incarnation;
-        vec![
-            Effect::Live(incarnation),
-            Effect::Report(Report::Booted { incarnation }),
-        ]
+        let mut effects = vec![Effect::Live(incarnation)];
+        // Who fell silent meanwhile speaks in a later one.
+        if self.silent.is_none() {
+            effects.push(Effect::Report(Report::Booted { incarnation }));
+        }
+        effects
     }
 
     /// A promised life could not be made durable.
@@ -215,18 +218,19 @@ impl Life {
         self.hear_of_myself(twin.incarnation, true)
     }
 
-    /// Others tell of a heartbeat under this id that is so old; this peer sent so many
+    /// Others tell of a heartbeat under this id that is so old; what is older than `lately_ms`
+    /// may be out of reach. This peer sent so many
     /// itself, and perhaps never sent that one or a record that was told of with it.
     pub fn hear_of_heartbeat(
         &mut self,
         (now, timers): (Time, &Timers),
         (incarnation, heartbeat): (Incarnation, u32),
-        age_ms: u64,
+        (age_ms, lately_ms): (u64, u64),
         (sent, never_said): (u32, bool),
     ) -> Effects {
         let quiet = self.silent.is_some() || self.listens(now, timers);
         let since = if quiet { self.quiet } else { self.started };
-        let is_young = age_ms.saturating_mul(2) < now.since_ms(since);
+        let is_young = age_ms <= lately_ms && age_ms.saturating_mul(2) < now.since_ms(since);
         let theirs = (incarnation, heartbeat) > (self.incarnation, sent);
         if is_young && (quiet || theirs) && !self.is_made_up(incarnation) {
             self.heard = self.heard.max(incarnation);
@@ -429,10 +433,37 @@ mod tests {
         ] {
             let mut of = living(2);
             let (now, timers) = at(10_000, speaks);
-            let effects = of.hear_of_heartbeat((now, &timers), theirs, age_ms, (15, false));
+            let effects =
+                of.hear_of_heartbeat((now, &timers), theirs, (age_ms, 4_950), (15, false));
             assert_eq!(of.is_silent(), silent, "{theirs:?} {age_ms}");
             assert_eq!(stored(&effects).first().copied(), life, "{theirs:?}");
         }
+    }
+
+    #[test]
+    fn a_twin_that_was_silent_for_long_may_be_out_of_reach() {
+        for (age_ms, silent) in [(4_500, true), (4_501, false)] {
+            let mut of = living(2);
+            let now = at(90_000, true);
+            let effects =
+                of.hear_of_heartbeat((now.0, &now.1), (3, 1), (age_ms, 4_500), (15, false));
+            assert_eq!(
+                (of.is_silent(), stored(&effects).is_empty()),
+                (silent, silent)
+            );
+        }
+    }
+
+    #[test]
+    fn a_life_that_becomes_durable_after_its_peer_fell_silent_is_not_spoken() {
+        let mut of = living(2);
+        let (now, mut timers) = at(60_000, true);
+        assert_eq!(stored(&of.hear_of_myself(3, false)), [4]);
+        of.hear_twin((now, &timers), twin(3, 1, Some(9)), 40, false);
+        assert!(matches!(of.is_durable(4)[..], [Effect::Live(4)]));
+        assert!(of.is_silent() && !of.speaks(now, &timers));
+        let back = of.tick(Time(72_001), (1000, 12_000), &mut timers, 4);
+        assert_eq!(stored(&back), [5]);
     }
 
     #[test]
@@ -440,7 +471,7 @@ mod tests {
         let mut of = living(2);
         of.was_late(8_000);
         let (now, timers) = at(10_000, true);
-        of.hear_of_heartbeat((now, &timers), (3, 1), 1_500, (15, false));
+        of.hear_of_heartbeat((now, &timers), (3, 1), (1_500, 4_500), (15, false));
         assert!(!of.is_silent());
     }
 
@@ -449,7 +480,7 @@ mod tests {
         let mut of = living(2);
         let (now, mut timers) = at(60_000, true);
         of.hear_twin((now, &timers), twin(3, 1, Some(9)), 40, false);
-        of.hear_of_heartbeat((Time(61_000), &timers), (5, 1), 400, (40, false));
+        of.hear_of_heartbeat((Time(61_000), &timers), (5, 1), (400, 4_500), (40, false));
         assert!(of.hear_of_myself(6, false).is_empty(), "others are told");
         let tick = |of: &mut Life, ms, timers: &mut Timers| {
             stored(&of.tick(Time(ms), (1000, 12_000), timers, 2))
@@ -459,7 +490,12 @@ mod tests {
         of.is_durable(7);
         assert!(!of.speaks(Time(75_600), &timers) && of.speaks(Time(75_601), &timers));
         // What it said itself before it was silent is no twin.
-        let mine = of.hear_of_heartbeat((Time(74_000), &timers), (2, 40), 14_000, (0, false));
+        let mine = of.hear_of_heartbeat(
+            (Time(74_000), &timers),
+            (2, 40),
+            (14_000, 15_000),
+            (0, false),
+        );
         assert!(mine.is_empty() && !of.is_silent());
     }
 

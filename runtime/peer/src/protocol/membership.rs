@@ -298,6 +298,13 @@ impl Membership {
         }
     }
 
+    /// Silence after which a peer is suspected, milliseconds: k1 T'.
+    #[must_use]
+    pub fn k1_ms(&self, now: Time) -> u64 {
+        let patience = self.patience(now);
+        patience.interval_ms * patience.k1_quarters / 4
+    }
+
     /// The longest time by which all know of a death, milliseconds.
     #[must_use]
     pub fn bound_ms(&self, now: Time) -> u64 {

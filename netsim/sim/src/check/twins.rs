@@ -1,0 +1,252 @@
+//! Of two processes under one id in one component one is silent, and only then: it says
+//! and plans nothing, and goes home (`twins`, `home`).
+
+use super::{Clocks, Findings, PeerSnapshot, Snapshot};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A peer looks four times a period, and the check once.
+const LOOK_PERIODS: u64 = 2;
+
+/// Who is as near as this to its twin may be in one airframe with it and flies nothing,
+/// metres: 60 m, and two seconds of flight between what the twin told and now.
+const ONE_PLACE_M: f64 = 100.0;
+
+/// What the twins of one run were found to do.
+#[derive(Clone, Debug, Default)]
+pub struct TwinCheck {
+    /// The id of each twin, by number.
+    twins: BTreeMap<u16, u16>,
+    silent: BTreeSet<u16>,
+    both: Clocks<(u16, u16)>,
+    neither: Clocks<u16>,
+    told: Clocks<u16>,
+}
+
+impl TwinCheck {
+    /// The twins of a run by number, each with its id.
+    #[must_use]
+    pub fn new(twins: BTreeMap<u16, u16>) -> Self {
+        Self {
+            twins,
+            ..Self::default()
+        }
+    }
+
+    fn id_of(&self, number: u16) -> u16 {
+        self.twins.get(&number).copied().unwrap_or(number)
+    }
+
+    /// The numbers of all others with the id of this one.
+    pub fn others(&self, number: u16) -> Vec<u16> {
+        let id = self.id_of(number);
+        let twins = self.twins.iter().filter(|(_, of)| **of == id);
+        let all = twins.map(|(n, _)| *n).chain([id]);
+        all.filter(|n| *n != number).collect()
+    }
+
+    /// A peer falls silent.
+    pub fn on_silenced(&mut self, number: u16) {
+        self.silent.insert(number);
+    }
+
+    /// A peer begins a life, or ends.
+    pub fn on_voice(&mut self, number: u16) {
+        self.silent.remove(&number);
+        self.neither.stop(number);
+        self.told.stop(number);
+    }
+
+    /// Whether a peer is silent.
+    #[must_use]
+    pub fn is_silent(&self, number: u16) -> bool {
+        self.silent.contains(&number)
+    }
+
+    /// A peer puts something on the air.
+    pub fn on_transmission(&mut self, now_ms: u64, number: u16, found: &mut Findings) {
+        if self.is_silent(number) {
+            found.broken("twins", now_ms, Some(number), || {
+                "is silent since another process has its id, and speaks".to_owned()
+            });
+        }
+    }
+
+    /// Judges who speaks, and who is silent.
+    pub fn on_snapshot(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        silent: &[PeerSnapshot],
+        found: &mut Findings,
+    ) {
+        if self.twins.is_empty() {
+            return;
+        }
+        self.look_for_both(snapshot, found);
+        for m in silent {
+            self.look_for_neither(snapshot, m, found);
+            if m.view.able || !m.view.plan.is_empty() || !m.view.held.is_empty() {
+                self.told.start(m.id, snapshot.now_ms);
+                if self.told.tell_once(m.id) {
+                    found.broken("twins", snapshot.now_ms, Some(m.id), || {
+                        "is silent since another process has its id, and plans".to_owned()
+                    });
+                }
+            }
+        }
+    }
+
+    /// In a component others tell each of the other, as soon as they find out who is there.
+    fn look_for_both(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        let bound_ms = snapshot.bounds.detection_ms();
+        let speak: Vec<&PeerSnapshot> = snapshot.peers.iter().filter(|m| m.view.speaks).collect();
+        for (number, id) in &self.twins {
+            for of in speak.iter().filter(|m| m.speaks_as == *id) {
+                let key = (of.id, *number);
+                let both = of.id != *number && speak.iter().any(|m| m.id == *number);
+                if !both || !snapshot.graph.joined(of.id, *number) {
+                    self.both.stop(key);
+                    continue;
+                }
+                let began_ms = self.both.start(key, snapshot.now_ms);
+                let stable_ms = snapshot.stability.component_since_ms(*number);
+                let from_ms = began_ms.max(stable_ms.unwrap_or(snapshot.now_ms));
+                let took_ms = snapshot.now_ms - from_ms;
+                let grown_ms = snapshot.grown_ms(bound_ms, from_ms);
+                let limit_ms = snapshot.grade().limit_ms(grown_ms);
+                if limit_ms.is_some_and(|l| took_ms > l) && self.both.tell_once(key) {
+                    found.broken("twins", snapshot.now_ms, Some(*number), || {
+                        format!(
+                            "speaks as peer {id}, as another process in its component does, for {took_ms} ms (bound {bound_ms} ms)"
+                        )
+                    });
+                }
+            }
+        }
+    }
+
+    /// Who is silent comes back when nobody speaks under its id for as long as it takes all
+    /// to find out; it must be able to write its life down.
+    fn look_for_neither(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        m: &PeerSnapshot,
+        found: &mut Findings,
+    ) {
+        let speaks = |o: &&PeerSnapshot| o.speaks_as == m.speaks_as && o.view.speaks;
+        if snapshot.peers.iter().any(|o| speaks(&o)) {
+            self.neither.stop(m.id);
+            return;
+        }
+        let since_ms = self.neither.start(m.id, snapshot.now_ms).max(m.since_ms);
+        let took_ms = snapshot.lived_ms(m.id, since_ms);
+        let bounds = super::Bounds {
+            diameter: snapshot.bounds.diameter.max(u64::from(m.view.diameter)),
+            ..snapshot.bounds
+        };
+        let bound_ms = snapshot.grown_ms(bounds.detection_ms(), since_ms)
+            + LOOK_PERIODS * bounds.period_ms
+            + snapshot.late_ms(m.id, since_ms);
+        let write_ms = snapshot.handicaps.write_ms(m.id, since_ms, snapshot.now_ms);
+        if write_ms.is_some_and(|w| took_ms > bound_ms + w) && self.neither.tell_once(m.id) {
+            found.broken("twins", snapshot.now_ms, Some(m.id), || {
+                format!(
+                    "is silent although nobody speaks as peer {}, for {took_ms} ms (bound {bound_ms} ms)",
+                    m.speaks_as
+                )
+            });
+        }
+    }
+
+    /// Of these who are silent those who can know that they have an airframe of their own.
+    #[must_use]
+    pub fn steered(&self, peers: &[PeerSnapshot], silent: &[PeerSnapshot]) -> Vec<PeerSnapshot> {
+        let near = |m: &PeerSnapshot, o: &PeerSnapshot| {
+            let both = m.at.zip(o.at);
+            o.id != m.id
+                && o.speaks_as == m.speaks_as
+                && both.is_some_and(|(a, b)| (a - b).norm() < ONE_PLACE_M)
+        };
+        let apart = |m: &&PeerSnapshot| !peers.iter().chain(silent).any(|o| near(m, o));
+        silent.iter().filter(apart).cloned().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Story, speaking};
+    use super::*;
+    use skein_geometry::frame::Point;
+    use skein_peer::Beliefs;
+
+    /// Peer 1 and its twin 9 for a minute: whether each speaks, or else is silent.
+    fn minute(loss_permille: u16, speak: [bool; 2], change: impl Fn(&mut Beliefs)) -> u64 {
+        let twins = BTreeMap::from([(9, 1)]);
+        let (mut check, mut found) = (TwinCheck::new(twins.clone()), Findings::new(1));
+        let mut story = Story::new(loss_permille);
+        story.twins = twins;
+        for t in 1..=60 {
+            let mut silent = speaking();
+            (silent.speaks, silent.is_silent, silent.able) = (false, true, false);
+            change(&mut silent);
+            let of = |speaks: bool| {
+                [(1, speak[0]), (9, speak[1])]
+                    .into_iter()
+                    .filter(|(_, s)| *s == speaks)
+                    .map(|(id, s)| (id, if s { speaking() } else { silent.clone() }))
+                    .collect::<Vec<_>>()
+            };
+            let mut mute = Vec::new();
+            let mut other = Story::new(0);
+            other.twins = BTreeMap::from([(9, 1)]);
+            other.snapshot(t * 1000, &of(false), |s| mute = s.peers.to_vec());
+            story.snapshot(t * 1000, &of(true), |s| {
+                check.on_snapshot(s, &mute, &mut found);
+            });
+        }
+        found.counts.get("twins").copied().unwrap_or(0)
+    }
+
+    #[test]
+    fn of_twins_in_one_component_just_one_speaks() {
+        assert_eq!(minute(0, [true, false], |_| {}), 0);
+        assert_eq!(minute(0, [false, true], |_| {}), 0);
+        assert_eq!(minute(0, [true, true], |_| {}), 1);
+        assert_eq!(minute(300, [true, true], |_| {}), 0, "reported only");
+        // Two who are both silent, each for the other's sake.
+        assert_eq!(minute(0, [false, false], |_| {}), 2);
+        assert_eq!(minute(300, [false, false], |_| {}), 2);
+    }
+
+    #[test]
+    fn who_is_silent_neither_plans_nor_speaks() {
+        assert_eq!(minute(300, [true, false], |b| b.able = true), 1);
+        assert_eq!(minute(300, [true, false], |b| b.plan = vec![2]), 1);
+        let (mut check, mut found) = (TwinCheck::new(BTreeMap::from([(9, 1)])), Findings::new(1));
+        check.on_transmission(1_000, 9, &mut found);
+        check.on_silenced(9);
+        check.on_transmission(2_000, 1, &mut found);
+        assert!(found.counts.is_empty());
+        check.on_transmission(2_000, 9, &mut found);
+        assert_eq!(found.counts.get("twins"), Some(&1));
+        check.on_voice(9);
+        check.on_transmission(2_000, 9, &mut found);
+        assert_eq!(found.counts.get("twins"), Some(&1));
+    }
+
+    #[test]
+    fn who_may_sit_in_one_airframe_with_its_twin_need_not_fly_home() {
+        for (away_m, steered) in [(99.0, 0), (101.0, 1)] {
+            let mut story = Story::new(0);
+            story.twins = BTreeMap::from([(9, 1)]);
+            story.place(1, Point::new(0.0, 0.0));
+            story.place(2, Point::new(away_m, 0.0));
+            story.place(9, Point::new(away_m, 0.0));
+            let check = TwinCheck::new(story.twins.clone());
+            let views = [1, 2, 9].map(|id| (id, speaking()));
+            story.snapshot(1_000, &views, |s| {
+                let (peers, silent) = s.peers.split_at(2);
+                assert_eq!(check.steered(peers, silent).len(), steered);
+            });
+        }
+    }
+}

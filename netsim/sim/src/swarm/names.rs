@@ -1,0 +1,73 @@
+//! Whom peers mean by an id that two processes have: checks and the account know each by
+//! the number of its radio.
+
+use skein_peer::Incarnation;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The twins of one run.
+#[derive(Clone, Debug, Default)]
+pub struct Names {
+    /// The id under which the peer with this number speaks, where it is another one.
+    twins: BTreeMap<u16, u16>,
+    /// Who spoke in each life of an id, the last one last.
+    lives: BTreeMap<(u16, Incarnation), Vec<u16>>,
+}
+
+impl Names {
+    /// Twins by number, each with its id.
+    #[must_use]
+    pub fn new(twins: BTreeMap<u16, u16>) -> Self {
+        let lives = BTreeMap::new();
+        Self { twins, lives }
+    }
+
+    /// Whether two have this id.
+    #[must_use]
+    pub fn is_ambiguous(&self, id: u16) -> bool {
+        self.twins.values().any(|of| *of == id)
+    }
+
+    /// The ids that two have, ascending.
+    #[must_use]
+    pub fn ambiguous(&self) -> BTreeSet<u16> {
+        self.twins.values().copied().collect()
+    }
+
+    /// A peer speaks in a life.
+    pub fn speaks(&mut self, number: u16, life: Incarnation) {
+        let id = self.twins.get(&number).copied().unwrap_or(number);
+        if self.is_ambiguous(id) {
+            let spoke = self.lives.entry((id, life)).or_default();
+            spoke.retain(|n| *n != number);
+            spoke.push(number);
+        }
+    }
+
+    /// Who is meant by an id in a life: the last one that spoke in it of those in reach, else
+    /// the last one that did, else the one whose number it is.
+    #[must_use]
+    pub fn meant(&self, id: u16, life: Incarnation, in_reach: impl Fn(u16) -> bool) -> u16 {
+        let spoke = self.lives.get(&(id, life)).map_or(&[][..], Vec::as_slice);
+        let near = spoke.iter().rev().find(|n| in_reach(**n));
+        near.or(spoke.last()).copied().unwrap_or(id)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_id_in_a_life_means_who_spoke_in_it_and_is_in_reach() {
+        let mut names = Names::new(BTreeMap::from([(9, 3)]));
+        for (number, life) in [(3, 1), (9, 1), (9, 2), (4, 1)] {
+            names.speaks(number, life);
+        }
+        assert_eq!(names.ambiguous(), BTreeSet::from([3]));
+        assert_eq!(names.meant(3, 1, |n| n == 3), 3);
+        assert_eq!(names.meant(3, 1, |n| n == 9), 9);
+        assert_eq!(names.meant(3, 2, |n| n == 3), 9, "nobody else spoke in it");
+        assert_eq!(names.meant(3, 5, |_| true), 3);
+        assert_eq!(names.meant(4, 1, |_| true), 4);
+    }
+}
