@@ -13,7 +13,7 @@
 //! | [`route`], [`route_polygons`], [`route_clearance`], [`route_graph`], [`route_maps`] | shortest paths and routes |
 //! | [`mod@line`] | tours along roads |
 //! | [`navmesh`] | public instances of shortest-path problems |
-//! | [`sim`], [`live`] | swarms in virtual time, swarms of processes |
+//! | [`sim`], [`live`], [`alike`] | swarms in virtual time, swarms of processes, the two compared |
 //! | [`measure`] | distances measured again, for checks |
 //! | [`figures`] | times and errors |
 //!
@@ -24,6 +24,7 @@
 //! assert!((to_piece_m(at(5.0, 3.0), at(0.0, 0.0), at(10.0, 0.0)) - 3.0).abs() < 1e-12);
 //! ```
 
+pub mod alike;
 pub mod cover;
 pub mod cover_exact;
 pub mod cover_loop;
@@ -81,6 +82,8 @@ pub enum Subject {
     Sim(sim::SimArgs),
     /// A swarm of processes on this machine: the pace held, and what a process needs.
     Live(live::LiveArgs),
+    /// Trials of processes against simulated runs of the same seeds: can they be told apart?
+    Alike(alike::AlikeArgs),
 }
 
 /// Measures, and returns the JSON text to print.
@@ -101,5 +104,6 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<String> {
         Subject::Line(args) => line::run(args),
         Subject::Sim(args) => sim::run(args),
         Subject::Live(args) => live::run(args),
+        Subject::Alike(args) => alike::run(args),
     }
 }

@@ -7,7 +7,7 @@
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// One trial, alone on this machine.
@@ -28,9 +28,50 @@ pub struct LiveArgs {
     /// Where the UAVs begin: `spread` or `base`.
     #[arg(long, default_value = "spread", value_name = "WHERE")]
     pub launch: String,
+    #[command(flatten)]
+    program: Program,
+}
+
+/// The command that flies.
+#[derive(Debug, Args)]
+pub(crate) struct Program {
     /// The command `skein`; without it the one beside this program.
     #[arg(long, value_name = "FILE")]
-    pub program: Option<PathBuf>,
+    program: Option<PathBuf>,
+}
+
+impl Program {
+    /// Its file.
+    ///
+    /// # Errors
+    /// When this program does not know its own place.
+    pub(crate) fn path(&self) -> Result<PathBuf> {
+        let beside = || -> Result<PathBuf> {
+            let own = std::env::current_exe().context("this program's own file")?;
+            Ok(own.with_file_name("skein"))
+        };
+        self.program.clone().map_or_else(beside, Ok)
+    }
+}
+
+/// The report of what `program` flies with these arguments; what it says meanwhile goes to
+/// stderr.
+///
+/// # Errors
+/// When there is no program, or it tells of no flight.
+pub(crate) fn report_of(program: &Path, arguments: &[String]) -> Result<Value> {
+    let out = Command::new(program)
+        .args(arguments)
+        .args(["--format", "json"])
+        .stdin(Stdio::null())
+        .stderr(Stdio::inherit())
+        .output()
+        .with_context(|| format!("{}: build it first: cargo build", program.display()))?;
+    // A mission that failed is measured, too.
+    if !matches!(out.status.code(), Some(0 | 1)) {
+        bail!("it could not be flown: {}", out.status);
+    }
+    serde_json::from_slice(&out.stdout).context("the report")
 }
 
 /// Flies once and measures. What the trial says meanwhile goes to stderr.
@@ -38,26 +79,16 @@ pub struct LiveArgs {
 /// # Errors
 /// When there is no program, or it tells of no flight.
 pub fn run(args: &LiveArgs) -> Result<String> {
-    let beside = || -> Result<PathBuf> {
-        let own = std::env::current_exe().context("this program's own file")?;
-        Ok(own.with_file_name("skein"))
-    };
-    let program = args.program.clone().map_or_else(beside, Ok)?;
-    let out = Command::new(&program)
-        .args(["trial", &args.scenario, "--format", "json"])
-        .args(["--peers", &args.peers.to_string()])
-        .args(["--launch", &args.launch])
-        .args(["--max-time", &args.seconds.to_string()])
-        .args(["--time-scale", &args.time_scale.to_string()])
-        .stdin(Stdio::null())
-        .stderr(Stdio::inherit())
-        .output()
-        .with_context(|| format!("{}: build it first: cargo build", program.display()))?;
-    // A mission that failed is measured, too.
-    if !matches!(out.status.code(), Some(0 | 1)) {
-        bail!("the trial could not be flown: {}", out.status);
+    let mut words = vec!["trial".to_owned(), args.scenario.clone()];
+    for (flag, value) in [
+        ("--peers", args.peers.to_string()),
+        ("--launch", args.launch.clone()),
+        ("--max-time", args.seconds.to_string()),
+        ("--time-scale", args.time_scale.to_string()),
+    ] {
+        words.extend([flag.to_owned(), value]);
     }
-    let report: Value = serde_json::from_slice(&out.stdout).context("the report of the trial")?;
+    let report = report_of(&args.program.path()?, &words)?;
     serde_json::to_string_pretty(&figures(&report)).context("the figures")
 }
 
@@ -161,7 +192,9 @@ mod tests {
             seconds: 5,
             time_scale: 1.0,
             launch: "base".to_owned(),
-            program: Some("/nowhere/skein".into()),
+            program: Program {
+                program: Some("/nowhere/skein".into()),
+            },
         };
         let error = format!("{:#}", run(&args).unwrap_err());
         assert!(error.contains("/nowhere/skein"), "{error}");
