@@ -1,10 +1,11 @@
 //! How a scenario goes with more or fewer UAVs, on other radios:
 //! `cargo run -p skein-scenario --example crowd -- helsinki 8,20,50 64000 1..3 2`.
 //!
-//! The arguments are a scenario, numbers of UAVs, bit rates, seeds, and how many UAVs are
-//! killed, one every five seconds from the 60th on; otherwise there are no faults. Prints a
-//! line a run.
+//! The arguments are a scenario, numbers of UAVs, bit rates, seeds, how many UAVs are
+//! killed, one every five seconds from the 60th on (otherwise there are no faults), and an SVG
+//! file for a figure of it all. Prints a line a run.
 
+use plotters::prelude::*;
 use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::history::What;
 use skein_netsim::prepared::Prepared;
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+    let mut points = Vec::new();
     for n in &peers {
         for rate_bps in &rates {
             let over = Overrides {
@@ -53,11 +55,120 @@ fn main() -> ExitCode {
                 };
                 let started = Instant::now();
                 let outcome = run(&prepared, seed, faults.clone(), wanted);
-                tell(*n, *rate_bps, &outcome, started.elapsed().as_secs_f64());
+                let point = Point::of(*n, *rate_bps, &outcome);
+                tell(&point, &outcome, started.elapsed().as_secs_f64());
+                points.push(point);
             }
         }
     }
+    if let Some(path) = args.get(5)
+        && let Err(e) = draw(path, &points)
+    {
+        eprintln!("{path}: {e}");
+        return ExitCode::from(3);
+    }
     ExitCode::SUCCESS
+}
+
+/// One run, as the figure shows it.
+struct Point {
+    n: u32,
+    rate_bps: u32,
+    makespan_over_work_bound: Option<f64>,
+    /// 95th percentile of how long it took a live UAV to find out that another was dead.
+    detection_s: Option<f64>,
+    bytes_per_peer_s: f64,
+}
+
+impl Point {
+    fn of(n: u32, rate_bps: u32, outcome: &Outcome) -> Self {
+        let report = &outcome.report;
+        Self {
+            n,
+            rate_bps,
+            makespan_over_work_bound: report.makespan_over_work_bound,
+            detection_s: percentile(&detections_ms(outcome), 95).map(|ms| ms as f64 / 1000.0),
+            bytes_per_peer_s: report.radio.bytes_sent as f64 * 1000.0
+                / (report.peer_ms.max(1) as f64),
+        }
+    }
+}
+
+/// How long it took each live UAV to find out about each dead one, the shortest first.
+fn detections_ms(outcome: &Outcome) -> Vec<u64> {
+    let kills = outcome.report.kills.iter();
+    let mut each: Vec<u64> = kills
+        .flat_map(|k| k.detections_ms.values().copied())
+        .collect();
+    each.sort_unstable();
+    each
+}
+
+fn percentile(sorted: &[u64], percent: usize) -> Option<u64> {
+    let i = (sorted.len() * percent / 100).min(sorted.len().saturating_sub(1));
+    sorted.get(i).copied()
+}
+
+type Drawn = Result<(), Box<dyn std::error::Error>>;
+
+/// What a panel shows of a run; nothing where the run has none.
+type Shown = fn(&Point) -> Option<f64>;
+
+/// Three panels over the number of UAVs, a line a bit rate.
+fn draw(path: &str, points: &[Point]) -> Drawn {
+    let root = SVGBackend::new(path, (960, 320)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let panels = root.split_evenly((1, 3));
+    let wanted: [(&str, Shown); 3] = [
+        ("makespan over the work bound", |p| {
+            p.makespan_over_work_bound
+        }),
+        ("deaths noticed within, s (95 %)", |p| p.detection_s),
+        ("bytes a second and peer", |p| Some(p.bytes_per_peer_s)),
+    ];
+    for (number, (panel, (title, of))) in panels.iter().zip(wanted).enumerate() {
+        let highest = points.iter().filter_map(of).fold(1.0, f64::max) * 1.1;
+        let widest = points.iter().map(|p| p.n).max().unwrap_or(1);
+        let mut chart = ChartBuilder::on(panel)
+            .margin(10)
+            .caption(title, ("sans-serif", 15))
+            .x_label_area_size(34)
+            .y_label_area_size(40)
+            .build_cartesian_2d(0..widest + 1, 0.0..highest)?;
+        chart
+            .configure_mesh()
+            .x_desc("UAVs")
+            .x_labels(6)
+            .y_labels(6)
+            .light_line_style(TRANSPARENT)
+            .draw()?;
+        let rates: BTreeSet<u32> = points.iter().map(|p| p.rate_bps).collect();
+        for (i, rate_bps) in rates.into_iter().enumerate() {
+            let colour = Palette99::pick(i).filled();
+            let line: Vec<(u32, f64)> = points
+                .iter()
+                .filter(|p| p.rate_bps == rate_bps)
+                .filter_map(|p| Some((p.n, of(p)?)))
+                .collect();
+            let marks = line.iter().map(|at| Circle::new(*at, 3, colour));
+            chart.draw_series(marks)?;
+            chart
+                .draw_series(LineSeries::new(line, colour))?
+                .label(format!("{} kbit/s", rate_bps / 1000))
+                .legend(move |(x, y)| Circle::new((x, y), 3, colour));
+        }
+        if number > 0 {
+            continue;
+        }
+        chart
+            .configure_series_labels()
+            .border_style(BLACK)
+            .background_style(WHITE)
+            .position(SeriesLabelPosition::LowerRight)
+            .draw()?;
+    }
+    root.present()?;
+    Ok(())
 }
 
 /// Every third UAV, one every five seconds.
@@ -71,7 +182,8 @@ fn deaths(kills: u64, uavs: impl Iterator<Item = u16>) -> Vec<TimedFault> {
         .collect()
 }
 
-fn tell(n: u32, rate_bps: u32, outcome: &Outcome, wall_s: f64) {
+fn tell(point: &Point, outcome: &Outcome, wall_s: f64) {
+    let Point { n, rate_bps, .. } = point;
     let report = &outcome.report;
     let rounds: BTreeSet<u32> = outcome
         .entries
@@ -84,16 +196,8 @@ fn tell(n: u32, rate_bps: u32, outcome: &Outcome, wall_s: f64) {
             _ => None,
         })
         .collect();
-    let mut detections: Vec<u64> = report
-        .kills
-        .iter()
-        .flat_map(|k| k.detections_ms.values().copied())
-        .collect();
-    detections.sort_unstable();
-    let part = |percent: usize| {
-        let i = (detections.len() * percent / 100).min(detections.len().saturating_sub(1));
-        detections.get(i).copied().unwrap_or(0)
-    };
+    let detections = detections_ms(outcome);
+    let part = |percent| percentile(&detections, percent).unwrap_or(0);
     let ran_s = report.peer_ms as f64 / 1000.0;
     let kinds = report.simulated.as_ref().map(|s| &s.bytes_by_kind);
     let kinds: Vec<String> = kinds
