@@ -3,9 +3,14 @@
 use skein_netsim::spec::{GroundStationSpec, Spec, UavSpec};
 use std::net::SocketAddr;
 
-/// After this much wall time without a byte a transport gives its neighbour up,
-/// milliseconds. Short, because a trial runs faster than life; below it, starved
-/// processes on two cores would lose their links.
+/// After so many beacon periods of scenario time without a byte a transport gives its
+/// neighbour up: about when its silence counts without a hint of the transport (k1 in
+/// `docs/protocol.md` §2), so that a trial finds out about deaths as soon as a simulated run,
+/// which gives no hints.
+const LEASE_PERIODS: f64 = 4.0;
+
+/// The least that it is in time of the machine, milliseconds: starved processes on two cores
+/// would lose their links.
 const LEAST_LEASE_MS: u32 = 500;
 
 /// The same for each peer of a large swarm, milliseconds: each two of them have a link that
@@ -13,12 +18,19 @@ const LEAST_LEASE_MS: u32 = 500;
 /// processor on it, and lose their links when they are late.
 const LEASE_MS_PER_PEER: u32 = 50;
 
-/// The lease of each link in a trial.
+/// The lease of each link in a trial, milliseconds of the machine.
 #[must_use]
 pub fn lease_ms(spec: &Spec) -> u32 {
     let n = spec.uavs.len() + usize::from(spec.ground.is_some());
     let n = u32::try_from(n).unwrap_or(u32::MAX);
-    LEASE_MS_PER_PEER.saturating_mul(n).max(LEAST_LEASE_MS)
+    let least_ms = LEASE_MS_PER_PEER.saturating_mul(n).max(LEAST_LEASE_MS);
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the scale is positive; the cast saturates"
+    )]
+    let scaled_ms = (LEASE_PERIODS * f64::from(spec.beacon_period_ms) / spec.time_scale) as u32;
+    scaled_ms.max(least_ms)
 }
 
 /// What a peer's configuration needs besides the scenario.

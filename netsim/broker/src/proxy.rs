@@ -1,9 +1,12 @@
-//! Loopback proxies between the transports of each pair of peers: a cut is silence.
+//! Loopback proxies between the transports of each pair of peers: a cut is silence, and so is
+//! the end of a process.
 //!
 //! A proxy only carries or withholds bytes. What single messages suffer is decided
 //! in the nodes' radio shims; a proxy goes dark when a link has been down for so
 //! long that a transport must notice, and closes its connections afterwards if it
-//! swallowed anything, because a stream with a hole cannot be healed.
+//! swallowed anything, because a stream with a hole cannot be healed. Where one end is gone
+//! the other is left in the silence until its transport notices: over a radio no kernel says
+//! goodbye for a computer that fell from the sky.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -109,17 +112,47 @@ async fn carry(dialler: TcpStream, mut state: watch::Receiver<State>) {
     if dialler.set_nodelay(true).is_err() || listener.set_nodelay(true).is_err() {
         return;
     }
-    let (from_dialler, to_dialler) = dialler.into_split();
-    let (from_listener, to_listener) = listener.into_split();
-    // When one direction ends, dropping the other closes both.
-    tokio::select! {
-        () = pump(from_dialler, to_listener, state.clone()) => {}
-        () = pump(from_listener, to_dialler, state) => {}
+    let (mut from_dialler, mut to_dialler) = dialler.into_split();
+    let (mut from_listener, mut to_listener) = listener.into_split();
+    let end = tokio::select! {
+        end = pump(&mut from_dialler, &mut to_listener, state.clone()) => end,
+        end = pump(&mut from_listener, &mut to_dialler, state) => end.back(),
+    };
+    match end {
+        End::Hole => {}
+        End::From => swallow(&mut from_listener).await,
+        End::To => swallow(&mut from_dialler).await,
+    }
+}
+
+/// Why a direction carries no more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
+    /// Something was swallowed.
+    Hole,
+    /// Where it comes from is gone.
+    From,
+    /// Where it leads is gone.
+    To,
+}
+
+impl End {
+    /// The same, seen from the other direction.
+    fn back(self) -> Self {
+        match self {
+            Self::Hole => Self::Hole,
+            Self::From => Self::To,
+            Self::To => Self::From,
+        }
     }
 }
 
 /// Carries one direction until it ends or has a hole.
-async fn pump(mut from: OwnedReadHalf, mut to: OwnedWriteHalf, mut state: watch::Receiver<State>) {
+async fn pump(
+    from: &mut OwnedReadHalf,
+    to: &mut OwnedWriteHalf,
+    mut state: watch::Receiver<State>,
+) -> End {
     let mut buffer = vec![0; 16 * 1024];
     let mut swallowed = false;
     loop {
@@ -127,18 +160,24 @@ async fn pump(mut from: OwnedReadHalf, mut to: OwnedWriteHalf, mut state: watch:
             biased;
             changed = state.changed() => {
                 if changed.is_err() || (swallowed && !state.borrow().dark) {
-                    return;
+                    return End::Hole;
                 }
             }
             read = from.read(&mut buffer) => match read {
-                Ok(0) | Err(_) => return,
+                Ok(0) | Err(_) => return End::From,
                 Ok(_) if state.borrow().dark => swallowed = true,
                 Ok(n) => if to.write_all(&buffer[..n]).await.is_err() {
-                    return;
+                    return End::To;
                 },
             },
         }
     }
+}
+
+/// Hears somebody out to whom nobody answers any more.
+async fn swallow(from: &mut OwnedReadHalf) {
+    let mut buffer = vec![0; 16 * 1024];
+    while matches!(from.read(&mut buffer).await, Ok(n) if n > 0) {}
 }
 
 #[cfg(test)]
@@ -210,5 +249,28 @@ mod tests {
         stream.read_exact(&mut answer).await.unwrap();
         assert_eq!(answer, [3]);
         server.abort();
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
+    async fn who_is_gone_is_silent() {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let proxy = Proxy::bind().await.unwrap();
+        proxy.lead_to(listener.local_addr().unwrap());
+        for dialler_is_gone in [true, false] {
+            let mut one = TcpStream::connect(proxy.address()).await.unwrap();
+            let (mut other, _) = listener.accept().await.unwrap();
+            one.write_all(&[5]).await.unwrap();
+            assert_eq!(other.read_u8().await.unwrap(), 5);
+            if dialler_is_gone {
+                std::mem::swap(&mut one, &mut other);
+            }
+            drop(other);
+            // Neither an end nor an error, as long as it waits and whatever it says.
+            for _ in 0..3 {
+                assert_eq!(ask(&mut one, 6).await, None);
+            }
+            let waits = tokio::time::timeout(Duration::from_millis(50), one.read_u8()).await;
+            assert!(waits.is_err(), "{waits:?}");
+        }
     }
 }
