@@ -37,7 +37,12 @@ impl Graph {
         };
         let adjacent: Vec<FixedBitSet> = (0..n).map(both).collect();
         // What is heard goes further than components, along links that are up one way.
-        let ((reach, _), (_, diameter)) = (close(&adjacent), close(&hears));
+        let (reach, mutual) = close(&adjacent);
+        let diameter = if hears == adjacent {
+            mutual
+        } else {
+            close(&hears).1
+        };
         Self {
             ids,
             adjacent,
@@ -151,6 +156,8 @@ fn close(adjacent: &[FixedBitSet]) -> (Vec<FixedBitSet>, u32) {
 pub struct Stability {
     component: BTreeMap<u16, (Vec<(u16, u32)>, u64)>,
     joined: BTreeMap<(u16, u16), u64>,
+    /// The components of which these pairs are.
+    joined_of: Vec<Vec<u16>>,
     diameters: Vec<(u64, u32)>,
     window_ms: u64,
 }
@@ -167,9 +174,10 @@ impl Stability {
         window_ms: u64,
     ) -> bool {
         let mut changed = false;
-        for members in graph.components() {
+        let components = graph.components();
+        for members in &components {
             let named: Vec<(u16, u32)> = members.iter().map(|m| (*m, life(*m))).collect();
-            for m in &members {
+            for m in members {
                 let known = self.component.get(m);
                 if known.is_none_or(|(old, _)| *old != named) {
                     self.component.insert(*m, (named.clone(), now_ms));
@@ -181,7 +189,10 @@ impl Stability {
         self.component
             .retain(|id, _| graph.ids().binary_search(id).is_ok());
         changed |= before != self.component.len();
-        self.join(now_ms, graph);
+        if components != self.joined_of {
+            self.join(now_ms, graph);
+            self.joined_of = components;
+        }
         // What a peer reckons with was measured in a window, and told in the one after it.
         self.window_ms = window_ms;
         self.diameters
@@ -204,6 +215,7 @@ impl Stability {
     /// A radio fell silent or began a new life: its pairs start again.
     pub fn forget(&mut self, id: u16) {
         self.joined.retain(|(a, b), _| *a != id && *b != id);
+        self.joined_of.clear();
         self.component.remove(&id);
     }
 

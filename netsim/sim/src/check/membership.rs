@@ -228,15 +228,17 @@ impl Membership {
         for m in snapshot.peers {
             for x in snapshot.peers.iter().filter(|x| x.speaks_as != m.speaks_as) {
                 let key = (m.id, x.id);
-                let since_ms = self.countable_since_ms(snapshot, m.id, x.id);
-                let agreed = match (since_ms, m.view.peers.get(&skein_peer::PeerId(x.id))) {
-                    (None, _) => true,
-                    (Some(_), Some((life, status))) => {
-                        *life == self.life(x.id) && *status != Status::Down
-                    }
-                    (Some(_), None) => false,
+                let believed = m.view.peers.get(&skein_peer::PeerId(x.id));
+                let is_right = believed.is_some_and(|(life, status)| {
+                    *status != Status::Down && *life == self.life(x.id)
+                });
+                // Most are: only of the others it matters whether they count.
+                let since_ms = if is_right {
+                    None
+                } else {
+                    self.countable_since_ms(snapshot, m.id, x.id)
                 };
-                if agreed {
+                if since_ms.is_none() {
                     if let Some(t) = self.disagreements.stop(key) {
                         found.took("L1", snapshot.grade(), snapshot.now_ms - t, bound_ms);
                     }

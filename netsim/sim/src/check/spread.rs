@@ -28,7 +28,10 @@ struct Lack {
 /// What came to whom in one run.
 #[derive(Clone, Debug, Default)]
 pub struct SpreadCheck {
-    held: BTreeMap<u16, BTreeMap<Key, Version>>,
+    /// All records that anybody held, each with its place in the rows of `held`.
+    places: BTreeMap<Key, usize>,
+    /// Which version each peer holds, by place; (0, 0) of what it does not hold.
+    held: BTreeMap<u16, Vec<Version>>,
     lacks: BTreeMap<(u16, Key), Lack>,
     apart: Clocks<(u16, u16, bool)>,
     doubles: Clocks<(u16, u16, u16)>,
@@ -119,9 +122,13 @@ impl SpreadCheck {
         }
         let key = (record.author, record.kind, record.subject);
         let version = (record.incarnation, record.seq);
+        let next = self.places.len();
+        let place = *self.places.entry(key).or_insert(next);
         let held = self.held.entry(by).or_default();
-        let known = held.entry(key).or_insert(version);
-        *known = (*known).max(version);
+        if held.len() <= place {
+            held.resize(place + 1, Version::default());
+        }
+        held[place] = held[place].max(version);
     }
 
     /// Judges what each member of a component lacks.
@@ -151,23 +158,32 @@ impl SpreadCheck {
         });
     }
 
-    /// The newest version of each record that any of these holds, of its author's newest life.
-    fn newest(&self, peers: &[&PeerSnapshot]) -> BTreeMap<Key, Version> {
+    /// The newest version of each record that any of these holds, of its author's newest life,
+    /// with its place.
+    fn newest(&self, peers: &[&PeerSnapshot]) -> Vec<(Key, usize, Version)> {
+        let mut most = vec![Version::default(); self.places.len()];
+        for held in peers.iter().filter_map(|m| self.held.get(&m.id)) {
+            for (most, version) in most.iter_mut().zip(held) {
+                *most = (*most).max(*version);
+            }
+        }
         let mut lives: BTreeMap<u16, Incarnation> = BTreeMap::new();
-        let mut newest: BTreeMap<Key, Version> = BTreeMap::new();
-        for (key, version) in peers.iter().filter_map(|m| self.held.get(&m.id)).flatten() {
+        for (key, place) in &self.places {
             let life = lives.entry(self.id_of(key.0)).or_default();
-            *life = (*life).max(version.0);
-            let known = newest.entry(*key).or_insert(*version);
-            *known = (*known).max(*version);
+            *life = (*life).max(most[*place].0);
         }
         // A later life voids all that earlier ones said; an author knows its own.
         for m in peers {
             let life = lives.entry(m.speaks_as).or_default();
             *life = (*life).max(m.view.incarnation);
         }
-        newest.retain(|key, version| lives.get(&self.id_of(key.0)) == Some(&version.0));
+        let newest = self.places.iter().map(|(key, i)| (*key, *i, most[*i]));
+        let is_held = |version: &Version| *version > Version::default();
         newest
+            .filter(|(key, _, version)| {
+                is_held(version) && lives.get(&self.id_of(key.0)) == Some(&version.0)
+            })
+            .collect()
     }
 
     fn look_for_lacks(
@@ -180,16 +196,16 @@ impl SpreadCheck {
     ) {
         let newest = self.newest(peers);
         for m in peers {
-            let others = newest
-                .iter()
-                .filter(|(key, _)| self.twins.get(&key.0).copied().unwrap_or(key.0) != m.speaks_as);
-            for (key, wanted) in others {
-                let bound_ms = record_ms(&snapshot.bounds, peers.len());
-                let held = self.held.get(&m.id).and_then(|h| h.get(key));
-                let held = held.copied().unwrap_or_default();
+            let row = self.held.get(&m.id).map_or(&[][..], |row| &row[..]);
+            let others = newest.iter().filter(|(key, ..)| {
+                self.twins.get(&key.0).copied().unwrap_or(key.0) != m.speaks_as
+            });
+            for (key, place, wanted) in others {
+                let held = row.get(*place).copied().unwrap_or_default();
                 if held >= *wanted {
                     continue;
                 }
+                let bound_ms = record_ms(&snapshot.bounds, peers.len());
                 let fresh = Lack {
                     version: *wanted,
                     since_ms: snapshot.now_ms,

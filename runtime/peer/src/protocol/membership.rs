@@ -88,8 +88,12 @@ struct Patience {
 struct Extent {
     /// The longest interval that anybody alive announced, T', quarters of T.
     interval: u8,
+    /// Who announced it, unless this peer did.
+    interval_by: Option<u16>,
     /// The most hops that anybody alive is away, or says that somebody is.
     hops: u8,
+    /// Whose hops these are: of several the one of whom they were heard last.
+    hops_by: Option<u16>,
     /// Unless something else is heard it is so until then.
     until: Time,
 }
@@ -228,27 +232,33 @@ impl Membership {
     }
 
     fn measured(&self, now: Time) -> Extent {
-        let interval = self.longest_interval();
+        let slowest = self.living().max_by_key(|k| k.freshest.interval);
+        let slowest = slowest.map(|k| k.freshest);
+        let slowest = slowest.filter(|h| h.interval > self.interval);
+        let interval = slowest.map_or(self.interval, |h| h.interval);
         let window_ms = self.window_ms(interval);
-        let each = || self.living().map(|k| k.weight(now, window_ms));
-        let hops = each().map(|w| w.hops.max(w.eccentricity)).max();
+        let each = || self.living().map(|k| (k, k.weight(now, window_ms)));
+        let hops = each().map(|(_, w)| w.hops.max(w.eccentricity)).max();
         let hops = hops.unwrap_or(0);
         // Until then nobody is farther, and somebody is as far.
-        let (mut nearer, mut as_far) = (Time(u64::MAX), Time(0));
-        for (known, weight) in self.living().zip(each()) {
+        let mut nearer = Time(u64::MAX);
+        let mut as_far: Option<(Time, u16)> = None;
+        for (known, weight) in each() {
+            let last = known.last_within(hops);
+            let said = known.info.heard.filter(|_| weight.eccentricity == hops);
+            let is_as_far = (weight.hops == hops).then_some(last).max(said);
             if weight.hops > 0 {
-                let last = known.last_within(hops);
                 nearer = nearer.min(last);
-                as_far = as_far.max(if weight.hops == hops { last } else { Time(0) });
             }
-            if weight.eccentricity == hops {
-                as_far = as_far.max(known.info.heard.unwrap_or_default());
-            }
+            as_far = as_far.max(is_as_far.map(|since| (since, known.freshest.id)));
         }
-        let until = if hops > 0 { nearer.min(as_far) } else { nearer };
+        let as_far = as_far.filter(|_| hops > 0);
+        let until = as_far.map_or(nearer, |(since, _)| nearer.min(since));
         Extent {
             interval,
+            interval_by: slowest.map(|h| h.id),
             hops,
+            hops_by: as_far.map(|(_, id)| id),
             until: until.plus_ms(window_ms),
         }
     }
@@ -266,18 +276,17 @@ impl Membership {
         })
     }
 
-    /// A peer weighs something else now: the extent stays what it is unless this was, or is,
-    /// the most. Of who comes back what was heard before it went counts again.
-    fn weighed(&mut self, before: Weight, after: Weight) {
-        let Some(extent) = self.extent.get() else {
+    /// A peer weighs something else now: the extent stays what it is unless this peer's was
+    /// the most or is more. Of who comes back what was heard before it went counts again.
+    fn weighed(&mut self, id: u16, before: Weight, after: Weight) {
+        let Some(extent) = self.extent.get().filter(|_| before != after) else {
             return;
         };
-        let is_most = |before: u8, after: u8, most| before != after && before.max(after) >= most;
-        if before == Weight::default()
-            || is_most(before.interval, after.interval, extent.interval)
-            || is_most(before.hops, after.hops, extent.hops)
-            || is_most(before.eccentricity, after.eccentricity, extent.hops)
-        {
+        let was_most = [extent.interval_by, extent.hops_by].contains(&Some(id));
+        let is_more = after.interval > extent.interval
+            || after.hops > extent.hops
+            || after.eccentricity > extent.hops;
+        if was_most || is_more || before == Weight::default() {
             self.extent.set(None);
         }
     }
@@ -341,7 +350,7 @@ impl Membership {
             teller.info = info_of(beacon, steady_since, now);
             teller.eccentricity = beacon.eccentricity.min(HOPS_MAX);
         }
-        self.weighed(before.0, self.weight(now, author));
+        self.weighed(author, before.0, self.weight(now, author));
         self.changes += u64::from(before.1 != self.seat(author));
         for told in &beacon.gossip {
             if told.id != self.me && told.id != author {
@@ -484,7 +493,7 @@ impl Membership {
     ) -> bool {
         let before = (self.weight(now, heard.id), self.seat(heard.id));
         let fresher = self.merge(now, heard, limits, changes);
-        self.weighed(before.0, self.weight(now, heard.id));
+        self.weighed(heard.id, before.0, self.weight(now, heard.id));
         self.changes += u64::from(before.1 != self.seat(heard.id));
         fresher
     }

@@ -314,6 +314,8 @@ impl Negotiation {
         }
         if self.sections.take_listing() || ctx.live_changed {
             self.orphans = self.sections.orphans(ctx.live);
+            let orphans = &self.orphans;
+            self.orphaned_at.retain(|c, _| orphans.contains(*c));
         }
         let orphans = core::mem::take(&mut self.orphans);
         self.watch_orphans(ctx, &orphans);
@@ -358,8 +360,8 @@ impl Negotiation {
             // counts from the decision.
             self.orphan_since = self.orphan_since.or(Some(ctx.now)).max(self.decided_at);
         }
-        self.orphaned_at.retain(|c, _| orphans.contains(*c));
-        if is_many(ctx) && ctx.able_since.is_some() {
+        let noted = self.orphaned_at.len() == usize::from(orphans.count());
+        if !noted && is_many(ctx) && ctx.able_since.is_some() {
             for cell in orphans.iter() {
                 self.orphaned_at.entry(cell).or_insert(ctx.now);
             }
