@@ -17,7 +17,7 @@ use skein_geometry::frame::Point;
 use skein_peer::journal::Durable;
 use skein_peer::output::Status;
 use skein_peer::wire::message::{Bid, Heartbeat};
-use skein_peer::{Beliefs, Report};
+use skein_peer::{Beliefs, Incarnation, Report};
 use std::collections::BTreeMap;
 
 /// Hard places that a batch of seeds must have reached to mean anything.
@@ -127,8 +127,11 @@ impl Checker {
     }
 
     /// A process falls silent since another one speaks under its id: for all others it is
-    /// gone, as one that stands still.
-    pub fn on_silenced(&mut self, now_ms: u64, id: u16) {
+    /// gone, as one that stands still. In lives that it shared its heirs are meant.
+    pub fn on_silenced(&mut self, now_ms: u64, id: u16, heirs: &[(Incarnation, u16)]) {
+        for (life, heir) in heirs {
+            self.members.on_heir(id, *heir, *life);
+        }
         self.on_silent(now_ms, id, false, false);
         self.twins.on_silenced(id);
     }
@@ -203,14 +206,16 @@ impl Checker {
 
     /// A peer reports something, having adopted so many divisions in its present life.
     pub fn on_report(&mut self, now_ms: u64, id: u16, report: &Report, adoptions: u32) {
-        self.rules.on_report(
-            now_ms,
-            id,
-            report,
-            (adoptions, self.bounds.diameter, &self.listing),
-            &self.handicaps,
-            &mut self.found,
-        );
+        if !self.twins.is_shared(report) {
+            self.rules.on_report(
+                now_ms,
+                id,
+                report,
+                (adoptions, self.bounds.diameter, &self.listing),
+                &self.handicaps,
+                &mut self.found,
+            );
+        }
         match report {
             Report::Booted { incarnation } => {
                 self.members.on_life(now_ms, id, *incarnation);
@@ -274,6 +279,7 @@ impl Checker {
         bytes_hash: u64,
         durable: (&[Vec<u8>], &[bool]),
     ) {
+        self.twins.on_said(id, said.record.incarnation);
         self.record
             .on_said(now_ms, id, said, bytes_hash, durable, &mut self.found);
         let seen = (self.loop_hash, durable.1);

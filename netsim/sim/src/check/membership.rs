@@ -72,6 +72,18 @@ impl Membership {
         self.late.retain(|(o, _)| *o != id);
     }
 
+    /// What others believe of this life of one peer they believe of another one.
+    pub fn on_heir(&mut self, of: u16, heir: u16, life: u32) {
+        let about = |(key, belief): (&(u16, u16), &(u32, Status))| {
+            (key.1 == of && belief.0 == life).then_some((key.0, *belief))
+        };
+        let beliefs: Vec<_> = self.beliefs.iter().filter_map(about).collect();
+        for (observer, belief) in beliefs {
+            self.beliefs.remove(&(observer, of));
+            self.beliefs.entry((observer, heir)).or_insert(belief);
+        }
+    }
+
     /// One peer means another one by the id of this one: for it this one is gone.
     pub fn on_another_meant(&mut self, now_ms: u64, observer: u16, subject: u16) {
         let known = self.beliefs.remove(&(observer, subject)).is_some();

@@ -2,6 +2,7 @@
 //! and plans nothing, and goes home (`twins`, `home`).
 
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
+use skein_peer::{Incarnation, Report};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A peer looks four times a period, and the check once.
@@ -17,6 +18,8 @@ pub struct TwinCheck {
     /// The id of each twin, by number.
     twins: BTreeMap<u16, u16>,
     silent: BTreeSet<u16>,
+    /// By id and life who spoke in it first, and whether another one did, too.
+    lives: BTreeMap<(u16, Incarnation), (u16, bool)>,
     both: Clocks<(u16, u16)>,
     neither: Clocks<u16>,
     told: Clocks<u16>,
@@ -42,6 +45,29 @@ impl TwinCheck {
         let twins = self.twins.iter().filter(|(_, of)| **of == id);
         let all = twins.map(|(n, _)| *n).chain([id]);
         all.filter(|n| *n != number).collect()
+    }
+
+    /// A peer says something in a life.
+    pub fn on_said(&mut self, number: u16, life: Incarnation) {
+        let key = (self.id_of(number), life);
+        if !self.others(number).is_empty() {
+            let spoke = self.lives.entry(key).or_insert((number, false));
+            spoke.1 |= spoke.0 != number;
+        }
+    }
+
+    /// Whether this is a belief about a life in which two spoke: their heartbeats cannot be
+    /// told apart, and the one with fewer is heard and not believed until it takes another.
+    #[must_use]
+    pub fn is_shared(&self, report: &Report) -> bool {
+        let Report::Membership {
+            peer, incarnation, ..
+        } = report
+        else {
+            return false;
+        };
+        let spoke = self.lives.get(&(self.id_of(peer.0), *incarnation));
+        spoke.is_some_and(|(_, shared)| *shared)
     }
 
     /// A peer falls silent.

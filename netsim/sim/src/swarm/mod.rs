@@ -920,7 +920,8 @@ impl Swarm {
             }
             Report::Silenced => {
                 self.peers[idx].silent = true;
-                self.checker.on_silenced(now_ms, id);
+                let heirs = self.names.silence(id);
+                self.checker.on_silenced(now_ms, id, &heirs);
             }
             _ => {}
         }

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Names {
     /// The id under which the peer with this number speaks, where it is another one.
     twins: BTreeMap<u16, u16>,
-    /// Who spoke in each life of an id, the last one last.
+    /// Who spoke in each life of an id, in that order, while it is not silent.
     lives: BTreeMap<(u16, Incarnation), Vec<u16>>,
 }
 
@@ -38,18 +38,32 @@ impl Names {
         let id = self.twins.get(&number).copied().unwrap_or(number);
         if self.is_ambiguous(id) {
             let spoke = self.lives.entry((id, life)).or_default();
-            spoke.retain(|n| *n != number);
-            spoke.push(number);
+            if !spoke.contains(&number) {
+                spoke.push(number);
+            }
         }
     }
 
-    /// Who is meant by an id in a life: the last one that spoke in it of those in reach, else
-    /// the last one that did, else the one whose number it is.
+    /// A peer is silent: whoever spoke beside it in one of its lives is meant by that from
+    /// now on. Returns who, and in which life.
+    pub fn silence(&mut self, number: u16) -> Vec<(Incarnation, u16)> {
+        let mut heirs = Vec::new();
+        for ((_, life), spoke) in &mut self.lives {
+            if spoke.len() > 1 && spoke.contains(&number) {
+                spoke.retain(|n| *n != number);
+                heirs.extend(spoke.first().map(|heir| (*life, *heir)));
+            }
+        }
+        heirs
+    }
+
+    /// Who is meant by an id in a life: the first one that spoke in it of those in reach, else
+    /// the first one that did, else the one whose number it is.
     #[must_use]
     pub fn meant(&self, id: u16, life: Incarnation, in_reach: impl Fn(u16) -> bool) -> u16 {
         let spoke = self.lives.get(&(id, life)).map_or(&[][..], Vec::as_slice);
-        let near = spoke.iter().rev().find(|n| in_reach(**n));
-        near.or(spoke.last()).copied().unwrap_or(id)
+        let near = spoke.iter().find(|n| in_reach(**n));
+        near.or(spoke.first()).copied().unwrap_or(id)
     }
 }
 
@@ -69,5 +83,9 @@ mod tests {
         assert_eq!(names.meant(3, 2, |n| n == 3), 9, "nobody else spoke in it");
         assert_eq!(names.meant(3, 5, |_| true), 3);
         assert_eq!(names.meant(4, 1, |_| true), 4);
+        assert_eq!(names.meant(3, 1, |_| true), 3, "the first one");
+        assert_eq!(names.silence(3), [(1, 9)]);
+        assert_eq!(names.meant(3, 1, |n| n == 3), 9);
+        assert!(names.silence(9).is_empty(), "nobody else is left");
     }
 }
