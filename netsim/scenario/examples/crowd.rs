@@ -206,10 +206,11 @@ fn tell(point: &Point, outcome: &Outcome, wall_s: f64) {
         .map(|(kind, bytes)| format!("{kind} {:.0}", *bytes as f64 / ran_s))
         .collect();
     println!(
-        "{n} UAVs {rate_bps} bit/s seed {}: makespan {:?} ms, {:.2} of the work bound, end {} ms; false downs {}; rounds {}; detection p50 {} p95 {} ms; lost by collision {}; bytes/s a peer: {}; violations {:?}; {:.0} times real time",
+        "{n} UAVs {rate_bps} bit/s seed {}: makespan {:?} ms, {:.2} of the work bound, {:.2} of that from the take-offs on, end {} ms; false downs {}; rounds {}; detection p50 {} p95 {} ms; lost by collision {}; bytes/s a peer: {}; violations {:?}; {:.0} times real time",
         report.seed,
         report.makespan_ms,
         report.makespan_over_work_bound.unwrap_or(0.0),
+        report.makespan_over_launch_bound.unwrap_or(0.0),
         report.end_ms,
         outcome.false_downs().len(),
         rounds.len(),
