@@ -6,7 +6,7 @@
 //! | the operator said hold | loiter here |
 //! | the operator said return, or all is covered, or the fuel is due, or another process speaks under its id | loiter at base |
 //! | the plan has cells | fly them |
-//! | nothing to fly, others at work | loiter here, at the seam |
+//! | nothing to fly, others at work | loiter where it is |
 //! | and among many nobody is heard | loiter at base |
 //!
 //! | event | what follows |

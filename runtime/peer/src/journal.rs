@@ -102,11 +102,11 @@ pub struct Durable {
     pub counter: u32,
     /// The latest bid.
     pub bid: Option<Bid>,
-    /// The latest section adopted.
+    /// The latest claim: a division adopted, or cells taken.
     pub claim: Option<Claim>,
     /// Covered cells, run-length encoded along the loop of `loop_hash`.
     pub covered: Vec<u8>,
-    /// The loop of `union`.
+    /// The loop of `covered`.
     pub loop_hash: u64,
     /// Number of cells of that loop.
     pub cells: u16,

@@ -111,7 +111,7 @@ pub(crate) struct MissionState {
     /// Cells covered by itself since the last entry of the journal.
     pub unsaved_cells: u16,
     pub claims: ClaimsWritten,
-    /// The roster, until it was used.
+    /// The roster: who begins where.
     pub launches: Arc<[Launch]>,
     /// Who of it was not heard of yet, and until when it is taken to be there.
     pub expected: BTreeMap<u16, Time>,

@@ -99,7 +99,8 @@ pub enum Report {
         /// Its members.
         members: Vec<PeerId>,
     },
-    /// A division was adopted, or cells were taken without a round.
+    /// The own claim was spoken: a division was adopted, cells were taken without a round, or
+    /// the expected end changed.
     Claim {
         /// Counter of the epoch.
         counter: u32,
@@ -132,7 +133,8 @@ pub enum Report {
         /// What.
         text: String,
     },
-    /// Bytes that were refused; nothing changed.
+    /// A record, a percept or an order that was refused: it changes no belief. A claim or a bid
+    /// that is refused for a round far ahead was well formed, and is passed on all the same.
     Refused {
         /// Why.
         reason: String,

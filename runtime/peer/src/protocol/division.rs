@@ -58,7 +58,7 @@ pub fn problem(
 }
 
 /// Whether the division of a complete round is adopted. All members judge alike:
-/// only the bids count.
+/// only the bids count, and the beacon period, which is configured alike everywhere.
 #[must_use]
 pub fn worthwhile(open: &OpenRound, division: &Division, beacon_period_ms: u64) -> bool {
     if open.round.loss {
@@ -137,7 +137,7 @@ pub fn section_of(division: &Division, ring: &[RingCell], id: u16) -> Vec<(u16, 
     out
 }
 
-/// Cells of commitments, in the order of the runs.
+/// The cells that the flyer of a bid is about to fly and keeps.
 #[must_use]
 pub fn commits_of(bid: &Bid, n: u16) -> CellSet {
     let mut set = CellSet::new(n);

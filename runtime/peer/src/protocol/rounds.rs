@@ -236,8 +236,8 @@ impl Rounds {
         })
     }
 
-    /// The open round ended in a decision: it is closed, and all that answered are
-    /// no longer silent.
+    /// The open round ended in a decision: it is closed, and nobody counts as
+    /// silent any more, also who was left out of it: the next round asks all.
     pub fn close(&mut self) {
         if let Some(open) = self.open.take() {
             self.closed = Some(order_of(&open.round));
