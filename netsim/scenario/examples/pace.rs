@@ -1,4 +1,5 @@
-//! How long a swarm takes, over the work bound and over a coordinator that knows all:
+//! How long a swarm takes, over the work bound and over a coordinator that knows all, how soon
+//! each peer knows of a death, and how often the living are believed dead:
 //! `cargo run --release -p skein-scenario --example pace -- helsinki 1000..1020 none --peers 8`.
 //!
 //! The third argument is `none` (no faults), `kills` (three UAVs lost for good as in the
@@ -64,15 +65,20 @@ fn told() -> Result<(), String> {
     let mut planned = prepared.spec.faults.clone();
     planned.retain(|f| kept(&f.fault));
     let (mut over_bound, mut over_baseline, mut failed) = (Vec::new(), Vec::new(), Vec::new());
-    let mut false_downs = 0;
+    let (mut false_downs, mut peer_ms, mut detections_s) = (0, 0, Vec::new());
     for seed in seeds.from..seeds.to {
         let o = if faults == "storm" {
             storm(&prepared, seed, free_ms, wanted)
         } else {
             run(&prepared, seed, planned.clone(), wanted)
         };
-        let swarm = o.report.simulated.as_ref();
-        false_downs += swarm.map_or(0, |s| s.false_downs.len());
+        for down in o.false_downs() {
+            eprintln!("seed {seed}: {down:?}");
+        }
+        false_downs += o.false_downs().len();
+        peer_ms += o.report.peer_ms;
+        let detections_ms = o.report.kills.iter().flat_map(|k| k.detections_ms.values());
+        detections_s.extend(detections_ms.map(|ms| *ms as f64 / 1000.0));
         over_bound.extend(o.report.makespan_over_work_bound);
         over_baseline.extend(o.report.makespan_over_baseline);
         if !o.report.passed {
@@ -87,14 +93,20 @@ fn told() -> Result<(), String> {
         }
     }
     let (a, b) = (Spread::of(over_bound), Spread::of(over_baseline));
+    let detection = Spread::of(detections_s);
+    let an_hour = f64::from(u32::try_from(false_downs).unwrap_or(u32::MAX)) * 3.6e6;
     println!(
-        "{}: over the work bound p50 {:.2} p95 {:.2} max {:.2}; over a coordinator p50 {:.2} p95 {:.2}; false downs {false_downs}; failed {failed:?}",
+        "{}: over the work bound p50 {:.2} p95 {:.2} max {:.2}; over a coordinator p50 {:.2} p95 {:.2}; detection p50 {:.1} p95 {:.1} max {:.1} s; false downs {false_downs}, {:.3} a peer-hour; failed {failed:?}",
         args.join(" "),
         a.p50,
         a.p95,
         a.max,
         b.p50,
-        b.p95
+        b.p95,
+        detection.p50,
+        detection.p95,
+        detection.max,
+        an_hour / peer_ms.max(1) as f64,
     );
     Ok(())
 }
