@@ -117,6 +117,18 @@ pub struct Info {
     pub place: Option<OffLoop>,
 }
 
+impl Info {
+    /// A neighbour tells of it. Members work on one loop: who is said to be able by a peer is
+    /// on that peer's loop, until its own beacon says otherwise.
+    fn hear_of(&mut self, able: bool, said: Option<&Beacon>) {
+        self.able = able;
+        if let Some(said) = said.filter(|_| able && self.heard.is_none()) {
+            self.revision = said.revision;
+            self.loop_hash = said.loop_hash;
+        }
+    }
+}
+
 /// All that a peer believes of others.
 #[derive(Clone, Debug)]
 pub struct Membership {
@@ -357,7 +369,11 @@ impl Membership {
                 self.on_gossip(now, told, (author, beacon), limits, &mut changes);
             }
         }
-        changes.extend(self.on_others(now, author, &beacon.fresh));
+        for told in &beacon.fresh {
+            if told.id != self.me && told.id != author {
+                self.on_fresh(now, told, (author, Some(beacon)), limits, &mut changes);
+            }
+        }
         changes
     }
 
@@ -367,7 +383,7 @@ impl Membership {
         let limits = self.patience(now);
         for told in others {
             if told.id != self.me && told.id != author {
-                self.on_fresh(now, told, author, limits, &mut changes);
+                self.on_fresh(now, told, (author, None), limits, &mut changes);
             }
         }
         changes
@@ -437,30 +453,26 @@ impl Membership {
             if !fresher {
                 return;
             }
-            known.info.able = told.able;
-            // Members work on one loop: who is said to be able by a peer is on that peer's
-            // loop, until its own beacon says otherwise.
-            if known.info.heard.is_none() && told.able {
-                known.info.revision = said.revision;
-                known.info.loop_hash = said.loop_hash;
-            }
+            known.info.hear_of(told.able, Some(said));
         }
         self.changes += u64::from(before != self.seat(told.id));
     }
 
-    /// A heartbeat without anything else: of a life that is known here, or it says nothing.
+    /// A heartbeat without anything else. Of a life it tells the last bits: of a peer that is
+    /// not known these are the life, until a higher one is heard of.
     fn on_fresh(
         &mut self,
         now: Time,
         told: &Fresh,
-        teller: u16,
+        (teller, said): (u16, Option<&Beacon>),
         limits: Patience,
         changes: &mut Vec<Change>,
     ) {
         let life = self.known.get(&told.id).map(|k| k.freshest.incarnation);
-        let Some(incarnation) = life.filter(|life| Fresh::life_of(*life) == told.life) else {
+        let incarnation = life.unwrap_or(Incarnation::from(told.life));
+        if incarnation == 0 || Fresh::life_of(incarnation) != told.life {
             return;
-        };
+        }
         let heartbeat = Heartbeat {
             id: told.id,
             incarnation,
@@ -474,13 +486,14 @@ impl Membership {
             suspected: None,
         };
         let fresher = self.hear(now, heartbeat, limits, changes);
+        let before = self.seat(told.id);
         if let Some(known) = self.known.get_mut(&told.id) {
             known.note_told(now, teller, &heartbeat, limits.interval_ms);
             if fresher {
-                self.changes += u64::from(known.info.able != told.able);
-                known.info.able = told.able;
+                known.info.hear_of(told.able, said);
             }
         }
+        self.changes += u64::from(before != self.seat(told.id));
     }
 
     /// Merges one heartbeat. Returns whether it was fresher than what was known.
@@ -693,43 +706,40 @@ impl Membership {
         changes
     }
 
-    /// What to say of others in the room of so many entries, half of which is for heartbeats
-    /// alone where not everybody fits: of those who are news and of those whom a neighbour is
-    /// farther from. The first of these go with the heartbeat between this beacon and the
-    /// next ([`Membership::tell_between`]).
+    /// What to say of others in the room of so many entries: where not everybody fits, a
+    /// quarter of it is for whole entries and another for news, the rest for heartbeats alone,
+    /// of those first of whom it gains most to tell. Half of these go with the heartbeat between
+    /// this beacon and the next ([`Membership::tell_between`]).
     pub fn tell(&mut self, now: Time, entries: usize) -> (Vec<Gossip>, Vec<Fresh>) {
         if self.known.len() <= entries {
             self.between = 0;
             return (self.gossip(now, entries), Vec::new());
         }
-        let full = entries.div_ceil(2);
+        let news = self.known.values().filter(|k| k.urgent_until > now).count();
+        let full = entries.div_ceil(4) + news.min(entries / 4);
         let told = self.gossip(now, full);
         let room = (entries - full) * ENTRY_BYTES / FRESH_BYTES;
-        self.between = room.min(BETWEEN_MAX);
+        self.between = room.div_ceil(2).min(BETWEEN_MAX);
         let fresh = self.fresh(now, &told, room - self.between);
         (told, fresh)
     }
 
     fn fresh(&mut self, now: Time, told: &[Gossip], max: usize) -> Vec<Fresh> {
+        // Where everybody hears everybody nobody has to be told.
+        let far = self.diameter(now) > 1;
         let others = self
             .known
             .iter_mut()
-            .filter(|(_, k)| k.is_worth_telling(now));
+            .filter(|(_, k)| k.is_believed() && (far || k.is_wanted(now)));
         let mut wanted: Vec<&mut Known> = others
             .filter(|(id, _)| told.iter().all(|g| g.id != **id))
             .map(|(_, k)| k)
             .collect();
-        wanted.sort_by_key(|k| {
-            (
-                k.urgent_until <= now,
-                Reverse(k.want_ms(now)),
-                k.freshest.id,
-            )
-        });
+        wanted.sort_by_key(|k| (Reverse(k.want(now)), k.freshest.id));
         wanted.truncate(max);
         wanted.sort_by_key(|k| k.freshest.id);
         let say = |known: &mut Known| {
-            known.told = now;
+            known.tell(now);
             known.fresh(now)
         };
         wanted.into_iter().map(say).collect()
@@ -758,8 +768,8 @@ impl Membership {
         ids.truncate(max / 2);
         let others = self.known.iter().filter(|(id, _)| !ids.contains(id));
         let wanted = others.filter(|(_, k)| k.is_wanted(now));
-        let mut wanted: Vec<(Reverse<u64>, u16)> = wanted
-            .map(|(id, k)| (Reverse(k.want_ms(now)), *id))
+        let mut wanted: Vec<(Reverse<(u64, u64)>, u16)> = wanted
+            .map(|(id, k)| (Reverse(k.want(now)), *id))
             .collect();
         wanted.sort_unstable();
         let room = max - ids.len();
@@ -784,7 +794,7 @@ impl Membership {
         ids.extend(rest);
         for id in &ids {
             if let Some(known) = self.known.get_mut(id) {
-                known.told = now;
+                known.tell(now);
             }
         }
         let entries = ids.iter().filter_map(|id| self.known.get(id));

@@ -19,6 +19,11 @@ impl Age {
         self.told_ms.saturating_add(now.since_ms(self.at))
     }
 
+    /// When what is so old began.
+    fn since(self) -> Time {
+        Time(self.at.0.saturating_sub(self.told_ms))
+    }
+
     /// As it is told: 100 ms units, rounded up.
     fn ds(self, now: Time) -> u16 {
         u16::try_from(self.ms(now).div_ceil(100)).unwrap_or(u16::MAX)
@@ -54,7 +59,9 @@ pub(super) struct Known {
     /// A neighbour that depends on what this peer tells of it.
     lag: Option<Lag>,
     /// When this peer last told of it.
-    pub(super) told: Time,
+    told: Time,
+    /// When the heartbeat was sent that neighbours were last told of.
+    told_sent: Time,
     /// An old heartbeat of this very life with a higher count than it now sends: it lost
     /// its disk and uses an incarnation twice. It is told, so that it takes a new one.
     pub(super) higher_count_heard: Option<Heartbeat>,
@@ -114,6 +121,7 @@ impl Known {
             urgent_until,
             lag: None,
             told: Time(0),
+            told_sent: Time(0),
             higher_count_heard: None,
         }
     }
@@ -173,24 +181,42 @@ impl Known {
         // One hop is that from the neighbour.
         let farther = told.hops > mine.hops.saturating_add(1);
         let behind = told.count.saturating_add(BEHIND) <= mine.count;
+        let sent = told.age.since();
         let told = Lag {
             teller,
-            since: Time(now.0.saturating_sub(told.age.ms(now))),
+            since: sent,
             at: now,
             until: now.plus_ms(super::HOP_INTERVALS * interval_ms),
         };
+        if !farther && !behind {
+            return self.others_told(sent);
+        }
         let outdated =
             |lag: Lag| lag.teller == teller || now.since_ms(lag.at) > LAG_INTERVALS * interval_ms;
-        let replaces = self
+        if self
             .lag
-            .is_none_or(|lag| outdated(lag) || told.since < lag.since);
-        if (farther || behind) && replaces {
-            self.lag = Some(told);
-        } else if let Some(lag) = &mut self.lag
-            && (farther || behind)
+            .is_none_or(|lag| outdated(lag) || told.since < lag.since)
         {
+            self.lag = Some(told);
+        } else if let Some(lag) = &mut self.lag {
             lag.until = lag.until.max(told.until);
         }
+    }
+
+    /// Neighbours were told of a heartbeat that was sent then. One in two did not hear it.
+    fn others_told(&mut self, sent: Time) {
+        let half = |before: Time| Time(u64::midpoint(before.0, sent.0)).max(before);
+        self.told_sent = half(self.told_sent);
+        if let Some(lag) = &mut self.lag {
+            lag.since = half(lag.since);
+        }
+    }
+
+    /// This peer tells of it.
+    pub(super) fn tell(&mut self, now: Time) {
+        let sent = self.freshest.age.since();
+        self.others_told(sent);
+        (self.told, self.told_sent) = (now, sent);
     }
 
     /// Whether a neighbour depends on what this peer tells of it.
@@ -198,11 +224,15 @@ impl Known {
         self.lag.is_some_and(|lag| lag.until > now)
     }
 
-    /// How much it is wanted: how old its heartbeat is where it is oldest, if what this peer
-    /// told last did not arrive, and if it did. One in two does not.
-    pub(super) fn want_ms(&self, now: Time) -> u64 {
-        let there_ms = self.lag.map_or(0, |lag| now.since_ms(lag.since));
-        there_ms.saturating_add(now.since_ms(self.told))
+    /// How much is gained by telling of it: by so much the heartbeat known here is later than
+    /// what the neighbour knows that knows least, or half of what it is later than the last
+    /// one told. Of equals goes first who was told of longest ago.
+    pub(super) fn want(&self, now: Time) -> (u64, u64) {
+        let sent = self.freshest.age.since();
+        let lag = self.lag.filter(|lag| lag.until > now);
+        let there_ms = lag.map_or(0, |lag| sent.since_ms(lag.since));
+        let untold_ms = sent.since_ms(self.told_sent) / 2;
+        (there_ms.max(untold_ms), now.since_ms(self.told))
     }
 
     /// Whether somebody is told to be suspected who was heard since.
@@ -262,10 +292,9 @@ impl Known {
         self.told(&self.freshest, now)
     }
 
-    /// Whether its heartbeat alone is worth telling: news, or a neighbour may depend on it.
-    pub(super) fn is_worth_telling(&self, now: Time) -> bool {
-        let asked = self.urgent_until > now || self.is_wanted(now);
-        asked && self.status == Status::Alive && self.freshest.suspected.is_none()
+    /// Whether its heartbeat alone tells what is believed of it.
+    pub(super) fn is_believed(&self) -> bool {
+        self.status == Status::Alive && self.freshest.suspected.is_none()
     }
 
     pub(super) fn fresh(&self, now: Time) -> Fresh {

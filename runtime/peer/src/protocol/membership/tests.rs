@@ -378,10 +378,9 @@ fn among_nineteen() -> Membership {
     m
 }
 
-/// Peer 3 hears 6 and 7 by others, and has not heard of 6 for long. That peers as near to 6
-/// as this one tell of it as well is of no use to 3, which does not hear them.
+/// Peer 3 hears 6 and 7 by others, and has not heard of 6 for long.
 #[test]
-fn who_is_heard_of_least_elsewhere_is_told_of_first_whoever_else_tells_of_it() {
+fn of_whom_it_gains_most_to_tell_is_told_first() {
     let mut m = among_nineteen();
     let far = |id, heartbeat, age_ds| Gossip {
         hops: 2,
@@ -389,9 +388,6 @@ fn who_is_heard_of_least_elsewhere_is_told_of_first_whoever_else_tells_of_it() {
     };
     let entries = vec![far(6, 5, 60), far(7, 9, 5)];
     m.on_beacon(Time(3_000), 3, 1, &beacon(11, entries));
-    for (now, teller) in [(Time(4_000), 4), (Time(4_900), 5)] {
-        m.on_beacon(now, teller, 1, &beacon(11, vec![entry(6, 10, 9, None)]));
-    }
     let mut first = |now_ms| m.gossip(Time(now_ms), 2)[0].id;
     assert_eq!(first(5_000), 6);
     // It was told just now; but as likely as not that was lost.
@@ -400,6 +396,26 @@ fn who_is_heard_of_least_elsewhere_is_told_of_first_whoever_else_tells_of_it() {
     let heard = vec![far(6, 10, 10), far(7, 5, 70)];
     m.on_beacon(Time(6_100), 3, 1, &beacon(12, heard));
     assert_eq!(m.gossip(Time(7_000), 2)[0].id, 7);
+}
+
+/// What another neighbour tells arrives where it is wanted one time in two, too: it is wanted
+/// less of this peer, and not no more, since who wants it may hear this peer alone.
+#[test]
+fn what_another_tells_is_wanted_half_as_much() {
+    let mut m = among_nineteen();
+    let far = |id, heartbeat, age_ds| Gossip {
+        hops: 2,
+        ..entry(id, heartbeat, age_ds, None)
+    };
+    let lags = vec![far(6, 5, 60), far(7, 5, 18)];
+    m.on_beacon(Time(3_000), 3, 1, &beacon(11, lags));
+    let want = |m: &Membership, id: u16| m.known[&id].want(Time(5_000)).0;
+    assert_eq!((want(&m, 6), want(&m, 7)), (2_500, 1_300));
+    for (now, left_ms) in [(Time(4_000), 1_250), (Time(4_500), 625)] {
+        let age_ds = u16::try_from((now.0 - 2_500) / 100).unwrap();
+        m.on_beacon(now, 4, 1, &beacon(11, vec![entry(6, 10, age_ds, None)]));
+        assert_eq!(want(&m, 6), left_ms);
+    }
 }
 
 #[test]
@@ -412,7 +428,7 @@ fn who_does_not_hear_a_neighbour_any_more_is_told_of_it_though_it_was_as_near() 
 }
 
 #[test]
-fn where_not_all_fit_half_of_the_room_is_for_heartbeats_alone() {
+fn where_not_all_fit_most_of_the_room_is_for_heartbeats_alone() {
     let mut m = among_nineteen();
     let far = |id| Gossip {
         hops: 2,
@@ -421,29 +437,37 @@ fn where_not_all_fit_half_of_the_room_is_for_heartbeats_alone() {
     m.on_beacon(Time(3_000), 3, 1, &beacon(11, (4..14).map(far).collect()));
     let ids = |fresh: &[Fresh]| -> Vec<u16> { fresh.iter().map(|f| f.id).collect() };
     let (told, fresh) = m.tell(Time(5_000), 4);
-    assert_eq!(told.iter().map(|g| g.id).collect::<Vec<_>>(), [4, 2]);
-    assert_eq!(ids(&fresh), [0; 0]);
-    assert_eq!(ids(&m.tell_between(Time(5_500))), [5, 6, 7, 8]);
+    assert_eq!(told.iter().map(|g| g.id).collect::<Vec<_>>(), [2]);
+    assert_eq!(ids(&fresh), [4, 5, 6]);
+    assert_eq!(ids(&m.tell_between(Time(5_500))), [7, 8, 9, 10]);
     assert_eq!(m.tell_between(Time(5_600)).len(), 0, "once a beacon");
     let (told, fresh) = m.tell(Time(6_000), 4);
-    assert_eq!(told.iter().map(|g| g.id).collect::<Vec<_>>(), [9, 3]);
-    assert_eq!(fresh.len(), 0);
-    assert_eq!(ids(&m.tell_between(Time(6_500))), [10, 11, 12, 13]);
+    assert_eq!(told.iter().map(|g| g.id).collect::<Vec<_>>(), [3]);
+    assert_eq!(ids(&fresh), [11, 12, 13]);
+    assert_eq!(ids(&m.tell_between(Time(6_500))), [4, 5, 6, 7]);
     let (told, fresh) = m.tell(Time(7_000), 8);
-    assert_eq!(
-        (told.len(), fresh.len()),
-        (4, 1),
-        "the beacon has what is left"
-    );
-    assert_eq!(m.tell_between(Time(7_500)).len(), 8);
+    assert_eq!((told.len(), fresh.len()), (2, 7));
+    assert_eq!(m.tell_between(Time(7_500)).len(), 7);
     m.tell(Time(8_000), 8);
     let (told, fresh) = m.tell(Time(9_000), 19);
     assert_eq!((told.len(), fresh.len()), (19, 0));
     assert_eq!(m.tell_between(Time(9_500)).len(), 0);
 }
 
+/// Of news there may be many at once, when two parts of a swarm meet: a quarter of the room.
 #[test]
-fn a_heartbeat_alone_counts_for_the_life_that_is_known() {
+fn news_take_a_quarter_of_the_room_and_leave_whole_entries_to_others() {
+    let mut m = among_nineteen();
+    for id in 21..40 {
+        m.on_beacon(Time(4_900), id, 1, &beacon(1, Vec::new()));
+    }
+    let (told, _) = m.tell(Time(5_000), 8);
+    let news = told.iter().filter(|g| g.id > 20).count();
+    assert_eq!((told.len(), news), (4, 2));
+}
+
+#[test]
+fn a_heartbeat_alone_counts_for_the_life_that_is_known_or_the_least_it_can_be() {
     let mut m = Membership::new(1, 1000);
     m.on_beacon(Time(0), 2, 9, &beacon(5, Vec::new()));
     let fresh = Fresh {
@@ -467,11 +491,12 @@ fn a_heartbeat_alone_counts_for_the_life_that_is_known() {
             .unwrap()
     };
     assert_eq!(of_2(&mut m).heartbeat, 5);
+    assert_eq!(m.status(7), None, "no life has these bits alone");
     m.on_beacon(Time(10_000), 3, 1, &say(fresh));
     let told = of_2(&mut m);
     assert_eq!((told.incarnation, told.heartbeat, told.age_ds), (9, 40, 10));
     assert_eq!((told.hops, told.interval, told.able), (2, 8, false));
-    assert_eq!(m.status(7), None, "nothing else is known of it");
+    assert_eq!(m.status(7), Some((1, Status::Alive)), "the least such life");
 }
 
 #[test]
