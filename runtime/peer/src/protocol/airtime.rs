@@ -104,8 +104,8 @@ pub const ENTRY_BYTES: usize = 17;
 /// And a heartbeat of somebody else alone.
 pub const FRESH_BYTES: usize = 7;
 
-/// A beacon has room for so many entries at least: two, for news and for the rotation, and
-/// four heartbeats of those who are far.
+/// A beacon has room for so many entries at least: one for news, one for the rotation, and two
+/// for the heartbeats of four others.
 const LEAST_ENTRIES: usize = 4;
 
 /// What a suspicion is answered from: so many heartbeats, refilled by a quarter of the

@@ -768,9 +768,8 @@ impl Membership {
         ids.truncate(max / 2);
         let others = self.known.iter().filter(|(id, _)| !ids.contains(id));
         let wanted = others.filter(|(_, k)| k.is_wanted(now));
-        let mut wanted: Vec<(Reverse<(u64, u64)>, u16)> = wanted
-            .map(|(id, k)| (Reverse(k.want(now)), *id))
-            .collect();
+        let mut wanted: Vec<(Reverse<(u64, u64)>, u16)> =
+            wanted.map(|(id, k)| (Reverse(k.want(now)), *id)).collect();
         wanted.sort_unstable();
         let room = max - ids.len();
         ids.extend(
