@@ -88,17 +88,17 @@ impl CoverCheck {
             let since_ms = component
                 .first()
                 .and_then(|id| snapshot.stability.component_since_ms(*id));
-            for c in 0..n {
-                if !peers.iter().any(|m| m.view.covered[c]) {
-                    continue;
+            let mut known = vec![false; n];
+            for m in &peers {
+                for (known, marked) in known.iter_mut().zip(&m.view.covered) {
+                    *known |= marked;
                 }
-                for m in peers.iter().filter(|m| !m.view.covered[c]) {
-                    lacks.push((
-                        m.id,
-                        u16::try_from(c).unwrap_or(u16::MAX),
-                        since_ms.unwrap_or(snapshot.now_ms).max(m.since_ms),
-                    ));
-                }
+            }
+            for m in &peers {
+                let from_ms = since_ms.unwrap_or(snapshot.now_ms).max(m.since_ms);
+                let cells = (0..).zip(known.iter().zip(&m.view.covered));
+                let lacking = cells.filter(|(_, (known, marked))| **known && !**marked);
+                lacks.extend(lacking.map(|(cell, _)| (m.id, cell, from_ms)));
             }
         }
         lacks.sort_unstable();

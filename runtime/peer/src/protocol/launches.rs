@@ -189,15 +189,20 @@ impl Table<'_> {
         let takeoffs: Vec<u64> = takeoffs
             .map(|l| l.map_or(0, |l| u64::from(l.takeoff_ms)))
             .collect();
-        // The nearest pairs first.
-        let mut pairs: Vec<(u64, usize, usize)> = Vec::with_capacity(n * n);
-        for (s, row) in ways.iter().enumerate() {
-            pairs.extend(row.iter().enumerate().map(|(u, mm)| (*mm, s, u)));
+        // The nearest pairs first: way, stretch and UAV in one number, which sorts faster.
+        let mut pairs: Vec<u128> = Vec::with_capacity(n * n);
+        for (s, row) in (0_u128..).zip(&ways) {
+            let way = |(u, mm): (u128, &u64)| (u128::from(*mm) << 64) | (s << 32) | u;
+            pairs.extend((0_u128..).zip(row).map(way));
         }
         pairs.sort_unstable();
         let mut of: Vec<usize> = vec![usize::MAX; n];
         let mut dealt = vec![false; n];
-        for (_, s, u) in pairs {
+        for pair in pairs {
+            let part = |shift: u32| usize::try_from((pair >> shift) & 0xffff_ffff);
+            let (Ok(s), Ok(u)) = (part(32), part(0)) else {
+                continue;
+            };
             if of[s] == usize::MAX && !dealt[u] {
                 of[s] = u;
                 dealt[u] = true;

@@ -361,14 +361,23 @@ impl Sections {
         free
     }
 
-    /// The highest stamp at which a live claim, this peer's own included, plans each cell.
+    /// The highest stamp at which a live claim, this peer's own included, plans each cell; the
+    /// least of all where none does.
     #[must_use]
-    pub fn highest_stamps(&self, live: &LivePeers) -> BTreeMap<u16, Stamp> {
-        let mut highest = self.planned_by(self.heard.iter(), live, &CellSet::full(self.cells));
-        for p in &self.plan {
-            let s = highest.entry(p.cell).or_default();
-            *s = (*s).max(p.stamp);
+    pub fn highest_stamps(&self, live: &LivePeers) -> Vec<Stamp> {
+        let mut highest = vec![Stamp::default(); usize::from(self.cells)];
+        let mut raise = |cell: u16, stamp: Stamp| {
+            if let Some(known) = highest.get_mut(usize::from(cell)) {
+                *known = (*known).max(stamp);
+            }
+        };
+        let is_live = |(author, h): &(&u16, &Heard)| live.get(author) == Some(&h.incarnation);
+        for (_, h) in self.heard.iter().filter(is_live) {
+            for l in &h.claim.plan {
+                cells_of(l.run, self.cells).for_each(|c| raise(c, l.stamp));
+            }
         }
+        self.plan.iter().for_each(|p| raise(p.cell, p.stamp));
         highest
     }
 

@@ -111,7 +111,8 @@ impl Negotiation {
     #[must_use]
     pub fn owners(&self, ctx: &Context<'_>) -> Vec<Owner> {
         let highest = self.sections.highest_stamps(ctx.live);
-        let is_taken = |c: &PlannedCell| highest.get(&c.cell).is_some_and(|s| *s > c.stamp);
+        let above = |c: &PlannedCell| highest.get(usize::from(c.cell));
+        let is_taken = |c: &PlannedCell| above(c).is_some_and(|s| *s > c.stamp);
         let at_work = self
             .progress
             .iter()
