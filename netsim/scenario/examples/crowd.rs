@@ -74,7 +74,7 @@ fn main() -> ExitCode {
 struct Point {
     n: u32,
     rate_bps: u32,
-    makespan_over_work_bound: Option<f64>,
+    makespan_over_launch_bound: Option<f64>,
     /// 95th percentile of how long it took a live UAV to find out that another was dead.
     detection_s: Option<f64>,
     bytes_per_peer_s: f64,
@@ -86,7 +86,7 @@ impl Point {
         Self {
             n,
             rate_bps,
-            makespan_over_work_bound: report.makespan_over_work_bound,
+            makespan_over_launch_bound: report.makespan_over_launch_bound,
             detection_s: percentile(&detections_ms(outcome), 95).map(|ms| ms as f64 / 1000.0),
             bytes_per_peer_s: report.radio.bytes_sent as f64 * 1000.0
                 / (report.peer_ms.max(1) as f64),
@@ -120,8 +120,8 @@ fn draw(path: &str, points: &[Point]) -> Drawn {
     root.fill(&WHITE)?;
     let panels = root.split_evenly((1, 3));
     let wanted: [(&str, Shown); 3] = [
-        ("makespan over the work bound", |p| {
-            p.makespan_over_work_bound
+        ("makespan over the launch bound", |p| {
+            p.makespan_over_launch_bound
         }),
         ("deaths noticed within, s (95 %)", |p| p.detection_s),
         ("bytes a second and peer", |p| Some(p.bytes_per_peer_s)),
