@@ -39,6 +39,8 @@ pub struct CadenceCheck {
     booted_ms: BTreeMap<u16, u64>,
     /// By author and receiver.
     heard: BTreeMap<(u16, u16), Heard>,
+    /// The highest life in which anybody heard an earlier process of each peer.
+    outlived: BTreeMap<u16, Incarnation>,
     /// What each peer's last beacon announced, milliseconds.
     announced: BTreeMap<u16, u64>,
     /// The longest since its last claim.
@@ -55,6 +57,7 @@ impl CadenceCheck {
             period_ms,
             booted_ms: BTreeMap::new(),
             heard: BTreeMap::new(),
+            outlived: BTreeMap::new(),
             announced: BTreeMap::new(),
             slowest: BTreeMap::new(),
             accused: Clocks::default(),
@@ -66,6 +69,10 @@ impl CadenceCheck {
     pub fn on_boot(&mut self, now_ms: u64, id: u16) {
         self.on_silent(id);
         self.booted_ms.insert(id, now_ms);
+        let lives = self.heard.range((id, 0)..=(id, u16::MAX));
+        if let Some(life) = lives.map(|(_, heard)| heard.incarnation).max() {
+            self.outlived.insert(id, life);
+        }
     }
 
     /// A process ends, stands still, or goes on with another clock: what it heard before
@@ -127,7 +134,9 @@ impl CadenceCheck {
     }
 
     /// A running peer receives a heartbeat from its author, that arrived then, with what
-    /// its author announced.
+    /// its author announced. A process that lost its disk and begins a life that an earlier
+    /// one has spoken in counts its heartbeats from the first again: they are older than what
+    /// was heard, and prove nothing, until it is reminded and takes a later life.
     pub fn on_heartbeat_heard(
         &mut self,
         arrived_ms: u64,
@@ -135,6 +144,9 @@ impl CadenceCheck {
         (author, incarnation): (u16, Incarnation),
         interval: u8,
     ) {
+        if self.outlived.get(&author) >= Some(&incarnation) {
+            return;
+        }
         let heard = Heard {
             incarnation,
             at_ms: arrived_ms,
@@ -321,6 +333,25 @@ mod tests {
                 broken,
                 "{status:?} {after_ms}"
             );
+        }
+    }
+
+    #[test]
+    fn what_a_process_without_its_disk_says_in_an_old_life_proves_nothing() {
+        let healthy = Handicaps::default();
+        for (life, broken) in [(4, false), (5, true)] {
+            let (mut c, mut found) = check();
+            c.on_beacon_heard((50_000, 50_000), (1, 1, 1), (2, 4), &beacon(None));
+            c.on_boot(70_000, 2);
+            c.on_beacon_heard((80_000, 80_000), (1, 1, 1), (2, life), &beacon(None));
+            c.on_belief(
+                81_000,
+                (1, 2),
+                (life, Status::Down),
+                (1, &healthy),
+                &mut found,
+            );
+            assert_eq!(found.counts.contains_key("haste"), broken, "{life}");
         }
     }
 
