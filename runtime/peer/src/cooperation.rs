@@ -603,7 +603,7 @@ impl MissionState {
         }
         let mut ctx = Context {
             now: s.now,
-            period_ms: s.membership.interval_ms(),
+            interval_ms: s.membership.interval_ms(),
             live: &company.live,
             live_changed,
             members: &company.members,

@@ -60,7 +60,7 @@ impl MissionState {
         let hands = others.into_iter().filter(|h| h.free_ms == 0);
         let hands: Vec<Hand> = hands.chain([me]).collect();
         // A claim is stored, spoken, and heard even if it is lost once.
-        let least_ms = SETTLE_PERIODS * ctx.period_ms;
+        let least_ms = SETTLE_PERIODS * ctx.interval_ms;
         let (cells, by_ms) = sharing::relief(&owners, &hands, me.id, pace, least_ms)?;
         let spendable_ms = u64::from(self.spendable_ms(s.percept));
         let cells = self.flown_besides(cells, by_ms.min(spendable_ms))?;
@@ -109,7 +109,7 @@ impl MissionState {
                 return Some(Hand { id, at, free_ms });
             }
             let info = s.membership.info(id)?;
-            let lately = |t| s.now.since_ms(t) < LASTING_INTERVALS * ctx.period_ms;
+            let lately = |t| s.now.since_ms(t) < LASTING_INTERVALS * ctx.interval_ms;
             let place = info.place.filter(|_| info.heard.is_some_and(lately))?;
             let at = place.pose().position();
             Some(Hand { id, at, free_ms: 0 })
@@ -243,7 +243,7 @@ impl MissionState {
         let covered = self.covered();
         let open = covered.capacity().saturating_sub(covered.count());
         let members = u16::try_from(ctx.members.len()).unwrap_or(u16::MAX);
-        let heard_ms = SETTLE_PERIODS * ctx.period_ms;
+        let heard_ms = SETTLE_PERIODS * ctx.interval_ms;
         let meanwhile = u16::try_from(heard_ms / CELL_MS).unwrap_or(u16::MAX);
         open.div_ceil(members.max(1)).max(meanwhile)
     }

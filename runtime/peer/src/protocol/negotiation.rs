@@ -64,9 +64,11 @@ const ROUND_STAGGER: u64 = 8;
 pub struct Context<'a> {
     /// The peer's time.
     pub now: Time,
-    /// Beacon period T, milliseconds.
-    pub period_ms: u64,
-    /// Peers not believed dead.
+    /// The swarm's interval T', milliseconds: the longest that anybody alive announced. Every
+    /// wait below counts in it.
+    pub interval_ms: u64,
+    /// Who is not believed dead and can be reached: without peers that say they are alone, and
+    /// with those that were to be launched and were not heard of yet.
     pub live: &'a LivePeers,
     /// Whether they may be others than at the last tick.
     pub live_changed: bool,
@@ -90,16 +92,16 @@ pub struct Context<'a> {
 }
 
 impl Context<'_> {
-    /// W0 = (2D + 3) T, milliseconds: a bid crosses the component, the answer
+    /// W0 = (2D + 3) T', milliseconds: a bid crosses the component, the answer
     /// comes back, and three periods for what is lost on the way.
     #[must_use]
     pub fn base_wait_ms(&self) -> u64 {
-        wait_ms(self.diameter, self.period_ms)
+        wait_ms(self.diameter, self.interval_ms)
     }
 }
 
-fn wait_ms(diameter: u32, period_ms: u64) -> u64 {
-    (2 * u64::from(diameter) + 3) * period_ms
+fn wait_ms(diameter: u32, interval_ms: u64) -> u64 {
+    (2 * u64::from(diameter) + 3) * interval_ms
 }
 
 /// What the negotiation wants done.
@@ -342,9 +344,9 @@ impl Negotiation {
 
     fn watch_period(&mut self, ctx: &Context<'_>) {
         let since = self.period_since;
-        if since.is_none_or(|t| ctx.now.since_ms(t) >= ctx.period_ms) {
+        if since.is_none_or(|t| ctx.now.since_ms(t) >= ctx.interval_ms) {
             self.period_since = Some(ctx.now);
-            let wait_ms = wait_ms(u32::from(HOPS_MAX), ctx.period_ms) << MAX_DOUBLINGS;
+            let wait_ms = wait_ms(u32::from(HOPS_MAX), ctx.interval_ms) << MAX_DOUBLINGS;
             let wait_ms = u32::try_from(wait_ms).unwrap_or(u32::MAX);
             self.rounds.new_period(wait_ms);
         }
@@ -416,19 +418,19 @@ impl Negotiation {
         // only itself may not have been heard yet.
         let company = ctx.members.len() > 1;
         let steady =
-            company && ctx.now.since_ms(self.members_since) >= STEADY_PERIODS * ctx.period_ms;
-        if self.decided_at.is_none() && !steady && orphaned_ms < PATIENT_PERIODS * ctx.period_ms {
+            company && ctx.now.since_ms(self.members_since) >= STEADY_PERIODS * ctx.interval_ms;
+        if self.decided_at.is_none() && !steady && orphaned_ms < PATIENT_PERIODS * ctx.interval_ms {
             return;
         }
         let settled = self
             .decided_at
-            .is_none_or(|t| ctx.now.since_ms(t) >= SETTLE_PERIODS * ctx.period_ms);
+            .is_none_or(|t| ctx.now.since_ms(t) >= SETTLE_PERIODS * ctx.interval_ms);
         let patience = if settled {
             STEADY_PERIODS
         } else {
             SETTLE_PERIODS
-        } * ctx.period_ms;
-        let stagger = self.rank(ctx) * ctx.period_ms / ROUND_STAGGER;
+        } * ctx.interval_ms;
+        let stagger = self.rank(ctx) * ctx.interval_ms / ROUND_STAGGER;
         if (self.loss_seen && settled) || orphaned_ms >= patience + stagger {
             self.start(ctx, true, 0);
         }
@@ -466,7 +468,7 @@ impl Negotiation {
     /// Whether it is worth to compute if a round without a loss would gain anything: idle,
     /// calm, and not computed lately.
     pub fn wants_foresight(&mut self, ctx: &Context<'_>) -> bool {
-        let patient = PATIENT_PERIODS * ctx.period_ms;
+        let patient = PATIENT_PERIODS * ctx.interval_ms;
         let rested = |t| ctx.now.since_ms(t) >= patient;
         let wants = self.rounds.open().is_none()
             && !is_many(ctx)
@@ -494,12 +496,12 @@ impl Negotiation {
     fn may_gain(&self, ctx: &Context<'_>) -> bool {
         let steady = ctx
             .able_since
-            .is_some_and(|t| ctx.now.since_ms(t) >= PATIENT_PERIODS * ctx.period_ms);
+            .is_some_and(|t| ctx.now.since_ms(t) >= PATIENT_PERIODS * ctx.interval_ms);
         let idle = self
             .idle_since
-            .is_some_and(|t| ctx.now.since_ms(t) >= STEADY_PERIODS * ctx.period_ms);
-        let calm = CALM_PERIODS * ctx.period_ms;
-        let stagger = self.rank(ctx) * ctx.period_ms / ROUND_STAGGER;
+            .is_some_and(|t| ctx.now.since_ms(t) >= STEADY_PERIODS * ctx.interval_ms);
+        let calm = CALM_PERIODS * ctx.interval_ms;
+        let stagger = self.rank(ctx) * ctx.interval_ms / ROUND_STAGGER;
         let last = self.decided_at.max(self.adopted_at);
         let rested = last.is_none_or(|t| ctx.now.since_ms(t) >= calm + stagger);
         let mut owners = ctx.live.keys();
@@ -587,7 +589,7 @@ impl Negotiation {
     /// from all others is long in coming: an owner whose ETA falls at half the pace of the
     /// clock at least is on its way.
     fn watch_progress(&mut self, ctx: &Context<'_>, changed: &BTreeSet<u16>) {
-        let cell_bound = TWO_CELLS_MS + 2 * u64::from(ctx.diameter) * ctx.period_ms;
+        let cell_bound = TWO_CELLS_MS + 2 * u64::from(ctx.diameter) * ctx.interval_ms;
         for id in changed.iter().copied() {
             let Some(heard) = self.sections.heard().get(&id) else {
                 continue;
@@ -595,7 +597,7 @@ impl Negotiation {
             let (epoch, eta_ms, seq) = (heard.claim.epoch, heard.claim.eta_ms, heard.seq);
             let left = self.sections.n_left(id);
             let eta_ms = u64::from(eta_ms);
-            let slack = eta_ms / 4 + PATIENT_PERIODS * ctx.period_ms + cell_bound;
+            let slack = eta_ms / 4 + PATIENT_PERIODS * ctx.interval_ms + cell_bound;
             let fresh = Progress {
                 left,
                 since: ctx.now,
@@ -688,7 +690,7 @@ mod tests {
             members.sort_unstable();
             let ctx = Context {
                 now: self.now,
-                period_ms: T,
+                interval_ms: T,
                 live: &self.live,
                 live_changed: true,
                 members: &members,

@@ -45,7 +45,7 @@ impl Negotiation {
         } else {
             FIRST_SECTION_QUARTERS
         };
-        let listened_ms = quarters * ctx.period_ms / 4;
+        let listened_ms = quarters * ctx.interval_ms / 4;
         let listened = ctx
             .able_since
             .is_some_and(|t| ctx.now.since_ms(t) >= listened_ms);
@@ -63,7 +63,7 @@ impl Negotiation {
     /// Whether this peer, among many, is to look for what it could take: half a period after
     /// it looked last.
     pub fn looks_around(&mut self, ctx: &Context<'_>) -> bool {
-        let rested = |t| ctx.now.since_ms(t) >= ctx.period_ms / LOOKS_A_PERIOD;
+        let rested = |t| ctx.now.since_ms(t) >= ctx.interval_ms / LOOKS_A_PERIOD;
         let looks = is_many(ctx)
             && ctx.able_since.is_some()
             && !self.sections.complete()
@@ -79,7 +79,7 @@ impl Negotiation {
     /// Orphans that others had the time to claim.
     #[must_use]
     pub fn ripe_orphans(&self, ctx: &Context<'_>) -> CellSet {
-        let patience_ms = STEADY_PERIODS * ctx.period_ms;
+        let patience_ms = STEADY_PERIODS * ctx.interval_ms;
         let ripe = self.orphaned_at.iter();
         let ripe = ripe.filter(|(_, since)| ctx.now.since_ms(**since) >= patience_ms);
         CellSet::of(self.sections.cells(), ripe.map(|(cell, _)| *cell))
@@ -94,8 +94,8 @@ impl Negotiation {
         orphan: u16,
         (sooner, later_ms): (usize, u64),
     ) -> bool {
-        let patience_ms = STEADY_PERIODS * ctx.period_ms;
-        let sooner_ms = sooner as u64 * SOONER_PERIODS * ctx.period_ms;
+        let patience_ms = STEADY_PERIODS * ctx.interval_ms;
+        let sooner_ms = sooner as u64 * SOONER_PERIODS * ctx.interval_ms;
         let for_others_ms = sooner_ms.min(ctx.base_wait_ms()).max(later_ms);
         let since = self.orphaned_at.get(&orphan);
         since.is_some_and(|t| ctx.now.since_ms(*t) >= patience_ms + for_others_ms)
@@ -104,7 +104,7 @@ impl Negotiation {
     /// Whether this peer will have nothing to fly before others have heard what it takes.
     #[must_use]
     pub fn may_relieve(&self, ctx: &Context<'_>, free_ms: u64) -> bool {
-        free_ms <= STEADY_PERIODS * ctx.period_ms
+        free_ms <= STEADY_PERIODS * ctx.interval_ms
     }
 
     /// The live owners with what they have left, but for what others took of it since.
@@ -155,22 +155,22 @@ impl Negotiation {
         if self.take_pending {
             return None;
         }
-        let stagger = self.rank(ctx) * ctx.period_ms / TAKE_STAGGER;
+        let stagger = self.rank(ctx) * ctx.interval_ms / TAKE_STAGGER;
         if let Some(since) = self.orphan_since {
             if is_many(ctx) {
                 return None;
             }
-            let patience = STEADY_PERIODS * ctx.period_ms + ctx.base_wait_ms() + stagger;
+            let patience = STEADY_PERIODS * ctx.interval_ms + ctx.base_wait_ms() + stagger;
             return (ctx.now.since_ms(since) >= patience)
                 .then(|| self.nearest_run(orphans, lp))
                 .flatten();
         }
         let idle_ms = self.idle_since.map(|t| ctx.now.since_ms(t))?;
-        if idle_ms < PATIENT_PERIODS * ctx.period_ms + stagger || self.rounds.open().is_some() {
+        if idle_ms < PATIENT_PERIODS * ctx.interval_ms + stagger || self.rounds.open().is_some() {
             return None;
         }
         let stalled_ms = TWO_CELLS_MS
-            + (PATIENT_PERIODS + 2 * u64::from(ctx.diameter)) * ctx.period_ms
+            + (PATIENT_PERIODS + 2 * u64::from(ctx.diameter)) * ctx.interval_ms
             + stagger;
         let (owner, _) = self.progress.iter().find(|(id, p)| {
             p.left > 0
@@ -206,8 +206,8 @@ impl Negotiation {
     /// What an idle peer may try to fly although no division could give it to anybody: fuel
     /// that others were to need may be left, or be back. Looked at once in ten periods.
     pub fn left_over(&mut self, ctx: &Context<'_>) -> Option<CellSet> {
-        let stagger = self.rank(ctx) * ctx.period_ms / TAKE_STAGGER;
-        let patience = PATIENT_PERIODS * ctx.period_ms;
+        let stagger = self.rank(ctx) * ctx.interval_ms / TAKE_STAGGER;
+        let patience = PATIENT_PERIODS * ctx.interval_ms;
         let for_long = |since: Option<Time>, ms| since.is_some_and(|t| ctx.now.since_ms(t) >= ms);
         let idle = ctx.able_since.is_some() && for_long(self.idle_since, patience + stagger);
         let busy = self.take_pending || self.orphan_since.is_some() || self.rounds.open().is_some();
