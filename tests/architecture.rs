@@ -245,6 +245,19 @@ fn imports_point_from_the_shell_to_the_core() {
     }
 }
 
+/// `cargo run -- trial`, as the README says it, must mean one program: several packages that
+/// are built by default have one.
+#[test]
+fn cargo_run_runs_the_command() {
+    let metadata = metadata();
+    let default = metadata.workspace_default_packages();
+    let run: Vec<&str> = default
+        .iter()
+        .filter_map(|p| p.default_run.as_deref())
+        .collect();
+    assert_eq!(run, ["skein"]);
+}
+
 #[test]
 fn the_command_carries_no_laboratory() {
     let reached = reaches(&metadata(), "skein");
