@@ -9,6 +9,7 @@
 //! | [`fault_generator`] | random faults for one run |
 //! | [`troubles`] | the kinds of trouble among them |
 //! | [`disk`] | virtual disks |
+//! | [`twins`] | which peers speak under the id of another |
 //! | [`prepared`] | what all runs of a scenario share |
 //! | [`runs`] | runs with the scenario's own faults, with drawn ones, without any |
 //! | [`swarm`] | peers, world and radio under one virtual clock |
@@ -36,6 +37,7 @@ pub mod summary;
 pub mod swarm;
 pub mod timeline;
 pub mod troubles;
+pub mod twins;
 pub mod world;
 
 pub use prepared::Prepared;

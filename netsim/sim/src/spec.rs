@@ -1,6 +1,7 @@
 //! A scenario with nothing left to resolve: no file names, no units to convert.
 
 use crate::fault::TimedFault;
+use crate::twins::Twins;
 use skein_flight::airframe::Airframe;
 use skein_flight::trajectory::timed::Objective;
 use skein_flight::trajectory::wind::Wind;
@@ -9,7 +10,6 @@ use skein_geometry::frame::{Point, Pose};
 use skein_peer::Mission;
 use skein_peer::config::Launch;
 use skein_peer::mission::mm;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Everything a run needs, besides a seed.
@@ -70,9 +70,9 @@ impl Spec {
         own.map(launch).collect()
     }
 
-    /// The numbers of twins, each with the id under which its peer speaks.
+    /// Which of its UAVs speak under the id of another.
     #[must_use]
-    pub fn twins(&self) -> BTreeMap<u16, u16> {
+    pub fn twins(&self) -> Twins {
         let twin = |u: &UavSpec| Some((u.id, u.twin_of?));
         self.uavs.iter().filter_map(twin).collect()
     }

@@ -5,6 +5,7 @@
 
 use super::{Findings, Handicaps};
 use crate::account::secs;
+use crate::twins::Twins;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_flight::coverage::ring::division::Rule;
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
@@ -45,8 +46,7 @@ pub struct Mover {
 #[derive(Clone, Debug, Default)]
 pub struct DecisionCheck {
     period_ms: u64,
-    /// The id of each twin, by number.
-    twins: BTreeMap<u16, u16>,
+    twins: Twins,
     grounds: BTreeMap<u64, Arc<MissionGeometry>>,
     rounds: BTreeMap<RoundOrder, OpenRound>,
     divisions: BTreeMap<Epoch, Option<Divided>>,
@@ -87,9 +87,9 @@ struct Adopted {
 }
 
 impl DecisionCheck {
-    /// The checks at beacon period T; of twins by number, each with its id.
+    /// The checks at beacon period T; of a run with these twins.
     #[must_use]
-    pub fn new(period_ms: u64, twins: BTreeMap<u16, u16>) -> Self {
+    pub fn new(period_ms: u64, twins: Twins) -> Self {
         Self {
             period_ms,
             twins,
@@ -147,17 +147,12 @@ impl DecisionCheck {
         for text in self.lies(now_ms, id, bid, (view, mover), handicaps) {
             found.broken("bid", now_ms, Some(id), || text);
         }
-        let (order, member) = (order_of(&bid.round), self.member(id));
+        let (order, member) = (order_of(&bid.round), self.twins.id_of(id));
         let open = self.rounds.entry(order).or_insert_with(|| OpenRound {
             round: bid.round.clone(),
             bids: BTreeMap::new(),
         });
         open.bids.insert(member, bid.clone());
-    }
-
-    /// As whom a peer takes part in rounds.
-    fn member(&self, id: u16) -> u16 {
-        self.twins.get(&id).copied().unwrap_or(id)
     }
 
     /// How a bid differs from what its author did and is.
@@ -314,7 +309,7 @@ impl DecisionCheck {
             return;
         };
         let open = open.clone();
-        let id = self.member(id);
+        let id = self.twins.id_of(id);
         self.judge_section(now_ms, id, (claim, &open), seen, found);
         self.judge_gain(now_ms, id, &open, epoch, found);
         self.judge_shares(now_ms, id, &open, epoch, found);
@@ -564,7 +559,7 @@ mod tests {
                 cells_since: 0,
                 idle: true,
             };
-            let mut check = DecisionCheck::new(1000, BTreeMap::new());
+            let mut check = DecisionCheck::new(1000, Twins::default());
             check.on_loop(&geometry);
             Self {
                 check,

@@ -11,6 +11,7 @@ use super::spoken::SpokenCheck;
 use super::spread::SpreadCheck;
 use super::{Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::spec::{Spec, UavSpec};
+use crate::twins::Twins;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::mission::{Mission, chunks, point_m};
@@ -35,8 +36,7 @@ pub struct Rules {
     spoken: SpokenCheck,
     spread: SpreadCheck,
     loops: BTreeMap<u16, u64>,
-    /// The ids of twins, by number.
-    twins: BTreeMap<u16, u16>,
+    twins: Twins,
     /// Where missions end, by the first revision that says so.
     bases: BTreeMap<u32, Point>,
 }
@@ -221,7 +221,7 @@ impl Rules {
         said: &Said,
     ) {
         self.on_held(id, said);
-        let speaks_as = self.twins.get(&id).copied().unwrap_or(id);
+        let speaks_as = self.twins.id_of(id);
         if let Body::Beacon(beacon) = &said.body {
             let author = (said.record.author, said.record.incarnation);
             let by = (id, speaks_as, life);

@@ -3,6 +3,7 @@
 
 use super::bounds::LIGHT_FACTOR;
 use super::{Bounds, Clocks, Findings, Grade, PeerSnapshot, Snapshot};
+use crate::twins::Twins;
 use skein_peer::Incarnation;
 use skein_peer::wire::kinds::Kind;
 use skein_peer::wire::message::Record;
@@ -35,8 +36,7 @@ pub struct SpreadCheck {
     lacks: BTreeMap<(u16, Key), Lack>,
     apart: Clocks<(u16, u16, bool)>,
     doubles: Clocks<(u16, u16, u16)>,
-    /// The id of each twin, by number.
-    twins: BTreeMap<u16, u16>,
+    twins: Twins,
     /// Pieces of the longest mission that the operator gave.
     pieces: u64,
 }
@@ -80,17 +80,13 @@ fn spreads(kind: u8) -> bool {
 }
 
 impl SpreadCheck {
-    /// Of twins by number, each with its id.
+    /// Of a run with these twins.
     #[must_use]
-    pub fn new(twins: BTreeMap<u16, u16>) -> Self {
+    pub fn new(twins: Twins) -> Self {
         Self {
             twins,
             ..Self::default()
         }
-    }
-
-    fn id_of(&self, number: u16) -> u16 {
-        self.twins.get(&number).copied().unwrap_or(number)
     }
 
     /// The operator has a mission of so many pieces.
@@ -169,7 +165,7 @@ impl SpreadCheck {
         }
         let mut lives: BTreeMap<u16, Incarnation> = BTreeMap::new();
         for (key, place) in &self.places {
-            let life = lives.entry(self.id_of(key.0)).or_default();
+            let life = lives.entry(self.twins.id_of(key.0)).or_default();
             *life = (*life).max(most[*place].0);
         }
         // A later life voids all that earlier ones said; an author knows its own.
@@ -181,7 +177,7 @@ impl SpreadCheck {
         let is_held = |version: &Version| *version > Version::default();
         newest
             .filter(|(key, _, version)| {
-                is_held(version) && lives.get(&self.id_of(key.0)) == Some(&version.0)
+                is_held(version) && lives.get(&self.twins.id_of(key.0)) == Some(&version.0)
             })
             .collect()
     }
@@ -197,9 +193,8 @@ impl SpreadCheck {
         let newest = self.newest(peers);
         for m in peers {
             let row = self.held.get(&m.id).map_or(&[][..], |row| &row[..]);
-            let others = newest.iter().filter(|(key, ..)| {
-                self.twins.get(&key.0).copied().unwrap_or(key.0) != m.speaks_as
-            });
+            let by_others = |key: &Key| self.twins.id_of(key.0) != m.speaks_as;
+            let others = newest.iter().filter(|(key, ..)| by_others(key));
             for (key, place, wanted) in others {
                 let held = row.get(*place).copied().unwrap_or_default();
                 if held >= *wanted {

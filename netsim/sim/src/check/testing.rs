@@ -1,6 +1,7 @@
 //! Snapshots for the tests of checks: so many peers that all hear each other.
 
 use super::{Bounds, Graph, Handicaps, PeerSnapshot, Snapshot, Stability};
+use crate::twins::Twins;
 use skein_geometry::frame::Point;
 use skein_peer::Beliefs;
 use std::collections::BTreeMap;
@@ -36,8 +37,8 @@ pub(super) struct Story {
     loss_permille: u16,
     covered: [bool; 4],
     places: BTreeMap<u16, Point>,
-    /// Of twins by number, each with its id.
-    pub(super) twins: BTreeMap<u16, u16>,
+    /// Who speaks under the id of another.
+    pub(super) twins: Twins,
     /// Whose clock, computer or disk is how late.
     pub(super) handicaps: Handicaps,
 }
@@ -50,7 +51,7 @@ impl Story {
             loss_permille,
             covered: [false; 4],
             places: BTreeMap::new(),
-            twins: BTreeMap::new(),
+            twins: Twins::default(),
             handicaps: Handicaps::default(),
         }
     }
@@ -71,7 +72,7 @@ impl Story {
             .iter()
             .map(|(id, view)| PeerSnapshot {
                 id: *id,
-                speaks_as: self.twins.get(id).copied().unwrap_or(*id),
+                speaks_as: self.twins.id_of(*id),
                 uav: true,
                 since_ms: 0,
                 at: self.places.get(id).copied(),

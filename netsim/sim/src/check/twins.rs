@@ -2,6 +2,7 @@
 //! and plans nothing, and goes home (`twins`, `home`).
 
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
+use crate::twins::Twins;
 use skein_peer::{Incarnation, Report};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,8 +16,7 @@ const ONE_PLACE_M: f64 = 100.0;
 /// What the twins of one run were found to do.
 #[derive(Clone, Debug, Default)]
 pub struct TwinCheck {
-    /// The id of each twin, by number.
-    twins: BTreeMap<u16, u16>,
+    twins: Twins,
     silent: BTreeSet<u16>,
     /// By id and life who spoke in it first, and whether another one did, too.
     lives: BTreeMap<(u16, Incarnation), (u16, bool)>,
@@ -26,31 +26,25 @@ pub struct TwinCheck {
 }
 
 impl TwinCheck {
-    /// The twins of a run by number, each with its id.
+    /// Of these twins.
     #[must_use]
-    pub fn new(twins: BTreeMap<u16, u16>) -> Self {
+    pub fn new(twins: Twins) -> Self {
         Self {
             twins,
             ..Self::default()
         }
     }
 
-    fn id_of(&self, number: u16) -> u16 {
-        self.twins.get(&number).copied().unwrap_or(number)
-    }
-
     /// The numbers of all others with the id of this one.
+    #[must_use]
     pub fn others(&self, number: u16) -> Vec<u16> {
-        let id = self.id_of(number);
-        let twins = self.twins.iter().filter(|(_, of)| **of == id);
-        let all = twins.map(|(n, _)| *n).chain([id]);
-        all.filter(|n| *n != number).collect()
+        self.twins.others(number)
     }
 
     /// A peer says something in a life.
     pub fn on_said(&mut self, number: u16, life: Incarnation) {
-        let key = (self.id_of(number), life);
-        if !self.others(number).is_empty() {
+        let key = (self.twins.id_of(number), life);
+        if self.twins.is_shared(key.0) {
             let spoke = self.lives.entry(key).or_insert((number, false));
             spoke.1 |= spoke.0 != number;
         }
@@ -66,7 +60,7 @@ impl TwinCheck {
         else {
             return false;
         };
-        let spoke = self.lives.get(&(self.id_of(peer.0), *incarnation));
+        let spoke = self.lives.get(&(self.twins.id_of(peer.0), *incarnation));
         spoke.is_some_and(|(_, shared)| *shared)
     }
 
@@ -125,22 +119,22 @@ impl TwinCheck {
     fn look_for_both(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let bound_ms = snapshot.bounds.detection_ms();
         let speak: Vec<&PeerSnapshot> = snapshot.peers.iter().filter(|m| m.view.speaks).collect();
-        for (number, id) in &self.twins {
-            for of in speak.iter().filter(|m| m.speaks_as == *id) {
-                let key = (of.id, *number);
-                let both = of.id != *number && speak.iter().any(|m| m.id == *number);
-                if !both || !snapshot.graph.joined(of.id, *number) {
+        for (number, id) in self.twins.iter() {
+            for of in speak.iter().filter(|m| m.speaks_as == id) {
+                let key = (of.id, number);
+                let both = of.id != number && speak.iter().any(|m| m.id == number);
+                if !both || !snapshot.graph.joined(of.id, number) {
                     self.both.stop(key);
                     continue;
                 }
                 let began_ms = self.both.start(key, snapshot.now_ms);
-                let stable_ms = snapshot.stability.component_since_ms(*number);
+                let stable_ms = snapshot.stability.component_since_ms(number);
                 let from_ms = began_ms.max(stable_ms.unwrap_or(snapshot.now_ms));
                 let took_ms = snapshot.now_ms - from_ms;
                 let grown_ms = snapshot.grown_ms(bound_ms, from_ms);
                 let limit_ms = snapshot.grade().limit_ms(grown_ms);
                 if limit_ms.is_some_and(|l| took_ms > l) && self.both.tell_once(key) {
-                    found.broken("twins", snapshot.now_ms, Some(*number), || {
+                    found.broken("twins", snapshot.now_ms, Some(number), || {
                         format!(
                             "speaks as peer {id}, as another process in its component does, for {took_ms} ms (bound {bound_ms} ms)"
                         )
@@ -206,7 +200,7 @@ mod tests {
 
     /// Peer 1 and its twin 9 for a minute: whether each speaks, or else is silent.
     fn minute(loss_permille: u16, speak: [bool; 2], change: impl Fn(&mut Beliefs)) -> u64 {
-        let twins = BTreeMap::from([(9, 1)]);
+        let twins = Twins::from_iter([(9, 1)]);
         let (mut check, mut found) = (TwinCheck::new(twins.clone()), Findings::new(1));
         let mut story = Story::new(loss_permille);
         story.twins = twins;
@@ -223,7 +217,7 @@ mod tests {
             };
             let mut mute = Vec::new();
             let mut other = Story::new(0);
-            other.twins = BTreeMap::from([(9, 1)]);
+            other.twins = Twins::from_iter([(9, 1)]);
             other.snapshot(t * 1000, &of(false), |s| mute = s.peers.to_vec());
             story.snapshot(t * 1000, &of(true), |s| {
                 check.on_snapshot(s, &mute, &mut found);
@@ -247,7 +241,7 @@ mod tests {
     fn who_is_silent_neither_plans_nor_speaks() {
         assert_eq!(minute(300, [true, false], |b| b.able = true), 1);
         assert_eq!(minute(300, [true, false], |b| b.plan = vec![2]), 1);
-        let (mut check, mut found) = (TwinCheck::new(BTreeMap::from([(9, 1)])), Findings::new(1));
+        let (mut check, mut found) = (TwinCheck::new(Twins::from_iter([(9, 1)])), Findings::new(1));
         check.on_transmission(1_000, 9, &mut found);
         check.on_silenced(9);
         check.on_transmission(2_000, 1, &mut found);
@@ -263,7 +257,7 @@ mod tests {
     fn who_may_sit_in_one_airframe_with_its_twin_need_not_fly_home() {
         for (away_m, steered) in [(99.0, 0), (101.0, 1)] {
             let mut story = Story::new(0);
-            story.twins = BTreeMap::from([(9, 1)]);
+            story.twins = Twins::from_iter([(9, 1)]);
             story.place(1, Point::new(0.0, 0.0));
             story.place(2, Point::new(away_m, 0.0));
             story.place(9, Point::new(away_m, 0.0));

@@ -1,22 +1,22 @@
 //! Whom peers mean by an id that two processes have: checks and the account know each by
 //! the number of its radio.
 
+use crate::twins::Twins;
 use skein_peer::Incarnation;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The twins of one run.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
-    /// The id under which the peer with this number speaks, where it is another one.
-    twins: BTreeMap<u16, u16>,
+    twins: Twins,
     /// Who spoke in each life of an id, in that order, while it is not silent.
     lives: BTreeMap<(u16, Incarnation), Vec<u16>>,
 }
 
 impl Names {
-    /// Twins by number, each with its id.
+    /// Before any of them spoke.
     #[must_use]
-    pub fn new(twins: BTreeMap<u16, u16>) -> Self {
+    pub fn new(twins: Twins) -> Self {
         let lives = BTreeMap::new();
         Self { twins, lives }
     }
@@ -24,18 +24,18 @@ impl Names {
     /// Whether two have this id.
     #[must_use]
     pub fn is_ambiguous(&self, id: u16) -> bool {
-        self.twins.values().any(|of| *of == id)
+        self.twins.is_shared(id)
     }
 
     /// The ids that two have, ascending.
     #[must_use]
     pub fn ambiguous(&self) -> BTreeSet<u16> {
-        self.twins.values().copied().collect()
+        self.twins.shared()
     }
 
     /// A peer speaks in a life.
     pub fn speaks(&mut self, number: u16, life: Incarnation) {
-        let id = self.twins.get(&number).copied().unwrap_or(number);
+        let id = self.twins.id_of(number);
         if self.is_ambiguous(id) {
             let spoke = self.lives.entry((id, life)).or_default();
             if !spoke.contains(&number) {
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn an_id_in_a_life_means_who_spoke_in_it_and_is_in_reach() {
-        let mut names = Names::new(BTreeMap::from([(9, 3)]));
+        let mut names = Names::new(Twins::from_iter([(9, 3)]));
         for (number, life) in [(3, 1), (9, 1), (9, 2), (4, 1)] {
             names.speaks(number, life);
         }

@@ -1,0 +1,70 @@
+//! Which peers of a run speak under the id of another. Checks and the account know each peer by
+//! its number, which is that of its radio.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The id of each twin, by its number.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Twins(BTreeMap<u16, u16>);
+
+impl Twins {
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The number and the id of each.
+    pub fn iter(&self) -> impl Iterator<Item = (u16, u16)> {
+        self.0.iter().map(|(number, id)| (*number, *id))
+    }
+
+    /// The id under which the peer with this number speaks.
+    #[must_use]
+    pub fn id_of(&self, number: u16) -> u16 {
+        self.0.get(&number).copied().unwrap_or(number)
+    }
+
+    /// The ids that more than one have, ascending.
+    #[must_use]
+    pub fn shared(&self) -> BTreeSet<u16> {
+        self.0.values().copied().collect()
+    }
+
+    /// Whether more than one have this id.
+    #[must_use]
+    pub fn is_shared(&self, id: u16) -> bool {
+        self.0.values().any(|of| *of == id)
+    }
+
+    /// The numbers of all others with the id of this one.
+    #[must_use]
+    pub fn others(&self, number: u16) -> Vec<u16> {
+        let id = self.id_of(number);
+        let twins = self.iter().filter(|(_, of)| *of == id);
+        let all = twins.map(|(n, _)| n).chain([id]);
+        all.filter(|n| *n != number).collect()
+    }
+}
+
+impl FromIterator<(u16, u16)> for Twins {
+    fn from_iter<T: IntoIterator<Item = (u16, u16)>>(each: T) -> Self {
+        Self(each.into_iter().collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_is_known_by_its_number_and_speaks_under_its_id() {
+        let twins = Twins::from_iter([(9, 3), (8, 3)]);
+        assert_eq!([3, 8, 9, 4].map(|n| twins.id_of(n)), [3, 3, 3, 4]);
+        assert_eq!(twins.others(3), [8, 9]);
+        assert_eq!(twins.others(9), [8, 3]);
+        assert!(twins.others(4).is_empty());
+        assert!(twins.is_shared(3) && !twins.is_shared(9));
+        assert_eq!(twins.shared(), BTreeSet::from([3]));
+    }
+}
