@@ -353,17 +353,18 @@ impl Membership {
         if author == self.me {
             return changes;
         }
-        let before = (self.weight(now, author), self.seat(author));
-        let Some(teller) = self.known.get_mut(&author) else {
+        if !self.known.contains_key(&author) {
             return changes;
-        };
-        if (teller.freshest.incarnation, teller.freshest.count) == (incarnation, count) {
-            let steady_since = teller.info.steady_since;
-            teller.info = info_of(beacon, steady_since, now);
-            teller.eccentricity = beacon.eccentricity.min(HOPS_MAX);
         }
-        self.weighed(author, before.0, self.weight(now, author));
-        self.changes += u64::from(before.1 != self.seat(author));
+        self.noting(now, author, |m| {
+            let teller = m.known.get_mut(&author);
+            let same = |h: &Heartbeat| (h.incarnation, h.count) == (incarnation, count);
+            if let Some(teller) = teller.filter(|t| same(&t.freshest)) {
+                let steady_since = teller.info.steady_since;
+                teller.info = info_of(beacon, steady_since, now);
+                teller.eccentricity = beacon.eccentricity.min(HOPS_MAX);
+            }
+        });
         for told in &beacon.gossip {
             if told.id != self.me && told.id != author {
                 self.on_gossip(now, told, (author, beacon), limits, &mut changes);
@@ -416,7 +417,9 @@ impl Membership {
             interval,
             suspected: None,
         };
-        self.hear(now, own, limits, &mut changes);
+        self.noting(now, author, |m| {
+            m.merge(now, own, limits, &mut changes);
+        });
         changes
     }
 
@@ -442,20 +445,19 @@ impl Membership {
             suspected: told.suspected_ds.map(age),
         };
         let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
-        let fresher = self.hear(now, heartbeat, limits, changes);
-        let before = self.seat(told.id);
-        if let Some(known) = self.known.get_mut(&told.id) {
-            known.note_told(now, teller, &heartbeat, limits.interval_ms);
-            if known.disputes(told) {
-                known.urgent_until = urgent_until;
-                self.refuted = true;
+        self.noting(now, told.id, |m| {
+            let fresher = m.merge(now, heartbeat, limits, changes);
+            if let Some(known) = m.known.get_mut(&told.id) {
+                known.note_told(now, teller, &heartbeat, limits.interval_ms);
+                if known.disputes(told) {
+                    known.urgent_until = urgent_until;
+                    m.refuted = true;
+                }
+                if fresher {
+                    known.info.hear_of(told.able, Some(said));
+                }
             }
-            if !fresher {
-                return;
-            }
-            known.info.hear_of(told.able, Some(said));
-        }
-        self.changes += u64::from(before != self.seat(told.id));
+        });
     }
 
     /// A heartbeat without anything else. Of a life it tells the last bits: of a peer that is
@@ -485,32 +487,27 @@ impl Membership {
             interval: told.interval,
             suspected: None,
         };
-        let fresher = self.hear(now, heartbeat, limits, changes);
-        let before = self.seat(told.id);
-        if let Some(known) = self.known.get_mut(&told.id) {
-            known.note_told(now, teller, &heartbeat, limits.interval_ms);
-            if fresher {
-                known.info.hear_of(told.able, said);
+        self.noting(now, told.id, |m| {
+            let fresher = m.merge(now, heartbeat, limits, changes);
+            if let Some(known) = m.known.get_mut(&told.id) {
+                known.note_told(now, teller, &heartbeat, limits.interval_ms);
+                if fresher {
+                    known.info.hear_of(told.able, said);
+                }
             }
-        }
-        self.changes += u64::from(before != self.seat(told.id));
+        });
+    }
+
+    /// Does something to what is known of one peer, and notes what the extent and the number
+    /// of changes owe to it.
+    fn noting(&mut self, now: Time, id: u16, change: impl FnOnce(&mut Self)) {
+        let before = (self.weight(now, id), self.seat(id));
+        change(self);
+        self.weighed(id, before.0, self.weight(now, id));
+        self.changes += u64::from(before.1 != self.seat(id));
     }
 
     /// Merges one heartbeat. Returns whether it was fresher than what was known.
-    fn hear(
-        &mut self,
-        now: Time,
-        heard: Heartbeat,
-        limits: Patience,
-        changes: &mut Vec<Change>,
-    ) -> bool {
-        let before = (self.weight(now, heard.id), self.seat(heard.id));
-        let fresher = self.merge(now, heard, limits, changes);
-        self.weighed(heard.id, before.0, self.weight(now, heard.id));
-        self.changes += u64::from(before.1 != self.seat(heard.id));
-        fresher
-    }
-
     fn merge(
         &mut self,
         now: Time,
