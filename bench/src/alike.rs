@@ -130,22 +130,17 @@ pub fn run(args: &AlikeArgs) -> Result<String> {
     let end = args.seed.saturating_add(args.runs);
     let (mut live, mut sim) = (Vec::new(), Vec::new());
     for seed in args.seed..end {
-        let flown = |verb: &str, more: &[String]| {
-            let mut words = vec![verb.to_owned(), args.scenario.clone()];
-            words.extend(["--seed".to_owned(), seed.to_string()]);
-            if let Some(n) = args.peers {
-                words.extend(["--peers".to_owned(), n.to_string()]);
-            }
-            words.extend_from_slice(more);
-            report_of(&program, &words).with_context(|| format!("{verb} of seed {seed}"))
+        let flown = |verb: &str, time_scale: Option<f64>| {
+            let flags = [
+                ("--seed", Some(seed.to_string())),
+                ("--peers", args.peers.map(|n| n.to_string())),
+                ("--time-scale", time_scale.map(|x| x.to_string())),
+            ];
+            let report = report_of(&program, verb, &args.scenario, &flags);
+            report.with_context(|| format!("{verb} of seed {seed}"))
         };
-        sim.push(flown("sim", &[])?);
-        let scale = args.time_scale.map(|x| x.to_string());
-        let scale = scale.map(|x| ["--time-scale".to_owned(), x]);
-        live.push(flown(
-            "trial",
-            scale.as_ref().map_or(&[][..], |s| s.as_slice()),
-        )?);
+        sim.push(flown("sim", None)?);
+        live.push(flown("trial", args.time_scale)?);
     }
     let figures = compare(&live, &sim);
     let passed = |reports: &[Value]| reports.iter().filter(|r| r["passed"] == true).count();

@@ -54,15 +54,23 @@ impl Program {
     }
 }
 
-/// The report of what `program` flies with these arguments; what it says meanwhile goes to
-/// stderr.
+/// The report of what a verb of `program` flies, with those flags that have a value; what it
+/// says meanwhile goes to stderr.
 ///
 /// # Errors
 /// When there is no program, or it tells of no flight.
-pub(crate) fn report_of(program: &Path, arguments: &[String]) -> Result<Value> {
+pub(crate) fn report_of(
+    program: &Path,
+    verb: &str,
+    scenario: &str,
+    flags: &[(&str, Option<String>)],
+) -> Result<Value> {
+    let given = flags
+        .iter()
+        .filter_map(|(flag, v)| Some([*flag, v.as_deref()?]));
     let out = Command::new(program)
-        .args(arguments)
-        .args(["--format", "json"])
+        .args([verb, scenario, "--format", "json"])
+        .args(given.flatten())
         .stdin(Stdio::null())
         .stderr(Stdio::inherit())
         .output()
@@ -79,16 +87,13 @@ pub(crate) fn report_of(program: &Path, arguments: &[String]) -> Result<Value> {
 /// # Errors
 /// When there is no program, or it tells of no flight.
 pub fn run(args: &LiveArgs) -> Result<String> {
-    let mut words = vec!["trial".to_owned(), args.scenario.clone()];
-    for (flag, value) in [
-        ("--peers", args.peers.to_string()),
-        ("--launch", args.launch.clone()),
-        ("--max-time", args.seconds.to_string()),
-        ("--time-scale", args.time_scale.to_string()),
-    ] {
-        words.extend([flag.to_owned(), value]);
-    }
-    let report = report_of(&args.program.path()?, &words)?;
+    let flags = [
+        ("--peers", Some(args.peers.to_string())),
+        ("--launch", Some(args.launch.clone())),
+        ("--max-time", Some(args.seconds.to_string())),
+        ("--time-scale", Some(args.time_scale.to_string())),
+    ];
+    let report = report_of(&args.program.path()?, "trial", &args.scenario, &flags)?;
     serde_json::to_string_pretty(&figures(&report)).context("the figures")
 }
 
