@@ -10,6 +10,7 @@ use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::history::What;
 use skein_netsim::prepared::Prepared;
 use skein_netsim::runs::{Wanted, run};
+use skein_netsim::summary::Spread;
 use skein_netsim::swarm::Outcome;
 use skein_peer::Report;
 use skein_scenario::{Overrides, Seeds, open};
@@ -75,38 +76,24 @@ struct Point {
     n: u32,
     rate_bps: u32,
     makespan_over_launch_bound: Option<f64>,
-    /// 95th percentile of how long it took a live UAV to find out that another was dead.
-    detection_s: Option<f64>,
+    /// How long it took each live UAV to find out about each dead one.
+    detection_ms: Spread,
     bytes_per_peer_s: f64,
 }
 
 impl Point {
     fn of(n: u32, rate_bps: u32, outcome: &Outcome) -> Self {
         let report = &outcome.report;
+        let each_ms = report.kills.iter().flat_map(|k| k.detections_ms.values());
         Self {
             n,
             rate_bps,
             makespan_over_launch_bound: report.makespan_over_launch_bound,
-            detection_s: percentile(&detections_ms(outcome), 95).map(|ms| ms as f64 / 1000.0),
+            detection_ms: Spread::of(each_ms.map(|ms| *ms as f64).collect()),
             bytes_per_peer_s: report.radio.bytes_sent as f64 * 1000.0
                 / (report.peer_ms.max(1) as f64),
         }
     }
-}
-
-/// How long it took each live UAV to find out about each dead one, the shortest first.
-fn detections_ms(outcome: &Outcome) -> Vec<u64> {
-    let kills = outcome.report.kills.iter();
-    let mut each: Vec<u64> = kills
-        .flat_map(|k| k.detections_ms.values().copied())
-        .collect();
-    each.sort_unstable();
-    each
-}
-
-fn percentile(sorted: &[u64], percent: usize) -> Option<u64> {
-    let i = (sorted.len() * percent / 100).min(sorted.len().saturating_sub(1));
-    sorted.get(i).copied()
 }
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
@@ -123,7 +110,9 @@ fn draw(path: &str, points: &[Point]) -> Drawn {
         ("makespan over the launch bound", |p| {
             p.makespan_over_launch_bound
         }),
-        ("deaths noticed within, s (95 %)", |p| p.detection_s),
+        ("deaths noticed within, s (95 %)", |p| {
+            Some(p.detection_ms.p95 / 1000.0).filter(|_| p.detection_ms.n > 0)
+        }),
         ("bytes a second and peer", |p| Some(p.bytes_per_peer_s)),
     ];
     for (number, (panel, (title, of))) in panels.iter().zip(wanted).enumerate() {
@@ -196,8 +185,6 @@ fn tell(point: &Point, outcome: &Outcome, wall_s: f64) {
             _ => None,
         })
         .collect();
-    let detections = detections_ms(outcome);
-    let part = |percent| percentile(&detections, percent).unwrap_or(0);
     let ran_s = report.peer_ms as f64 / 1000.0;
     let kinds = report.simulated.as_ref().map(|s| &s.bytes_by_kind);
     let kinds: Vec<String> = kinds
@@ -206,7 +193,7 @@ fn tell(point: &Point, outcome: &Outcome, wall_s: f64) {
         .map(|(kind, bytes)| format!("{kind} {:.0}", *bytes as f64 / ran_s))
         .collect();
     println!(
-        "{n} UAVs {rate_bps} bit/s seed {}: makespan {:?} ms, {:.2} of the work bound, {:.2} of that from the take-offs on, end {} ms; false downs {}; rounds {}; detection p50 {} p95 {} ms; lost by collision {}; bytes/s a peer: {}; violations {:?}; {:.0} times real time",
+        "{n} UAVs {rate_bps} bit/s seed {}: makespan {:?} ms, {:.2} of the work bound, {:.2} of that from the take-offs on, end {} ms; false downs {}; rounds {}; detection p50 {:.0} p95 {:.0} ms; lost by collision {}; bytes/s a peer: {}; violations {:?}; {:.0} times real time",
         report.seed,
         report.makespan_ms,
         report.makespan_over_work_bound.unwrap_or(0.0),
@@ -214,8 +201,8 @@ fn tell(point: &Point, outcome: &Outcome, wall_s: f64) {
         report.end_ms,
         outcome.false_downs().len(),
         rounds.len(),
-        part(50),
-        part(95),
+        point.detection_ms.p50,
+        point.detection_ms.p95,
         report.radio.lost.get("collision").copied().unwrap_or(0),
         kinds.join(", "),
         report.violations.as_ref().map(|v| &v.counts),
