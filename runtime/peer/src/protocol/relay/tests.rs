@@ -1,0 +1,397 @@
+//! One relay at a time, with records and beacons given by hand.
+
+use super::*;
+use crate::protocol::airtime::Filling;
+use crate::wire::message::MissionChunk;
+use crate::wire::samples;
+
+fn record(author: u16, seq: u32) -> Record {
+    Record {
+        author,
+        incarnation: 1,
+        seq,
+        kind: 1,
+        subject: 0,
+        body: vec![0; 20],
+        signature: Vec::new(),
+    }
+}
+
+/// A relay that has begun: it knows that it is alone.
+fn relay(me: u16) -> Relay {
+    let mut relay = Relay::new(me, "f", 64_000, 1000);
+    for t in 0..3 {
+        relay.air.plan_beacon(Time(t));
+    }
+    relay
+}
+
+#[test]
+fn a_new_record_is_passed_on_once() {
+    let mut r = relay(2);
+    assert_eq!(r.offer(Time(5000), &record(1, 1), &[1; 40], 0), Offer::New);
+    assert_eq!(r.poll(Time(5000)), None);
+    let out = r.poll(Time(5500)).unwrap();
+    assert_eq!((out.hops, out.bytes.len()), (1, 40));
+    assert_eq!(r.poll(Time(6000)), None);
+    assert_eq!(
+        r.offer(Time(6000), &record(1, 1), &[1; 40], 0),
+        Offer::Duplicate
+    );
+    assert_eq!(
+        r.offer(Time(6000), &record(1, 0), &[1; 40], 0),
+        Offer::Stale
+    );
+}
+
+#[test]
+fn two_copies_heard_are_enough() {
+    let mut r = relay(3);
+    r.offer(Time(5000), &record(1, 1), &[1; 40], 0);
+    r.offer(Time(5001), &record(1, 1), &[1; 40], 1);
+    assert_eq!(r.poll(Time(5500)), None);
+}
+
+#[test]
+fn what_a_neighbour_lacks_is_sent_again() {
+    let mut r = relay(2);
+    r.offer(Time(5000), &record(1, 7), &[1; 40], 0);
+    assert!(r.poll(Time(5500)).is_some());
+    r.catch_up(Time(9000), 1, 1, 3, 0);
+    assert!(r.poll(Time(9500)).is_some());
+    let (seq, digest) = r.version(1, 1);
+    r.catch_up(Time(20_000), 1, 1, seq, digest);
+    assert_eq!(r.poll(Time(20_500)), None, "nothing is lacking");
+}
+
+fn piece(subject: u16, chunks: u16) -> Record {
+    let piece = MissionChunk {
+        revision: 2,
+        content_hash: 6,
+        chunks,
+        bytes: vec![0; 180],
+    };
+    Record {
+        kind: Kind::Mission.number(),
+        subject,
+        body: codec::encode_body(&Body::Mission(piece)),
+        ..record(9, 1)
+    }
+}
+
+#[test]
+fn all_pieces_of_a_mission_are_sent_in_turn_though_few_go_within_their_lifetime() {
+    let mut r = relay(2);
+    for subject in 0..40 {
+        let byte = u8::try_from(subject).unwrap();
+        r.offer(Time(5_000), &piece(subject, 40), &[byte; 200], 0);
+    }
+    let mut times = [0; 40];
+    for t in 8_000..1_200_000 {
+        if t % 2000 == 0 {
+            let lacks = Beacon {
+                revision: 1,
+                sharers: 60,
+                gossip: Vec::new(),
+                ..samples::beacon(1)
+            };
+            r.on_beacon(Time(t), 7, &lacks);
+        }
+        if let Some(out) = r.poll(Time(t)) {
+            times[usize::from(out.bytes[0])] += 1;
+        }
+    }
+    let (least, most) = (times.iter().min(), times.iter().max());
+    assert!(
+        least >= Some(&2) && most <= Some(&(times[0] + 3)),
+        "{times:?}"
+    );
+}
+
+#[test]
+fn a_mission_goes_to_who_lacks_it_and_what_is_due_before_its_next_piece_goes_first() {
+    let mut r = relay(2);
+    let neighbour = |revision| Beacon {
+        revision,
+        sharers: 60,
+        gossip: Vec::new(),
+        ..samples::beacon(1)
+    };
+    r.on_beacon(Time(5_000), 7, &neighbour(2));
+    for subject in 0..6 {
+        r.offer(Time(5_000), &piece(subject, 6), &[1; 200], 0);
+    }
+    assert_eq!(r.version(9, 1).0, 0, "pieces are not counted");
+    assert_eq!(r.poll(Time(7_900)), None, "nobody lacks them");
+    r.on_beacon(Time(8_000), 7, &neighbour(1));
+    let mut sent = Vec::new();
+    for t in 8_000..50_000 {
+        if t == 9_000 {
+            // Due within 14 s; of the pieces the third is due after 17 s.
+            let said = Record {
+                kind: Kind::Finished.number(),
+                ..record(3, 1)
+            };
+            r.offer(Time(t), &said, &[3; 200], 0);
+        }
+        sent.extend(r.poll(Time(t)).map(|out| out.bytes[0]));
+    }
+    assert_eq!(sent.len(), 7, "{sent:?}");
+    assert!(sent[..3].contains(&3), "{sent:?}");
+    r.on_beacon(Time(50_000), 7, &neighbour(1));
+    r.on_beacon(Time(50_010), 7, &neighbour(2));
+    assert_eq!(r.poll(Time(60_000)), None, "nobody lacks them any more");
+}
+
+#[test]
+fn own_coverage_waits_for_own_bids_and_claims_and_not_for_their_repetition() {
+    let mut r = relay(2);
+    r.air.hear(Time(5_000), 9, (4, 30));
+    let mut sent = Vec::new();
+    for t in 5_000..40_000 {
+        let kind = match t {
+            5_000 => Some(Kind::Claim),
+            5_001 => Some(Kind::Cover),
+            5_002 => Some(Kind::Bid),
+            _ => None,
+        };
+        if let Some(kind) = kind {
+            let kind = kind.number();
+            r.own(
+                Time(t),
+                &Record {
+                    kind,
+                    ..record(2, 1)
+                },
+                vec![kind; 200],
+            );
+        }
+        sent.extend(r.poll(Time(t)).map(|out| out.bytes[0]));
+    }
+    let kinds = [Kind::Claim, Kind::Bid, Kind::Cover].map(Kind::number);
+    assert_eq!(sent[..3], kinds, "{sent:?}");
+    assert_eq!(sent[3..].iter().filter(|k| **k == kinds[0]).count(), 2);
+}
+
+#[test]
+fn the_bucket_bounds_what_is_sent() {
+    let mut r = relay(2);
+    let (mut bytes, mut frame) = (0, Filling::default());
+    for t in 0..10_000u64 {
+        r.own(Time(t), &record(2, u32::try_from(t).unwrap()), vec![0; 200]);
+        while let Some(out) = r.poll(Time(t)) {
+            bytes += frame.add(t, out.bytes.len());
+        }
+    }
+    assert!(bytes <= 64_000 / 8 * 10, "{bytes}");
+    assert!(bytes >= 64_000 / 8 * 10 * 4 / 10, "{bytes}");
+}
+
+#[test]
+fn what_waits_for_its_random_time_goes_with_what_is_sent_meanwhile() {
+    let together = |sharers: u16| {
+        let mut r = relay(2);
+        r.air.hear(Time(5_000), 9, (4, sharers));
+        for author in [1, 3, 4, 5] {
+            r.offer(Time(5_000), &record(author, 1), &[1; 100], 0);
+        }
+        let due = r.next_timeout(Time(5_000)).unwrap();
+        let sent = std::iter::from_fn(|| r.poll(due)).count();
+        assert!(r.next_timeout(due).unwrap() > due);
+        sent
+    };
+    // Three are 308 bytes; the fourth waits for its own time.
+    assert_eq!(together(13), 3);
+    assert_eq!(together(12), 1, "each waits for its own time");
+}
+
+#[test]
+fn an_own_claim_that_nobody_passes_on_is_sent_again_twice() {
+    let claim = |seq: u32| Record {
+        kind: Kind::Claim.number(),
+        ..record(2, seq)
+    };
+    let sent = |r: &mut Relay, from: u64, echo: Option<&Record>| {
+        let mut sent = Vec::new();
+        for t in from..from + 5_000 {
+            while r.poll(Time(t)).is_some() {
+                sent.push(t - from);
+                echo.iter().for_each(|e| r.echo(e));
+            }
+        }
+        sent
+    };
+    let mut r = relay(2);
+    r.own(Time(5_000), &claim(1), vec![1; 60]);
+    assert_eq!(sent(&mut r, 5_000, None), [0], "nobody is there to hear it");
+    r.air.hear(Time(10_000), 1, (4, 2));
+    r.own(Time(10_000), &claim(2), vec![1; 60]);
+    let times = sent(&mut r, 10_000, None);
+    assert_eq!((times.len(), times[0]), (3, 0), "{times:?}");
+    assert!((480..720).contains(&times[1]), "{times:?}");
+    r.air.hear(Time(15_000), 1, (4, 2));
+    r.own(Time(15_000), &claim(3), vec![1; 60]);
+    assert_eq!(
+        sent(&mut r, 15_000, Some(&claim(2))).len(),
+        3,
+        "an older one"
+    );
+    r.air.hear(Time(20_000), 1, (4, 2));
+    r.own(Time(20_000), &claim(4), vec![1; 60]);
+    assert_eq!(sent(&mut r, 20_000, Some(&claim(4))), [0]);
+    // Nor does it go along with itself where many share the channel.
+    r.air.hear(Time(25_000), 1, (4, 40));
+    r.own(Time(25_000), &claim(5), vec![1; 60]);
+    let times = sent(&mut r, 25_000, None);
+    let apart = times.windows(2).all(|w| w[1] - w[0] >= 2 * 30 * 40);
+    assert!(times.len() == 2 && apart, "{times:?}");
+}
+
+#[test]
+fn a_full_store_lets_telemetry_go_before_claims() {
+    let of_kind = |author: u16, kind: Kind| Record {
+        kind: kind.number(),
+        ..record(author, 1)
+    };
+    let mut r = relay(2);
+    let half = u16::try_from(MAX_RECORDS / 2).unwrap();
+    // The claims were on the air longest ago.
+    for author in 0..half {
+        let claim = of_kind(1000 + author, Kind::Claim);
+        r.offer(Time(1000), &claim, &[1; 40], 0);
+    }
+    for author in 0..2 * half {
+        let state = of_kind(5000 + author, Kind::State);
+        r.offer(Time(2000), &state, &[1; 40], 0);
+    }
+    let held = r.records();
+    let claims = held.iter().filter(|h| h.kind == Kind::Claim.number());
+    assert_eq!(held.len(), MAX_RECORDS);
+    assert_eq!(claims.count(), usize::from(half));
+}
+
+#[test]
+fn a_digest_tells_which_records_are_held_and_not_only_the_newest() {
+    let mut whole = relay(2);
+    let mut hole = relay(3);
+    for seq in 1..=6 {
+        let record = Record {
+            subject: u16::try_from(seq).unwrap(),
+            ..record(1, seq)
+        };
+        whole.offer(Time(5000), &record, &[1; 40], 0);
+        if seq != 3 {
+            hole.offer(Time(5000), &record, &[1; 40], 0);
+        }
+    }
+    let ((seq, digest), (other_seq, other)) = (whole.version(1, 1), hole.version(1, 1));
+    assert_eq!((seq, other_seq), (6, 6));
+    assert_ne!(digest, other);
+    // As it is told on the wire: FNV-1a of kind, subject and sequence number, folded.
+    let mut hash = Fnv::new();
+    for seq in 1..=6_u32 {
+        hash.write(&[1]);
+        hash.write(&u16::try_from(seq).unwrap().to_le_bytes());
+        hash.write(&seq.to_le_bytes());
+    }
+    let parts = hash.finish().to_le_bytes();
+    let parts = parts.chunks(2).map(|p| u16::from_le_bytes([p[0], p[1]]));
+    assert_eq!(digest, parts.fold(0, |a, b| a ^ b));
+}
+
+#[test]
+fn only_what_a_neighbour_lacks_is_sent_again_and_nothing_twice_in_two_periods() {
+    let of = |subject: u16, seq: u32| Record {
+        subject,
+        ..record(1, seq)
+    };
+    let mut r = relay(2);
+    for seq in 1..=4 {
+        let subject = u16::try_from(seq).unwrap();
+        r.offer(Time(5000), &of(subject, seq), &[1; 40], 0);
+    }
+    let drain = |r: &mut Relay, from: u64| {
+        let mut n = 0;
+        for t in from..from + 1_000 {
+            n += usize::from(r.poll(Time(t)).is_some());
+        }
+        n
+    };
+    assert_eq!(drain(&mut r, 5_000), 4);
+    // A neighbour has what came up to the second one.
+    r.catch_up(Time(9_000), 1, 1, 2, 0);
+    assert_eq!(drain(&mut r, 9_000), 2);
+    // They were on the air a moment ago: another neighbour has to wait.
+    r.catch_up(Time(11_000), 1, 1, 2, 0);
+    assert_eq!(drain(&mut r, 11_000), 0);
+    // Who has the newest but not all of it gets all.
+    r.catch_up(Time(20_000), 1, 1, 4, 0xdead);
+    assert_eq!(drain(&mut r, 20_000), 4);
+}
+
+#[test]
+fn a_relay_with_nothing_to_send_asks_for_no_time_and_tells_what_it_holds() {
+    let mut r = relay(2);
+    assert_eq!(r.next_timeout(Time(1_000)), None);
+    r.offer(Time(5_000), &record(1, 1), &[1; 40], 0);
+    let due = r.next_timeout(Time(5_000)).unwrap();
+    assert!(due > Time(5_000), "{due:?}");
+    assert_eq!(r.poll(Time(due.0 - 1)), None);
+    assert!(r.poll(due).is_some());
+    assert_eq!(r.next_timeout(due), None);
+    assert_eq!(
+        r.loads(),
+        [
+            ("records", 1, MAX_RECORDS),
+            ("queue", 0, MAX_QUEUE),
+            ("neighbours", 0, PEERS_MAX)
+        ]
+    );
+}
+
+#[test]
+fn who_knows_an_earlier_life_lacks_all_of_the_later_one_and_who_knows_a_later_one_nothing() {
+    let mut r = relay(2);
+    let of_life_2 = Record {
+        incarnation: 2,
+        ..record(1, 7)
+    };
+    r.offer(Time(5_000), &of_life_2, &[1; 40], 0);
+    assert!(r.poll(Time(5_500)).is_some());
+    let (seq, digest) = r.version(1, 2);
+    for (told_life, told_seq, lacks) in [
+        // In an earlier life the same numbers mean other records, and it may have
+        // written more.
+        (1, seq, true),
+        (1, seq + 2, true),
+        (2, seq, false),
+        (2, seq + 2, false),
+        (3, seq - 2, false),
+    ] {
+        let mut r = r.clone();
+        r.catch_up(Time(9_000), 1, told_life, told_seq, digest);
+        let again = (9_000..10_000).filter(|t| r.poll(Time(*t)).is_some());
+        assert_eq!(again.count() == 1, lacks, "life {told_life}, {told_seq}");
+    }
+}
+
+#[test]
+fn what_is_due_goes_before_what_only_shares_its_headers() {
+    let mut r = relay(2);
+    r.air.hear(Time(5_000), 9, (4, 13));
+    let of = |author, kind: Kind| Record {
+        kind: kind.number(),
+        ..record(author, 1)
+    };
+    // Its random time is over after 20 ms and 30 for each of 13 at most.
+    r.offer(Time(5_000), &of(1, Kind::State), &[1; 40], 0);
+    // A claim is to be sent sooner than a state, once its random time is over.
+    r.offer(Time(5_400), &of(3, Kind::Claim), &[1; 40], 0);
+    r.own(Time(5_411), &of(2, Kind::Finished), vec![1; 40]);
+    let sent = std::iter::from_fn(|| r.poll(Time(5_411)));
+    let authors: Vec<String> = sent.map(|out| out.key).collect();
+    assert_eq!(
+        authors,
+        ["f/v1/finished/0/2", "f/v1/state/0/1", "f/v1/claim/0/3"]
+    );
+}
