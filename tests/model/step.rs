@@ -150,7 +150,7 @@ impl Case {
     }
 
     fn take(&self, n: &mut Node, cells: &[(u16, Direction)]) {
-        n.sections.take(cells);
+        n.sections.take_at_once(cells);
         self.settle(n);
     }
 

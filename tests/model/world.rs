@@ -176,7 +176,7 @@ impl Node {
             .filter(|p| committed.contains(p.cell));
         let commits: Vec<(u16, Direction)> = commits.map(|p| (p.cell, p.direction)).collect();
         self.rounds.close();
-        self.sections.adopt(epoch, &commits, &section);
+        self.sections.adopt_at_once(epoch, &commits, &section);
     }
 
     /// By what right this peer lists a cell.

@@ -146,10 +146,10 @@ impl Cooperation {
         self.order = StandingOrder { order, version };
     }
 
-    /// A life of this peer begins.
-    pub fn new_life(&mut self, me: Member, timers: &mut Timers) {
+    /// What it owned is void: a life of this peer begins, or another process silences it.
+    pub fn void_ownership(&mut self, me: Member, timers: &mut Timers) {
         if let Some(state) = &mut self.state {
-            state.new_life(me, timers);
+            state.void_ownership(me, timers);
         }
     }
 
@@ -304,11 +304,11 @@ impl Cooperation {
     }
 
     /// A bid is durable: it may be spoken, if its round is still open.
-    pub fn bid_is_durable(&mut self, bid: Bid) -> Effects {
+    pub fn on_bid_durable(&mut self, bid: Bid) -> Effects {
         let spoken = self
             .state
             .as_mut()
-            .is_some_and(|s| s.negotiation.bid_is_durable(bid.clone()));
+            .is_some_and(|s| s.negotiation.on_bid_durable(bid.clone()));
         if spoken {
             vec![Effect::Speak(0, Body::Bid(bid)), Effect::Negotiate]
         } else {
@@ -325,7 +325,7 @@ impl Cooperation {
     }
 
     /// An adoption is durable: it is flown from now on.
-    pub fn adopt(
+    pub fn on_adoption_durable(
         &mut self,
         s: &Situation<'_>,
         written: u64,
@@ -358,7 +358,12 @@ impl Cooperation {
     }
 
     /// Cells taken without a round are durable: they are flown from now on.
-    pub fn take(&mut self, s: &Situation<'_>, written: u64, taken: &[PlannedCell]) -> Effects {
+    pub fn on_take_durable(
+        &mut self,
+        s: &Situation<'_>,
+        written: u64,
+        taken: &[PlannedCell],
+    ) -> Effects {
         let order = self.order.order;
         let Some(state) = &mut self.state else {
             return Effects::new();
@@ -367,7 +372,7 @@ impl Cooperation {
             state.negotiation.cancel_take();
             return Effects::new();
         }
-        state.negotiation.take(taken);
+        state.negotiation.append_take(taken);
         state.keep_within_endurance(s.percept);
         // Runs of orphans are taken one after the other, several in a period: the claim
         // tells of all of them at once.
@@ -377,7 +382,7 @@ impl Cooperation {
     }
 
     /// A promise could not be made durable, so what it was for does not happen.
-    pub fn broken(&mut self, promise: &Promise) {
+    pub fn on_broken(&mut self, promise: &Promise) {
         let Some(state) = &mut self.state else {
             return;
         };
@@ -561,7 +566,7 @@ impl MissionState {
         let alone = alone.clone();
         let mut live = reachable(s.membership, &alone);
         let members = self.members(s, &live, able);
-        let unheard = self.expect(s, &mut live);
+        let unheard = self.add_expected(s, &mut live);
         let until = self.expected.values().min().copied();
         self.company = Arc::new(Company {
             live,
@@ -599,7 +604,7 @@ impl MissionState {
         self.able_since = able.then(|| self.able_since.unwrap_or(s.now));
         let is_lost = |(id, life)| company.live.get(id) != Some(life);
         if live_changed && before.live.iter().any(is_lost) {
-            self.negotiation.note_loss();
+            self.negotiation.note_gone();
         }
         let mut ctx = Context {
             now: s.now,
@@ -615,12 +620,12 @@ impl MissionState {
             held_expired: timers.take_due(Timer::HeldCells, s.now),
             gain_in_sight: false,
         };
-        if self.negotiation.wants_foresight(&ctx) {
+        if self.negotiation.take_foresight(&ctx) {
             ctx.gain_in_sight = self.foresees_gain(s.me.id, &ctx);
         }
         let coverage_loop = Arc::clone(&self.geometry.coverage_loop);
         let mut actions = self.negotiation.tick(&ctx, &coverage_loop);
-        let left_over = self.negotiation.left_over(&ctx);
+        let left_over = self.negotiation.take_left_over(&ctx);
         let within_reach = left_over.and_then(|cells| self.within_reach(&cells, s.percept));
         let taken = within_reach.and_then(|cells| self.negotiation.begin_take(&cells));
         let taken = taken.or_else(|| self.taken_without_a_round(s, &ctx));
@@ -671,7 +676,7 @@ impl MissionState {
         };
         let present_ms = self.negotiation.present_end_ms(ctx);
         // The round takes a waiting time.
-        let delay_ms = ctx.base_wait_ms();
+        let delay_ms = ctx.first_wait_ms();
         division::gain_in_sight(
             &self.geometry,
             (sections, ctx.live),
@@ -691,7 +696,7 @@ impl MissionState {
         let is_open = |c: u16| !sections.covered().contains(c);
         let forecast = executive.forecast(open.round.wait_ms, &is_open);
         let is_planned = |c: &u16| sections.plan().iter().any(|p| p.cell == *c);
-        let committed: Vec<u16> = forecast.cells.iter().copied().filter(is_planned).collect();
+        let commits = forecast.cells.iter().copied().filter(is_planned);
         let idle = sections.plan().is_empty();
         let bid = Bid {
             round: open.round.clone(),
@@ -704,7 +709,7 @@ impl MissionState {
                 .spendable_ms(s.percept)
                 .saturating_sub(forecast.release_ms),
             covered: sections.covered().encode_rle(Some(BID_COVERED_MAX_BYTES)),
-            commits: division::runs_of(&committed, sections.cells()),
+            commits: CellSet::of(sections.cells(), commits).runs(),
             off_loop: forecast.off_loop.into_iter().collect(),
             eta_ms: if idle { 0 } else { forecast.finish_ms },
             adopted_ago_ms: self.negotiation.adopted_ago_ms(s.now),

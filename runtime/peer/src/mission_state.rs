@@ -118,10 +118,10 @@ pub(crate) struct MissionState {
 }
 
 impl MissionState {
-    /// A new life of this peer: ownership of the old one is void.
-    pub fn new_life(&mut self, me: Member, timers: &mut Timers) {
+    /// What it owned is void.
+    pub fn void_ownership(&mut self, me: Member, timers: &mut Timers) {
         timers.stop(Timer::HeldCells);
-        self.negotiation.new_life(me);
+        self.negotiation.void_ownership(me);
         if me.incarnation > FIRST_LIFE {
             self.launches = Arc::from([]);
             self.expected.clear();
@@ -325,9 +325,9 @@ fn negotiation_begun(
     let without_need = (0u16..)
         .zip(coverage_loop.cells())
         .filter(|(_, c)| !c.needed);
-    let base = CellSet::of(cells, without_need.map(|(i, _)| i));
+    let needless = CellSet::of(cells, without_need.map(|(i, _)| i));
     let counter = old.map_or(0, |m| m.negotiation.rounds.counter());
-    let mut negotiation = Negotiation::new(me, base, counter.max(durable.counter));
+    let mut negotiation = Negotiation::new(me, needless, counter.max(durable.counter));
     // Every lap begins with nothing covered.
     let same_lap = |old: &&MissionState| old.geometry.mission.lap == geometry.mission.lap;
     if let Some(old) = old.filter(same_lap) {

@@ -260,7 +260,7 @@ impl Peer {
                 self.relay.air.hear(now, author, (h.interval, h.sharers));
             }
             Heard::Record(kind, record, body) => {
-                self.membership.hears(self.now);
+                self.membership.note_heard(self.now);
                 if kind.relayed() && self.relay.offer(self.now, &record, bytes, hops) != Offer::New
                 {
                     return;
@@ -318,23 +318,23 @@ impl Peer {
         };
         if !ok {
             self.alarm("the journal could not be written; what it was to promise is not spoken");
-            return self.broken(&promise);
+            return self.on_broken(&promise);
         }
         self.durable.apply(&entry);
         let plans = matches!(promise, Promise::Adopt(..) | Promise::Take(..));
         if plans && self.life.is_silent() {
-            return self.broken(&promise);
+            return self.on_broken(&promise);
         }
         let effects = match promise {
-            Promise::Life(incarnation) => self.life.is_durable(incarnation),
-            Promise::Bid(bid) => self.cooperation.bid_is_durable(*bid),
+            Promise::Life(incarnation) => self.life.on_durable(incarnation),
+            Promise::Bid(bid) => self.cooperation.on_bid_durable(*bid),
             Promise::Adopt(written, adoption) => {
                 let (situation, cooperation, timers) = self.situation();
-                cooperation.adopt(&situation, written, &adoption, timers)
+                cooperation.on_adoption_durable(&situation, written, &adoption, timers)
             }
             Promise::Take(written, cells) => {
                 let (situation, cooperation, _) = self.situation();
-                cooperation.take(&situation, written, &cells)
+                cooperation.on_take_durable(&situation, written, &cells)
             }
             Promise::Covered(_) => Effects::new(),
         };
@@ -418,11 +418,11 @@ impl Peer {
                 self.relay.new_life();
                 self.outbound.new_life(&mut self.timers);
                 let me = self.me();
-                self.cooperation.new_life(me, &mut self.timers);
+                self.cooperation.void_ownership(me, &mut self.timers);
             }
             Effect::Silent => {
                 let me = self.me();
-                self.cooperation.new_life(me, &mut self.timers);
+                self.cooperation.void_ownership(me, &mut self.timers);
                 self.negotiate();
             }
             Effect::Negotiate => self.negotiate(),
@@ -558,7 +558,7 @@ impl Peer {
     /// too many are under way.
     fn store(&mut self, promise: Promise, entry: Entry) {
         if self.stores.len() >= MAX_STORES {
-            return self.broken(&promise);
+            return self.on_broken(&promise);
         }
         let token = self.token();
         self.outputs.push_back(Output::Store {
@@ -570,10 +570,10 @@ impl Peer {
     }
 
     /// What was promised does not happen.
-    fn broken(&mut self, promise: &Promise) {
+    fn on_broken(&mut self, promise: &Promise) {
         match promise {
-            Promise::Life(incarnation) => self.life.is_broken(*incarnation),
-            other => self.cooperation.broken(other),
+            Promise::Life(incarnation) => self.life.on_broken(*incarnation),
+            other => self.cooperation.on_broken(other),
         }
     }
 

@@ -8,7 +8,7 @@ use crate::cooperation::{Situation, speed_mmps};
 use crate::mission_state::MissionState;
 use crate::protocol::airtime::LASTING_INTERVALS;
 use crate::protocol::launches;
-use crate::protocol::negotiation::{Context, SETTLE_PERIODS};
+use crate::protocol::negotiation::{Context, SETTLE_INTERVALS};
 use crate::protocol::runs::{PlannedCell, cells_of, legs_of};
 use crate::protocol::sections::{FIRST_LIFE, LivePeers};
 use crate::protocol::sharing::{self, Hand, Owner, Pace, Site};
@@ -32,7 +32,7 @@ impl MissionState {
         s: &Situation<'_>,
         ctx: &Context<'_>,
     ) -> Option<Vec<PlannedCell>> {
-        if !self.negotiation.looks_around(ctx) {
+        if !self.negotiation.take_look(ctx) {
             return None;
         }
         let me = self.hand(s)?;
@@ -60,7 +60,7 @@ impl MissionState {
         let hands = others.into_iter().filter(|h| h.free_ms == 0);
         let hands: Vec<Hand> = hands.chain([me]).collect();
         // A claim is stored, spoken, and heard even if it is lost once.
-        let least_ms = SETTLE_PERIODS * ctx.interval_ms;
+        let least_ms = SETTLE_INTERVALS * ctx.interval_ms;
         let (cells, by_ms) = sharing::relief(&owners, &hands, me.id, pace, least_ms)?;
         let spendable_ms = u64::from(self.spendable_ms(s.percept));
         let cells = self.flown_besides(cells, by_ms.min(spendable_ms))?;
@@ -147,7 +147,7 @@ impl MissionState {
 
     /// Who was to be launched and was not heard of yet is taken to be there until its section
     /// would be flown. Returns how many that are.
-    pub(crate) fn expect(&mut self, s: &Situation<'_>, live: &mut LivePeers) -> usize {
+    pub(crate) fn add_expected(&mut self, s: &Situation<'_>, live: &mut LivePeers) -> usize {
         let unheard = |id: u16| s.membership.status(id).is_none();
         self.expected
             .retain(|id, until| s.now < *until && unheard(*id));
@@ -163,7 +163,7 @@ impl MissionState {
         ctx: &Context<'_>,
     ) -> Option<Vec<PlannedCell>> {
         let is_launched = self.launches.iter().any(|l| l.id == s.me.id);
-        if !self.negotiation.begins(ctx, is_launched) {
+        if !self.negotiation.take_begin(ctx, is_launched) {
             return None;
         }
         if is_launched {
@@ -243,7 +243,7 @@ impl MissionState {
         let covered = self.covered();
         let open = covered.capacity().saturating_sub(covered.count());
         let members = u16::try_from(ctx.members.len()).unwrap_or(u16::MAX);
-        let heard_ms = SETTLE_PERIODS * ctx.interval_ms;
+        let heard_ms = SETTLE_INTERVALS * ctx.interval_ms;
         let meanwhile = u16::try_from(heard_ms / CELL_MS).unwrap_or(u16::MAX);
         open.div_ceil(members.max(1)).max(meanwhile)
     }

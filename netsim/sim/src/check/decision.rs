@@ -1,6 +1,6 @@
 //! Rounds judged from the bids alone (`decision`): whoever divides, divides what the bids
 //! of one complete round say and nothing else; an adopted division is the one of its
-//! epoch; nobody takes what another has committed; without a loss only a gain is adopted.
+//! epoch; nobody takes what another has committed; of a rebalancing only a gain is adopted.
 //! And the bids themselves against what their authors did (`bid`).
 
 use super::{Findings, Handicaps};
@@ -20,10 +20,10 @@ use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Without a loss the new makespan is at most this many percent of the present one.
+/// For a rebalancing the new makespan is at most this many percent of the present one.
 const GAIN_PERCENT: u64 = 90;
 
-/// Divisions without a loss are at least this many beacon periods apart.
+/// Rebalancings are at least this many beacon periods apart.
 const CALM_PERIODS: u64 = 20;
 
 /// Most legs of a section.
@@ -413,7 +413,7 @@ impl DecisionCheck {
         }
     }
 
-    /// Without a loss: a gain of a tenth, calm for 20 T, something covered since.
+    /// A rebalancing: a gain of a tenth, calm for 20 T, something covered since.
     fn judge_gain(
         &mut self,
         now_ms: u64,
@@ -422,7 +422,7 @@ impl DecisionCheck {
         epoch: Epoch,
         found: &mut Findings,
     ) {
-        if open.round.loss {
+        if open.round.repair {
             return;
         }
         let calm_ms = CALM_PERIODS * self.period_ms;
@@ -436,7 +436,7 @@ impl DecisionCheck {
         let progress = all().any(|b| b.cells_since > 0);
         if new_ms * 100 > present_ms * GAIN_PERCENT || !calm || !progress {
             found.broken("decision", now_ms, Some(id), || {
-                format!("adopted without a loss what takes {new_ms} ms instead of {present_ms} ms (calm {calm}, progress {progress})")
+                format!("adopted a rebalancing that takes {new_ms} ms instead of {present_ms} ms (calm {calm}, progress {progress})")
             });
         }
     }
@@ -531,7 +531,7 @@ mod tests {
     }
 
     impl Case {
-        fn new(loss: bool) -> Self {
+        fn new(repair: bool) -> Self {
             let spec = fixture::square(2);
             let geometry = GeometryCache::default().of(&spec.mission).unwrap();
             let lp = Arc::clone(&geometry.coverage_loop);
@@ -540,7 +540,7 @@ mod tests {
                 members: [1, 2].map(|id| Member { id, incarnation: 1 }).to_vec(),
                 revision: 1,
                 loop_hash: lp.hash(),
-                loss,
+                repair,
                 wait_ms: 5000,
             };
             let bid = |anchor: usize| Bid {
@@ -728,7 +728,7 @@ mod tests {
     }
 
     #[test]
-    fn a_division_without_a_loss_needs_gain_calm_and_progress() {
+    fn a_rebalancing_needs_gain_calm_and_progress() {
         for (eta_ms, ago_ms, cells, broken) in [
             (900_000_000, 60_000, 1, false),
             (1_000, 60_000, 1, true),

@@ -1,4 +1,4 @@
-//! When rounds are opened: a loss opens one at once (`prompt`); without a loss only a peer
+//! When rounds are opened: a loss opens one at once (`prompt`); one that rebalances only a peer
 //! that has been able for 10 T opens one, 20 T after it last adopted a division
 //! (`patience`); a round that ran out of time is followed by one that waits twice as long
 //! (`waiting`).
@@ -16,10 +16,10 @@ use std::sync::Arc;
 /// After a decision losses are given so many periods to be heard of: they open no round at once.
 const SETTLED_PERIODS: u64 = 5;
 
-/// A peer is able for so long before it opens a round without a loss.
+/// A peer is able for so long before it opens a rebalancing.
 const STEADY_PERIODS: u64 = 10;
 
-/// Divisions without a loss are so far apart.
+/// Rebalancings are so far apart.
 const CALM_PERIODS: u64 = 20;
 
 /// After so long no peer waits for the bids of an earlier round: four times its first
@@ -37,7 +37,7 @@ struct Joined {
     order: RoundOrder,
     wait_ms: u32,
     members: Vec<Member>,
-    loss: bool,
+    repair: bool,
 }
 
 /// One peer's part.
@@ -134,7 +134,7 @@ impl PatienceCheck {
             order,
             wait_ms: bid.round.wait_ms,
             members: bid.round.members.clone(),
-            loss: bid.round.loss,
+            repair: bid.round.repair,
         });
         part.decided = false;
     }
@@ -244,7 +244,7 @@ impl PatienceCheck {
     }
 }
 
-/// A round without a loss, opened by the first who bids in it, unless it may follow one
+/// A rebalancing, opened by the first who bids in it, unless it may follow one
 /// that ran out of time.
 fn judge_patience(
     period_ms: u64,
@@ -257,7 +257,7 @@ fn judge_patience(
     let joined = part.joined.as_ref().filter(|_| !part.decided);
     let before = joined.map(|j| j.at_ms).max(part.heard.map(|(_, t)| t));
     let follows = before.is_some_and(|t| now_ms < t + FORGOTTEN_PERIODS * period_ms);
-    if bid.round.loss || follows {
+    if bid.round.repair || follows {
         return;
     }
     // Since the snapshot in which it was able first; it may have been so for T before.
@@ -268,7 +268,7 @@ fn judge_patience(
     if hasty || restless {
         found.broken("patience", now_ms, Some(id), || {
             format!(
-                "opens a round without a loss, able for {able_ms} ms, {calm_ms:?} ms after its last adoption"
+                "opens a rebalancing, able for {able_ms} ms, {calm_ms:?} ms after its last adoption"
             )
         });
     }
@@ -287,8 +287,8 @@ fn judge_waiting(
     let Some(before) = part.joined.as_ref().filter(|j| {
         let later = bid.round.counter == j.order.0 + 1;
         let out_of_time = ago_ms(j.at_ms) > u64::from(j.wait_ms);
-        // Without a loss a decision may be one not to adopt, which nobody can see.
-        later && out_of_time && j.loss && !part.decided && j.members == bid.round.members
+        // A rebalancing may be decided not to be adopted, which nobody can see.
+        later && out_of_time && j.repair && !part.decided && j.members == bid.round.members
     }) else {
         return;
     };
@@ -318,7 +318,7 @@ mod tests {
     use super::*;
     use skein_peer::wire::message::{CellRun, Firmness, ListedRun, Round, Stamp};
 
-    fn bid(counter: u32, loss: bool, wait_ms: u32) -> Bid {
+    fn bid(counter: u32, repair: bool, wait_ms: u32) -> Bid {
         Bid {
             round: Round {
                 counter,
@@ -328,7 +328,7 @@ mod tests {
                 }],
                 revision: 1,
                 loop_hash: LOOP,
-                loss,
+                repair,
                 wait_ms,
             },
             anchor: 0,
@@ -359,8 +359,8 @@ mod tests {
     }
 
     #[test]
-    fn a_round_without_a_loss_too_soon_is_found() {
-        for (adopted_s, able_s, loss, broken) in [
+    fn a_rebalancing_too_soon_is_found() {
+        for (adopted_s, able_s, repair, broken) in [
             (None, 3, false, true),
             (None, 12, false, false),
             (None, 3, true, false),
@@ -375,14 +375,14 @@ mod tests {
             check.on_bid(
                 able_s * 1000,
                 1,
-                &bid(4, loss, 5000),
+                &bid(4, repair, 5000),
                 &Handicaps::default(),
                 &mut found,
             );
             assert_eq!(
                 found.counts.contains_key("patience"),
                 broken,
-                "{adopted_s:?} {able_s} {loss}"
+                "{adopted_s:?} {able_s} {repair}"
             );
         }
     }

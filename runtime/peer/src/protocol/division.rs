@@ -5,35 +5,32 @@ use super::runs::{cells_of, direction_of};
 use super::sections::{LivePeers, Sections};
 use crate::cells::CellSet;
 use crate::offload::MissionGeometry;
-use crate::wire::message::{Bid, CellRun};
+use crate::wire::message::Bid;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
 
-/// A division without a loss is adopted only if it ends the work this much sooner:
+/// A rebalancing is adopted only if it ends the work this much sooner:
 /// the new makespan is at most this many percent of the present one.
 const GAIN_PERCENT: u64 = 90;
 
-/// Divisions without a loss are at least this many beacon periods apart.
+/// Rebalancings are at least this many beacon periods apart.
 pub const CALM_PERIODS: u64 = 20;
 
-/// The open cells and the members of a complete round, as the solver wants them.
+/// The open cells and the members of a complete round, as the solver wants them. What is
+/// `needless` is the same at every peer, and never what this one knows to be covered.
 #[must_use]
 pub fn problem(
     open: &OpenRound,
     coverage_loop: &CoverageLoop,
-    covered: &CellSet,
+    needless: &CellSet,
 ) -> (Vec<RingCell>, Vec<Uav>) {
-    let n = covered.capacity();
-    let mut done = covered.clone();
+    let n = needless.capacity();
+    let mut done = needless.clone();
     for s in open.bids.values() {
         if let Ok(covered) = CellSet::decode_rle(n, &s.covered) {
             done.union_with(&covered);
         }
-        for run in &s.commits {
-            for c in cells_of(*run, n) {
-                done.insert(c);
-            }
-        }
+        done.union_with(&commits_of(s, n));
     }
     let ring = coverage_loop.ring(|i, _| !done.contains(i));
     let uavs: Vec<Uav> = open
@@ -61,7 +58,7 @@ pub fn problem(
 /// only the bids count, and the beacon period, which is configured alike everywhere.
 #[must_use]
 pub fn worthwhile(open: &OpenRound, division: &Division, beacon_period_ms: u64) -> bool {
-    if open.round.loss {
+    if open.round.repair {
         return true;
     }
     let all = || open.bids.values();
@@ -140,30 +137,16 @@ pub fn section_of(division: &Division, ring: &[RingCell], id: u16) -> Vec<(u16, 
 /// The cells that the flyer of a bid is about to fly and keeps.
 #[must_use]
 pub fn commits_of(bid: &Bid, n: u16) -> CellSet {
-    let mut set = CellSet::new(n);
-    for run in &bid.commits {
-        for c in cells_of(*run, n) {
-            set.insert(c);
-        }
-    }
-    set
-}
-
-/// Runs of the given cells, in forward order, for a bid.
-#[must_use]
-pub fn runs_of(cells: &[u16], n: u16) -> Vec<CellRun> {
-    let mut set = CellSet::new(n);
-    for c in cells {
-        set.insert(*c);
-    }
-    set.runs()
+    CellSet::of(n, bid.commits.iter().flat_map(|run| cells_of(*run, n)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::mission;
-    use crate::wire::message::{Claim, Epoch, Firmness, ListedRun, Member, OffLoop, Round, Stamp};
+    use crate::wire::message::{
+        CellRun, Claim, Epoch, Firmness, ListedRun, Member, OffLoop, Round, Stamp,
+    };
     use crate::wire::samples;
     use std::sync::Arc;
 
@@ -263,7 +246,7 @@ mod tests {
             members: [1, 2].map(|id| Member { id, incarnation: 1 }).to_vec(),
             revision: 1,
             loop_hash: 7,
-            loss: false,
+            repair: false,
             wait_ms: 5_000,
         };
         Bid {
@@ -285,7 +268,7 @@ mod tests {
     /// §4.3: at most 90 % of the present makespan, 20 T after every member's last adoption,
     /// and with some cell covered since.
     #[test]
-    fn a_division_without_a_loss_is_adopted_for_a_tenth_after_calm_and_with_progress() {
+    fn a_rebalancing_is_adopted_for_a_tenth_after_calm_and_with_progress() {
         let worth = |makespan_ms: u32, bids: [Bid; 2]| {
             let division = Division {
                 sections: Vec::new(),
@@ -305,10 +288,10 @@ mod tests {
             !worth(1, [a, bid(60_000, u32::MAX, 0)]),
             "nothing was covered"
         );
-        // After a loss it always is.
-        let mut loss = calm();
-        loss.iter_mut().for_each(|b| b.round.loss = true);
-        assert!(worth(u32::MAX, loss));
+        // A repair always is.
+        let mut repair = calm();
+        repair.iter_mut().for_each(|b| b.round.repair = true);
+        assert!(worth(u32::MAX, repair));
     }
 
     #[test]

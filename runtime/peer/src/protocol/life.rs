@@ -142,7 +142,7 @@ impl Life {
     }
 
     /// A promised life is durable and may be spoken of.
-    pub fn is_durable(&mut self, incarnation: Incarnation) -> Effects {
+    pub fn on_durable(&mut self, incarnation: Incarnation) -> Effects {
         if self.promised != Some(incarnation) {
             return Effects::new();
         }
@@ -157,7 +157,7 @@ impl Life {
     }
 
     /// A promised life could not be made durable.
-    pub fn is_broken(&mut self, incarnation: Incarnation) {
+    pub fn on_broken(&mut self, incarnation: Incarnation) {
         self.promised = self.promised.filter(|p| *p != incarnation);
         let ticks = (2 * self.retry.1).clamp(1, RETRY_MAX_TICKS);
         self.retry = (ticks, ticks);
@@ -324,7 +324,7 @@ mod tests {
         let mut life = Life::default();
         let effects = life.start(Time(0), 1000, &mut Timers::default(), 7, incarnation - 1);
         assert_eq!(stored(&effects), [incarnation]);
-        assert_eq!(life.is_durable(incarnation).len(), 2);
+        assert_eq!(life.on_durable(incarnation).len(), 2);
         life
     }
 
@@ -333,8 +333,8 @@ mod tests {
         let (mut life, mut timers) = (Life::default(), Timers::default());
         life.start(Time(500), 1000, &mut timers, 7, 4);
         assert!(!life.speaks(Time(9000), &timers), "not durable yet");
-        assert!(life.is_durable(4).is_empty(), "another life was promised");
-        life.is_durable(5);
+        assert!(life.on_durable(4).is_empty(), "another life was promised");
+        life.on_durable(5);
         assert!(!life.speaks(Time(3499), &timers));
         assert!(life.speaks(Time(3500), &timers));
     }
@@ -354,10 +354,10 @@ mod tests {
         assert_eq!(stored(&life.hear_of_myself(6, false)), [7]);
         assert!(life.hear_of_myself(5, false).is_empty(), "7 is promised");
         assert!(
-            life.is_durable(3).is_empty(),
+            life.on_durable(3).is_empty(),
             "an earlier promise is overtaken"
         );
-        assert_eq!(life.is_durable(7).len(), 2);
+        assert_eq!(life.on_durable(7).len(), 2);
         assert_eq!(life.incarnation(), 7);
         tick(&mut life);
         assert!(life.hear_of_myself(u32::MAX, false).is_empty(), "made up");
@@ -460,7 +460,7 @@ mod tests {
         let (now, mut timers) = at(60_000, true);
         assert_eq!(stored(&of.hear_of_myself(3, false)), [4]);
         of.hear_twin((now, &timers), twin(3, 1, Some(9)), 40, false);
-        assert!(matches!(of.is_durable(4)[..], [Effect::Live(4)]));
+        assert!(matches!(of.on_durable(4)[..], [Effect::Live(4)]));
         assert!(of.is_silent() && !of.speaks(now, &timers));
         let back = of.tick(Time(72_001), (1000, 12_000), &mut timers, 4);
         assert_eq!(stored(&back), [5]);
@@ -487,7 +487,7 @@ mod tests {
         };
         assert!(tick(&mut of, 72_600, &mut timers).is_empty());
         assert_eq!(tick(&mut of, 72_601, &mut timers), [7]);
-        of.is_durable(7);
+        of.on_durable(7);
         assert!(!of.speaks(Time(75_600), &timers) && of.speaks(Time(75_601), &timers));
         // What it said itself before it was silent is no twin.
         let mine = of.hear_of_heartbeat(
@@ -504,7 +504,7 @@ mod tests {
         let mut life = Life::default();
         life.start(Time(0), 1000, &mut Timers::default(), 7, 4);
         assert!(tick(&mut life).is_empty());
-        life.is_broken(5);
+        life.on_broken(5);
         assert_eq!(stored(&tick(&mut life)), [5]);
     }
 

@@ -41,7 +41,7 @@ use crate::wire::limits::{HOPS_MAX, PEERS_MAX};
 use crate::wire::message::{Beacon, Fresh, Gossip, OffLoop};
 use core::cell::Cell;
 use core::cmp::Reverse;
-use known::{Age, Heartbeat, Known, Weight};
+use known::{Age, HeardHeartbeat, Known, Weight};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most other peers known: the largest fleet but this peer itself. A flood of made-up ids
@@ -358,7 +358,7 @@ impl Membership {
         }
         self.noting(now, author, |m| {
             let teller = m.known.get_mut(&author);
-            let same = |h: &Heartbeat| (h.incarnation, h.count) == (incarnation, count);
+            let same = |h: &HeardHeartbeat| (h.incarnation, h.count) == (incarnation, count);
             if let Some(teller) = teller.filter(|t| same(&t.freshest)) {
                 let steady_since = teller.info.steady_since;
                 teller.info = info_of(beacon, steady_since, now);
@@ -402,13 +402,13 @@ impl Membership {
         if author == self.me {
             return changes;
         }
-        self.hears(now);
+        self.note_heard(now);
         let limits = self.patience(now);
         let age = Age {
             told_ms: 0,
             at: now,
         };
-        let own = Heartbeat {
+        let own = HeardHeartbeat {
             id: author,
             incarnation,
             count,
@@ -435,7 +435,7 @@ impl Membership {
             told_ms: u64::from(ds) * 100,
             at: now,
         };
-        let heartbeat = Heartbeat {
+        let heartbeat = HeardHeartbeat {
             id: told.id,
             incarnation: told.incarnation,
             count: told.heartbeat,
@@ -475,7 +475,7 @@ impl Membership {
         if incarnation == 0 || Fresh::life_of(incarnation) != told.life {
             return;
         }
-        let heartbeat = Heartbeat {
+        let heartbeat = HeardHeartbeat {
             id: told.id,
             incarnation,
             count: told.heartbeat,
@@ -511,7 +511,7 @@ impl Membership {
     fn merge(
         &mut self,
         now: Time,
-        heard: Heartbeat,
+        heard: HeardHeartbeat,
         limits: Patience,
         changes: &mut Vec<Change>,
     ) -> bool {
@@ -549,7 +549,7 @@ impl Membership {
             self.known.insert(heard.id, known);
             return true;
         };
-        let version = |h: &Heartbeat| (h.incarnation, h.count);
+        let version = |h: &HeardHeartbeat| (h.incarnation, h.count);
         if version(&heard) < version(&known.freshest) {
             return false;
         }
@@ -599,7 +599,7 @@ impl Membership {
     /// A life that ended before it was ever met, or while it was out of reach: known
     /// as down, so that this peer's beacons ask for the records it left. Nobody else
     /// is forgotten for it.
-    fn remember_dead(&mut self, now: Time, heard: Heartbeat, changes: &mut Vec<Change>) {
+    fn remember_dead(&mut self, now: Time, heard: HeardHeartbeat, changes: &mut Vec<Change>) {
         let before = self.known.get(&heard.id);
         if before.is_none() && self.known.len() >= MAX_KNOWN {
             return;
@@ -831,7 +831,7 @@ impl Membership {
     }
 
     /// Something that another peer wrote is heard, by whatever way.
-    pub fn hears(&mut self, now: Time) {
+    pub fn note_heard(&mut self, now: Time) {
         self.last_heard = Some(now);
     }
 

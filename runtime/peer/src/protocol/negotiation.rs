@@ -3,17 +3,17 @@
 //!
 //! | what is seen | for how long | what follows |
 //! |---|---|---|
-//! | a member is lost and cells are orphaned | at once | a round with loss |
-//! | orphans | 2 T (5 T after a decision) | a round with loss |
+//! | a member is lost and cells are orphaned | at once | a repair |
+//! | orphans | 2 T (5 T after a decision) | a repair |
 //! | an open round with a member that is gone | at once | the next round |
 //! | an open round without all bids | W, doubling to 4 W0 | the next round |
 //! | a complete round without its division | 2 W | the next round |
 //! | nothing divided yet | 1.5 T of listening, with a roster at once | a first section is taken |
-//! | only first sections, among few | 2 T | a round with loss |
+//! | only first sections, among few | 2 T | a repair |
 //! | orphans, and no round helped | 2 T + W0 + rank T/2 | the nearest are taken |
 //! | orphans, among many | 2 T each; 2 T for each who would be there sooner (W0 at most), and no less than the first of them would be there sooner | the nearest are taken |
 //! | less than 2 T to fly, among many | twice a T | the far part of a slower one's plan is taken |
-//! | idle, and a gain was computed from what is held | 10 T steady, 20 T calm | a round without loss |
+//! | idle, and a gain was computed from what is held | 10 T steady, 20 T calm | a rebalancing |
 //! | idle, an owner makes no progress | its bound | the far half is taken |
 //! | idle, cells were beyond everybody | 10 T + rank T/2 | what the fuel allows of one run is taken |
 //! | cells held | 2 W | they expire |
@@ -37,19 +37,18 @@ use std::collections::{BTreeMap, BTreeSet};
 /// covers none for thrice what the bound makes of it, and comes no nearer, has stalled.
 const TWO_CELLS_MS: u64 = 12_000;
 
-/// Three waits, in periods: for members that stay the same before the first division, for
-/// orphans before a round that answers a loss, for an empty plan before one that does
-/// not. Two, so that one lost beacon or claim changes nothing.
-const STEADY_PERIODS: u64 = 2;
+/// The shortest wait, in intervals: for members that stay the same before the first division,
+/// for orphans, for an empty plan. Two, so that one lost beacon or claim changes nothing.
+const SHORT_INTERVALS: u64 = 2;
 
 /// After a decision cells count as orphans only after so many periods: the new owner's
 /// claim takes one to be stored, two to be spoken and passed on, and two more if it is
 /// lost once.
-pub const SETTLE_PERIODS: u64 = 5;
+pub const SETTLE_INTERVALS: u64 = 5;
 
 /// A return, a join or an idle peer waits for so many periods: shorter absences are the
 /// rule on a lossy channel.
-const PATIENT_PERIODS: u64 = 10;
+const PATIENT_INTERVALS: u64 = 10;
 
 /// The waiting time of a round doubles with each retry, up to this many doublings: a bid
 /// that four waiting times do not bring is not on its way.
@@ -87,7 +86,7 @@ pub struct Context<'a> {
     /// Whether the cells held ran out of time just now.
     pub held_expired: bool,
     /// Whether a division of what claims list would end the work sooner; asked for by
-    /// [`Negotiation::wants_foresight`].
+    /// [`Negotiation::take_foresight`].
     pub gain_in_sight: bool,
 }
 
@@ -95,7 +94,7 @@ impl Context<'_> {
     /// W0 = (2D + 3) T', milliseconds: a bid crosses the component, the answer
     /// comes back, and three periods for what is lost on the way.
     #[must_use]
-    pub fn base_wait_ms(&self) -> u64 {
+    pub fn first_wait_ms(&self) -> u64 {
         wait_ms(self.diameter, self.interval_ms)
     }
 }
@@ -108,7 +107,7 @@ fn wait_ms(diameter: u32, interval_ms: u64) -> u64 {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// Make a bid for the open round, make it durable, then call
-    /// [`Negotiation::bid_is_durable`].
+    /// [`Negotiation::on_bid_durable`].
     Bid,
     /// Divide this, then call [`Negotiation::divided`].
     Divide {
@@ -168,7 +167,7 @@ pub struct Negotiation {
     /// Bids.
     pub rounds: Rounds,
     me: u16,
-    base: CellSet,
+    needless: CellSet,
     opened_at: Time,
     retries: u32,
     bid_wanted: bool,
@@ -178,7 +177,7 @@ pub struct Negotiation {
     orphan_since: Option<Time>,
     /// Among many, since when each of them is one.
     orphaned_at: BTreeMap<u16, Time>,
-    loss_seen: bool,
+    somebody_gone: bool,
     decided_at: Option<Time>,
     adopted_at: Option<Time>,
     cells_since: u16,
@@ -203,15 +202,16 @@ pub struct Negotiation {
 }
 
 impl Negotiation {
-    /// Nothing negotiated yet. `base` holds the cells that need no service.
+    /// Nothing negotiated yet. `needless` holds the cells that need no service, the
+    /// same at every peer.
     #[must_use]
-    pub fn new(me: Member, base: CellSet, counter: u32) -> Self {
-        let cells = base.capacity();
+    pub fn new(me: Member, needless: CellSet, counter: u32) -> Self {
+        let cells = needless.capacity();
         Self {
-            sections: Sections::new(me.id, cells, base.clone()),
+            sections: Sections::new(me.id, cells, needless.clone()),
             rounds: Rounds::new(me, counter),
             me: me.id,
-            base,
+            needless,
             opened_at: Time(0),
             retries: 0,
             bid_wanted: false,
@@ -219,7 +219,7 @@ impl Negotiation {
             orphans: CellSet::new(cells),
             orphan_since: None,
             orphaned_at: BTreeMap::new(),
-            loss_seen: false,
+            somebody_gone: false,
             decided_at: None,
             adopted_at: None,
             cells_since: 0,
@@ -238,9 +238,9 @@ impl Negotiation {
         }
     }
 
-    /// A member was lost, or came back in a new life.
-    pub fn note_loss(&mut self) {
-        self.loss_seen = true;
+    /// Somebody is not live any more, or in another life: a UAV or the ground station.
+    pub fn note_gone(&mut self) {
+        self.somebody_gone = true;
     }
 
     /// For so long this peer did not listen: bids, claims and progress that it did not hear
@@ -293,7 +293,7 @@ impl Negotiation {
     }
 
     /// The bid is durable. Returns whether it may still be spoken.
-    pub fn bid_is_durable(&mut self, bid: Bid) -> bool {
+    pub fn on_bid_durable(&mut self, bid: Bid) -> bool {
         self.rounds.bid(bid)
     }
 
@@ -332,7 +332,7 @@ impl Negotiation {
         }
         self.orphans = orphans;
         // Who suspects itself of being deaf acts on a loss once it does no more.
-        self.loss_seen &= ctx.able_since.is_none();
+        self.somebody_gone &= ctx.able_since.is_none();
         if core::mem::take(&mut self.bid_wanted) && ctx.able_since.is_some() {
             actions.push(Action::Bid);
         }
@@ -394,13 +394,13 @@ impl Negotiation {
                 .iter()
                 .any(|m| m.id != self.me && (ctx.live.get(&m.id) != Some(&m.incarnation)));
             let waited = ctx.now.since_ms(self.opened_at);
-            let loss = open.round.loss || orphans.count() > 0;
+            let repair = open.round.repair || orphans.count() > 0;
             if gone {
                 self.rounds.give_up();
-                self.start(ctx, loss, 0);
+                self.start(ctx, repair, 0);
             } else if waited > self.patience_ms(open) {
                 self.rounds.give_up();
-                self.start(ctx, loss, self.retries + 1);
+                self.start(ctx, repair, self.retries + 1);
             }
             return;
         }
@@ -418,20 +418,21 @@ impl Negotiation {
         // only itself may not have been heard yet.
         let company = ctx.members.len() > 1;
         let steady =
-            company && ctx.now.since_ms(self.members_since) >= STEADY_PERIODS * ctx.interval_ms;
-        if self.decided_at.is_none() && !steady && orphaned_ms < PATIENT_PERIODS * ctx.interval_ms {
+            company && ctx.now.since_ms(self.members_since) >= SHORT_INTERVALS * ctx.interval_ms;
+        if self.decided_at.is_none() && !steady && orphaned_ms < PATIENT_INTERVALS * ctx.interval_ms
+        {
             return;
         }
         let settled = self
             .decided_at
-            .is_none_or(|t| ctx.now.since_ms(t) >= SETTLE_PERIODS * ctx.interval_ms);
+            .is_none_or(|t| ctx.now.since_ms(t) >= SETTLE_INTERVALS * ctx.interval_ms);
         let patience = if settled {
-            STEADY_PERIODS
+            SHORT_INTERVALS
         } else {
-            SETTLE_PERIODS
+            SETTLE_INTERVALS
         } * ctx.interval_ms;
         let stagger = self.rank(ctx) * ctx.interval_ms / ROUND_STAGGER;
-        if (self.loss_seen && settled) || orphaned_ms >= patience + stagger {
+        if (self.somebody_gone && settled) || orphaned_ms >= patience + stagger {
             self.start(ctx, true, 0);
         }
     }
@@ -447,28 +448,28 @@ impl Negotiation {
         }
     }
 
-    fn start(&mut self, ctx: &Context<'_>, loss: bool, retries: u32) {
+    fn start(&mut self, ctx: &Context<'_>, repair: bool, retries: u32) {
         if !ctx.members.iter().any(|m| m.id == self.me) || is_many(ctx) {
             return;
         }
         self.retries = retries;
-        let base = ctx.base_wait_ms();
-        let wait = base << retries.min(MAX_DOUBLINGS);
+        let first = ctx.first_wait_ms();
+        let wait = first << retries.min(MAX_DOUBLINGS);
         let wait = u32::try_from(wait).unwrap_or(u32::MAX);
         self.rounds.start(
             ctx.members.to_vec(),
             ctx.revision,
             ctx.loop_hash,
-            loss,
+            repair,
             wait,
         );
         self.opened(ctx.now);
     }
 
-    /// Whether it is worth to compute if a round without a loss would gain anything: idle,
+    /// Whether it is worth to compute if a rebalancing would gain anything: idle,
     /// calm, and not computed lately.
-    pub fn wants_foresight(&mut self, ctx: &Context<'_>) -> bool {
-        let patient = PATIENT_PERIODS * ctx.interval_ms;
+    pub fn take_foresight(&mut self, ctx: &Context<'_>) -> bool {
+        let patient = PATIENT_INTERVALS * ctx.interval_ms;
         let rested = |t| ctx.now.since_ms(t) >= patient;
         let wants = self.rounds.open().is_none()
             && !is_many(ctx)
@@ -496,10 +497,10 @@ impl Negotiation {
     fn may_gain(&self, ctx: &Context<'_>) -> bool {
         let steady = ctx
             .able_since
-            .is_some_and(|t| ctx.now.since_ms(t) >= PATIENT_PERIODS * ctx.interval_ms);
+            .is_some_and(|t| ctx.now.since_ms(t) >= PATIENT_INTERVALS * ctx.interval_ms);
         let idle = self
             .idle_since
-            .is_some_and(|t| ctx.now.since_ms(t) >= STEADY_PERIODS * ctx.interval_ms);
+            .is_some_and(|t| ctx.now.since_ms(t) >= SHORT_INTERVALS * ctx.interval_ms);
         let calm = CALM_PERIODS * ctx.interval_ms;
         let stagger = self.rank(ctx) * ctx.interval_ms / ROUND_STAGGER;
         let last = self.decided_at.max(self.adopted_at);
@@ -514,7 +515,7 @@ impl Negotiation {
         if self.dividing.as_ref().is_some_and(|d| d.epoch == epoch) {
             return None;
         }
-        let (ring, uavs) = division::problem(open, coverage_loop, &self.base);
+        let (ring, uavs) = division::problem(open, coverage_loop, &self.needless);
         self.dividing = Some(Dividing {
             epoch,
             ring: ring.clone(),
@@ -574,8 +575,8 @@ impl Negotiation {
         true
     }
 
-    /// A new life: ownership of the old one is void, coverage stays.
-    pub fn new_life(&mut self, me: Member) {
+    /// What it owned is void, coverage stays.
+    pub fn void_ownership(&mut self, me: Member) {
         self.rounds.set_me(me);
         self.sections.reset_ownership();
         self.sections.forget_presumed();
@@ -597,7 +598,7 @@ impl Negotiation {
             let (epoch, eta_ms, seq) = (heard.claim.epoch, heard.claim.eta_ms, heard.seq);
             let left = self.sections.n_left(id);
             let eta_ms = u64::from(eta_ms);
-            let slack = eta_ms / 4 + PATIENT_PERIODS * ctx.interval_ms + cell_bound;
+            let slack = eta_ms / 4 + PATIENT_INTERVALS * ctx.interval_ms + cell_bound;
             let fresh = Progress {
                 left,
                 since: ctx.now,

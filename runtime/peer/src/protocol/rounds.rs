@@ -28,7 +28,13 @@ pub type RoundOrder = (u32, usize, u32);
 #[must_use]
 pub fn order_of(round: &Round) -> RoundOrder {
     let mut h = Fnv::new();
-    (&round.members, round.revision, round.loop_hash, round.loss).hash(&mut h);
+    (
+        &round.members,
+        round.revision,
+        round.loop_hash,
+        round.repair,
+    )
+        .hash(&mut h);
     (round.counter, round.members.len(), fold(h.finish()))
 }
 
@@ -174,7 +180,7 @@ impl Rounds {
         mut members: Vec<Member>,
         revision: u32,
         loop_hash: u64,
-        loss: bool,
+        repair: bool,
         wait_ms: u32,
     ) {
         members
@@ -187,7 +193,7 @@ impl Rounds {
             members,
             revision,
             loop_hash,
-            loss,
+            repair,
             wait_ms,
         };
         self.open = Some(OpenRound {
@@ -343,7 +349,7 @@ mod tests {
             members: ids.iter().map(|i| member(*i)).collect(),
             revision: 1,
             loop_hash: 7,
-            loss: true,
+            repair: true,
             wait_ms: 5000,
         }
     }

@@ -44,7 +44,7 @@ pub type LivePeers = BTreeMap<u16, Incarnation>;
 
 /// The newest claim heard from another peer.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Heard {
+pub struct HeardClaim {
     /// In which life it was written.
     pub incarnation: Incarnation,
     /// Its version within that life.
@@ -91,7 +91,7 @@ pub struct Sections {
     done: CellSet,
     covered: CellSet,
     unassigned: CellSet,
-    heard: BTreeMap<u16, Heard>,
+    heard: BTreeMap<u16, HeardClaim>,
     /// The lives in which peers said with their newest claims that they are alone.
     alone: BTreeMap<u16, Incarnation>,
     news: News,
@@ -175,7 +175,7 @@ impl Sections {
 
     /// The newest claim heard of each other peer.
     #[must_use]
-    pub fn heard(&self) -> &BTreeMap<u16, Heard> {
+    pub fn heard(&self) -> &BTreeMap<u16, HeardClaim> {
         &self.heard
     }
 
@@ -238,7 +238,7 @@ impl Sections {
         }
         self.news.listing = true;
         self.news.owners.insert(author);
-        let heard = Heard {
+        let heard = HeardClaim {
             incarnation,
             seq,
             left: n_open(&claim, &self.covered),
@@ -308,7 +308,7 @@ impl Sections {
     /// Of some cells those that live claims of some others plan, each with the highest stamp.
     fn planned_by<'a>(
         &self,
-        heard: impl Iterator<Item = (&'a u16, &'a Heard)>,
+        heard: impl Iterator<Item = (&'a u16, &'a HeardClaim)>,
         live: &LivePeers,
         cells: &CellSet,
     ) -> BTreeMap<u16, Stamp> {
@@ -371,7 +371,7 @@ impl Sections {
                 *known = (*known).max(stamp);
             }
         };
-        let is_live = |(author, h): &(&u16, &Heard)| live.get(author) == Some(&h.incarnation);
+        let is_live = |(author, h): &(&u16, &HeardClaim)| live.get(author) == Some(&h.incarnation);
         for (_, h) in self.heard.iter().filter(is_live) {
             for l in &h.claim.plan {
                 cells_of(l.run, self.cells).for_each(|c| raise(c, l.stamp));
@@ -475,7 +475,7 @@ impl Sections {
     }
 
     /// Rules *adopt* and install in one step, for when nothing can come in between.
-    pub fn adopt(
+    pub fn adopt_at_once(
         &mut self,
         epoch: Epoch,
         commits: &[(u16, Direction)],
@@ -544,7 +544,7 @@ impl Sections {
     }
 
     /// Rules *take* and append in one step, for when nothing can come in between.
-    pub fn take(&mut self, cells: &[(u16, Direction)]) -> usize {
+    pub fn take_at_once(&mut self, cells: &[(u16, Direction)]) -> usize {
         let taken = self.taken(cells);
         self.append(&taken)
     }
@@ -732,7 +732,7 @@ mod tests {
     #[test]
     fn a_planned_cell_yields_to_a_higher_stamp_of_a_live_peer_only() {
         let mut s = sections(1);
-        s.adopt(
+        s.adopt_at_once(
             Epoch {
                 counter: 1,
                 hash: 0,
@@ -764,8 +764,8 @@ mod tests {
             hash: 9,
         };
         let (mut a, mut b) = (sections(1), sections(2));
-        a.adopt(e, &[], &forward(&[5]));
-        b.adopt(e, &[], &forward(&[5]));
+        a.adopt_at_once(e, &[], &forward(&[5]));
+        b.adopt_at_once(e, &[], &forward(&[5]));
         let (ra, rb) = (a.claim(1, 1, 0), b.claim(1, 1, 0));
         a.hear(2, 1, 1, rb);
         b.hear(1, 1, 1, ra);
@@ -778,7 +778,7 @@ mod tests {
     #[test]
     fn what_is_given_away_is_held_until_somebody_lists_it() {
         let mut s = sections(1);
-        s.adopt(
+        s.adopt_at_once(
             Epoch {
                 counter: 1,
                 hash: 0,
@@ -786,7 +786,7 @@ mod tests {
             &[],
             &forward(&[0, 1, 2, 3]),
         );
-        s.adopt(
+        s.adopt_at_once(
             Epoch {
                 counter: 2,
                 hash: 0,
@@ -808,9 +808,9 @@ mod tests {
     fn an_adoption_below_a_take_does_not_lower_its_stamp() {
         let mut s = sections(1);
         s.hear(2, 1, 1, claim(&[(7, 1, stamp(2, 0, 2))]));
-        s.take(&[(7, Direction::Forward)]);
+        s.take_at_once(&[(7, Direction::Forward)]);
         // Peer 2 yields to this take; then a division that was decided before ends.
-        s.adopt(
+        s.adopt_at_once(
             Epoch {
                 counter: 1,
                 hash: 0,
@@ -833,7 +833,7 @@ mod tests {
         let mut s = sections(1);
         s.hear(2, 1, 1, claim(&[(7, 1, stamp(5, 3, 2))]));
         assert_eq!(
-            s.take(&[(7, Direction::Backward), (7, Direction::Backward)]),
+            s.take_at_once(&[(7, Direction::Backward), (7, Direction::Backward)]),
             1
         );
         assert_eq!(s.plan()[0].stamp, stamp(5, 4, 1));
@@ -842,7 +842,7 @@ mod tests {
     #[test]
     fn covered_cells_leave_plan_and_held() {
         let mut s = sections(1);
-        s.adopt(
+        s.adopt_at_once(
             Epoch {
                 counter: 1,
                 hash: 0,
@@ -850,7 +850,7 @@ mod tests {
             &[],
             &forward(&[0, 1, 2]),
         );
-        s.adopt(
+        s.adopt_at_once(
             Epoch {
                 counter: 2,
                 hash: 0,
@@ -873,7 +873,7 @@ mod tests {
         let mut s = Sections::new(1, n, CellSet::new(n));
         let scattered: Vec<(u16, Direction)> =
             (0..n).step_by(2).map(|c| (c, Direction::Forward)).collect();
-        s.adopt(
+        s.adopt_at_once(
             Epoch {
                 counter: 1,
                 hash: 0,
@@ -913,13 +913,13 @@ mod tests {
     #[test]
     fn what_is_covered_planned_or_beyond_the_loop_is_not_taken() {
         let mut s = Sections::new(1, 10, CellSet::of(10, [4]));
-        assert_eq!(s.take(&forward(&[2])), 1);
+        assert_eq!(s.take_at_once(&forward(&[2])), 1);
         let taken = s.taken(&forward(&[2, 4, 10, 3, 3]));
         assert_eq!(taken.iter().map(|p| p.cell).collect::<Vec<_>>(), [3]);
         // Between the promise and the answer of the disk a cell may be covered or planned.
         let both = s.taken(&forward(&[5, 6, 7]));
         s.cover(&CellSet::of(10, [5]));
-        assert_eq!(s.take(&forward(&[6])), 1);
+        assert_eq!(s.take_at_once(&forward(&[6])), 1);
         assert_eq!(s.append(&both), 1);
         let plan: Vec<u16> = s.plan().iter().map(|p| p.cell).collect();
         assert_eq!(plan, [2, 6, 7]);
@@ -932,7 +932,7 @@ mod tests {
             counter: 3,
             hash: 9,
         };
-        assert!(s.adopt(epoch, &[], &forward(&[1, 2, 3])));
+        assert!(s.adopt_at_once(epoch, &[], &forward(&[1, 2, 3])));
         let written = s.claim_with(epoch, s.plan(), 7, 11);
         assert_eq!(written, s.claim(7, 11, 0));
         assert_eq!(s.fitting(s.plan()), 3);
@@ -946,7 +946,7 @@ mod tests {
         s.restore_epoch(epoch(2));
         assert_eq!(s.epoch(), epoch(4));
         assert_eq!(s.taken(&forward(&[2]))[0].stamp, stamp(4, 1, 1));
-        assert!(!s.adopt(epoch(4), &[], &forward(&[2])));
-        assert!(s.adopt(epoch(5), &[], &forward(&[2])));
+        assert!(!s.adopt_at_once(epoch(4), &[], &forward(&[2])));
+        assert!(s.adopt_at_once(epoch(5), &[], &forward(&[2])));
     }
 }

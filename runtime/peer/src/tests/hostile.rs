@@ -271,7 +271,7 @@ fn bids_and_claims_far_ahead_of_all_that_was_heard_of_are_refused() {
         members: [1, 2].map(|id| Member { id, incarnation: 1 }).to_vec(),
         revision: 1,
         loop_hash,
-        loss: true,
+        repair: true,
         wait_ms: 5_000,
     };
     let bid = |round: &Round| Body::Bid(samples::bid(round.clone()));

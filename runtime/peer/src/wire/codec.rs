@@ -310,7 +310,7 @@ array_of!(Round {
     members,
     revision,
     loop_hash,
-    loss,
+    repair,
     wait_ms
 });
 array_of!(OffLoop {

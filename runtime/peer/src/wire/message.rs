@@ -287,9 +287,9 @@ pub struct Round {
     pub revision: u32,
     /// The loop.
     pub loop_hash: u64,
-    /// Whether the starter saw cells that nobody lists: such a round needs no gain
-    /// to be adopted.
-    pub loss: bool,
+    /// Whether the starter saw cells that nobody lists: a repair needs no gain to be adopted,
+    /// any other round rebalances, and does.
+    pub repair: bool,
     /// How long to wait for all bids, milliseconds.
     pub wait_ms: u32,
 }

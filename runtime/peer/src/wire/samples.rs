@@ -110,7 +110,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         ],
         revision: 1,
         loop_hash: 0x0123_4567_89ab_cdef,
-        loss: true,
+        repair: true,
         wait_ms: 5000,
     };
     vec![
@@ -320,7 +320,7 @@ pub fn largest() -> Vec<Body> {
                 members,
                 revision: u32::MAX,
                 loop_hash: u64::MAX,
-                loss: true,
+                repair: true,
                 wait_ms: DURATION_MAX_MS,
             },
             anchor: u16::MAX,

@@ -234,7 +234,7 @@ const ROUND: &[Place] = &[
     REVISION,
     LOOP_HASH,
     at(
-        "loss",
+        "repair",
         "whether the starter saw cells that nobody lists",
         Shape::Flag,
     ),

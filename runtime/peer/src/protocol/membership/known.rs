@@ -32,7 +32,7 @@ impl Age {
 
 /// One heartbeat as it was heard.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Heartbeat {
+pub(super) struct HeardHeartbeat {
     pub(super) id: u16,
     pub(super) incarnation: Incarnation,
     pub(super) count: u32,
@@ -45,7 +45,7 @@ pub(super) struct Heartbeat {
 
 #[derive(Clone, Debug)]
 pub(super) struct Known {
-    pub(super) freshest: Heartbeat,
+    pub(super) freshest: HeardHeartbeat,
     /// Of the time since the freshest heartbeat so much was no silence: nobody listened.
     pub(super) excused_ms: u64,
     pub(super) status: Status,
@@ -59,12 +59,12 @@ pub(super) struct Known {
     /// A neighbour that depends on what this peer tells of it.
     lag: Option<Lag>,
     /// When this peer last told of it.
-    told: Time,
+    told_at: Time,
     /// When the heartbeat was sent that neighbours were last told of.
     told_sent: Time,
     /// An old heartbeat of this very life with a higher count than it now sends: it lost
     /// its disk and uses an incarnation twice. It is told, so that it takes a new one.
-    pub(super) higher_count_heard: Option<Heartbeat>,
+    pub(super) higher_count_heard: Option<HeardHeartbeat>,
 }
 
 /// What the patience of others owes to a peer; nothing of who is down or was not heard.
@@ -101,7 +101,7 @@ const LAG_INTERVALS: u64 = 4;
 const NO_HOPS: [(Time, u8); 10] = [(Time(0), u8::MAX); 10];
 
 impl Known {
-    pub(super) fn new(now: Time, heard: Heartbeat, urgent_until: Time) -> Self {
+    pub(super) fn new(now: Time, heard: HeardHeartbeat, urgent_until: Time) -> Self {
         let status = if heard.suspected.is_some() {
             Status::Suspect
         } else {
@@ -120,7 +120,7 @@ impl Known {
             eccentricity: 0,
             urgent_until,
             lag: None,
-            told: Time(0),
+            told_at: Time(0),
             told_sent: Time(0),
             higher_count_heard: None,
         }
@@ -145,7 +145,7 @@ impl Known {
     pub(super) fn merge_same(
         &mut self,
         now: Time,
-        heard: Heartbeat,
+        heard: HeardHeartbeat,
         interval_ms: u64,
         urgent_until: Time,
         changes: &mut Vec<Change>,
@@ -173,7 +173,13 @@ impl Known {
 
     /// A neighbour tells of it: if it hears of it by more hops than this peer, or not any
     /// more, it depends on whoever is nearer.
-    pub(super) fn note_told(&mut self, now: Time, teller: u16, told: &Heartbeat, interval_ms: u64) {
+    pub(super) fn note_told(
+        &mut self,
+        now: Time,
+        teller: u16,
+        told: &HeardHeartbeat,
+        interval_ms: u64,
+    ) {
         let mine = &self.freshest;
         if told.incarnation != mine.incarnation {
             return;
@@ -216,7 +222,7 @@ impl Known {
     pub(super) fn tell(&mut self, now: Time) {
         let sent = self.freshest.age.since();
         self.others_told(sent);
-        (self.told, self.told_sent) = (now, sent);
+        (self.told_at, self.told_sent) = (now, sent);
     }
 
     /// Whether a neighbour depends on what this peer tells of it.
@@ -232,7 +238,7 @@ impl Known {
         let lag = self.lag.filter(|lag| lag.until > now);
         let there_ms = lag.map_or(0, |lag| sent.since_ms(lag.since));
         let untold_ms = sent.since_ms(self.told_sent) / 2;
-        (there_ms.max(untold_ms), now.since_ms(self.told))
+        (there_ms.max(untold_ms), now.since_ms(self.told_at))
     }
 
     /// Whether somebody is told to be suspected who was heard since.
@@ -278,7 +284,7 @@ impl Known {
     }
 
     pub(super) fn change(&self) -> Change {
-        let Heartbeat {
+        let HeardHeartbeat {
             id, incarnation, ..
         } = self.freshest;
         Change {
@@ -289,7 +295,7 @@ impl Known {
     }
 
     pub(super) fn gossip(&self, now: Time) -> Gossip {
-        self.told(&self.freshest, now)
+        self.gossip_of(&self.freshest, now)
     }
 
     /// Whether its heartbeat alone tells what is believed of it.
@@ -298,7 +304,7 @@ impl Known {
     }
 
     pub(super) fn fresh(&self, now: Time) -> Fresh {
-        let Heartbeat {
+        let HeardHeartbeat {
             id,
             incarnation,
             count,
@@ -320,10 +326,12 @@ impl Known {
 
     /// What the peer itself has to hear, if it began a life anew without knowing.
     pub(super) fn reminder(&self, now: Time) -> Option<Gossip> {
-        self.higher_count_heard.as_ref().map(|h| self.told(h, now))
+        self.higher_count_heard
+            .as_ref()
+            .map(|h| self.gossip_of(h, now))
     }
 
-    fn told(&self, heard: &Heartbeat, now: Time) -> Gossip {
+    fn gossip_of(&self, heard: &HeardHeartbeat, now: Time) -> Gossip {
         Gossip {
             id: heard.id,
             incarnation: heard.incarnation,
@@ -340,7 +348,7 @@ impl Known {
 
     /// An old heartbeat of this life with a higher count than a fresh one: nobody counts
     /// backwards, so the incarnation is used twice.
-    pub(super) fn note_higher_count(&mut self, heard: Heartbeat) {
+    pub(super) fn note_higher_count(&mut self, heard: HeardHeartbeat) {
         // What was noted before goes beyond the fresh one itself.
         let most = self
             .higher_count_heard

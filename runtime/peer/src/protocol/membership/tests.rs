@@ -639,7 +639,7 @@ fn who_hears_nobody_for_k1_suspects_itself_until_it_believes_all_others_down() {
     assert!(!m.is_deaf(Time(60_000)), "it never heard anybody");
     m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
     assert!(!m.is_deaf(Time(4_249)) && m.is_deaf(Time(4_250)));
-    m.hears(Time(4_300));
+    m.note_heard(Time(4_300));
     assert!(!m.is_deaf(Time(8_549)) && m.is_deaf(Time(8_550)));
     for t in 0..80 {
         m.tick(Time(t * 250));

@@ -2,7 +2,7 @@
 //! What is worth taking is [`crate::protocol::sharing`]'s and
 //! [`crate::mission_state::MissionState`]'s.
 
-use super::{Context, Negotiation, PATIENT_PERIODS, STEADY_PERIODS, TWO_CELLS_MS, is_many};
+use super::{Context, Negotiation, PATIENT_INTERVALS, SHORT_INTERVALS, TWO_CELLS_MS, is_many};
 use crate::Time;
 use crate::cells::CellSet;
 use crate::protocol::runs::PlannedCell;
@@ -26,11 +26,11 @@ const NEARNESS_MAX: u64 = 60;
 const NEARNESS_STEP_MS: u64 = 4000;
 
 /// Among many a peer looks this often in a period for what it could take.
-const LOOKS_A_PERIOD: u64 = 2;
+const LOOKS_AN_INTERVAL: u64 = 2;
 
 /// Among many a peer waits so many periods for each who would be at an orphan sooner: a claim
 /// is stored, waits for its turn on the air, and is heard.
-const SOONER_PERIODS: u64 = 2;
+const SOONER_INTERVALS: u64 = 2;
 
 /// Peers take orphans one after the other by rank, this part of a period apart: a take has
 /// to be durable before others can hear of it.
@@ -39,7 +39,7 @@ const TAKE_STAGGER: u64 = 2;
 impl Negotiation {
     /// Whether this peer is to take a first section: it listened for a while, unless it knows who
     /// begins where, and as far as it knows nothing was divided yet. Asked once.
-    pub fn begins(&mut self, ctx: &Context<'_>, knows_where: bool) -> bool {
+    pub fn take_begin(&mut self, ctx: &Context<'_>, knows_where: bool) -> bool {
         let quarters = if knows_where {
             0
         } else {
@@ -62,8 +62,8 @@ impl Negotiation {
 
     /// Whether this peer, among many, is to look for what it could take: half a period after
     /// it looked last.
-    pub fn looks_around(&mut self, ctx: &Context<'_>) -> bool {
-        let rested = |t| ctx.now.since_ms(t) >= ctx.interval_ms / LOOKS_A_PERIOD;
+    pub fn take_look(&mut self, ctx: &Context<'_>) -> bool {
+        let rested = |t| ctx.now.since_ms(t) >= ctx.interval_ms / LOOKS_AN_INTERVAL;
         let looks = is_many(ctx)
             && ctx.able_since.is_some()
             && !self.sections.complete()
@@ -79,7 +79,7 @@ impl Negotiation {
     /// Orphans that others had the time to claim.
     #[must_use]
     pub fn ripe_orphans(&self, ctx: &Context<'_>) -> CellSet {
-        let patience_ms = STEADY_PERIODS * ctx.interval_ms;
+        let patience_ms = SHORT_INTERVALS * ctx.interval_ms;
         let ripe = self.orphaned_at.iter();
         let ripe = ripe.filter(|(_, since)| ctx.now.since_ms(**since) >= patience_ms);
         CellSet::of(self.sections.cells(), ripe.map(|(cell, _)| *cell))
@@ -94,9 +94,9 @@ impl Negotiation {
         orphan: u16,
         (sooner, later_ms): (usize, u64),
     ) -> bool {
-        let patience_ms = STEADY_PERIODS * ctx.interval_ms;
-        let sooner_ms = sooner as u64 * SOONER_PERIODS * ctx.interval_ms;
-        let for_others_ms = sooner_ms.min(ctx.base_wait_ms()).max(later_ms);
+        let patience_ms = SHORT_INTERVALS * ctx.interval_ms;
+        let sooner_ms = sooner as u64 * SOONER_INTERVALS * ctx.interval_ms;
+        let for_others_ms = sooner_ms.min(ctx.first_wait_ms()).max(later_ms);
         let since = self.orphaned_at.get(&orphan);
         since.is_some_and(|t| ctx.now.since_ms(*t) >= patience_ms + for_others_ms)
     }
@@ -104,7 +104,7 @@ impl Negotiation {
     /// Whether this peer will have nothing to fly before others have heard what it takes.
     #[must_use]
     pub fn may_relieve(&self, ctx: &Context<'_>, free_ms: u64) -> bool {
-        free_ms <= STEADY_PERIODS * ctx.interval_ms
+        free_ms <= SHORT_INTERVALS * ctx.interval_ms
     }
 
     /// The live owners with what they have left, but for what others took of it since.
@@ -135,7 +135,7 @@ impl Negotiation {
     }
 
     /// The takes are durable.
-    pub fn take(&mut self, taken: &[PlannedCell]) -> usize {
+    pub fn append_take(&mut self, taken: &[PlannedCell]) -> usize {
         self.take_pending = false;
         self.sections.append(taken)
     }
@@ -160,17 +160,17 @@ impl Negotiation {
             if is_many(ctx) {
                 return None;
             }
-            let patience = STEADY_PERIODS * ctx.interval_ms + ctx.base_wait_ms() + stagger;
+            let patience = SHORT_INTERVALS * ctx.interval_ms + ctx.first_wait_ms() + stagger;
             return (ctx.now.since_ms(since) >= patience)
                 .then(|| self.nearest_run(orphans, lp))
                 .flatten();
         }
         let idle_ms = self.idle_since.map(|t| ctx.now.since_ms(t))?;
-        if idle_ms < PATIENT_PERIODS * ctx.interval_ms + stagger || self.rounds.open().is_some() {
+        if idle_ms < PATIENT_INTERVALS * ctx.interval_ms + stagger || self.rounds.open().is_some() {
             return None;
         }
         let stalled_ms = TWO_CELLS_MS
-            + (PATIENT_PERIODS + 2 * u64::from(ctx.diameter)) * ctx.interval_ms
+            + (PATIENT_INTERVALS + 2 * u64::from(ctx.diameter)) * ctx.interval_ms
             + stagger;
         let (owner, _) = self.progress.iter().find(|(id, p)| {
             p.left > 0
@@ -205,9 +205,9 @@ impl Negotiation {
 
     /// What an idle peer may try to fly although no division could give it to anybody: fuel
     /// that others were to need may be left, or be back. Looked at once in ten periods.
-    pub fn left_over(&mut self, ctx: &Context<'_>) -> Option<CellSet> {
+    pub fn take_left_over(&mut self, ctx: &Context<'_>) -> Option<CellSet> {
         let stagger = self.rank(ctx) * ctx.interval_ms / TAKE_STAGGER;
-        let patience = PATIENT_PERIODS * ctx.interval_ms;
+        let patience = PATIENT_INTERVALS * ctx.interval_ms;
         let for_long = |since: Option<Time>, ms| since.is_some_and(|t| ctx.now.since_ms(t) >= ms);
         let idle = ctx.able_since.is_some() && for_long(self.idle_since, patience + stagger);
         let busy = self.take_pending || self.orphan_since.is_some() || self.rounds.open().is_some();

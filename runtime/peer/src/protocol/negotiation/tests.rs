@@ -177,11 +177,11 @@ impl Desk {
 }
 
 #[test]
-fn orphans_of_two_periods_open_a_round_with_loss() {
+fn orphans_of_two_periods_open_a_repair() {
     let mut desk = Desk::new(&[2]);
     let (after_ms, action) = desk.wait(10 * T).unwrap();
     assert_eq!((after_ms, action), (2 * T, Action::Bid));
-    assert!(desk.round().loss && desk.round().counter == 1);
+    assert!(desk.round().repair && desk.round().counter == 1);
     assert_eq!(desk.round().members, [member(1), member(2)]);
     assert_eq!(desk.round().wait_ms, 5 * 1000);
 }
@@ -218,9 +218,9 @@ fn a_lost_member_opens_a_round_at_once() {
     desk.claim(2, 1, 4, 20, 60_000);
     assert_eq!(desk.wait(8 * T), None, "nothing is orphaned");
     desk.live.clear();
-    desk.negotiation.note_loss();
+    desk.negotiation.note_gone();
     assert_eq!(desk.wait(T), Some((0, Action::Bid)));
-    assert!(desk.round().loss);
+    assert!(desk.round().repair);
     assert_eq!(desk.round().members, [member(1)]);
 }
 
@@ -239,7 +239,7 @@ fn a_round_without_all_bids_waits_longer_each_time_and_leaves_out_the_silent() {
     let mut desk = Desk::new(&[2]);
     desk.wait(5 * T).unwrap();
     let own = desk.bid_from(0);
-    assert!(desk.negotiation.bid_is_durable(own));
+    assert!(desk.negotiation.on_bid_durable(own));
     let mut waits = Vec::new();
     for _ in 0..2 {
         // Takes are made meanwhile; they are none of this test's business.
@@ -261,7 +261,7 @@ fn a_complete_round_is_divided_once_and_given_up_without_an_answer() {
     let mut desk = Desk::new(&[2]);
     desk.wait(5 * T).unwrap();
     let (own, other) = (desk.bid_from(0), desk.bid_from(12));
-    assert!(desk.negotiation.bid_is_durable(own));
+    assert!(desk.negotiation.on_bid_durable(own));
     desk.negotiation.hear_bid(desk.now, member(2), &other);
     let divides = desk.tick();
     assert!(
@@ -284,7 +284,7 @@ fn a_division_gives_each_member_its_part_and_all_compute_the_same() {
     let mut desk = Desk::new(&[2]);
     desk.wait(5 * T).unwrap();
     let (own, other) = (desk.bid_from(0), desk.bid_from(12));
-    desk.negotiation.bid_is_durable(own);
+    desk.negotiation.on_bid_durable(own);
     desk.negotiation.hear_bid(desk.now, member(2), &other);
     let divides = desk.tick();
     let [Action::Divide { epoch, ring, uavs }] = &divides[..] else {
@@ -335,7 +335,7 @@ fn an_idle_peer_asks_for_a_share_of_what_others_have_left() {
     desk.claim(2, 1, 0, 24, 600_000);
     let (after_ms, action) = desk.wait(60 * T).unwrap();
     assert_eq!(action, Action::Bid);
-    assert!(!desk.round().loss);
+    assert!(!desk.round().repair);
     assert!(after_ms >= 2 * T, "{after_ms}");
     // But not where nothing would be gained.
     let mut desk = Desk::new(&[2]);
@@ -393,7 +393,7 @@ fn cells_that_nobody_took_over_in_time_are_orphans() {
         counter: 2,
         hash: 0,
     };
-    assert!(desk.negotiation.sections.adopt(epoch, &[], &[]));
+    assert!(desk.negotiation.sections.adopt_at_once(epoch, &[], &[]));
     assert_eq!(desk.negotiation.sections.held().len(), 4);
     desk.held_expired = true;
     assert_eq!(desk.tick(), [Action::Changed]);
@@ -407,7 +407,7 @@ fn a_new_life_owns_nothing_and_keeps_what_is_covered() {
     let mut desk = Desk::new(&[2]);
     desk.adopt(4);
     desk.leave_open(2..24);
-    desk.negotiation.new_life(Member {
+    desk.negotiation.void_ownership(Member {
         id: 1,
         incarnation: 2,
     });
@@ -424,7 +424,7 @@ fn a_round_may_wait_for_four_times_what_the_largest_diameter_needs_and_no_longer
             members: vec![member(1), member(2)],
             revision: 1,
             loop_hash: 7,
-            loss: true,
+            repair: true,
             wait_ms,
         };
         desk.negotiation.rounds.refuse(&round)
@@ -483,7 +483,7 @@ fn after_a_division_a_loss_waits_until_the_new_claims_have_come() {
         assert!(desk.tick().is_empty());
         desk.now = desk.now.plus_ms(T / 4);
         desk.live.remove(&2);
-        desk.negotiation.note_loss();
+        desk.negotiation.note_gone();
         assert_eq!(desk.tick() == [Action::Bid], answered, "{waited} ms");
     }
 }
@@ -493,7 +493,7 @@ fn whether_a_round_would_gain_is_computed_once_in_ten_periods() {
     let mut desk = Desk::new(&[2]);
     desk.gain_in_sight = false;
     desk.claim(2, 1, 0, 24, 600_000);
-    let wants = |n: &mut Negotiation, ctx: &Context<'_>| n.wants_foresight(ctx);
+    let wants = |n: &mut Negotiation, ctx: &Context<'_>| n.take_foresight(ctx);
     assert_eq!(
         desk.until(9 * T, wants),
         Some(2 * T),
@@ -518,7 +518,7 @@ fn whether_a_round_would_gain_is_computed_once_in_ten_periods() {
 }
 
 #[test]
-fn a_round_without_a_loss_comes_twenty_periods_after_the_last_division() {
+fn a_rebalancing_comes_twenty_periods_after_the_last_division() {
     for (others, rank) in [([2], 0), ([0], 1)] {
         let mut desk = Desk::new(&[]);
         desk.live = others.iter().map(|id| (*id, 1)).collect();
@@ -694,7 +694,9 @@ fn the_nearest_orphans_are_those_along_the_loop_whichever_way() {
             counter: 1,
             hash: 1,
         };
-        desk.negotiation.sections.adopt(epoch, &[], &section);
+        desk.negotiation
+            .sections
+            .adopt_at_once(epoch, &[], &section);
         let orphans = CellSet::of(24, open.iter().copied());
         let coverage_loop = Arc::clone(&desk.coverage_loop);
         desk.ask(|n, _| n.nearest_run(&orphans, &coverage_loop))
@@ -740,7 +742,7 @@ fn cells_beyond_everybody_are_looked_at_by_the_idle_once_in_ten_periods() {
         desk.negotiation.sections.set_unassigned(&[5, 6, 7]);
         desk.claim(others[0], 1, 8, 20, 3_000_000);
         desk.negotiation.sections.cover(&CellSet::of(24, 0..5));
-        let cells = |n: &mut Negotiation, ctx: &Context<'_>| n.left_over(ctx).is_some();
+        let cells = |n: &mut Negotiation, ctx: &Context<'_>| n.take_left_over(ctx).is_some();
         assert_eq!(desk.until(30 * T, cells), Some(10 * T + rank * T / 2));
         for _ in 0..2 {
             desk.now = desk.now.plus_ms(T / 4);
@@ -783,10 +785,10 @@ fn orphans_are_taken_one_rank_after_the_other() {
 
 #[test]
 fn a_first_section_is_looked_for_once_and_only_where_nothing_was_divided() {
-    let begins = |n: &mut Negotiation, ctx: &Context<'_>| n.begins(ctx, false);
+    let begins = |n: &mut Negotiation, ctx: &Context<'_>| n.take_begin(ctx, false);
     let mut told = Desk::new(&[2]);
     told.able_since = Some(told.now);
-    assert!(told.ask(|n, ctx| n.begins(ctx, true)), "at once");
+    assert!(told.ask(|n, ctx| n.take_begin(ctx, true)), "at once");
     let mut desk = Desk::new(&[2]);
     desk.able_since = Some(desk.now);
     assert_eq!(desk.until(10 * T, begins), Some(3 * T / 2));
@@ -800,7 +802,9 @@ fn a_first_section_is_looked_for_once_and_only_where_nothing_was_divided() {
     divided.adopt(0);
     assert!(!divided.ask(begins), "this peer has had one");
     let mut took = Desk::new(&[2]);
-    took.negotiation.sections.take(&[(3, Direction::Forward)]);
+    took.negotiation
+        .sections
+        .take_at_once(&[(3, Direction::Forward)]);
     assert!(!took.ask(begins), "it has something to fly");
 }
 
@@ -819,7 +823,7 @@ fn of_two_who_take_what_nobody_lists_the_one_that_is_nearer_outranks_the_other()
 
 #[test]
 fn among_many_a_peer_looks_twice_a_period_for_what_it_could_take() {
-    let looks = |n: &mut Negotiation, ctx: &Context<'_>| n.looks_around(ctx);
+    let looks = |n: &mut Negotiation, ctx: &Context<'_>| n.take_look(ctx);
     let mut desk = Desk::new(&[2, 3, 4, 5, 6, 7, 8]);
     assert!(!desk.ask(looks), "eight are few");
     desk.live.insert(9, 1);
@@ -847,7 +851,7 @@ fn what_is_divided_are_the_bids_whatever_a_member_knows_besides() {
     let mut desk = Desk::new(&[2]);
     desk.wait(5 * T).unwrap();
     let (own, other) = (desk.bid_from(0), desk.bid_from(12));
-    assert!(desk.negotiation.bid_is_durable(own));
+    assert!(desk.negotiation.on_bid_durable(own));
     desk.negotiation.hear_bid(desk.now, member(2), &other);
     // It hears of covered cells after it bid, and others may not have heard of them.
     desk.leave_open(6..24);
