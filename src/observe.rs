@@ -21,7 +21,7 @@ const SILENCE: Duration = Duration::from_millis(1_500);
 /// given by `--endpoint`, and prints each record once, whoever passed it on.
 #[derive(Debug, Args)]
 pub struct ObserveArgs {
-    /// Which keys, for example `*/v1/state/**`; without it all.
+    /// Which keys, for example `*/v2/state/**`; without it all.
     pub keyexpr: Option<String>,
     /// Ends after this many seconds; without it by an interrupt.
     #[arg(long, value_name = "SECONDS")]
@@ -264,7 +264,7 @@ fn listings(all: &[ListedRun]) -> String {
     }
     let one = |l: &ListedRun| {
         let way = if l.backward { "<" } else { ">" };
-        format!("{}+{}{way}{:?}", l.run.first, l.run.count, l.firmness)
+        format!("{}+{}{way}", l.run.first, l.run.count)
     };
     all.iter().map(one).collect::<Vec<_>>().join(" ")
 }

@@ -96,7 +96,6 @@ impl Node {
     /// The claim as others will read it.
     pub(super) fn claim(&self) -> Claim {
         Claim {
-            done: Vec::new(),
             epoch: Epoch::default(),
             ..self.sections.claim(0, 0, 0)
         }
@@ -121,9 +120,8 @@ impl Node {
             commits: commits.collect(),
             off_loop: Vec::new(),
             eta_ms: 0,
-            adopted_ago_ms: 0,
-            cells_since: 0,
-            idle: false,
+            calm: false,
+            progressed: false,
         };
         self.rounds.bid(bid.clone()).then(|| Arc::new(bid))
     }

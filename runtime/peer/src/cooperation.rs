@@ -436,7 +436,7 @@ impl MissionState {
                     return Effects::new();
                 }
                 self.negotiation.sections.cover(&seen);
-                self.negotiation.covered_myself(seen.count());
+                self.negotiation.note_covered();
                 self.unsaved_cells = self.unsaved_cells.saturating_add(seen.count());
                 let cells = seen.iter().collect();
                 let mut effects = vec![
@@ -712,9 +712,8 @@ impl MissionState {
             commits: CellSet::of(sections.cells(), commits).runs(),
             off_loop: forecast.off_loop.into_iter().collect(),
             eta_ms: if idle { 0 } else { forecast.finish_ms },
-            adopted_ago_ms: self.negotiation.adopted_ago_ms(s.now),
-            cells_since: self.negotiation.cells_since(),
-            idle,
+            calm: self.negotiation.is_calm(s.now, s.membership.interval_ms()),
+            progressed: self.negotiation.progressed(),
         };
         let report = Report::Round {
             counter: bid.round.counter,
@@ -744,10 +743,7 @@ impl MissionState {
     }
 
     fn divided(&mut self, s: &Situation<'_>, epoch: Epoch, division: &Division) -> Effects {
-        let adoption = self
-            .negotiation
-            .divided(s.now, s.period_ms, epoch, division);
-        let Some(adoption) = adoption else {
+        let Some(adoption) = self.negotiation.divided(s.now, epoch, division) else {
             return Effects::new();
         };
         let claim = self.negotiation.sections.claim_with(

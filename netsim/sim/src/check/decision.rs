@@ -3,7 +3,7 @@
 //! epoch; nobody takes what another has committed; of a rebalancing only a gain is adopted.
 //! And the bids themselves against what their authors did (`bid`).
 
-use super::{Findings, Handicaps};
+use super::{Findings, Handicaps, Snapshot};
 use crate::account::secs;
 use crate::twins::Twins;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
@@ -14,7 +14,7 @@ use skein_peer::cells::CellSet;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::protocol::rounds::{OpenRound, RoundOrder, epoch_of, order_of};
 use skein_peer::protocol::runs::cells_of;
-use skein_peer::wire::message::{Bid, Claim, Epoch, Firmness, Round};
+use skein_peer::wire::message::{Bid, Claim, Epoch, Round};
 use skein_peer::{Beliefs, PeerId};
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
@@ -23,8 +23,8 @@ use std::sync::Arc;
 /// For a rebalancing the new makespan is at most this many percent of the present one.
 const GAIN_PERCENT: u64 = 90;
 
-/// Rebalancings are at least this many beacon periods apart.
-const CALM_PERIODS: u64 = 20;
+/// Rebalancings are at least so many of the longest interval apart.
+const CALM_INTERVALS: u64 = 20;
 
 /// Most legs of a section.
 const LEGS_MAX: usize = 6;
@@ -46,6 +46,8 @@ pub struct Mover {
 #[derive(Clone, Debug, Default)]
 pub struct DecisionCheck {
     period_ms: u64,
+    /// The longest interval that was announced lately.
+    longest_ms: u64,
     twins: Twins,
     grounds: BTreeMap<u64, Arc<MissionGeometry>>,
     rounds: BTreeMap<RoundOrder, OpenRound>,
@@ -82,8 +84,8 @@ struct Adopted {
     count: u32,
     /// When the last one was.
     at_ms: u64,
-    /// Cells covered since.
-    cells: u16,
+    /// Whether it covered a cell since.
+    progressed: bool,
 }
 
 impl DecisionCheck {
@@ -95,6 +97,11 @@ impl DecisionCheck {
             twins,
             ..Self::default()
         }
+    }
+
+    /// Once a period.
+    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>) {
+        self.longest_ms = snapshot.bounds.interval_ms;
     }
 
     /// A loop was derived.
@@ -117,9 +124,7 @@ impl DecisionCheck {
 
     /// A peer's camera saw so many cells that it did not know to be covered.
     pub fn on_covered(&mut self, id: u16, count: usize) {
-        let adopted = self.adopted.entry(id).or_default();
-        let count = u16::try_from(count).unwrap_or(u16::MAX);
-        adopted.cells = adopted.cells.saturating_add(count);
+        self.adopted.entry(id).or_default().progressed |= count > 0;
     }
 
     /// A peer tells what it will fly, having adopted so many divisions.
@@ -129,7 +134,7 @@ impl DecisionCheck {
             *adopted = Adopted {
                 count: adoptions,
                 at_ms: now_ms,
-                cells: 0,
+                progressed: false,
             };
         }
     }
@@ -167,18 +172,14 @@ impl DecisionCheck {
         let mut lies = Vec::new();
         let adopted = self.adopted.get(&id).copied().unwrap_or_default();
         let told = adopted.count == view.adoptions;
-        if told && bid.cells_since != adopted.cells {
+        if told && bid.progressed != adopted.progressed {
             lies.push(format!(
-                "says that it covered {} cells since its last adoption, it covered {}",
-                bid.cells_since, adopted.cells
+                "says that it covered a cell since its last adoption: {}",
+                bid.progressed
             ));
         }
-        if bid.idle != view.plan.is_empty() {
-            lies.push(format!(
-                "says idle {} with {} cells to fly",
-                bid.idle,
-                view.plan.len()
-            ));
+        if view.plan.is_empty() && bid.eta_ms > 0 {
+            lies.push(format!("ends nothing in {} ms", bid.eta_ms));
         }
         let budget_ms = u64::from(bid.release_ms) + u64::from(bid.endurance_ms);
         // A bid that cannot be flown at all offers nothing, whenever it is released.
@@ -188,12 +189,23 @@ impl DecisionCheck {
                 bid.endurance_ms, bid.release_ms, view.spendable_ms
             ));
         }
-        if told && adopted.count > 0 {
-            let ago_ms = handicaps.shown_ms(id, adopted.at_ms, now_ms);
-            if u64::from(bid.adopted_ago_ms).abs_diff(ago_ms) > self.period_ms {
+        if told {
+            let shown_ms = || handicaps.shown_ms(id, adopted.at_ms, now_ms);
+            let ago_ms = if adopted.count > 0 {
+                shown_ms()
+            } else {
+                u64::MAX
+            };
+            let least_ms = CALM_INTERVALS * view.interval_ms;
+            let most_ms = CALM_INTERVALS * self.longest_ms.max(view.interval_ms);
+            let (early, late) = (
+                ago_ms.saturating_add(self.period_ms) < least_ms,
+                ago_ms > most_ms + self.period_ms,
+            );
+            if (bid.calm && early) || (!bid.calm && late) {
                 lies.push(format!(
-                    "says that it adopted {} ms ago, it was {ago_ms} ms ago",
-                    bid.adopted_ago_ms
+                    "says that it is calm: {}, and adopted {ago_ms} ms ago",
+                    bid.calm
                 ));
             }
         }
@@ -393,7 +405,6 @@ impl DecisionCheck {
         let listed = claim
             .plan
             .iter()
-            .filter(|l| l.firmness != Firmness::Done)
             .filter(|l| l.stamp.epoch == claim.epoch && l.stamp.take == 0 && l.stamp.id == id);
         for cell in listed.flat_map(|l| cells_of(l.run, n)) {
             let c = usize::from(cell);
@@ -425,15 +436,14 @@ impl DecisionCheck {
         if open.round.repair {
             return;
         }
-        let calm_ms = CALM_PERIODS * self.period_ms;
         let Some(Divided { division, .. }) = self.division_of(epoch, open) else {
             return;
         };
         let all = || open.bids.values();
         let present_ms = all().map(|b| u64::from(b.eta_ms)).max().unwrap_or(0);
         let new_ms = u64::from(division.makespan_ms);
-        let calm = all().all(|b| u64::from(b.adopted_ago_ms) >= calm_ms);
-        let progress = all().any(|b| b.cells_since > 0);
+        let calm = all().all(|b| b.calm);
+        let progress = all().any(|b| b.progressed);
         if new_ms * 100 > present_ms * GAIN_PERCENT || !calm || !progress {
             found.broken("decision", now_ms, Some(id), || {
                 format!("adopted a rebalancing that takes {new_ms} ms instead of {present_ms} ms (calm {calm}, progress {progress})")
@@ -555,9 +565,8 @@ mod tests {
                 commits: Vec::new(),
                 off_loop: Vec::new(),
                 eta_ms: 0,
-                adopted_ago_ms: u32::MAX,
-                cells_since: 0,
-                idle: true,
+                calm: true,
+                progressed: false,
             };
             let mut check = DecisionCheck::new(1000, Twins::default());
             check.on_loop(&geometry);
@@ -572,7 +581,7 @@ mod tests {
         fn bid(&mut self) {
             for (id, bid) in [(1, self.bids[0].clone()), (2, self.bids[1].clone())] {
                 let view = Beliefs {
-                    plan: if bid.idle { Vec::new() } else { vec![0] },
+                    plan: if bid.eta_ms == 0 { Vec::new() } else { vec![0] },
                     ..view()
                 };
                 self.check.on_bid(
@@ -603,7 +612,6 @@ mod tests {
                 plan: vec![ListedRun {
                     run: CellRun { first, count },
                     backward: false,
-                    firmness: Firmness::Tentative,
                     stamp: Stamp {
                         epoch,
                         take: 0,
@@ -729,15 +737,15 @@ mod tests {
 
     #[test]
     fn a_rebalancing_needs_gain_calm_and_progress() {
-        for (eta_ms, ago_ms, cells, broken) in [
-            (900_000_000, 60_000, 1, false),
-            (1_000, 60_000, 1, true),
-            (900_000_000, 1_000, 1, true),
-            (900_000_000, 60_000, 0, true),
+        for (eta_ms, calm, progressed, broken) in [
+            (900_000_000, true, true, false),
+            (1_000, true, true, true),
+            (900_000_000, false, true, true),
+            (900_000_000, true, false, true),
         ] {
             let mut c = Case::new(false);
             for bid in &mut c.bids {
-                (bid.eta_ms, bid.adopted_ago_ms, bid.cells_since) = (eta_ms, ago_ms, cells);
+                (bid.eta_ms, bid.calm, bid.progressed) = (eta_ms, calm, progressed);
             }
             c.bid();
             let epoch = c.epoch();
@@ -745,7 +753,7 @@ mod tests {
             assert_eq!(
                 c.broken("decision"),
                 broken,
-                "{eta_ms} {ago_ms} {cells}: {:?}",
+                "{eta_ms} {calm} {progressed}: {:?}",
                 c.found.violations
             );
         }
@@ -758,28 +766,31 @@ mod tests {
             fastest_mps: 20.0,
         };
         type Lie = fn(&mut Bid);
-        let lies: [(Lie, f64, bool); 6] = [
-            (|_| {}, 0.0, false),
-            (|b| b.cells_since = 2, 0.0, true),
-            (|b| b.adopted_ago_ms = 500_000, 0.0, true),
-            (|b| b.idle = false, 0.0, true),
-            (|b| b.endurance_ms = 3_000_000, 0.0, true),
-            (|_| {}, 5_000.0, true),
+        let lies: [(Lie, u64, f64, bool); 8] = [
+            (|_| {}, 40, 0.0, false),
+            (|b| b.progressed = false, 40, 0.0, true),
+            (|b| b.calm = false, 40, 0.0, true),
+            (|_| {}, 10, 0.0, true),
+            (|b| b.calm = false, 10, 0.0, false),
+            (|b| b.eta_ms = 1, 40, 0.0, true),
+            (|b| b.endurance_ms = 3_000_000, 40, 0.0, true),
+            (|_| {}, 40, 5_000.0, true),
         ];
-        for (n, (lie, east_m, broken)) in lies.into_iter().enumerate() {
+        for (n, (lie, at_s, east_m, broken)) in lies.into_iter().enumerate() {
             let mut c = Case::new(true);
             c.check.on_told(0, 1, 1);
             c.check.on_covered(1, 3);
             let mut bid = c.bids[0].clone();
-            (bid.adopted_ago_ms, bid.cells_since) = (40_000, 3);
+            (bid.calm, bid.progressed) = (true, true);
             lie(&mut bid);
             let view = Beliefs {
                 adoptions: 1,
+                interval_ms: 1000,
                 ..view()
             };
             let at = Some(mover(east_m));
             c.check.on_bid(
-                40_000,
+                at_s * 1000,
                 1,
                 &bid,
                 (&view, at),

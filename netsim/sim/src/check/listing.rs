@@ -4,7 +4,7 @@ use super::membership::Membership;
 use super::snapshot::is_alone;
 use super::{Clocks, Findings, PeerSnapshot, Snapshot, bounds::LIGHT_FACTOR};
 use skein_peer::output::Status;
-use skein_peer::wire::message::{Claim, Firmness, ListedRun, Stamp};
+use skein_peer::wire::message::{Claim, ListedRun, Stamp};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -284,7 +284,7 @@ fn plans(claim: &Claim, cell: u16, n: usize) -> bool {
 
 /// Calls `f` with each cell of a listing that is still to be flown.
 fn each_cell(l: &ListedRun, n: usize, mut f: impl FnMut(usize)) {
-    if l.firmness == Firmness::Done || n == 0 {
+    if n == 0 {
         return;
     }
     for k in 0..usize::from(l.run.count) {
@@ -450,7 +450,6 @@ mod tests {
         let run = ListedRun {
             run: CellRun { first: 2, count: 2 },
             backward: false,
-            firmness: Firmness::Tentative,
             stamp: Stamp::default(),
         };
         let claim = Claim {
@@ -482,7 +481,6 @@ mod tests {
                 plan: vec![ListedRun {
                     run: CellRun { first: 3, count: 2 },
                     backward: false,
-                    firmness: Firmness::Tentative,
                     stamp: stamp(counter, id),
                 }],
                 ..Claim::default()

@@ -316,7 +316,7 @@ fn listed(claim: &Claim, n: u16) -> impl Iterator<Item = u16> {
 mod tests {
     use super::super::testing::{LOOP, Story, speaking};
     use super::*;
-    use skein_peer::wire::message::{CellRun, Firmness, ListedRun, Round, Stamp};
+    use skein_peer::wire::message::{CellRun, ListedRun, Round, Stamp};
 
     fn bid(counter: u32, repair: bool, wait_ms: u32) -> Bid {
         Bid {
@@ -341,9 +341,8 @@ mod tests {
             commits: Vec::new(),
             off_loop: Vec::new(),
             eta_ms: 0,
-            adopted_ago_ms: 0,
-            cells_since: 0,
-            idle: true,
+            calm: false,
+            progressed: false,
         }
     }
 
@@ -432,7 +431,6 @@ mod tests {
                 plan: vec![ListedRun {
                     run: CellRun { first: 0, count },
                     backward: false,
-                    firmness: Firmness::Tentative,
                     stamp: Stamp::default(),
                 }],
                 ..Claim::default()

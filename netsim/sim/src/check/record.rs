@@ -8,7 +8,7 @@ use skein_peer::cells::CellSet;
 use skein_peer::journal::{Durable, Entry};
 use skein_peer::wire::codec::{self, Body};
 use skein_peer::wire::kinds::Kind;
-use skein_peer::wire::message::{Bid, Claim, Epoch, Firmness, ListedRun, Record, Stamp};
+use skein_peer::wire::message::{Bid, Claim, Epoch, ListedRun, Record, Stamp};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -344,7 +344,7 @@ fn unpersisted(said: &Claim, durable: Option<&Claim>, covered: &[bool]) -> Optio
             }
         }
     }
-    for l in said.plan.iter().filter(|l| l.firmness != Firmness::Done) {
+    for l in &said.plan {
         for k in 0..l.run.count {
             let cell = cell_of(l, k);
             let bridged = covered.get(usize::from(cell)).copied().unwrap_or(false);
@@ -370,7 +370,6 @@ mod tests {
             plan: vec![ListedRun {
                 run: CellRun { first: 3, count },
                 backward: false,
-                firmness: Firmness::Tentative,
                 stamp: Stamp {
                     epoch: Epoch { counter, hash: 0 },
                     take: 0,

@@ -271,6 +271,7 @@ impl Rules {
     /// Judges everybody, once a beacon period.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         self.cadence.on_snapshot(snapshot, found);
+        self.decision.on_snapshot(snapshot);
         self.patience.on_snapshot(snapshot, found);
         self.spoken.on_snapshot(snapshot, found);
         self.spread.on_snapshot(snapshot, found);

@@ -251,7 +251,7 @@ mod tests {
     use super::*;
     use skein_peer::PeerId;
     use skein_peer::output::Status;
-    use skein_peer::wire::message::{CellRun, Cover, Finished, Firmness, ListedRun, Stamp};
+    use skein_peer::wire::message::{CellRun, Cover, Finished, ListedRun, Stamp};
 
     fn beacon_of(view: &Beliefs) -> Beacon {
         Beacon {
@@ -281,7 +281,6 @@ mod tests {
             plan: vec![ListedRun {
                 run: CellRun { first, count },
                 backward: false,
-                firmness: Firmness::Tentative,
                 stamp: Stamp::default(),
             }],
             // Peers that know nobody hear nobody.

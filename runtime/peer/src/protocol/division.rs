@@ -13,9 +13,6 @@ use skein_flight::coverage::ring::{CoverageLoop, Direction};
 /// the new makespan is at most this many percent of the present one.
 const GAIN_PERCENT: u64 = 90;
 
-/// Rebalancings are at least this many beacon periods apart.
-pub const CALM_PERIODS: u64 = 20;
-
 /// The open cells and the members of a complete round, as the solver wants them. What is
 /// `needless` is the same at every peer, and never what this one knows to be covered.
 #[must_use]
@@ -55,16 +52,16 @@ pub fn problem(
 }
 
 /// Whether the division of a complete round is adopted. All members judge alike:
-/// only the bids count, and the beacon period, which is configured alike everywhere.
+/// only the bids count.
 #[must_use]
-pub fn worthwhile(open: &OpenRound, division: &Division, beacon_period_ms: u64) -> bool {
+pub fn worthwhile(open: &OpenRound, division: &Division) -> bool {
     if open.round.repair {
         return true;
     }
     let all = || open.bids.values();
     let present = all().map(|s| u64::from(s.eta_ms)).max().unwrap_or(0);
-    let calm = all().all(|s| u64::from(s.adopted_ago_ms) >= CALM_PERIODS * beacon_period_ms);
-    let progress = all().any(|s| s.cells_since > 0);
+    let calm = all().all(|s| s.calm);
+    let progress = all().any(|s| s.progressed);
     calm && progress && gains(u64::from(division.makespan_ms), present)
 }
 
@@ -144,9 +141,7 @@ pub fn commits_of(bid: &Bid, n: u16) -> CellSet {
 mod tests {
     use super::*;
     use crate::testing::mission;
-    use crate::wire::message::{
-        CellRun, Claim, Epoch, Firmness, ListedRun, Member, OffLoop, Round, Stamp,
-    };
+    use crate::wire::message::{CellRun, Claim, Epoch, ListedRun, Member, OffLoop, Round, Stamp};
     use crate::wire::samples;
     use std::sync::Arc;
 
@@ -186,7 +181,6 @@ mod tests {
             let plan = vec![ListedRun {
                 run,
                 backward,
-                firmness: Firmness::Tentative,
                 stamp: Stamp { epoch, take: 0, id },
             }];
             let claim = Claim {
@@ -240,7 +234,7 @@ mod tests {
         ));
     }
 
-    fn bid(eta_ms: u32, adopted_ago_ms: u32, cells_since: u16) -> Bid {
+    fn bid(eta_ms: u32, calm: bool, progressed: bool) -> Bid {
         let round = Round {
             counter: 1,
             members: [1, 2].map(|id| Member { id, incarnation: 1 }).to_vec(),
@@ -251,8 +245,8 @@ mod tests {
         };
         Bid {
             eta_ms,
-            adopted_ago_ms,
-            cells_since,
+            calm,
+            progressed,
             speed_mmps: 12_000,
             ..samples::bid(round)
         }
@@ -265,8 +259,8 @@ mod tests {
         }
     }
 
-    /// §4.3: at most 90 % of the present makespan, 20 T after every member's last adoption,
-    /// and with some cell covered since.
+    /// §4.3: at most 90 % of the present makespan, if all members are calm and one has
+    /// covered a cell since.
     #[test]
     fn a_rebalancing_is_adopted_for_a_tenth_after_calm_and_with_progress() {
         let worth = |makespan_ms: u32, bids: [Bid; 2]| {
@@ -275,17 +269,17 @@ mod tests {
                 unassigned: Vec::new(),
                 makespan_ms,
             };
-            worthwhile(&round_of(bids), &division, 1_000)
+            worthwhile(&round_of(bids), &division)
         };
-        let calm = || [bid(100_000, 20_000, 0), bid(60_000, u32::MAX, 1)];
+        let calm = || [bid(100_000, true, false), bid(60_000, true, true)];
         assert!(worth(90_000, calm()) && !worth(90_001, calm()));
         let [a, b] = calm();
         assert!(
-            !worth(1, [bid(100_000, 19_999, 0), b]),
+            !worth(1, [bid(100_000, false, false), b]),
             "one adopted lately"
         );
         assert!(
-            !worth(1, [a, bid(60_000, u32::MAX, 0)]),
+            !worth(1, [a, bid(60_000, true, false)]),
             "nothing was covered"
         );
         // A repair always is.
@@ -297,7 +291,7 @@ mod tests {
     #[test]
     fn what_is_divided_is_open_in_all_bids_and_committed_in_none() {
         let geometry = Arc::new(mission(1, 6, 4)).geometry().unwrap();
-        let mut bids = [bid(0, 0, 0), bid(0, 0, 0)];
+        let mut bids = [bid(0, false, false), bid(0, false, false)];
         bids[0].covered = CellSet::of(24, [0, 1]).encode_rle(None);
         bids[0].commits = vec![CellRun {
             first: 23,

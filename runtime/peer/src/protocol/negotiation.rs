@@ -20,7 +20,7 @@
 
 mod takes;
 
-use super::division::{self, CALM_PERIODS};
+use super::division;
 use super::rounds::{HeardBid, OpenRound, Rounds};
 use super::runs::PlannedCell;
 use super::sections::{LivePeers, Sections};
@@ -49,6 +49,9 @@ pub const SETTLE_INTERVALS: u64 = 5;
 /// A return, a join or an idle peer waits for so many periods: shorter absences are the
 /// rule on a lossy channel.
 const PATIENT_INTERVALS: u64 = 10;
+
+/// Rebalancings are at least so many intervals apart.
+const CALM_INTERVALS: u64 = 20;
 
 /// The waiting time of a round doubles with each retry, up to this many doublings: a bid
 /// that four waiting times do not bring is not on its way.
@@ -180,7 +183,8 @@ pub struct Negotiation {
     somebody_gone: bool,
     decided_at: Option<Time>,
     adopted_at: Option<Time>,
-    cells_since: u16,
+    /// Whether this peer covered any cell since.
+    progressed: bool,
     take_pending: bool,
     idle_since: Option<Time>,
     progress: BTreeMap<u16, Progress>,
@@ -222,7 +226,7 @@ impl Negotiation {
             somebody_gone: false,
             decided_at: None,
             adopted_at: None,
-            cells_since: 0,
+            progressed: false,
             take_pending: false,
             idle_since: None,
             progress: BTreeMap::new(),
@@ -260,23 +264,22 @@ impl Negotiation {
         }
     }
 
-    /// Cells newly covered by this peer itself.
-    pub fn covered_myself(&mut self, count: u16) {
-        self.cells_since = self.cells_since.saturating_add(count);
+    /// This peer itself covered cells.
+    pub fn note_covered(&mut self) {
+        self.progressed = true;
     }
 
-    /// Milliseconds since the last adoption; very long if there was none.
+    /// Whether the last adoption is so long ago that a rebalancing may follow.
     #[must_use]
-    pub fn adopted_ago_ms(&self, now: Time) -> u32 {
-        self.adopted_at.map_or(u32::MAX, |t| {
-            u32::try_from(now.since_ms(t)).unwrap_or(u32::MAX)
-        })
+    pub fn is_calm(&self, now: Time, interval_ms: u64) -> bool {
+        let calm_ms = CALM_INTERVALS * interval_ms;
+        self.adopted_at.is_none_or(|t| now.since_ms(t) >= calm_ms)
     }
 
-    /// Cells covered since the last adoption.
+    /// Whether this peer covered any cell since the last adoption.
     #[must_use]
-    pub fn cells_since(&self) -> u16 {
-        self.cells_since
+    pub fn progressed(&self) -> bool {
+        self.progressed
     }
 
     /// A bid was heard.
@@ -501,7 +504,7 @@ impl Negotiation {
         let idle = self
             .idle_since
             .is_some_and(|t| ctx.now.since_ms(t) >= SHORT_INTERVALS * ctx.interval_ms);
-        let calm = CALM_PERIODS * ctx.interval_ms;
+        let calm = CALM_INTERVALS * ctx.interval_ms;
         let stagger = self.rank(ctx) * ctx.interval_ms / ROUND_STAGGER;
         let last = self.decided_at.max(self.adopted_at);
         let rested = last.is_none_or(|t| ctx.now.since_ms(t) >= calm + stagger);
@@ -526,19 +529,13 @@ impl Negotiation {
     /// The answer to [`Action::Divide`]. Returns what is to be made durable and then
     /// given to [`Negotiation::adopt`], unless the round was abandoned meanwhile or
     /// its division is not worth the change.
-    pub fn divided(
-        &mut self,
-        now: Time,
-        period_ms: u64,
-        epoch: Epoch,
-        division: &Division,
-    ) -> Option<Adoption> {
+    pub fn divided(&mut self, now: Time, epoch: Epoch, division: &Division) -> Option<Adoption> {
         let dividing = self.dividing.take_if(|d| d.epoch == epoch)?;
         let (now_epoch, open) = self.rounds.complete()?;
         if now_epoch != epoch {
             return None;
         }
-        let worthwhile = division::worthwhile(open, division, period_ms);
+        let worthwhile = division::worthwhile(open, division);
         let mine = open.bids.get(&self.me)?;
         let committed = division::commits_of(mine, self.sections.cells());
         let commits = self
@@ -570,7 +567,7 @@ impl Negotiation {
         self.sections.set_unassigned(&adoption.unassigned);
         self.adopted_at = Some(now);
         self.decided_at = Some(now);
-        self.cells_since = 0;
+        self.progressed = false;
         self.adoptions = self.adoptions.saturating_add(1);
         true
     }

@@ -304,9 +304,8 @@ pub fn epoch_of(open: &OpenRound) -> Epoch {
             &s.commits,
             &s.off_loop,
             s.eta_ms,
-            s.adopted_ago_ms,
-            s.cells_since,
-            s.idle,
+            s.calm,
+            s.progressed,
         )
             .hash(&mut h);
     }
@@ -337,9 +336,8 @@ mod tests {
             commits: Vec::new(),
             off_loop: Vec::new(),
             eta_ms: 0,
-            adopted_ago_ms: 0,
-            cells_since: 0,
-            idle: true,
+            calm: false,
+            progressed: false,
         }
     }
 
@@ -490,7 +488,7 @@ mod tests {
         let r = round(5, &[1, 2]);
         let epochs = [0, 1, 2].map(|anchor| complete(&r, anchor).hash);
         assert_eq!(order_of(&r), (5, 2, 3_341_732_236));
-        assert_eq!(epochs, [46_605_128, 46_606_571, 46_605_917]);
+        assert_eq!(epochs, [46_607_233, 46_607_986, 46_607_417]);
     }
 
     #[test]

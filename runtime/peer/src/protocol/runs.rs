@@ -2,7 +2,7 @@
 //! (D2.7 §3.6.5). Leaves which cells these are to [`super::sections`].
 
 use crate::cells::CellSet;
-use crate::wire::message::{CellRun, Firmness, ListedRun, Stamp};
+use crate::wire::message::{CellRun, ListedRun, Stamp};
 use skein_flight::coverage::ring::Direction;
 use skein_flight::coverage::ring::backtracking::Leg;
 
@@ -13,8 +13,6 @@ pub struct PlannedCell {
     pub cell: u16,
     /// Which way it is flown.
     pub direction: Direction,
-    /// Whether it was committed in a bid: it is flown whatever is decided.
-    pub committed: bool,
     /// By what right it is listed.
     pub stamp: Stamp,
 }
@@ -49,9 +47,7 @@ impl Packer<'_> {
 
     /// The length of the run `first, count` after `next` joins it, if it can.
     fn reach(&self, first: &PlannedCell, count: u16, next: &PlannedCell) -> Option<u16> {
-        if (first.direction, first.committed, first.stamp)
-            != (next.direction, next.committed, next.stamp)
-        {
+        if (first.direction, first.stamp) != (next.direction, next.stamp) {
             return None;
         }
         let n = self.cells;
@@ -88,11 +84,6 @@ impl Packer<'_> {
                 count: *count,
             },
             backward: first.direction == Direction::Backward,
-            firmness: if first.committed {
-                Firmness::Committed
-            } else {
-                Firmness::Tentative
-            },
             stamp: first.stamp,
         }
     }
@@ -134,7 +125,6 @@ pub fn unpack(listings: &[ListedRun], n: u16) -> Vec<PlannedCell> {
         out.extend(cells.into_iter().map(|cell| PlannedCell {
             cell,
             direction,
-            committed: l.firmness == Firmness::Committed,
             stamp: l.stamp,
         }));
     }
@@ -188,7 +178,6 @@ mod tests {
         let cell = |(cell, direction): &(u16, Direction)| PlannedCell {
             cell: *cell,
             direction: *direction,
-            committed: false,
             stamp: Stamp::default(),
         };
         let flown = [
@@ -231,7 +220,6 @@ mod tests {
             let planned = |cell: &u16| PlannedCell {
                 cell: *cell,
                 direction,
-                committed: false,
                 stamp: Stamp::default(),
             };
             cells.iter().map(planned).collect()

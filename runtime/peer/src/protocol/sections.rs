@@ -24,8 +24,8 @@
 use super::runs::{Packer, PlannedCell, cells_of, unpack};
 use crate::Incarnation;
 use crate::cells::CellSet;
-use crate::wire::limits::{DONE_MAX, HELD_MAX, PLAN_MAX};
-use crate::wire::message::{CellRun, Claim, Epoch, Firmness, ListedRun, Stamp};
+use crate::wire::limits::{HELD_MAX, PLAN_MAX};
+use crate::wire::message::{CellRun, Claim, Epoch, ListedRun, Stamp};
 use skein_flight::coverage::ring::Direction;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{Hash, Hasher};
@@ -88,7 +88,6 @@ pub struct Sections {
     epoch: Epoch,
     plan: Vec<PlannedCell>,
     held: BTreeMap<u16, Stamp>,
-    done: CellSet,
     covered: CellSet,
     unassigned: CellSet,
     heard: BTreeMap<u16, HeardClaim>,
@@ -107,7 +106,6 @@ impl Sections {
             epoch: Epoch::default(),
             plan: Vec::new(),
             held: BTreeMap::new(),
-            done: CellSet::new(cells),
             covered,
             unassigned: CellSet::new(cells),
             heard: BTreeMap::new(),
@@ -201,14 +199,7 @@ impl Sections {
                 self.news.owners.insert(*author);
             }
         }
-        let done = &mut self.done;
-        self.plan.retain(|p| {
-            let open = !covered.contains(p.cell);
-            if !open {
-                done.insert(p.cell);
-            }
-            open
-        });
+        self.plan.retain(|p| !covered.contains(p.cell));
         self.held.retain(|c, _| !covered.contains(*c));
         self.unassigned.subtract(covered);
         true
@@ -260,7 +251,6 @@ impl Sections {
         let listed = ListedRun {
             run,
             backward: direction == Direction::Backward,
-            firmness: Firmness::Tentative,
             stamp,
         };
         let claim = Claim {
@@ -425,18 +415,15 @@ impl Sections {
             .collect();
         let mut seen = self.covered.clone();
         let mut plan = Vec::new();
-        for (list, committed) in [(commits, true), (section, false)] {
-            for &(cell, direction) in list {
-                if cell < self.cells && !seen.contains(cell) {
-                    seen.insert(cell);
-                    let stamp = listed.get(&cell).map_or(stamp, |s| stamp.max(*s));
-                    plan.push(PlannedCell {
-                        cell,
-                        direction,
-                        committed,
-                        stamp,
-                    });
-                }
+        for &(cell, direction) in commits.iter().chain(section) {
+            if cell < self.cells && !seen.contains(cell) {
+                seen.insert(cell);
+                let stamp = listed.get(&cell).map_or(stamp, |s| stamp.max(*s));
+                plan.push(PlannedCell {
+                    cell,
+                    direction,
+                    stamp,
+                });
             }
         }
         let fits = self.packer().pack(&plan, PLAN_MAX).1;
@@ -467,7 +454,6 @@ impl Sections {
             .copied()
             .collect();
         self.epoch = epoch;
-        self.done = CellSet::new(self.cells);
         (self.news.gained, self.news.listing) = (true, true);
         self.trim();
         self.check();
@@ -519,7 +505,6 @@ impl Sections {
             out.push(PlannedCell {
                 cell,
                 direction,
-                committed: false,
                 stamp,
             });
         }
@@ -619,15 +604,12 @@ impl Sections {
     #[must_use]
     pub fn claim(&self, revision: u32, loop_hash: u64, eta_ms: u32) -> Claim {
         let held = self.held_cells();
-        let mut done: Vec<CellRun> = self.done.runs();
-        done.truncate(DONE_MAX);
         Claim {
             revision,
             loop_hash,
             epoch: self.epoch,
             plan: self.packer().pack(&self.plan, PLAN_MAX).0,
             held: self.packer().pack(&held, HELD_MAX).0,
-            done,
             eta_ms,
             alone: false,
         }
@@ -647,7 +629,6 @@ impl Sections {
             .map(|(c, s)| PlannedCell {
                 cell: *c,
                 direction: Direction::Forward,
-                committed: false,
                 stamp: *s,
             })
             .collect()
@@ -693,7 +674,7 @@ fn n_open(claim: &Claim, covered: &CellSet) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::message::{Firmness, ListedRun};
+    use crate::wire::message::ListedRun;
 
     fn stamp(counter: u32, take: u16, id: u16) -> Stamp {
         Stamp {
@@ -713,7 +694,6 @@ mod tests {
                         count: *count,
                     },
                     backward: false,
-                    firmness: Firmness::Tentative,
                     stamp: *stamp,
                 })
                 .collect(),
@@ -896,7 +876,6 @@ mod tests {
         let listed = |first, count| ListedRun {
             run: CellRun { first, count },
             backward: true,
-            firmness: Firmness::Tentative,
             stamp: stamp(1, 0, 2),
         };
         let claim = Claim {

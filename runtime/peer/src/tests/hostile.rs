@@ -4,7 +4,7 @@ use super::{beacon, covered, record};
 use crate::testing::{Harness, mission};
 use crate::wire::codec::Body;
 use crate::wire::kinds::{Kind, RECORD_MAX_BYTES};
-use crate::wire::message::{CellRun, Claim, Epoch, Finished, Firmness, Gossip};
+use crate::wire::message::{CellRun, Claim, Epoch, Finished, Gossip};
 use crate::wire::message::{ListedRun, Member, Round, Stamp};
 use crate::wire::samples;
 use crate::{Input, PeerId, Report};
@@ -105,7 +105,6 @@ fn a_claim_of_another_loop_takes_nothing() {
             count: 24,
         },
         backward: false,
-        firmness: Firmness::Tentative,
         stamp: Stamp {
             epoch: Epoch {
                 counter: 99,
@@ -252,7 +251,6 @@ fn bids_and_claims_far_ahead_of_all_that_was_heard_of_are_refused() {
         plan: vec![ListedRun {
             run: CellRun { first: 0, count: 4 },
             backward: false,
-            firmness: Firmness::Tentative,
             stamp: Stamp {
                 epoch: stamp_epoch,
                 take: 0,

@@ -456,7 +456,7 @@ fn a_bid_says_where_its_author_will_be_and_which_way_it_flies() {
             for (_, _, body) in &h.seat(id).said {
                 match body {
                     Body::Claim(claim) => plan.clone_from(&claim.plan),
-                    Body::Bid(bid) if bid.off_loop.is_empty() && !bid.idle => {
+                    Body::Bid(bid) if bid.off_loop.is_empty() && bid.eta_ms > 0 => {
                         let backward = plan.first().is_some_and(|l| l.backward);
                         if plan.iter().all(|l| l.backward == backward) {
                             assert_eq!(bid.backward, backward, "{id}: {bid:?}");

@@ -16,9 +16,8 @@ use super::limits::{
     self, COMMITS_MAX, FRESH_MAX_BYTES, GOSSIP_MAX, MEMBERS_MAX, PLAN_MAX, at_most, in_range,
 };
 use super::message::{
-    Activity, Beacon, Bid, CellRun, Claim, Cover, Epoch, Finished, Firmness, Fresh, Gossip,
-    Heartbeat, ListedRun, Member, MissionChunk, MissionStatus, OffLoop, Order, Record, Round,
-    Stamp, State,
+    Activity, Beacon, Bid, CellRun, Claim, Cover, Epoch, Finished, Fresh, Gossip, Heartbeat,
+    ListedRun, Member, MissionChunk, MissionStatus, OffLoop, Order, Record, Round, Stamp, State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
 use crate::varint;
@@ -331,9 +330,8 @@ array_of!(Bid {
     commits,
     off_loop,
     eta_ms,
-    adopted_ago_ms,
-    cells_since,
-    idle
+    calm,
+    progressed
 });
 array_of!(Claim {
     revision,
@@ -341,7 +339,6 @@ array_of!(Claim {
     epoch,
     plan,
     held,
-    done,
     eta_ms,
     alone
 });
@@ -368,11 +365,6 @@ number_of!(MissionStatus {
     Active,
     Accomplished,
     Failed
-});
-number_of!(Firmness {
-    Tentative,
-    Committed,
-    Done
 });
 number_of!(Order {
     Resume,
@@ -513,11 +505,10 @@ impl Listed for ListedRun {
 /// A listing is flat on the wire: nested arrays would cost three bytes each time.
 impl Wire for ListedRun {
     fn put(&self, out: &mut Out) {
-        out.array(8);
+        out.array(7);
         self.run.first.put(out);
         self.run.count.put(out);
         self.backward.put(out);
-        self.firmness.put(out);
         self.stamp.epoch.counter.put(out);
         self.stamp.epoch.hash.put(out);
         self.stamp.take.put(out);
@@ -525,12 +516,12 @@ impl Wire for ListedRun {
     }
 
     fn get(input: &mut In<'_>) -> Result<Self, WireError> {
-        input.array("listing", 8)?;
+        input.array("listing", 7)?;
         let run = CellRun {
             first: Wire::get(input)?,
             count: Wire::get(input)?,
         };
-        let (backward, firmness) = (Wire::get(input)?, Wire::get(input)?);
+        let backward = Wire::get(input)?;
         let epoch = Epoch {
             counter: Wire::get(input)?,
             hash: Wire::get(input)?,
@@ -543,7 +534,6 @@ impl Wire for ListedRun {
         Ok(Self {
             run,
             backward,
-            firmness,
             stamp,
         })
     }
@@ -827,8 +817,6 @@ mod tests {
                     with(&|r| r.plan[2].run.count = 0, "plan");
                     with(&|r| r.held.push(listing(1)), "held");
                     with(&|r| r.held[2].run.count = 0, "held");
-                    with(&|r| r.done.push(r.done[0]), "done");
-                    with(&|r| r.done[2].count = 0, "done");
                     with(&|r| r.eta_ms += 1, "eta_ms");
                 }
                 Body::Cover(mut c) => {

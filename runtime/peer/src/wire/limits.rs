@@ -26,8 +26,6 @@ pub const MEMBERS_MAX: usize = 8;
 pub const PLAN_MAX: usize = 16;
 /// Runs of held cells in a claim: those of one earlier plan, less what merges.
 pub const HELD_MAX: usize = 16;
-/// Runs of done cells in a claim; they inform people, nothing depends on them.
-pub const DONE_MAX: usize = 8;
 /// Runs a bid commits to: the flight of one waiting time crosses few fragments.
 pub const COMMITS_MAX: usize = 32;
 /// Run-length bytes of the covered cells in a bid (short runs are left out beyond): a bid
@@ -164,6 +162,5 @@ fn check_claim(r: &Claim) -> Result<(), WireError> {
         at_most(field, listings.len(), max)?;
         in_range(field, listings.iter().all(|l| l.run.count > 0))?;
     }
-    check_runs("done", &r.done, DONE_MAX)?;
     in_range("eta_ms", r.eta_ms <= DURATION_MAX_MS)
 }

@@ -222,17 +222,6 @@ pub struct CellRun {
     pub count: u16,
 }
 
-/// How firm a listing is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Firmness {
-    /// May move in the next round.
-    Tentative,
-    /// Will be flown whatever is decided.
-    Committed,
-    /// Covered.
-    Done,
-}
-
 /// A run of cells in a register, flown in one direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ListedRun {
@@ -240,8 +229,6 @@ pub struct ListedRun {
     pub run: CellRun,
     /// Whether they are flown against the order of the loop.
     pub backward: bool,
-    /// How firm.
-    pub firmness: Firmness,
     /// By what right.
     pub stamp: Stamp,
 }
@@ -259,8 +246,6 @@ pub struct Claim {
     pub plan: Vec<ListedRun>,
     /// What it gave away and nobody has taken over yet.
     pub held: Vec<ListedRun>,
-    /// What it has done of the present section.
-    pub done: Vec<CellRun>,
     /// Expected end of the plan, milliseconds from this record's writing.
     pub eta_ms: u32,
     /// Whether its author hears nobody: it believes all others down.
@@ -321,12 +306,11 @@ pub struct Bid {
     pub off_loop: Vec<OffLoop>,
     /// Expected end of its present plan, milliseconds from now.
     pub eta_ms: u32,
-    /// Time since it last adopted a division, milliseconds.
-    pub adopted_ago_ms: u32,
-    /// Cells it covered since.
-    pub cells_since: u16,
-    /// Whether it has nothing left to fly.
-    pub idle: bool,
+    /// Whether it adopted its last division so long ago that it may be given another one
+    /// without need.
+    pub calm: bool,
+    /// Whether it covered a cell since.
+    pub progressed: bool,
 }
 
 /// The union of covered cells one peer knows of, from all authors and lives.

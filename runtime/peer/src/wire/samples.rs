@@ -70,9 +70,8 @@ pub fn bid(round: Round) -> Bid {
         commits: Vec::new(),
         off_loop: Vec::new(),
         eta_ms: 0,
-        adopted_ago_ms: u32::MAX,
-        cells_since: 0,
-        idle: true,
+        calm: true,
+        progressed: false,
     }
 }
 
@@ -81,7 +80,6 @@ pub fn listing(first: u16) -> ListedRun {
     ListedRun {
         run: CellRun { first, count: 12 },
         backward: true,
-        firmness: Firmness::Committed,
         stamp: Stamp {
             epoch: Epoch {
                 counter: 7,
@@ -178,11 +176,10 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                     ready_ms: 2_000,
                 }],
                 eta_ms: 600_000,
-                adopted_ago_ms: 70_000,
-                cells_since: 5,
-                idle: false,
+                calm: true,
+                progressed: false,
             }),
-            "8e8607828301010183030102011b0123456789abcdeff519138811f4190fa01946501923281a00124f8044000c03048182100281841a0001d4c0397ab6193d5c1907d01a000927c01a0001117005f4",
+            "8d8607828301010183030102011b0123456789abcdeff519138811f4190fa01946501923281a00124f8044000c03048182100281841a0001d4c0397ab6193d5c1907d01a000927c0f5f4",
         ),
         (
             Body::Claim(Claim {
@@ -194,11 +191,10 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                 },
                 plan: vec![listing(20), listing(40)],
                 held: vec![listing(60)],
-                done: vec![CellRun { first: 1, count: 3 }],
                 eta_ms: 600_000,
                 alone: true,
             }),
-            "88011b0123456789abcdef82071adeadbeef8288140cf501071adeadbeef01038818280cf501071adeadbeef01038188183c0cf501071adeadbeef0103818201031a000927c0f5",
+            "87011b0123456789abcdef82071adeadbeef8287140cf5071adeadbeef01038718280cf5071adeadbeef01038187183c0cf5071adeadbeef01031a000927c0f5",
         ),
         (
             Body::Cover(Cover {
@@ -273,7 +269,6 @@ pub fn largest() -> Vec<Body> {
     let listing = ListedRun {
         run,
         backward: true,
-        firmness: Firmness::Done,
         stamp,
     };
     let members = (u16::MAX - 7..=u16::MAX)
@@ -338,9 +333,8 @@ pub fn largest() -> Vec<Body> {
                 ready_ms: DURATION_MAX_MS,
             }],
             eta_ms: DURATION_MAX_MS,
-            adopted_ago_ms: u32::MAX,
-            cells_since: u16::MAX,
-            idle: true,
+            calm: true,
+            progressed: true,
         }),
         Body::Claim(Claim {
             revision: u32::MAX,
@@ -348,7 +342,6 @@ pub fn largest() -> Vec<Body> {
             epoch,
             plan: vec![listing; PLAN_MAX],
             held: vec![listing; HELD_MAX],
-            done: vec![run; DONE_MAX],
             eta_ms: DURATION_MAX_MS,
             alone: true,
         }),

@@ -6,7 +6,7 @@
 
 use super::kinds::Kind;
 use super::limits::{
-    BID_COVERED_MAX_BYTES, CHUNK_MAX_BYTES, CHUNKS_MAX, COMMITS_MAX, COVERED_MAX_BYTES, DONE_MAX,
+    BID_COVERED_MAX_BYTES, CHUNK_MAX_BYTES, CHUNKS_MAX, COMMITS_MAX, COVERED_MAX_BYTES,
     DURATION_MAX_MS, FRESH_MAX_BYTES, GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX, HOPS_MAX,
     INTERVAL_LEAST, INTERVAL_MOST, MEMBERS_MAX, PEERS_MAX, PLAN_MAX, POSITION_MAX_MM,
     SPEED_MAX_MMPS,
@@ -281,12 +281,11 @@ const BID: &[Place] = &[
     ),
     ETA,
     at(
-        "adopted_ago_ms",
-        "time since it last adopted a division, ms",
-        U32,
+        "calm",
+        "whether it adopted its last division long ago",
+        Shape::Flag,
     ),
-    at("cells_since", "cells it covered since", U16),
-    at("idle", "whether it has nothing left to fly", Shape::Flag),
+    at("progressed", "whether it covered a cell since", Shape::Flag),
 ];
 
 const EPOCH: &[Place] = &[
@@ -301,11 +300,6 @@ const LISTING: &[Place] = &[
         "backward",
         "whether they are flown against the order of the loop",
         Shape::Flag,
-    ),
-    at(
-        "firmness",
-        "how firm",
-        Shape::Choice(&["tentative", "committed", "done"]),
     ),
     at("counter", "stamp: counter of the round", U32),
     at("hash", "stamp: hash of the round's bids", U32),
@@ -326,11 +320,6 @@ const CLAIM: &[Place] = &[
         "held",
         "what it gave away and nobody has taken over yet",
         Shape::Rows(LISTING, HELD_MAX),
-    ),
-    at(
-        "done",
-        "what it has done of the present section",
-        Shape::Rows(RUN, DONE_MAX),
     ),
     ETA,
     at("alone", "whether its author hears nobody", Shape::Flag),
@@ -587,7 +576,7 @@ mod tests {
         assert_eq!(
             schema(Kind::Finished).unwrap(),
             "{\"$schema\":\"https://json-schema.org/draft/2020-12/schema\",\
-             \"title\":\"skein v1 finished\",\"type\":\"array\",\"prefixItems\":[\
+             \"title\":\"skein v2 finished\",\"type\":\"array\",\"prefixItems\":[\
              {\"title\":\"revision\",\"description\":\"mission revision\",\
              \"type\":\"integer\",\"minimum\":0,\"maximum\":4294967295}],\
              \"items\":false,\"minItems\":1,\"maxItems\":1}"

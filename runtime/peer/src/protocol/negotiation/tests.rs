@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::testing::mission;
-use crate::wire::message::{CellRun, Claim, Firmness, ListedRun, Round, Stamp};
+use crate::wire::message::{CellRun, Claim, ListedRun, Round, Stamp};
 use crate::wire::samples;
 use std::sync::Arc;
 
@@ -135,7 +135,6 @@ impl Desk {
         let listed = ListedRun {
             run: CellRun { first, count },
             backward: false,
-            firmness: Firmness::Tentative,
             stamp: Stamp { epoch, take: 0, id },
         };
         let claim = Claim {
@@ -293,7 +292,7 @@ fn a_division_gives_each_member_its_part_and_all_compute_the_same() {
     let division = skein_flight::coverage::ring::backtracking::divide(ring, uavs);
     let adoption = desk
         .negotiation
-        .divided(desk.now, T, *epoch, &division)
+        .divided(desk.now, *epoch, &division)
         .unwrap();
     let mine = adoption.plan.len();
     assert!((10..=14).contains(&mine), "{mine} of 24");
@@ -515,6 +514,22 @@ fn whether_a_round_would_gain_is_computed_once_in_ten_periods() {
     desk.live = LivePeers::from([(2, 1)]);
     desk.leave_open(0..0);
     assert!(!desk.ask(wants));
+}
+
+#[test]
+fn calm_begins_twenty_periods_after_an_adoption_and_progress_with_the_first_cell_seen_since() {
+    let mut desk = Desk::new(&[2]);
+    let adopted = desk.now;
+    let said = |desk: &Desk, ms| {
+        let (n, now) = (&desk.negotiation, adopted.plus_ms(ms));
+        (n.is_calm(now, T), n.progressed())
+    };
+    assert_eq!(said(&desk, 0), (true, false), "nothing was adopted yet");
+    desk.negotiation.note_covered();
+    assert_eq!(said(&desk, 0), (true, true));
+    desk.adopt(4);
+    assert_eq!(said(&desk, 20 * T - 1), (false, false));
+    assert_eq!(said(&desk, 20 * T), (true, false));
 }
 
 #[test]
