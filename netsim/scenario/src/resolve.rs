@@ -157,6 +157,7 @@ fn launch(fleet: &Fleet, geometry: &MissionGeometry) -> Vec<UavSpec> {
         takeoff_ms: m.takeoff_ms.unwrap_or(0),
         height_m: m.height_m,
         twin_of: None,
+        aboard: false,
     };
     fleet.members.iter().enumerate().map(uav).collect()
 }

@@ -145,6 +145,10 @@ pub enum Fault {
     Twin {
         /// Whose id it has.
         peer: u16,
+        /// Whether it is a second program in that one's airframe, where there is one in the
+        /// air; otherwise it has an airframe of its own.
+        #[serde(default)]
+        aboard: bool,
     },
     /// The share of transmissions lost on every link, in thousandths.
     Loss {
@@ -172,7 +176,7 @@ impl Fault {
             | Self::ClockJump { peer, .. }
             | Self::ShortFuel { peer, .. }
             | Self::SpoiltRecord { peer }
-            | Self::Twin { peer } => vec![*peer],
+            | Self::Twin { peer, .. } => vec![*peer],
             Self::Cut { a, b, .. } => vec![*a, *b],
             Self::Partition { groups } => groups.concat(),
             Self::Heal
@@ -240,7 +244,14 @@ impl fmt::Display for Fault {
                 write!(f, "the battery of peer {peer} lasts {lasts_ms} ms more")
             }
             Self::SpoiltRecord { peer } => write!(f, "peer {peer} is sent a spoilt record"),
-            Self::Twin { peer } => write!(f, "a second UAV is switched on as peer {peer}"),
+            Self::Twin { peer, aboard } => {
+                let what = if *aboard {
+                    "program is started in the airframe of"
+                } else {
+                    "UAV is switched on as"
+                };
+                write!(f, "a second {what} peer {peer}")
+            }
             Self::Loss { permille } => {
                 let percent = f64::from(*permille) / 10.0;
                 write!(f, "{percent:.1} % of transmissions are lost")

@@ -67,15 +67,15 @@ impl Prepared {
         }
     }
 
-    /// The same with a body for each twin that these faults switch on: like the UAV as which
-    /// it was configured, under a number that is free.
+    /// The same with a number that is free for each twin that these faults switch on, and with
+    /// a body like that of the UAV as which it was configured, unless it is aboard of that one.
     #[must_use]
     pub fn with_twins(&self, faults: &[TimedFault]) -> Self {
         let mut uavs = self.spec.uavs.clone();
         let mut taken: BTreeSet<u16> = uavs.iter().map(|u| u.id).collect();
         taken.extend(self.spec.ground.iter().map(|g| g.id));
         for fault in faults {
-            let Fault::Twin { peer } = fault.fault else {
+            let Fault::Twin { peer, aboard } = fault.fault else {
                 continue;
             };
             let like = uavs.iter().find(|u| u.id == peer && u.twin_of.is_none());
@@ -85,6 +85,7 @@ impl Prepared {
                 uavs.push(UavSpec {
                     id,
                     twin_of: Some(peer),
+                    aboard,
                     takeoff_ms: 0,
                     ..like
                 });

@@ -74,7 +74,9 @@ impl Spec {
     #[must_use]
     pub fn twins(&self) -> Twins {
         let twin = |u: &UavSpec| Some((u.id, u.twin_of?));
-        self.uavs.iter().filter_map(twin).collect()
+        let aboard = self.uavs.iter().filter(|u| u.aboard).map(|u| u.id);
+        let twins: Twins = self.uavs.iter().filter_map(twin).collect();
+        twins.with_aboard(aboard)
     }
 }
 
@@ -104,6 +106,8 @@ pub struct UavSpec {
     /// As which other one it was configured by mistake: its peer speaks under that id. It is
     /// switched on by a fault, and its number is that of its airframe and radio.
     pub twin_of: Option<u16>,
+    /// Whether it is a program in the airframe of that one, with a radio of its own.
+    pub aboard: bool,
 }
 
 /// The ground station.

@@ -405,12 +405,13 @@ fn short_fuel(d: &mut Draw<'_>) {
     }
 }
 
-/// A second UAV is switched on with the id of one.
+/// A second UAV is switched on with the id of one, or a second program in its airframe.
 fn twin(d: &mut Draw<'_>) {
     let (from_ms, _) = d.span_ms(0);
     let ids: Vec<u16> = d.spec.uavs.iter().map(|u| u.id).collect();
     if let Some(&peer) = d.s.shuffled(&ids).first() {
-        d.push(from_ms, Fault::Twin { peer });
+        let aboard = d.s.one_in(2);
+        d.push(from_ms, Fault::Twin { peer, aboard });
     }
 }
 
@@ -748,7 +749,7 @@ mod tests {
                         Fault::Restart { peer, .. } => count("down", peer, -1),
                         Fault::Heal => assert!(d.out[0].at_ms < f.at_ms),
                         Fault::SpoiltRecord { .. } => {}
-                        Fault::Twin { peer } => assert!((1..=8).contains(&peer)),
+                        Fault::Twin { peer, .. } => assert!((1..=8).contains(&peer)),
                         Fault::Revise {
                             ref area,
                             ref zones,

@@ -3,38 +3,58 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The id of each twin, by its number.
+/// The id of each twin, by its number, and which of them have no airframe of their own.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Twins(BTreeMap<u16, u16>);
+pub struct Twins {
+    ids: BTreeMap<u16, u16>,
+    aboard: BTreeSet<u16>,
+}
 
 impl Twins {
     /// Whether there are none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.ids.is_empty()
     }
 
     /// The number and the id of each.
     pub fn iter(&self) -> impl Iterator<Item = (u16, u16)> {
-        self.0.iter().map(|(number, id)| (*number, *id))
+        self.ids.iter().map(|(number, id)| (*number, *id))
     }
 
     /// The id under which the peer with this number speaks.
     #[must_use]
     pub fn id_of(&self, number: u16) -> u16 {
-        self.0.get(&number).copied().unwrap_or(number)
+        self.ids.get(&number).copied().unwrap_or(number)
+    }
+
+    /// The same, these being programs in the airframe of the UAV whose number is their id.
+    #[must_use]
+    pub fn with_aboard(mut self, numbers: impl IntoIterator<Item = u16>) -> Self {
+        self.aboard.extend(numbers);
+        self
+    }
+
+    /// In whose airframe a peer is.
+    #[must_use]
+    pub fn airframe_of(&self, number: u16) -> u16 {
+        if self.aboard.contains(&number) {
+            self.id_of(number)
+        } else {
+            number
+        }
     }
 
     /// The ids that more than one have, ascending.
     #[must_use]
     pub fn shared(&self) -> BTreeSet<u16> {
-        self.0.values().copied().collect()
+        self.ids.values().copied().collect()
     }
 
     /// Whether more than one have this id.
     #[must_use]
     pub fn is_shared(&self, id: u16) -> bool {
-        self.0.values().any(|of| *of == id)
+        self.ids.values().any(|of| *of == id)
     }
 
     /// The numbers of all others with the id of this one.
@@ -49,7 +69,10 @@ impl Twins {
 
 impl FromIterator<(u16, u16)> for Twins {
     fn from_iter<T: IntoIterator<Item = (u16, u16)>>(each: T) -> Self {
-        Self(each.into_iter().collect())
+        Self {
+            ids: each.into_iter().collect(),
+            aboard: BTreeSet::new(),
+        }
     }
 }
 
@@ -66,5 +89,7 @@ mod tests {
         assert!(twins.others(4).is_empty());
         assert!(twins.is_shared(3) && !twins.is_shared(9));
         assert_eq!(twins.shared(), BTreeSet::from([3]));
+        let twins = twins.with_aboard([8]);
+        assert_eq!([3, 8, 9, 4].map(|n| twins.airframe_of(n)), [3, 3, 9, 4]);
     }
 }

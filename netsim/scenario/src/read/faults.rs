@@ -31,13 +31,15 @@ const KINDS: [(&str, &[&str]); 21] = [
     ("clock-jump", &["peer", "ahead_s"]),
     ("short-fuel", &["peer", "lasts_s"]),
     ("spoilt-record", &["peer"]),
-    ("twin", &["peer"]),
+    ("twin", &["peer", "aboard"]),
 ];
 
 /// Who there is, until when, and what a loss goes back to.
 pub(crate) struct Known<'a> {
     /// Numbers of all peers; `None` when unknown (a chaos plan without a scenario).
     pub(crate) peers: Option<&'a BTreeSet<u16>>,
+    /// The number of the ground station, where there is one and it is known.
+    pub(crate) ground: Option<u16>,
     /// Time at which the run ends, seconds.
     pub(crate) max_time_s: u32,
     /// The loss of the scenario, thousandths.
@@ -152,7 +154,7 @@ fn groups(node: &Node<'_>, known: &Known<'_>) -> Result<Vec<Vec<u16>>, Error> {
 }
 
 /// Every field that some kind of fault has.
-const ALL: [&str; 18] = [
+const ALL: [&str; 19] = [
     "at_s",
     "kind",
     "for_s",
@@ -171,6 +173,7 @@ const ALL: [&str; 18] = [
     "ahead_s",
     "one_in",
     "lasts_s",
+    "aboard",
 ];
 
 /// The kind of a fault, with no field that belongs to another kind.
@@ -258,7 +261,7 @@ fn one(item: &Node<'_>, known: &Known<'_>) -> Result<(TimedFault, Option<TimedFa
             lasts_ms: delay_ms(f.need("lasts_s", "300")?)?,
         },
         "spoilt-record" => Fault::SpoiltRecord { peer: peer()? },
-        "twin" => Fault::Twin { peer: peer()? },
+        "twin" => twin(&f, known)?,
         _ => Fault::Heal,
     };
     let end = match f.get("for_s") {
@@ -324,6 +327,18 @@ fn cut(f: &Fields<'_>, known: &Known<'_>) -> Result<Fault, Error> {
         b,
         one_way: flag(f, "one_way")?,
     })
+}
+
+/// Another process under the id of a UAV: a ground station neither flies nor plans, and only
+/// one airframe has room for a second program.
+fn twin(f: &Fields<'_>, known: &Known<'_>) -> Result<Fault, Error> {
+    let node = f.need("peer", "3")?;
+    let peer = known.peer(node)?;
+    if known.ground == Some(peer) {
+        return Err(node.wrong("is the ground station; only a UAV has a twin"));
+    }
+    let aboard = flag(f, "aboard")?;
+    Ok(Fault::Twin { peer, aboard })
 }
 
 fn ending(
@@ -485,6 +500,7 @@ pub fn chaos_plan(
     // A week is longer than any trial.
     let known = Known {
         peers,
+        ground: None,
         max_time_s: 604_800,
         loss_permille: 0,
         lenient: false,
@@ -635,10 +651,49 @@ mod tests {
                     ahead_ms: 20_000,
                 },
             ),
+            (
+                "{at_s:1, kind:'twin', peer:3}",
+                Fault::Twin {
+                    peer: 3,
+                    aboard: false,
+                },
+            ),
+            (
+                "{at_s:1, kind:'twin', peer:3, aboard:true}",
+                Fault::Twin {
+                    peer: 3,
+                    aboard: true,
+                },
+            ),
         ];
         for (text, want) in cases {
             assert_eq!(plan(text).unwrap()[0].fault, want, "{text}");
         }
+    }
+
+    #[test]
+    fn a_ground_station_has_no_twin() {
+        let text = "{ faults: [{at_s:1, kind:'twin', peer:100, aboard:true}] }";
+        let document = Document::parse("scenario", "c.json5", text).unwrap();
+        let root = document.root();
+        let fields = root.fields(&["faults"]).unwrap();
+        let peers = BTreeSet::from([1, 100]);
+        let faults = |ground| {
+            let known = Known {
+                peers: Some(&peers),
+                ground,
+                max_time_s: 100,
+                loss_permille: 0,
+                lenient: false,
+            };
+            read(fields.need("faults", "").unwrap(), &known, &mut Vec::new())
+        };
+        let wrong = faults(Some(100)).unwrap_err().to_string();
+        assert!(
+            wrong.contains("faults[0].peer: is the ground station"),
+            "{wrong}"
+        );
+        assert!(faults(None).is_ok());
     }
 
     #[test]
@@ -692,6 +747,10 @@ mod tests {
             (
                 "{at_s:1, kind:'clock-jump', peer:2, ahead_s:-1}",
                 "faults[0].ahead_s: -1 is out of range",
+            ),
+            (
+                "{at_s:1, kind:'kill', peer:1, aboard:true}",
+                "faults[0].aboard: a fault of kind kill has no such field",
             ),
             (
                 "{at_s:1, kind:'kill', peer:1, fresh_disk:true}",

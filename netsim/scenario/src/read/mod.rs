@@ -125,6 +125,7 @@ pub(crate) fn scenario(
         .collect();
     let known = Known {
         peers: Some(&peers),
+        ground: ground_id,
         max_time_s: run.max_time_s,
         loss_permille: radio.loss_permille,
         lenient: over.peers.is_some(),

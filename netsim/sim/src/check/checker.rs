@@ -299,6 +299,11 @@ impl Checker {
             .on_transmission(now_ms, id, bytes, &self.handicaps, &mut self.found);
     }
 
+    /// A peer hands its airframe a setpoint, which that takes or not.
+    pub fn on_setpoint(&mut self, now_ms: u64, id: u16, taken: bool) {
+        self.twins.on_setpoint(now_ms, id, taken);
+    }
+
     /// A peer publishes its own heartbeat.
     pub fn on_heartbeat(&mut self, now_ms: u64, id: u16, heartbeat: &Heartbeat) {
         self.rules.on_heartbeat(now_ms, id, heartbeat);
@@ -397,8 +402,9 @@ impl Checker {
             .on_snapshot(&snapshot, &self.members, &mut self.found);
         self.twins.on_snapshot(&snapshot, silent, &mut self.found);
         let steered = self.twins.steered(peers, silent);
+        let (silent, steered) = (silent.iter().map(|m| m.id), &steered);
         self.rules
-            .on_silent_home(&snapshot, &steered, &mut self.found);
+            .on_silent_home(&snapshot, (silent, steered), &mut self.found);
     }
 
     /// An interval counts for twenty of its own: what was announced is told for a while, and

@@ -286,15 +286,19 @@ impl Rules {
         self.flight.on_snapshot(snapshot, base, found);
     }
 
-    /// Judges how these fly home, who are silent.
+    /// Judges how those who are silent fly home, of whom these can; whoever could not is on
+    /// its way from when it can.
     pub fn on_silent_home(
         &mut self,
         snapshot: &Snapshot<'_>,
-        silent: &[PeerSnapshot],
+        (silent, steered): (impl Iterator<Item = u16>, &[PeerSnapshot]),
         found: &mut Findings,
     ) {
+        for id in silent.filter(|id| steered.iter().all(|m| m.id != *id)) {
+            self.flight.on_silent(id);
+        }
         let of_silent = Snapshot {
-            peers: silent,
+            peers: steered,
             ..*snapshot
         };
         self.on_way_home(&of_silent, found);

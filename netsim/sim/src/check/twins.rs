@@ -1,5 +1,6 @@
 //! Of two processes under one id in one component one is silent, and only then: it says
-//! and plans nothing, and goes home (`twins`, `home`).
+//! and plans nothing, and goes home (`twins`, `home`). In one airframe the one that speaks
+//! flies it, and the other gives it no setpoints (`twins`).
 
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use crate::twins::Twins;
@@ -13,6 +14,9 @@ const LOOK_PERIODS: u64 = 2;
 /// metres: 60 m, and two seconds of flight between what the twin told and now.
 const ONE_PLACE_M: f64 = 100.0;
 
+/// A peer that flies gives a setpoint at each percept: none for so long is none, milliseconds.
+const NO_SETPOINT_MS: u64 = 2_000;
+
 /// What the twins of one run were found to do.
 #[derive(Clone, Debug, Default)]
 pub struct TwinCheck {
@@ -23,6 +27,10 @@ pub struct TwinCheck {
     both: Clocks<(u16, u16)>,
     neither: Clocks<u16>,
     told: Clocks<u16>,
+    /// When each last gave its airframe a setpoint, and one that it took, milliseconds.
+    setpoints_ms: BTreeMap<u16, (u64, u64)>,
+    /// Who gives setpoints to an airframe that another one flies, or speaks and does not fly.
+    wrong: Clocks<u16>,
 }
 
 impl TwinCheck {
@@ -74,6 +82,16 @@ impl TwinCheck {
         self.silent.remove(&number);
         self.neither.stop(number);
         self.told.stop(number);
+        self.wrong.stop(number);
+    }
+
+    /// A peer gives its airframe a setpoint, which that takes or not.
+    pub fn on_setpoint(&mut self, now_ms: u64, number: u16, taken: bool) {
+        if self.twins.is_shared(self.twins.id_of(number)) {
+            let last = self.setpoints_ms.entry(number).or_default();
+            last.0 = now_ms;
+            last.1 = if taken { now_ms } else { last.1 };
+        }
     }
 
     /// Whether a peer is silent.
@@ -102,6 +120,7 @@ impl TwinCheck {
             return;
         }
         self.look_for_both(snapshot, found);
+        self.look_for_commanders(snapshot, silent, found);
         for m in silent {
             self.look_for_neither(snapshot, m, found);
             if m.view.able || !m.view.plan.is_empty() || !m.view.held.is_empty() {
@@ -138,6 +157,69 @@ impl TwinCheck {
                         format!(
                             "speaks as peer {id}, as another process in its component does, for {took_ms} ms (bound {bound_ms} ms)"
                         )
+                    });
+                }
+            }
+        }
+    }
+
+    /// Of two who are in one airframe one flies it, the one that speaks, as soon as the other
+    /// has heard that it does.
+    fn look_for_commanders(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        silent: &[PeerSnapshot],
+        found: &mut Findings,
+    ) {
+        let twins: Vec<(u16, u16)> = self.twins.iter().collect();
+        for (number, id) in twins {
+            if self.twins.airframe_of(number) != id {
+                continue;
+            }
+            let of = |peers: &[PeerSnapshot], speaks: bool| {
+                let is_one = |m: &&PeerSnapshot| [number, id].contains(&m.id);
+                let so = |m: &&PeerSnapshot| m.view.speaks == speaks;
+                peers.iter().filter(is_one).find(so).cloned()
+            };
+            let (Some(speaker), Some(other)) = (of(snapshot.peers, true), of(silent, false)) else {
+                self.wrong.stop(number);
+                self.wrong.stop(id);
+                continue;
+            };
+            let (gave_ms, _) = self
+                .setpoints_ms
+                .get(&other.id)
+                .copied()
+                .unwrap_or_default();
+            let (_, flew_ms) = self
+                .setpoints_ms
+                .get(&speaker.id)
+                .copied()
+                .unwrap_or_default();
+            let recent = |t: u64, m: &PeerSnapshot| {
+                t + NO_SETPOINT_MS + snapshot.late_ms(m.id, t) > snapshot.now_ms
+            };
+            let holds = speaker.view.loop_hash == 0 || recent(flew_ms, &speaker);
+            for (m, is_wrong, what) in [
+                (
+                    &other,
+                    gave_ms > 0 && recent(gave_ms, &other),
+                    "is silent, and steers",
+                ),
+                (&speaker, !holds, "speaks, and does not fly"),
+            ] {
+                if !is_wrong {
+                    self.wrong.stop(m.id);
+                    continue;
+                }
+                let from_ms = self.wrong.start(m.id, snapshot.now_ms);
+                let from_ms = from_ms.max(speaker.since_ms).max(other.since_ms);
+                let took_ms = snapshot.now_ms - from_ms;
+                let bound_ms = snapshot.grown_ms(snapshot.bounds.detection_ms(), from_ms);
+                let limit_ms = snapshot.grade().limit_ms(bound_ms);
+                if limit_ms.is_some_and(|l| took_ms > l) && self.wrong.tell_once(m.id) {
+                    found.broken("twins", snapshot.now_ms, Some(m.id), || {
+                        format!("{what} the airframe of peer {id}, in which another program is, for {took_ms} ms (bound {bound_ms} ms)")
                     });
                 }
             }
@@ -187,7 +269,13 @@ impl TwinCheck {
                 && both.is_some_and(|(a, b)| (a - b).norm() < ONE_PLACE_M)
         };
         let apart = |m: &&PeerSnapshot| !peers.iter().chain(silent).any(|o| near(m, o));
-        silent.iter().filter(apart).cloned().collect()
+        // Who shares an airframe with another program waits until it knows that to be gone.
+        let airframe = |number| self.twins.airframe_of(number);
+        let own = |m: &&PeerSnapshot| {
+            let others = self.twins.others(m.id);
+            others.iter().all(|o| airframe(*o) != airframe(m.id))
+        };
+        silent.iter().filter(apart).filter(own).cloned().collect()
     }
 }
 
@@ -253,6 +341,41 @@ mod tests {
         assert_eq!(found.counts.get("twins"), Some(&1));
     }
 
+    /// Peer 1 speaks and 9 is silent, in one airframe, for a minute: which of them give
+    /// setpoints, and from when on which one's are taken.
+    fn flown(loss_permille: u16, gives: [bool; 2], taken: u16) -> u64 {
+        let twins = Twins::from_iter([(9, 1)]).with_aboard([9]);
+        let (mut check, mut found) = (TwinCheck::new(twins.clone()), Findings::new(1));
+        let mut story = Story::new(loss_permille);
+        story.twins = twins;
+        for t in 1..=60 {
+            let mut silent = speaking();
+            (silent.speaks, silent.is_silent, silent.able) = (false, true, false);
+            for (number, gives) in [(1, gives[0]), (9, gives[1])] {
+                if gives {
+                    check.on_setpoint(t * 1000 - 200, number, taken == number);
+                }
+            }
+            let mut mute = Vec::new();
+            let mut other = Story::new(0);
+            other.twins = story.twins.clone();
+            other.snapshot(t * 1000, &[(9, silent)], |s| mute = s.peers.to_vec());
+            story.snapshot(t * 1000, &[(1, speaking())], |s| {
+                check.on_snapshot(s, &mute, &mut found);
+            });
+        }
+        found.counts.get("twins").copied().unwrap_or(0)
+    }
+
+    #[test]
+    fn of_two_programs_in_one_airframe_the_one_that_speaks_flies_it_and_the_other_does_not() {
+        assert_eq!(flown(0, [true, false], 1), 0);
+        assert_eq!(flown(0, [true, true], 1), 1, "the silent one steers, too");
+        assert_eq!(flown(0, [true, true], 9), 2, "and flies it");
+        assert_eq!(flown(0, [false, false], 1), 1, "nobody flies");
+        assert_eq!(flown(300, [true, true], 9), 0, "reported only");
+    }
+
     #[test]
     fn who_may_sit_in_one_airframe_with_its_twin_need_not_fly_home() {
         for (away_m, steered) in [(99.0, 0), (101.0, 1)] {
@@ -266,6 +389,9 @@ mod tests {
             story.snapshot(1_000, &views, |s| {
                 let (peers, silent) = s.peers.split_at(2);
                 assert_eq!(check.steered(peers, silent).len(), steered);
+                // Who has no airframe of its own waits, also where the other one is gone.
+                let aboard = TwinCheck::new(Twins::from_iter([(9, 1)]).with_aboard([9]));
+                assert!(aboard.steered(&[], silent).is_empty());
             });
         }
     }

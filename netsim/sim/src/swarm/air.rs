@@ -79,9 +79,9 @@ impl Air {
         self.world.percept(id)
     }
 
-    /// Hands a setpoint to an airframe.
-    pub fn apply(&mut self, id: u16, setpoint: Setpoint) {
-        self.world.apply(id, setpoint);
+    /// Hands a setpoint to an airframe; says whether it was taken.
+    pub fn apply(&mut self, id: u16, setpoint: Setpoint) -> bool {
+        self.world.apply(id, setpoint)
     }
 
     /// A computer starts, in a new airframe where the old one is gone.

@@ -107,11 +107,8 @@ impl Swarm {
                 *peer
             }
             Fault::SpoiltRecord { peer } => self.send_spoilt(*peer),
-            Fault::Twin { peer } => {
-                let of = |s: &SimPeer| s.is_twin() && s.config.id.0 == *peer && s.boots == 0;
-                if let Some(idx) = self.peers.iter().position(of) {
-                    self.boot(idx, false, false);
-                }
+            Fault::Twin { peer, aboard } => {
+                self.switch_on_twin(*peer, *aboard);
                 *peer
             }
             Fault::Loss { permille } => {
@@ -123,15 +120,32 @@ impl Swarm {
         self.observe_graph();
     }
 
-    /// A twin that a partition does not name is in one of its groups or in none, by the time
-    /// at which it begins.
+    /// A program is started in an airframe only where that is in the air.
+    fn switch_on_twin(&mut self, peer: u16, aboard: bool) {
+        let of = |s: &SimPeer| {
+            let is_aboard = self.airframe_of(s.id()) == peer;
+            s.is_twin() && s.config.id.0 == peer && s.boots == 0 && is_aboard == aboard
+        };
+        let twin = self.peers.iter().position(of);
+        let there = !aboard || self.air.percept(peer).is_some();
+        if let Some(idx) = twin.filter(|_| there) {
+            self.boot(idx, false, false);
+        }
+    }
+
+    /// A twin that a partition does not name is where its airframe is; or, in one of its own,
+    /// in one of the groups or in none, by the time at which it begins.
     fn with_twins_aside(&self, fault: &Fault) -> Fault {
         let mut fault = fault.clone();
         if let Fault::Partition { groups } = &mut fault {
             for twin in self.peers.iter().filter(|s| s.is_twin()) {
                 let aside = self.now_ms % (groups.len() as u64 + 1);
                 let named = groups.iter().any(|g| g.contains(&twin.id()));
-                let group = usize::try_from(aside).ok().and_then(|i| groups.get_mut(i));
+                let host = self.airframe_of(twin.id());
+                let drawn = usize::try_from(aside).ok();
+                let hosted =
+                    (host != twin.id()).then(|| groups.iter().position(|g| g.contains(&host)));
+                let group = hosted.unwrap_or(drawn).and_then(|i| groups.get_mut(i));
                 if let Some(group) = group.filter(|_| !named) {
                     group.push(twin.id());
                 }
@@ -176,8 +190,22 @@ impl Swarm {
         peer
     }
 
-    /// The process ends, and the airframe with it or not.
+    /// The process ends, and the airframe with it or not, and then all that is in it.
     fn end_process(&mut self, idx: usize, cause: Cause) {
+        let airframe = self.airframe_of(self.peers[idx].id());
+        let all = 0..self.peers.len();
+        let (own, others): (Vec<usize>, Vec<usize>) = all
+            .filter(|i| {
+                *i == idx
+                    || cause.takes_airframe() && self.airframe_of(self.peers[*i].id()) == airframe
+            })
+            .partition(|i| *i == idx);
+        for i in own.into_iter().chain(others) {
+            self.end_one(i, cause);
+        }
+    }
+
+    fn end_one(&mut self, idx: usize, cause: Cause) {
         let (now_ms, airframe) = (self.now_ms, cause.takes_airframe());
         let s = &mut self.peers[idx];
         let id = s.id();

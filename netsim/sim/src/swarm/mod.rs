@@ -207,7 +207,8 @@ impl Swarm {
         let latest_ms = swarm.period_ms() / 2;
         for idx in 0..swarm.peers.len() {
             if swarm.peers[idx].is_twin() {
-                swarm.air.stop(swarm.peers[idx].id(), true);
+                let own = swarm.airframe_of(swarm.peers[idx].id()) == swarm.peers[idx].id();
+                swarm.air.stop(swarm.peers[idx].id(), own);
                 continue;
             }
             let first_ms = swarm.peers[idx].first_boot_ms(latest_ms);
@@ -329,6 +330,11 @@ impl Swarm {
 
     fn period_ms(&self) -> u64 {
         u64::from(self.spec.beacon_period_ms.max(1))
+    }
+
+    /// In whose airframe a peer is.
+    fn airframe_of(&self, id: u16) -> u16 {
+        self.names.twins().airframe_of(id)
     }
 
     fn peer_idx(&self, id: u16) -> Option<usize> {
@@ -647,7 +653,8 @@ impl Swarm {
             Output::Setpoint(setpoint) => {
                 self.history
                     .fold(self.now_ms, id, Kind::Setpoint, setpoint_hash(&setpoint));
-                self.air.apply(id, setpoint);
+                let taken = self.air.apply(id, setpoint);
+                self.checker.on_setpoint(self.now_ms, id, taken);
             }
             Output::Store { token, record } => {
                 if let Some(Entry::Bid(bid)) = Entry::decode(&record) {

@@ -21,6 +21,12 @@ impl Names {
         Self { twins, lives }
     }
 
+    /// Who they are.
+    #[must_use]
+    pub fn twins(&self) -> &Twins {
+        &self.twins
+    }
+
     /// Whether two have this id.
     #[must_use]
     pub fn is_ambiguous(&self, id: u16) -> bool {

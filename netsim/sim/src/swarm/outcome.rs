@@ -98,7 +98,7 @@ impl Swarm {
         Outcome {
             report,
             ratios: found.ratios,
-            dead: u32::try_from(self.peers.iter().filter(|p| is_gone(p)).count())
+            dead: u32::try_from(self.peers.iter().filter(|p| self.is_gone(p)).count())
                 .unwrap_or(u32::MAX),
             idle_ms: self.checker.rules.flight.idle_ms,
             loss_permille: self.loss_max_permille,
@@ -136,6 +136,12 @@ impl Swarm {
             .collect()
     }
 
+    /// Of two programs in one airframe only the first one stands for it.
+    fn is_gone(&self, p: &SimPeer) -> bool {
+        let own = self.airframe_of(p.id()) == p.id();
+        own && p.config.airframe.is_some() && p.peer.is_none() && p.boots > 0
+    }
+
     fn radio_counters(&self) -> RadioCounters {
         let total = self.air.tally();
         RadioCounters {
@@ -148,8 +154,4 @@ impl Swarm {
             ..RadioCounters::default()
         }
     }
-}
-
-fn is_gone(p: &SimPeer) -> bool {
-    p.config.airframe.is_some() && p.peer.is_none() && p.boots > 0
 }

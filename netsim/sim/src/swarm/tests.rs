@@ -555,6 +555,10 @@ fn a_peer_that_stands_still_is_silent_and_is_missed() {
     assert!(missed, "nobody missed it");
 }
 
+fn twin(peer: u16, aboard: bool) -> Fault {
+    Fault::Twin { peer, aboard }
+}
+
 /// Who is silent since a twin speaks, and who speaks again after it, by number.
 fn voices(o: &Outcome) -> Vec<(u16, bool)> {
     let told = o.entries.iter().filter_map(|e| match &e.what {
@@ -580,12 +584,7 @@ fn voices(o: &Outcome) -> Vec<(u16, bool)> {
 #[test]
 fn a_second_uav_under_one_id_is_silent_and_the_mission_goes_on() {
     for seed in 1..4 {
-        let o = run(
-            &prepared(4),
-            seed,
-            vec![at(40_000, Fault::Twin { peer: 2 })],
-            true,
-        );
+        let o = run(&prepared(4), seed, vec![at(40_000, twin(2, false))], true);
         passed(&o);
         // The number of the twin is the first one that is free.
         assert_eq!(voices(&o), [(5, false)], "seed {seed}");
@@ -605,7 +604,7 @@ fn a_second_uav_under_one_id_is_silent_and_the_mission_goes_on() {
 #[test]
 fn a_twin_takes_the_place_of_one_that_is_lost() {
     let faults = vec![
-        at(30_000, Fault::Twin { peer: 2 }),
+        at(30_000, twin(2, false)),
         at(60_000, Fault::Kill { peer: 2 }),
     ];
     let o = run(&prepared(3), 2, faults, true);
@@ -628,11 +627,82 @@ fn twins_on_two_sides_of_a_partition_both_speak_until_it_heals() {
     let split = |groups: Vec<Vec<u16>>| Fault::Partition { groups };
     let faults = vec![
         at(20_000, split(vec![vec![1, 2, 100], vec![3, 4, 5]])),
-        at(21_000, Fault::Twin { peer: 2 }),
+        at(21_000, twin(2, false)),
         at(80_000, Fault::Heal),
     ];
     let o = run(&prepared(4), 5, faults, true);
     passed(&o);
     let silenced: Vec<(u16, bool)> = voices(&o).into_iter().filter(|v| !v.1).collect();
     assert_eq!(silenced.len(), 1, "{:?}", voices(&o));
+}
+
+/// Two programs in one airframe: the first goes on flying it, and nobody notices the second.
+#[test]
+fn a_second_program_in_an_airframe_is_silent_and_flies_nothing() {
+    for seed in 1..4 {
+        let o = run(&prepared(4), seed, vec![at(40_000, twin(2, true))], true);
+        passed(&o);
+        assert_eq!(voices(&o), [(5, false)], "seed {seed}");
+        assert_eq!(o.dead, 0);
+    }
+}
+
+#[test]
+fn a_second_program_takes_over_the_airframe_when_the_first_one_ends() {
+    let covers = |o: &Outcome, from_ms: u64| {
+        let by_second = |e: &crate::history::Entry| {
+            let covered = matches!(
+                &e.what,
+                What::Report {
+                    peer: 4,
+                    report: Report::Covered { .. }
+                }
+            );
+            covered && e.time_ms > from_ms
+        };
+        o.entries.iter().any(by_second)
+    };
+    for (fault, voices_of) in [
+        // The program alone: the other one comes back in a later life, in the same airframe.
+        (Fault::KillComputer { peer: 2 }, vec![(4, false), (4, true)]),
+        // It stands still for a while, and finds that it has been replaced.
+        (
+            Fault::Pause { peer: 2 },
+            vec![(4, false), (4, true), (2, false)],
+        ),
+        // With the airframe both are gone.
+        (Fault::Kill { peer: 2 }, vec![(4, false)]),
+    ] {
+        let faults = vec![
+            at(20_000, twin(2, true)),
+            at(35_000, fault.clone()),
+            at(80_000, Fault::Resume { peer: 2 }),
+        ];
+        let o = run(&prepared(3), 2, faults, true);
+        passed(&o);
+        assert_eq!(voices(&o), voices_of, "{fault}");
+        let goes_on = voices_of.contains(&(4, true));
+        assert_eq!(covers(&o, 60_000), goes_on, "{fault}");
+    }
+}
+
+#[test]
+fn no_program_is_started_in_an_airframe_that_is_gone() {
+    let faults = vec![
+        at(20_000, Fault::Kill { peer: 2 }),
+        at(30_000, twin(2, true)),
+    ];
+    let o = run(&prepared(3), 2, faults, true);
+    passed(&o);
+    let booted = |e: &crate::history::Entry| {
+        matches!(
+            &e.what,
+            What::Report {
+                peer: 4,
+                report: Report::Booted { .. }
+            }
+        )
+    };
+    assert!(!o.entries.iter().any(booted));
+    assert_eq!(o.dead, 1);
 }

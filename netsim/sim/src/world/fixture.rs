@@ -93,6 +93,7 @@ pub fn square(n_uavs: u16) -> Spec {
             takeoff_ms: 0,
             height_m: 45.0 + 5.0 * f64::from(i),
             twin_of: None,
+            aboard: false,
         })
         .collect();
     let launch = uavs

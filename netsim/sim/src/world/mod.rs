@@ -25,6 +25,7 @@ use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::patch::Patches;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::{CoverageTask, Mission};
+use std::iter;
 use std::sync::Arc;
 
 /// The world moves in steps of at most this long, aligned to its multiples, so that
@@ -64,9 +65,37 @@ impl Site {
 struct Uav {
     id: u16,
     body: Kinematic,
-    /// Whether its computer, and with it its radio, works.
-    computer: bool,
     failsafe: bool,
+    /// The computers in it: its own, and those of twins.
+    computers: Vec<Computer>,
+    /// Whose setpoint the airframe took last.
+    commander: u16,
+}
+
+impl Uav {
+    fn computer(&self, number: u16) -> Option<&Computer> {
+        self.computers.iter().find(|c| c.number == number)
+    }
+}
+
+/// A computer in an airframe, with a radio.
+#[derive(Clone, Copy, Debug)]
+struct Computer {
+    number: u16,
+    /// Whether it works, and with it its radio.
+    works: bool,
+    /// The revision of the mission that it follows, once it follows any.
+    revision: Option<u32>,
+}
+
+impl Computer {
+    fn new(number: u16) -> Self {
+        Self {
+            number,
+            works: true,
+            revision: None,
+        }
+    }
 }
 
 /// The pieces in which peers see an area by exact passes, and lines by stations of
@@ -111,16 +140,23 @@ impl World {
     /// site prepared from the same scenario.
     #[must_use]
     pub fn on(site: Arc<Site>, spec: &Spec, seed: u64) -> Self {
-        let mut uavs: Vec<Uav> = spec
-            .uavs
-            .iter()
+        let aboard = |of: u16| {
+            let twins = spec.uavs.iter().filter(move |u| u.aboard);
+            let twins = twins.filter(move |u| u.twin_of == Some(of));
+            twins.map(|u| Computer::new(u.id))
+        };
+        let own = spec.uavs.iter().filter(|u| !u.aboard);
+        let mut uavs: Vec<Uav> = own
             .map(|u| Uav {
                 id: u.id,
                 body: Kinematic::new(u.airframe, u.launch, u.height_m, 0)
                     .in_wind(spec.wind)
                     .taking_off_at(u64::from(u.takeoff_ms)),
-                computer: true,
                 failsafe: false,
+                computers: iter::once(Computer::new(u.id))
+                    .chain(aboard(u.id))
+                    .collect(),
+                commander: u.id,
             })
             .collect();
         uavs.sort_by_key(|u| u.id);
@@ -133,9 +169,9 @@ impl World {
                 },
             )
         });
-        let mut nodes: Vec<u16> = uavs
-            .iter()
-            .map(|u| u.id)
+        let computers = uavs.iter().flat_map(|u| &u.computers);
+        let mut nodes: Vec<u16> = computers
+            .map(|c| c.number)
             .chain(ground.map(|g| g.0))
             .collect();
         nodes.sort_unstable();
@@ -181,14 +217,20 @@ impl World {
         self.uavs.iter().map(|u| u.id)
     }
 
-    /// What a UAV flies, if there is such a UAV.
+    /// What the computer with this number flies, if it flies.
     #[must_use]
-    pub fn body(&self, uav: u16) -> Option<&Kinematic> {
-        self.uavs.iter().find(|u| u.id == uav).map(|u| &u.body)
+    pub fn body(&self, number: u16) -> Option<&Kinematic> {
+        self.uav(number).map(|u| &u.body)
     }
 
-    fn uav_mut(&mut self, uav: u16) -> Option<&mut Uav> {
-        self.uavs.iter_mut().find(|u| u.id == uav)
+    /// The UAV in which the computer with this number is.
+    fn uav(&self, number: u16) -> Option<&Uav> {
+        self.uavs.iter().find(|u| u.computer(number).is_some())
+    }
+
+    fn uav_mut(&mut self, number: u16) -> Option<&mut Uav> {
+        let mut uavs = self.uavs.iter_mut();
+        uavs.find(|u| u.computer(number).is_some())
     }
 
     /// Where the antenna of a node is; nothing for a lost airframe or a dead computer.
@@ -199,8 +241,9 @@ impl World {
         {
             return Some(place);
         }
-        let u = self.uavs.iter().find(|u| u.id == node)?;
-        (u.computer && u.body.airborne()).then(|| place_of(&u.body))
+        let u = self.uav(node)?;
+        let works = u.computer(node).is_some_and(|c| c.works);
+        (works && u.body.airborne()).then(|| place_of(&u.body))
     }
 
     /// The buildings.
@@ -225,9 +268,20 @@ impl World {
             .revise(survey, (claims, laps), mission.revision, room_m);
     }
 
-    /// A UAV follows this revision of the mission.
-    pub fn follows(&mut self, uav: u16, revision: u32) {
-        self.judge.follows(uav, revision);
+    /// The computer with this number follows this revision of the mission: so does its UAV,
+    /// if it commands it.
+    pub fn follows(&mut self, number: u16, revision: u32) {
+        let Some(u) = self.uav_mut(number) else {
+            return;
+        };
+        let mut computers = u.computers.iter_mut();
+        if let Some(c) = computers.find(|c| c.number == number) {
+            c.revision = Some(revision);
+        }
+        let (uav, commands) = (u.id, u.commander == number);
+        if commands {
+            self.judge.follows(uav, revision);
+        }
     }
 
     /// The facts recorded since the last call, in order of time per UAV.
@@ -235,12 +289,27 @@ impl World {
         std::mem::take(&mut self.facts)
     }
 
-    /// Hands a setpoint to an airframe; says whether it was taken. A dead computer
-    /// commands nothing.
-    pub fn apply(&mut self, uav: u16, setpoint: Setpoint) -> bool {
+    /// Hands a setpoint of the computer with this number to its airframe; says whether it was
+    /// taken. A dead computer commands nothing, and an airframe has one commander: it takes
+    /// none of another before its failsafe would trip.
+    pub fn apply(&mut self, number: u16, setpoint: Setpoint) -> bool {
         let now_ms = self.now_ms;
-        self.uav_mut(uav)
-            .is_some_and(|u| u.computer && u.body.apply(setpoint, now_ms))
+        let Some(u) = self.uav_mut(number) else {
+            return false;
+        };
+        let Some(computer) = u.computer(number).copied().filter(|c| c.works) else {
+            return false;
+        };
+        let changes = u.commander != number;
+        if changes && u.body.is_commanded(now_ms) || !u.body.apply(setpoint, now_ms) {
+            return false;
+        }
+        u.commander = number;
+        let uav = u.id;
+        if let Some(revision) = computer.revision.filter(|_| changes) {
+            self.judge.follows(uav, revision);
+        }
+        true
     }
 
     /// What a UAV senses now; nothing once it is lost.
@@ -262,7 +331,7 @@ impl World {
             && u.body.airborne()
         {
             u.body.kill();
-            let place = u.body.position();
+            let (uav, place) = (u.id, u.body.position());
             self.facts.push(Fact::Lost {
                 at_ms,
                 uav,
@@ -272,11 +341,13 @@ impl World {
         }
     }
 
-    /// Says whether a UAV's computer works; without it the radio is silent and the
+    /// Says whether the computer with this number works; without it the radio is silent and the
     /// airframe soon loiters on its own.
-    pub fn set_computer(&mut self, uav: u16, works: bool) {
-        if let Some(u) = self.uav_mut(uav) {
-            u.computer = works;
+    pub fn set_computer(&mut self, number: u16, works: bool) {
+        let u = self.uav_mut(number).into_iter();
+        let mut computers = u.flat_map(|u| u.computers.iter_mut());
+        if let Some(c) = computers.find(|c| c.number == number) {
+            c.works = works;
         }
     }
 
@@ -287,17 +358,19 @@ impl World {
         }
     }
 
-    /// Puts a lost UAV back: a new airframe at the launch point, its computer working.
+    /// Puts a lost UAV back: a new airframe at the launch point, this computer of it working.
     /// An airframe that still flies is left alone.
-    pub fn respawn(&mut self, uav: u16) {
+    pub fn respawn(&mut self, number: u16) {
         let now_ms = self.now_ms;
-        if let Some(u) = self.uav_mut(uav) {
-            u.computer = true;
-            if !u.body.airborne() {
-                u.body.relaunch(now_ms);
-                u.failsafe = false;
-                self.judge.forget_position(uav);
-            }
+        self.set_computer(number, true);
+        if let Some(u) = self.uav_mut(number)
+            && !u.body.airborne()
+        {
+            u.body.relaunch(now_ms);
+            u.failsafe = false;
+            u.commander = number;
+            let uav = u.id;
+            self.judge.forget_position(uav);
         }
     }
 
@@ -402,6 +475,38 @@ mod tests {
         assert!(a.judge().sightings().eq(b.judge().sightings()));
         assert_eq!(format!("{:?}", a.facts), format!("{:?}", b.facts));
         assert!(a.judge().n_covered() > 10);
+    }
+
+    #[test]
+    fn an_airframe_has_one_commander_until_that_is_quiet() {
+        let mut spec = fixture::square(2);
+        let mut second = spec.uavs[1].clone();
+        (second.id, second.twin_of, second.aboard) = (7, Some(2), true);
+        spec.uavs.push(second);
+        let mut w = World::new(&spec, 1);
+        assert_eq!(w.nodes(), [1, 2, 7, fixture::GROUND_ID]);
+        assert_eq!(w.uavs().collect::<Vec<_>>(), [1, 2]);
+        for t in (0..3_000).step_by(500) {
+            assert!(w.apply(2, straight(t)) && !w.apply(7, straight(t)), "{t}");
+            w.advance(t + 500);
+        }
+        assert_eq!(w.percept(7), w.percept(2));
+        assert!(w.antenna(7).is_some() && w.antenna(7) == w.antenna(2));
+        // Its radio ends with its computer, and the other one flies when the failsafe is due.
+        w.set_computer(2, false);
+        assert!(w.antenna(2).is_none() && w.antenna(7).is_some());
+        w.advance(3_400);
+        assert!(!w.apply(2, straight(3_400)) && !w.apply(7, straight(3_400)));
+        w.advance(3_500);
+        assert!(w.apply(7, straight(3_500)));
+        w.set_computer(2, true);
+        w.advance(4_000);
+        assert!(!w.apply(2, straight(4_000)) && w.apply(7, straight(4_000)));
+        // It goes with the airframe, which comes back under its first commander.
+        w.kill(7);
+        assert!(w.percept(2).is_none() && w.antenna(7).is_none());
+        w.respawn(2);
+        assert!(w.apply(2, straight(4_000)) && !w.apply(7, straight(4_000)));
     }
 
     #[test]

@@ -292,6 +292,12 @@ impl Kinematic {
         true
     }
 
+    /// Whether the last setpoint that it took still flies it.
+    #[must_use]
+    pub fn is_commanded(&self, now_ms: u64) -> bool {
+        self.setpoint.is_some() && now_ms.max(self.now_ms) < self.fresh_until_ms
+    }
+
     /// The fuel lasts no longer than this from now on, milliseconds.
     pub fn limit_fuel(&mut self, lasts_ms: u64) {
         self.fuel_ms = self.fuel_ms.min(lasts_ms);
