@@ -61,7 +61,7 @@ pub(super) struct Known {
     /// When this peer last told of it.
     told_at: Time,
     /// When the heartbeat was sent that neighbours were last told of.
-    told_sent: Time,
+    told_sent: Told,
     /// An old heartbeat of this very life with a higher count than it now sends: it lost
     /// its disk and uses an incarnation twice. It is told, so that it takes a new one.
     pub(super) higher_count_heard: Option<HeardHeartbeat>,
@@ -78,13 +78,51 @@ pub(super) struct Weight {
     pub(super) eccentricity: u8,
 }
 
+/// When the heartbeat was sent that somebody knows, as far as this peer can guess.
+#[derive(Clone, Copy, Debug, Default)]
+struct Told {
+    /// If whoever depends on this peer hears nobody else.
+    by_me: Time,
+    /// If it hears all.
+    by_any: Time,
+}
+
+impl Told {
+    fn of(sent: Time) -> Self {
+        Self {
+            by_me: sent,
+            by_any: sent,
+        }
+    }
+
+    /// A neighbour tells of a later one. One in two does not hear it.
+    fn by_others(&mut self, sent: Time) {
+        self.by_any = Time(u64::midpoint(self.by_any.0, sent.0)).max(self.by_any);
+    }
+
+    /// This peer does.
+    fn by_me(&mut self, sent: Time) {
+        self.by_others(sent);
+        self.by_me = Time(u64::midpoint(self.by_me.0, sent.0)).max(self.by_me);
+    }
+
+    /// What is gained by telling of one that was sent then.
+    fn gain_ms(self, sent: Time) -> u64 {
+        let alone_ms = sent.since_ms(self.by_me) / ALONE;
+        sent.since_ms(self.by_any).max(alone_ms)
+    }
+}
+
+/// In one of so many cases whoever depends on a peer hears nobody else.
+const ALONE: u64 = 4;
+
 /// A neighbour that hears somebody by more hops than this peer, or less: of several the one
 /// that knows least.
 #[derive(Clone, Copy, Debug)]
 struct Lag {
     teller: u16,
     /// When its freshest heartbeat was sent.
-    since: Time,
+    since: Told,
     /// When it told so.
     at: Time,
     until: Time,
@@ -121,7 +159,7 @@ impl Known {
             urgent_until,
             lag: None,
             told_at: Time(0),
-            told_sent: Time(0),
+            told_sent: Told::default(),
             higher_count_heard: None,
         }
     }
@@ -190,7 +228,7 @@ impl Known {
         let sent = told.age.since();
         let told = Lag {
             teller,
-            since: sent,
+            since: Told::of(sent),
             at: now,
             until: now.plus_ms(super::HOP_INTERVALS * interval_ms),
         };
@@ -201,7 +239,7 @@ impl Known {
             |lag: Lag| lag.teller == teller || now.since_ms(lag.at) > LAG_INTERVALS * interval_ms;
         if self
             .lag
-            .is_none_or(|lag| outdated(lag) || told.since < lag.since)
+            .is_none_or(|lag| outdated(lag) || told.since.by_any < lag.since.by_any)
         {
             self.lag = Some(told);
         } else if let Some(lag) = &mut self.lag {
@@ -209,20 +247,22 @@ impl Known {
         }
     }
 
-    /// Neighbours were told of a heartbeat that was sent then. One in two did not hear it.
+    /// A neighbour tells of a heartbeat that was sent then.
     fn others_told(&mut self, sent: Time) {
-        let half = |before: Time| Time(u64::midpoint(before.0, sent.0)).max(before);
-        self.told_sent = half(self.told_sent);
+        self.told_sent.by_others(sent);
         if let Some(lag) = &mut self.lag {
-            lag.since = half(lag.since);
+            lag.since.by_others(sent);
         }
     }
 
     /// This peer tells of it.
     pub(super) fn tell(&mut self, now: Time) {
         let sent = self.freshest.age.since();
-        self.others_told(sent);
-        (self.told_at, self.told_sent) = (now, sent);
+        self.told_at = now;
+        self.told_sent = Told::of(sent);
+        if let Some(lag) = &mut self.lag {
+            lag.since.by_me(sent);
+        }
     }
 
     /// Whether a neighbour depends on what this peer tells of it.
@@ -236,8 +276,8 @@ impl Known {
     pub(super) fn want(&self, now: Time) -> (u64, u64) {
         let sent = self.freshest.age.since();
         let lag = self.lag.filter(|lag| lag.until > now);
-        let there_ms = lag.map_or(0, |lag| sent.since_ms(lag.since));
-        let untold_ms = sent.since_ms(self.told_sent) / 2;
+        let there_ms = lag.map_or(0, |lag| lag.since.gain_ms(sent));
+        let untold_ms = self.told_sent.gain_ms(sent) / 2;
         (there_ms.max(untold_ms), now.since_ms(self.told_at))
     }
 

@@ -418,6 +418,28 @@ fn what_another_tells_is_wanted_half_as_much() {
     }
 }
 
+/// Peer 3 hears this peer alone: whatever others tell of 6, a quarter of the gain is left to
+/// this peer, and it grows with what 3 does not hear.
+#[test]
+fn what_others_tell_leaves_a_quarter_to_who_may_be_the_only_one_that_is_heard() {
+    let mut m = among_nineteen();
+    let far = Gossip {
+        hops: 2,
+        ..entry(6, 5, 60, None)
+    };
+    m.on_beacon(Time(3_000), 3, 1, &beacon(11, vec![far]));
+    for t in 1..=18 {
+        let now = Time(3_000 + 500 * t);
+        let count = 10 + u32::try_from(t).unwrap();
+        m.on_heartbeat(now, 6, 1, (count, 4));
+        m.on_beacon(now, 4, 1, &beacon(count, vec![entry(6, count, 0, None)]));
+    }
+    // Peer 3 knows a heartbeat that was sent 3 s before the beginning.
+    assert_eq!(m.known[&6].want(Time(12_000)).0, 12_000 / 4);
+    m.gossip(Time(12_000), 2);
+    assert_eq!(m.known[&6].want(Time(12_000)).0, 12_000 / 8);
+}
+
 #[test]
 fn who_does_not_hear_a_neighbour_any_more_is_told_of_it_though_it_was_as_near() {
     let mut m = among_nineteen();
