@@ -76,7 +76,7 @@ fn bring_to_the_end(case: &Case, w: &World) -> bool {
                 .iter()
                 .map(|c| (c, Direction::Forward))
                 .collect();
-            n.sections.take_at_once(&orphans);
+            n.sections.append(&n.sections.taken(&orphans));
         }
     }
     nodes.is_empty()

@@ -132,7 +132,7 @@ impl Case {
                     self.decide(n);
                     None
                 }
-                HeardBid::Nothing => None,
+                HeardBid::Nothing | HeardBid::Refused(_) => None,
             }
         });
         w.speak(i, bid.flatten());
@@ -150,7 +150,7 @@ impl Case {
     }
 
     fn take(&self, n: &mut Node, cells: &[(u16, Direction)]) {
-        n.sections.take_at_once(cells);
+        n.sections.append(&n.sections.taken(cells));
         self.settle(n);
     }
 

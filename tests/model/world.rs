@@ -4,7 +4,7 @@
 use super::PEERS;
 use skein_flight::coverage::ring::Direction;
 use skein_peer::cells::CellSet;
-use skein_peer::protocol::division::commits_of;
+use skein_peer::protocol::division::{adopted, commits_of};
 use skein_peer::protocol::rounds::{HeardBid, RoundOrder, Rounds, order_of};
 use skein_peer::protocol::sections::{LivePeers, Sections};
 use skein_peer::wire::message::{Bid, CellRun, Claim, Epoch, Member, Stamp};
@@ -166,15 +166,9 @@ impl Node {
             .take(share)
             .map(|c| (c, Direction::Forward))
             .collect();
-        let committed = commits_of(&open.bids[&self.me.id], n);
-        let commits = self
-            .sections
-            .plan()
-            .iter()
-            .filter(|p| committed.contains(p.cell));
-        let commits: Vec<(u16, Direction)> = commits.map(|p| (p.cell, p.direction)).collect();
+        let plan = adopted(&self.sections, epoch, &open.bids[&self.me.id], &section);
         self.rounds.close();
-        self.sections.adopt_at_once(epoch, &commits, &section);
+        self.sections.install(epoch, &plan);
     }
 
     /// By what right this peer lists a cell.

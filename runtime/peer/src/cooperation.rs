@@ -38,12 +38,12 @@ use crate::offload::{Job, MissionGeometry};
 use crate::output::Report;
 use crate::protocol::division;
 use crate::protocol::membership::Membership;
-use crate::protocol::negotiation::{Action, Adoption, Context};
+use crate::protocol::negotiation::{Action, Adoption, Context, are_many};
 use crate::protocol::runs::{PlannedCell, legs_of};
 use crate::protocol::sections::LivePeers;
 use crate::timers::{Timer, Timers};
 use crate::wire::codec::Body;
-use crate::wire::limits::{BID_COVERED_MAX_BYTES, MEMBERS_MAX};
+use crate::wire::limits::BID_COVERED_MAX_BYTES;
 use crate::wire::message::{Beacon, Bid, Epoch, Member, Order, Record};
 use crate::{Incarnation, PeerId};
 use skein_behaviors::executive::UNREACHABLE_MS;
@@ -293,7 +293,7 @@ impl Cooperation {
         let able = able && !s.membership.is_deaf(s.now);
         effects.extend(state.negotiate(s, able, timers));
         effects.extend(state.notice_end(s, timers));
-        state.astray = s.membership.known() > MEMBERS_MAX && s.membership.hears_nobody(s.now);
+        state.astray = are_many(s.membership.uavs()) && s.membership.hears_nobody(s.now);
         state.silent = s.is_silent;
         state.steer(order);
         assert!(
@@ -463,45 +463,47 @@ impl MissionState {
         let mine = self.loop_hash();
         let capacity = self.covered().capacity();
         let negotiation = &mut self.negotiation;
-        let refused = match &body {
+        let refused = |why: &str| {
+            let reason = why.to_owned();
+            vec![Effect::Report(Report::Refused { reason })]
+        };
+        match body {
             Body::Claim(claim) => {
                 let listed = claim.plan.iter().chain(&claim.held);
                 let counters = listed.map(|l| l.stamp.epoch.counter);
                 let latest = counters.fold(claim.epoch.counter, u32::max);
-                let believed = negotiation.rounds.hear_counter(latest);
-                (!believed).then_some("a claim of a round that is far ahead of all heard of")
+                if !negotiation.rounds.hear_counter(latest) {
+                    return refused("a claim of a round that is far ahead of all heard of");
+                }
+                let (id, life) = (author.id, author.incarnation);
+                let news =
+                    claim.loop_hash == mine && negotiation.sections.hear(id, life, seq, claim);
+                news.then_some(Effect::Negotiate).into_iter().collect()
             }
-            Body::Bid(bid) => negotiation.rounds.refuse(&bid.round),
-            _ => None,
-        };
-        if let Some(why) = refused {
-            let reason = why.to_owned();
-            return vec![Effect::Report(Report::Refused { reason })];
-        }
-        let mut heard = None;
-        let effect = match body {
-            Body::Claim(claim) if claim.loop_hash == mine => negotiation
-                .sections
-                .hear(author.id, author.incarnation, seq, claim)
-                .then_some(Effect::Negotiate),
             Body::Bid(bid) if bid.round.loop_hash == mine => {
+                if let Err(why) = negotiation.hear_bid(now, author, &bid) {
+                    return refused(why);
+                }
                 if let Ok(covered) = CellSet::decode_rle(capacity, &bid.covered) {
                     negotiation.sections.cover(&covered);
                 }
-                negotiation.hear_bid(now, author, &bid);
-                Some(Effect::Negotiate)
+                vec![Effect::Negotiate]
+            }
+            Body::Bid(bid) => {
+                let believed = negotiation.rounds.believe(&bid.round);
+                believed.err().map_or_else(Effects::new, refused)
             }
             Body::Cover(cover) if cover.loop_hash == mine => {
                 let Ok(covered) = CellSet::decode_rle(capacity, &cover.covered) else {
                     return Effects::new();
                 };
                 let news = negotiation.sections.cover(&covered);
-                heard = Some(Effect::CoverageHeard(mine, covered));
-                news.then_some(Effect::CoverageChanged)
+                let news = news.then_some(Effect::CoverageChanged);
+                let heard = Effect::CoverageHeard(mine, covered);
+                news.into_iter().chain([heard]).collect()
             }
-            _ => None,
-        };
-        effect.into_iter().chain(heard).collect()
+            _ => Effects::new(),
+        }
     }
 
     /// The own claim changed: it is spoken, and flown by.
@@ -525,7 +527,7 @@ impl MissionState {
         Some(Effect::Store(Promise::Covered(cells), entry))
     }
 
-    /// Whether the fuel has come due since it was last asked.
+    /// Whether the fuel is due, and the plan was not given up for it yet.
     fn fuel_is_due(&self, percept: Option<&Percept>) -> bool {
         percept.is_some() && !self.exhausted && self.spendable_ms(percept) == 0
     }
@@ -629,8 +631,8 @@ impl MissionState {
         let within_reach = left_over.and_then(|cells| self.within_reach(&cells, s.percept));
         let taken = within_reach.and_then(|cells| self.negotiation.begin_take(&cells));
         let taken = taken.or_else(|| self.taken_without_a_round(s, &ctx));
-        let first = self.first_section(s, &ctx);
-        actions.extend(taken.or(first).map(Action::Take));
+        let taken = taken.or_else(|| self.first_section(s, &ctx));
+        actions.extend(taken.map(Action::Take));
         let mut effects = Effects::new();
         let alone = s.membership.live().next().is_none();
         // What was said of being alone is taken back even where nothing is listed any more.

@@ -19,6 +19,7 @@ use crate::journal::Durable;
 use crate::mission::{PointMm, ring_mm};
 use crate::offload::MissionGeometry;
 use crate::protocol::Negotiation;
+use crate::protocol::negotiation::are_many;
 use crate::protocol::sections::{FIRST_LIFE, LivePeers};
 use crate::timers::{Timer, Timers};
 use crate::wire::limits::MEMBERS_MAX;
@@ -69,11 +70,11 @@ impl ClaimsWritten {
 /// Who is there to share the work, and what this was computed from.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Company {
-    /// The peers that are alive and hear somebody.
+    /// The others whose claims count.
     pub live: LivePeers,
     /// Of them those that can plan on this loop, this peer included if it can.
     pub members: Vec<Member>,
-    /// How many of the living were never heard of.
+    /// How many of them were never heard of.
     pub unheard: usize,
     /// As it was numbered by the membership, for this peer, able or not; none where it is to
     /// be looked up again.
@@ -288,7 +289,7 @@ fn roster(
     durable: &Durable,
 ) -> Arc<[Launch]> {
     let first = old.is_none() && me.incarnation.max(durable.incarnation) <= FIRST_LIFE;
-    let many = config.launches.len() > MEMBERS_MAX;
+    let many = are_many(config.launches.len());
     if first && many && config.launches.iter().any(|l| l.id == me.id) {
         Arc::clone(&config.launches)
     } else {

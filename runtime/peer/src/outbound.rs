@@ -139,7 +139,7 @@ impl Outbound {
         self.coverage_told.meet();
     }
 
-    /// A neighbour among many said that these cells are covered.
+    /// A neighbour in a crowded earshot said that these cells are covered.
     pub fn coverage_heard(&mut self, loop_hash: u64, cells: &CellSet) {
         self.coverage_told.heard(loop_hash, cells);
     }

@@ -23,12 +23,12 @@ use crate::outbound::{self, Outbound, Sources};
 use crate::output::{Output, Priority, Report, Status};
 use crate::protocol::life::Life;
 use crate::protocol::membership::{Change, Membership};
+use crate::protocol::negotiation::are_many;
 use crate::protocol::relay::{Offer, Relay};
 use crate::timers::{Timer, Timers};
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
-use crate::wire::limits::MEMBERS_MAX;
 use crate::wire::message::{Beacon, Gossip, Heartbeat, Member, Order, Record};
 use crate::{Incarnation, Mission, PeerId};
 use rand_chacha::ChaCha8Rng;
@@ -86,7 +86,7 @@ impl Peer {
         seed[8..10].copy_from_slice(&config.id.0.to_le_bytes());
         let mut timers = Timers::default();
         let mut relay = Relay::new(config.id.0, &config.fleet, config.rate_bps, period);
-        if config.launches.len() > MEMBERS_MAX {
+        if are_many(config.launches.len()) {
             relay.air.expect(config.launches.len());
         }
         Self {
@@ -730,6 +730,7 @@ impl Peer {
             ("stores", self.stores.len(), MAX_STORES),
             ("jobs", self.jobs.len(), MAX_JOBS),
         ];
+        beliefs.loads.extend(self.membership.loads());
         beliefs.loads.extend(self.relay.loads());
         let counter = self.durable.counter;
         self.cooperation

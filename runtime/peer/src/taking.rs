@@ -44,11 +44,10 @@ impl MissionState {
         let owners = self.negotiation.owners(ctx);
         let others = self.hands(s, ctx, &owners);
         let pace = self.pace()?;
-        let among = ctx.members.len() + ctx.unheard;
         let by_ms = if may_relieve {
             u64::MAX
         } else {
-            pace.in_time_ms(&owners, me.free_ms, &orphans, among)
+            pace.in_time_ms(&owners, me.free_ms, &orphans, ctx.uavs())
         };
         let wanted = self.wanted_orphans((s, ctx), &orphans, (&me, &others), by_ms);
         if let Some((begins_ms, cells)) = wanted {

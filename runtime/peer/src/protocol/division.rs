@@ -1,11 +1,11 @@
 //! What a complete round decides: a function of its bids alone.
 
 use super::rounds::OpenRound;
-use super::runs::{cells_of, direction_of};
+use super::runs::{PlannedCell, cells_of, direction_of};
 use super::sections::{LivePeers, Sections};
 use crate::cells::CellSet;
 use crate::offload::MissionGeometry;
-use crate::wire::message::Bid;
+use crate::wire::message::{Bid, Epoch};
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
 
@@ -129,6 +129,23 @@ pub fn section_of(division: &Division, ring: &[RingCell], id: u16) -> Vec<(u16, 
         }
     }
     out
+}
+
+/// The plan of a member once it adopts: what it committed to in its bid, then its section.
+#[must_use]
+pub fn adopted(
+    sections: &Sections,
+    epoch: Epoch,
+    bid: &Bid,
+    section: &[(u16, Direction)],
+) -> Vec<PlannedCell> {
+    let committed = commits_of(bid, sections.cells());
+    let kept = sections
+        .plan()
+        .iter()
+        .filter(|p| committed.contains(p.cell));
+    let commits: Vec<(u16, Direction)> = kept.map(|p| (p.cell, p.direction)).collect();
+    sections.adopted(epoch, &commits, section)
 }
 
 /// The cells that the flyer of a bid is about to fly and keeps.

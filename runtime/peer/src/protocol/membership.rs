@@ -109,8 +109,6 @@ pub struct Info {
     pub revision: u32,
     /// The loop it derived, likewise.
     pub loop_hash: u64,
-    /// Since when this life was never taken for down.
-    pub steady_since: Time,
     /// When its own beacon was last heard, without a relay.
     pub heard: Option<Time>,
     /// Where it was by then.
@@ -360,8 +358,7 @@ impl Membership {
             let teller = m.known.get_mut(&author);
             let same = |h: &HeardHeartbeat| (h.incarnation, h.count) == (incarnation, count);
             if let Some(teller) = teller.filter(|t| same(&t.freshest)) {
-                let steady_since = teller.info.steady_since;
-                teller.info = info_of(beacon, steady_since, now);
+                teller.info = info_of(beacon, now);
                 teller.eccentricity = beacon.eccentricity.min(HOPS_MAX);
             }
         });
@@ -543,7 +540,7 @@ impl Membership {
             if !self.make_room(now) {
                 return false;
             }
-            let mut known = Known::new(now, heard, urgent_until);
+            let mut known = Known::new(heard, urgent_until);
             known.note_hops(now, heard.hops, interval_ms);
             changes.push(known.change());
             self.known.insert(heard.id, known);
@@ -569,9 +566,6 @@ impl Membership {
         if new_life {
             known.info = Info::default();
             known.eccentricity = 0;
-        }
-        if new_life || known.status == Status::Down {
-            known.info.steady_since = now;
         }
         known.freshest = heard;
         if new_life
@@ -605,7 +599,7 @@ impl Membership {
             return;
         }
         let believed = before.is_some_and(|k| k.status != Status::Down);
-        let mut dead = Known::new(now, heard, now);
+        let mut dead = Known::new(heard, now);
         dead.status = Status::Down;
         if believed {
             changes.push(dead.change());
@@ -855,10 +849,12 @@ impl Membership {
         self.last_heard.is_some_and(silent)
     }
 
-    /// How many others were ever heard of.
+    /// How many UAVs are known, the dead and this one included; of whom only others told
+    /// counts as one.
     #[must_use]
-    pub fn known(&self) -> usize {
-        self.known.len()
+    pub fn uavs(&self) -> usize {
+        let others = self.known.values().filter(|k| !k.info.ground_station);
+        others.count() + 1
     }
 
     /// What is believed of a peer, if it is known.
@@ -890,13 +886,12 @@ impl Membership {
     }
 }
 
-fn info_of(beacon: &Beacon, steady_since: Time, now: Time) -> Info {
+fn info_of(beacon: &Beacon, now: Time) -> Info {
     Info {
         able: beacon.able,
         ground_station: beacon.ground_station,
         revision: beacon.revision,
         loop_hash: beacon.loop_hash,
-        steady_since,
         heard: Some(now),
         place: Some(OffLoop {
             east_mm: beacon.east_mm,

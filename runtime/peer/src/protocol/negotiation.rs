@@ -28,8 +28,8 @@ use crate::Time;
 use crate::cells::CellSet;
 use crate::wire::limits::{HOPS_MAX, MEMBERS_MAX};
 use crate::wire::message::{Bid, Epoch, Member};
+use skein_flight::coverage::ring::CoverageLoop;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
-use skein_flight::coverage::ring::{CoverageLoop, Direction};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Time in which an owner at work covers two cells, milliseconds: at the slowest ground
@@ -69,8 +69,7 @@ pub struct Context<'a> {
     /// The swarm's interval T', milliseconds: the longest that anybody alive announced. Every
     /// wait below counts in it.
     pub interval_ms: u64,
-    /// Who is not believed dead and can be reached: without peers that say they are alone, and
-    /// with those that were to be launched and were not heard of yet.
+    /// The others whose claims count.
     pub live: &'a LivePeers,
     /// Whether they may be others than at the last tick.
     pub live_changed: bool,
@@ -100,6 +99,18 @@ impl Context<'_> {
     pub fn first_wait_ms(&self) -> u64 {
         wait_ms(self.diameter, self.interval_ms)
     }
+
+    /// How many UAVs share the work: the members, and who was launched and is not heard yet.
+    #[must_use]
+    pub fn uavs(&self) -> usize {
+        self.members.len() + self.unheard
+    }
+
+    /// Whether they are too many for rounds.
+    #[must_use]
+    pub fn is_many(&self) -> bool {
+        are_many(self.uavs())
+    }
 }
 
 fn wait_ms(diameter: u32, interval_ms: u64) -> u64 {
@@ -121,7 +132,7 @@ pub enum Action {
         /// The members.
         uavs: Vec<Uav>,
     },
-    /// Make these takes durable, then call [`Negotiation::take`], or if they cannot be
+    /// Make these takes durable, then call [`Negotiation::append_take`], or if they cannot be
     /// [`Negotiation::cancel_take`].
     Take(Vec<PlannedCell>),
     /// The own claim changed: publish it and fly by it.
@@ -282,11 +293,17 @@ impl Negotiation {
         self.progressed
     }
 
-    /// A bid was heard.
-    pub fn hear_bid(&mut self, now: Time, author: Member, bid: &Bid) {
-        if self.rounds.hear(author, bid) == HeardBid::BidWanted {
-            self.opened(now);
+    /// A bid of this loop was heard.
+    ///
+    /// # Errors
+    /// Why it is refused.
+    pub fn hear_bid(&mut self, now: Time, author: Member, bid: &Bid) -> Result<(), &'static str> {
+        match self.rounds.hear(author, bid) {
+            HeardBid::Refused(why) => return Err(why),
+            HeardBid::BidWanted => self.opened(now),
+            HeardBid::Added | HeardBid::Nothing => {}
         }
+        Ok(())
     }
 
     fn opened(&mut self, now: Time) {
@@ -366,7 +383,7 @@ impl Negotiation {
             self.orphan_since = self.orphan_since.or(Some(ctx.now)).max(self.decided_at);
         }
         let noted = self.orphaned_at.len() == usize::from(orphans.count());
-        if !noted && is_many(ctx) && ctx.able_since.is_some() {
+        if !noted && ctx.is_many() && ctx.able_since.is_some() {
             for cell in orphans.iter() {
                 self.orphaned_at.entry(cell).or_insert(ctx.now);
             }
@@ -452,7 +469,7 @@ impl Negotiation {
     }
 
     fn start(&mut self, ctx: &Context<'_>, repair: bool, retries: u32) {
-        if !ctx.members.iter().any(|m| m.id == self.me) || is_many(ctx) {
+        if !ctx.members.iter().any(|m| m.id == self.me) || ctx.is_many() {
             return;
         }
         self.retries = retries;
@@ -475,7 +492,7 @@ impl Negotiation {
         let patient = PATIENT_INTERVALS * ctx.interval_ms;
         let rested = |t| ctx.now.since_ms(t) >= patient;
         let wants = self.rounds.open().is_none()
-            && !is_many(ctx)
+            && !ctx.is_many()
             && self.orphan_since.is_none()
             && self.foreseen_at.is_none_or(rested)
             && self.may_gain(ctx);
@@ -536,18 +553,11 @@ impl Negotiation {
             return None;
         }
         let worthwhile = division::worthwhile(open, division);
-        let mine = open.bids.get(&self.me)?;
-        let committed = division::commits_of(mine, self.sections.cells());
-        let commits = self
-            .sections
-            .plan()
-            .iter()
-            .filter(|p| committed.contains(p.cell));
-        let commits: Vec<(u16, Direction)> = commits.map(|p| (p.cell, p.direction)).collect();
+        let bid = open.bids.get(&self.me)?;
         let section = division::section_of(division, &dividing.ring, self.me);
         let adoption = Adoption {
             epoch,
-            plan: self.sections.adopted(epoch, &commits, &section),
+            plan: division::adopted(&self.sections, epoch, bid, &section),
             unassigned: division.unassigned.clone(),
             wait_ms: open.round.wait_ms,
         };
@@ -623,9 +633,10 @@ impl Negotiation {
     }
 }
 
-/// Whether there are too many for rounds.
-fn is_many(ctx: &Context<'_>) -> bool {
-    ctx.members.len() + ctx.unheard > MEMBERS_MAX
+/// Whether so many UAVs, this one included, are too many for rounds.
+#[must_use]
+pub fn are_many(uavs: usize) -> bool {
+    uavs > MEMBERS_MAX
 }
 
 #[cfg(test)]

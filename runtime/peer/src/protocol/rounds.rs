@@ -61,6 +61,8 @@ pub struct OpenRound {
 pub enum HeardBid {
     /// Nothing, or only the counter.
     Nothing,
+    /// No honest peer opens its round, and why.
+    Refused(&'static str),
     /// It opened a higher round that names this peer: a bid is wanted.
     BidWanted,
     /// It belongs to the open round.
@@ -116,14 +118,17 @@ impl Rounds {
         counter <= self.counter
     }
 
-    /// Why a round is none that an honest peer opens, if it is not.
-    pub fn refuse(&mut self, round: &Round) -> Option<&'static str> {
+    /// Remembers the counter of a round.
+    ///
+    /// # Errors
+    /// Why it is none that an honest peer opens.
+    pub fn believe(&mut self, round: &Round) -> Result<(), &'static str> {
         if !self.hear_counter(round.counter) {
-            Some("a round that is far ahead of all that was heard of")
+            Err("a round that is far ahead of all that was heard of")
         } else if round.wait_ms > self.longest_wait_ms {
-            Some("a round that waits for longer than any diameter needs")
+            Err("a round that waits for longer than any diameter needs")
         } else {
-            None
+            Ok(())
         }
     }
 
@@ -136,8 +141,10 @@ impl Rounds {
     /// A bid by its author, who speaks in the given life.
     pub fn hear(&mut self, author: Member, bid: &Bid) -> HeardBid {
         let round = &bid.round;
-        if self.refuse(round).is_some()
-            || !round.members.contains(&self.me)
+        if let Err(why) = self.believe(round) {
+            return HeardBid::Refused(why);
+        }
+        if !round.members.contains(&self.me)
             || !round.members.contains(&author)
             || author == self.me
         {
@@ -427,7 +434,7 @@ mod tests {
         let mut a = Rounds::new(member(1), 5);
         let far = bid(&round(u32::MAX, &[1, 2]), 0);
         for _ in 0..50 {
-            assert_eq!(a.hear(member(2), &far), HeardBid::Nothing);
+            assert!(matches!(a.hear(member(2), &far), HeardBid::Refused(_)));
             assert!(!a.hear_counter(u32::MAX));
         }
         assert_eq!(a.counter(), 5 + COUNTER_STEP);
@@ -439,7 +446,10 @@ mod tests {
         a.close();
         let mut slow = round(mine.counter + 1, &[1, 2]);
         slow.wait_ms = 9001;
-        assert_eq!(a.hear(member(2), &bid(&slow, 2)), HeardBid::Nothing);
+        assert!(matches!(
+            a.hear(member(2), &bid(&slow, 2)),
+            HeardBid::Refused(_)
+        ));
         slow.wait_ms = 9000;
         assert_eq!(a.hear(member(2), &bid(&slow, 2)), HeardBid::BidWanted);
     }

@@ -89,22 +89,25 @@ fn of_a_roster_who_never_came_is_replaced() {
 
 #[test]
 fn who_hears_nobody_of_many_and_has_nothing_to_fly_goes_home() {
-    // Far more UAVs than there is work for.
-    let mut h = Harness::with_roster(14, mission(1, 6, 4));
-    (1..=14).for_each(|id| h.start(id));
-    let idle = |h: &Harness, id: u16| h.beliefs(id).plan.is_empty() && !h.beliefs(id).finished;
-    assert!(h.run_until(12, |h| h.beliefs(14).peers.len() == 13 && idle(h, 14)));
-    h.isolate(14, true);
-    h.run_s(4);
-    let base = Point::new(-60.0, -60.0);
-    let before_m = (h.pose(14).position() - base).norm();
-    h.run_s(7);
-    assert!(idle(&h, 14));
-    let after_m = (h.pose(14).position() - base).norm();
-    assert!(
-        after_m < before_m - 50.0,
-        "{before_m:.0} m, then {after_m:.0} m"
-    );
+    // Far more UAVs than there is work for; and as few as are many.
+    for many in [14, 9] {
+        let mut h = Harness::with_roster(many, mission(1, 6, 4));
+        (1..=many).for_each(|id| h.start(id));
+        let idle = |h: &Harness| h.beliefs(many).plan.is_empty() && !h.beliefs(many).finished;
+        let others = usize::from(many - 1);
+        assert!(h.run_until(12, |h| h.beliefs(many).peers.len() == others && idle(h)));
+        h.isolate(many, true);
+        h.run_s(4);
+        let base = Point::new(-60.0, -60.0);
+        let before_m = (h.pose(many).position() - base).norm();
+        h.run_s(7);
+        assert!(idle(&h));
+        let after_m = (h.pose(many).position() - base).norm();
+        assert!(
+            after_m < before_m - 50.0,
+            "{many}: {before_m:.0} m, then {after_m:.0} m"
+        );
+    }
 }
 
 #[test]

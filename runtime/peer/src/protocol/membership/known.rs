@@ -139,7 +139,7 @@ const LAG_INTERVALS: u64 = 4;
 const NO_HOPS: [(Time, u8); 10] = [(Time(0), u8::MAX); 10];
 
 impl Known {
-    pub(super) fn new(now: Time, heard: HeardHeartbeat, urgent_until: Time) -> Self {
+    pub(super) fn new(heard: HeardHeartbeat, urgent_until: Time) -> Self {
         let status = if heard.suspected.is_some() {
             Status::Suspect
         } else {
@@ -149,10 +149,7 @@ impl Known {
             freshest: heard,
             excused_ms: 0,
             status,
-            info: Info {
-                steady_since: now,
-                ..Info::default()
-            },
+            info: Info::default(),
             hops: NO_HOPS,
             latest: 0,
             eccentricity: 0,

@@ -2,7 +2,7 @@
 //! What is worth taking is [`crate::protocol::sharing`]'s and
 //! [`crate::mission_state::MissionState`]'s.
 
-use super::{Context, Negotiation, PATIENT_INTERVALS, SHORT_INTERVALS, TWO_CELLS_MS, is_many};
+use super::{Context, Negotiation, PATIENT_INTERVALS, SHORT_INTERVALS, TWO_CELLS_MS};
 use crate::Time;
 use crate::cells::CellSet;
 use crate::protocol::runs::PlannedCell;
@@ -56,7 +56,7 @@ impl Negotiation {
         let untouched = self.rounds.counter() == 0
             && self.sections.epoch() == Epoch::default()
             && self.sections.plan().is_empty();
-        self.provisional = untouched && ctx.members.len() + ctx.unheard > 1;
+        self.provisional = untouched && ctx.uavs() > 1;
         self.provisional
     }
 
@@ -64,7 +64,7 @@ impl Negotiation {
     /// it looked last.
     pub fn take_look(&mut self, ctx: &Context<'_>) -> bool {
         let rested = |t| ctx.now.since_ms(t) >= ctx.interval_ms / LOOKS_AN_INTERVAL;
-        let looks = is_many(ctx)
+        let looks = ctx.is_many()
             && ctx.able_since.is_some()
             && !self.sections.complete()
             && !self.take_pending
@@ -135,9 +135,9 @@ impl Negotiation {
     }
 
     /// The takes are durable.
-    pub fn append_take(&mut self, taken: &[PlannedCell]) -> usize {
+    pub fn append_take(&mut self, taken: &[PlannedCell]) {
         self.take_pending = false;
-        self.sections.append(taken)
+        self.sections.append(taken);
     }
 
     /// The takes were not made durable: they may be tried again.
@@ -157,7 +157,7 @@ impl Negotiation {
         }
         let stagger = self.rank(ctx) * ctx.interval_ms / TAKE_STAGGER;
         if let Some(since) = self.orphan_since {
-            if is_many(ctx) {
+            if ctx.is_many() {
                 return None;
             }
             let patience = SHORT_INTERVALS * ctx.interval_ms + ctx.first_wait_ms() + stagger;

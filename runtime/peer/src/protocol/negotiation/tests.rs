@@ -1,9 +1,11 @@
 //! The negotiation against claims, bids and clocks set by hand.
 
 use super::*;
+use crate::protocol::membership::Membership;
 use crate::testing::mission;
-use crate::wire::message::{CellRun, Claim, ListedRun, Round, Stamp};
+use crate::wire::message::{Beacon, CellRun, Claim, ListedRun, Round, Stamp};
 use crate::wire::samples;
+use skein_flight::coverage::ring::Direction;
 use std::sync::Arc;
 
 const T: u64 = 1000;
@@ -261,7 +263,9 @@ fn a_complete_round_is_divided_once_and_given_up_without_an_answer() {
     desk.wait(5 * T).unwrap();
     let (own, other) = (desk.bid_from(0), desk.bid_from(12));
     assert!(desk.negotiation.on_bid_durable(own));
-    desk.negotiation.hear_bid(desk.now, member(2), &other);
+    desk.negotiation
+        .hear_bid(desk.now, member(2), &other)
+        .unwrap();
     let divides = desk.tick();
     assert!(
         matches!(&divides[..], [Action::Divide { uavs, .. }] if uavs.len() == 2),
@@ -284,7 +288,9 @@ fn a_division_gives_each_member_its_part_and_all_compute_the_same() {
     desk.wait(5 * T).unwrap();
     let (own, other) = (desk.bid_from(0), desk.bid_from(12));
     desk.negotiation.on_bid_durable(own);
-    desk.negotiation.hear_bid(desk.now, member(2), &other);
+    desk.negotiation
+        .hear_bid(desk.now, member(2), &other)
+        .unwrap();
     let divides = desk.tick();
     let [Action::Divide { epoch, ring, uavs }] = &divides[..] else {
         panic!("{divides:?}")
@@ -417,7 +423,7 @@ fn a_new_life_owns_nothing_and_keeps_what_is_covered() {
 #[test]
 fn a_round_may_wait_for_four_times_what_the_largest_diameter_needs_and_no_longer() {
     let mut desk = Desk::new(&[2]);
-    let mut refuse = |wait_ms| {
+    let mut believe = |wait_ms| {
         let round = Round {
             counter: 1,
             members: vec![member(1), member(2)],
@@ -426,11 +432,11 @@ fn a_round_may_wait_for_four_times_what_the_largest_diameter_needs_and_no_longer
             repair: true,
             wait_ms,
         };
-        desk.negotiation.rounds.refuse(&round)
+        desk.negotiation.rounds.believe(&round)
     };
     // (2 · 16 + 3) T, doubled twice.
-    assert_eq!(refuse(140_000), None);
-    assert!(refuse(140_001).is_some());
+    assert!(believe(140_000).is_ok());
+    assert!(believe(140_001).is_err());
 }
 
 #[test]
@@ -867,7 +873,9 @@ fn what_is_divided_are_the_bids_whatever_a_member_knows_besides() {
     desk.wait(5 * T).unwrap();
     let (own, other) = (desk.bid_from(0), desk.bid_from(12));
     assert!(desk.negotiation.on_bid_durable(own));
-    desk.negotiation.hear_bid(desk.now, member(2), &other);
+    desk.negotiation
+        .hear_bid(desk.now, member(2), &other)
+        .unwrap();
     // It hears of covered cells after it bid, and others may not have heard of them.
     desk.leave_open(6..24);
     let divides = desk.tick();
@@ -876,4 +884,25 @@ fn what_is_divided_are_the_bids_whatever_a_member_knows_besides() {
         _ => None,
     });
     assert!(ring.unwrap().iter().all(|c| c.open));
+}
+
+#[test]
+fn nine_uavs_are_many_and_a_ground_station_is_none_of_them() {
+    for (uavs, many) in [(1, false), (2, false), (8, false), (9, true)] {
+        for ground_station in [false, true] {
+            let others: Vec<u16> = (2..=uavs).collect();
+            let mut known = Membership::new(1, 1000);
+            for id in others.iter().copied().chain(ground_station.then_some(99)) {
+                let beacon = Beacon {
+                    ground_station: id == 99,
+                    ..samples::beacon(1)
+                };
+                known.on_beacon(Time(0), id, 1, &beacon);
+            }
+            let mut desk = Desk::new(&others);
+            let sharing = desk.ask(|_, ctx| (ctx.uavs(), ctx.is_many()));
+            assert_eq!(sharing, (usize::from(uavs), many));
+            assert_eq!((known.uavs(), are_many(known.uavs())), sharing);
+        }
+    }
 }
