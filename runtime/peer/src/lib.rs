@@ -89,6 +89,7 @@
 
 pub mod beliefs;
 pub mod cells;
+mod company;
 pub mod config;
 mod cooperation;
 mod coverage_told;
@@ -97,6 +98,7 @@ mod inbound;
 pub mod input;
 pub mod journal;
 pub mod mission;
+mod mission_change;
 mod mission_state;
 pub mod offload;
 mod outbound;

@@ -9,26 +9,46 @@
 //! | another lap | nothing is covered |
 //! | any | the highest round counter; what the journal knows of that loop |
 //!
-//! What is done with a mission is the cooperation manager's.
+//! And what it does with them: it hears of others' cells, negotiates, watches the fuel and
+//! the end. When that is, and where it flies, is the cooperation manager's; what it takes
+//! without a round is in `taking`.
 
-use crate::Incarnation;
+use crate::PeerId;
 use crate::cells::CellSet;
-use crate::config::{Launch, PeerConfig};
+use crate::company::Company;
+use crate::config::{PeerConfig, Role};
+use crate::cooperation::Situation;
+use crate::effect::{Effect, Effects, PendingJob, Promise};
 use crate::input::Time;
-use crate::journal::Durable;
-use crate::mission::{PointMm, ring_mm};
-use crate::offload::MissionGeometry;
-use crate::protocol::Negotiation;
-use crate::protocol::negotiation::are_many;
-use crate::protocol::sections::{FIRST_LIFE, LivePeers};
+use crate::journal::{Durable, Entry};
+use crate::mission_change::{executive_for, negotiation_begun};
+use crate::offload::{Job, MissionGeometry};
+use crate::output::Report;
+use crate::protocol::division;
+use crate::protocol::negotiation::{Action, Context, Negotiation};
+use crate::protocol::runs::{PlannedCell, legs_of};
+use crate::protocol::sections::FIRST_LIFE;
 use crate::timers::{Timer, Timers};
-use crate::wire::limits::MEMBERS_MAX;
-use crate::wire::message::{Activity, Claim, Member, MissionStatus};
-use skein_behaviors::{Executive, Goal, Percept};
-use skein_flight::coverage::ring::patch::Patches;
-use skein_flight::coverage::ring::{CellId, CoverageLoop};
-use std::collections::{BTreeMap, BTreeSet};
+use crate::wire::codec::Body;
+use crate::wire::limits::BID_COVERED_MAX_BYTES;
+use crate::wire::message::{Activity, Bid, Claim, Epoch, Member, MissionStatus};
+use skein_behaviors::executive::UNREACHABLE_MS;
+use skein_behaviors::{Event, Executive, Goal, Percept};
+use skein_flight::coverage::ring::Direction;
+use skein_flight::coverage::ring::backtracking::{Division, Uav};
 use std::sync::Arc;
+
+/// Own coverage is made durable every so many cells: a crash costs at most these.
+pub const CELLS_PER_COVERED_RECORD: u16 = 5;
+
+/// Beacon periods for which the last cells of a lap are told before the next lap begins:
+/// one to speak, two to be passed on. Who misses them flies those cells again, and hears
+/// of the next lap from the ground station.
+const LAP_PERIODS: u64 = 3;
+
+/// A UAV whose fuel was due works again when it may spend this much, milliseconds: less
+/// would be due again before the next round is decided.
+const FUEL_BACK_MS: u32 = 30_000;
 
 /// Claims on their way to the journal, numbered in the order in which it gets them. Only
 /// the last of them may be installed, for it is the one that the journal ends with.
@@ -67,39 +87,21 @@ impl ClaimsWritten {
     }
 }
 
-/// Who is there to share the work, and what this was computed from.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Company {
-    /// The others whose claims count.
-    pub live: LivePeers,
-    /// Of them those that can plan on this loop, this peer included if it can.
-    pub members: Vec<Member>,
-    /// How many of them were never heard of.
-    pub unheard: usize,
-    /// As it was numbered by the membership, for this peer, able or not; none where it is to
-    /// be looked up again.
-    pub of: Option<(u64, Member, bool)>,
-    /// The lives in which peers said that they are alone.
-    pub alone: BTreeMap<u16, Incarnation>,
-    /// When somebody is not expected any more.
-    pub until: Time,
-}
-
 /// What a peer has once it holds a mission and its geometry.
 #[derive(Debug)]
 pub(crate) struct MissionState {
     pub geometry: Arc<MissionGeometry>,
     pub executive: Option<Executive>,
     pub negotiation: Negotiation,
-    pub goal: Option<Goal>,
+    goal: Option<Goal>,
     /// Whether the goal is to be given to the executive again.
-    pub replan: bool,
+    replan: bool,
     /// Since when this peer can plan without a break.
     pub able_since: Option<crate::Time>,
-    /// Who shared the work at the last tick.
-    pub company: Arc<Company>,
+    /// Who shares the work.
+    pub company: Company,
     /// Whether all others were believed down at the last tick.
-    pub alone: bool,
+    alone: bool,
     pub finished: bool,
     /// Whether it heard of many and hears nobody now.
     pub astray: bool,
@@ -108,14 +110,10 @@ pub(crate) struct MissionState {
     /// Whether its fuel is due: it flies home until some is back.
     pub exhausted: bool,
     /// When its plan was last compared with what the fuel allows.
-    pub fuel_looked_at: Option<crate::Time>,
+    fuel_looked_at: Option<crate::Time>,
     /// Cells covered by itself since the last entry of the journal.
     pub unsaved_cells: u16,
     pub claims: ClaimsWritten,
-    /// The roster: who begins where.
-    pub launches: Arc<[Launch]>,
-    /// Who of it was not heard of yet, and until when it is taken to be there.
-    pub expected: BTreeMap<u16, Time>,
 }
 
 impl MissionState {
@@ -124,8 +122,7 @@ impl MissionState {
         timers.stop(Timer::HeldCells);
         self.negotiation.void_ownership(me);
         if me.incarnation > FIRST_LIFE {
-            self.launches = Arc::from([]);
-            self.expected.clear();
+            self.company.forget_launches();
         }
         self.able_since = None;
         self.replan = true;
@@ -187,13 +184,6 @@ impl MissionState {
         !sections.plan().is_empty() || !sections.held().is_empty()
     }
 
-    /// How many times eight peers are heard of and live, at least one.
-    pub fn eights(&self) -> u64 {
-        let heard_of = self.company.live.len();
-        let heard_of = heard_of.saturating_sub(self.expected.len());
-        (heard_of / MEMBERS_MAX).max(1) as u64
-    }
-
     pub fn eta_ms(&self) -> u32 {
         let sections = &self.negotiation.sections;
         match &self.executive {
@@ -211,6 +201,402 @@ impl MissionState {
         }
     }
 
+    pub fn on_event(&mut self, event: Event) -> Effects {
+        match event {
+            Event::Seen(cells) => {
+                let mut seen = CellSet::of(self.covered().capacity(), cells);
+                seen.subtract(self.covered());
+                if seen.is_empty() {
+                    return Effects::new();
+                }
+                self.negotiation.sections.cover(&seen);
+                self.negotiation.note_covered();
+                self.unsaved_cells = self.unsaved_cells.saturating_add(seen.count());
+                let cells = seen.iter().collect();
+                let mut effects = vec![
+                    Effect::Report(Report::Covered { cells }),
+                    Effect::CoverageChanged,
+                ];
+                effects.extend(self.save_covered(false));
+                effects
+            }
+            Event::PlanDone => {
+                self.replan |= !self.negotiation.sections.plan().is_empty();
+                Effects::new()
+            }
+            Event::Refused { cells } => {
+                self.negotiation.sections.give_up(&cells);
+                let text = "a cell could not be reached clear of the zones; it was given up";
+                vec![self.claim_changed(), Effect::Alarm(text.into())]
+            }
+        }
+    }
+
+    /// A claim, a bid or covered cells of another peer.
+    pub fn hear(&mut self, now: Time, author: Member, seq: u32, body: Body) -> Effects {
+        let mine = self.loop_hash();
+        let capacity = self.covered().capacity();
+        let negotiation = &mut self.negotiation;
+        let refused = |why: &str| {
+            let reason = why.to_owned();
+            vec![Effect::Report(Report::Refused { reason })]
+        };
+        match body {
+            Body::Claim(claim) => {
+                let listed = claim.plan.iter().chain(&claim.held);
+                let counters = listed.map(|l| l.stamp.epoch.counter);
+                let latest = counters.fold(claim.epoch.counter, u32::max);
+                if !negotiation.rounds.hear_counter(latest) {
+                    return refused("a claim of a round that is far ahead of all heard of");
+                }
+                let (id, life) = (author.id, author.incarnation);
+                let news =
+                    claim.loop_hash == mine && negotiation.sections.hear(id, life, seq, claim);
+                news.then_some(Effect::Negotiate).into_iter().collect()
+            }
+            Body::Bid(bid) if bid.round.loop_hash == mine => {
+                if let Err(why) = negotiation.hear_bid(now, author, &bid) {
+                    return refused(why);
+                }
+                if let Ok(covered) = CellSet::decode_rle(capacity, &bid.covered) {
+                    negotiation.sections.cover(&covered);
+                }
+                vec![Effect::Negotiate]
+            }
+            Body::Bid(bid) => {
+                let believed = negotiation.rounds.believe(&bid.round);
+                believed.err().map_or_else(Effects::new, refused)
+            }
+            Body::Cover(cover) if cover.loop_hash == mine => {
+                let Ok(covered) = CellSet::decode_rle(capacity, &cover.covered) else {
+                    return Effects::new();
+                };
+                let news = negotiation.sections.cover(&covered);
+                let news = news.then_some(Effect::CoverageChanged);
+                let heard = Effect::CoverageHeard(mine, covered);
+                news.into_iter().chain([heard]).collect()
+            }
+            _ => Effects::new(),
+        }
+    }
+
+    /// The own claim changed: it is spoken, and flown by.
+    pub fn claim_changed(&mut self) -> Effect {
+        self.replan = true;
+        Effect::ClaimChanged
+    }
+
+    /// Covered cells, if enough are new to be made durable; `now` takes any.
+    pub fn save_covered(&mut self, now: bool) -> Option<Effect> {
+        let least = if now { 1 } else { CELLS_PER_COVERED_RECORD };
+        if self.unsaved_cells < least {
+            return None;
+        }
+        let cells = core::mem::take(&mut self.unsaved_cells);
+        let entry = Entry::Covered {
+            loop_hash: self.loop_hash(),
+            cells: self.covered().capacity(),
+            covered: self.covered().encode_rle(None),
+        };
+        Some(Effect::Store(Promise::Covered(cells), entry))
+    }
+
+    /// Whether the fuel is due, and the plan was not given up for it yet.
+    fn fuel_is_due(&self, percept: Option<&Percept>) -> bool {
+        percept.is_some() && !self.exhausted && self.spendable_ms(percept) == 0
+    }
+
+    /// Whether a UAV whose fuel was due has some to spend again: it was refuelled, or what
+    /// it had sensed was wrong.
+    fn fuel_is_back(&self, percept: Option<&Percept>) -> bool {
+        self.exhausted && self.spendable_ms(percept) >= FUEL_BACK_MS
+    }
+
+    /// Gives up the plan when the fuel is due, and takes part again when some is back.
+    pub fn watch_fuel(&mut self, percept: Option<&Percept>) -> Effects {
+        if self.fuel_is_due(percept) {
+            return self.give_up_for_fuel();
+        }
+        self.exhausted &= !self.fuel_is_back(percept);
+        Effects::new()
+    }
+
+    /// The fuel is due: the plan is given up.
+    fn give_up_for_fuel(&mut self) -> Effects {
+        assert!(!self.exhausted, "fuel that is due comes due once");
+        self.exhausted = true;
+        self.negotiation.sections.keep(0);
+        let mut effects = vec![self.claim_changed()];
+        if self.executive.is_some() {
+            let text = "the fuel is due: returning to base";
+            effects.push(Effect::Alarm(text.into()));
+        }
+        effects
+    }
+
+    /// Whether this peer can fly what a division gives it.
+    pub fn can_fly_plans(&self, s: &Situation<'_>) -> bool {
+        let senses = s.percept.is_some() && self.executive.is_some();
+        s.role == Role::Uav && senses && !self.exhausted
+    }
+
+    /// Lets the negotiation look at the time, and carries out what it wants.
+    pub fn negotiate(&mut self, s: &Situation<'_>, able: bool, timers: &mut Timers) -> Effects {
+        let before = self.company.present();
+        let (loop_hash, alone) = (self.loop_hash(), self.negotiation.sections.alone());
+        let live_changed = self.company.gather(s, able, loop_hash, alone);
+        let present = self.company.present();
+        self.able_since = able.then(|| self.able_since.unwrap_or(s.now));
+        let is_lost = |(id, life)| present.live.get(id) != Some(life);
+        if live_changed && before.live.iter().any(is_lost) {
+            self.negotiation.note_gone();
+        }
+        let mut ctx = Context {
+            now: s.now,
+            interval_ms: s.membership.interval_ms(),
+            live: &present.live,
+            live_changed,
+            members: &present.members,
+            unheard: present.unheard,
+            diameter: s.membership.diameter(s.now),
+            able_since: self.able_since,
+            revision: self.revision(),
+            loop_hash,
+            held_expired: timers.take_due(Timer::HeldCells, s.now),
+            gain_in_sight: false,
+        };
+        if self.negotiation.take_foresight(&ctx) {
+            ctx.gain_in_sight = self.foresees_gain(s.me.id, &ctx);
+        }
+        let coverage_loop = Arc::clone(&self.geometry.coverage_loop);
+        let mut actions = self.negotiation.tick(&ctx, &coverage_loop);
+        let left_over = self.negotiation.take_left_over(&ctx);
+        let within_reach = left_over.and_then(|cells| self.within_reach(&cells, s.percept));
+        let taken = within_reach.and_then(|cells| self.negotiation.begin_take(&cells));
+        let taken = taken.or_else(|| self.taken_without_a_round(s, &ctx));
+        let taken = taken.or_else(|| self.first_section(s, &ctx));
+        actions.extend(taken.map(Action::Take));
+        let mut effects = Effects::new();
+        let alone = s.membership.live().next().is_none();
+        // What was said of being alone is taken back even where nothing is listed any more.
+        if core::mem::replace(&mut self.alone, alone) != alone && (self.lists() || !alone) {
+            effects.push(Effect::ClaimChanged);
+        }
+        for action in actions {
+            match action {
+                Action::Bid => effects.extend(self.bid(s)),
+                Action::Divide { epoch, ring, uavs } => {
+                    let geometry = Arc::clone(&self.geometry);
+                    let job = Job::Divide {
+                        geometry,
+                        ring,
+                        uavs,
+                    };
+                    effects.push(Effect::Compute(PendingJob::Division(epoch), job));
+                }
+                Action::Take(taken) => effects.extend(self.write_take(taken)),
+                Action::Changed => effects.push(self.claim_changed()),
+            }
+        }
+        effects
+    }
+
+    /// Whether this peer, with nothing to fly, would be of use in a new division of what
+    /// the claims of others list.
+    fn foresees_gain(&self, id: u16, ctx: &Context<'_>) -> bool {
+        let sections = &self.negotiation.sections;
+        let Some(executive) = &self.executive else {
+            return false;
+        };
+        let forecast = executive.forecast(0, &|c| !sections.covered().contains(c));
+        let me = Uav {
+            anchor: forecast.anchor,
+            id,
+            heading: forecast.heading,
+            release_ms: forecast.release_ms,
+            speed_mmps: speed_mmps(executive),
+            turn_ms: executive.turn_ms(),
+            endurance_ms: UNREACHABLE_MS,
+            off_loop: forecast.off_loop,
+        };
+        let present_ms = self.negotiation.present_end_ms(ctx);
+        // The round takes a waiting time.
+        let delay_ms = ctx.first_wait_ms();
+        division::gain_in_sight(
+            &self.geometry,
+            (sections, ctx.live),
+            me,
+            present_ms,
+            delay_ms,
+        )
+    }
+
+    /// This peer's bid in the open round, to be told and made durable.
+    fn bid(&self, s: &Situation<'_>) -> Effects {
+        let (Some(open), Some(executive)) = (self.negotiation.rounds.open(), &self.executive)
+        else {
+            return Effects::new();
+        };
+        let sections = &self.negotiation.sections;
+        let is_open = |c: u16| !sections.covered().contains(c);
+        let forecast = executive.forecast(open.round.wait_ms, &is_open);
+        let is_planned = |c: &u16| sections.plan().iter().any(|p| p.cell == *c);
+        let commits = forecast.cells.iter().copied().filter(is_planned);
+        let idle = sections.plan().is_empty();
+        let bid = Bid {
+            round: open.round.clone(),
+            anchor: forecast.anchor,
+            backward: forecast.heading == Direction::Backward,
+            release_ms: forecast.release_ms,
+            speed_mmps: speed_mmps(executive),
+            turn_ms: executive.turn_ms(),
+            endurance_ms: self
+                .spendable_ms(s.percept)
+                .saturating_sub(forecast.release_ms),
+            covered: sections.covered().encode_rle(Some(BID_COVERED_MAX_BYTES)),
+            commits: CellSet::of(sections.cells(), commits).runs(),
+            off_loop: forecast.off_loop.into_iter().collect(),
+            eta_ms: if idle { 0 } else { forecast.finish_ms },
+            calm: self.negotiation.is_calm(s.now, s.membership.interval_ms()),
+            progressed: self.negotiation.progressed(),
+        };
+        let report = Report::Round {
+            counter: bid.round.counter,
+            members: bid.round.members.iter().map(|m| PeerId(m.id)).collect(),
+        };
+        let entry = Entry::Bid(bid.clone());
+        vec![
+            Effect::Report(report),
+            Effect::Store(Promise::Bid(Box::new(bid)), entry),
+        ]
+    }
+
+    /// Cells to be taken without a round are made durable, as many as a claim holds.
+    fn write_take(&mut self, mut taken: Vec<PlannedCell>) -> Option<Effect> {
+        let sections = &self.negotiation.sections;
+        let mut plan: Vec<PlannedCell> = sections.plan().iter().chain(&taken).copied().collect();
+        plan.truncate(sections.fitting(&plan));
+        taken.truncate(plan.len().saturating_sub(sections.plan().len()));
+        if self.claims.under_way() || taken.is_empty() {
+            self.negotiation.cancel_take();
+            return None;
+        }
+        let (revision, loop_hash) = (self.revision(), self.loop_hash());
+        let claim = sections.claim_with(sections.epoch(), &plan, revision, loop_hash);
+        let promise = Promise::Take(self.claims.next(), taken);
+        Some(Effect::Store(promise, Entry::Claim(claim)))
+    }
+
+    pub fn divided(&mut self, s: &Situation<'_>, epoch: Epoch, division: &Division) -> Effects {
+        let Some(adoption) = self.negotiation.divided(s.now, epoch, division) else {
+            return Effects::new();
+        };
+        let claim = self.negotiation.sections.claim_with(
+            adoption.epoch,
+            &adoption.plan,
+            self.revision(),
+            self.loop_hash(),
+        );
+        let promise = Promise::Adopt(self.claims.next(), Box::new(adoption));
+        vec![Effect::Store(promise, Entry::Claim(claim))]
+    }
+
+    /// Lists only what can be flown (S10): the rest is orphaned, and that is a loss.
+    /// Returns whether anything was given up.
+    pub fn keep_within_endurance(&mut self, percept: Option<&Percept>) -> bool {
+        let spendable = self.spendable_ms(percept);
+        let Some(executive) = &self.executive else {
+            return false;
+        };
+        let sections = &self.negotiation.sections;
+        let legs = legs_of(sections.plan(), sections.cells());
+        let times = executive.schedule(&legs, &|c| !sections.covered().contains(c));
+        let Some((late, _)) = times.iter().find(|(_, ms)| *ms > spendable) else {
+            return false;
+        };
+        let good = sections.plan().iter().position(|p| p.cell == *late);
+        self.negotiation.sections.keep(good.unwrap_or(0));
+        self.replan = true;
+        true
+    }
+
+    /// A plan takes longer than when it was adopted if its first turn is begun from another
+    /// pose, or if the UAV waited elsewhere meanwhile: what the fuel allows is looked at
+    /// once a period.
+    pub fn check_endurance(&mut self, s: &Situation<'_>) -> Option<Effect> {
+        let looked_ago_ms = self.fuel_looked_at.map(|t| s.now.since_ms(t));
+        let planned = !self.negotiation.sections.plan().is_empty();
+        if !planned || looked_ago_ms.is_some_and(|ms| ms < s.period_ms) {
+            return None;
+        }
+        self.fuel_looked_at = Some(s.now);
+        self.keep_within_endurance(s.percept)
+            .then(|| self.claim_changed())
+    }
+
+    /// All that can be covered is covered, or again not: the mission ends, the next lap
+    /// begins once the others had the time to hear of the last cells, or it goes on.
+    pub fn notice_end(&mut self, s: &Situation<'_>, timers: &mut Timers) -> Effects {
+        let complete = self.negotiation.sections.complete();
+        if complete && self.geometry.mission.further_laps > 0 {
+            return self.next_lap(s, timers);
+        }
+        if complete == self.finished {
+            return Effects::new();
+        }
+        self.finished = complete;
+        self.replan = true;
+        if !complete || s.role != Role::Uav {
+            return Effects::new();
+        }
+        let revision = self.revision();
+        let mut effects = vec![
+            Effect::Report(Report::Finished { revision }),
+            Effect::MissionFinished,
+            Effect::ClaimChanged,
+            Effect::CoverageChanged,
+        ];
+        effects.extend(self.save_covered(true));
+        effects
+    }
+
+    fn next_lap(&mut self, s: &Situation<'_>, timers: &mut Timers) -> Effects {
+        if timers.at(Timer::NextLap).is_none() {
+            timers.set(Timer::NextLap, s.now.plus_ms(LAP_PERIODS * s.period_ms));
+            let mut effects = vec![Effect::CoverageChanged];
+            effects.extend(self.save_covered(true));
+            return effects;
+        }
+        let next = timers
+            .is_due(Timer::NextLap, s.now)
+            .then(|| self.geometry.mission.next_lap())
+            .flatten();
+        next.map(|m| Effect::Offer(Arc::new(m)))
+            .into_iter()
+            .collect()
+    }
+
+    /// Gives the executive its goal, if that changed.
+    pub fn steer(&mut self, goal: Goal) {
+        let sections = &self.negotiation.sections;
+        let same_kind = match (&self.goal, &goal) {
+            (Some(Goal::Legs(_)), Goal::Legs(_)) => true,
+            (Some(a), b) => a == b,
+            (None, _) => false,
+        };
+        if same_kind && !core::mem::take(&mut self.replan) {
+            return;
+        }
+        self.replan = false;
+        if same_kind && !matches!(goal, Goal::Legs(_)) {
+            return;
+        }
+        if let Some(executive) = &mut self.executive {
+            executive.set_goal(goal.clone(), &|c| !sections.covered().contains(c));
+        }
+        self.goal = Some(goal);
+    }
+
     /// The state of a mission whose geometry has arrived, with what is kept of the last
     /// one.
     pub fn begun(
@@ -224,17 +610,19 @@ impl MissionState {
         // A loop of more cells is no geometry: `LoopError::TooManyCells`.
         let cells = u16::try_from(geometry.coverage_loop.len()).unwrap_or(u16::MAX);
         timers.stop(Timer::NextLap);
-        let launches = roster(old.as_ref(), me, config, durable);
-        let others = launches.iter().map(|l| l.id).filter(|id| *id != me.id);
         let mut new = Self {
-            expected: others.map(|id| (id, Time(u64::MAX))).collect(),
-            launches,
-            negotiation: negotiation_begun(&geometry, old.as_ref(), me, durable, cells),
+            negotiation: negotiation_begun(
+                &geometry,
+                old.as_ref().map(|m| (&*m.geometry, &m.negotiation)),
+                me,
+                durable,
+                cells,
+            ),
             executive: executive_for(&geometry, config),
             goal: None,
             replan: true,
             able_since: None,
-            company: Arc::default(),
+            company: Company::begun(old.is_none(), me, config, durable),
             alone: false,
             finished: false,
             astray: false,
@@ -265,8 +653,6 @@ impl MissionState {
         self.alone = old.alone;
         self.claims = old.claims;
         self.unsaved_cells = old.unsaved_cells;
-        self.launches = old.launches;
-        self.expected = old.expected;
         let (new, before) = (&self.geometry.mission, &old.geometry.mission);
         let flown_alike = new.zones == before.zones
             && new.turn_radius_mm == before.turn_radius_mm
@@ -280,106 +666,20 @@ impl MissionState {
     }
 }
 
-/// The roster, where it says how things are: of a large fleet, at its first mission and in the
-/// first life.
-fn roster(
-    old: Option<&MissionState>,
-    me: Member,
-    config: &PeerConfig,
-    durable: &Durable,
-) -> Arc<[Launch]> {
-    let first = old.is_none() && me.incarnation.max(durable.incarnation) <= FIRST_LIFE;
-    let many = are_many(config.launches.len());
-    if first && many && config.launches.iter().any(|l| l.id == me.id) {
-        Arc::clone(&config.launches)
-    } else {
-        Arc::from([])
-    }
-}
-
-fn executive_for(geometry: &MissionGeometry, config: &PeerConfig) -> Option<Executive> {
-    let (mission, airframe) = (&geometry.mission, config.airframe?);
-    let (coverage_loop, router) = (&geometry.coverage_loop, &geometry.router);
-    let executive = Executive::new(
-        airframe,
-        config.height_m,
-        Arc::clone(coverage_loop),
-        Arc::clone(router),
-    );
-    Some(
-        executive
-            .with_tracking_error_m(mission.tracking_error_m())
-            .with_objective(config.objective)
-            .with_home(mission.base_m()),
-    )
-}
-
-/// A negotiation on a new loop, with all that is known to be covered.
-fn negotiation_begun(
-    geometry: &MissionGeometry,
-    old: Option<&MissionState>,
-    me: Member,
-    durable: &Durable,
-    cells: u16,
-) -> Negotiation {
-    let coverage_loop = &geometry.coverage_loop;
-    let without_need = (0u16..)
-        .zip(coverage_loop.cells())
-        .filter(|(_, c)| !c.needed);
-    let needless = CellSet::of(cells, without_need.map(|(i, _)| i));
-    let counter = old.map_or(0, |m| m.negotiation.rounds.counter());
-    let mut negotiation = Negotiation::new(me, needless, counter.max(durable.counter));
-    // Every lap begins with nothing covered.
-    let same_lap = |old: &&MissionState| old.geometry.mission.lap == geometry.mission.lap;
-    if let Some(old) = old.filter(same_lap) {
-        let before = &old.geometry.coverage_loop;
-        let covered = carried_over(before, old.covered(), coverage_loop);
-        negotiation.sections.cover(&covered);
-    }
-    if let Some(covered) = remembered(durable, coverage_loop.hash(), cells) {
-        negotiation.sections.cover(&covered);
-    }
-    let of_this_loop = |claim: &&Claim| claim.loop_hash == coverage_loop.hash();
-    if let Some(claim) = durable.claim.as_ref().filter(of_this_loop) {
-        negotiation.sections.restore_epoch(claim.epoch);
-    }
-    negotiation
-}
-
-/// Covered cells the journal held, if they are counted on this loop.
-fn remembered(durable: &Durable, loop_hash: u64, cells: u16) -> Option<CellSet> {
-    if durable.loop_hash == loop_hash && durable.cells == cells {
-        CellSet::decode_rle(cells, &durable.covered).ok()
-    } else {
-        None
-    }
-}
-
-/// Covered cells of one loop, found again at the same places of another: by name on one grid;
-/// pieces, whose names are mere numbers, by their corners.
-fn carried_over(old: &CoverageLoop, covered: &CellSet, new: &CoverageLoop) -> CellSet {
-    let before = |c: u16| old.cells().get(usize::from(c)).filter(|c| c.needed);
-    let seen = covered.iter().filter_map(before).map(|c| c.id);
-    let found: Vec<CellId> = match (old.patches(), new.patches()) {
-        (Patches::Grid(a), Patches::Grid(b)) if a == b => seen.collect(),
-        (Patches::Listed(a), Patches::Listed(b)) => {
-            let place = |n: u16| a.corners().get(usize::from(n)).map(|c| ring_mm(c));
-            let places: BTreeSet<Vec<PointMm>> =
-                seen.filter_map(|id| place(id.number()?)).collect();
-            let pieces = (0_u16..).zip(b.corners());
-            let same = pieces.filter(|(_, c)| places.contains(&ring_mm(&c[..])));
-            same.map(|(n, _)| CellId::numbered(n)).collect()
-        }
-        _ => Vec::new(),
-    };
-    let found = found.into_iter().filter_map(|id| new.index_of(id));
-    CellSet::of(u16::try_from(new.len()).unwrap_or(u16::MAX), found)
+/// How fast a UAV gets on along the loop, mm/s.
+pub(crate) fn speed_mmps(executive: &Executive) -> u32 {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "an airspeed is a small positive number"
+    )]
+    let speed_mmps = (executive.loop_speed_mps() * 1000.0) as u32;
+    speed_mmps
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{CoverageTask, Mission, PointTask};
 
     #[test]
     fn only_the_last_claim_written_is_installed() {
@@ -394,61 +694,5 @@ mod tests {
             !on_a_new_loop.answer(third),
             "it was written for the old loop"
         );
-    }
-
-    #[test]
-    fn covered_cells_are_carried_to_another_loop_by_name() {
-        let of = |cols| {
-            Arc::new(crate::testing::mission(1, cols, 4))
-                .geometry()
-                .unwrap()
-        };
-        let (before, after) = (of(6), of(8));
-        let (old, new) = (&before.coverage_loop, &after.coverage_loop);
-        let mut renumbered = 0;
-        for (i, cell) in (0u16..).zip(old.cells()) {
-            let n = u16::try_from(old.len()).unwrap();
-            let carried = carried_over(old, &CellSet::of(n, [i]), new);
-            let found: Vec<u16> = carried.iter().collect();
-            let wanted = new.index_of(cell.id).filter(|_| cell.needed);
-            assert_eq!(found, wanted.into_iter().collect::<Vec<_>>());
-            renumbered += u32::from(wanted.is_some_and(|w| w != i));
-        }
-        assert!(renumbered > 0, "no cell has another number");
-    }
-
-    /// Of other targets the third is what the second was: not the number counts.
-    #[test]
-    fn covered_points_are_carried_to_another_loop_by_their_places() {
-        let points = |at: &[PointMm]| {
-            let point = |at: &PointMm| PointTask {
-                at: *at,
-                radius_mm: 1_000,
-            };
-            let task = CoverageTask::Points(at.iter().map(point).collect());
-            let mission = Mission {
-                task,
-                ..crate::testing::mission(1, 6, 4)
-            };
-            Arc::new(mission).geometry().unwrap()
-        };
-        let (a, b, c) = ((20_000, 30_000), (150_000, 40_000), (80_000, 120_000));
-        let (before, after) = (points(&[a, b]), points(&[c, a, b]));
-        let (old, new) = (&before.coverage_loop, &after.coverage_loop);
-        for n in 0..2 {
-            let seen = old.index_of(CellId::numbered(n)).unwrap();
-            let carried = carried_over(old, &CellSet::of(2, [seen]), new);
-            let wanted = new.index_of(CellId::numbered(n + 1));
-            assert_eq!(carried.iter().next(), wanted);
-            assert_eq!(carried.count(), 1);
-        }
-        // A lane's name says nothing of a point, nor a point's number of a lane.
-        let lanes = Arc::new(crate::testing::mission(1, 6, 4))
-            .geometry()
-            .unwrap();
-        let (old, new) = (&lanes.coverage_loop, &after.coverage_loop);
-        let all = |l: &CoverageLoop| CellSet::full(u16::try_from(l.len()).unwrap());
-        assert!(carried_over(old, &all(old), new).is_empty());
-        assert!(carried_over(new, &all(new), old).is_empty());
     }
 }

@@ -201,7 +201,7 @@ impl Outbound {
             eta_ms: claim.eta_ms,
         };
         self.last_claim = self.jittered(s.now, rng);
-        let again_ms = CLAIM_INTERVALS * state.eights() * self.interval_ms;
+        let again_ms = CLAIM_INTERVALS * state.company.eights() * self.interval_ms;
         timers.set(Timer::Claim, self.last_claim.plus_ms(again_ms));
         vec![Effect::Speak(0, Body::Claim(claim)), Effect::Report(report)]
     }

@@ -4,19 +4,18 @@
 //! [`crate::protocol::negotiation`]'s.
 
 use crate::cells::CellSet;
-use crate::cooperation::{Situation, speed_mmps};
-use crate::mission_state::MissionState;
+use crate::cooperation::Situation;
+use crate::mission_state::{MissionState, speed_mmps};
 use crate::protocol::airtime::LASTING_INTERVALS;
 use crate::protocol::launches;
 use crate::protocol::negotiation::{Context, SETTLE_INTERVALS};
 use crate::protocol::runs::{PlannedCell, cells_of, legs_of};
-use crate::protocol::sections::{FIRST_LIFE, LivePeers};
 use crate::protocol::sharing::{self, Hand, Owner, Pace, Site};
 use crate::wire::message::CellRun;
 use skein_behaviors::Percept;
 use skein_flight::coverage::ring::backtracking::Leg;
 use skein_flight::coverage::ring::{Direction, LoopCell};
-use std::sync::Arc;
+use std::collections::BTreeMap;
 
 /// Turning round and coming onto a stretch is reckoned as so many turn radii: 7π/3.
 const TURN_RADII: u32 = 7;
@@ -122,10 +121,8 @@ impl MissionState {
         let lp = &self.geometry.coverage_loop;
         let mission = &self.geometry.mission;
         let turn_mm = mission.turn_radius_mm.saturating_mul(TURN_RADII);
-        let planned = launches::first_division(&self.launches, lp, turn_mm);
-        let mut mine = Vec::new();
-        self.expected.clear();
-        Arc::make_mut(&mut self.company).of = None;
+        let planned = launches::first_division(self.company.launches(), lp, turn_mm);
+        let (mut mine, mut expected) = (Vec::new(), BTreeMap::new());
         for p in planned {
             if p.id == s.me.id {
                 let flown = cells_of(p.run, self.negotiation.sections.cells());
@@ -136,22 +133,13 @@ impl MissionState {
                 continue;
             }
             let eta_ms = u32::try_from(p.end_ms).unwrap_or(u32::MAX);
-            self.expected.insert(p.id, s.now.plus_ms(p.end_ms));
+            expected.insert(p.id, s.now.plus_ms(p.end_ms));
             let sections = &mut self.negotiation.sections;
             sections.presume(p.id, p.run, p.direction, eta_ms);
         }
+        self.company.expect(expected);
         let mine = self.flown_besides(mine, u64::from(self.spendable_ms(s.percept)))?;
         self.negotiation.begin_take(&mine)
-    }
-
-    /// Who was to be launched and was not heard of yet is taken to be there until its section
-    /// would be flown. Returns how many that are.
-    pub(crate) fn add_expected(&mut self, s: &Situation<'_>, live: &mut LivePeers) -> usize {
-        let unheard = |id: u16| s.membership.status(id).is_none();
-        self.expected
-            .retain(|id, until| s.now < *until && unheard(*id));
-        live.extend(self.expected.keys().map(|id| (*id, FIRST_LIFE)));
-        self.expected.len()
     }
 
     /// An even share of the loop near this peer, judged from where its neighbours are. Whoever
@@ -161,7 +149,7 @@ impl MissionState {
         s: &Situation<'_>,
         ctx: &Context<'_>,
     ) -> Option<Vec<PlannedCell>> {
-        let is_launched = self.launches.iter().any(|l| l.id == s.me.id);
+        let is_launched = self.company.launches().iter().any(|l| l.id == s.me.id);
         if !self.negotiation.take_begin(ctx, is_launched) {
             return None;
         }

@@ -1,0 +1,157 @@
+//! What a peer begins another mission with: its executive, and a negotiation on the new loop
+//! that keeps what was covered at the same places.
+
+use crate::cells::CellSet;
+use crate::config::PeerConfig;
+use crate::journal::Durable;
+use crate::mission::{PointMm, ring_mm};
+use crate::offload::MissionGeometry;
+use crate::protocol::Negotiation;
+use crate::wire::message::{Claim, Member};
+use skein_behaviors::Executive;
+use skein_flight::coverage::ring::patch::Patches;
+use skein_flight::coverage::ring::{CellId, CoverageLoop};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// An executive for a mission; none for a ground station.
+pub(crate) fn executive_for(geometry: &MissionGeometry, config: &PeerConfig) -> Option<Executive> {
+    let (mission, airframe) = (&geometry.mission, config.airframe?);
+    let (coverage_loop, router) = (&geometry.coverage_loop, &geometry.router);
+    let executive = Executive::new(
+        airframe,
+        config.height_m,
+        Arc::clone(coverage_loop),
+        Arc::clone(router),
+    );
+    Some(
+        executive
+            .with_tracking_error_m(mission.tracking_error_m())
+            .with_objective(config.objective)
+            .with_home(mission.base_m()),
+    )
+}
+
+/// A negotiation on a new loop, with all that is known to be covered: before, on the loop of
+/// an `old` mission, and by the journal.
+pub(crate) fn negotiation_begun(
+    geometry: &MissionGeometry,
+    old: Option<(&MissionGeometry, &Negotiation)>,
+    me: Member,
+    durable: &Durable,
+    cells: u16,
+) -> Negotiation {
+    let coverage_loop = &geometry.coverage_loop;
+    let without_need = (0u16..)
+        .zip(coverage_loop.cells())
+        .filter(|(_, c)| !c.needed);
+    let needless = CellSet::of(cells, without_need.map(|(i, _)| i));
+    let counter = old.map_or(0, |(_, negotiation)| negotiation.rounds.counter());
+    let mut negotiation = Negotiation::new(me, needless, counter.max(durable.counter));
+    // Every lap begins with nothing covered.
+    if let Some((before, old)) = old.filter(|(g, _)| g.mission.lap == geometry.mission.lap) {
+        let covered = old.sections.covered();
+        let covered = carried_over(&before.coverage_loop, covered, coverage_loop);
+        negotiation.sections.cover(&covered);
+    }
+    if let Some(covered) = remembered(durable, coverage_loop.hash(), cells) {
+        negotiation.sections.cover(&covered);
+    }
+    let of_this_loop = |claim: &&Claim| claim.loop_hash == coverage_loop.hash();
+    if let Some(claim) = durable.claim.as_ref().filter(of_this_loop) {
+        negotiation.sections.restore_epoch(claim.epoch);
+    }
+    negotiation
+}
+
+/// Covered cells the journal held, if they are counted on this loop.
+fn remembered(durable: &Durable, loop_hash: u64, cells: u16) -> Option<CellSet> {
+    if durable.loop_hash == loop_hash && durable.cells == cells {
+        CellSet::decode_rle(cells, &durable.covered).ok()
+    } else {
+        None
+    }
+}
+
+/// Covered cells of one loop, found again at the same places of another: by name on one grid;
+/// pieces, whose names are mere numbers, by their corners.
+fn carried_over(old: &CoverageLoop, covered: &CellSet, new: &CoverageLoop) -> CellSet {
+    let before = |c: u16| old.cells().get(usize::from(c)).filter(|c| c.needed);
+    let seen = covered.iter().filter_map(before).map(|c| c.id);
+    let found: Vec<CellId> = match (old.patches(), new.patches()) {
+        (Patches::Grid(a), Patches::Grid(b)) if a == b => seen.collect(),
+        (Patches::Listed(a), Patches::Listed(b)) => {
+            let place = |n: u16| a.corners().get(usize::from(n)).map(|c| ring_mm(c));
+            let places: BTreeSet<Vec<PointMm>> =
+                seen.filter_map(|id| place(id.number()?)).collect();
+            let pieces = (0_u16..).zip(b.corners());
+            let same = pieces.filter(|(_, c)| places.contains(&ring_mm(&c[..])));
+            same.map(|(n, _)| CellId::numbered(n)).collect()
+        }
+        _ => Vec::new(),
+    };
+    let found = found.into_iter().filter_map(|id| new.index_of(id));
+    CellSet::of(u16::try_from(new.len()).unwrap_or(u16::MAX), found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{CoverageTask, Mission, PointTask};
+
+    #[test]
+    fn covered_cells_are_carried_to_another_loop_by_name() {
+        let of = |cols| {
+            Arc::new(crate::testing::mission(1, cols, 4))
+                .geometry()
+                .unwrap()
+        };
+        let (before, after) = (of(6), of(8));
+        let (old, new) = (&before.coverage_loop, &after.coverage_loop);
+        let mut renumbered = 0;
+        for (i, cell) in (0u16..).zip(old.cells()) {
+            let n = u16::try_from(old.len()).unwrap();
+            let carried = carried_over(old, &CellSet::of(n, [i]), new);
+            let found: Vec<u16> = carried.iter().collect();
+            let wanted = new.index_of(cell.id).filter(|_| cell.needed);
+            assert_eq!(found, wanted.into_iter().collect::<Vec<_>>());
+            renumbered += u32::from(wanted.is_some_and(|w| w != i));
+        }
+        assert!(renumbered > 0, "no cell has another number");
+    }
+
+    /// Of other targets the third is what the second was: not the number counts.
+    #[test]
+    fn covered_points_are_carried_to_another_loop_by_their_places() {
+        let points = |at: &[PointMm]| {
+            let point = |at: &PointMm| PointTask {
+                at: *at,
+                radius_mm: 1_000,
+            };
+            let task = CoverageTask::Points(at.iter().map(point).collect());
+            let mission = Mission {
+                task,
+                ..crate::testing::mission(1, 6, 4)
+            };
+            Arc::new(mission).geometry().unwrap()
+        };
+        let (a, b, c) = ((20_000, 30_000), (150_000, 40_000), (80_000, 120_000));
+        let (before, after) = (points(&[a, b]), points(&[c, a, b]));
+        let (old, new) = (&before.coverage_loop, &after.coverage_loop);
+        for n in 0..2 {
+            let seen = old.index_of(CellId::numbered(n)).unwrap();
+            let carried = carried_over(old, &CellSet::of(2, [seen]), new);
+            let wanted = new.index_of(CellId::numbered(n + 1));
+            assert_eq!(carried.iter().next(), wanted);
+            assert_eq!(carried.count(), 1);
+        }
+        // A lane's name says nothing of a point, nor a point's number of a lane.
+        let lanes = Arc::new(crate::testing::mission(1, 6, 4))
+            .geometry()
+            .unwrap();
+        let (old, new) = (&lanes.coverage_loop, &after.coverage_loop);
+        let all = |l: &CoverageLoop| CellSet::full(u16::try_from(l.len()).unwrap());
+        assert!(carried_over(old, &all(old), new).is_empty());
+        assert!(carried_over(new, &all(new), old).is_empty());
+    }
+}
