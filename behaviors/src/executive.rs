@@ -481,7 +481,7 @@ impl Executive {
         let mut at = start;
         while self.track.left_m() < least_m {
             let moves = self.next_moves(&at, is_open, events);
-            for step in self.cleared(&at, moves, events) {
+            for step in self.transit.cleared(&at, moves, events) {
                 at = self.push(&at, step);
             }
         }

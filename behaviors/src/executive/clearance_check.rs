@@ -7,8 +7,8 @@
 //! without proof is not flown: its cell is refused, its route is replaced by the circle
 //! here that keeps farthest.
 
+use super::Event;
 use super::transit::{ESCAPE_SLACK_M, Move, Place, Transit};
-use super::{Event, Executive};
 use skein_geometry::frame::Pose;
 use skein_geometry::{Curve, Segment};
 
@@ -34,15 +34,7 @@ impl Transit {
             Move::Loiter(circle) => zones.is_clear(&halves(circle), margin_m),
         }
     }
-}
 
-/// A full circle in two halves, because a whole one ends where it begins.
-fn halves(circle: &Segment) -> Curve {
-    let piece = (circle.curvature_per_m, 0.5 * circle.length_m);
-    Curve::from_pieces(circle.start, &[piece, piece])
-}
-
-impl Executive {
     /// Of moves that follow each other from a place, what may be flown. Where one lacks
     /// its proof, the cell they lead to is refused; without a cell it is held instead.
     pub(super) fn cleared(
@@ -53,8 +45,8 @@ impl Executive {
     ) -> Vec<Move> {
         let mut place = *at;
         let all = moves.iter().all(|step| {
-            let cleared = self.transit.is_cleared(&place, step);
-            place = self.transit.end_of(&place, step);
+            let cleared = self.is_cleared(&place, step);
+            place = self.end_of(&place, step);
             cleared
         });
         if all {
@@ -68,9 +60,15 @@ impl Executive {
             })
             .collect();
         if cells.is_empty() {
-            return vec![self.transit.stay(at)];
+            return vec![self.stay(at)];
         }
         events.push(Event::Refused { cells });
         Vec::new()
     }
+}
+
+/// A full circle in two halves, because a whole one ends where it begins.
+fn halves(circle: &Segment) -> Curve {
+    let piece = (circle.curvature_per_m, 0.5 * circle.length_m);
+    Curve::from_pieces(circle.start, &[piece, piece])
 }
