@@ -132,16 +132,6 @@ impl Executive {
             .collect()
     }
 
-    /// Flown time of `legs` if they became the goal now, milliseconds. Without a
-    /// percept [`UNREACHABLE_MS`].
-    #[must_use]
-    pub fn leg_time_ms(&self, legs: &[Leg], is_open: &dyn Fn(u16) -> bool) -> u32 {
-        if self.played.is_none() {
-            return UNREACHABLE_MS;
-        }
-        self.schedule(legs, is_open).last().map_or(0, |(_, ms)| *ms)
-    }
-
     /// Flight time that may still be planned: what is left less the reserve and the way
     /// home, milliseconds.
     #[must_use]

@@ -18,7 +18,7 @@
 
 use crate::setpoint::{MAX_STEPS, Steer};
 use skein_geometry::frame::{Point, Pose};
-use skein_geometry::math::{TAU, asin, atan2, cos, sin, wrap_pi, wrap_tau};
+use skein_geometry::math::{TAU, atan2, cos, sin, wrap_pi, wrap_tau};
 use skein_geometry::{Curve, Segment};
 use std::collections::VecDeque;
 
@@ -386,12 +386,6 @@ fn turn(at: Pose, speed_mps: f64, rate_radps: f64, ms: u32) -> Pose {
         north_m: at.north_m + chord * sin(course),
         heading_rad: wrap_pi(at.heading_rad + 2.0 * half),
     }
-}
-
-/// The steepest angle at which a far curve is approached, radians.
-#[must_use]
-pub fn approach_angle_rad(speed_mps: f64) -> f64 {
-    asin(MAX_CORRECTED_M / (1.5 * speed_mps * CORRECTION_S))
 }
 
 #[cfg(test)]

@@ -70,19 +70,6 @@ impl Overlay {
     }
 }
 
-/// A pair of nodes that came to hear each other, or ceased to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Change {
-    /// When it was noticed, milliseconds.
-    pub at_ms: u64,
-    /// The lower number.
-    pub a: u16,
-    /// The higher number.
-    pub b: u16,
-    /// Why they do not hear each other; nothing when they do.
-    pub cause: Option<Reason>,
-}
-
 /// The links between all nodes of a world, as of the last computation.
 #[derive(Clone, Debug)]
 pub struct LinkTable {
@@ -96,7 +83,6 @@ pub struct LinkTable {
     looks: Vec<Option<(Place, Place, bool)>>,
     /// By pair: whether both directions were up; nothing while an end is absent.
     up: Vec<Option<bool>>,
-    changes: Vec<Change>,
     cut_by_range: u64,
     cut_by_sight: u64,
     cut_by_fault: u64,
@@ -116,7 +102,6 @@ impl LinkTable {
             states: vec![LinkState::DOWN; n * n],
             looks: vec![None; n * n],
             up: vec![None; n * n],
-            changes: Vec::new(),
             cut_by_range: 0,
             cut_by_sight: 0,
             cut_by_fault: 0,
@@ -172,7 +157,7 @@ impl LinkTable {
                     state(self.nodes[j], self.nodes[i]),
                 );
                 (self.states[there], self.states[back]) = (ab, ba);
-                self.note(world.now_ms(), i, j, cause(&ab).or(cause(&ba)));
+                self.note(i, j, cause(&ab).or(cause(&ba)));
             }
         }
     }
@@ -190,7 +175,7 @@ impl LinkTable {
         sees
     }
 
-    fn note(&mut self, at_ms: u64, i: usize, j: usize, cause: Option<Reason>) {
+    fn note(&mut self, i: usize, j: usize, cause: Option<Reason>) {
         let pair = i * self.nodes.len() + j;
         let was = self.up[pair].replace(cause.is_none());
         if was == Some(cause.is_none()) || (was.is_none() && cause.is_some()) {
@@ -202,21 +187,10 @@ impl LinkTable {
             Some(_) => self.cut_by_fault += 1,
             None => {}
         }
-        self.changes.push(Change {
-            at_ms,
-            a: self.nodes[i],
-            b: self.nodes[j],
-            cause,
-        });
     }
 
-    /// The changes since the last call. Nodes that come and go are none: a link that
-    /// ended because one end was lost is not a cut.
-    pub fn take_changes(&mut self) -> Vec<Change> {
-        std::mem::take(&mut self.changes)
-    }
-
-    /// How often a pair that heard each other ceased to, by range, by sight, by fault.
+    /// How often a pair that heard each other ceased to, by range, by sight, by fault. A link
+    /// that ended because one end was lost is not cut.
     #[must_use]
     pub fn cuts(&self) -> (u64, u64, u64) {
         (self.cut_by_range, self.cut_by_sight, self.cut_by_fault)
@@ -306,7 +280,15 @@ mod tests {
         let (mut w, mut t) = table(&spec);
         let mut o = Overlay::default();
         t.compute(&w, &o);
-        assert_eq!(t.take_changes().len(), 6, "all pairs came up");
+        let all = [
+            (1, 2),
+            (1, 3),
+            (2, 3),
+            (1, GROUND_ID),
+            (2, GROUND_ID),
+            (3, GROUND_ID),
+        ];
+        assert!(all.iter().all(|(a, b)| t.joined(*a, *b)));
         assert!(o.apply(&Fault::Cut {
             a: 1,
             b: 2,
@@ -328,10 +310,8 @@ mod tests {
         assert!(t.joined(1, 2) && !t.present(3));
         assert_eq!(t.state(1, 2).loss_permille, 1000);
         assert_eq!(t.cuts(), (0, 0, 5));
-        t.take_changes();
         w.respawn(3);
         t.compute(&w, &o);
-        assert!(t.joined(1, 3));
-        assert_eq!(t.take_changes().len(), 3);
+        assert!(all.iter().all(|(a, b)| t.joined(*a, *b)));
     }
 }

@@ -12,5 +12,5 @@
 pub mod graph;
 pub mod link;
 
-pub use link::{Change, LinkTable, Overlay};
+pub use link::{LinkTable, Overlay};
 pub use skein_link::medium::{Channel, Delivery, Frame, Medium, Tally};

@@ -77,8 +77,6 @@ pub struct Judge {
     entries: usize,
     /// By UAV: for every zone whether the UAV was inside it at the end of its last piece.
     inside: BTreeMap<u16, Vec<bool>>,
-    /// By UAV: the least distance to any zone so far.
-    near_m: BTreeMap<u16, f64>,
     closest: Option<Approach>,
     too_close: BTreeMap<(u16, u16), bool>,
 }
@@ -363,7 +361,6 @@ impl Judge {
             room_m: 0.0,
             entries: 0,
             inside: BTreeMap::new(),
-            near_m: BTreeMap::new(),
             closest: None,
             too_close: BTreeMap::new(),
             boards: vec![Board::new(0, survey)],
@@ -512,13 +509,6 @@ impl Judge {
         self.entries
     }
 
-    /// The least distance a UAV ever had to a zone, metres; infinite without zones.
-    /// Exact to a centimetre up to the first entry, where it is zero.
-    #[must_use]
-    pub fn least_zone_distance_m(&self, uav: u16) -> f64 {
-        self.near_m.get(&uav).copied().unwrap_or(f64::INFINITY)
-    }
-
     /// The closest approach so far.
     #[must_use]
     pub fn closest(&self) -> Option<Approach> {
@@ -558,7 +548,6 @@ impl Judge {
             .inside
             .entry(uav)
             .or_insert_with(|| vec![false; n_zones]);
-        let near_m = self.near_m.entry(uav).or_insert(f64::INFINITY);
         let reach = Bounds {
             min: piece.start.position(),
             max: piece.start.position(),
@@ -566,8 +555,7 @@ impl Judge {
         .grown(piece.length_m());
         let zones = surveyed.chain(added).enumerate();
         for (i, (zone, _)) in zones.filter(|(_, (_, binds))| *binds) {
-            let apart_m = zone.bounds.distance_m(&reach);
-            if apart_m > 0.0 && apart_m >= *near_m {
+            if zone.bounds.distance_m(&reach) > 0.0 {
                 inside[i] = false;
                 continue;
             }
@@ -579,9 +567,7 @@ impl Judge {
                 let to = piece
                     .pose_after(span_s * f64::from(k) / f64::from(n))
                     .position();
-                let distance_m = segment_ring_m(from, to, &zone.ring);
-                *near_m = near_m.min(distance_m);
-                let entered = distance_m <= 0.0;
+                let entered = segment_ring_m(from, to, &zone.ring) <= 0.0;
                 if entered && !inside[i] {
                     self.entries += 1;
                     let at_ms = piece.from_ms
@@ -925,11 +911,8 @@ mod tests {
                 .filter(|f| matches!(f, Fact::ZoneEntry { .. }))
                 .collect();
             assert_eq!((found.len(), j.entries()), (entries, entries), "{top}");
-            if entries == 0 {
-                let d = j.least_zone_distance_m(1);
-                assert!((d - 0.05).abs() < 0.011, "{d}");
-            } else {
-                let Fact::ZoneEntry { place, zone: 0, .. } = found[0] else {
+            if let [found] = found[..] {
+                let Fact::ZoneEntry { place, zone: 0, .. } = found else {
                     panic!("{found:?}")
                 };
                 assert!(

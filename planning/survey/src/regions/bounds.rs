@@ -82,43 +82,6 @@ pub fn least_moves(task: &Task) -> u32 {
     moves + u32::from(task.closed && moves % 2 == 1)
 }
 
-/// No plan is done sooner, in moves of a UAV of speed 1, with each UAV flying `speeds`
-/// cells in that time.
-///
-/// # Complexity
-/// O(N + D k log N) for D layers.
-#[must_use]
-pub fn reach_time(task: &Task) -> f64 {
-    let mut far = 0u64;
-    let mut bound = 0.0f64;
-    for (d, here) in (0u32..)
-        .zip(layers(task))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .rev()
-    {
-        far += here;
-        bound = bound.max(least_time(&task.speeds, f64::from(d), far as f64));
-    }
-    bound
-}
-
-/// The least time T with sum over UAVs of max(0, v T − d + 1) at least `cells`.
-fn least_time(speeds: &[u32], d: f64, cells: f64) -> f64 {
-    // With the r fastest UAVs in play: T = (cells + r (d − 1)) / (their speeds).
-    let mut fastest = speeds.to_vec();
-    fastest.sort_unstable_by(|a, b| b.cmp(a));
-    let mut sum = 0.0;
-    let mut least = f64::INFINITY;
-    for (r, v) in (1u32..).zip(&fastest) {
-        sum += f64::from(*v);
-        let t = (cells + f64::from(r) * (d - 1.0)) / sum;
-        // UAVs that cannot get there in t do not help; the others alone give the same t.
-        least = least.min(t.max(0.0));
-    }
-    if least.is_finite() { least } else { 0.0 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::map::{Cell, LaneMap};
@@ -216,7 +179,6 @@ mod tests {
             reach_moves(&Task::new(&map, &[end, end], false).unwrap()),
             9
         );
-        assert!((reach_time(&Task::new(&map, &[end], false).unwrap()) - 9.0).abs() < 1e-12);
     }
 
     #[test]

@@ -13,11 +13,11 @@
 //! | alive | its freshest heartbeat was heard directly, k1 I ago | suspect |
 //! | alive | half of that, and the transport says that the link is gone | suspect |
 //! | alive | a suspicion against this very heartbeat is heard | suspect |
-//! | suspect | a fresher heartbeat from anybody, younger than the bound | alive |
+//! | any | a fresher heartbeat from anybody, younger than the bound | alive; suspect if a suspicion against it is told with it |
 //! | suspect | k2 T' unrefuted | down |
 //! | alive, suspect | heartbeat older than (k1 + k2 + D + 2) T' | down |
-//! | down | a fresher heartbeat from anybody, younger than the bound | alive |
-//! | any | a heartbeat of a later life, younger than the bound | alive, in that life |
+//! | any | a heartbeat of a later life, younger than the bound | likewise, in that life |
+//! | any | a heartbeat of a later life, older than the bound | down, in that life |
 //! | alive | an old heartbeat of the same life with a higher count | alive; gossip says it, until its author takes a new life |
 //!
 //! Ages are sums of holding times, never differences of clocks, and they count

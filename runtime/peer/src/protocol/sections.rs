@@ -263,12 +263,6 @@ impl Sections {
         self.hear(of, FIRST_LIFE, PRESUMED_SEQ, claim);
     }
 
-    /// Whether a peer's cells are only presumed to be listed by it.
-    #[must_use]
-    pub fn is_presumed(&self, of: u16) -> bool {
-        self.heard.get(&of).is_some_and(|h| h.seq == PRESUMED_SEQ)
-    }
-
     /// Nothing is presumed any more.
     pub fn forget_presumed(&mut self) {
         self.heard.retain(|_, h| h.seq != PRESUMED_SEQ);
