@@ -79,13 +79,14 @@ pub const BURST_PERIODS: u64 = 3;
 /// lost it is missed once in 170,000 times.
 pub const LASTING_INTERVALS: u64 = 10;
 
-/// A peer that has sent fewer than three beacons shares with so many, itself included: a
-/// whole swarm may have been started at once.
+/// A peer that has sent fewer than three beacons spends as one of all that were launched, or,
+/// where it does not know how many those are, of so many, itself included: a whole swarm may have
+/// been started at once, and of 255 some 150 are heard in an interval of 16 T in which all begin.
 const FIRST_SHARERS: u64 = 64;
 const FIRST_BEACONS: u8 = 3;
 
-/// Whoever knows how many were launched counts on all of them until it plans so many beacons:
-/// in the first interval each of them is heard twice.
+/// The interval of whoever knows how many were launched is long enough for all of them until it
+/// plans so many beacons.
 const EXPECTING_BEACONS: u8 = 2;
 
 /// A beacon without gossip, in its envelope, at most as long as this but for counters that
@@ -172,8 +173,8 @@ impl Airtime {
         }
     }
 
-    /// So many were to be launched, this peer included: until its second beacon it takes all of
-    /// them to share the channel with it, and a ground station.
+    /// So many were to be launched, this peer included: at first it takes all of them to share
+    /// the channel with it, and a ground station.
     pub fn expect(&mut self, fleet: usize) {
         self.fleet = fleet as u64 + 1;
     }
@@ -237,12 +238,10 @@ impl Airtime {
     }
 
     fn rate_bytes_ps(&self) -> u64 {
-        let least = if self.expects() {
-            self.fleet
-        } else if self.fleet == 0 && self.planned < FIRST_BEACONS {
-            FIRST_SHARERS
-        } else {
-            1
+        let least = match (self.planned < FIRST_BEACONS, self.fleet) {
+            (false, _) => 1,
+            (true, 0) => FIRST_SHARERS,
+            (true, fleet) => fleet,
         };
         self.share_bytes_ps(self.sharers().max(least))
     }
@@ -575,7 +574,7 @@ mod tests {
     }
 
     #[test]
-    fn who_knows_how_many_were_launched_counts_on_them_until_its_second_beacon() {
+    fn who_knows_how_many_were_launched_counts_on_them_until_it_heard_them() {
         for (fleet, first, later) in [(20, 8, 4), (100, 39, 4), (255, 64, 4)] {
             let mut air = Airtime::new(64_000, 1000);
             air.expect(fleet);
@@ -583,9 +582,11 @@ mod tests {
             let bucket = 3_600 / (fleet as i64 + 1) * 3_000;
             assert_eq!(air.tokens_millibytes, bucket, "{fleet}");
             assert_eq!(air.plan_beacon(Time(3_000)).interval, first, "{fleet}");
-            assert_eq!(air.rate_bytes_ps(), 3_600 / (fleet as u64 + 1));
-            // Nobody else was heard.
+            // Nobody else was heard: the interval follows that at once, and what else is said
+            // a beacon later.
             assert_eq!(air.plan_beacon(Time(19_000)).interval, later, "{fleet}");
+            assert_eq!(air.rate_bytes_ps(), 3_600 / (fleet as u64 + 1));
+            assert_eq!(air.plan_beacon(Time(20_000)).interval, later, "{fleet}");
             assert_eq!(air.rate_bytes_ps(), 3_600);
         }
     }
