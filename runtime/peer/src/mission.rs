@@ -300,11 +300,9 @@ impl Mission {
             clearance_m: problem.clearance_m,
         };
         let router = Router::new(zones, limits);
-        Ok(Arc::new(MissionGeometry {
-            mission: Arc::clone(self),
-            coverage_loop: Arc::new(coverage_loop.of_lap(self.lap)),
-            router: Arc::new(router),
-        }))
+        let coverage_loop = coverage_loop.of_lap(self.lap);
+        let geometry = MissionGeometry::new(Arc::clone(self), coverage_loop, router);
+        Ok(Arc::new(geometry))
     }
 
     fn the_loop(&self, problem: &LoopProblem) -> Result<CoverageLoop, LoopError> {

@@ -1,12 +1,18 @@
 //! Work that may take longer than a percept may wait: asked for by an output,
 //! computed by the driver with [`run`], answered by an input.
 
+use crate::config::Launch;
 use crate::mission::{GeometryError, Mission};
+use crate::protocol::launches::{self, Planned};
 use skein_flight::coverage::ring::CoverageLoop;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_flight::coverage::ring::division::{RouteNetwork, divide};
 use skein_flight::route::Router;
-use std::sync::Arc;
+use std::borrow::Cow;
+use std::sync::{Arc, OnceLock};
+
+/// Turning round and coming onto a stretch is reckoned as so many turn radii: 7π/3.
+const TURN_RADII: u32 = 7;
 
 /// What every UAV of a mission derives from it: the loop and the routes.
 #[derive(Clone, Debug)]
@@ -17,9 +23,35 @@ pub struct MissionGeometry {
     pub coverage_loop: Arc<CoverageLoop>,
     /// Routes that keep clear of the zones.
     pub router: Arc<Router>,
+    launched: OnceLock<(Vec<Launch>, Vec<Planned>)>,
 }
 
 impl MissionGeometry {
+    /// A loop and routes derived from a mission.
+    #[must_use]
+    pub fn new(mission: Arc<Mission>, coverage_loop: CoverageLoop, router: Router) -> Self {
+        Self {
+            mission,
+            coverage_loop: Arc::new(coverage_loop),
+            router: Arc::new(router),
+            launched: OnceLock::new(),
+        }
+    }
+
+    /// The sections that a roster begins with. Those of the first roster are remembered: peers
+    /// of one process share the geometry.
+    #[must_use]
+    pub fn first_division(&self, roster: &[Launch]) -> Cow<'_, [Planned]> {
+        let turn_mm = self.mission.turn_radius_mm.saturating_mul(TURN_RADII);
+        let divide = || launches::first_division(roster, &self.coverage_loop, turn_mm);
+        let (of, planned) = self.launched.get_or_init(|| (roster.to_vec(), divide()));
+        if of == roster {
+            Cow::Borrowed(planned)
+        } else {
+            Cow::Owned(divide())
+        }
+    }
+
     /// Divides the open cells of its loop by the rule of its mission.
     #[must_use]
     pub fn divide(&self, ring: &[RingCell], uavs: &[Uav]) -> Division {

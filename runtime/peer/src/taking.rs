@@ -7,7 +7,6 @@ use crate::cells::CellSet;
 use crate::cooperation::Situation;
 use crate::mission_state::{MissionState, speed_mmps};
 use crate::protocol::airtime::LASTING_INTERVALS;
-use crate::protocol::launches;
 use crate::protocol::negotiation::{Context, SETTLE_INTERVALS};
 use crate::protocol::runs::{PlannedCell, cells_of, legs_of};
 use crate::protocol::sharing::{self, Hand, Owner, Pace, Site};
@@ -16,9 +15,7 @@ use skein_behaviors::Percept;
 use skein_flight::coverage::ring::backtracking::Leg;
 use skein_flight::coverage::ring::{Direction, LoopCell};
 use std::collections::BTreeMap;
-
-/// Turning round and coming onto a stretch is reckoned as so many turn radii: 7π/3.
-const TURN_RADII: u32 = 7;
+use std::sync::Arc;
 
 /// A cell is flown in about so long, milliseconds.
 const CELL_MS: u64 = 4000;
@@ -118,12 +115,9 @@ impl MissionState {
     /// The section that the roster gives to this peer, where there is one; and until their own
     /// claims are heard the others are taken to have theirs.
     fn launched(&mut self, s: &Situation<'_>) -> Option<Vec<PlannedCell>> {
-        let lp = &self.geometry.coverage_loop;
-        let mission = &self.geometry.mission;
-        let turn_mm = mission.turn_radius_mm.saturating_mul(TURN_RADII);
-        let planned = launches::first_division(self.company.launches(), lp, turn_mm);
+        let geometry = Arc::clone(&self.geometry);
         let (mut mine, mut expected) = (Vec::new(), BTreeMap::new());
-        for p in planned {
+        for p in geometry.first_division(self.company.launches()).iter() {
             if p.id == s.me.id {
                 let flown = cells_of(p.run, self.negotiation.sections.cells());
                 mine = flown.map(|c| (c, p.direction)).collect();

@@ -13,6 +13,8 @@ use crate::cells::CellSet;
 use crate::wire::message::CellRun;
 use skein_flight::coverage::ring::{CoverageLoop, Direction, LoopCell};
 use skein_geometry::frame::Point;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 
 /// A part of a plan is taken over only if the work of the two then ends this much sooner: at
 /// most this many percent of the time that the owner alone needs.
@@ -194,29 +196,41 @@ impl Pace<'_> {
         all_ms * EVEN_PERCENT / 100 / (among as u64).max(1)
     }
 
+    /// How long the last cells of an owner's plan take, for one, two, … of them, milliseconds.
+    /// What is left to the owner has to last until it has heard of it.
+    fn tails_ms(&self, owner: &Owner, least_ms: u64) -> Vec<u64> {
+        let mut tail_ms = 0;
+        let mut after: Option<u16> = None;
+        let tails = owner.plan.iter().rev().map_while(|(cell, _)| {
+            tail_ms += self.cell_ms(*cell) + after.map_or(0, |a| self.gap_ms(*cell, a));
+            after = Some(*cell);
+            (owner.left_ms.saturating_sub(tail_ms) >= least_ms).then_some(tail_ms)
+        });
+        tails.collect()
+    }
+
     /// How many of the last cells of an owner's plan a hand takes over so that both are done
     /// soonest, and when that is; `None` where it gains too little. What the owner has left may
     /// be mostly the way to a few cells, which a hand beside them takes over whole.
-    fn relieved(&self, owner: &Owner, hand: &Hand, least_ms: u64) -> Option<(usize, u64)> {
+    fn relieved(&self, owner: &Owner, tails_ms: &[u64], hand: &Hand) -> Option<(usize, u64)> {
         let begins_ms = hand.free_ms + self.way_ms(hand.at, owner.plan.last()?.0);
-        let mut tail_ms = 0;
-        let mut best: Option<(u64, usize)> = None;
-        let mut after: Option<u16> = None;
-        for (taken, (cell, _)) in (1..).zip(owner.plan.iter().rev()) {
-            tail_ms += self.cell_ms(*cell) + after.map_or(0, |a| self.gap_ms(*cell, a));
-            after = Some(*cell);
-            // What is left to the owner has to last until it has heard of it.
-            let before_ms = owner.left_ms.saturating_sub(tail_ms);
-            if before_ms < least_ms {
-                break;
-            }
-            let all = taken == owner.plan.len();
-            let done_ms = (begins_ms + tail_ms).max(if all { 0 } else { before_ms });
-            if best.is_none_or(|(ms, _)| done_ms < ms) {
-                best = Some((done_ms, taken));
-            }
-        }
-        let (done_ms, taken) = best?;
+        let before_ms = |tail_ms: u64| owner.left_ms.saturating_sub(tail_ms);
+        // The more is taken the sooner the owner is done and the later the hand is.
+        let is_owner_last = |tail_ms: u64| begins_ms + tail_ms < before_ms(tail_ms);
+        let crossing = tails_ms.partition_point(|tail| is_owner_last(*tail));
+        let (sooner, later) = tails_ms.split_at(crossing);
+        let owner_last = sooner.last().map(|tail| before_ms(*tail));
+        let owner_last = owner_last.map(|done_ms| {
+            let taken = sooner.partition_point(|tail| before_ms(*tail) > done_ms) + 1;
+            (done_ms, taken)
+        });
+        let hand_last = later.first().map(|tail| (begins_ms + tail, crossing + 1));
+        // Without anything left to it the owner is done.
+        let whole = tails_ms
+            .last()
+            .filter(|_| tails_ms.len() == owner.plan.len());
+        let whole = whole.map(|tail| (begins_ms + tail, owner.plan.len()));
+        let (done_ms, taken) = [owner_last, hand_last, whole].into_iter().flatten().min()?;
         (done_ms * 100 <= owner.left_ms * RELIEF_PERCENT).then_some((taken, done_ms))
     }
 
@@ -249,18 +263,20 @@ pub fn relief(
     pace: Pace<'_>,
     least_ms: u64,
 ) -> Option<(Vec<(u16, Direction)>, u64)> {
-    let mut pairs: Vec<(u64, u16, u16, usize)> = Vec::new();
+    let mut pairs = Vec::new();
     for owner in owners {
+        let tails_ms = pace.tails_ms(owner, least_ms);
         for hand in hands {
-            if let Some((taken, done_ms)) = pace.relieved(owner, hand, least_ms) {
+            if let Some((taken, done_ms)) = pace.relieved(owner, &tails_ms, hand) {
                 let gain_ms = owner.left_ms - done_ms;
-                pairs.push((gain_ms, owner.id, hand.id, taken));
+                pairs.push((gain_ms, Reverse((owner.id, hand.id)), taken));
             }
         }
     }
-    pairs.sort_unstable_by(|a, b| b.0.cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    // Few are looked at until this peer's is there.
+    let mut pairs = BinaryHeap::from(pairs);
     let mut met: Vec<(u16, u16)> = Vec::new();
-    for (_, owner, hand, taken) in pairs {
+    while let Some((_, Reverse((owner, hand)), taken)) = pairs.pop() {
         if met.iter().any(|(o, h)| *o == owner || *h == hand) {
             continue;
         }
