@@ -4,7 +4,7 @@
 //! mean the same on every machine and for every near-degenerate ring. Offsets
 //! and distances to curves are in [`super::clearance`].
 
-use crate::frame::Point;
+use crate::frame::{Point, Vector};
 use robust::{Coord, orient2d};
 use thiserror::Error;
 
@@ -116,6 +116,10 @@ impl Polygon {
     pub fn contains(&self, p: Point) -> bool {
         let mut inside = false;
         for (a, b) in self.edges() {
+            // Of the others none is met by a ray to the side.
+            if p.y < a.y.min(b.y) || p.y > a.y.max(b.y) {
+                continue;
+            }
             let s = side(a, b, p);
             if s == 0 && in_box(a, b, p) {
                 return true;
@@ -136,9 +140,8 @@ impl Polygon {
         if self.contains(p) {
             return 0.0;
         }
-        self.edges()
-            .map(|(a, b)| point_to_line_m(p, a, b))
-            .fold(f64::INFINITY, f64::min)
+        let squares = self.edges().map(|(a, b)| to_line(p, a, b).norm_squared());
+        squares.fold(f64::INFINITY, f64::min).sqrt()
     }
 }
 
@@ -170,6 +173,11 @@ pub fn segments_meet(a: Point, b: Point, c: Point, d: Point) -> bool {
 
 /// Distance from `p` to the piece `a b`, metres.
 pub fn point_to_line_m(p: Point, a: Point, b: Point) -> f64 {
+    to_line(p, a, b).norm()
+}
+
+/// The way from the piece `a b` to `p`.
+fn to_line(p: Point, a: Point, b: Point) -> Vector {
     let along = b - a;
     let square = along.norm_squared();
     let t = if square > 0.0 {
@@ -177,7 +185,7 @@ pub fn point_to_line_m(p: Point, a: Point, b: Point) -> f64 {
     } else {
         0.0
     };
-    (p - (a + along * t)).norm()
+    p - (a + along * t)
 }
 
 /// Distance between the pieces `a b` and `c d`, metres.

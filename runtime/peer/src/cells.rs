@@ -96,11 +96,25 @@ impl CellSet {
         if self.n == 0 {
             return false;
         }
-        let mut fresh = false;
-        let mut cell = run.first % self.n;
-        for _ in 0..run.count.min(self.n) {
-            fresh |= self.insert(cell);
-            cell = if cell + 1 == self.n { 0 } else { cell + 1 };
+        let first = run.first % self.n;
+        let count = run.count.min(self.n);
+        // What reaches beyond the last cell goes on at the first.
+        let before = count.min(self.n - first);
+        let fresh = self.insert_stretch(first, before);
+        self.insert_stretch(0, count - before) || fresh
+    }
+
+    /// Adds `count` cells from `first` on, none of them beyond the loop, word by word.
+    fn insert_stretch(&mut self, first: u16, count: u16) -> bool {
+        let (mut fresh, mut at, end) =
+            (false, u32::from(first), u32::from(first) + u32::from(count));
+        while at < end {
+            let next = end.min((at / 64 + 1) * 64);
+            let bits = (u64::MAX >> (64 - (next - at))) << (at % 64);
+            let word = &mut self.words[(at / 64) as usize];
+            fresh |= bits & !*word != 0;
+            *word |= bits;
+            at = next;
         }
         fresh
     }
@@ -212,7 +226,13 @@ impl CellSet {
     /// One flag a cell of the loop.
     #[must_use]
     pub fn flags(&self) -> Vec<bool> {
-        (0..self.n).map(|cell| self.contains(cell)).collect()
+        let bits = |word: &u64| {
+            let word = *word;
+            (0..64).map(move |i| word & (1 << i) != 0)
+        };
+        let mut flags: Vec<bool> = self.words.iter().flat_map(bits).collect();
+        flags.truncate(usize::from(self.n));
+        flags
     }
 
     /// Identifies the content: two sets that differ differ here but for chance.
@@ -367,6 +387,19 @@ mod tests {
             prop_assert_eq!(listed, u32::from(set.count()));
             prop_assert_eq!(set.remove(probe), cells.contains(&probe));
             prop_assert!(!set.contains(probe));
+        }
+
+        #[test]
+        fn a_run_is_its_cells_one_by_one((n, cells) in sets(), first in any::<u16>(), count in any::<u16>()) {
+            let mut set = CellSet::of(n, cells);
+            let mut other = set.clone();
+            let listed = (0..u32::from(count.min(n))).map(|k| (u32::from(first) + k) % u32::from(n.max(1)));
+            // Not any(): each of them is added.
+            let fresh = listed.map(|c| other.insert(u16::try_from(c).unwrap())).fold(false, |a, b| a | b);
+            prop_assert_eq!(set.insert_run(CellRun { first, count }), fresh);
+            let flags: Vec<bool> = (0..n).map(|c| other.contains(c)).collect();
+            prop_assert_eq!(set.flags(), flags);
+            prop_assert_eq!(set, other);
         }
 
         #[test]

@@ -43,6 +43,10 @@ impl CoverCheck {
         covered: &[bool],
         found: &mut Findings,
     ) {
+        let known = self.known.entry(id).or_default();
+        if known.0 == snapshot.loop_hash && known.1 == covered {
+            return;
+        }
         for (c, (marked, seen)) in covered.iter().zip(snapshot.covered).enumerate() {
             let cell = u16::try_from(c).unwrap_or(u16::MAX);
             if *marked && !*seen && self.false_marks.insert((id, cell), ()).is_none() {
@@ -51,7 +55,6 @@ impl CoverCheck {
                 });
             }
         }
-        let known = self.known.entry(id).or_default();
         if known.0 == snapshot.loop_hash {
             if let Some(c) = known
                 .1
@@ -94,7 +97,7 @@ impl CoverCheck {
                     *known |= marked;
                 }
             }
-            for m in &peers {
+            for m in peers.iter().filter(|m| m.view.covered != known) {
                 let from_ms = since_ms.unwrap_or(snapshot.now_ms).max(m.since_ms);
                 let cells = (0..).zip(known.iter().zip(&m.view.covered));
                 let lacking = cells.filter(|(_, (known, marked))| **known && !**marked);

@@ -98,8 +98,8 @@ impl ListingCheck {
             .iter()
             .filter(|m| m.view.loop_hash == snapshot.loop_hash)
         {
-            for (c, known) in m.view.covered.iter().enumerate().take(n) {
-                settled[c] |= *known;
+            for (settled, known) in settled.iter_mut().zip(&m.view.covered) {
+                *settled |= *known;
             }
             for c in &m.view.unassigned {
                 if let Some(s) = settled.get_mut(usize::from(*c)) {
@@ -217,12 +217,19 @@ impl ListingCheck {
         {
             // By the stamps that it goes by: what it takes anew it may not have said yet.
             let mut stamps: Vec<Option<Stamp>> = vec![None; n];
+            let (mut first, mut last) = (n, 0);
             for (c, stamp) in m.view.plan.iter().zip(&m.view.stamps) {
                 let c = usize::from(*c);
                 if c < n && !m.view.covered.get(c).copied().unwrap_or(false) {
                     stamps[c] = Some(*stamp);
+                    (first, last) = (first.min(c), last.max(c));
                 }
             }
+            let plans_near = |l: &&ListedRun| {
+                let begin = usize::from(l.run.first);
+                let end = begin + usize::from(l.run.count);
+                end > n || (begin <= last && end > first)
+            };
             for (&(_, author), (claim, (life, _))) in self.heard.range((m.id, 0)..=(m.id, u16::MAX))
             {
                 let alive = members.belief(m.id, author) == Some((*life, Status::Alive));
@@ -230,7 +237,7 @@ impl ListingCheck {
                 if !alive || claim.alone || claim.loop_hash != snapshot.loop_hash {
                     continue;
                 }
-                for l in &claim.plan {
+                for l in claim.plan.iter().filter(plans_near) {
                     each_cell(l, n, |c| {
                         if stamps[c].is_some_and(|s| s < l.stamp) {
                             seen.push((m.id, author, u16::try_from(c).unwrap_or(u16::MAX)));

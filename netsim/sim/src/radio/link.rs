@@ -53,6 +53,12 @@ impl Overlay {
         true
     }
 
+    /// Whether a fault stops any transmissions.
+    #[must_use]
+    pub fn cuts_any(&self) -> bool {
+        self.groups.is_some() || !self.cuts.is_empty()
+    }
+
     /// Whether a fault stops transmissions from `tx` to `rx`.
     #[must_use]
     pub fn cuts(&self, tx: u16, rx: u16) -> bool {
@@ -74,6 +80,8 @@ impl Overlay {
 #[derive(Clone, Debug)]
 pub struct LinkTable {
     nodes: Vec<u16>,
+    /// By number: where the node is in `nodes`.
+    indices: Vec<Option<u16>>,
     radio: RadioSpec,
     computed_ms: Option<u64>,
     places: Vec<Option<Place>>,
@@ -94,8 +102,13 @@ impl LinkTable {
     #[must_use]
     pub fn new(nodes: &[u16], radio: RadioSpec) -> Self {
         let n = nodes.len();
+        let mut indices = vec![None; nodes.last().map_or(0, |id| usize::from(*id) + 1)];
+        for (i, id) in (0..).zip(nodes) {
+            indices[usize::from(*id)] = Some(i);
+        }
         Self {
             nodes: nodes.to_vec(),
+            indices,
             radio,
             computed_ms: None,
             places: vec![None; n],
@@ -134,6 +147,7 @@ impl LinkTable {
         }
         let n = self.nodes.len();
         let loss_permille = faults.loss_permille(&self.radio);
+        let cuts_any = faults.cuts_any();
         for i in 0..n {
             for j in i + 1..n {
                 let (there, back, pair) = (i * n + j, j * n + i, i * n + j);
@@ -148,7 +162,7 @@ impl LinkTable {
                 let state = |tx, rx| LinkState {
                     in_range,
                     in_sight,
-                    cut: faults.cuts(tx, rx),
+                    cut: cuts_any && faults.cuts(tx, rx),
                     loss_permille,
                     delay_ms: self.radio.delay_ms,
                 };
@@ -199,7 +213,8 @@ impl LinkTable {
     /// Where a node is in [`LinkTable::nodes`].
     #[must_use]
     pub fn index_of(&self, node: u16) -> Option<usize> {
-        self.nodes.binary_search(&node).ok()
+        let index = self.indices.get(usize::from(node)).copied().flatten();
+        index.map(usize::from)
     }
 
     /// Whether two nodes hear each other both ways.

@@ -595,30 +595,34 @@ impl Judge {
         limit_m: f64,
         facts: &mut Vec<Fact>,
     ) {
-        for (i, (a, pa)) in airborne.iter().enumerate() {
-            for (b, pb) in &airborne[i + 1..] {
-                let distance_m = pa.distance_m(pb);
-                if self.closest.is_none_or(|c| distance_m < c.distance_m) {
-                    self.closest = Some(Approach {
-                        at_ms,
-                        a: *a,
-                        b: *b,
-                        distance_m,
-                    });
+        let closest_m = self.closest.map_or(f64::INFINITY, |c| c.distance_m);
+        // Those who came too close are asked whether they have parted.
+        let reach_m = if self.too_close.is_empty() {
+            closest_m.max(limit_m)
+        } else {
+            f64::INFINITY
+        };
+        for (i, j) in pairs_within(airborne, reach_m) {
+            let ((a, pa), (b, pb)) = (&airborne[i], &airborne[j]);
+            let approach = Approach {
+                at_ms,
+                a: *a,
+                b: *b,
+                distance_m: pa.distance_m(pb),
+            };
+            if self
+                .closest
+                .is_none_or(|c| approach.distance_m < c.distance_m)
+            {
+                self.closest = Some(approach);
+            }
+            if approach.distance_m < limit_m {
+                let was = self.too_close.insert((*a, *b), true);
+                if was != Some(true) {
+                    facts.push(Fact::TooClose(approach));
                 }
-                if distance_m < limit_m {
-                    let was = self.too_close.insert((*a, *b), true);
-                    if was != Some(true) {
-                        facts.push(Fact::TooClose(Approach {
-                            at_ms,
-                            a: *a,
-                            b: *b,
-                            distance_m,
-                        }));
-                    }
-                } else if !self.too_close.is_empty() {
-                    self.too_close.remove(&(*a, *b));
-                }
+            } else if !self.too_close.is_empty() {
+                self.too_close.remove(&(*a, *b));
             }
         }
     }
@@ -627,6 +631,21 @@ impl Judge {
     pub fn forget_position(&mut self, uav: u16) {
         self.inside.remove(&uav);
     }
+}
+
+/// The pairs that are at most so far apart from west to east, in order.
+fn pairs_within(airborne: &[(u16, Place)], reach_m: f64) -> Vec<(usize, usize)> {
+    let east_m = |i: &usize| airborne[*i].1.at.x;
+    let mut by_east: Vec<usize> = (0..airborne.len()).collect();
+    by_east.sort_unstable_by(|i, j| east_m(i).total_cmp(&east_m(j)));
+    let mut pairs = Vec::new();
+    for (k, i) in by_east.iter().enumerate() {
+        let near = by_east[k + 1..].iter();
+        let near = near.take_while(|j| east_m(j) - east_m(i) <= reach_m);
+        pairs.extend(near.map(|j| (*i.min(j), *i.max(j))));
+    }
+    pairs.sort_unstable();
+    pairs
 }
 
 #[cfg(test)]

@@ -41,9 +41,13 @@ struct Prism {
 /// All buildings of a world, ready for many questions.
 #[derive(Debug)]
 pub struct Obstacles {
+    /// The highest first.
     prisms: Vec<Prism>,
     tree: Bvh,
 }
+
+/// So few buildings are looked at one by one, without the tree.
+const FEW: usize = 4;
 
 /// Prisms reach this far below the origin, so that a street lower than the origin
 /// does not look through under a house; deeper than any relief within a mission.
@@ -53,13 +57,14 @@ impl Obstacles {
     /// Prepares the buildings.
     #[must_use]
     pub fn new(buildings: &[Building]) -> Self {
-        let prisms: Vec<Prism> = buildings
+        let mut prisms: Vec<Prism> = buildings
             .iter()
             .map(|b| Prism {
                 ring: b.footprint.vertices().to_vec(),
                 roof_m: b.height_m,
             })
             .collect();
+        prisms.sort_by(|a, b| b.roof_m.total_cmp(&a.roof_m));
         let boxes: Vec<Aabb> = prisms.iter().map(Prism::bounds).collect();
         Self {
             tree: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
@@ -82,8 +87,12 @@ impl Obstacles {
     /// Whether no building stands between two places.
     #[must_use]
     pub fn sees(&self, a: Place, b: Place) -> bool {
-        if self.prisms.is_empty() {
-            return true;
+        // Flights are above most roofs.
+        let lower_m = a.height_m.min(b.height_m);
+        let high = self.prisms.iter().take(FEW + 1);
+        let high = high.take_while(|p| p.roof_m > lower_m).count();
+        if high <= FEW {
+            return !self.prisms.iter().take(high).any(|p| p.blocks(a, b));
         }
         let from = Vec3::new(a.at.x, a.at.y, a.height_m);
         let ray = Ray::new(from, Vec3::new(b.at.x, b.at.y, b.height_m) - from);
