@@ -169,10 +169,7 @@ mod tests {
     use super::*;
 
     fn covered(cells: &[u16]) -> Entry {
-        let mut set = CellSet::new(20);
-        for c in cells {
-            set.insert(*c);
-        }
+        let set = CellSet::of(20, cells.iter().copied());
         Entry::Covered {
             loop_hash: 5,
             cells: 20,

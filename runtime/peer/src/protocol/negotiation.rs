@@ -41,12 +41,12 @@ const TWO_CELLS_MS: u64 = 12_000;
 /// for orphans, for an empty plan. Two, so that one lost beacon or claim changes nothing.
 const SHORT_INTERVALS: u64 = 2;
 
-/// After a decision cells count as orphans only after so many periods: the new owner's
+/// After a decision cells count as orphans only after so many intervals: the new owner's
 /// claim takes one to be stored, two to be spoken and passed on, and two more if it is
 /// lost once.
 pub const SETTLE_INTERVALS: u64 = 5;
 
-/// A return, a join or an idle peer waits for so many periods: shorter absences are the
+/// A return, a join or an idle peer waits for so many intervals: shorter absences are the
 /// rule on a lossy channel.
 const PATIENT_INTERVALS: u64 = 10;
 
@@ -57,7 +57,7 @@ const CALM_INTERVALS: u64 = 20;
 /// that four waiting times do not bring is not on its way.
 const MAX_DOUBLINGS: u32 = 2;
 
-/// Peers begin rounds one after the other by rank, this part of a period apart: the
+/// Peers begin rounds one after the other by rank, this part of an interval apart: the
 /// first one's bid is heard before the third would begin.
 const ROUND_STAGGER: u64 = 8;
 
@@ -94,7 +94,7 @@ pub struct Context<'a> {
 
 impl Context<'_> {
     /// W0 = (2D + 3) T', milliseconds: a bid crosses the component, the answer
-    /// comes back, and three periods for what is lost on the way.
+    /// comes back, and three intervals for what is lost on the way.
     #[must_use]
     pub fn first_wait_ms(&self) -> u64 {
         wait_ms(self.diameter, self.interval_ms)

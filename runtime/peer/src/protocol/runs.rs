@@ -204,8 +204,7 @@ mod tests {
         // What does not fit is left out from its first run on.
         assert_eq!(packer.pack(&cells, 2).1, 5);
         // A covered cell between two others is bridged.
-        let mut covered = CellSet::new(10);
-        covered.insert(1);
+        let covered = CellSet::of(10, [1]);
         let packer = Packer {
             cells: 10,
             covered: &covered,

@@ -218,12 +218,9 @@ impl Sections {
         {
             return false;
         }
-        let mut listed = CellSet::new(self.cells);
-        for l in claim.plan.iter().chain(&claim.held) {
-            for c in cells_of(l.run, self.cells) {
-                listed.insert(c);
-            }
-        }
+        let runs = claim.plan.iter().chain(&claim.held);
+        let listed = runs.flat_map(|l| cells_of(l.run, self.cells));
+        let listed = CellSet::of(self.cells, listed);
         if claim.alone {
             self.alone.insert(author, incarnation);
         } else {
@@ -433,10 +430,7 @@ impl Sections {
         if epoch <= self.epoch {
             return false;
         }
-        let mut kept = CellSet::new(self.cells);
-        for p in plan {
-            kept.insert(p.cell);
-        }
+        let kept = CellSet::of(self.cells, plan.iter().map(|p| p.cell));
         for p in &self.plan {
             if !kept.contains(p.cell) {
                 let s = self.held.entry(p.cell).or_insert(p.stamp);
@@ -556,10 +550,7 @@ impl Sections {
 
     /// Notes which cells are beyond anybody's endurance.
     pub fn set_unassigned(&mut self, cells: &[u16]) {
-        self.unassigned = CellSet::new(self.cells);
-        for c in cells {
-            self.unassigned.insert(*c);
-        }
+        self.unassigned = CellSet::of(self.cells, cells.iter().copied());
         self.unassigned.subtract(&self.covered);
         self.news.listing = true;
     }

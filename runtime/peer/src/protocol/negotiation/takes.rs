@@ -15,7 +15,7 @@ use skein_flight::coverage::ring::{CoverageLoop, Direction};
 /// small ids lie far apart.
 const SPREAD: u64 = 7919;
 
-/// A peer takes its first section after so many quarters of a period of listening: who began
+/// A peer takes its first section after so many quarters of an interval of listening: who began
 /// with it has said twice by then where it is.
 const FIRST_SECTION_QUARTERS: u64 = 6;
 
@@ -25,14 +25,14 @@ const NEARNESS_MAX: u64 = 60;
 
 const NEARNESS_STEP_MS: u64 = 4000;
 
-/// Among many a peer looks this often in a period for what it could take.
+/// Among many a peer looks this often in an interval for what it could take.
 const LOOKS_AN_INTERVAL: u64 = 2;
 
-/// Among many a peer waits so many periods for each who would be at an orphan sooner: a claim
+/// Among many a peer waits so many intervals for each who would be at an orphan sooner: a claim
 /// is stored, waits for its turn on the air, and is heard.
 const SOONER_INTERVALS: u64 = 2;
 
-/// Peers take orphans one after the other by rank, this part of a period apart: a take has
+/// Peers take orphans one after the other by rank, this part of an interval apart: a take has
 /// to be durable before others can hear of it.
 const TAKE_STAGGER: u64 = 2;
 
@@ -60,8 +60,8 @@ impl Negotiation {
         self.provisional
     }
 
-    /// Whether this peer, among many, is to look for what it could take: half a period after
-    /// it looked last.
+    /// Whether this peer, among many, is to look for what it could take: half an interval
+    /// after it looked last.
     pub fn take_look(&mut self, ctx: &Context<'_>) -> bool {
         let rested = |t| ctx.now.since_ms(t) >= ctx.interval_ms / LOOKS_AN_INTERVAL;
         let looks = ctx.is_many()
@@ -204,7 +204,7 @@ impl Negotiation {
     }
 
     /// What an idle peer may try to fly although no division could give it to anybody: fuel
-    /// that others were to need may be left, or be back. Looked at once in ten periods.
+    /// that others were to need may be left, or be back. Looked at once in ten intervals.
     pub fn take_left_over(&mut self, ctx: &Context<'_>) -> Option<CellSet> {
         let stagger = self.rank(ctx) * ctx.interval_ms / TAKE_STAGGER;
         let patience = PATIENT_INTERVALS * ctx.interval_ms;

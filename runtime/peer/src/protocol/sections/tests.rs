@@ -23,9 +23,13 @@ impl Sections {
     }
 }
 
+fn epoch(counter: u32) -> Epoch {
+    Epoch { counter, hash: 0 }
+}
+
 fn stamp(counter: u32, take: u16, id: u16) -> Stamp {
     Stamp {
-        epoch: Epoch { counter, hash: 0 },
+        epoch: epoch(counter),
         take,
         id,
     }
@@ -59,14 +63,7 @@ fn forward(cells: &[u16]) -> Vec<(u16, Direction)> {
 #[test]
 fn a_planned_cell_yields_to_a_higher_stamp_of_a_live_peer_only() {
     let mut s = sections(1);
-    s.adopt_at_once(
-        Epoch {
-            counter: 1,
-            hash: 0,
-        },
-        &[],
-        &forward(&[2, 3, 4]),
-    );
+    s.adopt_at_once(epoch(1), &[], &forward(&[2, 3, 4]));
     s.hear(2, 1, 1, claim(&[(4, 2, stamp(2, 0, 2))]));
     assert!(!s.settle(&LivePeers::new()), "a dead claim takes nothing");
     assert!(s.settle(&LivePeers::from([(2, 1)])));
@@ -86,10 +83,7 @@ fn what_is_covered_is_beyond_nobodys_endurance() {
 
 #[test]
 fn of_two_equal_listings_exactly_one_yields() {
-    let e = Epoch {
-        counter: 3,
-        hash: 9,
-    };
+    let e = epoch(3);
     let (mut a, mut b) = (sections(1), sections(2));
     a.adopt_at_once(e, &[], &forward(&[5]));
     b.adopt_at_once(e, &[], &forward(&[5]));
@@ -105,22 +99,8 @@ fn of_two_equal_listings_exactly_one_yields() {
 #[test]
 fn what_is_given_away_is_held_until_somebody_lists_it() {
     let mut s = sections(1);
-    s.adopt_at_once(
-        Epoch {
-            counter: 1,
-            hash: 0,
-        },
-        &[],
-        &forward(&[0, 1, 2, 3]),
-    );
-    s.adopt_at_once(
-        Epoch {
-            counter: 2,
-            hash: 0,
-        },
-        &forward(&[0]),
-        &forward(&[1]),
-    );
+    s.adopt_at_once(epoch(1), &[], &forward(&[0, 1, 2, 3]));
+    s.adopt_at_once(epoch(2), &forward(&[0]), &forward(&[1]));
     assert_eq!(s.held().keys().copied().collect::<Vec<_>>(), [2, 3]);
     let live = LivePeers::from([(2, 1)]);
     assert!(!s.orphans(&live).contains(2));
@@ -137,14 +117,7 @@ fn an_adoption_below_a_take_does_not_lower_its_stamp() {
     s.hear(2, 1, 1, claim(&[(7, 1, stamp(2, 0, 2))]));
     s.take_at_once(&[(7, Direction::Forward)]);
     // Peer 2 yields to this take; then a division that was decided before ends.
-    s.adopt_at_once(
-        Epoch {
-            counter: 1,
-            hash: 0,
-        },
-        &[],
-        &forward(&[6, 7]),
-    );
+    s.adopt_at_once(epoch(1), &[], &forward(&[6, 7]));
     assert_eq!(
         s.plan().iter().map(|p| p.stamp).collect::<Vec<_>>(),
         [stamp(1, 0, 1), stamp(2, 1, 1)]
@@ -169,25 +142,9 @@ fn a_take_beats_every_stamp_heard() {
 #[test]
 fn covered_cells_leave_plan_and_held() {
     let mut s = sections(1);
-    s.adopt_at_once(
-        Epoch {
-            counter: 1,
-            hash: 0,
-        },
-        &[],
-        &forward(&[0, 1, 2]),
-    );
-    s.adopt_at_once(
-        Epoch {
-            counter: 2,
-            hash: 0,
-        },
-        &[],
-        &forward(&[0]),
-    );
-    let mut c = CellSet::new(10);
-    c.insert(0);
-    c.insert(1);
+    s.adopt_at_once(epoch(1), &[], &forward(&[0, 1, 2]));
+    s.adopt_at_once(epoch(2), &[], &forward(&[0]));
+    let c = CellSet::of(10, [0, 1]);
     assert!(s.cover(&c));
     assert!(!s.cover(&c));
     assert!(s.plan().is_empty());
@@ -200,14 +157,7 @@ fn what_does_not_fit_into_a_register_is_not_planned() {
     let mut s = Sections::new(1, n, CellSet::new(n));
     let scattered: Vec<(u16, Direction)> =
         (0..n).step_by(2).map(|c| (c, Direction::Forward)).collect();
-    s.adopt_at_once(
-        Epoch {
-            counter: 1,
-            hash: 0,
-        },
-        &[],
-        &scattered,
-    );
+    s.adopt_at_once(epoch(1), &[], &scattered);
     assert_eq!(s.plan().len(), PLAN_MAX);
     let listed: Vec<u16> = unpack(&s.claim(1, 1, 0).plan, n)
         .iter()
@@ -254,10 +204,7 @@ fn what_is_covered_planned_or_beyond_the_loop_is_not_taken() {
 #[test]
 fn what_is_made_durable_of_a_plan_is_the_claim_that_tells_it() {
     let mut s = sections(1);
-    let epoch = Epoch {
-        counter: 3,
-        hash: 9,
-    };
+    let epoch = epoch(3);
     assert!(s.adopt_at_once(epoch, &[], &forward(&[1, 2, 3])));
     let written = s.claim_with(epoch, s.plan(), 7, 11);
     assert_eq!(written, s.claim(7, 11, 0));
@@ -266,7 +213,6 @@ fn what_is_made_durable_of_a_plan_is_the_claim_that_tells_it() {
 
 #[test]
 fn takes_of_a_new_life_outrank_what_the_one_before_adopted() {
-    let epoch = |counter| Epoch { counter, hash: 0 };
     let mut s = sections(1);
     s.restore_epoch(epoch(4));
     s.restore_epoch(epoch(2));
