@@ -13,4 +13,5 @@ mod documents;
 mod many;
 mod model;
 mod names_of_checks;
+mod pace;
 mod seeds;

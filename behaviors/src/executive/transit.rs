@@ -10,8 +10,8 @@ use skein_flight::coverage::ring::{CoverageLoop, Direction};
 use skein_flight::route::{RouteError, Router};
 use skein_flight::trajectory::timed::Objective;
 use skein_geometry::frame::{Point, Pose};
-use skein_geometry::math::TAU;
-use skein_geometry::{Curve, Segment};
+use skein_geometry::math::{PI, TAU};
+use skein_geometry::{Curve, NoFlyZones, Segment};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -28,6 +28,12 @@ const MAX_NEAREST_TRIES: usize = 6;
 /// Lengths of the piece flown to get out of a zone's clearance, metres: from what a
 /// tracking error needs to a half turn.
 const ESCAPES_M: [f64; 4] = [5.0, 15.0, 35.0, 75.0];
+
+/// How far it is at most straight out of a zone that a UAV is in, after a turn, metres.
+const WAYS_OUT_M: [f64; 9] = [10.0, 25.0, 50.0, 75.0, 100.0, 150.0, 225.0, 350.0, 500.0];
+
+/// Turns before that, quarters of a half one.
+const TURNS_OUT: [f64; 9] = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0];
 
 /// A way out of a zone's clearance may come this much nearer to it at first, metres:
 /// what rounding and a bend take.
@@ -479,13 +485,17 @@ impl Transit {
     }
 
     /// The shortest single piece that comes no nearer to the zones than `from` is
-    /// (less what rounding takes) and from whose end `onward` finds a way.
+    /// (less what rounding takes) and from whose end `onward` finds a way; from inside of
+    /// a zone, which a new mission may have put round a UAV, the way out of it.
     fn escape(
         &self,
         from: Pose,
         onward: impl Fn(Pose) -> Result<Curve, RouteError>,
     ) -> Option<Curve> {
         let zones = self.router.zones();
+        if zones.distance_m(from.position()) <= 0.0 {
+            return self.way_out(from, onward);
+        }
         let least_m = zones.distance_m(from.position()) - ESCAPE_SLACK_M;
         let bend = 1.0 / self.router.limits().turn_radius_m;
         for length_m in ESCAPES_M {
@@ -507,6 +517,37 @@ impl Transit {
             }
         }
         None
+    }
+
+    /// A turn and a straight line that lead out of the zones in which a pose is and keep clear
+    /// of all others, so that little of them is flown; from its end `onward` finds a way.
+    fn way_out(
+        &self,
+        from: Pose,
+        onward: impl Fn(Pose) -> Result<Curve, RouteError>,
+    ) -> Option<Curve> {
+        let (at, limits) = (from.position(), self.router.limits());
+        let zones = self.router.zones().zones().iter();
+        let others = NoFlyZones::new(zones.filter(|z| z.distance_m(at) > 0.0).cloned().collect());
+        let turn_m = |turn: f64| 0.25 * PI * turn.abs() * limits.turn_radius_m;
+        let mut ways: Vec<(f64, f64)> = WAYS_OUT_M
+            .into_iter()
+            .flat_map(|length_m| TURNS_OUT.map(|turn| (length_m, turn)))
+            .collect();
+        ways.sort_by(|a, b| (a.0 + turn_m(a.1)).total_cmp(&(b.0 + turn_m(b.1))));
+        ways.into_iter().find_map(|(length_m, turn)| {
+            let bend = turn.signum() / limits.turn_radius_m;
+            let pieces = [(bend, turn_m(turn)), (0.0, length_m)];
+            let pieces = &pieces[usize::from(turn == 0.0)..];
+            let mut out = Curve::from_pieces(from, pieces);
+            let end = out.segments().last()?.end();
+            let is_out = self.router.zones().distance_m(end.position()) > limits.clearance_m;
+            if !is_out || !others.is_clear(&out, self.tracking_error_m) {
+                return None;
+            }
+            out.extend(&onward(end).ok()?);
+            Some(out)
+        })
     }
 
     /// The way to a circle that keeps clear of the zones, and that circle: here, else
@@ -620,7 +661,6 @@ mod tests {
     use crate::testing::{CLEARANCE_M, LANE_M, airframe, loop_and_router, square};
     use Direction::{Backward, Forward};
     use skein_geometry::Polygon;
-    use skein_geometry::math::PI;
 
     fn transit(cols: u32, rows: u32, zones: Vec<Polygon>) -> Transit {
         let (coverage_loop, router) = loop_and_router(cols, rows, zones);
@@ -741,6 +781,41 @@ mod tests {
             let piece = (circle.curvature_per_m, 0.5 * circle.length_m);
             let circle = Curve::from_pieces(circle.start, &[piece, piece]);
             assert!(t.router.zones().is_clear(&circle, CLEARANCE_M - 1e-6));
+        }
+    }
+
+    /// A new mission may put a zone round a UAV: it leaves it and does not stay there.
+    #[test]
+    fn who_is_in_a_zone_leaves_it_once_and_keeps_clear_of_all_others() {
+        let far = square(10.0, 10.0, 20.0);
+        for side_m in [60.0, 160.0] {
+            let zone = square(100.0, 40.0, side_m);
+            let t = transit(12, 8, vec![zone.clone(), far.clone()]);
+            for k in 0..16 {
+                let at = Point::new(110.0 + 2.0 * f64::from(k), 50.0 + f64::from(k));
+                let pose = Pose::new(at, 0.41 * f64::from(k) - PI);
+                let from = Place {
+                    pose,
+                    boundary: None,
+                };
+                let home = Point::new(-60.0, -60.0);
+                let circle = t.way_to_loiter(&from);
+                let ways = [t.connect_to_point(&from, home).unwrap(), circle];
+                for moves in ways {
+                    let Some(Move::Route(way)) = moves.first() else {
+                        panic!("{moves:?}");
+                    };
+                    assert!(t.is_cleared(&from, &moves[0]));
+                    let places = (0..).map(|d| f64::from(d) * 0.5);
+                    let places = places.take_while(|d| *d < way.length_m());
+                    let places: Vec<Point> =
+                        places.map(|d| way.pose_at(d).unwrap().position()).collect();
+                    let inside = |p: &&Point| zone.distance_m(**p) <= 0.0;
+                    let first = places.iter().take_while(inside).count();
+                    assert_eq!(first, places.iter().filter(inside).count(), "in again");
+                    assert!(places.iter().all(|p| far.distance_m(*p) > 1.5));
+                }
+            }
         }
     }
 

@@ -7,6 +7,8 @@ use crate::swarm::Outcome;
 use crate::troubles::{KINDS, Kind, RARE};
 use serde::Serialize;
 use skein_geometry::hash::Fnv;
+use skein_peer::CoverageTask;
+use skein_peer::wire::limits::MEMBERS_MAX;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -217,7 +219,7 @@ fn add_rates(s: &mut Summary, runs: &[Outcome], wall_s: f64) {
     let peer_s = |light: bool| {
         let of = runs
             .iter()
-            .filter(|o| !light || Grade::of(o.loss_permille) != Grade::Reported);
+            .filter(|o| !light || Grade::of(o.loss_permille) <= Grade::Light);
         let (mut ms, mut downs) = (0, 0);
         for o in of {
             ms += o.report.peer_ms;
@@ -268,13 +270,32 @@ fn add_violations(s: &mut Summary, runs: &[Outcome]) {
 /// storm of thirty is missed by all of them with a chance of one in a thousand.
 pub const JUDGED_BATCH: usize = 200;
 
-/// Half of the storms end within so many times the least time that all the work takes.
-/// The division keeps sections in one piece, ways lead there and back, and a storm kills
-/// in mid-section: measured 1.4, and 3 and more with anchors that say nothing.
-const PACE_P50: f64 = 2.0;
+/// Half of the storms end within so many times the least time that all the work takes: areas,
+/// lines and passes. Measured on 200 storms of the default scenario 1.22, on 20 to 30 of the
+/// others 1.0 to 1.23, so that a swarm which is slower by a seventh is found.
+const PACE_P50: f64 = 1.38;
 
-/// And 95 of 100 within so many: measured 1.8.
-const PACE_P95: f64 = 3.0;
+/// The same where places are visited one by one, measured 1.5 to 1.6: the bound knows of no way
+/// between them.
+const PACE_P50_POINTS: f64 = 1.8;
+
+/// And 95 of 100 within so many: measured 1.8 to 2.2, and 3.2 of places.
+const PACE_P95: f64 = 2.6;
+/// See [`PACE_P95`].
+const PACE_P95_POINTS: f64 = 3.8;
+
+/// The same among more than eight UAVs, who share without rounds and take off one after the
+/// other: measured 1.5 to 2.1, and 3.4.
+const PACE_P50_MANY: f64 = 2.4;
+/// See [`PACE_P50_MANY`].
+const PACE_P95_MANY: f64 = 4.0;
+
+/// Half of the storms leave UAVs idle for at most this share of their time while cells are
+/// open: measured 0.03 to 0.11.
+const IDLE_P50: f64 = 0.14;
+
+/// And 95 of 100 for at most this one: measured 0.14 to 0.36.
+const IDLE_P95: f64 = 0.45;
 
 /// False alarms of death in a peer-hour, at a loss of at most a tenth: each costs a round
 /// of half a minute, so that of eight peers less than one in a hundred is in one.
@@ -286,6 +307,7 @@ const FALSE_DOWNS_ANY: f64 = 1.0;
 impl Summary {
     /// Judges a batch of storms as a whole, if it is large enough: whether it reached the
     /// hard places that its scenario can reach (`reached`), how fast it was (`pace`), how
+    /// long who could work had nothing to do (`idle`), how
     /// often the living were believed dead (`false-downs`).
     pub fn judge_batch(&mut self, spec: &Spec) {
         if self.runs < JUDGED_BATCH {
@@ -308,13 +330,21 @@ impl Summary {
         let unmet = |kind: &&Kind| !self.struck.contains_key(kind.name);
         let kinds = KINDS.iter().chain(RARE).filter(troubled);
         let missed = missed + kinds.filter(unmet).count();
-        let slow = self.makespan_over_work_bound.p50 > PACE_P50
-            || self.makespan_over_work_bound.p95 > PACE_P95;
+        let (p50, p95) = match spec.mission.task {
+            _ if fleet > MEMBERS_MAX => (PACE_P50_MANY, PACE_P95_MANY),
+            CoverageTask::Points(_) => (PACE_P50_POINTS, PACE_P95_POINTS),
+            _ => (PACE_P50, PACE_P95),
+        };
+        let pace = &self.makespan_over_work_bound;
+        let idle = &self.idle_share;
+        let slow = pace.p50 > p50 || pace.p95 > p95;
+        let lazy = idle.p50 > IDLE_P50 || idle.p95 > IDLE_P95;
         let jumpy = self.false_downs_per_peer_hour > FALSE_DOWNS_LIGHT
             || self.false_downs_per_peer_hour_at_any_loss > FALSE_DOWNS_ANY;
         for (name, n) in [
             ("reached", missed as u64),
             ("pace", u64::from(slow)),
+            ("idle", u64::from(lazy)),
             ("false-downs", u64::from(jumpy)),
         ] {
             if n > 0 {
@@ -421,8 +451,10 @@ mod tests {
             s.violations.into_keys().collect::<Vec<_>>()
         };
         assert!(judged(|_| {}).is_empty());
-        assert_eq!(judged(|s| s.makespan_over_work_bound.p50 = 3.2), ["pace"]);
-        assert_eq!(judged(|s| s.makespan_over_work_bound.p95 = 6.0), ["pace"]);
+        assert_eq!(judged(|s| s.makespan_over_work_bound.p50 = 1.4), ["pace"]);
+        assert_eq!(judged(|s| s.makespan_over_work_bound.p95 = 2.7), ["pace"]);
+        assert_eq!(judged(|s| s.idle_share.p50 = 0.15), ["idle"]);
+        assert_eq!(judged(|s| s.idle_share.p95 = 0.5), ["idle"]);
         assert_eq!(judged(|s| s.reached = Places::default()), ["reached"]);
         let calm = |s: &mut Summary| s.struck.retain(|kind, _| kind != "pause");
         assert_eq!(judged(calm), ["reached"]);

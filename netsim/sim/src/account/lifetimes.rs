@@ -116,6 +116,8 @@ impl Lifetime {
 pub struct Lifetimes {
     speeds_mps: BTreeMap<u16, f64>,
     takeoffs_ms: BTreeMap<u16, u64>,
+    /// From when until when those have nothing left to spend whose batteries last for less.
+    spent_ms: BTreeMap<u16, Vec<(u64, u64)>>,
     work_m: f64,
     by_peer: BTreeMap<u16, Lifetime>,
 }
@@ -127,6 +129,7 @@ impl Lifetimes {
         Self {
             speeds_mps: setting.uavs.clone(),
             takeoffs_ms: setting.takeoffs_ms.clone(),
+            spent_ms: BTreeMap::new(),
             work_m: setting.work_m,
             by_peer: BTreeMap::new(),
         }
@@ -140,6 +143,23 @@ impl Lifetimes {
     /// A process starts.
     pub fn started(&mut self, now_ms: u64, peer: u16) {
         self.by_peer.entry(peer).or_default().go(now_ms);
+    }
+
+    /// The battery of a UAV lasts for less: from then on it has nothing left to spend.
+    pub fn limited(&mut self, peer: u16, until_ms: u64) {
+        let spent = self.spent_ms.entry(peer).or_default();
+        match spent.last_mut().filter(|(_, to)| *to == u64::MAX) {
+            Some((from, _)) => *from = until_ms.min(*from),
+            None => spent.push((until_ms, u64::MAX)),
+        }
+    }
+
+    /// The airframe of a UAV is gone: the next one has full tanks.
+    pub fn airframe_gone(&mut self, now_ms: u64, peer: u16) {
+        let last = self.spent_ms.get_mut(&peer).and_then(|s| s.last_mut());
+        if let Some((_, to)) = last {
+            *to = now_ms.min(*to);
+        }
     }
 
     /// A process ends; false when there was none.
@@ -198,8 +218,8 @@ impl Lifetimes {
 
     /// The work bound, milliseconds: the least time by which all UAVs alive have flown the
     /// length of all cells, each at its mean speed over the ground along the loop, with no
-    /// way to the first cell, none between sections and none flown twice. UAVs that run at
-    /// the end are taken to run on; `None` when those that there are never get so far.
+    /// way to the first cell, none between sections and none flown twice. Whose battery lasts
+    /// for less works until its reserve. UAVs that run at the end are taken to run on; `None` when those that there are never get so far.
     #[must_use]
     pub fn work_bound_ms(&self) -> Option<u64> {
         self.bound_ms(|_| 0)
@@ -228,12 +248,21 @@ impl Lifetimes {
                 continue;
             };
             let flies_ms = flies_ms(*id);
-            for (from, to) in l.ran.iter().filter(|(_, to)| *to > flies_ms) {
-                *changes.entry((*from).max(flies_ms)).or_default() += v;
-                *changes.entry(*to).or_default() -= v;
-            }
-            if l.process == Process::Runs {
-                *changes.entry(l.since_ms.max(flies_ms)).or_default() += v;
+            let runs = (l.process == Process::Runs).then_some((l.since_ms, u64::MAX));
+            let spent = self.spent_ms.get(id).map_or(&[][..], Vec::as_slice);
+            for (from, to) in l.ran.iter().copied().chain(runs) {
+                let mut works = |from: u64, to: u64, v: f64| {
+                    if from < to {
+                        *changes.entry(from).or_default() += v;
+                        *changes.entry(to).or_default() -= v;
+                    }
+                };
+                let from = from.max(flies_ms);
+                works(from, to, *v);
+                // Its last reserve is for the way home, and no work.
+                for (begin, end) in spent {
+                    works(from.max(*begin), to.min(*end), -*v);
+                }
             }
         }
         let (mut left_m, mut speed_mps, mut since_ms) = (self.work_m, 0.0, 0);
@@ -291,6 +320,30 @@ mod tests {
         all_die.ended(10_000, 2);
         assert_eq!(all_die.work_bound_ms(), None);
         assert_eq!(two_at_ten_mps(0.0).work_bound_ms(), None);
+    }
+
+    #[test]
+    fn whose_battery_lasts_for_less_works_until_its_reserve() {
+        let mut short = two_at_ten_mps(2_000.0);
+        short.limited(2, 60_000);
+        short.limited(2, 40_000);
+        short.limited(2, 50_000);
+        assert_eq!(short.work_bound_ms(), Some(160_000));
+        // Another airframe has full tanks.
+        short.airframe_gone(90_000, 2);
+        assert!(short.ended(90_000, 2));
+        short.started(100_000, 2);
+        assert_eq!(short.work_bound_ms(), Some(130_000));
+        // Who is gone before its reserve is due is gone once.
+        let mut dies = two_at_ten_mps(2_000.0);
+        dies.limited(2, 60_000);
+        dies.airframe_gone(40_000, 2);
+        dies.ended(40_000, 2);
+        assert_eq!(dies.work_bound_ms(), Some(160_000));
+        let mut all = two_at_ten_mps(2_000.0);
+        all.limited(1, 10_000);
+        all.limited(2, 10_000);
+        assert_eq!(all.work_bound_ms(), None, "they never get so far");
     }
 
     #[test]

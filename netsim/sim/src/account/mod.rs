@@ -123,7 +123,15 @@ impl Account {
             return Held::default();
         }
         self.detection.ended(now_ms, peer);
+        if cause.takes_airframe() {
+            self.lifetimes.airframe_gone(now_ms, peer);
+        }
         self.work.ended(now_ms, peer, cause)
+    }
+
+    /// The battery of a UAV lasts for less: it has something to spend until then.
+    pub fn limited(&mut self, peer: u16, until_ms: u64) {
+        self.lifetimes.limited(peer, until_ms);
     }
 
     /// A process stands still.

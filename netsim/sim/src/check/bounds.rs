@@ -12,8 +12,10 @@ pub struct Bounds {
     pub diameter: u64,
 }
 
-/// How often a bound may be exceeded in a single case at light loss.
-pub const LIGHT_FACTOR: u64 = 7;
+/// So many bounds are what a single case may take where something is lost: of some 700 storms
+/// of seven scenarios at up to 30 % loss none took more than 0.9 of a
+/// bound that this is for, and 1.4 among twenty UAVs over several hops.
+pub const LOSSY_FACTOR: u64 = 2;
 
 impl Bounds {
     /// Everybody in a component knows of a death: (k1 + k2 + D + 2)·I with
@@ -42,7 +44,7 @@ impl Bounds {
         (3 * self.diameter + 5) * self.interval_ms
     }
 
-    /// S5: a peer yields what it hears listed at a higher stamp within 2·T.
+    /// L3: a peer yields what it hears listed at a higher stamp within 2·T.
     #[must_use]
     pub fn yield_ms(&self) -> u64 {
         2 * self.period_ms
@@ -66,8 +68,10 @@ impl Bounds {
 pub enum Grade {
     /// No loss: every case keeps the bound.
     Hard,
-    /// At most a tenth is lost: 95 of 100 cases keep the bound, each seven times it.
+    /// At most a tenth is lost: 95 of 100 cases keep the bound, each twice it.
     Light,
+    /// At most three tenths are lost, as in the worst of storms: each case keeps twice the bound.
+    Heavy,
     /// More is lost: cases are reported.
     Reported,
 }
@@ -79,6 +83,7 @@ impl Grade {
         match loss_permille {
             0 => Self::Hard,
             1..=100 => Self::Light,
+            101..=300 => Self::Heavy,
             _ => Self::Reported,
         }
     }
@@ -86,9 +91,15 @@ impl Grade {
     /// What no single case may exceed, if anything, milliseconds.
     #[must_use]
     pub fn limit_ms(self, bound_ms: u64) -> Option<u64> {
+        self.limit_of(bound_ms, LOSSY_FACTOR)
+    }
+
+    /// The same where a single case may take so many bounds when something is lost.
+    #[must_use]
+    pub fn limit_of(self, bound_ms: u64, lossy_factor: u64) -> Option<u64> {
         match self {
             Self::Hard => Some(bound_ms),
-            Self::Light => Some(bound_ms * LIGHT_FACTOR),
+            Self::Light | Self::Heavy => Some(bound_ms * lossy_factor),
             Self::Reported => None,
         }
     }
@@ -120,7 +131,9 @@ mod tests {
     #[test]
     fn loss_grades_a_bound() {
         assert_eq!(Grade::of(0).limit_ms(10), Some(10));
-        assert_eq!(Grade::of(100).limit_ms(10), Some(70));
-        assert_eq!(Grade::of(101).limit_ms(10), None);
+        assert_eq!(Grade::of(100).limit_ms(10), Some(20));
+        assert_eq!(Grade::of(101).limit_ms(10), Some(20));
+        assert_eq!(Grade::of(300).limit_of(10, 3), Some(30));
+        assert_eq!(Grade::of(301).limit_ms(10), None);
     }
 }

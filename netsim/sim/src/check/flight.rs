@@ -42,6 +42,16 @@ struct Homing {
     told: bool,
 }
 
+/// Somebody who is to stay where it is.
+#[derive(Clone, Copy, Debug)]
+struct Holding {
+    since_ms: u64,
+    /// On which loop: with another one a flight is begun anew, and another circle with it.
+    loop_hash: u64,
+    /// Where it was once it had settled.
+    place: Option<Point>,
+}
+
 /// What the flights of one run were found to be.
 #[derive(Clone, Debug)]
 pub struct FlightCheck {
@@ -49,7 +59,7 @@ pub struct FlightCheck {
     zones: Vec<Polygon>,
     clearance_m: f64,
     homing: BTreeMap<u16, Homing>,
-    holding: BTreeMap<u16, (u64, Option<Point>)>,
+    holding: BTreeMap<u16, Holding>,
     told: Clocks<u16>,
     /// UAV milliseconds spent able and without anything to fly, while cells were open.
     pub idle_ms: u64,
@@ -120,7 +130,7 @@ impl FlightCheck {
                 }
             }
             if m.view.order == Order::Hold && m.view.loop_hash != 0 {
-                self.judge_holding(snapshot.now_ms, m.id, at, flyer, found);
+                self.judge_holding(snapshot.now_ms, m, at, flyer, found);
             } else {
                 self.holding.remove(&m.id);
             }
@@ -174,18 +184,27 @@ impl FlightCheck {
     fn judge_holding(
         &mut self,
         now_ms: u64,
-        id: u16,
+        m: &PeerSnapshot,
         at: Point,
         flyer: Flyer,
         found: &mut Findings,
     ) {
-        let (since_ms, place) = self.holding.entry(id).or_insert((now_ms, None));
+        let (id, loop_hash) = (m.id, m.view.loop_hash);
+        let fresh = Holding {
+            since_ms: now_ms,
+            loop_hash,
+            place: None,
+        };
+        let holding = self.holding.entry(id).or_insert(fresh);
+        if holding.loop_hash != loop_hash {
+            *holding = fresh;
+        }
         let settle_s = SETTLE_TURNS * core::f64::consts::TAU * flyer.turn_radius_m
             / flyer.slowest_mps.max(0.1);
-        if now_ms < *since_ms + milliseconds(settle_s) {
+        if now_ms < holding.since_ms + milliseconds(settle_s) {
             return;
         }
-        let place = *place.get_or_insert(at);
+        let place = *holding.place.get_or_insert(at);
         let away_m = (at - place).norm();
         let most_m = HOLD_RADII * flyer.turn_radius_m;
         if away_m <= most_m {
@@ -242,11 +261,13 @@ mod tests {
         };
         let mut check = FlightCheck::new(BTreeMap::from([(1, flyer)]), zones, 10.0);
         let (mut story, mut found) = (Story::new(300), Findings::new(1));
-        let mut view = speaking();
-        change(&mut view);
         for t in 0..200 {
+            let mut view = speaking();
+            change(&mut view);
+            // Another mission comes.
+            view.loop_hash += u64::from(t >= 100);
             story.place(1, Point::new(away_m(t), 0.0));
-            let views = [(1, view.clone())];
+            let views = [(1, view)];
             story.snapshot(t * 1000, &views, |s| {
                 check.on_snapshot(s, |_| Some(Point::new(0.0, 0.0)), &mut found);
             });
@@ -293,5 +314,10 @@ mod tests {
         let flies_on = |t: u64| 10.0 * f64::from(u8::try_from(t).unwrap());
         assert!(flown(hold, flies_on).contains_key("hold"));
         assert!(flown(|_| {}, flies_on).is_empty());
+        // A mission on another loop may come with another circle, and with one only.
+        let moves_at = |s: u64| move |t: u64| if t < s { 500.0 } else { 605.0 };
+        assert!(flown(hold, moves_at(100)).is_empty());
+        assert!(flown(hold, moves_at(80)).contains_key("hold"));
+        assert!(flown(hold, moves_at(140)).contains_key("hold"));
     }
 }

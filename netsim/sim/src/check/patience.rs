@@ -230,13 +230,13 @@ impl PatienceCheck {
             if part.orphans.len() < SURELY_ORPHANED {
                 self.owed.stop(m.id);
             }
-            // The peer looks four times a period, and its bid is written in 20 ms.
+            // It asks for a bid in the instant in which it gives the other one up.
             let late = self.owed.since(m.id).is_some_and(|t| {
-                snapshot.lived_ms(m.id, t) > self.period_ms / 2 + snapshot.late_ms(m.id, t)
+                snapshot.lived_ms(m.id, t) > self.period_ms / 4 + snapshot.late_ms(m.id, t)
             });
             if late && self.owed.tell_once(m.id) {
                 found.broken("prompt", now_ms, Some(m.id), || {
-                    "gave up a peer whose cells nobody lists and opened no round within T/2"
+                    "gave up a peer whose cells nobody lists and opened no round within T/4"
                         .to_owned()
                 });
             }

@@ -319,7 +319,8 @@ mod tests {
         assert_eq!(minute(0, [true, false], |_| {}), 0);
         assert_eq!(minute(0, [false, true], |_| {}), 0);
         assert_eq!(minute(0, [true, true], |_| {}), 1);
-        assert_eq!(minute(300, [true, true], |_| {}), 0, "reported only");
+        assert_eq!(minute(300, [true, true], |_| {}), 1);
+        assert_eq!(minute(400, [true, true], |_| {}), 0, "reported only");
         // Two who are both silent, each for the other's sake.
         assert_eq!(minute(0, [false, false], |_| {}), 2);
         assert_eq!(minute(300, [false, false], |_| {}), 2);
@@ -373,7 +374,7 @@ mod tests {
         assert_eq!(flown(0, [true, true], 1), 1, "the silent one steers, too");
         assert_eq!(flown(0, [true, true], 9), 2, "and flies it");
         assert_eq!(flown(0, [false, false], 1), 1, "nobody flies");
-        assert_eq!(flown(300, [true, true], 9), 0, "reported only");
+        assert_eq!(flown(400, [true, true], 9), 0, "reported only");
     }
 
     #[test]

@@ -104,6 +104,7 @@ impl Swarm {
             }
             Fault::ShortFuel { peer, lasts_ms } => {
                 self.air.limit_fuel(*peer, u64::from(*lasts_ms));
+                self.note_short_fuel(*peer, u64::from(*lasts_ms));
                 *peer
             }
             Fault::SpoiltRecord { peer } => self.send_spoilt(*peer),
@@ -118,6 +119,24 @@ impl Swarm {
         };
         self.history.fold(self.now_ms, subject, Kind::Fault, 0);
         self.observe_graph();
+    }
+
+    /// What is in an airframe can work until its battery has nothing but the reserve.
+    fn note_short_fuel(&mut self, peer: u16, lasts_ms: u64) {
+        let uav = self.spec.uavs.iter().find(|u| u.id == peer);
+        let reserve_s = uav.map_or(0.0, |u| u.airframe.reserve_s);
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "casts from floats saturate, and a reserve is not negative"
+        )]
+        let reserve_ms = (reserve_s * 1000.0) as u64;
+        let until_ms = self.now_ms + lasts_ms.saturating_sub(reserve_ms);
+        for id in self.peers.iter().map(SimPeer::id) {
+            if self.airframe_of(id) == peer {
+                self.account.limited(id, until_ms);
+            }
+        }
     }
 
     /// A program is started in an airframe only where that is in the air.
