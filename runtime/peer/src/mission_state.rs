@@ -7,7 +7,7 @@
 //! | and the same zones, turn radius and clearance | the flight itself, with its goal |
 //! | another loop, the same lap | covered cells of the same places |
 //! | another lap | nothing is covered |
-//! | any | the highest round counter; what the journal knows of that loop |
+//! | any | the highest round counter; what the journal knows of that loop; that the fuel is due |
 //!
 //! And what it does with them: it hears of others' cells, negotiates, watches the fuel and
 //! the end. When that is, and where it flies, is the cooperation manager's; what it takes

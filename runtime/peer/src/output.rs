@@ -106,7 +106,8 @@ pub enum Report {
         counter: u32,
         /// Hash of the epoch's bids.
         epoch: u32,
-        /// How often cells were taken without a round since.
+        /// How often cells were taken without a round since, and how near they were by then,
+        /// up to 60.
         take: u16,
         /// What will be flown, in order.
         legs: Vec<Leg>,

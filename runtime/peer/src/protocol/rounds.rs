@@ -272,7 +272,7 @@ impl Rounds {
         }
     }
 
-    /// A new life of this peer: rounds of the old one are void.
+    /// From now on this peer is `me`; the open round, which it joined before, is void.
     pub fn set_me(&mut self, me: Member) {
         self.me = me;
         self.open = None;

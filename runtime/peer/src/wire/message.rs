@@ -206,8 +206,8 @@ pub struct Epoch {
 pub struct Stamp {
     /// The round it goes back to.
     pub epoch: Epoch,
-    /// How often the cell was taken without a round since; of a first section by up to 60
-    /// more, the nearer its begin is.
+    /// How often the cell was taken without a round since; of a first section, and of orphans
+    /// among many, by up to 60 more, the nearer the first cell is.
     pub take: u16,
     /// Who lists it.
     pub id: u16,
