@@ -92,21 +92,26 @@ impl MissionState {
     }
 
     /// The other members, where and when each has nothing to fly any more, as far as is known:
-    /// at the end of its plan, or where it was last heard.
+    /// at the end of its plan, or where it was last heard, or at the end of the last plan that it
+    /// is known to have had.
     fn hands(&self, s: &Situation<'_>, ctx: &Context<'_>, owners: &[Owner]) -> Vec<Hand> {
         let others = ctx.members.iter().map(|m| m.id).filter(|id| *id != s.me.id);
+        let end = |cell: u16| {
+            let boundary = self.geometry.coverage_loop.boundary(usize::from(cell));
+            boundary.position()
+        };
         let hand = |id: u16| {
             let owner = owners.iter().find(|o| o.id == id && o.left_ms > 0);
             let last = owner.and_then(|o| Some((o.plan.last()?.0, o.left_ms)));
             if let Some((cell, free_ms)) = last {
-                let at = self.geometry.coverage_loop.boundary(usize::from(cell));
-                let at = at.position();
+                let at = end(cell);
                 return Some(Hand { id, at, free_ms });
             }
             let info = s.membership.info(id)?;
             let lately = |t| s.now.since_ms(t) < LASTING_INTERVALS * ctx.interval_ms;
-            let place = info.place.filter(|_| info.heard.is_some_and(lately))?;
-            let at = place.pose().position();
+            let place = info.place.filter(|_| info.heard.is_some_and(lately));
+            let place = place.map(|p| p.pose().position());
+            let at = place.or_else(|| self.negotiation.end_of(id).map(end))?;
             Some(Hand { id, at, free_ms: 0 })
         };
         others.filter_map(hand).collect()

@@ -22,7 +22,7 @@ mod takes;
 
 use super::division;
 use super::rounds::{HeardBid, OpenRound, Rounds};
-use super::runs::PlannedCell;
+use super::runs::{PlannedCell, unpack};
 use super::sections::{LivePeers, Sections};
 use crate::Time;
 use crate::cells::CellSet;
@@ -199,6 +199,8 @@ pub struct Negotiation {
     take_pending: bool,
     idle_since: Option<Time>,
     progress: BTreeMap<u16, Progress>,
+    /// The last cell that each of them listed: where it stays when it has nothing to fly.
+    ends_at: BTreeMap<u16, u16>,
     members: Vec<Member>,
     members_since: Time,
     foreseen_at: Option<Time>,
@@ -241,6 +243,7 @@ impl Negotiation {
             take_pending: false,
             idle_since: None,
             progress: BTreeMap::new(),
+            ends_at: BTreeMap::new(),
             members: Vec::new(),
             members_since: Time(0),
             foreseen_at: None,
@@ -603,6 +606,12 @@ impl Negotiation {
                 continue;
             };
             let (epoch, eta_ms, seq) = (heard.claim.epoch, heard.claim.eta_ms, heard.seq);
+            let is_new = self.progress.get(&id).is_none_or(|p| p.seq != seq);
+            let plan = heard.claim.plan.last().filter(|_| is_new);
+            let plan = plan.map_or(Vec::new(), |l| unpack(&[*l], self.sections.cells()));
+            if let Some(last) = plan.last() {
+                self.ends_at.insert(id, last.cell);
+            }
             let left = self.sections.n_left(id);
             let eta_ms = u64::from(eta_ms);
             let slack = eta_ms / 4 + PATIENT_INTERVALS * ctx.interval_ms + cell_bound;

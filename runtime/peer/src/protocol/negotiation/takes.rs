@@ -107,6 +107,12 @@ impl Negotiation {
         free_ms <= SHORT_INTERVALS * ctx.interval_ms
     }
 
+    /// Where the last plan of another peer that had any cells ended, covered since or not.
+    #[must_use]
+    pub fn end_of(&self, id: u16) -> Option<u16> {
+        self.ends_at.get(&id).copied()
+    }
+
     /// The live owners with what they have left, but for what others took of it since.
     #[must_use]
     pub fn owners(&self, ctx: &Context<'_>) -> Vec<Owner> {

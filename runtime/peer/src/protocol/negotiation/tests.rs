@@ -658,6 +658,17 @@ fn what_an_owner_has_left_is_less_what_others_took_and_the_time_in_proportion() 
 }
 
 #[test]
+fn who_has_nothing_left_to_fly_is_where_its_last_plan_ended() {
+    let mut desk = Desk::new(&[2, 3]);
+    for (seq, first, count, end) in [(1, 0, 15, 14), (2, 0, 0, 14), (3, 16, 5, 20)] {
+        desk.claim(2, seq, first, count, 40_000);
+        desk.tick();
+        assert_eq!(desk.ask(|n, _| n.end_of(2)), Some(end), "claim {seq}");
+    }
+    assert_eq!(desk.ask(|n, _| n.end_of(3)), None, "it listed nothing yet");
+}
+
+#[test]
 fn an_owner_that_comes_nearer_to_a_far_cell_has_not_stalled() {
     let stalled_ms = 3 * (12_000 + 12 * T + T / 2);
     // It says every ten periods how long its one cell will take yet; for the second time
