@@ -36,6 +36,7 @@ use super::life::LIFE_STEP;
 use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Status;
+use crate::peer::CADENCE;
 use crate::wire::limits::INTERVAL_LEAST;
 use crate::wire::limits::{HOPS_MAX, PEERS_MAX};
 use crate::wire::message::{Beacon, Fresh, Gossip, OffLoop};
@@ -52,12 +53,18 @@ pub const MAX_KNOWN: usize = PEERS_MAX - 1;
 /// heard: what a neighbour says of others comes round, and what is lost comes again.
 const HOP_INTERVALS: u64 = 10;
 
-/// News about a peer goes first in gossip for so many intervals: one beacon may be
-/// lost, two hardly are.
-const URGENT_INTERVALS: u64 = 2;
+/// What was not told of within so many intervals is no news any more.
+const URGENT_INTERVALS: u64 = 6;
 
 /// A heartbeat carries so many of others at most: then it is half as long as a beacon.
 const BETWEEN_MAX: usize = 8;
+
+/// Of a heartbeat that is older than such a part of the bound a later one is asked for, by
+/// telling it: most that are known are younger, and the rest of the bound is for the answer.
+const OLD: u64 = 4;
+
+/// For each again after so many intervals: each neighbour has spoken twice by then.
+const ASK_INTERVALS: u64 = 2;
 
 /// A belief that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -447,7 +454,7 @@ impl Membership {
             if let Some(known) = m.known.get_mut(&told.id) {
                 known.note_told(now, teller, &heartbeat, limits.interval_ms);
                 if known.disputes(told) {
-                    known.urgent_until = urgent_until;
+                    known.is_news_until(urgent_until);
                     m.refuted = true;
                 }
                 if fresher {
@@ -568,6 +575,7 @@ impl Membership {
             known.eccentricity = 0;
         }
         known.freshest = heard;
+        known.is_untold_suspicion = false;
         if new_life
             || known
                 .higher_count_heard
@@ -584,7 +592,7 @@ impl Membership {
         if new_life || status != known.status {
             self.refuted |= status == Status::Alive;
             known.status = status;
-            known.urgent_until = urgent_until;
+            known.is_news_until(urgent_until);
             changes.push(known.change());
         }
         true
@@ -656,6 +664,7 @@ impl Membership {
             ..
         } = self.patience(now);
         let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
+        let tick_ms = self.period_ms / CADENCE;
         let mut changes = Vec::new();
         for known in self.known.values_mut().filter(|k| k.status != Status::Down) {
             let silent_ms = known.silent_ms(now);
@@ -668,16 +677,14 @@ impl Membership {
                 k1_ms
             };
             if known.freshest.suspected.is_none() && answers_for_it && silent_ms >= patience_ms {
+                // It begins when the patience ends, not when this is noticed.
                 known.freshest.suspected = Some(Age {
-                    told_ms: 0,
+                    told_ms: (silent_ms - patience_ms).min(tick_ms),
                     at: now,
                 });
+                known.is_untold_suspicion = true;
             }
-            let condemned = known
-                .freshest
-                .suspected
-                .is_some_and(|age| age.ms(now) >= k2_ms);
-            let status = if condemned || silent_ms > bound_ms {
+            let status = if known.is_condemned(now, k2_ms) || silent_ms > bound_ms {
                 Status::Down
             } else if known.freshest.suspected.is_some() {
                 Status::Suspect
@@ -686,7 +693,7 @@ impl Membership {
             };
             if status != known.status {
                 known.status = status;
-                known.urgent_until = urgent_until;
+                known.is_news_until(urgent_until);
                 changes.push(known.change());
             }
         }
@@ -700,24 +707,28 @@ impl Membership {
     /// What to say of others in the room of so many entries: where not everybody fits, a
     /// quarter of it is for whole entries and another for news, the rest for heartbeats alone,
     /// of those first of whom it gains most to tell. Half of these go with the heartbeat between
-    /// this beacon and the next ([`Membership::tell_between`]).
+    /// this beacon and the next ([`Membership::tell_between`]). One of them asks: it is told since
+    /// it is old, and whoever knows a later one tells that.
     pub fn tell(&mut self, now: Time, entries: usize) -> (Vec<Gossip>, Vec<Fresh>) {
         if self.known.len() <= entries {
             self.between = 0;
             return (self.gossip(now, entries), Vec::new());
         }
-        let news = self.known.values().filter(|k| k.urgent_until > now).count();
+        let untold = |k: &&Known| k.is_untold_news(now);
+        let news = self.known.values().filter(untold).count();
         let full = entries.div_ceil(4) + news.min(entries / 4);
         let told = self.gossip(now, full);
         let room = (entries - full) * ENTRY_BYTES / FRESH_BYTES;
         self.between = room.div_ceil(2).min(BETWEEN_MAX);
-        let fresh = self.fresh(now, &told, room - self.between);
+        let fresh = self.fresh(now, &told, room - self.between, true);
         (told, fresh)
     }
 
-    fn fresh(&mut self, now: Time, told: &[Gossip], max: usize) -> Vec<Fresh> {
+    fn fresh(&mut self, now: Time, told: &[Gossip], max: usize, asks: bool) -> Vec<Fresh> {
         // Where everybody hears everybody nobody has to be told.
         let far = self.diameter(now) > 1;
+        let old_ms = self.patience(now).bound_ms / OLD;
+        let again_ms = ASK_INTERVALS * self.own_interval_ms();
         let others = self
             .known
             .iter_mut()
@@ -727,6 +738,14 @@ impl Membership {
             .map(|(_, k)| k)
             .collect();
         wanted.sort_by_key(|k| (Reverse(k.want(now)), k.freshest.id));
+        if asks && far {
+            let old = wanted.iter().enumerate();
+            let old = old.filter(|(_, k)| k.asks(now, old_ms, again_ms));
+            let oldest = old.max_by_key(|(at, k)| (k.freshest.age.ms(now), Reverse(*at)));
+            if let Some((at, _)) = oldest {
+                wanted[..=at].rotate_right(1);
+            }
+        }
         wanted.truncate(max);
         wanted.sort_by_key(|k| k.freshest.id);
         let say = |known: &mut Known| {
@@ -740,7 +759,7 @@ impl Membership {
     /// It is short, so it often arrives where a beacon does not.
     pub fn tell_between(&mut self, now: Time) -> Vec<Fresh> {
         let room = std::mem::take(&mut self.between);
-        self.fresh(now, &[], room)
+        self.fresh(now, &[], room, false)
     }
 
     /// Whole entries of others: at most `max`. Who began a life anew without
@@ -752,10 +771,12 @@ impl Membership {
         let reminders = self.known.values().filter_map(|k| k.reminder(now));
         let mut told: Vec<Gossip> = reminders.take(max / 4).collect();
         let max = max - told.len();
-        let urgent = self.known.iter().filter(|(_, k)| k.urgent_until > now);
+        let urgent = self.known.iter().filter(|(_, k)| k.is_news(now));
         let mut ids: Vec<u16> = urgent.map(|(id, _)| *id).collect();
-        // The latest news first: a flood of them must not starve the last one.
-        ids.sort_by_key(|id| Reverse(self.known.get(id).map(|k| k.urgent_until)));
+        // Nobody can refute a suspicion before it is told. Then the latest news: a flood of them
+        // must not starve the last one.
+        let order = |k: &Known| (k.is_untold_suspicion, Reverse(k.news_told), k.urgent_until);
+        ids.sort_by_key(|id| Reverse(self.known.get(id).map(order)));
         ids.truncate(max / 2);
         let others = self.known.iter().filter(|(id, _)| !ids.contains(id));
         let wanted = others.filter(|(_, k)| k.is_wanted(now));
@@ -782,9 +803,11 @@ impl Membership {
             self.next_gossip = last.wrapping_add(1);
         }
         ids.extend(rest);
+        let own_ms = self.own_interval_ms();
         for id in &ids {
             if let Some(known) = self.known.get_mut(id) {
                 known.tell(now);
+                known.tell_news(now, own_ms);
             }
         }
         let entries = ids.iter().filter_map(|id| self.known.get(id));

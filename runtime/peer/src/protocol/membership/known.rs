@@ -56,6 +56,10 @@ pub(super) struct Known {
     latest: usize,
     pub(super) eccentricity: u8,
     pub(super) urgent_until: Time,
+    /// How often others were told of it since it is news.
+    pub(super) news_told: u8,
+    /// This peer suspects it, and nobody was told so yet.
+    pub(super) is_untold_suspicion: bool,
     /// A neighbour that depends on what this peer tells of it.
     lag: Option<Lag>,
     /// When this peer last told of it.
@@ -128,6 +132,9 @@ struct Lag {
     until: Time,
 }
 
+/// News is told so often: one beacon may be lost, two hardly are.
+const NEWS_TOLD: u8 = 2;
+
 /// A heartbeat that is so many behind is two intervals older.
 const BEHIND: u32 = 4;
 
@@ -154,6 +161,8 @@ impl Known {
             latest: 0,
             eccentricity: 0,
             urgent_until,
+            news_told: 0,
+            is_untold_suspicion: false,
             lag: None,
             told_at: Time(0),
             told_sent: Told::default(),
@@ -192,6 +201,7 @@ impl Known {
         let Some(told) = heard.suspected else {
             return;
         };
+        self.is_untold_suspicion = false;
         if self
             .freshest
             .suspected
@@ -201,8 +211,47 @@ impl Known {
         }
         if self.status == Status::Alive {
             self.status = Status::Suspect;
-            self.urgent_until = urgent_until;
+            self.is_news_until(urgent_until);
             changes.push(self.change());
+        }
+    }
+
+    /// Whether what is believed of it changed lately, so that others are to hear of it first.
+    pub(super) fn is_news(&self, now: Time) -> bool {
+        (self.urgent_until > now && self.news_told < NEWS_TOLD) || self.is_untold_suspicion
+    }
+
+    /// What is believed of it changed: others are to hear of it first.
+    pub(super) fn is_news_until(&mut self, until: Time) {
+        (self.urgent_until, self.news_told) = (until, 0);
+    }
+
+    /// Whether it is news that nobody was told yet.
+    pub(super) fn is_untold_news(&self, now: Time) -> bool {
+        self.is_news(now) && self.news_told == 0
+    }
+
+    /// Whether nobody refuted a suspicion for so long, which could have been refuted.
+    pub(super) fn is_condemned(&self, now: Time, k2_ms: u64) -> bool {
+        let suspected = self
+            .freshest
+            .suspected
+            .filter(|_| !self.is_untold_suspicion);
+        suspected.is_some_and(|age| age.ms(now) >= k2_ms)
+    }
+
+    /// A suspicion that this peer raised is told the first time: whoever knows better has as
+    /// long to say so as if it had been told within an interval.
+    pub(super) fn tell_news(&mut self, now: Time, interval_ms: u64) {
+        self.news_told = self.news_told.saturating_add(1);
+        if std::mem::take(&mut self.is_untold_suspicion)
+            && let Some(age) = &mut self.freshest.suspected
+            && age.ms(now) > interval_ms
+        {
+            *age = Age {
+                told_ms: interval_ms,
+                at: now,
+            };
         }
     }
 
@@ -230,6 +279,7 @@ impl Known {
             until: now.plus_ms(super::HOP_INTERVALS * interval_ms),
         };
         if !farther && !behind {
+            self.lag = self.lag.filter(|lag| lag.teller != teller);
             return self.others_told(sent);
         }
         let outdated =
@@ -265,6 +315,11 @@ impl Known {
     /// Whether a neighbour depends on what this peer tells of it.
     pub(super) fn is_wanted(&self, now: Time) -> bool {
         self.lag.is_some_and(|lag| lag.until > now)
+    }
+
+    /// Whether its heartbeat is to be told because it is so old: who knows a later one tells it.
+    pub(super) fn asks(&self, now: Time, old_ms: u64, again_ms: u64) -> bool {
+        self.freshest.age.ms(now) > old_ms && now.since_ms(self.told_at) > again_ms
     }
 
     /// How much is gained by telling of it: by so much the heartbeat known here is later than

@@ -19,6 +19,7 @@ fn silence_leads_to_suspicion_and_then_to_a_verdict() {
         for c in m.tick(Time(t * 250)) {
             seen.push((t * 250, c.status));
         }
+        m.gossip(Time(t * 250), 1);
     }
     assert_eq!(seen, [(4250, Status::Suspect), (8750, Status::Down)]);
     assert!(8750 <= m.patience(Time(20_000)).bound_ms);
@@ -91,6 +92,7 @@ fn one_s_own_lateness_is_nobody_s_silence_but_the_age_that_is_told_is_true() {
     while m.status(2) != Some((1, Status::Down)) {
         now = now.plus_ms(250);
         m.tick(now);
+        m.gossip(now, 1);
         assert!(now.since_ms(woke) <= 20_000, "the excuse ends");
     }
     let silent_ms = 1_000 + now.since_ms(woke);
@@ -131,6 +133,7 @@ fn who_is_suspected_elsewhere_and_heard_here_is_told_of_first() {
     for id in 2..=20 {
         m.on_beacon(Time(0), id, 1, &beacon(5, Vec::new()));
     }
+    no_news(&mut m);
     m.take_refuted();
     let first = |m: &mut Membership, now_ms| m.gossip(Time(now_ms), 4)[0].id;
     assert_ne!(first(&mut m, 3_000), 15);
@@ -343,7 +346,7 @@ fn those_whom_a_neighbour_is_farther_from_are_told_of_first() {
     let near = (8..=20).map(|id| entry(id, 5, 10, None));
     let entries = near.chain([far(6), far(7)]).collect();
     m.on_beacon(Time(1_000), 3, 1, &beacon(6, entries));
-    // The news of all nineteen are over.
+    no_news(&mut m);
     let mut told: Vec<Vec<u16>> = Vec::new();
     for t in 0..4 {
         let entries = m.gossip(Time(3_000 + t * 1_000), 4);
@@ -368,7 +371,15 @@ fn among_nineteen() -> Membership {
             m.on_beacon(now, id, 1, &beacon(count, Vec::new()));
         }
     }
+    no_news(&mut m);
     m
+}
+
+/// All were told of what changed.
+fn no_news(m: &mut Membership) {
+    for known in m.known.values_mut() {
+        known.news_told = u8::MAX;
+    }
 }
 
 /// Peer 3 hears 6 and 7 by others, and has not heard of 6 for long.
@@ -708,15 +719,14 @@ fn how_many_are_known_is_told_with_the_cap() {
     assert_eq!(m.loads(), [("peers known", 2, 255)]);
 }
 
-#[test]
-fn news_of_somebody_goes_first_for_two_intervals() {
+/// Peers 2 to 20 are heard each second, 14 falls silent in its interval of a period and is
+/// suspected.
+fn who_suspects_fourteen() -> (Membership, Time) {
     let mut m = Membership::new(1, 1000);
     m.announce(16);
     for id in 2..=20 {
         m.on_beacon(Time(0), id, 1, &beacon(1, Vec::new()));
     }
-    // Peer 14 alone falls silent, in its interval of a period.
-    let mut suspected = None;
     for t in 1..=20 {
         let now = Time(t * 1_000);
         for id in (2..=20).filter(|id| *id != 14) {
@@ -725,15 +735,82 @@ fn news_of_somebody_goes_first_for_two_intervals() {
         }
         let changes = m.tick(now);
         if changes.iter().any(|c| c.peer == 14) {
-            suspected = Some(now);
-            break;
+            no_news(&mut m);
+            m.known.get_mut(&14).unwrap().news_told = 0;
+            return (m, now);
         }
     }
-    let suspected = suspected.unwrap();
-    for (after_ms, goes_first) in [(0, true), (4_000, true), (7_999, true), (8_000, false)] {
-        let told = m.clone().gossip(suspected.plus_ms(after_ms), 4);
+    panic!("it is suspected");
+}
+
+#[test]
+fn news_of_somebody_goes_first_in_two_beacons() {
+    let (mut m, now) = who_suspects_fourteen();
+    for (after_ms, goes_first) in [(1_000, true), (5_000, true), (9_000, false)] {
+        let told = m.gossip(now.plus_ms(after_ms), 4);
         assert_eq!(told[0].id == 14, goes_first, "after {after_ms} ms");
     }
+    // What was not told for so long is no news any more.
+    let (mut m, now) = who_suspects_fourteen();
+    m.known.get_mut(&14).unwrap().is_untold_suspicion = false;
+    assert_ne!(m.gossip(now.plus_ms(24_000), 4)[0].id, 14);
+}
+
+/// Nobody can refute what nobody was told: a suspicion that found no room for seven periods
+/// counts as if it had been told within the interval of four.
+#[test]
+fn a_suspicion_that_nobody_was_told_of_is_no_verdict() {
+    let (told, began) = who_suspects_fourteen();
+    let verdict = |mut m: Membership, told_after_ms: u64| {
+        (1..200_u32).find_map(|t| {
+            let now = began.plus_ms(u64::from(t) * 250);
+            for id in (2..=20).filter(|id| *id != 14) {
+                m.on_heartbeat(now, id, 1, (100 + t, 4));
+            }
+            if u64::from(t) * 250 == told_after_ms {
+                assert_eq!(m.gossip(now, 2)[0].id, 14, "it goes first");
+            }
+            let changes = m.tick(now);
+            let down = |c: &Change| c.peer == 14 && c.status == Status::Down;
+            changes.iter().any(down).then_some(u64::from(t) * 250)
+        })
+    };
+    let k2_ms = told.k2_ms(began);
+    assert!(k2_ms >= 18_000);
+    let soon = verdict(told.clone(), 1_000).unwrap();
+    assert!((k2_ms - 250..=k2_ms).contains(&soon), "{soon}");
+    assert_eq!(verdict(told.clone(), 7_000), Some(7_000 + k2_ms - 4_000));
+    // Never told, it is given up when its heartbeat is too old for anybody that lives.
+    let bound_ms = told.bound_ms(began);
+    let at_last = verdict(told, 0).unwrap() + began.0;
+    assert!(at_last > bound_ms, "{at_last}");
+}
+
+/// What is old is told, so that whoever knows a later one tells that.
+#[test]
+fn an_old_heartbeat_is_told_so_that_a_later_one_is_heard() {
+    let mut m = among_nineteen();
+    let far = Gossip {
+        hops: 2,
+        ..entry(30, 5, 0, None)
+    };
+    m.on_beacon(Time(2_500), 3, 1, &beacon(11, vec![far]));
+    let mut asked = Vec::new();
+    for t in 3..=12 {
+        let now = Time(t * 1_000);
+        for id in 2..=20 {
+            let count = 20 + u32::try_from(t).unwrap();
+            m.on_heartbeat(now, id, 1, (count, 4));
+        }
+        let (told, fresh) = m.tell(now, 4);
+        let asks = fresh.iter().any(|f| f.id == 30);
+        if asks && told.iter().all(|g| g.id != 30) {
+            asked.push(t);
+        }
+    }
+    // A quarter of the bound of 15.25 s is over at 6.3 s; then again after more than two
+    // intervals.
+    assert_eq!(asked, [7, 10]);
 }
 
 /// A peer that stood still when another had been silent for four periods: what arrived meanwhile
