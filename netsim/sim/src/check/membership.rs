@@ -5,6 +5,10 @@ use super::{Bounds, Clocks, Findings, Grade, Handicaps, PeerSnapshot, Snapshot};
 use skein_peer::output::Status;
 use std::collections::BTreeMap;
 
+/// Whoever is so many hops away at most is heard of in time at light loss: by the neighbour of
+/// a neighbour.
+const NEAR: u32 = 2;
+
 /// A peer that cannot be heard because its process does not run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Silence {
@@ -162,11 +166,17 @@ impl Membership {
         self.look_for_disagreement(snapshot, found);
     }
 
-    /// Without a loss nobody in reach is believed dead while it lives. (With a loss a
-    /// batch of runs is judged by the rate.)
+    /// Nobody in reach is believed dead while it lives: without a loss, and at light loss where
+    /// nobody was far away. (Elsewhere a batch of runs is judged by the rate.)
     fn look_for_false_downs(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        let is_near = snapshot.stability.lasting_diameter() <= NEAR;
+        let is_judged = match snapshot.grade() {
+            Grade::Hard => true,
+            Grade::Light => is_near,
+            Grade::Heavy | Grade::Reported => false,
+        };
         for (at_ms, by, of) in &self.false_downs[self.judged_downs..] {
-            if snapshot.grade() == Grade::Hard {
+            if is_judged {
                 found.broken("false-down", *at_ms, Some(*by), || {
                     format!("holds peer {of} for down, which lives and is in reach")
                 });
@@ -417,8 +427,8 @@ mod tests {
     }
 
     #[test]
-    fn a_false_down_is_a_violation_where_nothing_is_lost() {
-        for (loss, broken) in [(0, true), (50, false), (300, false)] {
+    fn a_false_down_is_a_violation_where_little_is_lost_and_nobody_is_far() {
+        for (loss, broken) in [(0, true), (100, true), (101, false), (300, false)] {
             let (mut m, mut found) = (Membership::default(), Findings::new(1));
             m.on_life(0, 2, 1);
             m.on_belief(
