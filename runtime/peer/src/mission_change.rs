@@ -48,6 +48,9 @@ pub(crate) fn negotiation_begun(
     let needless = CellSet::of(cells, without_need.map(|(i, _)| i));
     let counter = old.map_or(0, |(_, negotiation)| negotiation.rounds.counter());
     let mut negotiation = Negotiation::new(me, needless, counter.max(durable.counter));
+    if old.is_some_and(|(before, _)| before.coverage_loop.hash() != coverage_loop.hash()) {
+        negotiation.rounds.begin_at(geometry.mission.revision);
+    }
     // Every lap begins with nothing covered.
     if let Some((before, old)) = old.filter(|(g, _)| g.mission.lap == geometry.mission.lap) {
         let covered = old.sections.covered();

@@ -11,6 +11,7 @@
 //! | open | a bid of a lower round | open | ignored: it is dead |
 //! | complete | decided | closed | the counter stays |
 //! | any | a round that does not name me, or is far above all counters | same | only its counter is remembered, in steps |
+//! | any | a round of an earlier revision than that which led back to this loop | same | only its counter is remembered |
 //!
 //! Rounds are ordered by (counter, number of members, hash of members and loop);
 //! a higher one abandons a lower one, and bids of different rounds never mix.
@@ -77,6 +78,8 @@ pub struct Rounds {
     open: Option<OpenRound>,
     closed: Option<RoundOrder>,
     silent: BTreeMap<Member, u8>,
+    /// Rounds of earlier revisions of the mission are of an earlier stay on this loop.
+    since_revision: u32,
     /// By so much what is heard may still raise the counter in this period.
     may_rise: u32,
     longest_wait_ms: u32,
@@ -92,9 +95,16 @@ impl Rounds {
             open: None,
             closed: None,
             silent: BTreeMap::new(),
+            since_revision: 0,
             may_rise: COUNTER_STEP,
             longest_wait_ms: DURATION_MAX_MS,
         }
+    }
+
+    /// A mission of this revision leads to this loop from another one: bids of rounds of earlier
+    /// ones are what was said when it was flown before.
+    pub fn begin_at(&mut self, revision: u32) {
+        self.since_revision = revision;
     }
 
     /// A period begins, in which no honest round waits for longer than this.
@@ -147,6 +157,7 @@ impl Rounds {
         if !round.members.contains(&self.me)
             || !round.members.contains(&author)
             || author == self.me
+            || round.revision < self.since_revision
         {
             return HeardBid::Nothing;
         }
@@ -427,6 +438,20 @@ mod tests {
         assert_eq!(a.hear(member(2), &bid(&r, 0)), HeardBid::Nothing);
         assert!(a.open().is_none());
         assert_eq!(a.counter(), 9);
+    }
+
+    #[test]
+    fn what_was_bid_when_this_loop_was_flown_before_is_no_round_of_today() {
+        let mut a = Rounds::new(member(1), 19);
+        a.begin_at(3);
+        let mut r = round(10, &[1, 2]);
+        for revision in 1..3 {
+            r.revision = revision;
+            assert_eq!(a.hear(member(2), &bid(&r, 0)), HeardBid::Nothing);
+            assert!(a.open().is_none());
+        }
+        r.revision = 3;
+        assert_eq!(a.hear(member(2), &bid(&r, 0)), HeardBid::BidWanted);
     }
 
     #[test]
