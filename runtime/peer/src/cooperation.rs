@@ -21,6 +21,7 @@
 //! | covered cells that are news | they are spoken |
 //! | a beacon of this loop with other coverage | the own is spoken |
 //! | a beacon of this revision and another loop | an alarm, once |
+//! | a beacon of a later lap of this mission | that lap begins: its author knows that this one is seen |
 //! | a tick | the negotiation ticks, the end is noticed, the goal follows |
 //! | a bid is durable | it is spoken, if its round is still open |
 //! | a division, a take is durable | it is flown and spoken, if nothing was written after it |
@@ -223,6 +224,9 @@ impl Cooperation {
                 .then_some(Effect::CoverageWanted)
                 .into_iter()
                 .collect();
+        }
+        if let Some(lap) = state.lap_of(beacon) {
+            return vec![Effect::Offer(Arc::new(lap))];
         }
         let mismatch = beacon.revision == state.revision() && beacon.loop_hash != 0;
         if mismatch && !core::mem::replace(&mut self.mismatch_told, true) {

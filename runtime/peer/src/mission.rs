@@ -241,11 +241,18 @@ impl Mission {
     /// the last.
     #[must_use]
     pub fn next_lap(&self) -> Option<Self> {
-        let further_laps = self.further_laps.checked_sub(1)?;
+        self.later_lap(self.revision.checked_add(1)?)
+    }
+
+    /// The mission of a later lap, by its revision; none where no lap of this mission has it.
+    #[must_use]
+    pub fn later_lap(&self, revision: u32) -> Option<Self> {
+        let laps = revision.checked_sub(self.revision).filter(|n| *n > 0)?;
+        let laps = u16::try_from(laps).ok()?;
         Some(Self {
-            revision: self.revision.checked_add(1)?,
-            lap: self.lap.checked_add(1)?,
-            further_laps,
+            revision,
+            lap: self.lap.checked_add(laps)?,
+            further_laps: self.further_laps.checked_sub(laps)?,
             ..self.clone()
         })
     }
@@ -502,6 +509,11 @@ mod tests {
         assert_ne!(second.content_hash(), m.content_hash());
         assert_ne!(m.content_hash(), mission(1, 4).content_hash());
         assert_eq!(second.next_lap().unwrap().next_lap(), None);
+        let third = second.next_lap();
+        assert_eq!(m.later_lap(m.revision + 2), third);
+        for none in [0, m.revision, m.revision + 3, u32::MAX] {
+            assert_eq!(m.later_lap(none), None);
+        }
         let pieces = chunks(&second).unwrap();
         let mut library = Library::new(Some(Arc::new(m)));
         for (i, piece) in (0u16..).zip(&pieces) {

@@ -21,6 +21,7 @@ use crate::cooperation::Situation;
 use crate::effect::{Effect, Effects, PendingJob, Promise};
 use crate::input::Time;
 use crate::journal::{Durable, Entry};
+use crate::mission::Mission;
 use crate::mission_change::{executive_for, negotiation_begun};
 use crate::offload::{Job, MissionGeometry};
 use crate::output::Report;
@@ -31,7 +32,7 @@ use crate::protocol::sections::FIRST_LIFE;
 use crate::timers::{Timer, Timers};
 use crate::wire::codec::Body;
 use crate::wire::limits::BID_COVERED_MAX_BYTES;
-use crate::wire::message::{Activity, Bid, Claim, Epoch, Member, MissionStatus};
+use crate::wire::message::{Activity, Beacon, Bid, Claim, Epoch, Member, MissionStatus};
 use skein_behaviors::executive::UNREACHABLE_MS;
 use skein_behaviors::{Event, Executive, Goal, Percept};
 use skein_flight::coverage::ring::Direction;
@@ -558,6 +559,14 @@ impl MissionState {
         ];
         effects.extend(self.save_covered(true));
         effects
+    }
+
+    /// The later lap of this mission that the author of a beacon has begun.
+    pub fn lap_of(&self, beacon: &Beacon) -> Option<Mission> {
+        let (geometry, mission) = (&self.geometry, &self.geometry.mission);
+        let later = mission.later_lap(beacon.revision)?;
+        let hash = geometry.coverage_loop.hash_in_lap(mission.lap, later.lap);
+        (hash == beacon.loop_hash).then_some(later)
     }
 
     fn next_lap(&mut self, s: &Situation<'_>, timers: &mut Timers) -> Effects {

@@ -190,6 +190,33 @@ fn laps_follow_each_other_in_all_peers() {
     assert!(h.run_until(200, |h| h.beliefs(1).finished && h.beliefs(2).finished));
 }
 
+/// Who was out of reach when a lap ended hears of a later one from a beacon.
+#[test]
+fn who_missed_the_end_of_laps_begins_the_one_that_others_fly() {
+    let mut patrol = mission(1, 4, 4);
+    patrol.further_laps = 5;
+    let mut h = with_operator(2, patrol);
+    h.run_s(15);
+    for id in [2, GROUND_STATION] {
+        h.isolate(id, true);
+    }
+    // It has seen little, and goes no further.
+    h.stop(2);
+    assert!(h.run_until(600, |h| h.beliefs(1).revision == 3));
+    h.start(2);
+    assert_eq!(h.beliefs(GROUND_STATION).revision, 1);
+    for id in [2, GROUND_STATION] {
+        h.isolate(id, false);
+    }
+    let all = |h: &Harness| {
+        [2, GROUND_STATION]
+            .iter()
+            .all(|id| h.beliefs(*id).revision == 3)
+    };
+    assert!(h.run_until(20, all));
+    assert_eq!(h.beliefs(2).loop_hash, h.beliefs(1).loop_hash);
+}
+
 #[test]
 fn an_operator_s_mission_outranks_the_laps_that_a_peer_began_out_of_reach() {
     let mut patrol = mission(1, 4, 4);

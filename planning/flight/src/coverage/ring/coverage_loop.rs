@@ -198,9 +198,14 @@ impl CoverageLoop {
     /// The same loop in another lap: what was covered before does not count on it.
     #[must_use]
     pub fn of_lap(mut self, lap: u16) -> Self {
-        // The golden ratio's odd multiple spreads small numbers over all bits.
-        self.hash ^= u64::from(lap).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self.hash ^= lap_bits(lap);
         self
+    }
+
+    /// What identifies the loop in another lap than `lap`, which this one is of.
+    #[must_use]
+    pub fn hash_in_lap(&self, lap: u16, other: u16) -> u64 {
+        self.hash ^ lap_bits(lap) ^ lap_bits(other)
     }
 
     /// Identifies the loop: equal on all peers that derived it from the same mission.
@@ -208,6 +213,11 @@ impl CoverageLoop {
     pub fn hash(&self) -> u64 {
         self.hash
     }
+}
+
+fn lap_bits(lap: u16) -> u64 {
+    // The golden ratio's odd multiple spreads small numbers over all bits.
+    u64::from(lap).wrapping_mul(0x9e37_79b9_7f4a_7c15)
 }
 
 /// Length of a curve in whole millimetres, as loops count it.
