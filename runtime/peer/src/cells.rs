@@ -76,6 +76,16 @@ impl CellSet {
         set
     }
 
+    /// The cells of some runs (cyclic).
+    #[must_use]
+    pub fn of_runs(n: u16, runs: impl IntoIterator<Item = CellRun>) -> Self {
+        let mut set = Self::new(n);
+        for run in runs {
+            set.insert_run(run);
+        }
+        set
+    }
+
     fn place(cell: u16) -> (usize, u64) {
         (usize::from(cell / 64), 1_u64 << (cell % 64))
     }

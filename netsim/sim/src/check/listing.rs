@@ -4,6 +4,7 @@ use super::membership::Membership;
 use super::snapshot::is_alone;
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use skein_peer::output::Status;
+use skein_peer::protocol::runs::cells_of;
 use skein_peer::wire::message::{Claim, ListedRun, Stamp};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -166,7 +167,7 @@ impl ListingCheck {
         let mut owner = self.last_lister.get(&cell).copied();
         if !self.orphans.contains_key(&cell) {
             // Whoever listed it may have yielded it to one who is dead by now.
-            let n = snapshot.covered.len();
+            let n = u16::try_from(snapshot.covered.len()).unwrap_or(u16::MAX);
             let heard = owner.map(|by| self.heard.range((by, 0)..=(by, u16::MAX)));
             let silent = heard
                 .into_iter()
@@ -212,6 +213,7 @@ impl ListingCheck {
         found: &mut Findings,
     ) {
         let n = snapshot.covered.len();
+        let cells = u16::try_from(n).unwrap_or(u16::MAX);
         // It yields when it hears; a snapshot may fall between the two, the next one may not.
         let bound_ms = snapshot.bounds.period_ms / 2;
         let mut seen: Vec<(u16, u16, u16)> = Vec::new();
@@ -243,11 +245,9 @@ impl ListingCheck {
                     continue;
                 }
                 for l in claim.plan.iter().filter(plans_near) {
-                    each_cell(l, n, |c| {
-                        if stamps[c].is_some_and(|s| s < l.stamp) {
-                            seen.push((m.id, author, u16::try_from(c).unwrap_or(u16::MAX)));
-                        }
-                    });
+                    let lower = |c: &u16| stamps[usize::from(*c)].is_some_and(|s| s < l.stamp);
+                    let clashing = cells_of(l.run, cells).filter(lower);
+                    seen.extend(clashing.map(|c| (m.id, author, c)));
                 }
             }
         }
@@ -285,22 +285,9 @@ fn counted_from(o: &Orphan, members: &Membership) -> Option<u64> {
 }
 
 /// Whether a claim plans a cell that is still to be flown.
-fn plans(claim: &Claim, cell: u16, n: usize) -> bool {
-    let mut found = false;
-    for l in &claim.plan {
-        each_cell(l, n, |c| found |= c == usize::from(cell));
-    }
-    found
-}
-
-/// Calls `f` with each cell of a listing that is still to be flown.
-fn each_cell(l: &ListedRun, n: usize, mut f: impl FnMut(usize)) {
-    if n == 0 {
-        return;
-    }
-    for k in 0..usize::from(l.run.count) {
-        f((usize::from(l.run.first) + k) % n);
-    }
+fn plans(claim: &Claim, cell: u16, cells: u16) -> bool {
+    let mut runs = claim.plan.iter();
+    runs.any(|l| cells_of(l.run, cells).any(|c| c == cell))
 }
 
 #[cfg(test)]

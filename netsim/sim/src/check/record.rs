@@ -6,9 +6,10 @@ use super::{Findings, Handicaps, Snapshot};
 use skein_peer::Beliefs;
 use skein_peer::cells::CellSet;
 use skein_peer::journal::{Durable, Entry};
+use skein_peer::protocol::runs::cells_of;
 use skein_peer::wire::codec::{self, Body};
 use skein_peer::wire::kinds::Kind;
-use skein_peer::wire::message::{Bid, Claim, Epoch, ListedRun, Record, Stamp};
+use skein_peer::wire::message::{Bid, Claim, Epoch, Record, Stamp};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -331,22 +332,18 @@ fn of_last_life(journal: &[Vec<u8>]) -> impl Iterator<Item = Entry> {
 /// A run may bridge cells covered meanwhile: to fly over those is no promise.
 fn unpersisted(said: &Claim, durable: Option<&Claim>, covered: &[bool]) -> Option<String> {
     // Runs are cyclic: the same cell may be named with and without a lap.
-    let n = u32::try_from(covered.len()).unwrap_or(u32::MAX).max(1);
-    let cell_of = |l: &ListedRun, k: u16| {
-        u16::try_from((u32::from(l.run.first) + u32::from(k)) % n).unwrap_or(u16::MAX)
-    };
+    let n = u16::try_from(covered.len()).unwrap_or(u16::MAX).max(1);
     let mut promised: BTreeMap<u16, Stamp> = BTreeMap::new();
     if let Some(d) = durable {
         for l in d.plan.iter().chain(&d.held) {
-            for k in 0..l.run.count {
-                let s = promised.entry(cell_of(l, k)).or_insert(l.stamp);
+            for cell in cells_of(l.run, n) {
+                let s = promised.entry(cell).or_insert(l.stamp);
                 *s = (*s).max(l.stamp);
             }
         }
     }
     for l in &said.plan {
-        for k in 0..l.run.count {
-            let cell = cell_of(l, k);
+        for cell in cells_of(l.run, n) {
             let bridged = covered.get(usize::from(cell)).copied().unwrap_or(false);
             if !bridged && promised.get(&cell).is_none_or(|s| *s < l.stamp) {
                 return Some(format!(
@@ -363,7 +360,7 @@ fn unpersisted(said: &Claim, durable: Option<&Claim>, covered: &[bool]) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_peer::wire::message::CellRun;
+    use skein_peer::wire::message::{CellRun, ListedRun};
 
     fn claim(counter: u32, count: u16) -> Claim {
         Claim {

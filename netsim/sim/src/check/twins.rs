@@ -286,6 +286,24 @@ mod tests {
     use skein_geometry::frame::Point;
     use skein_peer::Beliefs;
 
+    fn silenced() -> Beliefs {
+        Beliefs {
+            speaks: false,
+            is_silent: true,
+            able: false,
+            ..speaking()
+        }
+    }
+
+    /// Some peers as a snapshot shows them.
+    fn seen(now_ms: u64, twins: &Twins, views: &[(u16, Beliefs)]) -> Vec<PeerSnapshot> {
+        let mut peers = Vec::new();
+        let mut story = Story::new(0);
+        story.twins = twins.clone();
+        story.snapshot(now_ms, views, |s| peers = s.peers.to_vec());
+        peers
+    }
+
     /// Peer 1 and its twin 9 for a minute: whether each speaks, or else is silent.
     fn minute(loss_permille: u16, speak: [bool; 2], change: impl Fn(&mut Beliefs)) -> u64 {
         let twins = Twins::from_iter([(9, 1)]);
@@ -293,8 +311,7 @@ mod tests {
         let mut story = Story::new(loss_permille);
         story.twins = twins;
         for t in 1..=60 {
-            let mut silent = speaking();
-            (silent.speaks, silent.is_silent, silent.able) = (false, true, false);
+            let mut silent = silenced();
             change(&mut silent);
             let of = |speaks: bool| {
                 [(1, speak[0]), (9, speak[1])]
@@ -303,10 +320,7 @@ mod tests {
                     .map(|(id, s)| (id, if s { speaking() } else { silent.clone() }))
                     .collect::<Vec<_>>()
             };
-            let mut mute = Vec::new();
-            let mut other = Story::new(0);
-            other.twins = Twins::from_iter([(9, 1)]);
-            other.snapshot(t * 1000, &of(false), |s| mute = s.peers.to_vec());
+            let mute = seen(t * 1000, &story.twins, &of(false));
             story.snapshot(t * 1000, &of(true), |s| {
                 check.on_snapshot(s, &mute, &mut found);
             });
@@ -350,17 +364,12 @@ mod tests {
         let mut story = Story::new(loss_permille);
         story.twins = twins;
         for t in 1..=60 {
-            let mut silent = speaking();
-            (silent.speaks, silent.is_silent, silent.able) = (false, true, false);
             for (number, gives) in [(1, gives[0]), (9, gives[1])] {
                 if gives {
                     check.on_setpoint(t * 1000 - 200, number, taken == number);
                 }
             }
-            let mut mute = Vec::new();
-            let mut other = Story::new(0);
-            other.twins = story.twins.clone();
-            other.snapshot(t * 1000, &[(9, silent)], |s| mute = s.peers.to_vec());
+            let mute = seen(t * 1000, &story.twins, &[(9, silenced())]);
             story.snapshot(t * 1000, &[(1, speaking())], |s| {
                 check.on_snapshot(s, &mute, &mut found);
             });

@@ -1,7 +1,7 @@
 //! What a complete round decides: a function of its bids alone.
 
 use super::rounds::OpenRound;
-use super::runs::{PlannedCell, cells_of, direction_of};
+use super::runs::{PlannedCell, direction_of};
 use super::sections::{LivePeers, Sections};
 use crate::cells::CellSet;
 use crate::offload::MissionGeometry;
@@ -151,7 +151,7 @@ pub fn adopted(
 /// The cells that the flyer of a bid is about to fly and keeps.
 #[must_use]
 pub fn commits_of(bid: &Bid, n: u16) -> CellSet {
-    CellSet::of(n, bid.commits.iter().flat_map(|run| cells_of(*run, n)))
+    CellSet::of_runs(n, bid.commits.iter().copied())
 }
 
 #[cfg(test)]

@@ -219,8 +219,7 @@ impl Sections {
             return false;
         }
         let runs = claim.plan.iter().chain(&claim.held);
-        let listed = runs.flat_map(|l| cells_of(l.run, self.cells));
-        let listed = CellSet::of(self.cells, listed);
+        let listed = CellSet::of_runs(self.cells, runs.map(|l| l.run));
         if claim.alone {
             self.alone.insert(author, incarnation);
         } else {

@@ -101,13 +101,13 @@ impl Told {
 
     /// A neighbour tells of a later one. One in two does not hear it.
     fn by_others(&mut self, sent: Time) {
-        self.by_any = Time(u64::midpoint(self.by_any.0, sent.0)).max(self.by_any);
+        self.by_any = half_way(self.by_any, sent);
     }
 
     /// This peer does.
     fn by_me(&mut self, sent: Time) {
         self.by_others(sent);
-        self.by_me = Time(u64::midpoint(self.by_me.0, sent.0)).max(self.by_me);
+        self.by_me = half_way(self.by_me, sent);
     }
 
     /// What is gained by telling of one that was sent then.
@@ -115,6 +115,11 @@ impl Told {
         let alone_ms = sent.since_ms(self.by_me) / ALONE;
         sent.since_ms(self.by_any).max(alone_ms)
     }
+}
+
+/// Half way from what was known to what is told, if that is later.
+fn half_way(known: Time, told: Time) -> Time {
+    Time(u64::midpoint(known.0, told.0)).max(known)
 }
 
 /// In one of so many cases whoever depends on a peer hears nobody else.

@@ -121,6 +121,14 @@ impl Desk {
         None
     }
 
+    /// This peer's bid is durable, and that of 2 is heard.
+    fn both_bid(&mut self) {
+        let (own, other) = (self.bid_from(0), self.bid_from(12));
+        assert!(self.negotiation.on_bid_durable(own));
+        let heard = self.negotiation.hear_bid(self.now, member(2), &other);
+        heard.unwrap();
+    }
+
     fn bid_from(&self, anchor: u16) -> Bid {
         Bid {
             anchor,
@@ -261,11 +269,7 @@ fn a_round_without_all_bids_waits_longer_each_time_and_leaves_out_the_silent() {
 fn a_complete_round_is_divided_once_and_given_up_without_an_answer() {
     let mut desk = Desk::new(&[2]);
     desk.wait(5 * T).unwrap();
-    let (own, other) = (desk.bid_from(0), desk.bid_from(12));
-    assert!(desk.negotiation.on_bid_durable(own));
-    desk.negotiation
-        .hear_bid(desk.now, member(2), &other)
-        .unwrap();
+    desk.both_bid();
     let divides = desk.tick();
     assert!(
         matches!(&divides[..], [Action::Divide { uavs, .. }] if uavs.len() == 2),
@@ -286,11 +290,7 @@ fn a_complete_round_is_divided_once_and_given_up_without_an_answer() {
 fn a_division_gives_each_member_its_part_and_all_compute_the_same() {
     let mut desk = Desk::new(&[2]);
     desk.wait(5 * T).unwrap();
-    let (own, other) = (desk.bid_from(0), desk.bid_from(12));
-    desk.negotiation.on_bid_durable(own);
-    desk.negotiation
-        .hear_bid(desk.now, member(2), &other)
-        .unwrap();
+    desk.both_bid();
     let divides = desk.tick();
     let [Action::Divide { epoch, ring, uavs }] = &divides[..] else {
         panic!("{divides:?}")
@@ -882,11 +882,7 @@ fn among_many_a_peer_looks_twice_a_period_for_what_it_could_take() {
 fn what_is_divided_are_the_bids_whatever_a_member_knows_besides() {
     let mut desk = Desk::new(&[2]);
     desk.wait(5 * T).unwrap();
-    let (own, other) = (desk.bid_from(0), desk.bid_from(12));
-    assert!(desk.negotiation.on_bid_durable(own));
-    desk.negotiation
-        .hear_bid(desk.now, member(2), &other)
-        .unwrap();
+    desk.both_bid();
     // It hears of covered cells after it bid, and others may not have heard of them.
     desk.leave_open(6..24);
     let divides = desk.tick();
