@@ -36,6 +36,7 @@ use crate::wire::kinds::Kind;
 use crate::wire::limits::{CHUNKS_MAX, HOPS_MAX, PEERS_MAX};
 use crate::wire::message::{Beacon, Record};
 use skein_geometry::hash::Fnv;
+mod digest;
 #[cfg(test)]
 mod many_relays;
 mod queue;
@@ -506,17 +507,22 @@ impl Relay {
             return;
         }
         self.answered.insert(author, now);
-        let all = life > incarnation || mine_seq == max_seq;
+        // Of equal numbers the digests tell of which kinds the versions differ.
+        let differs = |kind| match (life > incarnation, mine_seq == max_seq) {
+            (true, _) => true,
+            (false, true) => digest::differs(kind, mine_digest, digest),
+            (false, false) => false,
+        };
         let lacking: Vec<(RecordKey, Kind)> = self
             .held
             .range(keys_of(author))
             .filter(|(_, h)| {
-                h.record.incarnation == life
-                    && (all || h.record.seq > max_seq)
-                    && (now.since_ms(h.sent) >= quiet || h.copies == 0)
+                h.record.incarnation == life && (now.since_ms(h.sent) >= quiet || h.copies == 0)
             })
-            .filter_map(|(k, _)| Kind::of_number(k.1).map(|kind| (*k, kind)))
-            .filter(|(_, kind)| is_counted(*kind))
+            .filter_map(|(k, h)| Kind::of_number(k.1).map(|kind| (*k, h.record.seq, kind)))
+            .filter(|(_, _, kind)| is_counted(*kind))
+            .filter(|(_, seq, kind)| *seq > max_seq || differs(*kind))
+            .map(|(key, _, kind)| (key, kind))
             .collect();
         for (key, kind) in lacking {
             if !self.queue.contains(&key) {
@@ -529,24 +535,12 @@ impl Relay {
     /// highest `seq`, digest.
     #[must_use]
     pub fn version(&self, author: u16, incarnation: Incarnation) -> (u32, u16) {
-        let mut max = 0;
-        let mut h = Fnv::new();
-        for (k, held) in self.held.range(keys_of(author)) {
-            let counted = Kind::of_number(k.1).is_some_and(is_counted);
-            if held.record.incarnation == incarnation && counted {
-                max = max.max(held.record.seq);
-                h.write(&[k.1]);
-                h.write(&k.2.to_le_bytes());
-                h.write(&held.record.seq.to_le_bytes());
-            }
-        }
-        let d = h.finish();
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "folded to 16 bits on purpose"
-        )]
-        let digest = (d ^ (d >> 16) ^ (d >> 32) ^ (d >> 48)) as u16;
-        (max, digest)
+        let counted = self.held.range(keys_of(author)).filter(|(key, held)| {
+            held.record.incarnation == incarnation && Kind::of_number(key.1).is_some_and(is_counted)
+        });
+        let versions = counted.map(|(key, held)| (key.1, key.2, held.record.seq));
+        let max = versions.clone().map(|(_, _, seq)| seq).max();
+        (max.unwrap_or(0), digest::of(versions))
     }
 
     /// All records held, newest versions, by author, kind and subject.

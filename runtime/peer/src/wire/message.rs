@@ -105,7 +105,7 @@ pub struct Gossip {
     pub able: bool,
     /// The highest `seq` held of that author and life.
     pub max_seq: u32,
-    /// Digest of the versions held of that author.
+    /// Digest of the versions held of that author: of which kinds they differ, and a hash.
     pub digest: u16,
 }
 

@@ -287,16 +287,44 @@ fn a_digest_tells_which_records_are_held_and_not_only_the_newest() {
     let ((seq, digest), (other_seq, other)) = (whole.version(1, 1), hole.version(1, 1));
     assert_eq!((seq, other_seq), (6, 6));
     assert_ne!(digest, other);
-    // As it is told on the wire: FNV-1a of kind, subject and sequence number, folded.
-    let mut hash = Fnv::new();
-    for seq in 1..=6_u32 {
-        hash.write(&[1]);
-        hash.write(&u16::try_from(seq).unwrap().to_le_bytes());
-        hash.write(&seq.to_le_bytes());
-    }
-    let parts = hash.finish().to_le_bytes();
-    let parts = parts.chunks(2).map(|p| u16::from_le_bytes([p[0], p[1]]));
-    assert_eq!(digest, parts.fold(0, |a, b| a ^ b));
+}
+
+#[test]
+fn of_equal_numbers_only_what_differs_is_said_again() {
+    let of = |kind: Kind, seq| Record {
+        kind: kind.number(),
+        ..record(1, seq)
+    };
+    let kinds = [Kind::State, Kind::Bid, Kind::Claim, Kind::Finished];
+    let holding = |numbers: [u32; 4]| {
+        let mut r = relay(2);
+        for (kind, seq) in kinds.into_iter().zip(numbers).filter(|(_, seq)| *seq > 0) {
+            r.offer(Time(5_000), &of(kind, seq), &[kind.number(); 40], 0);
+        }
+        while r.next_timeout(Time(9_000)).is_some() {
+            assert!(r.poll(Time(9_000)).is_some());
+        }
+        r
+    };
+    let said = |theirs: [u32; 4]| {
+        let (mut mine, theirs) = (holding([38, 35, 39, 40]), holding(theirs));
+        let (max_seq, digest) = theirs.version(1, 1);
+        mine.catch_up(Time(20_000), 1, 1, max_seq, digest);
+        let out = (20_000..22_000).filter_map(|t| mine.poll(Time(t)).map(|out| out.bytes[0]));
+        let mut out: Vec<u8> = out.collect();
+        out.sort_unstable();
+        out
+    };
+    let [state, bid, claim, finished] = kinds.map(Kind::number);
+    assert_eq!(said([38, 35, 39, 40]), []);
+    // `finished` has no bits of its own: it goes whatever differs.
+    assert_eq!(said([29, 35, 39, 40]), [state, finished]);
+    assert_eq!(said([0, 35, 33, 40]), [state, claim, finished]);
+    assert_eq!(said([38, 0, 39, 40]), [bid, finished]);
+    // Sixteen, eight and four numbers apart the bits are equal: the hash tells, not of which.
+    assert_eq!(said([22, 31, 31, 40]), [state, bid, claim, finished]);
+    // A lower number is lacking what came later, whatever the digests say.
+    assert_eq!(said([38, 35, 0, 0]), [claim, finished]);
 }
 
 #[test]
