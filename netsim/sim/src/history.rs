@@ -6,6 +6,8 @@
 
 use crate::fault::Fault;
 use serde::Serialize;
+use skein_behaviors::Setpoint;
+use skein_geometry::frame::Pose;
 use skein_geometry::hash::Fnv;
 use skein_peer::Report;
 use skein_peer::output::Status;
@@ -138,6 +140,37 @@ pub fn bytes_hash(bytes: &[u8]) -> u64 {
     let mut h = Fnv::new();
     h.write(bytes);
     h.finish()
+}
+
+/// A pose as one number: millimetres and 1e-7 radians.
+#[must_use]
+pub fn pose_hash(pose: &Pose) -> u64 {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "casts from floats saturate, and only bits count"
+    )]
+    let q = |v: f64, scale: f64| (v * scale).round() as i64 as u64;
+    q(pose.east_m, 1e3).rotate_left(42)
+        ^ q(pose.north_m, 1e3).rotate_left(21)
+        ^ q(pose.heading_rad, 1e7)
+}
+
+/// A setpoint as one number.
+#[must_use]
+pub fn setpoint_hash(s: &Setpoint) -> u64 {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "casts from floats saturate, and only bits count"
+    )]
+    let q = |v: f64| (v * 1e6).round() as i64 as u64;
+    s.steps
+        .iter()
+        .fold(s.from_ms ^ q(s.airspeed_mps).rotate_left(32), |h, step| {
+            (h ^ q(step.turn_rate_radps) ^ (u64::from(step.duration_ms) << 40))
+                .wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        })
 }
 
 /// The content of a report as one number.

@@ -160,12 +160,6 @@ impl Air {
         self.world.judge().saw(revision, cell, laps)
     }
 
-    /// Whether every coverable cell is covered.
-    #[must_use]
-    pub fn is_complete(&self) -> bool {
-        self.world.judge().complete()
-    }
-
     /// The judge and its score.
     #[must_use]
     pub fn judge(&self) -> &Judge {

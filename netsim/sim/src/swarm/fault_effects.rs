@@ -66,14 +66,13 @@ impl Swarm {
             }
             Fault::Rebase { east_mm, north_mm } => {
                 let base = (*east_mm, *north_mm);
-                self.revise(Mission {
-                    base,
-                    ..(*self.mission).clone()
-                });
+                let before = (**self.operator.mission()).clone();
+                let next = self.operator.next(Mission { base, ..before });
+                self.revise(next);
                 0
             }
             Fault::Revise { area, zones, task } => {
-                let before = (*self.mission).clone();
+                let before = (**self.operator.mission()).clone();
                 self.give_mission(Mission {
                     area: area.clone(),
                     zones: zones.clone(),
@@ -83,7 +82,7 @@ impl Swarm {
                 0
             }
             Fault::Order { order } => {
-                self.order = Some((*order, None));
+                self.operator.order(*order);
                 self.repeat_order();
                 0
             }
@@ -252,10 +251,7 @@ impl Swarm {
     /// The operator gives another mission. A console refuses one that cannot be flown; no
     /// operator wants one of which the planner leaves out what could be seen.
     fn give_mission(&mut self, mission: Mission) {
-        let next = Arc::new(Mission {
-            revision: self.mission.revision_after(self.mission.revision),
-            ..mission.clone()
-        });
+        let next = self.operator.next(mission);
         let zones: Result<Vec<Polygon>, _> = next.zones_m().map(Polygon::new).collect();
         let (Ok(geometry), Ok(zones)) = (self.geometry_cache.of(&next), zones) else {
             return;
@@ -277,20 +273,18 @@ impl Swarm {
         if enough && coverable.all(|c| is_planned(c.id)) {
             self.air.revise(Arc::new(survey), &geometry);
             self.account.revised();
-            self.revise(mission);
+            self.revise(next);
         }
     }
 
     /// The operator's next revision enters at the ground station.
-    fn revise(&mut self, mut mission: Mission) {
-        mission.revision = self.mission.revision_after(self.mission.revision);
-        self.mission = Arc::new(mission);
-        self.checker.rules.on_mission(&self.mission);
+    fn revise(&mut self, next: Arc<Mission>) {
+        self.operator.give(Arc::clone(&next));
+        self.checker.rules.on_mission(&next);
         if let Some(idx) = self.ground_station() {
             // What the operator said last is what the next life begins with.
-            self.peers[idx].config.mission = Some(Arc::clone(&self.mission));
-            let command = Command::Mission(Arc::clone(&self.mission));
-            self.feed(idx, Input::Command(command));
+            self.peers[idx].config.mission = Some(Arc::clone(&next));
+            self.feed(idx, Input::Command(Command::Mission(next)));
         }
     }
 

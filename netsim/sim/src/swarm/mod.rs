@@ -8,6 +8,9 @@
 //! |---|---|
 //! | [`queue`] | the event queue |
 //! | [`stream`] | independent random streams |
+//! | [`operator`] | the mission and the order given last |
+//! | [`judged_loop`] | the loop on which cells are counted |
+//! | [`traffic`] | what the radios were given and brought |
 //! | [`names`] | whom peers mean by an id that two processes have |
 //! | [`sim_peer`] | one peer: process, clock, disk, inbox |
 //! | [`air`] | the world and the medium as the driver uses them |
@@ -15,14 +18,17 @@
 //! | [`outcome`] | what a run came to |
 //! | [`meter`] | how long its parts take |
 
-pub mod air;
-pub mod fault_effects;
+mod air;
+mod fault_effects;
+mod judged_loop;
 pub mod meter;
-pub mod names;
+mod names;
+mod operator;
 pub mod outcome;
-pub mod queue;
-pub mod sim_peer;
-pub mod stream;
+mod queue;
+mod sim_peer;
+pub(crate) mod stream;
+mod traffic;
 
 pub use outcome::Outcome;
 
@@ -34,37 +40,35 @@ use crate::check::record::Said;
 use crate::check::{Checker, PeerSnapshot};
 use crate::fault::TimedFault;
 use crate::geometry_cache::GeometryCache;
-use crate::history::{History, Kind, What, bytes_hash, report_hash};
+use crate::history::{History, Kind, What, bytes_hash, pose_hash, report_hash, setpoint_hash};
 use crate::prepared::Prepared;
 use crate::radio::{Delivery, Frame};
 use crate::spec::Spec;
 use crate::world::{Fact, Loss};
 use air::Air;
+use judged_loop::JudgedLoop;
 use meter::{Meter, Part};
 use names::Names;
+use operator::Operator;
 use queue::{Phase, Queue};
 use sim_peer::{Process, SimPeer};
-use skein_behaviors::{Order, Setpoint};
+use skein_behaviors::Order;
 use skein_geometry::frame::Pose;
 use skein_link::medium::key_hash;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
 use skein_peer::wire;
-use skein_peer::{
-    Beliefs, Command, Incarnation, Input, Mission, Output, Peer, PeerConfig, PeerId, Report, Role,
-};
+use skein_peer::{Beliefs, Command, Input, Output, Peer, Report, Role};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stream::{Concern, Stream};
+use traffic::Traffic;
 
 /// How long a division is modelled to take, milliseconds: ten times what a desktop
 /// needs for the largest ring, about what a flight computer does.
 const DIVIDE_MS: u64 = 50;
 /// How long deriving the loop is modelled to take, milliseconds.
 const GEOMETRY_MS: u64 = 200;
-
-/// So long it takes to carry an order to where no radio brings it, milliseconds.
-const COURIER_MS: u64 = 60_000;
 
 /// The longest time in which those who are finished may fly home, milliseconds: longer
 /// than the endurance that any of them has left.
@@ -114,34 +118,19 @@ pub struct Swarm {
     names: Names,
     air: Air,
     geometry_cache: GeometryCache,
-    /// The newest mission that the operator gave.
-    mission: Arc<Mission>,
-    /// The mission on whose loop cells are counted.
-    judged: Arc<Mission>,
-    /// The operator's standing order, and in which life the ground station spoke it.
-    order: Option<(Order, Option<Incarnation>)>,
-    /// The record in which the ground station spoke it.
-    order_said: Vec<u8>,
-    /// Since when somebody waits who cannot be told to go on, milliseconds.
-    stranded_ms: Option<u64>,
+    operator: Operator,
+    judged: JudgedLoop,
     faults: Vec<TimedFault>,
     history: History,
     checker: Checker,
     account: Account,
-    covered: Vec<bool>,
-    loop_hash: u64,
-    /// The newest lap that any peer has begun, from 0.
-    lap: u16,
     /// Records spoken so far, by hash of their bytes.
     spoken: BTreeMap<u64, Arc<Said>>,
     done: bool,
     /// All is over but the way home of those who are finished.
     homing: bool,
     unassigned: bool,
-    /// Inputs that arrived by radio.
-    received: u64,
-    /// Those whose record had been passed on before, by who transmitted it.
-    relayed_by: BTreeMap<u16, u64>,
+    traffic: Traffic,
     /// The bytes that a peer said last, for an outsider to spoil.
     last_said: Vec<u8>,
     outsider: Stream,
@@ -150,8 +139,6 @@ pub struct Swarm {
     /// Which group of the last partition each peer was in.
     sides: BTreeMap<u16, usize>,
     loss_max_permille: u16,
-    /// Bytes handed to the radios, by kind of record.
-    bytes_by_kind: BTreeMap<String, u64>,
     meter: Meter,
 }
 
@@ -162,43 +149,32 @@ impl Swarm {
         let prepared = &prepared.with_twins(&faults);
         let spec = &prepared.spec;
         let mut geometry_cache = prepared.geometry_cache.clone();
-        let loop_of = geometry_cache.of(&spec.mission);
-        let (covered, loop_hash) = loop_of.map_or((Vec::new(), 0), |g| {
-            (vec![false; g.coverage_loop.len()], g.coverage_loop.hash())
-        });
+        let judged = JudgedLoop::new(&spec.mission, &mut geometry_cache);
         let mut swarm = Self {
             spec: Arc::clone(spec),
             now_ms: 0,
             end_ms: u64::from(spec.max_time_s) * 1000,
             queue: Queue::default(),
-            peers: sim_peers(spec, seed),
+            peers: sim_peer::of_scenario(spec, seed),
             names: Names::new(spec.twins()),
             air: Air::new(prepared, seed),
             geometry_cache,
-            mission: Arc::clone(&spec.mission),
-            judged: Arc::clone(&spec.mission),
-            order: None,
-            order_said: Vec::new(),
-            stranded_ms: None,
+            operator: Operator::new(Arc::clone(&spec.mission)),
+            judged,
             faults,
             history: History::new(keep),
             checker: Checker::new(seed, spec),
             account: Account::new(prepared.setting(seed)),
-            covered,
-            loop_hash,
-            lap: 0,
             spoken: BTreeMap::new(),
             done: false,
             homing: false,
             unassigned: false,
-            received: 0,
-            relayed_by: BTreeMap::new(),
+            traffic: Traffic::default(),
             last_said: Vec::new(),
             outsider: Stream::new(seed, Concern::Outsider),
             spoilt: false,
             sides: BTreeMap::new(),
             loss_max_permille: spec.radio.loss_permille,
-            bytes_by_kind: BTreeMap::new(),
             meter: Meter::default(),
         };
         for (i, f) in swarm.faults.iter().enumerate() {
@@ -418,7 +394,7 @@ impl Swarm {
             return;
         };
         self.history
-            .fold(self.now_ms, id, Kind::Percept, quantised(&percept.pose));
+            .fold(self.now_ms, id, Kind::Percept, pose_hash(&percept.pose));
         let again_ms = self.now_ms + u64::from(self.spec.percept_period_ms.max(1));
         self.queue
             .push(again_ms, Phase::Sense, Event::Percept { idx, boot });
@@ -535,10 +511,7 @@ impl Swarm {
             };
             known = Some((d.bytes.as_ptr(), hash));
             self.fold(idx, Kind::Receive, hash);
-            self.received += 1;
-            if d.hops > 0 {
-                *self.relayed_by.entry(d.tx).or_default() += 1;
-            }
+            self.traffic.received(d.tx, d.hops);
             let s = &self.peers[idx];
             if s.process == Process::Running && s.slow_ms == 0 {
                 self.heard(self.now_ms, d.rx, hash);
@@ -634,7 +607,7 @@ impl Swarm {
                 self.checker.on_transmission(self.now_ms, id, bytes.len());
                 self.meter.enter(before);
                 let cost = self.peers[idx].frame.add(self.now_ms, bytes.len());
-                self.count_bytes(&key, cost as u64);
+                self.traffic.transmitted(&key, cost as u64);
                 if hops == 0 {
                     self.metered(Part::Checks, |swarm| swarm.said(idx, peer, &bytes, hash));
                     self.last_said.clone_from(&bytes);
@@ -700,14 +673,6 @@ impl Swarm {
         }
     }
 
-    fn count_bytes(&mut self, key: &str, bytes: u64) {
-        let kind = key.split('/').nth(2).unwrap_or_default();
-        match self.bytes_by_kind.get_mut(kind) {
-            Some(sum) => *sum += bytes,
-            None => drop(self.bytes_by_kind.insert(kind.to_owned(), bytes)),
-        }
-    }
-
     fn said(&mut self, idx: usize, peer: &Peer, bytes: &[u8], hash: u64) {
         let id = self.peers[idx].id();
         if let Some(mut said) = Said::read(bytes) {
@@ -720,7 +685,7 @@ impl Swarm {
                 self.refresh_covered();
             }
             if said.record.kind == wire::kinds::Kind::Operator.number() {
-                self.order_said = bytes.to_vec();
+                self.operator.was_spoken(bytes);
             }
             if said.record.kind == wire::kinds::Kind::Beacon.number() {
                 self.checker
@@ -732,9 +697,9 @@ impl Swarm {
             // Of another loop than the one that cells are counted on only its peer knows what
             // its runs bridge.
             let other = said.claim.as_ref().map(|c| c.loop_hash);
-            let other = other.filter(|hash| *hash != self.loop_hash);
+            let other = other.filter(|hash| *hash != self.judged.hash());
             let covered = other.map(|_| peer.beliefs().covered);
-            let covered = covered.as_deref().unwrap_or(&self.covered);
+            let covered = covered.as_deref().unwrap_or(self.judged.covered());
             let durable = (self.peers[idx].disk.records(), covered);
             self.checker.on_said(self.now_ms, id, &said, hash, durable);
             self.spoken.insert(hash, Arc::new(said));
@@ -753,7 +718,7 @@ impl Swarm {
             _ => 0,
         };
         let before = self.meter.enter(Part::Checks);
-        let meant = self.meant_in(id, &report);
+        let meant = self.names.meant_in(id, &report, self.checker.graph());
         self.checker.on_report(self.now_ms, id, &meant, adoptions);
         self.meter.enter(before);
         self.account.reported(self.now_ms, id, &meant);
@@ -790,7 +755,9 @@ impl Swarm {
             self.snapshots().into_iter().partition(|m| m.view.is_silent);
         self.carry_order(&peers);
         if self.homing {
-            self.done = self.checker.on_way_home(self.now_ms, &peers, &self.covered);
+            self.done = self
+                .checker
+                .on_way_home(self.now_ms, &peers, self.judged.covered());
             return;
         }
         let loss_permille = self.air.loss_permille();
@@ -798,8 +765,8 @@ impl Swarm {
             self.now_ms,
             loss_permille,
             (&peers, &silent),
-            &self.covered,
-            self.loop_hash,
+            self.judged.covered(),
+            self.judged.hash(),
         );
         self.unassigned = peers.iter().any(|m| !m.view.unassigned.is_empty());
         let mut flying = 0;
@@ -820,14 +787,12 @@ impl Swarm {
 
     /// The ground station says the standing order once in each life, as a live one does.
     fn repeat_order(&mut self) {
-        let station = self.ground_station();
-        let speaks_in = station.and_then(|idx| self.peers[idx].peer.as_ref()?.speaks_in());
-        if let (Some(idx), Some((order, said_in))) = (station, &mut self.order)
-            && speaks_in.is_some()
-            && *said_in != speaks_in
-        {
-            *said_in = speaks_in;
-            let order = *order;
+        let Some(idx) = self.ground_station() else {
+            return;
+        };
+        let peer = self.peers[idx].peer.as_ref();
+        let speaks_in = peer.and_then(|p| p.speaks_in());
+        if let Some(order) = self.operator.speaks(speaks_in) {
             self.feed(idx, Input::Command(Command::Order(order)));
         }
     }
@@ -839,17 +804,10 @@ impl Swarm {
         let waits = |m: &&PeerSnapshot| m.uav && m.view.order != Order::Resume;
         let out_of_reach = |m: &&PeerSnapshot| !self.checker.graph().joined(m.id, station);
         let stranded = peers.iter().filter(waits).find(out_of_reach).map(|m| m.id);
-        let goes_on = matches!(self.order, Some((Order::Resume, Some(_))));
-        let Some(id) = stranded.filter(|_| goes_on) else {
-            self.stranded_ms = None;
-            return;
-        };
-        let since_ms = *self.stranded_ms.get_or_insert(self.now_ms);
-        if self.now_ms >= since_ms + COURIER_MS
+        if let Some(bytes) = self.operator.courier(self.now_ms, stranded.is_some())
+            && let Some(id) = stranded
             && let Some(idx) = self.peer_idx(id)
         {
-            self.stranded_ms = None;
-            let bytes = self.order_said.clone();
             self.heard(self.now_ms, id, bytes_hash(&bytes));
             let (transmitter, hops) = (station, 0);
             self.feed(
@@ -872,45 +830,11 @@ impl Swarm {
     fn snapshots(&self) -> Vec<PeerSnapshot> {
         let air = &self.air;
         let of = |s: &SimPeer| {
-            let mut m = snapshot(s, air)?;
-            self.rename(m.id, &mut m.view);
+            let mut m = s.snapshot(air)?;
+            self.names.rename(m.id, &mut m.view, self.checker.graph());
             Some(m)
         };
         self.peers.iter().filter_map(of).collect()
-    }
-
-    /// Whom a peer means by an id, in this life: of several that live there one in its
-    /// component that speaks.
-    fn meant(&self, by: u16, id: u16, life: Incarnation) -> u16 {
-        let graph = self.checker.graph();
-        self.names
-            .meant(id, life, |number| graph.joined(by, number))
-    }
-
-    /// A report with the numbers of those whom it means.
-    fn meant_in(&self, by: u16, report: &Report) -> Report {
-        match *report {
-            Report::Membership {
-                peer,
-                incarnation,
-                status,
-            } if self.names.is_ambiguous(peer.0) => Report::Membership {
-                peer: PeerId(self.meant(by, peer.0, incarnation)),
-                incarnation,
-                status,
-            },
-            ref other => other.clone(),
-        }
-    }
-
-    /// What a peer believes, of those whom it means.
-    fn rename(&self, by: u16, view: &mut Beliefs) {
-        for id in self.names.ambiguous() {
-            if let Some((life, status)) = view.peers.remove(&PeerId(id)) {
-                let meant = PeerId(self.meant(by, id, life));
-                view.peers.insert(meant, (life, status));
-            }
-        }
     }
 
     /// A peer begins a life, or falls silent since a twin speaks.
@@ -963,124 +887,16 @@ impl Swarm {
         }
     }
 
-    /// A peer begins a mission, or a lap of one, that nobody has begun before: cells are
-    /// counted on its loop from now on.
+    /// A peer begins a mission, or a lap of one.
     fn mission_begun(&mut self, revision: u32, loop_hash: u64) {
-        let lap = revision.checked_sub(self.mission.revision);
-        let lap = lap.and_then(|lap| u16::try_from(lap).ok());
-        let Some(lap) = lap.filter(|lap| *lap <= self.mission.further_laps) else {
-            return;
-        };
-        if (self.mission.revision, lap) <= (self.judged.revision, self.lap) {
-            return;
-        }
-        self.judged = Arc::clone(&self.mission);
-        self.lap = lap;
-        if loop_hash != self.loop_hash {
-            self.loop_hash = loop_hash;
-            let geometry = self.geometry_cache.of(&self.judged);
-            self.covered = vec![false; geometry.map_or(0, |g| g.coverage_loop.len())];
-            self.refresh_covered();
+        let given = self.operator.mission();
+        let (cache, air) = (&mut self.geometry_cache, &self.air);
+        if self.judged.begin(given, revision, loop_hash, (cache, air)) {
             self.checker.on_new_loop(loop_hash);
         }
     }
 
     fn refresh_covered(&mut self) {
-        if let Ok(ground) = self.geometry_cache.of(&self.judged) {
-            for (flag, cell) in self.covered.iter_mut().zip(ground.coverage_loop.cells()) {
-                // A cell that nobody needs counts as covered from the start.
-                let (revision, laps) = (self.judged.revision, self.lap + 1);
-                *flag = *flag || !cell.needed || self.air.is_covered(revision, cell.id, laps);
-            }
-        }
+        self.judged.refresh(&mut self.geometry_cache, &self.air);
     }
-}
-
-/// The peers of a scenario, ascending by number.
-fn sim_peers(spec: &Spec, seed: u64) -> Vec<SimPeer> {
-    let launches = spec.launches();
-    let config = |id: u16| PeerConfig {
-        id: PeerId(id),
-        role: Role::Uav,
-        fleet: spec.fleet.clone(),
-        beacon_period_ms: spec.beacon_period_ms,
-        rate_bps: spec.radio.rate_bps,
-        airframe: None,
-        objective: spec.objective,
-        height_m: 0.0,
-        mission: Some(Arc::clone(&spec.mission)),
-        launches: Arc::clone(&launches),
-        seed: 0,
-    };
-    let mut peers: Vec<SimPeer> = spec
-        .uavs
-        .iter()
-        .map(|u| {
-            SimPeer::new(
-                seed,
-                u.id,
-                PeerConfig {
-                    airframe: Some(u.airframe),
-                    height_m: u.height_m,
-                    ..config(u.twin_of.unwrap_or(u.id))
-                },
-            )
-        })
-        .collect();
-    if let Some(g) = &spec.ground {
-        peers.push(SimPeer::new(
-            seed,
-            g.id,
-            PeerConfig {
-                role: Role::GroundStation,
-                height_m: g.height_m,
-                ..config(g.id)
-            },
-        ));
-    }
-    peers.sort_by_key(SimPeer::id);
-    peers
-}
-
-fn snapshot(of: &SimPeer, air: &Air) -> Option<PeerSnapshot> {
-    let peer = of
-        .peer
-        .as_ref()
-        .filter(|_| of.process == Process::Running)?;
-    Some(PeerSnapshot {
-        id: of.id(),
-        speaks_as: of.config.id.0,
-        uav: of.config.role == Role::Uav,
-        since_ms: of.since_ms,
-        at: air.percept(of.id()).map(|p| p.pose.position()),
-        view: peer.beliefs(),
-    })
-}
-
-/// A pose as one number: millimetres and 1e-7 radians.
-fn quantised(pose: &skein_geometry::frame::Pose) -> u64 {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "casts from floats saturate, and only bits count"
-    )]
-    let q = |v: f64, scale: f64| (v * scale).round() as i64 as u64;
-    q(pose.east_m, 1e3).rotate_left(42)
-        ^ q(pose.north_m, 1e3).rotate_left(21)
-        ^ q(pose.heading_rad, 1e7)
-}
-
-fn setpoint_hash(s: &Setpoint) -> u64 {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "casts from floats saturate, and only bits count"
-    )]
-    let q = |v: f64| (v * 1e6).round() as i64 as u64;
-    s.steps
-        .iter()
-        .fold(s.from_ms ^ q(s.airspeed_mps).rotate_left(32), |h, step| {
-            (h ^ q(step.turn_rate_radps) ^ (u64::from(step.duration_ms) << 40))
-                .wrapping_mul(0x9E37_79B9_7F4A_7C15)
-        })
 }

@@ -1,8 +1,9 @@
 //! Whom peers mean by an id that two processes have: checks and the account know each by
 //! the number of its radio.
 
+use crate::check::Graph;
 use crate::twins::Twins;
-use skein_peer::Incarnation;
+use skein_peer::{Beliefs, Incarnation, PeerId, Report};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The twins of one run.
@@ -28,14 +29,12 @@ impl Names {
     }
 
     /// Whether two have this id.
-    #[must_use]
-    pub fn is_ambiguous(&self, id: u16) -> bool {
+    fn is_ambiguous(&self, id: u16) -> bool {
         self.twins.is_shared(id)
     }
 
     /// The ids that two have, ascending.
-    #[must_use]
-    pub fn ambiguous(&self) -> BTreeSet<u16> {
+    fn ambiguous(&self) -> BTreeSet<u16> {
         self.twins.shared()
     }
 
@@ -63,10 +62,37 @@ impl Names {
         heirs
     }
 
+    /// A report with the numbers of those whom its author means: of several that live under an
+    /// id one in its component that speaks.
+    #[must_use]
+    pub fn meant_in(&self, by: u16, report: &Report, graph: &Graph) -> Report {
+        match *report {
+            Report::Membership {
+                peer,
+                incarnation,
+                status,
+            } if self.is_ambiguous(peer.0) => Report::Membership {
+                peer: PeerId(self.meant(peer.0, incarnation, |n| graph.joined(by, n))),
+                incarnation,
+                status,
+            },
+            ref other => other.clone(),
+        }
+    }
+
+    /// What a peer believes, of those whom it means.
+    pub fn rename(&self, by: u16, view: &mut Beliefs, graph: &Graph) {
+        for id in self.ambiguous() {
+            if let Some((life, status)) = view.peers.remove(&PeerId(id)) {
+                let meant = PeerId(self.meant(id, life, |n| graph.joined(by, n)));
+                view.peers.insert(meant, (life, status));
+            }
+        }
+    }
+
     /// Who is meant by an id in a life: the first one that spoke in it of those in reach, else
     /// the first one that did, else the one whose number it is.
-    #[must_use]
-    pub fn meant(&self, id: u16, life: Incarnation, in_reach: impl Fn(u16) -> bool) -> u16 {
+    fn meant(&self, id: u16, life: Incarnation, in_reach: impl Fn(u16) -> bool) -> u16 {
         let spoke = self.lives.get(&(id, life)).map_or(&[][..], Vec::as_slice);
         let near = spoke.iter().find(|n| in_reach(**n));
         near.or(spoke.first()).copied().unwrap_or(id)

@@ -4,7 +4,6 @@ use super::{Swarm, sim_peer::SimPeer};
 use crate::account::{Details, Ending, FalseDown, RunReport, Simulated, Violations};
 use crate::check::{Reached, Violation};
 use crate::history::Entry;
-use skein_link::RadioCounters;
 use std::collections::BTreeMap;
 
 /// The result of one run: its report, and what only a batch or a timeline wants to know.
@@ -68,7 +67,7 @@ impl Swarm {
                 self.checker.on_crash(self.now_ms, p.id(), kept);
             }
         }
-        self.account.radio(&self.radio_counters());
+        self.account.radio(&self.traffic.counters(self.air.tally()));
         let found = self.checker.found.take();
         let false_downs = std::mem::take(&mut self.checker.members.false_downs);
         let history_hash = self.history.hash();
@@ -87,12 +86,12 @@ impl Swarm {
             details: Details::Simulated(Simulated {
                 history_hash: format!("{history_hash:016x}"),
                 events: self.history.events(),
-                infeasible: self.unassigned || self.covered.is_empty(),
+                infeasible: self.unassigned || self.judged.covered().is_empty(),
                 false_downs: false_downs
                     .into_iter()
                     .map(|(at_ms, by, of)| FalseDown { at_ms, by, of })
                     .collect(),
-                bytes_by_kind: std::mem::take(&mut self.bytes_by_kind),
+                bytes_by_kind: self.traffic.bytes_by_kind(),
             }),
         });
         Outcome {
@@ -140,18 +139,5 @@ impl Swarm {
     fn is_gone(&self, p: &SimPeer) -> bool {
         let own = self.airframe_of(p.id()) == p.id();
         own && p.config.airframe.is_some() && p.peer.is_none() && p.boots > 0
-    }
-
-    fn radio_counters(&self) -> RadioCounters {
-        let total = self.air.tally();
-        RadioCounters {
-            sent: total.frames,
-            sent_bytes: total.bytes,
-            received: self.received,
-            multi_hop: self.relayed_by.values().sum(),
-            relayed_by: self.relayed_by.iter().map(|(k, v)| (*k, *v)).collect(),
-            lost: total.dropped.into_iter().collect(),
-            ..RadioCounters::default()
-        }
     }
 }

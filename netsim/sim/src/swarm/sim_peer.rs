@@ -1,10 +1,14 @@
 //! One peer of a swarm as its driver sees it: process, clock, disk, inbox.
 
+use super::air::Air;
 use super::stream::{Concern, Stream};
+use crate::check::PeerSnapshot;
 use crate::disk::Disk;
+use crate::spec::Spec;
 use skein_peer::protocol::airtime::Filling;
-use skein_peer::{Input, Peer, PeerConfig, Time};
+use skein_peer::{Input, Peer, PeerConfig, PeerId, Role, Time};
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// Most inputs that wait for a process that stands still; the oldest is dropped. The
 /// receive buffer of a socket holds about as many records of 200 bytes.
@@ -217,6 +221,68 @@ impl SimPeer {
         }
         self.inbox.push_back((now_ms, input));
     }
+
+    /// What it believes and where it is, while it runs.
+    #[must_use]
+    pub fn snapshot(&self, air: &Air) -> Option<PeerSnapshot> {
+        let running = self.process == Process::Running;
+        let peer = self.peer.as_ref().filter(|_| running)?;
+        Some(PeerSnapshot {
+            id: self.id(),
+            speaks_as: self.config.id.0,
+            uav: self.config.role == Role::Uav,
+            since_ms: self.since_ms,
+            at: air.percept(self.id()).map(|p| p.pose.position()),
+            view: peer.beliefs(),
+        })
+    }
+}
+
+/// The peers of a scenario, ascending by number.
+#[must_use]
+pub fn of_scenario(spec: &Spec, seed: u64) -> Vec<SimPeer> {
+    let launches = spec.launches();
+    let config = |id: u16| PeerConfig {
+        id: PeerId(id),
+        role: Role::Uav,
+        fleet: spec.fleet.clone(),
+        beacon_period_ms: spec.beacon_period_ms,
+        rate_bps: spec.radio.rate_bps,
+        airframe: None,
+        objective: spec.objective,
+        height_m: 0.0,
+        mission: Some(Arc::clone(&spec.mission)),
+        launches: Arc::clone(&launches),
+        seed: 0,
+    };
+    let mut peers: Vec<SimPeer> = spec
+        .uavs
+        .iter()
+        .map(|u| {
+            SimPeer::new(
+                seed,
+                u.id,
+                PeerConfig {
+                    airframe: Some(u.airframe),
+                    height_m: u.height_m,
+                    ..config(u.twin_of.unwrap_or(u.id))
+                },
+            )
+        })
+        .collect();
+    if let Some(g) = &spec.ground {
+        peers.push(SimPeer::new(
+            seed,
+            g.id,
+            PeerConfig {
+                role: Role::GroundStation,
+                height_m: g.height_m,
+                ..config(g.id)
+            },
+        ));
+    }
+    peers.sort_by_key(SimPeer::id);
+    peers
 }
 
 #[cfg(test)]

@@ -502,7 +502,7 @@ fn an_order_to_return_brings_all_uavs_to_the_base() {
         false,
     );
     swarm.run_until(120_000);
-    let (east_mm, north_mm) = swarm.mission.base;
+    let (east_mm, north_mm) = swarm.operator.mission().base;
     for id in [1, 2, 3] {
         let pose = swarm.pose(id).unwrap();
         let away_m = (pose.east_m - f64::from(east_mm) / 1000.0)

@@ -3,350 +3,27 @@
 //! The judge follows the flown pieces themselves, not reports, and uses only the
 //! world's own geometry. The camera looks straight down and stays level in turns.
 
+use super::board::Board;
 use super::fact::{Approach, Fact};
-use super::flat::{Bounds, point_ring_m, segment_ring_m};
 use super::motion::Piece;
+use super::no_fly::Zones;
 use super::obstacles::Place;
 use super::pieces::Pieces;
-use super::survey::{Cell, Survey, Zone};
+use super::separation::Separation;
+use super::survey::Survey;
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::CellId;
-use skein_geometry::frame::Pose;
-use skein_peer::mission::{PointMm, ring_mm};
-use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// The camera looks at least once per this length of flight, metres.
-const LOOK_M: f64 = 0.25;
-/// Arcs are tested as chords no farther than this from them, metres; distances to
-/// zones are exact to this much.
-const SAGITTA_M: f64 = 0.01;
-
-/// Who saw a cell first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Sighting {
-    /// When, milliseconds.
-    pub at_ms: u64,
-    /// Who.
-    pub uav: u16,
-}
-
-/// A no-fly zone that a revision added.
-#[derive(Clone, Debug)]
-struct Added {
-    revision: u32,
-    zone: Zone,
-    /// Who has been told of it and was clear of it since.
-    binds: BTreeSet<u16>,
-}
-
-/// What one mission asks for, and what of it was seen.
-#[derive(Clone, Debug)]
-struct Board {
-    /// From which revision on it is asked for.
-    revision: u32,
-    survey: Arc<Survey>,
-    seen: Vec<Option<Sighting>>,
-    n_covered: usize,
-    n_coverable: usize,
-    /// What peers name cells, where the survey knows other ones; and which were seen.
-    claims: Option<(Arc<Pieces>, Vec<bool>)>,
-    /// How often everything is to be seen, and which time it is.
-    laps: u16,
-    lap: u16,
-    /// In how many of the laps a cell was seen, and when it was seen first in the last.
-    times: Vec<(u16, u64)>,
-    /// Longest time from one first sighting of a cell to that of the next lap.
-    longest_gap_ms: u64,
-}
+pub use super::board::Sighting;
 
 /// Follows all airframes and keeps the score.
 #[derive(Clone, Debug)]
 pub struct Judge {
     /// One for each mission so far: who follows an older one yet is judged by it.
     boards: Vec<Board>,
-    /// The zones of the first mission.
-    zones: Vec<Zone>,
-    /// By zone of the first mission: whether a revision lifted it.
-    lifted: Vec<bool>,
-    added: Vec<Added>,
-    /// Which revision each UAV follows.
-    told: BTreeMap<u16, u32>,
-    /// Farther from a new zone than this a UAV has room to stay clear of it, metres.
-    room_m: f64,
-    entries: usize,
-    /// By UAV: for every zone whether the UAV was inside it at the end of its last piece.
-    inside: BTreeMap<u16, Vec<bool>>,
-    closest: Option<Approach>,
-    too_close: BTreeMap<(u16, u16), bool>,
-}
-
-fn is_coverable(cell: &Cell) -> bool {
-    cell.uncoverable.is_none()
-}
-
-impl Board {
-    fn new(revision: u32, survey: Arc<Survey>) -> Self {
-        Self {
-            revision,
-            seen: vec![None; survey.cells().len()],
-            n_covered: 0,
-            n_coverable: survey.n_coverable(),
-            claims: None,
-            laps: 1,
-            lap: 1,
-            times: vec![(0, 0); survey.cells().len()],
-            longest_gap_ms: 0,
-            survey,
-        }
-    }
-
-    fn watch_claims(&mut self, pieces: Option<Arc<Pieces>>) {
-        self.claims = pieces.map(|p| {
-            let seen = vec![false; p.rings().len()];
-            (p, seen)
-        });
-    }
-
-    /// Takes over what another board saw of the same places: squares of one grid, or pieces
-    /// with the same corners.
-    fn remember(&mut self, other: &Self) {
-        for i in 0..self.seen.len() {
-            let Some(j) = self.same_place(other, i) else {
-                continue;
-            };
-            if let (None, (1.., at_ms), Some(sighting)) =
-                (self.seen[i], other.times[j], other.last_sighting(j))
-            {
-                self.seen[i] = Some(sighting);
-                self.times[i] = (1, at_ms);
-                let cell = self.survey.cells()[i];
-                self.n_covered += usize::from(is_coverable(&cell));
-            }
-        }
-        let (Some((mine, seen)), Some((theirs, saw))) = (&mut self.claims, &other.claims) else {
-            return;
-        };
-        let places = theirs.rings().iter().map(|r| ring_mm(r)).zip(saw);
-        let known: BTreeSet<Vec<PointMm>> = places.filter(|(_, s)| **s).map(|(p, _)| p).collect();
-        for (ring, seen) in mine.rings().iter().zip(seen) {
-            *seen = *seen || known.contains(&ring_mm(ring));
-        }
-    }
-
-    /// Who saw a cell last, in whichever lap.
-    fn last_sighting(&self, i: usize) -> Option<Sighting> {
-        let (times, at_ms) = self.times[i];
-        let earlier = Sighting { at_ms, uav: 0 };
-        self.seen[i].or((times > 0).then_some(earlier))
-    }
-
-    /// Which cell of another board is where this one is.
-    fn same_place(&self, other: &Self, i: usize) -> Option<usize> {
-        let (mine, theirs) = (&self.survey, &other.survey);
-        match (mine.pieces(), theirs.pieces()) {
-            (Some(a), Some(b)) => {
-                let place = ring_mm(&a.rings()[i]);
-                b.rings().iter().position(|ring| ring_mm(ring) == place)
-            }
-            (None, None) if mine.has_grid_of(theirs) => theirs.index_of(mine.cells()[i].id),
-            _ => None,
-        }
-    }
-
-    fn saw(&self, cell: CellId, laps: u16) -> bool {
-        match &self.claims {
-            Some((_, seen)) => cell
-                .number()
-                .and_then(|n| seen.get(usize::from(n)))
-                .is_some_and(|s| *s),
-            None => self
-                .survey
-                .index_of(cell)
-                .is_some_and(|i| self.times[i].0 >= laps),
-        }
-    }
-
-    fn complete(&self) -> bool {
-        self.n_covered == self.n_coverable && self.lap == self.laps
-    }
-
-    /// Everything is to be seen once more.
-    fn next_lap(&mut self) {
-        if self.n_covered == self.n_coverable && self.lap < self.laps {
-            self.lap += 1;
-            self.n_covered = 0;
-            self.seen.fill(None);
-        }
-    }
-
-    fn look(&mut self, uav: u16, airframe: &Airframe, piece: &Piece, facts: &mut Vec<Fact>) {
-        let length_m = piece.length_m();
-        let reach_m = self.reach_m(airframe) + length_m;
-        let new = match self.survey.pieces() {
-            Some(pieces) => pieces
-                .near(piece.start.position(), reach_m)
-                .any(|i| self.seen[i].is_none()),
-            None => self.anything_new(piece.start, reach_m),
-        };
-        if !new && self.claims.is_none() {
-            return;
-        }
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a piece is as long as one step of the world"
-        )]
-        let n = (length_m / LOOK_M).ceil().clamp(1.0, 1e6) as u32;
-        let span_ms = piece.to_ms - piece.from_ms;
-        for k in 0..=n {
-            #[allow(clippy::cast_precision_loss, reason = "milliseconds of one step")]
-            let dt_s = span_ms as f64 / 1000.0 * f64::from(k) / f64::from(n);
-            let at_ms = piece.from_ms + span_ms * u64::from(k) / u64::from(n);
-            let pose = piece.pose_after(dt_s);
-            if self.survey.pieces().is_some() {
-                self.snap_pieces(uav, airframe, pose, at_ms, facts);
-            } else {
-                self.snap(uav, airframe, pose, at_ms, facts);
-            }
-            self.snap_claims(airframe, pose);
-        }
-    }
-
-    fn snap_claims(&mut self, airframe: &Airframe, pose: Pose) {
-        let Some((pieces, seen)) = &mut self.claims else {
-            return;
-        };
-        let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
-        let reach_m = (across_m * across_m + along_m * along_m).sqrt();
-        for i in pieces.near(pose.position(), reach_m) {
-            seen[i] = seen[i] || pieces.held(i, pose, across_m, along_m);
-        }
-    }
-
-    /// One picture of a mission for targets: marks the pieces that lie in it whole.
-    fn snap_pieces(
-        &mut self,
-        uav: u16,
-        airframe: &Airframe,
-        pose: Pose,
-        at_ms: u64,
-        facts: &mut Vec<Fact>,
-    ) {
-        let survey = Arc::clone(&self.survey);
-        let Some(pieces) = survey.pieces() else {
-            return;
-        };
-        let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
-        for i in pieces.near(pose.position(), self.reach_m(airframe)) {
-            if self.seen[i].is_none() && pieces.held(i, pose, across_m, along_m) {
-                self.see(i, Sighting { at_ms, uav }, facts);
-            }
-        }
-    }
-
-    fn see(&mut self, i: usize, sighting: Sighting, facts: &mut Vec<Fact>) {
-        self.seen[i] = Some(sighting);
-        let cell = self.survey.cells()[i];
-        self.n_covered += usize::from(is_coverable(&cell));
-        facts.push(Fact::Seen {
-            at_ms: sighting.at_ms,
-            uav: sighting.uav,
-            cell: cell.id,
-        });
-        let (times, before_ms) = self.times[i];
-        if times > 0 {
-            let gap_ms = sighting.at_ms.saturating_sub(before_ms);
-            self.longest_gap_ms = self.longest_gap_ms.max(gap_ms);
-        }
-        self.times[i] = (times + 1, sighting.at_ms);
-        self.next_lap();
-    }
-
-    /// How far from the camera the centre of a cell in its picture can be.
-    fn reach_m(&self, airframe: &Airframe) -> f64 {
-        if self.survey.pieces().is_some() {
-            // A corner of a piece may lie in a corner of the picture.
-            let (a, b) = (airframe.footprint_across_m, airframe.footprint_along_m);
-            return (a * a + b * b).sqrt();
-        }
-        let half = self.survey.extent_m() / 2.0;
-        let (a, b) = (
-            airframe.footprint_across_m - half,
-            airframe.footprint_along_m - half,
-        );
-        if a < 0.0 || b < 0.0 {
-            0.0
-        } else {
-            (a * a + b * b).sqrt()
-        }
-    }
-
-    fn near(&self, pose: Pose, reach_m: f64) -> (i32, i32, i32, i32) {
-        let d = self.survey.lane_m();
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "a cast of a float saturates"
-        )]
-        let (lo, hi) = (
-            |v: f64| ((v - reach_m) / d - 0.5).ceil() as i32,
-            |v: f64| ((v + reach_m) / d - 0.5).floor() as i32,
-        );
-        (
-            lo(pose.east_m),
-            hi(pose.east_m),
-            lo(pose.north_m),
-            hi(pose.north_m),
-        )
-    }
-
-    fn anything_new(&self, pose: Pose, reach_m: f64) -> bool {
-        let (c0, c1, r0, r1) = self.near(pose, reach_m);
-        (r0..=r1).any(|r| {
-            (c0..=c1).any(|c| self.survey.at(c, r).is_some_and(|i| self.seen[i].is_none()))
-        })
-    }
-
-    /// One picture: marks the cells that lie in it whole.
-    ///
-    /// A square turned by the heading sticks out from its centre by half a side times
-    /// |cos| + |sin|, across as well as along.
-    fn snap(
-        &mut self,
-        uav: u16,
-        airframe: &Airframe,
-        pose: Pose,
-        at_ms: u64,
-        facts: &mut Vec<Fact>,
-    ) {
-        let (c0, c1, r0, r1) = self.near(pose, self.reach_m(airframe));
-        let d = self.survey.lane_m();
-        let forward = pose.direction();
-        let out_m = self.survey.extent_m() / 2.0 * (forward.x.abs() + forward.y.abs());
-        let (across, along) = (
-            airframe.footprint_across_m - out_m,
-            airframe.footprint_along_m - out_m,
-        );
-        for row in r0..=r1 {
-            for col in c0..=c1 {
-                let Some(i) = self.survey.at(col, row) else {
-                    continue;
-                };
-                if self.seen[i].is_some() {
-                    continue;
-                }
-                let (x, y) = (
-                    (f64::from(col) + 0.5) * d - pose.east_m,
-                    (f64::from(row) + 0.5) * d - pose.north_m,
-                );
-                let inside = (x * forward.x + y * forward.y).abs() <= along
-                    && (y * forward.x - x * forward.y).abs() <= across;
-                if inside {
-                    self.see(i, Sighting { at_ms, uav }, facts);
-                }
-            }
-        }
-    }
+    zones: Zones,
+    separation: Separation,
 }
 
 impl Judge {
@@ -354,15 +31,8 @@ impl Judge {
     #[must_use]
     pub fn new(survey: Arc<Survey>) -> Self {
         Self {
-            zones: survey.zones().to_vec(),
-            lifted: vec![false; survey.zones().len()],
-            added: Vec::new(),
-            told: BTreeMap::new(),
-            room_m: 0.0,
-            entries: 0,
-            inside: BTreeMap::new(),
-            closest: None,
-            too_close: BTreeMap::new(),
+            zones: Zones::new(survey.zones()),
+            separation: Separation::default(),
             boards: vec![Board::new(0, survey)],
         }
     }
@@ -370,7 +40,7 @@ impl Judge {
     /// Wants everything to be seen so many times, one lap after the other.
     #[must_use]
     pub fn with_laps(mut self, laps: u16) -> Self {
-        self.board_mut().laps = laps.max(1);
+        self.board_mut().want_laps(laps);
         self
     }
 
@@ -386,8 +56,7 @@ impl Judge {
     /// The longest time between the first sightings of a cell in one lap and the next, milliseconds; none where everything is seen once.
     #[must_use]
     pub fn longest_gap_ms(&self) -> Option<u64> {
-        let board = self.board();
-        (board.laps > 1).then_some(board.longest_gap_ms)
+        self.board().longest_gap_ms()
     }
 
     /// Watches these pieces besides, so that what peers claim to have seen can be
@@ -409,32 +78,10 @@ impl Judge {
         revision: u32,
         room_m: f64,
     ) {
-        let zones = wanted.zones();
-        let same = |a: &Zone, b: &Zone| ring_mm(&a.ring) == ring_mm(&b.ring);
-        let is_wanted = |old: &Zone| zones.iter().any(|new| same(old, new));
-        // A zone that was lifted and comes back is new to whoever flew without it.
-        for (old, lifted) in self.zones.iter().zip(&mut self.lifted) {
-            *lifted |= !is_wanted(old);
-        }
-        self.added.retain(|a| is_wanted(&a.zone));
-        for zone in zones {
-            let surveyed = self.zones.iter().zip(&self.lifted);
-            let known = surveyed
-                .filter(|(_, lifted)| !**lifted)
-                .any(|(old, _)| same(old, zone));
-            if !known && !self.added.iter().any(|a| same(&a.zone, zone)) {
-                self.added.push(Added {
-                    revision,
-                    zone: zone.clone(),
-                    binds: BTreeSet::new(),
-                });
-            }
-        }
-        self.inside.clear();
-        self.room_m = room_m;
+        self.zones.revise(wanted.zones(), revision, room_m);
         let mut board = Board::new(revision, wanted);
         board.watch_claims(claims);
-        board.laps = laps.max(1);
+        board.want_laps(laps);
         for old in self.boards.iter().rev() {
             board.remember(old);
         }
@@ -442,59 +89,42 @@ impl Judge {
         self.boards.push(board);
     }
 
-    /// A UAV follows this revision of the mission.
-    pub fn follows(&mut self, uav: u16, revision: u32) {
-        self.told.insert(uav, revision);
-        for added in self.added.iter_mut().filter(|a| a.revision > revision) {
-            added.binds.remove(&uav);
-        }
-    }
-
     /// Whether a camera saw what peers that follow this revision call this cell, in that
     /// many laps.
     #[must_use]
     pub fn saw(&self, revision: u32, cell: CellId, laps: u16) -> bool {
         let mut boards = self.boards.iter().rev();
-        let board = boards.find(|b| b.revision <= revision);
+        let board = boards.find(|b| b.revision() <= revision);
         board.is_some_and(|b| b.saw(cell, laps))
     }
 
     /// The cells and which of them can be seen.
     #[must_use]
     pub fn survey(&self) -> &Survey {
-        &self.board().survey
+        self.board().survey()
     }
 
     /// Who saw a cell first and when, if anybody did.
     #[must_use]
     pub fn sighting(&self, cell: CellId) -> Option<Sighting> {
-        let board = self.board();
-        board.seen[board.survey.index_of(cell)?]
+        self.board().sighting(cell)
     }
 
     /// All cells of the mission with their first sightings, in the survey's order.
     pub fn sightings(&self) -> impl Iterator<Item = (CellId, Option<Sighting>)> + '_ {
-        let board = self.board();
-        let cells = board.survey.cells().iter();
-        cells.zip(&board.seen).map(|(c, s)| (c.id, *s))
+        self.board().sightings()
     }
 
     /// Number of coverable cells seen.
     #[must_use]
     pub fn n_covered(&self) -> usize {
-        self.board().n_covered
+        self.board().n_covered()
     }
 
     /// Share of the coverable cells that were seen, 0 to 1; 1 when there are none.
     #[must_use]
     pub fn covered_share(&self) -> f64 {
-        #[allow(clippy::cast_precision_loss, reason = "cells are counted in thousands")]
-        let share = self.n_covered() as f64 / self.board().n_coverable.max(1) as f64;
-        if self.board().n_coverable == 0 {
-            1.0
-        } else {
-            share
-        }
+        self.board().covered_share()
     }
 
     /// Whether every coverable cell was seen.
@@ -506,13 +136,13 @@ impl Judge {
     /// How often a UAV entered a no-fly zone.
     #[must_use]
     pub fn entries(&self) -> usize {
-        self.entries
+        self.zones.entries()
     }
 
     /// The closest approach so far.
     #[must_use]
     pub fn closest(&self) -> Option<Approach> {
-        self.closest
+        self.separation.closest()
     }
 
     /// Judges one flown piece of a UAV.
@@ -524,66 +154,12 @@ impl Judge {
             let told = if i == last { &mut *facts } else { &mut old };
             board.look(uav, airframe, piece, told);
         }
-        self.fence(uav, piece, facts);
+        self.zones.watch(uav, piece, facts);
     }
 
-    /// Distances to the zones, and entries. A zone farther away than the least distance
-    /// so far cannot change anything and costs one comparison of boxes.
-    fn fence(&mut self, uav: u16, piece: &Piece, facts: &mut Vec<Fact>) {
-        let n_zones = self.zones.len() + self.added.len();
-        if n_zones == 0 {
-            return;
-        }
-        let told = self.told.get(&uav).copied().unwrap_or(0);
-        let room_m = self.room_m + piece.length_m();
-        for added in self.added.iter_mut().filter(|a| a.revision <= told) {
-            if point_ring_m(piece.start.position(), &added.zone.ring) > room_m {
-                added.binds.insert(uav);
-            }
-        }
-        let surveyed = self.zones.iter().zip(&self.lifted);
-        let surveyed = surveyed.map(|(zone, lifted)| (zone, !lifted));
-        let added = self.added.iter().map(|a| (&a.zone, a.binds.contains(&uav)));
-        let inside = self
-            .inside
-            .entry(uav)
-            .or_insert_with(|| vec![false; n_zones]);
-        let reach = Bounds {
-            min: piece.start.position(),
-            max: piece.start.position(),
-        }
-        .grown(piece.length_m());
-        let zones = surveyed.chain(added).enumerate();
-        for (i, (zone, _)) in zones.filter(|(_, (_, binds))| *binds) {
-            if zone.bounds.distance_m(&reach) > 0.0 {
-                inside[i] = false;
-                continue;
-            }
-            let n = piece.chords(SAGITTA_M);
-            let mut from = piece.start.position();
-            for k in 1..=n {
-                #[allow(clippy::cast_precision_loss, reason = "milliseconds of one step")]
-                let span_s = (piece.to_ms - piece.from_ms) as f64 / 1000.0;
-                let to = piece
-                    .pose_after(span_s * f64::from(k) / f64::from(n))
-                    .position();
-                let entered = segment_ring_m(from, to, &zone.ring) <= 0.0;
-                if entered && !inside[i] {
-                    self.entries += 1;
-                    let at_ms = piece.from_ms
-                        + (piece.to_ms - piece.from_ms) * u64::from(k - 1) / u64::from(n);
-                    facts.push(Fact::ZoneEntry {
-                        at_ms,
-                        uav,
-                        zone: i,
-                        place: from,
-                    });
-                }
-                // A chord may cut a corner and end outside again.
-                inside[i] = entered && point_ring_m(to, &zone.ring) <= 0.0;
-                from = to;
-            }
-        }
+    /// A UAV follows this revision of the mission.
+    pub fn follows(&mut self, uav: u16, revision: u32) {
+        self.zones.follows(uav, revision);
     }
 
     /// Compares all airborne UAVs at one moment; `limit_m` is the separation below
@@ -595,64 +171,21 @@ impl Judge {
         limit_m: f64,
         facts: &mut Vec<Fact>,
     ) {
-        let closest_m = self.closest.map_or(f64::INFINITY, |c| c.distance_m);
-        // Those who came too close are asked whether they have parted.
-        let reach_m = if self.too_close.is_empty() {
-            closest_m.max(limit_m)
-        } else {
-            f64::INFINITY
-        };
-        for (i, j) in pairs_within(airborne, reach_m) {
-            let ((a, pa), (b, pb)) = (&airborne[i], &airborne[j]);
-            let approach = Approach {
-                at_ms,
-                a: *a,
-                b: *b,
-                distance_m: pa.distance_m(pb),
-            };
-            if self
-                .closest
-                .is_none_or(|c| approach.distance_m < c.distance_m)
-            {
-                self.closest = Some(approach);
-            }
-            if approach.distance_m < limit_m {
-                let was = self.too_close.insert((*a, *b), true);
-                if was != Some(true) {
-                    facts.push(Fact::TooClose(approach));
-                }
-            } else if !self.too_close.is_empty() {
-                self.too_close.remove(&(*a, *b));
-            }
-        }
+        self.separation.observe(at_ms, airborne, limit_m, facts);
     }
 
     /// A new airframe under an old number begins outside all zones' memory.
     pub fn forget_position(&mut self, uav: u16) {
-        self.inside.remove(&uav);
+        self.zones.forget_position(uav);
     }
-}
-
-/// The pairs that are at most so far apart from west to east, in order.
-fn pairs_within(airborne: &[(u16, Place)], reach_m: f64) -> Vec<(usize, usize)> {
-    let east_m = |i: &usize| airborne[*i].1.at.x;
-    let mut by_east: Vec<usize> = (0..airborne.len()).collect();
-    by_east.sort_unstable_by(|i, j| east_m(i).total_cmp(&east_m(j)));
-    let mut pairs = Vec::new();
-    for (k, i) in by_east.iter().enumerate() {
-        let near = by_east[k + 1..].iter();
-        let near = near.take_while(|j| east_m(j) - east_m(i) <= reach_m);
-        pairs.extend(near.map(|j| (*i.min(j), *i.max(j))));
-    }
-    pairs.sort_unstable();
-    pairs
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::world::fixture::{airframe, polygon, square};
-    use skein_geometry::frame::Point;
+    use skein_geometry::frame::{Point, Pose};
+    use skein_peer::mission::PointMm;
     use skein_peer::{CoverageTask, PointTask};
 
     fn piece(x: f64, y: f64, heading: f64, ms: u64, rate: f64) -> Piece {
@@ -805,19 +338,19 @@ mod tests {
                 to_ms: over.from_ms + 1000,
                 ..over
             });
-            steps.for_each(|p| judge.fence(1, &p, &mut facts));
+            steps.for_each(|p| judge.zones.watch(1, &p, &mut facts));
             assert_eq!(judge.entries(), entries, "told {told}, from {from_m} m");
         }
         // What was lifted binds nobody.
         let mut judge = judge_with(&[&block]);
         let elsewhere = [(0, 0), (9_000, 0), (0, 9_000)];
         judge.revise(revised(480_000, &elsewhere), (None, 1), 2, 80.0);
-        judge.fence(1, &over, &mut Vec::new());
+        judge.zones.watch(1, &over, &mut Vec::new());
         assert_eq!(judge.entries(), 0);
         // Nor does it when it comes back, before it is known again.
         judge.follows(1, 2);
         judge.revise(revised(480_000, &block), (None, 1), 3, 80.0);
-        judge.fence(1, &over, &mut Vec::new());
+        judge.zones.watch(1, &over, &mut Vec::new());
         assert_eq!(judge.entries(), 0);
         judge.follows(1, 3);
         let far = Piece {
@@ -828,8 +361,8 @@ mod tests {
             to_ms: over.from_ms + 1000,
             ..over
         };
-        judge.fence(1, &far, &mut Vec::new());
-        judge.fence(1, &over, &mut Vec::new());
+        judge.zones.watch(1, &far, &mut Vec::new());
+        judge.zones.watch(1, &over, &mut Vec::new());
         assert_eq!(judge.entries(), 1);
     }
 
@@ -993,7 +526,7 @@ mod tests {
     #[test]
     fn all_is_covered_with_the_very_last_cell_and_not_before() {
         let mut judge = judge_with(&[]);
-        let survey = Arc::clone(&judge.board().survey);
+        let survey = Arc::clone(judge.board().survey());
         let cells = survey.cells();
         let mut left = cells.iter().filter(|c| c.uncoverable.is_none()).count();
         assert!(left > 5);

@@ -4,13 +4,16 @@
 //! live trial) says how far to go, brings setpoints and takes percepts away; the order
 //! of a tick is act, move, radio, sense, decide.
 
+mod board;
 pub mod fact;
 pub mod fixture;
 pub mod flat;
 pub mod judge;
 pub mod motion;
+mod no_fly;
 pub mod obstacles;
 pub mod pieces;
+mod separation;
 pub mod survey;
 
 pub use fact::{Approach, Fact};

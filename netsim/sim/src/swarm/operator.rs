@@ -1,0 +1,113 @@
+//! The operator of a simulated swarm: the mission and the order given last.
+
+use skein_behaviors::Order;
+use skein_peer::{Incarnation, Mission};
+use std::sync::Arc;
+
+/// So long it takes to carry an order to where no radio brings it, milliseconds.
+const COURIER_MS: u64 = 60_000;
+
+/// What the operator wants, and what the ground station said of it.
+#[derive(Debug)]
+pub(super) struct Operator {
+    mission: Arc<Mission>,
+    /// The standing order, and in which life the ground station spoke it.
+    order: Option<(Order, Option<Incarnation>)>,
+    /// The record in which it spoke last.
+    spoken: Vec<u8>,
+    /// Since when somebody waits who cannot be told to go on, milliseconds.
+    stranded_ms: Option<u64>,
+}
+
+impl Operator {
+    pub(super) fn new(mission: Arc<Mission>) -> Self {
+        Self {
+            mission,
+            order: None,
+            spoken: Vec::new(),
+            stranded_ms: None,
+        }
+    }
+
+    /// The newest mission.
+    pub(super) fn mission(&self) -> &Arc<Mission> {
+        &self.mission
+    }
+
+    /// What a mission would be as the next revision.
+    pub(super) fn next(&self, mission: Mission) -> Arc<Mission> {
+        let revision = self.mission.revision_after(self.mission.revision);
+        Arc::new(Mission {
+            revision,
+            ..mission
+        })
+    }
+
+    /// Gives the next revision.
+    pub(super) fn give(&mut self, next: Arc<Mission>) {
+        self.mission = next;
+    }
+
+    /// Gives an order.
+    pub(super) fn order(&mut self, order: Order) {
+        self.order = Some((order, None));
+    }
+
+    /// The order that the ground station is to say in the life in which it speaks, once.
+    pub(super) fn speaks(&mut self, life: Option<Incarnation>) -> Option<Order> {
+        let (order, said_in) = self.order.as_mut()?;
+        let news = life.is_some() && *said_in != life;
+        news.then(|| {
+            *said_in = life;
+            *order
+        })
+    }
+
+    /// The ground station spoke in a record of these bytes.
+    pub(super) fn was_spoken(&mut self, bytes: &[u8]) {
+        self.spoken = bytes.to_vec();
+    }
+
+    /// The record to hand to whoever waits out of reach for an order that was spoken, once a
+    /// courier has had time to go there.
+    pub(super) fn courier(&mut self, now_ms: u64, is_stranded: bool) -> Option<Vec<u8>> {
+        let goes_on = matches!(self.order, Some((Order::Resume, Some(_))));
+        if !is_stranded || !goes_on {
+            self.stranded_ms = None;
+            return None;
+        }
+        let since_ms = *self.stranded_ms.get_or_insert(now_ms);
+        (now_ms >= since_ms + COURIER_MS).then(|| {
+            self.stranded_ms = None;
+            self.spoken.clone()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::fixture;
+
+    #[test]
+    fn an_order_is_said_once_in_each_life_and_carried_to_who_waits_out_of_reach_for_a_minute() {
+        let mut operator = Operator::new(fixture::square(1).mission);
+        assert_eq!(operator.speaks(Some(1)), None);
+        operator.order(Order::Hold);
+        assert_eq!(operator.speaks(None), None);
+        assert_eq!(operator.speaks(Some(1)), Some(Order::Hold));
+        assert_eq!(operator.speaks(Some(1)), None);
+        assert_eq!(operator.speaks(Some(2)), Some(Order::Hold));
+        operator.was_spoken(&[7]);
+        assert_eq!(operator.courier(0, true), None);
+        assert_eq!(operator.courier(COURIER_MS, true), None, "nobody goes on");
+        operator.order(Order::Resume);
+        assert_eq!(operator.courier(COURIER_MS, true), None, "nobody said it");
+        operator.speaks(Some(2));
+        assert_eq!(operator.courier(10, true), None);
+        assert_eq!(operator.courier(20, false), None);
+        assert_eq!(operator.courier(30, true), None);
+        assert_eq!(operator.courier(COURIER_MS + 29, true), None);
+        assert_eq!(operator.courier(COURIER_MS + 30, true), Some(vec![7]));
+    }
+}

@@ -1,0 +1,359 @@
+//! What one mission asks to be seen, and what cameras saw of it (D2.7 §3.6).
+//!
+//! The camera looks straight down and stays level in turns.
+
+use super::fact::Fact;
+use super::motion::Piece;
+use super::pieces::Pieces;
+use super::survey::{Cell, Survey};
+use skein_flight::airframe::Airframe;
+use skein_flight::coverage::ring::CellId;
+use skein_geometry::frame::Pose;
+use skein_peer::mission::{PointMm, ring_mm};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// The camera looks at least once per this length of flight, metres.
+const LOOK_M: f64 = 0.25;
+
+/// Who saw a cell first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sighting {
+    /// When, milliseconds.
+    pub at_ms: u64,
+    /// Who.
+    pub uav: u16,
+}
+
+/// What one mission asks for, and what of it was seen.
+#[derive(Clone, Debug)]
+pub(super) struct Board {
+    /// From which revision on it is asked for.
+    revision: u32,
+    survey: Arc<Survey>,
+    seen: Vec<Option<Sighting>>,
+    n_covered: usize,
+    n_coverable: usize,
+    /// What peers name cells, where the survey knows other ones; and which were seen.
+    claims: Option<(Arc<Pieces>, Vec<bool>)>,
+    /// How often everything is to be seen, and which time it is.
+    laps: u16,
+    lap: u16,
+    /// In how many of the laps a cell was seen, and when it was seen first in the last.
+    times: Vec<(u16, u64)>,
+    /// Longest time from one first sighting of a cell to that of the next lap.
+    longest_gap_ms: u64,
+}
+
+fn is_coverable(cell: &Cell) -> bool {
+    cell.uncoverable.is_none()
+}
+
+impl Board {
+    pub(super) fn new(revision: u32, survey: Arc<Survey>) -> Self {
+        Self {
+            revision,
+            seen: vec![None; survey.cells().len()],
+            n_covered: 0,
+            n_coverable: survey.n_coverable(),
+            claims: None,
+            laps: 1,
+            lap: 1,
+            times: vec![(0, 0); survey.cells().len()],
+            longest_gap_ms: 0,
+            survey,
+        }
+    }
+
+    pub(super) fn watch_claims(&mut self, pieces: Option<Arc<Pieces>>) {
+        self.claims = pieces.map(|p| {
+            let seen = vec![false; p.rings().len()];
+            (p, seen)
+        });
+    }
+
+    /// Takes over what another board saw of the same places: squares of one grid, or pieces
+    /// with the same corners.
+    pub(super) fn remember(&mut self, other: &Self) {
+        for i in 0..self.seen.len() {
+            let Some(j) = self.same_place(other, i) else {
+                continue;
+            };
+            if let (None, (1.., at_ms), Some(sighting)) =
+                (self.seen[i], other.times[j], other.last_sighting(j))
+            {
+                self.seen[i] = Some(sighting);
+                self.times[i] = (1, at_ms);
+                let cell = self.survey.cells()[i];
+                self.n_covered += usize::from(is_coverable(&cell));
+            }
+        }
+        let (Some((mine, seen)), Some((theirs, saw))) = (&mut self.claims, &other.claims) else {
+            return;
+        };
+        let places = theirs.rings().iter().map(|r| ring_mm(r)).zip(saw);
+        let known: BTreeSet<Vec<PointMm>> = places.filter(|(_, s)| **s).map(|(p, _)| p).collect();
+        for (ring, seen) in mine.rings().iter().zip(seen) {
+            *seen = *seen || known.contains(&ring_mm(ring));
+        }
+    }
+
+    /// Everything is to be seen so many times.
+    pub(super) fn want_laps(&mut self, laps: u16) {
+        self.laps = laps.max(1);
+    }
+
+    pub(super) fn revision(&self) -> u32 {
+        self.revision
+    }
+
+    pub(super) fn survey(&self) -> &Arc<Survey> {
+        &self.survey
+    }
+
+    pub(super) fn longest_gap_ms(&self) -> Option<u64> {
+        (self.laps > 1).then_some(self.longest_gap_ms)
+    }
+
+    pub(super) fn sighting(&self, cell: CellId) -> Option<Sighting> {
+        self.seen[self.survey.index_of(cell)?]
+    }
+
+    pub(super) fn sightings(&self) -> impl Iterator<Item = (CellId, Option<Sighting>)> + '_ {
+        let cells = self.survey.cells().iter();
+        cells.zip(&self.seen).map(|(c, s)| (c.id, *s))
+    }
+
+    pub(super) fn n_covered(&self) -> usize {
+        self.n_covered
+    }
+
+    pub(super) fn covered_share(&self) -> f64 {
+        if self.n_coverable == 0 {
+            return 1.0;
+        }
+        #[allow(clippy::cast_precision_loss, reason = "cells are counted in thousands")]
+        let share = self.n_covered as f64 / self.n_coverable as f64;
+        share
+    }
+
+    /// Who saw a cell last, in whichever lap.
+    fn last_sighting(&self, i: usize) -> Option<Sighting> {
+        let (times, at_ms) = self.times[i];
+        let earlier = Sighting { at_ms, uav: 0 };
+        self.seen[i].or((times > 0).then_some(earlier))
+    }
+
+    /// Which cell of another board is where this one is.
+    fn same_place(&self, other: &Self, i: usize) -> Option<usize> {
+        let (mine, theirs) = (&self.survey, &other.survey);
+        match (mine.pieces(), theirs.pieces()) {
+            (Some(a), Some(b)) => {
+                let place = ring_mm(&a.rings()[i]);
+                b.rings().iter().position(|ring| ring_mm(ring) == place)
+            }
+            (None, None) if mine.has_grid_of(theirs) => theirs.index_of(mine.cells()[i].id),
+            _ => None,
+        }
+    }
+
+    pub(super) fn saw(&self, cell: CellId, laps: u16) -> bool {
+        match &self.claims {
+            Some((_, seen)) => cell
+                .number()
+                .and_then(|n| seen.get(usize::from(n)))
+                .is_some_and(|s| *s),
+            None => self
+                .survey
+                .index_of(cell)
+                .is_some_and(|i| self.times[i].0 >= laps),
+        }
+    }
+
+    pub(super) fn complete(&self) -> bool {
+        self.n_covered == self.n_coverable && self.lap == self.laps
+    }
+
+    /// Everything is to be seen once more.
+    pub(super) fn next_lap(&mut self) {
+        if self.n_covered == self.n_coverable && self.lap < self.laps {
+            self.lap += 1;
+            self.n_covered = 0;
+            self.seen.fill(None);
+        }
+    }
+
+    pub(super) fn look(
+        &mut self,
+        uav: u16,
+        airframe: &Airframe,
+        piece: &Piece,
+        facts: &mut Vec<Fact>,
+    ) {
+        let length_m = piece.length_m();
+        let reach_m = self.reach_m(airframe) + length_m;
+        let new = match self.survey.pieces() {
+            Some(pieces) => pieces
+                .near(piece.start.position(), reach_m)
+                .any(|i| self.seen[i].is_none()),
+            None => self.anything_new(piece.start, reach_m),
+        };
+        if !new && self.claims.is_none() {
+            return;
+        }
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a piece is as long as one step of the world"
+        )]
+        let n = (length_m / LOOK_M).ceil().clamp(1.0, 1e6) as u32;
+        let span_ms = piece.to_ms - piece.from_ms;
+        for k in 0..=n {
+            #[allow(clippy::cast_precision_loss, reason = "milliseconds of one step")]
+            let dt_s = span_ms as f64 / 1000.0 * f64::from(k) / f64::from(n);
+            let at_ms = piece.from_ms + span_ms * u64::from(k) / u64::from(n);
+            let pose = piece.pose_after(dt_s);
+            if self.survey.pieces().is_some() {
+                self.snap_pieces(uav, airframe, pose, at_ms, facts);
+            } else {
+                self.snap(uav, airframe, pose, at_ms, facts);
+            }
+            self.snap_claims(airframe, pose);
+        }
+    }
+
+    fn snap_claims(&mut self, airframe: &Airframe, pose: Pose) {
+        let Some((pieces, seen)) = &mut self.claims else {
+            return;
+        };
+        let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
+        let reach_m = (across_m * across_m + along_m * along_m).sqrt();
+        for i in pieces.near(pose.position(), reach_m) {
+            seen[i] = seen[i] || pieces.held(i, pose, across_m, along_m);
+        }
+    }
+
+    /// One picture of a mission for targets: marks the pieces that lie in it whole.
+    fn snap_pieces(
+        &mut self,
+        uav: u16,
+        airframe: &Airframe,
+        pose: Pose,
+        at_ms: u64,
+        facts: &mut Vec<Fact>,
+    ) {
+        let survey = Arc::clone(&self.survey);
+        let Some(pieces) = survey.pieces() else {
+            return;
+        };
+        let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
+        for i in pieces.near(pose.position(), self.reach_m(airframe)) {
+            if self.seen[i].is_none() && pieces.held(i, pose, across_m, along_m) {
+                self.see(i, Sighting { at_ms, uav }, facts);
+            }
+        }
+    }
+
+    pub(super) fn see(&mut self, i: usize, sighting: Sighting, facts: &mut Vec<Fact>) {
+        self.seen[i] = Some(sighting);
+        let cell = self.survey.cells()[i];
+        self.n_covered += usize::from(is_coverable(&cell));
+        facts.push(Fact::Seen {
+            at_ms: sighting.at_ms,
+            uav: sighting.uav,
+            cell: cell.id,
+        });
+        let (times, before_ms) = self.times[i];
+        if times > 0 {
+            let gap_ms = sighting.at_ms.saturating_sub(before_ms);
+            self.longest_gap_ms = self.longest_gap_ms.max(gap_ms);
+        }
+        self.times[i] = (times + 1, sighting.at_ms);
+        self.next_lap();
+    }
+
+    /// How far from the camera the centre of a cell in its picture can be.
+    fn reach_m(&self, airframe: &Airframe) -> f64 {
+        if self.survey.pieces().is_some() {
+            // A corner of a piece may lie in a corner of the picture.
+            let (a, b) = (airframe.footprint_across_m, airframe.footprint_along_m);
+            return (a * a + b * b).sqrt();
+        }
+        let half = self.survey.extent_m() / 2.0;
+        let (a, b) = (
+            airframe.footprint_across_m - half,
+            airframe.footprint_along_m - half,
+        );
+        if a < 0.0 || b < 0.0 {
+            0.0
+        } else {
+            (a * a + b * b).sqrt()
+        }
+    }
+
+    fn near(&self, pose: Pose, reach_m: f64) -> (i32, i32, i32, i32) {
+        let d = self.survey.lane_m();
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "a cast of a float saturates"
+        )]
+        let (lo, hi) = (
+            |v: f64| ((v - reach_m) / d - 0.5).ceil() as i32,
+            |v: f64| ((v + reach_m) / d - 0.5).floor() as i32,
+        );
+        (
+            lo(pose.east_m),
+            hi(pose.east_m),
+            lo(pose.north_m),
+            hi(pose.north_m),
+        )
+    }
+
+    fn anything_new(&self, pose: Pose, reach_m: f64) -> bool {
+        let (c0, c1, r0, r1) = self.near(pose, reach_m);
+        (r0..=r1).any(|r| {
+            (c0..=c1).any(|c| self.survey.at(c, r).is_some_and(|i| self.seen[i].is_none()))
+        })
+    }
+
+    /// One picture: marks the cells that lie in it whole.
+    ///
+    /// A square turned by the heading sticks out from its centre by half a side times
+    /// |cos| + |sin|, across as well as along.
+    fn snap(
+        &mut self,
+        uav: u16,
+        airframe: &Airframe,
+        pose: Pose,
+        at_ms: u64,
+        facts: &mut Vec<Fact>,
+    ) {
+        let (c0, c1, r0, r1) = self.near(pose, self.reach_m(airframe));
+        let d = self.survey.lane_m();
+        let forward = pose.direction();
+        let out_m = self.survey.extent_m() / 2.0 * (forward.x.abs() + forward.y.abs());
+        let (across, along) = (
+            airframe.footprint_across_m - out_m,
+            airframe.footprint_along_m - out_m,
+        );
+        for row in r0..=r1 {
+            for col in c0..=c1 {
+                let Some(i) = self.survey.at(col, row) else {
+                    continue;
+                };
+                if self.seen[i].is_some() {
+                    continue;
+                }
+                let (x, y) = (
+                    (f64::from(col) + 0.5) * d - pose.east_m,
+                    (f64::from(row) + 0.5) * d - pose.north_m,
+                );
+                let inside = (x * forward.x + y * forward.y).abs() <= along
+                    && (y * forward.x - x * forward.y).abs() <= across;
+                if inside {
+                    self.see(i, Sighting { at_ms, uav }, facts);
+                }
+            }
+        }
+    }
+}
