@@ -424,6 +424,33 @@ mod tests {
     }
 
     #[test]
+    fn a_uav_from_which_no_way_is_known_begins_where_it_told_that_it_will_be() {
+        let site = Site::with_a_block(22, 20);
+        let n = site.coverage_loop.len();
+        let anchor = n / 3;
+        let ring = site.ring(|i| (anchor + 5..anchor + 35).contains(&i));
+        // Right before the block, flying at it.
+        let off = OffLoop::of(Pose::new(Point::new(455.0, 480.0), 0.0), 0);
+        let entry = site
+            .coverage_loop
+            .boundary_towards(anchor + 5, Direction::Forward);
+        assert!(site.router.route(off.pose(), entry).is_err());
+        let uav = Uav {
+            release_ms: 20_000,
+            off_loop: Some(off),
+            ..site.uav(1, u16::try_from(anchor).unwrap())
+        };
+        let d = divide(&ring, &[uav], site.network(), Rule::Best);
+        assert_sound(&ring, &[uav], &d);
+        let least_ms = u64::from(backtracking::divide(&ring, &[uav]).makespan_ms);
+        let most_ms = least_ms + 1;
+        assert!(
+            (20_000..=most_ms).contains(&u64::from(d.makespan_ms)),
+            "{d:?} {least_ms}"
+        );
+    }
+
+    #[test]
     fn a_mission_may_ask_for_backtracking_alone() {
         let site = Site::new(10, 8, Vec::new());
         let (ring, uavs) = site.drawn(&mut SplitMix64::new(7));

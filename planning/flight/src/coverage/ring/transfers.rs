@@ -31,6 +31,8 @@ pub(super) struct Transfers<'a> {
     poses: Vec<Pose>,
     /// Millimetres flown along the loop before each boundary, nothing served.
     travel_mm: Vec<u64>,
+    /// Where on the loop each UAV can get to, and how far that is, millimetres.
+    anchors: Vec<(Place, u64)>,
     proved: BTreeMap<(Place, Place), u64>,
     /// Lengths asked for so far.
     asked: Cell<u64>,
@@ -55,13 +57,22 @@ impl<'a> Transfers<'a> {
             let before = travel_mm.last().copied().unwrap_or(0);
             travel_mm.push(before + u64::from(cell.travel_mm));
         }
-        Self {
+        let mut transfers = Self {
             router: network.router,
             poses,
             travel_mm,
+            anchors: Vec::new(),
             proved: BTreeMap::new(),
             asked: Cell::new(0),
-        }
+        };
+        let anchor = |uav: &Uav| {
+            let ready_ms = uav.off_loop.map_or(uav.release_ms, |off| off.ready_ms);
+            let way_ms = u64::from(uav.release_ms.saturating_sub(ready_ms));
+            let place = transfers.boundary(usize::from(uav.anchor), uav.heading);
+            (place, way_ms * u64::from(uav.speed_mmps) / 1000)
+        };
+        transfers.anchors = uavs.iter().map(anchor).collect();
+        transfers
     }
 
     fn cells(&self) -> usize {
@@ -112,11 +123,24 @@ impl<'a> Transfers<'a> {
         let proved_mm = match self.router.route(self.pose(from), self.pose(to)) {
             Ok(curve) => whole_mm(curve.length_m()).min(along_mm.unwrap_or(u64::MAX)),
             Err(RouteError::StartInZone) => reckoned_mm + ESCAPE_MM,
-            // Onto the loop near by and along it, which is never more than once round.
-            Err(_) => along_mm.unwrap_or_else(|| reckoned_mm + self.travel_mm[self.cells()] / 2),
+            Err(_) => along_mm
+                .or_else(|| self.by_anchor_mm(from, to))
+                // Onto the loop near by and along it, which is never more than once round.
+                .unwrap_or_else(|| reckoned_mm + self.travel_mm[self.cells()] / 2),
         };
         self.proved.insert((from, to), proved_mm);
         proved_mm > reckoned_mm
+    }
+
+    /// From a UAV over where it told that it will be on the loop, and from there the shorter of
+    /// along it and the router's way.
+    fn by_anchor_mm(&self, from: Place, to: Place) -> Option<u64> {
+        let uav = (from.0 as usize).checked_sub(2 * self.cells())?;
+        let (anchor, to_anchor_mm) = *self.anchors.get(uav)?;
+        let way = self.router.route(self.pose(anchor), self.pose(to)).ok();
+        let way_mm = way.map(|curve| whole_mm(curve.length_m()));
+        let on_mm = self.along_mm(anchor, to).into_iter().chain(way_mm).min()?;
+        Some(to_anchor_mm.saturating_add(on_mm))
     }
 
     /// Along the loop without turning round, if both places look the same way on it.
