@@ -1,5 +1,5 @@
 //! Replays the seeds that once failed (`tests/seeds/*.txt`: scenario, seed, `storm` if its
-//! faults are drawn, where the UAVs begin, one a line). Each must complete and break no rule, and the first must give the same history
+//! faults are drawn, where the UAVs begin, `own` for where the scenario says, one a line). Each must complete and break no rule, and the first must give the same history
 //! twice.
 
 use skein_netsim::Prepared;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// UAVs of the small scenarios.
 const N_UAVS: u16 = 8;
 
-fn prepared(scenario: &str, launch: Launch) -> Prepared {
+fn prepared(scenario: &str, launch: Option<Launch>) -> Prepared {
     Prepared::new(match scenario {
         "square" => fixture::square(N_UAVS),
         "open" => {
@@ -28,7 +28,7 @@ fn prepared(scenario: &str, launch: Launch) -> Prepared {
         "walls" => walls(),
         name => {
             let over = Overrides {
-                launch: Some(launch),
+                launch,
                 ..Overrides::default()
             };
             open(Some(name), &over).expect("a built-in scenario").spec
@@ -73,7 +73,7 @@ fn seeds_that_once_failed_hold() {
                     file.display()
                 );
             };
-            let launch: Launch = launch.parse().unwrap();
+            let launch: Option<Launch> = (*launch != "own").then(|| launch.parse().unwrap());
             let seed: u64 = seed.parse().unwrap();
             let (prepared, free_ms) = prepared_by_name
                 .entry(format!("{scenario} {launch:?}"))

@@ -111,8 +111,9 @@ impl Peer {
 
     /// Takes one input at the peer's own time. Time that runs backwards stands still.
     pub fn handle(&mut self, now: Time, input: Input) {
-        self.now = self.now.max(now);
-        self.notice_lateness();
+        let before = self.now;
+        self.now = before.max(now);
+        self.notice_lateness(before);
         match input {
             Input::Start { persisted, nonce } if !self.started => {
                 return self.on_start(&persisted, nonce);
@@ -171,11 +172,12 @@ impl Peer {
 
     /// Whoever stood still, or whose clock jumped, was deaf meanwhile: what it waits for
     /// from others it waits for in the time in which it listens.
-    fn notice_lateness(&mut self) {
+    fn notice_lateness(&mut self, before: Time) {
         let due = self.timers.at(Timer::Tick).unwrap_or(self.now);
         let late_ms = self.now.since_ms(due);
         if late_ms > self.period_ms() / 2 {
-            self.membership.was_late(self.now, late_ms);
+            let slept_ms = self.now.since_ms(before);
+            self.membership.was_late(self.now, late_ms, slept_ms);
             self.life.was_late(late_ms);
             self.cooperation.was_late(late_ms, &mut self.timers);
         }

@@ -50,7 +50,8 @@ impl MissionState {
             return self.negotiation.begin_nearest(&cells, begins_ms);
         }
         if !may_relieve {
-            return None;
+            let (begins_ms, cells) = self.overdue_orphans((s, ctx), (&me, &others))?;
+            return self.negotiation.begin_nearest(&cells, begins_ms);
         }
         let hands = others.into_iter().filter(|h| h.free_ms == 0);
         let hands: Vec<Hand> = hands.chain([me]).collect();
@@ -88,6 +89,28 @@ impl MissionState {
         let cells = self
             .flown_besides(cells, by_ms.min(spendable_ms))
             .or_else(any)?;
+        Some((begins_ms, cells))
+    }
+
+    /// Orphans that nobody took who has nothing to fly, though it was the turn of each: for
+    /// want of fuel, mostly. Whoever has something to fly takes them then, the one that would be
+    /// there soonest first, however much that is: or they would wait for one that never comes.
+    fn overdue_orphans(
+        &self,
+        (s, ctx): (&Situation<'_>, &Context<'_>),
+        (me, others): (&Hand, &[Hand]),
+    ) -> Option<(u64, Vec<(u16, Direction)>)> {
+        let overdue = self.negotiation.overdue_orphans(ctx);
+        let (pace, share) = (self.pace()?, self.share_at_once(ctx));
+        let (begins_ms, cells) = sharing::nearest_orphans(&overdue.runs(), me, share, pace)?;
+        let first = cells.first()?.0;
+        let at_work = others.iter().copied().filter(|h| h.free_ms > 0);
+        let at_work: Vec<Hand> = at_work.collect();
+        let (sooner, _) = pace.how_many_sooner(me, (&at_work, 0), first);
+        if !self.negotiation.is_my_turn_at_last(ctx, first, sooner) {
+            return None;
+        }
+        let cells = self.flown_besides(cells, u64::from(self.spendable_ms(s.percept)))?;
         Some((begins_ms, cells))
     }
 

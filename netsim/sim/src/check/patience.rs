@@ -13,8 +13,13 @@ use skein_peer::{Beliefs, Incarnation, PeerId};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// After a decision losses are given so many periods to be heard of: they open no round at once.
-const SETTLED_PERIODS: u64 = 5;
+/// After a decision losses are given so many of the longest intervals to be heard of: they open
+/// no round at once.
+const SETTLED_INTERVALS: u64 = 5;
+
+/// A peer looks four times in a period at who is there. Whom it took for alive between two looks
+/// only, as when halves meet of which one is about to give somebody up, it never counted.
+const LOOKS_A_PERIOD: u64 = 4;
 
 /// A peer is able for so long before it opens a rebalancing.
 const STEADY_PERIODS: u64 = 10;
@@ -68,6 +73,10 @@ pub struct PatienceCheck {
     owed: Clocks<u16>,
     /// Who ever flew.
     uavs: BTreeSet<u16>,
+    /// Since when who takes whom for alive.
+    believed: Clocks<(u16, u16)>,
+    /// The longest interval that counted at the last snapshot.
+    interval_ms: u64,
 }
 
 impl PatienceCheck {
@@ -80,6 +89,8 @@ impl PatienceCheck {
             spoken: BTreeSet::new(),
             owed: Clocks::default(),
             uavs: BTreeSet::new(),
+            believed: Clocks::default(),
+            interval_ms: period_ms,
         }
     }
 
@@ -87,11 +98,21 @@ impl PatienceCheck {
     pub fn on_anew(&mut self, id: u16) {
         self.parts.remove(&id);
         self.owed.stop(id);
+        self.believed.retain(|(observer, _)| *observer != id);
     }
 
-    /// A process ends or stands still: it owes nothing meanwhile.
+    /// A process ends or stands still: it owes nothing meanwhile, and what it believed may be
+    /// long outdated when it wakes.
     pub fn on_silent(&mut self, id: u16) {
         self.owed.stop(id);
+        if let Some(part) = self.parts.get_mut(&id) {
+            part.view = None;
+        }
+    }
+
+    /// A belief about another peer changed, not to being down.
+    pub fn on_believed(&mut self, now_ms: u64, about: (u16, u16)) {
+        self.believed.start(about, now_ms);
     }
 
     /// A peer tells what it will fly, having adopted so many divisions, the last one in
@@ -158,16 +179,17 @@ impl PatienceCheck {
         incarnation: Incarnation,
         heard: impl Fn(u16) -> Option<(&'a Arc<Claim>, Incarnation)>,
     ) {
+        let believed_ms = self.believed.stop((observer, subject));
+        let look_ms = self.period_ms / LOOKS_A_PERIOD;
+        let was_counted = believed_ms.is_none_or(|t| now_ms > t + look_ms);
         let Some(part) = self.parts.get(&observer) else {
             return;
         };
-        let Some(view) = &part.view else {
+        let Some(view) = part.view.as_ref().filter(|_| was_counted) else {
             return;
         };
-        let period_ms = self.period_ms;
-        let settled = part
-            .adopted_ms
-            .is_some_and(|t| now_ms > t + SETTLED_PERIODS * period_ms);
+        let settled_ms = SETTLED_INTERVALS * self.interval_ms;
+        let settled = part.adopted_ms.is_some_and(|t| now_ms > t + settled_ms);
         let believed = view.peers.get(&PeerId(subject));
         let was_alive = believed.is_some_and(|(i, s)| *i == incarnation && *s != Status::Down);
         let lives = |(id, (_, s)): (&PeerId, &(Incarnation, Status))| {
@@ -213,6 +235,7 @@ impl PatienceCheck {
     /// Judges what is overdue, and remembers what everybody believes now.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let now_ms = snapshot.now_ms;
+        self.interval_ms = snapshot.bounds.interval_ms;
         for m in snapshot.peers.iter().filter(|m| m.uav) {
             self.uavs.insert(m.id);
             let part = self.parts.entry(m.id).or_default();
@@ -436,15 +459,29 @@ mod tests {
                 ..Claim::default()
             })
         };
-        for (cells, opens, adopted_s, broken) in [
-            (4, false, 2, true),
-            (4, true, 2, false),
-            (0, false, 2, false),
-            (4, false, 28, false),
+        let nothing: fn(&mut PatienceCheck) = |_| ();
+        for (cells, opens, adopted_s, besides, broken) in [
+            (4, false, 2, nothing, true),
+            (4, true, 2, nothing, false),
+            (0, false, 2, nothing, false),
+            (4, false, 28, nothing, false),
+            // The other one was taken for alive since then: between two looks, or for longer.
+            (
+                4,
+                false,
+                2,
+                |check| check.on_believed(29_900, (1, 2)),
+                false,
+            ),
+            (4, false, 2, |check| check.on_believed(29_800, (1, 2)), true),
+            (4, false, 2, |check| check.on_silent(1), false),
+            // Five of the longest intervals after a decision.
+            (4, false, 2, |check| check.interval_ms = 6000, false),
         ] {
             let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
             check.on_told(adopted_s * 1000, 1, (1, 1));
             able_until(&mut check, 30, &mut found);
+            besides(&mut check);
             let dead = claim(cells);
             let heard = |id| (id == 2).then_some((&dead, 1));
             check.on_down(30_100, (1, 2), 1, heard);
@@ -464,7 +501,8 @@ mod tests {
             assert_eq!(
                 found.counts.contains_key("prompt"),
                 broken,
-                "{cells} {opens} {adopted_s}"
+                "{cells} {opens} {adopted_s} {:?}",
+                check.believed
             );
         }
     }

@@ -126,6 +126,8 @@ impl Rules {
                 if *status == Status::Down {
                     let heard = |author| listing.heard(id, author);
                     self.patience.on_down(now_ms, about, *incarnation, heard);
+                } else {
+                    self.patience.on_believed(now_ms, about);
                 }
             }
             Report::Claim { counter, .. } => {

@@ -146,6 +146,8 @@ pub struct Membership {
     /// What this peer announced itself, quarters of T.
     interval: u8,
     doubt_until: Time,
+    /// What is heard until then may have waited for so long, since this peer stood still.
+    waking: (Time, u64),
     /// Somebody who was suspected or believed down is heard, or a neighbour suspects
     /// somebody who was heard since, and nobody was told yet.
     refuted: bool,
@@ -172,6 +174,7 @@ impl Membership {
             between: 0,
             interval: INTERVAL_LEAST,
             doubt_until: Time(0),
+            waking: (Time(0), 0),
             refuted: false,
             last_heard: None,
             gone: BTreeSet::new(),
@@ -409,7 +412,7 @@ impl Membership {
         self.note_heard(now);
         let limits = self.patience(now);
         let age = Age {
-            told_ms: 0,
+            told_ms: self.waited_ms(now),
             at: now,
         };
         let own = HeardHeartbeat {
@@ -439,11 +442,12 @@ impl Membership {
             told_ms: u64::from(ds) * 100,
             at: now,
         };
+        let waited_ms = self.waited_ms(now);
         let heartbeat = HeardHeartbeat {
             id: told.id,
             incarnation: told.incarnation,
             count: told.heartbeat,
-            age: age(told.age_ds),
+            age: age(told.age_ds).and_ms(waited_ms),
             hops: told.hops.saturating_add(1),
             interval: told.interval,
             suspected: told.suspected_ds.map(age),
@@ -484,7 +488,7 @@ impl Membership {
             incarnation,
             count: told.heartbeat,
             age: Age {
-                told_ms: u64::from(told.age_ds) * 100,
+                told_ms: u64::from(told.age_ds) * 100 + self.waited_ms(now),
                 at: now,
             },
             hops: told.hops.saturating_add(1),
@@ -530,7 +534,9 @@ impl Membership {
         }
         let condemned = heard.suspected.is_some_and(|age| age.ms(now) >= k2_ms);
         let known_life = self.known.get(&heard.id).map(|k| k.freshest.incarnation);
-        let too_old = heard.age.ms(now) > bound_ms;
+        // Nobody listened while it waited: that was no silence.
+        let waited_ms = self.waited_ms(now);
+        let too_old = heard.age.ms(now).saturating_sub(waited_ms) > bound_ms;
         if too_old || (condemned && known_life.is_none()) {
             if known_life.is_none_or(|life| life < heard.incarnation) {
                 self.remember_dead(now, heard, changes);
@@ -548,6 +554,7 @@ impl Membership {
                 return false;
             }
             let mut known = Known::new(heard, urgent_until);
+            known.excused_ms = waited_ms;
             known.note_hops(now, heard.hops, interval_ms);
             changes.push(known.change());
             self.known.insert(heard.id, known);
@@ -567,7 +574,7 @@ impl Membership {
             // clock that jumped.
             heard.age = known.freshest.age;
         } else {
-            known.excused_ms = 0;
+            known.excused_ms = waited_ms;
         }
         let new_life = heard.incarnation > known.freshest.incarnation;
         if new_life {
@@ -634,14 +641,23 @@ impl Membership {
 
     /// This peer came so late that it did not listen for a time, or its clock jumped: that
     /// time is no silence of others, so no verdict counts it. What is told of ages does:
-    /// a heartbeat is as old as it is, whoever slept. What arrived meanwhile is heard
-    /// within a period; until then verdicts are doubted.
-    pub fn was_late(&mut self, now: Time, late_ms: u64) {
+    /// a heartbeat is as old as it is, whoever slept. What arrived meanwhile, since this
+    /// peer last did anything, is heard before it looks at the time again: it may have waited
+    /// all the while, and is as old. What is to refute a suspicion is heard within a period;
+    /// until then verdicts are doubted.
+    pub fn was_late(&mut self, now: Time, late_ms: u64, slept_ms: u64) {
         self.doubt_until = now.plus_ms(self.period_ms);
+        self.waking = (now.plus_ms(self.period_ms / CADENCE), slept_ms);
         self.last_heard = self.last_heard.map(|t| t.plus_ms(late_ms).min(now));
         for known in self.known.values_mut() {
             known.excuse(now, late_ms);
         }
+    }
+
+    /// For so long what is heard now may have waited for this peer to listen.
+    fn waited_ms(&self, now: Time) -> u64 {
+        let (until, slept_ms) = self.waking;
+        if now < until { slept_ms } else { 0 }
     }
 
     /// Whether somebody was heard since this was last asked who had been suspected or

@@ -57,6 +57,40 @@ fn twelve_share_an_area_and_take_over_without_a_round() {
     assert_eq!(bids, 0);
 }
 
+/// Of ten, seven have fuel for hardly a cell: they may plan, and take nothing. The others do not
+/// wait for them longer than it takes for the turn of each to come.
+#[test]
+fn what_the_idle_cannot_fly_is_taken_by_who_has_something_to_fly() {
+    let mut h = Harness::started(10, mission(1, 16, 12));
+    let all: Vec<u16> = (1..=10).collect();
+    let open = |h: &Harness| {
+        let beliefs: Vec<_> = all.iter().map(|id| h.beliefs(*id)).collect();
+        let listed: BTreeSet<u16> = beliefs.iter().flat_map(|b| b.plan.clone()).collect();
+        let covered = |c: usize| beliefs.iter().any(|b| b.covered.get(c) == Some(&true));
+        let cells = (0..16 * 12).filter(|c| !covered(*c));
+        let cells = cells.filter(|c| u16::try_from(*c).is_ok_and(|c| !listed.contains(&c)));
+        cells.count()
+    };
+    let mut orphaned = Vec::new();
+    // 3 T of listening, 1.5 T before a first section.
+    for _ in 0..20 {
+        h.run_s(1);
+        // A few seconds to spend, all the time.
+        for id in 4..=10 {
+            let spendable_s = f64::from(h.beliefs(id).spendable_ms) / 1000.0;
+            h.seat(id).fuel_s += 5.0 - spendable_s;
+        }
+        orphaned.push(open(&h));
+    }
+    let idle = all.iter().filter(|id| h.beliefs(**id).plan.is_empty());
+    let able = all.iter().all(|id| h.beliefs(*id).able);
+    assert!(able && idle.count() >= 4);
+    // From 5 s on 2 T' and W0, which is 5 T', until all idle ones had their turn; half of W0
+    // for those who are there sooner, and what it takes to write it, several times.
+    assert!(orphaned[6] > 60, "{orphaned:?}");
+    assert_eq!(orphaned[17], 0, "{orphaned:?}");
+}
+
 #[test]
 fn who_hears_only_a_part_of_a_roster_takes_only_its_own_part_of_the_loop() {
     let mut h = Harness::with_roster(12, mission(1, 16, 12));

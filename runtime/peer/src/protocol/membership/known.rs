@@ -19,6 +19,12 @@ impl Age {
         self.told_ms.saturating_add(now.since_ms(self.at))
     }
 
+    /// As much older.
+    pub(super) fn and_ms(self, more_ms: u64) -> Self {
+        let told_ms = self.told_ms.saturating_add(more_ms);
+        Self { told_ms, ..self }
+    }
+
     /// When what is so old began.
     fn since(self) -> Time {
         Time(self.at.0.saturating_sub(self.told_ms))

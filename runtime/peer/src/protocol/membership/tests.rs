@@ -81,12 +81,12 @@ fn one_s_own_lateness_is_nobody_s_silence_but_the_age_that_is_told_is_true() {
     m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
     m.tick(Time(1_000));
     let mut now = Time(3_601_000);
-    m.was_late(now, 3_600_000);
+    m.was_late(now, 3_600_000, 3_600_000);
     assert_eq!(m.tick(now), []);
     assert_eq!(m.gossip(now, 1)[0].age_ds, 36_010);
     // From then on it is silent, and known to be down within what is left of the bound;
     // more lateness puts that off.
-    m.was_late(now.plus_ms(60_000), 60_000);
+    m.was_late(now.plus_ms(60_000), 60_000, 60_000);
     now = now.plus_ms(60_000);
     let woke = now;
     while m.status(2) != Some((1, Status::Down)) {
@@ -593,7 +593,7 @@ fn a_loop_that_ran_late_doubts_its_verdicts_for_a_period() {
             }
             let now = Time(t * 250);
             if late && t == 18 {
-                m.was_late(now, 2_250);
+                m.was_late(now, 2_250, 2_500);
             }
             if m.tick(now).iter().any(|c| c.status == Status::Suspect) {
                 suspected = suspected.or(Some(now.0));
@@ -820,11 +820,52 @@ fn who_was_late_raises_no_suspicion_for_a_period() {
     let mut m = Membership::new(1, 1000);
     m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
     assert!((0..=16).all(|t| m.tick(Time(t * 250)).is_empty()));
-    m.was_late(Time(7_000), 3_000);
+    m.was_late(Time(7_000), 3_000, 3_000);
     let mut ticks = (28..60).map(|t| (t * 250, m.tick(Time(t * 250))));
     let suspected = ticks.find(|(_, changes)| !changes.is_empty()).unwrap();
     // Four and a quarter periods of silence would be over at 7.25 s.
     assert_eq!(suspected.0, 8_000);
+}
+
+/// What waited while a peer stood still may be as old as that: it tells so, and nobody else
+/// takes it for fresh; for its own verdicts it is no silence.
+#[test]
+fn what_waited_for_who_stood_still_is_as_old_as_that() {
+    let mut m = Membership::new(1, 1000);
+    let met = vec![entry(3, 1, 1, None)];
+    m.on_beacon(Time(0), 2, 1, &beacon(1, met));
+    m.tick(Time(1_000));
+    // It stands still for 39 s. Three beacons waited, and a heartbeat of one not met before.
+    let woke = Time(40_000);
+    m.was_late(woke, 38_750, 39_000);
+    m.on_beacon(woke, 2, 1, &beacon(9, vec![entry(3, 9, 1, None)]));
+    m.on_heartbeat(woke.plus_ms(249), 4, 1, (1, INTERVAL_LEAST));
+    assert_eq!(m.tick(woke), []);
+    let mut ages = m.gossip(woke.plus_ms(249), 4);
+    ages.sort_by_key(|g| g.id);
+    let ages: Vec<_> = ages.iter().map(|g| (g.id, g.heartbeat, g.age_ds)).collect();
+    assert_eq!(ages, [(2, 9, 393), (3, 9, 394), (4, 1, 390)]);
+    let alive = |m: &Membership, id| m.status(id) == Some((1, Status::Alive));
+    assert!([2, 3, 4].into_iter().all(|id| alive(&m, id)));
+    // Whoever hears that knows that the heartbeats are old.
+    let mut other = Membership::new(5, 1000);
+    let told = m.gossip(woke.plus_ms(249), 4);
+    other.on_beacon(woke.plus_ms(249), 1, 1, &beacon(1, told));
+    assert_eq!(other.status(4), Some((1, Status::Down)));
+    // What is heard after the next look at the time did not wait, and a neighbour that
+    // says nothing any more is missed as if it had been heard when this peer woke.
+    m.on_heartbeat(woke.plus_ms(250), 4, 1, (2, INTERVAL_LEAST));
+    let told = m.gossip(woke.plus_ms(250), 4);
+    assert!(told.iter().any(|g| (g.id, g.age_ds) == (4, 0)));
+    let mut ticks = (0..60).map(|t| woke.plus_ms(t * 250));
+    let missed = ticks.find(|t| {
+        let changes = m.tick(*t);
+        changes
+            .iter()
+            .any(|c| (c.peer, c.status) == (2, Status::Suspect))
+    });
+    // Over two hops k1 is four and a half.
+    assert_eq!(missed, Some(woke.plus_ms(4_500)));
 }
 
 #[test]

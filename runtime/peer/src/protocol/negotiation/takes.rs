@@ -79,10 +79,20 @@ impl Negotiation {
     /// Orphans that others had the time to claim.
     #[must_use]
     pub fn ripe_orphans(&self, ctx: &Context<'_>) -> CellSet {
-        let patience_ms = SHORT_INTERVALS * ctx.interval_ms;
-        let ripe = self.orphaned_at.iter();
-        let ripe = ripe.filter(|(_, since)| ctx.now.since_ms(**since) >= patience_ms);
-        CellSet::of(self.sections.cells(), ripe.map(|(cell, _)| *cell))
+        self.orphans_older_than(ctx, SHORT_INTERVALS * ctx.interval_ms)
+    }
+
+    /// Orphans that everybody had the time to take who had nothing to fly: it was the turn of
+    /// each of them, so none of them can fly these.
+    #[must_use]
+    pub fn overdue_orphans(&self, ctx: &Context<'_>) -> CellSet {
+        self.orphans_older_than(ctx, overdue_ms(ctx))
+    }
+
+    fn orphans_older_than(&self, ctx: &Context<'_>, ms: u64) -> CellSet {
+        let old = self.orphaned_at.iter();
+        let old = old.filter(|(_, since)| ctx.now.since_ms(**since) >= ms);
+        CellSet::of(self.sections.cells(), old.map(|(cell, _)| *cell))
     }
 
     /// Whether an orphan has waited for long enough for so many who would be there sooner, the
@@ -94,11 +104,22 @@ impl Negotiation {
         orphan: u16,
         (sooner, later_ms): (usize, u64),
     ) -> bool {
-        let patience_ms = SHORT_INTERVALS * ctx.interval_ms;
-        let sooner_ms = sooner as u64 * SOONER_INTERVALS * ctx.interval_ms;
-        let for_others_ms = sooner_ms.min(ctx.first_wait_ms()).max(later_ms);
+        let for_others_ms = for_sooner_ms(ctx, sooner, ctx.first_wait_ms()).max(later_ms);
+        let patience_ms = SHORT_INTERVALS * ctx.interval_ms + for_others_ms;
+        self.is_orphan_for(ctx, orphan, patience_ms)
+    }
+
+    /// The same of an overdue one, for so many who have something to fly and would be there
+    /// sooner. No longer than that: nobody else is left.
+    #[must_use]
+    pub fn is_my_turn_at_last(&self, ctx: &Context<'_>, orphan: u16, sooner: usize) -> bool {
+        let for_others_ms = for_sooner_ms(ctx, sooner, ctx.first_wait_ms() / 2);
+        self.is_orphan_for(ctx, orphan, overdue_ms(ctx) + for_others_ms)
+    }
+
+    fn is_orphan_for(&self, ctx: &Context<'_>, orphan: u16, ms: u64) -> bool {
         let since = self.orphaned_at.get(&orphan);
-        since.is_some_and(|t| ctx.now.since_ms(*t) >= patience_ms + for_others_ms)
+        since.is_some_and(|t| ctx.now.since_ms(*t) >= ms)
     }
 
     /// Whether this peer will have nothing to fly before others have heard what it takes.
@@ -253,6 +274,16 @@ impl Negotiation {
             Some((first..=last).map(|c| (c, Direction::Forward)).collect())
         }
     }
+}
+
+/// After so long it was everybody's turn to take an orphan who had nothing to fly.
+fn overdue_ms(ctx: &Context<'_>) -> u64 {
+    SHORT_INTERVALS * ctx.interval_ms + ctx.first_wait_ms()
+}
+
+/// How long an orphan is left to so many who would be there sooner.
+fn for_sooner_ms(ctx: &Context<'_>, sooner: usize, most_ms: u64) -> u64 {
+    (sooner as u64 * SOONER_INTERVALS * ctx.interval_ms).min(most_ms)
 }
 
 /// The second half of an owner's plan, from its far end.

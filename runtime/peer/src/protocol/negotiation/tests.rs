@@ -609,6 +609,27 @@ fn orphans_are_left_to_those_who_would_be_there_sooner_each_for_two_periods() {
 }
 
 #[test]
+fn an_orphan_whose_turn_passed_for_all_the_idle_goes_to_who_has_something_to_fly() {
+    let mut desk = Desk::new(&[2, 3, 4, 5, 6, 7, 8, 9]);
+    desk.claim(2, 1, 0, 20, 600_000);
+    desk.tick();
+    let from = desk.now;
+    // 2 T and W0, which is 5 T; 2 T for each who would be there sooner, half of W0 at most.
+    for (after, overdue, turns) in [
+        (7 * T - 1, 0, [false, false, false]),
+        (7 * T, 4, [true, false, false]),
+        (9 * T, 4, [true, true, false]),
+        (9 * T + T / 2, 4, [true, true, true]),
+    ] {
+        desk.now = from.plus_ms(after);
+        let cells = desk.ask(|n, ctx| n.overdue_orphans(ctx).count());
+        assert_eq!(cells, overdue, "after {after} ms");
+        let turn = |sooner| desk.ask(|n, ctx| n.is_my_turn_at_last(ctx, 22, sooner));
+        assert_eq!([0, 1, 9].map(turn), turns, "after {after} ms");
+    }
+}
+
+#[test]
 fn an_orphan_is_left_to_who_is_near_for_as_long_as_the_way_takes_longer() {
     let mut desk = Desk::new(&[2, 3, 4, 5, 6, 7, 8, 9]);
     desk.claim(2, 1, 0, 20, 600_000);
