@@ -508,14 +508,8 @@ impl Executive {
             return vec![Move::Loiter(circle)];
         }
         if let Aim::Point(p) = self.aim {
-            match self.transit.connect_to_point(at, p) {
-                Some(mut moves) => {
-                    let end = moves
-                        .iter()
-                        .fold(*at, |place, step| self.transit.end_of(&place, step));
-                    moves.extend(self.transit.way_to_loiter(&end));
-                    return moves;
-                }
+            match self.transit.way_to_wait_at(at, p) {
+                Some(moves) => return moves,
                 None => events.push(Event::Refused { cells: Vec::new() }),
             }
         }

@@ -43,6 +43,9 @@ pub(super) const ESCAPE_SLACK_M: f64 = 0.25;
 /// that following them has authority on both sides.
 const LOITER_RADII: [f64; 2] = [1.2, 1.0];
 
+/// Headings that are tried at a point with little room for a circle.
+const WAITING_HEADINGS: u32 = 32;
+
 /// Distances are compared with this much leniency, metres.
 const ROUNDING_M: f64 = 1e-6;
 
@@ -588,6 +591,35 @@ impl Transit {
         vec![Move::Loiter(here)]
     }
 
+    /// The way to a point, and a circle that keeps clear of the zones: through the point
+    /// whatever the heading there, where room is scarce with a heading that has some, else
+    /// [`Transit::way_to_loiter`] from there. `None` where there is no way to the point.
+    #[must_use]
+    pub fn way_to_wait_at(&self, from: &Place, to: Point) -> Option<Vec<Move>> {
+        let mut moves = self.connect_to_point(from, to)?;
+        let steps = moves.iter();
+        let end = steps.fold(*from, |place, step| self.end_of(&place, step));
+        let clearance_m = self.router.limits().clearance_m;
+        let has_room = |pose: &Pose| {
+            let (circle, room_m) = self.circle(pose);
+            (room_m >= clearance_m - ROUNDING_M).then_some(circle)
+        };
+        if has_room(&end.pose).is_none() {
+            let headings =
+                (0..WAITING_HEADINGS).map(|k| f64::from(k) * TAU / f64::from(WAITING_HEADINGS));
+            let ways = headings.filter_map(|heading_rad| {
+                let circle = has_room(&Pose::new(to, heading_rad))?;
+                Some((self.route(from.pose, circle.start).ok()?, circle))
+            });
+            let shortest = ways.min_by(|(a, _), (b, _)| a.length_m().total_cmp(&b.length_m()));
+            if let Some((way, circle)) = shortest {
+                return Some(vec![Move::Route(way), Move::Loiter(circle)]);
+            }
+        }
+        moves.extend(self.way_to_loiter(&end));
+        Some(moves)
+    }
+
     /// The least radius over the ground that is flown, metres: the mission's, more where
     /// the wind demands it.
     #[must_use]
@@ -817,6 +849,50 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Between two walls, with room for one circle across: whatever way it comes from, a UAV
+    /// waits there and not where the walls end.
+    #[test]
+    fn who_waits_in_a_gate_comes_with_a_heading_that_has_room() {
+        let t = transit(12, 8, Vec::new());
+        let half_m = t.turn_radius_m() + t.router.limits().clearance_m + 4.0;
+        let gate = Point::new(250.0, 180.0);
+        let wall = |west: f64| {
+            let at = |east: f64, north: f64| Point::new(gate.x + west + east, gate.y + north);
+            let ring = vec![at(0.0, -4.0), at(200.0, -4.0), at(200.0, 4.0), at(0.0, 4.0)];
+            Polygon::new(ring).unwrap()
+        };
+        let t = transit(12, 8, vec![wall(half_m), wall(-half_m - 200.0)]);
+        let mut elsewhere = 0;
+        for k in 0..16 {
+            let turned = 0.4 * f64::from(k);
+            let from = Place {
+                pose: Pose::new(
+                    Point::new(gate.x + 90.0 * turned.cos(), gate.y + 130.0 * turned.sin()),
+                    turned,
+                ),
+                boundary: None,
+            };
+            if t.router.zones().distance_m(from.pose.position()) < t.router.limits().clearance_m {
+                continue;
+            }
+            let moves = t.way_to_wait_at(&from, gate).unwrap();
+            let [Move::Route(_), Move::Loiter(circle)] = moves.as_slice() else {
+                panic!("{moves:?}");
+            };
+            assert!((circle.start.position() - gate).norm() < 0.01, "{k}");
+            assert!(moves.iter().all(|step| t.is_cleared(&from, step)), "{k}");
+            let straight = t.connect_to_point(&from, gate).unwrap();
+            let end = straight
+                .iter()
+                .fold(from, |place, step| t.end_of(&place, step));
+            elsewhere += usize::from(!matches!(
+                t.way_to_loiter(&end).as_slice(),
+                [Move::Loiter(_)]
+            ));
+        }
+        assert!(elsewhere > 3, "{elsewhere}");
     }
 
     #[test]

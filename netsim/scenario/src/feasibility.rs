@@ -7,8 +7,8 @@ use skein_flight::coverage::passes::PassesError;
 use skein_flight::coverage::ring::backtracking::{Division, OffLoop, Uav};
 use skein_flight::coverage::ring::patch::Patches;
 use skein_flight::coverage::ring::{CellId, CoverageLoop, Direction, Grid, LoopError};
-use skein_geometry::Polygon;
-use skein_geometry::frame::Point;
+use skein_geometry::frame::{Point, Vector};
+use skein_geometry::{Polygon, math};
 use skein_netsim::fault::Fault;
 use skein_netsim::fault_generator::kills;
 use skein_netsim::spec::{Spec, UavSpec};
@@ -21,6 +21,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Endurance, in flights round the whole loop, below which the death of some UAVs
 /// may leave cells that nobody has the fuel for.
 const COMFORTABLE_LOOPS: f64 = 2.5;
+
+/// Circles through the base that are tried for their room.
+const WAITING_HEADINGS: u32 = 32;
 
 /// Checks everything that can be told before a run.
 ///
@@ -240,6 +243,27 @@ fn on_loop(spec: &Spec, geometry: &MissionGeometry, summary: &Summary, out: &mut
         out.push(Finding::new(Severity::Error, "max_time_s", text));
     }
     launches(spec, geometry, out);
+    room_at_base(spec, geometry, out);
+}
+
+/// Who has finished waits on a circle through the base.
+fn room_at_base(spec: &Spec, geometry: &MissionGeometry, out: &mut Vec<Finding>) {
+    let limits = geometry.router.limits();
+    let (base, radius_m) = (spec.mission.base_m(), limits.turn_radius_m);
+    let room_m = (0..WAITING_HEADINGS).map(|k| {
+        let (sin, cos) = math::sin_cos(f64::from(k) * math::TAU / f64::from(WAITING_HEADINGS));
+        let middle = base + Vector::new(cos, sin) * radius_m;
+        geometry.router.zones().distance_m(middle) - radius_m
+    });
+    let room_m = room_m.fold(f64::NEG_INFINITY, f64::max);
+    if room_m < limits.clearance_m - 0.01 {
+        let text = format!(
+            "no circle of {radius_m:.1} m radius through it stays farther than {:.1} m from the no-fly zones; expected at least the clearance of {:.1} m: who has finished waits there",
+            room_m.max(0.0),
+            limits.clearance_m
+        );
+        out.push(Finding::new(Severity::Error, "base", text));
+    }
 }
 
 fn launches(spec: &Spec, geometry: &MissionGeometry, out: &mut Vec<Finding>) {
@@ -617,6 +641,23 @@ mod tests {
                 .any(|f| f.starts_with("warning: airframes: the weakest UAV")),
             "{all:?}"
         );
+    }
+
+    #[test]
+    fn a_base_without_room_to_wait_is_an_error() {
+        let at = |east_m: i32, north_m: i32| {
+            let all = told(3, |s| {
+                let mut mission = (*s.mission).clone();
+                mission.base = (east_m * 1000, north_m * 1000);
+                s.mission = std::sync::Arc::new(mission);
+            });
+            let text = "error: base: no circle of ";
+            all.into_iter().find(|f| f.starts_with(text))
+        };
+        // In the zone of the fixture, within its clearance, and well away.
+        assert!(at(240, 240).is_some_and(|f| f.contains("stays farther than 0.0 m")));
+        assert!(at(240, 258).is_some());
+        assert_eq!(at(-40, -40), None);
     }
 
     #[test]
