@@ -87,8 +87,42 @@ pub(crate) fn read(bytes: &[u8], me: u16, life: &Life) -> Heard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::message::Finished;
+    use crate::wire::message::{Finished, Heartbeat};
     use crate::wire::signature::SIGNATURE_MAX_BYTES;
+
+    #[test]
+    fn a_heartbeat_under_the_own_id_is_that_of_a_twin_and_what_others_pass_on_is_an_echo() {
+        let said = |body: &Body| {
+            let record = Record {
+                author: 1,
+                incarnation: 3,
+                seq: 9,
+                kind: body.kind().number(),
+                subject: 0,
+                body: codec::encode_body(body),
+                signature: Vec::new(),
+            };
+            read(&codec::encode_record(&record), 1, &Life::default())
+        };
+        let heartbeat = Heartbeat {
+            interval: 4,
+            sharers: 2,
+            east_dm: 120,
+            north_dm: -35,
+            fresh: Vec::new(),
+        };
+        let Heard::Twin(twin, at) = said(&Body::Heartbeat(heartbeat)) else {
+            panic!("it is taken for something else")
+        };
+        let wanted = Twin {
+            incarnation: 3,
+            heartbeat: 9,
+            nonce: None,
+        };
+        assert_eq!((twin, at), (wanted, Point::new(12.0, -3.5)));
+        let finished = Body::Finished(Finished { revision: 1 });
+        assert!(matches!(said(&finished), Heard::Echo(_)));
+    }
 
     #[test]
     fn a_record_that_carries_a_signature_is_refused_where_nobody_signs() {

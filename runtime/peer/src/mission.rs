@@ -555,10 +555,11 @@ mod tests {
     #[test]
     fn exact_passes_keep_clear_of_the_zones() {
         let square = |low: i32, high: i32| vec![(low, low), (high, low), (high, high), (low, high)];
-        let cells = |zones: Vec<Vec<PointMm>>| {
+        let cells = |zones: Vec<Vec<PointMm>>, clearance_mm: u32| {
             let of = Mission {
                 area: square(0, 600_000),
                 zones,
+                clearance_mm,
                 task: CoverageTask::Exact,
                 launch: (-30_000, -30_000),
                 ..mission(1, 4)
@@ -579,10 +580,11 @@ mod tests {
             let (x, y) = middle(corners);
             (230.0..370.0).contains(&x) && (230.0..370.0).contains(&y)
         };
-        assert!(cells(Vec::new()).iter().filter(deep).count() > 0);
-        let around = cells(vec![square(200_000, 400_000)]);
+        assert!(cells(Vec::new(), 8_000).iter().filter(deep).count() > 0);
+        let around = cells(vec![square(200_000, 400_000)], 8_000);
         assert_eq!(around.iter().filter(deep).count(), 0);
-        assert!(!around.is_empty());
+        let farther = cells(vec![square(200_000, 400_000)], 60_000);
+        assert!(!farther.is_empty() && farther.len() < around.len());
     }
 
     fn points(n: i32) -> CoverageTask {

@@ -121,6 +121,16 @@ mod tests {
             renumbered += u32::from(wanted.is_some_and(|w| w != i));
         }
         assert!(renumbered > 0, "no cell has another number");
+        // On lanes of another spacing the same name is another place.
+        let wider = Mission {
+            lane_spacing_mm: crate::testing::LANE_MM + 8_000,
+            footprint_across_mm: 60_000,
+            footprint_along_mm: 50_000,
+            ..crate::testing::mission(1, 6, 4)
+        };
+        let wider = Arc::new(wider).geometry().unwrap();
+        let all = CellSet::full(u16::try_from(old.len()).unwrap());
+        assert!(carried_over(old, &all, &wider.coverage_loop).is_empty());
     }
 
     /// Of other targets the third is what the second was: not the number counts.

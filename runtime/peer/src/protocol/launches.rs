@@ -300,6 +300,21 @@ mod tests {
         planned
     }
 
+    #[test]
+    fn the_last_stretch_takes_what_the_lengths_leave_over() {
+        let geometry = Arc::new(mission(1, 16, 12)).geometry().unwrap();
+        let n = geometry.coverage_loop.len();
+        let table = Table {
+            roster: &[launch(1, 0, 0, 0), launch(2, 0, 0, 0)],
+            coverage_loop: &geometry.coverage_loop,
+            turn_mm: 0,
+            begins: (0..=n as u64).map(|i| i * 48_000).collect(),
+        };
+        let cut = table.cut([(0, 480_000), (1, 48_000)].into_iter());
+        let counts: Vec<usize> = cut.iter().map(|s| s.count).collect();
+        assert_eq!(counts, [10, n - 10]);
+    }
+
     fn count_of(planned: &[Planned], id: u16) -> u16 {
         planned
             .iter()

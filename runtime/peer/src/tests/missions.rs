@@ -27,6 +27,22 @@ fn a_uav_without_a_mission_learns_it_by_radio() {
     assert!(h.run_until(250, |h| h.beliefs(2).finished));
 }
 
+/// What others listed before it had a mission is known to it with its loop.
+#[test]
+fn who_learns_the_mission_late_takes_nothing_that_another_lists() {
+    let mut h = with_operator(1, mission(1, 10, 8));
+    h.run_s(20);
+    h.add(2, Role::Uav, None);
+    h.start(2);
+    assert!(h.run_until(30, |h| h.beliefs(2).revision == 1));
+    let both = |h: &Harness| {
+        let (a, b) = (h.beliefs(1).plan, h.beliefs(2).plan);
+        a.iter().any(|c| b.contains(c))
+    };
+    assert!(h.run_until(10, |h| both(h) || h.beliefs(2).epoch.counter > 0));
+    assert!(!both(&h));
+}
+
 /// All know the first mission before they start; what is newer is told until all follow it.
 #[test]
 fn a_mission_is_said_while_somebody_follows_an_older_one() {

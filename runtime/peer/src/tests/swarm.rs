@@ -9,7 +9,7 @@ use crate::wire::kinds::Kind;
 use crate::wire::message::{Activity, MissionStatus};
 use crate::{Input, PeerId};
 use skein_behaviors::Order;
-use skein_geometry::frame::Point;
+use skein_geometry::frame::{Point, Pose};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Whether each open cell is in the plan of exactly one of these peers.
@@ -42,6 +42,24 @@ fn everybody_flies_a_section_within_five_seconds_before_any_round() {
     assert_eq!(bids, 0);
     // A round divides anew what everybody took.
     assert!(h.run_until(15, |h| h.beliefs(1).epoch.counter == 1));
+}
+
+/// Where they are close together each leaves to the others what is nearer to them.
+#[test]
+fn first_sections_of_those_who_know_where_all_are_lie_side_by_side() {
+    let mut h = Harness::new(5, mission(1, 10, 8));
+    for id in 1..=5 {
+        h.seat(id).pose = Pose {
+            east_m: 24.0 + 48.0 * f64::from(id),
+            north_m: 24.0,
+            heading_rad: 0.0,
+        };
+        h.start(id);
+    }
+    assert!(h.run_until(5, |h| (1..=5).all(|id| !h.beliefs(id).plan.is_empty())));
+    let plans: Vec<u16> = (1..=5).flat_map(|id| h.beliefs(id).plan).collect();
+    let distinct: BTreeSet<u16> = plans.iter().copied().collect();
+    assert!(distinct.len() > 70, "{} of {}", distinct.len(), plans.len());
 }
 
 #[test]
