@@ -12,6 +12,7 @@ use skein_flight::coverage::ring::{CoverageLoop, Direction};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;
 use skein_peer::offload::MissionGeometry;
+use skein_peer::protocol::airtime::ms_of;
 use skein_peer::protocol::rounds::{OpenRound, RoundOrder, epoch_of, order_of};
 use skein_peer::protocol::runs::cells_of;
 use skein_peer::wire::message::{Bid, Claim, Epoch, Round};
@@ -102,6 +103,11 @@ impl DecisionCheck {
     /// Once a period.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>) {
         self.longest_ms = snapshot.bounds.interval_ms;
+    }
+
+    /// A peer announces an interval, which counts at once for who hears it.
+    pub fn on_interval(&mut self, interval: u8) {
+        self.longest_ms = self.longest_ms.max(ms_of(interval, self.period_ms));
     }
 
     /// A loop was derived.
@@ -766,20 +772,23 @@ mod tests {
             fastest_mps: 20.0,
         };
         type Lie = fn(&mut Bid);
-        let lies: [(Lie, u64, f64, bool); 8] = [
-            (|_| {}, 40, 0.0, false),
-            (|b| b.progressed = false, 40, 0.0, true),
-            (|b| b.calm = false, 40, 0.0, true),
-            (|_| {}, 10, 0.0, true),
-            (|b| b.calm = false, 10, 0.0, false),
-            (|b| b.eta_ms = 1, 40, 0.0, true),
-            (|b| b.endurance_ms = 3_000_000, 40, 0.0, true),
-            (|_| {}, 40, 5_000.0, true),
+        let lies: [(Lie, u64, f64, u8, bool); 9] = [
+            (|_| {}, 40, 0.0, 4, false),
+            (|b| b.progressed = false, 40, 0.0, 4, true),
+            (|b| b.calm = false, 40, 0.0, 4, true),
+            (|_| {}, 10, 0.0, 4, true),
+            // Somebody just announced an interval of two periods.
+            (|b| b.calm = false, 40, 0.0, 8, false),
+            (|b| b.calm = false, 10, 0.0, 4, false),
+            (|b| b.eta_ms = 1, 40, 0.0, 4, true),
+            (|b| b.endurance_ms = 3_000_000, 40, 0.0, 4, true),
+            (|_| {}, 40, 5_000.0, 4, true),
         ];
-        for (n, (lie, at_s, east_m, broken)) in lies.into_iter().enumerate() {
+        for (n, (lie, at_s, east_m, announced, broken)) in lies.into_iter().enumerate() {
             let mut c = Case::new(true);
             c.check.on_told(0, 1, 1);
             c.check.on_covered(1, 3);
+            c.check.on_interval(announced);
             let mut bid = c.bids[0].clone();
             (bid.calm, bid.progressed) = (true, true);
             lie(&mut bid);

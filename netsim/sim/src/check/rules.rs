@@ -177,6 +177,7 @@ impl Rules {
             let author = (id, said.record.incarnation);
             self.spoken.on_beacon(now_ms, author, beacon, view, found);
             self.cadence.on_beacon_spoken(id, beacon.interval);
+            self.decision.on_interval(beacon.interval);
             self.airtime.on_beat(now_ms, id, beacon.interval, false);
         }
     }
@@ -184,6 +185,7 @@ impl Rules {
     /// A peer puts its own heartbeat on the air.
     pub fn on_heartbeat(&mut self, now_ms: u64, id: u16, heartbeat: &Heartbeat) {
         self.cadence.on_beacon_spoken(id, heartbeat.interval);
+        self.decision.on_interval(heartbeat.interval);
         self.airtime.on_beat(now_ms, id, heartbeat.interval, true);
     }
 

@@ -202,6 +202,8 @@ impl Airtime {
         if now < self.first_until {
             return;
         }
+        // Until now the share was one among them: who stood still was not alone meanwhile.
+        self.refill(now);
         self.neighbours.retain(|_, n| n.until > now);
         let untils = self.neighbours.values().map(|n| n.until);
         self.first_until = untils.min().unwrap_or(Time(u64::MAX));
@@ -522,6 +524,22 @@ mod tests {
         assert_eq!((air.counted(), air.sharers()), (2, 12));
         air.plan_beacon(Time(10_600));
         assert_eq!((air.counted(), air.sharers()), (1, 1));
+    }
+
+    /// What it did not hear meanwhile was there all the same: a minute alone would be a bucket of
+    /// three seconds of all the channel.
+    #[test]
+    fn the_bucket_of_who_stood_still_is_that_of_one_among_its_neighbours() {
+        for hears_first in [false, true] {
+            let mut air = air(64_000, 8);
+            let woke = Time(60_000);
+            if hears_first {
+                air.hear(woke, 3, (4, 1));
+            }
+            air.plan_beacon(woke);
+            assert!(air.sharers() < 3);
+            assert_eq!(air.tokens_millibytes, 1_200_000, "{hears_first}");
+        }
     }
 
     #[test]

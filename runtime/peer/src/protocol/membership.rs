@@ -868,12 +868,13 @@ impl Membership {
         self.last_heard = Some(now);
     }
 
-    /// Whether nobody was heard for k1 T' although some are not believed down yet. That
+    /// Whether nobody was heard for k1 T' although some UAV is not believed down yet. That
     /// many die at once is less likely than that this peer is deaf, so it suspects itself
-    /// until it has heard somebody, or believes all down.
+    /// until it has heard somebody, or believes all UAVs down. A ground station has nothing
+    /// that could be taken from it, and who flies alone is often out of its reach.
     #[must_use]
     pub fn is_deaf(&self, now: Time) -> bool {
-        self.hears_nobody(now) && self.live().next().is_some()
+        self.hears_nobody(now) && self.living().any(|k| !k.info.ground_station)
     }
 
     /// Whether nobody was heard for k1 T', who was heard before.

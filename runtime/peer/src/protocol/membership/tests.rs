@@ -673,6 +673,20 @@ fn who_hears_nobody_for_k1_suspects_itself_until_it_believes_all_others_down() {
     assert!(!m.is_deaf(Time(20_000)), "there is nobody left");
 }
 
+/// The last UAV, at the edge of the ground station's reach: it can plan all the time.
+#[test]
+fn who_hears_no_ground_station_and_knows_no_other_uav_is_not_deaf() {
+    let mut m = Membership::new(1, 1000);
+    let station = Beacon {
+        ground_station: true,
+        ..beacon(1, Vec::new())
+    };
+    m.on_beacon(Time(0), 100, 1, &station);
+    assert!(m.hears_nobody(Time(5_000)) && !m.is_deaf(Time(5_000)));
+    m.on_beacon(Time(5_000), 2, 1, &beacon(1, Vec::new()));
+    assert!(m.is_deaf(Time(9_250)));
+}
+
 #[test]
 fn a_life_far_ahead_of_the_one_that_is_known_is_none() {
     let mut m = Membership::new(1, 1000);
