@@ -114,12 +114,6 @@ impl Disk {
         &self.synced
     }
 
-    /// How many writes are under way.
-    #[must_use]
-    pub fn pending(&self) -> usize {
-        self.pending.len()
-    }
-
     /// How many crashes tore a record.
     #[must_use]
     pub fn torn(&self) -> u64 {

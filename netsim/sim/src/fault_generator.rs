@@ -1,6 +1,6 @@
 //! Random faults for one run, drawn from a scenario's storm: kills, loss, partitions
 //! that heal, restarts with and without disk, moved bases, and a few of the other
-//! [kinds of trouble](crate::troubles), which are drawn on their own.
+//! kinds of trouble, which are drawn on their own.
 //!
 //! The number of kills is drawn first and evenly from none to the most allowed, so
 //! that a batch of seeds meets each of them equally often; all else fits round it.

@@ -7,28 +7,28 @@
 //! | [`radio`] | links, the graph they form, the shared channel |
 //! | [`fault`] | one enum of faults, for simulated and live swarms |
 //! | [`fault_generator`] | random faults for one run |
-//! | [`troubles`] | the kinds of trouble among them |
+//! | `troubles` | the kinds of trouble among them |
 //! | [`disk`] | virtual disks |
-//! | [`twins`] | which peers speak under the id of another |
+//! | `twins` | which peers speak under the id of another |
 //! | [`prepared`] | what all runs of a scenario share |
 //! | [`runs`] | runs with the scenario's own faults, with drawn ones, without any |
 //! | [`swarm`] | peers, world and radio under one virtual clock |
 //! | [`account`] | who took over what, when, and the verdict: one judge for simulated and live runs |
-//! | [`check`] | what must hold, judged while a run goes on |
-//! | [`geometry_cache`] | loops and routers, derived once for all peers and runs |
+//! | `check` | what must hold, judged while a run goes on |
+//! | `geometry_cache` | loops and routers, derived once for all peers and runs |
 //! | [`history`] | what happened, hashed and replayable |
-//! | [`omniscient_baseline`] | how long it takes when everybody knows everything |
+//! | `omniscient_baseline` | how long it takes when everybody knows everything |
 //! | [`timeline`] | the kept events of a run for a person |
 //! | [`summary`] | what many runs come to |
 
 pub mod account;
-pub mod check;
+mod check;
 pub mod disk;
 pub mod fault;
 pub mod fault_generator;
-pub mod geometry_cache;
+mod geometry_cache;
 pub mod history;
-pub mod omniscient_baseline;
+mod omniscient_baseline;
 pub mod prepared;
 pub mod radio;
 pub mod runs;
@@ -36,8 +36,8 @@ pub mod spec;
 pub mod summary;
 pub mod swarm;
 pub mod timeline;
-pub mod troubles;
-pub mod twins;
+mod troubles;
+mod twins;
 pub mod world;
 
 pub use prepared::Prepared;

@@ -157,7 +157,7 @@ pub struct StormSpec {
     pub troubles: TroubleSpec,
 }
 
-/// How bad the [kinds of trouble](crate::troubles) of a storm are at worst. A kind whose
+/// How bad the kinds of trouble of a storm are at worst. A kind whose
 /// limit is 0 is not drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TroubleSpec {

@@ -18,7 +18,7 @@
 //! | `inbound`, `outbound` | what bytes turn out to be; what is spoken, and when |
 //! | `cooperation`, `mission_state` | mission, goal, the peer's part in negotiations |
 //! | [`protocol`] | the machines and rules by which peers agree |
-//! | [`timers`] | every deadline, in one table |
+//! | `timers` | every deadline, in one table |
 //! | [`journal`] | what is durable before it is spoken of |
 //! | [`offload`] | work that takes too long for a percept to wait |
 //! | [`wire`] | keys, kinds, messages, their bytes and limits |
@@ -111,7 +111,7 @@ mod task;
 pub mod testing;
 #[cfg(test)]
 mod tests;
-pub mod timers;
+mod timers;
 mod varint;
 pub mod wire;
 

@@ -7,7 +7,7 @@
 //! the same rules for live processes and for virtual time. Facts about the world come
 //! from the world, facts about beliefs from the peers' reports; nothing here looks into a
 //! peer or listens to the radio. What only a simulator can see, the
-//! [checks](crate::check) over beliefs, joins the report as its violations.
+//! checks over beliefs, joins the report as its violations.
 //!
 //! | module | what it accounts for |
 //! |---|---|

@@ -1,20 +1,20 @@
 //! A swarm in virtual time: N peers, one world, one radio, one seed, one clock.
 //!
 //! The order within a millisecond is fixed: act → radio → answer → sense → decide →
-//! judge (see [`queue::Phase`]). One run is single-threaded and owes everything to its seed, its
+//! judge (see `queue::Phase`). One run is single-threaded and owes everything to its seed, its
 //! scenario and its faults: the same three give the same history, event for event.
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`queue`] | the event queue |
-//! | [`stream`] | independent random streams |
-//! | [`operator`] | the mission and the order given last |
-//! | [`judged_loop`] | the loop on which cells are counted |
-//! | [`traffic`] | what the radios were given and brought |
-//! | [`names`] | whom peers mean by an id that two processes have |
-//! | [`sim_peer`] | one peer: process, clock, disk, inbox |
-//! | [`air`] | the world and the medium as the driver uses them |
-//! | [`fault_effects`] | what each fault does |
+//! | `queue` | the event queue |
+//! | `stream` | independent random streams |
+//! | `operator` | the mission and the order given last |
+//! | `judged_loop` | the loop on which cells are counted |
+//! | `traffic` | what the radios were given and brought |
+//! | `names` | whom peers mean by an id that two processes have |
+//! | `sim_peer` | one peer: process, clock, disk, inbox |
+//! | `air` | the world and the medium as the driver uses them |
+//! | `fault_effects` | what each fault does |
 //! | [`outcome`] | what a run came to |
 //! | [`meter`] | how long its parts take |
 

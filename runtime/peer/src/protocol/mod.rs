@@ -2,21 +2,21 @@
 //! fallen, finished by whoever is left (D2.7 §3.6.5).
 //!
 //! [`sections`] holds the rules by which cells change hands, [`runs`] how they are
-//! written into a claim, [`rounds`] the exchange of bids, [`negotiation`] when each
-//! is used, [`division`] what a complete round decides, [`sharing`] what is taken without
-//! one, [`launches`] what everybody begins with. What travels is [`relay`]'s, and how much of it [`airtime`]'s.
+//! written into a claim, [`rounds`] the exchange of bids, `negotiation` when each
+//! is used, [`division`] what a complete round decides, `sharing` what is taken without
+//! one, `launches` what everybody begins with. What travels is `relay`'s, and how much of it [`airtime`]'s.
 
 pub mod airtime;
 pub mod division;
-pub mod launches;
+pub(crate) mod launches;
 pub(crate) mod life;
-pub mod membership;
-pub mod negotiation;
-pub mod relay;
+pub(crate) mod membership;
+pub(crate) mod negotiation;
+pub(crate) mod relay;
 pub mod rounds;
 pub mod runs;
 pub mod sections;
-pub mod sharing;
+pub(crate) mod sharing;
 
-pub use negotiation::Negotiation;
+pub(crate) use negotiation::Negotiation;
 pub use sections::{LivePeers, Sections};

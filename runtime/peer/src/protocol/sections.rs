@@ -17,7 +17,7 @@
 //! lost adoption is duplicate work, never a gap.
 //!
 //! There is no time in here: *when* a rule may be used is the business of
-//! [`super::negotiation`]; that it is safe whenever it is used is checked
+//! `negotiation`; that it is safe whenever it is used is checked
 //! exhaustively on small swarms in `tests/model.rs`. How cells are written into a
 //! claim is left to [`super::runs`].
 
