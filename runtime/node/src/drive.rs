@@ -20,7 +20,7 @@ use crate::world::{News, Tick, World};
 use skein_behaviors::{Order, Percept};
 use skein_console::{Answer, Asked, Command as Request};
 use skein_peer::offload::{Job, JobResult, run};
-use skein_peer::{Command, Incarnation, Input, Mission, Output, Peer, Time};
+use skein_peer::{Command, Incarnation, Input, Mission, Output, Peer, Time, Transmission};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::{mpsc, oneshot};
@@ -299,7 +299,7 @@ where
             self.step(Input::Received {
                 transmitter: arrived.transmitter,
                 hops: arrived.hops,
-                bytes: arrived.bytes,
+                heard: Transmission::read(arrived.bytes).into(),
             })
             .await;
         }

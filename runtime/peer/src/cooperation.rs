@@ -237,19 +237,19 @@ impl Cooperation {
     }
 
     /// A record of another peer that is new here.
-    pub fn hear(&mut self, now: Time, record: &Record, body: Body) -> Effects {
+    pub fn hear(&mut self, now: Time, record: &Record, body: &Body) -> Effects {
         let author = Member {
             id: record.author,
             incarnation: record.incarnation,
         };
         match body {
-            Body::Mission(chunk) => match self.library.chunk(record.subject, &chunk) {
+            Body::Mission(chunk) => match self.library.chunk(record.subject, chunk) {
                 Ok(true) => self.consider_mission(),
                 Ok(false) => Effects::new(),
                 Err(why) => vec![Effect::Alarm(why)],
             },
             Body::Operator(order) => {
-                self.hear_order(order, (record.incarnation, record.seq, record.author));
+                self.hear_order(*order, (record.incarnation, record.seq, record.author));
                 Effects::new()
             }
             body => match &mut self.state {

@@ -13,46 +13,36 @@
 
 use crate::mission::point_m;
 use crate::protocol::life::{Life, Twin};
-use crate::wire::codec::{self, Body, WireError};
+use crate::transmission::Transmission;
+use crate::wire::codec::Body;
 use crate::wire::kinds::Kind;
 use crate::wire::message::{Beacon, Heartbeat, Record};
-use crate::wire::signature::{Off, Verifier};
 use skein_geometry::frame::Point;
 
 /// What was heard.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Heard {
+pub(crate) enum Heard<'a> {
     /// Bytes that are refused, and why.
-    Refused(String),
+    Refused(&'a str),
     /// Another process under this peer's id, and where it is.
     Twin(Twin, Point),
     /// This peer's own beacon.
     Myself,
     /// What was said under this peer's own id is passed on.
-    Echo(Record),
+    Echo(&'a Record),
     /// A neighbour's beacon.
-    Beacon(Record, Beacon),
+    Beacon(&'a Record, &'a Beacon),
     /// A neighbour's heartbeat.
-    Heartbeat(Record, Heartbeat),
+    Heartbeat(&'a Record, &'a Heartbeat),
     /// A record of another peer.
-    Record(Kind, Record, Body),
+    Record(Kind, &'a Record, &'a Body),
 }
 
-/// Reads one transmission as the peer `me` in its present life.
-pub(crate) fn read(bytes: &[u8], me: u16, life: &Life) -> Heard {
-    let record = match codec::decode_record(bytes) {
-        Ok(record) => record,
-        Err(why) => return Heard::Refused(why.to_string()),
-    };
-    if !Off.verify(record.author, record.incarnation, bytes, &record.signature) {
-        return Heard::Refused(WireError::Signature.to_string());
-    }
-    let Some(kind) = Kind::of_number(record.kind) else {
-        return Heard::Refused("a kind of a later version".into());
-    };
-    let body = match codec::decode_body(kind, &record.body) {
-        Ok(body) => body,
-        Err(why) => return Heard::Refused(why.to_string()),
+/// What one transmission is to the peer `me` in its present life.
+pub(crate) fn sort<'a>(heard: &'a Transmission, me: u16, life: &Life) -> Heard<'a> {
+    let (kind, record, body) = match heard.said() {
+        Ok(said) => said,
+        Err(why) => return Heard::Refused(why),
     };
     match body {
         // Beacons and heartbeats are passed on by nobody, so whoever says one is there.
@@ -87,6 +77,7 @@ pub(crate) fn read(bytes: &[u8], me: u16, life: &Life) -> Heard {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wire::codec;
     use crate::wire::message::{Finished, Heartbeat};
     use crate::wire::signature::SIGNATURE_MAX_BYTES;
 
@@ -102,7 +93,7 @@ mod tests {
                 body: codec::encode_body(body),
                 signature: Vec::new(),
             };
-            read(&codec::encode_record(&record), 1, &Life::default())
+            Transmission::read(codec::encode_record(&record))
         };
         let heartbeat = Heartbeat {
             interval: 4,
@@ -111,7 +102,9 @@ mod tests {
             north_dm: -35,
             fresh: Vec::new(),
         };
-        let Heard::Twin(twin, at) = said(&Body::Heartbeat(heartbeat)) else {
+        let life = Life::default();
+        let heartbeat = said(&Body::Heartbeat(heartbeat));
+        let Heard::Twin(twin, at) = sort(&heartbeat, 1, &life) else {
             panic!("it is taken for something else")
         };
         let wanted = Twin {
@@ -120,8 +113,8 @@ mod tests {
             nonce: None,
         };
         assert_eq!((twin, at), (wanted, Point::new(12.0, -3.5)));
-        let finished = Body::Finished(Finished { revision: 1 });
-        assert!(matches!(said(&finished), Heard::Echo(_)));
+        let finished = said(&Body::Finished(Finished { revision: 1 }));
+        assert!(matches!(sort(&finished, 1, &life), Heard::Echo(_)));
     }
 
     #[test]
@@ -135,14 +128,16 @@ mod tests {
             body: codec::encode_body(&Body::Finished(Finished { revision: 1 })),
             signature: Vec::new(),
         };
-        let heard = |record: &Record| read(&codec::encode_record(record), 1, &Life::default());
-        assert!(matches!(heard(&record), Heard::Record(..)));
+        let heard = |record: &Record| Transmission::read(codec::encode_record(record));
+        let life = Life::default();
+        assert!(matches!(sort(&heard(&record), 1, &life), Heard::Record(..)));
         for n_bytes in [1, SIGNATURE_MAX_BYTES] {
             let signed = Record {
                 signature: vec![7; n_bytes],
                 ..record.clone()
             };
-            let Heard::Refused(why) = heard(&signed) else {
+            let heard = heard(&signed);
+            let Heard::Refused(why) = sort(&heard, 1, &life) else {
                 panic!("{n_bytes} bytes of signature are accepted")
             };
             assert!(why.contains("signature"), "{why}");

@@ -2,6 +2,7 @@
 
 use crate::mission::Mission;
 use crate::offload::JobResult;
+use crate::transmission::Transmission;
 use serde::{Deserialize, Serialize};
 use skein_behaviors::{Order, Percept};
 use std::sync::Arc;
@@ -46,8 +47,8 @@ pub enum Input {
         transmitter: u16,
         /// Hops it had made before this one.
         hops: u8,
-        /// The record, as sent.
-        bytes: Vec<u8>,
+        /// The record.
+        heard: Arc<Transmission>,
     },
     /// Time passed; harmless at any time.
     Timer,

@@ -15,7 +15,7 @@
 //! |---|---|
 //! | [`input`], [`output`] | what can happen to a peer, and what it wants done |
 //! | [`peer`] | routes events to the parts and carries out their effects |
-//! | `inbound`, `outbound` | what bytes turn out to be; what is spoken, and when |
+//! | [`transmission`], `inbound`, `outbound` | bytes as they are read, and what they are to a peer; what is spoken, and when |
 //! | `cooperation`, `mission_state` | mission, goal, the peer's part in negotiations |
 //! | [`protocol`] | the machines and rules by which peers agree |
 //! | `timers` | every deadline, in one table |
@@ -112,6 +112,7 @@ pub mod testing;
 #[cfg(test)]
 mod tests;
 mod timers;
+pub mod transmission;
 mod varint;
 pub mod wire;
 
@@ -122,6 +123,7 @@ pub use mission::Mission;
 pub use output::{Output, Priority, Report};
 pub use peer::Peer;
 pub use task::{CoverageTask, LineTask, PointTask};
+pub use transmission::Transmission;
 
 use serde::{Deserialize, Serialize};
 

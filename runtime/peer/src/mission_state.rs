@@ -234,7 +234,7 @@ impl MissionState {
     }
 
     /// A claim, a bid or covered cells of another peer.
-    pub fn hear(&mut self, now: Time, author: Member, seq: u32, body: Body) -> Effects {
+    pub fn hear(&mut self, now: Time, author: Member, seq: u32, body: &Body) -> Effects {
         let mine = self.loop_hash();
         let capacity = self.covered().capacity();
         let negotiation = &mut self.negotiation;
@@ -251,12 +251,12 @@ impl MissionState {
                     return refused("a claim of a round that is far ahead of all heard of");
                 }
                 let (id, life) = (author.id, author.incarnation);
-                let news =
-                    claim.loop_hash == mine && negotiation.sections.hear(id, life, seq, claim);
+                let sections = &mut negotiation.sections;
+                let news = claim.loop_hash == mine && sections.hear(id, life, seq, claim.clone());
                 news.then_some(Effect::Negotiate).into_iter().collect()
             }
             Body::Bid(bid) if bid.round.loop_hash == mine => {
-                if let Err(why) = negotiation.hear_bid(now, author, &bid) {
+                if let Err(why) = negotiation.hear_bid(now, author, bid) {
                     return refused(why);
                 }
                 if let Ok(covered) = CellSet::decode_rle(capacity, &bid.covered) {

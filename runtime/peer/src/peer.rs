@@ -26,6 +26,7 @@ use crate::protocol::membership::{Change, Membership};
 use crate::protocol::negotiation::are_many;
 use crate::protocol::relay::{Offer, Relay};
 use crate::timers::{Timer, Timers};
+use crate::transmission::Transmission;
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
@@ -122,7 +123,7 @@ impl Peer {
             Input::Start { .. } | Input::Timer => {}
             Input::Percept(percept) => self.on_percept(percept),
             // What is passed on is judged by the copies heard, whoever sent them.
-            Input::Received { hops, bytes, .. } => self.on_received(hops, &bytes),
+            Input::Received { hops, heard, .. } => self.on_received(hops, &heard),
             Input::LinkHint { neighbour, up } => self.membership.link(neighbour, up),
             Input::Stored { token, ok } => self.on_stored(token, ok),
             Input::Computed { token, result } => self.on_computed(token, result),
@@ -227,8 +228,8 @@ impl Peer {
         self.carry_out(effects);
     }
 
-    fn on_received(&mut self, hops: u8, bytes: &[u8]) {
-        let heard = inbound::read(bytes, self.config.id.0, &self.life);
+    fn on_received(&mut self, hops: u8, transmission: &Transmission) {
+        let heard = inbound::sort(transmission, self.config.id.0, &self.life);
         if let Heard::Beacon(record, _) | Heard::Heartbeat(record, _) | Heard::Record(_, record, _) =
             &heard
             && !self
@@ -238,7 +239,7 @@ impl Peer {
             return self.refuse("a life far ahead of the one that is known".into());
         }
         match heard {
-            Heard::Refused(why) => self.refuse(why),
+            Heard::Refused(why) => self.refuse(why.to_owned()),
             Heard::Twin(twin, at) => {
                 let mine = self.percept.map(|p| p.pose.position());
                 let here = mine.is_some_and(|mine| (at - mine).norm() < SAME_PLACE_M);
@@ -248,11 +249,11 @@ impl Peer {
             }
             Heard::Myself => {}
             Heard::Echo(record) => {
-                self.relay.echo(&record);
+                self.relay.echo(record);
                 let effects = self.life.hear_of_myself(record.incarnation, false);
                 self.carry_out(effects);
             }
-            Heard::Beacon(record, beacon) => self.on_beacon(&record, &beacon),
+            Heard::Beacon(record, beacon) => self.on_beacon(record, beacon),
             Heard::Heartbeat(record, h) => {
                 let (now, author, life) = (self.now, record.author, record.incarnation);
                 let heartbeat = (record.seq, h.interval);
@@ -263,11 +264,11 @@ impl Peer {
             }
             Heard::Record(kind, record, body) => {
                 self.membership.note_heard(self.now);
-                if kind.relayed() && self.relay.offer(self.now, &record, bytes, hops) != Offer::New
-                {
+                let bytes = transmission.bytes();
+                if kind.relayed() && self.relay.offer(self.now, record, bytes, hops) != Offer::New {
                     return;
                 }
-                let effects = self.cooperation.hear(self.now, &record, body);
+                let effects = self.cooperation.hear(self.now, record, body);
                 self.carry_out(effects);
             }
         }
@@ -464,7 +465,7 @@ impl Peer {
                 && record.author != self.config.id.0
                 && let Ok(body) = codec::decode_body(kind, &record.body)
             {
-                let effects = self.cooperation.hear(self.now, &record, body);
+                let effects = self.cooperation.hear(self.now, &record, &body);
                 self.carry_out(effects);
             }
         }

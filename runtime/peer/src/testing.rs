@@ -15,7 +15,7 @@ use crate::wire::codec::{self, Body};
 use crate::wire::kinds::Kind;
 use crate::wire::message::Record;
 use crate::{Beliefs, Command, CoverageTask, Input, Output, Peer, PeerConfig, PeerId};
-use crate::{Report, Role, Time};
+use crate::{Report, Role, Time, Transmission};
 use skein_behaviors::reactive::follow::fly;
 use skein_behaviors::{Order, Percept, Setpoint, Steer};
 use skein_flight::airframe::Airframe;
@@ -425,7 +425,7 @@ impl Harness {
             Input::Received {
                 transmitter: u16::MAX,
                 hops: 0,
-                bytes,
+                heard: Transmission::read(bytes).into(),
             },
         );
     }
@@ -495,7 +495,7 @@ impl Harness {
                 Input::Received {
                     transmitter: from,
                     hops,
-                    bytes,
+                    heard: Transmission::read(bytes).into(),
                 },
             ),
             Event::Stored {

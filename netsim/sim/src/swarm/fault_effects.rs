@@ -11,7 +11,7 @@ use crate::spec::Spec;
 use crate::world::Survey;
 use skein_geometry::Polygon;
 use skein_peer::input::Command;
-use skein_peer::{Beliefs, Input, Mission, Role};
+use skein_peer::{Beliefs, Input, Mission, Role, Transmission};
 use std::sync::Arc;
 
 /// The number of a radio that belongs to nobody.
@@ -328,7 +328,7 @@ impl Swarm {
         let input = Input::Received {
             transmitter: OUTSIDER,
             hops: 0,
-            bytes,
+            heard: Transmission::read(bytes).into(),
         };
         self.feed(idx, input);
         let taken = std::mem::take(&mut self.spoilt);

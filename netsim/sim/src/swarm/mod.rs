@@ -58,7 +58,7 @@ use skein_link::medium::key_hash;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
 use skein_peer::wire;
-use skein_peer::{Beliefs, Command, Input, Output, Peer, Report, Role};
+use skein_peer::{Beliefs, Command, Input, Output, Peer, Report, Role, Transmission};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stream::{Concern, Stream};
@@ -105,6 +105,13 @@ enum Event {
         boot: u32,
     },
     Judge,
+}
+
+/// What all receivers of one transmission share: it is hashed, read and looked up once.
+struct Shared {
+    hash: u64,
+    heard: Arc<Transmission>,
+    said: Option<Arc<Said>>,
 }
 
 /// A run under way.
@@ -496,7 +503,7 @@ impl Swarm {
     }
 
     fn receive(&mut self, deliveries: Vec<Delivery>) {
-        let mut known: Option<(*const u8, u64)> = None;
+        let mut last: Option<(Arc<[u8]>, Shared)> = None;
         for d in deliveries {
             let Some(idx) = self.peer_idx(d.rx) else {
                 continue;
@@ -504,33 +511,42 @@ impl Swarm {
             if self.peers[idx].process == Process::Stopped {
                 continue;
             }
-            // Receivers of one transmission share its bytes, so they are hashed once.
-            let hash = match known {
-                Some((at, hash)) if at == d.bytes.as_ptr() => hash,
-                _ => bytes_hash(&d.bytes),
-            };
-            known = Some((d.bytes.as_ptr(), hash));
-            self.fold(idx, Kind::Receive, hash);
+            let known = last.take().filter(|(bytes, _)| Arc::ptr_eq(bytes, &d.bytes));
+            let (_, shared) = last.insert(known.unwrap_or_else(|| {
+                let shared = self.shared(&d.bytes);
+                (d.bytes, shared)
+            }));
+            self.fold(idx, Kind::Receive, shared.hash);
             self.traffic.received(d.tx, d.hops);
             let s = &self.peers[idx];
             if s.process == Process::Running && s.slow_ms == 0 {
-                self.heard(self.now_ms, d.rx, hash);
+                self.heard(self.now_ms, d.rx, shared.said.as_deref());
             }
+            let heard = Arc::clone(&shared.heard);
             self.feed(
                 idx,
                 Input::Received {
                     transmitter: d.tx,
                     hops: d.hops,
-                    bytes: d.bytes.to_vec(),
+                    heard,
                 },
             );
         }
     }
 
-    /// A running peer is given a record with this hash, which arrived then.
-    fn heard(&mut self, arrived_ms: u64, id: u16, hash: u64) {
+    fn shared(&self, bytes: &[u8]) -> Shared {
+        let hash = bytes_hash(bytes);
+        Shared {
+            hash,
+            heard: Arc::new(Transmission::read(bytes.to_vec())),
+            said: self.spoken.get(&hash).map(Arc::clone),
+        }
+    }
+
+    /// A running peer is given a record, which arrived then.
+    fn heard(&mut self, arrived_ms: u64, id: u16, said: Option<&Said>) {
         let before = self.meter.enter(Part::Checks);
-        if let Some(said) = self.spoken.get(&hash) {
+        if let Some(said) = said {
             self.checker
                 .on_received((self.now_ms, arrived_ms), id, said);
         }
@@ -539,8 +555,9 @@ impl Swarm {
 
     /// A peer gets round to an input that arrived then.
     fn hear_late(&mut self, idx: usize, arrived_ms: u64, input: &Input) {
-        if let Input::Received { bytes, .. } = input {
-            self.heard(arrived_ms, self.peers[idx].id(), bytes_hash(bytes));
+        if let Input::Received { heard, .. } = input {
+            let shared = self.shared(heard.bytes());
+            self.heard(arrived_ms, self.peers[idx].id(), shared.said.as_deref());
         }
     }
 
@@ -808,14 +825,15 @@ impl Swarm {
             && let Some(id) = stranded
             && let Some(idx) = self.peer_idx(id)
         {
-            self.heard(self.now_ms, id, bytes_hash(&bytes));
+            let Shared { heard, said, .. } = self.shared(&bytes);
+            self.heard(self.now_ms, id, said.as_deref());
             let (transmitter, hops) = (station, 0);
             self.feed(
                 idx,
                 Input::Received {
                     transmitter,
                     hops,
-                    bytes,
+                    heard,
                 },
             );
         }
