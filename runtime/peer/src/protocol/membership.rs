@@ -453,19 +453,13 @@ impl Membership {
             suspected: told.suspected_ds.map(age),
         };
         let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
-        self.noting(now, told.id, |m| {
-            let fresher = m.merge(now, heartbeat, limits, changes);
-            if let Some(known) = m.known.get_mut(&told.id) {
-                known.note_told(now, teller, &heartbeat, limits.interval_ms);
-                if known.disputes(told) {
-                    known.is_news_until(urgent_until);
-                    m.refuted = true;
-                }
-                if fresher {
-                    known.info.hear_of(told.able, Some(said));
-                }
-            }
-        });
+        self.on_told(now, (teller, told.able, Some(said)), heartbeat, limits, changes);
+        if let Some(known) = self.known.get_mut(&told.id)
+            && known.disputes(told)
+        {
+            known.is_news_until(urgent_until);
+            self.refuted = true;
+        }
     }
 
     /// A heartbeat without anything else. Of a life it tells the last bits: of a peer that is
@@ -495,12 +489,29 @@ impl Membership {
             interval: told.interval,
             suspected: None,
         };
-        self.noting(now, told.id, |m| {
+        self.on_told(now, (teller, told.able, said), heartbeat, limits, changes);
+    }
+
+    /// A heartbeat of another peer, which a neighbour tells of, with whether that one is able.
+    /// Most are known already, and of these only is noted who knows them.
+    fn on_told(
+        &mut self,
+        now: Time,
+        (teller, able, said): (u16, bool, Option<&Beacon>),
+        heartbeat: HeardHeartbeat,
+        limits: Patience,
+        changes: &mut Vec<Change>,
+    ) {
+        let known = self.known.get_mut(&heartbeat.id);
+        if let Some(known) = known.filter(|known| known.has_heard(&heartbeat)) {
+            return known.note_told(now, teller, &heartbeat, limits.interval_ms);
+        }
+        self.noting(now, heartbeat.id, |m| {
             let fresher = m.merge(now, heartbeat, limits, changes);
-            if let Some(known) = m.known.get_mut(&told.id) {
+            if let Some(known) = m.known.get_mut(&heartbeat.id) {
                 known.note_told(now, teller, &heartbeat, limits.interval_ms);
                 if fresher {
-                    known.info.hear_of(told.able, said);
+                    known.info.hear_of(able, said);
                 }
             }
         });

@@ -194,6 +194,16 @@ impl Known {
         }
     }
 
+    /// Whether a heartbeat of this life says nothing that is not known: it is no later than the
+    /// freshest, and if it is the same it came by no shorter way and is not suspected.
+    pub(super) fn has_heard(&self, heard: &HeardHeartbeat) -> bool {
+        let mine = &self.freshest;
+        let again = heard.count == mine.count
+            && heard.hops >= mine.hops
+            && heard.suspected.is_none();
+        heard.incarnation == mine.incarnation && (heard.count < mine.count || again)
+    }
+
     /// The heartbeat known, heard once more. Its age stays as first heard: taking the
     /// younger would let echoes keep the dead alive, taking the older would age the
     /// living by the rounding of every echo.
