@@ -338,12 +338,7 @@ impl Negotiation {
             self.sections.expire_held();
             actions.push(Action::Changed);
         }
-        if self.sections.take_listing() || ctx.live_changed {
-            self.orphans = self.sections.orphans(ctx.live);
-            let orphans = &self.orphans;
-            self.orphaned_at.retain(|c, _| orphans.contains(*c));
-        }
-        let orphans = core::mem::take(&mut self.orphans);
+        let orphans = self.find_orphans(ctx, &heard);
         self.watch_orphans(ctx, &orphans);
         self.watch_progress(ctx, &heard);
         if ctx.able_since.is_some() && !self.sections.complete() {
@@ -364,6 +359,24 @@ impl Negotiation {
             actions.push(divide);
         }
         actions
+    }
+
+    /// Cells that nobody lists. Most news takes some away and adds none: then the others are
+    /// those that were found before.
+    fn find_orphans(&mut self, ctx: &Context<'_>, heard: &BTreeSet<u16>) -> CellSet {
+        let mut orphans = core::mem::take(&mut self.orphans);
+        let before = orphans.count();
+        let anew = self.sections.take_listing() || ctx.live_changed;
+        if anew {
+            orphans = self.sections.orphans(ctx.live);
+        } else {
+            self.sections.still_orphans(&mut orphans, heard, ctx.live);
+            debug_assert_eq!(orphans, self.sections.orphans(ctx.live));
+        }
+        if anew || orphans.count() < before {
+            self.orphaned_at.retain(|c, _| orphans.contains(*c));
+        }
+        orphans
     }
 
     fn watch_period(&mut self, ctx: &Context<'_>) {

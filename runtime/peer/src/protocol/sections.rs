@@ -66,7 +66,7 @@ struct News {
     owners: BTreeSet<u16>,
     /// Whether this peer lists more than before.
     gained: bool,
-    /// Whether anything changed of what is covered, listed by anybody, or beyond all.
+    /// Whether any cell may be listed by fewer than before, or beyond all or not any more.
     listing: bool,
 }
 
@@ -112,7 +112,10 @@ impl Sections {
             unassigned: CellSet::new(cells),
             heard: BTreeMap::new(),
             alone: BTreeMap::new(),
-            news: News::default(),
+            news: News {
+                listing: true,
+                ..News::default()
+            },
         }
     }
 
@@ -126,7 +129,8 @@ impl Sections {
         core::mem::take(&mut self.news.gained)
     }
 
-    /// Whether orphans may be others since this was last asked, if the same peers are alive.
+    /// Whether there may be orphans since this was last asked that were none, if the same peers
+    /// are alive.
     pub(crate) fn take_listing(&mut self) -> bool {
         core::mem::take(&mut self.news.listing)
     }
@@ -193,7 +197,6 @@ impl Sections {
         if !self.covered.union_with(covered) {
             return false;
         }
-        self.news.listing = true;
         let covered = &self.covered;
         for (author, h) in &mut self.heard {
             if h.listed.intersects(&fresh) {
@@ -225,7 +228,6 @@ impl Sections {
         } else {
             self.alone.remove(&author);
         }
-        self.news.listing = true;
         self.news.owners.insert(author);
         let heard = HeardClaim {
             incarnation,
@@ -234,8 +236,18 @@ impl Sections {
             claim,
             listed,
         };
-        self.heard.insert(author, heard);
+        let before = self.heard.insert(author, heard);
+        self.news.listing |= before.is_some_and(|b| self.frees(author, b));
         true
+    }
+
+    /// Whether what an author listed before is not covered and not listed by it any more.
+    fn frees(&self, author: u16, before: HeardClaim) -> bool {
+        let mut freed = before.listed;
+        freed.subtract(&self.covered);
+        let now = self.heard.get(&author);
+        let now = now.filter(|h| h.incarnation == before.incarnation);
+        now.is_none_or(|h| !freed.is_subset(&h.listed))
     }
 
     /// What everybody computed alike from the roster, that a peer of which no claim was heard
@@ -317,6 +329,24 @@ impl Sections {
         let mut wanted = CellSet::full(self.cells);
         wanted.subtract(&self.unassigned);
         self.unlisted(wanted, live)
+    }
+
+    /// The same where none may have become one since these were found: without those that are
+    /// covered by now, or listed by those whose claims are new.
+    pub(crate) fn still_orphans(
+        &self,
+        orphans: &mut CellSet,
+        new: &BTreeSet<u16>,
+        live: &LivePeers,
+    ) {
+        orphans.subtract(&self.covered);
+        for author in new {
+            let heard = self.heard.get(author);
+            let heard = heard.filter(|h| live.get(author) == Some(&h.incarnation));
+            if let Some(h) = heard {
+                orphans.subtract(&h.listed);
+            }
+        }
     }
 
     /// Cells that were beyond everybody's endurance when they were last divided, and that
