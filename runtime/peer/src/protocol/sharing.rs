@@ -213,7 +213,14 @@ impl Pace<'_> {
     /// soonest, and when that is; `None` where it gains too little. What the owner has left may
     /// be mostly the way to a few cells, which a hand beside them takes over whole.
     fn relieved(&self, owner: &Owner, tails_ms: &[u64], hand: &Hand) -> Option<(usize, u64)> {
-        let begins_ms = hand.free_ms + self.way_ms(hand.at, owner.plan.last()?.0);
+        // Nobody is done before the hand begins: most hands are too late or too far, and of those
+        // nothing more is asked.
+        let worth_it = |done_ms: u64| done_ms * 100 <= owner.left_ms * RELIEF_PERCENT;
+        let last = owner.plan.last().filter(|_| worth_it(hand.free_ms))?;
+        let begins_ms = hand.free_ms + self.way_ms(hand.at, last.0);
+        if !worth_it(begins_ms) {
+            return None;
+        }
         let before_ms = |tail_ms: u64| owner.left_ms.saturating_sub(tail_ms);
         // The more is taken the sooner the owner is done and the later the hand is.
         let is_owner_last = |tail_ms: u64| begins_ms + tail_ms < before_ms(tail_ms);
@@ -231,7 +238,7 @@ impl Pace<'_> {
             .filter(|_| tails_ms.len() == owner.plan.len());
         let whole = whole.map(|tail| (begins_ms + tail, owner.plan.len()));
         let (done_ms, taken) = [owner_last, hand_last, whole].into_iter().flatten().min()?;
-        (done_ms * 100 <= owner.left_ms * RELIEF_PERCENT).then_some((taken, done_ms))
+        worth_it(done_ms).then_some((taken, done_ms))
     }
 
     /// How long a cell is flown, milliseconds.
