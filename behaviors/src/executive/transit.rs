@@ -12,6 +12,7 @@ use skein_flight::trajectory::timed::Objective;
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::{PI, TAU};
 use skein_geometry::{Curve, NoFlyZones, Segment};
+use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -103,7 +104,16 @@ pub struct Transit {
     /// What passing each cell costs, forward and backward, metres; empty where that is
     /// the cell's length.
     pub(super) cells_cost_m: Vec<[f64; 2]>,
+    /// Routes found last, in this air, the latest first: forecasts ask for the same ones between
+    /// two percepts, and as long as the plan stays.
+    routes: RefCell<VecDeque<FoundRoute>>,
 }
+
+/// Between which poses, and the route if there is one.
+type FoundRoute = (Pose, Pose, Result<Curve, RouteError>);
+
+/// So many of them are kept: a plan leaves the loop a few times.
+const ROUTES_KEPT: usize = 8;
 
 impl Transit {
     /// A transit for calm air at cruise.
@@ -118,6 +128,7 @@ impl Transit {
             objective: Objective::Time,
             tracking_error_m: super::DEFAULT_TRACKING_ERROR_M,
             cells_cost_m: Vec::new(),
+            routes: RefCell::default(),
         }
     }
 
@@ -138,6 +149,7 @@ impl Transit {
     /// From now on lengths are distances through this air.
     pub fn set_air(&mut self, air: Air) {
         self.air = air;
+        self.routes.take();
         self.cells_air_m.clear();
         if !air.is_calm() {
             self.cells_air_m = self.each_cell(|curve| air.air_length_m(curve));
@@ -448,12 +460,20 @@ impl Transit {
     /// A clear route; from inside a zone's clearance with a piece that leads out of
     /// it first.
     fn route(&self, from: Pose, to: Pose) -> Result<Curve, RouteError> {
-        match self.transfer(from, to) {
+        let is_this = |(a, b, _): &&FoundRoute| (*a, *b) == (from, to);
+        if let Some((_, _, route)) = self.routes.borrow().iter().find(is_this) {
+            return route.clone();
+        }
+        let route = match self.transfer(from, to) {
             Err(e) if e != RouteError::GoalInZone && self.is_tight(&from) => {
                 self.escape(from, |out| self.transfer(out, to)).ok_or(e)
             }
             answer => answer,
-        }
+        };
+        let mut routes = self.routes.borrow_mut();
+        routes.truncate(ROUTES_KEPT - 1);
+        routes.push_front((from, to, route.clone()));
+        route
     }
 
     /// As [`Transit::connect`], to a point, whatever the heading there: by a direct
