@@ -20,10 +20,10 @@ fn begins_well(scenario: &str, peers: u16, seconds: u64) {
     let views: Vec<_> = ids.filter_map(|id| swarm.view(id)).collect();
     assert_eq!(views.len(), usize::from(peers));
     let mut relieved = 0;
-    for (c, cell) in cells.iter().enumerate() {
-        let covered = views.iter().any(|v| v.covered[c]);
+    for (c, cell) in (0..).zip(&cells) {
+        let covered = views.iter().any(|v| v.covered.contains(c));
         let planned = views.iter().flat_map(|v| v.plan.iter().zip(&v.stamps));
-        let listed = planned.filter(|(p, _)| usize::from(**p) == c);
+        let listed = planned.filter(|(p, _)| **p == c);
         let takes: Vec<u16> = listed.map(|(_, stamp)| stamp.take).collect();
         assert!(
             !cell.needed || covered || !takes.is_empty(),

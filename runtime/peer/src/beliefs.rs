@@ -1,5 +1,6 @@
 //! What checks may look at: a copy of what one peer believes.
 
+use crate::cells::CellSet;
 use crate::output::Status;
 use crate::wire::message::{Epoch, Order, Stamp};
 use crate::{Incarnation, PeerId};
@@ -20,8 +21,8 @@ pub struct Beliefs {
     pub loop_hash: u64,
     /// Mission revision it follows; 0 before it has one.
     pub revision: u32,
-    /// Covered cells it knows of, one flag per cell of the loop.
-    pub covered: Vec<bool>,
+    /// Covered cells of the loop that it knows of.
+    pub covered: CellSet,
     /// Cells it lists as its own future, in order of flight, uncovered or not.
     pub plan: Vec<u16>,
     /// By what right it lists each of them.

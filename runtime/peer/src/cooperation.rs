@@ -393,7 +393,7 @@ impl Cooperation {
         beliefs.able = state.able();
         beliefs.loop_hash = state.loop_hash();
         beliefs.revision = state.revision();
-        beliefs.covered = sections.covered().flags();
+        beliefs.covered = sections.covered().clone();
         beliefs.plan = sections.plan().iter().map(|p| p.cell).collect();
         beliefs.stamps = sections.plan().iter().map(|p| p.stamp).collect();
         beliefs.held = sections.held().keys().copied().collect();

@@ -726,9 +726,10 @@ impl Peer {
             order: self.cooperation.order(),
             ..Beliefs::default()
         };
-        for (id, incarnation, status) in self.membership.all() {
-            beliefs.peers.insert(PeerId(id), (incarnation, status));
-        }
+        let others = self.membership.all();
+        beliefs.peers = others
+            .map(|(id, life, s)| (PeerId(id), (life, s)))
+            .collect();
         beliefs.loads = vec![
             ("stores", self.stores.len(), MAX_STORES),
             ("jobs", self.jobs.len(), MAX_JOBS),

@@ -14,6 +14,7 @@ use crate::fault::Fault;
 use crate::spec::Spec;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
+use skein_peer::cells::CellSet;
 use skein_peer::journal::Durable;
 use skein_peer::output::Status;
 use skein_peer::wire::message::{Bid, Heartbeat};
@@ -277,7 +278,7 @@ impl Checker {
         id: u16,
         said: &Said,
         bytes_hash: u64,
-        durable: (&[Vec<u8>], &[bool]),
+        durable: (&[Vec<u8>], &CellSet),
     ) {
         self.twins.on_said(id, said.record.incarnation);
         self.record
@@ -370,7 +371,7 @@ impl Checker {
         now_ms: u64,
         loss_permille: u16,
         (peers, silent): (&[PeerSnapshot], &[PeerSnapshot]),
-        covered: &[bool],
+        covered: &CellSet,
         loop_hash: u64,
     ) {
         self.note_interval(now_ms, peers);
@@ -420,7 +421,7 @@ impl Checker {
     }
 
     /// Judges how those who are finished get home, after all else is over.
-    pub fn on_way_home(&mut self, now_ms: u64, peers: &[PeerSnapshot], covered: &[bool]) -> bool {
+    pub fn on_way_home(&mut self, now_ms: u64, peers: &[PeerSnapshot], covered: &CellSet) -> bool {
         let snapshot = Snapshot {
             now_ms,
             loss_permille: 0,

@@ -2,6 +2,7 @@
 //! to all (L4).
 
 use super::{Clocks, Findings, Grade, Snapshot};
+use skein_peer::cells::CellSet;
 use std::collections::BTreeMap;
 
 /// What is news of coverage is said twice, two intervals apart; what collided both times comes
@@ -23,7 +24,7 @@ const HIDDEN_FACTOR: u64 = 2;
 /// What the marks of one run were found to be.
 #[derive(Clone, Debug, Default)]
 pub struct CoverCheck {
-    known: BTreeMap<u16, (u64, Vec<bool>)>,
+    known: BTreeMap<u16, (u64, CellSet)>,
     lacking: Clocks<(u16, u16)>,
     false_marks: BTreeMap<(u16, u16), ()>,
 }
@@ -51,41 +52,36 @@ impl CoverCheck {
         &mut self,
         snapshot: &Snapshot<'_>,
         id: u16,
-        covered: &[bool],
+        covered: &CellSet,
         found: &mut Findings,
     ) {
         let known = self.known.entry(id).or_default();
-        if known.0 == snapshot.loop_hash && known.1 == covered {
+        if known.0 == snapshot.loop_hash && known.1 == *covered {
             return;
         }
-        for (c, (marked, seen)) in covered.iter().zip(snapshot.covered).enumerate() {
-            let cell = u16::try_from(c).unwrap_or(u16::MAX);
-            if *marked && !*seen && self.false_marks.insert((id, cell), ()).is_none() {
+        let mut unseen = covered.clone();
+        unseen.subtract(snapshot.covered);
+        for cell in unseen.iter() {
+            if self.false_marks.insert((id, cell), ()).is_none() {
                 found.broken("S6", snapshot.now_ms, Some(id), || {
                     format!("marks cell {cell} as covered, no camera has seen it")
                 });
             }
         }
         if known.0 == snapshot.loop_hash {
-            if let Some(c) = known
-                .1
-                .iter()
-                .zip(covered)
-                .position(|(was, is)| *was && !*is)
-            {
+            known.1.subtract(covered);
+            if let Some(c) = known.1.iter().next() {
                 found.broken("S3", snapshot.now_ms, Some(id), || {
                     format!("forgot that cell {c} is covered")
                 });
             }
-            known.1.copy_from_slice(covered);
-        } else {
-            *known = (snapshot.loop_hash, covered.to_vec());
         }
+        *known = (snapshot.loop_hash, covered.clone());
     }
 
     /// L4: what one member of an unchanged component knows, all know soon.
     fn check_spread(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
-        let n = snapshot.covered.len();
+        let n = snapshot.covered.capacity();
         let bounds = snapshot.bounds;
         let hidden = snapshot.grade() == Grade::Hard && bounds.diameter > 1;
         let hidden = if hidden { HIDDEN_FACTOR } else { 1 };
@@ -98,23 +94,21 @@ impl CoverCheck {
                 .filter(|m| {
                     m.view.loop_hash == snapshot.loop_hash
                         && m.view.speaks
-                        && m.view.covered.len() == n
+                        && m.view.covered.capacity() == n
                 })
                 .collect();
             let since_ms = component
                 .first()
                 .and_then(|id| snapshot.stability.component_since_ms(*id));
-            let mut known = vec![false; n];
+            let mut known = CellSet::new(n);
             for m in &peers {
-                for (known, marked) in known.iter_mut().zip(&m.view.covered) {
-                    *known |= marked;
-                }
+                known.union_with(&m.view.covered);
             }
             for m in peers.iter().filter(|m| m.view.covered != known) {
                 let from_ms = since_ms.unwrap_or(snapshot.now_ms).max(m.since_ms);
-                let cells = (0..).zip(known.iter().zip(&m.view.covered));
-                let lacking = cells.filter(|(_, (known, marked))| **known && !**marked);
-                lacks.extend(lacking.map(|(cell, _)| (m.id, cell, from_ms)));
+                let mut lacking = known.clone();
+                lacking.subtract(&m.view.covered);
+                lacks.extend(lacking.iter().map(|cell| (m.id, cell, from_ms)));
             }
         }
         lacks.sort_unstable();
@@ -171,7 +165,10 @@ mod tests {
                 view: Beliefs {
                     speaks: true,
                     loop_hash: 3,
-                    covered: covered.to_vec(),
+                    covered: CellSet::of(
+                        2,
+                        (0..).zip(covered).filter(|(_, is)| **is).map(|(c, _)| c),
+                    ),
                     ..Beliefs::default()
                 },
             })
@@ -190,7 +187,7 @@ mod tests {
             stability: s,
             handicaps: &Handicaps::default(),
             peers: &peers,
-            covered: &[true, false],
+            covered: &CellSet::of(2, [0]),
             loop_hash: 3,
         };
         check.on_snapshot(&snapshot, found);

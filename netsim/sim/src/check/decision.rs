@@ -312,7 +312,7 @@ impl DecisionCheck {
         now_ms: u64,
         id: u16,
         claim: &Claim,
-        seen: &[bool],
+        seen: Option<&CellSet>,
         found: &mut Findings,
     ) {
         let epoch = claim.epoch;
@@ -387,7 +387,7 @@ impl DecisionCheck {
         now_ms: u64,
         id: u16,
         (claim, open): (&Claim, &OpenRound),
-        seen: &[bool],
+        seen: Option<&CellSet>,
         found: &mut Findings,
     ) {
         let Some(Divided { ring, division, .. }) = self.division_of(claim.epoch, open) else {
@@ -415,7 +415,8 @@ impl DecisionCheck {
         for cell in listed.flat_map(|l| cells_of(l.run, n)) {
             let c = usize::from(cell);
             // Runs bridge what is covered; cells already committed are the author's own.
-            if seen.get(c).copied().unwrap_or(true) || own.contains(&cell) {
+            let is_open = |seen: &CellSet| cell < seen.capacity() && !seen.contains(cell);
+            if !seen.is_some_and(is_open) || own.contains(&cell) {
                 continue;
             }
             if others.contains(&cell) {
@@ -626,8 +627,9 @@ mod tests {
                 }],
                 ..Claim::default()
             };
-            let seen = vec![false; self.lp.len()];
-            self.check.on_claim(9, 1, &claim, &seen, &mut self.found);
+            let seen = CellSet::new(u16::try_from(self.lp.len()).unwrap());
+            self.check
+                .on_claim(9, 1, &claim, Some(&seen), &mut self.found);
         }
 
         fn broken(&self, name: &str) -> bool {

@@ -110,7 +110,7 @@ impl FlightCheck {
         base: impl Fn(u32) -> Option<Point>,
         found: &mut Findings,
     ) {
-        let open = snapshot.covered.iter().any(|c| !c);
+        let open = !snapshot.covered.is_full();
         for m in snapshot.peers.iter().filter(|m| m.uav) {
             if open && m.view.able && m.view.plan.is_empty() {
                 self.idle_ms += snapshot.bounds.period_ms;

@@ -77,7 +77,7 @@ impl ListingCheck {
         members: &Membership,
         found: &mut Findings,
     ) {
-        let n = snapshot.covered.len();
+        let n = usize::from(snapshot.covered.capacity());
         // Whose disk takes no writes can promise nothing, so it lists nothing new.
         let since_ms = |m: &PeerSnapshot| {
             let writes_ms = snapshot.handicaps.writes_since_ms(m.id, snapshot.now_ms)?;
@@ -97,19 +97,15 @@ impl ListingCheck {
         };
         let able_since_ms = *self.able_since_ms.get_or_insert(snapshot.now_ms);
         let mut lister: Vec<Option<u16>> = vec![None; n];
-        let mut settled = snapshot.covered.to_vec();
+        let mut settled = snapshot.covered.clone();
         for m in snapshot
             .peers
             .iter()
             .filter(|m| m.view.loop_hash == snapshot.loop_hash)
         {
-            for (settled, known) in settled.iter_mut().zip(&m.view.covered) {
-                *settled |= *known;
-            }
+            settled.union_with(&m.view.covered);
             for c in &m.view.unassigned {
-                if let Some(s) = settled.get_mut(usize::from(*c)) {
-                    *s = true;
-                }
+                settled.insert(*c);
             }
             if !lists(m) {
                 continue;
@@ -121,10 +117,9 @@ impl ListingCheck {
             }
         }
         let counts_from_ms = stable_ms.max(able_since_ms);
-        for c in 0..n {
-            let cell = u16::try_from(c).unwrap_or(u16::MAX);
-            if settled[c] || lister[c].is_some() {
-                self.settle(snapshot, cell, lister[c], members, counts_from_ms, found);
+        for (cell, lister) in (0..).zip(lister) {
+            if settled.contains(cell) || lister.is_some() {
+                self.settle(snapshot, cell, lister, members, counts_from_ms, found);
             } else {
                 self.orphaned(snapshot, cell, members, counts_from_ms, found);
             }
@@ -167,7 +162,7 @@ impl ListingCheck {
         let mut owner = self.last_lister.get(&cell).copied();
         if !self.orphans.contains_key(&cell) {
             // Whoever listed it may have yielded it to one who is dead by now.
-            let n = u16::try_from(snapshot.covered.len()).unwrap_or(u16::MAX);
+            let n = snapshot.covered.capacity();
             let heard = owner.map(|by| self.heard.range((by, 0)..=(by, u16::MAX)));
             let silent = heard
                 .into_iter()
@@ -212,8 +207,8 @@ impl ListingCheck {
         members: &Membership,
         found: &mut Findings,
     ) {
-        let n = snapshot.covered.len();
-        let cells = u16::try_from(n).unwrap_or(u16::MAX);
+        let cells = snapshot.covered.capacity();
+        let n = usize::from(cells);
         // It yields when it hears; a snapshot may fall between the two, the next one may not.
         let bound_ms = snapshot.bounds.period_ms / 2;
         let mut seen: Vec<(u16, u16, u16)> = Vec::new();
@@ -225,9 +220,9 @@ impl ListingCheck {
             // By the stamps that it goes by: what it takes anew it may not have said yet.
             let mut stamps: Vec<Option<Stamp>> = vec![None; n];
             let (mut first, mut last) = (n, 0);
-            for (c, stamp) in m.view.plan.iter().zip(&m.view.stamps) {
-                let c = usize::from(*c);
-                if c < n && !m.view.covered.get(c).copied().unwrap_or(false) {
+            for (cell, stamp) in m.view.plan.iter().zip(&m.view.stamps) {
+                let c = usize::from(*cell);
+                if c < n && !m.view.covered.contains(*cell) {
                     stamps[c] = Some(*stamp);
                     (first, last) = (first.min(c), last.max(c));
                 }
@@ -294,6 +289,7 @@ fn plans(claim: &Claim, cell: u16, cells: u16) -> bool {
 mod tests {
     use super::super::{Bounds, Graph, Handicaps, Stability};
     use super::*;
+    use skein_peer::cells::CellSet;
     use skein_peer::wire::message::{CellRun, Epoch};
     use skein_peer::{Beliefs, PeerId};
 
@@ -354,7 +350,7 @@ mod tests {
                     view: Beliefs {
                         able: true,
                         loop_hash: 9,
-                        covered: vec![false; 4],
+                        covered: CellSet::new(4),
                         plan: plan.to_vec(),
                         stamps: vec![stamp(5, *id); plan.len()],
                         peers: [(PeerId(99), (1, self.believed(*id)))].into(),
@@ -372,7 +368,7 @@ mod tests {
                 stability: &self.stability,
                 handicaps: &Handicaps::default(),
                 peers: &peers,
-                covered: &[false; 4],
+                covered: &CellSet::new(4),
                 loop_hash: 9,
             };
             self.check

@@ -311,6 +311,7 @@ mod tests {
     use super::super::testing::{Story, speaking};
     use super::super::{Graph, Stability};
     use super::*;
+    use skein_peer::cells::CellSet;
     use skein_peer::{Beliefs, PeerId};
 
     /// A peer and what it believes of others.
@@ -358,7 +359,7 @@ mod tests {
             stability,
             handicaps: &Handicaps::default(),
             peers: &peers,
-            covered: &[],
+            covered: &CellSet::default(),
             loop_hash: 0,
         };
         m.on_snapshot(&snapshot, found);

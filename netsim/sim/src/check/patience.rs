@@ -201,7 +201,7 @@ impl PatienceCheck {
         if !view.able || !settled || !part.decided || !was_alive || !few {
             return;
         }
-        let n = u16::try_from(view.covered.len()).unwrap_or(u16::MAX);
+        let n = view.covered.capacity();
         let Some((claim, life)) = heard(subject) else {
             return;
         };
@@ -209,7 +209,7 @@ impl PatienceCheck {
             return;
         }
         let mut orphans: BTreeSet<u16> = listed(claim, n)
-            .filter(|c| !view.covered.get(usize::from(*c)).copied().unwrap_or(true))
+            .filter(|c| !view.covered.contains(*c))
             .collect();
         let mine = [&view.plan, &view.held, &view.unassigned];
         for c in mine.into_iter().flatten() {
@@ -248,8 +248,7 @@ impl PatienceCheck {
             part.diameters = [m.view.diameter, part.diameters[0]];
             part.view = Some(m.view.clone());
             // Who stood still hears all at once, when it wakes, what was covered meanwhile.
-            let covered = |c: &u16| m.view.covered.get(usize::from(*c)) == Some(&true);
-            part.orphans.retain(|c| !covered(c));
+            part.orphans.retain(|c| !m.view.covered.contains(*c));
             if part.orphans.len() < SURELY_ORPHANED {
                 self.owed.stop(m.id);
             }

@@ -120,7 +120,7 @@ impl ProgressCheck {
 
     /// L7: adoptions are bounded by cells and losses.
     fn check_adoptions(&mut self, snapshot: &Snapshot<'_>, m: &PeerSnapshot, found: &mut Findings) {
-        let cap = snapshot.covered.len() as u64 + self.losses + 1;
+        let cap = u64::from(snapshot.covered.capacity()) + self.losses + 1;
         if self.exceeds(
             (m.id, "adoptions"),
             m.view.loop_hash != 0 && u64::from(m.view.adoptions) > cap,
@@ -188,7 +188,7 @@ impl ProgressCheck {
 
 /// Whether every cell is covered or in somebody's plan.
 fn all_listed(snapshot: &Snapshot<'_>) -> bool {
-    let mut open: Vec<bool> = snapshot.covered.iter().map(|c| !c).collect();
+    let mut listed = snapshot.covered.clone();
     for m in snapshot
         .peers
         .iter()
@@ -201,12 +201,10 @@ fn all_listed(snapshot: &Snapshot<'_>) -> bool {
             .chain(&m.view.held)
             .chain(&m.view.unassigned)
         {
-            if let Some(o) = open.get_mut(usize::from(*c)) {
-                *o = false;
-            }
+            listed.insert(*c);
         }
     }
-    open.iter().all(|o| !o)
+    listed.is_full()
 }
 
 #[cfg(test)]
@@ -214,6 +212,7 @@ mod tests {
     use super::super::{Bounds, Graph, Handicaps, Stability};
     use super::*;
     use skein_peer::Beliefs;
+    use skein_peer::cells::CellSet;
 
     fn run(view: &Beliefs, seconds: u64, restart: bool) -> BTreeMap<&'static str, u64> {
         let (mut check, mut found, mut s) = (
@@ -247,7 +246,7 @@ mod tests {
                 stability: &s,
                 handicaps: &Handicaps::default(),
                 peers: &peers,
-                covered: &[false, false],
+                covered: &CellSet::new(2),
                 loop_hash: 3,
             };
             check.on_snapshot(&snapshot, &Membership::default(), &mut found);

@@ -121,7 +121,7 @@ impl RecordCheck {
         id: u16,
         said: &Said,
         bytes_hash: u64,
-        (journal, covered): (&[Vec<u8>], &[bool]),
+        (journal, covered): (&[Vec<u8>], &CellSet),
         found: &mut Findings,
     ) {
         let r = &said.record;
@@ -161,7 +161,7 @@ impl RecordCheck {
         now_ms: u64,
         id: u16,
         said: &Said,
-        (journal, covered): (&[Vec<u8>], &[bool]),
+        (journal, covered): (&[Vec<u8>], &CellSet),
         found: &mut Findings,
     ) {
         let known = self.durable.get(&id);
@@ -305,7 +305,7 @@ fn versions(v: &Beliefs) -> Versions {
 
 /// What a claim lists that no section of the journal's last life does, as a sentence about
 /// the newest. A later one may be durable while a claim waits for its turn on the air.
-fn unpromised(said: &Claim, journal: &[Vec<u8>], covered: &[bool]) -> Option<String> {
+fn unpromised(said: &Claim, journal: &[Vec<u8>], covered: &CellSet) -> Option<String> {
     let mut newest = None;
     for entry in of_last_life(journal) {
         if let Entry::Claim(claim) = entry {
@@ -330,9 +330,9 @@ fn of_last_life(journal: &[Vec<u8>]) -> impl Iterator<Item = Entry> {
 
 /// A listed cell that no durable section lists at that stamp, as a sentence.
 /// A run may bridge cells covered meanwhile: to fly over those is no promise.
-fn unpersisted(said: &Claim, durable: Option<&Claim>, covered: &[bool]) -> Option<String> {
+fn unpersisted(said: &Claim, durable: Option<&Claim>, covered: &CellSet) -> Option<String> {
     // Runs are cyclic: the same cell may be named with and without a lap.
-    let n = u16::try_from(covered.len()).unwrap_or(u16::MAX).max(1);
+    let n = covered.capacity().max(1);
     let mut promised: BTreeMap<u16, Stamp> = BTreeMap::new();
     if let Some(d) = durable {
         for l in d.plan.iter().chain(&d.held) {
@@ -344,7 +344,7 @@ fn unpersisted(said: &Claim, durable: Option<&Claim>, covered: &[bool]) -> Optio
     }
     for l in &said.plan {
         for cell in cells_of(l.run, n) {
-            let bridged = covered.get(usize::from(cell)).copied().unwrap_or(false);
+            let bridged = covered.contains(cell);
             if !bridged && promised.get(&cell).is_none_or(|s| *s < l.stamp) {
                 return Some(format!(
                     "lists cell {cell} at {:?}, its disk holds {:?}",
@@ -379,7 +379,7 @@ mod tests {
 
     #[test]
     fn a_claim_may_have_waited_for_its_turn_while_a_later_one_became_durable() {
-        let open = [false; 20];
+        let open = CellSet::new(20);
         let entry = |c: Claim| Entry::Claim(c).encode();
         let life = Entry::Life(2).encode();
         let journal = [
@@ -401,9 +401,8 @@ mod tests {
     #[test]
     fn a_section_may_shrink_but_not_grow_beyond_what_is_durable() {
         let durable = claim(4, 5);
-        let open = [false; 20];
-        let mut covered = open;
-        covered[8] = true;
+        let open = CellSet::new(20);
+        let covered = CellSet::of(20, [8]);
         assert_eq!(unpersisted(&claim(4, 5), Some(&durable), &open), None);
         assert_eq!(unpersisted(&claim(4, 2), Some(&durable), &open), None);
         assert!(unpersisted(&claim(4, 6), Some(&durable), &open).is_some());

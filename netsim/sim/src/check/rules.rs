@@ -14,6 +14,7 @@ use crate::spec::{Spec, UavSpec};
 use crate::twins::Twins;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
+use skein_peer::cells::CellSet;
 use skein_peer::mission::{Mission, chunks, point_m};
 use skein_peer::offload::MissionGeometry;
 use skein_peer::output::Status;
@@ -195,7 +196,7 @@ impl Rules {
         now_ms: u64,
         id: u16,
         said: &Said,
-        seen: (u64, &[bool]),
+        seen: (u64, &CellSet),
         found: &mut Findings,
     ) {
         let author = (id, said.record.incarnation);
@@ -203,11 +204,7 @@ impl Rules {
         self.spoken.on_said(now_ms, author, &said.body, seen, found);
         if let Some(claim) = &said.claim {
             self.spoken.on_claim(id, author.1, Arc::clone(claim));
-            let covered = if claim.loop_hash == seen.0 {
-                seen.1
-            } else {
-                &[]
-            };
+            let covered = (claim.loop_hash == seen.0).then_some(seen.1);
             self.decision.on_claim(now_ms, id, claim, covered, found);
         }
     }

@@ -4,6 +4,7 @@
 use super::{Bounds, Grade, Graph, Handicaps, Stability};
 use skein_geometry::frame::Point;
 use skein_peer::Beliefs;
+use skein_peer::cells::CellSet;
 use skein_peer::output::Status;
 
 /// One running peer at the moment of a snapshot.
@@ -40,8 +41,8 @@ pub struct Snapshot<'a> {
     pub handicaps: &'a Handicaps,
     /// The running peers, ascending by id.
     pub peers: &'a [PeerSnapshot],
-    /// What the world saw, by index on the loop; empty before any peer has a loop.
-    pub covered: &'a [bool],
+    /// Which cells of the loop the world saw; of no cells before any peer has a loop.
+    pub covered: &'a CellSet,
     /// Identifies that loop.
     pub loop_hash: u64,
 }

@@ -73,7 +73,7 @@ impl SpokenCheck {
         view: &Beliefs,
         found: &mut Findings,
     ) {
-        let digest = covered(view).digest();
+        let digest = view.covered.digest();
         let says = [
             (
                 "its life",
@@ -114,7 +114,7 @@ impl SpokenCheck {
         now_ms: u64,
         (id, incarnation): (u16, Incarnation),
         body: &Body,
-        (loop_hash, seen): (u64, &[bool]),
+        (loop_hash, seen): (u64, &CellSet),
         found: &mut Findings,
     ) {
         let marks = match body {
@@ -130,10 +130,9 @@ impl SpokenCheck {
         let Some((_, runs)) = marks.filter(|(hash, _)| *hash == loop_hash && loop_hash != 0) else {
             return;
         };
-        let n = u16::try_from(seen.len()).unwrap_or(u16::MAX);
-        let unseen = CellSet::decode_rle(n, runs).map(|set| {
-            set.iter()
-                .find(|c| !seen.get(usize::from(*c)).copied().unwrap_or(false))
+        let unseen = CellSet::decode_rle(seen.capacity(), runs).map(|mut set| {
+            set.subtract(seen);
+            set.iter().next()
         });
         match unseen {
             Ok(None) => {}
@@ -152,8 +151,7 @@ impl SpokenCheck {
     /// Compares what is held with what was published last.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         for (at_ms, id, loop_hash, cell) in std::mem::take(&mut self.unseen) {
-            let seen = snapshot.covered.get(usize::from(cell)).copied();
-            if loop_hash == snapshot.loop_hash && seen == Some(false) {
+            if loop_hash == snapshot.loop_hash && !snapshot.covered.contains(cell) {
                 found.broken("S6", at_ms, Some(id), || {
                     format!("publishes cell {cell} as covered, no camera has seen it")
                 });
@@ -208,8 +206,8 @@ impl SpokenCheck {
     /// In what the claim published last differs from what is held: open cells of the plan,
     /// and whether its author hears anybody.
     fn claim_owed(&self, id: u16, view: &Beliefs) -> BTreeSet<Owed> {
-        let n = u16::try_from(view.covered.len()).unwrap_or(u16::MAX);
-        let open = |c: &u16| !view.covered.get(usize::from(*c)).copied().unwrap_or(true);
+        let n = view.covered.capacity();
+        let open = |c: &u16| *c < n && !view.covered.contains(*c);
         let held: BTreeSet<u16> = view.plan.iter().copied().filter(|c| open(c)).collect();
         let published = self
             .claims
@@ -237,14 +235,6 @@ impl SpokenCheck {
     }
 }
 
-fn covered(view: &Beliefs) -> CellSet {
-    let mut set = CellSet::new(u16::try_from(view.covered.len()).unwrap_or(u16::MAX));
-    for (c, _) in view.covered.iter().enumerate().filter(|(_, is)| **is) {
-        set.insert(u16::try_from(c).unwrap_or(u16::MAX));
-    }
-    set
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::testing::{LOOP, Story, speaking};
@@ -269,7 +259,7 @@ mod tests {
             sharers: 2,
             revision: view.revision,
             loop_hash: view.loop_hash,
-            cover_digest: covered(view).digest(),
+            cover_digest: view.covered.digest(),
             gossip: Vec::new(),
             fresh: Vec::new(),
         }
@@ -382,7 +372,7 @@ mod tests {
             check.on_claim(1, 1, Arc::new(claim));
             let view = Beliefs {
                 plan: if lists { vec![0] } else { Vec::new() },
-                covered: vec![!lists, false, false, false],
+                covered: CellSet::of(4, (!lists).then_some(0)),
                 peers: if hears {
                     company.clone()
                 } else {
@@ -407,7 +397,7 @@ mod tests {
             let mut story = Story::new(0);
             let body = Body::Finished(Finished { revision: 1 });
             if says {
-                check.on_said(1, (1, 1), &body, (LOOP, &[false; 4]), &mut found);
+                check.on_said(1, (1, 1), &body, (LOOP, &CellSet::new(4)), &mut found);
             }
             let view = Beliefs {
                 finished: true,
@@ -430,10 +420,12 @@ mod tests {
             loop_hash: LOOP,
             covered: set.encode_rle(None),
         });
-        for (seen, broken) in [([false, false, true, false], false), ([true; 4], false)]
-            .into_iter()
-            .chain([([true, true, false, true], true)])
-        {
+        for (seen, broken) in [
+            (&[2][..], false),
+            (&[0, 1, 2, 3], false),
+            (&[0, 1, 3], true),
+        ] {
+            let seen = CellSet::of(4, seen.iter().copied());
             let (mut check, mut found) = (SpokenCheck::default(), Findings::new(1));
             check.on_said(9, (1, 1), &cover, (LOOP, &seen), &mut found);
             let mut story = Story::new(0);

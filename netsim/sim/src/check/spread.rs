@@ -319,13 +319,9 @@ impl SpreadCheck {
             .iter()
             .filter(|m| m.view.loop_hash == snapshot.loop_hash)
         {
-            for c in m.view.plan.iter().filter(|c| {
-                !snapshot
-                    .covered
-                    .get(usize::from(**c))
-                    .copied()
-                    .unwrap_or(true)
-            }) {
+            let open =
+                |c: &&u16| **c < snapshot.covered.capacity() && !snapshot.covered.contains(**c);
+            for c in m.view.plan.iter().filter(open) {
                 planners.entry(*c).or_default().push(m);
             }
         }

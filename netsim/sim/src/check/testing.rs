@@ -4,6 +4,7 @@ use super::{Bounds, Graph, Handicaps, PeerSnapshot, Snapshot, Stability};
 use crate::twins::Twins;
 use skein_geometry::frame::Point;
 use skein_peer::Beliefs;
+use skein_peer::cells::CellSet;
 use std::collections::BTreeMap;
 
 /// Identifies the loop of these snapshots.
@@ -24,7 +25,7 @@ pub(super) fn speaking() -> Beliefs {
         able: true,
         loop_hash: LOOP,
         revision: 1,
-        covered: vec![false; 4],
+        covered: CellSet::new(4),
         diameter: 1,
         spendable_ms: 1_000_000,
         ..Beliefs::default()
@@ -35,7 +36,7 @@ pub(super) fn speaking() -> Beliefs {
 pub(super) struct Story {
     stability: Stability,
     loss_permille: u16,
-    covered: [bool; 4],
+    covered: CellSet,
     places: BTreeMap<u16, Point>,
     /// Who speaks under the id of another.
     pub(super) twins: Twins,
@@ -49,7 +50,7 @@ impl Story {
         Self {
             stability: Stability::default(),
             loss_permille,
-            covered: [false; 4],
+            covered: CellSet::new(4),
             places: BTreeMap::new(),
             twins: Twins::default(),
             handicaps: Handicaps::default(),

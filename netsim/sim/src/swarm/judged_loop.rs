@@ -3,27 +3,30 @@
 use super::air::Air;
 use crate::geometry_cache::GeometryCache;
 use skein_peer::Mission;
+use skein_peer::cells::CellSet;
+use skein_peer::offload::MissionGeometry;
 use std::sync::Arc;
 
 /// The newest loop that any peer has begun.
 #[derive(Debug)]
 pub(super) struct JudgedLoop {
     mission: Arc<Mission>,
+    /// Of that mission, where it has any.
+    geometry: Option<Arc<MissionGeometry>>,
     hash: u64,
-    covered: Vec<bool>,
+    covered: CellSet,
     /// The newest lap that any peer has begun, from 0.
     lap: u16,
 }
 
 impl JudgedLoop {
     pub(super) fn new(mission: &Arc<Mission>, cache: &mut GeometryCache) -> Self {
-        let (covered, hash) = cache.of(mission).map_or((Vec::new(), 0), |g| {
-            (vec![false; g.coverage_loop.len()], g.coverage_loop.hash())
-        });
+        let geometry = cache.of(mission).ok();
         Self {
             mission: Arc::clone(mission),
-            hash,
-            covered,
+            hash: geometry.as_ref().map_or(0, |g| g.coverage_loop.hash()),
+            covered: uncovered(geometry.as_deref()),
+            geometry,
             lap: 0,
         }
     }
@@ -32,8 +35,8 @@ impl JudgedLoop {
         self.hash
     }
 
-    /// By cell whether it is covered; one that nobody needs is.
-    pub(super) fn covered(&self) -> &[bool] {
+    /// The cells that are covered; those that nobody needs are.
+    pub(super) fn covered(&self) -> &CellSet {
         &self.covered
     }
 
@@ -55,24 +58,35 @@ impl JudgedLoop {
             return false;
         }
         self.mission = Arc::clone(given);
+        self.geometry = cache.of(given).ok();
         self.lap = lap;
         let is_another = loop_hash != self.hash;
         if is_another {
             self.hash = loop_hash;
-            let geometry = cache.of(&self.mission);
-            self.covered = vec![false; geometry.map_or(0, |g| g.coverage_loop.len())];
-            self.refresh(cache, air);
+            self.covered = uncovered(self.geometry.as_deref());
+            self.refresh(air);
         }
         is_another
     }
 
     /// Marks what was seen since.
-    pub(super) fn refresh(&mut self, cache: &mut GeometryCache, air: &Air) {
-        if let Ok(geometry) = cache.of(&self.mission) {
-            let (revision, laps) = (self.mission.revision, self.lap + 1);
-            for (flag, cell) in self.covered.iter_mut().zip(geometry.coverage_loop.cells()) {
-                *flag = *flag || !cell.needed || air.is_covered(revision, cell.id, laps);
+    pub(super) fn refresh(&mut self, air: &Air) {
+        let Some(geometry) = &self.geometry else {
+            return;
+        };
+        let (revision, laps) = (self.mission.revision, self.lap + 1);
+        let cells = geometry.coverage_loop.cells();
+        for c in self.covered.complement().iter() {
+            let cell = &cells[usize::from(c)];
+            if !cell.needed || air.is_covered(revision, cell.id, laps) {
+                self.covered.insert(c);
             }
         }
     }
+}
+
+/// None of the cells of a loop.
+fn uncovered(geometry: Option<&MissionGeometry>) -> CellSet {
+    let n = geometry.map_or(0, |g| g.coverage_loop.len());
+    CellSet::new(u16::try_from(n).unwrap_or(u16::MAX))
 }

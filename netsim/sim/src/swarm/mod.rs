@@ -511,7 +511,9 @@ impl Swarm {
             if self.peers[idx].process == Process::Stopped {
                 continue;
             }
-            let known = last.take().filter(|(bytes, _)| Arc::ptr_eq(bytes, &d.bytes));
+            let known = last
+                .take()
+                .filter(|(bytes, _)| Arc::ptr_eq(bytes, &d.bytes));
             let (_, shared) = last.insert(known.unwrap_or_else(|| {
                 let shared = self.shared(&d.bytes);
                 (d.bytes, shared)
@@ -716,7 +718,7 @@ impl Swarm {
             let other = said.claim.as_ref().map(|c| c.loop_hash);
             let other = other.filter(|hash| *hash != self.judged.hash());
             let covered = other.map(|_| peer.beliefs().covered);
-            let covered = covered.as_deref().unwrap_or(self.judged.covered());
+            let covered = covered.as_ref().unwrap_or(self.judged.covered());
             let durable = (self.peers[idx].disk.records(), covered);
             self.checker.on_said(self.now_ms, id, &said, hash, durable);
             self.spoken.insert(hash, Arc::new(said));
@@ -915,6 +917,6 @@ impl Swarm {
     }
 
     fn refresh_covered(&mut self) {
-        self.judged.refresh(&mut self.geometry_cache, &self.air);
+        self.judged.refresh(&self.air);
     }
 }

@@ -86,7 +86,7 @@ impl Swarm {
             details: Details::Simulated(Simulated {
                 history_hash: format!("{history_hash:016x}"),
                 events: self.history.events(),
-                infeasible: self.unassigned || self.judged.covered().is_empty(),
+                infeasible: self.unassigned || self.judged.covered().capacity() == 0,
                 false_downs: false_downs
                     .into_iter()
                     .map(|(at_ms, by, of)| FalseDown { at_ms, by, of })

@@ -453,7 +453,13 @@ impl Membership {
             suspected: told.suspected_ds.map(age),
         };
         let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
-        self.on_told(now, (teller, told.able, Some(said)), heartbeat, limits, changes);
+        self.on_told(
+            now,
+            (teller, told.able, Some(said)),
+            heartbeat,
+            limits,
+            changes,
+        );
         if let Some(known) = self.known.get_mut(&told.id)
             && known.disputes(told)
         {

@@ -74,7 +74,7 @@ fn a_new_revision_is_taken_by_all_and_covered_cells_keep_their_names() {
         && h.beliefs(2).revision == 2));
     assert!(covered(&h, 1) >= before, "{} of {before}", covered(&h, 1));
     assert!(h.run_until(300, |h| h.beliefs(1).finished && h.beliefs(2).finished));
-    assert_eq!(h.beliefs(1).covered.len(), 32);
+    assert_eq!(h.beliefs(1).covered.capacity(), 32);
 }
 
 /// The way home from a base that has moved away costs fuel that was planned: what is cut

@@ -16,13 +16,9 @@ use std::collections::{BTreeMap, BTreeSet};
 fn divided(h: &Harness, ids: &[u16]) -> bool {
     let plans = ids.iter().map(|id| h.beliefs(*id));
     let plans: Vec<_> = plans.collect();
-    let open = plans[0].covered.iter().enumerate().filter(|(_, c)| !**c);
-    let lists = |c: usize| {
-        plans
-            .iter()
-            .filter(move |b| b.plan.iter().any(|p| usize::from(*p) == c))
-    };
-    open.clone().count() > 0 && open.clone().all(|(c, _)| lists(c).count() == 1)
+    let open = plans[0].covered.complement();
+    let lists = |c: u16| plans.iter().filter(move |b| b.plan.contains(&c));
+    !open.is_empty() && open.iter().all(|c| lists(c).count() == 1)
 }
 
 #[test]
@@ -84,9 +80,8 @@ fn what_the_idle_cannot_fly_is_taken_by_who_has_something_to_fly() {
     let open = |h: &Harness| {
         let beliefs: Vec<_> = all.iter().map(|id| h.beliefs(*id)).collect();
         let listed: BTreeSet<u16> = beliefs.iter().flat_map(|b| b.plan.clone()).collect();
-        let covered = |c: usize| beliefs.iter().any(|b| b.covered.get(c) == Some(&true));
-        let cells = (0..16 * 12).filter(|c| !covered(*c));
-        let cells = cells.filter(|c| u16::try_from(*c).is_ok_and(|c| !listed.contains(&c)));
+        let covered = |c: u16| beliefs.iter().any(|b| b.covered.contains(c));
+        let cells = (0..16 * 12).filter(|c| !covered(*c) && !listed.contains(c));
         cells.count()
     };
     let mut orphaned = Vec::new();
@@ -321,7 +316,7 @@ fn what_is_published_is_what_is_planned() {
             let of_two_seconds_ago = core::mem::replace(first, second.clone());
             second.clone_from(&plan);
             let plan: BTreeSet<u16> = plan.intersection(&of_two_seconds_ago).copied().collect();
-            let cells = u16::try_from(h.beliefs(id).covered.len()).unwrap_or(0);
+            let cells = h.beliefs(id).covered.capacity();
             let claim = h.seat(id).said.iter().rev().find_map(|(_, _, b)| match b {
                 Body::Claim(c) => Some(c.clone()),
                 _ => None,
@@ -396,7 +391,7 @@ fn who_hears_nobody_flies_for_itself_and_takes_nothing_from_those_who_hear_it() 
     assert!(believed(&h) && h.beliefs(3).adoptions == 1);
     // Then it works alone, on everything, and says so; the others do likewise without it.
     let all_open = |h: &Harness, id: u16| {
-        let open = h.beliefs(id).covered.iter().filter(|c| !**c).count();
+        let open = usize::from(h.beliefs(id).covered.complement().count());
         h.beliefs(id).plan.len() >= open
     };
     assert!(h.run_until(20, |h| all_open(h, 3)));
@@ -456,7 +451,7 @@ fn what_is_said_of_a_uav_is_what_it_senses() {
     assert_eq!(said.mission, MissionStatus::Active);
     let of_station = state(&mut h, GROUND_STATION);
     assert_eq!(of_station.mission, MissionStatus::Active);
-    assert_eq!(usize::from(said.cells), b.covered.len());
+    assert_eq!(said.cells, b.covered.capacity());
     assert!(said.covered > 0 && usize::from(said.covered) <= covered(&h, 1));
     let activity = |h: &mut Harness| {
         h.run_s(12);
@@ -505,7 +500,11 @@ fn a_bid_says_where_its_author_will_be_and_which_way_it_flies() {
         h.run_s(10);
         h.stop(stopped);
         h.run_s(40);
-        let n = u16::try_from(h.beliefs(4).covered.len().max(h.beliefs(1).covered.len())).unwrap();
+        let n = h
+            .beliefs(4)
+            .covered
+            .capacity()
+            .max(h.beliefs(1).covered.capacity());
         for id in (1..=4).filter(|id| *id != stopped) {
             let mut plan = Vec::new();
             for (_, _, body) in &h.seat(id).said {

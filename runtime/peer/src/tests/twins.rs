@@ -104,7 +104,7 @@ fn twins_that_both_speak_and_meet_leave_one_and_no_cell_without_an_owner() {
         let believed = h.beliefs(2).peers[&PeerId(1)];
         assert_eq!(believed, (h.beliefs(stays).incarnation, Status::Alive));
         // All that is open is listed again.
-        let open = h.beliefs(2).covered.iter().filter(|c| !**c).count();
+        let open = usize::from(h.beliefs(2).covered.complement().count());
         assert!(planned(&h, &[stays, 2]).len() + 2 >= open, "{open}");
         assert!(h.run_until(900, |h| {
             [2, stays, goes].iter().all(|id| h.beliefs(*id).finished)

@@ -198,9 +198,8 @@ impl Known {
     /// freshest, and if it is the same it came by no shorter way and is not suspected.
     pub(super) fn has_heard(&self, heard: &HeardHeartbeat) -> bool {
         let mine = &self.freshest;
-        let again = heard.count == mine.count
-            && heard.hops >= mine.hops
-            && heard.suspected.is_none();
+        let again =
+            heard.count == mine.count && heard.hops >= mine.hops && heard.suspected.is_none();
         heard.incarnation == mine.incarnation && (heard.count < mine.count || again)
     }
 
