@@ -321,7 +321,7 @@ impl Swarm {
     }
 
     fn peer_idx(&self, id: u16) -> Option<usize> {
-        self.peers.iter().position(|s| s.id() == id)
+        self.peers.binary_search_by_key(&id, SimPeer::id).ok()
     }
 
     fn happen(&mut self, event: Event) {

@@ -123,6 +123,9 @@ pub struct World {
     seed: u64,
     now_ms: u64,
     uavs: Vec<Uav>,
+    /// By number of a computer: in which of the UAVs it is. Asked for at every percept, every
+    /// setpoint and for every antenna.
+    seats: Vec<Option<usize>>,
     ground: Option<(u16, Place)>,
     nodes: Vec<u16>,
     min_separation_m: f64,
@@ -179,6 +182,12 @@ impl World {
             .collect();
         nodes.sort_unstable();
         nodes.dedup();
+        let mut seats = vec![None; nodes.last().map_or(0, |last| usize::from(*last) + 1)];
+        for (i, u) in uavs.iter().enumerate() {
+            for c in &u.computers {
+                seats[usize::from(c.number)] = Some(i);
+            }
+        }
         let judge = Judge::new(Arc::clone(&site.survey))
             .with_claims(site.claims.clone())
             .with_laps(spec.mission.further_laps.saturating_add(1));
@@ -187,6 +196,7 @@ impl World {
             seed,
             now_ms: 0,
             uavs,
+            seats,
             ground,
             nodes,
             min_separation_m: spec.min_separation_m,
@@ -228,12 +238,16 @@ impl World {
 
     /// The UAV in which the computer with this number is.
     fn uav(&self, number: u16) -> Option<&Uav> {
-        self.uavs.iter().find(|u| u.computer(number).is_some())
+        self.uavs.get(self.seat(number)?)
+    }
+
+    fn seat(&self, number: u16) -> Option<usize> {
+        self.seats.get(usize::from(number)).copied().flatten()
     }
 
     fn uav_mut(&mut self, number: u16) -> Option<&mut Uav> {
-        let mut uavs = self.uavs.iter_mut();
-        uavs.find(|u| u.computer(number).is_some())
+        let seat = self.seat(number)?;
+        self.uavs.get_mut(seat)
     }
 
     /// Where the antenna of a node is; nothing for a lost airframe or a dead computer.
