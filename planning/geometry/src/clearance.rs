@@ -58,8 +58,15 @@ impl NoFlyZones {
     pub fn distance_m(&self, p: Point) -> f64 {
         let mut least = f64::INFINITY;
         for (zone, bounds) in self.zones.iter().zip(&self.boxes) {
-            if box_gap_m(bounds, &(p, p)) < least {
-                least = least.min(zone.distance_m(p));
+            let gap_m = box_gap_m(bounds, &(p, p));
+            if gap_m < least {
+                // Outside of its box it is outside.
+                let outside = gap_m > 0.0;
+                least = least.min(if outside {
+                    zone.outline_distance_m(p)
+                } else {
+                    zone.distance_m(p)
+                });
             }
         }
         least

@@ -140,6 +140,12 @@ impl Polygon {
         if self.contains(p) {
             return 0.0;
         }
+        self.outline_distance_m(p)
+    }
+
+    /// Distance from `p` to the nearest edge, metres.
+    #[must_use]
+    pub fn outline_distance_m(&self, p: Point) -> f64 {
         let squares = self.edges().map(|(a, b)| to_line(p, a, b).norm_squared());
         squares.fold(f64::INFINITY, f64::min).sqrt()
     }
