@@ -34,7 +34,7 @@ use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
 use crate::wire::limits::{CHUNKS_MAX, HOPS_MAX, PEERS_MAX};
-use crate::wire::message::{Beacon, Record};
+use crate::wire::message::{Beacon, Gossip, Record};
 use skein_geometry::hash::Fnv;
 mod digest;
 #[cfg(test)]
@@ -423,17 +423,12 @@ impl Relay {
         let window = 2 * self.air.interval_ms();
         self.answered.retain(|_, t| now.since_ms(*t) < window);
         self.bring_mission(now, author, beacon);
-        let mut theirs: BTreeMap<u16, (Incarnation, u32, u16)> = BTreeMap::new();
-        for g in &beacon.gossip {
-            theirs.insert(g.id, (g.incarnation, g.max_seq, g.digest));
-        }
-        let authors: Vec<u16> = theirs.keys().copied().collect();
-        for subject in authors {
-            if subject == author {
-                continue;
-            }
-            let (incarnation, max_seq, digest) = theirs[&subject];
-            self.catch_up(now, subject, incarnation, max_seq, digest);
+        // What is told of somebody last counts.
+        let mut theirs: Vec<&Gossip> = beacon.gossip.iter().rev().collect();
+        theirs.sort_by_key(|g| g.id);
+        theirs.dedup_by_key(|g| g.id);
+        for g in theirs.into_iter().filter(|g| g.id != author) {
+            self.catch_up(now, g.id, g.incarnation, g.max_seq, g.digest);
         }
     }
 
@@ -490,20 +485,20 @@ impl Relay {
         max_seq: u32,
         digest: u16,
     ) {
-        let life = self.newest_life(author);
-        let (mine_seq, mine_digest) = self.version(author, life);
-        if life == 0 || life < incarnation || (life == incarnation && mine_seq < max_seq) {
-            return;
-        }
-        if (life, mine_seq, mine_digest) == (incarnation, max_seq, digest) {
-            return;
-        }
         let quiet = 2 * self.air.interval_ms();
         if self
             .answered
             .get(&author)
             .is_some_and(|t| now.since_ms(*t) < quiet)
         {
+            return;
+        }
+        let life = self.newest_life(author);
+        let (mine_seq, mine_digest) = self.version(author, life);
+        if life == 0 || life < incarnation || (life == incarnation && mine_seq < max_seq) {
+            return;
+        }
+        if (life, mine_seq, mine_digest) == (incarnation, max_seq, digest) {
             return;
         }
         self.answered.insert(author, now);
