@@ -234,12 +234,16 @@ impl ListingCheck {
             };
             for (&(_, author), (claim, (life, _))) in self.heard.range((m.id, 0)..=(m.id, u16::MAX))
             {
-                let alive = members.belief(m.id, author) == Some((*life, Status::Alive));
                 // Who believes all others down is no part of their component.
-                if !alive || claim.alone || claim.loop_hash != snapshot.loop_hash {
+                if claim.alone || claim.loop_hash != snapshot.loop_hash {
                     continue;
                 }
-                for l in claim.plan.iter().filter(plans_near) {
+                let mut near = claim.plan.iter().filter(plans_near).peekable();
+                let alive = || members.belief(m.id, author) == Some((*life, Status::Alive));
+                if near.peek().is_none() || !alive() {
+                    continue;
+                }
+                for l in near {
                     let lower = |c: &u16| stamps[usize::from(*c)].is_some_and(|s| s < l.stamp);
                     let clashing = cells_of(l.run, cells).filter(lower);
                     seen.extend(clashing.map(|c| (m.id, author, c)));
