@@ -257,13 +257,16 @@ impl Membership {
         let slowest = slowest.filter(|h| h.interval > self.interval);
         let interval = slowest.map_or(self.interval, |h| h.interval);
         let window_ms = self.window_ms(interval);
-        let each = || self.living().map(|k| (k, k.weight(now, window_ms)));
-        let hops = each().map(|(_, w)| w.hops.max(w.eccentricity)).max();
+        let each: Vec<(&Known, Weight)> = self
+            .living()
+            .map(|k| (k, k.weight(now, window_ms)))
+            .collect();
+        let hops = each.iter().map(|(_, w)| w.hops.max(w.eccentricity)).max();
         let hops = hops.unwrap_or(0);
         // Until then nobody is farther, and somebody is as far.
         let mut nearer = Time(u64::MAX);
         let mut as_far: Option<(Time, u16)> = None;
-        for (known, weight) in each() {
+        for (known, weight) in each {
             let last = known.last_within(hops);
             let said = known.info.heard.filter(|_| weight.eccentricity == hops);
             let is_as_far = (weight.hops == hops).then_some(last).max(said);
@@ -770,7 +773,7 @@ impl Membership {
             .filter(|(id, _)| told.iter().all(|g| g.id != **id))
             .map(|(_, k)| k)
             .collect();
-        wanted.sort_by_key(|k| (Reverse(k.want(now)), k.freshest.id));
+        wanted.sort_by_cached_key(|k| (Reverse(k.want(now)), k.freshest.id));
         if asks && far {
             let old = wanted.iter().enumerate();
             let old = old.filter(|(_, k)| k.asks(now, old_ms, again_ms));
