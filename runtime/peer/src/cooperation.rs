@@ -274,7 +274,7 @@ impl Cooperation {
         let able = able && !s.membership.is_deaf(s.now);
         effects.extend(state.negotiate(s, able, timers));
         effects.extend(state.notice_end(s, timers));
-        state.astray = are_many(s.membership.uavs()) && s.membership.hears_nobody(s.now);
+        state.astray = s.membership.hears_nobody(s.now) && are_many(s.membership.uavs());
         state.silent = s.is_silent;
         state.steer(goal_of(state, order));
         assert!(

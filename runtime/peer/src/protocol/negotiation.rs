@@ -365,16 +365,16 @@ impl Negotiation {
     /// those that were found before.
     fn find_orphans(&mut self, ctx: &Context<'_>, heard: &BTreeSet<u16>) -> CellSet {
         let mut orphans = core::mem::take(&mut self.orphans);
-        let before = orphans.count();
-        let anew = self.sections.take_listing() || ctx.live_changed;
-        if anew {
+        let mut gone = orphans.clone();
+        if self.sections.take_listing() || ctx.live_changed {
             orphans = self.sections.orphans(ctx.live);
         } else {
             self.sections.still_orphans(&mut orphans, heard, ctx.live);
             debug_assert_eq!(orphans, self.sections.orphans(ctx.live));
         }
-        if anew || orphans.count() < before {
-            self.orphaned_at.retain(|c, _| orphans.contains(*c));
+        gone.subtract(&orphans);
+        for cell in gone.iter() {
+            self.orphaned_at.remove(&cell);
         }
         orphans
     }

@@ -192,6 +192,10 @@ impl Sections {
     /// Adds covered cells; they leave the plan, and are beyond nobody's endurance. Returns
     /// whether any was new.
     pub fn cover(&mut self, covered: &CellSet) -> bool {
+        // Most that is heard is known.
+        if covered.is_subset(&self.covered) {
+            return false;
+        }
         let mut fresh = covered.clone();
         fresh.subtract(&self.covered);
         if !self.covered.union_with(covered) {
@@ -280,16 +284,26 @@ impl Sections {
     /// Rules *yield* and *release*, against every live claim. Returns whether
     /// this peer's own claim changed.
     pub fn settle(&mut self, live: &LivePeers) -> bool {
-        let all: BTreeSet<u16> = self.heard.keys().copied().collect();
-        self.settle_with(&all, live)
+        let mine = self.listed();
+        let theirs = self.planned_by(self.heard.iter(), live, &mine);
+        self.yield_to(&theirs)
     }
 
     /// The same against the live claims of some.
     pub(crate) fn settle_with(&mut self, authors: &BTreeSet<u16>, live: &LivePeers) -> bool {
-        let planned = self.plan.iter().map(|p| p.cell);
-        let mine = CellSet::of(self.cells, planned.chain(self.held.keys().copied()));
+        let mine = self.listed();
         let heard = authors.iter().filter_map(|id| self.heard.get_key_value(id));
         let theirs = self.planned_by(heard, live, &mine);
+        self.yield_to(&theirs)
+    }
+
+    /// The cells that this peer lists.
+    fn listed(&self) -> CellSet {
+        let planned = self.plan.iter().map(|p| p.cell);
+        CellSet::of(self.cells, planned.chain(self.held.keys().copied()))
+    }
+
+    fn yield_to(&mut self, theirs: &BTreeMap<u16, Stamp>) -> bool {
         let before = (self.plan.len(), self.held.len());
         let outbid = |cell: u16, mine: Stamp| theirs.get(&cell).is_some_and(|s| *s > mine);
         self.plan.retain(|p| !outbid(p.cell, p.stamp));
