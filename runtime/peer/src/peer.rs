@@ -302,7 +302,7 @@ impl Peer {
             if told.incarnation == self.life.incarnation() {
                 match told.suspected_ds {
                     Some(_) => {
-                        let until = now.plus_ms(self.membership.k2_ms(now));
+                        let until = now.plus_ms(self.membership.verdict_ms(now));
                         self.outbound
                             .refute(now, until, &mut self.timers, &mut self.rng);
                     }

@@ -11,7 +11,9 @@
 //! | a beacon is due | its interval is the shortest in which three fifths of the share carry it and a heartbeat, 16 T at most |
 //!
 //! Who shares a channel is the most that this peer or a neighbour counts: a station hears
-//! nothing of those behind its neighbours, and its neighbours hear them all. Counting for
+//! nothing of those behind its neighbours, and its neighbours hear them all. Beyond twenty it is
+//! what this peer counts itself, twenty at least: over several hops the most of all neighbours is
+//! more than most receivers hear, and what is left of the air brings heartbeats. Counting for
 //! ten intervals makes loss hide nobody: where the count fell with each beacon that
 //! collided, everybody's share would grow as the channel fills.
 
@@ -71,6 +73,10 @@ impl Filling {
 
 /// More than so many in one earshot are a crowd.
 const CROWD: u64 = 12;
+
+/// Where more than so many share the channel, each counts those that it hears itself: those at
+/// the edge of a dense place say more than those within, and beacons come often everywhere.
+const DENSE: u64 = 20;
 
 /// A bucket holds the share of so many periods: what a round asks of a peer at once.
 pub const BURST_PERIODS: u64 = 3;
@@ -221,10 +227,13 @@ impl Airtime {
         u16::try_from(self.neighbours.len() + 1).unwrap_or(u16::MAX)
     }
 
-    /// How many share the channel: as many as whoever hears most of them counts.
+    /// How many share the channel: as many as whoever hears most of them counts, up to so many
+    /// that all who are told of have an even part where that is dense; else as many as this
+    /// peer hears.
     #[must_use]
     pub fn sharers(&self) -> u64 {
-        u64::from(self.most_told.max(self.counted()))
+        let own = u64::from(self.counted());
+        u64::from(self.most_told).clamp(own, own.max(DENSE))
     }
 
     /// Whether so many share it that headers are dearer than random times, and what neighbours
@@ -539,6 +548,24 @@ mod tests {
             air.plan_beacon(woke);
             assert!(air.sharers() < 3);
             assert_eq!(air.tokens_millibytes, 1_200_000, "{hears_first}");
+        }
+    }
+
+    /// The most that a neighbour counts holds up to twenty; beyond it what is heard here.
+    #[test]
+    fn who_hears_fewer_than_a_dense_place_near_by_counts_those_or_twenty() {
+        for (heard, told, sharers) in [
+            (3, 19, 19),
+            (3, 20, 20),
+            (3, 45, 20),
+            (30, 45, 31),
+            (30, 25, 31),
+        ] {
+            let mut air = air(64_000, 0);
+            for author in 1..=heard {
+                air.hear(Time(0), author, (4, told));
+            }
+            assert_eq!(air.sharers(), sharers, "{heard} heard, {told} told");
         }
     }
 

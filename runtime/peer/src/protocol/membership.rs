@@ -14,7 +14,7 @@
 //! | alive | half of that, and the transport says that the link is gone | suspect |
 //! | alive | a suspicion against this very heartbeat is heard | suspect |
 //! | any | a fresher heartbeat from anybody, younger than the bound | alive; suspect if a suspicion against it is told with it |
-//! | suspect | k2 T' unrefuted | down |
+//! | suspect | k2 T' + k1 (T' - I), and T'/3 for each hop of D beyond four, unrefuted | down |
 //! | alive, suspect | heartbeat older than (k1 + k2 + D + 2) T' | down |
 //! | any | a heartbeat of a later life, younger than the bound | likewise, in that life |
 //! | any | a heartbeat of a later life, older than the bound | down, in that life |
@@ -53,6 +53,9 @@ pub const MAX_KNOWN: usize = PEERS_MAX - 1;
 /// heard: what a neighbour says of others comes round, and what is lost comes again.
 const HOP_INTERVALS: u64 = 10;
 
+/// Over so many hops an answer to a suspicion comes back within k2.
+const NEAR_HOPS: u64 = 4;
+
 /// What was not told of within so many intervals is no news any more.
 const URGENT_INTERVALS: u64 = 6;
 
@@ -82,12 +85,26 @@ pub struct Change {
 struct Patience {
     /// The longest interval announced, T'.
     interval_ms: u64,
+    /// D beyond [`NEAR_HOPS`].
+    far_hops: u64,
     /// k1, quarters.
     k1_quarters: u64,
     /// Time to refute a suspicion: k2 T'.
     k2_ms: u64,
     /// No living peer's heartbeat is older: (k1 + k2 + D + 2) T'.
     bound_ms: u64,
+}
+
+impl Patience {
+    /// Time to refute a suspicion of who announced such an interval: k2 T', and as much more
+    /// as it is suspected sooner than the slowest would be. Where many are on the way what a
+    /// heartbeat takes is counted in the longest interval, whoever sent it. A question and its
+    /// answer wait for their turn at each hop: a third of T' more for each beyond four.
+    fn verdict_ms(&self, interval_ms: u64) -> u64 {
+        let sooner_ms = self.interval_ms.saturating_sub(interval_ms);
+        let far_ms = self.far_hops * self.interval_ms / 3;
+        self.k2_ms + sooner_ms * self.k1_quarters / 4 + far_ms
+    }
 }
 
 /// How slow and how wide the swarm is, as far as this peer knows.
@@ -324,6 +341,7 @@ impl Membership {
         let travel_ms = (diameter + 2) * interval_ms;
         Patience {
             interval_ms,
+            far_hops: diameter.saturating_sub(NEAR_HOPS),
             k1_quarters,
             k2_ms,
             bound_ms: interval_ms * k1_quarters / 4 + k2_ms + travel_ms,
@@ -343,10 +361,10 @@ impl Membership {
         self.patience(now).bound_ms
     }
 
-    /// Time to refute a suspicion, milliseconds: k2 T'.
+    /// Time to refute a suspicion of this peer, milliseconds.
     #[must_use]
-    pub fn k2_ms(&self, now: Time) -> u64 {
-        self.patience(now).k2_ms
+    pub fn verdict_ms(&self, now: Time) -> u64 {
+        self.patience(now).verdict_ms(self.own_interval_ms())
     }
 
     /// A beacon, heard from its author directly. Returns what changed.
@@ -546,13 +564,13 @@ impl Membership {
         let Patience {
             interval_ms,
             bound_ms,
-            k2_ms,
             ..
         } = limits;
         if heard.hops > HOPS_MAX || !self.may_live_in(heard.id, heard.incarnation) {
             return false;
         }
-        let condemned = heard.suspected.is_some_and(|age| age.ms(now) >= k2_ms);
+        let verdict_ms = limits.verdict_ms(ms_of(heard.interval, self.period_ms));
+        let condemned = heard.suspected.is_some_and(|age| age.ms(now) >= verdict_ms);
         let known_life = self.known.get(&heard.id).map(|k| k.freshest.incarnation);
         // Nobody listened while it waited: that was no silence.
         let waited_ms = self.waited_ms(now);
@@ -582,6 +600,7 @@ impl Membership {
         };
         let version = |h: &HeardHeartbeat| (h.incarnation, h.count);
         if version(&heard) < version(&known.freshest) {
+            known.note_as_near(now, &heard, interval_ms);
             return false;
         }
         if version(&heard) == version(&known.freshest) {
@@ -693,12 +712,12 @@ impl Membership {
             self.known.len() <= MAX_KNOWN,
             "peers known keep to their cap"
         );
+        let patience = self.patience(now);
         let Patience {
             k1_quarters,
-            k2_ms,
             bound_ms,
             ..
-        } = self.patience(now);
+        } = patience;
         let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
         let tick_ms = self.period_ms / CADENCE;
         let mut changes = Vec::new();
@@ -706,7 +725,8 @@ impl Membership {
             let silent_ms = known.silent_ms(now);
             // Who heard it from others since its link ended knows that the link ended.
             let answers_for_it = known.freshest.hops == 1;
-            let k1_ms = ms_of(known.freshest.interval, self.period_ms) * k1_quarters / 4;
+            let interval_ms = ms_of(known.freshest.interval, self.period_ms);
+            let k1_ms = interval_ms * k1_quarters / 4;
             let patience_ms = if self.gone.contains(&known.freshest.id) {
                 k1_ms / 2
             } else {
@@ -720,7 +740,8 @@ impl Membership {
                 });
                 known.is_untold_suspicion = true;
             }
-            let status = if known.is_condemned(now, k2_ms) || silent_ms > bound_ms {
+            let verdict_ms = patience.verdict_ms(interval_ms);
+            let status = if known.is_condemned(now, verdict_ms) || silent_ms > bound_ms {
                 Status::Down
             } else if known.freshest.suspected.is_some() {
                 Status::Suspect
@@ -765,6 +786,7 @@ impl Membership {
         let far = self.diameter(now) > 1;
         let old_ms = self.patience(now).bound_ms / OLD;
         let again_ms = ASK_INTERVALS * self.own_interval_ms();
+        let interval_ms = self.interval_ms();
         let others = self
             .known
             .iter_mut()
@@ -786,7 +808,7 @@ impl Membership {
         wanted.sort_by_key(|k| k.freshest.id);
         let say = |known: &mut Known| {
             known.tell(now);
-            known.fresh(now)
+            known.fresh(now, interval_ms)
         };
         wanted.into_iter().map(say).collect()
     }
@@ -804,7 +826,9 @@ impl Membership {
     /// thirds of the rest), then all in rotation, so that nobody is left out for long. The
     /// relay fills in the versions of records.
     pub fn gossip(&mut self, now: Time, max: usize) -> Vec<Gossip> {
-        let reminders = self.known.values().filter_map(|k| k.reminder(now));
+        let interval_ms = self.interval_ms();
+        let known = self.known.values();
+        let reminders = known.filter_map(|k| k.reminder(now, interval_ms));
         let mut told: Vec<Gossip> = reminders.take(max / 4).collect();
         let max = max - told.len();
         let urgent = self.known.iter().filter(|(_, k)| k.is_news(now));
@@ -847,7 +871,7 @@ impl Membership {
             }
         }
         let entries = ids.iter().filter_map(|id| self.known.get(id));
-        told.extend(entries.map(|k| k.gossip(now)));
+        told.extend(entries.map(|k| k.gossip(now, interval_ms)));
         told
     }
 

@@ -95,7 +95,7 @@ pub struct Gossip {
     pub heartbeat: u32,
     /// Age of that heartbeat, sum of holding times, 100 ms units.
     pub age_ds: u16,
-    /// Hops it took.
+    /// The fewest hops by which its author was heard of lately.
     pub hops: u8,
     /// The interval its author announced with it, quarters of T.
     pub interval: u8,
@@ -120,7 +120,7 @@ pub struct Fresh {
     pub heartbeat: u32,
     /// Its age, sum of holding times, 100 ms units.
     pub age_ds: u16,
-    /// Hops it took.
+    /// The fewest hops by which its author was heard of lately.
     pub hops: u8,
     /// The interval its author announced with it, quarters of T.
     pub interval: u8,

@@ -105,7 +105,7 @@ const GOSSIP: &[Place] = &[
     at("incarnation", "the latest life known", U32),
     at("heartbeat", "the freshest heartbeat known", U32),
     at("age_ds", "its age, sum of holding times, 100 ms", U16),
-    at("hops", "hops it took", HOPS),
+    at("hops", "fewest hops to its author of late", HOPS),
     at(
         "interval",
         "what its author announced, quarters of T",

@@ -143,6 +143,10 @@ struct Lag {
     until: Time,
 }
 
+/// Of a peer the fewest hops are told by which it was heard of in so many of the longest
+/// intervals: each neighbour has told of it by then, and it has not flown far.
+const NEAR_INTERVALS: u64 = 4;
+
 /// News is told so often: one beacon may be lost, two hardly are.
 const NEWS_TOLD: u8 = 2;
 
@@ -214,10 +218,8 @@ impl Known {
         urgent_until: Time,
         changes: &mut Vec<Change>,
     ) {
-        if heard.hops < self.freshest.hops {
-            self.freshest.hops = heard.hops;
-            self.note_hops(now, heard.hops, interval_ms);
-        }
+        self.note_as_near(now, &heard, interval_ms);
+        self.freshest.hops = self.freshest.hops.min(heard.hops);
         let Some(told) = heard.suspected else {
             return;
         };
@@ -252,12 +254,12 @@ impl Known {
     }
 
     /// Whether nobody refuted a suspicion for so long, which could have been refuted.
-    pub(super) fn is_condemned(&self, now: Time, k2_ms: u64) -> bool {
+    pub(super) fn is_condemned(&self, now: Time, verdict_ms: u64) -> bool {
         let suspected = self
             .freshest
             .suspected
             .filter(|_| !self.is_untold_suspicion);
-        suspected.is_some_and(|age| age.ms(now) >= k2_ms)
+        suspected.is_some_and(|age| age.ms(now) >= verdict_ms)
     }
 
     /// A suspicion that this peer raised is told the first time: whoever knows better has as
@@ -289,7 +291,7 @@ impl Known {
             return;
         }
         // One hop is that from the neighbour.
-        let farther = told.hops > mine.hops.saturating_add(1);
+        let farther = told.hops > self.distance(now, interval_ms).saturating_add(1);
         let behind = told.count.saturating_add(BEHIND) <= mine.count;
         let sent = told.age.since();
         let told = Lag {
@@ -371,6 +373,27 @@ impl Known {
         }
     }
 
+    /// A heartbeat that is no fresher than the one known came by no more hops than those of
+    /// late. By more only what is fresher counts: who is gone would be farther with each echo.
+    pub(super) fn note_as_near(&mut self, now: Time, heard: &HeardHeartbeat, interval_ms: u64) {
+        let same_life = heard.incarnation == self.freshest.incarnation;
+        if same_life && heard.hops <= self.distance(now, interval_ms) {
+            self.note_hops(now, heard.hops, interval_ms);
+        }
+    }
+
+    /// The fewest hops by which it was heard of lately: the freshest heartbeat may have come
+    /// by a longer way.
+    fn distance(&self, now: Time, interval_ms: u64) -> u8 {
+        let lately_ms = NEAR_INTERVALS * interval_ms;
+        let lately = self
+            .hops
+            .iter()
+            .filter(|(since, _)| now.since_ms(*since) < lately_ms);
+        let fewest = lately.map(|(_, hops)| *hops).min();
+        fewest.unwrap_or(u8::MAX).min(self.freshest.hops)
+    }
+
     /// What counts of it at a moment.
     pub(super) fn weight(&self, now: Time, window_ms: u64) -> Weight {
         if self.status == Status::Down {
@@ -406,8 +429,8 @@ impl Known {
         }
     }
 
-    pub(super) fn gossip(&self, now: Time) -> Gossip {
-        self.gossip_of(&self.freshest, now)
+    pub(super) fn gossip(&self, now: Time, interval_ms: u64) -> Gossip {
+        self.gossip_of(&self.freshest, now, interval_ms)
     }
 
     /// Whether its heartbeat alone tells what is believed of it.
@@ -415,13 +438,12 @@ impl Known {
         self.status == Status::Alive && self.freshest.suspected.is_none()
     }
 
-    pub(super) fn fresh(&self, now: Time) -> Fresh {
+    pub(super) fn fresh(&self, now: Time, interval_ms: u64) -> Fresh {
         let HeardHeartbeat {
             id,
             incarnation,
             count,
             age,
-            hops,
             interval,
             ..
         } = self.freshest;
@@ -430,26 +452,26 @@ impl Known {
             life: Fresh::life_of(incarnation),
             heartbeat: count,
             age_ds: age.ds(now),
-            hops,
+            hops: self.distance(now, interval_ms),
             interval,
             able: self.info.able,
         }
     }
 
     /// What the peer itself has to hear, if it began a life anew without knowing.
-    pub(super) fn reminder(&self, now: Time) -> Option<Gossip> {
+    pub(super) fn reminder(&self, now: Time, interval_ms: u64) -> Option<Gossip> {
         self.higher_count_heard
             .as_ref()
-            .map(|h| self.gossip_of(h, now))
+            .map(|h| self.gossip_of(h, now, interval_ms))
     }
 
-    fn gossip_of(&self, heard: &HeardHeartbeat, now: Time) -> Gossip {
+    fn gossip_of(&self, heard: &HeardHeartbeat, now: Time, interval_ms: u64) -> Gossip {
         Gossip {
             id: heard.id,
             incarnation: heard.incarnation,
             heartbeat: heard.count,
             age_ds: heard.age.ds(now),
-            hops: heard.hops,
+            hops: self.distance(now, interval_ms),
             interval: heard.interval,
             suspected_ds: heard.suspected.map(|age| age.ds(now)),
             able: self.info.able,

@@ -580,6 +580,70 @@ fn of_two_suspicions_of_a_heartbeat_the_older_one_counts() {
     }
 }
 
+/// Where others speak less often, a suspicion of who speaks often has as long to be refuted as
+/// one of them: what is heard on the way from far is theirs.
+#[test]
+fn who_speaks_often_is_suspected_soon_and_given_up_as_late_as_the_slowest() {
+    for (slowest, down_at_ms) in [(4, 8_750), (8, 17_500)] {
+        let mut m = Membership::new(1, 1000);
+        m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
+        let mut seen = Vec::new();
+        for t in 0u32..120 {
+            let now = Time(u64::from(t) * 250);
+            let slow = Beacon {
+                interval: slowest,
+                ..beacon(t + 1, Vec::new())
+            };
+            m.on_beacon(now, 3, 1, &slow);
+            m.gossip(now, 2);
+            let of_2 = m.tick(now).into_iter().filter(|c| c.peer == 2);
+            seen.extend(of_2.map(|c| (now.0, c.status)));
+        }
+        let expected = [(4_250, Status::Suspect), (down_at_ms, Status::Down)];
+        assert_eq!(seen, expected, "the slowest speaks every {slowest} T/4");
+        // Whoever hears of it from others waits as long.
+        let told = |suspected_ds| {
+            let mut m = Membership::new(4, 1000);
+            let slow = Beacon {
+                interval: slowest,
+                ..beacon(1, vec![told_suspicion(suspected_ds)])
+            };
+            m.on_beacon(Time(0), 3, 1, &slow);
+            m.on_beacon(Time(1), 3, 1, &slow);
+            m.status(2).map(|(_, status)| status)
+        };
+        let verdict_ds = u16::try_from((down_at_ms - 4_250) / 100).unwrap();
+        assert_eq!(told(verdict_ds - 6), Some(Status::Suspect));
+        assert_eq!(told(verdict_ds + 3), Some(Status::Down));
+    }
+}
+
+/// The freshest heartbeat came round by five hops, an older one by two: it is two hops away,
+/// for some intervals.
+#[test]
+fn a_peer_is_as_far_as_the_shortest_way_of_late_whatever_way_the_freshest_heartbeat_took() {
+    let mut m = Membership::new(1, 1000);
+    let over = |heartbeat, hops| Gossip {
+        hops,
+        ..entry(9, heartbeat, 10, None)
+    };
+    m.on_beacon(Time(0), 2, 1, &beacon(1, vec![over(7, 4)]));
+    let told = |m: &mut Membership, now_ms| {
+        let told = m.gossip(Time(now_ms), 5);
+        let of_9 = told.iter().find(|g| g.id == 9).unwrap();
+        (of_9.heartbeat, of_9.hops)
+    };
+    assert_eq!(told(&mut m, 100), (7, 5));
+    m.on_beacon(Time(1_000), 3, 1, &beacon(1, vec![over(5, 1)]));
+    assert_eq!(told(&mut m, 1_000), (7, 2));
+    assert_eq!(m.eccentricity(Time(1_000)), 2);
+    // What is older and farther changes nothing; what is fresher counts when the other is old.
+    m.on_beacon(Time(2_500), 3, 1, &beacon(2, vec![over(6, 8)]));
+    m.on_beacon(Time(4_500), 2, 1, &beacon(2, vec![over(8, 4)]));
+    assert_eq!(told(&mut m, 4_900), (8, 2));
+    assert_eq!(told(&mut m, 5_100), (8, 5));
+}
+
 #[test]
 fn a_loop_that_ran_late_doubts_its_verdicts_for_a_period() {
     for (late, suspects_at_ms) in [(false, 4_250), (true, 6_500)] {
@@ -634,6 +698,8 @@ fn the_diameter_is_the_largest_eccentricity_heard_of_in_ten_intervals() {
     let patience = m.patience(Time(20_000));
     assert_eq!((patience.k1_quarters, patience.k2_ms), (22, 7_000));
     assert_eq!(patience.bound_ms, 5_500 + 7_000 + 8_000);
+    // Two hops beyond four: a verdict waits two thirds of an interval longer.
+    assert_eq!(patience.verdict_ms(1_000), 7_666);
 }
 
 #[test]
@@ -789,8 +855,9 @@ fn a_suspicion_that_nobody_was_told_of_is_no_verdict() {
             changes.iter().any(down).then_some(u64::from(t) * 250)
         })
     };
-    let k2_ms = told.k2_ms(began);
-    assert!(k2_ms >= 18_000);
+    // 18 s, and as much more as it was suspected before the slowest would be.
+    let k2_ms = told.patience(began).verdict_ms(1_000);
+    assert!(k2_ms >= 30_750);
     let soon = verdict(told.clone(), 1_000).unwrap();
     assert!((k2_ms - 250..=k2_ms).contains(&soon), "{soon}");
     assert_eq!(verdict(told.clone(), 7_000), Some(7_000 + k2_ms - 4_000));

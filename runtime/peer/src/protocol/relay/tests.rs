@@ -108,6 +108,13 @@ fn all_pieces_of_a_mission_are_sent_in_turn_though_few_go_within_their_lifetime(
     );
 }
 
+/// So many share the channel from then on, this peer included.
+fn share(r: &mut Relay, now_ms: u64, sharers: u16) {
+    for id in 1..sharers {
+        r.air.hear(Time(now_ms), 100 + id, (64, sharers));
+    }
+}
+
 #[test]
 fn a_mission_goes_to_who_lacks_it_and_what_is_due_before_its_next_piece_goes_first() {
     let mut r = relay(2);
@@ -117,6 +124,7 @@ fn a_mission_goes_to_who_lacks_it_and_what_is_due_before_its_next_piece_goes_fir
         gossip: Vec::new(),
         ..samples::beacon(1)
     };
+    share(&mut r, 5_000, 60);
     r.on_beacon(Time(5_000), 7, &neighbour(2));
     for subject in 0..6 {
         r.offer(Time(5_000), &piece(subject, 6), &[1; 200], 0);
@@ -146,7 +154,7 @@ fn a_mission_goes_to_who_lacks_it_and_what_is_due_before_its_next_piece_goes_fir
 #[test]
 fn own_coverage_waits_for_own_bids_and_claims_and_not_for_their_repetition() {
     let mut r = relay(2);
-    r.air.hear(Time(5_000), 9, (4, 30));
+    share(&mut r, 5_000, 30);
     let mut sent = Vec::new();
     for t in 5_000..40_000 {
         let kind = match t {
@@ -240,7 +248,7 @@ fn an_own_claim_that_nobody_passes_on_is_sent_again_twice() {
     r.own(Time(20_000), &claim(4), vec![1; 60]);
     assert_eq!(sent(&mut r, 20_000, Some(&claim(4))), [0]);
     // Nor does it go along with itself where many share the channel.
-    r.air.hear(Time(25_000), 1, (4, 40));
+    share(&mut r, 25_000, 40);
     r.own(Time(25_000), &claim(5), vec![1; 60]);
     let times = sent(&mut r, 25_000, None);
     let apart = times.windows(2).all(|w| w[1] - w[0] >= 2 * 30 * 40);
