@@ -1,7 +1,8 @@
 //! What a peer takes without a round, computed from what it holds (D2.7 §3.6.5): its first
 //! section, orphans or a part of a slower one's plan among many, and what was beyond everybody's
 //! endurance. The rules are [`crate::protocol::sharing`]'s; when they are used,
-//! [`crate::protocol::negotiation`]'s.
+//! [`crate::protocol::negotiation`]'s. These are questions to a [`MissionState`] that need all of
+//! it: loop, executive, sections, company.
 
 use crate::cells::CellSet;
 use crate::cooperation::Situation;

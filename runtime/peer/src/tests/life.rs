@@ -24,6 +24,19 @@ fn a_peer_that_lost_its_disk_takes_a_life_above_the_one_others_know() {
     assert_eq!(h.beliefs(1).incarnation, 2);
 }
 
+/// By it a process knows its own beacons from those of a twin.
+#[test]
+fn every_beacon_carries_the_number_drawn_for_its_process() {
+    let mut h = Harness::started(1, mission(1, 6, 4));
+    h.run_s(10);
+    let nonces = h.seat(1).said.iter().filter_map(|(_, _, body)| match body {
+        Body::Beacon(b) => Some(b.nonce),
+        _ => None,
+    });
+    // The harness draws them by id and start.
+    assert_eq!(nonces.collect::<BTreeSet<_>>(), BTreeSet::from([1001]));
+}
+
 #[test]
 fn a_life_begun_anew_that_outlasted_the_first_is_known_by_the_records_of_the_first() {
     let mut h = Harness::started(2, mission(1, 12, 10));

@@ -23,6 +23,7 @@ fn hold_loiters_where_it_is_and_resume_goes_on() {
     h.order(GROUND_STATION, Order::Hold);
     h.run_s(6);
     assert!(!h.beliefs(1).able && !h.beliefs(2).able);
+    assert_eq!(h.beliefs(2).order, Order::Hold);
     let (places, seen) = ([h.seat(1).pose, h.seat(2).pose], covered(&h, 1));
     for _ in 0..6 {
         h.run_s(5);
