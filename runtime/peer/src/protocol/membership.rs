@@ -600,7 +600,6 @@ impl Membership {
         };
         let version = |h: &HeardHeartbeat| (h.incarnation, h.count);
         if version(&heard) < version(&known.freshest) {
-            known.note_as_near(now, &heard, interval_ms);
             return false;
         }
         if version(&heard) == version(&known.freshest) {

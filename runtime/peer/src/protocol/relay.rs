@@ -382,22 +382,40 @@ impl Relay {
                 self.queue.remove(&k);
             }
         }
-        self.newest_piece = self.newest_piece.max(held.revision.unwrap_or(0));
+        if let Some(revision) = held.revision {
+            self.newest_piece = self.newest_piece.max(revision);
+            self.forget_older_pieces(key.0, revision);
+        }
         self.held.insert(key, held);
         assert!(self.held.len() <= MAX_RECORDS, "records keep to their cap");
     }
 
+    /// A mission of fewer pieces leaves the last ones of the one before, which complete nothing.
+    fn forget_older_pieces(&mut self, author: u16, revision: u32) {
+        let older = self.held.range(keys_of(author));
+        let older = older.filter(|(_, h)| h.revision.is_some_and(|piece| piece < revision));
+        let older: Vec<RecordKey> = older.map(|(key, _)| *key).collect();
+        for key in older {
+            self.held.remove(&key);
+            self.queue.remove(&key);
+        }
+    }
+
+    /// A piece of a mission waits until it is due, however many are before it: those that were
+    /// said lately would else wait in front of those whose lifetime is over, for ever.
     fn wait(&mut self, now: Time, key: RecordKey, kind: Kind, delay_ms: u64) {
         self.queue.make_room(&key);
         let row = kind.row();
         let from = now.plus_ms(delay_ms);
-        let until = from.plus_ms(u64::from(self.lifetime_ms(kind)));
+        let due = self.due(&key, from, row.priority);
+        let lasts_from = if is_piece(&key) { due } else { from };
+        let until = lasts_from.plus_ms(u64::from(self.lifetime_ms(kind)));
         self.queue.insert(
             key,
             Waiting {
                 from,
                 until,
-                due: self.due(&key, from, row.priority),
+                due,
                 priority: row.priority,
                 standing: self.standing(&key, row.priority),
             },

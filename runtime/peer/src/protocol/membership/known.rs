@@ -373,11 +373,10 @@ impl Known {
         }
     }
 
-    /// A heartbeat that is no fresher than the one known came by no more hops than those of
-    /// late. By more only what is fresher counts: who is gone would be farther with each echo.
-    pub(super) fn note_as_near(&mut self, now: Time, heard: &HeardHeartbeat, interval_ms: u64) {
-        let same_life = heard.incarnation == self.freshest.incarnation;
-        if same_life && heard.hops <= self.distance(now, interval_ms) {
+    /// The heartbeat known came once more, by no more hops than those of late. By more only
+    /// what is fresher counts: who is gone would be farther with each echo.
+    fn note_as_near(&mut self, now: Time, heard: &HeardHeartbeat, interval_ms: u64) {
+        if heard.hops <= self.distance(now, interval_ms) {
             self.note_hops(now, heard.hops, interval_ms);
         }
     }

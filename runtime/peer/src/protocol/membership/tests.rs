@@ -618,8 +618,8 @@ fn who_speaks_often_is_suspected_soon_and_given_up_as_late_as_the_slowest() {
     }
 }
 
-/// The freshest heartbeat came round by five hops, an older one by two: it is two hops away,
-/// for some intervals.
+/// A heartbeat came round by five hops and again by two: its author is two hops away for some
+/// intervals, also by fresher ones that come round.
 #[test]
 fn a_peer_is_as_far_as_the_shortest_way_of_late_whatever_way_the_freshest_heartbeat_took() {
     let mut m = Membership::new(1, 1000);
@@ -634,11 +634,11 @@ fn a_peer_is_as_far_as_the_shortest_way_of_late_whatever_way_the_freshest_heartb
         (of_9.heartbeat, of_9.hops)
     };
     assert_eq!(told(&mut m, 100), (7, 5));
-    m.on_beacon(Time(1_000), 3, 1, &beacon(1, vec![over(5, 1)]));
+    m.on_beacon(Time(1_000), 3, 1, &beacon(1, vec![over(7, 1)]));
     assert_eq!(told(&mut m, 1_000), (7, 2));
     assert_eq!(m.eccentricity(Time(1_000)), 2);
-    // What is older and farther changes nothing; what is fresher counts when the other is old.
-    m.on_beacon(Time(2_500), 3, 1, &beacon(2, vec![over(6, 8)]));
+    // What is older changes nothing; what is fresher counts when the shorter way is old.
+    m.on_beacon(Time(2_500), 3, 1, &beacon(2, vec![over(6, 0)]));
     m.on_beacon(Time(4_500), 2, 1, &beacon(2, vec![over(8, 4)]));
     assert_eq!(told(&mut m, 4_900), (8, 2));
     assert_eq!(told(&mut m, 5_100), (8, 5));

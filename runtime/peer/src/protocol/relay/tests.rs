@@ -116,6 +116,68 @@ fn share(r: &mut Relay, now_ms: u64, sharers: u16) {
 }
 
 #[test]
+fn pieces_that_came_at_different_times_are_sent_in_turn_too() {
+    let mut r = relay(2);
+    let mut times = [0; 98];
+    for t in 5_000..3_000_000 {
+        let (subject, rest) = ((t - 5_000) / 700, t % 700);
+        if subject < 98 && rest == 100 {
+            let subject = u16::try_from(subject).unwrap();
+            let byte = u8::try_from(subject).unwrap();
+            r.offer(Time(t), &piece(subject, 98), &[byte; 200], 0);
+        }
+        if t % 1000 == 0 {
+            let lacks = Beacon {
+                revision: 1,
+                sharers: 28,
+                gossip: Vec::new(),
+                ..samples::beacon(1)
+            };
+            r.on_beacon(Time(t), 7, &lacks);
+        }
+        if let Some(out) = r.poll(Time(t)) {
+            times[usize::from(out.bytes[0])] += 1;
+        }
+    }
+    let (least, most) = (times.iter().min(), times.iter().max());
+    assert!(
+        least >= Some(&3) && most <= Some(&(times[0] + 3)),
+        "{times:?}"
+    );
+}
+
+#[test]
+fn what_a_longer_mission_leaves_is_not_sent_any_more() {
+    let mut r = relay(2);
+    let of = |revision, subject| {
+        let mut record = piece(subject, 4);
+        let chunk = MissionChunk {
+            revision,
+            content_hash: 6,
+            chunks: 4,
+            bytes: vec![0; 20],
+        };
+        record.seq = revision * 10 + u32::from(subject);
+        record.body = codec::encode_body(&Body::Mission(chunk));
+        record
+    };
+    let lacks = Beacon {
+        revision: 1,
+        gossip: Vec::new(),
+        ..samples::beacon(1)
+    };
+    r.on_beacon(Time(4_000), 7, &lacks);
+    for (revision, subject) in [(2, 0), (2, 1), (2, 2), (2, 3), (3, 0), (3, 1)] {
+        let bytes = [10 * revision as u8 + subject as u8; 40];
+        r.offer(Time(5_000), &of(revision, subject), &bytes, 0);
+    }
+    let said = (5_000..200_000).filter_map(|t| r.poll(Time(t)).map(|out| out.bytes[0]));
+    let said: std::collections::BTreeSet<u8> = said.collect();
+    assert_eq!(said.into_iter().collect::<Vec<u8>>(), [30, 31]);
+    assert_eq!(r.records().len(), 2);
+}
+
+#[test]
 fn a_mission_goes_to_who_lacks_it_and_what_is_due_before_its_next_piece_goes_first() {
     let mut r = relay(2);
     let neighbour = |revision| Beacon {
