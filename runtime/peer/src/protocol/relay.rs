@@ -149,6 +149,8 @@ struct Held {
     bytes: Vec<u8>,
     hops: u8,
     copies: u8,
+    /// Whether somebody was heard sending it whom this peer has not got it from.
+    is_passed_on: bool,
     /// How often this peer's own record may be sent again yet.
     repeats: u8,
     /// Of which mission it is a piece.
@@ -212,6 +214,7 @@ impl Relay {
                 bytes,
                 hops: 0,
                 copies: 0,
+                is_passed_on: false,
                 repeats: if vital { REPEATS } else { 0 },
                 revision: revision_of(kind, record),
                 sent: now,
@@ -242,6 +245,7 @@ impl Relay {
             }
             if version == known {
                 h.copies = h.copies.saturating_add(1);
+                h.is_passed_on = true;
                 h.sent = now;
                 // A copy by a shorter way: what is passed on has made fewer hops.
                 h.hops = h.hops.min(hops.saturating_add(1));
@@ -261,6 +265,7 @@ impl Relay {
             bytes: bytes.to_vec(),
             hops,
             copies: 1,
+            is_passed_on: false,
             repeats: 0,
             revision: revision_of(kind, record),
             sent: now,
@@ -283,6 +288,7 @@ impl Relay {
             && held.copies > 0
         {
             held.copies = held.copies.saturating_add(1);
+            held.is_passed_on = true;
             held.repeats = 0;
             self.queue.remove(&key);
         }
@@ -324,16 +330,26 @@ impl Relay {
 
     /// By when a record is to be sent: own coverage at once, what others wrote may wait an
     /// interval, telemetry one or two more. Where all are late, each class gets its part:
-    /// nothing waits for ever behind what is more urgent.
+    /// nothing waits for ever behind what is more urgent. A piece that nobody passes on, so
+    /// that maybe nobody has it, waits only for others of that kind.
     fn due(&self, key: &RecordKey, from: Time, priority: Priority) -> Time {
         let telemetry = priority == Priority::Telemetry;
         let intervals = match (key.0 == self.me, telemetry) {
-            _ if is_piece(key) => PIECE_INTERVALS * (1 + self.queue.n_pieces() as u64),
+            _ if is_piece(key) => PIECE_INTERVALS * (1 + self.pieces_before(key) as u64),
             (true, false) => 0,
             (true, true) | (false, false) => 1,
             (false, true) => 3,
         };
         from.plus_ms(intervals * self.air.interval_ms())
+    }
+
+    fn pieces_before(&self, key: &RecordKey) -> usize {
+        let is_passed_on = |key: &RecordKey| self.held.get(key).is_none_or(|h| h.is_passed_on);
+        if is_passed_on(key) {
+            return self.queue.n_pieces();
+        }
+        let waiting = self.queue.pieces();
+        waiting.iter().filter(|key| !is_passed_on(key)).count()
     }
 
     /// What this peer bids and claims itself goes before all else, once: nobody else can say

@@ -147,6 +147,38 @@ fn pieces_that_came_at_different_times_are_sent_in_turn_too() {
 }
 
 #[test]
+fn a_piece_that_nobody_passes_on_is_sent_most_often() {
+    let mut r = relay(2);
+    let of = |subject: u16| [u8::try_from(subject).unwrap(); 200];
+    for subject in 0..40 {
+        r.offer(Time(5_000), &piece(subject, 40), &of(subject), 0);
+    }
+    let mut times = [0; 40];
+    for t in 6_000..1_200_000 {
+        if t % 1000 == 0 {
+            let lacks = Beacon {
+                revision: 1,
+                sharers: 28,
+                gossip: Vec::new(),
+                ..samples::beacon(1)
+            };
+            r.on_beacon(Time(t), 7, &lacks);
+            // Neighbours say the others in turn, each every forty seconds.
+            let subject = u16::try_from(t / 1000 % 40).unwrap();
+            if subject != 7 {
+                r.offer(Time(t), &piece(subject, 40), &of(subject), 0);
+            }
+        }
+        if let Some(out) = r.poll(Time(t)) {
+            times[usize::from(out.bytes[0])] += 1;
+        }
+    }
+    let others = times.iter().enumerate().filter(|(i, _)| *i != 7);
+    let most = others.map(|(_, n)| *n).max().unwrap();
+    assert!(times[7] > 3 * most && most > 1, "{times:?}");
+}
+
+#[test]
 fn what_a_longer_mission_leaves_is_not_sent_any_more() {
     let mut r = relay(2);
     let of = |revision, subject| {
