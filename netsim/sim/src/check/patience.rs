@@ -57,7 +57,8 @@ struct Part {
     heard: Option<(RoundOrder, u64)>,
     /// Whether the round joined last ended in an adoption of this peer.
     decided: bool,
-    /// The least diameter it reckoned with lately: at this snapshot and the one before.
+    /// The least diameter it reckoned with lately: at this snapshot, with a bid since, and at the
+    /// snapshot before.
     diameters: [u32; 2],
     view: Option<Beliefs>,
     /// The cells for which it owes a round.
@@ -132,13 +133,14 @@ impl PatienceCheck {
         &mut self,
         now_ms: u64,
         id: u16,
-        bid: &Bid,
+        (bid, diameter): (&Bid, u32),
         handicaps: &Handicaps,
         found: &mut Findings,
     ) {
         self.owed.stop(id);
         let order = order_of(&bid.round);
         let part = self.parts.entry(id).or_default();
+        part.diameters[0] = part.diameters[0].min(diameter);
         if self.spoken.insert(order) {
             let ago_ms = |t| handicaps.shown_ms(id, t, now_ms);
             judge_patience(self.period_ms, now_ms, (id, part), bid, ago_ms, found);
@@ -396,7 +398,7 @@ mod tests {
             check.on_bid(
                 able_s * 1000,
                 1,
-                &bid(4, repair, 5000),
+                (&bid(4, repair, 5000), 9),
                 &Handicaps::default(),
                 &mut found,
             );
@@ -426,14 +428,14 @@ mod tests {
             check.on_bid(
                 30_000,
                 1,
-                &bid(4, true, 5000),
+                (&bid(4, true, 5000), 9),
                 &Handicaps::default(),
                 &mut found,
             );
             check.on_bid(
                 30_000 + after_ms,
                 1,
-                &bid(5, true, wait_ms),
+                (&bid(5, true, wait_ms), 9),
                 &handicaps,
                 &mut found,
             );
@@ -442,6 +444,21 @@ mod tests {
                 broken,
                 "{wait_ms} {after_ms}"
             );
+        }
+    }
+
+    #[test]
+    fn who_reckons_with_a_narrower_swarm_waits_for_less() {
+        for (diameter, broken) in [(6, true), (4, false)] {
+            let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
+            able_until(&mut check, 30, &mut found);
+            check.parts.entry(1).or_default().diameters = [6, 6];
+            for (at_ms, counter, wait_ms) in [(30_000, 4, 9_000), (39_100, 5, 18_000)] {
+                let bid = bid(counter, true, wait_ms);
+                let handicaps = Handicaps::default();
+                check.on_bid(at_ms, 1, (&bid, diameter), &handicaps, &mut found);
+            }
+            assert_eq!(found.counts.contains_key("waiting"), broken, "{diameter}");
         }
     }
 
@@ -488,7 +505,7 @@ mod tests {
                 check.on_bid(
                     30_300,
                     1,
-                    &bid(7, true, 5000),
+                    (&bid(7, true, 5000), 9),
                     &Handicaps::default(),
                     &mut found,
                 );

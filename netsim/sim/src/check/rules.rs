@@ -255,7 +255,8 @@ impl Rules {
         });
         self.decision
             .on_bid(now_ms, id, bid, (view, mover), handicaps, found);
-        self.patience.on_bid(now_ms, id, bid, handicaps, found);
+        self.patience
+            .on_bid(now_ms, id, (bid, view.diameter), handicaps, found);
     }
 
     /// A peer asks for a division, and gets it.
