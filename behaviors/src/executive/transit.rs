@@ -578,9 +578,7 @@ impl Transit {
     /// such place, the circle here that keeps farthest.
     #[must_use]
     pub fn way_to_loiter(&self, from: &Place) -> Vec<Move> {
-        let clearance_m = self.router.limits().clearance_m;
-        let (here, room_m) = self.circle(&from.pose);
-        if room_m >= clearance_m - ROUNDING_M {
+        if let Some(here) = self.roomy_circle(&from.pose) {
             return vec![Move::Loiter(here)];
         }
         let mut moves = Vec::new();
@@ -591,8 +589,7 @@ impl Transit {
                 Direction::Backward => self.before(b),
             };
             moves.extend(self.along(b, d, next, f64::INFINITY).unwrap_or_default());
-            let (circle, room_m) = self.circle(&self.place(next, d).pose);
-            if room_m >= clearance_m - ROUNDING_M {
+            if let Some(circle) = self.roomy_circle(&self.place(next, d).pose) {
                 moves.push(Move::Loiter(circle));
                 return moves;
             }
@@ -600,15 +597,14 @@ impl Transit {
         }
         for b in self.nearest(from.pose.position(), MAX_NEAREST_TRIES) {
             for d in [Direction::Forward, Direction::Backward] {
-                let (circle, room_m) = self.circle(&self.place(b, d).pose);
-                if room_m >= clearance_m - ROUNDING_M
+                if let Some(circle) = self.roomy_circle(&self.place(b, d).pose)
                     && let Ok(curve) = self.route(from.pose, circle.start)
                 {
                     return vec![Move::Route(curve), Move::Loiter(circle)];
                 }
             }
         }
-        vec![Move::Loiter(here)]
+        vec![self.stay(from)]
     }
 
     /// The way to a point, and a circle that keeps clear of the zones: through the point
@@ -619,16 +615,11 @@ impl Transit {
         let mut moves = self.connect_to_point(from, to)?;
         let steps = moves.iter();
         let end = steps.fold(*from, |place, step| self.end_of(&place, step));
-        let clearance_m = self.router.limits().clearance_m;
-        let has_room = |pose: &Pose| {
-            let (circle, room_m) = self.circle(pose);
-            (room_m >= clearance_m - ROUNDING_M).then_some(circle)
-        };
-        if has_room(&end.pose).is_none() {
+        if self.roomy_circle(&end.pose).is_none() {
             let headings =
                 (0..WAITING_HEADINGS).map(|k| f64::from(k) * TAU / f64::from(WAITING_HEADINGS));
             let ways = headings.filter_map(|heading_rad| {
-                let circle = has_room(&Pose::new(to, heading_rad))?;
+                let circle = self.roomy_circle(&Pose::new(to, heading_rad))?;
                 Some((self.route(from.pose, circle.start).ok()?, circle))
             });
             let shortest = ways.min_by(|(a, _), (b, _)| a.length_m().total_cmp(&b.length_m()));
@@ -658,6 +649,12 @@ impl Transit {
     #[must_use]
     pub fn stay(&self, at: &Place) -> Move {
         Move::Loiter(self.circle(&at.pose).0)
+    }
+
+    /// A circle through a pose that keeps clear of the zones, if there is one.
+    fn roomy_circle(&self, pose: &Pose) -> Option<Segment> {
+        let (circle, room_m) = self.circle(pose);
+        (room_m >= self.router.limits().clearance_m - ROUNDING_M).then_some(circle)
     }
 
     /// The circle through a pose that keeps farthest from the zones, and how far; a

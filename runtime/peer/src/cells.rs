@@ -233,18 +233,6 @@ impl CellSet {
         })
     }
 
-    /// One flag a cell of the loop.
-    #[must_use]
-    pub fn flags(&self) -> Vec<bool> {
-        let bits = |word: &u64| {
-            let word = *word;
-            (0..64).map(move |i| word & (1 << i) != 0)
-        };
-        let mut flags: Vec<bool> = self.words.iter().flat_map(bits).collect();
-        flags.truncate(usize::from(self.n));
-        flags
-    }
-
     /// Identifies the content: two sets that differ differ here but for chance.
     #[must_use]
     pub fn digest(&self) -> u32 {
@@ -407,8 +395,8 @@ mod tests {
             // Not any(): each of them is added.
             let fresh = listed.map(|c| other.insert(u16::try_from(c).unwrap())).fold(false, |a, b| a | b);
             prop_assert_eq!(set.insert_run(CellRun { first, count }), fresh);
-            let flags: Vec<bool> = (0..n).map(|c| other.contains(c)).collect();
-            prop_assert_eq!(set.flags(), flags);
+            let flags = |set: &CellSet| (0..n).map(|c| set.contains(c)).collect::<Vec<bool>>();
+            prop_assert_eq!(flags(&set), flags(&other));
             prop_assert_eq!(set, other);
         }
 

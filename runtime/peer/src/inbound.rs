@@ -78,7 +78,7 @@ pub(crate) fn sort<'a>(heard: &'a Transmission, me: u16, life: &Life) -> Heard<'
 mod tests {
     use super::*;
     use crate::wire::codec;
-    use crate::wire::message::{Finished, Heartbeat};
+    use crate::wire::message::Finished;
     use crate::wire::signature::SIGNATURE_MAX_BYTES;
 
     #[test]

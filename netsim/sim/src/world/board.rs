@@ -45,6 +45,12 @@ pub(super) struct Board {
     longest_gap_ms: u64,
 }
 
+/// From corner to corner of a picture, metres.
+fn diagonal_m(airframe: &Airframe) -> f64 {
+    let (a, b) = (airframe.footprint_across_m, airframe.footprint_along_m);
+    (a * a + b * b).sqrt()
+}
+
 fn is_coverable(cell: &Cell) -> bool {
     cell.uncoverable.is_none()
 }
@@ -227,8 +233,7 @@ impl Board {
             return;
         };
         let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
-        let reach_m = (across_m * across_m + along_m * along_m).sqrt();
-        for i in pieces.near(pose.position(), reach_m) {
+        for i in pieces.near(pose.position(), diagonal_m(airframe)) {
             seen[i] = seen[i] || pieces.held(i, pose, across_m, along_m);
         }
     }
@@ -276,8 +281,7 @@ impl Board {
     fn reach_m(&self, airframe: &Airframe) -> f64 {
         if self.survey.pieces().is_some() {
             // A corner of a piece may lie in a corner of the picture.
-            let (a, b) = (airframe.footprint_across_m, airframe.footprint_along_m);
-            return (a * a + b * b).sqrt();
+            return diagonal_m(airframe);
         }
         let half = self.survey.extent_m() / 2.0;
         let (a, b) = (

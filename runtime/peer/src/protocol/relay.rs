@@ -149,7 +149,7 @@ struct Held {
     bytes: Vec<u8>,
     hops: u8,
     copies: u8,
-    /// Whether somebody was heard sending it whom this peer has not got it from.
+    /// Whether this version was heard once more since it is held here.
     is_passed_on: bool,
     /// How often this peer's own record may be sent again yet.
     repeats: u8,
@@ -313,12 +313,15 @@ impl Relay {
     /// A later life supersedes all that earlier ones said: it is neither held nor
     /// sent any more.
     fn void(&mut self, author: u16, incarnation: Incarnation) {
-        let earlier = self
-            .held
-            .range(keys_of(author))
-            .filter(|(_, h)| h.record.incarnation < incarnation);
-        let earlier: Vec<RecordKey> = earlier.map(|(key, _)| *key).collect();
-        for key in earlier {
+        self.forget(author, |held| held.record.incarnation < incarnation);
+    }
+
+    /// Such records of an author are neither held nor sent any more.
+    fn forget(&mut self, author: u16, is_past: impl Fn(&Held) -> bool) {
+        let past = self.held.range(keys_of(author));
+        let past = past.filter(|(_, held)| is_past(held));
+        let past: Vec<RecordKey> = past.map(|(key, _)| *key).collect();
+        for key in past {
             self.held.remove(&key);
             self.queue.remove(&key);
         }
@@ -400,21 +403,14 @@ impl Relay {
         }
         if let Some(revision) = held.revision {
             self.newest_piece = self.newest_piece.max(revision);
-            self.forget_older_pieces(key.0, revision);
+            // A mission of fewer pieces leaves the last ones of the one before, which complete
+            // nothing.
+            self.forget(key.0, |held| {
+                held.revision.is_some_and(|piece| piece < revision)
+            });
         }
         self.held.insert(key, held);
         assert!(self.held.len() <= MAX_RECORDS, "records keep to their cap");
-    }
-
-    /// A mission of fewer pieces leaves the last ones of the one before, which complete nothing.
-    fn forget_older_pieces(&mut self, author: u16, revision: u32) {
-        let older = self.held.range(keys_of(author));
-        let older = older.filter(|(_, h)| h.revision.is_some_and(|piece| piece < revision));
-        let older: Vec<RecordKey> = older.map(|(key, _)| *key).collect();
-        for key in older {
-            self.held.remove(&key);
-            self.queue.remove(&key);
-        }
     }
 
     /// A piece of a mission waits until it is due, however many are before it: those that were

@@ -79,19 +79,32 @@ fn piece(subject: u16, chunks: u16) -> Record {
     }
 }
 
-#[test]
-fn all_pieces_of_a_mission_are_sent_in_turn_though_few_go_within_their_lifetime() {
-    let mut r = relay(2);
-    for subject in 0..40 {
-        let byte = u8::try_from(subject).unwrap();
-        r.offer(Time(5_000), &piece(subject, 40), &[byte; 200], 0);
-    }
-    let mut times = [0; 40];
-    for t in 8_000..1_200_000 {
-        if t % 2000 == 0 {
+/// A piece of a mission of so many is heard.
+fn hear_piece(r: &mut Relay, now_ms: u64, subject: u64, chunks: u16) {
+    let byte = u8::try_from(subject).unwrap();
+    r.offer(
+        Time(now_ms),
+        &piece(u16::from(byte), chunks),
+        &[byte; 200],
+        0,
+    );
+}
+
+/// How often each of `N` pieces is sent in a time while a neighbour's beacon shows now and then
+/// that it lacks them; first in each millisecond comes what is heard in it.
+fn pieces_sent<const N: usize>(
+    r: &mut Relay,
+    during_ms: core::ops::Range<u64>,
+    (every_ms, sharers): (u64, u16),
+    hears: impl Fn(&mut Relay, u64),
+) -> [u32; N] {
+    let mut times = [0; N];
+    for t in during_ms {
+        hears(r, t);
+        if t.is_multiple_of(every_ms) {
             let lacks = Beacon {
                 revision: 1,
-                sharers: 60,
+                sharers,
                 gossip: Vec::new(),
                 ..samples::beacon(1)
             };
@@ -101,6 +114,16 @@ fn all_pieces_of_a_mission_are_sent_in_turn_though_few_go_within_their_lifetime(
             times[usize::from(out.bytes[0])] += 1;
         }
     }
+    times
+}
+
+#[test]
+fn all_pieces_of_a_mission_are_sent_in_turn_though_few_go_within_their_lifetime() {
+    let mut r = relay(2);
+    for subject in 0..40 {
+        hear_piece(&mut r, 5_000, subject, 40);
+    }
+    let times: [u32; 40] = pieces_sent(&mut r, 8_000..1_200_000, (2000, 60), |_, _| ());
     let (least, most) = (times.iter().min(), times.iter().max());
     assert!(
         least >= Some(&2) && most <= Some(&(times[0] + 3)),
@@ -117,28 +140,13 @@ fn share(r: &mut Relay, now_ms: u64, sharers: u16) {
 
 #[test]
 fn pieces_that_came_at_different_times_are_sent_in_turn_too() {
-    let mut r = relay(2);
-    let mut times = [0; 98];
-    for t in 5_000..3_000_000 {
+    let comes = |r: &mut Relay, t: u64| {
         let (subject, rest) = ((t - 5_000) / 700, t % 700);
         if subject < 98 && rest == 100 {
-            let subject = u16::try_from(subject).unwrap();
-            let byte = u8::try_from(subject).unwrap();
-            r.offer(Time(t), &piece(subject, 98), &[byte; 200], 0);
+            hear_piece(r, t, subject, 98);
         }
-        if t % 1000 == 0 {
-            let lacks = Beacon {
-                revision: 1,
-                sharers: 28,
-                gossip: Vec::new(),
-                ..samples::beacon(1)
-            };
-            r.on_beacon(Time(t), 7, &lacks);
-        }
-        if let Some(out) = r.poll(Time(t)) {
-            times[usize::from(out.bytes[0])] += 1;
-        }
-    }
+    };
+    let times: [u32; 98] = pieces_sent(&mut relay(2), 5_000..3_000_000, (1000, 28), comes);
     let (least, most) = (times.iter().min(), times.iter().max());
     assert!(
         least >= Some(&3) && most <= Some(&(times[0] + 3)),
@@ -149,30 +157,17 @@ fn pieces_that_came_at_different_times_are_sent_in_turn_too() {
 #[test]
 fn a_piece_that_nobody_passes_on_is_sent_most_often() {
     let mut r = relay(2);
-    let of = |subject: u16| [u8::try_from(subject).unwrap(); 200];
     for subject in 0..40 {
-        r.offer(Time(5_000), &piece(subject, 40), &of(subject), 0);
+        hear_piece(&mut r, 5_000, subject, 40);
     }
-    let mut times = [0; 40];
-    for t in 6_000..1_200_000 {
-        if t % 1000 == 0 {
-            let lacks = Beacon {
-                revision: 1,
-                sharers: 28,
-                gossip: Vec::new(),
-                ..samples::beacon(1)
-            };
-            r.on_beacon(Time(t), 7, &lacks);
-            // Neighbours say the others in turn, each every forty seconds.
-            let subject = u16::try_from(t / 1000 % 40).unwrap();
-            if subject != 7 {
-                r.offer(Time(t), &piece(subject, 40), &of(subject), 0);
-            }
+    // Neighbours say the others in turn, each every forty seconds.
+    let passed_on = |r: &mut Relay, t: u64| {
+        let subject = t / 1000 % 40;
+        if t.is_multiple_of(1000) && subject != 7 {
+            hear_piece(r, t, subject, 40);
         }
-        if let Some(out) = r.poll(Time(t)) {
-            times[usize::from(out.bytes[0])] += 1;
-        }
-    }
+    };
+    let times: [u32; 40] = pieces_sent(&mut r, 6_000..1_200_000, (1000, 28), passed_on);
     let others = times.iter().enumerate().filter(|(i, _)| *i != 7);
     let most = others.map(|(_, n)| *n).max().unwrap();
     assert!(times[7] > 3 * most && most > 1, "{times:?}");
