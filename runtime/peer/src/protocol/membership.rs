@@ -25,13 +25,15 @@
 //! a merging component cannot raise the dead. What follows from a verdict is left to
 //! the callers; here it revokes nothing.
 
+mod extent;
 mod known;
 #[cfg(test)]
 pub(crate) mod many_detectors;
+mod telling;
 #[cfg(test)]
 mod tests;
 
-use super::airtime::{ENTRY_BYTES, FRESH_BYTES, ms_of};
+use super::airtime::ms_of;
 use super::life::LIFE_STEP;
 use crate::Incarnation;
 use crate::input::Time;
@@ -41,33 +43,17 @@ use crate::wire::limits::INTERVAL_LEAST;
 use crate::wire::limits::{HOPS_MAX, PEERS_MAX};
 use crate::wire::message::{Beacon, Fresh, Gossip, OffLoop};
 use core::cell::Cell;
-use core::cmp::Reverse;
+use extent::{Extent, Patience, window_ms};
 use known::{Age, HeardHeartbeat, Known, Weight};
 use std::collections::{BTreeMap, BTreeSet};
+use telling::{Moment, Telling};
 
 /// Most other peers known: the largest fleet but this peer itself. A flood of made-up ids
 /// must end somewhere.
 pub const MAX_KNOWN: usize = PEERS_MAX - 1;
 
-/// Hops and eccentricities count for so many of the longest intervals after they were
-/// heard: what a neighbour says of others comes round, and what is lost comes again.
-const HOP_INTERVALS: u64 = 10;
-
-/// Over so many hops an answer to a suspicion comes back within k2.
-const NEAR_HOPS: u64 = 4;
-
 /// What was not told of within so many intervals is no news any more.
 const URGENT_INTERVALS: u64 = 6;
-
-/// A heartbeat carries so many of others at most: then it is half as long as a beacon.
-const BETWEEN_MAX: usize = 8;
-
-/// Of a heartbeat that is older than such a part of the bound a later one is asked for, by
-/// telling it: most that are known are younger, and the rest of the bound is for the answer.
-const OLD: u64 = 4;
-
-/// For each again after so many intervals: each neighbour has spoken twice by then.
-const ASK_INTERVALS: u64 = 2;
 
 /// A belief that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,48 +64,6 @@ pub struct Change {
     pub incarnation: Incarnation,
     /// The new belief; `Alive` for a peer or a life not known before.
     pub status: Status,
-}
-
-/// How long a peer waits before it believes what, at one moment.
-#[derive(Clone, Copy, Debug)]
-struct Patience {
-    /// The longest interval announced, T'.
-    interval_ms: u64,
-    /// D beyond [`NEAR_HOPS`].
-    far_hops: u64,
-    /// k1, quarters.
-    k1_quarters: u64,
-    /// Time to refute a suspicion: k2 T'.
-    k2_ms: u64,
-    /// No living peer's heartbeat is older: (k1 + k2 + D + 2) T'.
-    bound_ms: u64,
-}
-
-impl Patience {
-    /// Time to refute a suspicion of who announced such an interval: k2 T', and as much more
-    /// as it is suspected sooner than the slowest would be. Where many are on the way what a
-    /// heartbeat takes is counted in the longest interval, whoever sent it. A question and its
-    /// answer wait for their turn at each hop: a third of T' more for each beyond four.
-    fn verdict_ms(&self, interval_ms: u64) -> u64 {
-        let sooner_ms = self.interval_ms.saturating_sub(interval_ms);
-        let far_ms = self.far_hops * self.interval_ms / 3;
-        self.k2_ms + sooner_ms * self.k1_quarters / 4 + far_ms
-    }
-}
-
-/// How slow and how wide the swarm is, as far as this peer knows.
-#[derive(Clone, Copy, Debug)]
-struct Extent {
-    /// The longest interval that anybody alive announced, T', quarters of T.
-    interval: u8,
-    /// Who announced it, unless this peer did.
-    interval_by: Option<u16>,
-    /// The most hops that anybody alive is away, or says that somebody is.
-    hops: u8,
-    /// Whose hops these are: of several the one of whom they were heard last.
-    hops_by: Option<u16>,
-    /// Unless something else is heard it is so until then.
-    until: Time,
 }
 
 /// What a peer last said of itself in its present life.
@@ -157,9 +101,7 @@ pub struct Membership {
     me: u16,
     period_ms: u64,
     known: BTreeMap<u16, Known>,
-    next_gossip: u16,
-    /// So many heartbeats of others the next own one carries.
-    between: usize,
+    telling: Telling,
     /// What this peer announced itself, quarters of T.
     interval: u8,
     doubt_until: Time,
@@ -186,9 +128,7 @@ impl Membership {
             me,
             period_ms: u64::from(period_ms.max(1)),
             known: BTreeMap::new(),
-            // Neighbours tell of different peers.
-            next_gossip: me,
-            between: 0,
+            telling: Telling::new(me),
             interval: INTERVAL_LEAST,
             doubt_until: Time(0),
             waking: (Time(0), 0),
@@ -256,103 +196,45 @@ impl Membership {
         told.unwrap_or(0).max(self.interval)
     }
 
-    fn living(&self) -> impl Iterator<Item = &Known> {
+    fn living(&self) -> impl Iterator<Item = &Known> + Clone {
         self.known.values().filter(|k| k.status != Status::Down)
     }
 
     /// Asked for with every input, and measured only after it changed.
     fn extent(&self, now: Time) -> Extent {
         let known = self.extent.get().filter(|e| now < e.until);
-        let extent = known.unwrap_or_else(|| self.measured(now));
+        let extent = known
+            .unwrap_or_else(|| Extent::measured(self.living(), self.interval, self.period_ms, now));
         self.extent.set(Some(extent));
         extent
-    }
-
-    fn measured(&self, now: Time) -> Extent {
-        let slowest = self.living().max_by_key(|k| k.freshest.interval);
-        let slowest = slowest.map(|k| k.freshest);
-        let slowest = slowest.filter(|h| h.interval > self.interval);
-        let interval = slowest.map_or(self.interval, |h| h.interval);
-        let window_ms = self.window_ms(interval);
-        let each: Vec<(&Known, Weight)> = self
-            .living()
-            .map(|k| (k, k.weight(now, window_ms)))
-            .collect();
-        let hops = each.iter().map(|(_, w)| w.hops.max(w.eccentricity)).max();
-        let hops = hops.unwrap_or(0);
-        // Until then nobody is farther, and somebody is as far.
-        let mut nearer = Time(u64::MAX);
-        let mut as_far: Option<(Time, u16)> = None;
-        for (known, weight) in each {
-            let last = known.last_within(hops);
-            let said = known.info.heard.filter(|_| weight.eccentricity == hops);
-            let is_as_far = (weight.hops == hops).then_some(last).max(said);
-            if weight.hops > 0 {
-                nearer = nearer.min(last);
-            }
-            as_far = as_far.max(is_as_far.map(|since| (since, known.freshest.id)));
-        }
-        let as_far = as_far.filter(|_| hops > 0);
-        let until = as_far.map_or(nearer, |(since, _)| nearer.min(since));
-        Extent {
-            interval,
-            interval_by: slowest.map(|h| h.id),
-            hops,
-            hops_by: as_far.map(|(_, id)| id),
-            until: until.plus_ms(window_ms),
-        }
-    }
-
-    /// Hops and eccentricities count for so long.
-    fn window_ms(&self, interval: u8) -> u64 {
-        HOP_INTERVALS * ms_of(interval, self.period_ms)
     }
 
     /// What the extent owes to a peer.
     fn weight(&self, now: Time, id: u16) -> Weight {
         let known = self.known.get(&id).zip(self.extent.get());
         known.map_or(Weight::default(), |(known, extent)| {
-            known.weight(now, self.window_ms(extent.interval))
+            known.weight(now, window_ms(extent.interval, self.period_ms))
         })
     }
 
-    /// A peer weighs something else now: the extent stays what it is unless this peer's was
-    /// the most or is more. Of who comes back what was heard before it went counts again.
+    /// A peer weighs something else now.
     fn weighed(&mut self, id: u16, before: Weight, after: Weight) {
-        let Some(extent) = self.extent.get().filter(|_| before != after) else {
-            return;
-        };
-        let was_most = [extent.interval_by, extent.hops_by].contains(&Some(id));
-        let is_more = after.interval > extent.interval
-            || after.hops > extent.hops
-            || after.eccentricity > extent.hops;
-        if was_most || is_more || before == Weight::default() {
+        let extent = self.extent.get();
+        if extent.is_some_and(|e| e.depends_on(id, before, after)) {
             self.extent.set(None);
         }
     }
 
-    /// A peer whose own loop ran late doubts its verdicts first: both factors double.
     fn patience(&self, now: Time) -> Patience {
-        let doubt = if now < self.doubt_until { 2 } else { 1 };
         let diameter = u64::from(self.diameter(now));
-        let interval_ms = self.interval_ms();
-        let k1_quarters = doubt * (16 + diameter);
-        let k2_ms = doubt * interval_ms * (8 + diameter) / 2;
-        let travel_ms = (diameter + 2) * interval_ms;
-        Patience {
-            interval_ms,
-            far_hops: diameter.saturating_sub(NEAR_HOPS),
-            k1_quarters,
-            k2_ms,
-            bound_ms: interval_ms * k1_quarters / 4 + k2_ms + travel_ms,
-        }
+        Patience::new(self.interval_ms(), diameter, now < self.doubt_until)
     }
 
     /// Silence after which a peer is suspected, milliseconds: k1 T'.
     #[must_use]
     pub fn k1_ms(&self, now: Time) -> u64 {
         let patience = self.patience(now);
-        patience.interval_ms * patience.k1_quarters / 4
+        patience.k1_ms(patience.interval_ms)
     }
 
     /// The longest time by which all know of a death, milliseconds.
@@ -712,11 +594,6 @@ impl Membership {
             "peers known keep to their cap"
         );
         let patience = self.patience(now);
-        let Patience {
-            k1_quarters,
-            bound_ms,
-            ..
-        } = patience;
         let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
         let tick_ms = self.period_ms / CADENCE;
         let mut changes = Vec::new();
@@ -725,7 +602,7 @@ impl Membership {
             // Who heard it from others since its link ended knows that the link ended.
             let answers_for_it = known.freshest.hops == 1;
             let interval_ms = ms_of(known.freshest.interval, self.period_ms);
-            let k1_ms = interval_ms * k1_quarters / 4;
+            let k1_ms = patience.k1_ms(interval_ms);
             let patience_ms = if self.gone.contains(&known.freshest.id) {
                 k1_ms / 2
             } else {
@@ -740,7 +617,7 @@ impl Membership {
                 known.is_untold_suspicion = true;
             }
             let verdict_ms = patience.verdict_ms(interval_ms);
-            let status = if known.is_condemned(now, verdict_ms) || silent_ms > bound_ms {
+            let status = if known.is_condemned(now, verdict_ms) || silent_ms > patience.bound_ms {
                 Status::Down
             } else if known.freshest.suspected.is_some() {
                 Status::Suspect
@@ -760,124 +637,33 @@ impl Membership {
         changes
     }
 
-    /// What to say of others in the room of so many entries: where not everybody fits, a
-    /// quarter of it is for whole entries and another for news, the rest for heartbeats alone,
-    /// of those first of whom it gains most to tell. Half of these go with the heartbeat between
-    /// this beacon and the next ([`Membership::tell_between`]). One of them asks: it is told since
-    /// it is old, and whoever knows a later one tells that.
+    /// What a beacon says of others in the room of so many entries: whole entries, and
+    /// heartbeats alone.
     pub fn tell(&mut self, now: Time, entries: usize) -> (Vec<Gossip>, Vec<Fresh>) {
-        if self.known.len() <= entries {
-            self.between = 0;
-            return (self.gossip(now, entries), Vec::new());
-        }
-        let untold = |k: &&Known| k.is_untold_news(now);
-        let news = self.known.values().filter(untold).count();
-        let full = entries.div_ceil(4) + news.min(entries / 4);
-        let told = self.gossip(now, full);
-        let room = (entries - full) * ENTRY_BYTES / FRESH_BYTES;
-        self.between = room.div_ceil(2).min(BETWEEN_MAX);
-        let fresh = self.fresh(now, &told, room - self.between, true);
-        (told, fresh)
+        let moment = self.moment(now);
+        self.telling.tell(&mut self.known, moment, entries)
     }
 
-    fn fresh(&mut self, now: Time, told: &[Gossip], max: usize, asks: bool) -> Vec<Fresh> {
-        // Where everybody hears everybody nobody has to be told.
-        let far = self.diameter(now) > 1;
-        let old_ms = self.patience(now).bound_ms / OLD;
-        let again_ms = ASK_INTERVALS * self.own_interval_ms();
-        let interval_ms = self.interval_ms();
-        let others = self
-            .known
-            .iter_mut()
-            .filter(|(_, k)| k.is_believed() && (far || k.is_wanted(now)));
-        let mut wanted: Vec<&mut Known> = others
-            .filter(|(id, _)| told.iter().all(|g| g.id != **id))
-            .map(|(_, k)| k)
-            .collect();
-        wanted.sort_by_cached_key(|k| (Reverse(k.want(now)), k.freshest.id));
-        if asks && far {
-            let old = wanted.iter().enumerate();
-            let old = old.filter(|(_, k)| k.asks(now, old_ms, again_ms));
-            let oldest = old.max_by_key(|(at, k)| (k.freshest.age.ms(now), Reverse(*at)));
-            if let Some((at, _)) = oldest {
-                wanted[..=at].rotate_right(1);
-            }
-        }
-        wanted.truncate(max);
-        wanted.sort_by_key(|k| k.freshest.id);
-        let say = |known: &mut Known| {
-            known.tell(now);
-            known.fresh(now, interval_ms)
-        };
-        wanted.into_iter().map(say).collect()
-    }
-
-    /// What the next heartbeat says of others: those that the last beacon had no room for.
-    /// It is short, so it often arrives where a beacon does not.
+    /// What the next heartbeat says of others.
     pub fn tell_between(&mut self, now: Time) -> Vec<Fresh> {
-        let room = std::mem::take(&mut self.between);
-        self.fresh(now, &[], room, false)
+        let moment = self.moment(now);
+        self.telling.between(&mut self.known, moment)
     }
 
-    /// Whole entries of others: at most `max`. Who began a life anew without
-    /// knowing is reminded first (a quarter of the entries at most), then news (half of
-    /// the rest at most), then those whom a neighbour is farther from than this peer (two
-    /// thirds of the rest), then all in rotation, so that nobody is left out for long. The
-    /// relay fills in the versions of records.
-    pub fn gossip(&mut self, now: Time, max: usize) -> Vec<Gossip> {
-        let interval_ms = self.interval_ms();
-        let known = self.known.values();
-        let reminders = known.filter_map(|k| k.reminder(now, interval_ms));
-        let mut told: Vec<Gossip> = reminders.take(max / 4).collect();
-        let max = max - told.len();
-        let urgent = self.known.iter().filter(|(_, k)| k.is_news(now));
-        let mut ids: Vec<u16> = urgent.map(|(id, _)| *id).collect();
-        // Nobody can refute a suspicion before it is told. Then the latest news: a flood of them
-        // must not starve the last one.
-        let order = |k: &Known| (k.is_untold_suspicion, Reverse(k.news_told), k.urgent_until);
-        ids.sort_by_key(|id| Reverse(self.known.get(id).map(order)));
-        ids.truncate(max / 2);
-        let others = self.known.iter().filter(|(id, _)| !ids.contains(id));
-        let wanted = others.filter(|(_, k)| k.is_wanted(now));
-        let mut wanted: Vec<(Reverse<(u64, u64)>, u16)> =
-            wanted.map(|(id, k)| (Reverse(k.want(now)), *id)).collect();
-        wanted.sort_unstable();
-        let room = max - ids.len();
-        ids.extend(
-            wanted
-                .iter()
-                .take(room - room.div_ceil(3))
-                .map(|(_, id)| *id),
-        );
-        let rotation = self
-            .known
-            .range(self.next_gossip..)
-            .chain(self.known.range(..self.next_gossip));
-        let rest: Vec<u16> = rotation
-            .map(|(id, _)| *id)
-            .filter(|id| !ids.contains(id))
-            .take(max - ids.len())
-            .collect();
-        if let Some(last) = rest.last() {
-            self.next_gossip = last.wrapping_add(1);
+    fn moment(&self, now: Time) -> Moment {
+        Moment {
+            now,
+            is_far: self.diameter(now) > 1,
+            interval_ms: self.interval_ms(),
+            own_interval_ms: self.own_interval_ms(),
+            bound_ms: self.patience(now).bound_ms,
         }
-        ids.extend(rest);
-        let own_ms = self.own_interval_ms();
-        for id in &ids {
-            if let Some(known) = self.known.get_mut(id) {
-                known.tell(now);
-                known.tell_news(now, own_ms);
-            }
-        }
-        let entries = ids.iter().filter_map(|id| self.known.get(id));
-        told.extend(entries.map(|k| k.gossip(now, interval_ms)));
-        told
     }
 
     /// Fewest hops to the farthest live author of the last 10 T'.
     #[must_use]
     pub fn eccentricity(&self, now: Time) -> u8 {
-        let window_ms = self.window_ms(self.extent(now).interval);
+        let window_ms = window_ms(self.extent(now).interval, self.period_ms);
         let hops = self.living().map(|k| k.weight(now, window_ms).hops);
         hops.max().unwrap_or(0)
     }
@@ -923,12 +709,8 @@ impl Membership {
     /// Whether nobody was heard for k1 T', who was heard before.
     #[must_use]
     pub fn hears_nobody(&self, now: Time) -> bool {
-        let Patience {
-            interval_ms,
-            k1_quarters,
-            ..
-        } = self.patience(now);
-        let silent = |heard: Time| now.since_ms(heard) >= interval_ms * k1_quarters / 4;
+        let k1_ms = self.k1_ms(now);
+        let silent = |heard: Time| now.since_ms(heard) >= k1_ms;
         self.last_heard.is_some_and(silent)
     }
 

@@ -298,7 +298,7 @@ impl Known {
             teller,
             since: Told::of(sent),
             at: now,
-            until: now.plus_ms(super::HOP_INTERVALS * interval_ms),
+            until: now.plus_ms(super::extent::HOP_INTERVALS * interval_ms),
         };
         if !farther && !behind {
             self.lag = self.lag.filter(|lag| lag.teller != teller);

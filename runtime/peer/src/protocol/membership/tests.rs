@@ -3,6 +3,18 @@
 use super::*;
 use crate::wire::samples;
 
+impl Membership {
+    /// Whole entries of others: at most `max`.
+    pub(super) fn gossip(&mut self, now: Time, max: usize) -> Vec<Gossip> {
+        let moment = self.moment(now);
+        self.telling.whole(&mut self.known, moment, max)
+    }
+
+    fn measured(&self, now: Time) -> Extent {
+        Extent::measured(self.living(), self.interval, self.period_ms, now)
+    }
+}
+
 fn beacon(heartbeat: u32, gossip: Vec<Gossip>) -> Beacon {
     Beacon {
         gossip,
@@ -696,7 +708,7 @@ fn the_diameter_is_the_largest_eccentricity_heard_of_in_ten_intervals() {
     );
     // Both patiences grow with it: k1 = 4 + 6/4, k2 = 4 + 6/2 of the longest interval.
     let patience = m.patience(Time(20_000));
-    assert_eq!((patience.k1_quarters, patience.k2_ms), (22, 7_000));
+    assert_eq!(patience.k1_ms(1_000), 5_500);
     assert_eq!(patience.bound_ms, 5_500 + 7_000 + 8_000);
     // Two hops beyond four: a verdict waits two thirds of an interval longer.
     assert_eq!(patience.verdict_ms(1_000), 7_666);
