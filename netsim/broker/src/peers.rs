@@ -5,6 +5,7 @@ use crate::config::{Surroundings, lease_ms};
 use crate::error::{TrialError, io};
 use crate::live_peer::LivePeer;
 use crate::live_world::LiveWorld;
+use crate::pacer::STEP_MS;
 use crate::process::{Processes, Used};
 use crate::registry::{ConsoleEntry, private_file};
 use crate::stream::{Heard, Line, Streams};
@@ -13,6 +14,7 @@ use skein_behaviors::Setpoint;
 use skein_link::frame::ToWorld;
 use skein_link::{LinkNews, RadioCounters};
 use skein_netsim::spec::Spec;
+use skein_netsim::world::percept_phase_ms;
 use skein_peer::Report;
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -94,6 +96,13 @@ pub(crate) struct Peers {
     transports: Transports,
     processes: Processes,
     seed: u64,
+}
+
+/// Whether one of so many senses in the step of the world that ends now.
+fn senses(now_ms: u64, nth: usize, of: usize, period_ms: u32) -> bool {
+    let period = u64::from(period_ms.max(1));
+    let ahead_ms = period - percept_phase_ms(nth, of, period_ms) % period;
+    (now_ms + ahead_ms) / period > (now_ms + ahead_ms).saturating_sub(STEP_MS) / period
 }
 
 impl Peers {
@@ -275,9 +284,9 @@ impl Peers {
         }
     }
 
-    /// Follows the world: tells everybody the time and the links, and what it senses
-    /// where `percepts` says so.
-    pub(crate) fn tell(&mut self, clock: Clock, world: &LiveWorld, percepts: bool) {
+    /// Follows the world by a step: tells everybody the time and the links, and what it senses
+    /// once in so many milliseconds, each when it is due as in simulated runs.
+    pub(crate) fn tell(&mut self, clock: Clock, world: &LiveWorld, percept_period_ms: u32) {
         self.transports.follow(world);
         let on_air: Vec<u16> = self
             .by_id
@@ -286,7 +295,8 @@ impl Peers {
             .map(LivePeer::id)
             .collect();
         let hearing = world.hearing(on_air);
-        for (id, peer) in &mut self.by_id {
+        let of = self.by_id.len();
+        for (nth, (id, peer)) in self.by_id.iter_mut().enumerate() {
             if !peer.is_connected() {
                 continue;
             }
@@ -297,7 +307,8 @@ impl Peers {
             });
             let percept = world
                 .percept(*id)
-                .filter(|_| percepts && peer.flies() && peer.airborne());
+                .filter(|_| peer.flies() && peer.airborne())
+                .filter(|_| senses(clock.now_ms, nth, of, percept_period_ms));
             if percept.is_some() {
                 peer.told_percept(clock.now_ms);
             }
@@ -399,5 +410,34 @@ impl Peers {
     /// Ends the guard.
     pub(crate) async fn close(self) {
         self.processes.end().await;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_senses_once_in_a_period_and_not_all_at_once() {
+        for (of, period_ms) in [(1, 200), (8, 200), (20, 500), (50, 500), (8, 250), (3, 20)] {
+            let steps: Vec<u64> = (1..=100).map(|step| step * STEP_MS).collect();
+            let each = (0..of).map(|nth| {
+                let at = steps.iter().filter(|ms| senses(**ms, nth, of, period_ms));
+                at.count() as u64
+            });
+            let often = 100 * STEP_MS / u64::from(period_ms).max(STEP_MS);
+            assert!(each.into_iter().all(|n| n.abs_diff(often) <= 1));
+            let at_once = steps.iter().map(|ms| {
+                (0..of)
+                    .filter(|nth| senses(*ms, *nth, of, period_ms))
+                    .count()
+            });
+            let most = if of > 1 && period_ms > 100 {
+                of - 1
+            } else {
+                of
+            };
+            assert!(at_once.max() <= Some(most));
+        }
     }
 }

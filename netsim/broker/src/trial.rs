@@ -377,10 +377,8 @@ impl<'a> Trial<'a> {
         if let Some(text) = self.account.connected(&components) {
             self.note(text);
         }
-        let percepts = self
-            .now_ms
-            .is_multiple_of(u64::from(self.spec.percept_period_ms).max(STEP_MS));
-        self.peers.tell(self.clock(), &self.world, percepts);
+        self.peers
+            .tell(self.clock(), &self.world, self.spec.percept_period_ms);
         if self.now_ms.is_multiple_of(LOOK_MS) {
             let (arrived, late) = std::mem::take(&mut self.transmissions);
             if self.pacer.heard(arrived, late) {

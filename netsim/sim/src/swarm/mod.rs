@@ -44,7 +44,7 @@ use crate::history::{History, Kind, What, bytes_hash, pose_hash, report_hash, se
 use crate::prepared::Prepared;
 use crate::radio::{Delivery, Frame};
 use crate::spec::Spec;
-use crate::world::{Fact, Loss};
+use crate::world::{Fact, Loss, percept_phase_ms};
 use air::Air;
 use judged_loop::JudgedLoop;
 use meter::{Meter, Part};
@@ -378,13 +378,9 @@ impl Swarm {
             .fold(self.now_ms, self.peers[idx].id(), kind, content);
     }
 
-    /// Percepts of different UAVs are spread over the period, so that no tick does all
-    /// the work and no two peers decide on the same instant by construction.
     fn first_percept_ms(&self, idx: usize) -> u64 {
         let period_ms = u64::from(self.spec.percept_period_ms.max(1));
-        let spread_ms = idx as u64 * period_ms / self.peers.len().max(1) as u64;
-        // The world steps at multiples of its own step; other instants would cost more of them.
-        let phase_ms = spread_ms - spread_ms % crate::world::STEP_MS;
+        let phase_ms = percept_phase_ms(idx, self.peers.len(), self.spec.percept_period_ms);
         let past = (self.now_ms + period_ms).saturating_sub(phase_ms) / period_ms;
         past * period_ms + phase_ms
     }

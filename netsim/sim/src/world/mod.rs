@@ -35,6 +35,15 @@ use std::sync::Arc;
 /// separation is looked at this often however seldom the driver asks.
 pub const STEP_MS: u64 = 100;
 
+/// After the beginning of each period one of so many UAVs senses by so much: spread over the
+/// period, so that no instant does all the work and no two peers decide on the same one by
+/// construction. A multiple of the world's step, since other instants would cost more of them.
+#[must_use]
+pub fn percept_phase_ms(nth: usize, of: usize, period_ms: u32) -> u64 {
+    let spread_ms = nth as u64 * u64::from(period_ms) / of.max(1) as u64;
+    spread_ms - spread_ms % STEP_MS
+}
+
 /// So many turn radii from a zone that it did not know a UAV still turns away from it.
 const TURNS_TO_STAY_CLEAR: f64 = 3.0;
 
