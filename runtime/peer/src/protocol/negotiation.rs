@@ -54,6 +54,12 @@ const PATIENT_INTERVALS: u64 = 10;
 /// Rebalancings are at least so many intervals apart.
 const CALM_INTERVALS: u64 = 20;
 
+/// What a living owner lists no more is covered, or listed by somebody else whose claim may be on
+/// the way: for half an interval at each hop beyond the first it is no orphan.
+fn claims_on_the_way_ms(ctx: &Context<'_>) -> u64 {
+    u64::from(ctx.diameter.saturating_sub(1)) * ctx.interval_ms / 2
+}
+
 /// The waiting time of a round doubles with each retry, up to this many doublings: a bid
 /// that four waiting times do not bring is not on its way.
 const MAX_DOUBLINGS: u32 = 2;
@@ -401,8 +407,16 @@ impl Negotiation {
         }
         let noted = self.orphaned_at.len() == usize::from(orphans.count());
         if !noted && ctx.is_many() && ctx.able_since.is_some() {
+            let let_go = self.sections.take_let_go();
+            let found_at = ctx.now.plus_ms(claims_on_the_way_ms(ctx));
             for cell in orphans.iter() {
-                self.orphaned_at.entry(cell).or_insert(ctx.now);
+                let is_listed_elsewhere = let_go.contains(cell);
+                let since = if is_listed_elsewhere {
+                    found_at
+                } else {
+                    ctx.now
+                };
+                self.orphaned_at.entry(cell).or_insert(since);
             }
         }
         if self.members != ctx.members {

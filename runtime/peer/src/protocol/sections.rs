@@ -68,6 +68,8 @@ struct News {
     gained: bool,
     /// Whether any cell may be listed by fewer than before, or beyond all or not any more.
     listing: bool,
+    /// What others ceased to list in the life in which they listed it.
+    let_go: Vec<CellSet>,
 }
 
 impl PartialEq for News {
@@ -133,6 +135,16 @@ impl Sections {
     /// are alive.
     pub(crate) fn take_listing(&mut self) -> bool {
         core::mem::take(&mut self.news.listing)
+    }
+
+    /// What others let go since this was last asked, in the life in which they listed it: they
+    /// covered it, or somebody else lists it.
+    pub(crate) fn take_let_go(&mut self) -> CellSet {
+        let mut all = CellSet::new(self.cells);
+        for cells in core::mem::take(&mut self.news.let_go) {
+            all.union_with(&cells);
+        }
+        all
     }
 
     /// The lives in which peers said with their newest claims that they are alone.
@@ -241,17 +253,26 @@ impl Sections {
             listed,
         };
         let before = self.heard.insert(author, heard);
-        self.news.listing |= before.is_some_and(|b| self.frees(author, b));
+        if let Some(before) = before {
+            self.note_freed(author, before);
+        }
         true
     }
 
-    /// Whether what an author listed before is not covered and not listed by it any more.
-    fn frees(&self, author: u16, before: HeardClaim) -> bool {
+    /// Notes what an author listed before and that is not covered and not listed by it any more.
+    fn note_freed(&mut self, author: u16, before: HeardClaim) {
         let mut freed = before.listed;
         freed.subtract(&self.covered);
         let now = self.heard.get(&author);
-        let now = now.filter(|h| h.incarnation == before.incarnation);
-        now.is_none_or(|h| !freed.is_subset(&h.listed))
+        let Some(now) = now.filter(|h| h.incarnation == before.incarnation) else {
+            self.news.listing = true;
+            return;
+        };
+        freed.subtract(&now.listed);
+        if freed.count() > 0 {
+            self.news.listing = true;
+            self.news.let_go.push(freed);
+        }
     }
 
     /// What everybody computed alike from the roster, that a peer of which no claim was heard

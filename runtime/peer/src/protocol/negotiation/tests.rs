@@ -19,6 +19,7 @@ struct Desk {
     able_since: Option<Time>,
     held_expired: bool,
     gain_in_sight: bool,
+    diameter: u32,
 }
 
 fn member(id: u16) -> Member {
@@ -38,6 +39,7 @@ impl Desk {
             able_since: Some(Time(0)),
             held_expired: false,
             gain_in_sight: true,
+            diameter: 1,
         };
         assert_eq!(desk.cells(), 24);
         assert!(desk.tick().is_empty());
@@ -65,7 +67,7 @@ impl Desk {
             live_changed: true,
             members: &members,
             unheard: 0,
-            diameter: 1,
+            diameter: self.diameter,
             able_since: self.able_since,
             revision: 1,
             loop_hash: 7,
@@ -605,6 +607,29 @@ fn orphans_are_left_to_those_who_would_be_there_sooner_each_for_two_periods() {
             of_0,
             "after {after} ms"
         );
+    }
+}
+
+#[test]
+fn what_a_living_owner_lets_go_is_an_orphan_once_another_claim_could_have_come() {
+    // Over five hops a claim may be on the way for two periods.
+    for (diameter, later_ms) in [(1, 0), (5, 2 * T)] {
+        let mut desk = Desk::new(&[2, 3, 4, 5, 6, 7, 8, 9, 10]);
+        desk.diameter = diameter;
+        desk.claim(2, 1, 0, 12, 600_000);
+        desk.claim(3, 1, 12, 12, 600_000);
+        desk.tick();
+        let from = desk.now;
+        // Peer 2 lists its first two cells no more, and peer 3 is lost with all of its own.
+        desk.claim(2, 2, 2, 10, 600_000);
+        desk.live.remove(&3);
+        desk.tick();
+        let mut ripe_at = |cell: u16, ms: u64| {
+            desk.now = from.plus_ms(ms);
+            desk.ask(|n, ctx| n.ripe_orphans(ctx).contains(cell))
+        };
+        assert!(!ripe_at(12, 2 * T - 1) && ripe_at(12, 2 * T));
+        assert!(!ripe_at(0, 2 * T + later_ms - 1) && ripe_at(0, 2 * T + later_ms));
     }
 }
 
