@@ -21,7 +21,7 @@ const SILENCE: Duration = Duration::from_millis(1_500);
 /// given by `--endpoint`, and prints each record once, whoever passed it on.
 #[derive(Debug, Args)]
 pub struct ObserveArgs {
-    /// Which keys, for example `*/v2/state/**`; without it all.
+    /// Which keys, for example `*/v3/state/**`; without it all.
     pub keyexpr: Option<String>,
     /// Ends after this many seconds; without it by an interrupt.
     #[arg(long, value_name = "SECONDS")]

@@ -38,9 +38,9 @@ fn main() {
         .unwrap();
     let said = String::from_utf8_lossy(&out.stdout) + String::from_utf8_lossy(&out.stderr);
     for expected in [
-        "live/v2/state/",
-        "live/v2/beacon/",
-        "live/v2/cover/",
+        "live/v3/state/",
+        "live/v3/beacon/",
+        "live/v3/cover/",
         "peer 1 life",
     ] {
         let begin: String = said.chars().take(1000).collect();

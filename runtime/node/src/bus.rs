@@ -634,7 +634,7 @@ mod tests {
         };
         let speak = async {
             loop {
-                a.publish("bus-test/v2/state/0/1", vec![9, 9], hop, Priority::Beacon)
+                a.publish("bus-test/v3/state/0/1", vec![9, 9], hop, Priority::Beacon)
                     .await;
                 tokio::time::sleep(Duration::from_millis(50)).await;
             }
@@ -653,7 +653,7 @@ mod tests {
         let seen = tokio::time::timeout(deadline, async {
             let speak = async {
                 loop {
-                    b.publish("bus-test/v2/state/0/2", vec![4], hop, Priority::Claim)
+                    b.publish("bus-test/v3/state/0/2", vec![4], hop, Priority::Claim)
                         .await;
                     tokio::time::sleep(Duration::from_millis(50)).await;
                 }

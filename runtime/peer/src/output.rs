@@ -11,7 +11,7 @@ use skein_flight::coverage::ring::backtracking::Leg;
 pub enum Output {
     /// Broadcast these bytes one hop, under this key.
     Publish {
-        /// The natural key, `<fleet>/v2/<kind>/<subject>/<author>`.
+        /// The natural key, `<fleet>/v3/<kind>/<subject>/<author>`.
         key: String,
         /// The record.
         bytes: Vec<u8>,

@@ -30,10 +30,10 @@ use crate::transmission::Transmission;
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
-use crate::wire::message::{Beacon, Gossip, Heartbeat, Member, Order, Record};
+use crate::wire::message::{Beacon, Fresh, Gossip, Heartbeat, Member, Order, Record};
 use crate::{Incarnation, Mission, PeerId};
 use rand_chacha::ChaCha8Rng;
-use rand_core::SeedableRng;
+use rand_core::{Rng, SeedableRng};
 use skein_behaviors::Percept;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -52,6 +52,13 @@ const STRANGE_INTERVALS: u64 = 4;
 /// Two programs in one airframe sense one place: what one of them tells of it is at most a
 /// second old when the other hears it, and a position is known to some metres.
 const SAME_PLACE_M: f64 = 60.0;
+
+/// What is said at once carries so many heartbeats of others at most.
+const AT_ONCE_MAX: usize = 12;
+
+/// What is said at once waits a random time up to so long for each who shares the channel: it
+/// takes as long on the air.
+const QUESTION_SPREAD_MS: u64 = 12;
 
 /// How often a peer looks at its deadlines, as a fraction of the beacon period.
 pub const CADENCE: u64 = 4;
@@ -206,6 +213,9 @@ impl Peer {
         if self.timers.is_due(Timer::Beacon, self.now) {
             self.beacon();
         }
+        if self.timers.take_due(Timer::Question, self.now) {
+            self.say_at_once();
+        }
         self.send();
     }
 
@@ -259,6 +269,7 @@ impl Peer {
                 let heartbeat = (record.seq, h.interval);
                 let mut changes = self.membership.on_heartbeat(now, author, life, heartbeat);
                 changes.extend(self.membership.on_others(now, author, &h.fresh));
+                self.on_question_of_me(&h.fresh);
                 self.report_changes(changes);
                 self.relay.air.hear(now, author, (h.interval, h.sharers));
             }
@@ -284,6 +295,19 @@ impl Peer {
         let ages_ms = (age_ms, self.membership.k1_ms(self.now));
         let effects = self.life.hear_of_heartbeat(now, heartbeat, ages_ms, sent);
         self.carry_out(effects);
+    }
+
+    /// A neighbour suspects this peer, and asks for it at once.
+    fn on_question_of_me(&mut self, told: &[Fresh]) {
+        let (me, life) = (self.me().id, Fresh::life_of(self.me().incarnation));
+        if told
+            .iter()
+            .any(|f| f.id == me && f.life == life && f.suspected_ds.is_some())
+        {
+            let until = self.now.plus_ms(self.membership.verdict_ms(self.now));
+            self.outbound
+                .refute(self.now, until, &mut self.timers, &mut self.rng);
+        }
     }
 
     fn on_beacon(&mut self, record: &Record, beacon: &Beacon) {
@@ -497,7 +521,6 @@ impl Peer {
         if !self.speaks() {
             return;
         }
-        let me = self.me();
         let (interval, sharers) = (self.relay.air.interval(), self.relay.air.counted());
         let body = if let Some(entries) = entries {
             let (mut gossip, fresh) = self.membership.tell(self.now, entries);
@@ -525,9 +548,48 @@ impl Peer {
                 ..self.with_sources(|_, s, _, _| outbound::heartbeat_of(s))
             })
         };
-        let record = self.outbound.beat(self.now, me.id, me.incarnation, &body);
+        let answers = !full && self.timers.is_running(Timer::Refutation, self.now);
+        self.publish_beat(&body, answers);
+    }
+
+    /// Says what is asked for and answered at once, with a heartbeat.
+    fn say_at_once(&mut self) {
+        if !self.speaks() {
+            return;
+        }
+        if !self.relay.air.may_answer(self.now) {
+            let later = self.now.plus_ms(self.relay.air.interval_ms() / 8);
+            self.timers.set(Timer::Question, later);
+            return;
+        }
+        let fresh = self.membership.tell_at_once(self.now, AT_ONCE_MAX);
+        if self.membership.has_questions() {
+            self.delay_question();
+        }
+        if fresh.is_empty() {
+            return;
+        }
+        let body = Body::Heartbeat(Heartbeat {
+            interval: self.relay.air.interval(),
+            sharers: self.relay.air.counted(),
+            fresh,
+            ..self.with_sources(|_, s, _, _| outbound::heartbeat_of(s))
+        });
+        self.publish_beat(&body, true);
+    }
+
+    fn delay_question(&mut self) {
+        let spread_ms = QUESTION_SPREAD_MS * self.relay.air.sharers().max(8);
+        let delay_ms = 20 + u64::from(self.rng.next_u32()) % spread_ms;
+        let at = self.now.plus_ms(delay_ms);
+        self.timers.set_earlier(Timer::Question, at);
+    }
+
+    fn publish_beat(&mut self, body: &Body, answers: bool) {
+        let me = self.me();
+        let record = self.outbound.beat(self.now, me.id, me.incarnation, body);
         let bytes = codec::encode_record(&record);
-        if !full && self.timers.is_running(Timer::Refutation, self.now) {
+        if answers {
             self.relay.air.charge_answer(self.now, bytes.len());
         } else {
             self.relay.air.charge(self.now, bytes.len());
@@ -604,6 +666,9 @@ impl Peer {
         if self.membership.take_refuted() && self.speaks() && self.relay.air.is_in_credit() {
             self.outbound
                 .hasten(self.now, &mut self.timers, &mut self.rng);
+        }
+        if self.membership.take_question() {
+            self.delay_question();
         }
         for c in changes {
             let (by, at_ms) = (self.config.id.0, self.now.0);

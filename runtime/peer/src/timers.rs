@@ -1,6 +1,6 @@
 //! Timers: every deadline of a peer, in one table.
 //!
-//! A timer has one owner, which alone sets and stops it. Two of them wake the peer
+//! A timer has one owner, which alone sets and stops it. Three of them wake the peer
 //! ([`Timers::next_timeout`]); the others are looked at when [`Timer::Tick`] is due, so
 //! that what they stand for happens at most a quarter of a beacon period late. How long
 //! something *has held* (an orphan, an idle plan) is no deadline: its bound moves with
@@ -17,6 +17,8 @@ pub enum Timer {
     Beacon,
     /// The next beacon with gossip: one interval after the last, ±10 %.
     FullBeacon,
+    /// What is asked for at once is to be said. Wakes the peer.
+    Question,
     /// While it runs, a suspicion against this peer is answered.
     Refutation,
     /// The probation of a life ends: it may speak.
@@ -37,10 +39,11 @@ pub enum Timer {
 
 impl Timer {
     /// All timers, in the order of the table.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Tick,
         Self::Beacon,
         Self::FullBeacon,
+        Self::Question,
         Self::Refutation,
         Self::Probation,
         Self::Claim,
@@ -54,7 +57,7 @@ impl Timer {
     /// Whether the driver is asked to come back for it.
     #[must_use]
     pub const fn wakes(self) -> bool {
-        matches!(self, Self::Tick | Self::Beacon)
+        matches!(self, Self::Tick | Self::Beacon | Self::Question)
     }
 }
 
@@ -128,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn timers_run_out_once_and_only_two_wake() {
+    fn timers_run_out_once_and_only_three_wake() {
         let mut timers = Timers::default();
         timers.set(Timer::Claim, Time(5));
         assert_eq!(timers.next_timeout(), None);

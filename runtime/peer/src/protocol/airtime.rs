@@ -7,7 +7,7 @@
 //! | a record is sent | it is paid for; one that is larger than the bucket goes when the bucket is full, and the rest is owed |
 //! | another follows in the same instant | it shares the headers of the first while one transmission holds both |
 //! | a beacon or a heartbeat is sent | it is paid for, if need be later: what is owed makes everything else wait |
-//! | a suspicion is answered | it is paid from a reserve, and from the share when the reserve is empty |
+//! | a suspicion is answered, or something is asked for at once | it is paid from a reserve, and from the share when the reserve is empty |
 //! | a beacon is due | its interval is the shortest in which three fifths of the share carry it and a heartbeat, 16 T at most |
 //!
 //! Who shares a channel is the most that this peer or a neighbour counts: a station hears
@@ -336,6 +336,13 @@ impl Airtime {
         let reserved = self.reserve_millibytes.min(cost);
         self.reserve_millibytes -= reserved;
         self.tokens_millibytes = self.tokens_millibytes.saturating_sub(cost - reserved);
+    }
+
+    /// Whether an answer to a suspicion could be paid from the reserve or the share.
+    pub fn may_answer(&mut self, now: Time) -> bool {
+        self.refill(now);
+        self.reserve_millibytes >= millibytes(2 * (HEARTBEAT_BYTES + OVERHEAD_BYTES))
+            || self.tokens_millibytes >= 0
     }
 
     /// Pays for a record if it may go now.

@@ -14,7 +14,7 @@
 //! | alive | half of that, and the transport says that the link is gone | suspect |
 //! | alive | a suspicion against this very heartbeat is heard | suspect |
 //! | any | a fresher heartbeat from anybody, younger than the bound | alive; suspect if a suspicion against it is told with it |
-//! | suspect | k2 T' + k1 (T' - I), and T'/3 for each hop of D beyond four, unrefuted | down |
+//! | suspect | k2 T' + k1 (T' - I) unrefuted | down |
 //! | alive, suspect | heartbeat older than (k1 + k2 + D + 2) T' | down |
 //! | any | a heartbeat of a later life, younger than the bound | likewise, in that life |
 //! | any | a heartbeat of a later life, older than the bound | down, in that life |
@@ -29,6 +29,7 @@ mod extent;
 mod known;
 #[cfg(test)]
 pub(crate) mod many_detectors;
+mod questions;
 mod telling;
 #[cfg(test)]
 mod tests;
@@ -45,6 +46,7 @@ use crate::wire::message::{Beacon, Fresh, Gossip, OffLoop};
 use core::cell::Cell;
 use extent::{Extent, Patience, window_ms};
 use known::{Age, HeardHeartbeat, Known, Weight};
+use questions::{Questions, urgency};
 use std::collections::{BTreeMap, BTreeSet};
 use telling::{Moment, Telling};
 
@@ -54,6 +56,13 @@ pub const MAX_KNOWN: usize = PEERS_MAX - 1;
 
 /// What was not told of within so many intervals is no news any more.
 const URGENT_INTERVALS: u64 = 6;
+
+/// Who knows more others than this may be several hops from some, of whom not all fit into a
+/// beacon.
+const MANY: usize = 8;
+
+/// Whoever knows a later heartbeat of somebody says so at once, once in so many intervals.
+const ANSWER_INTERVALS: u64 = 2;
 
 /// A belief that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +111,7 @@ pub struct Membership {
     period_ms: u64,
     known: BTreeMap<u16, Known>,
     telling: Telling,
+    questions: Questions,
     /// What this peer announced itself, quarters of T.
     interval: u8,
     doubt_until: Time,
@@ -129,6 +139,7 @@ impl Membership {
             period_ms: u64::from(period_ms.max(1)),
             known: BTreeMap::new(),
             telling: Telling::new(me),
+            questions: Questions::default(),
             interval: INTERVAL_LEAST,
             doubt_until: Time(0),
             waking: (Time(0), 0),
@@ -396,7 +407,10 @@ impl Membership {
             },
             hops: told.hops.saturating_add(1),
             interval: told.interval,
-            suspected: None,
+            suspected: told.suspected_ds.map(|ds| Age {
+                told_ms: u64::from(ds) * 100,
+                at: now,
+            }),
         };
         self.on_told(now, (teller, told.able, said), heartbeat, limits, changes);
     }
@@ -411,6 +425,7 @@ impl Membership {
         limits: Patience,
         changes: &mut Vec<Change>,
     ) {
+        self.hear_question(now, &heartbeat, limits);
         let known = self.known.get_mut(&heartbeat.id);
         if let Some(known) = known.filter(|known| known.has_heard(&heartbeat)) {
             return known.note_told(now, teller, &heartbeat, limits.interval_ms);
@@ -424,6 +439,75 @@ impl Membership {
                 }
             }
         });
+        if self.floods(&limits)
+            && let Some(known) = self.known.get_mut(&heartbeat.id)
+            && known.asks_at_once(now, &limits, self.period_ms)
+        {
+            self.questions.ask(heartbeat.id, known.freshest.count);
+        }
+    }
+
+    /// Whether what is asked for travels at once.
+    fn floods(&self, patience: &Patience) -> bool {
+        self.known.len() > MANY && patience.is_far
+    }
+
+    /// Somebody asks for a heartbeat later than one that is known here, or says what this peer
+    /// was to say.
+    fn hear_question(&mut self, now: Time, told: &HeardHeartbeat, limits: Patience) {
+        if !self.floods(&limits) {
+            return;
+        }
+        let verdict_ms = limits.verdict_ms(ms_of(told.interval, self.period_ms));
+        let is_question = urgency(told, &limits, verdict_ms, now) > 0;
+        self.questions.hear(told, is_question);
+        let again_ms = ANSWER_INTERVALS * self.own_interval_ms();
+        if is_question
+            && let Some(known) = self.known.get_mut(&told.id)
+            && known.answers(now, told, again_ms)
+        {
+            self.questions.answer(told.id, told.count);
+        }
+    }
+
+    /// Whether something is to be said at once that was not when this was last asked.
+    pub fn take_question(&mut self) -> bool {
+        self.questions.take_new()
+    }
+
+    /// Whether something is to be said at once.
+    #[must_use]
+    pub fn has_questions(&self) -> bool {
+        !self.questions.is_empty()
+    }
+
+    /// What is to be said at once: heartbeats that are asked for, and those that answer.
+    pub fn tell_at_once(&mut self, now: Time, max: usize) -> Vec<Fresh> {
+        let (interval_ms, own_ms) = (self.interval_ms(), self.own_interval_ms());
+        let mut said = Vec::new();
+        for (id, waiting) in self.questions.take(max) {
+            let Some(known) = self.known.get_mut(&id) else {
+                continue;
+            };
+            let suspected = known.freshest.suspected.is_some();
+            let holds = if waiting.answers {
+                known.freshest.count > waiting.count && known.status == Status::Alive
+            } else {
+                known.freshest.count == waiting.count && known.status != Status::Down
+            };
+            if !holds {
+                continue;
+            }
+            if waiting.answers {
+                known.answered_at = now;
+            }
+            known.tell(now);
+            if suspected {
+                known.tell_news(now, own_ms);
+            }
+            said.push(known.fresh(now, interval_ms));
+        }
+        said
     }
 
     /// Does something to what is known of one peer, and notes what the extent and the number
@@ -469,6 +553,7 @@ impl Membership {
             return false;
         }
         let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
+        let floods = self.floods(&limits);
         let Some(known) = self.known.get_mut(&heard.id) else {
             if !self.make_room(now) {
                 return false;
@@ -501,7 +586,17 @@ impl Membership {
             known.info = Info::default();
             known.eccentricity = 0;
         }
+        let verdict_ms = limits.verdict_ms(ms_of(known.freshest.interval, self.period_ms));
+        let was_asked =
+            known.status != Status::Down && urgency(&known.freshest, &limits, verdict_ms, now) > 0;
+        let passes_on = floods && was_asked && heard.suspected.is_none() && !new_life;
+        let before = known.freshest;
+        if passes_on && heard.hops > 1 {
+            // What was asked for comes by whatever way is quick: nobody is farther for it.
+            heard.hops = heard.hops.min(before.hops.max(2));
+        }
         known.freshest = heard;
+        known.asked = 0;
         known.is_untold_suspicion = false;
         if new_life
             || known
@@ -510,7 +605,9 @@ impl Membership {
         {
             known.higher_count_heard = None;
         }
-        known.note_hops(now, heard.hops, interval_ms);
+        if !passes_on || heard.hops == 1 {
+            known.note_hops(now, heard.hops, interval_ms);
+        }
         let status = if heard.suspected.is_some() {
             Status::Suspect
         } else {
@@ -521,6 +618,9 @@ impl Membership {
             known.status = status;
             known.is_news_until(urgent_until);
             changes.push(known.change());
+        }
+        if passes_on {
+            self.questions.answer(heard.id, before.count);
         }
         true
     }
@@ -633,6 +733,13 @@ impl Membership {
         if !changes.is_empty() {
             self.extent.set(None);
             self.changes += 1;
+        }
+        if self.floods(&patience) {
+            for known in self.known.values_mut() {
+                if known.asks_at_once(now, &patience, self.period_ms) {
+                    self.questions.ask(known.freshest.id, known.freshest.count);
+                }
+            }
         }
         changes
     }

@@ -394,28 +394,34 @@ impl Wire for Vec<Fresh> {
         let bytes = <Vec<u8> as Wire>::get(input)?;
         at_most("fresh", bytes.len(), FRESH_MAX_BYTES)?;
         let malformed = WireError::Malformed { field: "fresh" };
+        let number = |rest: &mut &[u8]| {
+            let (value, used) = varint::read(rest).ok_or(malformed)?;
+            *rest = &rest[used..];
+            Ok::<u32, WireError>(value)
+        };
         let mut rest = bytes.as_slice();
         let mut list = Self::new();
         while !rest.is_empty() {
-            let mut number = || {
-                let (value, used) = varint::read(rest).ok_or(malformed)?;
-                rest = &rest[used..];
-                Ok::<u32, WireError>(value)
-            };
-            let (id, heartbeat, age) = (number()?, number()?, number()?);
+            let (id, heartbeat, age) = (number(&mut rest)?, number(&mut rest)?, number(&mut rest)?);
             let [high, low, ..] = *rest else {
                 return Err(malformed);
             };
             rest = &rest[2..];
             let mark = u16::from_be_bytes([high, low]);
+            let is_suspected = low >> 6 & 1 == 1;
+            let suspected = is_suspected.then(|| number(&mut rest)).transpose()?;
             list.push(Fresh {
                 id: u16::try_from(id).map_err(|_| malformed)?,
                 life: high >> 5,
                 heartbeat,
                 age_ds: u16::try_from(age).map_err(|_| malformed)?,
                 hops: (mark >> 7 & 31) as u8,
-                interval: low & 127,
+                interval: (low & 63) + 1,
                 able: high >> 4 & 1 == 1,
+                suspected_ds: suspected
+                    .map(u16::try_from)
+                    .transpose()
+                    .map_err(|_| malformed)?,
             });
         }
         Ok(list)
@@ -429,8 +435,13 @@ fn fresh_bytes(list: &[Fresh]) -> Vec<u8> {
             varint::write(&mut bytes, number);
         }
         let life_able = u16::from(f.life & 7) << 13 | u16::from(f.able) << 12;
-        let mark = life_able | u16::from(f.hops & 31) << 7 | u16::from(f.interval & 127);
+        let suspected = u16::from(f.suspected_ds.is_some()) << 6;
+        let interval = u16::from(f.interval.wrapping_sub(1) & 63);
+        let mark = life_able | u16::from(f.hops & 31) << 7 | suspected | interval;
         bytes.extend(mark.to_be_bytes());
+        if let Some(age_ds) = f.suspected_ds {
+            varint::write(&mut bytes, u32::from(age_ds));
+        }
     }
     bytes
 }

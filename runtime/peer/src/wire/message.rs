@@ -126,6 +126,8 @@ pub struct Fresh {
     pub interval: u8,
     /// Whether its author said it can plan.
     pub able: bool,
+    /// Age of a suspicion against it, 100 ms units, if there is one.
+    pub suspected_ds: Option<u16>,
 }
 
 impl Fresh {

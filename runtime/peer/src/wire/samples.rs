@@ -30,6 +30,7 @@ pub fn fresh(id: u16) -> Fresh {
         hops: 2,
         interval: 4,
         able: true,
+        suspected_ds: None,
     }
 }
 
@@ -138,7 +139,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                 ],
                 fresh: vec![fresh(6)],
             }),
-            "91182a3a0012d6861a000d950b193d5cf5f4f41acafef00d07020403011b0123456789abcdef1863828a040219012c0f020404f51a0001117019beef8a050219012c0f0204f6f51a0001117019beef4606ac020f5104",
+            "91182a3a0012d6861a000d950b193d5cf5f4f41acafef00d07020403011b0123456789abcdef1863828a040219012c0f020404f51a0001117019beef8a050219012c0f0204f6f51a0001117019beef4606ac020f5103",
         ),
         (
             Body::State(State {
@@ -223,7 +224,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
                 north_dm: 8_901,
                 fresh: vec![fresh(6)],
             }),
-            "8504033930391922c54606ac020f5104",
+            "8504033930391922c54606ac020f5103",
         ),
     ]
 }
@@ -242,7 +243,7 @@ pub fn largest() -> Vec<Body> {
         max_seq: u32::MAX,
         digest: u16::MAX,
     };
-    let fresh: Vec<Fresh> = (u16::MAX - 18..u16::MAX)
+    let fresh: Vec<Fresh> = (u16::MAX - 15..u16::MAX)
         .map(|id| Fresh {
             id,
             life: 7,
@@ -251,6 +252,7 @@ pub fn largest() -> Vec<Body> {
             hops: HOPS_MAX,
             interval: INTERVAL_MOST,
             able: true,
+            suspected_ds: Some(u16::MAX),
         })
         .collect();
     let epoch = Epoch {

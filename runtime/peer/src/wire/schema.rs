@@ -74,7 +74,7 @@ const SHARERS: Place = at(
 
 const FRESH: Place = at(
     "fresh",
-    "heartbeats of others, ascending by id; of each: id, count and age (100 ms), seven bits a byte, the lowest first; then in two bytes three bits of the life, one whether it can plan, five of the hops, seven of the interval",
+    "heartbeats of others, ascending by id; of each: id, count and age (100 ms), seven bits a byte, the lowest first; then in two bytes three bits of the life, one whether it can plan, five of the hops, one whether it is suspected, six of the interval less one; then the age of the suspicion, likewise, if there is one",
     Shape::Bytes(FRESH_MAX_BYTES),
 );
 
@@ -576,7 +576,7 @@ mod tests {
         assert_eq!(
             schema(Kind::Finished).unwrap(),
             "{\"$schema\":\"https://json-schema.org/draft/2020-12/schema\",\
-             \"title\":\"skein v2 finished\",\"type\":\"array\",\"prefixItems\":[\
+             \"title\":\"skein v3 finished\",\"type\":\"array\",\"prefixItems\":[\
              {\"title\":\"revision\",\"description\":\"mission revision\",\
              \"type\":\"integer\",\"minimum\":0,\"maximum\":4294967295}],\
              \"items\":false,\"minItems\":1,\"maxItems\":1}"

@@ -9,9 +9,6 @@ use crate::protocol::airtime::ms_of;
 /// heard: what a neighbour says of others comes round, and what is lost comes again.
 pub(super) const HOP_INTERVALS: u64 = 10;
 
-/// Over so many hops an answer to a suspicion comes back within k2.
-const NEAR_HOPS: u64 = 4;
-
 /// How slow and how wide the swarm is, as far as this peer knows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extent {
@@ -89,8 +86,8 @@ pub(super) fn window_ms(interval: u8, period_ms: u64) -> u64 {
 pub(super) struct Patience {
     /// The longest interval announced, T'.
     pub(super) interval_ms: u64,
-    /// D beyond [`NEAR_HOPS`].
-    far_hops: u64,
+    /// Whether D is more than one hop; else nobody has to be told.
+    pub(super) is_far: bool,
     /// k1, quarters.
     k1_quarters: u64,
     /// Time to refute a suspicion: k2 T'.
@@ -109,7 +106,7 @@ impl Patience {
         let travel_ms = (diameter + 2) * interval_ms;
         Self {
             interval_ms,
-            far_hops: diameter.saturating_sub(NEAR_HOPS),
+            is_far: diameter > 1,
             k1_quarters,
             k2_ms,
             bound_ms: interval_ms * k1_quarters / 4 + k2_ms + travel_ms,
@@ -123,11 +120,9 @@ impl Patience {
 
     /// Time to refute a suspicion of who announced such an interval: k2 T', and as much more
     /// as it is suspected sooner than the slowest would be. Where many are on the way what a
-    /// heartbeat takes is counted in the longest interval, whoever sent it. A question and its
-    /// answer wait for their turn at each hop: a third of T' more for each beyond four.
+    /// heartbeat takes is counted in the longest interval, whoever sent it.
     pub(super) fn verdict_ms(&self, interval_ms: u64) -> u64 {
         let sooner_ms = self.interval_ms.saturating_sub(interval_ms);
-        let far_ms = self.far_hops * self.interval_ms / 3;
-        self.k2_ms + self.k1_ms(sooner_ms) + far_ms
+        self.k2_ms + self.k1_ms(sooner_ms)
     }
 }

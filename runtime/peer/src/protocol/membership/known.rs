@@ -1,10 +1,13 @@
 //! One peer as another knows it: its freshest heartbeat, how old that is, by how many
 //! hops it came.
 
+use super::extent::Patience;
+use super::questions::urgency;
 use super::{Change, Info};
 use crate::Incarnation;
 use crate::input::Time;
 use crate::output::Status;
+use crate::protocol::airtime::ms_of;
 use crate::wire::message::{Fresh, Gossip};
 
 /// An age that grows: so much when it was heard, and the time since.
@@ -72,6 +75,10 @@ pub(super) struct Known {
     told_at: Time,
     /// When the heartbeat was sent that neighbours were last told of.
     told_sent: Told,
+    /// How urgently a later heartbeat was asked for.
+    pub(super) asked: u8,
+    /// When this peer last answered for it at once.
+    pub(super) answered_at: Time,
     /// An old heartbeat of this very life with a higher count than it now sends: it lost
     /// its disk and uses an incarnation twice. It is told, so that it takes a new one.
     pub(super) higher_count_heard: Option<HeardHeartbeat>,
@@ -181,6 +188,8 @@ impl Known {
             lag: None,
             told_at: Time(0),
             told_sent: Told::default(),
+            asked: 0,
+            answered_at: Time(0),
             higher_count_heard: None,
         }
     }
@@ -363,6 +372,26 @@ impl Known {
             && told.heartbeat < self.freshest.count
     }
 
+    /// Whether a later heartbeat is to be asked for at once, more urgently than before.
+    pub(super) fn asks_at_once(&mut self, now: Time, patience: &Patience, period_ms: u64) -> bool {
+        if self.status == Status::Down {
+            return false;
+        }
+        let verdict_ms = patience.verdict_ms(ms_of(self.freshest.interval, period_ms));
+        let urgency = urgency(&self.freshest, patience, verdict_ms, now);
+        let asks = urgency > self.asked;
+        self.asked = self.asked.max(urgency);
+        asks
+    }
+
+    /// Whether somebody asks for a later heartbeat than this, and one is known here.
+    pub(super) fn answers(&self, now: Time, asked: &HeardHeartbeat, again_ms: u64) -> bool {
+        self.status == Status::Alive
+            && asked.incarnation == self.freshest.incarnation
+            && asked.count < self.freshest.count
+            && (self.answered_at == Time(0) || now.since_ms(self.answered_at) >= again_ms)
+    }
+
     pub(super) fn note_hops(&mut self, now: Time, hops: u8, interval_ms: u64) {
         let (since, fewest) = self.hops[self.latest];
         if fewest != u8::MAX && now.since_ms(since) < interval_ms {
@@ -454,6 +483,7 @@ impl Known {
             hops: self.distance(now, interval_ms),
             interval,
             able: self.info.able,
+            suspected_ds: self.freshest.suspected.map(|age| age.ds(now)),
         }
     }
 

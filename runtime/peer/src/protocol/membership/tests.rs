@@ -516,6 +516,7 @@ fn a_heartbeat_alone_counts_for_the_life_that_is_known_or_the_least_it_can_be() 
         hops: 1,
         interval: 8,
         able: false,
+        suspected_ds: None,
     };
     let say = |fresh| Beacon {
         fresh: vec![fresh, Fresh { id: 7, ..fresh }],
@@ -710,8 +711,7 @@ fn the_diameter_is_the_largest_eccentricity_heard_of_in_ten_intervals() {
     let patience = m.patience(Time(20_000));
     assert_eq!(patience.k1_ms(1_000), 5_500);
     assert_eq!(patience.bound_ms, 5_500 + 7_000 + 8_000);
-    // Two hops beyond four: a verdict waits two thirds of an interval longer.
-    assert_eq!(patience.verdict_ms(1_000), 7_666);
+    assert_eq!(patience.verdict_ms(1_000), 7_000);
 }
 
 #[test]
@@ -1013,4 +1013,130 @@ fn the_extent_that_is_kept_is_the_one_that_is_measured() {
         }
     }
     assert!((50_000..550_000).contains(&kept), "{kept}");
+}
+
+/// Peers 2 to 20 are neighbours, and 2 tells of 30, which it hears by itself.
+fn among_many_far_apart() -> Membership {
+    let mut m = among_nineteen();
+    let far = entry(30, 5, 0, None);
+    m.on_beacon(Time(2_500), 2, 1, &beacon(11, vec![far]));
+    assert_eq!(m.diameter(Time(2_500)), 2);
+    m
+}
+
+fn at_once(m: &mut Membership, now: Time) -> Vec<(u16, u32, bool)> {
+    let told = m.tell_at_once(now, 12);
+    let short = |f: &Fresh| (f.id, f.heartbeat, f.suspected_ds.is_some());
+    told.iter().map(short).collect()
+}
+
+/// What a neighbour says at once of 30, suspected for so long.
+fn asked(heartbeat: u32, suspected_ds: Option<u16>) -> Vec<Fresh> {
+    let fresh = Fresh {
+        heartbeat,
+        age_ds: 60,
+        life: 1,
+        suspected_ds,
+        ..samples::fresh(30)
+    };
+    vec![fresh]
+}
+
+#[test]
+fn a_suspicion_is_asked_about_at_once_after_a_third_and_two_thirds_of_its_time() {
+    let mut m = among_many_far_apart();
+    let now = Time(3_000);
+    let verdict_ms = m.patience(now).verdict_ms(1_000);
+    assert_eq!(verdict_ms, 5_000);
+    m.on_others(now, 3, &asked(5, Some(10)));
+    assert_eq!(m.status(30), Some((1, Status::Suspect)));
+    assert!(!m.take_question(), "gossip has time");
+    let mut asked_at = Vec::new();
+    for t in 1..24 {
+        let now = now.plus_ms(t * 250);
+        for id in 2..=20 {
+            m.on_heartbeat(now, id, 1, (100 + t as u32, 4));
+        }
+        m.tick(now);
+        if m.take_question() {
+            assert_eq!(at_once(&mut m, now), [(30, 5, true)]);
+            asked_at.push(t * 250 + 1_000);
+        }
+    }
+    assert_eq!(asked_at, [1_750, 3_500]);
+    assert_eq!(m.status(30), Some((1, Status::Down)));
+}
+
+#[test]
+fn who_knows_a_later_heartbeat_answers_at_once_and_once_in_two_intervals() {
+    let mut m = among_many_far_apart();
+    m.on_others(Time(3_000), 3, &asked(4, Some(10)));
+    assert!(!m.has_questions(), "gossip has time");
+    m.on_others(Time(3_000), 3, &asked(4, Some(20)));
+    assert!(m.take_question());
+    assert_eq!(at_once(&mut m, Time(3_100)), [(30, 5, false)]);
+    m.on_others(Time(4_000), 4, &asked(4, Some(30)));
+    assert!(!m.has_questions());
+    m.on_others(Time(5_100), 4, &asked(4, Some(41)));
+    assert!(m.has_questions());
+    // Two others say it meanwhile.
+    m.on_others(Time(5_150), 5, &asked(5, None));
+    assert!(m.has_questions());
+    m.on_others(Time(5_200), 6, &asked(5, None));
+    assert!(!m.has_questions());
+}
+
+#[test]
+fn an_answer_is_passed_on_by_who_asked_and_tells_nothing_of_how_far_somebody_is() {
+    let mut m = among_many_far_apart();
+    m.on_others(Time(3_000), 3, &asked(5, Some(20)));
+    assert!(m.take_question());
+    let answer = Fresh {
+        hops: 7,
+        ..asked(9, None)[0]
+    };
+    m.on_others(Time(3_100), 4, &[answer]);
+    assert_eq!(m.status(30), Some((1, Status::Alive)));
+    assert_eq!(m.diameter(Time(3_100)), 2);
+    assert_eq!(at_once(&mut m, Time(3_200)), [(30, 9, false)]);
+    // Who did not ask passes nothing on: gossip does.
+    m.on_others(Time(3_300), 4, &asked(12, None));
+    assert!(!m.has_questions());
+}
+
+#[test]
+fn a_heartbeat_older_than_three_fifths_of_the_bound_is_asked_for_at_once() {
+    let mut m = among_many_far_apart();
+    let bound_ms = m.bound_ms(Time(2_500));
+    let mut asked_at = Vec::new();
+    for t in 1..bound_ms / 250 {
+        let now = Time(2_500 + t * 250);
+        for id in 2..=20 {
+            let said = Beacon {
+                eccentricity: 2,
+                ..beacon(100 + t as u32, Vec::new())
+            };
+            m.on_beacon(now, id, 1, &said);
+        }
+        m.tick(now);
+        if m.take_question() {
+            assert_eq!(at_once(&mut m, now), [(30, 5, false)]);
+            asked_at.push(t * 250);
+        }
+    }
+    let parts = asked_at.iter().map(|ms| ms * 5 / bound_ms);
+    assert_eq!(parts.collect::<Vec<_>>(), [3, 4]);
+}
+
+#[test]
+fn among_few_and_where_all_hear_all_nothing_is_asked_at_once() {
+    let mut few = Membership::new(1, 1000);
+    few.on_beacon(Time(0), 2, 1, &beacon(1, vec![entry(30, 5, 0, None)]));
+    let mut near = among_nineteen();
+    near.on_beacon(Time(2_500), 30, 1, &beacon(5, Vec::new()));
+    for m in [&mut few, &mut near] {
+        m.on_others(Time(3_000), 2, &asked(5, Some(20)));
+        assert_eq!(m.status(30), Some((1, Status::Suspect)));
+        assert!(!m.has_questions());
+    }
 }

@@ -52,13 +52,13 @@ fn heartbeats_in_one_byte_string_have_one_encoding_and_ascend() {
         bytes.to_vec().put(&mut out);
         <Vec<Fresh> as Wire>::get(&mut In::new(&out.into_bytes()))
     };
-    let good = [6, 0xac, 2, 15, 0x51, 4];
+    let good = [6, 0xac, 2, 15, 0x51, 3];
     assert_eq!(read(&good), Ok(vec![fresh(6)]));
     assert_eq!(read(&[]), Ok(Vec::new()));
-    let long = [0x86, 0, 0xac, 2, 15, 0x51, 4];
-    let over = [6, 0xff, 0xff, 0xff, 0xff, 0x1f, 15, 0x51, 4];
+    let long = [0x86, 0, 0xac, 2, 15, 0x51, 3];
+    let over = [6, 0xff, 0xff, 0xff, 0xff, 0x1f, 15, 0x51, 3];
     let endless = [0xff; 12];
-    let far_id = [0x80, 0x80, 4, 0xac, 2, 15, 0x51, 4];
+    let far_id = [0x80, 0x80, 4, 0xac, 2, 15, 0x51, 3];
     for bad in [&long[..], &over, &endless, &far_id, &good[..5], &good[..1]] {
         assert_eq!(
             read(bad),

@@ -1,0 +1,114 @@
+//! Who is asked for and who is answered for at once, from peer to peer, where gossip would
+//! take an interval a hop.
+
+use super::extent::Patience;
+use super::known::HeardHeartbeat;
+use crate::input::Time;
+use std::collections::BTreeMap;
+
+/// A later heartbeat of who is suspected is asked for after each third of the time to refute
+/// that: most suspicions are refuted by gossip within the first, and what is lost is asked for
+/// once more.
+const ASKS: u64 = 3;
+
+/// Of who is not suspected one is asked for when its age is more than three and four fifths of
+/// the bound: few heartbeats of the living are, and a fifth is time enough for an answer.
+const AGES: u64 = 5;
+const AGES_PATIENT: u64 = 2;
+
+/// What was heard from so many neighbours meanwhile is not said again: one copy is not enough
+/// where three in ten are lost.
+const COPIES_HEARD: u8 = 2;
+
+/// A heartbeat of others, which this peer is to say at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Waiting {
+    /// The count that is asked for, or that a later one answers.
+    pub(super) count: u32,
+    /// Whether a later one is known here.
+    pub(super) answers: bool,
+    copies: u8,
+}
+
+/// How urgent it is to hear of a peer: 0 while gossip has time.
+pub(super) fn urgency(
+    heard: &HeardHeartbeat,
+    patience: &Patience,
+    verdict_ms: u64,
+    now: Time,
+) -> u8 {
+    let suspected_ms = heard.suspected.map_or(0, |age| age.ms(now));
+    let by_suspicion = ASKS * suspected_ms / verdict_ms.max(1);
+    let by_age = (AGES * heard.age.ms(now) / patience.bound_ms.max(1)).saturating_sub(AGES_PATIENT);
+    u8::try_from(by_suspicion.max(by_age)).unwrap_or(u8::MAX)
+}
+
+/// What this peer is to say at once.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Questions {
+    waiting: BTreeMap<u16, Waiting>,
+    /// Somebody waits who did not when this was last asked.
+    is_new: bool,
+}
+
+impl Questions {
+    /// Nobody knows a later heartbeat than this one here; whoever does is to say it.
+    pub(super) fn ask(&mut self, id: u16, count: u32) {
+        self.insert(id, count, false);
+    }
+
+    /// Somebody knows none later than this count, and this peer does.
+    pub(super) fn answer(&mut self, id: u16, count: u32) {
+        self.insert(id, count, true);
+    }
+
+    fn insert(&mut self, id: u16, count: u32, answers: bool) {
+        let waiting = Waiting {
+            count,
+            answers,
+            copies: 0,
+        };
+        let before = self.waiting.get(&id);
+        if before.is_none_or(|w| w.answers != answers) {
+            self.waiting.insert(id, waiting);
+            self.is_new = true;
+        }
+    }
+
+    /// A neighbour tells of somebody: whether that is what this peer was to say.
+    pub(super) fn hear(&mut self, told: &HeardHeartbeat, is_question: bool) {
+        let Some(waiting) = self.waiting.get_mut(&told.id) else {
+            return;
+        };
+        let same = if waiting.answers {
+            told.count > waiting.count && told.suspected.is_none()
+        } else {
+            is_question && told.count == waiting.count
+        };
+        if same {
+            waiting.copies += 1;
+            if waiting.copies >= COPIES_HEARD {
+                self.waiting.remove(&told.id);
+            }
+        }
+    }
+
+    pub(super) fn take_new(&mut self) -> bool {
+        std::mem::take(&mut self.is_new)
+    }
+
+    /// At most so many of those that wait.
+    pub(super) fn take(&mut self, max: usize) -> BTreeMap<u16, Waiting> {
+        let mut taken = BTreeMap::new();
+        while taken.len() < max
+            && let Some((id, waiting)) = self.waiting.pop_first()
+        {
+            taken.insert(id, waiting);
+        }
+        taken
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.waiting.is_empty()
+    }
+}
