@@ -187,6 +187,7 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Operator(b) => serde_json::to_value(b),
         Body::Finished(b) => serde_json::to_value(b),
         Body::Heartbeat(b) => serde_json::to_value(b),
+        Body::Lacking(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -254,6 +255,11 @@ fn words(body: &Body) -> String {
             "at ({:.0}, {:.0}) m",
             f64::from(h.east_dm) / 10.0,
             f64::from(h.north_dm) / 10.0
+        ),
+        Body::Lacking(l) => format!(
+            "lacks {} pieces of mission revision {}",
+            l.pieces.iter().map(|b| b.count_ones()).sum::<u32>(),
+            l.revision
         ),
     }
 }

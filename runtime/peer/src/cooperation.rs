@@ -42,7 +42,7 @@ use crate::protocol::negotiation::{Adoption, are_many};
 use crate::protocol::runs::{PlannedCell, legs_of};
 use crate::timers::{Timer, Timers};
 use crate::wire::codec::Body;
-use crate::wire::message::{Beacon, Bid, Epoch, Member, Order, Record};
+use crate::wire::message::{Beacon, Bid, Epoch, Lacking, Member, Order, Record};
 use skein_behaviors::{Goal, Percept};
 use skein_flight::coverage::ring::backtracking::Division;
 use std::sync::Arc;
@@ -83,6 +83,8 @@ pub(crate) struct Cooperation {
     order: StandingOrder,
     state: Option<MissionState>,
     mismatch_told: bool,
+    /// When a piece of a mission came last.
+    piece_came: Time,
 }
 
 impl Cooperation {
@@ -93,6 +95,7 @@ impl Cooperation {
             order: StandingOrder::default(),
             state: None,
             mismatch_told: false,
+            piece_came: Time(0),
         }
     }
 
@@ -104,6 +107,22 @@ impl Cooperation {
     /// The newest whole mission, derived or not.
     pub fn newest_mission(&self) -> Option<Arc<Mission>> {
         self.library.newest()
+    }
+
+    /// Which pieces it lacks of a newer mission than the one it follows, and when one came last;
+    /// all of them of the `newest` that neighbours follow, where none came.
+    pub fn lacking(&self, newest: u32) -> Option<(Lacking, Time)> {
+        let follows = self.state.as_ref().map_or(0, MissionState::revision);
+        let unseen = || (newest > follows).then(|| (newest, 0, Lacking::bits(1, |_| true)));
+        let told = self.library.lacking(follows).or_else(unseen);
+        let (revision, content_hash, pieces) = told?;
+        let lacking = Lacking {
+            revision,
+            content_hash,
+            holders: 0,
+            pieces,
+        };
+        Some((lacking, self.piece_came))
     }
 
     /// A whole mission is on offer.
@@ -243,11 +262,14 @@ impl Cooperation {
             incarnation: record.incarnation,
         };
         match body {
-            Body::Mission(chunk) => match self.library.chunk(record.subject, chunk) {
-                Ok(true) => self.consider_mission(),
-                Ok(false) => Effects::new(),
-                Err(why) => vec![Effect::Alarm(why)],
-            },
+            Body::Mission(chunk) => {
+                self.piece_came = now;
+                match self.library.chunk(record.subject, chunk) {
+                    Ok(true) => self.consider_mission(),
+                    Ok(false) => Effects::new(),
+                    Err(why) => vec![Effect::Alarm(why)],
+                }
+            }
             Body::Operator(order) => {
                 self.hear_order(*order, (record.incarnation, record.seq, record.author));
                 Effects::new()

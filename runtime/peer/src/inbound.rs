@@ -8,6 +8,7 @@
 //! | anything else under its own id | an echo: `relay`; or news of another life: `life` |
 //! | a heartbeat | `membership`, `relay` |
 //! | a beacon | `membership`, `relay`, `cooperation` |
+//! | what a neighbour lacks of a mission | `relay` |
 //! | a relayed record that is held already, or older than what is held | nothing |
 //! | any other record | `cooperation` |
 

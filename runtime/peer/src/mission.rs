@@ -3,7 +3,7 @@
 use crate::offload::MissionGeometry;
 use crate::task::CoverageTask;
 use crate::wire::limits::{CHUNK_MAX_BYTES, CHUNKS_MAX};
-use crate::wire::message::MissionChunk;
+use crate::wire::message::{Lacking, MissionChunk};
 use serde::{Deserialize, Serialize};
 use skein_flight::coverage::lanes;
 use skein_flight::coverage::passes::{self, PassesProblem};
@@ -384,6 +384,8 @@ pub fn chunks(mission: &Mission) -> Result<Vec<MissionChunk>, TooLarge> {
 pub struct Library {
     whole: Option<Arc<Mission>>,
     partial: BTreeMap<(u32, u64), BTreeMap<u16, MissionChunk>>,
+    /// Of which mission the last piece was that completed none.
+    latest: Option<(u32, u64)>,
 }
 
 impl Library {
@@ -393,7 +395,29 @@ impl Library {
         Self {
             whole: mission,
             partial: BTreeMap::new(),
+            latest: None,
         }
+    }
+
+    /// The mission that is newer than the revision followed and is being collected, or held
+    /// whole: its revision, its hash, and a bit for each piece that is lacking. Of several that
+    /// are collected the one of which the last piece was, so that a made-up one hides none.
+    #[must_use]
+    pub fn lacking(&self, follows: u32) -> Option<(u32, u64, Vec<u8>)> {
+        let latest = self.latest.as_ref();
+        let latest = latest.and_then(|key| self.partial.get_key_value(key));
+        let partial = latest.or_else(|| self.partial.last_key_value());
+        let partial = partial.filter(|(key, _)| key.0 > follows);
+        let of = |(key, pieces): (&(u32, u64), &BTreeMap<u16, MissionChunk>)| {
+            let count = pieces.values().next().map_or(0, |piece| piece.chunks);
+            let bits = Lacking::bits(count, |piece| !pieces.contains_key(&piece));
+            (key.0, key.1, bits)
+        };
+        let whole = || {
+            let whole = self.whole.as_ref().filter(|w| w.revision > follows)?;
+            Some((whole.revision, whole.content_hash(), Vec::new()))
+        };
+        partial.map(of).or_else(whole)
     }
 
     /// The newest whole mission.
@@ -432,6 +456,7 @@ impl Library {
         let key = (chunk.revision, chunk.content_hash);
         let pieces = self.partial.entry(key).or_default();
         pieces.insert(index, chunk.clone());
+        self.latest = Some(key);
         if pieces.len() < usize::from(chunk.chunks) {
             while self.partial.len() > MAX_PARTIAL {
                 self.partial.pop_first();

@@ -10,6 +10,7 @@
 //! | bid | once it is durable |
 //! | finished | once a mission revision |
 //! | mission | all pieces, by a ground station and to whom its neighbours' beacons show that they follow an older revision |
+//! | lacking | with a beacon, in a crowd with every second, while a newer mission than the one followed is collected or followed by a neighbour |
 //! | operator | when the operator gives an order, by a ground station |
 //!
 //! I is the interval that this peer's beacons announce, a period T where there is room.

@@ -30,7 +30,7 @@ use crate::transmission::Transmission;
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
-use crate::wire::message::{Beacon, Fresh, Gossip, Heartbeat, Member, Order, Record};
+use crate::wire::message::{Beacon, Fresh, Gossip, Heartbeat, Lacking, Member, Order, Record};
 use crate::{Incarnation, Mission, PeerId};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
@@ -48,6 +48,10 @@ pub const MAX_JOBS: usize = 8;
 
 /// Whoever was not heard for so many intervals may have missed what was said meanwhile.
 const STRANGE_INTERVALS: u64 = 4;
+
+/// A mission of which nobody heard follows it, and no piece came for so many intervals, is
+/// asked for no more: it may be made up.
+const COLLECTING_INTERVALS: u64 = 32;
 
 /// Two programs in one airframe sense one place: what one of them tells of it is at most a
 /// second old when the other hears it, and a position is known to some metres.
@@ -82,6 +86,8 @@ pub struct Peer {
     last_token: u64,
     stores: BTreeMap<u64, (Promise, Entry)>,
     jobs: BTreeMap<u64, PendingJob>,
+    /// Whether the last beacon was one with which goes what is lacking.
+    lacking_told: bool,
 }
 
 impl Peer {
@@ -108,6 +114,7 @@ impl Peer {
             last_token: 1,
             stores: BTreeMap::new(),
             jobs: BTreeMap::new(),
+            lacking_told: false,
             now: Time(0),
             started: false,
             life: Life::default(),
@@ -272,6 +279,9 @@ impl Peer {
                 self.on_question_of_me(&h.fresh);
                 self.report_changes(changes);
                 self.relay.air.hear(now, author, (h.interval, h.sharers));
+            }
+            Heard::Record(_, record, Body::Lacking(lacking)) => {
+                self.relay.on_lacking(self.now, record.author, lacking);
             }
             Heard::Record(kind, record, body) => {
                 self.membership.note_heard(self.now);
@@ -587,6 +597,10 @@ impl Peer {
 
     fn publish_beat(&mut self, body: &Body, answers: bool) {
         let me = self.me();
+        let follows = match body {
+            Body::Beacon(beacon) => Some(beacon.revision),
+            _ => None,
+        };
         let record = self.outbound.beat(self.now, me.id, me.incarnation, body);
         let bytes = codec::encode_record(&record);
         if answers {
@@ -600,6 +614,45 @@ impl Peer {
             hops: 0,
             priority: Priority::Beacon,
             lifetime_ms: self.relay.lifetime_ms(body.kind()),
+        });
+        if let Some(follows) = follows {
+            self.tell_lacking(follows);
+        }
+    }
+
+    /// With a beacon goes, in one transmission, which pieces of a newer mission are lacking; in a
+    /// crowd with every second one.
+    fn tell_lacking(&mut self, follows: u32) {
+        self.relay.follow(self.now, follows);
+        let newest = self.relay.newest(self.now);
+        let told = self
+            .cooperation
+            .lacking(newest)
+            .and_then(|(lacking, came)| {
+                let holders = self.relay.holders(self.now, lacking.revision);
+                let lately_ms = COLLECTING_INTERVALS * self.relay.air.interval_ms();
+                let is_sought = holders > 0 || self.now.since_ms(came) < lately_ms;
+                is_sought.then_some(Lacking { holders, ..lacking })
+            });
+        let was_told = core::mem::replace(&mut self.lacking_told, false);
+        if told.is_some() && was_told && self.relay.air.is_crowded() {
+            return;
+        }
+        self.relay.lack(self.now, told.as_ref());
+        let Some(lacking) = told else {
+            return;
+        };
+        self.lacking_told = true;
+        let (me, body) = (self.me(), Body::Lacking(lacking));
+        let record = self.outbound.record(me.id, me.incarnation, 0, &body);
+        let bytes = codec::encode_record(&record);
+        self.relay.air.charge(self.now, bytes.len());
+        self.outputs.push_back(Output::Publish {
+            key: key::key(&self.config.fleet, Kind::Lacking, 0, me.id),
+            bytes,
+            hops: 0,
+            priority: Priority::Beacon,
+            lifetime_ms: self.relay.lifetime_ms(Kind::Lacking),
         });
     }
 

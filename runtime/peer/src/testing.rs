@@ -133,6 +133,8 @@ pub struct Seat {
     pub reports: Vec<(u64, Report)>,
     /// What it wrote itself and put on the air, likewise.
     pub said: Vec<(u64, Record, Body)>,
+    /// Of which kinds the records were that it passed on.
+    pub passed_on: Vec<Kind>,
 }
 
 impl Seat {
@@ -293,6 +295,7 @@ impl Harness {
             sensed_ms: 0,
             reports: Vec::new(),
             said: Vec::new(),
+            passed_on: Vec::new(),
         };
         self.seats.insert(id, seat);
     }
@@ -583,12 +586,15 @@ impl Harness {
 
     fn publish(&mut self, from: u16, hops: u8, bytes: &[u8]) {
         let now_ms = self.now_ms;
-        if hops == 0
-            && let Ok(record) = codec::decode_record(bytes)
+        if let Ok(record) = codec::decode_record(bytes)
             && let Some(kind) = Kind::of_number(record.kind)
             && let Ok(body) = codec::decode_body(kind, &record.body)
         {
-            self.seat(from).said.push((now_ms, record, body));
+            let seat = self.seat(from);
+            match hops {
+                0 => seat.said.push((now_ms, record, body)),
+                _ => seat.passed_on.push(kind),
+            }
         }
         let others: Vec<u16> = self.seats.keys().copied().filter(|o| *o != from).collect();
         for to in others {

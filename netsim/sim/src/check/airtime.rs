@@ -1,8 +1,8 @@
 //! Bytes on the air: over 10 s no peer transmits more than its share of the channel it is
 //! in (S9), beacons included, at any number of radios.
 
-use super::{Clocks, Findings, Snapshot};
-use skein_peer::protocol::airtime::{BURST_PERIODS, Filling, SHARE_PERCENT, ms_of};
+use super::{Clocks, Findings, PeerSnapshot, Snapshot};
+use skein_peer::protocol::airtime::{BURST_PERIODS, Filling, LENT_PERCENT, SHARE_PERCENT, ms_of};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Over so long a time a share is kept.
@@ -23,6 +23,8 @@ pub struct AirtimeCheck {
     /// When each last sent a beacon or a heartbeat.
     beats: BTreeMap<u16, u64>,
     sharers: BTreeMap<u16, VecDeque<(u64, u64)>>,
+    /// When somebody in its component last followed an older mission.
+    ahead: BTreeMap<u16, u64>,
     over: Clocks<u16>,
 }
 
@@ -38,6 +40,7 @@ impl AirtimeCheck {
             frames: BTreeMap::new(),
             beats: BTreeMap::new(),
             sharers: BTreeMap::new(),
+            ahead: BTreeMap::new(),
             over: Clocks::default(),
         }
     }
@@ -64,12 +67,14 @@ impl AirtimeCheck {
     /// (itself included) meanwhile, of which it may miss one. To the share of that time
     /// comes what a full bucket held when it began, by the fewest of the time before, and
     /// one record: the largest goes when
-    /// the bucket is full, and what it lacked is owed.
+    /// the bucket is full, and what it lacked is owed. Whoever follows a newer mission than
+    /// somebody in its component may have borrowed its part of what all may use, and a period of it.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let now_ms = snapshot.now_ms;
         let old = |t: &(u64, u64)| t.0 + WINDOW_MS < now_ms;
         let older = |t: &(u64, u64)| t.0 + WINDOW_MS + BEFORE_MS < now_ms;
         for id in snapshot.graph.ids() {
+            let borrows = self.borrows(*id, snapshot);
             let heard = u64::from(snapshot.graph.neighbours(*id)) + 1;
             let sharers = self.sharers.entry(*id).or_default();
             sharers.push_back((now_ms, heard));
@@ -93,7 +98,14 @@ impl AirtimeCheck {
             let shown_ms = snapshot.handicaps.shown_ms(*id, from_ms, now_ms);
             let jumped_ms = shown_ms.saturating_sub(WINDOW_MS);
             let jumped = (share_ps(fewest) * jumped_ms / 1000).min(burst);
-            let most = share_ps(fewest) * WINDOW_MS / 1000 + burst + jumped + largest;
+            let lent_ps = share_ps(1) * LENT_PERCENT / 100;
+            let lent_ms = if borrows {
+                WINDOW_MS + self.period_ms
+            } else {
+                0
+            };
+            let lent = lent_ps * lent_ms / 1000;
+            let most = share_ps(fewest) * WINDOW_MS / 1000 + burst + jumped + lent + largest;
             if bytes <= most {
                 self.over.stop(*id);
                 continue;
@@ -108,6 +120,24 @@ impl AirtimeCheck {
                 });
             }
         }
+    }
+}
+
+impl AirtimeCheck {
+    /// Whether a peer may have borrowed within the window: its neighbours lend until their next
+    /// beacons tell that they follow its mission.
+    fn borrows(&mut self, id: u16, snapshot: &Snapshot<'_>) -> bool {
+        let now_ms = snapshot.now_ms;
+        let revision = |p: &PeerSnapshot| p.view.revision;
+        let mine = snapshot.peers.iter().find(|p| p.id == id).map(revision);
+        let is_behind = |p: &PeerSnapshot| {
+            mine.is_some_and(|mine| revision(p) < mine) && snapshot.graph.joined(id, p.id)
+        };
+        if snapshot.peers.iter().any(is_behind) {
+            self.ahead.insert(id, now_ms);
+        }
+        let ahead = self.ahead.get(&id);
+        ahead.is_some_and(|t| now_ms <= t + WINDOW_MS + BEFORE_MS)
     }
 }
 

@@ -8,6 +8,8 @@
 //! | another follows in the same instant | it shares the headers of the first while one transmission holds both |
 //! | a beacon or a heartbeat is sent | it is paid for, if need be later: what is owed makes everything else wait |
 //! | a suspicion is answered, or something is asked for at once | it is paid from a reserve, and from the share when the reserve is empty |
+//! | pieces of a newer mission are lacking, and a neighbour follows it | a tenth of the share is lent to it, or in even parts to those who do |
+//! | a piece of a mission is sent that neighbours lack | it is paid from what they lend, or from the share |
 //! | a beacon is due | its interval is the shortest in which three fifths of the share carry it and a heartbeat, 16 T at most |
 //!
 //! Who shares a channel is the most that this peer or a neighbour counts: a station hears
@@ -119,6 +121,14 @@ const LEAST_ENTRIES: usize = 4;
 /// share. At four an interval that is more than a whole k2 at D = 1.
 const RESERVE_BEACONS: i64 = 16;
 
+/// Of its share who lacks pieces of a mission lends so much, percent, and of what all in one
+/// earshot may use together one peer borrows so much at most. Of the two fifths that beacons
+/// leave, what is said meanwhile needs the rest.
+pub const LENT_PERCENT: u64 = 10;
+
+/// What was lent keeps for one piece of a mission, or for a period.
+const LENT_BYTES: usize = FRAME_BYTES + OVERHEAD_BYTES;
+
 /// Longer pauses refill nothing more, milliseconds.
 const REFILL_MAX_MS: u64 = 600_000;
 
@@ -150,6 +160,11 @@ pub struct Airtime {
     /// What may be sent; below zero, what is owed.
     tokens_millibytes: i64,
     reserve_millibytes: i64,
+    /// Whether a part of the share is lent.
+    lends: bool,
+    /// What is borrowed: bytes a second, and what of it may be sent.
+    lent_bytes_ps: u64,
+    lent_millibytes: i64,
     filled: Time,
     frame: Filling,
     interval: u8,
@@ -171,6 +186,9 @@ impl Airtime {
             most_told: 0,
             tokens_millibytes: 0,
             reserve_millibytes: full_reserve(),
+            lends: false,
+            lent_bytes_ps: 0,
+            lent_millibytes: 0,
             filled: Time(0),
             frame: Filling::default(),
             interval: INTERVAL_LEAST,
@@ -254,7 +272,55 @@ impl Airtime {
             (true, 0) => FIRST_SHARERS,
             (true, fleet) => fleet,
         };
-        self.share_bytes_ps(self.sharers().max(least))
+        let share = self.share_bytes_ps(self.sharers().max(least));
+        if self.lends {
+            (share * (100 - LENT_PERCENT) / 100).max(1)
+        } else {
+            share
+        }
+    }
+
+    /// From now on a part of the share is lent to who has what this peer lacks, or none is.
+    pub fn lend(&mut self, now: Time, lends: bool) {
+        self.refill(now);
+        self.lends = lends;
+    }
+
+    /// From now on so many neighbours lend, thousandths.
+    pub fn borrow(&mut self, now: Time, permille: u64) {
+        if permille > 0 || self.borrows() {
+            self.refill(now);
+            let each = self.share_bytes_ps(self.sharers()) * LENT_PERCENT / 100;
+            let most = self.share_bytes_ps(1) * LENT_PERCENT / 100;
+            self.lent_bytes_ps = (each * permille / 1000).min(most);
+        }
+    }
+
+    /// Whether anything is lent to this peer.
+    #[must_use]
+    pub fn borrows(&self) -> bool {
+        self.lent_bytes_ps > 0
+    }
+
+    /// Pays for a record from what is lent, if that is enough now.
+    pub fn pay_lent(&mut self, now: Time, bytes: usize) -> bool {
+        self.refill(now);
+        let goes = self.lent_millibytes >= millibytes(self.frame.cost_bytes(now.0, bytes));
+        if goes {
+            self.lent_millibytes -= millibytes(self.frame.add(now.0, bytes));
+        }
+        goes
+    }
+
+    /// How long a record waits until what is lent is enough, milliseconds, at least one.
+    #[must_use]
+    pub fn wait_lent_ms(&self, now: Time, bytes: usize) -> u64 {
+        let later = now.plus_ms(1);
+        let cost = millibytes(self.frame.cost_bytes(later.0, bytes));
+        let lacking = u64::try_from(cost - self.lent_millibytes).unwrap_or(0);
+        let passed_ms = now.since_ms(self.filled);
+        let wait_ms = lacking.div_ceil(self.lent_bytes_ps.max(1));
+        wait_ms.saturating_sub(passed_ms).max(1)
     }
 
     fn expects(&self) -> bool {
@@ -317,6 +383,10 @@ impl Airtime {
         let gained = i64::try_from(passed_ms * self.rate_bytes_ps()).unwrap_or(i64::MAX / 2);
         self.tokens_millibytes =
             (self.tokens_millibytes.saturating_add(gained)).min(self.depth_millibytes());
+        let lent = i64::try_from(passed_ms * self.lent_bytes_ps).unwrap_or(i64::MAX / 2);
+        let lent_most = (self.lent_bytes_ps * self.period_ms).max(1000 * LENT_BYTES as u64);
+        self.lent_millibytes = (self.lent_millibytes.saturating_add(lent))
+            .min(i64::try_from(lent_most).unwrap_or(i64::MAX / 2));
         let refilled = self.reserve_millibytes.saturating_add(gained / 4);
         self.reserve_millibytes = refilled.min(full_reserve());
         self.filled = now;
@@ -653,5 +723,29 @@ mod tests {
         let mut crowded = super::tests::air(20_000, 200);
         let intervals = [0; 6].map(|_| crowded.plan_beacon(Time(100)).interval);
         assert_eq!(intervals, [8, 16, 32, 64, 64, 64]);
+    }
+
+    #[test]
+    fn who_lends_sends_a_tenth_less_and_what_is_borrowed_is_no_more_than_that() {
+        let sent = |lends: bool, permille: u64| {
+            let mut air = air(64_000, 27);
+            air.lend(Time(0), lends);
+            air.borrow(Time(0), permille);
+            let mut bytes = (0, 0);
+            for t in 0..100_000 {
+                bytes.0 += if air.pay(Time(t), 100) { 126 } else { 0 };
+                bytes.1 += if air.pay_lent(Time(t), 274) { 300 } else { 0 };
+            }
+            bytes
+        };
+        let ((whole, none), (lending, _)) = (sent(false, 0), sent(true, 0));
+        let (own, lent) = sent(false, 27_000);
+        assert_eq!((none, own), (0, whole));
+        assert!(whole - lending >= whole / 11, "{whole} {lending}");
+        assert!(lent > 20 * (whole - lending), "{whole} {lending} {lent}");
+        assert!(
+            lent <= 27 * (whole - lending) + 600,
+            "{whole} {lending} {lent}"
+        );
     }
 }

@@ -13,7 +13,8 @@
 //! | held in a newer version, or of an earlier life | it is heard | nothing |
 //! | any of an author | a later life of the author is heard | void: neither held nor sent |
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
-//! | a piece of a mission | a neighbour's beacon, the last ten intervals considered, shows an older revision; else it only is held | passed on, or sent again as to who lacks it |
+//! | a piece of a mission | a neighbour lacks it: its beacon, the last ten intervals considered, shows an older revision, and it says no pieces of that mission or this one; else it only is held | passed on, or sent again as to who lacks it |
+//! | a piece of a mission | it is due | of all that wait goes first what was never on the air, then what most lack, what nobody passed on, what was on the air longest ago |
 //! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
 //! | this peer's own bid, claim or order | it was sent, and nobody is heard passing it on | sent again, twice at most |
 //! | waiting | the share allows it, it is this peer's own bid or claim and was not sent yet, or nothing is due earlier | sent |
@@ -34,16 +35,19 @@ use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
 use crate::wire::limits::{CHUNKS_MAX, HOPS_MAX, PEERS_MAX};
-use crate::wire::message::{Beacon, Gossip, Record};
+use crate::wire::message::{Beacon, Gossip, Lacking, Record};
+use core::cmp::Reverse;
 use skein_geometry::hash::Fnv;
 mod digest;
 #[cfg(test)]
 mod many_relays;
 mod queue;
+mod wants;
 
 pub use queue::MAX_QUEUE;
 use queue::{Queue, Standing, Waiting};
 use std::collections::BTreeMap;
+use wants::{Mission, Wants};
 
 /// Most records held: 256 peers with a state, a bid, a claim, an order, a finish and
 /// four events each, and one mission of 256 pieces.
@@ -84,6 +88,10 @@ const LEAST_SPREAD: u64 = 8;
 /// waits is due so much later, and what is said meanwhile goes before it.
 const PIECE_INTERVALS: u64 = 3;
 
+/// What was on the air within this part of an interval before a neighbour told what it lacks
+/// may have been on the way to it.
+const ON_THE_WAY: u64 = 4;
+
 /// What became of a record that was heard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Offer {
@@ -123,13 +131,13 @@ fn is_counted(kind: Kind) -> bool {
 }
 
 /// Of which mission a record is a piece.
-fn revision_of(kind: Kind, record: &Record) -> Option<u32> {
+fn mission_of(kind: Kind, record: &Record) -> Option<Mission> {
     // Most records are none: only a piece is decoded a second time.
     if kind != Kind::Mission {
         return None;
     }
     match codec::decode_body(kind, &record.body) {
-        Ok(Body::Mission(piece)) => Some(piece.revision),
+        Ok(Body::Mission(piece)) => Some((piece.revision, piece.content_hash)),
         _ => None,
     }
 }
@@ -154,9 +162,25 @@ struct Held {
     /// How often this peer's own record may be sent again yet.
     repeats: u8,
     /// Of which mission it is a piece.
-    revision: Option<u32>,
+    mission: Option<Mission>,
+    /// How many neighbours told since it was last on the air that they lack this piece.
+    lack: usize,
     /// When somebody, this peer included, was last heard sending this version.
     sent: Time,
+}
+
+/// Whether it was on the air, how many lack it, whether anybody passed it on, and when it was on
+/// the air last.
+type Turn = (bool, Reverse<usize>, bool, Time);
+
+impl Held {
+    /// Among pieces: first what nobody can have, then what most lack, of those what nobody was
+    /// heard passing on, and what was on the air longest ago. Pieces that waited in vain till their lifetime was over would else wait
+    /// behind the same ones again, for ever.
+    fn turn(&self) -> Turn {
+        let lack = Reverse(self.lack);
+        (self.copies > 0, lack, self.is_passed_on, self.sent)
+    }
 }
 
 /// The relay of one peer.
@@ -169,8 +193,9 @@ pub struct Relay {
     held: BTreeMap<RecordKey, Held>,
     queue: Queue,
     answered: BTreeMap<u16, Time>,
-    /// Which revision the last beacon of each neighbour showed, and until when that counts.
-    follow: BTreeMap<u16, (u32, Time)>,
+    wants: Wants,
+    /// Which revision this peer's last beacon showed.
+    follows: u32,
     /// The newest revision of which a piece was held.
     newest_piece: u32,
     salt: u64,
@@ -187,7 +212,8 @@ impl Relay {
             held: BTreeMap::new(),
             queue: Queue::new(),
             answered: BTreeMap::new(),
-            follow: BTreeMap::new(),
+            wants: Wants::default(),
+            follows: 0,
             newest_piece: 0,
             salt: u64::from(me).wrapping_mul(0x9E37_79B9_7F4A_7C15),
         }
@@ -216,7 +242,8 @@ impl Relay {
                 copies: 0,
                 is_passed_on: false,
                 repeats: if vital { REPEATS } else { 0 },
-                revision: revision_of(kind, record),
+                mission: mission_of(kind, record),
+                lack: 0,
                 sent: now,
             },
         );
@@ -246,6 +273,7 @@ impl Relay {
             if version == known {
                 h.copies = h.copies.saturating_add(1);
                 h.is_passed_on = true;
+                h.lack = 0;
                 h.sent = now;
                 // A copy by a shorter way: what is passed on has made fewer hops.
                 h.hops = h.hops.min(hops.saturating_add(1));
@@ -267,7 +295,8 @@ impl Relay {
             copies: 1,
             is_passed_on: false,
             repeats: 0,
-            revision: revision_of(kind, record),
+            mission: mission_of(kind, record),
+            lack: 0,
             sent: now,
         };
         self.hold(key, held);
@@ -294,12 +323,10 @@ impl Relay {
         }
     }
 
-    /// Whether some neighbour may need a record: a piece of a mission only if it follows an
-    /// older one.
+    /// Whether some neighbour may need a record: a piece of a mission only if it lacks it.
     fn is_wanted(&self, now: Time, key: &RecordKey) -> bool {
-        let revision = self.held.get(key).and_then(|h| h.revision);
-        let mut follow = self.follow.values().filter(|(_, until)| *until > now);
-        revision.is_none_or(|piece| follow.any(|(follows, _)| *follows < piece))
+        let mission = self.held.get(key).and_then(|h| h.mission);
+        mission.is_none_or(|mission| self.wants.is_wanted(now, mission, key.2))
     }
 
     fn newest_life(&self, author: u16) -> Incarnation {
@@ -338,6 +365,9 @@ impl Relay {
     fn due(&self, key: &RecordKey, from: Time, priority: Priority) -> Time {
         let telemetry = priority == Priority::Telemetry;
         let intervals = match (key.0 == self.me, telemetry) {
+            // The first of what this peer alone has is said at once: who hears it says what it
+            // lacks, and lends.
+            (true, true) if is_piece(key) => PIECE_INTERVALS * self.pieces_before(key) as u64,
             _ if is_piece(key) => PIECE_INTERVALS * (1 + self.pieces_before(key) as u64),
             (true, false) => 0,
             (true, true) | (false, false) => 1,
@@ -401,12 +431,12 @@ impl Relay {
                 self.queue.remove(&k);
             }
         }
-        if let Some(revision) = held.revision {
+        if let Some((revision, _)) = held.mission {
             self.newest_piece = self.newest_piece.max(revision);
             // A mission of fewer pieces leaves the last ones of the one before, which complete
             // nothing.
             self.forget(key.0, |held| {
-                held.revision.is_some_and(|piece| piece < revision)
+                held.mission.is_some_and(|piece| piece.0 < revision)
             });
         }
         self.held.insert(key, held);
@@ -462,38 +492,84 @@ impl Relay {
         }
     }
 
-    /// Queues the pieces of missions that a neighbour may lack, and takes out those that
-    /// nobody lacks any more.
+    /// Notes what a neighbour follows, and queues the pieces of missions that it may lack.
     fn bring_mission(&mut self, now: Time, author: u16, beacon: &Beacon) {
-        if self.follow.len() >= PEERS_MAX {
-            self.follow.retain(|_, (_, until)| *until > now);
-        }
-        if self.follow.len() < PEERS_MAX || self.follow.contains_key(&author) {
-            let lasts_ms = LASTING_INTERVALS * self.air.told_ms(beacon.interval);
-            let follows = (beacon.revision, now.plus_ms(lasts_ms));
-            self.follow.insert(author, follows);
-        }
+        let interval_ms = self.air.told_ms(beacon.interval);
+        let spans_ms = (interval_ms, LASTING_INTERVALS * interval_ms);
+        self.wants.on_beacon(now, author, beacon.revision, spans_ms);
+        self.queue_pieces(now, beacon.revision < self.newest_piece);
+    }
+
+    /// A neighbour says which pieces of a mission it lacks.
+    pub fn on_lacking(&mut self, now: Time, author: u16, lacking: &Lacking) {
+        self.wants.on_lacking(now, author, lacking);
+        self.queue_pieces(now, lacking.revision <= self.newest_piece);
+    }
+
+    /// Takes out the pieces that nobody lacks any more, and queues those that somebody lacks,
+    /// `wanted` by the one that was heard.
+    fn queue_pieces(&mut self, now: Time, wanted: bool) {
         for key in self.queue.pieces() {
             if !self.is_wanted(now, &key) {
                 self.queue.remove(&key);
             }
         }
-        if beacon.revision >= self.newest_piece {
+        self.borrow(now);
+        if !wanted {
             return;
         }
-        let quiet = 2 * self.air.interval_ms();
-        let pieces = self.held.iter().filter(|(k, h)| {
-            h.revision.is_some_and(|piece| beacon.revision < piece)
-                && (now.since_ms(h.sent) >= quiet || h.copies == 0)
-                && !self.queue.contains(k)
-        });
-        // What was on the air longest ago goes first: pieces that waited in vain till their
-        // lifetime was over would else wait behind the same ones again, for ever.
-        let mut lacking: Vec<(Time, RecordKey)> = pieces.map(|(k, h)| (h.sent, *k)).collect();
+        // What was said a moment ago may not have arrived when its want was told.
+        let on_the_way_ms = self.air.interval_ms() / ON_THE_WAY;
+        let mut lacking: Vec<(Turn, RecordKey)> = Vec::new();
+        for (key, held) in &mut self.held {
+            let Some(mission) = held.mission else {
+                continue;
+            };
+            let said = (held.copies > 0).then(|| held.sent.plus_ms(on_the_way_ms));
+            held.lack = self.wants.lacking(now, (mission, key.2), said);
+            if held.lack > 0 && !self.queue.contains(key) {
+                lacking.push((held.turn(), *key));
+            }
+        }
         lacking.sort_unstable();
         for (_, key) in lacking {
             self.send_again(now, key, Kind::Mission);
         }
+    }
+
+    /// Of the pieces that have waited for their random time the one that goes first.
+    fn first_piece(&self, now: Time) -> Option<RecordKey> {
+        let waiting = self.queue.ripe_pieces(now);
+        waiting.min_by_key(|key| (self.held.get(key).map(Held::turn), *key))
+    }
+
+    /// This peer's beacon shows this revision.
+    pub fn follow(&mut self, now: Time, revision: u32) {
+        self.follows = revision;
+        self.borrow(now);
+    }
+
+    /// This peer says which pieces of a mission it lacks, or none any more.
+    pub fn lack(&mut self, now: Time, lacking: Option<&Lacking>) {
+        self.air.lend(now, lacking.is_some_and(wants::lends));
+    }
+
+    /// The newest revision that a neighbour follows.
+    #[must_use]
+    pub fn newest(&self, now: Time) -> u32 {
+        self.wants.newest(now)
+    }
+
+    /// How many neighbours follow this revision or a newer one.
+    #[must_use]
+    pub fn holders(&self, now: Time, revision: u32) -> u16 {
+        self.wants.holders(now, revision)
+    }
+
+    /// What neighbours lend is for the pieces that they lack.
+    fn borrow(&mut self, now: Time) {
+        let lent = self.wants.lent_permille(now, self.follows);
+        self.air.borrow(now, lent);
     }
 
     /// Queues a record that a neighbour lacks.
@@ -501,7 +577,12 @@ impl Relay {
         let delay =
             RELAY_DELAY_MS + self.jitter_again(now, &key) % self.spread_ms(REPAIR_SPREAD_MS);
         if let Some(h) = self.held.get_mut(&key) {
-            h.copies = 0;
+            // Who lacks a piece says so again: one more copy on the air is enough.
+            h.copies = if kind == Kind::Mission {
+                h.copies.min(1)
+            } else {
+                0
+            };
         }
         self.wait(now, key, kind, delay);
     }
@@ -577,14 +658,23 @@ impl Relay {
     /// What may go out now, the most urgent first; `None` when nothing may.
     pub fn poll(&mut self, now: Time) -> Option<Out> {
         self.queue.expire(now);
-        let (key, priority) = self.first(now)?;
+        let lent = self.lent_turn(now);
+        let lent = lent.filter(|(_, bytes)| self.air.pay_lent(now, *bytes));
+        let (key, priority) = match lent {
+            Some((key, _)) => (key, Kind::Mission.priority()),
+            None => {
+                let (key, priority) = self.first(now)?;
+                (self.in_its_place(now, key), priority)
+            }
+        };
         let kind = Kind::of_number(key.1)?;
         let lifetime_ms = self.lifetime_ms(kind);
         let held = self.held.get_mut(&key)?;
-        if !self.air.pay(now, held.bytes.len()) {
+        if lent.is_none() && !self.air.pay(now, held.bytes.len()) {
             return None;
         }
         self.queue.remove(&key);
+        held.lack = 0;
         held.sent = now;
         held.copies = held.copies.saturating_add(1);
         let out = Out {
@@ -601,6 +691,28 @@ impl Relay {
             self.wait(now, key, kind, delay_ms);
         }
         Some(out)
+    }
+
+    /// The piece that goes next from what neighbours lent, and its bytes.
+    fn lent_turn(&self, now: Time) -> Option<(RecordKey, usize)> {
+        if !self.air.borrows() {
+            return None;
+        }
+        let key = self.first_piece(now)?;
+        Some((key, self.held.get(&key)?.bytes.len()))
+    }
+
+    /// When a piece may go is a question of what else waits; which goes is told by who lacks it.
+    fn instead(&self, now: Time, key: RecordKey) -> RecordKey {
+        let first = is_piece(&key).then(|| self.first_piece(now)).flatten();
+        first.unwrap_or(key)
+    }
+
+    /// The same, and what is not sent gets the turn of what is.
+    fn in_its_place(&mut self, now: Time, key: RecordKey) -> RecordKey {
+        let first = self.instead(now, key);
+        self.queue.swap(&key, &first);
+        first
     }
 
     /// What goes next: it is its turn, or it can share the headers of what goes now.
@@ -625,8 +737,15 @@ impl Relay {
             return (self.queue.len() > 0).then_some(turn.next);
         }
         let (key, _) = self.first(now)?;
+        let key = self.instead(now, key);
         let bytes = self.held.get(&key)?.bytes.len();
-        Some(now.plus_ms(self.air.wait_ms(now, bytes)))
+        let own = now.plus_ms(self.air.wait_ms(now, bytes));
+        if !self.air.borrows() {
+            return Some(own);
+        }
+        let lent = self.lent_turn(now);
+        let lent = lent.map(|(_, bytes)| now.plus_ms(self.air.wait_lent_ms(now, bytes)));
+        Some(own.min(lent.unwrap_or(turn.next)))
     }
 
     /// What is held and what waits, each with its cap.

@@ -274,3 +274,36 @@ fn a_lap_begins_three_periods_after_the_last_cell_of_the_one_before() {
     assert!((2_750..=3_750).contains(&after_ms), "{after_ms}");
     assert_eq!(covered(&h, 1), 0);
 }
+
+/// Two hold halves of a mission whose author is gone: each says what the other lacks, once.
+#[test]
+fn halves_of_a_mission_are_brought_together_after_its_author_is_gone() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.run_s(10);
+    let mut large = mission(2, 8, 4);
+    large.zones = (0..120)
+        .map(|i| 1_000_000 + 20_000 * i)
+        .map(|x| vec![(x, 900_000), (x + 9_000, 900_000), (x, 909_000)])
+        .collect();
+    let pieces = chunks(&large).unwrap();
+    let n = pieces.len();
+    assert!(n > 10, "{n}");
+    for id in [1, 2] {
+        h.isolate(id, true);
+    }
+    for (i, piece) in (0u16..).zip(pieces) {
+        let said = record(9, 1, u32::from(i) + 1, i, &Body::Mission(piece));
+        h.inject(1 + i % 2, said);
+    }
+    for id in [1, 2] {
+        h.isolate(id, false);
+    }
+    assert!(h.run_until(30, |h| (1..=2).all(|id| h.beliefs(id).revision == 2)));
+    h.run_s(10);
+    let is_piece = |kind: &&Kind| **kind == Kind::Mission;
+    let said = [1, 2].map(|id| h.seat(id).passed_on.iter().filter(is_piece).count());
+    assert_eq!(said.iter().sum::<usize>(), n, "{said:?}");
+    let lacking = h.count_said(1, Kind::Lacking);
+    h.run_s(10);
+    assert_eq!(h.count_said(1, Kind::Lacking), lacking, "nobody lacks any");
+}

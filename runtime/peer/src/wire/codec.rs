@@ -17,7 +17,8 @@ use super::limits::{
 };
 use super::message::{
     Activity, Beacon, Bid, CellRun, Claim, Cover, Epoch, Finished, Fresh, Gossip, Heartbeat,
-    ListedRun, Member, MissionChunk, MissionStatus, OffLoop, Order, Record, Round, Stamp, State,
+    Lacking, ListedRun, Member, MissionChunk, MissionStatus, OffLoop, Order, Record, Round, Stamp,
+    State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
 use crate::varint;
@@ -81,6 +82,7 @@ pub enum Body {
     Operator(Order),
     Finished(Finished),
     Heartbeat(Heartbeat),
+    Lacking(Lacking),
 }
 
 impl Body {
@@ -97,6 +99,7 @@ impl Body {
             Self::Operator(_) => Kind::Operator,
             Self::Finished(_) => Kind::Finished,
             Self::Heartbeat(_) => Kind::Heartbeat,
+            Self::Lacking(_) => Kind::Lacking,
         }
     }
 
@@ -127,6 +130,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         }
         Body::Finished(b) => b.put(&mut out),
         Body::Heartbeat(b) => b.put(&mut out),
+        Body::Lacking(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -156,6 +160,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         }
         Kind::Finished => Body::Finished(Wire::get(&mut input)?),
         Kind::Heartbeat => Body::Heartbeat(Wire::get(&mut input)?),
+        Kind::Lacking => Body::Lacking(Wire::get(&mut input)?),
         Kind::Event | Kind::Task | Kind::Intent | Kind::Conflict => {
             return Err(WireError::Kind {
                 number: kind.number(),
@@ -354,6 +359,12 @@ array_of!(MissionChunk {
     bytes
 });
 array_of!(Finished { revision });
+array_of!(Lacking {
+    revision,
+    content_hash,
+    holders,
+    pieces
+});
 number_of!(Activity {
     Waiting,
     Covering,

@@ -39,6 +39,8 @@ pub enum Kind {
     Conflict = 11,
     /// "I am here", with heartbeats of others at most.
     Heartbeat = 12,
+    /// Which pieces of a mission the author lacks.
+    Lacking = 13,
 }
 
 /// How long a record waiting to be sent matters.
@@ -96,7 +98,7 @@ const fn row(
 // matters until the longest partition a mission tolerates, and is repaired by
 // anti-entropy afterwards.
 // Caps: the largest valid body, which a test of `codec` computes, rounded up.
-const TABLE: [KindRow; 13] = [
+const TABLE: [KindRow; 14] = [
     KindRow {
         relayed: false,
         ..row(
@@ -214,11 +216,21 @@ const TABLE: [KindRow; 13] = [
             Lifetime::Beacons(1),
         )
     },
+    KindRow {
+        relayed: false,
+        ..row(
+            Kind::Lacking,
+            "lacking",
+            56,
+            Priority::Beacon,
+            Lifetime::Beacons(1),
+        )
+    },
 ];
 
 impl Kind {
     /// All kinds, by number.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Beacon,
         Self::State,
         Self::Bid,
@@ -232,6 +244,7 @@ impl Kind {
         Self::Intent,
         Self::Conflict,
         Self::Heartbeat,
+        Self::Lacking,
     ];
 
     /// Its number on the wire.
@@ -335,7 +348,7 @@ mod tests {
             assert_eq!(Kind::of_name(kind.name()), Some(kind));
             assert!(kind.cap_bytes() + super::super::codec::ENVELOPE_MAX_BYTES <= RECORD_MAX_BYTES);
         }
-        assert_eq!(Kind::of_number(13), None);
+        assert_eq!(Kind::of_number(14), None);
         assert_eq!(Kind::of_name("rumour"), None);
     }
 

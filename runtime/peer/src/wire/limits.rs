@@ -38,6 +38,8 @@ pub const COVERED_MAX_BYTES: usize = 1000;
 pub const CHUNK_MAX_BYTES: usize = 256;
 /// Pieces of a mission: 64 KiB of rings are some 6,000 corners.
 pub const CHUNKS_MAX: u16 = 256;
+/// Bytes of a bit for each piece of a mission.
+pub const LACKING_MAX_BYTES: usize = CHUNKS_MAX as usize / 8;
 /// Farthest from the origin that the tangent plane is trusted, mm: 20 km.
 pub const POSITION_MAX_MM: i32 = 20_000_000;
 /// Heading, 1e-4 rad: a turn either way.
@@ -63,6 +65,11 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
         }
         Body::Operator(_) | Body::Finished(_) => Ok(()),
         Body::Heartbeat(h) => check_heartbeat(h),
+        Body::Lacking(l) => {
+            in_range("holders", usize::from(l.holders) <= PEERS_MAX)?;
+            at_most("pieces", l.pieces.len(), LACKING_MAX_BYTES)?;
+            in_range("pieces", l.pieces.last() != Some(&0))
+        }
     }
 }
 

@@ -341,6 +341,45 @@ pub struct MissionChunk {
     pub bytes: Vec<u8>,
 }
 
+/// Which pieces of a newer mission than the one it follows its author lacks: one hop, with
+/// each beacon of that time. None where it has them all and cannot follow it yet.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Lacking {
+    /// Revision of that mission.
+    pub revision: u32,
+    /// Hash of its content; 0 where no piece of it came yet, and all of them are lacking.
+    pub content_hash: u64,
+    /// How many neighbours follow that revision or a newer one, as far as their beacons tell:
+    /// its author lends them a part of its share of the air.
+    pub holders: u16,
+    /// A bit for each piece that it lacks, the lowest of the first byte for the first piece;
+    /// without bytes of zero at the end.
+    #[serde(with = "serde_bytes")]
+    pub pieces: Vec<u8>,
+}
+
+impl Lacking {
+    /// Whether a piece is lacking.
+    #[must_use]
+    pub fn lacks(&self, piece: u16) -> bool {
+        let byte = self.pieces.get(usize::from(piece / 8));
+        byte.is_some_and(|byte| byte >> (piece % 8) & 1 == 1)
+    }
+
+    /// The bits of the pieces that are lacking of so many.
+    #[must_use]
+    pub fn bits(pieces: u16, is_lacking: impl Fn(u16) -> bool) -> Vec<u8> {
+        let mut bits = vec![0; usize::from(pieces.div_ceil(8))];
+        for piece in (0..pieces).filter(|piece| is_lacking(*piece)) {
+            bits[usize::from(piece / 8)] |= 1 << (piece % 8);
+        }
+        while bits.last() == Some(&0) {
+            bits.pop();
+        }
+        bits
+    }
+}
+
 /// "All that can be covered is covered."
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Finished {

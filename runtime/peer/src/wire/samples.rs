@@ -226,6 +226,15 @@ pub fn golden() -> Vec<(Body, &'static str)> {
             }),
             "8504033930391922c54606ac020f5103",
         ),
+        (
+            Body::Lacking(Lacking {
+                revision: 2,
+                content_hash: 6,
+                holders: 1,
+                pieces: vec![0b1000_0001, 2],
+            }),
+            "84020601428102",
+        ),
     ]
 }
 
@@ -366,6 +375,12 @@ pub fn largest() -> Vec<Body> {
             east_dm: -POSITION_MAX_MM / 100,
             north_dm: -POSITION_MAX_MM / 100,
             fresh,
+        }),
+        Body::Lacking(Lacking {
+            revision: u32::MAX,
+            content_hash: u64::MAX,
+            holders: u16::try_from(PEERS_MAX).unwrap_or(u16::MAX),
+            pieces: vec![255; LACKING_MAX_BYTES],
         }),
     ]
 }

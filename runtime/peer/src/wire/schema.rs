@@ -8,8 +8,8 @@ use super::kinds::Kind;
 use super::limits::{
     BID_COVERED_MAX_BYTES, CHUNK_MAX_BYTES, CHUNKS_MAX, COMMITS_MAX, COVERED_MAX_BYTES,
     DURATION_MAX_MS, FRESH_MAX_BYTES, GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX, HOPS_MAX,
-    INTERVAL_LEAST, INTERVAL_MOST, MEMBERS_MAX, PEERS_MAX, PLAN_MAX, POSITION_MAX_MM,
-    SPEED_MAX_MMPS,
+    INTERVAL_LEAST, INTERVAL_MOST, LACKING_MAX_BYTES, MEMBERS_MAX, PEERS_MAX, PLAN_MAX,
+    POSITION_MAX_MM, SPEED_MAX_MMPS,
 };
 use core::fmt::Write as _;
 
@@ -354,6 +354,21 @@ const OPERATOR: &[Place] = &[at(
 
 const FINISHED: &[Place] = &[REVISION];
 
+const LACKING: &[Place] = &[
+    REVISION,
+    at("content_hash", "hash of the content", U64),
+    at(
+        "holders",
+        "neighbours that follow that revision or a newer one",
+        Shape::Number(0, PEERS_MAX as i128),
+    ),
+    at(
+        "pieces",
+        "a bit for each piece that is lacking, the first lowest",
+        Shape::Bytes(LACKING_MAX_BYTES),
+    ),
+];
+
 /// The places of a kind's body; `None` for a reserved kind.
 #[must_use]
 pub fn places(kind: Kind) -> Option<&'static [Place]> {
@@ -367,6 +382,7 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Operator => Some(OPERATOR),
         Kind::Finished => Some(FINISHED),
         Kind::Heartbeat => Some(HEARTBEAT),
+        Kind::Lacking => Some(LACKING),
         Kind::Event | Kind::Task | Kind::Intent | Kind::Conflict => None,
     }
 }

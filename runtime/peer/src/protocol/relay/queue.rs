@@ -140,6 +140,26 @@ impl Queue {
         keys.copied().collect()
     }
 
+    /// The pieces among those that have waited for their random time.
+    pub(super) fn ripe_pieces(&self, now: Time) -> impl Iterator<Item = RecordKey> {
+        let none = self.pieces == 0;
+        let waiting = self.waiting.iter().take_while(move |_| !none);
+        let pieces = waiting.filter(move |(k, w)| is_piece(k) && w.from <= now);
+        pieces.map(|(k, _)| *k)
+    }
+
+    /// Two that wait change places.
+    pub(super) fn swap(&mut self, a: &RecordKey, b: &RecordKey) {
+        if a != b
+            && let (Some(of_a), Some(of_b)) = (self.waiting.get(a), self.waiting.get(b))
+        {
+            let (of_a, of_b) = (*of_a, *of_b);
+            self.waiting.insert(*a, of_b);
+            self.waiting.insert(*b, of_a);
+            self.turn.set(None);
+        }
+    }
+
     pub(super) fn n_pieces(&self) -> usize {
         self.pieces
     }

@@ -520,3 +520,107 @@ fn what_is_due_goes_before_what_only_shares_its_headers() {
         ["f/v3/finished/0/2", "f/v3/state/0/1", "f/v3/claim/0/3"]
     );
 }
+
+/// What a neighbour says it lacks of the mission of which [`piece`] gives the pieces.
+fn lacking(pieces: &[u16], holders: u16) -> Lacking {
+    Lacking {
+        revision: 2,
+        content_hash: 6,
+        holders,
+        pieces: Lacking::bits(256, |piece| pieces.contains(&piece)),
+    }
+}
+
+fn beacon_of(revision: u32, sharers: u16) -> Beacon {
+    Beacon {
+        revision,
+        sharers,
+        gossip: Vec::new(),
+        ..samples::beacon(1)
+    }
+}
+
+#[test]
+fn just_the_pieces_that_neighbours_say_they_lack_are_said_and_the_most_wanted_first() {
+    let mut r = relay(2);
+    for subject in 0..40 {
+        hear_piece(&mut r, 5_000, subject, 40);
+    }
+    let says = |r: &mut Relay, t: u64, id: u16, pieces: &[u16]| {
+        r.on_beacon(Time(t), id, &beacon_of(1, 9));
+        r.on_lacking(Time(t), id, &lacking(pieces, 0));
+    };
+    let mut said = Vec::new();
+    for t in 9_000..30_000 {
+        match t {
+            9_000 => says(&mut r, t, 7, &[3, 5, 30]),
+            9_001 => says(&mut r, t, 8, &[5, 30]),
+            9_002 => says(&mut r, t, 9, &[30]),
+            // Another neighbour said one of them meanwhile: it is not said twice.
+            9_003 => hear_piece(&mut r, t, 3, 40),
+            15_000 => says(&mut r, t, 7, &[5]),
+            15_001 => says(&mut r, t, 8, &[]),
+            15_002 => r.on_beacon(Time(t), 9, &beacon_of(2, 9)),
+            _ => {}
+        }
+        // The random times of all are over.
+        let polled = (t > 9_400).then(|| r.poll(Time(t))).flatten();
+        said.extend(polled.map(|out| out.bytes[0]));
+    }
+    assert_eq!(said, [30, 5, 5]);
+    // What is said of another mission hides nothing of this one.
+    let other = Lacking {
+        revision: u32::MAX,
+        ..lacking(&[], 1)
+    };
+    r.on_beacon(Time(30_000), 8, &beacon_of(1, 9));
+    r.on_lacking(Time(30_000), 8, &other);
+    let rest = (30_000..90_000).filter_map(|t| r.poll(Time(t)).map(|out| out.bytes[0]));
+    let rest: std::collections::BTreeSet<u8> = rest.collect();
+    assert_eq!(rest.len(), 40);
+}
+
+/// A big mission that one station of a crowd has: alone it would take eight minutes to say it.
+#[test]
+fn those_who_lack_a_mission_lend_to_who_has_it_and_nobody_sends_more_than_its_part() {
+    let all: Vec<u16> = (0..76).collect();
+    let took_s = |holders: u16| {
+        let mut r = relay(9);
+        share(&mut r, 5_000, 29);
+        r.follow(Time(5_000), 2);
+        for subject in 0..76 {
+            let own = piece(subject, 76);
+            let byte = u8::try_from(subject).unwrap();
+            r.on_beacon(Time(5_000), 100, &beacon_of(1, 29));
+            r.own(Time(5_000), &own, vec![byte; 280]);
+        }
+        let mut said = std::collections::BTreeSet::new();
+        let (mut bytes, mut frame) = (0, Filling::default());
+        for t in 5_000..600_000 {
+            if t % 1_000 < 28 {
+                let id = 100 + u16::try_from(t % 1_000).unwrap();
+                r.on_beacon(Time(t), id, &beacon_of(1, 29));
+                let left = all.iter().copied().filter(|p| !said.contains(p));
+                r.on_lacking(Time(t), id, &lacking(&left.collect::<Vec<_>>(), holders));
+            }
+            while let Some(out) = r.poll(Time(t)) {
+                bytes += frame.add(t, out.bytes.len());
+                said.insert(u16::from(out.bytes[0]));
+            }
+            if said.len() == 76 {
+                return ((t - 5_000) / 1_000, bytes as u64);
+            }
+        }
+        panic!("{} of 76 were said", said.len())
+    };
+    let ((alone_s, _), (lent_s, bytes)) = (took_s(0), took_s(1));
+    assert!(alone_s > 160 && lent_s < 60, "{alone_s} {lent_s}");
+    // A share of 124 bytes a second and a tenth of 28 others, and what a bucket holds.
+    assert!(bytes < lent_s * (124 + 348) + 3 * 124 + 2 * 348, "{bytes}");
+    // Of several who have it each borrows its part.
+    let among_four_s = took_s(4).0;
+    assert!(
+        among_four_s > lent_s && among_four_s < alone_s,
+        "{among_four_s}"
+    );
+}

@@ -291,10 +291,21 @@ fn every_limit_is_sharp() {
                 let chunks = CHUNKS_MAX + 1;
                 refused(&Body::Mission(MissionChunk { chunks, ..m }), "chunks");
             }
+            Body::Lacking(l) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut Lacking), field| {
+                    let mut l = l.clone();
+                    change(&mut l);
+                    refused(&Body::Lacking(l), field);
+                };
+                with(&|l| l.holders += 1, "holders");
+                with(&|l| l.pieces.push(1), "pieces");
+                with(&|l| l.pieces[31] = 0, "pieces");
+            }
             Body::Operator(_) | Body::Finished(_) => {}
         }
     }
-    assert_eq!(kinds, 7);
+    assert_eq!(kinds, 8);
 }
 
 #[test]
@@ -350,7 +361,7 @@ fn envelopes_beyond_the_table_are_refused() {
     };
     assert!(of(|_| ()).is_ok());
     assert_eq!(of(|r| r.kind = 9), Err(WireError::Kind { number: 9 }));
-    assert_eq!(of(|r| r.kind = 13), Err(WireError::Kind { number: 13 }));
+    assert_eq!(of(|r| r.kind = 14), Err(WireError::Kind { number: 14 }));
     assert_eq!(
         of(|r| r.subject = 1),
         Err(WireError::Range { field: "subject" })
