@@ -503,7 +503,7 @@ impl Relay {
     /// A neighbour says which pieces of a mission it lacks.
     pub fn on_lacking(&mut self, now: Time, author: u16, lacking: &Lacking) {
         self.wants.on_lacking(now, author, lacking);
-        self.queue_pieces(now, lacking.revision <= self.newest_piece);
+        self.queue_pieces(now, self.newest_piece > 0);
     }
 
     /// Takes out the pieces that nobody lacks any more, and queues those that somebody lacks,

@@ -295,8 +295,10 @@ fn halves_of_a_mission_are_brought_together_after_its_author_is_gone() {
         let said = record(9, 1, u32::from(i) + 1, i, &Body::Mission(piece));
         h.inject(1 + i % 2, said);
     }
+    h.run_s(5);
     for id in [1, 2] {
         h.isolate(id, false);
+        h.seat(id).passed_on.clear();
     }
     assert!(h.run_until(30, |h| (1..=2).all(|id| h.beliefs(id).revision == 2)));
     h.run_s(10);
