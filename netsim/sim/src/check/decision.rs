@@ -7,8 +7,8 @@ use super::{Findings, Handicaps, Snapshot};
 use crate::account::secs;
 use crate::twins::Twins;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
-use skein_flight::coverage::ring::division::Rule;
-use skein_flight::coverage::ring::{CoverageLoop, Direction};
+use skein_flight::coverage::ring::division::{RouteNetwork, Rule};
+use skein_flight::coverage::ring::{CoverageLoop, Direction, shares};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;
 use skein_peer::offload::MissionGeometry;
@@ -26,9 +26,6 @@ const GAIN_PERCENT: u64 = 90;
 
 /// Rebalancings are at least so many of the longest interval apart.
 const CALM_INTERVALS: u64 = 20;
-
-/// Most legs of a section.
-const LEGS_MAX: usize = 6;
 
 /// A bid may put its author nearer than it can fly by this much, metres: a frame sees a
 /// cell from short of its boundary.
@@ -459,64 +456,23 @@ impl DecisionCheck {
     }
 }
 
-/// Who of a division has more than twice an even share of the remaining time while another,
-/// after its own section, could serve its last cell a tenth sooner.
+/// Who of a division is given too much.
 fn overburdened(ground: &MissionGeometry, divided: &Divided) -> Option<String> {
+    let network = RouteNetwork {
+        coverage_loop: &ground.coverage_loop,
+        router: &ground.router,
+    };
     let Divided {
         ring,
         uavs,
         division,
         ..
     } = divided;
-    let work_mm: u64 = ring
-        .iter()
-        .filter(|c| c.open)
-        .map(|c| u64::from(c.service_mm))
-        .sum();
-    let speed_mmps: u64 = uavs.iter().map(|u| u64::from(u.speed_mmps)).sum();
-    let even_ms = work_mm * 1000 / speed_mmps.max(1);
-    let n = ring.len();
-    let pose = |boundary: u16, way| {
-        ground
-            .coverage_loop
-            .boundary_towards(usize::from(boundary), way)
-    };
-    let into = |cell: u16, way| pose(cell + u16::from(way == Direction::Backward), way);
-    let out_of = |cell: u16, way| pose(cell + u16::from(way == Direction::Forward), way);
-    let of = |id: u16| division.sections.iter().find(|s| s.id == id);
-    let begins_ms = |u: &Uav| u.off_loop.map_or(u.release_ms, |off| off.ready_ms);
-    uavs.iter().find_map(|late| {
-        let section = of(late.id)?;
-        let given_ms = u64::from(section.finish_ms.saturating_sub(begins_ms(late)));
-        let last = section.legs.last()?.cells(n).last()?;
-        if given_ms <= 2 * even_ms {
-            return None;
-        }
-        let helper = uavs.iter().filter(|u| u.id != late.id).find(|u| {
-            let Some(own) = of(u.id).filter(|s| s.legs.len() < LEGS_MAX) else {
-                return false;
-            };
-            let ended = own.legs.last().and_then(|l| Some((l.cells(n).last()?, l.direction)));
-            let (from, at_ms) = match (ended, u.off_loop) {
-                (Some((cell, way)), _) => (out_of(cell, way), own.finish_ms),
-                (None, Some(off)) => (off.pose(), off.ready_ms),
-                (None, None) => (pose(u.anchor, u.heading), u.release_ms),
-            };
-            let ways = [Direction::Forward, Direction::Backward];
-            let routes = ways.map(|way| ground.router.route(from, into(last, way)));
-            let way_m = routes.into_iter().flatten().map(|c| c.length_m()).reduce(f64::min);
-            way_m.is_some_and(|way_m| {
-                let flown_m = way_m + f64::from(ring[usize::from(last)].service_mm) / 1000.0;
-                let ms = f64::from(at_ms) + flown_m * 1e6 / f64::from(u.speed_mmps.max(1));
-                let until_ms = u64::from(u.release_ms) + u64::from(u.endurance_ms);
-                ms * 1.1 < f64::from(section.finish_ms) && ms <= until_ms as f64
-            })
-        })?;
-        Some(format!(
-            "gives uav{} {given_ms} ms of flight, an even share being {even_ms} ms, though uav{} could serve its cell {last} sooner",
-            late.id, helper.id
-        ))
-    })
+    let who = shares::overburdened(ring, uavs, network, division)?;
+    Some(format!(
+        "gives uav{} {} ms of flight, an even share being {} ms, though uav{} could serve its cell {} sooner",
+        who.id, who.given_ms, who.even_ms, who.helper, who.cell
+    ))
 }
 
 fn is_complete(open: &OpenRound) -> bool {

@@ -87,6 +87,7 @@ pub fn divide(ring: &[RingCell], uavs: &[Uav], network: RouteNetwork<'_>, rule: 
     } else {
         around
     };
+    let chosen = search.handed_over(chosen);
     division_of(&search, &uavs, &chosen)
 }
 
@@ -136,6 +137,7 @@ mod tests {
     use super::super::backtracking::OffLoop;
     use super::super::coverage_loop::Direction;
     use super::super::problem::LoopProblem;
+    use super::super::shares::overburdened;
     use super::super::tree::Tree;
     use super::*;
     use crate::coverage::lanes;
@@ -187,6 +189,39 @@ mod tests {
             let corners = [(-60.0, -40.0), (60.0, -40.0), (60.0, 40.0), (-60.0, 40.0)];
             let block = corners.map(|(e, n)| Point::new(x + e, y + n)).to_vec();
             Self::new(columns, rows, vec![Polygon::new(block).unwrap()])
+        }
+
+        /// Two to four pockets, behind walls with a gate of two lanes each.
+        fn with_pockets(draw: &mut SplitMix64) -> Self {
+            let (columns, rows) = (16, 12);
+            let (east, north) = (LANE_M * f64::from(columns), LANE_M * f64::from(rows));
+            let wall = |(west, south): (f64, f64), (east, north): (f64, f64)| {
+                let corners = [(west, south), (east, south), (east, north), (west, north)];
+                Polygon::new(corners.map(|(x, y)| Point::new(x, y)).to_vec()).unwrap()
+            };
+            let lanes = |n: usize| LANE_M * f64::from(u16::try_from(n).unwrap());
+            let (past, half) = (90.0, 3.0);
+            let across = lanes(4 + 2 * draw.below(2));
+            let gate = lanes(1 + draw.below(14));
+            let (below, above) = (across - half, across + half);
+            let mut walls = vec![
+                wall((-past, below), (gate - half, above)),
+                wall((gate + 2.0 * LANE_M + half, below), (east + past, above)),
+            ];
+            for (from, to) in [(-past, below), (above, north + past)] {
+                let upright = lanes(4 + 2 * draw.below(5));
+                let is_in_gate = (upright - gate - LANE_M).abs() <= 2.5 * LANE_M;
+                if draw.below(4) == 0 || is_in_gate {
+                    continue;
+                }
+                let (from, to) = if draw.below(2) == 0 {
+                    (from.max(2.0 * LANE_M), to)
+                } else {
+                    (from, to.min(north - 2.0 * LANE_M))
+                };
+                walls.push(wall((upright - half, from), (upright + half, to)));
+            }
+            Self::new(columns, rows, walls)
         }
 
         fn network(&self) -> RouteNetwork<'_> {
@@ -450,6 +485,27 @@ mod tests {
         );
     }
 
+    /// Eight swarms between walls drawn from a seed, and nobody of them has too much.
+    fn assert_shared_behind_walls(seed: u64) {
+        let draw = &mut SplitMix64::new(seed);
+        let site = Site::with_pockets(draw);
+        for _ in 0..8 {
+            let (ring, uavs) = site.drawn(draw);
+            let d = divide(&ring, &uavs, site.network(), Rule::Best);
+            assert_sound(&ring, &uavs, &d);
+            let who = overburdened(&ring, &uavs, site.network(), &d);
+            assert_eq!(who, None, "seed {seed}: {d:?}");
+        }
+    }
+
+    /// The search alone leaves somebody with too much in each of these.
+    #[test]
+    fn what_the_search_leaves_to_the_last_behind_walls_goes_to_who_is_sooner() {
+        for seed in [38, 120, 245, 538, 609, 627] {
+            assert_shared_behind_walls(seed);
+        }
+    }
+
     #[test]
     fn a_mission_may_ask_for_backtracking_alone() {
         let site = Site::new(10, 8, Vec::new());
@@ -461,6 +517,11 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig { max_shrink_iters: 64, ..ProptestConfig::default() })]
+
+        #[test]
+        fn nobody_has_too_much_behind_walls(seed in any::<u64>()) {
+            assert_shared_behind_walls(seed);
+        }
 
         #[test]
         fn never_worse_than_backtracking(seed in any::<u64>(), block in any::<bool>()) {

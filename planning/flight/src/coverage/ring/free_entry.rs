@@ -14,6 +14,8 @@
 //! # Complexity
 //! The number of steps that it is given; each asks for the length of one curve.
 
+mod handover;
+
 use super::backtracking::{Leg, RingCell, Uav};
 use super::coverage_loop::Direction;
 use super::transfers::{Place, Transfers};

@@ -11,6 +11,7 @@
 //! | [`division`] | the division among UAVs that is flown: the best of those below |
 //! | [`backtracking`] | the division among UAVs: backtracking MSTC |
 //! | `free_entry` | the division without ties to where UAVs are |
+//! | [`shares`] | whether a division gives somebody too much |
 //! | `transfers` | how long the ways between its runs are |
 //! | `endurance_limited` | the division when endurance does not suffice for all cells |
 
@@ -23,6 +24,7 @@ mod free_entry;
 pub mod grid;
 pub mod patch;
 pub mod problem;
+pub mod shares;
 mod transfers;
 pub mod tree;
 
