@@ -43,12 +43,28 @@ struct Joined {
     wait_ms: u32,
     members: Vec<Member>,
     repair: bool,
+    /// Whether one of its members was gone since, or too many UAVs were there to open another.
+    apart: bool,
+}
+
+impl Joined {
+    /// Whether a peer that believes this would try the round again.
+    fn holds(&self, me: u16, view: &Beliefs, uavs: &BTreeSet<u16>) -> bool {
+        let lives = |id: u16| {
+            let believed = view.peers.get(&PeerId(id));
+            id == me || believed.is_some_and(|(_, s)| *s != Status::Down)
+        };
+        let n_uavs = uavs.iter().filter(|id| lives(**id)).count();
+        n_uavs <= MEMBERS_MAX && self.members.iter().all(|m| lives(m.id))
+    }
 }
 
 /// One peer's part.
 #[derive(Clone, Debug, Default)]
 struct Part {
     able_since_ms: Option<u64>,
+    /// Whether it stood still before a snapshot showed it able.
+    stood_still: bool,
     adoptions: u32,
     adopted_ms: Option<u64>,
     joined: Option<Joined>,
@@ -108,6 +124,7 @@ impl PatienceCheck {
         self.owed.stop(id);
         if let Some(part) = self.parts.get_mut(&id) {
             part.view = None;
+            part.stood_still |= part.able_since_ms.is_none();
         }
     }
 
@@ -158,6 +175,7 @@ impl PatienceCheck {
             wait_ms: bid.round.wait_ms,
             members: bid.round.members.clone(),
             repair: bid.round.repair,
+            apart: false,
         });
         part.decided = false;
     }
@@ -184,9 +202,12 @@ impl PatienceCheck {
         let believed_ms = self.believed.stop((observer, subject));
         let look_ms = self.period_ms / LOOKS_A_PERIOD;
         let was_counted = believed_ms.is_none_or(|t| now_ms > t + look_ms);
-        let Some(part) = self.parts.get(&observer) else {
+        let Some(part) = self.parts.get_mut(&observer) else {
             return;
         };
+        if let Some(joined) = &mut part.joined {
+            joined.apart |= joined.members.iter().any(|m| m.id == subject);
+        }
         let Some(view) = part.view.as_ref().filter(|_| was_counted) else {
             return;
         };
@@ -245,7 +266,11 @@ impl PatienceCheck {
                 part.able_since_ms.get_or_insert(now_ms);
             } else {
                 part.able_since_ms = None;
+                part.stood_still = false;
                 self.owed.stop(m.id);
+            }
+            if let Some(joined) = &mut part.joined {
+                joined.apart |= !joined.holds(m.speaks_as, &m.view, &self.uavs);
             }
             part.diameters = [m.view.diameter, part.diameters[0]];
             part.view = Some(m.view.clone());
@@ -284,8 +309,10 @@ fn judge_patience(
     if bid.round.repair || follows {
         return;
     }
-    // Since the snapshot in which it was able first; it may have been so for T before.
-    let able_ms = part.able_since_ms.map_or(0, &ago_ms) + period_ms;
+    // Since the snapshot in which it was able first; it may have been so for T before, and for
+    // as long again if it stood still in between.
+    let unseen_ms = period_ms * (1 + u64::from(part.stood_still));
+    let able_ms = part.able_since_ms.map_or(0, &ago_ms) + unseen_ms;
     let calm_ms = part.adopted_ms.map(&ago_ms);
     let hasty = able_ms < STEADY_PERIODS * period_ms;
     let restless = calm_ms.is_some_and(|c| c < CALM_PERIODS * period_ms);
@@ -298,8 +325,9 @@ fn judge_patience(
     }
 }
 
-/// A round that ran out of time, with all its members still there, is followed by one that
-/// waits at least twice the first waiting time.
+/// A round that ran out of time, with all its members there and no more UAVs than may share one
+/// all the while, is followed by one that waits at least twice the first waiting time. What was
+/// given up since a member was gone, or among too many, is no first try.
 fn judge_waiting(
     period_ms: u64,
     now_ms: u64,
@@ -312,7 +340,8 @@ fn judge_waiting(
         let later = bid.round.counter == j.order.0 + 1;
         let out_of_time = ago_ms(j.at_ms) > u64::from(j.wait_ms);
         // A rebalancing may be decided not to be adopted, which nobody can see.
-        later && out_of_time && j.repair && !part.decided && j.members == bid.round.members
+        let goes_on = !j.apart && !part.decided && j.members == bid.round.members;
+        later && out_of_time && j.repair && goes_on
     }) else {
         return;
     };
@@ -443,6 +472,54 @@ mod tests {
                 found.counts.contains_key("waiting"),
                 broken,
                 "{wait_ms} {after_ms}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_round_that_others_ended_is_no_first_try() {
+        for (others, status, broken) in [
+            (1, Status::Alive, true),
+            (7, Status::Alive, true),
+            (8, Status::Alive, false),
+            (1, Status::Down, false),
+        ] {
+            let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
+            let mut story = Story::new(0);
+            let mut view = speaking();
+            let members = [1, 2].map(|id| Member { id, incarnation: 1 });
+            for (at_ms, counter) in [(30_000, 4), (35_100, 5)] {
+                let mut bid = bid(counter, true, 5000);
+                bid.round.members = members.to_vec();
+                check.on_bid(at_ms, 1, (&bid, 9), &Handicaps::default(), &mut found);
+                view.peers = (0..others).map(|i| (PeerId(2 + i), (1, status))).collect();
+                let all = (0..=others).map(|i| (1 + i, view.clone()));
+                let views: Vec<_> = all.collect();
+                story.snapshot(at_ms + 500, &views, |s| check.on_snapshot(s, &mut found));
+            }
+            assert_eq!(
+                found.counts.contains_key("waiting"),
+                broken,
+                "{others} {status:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn who_stood_still_before_it_was_seen_able_may_have_been_so_for_longer() {
+        for (stood_still, broken) in [(false, true), (true, false)] {
+            let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
+            check.parts.entry(1).or_default();
+            if stood_still {
+                check.on_silent(1);
+            }
+            able_until(&mut check, 8, &mut found);
+            let bid = bid(4, false, 5000);
+            check.on_bid(8_400, 1, (&bid, 9), &Handicaps::default(), &mut found);
+            assert_eq!(
+                found.counts.contains_key("patience"),
+                broken,
+                "{stood_still}"
             );
         }
     }
