@@ -488,13 +488,14 @@ mod tests {
             let mut story = Story::new(0);
             let mut view = speaking();
             let members = [1, 2].map(|id| Member { id, incarnation: 1 });
+            view.peers = (0..others).map(|i| (PeerId(2 + i), (1, status))).collect();
+            let all = (0..=others).map(|i| (1 + i, view.clone()));
+            let views: Vec<_> = all.collect();
+            story.snapshot(29_000, &views, |s| check.on_snapshot(s, &mut found));
             for (at_ms, counter) in [(30_000, 4), (35_100, 5)] {
                 let mut bid = bid(counter, true, 5000);
                 bid.round.members = members.to_vec();
                 check.on_bid(at_ms, 1, (&bid, 9), &Handicaps::default(), &mut found);
-                view.peers = (0..others).map(|i| (PeerId(2 + i), (1, status))).collect();
-                let all = (0..=others).map(|i| (1 + i, view.clone()));
-                let views: Vec<_> = all.collect();
                 story.snapshot(at_ms + 500, &views, |s| check.on_snapshot(s, &mut found));
             }
             assert_eq!(
