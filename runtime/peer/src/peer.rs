@@ -560,6 +560,9 @@ impl Peer {
         };
         let answers = !full && self.timers.is_running(Timer::Refutation, self.now);
         self.publish_beat(&body, answers);
+        if let Body::Beacon(beacon) = &body {
+            self.tell_lacking(beacon.revision);
+        }
     }
 
     /// Says what is asked for and answered at once, with a heartbeat.
@@ -597,10 +600,6 @@ impl Peer {
 
     fn publish_beat(&mut self, body: &Body, answers: bool) {
         let me = self.me();
-        let follows = match body {
-            Body::Beacon(beacon) => Some(beacon.revision),
-            _ => None,
-        };
         let record = self.outbound.beat(self.now, me.id, me.incarnation, body);
         let bytes = codec::encode_record(&record);
         if answers {
@@ -608,16 +607,18 @@ impl Peer {
         } else {
             self.relay.air.charge(self.now, bytes.len());
         }
+        self.broadcast(body.kind(), bytes);
+    }
+
+    /// Puts a record of this peer that nobody passes on, and that is paid for, on the air.
+    fn broadcast(&mut self, kind: Kind, bytes: Vec<u8>) {
         self.outputs.push_back(Output::Publish {
-            key: key::key(&self.config.fleet, body.kind(), 0, me.id),
+            key: key::key(&self.config.fleet, kind, 0, self.me().id),
             bytes,
             hops: 0,
             priority: Priority::Beacon,
-            lifetime_ms: self.relay.lifetime_ms(body.kind()),
+            lifetime_ms: self.relay.lifetime_ms(kind),
         });
-        if let Some(follows) = follows {
-            self.tell_lacking(follows);
-        }
     }
 
     /// With a beacon goes, in one transmission, which pieces of a newer mission are lacking; in a
@@ -647,13 +648,7 @@ impl Peer {
         let record = self.outbound.record(me.id, me.incarnation, 0, &body);
         let bytes = codec::encode_record(&record);
         self.relay.air.charge(self.now, bytes.len());
-        self.outputs.push_back(Output::Publish {
-            key: key::key(&self.config.fleet, Kind::Lacking, 0, me.id),
-            bytes,
-            hops: 0,
-            priority: Priority::Beacon,
-            lifetime_ms: self.relay.lifetime_ms(Kind::Lacking),
-        });
+        self.broadcast(Kind::Lacking, bytes);
     }
 
     /// Sends what the relay lets go.

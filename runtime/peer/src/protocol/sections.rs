@@ -69,7 +69,7 @@ struct News {
     /// Whether any cell may be listed by fewer than before, or beyond all or not any more.
     listing: bool,
     /// What others ceased to list in the life in which they listed it.
-    let_go: Vec<CellSet>,
+    let_go: CellSet,
 }
 
 impl PartialEq for News {
@@ -116,6 +116,7 @@ impl Sections {
             alone: BTreeMap::new(),
             news: News {
                 listing: true,
+                let_go: CellSet::new(cells),
                 ..News::default()
             },
         }
@@ -140,11 +141,7 @@ impl Sections {
     /// What others let go since this was last asked, in the life in which they listed it: they
     /// covered it, or somebody else lists it.
     pub(crate) fn take_let_go(&mut self) -> CellSet {
-        let mut all = CellSet::new(self.cells);
-        for cells in core::mem::take(&mut self.news.let_go) {
-            all.union_with(&cells);
-        }
-        all
+        core::mem::replace(&mut self.news.let_go, CellSet::new(self.cells))
     }
 
     /// The lives in which peers said with their newest claims that they are alone.
@@ -271,7 +268,7 @@ impl Sections {
         freed.subtract(&now.listed);
         if freed.count() > 0 {
             self.news.listing = true;
-            self.news.let_go.push(freed);
+            self.news.let_go.union_with(&freed);
         }
     }
 
