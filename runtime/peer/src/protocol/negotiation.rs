@@ -405,12 +405,14 @@ impl Negotiation {
             // counts from the decision.
             self.orphan_since = self.orphan_since.or(Some(ctx.now)).max(self.decided_at);
         }
+        // Asked at each look: what was let go earlier and orphaned by a death since has no claim
+        // on its way.
+        let let_go = self.sections.take_let_go();
         let noted = self.orphaned_at.len() == usize::from(orphans.count());
         if !noted && ctx.is_many() && ctx.able_since.is_some() {
-            let let_go = self.sections.take_let_go();
             let found_at = ctx.now.plus_ms(claims_on_the_way_ms(ctx));
             for cell in orphans.iter() {
-                let is_listed_elsewhere = let_go.contains(cell);
+                let is_listed_elsewhere = let_go.as_ref().is_some_and(|l| l.contains(cell));
                 let since = if is_listed_elsewhere {
                     found_at
                 } else {

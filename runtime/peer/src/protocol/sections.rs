@@ -69,7 +69,7 @@ struct News {
     /// Whether any cell may be listed by fewer than before, or beyond all or not any more.
     listing: bool,
     /// What others ceased to list in the life in which they listed it.
-    let_go: CellSet,
+    let_go: Option<CellSet>,
 }
 
 impl PartialEq for News {
@@ -116,7 +116,6 @@ impl Sections {
             alone: BTreeMap::new(),
             news: News {
                 listing: true,
-                let_go: CellSet::new(cells),
                 ..News::default()
             },
         }
@@ -140,8 +139,8 @@ impl Sections {
 
     /// What others let go since this was last asked, in the life in which they listed it: they
     /// covered it, or somebody else lists it.
-    pub(crate) fn take_let_go(&mut self) -> CellSet {
-        core::mem::replace(&mut self.news.let_go, CellSet::new(self.cells))
+    pub(crate) fn take_let_go(&mut self) -> Option<CellSet> {
+        self.news.let_go.take()
     }
 
     /// The lives in which peers said with their newest claims that they are alone.
@@ -268,7 +267,9 @@ impl Sections {
         freed.subtract(&now.listed);
         if freed.count() > 0 {
             self.news.listing = true;
-            self.news.let_go.union_with(&freed);
+            let none = || CellSet::new(self.cells);
+            let let_go = self.news.let_go.get_or_insert_with(none);
+            let_go.union_with(&freed);
         }
     }
 

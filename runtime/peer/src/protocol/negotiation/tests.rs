@@ -614,21 +614,28 @@ fn orphans_are_left_to_those_who_would_be_there_sooner_each_for_two_periods() {
 fn what_a_living_owner_lets_go_is_an_orphan_once_another_claim_could_have_come() {
     // Over five hops a claim may be on the way for two periods.
     for (diameter, later_ms) in [(1, 0), (5, 2 * T)] {
-        let mut desk = Desk::new(&[2, 3, 4, 5, 6, 7, 8, 9, 10]);
+        let mut desk = Desk::new(&[2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
         desk.diameter = diameter;
         desk.claim(2, 1, 0, 12, 600_000);
         desk.claim(3, 1, 12, 12, 600_000);
+        desk.claim(4, 2, 22, 2, 600_000);
+        desk.tick();
+        // Peer 3 lets go what peer 4 lists.
+        desk.claim(3, 2, 12, 10, 600_000);
         desk.tick();
         let from = desk.now;
-        // Peer 2 lists its first two cells no more, and peer 3 is lost with all of its own.
+        // Peer 2 lists its first two cells no more, and peers 3 and 4 are lost with all of theirs.
         desk.claim(2, 2, 2, 10, 600_000);
         desk.live.remove(&3);
+        desk.live.remove(&4);
         desk.tick();
         let mut ripe_at = |cell: u16, ms: u64| {
             desk.now = from.plus_ms(ms);
             desk.ask(|n, ctx| n.ripe_orphans(ctx).contains(cell))
         };
-        assert!(!ripe_at(12, 2 * T - 1) && ripe_at(12, 2 * T));
+        for of_the_dead in [12, 22] {
+            assert!(!ripe_at(of_the_dead, 2 * T - 1) && ripe_at(of_the_dead, 2 * T));
+        }
         assert!(!ripe_at(0, 2 * T + later_ms - 1) && ripe_at(0, 2 * T + later_ms));
     }
 }
