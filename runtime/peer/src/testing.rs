@@ -378,6 +378,12 @@ impl Harness {
         peer.map_or(0, Peer::next_revision)
     }
 
+    /// The newest mission that a running peer holds.
+    #[must_use]
+    pub fn newest_mission(&self, id: u16) -> Option<Arc<Mission>> {
+        self.seats.get(&id)?.peer.as_ref()?.mission()
+    }
+
     /// Where a UAV is.
     ///
     /// # Panics

@@ -73,6 +73,7 @@ fn a_new_revision_is_taken_by_all_and_covered_cells_keep_their_names() {
     assert!(h.run_until(10, |h| h.beliefs(1).revision == 2
         && h.beliefs(2).revision == 2));
     assert!(covered(&h, 1) >= before, "{} of {before}", covered(&h, 1));
+    assert_eq!(h.newest_mission(1).as_deref(), Some(&mission(2, 8, 4)));
     assert!(h.run_until(300, |h| h.beliefs(1).finished && h.beliefs(2).finished));
     assert_eq!(h.beliefs(1).covered.capacity(), 32);
 }

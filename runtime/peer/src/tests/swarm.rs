@@ -469,6 +469,28 @@ fn what_is_said_of_a_uav_is_what_it_senses() {
 }
 
 /// §7: claims and states are said again every ten intervals, and up to a quarter of one more.
+/// Of fifty in a row, each in earshot of three on either side, a beacon has no room for all: the
+/// heartbeats between two beacons tell of others, too.
+#[test]
+fn a_heartbeat_of_one_of_many_tells_of_others() {
+    const N: u16 = 50;
+    let mut h = Harness::new(N, mission(1, 16, 12));
+    for (a, b) in (1..=N).flat_map(|a| (1..=N).map(move |b| (a, b))) {
+        h.link(a, b).cut = a.abs_diff(b) > 3;
+    }
+    for id in 1..=N {
+        h.start(id);
+    }
+    h.run_s(40);
+    let said = &h.seat(1).said;
+    let told = said.iter().filter_map(|(_, _, body)| match body {
+        Body::Heartbeat(heartbeat) => Some(heartbeat.fresh.iter()),
+        _ => None,
+    });
+    let told: BTreeSet<u16> = told.flatten().map(|fresh| fresh.id).collect();
+    assert!(told.len() > 8, "{told:?}");
+}
+
 #[test]
 fn claims_and_states_are_said_again_every_ten_intervals() {
     let mut h = Harness::started(2, mission(1, 12, 10));
