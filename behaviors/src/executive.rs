@@ -496,11 +496,12 @@ impl Executive {
     ) -> Vec<Move> {
         if self.aim == Aim::Legs {
             let mut cells = Vec::new();
-            let moves = self.transit.next(at, &mut self.queue, is_open, &mut cells);
+            let next = self.transit.next(at, &mut self.queue, is_open, &mut cells);
             if !cells.is_empty() {
                 events.push(Event::Refused { cells });
             }
-            if let Some(moves) = moves {
+            if let Some((mut moves, visit)) = next {
+                moves.push(Move::Serve(visit));
                 return moves;
             }
         }
@@ -571,7 +572,9 @@ impl Executive {
     /// When all legs are flown, milliseconds from the last percept.
     #[must_use]
     pub fn finish_ms(&self, is_open: &dyn Fn(u16) -> bool) -> u32 {
-        self.forecast(0, is_open).finish_ms
+        let finish_ms = self.legs_ms(is_open);
+        debug_assert_eq!(finish_ms, self.forecast(0, is_open).finish_ms);
+        finish_ms
     }
 }
 

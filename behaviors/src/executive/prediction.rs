@@ -49,11 +49,7 @@ impl Executive {
         };
         let kept = if self.replan { 0 } else { self.stretches.len() };
         let items = self.items(&from, kept, self.waiting(kept), is_open);
-        let finish_ms = items
-            .iter()
-            .rev()
-            .find(|i| i.visit.is_some())
-            .map_or(0, |i| self.when_ms(i.end_m));
+        let finish_ms = self.last_visit_ms(&items);
         let mut cells = Vec::new();
         let mut anchor: Option<(Place, f64)> = None;
         let mut before_m = 0.0;
@@ -97,6 +93,21 @@ impl Executive {
             },
             None => Self::nowhere(),
         }
+    }
+
+    /// When the last cell of the goal is done, milliseconds from the last percept: of the
+    /// forecast that alone.
+    pub(super) fn legs_ms(&self, is_open: &dyn Fn(u16) -> bool) -> u32 {
+        let Some(from) = self.here() else {
+            return 0;
+        };
+        let kept = if self.replan { 0 } else { self.stretches.len() };
+        self.last_visit_ms(&self.items(&from, kept, self.waiting(kept), is_open))
+    }
+
+    fn last_visit_ms(&self, items: &[Item]) -> u32 {
+        let last = items.iter().rev().find(|i| i.visit.is_some());
+        last.map_or(0, |i| self.when_ms(i.end_m))
     }
 
     fn nowhere() -> Forecast {
@@ -245,8 +256,9 @@ impl Executive {
             });
         }
         let mut refused = Vec::new();
-        while let Some(moves) = self.transit.next(&place, &mut queue, is_open, &mut refused) {
-            for step in moves {
+        while let Some((way, visit)) = self.transit.next(&place, &mut queue, is_open, &mut refused)
+        {
+            for step in way.into_iter().chain([Move::Serve(visit)]) {
                 end_m += self.transit.length_m(&step);
                 place = self.transit.end_of(&place, &step);
                 let (visit, cell) = match &step {

@@ -276,15 +276,15 @@ impl Transit {
     }
 
     /// The way from `from` to the next cell of `queue` that is open and can be
-    /// reached, with that cell as its last move; cells that cannot be reached go to
-    /// `refused`. `None` when the queue holds nothing more to fly.
+    /// reached, and that cell; cells that cannot be reached go to `refused`. `None` when
+    /// the queue holds nothing more to fly.
     pub fn next(
         &self,
         from: &Place,
         queue: &mut VecDeque<CellVisit>,
         is_open: &dyn Fn(u16) -> bool,
         refused: &mut Vec<u16>,
-    ) -> Option<Vec<Move>> {
+    ) -> Option<(Vec<Move>, CellVisit)> {
         while let Some(visit) = queue.pop_front() {
             if usize::from(visit.cell) >= self.len() || !is_open(visit.cell) {
                 continue;
@@ -294,10 +294,7 @@ impl Transit {
                 self.entry(visit.cell, visit.direction),
                 visit.direction,
             ) {
-                Some(mut moves) => {
-                    moves.push(Move::Serve(visit));
-                    return Some(moves);
-                }
+                Some(way) => return Some((way, visit)),
                 None => refused.push(visit.cell),
             }
         }
@@ -309,6 +306,10 @@ impl Transit {
     /// elsewhere. `None` when there is no clear way.
     #[must_use]
     pub fn connect(&self, from: &Place, to: u16, direction: Direction) -> Option<Vec<Move>> {
+        // Most cells of a plan begin where the one before ends.
+        if from.boundary == Some((to, direction)) {
+            return Some(Vec::new());
+        }
         let goal = self.place(to, direction);
         let straight_m = (goal.pose.position() - from.pose.position()).norm();
         let ahead = from
@@ -809,10 +810,10 @@ mod tests {
         let from = t.place(0, Forward);
         let mut queue: VecDeque<CellVisit> = (0..4).map(visit).collect();
         let mut refused = Vec::new();
-        let moves = t
+        let (_, served) = t
             .next(&from, &mut queue, &|c| c >= 2, &mut refused)
             .unwrap();
-        assert_eq!(moves.last(), Some(&Move::Serve(visit(2))));
+        assert_eq!(served, visit(2));
         assert_eq!(queue, [visit(3)]);
         assert!(refused.is_empty());
         queue.clear();
