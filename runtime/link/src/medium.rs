@@ -182,6 +182,8 @@ pub struct Medium {
     seed: u64,
     stations: Vec<Station>,
     air: Vec<OnAir>,
+    /// What [`Medium::earliest`] was after the last change: drivers ask at each step.
+    next: Option<(u64, Next)>,
 }
 
 /// What happens next. Ends come before begins at the same time.
@@ -202,6 +204,7 @@ impl Medium {
             seed,
             stations,
             air: Vec::new(),
+            next: None,
         }
     }
 
@@ -254,6 +257,7 @@ impl Medium {
         if self.stations[i].listen_us.is_none() && !self.stations[i].sending {
             let wait_us = self.backoff(i);
             self.stations[i].listen_us = Some(now_us + wait_us);
+            self.next = self.earliest();
         }
     }
 
@@ -266,15 +270,17 @@ impl Medium {
         self.stations[i].listen_us = None;
         self.stations[i].sending = false;
         self.air.retain(|a| a.station != i || a.over);
+        self.next = self.earliest();
     }
 
     /// When the channel wants [`Medium::advance`] next, microseconds.
     #[must_use]
     pub fn next_event(&self) -> Option<u64> {
-        self.next().map(|(at_us, _)| at_us)
+        debug_assert_eq!(self.next, self.earliest());
+        self.next.map(|(at_us, _)| at_us)
     }
 
-    fn next(&self) -> Option<(u64, Next)> {
+    fn earliest(&self) -> Option<(u64, Next)> {
         let ends = self
             .air
             .iter()
@@ -294,11 +300,12 @@ impl Medium {
     /// may lie as far after now as the link's delay.
     pub fn advance(&mut self, now_us: u64, links: &impl Links) -> Vec<Delivery> {
         let mut out = Vec::new();
-        while let Some((at_us, what)) = self.next().filter(|(at_us, _)| *at_us <= now_us) {
+        while let Some((at_us, what)) = self.next.filter(|(at_us, _)| *at_us <= now_us) {
             match what {
                 Next::End(k) => self.end(k, links, &mut out),
                 Next::Listen(i) => self.listen(at_us, i, links),
             }
+            self.next = self.earliest();
         }
         out
     }
