@@ -54,11 +54,8 @@ impl Timer {
         Self::NextLap,
     ];
 
-    /// Whether the driver is asked to come back for it.
-    #[must_use]
-    pub const fn wakes(self) -> bool {
-        matches!(self, Self::Tick | Self::Beacon | Self::Question)
-    }
+    /// Those for which the driver is asked to come back.
+    pub const WAKING: [Self; 3] = [Self::Tick, Self::Beacon, Self::Question];
 }
 
 /// When each timer runs out; none that is stopped does.
@@ -114,8 +111,7 @@ impl Timers {
     /// The earliest timer that wakes the peer.
     #[must_use]
     pub fn next_timeout(&self) -> Option<Time> {
-        let waking = Timer::ALL.into_iter().filter(|t| t.wakes());
-        waking.filter_map(|t| self.at(t)).min()
+        Timer::WAKING.into_iter().filter_map(|t| self.at(t)).min()
     }
 }
 

@@ -19,6 +19,7 @@
 //! | idle, cells were beyond everybody | 10 T + rank T/2 | what the fuel allows of one run is taken |
 //! | cells held | 2 W | they expire |
 
+mod orphaned;
 mod takes;
 
 use super::division;
@@ -29,6 +30,7 @@ use crate::Time;
 use crate::cells::CellSet;
 use crate::wire::limits::{HOPS_MAX, MEMBERS_MAX};
 use crate::wire::message::{Bid, Epoch, Member};
+use orphaned::OrphanedAt;
 use skein_flight::coverage::ring::CoverageLoop;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use std::collections::{BTreeMap, BTreeSet};
@@ -197,7 +199,7 @@ pub struct Negotiation {
     orphans: CellSet,
     orphan_since: Option<Time>,
     /// Among many, since when each of them is one.
-    orphaned_at: BTreeMap<u16, Time>,
+    orphaned_at: OrphanedAt,
     somebody_gone: bool,
     decided_at: Option<Time>,
     adopted_at: Option<Time>,
@@ -242,7 +244,7 @@ impl Negotiation {
             dividing: None,
             orphans: CellSet::new(cells),
             orphan_since: None,
-            orphaned_at: BTreeMap::new(),
+            orphaned_at: OrphanedAt::new(cells),
             somebody_gone: false,
             decided_at: None,
             adopted_at: None,
@@ -276,9 +278,7 @@ impl Negotiation {
             *since = since.plus_ms(late_ms);
         }
         self.opened_at = self.opened_at.plus_ms(late_ms);
-        for since in self.orphaned_at.values_mut() {
-            *since = since.plus_ms(late_ms);
-        }
+        self.orphaned_at.delay(late_ms);
         for progress in self.progress.values_mut() {
             progress.since = progress.since.plus_ms(late_ms);
             progress.bound = progress.bound.plus_ms(late_ms);
@@ -380,7 +380,7 @@ impl Negotiation {
         }
         gone.subtract(&orphans);
         for cell in gone.iter() {
-            self.orphaned_at.remove(&cell);
+            self.orphaned_at.forget(cell);
         }
         orphans
     }
@@ -418,7 +418,7 @@ impl Negotiation {
                 } else {
                     ctx.now
                 };
-                self.orphaned_at.entry(cell).or_insert(since);
+                self.orphaned_at.note(cell, since);
             }
         }
         if self.members != ctx.members {

@@ -117,16 +117,16 @@ pub fn direction_of(backward: bool) -> Direction {
 pub fn unpack(listings: &[ListedRun], n: u16) -> Vec<PlannedCell> {
     let mut out = Vec::new();
     for l in listings {
-        let mut cells: Vec<u16> = cells_of(l.run, n).collect();
         let direction = direction_of(l.backward);
-        if l.backward {
-            cells.reverse();
-        }
-        out.extend(cells.into_iter().map(|cell| PlannedCell {
+        let from = out.len();
+        out.extend(cells_of(l.run, n).map(|cell| PlannedCell {
             cell,
             direction,
             stamp: l.stamp,
         }));
+        if l.backward {
+            out[from..].reverse();
+        }
     }
     out
 }

@@ -210,8 +210,10 @@ impl Sections {
             return false;
         }
         let covered = &self.covered;
+        // News is of a few cells mostly.
+        let fresh: Vec<u16> = fresh.iter().collect();
         for (author, h) in &mut self.heard {
-            if h.listed.intersects(&fresh) {
+            if fresh.iter().any(|c| h.listed.contains(*c)) {
                 h.left = n_open(&h.claim, covered);
                 self.news.owners.insert(*author);
             }
@@ -432,10 +434,9 @@ impl Sections {
         let Some(h) = self.heard.get(&author) else {
             return Vec::new();
         };
-        unpack(&h.claim.plan, self.cells)
-            .into_iter()
-            .filter(|p| !self.covered.contains(p.cell))
-            .collect()
+        let mut plan = unpack(&h.claim.plan, self.cells);
+        plan.retain(|p| !self.covered.contains(p.cell));
+        plan
     }
 
     /// How many cells [`Sections::plan_of`] has.

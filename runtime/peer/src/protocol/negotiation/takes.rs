@@ -90,9 +90,7 @@ impl Negotiation {
     }
 
     fn orphans_older_than(&self, ctx: &Context<'_>, ms: u64) -> CellSet {
-        let old = self.orphaned_at.iter();
-        let old = old.filter(|(_, since)| ctx.now.since_ms(**since) >= ms);
-        CellSet::of(self.sections.cells(), old.map(|(cell, _)| *cell))
+        self.orphaned_at.older_than(ctx.now, ms)
     }
 
     /// Whether an orphan has waited for long enough for so many who would be there sooner, the
@@ -118,8 +116,8 @@ impl Negotiation {
     }
 
     fn is_orphan_for(&self, ctx: &Context<'_>, orphan: u16, ms: u64) -> bool {
-        let since = self.orphaned_at.get(&orphan);
-        since.is_some_and(|t| ctx.now.since_ms(*t) >= ms)
+        let since = self.orphaned_at.since(orphan);
+        since.is_some_and(|t| ctx.now.since_ms(t) >= ms)
     }
 
     /// Whether this peer will have nothing to fly before others have heard what it takes.
