@@ -47,8 +47,6 @@ pub struct Beliefs {
     pub finished: bool,
     /// The operator's standing order, as far as it has heard.
     pub order: Order,
-    /// Predicted end of its plan, milliseconds from now.
-    pub eta_ms: u32,
     /// Flight time it may still spend, milliseconds (endurance less reserve).
     pub spendable_ms: u32,
     /// Records held, bytes waiting to be sent, open stores: each with its cap.

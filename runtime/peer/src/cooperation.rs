@@ -424,7 +424,6 @@ impl Cooperation {
         beliefs.counter = counter;
         beliefs.adoptions = state.negotiation.adoptions;
         beliefs.finished = state.finished;
-        beliefs.eta_ms = state.eta_ms();
         beliefs.spendable_ms = state.spendable_ms(percept);
     }
 }

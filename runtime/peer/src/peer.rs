@@ -855,6 +855,20 @@ impl Peer {
         beliefs
     }
 
+    /// Predicted end of its plan, milliseconds from now; 0 without a plan.
+    #[must_use]
+    pub fn eta_ms(&self) -> u32 {
+        let state = self.cooperation.state();
+        state.map_or(0, crate::mission_state::MissionState::eta_ms)
+    }
+
+    /// Divisions adopted in this life.
+    #[must_use]
+    pub fn adoptions(&self) -> u32 {
+        let state = self.cooperation.state();
+        state.map_or(0, |s| s.negotiation.adoptions)
+    }
+
     /// What it believes to be durable: a judge compares it with what replaying the
     /// journal gives.
     #[must_use]

@@ -371,6 +371,13 @@ impl Harness {
         peer.map(Peer::beliefs).unwrap_or_default()
     }
 
+    /// Predicted end of a running peer's plan, milliseconds from now.
+    #[must_use]
+    pub fn eta_ms(&self, id: u16) -> u32 {
+        let peer = self.seats.get(&id).and_then(|s| s.peer.as_ref());
+        peer.map_or(0, Peer::eta_ms)
+    }
+
     /// The revision that the operator's next mission gets at a running peer.
     #[must_use]
     pub fn next_revision(&self, id: u16) -> u32 {

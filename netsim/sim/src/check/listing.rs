@@ -351,6 +351,7 @@ mod tests {
                     uav: true,
                     since_ms: 0,
                     at: None,
+                    eta_ms: 0,
                     view: Beliefs {
                         able: true,
                         loop_hash: 9,

@@ -91,7 +91,7 @@ impl ProgressCheck {
         let v = &m.view;
         let late_ms = snapshot.late_ms(m.id, now_ms);
         let slack_ms = ETA_ROUNDING_MS.saturating_add(u32::try_from(late_ms).unwrap_or(u32::MAX));
-        let short = !v.plan.is_empty() && v.eta_ms > v.spendable_ms.saturating_add(slack_ms);
+        let short = !v.plan.is_empty() && m.eta_ms > v.spendable_ms.saturating_add(slack_ms);
         // A plan may become too long while it is flown; its peer looks once a period, so that
         // of two snapshots running one is after that.
         if !short {
@@ -104,7 +104,7 @@ impl ProgressCheck {
         let lasts = took_ms > snapshot.bounds.period_ms / 2 + late_ms;
         if self.exceeds((m.id, "plan"), lasts, now_ms) {
             found.broken("S10", now_ms, Some(m.id), || {
-                format!("plans {} ms with {} ms to spend", v.eta_ms, v.spendable_ms)
+                format!("plans {} ms with {} ms to spend", m.eta_ms, v.spendable_ms)
             });
         }
     }
@@ -230,6 +230,7 @@ mod tests {
                 uav: true,
                 since_ms: 0,
                 at: None,
+                eta_ms: 5000,
                 view: view.clone(),
             }];
             let graph = Graph::new(vec![1], |_, _| false);
@@ -259,7 +260,6 @@ mod tests {
         let good = Beliefs {
             loop_hash: 3,
             plan: vec![0],
-            eta_ms: 5000,
             spendable_ms: 6000,
             adoptions: 3,
             loads: vec![("queue", 4, 4)],
@@ -285,7 +285,7 @@ mod tests {
         let idle = Beliefs {
             loop_hash: 3,
             able: true,
-            spendable_ms: 9,
+            spendable_ms: 6000,
             ..Beliefs::default()
         };
         let out_of_fuel = Beliefs {

@@ -20,6 +20,8 @@ pub struct PeerSnapshot {
     pub since_ms: u64,
     /// Where its airframe is, if it flies.
     pub at: Option<Point>,
+    /// When it expects its plan to be flown, milliseconds from now.
+    pub eta_ms: u32,
     /// What it believes.
     pub view: Beliefs,
 }

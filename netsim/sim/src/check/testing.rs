@@ -77,6 +77,7 @@ impl Story {
                 uav: true,
                 since_ms: 0,
                 at: self.places.get(id).copied(),
+                eta_ms: 0,
                 view: view.clone(),
             })
             .collect();

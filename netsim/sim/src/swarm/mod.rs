@@ -729,7 +729,7 @@ impl Swarm {
         self.history
             .fold(self.now_ms, id, Kind::Report, report_hash(&report));
         let adoptions = match &report {
-            Report::Claim { .. } => peer.beliefs().adoptions,
+            Report::Claim { .. } => peer.adoptions(),
             _ => 0,
         };
         let before = self.meter.enter(Part::Checks);

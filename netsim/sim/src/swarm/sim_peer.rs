@@ -233,6 +233,7 @@ impl SimPeer {
             uav: self.config.role == Role::Uav,
             since_ms: self.since_ms,
             at: air.percept(self.id()).map(|p| p.pose.position()),
+            eta_ms: peer.eta_ms(),
             view: peer.beliefs(),
         })
     }
