@@ -17,6 +17,9 @@ pub(super) struct JudgedLoop {
     covered: CellSet,
     /// The newest lap that any peer has begun, from 0.
     lap: u16,
+    /// The version of the judge that the covered cells are of; none once they are counted
+    /// otherwise.
+    judged: Option<u64>,
 }
 
 impl JudgedLoop {
@@ -28,6 +31,7 @@ impl JudgedLoop {
             covered: uncovered(geometry.as_deref()),
             geometry,
             lap: 0,
+            judged: None,
         }
     }
 
@@ -60,6 +64,7 @@ impl JudgedLoop {
         self.mission = Arc::clone(given);
         self.geometry = cache.of(given).ok();
         self.lap = lap;
+        self.judged = None;
         let is_another = loop_hash != self.hash;
         if is_another {
             self.hash = loop_hash;
@@ -74,6 +79,11 @@ impl JudgedLoop {
         let Some(geometry) = &self.geometry else {
             return;
         };
+        // Most of what is said is said between two sightings.
+        let version = Some(air.judge().version());
+        if core::mem::replace(&mut self.judged, version) == version {
+            return;
+        }
         let (revision, laps) = (self.mission.revision, self.lap + 1);
         let cells = geometry.coverage_loop.cells();
         for c in self.covered.complement().iter() {

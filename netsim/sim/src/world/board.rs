@@ -43,6 +43,8 @@ pub(super) struct Board {
     times: Vec<(u16, u64)>,
     /// Longest time from one first sighting of a cell to that of the next lap.
     longest_gap_ms: u64,
+    /// How often a camera saw something for the first time in a lap.
+    marks: u64,
 }
 
 /// From corner to corner of a picture, metres.
@@ -67,6 +69,7 @@ impl Board {
             lap: 1,
             times: vec![(0, 0); survey.cells().len()],
             longest_gap_ms: 0,
+            marks: 0,
             survey,
         }
     }
@@ -111,6 +114,10 @@ impl Board {
 
     pub(super) fn revision(&self) -> u32 {
         self.revision
+    }
+
+    pub(super) fn marks(&self) -> u64 {
+        self.marks
     }
 
     pub(super) fn survey(&self) -> &Arc<Survey> {
@@ -234,7 +241,10 @@ impl Board {
         };
         let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
         for i in pieces.near(pose.position(), diagonal_m(airframe)) {
-            seen[i] = seen[i] || pieces.held(i, pose, across_m, along_m);
+            if !seen[i] && pieces.held(i, pose, across_m, along_m) {
+                seen[i] = true;
+                self.marks += 1;
+            }
         }
     }
 
@@ -261,6 +271,7 @@ impl Board {
 
     pub(super) fn see(&mut self, i: usize, sighting: Sighting, facts: &mut Vec<Fact>) {
         self.seen[i] = Some(sighting);
+        self.marks += 1;
         let cell = self.survey.cells()[i];
         self.n_covered += usize::from(is_coverable(&cell));
         facts.push(Fact::Seen {

@@ -98,6 +98,12 @@ impl Judge {
         board.is_some_and(|b| b.saw(cell, laps))
     }
 
+    /// A number that grows whenever [`Judge::saw`] may answer otherwise than before.
+    #[must_use]
+    pub fn version(&self) -> u64 {
+        self.boards.iter().map(|b| b.marks() + 1).sum()
+    }
+
     /// The cells and which of them can be seen.
     #[must_use]
     pub fn survey(&self) -> &Survey {
