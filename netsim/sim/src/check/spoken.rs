@@ -3,9 +3,8 @@
 //! finished says so (`spoken`). What is published as covered was seen (S6).
 
 use super::snapshot::is_alone;
-use super::{Clocks, Findings, Snapshot};
+use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use skein_peer::cells::CellSet;
-use skein_peer::protocol::runs::unpack;
 use skein_peer::wire::codec::Body;
 use skein_peer::wire::message::{Beacon, Claim};
 use skein_peer::{Beliefs, Incarnation};
@@ -157,22 +156,28 @@ impl SpokenCheck {
                 });
             }
         }
+        let owed = snapshot.peers.iter().map(|m| (m.id, self.owed(m)));
+        let owed: BTreeMap<u16, BTreeSet<Owed>> = owed.collect();
+        self.unspoken
+            .retain(|(p, what)| owed.get(p).is_none_or(|owed| owed.contains(what)));
         for m in snapshot.peers {
-            if !m.view.speaks || !m.uav || m.view.loop_hash == 0 {
-                self.unspoken.retain(|(p, _)| *p != m.id);
-                continue;
-            }
-            let mut owed = self.claim_owed(m.id, &m.view);
-            let key = (m.id, m.view.incarnation, m.view.revision);
-            if m.view.finished && !self.finished.contains(&key) {
-                owed.insert(Owed::Finished);
-            }
-            self.unspoken
-                .retain(|(p, what)| *p != m.id || owed.contains(what));
-            for what in owed {
-                self.judge(snapshot, (m.id, what), found);
+            for what in owed.get(&m.id).into_iter().flatten() {
+                self.judge(snapshot, (m.id, *what), found);
             }
         }
+    }
+
+    /// What a peer has to say that it did not say yet.
+    fn owed(&self, m: &PeerSnapshot) -> BTreeSet<Owed> {
+        if !m.view.speaks || !m.uav || m.view.loop_hash == 0 {
+            return BTreeSet::new();
+        }
+        let mut owed = self.claim_owed(m.id, &m.view);
+        let key = (m.id, m.view.incarnation, m.view.revision);
+        if m.view.finished && !self.finished.contains(&key) {
+            owed.insert(Owed::Finished);
+        }
+        owed
     }
 
     fn judge(&mut self, snapshot: &Snapshot<'_>, key: (u16, Owed), found: &mut Findings) {
@@ -207,18 +212,20 @@ impl SpokenCheck {
     /// and whether its author hears anybody.
     fn claim_owed(&self, id: u16, view: &Beliefs) -> BTreeSet<Owed> {
         let n = view.covered.capacity();
-        let open = |c: &u16| *c < n && !view.covered.contains(*c);
-        let held: BTreeSet<u16> = view.plan.iter().copied().filter(|c| open(c)).collect();
+        let held = CellSet::of(n, view.plan.iter().copied());
         let published = self
             .claims
             .get(&id)
             .filter(|p| p.incarnation == view.incarnation && p.claim.loop_hash == view.loop_hash);
-        let said: BTreeSet<u16> = published.map_or_else(BTreeSet::new, |p| {
-            let cells = unpack(&p.claim.plan, n).into_iter().map(|p| p.cell);
-            cells.filter(|c| open(c)).collect()
-        });
-        let cells = held.symmetric_difference(&said);
-        let mut owed: BTreeSet<Owed> = cells.map(|c| Owed::Cell(*c)).collect();
+        let runs = published.map_or(&[][..], |p| &p.claim.plan);
+        let said = CellSet::of_runs(n, runs.iter().map(|l| l.run));
+        let (mut vain, mut secret) = (said.clone(), held);
+        vain.subtract(&secret);
+        secret.subtract(&said);
+        let mut differing = secret;
+        differing.union_with(&vain);
+        differing.subtract(&view.covered);
+        let mut owed: BTreeSet<Owed> = differing.iter().map(Owed::Cell).collect();
         // Who lists nothing need not say that it is alone, and may have said so before.
         let lists = !view.plan.is_empty() || !view.held.is_empty();
         let owes = |says: bool| {

@@ -4,6 +4,7 @@
 use super::{Bounds, Clocks, Findings, Grade, PeerSnapshot, Snapshot};
 use crate::twins::Twins;
 use skein_peer::Incarnation;
+use skein_peer::cells::CellSet;
 use skein_peer::wire::kinds::Kind;
 use skein_peer::wire::message::Record;
 use std::collections::BTreeMap;
@@ -314,14 +315,20 @@ impl SpreadCheck {
         found: &mut Findings,
     ) {
         let bound_ms = snapshot.bounds.spread_ms() + snapshot.bounds.yield_ms();
+        let on_the_loop = peers.iter();
+        let on_the_loop = on_the_loop.filter(|m| m.view.loop_hash == snapshot.loop_hash);
+        let n = snapshot.covered.capacity();
+        let (mut planned, mut twice) = (CellSet::new(n), CellSet::new(n));
+        for c in on_the_loop.clone().flat_map(|m| &m.view.plan) {
+            if !planned.insert(*c) {
+                twice.insert(*c);
+            }
+        }
+        twice.subtract(snapshot.covered);
+        // Of most cells there is one planner at most.
         let mut planners: BTreeMap<u16, Vec<&PeerSnapshot>> = BTreeMap::new();
-        for m in peers
-            .iter()
-            .filter(|m| m.view.loop_hash == snapshot.loop_hash)
-        {
-            let open =
-                |c: &&u16| **c < snapshot.covered.capacity() && !snapshot.covered.contains(**c);
-            for c in m.view.plan.iter().filter(open) {
+        for m in on_the_loop.filter(|_| !twice.is_empty()) {
+            for c in m.view.plan.iter().filter(|c| twice.contains(**c)) {
                 planners.entry(*c).or_default().push(m);
             }
         }
