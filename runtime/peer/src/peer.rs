@@ -576,8 +576,8 @@ impl Peer {
             return;
         }
         let fresh = self.membership.tell_at_once(self.now, AT_ONCE_MAX);
-        if self.membership.has_questions() {
-            self.delay_question();
+        if let Some(at) = self.membership.question_at() {
+            self.delay_question(at);
         }
         if fresh.is_empty() {
             return;
@@ -591,10 +591,11 @@ impl Peer {
         self.publish_beat(&body, true);
     }
 
-    fn delay_question(&mut self) {
+    /// What is to be said at once is said a random time after it could be.
+    fn delay_question(&mut self, from: Time) {
         let spread_ms = QUESTION_SPREAD_MS * self.relay.air.sharers().max(8);
         let delay_ms = 20 + u64::from(self.rng.next_u32()) % spread_ms;
-        let at = self.now.plus_ms(delay_ms);
+        let at = from.max(self.now).plus_ms(delay_ms);
         self.timers.set_earlier(Timer::Question, at);
     }
 
@@ -716,7 +717,7 @@ impl Peer {
                 .hasten(self.now, &mut self.timers, &mut self.rng);
         }
         if self.membership.take_question() {
-            self.delay_question();
+            self.delay_question(self.now);
         }
         for c in changes {
             let (by, at_ms) = (self.config.id.0, self.now.0);

@@ -475,17 +475,17 @@ impl Membership {
         self.questions.take_new()
     }
 
-    /// Whether something is to be said at once.
+    /// When something is to be said at once, the past if now, unless nothing is.
     #[must_use]
-    pub fn has_questions(&self) -> bool {
-        !self.questions.is_empty()
+    pub fn question_at(&self) -> Option<Time> {
+        self.questions.next()
     }
 
     /// What is to be said at once: heartbeats that are asked for, and those that answer.
     pub fn tell_at_once(&mut self, now: Time, max: usize) -> Vec<Fresh> {
         let (interval_ms, own_ms) = (self.interval_ms(), self.own_interval_ms());
         let mut said = Vec::new();
-        for (id, waiting) in self.questions.take(max) {
+        for (id, waiting) in self.questions.take(now, max) {
             let Some(known) = self.known.get_mut(&id) else {
                 continue;
             };
@@ -500,6 +500,9 @@ impl Membership {
             }
             if waiting.answers {
                 known.answered_at = now;
+                let again_at = now.plus_ms(own_ms);
+                let count = known.freshest.count;
+                self.questions.said(id, waiting, count, again_at);
             }
             known.tell(now);
             if suspected {

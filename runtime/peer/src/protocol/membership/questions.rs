@@ -20,6 +20,10 @@ const AGES_PATIENT: u64 = 2;
 /// where three in ten are lost.
 const COPIES_HEARD: u8 = 2;
 
+/// An answer that nobody is heard passing on is said again so often: questions come from many at
+/// once, and where they meet an answer is often lost.
+const REPEATS: u8 = 2;
+
 /// A heartbeat of others, which this peer is to say at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Waiting {
@@ -28,6 +32,21 @@ pub(super) struct Waiting {
     /// Whether a later one is known here.
     pub(super) answers: bool,
     copies: u8,
+    /// Which later count this peer answered, how often it may say so again, and when.
+    again: Option<Again>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Again {
+    count: u32,
+    repeats: u8,
+    at: Time,
+}
+
+impl Waiting {
+    fn is_due(&self, now: Time) -> bool {
+        self.again.is_none_or(|again| again.at <= now)
+    }
 }
 
 /// How urgent it is to hear of a peer: 0 while gossip has time.
@@ -67,6 +86,7 @@ impl Questions {
             count,
             answers,
             copies: 0,
+            again: None,
         };
         let before = self.waiting.get(&id);
         if before.is_none_or(|w| w.answers != answers) {
@@ -80,6 +100,13 @@ impl Questions {
         let Some(waiting) = self.waiting.get_mut(&told.id) else {
             return;
         };
+        if let Some(again) = waiting.again {
+            // What others tell of it anyway is no sign that the answer was heard.
+            if told.count == again.count && told.suspected.is_none() {
+                self.waiting.remove(&told.id);
+            }
+            return;
+        }
         let same = if waiting.answers {
             told.count > waiting.count && told.suspected.is_none()
         } else {
@@ -97,18 +124,33 @@ impl Questions {
         std::mem::take(&mut self.is_new)
     }
 
-    /// At most so many of those that wait.
-    pub(super) fn take(&mut self, max: usize) -> BTreeMap<u16, Waiting> {
-        let mut taken = BTreeMap::new();
-        while taken.len() < max
-            && let Some((id, waiting)) = self.waiting.pop_first()
-        {
-            taken.insert(id, waiting);
-        }
-        taken
+    /// At most so many of those that are due.
+    pub(super) fn take(&mut self, now: Time, max: usize) -> BTreeMap<u16, Waiting> {
+        let due = self.waiting.iter().filter(|(_, w)| w.is_due(now));
+        let due: Vec<u16> = due.map(|(id, _)| *id).take(max).collect();
+        let taken = due.into_iter();
+        let taken = taken.filter_map(|id| Some((id, self.waiting.remove(&id)?)));
+        taken.collect()
     }
 
-    pub(super) fn is_empty(&self) -> bool {
-        self.waiting.is_empty()
+    /// An answer was said, with this count. If nobody else is heard saying so it is said again
+    /// then.
+    pub(super) fn said(&mut self, id: u16, waiting: Waiting, count: u32, again_at: Time) {
+        let left = waiting.again.map_or(REPEATS, |again| again.repeats);
+        if waiting.copies > 0 || left == 0 {
+            return;
+        }
+        let again = Some(Again {
+            count,
+            repeats: left - 1,
+            at: again_at,
+        });
+        self.waiting.insert(id, Waiting { again, ..waiting });
+    }
+
+    /// When the next of those that wait is due; at once is the beginning of time.
+    pub(super) fn next(&self) -> Option<Time> {
+        let at = |w: &Waiting| w.again.map_or(Time(0), |again| again.at);
+        self.waiting.values().map(at).min()
     }
 }

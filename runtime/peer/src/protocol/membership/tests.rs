@@ -1071,19 +1071,47 @@ fn a_suspicion_is_asked_about_at_once_after_a_third_and_two_thirds_of_its_time()
 fn who_knows_a_later_heartbeat_answers_at_once_and_once_in_two_intervals() {
     let mut m = among_many_far_apart();
     m.on_others(Time(3_000), 3, &asked(4, Some(10)));
-    assert!(!m.has_questions(), "gossip has time");
+    assert!(m.question_at().is_none(), "gossip has time");
     m.on_others(Time(3_000), 3, &asked(4, Some(20)));
     assert!(m.take_question());
     assert_eq!(at_once(&mut m, Time(3_100)), [(30, 5, false)]);
     m.on_others(Time(4_000), 4, &asked(4, Some(30)));
-    assert!(!m.has_questions());
+    assert!(!m.take_question() && at_once(&mut m, Time(4_000)).is_empty());
+    m.on_others(Time(4_050), 5, &asked(5, None));
+    assert!(m.question_at().is_none(), "somebody heard the answer");
     m.on_others(Time(5_100), 4, &asked(4, Some(41)));
-    assert!(m.has_questions());
+    assert!(m.question_at().is_some());
     // Two others say it meanwhile.
     m.on_others(Time(5_150), 5, &asked(5, None));
-    assert!(m.has_questions());
+    assert!(m.question_at().is_some());
     m.on_others(Time(5_200), 6, &asked(5, None));
-    assert!(!m.has_questions());
+    assert!(m.question_at().is_none());
+}
+
+/// An answer that meets many questions is lost; what is told of a later heartbeat meanwhile, by
+/// those who know it anyway, does not say that it was heard.
+#[test]
+fn an_answer_that_nobody_passes_on_is_said_twice_more() {
+    let mut m = among_many_far_apart();
+    m.on_others(Time(3_000), 3, &asked(4, Some(20)));
+    assert_eq!(at_once(&mut m, Time(3_100)), [(30, 5, false)]);
+    assert_eq!(m.question_at(), Some(Time(4_100)));
+    assert!(at_once(&mut m, Time(4_099)).is_empty());
+    assert_eq!(at_once(&mut m, Time(4_100)), [(30, 5, false)]);
+    m.on_others(Time(4_500), 5, &asked(7, None));
+    assert_eq!(m.question_at(), Some(Time(5_100)));
+    assert_eq!(at_once(&mut m, Time(5_100)), [(30, 7, false)]);
+    assert_eq!(m.question_at(), None);
+}
+
+/// Of several who pass an answer on, none says it again.
+#[test]
+fn an_answer_heard_once_before_it_is_said_is_not_said_again() {
+    let mut m = among_many_far_apart();
+    m.on_others(Time(3_000), 3, &asked(4, Some(20)));
+    m.on_others(Time(3_050), 5, &asked(5, None));
+    assert_eq!(at_once(&mut m, Time(3_100)), [(30, 5, false)]);
+    assert_eq!(m.question_at(), None);
 }
 
 #[test]
@@ -1099,9 +1127,10 @@ fn an_answer_is_passed_on_by_who_asked_and_tells_nothing_of_how_far_somebody_is(
     assert_eq!(m.status(30), Some((1, Status::Alive)));
     assert_eq!(m.diameter(Time(3_100)), 2);
     assert_eq!(at_once(&mut m, Time(3_200)), [(30, 9, false)]);
+    m.on_others(Time(3_250), 5, &asked(9, None));
     // Who did not ask passes nothing on: gossip does.
     m.on_others(Time(3_300), 4, &asked(12, None));
-    assert!(!m.has_questions());
+    assert!(m.question_at().is_none());
 }
 
 #[test]
@@ -1137,6 +1166,6 @@ fn among_few_and_where_all_hear_all_nothing_is_asked_at_once() {
     for m in [&mut few, &mut near] {
         m.on_others(Time(3_000), 2, &asked(5, Some(20)));
         assert_eq!(m.status(30), Some((1, Status::Suspect)));
-        assert!(!m.has_questions());
+        assert!(m.question_at().is_none());
     }
 }
