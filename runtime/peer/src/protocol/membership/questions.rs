@@ -6,15 +6,16 @@ use super::known::HeardHeartbeat;
 use crate::input::Time;
 use std::collections::BTreeMap;
 
-/// A later heartbeat of who is suspected is asked for after each third of the time to refute
-/// that: most suspicions are refuted by gossip within the first, and what is lost is asked for
-/// once more.
-const ASKS: u64 = 3;
+/// A later heartbeat of who is suspected is asked for after each sixth of the time to refute that,
+/// from the second on: most suspicions are refuted by gossip within the first two, and over a thin
+/// bridge single questions are lost.
+const ASKS: u64 = 6;
+const ASKS_PATIENT: u64 = 1;
 
-/// Of who is not suspected one is asked for when its age is more than three and four fifths of
-/// the bound: few heartbeats of the living are, and a fifth is time enough for an answer.
-const AGES: u64 = 5;
-const AGES_PATIENT: u64 = 2;
+/// Of who is not suspected one is asked for after each tenth of the bound from the sixth on: few
+/// heartbeats of the living are as old, and four tenths are time enough for an answer.
+const AGES: u64 = 10;
+const AGES_PATIENT: u64 = 5;
 
 /// What was heard from so many neighbours meanwhile is not said again: one copy is not enough
 /// where three in ten are lost.
@@ -57,7 +58,7 @@ pub(super) fn urgency(
     now: Time,
 ) -> u8 {
     let suspected_ms = heard.suspected.map_or(0, |age| age.ms(now));
-    let by_suspicion = ASKS * suspected_ms / verdict_ms.max(1);
+    let by_suspicion = (ASKS * suspected_ms / verdict_ms.max(1)).saturating_sub(ASKS_PATIENT);
     let by_age = (AGES * heard.age.ms(now) / patience.bound_ms.max(1)).saturating_sub(AGES_PATIENT);
     u8::try_from(by_suspicion.max(by_age)).unwrap_or(u8::MAX)
 }

@@ -1043,7 +1043,7 @@ fn asked(heartbeat: u32, suspected_ds: Option<u16>) -> Vec<Fresh> {
 }
 
 #[test]
-fn a_suspicion_is_asked_about_at_once_after_a_third_and_two_thirds_of_its_time() {
+fn a_suspicion_is_asked_about_at_once_from_a_third_of_its_time_on() {
     let mut m = among_many_far_apart();
     let now = Time(3_000);
     let verdict_ms = m.patience(now).verdict_ms(1_000);
@@ -1063,7 +1063,7 @@ fn a_suspicion_is_asked_about_at_once_after_a_third_and_two_thirds_of_its_time()
             asked_at.push(t * 250 + 1_000);
         }
     }
-    assert_eq!(asked_at, [1_750, 3_500]);
+    assert_eq!(asked_at, [1_750, 2_500, 3_500, 4_250]);
     assert_eq!(m.status(30), Some((1, Status::Down)));
 }
 
@@ -1134,7 +1134,7 @@ fn an_answer_is_passed_on_by_who_asked_and_tells_nothing_of_how_far_somebody_is(
 }
 
 #[test]
-fn a_heartbeat_older_than_three_fifths_of_the_bound_is_asked_for_at_once() {
+fn a_heartbeat_older_than_six_tenths_of_the_bound_is_asked_for_at_once() {
     let mut m = among_many_far_apart();
     let bound_ms = m.bound_ms(Time(2_500));
     let mut asked_at = Vec::new();
@@ -1153,8 +1153,8 @@ fn a_heartbeat_older_than_three_fifths_of_the_bound_is_asked_for_at_once() {
             asked_at.push(t * 250);
         }
     }
-    let parts = asked_at.iter().map(|ms| ms * 5 / bound_ms);
-    assert_eq!(parts.collect::<Vec<_>>(), [3, 4]);
+    let parts = asked_at.iter().map(|ms| ms * 10 / bound_ms);
+    assert_eq!(parts.collect::<Vec<_>>(), [6, 7, 8, 9]);
 }
 
 #[test]
