@@ -568,14 +568,6 @@ impl Executive {
             events.push(Event::PlanDone);
         }
     }
-
-    /// When all legs are flown, milliseconds from the last percept.
-    #[must_use]
-    pub fn finish_ms(&self, is_open: &dyn Fn(u16) -> bool) -> u32 {
-        let finish_ms = self.legs_ms(is_open);
-        debug_assert_eq!(finish_ms, self.forecast(0, is_open).finish_ms);
-        finish_ms
-    }
 }
 
 #[cfg(test)]

@@ -47,8 +47,7 @@ impl Executive {
         let Some(from) = self.here() else {
             return Self::nowhere();
         };
-        let kept = if self.replan { 0 } else { self.stretches.len() };
-        let items = self.items(&from, kept, self.waiting(kept), is_open);
+        let (kept, items) = self.ahead(&from, is_open);
         let finish_ms = self.last_visit_ms(&items);
         let mut cells = Vec::new();
         let mut anchor: Option<(Place, f64)> = None;
@@ -95,14 +94,19 @@ impl Executive {
         }
     }
 
-    /// When the last cell of the goal is done, milliseconds from the last percept: of the
-    /// forecast that alone.
-    pub(super) fn legs_ms(&self, is_open: &dyn Fn(u16) -> bool) -> u32 {
-        let Some(from) = self.here() else {
-            return 0;
-        };
+    /// When all legs are flown, milliseconds from the last percept: of the forecast that alone.
+    #[must_use]
+    pub fn finish_ms(&self, is_open: &dyn Fn(u16) -> bool) -> u32 {
+        let ahead = self.here().map(|from| self.ahead(&from, is_open));
+        let finish_ms = ahead.map_or(0, |(_, items)| self.last_visit_ms(&items));
+        debug_assert_eq!(finish_ms, self.forecast(0, is_open).finish_ms);
+        finish_ms
+    }
+
+    /// All that is still to fly from a place on, and how much of it was kept from the last plan.
+    fn ahead(&self, from: &Place, is_open: &dyn Fn(u16) -> bool) -> (usize, Vec<Item>) {
         let kept = if self.replan { 0 } else { self.stretches.len() };
-        self.last_visit_ms(&self.items(&from, kept, self.waiting(kept), is_open))
+        (kept, self.items(from, kept, self.waiting(kept), is_open))
     }
 
     fn last_visit_ms(&self, items: &[Item]) -> u32 {

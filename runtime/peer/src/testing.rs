@@ -364,31 +364,32 @@ impl Harness {
         self.now_ms
     }
 
+    fn peer(&self, id: u16) -> Option<&Peer> {
+        self.seats.get(&id)?.peer.as_ref()
+    }
+
     /// What a running peer believes; nothing of one that does not run.
     #[must_use]
     pub fn beliefs(&self, id: u16) -> Beliefs {
-        let peer = self.seats.get(&id).and_then(|s| s.peer.as_ref());
-        peer.map(Peer::beliefs).unwrap_or_default()
+        self.peer(id).map(Peer::beliefs).unwrap_or_default()
     }
 
     /// Predicted end of a running peer's plan, milliseconds from now.
     #[must_use]
     pub fn eta_ms(&self, id: u16) -> u32 {
-        let peer = self.seats.get(&id).and_then(|s| s.peer.as_ref());
-        peer.map_or(0, Peer::eta_ms)
+        self.peer(id).map_or(0, Peer::eta_ms)
     }
 
     /// The revision that the operator's next mission gets at a running peer.
     #[must_use]
     pub fn next_revision(&self, id: u16) -> u32 {
-        let peer = self.seats.get(&id).and_then(|s| s.peer.as_ref());
-        peer.map_or(0, Peer::next_revision)
+        self.peer(id).map_or(0, Peer::next_revision)
     }
 
     /// The newest mission that a running peer holds.
     #[must_use]
     pub fn newest_mission(&self, id: u16) -> Option<Arc<Mission>> {
-        self.seats.get(&id)?.peer.as_ref()?.mission()
+        self.peer(id)?.mission()
     }
 
     /// Where a UAV is.

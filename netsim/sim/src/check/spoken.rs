@@ -219,11 +219,11 @@ impl SpokenCheck {
             .filter(|p| p.incarnation == view.incarnation && p.claim.loop_hash == view.loop_hash);
         let runs = published.map_or(&[][..], |p| &p.claim.plan);
         let said = CellSet::of_runs(n, runs.iter().map(|l| l.run));
-        let (mut vain, mut secret) = (said.clone(), held);
-        vain.subtract(&secret);
-        secret.subtract(&said);
-        let mut differing = secret;
-        differing.union_with(&vain);
+        let mut unsaid = held.clone();
+        unsaid.subtract(&said);
+        let mut differing = said;
+        differing.subtract(&held);
+        differing.union_with(&unsaid);
         differing.subtract(&view.covered);
         let mut owed: BTreeSet<Owed> = differing.iter().map(Owed::Cell).collect();
         // Who lists nothing need not say that it is alone, and may have said so before.

@@ -468,7 +468,6 @@ fn what_is_said_of_a_uav_is_what_it_senses() {
     );
 }
 
-/// §7: claims and states are said again every ten intervals, and up to a quarter of one more.
 /// Of fifty in a row, each in earshot of three on either side, a beacon has no room for all: the
 /// heartbeats between two beacons tell of others, too.
 #[test]
@@ -491,6 +490,7 @@ fn a_heartbeat_of_one_of_many_tells_of_others() {
     assert!(told.len() > 8, "{told:?}");
 }
 
+/// §7: claims and states are said again every ten intervals, and up to a quarter of one more.
 #[test]
 fn claims_and_states_are_said_again_every_ten_intervals() {
     let mut h = Harness::started(2, mission(1, 12, 10));

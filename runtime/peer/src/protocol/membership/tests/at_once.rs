@@ -1,0 +1,163 @@
+//! What is asked for and answered at once, from peer to peer.
+
+use super::*;
+
+/// Peers 2 to 20 are neighbours, and 2 tells of 30, which it hears by itself.
+fn among_many_far_apart() -> Membership {
+    let mut m = among_nineteen();
+    let far = entry(30, 5, 0, None);
+    m.on_beacon(Time(2_500), 2, 1, &beacon(11, vec![far]));
+    assert_eq!(m.diameter(Time(2_500)), 2);
+    m
+}
+
+fn at_once(m: &mut Membership, now: Time) -> Vec<(u16, u32, bool)> {
+    let told = m.tell_at_once(now, 12);
+    let short = |f: &Fresh| (f.id, f.heartbeat, f.suspected_ds.is_some());
+    told.iter().map(short).collect()
+}
+
+/// What a neighbour says at once of 30, suspected for so long.
+fn asked(heartbeat: u32, suspected_ds: Option<u16>) -> Vec<Fresh> {
+    let fresh = Fresh {
+        heartbeat,
+        age_ds: 60,
+        life: 1,
+        suspected_ds,
+        ..samples::fresh(30)
+    };
+    vec![fresh]
+}
+
+/// Peer 3 asks for a heartbeat of 30 later than one that is older than what is known here.
+fn asked_by_3() -> Membership {
+    let mut m = among_many_far_apart();
+    m.on_others(Time(3_000), 3, &asked(4, Some(20)));
+    m
+}
+
+#[test]
+fn a_suspicion_is_asked_about_at_once_from_a_third_of_its_time_on() {
+    let mut m = among_many_far_apart();
+    let now = Time(3_000);
+    let verdict_ms = m.patience(now).verdict_ms(1_000);
+    assert_eq!(verdict_ms, 5_000);
+    m.on_others(now, 3, &asked(5, Some(10)));
+    assert_eq!(m.status(30), Some((1, Status::Suspect)));
+    assert!(!m.take_question(), "gossip has time");
+    let mut asked_at = Vec::new();
+    for t in 1..24 {
+        let now = now.plus_ms(t * 250);
+        for id in 2..=20 {
+            m.on_heartbeat(now, id, 1, (100 + t as u32, 4));
+        }
+        m.tick(now);
+        if m.take_question() {
+            assert_eq!(at_once(&mut m, now), [(30, 5, true)]);
+            asked_at.push(t * 250 + 1_000);
+        }
+    }
+    assert_eq!(asked_at, [1_750, 2_500, 3_500, 4_250]);
+    assert_eq!(m.status(30), Some((1, Status::Down)));
+}
+
+#[test]
+fn who_knows_a_later_heartbeat_answers_at_once_and_once_in_two_intervals() {
+    let mut m = among_many_far_apart();
+    m.on_others(Time(3_000), 3, &asked(4, Some(10)));
+    assert!(m.question_at().is_none(), "gossip has time");
+    m.on_others(Time(3_000), 3, &asked(4, Some(20)));
+    assert!(m.take_question());
+    assert_eq!(at_once(&mut m, Time(3_100)), [(30, 5, false)]);
+    m.on_others(Time(4_000), 4, &asked(4, Some(30)));
+    assert!(!m.take_question() && at_once(&mut m, Time(4_000)).is_empty());
+    m.on_others(Time(4_050), 5, &asked(5, None));
+    assert!(m.question_at().is_none(), "somebody heard the answer");
+    m.on_others(Time(5_100), 4, &asked(4, Some(41)));
+    assert!(m.question_at().is_some());
+    // Two others say it meanwhile.
+    m.on_others(Time(5_150), 5, &asked(5, None));
+    assert!(m.question_at().is_some());
+    m.on_others(Time(5_200), 6, &asked(5, None));
+    assert!(m.question_at().is_none());
+}
+
+/// An answer that meets many questions is lost; what is told of a later heartbeat meanwhile, by
+/// those who know it anyway, does not say that it was heard.
+#[test]
+fn an_answer_that_nobody_passes_on_is_said_twice_more() {
+    let mut m = asked_by_3();
+    assert_eq!(at_once(&mut m, Time(3_100)), [(30, 5, false)]);
+    assert_eq!(m.question_at(), Some(Time(4_100)));
+    assert!(at_once(&mut m, Time(4_099)).is_empty());
+    assert_eq!(at_once(&mut m, Time(4_100)), [(30, 5, false)]);
+    m.on_others(Time(4_500), 5, &asked(7, None));
+    assert_eq!(m.question_at(), Some(Time(5_100)));
+    assert_eq!(at_once(&mut m, Time(5_100)), [(30, 7, false)]);
+    assert_eq!(m.question_at(), None);
+}
+
+/// Of several who pass an answer on, none says it again.
+#[test]
+fn an_answer_heard_once_before_it_is_said_is_not_said_again() {
+    let mut m = asked_by_3();
+    m.on_others(Time(3_050), 5, &asked(5, None));
+    assert_eq!(at_once(&mut m, Time(3_100)), [(30, 5, false)]);
+    assert_eq!(m.question_at(), None);
+}
+
+#[test]
+fn an_answer_is_passed_on_by_who_asked_and_tells_nothing_of_how_far_somebody_is() {
+    let mut m = among_many_far_apart();
+    m.on_others(Time(3_000), 3, &asked(5, Some(20)));
+    assert!(m.take_question());
+    let answer = Fresh {
+        hops: 7,
+        ..asked(9, None)[0]
+    };
+    m.on_others(Time(3_100), 4, &[answer]);
+    assert_eq!(m.status(30), Some((1, Status::Alive)));
+    assert_eq!(m.diameter(Time(3_100)), 2);
+    assert_eq!(at_once(&mut m, Time(3_200)), [(30, 9, false)]);
+    m.on_others(Time(3_250), 5, &asked(9, None));
+    // Who did not ask passes nothing on: gossip does.
+    m.on_others(Time(3_300), 4, &asked(12, None));
+    assert!(m.question_at().is_none());
+}
+
+#[test]
+fn a_heartbeat_older_than_six_tenths_of_the_bound_is_asked_for_at_once() {
+    let mut m = among_many_far_apart();
+    let bound_ms = m.bound_ms(Time(2_500));
+    let mut asked_at = Vec::new();
+    for t in 1..bound_ms / 250 {
+        let now = Time(2_500 + t * 250);
+        for id in 2..=20 {
+            let said = Beacon {
+                eccentricity: 2,
+                ..beacon(100 + t as u32, Vec::new())
+            };
+            m.on_beacon(now, id, 1, &said);
+        }
+        m.tick(now);
+        if m.take_question() {
+            assert_eq!(at_once(&mut m, now), [(30, 5, false)]);
+            asked_at.push(t * 250);
+        }
+    }
+    let parts = asked_at.iter().map(|ms| ms * 10 / bound_ms);
+    assert_eq!(parts.collect::<Vec<_>>(), [6, 7, 8, 9]);
+}
+
+#[test]
+fn among_few_and_where_all_hear_all_nothing_is_asked_at_once() {
+    let mut few = Membership::new(1, 1000);
+    few.on_beacon(Time(0), 2, 1, &beacon(1, vec![entry(30, 5, 0, None)]));
+    let mut near = among_nineteen();
+    near.on_beacon(Time(2_500), 30, 1, &beacon(5, Vec::new()));
+    for m in [&mut few, &mut near] {
+        m.on_others(Time(3_000), 2, &asked(5, Some(20)));
+        assert_eq!(m.status(30), Some((1, Status::Suspect)));
+        assert!(m.question_at().is_none());
+    }
+}
