@@ -168,7 +168,7 @@ impl CellSet {
     /// Whether every cell of the loop is in the set.
     #[must_use]
     pub fn is_full(&self) -> bool {
-        self.count() == self.n
+        self.next_from(0, false) == self.n
     }
 
     /// Adds all cells of `other`; returns whether any was missing. A set over another
@@ -192,6 +192,16 @@ impl CellSet {
         }
         for (mine, theirs) in self.words.iter_mut().zip(&other.words) {
             *mine &= !theirs;
+        }
+    }
+
+    /// Keeps only what is in `other` too. A set over another loop length is ignored.
+    pub fn intersect_with(&mut self, other: &Self) {
+        if other.n != self.n {
+            return;
+        }
+        for (mine, theirs) in self.words.iter_mut().zip(&other.words) {
+            *mine &= theirs;
         }
     }
 
@@ -249,19 +259,42 @@ impl CellSet {
     /// between the last cell and cell 0.
     #[must_use]
     pub fn runs(&self) -> Vec<CellRun> {
-        let mut runs: Vec<CellRun> = Vec::new();
-        for cell in self.iter() {
-            match runs.last_mut() {
-                Some(run) if u32::from(run.first) + u32::from(run.count) == u32::from(cell) => {
-                    run.count += 1;
-                }
-                _ => runs.push(CellRun {
-                    first: cell,
-                    count: 1,
-                }),
+        self.each_run().collect()
+    }
+
+    fn each_run(&self) -> impl Iterator<Item = CellRun> + '_ {
+        let mut at = 0;
+        core::iter::from_fn(move || {
+            let first = self.next_from(at, true);
+            at = self.next_from(first, false);
+            let count = at - first;
+            (count > 0).then_some(CellRun { first, count })
+        })
+    }
+
+    /// The first cell from one on that is in the set, or that is not; the number of cells where
+    /// there is none.
+    fn next_from(&self, from: u16, is_in: bool) -> u16 {
+        let (word, bit) = Self::place(from);
+        let mut from_here = !(bit - 1);
+        let mut cells_before = from - from % 64;
+        for word in self.words.iter().skip(word) {
+            let found = if is_in { *word } else { !word } & from_here;
+            if found != 0 {
+                let bit = u16::try_from(found.trailing_zeros()).unwrap_or(0);
+                // Past the last cell bits are neither.
+                return (cells_before + bit).min(self.n);
             }
+            from_here = u64::MAX;
+            cells_before = cells_before.saturating_add(64);
         }
-        runs
+        self.n
+    }
+
+    /// Bytes of the run lengths of the whole set.
+    #[must_use]
+    pub fn rle_len(&self) -> usize {
+        lengths_of(self.each_run()).map(varint::len).sum()
     }
 
     /// Run lengths, uncovered first, alternating, each as a little-endian base-128
@@ -270,11 +303,10 @@ impl CellSet {
     /// that forgets coverage, which costs duplicate work and never leaves a gap.
     #[must_use]
     pub fn encode_rle(&self, max_bytes: Option<usize>) -> Vec<u8> {
-        let runs = self.runs();
-        let whole = encode_runs(runs.iter().copied());
-        let Some(cap) = max_bytes.filter(|cap| whole.len() > *cap) else {
-            return whole;
+        let Some(cap) = max_bytes.filter(|cap| self.rle_len() > *cap) else {
+            return encode_runs(self.each_run());
         };
+        let runs = self.runs();
         let mut by_length: Vec<usize> = (0..runs.len()).collect();
         by_length.sort_by_key(|i| (runs[*i].count, *i));
         let mut dropped_at = vec![0_usize; runs.len()];
@@ -341,14 +373,19 @@ impl CellSet {
 
 fn encode_runs(runs: impl Iterator<Item = CellRun>) -> Vec<u8> {
     let mut bytes = Vec::new();
+    lengths_of(runs).for_each(|length| varint::write(&mut bytes, length));
+    bytes
+}
+
+/// How many cells are not in any run, how many are in the first, and so on by turns.
+fn lengths_of(runs: impl Iterator<Item = CellRun>) -> impl Iterator<Item = u32> {
     let mut end = 0_u16;
-    for run in runs {
-        varint::write(&mut bytes, u32::from(run.first - end));
-        varint::write(&mut bytes, u32::from(run.count));
+    runs.flat_map(move |run| {
+        let gap = run.first - end;
         // A run ends at the loop's last cell at most, so the sum fits.
         end = run.first.saturating_add(run.count);
-    }
-    bytes
+        [u32::from(gap), u32::from(run.count)]
+    })
 }
 
 #[cfg(test)]
@@ -383,6 +420,10 @@ mod tests {
             prop_assert_eq!(set.complement().count(), n - set.count());
             let listed: u32 = set.runs().iter().map(|r| u32::from(r.count)).sum();
             prop_assert_eq!(listed, u32::from(set.count()));
+            // Between two runs a cell is missing, and each is as long as can be.
+            let apart = set.runs().windows(2).all(|r| r[0].first + r[0].count < r[1].first);
+            prop_assert!(apart);
+            prop_assert_eq!(CellSet::of_runs(n, set.runs()), set.clone());
             prop_assert_eq!(set.remove(probe), cells.contains(&probe));
             prop_assert!(!set.contains(probe));
         }
@@ -404,6 +445,7 @@ mod tests {
         fn run_lengths_come_back((n, cells) in sets()) {
             let set = CellSet::of(n, cells);
             let bytes = set.encode_rle(None);
+            prop_assert_eq!(bytes.len(), set.rle_len());
             prop_assert_eq!(CellSet::decode_rle(n, &bytes), Ok(set));
         }
 
@@ -435,6 +477,10 @@ mod tests {
             let mut left = a.clone();
             left.subtract(&b);
             prop_assert!(!left.intersects(&b) && left.is_subset(&a));
+            let mut common = a.clone();
+            common.intersect_with(&b);
+            prop_assert!(common.is_subset(&a) && common.is_subset(&b));
+            prop_assert_eq!(join(&left, &common), a);
         }
 
         #[test]

@@ -86,7 +86,7 @@ impl CoverageTold {
     fn count(&mut self, said: &CellSet) {
         if let Some(before) = &self.once {
             let mut again = before.clone();
-            again.subtract(&said.complement());
+            again.intersect_with(said);
             if let Some(twice) = &self.twice {
                 again.union_with(twice);
             }
@@ -100,7 +100,7 @@ impl CoverageTold {
     /// As much as one record holds: what is news first, then of all that is known the next
     /// runs in turn.
     fn part(&mut self, news: &CellSet, all: &CellSet) -> CellSet {
-        let fits = |set: &CellSet| set.encode_rle(None).len() <= COVERED_PART_BYTES;
+        let fits = |set: &CellSet| set.rle_len() <= COVERED_PART_BYTES;
         let mut said = news.clone();
         said.union_with(all);
         let in_parts = !fits(&said);

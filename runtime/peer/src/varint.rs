@@ -12,6 +12,12 @@ pub(crate) fn write(bytes: &mut Vec<u8>, mut value: u32) {
     bytes.push(value.to_le_bytes()[0]);
 }
 
+/// Bytes of a number.
+pub(crate) fn len(value: u32) -> usize {
+    let bits = u32::BITS - (value | 1).leading_zeros();
+    bits.div_ceil(7) as usize
+}
+
 /// The number at the begin of some bytes, and how many it takes; none where there is none, or
 /// one that could be written shorter.
 pub(crate) fn read(bytes: &[u8]) -> Option<(u32, usize)> {
@@ -38,6 +44,7 @@ mod tests {
             let mut bytes = Vec::new();
             write(&mut bytes, value);
             assert_eq!(read(&bytes), Some((value, bytes.len())));
+            assert_eq!(len(value), bytes.len());
             assert_eq!(read(&bytes[..bytes.len() - 1]), None, "{value}");
         }
         for wrong in [&[0x80, 0][..], &[0xff; 6], &[0xff, 0xff, 0xff, 0xff, 0x1f]] {
