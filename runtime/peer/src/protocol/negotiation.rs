@@ -396,7 +396,7 @@ impl Negotiation {
     }
 
     fn watch_orphans(&mut self, ctx: &Context<'_>, orphans: &CellSet) {
-        if orphans.count() == 0 || ctx.able_since.is_none() {
+        if orphans.is_empty() || ctx.able_since.is_none() {
             // Who is not able takes no note of orphans: it may not have heard the claims that
             // list them.
             self.orphan_since = None;
@@ -408,7 +408,7 @@ impl Negotiation {
         // Asked at each look: what was let go earlier and orphaned by a death since has no claim
         // on its way.
         let let_go = self.sections.take_let_go();
-        let noted = self.orphaned_at.len() == usize::from(orphans.count());
+        let noted = self.orphaned_at.cells() == orphans;
         if !noted && ctx.is_many() && ctx.able_since.is_some() {
             let found_at = ctx.now.plus_ms(claims_on_the_way_ms(ctx));
             for cell in orphans.iter() {
@@ -447,7 +447,7 @@ impl Negotiation {
                 .iter()
                 .any(|m| m.id != self.me && (ctx.live.get(&m.id) != Some(&m.incarnation)));
             let waited = ctx.now.since_ms(self.opened_at);
-            let repair = open.round.repair || orphans.count() > 0;
+            let repair = open.round.repair || !orphans.is_empty();
             if gone {
                 self.rounds.give_up();
                 self.start(ctx, repair, 0);

@@ -1,5 +1,5 @@
-//! Since when which cells are orphans: a place for each cell of the loop, since among many all
-//! of them are at first.
+//! Since when which cells are orphans: a place for each cell of the loop, because among many all
+//! of them are at first, and which of these places count.
 
 use crate::Time;
 use crate::cells::CellSet;
@@ -7,56 +7,59 @@ use crate::cells::CellSet;
 /// Since when which cells of a loop are orphans.
 #[derive(Clone, Debug)]
 pub(super) struct OrphanedAt {
-    since: Vec<Option<Time>>,
-    noted: usize,
+    noted: CellSet,
+    /// Of a cell that is not noted it says nothing.
+    since: Vec<Time>,
 }
 
 impl OrphanedAt {
     /// None of so many cells.
     pub fn new(cells: u16) -> Self {
         Self {
-            since: vec![None; usize::from(cells)],
-            noted: 0,
+            noted: CellSet::new(cells),
+            since: vec![Time(0); usize::from(cells)],
         }
     }
 
-    /// How many cells are noted.
-    pub fn len(&self) -> usize {
-        self.noted
+    /// The cells that are noted.
+    pub fn cells(&self) -> &CellSet {
+        &self.noted
     }
 
     /// Since when a cell is one, if it is noted.
     pub fn since(&self, cell: u16) -> Option<Time> {
-        self.since.get(usize::from(cell)).copied().flatten()
+        let since = self.since.get(usize::from(cell)).copied();
+        since.filter(|_| self.noted.contains(cell))
     }
 
     /// Notes a cell, unless it is.
     pub fn note(&mut self, cell: u16, since: Time) {
-        if let Some(place @ None) = self.since.get_mut(usize::from(cell)) {
-            *place = Some(since);
-            self.noted += 1;
+        if self.noted.insert(cell) {
+            self.since[usize::from(cell)] = since;
         }
     }
 
     /// A cell is no orphan any more.
     pub fn forget(&mut self, cell: u16) {
-        let place = self.since.get_mut(usize::from(cell));
-        self.noted -= usize::from(place.and_then(Option::take).is_some());
+        self.noted.remove(cell);
     }
 
     /// All noted cells are orphans since so much later.
     pub fn delay(&mut self, ms: u64) {
-        for since in self.since.iter_mut().flatten() {
+        for since in &mut self.since {
             *since = since.plus_ms(ms);
         }
     }
 
     /// The cells that have been orphans for so long.
     pub fn older_than(&self, now: Time, ms: u64) -> CellSet {
-        let cells = u16::try_from(self.since.len()).unwrap_or(u16::MAX);
-        let is_old = |since: &Option<Time>| since.is_some_and(|t| now.since_ms(t) >= ms);
-        let old = (0..).zip(&self.since).filter(|(_, since)| is_old(since));
-        CellSet::of(cells, old.map(|(cell, _)| cell))
+        let mut old = self.noted.clone();
+        for cell in self.noted.iter() {
+            if now.since_ms(self.since[usize::from(cell)]) < ms {
+                old.remove(cell);
+            }
+        }
+        old
     }
 }
 
@@ -71,12 +74,14 @@ mod tests {
         orphaned.note(69, Time(8));
         orphaned.note(3, Time(7));
         orphaned.note(70, Time(1));
-        assert_eq!((orphaned.len(), orphaned.since(69)), (2, Some(Time(5))));
+        assert!(orphaned.cells().iter().eq([3, 69]));
+        assert_eq!(orphaned.since(69), Some(Time(5)));
         orphaned.delay(10);
         let old = orphaned.older_than(Time(25), 10);
         assert!(old.iter().eq([69]));
         orphaned.forget(69);
         orphaned.forget(69);
-        assert_eq!((orphaned.len(), orphaned.since(69)), (1, None));
+        assert!(orphaned.cells().iter().eq([3]));
+        assert_eq!(orphaned.since(69), None);
     }
 }
