@@ -90,7 +90,8 @@ impl Company {
     }
 
     /// Looks up who is there, where that may have changed: for this peer, able or not, on its
-    /// loop, when some said that they are `alone`. Returns whether it did.
+    /// loop, when some said that they are `alone`. Returns whether the claims of others count
+    /// than before, or may.
     pub fn gather(
         &mut self,
         s: &Situation<'_>,
@@ -113,6 +114,7 @@ impl Company {
         let members = members(s, &live, able, loop_hash);
         let unheard = self.add_expected(s, &mut live);
         let until = self.expected.values().min().copied();
+        let is_changed = self.present.of.is_none() || live != self.present.live;
         self.present = Arc::new(Present {
             live,
             members,
@@ -121,7 +123,7 @@ impl Company {
             alone: alone.clone(),
             until: until.unwrap_or(Time(u64::MAX)),
         });
-        true
+        is_changed
     }
 
     /// Who was to be launched and was not heard of yet is taken to be there until its section
