@@ -91,9 +91,17 @@ impl Packer<'_> {
 
 /// The cells of a run on a loop of `n`, in forward order.
 pub fn cells_of(run: CellRun, n: u16) -> impl Iterator<Item = u16> {
-    let n32 = u32::from(n.max(1));
-    (0..u32::from(run.count.min(n)))
-        .map(move |k| u16::try_from((u32::from(run.first) + k) % n32).unwrap_or(0))
+    let first = run.first % n.max(1);
+    // What reaches beyond the last cell goes on at the first.
+    let before_the_seam = n - first;
+    let nth = move |k: u16| {
+        if k < before_the_seam {
+            first + k
+        } else {
+            k - before_the_seam
+        }
+    };
+    (0..run.count.min(n)).map(nth)
 }
 
 /// The cell so many cells after another, on a loop of `n`.
@@ -115,7 +123,8 @@ pub fn direction_of(backward: bool) -> Direction {
 /// The cells of listings in order of flight.
 #[must_use]
 pub fn unpack(listings: &[ListedRun], n: u16) -> Vec<PlannedCell> {
-    let mut out = Vec::new();
+    let counts = listings.iter().map(|l| usize::from(l.run.count.min(n)));
+    let mut out = Vec::with_capacity(counts.sum());
     for l in listings {
         let direction = direction_of(l.backward);
         let from = out.len();

@@ -409,19 +409,31 @@ impl Sections {
     }
 
     /// The highest stamp at which a live claim, this peer's own included, plans each cell; the
-    /// least of all where none does.
+    /// least of all where none does, or where no other claim lists the cell.
     #[must_use]
     pub fn highest_stamps(&self, live: &LivePeers) -> Vec<Stamp> {
+        let mut listed = self.listed();
+        let mut by_several = CellSet::new(self.cells);
+        for h in self.heard.values() {
+            if h.listed.intersects(&listed) {
+                let mut again = h.listed.clone();
+                again.intersect_with(&listed);
+                by_several.union_with(&again);
+            }
+            listed.union_with(&h.listed);
+        }
         let mut highest = vec![Stamp::default(); usize::from(self.cells)];
         let mut raise = |cell: u16, stamp: Stamp| {
-            if let Some(known) = highest.get_mut(usize::from(cell)) {
+            if by_several.contains(cell) {
+                let known = &mut highest[usize::from(cell)];
                 *known = (*known).max(stamp);
             }
         };
-        let is_live = |(author, h): &(&u16, &HeardClaim)| live.get(author) == Some(&h.incarnation);
-        for (_, h) in self.heard.iter().filter(is_live) {
-            for l in &h.claim.plan {
-                cells_of(l.run, self.cells).for_each(|c| raise(c, l.stamp));
+        for (author, h) in &self.heard {
+            if live.get(author) == Some(&h.incarnation) && h.listed.intersects(&by_several) {
+                for l in &h.claim.plan {
+                    cells_of(l.run, self.cells).for_each(|c| raise(c, l.stamp));
+                }
             }
         }
         self.plan.iter().for_each(|p| raise(p.cell, p.stamp));

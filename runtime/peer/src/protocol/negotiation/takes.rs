@@ -144,12 +144,14 @@ impl Negotiation {
             .filter(|(id, _)| ctx.live.contains_key(id));
         at_work
             .filter_map(|(id, p)| {
-                let plan = self.sections.plan_of(*id);
-                let listed = u64::try_from(plan.len()).ok().filter(|n| *n > 0)?;
-                let kept = plan.iter().filter(|c| !is_taken(c));
-                let plan: Vec<_> = kept.map(|c| (c.cell, c.direction)).collect();
-                let many = u64::try_from(plan.len()).unwrap_or(0);
-                let left_ms = p.end.since_ms(ctx.now) * many / listed;
+                let listed = self.sections.plan_of(*id);
+                if listed.is_empty() {
+                    return None;
+                }
+                let mut plan = Vec::with_capacity(listed.len());
+                let left = listed.iter().filter(|c| !is_taken(c));
+                plan.extend(left.map(|c| (c.cell, c.direction)));
+                let left_ms = p.end.since_ms(ctx.now) * plan.len() as u64 / listed.len() as u64;
                 Some(Owner {
                     id: *id,
                     plan,
