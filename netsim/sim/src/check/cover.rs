@@ -1,7 +1,7 @@
 //! What peers mark as covered: truly seen (S6), never forgotten (S3), and soon known
 //! to all (L4).
 
-use super::{Clocks, Findings, Grade, Snapshot};
+use super::{Findings, Grade, Snapshot};
 use skein_peer::cells::CellSet;
 use std::collections::BTreeMap;
 
@@ -21,11 +21,44 @@ const LOSSY_FACTOR: u64 = 5;
 /// bounds one of a thousand. In one hop nothing is hidden.
 const HIDDEN_FACTOR: u64 = 2;
 
+/// Which covered cells one peer does not know of that others of its component do.
+#[derive(Clone, Debug)]
+struct Lacking {
+    cells: CellSet,
+    /// Since when, a place for each cell of the loop.
+    since_ms: Vec<u64>,
+    /// Those of which it was told that they take too long.
+    told: CellSet,
+}
+
+impl Lacking {
+    /// Nothing of so many cells.
+    fn nothing(cells: u16) -> Self {
+        Self {
+            cells: CellSet::new(cells),
+            since_ms: vec![0; usize::from(cells)],
+            told: CellSet::new(cells),
+        }
+    }
+
+    /// From now on it is these. Returns how many are not lacking any more.
+    fn become_these(&mut self, cells: CellSet, now_ms: u64) -> u16 {
+        let mut fresh = cells.clone();
+        fresh.subtract(&self.cells);
+        for cell in fresh.iter() {
+            self.since_ms[usize::from(cell)] = now_ms;
+        }
+        self.told.intersect_with(&cells);
+        let before = core::mem::replace(&mut self.cells, cells);
+        before.count() + fresh.count() - self.cells.count()
+    }
+}
+
 /// What the marks of one run were found to be.
 #[derive(Clone, Debug, Default)]
 pub struct CoverCheck {
     known: BTreeMap<u16, (u64, CellSet)>,
-    lacking: Clocks<(u16, u16)>,
+    lacking: BTreeMap<u16, Lacking>,
     false_marks: BTreeMap<(u16, u16), ()>,
 }
 
@@ -33,7 +66,7 @@ impl CoverCheck {
     /// A process starts with what its disk held: it may know less than before.
     pub fn on_boot(&mut self, id: u16) {
         self.known.remove(&id);
-        self.lacking.retain(|(p, _)| *p != id);
+        self.lacking.remove(&id);
     }
 
     /// Looks at everybody's union of covered cells.
@@ -86,7 +119,7 @@ impl CoverCheck {
         let hidden = snapshot.grade() == Grade::Hard && bounds.diameter > 1;
         let hidden = if hidden { HIDDEN_FACTOR } else { 1 };
         let bound_ms = bounds.spread_ms() + WHOLE_PERIODS * bounds.interval_ms;
-        let mut lacks: Vec<(u16, u16, u64)> = Vec::new();
+        let mut lacks: BTreeMap<u16, (CellSet, u64)> = BTreeMap::new();
         for component in snapshot.graph.components() {
             let peers: Vec<_> = component
                 .iter()
@@ -108,34 +141,39 @@ impl CoverCheck {
                 let from_ms = since_ms.unwrap_or(snapshot.now_ms).max(m.since_ms);
                 let mut lacking = known.clone();
                 lacking.subtract(&m.view.covered);
-                lacks.extend(lacking.iter().map(|cell| (m.id, cell, from_ms)));
+                lacks.insert(m.id, (lacking, from_ms));
             }
         }
-        lacks.sort_unstable();
-        let mut ended = Vec::new();
-        self.lacking.retain(|k| {
-            let goes_on = lacks.binary_search_by(|l| (l.0, l.1).cmp(k)).is_ok();
-            if !goes_on {
-                ended.push(*k);
+        let limit_ms = |bound_ms| {
+            let limit_ms = snapshot.grade().limit_of(bound_ms, LOSSY_FACTOR);
+            limit_ms.map_or(u64::MAX, |l| l * hidden)
+        };
+        // Whatever is wrong with peers makes it longer.
+        let least_ms = limit_ms(bound_ms);
+        let mut before = core::mem::take(&mut self.lacking);
+        let mut ended = 0;
+        for (id, (cells, from_ms)) in lacks {
+            let lacking = before.remove(&id).filter(|l| l.cells.capacity() == n);
+            let mut lacking = lacking.unwrap_or_else(|| Lacking::nothing(n));
+            ended += u64::from(lacking.become_these(cells, snapshot.now_ms));
+            for cell in lacking.cells.iter() {
+                let since_ms = lacking.since_ms[usize::from(cell)].max(from_ms);
+                let took_ms = snapshot.now_ms - since_ms;
+                if took_ms > least_ms
+                    && took_ms > limit_ms(snapshot.grown_ms(bound_ms, since_ms))
+                    && lacking.told.insert(cell)
+                {
+                    found.broken("L4", snapshot.now_ms, Some(id), || {
+                        format!("does not know that cell {cell} is covered, {took_ms} ms after a peer of its component did (bound {bound_ms} ms)")
+                    });
+                }
             }
-            goes_on
-        });
-        for (id, cell, from_ms) in lacks {
-            let since_ms = self.lacking.start((id, cell), snapshot.now_ms).max(from_ms);
-            let took_ms = snapshot.now_ms - since_ms;
-            if snapshot
-                .grade()
-                .limit_of(snapshot.grown_ms(bound_ms, since_ms), LOSSY_FACTOR)
-                .is_some_and(|l| took_ms > l * hidden)
-                && self.lacking.tell_once((id, cell))
-            {
-                found.broken("L4", snapshot.now_ms, Some(id), || {
-                    format!("does not know that cell {cell} is covered, {took_ms} ms after a peer of its component did (bound {bound_ms} ms)")
-                });
-            }
+            self.lacking.insert(id, lacking);
         }
+        let gone = before.values().map(|l| u64::from(l.cells.count()));
+        ended += gone.sum::<u64>();
         // What ended between two snapshots kept the bound unless it was told above.
-        for _ in ended {
+        for _ in 0..ended {
             found.took("L4", snapshot.grade(), snapshot.bounds.period_ms, bound_ms);
         }
     }
