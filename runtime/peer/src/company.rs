@@ -90,8 +90,8 @@ impl Company {
     }
 
     /// Looks up who is there, where that may have changed: for this peer, able or not, on its
-    /// loop, when some said that they are `alone`. Returns whether claims of other authors
-    /// count than before, or may.
+    /// loop, when some said that they are `alone`. Returns whether others are live than
+    /// before, or may be.
     pub fn gather(
         &mut self,
         s: &Situation<'_>,

@@ -162,7 +162,7 @@ impl MissionState {
         let sections = &self.negotiation.sections;
         if self.finished {
             MissionStatus::Accomplished
-        } else if sections.unassigned().count() > 0 && sections.plan().is_empty() {
+        } else if !sections.unassigned().is_empty() && sections.plan().is_empty() {
             MissionStatus::Failed
         } else {
             MissionStatus::Active

@@ -267,7 +267,7 @@ impl Sections {
             return;
         };
         freed.subtract(&now.listed);
-        if freed.count() > 0 {
+        if !freed.is_empty() {
             self.news.listing = true;
             let none = || CellSet::new(self.cells);
             let let_go = self.news.let_go.get_or_insert_with(none);
@@ -408,35 +408,24 @@ impl Sections {
         free
     }
 
-    /// The highest stamp at which a live claim, this peer's own included, plans each cell; the
-    /// least of all where none does, or where no other claim lists the cell.
+    /// Of the cells that several claims list those that a live one plans, this peer's own
+    /// included, each with the highest stamp. A claim of a life that is over counts among the
+    /// several: [`Self::plan_of`] tells its plan until a later one is heard.
     #[must_use]
-    pub fn highest_stamps(&self, live: &LivePeers) -> Vec<Stamp> {
+    pub fn contested(&self, live: &LivePeers) -> BTreeMap<u16, Stamp> {
         let mut listed = self.listed();
         let mut by_several = CellSet::new(self.cells);
-        for h in self.heard.values() {
-            if h.listed.intersects(&listed) {
-                let mut again = h.listed.clone();
-                again.intersect_with(&listed);
-                by_several.union_with(&again);
-            }
+        for h in self.heard.values().filter(|h| !h.listed.is_empty()) {
+            let mut again = h.listed.clone();
+            again.intersect_with(&listed);
+            by_several.union_with(&again);
             listed.union_with(&h.listed);
         }
-        let mut highest = vec![Stamp::default(); usize::from(self.cells)];
-        let mut raise = |cell: u16, stamp: Stamp| {
-            if by_several.contains(cell) {
-                let known = &mut highest[usize::from(cell)];
-                *known = (*known).max(stamp);
-            }
-        };
-        for (author, h) in &self.heard {
-            if live.get(author) == Some(&h.incarnation) && h.listed.intersects(&by_several) {
-                for l in &h.claim.plan {
-                    cells_of(l.run, self.cells).for_each(|c| raise(c, l.stamp));
-                }
-            }
+        let mut highest = self.planned_by(self.heard.iter(), live, &by_several);
+        for p in self.plan.iter().filter(|p| by_several.contains(p.cell)) {
+            let known = highest.entry(p.cell).or_default();
+            *known = (*known).max(p.stamp);
         }
-        self.plan.iter().for_each(|p| raise(p.cell, p.stamp));
         highest
     }
 

@@ -28,8 +28,8 @@ impl OrphanedAt {
 
     /// Since when a cell is one, if it is noted.
     pub fn since(&self, cell: u16) -> Option<Time> {
-        let since = self.since.get(usize::from(cell)).copied();
-        since.filter(|_| self.noted.contains(cell))
+        let is_noted = self.noted.contains(cell);
+        is_noted.then(|| self.since[usize::from(cell)])
     }
 
     /// Notes a cell, unless it is.
@@ -53,13 +53,8 @@ impl OrphanedAt {
 
     /// The cells that have been orphans for so long.
     pub fn older_than(&self, now: Time, ms: u64) -> CellSet {
-        let mut old = self.noted.clone();
-        for cell in self.noted.iter() {
-            if now.since_ms(self.since[usize::from(cell)]) < ms {
-                old.remove(cell);
-            }
-        }
-        old
+        let is_old = |cell: &u16| now.since_ms(self.since[usize::from(*cell)]) >= ms;
+        CellSet::of(self.noted.capacity(), self.noted.iter().filter(is_old))
     }
 }
 

@@ -135,8 +135,8 @@ impl Negotiation {
     /// The live owners with what they have left, but for what others took of it since.
     #[must_use]
     pub fn owners(&self, ctx: &Context<'_>) -> Vec<Owner> {
-        let highest = self.sections.highest_stamps(ctx.live);
-        let above = |c: &PlannedCell| highest.get(usize::from(c.cell));
+        let contested = self.sections.contested(ctx.live);
+        let above = |c: &PlannedCell| contested.get(&c.cell);
         let is_taken = |c: &PlannedCell| above(c).is_some_and(|s| *s > c.stamp);
         let at_work = self
             .progress

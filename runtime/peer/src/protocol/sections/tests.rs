@@ -187,6 +187,20 @@ fn what_another_has_left_are_the_open_cells_of_its_newest_plan() {
 }
 
 #[test]
+fn of_what_several_list_the_highest_live_stamp_counts_and_claims_of_past_lives_are_among_them() {
+    let mut s = sections(1);
+    s.adopt_at_once(epoch(3), &[], &forward(&[2, 3]));
+    s.hear(2, 1, 1, claim(&[(3, 2, stamp(2, 0, 2))]));
+    s.hear(3, 1, 1, claim(&[(4, 3, stamp(4, 0, 3))]));
+    s.hear(4, 1, 1, claim(&[(6, 3, stamp(9, 0, 4))]));
+    // The UAV 4 is in its second life, of which nothing is heard yet.
+    let contested = s.contested(&LivePeers::from([(2, 1), (3, 1), (4, 2)]));
+    let own = s.plan().iter().find(|p| p.cell == 3).map(|p| p.stamp);
+    let wanted = [(3, own.unwrap()), (4, stamp(4, 0, 3)), (6, stamp(4, 0, 3))];
+    assert_eq!(contested, wanted.into());
+}
+
+#[test]
 fn what_is_covered_planned_or_beyond_the_loop_is_not_taken() {
     let mut s = Sections::new(1, 10, CellSet::of(10, [4]));
     assert_eq!(s.take_at_once(&forward(&[2])), 1);
