@@ -15,11 +15,15 @@ use crate::spec::Spec;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;
+use skein_peer::config::Launch;
 use skein_peer::journal::Durable;
+use skein_peer::offload::MissionGeometry;
 use skein_peer::output::Status;
+use skein_peer::wire::limits::MEMBERS_MAX;
 use skein_peer::wire::message::{Bid, Heartbeat};
 use skein_peer::{Beliefs, Incarnation, Report};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Hard places that a batch of seeds must have reached to mean anything.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,6 +70,8 @@ pub struct Checker {
     ready_ms: BTreeMap<u32, u64>,
     /// The loop on which cells are judged.
     loop_hash: u64,
+    /// Who is launched where, as all of a large fleet are told, until there is a loop.
+    roster: Option<Arc<[Launch]>>,
 }
 
 impl Checker {
@@ -98,6 +104,16 @@ impl Checker {
             split_at: None,
             ready_ms: BTreeMap::new(),
             loop_hash: 0,
+            roster: Some(spec.launches()).filter(|l| l.len() > MEMBERS_MAX),
+        }
+    }
+
+    /// A loop was derived.
+    pub fn on_loop(&mut self, geometry: &Arc<MissionGeometry>) {
+        self.rules.on_loop(geometry);
+        if let Some(roster) = self.roster.take() {
+            let planned = geometry.first_division(&roster);
+            self.listing = ListingCheck::with_roster(planned.into_owned());
         }
     }
 

@@ -3,7 +3,10 @@
 use super::membership::Membership;
 use super::snapshot::is_alone;
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
+use skein_peer::PeerId;
+use skein_peer::cells::CellSet;
 use skein_peer::output::Status;
+use skein_peer::protocol::launches::Planned;
 use skein_peer::protocol::runs::cells_of;
 use skein_peer::wire::message::{Claim, ListedRun, Stamp};
 use std::collections::BTreeMap;
@@ -27,6 +30,9 @@ struct Orphan {
 /// What listing found out in one run.
 #[derive(Clone, Debug, Default)]
 pub struct ListingCheck {
+    /// Whom the roster gives which section: until it would be flown that one is taken to be
+    /// there by all who never heard of it.
+    roster: Vec<Planned>,
     orphans: BTreeMap<u16, Orphan>,
     last_lister: BTreeMap<u16, u16>,
     able_since_ms: Option<u64>,
@@ -35,6 +41,15 @@ pub struct ListingCheck {
 }
 
 impl ListingCheck {
+    /// On the loop of which a roster gives everybody one of these sections.
+    #[must_use]
+    pub fn with_roster(roster: Vec<Planned>) -> Self {
+        Self {
+            roster,
+            ..Self::default()
+        }
+    }
+
     /// A process ended.
     pub fn on_death(&mut self, id: u16) {
         self.heard.retain(|(o, _), _| *o != id);
@@ -117,13 +132,35 @@ impl ListingCheck {
             }
         }
         let counts_from_ms = stable_ms.max(able_since_ms);
+        let expected = self.expected(snapshot, able_since_ms);
         for (cell, lister) in (0..).zip(lister) {
-            if settled.contains(cell) || lister.is_some() {
+            if lister.is_none() && expected.contains(cell) {
+                self.orphans.remove(&cell);
+            } else if settled.contains(cell) || lister.is_some() {
                 self.settle(snapshot, cell, lister, members, counts_from_ms, found);
             } else {
                 self.orphaned(snapshot, cell, members, counts_from_ms, found);
             }
         }
+    }
+
+    /// The sections of whom the roster names and nobody able has heard of, for as long as
+    /// each would take.
+    fn expected(&self, snapshot: &Snapshot<'_>, begin_ms: u64) -> CellSet {
+        let mut expected = CellSet::new(snapshot.covered.capacity());
+        for p in &self.roster {
+            let end_ms = begin_ms + snapshot.grown_ms(p.end_ms, begin_ms);
+            let mut able = snapshot.able();
+            let id = PeerId(p.id);
+            if snapshot.now_ms < end_ms
+                && !able.any(|m| m.speaks_as == p.id || m.view.peers.contains_key(&id))
+            {
+                for c in cells_of(p.run, expected.capacity()) {
+                    expected.insert(c);
+                }
+            }
+        }
+        expected
     }
 
     fn settle(
@@ -293,9 +330,9 @@ fn plans(claim: &Claim, cell: u16, cells: u16) -> bool {
 mod tests {
     use super::super::{Bounds, Graph, Handicaps, Stability};
     use super::*;
-    use skein_peer::cells::CellSet;
+    use skein_flight::coverage::ring::Direction;
+    use skein_peer::Beliefs;
     use skein_peer::wire::message::{CellRun, Epoch};
-    use skein_peer::{Beliefs, PeerId};
 
     const BOUNDS: Bounds = Bounds {
         period_ms: 1000,
@@ -394,6 +431,42 @@ mod tests {
             }
             assert_eq!(s.found.counts.values().sum::<u64>(), at_90, "loss {loss}");
         }
+    }
+
+    #[test]
+    fn the_section_of_whom_the_roster_names_is_no_orphan_until_it_would_be_flown() {
+        let roster = |end_ms| {
+            vec![Planned {
+                id: 3,
+                run: CellRun { first: 3, count: 1 },
+                direction: Direction::Forward,
+                end_ms,
+            }]
+        };
+        // Who has heard of it: peer 99 is known, 3 is not.
+        for (end_ms, broken) in [(0, true), (20_000, false)] {
+            let mut s = Story::new(0);
+            s.check = ListingCheck::with_roster(roster(end_ms));
+            for t in 0..30 {
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
+            }
+            assert_eq!(s.found.counts.contains_key("L2"), broken, "{end_ms}");
+            for t in 30..50 {
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
+            }
+            assert!(s.found.counts.contains_key("L2"), "{end_ms}");
+        }
+        let mut s = Story::new(0);
+        let mut known = roster(90_000);
+        known[0].id = 99;
+        s.check = ListingCheck::with_roster(known);
+        for t in 0..30 {
+            s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
+        }
+        assert!(
+            s.found.counts.contains_key("L2"),
+            "somebody has heard of it"
+        );
     }
 
     #[test]

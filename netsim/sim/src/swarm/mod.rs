@@ -668,7 +668,7 @@ impl Swarm {
                         self.checker.on_divide(self.now_ms, id, divided);
                     }
                     (_, JobResult::Geometry(Ok(geometry))) => {
-                        self.checker.rules.on_loop(geometry);
+                        self.checker.on_loop(geometry);
                     }
                     _ => {}
                 }

@@ -4,11 +4,11 @@
 //! [`sections`] holds the rules by which cells change hands, [`runs`] how they are
 //! written into a claim, [`rounds`] the exchange of bids, `negotiation` when each
 //! is used, [`division`] what a complete round decides, `sharing` what is taken without
-//! one, `launches` what everybody begins with. What travels is `relay`'s, and how much of it [`airtime`]'s.
+//! one, [`launches`] what everybody begins with. What travels is `relay`'s, and how much of it [`airtime`]'s.
 
 pub mod airtime;
 pub mod division;
-pub(crate) mod launches;
+pub mod launches;
 pub(crate) mod life;
 pub(crate) mod membership;
 pub(crate) mod negotiation;
