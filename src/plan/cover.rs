@@ -114,6 +114,7 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         area: input.area.clone(),
         holes: input.holes.clone(),
         zones: input.zones.clone(),
+        fences: Vec::new(),
         team: team_input::in_plane(&team, input.origin, defaults)?,
         sensor: sensor(args, &input)?,
         clearance_m: args.clearance_m,

@@ -6,10 +6,11 @@
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
+use skein_geometry::Segment;
 use skein_geometry::frame::{Origin, Point};
 use skein_interop::place::from_plane;
 use skein_interop::plan::{PlanFile, Waypoint, write};
-use skein_survey::flight::UavFlight;
+use skein_survey::flight::{Leg, UavFlight};
 use std::path::{Path, PathBuf};
 
 /// Points nearer to each other than this are one in the track, metres.
@@ -98,6 +99,8 @@ pub struct Printed {
     pub altitude_m: f64,
     /// Airspeed, m/s.
     pub speed_mps: f64,
+    /// What it flies, piece by piece; empty if it stays.
+    pub legs: Vec<Leg>,
     /// What is told about it in every form but files.
     pub told: Map<String, Value>,
     /// What is told about it in JSON alone.
@@ -128,6 +131,7 @@ impl Printed {
             track: flight.path.clone(),
             altitude_m: flight.altitude_m,
             speed_mps: flight.speed_mps,
+            legs: flight.legs.clone(),
             told,
             details: Map::new(),
         }
@@ -178,11 +182,36 @@ impl Sheet {
             let mut tour = flight.told(uav);
             tour.extend(flight.details.clone());
             tour.insert("points".to_owned(), points.collect());
+            if !flight.legs.is_empty() {
+                tour.insert("trajectory".to_owned(), self.trajectory(&flight.legs));
+            }
             Value::Object(tour)
         });
         let mut out = self.summary.clone();
+        let Origin { lat_deg, lon_deg } = self.origin;
+        out["origin"] = json!({"lat_deg": lat_deg, "lon_deg": lon_deg});
         out["flights"] = flights.collect();
         out
+    }
+
+    /// Lines and arcs one after the other. Courses are clockwise from north, and radii
+    /// positive to the right; a line has none.
+    fn trajectory(&self, legs: &[Leg]) -> Value {
+        let piece = |leg: &Leg, s: &Segment| {
+            let at = from_plane(self.origin, s.start.position());
+            let arc = s.curvature_per_m != 0.0;
+            json!({
+                "lat_deg": at.lat_deg, "lon_deg": at.lon_deg,
+                "course_deg": (90.0 - s.start.heading_rad.to_degrees()).rem_euclid(360.0),
+                "length_m": s.length_m,
+                "radius_m": arc.then(|| -1.0 / s.curvature_per_m),
+                "sees": leg.sees,
+            })
+        };
+        let pieces = legs
+            .iter()
+            .flat_map(|leg| leg.curve.segments().iter().map(move |s| piece(leg, s)));
+        pieces.collect()
     }
 
     fn geojson(&self) -> Value {
@@ -253,6 +282,7 @@ mod tests {
             track: [0.0, 0.0, 100.0, 0.0].map(|x| Point::new(x, 0.0)).to_vec(),
             altitude_m: 80.0,
             speed_mps: 15.0,
+            legs: Vec::new(),
             told: Map::new(),
             details: Map::from_iter([("passes".to_owned(), json!(2))]),
         };

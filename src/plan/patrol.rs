@@ -232,6 +232,7 @@ fn printed(flight: &PatrolFlight) -> Printed {
         track: flight.path.clone(),
         altitude_m: flight.altitude_m,
         speed_mps: flight.speed_mps,
+        legs: Vec::new(),
         told,
         details: Map::new(),
     }

@@ -3,6 +3,7 @@
 
 use crate::team::Uav;
 use skein_flight::airframe::{Airframe, GRAVITY_MPS2, PowerModel};
+use skein_geometry::Curve;
 use skein_geometry::frame::Point;
 use skein_geometry::math::{PI, atan2};
 
@@ -33,6 +34,8 @@ pub(crate) struct Flight {
     pub cruise_power_w: Option<f64>,
     /// How many straight passes it flies, where the planner knows passes.
     pub passes: Option<usize>,
+    /// What it flies, piece by piece; empty if it stays.
+    pub legs: Vec<Leg>,
 }
 
 impl Flight {
@@ -89,9 +92,20 @@ impl Flight {
             energy_wh: self.energy_wh(),
             lane_m: self.flies().then_some(self.lane_m),
             passes: self.passes,
+            legs: self.legs.clone(),
             stays: (!self.flies()).then_some(Stays::NotNeeded),
         }
     }
+}
+
+/// A stretch of a flight: lines and arcs that follow on the leg before without a gap or a
+/// bend.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Leg {
+    /// What is flown, in the plane of the plan.
+    pub curve: Curve,
+    /// Whether the camera works on it; the others are ways and turns.
+    pub sees: bool,
 }
 
 /// What one UAV of a team flies.
@@ -120,6 +134,8 @@ pub struct UavFlight {
     pub lane_m: Option<f64>,
     /// How many straight passes it flies, where the planner knows passes.
     pub passes: Option<usize>,
+    /// What it flies, piece by piece, from its start and back to it; empty if it stays.
+    pub legs: Vec<Leg>,
     /// Why it stays, if it does.
     pub stays: Option<Stays>,
 }
@@ -148,6 +164,7 @@ impl UavFlight {
             energy_wh: None,
             lane_m: None,
             passes: None,
+            legs: Vec::new(),
             stays: Some(why),
         }
     }

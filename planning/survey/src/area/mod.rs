@@ -55,6 +55,8 @@ pub struct AreaRequest {
     pub holes: Vec<Polygon>,
     /// Where nobody may fly.
     pub zones: Arc<NoFlyZones>,
+    /// What must be stayed within, with the clearance: inside each of them.
+    pub fences: Vec<Polygon>,
     /// The UAVs; those that cannot see, or are not needed, stay.
     pub team: Vec<Uav>,
     /// The sensor to see the area with: UAVs without it stay, and its swath counts.
@@ -89,6 +91,7 @@ impl AreaRequest {
             area,
             holes: Vec::new(),
             zones: Arc::new(NoFlyZones::new(Vec::new())),
+            fences: Vec::new(),
             team,
             sensor: None,
             clearance_m,

@@ -290,6 +290,7 @@ fn flight(uav: &PlannedUav, job: &Job<'_>, track: &[Point], length_m: f64) -> Fl
         lane_m: job.lane_m,
         cruise_power_w: uav.cruise_power_w,
         passes: None,
+        legs: Vec::new(),
     }
 }
 

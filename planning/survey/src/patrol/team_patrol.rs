@@ -283,6 +283,7 @@ pub fn plan(request: &PatrolRequest) -> Result<PatrolPlan, PatrolError> {
                 area: area.clone(),
                 holes: holes.clone(),
                 zones: Arc::clone(zones),
+                fences: Vec::new(),
                 team: vec![alone(request)],
                 sensor: None,
                 clearance_m: request.clearance_m,
