@@ -56,6 +56,7 @@ pub mod area;
 pub mod detours;
 pub mod fleet;
 pub mod flight;
+pub mod flown;
 pub mod heights;
 pub mod measure;
 pub mod objective;

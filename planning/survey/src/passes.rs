@@ -88,21 +88,7 @@ pub fn plan_team(problem: &PassesProblem, team: &[Uav]) -> Result<TeamPlan, Pass
     if team.len() > MOST_UAVS {
         return Err(PassesError::Number("number of UAVs"));
     }
-    let mut launches: Vec<Point> = Vec::new();
-    let mut from = Vec::with_capacity(team.len());
-    for member in team {
-        let known = launches
-            .iter()
-            .position(|p| (p - member.launch).norm() <= 0.0);
-        from.push(known.unwrap_or(launches.len()));
-        if known.is_none() {
-            launches.push(member.launch);
-        }
-    }
-    let finite = |p: &Point| p.x.is_finite() && p.y.is_finite();
-    if !launches.iter().all(finite) {
-        return Err(PassesError::Number("launch point"));
-    }
+    let (launches, from) = launches(team)?;
     let mut layout = Layout::new(problem)?;
     cut(&mut layout.passes, team.len(), problem.shortest_pass_m);
     let ways = layout.ways(&launches)?;
@@ -156,8 +142,31 @@ pub fn plan_team(problem: &PassesProblem, team: &[Uav]) -> Result<TeamPlan, Pass
     })
 }
 
+/// The launch points of a team, none twice, and by UAV which is its own.
+///
+/// # Errors
+/// When one is nowhere.
+pub(crate) fn launches(team: &[Uav]) -> Result<(Vec<Point>, Vec<usize>), PassesError> {
+    let mut launches: Vec<Point> = Vec::new();
+    let mut from = Vec::with_capacity(team.len());
+    for member in team {
+        let known = launches
+            .iter()
+            .position(|p| (p - member.launch).norm() <= 0.0);
+        from.push(known.unwrap_or(launches.len()));
+        if known.is_none() {
+            launches.push(member.launch);
+        }
+    }
+    let finite = |p: &Point| p.x.is_finite() && p.y.is_finite();
+    if !launches.iter().all(finite) {
+        return Err(PassesError::Number("launch point"));
+    }
+    Ok((launches, from))
+}
+
 /// Cuts passes into equal pieces, so that none is longer than a fair share for `k` UAVs.
-fn cut(passes: &mut Vec<Pass>, k: usize, shortest_m: f64) {
+pub(crate) fn cut(passes: &mut Vec<Pass>, k: usize, shortest_m: f64) {
     let total_m: f64 = passes.iter().map(Pass::length_m).sum();
     let most_m = (LONGEST_SHARE * total_m / k.min(MOST_CUT) as f64).max(shortest_m);
     let mut pieces = Vec::with_capacity(passes.len());

@@ -4,17 +4,22 @@
 //! Leaves to others: the cells' planner ([`crate::regions`]), and straight passes.
 
 use super::PlannerError;
-use crate::detours::{DetourSearch, Detours};
+use crate::detours::Detours;
 use crate::flight::length_m;
 use crate::regions::improve::Improver;
 use crate::regions::raster::Raster;
 use crate::regions::{Cell, Task, TaskError, bounds};
 use crate::team::PlannedUav;
+use skein_flight::coverage::passes::Pass;
 use skein_geometry::Polygon;
 use skein_geometry::frame::Point;
+use std::collections::BTreeSet;
 
 /// Speeds are counted in whole hundredths of a metre a second.
 const SPEED_UNITS: f64 = 100.0;
+
+/// A pass over a single cell, metres.
+const SHORT_M: f64 = 2.0;
 
 /// Corners with less than this sine of their angle are none: rounding.
 const STRAIGHT: f64 = 1e-9;
@@ -39,26 +44,14 @@ pub(crate) struct CellProblem<'a> {
 pub(crate) struct CellFlights {
     /// The grid.
     pub raster: Raster,
-    /// By UAV: corners of its flight, from its start and back to it.
-    pub tracks: Vec<Vec<Point>>,
-    /// By UAV: the corners of its flight over cells alone.
+    /// By UAV: the straight passes that see its cells, in order.
+    pub passes: Vec<Vec<Pass>>,
+    /// By UAV: the corners of its path over cells alone.
     pub laps: Vec<Vec<Point>>,
-    /// By UAV: length of its flight, metres.
-    pub lengths_m: Vec<f64>,
-    /// By cell number: whether somebody covers it.
-    covered: Vec<bool>,
     /// Middles of the cells that nobody has the endurance or the way to cover.
     pub left: Vec<Point>,
     /// No plan of these cells is done sooner than this, seconds; for equal UAVs only.
     pub least_s: Option<f64>,
-}
-
-impl CellFlights {
-    /// Whether a point of the area is seen.
-    pub(crate) fn sees(&self, p: Point) -> bool {
-        let cell = self.raster.cell_at(p);
-        cell.is_some_and(|c| self.covered[c as usize])
-    }
 }
 
 /// Plans.
@@ -86,12 +79,9 @@ pub(crate) fn plan(request: &CellProblem<'_>) -> Result<CellFlights, PlannerErro
     let plan = improver.plan();
     let middles =
         |cells: &[Cell]| -> Vec<Point> { cells.iter().map(|c| raster.middle(*c)).collect() };
-    let tracks: Vec<Vec<Point>> = plan
-        .paths
-        .iter()
-        .zip(&ways)
-        .map(|(path, way)| track(&middles(path), way, &mut search))
-        .collect();
+    let passes = plan.paths.iter();
+    let passes = passes.map(|path| passes_over(path, |c| raster.middle(c)));
+    let passes = passes.collect();
     let laps = plan.paths.iter().map(|path| corners(middles(path)));
     let laps = laps.collect();
     let mut covered = vec![false; raster.map.table_len()];
@@ -110,11 +100,9 @@ pub(crate) fn plan(request: &CellProblem<'_>) -> Result<CellFlights, PlannerErro
     });
     let least_m = f64::from(bounds::least_moves(&task)) * raster.side_m();
     Ok(CellFlights {
-        lengths_m: tracks.iter().map(|t| length_m(t)).collect(),
-        tracks,
+        passes,
         laps,
         left: middles(&left),
-        covered,
         least_s: equal.then(|| least_m / first.speed_mps),
         raster,
     })
@@ -144,19 +132,65 @@ fn task(
     Ok(task)
 }
 
-/// The corners of a flight; a UAV without cells stays where it is.
-fn track(path: &[Point], way: &[Point], search: &mut DetourSearch<'_>) -> Vec<Point> {
-    let (Some(start), Some(last)) = (way.first(), path.last()) else {
-        return Vec::new();
-    };
-    if path.len() < 2 {
-        return vec![*start];
+/// The straight passes that see all cells of a path, in its order; none where it has but
+/// the cell where it would begin.
+///
+/// Each cell is seen once, by the longest straight part of the path that leads over it: what
+/// is left of the others is flown if anything is.
+fn passes_over(path: &[Cell], middle: impl Fn(Cell) -> Point) -> Vec<Pass> {
+    let at: Vec<Point> = path.iter().map(|c| middle(*c)).collect();
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for i in 1..path.len() {
+        let goes_on = i > 1 && {
+            let (u, v) = (at[i - 1] - at[i - 2], at[i] - at[i - 1]);
+            u.perp(&v).abs() <= STRAIGHT * u.norm() * v.norm() && u.dot(&v) > 0.0
+        };
+        match runs.last_mut() {
+            Some(run) if goes_on => run.1 = i,
+            _ => runs.push((i - 1, i)),
+        }
     }
-    let mut track = way.to_vec();
-    track.extend(path.iter().skip(1));
-    let home = search.way(*last, *start).unwrap_or_default();
-    track.extend(home.iter().skip(1));
-    corners(track)
+    runs.sort_by_key(|(first, last)| (std::cmp::Reverse(last - first), *first));
+    let mut seen: BTreeSet<Cell> = BTreeSet::new();
+    let mut spans: Vec<(usize, usize)> = Vec::new();
+    for (first, last) in runs {
+        let mut span: Option<(usize, usize)> = None;
+        for (i, cell) in path.iter().enumerate().take(last + 1).skip(first) {
+            if seen.insert(*cell) {
+                span = Some((span.map_or(i, |s| s.0), i));
+            } else {
+                spans.extend(span.take());
+            }
+        }
+        spans.extend(span);
+    }
+    spans.sort_unstable();
+    let pass = |(first, last): (usize, usize)| {
+        let d = match path.len() {
+            0 | 1 => return None,
+            n if last + 1 < n => at[last + 1] - at[last],
+            _ => at[last] - at[last - 1],
+        };
+        let along = if first < last {
+            at[last] - at[first]
+        } else {
+            d
+        };
+        // Over a single cell it is short.
+        let half = along / along.norm() * (SHORT_M / 2.0);
+        Some(if first < last {
+            Pass {
+                from: at[first],
+                to: at[last],
+            }
+        } else {
+            Pass {
+                from: at[first] - half,
+                to: at[first] + half,
+            }
+        })
+    };
+    spans.into_iter().filter_map(pass).collect()
 }
 
 /// Leaves out what lies straight between its neighbours.
@@ -219,27 +253,42 @@ mod tests {
         let start = Point::new(-400.0, -300.0);
         let flights = planned(&team(&[10.0, 20.0], f64::INFINITY, start));
         assert!(flights.left.is_empty() && flights.least_s.is_none());
-        assert!(flights.sees(Point::new(299.0, -299.0)) && !flights.sees(Point::new(330.0, 0.0)));
-        let ratio = flights.lengths_m[1] / flights.lengths_m[0];
+        let lengths_m: Vec<f64> = flights.laps.iter().map(|l| length_m(l)).collect();
+        let ratio = lengths_m[1] / lengths_m[0];
         assert!((1.6..2.4).contains(&ratio), "{ratio}");
-        for track in &flights.tracks {
-            assert!((track[0] - start).norm() < 1e-9);
-            assert!((track[track.len() - 1] - start).norm() < 1e-9);
-        }
-        let all: f64 = flights.lengths_m.iter().sum();
+        let all: f64 = lengths_m.iter().sum();
         assert!(all < 1.15 * 600.0 * 600.0 / 30.0 + 4.0 * 400.0, "{all}");
+        // Every cell is seen by one pass: what passes see beyond their ends is their own.
+        let passes = || flights.passes.iter().flatten();
+        for i in 0..60 {
+            for j in 0..60 {
+                let p = Point::new(f64::from(i) * 10.0 - 295.0, f64::from(j) * 10.0 - 295.0);
+                assert!(passes().any(|pass| pass.sees(p, 15.0, 15.0)), "{p}");
+            }
+        }
+        let seen_m: f64 = passes()
+            .map(|p| (p.length_m() / 30.0).floor() * 30.0 + 30.0)
+            .sum();
+        assert!(seen_m < 1.02 * 600.0 * 600.0 / 30.0, "{seen_m}");
     }
 
     #[test]
     fn a_short_endurance_is_kept_and_the_rest_is_listed() {
         let flights = planned(&team(&[15.0, 15.0], 300.0, Point::new(0.0, 0.0)));
-        assert!(flights.lengths_m.iter().all(|l| *l <= 4500.0 + 1e-6));
+        assert!(flights.laps.iter().all(|l| length_m(l) <= 4500.0 + 1e-6));
         // 9 km of lanes of the 12 km that there are.
         assert!(
             (80..=140).contains(&flights.left.len()),
             "{}",
             flights.left.len()
         );
-        assert!(!flights.sees(flights.left[0]));
+        let seen = |p| {
+            flights
+                .passes
+                .iter()
+                .flatten()
+                .any(|pass| pass.sees(p, 14.0, 14.0))
+        };
+        assert!(!seen(flights.left[0]));
     }
 }

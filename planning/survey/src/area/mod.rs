@@ -4,6 +4,8 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `planners` | both planners behind one question: a part of the area, lanes of one width |
+//! | `flown_passes` | the exact planner: passes shared out, ordered and flown |
+//! | `gaps` | passes for what lanes leave unseen beside walls |
 //! | `cells` | the approximate planner: a region of lane cells for each UAV |
 //! | `lanes` | lanes for unlike swaths: one width for all, or a section for each crew |
 //! | `team_selection` | which UAVs of the team fly |
@@ -13,6 +15,8 @@
 
 mod cells;
 mod flights;
+mod flown_passes;
+mod gaps;
 mod lanes;
 mod planners;
 mod team_selection;
@@ -21,6 +25,7 @@ mod tests;
 
 use crate::detours::DetourError;
 use crate::flight::{Stays, UavFlight};
+use crate::flown::AirspaceError;
 use crate::heights::{NoSeparation, Separation};
 use crate::objective::{Objective, in_watt_hours};
 use crate::regions::TaskError;
@@ -179,6 +184,8 @@ pub enum Facts {
         passes: usize,
         /// Passes that nobody has the endurance for.
         unserved_passes: usize,
+        /// Passes, or lanes of them, to which no curve leads that keeps clear.
+        unreached_passes: usize,
     },
     /// Of lane cells.
     Cells {
@@ -207,18 +214,21 @@ impl Facts {
                     cells,
                     passes,
                     unserved_passes,
+                    unreached_passes,
                 },
                 Self::Passes {
                     area_m2: more_m2,
                     cells: more_cells,
                     passes: more_passes,
                     unserved_passes: more_unserved,
+                    unreached_passes: more_unreached,
                 },
             ) => Self::Passes {
                 area_m2: area_m2 + more_m2,
                 cells: cells + more_cells,
                 passes: passes + more_passes,
                 unserved_passes: unserved_passes + more_unserved,
+                unreached_passes: unreached_passes + more_unreached,
             },
             (
                 Self::Cells {
@@ -269,6 +279,8 @@ pub enum ShapeKind {
     },
     /// A lane cell that nobody covers.
     LeftCell,
+    /// A pass to which no curve leads that keeps clear: its two ends.
+    Unreached,
     /// A section of the area.
     Section {
         /// Its number, from 1.
@@ -310,6 +322,9 @@ pub enum AreaError {
     /// There are no ways round the zones.
     #[error(transparent)]
     Zones(#[from] DetourError),
+    /// A fence cannot be stayed within.
+    #[error(transparent)]
+    Fences(#[from] AirspaceError),
     /// None of the planners that were asked has a plan; this is why the first has none.
     #[error(transparent)]
     NoPlan(#[from] PlannerError),

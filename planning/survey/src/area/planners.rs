@@ -4,10 +4,12 @@
 //! Leaves to [`super::lanes`] which UAVs work on which part.
 
 use super::cells::{self, CellProblem};
-use super::{AreaRequest, Facts, Planner, PlannerError, Shape, ShapeKind};
+use super::flown_passes::{fly_team, fly_within};
+use super::{AreaError, AreaRequest, Facts, Planner, PlannerError, Shape, ShapeKind};
 use crate::detours::{DetourError, Detours};
 use crate::flight::Flight;
-use crate::passes::{self, plan_team};
+use crate::flown::Airspace;
+use crate::passes;
 use crate::team::PlannedUav;
 use skein_flight::coverage::passes::{Directions, Pass, PassesError, PassesProblem};
 use skein_geometry::frame::Point;
@@ -18,10 +20,14 @@ use skein_geometry::{NoFlyZones, Polygon};
 /// are smaller.
 const CELL_STEPS: usize = 50;
 
+/// Times that cells are shared out again where turns take what endurance was left.
+const ENDURANCE_ROUNDS: usize = 3;
+
 /// What all plans of one area share: the request, and the zones grown by the clearance.
 pub(crate) struct OpenArea<'a> {
     /// What is asked.
     pub request: &'a AreaRequest,
+    airspace: Airspace,
     detours: Detours,
 }
 
@@ -64,7 +70,6 @@ enum Seen {
         across_m: f64,
         along_m: f64,
     },
-    Cells(Box<cells::CellFlights>),
 }
 
 impl Part {
@@ -77,7 +82,6 @@ impl Part {
                 across_m,
                 along_m,
             } => passes.iter().any(|pass| pass.sees(p, *across_m, *along_m)),
-            Seen::Cells(cells) => cells.sees(p),
         }
     }
 
@@ -91,21 +95,34 @@ impl<'a> OpenArea<'a> {
     /// The area with its zones grown by the clearance; `starts` are the UAVs'.
     ///
     /// # Errors
-    /// When the clearance is no length.
+    /// When the clearance is no length, or a fence has no outside.
     pub(crate) fn new(
         request: &'a AreaRequest,
         starts: impl Iterator<Item = Point>,
-    ) -> Result<Self, DetourError> {
+    ) -> Result<Self, AreaError> {
+        let starts: Vec<Point> = starts.collect();
+        let places = starts.iter().chain(request.area.vertices()).copied();
+        let (zones, fences) = (&request.zones, &request.fences);
+        let airspace = Airspace::new(zones, fences, places, request.clearance_m)?;
+        let keep_m = airspace.clearance_m();
         Ok(Self {
             request,
-            detours: detours(&request.area, &request.zones, request.clearance_m, starts)?,
+            detours: detours(&request.area, airspace.zones(), keep_m, starts.into_iter())?,
+            airspace,
         })
     }
 
-    /// Whether a point of the area is to be seen: not in a hole, and not nearer to a zone
-    /// than the clearance.
+    /// Whether a point of the area is to be seen: in no hole and no zone as they are drawn,
+    /// and outside of no fence.
     pub(crate) fn wants(&self, p: Point) -> bool {
-        !self.detours.forbids(p) && !self.request.holes.iter().any(|h| h.contains(p))
+        let zones = self.airspace.zones();
+        zones.distance_m(p) > 0.0 && !self.request.holes.iter().any(|h| h.contains(p))
+    }
+
+    /// Whether a point that is to be seen is nearer to a zone or a fence than the
+    /// clearance.
+    pub(crate) fn is_too_near(&self, p: Point) -> bool {
+        self.airspace.zones().distance_m(p) < self.airspace.clearance_m()
     }
 
     /// Plans a part.
@@ -123,8 +140,8 @@ impl<'a> OpenArea<'a> {
         let look_ahead_m = self.request.look_ahead_m.unwrap_or(job.lane_m / 2.0);
         let problem = PassesProblem {
             holes: self.request.holes.clone(),
-            zones: self.request.zones.clone(),
-            clearance_m: self.request.clearance_m,
+            zones: self.airspace.zones().clone(),
+            clearance_m: self.airspace.clearance_m(),
             look_ahead_m,
             steps: job.steps,
             directions: match self.request.heading_rad {
@@ -145,7 +162,7 @@ impl<'a> OpenArea<'a> {
             ..passes::Uav::at(uav.start)
         };
         let team: Vec<passes::Uav> = job.crew.iter().map(uav).collect();
-        let plan = match plan_team(&problem, &team) {
+        let plan = match fly_team(&problem, &team) {
             // A section that zones and holes fill is no work.
             Err(PassesError::Nothing) if job.area != &self.request.area => {
                 return Ok(Part::at_home(&job));
@@ -153,13 +170,12 @@ impl<'a> OpenArea<'a> {
             plan => plan?,
         };
         let flights = job.crew.iter().enumerate().map(|(i, uav)| {
-            let mut flight = flight(uav, &job, &plan.tracks[i], plan.lengths_m[i]);
-            let passes = plan.tours[i].len();
-            flight.lap = lap(&plan.tracks[i], &plan.tours[i]);
-            flight.passes = Some(passes);
-            if passes == 0 {
-                flight.track.truncate(1);
-            }
+            let flown = &plan.flights[i];
+            let track = flown.track(uav.start);
+            let mut flight = flight(uav, &job, &track, flown.length_m());
+            flight.lap = lap(&track, &plan.tours[i]);
+            flight.passes = Some(plan.tours[i].len());
+            flight.legs.clone_from(&flown.legs);
             flight
         });
         let flights = flights.collect();
@@ -174,6 +190,11 @@ impl<'a> OpenArea<'a> {
         let passes: Vec<Pass> = plan.tours.into_iter().flatten().collect();
         let length_m = |passes: &[Pass]| passes.iter().map(Pass::length_m).sum();
         let (flown_m, left_m): (f64, f64) = (length_m(&passes), length_m(&plan.unserved));
+        let unreached = plan.unreached.iter().map(|pass| Shape {
+            ring: vec![pass.from, pass.to],
+            kind: ShapeKind::Unreached,
+        });
+        let shapes = shapes.chain(unreached);
         Ok(Part {
             flights,
             done_share: flown_m / (flown_m + left_m).max(f64::MIN_POSITIVE),
@@ -182,6 +203,7 @@ impl<'a> OpenArea<'a> {
                 cells: plan.cells.len(),
                 passes: passes.len(),
                 unserved_passes: plan.unserved.len(),
+                unreached_passes: plan.unreached.len(),
             }),
             shapes: shapes.collect(),
             seen: Seen::Passes {
@@ -196,24 +218,55 @@ impl<'a> OpenArea<'a> {
         for uav in job.crew {
             check_start(&self.detours, &uav.name, uav.start)?;
         }
-        let plan = cells::plan(&CellProblem {
-            area: job.area,
-            holes: &self.request.holes,
-            detours: &self.detours,
-            team: job.crew,
-            lane_m: job.lane_m,
-            steps: job.steps.saturating_mul(CELL_STEPS),
-        })?;
-        let flights = job.crew.iter().enumerate();
-        let flights = flights.map(|(i, uav)| Flight {
-            lap: plan.laps[i].clone(),
-            ..flight(uav, &job, &plan.tracks[i], plan.lengths_m[i])
-        });
+        let router = self.airspace.router(job.turn_radius_m);
+        let mut crew = job.crew.to_vec();
+        let mut rounds = ENDURANCE_ROUNDS;
+        let plan = loop {
+            let plan = cells::plan(&CellProblem {
+                area: job.area,
+                holes: &self.request.holes,
+                detours: &self.detours,
+                team: &crew,
+                lane_m: job.lane_m,
+                steps: job.steps.saturating_mul(CELL_STEPS),
+            })?;
+            // What turns take of the endurance is not flown over cells: others fly these.
+            let mut late = false;
+            for (i, uav) in job.crew.iter().enumerate() {
+                if uav.endurance_s.is_finite() && rounds > 0 {
+                    let all = fly_within(&router, uav.start, &plan.passes[i], f64::INFINITY);
+                    let over = all.0.length_m() / (uav.endurance_s * uav.speed_mps);
+                    late |= over > 1.0;
+                    crew[i].endurance_s /= over.max(1.0) * 1.01;
+                }
+            }
+            if !late {
+                break plan;
+            }
+            rounds -= 1;
+        };
+        let (mut flights, mut seen) = (Vec::new(), Vec::new());
+        let (mut wanted_m, mut seen_m) = (0.0, 0.0);
+        for (i, uav) in job.crew.iter().enumerate() {
+            let longest_m = uav.endurance_s * uav.speed_mps;
+            let (flown, passes) = fly_within(&router, uav.start, &plan.passes[i], longest_m);
+            let length_m = |p: &[Pass]| p.iter().map(|p| p.length_m() + job.lane_m).sum::<f64>();
+            wanted_m += length_m(&plan.passes[i]);
+            seen_m += length_m(&passes);
+            flights.push(Flight {
+                lap: plan.laps[i].clone(),
+                passes: Some(passes.len()),
+                legs: flown.legs.clone(),
+                ..flight(uav, &job, &flown.track(uav.start), flown.length_m())
+            });
+            seen.extend(passes);
+        }
         let cells = plan.raster.map.n_free();
         let left = plan.left.iter();
+        let covered = 1.0 - plan.left.len() as f64 / cells.max(1) as f64;
         Ok(Part {
-            flights: flights.collect(),
-            done_share: 1.0 - plan.left.len() as f64 / cells.max(1) as f64,
+            flights,
+            done_share: covered * seen_m / f64::max(wanted_m, f64::MIN_POSITIVE),
             facts: Some(Facts::Cells {
                 lower_bound_s: plan.least_s,
                 cells,
@@ -227,7 +280,11 @@ impl<'a> OpenArea<'a> {
                     kind: ShapeKind::LeftCell,
                 })
                 .collect(),
-            seen: Seen::Cells(Box::new(plan)),
+            seen: Seen::Passes {
+                passes: seen,
+                across_m: job.lane_m / 2.0,
+                along_m: self.request.look_ahead_m.unwrap_or(job.lane_m / 2.0),
+            },
         })
     }
 }

@@ -87,6 +87,13 @@ impl Ways {
         track
     }
 
+    /// Whether any way leads from one place to the other.
+    #[must_use]
+    pub fn joins(&self, a: Point, b: Point) -> bool {
+        let search = self.mesh.as_ref().map(Search::new);
+        search.is_none_or(|mut s| s.distance_m(a, b).is_some())
+    }
+
     /// Whether the straight line crosses a border of a zone.
     fn is_blocked(&self, a: Point, b: Point) -> bool {
         self.blocking(a, b).next().is_some()

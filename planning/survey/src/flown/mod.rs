@@ -1,0 +1,173 @@
+//! What a UAV flies from its start over stops in a given order and back: lines and arcs
+//! that join without a bend and keep clear of zones and fences all along (D2.7 §2.3, §2.4).
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `airspace` | zones, and fences turned inside out, as one kind of zones |
+//! | `chain` | which way each stop is flown, and the curves between them |
+//! | `ends` | how far a straight pass may reach before a wall |
+//! | `polyline` | a line with corners as stretches that can be flown |
+//!
+//! Every curve comes from [`skein_flight::route::Router`], by which the swarm flies too: a
+//! turn is to either side, in a bulb or after a longer run-out, whichever is shortest and
+//! proved clear. A stop that no such curve leads to is left out and told. Leaves to others
+//! which stops there are, in which order, and who flies them.
+
+mod airspace;
+mod chain;
+mod ends;
+mod polyline;
+#[cfg(test)]
+mod tests;
+
+use crate::flight::Leg;
+pub use airspace::{Airspace, AirspaceError};
+pub use chain::{Node, fly};
+pub use ends::turnable;
+pub use polyline::stretches;
+use skein_flight::trajectory::Trajectory;
+use skein_flight::trajectory::wind::Wind;
+use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::math::{FRAC_PI_2, PI, TAU};
+use skein_geometry::{Curve, Segment};
+
+/// Courses over a point that are compared: every 22.5°.
+const COURSES: u8 = 16;
+
+/// Arcs become chords of at most this turn in a track of points, radians.
+const CHORD_RAD: f64 = FRAC_PI_2 / 6.0;
+
+/// Something to be flown over.
+#[derive(Clone, Debug)]
+pub struct Stop {
+    /// The ways in which it may be flown, the wanted one first.
+    pub stands: Vec<Stand>,
+    /// Whether the camera works on it.
+    pub sees: bool,
+}
+
+/// One way of flying over a stop.
+#[derive(Clone, Debug)]
+pub struct Stand {
+    /// Where it begins.
+    pub from: Pose,
+    /// Where it ends.
+    pub to: Pose,
+    /// What lies between; empty over a point.
+    pub curve: Curve,
+}
+
+impl Stand {
+    /// A curve as it is; `None` for one of no length.
+    pub fn along(curve: Curve) -> Option<Self> {
+        let (from, to) = curve.start().zip(curve.end())?;
+        Some(Self { from, to, curve })
+    }
+
+    fn reversed(&self) -> Self {
+        Self {
+            from: self.to.reversed(),
+            to: self.from.reversed(),
+            curve: self.curve.reversed(),
+        }
+    }
+}
+
+impl Stop {
+    /// A curve to be seen from, in this direction rather than the other.
+    pub fn along(curve: Curve) -> Option<Self> {
+        let stand = Stand::along(curve)?;
+        let back = stand.reversed();
+        Some(Self {
+            stands: vec![stand, back],
+            sees: true,
+        })
+    }
+
+    /// A point to be flown over on any course.
+    pub fn over(point: Point) -> Self {
+        let stands = (0..COURSES).map(|i| {
+            let pose = Pose::new(point, TAU * f64::from(i) / f64::from(COURSES) - PI);
+            Stand {
+                from: pose,
+                to: pose,
+                curve: Curve::empty(),
+            }
+        });
+        Self {
+            stands: stands.collect(),
+            sees: true,
+        }
+    }
+}
+
+/// A straight line as a curve; empty where both ends are the same.
+pub fn straight(from: Point, to: Point) -> Curve {
+    let d = to - from;
+    let mut curve = Curve::empty();
+    let length_m = d.norm();
+    if length_m > 0.0 {
+        curve.push(Segment {
+            start: Pose::new(from, skein_geometry::math::atan2(d.y, d.x)),
+            curvature_per_m: 0.0,
+            length_m,
+        });
+    }
+    curve
+}
+
+/// One UAV's flight over its stops.
+#[derive(Clone, Debug, Default)]
+pub struct Flown {
+    /// What is flown, from the start and back; empty where no stop is.
+    pub legs: Vec<Leg>,
+    /// The stops that are flown in order, each with the number of its stand.
+    pub order: Vec<(usize, usize)>,
+    /// The stops that no curve leads to or back from.
+    pub left: Vec<usize>,
+    /// The ways that were looked for between stops, each with its stand, none for the
+    /// start; and how long they are where they are there, metres.
+    pub ways: Vec<(Node, Node, Option<f64>)>,
+}
+
+impl Flown {
+    /// Length over the ground, metres.
+    pub fn length_m(&self) -> f64 {
+        self.legs.iter().map(|l| l.curve.length_m()).sum()
+    }
+
+    /// How long it takes at an airspeed in a wind, seconds; infinite where the wind is too
+    /// strong.
+    pub fn time_s(&self, airspeed_mps: f64, wind_mps: Vector) -> f64 {
+        if wind_mps.norm() <= 0.0 {
+            return self.length_m() / airspeed_mps;
+        }
+        let wind = Wind::new(wind_mps.x, wind_mps.y);
+        let time_s = |leg: &Leg| {
+            Trajectory::along(&leg.curve, airspeed_mps, wind)
+                .map_or(f64::INFINITY, |t| t.duration_s())
+        };
+        self.legs.iter().map(time_s).sum()
+    }
+
+    /// Its points: the ends of all pieces, and of arcs enough that chords stand for them.
+    pub fn track(&self, start: Point) -> Vec<Point> {
+        track(&self.legs, start)
+    }
+}
+
+/// The points of legs: the ends of all pieces, and of arcs enough that chords stand for
+/// them.
+pub fn track(legs: &[Leg], start: Point) -> Vec<Point> {
+    let mut track = vec![start];
+    for s in legs.iter().flat_map(|l| l.curve.segments()) {
+        let chords = (s.length_m * s.curvature_per_m.abs() / CHORD_RAD).ceil();
+        let mut i = 1.0;
+        while i <= chords.max(1.0) {
+            let at_m = s.length_m * i / chords.max(1.0);
+            track.push(s.pose_at(at_m).position());
+            i += 1.0;
+        }
+    }
+    track
+}
