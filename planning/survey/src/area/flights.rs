@@ -24,6 +24,9 @@ pub(crate) struct Flights {
     pub flights: Vec<Flight>,
     /// The share of the area that is seen.
     pub covered_share: f64,
+    /// The share of the area that is not seen and nearer to a zone or a fence than the
+    /// clearance.
+    pub too_near_share: f64,
     /// What the planner tells of its own; none where nothing was to be planned.
     pub facts: Option<Facts>,
     /// Rings for a map.

@@ -199,6 +199,8 @@ impl Desk<'_> {
         let sees = |p| parts.iter().any(|part| part.sees(p));
         let wanted = |p| self.ground.wants(p);
         let share = covered_share(&self.ground.request.area, wanted, lane_m, most, sees);
+        let near = |p| self.ground.is_too_near(p) && !sees(p);
+        let near = covered_share(&self.ground.request.area, wanted, lane_m, most, near);
         let mut facts: Option<Facts> = None;
         let (mut flights, mut shapes): (Vec<Flight>, Vec<_>) = (Vec::new(), Vec::new());
         for part in parts {
@@ -219,6 +221,7 @@ impl Desk<'_> {
             laid,
             flights,
             covered_share: share,
+            too_near_share: near,
             facts,
             shapes,
         }

@@ -27,7 +27,7 @@ use crate::detours::DetourError;
 use crate::flight::{Stays, UavFlight};
 use crate::flown::AirspaceError;
 use crate::heights::{NoSeparation, Separation};
-use crate::objective::{Objective, in_watt_hours};
+use crate::objective::{Objective, SAME_SHARE, in_watt_hours};
 use crate::regions::TaskError;
 use crate::regions::raster::RasterError;
 use crate::team::{self, PlannedUav, TeamError, Uav, taking_part};
@@ -511,15 +511,65 @@ impl Job<'_> {
             compared.extend(chosen.others.iter().map(Flights::figures));
             compared.sort_by_key(|p| (p.planner, p.laid));
         }
+        let mut notices = chosen.refused;
+        notices.extend(unseen(&best));
         Ok(AreaPlan {
             uavs,
             figures,
             facts: best.facts,
             compared,
             shapes: best.shapes,
-            notices: chosen.refused,
+            notices,
         })
     }
+}
+
+/// What of the area is not seen, and why; nothing is said of less than a person compares.
+fn unseen(flights: &Flights) -> Vec<String> {
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let mut told = Vec::new();
+    if flights.too_near_share > SAME_SHARE {
+        told.push(format!(
+            "{} of the area is nearer to zones or fences than the clearance, and not seen",
+            percent(flights.too_near_share)
+        ));
+    }
+    let mut others = Vec::new();
+    match flights.facts {
+        Some(Facts::Passes {
+            unserved_passes,
+            unreached_passes,
+            ..
+        }) => {
+            if unserved_passes > 0 {
+                others.push(format!("{unserved_passes} passes are beyond the endurance"));
+            }
+            if unreached_passes > 0 {
+                others.push(format!(
+                    "to {unreached_passes} no flight with its turns keeps clear of zones and fences"
+                ));
+            }
+        }
+        Some(Facts::Cells { cells_left, .. }) if cells_left > 0 => {
+            others.push(format!(
+                "nobody has the endurance or a way for {cells_left} cells"
+            ));
+        }
+        _ => {}
+    }
+    let rest = 1.0 - flights.covered_share - flights.too_near_share;
+    if rest > SAME_SHARE || !others.is_empty() {
+        let why = if others.is_empty() {
+            "beside zones, fences or other cells no turn fits".to_owned()
+        } else {
+            others.join(", ")
+        };
+        told.push(format!(
+            "{} of the area is not seen: {why}",
+            percent(rest.max(0.0))
+        ));
+    }
+    told
 }
 
 /// An error with all that it came from.

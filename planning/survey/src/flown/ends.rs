@@ -3,9 +3,9 @@
 
 use skein_flight::coverage::passes::Pass;
 use skein_flight::route::Router;
+use skein_geometry::Segment;
 use skein_geometry::frame::Pose;
 use skein_geometry::math::FRAC_PI_2;
-use skein_geometry::{Curve, Segment};
 
 /// Ends are moved to this, metres.
 const RESOLUTION_M: f64 = 0.05;
@@ -88,9 +88,4 @@ fn first_clear(most_m: f64, is_clear: impl Fn(f64) -> bool) -> Option<f64> {
         }
     }
     Some(high_m)
-}
-
-/// A pass as a curve.
-pub fn curve(pass: &Pass) -> Curve {
-    super::straight(pass.from, pass.to)
 }

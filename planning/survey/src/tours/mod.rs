@@ -5,11 +5,13 @@
 //! |---|---|
 //! | `targets` | points and lines as ways to fly: sweeps, lanes of strips, networks of roads |
 //! | `tour_problem` | ways over numbered places, what flights cost, and the zones on the way |
+//! | `flown_tours` | tours as they are flown, with turns and in the wind |
 //! | `sensor_groups` | who flies which targets where sensors differ |
 //!
 //! Leaves to others: files, and what a person is shown. The local search of tours is that
 //! of [`skein_flight::coverage::lines`] and [`crate::visits`].
 
+mod flown_tours;
 mod sensor_groups;
 mod targets;
 #[cfg(test)]
@@ -18,11 +20,13 @@ mod tour_problem;
 
 use crate::detours::DetourError;
 use crate::flight::UavFlight;
+use crate::flown::AirspaceError;
 use crate::heights::{NoSeparation, Separation};
 use crate::objective::Objective;
 use crate::team::{TeamError, Uav, has};
 use skein_flight::coverage::lines::LineError;
 use skein_flight::coverage::metric::TooWindy;
+use skein_geometry::PolygonError;
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::offset::Zone;
 use thiserror::Error;
@@ -178,6 +182,12 @@ pub enum ToursError {
     /// There are no ways round the zones.
     #[error(transparent)]
     Zones(#[from] DetourError),
+    /// A zone or a fence is no polygon.
+    #[error("a no-fly zone or a fence")]
+    Zone(#[source] PolygonError),
+    /// A fence cannot be stayed within.
+    #[error(transparent)]
+    Fences(#[from] AirspaceError),
     /// Nobody has the sensor that a target asks for.
     #[error(
         "{target} asks for the sensor {sensor:?}, nobody carries it: {}",

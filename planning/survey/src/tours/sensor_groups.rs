@@ -5,10 +5,11 @@
 //! sensors that it carries, and every way to group the sensors is tried. Leaves to others:
 //! which ways there are, and the planners of lines and points.
 
+use super::flown_tours::Pilot;
 use super::tour_problem::{Cost, Question, TourProblem, Way};
 use super::{MOST_SENSORS, Targets, TourPlan, TourRequest, ToursError, UavTour, Visit};
 use crate::fleet::team_selection::{kinds, search};
-use crate::flight::{Flight, Stays, UavFlight, length_m};
+use crate::flight::{Flight, Stays, UavFlight};
 use crate::objective::{Objective, Worth, in_watt_hours};
 use crate::team::Uav;
 use crate::visits::visit;
@@ -17,6 +18,9 @@ use std::collections::BTreeMap;
 
 /// Teams and groups are compared with this part of the steps.
 const SEARCH_PART: usize = 8;
+
+/// Times that targets are shared out again where turns take what endurance was left.
+const ENDURANCE_ROUNDS: usize = 3;
 
 /// Times that a UAV is moved to the group that takes longest.
 const MOST_MOVES: usize = 12;
@@ -37,13 +41,35 @@ pub(super) fn plan(
         Targets::Lines(_) => |lines, team, metric, steps| lines::plan(lines, team, metric, steps),
     };
     let (tours, _) = problem.solve(|question| {
-        Desk {
-            question,
-            solver,
-            objective: request.objective,
-            in_watt_hours,
+        let pilot = Pilot::new(question.problem, request)?;
+        let mut team = question.team.to_vec();
+        let mut rounds = ENDURANCE_ROUNDS;
+        loop {
+            let desk = Desk {
+                question: &Question {
+                    team: &team,
+                    ..*question
+                },
+                solver,
+                objective: request.objective,
+                in_watt_hours,
+            };
+            let tours = desk.best(request.steps)?;
+            let mut late = false;
+            for (flight, passes) in &tours.flights {
+                let longest_s = question.problem.team[flight.uav].endurance_s;
+                if let Some(longest_s) = longest_s.filter(|_| rounds > 0) {
+                    // What turns take is planned for as a shorter endurance.
+                    let over = pilot.flown(flight, passes).flight.time_s() / longest_s;
+                    late |= over > 1.0;
+                    team[flight.uav].endurance /= over.max(1.0) * 1.01;
+                }
+            }
+            if !late {
+                return Ok(tours.flown(&pilot));
+            }
+            rounds -= 1;
         }
-        .best(request.steps)
     })?;
     Ok(tours.told(problem, request))
 }
@@ -63,6 +89,8 @@ struct Tours {
     flights: Vec<(Flight, Vec<Traversal>)>,
     /// Lines that nobody has the endurance for.
     unserved: Vec<usize>,
+    /// Lines that no curve leads to.
+    left: Vec<usize>,
     /// No plan is faster, seconds, where that is known.
     lower_bound_s: Option<f64>,
 }
@@ -86,6 +114,7 @@ impl Tours {
     fn and(mut self, other: Self) -> Self {
         self.flights.extend(other.flights);
         self.unserved.extend(other.unserved);
+        self.left.extend(other.left);
         self.lower_bound_s = None;
         self
     }
@@ -309,6 +338,7 @@ impl Desk<'_> {
         Ok(Tours {
             flights: flights.collect(),
             unserved: plan.unserved.iter().map(|i| lines[*i]).collect(),
+            left: Vec::new(),
             // Of the team that flies: without a meaning where that is a choice.
             lower_bound_s: (self.objective == Objective::Time).then_some(plan.lower_bound),
         })
@@ -331,6 +361,21 @@ fn partitions(n: usize) -> Vec<Vec<usize>> {
 }
 
 impl Tours {
+    /// The same as they are flown; what then is beyond an endurance is not.
+    fn flown(self, pilot: &Pilot<'_>) -> Self {
+        let mut all = Self {
+            flights: Vec::new(),
+            ..self
+        };
+        for (flight, passes) in self.flights {
+            let (flown, beyond) = pilot.flown_within(&flight, &passes);
+            all.unserved.extend(beyond.iter().map(|p| p.line));
+            all.left.extend(flown.left.iter().map(|p| p.line));
+            all.flights.push((flown.flight, flown.passes));
+        }
+        all
+    }
+
     /// The same for the caller.
     fn told(&self, problem: TourProblem, request: &TourRequest) -> TourPlan {
         let of = |uav: usize| self.flights.iter().find(|(f, _)| f.uav == uav);
@@ -362,15 +407,22 @@ impl Tours {
                 ),
             };
             // Over the ground: through the air it differs in a wind.
-            flight.length_m = length_m(&flight.path);
+            flight.length_m = flight.legs.iter().map(|l| l.curve.length_m()).sum();
             flight.lane_m = None;
             if !flight.flies() && !problem.ways.iter().any(sees) {
                 flight.stays = Some(Stays::NoSensor);
             }
             UavTour { flight, visits }
         });
-        let mut unserved = self.unserved.clone();
+        let mut unserved = [&self.unserved[..], &self.left].concat();
         unserved.sort_unstable();
+        let mut notices = problem.notices.clone();
+        let mut left = self.left.clone();
+        left.sort_unstable();
+        notices.extend(left.iter().map(|i| {
+            let name = &problem.ways[*i].name;
+            format!("{name}: left out, no flight with its turns keeps clear of zones and fences")
+        }));
         let flights = || self.flights.iter().map(|(f, _)| f).filter(|f| f.flies());
         let worth = self.worth(false);
         TourPlan {
@@ -386,7 +438,7 @@ impl Tours {
                 .iter()
                 .map(|i| problem.ways[*i].name.clone())
                 .collect(),
-            notices: problem.notices.clone(),
+            notices,
         }
     }
 }
