@@ -80,7 +80,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Mission(args) => console::mission(args),
         Verb::Observe(args) => observe::run(args),
         Verb::Check(args) => check::run(args),
-        Verb::Plan(args) => Ok(exit::answer(plan::run(args))?),
+        Verb::Plan(args) => Ok(plan::run(args)?),
         Verb::Guard => {
             skein_broker::process::guard();
             Ok(ExitCode::from(exit::OK))

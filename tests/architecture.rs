@@ -38,6 +38,13 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
         &["tokio", "zenoh", "rand_core"],
     ),
     (
+        // Shares no geometry with what it recounts: of the planners it may use nothing, and
+        // of formats the readers alone.
+        "skein-verify",
+        &["skein-interop"],
+        &["tokio", "zenoh", "rand_core", "skein-survey", "skein-lab"],
+    ),
+    (
         "skein-behaviors",
         &["skein-geometry", "skein-flight"],
         &["tokio", "zenoh", "rand_core", "skein-survey", "skein-lab"],
@@ -265,6 +272,19 @@ fn the_command_carries_no_laboratory() {
     assert!(!reached.contains("skein-lab") && !reached.contains("skein-bench"));
 }
 
+/// Formats come with points of the planners' plane; whoever recounts a plan measures with
+/// its own.
+#[test]
+fn the_recount_knows_no_geometry_of_the_planners() {
+    for file in sources(&["planning/verify/src"]) {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+        for theirs in ["skein_geometry", "skein_flight", "skein_survey", "to_plane", "from_plane"] {
+            assert!(!code.contains(theirs), "{} uses {theirs}", file.display());
+        }
+    }
+}
+
 #[test]
 fn every_package_of_the_workspace_has_a_rule() {
     let metadata = metadata();
@@ -343,6 +363,7 @@ fn the_core_asks_neither_clock_nor_chance() {
         "planning/flight/src",
         "planning/survey/src",
         "planning/lab/src",
+        "planning/verify/src",
         "behaviors/src",
         "runtime/peer/src",
         "runtime/link/src",

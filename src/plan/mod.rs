@@ -1,6 +1,8 @@
-//! `plan`: a plan for a person, from files as other programs write them.
+//! `plan`: a plan for a person, from files as other programs write them; and whether one
+//! holds.
 //!
-//! Arguments in, a request to [`skein_survey`], text out: the planning is there.
+//! Arguments in, a request to [`skein_survey`], text out: the planning is there. What is
+//! recounted is by [`skein_verify`], which shares nothing with it.
 
 mod area_input;
 mod args;
@@ -12,12 +14,16 @@ pub mod route;
 mod target_input;
 mod team_input;
 mod tour_args;
+pub mod verify;
 pub mod visit;
 mod zone_input;
 
+use crate::exit;
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand};
 use skein_interop::place::LatLon;
+use std::io;
+use std::process::ExitCode;
 
 /// Why a UAV stays that could take part.
 const NOT_NEEDED: &str = "is not needed, or has not the endurance";
@@ -43,21 +49,23 @@ pub enum Subject {
     Visit(visit::VisitArgs),
     /// Points, lines or an area seen again and again by a team.
     Patrol(patrol::PatrolArgs),
+    /// Whether plans hold, ours or another program's, by geometry that no planner uses.
+    Verify(verify::VerifyArgs),
 }
 
-/// Plans, and returns the text to print.
+/// Plans or recounts a plan, and prints it; a file that is missing or malformed is named.
 ///
 /// # Errors
-/// When a file is missing or malformed, or there is no such plan; the error names
-/// the place.
-pub fn run(args: &PlanArgs) -> Result<String> {
-    match &args.subject {
+/// When stdout cannot be written.
+pub fn run(args: &PlanArgs) -> io::Result<ExitCode> {
+    exit::answer(match &args.subject {
         Subject::Route(args) => route::run(args),
         Subject::Cover(args) => cover::run(args),
         Subject::Line(args) => line::run(args),
         Subject::Visit(args) => visit::run(args),
         Subject::Patrol(args) => patrol::run(args),
-    }
+        Subject::Verify(args) => return verify::run(args),
+    })
 }
 
 /// Reads `LAT,LON` in degrees.
