@@ -47,6 +47,9 @@ pub struct VerifyArgs {
     /// Speed over the ground, m/s; by default what the plan says.
     #[arg(long, value_name = "V", allow_hyphen_values = true)]
     pub speed_mps: Option<f64>,
+    /// Holes of the area may be flown over; without it they are kept out of.
+    #[arg(long)]
+    pub cross_holes: bool,
     /// The least share of the area to be seen, from 0 to 1.
     #[arg(long, value_name = "X", allow_hyphen_values = true)]
     pub min_share: Option<f64>,
@@ -113,6 +116,7 @@ fn told(args: &VerifyArgs) -> Result<(String, bool)> {
         swath_m: args.swath_m,
         look_ahead_m: args.look_ahead_m,
         speed_mps: args.speed_mps,
+        cross_holes: args.cross_holes,
         min_share: args.min_share,
         tolerance_m: args.tolerance_m,
     };

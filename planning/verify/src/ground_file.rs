@@ -8,10 +8,11 @@
 use crate::VerifyError;
 use crate::ground::{Ground, Named};
 use crate::outline::{Outline, Ring};
+use crate::plan_file::pair;
 use crate::plane::{Plane, Point, REACH_M};
 use serde_json::Value;
 use skein_interop::geojson::{self, Feature};
-use skein_interop::json::Document;
+use skein_interop::json::{Document, Error, Node};
 use skein_interop::place::{LatLon, Shape};
 use skein_interop::plan;
 
@@ -54,19 +55,26 @@ pub fn read(file: &str, text: &str, role: Role) -> Result<GroundFile, VerifyErro
         notices: Vec::new(),
     };
     if is_plan {
-        of_plan(&mut out, text, role)?;
+        of_plan(&mut out, &document.root(), text, role)?;
     } else {
         of_geojson(&mut out, text, role)?;
     }
     Ok(out)
 }
 
-fn of_plan(out: &mut GroundFile, text: &str, role: Role) -> Result<(), VerifyError> {
+fn of_plan(
+    out: &mut GroundFile,
+    root: &Node<'_>,
+    text: &str,
+    role: Role,
+) -> Result<(), VerifyError> {
     let file = plan::read(text).map_err(|e| e.in_file(&out.file))?;
-    let surveys = file.surveys.into_iter().map(Shape::Ring);
-    let surveys = surveys.filter(|_| role == Role::Area);
+    let surveys = match role {
+        Role::Area => surveys(root)?,
+        Role::Zones => Vec::new(),
+    };
     let each = [
-        (Kind::Area, "survey", surveys.collect::<Vec<_>>()),
+        (Kind::Area, "survey", surveys),
         (Kind::Zone, "exclusion fence", file.keep_out),
         (Kind::Fence, "inclusion fence", file.keep_in),
     ];
@@ -77,6 +85,24 @@ fn of_plan(out: &mut GroundFile, text: &str, role: Role) -> Result<(), VerifyErr
         }
     }
     Ok(())
+}
+
+/// The polygons of the surveys of a plan.
+fn surveys(root: &Node<'_>) -> Result<Vec<Shape>, Error> {
+    let mut out = Vec::new();
+    let items = match root.get("mission")? {
+        Some(mission) => mission.get("items")?,
+        None => None,
+    };
+    for item in items.map_or(Ok(Vec::new()), |i| i.items())? {
+        let kind = item.get("complexItemType")?;
+        if kind.is_some_and(|k| k.text().is_ok_and(|k| k == "survey")) {
+            let corners = item.need("polygon")?.items()?;
+            let corners = corners.iter().map(|c| pair(c, false));
+            out.push(Shape::Ring(corners.collect::<Result<_, _>>()?));
+        }
+    }
+    Ok(out)
 }
 
 fn of_geojson(out: &mut GroundFile, text: &str, role: Role) -> Result<(), VerifyError> {
@@ -122,8 +148,8 @@ fn is_no_fly(file: &str, f: &Feature) -> Result<bool, VerifyError> {
         Some(other) => other.to_string(),
     };
     match said.as_str() {
-        "true" | "yes" | "y" | "on" | "1" | "1.0" => Ok(true),
-        "false" | "no" | "n" | "off" | "0" | "0.0" | "" => Ok(false),
+        "true" | "t" | "yes" | "y" | "on" | "1" | "1.0" => Ok(true),
+        "false" | "f" | "no" | "n" | "off" | "0" | "0.0" | "" => Ok(false),
         _ => Err(VerifyError::Value {
             file: file.to_owned(),
             at: format!("{}/properties/no_fly", f.pointer),

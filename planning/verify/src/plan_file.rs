@@ -20,6 +20,9 @@ const NAV_LAST: u32 = 95;
 /// MAVLink: the command among those whose place is only looked at.
 const NAV_ROI: u32 = 80;
 
+/// MAVLink: take a picture after each so many metres, or none if that is 0.
+const DO_TRIGGER: u32 = 206;
+
 /// MAVLink: fly back to where it began.
 const NAV_RETURN: u32 = 20;
 
@@ -61,8 +64,14 @@ pub fn read(file: &str, text: &str, plane: Plane) -> Result<Plan, VerifyError> {
     for track in tracks(&root, file, &mut plan.notices)? {
         let corners = track.corners.iter().map(|c| c.in_plane(plane));
         let corners = corners.collect::<Result<Vec<_>, _>>()?;
-        let mut flight = Flight::straight(track.name, &corners);
+        let mut flight = Flight::straight(track.name, &[]);
         flight.speed_mps = track.speed_mps;
+        for (leg, from) in corners.windows(2).zip(&track.corners) {
+            if leg[0].distance(leg[1]) > 1e-6 {
+                let sees = from.camera || !track.triggered;
+                flight.pieces.push(Piece::between(leg[0], leg[1], sees));
+            }
+        }
         plan.flights.push(flight);
     }
     Ok(plan)
@@ -198,6 +207,8 @@ fn piece(at: &Node<'_>, plane: Plane) -> Result<Piece, Error> {
 struct Corner<'a> {
     node: Node<'a>,
     at: LatLon,
+    /// Whether pictures are taken from here on.
+    camera: bool,
 }
 
 impl<'a> Corner<'a> {
@@ -205,6 +216,7 @@ impl<'a> Corner<'a> {
         Self {
             node: node.clone(),
             at,
+            camera: false,
         }
     }
 
@@ -218,7 +230,17 @@ impl<'a> Corner<'a> {
 struct Track<'a> {
     name: String,
     corners: Vec<Corner<'a>>,
+    /// Whether pictures are taken where it says so, and not all the way.
+    triggered: bool,
     speed_mps: Option<f64>,
+}
+
+impl<'a> Track<'a> {
+    /// Goes on to a corner; the camera stays as it is.
+    fn add(&mut self, mut corner: Corner<'a>) {
+        corner.camera = self.corners.last().is_some_and(|c| c.camera);
+        self.corners.push(corner);
+    }
 }
 
 fn tracks<'a>(
@@ -255,13 +277,14 @@ fn of_plan<'a>(root: &Node<'a>, file: &str, notices: &mut Vec<String>) -> Result
     let mut track = Track {
         name: stem(file),
         corners: Vec::new(),
+        triggered: false,
         speed_mps: positive(&mission, "cruiseSpeed", "m/s")?,
     };
     if let Some(home) = mission.get("plannedHomePosition")? {
         let at = pair(&home, false)?;
         // A plan without a home says 0, 0.
         if at.lat_deg.abs() + at.lon_deg.abs() > 1e-12 {
-            track.corners.push(Corner::new(&home, at));
+            track.add(Corner::new(&home, at));
         }
     }
     let mut left = MOST_PIECES;
@@ -300,7 +323,7 @@ fn items_of_plan<'a>(
                     }
                     (_, Some(points)) => {
                         for p in points.items()? {
-                            track.corners.push(Corner::new(&p, pair(&p, false)?));
+                            track.add(Corner::new(&p, pair(&p, false)?));
                         }
                     }
                     _ => notices.push(format!(
@@ -323,12 +346,20 @@ fn simple_item<'a>(item: &Node<'a>, track: &mut Track<'a>) -> Result<(), Error> 
     if command == NAV_RETURN {
         if let Some(home) = track.corners.first() {
             let back = Corner::new(&home.node, home.at);
-            track.corners.push(back);
+            track.add(back);
         }
         return Ok(());
     }
     let params = item.need("params")?;
     let params = params.items()?;
+    if command == DO_TRIGGER {
+        track.triggered = true;
+        let on = params.first().and_then(Node::as_number);
+        if let (Some(last), Some(distance_m)) = (track.corners.last_mut(), on) {
+            last.camera = distance_m > 0.0;
+        }
+        return Ok(());
+    }
     let [_, _, _, _, lat, lon, ..] = params.as_slice() else {
         return Ok(());
     };
@@ -340,12 +371,12 @@ fn simple_item<'a>(item: &Node<'a>, track: &mut Track<'a>) -> Result<(), Error> 
         lat_deg: latitude(lat)?,
         lon_deg: longitude(lon)?,
     };
-    track.corners.push(Corner::new(item, at));
+    track.add(Corner::new(item, at));
     Ok(())
 }
 
 /// Two numbers: longitude first in GeoJSON, latitude first elsewhere.
-fn pair(at: &Node<'_>, lon_first: bool) -> Result<LatLon, Error> {
+pub(crate) fn pair(at: &Node<'_>, lon_first: bool) -> Result<LatLon, Error> {
     let items = at.items()?;
     let [a, b, ..] = items.as_slice() else {
         return Err(at.wrong("a position has two numbers"));
@@ -407,6 +438,7 @@ fn lines<'a>(
         out.push(Track {
             name: name.to_owned(),
             corners: items.iter().map(corner).collect::<Result<_, Error>>()?,
+            triggered: false,
             speed_mps: None,
         });
     }

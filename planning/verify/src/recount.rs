@@ -49,6 +49,8 @@ pub struct Settings {
     pub look_ahead_m: Option<f64>,
     /// Speed over the ground, m/s.
     pub speed_mps: Option<f64>,
+    /// Whether holes of the area may be flown over.
+    pub cross_holes: bool,
     /// The least share of the area to be seen.
     pub min_share: Option<f64>,
     /// How much nearer and tighter than asked for is no violation, metres.
@@ -64,6 +66,7 @@ impl Default for Settings {
             swath_m: None,
             look_ahead_m: None,
             speed_mps: None,
+            cross_holes: false,
             min_share: None,
             tolerance_m: 0.001,
         }
@@ -262,7 +265,7 @@ pub fn recount(plan: &Plan, ground: &Ground, settings: &Settings) -> Result<Repo
         settings,
         clearance_m,
         fence_clearance_m: settings.fence_clearance_m.unwrap_or(clearance_m),
-        obstacles: Obstacles::new(ground),
+        obstacles: Obstacles::new(ground, settings.cross_holes),
         fences: &ground.fences,
         unmeasured: false,
         report: Report {
@@ -284,8 +287,9 @@ pub fn recount(plan: &Plan, ground: &Ground, settings: &Settings) -> Result<Repo
         },
     };
     desk.report.fence_clearance_m = desk.fence_clearance_m;
+    let keeps = [&ground.zones, &ground.holes, &ground.fences];
     let told = settings.clearance_m.or(plan.clearance_m).is_some();
-    if !told && !(ground.zones.is_empty() && ground.holes.is_empty() && ground.fences.is_empty()) {
+    if !told && keeps.iter().any(|list| !list.is_empty()) {
         desk.say("no clearance is told: nobody may be inside of a zone, and may touch it");
     }
     for flight in &plan.flights {
@@ -308,9 +312,10 @@ struct Obstacles<'a> {
 }
 
 impl<'a> Obstacles<'a> {
-    fn new(ground: &'a Ground) -> Self {
+    fn new(ground: &'a Ground, cross_holes: bool) -> Self {
         let zones = ground.zones.iter().map(|z| (Rule::Zone, z));
-        let holes = ground.holes.iter().map(|h| (Rule::Hole, h));
+        let holes = ground.holes.iter().filter(|_| !cross_holes);
+        let holes = holes.map(|h| (Rule::Hole, h));
         let all: Vec<(Rule, &Named)> = zones.chain(holes).collect();
         let boxes: Vec<Bounds> = all.iter().map(|(_, n)| n.outline.bounds()).collect();
         Self {

@@ -272,6 +272,12 @@ fn holes_are_kept_out_of() {
         let hole = rectangle(-20.0, -high_m / 2.0, 40.0, high_m);
         let ground = polygon(&[rectangle(-150.0, -60.0, 300.0, 120.0), hole], json!({}));
         assert_eq!(broken(&plan_of(&racetrack()), &ground), rules, "{high_m}");
+        let settings = Settings {
+            cross_holes: true,
+            ..Settings::default()
+        };
+        let report = told(&plan_of(&racetrack()), &ground, &settings).unwrap();
+        assert!(report.holds(), "{}", report::text(&report));
     }
 }
 
@@ -425,11 +431,15 @@ fn plans_of_other_programs_are_straight_legs() {
         json!({"type": "SimpleItem", "command": command, "params": [0, 0, 0, null, lat, lon, 60]})
     };
     let (lat, lon) = pair(-200.0, -30.0);
+    // Pictures from the first corner of the survey to the last.
+    let trigger =
+        |m: f64| json!({"type": "SimpleItem", "command": 206, "params": [m, 0, 1, 0, 0, 0, 0]});
     let transects = [
+        trigger(20.0),
         item(16, 150.0, -30.0),
-        item(206, 0.0, 0.0),
         item(16, 150.0, 30.0),
         item(16, -150.0, 30.0),
+        trigger(0.0),
     ];
     let plan = json!({"fileType": "Plan", "mission": {
         "cruiseSpeed": 10, "plannedHomePosition": [lat, lon, 0],
@@ -455,6 +465,8 @@ fn plans_of_other_programs_are_straight_legs() {
     assert!((report.makespan_s.unwrap() - way_m / 10.0).abs() < 1e-3);
     assert!((report.flights[0].to_zone.unwrap() - 10.0).abs() < 1e-3);
     assert!((report.covered_share.unwrap() - 1.0).abs() < 1e-6);
+    let seeing_m = report.flights[0].seeing_m;
+    assert!((seeing_m - 660.0).abs() < 1e-3, "{seeing_m}");
     // Of legs it is told that their corners cannot be rounded, and no more.
     assert!(
         report
