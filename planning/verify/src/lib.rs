@@ -13,6 +13,7 @@
 //! | [`plan`], [`ground`] | the same in the plane |
 //! | [`recount`] | the rules, and what is recounted |
 //! | [`report`] | what is told, as text and as JSON |
+//! | [`generate`] | sites for tests of planners, by seed |
 //! | [`plane`], [`path`], [`outline`] | the geometry |
 //!
 //! Text in, values out: no file is opened here. What is read is not believed: numbers have
@@ -45,6 +46,7 @@
 //! ```
 
 mod boxes;
+pub mod generate;
 pub mod ground;
 pub mod ground_file;
 pub mod load;

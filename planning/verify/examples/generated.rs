@@ -1,0 +1,301 @@
+//! Plans generated sites and recounts each plan.
+//!
+//! `cargo run --release -p skein-verify --example generated -- 0..10000 [exact|approximate]`
+//! prints a line for each site whose plan breaks a rule or whose planning panics, and a
+//! summary; the exit code is 1 if there is one. `-- write 17 DIR` writes the files of a site,
+//! and prints how `skein plan cover` is asked for it.
+
+#![allow(clippy::print_stdout, reason = "an example prints")]
+
+use skein_geometry::frame::Point as Theirs;
+use skein_geometry::{NoFlyZones, Polygon};
+use skein_survey::area::{self, AreaPlan, AreaRequest, Planner, Planners};
+use skein_survey::flight::UavFlight;
+use skein_survey::team::{Sensor, Uav};
+use skein_verify::generate::{PLANE, Site};
+use skein_verify::path::Piece;
+use skein_verify::plan::{Flight, FlightClaims, Plan, PlanClaims};
+use skein_verify::plane::Point;
+use skein_verify::recount::{Report, Settings, recount};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind, set_hook};
+use std::process::ExitCode;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+/// Steps of improvement: plans are to be right, not good.
+const STEPS: usize = 200;
+
+/// Sites that are told one by one.
+const MOST_TOLD: usize = 40;
+
+fn polygon(ring: &[Point]) -> Result<Polygon, String> {
+    let points = ring.iter().map(|p| Theirs::new(p.x, p.y)).collect();
+    Polygon::new(points).map_err(|error| format!("Polygon {error:?}"))
+}
+
+fn request(site: &Site, planners: Planners) -> Result<AreaRequest, String> {
+    let manner = &site.manner;
+    let camera = Sensor::Swath {
+        width_m: manner.swath_m,
+    };
+    let start = Theirs::new(site.launch.x, site.launch.y);
+    let uav = |i| {
+        let name = format!("uav-{}", i + 1);
+        Uav::new(name, start, manner.speed_mps, manner.turn_radius_m, camera)
+    };
+    let team = (0..manner.n_uavs).map(uav).collect();
+    let rings = |rings: &[Vec<Point>]| {
+        rings
+            .iter()
+            .map(|r| polygon(r))
+            .collect::<Result<Vec<_>, _>>()
+    };
+    // Holes are kept out of, as the command asks for them.
+    let mut zones = rings(&site.zones)?;
+    zones.extend(rings(&site.holes)?);
+    Ok(AreaRequest {
+        zones: Arc::new(NoFlyZones::new(zones)),
+        fences: rings(&site.fences)?,
+        look_ahead_m: manner.look_ahead_m,
+        planners,
+        steps: STEPS,
+        ..AreaRequest::new(polygon(&site.area)?, team, manner.clearance_m, 60.0)
+    })
+}
+
+fn flight(site: &Site, own: &UavFlight) -> Flight {
+    let point = |p: &Theirs| Point::new(p.x, p.y);
+    let mut pieces = Vec::new();
+    for leg in &own.legs {
+        pieces.extend(leg.curve.segments().iter().map(|s| Piece {
+            start: Point::new(s.start.east_m, s.start.north_m),
+            heading_rad: s.start.heading_rad,
+            length_m: s.length_m,
+            radius_m: (s.curvature_per_m.abs() > 0.0).then(|| -1.0 / s.curvature_per_m),
+            sees: leg.sees,
+        }));
+    }
+    Flight {
+        speed_mps: Some(own.speed_mps),
+        turn_radius_m: Some(site.manner.turn_radius_m),
+        swath_m: Some(site.manner.swath_m),
+        look_ahead_m: site.manner.look_ahead_m,
+        claims: FlightClaims {
+            length_m: Some(own.length_m),
+            time_s: Some(own.time_s),
+            lane_m: own.lane_m,
+            from: own.path.first().map(point),
+            to: own.path.last().map(point),
+        },
+        ..Flight::new(own.name.clone(), pieces)
+    }
+}
+
+fn report(site: &Site, own: &AreaPlan) -> Result<Report, String> {
+    let plan = Plan {
+        flights: own.uavs.iter().map(|f| flight(site, f)).collect(),
+        clearance_m: Some(site.manner.clearance_m),
+        claims: PlanClaims {
+            makespan_s: Some(own.figures.makespan_s),
+            total_m: Some(own.figures.total_m),
+            covered_share: Some(own.figures.covered_share),
+        },
+        ..Plan::new(PLANE)
+    };
+    let ground = site.ground().map_err(|e| e.to_string())?;
+    recount(&plan, &ground, &Settings::default()).map_err(|e| e.to_string())
+}
+
+/// What came of a site.
+enum Outcome {
+    Refused(String),
+    NoTrajectory,
+    Recounted(Report),
+}
+
+fn outcome(site: &Site, planners: Planners) -> Outcome {
+    let planned =
+        request(site, planners).and_then(|r| area::plan(&r).map_err(|error| format!("{error:?}")));
+    let plan = match planned {
+        Ok(plan) => plan,
+        Err(why) => return Outcome::Refused(kind(&why)),
+    };
+    if plan.uavs.iter().any(|f| f.flies() && f.legs.is_empty()) {
+        return Outcome::NoTrajectory;
+    }
+    match report(site, &plan) {
+        Ok(report) => Outcome::Recounted(report),
+        Err(why) => Outcome::Refused(why),
+    }
+}
+
+/// An error without its numbers and names.
+fn kind(why: &str) -> String {
+    let end = why.find(|c: char| c == '{' || c == '"' || c.is_ascii_digit());
+    why[..end.unwrap_or(why.len())]
+        .trim_end_matches([' ', '(', '-'])
+        .to_owned()
+}
+
+#[derive(Default)]
+struct Tally {
+    planned: usize,
+    no_trajectory: usize,
+    refused: BTreeMap<String, (usize, u64)>,
+    broken: BTreeMap<&'static str, (usize, u64)>,
+    wrong: usize,
+    panics: Vec<u64>,
+    least_share: Option<(f64, u64)>,
+    slowest: Option<(Duration, u64)>,
+}
+
+impl Tally {
+    fn add(&mut self, seed: u64, site: &Site, outcome: Outcome) {
+        match outcome {
+            Outcome::Refused(why) => self.refused.entry(why).or_insert((0, seed)).0 += 1,
+            Outcome::NoTrajectory => {
+                self.planned += 1;
+                self.no_trajectory += 1;
+            }
+            Outcome::Recounted(report) => {
+                self.planned += 1;
+                if let Some(share) = report.covered_share
+                    && self.least_share.is_none_or(|(least, _)| share < least)
+                {
+                    self.least_share = Some((share, seed));
+                }
+                if report.holds() {
+                    return;
+                }
+                self.wrong += 1;
+                let mut rules: Vec<&str> =
+                    report.violations.iter().map(|v| v.rule.name()).collect();
+                rules.sort_unstable();
+                rules.dedup();
+                for rule in &rules {
+                    self.broken.entry(rule).or_insert((0, seed)).0 += 1;
+                }
+                if self.wrong <= MOST_TOLD {
+                    println!("seed {seed} ({})", site.kind);
+                    for v in report.violations.iter().take(3) {
+                        let who = v.flight.as_deref().unwrap_or("all");
+                        println!("  {}: {who}: {}", v.rule.name(), v.text);
+                    }
+                }
+            }
+        }
+    }
+
+    fn print(&self, seeds: &Range<u64>, took: Duration) {
+        let refused: usize = self.refused.values().map(|(n, _)| n).sum();
+        for (why, (n, seed)) in &self.refused {
+            println!("refused {n:>6}  {why} (first {seed})");
+        }
+        for (rule, (n, seed)) in &self.broken {
+            println!("broken  {n:>6}  {rule} (first {seed})");
+        }
+        let share = self.least_share.map_or("none".to_owned(), |(share, seed)| {
+            format!("{:.2} % (seed {seed})", 100.0 * share)
+        });
+        let slowest = self.slowest.map_or("none".to_owned(), |(time, seed)| {
+            format!("{:.1} s (seed {seed})", time.as_secs_f64())
+        });
+        println!(
+            "seeds {}..{}: {} planned ({} without a trajectory), {refused} refused, {} with a violation, {} panics; least share {share}; {:.1} s, slowest {slowest}",
+            seeds.start,
+            seeds.end,
+            self.planned,
+            self.no_trajectory,
+            self.wrong,
+            self.panics.len(),
+            took.as_secs_f64()
+        );
+    }
+}
+
+fn run(seeds: &Range<u64>, planners: Planners) -> bool {
+    let said: Arc<Mutex<String>> = Arc::default();
+    let heard = said.clone();
+    set_hook(Box::new(move |info| {
+        if let Ok(mut said) = heard.lock() {
+            *said = info.to_string();
+        }
+    }));
+    let began = Instant::now();
+    let mut tally = Tally::default();
+    for seed in seeds.clone() {
+        let site = Site::of(seed);
+        let at = Instant::now();
+        match catch_unwind(AssertUnwindSafe(|| outcome(&site, planners))) {
+            Ok(outcome) => tally.add(seed, &site, outcome),
+            Err(_) => {
+                tally.panics.push(seed);
+                let said = said.lock().map(|s| s.clone()).unwrap_or_default();
+                println!("seed {seed} ({}) panics: {said}", site.kind);
+            }
+        }
+        let took = at.elapsed();
+        if tally.slowest.is_none_or(|(slowest, _)| took > slowest) {
+            tally.slowest = Some((took, seed));
+        }
+    }
+    tally.print(seeds, began.elapsed());
+    tally.wrong == 0 && tally.panics.is_empty()
+}
+
+fn write(seed: u64, dir: &str) -> std::io::Result<()> {
+    let site = Site::of(seed);
+    std::fs::create_dir_all(dir)?;
+    for (name, text) in [("geojson", site.geojson()), ("plan", site.plan())] {
+        std::fs::write(format!("{dir}/{seed}.{name}"), format!("{text}\n"))?;
+    }
+    let m = &site.manner;
+    let at = PLANE.place(site.launch);
+    let ahead = m
+        .look_ahead_m
+        .map_or(String::new(), |a| format!(" --look-ahead-m {a}"));
+    println!("# {}", site.kind);
+    println!(
+        "skein plan cover {dir}/{seed}.plan --k {} --launch {},{} --swath-m {} --turn-radius-m {} --clearance-m {} --speed-mps {}{ahead}",
+        m.n_uavs, at.lat_deg, at.lon_deg, m.swath_m, m.turn_radius_m, m.clearance_m, m.speed_mps
+    );
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    if let ["write", seed, dir] = args.as_slice()
+        && let Ok(seed) = seed.parse()
+    {
+        return match write(seed, dir) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("{dir}: {error}");
+                ExitCode::from(2)
+            }
+        };
+    }
+    let range = |text: &str| {
+        let (from, to) = text.split_once("..")?;
+        Some(from.parse().ok()?..to.parse().ok()?)
+    };
+    let asked = args.first().and_then(|text| range(text));
+    let planners = match args.get(1) {
+        None => Some(Planners::Both),
+        Some(&"exact") => Some(Planners::Only(Planner::Exact)),
+        Some(&"approximate") => Some(Planners::Only(Planner::Approximate)),
+        Some(_) => None,
+    };
+    let (Some(seeds), Some(planners)) = (asked, planners) else {
+        eprintln!("usage: generated FROM..TO [exact|approximate], or generated write SEED DIR");
+        return ExitCode::from(2);
+    };
+    if run(&seeds, planners) {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}
