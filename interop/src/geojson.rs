@@ -22,6 +22,54 @@ pub struct Feature {
     pub properties: Map<String, Value>,
 }
 
+/// A property that is neither true nor false. The polygon means nothing then.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "at {pointer}/properties/no_fly: {found} is neither true nor false; expected true, \"yes\" or 1 for a zone, false, \"no\", 0 or nothing for none"
+)]
+pub struct NoTruth {
+    /// JSON pointer of the feature.
+    pub pointer: String,
+    /// What stands there.
+    pub found: Value,
+}
+
+impl Feature {
+    /// Whether its property `no_fly` says that it is a zone, in the words of any GIS: these
+    /// export truth values as numbers and texts too.
+    ///
+    /// # Errors
+    /// [`NoTruth`] when the property is neither true nor false.
+    pub fn is_no_fly(&self) -> Result<bool, NoTruth> {
+        let Some(found) = self.properties.get("no_fly") else {
+            return Ok(false);
+        };
+        truth(found).ok_or_else(|| NoTruth {
+            pointer: self.pointer.clone(),
+            found: found.clone(),
+        })
+    }
+}
+
+/// What a property says, if it is true or false.
+fn truth(value: &Value) -> Option<bool> {
+    match value {
+        Value::Null => Some(false),
+        Value::Bool(flag) => Some(*flag),
+        Value::Number(n) => {
+            let n = n.as_f64()?;
+            let is = |whole: f64| (n - whole).abs() < f64::EPSILON;
+            (is(0.0) || is(1.0)).then_some(is(1.0))
+        }
+        Value::String(text) => match text.trim().to_lowercase().as_str() {
+            "true" | "t" | "yes" | "y" | "1" => Some(true),
+            "false" | "f" | "no" | "n" | "0" | "" => Some(false),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
 /// What a file holds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Features {
@@ -315,6 +363,50 @@ mod tests {
         assert_eq!(read.notices.len(), 4, "{:?}", read.notices);
         assert_eq!(read.buildings.len(), 1);
         assert!((read.buildings[0].height_m - 6.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn zones_are_told_in_the_words_of_any_gis() {
+        let says = |value: &str| {
+            let text = format!(
+                r#"{{"type":"Feature","properties":{{"no_fly":{value}}},"geometry":{{"type":"Polygon","coordinates":[[[0,0],[0,1],[1,1],[0,0]]]}}}}"#
+            );
+            read(&text).unwrap().polygons[0].is_no_fly()
+        };
+        for yes in [
+            "true",
+            "1",
+            "1.0",
+            "\"true\"",
+            "\"True\"",
+            "\"TRUE\"",
+            "\"yes\"",
+            "\"Y\"",
+            "\"t\"",
+            "\"1\"",
+            "\" true \"",
+        ] {
+            assert_eq!(says(yes), Ok(true), "{yes}");
+        }
+        for no in [
+            "false",
+            "0",
+            "null",
+            "\"false\"",
+            "\"False\"",
+            "\"no\"",
+            "\"N\"",
+            "\"f\"",
+            "\"0\"",
+            "\"\"",
+        ] {
+            assert_eq!(says(no), Ok(false), "{no}");
+        }
+        for other in ["2", "-1", "0.5", "\"maybe\"", "[]", "{}"] {
+            let error = says(other).unwrap_err().to_string();
+            assert!(error.starts_with("at //properties/no_fly: "), "{error}");
+            assert!(error.contains("neither true nor false"), "{error}");
+        }
     }
 
     #[test]

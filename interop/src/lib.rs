@@ -10,7 +10,8 @@
 //! |---|---|
 //! | [`json`] | a parsed text whose values know their places |
 //! | [`place`] | latitude and longitude, rings, circles, the way to a mission's plane |
-//! | [`plan`] | QGroundControl `.plan`: geofence, survey, waypoints |
+//! | [`plan`] | QGroundControl `.plan`, read: geofence, surveys, waypoints |
+//! | [`mission`] | QGroundControl `.plan`, written: what one UAV uploads |
 //! | [`geojson`] | areas, and buildings with heights |
 //! | [`targets`] | points and lines to look at, of both formats |
 //! | [`airframe`] | airframes of scenarios and of peers, with their limits |
@@ -31,6 +32,7 @@ pub mod fleet;
 pub mod geojson;
 pub mod height;
 pub mod json;
+pub mod mission;
 pub mod place;
 pub mod plan;
 pub mod targets;

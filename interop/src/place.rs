@@ -3,6 +3,7 @@
 
 use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
 use skein_geometry::math::{TAU, cos, sin_cos};
+use skein_geometry::polygon::side;
 use thiserror::Error;
 
 /// A point on the WGS84 ellipsoid.
@@ -138,6 +139,70 @@ pub fn orient(mut ring: Vec<LatLon>) -> Vec<LatLon> {
     ring
 }
 
+/// Where two edges of a ring cross.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[error(
+    "the ring crosses itself near {:.7}, {:.7}: its edge from {:.7}, {:.7} to {:.7}, {:.7} and that from {:.7}, {:.7} to {:.7}, {:.7}; draw it so that edges meet at corners only, or as two polygons",
+    .at.lat_deg, .at.lon_deg,
+    .first[0].lat_deg, .first[0].lon_deg, .first[1].lat_deg, .first[1].lon_deg,
+    .second[0].lat_deg, .second[0].lon_deg, .second[1].lat_deg, .second[1].lon_deg
+)]
+pub struct Crossing {
+    /// Where.
+    pub at: LatLon,
+    /// Both ends of one edge.
+    pub first: [LatLon; 2],
+    /// Both ends of the other.
+    pub second: [LatLon; 2],
+}
+
+/// Refuses a ring of which two edges cross, each on both sides of the other; what merely
+/// touches itself passes.
+///
+/// # Complexity
+/// O(n²) in the number of corners, with a box test a pair.
+///
+/// # Errors
+/// [`Crossing`] names the first two such edges.
+pub fn check_ring(ring: &[LatLon]) -> Result<(), Crossing> {
+    let n = ring.len();
+    let edge = |i: usize| [ring[i], ring[(i + 1) % n]];
+    for i in 0..n {
+        for j in i + 2..n {
+            if let Some(at) = crossing(edge(i), edge(j)) {
+                return Err(Crossing {
+                    at,
+                    first: edge(i),
+                    second: edge(j),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Where two edges cross, if each lies on both sides of the other.
+fn crossing(first: [LatLon; 2], second: [LatLon; 2]) -> Option<LatLon> {
+    let point = |p: LatLon| Point::new(p.lon_deg, p.lat_deg);
+    let ([a, b], [c, d]) = (first.map(point), second.map(point));
+    // Most edges lie apart, and this is told without a product.
+    let beside = |a: f64, b: f64, c: f64, d: f64| a.max(b) < c.min(d) || c.max(d) < a.min(b);
+    if beside(a.x, b.x, c.x, d.x) || beside(a.y, b.y, c.y, d.y) {
+        return None;
+    }
+    let apart = |s: i8, t: i8| s * t < 0;
+    if !apart(side(a, b, c), side(a, b, d)) || !apart(side(c, d, a), side(c, d, b)) {
+        return None;
+    }
+    let (u, v) = (b - a, d - c);
+    let share = (c - a).perp(&v) / u.perp(&v);
+    let at = a + u * share;
+    Some(LatLon {
+        lat_deg: at.y,
+        lon_deg: at.x,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -155,6 +220,34 @@ mod tests {
         assert_eq!(ring.len(), 3);
         assert!(winding(&ring) > 0.0);
         assert_eq!(orient(ring.clone()), ring);
+    }
+
+    #[test]
+    fn rings_that_cross_themselves_are_refused_where_they_do() {
+        let ring = |corners: &[(f64, f64)]| -> Vec<LatLon> {
+            let corner = |&(lat_deg, lon_deg): &(f64, f64)| LatLon { lat_deg, lon_deg };
+            corners.iter().map(corner).collect()
+        };
+        let bow_tie = ring(&[(47.0, 8.0), (47.0, 8.2), (47.2, 8.0), (47.2, 8.2)]);
+        let crossing = check_ring(&bow_tie).unwrap_err();
+        assert!((crossing.at.lat_deg - 47.1).abs() < 1e-9, "{crossing}");
+        assert!((crossing.at.lon_deg - 8.1).abs() < 1e-9, "{crossing}");
+        assert!(
+            crossing
+                .to_string()
+                .contains("near 47.1000000, 8.1000000: its edge from 47.0")
+        );
+        assert_eq!(crossing.first, [bow_tie[1], bow_tie[2]]);
+        assert_eq!(crossing.second, [bow_tie[3], bow_tie[0]]);
+        // Edges that share a corner, and a corner on an edge, cross nothing.
+        for corners in [
+            &[(0.0, 0.0), (0.0, 1.0), (1.0, 1.0)][..],
+            &[(0.0, 0.0), (0.0, 2.0), (1.0, 1.0), (0.0, 1.0), (1.0, 0.0)],
+            &[(0.0, 0.0), (0.0, 1.0)],
+            &[],
+        ] {
+            assert_eq!(check_ring(&ring(corners)), Ok(()), "{corners:?}");
+        }
     }
 
     #[test]

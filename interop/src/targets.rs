@@ -108,6 +108,7 @@ fn of_plan(root: &Node<'_>) -> Result<Targets, Error> {
         if kind.text()? != "CorridorScan" {
             continue;
         }
+        plan::version(&item, plan::CORRIDOR, "a corridor scan")?;
         let width = item.need("CorridorWidth")?;
         let line = item.need("polyline")?;
         let points = line.items()?;
@@ -267,6 +268,10 @@ mod tests {
         assert!((t.lines[0].width_m - 80.0).abs() < 1e-9);
         assert_eq!(t.lines[0].way.len(), 3);
         assert!(t.home.is_some());
+        let scan = "\"CorridorScan\",";
+        let newer = text.replace(scan, &format!("{scan}\"version\":3,"));
+        let error = read(&newer).unwrap_err().to_string();
+        assert!(error.contains("items[2].version: 3 is no known version of a corridor scan"));
         let wrong = text.replace("80", "\"x\"");
         assert!(
             read(&wrong)

@@ -3,6 +3,8 @@
 
 use anyhow::{Error, Result, anyhow, ensure};
 use clap::{Args, ValueEnum};
+use skein_interop::airframe::{ENDURANCE_S, SPEED_MPS};
+use skein_interop::fleet::TURN_RADIUS_M;
 use skein_survey::area::{self, AreaError};
 use skein_survey::detours::DetourError;
 use skein_survey::heights::{LAYER_STEP_M, NoSeparation, Separation};
@@ -30,6 +32,18 @@ pub struct LayerArgs {
 }
 
 impl LayerArgs {
+    /// Refuses distances without a meaning, before anything is planned.
+    ///
+    /// # Errors
+    /// Names the flag.
+    pub fn check(&self) -> Result<()> {
+        if let Some(separation_m) = self.separation_m {
+            within("--separation-m", separation_m, DISTANCE_M, "m")?;
+        }
+        within("--layer-step-m", self.layer_step_m, DISTANCE_M, "m")?;
+        Ok(())
+    }
+
     /// The same for the planner.
     #[must_use]
     pub fn separation(&self) -> Separation {
@@ -107,20 +121,53 @@ pub fn planners(exact: bool, approximate: bool) -> area::Planners {
     }
 }
 
-/// Refuses figures that nothing flies by.
+/// Lengths that are accepted where 0 has no meaning, metres: up to the radius of a mission.
+pub const LENGTH_M: (f64, f64) = (0.1, 20_000.0);
+
+/// Distances that are accepted, metres.
+pub const DISTANCE_M: (f64, f64) = (0.0, 20_000.0);
+
+/// The number of a flag, if it lies in a closed range.
+///
+/// # Errors
+/// Names the flag, the range and the number; what is no number lies in no range.
+pub fn within(flag: &str, value: f64, (low, high): (f64, f64), unit: &str) -> Result<f64> {
+    ensure!(
+        (low..=high).contains(&value),
+        "{flag} must be between {low} and {high} {unit}, found {value}"
+    );
+    Ok(value)
+}
+
+/// A course of a flag, degrees: from 0 up to 360, or negative down to a half turn.
 ///
 /// # Errors
 /// Names the flag.
-pub fn positive(speed_mps: f64, turn_radius_m: f64, swath_m: f64) -> Result<()> {
-    for (flag, value) in [
-        ("--speed-mps: the speed", speed_mps),
-        ("--turn-radius-m: the turn radius", turn_radius_m),
-        ("--swath-m: the swath", swath_m),
-    ] {
-        ensure!(
-            value.is_finite() && value > 0.0,
-            "{flag} must be above 0, found {value}"
-        );
+pub fn course(flag: &str, deg: f64) -> Result<f64> {
+    ensure!(
+        (-180.0..360.0).contains(&deg),
+        "{flag} must be from -180 up to 360 degrees, found {deg}"
+    );
+    Ok(deg)
+}
+
+/// Refuses figures of flags that nothing flies by; the turn radius where there is a flag.
+///
+/// # Errors
+/// Names the flag.
+pub fn flyable(
+    speed_mps: f64,
+    turn_radius_m: Option<f64>,
+    clearance_m: f64,
+    endurance_s: Option<f64>,
+) -> Result<()> {
+    within("--speed-mps", speed_mps, SPEED_MPS, "m/s")?;
+    if let Some(radius_m) = turn_radius_m {
+        within("--turn-radius-m", radius_m, TURN_RADIUS_M, "m")?;
+    }
+    within("--clearance-m", clearance_m, DISTANCE_M, "m")?;
+    if let Some(endurance_s) = endurance_s {
+        within("--endurance-s", endurance_s, ENDURANCE_S, "s")?;
     }
     Ok(())
 }

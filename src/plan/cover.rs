@@ -1,14 +1,18 @@
 //! `plan cover`: an area covered by a team (D2.7 §3.6). Planned by
 //! [`skein_survey::area`].
 
-use super::area_input::{self, AreaInput};
-use super::args::{Lanes, LayerArgs, Objective, area_error, planners, positive};
+use super::area_input::{self, AreaInput, Asked};
+use super::args::{Lanes, LayerArgs, Objective, area_error, flyable, planners};
 use super::output::{OutputArgs, Printed, Sheet};
-use super::{NOT_NEEDED, team_input};
+use super::size::Work;
+use super::view::{Flags, View};
+use super::{team_input, why_home};
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::{Map, Value, json};
-use skein_survey::area::{self, AreaPlan, AreaRequest, Facts, Figures, Laid, Planner, ShapeKind};
+use skein_survey::area::{
+    self, AreaPlan, AreaRequest, Facts, Figures, Laid, Planner, Planners, ShapeKind,
+};
 use skein_survey::flight::Stays;
 use std::path::PathBuf;
 
@@ -18,10 +22,11 @@ use std::path::PathBuf;
 /// Without `--exact` or `--approximate` both planners are asked, both are told, and the
 /// flights are those of the one that sees more, or as much sooner.
 ///
-/// The survey of a QGroundControl `.plan` with its exclusion fences, or a GeoJSON polygon
-/// with its holes, and zones with the property "no_fly": true. The property "sensor" of
-/// the polygon names the sensor to see it with. Times are without wind. Flights that come
-/// near to each other get heights of their own.
+/// The survey of a QGroundControl `.plan` with its fences, or a GeoJSON polygon with its
+/// holes, and zones with the property "no_fly": true. What the survey says of course,
+/// height, lanes and pictures is done unless a flag says otherwise. The property "sensor"
+/// of the polygon names the sensor to see it with. Times are without wind. Flights that
+/// come near to each other get heights of their own.
 #[derive(Debug, Args)]
 pub struct CoverArgs {
     /// A QGroundControl `.plan` or GeoJSON.
@@ -49,14 +54,29 @@ pub struct CoverArgs {
         allow_hyphen_values = true
     )]
     pub launch: Option<String>,
-    /// Width of the ground that a pass sees, metres.
-    #[arg(long, default_value_t = 60.0, value_name = "M")]
-    pub swath_m: f64,
-    /// How far the camera sees before and behind, metres; half the swath by default.
-    #[arg(long, value_name = "M")]
+    /// A file of more zones and fences: those of a `.plan`, or all polygons of GeoJSON as
+    /// zones.
+    #[arg(long, value_name = "FILE")]
+    pub zones: Option<PathBuf>,
+    /// Holes of the area need not be seen and may be flown over; without it they are
+    /// no-fly zones.
+    #[arg(long)]
+    pub cross_holes: bool,
+    /// Width of the ground that a pass sees, metres; by default the distance between lanes
+    /// of the file's survey, else 60.
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub swath_m: Option<f64>,
+    /// How far the camera sees before and behind, metres; by default half of what lies
+    /// between two pictures of the file's survey, else half the swath.
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub look_ahead_m: Option<f64>,
     /// Turn radius, metres.
-    #[arg(long, default_value_t = 30.0, value_name = "M")]
+    #[arg(
+        long,
+        default_value_t = 30.0,
+        value_name = "M",
+        allow_hyphen_values = true
+    )]
     pub turn_radius_m: f64,
     /// Distance kept from every zone, metres.
     #[arg(
@@ -67,13 +87,20 @@ pub struct CoverArgs {
     )]
     pub clearance_m: f64,
     /// Speed, m/s: there is no wind, so over the ground as through the air.
-    #[arg(long, default_value_t = 15.0, value_name = "V")]
+    #[arg(
+        long,
+        default_value_t = 15.0,
+        value_name = "V",
+        allow_hyphen_values = true
+    )]
     pub speed_mps: f64,
     /// The longest time that a UAV flies, seconds; passes beyond that are left out and
     /// listed.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub endurance_s: Option<f64>,
-    /// Course of all lanes, degrees clockwise from north; by default the shortest found.
+    /// Course of all lanes, degrees clockwise from north, from -180 up to 360; by default
+    /// that of the file's survey, else the shortest found. Lanes of a course are straight
+    /// passes: without `--approximate` only these are planned then.
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     pub course_deg: Option<f64>,
     /// The sensor to see the area with: UAVs without it stay, and its swath counts.
@@ -102,33 +129,95 @@ pub struct CoverArgs {
 /// When the file or a flag is wrong; the error names the place.
 pub fn run(args: &CoverArgs) -> Result<String> {
     let fleet = args.fleet.as_deref();
+    args.layers.check()?;
+    flyable(
+        args.speed_mps,
+        Some(args.turn_radius_m),
+        args.clearance_m,
+        args.endurance_s,
+    )?;
+    View::of(flags(args), None)?;
     let team = team_input::team(fleet, args.k, args.speed_mps, args.endurance_s)?;
     args.output.check(team.len())?;
-    positive(args.speed_mps, args.turn_radius_m, args.swath_m)?;
-    let input = area_input::read(&args.file, args.launch.as_deref())?;
+    let asked = Asked {
+        launch: args.launch.as_deref(),
+        cross_holes: args.cross_holes,
+        zones: args.zones.as_deref(),
+    };
+    let mut input = area_input::read(&args.file, asked)?;
+    let view = View::of(flags(args), input.survey.as_ref())?;
+    args.output.check_altitude(view.altitude_m)?;
     let defaults = team_input::Defaults {
-        swath_m: args.swath_m,
+        camera: view.camera,
         turn_radius_m: args.turn_radius_m,
     };
+    let team = team_input::in_plane(&team, input.origin, defaults)?;
+    input.check_starts(&team)?;
+    input.site.trigger_m = view.trigger_m.or(view.look_ahead_m.filter(|m| *m > 0.0));
+    input.notices.extend(view.notices.iter().cloned());
+    let sensor = sensor(args, &input)?;
+    let work = Work {
+        area: &input.area,
+        team: &team,
+        sensor: sensor.as_deref(),
+        lanes: args.lanes.asked(),
+        altitude_m: view.altitude_m,
+    };
+    let (planners, told) = work.planners(asked_planners(args, &view))?;
+    input.notices.extend(told);
     let request = AreaRequest {
         area: input.area.clone(),
         holes: input.holes.clone(),
-        zones: input.zones.clone(),
-        fences: Vec::new(),
-        team: team_input::in_plane(&team, input.origin, defaults)?,
-        sensor: sensor(args, &input)?,
+        zones: input.no_fly(),
+        fences: input.stay_within(),
+        team,
+        sensor,
         clearance_m: args.clearance_m,
-        look_ahead_m: args.look_ahead_m,
-        heading_rad: args.course_deg.map(|course| (90.0 - course).to_radians()),
-        planners: planners(args.exact, args.approximate),
+        look_ahead_m: view.look_ahead_m,
+        heading_rad: view.course_deg.map(|course| (90.0 - course).to_radians()),
+        planners,
         lanes: args.lanes.asked(),
         objective: args.objective.asked(),
         separation: args.layers.separation(),
-        altitude_m: args.output.altitude_m,
+        altitude_m: view.altitude_m,
         steps: args.steps,
     };
     let plan = area::plan(&request).map_err(|error| area_error(error, &args.file))?;
     args.output.print(&sheet(args, &input, &request, &plan))
+}
+
+/// The planners that are asked: only passes have a course.
+fn asked_planners(args: &CoverArgs, view: &View) -> Planners {
+    let exact = args.exact || (view.course_deg.is_some() && !args.approximate);
+    planners(exact, args.approximate)
+}
+
+/// What flags say of how the area is seen.
+fn flags(args: &CoverArgs) -> Flags {
+    Flags {
+        altitude_m: args.output.altitude_m,
+        swath_m: args.swath_m,
+        look_ahead_m: args.look_ahead_m,
+        course_deg: args.course_deg,
+        trigger_m: args.output.upload.trigger_m,
+    }
+}
+
+/// Why a UAV stays at home.
+fn why(uav: usize, stays: Stays, request: &AreaRequest, plan: &AreaPlan) -> String {
+    if let (Stays::NoSensor, Some(sensor)) = (stays, &request.sensor) {
+        return format!("has no sensor {sensor:?}");
+    }
+    let left = match plan.facts {
+        Some(Facts::Passes {
+            unserved_passes, ..
+        }) => unserved_passes > 0,
+        Some(Facts::Cells { cells_left, .. }) => cells_left > 0,
+        None => false,
+    };
+    let uav = &request.team[uav];
+    let way_s = 2.0 * request.area.distance_m(uav.start) / uav.speed_mps;
+    why_home(uav.endurance_s, way_s, left)
 }
 
 /// The sensor that is asked for by the file or the flag.
@@ -142,11 +231,8 @@ fn sensor(args: &CoverArgs, input: &AreaInput) -> Result<Option<String>> {
 }
 
 fn sheet(args: &CoverArgs, input: &AreaInput, request: &AreaRequest, plan: &AreaPlan) -> Sheet {
-    let at_home = plan.uavs.iter().filter_map(|uav| {
-        let why = match (uav.stays?, &request.sensor) {
-            (Stays::NoSensor, Some(sensor)) => format!("has no sensor {sensor:?}"),
-            _ => NOT_NEEDED.to_owned(),
-        };
+    let at_home = plan.uavs.iter().enumerate().filter_map(|(i, uav)| {
+        let why = why(i, uav.stays?, request, plan);
         Some(json!({"name": uav.name, "why": why}))
     });
     let mut summary = figures(&plan.figures);
@@ -174,6 +260,7 @@ fn sheet(args: &CoverArgs, input: &AreaInput, request: &AreaRequest, plan: &Area
     });
     Sheet {
         origin: input.origin,
+        site: input.site.clone(),
         flights: plan.uavs.iter().map(Printed::new).collect(),
         summary,
         shapes: shapes.collect(),

@@ -89,7 +89,7 @@ mod tests {
             (&["--k", "2", "--format", "plan"], "--out DIR"),
             (&["--out", "plans"], "add --format plan"),
             (&["--depot", "x"], "--depot"),
-            (&["--swath-m", "0"], "/features/"),
+            (&["--swath-m", "0"], "--swath-m must be"),
         ] {
             let error = format!("{:#}", run(&args(&dir, CROSS, more)).unwrap_err());
             assert!(error.contains(says), "{error}");

@@ -11,10 +11,14 @@ pub mod line;
 mod output;
 pub mod patrol;
 pub mod route;
+mod site;
+mod size;
 mod target_input;
 mod team_input;
 mod tour_args;
+mod upload;
 pub mod verify;
+mod view;
 pub mod visit;
 mod zone_input;
 
@@ -25,8 +29,19 @@ use skein_interop::place::LatLon;
 use std::io;
 use std::process::ExitCode;
 
-/// Why a UAV stays that could take part.
-const NOT_NEEDED: &str = "is not needed, or has not the endurance";
+/// Why a UAV stays that could take part: because of its endurance, if it has one that does
+/// not reach as far as `way_s`, there and back, says, or if something is left that nobody flies.
+fn why_home(endurance_s: Option<f64>, way_s: f64, left: bool) -> String {
+    match endurance_s {
+        Some(endurance_s) if way_s > endurance_s => format!(
+            "has not the endurance: the way there and back takes {way_s:.0} s, and it has {endurance_s:.0} s"
+        ),
+        Some(endurance_s) if left => format!(
+            "has not the endurance: {endurance_s:.0} s are too few for anything that is left"
+        ),
+        _ => "is not needed: the others are done as soon without it".to_owned(),
+    }
+}
 
 /// What to plan.
 #[derive(Debug, Args)]

@@ -3,14 +3,19 @@
 //!
 //! Leaves to the planners what is worth telling about a flight.
 
-use anyhow::{Context, Result, bail, ensure};
+use super::args::{LENGTH_M, within};
+use super::site::Site;
+use super::upload::{self, UploadArgs};
+use super::view::ALTITUDE_M;
+use anyhow::{Context, Error, Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 use skein_geometry::Segment;
 use skein_geometry::frame::{Origin, Point};
+use skein_interop::mission::write;
 use skein_interop::place::from_plane;
-use skein_interop::plan::{PlanFile, Waypoint, write};
 use skein_survey::flight::{Leg, UavFlight};
+use skein_survey::heights::{MOST_HEIGHT_M, check_heights};
 use std::path::{Path, PathBuf};
 
 /// Points nearer to each other than this are one in the track, metres.
@@ -22,20 +27,27 @@ const HIGHEST_M: f64 = 20_000.0;
 /// The form of the result.
 #[derive(Clone, Debug, Args)]
 pub struct OutputArgs {
-    /// Height of the waypoints above home, metres.
+    /// Height of the lowest flight above home, metres; by default that of the file's
+    /// survey, else 60.
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub altitude_m: Option<f64>,
+    /// Plans with a flight above this height above home are refused, metres.
     #[arg(
         long,
-        default_value_t = 60.0,
+        default_value_t = MOST_HEIGHT_M,
         value_name = "M",
         allow_hyphen_values = true
     )]
-    pub altitude_m: f64,
+    pub max_height_m: f64,
     /// How the result is printed.
     #[arg(long, value_enum, default_value_t = Format::Json)]
     pub format: Format,
     /// Directory for the `.plan` files, one a UAV, instead of printing.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// What is written into files beside the flights.
+    #[command(flatten)]
+    pub upload: UploadArgs,
 }
 
 /// Forms of the result.
@@ -50,17 +62,44 @@ pub enum Format {
 }
 
 impl OutputArgs {
+    /// The height of the lowest flight where no file says one, metres.
+    #[must_use]
+    pub fn altitude_m(&self) -> f64 {
+        self.altitude_m.unwrap_or(ALTITUDE_M)
+    }
+
+    /// Refuses a height of the lowest flight, whoever chose it.
+    ///
+    /// # Errors
+    /// Names the flag.
+    pub fn check_altitude(&self, altitude_m: f64) -> Result<()> {
+        within("--altitude-m", altitude_m, (-HIGHEST_M, HIGHEST_M), "m")?;
+        ensure!(
+            altitude_m <= self.max_height_m,
+            "the lowest flight would be at {altitude_m} m, above --max-height-m {}: a lower --altitude-m, or a higher limit where one may fly there",
+            self.max_height_m
+        );
+        Ok(())
+    }
+
     /// Refuses what cannot be printed for a team of this size, before it is planned.
     ///
     /// # Errors
     /// When the height is no height, a folder was named for what is printed, or several
     /// plans have none.
     pub fn check(&self, n_uavs: usize) -> Result<()> {
-        ensure!(
-            self.altitude_m.abs() <= HIGHEST_M,
-            "--altitude-m must be between -{HIGHEST_M} and {HIGHEST_M}, found {}",
-            self.altitude_m
-        );
+        let heights_m = (-HIGHEST_M, HIGHEST_M);
+        within("--max-height-m", self.max_height_m, heights_m, "m")?;
+        // Where no flag says one, a file may.
+        if let Some(altitude_m) = self.altitude_m {
+            self.check_altitude(altitude_m)?;
+        }
+        if let Some(altitude_m) = self.upload.home_altitude_m {
+            within("--home-altitude-m", altitude_m, heights_m, "m")?;
+        }
+        if let Some(trigger_m) = self.upload.trigger_m {
+            within("--trigger-m", trigger_m, LENGTH_M, "m")?;
+        }
         let files = self.format == Format::Plan;
         // Nobody is to look for files in a folder that gets none.
         if self.out.is_some() && !files {
@@ -78,13 +117,29 @@ impl OutputArgs {
     /// As [`OutputArgs::check`], or when a file cannot be written.
     pub fn print(&self, sheet: &Sheet) -> Result<String> {
         self.check(sheet.flights.len())?;
-        Ok(match (self.format, &self.out, sheet.flights.as_slice()) {
-            (Format::Json, ..) => sheet.json().to_string(),
-            (Format::Geojson, ..) => sheet.geojson().to_string(),
-            (Format::Plan, Some(dir), _) => sheet.write(dir)?.to_string(),
-            (Format::Plan, None, [flight]) => sheet.plan(flight),
+        let flying = sheet.flights.iter().filter(|flight| flight.flies());
+        let heights = flying.map(|flight| (flight.name.as_str(), flight.altitude_m));
+        let heights: Vec<(&str, f64)> = heights.collect();
+        check_heights(&heights, self.max_height_m).map_err(|error| {
+            Error::new(error).context(
+                "--max-height-m: fewer UAVs, a smaller --layer-step-m or --separation-m, a lower --altitude-m, or several launches one after the other",
+            )
+        })?;
+        let json = match (self.format, &self.out, sheet.flights.as_slice()) {
+            (Format::Json, ..) => sheet.json(),
+            (Format::Geojson, ..) => sheet.geojson(),
+            (Format::Plan, Some(dir), _) => sheet.write(dir, &self.upload)?,
+            (Format::Plan, None, [flight]) => {
+                ensure!(
+                    flight.flies(),
+                    "{} stays at home, so there is nothing to upload: --format json says why",
+                    flight.name
+                );
+                return Ok(sheet.plan(flight, &self.upload));
+            }
             (Format::Plan, None, _) => bail!("there are no flights"),
-        })
+        };
+        Ok(text(json))
     }
 }
 
@@ -99,6 +154,8 @@ pub struct Printed {
     pub altitude_m: f64,
     /// Airspeed, m/s.
     pub speed_mps: f64,
+    /// Distance between two pictures where nobody else says one, metres.
+    pub trigger_m: Option<f64>,
     /// What it flies, piece by piece; empty if it stays.
     pub legs: Vec<Leg>,
     /// What is told about it in every form but files.
@@ -131,10 +188,18 @@ impl Printed {
             track: flight.path.clone(),
             altitude_m: flight.altitude_m,
             speed_mps: flight.speed_mps,
+            // A picture sees half a lane before and behind; half of that is shared.
+            trigger_m: flight.lane_m.map(|lane_m| lane_m / 2.0),
             legs: flight.legs.clone(),
             told,
             details: Map::new(),
         }
+    }
+
+    /// Whether it leaves its start at all.
+    #[must_use]
+    pub fn flies(&self) -> bool {
+        self.points().len() > 1
     }
 
     /// The corners, none twice in a row: different places may coincide, a target with the
@@ -159,6 +224,8 @@ impl Printed {
 pub struct Sheet {
     /// Where the plane lies.
     pub origin: Origin,
+    /// What files for upload take over.
+    pub site: Site,
     /// What is told about all flights together: an object.
     pub summary: Value,
     /// By UAV.
@@ -241,34 +308,79 @@ impl Sheet {
     }
 
     /// The QGroundControl plan of a flight.
-    fn plan(&self, flight: &Printed) -> String {
-        let at = |p: &Point| from_plane(self.origin, *p);
-        let track = flight.points();
-        let waypoints = track.iter().skip(1);
-        write(&PlanFile {
-            waypoints: waypoints
-                .map(|p| Waypoint::new(at(p), flight.altitude_m))
-                .collect(),
-            home: track.first().map(at),
-            cruise_mps: Some(flight.speed_mps),
-            ..PlanFile::default()
-        })
+    fn plan(&self, flight: &Printed, asked: &UploadArgs) -> String {
+        write(&upload::mission(flight, self.origin, &self.site, asked))
     }
 
-    /// Writes one plan a UAV, also for one that stays: an older file would be flown.
-    fn write(&self, dir: &Path) -> Result<Value> {
+    /// Writes one plan for each UAV that flies. What an older plan of one that stays would
+    /// have it fly is removed.
+    fn write(&self, dir: &Path, asked: &UploadArgs) -> Result<Value> {
         std::fs::create_dir_all(dir)
             .with_context(|| format!("--out: cannot make the folder {}", dir.display()))?;
-        let mut written = Vec::new();
+        let (mut written, mut removed) = (Vec::new(), Vec::new());
+        let mut notices = upload::notices(&self.flights, self.origin, &self.site, asked);
         for flight in &self.flights {
             let path = dir.join(format!("{}.plan", flight.name));
-            std::fs::write(&path, self.plan(flight) + "\n")
-                .with_context(|| format!("--out: cannot write {}", path.display()))?;
-            written.push(path.display().to_string());
+            let shown = path.display().to_string();
+            if flight.flies() {
+                std::fs::write(&path, self.plan(flight, asked) + "\n")
+                    .with_context(|| format!("--out: cannot write {shown}"))?;
+                written.push(shown);
+            } else if std::fs::symlink_metadata(&path).is_ok() {
+                std::fs::remove_file(&path).with_context(|| {
+                    format!(
+                        "--out: {} stays at home, and {shown} of an earlier plan cannot be removed",
+                        flight.name
+                    )
+                })?;
+                notices.push(format!(
+                    "{shown} was removed: {} stays at home",
+                    flight.name
+                ));
+                removed.push(shown);
+            } else {
+                notices.push(format!("{} stays at home: no file", flight.name));
+            }
+        }
+        let older = older_plans(dir, &written);
+        if !older.is_empty() {
+            notices.push(format!("not of this plan: {}", older.join(", ")));
         }
         let mut out = self.summary.clone();
         out["files"] = json!(written);
+        out["removed"] = json!(removed);
+        match out.get_mut("notices").and_then(Value::as_array_mut) {
+            Some(all) => all.extend(notices.into_iter().map(Value::from)),
+            None => out["notices"] = json!(notices),
+        }
         Ok(out)
+    }
+}
+
+/// Plans in a folder that were not written now.
+fn older_plans(dir: &Path, written: &[String]) -> Vec<String> {
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+    let paths = entries.map(|entry| entry.path());
+    let plans = paths.filter(|path| path.extension().is_some_and(|e| e == "plan"));
+    let shown = plans.map(|path| path.display().to_string());
+    let mut older: Vec<String> = shown.filter(|path| !written.contains(path)).collect();
+    older.sort();
+    older
+}
+
+/// The text of a value.
+pub(super) fn text(mut value: Value) -> String {
+    positive_zeros(&mut value);
+    value.to_string()
+}
+
+/// Writes -0.0 as 0.0 wherever it stands.
+fn positive_zeros(value: &mut Value) {
+    match value {
+        Value::Number(n) if n.is_f64() && n.as_f64() == Some(0.0) => *value = json!(0.0),
+        Value::Array(items) => items.iter_mut().for_each(positive_zeros),
+        Value::Object(members) => members.values_mut().for_each(positive_zeros),
+        _ => {}
     }
 }
 
@@ -282,6 +394,7 @@ mod tests {
             track: [0.0, 0.0, 100.0, 0.0].map(|x| Point::new(x, 0.0)).to_vec(),
             altitude_m: 80.0,
             speed_mps: 15.0,
+            trigger_m: None,
             legs: Vec::new(),
             told: Map::new(),
             details: Map::from_iter([("passes".to_owned(), json!(2))]),
@@ -291,6 +404,7 @@ mod tests {
                 lat_deg: 47.0,
                 lon_deg: 8.0,
             },
+            site: Site::default(),
             summary: json!({"makespan_s": 1.0}),
             flights: names.iter().map(flight).collect(),
             shapes: Vec::new(),
@@ -299,9 +413,11 @@ mod tests {
 
     fn args(format: Format, out: Option<PathBuf>) -> OutputArgs {
         OutputArgs {
-            altitude_m: 60.0,
+            altitude_m: None,
+            max_height_m: MOST_HEIGHT_M,
             format,
             out,
+            upload: UploadArgs::default(),
         }
     }
 
@@ -315,8 +431,71 @@ mod tests {
         assert!(map.contains("\"altitude_m\":80.0") && !map.contains("passes"));
         let plan = args(Format::Plan, None).print(&sheet(&["a"])).unwrap();
         let plan = skein_interop::plan::read(&plan).unwrap();
-        assert_eq!(plan.waypoints.len(), 2);
-        assert!((plan.waypoints[0].altitude_m - 80.0).abs() < 1e-9);
+        // Take-off, out and back.
+        assert_eq!(plan.waypoints.len(), 3);
+        assert!(
+            plan.waypoints
+                .iter()
+                .all(|w| (w.altitude_m - 80.0).abs() < 1e-9)
+        );
+    }
+
+    #[test]
+    fn who_stays_gets_no_file_and_loses_an_older_one() {
+        let dir = std::env::temp_dir().join(format!("skein-plan-stays-{}", std::process::id()));
+        let mut both = sheet(&["a", "b"]);
+        let to_plan = args(Format::Plan, Some(dir.clone()));
+        let told = |sheet: &Sheet| -> Value {
+            serde_json::from_str(&to_plan.print(sheet).unwrap()).unwrap()
+        };
+        assert_eq!(told(&both)["files"].as_array().unwrap().len(), 2);
+        both.flights[1].track.truncate(1);
+        let second = told(&both);
+        assert_eq!(second["files"].as_array().unwrap().len(), 1);
+        assert!(second["removed"][0].as_str().unwrap().ends_with("b.plan"));
+        assert!(
+            second["notices"]
+                .to_string()
+                .contains("was removed: b stays at home")
+        );
+        assert!(dir.join("a.plan").exists() && !dir.join("b.plan").exists());
+        let third = told(&sheet(&["c"]));
+        assert!(
+            third["notices"].to_string().contains("not of this plan: "),
+            "{third}"
+        );
+        let mut alone = sheet(&["a"]);
+        alone.flights[0].track.truncate(1);
+        let error = args(Format::Plan, None)
+            .print(&alone)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("a stays at home"), "{error}");
+        std::fs::remove_dir_all(&dir).unwrap();
+    }
+
+    #[test]
+    fn nobody_is_sent_higher_than_allowed() {
+        let mut both = sheet(&["a", "b"]);
+        both.flights[1].altitude_m = 140.0;
+        let mut json = args(Format::Json, None);
+        let error = format!("{:#}", json.print(&both).unwrap_err());
+        assert!(
+            error.contains("b would fly at 140 m, above the 120 m"),
+            "{error}"
+        );
+        assert!(error.contains("--max-height-m: fewer UAVs"), "{error}");
+        json.max_height_m = 150.0;
+        assert!(json.print(&both).is_ok());
+        both.flights[1].track.truncate(1);
+        json.max_height_m = 120.0;
+        assert!(json.print(&both).is_ok());
+    }
+
+    #[test]
+    fn zeros_have_no_sign() {
+        let value = json!({"a": [-0.0, {"b": -0.0}], "c": -1.5, "d": 0});
+        assert_eq!(text(value), r#"{"a":[0.0,{"b":0.0}],"c":-1.5,"d":0}"#);
     }
 
     #[test]
@@ -340,8 +519,16 @@ mod tests {
         std::fs::remove_dir_all(&dir).unwrap();
         let mut high = args(Format::Json, None);
         for altitude_m in [f64::NAN, f64::INFINITY, 1e6] {
-            high.altitude_m = altitude_m;
+            high.altitude_m = Some(altitude_m);
             assert!(error(&high).contains("--altitude-m must be"));
         }
+        high.altitude_m = Some(130.0);
+        assert!(error(&high).contains("at 130 m, above --max-height-m 120"));
+        high.altitude_m = None;
+        high.upload.trigger_m = Some(-1.0);
+        assert!(error(&high).contains("--trigger-m must be"));
+        high.upload.trigger_m = None;
+        high.upload.home_altitude_m = Some(f64::NAN);
+        assert!(error(&high).contains("--home-altitude-m must be"));
     }
 }

@@ -1,15 +1,18 @@
 //! `plan patrol`: points, lines or an area seen again and again by a team (D2.7 §3.6.6).
 //! Planned by [`skein_survey::patrol`].
 
-use super::args::{area_error, detour_error, planners, positive, tours_error};
+use super::args::{area_error, detour_error, planners, tours_error, within};
 use super::output::{Printed, Sheet};
+use super::site::Site;
 use super::target_input::{Kind, TargetInput};
 use super::tour_args::TourArgs;
+use super::view::{Flags, View};
 use super::{area_input, cover, team_input};
 use anyhow::{Error, Result, anyhow, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 use skein_geometry::frame::Origin;
+use skein_interop::fleet::TURN_RADIUS_M;
 use skein_interop::place::from_plane;
 use skein_survey::patrol::{
     self, AfterLosses, GoesOn, Losses, PatrolError, PatrolFlight, PatrolPlan, PatrolRequest,
@@ -55,8 +58,16 @@ pub struct PatrolArgs {
     /// When they fail, seconds after a moment in which all are at their stations.
     #[arg(long, default_value_t = 0.0, value_name = "S")]
     pub lost_after_s: f64,
+    /// Over an area: holes of it may be flown over; without it they are no-fly zones.
+    #[arg(long)]
+    pub cross_holes: bool,
     /// Over an area: turn radius, metres.
-    #[arg(long, default_value_t = 30.0, value_name = "M")]
+    #[arg(
+        long,
+        default_value_t = 30.0,
+        value_name = "M",
+        allow_hyphen_values = true
+    )]
     pub turn_radius_m: f64,
     /// Team, wind and form of the result.
     #[command(flatten)]
@@ -74,6 +85,8 @@ pub fn run(args: &PatrolArgs) -> Result<String> {
         "--lost-after-s must be a time, found {}",
         args.lost_after_s
     );
+    args.tours.check()?;
+    within("--turn-radius-m", args.turn_radius_m, TURN_RADIUS_M, "m")?;
     let input = match args.over {
         Over::Area => over_area(args),
         Over::Points => over_targets(args, Kind::Points),
@@ -88,14 +101,14 @@ pub fn run(args: &PatrolArgs) -> Result<String> {
         team: input.team,
         clearance_m: args.tours.clearance_m,
         wind_mps: args.tours.wind(),
-        altitude_m: args.tours.output.altitude_m,
+        altitude_m: input.altitude_m,
         steps: args.tours.steps,
         losses: (!args.lost.is_empty()).then_some(losses),
     });
     let plan = plan.map_err(|error| patrol_error(error, args))?;
     args.tours
         .output
-        .print(&sheet(&plan, input.origin, &input.notices))
+        .print(&sheet(&plan, input.origin, input.site, &input.notices))
 }
 
 /// What is patrolled, by whom.
@@ -103,6 +116,8 @@ struct Input {
     origin: Origin,
     over: patrol::Over,
     team: Vec<Uav>,
+    altitude_m: f64,
+    site: Site,
     notices: Vec<String>,
 }
 
@@ -111,6 +126,8 @@ fn over_targets(args: &PatrolArgs, kind: Kind) -> Result<Input> {
         !args.exact && !args.approximate,
         "--exact and --approximate are for --over area"
     );
+    let output = &args.tours.output;
+    output.check_altitude(output.altitude_m())?;
     let input = TargetInput::read(kind, &args.file, &args.tours, args.turn_radius_m)?;
     Ok(Input {
         origin: input.origin,
@@ -119,6 +136,8 @@ fn over_targets(args: &PatrolArgs, kind: Kind) -> Result<Input> {
             zones: input.zones,
         },
         team: input.team,
+        altitude_m: args.tours.output.altitude_m(),
+        site: input.site,
         notices: input.notices,
     })
 }
@@ -136,25 +155,54 @@ fn over_area(args: &PatrolArgs) -> Result<Input> {
         tours.endurance_s,
     )?;
     tours.output.check(team.len())?;
-    positive(tours.speed_mps, args.turn_radius_m, tours.swath_m)?;
-    let mut site = area_input::read(&args.file, tours.depot.as_deref())?;
+    let asked = area_input::Asked {
+        launch: tours.depot.as_deref(),
+        cross_holes: args.cross_holes,
+        zones: None,
+    };
+    let mut site = area_input::read(&args.file, asked)?;
+    let flags = Flags {
+        altitude_m: tours.output.altitude_m,
+        swath_m: tours.swath_m,
+        trigger_m: tours.output.upload.trigger_m,
+        ..Flags::default()
+    };
+    let view = View::of(flags, site.survey.as_ref())?;
+    tours.output.check_altitude(view.altitude_m)?;
+    site.notices.extend(view.notices.iter().cloned());
+    if view.course_deg.is_some() {
+        let text = "the survey's angle is ignored: a patrol has the shortest course".to_owned();
+        site.notices.push(text);
+    }
+    if !site.fences.is_empty() {
+        let text = format!(
+            "{} inclusion fence(s) ignored by a patrol",
+            site.fences.len()
+        );
+        site.notices.push(text);
+    }
     if let Some(sensor) = site.sensor.take() {
         let text = format!("sensor {sensor:?} of the area ignored: all fly the same tour");
         site.notices.push(text);
     }
     let defaults = team_input::Defaults {
-        swath_m: tours.swath_m,
+        camera: view.camera,
         turn_radius_m: args.turn_radius_m,
     };
+    let team = team_input::in_plane(&team, site.origin, defaults)?;
+    site.check_zones(&team)?;
+    site.site.trigger_m = view.trigger_m;
     Ok(Input {
         origin: site.origin,
-        team: team_input::in_plane(&team, site.origin, defaults)?,
+        team,
+        altitude_m: view.altitude_m,
         over: patrol::Over::Area {
+            zones: site.no_fly(),
             area: site.area,
             holes: site.holes,
-            zones: site.zones,
             planners: planners(args.exact, args.approximate),
         },
+        site: site.site,
         notices: site.notices,
     })
 }
@@ -174,7 +222,7 @@ fn patrol_error(error: PatrolError, args: &PatrolArgs) -> Error {
 }
 
 /// What is told about everybody together.
-fn sheet(plan: &PatrolPlan, origin: Origin, notices: &[String]) -> Sheet {
+fn sheet(plan: &PatrolPlan, origin: Origin, site: Site, notices: &[String]) -> Sheet {
     let mut summary = json!({
         "over": match plan.over {
             TourKind::Points => "points",
@@ -195,6 +243,7 @@ fn sheet(plan: &PatrolPlan, origin: Origin, notices: &[String]) -> Sheet {
     }
     Sheet {
         origin,
+        site,
         summary,
         flights: plan.uavs.iter().map(printed).collect(),
         shapes: Vec::new(),
@@ -232,6 +281,7 @@ fn printed(flight: &PatrolFlight) -> Printed {
         track: flight.path.clone(),
         altitude_m: flight.altitude_m,
         speed_mps: flight.speed_mps,
+        trigger_m: None,
         legs: Vec::new(),
         told,
         details: Map::new(),

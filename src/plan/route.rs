@@ -2,6 +2,7 @@
 //! Planned by [`skein_survey::route`].
 
 use super::lat_lon;
+use super::output::text;
 use super::zone_input::{self, Polygons, ZoneInput};
 use anyhow::{Context, Error, Result, anyhow, ensure};
 use clap::{Args, ValueEnum};
@@ -30,14 +31,19 @@ pub struct RouteArgs {
     #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true)]
     pub via: Vec<String>,
     /// Distance kept from every zone and from the fence, metres.
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "R", allow_hyphen_values = true)]
     pub clearance_m: f64,
     /// Flight level above the ground, metres: buildings of GeoJSON that end below it
     /// are flown over.
-    #[arg(long, value_name = "H")]
+    #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub level_m: Option<f64>,
     /// Distance kept above buildings, metres.
-    #[arg(long, value_name = "H", default_value_t = 10.0)]
+    #[arg(
+        long,
+        value_name = "H",
+        default_value_t = 10.0,
+        allow_hyphen_values = true
+    )]
     pub vertical_margin_m: f64,
     /// Which engine looks for the path; both find the shortest.
     #[arg(long, value_enum, default_value_t = Engine::Mesh)]
@@ -97,6 +103,7 @@ pub fn run(args: &RouteArgs) -> Result<String> {
         keep_out,
         keep_in,
         mut notices,
+        ..
     } = zone_input::read(&args.file, origin, polygons)?;
     let plan = route::plan(&RouteRequest {
         places,
@@ -111,10 +118,10 @@ pub fn run(args: &RouteArgs) -> Result<String> {
     });
     let plan = plan.map_err(|error| route_error(error, args))?;
     notices.extend(plan.notices.iter().cloned());
-    Ok(match args.format {
-        Format::Json => json(&plan, origin, args.clearance_m, &notices).to_string(),
-        Format::Geojson => geojson(&plan, origin).to_string(),
-    })
+    Ok(text(match args.format {
+        Format::Json => json(&plan, origin, args.clearance_m, &notices),
+        Format::Geojson => geojson(&plan, origin),
+    }))
 }
 
 fn level(args: &RouteArgs) -> Result<Option<Level>> {

@@ -1,14 +1,16 @@
 //! Points or lines of a file with the team that is to see them, in the plane of the depot.
 
+use super::site::Site;
 use super::tour_args::TourArgs;
-use super::zone_input::{self, Polygons, ZoneInput};
+use super::zone_input::{self, Polygons, ZoneInput, is_plan};
 use super::{lat_lon, team_input};
 use anyhow::{Context, Result};
 use skein_geometry::frame::{Origin, Point};
 use skein_geometry::offset::Zone;
 use skein_interop::place::to_plane;
+use skein_interop::plan;
 use skein_interop::targets::{self, read};
-use skein_survey::team::Uav;
+use skein_survey::team::{Sensor, Uav};
 use skein_survey::tours::{LineTarget, PointTarget, Targets};
 use skein_survey::zones::flight_zones;
 use std::collections::BTreeMap;
@@ -33,6 +35,8 @@ pub struct TargetInput {
     pub zones: Vec<Zone>,
     /// The UAVs.
     pub team: Vec<Uav>,
+    /// What files for upload take over.
+    pub site: Site,
     /// What of the file was left out.
     pub notices: Vec<String>,
 }
@@ -81,13 +85,25 @@ impl TargetInput {
         )?;
         args.output.check(team.len())?;
         let inside = zone_input::of_text(file, &text, origin, Polygons::NoFly);
-        let mut zones = zones_of(&inside.with_context(shown)?);
+        let inside = inside.with_context(shown)?;
+        let mut zones = zones_of(&inside);
+        let mut site = if is_plan(file) {
+            Site::of(&plan::read(&text).with_context(shown)?)
+        } else {
+            let mut site = Site::default();
+            fence(&mut site, &inside);
+            site
+        };
         if let Some(file) = &args.zones {
             let more = zone_input::read(file, origin, Polygons::All);
-            zones.extend(zones_of(&more.context("--zones")?));
+            let more = more.context("--zones")?;
+            zones.extend(zones_of(&more));
+            fence(&mut site, &more);
         }
         let defaults = team_input::Defaults {
-            swath_m: args.swath_m,
+            camera: Sensor::Swath {
+                width_m: args.swath_m(),
+            },
             turn_radius_m,
         };
         let team = team_input::in_plane(&team, origin, defaults)?;
@@ -100,6 +116,7 @@ impl TargetInput {
             targets,
             zones,
             team,
+            site,
             notices,
         })
     }
@@ -139,6 +156,13 @@ fn lines(found: &[targets::LineTarget], origin: Origin) -> Result<Vec<LineTarget
         });
     }
     Ok(all)
+}
+
+/// Adds zones and fences to those that are uploaded.
+fn fence(site: &mut Site, input: &ZoneInput) {
+    for (inclusion, shape) in &input.drawn {
+        site.keep(*inclusion, [shape]);
+    }
 }
 
 /// Zones and fences as zones.

@@ -13,8 +13,8 @@ pub const TURN_RADIUS_M: f64 = 30.0;
 /// What is so of all UAVs that do not state their own.
 #[derive(Clone, Copy, Debug)]
 pub struct Defaults {
-    /// Width of the ground that one sees, metres.
-    pub swath_m: f64,
+    /// What one sees with.
+    pub camera: Sensor,
     /// Turn radius, metres.
     pub turn_radius_m: f64,
 }
@@ -54,9 +54,6 @@ fn read(file: &Path) -> Result<Vec<fleet::Uav>> {
 pub fn in_plane(team: &[fleet::Uav], origin: Origin, defaults: Defaults) -> Result<Vec<Uav>> {
     let uav = |u: &fleet::Uav| -> Result<Uav> {
         let own = sensor(u.swath_m, u.fov_across_deg);
-        let flag = Sensor::Swath {
-            width_m: defaults.swath_m,
-        };
         let sensors = u.sensors.iter().filter_map(|(name, s)| {
             let sees = sensor(s.swath_m, s.fov_across_deg)?;
             Some((name.clone(), sees))
@@ -67,7 +64,7 @@ pub fn in_plane(team: &[fleet::Uav], origin: Origin, defaults: Defaults) -> Resu
             speed_mps: u.speed_mps,
             endurance_s: u.endurance_s,
             turn_radius_m: u.turn_radius_m.unwrap_or(defaults.turn_radius_m),
-            camera: own.or_else(|| u.sensors.is_empty().then_some(flag)),
+            camera: own.or_else(|| u.sensors.is_empty().then_some(defaults.camera)),
             sensors: sensors.collect(),
             cruise_power_w: u.cruise_power_w,
         })
@@ -94,7 +91,7 @@ mod tests {
             lon_deg: 8.0,
         };
         let defaults = Defaults {
-            swath_m: 50.0,
+            camera: Sensor::Swath { width_m: 50.0 },
             turn_radius_m: 30.0,
         };
         let team = fleet::read("fleet", text).unwrap();

@@ -1,15 +1,18 @@
 //! What `plan line` and `plan visit` share: flags, the way from a file to a request, and
 //! what is told of the tours. Planned by [`skein_survey::tours`].
 
-use super::args::{LayerArgs, Objective, tours_error};
+use super::args::{LayerArgs, Objective, course, flyable, tours_error, within};
 use super::output::{OutputArgs, Printed, Sheet};
 use super::target_input::{Kind, TargetInput};
-use super::{NOT_NEEDED, team_input};
+use super::view::USUAL_SWATH_M;
+use super::{team_input, why_home};
 use anyhow::Result;
 use clap::Args;
 use serde_json::{Value, json};
 use skein_geometry::frame::Vector;
 use skein_geometry::math::sin_cos;
+use skein_interop::airframe::SPEED_MPS;
+use skein_interop::fleet::SWATH_M;
 use skein_survey::flight::Stays;
 use skein_survey::tours::{self, TourPlan, TourRequest, UavTour, Visit};
 use std::path::{Path, PathBuf};
@@ -47,10 +50,20 @@ pub struct TourArgs {
     )]
     pub depot: Option<String>,
     /// Airspeed, m/s.
-    #[arg(long, default_value_t = 15.0, value_name = "V")]
+    #[arg(
+        long,
+        default_value_t = 15.0,
+        value_name = "V",
+        allow_hyphen_values = true
+    )]
     pub speed_mps: f64,
     /// Wind speed, m/s.
-    #[arg(long, default_value_t = 0.0, value_name = "W")]
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        value_name = "W",
+        allow_hyphen_values = true
+    )]
     pub wind_mps: f64,
     /// Where the wind comes from, degrees clockwise from north.
     #[arg(
@@ -61,11 +74,12 @@ pub struct TourArgs {
     )]
     pub wind_from_deg: f64,
     /// The longest time that a UAV flies, seconds; lines beyond that are left out and named.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub endurance_s: Option<f64>,
-    /// Width of the ground that a UAV sees, metres: what is wider is flown in lanes.
-    #[arg(long, default_value_t = 60.0, value_name = "M")]
-    pub swath_m: f64,
+    /// Width of the ground that a UAV sees, metres: what is wider is flown in lanes; 60 by
+    /// default, and over an area what the file's survey says.
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub swath_m: Option<f64>,
     /// Steps of improvement; the same steps give the same plan everywhere.
     #[arg(long, default_value_t = tours::DEFAULT_STEPS, value_name = "N")]
     pub steps: usize,
@@ -75,6 +89,24 @@ pub struct TourArgs {
 }
 
 impl TourArgs {
+    /// The width that a UAV sees where no file says one, metres.
+    #[must_use]
+    pub fn swath_m(&self) -> f64 {
+        self.swath_m.unwrap_or(USUAL_SWATH_M)
+    }
+
+    /// Refuses numbers without a meaning, before anything is read.
+    ///
+    /// # Errors
+    /// Names the flag.
+    pub fn check(&self) -> Result<()> {
+        flyable(self.speed_mps, None, self.clearance_m, self.endurance_s)?;
+        within("--swath-m", self.swath_m(), SWATH_M, "m")?;
+        within("--wind-mps", self.wind_mps, (0.0, SPEED_MPS.1), "m/s")?;
+        course("--wind-from-deg", self.wind_from_deg)?;
+        Ok(())
+    }
+
     /// The wind, where it blows to, m/s.
     #[must_use]
     pub fn wind(&self) -> Vector {
@@ -103,6 +135,9 @@ pub struct Wishes {
 /// # Errors
 /// When the file or a flag is wrong; the error names the place.
 pub fn run(kind: Kind, file: &Path, args: &TourArgs, wishes: &Wishes) -> Result<String> {
+    args.check()?;
+    args.output.check_altitude(args.output.altitude_m())?;
+    wishes.layers.check()?;
     let input = TargetInput::read(kind, file, args, team_input::TURN_RADIUS_M)?;
     let request = TourRequest {
         targets: input.targets,
@@ -113,13 +148,17 @@ pub fn run(kind: Kind, file: &Path, args: &TourArgs, wishes: &Wishes) -> Result<
         sensor: wishes.sensor.clone(),
         objective: wishes.objective.asked(),
         separation: wishes.layers.separation(),
-        altitude_m: args.output.altitude_m,
+        altitude_m: args.output.altitude_m(),
         steps: args.steps,
     };
     let plan = tours::plan(&request).map_err(tours_error)?;
+    let mut site = input.site;
+    // Half of what a picture sees along, if it sees as far along as across.
+    site.trigger_m = site.trigger_m.or(Some(args.swath_m() / 2.0));
     args.output.print(&Sheet {
         origin: input.origin,
-        summary: summary(&plan, wishes, &input.notices),
+        site,
+        summary: summary(&request, &plan, wishes, &input.notices),
         flights: plan.uavs.iter().map(printed).collect(),
         shapes: Vec::new(),
     })
@@ -135,14 +174,18 @@ fn printed(tour: &UavTour) -> Printed {
     printed
 }
 
-fn summary(plan: &TourPlan, wishes: &Wishes, notices: &[String]) -> Value {
-    let at_home = plan.uavs.iter().filter_map(|uav| {
-        let why = match uav.flight.stays? {
-            Stays::NoSensor => "has none of the sensors that are asked for",
-            Stays::NotNeeded => NOT_NEEDED,
-        };
-        Some(json!({"name": uav.flight.name, "why": why}))
-    });
+fn summary(request: &TourRequest, plan: &TourPlan, wishes: &Wishes, notices: &[String]) -> Value {
+    let at_home = plan
+        .uavs
+        .iter()
+        .zip(&request.team)
+        .filter_map(|(uav, asked)| {
+            let why = match uav.flight.stays? {
+                Stays::NoSensor => "has none of the sensors that are asked for".to_owned(),
+                Stays::NotNeeded => why_home(asked.endurance_s, 0.0, !plan.unserved.is_empty()),
+            };
+            Some(json!({"name": uav.flight.name, "why": why}))
+        });
     let at_home: Vec<Value> = at_home.collect();
     json!({
         "makespan_s": plan.makespan_s, "lower_bound_s": plan.lower_bound_s,

@@ -1,11 +1,11 @@
 //! Zones and fences of a file in the plane of a plan (D2.7 §2.3.1).
 
-use anyhow::{Context, Result};
-use serde_json::Value;
+use anyhow::{Context, Error, Result, anyhow};
 use skein_geometry::frame::{Origin, Point};
 use skein_geometry::offset::{LayeredZone, Zone};
+use skein_geometry::{Polygon, PolygonError};
 use skein_interop::geojson::{self, HeightRules};
-use skein_interop::place::{LatLon, Shape, Side, to_plane};
+use skein_interop::place::{LatLon, Shape, Side, check_ring, to_plane};
 use skein_interop::plan;
 use skein_survey::zones::{Fence, NamedZone};
 use std::path::Path;
@@ -17,6 +17,8 @@ pub(super) struct ZoneInput {
     pub(super) keep_out: Vec<NamedZone>,
     /// What must be stayed within.
     pub(super) keep_in: Vec<Fence>,
+    /// The same as the file draws it, for other files: whether it is to be stayed within.
+    pub(super) drawn: Vec<(bool, Shape)>,
     /// What was left out or put right.
     pub(super) notices: Vec<String>,
 }
@@ -28,7 +30,7 @@ pub(super) enum Polygons {
     All,
     /// All, up to their height: a file of buildings.
     Buildings,
-    /// Those with the property `"no_fly": true`: a file of something else.
+    /// Those whose property `no_fly` is true: a file of something else.
     NoFly,
 }
 
@@ -63,9 +65,32 @@ pub(super) fn is_plan(file: &Path) -> bool {
     file.extension().is_some_and(|e| e == "plan")
 }
 
-/// Whether a polygon says that it is a zone.
-pub(super) fn is_no_fly(polygon: &geojson::Feature) -> bool {
-    polygon.properties.get("no_fly").and_then(Value::as_bool) == Some(true)
+/// A ring of a file as a polygon.
+///
+/// # Errors
+/// When it crosses or touches itself, is too far away, or no polygon; names the place.
+pub(super) fn polygon(origin: Origin, ring: &[LatLon], name: &str) -> Result<Polygon> {
+    check_ring(ring).with_context(|| name.to_owned())?;
+    let points = ring.iter().map(|p| to_plane(origin, *p));
+    let points = points
+        .collect::<Result<Vec<Point>, _>>()
+        .with_context(|| name.to_owned())?;
+    Polygon::new(points).map_err(|error| match error {
+        PolygonError::SelfCrossing(i, j) => {
+            let corner = |k: usize| {
+                let LatLon { lat_deg, lon_deg } = ring[k % ring.len()];
+                format!("{lat_deg:.7}, {lon_deg:.7}")
+            };
+            anyhow!(
+                "{name}: the ring touches itself: its edge from {} to {} and that from {} to {}; move them apart, or draw two polygons",
+                corner(i),
+                corner(i + 1),
+                corner(j),
+                corner(j + 1)
+            )
+        }
+        error => Error::new(error).context(name.to_owned()),
+    })
 }
 
 fn named(name: String, ring: Vec<Point>, ceiling_m: f64) -> NamedZone {
@@ -87,6 +112,9 @@ fn of_plan(text: &str, origin: Origin) -> Result<ZoneInput> {
         ..ZoneInput::default()
     };
     let drawn = |shape: &Shape, name: &str, side: Side| {
+        if let Shape::Ring(ring) = shape {
+            check_ring(ring).with_context(|| name.to_owned())?;
+        }
         let ring = shape.to_plane(origin, side);
         ring.with_context(|| name.to_owned())
     };
@@ -100,13 +128,22 @@ fn of_plan(text: &str, origin: Origin) -> Result<ZoneInput> {
         let ring = drawn(s, &name, Side::Inside)?;
         input.keep_in.push(Fence { name, ring });
     }
+    let keep_out = file.keep_out.into_iter().map(|s| (false, s));
+    let keep_in = file.keep_in.into_iter().map(|s| (true, s));
+    input.drawn = keep_out.chain(keep_in).collect();
     Ok(input)
 }
 
 fn of_geojson(text: &str, origin: Origin, polygons: Polygons) -> Result<ZoneInput> {
     let mut input = ZoneInput::default();
+    // Footprints of map data touch and cross themselves; what is drawn by hand should not.
+    let by_hand = polygons != Polygons::Buildings;
     let mut add = |pointer: &str, ring: &[LatLon], ceiling_m: f64| -> Result<()> {
         let name = format!("zone at {pointer}");
+        if by_hand {
+            check_ring(ring).with_context(|| name.clone())?;
+            input.drawn.push((false, Shape::Ring(ring.to_vec())));
+        }
         let ring = ring
             .iter()
             .map(|p| to_plane(origin, *p))
@@ -123,9 +160,10 @@ fn of_geojson(text: &str, origin: Origin, polygons: Polygons) -> Result<ZoneInpu
         read.notices
     } else {
         let read = geojson::read(text)?;
-        let counts = |f: &&_| polygons == Polygons::All || is_no_fly(f);
-        for f in read.polygons.iter().filter(counts) {
-            add(&f.pointer, &f.ring, f64::INFINITY)?;
+        for f in &read.polygons {
+            if polygons == Polygons::All || f.is_no_fly()? {
+                add(&f.pointer, &f.ring, f64::INFINITY)?;
+            }
         }
         read.notices
     };

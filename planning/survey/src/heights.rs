@@ -11,6 +11,13 @@ use thiserror::Error;
 /// Height between two layers unless said otherwise, metres: twice what a barometer errs.
 pub const LAYER_STEP_M: f64 = 20.0;
 
+/// Heights nearer to each other than this are one layer, metres.
+const SAME_HEIGHT_M: f64 = 1e-6;
+
+/// The most above home that a flight is planned at unless said otherwise, metres: what the
+/// open category allows in Europe.
+pub const MOST_HEIGHT_M: f64 = 120.0;
+
 /// How flights are kept apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation {
@@ -31,6 +38,45 @@ pub enum NoSeparation {
     /// `layer_step_m`.
     #[error("the step between layers must be 0 or more, found {0}")]
     LayerStep(f64),
+}
+
+/// A flight is higher than it may be. Nothing of the plan is to be flown.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error(
+    "{name} would fly at {height_m} m, above the {most_m} m that are allowed: flights that come near to each other need {layers} layers from {lowest_m} m up"
+)]
+pub struct TooHigh {
+    /// What the UAV that flies highest is called.
+    pub name: String,
+    /// Its height above home, metres.
+    pub height_m: f64,
+    /// The most that is allowed, metres.
+    pub most_m: f64,
+    /// The height of the lowest flight, metres.
+    pub lowest_m: f64,
+    /// How many heights there are.
+    pub layers: usize,
+}
+
+/// Refuses flights, each with its name and its height, of which one is too high.
+///
+/// # Errors
+/// [`TooHigh`] names the highest.
+pub fn check_heights(flights: &[(&str, f64)], most_m: f64) -> Result<(), TooHigh> {
+    let highest = flights.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    let Some(&(name, height_m)) = highest.filter(|f| f.1 > most_m) else {
+        return Ok(());
+    };
+    let mut heights: Vec<f64> = flights.iter().map(|f| f.1).collect();
+    heights.sort_by(f64::total_cmp);
+    heights.dedup_by(|a, b| (*a - *b).abs() < SAME_HEIGHT_M);
+    Err(TooHigh {
+        name: name.to_owned(),
+        height_m,
+        most_m,
+        lowest_m: heights.first().copied().unwrap_or(height_m),
+        layers: heights.len(),
+    })
 }
 
 impl Separation {
@@ -85,6 +131,18 @@ impl Separation {
 mod tests {
     use super::*;
     use crate::team::Sensor;
+
+    #[test]
+    fn the_highest_flight_is_named_with_the_layers_below_it() {
+        let flights = [("a", 60.0), ("b", 140.0), ("c", 100.0), ("d", 60.0)];
+        assert_eq!(check_heights(&flights, 140.0), Ok(()));
+        assert_eq!(check_heights(&[], 0.0), Ok(()));
+        let error = check_heights(&flights, 120.0).unwrap_err();
+        assert_eq!((error.name.as_str(), error.layers), ("b", 3));
+        let error = error.to_string();
+        let says = "b would fly at 140 m, above the 120 m that are allowed: flights that come near to each other need 3 layers from 60 m up";
+        assert_eq!(error, says);
+    }
 
     #[test]
     fn flights_that_cross_have_heights_of_their_own() {

@@ -340,7 +340,7 @@ fn shapes_of(node: &Node<'_>, text: &str, notices: &mut Notices) -> Result<FileS
         let area = if p.surveys.is_empty() {
             p.keep_in
         } else {
-            p.surveys.into_iter().map(Shape::Ring).collect()
+            p.surveys.into_iter().map(|s| Shape::Ring(s.ring)).collect()
         };
         return Ok(FileShapes {
             area,
