@@ -78,7 +78,7 @@ impl Vehicle {
 pub enum Item {
     /// Takes off towards a place, up to a height.
     Takeoff {
-        /// Where.
+        /// The place: a fixed wing needs one away from home.
         at: LatLon,
         /// Height above home, metres.
         height_m: f64,
@@ -193,7 +193,7 @@ pub fn write(mission: &Mission) -> String {
             "firmwareType": mission.vehicle.firmware_type,
             "vehicleType": mission.vehicle.vehicle_type,
             "globalPlanAltitudeMode": ALTITUDE_RELATIVE,
-            "plannedHomePosition": [lat_deg, lon_deg, mission.home_altitude_m],
+            "plannedHomePosition": [lat_deg + 0.0, lon_deg + 0.0, mission.home_altitude_m + 0.0],
             "items": items,
         },
         "rallyPoints": mission.rally,
@@ -205,10 +205,11 @@ pub fn write(mission: &Mission) -> String {
 fn item_json(item: &Item, vehicle: Vehicle, id: usize) -> Value {
     let placed = |command: i64, [p1, p2, p3]: [f64; 3], at: LatLon, height_m: f64| {
         json!({
-            "AMSLAltAboveTerrain": null, "Altitude": height_m,
+            "AMSLAltAboveTerrain": null, "Altitude": height_m + 0.0,
             "AltitudeMode": ALTITUDE_RELATIVE, "autoContinue": true, "command": command,
             "doJumpId": id, "frame": FRAME_RELATIVE_ALT, "type": "SimpleItem",
-            "params": [p1, p2, p3, null, at.lat_deg, at.lon_deg, height_m],
+            // Adding 0 leaves no zero its sign.
+            "params": [p1, p2, p3, null, at.lat_deg + 0.0, at.lon_deg + 0.0, height_m + 0.0],
         })
     };
     let unplaced = |command: i64, [p1, p2, p3]: [f64; 3]| {
@@ -349,6 +350,17 @@ mod tests {
             ..Vehicle::default()
         };
         assert_eq!(json(copter)["mission"]["items"][0]["params"][0], 0.0);
+    }
+
+    #[test]
+    fn zeros_have_no_sign() {
+        let mut mission = mission(Vehicle::default());
+        let (lat_deg, lon_deg) = (-0.0, -0.0);
+        mission.home = LatLon { lat_deg, lon_deg };
+        mission.home_altitude_m = -0.0;
+        mission.items = vec![Item::Land { at: mission.home }];
+        let text = write(&mission);
+        assert!(!text.contains("-0"), "{text}");
     }
 
     #[test]

@@ -79,6 +79,10 @@ impl OutputArgs {
             "the lowest flight would be at {altitude_m} m, above --max-height-m {}: a lower --altitude-m, or a higher limit where one may fly there",
             self.max_height_m
         );
+        ensure!(
+            self.format != Format::Plan || altitude_m > 0.0,
+            "--altitude-m must be above 0 in .plan files, which begin with a take-off, found {altitude_m}"
+        );
         Ok(())
     }
 
@@ -524,6 +528,9 @@ mod tests {
         }
         high.altitude_m = Some(130.0);
         assert!(error(&high).contains("at 130 m, above --max-height-m 120"));
+        let mut low = args(Format::Plan, Some(dir.clone()));
+        low.altitude_m = Some(0.0);
+        assert!(error(&low).contains("begin with a take-off"));
         high.altitude_m = None;
         high.upload.trigger_m = Some(-1.0);
         assert!(error(&high).contains("--trigger-m must be"));

@@ -89,12 +89,9 @@ pub(super) fn mission(
     let radius_m = tightest_m(flight);
     let accepted = radius_m.map(|r| (r * ACCEPTED_SHARE).clamp(ACCEPTED_M.0, ACCEPTED_M.1));
     let mut way = Way {
-        items: vec![
-            Item::Takeoff { at: home, height_m },
-            Item::Airspeed {
-                mps: flight.speed_mps,
-            },
-        ],
+        items: vec![Item::Airspeed {
+            mps: flight.speed_mps,
+        }],
         last: start,
         height_m,
         acceptance_m: accepted.unwrap_or(ACCEPTED_WITHOUT_TURNS_M),
@@ -111,6 +108,13 @@ pub(super) fn mission(
         );
     }
     let mut items = way.items;
+    // A fixed wing climbs towards the place of its take-off, and has no way to where it is.
+    let first = items.iter().find_map(|item| match item {
+        Item::Waypoint { at, .. } => Some(*at),
+        _ => None,
+    });
+    let at = first.unwrap_or(home);
+    items.insert(0, Item::Takeoff { at, height_m });
     items.push(match asked.end {
         End::Rtl => Item::ReturnToLaunch,
         End::Land => Item::Land { at: home },
@@ -318,7 +322,11 @@ mod tests {
         let mut on_circle = 0;
         for item in &mission.items {
             said.push(match item {
-                Item::Takeoff { .. } => 'T',
+                Item::Takeoff { at, .. } => {
+                    let towards = ORIGIN.to_enu(at.lat_deg, at.lon_deg);
+                    assert!((towards - Point::new(100.0, 0.0)).norm() < 1e-3);
+                    'T'
+                }
                 Item::Airspeed { .. } => 'v',
                 Item::Waypoint {
                     at, acceptance_m, ..
