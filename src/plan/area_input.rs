@@ -3,7 +3,7 @@
 
 use super::lat_lon;
 use super::site::Site;
-use super::zone_input::{self, Polygons, ZoneInput, is_plan, polygon};
+use super::zone_input::{self, Polygons, ZoneInput, is_plan, polygon, simple};
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 use skein_geometry::frame::{Origin, Point};
@@ -122,7 +122,11 @@ pub fn read(file: &Path, asked: Asked<'_>) -> Result<AreaInput> {
     own.and_then(|own| input.add(own, fenced))
         .with_context(shown)?;
     if let Some(file) = asked.zones {
-        let more = zone_input::read(file, origin, Polygons::All).context("--zones")?;
+        let mut more = zone_input::read(file, origin, Polygons::All).context("--zones")?;
+        let zones = more.keep_out.iter_mut().map(|z| &mut z.name);
+        for name in zones.chain(more.keep_in.iter_mut().map(|f| &mut f.name)) {
+            *name += &format!(" of {}", file.display());
+        }
         input.notices.extend(more.notices.iter().cloned());
         input.add(more, false).context("--zones")?;
     }
@@ -231,8 +235,9 @@ fn in_plane(
 impl AreaInput {
     /// Adds zones and fences; `fenced` if the site's fence has them already.
     fn add(&mut self, more: ZoneInput, fenced: bool) -> Result<()> {
+        let origin = self.origin;
         let named = |name: String, ring: Vec<Point>| -> Result<Named> {
-            let polygon = Polygon::new(ring).with_context(|| name.clone())?;
+            let polygon = simple(origin, ring, &name)?;
             Ok(Named { name, polygon })
         };
         for zone in more.keep_out {

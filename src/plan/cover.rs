@@ -7,7 +7,7 @@ use super::output::{OutputArgs, Printed, Sheet};
 use super::size::Work;
 use super::view::{Flags, View};
 use super::{team_input, why_home};
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::{Map, Value, json};
 use skein_survey::area::{
@@ -152,7 +152,8 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         turn_radius_m: args.turn_radius_m,
     };
     let team = team_input::in_plane(&team, input.origin, defaults)?;
-    input.check_starts(&team)?;
+    let shown = || args.file.display().to_string();
+    input.check_starts(&team).with_context(shown)?;
     input.site.trigger_m = view.trigger_m.or(view.look_ahead_m.filter(|m| *m > 0.0));
     input.notices.extend(view.notices.iter().cloned());
     let sensor = sensor(args, &input)?;
@@ -163,7 +164,8 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         lanes: args.lanes.asked(),
         altitude_m: view.altitude_m,
     };
-    let (planners, told) = work.planners(asked_planners(args, &view))?;
+    let planners = work.planners(asked_planners(args, &view));
+    let (planners, told) = planners.with_context(shown)?;
     input.notices.extend(told);
     let request = AreaRequest {
         area: input.area.clone(),

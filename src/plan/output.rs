@@ -7,7 +7,7 @@ use super::args::{LENGTH_M, within};
 use super::site::Site;
 use super::upload::{self, UploadArgs};
 use super::view::ALTITUDE_M;
-use anyhow::{Context, Error, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 use skein_geometry::Segment;
@@ -125,8 +125,8 @@ impl OutputArgs {
         let heights = flying.map(|flight| (flight.name.as_str(), flight.altitude_m));
         let heights: Vec<(&str, f64)> = heights.collect();
         check_heights(&heights, self.max_height_m).map_err(|error| {
-            Error::new(error).context(
-                "--max-height-m: fewer UAVs, a smaller --layer-step-m or --separation-m, a lower --altitude-m, or several launches one after the other",
+            anyhow!(
+                "{error}; fewer UAVs, a smaller --layer-step-m or --separation-m, a lower --altitude-m, several launches one after the other, or a higher --max-height-m where one may fly there"
             )
         })?;
         let json = match (self.format, &self.out, sheet.flights.as_slice()) {
@@ -488,7 +488,10 @@ mod tests {
             error.contains("b would fly at 140 m, above the 120 m"),
             "{error}"
         );
-        assert!(error.contains("--max-height-m: fewer UAVs"), "{error}");
+        assert!(
+            error.contains("layers of at most 40 m fit; fewer UAVs"),
+            "{error}"
+        );
         json.max_height_m = 150.0;
         assert!(json.print(&both).is_ok());
         both.flights[1].track.truncate(1);

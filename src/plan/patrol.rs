@@ -8,7 +8,7 @@ use super::target_input::{Kind, TargetInput};
 use super::tour_args::TourArgs;
 use super::view::{Flags, View};
 use super::{area_input, cover, team_input};
-use anyhow::{Error, Result, anyhow, ensure};
+use anyhow::{Context, Error, Result, anyhow, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 use skein_geometry::frame::Origin;
@@ -190,7 +190,8 @@ fn over_area(args: &PatrolArgs) -> Result<Input> {
         turn_radius_m: args.turn_radius_m,
     };
     let team = team_input::in_plane(&team, site.origin, defaults)?;
-    site.check_zones(&team)?;
+    site.check_zones(&team)
+        .with_context(|| args.file.display().to_string())?;
     site.site.trigger_m = view.trigger_m;
     Ok(Input {
         origin: site.origin,

@@ -1,7 +1,6 @@
 //! How much work an area is, told before it is begun.
 
 use anyhow::{Result, bail};
-use skein_flight::coverage::passes::sweep_directions;
 use skein_geometry::Polygon;
 use skein_survey::area::{Lanes, Planner, Planners};
 use skein_survey::team::Uav;
@@ -40,14 +39,12 @@ impl Work<'_> {
         };
         let (low, high) = self.area.bounds();
         let across_m = (high - low).norm();
-        let least_m = sweep_directions(&[self.area.vertices()]);
-        let least_m = least_m.first().map_or(across_m, |d| d.1);
-        let (passes, cells) = (least_m / lane_m, self.area.area_m2() / (lane_m * lane_m));
-        let too_many_passes = across_m / lane_m > MOST_LANES;
+        let (lanes, cells) = (across_m / lane_m, self.area.area_m2() / (lane_m * lane_m));
+        let too_many_passes = lanes > MOST_LANES;
         let too_many_cells = cells > MOST_CELLS;
         let passes_said = format!(
-            "some {:.0} passes or more, where {MOST_LANES} lanes may lie across it",
-            passes.ceil()
+            "some {:.0} lanes across its box, of {MOST_LANES} at most",
+            lanes.ceil()
         );
         let cells_said = format!(
             "some {:.0} lane cells, of {MOST_CELLS} at most",
@@ -126,7 +123,7 @@ mod tests {
         let error = error.to_string();
         for part in [
             "lanes of 0.20 m over 9.000 km²",
-            "some 15000 passes or more",
+            "some 21214 lanes across its box, of 1500 at most",
             "some 225000000 lane cells, of 250000 at most",
             "a swath of 2.9 m or more (--swath-m)",
         ] {

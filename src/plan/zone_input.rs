@@ -5,7 +5,7 @@ use skein_geometry::frame::{Origin, Point};
 use skein_geometry::offset::{LayeredZone, Zone};
 use skein_geometry::{Polygon, PolygonError};
 use skein_interop::geojson::{self, HeightRules};
-use skein_interop::place::{LatLon, Shape, Side, check_ring, to_plane};
+use skein_interop::place::{LatLon, Shape, Side, check_ring, from_plane, to_plane};
 use skein_interop::plan;
 use skein_survey::zones::{Fence, NamedZone};
 use std::path::Path;
@@ -75,20 +75,27 @@ pub(super) fn polygon(origin: Origin, ring: &[LatLon], name: &str) -> Result<Pol
     let points = points
         .collect::<Result<Vec<Point>, _>>()
         .with_context(|| name.to_owned())?;
-    Polygon::new(points).map_err(|error| match error {
-        PolygonError::SelfCrossing(i, j) => {
-            let corner = |k: usize| {
-                let LatLon { lat_deg, lon_deg } = ring[k % ring.len()];
-                format!("{lat_deg:.7}, {lon_deg:.7}")
-            };
-            anyhow!(
-                "{name}: the ring touches itself: its edge from {} to {} and that from {} to {}; move them apart, or draw two polygons",
-                corner(i),
-                corner(i + 1),
-                corner(j),
-                corner(j + 1)
-            )
-        }
+    simple(origin, points, name)
+}
+
+/// A ring of the plane as a polygon.
+///
+/// # Errors
+/// When it touches itself, or is no polygon; names the place.
+pub(super) fn simple(origin: Origin, ring: Vec<Point>, name: &str) -> Result<Polygon> {
+    let corner = |k: usize| {
+        let p = ring.get(k % ring.len().max(1)).copied();
+        let LatLon { lat_deg, lon_deg } = from_plane(origin, p.unwrap_or(Point::origin()));
+        format!("{lat_deg:.7}, {lon_deg:.7}")
+    };
+    Polygon::new(ring.clone()).map_err(|error| match error {
+        PolygonError::SelfCrossing(i, j) => anyhow!(
+            "{name}: the ring touches itself: its edge from {} to {} and that from {} to {}; move them apart, or draw two polygons",
+            corner(i),
+            corner(i + 1),
+            corner(j),
+            corner(j + 1)
+        ),
         error => Error::new(error).context(name.to_owned()),
     })
 }

@@ -43,7 +43,8 @@ pub enum NoSeparation {
 /// A flight is higher than it may be. Nothing of the plan is to be flown.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error(
-    "{name} would fly at {height_m} m, above the {most_m} m that are allowed: flights that come near to each other need {layers} layers from {lowest_m} m up"
+    "{name} would fly at {height_m} m, above the {most_m} m that are allowed: flights that come near to each other need {layers} layers from {lowest_m} m up, and layers of at most {} m fit",
+    self.fitting_step_m()
 )]
 pub struct TooHigh {
     /// What the UAV that flies highest is called.
@@ -56,6 +57,16 @@ pub struct TooHigh {
     pub lowest_m: f64,
     /// How many heights there are.
     pub layers: usize,
+}
+
+impl TooHigh {
+    /// The height between two layers with which all of them would fit, whole metres; 0
+    /// where none would.
+    #[must_use]
+    pub fn fitting_step_m(&self) -> f64 {
+        let steps = self.layers.saturating_sub(1).max(1) as f64;
+        ((self.most_m - self.lowest_m) / steps).floor().max(0.0)
+    }
 }
 
 /// Refuses flights, each with its name and its height, of which one is too high.
@@ -140,7 +151,7 @@ mod tests {
         let error = check_heights(&flights, 120.0).unwrap_err();
         assert_eq!((error.name.as_str(), error.layers), ("b", 3));
         let error = error.to_string();
-        let says = "b would fly at 140 m, above the 120 m that are allowed: flights that come near to each other need 3 layers from 60 m up";
+        let says = "b would fly at 140 m, above the 120 m that are allowed: flights that come near to each other need 3 layers from 60 m up, and layers of at most 30 m fit";
         assert_eq!(error, says);
     }
 
