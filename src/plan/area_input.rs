@@ -4,7 +4,7 @@
 use super::lat_lon;
 use super::site::Site;
 use super::zone_input::{self, Polygons, ZoneInput, is_plan, polygon, simple};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 use skein_geometry::frame::{Origin, Point};
 use skein_geometry::{NoFlyZones, Polygon};
@@ -162,10 +162,14 @@ fn of_geojson(text: &str) -> Result<FileShapes> {
         if f.is_no_fly()? {
             continue;
         }
-        if f.hole_rings.len() < f.holes {
-            let text = format!("at {}: a hole without an area was filled", f.pointer);
-            shapes.notices.push(text);
-        }
+        // What cannot be read is not flown over as if it were not there.
+        ensure!(
+            f.hole_rings.len() == f.holes,
+            "at {}: {} of its {} holes is no ring of at least 3 different points with a longitude and a latitude each: mend or delete it",
+            f.pointer,
+            f.holes - f.hole_rings.len(),
+            f.holes
+        );
         let sensor = match f.properties.get("sensor") {
             None | Some(Value::Null) => None,
             Some(Value::String(name)) => Some(name.clone()),

@@ -48,7 +48,7 @@ fn why_home(endurance_s: Option<f64>, way_s: f64, left: bool) -> String {
 pub struct PlanArgs {
     /// The kind of plan.
     #[command(subcommand)]
-    pub subject: Subject,
+    pub subject: Box<Subject>,
 }
 
 /// The kinds of plans.
@@ -73,7 +73,7 @@ pub enum Subject {
 /// # Errors
 /// When stdout cannot be written.
 pub fn run(args: &PlanArgs) -> io::Result<ExitCode> {
-    exit::answer(match &args.subject {
+    exit::answer(match args.subject.as_ref() {
         Subject::Route(args) => route::run(args),
         Subject::Cover(args) => cover::run(args),
         Subject::Line(args) => line::run(args),

@@ -324,7 +324,17 @@ fn what_cannot_be_meant_is_refused_with_the_place_and_what_helps() {
     let maybe = with_ring(small, r#"{"no_fly":"maybe"}"#);
     let alone = format!(r#"{{"type":"Polygon","coordinates":[{bow_tie}]}}"#);
     let touching = r#"{"type":"Polygon","coordinates":[[[8.54,47.40],[8.55,47.40],[8.545,47.40],[8.545,47.41],[8.54,47.40]]]}"#;
+    let no_hole = FIELD.replacen(
+        "[[8.542,47.402],[8.544,47.402],",
+        "[[8.542,47.402],[8.544,147.402],",
+        1,
+    );
     for (text, more, says) in [
+        (
+            no_hole.as_str(),
+            &[][..],
+            "at /features/0: 1 of its 1 holes is no ring",
+        ),
         (
             crossed.as_str(),
             &[][..],
