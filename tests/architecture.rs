@@ -279,7 +279,13 @@ fn the_recount_knows_no_geometry_of_the_planners() {
     for file in sources(&["planning/verify/src"]) {
         let text = std::fs::read_to_string(&file).unwrap();
         let code = text.split("#[cfg(test)]").next().unwrap_or_default();
-        for theirs in ["skein_geometry", "skein_flight", "skein_survey", "to_plane", "from_plane"] {
+        for theirs in [
+            "skein_geometry",
+            "skein_flight",
+            "skein_survey",
+            "to_plane",
+            "from_plane",
+        ] {
             assert!(!code.contains(theirs), "{} uses {theirs}", file.display());
         }
     }

@@ -205,6 +205,7 @@ pub fn area_error(error: AreaError, file: &Path) -> Error {
         AreaError::Team(error) => team_error(error),
         AreaError::Separation(error) => separation_error(error),
         AreaError::Zones(error) => detour_error(error),
+        AreaError::Fences(error) => Error::new(error).context(file.display().to_string()),
         AreaError::NoPlan(error) => Error::new(error).context(file.display().to_string()),
     }
 }

@@ -246,12 +246,15 @@ fn sheet(args: &CoverArgs, input: &AreaInput, request: &AreaRequest, plan: &Area
     }
     summary["objective"] = json!(args.objective.name());
     summary["sensor"] = json!(request.sensor);
+    summary["clearance_m"] = json!(request.clearance_m);
+    summary["look_ahead_m"] = json!(request.look_ahead_m);
     summary["at_home"] = at_home.collect();
     summary["notices"] = json!([&input.notices[..], &plan.notices].concat());
     let shapes = plan.shapes.iter().map(|shape| {
         let told = match &shape.kind {
             ShapeKind::Cell { number, area_m2 } => json!({"cell": number, "area_m2": area_m2}),
             ShapeKind::LeftCell => json!({"left": true}),
+            ShapeKind::Unreached => json!({"unreached": true}),
             ShapeKind::Section {
                 number,
                 uavs,
@@ -306,9 +309,10 @@ fn facts(plan: &AreaPlan) -> Map<String, Value> {
             cells,
             passes,
             unserved_passes,
+            unreached_passes,
         }) => json!({
             "area_m2": area_m2, "cells": cells, "passes": passes,
-            "unserved_passes": unserved_passes,
+            "unserved_passes": unserved_passes, "unreached_passes": unreached_passes,
         }),
         Some(Facts::Cells {
             lower_bound_s,

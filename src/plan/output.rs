@@ -174,6 +174,7 @@ impl Printed {
     pub fn new(flight: &UavFlight) -> Self {
         let mut told = Map::new();
         for (key, value) in [
+            ("speed_mps", Some(flight.speed_mps)),
             ("time_s", Some(flight.time_s)),
             ("length_m", Some(flight.length_m)),
             ("energy_s", Some(flight.energy_s)),
@@ -298,12 +299,16 @@ impl Sheet {
             json!({"type": "Feature", "properties": flight.told(uav), "geometry": geometry})
         });
         let shapes = self.shapes.iter().map(|(ring, properties)| {
-            let ring = ring.iter().chain(ring.first());
+            // Two corners are a line.
+            let is_line = ring.len() == 2;
+            let ring = ring.iter().chain(ring.first().filter(|_| !is_line));
             let ring: Vec<Value> = ring.map(|p| self.position(p)).collect();
-            json!({
-                "type": "Feature", "properties": properties,
-                "geometry": {"type": "Polygon", "coordinates": [ring]},
-            })
+            let geometry = if is_line {
+                json!({"type": "LineString", "coordinates": ring})
+            } else {
+                json!({"type": "Polygon", "coordinates": [ring]})
+            };
+            json!({"type": "Feature", "properties": properties, "geometry": geometry})
         });
         let mut out = self.summary.clone();
         out["type"] = json!("FeatureCollection");
