@@ -530,7 +530,7 @@ fn unseen(flights: &Flights) -> Vec<String> {
     let mut told = Vec::new();
     if flights.too_near_share > SAME_SHARE {
         told.push(format!(
-            "{} of the area is nearer to zones or fences than the clearance, and not seen",
+            "{} of the area is nearer to zones or fences than the clearance or outside of these, and not seen",
             percent(flights.too_near_share)
         ));
     }

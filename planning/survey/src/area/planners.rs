@@ -112,15 +112,13 @@ impl<'a> OpenArea<'a> {
         })
     }
 
-    /// Whether a point of the area is to be seen: in no hole and no zone as they are drawn,
-    /// and outside of no fence.
+    /// Whether a point of the area is to be seen: in no hole and no zone as they are drawn.
     pub(crate) fn wants(&self, p: Point) -> bool {
-        let zones = self.airspace.zones();
-        zones.distance_m(p) > 0.0 && !self.request.holes.iter().any(|h| h.contains(p))
+        self.request.zones.distance_m(p) > 0.0 && !self.request.holes.iter().any(|h| h.contains(p))
     }
 
-    /// Whether a point that is to be seen is nearer to a zone or a fence than the
-    /// clearance.
+    /// Whether a point that is to be seen is nearer to a zone or a fence than the clearance,
+    /// or outside of a fence.
     pub(crate) fn is_too_near(&self, p: Point) -> bool {
         self.airspace.zones().distance_m(p) < self.airspace.clearance_m()
     }
