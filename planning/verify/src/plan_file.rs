@@ -58,7 +58,7 @@ pub fn read(file: &str, text: &str, plane: Plane) -> Result<Plan, VerifyError> {
     let document = Document::parse("the plan", file, text)?;
     let root = document.root();
     if root.get("flights")?.is_some() {
-        return Ok(of_skein(&root, plane)?);
+        return Ok(plan_of_skein(&root, plane)?);
     }
     let mut plan = Plan::new(plane);
     for track in tracks(&root, file, &mut plan.notices)? {
@@ -104,7 +104,7 @@ fn positive(at: &Node<'_>, name: &str, unit: &str) -> Result<Option<f64>, Error>
     value.map(|v| v.number(1e-3, LONGEST_M, unit)).transpose()
 }
 
-fn of_skein(root: &Node<'_>, plane: Plane) -> Result<Plan, Error> {
+fn plan_of_skein(root: &Node<'_>, plane: Plane) -> Result<Plan, Error> {
     let mut plan = Plan::new(plane);
     plan.clearance_m = figure(root, "clearance_m", LONGEST_M, "metres")?;
     plan.look_ahead_m = figure(root, "look_ahead_m", LONGEST_M, "metres")?;
@@ -117,7 +117,7 @@ fn of_skein(root: &Node<'_>, plane: Plane) -> Result<Plan, Error> {
     };
     let mut left = MOST_PIECES;
     for (i, at) in root.need("flights")?.items()?.iter().enumerate() {
-        let flight = skein_flight(at, i, plane, &mut left)?;
+        let flight = flight_of_skein(at, i, plane, &mut left)?;
         if !flight.exact && !flight.pieces.is_empty() {
             plan.notices.push(format!(
                 "{}: no trajectory: its corners are taken for what it flies, its turns and its camera are not known",
@@ -129,7 +129,7 @@ fn of_skein(root: &Node<'_>, plane: Plane) -> Result<Plan, Error> {
     Ok(plan)
 }
 
-fn skein_flight(
+fn flight_of_skein(
     at: &Node<'_>,
     number: usize,
     plane: Plane,
