@@ -27,8 +27,8 @@ use std::time::{Duration, Instant};
 /// Steps of improvement: plans are to be right, not good.
 const STEPS: usize = 200;
 
-/// Sites that are told one by one.
-const MOST_TOLD: usize = 40;
+/// Sites that are told one by one for each rule.
+const MOST_TOLD: usize = 10;
 
 fn polygon(ring: &[Point]) -> Result<Polygon, String> {
     let points = ring.iter().map(|p| Theirs::new(p.x, p.y)).collect();
@@ -174,10 +174,13 @@ impl Tally {
                     report.violations.iter().map(|v| v.rule.name()).collect();
                 rules.sort_unstable();
                 rules.dedup();
+                let mut tell = false;
                 for rule in &rules {
-                    self.broken.entry(rule).or_insert((0, seed)).0 += 1;
+                    let (n, _) = self.broken.entry(rule).or_insert((0, seed));
+                    *n += 1;
+                    tell |= *n <= MOST_TOLD;
                 }
-                if self.wrong <= MOST_TOLD {
+                if tell {
                     println!("seed {seed} ({})", site.kind);
                     for v in report.violations.iter().take(3) {
                         let who = v.flight.as_deref().unwrap_or("all");

@@ -351,4 +351,76 @@ mod tests {
         let share = seen(&ground, &[pass]).share();
         assert!((share - 0.5).abs() < 1e-3, "{share}");
     }
+
+    #[test]
+    fn shares_are_those_of_dense_samples() {
+        for seed in 0..60_u32 {
+            let site = crate::generate::Site::of(u64::from(seed));
+            let ground = site.ground().unwrap();
+            let bounds = ground.areas[0].outline.bounds();
+            let (low, high) = (bounds.low, bounds.high);
+            // A zigzag over the box, with a bend at each end and the camera on.
+            let swath_m = (high.y - low.y) / 7.0;
+            let mut looks = Vec::new();
+            for i in 0..4 {
+                let y = low.y + swath_m * (0.7 + 1.4 * f64::from(i));
+                let slope = swath_m * (f64::from(seed % 7) - 3.4) / 5.0;
+                let (a, b) = (Point::new(low.x, y), Point::new(high.x, y + slope));
+                looks.push(Look {
+                    piece: Piece::between(a, b, true),
+                    swath_m,
+                    look_ahead_m: 0.1 * swath_m,
+                });
+            }
+            let sees = |p: Point| {
+                looks.iter().any(|l| {
+                    let way = l.piece.end().minus(l.piece.start);
+                    let along = way.dot(p.minus(l.piece.start)) / way.norm();
+                    let aside = way.cross(p.minus(l.piece.start)) / way.norm();
+                    (-l.look_ahead_m..=way.norm() + l.look_ahead_m).contains(&along)
+                        && aside.abs() <= l.swath_m / 2.0
+                })
+            };
+            let forbidden = |p: Point| {
+                let mut out = ground.zones.iter().chain(&ground.holes);
+                out.any(|z| z.outline.contains(p))
+            };
+            // A sequence that no border is aligned with (Roberts, "The unreasonable
+            // effectiveness of quasirandom sequences", 2018).
+            let n = 200_000;
+            let (mut all, mut some) = (0_u32, 0_u32);
+            for i in 0..n {
+                let share = |step: f64| (f64::from(i) * step).fract();
+                let p = Point::new(
+                    low.x + (high.x - low.x) * share(0.754_877_666_246_692_8),
+                    low.y + (high.y - low.y) * share(0.569_840_290_998_053_3),
+                );
+                if ground.areas[0].outline.contains(p) && !forbidden(p) {
+                    all += 1;
+                    some += u32::from(sees(p));
+                }
+            }
+            let seen = seen(&ground, &looks);
+            let box_m2 = (high.x - low.x) * (high.y - low.y);
+            let sampled_m2 = f64::from(all) / f64::from(n) * box_m2;
+            let slack = 1e-3 * box_m2;
+            assert!(
+                (seen.area_m2 - sampled_m2).abs() < slack,
+                "{seed}: {seen:?} {sampled_m2}"
+            );
+            let sampled_m2 = f64::from(some) / f64::from(n) * box_m2;
+            assert!(
+                (seen.seen_m2 - sampled_m2).abs() < slack,
+                "{seed}: {seen:?} {sampled_m2}"
+            );
+            let share = f64::from(some) / f64::from(all.max(1));
+            if all > 20_000 {
+                assert!(
+                    (seen.share() - share).abs() < 3e-3,
+                    "{seed}: {} {share}",
+                    seen.share()
+                );
+            }
+        }
+    }
 }
