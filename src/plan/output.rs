@@ -175,6 +175,8 @@ impl Printed {
         let mut told = Map::new();
         for (key, value) in [
             ("speed_mps", Some(flight.speed_mps)),
+            ("turn_radius_m", Some(flight.turn_radius_m)),
+            ("swath_m", flight.lane_m),
             ("time_s", Some(flight.time_s)),
             ("length_m", Some(flight.length_m)),
             ("energy_s", Some(flight.energy_s)),

@@ -191,6 +191,7 @@ fn summary(request: &TourRequest, plan: &TourPlan, wishes: &Wishes, notices: &[S
         "makespan_s": plan.makespan_s, "lower_bound_s": plan.lower_bound_s,
         "total_s": plan.total_s, "total_m": plan.total_m,
         "energy_s": plan.energy_s, "energy_wh": plan.energy_wh,
+        "wind_mps": request.wind_mps.norm(), "clearance_m": request.clearance_m,
         "objective": wishes.objective.name(), "sensor": wishes.sensor,
         "uavs_flying": plan.uavs_flying(), "at_home": at_home,
         "targets": plan.targets, "unserved": plan.unserved,

@@ -86,6 +86,7 @@ impl Flight {
             lap: self.lap.clone(),
             altitude_m,
             speed_mps: self.speed_mps,
+            turn_radius_m: self.turn_radius_m,
             length_m: self.length_m,
             time_s: self.time_s(),
             energy_s: self.energy_s(),
@@ -122,6 +123,8 @@ pub struct UavFlight {
     pub altitude_m: f64,
     /// Airspeed, m/s.
     pub speed_mps: f64,
+    /// The tightest turn that it can fly, metres.
+    pub turn_radius_m: f64,
     /// Length over the ground, metres, with the turns where the planner knows them.
     pub length_m: f64,
     /// How long it takes, seconds.
@@ -158,6 +161,7 @@ impl UavFlight {
             lap: Vec::new(),
             altitude_m,
             speed_mps: uav.speed_mps,
+            turn_radius_m: uav.turn_radius_m,
             length_m: 0.0,
             time_s: 0.0,
             energy_s: 0.0,

@@ -34,6 +34,9 @@ use skein_geometry::{Curve, Segment};
 /// Courses over a point that are compared: every 22.5°.
 const COURSES: u8 = 16;
 
+/// What is flown straight over a point, metres.
+const OVER_M: f64 = 1.0;
+
 /// Arcs become chords of at most this turn in a track of points, radians.
 const CHORD_RAD: f64 = FRAC_PI_2 / 6.0;
 
@@ -53,7 +56,7 @@ pub struct Stand {
     pub from: Pose,
     /// Where it ends.
     pub to: Pose,
-    /// What lies between; empty over a point.
+    /// What lies between.
     pub curve: Curve,
 }
 
@@ -84,15 +87,12 @@ impl Stop {
         })
     }
 
-    /// A point to be flown over on any course.
+    /// A point to be flown over straight, on any course.
     pub fn over(point: Point) -> Self {
-        let stands = (0..COURSES).map(|i| {
-            let pose = Pose::new(point, TAU * f64::from(i) / f64::from(COURSES) - PI);
-            Stand {
-                from: pose,
-                to: pose,
-                curve: Curve::empty(),
-            }
+        let stands = (0..COURSES).filter_map(|i| {
+            let course_rad = TAU * f64::from(i) / f64::from(COURSES) - PI;
+            let half = Pose::new(point, course_rad).direction() * (OVER_M / 2.0);
+            Stand::along(straight(point - half, point + half))
         });
         Self {
             stands: stands.collect(),
