@@ -85,7 +85,6 @@ fn flight(site: &Site, own: &UavFlight) -> Flight {
         claims: FlightClaims {
             length_m: Some(own.length_m),
             time_s: Some(own.time_s),
-            lane_m: own.lane_m,
             from: own.path.first().map(point),
             to: own.path.last().map(point),
         },

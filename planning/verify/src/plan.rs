@@ -11,8 +11,6 @@ pub struct FlightClaims {
     pub length_m: Option<f64>,
     /// How long it takes, seconds.
     pub time_s: Option<f64>,
-    /// Distance of the lanes it flies, metres.
-    pub lane_m: Option<f64>,
     /// Where it begins.
     pub from: Option<Point>,
     /// Where it ends.

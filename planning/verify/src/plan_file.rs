@@ -164,7 +164,6 @@ fn flight_of_skein(
     flight.claims = FlightClaims {
         length_m: figure(at, "length_m", 1e12, "metres")?,
         time_s: figure(at, "time_s", 1e12, "seconds")?,
-        lane_m: figure(at, "lane_m", 1e12, "metres")?,
         from: corners.first().copied(),
         to: corners.last().copied(),
     };

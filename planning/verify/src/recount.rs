@@ -212,8 +212,8 @@ pub struct FlightRecount {
     pub inside_fences: Option<f64>,
     /// The least radius of its arcs, metres.
     pub tightest_m: Option<f64>,
-    /// What the plan says: length, time, lanes.
-    pub claimed: (Option<f64>, Option<f64>, Option<f64>),
+    /// What the plan says: length and time.
+    pub claimed: (Option<f64>, Option<f64>),
     /// The turn radius that was asked for, metres.
     pub asked_radius_m: Option<f64>,
 }
@@ -432,11 +432,7 @@ impl Desk<'_> {
                 .map(|v| length_m / v)
                 .or((length_m <= 0.0).then_some(0.0)),
             asked_radius_m: self.settings.turn_radius_m.or(flight.turn_radius_m),
-            claimed: (
-                flight.claims.length_m,
-                flight.claims.time_s,
-                flight.claims.lane_m,
-            ),
+            claimed: (flight.claims.length_m, flight.claims.time_s),
             ..FlightRecount::default()
         };
         if flight.exact {

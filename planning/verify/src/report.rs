@@ -44,12 +44,12 @@ pub fn text(report: &Report) -> String {
             let _ = writeln!(out, "  {}: stays", f.name);
             continue;
         }
-        let (length_m, time_s, lane_m) = f.claimed;
+        let (length_m, time_s) = f.claimed;
         let _ = writeln!(out, "  {}: {} pieces", f.name, f.pieces);
         let lines = [
             ("length", beside(Some(f.length_m), length_m, " m", 1)),
             ("time", beside(f.time_s, time_s, " s", 1)),
-            ("camera on", beside(Some(f.seeing_m), lane_m, " m", 1)),
+            ("camera on", beside(Some(f.seeing_m), None, " m", 1)),
             ("from zones", asked(f.to_zone, Some(report.clearance_m))),
             (
                 "in fences",
@@ -101,10 +101,10 @@ pub fn json(report: &Report) -> Value {
     let flights = report.flights.iter().map(|f| {
         json!({
             "name": f.name, "pieces": f.pieces, "length_m": f.length_m, "time_s": f.time_s,
-            "lane_m": f.seeing_m, "zone_distance_m": f.to_zone,
+            "camera_m": f.seeing_m, "zone_distance_m": f.to_zone,
             "fence_distance_m": f.inside_fences, "least_radius_m": f.tightest_m,
             "turn_radius_m": f.asked_radius_m,
-            "claimed": {"length_m": f.claimed.0, "time_s": f.claimed.1, "lane_m": f.claimed.2},
+            "claimed": {"length_m": f.claimed.0, "time_s": f.claimed.1},
         })
     });
     json!({

@@ -138,7 +138,6 @@ fn a_plan_that_keeps_all_rules_holds() {
     assert!((report.area_m2.unwrap() - 36_000.0).abs() < 5.0);
     let json = report::json(&report);
     assert_eq!(json["holds"], true);
-    assert_eq!(json["flights"][0]["claimed"]["lane_m"], 600.0);
 }
 
 #[test]

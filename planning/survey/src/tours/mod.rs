@@ -148,7 +148,7 @@ pub struct TourPlan {
     pub lower_bound_s: Option<f64>,
     /// The time of all flights together, seconds.
     pub total_s: f64,
-    /// The length of all flights together, through the air, metres.
+    /// The length of all flights together, over the ground, metres.
     pub total_m: f64,
     /// The energy of all flights together, seconds of cruise.
     pub energy_s: f64,

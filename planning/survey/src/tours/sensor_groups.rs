@@ -430,7 +430,10 @@ impl Tours {
             makespan_s: worth.makespan_s,
             lower_bound_s: self.lower_bound_s,
             total_s: flights().map(Flight::time_s).sum(),
-            total_m: worth.total_m,
+            total_m: flights()
+                .flat_map(|f| &f.legs)
+                .map(|l| l.curve.length_m())
+                .sum(),
             energy_s: worth.energy,
             energy_wh: flights().map(Flight::energy_wh).sum(),
             targets: problem.ways.len(),
