@@ -257,7 +257,10 @@ impl Sheet {
             tour.extend(flight.details.clone());
             tour.insert("points".to_owned(), points.collect());
             if !flight.legs.is_empty() {
-                tour.insert("trajectory".to_owned(), self.trajectory(&flight.legs));
+                tour.insert(
+                    "trajectory".to_owned(),
+                    trajectory(self.origin, &flight.legs),
+                );
             }
             Value::Object(tour)
         });
@@ -266,26 +269,6 @@ impl Sheet {
         out["origin"] = json!({"lat_deg": lat_deg, "lon_deg": lon_deg});
         out["flights"] = flights.collect();
         out
-    }
-
-    /// Lines and arcs one after the other. Courses are clockwise from north, and radii
-    /// positive to the right; a line has none.
-    fn trajectory(&self, legs: &[Leg]) -> Value {
-        let piece = |leg: &Leg, s: &Segment| {
-            let at = from_plane(self.origin, s.start.position());
-            let arc = s.curvature_per_m != 0.0;
-            json!({
-                "lat_deg": at.lat_deg, "lon_deg": at.lon_deg,
-                "course_deg": (90.0 - s.start.heading_rad.to_degrees()).rem_euclid(360.0),
-                "length_m": s.length_m,
-                "radius_m": arc.then(|| -1.0 / s.curvature_per_m),
-                "sees": leg.sees,
-            })
-        };
-        let pieces = legs
-            .iter()
-            .flat_map(|leg| leg.curve.segments().iter().map(move |s| piece(leg, s)));
-        pieces.collect()
     }
 
     fn geojson(&self) -> Value {
@@ -393,6 +376,26 @@ fn positive_zeros(value: &mut Value) {
         Value::Object(members) => members.values_mut().for_each(positive_zeros),
         _ => {}
     }
+}
+
+/// Lines and arcs one after the other. Courses are clockwise from north, and radii
+/// positive to the right; a line has none.
+pub(super) fn trajectory(origin: Origin, legs: &[Leg]) -> Value {
+    let piece = |leg: &Leg, s: &Segment| {
+        let at = from_plane(origin, s.start.position());
+        let arc = s.curvature_per_m != 0.0;
+        json!({
+            "lat_deg": at.lat_deg, "lon_deg": at.lon_deg,
+            "course_deg": (90.0 - s.start.heading_rad.to_degrees()).rem_euclid(360.0),
+            "length_m": s.length_m,
+            "radius_m": arc.then(|| -1.0 / s.curvature_per_m),
+            "sees": leg.sees,
+        })
+    };
+    let pieces = legs
+        .iter()
+        .flat_map(|leg| leg.curve.segments().iter().map(move |s| piece(leg, s)));
+    pieces.collect()
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! Planned by [`skein_survey::route`].
 
 use super::lat_lon;
-use super::output::text;
+use super::output::{text, trajectory};
 use super::zone_input::{self, Polygons, ZoneInput};
 use anyhow::{Context, Error, Result, anyhow, ensure};
 use clap::{Args, ValueEnum};
@@ -45,6 +45,10 @@ pub struct RouteArgs {
         allow_hyphen_values = true
     )]
     pub vertical_margin_m: f64,
+    /// The tightest turn of who flies it, metres: what is flown then is told as
+    /// `trajectory`, or that nothing can be.
+    #[arg(long, value_name = "R", allow_hyphen_values = true)]
+    pub turn_radius_m: Option<f64>,
     /// Which engine looks for the path; both find the shortest.
     #[arg(long, value_enum, default_value_t = Engine::Mesh)]
     pub engine: Engine,
@@ -115,6 +119,7 @@ pub fn run(args: &RouteArgs) -> Result<String> {
             Engine::Mesh => route::Engine::Mesh,
             Engine::Graph => route::Engine::Graph,
         },
+        turn_radius_m: args.turn_radius_m,
     });
     let plan = plan.map_err(|error| route_error(error, args))?;
     notices.extend(plan.notices.iter().cloned());
@@ -143,6 +148,7 @@ fn level(args: &RouteArgs) -> Result<Option<Level>> {
 fn route_error(error: RouteError, args: &RouteArgs) -> Error {
     match error {
         RouteError::Clearance(cause) => Error::new(cause).context("--clearance-m"),
+        RouteError::Radius(_) => Error::new(error).context("--turn-radius-m"),
         RouteError::NoWay { leg, .. } => {
             let ends = |i: usize| match i.checked_sub(1) {
                 None => &args.from,
@@ -185,6 +191,11 @@ fn json(plan: &RoutePlan, origin: Origin, clearance_m: f64, notices: &[String]) 
     out["points"] = points.collect();
     out["repairs"] = json!(repairs);
     out["notices"] = json!(notices);
+    if !plan.legs.is_empty() {
+        let flown_m = plan.legs.iter().map(|l| l.curve.length_m()).sum::<f64>();
+        out["flown_m"] = json!(flown_m);
+        out["trajectory"] = trajectory(origin, &plan.legs);
+    }
     out
 }
 
@@ -224,6 +235,7 @@ mod tests {
             clearance_m,
             level_m: None,
             vertical_margin_m: 10.0,
+            turn_radius_m: None,
             engine: Engine::Mesh,
             format: Format::Json,
         }

@@ -4,6 +4,8 @@
 //! and its distance from the zones as drawn is measured again before it is given away.
 //! Turns are left to the UAV: D2.7 §2.4 is the business of trajectories.
 
+use crate::flight::Leg;
+use crate::flown::{Airspace, AirspaceError, Stop, fly_to};
 use crate::measure::to_piece_m;
 use crate::via_points::{NoLeg, shortest_through};
 use crate::visibility::VisibilityGraph;
@@ -46,6 +48,8 @@ pub struct RouteRequest {
     pub level: Option<Level>,
     /// Which engine looks for the path.
     pub engine: Engine,
+    /// The tightest turn of who flies it, metres; `None` where nobody is to.
+    pub turn_radius_m: Option<f64>,
 }
 
 /// The engines; both find the shortest path.
@@ -74,6 +78,8 @@ pub struct RoutePlan {
     pub repairs: Vec<NamedRepair>,
     /// What is worth saying: zones that are flown over.
     pub notices: Vec<String>,
+    /// What is flown over the places in order, with turns; empty where nobody is to.
+    pub legs: Vec<Leg>,
 }
 
 impl RoutePlan {
@@ -98,6 +104,18 @@ pub struct NamedRepair {
 /// Why there is no route. Nothing was planned.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum RouteError {
+    /// The turn radius is no length.
+    #[error("a turn radius is a number of metres above 0, found {0}")]
+    Radius(f64),
+    /// A zone is no polygon, or a fence cannot be stayed within.
+    #[error(transparent)]
+    Fences(#[from] AirspaceError),
+    /// There is a way, and nobody can fly it.
+    #[error("no flight with turns of {turn_radius_m} m keeps clear of zones and fences")]
+    NoFlight {
+        /// The tightest turn, metres.
+        turn_radius_m: f64,
+    },
     /// The clearance is no length.
     #[error("the clearance")]
     Clearance(#[source] OffsetError),
@@ -204,6 +222,10 @@ pub fn plan(request: &RouteRequest) -> Result<RoutePlan, RouteError> {
         vertex: r.place.vertex,
         kind: r.kind,
     });
+    let legs = match request.turn_radius_m {
+        Some(turn_radius_m) => flown(&places, &zones.zones, clearance_m, turn_radius_m)?,
+        None => Vec::new(),
+    };
     let mut notices = Vec::new();
     if zones.flown_over > 0 {
         let over = zones.flown_over;
@@ -217,7 +239,31 @@ pub fn plan(request: &RouteRequest) -> Result<RoutePlan, RouteError> {
         repairs: repairs.collect(),
         regions: grown.regions,
         notices,
+        legs,
     })
+}
+
+/// What is flown over places in order: lines and arcs that keep the clearance all along.
+fn flown(
+    places: &[Point],
+    zones: &[Zone],
+    clearance_m: f64,
+    turn_radius_m: f64,
+) -> Result<Vec<Leg>, RouteError> {
+    if !(turn_radius_m > 0.0 && turn_radius_m.is_finite()) {
+        return Err(RouteError::Radius(turn_radius_m));
+    }
+    let [start, via @ .., end] = places else {
+        return Ok(Vec::new());
+    };
+    let airspace = Airspace::of_zones(zones, places.iter().copied(), clearance_m)?;
+    let stops: Vec<Stop> = via.iter().map(|p| Stop::over(*p)).collect();
+    let flown = fly_to(&airspace.router(turn_radius_m), (*start, *end), &stops);
+    let in_order = flown.order.iter().map(|(stop, _)| *stop).eq(0..stops.len());
+    if !in_order || flown.legs.is_empty() && start != end {
+        return Err(RouteError::NoFlight { turn_radius_m });
+    }
+    Ok(flown.legs)
 }
 
 /// The error with the name that the zone has.
@@ -344,6 +390,7 @@ fn least_distance_m(path: &[Point], zones: &[Zone]) -> f64 {
 mod tests {
     use super::*;
     use skein_geometry::offset::LayeredZone;
+    use skein_geometry::{NoFlyZones, Polygon};
 
     fn ring(x: f64, y: f64, half: f64) -> Vec<Point> {
         [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
@@ -382,6 +429,7 @@ mod tests {
             }],
             clearance_m: 10.0,
             level: None,
+            turn_radius_m: None,
             engine: Engine::Mesh,
         }
     }
@@ -441,5 +489,54 @@ mod tests {
             panic!("a way through the wall");
         };
         assert_eq!((from.as_str(), to.as_str()), ("place 0", "place 1"));
+    }
+
+    #[test]
+    fn a_flown_route_turns_within_the_clearance_or_is_refused() {
+        let square = [(100.0, -50.0), (200.0, -50.0), (200.0, 50.0), (100.0, 50.0)];
+        let mut asked = request(&[(0.0, 0.0), (150.0, 120.0), (300.0, 0.0)]);
+        let zone = Zone {
+            outer: square.map(|(x, y)| Point::new(x, y)).to_vec(),
+            holes: Vec::new(),
+        };
+        asked.keep_out = vec![NamedZone {
+            name: "square".to_owned(),
+            zone: LayeredZone {
+                zone: zone.clone(),
+                floor_m: f64::NEG_INFINITY,
+                ceiling_m: f64::INFINITY,
+            },
+        }];
+        asked.clearance_m = 10.0;
+        asked.turn_radius_m = Some(30.0);
+        let plan = plan(&asked).unwrap();
+        let flown_m: f64 = plan.legs.iter().map(|l| l.curve.length_m()).sum();
+        assert!(
+            flown_m >= plan.length_m() && flown_m < 1.3 * plan.length_m(),
+            "{flown_m}"
+        );
+        let zones = NoFlyZones::new(vec![Polygon::new(zone.outer).unwrap()]);
+        assert!(plan.legs.iter().all(|l| zones.is_clear(&l.curve, 10.0)));
+        let ends: Vec<_> = plan.legs.iter().flat_map(|l| l.curve.segments()).collect();
+        assert!(ends[0].start.position().coords.norm() < 1e-6);
+        let end = ends[ends.len() - 1].end().position();
+        assert!((end - Point::new(300.0, 0.0)).norm() < 1e-6);
+        // A fence in which nobody turns.
+        let corners = [
+            (-20.0, -20.0),
+            (320.0, -20.0),
+            (320.0, 150.0),
+            (-20.0, 150.0),
+        ];
+        asked.keep_in = vec![Fence {
+            name: "fence".to_owned(),
+            ring: corners.map(|(x, y)| Point::new(x, y)).to_vec(),
+        }];
+        assert!(super::plan(&asked).is_ok());
+        asked.turn_radius_m = Some(500.0);
+        let refused = super::plan(&asked).unwrap_err();
+        assert!(matches!(refused, RouteError::NoFlight { .. }), "{refused}");
+        asked.turn_radius_m = Some(0.0);
+        assert_eq!(super::plan(&asked), Err(RouteError::Radius(0.0)));
     }
 }

@@ -6,6 +6,7 @@
 
 use skein_flight::route::{RouteLimits, Router};
 use skein_geometry::frame::Point;
+use skein_geometry::offset::Zone;
 use skein_geometry::polygon::PolygonError;
 use skein_geometry::{NoFlyZones, Polygon};
 use std::sync::Arc;
@@ -29,15 +30,11 @@ pub enum AirspaceError {
         /// Why.
         source: PolygonError,
     },
-    /// A place lies outside of a fence, or nearer to it than the clearance.
-    #[error(
-        "{place} lies outside of inclusion fence {number}, or nearer to its border than the clearance"
-    )]
-    Outside {
-        /// What lies there.
-        place: String,
-        /// Which fence, from 1.
-        number: usize,
+    /// A zone or a fence is no polygon.
+    #[error("a no-fly zone or a fence")]
+    Zone {
+        /// Why.
+        source: PolygonError,
     },
 }
 
@@ -80,6 +77,31 @@ impl Airspace {
             zones: Arc::new(NoFlyZones::new(all)),
             clearance_m,
         })
+    }
+
+    /// As [`Airspace::new`], of zones as planners of ways have them: what lies round a fence
+    /// is a zone with the fence as its hole.
+    ///
+    /// # Errors
+    /// When a zone is no polygon, or a fence has no outside in the plane.
+    pub fn of_zones(
+        zones: &[Zone],
+        places: impl Iterator<Item = Point>,
+        clearance_m: f64,
+    ) -> Result<Self, AirspaceError> {
+        let polygon = |ring: &[Point]| {
+            Polygon::new(ring.to_vec()).map_err(|source| AirspaceError::Zone { source })
+        };
+        let (mut out, mut fences) = (Vec::new(), Vec::new());
+        for zone in zones {
+            if zone.holes.is_empty() {
+                out.push(polygon(&zone.outer)?);
+            }
+            for hole in &zone.holes {
+                fences.push(polygon(hole)?);
+            }
+        }
+        Self::new(&NoFlyZones::new(out), &fences, places, clearance_m)
     }
 
     /// Zones, and what lies outside of fences.

@@ -6,12 +6,13 @@
 //! joins to its neighbours is taken out, and put back wherever in the flight there are
 //! curves to it.
 
-use super::{Flown, Stand, Stop};
+use super::{COURSES, Flown, Stand, Stop};
 use crate::flight::Leg;
 use skein_flight::route::Router;
 use skein_flight::trajectory::dubins;
 use skein_geometry::Curve;
 use skein_geometry::frame::{Point, Pose};
+use skein_geometry::math::{TAU, atan2, wrap_pi};
 use std::collections::BTreeMap;
 
 /// Chains that are tried for each stop.
@@ -28,6 +29,7 @@ struct Ways<'a> {
     router: &'a Router,
     stops: &'a [Stop],
     start: Point,
+    end: Point,
     known: BTreeMap<(Node, Node), Option<Curve>>,
 }
 
@@ -43,12 +45,11 @@ impl Ways<'_> {
             return known.as_ref().map(Curve::length_m);
         }
         let radius_m = self.router.limits().turn_radius_m;
-        let to_start_m = |p: Pose| (p.position() - self.start).norm();
         Some(match (from, to) {
             (Some(a), Some(b)) => dubins::length_m(self.stand(a).to, self.stand(b).from, radius_m),
-            (Some(a), None) => to_start_m(self.stand(a).to),
-            (None, Some(b)) => to_start_m(self.stand(b).from),
-            (None, None) => 0.0,
+            (Some(a), None) => (self.stand(a).to.position() - self.end).norm(),
+            (None, Some(b)) => (self.stand(b).from.position() - self.start).norm(),
+            (None, None) => (self.end - self.start).norm(),
         })
     }
 
@@ -64,16 +65,29 @@ impl Ways<'_> {
     fn searched(&self, from: Node, to: Node) -> Option<Curve> {
         let found = match (from, to) {
             (Some(a), Some(b)) => self.router.route(self.stand(a).to, self.stand(b).from),
-            (Some(a), None) => self.router.route_to_point(self.stand(a).to, self.start),
+            (Some(a), None) => self.router.route_to_point(self.stand(a).to, self.end),
             // Flown backwards from the stop: at its start a UAV may head anywhere.
             (None, Some(b)) => {
                 let back = self.stand(b).from.reversed();
                 let way = self.router.route_to_point(back, self.start);
                 way.map(|curve| curve.reversed())
             }
-            (None, None) => Ok(Curve::empty()),
+            (None, None) => return self.direct(),
         };
         found.ok()
+    }
+
+    /// From the start to the end over nothing, on any course at both.
+    fn direct(&self) -> Option<Curve> {
+        if self.start == self.end {
+            return Some(Curve::empty());
+        }
+        let d = self.end - self.start;
+        let ahead_rad = atan2(d.y, d.x);
+        let course = |i: u8| ahead_rad + TAU * f64::from(i) / f64::from(COURSES);
+        let from = |i: u8| Pose::new(self.start, wrap_pi(course(i)));
+        let all = (0..COURSES).filter_map(|i| self.router.route_to_point(from(i), self.end).ok());
+        all.min_by(|a, b| a.length_m().total_cmp(&b.length_m()))
     }
 
     /// Whether there is a way between two stops, however they are flown.
@@ -243,10 +257,16 @@ impl Ways<'_> {
 /// Every curve keeps the router's limits, and all join without a bend; stops that no curve
 /// leads to are told in [`Flown::left`].
 pub fn fly(router: &Router, start: Point, stops: &[Stop]) -> Flown {
+    fly_to(router, (start, start), stops)
+}
+
+/// As [`fly`], from one place to another one.
+pub fn fly_to(router: &Router, (start, end): (Point, Point), stops: &[Stop]) -> Flown {
     let mut ways = Ways {
         router,
         stops,
         start,
+        end,
         known: BTreeMap::new(),
     };
     let flies = |s: &usize| stops[*s].stands.iter().any(|x| is_clear(router, x));

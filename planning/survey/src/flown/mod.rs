@@ -22,7 +22,7 @@ mod tests;
 
 use crate::flight::Leg;
 pub use airspace::{Airspace, AirspaceError};
-pub use chain::{Node, fly};
+pub use chain::{Node, fly, fly_to};
 pub use ends::turnable;
 pub use polyline::stretches;
 use skein_flight::trajectory::Trajectory;

@@ -11,7 +11,6 @@ use crate::team::Uav;
 use skein_flight::coverage::lines::Traversal;
 use skein_flight::route::Router;
 use skein_geometry::frame::Point;
-use skein_geometry::{NoFlyZones, Polygon};
 
 /// A line is seen where a corner is cut by no more than this share of the swath.
 const STRAY_SHARE: f64 = 0.25;
@@ -42,19 +41,8 @@ impl<'a> Pilot<'a> {
         problem: &'a TourProblem,
         request: &'a TourRequest,
     ) -> Result<Self, ToursError> {
-        let (mut zones, mut fences) = (Vec::new(), Vec::new());
-        for zone in &request.zones {
-            // A fence is a zone with a hole: what lies round it.
-            if zone.holes.is_empty() {
-                zones.push(Polygon::new(zone.outer.clone()).map_err(ToursError::Zone)?);
-            }
-            for hole in &zone.holes {
-                fences.push(Polygon::new(hole.clone()).map_err(ToursError::Zone)?);
-            }
-        }
         let places = problem.at.iter().copied();
-        let zones = NoFlyZones::new(zones);
-        let airspace = Airspace::new(&zones, &fences, places, request.clearance_m)?;
+        let airspace = Airspace::of_zones(&request.zones, places, request.clearance_m)?;
         Ok(Self {
             problem,
             request,

@@ -26,7 +26,6 @@ use crate::objective::Objective;
 use crate::team::{TeamError, Uav, has};
 use skein_flight::coverage::lines::LineError;
 use skein_flight::coverage::metric::TooWindy;
-use skein_geometry::PolygonError;
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::offset::Zone;
 use thiserror::Error;
@@ -182,10 +181,7 @@ pub enum ToursError {
     /// There are no ways round the zones.
     #[error(transparent)]
     Zones(#[from] DetourError),
-    /// A zone or a fence is no polygon.
-    #[error("a no-fly zone or a fence")]
-    Zone(#[source] PolygonError),
-    /// A fence cannot be stayed within.
+    /// A zone is no polygon, or a fence cannot be stayed within.
     #[error(transparent)]
     Fences(#[from] AirspaceError),
     /// Nobody has the sensor that a target asks for.
