@@ -164,6 +164,8 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-netsim",
             "skein-scenario",
             "skein-interop",
+            "skein-survey",
+            "skein-verify",
         ],
         &["zenoh", "skein-node", "skein-broker"],
     ),

@@ -10,6 +10,7 @@ mod architecture;
 mod configs;
 mod d27;
 mod documents;
+mod flown_plans;
 mod many;
 mod model;
 mod names_of_checks;
