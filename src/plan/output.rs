@@ -21,6 +21,9 @@ use std::path::{Path, PathBuf};
 /// Points nearer to each other than this are one in the track, metres.
 const COINCIDENT_M: f64 = 1e-3;
 
+/// Of so many UAVs it is said why nobody flies.
+const SHOWN: usize = 3;
+
 /// Nothing that this plans for flies higher above its home, metres.
 const HIGHEST_M: f64 = 20_000.0;
 
@@ -121,6 +124,11 @@ impl OutputArgs {
     /// As [`OutputArgs::check`], or when a file cannot be written.
     pub fn print(&self, sheet: &Sheet) -> Result<String> {
         self.check(sheet.flights.len())?;
+        ensure!(
+            sheet.flights.iter().any(Printed::flies),
+            "nobody can fly: {}",
+            sheet.reasons()
+        );
         let flying = sheet.flights.iter().filter(|flight| flight.flies());
         let heights = flying.map(|flight| (flight.name.as_str(), flight.altitude_m));
         let heights: Vec<(&str, f64)> = heights.collect();
@@ -133,14 +141,7 @@ impl OutputArgs {
             (Format::Json, ..) => sheet.json(),
             (Format::Geojson, ..) => sheet.geojson(),
             (Format::Plan, Some(dir), _) => sheet.write(dir, &self.upload)?,
-            (Format::Plan, None, [flight]) => {
-                ensure!(
-                    flight.flies(),
-                    "{} stays at home, so there is nothing to upload: --format json says why",
-                    flight.name
-                );
-                return Ok(sheet.plan(flight, &self.upload));
-            }
+            (Format::Plan, None, [flight]) => return Ok(sheet.plan(flight, &self.upload)),
             (Format::Plan, None, _) => bail!("there are no flights"),
         };
         Ok(text(json))
@@ -242,6 +243,19 @@ pub struct Sheet {
 }
 
 impl Sheet {
+    /// Why UAVs stay at home, and what was noticed: the first few, for a person.
+    fn reasons(&self) -> String {
+        let home = self.summary["at_home"].as_array().into_iter().flatten();
+        let home = home.filter_map(|uav| {
+            let (name, why) = (uav["name"].as_str()?, uav["why"].as_str()?);
+            Some(format!("{name} {why}"))
+        });
+        let notices = self.summary["notices"].as_array().into_iter().flatten();
+        let notices = notices.filter_map(|notice| notice.as_str().map(str::to_owned));
+        let all: Vec<String> = home.take(SHOWN).chain(notices.take(SHOWN)).collect();
+        all.join("; ")
+    }
+
     fn position(&self, p: &Point) -> Value {
         let at = from_plane(self.origin, *p);
         json!([at.lon_deg, at.lat_deg])
@@ -480,11 +494,12 @@ mod tests {
         );
         let mut alone = sheet(&["a"]);
         alone.flights[0].track.truncate(1);
+        alone.summary["at_home"] = json!([{"name": "a", "why": "rests"}]);
         let error = args(Format::Plan, None)
             .print(&alone)
             .unwrap_err()
             .to_string();
-        assert!(error.contains("a stays at home"), "{error}");
+        assert!(error.contains("nobody can fly: a rests"), "{error}");
         std::fs::remove_dir_all(&dir).unwrap();
     }
 

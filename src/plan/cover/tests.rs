@@ -416,11 +416,14 @@ fn who_stays_is_told_for_want_of_endurance_or_of_work() {
     let why = plan(two, &["--objective", "distance"])["at_home"][0]["why"].to_string();
     assert!(why.contains("is not needed"), "{why}");
     let weak = "[{name: 'a', speed_mps: 15, endurance_s: 2}]";
-    let told = plan(weak, &[]);
-    let why = told["at_home"][0]["why"].to_string();
+    let file = dir.join("weak.json5");
+    std::fs::write(&file, weak).unwrap();
+    let fleet = file.display().to_string();
+    let error = told(&dir, FIELD, &["--exact", "--fleet", &fleet]).unwrap_err();
+    let error = format!("{error:#}");
     assert!(
-        why.contains("has not the endurance: 2 s are too few"),
-        "{told}"
+        error.starts_with("nobody can fly: a has not the endurance: 2 s are too few"),
+        "{error}"
     );
     std::fs::remove_dir_all(&dir).unwrap();
 }
