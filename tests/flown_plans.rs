@@ -14,6 +14,7 @@ use skein_netsim::world::fixture;
 use skein_netsim::world::motion::Kinematic;
 use skein_survey::area::{self, AreaRequest, Planner, Planners};
 use skein_survey::flight::UavFlight;
+use skein_survey::patrol::{self, Over, PatrolFlight, PatrolRequest, Pattern};
 use skein_survey::team::{Sensor, Uav};
 use skein_survey::tours::{self, LineTarget, PointTarget, Targets, TourRequest};
 use skein_verify::generate::Site;
@@ -251,4 +252,91 @@ fn tours_take_the_time_that_is_claimed_in_the_wind_too() {
         }
     }
     assert!(n_flown > 20, "{n_flown}");
+}
+
+/// What a UAV of a patrol flies at first.
+fn first_period(flight: &PatrolFlight) -> UavFlight {
+    UavFlight {
+        name: flight.name.clone(),
+        path: flight.path.clone(),
+        lap: Vec::new(),
+        altitude_m: flight.altitude_m,
+        speed_mps: flight.speed_mps,
+        turn_radius_m: flight.turn_radius_m,
+        length_m: flight.length_m,
+        time_s: flight.station.map_or(0.0, |station| station.time_s),
+        energy_s: 0.0,
+        energy_wh: None,
+        lane_m: None,
+        passes: None,
+        legs: flight.legs.clone(),
+        stays: None,
+    }
+}
+
+/// A patrol of a site, over its area or over its corners.
+fn patrol_of(site: &Site, no_fly: &[Polygon], area: bool, wind_mps: Vector) -> PatrolRequest {
+    let over = if area {
+        Over::Area {
+            area: polygon(&site.area),
+            holes: Vec::new(),
+            zones: Arc::new(NoFlyZones::new(no_fly.to_vec())),
+            fences: site.fences.iter().map(|f| polygon(f)).collect(),
+            planners: Planners::Only(Planner::Exact),
+        }
+    } else {
+        Over::Targets {
+            targets: targets(site, false),
+            zones: no_fly.iter().map(Into::into).collect(),
+        }
+    };
+    PatrolRequest {
+        over,
+        team: team(site),
+        clearance_m: site.manner.clearance_m,
+        wind_mps,
+        altitude_m: 60.0,
+        steps: 200,
+        losses: None,
+    }
+}
+
+#[test]
+fn patrols_take_the_time_that_is_claimed_round_and_to_and_fro() {
+    let (mut n_flown, mut arcs) = (0, 0);
+    for site in SITES.map(Site::of) {
+        let no_fly = zones(&site);
+        let shared = Arc::new(NoFlyZones::new(no_fly.clone()));
+        for (area, share, tired) in [
+            (true, 0.0, false),
+            (true, 0.3, false),
+            (false, 0.0, false),
+            (false, 0.3, false),
+            (false, 0.0, true),
+        ] {
+            let wind_mps = Vector::new(0.8, 0.6) * (share * speed_mps(&site));
+            let mut request = patrol_of(&site, &no_fly, area, wind_mps);
+            let Ok(mut plan) = patrol::plan(&request) else {
+                continue;
+            };
+            if tired {
+                // Once round takes a little too long for each.
+                let station = plan.uavs[0].station.unwrap();
+                for uav in &mut request.team {
+                    uav.endurance_s = Some(station.time_s * 0.97);
+                }
+                let Ok(other) = patrol::plan(&request) else {
+                    continue;
+                };
+                plan = other;
+            }
+            arcs += usize::from(matches!(plan.pattern, Pattern::Arcs { .. }));
+            let flying = plan.uavs.iter().filter(|uav| uav.station.is_some());
+            let flights: Vec<UavFlight> = flying.map(first_period).collect();
+            let what = format!("seed {}, area {area}, wind {share}, {tired}", site.seed);
+            let clearance_m = request.clearance_m;
+            n_flown += fly_all(&what, flights.iter(), &shared, clearance_m, wind_mps);
+        }
+    }
+    assert!(n_flown > 20 && arcs > 0, "{n_flown}, {arcs} on arcs");
 }

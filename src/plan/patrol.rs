@@ -35,10 +35,10 @@ pub enum Over {
 /// Points, lines or an area seen again and again by a team.
 ///
 /// One closed tour is planned as if for one UAV. Equal UAVs fly round, evenly spaced. Of
-/// unequal ones either each flies to and fro on an arc in proportion to its speed, or the
+/// unequal ones either each flies to and fro on an arc, all in the same time, or the
 /// fastest few fly round at the speed of the slowest of them, whichever revisits sooner.
-/// Each flight that is shown is one period: the way to the tour, once round (or to and
-/// fro), and home.
+/// Each flight that is shown is what a UAV flies at first, turns included: the way to the
+/// tour, once round (or to and fro), and home.
 #[derive(Debug, Args)]
 pub struct PatrolArgs {
     /// A QGroundControl `.plan` or GeoJSON.
@@ -97,8 +97,8 @@ pub fn run(args: &PatrolArgs) -> Result<String> {
         after_s: args.lost_after_s,
     };
     let plan = patrol::plan(&PatrolRequest {
-        over: input.over,
-        team: input.team,
+        over: input.over.clone(),
+        team: input.team.clone(),
         clearance_m: args.tours.clearance_m,
         wind_mps: args.tours.wind(),
         altitude_m: input.altitude_m,
@@ -106,9 +106,7 @@ pub fn run(args: &PatrolArgs) -> Result<String> {
         losses: (!args.lost.is_empty()).then_some(losses),
     });
     let plan = plan.map_err(|error| patrol_error(error, args))?;
-    args.tours
-        .output
-        .print(&sheet(&plan, input.origin, input.site, &input.notices))
+    args.tours.output.print(&sheet(&plan, args, input))
 }
 
 /// What is patrolled, by whom.
@@ -174,13 +172,6 @@ fn over_area(args: &PatrolArgs) -> Result<Input> {
         let text = "the survey's angle is ignored: a patrol has the shortest course".to_owned();
         site.notices.push(text);
     }
-    if !site.fences.is_empty() {
-        let text = format!(
-            "{} inclusion fence(s) ignored by a patrol",
-            site.fences.len()
-        );
-        site.notices.push(text);
-    }
     if let Some(sensor) = site.sensor.take() {
         let text = format!("sensor {sensor:?} of the area ignored: all fly the same tour");
         site.notices.push(text);
@@ -199,6 +190,7 @@ fn over_area(args: &PatrolArgs) -> Result<Input> {
         altitude_m: view.altitude_m,
         over: patrol::Over::Area {
             zones: site.no_fly(),
+            fences: site.stay_within(),
             area: site.area,
             holes: site.holes,
             planners: planners(args.exact, args.approximate),
@@ -213,6 +205,10 @@ fn patrol_error(error: PatrolError, args: &PatrolArgs) -> Error {
         PatrolError::Area(error) => area_error(error, &args.file),
         PatrolError::Targets(error) => tours_error(error),
         PatrolError::Zones(error) => detour_error(error),
+        PatrolError::Fences(error) => Error::new(error).context(args.file.display().to_string()),
+        PatrolError::NoRound { .. } | PatrolError::NoWay(_) | PatrolError::LaunchInZone(_) => {
+            Error::new(error).context(args.file.display().to_string())
+        }
         PatrolError::Nothing => anyhow!("the file holds nothing to patrol"),
         PatrolError::UnlikeInWind | PatrolError::TooWindy(_) => {
             Error::new(error).context("--wind-mps")
@@ -223,7 +219,13 @@ fn patrol_error(error: PatrolError, args: &PatrolArgs) -> Error {
 }
 
 /// What is told about everybody together.
-fn sheet(plan: &PatrolPlan, origin: Origin, site: Site, notices: &[String]) -> Sheet {
+fn sheet(plan: &PatrolPlan, args: &PatrolArgs, input: Input) -> Sheet {
+    let Input {
+        origin,
+        site,
+        notices,
+        ..
+    } = input;
     let mut summary = json!({
         "over": match plan.over {
             TourKind::Points => "points",
@@ -237,7 +239,9 @@ fn sheet(plan: &PatrolPlan, origin: Origin, site: Site, notices: &[String]) -> S
         "revisit_bound_s": plan.revisit_bound_s,
         "ratio": plan.revisit_s / plan.revisit_bound_s,
         "steady_s": plan.steady_s,
-        "notices": ([notices, &plan.notices].concat()),
+        "clearance_m": args.tours.clearance_m,
+        "wind_mps": args.tours.wind().norm(),
+        "notices": ([&notices[..], &plan.notices].concat()),
     });
     if let Some(after) = &plan.after_losses {
         summary["after_losses"] = after_losses(after, origin);
@@ -276,6 +280,15 @@ fn printed(flight: &PatrolFlight) -> Printed {
             told.insert("arc_m".to_owned(), json!(arc_m));
         }
     }
+    if flight.station.is_some() {
+        for (key, value) in [
+            ("speed_mps", flight.speed_mps),
+            ("turn_radius_m", flight.turn_radius_m),
+            ("length_m", flight.length_m),
+        ] {
+            told.insert(key.to_owned(), json!(value));
+        }
+    }
     told.insert("at_home".to_owned(), json!(flight.station.is_none()));
     Printed {
         name: flight.name.clone(),
@@ -283,7 +296,7 @@ fn printed(flight: &PatrolFlight) -> Printed {
         altitude_m: flight.altitude_m,
         speed_mps: flight.speed_mps,
         trigger_m: None,
-        legs: Vec::new(),
+        legs: flight.legs.clone(),
         told,
         details: Map::new(),
     }
@@ -456,8 +469,15 @@ mod tests {
         let flags = ["--over", "points", "--fleet", &fleet];
         let told = dir.told(&flags).unwrap();
         assert_eq!(told["pattern"], "round");
-        let all = dir.told(&["--over", "points", "--k", "3", "--endurance-s", "250"]);
-        assert_eq!(all.unwrap()["pattern"], "arcs");
+        let middle = ["--depot", "47.405,8.55", "--k", "3", "--endurance-s", "400"];
+        let arcs = dir
+            .told(&[&["--over", "points"], &middle[..]].concat())
+            .unwrap();
+        assert_eq!(arcs["pattern"], "arcs");
+        let first = &arcs["flights"][0];
+        assert!(first["time_s"].as_f64().unwrap() <= 400.0, "{first}");
+        let pieces = first["trajectory"].as_array().unwrap();
+        assert!(pieces.iter().any(|piece| !piece["radius_m"].is_null()));
         for (more, says) in [
             (
                 &["--over", "points", "--endurance-s", "60"][..],

@@ -30,7 +30,7 @@ pub fn first_period(task: &Task) -> Plan {
                 .map(|(u, a)| (u, a.0, a.1))
                 .collect()
         }
-        Pattern::Arcs { arcs } => (0..).zip(arcs).map(|(u, a)| (u, a.0, a.1)).collect(),
+        Pattern::Arcs { arcs, .. } => (0..).zip(arcs).map(|(u, a)| (u, a.0, a.1)).collect(),
     };
     let first = arcs.first().map_or(0, |a| at[a.0]);
     for (uav, from, len) in arcs {

@@ -34,7 +34,6 @@ use crate::team::{self, PlannedUav, TeamError, Uav, taking_part};
 use flights::Flights;
 use lanes::Desk;
 use planners::OpenArea;
-pub(crate) use planners::detours;
 use skein_flight::coverage::passes::PassesError;
 use skein_geometry::frame::Point;
 use skein_geometry::{NoFlyZones, Polygon};

@@ -303,7 +303,7 @@ impl Part {
 ///
 /// # Errors
 /// When the clearance is no length.
-pub(crate) fn detours(
+pub(super) fn detours(
     area: &Polygon,
     zones: &NoFlyZones,
     clearance_m: f64,

@@ -24,12 +24,30 @@ const PLACES_TRIED: usize = 24;
 /// A stop and the way in which it is flown; none for the start.
 pub type Node = Option<(usize, usize)>;
 
+/// Where a flight begins or ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Terminal {
+    /// There, on any course.
+    Place(Point),
+    /// There, on this course.
+    Pose(Pose),
+}
+
+impl Terminal {
+    fn position(self) -> Point {
+        match self {
+            Self::Place(p) => p,
+            Self::Pose(pose) => pose.position(),
+        }
+    }
+}
+
 /// The curves that were looked for.
 struct Ways<'a> {
     router: &'a Router,
     stops: &'a [Stop],
-    start: Point,
-    end: Point,
+    start: Terminal,
+    end: Terminal,
     known: BTreeMap<(Node, Node), Option<Curve>>,
 }
 
@@ -45,11 +63,11 @@ impl Ways<'_> {
             return known.as_ref().map(Curve::length_m);
         }
         let radius_m = self.router.limits().turn_radius_m;
+        let from = from.map_or(self.start, |a| Terminal::Pose(self.stand(a).to));
+        let to = to.map_or(self.end, |b| Terminal::Pose(self.stand(b).from));
         Some(match (from, to) {
-            (Some(a), Some(b)) => dubins::length_m(self.stand(a).to, self.stand(b).from, radius_m),
-            (Some(a), None) => (self.stand(a).to.position() - self.end).norm(),
-            (None, Some(b)) => (self.stand(b).from.position() - self.start).norm(),
-            (None, None) => (self.end - self.start).norm(),
+            (Terminal::Pose(a), Terminal::Pose(b)) => dubins::length_m(a, b, radius_m),
+            (a, b) => (b.position() - a.position()).norm(),
         })
     }
 
@@ -63,30 +81,31 @@ impl Ways<'_> {
     }
 
     fn searched(&self, from: Node, to: Node) -> Option<Curve> {
+        let from = from.map_or(self.start, |a| Terminal::Pose(self.stand(a).to));
+        let to = to.map_or(self.end, |b| Terminal::Pose(self.stand(b).from));
         let found = match (from, to) {
-            (Some(a), Some(b)) => self.router.route(self.stand(a).to, self.stand(b).from),
-            (Some(a), None) => self.router.route_to_point(self.stand(a).to, self.end),
+            (Terminal::Pose(a), Terminal::Pose(b)) => self.router.route(a, b),
+            (Terminal::Pose(a), Terminal::Place(b)) => self.router.route_to_point(a, b),
             // Flown backwards from the stop: at its start a UAV may head anywhere.
-            (None, Some(b)) => {
-                let back = self.stand(b).from.reversed();
-                let way = self.router.route_to_point(back, self.start);
+            (Terminal::Place(a), Terminal::Pose(b)) => {
+                let way = self.router.route_to_point(b.reversed(), a);
                 way.map(|curve| curve.reversed())
             }
-            (None, None) => return self.direct(),
+            (Terminal::Place(a), Terminal::Place(b)) => return self.direct(a, b),
         };
         found.ok()
     }
 
     /// From the start to the end over nothing, on any course at both.
-    fn direct(&self) -> Option<Curve> {
-        if self.start == self.end {
+    fn direct(&self, start: Point, end: Point) -> Option<Curve> {
+        if start == end {
             return Some(Curve::empty());
         }
-        let d = self.end - self.start;
+        let d = end - start;
         let ahead_rad = atan2(d.y, d.x);
         let course = |i: u8| ahead_rad + TAU * f64::from(i) / f64::from(COURSES);
-        let from = |i: u8| Pose::new(self.start, wrap_pi(course(i)));
-        let all = (0..COURSES).filter_map(|i| self.router.route_to_point(from(i), self.end).ok());
+        let from = |i: u8| Pose::new(start, wrap_pi(course(i)));
+        let all = (0..COURSES).filter_map(|i| self.router.route_to_point(from(i), end).ok());
         all.min_by(|a, b| a.length_m().total_cmp(&b.length_m()))
     }
 
@@ -172,8 +191,10 @@ impl Ways<'_> {
             let to = nodes.get(k).copied().flatten();
             let thought_m = self.cost_m(*from, to).unwrap_or(f64::INFINITY);
             let found_m = self.curve(*from, to).map_or(f64::INFINITY, Curve::length_m);
-            // Ways from and to the start are straight as far as is thought.
-            let is_end = from.is_none() || to.is_none();
+            // Ways from and to a place are straight as far as is thought.
+            let is_place = |end: Terminal| matches!(end, Terminal::Place(_));
+            let is_end =
+                (from.is_none() && is_place(self.start)) || (to.is_none() && is_place(self.end));
             as_thought &= found_m.is_finite() && (is_end || found_m <= thought_m + 1e-6);
         }
         as_thought
@@ -262,6 +283,12 @@ pub fn fly(router: &Router, start: Point, stops: &[Stop]) -> Flown {
 
 /// As [`fly`], from one place to another one.
 pub fn fly_to(router: &Router, (start, end): (Point, Point), stops: &[Stop]) -> Flown {
+    let ends = (Terminal::Place(start), Terminal::Place(end));
+    fly_between(router, ends, stops)
+}
+
+/// As [`fly`], from one place or pose to another one.
+pub fn fly_between(router: &Router, (start, end): (Terminal, Terminal), stops: &[Stop]) -> Flown {
     let mut ways = Ways {
         router,
         stops,
@@ -311,7 +338,7 @@ fn push(legs: &mut Vec<Leg>, curve: Curve, sees: bool) {
 }
 
 /// Whether a way of flying over a stop keeps clear itself.
-fn is_clear(router: &Router, stand: &Stand) -> bool {
+pub(super) fn is_clear(router: &Router, stand: &Stand) -> bool {
     let keep_m = router.limits().clearance_m;
     router.zones().is_clear(&stand.curve, keep_m)
 }

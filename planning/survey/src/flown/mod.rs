@@ -5,6 +5,7 @@
 //! |---|---|
 //! | `airspace` | zones, and fences turned inside out, as one kind of zones |
 //! | `chain` | which way each stop is flown, and the curves between them |
+//! | `cycle` | stops flown round and round |
 //! | `ends` | how far a straight pass may reach before a wall |
 //! | `polyline` | a line with corners as stretches that can be flown |
 //!
@@ -15,6 +16,7 @@
 
 mod airspace;
 mod chain;
+mod cycle;
 mod ends;
 mod polyline;
 #[cfg(test)]
@@ -23,6 +25,7 @@ mod tests;
 use crate::flight::Leg;
 pub use airspace::{Airspace, AirspaceError};
 pub use chain::{Node, fly, fly_to};
+pub use cycle::{Cycle, fly_round};
 pub use ends::turnable;
 pub use polyline::stretches;
 use skein_flight::trajectory::Trajectory;
@@ -139,21 +142,27 @@ impl Flown {
     /// How long it takes at an airspeed in a wind, seconds; infinite where the wind is too
     /// strong.
     pub fn time_s(&self, airspeed_mps: f64, wind_mps: Vector) -> f64 {
-        if wind_mps.norm() <= 0.0 {
-            return self.length_m() / airspeed_mps;
-        }
-        let wind = Wind::new(wind_mps.x, wind_mps.y);
-        let time_s = |leg: &Leg| {
-            Trajectory::along(&leg.curve, airspeed_mps, wind)
-                .map_or(f64::INFINITY, |t| t.duration_s())
-        };
-        self.legs.iter().map(time_s).sum()
+        time_s(&self.legs, airspeed_mps, wind_mps)
     }
 
     /// Its points: the ends of all pieces, and of arcs enough that chords stand for them.
     pub fn track(&self, start: Point) -> Vec<Point> {
         track(&self.legs, start)
     }
+}
+
+/// How long legs take at an airspeed in a wind, seconds; infinite where the wind is too
+/// strong.
+pub fn time_s(legs: &[Leg], airspeed_mps: f64, wind_mps: Vector) -> f64 {
+    if wind_mps.norm() <= 0.0 {
+        let length_m: f64 = legs.iter().map(|l| l.curve.length_m()).sum();
+        return length_m / airspeed_mps;
+    }
+    let wind = Wind::new(wind_mps.x, wind_mps.y);
+    let time_s = |leg: &Leg| {
+        Trajectory::along(&leg.curve, airspeed_mps, wind).map_or(f64::INFINITY, |t| t.duration_s())
+    };
+    legs.iter().map(time_s).sum()
 }
 
 /// The points of legs: the ends of all pieces, and of arcs enough that chords stand for

@@ -1,7 +1,7 @@
 //! How a patrol begins, and how the others go on when UAVs have failed.
 
 use super::course::Course;
-use super::pattern::{Patrol, Pattern, Uav, patrol_within, proportional, respace};
+use super::pattern::{Patrol, Pattern, Uav, equal_periods, patrol_within, respace, to_and_fro_s};
 
 /// Phases of the whole pattern that are tried at its beginning: the farthest way differs
 /// by a sixteenth of the distance between two UAVs at most.
@@ -39,7 +39,15 @@ pub struct Station {
 pub fn spread(n: u32, patrol: &Patrol, cost: impl Fn(usize, u32) -> f64) -> (Patrol, Vec<Station>) {
     match &patrol.pattern {
         Pattern::Round { uavs, .. } => (patrol.clone(), spread_round(n, uavs, cost)),
-        Pattern::Arcs { arcs } => spread_arcs(n, arcs, patrol.revisit_s, cost),
+        Pattern::Arcs { arcs, turn } => {
+            let (arcs, stations) = spread_arcs(n, arcs, cost);
+            let pattern = Pattern::Arcs { arcs, turn: *turn };
+            let patrol = Patrol {
+                pattern,
+                revisit_s: patrol.revisit_s,
+            };
+            (patrol, stations)
+        }
     }
 }
 
@@ -96,9 +104,8 @@ fn spread_round(n: u32, uavs: &[usize], cost: impl Fn(usize, u32) -> f64) -> Vec
 fn spread_arcs(
     n: u32,
     arcs: &[(u32, u32)],
-    revisit_s: f64,
     cost: impl Fn(usize, u32) -> f64,
-) -> (Patrol, Vec<Station>) {
+) -> (Vec<(u32, u32)>, Vec<Station>) {
     let turned = |by: u32| -> Vec<(u32, u32)> {
         let place = |from: u32| (u64::from(from) + u64::from(by)) % u64::from(n.max(1));
         let arc = |a: &(u32, u32)| (u32::try_from(place(a.0)).unwrap_or(0), a.1);
@@ -117,11 +124,7 @@ fn spread_arcs(
     let best = best.reduce(|a, b| if b.0 < a.0 { b } else { a });
     let arcs = turned(best.map_or(0, |b| b.1));
     let stations = stations(&arcs);
-    let patrol = Patrol {
-        pattern: Pattern::Arcs { arcs },
-        revisit_s,
-    };
-    (patrol, stations)
+    (arcs, stations)
 }
 
 impl Patrol {
@@ -136,9 +139,10 @@ impl Patrol {
                     since_s: 0.0,
                     speed: f64::from(*speed),
                 },
-                Pattern::Arcs { arcs } => Course::ToAndFro {
+                Pattern::Arcs { arcs, turn } => Course::ToAndFro {
                     from: f64::from(arcs[s.uav].0),
                     len: f64::from(arcs[s.uav].1),
+                    turn: f64::from(*turn),
                     at: 0.0,
                     since_s: 0.0,
                     speed: f64::from(speeds[s.uav]),
@@ -180,6 +184,7 @@ pub struct Change {
 
 /// The others go on after some have failed, all at once, `t_s` seconds into a patrol that
 /// has been steady for one period at least. `None` when nobody is left who can fly.
+/// Turning round at the end of an arc takes `turn` units.
 ///
 /// `joins(uav)` says where one that has rested would come to the tour, and how long it
 /// takes to be there.
@@ -195,6 +200,7 @@ pub struct Change {
 #[must_use]
 pub fn after_losses(
     n: u32,
+    turn: u32,
     uavs: &[Uav],
     before: &[Course],
     t_s: f64,
@@ -210,7 +216,7 @@ pub fn after_losses(
             ..*u
         })
         .collect();
-    let patrol = patrol_within(n, &left)?;
+    let patrol = patrol_within(n, turn, &left)?;
     let stand = |i: usize| -> Option<Stand> {
         if !patrol.pattern.flies(i) {
             return None;
@@ -240,7 +246,7 @@ pub fn after_losses(
     };
     match change.patrol.pattern.clone() {
         Pattern::Round { uavs, speed } => change.round(n, &uavs, speed),
-        Pattern::Arcs { .. } => change.arcs(n, &left),
+        Pattern::Arcs { .. } => change.arcs(n, turn, &left),
     }
     let since = change.courses.iter().filter_map(Course::since_s);
     change.steady_s = since.fold(0.0, f64::max);
@@ -280,17 +286,18 @@ impl Change {
     }
 
     /// Everyone moves along the tour to its new arc, in the order in which they are.
-    fn arcs(&mut self, n: u32, uavs: &[Uav]) {
+    fn arcs(&mut self, n: u32, turn: u32, uavs: &[Uav]) {
         let flying = self.stands.iter().enumerate();
         let mut order: Vec<(usize, Stand)> = flying.filter_map(|(i, s)| Some((i, (*s)?))).collect();
         order.sort_by(|a, b| a.1.place.total_cmp(&b.1.place).then(a.0.cmp(&b.0)));
         let speeds: Vec<u32> = order.iter().map(|(i, _)| uavs[*i].speed).collect();
-        let lens = proportional(n, &speeds);
+        let lens = equal_periods(n, turn, &speeds);
         let course = |j: usize, by: u32| {
             let (i, stand) = order[j];
             let (from, len) = (u64::from(lens[j].0) + u64::from(by), lens[j].1);
             let from = u32::try_from(from % u64::from(n)).unwrap_or(0);
-            to_arc(f64::from(n), stand, (from, len), f64::from(uavs[i].speed))
+            let speed = f64::from(uavs[i].speed);
+            to_arc(f64::from(n), stand, (from, len), f64::from(turn), speed)
         };
         let last = |by: u32| {
             let since = (0..order.len()).filter_map(|j| course(j, by).since_s());
@@ -307,11 +314,12 @@ impl Change {
             arcs[*i] = (u32::try_from(from).unwrap_or(0), lens[j].1);
             if lens[j].1 > 0 {
                 self.courses[*i] = course(j, by);
-                revisit_s = revisit_s.max(2.0 * f64::from(lens[j].1) / f64::from(uavs[*i].speed));
+                let period_s = to_and_fro_s(lens[j].1, turn, uavs[*i].speed);
+                revisit_s = revisit_s.max(period_s);
             }
         }
         self.patrol = Patrol {
-            pattern: Pattern::Arcs { arcs },
+            pattern: Pattern::Arcs { arcs, turn },
             revisit_s,
         };
     }
@@ -350,7 +358,7 @@ impl Change {
 }
 
 /// The motion of a UAV that moves along the tour to its arc, the shorter way.
-fn to_arc(n: f64, stand: Stand, arc: (u32, u32), speed: f64) -> Course {
+fn to_arc(n: f64, stand: Stand, arc: (u32, u32), turn: f64, speed: f64) -> Course {
     let (from, len) = (f64::from(arc.0), f64::from(arc.1));
     let ahead = |from: f64, to: f64| {
         let d = to - from;
@@ -358,19 +366,22 @@ fn to_arc(n: f64, stand: Stand, arc: (u32, u32), speed: f64) -> Course {
     };
     let y = ahead(from, stand.place);
     let (at, way) = if y <= len {
-        (if stand.forward { y } else { 2.0 * len - y }, 0.0)
+        let back = 2.0 * len + turn - y;
+        (if stand.forward { y } else { back }, 0.0)
     } else {
-        // Forward to the arc's beginning, or back to its end.
-        let (forth, back) = (n - y, y - len);
+        // Forward to the arc's beginning, or back to its end; who flies the other way turns.
+        let turned = |forward: bool| if stand.forward == forward { 0.0 } else { turn };
+        let (forth, back) = (n - y + turned(true), y - len + turned(false));
         if forth <= back {
             (0.0, forth)
         } else {
-            (len, back)
+            (len + turn, back)
         }
     };
     Course::ToAndFro {
         from,
         len,
+        turn,
         at,
         since_s: stand.way_s + way / speed,
         speed,

@@ -20,7 +20,10 @@ pub enum Course {
         from: f64,
         /// The arc's length.
         len: f64,
-        /// How far it has flown at the moment: on the way forth below `len`, back above.
+        /// What turning round at an end takes, units.
+        turn: f64,
+        /// How far it has flown at the moment: on the way forth below `len`, then a turn,
+        /// the way back, and a turn.
         at: f64,
         /// The moment, seconds.
         since_s: f64,
@@ -60,14 +63,16 @@ impl Course {
             Self::ToAndFro {
                 from,
                 len,
+                turn,
                 at,
                 since_s,
                 speed,
             } => {
-                let flown = wrap(at + (t_s - since_s) * speed, 2.0 * len);
-                let forth = flown < len;
-                let offset = if forth { flown } else { 2.0 * len - flown };
-                Some((wrap(from + offset, n), forth))
+                let flown = wrap(at + (t_s - since_s) * speed, 2.0 * (len + turn));
+                let back = 2.0 * len + turn - flown;
+                let forth = flown < len || back < 0.0;
+                let offset = if flown < len { flown } else { back };
+                Some((wrap(from + offset.clamp(0.0, len), n), forth))
             }
         }
     }
@@ -83,6 +88,7 @@ impl Course {
             Self::ToAndFro {
                 from,
                 len,
+                turn,
                 at,
                 since_s,
                 speed,
@@ -92,8 +98,9 @@ impl Course {
                     return None;
                 }
                 let flown = at + (t_s - since_s) * speed;
-                let forth = wrap(flown - y, 2.0 * len);
-                let back = wrap(flown + y, 2.0 * len);
+                let both = 2.0 * (len + turn);
+                let forth = wrap(flown - y, both);
+                let back = wrap(flown - (2.0 * len + turn - y), both);
                 Some(forth.min(back) / speed)
             }
         }
@@ -111,6 +118,7 @@ impl Course {
             Self::ToAndFro {
                 from,
                 len,
+                turn,
                 at,
                 since_s,
                 speed,
@@ -119,9 +127,10 @@ impl Course {
                 if y > len {
                     return None;
                 }
-                let forth = wrap(y - at, 2.0 * len);
-                let back = wrap(-y - at, 2.0 * len);
-                let period_s = 2.0 * len / speed;
+                let both = 2.0 * (len + turn);
+                let forth = wrap(y - at, both);
+                let back = wrap(2.0 * len + turn - y - at, both);
+                let period_s = both / speed;
                 Some((since_s + forth.min(back) / speed, period_s))
             }
         }

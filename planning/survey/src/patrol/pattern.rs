@@ -14,6 +14,8 @@ pub enum Pattern {
     Arcs {
         /// By UAV: where its arc begins on the tour, and its length; 0 for one that rests.
         arcs: Vec<(u32, u32)>,
+        /// What turning round at the end of an arc takes, units.
+        turn: u32,
     },
 }
 
@@ -23,7 +25,7 @@ impl Pattern {
     pub fn flies(&self, uav: usize) -> bool {
         match self {
             Self::Round { uavs, .. } => uavs.contains(&uav),
-            Self::Arcs { arcs } => arcs.get(uav).is_some_and(|a| a.1 > 0),
+            Self::Arcs { arcs, .. } => arcs.get(uav).is_some_and(|a| a.1 > 0),
         }
     }
 }
@@ -43,7 +45,7 @@ impl Patrol {
     pub fn period_s(&self, n: u32, uav: usize, speeds: &[u32]) -> f64 {
         match &self.pattern {
             Pattern::Round { speed, .. } => f64::from(n) / f64::from(*speed),
-            Pattern::Arcs { arcs } => to_and_fro_s(arcs[uav].1, speeds[uav]),
+            Pattern::Arcs { arcs, turn } => to_and_fro_s(arcs[uav].1, *turn, speeds[uav]),
         }
     }
 }
@@ -74,17 +76,17 @@ pub fn patrol(n: u32, speeds: &[u32]) -> Option<Patrol> {
         speed: *v,
         longest_s: f64::INFINITY,
     };
-    patrol_within(n, &speeds.iter().map(tireless).collect::<Vec<_>>())
+    patrol_within(n, 0, &speeds.iter().map(tireless).collect::<Vec<_>>())
 }
 
-/// The same where endurance is short: who cannot fly one period rests. `None` when nobody
-/// can.
+/// The same where endurance is short, and where turning round at the end of an arc takes
+/// `turn` units: who cannot fly one period rests. `None` when nobody can.
 ///
 /// # Complexity
 /// O(k²).
 #[must_use]
-pub fn patrol_within(n: u32, uavs: &[Uav]) -> Option<Patrol> {
-    match (round(n, uavs), arcs(n, uavs)) {
+pub fn patrol_within(n: u32, turn: u32, uavs: &[Uav]) -> Option<Patrol> {
+    match (round(n, uavs), arcs(n, turn, uavs)) {
         (Some(round), Some(arcs)) if arcs.revisit_s < round.revisit_s => Some(arcs),
         (Some(round), _) => Some(round),
         (None, arcs) => arcs,
@@ -114,11 +116,11 @@ fn round(n: u32, uavs: &[Uav]) -> Option<Patrol> {
 }
 
 /// Each flies to and fro on its own arc.
-fn arcs(n: u32, uavs: &[Uav]) -> Option<Patrol> {
+fn arcs(n: u32, turn: u32, uavs: &[Uav]) -> Option<Patrol> {
     let mut speeds: Vec<u32> = uavs.iter().map(|u| u.speed).collect();
     loop {
-        let arcs = proportional(n, &speeds);
-        let period = |i: usize| to_and_fro_s(arcs[i].1, speeds[i]);
+        let arcs = equal_periods(n, turn, &speeds);
+        let period = |i: usize| to_and_fro_s(arcs[i].1, turn, speeds[i]);
         // Who is left out makes the arcs of the others longer, so none comes back.
         let over: Vec<usize> = (0..uavs.len())
             .filter(|i| period(*i) > uavs[*i].longest_s)
@@ -129,7 +131,7 @@ fn arcs(n: u32, uavs: &[Uav]) -> Option<Patrol> {
         if over.is_empty() {
             let revisit_s = (0..uavs.len()).map(period).fold(0.0, f64::max);
             return Some(Patrol {
-                pattern: Pattern::Arcs { arcs },
+                pattern: Pattern::Arcs { arcs, turn },
                 revisit_s,
             });
         }
@@ -139,10 +141,47 @@ fn arcs(n: u32, uavs: &[Uav]) -> Option<Patrol> {
     }
 }
 
-fn to_and_fro_s(len: u32, speed: u32) -> f64 {
+/// Once to and fro on an arc, with a turn at each end.
+pub(super) fn to_and_fro_s(len: u32, turn: u32, speed: u32) -> f64 {
     match len {
         0 => 0.0,
-        len => 2.0 * f64::from(len) / f64::from(speed),
+        len => 2.0 * (f64::from(len) + f64::from(turn)) / f64::from(speed),
+    }
+}
+
+/// Arcs of whole units, one after the other, on which to and fro takes all equally long:
+/// as [`proportional`] without turns. Who would do nothing but turn has none.
+pub(super) fn equal_periods(n: u32, turn: u32, speeds: &[u32]) -> Vec<(u32, u32)> {
+    let mut speeds = speeds.to_vec();
+    loop {
+        let k = speeds.iter().filter(|v| **v > 0).count() as u64;
+        let sum: u64 = speeds.iter().map(|v| u64::from(*v)).sum::<u64>().max(1);
+        // What all of them fly in half a period.
+        let all = u128::from(n) + u128::from(k) * u128::from(turn);
+        let idle = |v: u32| v > 0 && u128::from(v) * all <= u128::from(turn) * u128::from(sum);
+        let slowest = speeds.iter().copied().filter(|v| idle(*v)).min();
+        if let Some(slow) = slowest
+            && k > 1
+        {
+            let last = speeds.iter().rposition(|v| *v == slow);
+            if let Some(v) = last.and_then(|i| speeds.get_mut(i)) {
+                *v = 0;
+            }
+            continue;
+        }
+        let (mut flown, mut turns) = (0u64, 0u64);
+        let mut arcs = Vec::with_capacity(speeds.len());
+        let mut from = 0;
+        for v in &speeds {
+            flown += u64::from(*v);
+            turns += u64::from(*v > 0);
+            let at = all * u128::from(flown) / u128::from(sum);
+            let at = at.saturating_sub(u128::from(turns) * u128::from(turn));
+            let to = u32::try_from(at).unwrap_or(n).clamp(from, n);
+            arcs.push((from, to - from));
+            from = to;
+        }
+        return arcs;
     }
 }
 

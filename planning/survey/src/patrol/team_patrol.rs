@@ -1,31 +1,24 @@
 //! Points, lines or an area seen again and again by a team: one closed tour planned as if
 //! for one UAV, and the team spaced on it (D2.7 §3.6.6).
 //!
-//! Leaves to others: the tour ([`crate::tours`], [`crate::area`]) and what spacing is best
-//! ([`crate::patrol`]).
+//! Leaves the tour to `team_tour`, who flies where on it to `watch`, and what spacing is best
+//! to [`crate::patrol`].
 
-use super::{
-    Change, Patrol, Pattern, Station, Tour, TourError, Uav as PatrolUav, after_losses,
-    patrol_within, revisit_bound, spread,
-};
-use crate::area::{self, AreaError, AreaRequest, Lanes, Planner, Planners};
-use crate::detours::{DetourError, DetourSearch, Detours};
-use crate::flight::length_m;
-use crate::heights::Separation;
-use crate::objective::Objective;
-use crate::team::{self, Sensor, TeamError, Uav};
-use crate::tours::{Targets, TourProblem, TourRequest, ToursError};
-use crate::visits;
-use skein_flight::coverage::lines;
-use skein_flight::coverage::metric::{InWind, Metric, TooWindy};
+use super::team_tour::{over_area, over_targets};
+use super::watch::Watch;
+use super::{Pattern, TourError};
+use crate::area::{AreaError, Planner, Planners};
+use crate::detours::DetourError;
+use crate::flight::Leg;
+use crate::flown::AirspaceError;
+use crate::team::{self, TeamError, Uav};
+use crate::tours::{Targets, ToursError};
+use skein_flight::coverage::metric::TooWindy;
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::offset::Zone;
 use skein_geometry::{NoFlyZones, Polygon};
 use std::sync::Arc;
 use thiserror::Error;
-
-/// Speeds that differ by less than this are the same, m/s.
-const SAME_SPEED_MPS: f64 = 1e-9;
 
 /// What is patrolled.
 #[derive(Clone, Debug)]
@@ -45,6 +38,8 @@ pub enum Over {
         holes: Vec<Polygon>,
         /// Where nobody may fly.
         zones: Arc<NoFlyZones>,
+        /// What must be stayed within, with the clearance: inside each of them.
+        fences: Vec<Polygon>,
         /// Which planners are asked.
         planners: Planners,
     },
@@ -94,7 +89,7 @@ pub enum TourKind {
 pub struct PatrolPlan {
     /// What the tour leads over.
     pub over: TourKind,
-    /// Length of the tour, metres, with its turns where the planner knows them.
+    /// Length of the tour as it is flown, metres; in a wind through the air.
     pub tour_m: f64,
     /// Who flies where on the tour.
     pub pattern: Pattern,
@@ -125,13 +120,19 @@ impl PatrolPlan {
 pub struct PatrolFlight {
     /// What the UAV is called.
     pub name: String,
-    /// Corners: the way to its station, once round or to and fro, and home; its start
-    /// alone if it rests.
+    /// What it flies: the way to its station, once round or to and fro, and home; empty if
+    /// it rests.
+    pub legs: Vec<Leg>,
+    /// Points along that; its start alone if it rests.
     pub path: Vec<Point>,
     /// Height above home, metres.
     pub altitude_m: f64,
-    /// Airspeed, m/s.
+    /// Airspeed, m/s: round the tour the common one of all.
     pub speed_mps: f64,
+    /// The tightest turn of the tour, metres.
+    pub turn_radius_m: f64,
+    /// Length over the ground, metres.
+    pub length_m: f64,
     /// Its station; none if it rests.
     pub station: Option<PatrolStation>,
 }
@@ -149,7 +150,8 @@ pub struct PatrolStation {
     pub wait_s: f64,
     /// Once round, or to and fro on its arc, seconds.
     pub period_s: f64,
-    /// One period with the ways there and back, seconds.
+    /// What is flown at first takes so long: one period with the ways there and back,
+    /// seconds.
     pub time_s: f64,
     /// Length of its arc, metres, if it flies to and fro.
     pub arc_m: Option<f64>,
@@ -210,6 +212,20 @@ pub enum PatrolError {
     /// There are no ways round the zones.
     #[error(transparent)]
     Zones(#[from] DetourError),
+    /// A zone is no polygon, or a fence cannot be stayed within.
+    #[error(transparent)]
+    Fences(#[from] AirspaceError),
+    /// No curve joins what is to be seen.
+    #[error("nothing of it can be flown round and round with a turn radius of {radius_m} m")]
+    NoRound {
+        /// The widest turn of the team, metres.
+        radius_m: f64,
+    },
+    /// Round the tour nobody has the endurance, and on arcs there is no room to turn.
+    #[error(
+        "nobody has the endurance for once round, and to and fro there is no room to turn at the ends of all arcs"
+    )]
+    NoTurn,
     /// Nothing is to be seen.
     #[error("there is nothing to patrol")]
     Nothing,
@@ -254,12 +270,14 @@ pub enum PatrolError {
 /// Plans.
 ///
 /// One closed tour is planned as if for one UAV. Equal UAVs fly round, evenly spaced. Of
-/// unequal ones either each flies to and fro on an arc in proportion to its speed, or the
+/// unequal ones either each flies to and fro on an arc, all in the same time, or the
 /// fastest few fly round at the speed of the slowest of them, whichever revisits sooner.
 ///
 /// # Guarantees
-/// As [`patrol_within`], for the tour that was found. The same request gives the same plan
-/// everywhere.
+/// As [`patrol_within`], for the tour that was found. What is flown at first, the tour and
+/// the ways there and back, are lines and arcs of the widest turn of the team that join
+/// without a bend and keep the clearance. After losses, ways and turns to new arcs are
+/// estimates. The same request gives the same plan everywhere.
 ///
 /// # Errors
 /// [`PatrolError`] when a figure has no meaning, there is no tour, or nobody can fly one
@@ -273,419 +291,16 @@ pub fn plan(request: &PatrolRequest) -> Result<PatrolPlan, PatrolError> {
     }
     let course = match &request.over {
         Over::Targets { targets, zones } => over_targets(request, targets, zones)?,
-        Over::Area {
-            area,
-            holes,
-            zones,
-            planners,
-        } => {
-            let alone = AreaRequest {
-                area: area.clone(),
-                holes: holes.clone(),
-                zones: Arc::clone(zones),
-                fences: Vec::new(),
-                team: vec![alone(request)],
-                sensor: None,
-                clearance_m: request.clearance_m,
-                look_ahead_m: None,
-                heading_rad: None,
-                planners: *planners,
-                lanes: Lanes::Common,
-                objective: Objective::Time,
-                separation: Separation::FLAT,
-                altitude_m: request.altitude_m,
-                steps: request.steps,
-            };
-            over_area(request, &alone)?
-        }
+        Over::Area { .. } => over_area(request)?,
     };
     let watch = Watch::new(request, course)?;
-    let flown = watch.flown()?;
-    watch.told(&flown)
-}
-
-/// What is flown again and again, and by whom.
-struct Course {
-    kind: TourKind,
-    /// Corners; the last leads to the first.
-    lap: Vec<Point>,
-    /// What a leg takes for each metre of it: turns add to its length.
-    stretch: f64,
-    detours: Detours,
-    notices: Vec<String>,
-}
-
-/// One tour over points or lines, without a depot on it.
-fn over_targets(
-    request: &PatrolRequest,
-    targets: &Targets,
-    zones: &[Zone],
-) -> Result<Course, PatrolError> {
-    let mut problem = TourProblem::new(&TourRequest {
-        targets: targets.clone(),
-        zones: zones.to_vec(),
-        clearance_m: request.clearance_m,
-        team: request.team.clone(),
-        wind_mps: request.wind_mps,
-        sensor: None,
-        objective: Objective::Time,
-        separation: Separation::FLAT,
-        altitude_m: request.altitude_m,
-        steps: request.steps,
-    })?;
-    let points = matches!(targets, Targets::Points(_));
-    let (plan, detours) = problem.solve(|q| {
-        let Some(first) = q.lines.first() else {
-            return Ok(None);
-        };
-        let one = [lines::Uav::at(first.a)];
-        let plan = if points {
-            visits::visit(q.lines, &one, q.metric, request.steps)
-        } else {
-            lines::plan(q.lines, &one, q.metric, request.steps)
-        };
-        Ok(Some(plan?))
-    })?;
-    problem.ignore_sensors();
-    let first = problem.ways.first().and_then(|w| w.places.first());
-    let (Some(plan), Some(first)) = (plan, first) else {
-        return Err(PatrolError::Nothing);
-    };
-    let mut lap = problem.track(&detours, &plan.tours[0].passes, problem.at[*first]);
-    lap.pop();
-    Ok(Course {
-        kind: if points {
-            TourKind::Points
-        } else {
-            TourKind::Lines
-        },
-        lap,
-        stretch: 1.0,
-        detours,
-        notices: problem.notices,
-    })
-}
-
-/// The UAV that the tour over an area is planned for: it sees as narrow and turns as wide
-/// as any of the team.
-fn alone(request: &PatrolRequest) -> Uav {
-    let (team, height_m) = (&request.team, request.altitude_m);
-    let swaths = team.iter().filter_map(|u| u.swath_m(None, height_m));
-    let width_m = swaths.fold(f64::INFINITY, f64::min);
-    let turns = team.iter().map(|u| u.turn_radius_m);
-    // The first of the team lends its name and speed: one UAV's tour is the same at any.
-    let (name, speed_mps) = team.first().map_or(("", 0.0), |u| (&u.name, u.speed_mps));
-    Uav::new(
-        name,
-        Point::origin(),
-        speed_mps,
-        turns.fold(0.0, f64::max),
-        Sensor::Swath { width_m },
-    )
-}
-
-/// One tour over an area: of the planner that is asked for, or the better one.
-fn over_area(request: &PatrolRequest, alone: &AreaRequest) -> Result<Course, PatrolError> {
-    let plan = area::plan(alone)?;
-    let flight = plan.uavs.first().ok_or(PatrolError::Nothing)?;
-    let team = &request.team;
-    let starts = team.iter().map(|u| u.start);
-    let detours = area::detours(&alone.area, &alone.zones, request.clearance_m, starts)?;
-    for uav in team {
-        if detours.forbids(uav.start) {
-            return Err(PatrolError::LaunchInZone(uav.name.clone()));
-        }
-    }
-    let mut lap = flight.lap.clone();
-    if let (Some(first), Some(last)) = (lap.first().copied(), lap.last().copied()) {
-        let home = detours.search().way(last, first).unwrap_or_default();
-        let between = home.len().saturating_sub(2);
-        lap.extend(home.into_iter().skip(1).take(between));
-    }
-    let drawn_m = length_m(&flight.path);
-    Ok(Course {
-        kind: TourKind::Area(plan.figures.planner),
-        lap,
-        stretch: (flight.length_m / drawn_m.max(f64::MIN_POSITIVE)).max(1.0),
-        detours,
-        notices: plan.notices,
-    })
-}
-
-/// The tour in millimetres with the team beside it.
-struct Watch<'a> {
-    request: &'a PatrolRequest,
-    course: Course,
-    tour: Tour,
-    /// By UAV, millimetres a second.
-    speeds: Vec<u32>,
-    /// By UAV: its nearest place on the tour, and the way there.
-    nearest: Vec<(u32, f64)>,
-    uavs: Vec<PatrolUav>,
-}
-
-/// A patrol from its beginning on.
-struct Flown {
-    patrol: Patrol,
-    stations: Vec<Station>,
-    /// By UAV: the way to its station; none for one that rests.
-    ways: Vec<Option<(Vec<Point>, f64)>>,
-    /// When all are there, seconds.
-    steady_s: f64,
-}
-
-impl<'a> Watch<'a> {
-    fn new(request: &'a PatrolRequest, course: Course) -> Result<Self, PatrolError> {
-        let wind = request.wind_mps;
-        let base_mps = request.team.first().map_or(0.0, |u| u.speed_mps);
-        let alike = |u: &Uav| (u.speed_mps - base_mps).abs() < SAME_SPEED_MPS;
-        if wind.norm() >= SAME_SPEED_MPS && !request.team.iter().all(alike) {
-            return Err(PatrolError::UnlikeInWind);
-        }
-        InWind::new(&[], base_mps, wind)?;
-        let leg = |a: Point, b: Point| course.stretch * air_m(&[a, b], base_mps, wind);
-        let tour = Tour::new(course.lap.clone(), leg)?;
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a cast of a float saturates"
-        )]
-        let whole = |u: &Uav| ((u.speed_mps * 1000.0).round() as u32).max(1);
-        let speeds = request.team.iter().map(whole).collect();
-        let mut watch = Self {
-            nearest: Vec::new(),
-            uavs: Vec::new(),
-            request,
-            course,
-            tour,
-            speeds,
-        };
-        let mut search = watch.course.detours.search();
-        let mut nearest = Vec::new();
-        for (i, uav) in request.team.iter().enumerate() {
-            let place = watch.tour.nearest(uav.start);
-            let (_, way_s) = watch.way(&mut search, i, place)?;
-            nearest.push((place, way_s));
-        }
-        let able = |(uav, (_, way_s)): (usize, &(u32, f64))| {
-            let endurance_s = request.team[uav].endurance_s;
-            PatrolUav {
-                speed: watch.speeds[uav],
-                longest_s: endurance_s.unwrap_or(f64::INFINITY) - 2.0 * way_s,
-            }
-        };
-        let uavs = nearest.iter().enumerate().map(able).collect();
-        drop(search);
-        (watch.nearest, watch.uavs) = (nearest, uavs);
-        Ok(watch)
-    }
-
-    fn name(&self, uav: usize) -> &str {
-        &self.request.team[uav].name
-    }
-
-    /// The way from a UAV's launch point to a place of the tour, and what it takes.
-    fn way(
-        &self,
-        search: &mut DetourSearch<'_>,
-        uav: usize,
-        place: u32,
-    ) -> Result<(Vec<Point>, f64), PatrolError> {
-        let to = self.tour.point(place);
-        let Uav {
-            start, speed_mps, ..
-        } = self.request.team[uav];
-        let way = search
-            .way(start, to)
-            .ok_or_else(|| PatrolError::NoWay(self.name(uav).to_owned()))?;
-        let way_s = air_m(&way, speed_mps, self.request.wind_mps) / speed_mps;
-        Ok((way, way_s))
-    }
-
-    /// The pattern, and how it begins.
-    fn flown(&self) -> Result<Flown, PatrolError> {
-        let n = self.tour.len_mm();
-        let Some(patrol) = patrol_within(n, &self.uavs) else {
-            let fastest = self.speeds.iter().max().copied().unwrap_or(1);
-            let longest = self.uavs.iter().map(|u| u.longest_s).fold(0.0, f64::max);
-            return Err(PatrolError::Nobody {
-                round_s: f64::from(n) / f64::from(fastest),
-                arc_s: 2.0 * revisit_bound(n, &self.speeds),
-                longest_s: longest,
-            });
-        };
-        let straight_s = |uav: usize, place: u32| {
-            let uav = &self.request.team[uav];
-            (self.tour.point(place) - uav.start).norm() / uav.speed_mps
-        };
-        let (patrol, stations) = spread(n, &patrol, straight_s);
-        let mut ways = vec![None; self.uavs.len()];
-        let mut search = self.course.detours.search();
-        for s in &stations {
-            ways[s.uav] = Some(self.way(&mut search, s.uav, s.place)?);
-        }
-        let steady_s = ways.iter().flatten().map(|w| w.1).fold(0.0, f64::max);
-        Ok(Flown {
-            patrol,
-            stations,
-            ways,
-            steady_s,
-        })
-    }
-
-    /// What the caller gets.
-    fn told(&self, flown: &Flown) -> Result<PatrolPlan, PatrolError> {
-        let n = self.tour.len_mm();
-        let mut notices = self.course.notices.clone();
-        notices.extend(self.too_short(&flown.patrol));
-        let losses = self.request.losses.as_ref();
-        let uavs = 0..self.uavs.len();
-        Ok(PatrolPlan {
-            over: self.course.kind,
-            tour_m: f64::from(n) / 1000.0,
-            pattern: flown.patrol.pattern.clone(),
-            revisit_s: flown.patrol.revisit_s,
-            revisit_bound_s: revisit_bound(n, &self.speeds),
-            steady_s: flown.steady_s,
-            uavs: uavs.map(|uav| self.flight(flown, uav)).collect(),
-            after_losses: losses.map(|l| self.after(l, flown)).transpose()?,
-            notices,
-        })
-    }
-
-    /// Who rests because its endurance is short.
-    fn too_short(&self, patrol: &Patrol) -> Vec<String> {
-        let n = self.tour.len_mm();
-        let round_s = |uav: usize| match patrol.pattern {
-            Pattern::Round { speed, .. } if self.speeds[uav] < speed => None,
-            Pattern::Round { speed, .. } => Some(f64::from(n) / f64::from(speed)),
-            Pattern::Arcs { .. } => Some(2.0 * revisit_bound(n, &self.speeds)),
-        };
-        let short = (0..self.uavs.len()).filter_map(|uav| {
-            let (needs_s, has_s) = (round_s(uav)?, self.uavs[uav].longest_s);
-            (!patrol.pattern.flies(uav) && needs_s > has_s).then(|| {
-                format!(
-                    "{} rests: one period takes {needs_s:.0} s, its endurance leaves {:.0} s besides the ways there and back",
-                    self.name(uav),
-                    has_s.max(0.0)
-                )
-            })
-        });
-        short.collect()
-    }
-
-    /// One UAV: its station, and the first period.
-    fn flight(&self, flown: &Flown, uav: usize) -> PatrolFlight {
-        let n = self.tour.len_mm();
-        let own = &self.request.team[uav];
-        let at = flown.stations.iter().find(|s| s.uav == uav);
-        let mut station = None;
-        let mut path = vec![own.start];
-        if let (Some(at), Some((way, way_s))) = (at, &flown.ways[uav]) {
-            let period_s = flown.patrol.period_s(n, uav, &self.speeds);
-            let mut arc_m = None;
-            path.clone_from(way);
-            match &flown.patrol.pattern {
-                Pattern::Round { .. } => path.extend(self.tour.stretch(at.place, n)),
-                Pattern::Arcs { arcs } => {
-                    let (from, len) = arcs[uav];
-                    arc_m = Some(f64::from(len) / 1000.0);
-                    let forth = self.tour.stretch(from, len);
-                    path.extend(forth.iter().chain(forth.iter().rev()));
-                }
-            }
-            path.extend(way.iter().rev());
-            station = Some(PatrolStation {
-                place_m: f64::from(at.place) / 1000.0,
-                phase: f64::from(at.place) / f64::from(n),
-                way_s: *way_s,
-                wait_s: flown.steady_s - way_s,
-                period_s,
-                time_s: period_s + 2.0 * way_s,
-                arc_m,
-            });
-        }
-        PatrolFlight {
-            name: own.name.clone(),
-            path,
-            altitude_m: self.request.altitude_m,
-            speed_mps: own.speed_mps,
-            station,
-        }
-    }
-
-    /// How the others go on.
-    fn after(&self, losses: &Losses, flown: &Flown) -> Result<AfterLosses, PatrolError> {
-        let named = |name: &String| {
-            let known = self.request.team.iter().position(|u| u.name == *name);
-            known.ok_or_else(|| PatrolError::Unknown(name.clone()))
-        };
-        let lost: Vec<usize> = losses.names.iter().map(named).collect::<Result<_, _>>()?;
-        let n = self.tour.len_mm();
-        let before = flown.patrol.courses(&self.speeds, &flown.stations);
-        let joins = |uav: usize| self.nearest[uav];
-        let change = after_losses(n, &self.uavs, &before, losses.after_s, &lost, joins)
-            .ok_or(PatrolError::NobodyLeft)?;
-        let left: Vec<u32> = (0..self.speeds.len())
-            .map(|i| if lost.contains(&i) { 0 } else { self.speeds[i] })
-            .collect();
-        let flies = |uav: &usize| change.stands[*uav].is_some();
-        let uavs = (0..self.uavs.len()).filter(flies);
-        Ok(AfterLosses {
-            lost: lost.iter().map(|i| self.name(*i).to_owned()).collect(),
-            pattern: change.patrol.pattern.clone(),
-            revisit_s: change.patrol.revisit_s,
-            revisit_bound_s: revisit_bound(n, &left),
-            steady_s: change.steady_s,
-            gap_s: change.gap_s,
-            uavs: uavs.map(|uav| self.goes_on(flown, &change, uav)).collect(),
-        })
-    }
-
-    /// What one of those who are left does.
-    fn goes_on(&self, flown: &Flown, change: &Change, uav: usize) -> GoesOn {
-        let n = self.tour.len_mm();
-        let place = change.stands[uav].map_or(0.0, |s| s.place);
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a place on the tour"
-        )]
-        let at = self.tour.point(place as u32);
-        let since_s = change.courses[uav].since_s().unwrap_or(0.0);
-        let arc = |arcs: &[(u32, u32)]| {
-            let (from, len) = arcs[uav];
-            (f64::from(from) / 1000.0, f64::from(len) / 1000.0)
-        };
-        GoesOn {
-            name: self.name(uav).to_owned(),
-            place_m: place / 1000.0,
-            at,
-            joins: flown.ways[uav].is_none(),
-            way_s: since_s - change.loiter_s[uav],
-            loiter_s: change.loiter_s[uav],
-            period_s: change.patrol.period_s(n, uav, &self.speeds),
-            arc_m: match &change.patrol.pattern {
-                Pattern::Arcs { arcs } => Some(arc(arcs)),
-                Pattern::Round { .. } => None,
-            },
-        }
-    }
-}
-
-/// The length of a way through the air, metres: in a wind, up to what vanishes on a closed
-/// flight.
-fn air_m(way: &[Point], airspeed_mps: f64, wind: Vector) -> f64 {
-    let legs = way.windows(2).map(|leg| {
-        let leg = InWind::new(leg, airspeed_mps, wind);
-        leg.map_or(f64::MAX, |l| l.cost(0, 1) * airspeed_mps)
-    });
-    legs.sum()
+    watch.plan()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::team::Sensor;
     use crate::tours::{LineTarget, PointTarget};
 
     const SQUARE: [(f64, f64); 4] = [(0.0, 0.0), (1500.0, 0.0), (1500.0, 1100.0), (0.0, 1100.0)];
@@ -727,6 +342,7 @@ mod tests {
             area: polygon(&SQUARE),
             holes: Vec::new(),
             zones: Arc::new(NoFlyZones::new(vec![zone])),
+            fences: Vec::new(),
             planners: Planners::Only(planner),
         }
     }
@@ -786,7 +402,8 @@ mod tests {
             let waits = stations.iter().map(|s| s.wait_s);
             assert!(waits.fold(f64::INFINITY, f64::min).abs() < 1e-9);
             // A station is a place to be: the flight ends where it began.
-            assert_eq!(found.uavs[0].path.first(), found.uavs[0].path.last());
+            let path = &found.uavs[0].path;
+            assert!((path[0] - path[path.len() - 1]).norm() < 1e-6);
         }
         let road = plan(&request(lines(), &[15.0])).unwrap();
         assert!(road.notices[0].contains("sensors of the targets ignored"));
@@ -820,11 +437,24 @@ mod tests {
         assert!(after.uavs.len() == 2 && after.uavs[0].joins);
         let mut tired = request(points(), &[15.0; 3]);
         for uav in &mut tired.team {
-            uav.endurance_s = Some(250.0);
+            uav.start = Point::new(750.0, 550.0);
+            uav.endurance_s = Some(390.0);
         }
         let arcs = plan(&tired).unwrap();
         assert!(matches!(arcs.pattern, Pattern::Arcs { .. }));
-        assert!(arcs.uavs.iter().all(|u| u.station.unwrap().arc_m.is_some()));
+        assert!(arcs.uavs.iter().all(|u| {
+            let station = u.station.unwrap();
+            let joined = u.legs.windows(2).all(|pair| {
+                let (end, start) = (pair[0].curve.end(), pair[1].curve.start());
+                (end.unwrap().position() - start.unwrap().position()).norm() < 1e-3
+            });
+            joined && station.arc_m.is_some() && station.time_s <= 390.0
+        }));
+        for uav in &mut tired.team {
+            uav.start = Point::origin();
+        }
+        // From a corner the ways to two of the arcs are too long, and alone an arc is all.
+        assert!(matches!(plan(&tired), Err(PatrolError::Nobody { .. })));
         let refused = |change: fn(&mut PatrolRequest)| {
             let mut asked = request(points(), &[15.0, 12.0]);
             change(&mut asked);

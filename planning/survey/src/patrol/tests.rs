@@ -1,6 +1,10 @@
 use super::*;
+use crate::flight::Leg;
+use crate::flown::straight;
 use proptest::prelude::*;
-use skein_geometry::frame::Point;
+use skein_geometry::Curve;
+use skein_geometry::frame::{Point, Pose};
+use skein_geometry::math::PI;
 
 /// Ticks a second of the simulation.
 const FINE: u32 = 64;
@@ -35,8 +39,8 @@ fn flown(
 }
 
 /// A patrol that has begun: its courses.
-fn begun(n: u32, uavs: &[Uav]) -> (Patrol, Vec<Course>) {
-    let patrol = patrol_within(n, uavs).unwrap();
+fn begun(n: u32, turn: u32, uavs: &[Uav]) -> (Patrol, Vec<Course>) {
+    let patrol = patrol_within(n, turn, uavs).unwrap();
     // Launch points somewhere off the tour.
     let cost = |uav: usize, place: u32| f64::from(place.abs_diff(uav as u32 * 7 % n)) + 3.0;
     let (patrol, stations) = spread(n, &patrol, cost);
@@ -64,9 +68,10 @@ proptest! {
     #[test]
     fn nobody_waits_longer_than_promised(
         n in 5u32..60,
+        turn in 0u32..8,
         speeds in prop::collection::vec(1u32..6, 1..6),
     ) {
-        let (patrol, courses) = begun(n, &team(&speeds));
+        let (patrol, courses) = begun(n, turn, &team(&speeds));
         let place = |uav: usize, t: f64| courses[uav].place(f64::from(n), t).map(|p| p.0);
         let mut seen = vec![None; n as usize];
         flown(n, speeds.len(), (0.0, patrol.revisit_s * 2.0 + 1.0), &mut seen, place);
@@ -79,7 +84,8 @@ proptest! {
         let bound = revisit_bound(n, &speeds);
         prop_assert!(patrol.revisit_s >= bound - 1e-9);
         let slow = f64::from(*speeds.iter().min().unwrap());
-        prop_assert!(patrol.revisit_s <= 2.0 * bound + 2.0 / slow);
+        let turns = f64::from(turn) * speeds.len() as f64 / f64::from(speeds.iter().sum::<u32>());
+        prop_assert!(patrol.revisit_s <= 2.0 * (bound + turns) + 2.0 / slow);
         if speeds.iter().all(|v| *v == speeds[0]) {
             prop_assert!(patrol.revisit_s - bound < 1.0 / slow);
         }
@@ -88,16 +94,17 @@ proptest! {
     #[test]
     fn after_failures_no_wait_is_longer_than_told(
         n in 20u32..80,
+        turn in 0u32..8,
         speeds in prop::collection::vec(1u32..6, 2..7),
         t_s in 40.0f64..100.0,
         picks in prop::collection::vec(any::<prop::sample::Index>(), 1..3),
     ) {
         let round = f64::from(n);
         let uavs = team(&speeds);
-        let (_, courses) = begun(n, &uavs);
+        let (_, courses) = begun(n, turn, &uavs);
         let lost: Vec<usize> = picks.iter().map(|p| p.index(speeds.len())).collect();
         let joins = |uav: usize| ((uav as u32 * 5) % n, 2.5 + uav as f64);
-        let Some(change) = after_losses(n, &uavs, &courses, t_s, &lost, joins) else {
+        let Some(change) = after_losses(n, turn, &uavs, &courses, t_s, &lost, joins) else {
             prop_assert!((0..speeds.len()).all(|i| lost.contains(&i)));
             return Ok(());
         };
@@ -130,8 +137,8 @@ proptest! {
         t_s in 0.0f64..1e6,
     ) {
         let (uavs, lost) = (team(&vec![10; k]), lost.index(k));
-        let (_, courses) = begun(n, &uavs);
-        let change = after_losses(n, &uavs, &courses, t_s, &[lost], |_| (0, 0.0)).unwrap();
+        let (_, courses) = begun(n, 0, &uavs);
+        let change = after_losses(n, 0, &uavs, &courses, t_s, &[lost], |_| (0, 0.0)).unwrap();
         let spacing_s = f64::from(n) / 10.0 / k as f64;
         prop_assert!(change.steady_s <= spacing_s + 0.2);
         prop_assert!(change.gap_s <= 2.0 * spacing_s + 0.2);
@@ -191,7 +198,7 @@ fn mixed_speeds_take_the_better_pattern() {
 fn who_cannot_fly_one_period_rests() {
     let uav = |speed, longest_s| Uav { speed, longest_s };
     // Once round takes 100 s: the second one cannot, the others can.
-    let p = patrol_within(1000, &[uav(10, 200.0), uav(10, 99.0), uav(10, 100.0)]).unwrap();
+    let p = patrol_within(1000, 0, &[uav(10, 200.0), uav(10, 99.0), uav(10, 100.0)]).unwrap();
     assert_eq!(
         p.pattern,
         Pattern::Round {
@@ -200,36 +207,90 @@ fn who_cannot_fly_one_period_rests() {
         }
     );
     // Nobody can fly round, but each of three can fly its third to and fro.
-    let p = patrol_within(1000, &[uav(10, 70.0); 3]).unwrap();
+    let p = patrol_within(1000, 0, &[uav(10, 70.0); 3]).unwrap();
     assert!(matches!(p.pattern, Pattern::Arcs { .. }), "{p:?}");
     assert!((66.0..67.0).contains(&p.revisit_s));
-    assert!(patrol_within(1000, &[uav(10, 60.0); 3]).is_none());
+    assert!(patrol_within(1000, 0, &[uav(10, 60.0); 3]).is_none());
+    // Turns at both ends take 10 s, and the slowest does nothing but turn.
+    let p = patrol_within(1000, 50, &[uav(10, 80.0), uav(10, 80.0), uav(10, 80.0)]).unwrap();
+    assert!((76.0..77.0).contains(&p.revisit_s), "{p:?}");
+    assert!(patrol_within(1000, 50, &[uav(10, 70.0); 3]).is_none());
+    let p = patrol_within(1000, 200, &[uav(100, 50.0), uav(1, 1e9)]).unwrap();
+    assert!(!p.pattern.flies(1), "{p:?}");
+}
+
+fn legs(corners: &[(f64, f64)]) -> Vec<Leg> {
+    let at = |c: &(f64, f64)| Point::new(c.0, c.1);
+    let next = corners.iter().cycle().skip(1);
+    let sides = corners.iter().zip(next);
+    let leg = |(a, b)| Leg {
+        curve: straight(at(a), at(b)),
+        sees: true,
+    };
+    sides.map(leg).collect()
+}
+
+fn length_m(legs: &[Leg]) -> f64 {
+    legs.iter().map(|leg| leg.curve.length_m()).sum()
 }
 
 #[test]
 fn a_tour_is_measured_cut_and_asked() {
     let at = |x: f64, y: f64| Point::new(x, y);
-    let corners = vec![at(0.0, 0.0), at(100.0, 0.0), at(100.0, 50.0), at(0.0, 50.0)];
-    let tour = Tour::new(corners, |a, b| (b - a).norm()).unwrap();
+    let corners = [(0.0, 0.0), (100.0, 0.0), (100.0, 50.0), (0.0, 50.0)];
+    let tour = Tour::new(&legs(&corners), Curve::length_m).unwrap();
     assert_eq!(tour.len_mm(), 300_000);
     let near = |p: Point, q: Point| (p - q).norm() < 1e-6;
     assert!(near(tour.point(125_000), at(100.0, 25.0)));
     assert!(near(tour.point(300_000), at(0.0, 0.0)));
     assert_eq!(tour.nearest(at(120.0, 20.0)), 120_000);
     let over = tour.stretch(275_000, 50_000);
-    assert_eq!(over.len(), 3);
-    assert!(near(over[0], at(0.0, 25.0)) && near(over[1], at(0.0, 0.0)));
-    assert!(near(over[2], at(25.0, 0.0)));
-    assert_eq!(tour.stretch(10_000, 300_000).len(), 6);
-    assert_eq!(Tour::new(vec![], |_, _| 1.0), Err(TourError::Empty));
-    let same = vec![at(1.0, 1.0); 3];
+    assert!(over.len() == 1 && (length_m(&over) - 50.0).abs() < 1e-9);
+    let pieces = over[0].curve.segments();
+    assert!(near(pieces[0].start.position(), at(0.0, 25.0)));
+    assert!(near(pieces[1].start.position(), at(0.0, 0.0)));
+    assert!(near(over[0].curve.end().unwrap().position(), at(25.0, 0.0)));
+    let round = tour.stretch(10_000, 300_000);
+    assert!((length_m(&round) - 300.0).abs() < 1e-9);
+    let cost = Curve::length_m;
+    assert_eq!(Tour::new(&[], cost), Err(TourError::Empty));
     assert_eq!(
-        Tour::new(same, |a, b| (b - a).norm()),
+        Tour::new(&legs(&[(1.0, 1.0); 3]), cost),
         Err(TourError::Empty)
     );
-    let far = vec![at(0.0, 0.0), at(1.0, 0.0)];
+    let far = legs(&[(0.0, 0.0), (1.0, 0.0)]);
     assert!(matches!(
-        Tour::new(far, |_, _| 1e9),
+        Tour::new(&far, |_| 1e9),
         Err(TourError::TooLong(_))
     ));
+}
+
+#[test]
+fn arcs_of_a_tour_are_cut_to_the_millimetre_and_are_whole_again() {
+    let turn = (1.0 / 30.0, 30.0 * PI);
+    let oval = Curve::from_pieces(
+        Pose::new(Point::origin(), 0.0),
+        &[(0.0, 80.0), turn, (0.0, 80.0), turn],
+    );
+    let tour = Tour::new(
+        &[Leg {
+            curve: oval.clone(),
+            sees: true,
+        }],
+        Curve::length_m,
+    )
+    .unwrap();
+    let n = tour.len_mm();
+    for (from, len) in [(0, n), (90_001, 140_000), (200_000, n), (n - 1, 5)] {
+        let cut = tour.stretch(from, len);
+        assert!((length_m(&cut) - f64::from(len) / 1000.0).abs() < 2e-3);
+        let curve = &cut[0].curve;
+        let told = (curve.largest_gap_m(), curve.segments().len());
+        assert!(told.0 < 1e-6 && told.1 <= 6, "{from} {len}: {told:?}");
+        let end = curve.end().unwrap().position();
+        assert!((end - tour.point(from + len)).norm() < 2e-3);
+        assert!((curve.max_curvature_per_m() - 1.0 / 30.0).abs() < 1e-12 || len == 5);
+    }
+    let high = tour.nearest(Point::new(120.0, 30.0));
+    assert!((tour.point(high) - Point::new(110.0, 30.0)).norm() < 0.3);
 }

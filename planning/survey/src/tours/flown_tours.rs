@@ -122,26 +122,37 @@ impl<'a> Pilot<'a> {
 
     /// What is flown over to see one target.
     fn stops(&self, uav: &Uav, pass: &Traversal) -> Vec<Stop> {
-        let way = &self.problem.ways[pass.line];
-        let mut points: Vec<Point> = way.places.iter().map(|p| self.problem.at[*p]).collect();
-        if pass.backward {
-            points.reverse();
-        }
-        if let [point] = points.as_slice() {
-            return vec![Stop::over(*point)];
-        }
-        let curves = if matches!(self.request.targets, Targets::Points(_)) {
-            // Lanes over a disc: what joins them need not be flown.
-            points
-                .chunks(2)
-                .map(|l| straight(l[0], l[l.len() - 1]))
-                .collect()
-        } else {
-            let swath_m = uav.swath_m(way.sensor.as_deref(), self.request.altitude_m);
-            let stray_m = STRAY_SHARE * swath_m.unwrap_or(0.0);
-            let radius_m = self.router(uav).limits().turn_radius_m;
-            stretches(&points, radius_m, stray_m)
-        };
-        curves.into_iter().filter_map(Stop::along).collect()
+        let sensor = self.problem.ways[pass.line].sensor.as_deref();
+        let swath_m = uav.swath_m(sensor, self.request.altitude_m);
+        let radius_m = self.router(uav).limits().turn_radius_m;
+        let points = matches!(self.request.targets, Targets::Points(_));
+        stops(self.problem, pass, points, swath_m, radius_m)
     }
+}
+
+/// What is flown over to see one target: a point, or a piece of a line with a swath, by a
+/// UAV that turns no tighter.
+pub(crate) fn stops(
+    problem: &TourProblem,
+    pass: &Traversal,
+    points: bool,
+    swath_m: Option<f64>,
+    radius_m: f64,
+) -> Vec<Stop> {
+    let way = &problem.ways[pass.line];
+    let mut places: Vec<Point> = way.places.iter().map(|p| problem.at[*p]).collect();
+    if pass.backward {
+        places.reverse();
+    }
+    if let [point] = places.as_slice() {
+        return vec![Stop::over(*point)];
+    }
+    let curves = if points {
+        // Lanes over a disc: what joins them need not be flown.
+        let lanes = places.chunks(2);
+        lanes.map(|l| straight(l[0], l[l.len() - 1])).collect()
+    } else {
+        stretches(&places, radius_m, STRAY_SHARE * swath_m.unwrap_or(0.0))
+    };
+    curves.into_iter().filter_map(Stop::along).collect()
 }

@@ -24,6 +24,7 @@ use crate::flown::AirspaceError;
 use crate::heights::{NoSeparation, Separation};
 use crate::objective::Objective;
 use crate::team::{TeamError, Uav, has};
+pub(crate) use flown_tours::stops;
 use skein_flight::coverage::lines::LineError;
 use skein_flight::coverage::metric::TooWindy;
 use skein_geometry::frame::{Point, Vector};

@@ -110,7 +110,7 @@ impl TourProblem {
     ///
     /// # Errors
     /// When nobody can; the error names the target.
-    pub(super) fn swath_m(
+    pub(crate) fn swath_m(
         &self,
         altitude_m: f64,
         sensor: Option<&str>,
