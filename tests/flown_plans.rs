@@ -171,12 +171,19 @@ fn zones(site: &Site) -> Vec<Polygon> {
 }
 
 #[test]
-fn areas_take_the_time_that_is_claimed() {
+fn areas_take_the_time_that_is_claimed_in_the_wind_too() {
     let mut n_flown = 0;
     for site in SITES.map(Site::of) {
         let no_fly = Arc::new(NoFlyZones::new(zones(&site)));
-        for planner in [Planner::Exact, Planner::Approximate] {
+        for (planner, share) in [
+            (Planner::Exact, 0.0),
+            (Planner::Exact, 0.35),
+            (Planner::Approximate, 0.0),
+            (Planner::Approximate, 0.35),
+        ] {
+            let wind_mps = Vector::new(-0.6, 0.8) * (share * speed_mps(&site));
             let request = AreaRequest {
+                wind_mps,
                 zones: Arc::clone(&no_fly),
                 fences: site.fences.iter().map(|f| polygon(f)).collect(),
                 planners: Planners::Only(planner),
@@ -192,15 +199,9 @@ fn areas_take_the_time_that_is_claimed() {
             let Ok(plan) = area::plan(&request) else {
                 continue;
             };
-            let what = format!("seed {}, {planner:?}", site.seed);
+            let what = format!("seed {}, {planner:?}, wind {share}", site.seed);
             let clearance_m = site.manner.clearance_m;
-            n_flown += fly_all(
-                &what,
-                plan.uavs.iter(),
-                &no_fly,
-                clearance_m,
-                Vector::zeros(),
-            );
+            n_flown += fly_all(&what, plan.uavs.iter(), &no_fly, clearance_m, wind_mps);
         }
     }
     assert!(n_flown > 20, "{n_flown}");

@@ -3,6 +3,8 @@
 
 use anyhow::{Error, Result, anyhow, ensure};
 use clap::{Args, ValueEnum};
+use skein_geometry::frame::Vector;
+use skein_geometry::math::sin_cos;
 use skein_interop::airframe::{ENDURANCE_S, SPEED_MPS};
 use skein_interop::fleet::TURN_RADIUS_M;
 use skein_survey::area::{self, AreaError};
@@ -198,6 +200,46 @@ pub fn detour_error(error: DetourError) -> Error {
     }
 }
 
+/// The wind.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct WindArgs {
+    /// Wind speed, m/s.
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        value_name = "W",
+        allow_hyphen_values = true
+    )]
+    pub wind_mps: f64,
+    /// Where the wind comes from, degrees clockwise from north.
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        value_name = "DEG",
+        allow_hyphen_values = true
+    )]
+    pub wind_from_deg: f64,
+}
+
+impl WindArgs {
+    /// Refuses numbers without a meaning.
+    ///
+    /// # Errors
+    /// Names the flag.
+    pub fn check(&self) -> Result<()> {
+        within("--wind-mps", self.wind_mps, (0.0, SPEED_MPS.1), "m/s")?;
+        course("--wind-from-deg", self.wind_from_deg)?;
+        Ok(())
+    }
+
+    /// Where it blows to, m/s.
+    #[must_use]
+    pub fn velocity(&self) -> Vector {
+        let (s, c) = sin_cos(self.wind_from_deg.to_radians());
+        Vector::new(-s, -c) * self.wind_mps
+    }
+}
+
 /// An error of an area of this file.
 #[must_use]
 pub fn area_error(error: AreaError, file: &Path) -> Error {
@@ -206,6 +248,7 @@ pub fn area_error(error: AreaError, file: &Path) -> Error {
         AreaError::Separation(error) => separation_error(error),
         AreaError::Zones(error) => detour_error(error),
         AreaError::Fences(error) => Error::new(error).context(file.display().to_string()),
+        AreaError::TooWindy(error) => Error::new(error).context("--wind-mps"),
         AreaError::NoPlan(error) => Error::new(error).context(file.display().to_string()),
     }
 }

@@ -2,7 +2,7 @@
 //! [`skein_survey::area`].
 
 use super::area_input::{self, AreaInput, Asked};
-use super::args::{Lanes, LayerArgs, Objective, area_error, flyable, planners};
+use super::args::{Lanes, LayerArgs, Objective, WindArgs, area_error, flyable, planners};
 use super::output::{OutputArgs, Printed, Sheet};
 use super::size::Work;
 use super::view::{Flags, View};
@@ -25,8 +25,8 @@ use std::path::PathBuf;
 /// The survey of a QGroundControl `.plan` with its fences, or a GeoJSON polygon with its
 /// holes, and zones with the property "no_fly": true. What the survey says of course,
 /// height, lanes and pictures is done unless a flag says otherwise. The property "sensor"
-/// of the polygon names the sensor to see it with. Times are without wind. Flights that
-/// come near to each other get heights of their own.
+/// of the polygon names the sensor to see it with. Flights that come
+/// near to each other get heights of their own.
 #[derive(Debug, Args)]
 pub struct CoverArgs {
     /// A QGroundControl `.plan` or GeoJSON.
@@ -86,7 +86,7 @@ pub struct CoverArgs {
         allow_hyphen_values = true
     )]
     pub clearance_m: f64,
-    /// Speed, m/s: there is no wind, so over the ground as through the air.
+    /// Airspeed, m/s.
     #[arg(
         long,
         default_value_t = 15.0,
@@ -112,6 +112,9 @@ pub struct CoverArgs {
     /// Lanes for UAVs of unlike swath.
     #[arg(long, value_enum, default_value_t = Lanes::Best)]
     pub lanes: Lanes,
+    /// The wind.
+    #[command(flatten)]
+    pub wind: WindArgs,
     /// How flights are kept apart.
     #[command(flatten)]
     pub layers: LayerArgs,
@@ -130,6 +133,7 @@ pub struct CoverArgs {
 pub fn run(args: &CoverArgs) -> Result<String> {
     let fleet = args.fleet.as_deref();
     args.layers.check()?;
+    args.wind.check()?;
     flyable(
         args.speed_mps,
         Some(args.turn_radius_m),
@@ -177,6 +181,7 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         clearance_m: args.clearance_m,
         look_ahead_m: view.look_ahead_m,
         heading_rad: view.course_deg.map(|course| (90.0 - course).to_radians()),
+        wind_mps: args.wind.velocity(),
         planners,
         lanes: args.lanes.asked(),
         objective: args.objective.asked(),
@@ -247,6 +252,7 @@ fn sheet(args: &CoverArgs, input: &AreaInput, request: &AreaRequest, plan: &Area
     summary["objective"] = json!(args.objective.name());
     summary["sensor"] = json!(request.sensor);
     summary["clearance_m"] = json!(request.clearance_m);
+    summary["wind_mps"] = json!(request.wind_mps.norm());
     summary["look_ahead_m"] = json!(request.look_ahead_m);
     summary["at_home"] = at_home.collect();
     summary["notices"] = json!([&input.notices[..], &plan.notices].concat());

@@ -100,7 +100,7 @@ pub fn run(args: &PatrolArgs) -> Result<String> {
         over: input.over.clone(),
         team: input.team.clone(),
         clearance_m: args.tours.clearance_m,
-        wind_mps: args.tours.wind(),
+        wind_mps: args.tours.wind.velocity(),
         altitude_m: input.altitude_m,
         steps: args.tours.steps,
         losses: (!args.lost.is_empty()).then_some(losses),
@@ -240,7 +240,7 @@ fn sheet(plan: &PatrolPlan, args: &PatrolArgs, input: Input) -> Sheet {
         "ratio": plan.revisit_s / plan.revisit_bound_s,
         "steady_s": plan.steady_s,
         "clearance_m": args.tours.clearance_m,
-        "wind_mps": args.tours.wind().norm(),
+        "wind_mps": args.tours.wind.velocity().norm(),
         "notices": ([&notices[..], &plan.notices].concat()),
     });
     if let Some(after) = &plan.after_losses {

@@ -1,7 +1,7 @@
 //! What `plan line` and `plan visit` share: flags, the way from a file to a request, and
 //! what is told of the tours. Planned by [`skein_survey::tours`].
 
-use super::args::{LayerArgs, Objective, course, flyable, tours_error, within};
+use super::args::{LayerArgs, Objective, WindArgs, flyable, tours_error, within};
 use super::output::{OutputArgs, Printed, Sheet};
 use super::target_input::{Kind, TargetInput};
 use super::view::USUAL_SWATH_M;
@@ -9,9 +9,6 @@ use super::{team_input, why_home};
 use anyhow::Result;
 use clap::Args;
 use serde_json::{Value, json};
-use skein_geometry::frame::Vector;
-use skein_geometry::math::sin_cos;
-use skein_interop::airframe::SPEED_MPS;
 use skein_interop::fleet::SWATH_M;
 use skein_survey::flight::Stays;
 use skein_survey::tours::{self, TourPlan, TourRequest, UavTour, Visit};
@@ -57,22 +54,9 @@ pub struct TourArgs {
         allow_hyphen_values = true
     )]
     pub speed_mps: f64,
-    /// Wind speed, m/s.
-    #[arg(
-        long,
-        default_value_t = 0.0,
-        value_name = "W",
-        allow_hyphen_values = true
-    )]
-    pub wind_mps: f64,
-    /// Where the wind comes from, degrees clockwise from north.
-    #[arg(
-        long,
-        default_value_t = 0.0,
-        value_name = "DEG",
-        allow_hyphen_values = true
-    )]
-    pub wind_from_deg: f64,
+    /// The wind.
+    #[command(flatten)]
+    pub wind: WindArgs,
     /// The longest time that a UAV flies, seconds; lines beyond that are left out and named.
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub endurance_s: Option<f64>,
@@ -102,16 +86,7 @@ impl TourArgs {
     pub fn check(&self) -> Result<()> {
         flyable(self.speed_mps, None, self.clearance_m, self.endurance_s)?;
         within("--swath-m", self.swath_m(), SWATH_M, "m")?;
-        within("--wind-mps", self.wind_mps, (0.0, SPEED_MPS.1), "m/s")?;
-        course("--wind-from-deg", self.wind_from_deg)?;
-        Ok(())
-    }
-
-    /// The wind, where it blows to, m/s.
-    #[must_use]
-    pub fn wind(&self) -> Vector {
-        let (s, c) = sin_cos(self.wind_from_deg.to_radians());
-        Vector::new(-s, -c) * self.wind_mps
+        self.wind.check()
     }
 }
 
@@ -144,7 +119,7 @@ pub fn run(kind: Kind, file: &Path, args: &TourArgs, wishes: &Wishes) -> Result<
         zones: input.zones,
         clearance_m: args.clearance_m,
         team: input.team,
-        wind_mps: args.wind(),
+        wind_mps: args.wind.velocity(),
         sensor: wishes.sensor.clone(),
         objective: wishes.objective.asked(),
         separation: wishes.layers.separation(),

@@ -22,7 +22,7 @@ pub(crate) struct Flight {
     /// Its corners without the ways from its start and back: what closes to be flown again
     /// and again.
     pub lap: Vec<Point>,
-    /// Length, metres.
+    /// Length through the air, metres.
     pub length_m: f64,
     /// Speed, m/s.
     pub speed_mps: f64,
@@ -42,6 +42,14 @@ impl Flight {
     /// Whether it leaves its start at all.
     pub(crate) fn flies(&self) -> bool {
         self.track.len() > 1
+    }
+
+    /// Length over the ground, metres.
+    pub(crate) fn ground_m(&self) -> f64 {
+        if self.legs.is_empty() {
+            return self.length_m;
+        }
+        self.legs.iter().map(|leg| leg.curve.length_m()).sum()
     }
 
     /// How long it takes, seconds.
@@ -87,7 +95,7 @@ impl Flight {
             altitude_m,
             speed_mps: self.speed_mps,
             turn_radius_m: self.turn_radius_m,
-            length_m: self.length_m,
+            length_m: self.ground_m(),
             time_s: self.time_s(),
             energy_s: self.energy_s(),
             energy_wh: self.energy_wh(),

@@ -427,3 +427,31 @@ fn who_stays_is_told_for_want_of_endurance_or_of_work() {
     );
     std::fs::remove_dir_all(&dir).unwrap();
 }
+
+#[test]
+fn an_area_is_covered_in_the_wind() {
+    let dir = std::env::temp_dir().join(format!("skein-plan-wind-{}", std::process::id()));
+    std::fs::create_dir_all(&dir).unwrap();
+    let plan = |wind: &str| -> Value {
+        let flags = ["--exact", "--steps", "200", "--wind-mps", wind];
+        serde_json::from_str(&told(&dir, FIELD, &flags).unwrap()).unwrap()
+    };
+    let (calm, windy) = (plan("0"), plan("7"));
+    let of = |plan: &Value, key: &str| plan[key].as_f64().unwrap();
+    assert!((of(&windy, "wind_mps") - 7.0).abs() < 1e-9);
+    assert!(of(&windy, "makespan_s") > 1.1 * of(&calm, "makespan_s"));
+    // Lengths stay those over the ground, where turns are wider.
+    let flight = &windy["flights"][0];
+    assert!(of(flight, "time_s") > of(flight, "length_m") / of(flight, "speed_mps"));
+    assert!((of(&windy, "total_m") - of(flight, "length_m")).abs() < 1e-6);
+    let least_m = |plan: &Value| {
+        let pieces = plan["flights"][0]["trajectory"].as_array().unwrap();
+        let radii = pieces.iter().filter_map(|p| p["radius_m"].as_f64());
+        radii.map(f64::abs).fold(f64::INFINITY, f64::min)
+    };
+    let wider = (1.0 + 7.0 / 15.0_f64).powi(2);
+    assert!((least_m(&windy) / least_m(&calm) - wider).abs() < 1e-6);
+    let error = told(&dir, FIELD, &["--wind-mps", "15"]).unwrap_err();
+    assert!(format!("{error:#}").contains("--wind-mps"), "{error:#}");
+    std::fs::remove_dir_all(&dir).unwrap();
+}

@@ -63,7 +63,7 @@ impl Flights {
         Worth {
             share: self.covered_share,
             makespan_s: self.makespan_s(),
-            total_m: self.flights.iter().map(|f| f.length_m).sum(),
+            total_m: self.flights.iter().map(Flight::ground_m).sum(),
             energy: match self.energy_wh() {
                 Some(energy_wh) if in_watt_hours => energy_wh,
                 _ => cruise_s(),

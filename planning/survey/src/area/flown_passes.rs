@@ -5,7 +5,7 @@
 //! what these ways then took. Leaves to [`crate::flown`] which curves there are.
 
 use super::gaps;
-use crate::flown::{Flown, Stop, fly, straight, turnable};
+use crate::flown::{Air, Flown, Stop, fly, straight, turnable};
 use crate::passes::{Uav, cut, launches};
 use skein_flight::coverage::lines::{self, LineError};
 use skein_flight::coverage::metric::Matrix;
@@ -42,11 +42,15 @@ pub(super) struct FlownPasses {
 }
 
 /// Plans flights for a team so that every pass that can be is flown once, and the longest
-/// time is short; `problem.launch` is not used.
+/// time is short; `problem.launch` is not used. `airs` is what each flies through.
 ///
 /// # Errors
 /// [`PassesError`]; nothing is planned then.
-pub(super) fn fly_team(problem: &PassesProblem, team: &[Uav]) -> Result<FlownPasses, PassesError> {
+pub(super) fn fly_team(
+    problem: &PassesProblem,
+    team: &[Uav],
+    airs: &[Air],
+) -> Result<FlownPasses, PassesError> {
     if team.is_empty() {
         return Err(PassesError::Team(LineError::NoTeam));
     }
@@ -84,6 +88,7 @@ pub(super) fn fly_team(problem: &PassesProblem, team: &[Uav]) -> Result<FlownPas
         problem,
         router: &router,
         team,
+        airs,
         from: &from,
         passes: &passes,
         places: Places::new(&ways, &passes, &starts, problem.turn_radius_m),
@@ -97,12 +102,13 @@ pub(super) fn fly_team(problem: &PassesProblem, team: &[Uav]) -> Result<FlownPas
 }
 
 /// What one UAV flies over passes in this order, as many from the first on as it may fly so
-/// far; and the passes that it flies.
+/// far through the air; and the passes that it flies.
 pub(super) fn fly_within(
     router: &Router,
     start: Point,
     passes: &[Pass],
     longest_m: f64,
+    air: &Air,
 ) -> (Flown, Vec<Pass>) {
     let passes: Vec<Pass> = passes.iter().filter_map(|p| turnable(router, *p)).collect();
     let fly_first = |n: usize| {
@@ -113,13 +119,13 @@ pub(super) fn fly_within(
         fly(router, start, &stops)
     };
     let mut best = fly_first(passes.len());
-    if best.length_m() > longest_m {
+    if best.air_m(air) > longest_m {
         best = Flown::default();
         let (mut low, mut high) = (0, passes.len());
         while high - low > 1 {
             let n = usize::midpoint(low, high);
             let flown = fly_first(n);
-            if flown.length_m() <= longest_m {
+            if flown.air_m(air) <= longest_m {
                 (best, low) = (flown, n);
             } else {
                 high = n;
@@ -139,6 +145,8 @@ struct Desk<'a> {
     problem: &'a PassesProblem,
     router: &'a Router,
     team: &'a [Uav],
+    /// By UAV: what it flies through.
+    airs: &'a [Air],
     /// By UAV: which of the starts is its own.
     from: &'a [usize],
     passes: &'a [Pass],
@@ -235,8 +243,10 @@ impl Desk<'_> {
     }
 
     fn times(&self, flown: &FlownPasses) -> Vec<f64> {
-        let flights = flown.flights.iter().zip(self.team);
-        flights.map(|(f, u)| f.length_m() / u.speed).collect()
+        let flights = flown.flights.iter().zip(self.team).zip(self.airs);
+        flights
+            .map(|((f, u), air)| f.air_m(air) / u.speed)
+            .collect()
     }
 
     /// Who flies longer than it may, and how many times as long.
@@ -249,7 +259,7 @@ impl Desk<'_> {
     /// Passes are left off the ends of flights until all are within their endurance.
     fn within_endurance(&self, mut flown: FlownPasses) -> FlownPasses {
         for (i, uav) in self.team.iter().enumerate() {
-            while flown.flights[i].length_m() / uav.speed > uav.endurance {
+            while flown.flights[i].air_m(&self.airs[i]) / uav.speed > uav.endurance {
                 let Some(last) = flown.tours[i].pop() else {
                     flown.flights[i] = Flown::default();
                     break;

@@ -25,7 +25,7 @@ mod tests;
 
 use crate::detours::DetourError;
 use crate::flight::{Stays, UavFlight};
-use crate::flown::AirspaceError;
+use crate::flown::{Air, AirspaceError};
 use crate::heights::{NoSeparation, Separation};
 use crate::objective::{Objective, SAME_SHARE, in_watt_hours};
 use crate::regions::TaskError;
@@ -34,8 +34,9 @@ use crate::team::{self, PlannedUav, TeamError, Uav, taking_part};
 use flights::Flights;
 use lanes::Desk;
 use planners::OpenArea;
+use skein_flight::coverage::metric::{InWind, TooWindy};
 use skein_flight::coverage::passes::PassesError;
-use skein_geometry::frame::Point;
+use skein_geometry::frame::{Point, Vector};
 use skein_geometry::{NoFlyZones, Polygon};
 use std::sync::Arc;
 use team_selection::choose;
@@ -72,6 +73,8 @@ pub struct AreaRequest {
     /// Heading of all exact passes, radians counter-clockwise from east; `None` for the
     /// shortest found.
     pub heading_rad: Option<f64>,
+    /// The wind, where it blows to, m/s: flights are compared by their times in it.
+    pub wind_mps: Vector,
     /// Which planners are asked.
     pub planners: Planners,
     /// Lanes for UAVs of unlike swath.
@@ -101,12 +104,22 @@ impl AreaRequest {
             clearance_m,
             look_ahead_m: None,
             heading_rad: None,
+            wind_mps: Vector::zeros(),
             planners: Planners::Both,
             lanes: Lanes::Best,
             objective: Objective::Time,
             separation: Separation::BY_TURNS,
             altitude_m,
             steps: DEFAULT_STEPS,
+        }
+    }
+}
+
+impl AreaRequest {
+    fn air(&self, airspeed_mps: f64) -> Air {
+        Air {
+            airspeed_mps,
+            wind_mps: self.wind_mps,
         }
     }
 }
@@ -160,7 +173,7 @@ pub struct Figures {
     pub makespan_s: f64,
     /// The share of the area that is seen, by samples.
     pub covered_share: f64,
-    /// The length of all flights together, metres.
+    /// The length of all flights together, over the ground, metres.
     pub total_m: f64,
     /// The energy of all flights together, seconds of cruise.
     pub energy_s: f64,
@@ -324,6 +337,9 @@ pub enum AreaError {
     /// A fence cannot be stayed within.
     #[error(transparent)]
     Fences(#[from] AirspaceError),
+    /// The wind is as fast as a UAV.
+    #[error(transparent)]
+    TooWindy(#[from] TooWindy),
     /// None of the planners that were asked has a plan; this is why the first has none.
     #[error(transparent)]
     NoPlan(#[from] PlannerError),
@@ -369,6 +385,9 @@ pub enum PlannerError {
 /// has a plan.
 pub fn plan(request: &AreaRequest) -> Result<AreaPlan, AreaError> {
     team::check(&request.team)?;
+    for uav in &request.team {
+        InWind::new(&[], uav.speed_mps, request.wind_mps)?;
+    }
     request.separation.check()?;
     let job = Job {
         request,
@@ -399,7 +418,13 @@ struct Chosen {
 impl Job<'_> {
     fn taking_part(&self, heights_m: &[f64]) -> Result<Vec<PlannedUav>, TeamError> {
         let request = self.request;
-        taking_part(&request.team, request.sensor.as_deref(), heights_m)
+        let mut all = taking_part(&request.team, request.sensor.as_deref(), heights_m)?;
+        for uav in &mut all {
+            uav.turn_radius_m = request
+                .air(uav.speed_mps)
+                .ground_radius_m(uav.turn_radius_m);
+        }
+        Ok(all)
     }
 
     /// The plan, and heights at which no swath is narrower than its lanes.

@@ -8,7 +8,7 @@ use super::flown_passes::{fly_team, fly_within};
 use super::{AreaError, AreaRequest, Facts, Planner, PlannerError, Shape, ShapeKind};
 use crate::detours::{DetourError, Detours};
 use crate::flight::Flight;
-use crate::flown::Airspace;
+use crate::flown::{Air, Airspace};
 use crate::passes;
 use crate::team::PlannedUav;
 use skein_flight::coverage::passes::{Directions, Pass, PassesError, PassesProblem};
@@ -160,17 +160,22 @@ impl<'a> OpenArea<'a> {
             ..passes::Uav::at(uav.start)
         };
         let team: Vec<passes::Uav> = job.crew.iter().map(uav).collect();
-        let plan = match fly_team(&problem, &team) {
+        let airs: Vec<Air> = job
+            .crew
+            .iter()
+            .map(|uav| self.request.air(uav.speed_mps))
+            .collect();
+        let plan = match fly_team(&problem, &team, &airs) {
             // A section that zones and holes fill is no work.
             Err(PassesError::Nothing) if job.area != &self.request.area => {
-                return Ok(Part::at_home(&job));
+                return Ok(self.at_home(&job));
             }
             plan => plan?,
         };
         let flights = job.crew.iter().enumerate().map(|(i, uav)| {
             let flown = &plan.flights[i];
             let track = flown.track(uav.start);
-            let mut flight = flight(uav, &job, &track, flown.length_m());
+            let mut flight = self.flight(uav, &job, &track, flown.air_m(&airs[i]));
             flight.lap = lap(&track, &plan.tours[i]);
             flight.passes = Some(plan.tours[i].len());
             flight.legs.clone_from(&flown.legs);
@@ -232,8 +237,9 @@ impl<'a> OpenArea<'a> {
             let mut late = false;
             for (i, uav) in job.crew.iter().enumerate() {
                 if uav.endurance_s.is_finite() && rounds > 0 {
-                    let all = fly_within(&router, uav.start, &plan.passes[i], f64::INFINITY);
-                    let over = all.0.length_m() / (uav.endurance_s * uav.speed_mps);
+                    let air = self.request.air(uav.speed_mps);
+                    let all = fly_within(&router, uav.start, &plan.passes[i], f64::INFINITY, &air);
+                    let over = all.0.air_m(&air) / (uav.endurance_s * uav.speed_mps);
                     late |= over > 1.0;
                     crew[i].endurance_s /= over.max(1.0) * 1.01;
                 }
@@ -247,7 +253,8 @@ impl<'a> OpenArea<'a> {
         let (mut wanted_m, mut seen_m) = (0.0, 0.0);
         for (i, uav) in job.crew.iter().enumerate() {
             let longest_m = uav.endurance_s * uav.speed_mps;
-            let (flown, passes) = fly_within(&router, uav.start, &plan.passes[i], longest_m);
+            let air = self.request.air(uav.speed_mps);
+            let (flown, passes) = fly_within(&router, uav.start, &plan.passes[i], longest_m, &air);
             let length_m = |p: &[Pass]| p.iter().map(|p| p.length_m() + job.lane_m).sum::<f64>();
             wanted_m += length_m(&plan.passes[i]);
             seen_m += length_m(&passes);
@@ -255,7 +262,7 @@ impl<'a> OpenArea<'a> {
                 lap: plan.laps[i].clone(),
                 passes: Some(passes.len()),
                 legs: flown.legs.clone(),
-                ..flight(uav, &job, &flown.track(uav.start), flown.length_m())
+                ..self.flight(uav, &job, &flown.track(uav.start), flown.air_m(&air))
             });
             seen.extend(passes);
         }
@@ -287,14 +294,34 @@ impl<'a> OpenArea<'a> {
     }
 }
 
-impl Part {
+impl OpenArea<'_> {
     /// Nothing to see: all stay.
-    fn at_home(job: &Job<'_>) -> Self {
-        let stay = |uav| flight(uav, job, &[], 0.0);
-        Self {
+    fn at_home(&self, job: &Job<'_>) -> Part {
+        let stay = |uav| self.flight(uav, job, &[], 0.0);
+        Part {
             flights: job.crew.iter().map(stay).collect(),
             done_share: 1.0,
-            ..Self::default()
+            ..Part::default()
+        }
+    }
+
+    /// One UAV's flight, so long through the air; without a track it stays at its start.
+    fn flight(&self, uav: &PlannedUav, job: &Job<'_>, track: &[Point], length_m: f64) -> Flight {
+        Flight {
+            uav: uav.uav,
+            name: uav.name.clone(),
+            track: match track {
+                [] => vec![uav.start],
+                track => track.to_vec(),
+            },
+            lap: Vec::new(),
+            length_m,
+            speed_mps: uav.speed_mps,
+            turn_radius_m: self.request.team[uav.uav].turn_radius_m,
+            lane_m: job.lane_m,
+            cruise_power_w: uav.cruise_power_w,
+            passes: None,
+            legs: Vec::new(),
         }
     }
 }
@@ -327,26 +354,6 @@ pub(crate) fn check_start(detours: &Detours, name: &str, start: Point) -> Result
         return Err(PlannerError::LaunchInZone(name.to_owned()));
     }
     Ok(())
-}
-
-/// One UAV's flight; without a track it stays at its start.
-fn flight(uav: &PlannedUav, job: &Job<'_>, track: &[Point], length_m: f64) -> Flight {
-    Flight {
-        uav: uav.uav,
-        name: uav.name.clone(),
-        track: match track {
-            [] => vec![uav.start],
-            track => track.to_vec(),
-        },
-        lap: Vec::new(),
-        length_m,
-        speed_mps: uav.speed_mps,
-        turn_radius_m: uav.turn_radius_m,
-        lane_m: job.lane_m,
-        cruise_power_w: uav.cruise_power_w,
-        passes: None,
-        legs: Vec::new(),
-    }
 }
 
 /// What lies between the beginning of the first pass and the end of the last one.

@@ -119,6 +119,24 @@ pub fn straight(from: Point, to: Point) -> Curve {
     curve
 }
 
+/// The air that a UAV flies through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Air {
+    /// Airspeed, m/s.
+    pub airspeed_mps: f64,
+    /// The wind, where it blows to, m/s.
+    pub wind_mps: Vector,
+}
+
+impl Air {
+    /// What a turn radius through the air becomes over the ground where the wind is from
+    /// behind, metres.
+    pub fn ground_radius_m(&self, turn_radius_m: f64) -> f64 {
+        let faster = 1.0 + self.wind_mps.norm() / self.airspeed_mps;
+        turn_radius_m * faster * faster
+    }
+}
+
 /// One UAV's flight over its stops.
 #[derive(Clone, Debug, Default)]
 pub struct Flown {
@@ -143,6 +161,12 @@ impl Flown {
     /// strong.
     pub fn time_s(&self, airspeed_mps: f64, wind_mps: Vector) -> f64 {
         time_s(&self.legs, airspeed_mps, wind_mps)
+    }
+
+    /// The distance through the air while it is flown, metres: what it takes times the
+    /// airspeed.
+    pub fn air_m(&self, air: &Air) -> f64 {
+        self.time_s(air.airspeed_mps, air.wind_mps) * air.airspeed_mps
     }
 
     /// Its points: the ends of all pieces, and of arcs enough that chords stand for them.

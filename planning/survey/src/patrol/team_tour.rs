@@ -4,7 +4,7 @@
 use super::team_patrol::{Over, PatrolError, PatrolRequest, TourKind};
 use crate::area::{self, AreaRequest, Lanes};
 use crate::flight::Leg;
-use crate::flown::{Airspace, Stop, fly_round};
+use crate::flown::{Air, Airspace, Stop, fly_round};
 use crate::heights::Separation;
 use crate::objective::Objective;
 use crate::team::{Sensor, Uav};
@@ -30,8 +30,11 @@ pub(super) struct Course {
 /// as the wind from behind makes them.
 fn router(request: &PatrolRequest, airspace: &Airspace) -> Result<Router, PatrolError> {
     let turns = request.team.iter().map(|u| {
-        let faster = 1.0 + request.wind_mps.norm() / u.speed_mps;
-        u.turn_radius_m * faster * faster
+        let air = Air {
+            airspeed_mps: u.speed_mps,
+            wind_mps: request.wind_mps,
+        };
+        air.ground_radius_m(u.turn_radius_m)
     });
     for uav in &request.team {
         // What is no clearance is refused by the planners.
@@ -147,6 +150,7 @@ pub(super) fn over_area(request: &PatrolRequest) -> Result<Course, PatrolError> 
         holes: holes.clone(),
         zones: Arc::clone(zones),
         fences: fences.clone(),
+        wind_mps: request.wind_mps,
         planners: *planners,
         lanes: Lanes::Common,
         separation: Separation::FLAT,

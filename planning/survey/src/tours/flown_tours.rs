@@ -6,7 +6,7 @@
 use super::tour_problem::TourProblem;
 use super::{Targets, TourRequest, ToursError};
 use crate::flight::Flight;
-use crate::flown::{Airspace, Flown, Stop, fly, straight, stretches};
+use crate::flown::{Air, Airspace, Flown, Stop, fly, straight, stretches};
 use crate::team::Uav;
 use skein_flight::coverage::lines::Traversal;
 use skein_flight::route::Router;
@@ -106,8 +106,11 @@ impl<'a> Pilot<'a> {
     /// Ways for a UAV. In a wind its turns over the ground are as wide as the wind from
     /// behind makes them.
     fn router(&self, uav: &Uav) -> Router {
-        let faster = 1.0 + self.request.wind_mps.norm() / uav.speed_mps;
-        self.airspace.router(uav.turn_radius_m * faster * faster)
+        let air = Air {
+            airspeed_mps: uav.speed_mps,
+            wind_mps: self.request.wind_mps,
+        };
+        self.airspace.router(air.ground_radius_m(uav.turn_radius_m))
     }
 
     fn with(&self, flight: &Flight, flown: &Flown, uav: &Uav) -> Flight {

@@ -406,8 +406,6 @@ impl Tours {
                     Vec::new(),
                 ),
             };
-            // Over the ground: through the air it differs in a wind.
-            flight.length_m = flight.legs.iter().map(|l| l.curve.length_m()).sum();
             flight.lane_m = None;
             if !flight.flies() && !problem.ways.iter().any(sees) {
                 flight.stays = Some(Stays::NoSensor);
@@ -430,10 +428,7 @@ impl Tours {
             makespan_s: worth.makespan_s,
             lower_bound_s: self.lower_bound_s,
             total_s: flights().map(Flight::time_s).sum(),
-            total_m: flights()
-                .flat_map(|f| &f.legs)
-                .map(|l| l.curve.length_m())
-                .sum(),
+            total_m: flights().map(Flight::ground_m).sum(),
             energy_s: worth.energy,
             energy_wh: flights().map(Flight::energy_wh).sum(),
             targets: problem.ways.len(),
