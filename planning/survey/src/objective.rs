@@ -38,7 +38,7 @@ pub(crate) struct Worth {
 
 impl Worth {
     /// The figure of an objective.
-    fn figure(&self, objective: Objective) -> f64 {
+    pub(crate) fn figure(&self, objective: Objective) -> f64 {
         match objective {
             Objective::Time => self.makespan_s,
             Objective::Distance => self.total_m,

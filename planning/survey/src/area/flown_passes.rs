@@ -16,12 +16,24 @@ use skein_flight::route::{RouteLimits, Router};
 use skein_geometry::frame::Point;
 use std::collections::BTreeMap;
 
-/// Times that passes are ordered: after the first by what the ways took.
-const ROUNDS: usize = 3;
-
 /// What a way costs that is not there, in turns: others are preferred, and what can be
 /// reached by no other is still planned for.
 const NO_WAY_TURNS: f64 = 20.0;
+
+/// What a search takes where there are no zones, as if there were so many edges.
+const FREE_EDGES: usize = 20;
+
+/// What is looked at of each edge for a way that nothing is in the way of.
+const WAY_WORK: u64 = 12;
+
+/// What is looked at of each edge for the ends of a pass.
+const PASS_WORK: usize = 60;
+
+/// What is looked at of each edge for the share that is seen.
+const SAMPLES_WORK: u64 = 5_000;
+
+/// What is looked at for the order of each pair of passes.
+const PAIR_WORK: usize = 10;
 
 /// Times that a shorter endurance is planned for where turns take what was left.
 const ENDURANCE_ROUNDS: usize = 3;
@@ -39,10 +51,13 @@ pub(super) struct FlownPasses {
     pub unreached: Vec<Pass>,
     /// The cells.
     pub cells: Vec<CellPlan>,
+    /// What it took to plan, about, in edges that were looked at.
+    pub work: u64,
 }
 
 /// Plans flights for a team so that every pass that can be is flown once, and the longest
-/// time is short; `problem.launch` is not used. `airs` is what each flies through.
+/// time is short; `problem.launch` is not used. `airs` is what each flies through. Passes are
+/// ordered `rounds` times, after the first by what the ways took.
 ///
 /// # Errors
 /// [`PassesError`]; nothing is planned then.
@@ -50,6 +65,7 @@ pub(super) fn fly_team(
     problem: &PassesProblem,
     team: &[Uav],
     airs: &[Air],
+    rounds: usize,
 ) -> Result<FlownPasses, PassesError> {
     if team.is_empty() {
         return Err(PassesError::Team(LineError::NoTeam));
@@ -72,7 +88,8 @@ pub(super) fn fly_team(
             None => unreached.push(*pass),
         }
     }
-    let more = gaps::fill(problem, &router, &passes, is_open);
+    let (more, tried) = gaps::fill(problem, &router, &passes, is_open);
+    let tried = tried + layout.passes.len();
     passes.extend(more);
     cut(&mut passes, team.len(), problem.shortest_pass_m);
     if passes.is_empty() {
@@ -95,7 +112,13 @@ pub(super) fn fly_team(
         starts: starts.len(),
         lines: lines(&passes),
     };
-    let mut found = desk.best()?;
+    let mut found = desk.best(rounds)?;
+    let edges = problem.zones.zones().iter().map(|z| z.vertices().len());
+    let edges = edges.sum::<usize>() + FREE_EDGES;
+    let pairs = passes.len() * passes.len();
+    found.work = (WAY_WORK * found.work + (PASS_WORK * tried) as u64 + SAMPLES_WORK)
+        .saturating_mul(edges as u64)
+        .saturating_add((PAIR_WORK * pairs) as u64);
     found.unreached.extend(unreached);
     found.cells = layout.cells;
     Ok(found)
@@ -159,13 +182,14 @@ struct Desk<'a> {
 type Known = BTreeMap<(usize, usize), f64>;
 
 impl Desk<'_> {
-    fn best(&self) -> Result<FlownPasses, PassesError> {
+    fn best(&self, mut rounds: usize) -> Result<FlownPasses, PassesError> {
         let mut known = Known::new();
         let mut best: Option<FlownPasses> = None;
         let mut endurances: Vec<f64> = self.team.iter().map(|u| u.endurance).collect();
-        let (mut rounds, mut shorter) = (ROUNDS, ENDURANCE_ROUNDS);
+        let (mut shorter, mut work) = (ENDURANCE_ROUNDS, 0);
         while rounds > 0 {
             let found = self.ordered(&endurances, &mut known)?;
+            work += found.flights.iter().map(|f| f.work).sum::<u64>();
             let late = self.too_long(&found);
             if late.is_empty() || shorter == 0 {
                 rounds -= 1;
@@ -180,7 +204,9 @@ impl Desk<'_> {
                 }
             }
         }
-        Ok(best.unwrap_or_default())
+        let mut best = best.unwrap_or_default();
+        best.work = work;
+        Ok(best)
     }
 
     /// Shared out, ordered and flown; what the ways took is noted.

@@ -36,17 +36,17 @@ const SAME_RAD: f64 = 0.02;
 /// Where a line across a group is tried beside its place, in eighths of a lane.
 const SHIFTS: [f64; 9] = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0];
 
-/// Passes beside `passes` that see what these do not, as far as turns find room; `is_open`
-/// says where somebody can be at all.
+/// Passes beside `passes` that see what these do not, as far as turns find room, and how many
+/// were tried; `is_open` says where somebody can be at all.
 pub(super) fn fill(
     problem: &PassesProblem,
     router: &Router,
     passes: &[Pass],
     is_open: impl Fn(Point) -> bool,
-) -> Vec<Pass> {
-    let mut added = Vec::new();
+) -> (Vec<Pass>, usize) {
+    let (mut added, mut tried) = (Vec::new(), 0);
     for mut group in unseen(problem, passes) {
-        let pool = candidates(problem, router, &group, &is_open);
+        let pool = candidates(problem, router, &group, &is_open, &mut tried);
         let mut pool: Vec<(Pass, f64)> = pool
             .into_iter()
             .map(|p| (p, p.length_m() + problem.turn_m()))
@@ -70,7 +70,7 @@ pub(super) fn fill(
             added.push(pass);
         }
     }
-    added
+    (added, tried)
 }
 
 fn sees(problem: &PassesProblem, pass: &Pass, p: Point) -> bool {
@@ -150,6 +150,7 @@ fn candidates(
     router: &Router,
     group: &Group,
     is_open: &impl Fn(Point) -> bool,
+    tried: &mut usize,
 ) -> Vec<Pass> {
     let lane_m = problem.lane_spacing_m;
     let mut found = Vec::new();
@@ -175,6 +176,7 @@ fn candidates(
                     from: at(u0 + ahead_m),
                     to: at((u1 - ahead_m).max(u0 + ahead_m + 1.0)),
                 };
+                *tried += 1;
                 let open = clear_part(router, pass).filter(|p| is_open(p.from));
                 found.extend(open.and_then(|p| turnable(router, p)));
             }

@@ -20,7 +20,7 @@ const STYLES: usize = 3;
 const EVENING_PART: usize = 8;
 
 /// Samples of the area while plans are only compared.
-const FEW_SAMPLES: f64 = 4_000.0;
+pub(crate) const FEW_SAMPLES: f64 = 4_000.0;
 
 /// A section of which next to nothing can be flown counts as if this were done of it.
 const LEAST_DONE: f64 = 0.05;
@@ -92,16 +92,11 @@ impl Desk<'_> {
 
     /// One width for all.
     fn common(&self, team: &[PlannedUav], care: Care) -> Result<Flights, PlannerError> {
-        let part = self.part(&self.ground.request.area, team, care.steps)?;
+        let part = self.part(&self.ground.request.area, team, care)?;
         Ok(self.joined(Laid::Common, vec![part], care))
     }
 
-    fn part(
-        &self,
-        area: &Polygon,
-        crew: &[PlannedUav],
-        steps: usize,
-    ) -> Result<Part, PlannerError> {
+    fn part(&self, area: &Polygon, crew: &[PlannedUav], care: Care) -> Result<Part, PlannerError> {
         let lane_m = crew.iter().map(|f| f.swath_m).fold(f64::INFINITY, f64::min);
         let turn_radius_m = crew.iter().map(|f| f.turn_radius_m).fold(0.0, f64::max);
         let job = Job {
@@ -109,7 +104,8 @@ impl Desk<'_> {
             crew,
             lane_m,
             turn_radius_m,
-            steps,
+            steps: care.steps,
+            rough: care.rough,
         };
         self.ground.plan(self.planner, job)
     }
@@ -167,7 +163,7 @@ impl Desk<'_> {
                 times_s.push(0.0);
                 continue;
             };
-            let mut part = self.part(section, crew, care.steps).ok()?;
+            let mut part = self.part(section, crew, care).ok()?;
             times_s.push(part.makespan_s() / part.done_share.max(LEAST_DONE));
             let kind = ShapeKind::Section {
                 number: parts.len() + 1,

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | `planners` | both planners behind one question: a part of the area, lanes of one width |
 //! | `flown_passes` | the exact planner: passes shared out, ordered and flown |
+//! | `courses` | the course of exact passes, searched by what they take |
 //! | `gaps` | passes for what lanes leave unseen beside walls |
 //! | `cells` | the approximate planner: a region of lane cells for each UAV |
 //! | `lanes` | lanes for unlike swaths: one width for all, or a section for each crew |
@@ -14,6 +15,7 @@
 //! Leaves to others: files, and what a person is shown.
 
 mod cells;
+mod courses;
 mod flights;
 mod flown_passes;
 mod gaps;
@@ -71,7 +73,7 @@ pub struct AreaRequest {
     /// How far a camera sees before and behind, metres; `None` for half a lane.
     pub look_ahead_m: Option<f64>,
     /// Heading of all exact passes, radians counter-clockwise from east; `None` for the
-    /// shortest found.
+    /// best found by plans on courses all round.
     pub heading_rad: Option<f64>,
     /// The wind, where it blows to, m/s: flights are compared by their times in it.
     pub wind_mps: Vector,

@@ -4,11 +4,14 @@
 //! Leaves to [`super::lanes`] which UAVs work on which part.
 
 use super::cells::{self, CellProblem};
+use super::courses::{self, Effort};
+use super::flights::covered_share;
 use super::flown_passes::{fly_team, fly_within};
 use super::{AreaError, AreaRequest, Facts, Planner, PlannerError, Shape, ShapeKind};
 use crate::detours::{DetourError, Detours};
 use crate::flight::Flight;
 use crate::flown::{Air, Airspace};
+use crate::objective::Worth;
 use crate::passes;
 use crate::team::PlannedUav;
 use skein_flight::coverage::passes::{Directions, Pass, PassesError, PassesProblem};
@@ -44,10 +47,12 @@ pub(crate) struct Job<'a> {
     pub turn_radius_m: f64,
     /// Steps of improvement.
     pub steps: usize,
+    /// Whether the plan is only compared with others: no courses are searched for it.
+    pub rough: bool,
 }
 
 /// The flights over a part.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Part {
     /// In the order of the crew.
     pub flights: Vec<Flight>,
@@ -57,11 +62,13 @@ pub(crate) struct Part {
     pub facts: Option<Facts>,
     /// Rings for a map.
     pub shapes: Vec<Shape>,
+    /// What it took to plan, about, in edges that were looked at; 0 if nobody counted.
+    pub work: u64,
     seen: Seen,
 }
 
 /// What of the ground is seen.
-#[derive(Default)]
+#[derive(Clone, Default)]
 enum Seen {
     #[default]
     Nothing,
@@ -82,6 +89,18 @@ impl Part {
                 across_m,
                 along_m,
             } => passes.iter().any(|pass| pass.sees(p, *across_m, *along_m)),
+        }
+    }
+
+    /// What it is compared by; energies in watt-hours where all state their power.
+    fn worth(&self, share: f64) -> Worth {
+        let flying = || self.flights.iter().filter(|f| f.flies());
+        let energy_wh: Option<f64> = flying().map(Flight::energy_wh).sum();
+        Worth {
+            share,
+            makespan_s: self.makespan_s(),
+            total_m: self.flights.iter().map(|f| f.length_m).sum(),
+            energy: energy_wh.unwrap_or_else(|| flying().map(Flight::energy_s).sum()),
         }
     }
 
@@ -129,23 +148,40 @@ impl<'a> OpenArea<'a> {
     /// When there is no plan.
     pub(crate) fn plan(&self, planner: Planner, job: Job<'_>) -> Result<Part, PlannerError> {
         match planner {
-            Planner::Exact => self.exact(job),
+            Planner::Exact => match self.request.heading_rad {
+                Some(heading_rad) => self.exact(job, Directions::Fixed(heading_rad), Effort::FULL),
+                None if job.rough => self.exact(job, Directions::Best, Effort::FULL),
+                None => self.on_best_course(job),
+            },
             Planner::Approximate => self.approximate(job),
         }
     }
 
-    fn exact(&self, job: Job<'_>) -> Result<Part, PlannerError> {
+    /// Passes on the course that is best when they are flown.
+    fn on_best_course(&self, job: Job<'_>) -> Result<Part, PlannerError> {
+        let fly = |directions, effort| self.exact(job, directions, effort);
+        let worth = |part: &Part, samples: f64| {
+            let wants = |p| self.wants(p);
+            let share = covered_share(job.area, wants, job.lane_m, samples, |p| part.sees(p));
+            part.worth(share)
+        };
+        courses::best(job.area, self.request.objective, fly, worth)
+    }
+
+    fn exact(
+        &self,
+        job: Job<'_>,
+        directions: Directions,
+        effort: Effort,
+    ) -> Result<Part, PlannerError> {
         let look_ahead_m = self.request.look_ahead_m.unwrap_or(job.lane_m / 2.0);
         let problem = PassesProblem {
             holes: self.request.holes.clone(),
             zones: self.airspace.zones().clone(),
             clearance_m: self.airspace.clearance_m(),
             look_ahead_m,
-            steps: job.steps,
-            directions: match self.request.heading_rad {
-                Some(heading) => Directions::Fixed(heading),
-                None => Directions::Best,
-            },
+            steps: (job.steps / effort.steps_part).max(1),
+            directions,
             ..PassesProblem::new(
                 job.area.clone(),
                 job.lane_m,
@@ -165,7 +201,7 @@ impl<'a> OpenArea<'a> {
             .iter()
             .map(|uav| self.request.air(uav.speed_mps))
             .collect();
-        let plan = match fly_team(&problem, &team, &airs) {
+        let plan = match fly_team(&problem, &team, &airs, effort.rounds) {
             // A section that zones and holes fill is no work.
             Err(PassesError::Nothing) if job.area != &self.request.area => {
                 return Ok(self.at_home(&job));
@@ -209,6 +245,7 @@ impl<'a> OpenArea<'a> {
                 unreached_passes: plan.unreached.len(),
             }),
             shapes: shapes.collect(),
+            work: plan.work,
             seen: Seen::Passes {
                 passes,
                 across_m: job.lane_m / 2.0,
@@ -285,6 +322,7 @@ impl<'a> OpenArea<'a> {
                     kind: ShapeKind::LeftCell,
                 })
                 .collect(),
+            work: 0,
             seen: Seen::Passes {
                 passes: seen,
                 across_m: job.lane_m / 2.0,

@@ -149,6 +149,8 @@ pub struct Flown {
     /// The ways that were looked for between stops, each with its stand, none for the
     /// start; and how long they are where they are there, metres.
     pub ways: Vec<(Node, Node, Option<f64>)>,
+    /// What it took to find them, in ways that nothing is in the way of.
+    pub work: u64,
 }
 
 impl Flown {

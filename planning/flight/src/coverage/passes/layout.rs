@@ -30,7 +30,7 @@ const OVERSHOOT: f64 = 0.083;
 const HEADINGS: usize = 6;
 
 /// Where the first of the common strips begins, as a share of what whole lanes leave.
-const SHIFTS: [f64; 4] = [0.5, 0.0, 1.0, 0.25];
+pub const SHIFTS: [f64; 4] = [0.5, 0.0, 1.0, 0.25];
 
 /// Headings of a cell that are compared.
 const CELL_HEADINGS: usize = 12;
@@ -240,23 +240,31 @@ impl Layout {
             }
         };
         let headings: Vec<f64> = match problem.directions {
-            Directions::Fixed(heading) => vec![half_turn(heading)],
+            Directions::Fixed(heading_rad) | Directions::Shifted { heading_rad, .. } => {
+                vec![half_turn(heading_rad)]
+            }
             Directions::Huang => first(&borders, 1),
             Directions::PerCell | Directions::Best => first(&borders, HEADINGS),
         };
+        let shifts = match &problem.directions {
+            Directions::Best | Directions::Fixed(_) => SHIFTS.as_slice(),
+            Directions::Shifted { shift, .. } => std::slice::from_ref(shift),
+            Directions::PerCell | Directions::Huang => &[],
+        };
         for heading in headings {
             let sweep = Sweep::new(&borders, heading, problem.decomposition, &measures)?;
-            if matches!(problem.directions, Directions::Best | Directions::Fixed(_)) {
-                for shift in SHIFTS {
-                    let zones = &sweep.zones;
-                    offer(Draft::common(
-                        &sweep.cells,
-                        heading,
-                        zones,
-                        &measures,
-                        shift,
-                    ));
-                }
+            for shift in shifts {
+                let zones = &sweep.zones;
+                offer(Draft::common(
+                    &sweep.cells,
+                    heading,
+                    zones,
+                    &measures,
+                    *shift,
+                ));
+            }
+            if matches!(problem.directions, Directions::Shifted { .. }) {
+                continue;
             }
             let mut covered = sweep.covered(&measures);
             if matches!(problem.directions, Directions::Best | Directions::PerCell) {

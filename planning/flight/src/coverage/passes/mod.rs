@@ -42,7 +42,7 @@ use crate::coverage::lines::{self, Line, LineError, Uav};
 use crate::coverage::metric::Matrix;
 pub use cells::Decomposition;
 pub use direction::{altitudes_m, sweep_directions};
-pub use layout::Layout;
+pub use layout::{Layout, SHIFTS};
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::atan2;
 use skein_geometry::offset::OffsetError;
@@ -136,6 +136,13 @@ pub enum Directions {
     Huang,
     /// All lanes in this heading, radians counter-clockwise from east.
     Fixed(f64),
+    /// Lanes common to all cells in one heading, from a place of the first one on.
+    Shifted {
+        /// The heading, radians counter-clockwise from east.
+        heading_rad: f64,
+        /// Where the first lane begins, as a share of what whole lanes leave of the area.
+        shift: f64,
+    },
 }
 
 /// What is to be seen, and how.
@@ -228,10 +235,16 @@ impl PassesProblem {
         if !(self.launch.x.abs() <= most_m && self.launch.y.abs() <= most_m) {
             return Err(PassesError::Number("launch point"));
         }
-        if let Directions::Fixed(heading) = self.directions
-            && !heading.is_finite()
-        {
+        let figures = match self.directions {
+            Directions::Fixed(heading_rad) => [heading_rad, 0.0],
+            Directions::Shifted { heading_rad, shift } => [heading_rad, shift],
+            Directions::Best | Directions::PerCell | Directions::Huang => [0.0; 2],
+        };
+        if !figures[0].is_finite() {
             return Err(PassesError::Number("heading"));
+        }
+        if !(0.0..=1.0).contains(&figures[1]) {
+            return Err(PassesError::Number("shift of the lanes"));
         }
         let (low, high) = self.area.bounds();
         let lanes = (high - low).norm() / self.lane_spacing_m;

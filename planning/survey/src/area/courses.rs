@@ -1,0 +1,229 @@
+//! The course of straight passes, searched by what they take when they are flown.
+//!
+//! Lengths of passes and a guess for each turn say little of a plan where turns are wide,
+//! zones stand close or several UAVs share the work. So every course is flown quickly, those
+//! that promise most with more steps and with their lanes moved aside, and the best of these
+//! as thoroughly as any plan. Leaves to [`super::planners`] the flights on a course.
+
+use super::PlannerError;
+use super::flights::MOST_SAMPLES;
+use super::lanes::FEW_SAMPLES;
+use super::planners::Part;
+use crate::objective::{Objective, SAME_SHARE, Worth};
+use skein_flight::coverage::passes::{Directions, SHIFTS};
+use skein_geometry::Polygon;
+use skein_geometry::math::{PI, atan2};
+
+/// Courses over half a turn: every 5°.
+const COURSES: u32 = 36;
+
+/// Courses are tried in steps of so many, which meet them all: the first ones lie far apart.
+const STRIDE: u32 = 11;
+
+/// Courses nearer to each other than this are one, radians.
+const SAME_RAD: f64 = 1e-3;
+
+/// Courses along edges of the area at most, the longest edges first.
+const MOST_EDGES: usize = 8;
+
+/// Courses and places of lanes that are flown with more steps.
+const LONGER: usize = 8;
+
+/// Courses of these whose lanes are moved aside.
+const ASIDE: usize = 2;
+
+/// Plans that are made in full beside the guessed one.
+const IN_FULL: usize = 3;
+
+/// What a search may take, in the unit of [`Part::work`]: as much as so many plans, but at
+/// least and at most this, which is some seconds.
+const WORK_PLANS: u64 = 8;
+const WORK: (u64, u64) = (25_000_000, 100_000_000);
+
+/// How thoroughly a course is flown.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort {
+    /// The steps of improvement are divided by this.
+    pub steps_part: usize,
+    /// Times that passes are ordered.
+    pub rounds: usize,
+    /// Samples by which the share that is seen is told.
+    samples: f64,
+}
+
+impl Effort {
+    /// A plan to be flown.
+    pub(super) const FULL: Self = Self {
+        steps_part: 1,
+        rounds: 3,
+        samples: MOST_SAMPLES,
+    };
+    const QUICK: Self = Self {
+        steps_part: 20,
+        rounds: 1,
+        samples: FEW_SAMPLES,
+    };
+    const LONGER: Self = Self {
+        steps_part: 5,
+        rounds: 2,
+        samples: FEW_SAMPLES,
+    };
+}
+
+/// A course and what came of it.
+struct Tried {
+    directions: Directions,
+    part: Part,
+    worth: Worth,
+}
+
+/// What plans on courses are made by.
+struct Search<F, W> {
+    objective: Objective,
+    fly: F,
+    worth: W,
+    /// What may still be done.
+    left: u64,
+}
+
+impl<F, W> Search<F, W>
+where
+    F: Fn(Directions, Effort) -> Result<Part, PlannerError>,
+    W: Fn(&Part, f64) -> Worth,
+{
+    /// A plan on a course, unless there is none or less than `reserve` is left to do.
+    fn tried(&mut self, directions: Directions, effort: Effort, reserve: u64) -> Option<Tried> {
+        if self.left <= reserve {
+            return None;
+        }
+        let part = (self.fly)(directions, effort).ok()?;
+        Some(self.noted(directions, part, effort.samples))
+    }
+
+    fn noted(&mut self, directions: Directions, part: Part, samples: f64) -> Tried {
+        self.left = self.left.saturating_sub(part.work);
+        Tried {
+            directions,
+            worth: (self.worth)(&part, samples),
+            part,
+        }
+    }
+
+    /// Those that see as much as any first, the best of them before others; then those that
+    /// see less. What is known already is left out.
+    fn best_first(&self, mut all: Vec<Tried>) -> Vec<Tried> {
+        let most = all.iter().map(|t| t.worth.share).fold(0.0, f64::max);
+        let figure = |t: &Tried| {
+            let less = (most - t.worth.share).max(0.0);
+            let lacks = if less > SAME_SHARE { less } else { 0.0 };
+            (lacks, t.worth.figure(self.objective), t.worth.makespan_s)
+        };
+        all.sort_by(|a, b| {
+            let (a, b) = (figure(a), figure(b));
+            let by_share = a.0.total_cmp(&b.0);
+            by_share.then(a.1.total_cmp(&b.1)).then(a.2.total_cmp(&b.2))
+        });
+        all.dedup_by(|a, b| a.worth == b.worth);
+        all
+    }
+}
+
+/// The best plan that was found on any course; `fly` plans on one.
+///
+/// # Errors
+/// When there is no plan on the course that is guessed to be the shortest.
+pub(super) fn best(
+    area: &Polygon,
+    objective: Objective,
+    fly: impl Fn(Directions, Effort) -> Result<Part, PlannerError>,
+    worth: impl Fn(&Part, f64) -> Worth,
+) -> Result<Part, PlannerError> {
+    let guessed = fly(Directions::Best, Effort::FULL)?;
+    if guessed.work == 0 {
+        return Ok(guessed);
+    }
+    let left = guessed
+        .work
+        .saturating_mul(WORK_PLANS)
+        .clamp(WORK.0, WORK.1);
+    let mut search = Search {
+        objective,
+        fly,
+        worth,
+        left,
+    };
+    let reserve = guessed.work.saturating_mul(IN_FULL as u64).min(left / 2);
+    let first = search.noted(Directions::Best, guessed, Effort::FULL.samples);
+    let mut quick = Vec::new();
+    for directions in courses(area) {
+        quick.extend(search.tried(directions, Effort::QUICK, reserve));
+    }
+    let mut longer = Vec::new();
+    for (i, t) in search.best_first(quick).iter().take(LONGER).enumerate() {
+        longer.extend(search.tried(t.directions, Effort::LONGER, reserve));
+        if let Directions::Fixed(heading_rad) = t.directions
+            && i < ASIDE
+        {
+            for shift in SHIFTS {
+                let aside = Directions::Shifted { heading_rad, shift };
+                longer.extend(search.tried(aside, Effort::LONGER, reserve));
+            }
+        }
+    }
+    let mut found = Vec::new();
+    for t in search.best_first(longer).iter().take(IN_FULL) {
+        found.extend(search.tried(t.directions, Effort::FULL, 0));
+    }
+    let fallback = first.part.clone();
+    found.push(first);
+    let best = search.best_first(found).into_iter().next();
+    Ok(best.map_or(fallback, |t| t.part))
+}
+
+/// What is tried: lanes cell by cell, courses along edges of the area, and courses all round.
+fn courses(area: &Polygon) -> Vec<Directions> {
+    let mut edges: Vec<_> = area.edges().map(|(a, b)| b - a).collect();
+    edges.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
+    let along = edges.iter().map(|d| atan2(d.y, d.x).rem_euclid(PI));
+    let mut headings: Vec<f64> = Vec::new();
+    let is_new = |headings: &[f64], course_rad: f64| {
+        !headings.iter().any(|h| {
+            let apart = (course_rad - h).rem_euclid(PI);
+            apart.min(PI - apart) < SAME_RAD
+        })
+    };
+    for course_rad in along {
+        if headings.len() < MOST_EDGES && is_new(&headings, course_rad) {
+            headings.push(course_rad);
+        }
+    }
+    for i in 0..COURSES {
+        let course_rad = PI * f64::from(i * STRIDE % COURSES) / f64::from(COURSES);
+        if is_new(&headings, course_rad) {
+            headings.push(course_rad);
+        }
+    }
+    let fixed = headings.into_iter().map(Directions::Fixed);
+    [Directions::PerCell].into_iter().chain(fixed).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skein_geometry::frame::Point;
+
+    #[test]
+    fn courses_lie_along_edges_and_all_round() {
+        let corners = [(0.0, 0.0), (400.0, 30.0), (380.0, 200.0), (0.0, 200.0)];
+        let corners = corners.map(|(x, y)| Point::new(x, y)).to_vec();
+        let all = courses(&Polygon::new(corners).unwrap());
+        let has = |course_rad: f64| {
+            let is = |d: &Directions| matches!(d, Directions::Fixed(h) if (h - course_rad).abs() < SAME_RAD);
+            all.iter().any(is)
+        };
+        assert!(has(atan2(30.0, 400.0)) && all.contains(&Directions::PerCell));
+        for i in 0..COURSES {
+            assert!(has(PI * f64::from(i) / f64::from(COURSES)), "{i}");
+        }
+    }
+}
