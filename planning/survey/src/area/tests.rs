@@ -297,3 +297,26 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn no_course_that_is_asked_for_is_flown_sooner() {
+    let area = polygon(&[(0.0, 0.0), (420.0, 60.0), (380.0, 260.0), (-40.0, 200.0)]);
+    let team = ["a", "b", "c"].map(|name| uav(name, swath(45.0)));
+    let free = AreaRequest {
+        steps: 200,
+        ..request(area, &team, Planner::Exact)
+    };
+    let found = planned(&free).figures;
+    for i in 0..36 {
+        let asked = AreaRequest {
+            heading_rad: Some((5.0 * f64::from(i)).to_radians()),
+            ..free.clone()
+        };
+        let own = planned(&asked).figures;
+        let sees_as_much = own.covered_share >= found.covered_share;
+        assert!(
+            !sees_as_much || found.makespan_s <= 1.005 * own.makespan_s,
+            "{i}: {own:?} {found:?}"
+        );
+    }
+}
