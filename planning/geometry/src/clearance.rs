@@ -91,7 +91,7 @@ impl NoFlyZones {
         let mut least = limit_m;
         for ((zone, bounds), disc) in self.zones.iter().zip(&self.boxes).zip(&self.discs) {
             if box_gap_m(bounds, &around) < least && reach.gap_m(disc) < least {
-                least = least.min(segment_to_polygon_m(segment, zone));
+                least = segment_to_polygon_m(segment, &around, zone, least, enough_m);
                 if least < enough_m {
                     return least;
                 }

@@ -13,28 +13,49 @@ use crate::math::{TAU, atan2, wrap_tau};
 /// nearer, by less than a micrometre for arcs of up to a kilometre.
 const ON_ARC_RAD: f64 = 1e-9;
 
+/// Boxes are right to far less than this, metres.
+const ROUNDING_M: f64 = 1e-6;
+
 /// A piece turning less than this is a straight line to the nanometre, radians.
 const STRAIGHT_RAD: f64 = 1e-9;
 
-/// Distance from a piece to a polygon, metres; 0 when it touches or enters it.
-pub(super) fn segment_to_polygon_m(segment: &Segment, polygon: &Polygon) -> f64 {
+/// Distance from a piece, which lies in the box `around`, to a polygon, metres; 0 when it
+/// touches or enters it. `limit_m` if it is no nearer than that, and any distance below
+/// `enough_m` if one is found.
+pub(super) fn segment_to_polygon_m(
+    segment: &Segment,
+    around: &(Point, Point),
+    polygon: &Polygon,
+    limit_m: f64,
+    enough_m: f64,
+) -> f64 {
     let (from, to) = (segment.start.position(), segment.end().position());
-    if polygon.contains(from) {
-        return 0.0;
-    }
-    match segment.centre() {
-        Some(centre) if is_arc(segment) => {
-            let arc = Arc::new(centre, segment, from, to);
-            polygon
-                .edges()
-                .map(|(a, b)| arc.distance_m(a, b))
-                .fold(f64::INFINITY, f64::min)
+    let arc = segment
+        .centre()
+        .filter(|_| is_arc(segment))
+        .map(|centre| Arc::new(centre, segment, from, to));
+    let mut least = limit_m;
+    for (a, b) in polygon.edges() {
+        if is_farther(around, a, b, least) {
+            continue;
         }
-        _ => polygon
-            .edges()
-            .map(|(a, b)| line_to_line_m(from, to, a, b))
-            .fold(f64::INFINITY, f64::min),
+        least = least.min(match &arc {
+            Some(arc) => arc.distance_m(a, b),
+            None => line_to_line_m(from, to, a, b),
+        });
+        if least < enough_m {
+            return least;
+        }
     }
+    if polygon.contains(from) { 0.0 } else { least }
+}
+
+/// Whether an edge is certainly farther from a box than `least_m`.
+fn is_farther((low, high): &(Point, Point), a: Point, b: Point, least_m: f64) -> bool {
+    let gap = |low: f64, high: f64, a: f64, b: f64| (a.min(b) - high).max(low - a.max(b)).max(0.0);
+    let (x, y) = (gap(low.x, high.x, a.x, b.x), gap(low.y, high.y, a.y, b.y));
+    let far_m = least_m + ROUNDING_M;
+    x * x + y * y > far_m * far_m
 }
 
 /// Whether a piece is measured as an arc, not as a line.
