@@ -116,20 +116,21 @@ impl Polygon {
     pub fn contains(&self, p: Point) -> bool {
         let mut inside = false;
         for (a, b) in self.edges() {
-            // Of the others none is met by a ray to the side.
-            if p.y < a.y.min(b.y) || p.y > a.y.max(b.y) {
+            // Of the others none is met by a ray to the east.
+            if p.y < a.y.min(b.y) || p.y > a.y.max(b.y) || p.x > a.x.max(b.x) {
+                continue;
+            }
+            // Half-open in y, so that a ray through a vertex counts it once.
+            let (upward, downward) = (a.y <= p.y && p.y < b.y, b.y <= p.y && p.y < a.y);
+            if p.x < a.x.min(b.x) {
+                inside ^= upward || downward;
                 continue;
             }
             let s = side(a, b, p);
             if s == 0 && in_box(a, b, p) {
                 return true;
             }
-            // Half-open in y, so that a ray through a vertex counts it once.
-            let upward = a.y <= p.y && p.y < b.y && s > 0;
-            let downward = b.y <= p.y && p.y < a.y && s < 0;
-            if upward || downward {
-                inside = !inside;
-            }
+            inside ^= (upward && s > 0) || (downward && s < 0);
         }
         inside
     }

@@ -6,8 +6,6 @@
 //! as thoroughly as any plan. Leaves to [`super::planners`] the flights on a course.
 
 use super::PlannerError;
-use super::flights::MOST_SAMPLES;
-use super::lanes::FEW_SAMPLES;
 use super::planners::Part;
 use crate::objective::{Objective, SAME_SHARE, Worth};
 use skein_flight::coverage::passes::{Directions, SHIFTS};
@@ -38,7 +36,7 @@ const IN_FULL: usize = 3;
 /// What a search may take, in the unit of [`Part::work`]: as much as so many plans, but at
 /// least and at most this, which is some seconds.
 const WORK_PLANS: u64 = 8;
-const WORK: (u64, u64) = (25_000_000, 100_000_000);
+const WORK: (u64, u64) = (100_000_000, 250_000_000);
 
 /// How thoroughly a course is flown.
 #[derive(Clone, Copy, Debug)]
@@ -47,8 +45,6 @@ pub(super) struct Effort {
     pub steps_part: usize,
     /// Times that passes are ordered.
     pub rounds: usize,
-    /// Samples by which the share that is seen is told.
-    samples: f64,
 }
 
 impl Effort {
@@ -56,18 +52,20 @@ impl Effort {
     pub(super) const FULL: Self = Self {
         steps_part: 1,
         rounds: 3,
-        samples: MOST_SAMPLES,
     };
     const QUICK: Self = Self {
         steps_part: 20,
         rounds: 1,
-        samples: FEW_SAMPLES,
     };
     const LONGER: Self = Self {
         steps_part: 5,
         rounds: 2,
-        samples: FEW_SAMPLES,
     };
+
+    /// Whether this is a plan to be flown.
+    pub(super) fn is_full(self) -> bool {
+        self.steps_part == 1
+    }
 }
 
 /// A course and what came of it.
@@ -89,7 +87,7 @@ struct Search<F, W> {
 impl<F, W> Search<F, W>
 where
     F: Fn(Directions, Effort) -> Result<Part, PlannerError>,
-    W: Fn(&Part, f64) -> Worth,
+    W: Fn(&Part, Effort) -> Worth,
 {
     /// A plan on a course, unless there is none or less than `reserve` is left to do.
     fn tried(&mut self, directions: Directions, effort: Effort, reserve: u64) -> Option<Tried> {
@@ -97,14 +95,14 @@ where
             return None;
         }
         let part = (self.fly)(directions, effort).ok()?;
-        Some(self.noted(directions, part, effort.samples))
+        Some(self.noted(directions, part, effort))
     }
 
-    fn noted(&mut self, directions: Directions, part: Part, samples: f64) -> Tried {
+    fn noted(&mut self, directions: Directions, part: Part, effort: Effort) -> Tried {
         self.left = self.left.saturating_sub(part.work);
         Tried {
             directions,
-            worth: (self.worth)(&part, samples),
+            worth: (self.worth)(&part, effort),
             part,
         }
     }
@@ -136,7 +134,7 @@ pub(super) fn best(
     area: &Polygon,
     objective: Objective,
     fly: impl Fn(Directions, Effort) -> Result<Part, PlannerError>,
-    worth: impl Fn(&Part, f64) -> Worth,
+    worth: impl Fn(&Part, Effort) -> Worth,
 ) -> Result<Part, PlannerError> {
     let guessed = fly(Directions::Best, Effort::FULL)?;
     if guessed.work == 0 {
@@ -153,7 +151,7 @@ pub(super) fn best(
         left,
     };
     let reserve = guessed.work.saturating_mul(IN_FULL as u64).min(left / 2);
-    let first = search.noted(Directions::Best, guessed, Effort::FULL.samples);
+    let first = search.noted(Directions::Best, guessed, Effort::FULL);
     let mut quick = Vec::new();
     for directions in courses(area) {
         quick.extend(search.tried(directions, Effort::QUICK, reserve));

@@ -87,6 +87,54 @@ impl Flights {
     }
 }
 
+/// The wanted ground of an area, as points that are spread evenly over it.
+pub(crate) struct Samples(Vec<Point>);
+
+impl Samples {
+    /// About so many at most, an eighth of a swath apart at least.
+    pub(crate) fn new(
+        area: &Polygon,
+        wanted: impl Fn(Point) -> bool,
+        swath_m: f64,
+        most: f64,
+    ) -> Self {
+        // In a box along the longest edge: a needle across its box would be missed.
+        let along = area.edges().map(|(a, b)| b - a);
+        let along = along.max_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
+        let along = along.map_or(Vector::x(), |d| d.normalize());
+        let across = Vector::new(-along.y, along.x);
+        let span = |axis: Vector| {
+            let each = area.vertices().iter().map(|p| p.coords.dot(&axis));
+            each.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+                (l.min(x), h.max(x))
+            })
+        };
+        let ((u0, u1), (v0, v1)) = (span(along), span(across));
+        let most_m = (area.area_m2() / (most * LEAST_SAMPLES)).sqrt();
+        let least_m = (area.area_m2() / most).sqrt();
+        let pitch_m = (swath_m / SAMPLES_A_SWATH).min(most_m).max(least_m);
+        let n = (u1 - u0) * (v1 - v0) / (pitch_m * pitch_m);
+        let n = n.min(most * MOST_BESIDE).ceil();
+        let mut points = Vec::new();
+        let mut i = 0.0;
+        while i < n {
+            let at = |step: f64, low: f64, high: f64| low + (0.5 + i * step).fract() * (high - low);
+            let p = Point::from(along * at(STEPS[0], u0, u1) + across * at(STEPS[1], v0, v1));
+            if area.contains(p) && wanted(p) {
+                points.push(p);
+            }
+            i += 1.0;
+        }
+        Self(points)
+    }
+
+    /// The share of them that is seen.
+    pub(crate) fn share(&self, sees: impl Fn(Point) -> bool) -> f64 {
+        let seen = self.0.iter().filter(|p| sees(**p)).count();
+        seen as f64 / self.0.len().max(1) as f64
+    }
+}
+
 /// The share of the wanted ground of an area that is seen, by samples.
 pub(crate) fn covered_share(
     area: &Polygon,
@@ -95,25 +143,7 @@ pub(crate) fn covered_share(
     most_samples: f64,
     sees: impl Fn(Point) -> bool,
 ) -> f64 {
-    let (low, high) = area.bounds();
-    let most_m = (area.area_m2() / (most_samples * LEAST_SAMPLES)).sqrt();
-    let least_m = (area.area_m2() / most_samples).sqrt();
-    let pitch_m = (swath_m / SAMPLES_A_SWATH).min(most_m).max(least_m);
-    let size = high - low;
-    let n = size.x * size.y / (pitch_m * pitch_m);
-    let n = n.min(most_samples * MOST_BESIDE).ceil();
-    let (mut all, mut seen) = (0u32, 0u32);
-    let mut i = 0.0;
-    while i < n {
-        let at = |step: f64, m: f64| (0.5 + i * step).fract() * m;
-        let p = low + Vector::new(at(STEPS[0], size.x), at(STEPS[1], size.y));
-        if area.contains(p) && wanted(p) {
-            all += 1;
-            seen += u32::from(sees(p));
-        }
-        i += 1.0;
-    }
-    f64::from(seen) / f64::from(all.max(1))
+    Samples::new(area, wanted, swath_m, most_samples).share(sees)
 }
 
 #[cfg(test)]
@@ -144,5 +174,8 @@ mod tests {
         );
         // 2 × 50 × 200 of 30,000 square metres.
         assert!((rest - 2.0 / 3.0).abs() < 0.01, "{rest}");
+        let needle = Polygon::new(vec![at(0.0, 0.0), at(700.0, 697.0), at(703.0, 700.0)]).unwrap();
+        let half = covered_share(&needle, |_| true, 40.0, MOST_SAMPLES, |p| p.x > 497.0);
+        assert!((half - 0.5).abs() < 0.005, "{half}");
     }
 }

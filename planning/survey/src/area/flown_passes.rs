@@ -88,7 +88,7 @@ pub(super) fn fly_team(
             None => unreached.push(*pass),
         }
     }
-    let (more, tried) = gaps::fill(problem, &router, &passes, is_open);
+    let (more, tried) = gaps::fill(problem, &router, &passes, is_open, rounds > 1);
     let tried = tried + layout.passes.len();
     passes.extend(more);
     cut(&mut passes, team.len(), problem.shortest_pass_m);
@@ -187,8 +187,10 @@ impl Desk<'_> {
         let mut best: Option<FlownPasses> = None;
         let mut endurances: Vec<f64> = self.team.iter().map(|u| u.endurance).collect();
         let (mut shorter, mut work) = (ENDURANCE_ROUNDS, 0);
+        // Where orders are only compared, passes are joined in the cheapest way at hand.
+        let thorough = rounds > 1;
         while rounds > 0 {
-            let found = self.ordered(&endurances, &mut known)?;
+            let found = self.ordered(&endurances, &mut known, thorough)?;
             work += found.flights.iter().map(|f| f.work).sum::<u64>();
             let late = self.too_long(&found);
             if late.is_empty() || shorter == 0 {
@@ -210,7 +212,12 @@ impl Desk<'_> {
     }
 
     /// Shared out, ordered and flown; what the ways took is noted.
-    fn ordered(&self, endurances: &[f64], known: &mut Known) -> Result<FlownPasses, PassesError> {
+    fn ordered(
+        &self,
+        endurances: &[f64],
+        known: &mut Known,
+        thorough: bool,
+    ) -> Result<FlownPasses, PassesError> {
         let first = 2 * self.passes.len();
         let near_m = NEAR_TURNS * self.problem.turn_m();
         let cost = |a: usize, b: usize| {
@@ -225,7 +232,11 @@ impl Desk<'_> {
         };
         let uavs = self.team.iter().zip(self.from).zip(endurances);
         let uavs: Vec<lines::Uav> = uavs.map(uav).collect();
-        let found = lines::plan(&self.lines, &uavs, &costs, self.problem.steps)?;
+        let found = if thorough {
+            lines::plan(&self.lines, &uavs, &costs, self.problem.steps)?
+        } else {
+            lines::plan_passes(&self.lines, &uavs, &costs, self.problem.steps)?
+        };
         let mut flown = FlownPasses {
             unserved: found.unserved.iter().map(|i| self.passes[*i]).collect(),
             ..FlownPasses::default()

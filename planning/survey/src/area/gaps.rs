@@ -33,8 +33,12 @@ const GROUP_LANES: f64 = 4.0;
 /// Courses nearer to each other than this are one, radians.
 const SAME_RAD: f64 = 0.02;
 
-/// Where a line across a group is tried beside its place, in eighths of a lane.
+/// Where a line across a group is tried beside its place, in eighths of a lane; the first
+/// few where plans are only compared.
 const SHIFTS: [f64; 9] = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0];
+
+/// Of the places of a line, how many are tried where plans are only compared.
+const FEW_SHIFTS: usize = 3;
 
 /// Passes beside `passes` that see what these do not, as far as turns find room, and how many
 /// were tried; `is_open` says where somebody can be at all.
@@ -43,10 +47,12 @@ pub(super) fn fill(
     router: &Router,
     passes: &[Pass],
     is_open: impl Fn(Point) -> bool,
+    thorough: bool,
 ) -> (Vec<Pass>, usize) {
+    let shifts = if thorough { SHIFTS.len() } else { FEW_SHIFTS };
     let (mut added, mut tried) = (Vec::new(), 0);
     for mut group in unseen(problem, passes) {
-        let pool = candidates(problem, router, &group, &is_open, &mut tried);
+        let pool = candidates(problem, router, &group, (&is_open, shifts), &mut tried);
         let mut pool: Vec<(Pass, f64)> = pool
             .into_iter()
             .map(|p| (p, p.length_m() + problem.turn_m()))
@@ -149,7 +155,7 @@ fn candidates(
     problem: &PassesProblem,
     router: &Router,
     group: &Group,
-    is_open: &impl Fn(Point) -> bool,
+    (is_open, shifts): (&impl Fn(Point) -> bool, usize),
     tried: &mut usize,
 ) -> Vec<Pass> {
     let lane_m = problem.lane_spacing_m;
@@ -168,7 +174,7 @@ fn candidates(
         let mut i = 0.5;
         while i < lines {
             let v = v0 + (v1 - v0) * i / lines;
-            for shift in SHIFTS {
+            for shift in SHIFTS.into_iter().take(shifts) {
                 let middle = across * (v + shift * lane_m / SAMPLES_A_LANE);
                 let ahead_m = problem.look_ahead_m.min((u1 - u0) / 2.0);
                 let at = |u: f64| Point::from(along * u + middle);

@@ -5,8 +5,9 @@
 
 use super::cells::{self, CellProblem};
 use super::courses::{self, Effort};
-use super::flights::covered_share;
+use super::flights::{MOST_SAMPLES, Samples};
 use super::flown_passes::{fly_team, fly_within};
+use super::lanes::FEW_SAMPLES;
 use super::{AreaError, AreaRequest, Facts, Planner, PlannerError, Shape, ShapeKind};
 use crate::detours::{DetourError, Detours};
 use crate::flight::Flight;
@@ -160,10 +161,12 @@ impl<'a> OpenArea<'a> {
     /// Passes on the course that is best when they are flown.
     fn on_best_course(&self, job: Job<'_>) -> Result<Part, PlannerError> {
         let fly = |directions, effort| self.exact(job, directions, effort);
-        let worth = |part: &Part, samples: f64| {
-            let wants = |p| self.wants(p);
-            let share = covered_share(job.area, wants, job.lane_m, samples, |p| part.sees(p));
-            part.worth(share)
+        let wants = |p| self.wants(p);
+        let few = Samples::new(job.area, wants, job.lane_m, FEW_SAMPLES);
+        let all = Samples::new(job.area, wants, job.lane_m, MOST_SAMPLES);
+        let worth = |part: &Part, effort: Effort| {
+            let samples = if effort.is_full() { &all } else { &few };
+            part.worth(samples.share(|p| part.sees(p)))
         };
         courses::best(job.area, self.request.objective, fly, worth)
     }

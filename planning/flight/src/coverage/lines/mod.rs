@@ -102,7 +102,7 @@ pub fn plan(
 ///
 /// # Errors
 /// As [`plan`].
-pub(super) fn plan_passes(
+pub fn plan_passes(
     lines: &[Line],
     team: &[Uav],
     metric: &impl Metric,
