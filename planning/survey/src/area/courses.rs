@@ -5,8 +5,8 @@
 //! that promise most with more steps and with their lanes moved aside, and the best of these
 //! as thoroughly as any plan. Leaves to [`super::planners`] the flights on a course.
 
-use super::PlannerError;
 use super::planners::Part;
+use super::{DEFAULT_STEPS, PlannerError};
 use crate::objective::{Objective, SAME_SHARE, Worth};
 use skein_flight::coverage::passes::{Directions, SHIFTS};
 use skein_geometry::Polygon;
@@ -34,7 +34,7 @@ const ASIDE: usize = 2;
 const IN_FULL: usize = 3;
 
 /// What a search may take, in the unit of [`Part::work`]: as much as so many plans, but at
-/// least and at most this, which is some seconds.
+/// least and at most this, which is some seconds; in proportion to the steps of improvement.
 const WORK_PLANS: u64 = 8;
 const WORK: (u64, u64) = (100_000_000, 250_000_000);
 
@@ -126,13 +126,15 @@ where
     }
 }
 
-/// The best plan that was found on any course; `fly` plans on one.
+/// The best plan that was found on any course, with so many steps of improvement; `fly` plans
+/// on one.
 ///
 /// # Errors
 /// When there is no plan on the course that is guessed to be the shortest.
 pub(super) fn best(
     area: &Polygon,
     objective: Objective,
+    steps: usize,
     fly: impl Fn(Directions, Effort) -> Result<Part, PlannerError>,
     worth: impl Fn(&Part, Effort) -> Worth,
 ) -> Result<Part, PlannerError> {
@@ -143,7 +145,9 @@ pub(super) fn best(
     let left = guessed
         .work
         .saturating_mul(WORK_PLANS)
-        .clamp(WORK.0, WORK.1);
+        .clamp(WORK.0, WORK.1)
+        .saturating_mul(steps as u64)
+        / DEFAULT_STEPS as u64;
     let mut search = Search {
         objective,
         fly,

@@ -168,7 +168,7 @@ impl<'a> OpenArea<'a> {
             let samples = if effort.is_full() { &all } else { &few };
             part.worth(samples.share(|p| part.sees(p)))
         };
-        courses::best(job.area, self.request.objective, fly, worth)
+        courses::best(job.area, self.request.objective, job.steps, fly, worth)
     }
 
     fn exact(
