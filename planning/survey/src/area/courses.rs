@@ -35,8 +35,8 @@ const IN_FULL: usize = 3;
 
 /// What a search may take, in the unit of [`Part::work`]: as much as so many plans, but at
 /// least and at most this, which is some seconds; in proportion to the steps of improvement.
-const WORK_PLANS: u64 = 8;
-const WORK: (u64, u64) = (100_000_000, 250_000_000);
+const WORK_PLANS: u64 = 12;
+const WORK: (u64, u64) = (100_000_000, 320_000_000);
 
 /// How thoroughly a course is flown.
 #[derive(Clone, Copy, Debug)]
@@ -99,6 +99,15 @@ where
     }
 
     fn noted(&mut self, directions: Directions, part: Part, effort: Effort) -> Tried {
+        eprintln!(
+            "W {:?} {} work {} left {} share {:.4} mk {:.1}",
+            directions,
+            effort.steps_part,
+            part.work,
+            self.left,
+            (self.worth)(&part, effort).share,
+            part.makespan_s()
+        );
         self.left = self.left.saturating_sub(part.work);
         Tried {
             directions,
@@ -154,26 +163,32 @@ pub(super) fn best(
         worth,
         left,
     };
-    let reserve = guessed.work.saturating_mul(IN_FULL as u64).min(left / 2);
+    // What is left for the better ones, and of that for full plans.
+    let (longer_left, full_left) = (left / 2, left / 3);
     let first = search.noted(Directions::Best, guessed, Effort::FULL);
     let mut quick = Vec::new();
     for directions in courses(area) {
-        quick.extend(search.tried(directions, Effort::QUICK, reserve));
+        quick.extend(search.tried(directions, Effort::QUICK, longer_left));
     }
+    let quick = search.best_first(quick);
     let mut longer = Vec::new();
-    for (i, t) in search.best_first(quick).iter().take(LONGER).enumerate() {
-        longer.extend(search.tried(t.directions, Effort::LONGER, reserve));
+    for (i, t) in quick.iter().take(LONGER).enumerate() {
+        longer.extend(search.tried(t.directions, Effort::LONGER, full_left));
         if let Directions::Fixed(heading_rad) = t.directions
             && i < ASIDE
         {
             for shift in SHIFTS {
                 let aside = Directions::Shifted { heading_rad, shift };
-                longer.extend(search.tried(aside, Effort::LONGER, reserve));
+                longer.extend(search.tried(aside, Effort::LONGER, full_left));
             }
         }
     }
+    let promising = match search.best_first(longer) {
+        none if none.is_empty() => quick,
+        longer => longer,
+    };
     let mut found = Vec::new();
-    for t in search.best_first(longer).iter().take(IN_FULL) {
+    for t in promising.iter().take(IN_FULL) {
         found.extend(search.tried(t.directions, Effort::FULL, 0));
     }
     let fallback = first.part.clone();

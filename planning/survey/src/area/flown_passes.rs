@@ -5,7 +5,7 @@
 //! what these ways then took. Leaves to [`crate::flown`] which curves there are.
 
 use super::gaps;
-use crate::flown::{Air, Flown, Stop, fly, straight, turnable};
+use crate::flown::{Air, Fineness, Flown, Stop, fly, straight, turnable, turnable_by};
 use crate::passes::{Uav, cut, launches};
 use skein_flight::coverage::lines::{self, LineError};
 use skein_flight::coverage::metric::Matrix;
@@ -26,8 +26,8 @@ const FREE_EDGES: usize = 20;
 /// What is looked at of each edge for a way that nothing is in the way of.
 const WAY_WORK: u64 = 12;
 
-/// What is looked at of each edge for the ends of a pass.
-const PASS_WORK: usize = 60;
+/// What is looked at of each edge for the ends of a pass, and where plans are only compared.
+const PASS_WORK: (usize, usize) = (60, 20);
 
 /// What is looked at of each edge for the share that is seen.
 const SAMPLES_WORK: u64 = 5_000;
@@ -81,9 +81,14 @@ pub(super) fn fly_team(
     );
     let ways = layout.ways(&starts)?;
     let is_open = |p: Point| starts.iter().any(|s| ways.joins(*s, p));
+    let (fineness, pass_work) = if rounds > 1 {
+        (Fineness::FULL, PASS_WORK.0)
+    } else {
+        (Fineness::COARSE, PASS_WORK.1)
+    };
     let (mut passes, mut unreached) = (Vec::new(), Vec::new());
     for pass in &layout.passes {
-        match turnable(&router, *pass).filter(|_| is_open(pass.from)) {
+        match turnable_by(&router, *pass, fineness).filter(|_| is_open(pass.from)) {
             Some(part) => passes.push(part),
             None => unreached.push(*pass),
         }
@@ -116,7 +121,7 @@ pub(super) fn fly_team(
     let edges = problem.zones.zones().iter().map(|z| z.vertices().len());
     let edges = edges.sum::<usize>() + FREE_EDGES;
     let pairs = passes.len() * passes.len();
-    found.work = (WAY_WORK * found.work + (PASS_WORK * tried) as u64 + SAMPLES_WORK)
+    found.work = (WAY_WORK * found.work + (pass_work * tried) as u64 + SAMPLES_WORK)
         .saturating_mul(edges as u64)
         .saturating_add((PAIR_WORK * pairs) as u64);
     found.unreached.extend(unreached);

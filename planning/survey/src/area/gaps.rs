@@ -5,7 +5,7 @@
 //! along lanes and across them are tried, and the one that sees most for what it takes is
 //! flown too, until none sees much more.
 
-use crate::flown::turnable;
+use crate::flown::{Fineness, straight, turnable_by};
 use skein_flight::coverage::passes::{Pass, PassesProblem};
 use skein_flight::route::Router;
 use skein_geometry::frame::{Point, Vector};
@@ -49,10 +49,20 @@ pub(super) fn fill(
     is_open: impl Fn(Point) -> bool,
     thorough: bool,
 ) -> (Vec<Pass>, usize) {
-    let shifts = if thorough { SHIFTS.len() } else { FEW_SHIFTS };
+    let (shifts, fineness) = if thorough {
+        (SHIFTS.len(), Fineness::FULL)
+    } else {
+        (FEW_SHIFTS, Fineness::COARSE)
+    };
     let (mut added, mut tried) = (Vec::new(), 0);
     for mut group in unseen(problem, passes) {
-        let pool = candidates(problem, router, &group, (&is_open, shifts), &mut tried);
+        let pool = candidates(
+            problem,
+            router,
+            &group,
+            (&is_open, shifts, fineness),
+            &mut tried,
+        );
         let mut pool: Vec<(Pass, f64)> = pool
             .into_iter()
             .map(|p| (p, p.length_m() + problem.turn_m()))
@@ -155,7 +165,7 @@ fn candidates(
     problem: &PassesProblem,
     router: &Router,
     group: &Group,
-    (is_open, shifts): (&impl Fn(Point) -> bool, usize),
+    (is_open, shifts, fineness): (&impl Fn(Point) -> bool, usize, Fineness),
     tried: &mut usize,
 ) -> Vec<Pass> {
     let lane_m = problem.lane_spacing_m;
@@ -184,7 +194,7 @@ fn candidates(
                 };
                 *tried += 1;
                 let open = clear_part(router, pass).filter(|p| is_open(p.from));
-                found.extend(open.and_then(|p| turnable(router, p)));
+                found.extend(open.and_then(|p| turnable_by(router, p, fineness)));
             }
             i += 1.0;
         }
@@ -197,10 +207,14 @@ fn clear_part(router: &Router, pass: Pass) -> Option<Pass> {
     const PIECES: u8 = 24;
     let at = |k: u8| pass.from + (pass.to - pass.from) * (f64::from(k) / f64::from(PIECES));
     let keep_m = router.limits().clearance_m;
-    let is_clear = |k: u8| {
-        let piece = crate::flown::straight(at(k), at(k + 1));
+    let is_free = |from: u8, to: u8| {
+        let piece = straight(at(from), at(to));
         router.zones().is_clear(&piece, keep_m)
     };
+    if is_free(0, PIECES) {
+        return Some(pass);
+    }
+    let is_clear = |k: u8| is_free(k, k + 1);
     let (mut best, mut begin) = ((0, 0), None);
     for k in 0..=PIECES {
         if k < PIECES && is_clear(k) {

@@ -7,8 +7,27 @@ use skein_geometry::Segment;
 use skein_geometry::frame::Pose;
 use skein_geometry::math::FRAC_PI_2;
 
-/// Ends are moved to this, metres.
-const RESOLUTION_M: f64 = 0.05;
+/// How finely ends are moved.
+#[derive(Clone, Copy, Debug)]
+pub struct Fineness {
+    /// To this, metres.
+    resolution_m: f64,
+    /// In so many steps along a pass.
+    steps: f64,
+}
+
+impl Fineness {
+    /// For passes that are flown.
+    pub const FULL: Self = Self {
+        resolution_m: 0.05,
+        steps: 64.0,
+    };
+    /// For passes that are only compared.
+    pub const COARSE: Self = Self {
+        resolution_m: 1.0,
+        steps: 16.0,
+    };
+}
 
 /// A pass that is shorter than this is none, metres.
 const SHORTEST_M: f64 = 1.0;
@@ -19,14 +38,23 @@ const SHORTEST_M: f64 = 1.0;
 /// Either end is moved as little as brings a turn: what is nearer to a wall than the turn
 /// needs is to be seen by passes along that wall.
 pub fn turnable(router: &Router, pass: Pass) -> Option<Pass> {
+    turnable_by(router, pass, Fineness::FULL)
+}
+
+/// As [`turnable`], as finely as is asked.
+pub fn turnable_by(router: &Router, pass: Pass, fineness: Fineness) -> Option<Pass> {
     let whole_m = pass.length_m();
     let ahead = |from_m: f64| {
         let d = (pass.to - pass.from) / whole_m;
         Pose::new(pass.from + d * from_m, pass.heading_rad())
     };
     // From the end backwards, and from the beginning as if it were flown the other way.
-    let to_m = first_clear(whole_m, |cut_m| turns(router, ahead(whole_m - cut_m)))?;
-    let from_m = first_clear(whole_m, |cut_m| turns(router, ahead(cut_m).reversed()))?;
+    let to_m = first_clear(whole_m, fineness, |cut_m| {
+        turns(router, ahead(whole_m - cut_m))
+    })?;
+    let from_m = first_clear(whole_m, fineness, |cut_m| {
+        turns(router, ahead(cut_m).reversed())
+    })?;
     let (from, to) = (ahead(from_m).position(), ahead(whole_m - to_m).position());
     let left_m = whole_m - to_m - from_m;
     (left_m >= SHORTEST_M).then_some(Pass {
@@ -64,13 +92,16 @@ fn turns_at_once(router: &Router, pose: Pose) -> bool {
     })
 }
 
-/// The least length up to `most_m` that is clear, as far as steps of a quarter of the
-/// first one and halving find it.
-fn first_clear(most_m: f64, is_clear: impl Fn(f64) -> bool) -> Option<f64> {
+/// The least length up to `most_m` that is clear, as far as steps and halving find it.
+fn first_clear(most_m: f64, fineness: Fineness, is_clear: impl Fn(f64) -> bool) -> Option<f64> {
     if is_clear(0.0) {
         return Some(0.0);
     }
-    let step_m = (most_m / 64.0).clamp(RESOLUTION_M, 5.0);
+    let Fineness {
+        resolution_m,
+        steps,
+    } = fineness;
+    let step_m = (most_m / steps).clamp(resolution_m, 100.0 * resolution_m);
     let (mut low_m, mut high_m) = (0.0, step_m);
     while !is_clear(high_m) {
         low_m = high_m;
@@ -79,7 +110,7 @@ fn first_clear(most_m: f64, is_clear: impl Fn(f64) -> bool) -> Option<f64> {
             return None;
         }
     }
-    while high_m - low_m > RESOLUTION_M {
+    while high_m - low_m > resolution_m {
         let middle_m = f64::midpoint(low_m, high_m);
         if is_clear(middle_m) {
             high_m = middle_m;

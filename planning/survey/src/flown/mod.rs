@@ -26,7 +26,7 @@ use crate::flight::Leg;
 pub use airspace::{Airspace, AirspaceError};
 pub use chain::{Node, fly, fly_to};
 pub use cycle::{Cycle, fly_round};
-pub use ends::turnable;
+pub use ends::{Fineness, turnable, turnable_by};
 pub use polyline::stretches;
 use skein_flight::trajectory::Trajectory;
 use skein_flight::trajectory::wind::Wind;
