@@ -24,14 +24,14 @@ const SAME_RAD: f64 = 1e-3;
 /// Courses along edges of the area at most, the longest edges first.
 const MOST_EDGES: usize = 8;
 
-/// Courses and places of lanes that are flown with more steps.
-const LONGER: usize = 8;
+/// Courses that are flown with more steps, as long as there is work left.
+const LONGER: usize = 24;
 
 /// Courses of these whose lanes are moved aside.
 const ASIDE: usize = 2;
 
-/// Plans that are made in full beside the guessed one.
-const IN_FULL: usize = 3;
+/// Plans that are made in full beside the guessed one, as long as there is work left.
+const IN_FULL: usize = 8;
 
 /// What a search may take, in the unit of [`Part::work`]: as much as so many plans, but at
 /// least and at most this, which is some seconds; in proportion to the steps of improvement.
@@ -99,15 +99,6 @@ where
     }
 
     fn noted(&mut self, directions: Directions, part: Part, effort: Effort) -> Tried {
-        eprintln!(
-            "W {:?} {} work {} left {} share {:.4} mk {:.1}",
-            directions,
-            effort.steps_part,
-            part.work,
-            self.left,
-            (self.worth)(&part, effort).share,
-            part.makespan_s()
-        );
         self.left = self.left.saturating_sub(part.work);
         Tried {
             directions,
