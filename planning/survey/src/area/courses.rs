@@ -36,7 +36,11 @@ const IN_FULL: usize = 8;
 /// What a search may take, in the unit of [`Part::work`]: as much as so many plans, but at
 /// least and at most this, which is some seconds; in proportion to the steps of improvement.
 const WORK_PLANS: u64 = 12;
-const WORK: (u64, u64) = (100_000_000, 320_000_000);
+const WORK: (u64, u64) = (100_000_000, 250_000_000);
+
+/// While plans are only compared: what sees a percent of the area less counts as if it took so
+/// many percent longer.
+const SHARE_WORTH: f64 = 8.0;
 
 /// How thoroughly a course is flown.
 #[derive(Clone, Copy, Debug)]
@@ -109,12 +113,31 @@ where
 
     /// Those that see as much as any first, the best of them before others; then those that
     /// see less. What is known already is left out.
-    fn best_first(&self, mut all: Vec<Tried>) -> Vec<Tried> {
+    fn best_first(&self, all: Vec<Tried>) -> Vec<Tried> {
+        self.sorted(
+            all,
+            |lacks| if lacks > SAME_SHARE { lacks } else { 0.0 },
+            |_| 1.0,
+        )
+    }
+
+    /// Those that promise most first: what a quick plan sees is told by few samples, and a
+    /// thorough one sees more.
+    fn promising_first(&self, all: Vec<Tried>) -> Vec<Tried> {
+        self.sorted(all, |_| 0.0, |lacks| 1.0 + SHARE_WORTH * lacks)
+    }
+
+    fn sorted(
+        &self,
+        mut all: Vec<Tried>,
+        rank: impl Fn(f64) -> f64,
+        dearer: impl Fn(f64) -> f64,
+    ) -> Vec<Tried> {
         let most = all.iter().map(|t| t.worth.share).fold(0.0, f64::max);
         let figure = |t: &Tried| {
-            let less = (most - t.worth.share).max(0.0);
-            let lacks = if less > SAME_SHARE { less } else { 0.0 };
-            (lacks, t.worth.figure(self.objective), t.worth.makespan_s)
+            let lacks = (most - t.worth.share).max(0.0);
+            let own = t.worth.figure(self.objective) * dearer(lacks);
+            (rank(lacks), own, t.worth.makespan_s)
         };
         all.sort_by(|a, b| {
             let (a, b) = (figure(a), figure(b));
@@ -161,7 +184,7 @@ pub(super) fn best(
     for directions in courses(area) {
         quick.extend(search.tried(directions, Effort::QUICK, longer_left));
     }
-    let quick = search.best_first(quick);
+    let quick = search.promising_first(quick);
     let mut longer = Vec::new();
     for (i, t) in quick.iter().take(LONGER).enumerate() {
         longer.extend(search.tried(t.directions, Effort::LONGER, full_left));
@@ -174,7 +197,7 @@ pub(super) fn best(
             }
         }
     }
-    let promising = match search.best_first(longer) {
+    let promising = match search.promising_first(longer) {
         none if none.is_empty() => quick,
         longer => longer,
     };

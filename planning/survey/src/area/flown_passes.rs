@@ -35,6 +35,9 @@ const SAMPLES_WORK: u64 = 5_000;
 /// What is looked at for the order of each pair of passes.
 const PAIR_WORK: usize = 10;
 
+/// What is looked at in a step of improvement.
+const STEP_WORK: u64 = 300;
+
 /// Times that a shorter endurance is planned for where turns take what was left.
 const ENDURANCE_ROUNDS: usize = 3;
 
@@ -123,7 +126,8 @@ pub(super) fn fly_team(
     let pairs = passes.len() * passes.len();
     found.work = (WAY_WORK * found.work + (pass_work * tried) as u64 + SAMPLES_WORK)
         .saturating_mul(edges as u64)
-        .saturating_add((PAIR_WORK * pairs) as u64);
+        .saturating_add((PAIR_WORK * pairs) as u64)
+        .saturating_add(STEP_WORK * (problem.steps * rounds) as u64);
     found.unreached.extend(unreached);
     found.cells = layout.cells;
     Ok(found)
