@@ -25,6 +25,7 @@ fn uav(name: &str, camera: Sensor) -> Uav {
 fn request(area: Polygon, team: &[Uav], planner: Planner) -> AreaRequest {
     AreaRequest {
         planners: Planners::Only(planner),
+        steps: 1_000,
         ..AreaRequest::new(area, team.to_vec(), 10.0, 60.0)
     }
 }
@@ -286,7 +287,7 @@ proptest! {
         for planner in PLANNERS {
             let plans = [Lanes::Common, Lanes::Sections, Lanes::Best].map(|lanes| {
                 let area = rectangle(size.0, size.1);
-                planned(&AreaRequest { lanes, steps: 2_000, ..request(area, &team, planner) })
+                planned(&AreaRequest { lanes, ..request(area, &team, planner) })
             });
             let [common, sections, best] = plans.map(|plan| plan.figures);
             for figures in [&common, &sections, &best] {
@@ -303,7 +304,7 @@ fn no_course_that_is_asked_for_is_flown_sooner() {
     let area = polygon(&[(0.0, 0.0), (420.0, 60.0), (380.0, 260.0), (-40.0, 200.0)]);
     let team = ["a", "b", "c"].map(|name| uav(name, swath(45.0)));
     let free = AreaRequest {
-        steps: 200,
+        steps: 3_000,
         ..request(area, &team, Planner::Exact)
     };
     let found = planned(&free).figures;
