@@ -20,7 +20,11 @@ fn polygon(ring: &[Point]) -> Result<Polygon, String> {
     Polygon::new(points).map_err(|error| format!("Polygon {error:?}"))
 }
 
-fn request(site: &Site, planners: Planners) -> Result<AreaRequest, String> {
+/// What is asked of a site.
+///
+/// # Errors
+/// Which of its rings is no polygon.
+pub fn request(site: &Site, planners: Planners) -> Result<AreaRequest, String> {
     let manner = &site.manner;
     let camera = Sensor::Swath {
         width_m: manner.swath_m,
