@@ -12,6 +12,7 @@
 //! | `blossom`, `matching` | the cheapest pairing of places, exact |
 //! | `postman` | one tour along all lines |
 //! | `moats` | parts that are apart: what joining them costs, and how |
+//! | `alone` | local search on a tour of one UAV |
 //! | `split` | one tour cut into several |
 //! | `improve` | local search on the longest tour |
 //! | [`strip`] | strips wider than a swath, as lanes |
@@ -36,6 +37,7 @@
 //! assert_eq!(plan.tours[0].places(&lines, 0).len(), 5);
 //! ```
 
+mod alone;
 mod blossom;
 mod bound;
 mod improve;
@@ -59,14 +61,17 @@ use moats::Joining;
 /// second for the roads of a square kilometre.
 pub const DEFAULT_STEPS: usize = 20_000;
 
-/// Steps for a single tour, whose start is at most a few percent from the optimum.
+/// Steps for a single tour where the way along a line matters: it is improved already.
 const STEPS_ALONE: usize = 1_000;
+
+/// Costs that differ by less than this share are the same.
+const SAME: f64 = 1e-9;
 
 /// Plans that the improvement begins with; the best goes on.
 const STARTS: usize = 4;
 
-/// Lines above which a single tour is left as it is: looking up the neighbours of all
-/// would take longer than the tour, for the last tenth of a percent.
+/// Lines above which the way along each is left as it is: looking up the neighbours of
+/// all would take longer than the tour, for the last tenth of a percent.
 const MOST_ALONE: usize = 1_000;
 
 /// Plans closed tours for a team so that every line is flown along once and the longest
@@ -169,6 +174,7 @@ fn shared_out(
     lower_bound: f64,
     giants: Vec<Vec<Traversal>>,
 ) -> Vec<Vec<Traversal>> {
+    let giants = short_giants(lines, team, metric, steps, lower_bound, giants);
     let share = |giant: Vec<Traversal>| match team.len() {
         1 => vec![giant],
         _ => split::split(&giant, lines, team, metric),
@@ -183,15 +189,16 @@ fn shared_out(
     let Some(mut best) = plans.first().cloned() else {
         return vec![Vec::new(); team.len()];
     };
-    let alone = team.len() == 1;
-    // A tour that meets the bound is optimal; so is one of a single UAV nearly, and
-    // large ones are not worth the search.
-    if key(&best).0 <= lower_bound * (1.0 + 1e-9) || (alone && lines.len() > MOST_ALONE) {
+    if key(&best).0 <= lower_bound * (1.0 + SAME) {
         return best;
     }
     let search = improve::Search::new(lines, team, metric, lower_bound);
-    if alone {
-        search.run(&mut best, steps.min(STEPS_ALONE), improve::LUKEWARM, 0);
+    if team.len() == 1 {
+        // The tour is as short as it gets, unless the way along a line matters.
+        let matters = |l: &Line| (l.cost[0] - l.cost[1]).abs() > SAME * l.cost[0];
+        if lines.len() <= MOST_ALONE && lines.iter().any(matters) {
+            search.run(&mut best, steps.min(STEPS_ALONE), improve::LUKEWARM, 0);
+        }
         return best;
     }
     for seed in 0..STARTS {
@@ -204,7 +211,51 @@ fn shared_out(
     }
     search.run(&mut best, steps / 2, improve::LUKEWARM, STARTS as u64);
     postmen_again(&mut best, lines, team, metric);
+    each_alone(&mut best, lines, team, metric, steps);
     best
+}
+
+/// Improves every tour of a team by itself; each has its share of the steps.
+fn each_alone(
+    tours: &mut [Vec<Traversal>],
+    lines: &[Line],
+    team: &[Uav],
+    metric: &impl Metric,
+    steps: usize,
+) {
+    let share = steps / team.len();
+    for (tour, uav) in tours.iter_mut().zip(team) {
+        alone::improve(tour, lines, uav.depot, metric, share);
+    }
+}
+
+/// The tours that are shared out: the first of `giants` improved, where that shortens it,
+/// in place of all of them.
+fn short_giants(
+    lines: &[Line],
+    team: &[Uav],
+    metric: &impl Metric,
+    steps: usize,
+    lower_bound: f64,
+    giants: Vec<Vec<Traversal>>,
+) -> Vec<Vec<Traversal>> {
+    let (Some(first), Some(uav)) = (giants.first(), team.first()) else {
+        return giants;
+    };
+    let cost = |passes: &[Traversal]| tour_cost(passes, lines, uav.depot, metric);
+    let before = cost(first);
+    let speed: f64 = team.iter().map(|u| u.speed).sum();
+    if before <= lower_bound * speed * (1.0 + SAME) {
+        return giants;
+    }
+    let mut short = first.clone();
+    let share = if team.len() == 1 { steps } else { steps / 2 };
+    alone::improve(&mut short, lines, uav.depot, metric, share);
+    if cost(&short) < before * (1.0 - SAME) {
+        vec![short]
+    } else {
+        giants
+    }
 }
 
 /// The longest time and the sum of all times.

@@ -15,7 +15,7 @@ use std::collections::VecDeque;
 const NEIGHBOURS: usize = 10;
 
 /// Near places that the second new leg may lead to.
-const SECOND_NEIGHBOURS: usize = 6;
+const SECOND_NEIGHBOURS: usize = 5;
 
 /// A closed tour as an array of nodes, with its search for exchanges.
 ///
@@ -38,14 +38,14 @@ pub(super) struct Exchange<'a, M> {
 }
 
 /// New legs and the legs given up for them: `t[0]`–`t[1]`, `t[2]`–`t[3]` and so on go.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Move {
     gain: f64,
     t: [u32; 6],
     kind: Kind,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 enum Kind {
     /// One stretch is turned.
     Two,
@@ -82,9 +82,9 @@ impl<'a, M: Metric> Exchange<'a, M> {
         self.order.len()
     }
 
-    /// The places in the order of the tour.
-    pub(super) fn places(&self) -> Vec<usize> {
-        self.order.iter().map(|&v| self.names[v as usize]).collect()
+    /// The places of these nodes.
+    pub(super) fn places(&self, nodes: &[u32]) -> Vec<usize> {
+        nodes.iter().map(|&v| self.names[v as usize]).collect()
     }
 
     /// The node at a position, cyclically.
@@ -95,6 +95,18 @@ impl<'a, M: Metric> Exchange<'a, M> {
     pub(super) fn cost(&self, a: u32, b: u32) -> f64 {
         self.metric
             .cost(self.names[a as usize], self.names[b as usize])
+    }
+
+    /// The mean cost of the legs that may be given up.
+    pub(super) fn mean_leg(&self) -> f64 {
+        let n = self.len();
+        let legs = (0..n).map(|i| self.cost(self.order[i], self.order[(i + 1) % n]));
+        legs.map(|c| c.max(0.0)).sum::<f64>() / n as f64
+    }
+
+    /// The nodes in the order of the tour.
+    pub(super) fn order(&self) -> &[u32] {
+        &self.order
     }
 
     /// The changes so far are final.
@@ -129,11 +141,15 @@ impl<'a, M: Metric> Exchange<'a, M> {
         gained
     }
 
-    /// Two runs in a row, from a position on, change places (the double bridge).
-    pub(super) fn swap_runs(&mut self, from: usize, first: usize, second: usize) {
-        self.reverse(from, first + second);
-        self.reverse(from, second);
-        self.reverse(from + second, first);
+    /// Two runs in a row change places (the double bridge): the first lies between the
+    /// nodes `first`, the second between `second`, and `around` are the nodes beside them.
+    pub(super) fn swap_runs(&mut self, around: [u32; 2], first: [u32; 2], second: [u32; 2]) {
+        let ([v, y], [w, p], [q, x]) = (around, first, second);
+        self.carry_out(Move {
+            gain: 0.0,
+            t: [v, w, x, y, p, q],
+            kind: Kind::Swapped,
+        });
     }
 
     fn next(&self, v: u32, ahead: bool) -> u32 {
@@ -154,7 +170,11 @@ impl<'a, M: Metric> Exchange<'a, M> {
             self.at[to as usize] as usize,
         );
         let (i, j) = if ahead { (i, j) } else { (j, i) };
-        if j >= i { j - i } else { j + self.order.len() - i }
+        if j >= i {
+            j - i
+        } else {
+            j + self.order.len() - i
+        }
     }
 
     /// The best exchange found that gives up a leg at `v`.
@@ -295,7 +315,11 @@ impl<'a, M: Metric> Exchange<'a, M> {
     /// Gives up the legs (a, b) and the one beyond `d` for one from `a` to `d` and one from
     /// `b` on: turns the stretch from `b` to `d`, where `b` follows `a`, ahead or back.
     fn exchange(&mut self, a: u32, b: u32, d: u32) {
-        let (from, to) = if self.next(a, true) == b { (b, d) } else { (d, b) };
+        let (from, to) = if self.next(a, true) == b {
+            (b, d)
+        } else {
+            (d, b)
+        };
         let len = self.gap(from, to, true) + 1;
         self.reverse(self.at[from as usize] as usize, len);
     }
@@ -335,8 +359,7 @@ fn neighbours(names: &[usize], metric: &impl Metric, width: usize) -> Vec<(u32, 
     let n = names.len();
     let mut near = Vec::with_capacity(n * width);
     let mut row: Vec<(u32, f64)> = Vec::with_capacity(n);
-    let order =
-        |x: &(u32, f64), y: &(u32, f64)| x.1.total_cmp(&y.1).then(x.0.cmp(&y.0));
+    let order = |x: &(u32, f64), y: &(u32, f64)| x.1.total_cmp(&y.1).then(x.0.cmp(&y.0));
     for i in 0..n {
         row.clear();
         row.extend((0..n).filter(|&j| j != i).map(|j| {
@@ -351,4 +374,42 @@ fn neighbours(names: &[usize], metric: &impl Metric, width: usize) -> Vec<(u32, 
         near.extend_from_slice(&row);
     }
     near
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coverage::metric::{Matrix, Straight};
+    use crate::coverage::tour::closed_cost;
+    use skein_geometry::frame::Point;
+    use skein_geometry::random::SplitMix64;
+
+    #[test]
+    fn every_exchange_gains_what_it_says_and_is_taken_back() {
+        let mut random = SplitMix64::new(33);
+        for round in 0..400 {
+            let n = 4 + random.below(12);
+            // Places that coincide are ordinary.
+            let mut draw = || (10.0 * random.unit()).floor();
+            let at: Vec<Point> = (0..n).map(|_| Point::new(draw(), draw())).collect();
+            let m = Matrix::of(n, &Straight(&at));
+            let mut exchange = Exchange::new((0..n).collect(), &m, 1e-9);
+            let cost = |e: &Exchange<'_, Matrix>| closed_cost(&e.places(e.order()), &m);
+            let start = exchange.order().to_vec();
+            for _ in 0..1000 {
+                let from = (0..n as u32).find_map(|v| exchange.best_from(v));
+                let Some(found) = from else { break };
+                let before = cost(&exchange);
+                exchange.carry_out(found);
+                let gain = before - cost(&exchange);
+                assert!(
+                    (gain - found.gain).abs() < 1e-6,
+                    "round {round}: {gain} {found:?}"
+                );
+            }
+            assert!((0..n as u32).all(|v| exchange.best_from(v).is_none()));
+            exchange.take_back();
+            assert_eq!(exchange.order(), start);
+        }
+    }
 }

@@ -125,8 +125,8 @@ pub fn searched(tour: Tour, metric: &impl Metric, steps: usize) -> Tour {
     let legs = (0..n).map(|i| metric.cost(tour.order[i], tour.order[(i + 1) % n]));
     let least_gain = ROUNDING * legs.map(|c| c.max(0.0)).sum::<f64>() / n as f64;
     let mut exchange = Exchange::new(tour.order.clone(), metric, least_gain);
-    kicks::search(&mut exchange, steps);
-    let mut order = exchange.places();
+    let best = kicks::search(&mut exchange, steps);
+    let mut order = exchange.places(&best);
     let at = order.iter().position(|&p| p == first).unwrap_or(0);
     order.rotate_left(at);
     let cost = closed_cost(&order, metric);
