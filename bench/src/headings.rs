@@ -4,7 +4,7 @@
 //! neighbour, so the more there are the nearer they lie.
 
 use super::figures::{Times, timed};
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
 use serde::Serialize;
 use skein_flight::trajectory::wind::Wind;
@@ -53,7 +53,10 @@ struct Answer {
     /// The largest certified gap, and the mean.
     gap: f64,
     mean_gap: f64,
-    /// Instances whose gap is above the one asked for.
+    /// The gap asked for, and whether it is certified for every instance.
+    asked_gap: f64,
+    certified: bool,
+    /// Instances for which it is not.
     misses: usize,
     wind_ratio: f64,
     /// Sums over all instances, metres; seconds in wind.
@@ -69,12 +72,17 @@ struct Answer {
 /// # Errors
 /// When the request is malformed.
 pub fn run(args: &HeadingsArgs) -> Result<String> {
+    if args.wind_ratio.is_sign_negative() {
+        bail!("--wind-ratio is a share of the airspeed, zero or more");
+    }
     let mut random = SplitMix64::new(args.seed);
     let mut answer = Answer {
         n: args.n,
         instances: args.instances,
         gap: 0.0,
         mean_gap: 0.0,
+        asked_gap: args.gap,
+        certified: true,
         misses: 0,
         wind_ratio: args.wind_ratio,
         lower_bound: 0.0,
@@ -110,7 +118,8 @@ pub fn run(args: &HeadingsArgs) -> Result<String> {
         let gap = 1.0 - found.lower_bound / found.length.max(f64::MIN_POSITIVE);
         answer.gap = answer.gap.max(gap);
         answer.mean_gap += gap / args.instances as f64;
-        answer.misses += usize::from(gap > args.gap);
+        answer.certified &= found.certified;
+        answer.misses += usize::from(!found.certified);
         answer.lower_bound += found.lower_bound;
         answer.length += found.length;
         answer.max_rounds = answer.max_rounds.max(found.rounds);
@@ -123,15 +132,17 @@ pub fn run(args: &HeadingsArgs) -> Result<String> {
 struct Found {
     lower_bound: f64,
     length: f64,
+    certified: bool,
     rounds: usize,
 }
 
 /// Solves one instance, in calm or in a wind that blows along `course_rad`.
 fn solve(args: &HeadingsArgs, request: &Request, course_rad: f64) -> Result<Found, HeadingsError> {
-    if args.wind_ratio <= 0.0 {
+    if args.wind_ratio == 0.0 {
         return choose(request).map(|h| Found {
             lower_bound: h.lower_bound_m,
             length: h.length_m,
+            certified: h.certified,
             rounds: h.rounds.len(),
         });
     }
@@ -140,6 +151,7 @@ fn solve(args: &HeadingsArgs, request: &Request, course_rad: f64) -> Result<Foun
     choose_in_wind(request, args.airspeed_mps, wind).map(|h| Found {
         lower_bound: h.lower_bound_s,
         length: h.time_s,
+        certified: h.certified,
         rounds: h.rounds_s.len(),
     })
 }

@@ -100,6 +100,8 @@ pub struct Headings {
     pub length_m: f64,
     /// No choice of headings is shorter, metres.
     pub lower_bound_m: f64,
+    /// Whether the gap asked for is certified; if not, the steps ran out before.
+    pub certified: bool,
     /// Both bounds round by round.
     pub rounds: Vec<Bounds>,
 }
@@ -147,6 +149,8 @@ pub struct TimedHeadings {
     pub time_s: f64,
     /// No choice of headings is faster, seconds.
     pub lower_bound_s: f64,
+    /// Whether the gap asked for is certified; if not, the steps ran out before.
+    pub certified: bool,
     /// Both bounds round by round, seconds: no choice is faster than the first, and
     /// one that lasts the second is found.
     pub rounds_s: Vec<(f64, f64)>,
@@ -168,8 +172,8 @@ impl TimedHeadings {
 ///
 /// # Guarantees
 /// `lower_bound_m` ≤ the optimum ≤ `length_m`, and [`Headings::gap`] is at most
-/// the gap asked for unless the rounds run out (hundreds of waypoints much nearer
-/// than a turn radius); then it is what was reached. Bounds never get worse from
+/// the gap asked for if the answer is `certified`; otherwise the rounds ran out (hundreds
+/// of waypoints much nearer than a turn radius) and it is what was reached. Bounds never get worse from
 /// round to round. The same bits on every machine.
 ///
 /// # Errors
@@ -182,6 +186,7 @@ pub fn choose(request: &Request) -> Result<Headings, HeadingsError> {
         headings_rad: found.headings_rad,
         length_m: found.upper * r,
         lower_bound_m: found.lower * r,
+        certified: found.certified,
         rounds: found
             .rounds
             .iter()
@@ -222,6 +227,7 @@ pub fn choose_in_wind(
         headings_rad: found.headings_rad,
         time_s: found.upper * unit_s,
         lower_bound_s: found.lower * unit_s,
+        certified: found.certified,
         rounds_s: found
             .rounds
             .iter()
@@ -235,6 +241,7 @@ struct Solved {
     headings_rad: Vec<f64>,
     upper: f64,
     lower: f64,
+    certified: bool,
     rounds: Vec<(f64, f64)>,
 }
 
@@ -282,7 +289,7 @@ fn solve(request: &Request, air: Air) -> Solved {
             .max(solved.least.min(aside) * (1.0 - ROUNDING))
             .min(best.0);
         rounds.push((lower, best.0));
-        if lower >= best.0 * (1.0 - request.gap) {
+        if near_enough(lower, best.0, request.gap) {
             break;
         }
         let wanted = best.0 * (1.0 - 0.99 * request.gap);
@@ -312,8 +319,14 @@ fn solve(request: &Request, air: Air) -> Solved {
         headings_rad: best.1.into_iter().map(wrap_tau).collect(),
         upper: best.0,
         lower,
+        certified: near_enough(lower, best.0, request.gap),
         rounds,
     }
+}
+
+/// Whether the bounds are as near as was asked for.
+fn near_enough(lower: f64, upper: f64, gap: f64) -> bool {
+    lower >= upper * (1.0 - gap)
 }
 
 fn check(request: &Request) -> Result<(), HeadingsError> {
@@ -428,6 +441,5 @@ fn given(request: &Request) -> Vec<bool> {
     }
     fixed
 }
-
 #[cfg(test)]
 mod tests;

@@ -166,6 +166,17 @@ fn down_wind_and_back_against_it() {
 }
 
 #[test]
+fn an_answer_says_whether_the_gap_is_certified() {
+    let p = points(&[(0.0, 0.0), (1.5, 0.7), (0.4, 2.2)]);
+    let wind = Vector::new(0.3, 0.0);
+    let wide = solve_in_wind(&p, FREE, 0.9, wind);
+    assert!(wide.certified && wide.gap() <= 0.9, "{wide:?}");
+    // Rounding alone keeps the bounds apart.
+    let none = solve_in_wind(&p, FREE, 0.0, wind);
+    assert!(!none.certified && none.gap() > 0.0, "{none:?}");
+}
+
+#[test]
 fn the_same_place_twice_is_no_trouble() {
     let p = points(&[(0.0, 0.0), (0.0, 0.0), (4.0, 1.0), (4.0, 1.0)]);
     let h = solve(&p, FREE, 1e-3);
@@ -184,7 +195,7 @@ proptest! {
         let best = brute(&p, chain, [180, 48][closed]);
         prop_assert!(h.lower_bound_m <= best + 1e-9, "{h:?} {best}");
         prop_assert!(h.length_m <= best * 1.001 + 1e-9, "{h:?} {best}");
-        prop_assert!(monotone(&h) && h.gap() <= 1e-3, "{h:?}");
+        prop_assert!(monotone(&h) && h.certified && h.gap() <= 1e-3, "{h:?}");
         let flown: f64 = (0..p.len() - usize::from(closed == 0))
             .map(|i| leg_length(p[(i + 1) % p.len()] - p[i], h.headings_rad[i], h.headings_rad[(i + 1) % p.len()]))
             .sum();
