@@ -24,9 +24,9 @@ const FIRST_SLICE: f64 = 0.5;
 /// its length is halved, and 20 halvings exhaust any interval.
 const LOOKS: usize = 48;
 
-/// The last slice in half widths: the slopes of the planes, with the pace of a wind
-/// of half the airspeed, reach that far from both sides.
-const LAST_SLICE: f64 = 8.0;
+/// The last slice in half widths: a wide one lets in words that only fit elsewhere in it,
+/// a narrow one takes more looks.
+const LAST_SLICE: f64 = 2.0;
 
 /// The air over a chain, in turn radii and airspeeds.
 #[derive(Clone, Copy, Debug, Default)]
