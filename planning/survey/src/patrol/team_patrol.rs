@@ -274,7 +274,7 @@ pub enum PatrolError {
 /// fastest few fly round at the speed of the slowest of them, whichever revisits sooner.
 ///
 /// # Guarantees
-/// As [`patrol_within`], for the tour that was found. What is flown at first, the tour and
+/// As [`crate::patrol::patrol_within`], for the tour that was found. What is flown at first, the tour and
 /// the ways there and back, are lines and arcs of the widest turn of the team that join
 /// without a bend and keep the clearance. After losses, ways and turns to new arcs are
 /// estimates. The same request gives the same plan everywhere.
