@@ -17,6 +17,9 @@ struct Ends<'a, M> {
     bond: f64,
 }
 
+/// Steps for each line at most: a tour of few lines is as good as it gets after that.
+const MOST_STEPS_A_LINE: usize = 50;
+
 /// No line: the depot.
 const NONE: usize = usize::MAX;
 
@@ -45,6 +48,7 @@ pub(super) fn improve(
     steps: usize,
 ) {
     let before = super::tour_cost(passes, lines, depot, metric);
+    let steps = steps.min(MOST_STEPS_A_LINE * passes.len());
     let mut of = vec![(depot, NONE)];
     for pass in passes.iter() {
         let (start, end) = (pass.start(lines), pass.end(lines));
