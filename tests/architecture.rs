@@ -366,6 +366,9 @@ fn the_core_asks_neither_clock_nor_chance() {
         "std::net",
         "OsRng",
     ];
+    // Plans for people on several courses at once, joined in the order of the courses: no
+    // answer depends on which is done first.
+    let threads = "planning/survey/src/area/courses.rs";
     for file in sources(&[
         "planning/geometry/src",
         "planning/flight/src",
@@ -384,8 +387,9 @@ fn the_core_asks_neither_clock_nor_chance() {
             .filter(|(_, l)| !l.trim_start().starts_with("//"))
         {
             for b in banned {
+                let allowed = b == "std::thread" && file.ends_with(threads);
                 assert!(
-                    !line.contains(b),
+                    allowed || !line.contains(b),
                     "{}:{}: {b} has no place in the core",
                     file.display(),
                     i + 1

@@ -1,6 +1,7 @@
 //! `bench cover`: plans on public grid maps, one line an instance, each path cell by cell,
 //! so that anyone can recount them.
 
+use super::cover_drawn;
 use super::figures::timed;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
@@ -44,17 +45,25 @@ pub enum Planner {
 #[derive(Debug, Args)]
 pub struct CoverArgs {
     /// Instances, one JSON object a line with `map`, `k`, `mode`, `seed`, `roots`.
-    #[arg(long, value_name = "FILE")]
-    pub instances: PathBuf,
+    #[arg(
+        long,
+        value_name = "FILE",
+        required_unless_present = "drawn",
+        requires = "maps"
+    )]
+    pub instances: Option<PathBuf>,
     /// Folder of the maps (`octile` text, one character a cell); an open field named
     /// `empty-ROWS-COLUMNS` needs no file.
     #[arg(long, value_name = "DIR")]
-    pub maps: PathBuf,
+    pub maps: Option<PathBuf>,
+    /// Instances drawn by seeds, one each, instead of those of a file.
+    #[arg(long, value_name = "FROM..TO", conflicts_with = "instances", value_parser = seeds)]
+    pub drawn: Option<std::ops::Range<u64>>,
     /// The planner.
     #[arg(long, value_enum)]
     pub planner: Planner,
-    /// Stop improving after this many milliseconds; without it after a fixed number of
-    /// steps, as in a mission.
+    /// Go on improving for this many milliseconds; without it for a fixed number of steps,
+    /// as in `skein plan`.
     #[arg(long, value_name = "MS")]
     pub budget_ms: Option<u64>,
     /// Each UAV returns to its root.
@@ -119,25 +128,12 @@ struct Answer {
 /// # Errors
 /// When a file is missing or malformed, or a root is not free; the error names the line.
 pub fn run(args: &CoverArgs) -> Result<String> {
-    let text = std::fs::read_to_string(&args.instances)
-        .with_context(|| format!("cannot read {}", args.instances.display()))?;
     let file = std::fs::File::create(&args.out)
         .with_context(|| format!("cannot write {}", args.out.display()))?;
     let mut out = BufWriter::new(file);
-    let mut maps: BTreeMap<String, LaneMap> = BTreeMap::new();
     let mut results = Vec::new();
-    for (number, line) in (1..)
-        .zip(text.lines())
-        .filter(|(_, l)| !l.trim().is_empty())
-    {
-        let place = || format!("{}:{number}", args.instances.display());
-        let instance: Instance = serde_json::from_str(line).with_context(place)?;
-        if !maps.contains_key(&instance.map) {
-            let map = named_map(&args.maps, &instance.map).with_context(place)?;
-            maps.insert(instance.map.clone(), map);
-        }
-        let map = &maps[&instance.map];
-        let (line, cells) = solve(map, &instance, args).with_context(place)?;
+    let mut solve_next = |map: &LaneMap, instance: &Instance| {
+        let (line, cells) = solve(map, instance, args)?;
         results.push((
             cells,
             line.ratio,
@@ -146,9 +142,54 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         ));
         serde_json::to_writer(&mut out, &line)?;
         out.write_all(b"\n")?;
+        Ok(())
+    };
+    if let (Some(instances), Some(maps)) = (&args.instances, &args.maps) {
+        of_file(instances, maps, &mut solve_next)?;
+    }
+    for seed in args.drawn.clone().into_iter().flatten() {
+        let drawn = cover_drawn::draw(seed)?;
+        let instance = Instance {
+            map: drawn.name,
+            k: drawn.roots.len(),
+            mode: drawn.mode.to_owned(),
+            seed: i64::try_from(seed)?,
+            roots: drawn.roots.iter().map(|r| drawn.map.place(*r)).collect(),
+        };
+        solve_next(&drawn.map, &instance)?;
     }
     out.flush()?;
     Ok(serde_json::to_string(&sum_up(args, &results))?)
+}
+
+/// Solves the instances of a file, each on the map that it names.
+fn of_file(
+    instances: &Path,
+    folder: &Path,
+    solve_next: &mut impl FnMut(&LaneMap, &Instance) -> Result<()>,
+) -> Result<()> {
+    let text = std::fs::read_to_string(instances)
+        .with_context(|| format!("cannot read {}", instances.display()))?;
+    let mut maps: BTreeMap<String, LaneMap> = BTreeMap::new();
+    let lines = (1..).zip(text.lines());
+    for (number, line) in lines.filter(|(_, l)| !l.trim().is_empty()) {
+        let place = || format!("{}:{number}", instances.display());
+        let instance: Instance = serde_json::from_str(line).with_context(place)?;
+        if !maps.contains_key(&instance.map) {
+            let map = named_map(folder, &instance.map).with_context(place)?;
+            maps.insert(instance.map.clone(), map);
+        }
+        solve_next(&maps[&instance.map], &instance).with_context(place)?;
+    }
+    Ok(())
+}
+
+/// Reads `FROM..TO`.
+fn seeds(text: &str) -> Result<std::ops::Range<u64>, String> {
+    let ends = text.split_once("..");
+    let ends = ends.and_then(|(from, to)| Some((from.parse().ok()?, to.parse().ok()?)));
+    let (from, to) = ends.ok_or("write FROM..TO, for example 100..200")?;
+    Ok(from..to)
 }
 
 fn solve<'a>(map: &LaneMap, instance: &'a Instance, args: &CoverArgs) -> Result<(Line<'a>, f64)> {
@@ -208,7 +249,7 @@ fn best(task: &Task, budget_ms: Option<u64>) -> Plan {
         return improve::best(task);
     };
     let start = Instant::now();
-    let mut improver = Improver::new(task, improve::STEPS);
+    let mut improver = Improver::new(task, usize::MAX);
     while start.elapsed().as_millis() < u128::from(budget_ms) && improver.round() {}
     improver.plan()
 }

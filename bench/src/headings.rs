@@ -31,6 +31,9 @@ pub struct HeadingsArgs {
     /// The share of the length by which the answer may exceed the optimum.
     #[arg(long, default_value_t = 1e-3, value_name = "SHARE")]
     pub gap: f64,
+    /// Pairs of intervals looked at for each leg at most; by default 8,000 in wind.
+    #[arg(long, value_name = "PAIRS")]
+    pub pairs_a_leg: Option<usize>,
     /// Return to the first waypoint.
     #[arg(long)]
     pub closed: bool,
@@ -106,6 +109,7 @@ pub fn run(args: &HeadingsArgs) -> Result<String> {
             chain,
             radius_m: args.radius_m,
             gap: args.gap,
+            pairs_a_leg: args.pairs_a_leg,
         };
         let course = if args.wind_ratio > 0.0 {
             TAU * random.unit()
@@ -186,6 +190,7 @@ mod tests {
                 side: 20.0,
                 instances: 2,
                 gap: 1e-2,
+                pairs_a_leg: None,
                 closed: false,
                 wind_ratio,
                 airspeed_mps: 20.0,

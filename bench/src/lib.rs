@@ -26,6 +26,7 @@
 
 pub mod alike;
 pub mod cover;
+mod cover_drawn;
 pub mod cover_exact;
 pub mod cover_loop;
 mod cover_trees;

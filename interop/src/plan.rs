@@ -76,6 +76,8 @@ pub struct SurveyGrid {
     pub side_overlap_percent: Option<f64>,
     /// Share of the footprint along that two frames share, percent.
     pub frontal_overlap_percent: Option<f64>,
+    /// How far lanes run out straight beyond the area before a turn, metres.
+    pub turn_around_m: Option<f64>,
     /// What the camera is called.
     pub camera: Option<String>,
     /// Whether the camera's lens is known, so that its footprint grows with the height.
@@ -313,10 +315,9 @@ fn survey_grid(
             tell(text);
         }
     }
-    if let Some(turns) = transects.get("TurnAroundDistance")?
-        && turns.number(0.0, LONGEST_M, "metres")? > 0.0
-    {
-        tell("TurnAroundDistance is ignored: turns are as wide as the turn radius asks");
+    if let Some(out) = transects.get("TurnAroundDistance")? {
+        let out_m = out.number(0.0, LONGEST_M, "metres")?;
+        grid.turn_around_m = Some(out_m).filter(|m| *m > 0.0);
     }
     let Some(camera) = transects.get("CameraCalc")? else {
         return Ok(grid);
@@ -535,6 +536,7 @@ mod tests {
                 trigger_m: Some(20.0),
                 side_overlap_percent: Some(70.0),
                 frontal_overlap_percent: Some(75.0),
+                turn_around_m: Some(10.0),
                 camera: Some("Sony ILCE-QX1".to_owned()),
                 lens_known: true,
             }

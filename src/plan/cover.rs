@@ -103,6 +103,10 @@ pub struct CoverArgs {
     /// passes: without `--approximate` only these are planned then.
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     pub course_deg: Option<f64>,
+    /// How far each pass runs out straight beyond both ends before a turn, where that is clear,
+    /// metres; by default what the file's survey says, else 0.
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub run_out_m: Option<f64>,
     /// The sensor to see the area with: UAVs without it stay, and its swath counts.
     #[arg(long, value_name = "NAME")]
     pub sensor: Option<String>,
@@ -181,6 +185,7 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         clearance_m: args.clearance_m,
         look_ahead_m: view.look_ahead_m,
         heading_rad: view.course_deg.map(|course| (90.0 - course).to_radians()),
+        run_out_m: view.run_out_m,
         wind_mps: args.wind.velocity(),
         planners,
         lanes: args.lanes.asked(),
@@ -207,6 +212,7 @@ fn flags(args: &CoverArgs) -> Flags {
         look_ahead_m: args.look_ahead_m,
         course_deg: args.course_deg,
         trigger_m: args.output.upload.trigger_m,
+        run_out_m: args.run_out_m,
     }
 }
 
@@ -252,7 +258,8 @@ fn sheet(args: &CoverArgs, input: &AreaInput, request: &AreaRequest, plan: &Area
     summary["objective"] = json!(args.objective.name());
     summary["sensor"] = json!(request.sensor);
     summary["clearance_m"] = json!(request.clearance_m);
-    summary["wind_mps"] = json!(request.wind_mps.norm());
+    summary["wind_mps"] = json!(args.wind.wind_mps);
+    summary["wind_from_deg"] = json!(args.wind.wind_from_deg);
     summary["look_ahead_m"] = json!(request.look_ahead_m);
     summary["at_home"] = at_home.collect();
     summary["notices"] = json!([&input.notices[..], &plan.notices].concat());

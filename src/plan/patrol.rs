@@ -240,7 +240,8 @@ fn sheet(plan: &PatrolPlan, args: &PatrolArgs, input: Input) -> Sheet {
         "ratio": plan.revisit_s / plan.revisit_bound_s,
         "steady_s": plan.steady_s,
         "clearance_m": args.tours.clearance_m,
-        "wind_mps": args.tours.wind.velocity().norm(),
+        "wind_mps": args.tours.wind.wind_mps,
+        "wind_from_deg": args.tours.wind.wind_from_deg,
         "notices": ([&notices[..], &plan.notices].concat()),
     });
     if let Some(after) = &plan.after_losses {

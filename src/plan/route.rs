@@ -9,6 +9,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use skein_geometry::frame::{Origin, Point};
 use skein_interop::place::{LatLon, from_plane, to_plane};
+use skein_survey::flown::{length_m, track};
 use skein_survey::route::{self, NamedRepair, RouteError, RoutePlace, RoutePlan, RouteRequest};
 use skein_survey::zones::Level;
 use std::path::PathBuf;
@@ -45,10 +46,15 @@ pub struct RouteArgs {
         allow_hyphen_values = true
     )]
     pub vertical_margin_m: f64,
-    /// The tightest turn of who flies it, metres: what is flown then is told as
-    /// `trajectory`, or that nothing can be.
-    #[arg(long, value_name = "R", allow_hyphen_values = true)]
-    pub turn_radius_m: Option<f64>,
+    /// The tightest turn of who flies it, metres: what is flown is told as `trajectory`, or
+    /// that nothing can be. 0 for who stops and turns on the spot: the way with its corners.
+    #[arg(
+        long,
+        value_name = "R",
+        default_value_t = 30.0,
+        allow_hyphen_values = true
+    )]
+    pub turn_radius_m: f64,
     /// Which engine looks for the path; both find the shortest.
     #[arg(long, value_enum, default_value_t = Engine::Mesh)]
     pub engine: Engine,
@@ -119,12 +125,12 @@ pub fn run(args: &RouteArgs) -> Result<String> {
             Engine::Mesh => route::Engine::Mesh,
             Engine::Graph => route::Engine::Graph,
         },
-        turn_radius_m: args.turn_radius_m,
+        turn_radius_m: (args.turn_radius_m.abs() > 0.0).then_some(args.turn_radius_m),
     });
     let plan = plan.map_err(|error| route_error(error, args))?;
     notices.extend(plan.notices.iter().cloned());
     Ok(text(match args.format {
-        Format::Json => json(&plan, origin, args.clearance_m, &notices),
+        Format::Json => json(&plan, origin, args, &notices),
         Format::Geojson => geojson(&plan, origin),
     }))
 }
@@ -171,13 +177,14 @@ fn summary(plan: &RoutePlan) -> Value {
     json!({
         "length_m": plan.length_m(),
         "straight_m": ends.map_or(0.0, |(a, b)| (b - a).norm()),
+        "flown_m": (!plan.legs.is_empty()).then(|| length_m(&plan.legs)),
         "bends": plan.path.len().saturating_sub(2),
         "least_distance_m": least_m.is_finite().then_some(least_m),
         "structure_hash": format!("{:016x}", plan.structure_hash),
     })
 }
 
-fn json(plan: &RoutePlan, origin: Origin, clearance_m: f64, notices: &[String]) -> Value {
+fn json(plan: &RoutePlan, origin: Origin, args: &RouteArgs, notices: &[String]) -> Value {
     let points = plan.path.iter().map(|p| {
         let LatLon { lat_deg, lon_deg } = from_plane(origin, *p);
         json!({"lat_deg": lat_deg, "lon_deg": lon_deg, "east_m": p.x, "north_m": p.y})
@@ -185,17 +192,25 @@ fn json(plan: &RoutePlan, origin: Origin, clearance_m: f64, notices: &[String]) 
     let repair = |r: &NamedRepair| format!("{}, vertex {}: {:?}", r.zone, r.vertex, r.kind);
     let repairs: Vec<String> = plan.repairs.iter().map(repair).collect();
     let mut out = summary(plan);
-    out["clearance_m"] = json!(clearance_m);
+    out["clearance_m"] = json!(args.clearance_m);
     out["zones"] = json!(plan.n_zones);
     out["regions"] = json!(plan.regions.len());
     out["points"] = points.collect();
     out["repairs"] = json!(repairs);
     out["notices"] = json!(notices);
-    if !plan.legs.is_empty() {
-        let flown_m = plan.legs.iter().map(|l| l.curve.length_m()).sum::<f64>();
-        out["flown_m"] = json!(flown_m);
-        out["trajectory"] = trajectory(origin, &plan.legs);
-    }
+    let at = |p: &Point| {
+        let LatLon { lat_deg, lon_deg } = from_plane(origin, *p);
+        json!({"lat_deg": lat_deg, "lon_deg": lon_deg})
+    };
+    out["origin"] = json!({"lat_deg": origin.lat_deg, "lon_deg": origin.lon_deg});
+    out["flights"] = match plan.path.first() {
+        Some(start) if !plan.legs.is_empty() => json!([{
+            "name": "route", "length_m": length_m(&plan.legs), "turn_radius_m": args.turn_radius_m,
+            "points": track(&plan.legs, *start).iter().map(at).collect::<Vec<_>>(),
+            "trajectory": trajectory(origin, &plan.legs),
+        }]),
+        _ => json!([]),
+    };
     out
 }
 
@@ -206,7 +221,9 @@ fn geojson(plan: &RoutePlan, origin: Origin) -> Value {
     };
     let closed =
         |ring: &[Point]| -> Value { ring.iter().chain(ring.first()).map(position).collect() };
-    let line: Vec<Value> = plan.path.iter().map(position).collect();
+    let start = plan.path.first().filter(|_| !plan.legs.is_empty());
+    let flown = start.map_or_else(|| plan.path.clone(), |s| track(&plan.legs, *s));
+    let line: Vec<Value> = flown.iter().map(position).collect();
     let mut features = vec![json!({
         "type": "Feature", "properties": summary(plan),
         "geometry": {"type": "LineString", "coordinates": line},
@@ -235,7 +252,7 @@ mod tests {
             clearance_m,
             level_m: None,
             vertical_margin_m: 10.0,
-            turn_radius_m: None,
+            turn_radius_m: 0.0,
             engine: Engine::Mesh,
             format: Format::Json,
         }
@@ -275,6 +292,30 @@ mod tests {
         let text = run(&a).unwrap();
         let zones = skein_interop::geojson::read(&text).unwrap().polygons.len();
         assert!(zones > 0, "{text}");
+    }
+
+    #[test]
+    fn a_route_is_flown_with_its_turns() {
+        let mut a = args(PLAN, HERE, THERE, 20.0);
+        assert!(answer(&a)["flown_m"].is_null());
+        a.turn_radius_m = 30.0;
+        let flown = answer(&a);
+        let length = |v: &Value| v["length_m"].as_f64().unwrap();
+        let pieces = flown["flights"][0]["trajectory"].as_array().unwrap();
+        let flown_m: f64 = pieces.iter().map(length).sum();
+        assert!((flown["flown_m"].as_f64().unwrap() - flown_m).abs() < 1e-6);
+        // It rounds a circle, which the way with corners passes on a polygon.
+        assert!((flown_m / length(&flown) - 1.0).abs() < 0.01, "{flown_m}");
+        a.format = Format::Geojson;
+        let map: Value = serde_json::from_str(&run(&a).unwrap()).unwrap();
+        let line = &map["features"][0]["geometry"]["coordinates"];
+        assert!(line.as_array().unwrap().len() > flown["points"].as_array().unwrap().len());
+        a.turn_radius_m = 500.0;
+        assert!(
+            error(&a).contains("no flight with turns of 500 m"),
+            "{}",
+            error(&a)
+        );
     }
 
     #[test]

@@ -133,7 +133,7 @@ pub fn run(kind: Kind, file: &Path, args: &TourArgs, wishes: &Wishes) -> Result<
     args.output.print(&Sheet {
         origin: input.origin,
         site,
-        summary: summary(&request, &plan, wishes, &input.notices),
+        summary: summary(&request, &plan, args, wishes, &input.notices),
         flights: plan.uavs.iter().map(printed).collect(),
         shapes: Vec::new(),
     })
@@ -149,7 +149,13 @@ fn printed(tour: &UavTour) -> Printed {
     printed
 }
 
-fn summary(request: &TourRequest, plan: &TourPlan, wishes: &Wishes, notices: &[String]) -> Value {
+fn summary(
+    request: &TourRequest,
+    plan: &TourPlan,
+    args: &TourArgs,
+    wishes: &Wishes,
+    notices: &[String],
+) -> Value {
     let at_home = plan
         .uavs
         .iter()
@@ -166,7 +172,8 @@ fn summary(request: &TourRequest, plan: &TourPlan, wishes: &Wishes, notices: &[S
         "makespan_s": plan.makespan_s, "lower_bound_s": plan.lower_bound_s,
         "total_s": plan.total_s, "total_m": plan.total_m,
         "energy_s": plan.energy_s, "energy_wh": plan.energy_wh,
-        "wind_mps": request.wind_mps.norm(), "clearance_m": request.clearance_m,
+        "wind_mps": args.wind.wind_mps, "wind_from_deg": args.wind.wind_from_deg,
+        "clearance_m": request.clearance_m,
         "objective": wishes.objective.name(), "sensor": wishes.sensor,
         "uavs_flying": plan.uavs_flying(), "at_home": at_home,
         "targets": plan.targets, "unserved": plan.unserved,

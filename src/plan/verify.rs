@@ -44,7 +44,7 @@ pub struct VerifyArgs {
     /// half the swath.
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub look_ahead_m: Option<f64>,
-    /// Speed over the ground, m/s; by default what the plan says.
+    /// Airspeed, m/s; by default what the plan says.
     #[arg(long, value_name = "V", allow_hyphen_values = true)]
     pub speed_mps: Option<f64>,
     /// Holes of the area may be flown over; without it they are kept out of.

@@ -27,6 +27,8 @@ pub struct Flags {
     pub course_deg: Option<f64>,
     /// `--trigger-m`.
     pub trigger_m: Option<f64>,
+    /// `--run-out-m`.
+    pub run_out_m: Option<f64>,
 }
 
 /// How an area is seen.
@@ -42,6 +44,8 @@ pub struct View {
     pub course_deg: Option<f64>,
     /// Distance between two pictures, metres; `None` for half of what one sees along.
     pub trigger_m: Option<f64>,
+    /// How far lanes run out straight before a turn, metres.
+    pub run_out_m: f64,
     /// Where each of these comes from, if there is a survey.
     pub notices: Vec<String>,
 }
@@ -96,6 +100,14 @@ impl View {
             "AdjustedFootprintFrontal",
             " m",
         );
+        let run_out_m = choose(
+            flags.run_out_m,
+            grid.turn_around_m,
+            "--run-out-m",
+            "TurnAroundDistance",
+            " m",
+        );
+        let run_out_m = within("--run-out-m", run_out_m.unwrap_or(0.0), DISTANCE_M, "m")?;
         if let Some(course_deg) = course_deg {
             course("--course-deg", course_deg)?;
         }
@@ -134,6 +146,7 @@ impl View {
             look_ahead_m,
             course_deg,
             trigger_m,
+            run_out_m,
             notices,
         })
     }
@@ -169,6 +182,7 @@ mod tests {
             trigger_m: Some(20.0),
             side_overlap_percent: Some(70.0),
             frontal_overlap_percent: Some(75.0),
+            turn_around_m: Some(25.0),
             camera: Some("Sony".to_owned()),
             lens_known: false,
         }
@@ -179,6 +193,7 @@ mod tests {
         let view = View::of(Flags::default(), Some(&survey())).unwrap();
         assert_eq!(view.camera, Sensor::Swath { width_m: 40.0 });
         assert_eq!((view.altitude_m, view.course_deg), (80.0, Some(30.0)));
+        assert!((view.run_out_m - 25.0).abs() < 1e-9);
         assert_eq!(
             (view.look_ahead_m, view.trigger_m),
             (Some(10.0), Some(20.0))
@@ -189,6 +204,7 @@ mod tests {
             "AdjustedFootprintSide 40 m",
             "AdjustedFootprintFrontal 20 m",
             "angle 30°",
+            "TurnAroundDistance 25 m; --run-out-m overrides it",
             "camera \"Sony\", SideOverlap 70 %, FrontalOverlap 75 %",
         ] {
             assert!(told.contains(part), "{told}");
@@ -199,10 +215,12 @@ mod tests {
             look_ahead_m: Some(5.0),
             course_deg: Some(-90.0),
             trigger_m: Some(8.0),
+            run_out_m: Some(0.0),
         };
         let view = View::of(flags, Some(&survey())).unwrap();
         assert_eq!(view.camera, Sensor::Swath { width_m: 55.0 });
         assert_eq!((view.altitude_m, view.course_deg), (100.0, Some(-90.0)));
+        assert!(view.run_out_m.abs() < 1e-9);
         assert_eq!((view.look_ahead_m, view.trigger_m), (Some(5.0), Some(8.0)));
         let told = view.notices.join("\n");
         assert!(

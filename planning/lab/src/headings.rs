@@ -36,12 +36,13 @@ const FIRST_INTERVALS: u32 = 16;
 /// one is a millionth of a radian, so that only equal answers are left to tell apart.
 const MAX_ROUNDS: usize = 40;
 
-/// Pairs of intervals in one round at most, 10 s of work; with more the gap
-/// reached so far is the answer.
+/// Pairs of intervals in one round at most, for the memory that they take; with more the
+/// gap reached so far is the answer.
 const MAX_PAIRS: usize = 40_000_000;
 
-/// The same in wind, where a pair takes ten times as long.
-const MAX_PAIRS_IN_WIND: usize = 400_000;
+/// Pairs of intervals a leg in all rounds together, unless more are asked for: in wind,
+/// where a pair takes ten times as long, 20 waypoints are answered within a second.
+pub const PAIRS_A_LEG_IN_WIND: usize = 8_000;
 
 /// A waypoint's intervals are fine enough when they loosen the bound by this share
 /// of what the gap allows on the average: the rest is left to the others.
@@ -80,6 +81,9 @@ pub struct Request<'a> {
     pub radius_m: f64,
     /// The share of the length the answer may be above the optimum.
     pub gap: f64,
+    /// Pairs of intervals looked at for each leg, after which what is reached is the
+    /// answer; without it [`PAIRS_A_LEG_IN_WIND`] in wind, and no limit in calm air.
+    pub pairs_a_leg: Option<usize>,
 }
 
 /// Both bounds after a round, metres.
@@ -202,8 +206,8 @@ pub fn choose(request: &Request) -> Result<Headings, HeadingsError> {
 /// `airspeed_mps` through the air.
 ///
 /// # Guarantees
-/// As [`choose`], in seconds; the rounds run out sooner, so that among waypoints nearer
-/// than a turn radius the gap may be wider than asked for. Flights are those of [`skein_flight::trajectory::wind`]: three
+/// As [`choose`], in seconds; pairs run out sooner, so that among waypoints nearer than
+/// two turn radii the gap may be wider than asked for, unless more are allowed. Flights are those of [`skein_flight::trajectory::wind`]: three
 /// pieces, no turn longer than a circle.
 ///
 /// # Errors
@@ -267,6 +271,12 @@ fn solve(request: &Request, air: Air) -> Solved {
         closed,
     };
     let mut known = Known::default();
+    let a_leg = match air.wind {
+        Some(_) => Some(request.pairs_a_leg.unwrap_or(PAIRS_A_LEG_IN_WIND)),
+        None => request.pairs_a_leg,
+    };
+    // What may still be looked at.
+    let mut left = a_leg.map_or(usize::MAX, |n| n.saturating_mul(legs.len()));
     let mut step = TAU / f64::from(2 * FIRST_INTERVALS);
     for _ in 0..MAX_ROUNDS {
         let ends = if closed { Ends::Closed } else { Ends::Open };
@@ -306,14 +316,11 @@ fn solve(request: &Request, air: Air) -> Solved {
             lower = lower.max(aside * (1.0 - ROUNDING)).min(best.0);
             break;
         }
-        let most = if air.wind.is_some() {
-            MAX_PAIRS_IN_WIND
-        } else {
-            MAX_PAIRS
-        };
-        if pairs(&layers, closed) > most {
+        let (all, open) = pairs(&layers, closed, &known);
+        if all > MAX_PAIRS || open > left {
             break;
         }
+        left -= open;
     }
     Solved {
         headings_rad: best.1.into_iter().map(wrap_tau).collect(),
@@ -415,16 +422,18 @@ fn halved(
     (kept, slopes)
 }
 
-/// Pairs of neighbouring intervals.
-fn pairs(layers: &[Vec<Arc>], closed: bool) -> usize {
-    let last = layers.len() - 1;
-    let joint = if closed {
-        layers[last].len() * layers[0].len()
-    } else {
-        0
-    };
-    let between: usize = layers.windows(2).map(|w| w[0].len() * w[1].len()).sum();
-    between + joint
+/// Pairs of neighbouring intervals: all, and those that are not put aside.
+fn pairs(layers: &[Vec<Arc>], closed: bool, known: &Known) -> (usize, usize) {
+    let (mut all, mut open) = (0, 0);
+    let n_legs = layers.len() - usize::from(!closed);
+    for leg in 0..n_legs {
+        let (from, to) = (&layers[leg], &layers[(leg + 1) % layers.len()]);
+        all += from.len() * to.len();
+        for a in from {
+            open += to.iter().filter(|b| !known.aside(leg, a, b)).count();
+        }
+    }
+    (all, open)
 }
 
 /// Which headings are given.

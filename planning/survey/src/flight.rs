@@ -1,6 +1,7 @@
 //! What flights of a team are predicted to take, whoever planned them (D2.7 §3.6): while
 //! they are compared, and as the caller gets them.
 
+use crate::flown;
 use crate::team::Uav;
 use skein_flight::airframe::{Airframe, GRAVITY_MPS2, PowerModel};
 use skein_geometry::Curve;
@@ -49,7 +50,7 @@ impl Flight {
         if self.legs.is_empty() {
             return self.length_m;
         }
-        self.legs.iter().map(|leg| leg.curve.length_m()).sum()
+        flown::length_m(&self.legs)
     }
 
     /// How long it takes, seconds.

@@ -2,6 +2,7 @@
 //!
 //! Leaves to the planners which plans there are to choose from.
 
+use crate::flight::Flight;
 use crate::team::{TeamError, Uav};
 
 /// Shares of the work that differ by less than this are the same to a person: samples
@@ -37,6 +38,26 @@ pub(crate) struct Worth {
 }
 
 impl Worth {
+    /// What flights come to that do this share of the work; energies in watt-hours where
+    /// those are known and asked for, else in seconds of cruise.
+    pub(crate) fn of<'a>(
+        flights: impl Iterator<Item = &'a Flight> + Clone,
+        share: f64,
+        in_watt_hours: bool,
+    ) -> Self {
+        let flying = flights.clone().filter(|f| f.flies());
+        let energy_wh: Option<f64> = flying.map(Flight::energy_wh).sum();
+        Self {
+            share,
+            makespan_s: flights.clone().map(Flight::time_s).fold(0.0, f64::max),
+            total_m: flights.clone().map(Flight::ground_m).sum(),
+            energy: match energy_wh {
+                Some(energy_wh) if in_watt_hours => energy_wh,
+                _ => flights.map(Flight::energy_s).sum(),
+            },
+        }
+    }
+
     /// The figure of an objective.
     pub(crate) fn figure(&self, objective: Objective) -> f64 {
         match objective {

@@ -15,6 +15,7 @@
 //! | [`report`] | what is told, as text and as JSON |
 //! | [`generate`] | sites for tests of planners, by seed |
 //! | [`plane`], [`path`], [`outline`] | the geometry |
+//! | [`air`] | times and turns in a wind |
 //!
 //! Text in, values out: no file is opened here. What is read is not believed: numbers have
 //! ranges, lists have limits, and every error names its place.
@@ -45,6 +46,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod air;
 mod boxes;
 pub mod generate;
 pub mod ground;

@@ -17,6 +17,18 @@ pub struct FlightClaims {
     pub to: Option<Point>,
 }
 
+/// What a plan says of the wind.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Wind {
+    /// None.
+    #[default]
+    Calm,
+    /// Where it blows to, m/s east and north.
+    To(f64, f64),
+    /// There is one, but not from where: times cannot be recounted.
+    Unknown,
+}
+
 /// What one UAV flies.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flight {
@@ -27,8 +39,10 @@ pub struct Flight {
     /// Whether the pieces are what is flown, turns and all; corners with straight legs
     /// between them are not.
     pub exact: bool,
-    /// Speed over the ground, m/s.
+    /// Airspeed, m/s.
     pub speed_mps: Option<f64>,
+    /// The wind.
+    pub wind: Wind,
     /// Its turn radius, metres.
     pub turn_radius_m: Option<f64>,
     /// Width of the ground that it sees, metres.
@@ -93,8 +107,6 @@ pub struct Plan {
     pub swath_m: Option<f64>,
     /// How far all see before and behind, metres.
     pub look_ahead_m: Option<f64>,
-    /// Whether it was planned in a wind, so that times are not lengths over speeds.
-    pub windy: bool,
     /// What the plan says of itself.
     pub claims: PlanClaims,
     /// What of the files was left out.
@@ -111,7 +123,6 @@ impl Plan {
             clearance_m: None,
             swath_m: None,
             look_ahead_m: None,
-            windy: false,
             claims: PlanClaims::default(),
             notices: Vec::new(),
         }
@@ -138,7 +149,6 @@ impl Plan {
             self.notices.push(text.to_owned());
         }
         self.claims = PlanClaims::default();
-        self.windy |= other.windy;
         self.flights.extend(other.flights);
         self.notices.extend(other.notices);
         Ok(self)

@@ -6,8 +6,9 @@
 use crate::VerifyError;
 use crate::ground_file::too_far;
 use crate::path::{LONGEST_M, Piece, RADII_M};
-use crate::plan::{Flight, FlightClaims, Plan, PlanClaims};
+use crate::plan::{Flight, FlightClaims, Plan, PlanClaims, Wind};
 use crate::plane::{Plane, Point, REACH_M};
+use libm::{cos, sin};
 use skein_interop::json::{Document, Error, Node};
 use skein_interop::place::LatLon;
 
@@ -109,7 +110,7 @@ fn plan_of_skein(root: &Node<'_>, plane: Plane) -> Result<Plan, Error> {
     plan.clearance_m = figure(root, "clearance_m", LONGEST_M, "metres")?;
     plan.look_ahead_m = figure(root, "look_ahead_m", LONGEST_M, "metres")?;
     plan.swath_m = positive(root, "swath_m", "metres")?;
-    plan.windy = figure(root, "wind_mps", 1e3, "m/s")?.is_some_and(|w| w > 0.0);
+    let wind = wind(root)?;
     plan.claims = PlanClaims {
         makespan_s: figure(root, "makespan_s", 1e12, "seconds")?,
         total_m: figure(root, "total_m", 1e12, "metres")?,
@@ -117,7 +118,10 @@ fn plan_of_skein(root: &Node<'_>, plane: Plane) -> Result<Plan, Error> {
     };
     let mut left = MOST_PIECES;
     for (i, at) in root.need("flights")?.items()?.iter().enumerate() {
-        let flight = flight_of_skein(at, i, plane, &mut left)?;
+        let flight = Flight {
+            wind,
+            ..flight_of_skein(at, i, plane, &mut left)?
+        };
         if !flight.exact && !flight.pieces.is_empty() {
             plan.notices.push(format!(
                 "{}: no trajectory: its corners are taken for what it flies, its turns and its camera are not known",
@@ -127,6 +131,23 @@ fn plan_of_skein(root: &Node<'_>, plane: Plane) -> Result<Plan, Error> {
         plan.flights.push(flight);
     }
     Ok(plan)
+}
+
+fn wind(root: &Node<'_>) -> Result<Wind, Error> {
+    let speed_mps = figure(root, "wind_mps", 1e3, "m/s")?.unwrap_or(0.0);
+    if speed_mps <= 0.0 {
+        return Ok(Wind::Calm);
+    }
+    let Some(from) = root.get("wind_from_deg")? else {
+        return Ok(Wind::Unknown);
+    };
+    let from_rad = from
+        .number(-360.0, 360.0, "degrees clockwise from north")?
+        .to_radians();
+    Ok(Wind::To(
+        -speed_mps * sin(from_rad),
+        -speed_mps * cos(from_rad),
+    ))
 }
 
 fn flight_of_skein(

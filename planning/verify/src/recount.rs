@@ -1,11 +1,12 @@
 //! The rules of a plan, and what it comes to by them.
 
 use crate::VerifyError;
+use crate::air::Air;
 use crate::boxes::{Bounds, Tree};
 use crate::ground::{Ground, Named};
 use crate::outline::Side;
 use crate::path::{Path, Piece};
-use crate::plan::{Flight, Plan};
+use crate::plan::{Flight, Plan, Wind};
 use crate::plane::{Plane, Point};
 use crate::seen::{Look, seen};
 use core::f64::consts::{PI, TAU};
@@ -47,7 +48,7 @@ pub struct Settings {
     pub swath_m: Option<f64>,
     /// How far a camera sees before and behind, metres; half the swath by default.
     pub look_ahead_m: Option<f64>,
-    /// Speed over the ground, m/s.
+    /// Airspeed, m/s.
     pub speed_mps: Option<f64>,
     /// Whether holes of the area may be flown over.
     pub cross_holes: bool,
@@ -293,7 +294,7 @@ pub fn recount(plan: &Plan, ground: &Ground, settings: &Settings) -> Result<Repo
         desk.say("no clearance is told: nobody may be inside of a zone, and may touch it");
     }
     for flight in &plan.flights {
-        desk.flight(flight, plan.windy);
+        desk.flight(flight);
     }
     if plan.flights.iter().all(|f| f.pieces.is_empty()) {
         desk.say("nobody flies");
@@ -348,19 +349,36 @@ struct Desk<'a> {
     unmeasured: bool,
 }
 
-/// Where along a flight its pieces begin, and how fast it is.
+/// A flight, and the air that it flies through where it is known.
 struct Track<'a> {
     flight: &'a Flight,
-    speed_mps: Option<f64>,
+    air: Option<Air>,
 }
 
 impl Track<'_> {
     fn spot(&self, plane: Plane, along_m: f64, at: Point) -> Spot {
         Spot {
             along_m,
-            time_s: self.speed_mps.map(|v| along_m / v),
+            time_s: self.time_s(along_m),
             at: plane.place(at),
         }
+    }
+
+    /// How long the first metres take, seconds.
+    fn time_s(&self, length_m: f64) -> Option<f64> {
+        let air = self.air?;
+        let (mut left_m, mut time_s) = (length_m, 0.0);
+        for piece in &self.flight.pieces {
+            time_s += air.time_s(piece, piece.length_m.min(left_m))?;
+            left_m = (left_m - piece.length_m).max(0.0);
+        }
+        Some(time_s)
+    }
+
+    /// The tightest radius of an arc, metres; in a wind through the air.
+    fn radius_m(&self, piece: &Piece) -> Option<f64> {
+        let bent = piece.radius_m.filter(|_| piece.length_m > 0.0)?.abs();
+        self.air.map_or(Some(bent), |air| air.radius_m(piece))
     }
 
     /// The place so far along, found from the beginning.
@@ -407,10 +425,21 @@ impl Desk<'_> {
         }
     }
 
-    fn flight(&mut self, flight: &Flight, windy: bool) {
+    fn flight(&mut self, flight: &Flight) {
+        let speed_mps = self.settings.speed_mps.or(flight.speed_mps);
+        let wind_mps = match flight.wind {
+            Wind::Calm => Some((0.0, 0.0)),
+            Wind::To(east_mps, north_mps) => Some((east_mps, north_mps)),
+            Wind::Unknown => None,
+        };
+        let air = speed_mps.zip(wind_mps);
+        let air = air.map(|(airspeed_mps, wind_mps)| Air {
+            airspeed_mps,
+            wind_mps,
+        });
         let track = Track {
             flight,
-            speed_mps: self.settings.speed_mps.or(flight.speed_mps),
+            air: air.filter(Air::flyable),
         };
         let bad = flight.pieces.iter().enumerate();
         if let Some((i, problem)) = bad.filter_map(|(i, p)| Some((i, p.problem()?))).next() {
@@ -425,12 +454,8 @@ impl Desk<'_> {
             name: flight.name.clone(),
             pieces: flight.pieces.len(),
             length_m,
-            seeing_m: seeing.map(|p| p.length_m).sum(),
-            time_s: track
-                .speed_mps
-                .filter(|_| !windy)
-                .map(|v| length_m / v)
-                .or((length_m <= 0.0).then_some(0.0)),
+            seeing_m: seeing.fold(0.0, |sum, p| sum + p.length_m),
+            time_s: track.time_s(length_m).or((length_m <= 0.0).then_some(0.0)),
             asked_radius_m: self.settings.turn_radius_m.or(flight.turn_radius_m),
             claimed: (flight.claims.length_m, flight.claims.time_s),
             ..FlightRecount::default()
@@ -512,11 +537,10 @@ impl Desk<'_> {
     }
 
     fn radii(&mut self, track: &Track<'_>, asked_m: Option<f64>) -> Option<f64> {
-        let arcs = || {
-            let bent = track.flight.pieces.iter().filter(|p| p.length_m > 0.0);
-            bent.filter_map(|p| p.radius_m)
-        };
-        let tightest_m = arcs().map(f64::abs).min_by(f64::total_cmp);
+        let arcs = track.flight.pieces.iter();
+        let tightest_m = arcs
+            .filter_map(|p| track.radius_m(p))
+            .min_by(f64::total_cmp);
         let (Some(asked_m), Some(tightest)) = (asked_m, tightest_m) else {
             if tightest_m.is_some() {
                 let name = &track.flight.name;
@@ -530,8 +554,7 @@ impl Desk<'_> {
         let mut first = None;
         let mut tight = 0;
         for piece in &track.flight.pieces {
-            let bent = piece.radius_m.filter(|_| piece.length_m > 0.0);
-            if bent.is_some_and(|r| r.abs() < least_m) {
+            if track.radius_m(piece).is_some_and(|r| r < least_m) {
                 tight += 1;
                 first = first.or(Some((along_m, piece.start)));
             }
@@ -700,8 +723,11 @@ impl Desk<'_> {
         self.report.makespan_s = times.map(|t| t.into_iter().fold(0.0, f64::max));
         self.report.total_m = self.report.flights.iter().map(|f| f.length_m).sum();
         if self.report.makespan_s.is_none() {
-            self.say(if plan.windy {
-                "planned in a wind: times are not recounted"
+            let winds: Vec<Wind> = plan.flights.iter().map(|f| f.wind).collect();
+            self.say(if winds.contains(&Wind::Unknown) {
+                "it is not told where the wind comes from: times are not recounted"
+            } else if winds.iter().any(|w| matches!(w, Wind::To(..))) {
+                "no speed is told, or the wind is as fast as a UAV: times are not recounted"
             } else {
                 "no speed is told: times are not recounted"
             });

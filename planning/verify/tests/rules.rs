@@ -382,6 +382,28 @@ fn claims_are_compared() {
 }
 
 #[test]
+fn in_a_wind_times_and_turns_are_those_through_the_air() {
+    let ground = area();
+    let mut plan = plan_of(&racetrack());
+    plan["wind_mps"] = json!(5.0);
+    assert_eq!(broken(&plan, &ground), []);
+    assert!(said(&plan, &ground).contains("not told where the wind comes from"));
+    // One lane with it, one against; a turn of 30 m with 20 m/s is one of 30 (15 / 20)².
+    plan["wind_from_deg"] = json!(270.0);
+    let report = told(&plan, &ground, &Settings::default()).unwrap();
+    let rules: Vec<Rule> = report.violations.iter().map(|v| v.rule).collect();
+    assert_eq!(rules, [Rule::Radius, Rule::Time, Rule::Makespan]);
+    let time_s = report.makespan_s.unwrap();
+    assert!((55.0..66.0).contains(&time_s), "{time_s}");
+    plan["flights"][0]["turn_radius_m"] = json!(30.0 * 0.75 * 0.75);
+    plan["flights"][0]["time_s"] = json!(time_s);
+    plan["makespan_s"] = json!(time_s);
+    assert_eq!(broken(&plan, &ground), []);
+    plan["wind_mps"] = json!(15.0);
+    assert!(said(&plan, &ground).contains("as fast as a UAV"));
+}
+
+#[test]
 fn flags_say_what_the_plan_does_not() {
     let mut plan = plan_of(&racetrack());
     for name in ["clearance_m", "look_ahead_m", "swath_m"] {

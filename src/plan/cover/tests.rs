@@ -193,6 +193,7 @@ fn a_survey_is_flown_as_it_asks_and_its_files_keep_what_it_holds() {
     assert_eq!(told["planner"], "exact", "a course asks for passes");
     let notices = told["notices"].to_string();
     assert!(notices.contains("AdjustedFootprintSide 70 m"), "{notices}");
+    assert!(notices.contains("TurnAroundDistance 30 m"), "{notices}");
     assert!(!notices.contains("inclusion fence"), "{notices}");
     let flags = ["--swath-m", "90", "--altitude-m", "100", "--approximate"];
     let told = dir.plan(SURVEY, &flags).unwrap();

@@ -61,7 +61,7 @@ pub(super) struct Known {
 }
 
 impl Known {
-    fn aside(&self, leg: usize, a: &Arc, b: &Arc) -> bool {
+    pub fn aside(&self, leg: usize, a: &Arc, b: &Arc) -> bool {
         self.pairs
             .get(leg)
             .is_some_and(|t| t.row(a.parent)[b.parent] >= self.wanted)

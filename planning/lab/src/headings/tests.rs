@@ -10,6 +10,7 @@ fn solve(waypoints: &[Point], chain: Chain, gap: f64) -> Headings {
         chain,
         radius_m: 1.0,
         gap,
+        pairs_a_leg: None,
     })
     .unwrap()
 }
@@ -29,6 +30,7 @@ fn solve_in_wind(waypoints: &[Point], chain: Chain, gap: f64, wind: Vector) -> T
         chain,
         radius_m: 1.0,
         gap,
+        pairs_a_leg: None,
     };
     choose_in_wind(&request, 1.0, Wind::new(wind.x, wind.y)).unwrap()
 }
@@ -114,6 +116,7 @@ fn malformed_requests_are_refused() {
             chain,
             radius_m,
             gap,
+            pairs_a_leg: None,
         })
         .unwrap_err()
     };
@@ -138,6 +141,7 @@ fn a_wind_no_slower_than_the_uav_is_refused() {
         chain: FREE,
         radius_m: 50.0,
         gap: 1e-2,
+        pairs_a_leg: None,
     };
     for (airspeed_mps, wind) in [
         (20.0, Wind::new(12.0, 16.0)),
@@ -157,6 +161,7 @@ fn down_wind_and_back_against_it() {
         chain: FREE,
         radius_m: 50.0,
         gap: 1e-4,
+        pairs_a_leg: None,
     };
     for (east_mps, seconds) in [(10.0, 30.0), (-10.0, 90.0)] {
         let h = choose_in_wind(&request, 20.0, Wind::new(east_mps, 0.0)).unwrap();
@@ -174,6 +179,24 @@ fn an_answer_says_whether_the_gap_is_certified() {
     // Rounding alone keeps the bounds apart.
     let none = solve_in_wind(&p, FREE, 0.0, wind);
     assert!(!none.certified && none.gap() > 0.0, "{none:?}");
+}
+
+#[test]
+fn more_pairs_narrow_the_gap() {
+    let p = points(&[(0.0, 0.0), (1.5, 0.7), (0.4, 2.2), (2.0, 2.5), (0.2, 1.0)]);
+    let gap = |pairs_a_leg| {
+        let request = Request {
+            waypoints: &p,
+            chain: FREE,
+            radius_m: 1.0,
+            gap: 1e-4,
+            pairs_a_leg: Some(pairs_a_leg),
+        };
+        choose_in_wind(&request, 1.0, Wind::new(0.3, 0.0))
+            .unwrap()
+            .gap()
+    };
+    assert!(gap(500) > gap(2_000) && gap(2_000) > gap(20_000));
 }
 
 #[test]

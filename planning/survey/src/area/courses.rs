@@ -11,6 +11,8 @@ use crate::objective::{Objective, SAME_SHARE, Worth};
 use skein_flight::coverage::passes::{Directions, SHIFTS};
 use skein_geometry::Polygon;
 use skein_geometry::math::{PI, atan2};
+use std::panic::resume_unwind;
+use std::thread;
 
 /// Courses over half a turn: every 5°.
 const COURSES: u32 = 36;
@@ -25,7 +27,7 @@ const SAME_RAD: f64 = 1e-3;
 const MOST_EDGES: usize = 8;
 
 /// Courses that are flown with more steps, as long as there is work left.
-const LONGER: usize = 24;
+const LONGER: usize = 16;
 
 /// Courses of these whose lanes are moved aside.
 const ASIDE: usize = 2;
@@ -34,9 +36,12 @@ const ASIDE: usize = 2;
 const IN_FULL: usize = 8;
 
 /// What a search may take, in the unit of [`Part::work`]: as much as so many plans, but at
-/// least and at most this, which is some seconds; in proportion to the steps of improvement.
-const WORK_PLANS: u64 = 12;
-const WORK: (u64, u64) = (100_000_000, 250_000_000);
+/// least and at most this, which is some seconds of two processors; in proportion to the steps of improvement.
+const WORK_PLANS: u64 = 24;
+const WORK: (u64, u64) = (150_000_000, 750_000_000);
+
+/// Plans that are made at once.
+const BATCH: usize = 4;
 
 /// While plans are only compared: what sees a percent of the area less counts as if it took so
 /// many percent longer.
@@ -90,25 +95,42 @@ struct Search<F, W> {
 
 impl<F, W> Search<F, W>
 where
-    F: Fn(Directions, Effort) -> Result<Part, PlannerError>,
-    W: Fn(&Part, Effort) -> Worth,
+    F: Fn(Directions, Effort) -> Result<Part, PlannerError> + Sync,
+    W: Fn(&Part, Effort) -> Worth + Sync,
 {
-    /// A plan on a course, unless there is none or less than `reserve` is left to do.
-    fn tried(&mut self, directions: Directions, effort: Effort, reserve: u64) -> Option<Tried> {
-        if self.left <= reserve {
-            return None;
+    /// Plans on courses, as many at once as a batch has, while more than `reserve` is left to
+    /// do; how many processors there are changes nothing.
+    fn tried(&mut self, courses: &[Directions], effort: Effort, reserve: u64) -> Vec<Tried> {
+        let mut all = Vec::new();
+        for batch in courses.chunks(BATCH) {
+            if self.left <= reserve {
+                break;
+            }
+            let flown = thread::scope(|scope| {
+                let plan = |d: &Directions| {
+                    let directions = *d;
+                    let (fly, worth) = (&self.fly, &self.worth);
+                    scope.spawn(move || {
+                        let part = fly(directions, effort).ok()?;
+                        let worth = worth(&part, effort);
+                        Some(Tried {
+                            directions,
+                            part,
+                            worth,
+                        })
+                    })
+                };
+                let begun: Vec<_> = batch.iter().map(plan).collect();
+                let done = begun
+                    .into_iter()
+                    .map(|t| t.join().unwrap_or_else(|p| resume_unwind(p)));
+                done.flatten().collect::<Vec<Tried>>()
+            });
+            let work: u64 = flown.iter().map(|t| t.part.work).sum();
+            self.left = self.left.saturating_sub(work);
+            all.extend(flown);
         }
-        let part = (self.fly)(directions, effort).ok()?;
-        Some(self.noted(directions, part, effort))
-    }
-
-    fn noted(&mut self, directions: Directions, part: Part, effort: Effort) -> Tried {
-        self.left = self.left.saturating_sub(part.work);
-        Tried {
-            directions,
-            worth: (self.worth)(&part, effort),
-            part,
-        }
+        all
     }
 
     /// Those that see as much as any first, the best of them before others; then those that
@@ -158,8 +180,8 @@ pub(super) fn best(
     area: &Polygon,
     objective: Objective,
     steps: usize,
-    fly: impl Fn(Directions, Effort) -> Result<Part, PlannerError>,
-    worth: impl Fn(&Part, Effort) -> Worth,
+    fly: impl Fn(Directions, Effort) -> Result<Part, PlannerError> + Sync,
+    worth: impl Fn(&Part, Effort) -> Worth + Sync,
 ) -> Result<Part, PlannerError> {
     let guessed = fly(Directions::Best, Effort::FULL)?;
     if guessed.work == 0 {
@@ -171,44 +193,53 @@ pub(super) fn best(
         .clamp(WORK.0, WORK.1)
         .saturating_mul(steps as u64)
         / DEFAULT_STEPS as u64;
+    let first = Tried {
+        directions: Directions::Best,
+        worth: worth(&guessed, Effort::FULL),
+        part: guessed,
+    };
     let mut search = Search {
         objective,
         fly,
         worth,
-        left,
+        left: left.saturating_sub(first.part.work),
     };
     // What is left for the better ones, and of that for full plans.
     let (longer_left, full_left) = (left / 2, left / 3);
-    let first = search.noted(Directions::Best, guessed, Effort::FULL);
-    let mut quick = Vec::new();
-    for directions in courses(area) {
-        quick.extend(search.tried(directions, Effort::QUICK, longer_left));
-    }
+    let quick = search.tried(&courses(area), Effort::QUICK, longer_left);
     let quick = search.promising_first(quick);
-    let mut longer = Vec::new();
-    for (i, t) in quick.iter().take(LONGER).enumerate() {
-        longer.extend(search.tried(t.directions, Effort::LONGER, full_left));
-        if let Directions::Fixed(heading_rad) = t.directions
-            && i < ASIDE
-        {
-            for shift in SHIFTS {
-                let aside = Directions::Shifted { heading_rad, shift };
-                longer.extend(search.tried(aside, Effort::LONGER, full_left));
-            }
-        }
-    }
+    let longer = search.tried(&promising(&quick), Effort::LONGER, full_left);
     let promising = match search.promising_first(longer) {
         none if none.is_empty() => quick,
         longer => longer,
     };
-    let mut found = Vec::new();
-    for t in promising.iter().take(IN_FULL) {
-        found.extend(search.tried(t.directions, Effort::FULL, 0));
-    }
-    let fallback = first.part.clone();
+    let in_full: Vec<Directions> = promising.iter().map(|t| t.directions).collect();
+    let in_full = &in_full[..in_full.len().min(IN_FULL)];
+    let mut found = search.tried(in_full, Effort::FULL, 0);
     found.push(first);
     let best = search.best_first(found).into_iter().next();
-    Ok(best.map_or(fallback, |t| t.part))
+    Ok(best.map(|t| t.part).unwrap_or_default())
+}
+
+/// The courses that are flown with more steps, and those of them with lanes moved aside.
+fn promising(quick: &[Tried]) -> Vec<Directions> {
+    let mut all = Vec::new();
+    for (i, t) in quick.iter().take(LONGER).enumerate() {
+        all.push(t.directions);
+        if let Directions::Fixed(heading_rad) = t.directions
+            && i < ASIDE
+        {
+            let aside = |shift| Directions::Shifted { heading_rad, shift };
+            all.extend(SHIFTS.into_iter().map(aside));
+        }
+    }
+    all
+}
+
+/// The angle between two courses that may be flown either way, radians.
+pub(super) fn apart_rad(a_rad: f64, b_rad: f64) -> f64 {
+    let apart = (a_rad - b_rad).rem_euclid(PI);
+    apart.min(PI - apart)
 }
 
 /// What is tried: lanes cell by cell, courses along edges of the area, and courses all round.
@@ -218,10 +249,8 @@ fn courses(area: &Polygon) -> Vec<Directions> {
     let along = edges.iter().map(|d| atan2(d.y, d.x).rem_euclid(PI));
     let mut headings: Vec<f64> = Vec::new();
     let is_new = |headings: &[f64], course_rad: f64| {
-        !headings.iter().any(|h| {
-            let apart = (course_rad - h).rem_euclid(PI);
-            apart.min(PI - apart) < SAME_RAD
-        })
+        let same = |h: &f64| apart_rad(course_rad, *h) < SAME_RAD;
+        !headings.iter().any(same)
     };
     for course_rad in along {
         if headings.len() < MOST_EDGES && is_new(&headings, course_rad) {

@@ -44,11 +44,6 @@ pub(crate) struct Flights {
 }
 
 impl Flights {
-    /// When the last UAV is back, seconds.
-    pub(crate) fn makespan_s(&self) -> f64 {
-        self.flights.iter().map(Flight::time_s).fold(0.0, f64::max)
-    }
-
     fn energy_wh(&self) -> Option<f64> {
         self.flights
             .iter()
@@ -59,16 +54,7 @@ impl Flights {
 
     /// What it is compared by; energies in watt-hours or in seconds of cruise.
     pub(crate) fn worth(&self, in_watt_hours: bool) -> Worth {
-        let cruise_s = || self.flights.iter().map(Flight::energy_s).sum();
-        Worth {
-            share: self.covered_share,
-            makespan_s: self.makespan_s(),
-            total_m: self.flights.iter().map(Flight::ground_m).sum(),
-            energy: match self.energy_wh() {
-                Some(energy_wh) if in_watt_hours => energy_wh,
-                _ => cruise_s(),
-            },
-        }
+        Worth::of(self.flights.iter(), self.covered_share, in_watt_hours)
     }
 
     /// What a person compares.
@@ -87,6 +73,14 @@ impl Flights {
     }
 }
 
+/// From where to where points lie along an axis.
+pub(super) fn span(points: &[Point], axis: Vector) -> (f64, f64) {
+    let each = points.iter().map(|p| p.coords.dot(&axis));
+    each.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+        (l.min(x), h.max(x))
+    })
+}
+
 /// The wanted ground of an area, as points that are spread evenly over it.
 pub(crate) struct Samples(Vec<Point>);
 
@@ -103,13 +97,7 @@ impl Samples {
         let along = along.max_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
         let along = along.map_or(Vector::x(), |d| d.normalize());
         let across = Vector::new(-along.y, along.x);
-        let span = |axis: Vector| {
-            let each = area.vertices().iter().map(|p| p.coords.dot(&axis));
-            each.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
-                (l.min(x), h.max(x))
-            })
-        };
-        let ((u0, u1), (v0, v1)) = (span(along), span(across));
+        let ((u0, u1), (v0, v1)) = (span(area.vertices(), along), span(area.vertices(), across));
         let most_m = (area.area_m2() / (most * LEAST_SAMPLES)).sqrt();
         let least_m = (area.area_m2() / most).sqrt();
         let pitch_m = (swath_m / SAMPLES_A_SWATH).min(most_m).max(least_m);
@@ -135,17 +123,6 @@ impl Samples {
     }
 }
 
-/// The share of the wanted ground of an area that is seen, by samples.
-pub(crate) fn covered_share(
-    area: &Polygon,
-    wanted: impl Fn(Point) -> bool,
-    swath_m: f64,
-    most_samples: f64,
-    sees: impl Fn(Point) -> bool,
-) -> f64 {
-    Samples::new(area, wanted, swath_m, most_samples).share(sees)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,19 +140,16 @@ mod tests {
             .unwrap()
         };
         let (area, hole) = (square(100.0), square(50.0));
-        let half = covered_share(&area, |_| true, 40.0, MOST_SAMPLES, |p| p.x > 0.0);
+        let covered_share = |area, wanted: &dyn Fn(Point) -> bool, sees: &dyn Fn(Point) -> bool| {
+            Samples::new(area, wanted, 40.0, MOST_SAMPLES).share(sees)
+        };
+        let half = covered_share(&area, &|_| true, &|p| p.x > 0.0);
         assert!((half - 0.5).abs() < 0.01);
-        let rest = covered_share(
-            &area,
-            |p| !hole.contains(p),
-            40.0,
-            MOST_SAMPLES,
-            |p| p.x.abs() > 50.0,
-        );
+        let rest = covered_share(&area, &|p| !hole.contains(p), &|p| p.x.abs() > 50.0);
         // 2 × 50 × 200 of 30,000 square metres.
         assert!((rest - 2.0 / 3.0).abs() < 0.01, "{rest}");
         let needle = Polygon::new(vec![at(0.0, 0.0), at(700.0, 697.0), at(703.0, 700.0)]).unwrap();
-        let half = covered_share(&needle, |_| true, 40.0, MOST_SAMPLES, |p| p.x > 497.0);
+        let half = covered_share(&needle, &|_| true, &|p| p.x > 497.0);
         assert!((half - 0.5).abs() < 0.005, "{half}");
     }
 }

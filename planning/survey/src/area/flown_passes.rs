@@ -5,7 +5,7 @@
 //! what these ways then took. Leaves to [`crate::flown`] which curves there are.
 
 use super::gaps;
-use crate::flown::{Air, Fineness, Flown, Stop, fly, straight, turnable, turnable_by};
+use crate::flown::{Air, Fineness, Flown, Stop, clear_ahead_m, fly, turnable, turnable_by};
 use crate::passes::{Uav, cut, launches};
 use skein_flight::coverage::lines::{self, LineError};
 use skein_flight::coverage::metric::Matrix;
@@ -13,7 +13,7 @@ use skein_flight::coverage::passes::{
     CellPlan, Layout, NEAR_TURNS, Pass, PassesError, PassesProblem, Places, lines,
 };
 use skein_flight::route::{RouteLimits, Router};
-use skein_geometry::frame::Point;
+use skein_geometry::frame::{Point, Pose};
 use std::collections::BTreeMap;
 
 /// What a way costs that is not there, in turns: others are preferred, and what can be
@@ -60,7 +60,8 @@ pub(super) struct FlownPasses {
 
 /// Plans flights for a team so that every pass that can be is flown once, and the longest
 /// time is short; `problem.launch` is not used. `airs` is what each flies through. Passes are
-/// ordered `rounds` times, after the first by what the ways took.
+/// ordered `rounds` times, after the first by what the ways took, and run out straight so far
+/// where that is clear.
 ///
 /// # Errors
 /// [`PassesError`]; nothing is planned then.
@@ -69,6 +70,7 @@ pub(super) fn fly_team(
     team: &[Uav],
     airs: &[Air],
     rounds: usize,
+    run_out_m: f64,
 ) -> Result<FlownPasses, PassesError> {
     if team.is_empty() {
         return Err(PassesError::Team(LineError::NoTeam));
@@ -84,7 +86,9 @@ pub(super) fn fly_team(
     );
     let ways = layout.ways(&starts)?;
     let is_open = |p: Point| starts.iter().any(|s| ways.joins(*s, p));
-    let (fineness, pass_work) = if rounds > 1 {
+    // Where orders are only compared, one is enough, and so are coarse ends.
+    let thorough = rounds > 1;
+    let (fineness, pass_work) = if thorough {
         (Fineness::FULL, PASS_WORK.0)
     } else {
         (Fineness::COARSE, PASS_WORK.1)
@@ -96,7 +100,7 @@ pub(super) fn fly_team(
             None => unreached.push(*pass),
         }
     }
-    let (more, tried) = gaps::fill(problem, &router, &passes, is_open, rounds > 1);
+    let (more, tried) = gaps::fill(problem, &router, &passes, is_open, thorough);
     let tried = tried + layout.passes.len();
     passes.extend(more);
     cut(&mut passes, team.len(), problem.shortest_pass_m);
@@ -114,6 +118,8 @@ pub(super) fn fly_team(
         router: &router,
         team,
         airs,
+        thorough,
+        run_out_m,
         from: &from,
         passes: &passes,
         places: Places::new(&ways, &passes, &starts, problem.turn_radius_m),
@@ -141,13 +147,12 @@ pub(super) fn fly_within(
     passes: &[Pass],
     longest_m: f64,
     air: &Air,
+    run_out_m: f64,
 ) -> (Flown, Vec<Pass>) {
     let passes: Vec<Pass> = passes.iter().filter_map(|p| turnable(router, *p)).collect();
     let fly_first = |n: usize| {
         let stops = passes.iter().take(n);
-        let stops: Vec<Stop> = stops
-            .filter_map(|p| Stop::along(straight(p.from, p.to)))
-            .collect();
+        let stops: Vec<Stop> = stops.filter_map(|p| stop(router, *p, run_out_m)).collect();
         fly(router, start, &stops)
     };
     let mut best = fly_first(passes.len());
@@ -166,10 +171,33 @@ pub(super) fn fly_within(
     }
     let pass = |(stop, stand): &(usize, usize)| {
         let pass = passes[*stop];
-        if *stand == 0 { pass } else { pass.reversed() }
+        if is_forward(*stand) {
+            pass
+        } else {
+            pass.reversed()
+        }
     };
     let flown = best.order.iter().map(pass).collect();
     (best, flown)
+}
+
+/// A pass to be flown in its direction rather than the other, which runs out so far where
+/// that is clear.
+fn stop(router: &Router, pass: Pass, run_out_m: f64) -> Option<Stop> {
+    let end = Pose::new(pass.to, pass.heading_rad());
+    let begin = Pose::new(pass.from, pass.heading_rad()).reversed();
+    let out_m = |pose: Pose| clear_ahead_m(router, pose, run_out_m);
+    let unseen_m = if run_out_m > 0.0 {
+        (out_m(begin), out_m(end))
+    } else {
+        (0.0, 0.0)
+    };
+    Stop::run_out((pass.from, pass.to), unseen_m)
+}
+
+/// Whether a stand of [`stop`] is flown in the pass's direction: each other one is.
+fn is_forward(stand: usize) -> bool {
+    stand.is_multiple_of(2)
 }
 
 /// What flights are planned from.
@@ -179,6 +207,11 @@ struct Desk<'a> {
     team: &'a [Uav],
     /// By UAV: what it flies through.
     airs: &'a [Air],
+    /// Whether the order is searched for at length; else passes are joined in the cheapest
+    /// way at hand.
+    thorough: bool,
+    /// How far passes run out, metres.
+    run_out_m: f64,
     /// By UAV: which of the starts is its own.
     from: &'a [usize],
     passes: &'a [Pass],
@@ -196,10 +229,8 @@ impl Desk<'_> {
         let mut best: Option<FlownPasses> = None;
         let mut endurances: Vec<f64> = self.team.iter().map(|u| u.endurance).collect();
         let (mut shorter, mut work) = (ENDURANCE_ROUNDS, 0);
-        // Where orders are only compared, passes are joined in the cheapest way at hand.
-        let thorough = rounds > 1;
         while rounds > 0 {
-            let found = self.ordered(&endurances, &mut known, thorough)?;
+            let found = self.ordered(&endurances, &mut known)?;
             work += found.flights.iter().map(|f| f.work).sum::<u64>();
             let late = self.too_long(&found);
             if late.is_empty() || shorter == 0 {
@@ -221,12 +252,7 @@ impl Desk<'_> {
     }
 
     /// Shared out, ordered and flown; what the ways took is noted.
-    fn ordered(
-        &self,
-        endurances: &[f64],
-        known: &mut Known,
-        thorough: bool,
-    ) -> Result<FlownPasses, PassesError> {
+    fn ordered(&self, endurances: &[f64], known: &mut Known) -> Result<FlownPasses, PassesError> {
         let first = 2 * self.passes.len();
         let near_m = NEAR_TURNS * self.problem.turn_m();
         let cost = |a: usize, b: usize| {
@@ -241,7 +267,7 @@ impl Desk<'_> {
         };
         let uavs = self.team.iter().zip(self.from).zip(endurances);
         let uavs: Vec<lines::Uav> = uavs.map(uav).collect();
-        let found = if thorough {
+        let found = if self.thorough {
             lines::plan(&self.lines, &uavs, &costs, self.problem.steps)?
         } else {
             lines::plan_passes(&self.lines, &uavs, &costs, self.problem.steps)?
@@ -255,14 +281,14 @@ impl Desk<'_> {
             let stops = tour.passes.iter().filter_map(|t| {
                 let pass = self.passes[t.line];
                 let wanted = if t.backward { pass.reversed() } else { pass };
-                Stop::along(straight(wanted.from, wanted.to))
+                stop(self.router, wanted, self.run_out_m)
             });
             let stops: Vec<Stop> = stops.collect();
             let flight = fly(self.router, self.team[i].launch, &stops);
             // By stand the end of a pass where a way comes in, and where one goes out.
             let ends = |(stop, stand): (usize, usize)| {
                 let line = 2 * order[stop];
-                if tour.passes[stop].backward == (stand == 0) {
+                if tour.passes[stop].backward == is_forward(stand) {
                     (line + 1, line)
                 } else {
                     (line, line + 1)
@@ -277,7 +303,7 @@ impl Desk<'_> {
             }
             let pass = |(stop, stand): &(usize, usize)| {
                 let pass = self.passes[order[*stop]];
-                let backward = tour.passes[*stop].backward == (*stand == 0);
+                let backward = tour.passes[*stop].backward == is_forward(*stand);
                 if backward { pass.reversed() } else { pass }
             };
             flown.tours.push(flight.order.iter().map(pass).collect());
@@ -313,12 +339,16 @@ impl Desk<'_> {
                 flown.unserved.push(last);
                 let stops = flown.tours[i].iter();
                 let stops: Vec<Stop> = stops
-                    .filter_map(|p| Stop::along(straight(p.from, p.to)))
+                    .filter_map(|p| stop(self.router, *p, self.run_out_m))
                     .collect();
                 flown.flights[i] = fly(self.router, uav.launch, &stops);
                 let ordered = flown.flights[i].order.iter().map(|(stop, stand)| {
                     let pass = flown.tours[i][*stop];
-                    if *stand == 0 { pass } else { pass.reversed() }
+                    if is_forward(*stand) {
+                        pass
+                    } else {
+                        pass.reversed()
+                    }
                 });
                 let ordered: Vec<Pass> = ordered.collect();
                 let left = flown.flights[i].left.iter().map(|s| flown.tours[i][*s]);

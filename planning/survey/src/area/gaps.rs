@@ -5,11 +5,13 @@
 //! along lanes and across them are tried, and the one that sees most for what it takes is
 //! flown too, until none sees much more.
 
+use super::courses::apart_rad;
+use super::flights::span;
 use crate::flown::{Fineness, straight, turnable_by};
 use skein_flight::coverage::passes::{Pass, PassesProblem};
 use skein_flight::route::Router;
 use skein_geometry::frame::{Point, Vector};
-use skein_geometry::math::{FRAC_PI_2, PI, atan2, sin_cos};
+use skein_geometry::math::{FRAC_PI_2, atan2, sin_cos};
 use skein_geometry::polygon::point_to_line_m;
 
 /// Samples across a lane.
@@ -173,13 +175,7 @@ fn candidates(
     for course_rad in courses(problem, group) {
         let (s, c) = sin_cos(course_rad);
         let (along, across) = (Vector::new(c, s), Vector::new(-s, c));
-        let span = |axis: Vector| {
-            let each = group.points.iter().map(|p| p.coords.dot(&axis));
-            each.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
-                (l.min(x), h.max(x))
-            })
-        };
-        let ((u0, u1), (v0, v1)) = (span(along), span(across));
+        let ((u0, u1), (v0, v1)) = (span(&group.points, along), span(&group.points, across));
         let lines = ((v1 - v0) / lane_m).ceil().clamp(1.0, MOST_LINES);
         let mut i = 0.5;
         while i < lines {
@@ -254,10 +250,7 @@ fn courses(problem: &PassesProblem, group: &Group) -> Vec<f64> {
     for (a, b) in edges {
         let d = b - a;
         let rad = atan2(d.y, d.x);
-        let same = |c: &f64| {
-            let apart = (rad - c).rem_euclid(PI);
-            apart.min(PI - apart) < SAME_RAD
-        };
+        let same = |c: &f64| apart_rad(rad, *c) < SAME_RAD;
         if !courses.iter().any(same) && courses.len() < 2 + MOST_EDGES {
             courses.push(rad);
         }

@@ -4,7 +4,7 @@
 //! Leaves to [`super::planners`] the flights over a part, and to the caller which UAVs
 //! there are.
 
-use super::flights::{Flights, MOST_SAMPLES, covered_share};
+use super::flights::{Flights, MOST_SAMPLES, Samples};
 use super::planners::{Job, OpenArea, Part};
 use super::{Facts, Laid, Lanes, Planner, PlannerError, Shape, ShapeKind};
 use crate::fleet::sections::{self, Crew, Outcome, Uav, alike, evened, styles};
@@ -105,6 +105,7 @@ impl Desk<'_> {
             lane_m,
             turn_radius_m,
             steps: care.steps,
+            in_watt_hours: self.in_watt_hours,
             rough: care.rough,
         };
         self.ground.plan(self.planner, job)
@@ -194,9 +195,9 @@ impl Desk<'_> {
         };
         let sees = |p| parts.iter().any(|part| part.sees(p));
         let wanted = |p| self.ground.wants(p);
-        let share = covered_share(&self.ground.request.area, wanted, lane_m, most, sees);
-        let near = |p| self.ground.is_too_near(p) && !sees(p);
-        let near = covered_share(&self.ground.request.area, wanted, lane_m, most, near);
+        let samples = Samples::new(&self.ground.request.area, wanted, lane_m, most);
+        let share = samples.share(sees);
+        let near = samples.share(|p| self.ground.is_too_near(p) && !sees(p));
         let mut facts: Option<Facts> = None;
         let (mut flights, mut shapes): (Vec<Flight>, Vec<_>) = (Vec::new(), Vec::new());
         for part in parts {

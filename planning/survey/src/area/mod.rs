@@ -75,6 +75,9 @@ pub struct AreaRequest {
     /// Heading of all exact passes, radians counter-clockwise from east; `None` for the
     /// best found by plans on courses all round.
     pub heading_rad: Option<f64>,
+    /// How far each pass runs out straight beyond both ends before a turn, where that is
+    /// clear, metres: cameras and autopilots settle there.
+    pub run_out_m: f64,
     /// The wind, where it blows to, m/s: flights are compared by their times in it.
     pub wind_mps: Vector,
     /// Which planners are asked.
@@ -106,6 +109,7 @@ impl AreaRequest {
             clearance_m,
             look_ahead_m: None,
             heading_rad: None,
+            run_out_m: 0.0,
             wind_mps: Vector::zeros(),
             planners: Planners::Both,
             lanes: Lanes::Best,

@@ -48,12 +48,14 @@ pub(crate) struct Job<'a> {
     pub turn_radius_m: f64,
     /// Steps of improvement.
     pub steps: usize,
+    /// Whether energies are compared in watt-hours.
+    pub in_watt_hours: bool,
     /// Whether the plan is only compared with others: no courses are searched for it.
     pub rough: bool,
 }
 
 /// The flights over a part.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub(crate) struct Part {
     /// In the order of the crew.
     pub flights: Vec<Flight>,
@@ -69,7 +71,7 @@ pub(crate) struct Part {
 }
 
 /// What of the ground is seen.
-#[derive(Clone, Default)]
+#[derive(Default)]
 enum Seen {
     #[default]
     Nothing,
@@ -90,18 +92,6 @@ impl Part {
                 across_m,
                 along_m,
             } => passes.iter().any(|pass| pass.sees(p, *across_m, *along_m)),
-        }
-    }
-
-    /// What it is compared by; energies in watt-hours where all state their power.
-    fn worth(&self, share: f64) -> Worth {
-        let flying = || self.flights.iter().filter(|f| f.flies());
-        let energy_wh: Option<f64> = flying().map(Flight::energy_wh).sum();
-        Worth {
-            share,
-            makespan_s: self.makespan_s(),
-            total_m: self.flights.iter().map(|f| f.length_m).sum(),
-            energy: energy_wh.unwrap_or_else(|| flying().map(Flight::energy_s).sum()),
         }
     }
 
@@ -166,7 +156,8 @@ impl<'a> OpenArea<'a> {
         let all = Samples::new(job.area, wants, job.lane_m, MOST_SAMPLES);
         let worth = |part: &Part, effort: Effort| {
             let samples = if effort.is_full() { &all } else { &few };
-            part.worth(samples.share(|p| part.sees(p)))
+            let share = samples.share(|p| part.sees(p));
+            Worth::of(part.flights.iter(), share, job.in_watt_hours)
         };
         courses::best(job.area, self.request.objective, job.steps, fly, worth)
     }
@@ -204,7 +195,13 @@ impl<'a> OpenArea<'a> {
             .iter()
             .map(|uav| self.request.air(uav.speed_mps))
             .collect();
-        let plan = match fly_team(&problem, &team, &airs, effort.rounds) {
+        let plan = match fly_team(
+            &problem,
+            &team,
+            &airs,
+            effort.rounds,
+            self.request.run_out_m,
+        ) {
             // A section that zones and holes fill is no work.
             Err(PassesError::Nothing) if job.area != &self.request.area => {
                 return Ok(self.at_home(&job));
@@ -278,7 +275,14 @@ impl<'a> OpenArea<'a> {
             for (i, uav) in job.crew.iter().enumerate() {
                 if uav.endurance_s.is_finite() && rounds > 0 {
                     let air = self.request.air(uav.speed_mps);
-                    let all = fly_within(&router, uav.start, &plan.passes[i], f64::INFINITY, &air);
+                    let all = fly_within(
+                        &router,
+                        uav.start,
+                        &plan.passes[i],
+                        f64::INFINITY,
+                        &air,
+                        self.request.run_out_m,
+                    );
                     let over = all.0.air_m(&air) / (uav.endurance_s * uav.speed_mps);
                     late |= over > 1.0;
                     crew[i].endurance_s /= over.max(1.0) * 1.01;
@@ -294,7 +298,14 @@ impl<'a> OpenArea<'a> {
         for (i, uav) in job.crew.iter().enumerate() {
             let longest_m = uav.endurance_s * uav.speed_mps;
             let air = self.request.air(uav.speed_mps);
-            let (flown, passes) = fly_within(&router, uav.start, &plan.passes[i], longest_m, &air);
+            let (flown, passes) = fly_within(
+                &router,
+                uav.start,
+                &plan.passes[i],
+                longest_m,
+                &air,
+                self.request.run_out_m,
+            );
             let length_m = |p: &[Pass]| p.iter().map(|p| p.length_m() + job.lane_m).sum::<f64>();
             wanted_m += length_m(&plan.passes[i]);
             seen_m += length_m(&passes);

@@ -1,6 +1,7 @@
 //! Stories of teams over areas: unlike swaths, sensors, objectives and heights.
 
 use super::*;
+use crate::flight::Leg;
 use crate::team::Sensor;
 use proptest::prelude::*;
 
@@ -53,6 +54,50 @@ fn planned(request: &AreaRequest) -> AreaPlan {
 }
 
 const PLANNERS: [Planner; 2] = [Planner::Exact, Planner::Approximate];
+
+/// Straight pieces before and after what is seen, in order of flight, metres.
+fn run_outs_m(plan: &AreaPlan) -> Vec<f64> {
+    let legs = plan.uavs.iter().flat_map(|uav| uav.legs.windows(2));
+    let ends = legs.filter(|pair| pair[0].sees != pair[1].sees);
+    let out = ends.map(|pair| if pair[0].sees { &pair[1] } else { &pair[0] });
+    let straight_m = |leg: &Leg| match leg.curve.segments() {
+        [s] if s.curvature_per_m.abs() <= 0.0 => s.length_m,
+        _ => 0.0,
+    };
+    out.map(straight_m).collect()
+}
+
+#[test]
+fn passes_run_out_as_far_as_is_clear() {
+    let team = [uav("a", swath(100.0))];
+    for planner in PLANNERS {
+        let asked = |run_out_m| AreaRequest {
+            run_out_m,
+            heading_rad: (planner == Planner::Exact).then_some(0.0),
+            steps: 200,
+            ..field(&team, planner)
+        };
+        let (plain, out) = (planned(&asked(0.0)), planned(&asked(40.0)));
+        assert!(out.figures.makespan_s > plain.figures.makespan_s);
+        assert!(out.figures.covered_share >= plain.figures.covered_share - 0.002);
+        let outs = run_outs_m(&out);
+        let whole = outs.iter().filter(|m| (**m - 40.0).abs() < 1e-6).count();
+        // A zone stands in the way of some.
+        assert!(whole * 10 > outs.len() * 6, "{planner:?}: {outs:?}");
+        assert!(outs.iter().all(|m| *m < 41.0), "{outs:?}");
+    }
+}
+
+#[test]
+fn courses_that_are_planned_at_once_give_the_same_plan_again() {
+    let team = [uav("a", swath(100.0)), uav("b", swath(100.0))];
+    let request = field(&team, Planner::Exact);
+    let (one, two) = (planned(&request), planned(&request));
+    assert_eq!(one.figures, two.figures);
+    for (a, b) in one.uavs.iter().zip(&two.uavs) {
+        assert_eq!(a.path, b.path);
+    }
+}
 
 #[test]
 fn both_planners_are_told_side_by_side() {

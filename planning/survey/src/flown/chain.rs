@@ -61,6 +61,13 @@ impl Ways<'_> {
         &self.stops[node.0].stands[node.1]
     }
 
+    /// Where the way between two stops begins and ends.
+    fn terminals(&self, from: Node, to: Node) -> (Terminal, Terminal) {
+        let from = from.map_or(self.start, |a| Terminal::Pose(self.stand(a).to));
+        let to = to.map_or(self.end, |b| Terminal::Pose(self.stand(b).from));
+        (from, to)
+    }
+
     /// What the way between two stops takes at least, or takes as far as it is known; none
     /// where there is no way.
     fn cost_m(&self, from: Node, to: Node) -> Option<f64> {
@@ -68,9 +75,7 @@ impl Ways<'_> {
             return known.as_ref().map(Curve::length_m);
         }
         let radius_m = self.router.limits().turn_radius_m;
-        let from = from.map_or(self.start, |a| Terminal::Pose(self.stand(a).to));
-        let to = to.map_or(self.end, |b| Terminal::Pose(self.stand(b).from));
-        Some(match (from, to) {
+        Some(match self.terminals(from, to) {
             (Terminal::Pose(a), Terminal::Pose(b)) => dubins::length_m(a, b, radius_m),
             (a, b) => (b.position() - a.position()).norm(),
         })
@@ -93,9 +98,7 @@ impl Ways<'_> {
     }
 
     fn searched(&self, from: Node, to: Node) -> Option<Curve> {
-        let from = from.map_or(self.start, |a| Terminal::Pose(self.stand(a).to));
-        let to = to.map_or(self.end, |b| Terminal::Pose(self.stand(b).from));
-        let found = match (from, to) {
+        let found = match self.terminals(from, to) {
             (Terminal::Pose(a), Terminal::Pose(b)) => self.router.route(a, b),
             (Terminal::Pose(a), Terminal::Place(b)) => self.router.route_to_point(a, b),
             // Flown backwards from the stop: at its start a UAV may head anywhere.
@@ -144,7 +147,10 @@ impl Ways<'_> {
             let node = |i: usize| stop.map(|s| (s, i));
             let row: Vec<(f64, usize)> = (0..stands)
                 .map(|i| {
-                    let own_m = node(i).map_or(0.0, |n| self.stand(n).curve.length_m());
+                    let own_m = node(i).map_or(0.0, |n| {
+                        let stand = self.stand(n);
+                        stand.curve.length_m() + stand.dearer_m
+                    });
                     let each = before.iter().enumerate().filter_map(|(j, (from, m))| {
                         m.is_finite().then_some(())?;
                         Some((m + own_m + self.cost_m(*from, node(i))?, j))
@@ -331,11 +337,9 @@ pub fn fly_between(router: &Router, (start, end): (Terminal, Terminal), stops: &
         let way = ways.curve(from, node).cloned().unwrap_or_default();
         push(&mut flown.legs, way, false);
         if let Some(n) = node {
-            push(
-                &mut flown.legs,
-                ways.stand(n).curve.clone(),
-                stops[n.0].sees,
-            );
+            for (curve, sees) in ways.stand(n).parts() {
+                push(&mut flown.legs, curve, sees && stops[n.0].sees);
+            }
         }
         from = node;
     }

@@ -2,10 +2,16 @@
 //! course.
 
 use super::chain::{Terminal, fly_between, is_clear};
-use super::{Flown, Stand, Stop};
+use super::{Flown, Stand, Stop, length_m};
 use crate::flight::Leg;
 use skein_flight::route::Router;
 use skein_flight::trajectory::dubins;
+
+/// Stands of the first stop that are tried.
+const MOST_STANDS: usize = 4;
+
+/// A flight that ends nearer than this to where it began is closed, metres.
+const CLOSED_M: f64 = 1e-3;
 
 /// A closed flight.
 #[derive(Clone, Debug)]
@@ -18,7 +24,7 @@ pub struct Cycle {
 
 impl Cycle {
     fn length_m(&self) -> f64 {
-        self.legs.iter().map(|l| l.curve.length_m()).sum()
+        length_m(&self.legs)
     }
 }
 
@@ -48,9 +54,6 @@ pub fn fly_round(router: &Router, stops: &[Stop]) -> Option<Cycle> {
         .filter(|(c, _)| (c.left.len(), c.length_m()) < (cycle.0.left.len(), cycle.0.length_m()));
     Some(better.unwrap_or(cycle).0)
 }
-
-/// Stands of the first stop that are tried.
-const MOST_STANDS: usize = 4;
 
 /// The same order, beginning with a stop.
 fn rotated(order: &[usize], first: usize) -> Vec<usize> {
@@ -115,6 +118,3 @@ fn closed(
     let flown = order.into_iter().map(|(i, stand)| (others[i], stand));
     Some((cycle, flown.collect()))
 }
-
-/// A flight that ends nearer than this to where it began is closed, metres.
-const CLOSED_M: f64 = 1e-3;

@@ -80,6 +80,25 @@ pub fn turns(router: &Router, pose: Pose) -> bool {
     })
 }
 
+/// Parts of a run-out that are tried where it is not clear.
+const RUN_OUT_PARTS: [f64; 4] = [1.0, 0.75, 0.5, 0.25];
+
+/// How far a UAV may fly straight on, up to `most_m`, and then turn at once, metres; 0 where
+/// it cannot.
+pub fn clear_ahead_m(router: &Router, pose: Pose, most_m: f64) -> f64 {
+    let is_clear = |length_m: &f64| {
+        let out = Segment {
+            start: pose,
+            curvature_per_m: 0.0,
+            length_m: *length_m,
+        };
+        let keep_m = router.limits().clearance_m;
+        router.zones().is_segment_clear(&out, keep_m) && turns_at_once(router, out.end())
+    };
+    let mut lengths = RUN_OUT_PARTS.into_iter().map(|part| part * most_m);
+    lengths.find(is_clear).unwrap_or(0.0)
+}
+
 fn turns_at_once(router: &Router, pose: Pose) -> bool {
     let limits = router.limits();
     [1.0, -1.0].into_iter().any(|side| {

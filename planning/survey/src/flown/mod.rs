@@ -26,7 +26,7 @@ use crate::flight::Leg;
 pub use airspace::{Airspace, AirspaceError};
 pub use chain::{Node, fly, fly_to};
 pub use cycle::{Cycle, fly_round};
-pub use ends::{Fineness, turnable, turnable_by};
+pub use ends::{Fineness, clear_ahead_m, turnable, turnable_by};
 pub use polyline::stretches;
 use skein_flight::trajectory::Trajectory;
 use skein_flight::trajectory::wind::Wind;
@@ -39,6 +39,9 @@ const COURSES: u8 = 16;
 
 /// What is flown straight over a point, metres.
 const OVER_M: f64 = 1.0;
+
+/// A run-out is left out only if that is shorter by so many times its length.
+const RUN_OUT_WORTH: f64 = 20.0;
 
 /// Arcs become chords of at most this turn in a track of points, radians.
 const CHORD_RAD: f64 = FRAC_PI_2 / 6.0;
@@ -61,13 +64,23 @@ pub struct Stand {
     pub to: Pose,
     /// What lies between.
     pub curve: Curve,
+    /// What of it is not seen from at its beginning and its end, metres.
+    pub unseen_m: (f64, f64),
+    /// It is flown only if that is shorter by more than this, metres.
+    pub dearer_m: f64,
 }
 
 impl Stand {
     /// A curve as it is; `None` for one of no length.
     pub fn along(curve: Curve) -> Option<Self> {
         let (from, to) = curve.start().zip(curve.end())?;
-        Some(Self { from, to, curve })
+        Some(Self {
+            from,
+            to,
+            curve,
+            unseen_m: (0.0, 0.0),
+            dearer_m: 0.0,
+        })
     }
 
     fn reversed(&self) -> Self {
@@ -75,7 +88,28 @@ impl Stand {
             from: self.to.reversed(),
             to: self.from.reversed(),
             curve: self.curve.reversed(),
+            unseen_m: (self.unseen_m.1, self.unseen_m.0),
+            dearer_m: self.dearer_m,
         }
+    }
+
+    /// Its curve in parts, each with whether it is seen from; what is not seen from is
+    /// straight.
+    fn parts(&self) -> [(Curve, bool); 3] {
+        let (first_m, last_m) = self.unseen_m;
+        let (from, to) = (self.from, self.to);
+        let seen_from = from.position() + from.direction() * first_m;
+        let seen_to = to.position() - to.direction() * last_m;
+        let seen = if first_m + last_m > 0.0 {
+            straight(seen_from, seen_to)
+        } else {
+            self.curve.clone()
+        };
+        [
+            (straight(from.position(), seen_from), false),
+            (seen, true),
+            (straight(seen_to, to.position()), false),
+        ]
     }
 }
 
@@ -88,6 +122,28 @@ impl Stop {
             stands: vec![stand, back],
             sees: true,
         })
+    }
+
+    /// A straight line to be seen from that runs out so far at its beginning and its end;
+    /// without that where nothing else can be flown.
+    pub fn run_out((from, to): (Point, Point), unseen_m: (f64, f64)) -> Option<Self> {
+        let mut stop = Self::along(straight(from, to))?;
+        let (first_m, last_m) = unseen_m;
+        if first_m + last_m <= 0.0 {
+            return Some(stop);
+        }
+        let ahead = stop.stands[0].from.direction();
+        let longer = straight(from - ahead * first_m, to + ahead * last_m);
+        let stand = Stand {
+            unseen_m,
+            ..Stand::along(longer)?
+        };
+        for plain in &mut stop.stands {
+            plain.dearer_m = RUN_OUT_WORTH * (first_m + last_m);
+        }
+        let back = stand.reversed();
+        stop.stands.splice(0..0, [stand, back]);
+        Some(stop)
     }
 
     /// A point to be flown over straight, on any course.
@@ -135,6 +191,15 @@ impl Air {
         let faster = 1.0 + self.wind_mps.norm() / self.airspeed_mps;
         turn_radius_m * faster * faster
     }
+
+    /// How long a curve takes, seconds; infinite where the wind is too strong.
+    pub fn time_s(&self, curve: &Curve) -> f64 {
+        if self.wind_mps.norm() <= 0.0 {
+            return curve.length_m() / self.airspeed_mps;
+        }
+        let wind = Wind::new(self.wind_mps.x, self.wind_mps.y);
+        Trajectory::along(curve, self.airspeed_mps, wind).map_or(f64::INFINITY, |t| t.duration_s())
+    }
 }
 
 /// One UAV's flight over its stops.
@@ -156,19 +221,13 @@ pub struct Flown {
 impl Flown {
     /// Length over the ground, metres.
     pub fn length_m(&self) -> f64 {
-        self.legs.iter().map(|l| l.curve.length_m()).sum()
-    }
-
-    /// How long it takes at an airspeed in a wind, seconds; infinite where the wind is too
-    /// strong.
-    pub fn time_s(&self, airspeed_mps: f64, wind_mps: Vector) -> f64 {
-        time_s(&self.legs, airspeed_mps, wind_mps)
+        length_m(&self.legs)
     }
 
     /// The distance through the air while it is flown, metres: what it takes times the
     /// airspeed.
     pub fn air_m(&self, air: &Air) -> f64 {
-        self.time_s(air.airspeed_mps, air.wind_mps) * air.airspeed_mps
+        time_s(&self.legs, air) * air.airspeed_mps
     }
 
     /// Its points: the ends of all pieces, and of arcs enough that chords stand for them.
@@ -177,18 +236,17 @@ impl Flown {
     }
 }
 
-/// How long legs take at an airspeed in a wind, seconds; infinite where the wind is too
-/// strong.
-pub fn time_s(legs: &[Leg], airspeed_mps: f64, wind_mps: Vector) -> f64 {
-    if wind_mps.norm() <= 0.0 {
-        let length_m: f64 = legs.iter().map(|l| l.curve.length_m()).sum();
-        return length_m / airspeed_mps;
+/// Length of legs over the ground, metres.
+pub fn length_m(legs: &[Leg]) -> f64 {
+    legs.iter().map(|leg| leg.curve.length_m()).sum()
+}
+
+/// How long legs take, seconds; infinite where the wind is too strong.
+pub fn time_s(legs: &[Leg], air: &Air) -> f64 {
+    if air.wind_mps.norm() <= 0.0 {
+        return length_m(legs) / air.airspeed_mps;
     }
-    let wind = Wind::new(wind_mps.x, wind_mps.y);
-    let time_s = |leg: &Leg| {
-        Trajectory::along(&leg.curve, airspeed_mps, wind).map_or(f64::INFINITY, |t| t.duration_s())
-    };
-    legs.iter().map(time_s).sum()
+    legs.iter().map(|leg| air.time_s(&leg.curve)).sum()
 }
 
 /// The points of legs: the ends of all pieces, and of arcs enough that chords stand for

@@ -194,19 +194,7 @@ pub fn revisit_bound(n: u32, speeds: &[u32]) -> f64 {
 
 /// Arcs of whole units in proportion to the speeds, one after the other.
 pub fn proportional(n: u32, speeds: &[u32]) -> Vec<(u32, u32)> {
-    let sum: u64 = speeds.iter().map(|v| u64::from(*v)).sum::<u64>().max(1);
-    let mut before = 0u64;
-    let mut arcs = Vec::with_capacity(speeds.len());
-    for v in speeds {
-        let place = |flown: u64| {
-            let at = u128::from(n) * u128::from(flown) / u128::from(sum);
-            u32::try_from(at).unwrap_or(n)
-        };
-        let (from, to) = (place(before), place(before + u64::from(*v)));
-        arcs.push((from, to - from));
-        before += u64::from(*v);
-    }
-    arcs
+    equal_periods(n, 0, speeds)
 }
 
 /// How much each of the UAVs that fly round a tour of length `n` has to fall behind so

@@ -10,7 +10,7 @@ use super::{Pattern, TourError};
 use crate::area::{AreaError, Planner, Planners};
 use crate::detours::DetourError;
 use crate::flight::Leg;
-use crate::flown::AirspaceError;
+use crate::flown::{Air, AirspaceError};
 use crate::team::{self, TeamError, Uav};
 use crate::tours::{Targets, ToursError};
 use skein_flight::coverage::metric::TooWindy;
@@ -62,6 +62,15 @@ pub struct PatrolRequest {
     pub steps: usize,
     /// Who fails, if that is asked.
     pub losses: Option<Losses>,
+}
+
+impl PatrolRequest {
+    pub(super) fn air(&self, airspeed_mps: f64) -> Air {
+        Air {
+            airspeed_mps,
+            wind_mps: self.wind_mps,
+        }
+    }
 }
 
 /// UAVs that fail.

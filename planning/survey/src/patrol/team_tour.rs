@@ -4,7 +4,7 @@
 use super::team_patrol::{Over, PatrolError, PatrolRequest, TourKind};
 use crate::area::{self, AreaRequest, Lanes};
 use crate::flight::Leg;
-use crate::flown::{Air, Airspace, Stop, fly_round};
+use crate::flown::{Airspace, Stop, fly_round};
 use crate::heights::Separation;
 use crate::objective::Objective;
 use crate::team::{Sensor, Uav};
@@ -29,13 +29,8 @@ pub(super) struct Course {
 /// Ways for all of the team: turns as wide as any needs, in a wind as wide over the ground
 /// as the wind from behind makes them.
 fn router(request: &PatrolRequest, airspace: &Airspace) -> Result<Router, PatrolError> {
-    let turns = request.team.iter().map(|u| {
-        let air = Air {
-            airspeed_mps: u.speed_mps,
-            wind_mps: request.wind_mps,
-        };
-        air.ground_radius_m(u.turn_radius_m)
-    });
+    let over_ground = |u: &Uav| request.air(u.speed_mps).ground_radius_m(u.turn_radius_m);
+    let turns = request.team.iter().map(over_ground);
     for uav in &request.team {
         // What is no clearance is refused by the planners.
         if airspace.zones().distance_m(uav.start) < airspace.clearance_m() {

@@ -11,7 +11,7 @@ use super::{
     spread,
 };
 use crate::flight::Leg;
-use crate::flown::{time_s, track};
+use crate::flown::{Air, length_m, time_s, track};
 use crate::team::Uav;
 use skein_flight::coverage::metric::InWind;
 use skein_flight::trajectory::dubins;
@@ -68,9 +68,8 @@ impl<'a> Watch<'a> {
             return Err(PatrolError::UnlikeInWind);
         }
         InWind::new(&[], base_mps, wind)?;
-        let tour = Tour::new(&course.legs, |curve| {
-            air_m(request, curve.clone(), base_mps)
-        })?;
+        let air = request.air(base_mps);
+        let tour = Tour::new(&course.legs, |curve| air_m(&air, curve))?;
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -104,12 +103,14 @@ impl<'a> Watch<'a> {
         &self.request.team[uav].name
     }
 
-    fn time_s(&self, curve: &Curve, speed_mps: f64) -> f64 {
-        let leg = Leg {
-            curve: curve.clone(),
-            sees: false,
-        };
-        time_s(&[leg], speed_mps, self.request.wind_mps)
+    fn time_s(&self, curve: &Curve, airspeed_mps: f64) -> f64 {
+        self.request.air(airspeed_mps).time_s(curve)
+    }
+
+    /// What the straight way from a UAV's launch point to a place of the tour would take.
+    fn straight_s(&self, uav: usize, place: u32) -> f64 {
+        let uav = &self.request.team[uav];
+        (self.tour.point(place) - uav.start).norm() / uav.speed_mps
     }
 
     /// The way from a UAV's launch point onto the tour.
@@ -128,7 +129,7 @@ impl<'a> Watch<'a> {
     /// A turn back at the end of an arc, and what it takes; none where there is no room.
     fn turn(&self, at: Pose) -> Option<(Curve, f64)> {
         let curve = self.course.router.route(at, at.reversed()).ok()?;
-        let takes_m = air_m(self.request, curve.clone(), self.base_mps());
+        let takes_m = air_m(&self.request.air(self.base_mps()), &curve);
         Some((curve, takes_m))
     }
 
@@ -151,10 +152,7 @@ impl<'a> Watch<'a> {
             let Some(patrol) = patrol_within(n, millimetres(turn_m), &self.uavs) else {
                 return Err(self.nobody(turn_m));
             };
-            let (patrol, stations) = spread(n, &patrol, |uav, place| {
-                let uav = &self.request.team[uav];
-                (self.tour.point(place) - uav.start).norm() / uav.speed_mps
-            });
+            let (patrol, stations) = spread(n, &patrol, |uav, place| self.straight_s(uav, place));
             let Pattern::Arcs { arcs, turn } = &patrol.pattern else {
                 return Ok((patrol, stations));
             };
@@ -178,10 +176,7 @@ impl<'a> Watch<'a> {
         let patrol = patrol_within(n, u32::MAX, &self.uavs);
         let patrol = patrol.filter(|p| matches!(p.pattern, Pattern::Round { .. }));
         let patrol = patrol.ok_or(PatrolError::NoTurn)?;
-        Ok(spread(n, &patrol, |uav, place| {
-            let uav = &self.request.team[uav];
-            (self.tour.point(place) - uav.start).norm() / uav.speed_mps
-        }))
+        Ok(spread(n, &patrol, |uav, place| self.straight_s(uav, place)))
     }
 
     fn nobody(&self, turn_m: f64) -> PatrolError {
@@ -343,7 +338,7 @@ impl<'a> Watch<'a> {
             Pattern::Arcs { arcs, .. } => Some(f64::from(arcs[uav].1) / 1000.0),
         };
         flight.path = track(&first.legs, own.start);
-        flight.length_m = first.legs.iter().map(|l| l.curve.length_m()).sum();
+        flight.length_m = length_m(&first.legs);
         flight.speed_mps = first.speed_mps;
         flight.legs.clone_from(&first.legs);
         flight.station = Some(PatrolStation {
@@ -352,7 +347,7 @@ impl<'a> Watch<'a> {
             way_s: first.way_s,
             wait_s: flown.steady_s - first.way_s,
             period_s: first.period_s,
-            time_s: time_s(&first.legs, first.speed_mps, self.request.wind_mps),
+            time_s: time_s(&first.legs, &self.request.air(first.speed_mps)),
             arc_m,
         });
         flight
@@ -423,13 +418,8 @@ impl<'a> Watch<'a> {
 
 /// What a way takes through the air, metres: the mean of both directions. In a wind that is
 /// up to what vanishes on a closed flight.
-fn air_m(request: &PatrolRequest, curve: Curve, airspeed_mps: f64) -> f64 {
-    let back = curve.reversed();
-    let each = [curve, back].map(|curve| {
-        let leg = Leg { curve, sees: false };
-        time_s(&[leg], airspeed_mps, request.wind_mps)
-    });
-    (each[0] + each[1]) / 2.0 * airspeed_mps
+fn air_m(air: &Air, curve: &Curve) -> f64 {
+    (air.time_s(curve) + air.time_s(&curve.reversed())) / 2.0 * air.airspeed_mps
 }
 
 /// Whole millimetres of at least so many metres.

@@ -4,13 +4,15 @@
 //! Regions are made of *pieces*: the connected free cells of one 2×2 block, so that a
 //! loop round a region's blocks covers it without a repeat. All regions grow at once;
 //! then pieces pass across borders from regions with too much to regions with too little,
-//! and regions go to the UAVs that they suit.
+//! regions that no border can even are settled anew, and regions go to the UAVs that they
+//! suit.
 //!
-//! Left to others: which pieces may pass, the path through a region, and the
-//! balance of single cells.
+//! Left to others: which pieces may pass, which regions are settled anew, the path through
+//! a region, and the balance of single cells.
 
 mod assign;
 mod border_moves;
+mod resettle;
 
 use super::map::{Cell, LaneMap, NOWHERE, UNREACHED};
 use super::plan::Task;
@@ -106,6 +108,11 @@ impl<'a> Partition<'a> {
     /// Gives regions to the UAVs that they suit, and shakes the borders: what is shut in
     /// between others has to pass through them.
     pub(super) fn shake(&mut self) {
+        for _ in 0..ASSIGNED {
+            self.resettle();
+            self.reassign();
+            self.balance();
+        }
         let short = self.task.map.n_free() < SHORT * self.seed.len();
         for _ in 0..ASSIGNED {
             if short || !self.hopeless() {
@@ -130,6 +137,7 @@ impl<'a> Partition<'a> {
             // Half the difference at a time: the borders that move change the waste too.
             self.waste[uav] = self.waste[uav].midpoint(seen);
         }
+        self.resettle();
         self.balance();
         self.reassign();
         self.balance();
@@ -350,28 +358,37 @@ impl<'a> Partition<'a> {
                 }
             }
         }
-        // A shut-in region has neighbours all round; each pass gives what touches them.
-        while !mine.is_empty() {
-            let before = mine.len();
-            mine.retain(|piece| {
-                let to = self
-                    .near(*piece)
-                    .map(|i| self.owner[self.links[i] as usize])
-                    .filter(|o| *o != me && *o != NOBODY)
-                    .min_by_key(|o| self.load(*o as usize));
-                if let Some(to) = to {
-                    self.owner[*piece as usize] = to;
-                    self.size[to as usize] += self.cells(*piece);
-                }
-                to.is_none()
-            });
-            if mine.len() == before {
-                // Nobody else is near: the pieces are free again.
-                for piece in mine.drain(..) {
-                    self.owner[piece as usize] = NOBODY;
-                }
-            }
+        // Where nobody else is near the pieces are free again.
+        for piece in self.disperse(me, mine) {
+            self.owner[piece as usize] = NOBODY;
         }
+    }
+
+    /// Gives pieces to the neighbours that they touch, those with least to fly first, and
+    /// what these shut in then; what no neighbour can have is left.
+    fn disperse(&mut self, from: u32, mut pieces: Vec<u32>) -> Vec<u32> {
+        let mut before = usize::MAX;
+        while pieces.len() < before {
+            before = pieces.len();
+            pieces.retain(|piece| {
+                let heirs = self
+                    .near(*piece)
+                    .map(|i| self.owner[self.links[i] as usize]);
+                let heirs = heirs.filter(|o| *o != from && *o != NOBODY);
+                let Some(to) = heirs.min_by_key(|o| self.load(*o as usize)) else {
+                    return true;
+                };
+                self.owner[*piece as usize] = to;
+                let heir = to as usize;
+                self.size[heir] += self.cells(*piece);
+                let way = self.way(heir, *piece);
+                if way < self.entry[heir] {
+                    (self.entry[heir], self.seed[heir]) = (way, *piece);
+                }
+                false
+            });
+        }
+        pieces
     }
 
     /// Whether the regions are still so uneven that sweeps will not help.

@@ -42,7 +42,7 @@ const TIME_PRICE: i64 = 16;
 const EARLY: i64 = 6;
 
 /// How far behind the target it still grows: one part in so many of the target, or so
-/// many units of time. Beyond, it would buy balance with waste.
+/// many units of time, or up to the last UAV. Beyond, it would buy balance with waste.
 const LATE_PART: i64 = 12;
 const LATE_LEAST: i64 = 16;
 
@@ -132,6 +132,19 @@ impl<'a> Search<'a> {
         search
     }
 
+    /// Begins anew from other orders of the same cells; chance goes on where it was.
+    pub(super) fn restart(&mut self, orders: Vec<Vec<Cell>>) {
+        self.orders = orders;
+        for uav in 0..self.orders.len() {
+            self.index(uav, 0, self.orders[uav].len());
+            self.recount(uav);
+            for index in 0..self.orders[uav].len() {
+                self.list_border(self.orders[uav][index]);
+            }
+        }
+        self.aim();
+    }
+
     /// The orders.
     #[must_use]
     pub fn orders(&self) -> &[Vec<Cell>] {
@@ -193,7 +206,11 @@ impl<'a> Search<'a> {
         } else {
             0
         };
-        self.late = (self.target / PACE / LATE_PART).max(LATE_LEAST);
+        // Up to the last UAV: what is too much for it has to pass through others that are
+        // late as well.
+        self.late = (self.target / PACE / LATE_PART)
+            .max(LATE_LEAST)
+            .max((self.makespan() - self.target) / PACE);
     }
 
     /// Sets the greatest loss that is sometimes accepted, in thousandths of a move.

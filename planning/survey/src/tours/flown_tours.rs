@@ -113,12 +113,18 @@ impl<'a> Pilot<'a> {
         self.airspace.router(air.ground_radius_m(uav.turn_radius_m))
     }
 
+    fn air(&self, uav: &Uav) -> Air {
+        Air {
+            airspeed_mps: uav.speed_mps,
+            wind_mps: self.request.wind_mps,
+        }
+    }
+
     fn with(&self, flight: &Flight, flown: &Flown, uav: &Uav) -> Flight {
-        let time_s = flown.time_s(uav.speed_mps, self.request.wind_mps);
         Flight {
             track: flown.track(uav.start),
             legs: flown.legs.clone(),
-            length_m: time_s * uav.speed_mps,
+            length_m: flown.air_m(&self.air(uav)),
             ..flight.clone()
         }
     }

@@ -98,16 +98,11 @@ struct Tours {
 impl Tours {
     /// What they are compared by; the share is a count of lines.
     fn worth(&self, in_watt_hours: bool) -> Worth {
-        let flights = || self.flights.iter().map(|(f, _)| f);
-        let energy_wh: Option<f64> = flights().filter(|f| f.flies()).map(Flight::energy_wh).sum();
+        let flights = self.flights.iter().map(|(f, _)| f);
+        let share = -(self.unserved.len() as f64);
         Worth {
-            share: -(self.unserved.len() as f64),
-            makespan_s: flights().map(Flight::time_s).fold(0.0, f64::max),
-            total_m: flights().map(|f| f.length_m).sum(),
-            energy: match energy_wh {
-                Some(energy_wh) if in_watt_hours => energy_wh,
-                _ => flights().map(Flight::energy_s).sum(),
-            },
+            total_m: flights.clone().map(|f| f.length_m).sum(),
+            ..Worth::of(flights, share, in_watt_hours)
         }
     }
 

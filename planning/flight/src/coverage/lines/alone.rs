@@ -4,7 +4,7 @@
 //! them costs less than nothing. The exchanges of [`crate::coverage::tour`] then choose
 //! the order of the lines and the way along each at once.
 
-use super::network::{Line, Traversal};
+use super::network::{Line, Traversal, reversed};
 use crate::coverage::metric::Metric;
 use crate::coverage::tour::{self, Tour};
 
@@ -75,14 +75,7 @@ pub(super) fn improve(
         }
         ahead.push(Traversal { line, backward });
     }
-    let back: Vec<Traversal> = ahead
-        .iter()
-        .rev()
-        .map(|p| Traversal {
-            backward: !p.backward,
-            ..*p
-        })
-        .collect();
+    let back = reversed(&ahead);
     let cost = |passes: &[Traversal]| super::tour_cost(passes, lines, depot, metric);
     let found = if cost(&back) < cost(&ahead) {
         back

@@ -60,6 +60,15 @@ impl Traversal {
     }
 }
 
+/// Passes flown the other way round.
+pub(super) fn reversed(passes: &[Traversal]) -> Vec<Traversal> {
+    let turned = passes.iter().rev().map(|p| Traversal {
+        backward: !p.backward,
+        ..*p
+    });
+    turned.collect()
+}
+
 /// One UAV of the team.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Uav {

@@ -5,7 +5,7 @@
 
 use super::matching::pair_up;
 use super::moats::{self, Joining};
-use super::network::{Line, Traversal};
+use super::network::{Line, Traversal, reversed};
 use super::parts::Parts;
 use crate::coverage::metric::Metric;
 use skein_geometry::random::SplitMix64;
@@ -284,14 +284,7 @@ impl<'a, M: Metric> Graph<'a, M> {
 
     /// The walk or its reverse, whichever costs less.
     fn cheaper_way_round(&self, passes: Vec<Traversal>) -> Vec<Traversal> {
-        let turned: Vec<Traversal> = passes
-            .iter()
-            .rev()
-            .map(|p| Traversal {
-                backward: !p.backward,
-                ..*p
-            })
-            .collect();
+        let turned = reversed(&passes);
         let cost = |passes: &[Traversal]| passes.iter().map(|p| p.cost(self.lines)).sum::<f64>();
         if cost(&turned) < cost(&passes) {
             turned

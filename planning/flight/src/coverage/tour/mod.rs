@@ -1,9 +1,6 @@
 //! One closed tour through all points: the minimum spanning tree's preorder walk, then
-//! 2-opt and Or-opt (D2.7 §3.4.1, algorithm 3).
-//!
-//! Croes, "A method for solving traveling-salesman problems", 1958,
-//! <https://doi.org/10.1287/opre.6.6.791>; Or's exchange moves runs of up to three places
-//! (thesis, 1976). Prim's tree is written out: it asks a metric for n² costs and keeps n,
+//! exchanges of up to three legs (`exchange`), and kicks (`kicks`) where steps are told
+//! (D2.7 §3.4.1, algorithm 3). Prim's tree is written out: it asks a metric for n² costs and keeps n,
 //! where a graph library wants all of them as edges.
 
 mod exchange;
