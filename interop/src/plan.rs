@@ -78,6 +78,8 @@ pub struct SurveyGrid {
     pub frontal_overlap_percent: Option<f64>,
     /// How far lanes run out straight beyond the area before a turn, metres.
     pub turn_around_m: Option<f64>,
+    /// Whether pictures are taken in turns too.
+    pub pictures_in_turns: bool,
     /// What the camera is called.
     pub camera: Option<String>,
     /// Whether the camera's lens is known, so that its footprint grows with the height.
@@ -304,16 +306,15 @@ fn survey_grid(
             "HoverAndCapture",
             "HoverAndCapture is ignored: nobody hovers",
         ),
-        (
-            "CameraTriggerInTurnAround",
-            "CameraTriggerInTurnAround is ignored: turns are not seen",
-        ),
     ] {
         if let Some(flag) = transects.get(name)?
             && flag.flag()?
         {
             tell(text);
         }
+    }
+    if let Some(in_turns) = transects.get("CameraTriggerInTurnAround")? {
+        grid.pictures_in_turns = in_turns.flag()?;
     }
     if let Some(out) = transects.get("TurnAroundDistance")? {
         let out_m = out.number(0.0, LONGEST_M, "metres")?;
@@ -518,7 +519,7 @@ mod tests {
     const SURVEY: &str = r#"{"fileType":"Plan","version":1,"mission":{"version":2,"items":[
         {"type":"ComplexItem","complexItemType":"survey","version":5,"angle":-30,
          "polygon":[[47,8],[47,8.1],[47.1,8.1]],"TransectStyleComplexItem":{"version":2,
-         "TurnAroundDistance":10,"Refly90Degrees":false,"CameraCalc":{"version":2,
+         "TurnAroundDistance":10,"CameraTriggerInTurnAround":true,"Refly90Degrees":false,"CameraCalc":{"version":2,
          "AdjustedFootprintSide":40.5,"AdjustedFootprintFrontal":20,"DistanceToSurface":80,
          "DistanceMode":1,"SideOverlap":70,"FrontalOverlap":75,"CameraName":"Sony ILCE-QX1",
          "FocalLength":16}}}]},"geoFence":{"version":2},"rallyPoints":{"points":[],"version":2}}"#;
@@ -537,6 +538,7 @@ mod tests {
                 side_overlap_percent: Some(70.0),
                 frontal_overlap_percent: Some(75.0),
                 turn_around_m: Some(10.0),
+                pictures_in_turns: true,
                 camera: Some("Sony ILCE-QX1".to_owned()),
                 lens_known: true,
             }

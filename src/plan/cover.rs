@@ -163,6 +163,7 @@ pub fn run(args: &CoverArgs) -> Result<String> {
     let shown = || args.file.display().to_string();
     input.check_starts(&team).with_context(shown)?;
     input.site.trigger_m = view.trigger_m.or(view.look_ahead_m.filter(|m| *m > 0.0));
+    input.site.pictures_in_turns = view.pictures_in_turns;
     input.notices.extend(view.notices.iter().cloned());
     let sensor = sensor(args, &input)?;
     let work = Work {

@@ -184,6 +184,7 @@ fn over_area(args: &PatrolArgs) -> Result<Input> {
     site.check_zones(&team)
         .with_context(|| args.file.display().to_string())?;
     site.site.trigger_m = view.trigger_m;
+    site.site.pictures_in_turns = view.pictures_in_turns;
     Ok(Input {
         origin: site.origin,
         team,

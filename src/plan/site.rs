@@ -21,6 +21,8 @@ pub struct Site {
     pub rally: Value,
     /// Distance between two pictures, metres; by default half of what one sees along.
     pub trigger_m: Option<f64>,
+    /// Whether the camera goes on between the first pass and the last one.
+    pub pictures_in_turns: bool,
 }
 
 impl Default for Site {
@@ -33,6 +35,7 @@ impl Default for Site {
             fence: no_fence(),
             rally: no_rally(),
             trigger_m: None,
+            pictures_in_turns: false,
         }
     }
 }
@@ -53,6 +56,7 @@ impl Site {
             fence: file.fence.clone().unwrap_or_else(no_fence),
             rally: file.rally.clone().unwrap_or_else(no_rally),
             trigger_m: None,
+            pictures_in_turns: false,
         };
         // A fence of version 1 is skipped by today's QGroundControl.
         if file.fence.is_none() {

@@ -105,6 +105,7 @@ pub(super) fn mission(
         way.legs(
             flight,
             asked.trigger_m.or(site.trigger_m).or(flight.trigger_m),
+            site.pictures_in_turns,
         );
     }
     let mut items = way.items;
@@ -219,17 +220,21 @@ impl<F: Fn(Point) -> LatLon> Way<F> {
         });
     }
 
-    /// Flies all legs, with pictures along those that see.
-    fn legs(&mut self, flight: &Printed, trigger_m: Option<f64>) {
+    /// Flies all legs, with pictures along those that see, or from the first to the last of them.
+    fn legs(&mut self, flight: &Printed, trigger_m: Option<f64>, in_turns: bool) {
         let mut seeing = false;
-        let flown = flight.legs.iter().filter(|leg| !leg.curve.is_empty());
-        for leg in flown {
+        let flown = || flight.legs.iter().filter(|leg| !leg.curve.is_empty());
+        let mut left = flown().filter(|leg| leg.sees).count();
+        for leg in flown() {
+            let goes_on = in_turns && seeing && left > 0;
+            left -= usize::from(leg.sees);
             if let Some(start) = leg.curve.start() {
                 self.fly(start.position());
             }
-            if leg.sees != seeing {
-                self.trigger(trigger_m, leg.sees);
-                seeing = leg.sees;
+            let sees = leg.sees || goes_on;
+            if sees != seeing {
+                self.trigger(trigger_m, sees);
+                seeing = sees;
             }
             for piece in leg.curve.segments() {
                 for p in along(piece) {
@@ -375,6 +380,25 @@ mod tests {
         let (distance_m, end) = trigger(&site, &asked);
         assert!((distance_m - 9.0).abs() < 1e-9);
         assert!(matches!(end, Item::Land { .. }));
+    }
+
+    #[test]
+    fn pictures_go_on_in_turns_where_a_survey_asks_for_it() {
+        let triggers = |pictures_in_turns: bool| {
+            let site = Site {
+                pictures_in_turns,
+                ..Site::default()
+            };
+            let items = mission(&flight(), ORIGIN, &site, &UploadArgs::default()).items;
+            let of = |item: &Item| matches!(item, Item::Trigger { .. });
+            let first = items.iter().position(of).unwrap();
+            let last = items.iter().rposition(of).unwrap();
+            (items.iter().filter(|i| of(i)).count(), last - first)
+        };
+        let (apart, together) = (triggers(false), triggers(true));
+        assert_eq!((apart.0, together.0), (4, 2));
+        // The camera goes on and off at the same places, and only there.
+        assert_eq!(together.1, apart.1 - 2);
     }
 
     #[test]

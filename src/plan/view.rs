@@ -46,6 +46,8 @@ pub struct View {
     pub trigger_m: Option<f64>,
     /// How far lanes run out straight before a turn, metres.
     pub run_out_m: f64,
+    /// Whether pictures are taken in turns too.
+    pub pictures_in_turns: bool,
     /// Where each of these comes from, if there is a survey.
     pub notices: Vec<String>,
 }
@@ -137,6 +139,10 @@ impl View {
             }
             _ => Sensor::Swath { width_m: swath_m },
         };
+        if grid.pictures_in_turns {
+            let text = "of the survey: pictures are taken in turns too (CameraTriggerInTurnAround); what they see does not count";
+            notices.push(text.to_owned());
+        }
         if survey.is_some() {
             notices.extend(told(grid));
         }
@@ -147,6 +153,7 @@ impl View {
             course_deg,
             trigger_m,
             run_out_m,
+            pictures_in_turns: grid.pictures_in_turns,
             notices,
         })
     }
@@ -183,6 +190,7 @@ mod tests {
             side_overlap_percent: Some(70.0),
             frontal_overlap_percent: Some(75.0),
             turn_around_m: Some(25.0),
+            pictures_in_turns: true,
             camera: Some("Sony".to_owned()),
             lens_known: false,
         }
@@ -193,7 +201,7 @@ mod tests {
         let view = View::of(Flags::default(), Some(&survey())).unwrap();
         assert_eq!(view.camera, Sensor::Swath { width_m: 40.0 });
         assert_eq!((view.altitude_m, view.course_deg), (80.0, Some(30.0)));
-        assert!((view.run_out_m - 25.0).abs() < 1e-9);
+        assert!((view.run_out_m - 25.0).abs() < 1e-9 && view.pictures_in_turns);
         assert_eq!(
             (view.look_ahead_m, view.trigger_m),
             (Some(10.0), Some(20.0))
@@ -205,6 +213,7 @@ mod tests {
             "AdjustedFootprintFrontal 20 m",
             "angle 30°",
             "TurnAroundDistance 25 m; --run-out-m overrides it",
+            "pictures are taken in turns too",
             "camera \"Sony\", SideOverlap 70 %, FrontalOverlap 75 %",
         ] {
             assert!(told.contains(part), "{told}");

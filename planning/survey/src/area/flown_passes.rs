@@ -72,11 +72,32 @@ pub(super) fn fly_team(
     rounds: usize,
     run_out_m: f64,
 ) -> Result<FlownPasses, PassesError> {
+    fly_layout(
+        problem,
+        Layout::new(problem)?,
+        team,
+        airs,
+        rounds,
+        run_out_m,
+    )
+}
+
+/// The same with passes that were laid already, and such that see what these do not.
+///
+/// # Errors
+/// [`PassesError`]; nothing is planned then.
+pub(super) fn fly_layout(
+    problem: &PassesProblem,
+    layout: Layout,
+    team: &[Uav],
+    airs: &[Air],
+    rounds: usize,
+    run_out_m: f64,
+) -> Result<FlownPasses, PassesError> {
     if team.is_empty() {
         return Err(PassesError::Team(LineError::NoTeam));
     }
     let (starts, from) = launches(team)?;
-    let layout = Layout::new(problem)?;
     let router = Router::new(
         problem.zones.clone(),
         RouteLimits {

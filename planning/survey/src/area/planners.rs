@@ -3,10 +3,10 @@
 //!
 //! Leaves to [`super::lanes`] which UAVs work on which part.
 
-use super::cells::{self, CellProblem};
+use super::cells::{self, CellFlights, CellProblem};
 use super::courses::{self, Effort};
 use super::flights::{MOST_SAMPLES, Samples};
-use super::flown_passes::{fly_team, fly_within};
+use super::flown_passes::{FlownPasses, fly_layout, fly_team, fly_within};
 use super::lanes::FEW_SAMPLES;
 use super::{AreaError, AreaRequest, Facts, Planner, PlannerError, Shape, ShapeKind};
 use crate::detours::{DetourError, Detours};
@@ -15,7 +15,7 @@ use crate::flown::{Air, Airspace};
 use crate::objective::Worth;
 use crate::passes;
 use crate::team::PlannedUav;
-use skein_flight::coverage::passes::{Directions, Pass, PassesError, PassesProblem};
+use skein_flight::coverage::passes::{Directions, Layout, Pass, PassesError, PassesProblem};
 use skein_geometry::frame::Point;
 use skein_geometry::offset::Zone;
 use skein_geometry::{NoFlyZones, Polygon};
@@ -168,12 +168,30 @@ impl<'a> OpenArea<'a> {
         directions: Directions,
         effort: Effort,
     ) -> Result<Part, PlannerError> {
-        let look_ahead_m = self.request.look_ahead_m.unwrap_or(job.lane_m / 2.0);
-        let problem = PassesProblem {
+        let problem = self.passes_problem(&job, directions, effort);
+        let airs = self.airs(&job);
+        let run_out_m = self.request.run_out_m;
+        let plan = match fly_team(&problem, &crew_of(&job), &airs, effort.rounds, run_out_m) {
+            // A section that zones and holes fill is no work.
+            Err(PassesError::Nothing) if job.area != &self.request.area => {
+                return Ok(self.at_home(&job));
+            }
+            plan => plan?,
+        };
+        Ok(self.part(&job, plan, &airs))
+    }
+
+    fn passes_problem(
+        &self,
+        job: &Job<'_>,
+        directions: Directions,
+        effort: Effort,
+    ) -> PassesProblem {
+        PassesProblem {
             holes: self.request.holes.clone(),
             zones: self.airspace.zones().clone(),
             clearance_m: self.airspace.clearance_m(),
-            look_ahead_m,
+            look_ahead_m: self.look_ahead_m(job),
             steps: (job.steps / effort.steps_part).max(1),
             directions,
             ..PassesProblem::new(
@@ -182,36 +200,25 @@ impl<'a> OpenArea<'a> {
                 job.turn_radius_m,
                 Point::origin(),
             )
-        };
-        let uav = |uav: &PlannedUav| passes::Uav {
-            speed: uav.speed_mps * uav.pace,
-            // In the time of that pace, so that the length is the same.
-            endurance: uav.endurance_s / uav.pace,
-            ..passes::Uav::at(uav.start)
-        };
-        let team: Vec<passes::Uav> = job.crew.iter().map(uav).collect();
-        let airs: Vec<Air> = job
-            .crew
-            .iter()
-            .map(|uav| self.request.air(uav.speed_mps))
-            .collect();
-        let plan = match fly_team(
-            &problem,
-            &team,
-            &airs,
-            effort.rounds,
-            self.request.run_out_m,
-        ) {
-            // A section that zones and holes fill is no work.
-            Err(PassesError::Nothing) if job.area != &self.request.area => {
-                return Ok(self.at_home(&job));
-            }
-            plan => plan?,
-        };
+        }
+    }
+
+    fn look_ahead_m(&self, job: &Job<'_>) -> f64 {
+        self.request.look_ahead_m.unwrap_or(job.lane_m / 2.0)
+    }
+
+    /// By UAV: what it flies through.
+    fn airs(&self, job: &Job<'_>) -> Vec<Air> {
+        let air = |uav: &PlannedUav| self.request.air(uav.speed_mps);
+        job.crew.iter().map(air).collect()
+    }
+
+    /// A plan of passes as flights.
+    fn part(&self, job: &Job<'_>, plan: FlownPasses, airs: &[Air]) -> Part {
         let flights = job.crew.iter().enumerate().map(|(i, uav)| {
             let flown = &plan.flights[i];
             let track = flown.track(uav.start);
-            let mut flight = self.flight(uav, &job, &track, flown.air_m(&airs[i]));
+            let mut flight = self.flight(uav, job, &track, flown.air_m(&airs[i]));
             flight.lap = lap(&track, &plan.tours[i]);
             flight.passes = Some(plan.tours[i].len());
             flight.legs.clone_from(&flown.legs);
@@ -234,7 +241,7 @@ impl<'a> OpenArea<'a> {
             kind: ShapeKind::Unreached,
         });
         let shapes = shapes.chain(unreached);
-        Ok(Part {
+        Part {
             flights,
             done_share: flown_m / (flown_m + left_m).max(f64::MIN_POSITIVE),
             facts: Some(Facts::Passes {
@@ -249,19 +256,39 @@ impl<'a> OpenArea<'a> {
             seen: Seen::Passes {
                 passes,
                 across_m: job.lane_m / 2.0,
-                along_m: look_ahead_m,
+                along_m: self.look_ahead_m(job),
             },
-        })
+        }
     }
 
+    /// Cells shared out, and flown cell by cell or as the passes over them are best flown.
     fn approximate(&self, job: Job<'_>) -> Result<Part, PlannerError> {
         for uav in job.crew {
             check_start(&self.detours, &uav.name, uav.start)?;
         }
+        let cells = self.cells(&job)?;
+        let by_cell = self.cell_by_cell(&job, &cells);
+        if job.rough {
+            return Ok(by_cell);
+        }
+        let Ok(by_pass) = self.pass_by_pass(&job, &cells) else {
+            return Ok(by_cell);
+        };
+        let samples = Samples::new(job.area, |p| self.wants(p), job.lane_m, MOST_SAMPLES);
+        let worth = |part: &Part| {
+            let share = samples.share(|p| part.sees(p));
+            Worth::of(part.flights.iter(), share, job.in_watt_hours)
+        };
+        let sooner = worth(&by_pass).beats(&worth(&by_cell), self.request.objective);
+        Ok(if sooner { by_pass } else { by_cell })
+    }
+
+    /// Cells for each UAV, as many as its endurance lets it fly with all turns.
+    fn cells(&self, job: &Job<'_>) -> Result<CellFlights, PlannerError> {
         let router = self.airspace.router(job.turn_radius_m);
         let mut crew = job.crew.to_vec();
         let mut rounds = ENDURANCE_ROUNDS;
-        let plan = loop {
+        loop {
             let plan = cells::plan(&CellProblem {
                 area: job.area,
                 holes: &self.request.holes,
@@ -289,10 +316,15 @@ impl<'a> OpenArea<'a> {
                 }
             }
             if !late {
-                break plan;
+                return Ok(plan);
             }
             rounds -= 1;
-        };
+        }
+    }
+
+    /// Every UAV flies its cells in the order in which they were shared out.
+    fn cell_by_cell(&self, job: &Job<'_>, cells: &CellFlights) -> Part {
+        let router = self.airspace.router(job.turn_radius_m);
         let (mut flights, mut seen) = (Vec::new(), Vec::new());
         let (mut wanted_m, mut seen_m) = (0.0, 0.0);
         for (i, uav) in job.crew.iter().enumerate() {
@@ -301,48 +333,78 @@ impl<'a> OpenArea<'a> {
             let (flown, passes) = fly_within(
                 &router,
                 uav.start,
-                &plan.passes[i],
+                &cells.passes[i],
                 longest_m,
                 &air,
                 self.request.run_out_m,
             );
             let length_m = |p: &[Pass]| p.iter().map(|p| p.length_m() + job.lane_m).sum::<f64>();
-            wanted_m += length_m(&plan.passes[i]);
+            wanted_m += length_m(&cells.passes[i]);
             seen_m += length_m(&passes);
             flights.push(Flight {
-                lap: plan.laps[i].clone(),
+                lap: cells.laps[i].clone(),
                 passes: Some(passes.len()),
                 legs: flown.legs.clone(),
-                ..self.flight(uav, &job, &flown.track(uav.start), flown.air_m(&air))
+                ..self.flight(uav, job, &flown.track(uav.start), flown.air_m(&air))
             });
             seen.extend(passes);
         }
-        let cells = plan.raster.map.n_free();
-        let left = plan.left.iter();
-        let covered = 1.0 - plan.left.len() as f64 / cells.max(1) as f64;
-        Ok(Part {
+        let covered = 1.0 - cells.left.len() as f64 / cells.raster.map.n_free().max(1) as f64;
+        let part = Part {
             flights,
             done_share: covered * seen_m / f64::max(wanted_m, f64::MIN_POSITIVE),
-            facts: Some(Facts::Cells {
-                lower_bound_s: plan.least_s,
-                cells,
-                cells_blocked: plan.raster.n_blocked,
-                cells_left: plan.left.len(),
-                turns_fit: 2.0 * job.turn_radius_m <= job.lane_m,
-            }),
-            shapes: left
-                .map(|p| Shape {
-                    ring: square(*p, job.lane_m),
-                    kind: ShapeKind::LeftCell,
-                })
-                .collect(),
-            work: 0,
             seen: Seen::Passes {
                 passes: seen,
                 across_m: job.lane_m / 2.0,
-                along_m: self.request.look_ahead_m.unwrap_or(job.lane_m / 2.0),
+                along_m: self.look_ahead_m(job),
             },
-        })
+            ..Part::default()
+        };
+        of_cells(part, job, cells, cells.left.clone())
+    }
+
+    /// The passes over all cells, and such that see what no cell does, shared out and ordered
+    /// by what they take when they are flown.
+    fn pass_by_pass(&self, job: &Job<'_>, cells: &CellFlights) -> Result<Part, PlannerError> {
+        let effort = Effort::FULL;
+        let problem = self.passes_problem(job, Directions::Best, effort);
+        let passes = cells.passes.iter().flatten().copied().collect();
+        let layout = Layout::of_passes(&problem, passes)?;
+        let airs = self.airs(job);
+        let run_out_m = self.request.run_out_m;
+        let plan = fly_layout(
+            &problem,
+            layout,
+            &crew_of(job),
+            &airs,
+            effort.rounds,
+            run_out_m,
+        )?;
+        let part = self.part(job, plan, &airs);
+        let left = cells.left.iter().filter(|p| !part.sees(**p));
+        let left = left.copied().collect();
+        Ok(of_cells(part, job, cells, left))
+    }
+}
+
+/// A plan of cells with what is told of these: how many, and which are left.
+fn of_cells(part: Part, job: &Job<'_>, cells: &CellFlights, left: Vec<Point>) -> Part {
+    let shape = |p: &Point| Shape {
+        ring: square(*p, job.lane_m),
+        kind: ShapeKind::LeftCell,
+    };
+    let shapes = part.shapes.iter().cloned();
+    Part {
+        shapes: shapes.chain(left.iter().map(shape)).collect(),
+        facts: Some(Facts::Cells {
+            lower_bound_s: cells.least_s,
+            cells: cells.raster.map.n_free(),
+            cells_blocked: cells.raster.n_blocked,
+            cells_left: left.len(),
+            turns_fit: 2.0 * job.turn_radius_m <= job.lane_m,
+        }),
+        work: 0,
+        ..part
     }
 }
 
@@ -376,6 +438,17 @@ impl OpenArea<'_> {
             legs: Vec::new(),
         }
     }
+}
+
+/// A crew as planners of passes take it.
+fn crew_of(job: &Job<'_>) -> Vec<passes::Uav> {
+    let uav = |uav: &PlannedUav| passes::Uav {
+        speed: uav.speed_mps * uav.pace,
+        // In the time of that pace, so that the length is the same.
+        endurance: uav.endurance_s / uav.pace,
+        ..passes::Uav::at(uav.start)
+    };
+    job.crew.iter().map(uav).collect()
 }
 
 /// The zones of an area to fly round, from these starts too.

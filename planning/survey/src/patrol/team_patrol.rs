@@ -285,8 +285,9 @@ pub enum PatrolError {
 /// # Guarantees
 /// As [`crate::patrol::patrol_within`], for the tour that was found. What is flown at first, the tour and
 /// the ways there and back, are lines and arcs of the widest turn of the team that join
-/// without a bend and keep the clearance. After losses, ways and turns to new arcs are
-/// estimates. The same request gives the same plan everywhere.
+/// without a bend and keep the clearance. After losses the turns at the ends of new arcs are
+/// flown ones too, and who joins flies its way; a turn on the way to a new arc takes as long as
+/// the longest of these, and loitering any time. The same request gives the same plan everywhere.
 ///
 /// # Errors
 /// [`PatrolError`] when a figure has no meaning, there is no tour, or nobody can fly one

@@ -140,6 +140,18 @@ impl<'a> Watch<'a> {
         dubins::length_m(there, there.reversed(), radius_m)
     }
 
+    /// The longest turn back at the ends of arcs, metres; infinite where there is no room.
+    fn widest_turn_m(&self, arcs: &[(u32, u32)]) -> f64 {
+        let n = u64::from(self.tour.len_mm());
+        let ends = arcs.iter().filter(|a| a.1 > 0).flat_map(|(from, len)| {
+            let on = |at: u64| self.tour.pose(u32::try_from(at % n).unwrap_or(0));
+            let end = on(u64::from(*from) + u64::from(*len));
+            [end, on(u64::from(*from)).reversed()]
+        });
+        let turns = ends.map(|end| self.turn(end).map_or(f64::INFINITY, |t| t.1));
+        turns.fold(0.0, f64::max)
+    }
+
     fn base_mps(&self) -> f64 {
         self.request.team.first().map_or(0.0, |u| u.speed_mps)
     }
@@ -156,16 +168,7 @@ impl<'a> Watch<'a> {
             let Pattern::Arcs { arcs, turn } = &patrol.pattern else {
                 return Ok((patrol, stations));
             };
-            let ends = arcs.iter().filter(|a| a.1 > 0).flat_map(|(from, len)| {
-                let on = |at: u64| {
-                    self.tour
-                        .pose(u32::try_from(at % u64::from(n)).unwrap_or(0))
-                };
-                let end = on(u64::from(*from) + u64::from(*len));
-                [end, on(u64::from(*from)).reversed()]
-            });
-            let turns = ends.map(|end| self.turn(end).map_or(f64::INFINITY, |t| t.1));
-            turn_m = turns.fold(0.0, f64::max);
+            turn_m = self.widest_turn_m(arcs);
             if millimetres(turn_m) <= *turn {
                 return Ok((patrol, stations));
             }
@@ -361,14 +364,7 @@ impl<'a> Watch<'a> {
         };
         let lost: Vec<usize> = losses.names.iter().map(named).collect::<Result<_, _>>()?;
         let n = self.tour.len_mm();
-        let turn = match flown.patrol.pattern {
-            Pattern::Arcs { turn, .. } => turn,
-            Pattern::Round { .. } => millimetres(self.free_turn_m()),
-        };
-        let before = flown.patrol.courses(&self.speeds, &flown.stations);
-        let joins = |uav: usize| self.nearest[uav];
-        let change = after_losses(n, turn, &self.uavs, &before, losses.after_s, &lost, joins)
-            .ok_or(PatrolError::NobodyLeft)?;
+        let change = self.change(losses.after_s, &lost, flown)?;
         let left: Vec<u32> = (0..self.speeds.len())
             .map(|i| if lost.contains(&i) { 0 } else { self.speeds[i] })
             .collect();
@@ -383,6 +379,37 @@ impl<'a> Watch<'a> {
             gap_s: change.gap_s,
             uavs: uavs.map(|uav| self.goes_on(flown, &change, uav)).collect(),
         })
+    }
+
+    /// What follows a failure; with the turns at the ends of arcs as long as they are.
+    fn change(&self, t_s: f64, lost: &[usize], flown: &Flown) -> Result<Change, PatrolError> {
+        let n = self.tour.len_mm();
+        let before = flown.patrol.courses(&self.speeds, &flown.stations);
+        let joins = |uav: usize| self.nearest[uav];
+        let turned = |turn| after_losses(n, turn, &self.uavs, &before, t_s, lost, joins);
+        let mut turn = match flown.patrol.pattern {
+            Pattern::Arcs { turn, .. } => turn,
+            Pattern::Round { .. } => millimetres(self.free_turn_m()),
+        };
+        for _ in 0..TURN_ROUNDS {
+            let change = turned(turn).ok_or(PatrolError::NobodyLeft)?;
+            let Pattern::Arcs { arcs, .. } = &change.patrol.pattern else {
+                return Ok(change);
+            };
+            let turn_m = self.widest_turn_m(arcs);
+            if millimetres(turn_m) <= turn {
+                return Ok(change);
+            }
+            if turn_m.is_infinite() {
+                break;
+            }
+            turn = millimetres(turn_m);
+        }
+        let change = turned(u32::MAX).ok_or(PatrolError::NobodyLeft)?;
+        match change.patrol.pattern {
+            Pattern::Round { .. } => Ok(change),
+            Pattern::Arcs { .. } => Err(PatrolError::NoTurn),
+        }
     }
 
     /// What one of those who are left does.

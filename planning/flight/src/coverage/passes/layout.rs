@@ -275,6 +275,22 @@ impl Layout {
             offer(Draft::by_cell(covered, &measures));
         }
         let draft = best.map(|b| b.1).unwrap_or_default();
+        if draft.passes.is_empty() {
+            return Err(PassesError::Nothing);
+        }
+        Self::assemble(draft, grown(problem, 0.0)?)
+    }
+
+    /// Passes that were laid in another way, among the same zones.
+    ///
+    /// # Errors
+    /// [`PassesError`], as for passes that are laid here; there may be none.
+    pub fn of_passes(problem: &PassesProblem, passes: Vec<Pass>) -> Result<Self, PassesError> {
+        problem.check()?;
+        let draft = Draft {
+            passes,
+            ..Draft::default()
+        };
         Self::assemble(draft, grown(problem, 0.0)?)
     }
 
@@ -284,9 +300,6 @@ impl Layout {
             cells,
             extra,
         } = draft;
-        if passes.is_empty() {
-            return Err(PassesError::Nothing);
-        }
         if passes.len() > MOST_PASSES {
             return Err(PassesError::TooMany);
         }
