@@ -36,9 +36,10 @@ const ASIDE: usize = 2;
 const IN_FULL: usize = 8;
 
 /// What a search may take, in the unit of [`Part::work`]: as much as so many plans, but at
-/// least and at most this, which is some seconds of two processors; in proportion to the steps of improvement.
+/// least and at most this, which is 2 to 9 seconds of two processors; in proportion to the steps
+/// of improvement.
 const WORK_PLANS: u64 = 24;
-const WORK: (u64, u64) = (150_000_000, 750_000_000);
+const WORK: (u64, u64) = (150_000_000, 600_000_000);
 
 /// Plans that are made at once.
 const BATCH: usize = 4;

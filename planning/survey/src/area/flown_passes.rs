@@ -35,8 +35,8 @@ const SAMPLES_WORK: u64 = 5_000;
 /// What is looked at for the order of each pair of passes.
 const PAIR_WORK: usize = 10;
 
-/// What is looked at in a step of improvement.
-const STEP_WORK: u64 = 300;
+/// What is looked at in a step of improvement for each pass.
+const STEP_WORK: usize = 5;
 
 /// Times that a shorter endurance is planned for where turns take what was left.
 const ENDURANCE_ROUNDS: usize = 3;
@@ -154,7 +154,7 @@ pub(super) fn fly_layout(
     found.work = (WAY_WORK * found.work + (pass_work * tried) as u64 + SAMPLES_WORK)
         .saturating_mul(edges as u64)
         .saturating_add((PAIR_WORK * pairs) as u64)
-        .saturating_add(STEP_WORK * (problem.steps * rounds) as u64);
+        .saturating_add((STEP_WORK * passes.len()) as u64 * (problem.steps * rounds) as u64);
     found.unreached.extend(unreached);
     found.cells = layout.cells;
     Ok(found)

@@ -18,7 +18,7 @@ struct Ends<'a, M> {
 }
 
 /// Steps for each line at most: a tour of few lines is as good as it gets after that.
-const MOST_STEPS_A_LINE: usize = 50;
+const MOST_STEPS_A_LINE: usize = 100;
 
 /// No line: the depot.
 const NONE: usize = usize::MAX;

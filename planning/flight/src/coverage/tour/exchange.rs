@@ -97,11 +97,13 @@ impl<'a, M: Metric> Exchange<'a, M> {
             .cost(self.names[a as usize], self.names[b as usize])
     }
 
-    /// The mean cost of the legs that may be given up.
-    pub(super) fn mean_leg(&self) -> f64 {
+    /// The mean cost of the legs that may be given up, and whether there are others.
+    pub(super) fn mean_leg(&self) -> (f64, bool) {
         let n = self.len();
         let legs = (0..n).map(|i| self.cost(self.order[i], self.order[(i + 1) % n]));
-        legs.map(|c| c.max(0.0)).sum::<f64>() / n as f64
+        let free: Vec<f64> = legs.filter(|c| *c >= 0.0).collect();
+        let mean = free.iter().sum::<f64>() / free.len().max(1) as f64;
+        (mean, free.len() < n)
     }
 
     /// The nodes in the order of the tour.

@@ -18,9 +18,11 @@ const KICKS_A_STEP: usize = 10;
 /// The longest run of places that a kick moves.
 const LONGEST_RUN: usize = 30;
 
-/// Losses that are kept at first and at last, in mean legs.
-const WARM: f64 = 0.1;
-const COLD: f64 = 0.02;
+/// Losses that are kept at first and at last, in mean legs that may be given up.
+const HEATS: (f64, f64) = (0.1, 0.02);
+
+/// The same where some legs stay: what lies between these is harder to turn.
+const HEATS_OF_LINES: (f64, f64) = (2.0, 0.05);
 
 /// Tours of fewer places have no room for two runs and what is around them.
 const FEWEST: usize = 8;
@@ -42,8 +44,10 @@ pub(super) fn search<M: Metric>(tour: &mut Exchange<'_, M>, steps: usize) -> Vec
         return best;
     }
     let mut random = SplitMix64::new(n as u64);
-    let cooling = math::exp(math::ln(COLD / WARM) / kicks as f64);
-    let mut heat = WARM * tour.mean_leg();
+    let (mean_leg, some_stay) = tour.mean_leg();
+    let (warm, cold) = if some_stay { HEATS_OF_LINES } else { HEATS };
+    let cooling = math::exp(math::ln(cold / warm) / kicks as f64);
+    let mut heat = warm * mean_leg;
     // What the tour is longer by than the best one.
     let mut excess = 0.0;
     for _ in 0..kicks {
