@@ -103,6 +103,10 @@ pub struct CoverArgs {
     /// passes: without `--approximate` only these are planned then.
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     pub course_deg: Option<f64>,
+    /// Plans every course of the search in full: no course that `--course-deg` can ask for in
+    /// steps of 5 degrees is sooner then. Takes some ten times as long.
+    #[arg(long, conflicts_with = "course_deg")]
+    pub every_course: bool,
     /// How far each pass runs out straight beyond both ends before a turn, where that is clear,
     /// metres; by default what the file's survey says, else 0.
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
@@ -186,6 +190,7 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         clearance_m: args.clearance_m,
         look_ahead_m: view.look_ahead_m,
         heading_rad: view.course_deg.map(|course| (90.0 - course).to_radians()),
+        every_course: args.every_course,
         run_out_m: view.run_out_m,
         wind_mps: args.wind.velocity(),
         planners,

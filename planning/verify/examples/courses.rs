@@ -2,7 +2,7 @@
 //! on those without zones and fences, a lawnmower: all lanes of a course to and fro, cut at equal
 //! times.
 //!
-//! `cargo run --release -p skein-verify --example courses -- 30600..30616 [UAVs]`
+//! `cargo run --release -p skein-verify --example courses -- 30600..30616 [UAVs] [every]`
 
 #[path = "generated/planned.rs"]
 #[allow(dead_code, reason = "plans are only compared here")]
@@ -123,6 +123,7 @@ fn main() -> ExitCode {
         eprintln!("use: courses FROM..TO [UAVS]");
         return ExitCode::from(2);
     };
+    let every = args.get(2).is_some_and(|a| a == "every");
     let (mut open_sites, mut sooner) = (0, 0.0_f64);
     let (mut compared, mut beaten, mut worst, mut slowest_s) = (0, 0, 0.0_f64, 0.0_f64);
     for seed in seeds {
@@ -133,6 +134,7 @@ fn main() -> ExitCode {
         };
         let free = AreaRequest {
             steps: DEFAULT_STEPS,
+            every_course: every,
             ..request
         };
         let began = Instant::now();

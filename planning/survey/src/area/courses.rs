@@ -172,15 +172,28 @@ where
     }
 }
 
+/// What is asked of the search.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asked {
+    /// What is to be least.
+    pub objective: Objective,
+    /// Steps of improvement.
+    pub steps: usize,
+    /// Whether every course is planned in full.
+    pub every: bool,
+}
+
 /// The best plan that was found on any course, with so many steps of improvement; `fly` plans
 /// on one.
+///
+/// # Guarantees
+/// Where every course is asked for, none of them sees more, or as much for less.
 ///
 /// # Errors
 /// When there is no plan on the course that is guessed to be the shortest.
 pub(super) fn best(
     area: &Polygon,
-    objective: Objective,
-    steps: usize,
+    asked: Asked,
     fly: impl Fn(Directions, Effort) -> Result<Part, PlannerError> + Sync,
     worth: impl Fn(&Part, Effort) -> Worth + Sync,
 ) -> Result<Part, PlannerError> {
@@ -192,7 +205,7 @@ pub(super) fn best(
         .work
         .saturating_mul(WORK_PLANS)
         .clamp(WORK.0, WORK.1)
-        .saturating_mul(steps as u64)
+        .saturating_mul(asked.steps as u64)
         / DEFAULT_STEPS as u64;
     let first = Tried {
         directions: Directions::Best,
@@ -200,11 +213,18 @@ pub(super) fn best(
         part: guessed,
     };
     let mut search = Search {
-        objective,
+        objective: asked.objective,
         fly,
         worth,
         left: left.saturating_sub(first.part.work),
     };
+    if asked.every {
+        search.left = u64::MAX;
+        let mut found = search.tried(&courses(area), Effort::FULL, 0);
+        found.push(first);
+        let best = search.best_first(found).into_iter().next();
+        return Ok(best.map(|t| t.part).unwrap_or_default());
+    }
     // What is left for the better ones, and of that for full plans.
     let (longer_left, full_left) = (left / 2, left / 3);
     let quick = search.tried(&courses(area), Effort::QUICK, longer_left);

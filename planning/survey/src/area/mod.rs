@@ -75,6 +75,9 @@ pub struct AreaRequest {
     /// Heading of all exact passes, radians counter-clockwise from east; `None` for the
     /// best found by plans on courses all round.
     pub heading_rad: Option<f64>,
+    /// Whether every course of the search is planned in full, not only those that promise
+    /// most when they are planned quickly.
+    pub every_course: bool,
     /// How far each pass runs out straight beyond both ends before a turn, where that is
     /// clear, metres: cameras and autopilots settle there.
     pub run_out_m: f64,
@@ -109,6 +112,7 @@ impl AreaRequest {
             clearance_m,
             look_ahead_m: None,
             heading_rad: None,
+            every_course: false,
             run_out_m: 0.0,
             wind_mps: Vector::zeros(),
             planners: Planners::Both,

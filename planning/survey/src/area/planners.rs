@@ -159,7 +159,12 @@ impl<'a> OpenArea<'a> {
             let share = samples.share(|p| part.sees(p));
             Worth::of(part.flights.iter(), share, job.in_watt_hours)
         };
-        courses::best(job.area, self.request.objective, job.steps, fly, worth)
+        let asked = courses::Asked {
+            objective: self.request.objective,
+            steps: job.steps,
+            every: self.request.every_course,
+        };
+        courses::best(job.area, asked, fly, worth)
     }
 
     fn exact(

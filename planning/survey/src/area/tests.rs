@@ -3,6 +3,7 @@
 use super::*;
 use crate::flight::Leg;
 use crate::team::Sensor;
+use core::f64::consts::PI;
 use proptest::prelude::*;
 
 fn polygon(corners: &[(f64, f64)]) -> Polygon {
@@ -362,6 +363,31 @@ fn no_course_that_is_asked_for_is_flown_sooner() {
         let sees_as_much = own.covered_share >= found.covered_share;
         assert!(
             !sees_as_much || found.makespan_s <= 1.005 * own.makespan_s,
+            "{i}: {own:?} {found:?}"
+        );
+    }
+}
+
+#[test]
+fn when_every_course_is_planned_none_is_better() {
+    let area = polygon(&[(0.0, 0.0), (420.0, 60.0), (380.0, 260.0), (-40.0, 200.0)]);
+    let needle = |x: f64| polygon(&[(x, 60.0), (x + 4.0, 60.0), (x + 30.0, 170.0)]);
+    let team = ["a", "b"].map(|name| uav(name, swath(45.0)));
+    let free = AreaRequest {
+        zones: Arc::new(NoFlyZones::new(vec![needle(120.0), needle(230.0)])),
+        every_course: true,
+        steps: 200,
+        ..request(area, &team, Planner::Exact)
+    };
+    let found = planned(&free).figures;
+    for i in 0..36 {
+        let asked = AreaRequest {
+            heading_rad: Some(PI * f64::from(i) / 36.0),
+            ..free.clone()
+        };
+        let own = planned(&asked).figures;
+        assert!(
+            own.covered_share < found.covered_share || own.makespan_s >= found.makespan_s,
             "{i}: {own:?} {found:?}"
         );
     }
