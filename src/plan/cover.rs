@@ -105,7 +105,7 @@ pub struct CoverArgs {
     pub course_deg: Option<f64>,
     /// Plans every course of the search in full: no course that `--course-deg` can ask for in
     /// steps of 5 degrees is sooner then. Takes some ten times as long.
-    #[arg(long, conflicts_with = "course_deg")]
+    #[arg(long, conflicts_with_all = ["course_deg", "approximate"])]
     pub every_course: bool,
     /// How far each pass runs out straight beyond both ends before a turn, where that is clear,
     /// metres; by default what the file's survey says, else 0.
@@ -157,7 +157,12 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         zones: args.zones.as_deref(),
     };
     let mut input = area_input::read(&args.file, asked)?;
-    let view = View::of(flags(args), input.survey.as_ref())?;
+    let mut view = View::of(flags(args), input.survey.as_ref())?;
+    if args.every_course && view.course_deg.take().is_some() {
+        view.notices.retain(|n| !n.contains("--course-deg"));
+        let text = "the survey's angle is not used: --every-course";
+        view.notices.push(text.to_owned());
+    }
     args.output.check_altitude(view.altitude_m)?;
     let defaults = team_input::Defaults {
         camera: view.camera,

@@ -205,6 +205,16 @@ fn a_survey_is_flown_as_it_asks_and_its_files_keep_what_it_holds() {
             .contains("--swath-m 90 m instead of the survey's 70 m")
     );
 
+    let time_s = |told: &Value| told["makespan_s"].as_f64().unwrap();
+    let asked = dir.plan(SURVEY, &["--exact"]).unwrap();
+    let best = dir.plan(SURVEY, &["--exact", "--every-course"]).unwrap();
+    assert!(time_s(&best) <= time_s(&asked), "{asked} {best}");
+    let notices = best["notices"].to_string();
+    assert!(
+        notices.contains("angle is not used") && !notices.contains("--course-deg"),
+        "{notices}"
+    );
+
     let out = dir.0.join("plans").display().to_string();
     let zone = square(8.5425, 47.4025, 8.5435, 47.4035);
     let zone = dir.file("zone.geojson", &zone);
