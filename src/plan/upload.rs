@@ -16,6 +16,9 @@ use skein_interop::place::{LatLon, from_plane, to_plane};
 /// Points nearer to each other than this are one, metres.
 const COINCIDENT_M: f64 = 1e-3;
 
+/// A first waypoint nearer to home than this is left out: a take-off leads somewhere, metres.
+const OVER_HOME_M: f64 = 2.0;
+
 /// The most that an arc turns between two waypoints, radians: its chord is within 3.4 % of
 /// the radius then.
 const MOST_TURN_RAD: f64 = PI / 6.0;
@@ -209,7 +212,13 @@ struct Way<F> {
 impl<F: Fn(Point) -> LatLon> Way<F> {
     /// Flies to a point, unless it is there.
     fn fly(&mut self, p: Point) {
-        if (p - self.last).norm() < COINCIDENT_M {
+        let of_way = |item: &Item| matches!(item, Item::Waypoint { .. });
+        let there_m = if self.items.iter().any(of_way) {
+            COINCIDENT_M
+        } else {
+            OVER_HOME_M
+        };
+        if (p - self.last).norm() < there_m {
             return;
         }
         self.last = p;
@@ -399,6 +408,27 @@ mod tests {
         assert_eq!((apart.0, together.0), (4, 2));
         // The camera goes on and off at the same places, and only there.
         assert_eq!(together.1, apart.1 - 2);
+    }
+
+    #[test]
+    fn a_take_off_leads_away_from_home() {
+        let mut near = flight();
+        let start = Pose::new(Point::origin(), 0.0);
+        let (first, rest) = (
+            Curve::from_pieces(start, &[(0.0, 0.5)]),
+            near.legs.remove(0),
+        );
+        let then = Curve::from_pieces(first.end().unwrap(), &[(0.0, 99.5)]);
+        let leg = |curve| Leg { curve, sees: false };
+        near.legs.splice(0..0, [leg(first), leg(then)]);
+        let items = |flight: &Printed| {
+            mission(flight, ORIGIN, &Site::default(), &UploadArgs::default()).items
+        };
+        assert_eq!(items(&near).len(), items(&flight()).len(), "{rest:?}");
+        let Item::Takeoff { at, .. } = items(&near)[0] else {
+            panic!("no take-off");
+        };
+        assert!((at.lon_deg - ORIGIN.lon_deg).abs() > 1e-4, "{at:?}");
     }
 
     #[test]
