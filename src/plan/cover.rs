@@ -103,8 +103,9 @@ pub struct CoverArgs {
     /// passes: without `--approximate` only these are planned then.
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     pub course_deg: Option<f64>,
-    /// Plans every course of the search in full: no course that `--course-deg` can ask for in
-    /// steps of 5 degrees is sooner then. Takes some ten times as long.
+    /// Plans every course of the search in full, so that none that `--course-deg` can ask for in
+    /// steps of 5 degrees is sooner, also where that takes longer than a minute; where it does
+    /// not, that is done anyway.
     #[arg(long, conflicts_with_all = ["course_deg", "approximate"])]
     pub every_course: bool,
     /// How far each pass runs out straight beyond both ends before a turn, where that is clear,

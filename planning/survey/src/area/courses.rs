@@ -3,7 +3,8 @@
 //! Lengths of passes and a guess for each turn say little of a plan where turns are wide,
 //! zones stand close or several UAVs share the work. So every course is flown quickly, those
 //! that promise most with more steps and with their lanes moved aside, and the best of these
-//! as thoroughly as any plan. Leaves to [`super::planners`] the flights on a course.
+//! as thoroughly as any plan. Where that is not too much work, all of them are planned as
+//! thoroughly at once. Leaves to [`super::planners`] the flights on a course.
 
 use super::planners::Part;
 use super::{DEFAULT_STEPS, PlannerError};
@@ -32,6 +33,9 @@ const LONGER: usize = 16;
 /// Courses of these whose lanes are moved aside.
 const ASIDE: usize = 2;
 
+/// The same where every course is planned in full.
+const ASIDE_IN_FULL: usize = 3;
+
 /// Plans that are made in full beside the guessed one, as long as there is work left.
 const IN_FULL: usize = 8;
 
@@ -40,6 +44,10 @@ const IN_FULL: usize = 8;
 /// of improvement.
 const WORK_PLANS: u64 = 24;
 const WORK: (u64, u64) = (150_000_000, 600_000_000);
+
+/// What planning every course in full may take unless it is asked for, in the same unit and
+/// proportion: some 40 seconds of two processors, which few areas need.
+const EVERY_WORK: u64 = 2_400_000_000;
 
 /// Plans that are made at once.
 const BATCH: usize = 4;
@@ -92,6 +100,8 @@ struct Search<F, W> {
     worth: W,
     /// What may still be done.
     left: u64,
+    /// Courses that were planned in full.
+    in_full: Vec<Directions>,
 }
 
 impl<F, W> Search<F, W>
@@ -129,9 +139,37 @@ where
             });
             let work: u64 = flown.iter().map(|t| t.part.work).sum();
             self.left = self.left.saturating_sub(work);
+            if effort.is_full() {
+                self.in_full.extend_from_slice(batch);
+            }
             all.extend(flown);
         }
         all
+    }
+
+    /// Plans in full on every course, and on the best of them with lanes moved aside.
+    fn all_in_full(&mut self, courses: &[Directions]) -> Vec<Tried> {
+        let found = self.tried(courses, Effort::FULL, 0);
+        let mut found = self.best_first(found);
+        let best = found.iter().take(ASIDE_IN_FULL);
+        let moved: Vec<Directions> = best.flat_map(|t| aside(t.directions)).collect();
+        found.extend(self.tried(&moved, Effort::FULL, 0));
+        found
+    }
+
+    /// Plans in full on the courses that promise most.
+    fn best_in_full(&mut self, courses: &[Directions]) -> Vec<Tried> {
+        // What is left for the better ones, and of that for full plans.
+        let (longer_left, full_left) = (self.left / 2, self.left / 3);
+        let quick = self.tried(courses, Effort::QUICK, longer_left);
+        let quick = self.promising_first(quick);
+        let longer = self.tried(&promising(&quick), Effort::LONGER, full_left);
+        let promising = match self.promising_first(longer) {
+            none if none.is_empty() => quick,
+            longer => longer,
+        };
+        let in_full: Vec<Directions> = promising.iter().map(|t| t.directions).collect();
+        self.tried(&in_full[..in_full.len().min(IN_FULL)], Effort::FULL, 0)
     }
 
     /// Those that see as much as any first, the best of them before others; then those that
@@ -179,15 +217,23 @@ pub(super) struct Asked {
     pub objective: Objective,
     /// Steps of improvement.
     pub steps: usize,
-    /// Whether every course is planned in full.
+    /// Whether every course is planned in full, whatever it takes.
     pub every: bool,
+}
+
+/// The best plan, and how thoroughly it was searched for.
+#[derive(Default)]
+pub(super) struct Best {
+    pub part: Part,
+    /// Courses that were not planned in full, because that would have taken too long.
+    pub courses_left: usize,
 }
 
 /// The best plan that was found on any course, with so many steps of improvement; `fly` plans
 /// on one.
 ///
 /// # Guarantees
-/// Where every course is asked for, none of them sees more, or as much for less.
+/// Where no courses are left, none sees more, or as much for less.
 ///
 /// # Errors
 /// When there is no plan on the course that is guessed to be the shortest.
@@ -196,50 +242,48 @@ pub(super) fn best(
     asked: Asked,
     fly: impl Fn(Directions, Effort) -> Result<Part, PlannerError> + Sync,
     worth: impl Fn(&Part, Effort) -> Worth + Sync,
-) -> Result<Part, PlannerError> {
+) -> Result<Best, PlannerError> {
     let guessed = fly(Directions::Best, Effort::FULL)?;
     if guessed.work == 0 {
-        return Ok(guessed);
+        return Ok(Best {
+            part: guessed,
+            courses_left: 0,
+        });
     }
-    let left = guessed
-        .work
-        .saturating_mul(WORK_PLANS)
-        .clamp(WORK.0, WORK.1)
-        .saturating_mul(asked.steps as u64)
-        / DEFAULT_STEPS as u64;
+    let by_steps = |work: u64| work.saturating_mul(asked.steps as u64) / DEFAULT_STEPS as u64;
+    let a_plan = guessed.work;
     let first = Tried {
         directions: Directions::Best,
         worth: worth(&guessed, Effort::FULL),
         part: guessed,
     };
+    let all = courses(area);
     let mut search = Search {
         objective: asked.objective,
         fly,
         worth,
-        left: left.saturating_sub(first.part.work),
+        left: 0,
+        in_full: Vec::new(),
     };
-    if asked.every {
+    let mut found = if asked.every {
         search.left = u64::MAX;
-        let mut found = search.tried(&courses(area), Effort::FULL, 0);
-        found.push(first);
-        let best = search.best_first(found).into_iter().next();
-        return Ok(best.map(|t| t.part).unwrap_or_default());
-    }
-    // What is left for the better ones, and of that for full plans.
-    let (longer_left, full_left) = (left / 2, left / 3);
-    let quick = search.tried(&courses(area), Effort::QUICK, longer_left);
-    let quick = search.promising_first(quick);
-    let longer = search.tried(&promising(&quick), Effort::LONGER, full_left);
-    let promising = match search.promising_first(longer) {
-        none if none.is_empty() => quick,
-        longer => longer,
+        search.all_in_full(&all)
+    } else if a_plan.saturating_mul(all.len() as u64) <= by_steps(EVERY_WORK) {
+        search.left = by_steps(EVERY_WORK);
+        search.all_in_full(&all)
+    } else {
+        let most = a_plan.saturating_mul(WORK_PLANS).clamp(WORK.0, WORK.1);
+        search.left = by_steps(most).saturating_sub(a_plan);
+        search.best_in_full(&all)
     };
-    let in_full: Vec<Directions> = promising.iter().map(|t| t.directions).collect();
-    let in_full = &in_full[..in_full.len().min(IN_FULL)];
-    let mut found = search.tried(in_full, Effort::FULL, 0);
     found.push(first);
+    let left = all.iter().filter(|d| !search.in_full.contains(d));
+    let courses_left = left.count();
     let best = search.best_first(found).into_iter().next();
-    Ok(best.map(|t| t.part).unwrap_or_default())
+    Ok(Best {
+        part: best.map(|t| t.part).unwrap_or_default(),
+        courses_left,
+    })
 }
 
 /// The courses that are flown with more steps, and those of them with lanes moved aside.
@@ -247,14 +291,20 @@ fn promising(quick: &[Tried]) -> Vec<Directions> {
     let mut all = Vec::new();
     for (i, t) in quick.iter().take(LONGER).enumerate() {
         all.push(t.directions);
-        if let Directions::Fixed(heading_rad) = t.directions
-            && i < ASIDE
-        {
-            let aside = |shift| Directions::Shifted { heading_rad, shift };
-            all.extend(SHIFTS.into_iter().map(aside));
+        if i < ASIDE {
+            all.extend(aside(t.directions));
         }
     }
     all
+}
+
+/// A course with its lanes moved aside; nothing where every cell has its own.
+fn aside(directions: Directions) -> Vec<Directions> {
+    let Directions::Fixed(heading_rad) = directions else {
+        return Vec::new();
+    };
+    let shifted = |shift| Directions::Shifted { heading_rad, shift };
+    SHIFTS.into_iter().map(shifted).collect()
 }
 
 /// The angle between two courses that may be flown either way, radians.

@@ -41,6 +41,8 @@ pub(crate) struct Flights {
     pub facts: Option<Facts>,
     /// Rings for a map.
     pub shapes: Vec<Shape>,
+    /// Courses that would have taken too long to plan in full.
+    pub courses_left: usize,
 }
 
 impl Flights {

@@ -198,6 +198,7 @@ impl Desk<'_> {
         let samples = Samples::new(&self.ground.request.area, wanted, lane_m, most);
         let share = samples.share(sees);
         let near = samples.share(|p| self.ground.is_too_near(p) && !sees(p));
+        let courses_left = parts.iter().map(|p| p.courses_left).max().unwrap_or(0);
         let mut facts: Option<Facts> = None;
         let (mut flights, mut shapes): (Vec<Flight>, Vec<_>) = (Vec::new(), Vec::new());
         for part in parts {
@@ -221,6 +222,7 @@ impl Desk<'_> {
             too_near_share: near,
             facts,
             shapes,
+            courses_left,
         }
     }
 }

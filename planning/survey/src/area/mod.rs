@@ -75,8 +75,8 @@ pub struct AreaRequest {
     /// Heading of all exact passes, radians counter-clockwise from east; `None` for the
     /// best found by plans on courses all round.
     pub heading_rad: Option<f64>,
-    /// Whether every course of the search is planned in full, not only those that promise
-    /// most when they are planned quickly.
+    /// Whether every course of the search is planned in full also where that takes long, and
+    /// not only those that promise most when they are planned quickly.
     pub every_course: bool,
     /// How far each pass runs out straight beyond both ends before a turn, where that is
     /// clear, metres: cameras and autopilots settle there.
@@ -547,6 +547,12 @@ impl Job<'_> {
         }
         let mut notices = chosen.refused;
         notices.extend(unseen(&best));
+        if best.courses_left > 0 {
+            notices.push(format!(
+                "{} courses were only looked at, not planned in full: that would take long",
+                best.courses_left
+            ));
+        }
         Ok(AreaPlan {
             uavs,
             figures,

@@ -67,6 +67,8 @@ pub(crate) struct Part {
     pub shapes: Vec<Shape>,
     /// What it took to plan, about, in edges that were looked at; 0 if nobody counted.
     pub work: u64,
+    /// Courses that would have taken too long to plan in full.
+    pub courses_left: usize,
     seen: Seen,
 }
 
@@ -164,7 +166,11 @@ impl<'a> OpenArea<'a> {
             steps: job.steps,
             every: self.request.every_course,
         };
-        courses::best(job.area, asked, fly, worth)
+        let best = courses::best(job.area, asked, fly, worth)?;
+        Ok(Part {
+            courses_left: best.courses_left,
+            ..best.part
+        })
     }
 
     fn exact(
@@ -258,6 +264,7 @@ impl<'a> OpenArea<'a> {
             }),
             shapes: shapes.collect(),
             work: plan.work,
+            courses_left: 0,
             seen: Seen::Passes {
                 passes,
                 across_m: job.lane_m / 2.0,
