@@ -71,15 +71,16 @@ impl FreeSpace<'_> {
         free
     }
 
-    /// How far the line at `x` may be followed from `from` towards `to` before a zone.
+    /// How far the line at `x` may be followed from `from` towards `to` before a zone: not at
+    /// all from inside of one, where rounding puts a place on a steep border.
     fn run(&self, x: f64, from: f64, to: f64) -> f64 {
         let up = to >= from;
         let mut reach = to;
         for (a, b) in self.blocked(x) {
-            if up && a >= from - SAME_M {
+            if up && b > from + SAME_M {
                 reach = reach.min(a);
             }
-            if !up && b <= from + SAME_M {
+            if !up && a < from - SAME_M {
                 reach = reach.max(b);
             }
         }

