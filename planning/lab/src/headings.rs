@@ -40,6 +40,10 @@ const MAX_ROUNDS: usize = 40;
 /// gap reached so far is the answer.
 const MAX_PAIRS: usize = 40_000_000;
 
+/// The same for each leg: where a few waypoints lie within a turn of each other, many choices
+/// of headings are as good, and each leg may take a hundred times as many as usual.
+const MAX_PAIRS_A_LEG: usize = 1_000_000;
+
 /// Pairs of intervals a leg in all rounds together, unless more are asked for: in wind,
 /// where a pair takes ten times as long, 20 waypoints are answered within a second.
 pub const PAIRS_A_LEG_IN_WIND: usize = 8_000;
@@ -277,6 +281,7 @@ fn solve(request: &Request, air: Air) -> Solved {
     };
     // What may still be looked at.
     let mut left = a_leg.map_or(usize::MAX, |n| n.saturating_mul(legs.len()));
+    let most_pairs = MAX_PAIRS.min(MAX_PAIRS_A_LEG * legs.len());
     let mut step = TAU / f64::from(2 * FIRST_INTERVALS);
     for _ in 0..MAX_ROUNDS {
         let ends = if closed { Ends::Closed } else { Ends::Open };
@@ -317,7 +322,7 @@ fn solve(request: &Request, air: Air) -> Solved {
             break;
         }
         let (all, open) = pairs(&layers, closed, &known);
-        if all > MAX_PAIRS || open > left {
+        if all > most_pairs || open > left {
             break;
         }
         left -= open;
