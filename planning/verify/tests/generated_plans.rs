@@ -4,7 +4,7 @@
 mod planned;
 
 use planned::{Outcome, outcome};
-use skein_survey::area::Planners;
+use skein_survey::area::{self, Planners};
 use skein_verify::generate::Site;
 
 /// Sites: a debug build plans each in about a second.
@@ -25,4 +25,17 @@ fn plans_of_generated_sites_hold() {
     }
     assert!(told.is_empty(), "{told:?}");
     assert!(planned >= SITES / 2, "{planned}");
+}
+
+/// On this site six share what sees most worse than four do, unless two of them stay at home.
+#[test]
+fn more_uavs_are_not_slower() {
+    let makespan_s = |uavs| {
+        let mut site = Site::of(140_010);
+        site.manner.n_uavs = uavs;
+        let request = planned::request(&site, Planners::Both).unwrap();
+        area::plan(&request).unwrap().figures.makespan_s
+    };
+    let (four_s, six_s) = (makespan_s(4), makespan_s(6));
+    assert!(six_s <= four_s, "{six_s} {four_s}");
 }

@@ -2,9 +2,9 @@
 //!
 //! Leaves to [`super::lanes`] the plans of a team.
 
-use super::PlannerError;
 use super::flights::Flights;
 use super::lanes::{Care, Desk};
+use super::{Planner, PlannerError};
 use crate::fleet::sections::alike;
 use crate::fleet::team_selection::{kinds, search};
 use crate::objective::Objective;
@@ -18,6 +18,17 @@ const PACES: usize = 3;
 
 /// Shares of the work are searched for teams of at most so many.
 const MOST_PACED: usize = 6;
+
+/// Smaller teams that are tried: so many less by one each, and these parts of all.
+const FEWER: usize = 8;
+const FEWER_PARTS: [f64; 3] = [0.75, 0.5, 0.25];
+
+/// Up to so many UAVs, lanes of cells are planned in full for each smaller team.
+const MOST_IN_FULL: usize = 12;
+
+/// A smaller team is planned in full where more UAVs bring less than this part of what they
+/// would if all work could be shared.
+const LEAST_GAIN: f64 = 0.5;
 
 /// The best plan for each kind of lanes that was found, the best of all first.
 ///
@@ -43,7 +54,19 @@ pub(crate) fn choose(
         }
     }
     match whole {
-        Ok(plans) => found.extend(plans),
+        Ok(plans) => {
+            if desk.objective == Objective::Time
+                && let Some(first) = plans.first()
+            {
+                // Seeing a little more is no reason to leave UAVs at home.
+                let all_s = makespan_s(first);
+                for k in fewer(desk, uavs, first, steps / SEARCH_PART) {
+                    let plans = desk.plans(&uavs[..k], care).unwrap_or_default();
+                    found.extend(plans.into_iter().filter(|p| makespan_s(p) < all_s));
+                }
+            }
+            found.extend(plans);
+        }
         // Fewer may do what all cannot: lanes for the narrowest swath can be too many.
         Err(error) if found.is_empty() => return Err(error),
         Err(_) => {}
@@ -70,6 +93,41 @@ pub(crate) fn choose(
         best.reverse();
     }
     Ok(best)
+}
+
+/// How many of the first ones of the team promise to be about as soon as all of them are: many
+/// that share a few lanes may hinder each other.
+fn fewer(desk: &Desk<'_>, uavs: &[PlannedUav], plan: &Flights, steps: usize) -> Vec<usize> {
+    let n = uavs.len();
+    let by_one = (1..=FEWER).filter_map(|less| n.checked_sub(less));
+    let parts = FEWER_PARTS.map(|part| (n as f64 * part) as usize);
+    let mut sizes: Vec<usize> = by_one.chain(parts).filter(|k| *k > 0).collect();
+    sizes.sort_unstable();
+    sizes.dedup();
+    if desk.planner == Planner::Approximate {
+        // A rough plan of cells sees too little to be compared.
+        sizes.retain(|_| n <= MOST_IN_FULL);
+        return sizes;
+    }
+    let all_s = makespan_s(plan);
+    let mut best: Option<(usize, Flights)> = None;
+    for k in sizes {
+        let rough = Care { steps, rough: true };
+        let Some(found) = best_of(desk, &uavs[..k], rough) else {
+            continue;
+        };
+        let most = 1.0 + LEAST_GAIN * (n as f64 / k as f64 - 1.0);
+        let soon = makespan_s(&found) <= all_s * most;
+        if soon && best.as_ref().is_none_or(|(_, b)| desk.beats(&found, b)) {
+            best = Some((k, found));
+        }
+    }
+    best.map(|(k, _)| k).into_iter().collect()
+}
+
+/// When the last one is back, seconds.
+fn makespan_s(plan: &Flights) -> f64 {
+    plan.worth(false).makespan_s
 }
 
 fn members(uavs: &[PlannedUav], team: &[usize]) -> Vec<PlannedUav> {

@@ -27,7 +27,7 @@ fn uav(name: &str, camera: Sensor) -> Uav {
 fn request(area: Polygon, team: &[Uav], planner: Planner) -> AreaRequest {
     AreaRequest {
         planners: Planners::Only(planner),
-        steps: 1_000,
+        steps: 200,
         ..AreaRequest::new(area, team.to_vec(), 10.0, 60.0)
     }
 }
@@ -333,7 +333,7 @@ proptest! {
         for planner in PLANNERS {
             let plans = [Lanes::Common, Lanes::Sections, Lanes::Best].map(|lanes| {
                 let area = rectangle(size.0, size.1);
-                planned(&AreaRequest { lanes, ..request(area, &team, planner) })
+                planned(&AreaRequest { lanes, steps: 40, ..request(area, &team, planner) })
             });
             let [common, sections, best] = plans.map(|plan| plan.figures);
             for figures in [&common, &sections, &best] {
