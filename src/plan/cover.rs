@@ -158,12 +158,7 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         zones: args.zones.as_deref(),
     };
     let mut input = area_input::read(&args.file, asked)?;
-    let mut view = View::of(flags(args), input.survey.as_ref())?;
-    if args.every_course && view.course_deg.take().is_some() {
-        view.notices.retain(|n| !n.contains("--course-deg"));
-        let text = "the survey's angle is not used: --every-course";
-        view.notices.push(text.to_owned());
-    }
+    let view = View::of(flags(args), input.survey.as_ref())?;
     args.output.check_altitude(view.altitude_m)?;
     let defaults = team_input::Defaults {
         camera: view.camera,
@@ -225,6 +220,9 @@ fn flags(args: &CoverArgs) -> Flags {
         course_deg: args.course_deg,
         trigger_m: args.output.upload.trigger_m,
         run_out_m: args.run_out_m,
+        no_course: args
+            .every_course
+            .then_some("the survey's angle is not used: --every-course"),
     }
 }
 

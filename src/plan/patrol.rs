@@ -163,15 +163,12 @@ fn over_area(args: &PatrolArgs) -> Result<Input> {
         altitude_m: tours.output.altitude_m,
         swath_m: tours.swath_m,
         trigger_m: tours.output.upload.trigger_m,
+        no_course: Some("the survey's angle is ignored: a patrol has the shortest course"),
         ..Flags::default()
     };
     let view = View::of(flags, site.survey.as_ref())?;
     tours.output.check_altitude(view.altitude_m)?;
     site.notices.extend(view.notices.iter().cloned());
-    if view.course_deg.is_some() {
-        let text = "the survey's angle is ignored: a patrol has the shortest course".to_owned();
-        site.notices.push(text);
-    }
     if let Some(sensor) = site.sensor.take() {
         let text = format!("sensor {sensor:?} of the area ignored: all fly the same tour");
         site.notices.push(text);

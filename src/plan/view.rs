@@ -29,6 +29,8 @@ pub struct Flags {
     pub trigger_m: Option<f64>,
     /// `--run-out-m`.
     pub run_out_m: Option<f64>,
+    /// What is told where the survey's course is not used.
+    pub no_course: Option<&'static str>,
 }
 
 /// How an area is seen.
@@ -88,13 +90,8 @@ impl View {
             "AdjustedFootprintSide",
             " m",
         );
-        let course_deg = choose(
-            flags.course_deg,
-            grid.course_deg,
-            "--course-deg",
-            "angle",
-            "°",
-        );
+        let survey_deg = grid.course_deg.filter(|_| flags.no_course.is_none());
+        let course_deg = choose(flags.course_deg, survey_deg, "--course-deg", "angle", "°");
         let trigger_m = choose(
             flags.trigger_m,
             grid.trigger_m,
@@ -110,7 +107,7 @@ impl View {
             " m",
         );
         let run_out_m = within("--run-out-m", run_out_m.unwrap_or(0.0), DISTANCE_M, "m")?;
-        if let Some(course_deg) = course_deg {
+        if let Some(course_deg) = flags.course_deg.or(grid.course_deg) {
             course("--course-deg", course_deg)?;
         }
         let altitude_m = altitude.unwrap_or(ALTITUDE_M);
@@ -145,6 +142,9 @@ impl View {
         }
         if survey.is_some() {
             notices.extend(told(grid));
+        }
+        if grid.course_deg.is_some() {
+            notices.extend(flags.no_course.map(str::to_owned));
         }
         Ok(Self {
             altitude_m,
@@ -225,6 +225,7 @@ mod tests {
             course_deg: Some(-90.0),
             trigger_m: Some(8.0),
             run_out_m: Some(0.0),
+            no_course: None,
         };
         let view = View::of(flags, Some(&survey())).unwrap();
         assert_eq!(view.camera, Sensor::Swath { width_m: 55.0 });

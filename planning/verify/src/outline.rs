@@ -324,12 +324,12 @@ impl Outline {
     /// be the farthest are cut first: what the limit on cuts leaves open is then no more than
     /// about a 4000th of the stretch, also where a path keeps one distance for long.
     fn farthest(&self, path: &Path, from_m: f64, to_m: f64) -> Near {
-        let half = |from_m: f64, to_m: f64| {
-            let along_m = f64::midpoint(from_m, to_m);
-            let middle = Near {
-                distance_m: self.to_border(path.at(along_m)),
-                along_m,
-            };
+        let at = |along_m: f64| Near {
+            distance_m: self.to_border(path.at(along_m)),
+            along_m,
+        };
+        let stretch = |from_m: f64, to_m: f64| {
+            let middle = at(f64::midpoint(from_m, to_m));
             Stretch {
                 at_most_m: middle.distance_m + (to_m - from_m) / 2.0,
                 from_m,
@@ -337,33 +337,29 @@ impl Outline {
                 middle,
             }
         };
-        let mut best = Near {
-            distance_m: self.to_border(path.at(from_m)),
-            along_m: from_m,
+        let farther = |a: Near, b: Near| {
+            if b.distance_m > a.distance_m { b } else { a }
         };
-        let mut open = BinaryHeap::from([half(from_m, to_m)]);
+        let whole = stretch(from_m, to_m);
+        let mut best = farther(at(from_m), whole.middle);
+        let mut open = BinaryHeap::from([whole]);
         for _ in 0..2000 {
-            let Some(stretch) = open.pop() else {
+            let Some(widest) = open.pop() else {
                 break;
             };
-            if stretch.middle.distance_m > best.distance_m {
-                best = stretch.middle;
-            }
-            if stretch.at_most_m <= best.distance_m + 1e-3 {
+            if widest.at_most_m <= best.distance_m + 1e-3 {
                 break;
             }
-            open.push(half(stretch.from_m, stretch.middle.along_m));
-            open.push(half(stretch.middle.along_m, stretch.to_m));
+            let middle_m = widest.middle.along_m;
+            for half in [
+                stretch(widest.from_m, middle_m),
+                stretch(middle_m, widest.to_m),
+            ] {
+                best = farther(best, half.middle);
+                open.push(half);
+            }
         }
-        open.into_iter()
-            .map(|stretch| stretch.middle)
-            .fold(best, |best, middle| {
-                if middle.distance_m > best.distance_m {
-                    middle
-                } else {
-                    best
-                }
-            })
+        best
     }
 }
 

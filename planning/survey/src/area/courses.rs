@@ -221,19 +221,11 @@ pub(super) struct Asked {
     pub every: bool,
 }
 
-/// The best plan, and how thoroughly it was searched for.
-#[derive(Default)]
-pub(super) struct Best {
-    pub part: Part,
-    /// Courses that were not planned in full, because that would have taken too long.
-    pub courses_left: usize,
-}
-
 /// The best plan that was found on any course, with so many steps of improvement; `fly` plans
 /// on one.
 ///
 /// # Guarantees
-/// Where no courses are left, none sees more, or as much for less.
+/// Where no courses are left in the plan, none sees more, or as much for less.
 ///
 /// # Errors
 /// When there is no plan on the course that is guessed to be the shortest.
@@ -242,48 +234,49 @@ pub(super) fn best(
     asked: Asked,
     fly: impl Fn(Directions, Effort) -> Result<Part, PlannerError> + Sync,
     worth: impl Fn(&Part, Effort) -> Worth + Sync,
-) -> Result<Best, PlannerError> {
+) -> Result<Part, PlannerError> {
     let guessed = fly(Directions::Best, Effort::FULL)?;
     if guessed.work == 0 {
-        return Ok(Best {
-            part: guessed,
-            courses_left: 0,
-        });
+        return Ok(guessed);
     }
+    let all = courses(area);
     let by_steps = |work: u64| work.saturating_mul(asked.steps as u64) / DEFAULT_STEPS as u64;
-    let a_plan = guessed.work;
+    let every_work = if asked.every {
+        u64::MAX
+    } else {
+        by_steps(EVERY_WORK)
+    };
+    let all_fit = guessed.work.saturating_mul(all.len() as u64) <= every_work;
+    let left = if all_fit {
+        every_work
+    } else {
+        let most = guessed.work.saturating_mul(WORK_PLANS);
+        by_steps(most.clamp(WORK.0, WORK.1)).saturating_sub(guessed.work)
+    };
     let first = Tried {
         directions: Directions::Best,
         worth: worth(&guessed, Effort::FULL),
         part: guessed,
     };
-    let all = courses(area);
     let mut search = Search {
         objective: asked.objective,
         fly,
         worth,
-        left: 0,
+        left,
         in_full: Vec::new(),
     };
-    let mut found = if asked.every {
-        search.left = u64::MAX;
-        search.all_in_full(&all)
-    } else if a_plan.saturating_mul(all.len() as u64) <= by_steps(EVERY_WORK) {
-        search.left = by_steps(EVERY_WORK);
+    let mut found = if all_fit {
         search.all_in_full(&all)
     } else {
-        let most = a_plan.saturating_mul(WORK_PLANS).clamp(WORK.0, WORK.1);
-        search.left = by_steps(most).saturating_sub(a_plan);
         search.best_in_full(&all)
     };
     found.push(first);
     let left = all.iter().filter(|d| !search.in_full.contains(d));
     let courses_left = left.count();
     let best = search.best_first(found).into_iter().next();
-    Ok(Best {
-        part: best.map(|t| t.part).unwrap_or_default(),
-        courses_left,
-    })
+    let mut part = best.map(|t| t.part).unwrap_or_default();
+    part.courses_left = courses_left;
+    Ok(part)
 }
 
 /// The courses that are flown with more steps, and those of them with lanes moved aside.

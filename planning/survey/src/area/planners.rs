@@ -166,11 +166,7 @@ impl<'a> OpenArea<'a> {
             steps: job.steps,
             every: self.request.every_course,
         };
-        let best = courses::best(job.area, asked, fly, worth)?;
-        Ok(Part {
-            courses_left: best.courses_left,
-            ..best.part
-        })
+        courses::best(job.area, asked, fly, worth)
     }
 
     fn exact(

@@ -60,7 +60,7 @@ pub(crate) fn choose(
             {
                 // Seeing a little more is no reason to leave UAVs at home.
                 let all_s = makespan_s(first);
-                for k in fewer(desk, uavs, first, steps / SEARCH_PART) {
+                for k in fewer(desk, uavs, all_s, steps / SEARCH_PART) {
                     let plans = desk.plans(&uavs[..k], care).unwrap_or_default();
                     found.extend(plans.into_iter().filter(|p| makespan_s(p) < all_s));
                 }
@@ -95,9 +95,9 @@ pub(crate) fn choose(
     Ok(best)
 }
 
-/// How many of the first ones of the team promise to be about as soon as all of them are: many
-/// that share a few lanes may hinder each other.
-fn fewer(desk: &Desk<'_>, uavs: &[PlannedUav], plan: &Flights, steps: usize) -> Vec<usize> {
+/// How many of the first ones of the team promise to be about as soon as all of them are, who
+/// take `all_s` seconds: many that share a few lanes may hinder each other.
+fn fewer(desk: &Desk<'_>, uavs: &[PlannedUav], all_s: f64, steps: usize) -> Vec<usize> {
     let n = uavs.len();
     let by_one = (1..=FEWER).filter_map(|less| n.checked_sub(less));
     let parts = FEWER_PARTS.map(|part| (n as f64 * part) as usize);
@@ -109,10 +109,9 @@ fn fewer(desk: &Desk<'_>, uavs: &[PlannedUav], plan: &Flights, steps: usize) -> 
         sizes.retain(|_| n <= MOST_IN_FULL);
         return sizes;
     }
-    let all_s = makespan_s(plan);
+    let rough = Care { steps, rough: true };
     let mut best: Option<(usize, Flights)> = None;
     for k in sizes {
-        let rough = Care { steps, rough: true };
         let Some(found) = best_of(desk, &uavs[..k], rough) else {
             continue;
         };
