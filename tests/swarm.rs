@@ -15,4 +15,5 @@ mod many;
 mod model;
 mod names_of_checks;
 mod pace;
+mod promises;
 mod seeds;

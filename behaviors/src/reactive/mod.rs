@@ -3,3 +3,4 @@
 pub mod air;
 pub mod envelope;
 pub mod follow;
+pub mod promise;

@@ -24,6 +24,7 @@
 pub mod account;
 mod check;
 pub mod disk;
+pub mod encounters;
 pub mod fault;
 pub mod fault_generator;
 mod geometry_cache;

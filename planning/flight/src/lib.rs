@@ -60,4 +60,5 @@
 pub mod airframe;
 pub mod coverage;
 pub mod route;
+pub mod separation;
 pub mod trajectory;

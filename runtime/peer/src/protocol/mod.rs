@@ -7,11 +7,13 @@
 //! one, [`launches`] what everybody begins with. What travels is `relay`'s, and how much of it [`airtime`]'s.
 
 pub mod airtime;
+pub mod conflict;
 pub mod division;
 pub mod launches;
 pub(crate) mod life;
 pub(crate) mod membership;
 pub(crate) mod negotiation;
+pub mod promises;
 pub(crate) mod relay;
 pub mod rounds;
 pub mod runs;

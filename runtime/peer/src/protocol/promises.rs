@@ -1,0 +1,275 @@
+//! Promises: what a UAV flies, what it would rather fly, and who has accepted that (D2.7
+//! §1.2.2, §2.3.1).
+//!
+//! Each UAV has one promised motion in force, which ends in a loiter for ever. It flies
+//! another one only when everybody whom it may meet has accepted that; until then, and if
+//! nobody ever answers, the old promise stands. So separation depends on no message.
+//! Which motion is wanted, and when it is too late for an answer, is
+//! [`conflict`](super::conflict)'s; whether two keep apart is told by the caller.
+//!
+//! | state | event | next state | what is said |
+//! |---|---|---|---|
+//! | flying | a wish ([`Promises::propose`]) | proposing | the proposal |
+//! | proposing | all others accept | flying the proposal | the new motion in force |
+//! | proposing | withdrawn by the caller, for time | flying | that it is withdrawn |
+//! | proposing | it conflicts with what stands, or with a proposal that goes before | flying | that it is withdrawn |
+//! | any | a proposal that keeps apart from the motion in force and the own proposal | same | that it is accepted |
+//! | proposing | a proposal that goes before the own and conflicts with it alone | flying | the own is withdrawn, the other accepted |
+//! | any | a proposal that conflicts with the motion in force, or goes behind | same | nothing |
+//! | any | another motion in force, a withdrawal | same | nothing: what was accepted of it is free again |
+//!
+//! Everything is said in one [`Statement`], of which the newest counts; so losing, repeating
+//! and reordering do no harm. A version is proposed once and never again.
+//!
+//! # Guarantees
+//! **Any two motions in force keep apart, whatever is lost, late, doubled or out of order,
+//! and whoever falls silent.** Let A adopt a. B had accepted it, and from then on held every
+//! own proposal against a, until it heard that a is withdrawn (then A never adopts it) or in
+//! force (then it is held against as such). And what B had in force or on offer when it
+//! accepted was held against a then. So there is no moment at which B may adopt what
+//! conflicts with a, and none at which A may. `tests/promises.rs` searches this exhaustively.
+//!
+//! Of two proposals that conflict, that of the UAV with less endurance goes before, of equal
+//! ones that with the lower number: the order is total, so somebody always gets through.
+//!
+//! # Complexity
+//! A statement heard costs as many tests of separation as there are open proposals.
+
+use crate::PeerId;
+use std::collections::BTreeMap;
+
+/// Who goes before: the lower. Endurance in seconds, then the number of the peer.
+pub type Rank = (u32, PeerId);
+
+/// A motion and its number among the promises of its author.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Promise<M> {
+    /// Versions of a life only grow.
+    pub version: u32,
+    /// What is promised.
+    pub motion: M,
+}
+
+/// All that a UAV says about its flight to those whom it may meet.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Statement<M> {
+    /// Number of the statement: the newest counts.
+    pub number: u32,
+    /// Its endurance when the mission began, seconds: who has less goes before.
+    pub endurance_s: u32,
+    /// What it flies.
+    pub in_force: Promise<M>,
+    /// What it would rather fly.
+    pub proposal: Option<Promise<M>>,
+    /// Which version of whom it accepted last, ascending by peer.
+    pub accepts: Vec<(PeerId, u32)>,
+}
+
+/// What is known of another UAV.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Other<M> {
+    number: u32,
+    rank: Rank,
+    in_force: Promise<M>,
+    /// Its proposal, as heard last.
+    proposal: Option<Promise<M>>,
+    /// The version of it that was accepted: held against until it is withdrawn or in force.
+    accepted: Option<u32>,
+    /// What was accepted last, to be said.
+    told: u32,
+    /// Which version of ours it accepted last.
+    accepts: u32,
+}
+
+impl<M> Other<M> {
+    /// Whatever it may fly without asking again.
+    fn standing(&self) -> impl Iterator<Item = &M> {
+        let accepted = self.proposal.as_ref();
+        let accepted = accepted.filter(|p| self.accepted == Some(p.version));
+        std::iter::once(&self.in_force.motion).chain(accepted.map(|p| &p.motion))
+    }
+
+    /// Its proposal, unless it was accepted.
+    fn open(&self) -> Option<&Promise<M>> {
+        let open = self.proposal.as_ref()?;
+        (self.accepted != Some(open.version)).then_some(open)
+    }
+}
+
+/// The promises of one UAV, and what it knows of those of others.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Promises<M> {
+    rank: Rank,
+    number: u32,
+    last_version: u32,
+    in_force: Promise<M>,
+    proposal: Option<Promise<M>>,
+    others: BTreeMap<PeerId, Other<M>>,
+}
+
+/// What became of the own proposal.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Settled {
+    /// There is something new to say.
+    pub news: bool,
+    /// The proposal is in force now.
+    pub adopted: bool,
+    /// The proposal was withdrawn for another's sake.
+    pub gave_way: bool,
+}
+
+impl<M: Clone> Promises<M> {
+    /// A UAV that flies a motion and wants nothing else.
+    #[must_use]
+    pub fn new(rank: Rank, in_force: M) -> Self {
+        Self {
+            rank,
+            number: 1,
+            last_version: 1,
+            in_force: Promise {
+                version: 1,
+                motion: in_force,
+            },
+            proposal: None,
+            others: BTreeMap::new(),
+        }
+    }
+
+    /// What is to be flown.
+    #[must_use]
+    pub fn in_force(&self) -> &M {
+        &self.in_force.motion
+    }
+
+    /// What is on offer.
+    #[must_use]
+    pub fn proposal(&self) -> Option<&M> {
+        self.proposal.as_ref().map(|p| &p.motion)
+    }
+
+    /// All that is to be said now; said again until something newer is.
+    #[must_use]
+    pub fn statement(&self) -> Statement<M> {
+        Statement {
+            number: self.number,
+            endurance_s: self.rank.0,
+            in_force: self.in_force.clone(),
+            proposal: self.proposal.clone(),
+            accepts: self.others.iter().map(|(id, o)| (*id, o.told)).collect(),
+        }
+    }
+
+    /// Takes note of a statement; says whether it was newer than what was known. Nothing
+    /// follows from it before [`Promises::settle`].
+    pub fn hear(&mut self, author: PeerId, said: &Statement<M>) -> bool {
+        let me = self.rank.1;
+        if author == me {
+            return false;
+        }
+        let rank = (said.endurance_s, author);
+        let other = self.others.entry(author).or_insert_with(|| Other {
+            number: 0,
+            rank,
+            in_force: said.in_force.clone(),
+            proposal: None,
+            accepted: None,
+            told: 0,
+            accepts: 0,
+        });
+        if said.number <= other.number {
+            return false;
+        }
+        other.number = said.number;
+        other.rank = rank;
+        other.in_force = said.in_force.clone();
+        let accepts = said.accepts.iter().find(|(id, _)| *id == me);
+        other.accepts = accepts.map_or(0, |(_, version)| *version);
+        // What is no longer proposed is in force, or withdrawn for ever.
+        let proposed = said.proposal.as_ref().map(|p| p.version);
+        other.accepted = other.accepted.filter(|a| Some(*a) == proposed);
+        other.proposal = said.proposal.clone();
+        true
+    }
+
+    /// Forgets those who can meet nobody any more.
+    pub fn forget(&mut self, is_gone: impl Fn(&M) -> bool) {
+        self.others.retain(|_, o| !is_gone(&o.in_force.motion));
+    }
+
+    /// Offers a motion in place of that in force.
+    pub fn propose(&mut self, motion: M) {
+        self.last_version += 1;
+        self.number += 1;
+        self.proposal = Some(Promise {
+            version: self.last_version,
+            motion,
+        });
+    }
+
+    /// Withdraws the own proposal, if there is one; says whether.
+    pub fn withdraw(&mut self) -> bool {
+        let had = self.proposal.take().is_some();
+        self.number += u32::from(had);
+        had
+    }
+
+    /// Gives way, accepts and adopts whatever can be. `may_adopt` is false once the place
+    /// is passed at which the proposal leaves what is in force.
+    pub fn settle(&mut self, may_adopt: bool, apart: &dyn Fn(&M, &M) -> bool) -> Settled {
+        let mut settled = Settled::default();
+        if let Some(own) = &self.proposal
+            && !self.is_clear(&own.motion, apart)
+        {
+            self.proposal = None;
+            settled.gave_way = true;
+        }
+        let accepted = self.accept(apart);
+        if may_adopt && self.is_agreed() {
+            if let Some(own) = self.proposal.take() {
+                self.in_force = own;
+            }
+            settled.adopted = true;
+        }
+        settled.news = settled.gave_way || accepted || settled.adopted;
+        self.number += u32::from(settled.news);
+        settled
+    }
+
+    /// Whether a motion keeps apart from whatever others may fly, and from the proposals
+    /// that go before this UAV's.
+    #[must_use]
+    pub fn is_clear(&self, motion: &M, apart: &dyn Fn(&M, &M) -> bool) -> bool {
+        self.others.values().all(|o| {
+            let before = o.open().filter(|_| o.rank < self.rank);
+            // A proposal that this UAV must refuse gets nowhere, so it need not be avoided.
+            let before = before.filter(|p| apart(&self.in_force.motion, &p.motion));
+            o.standing().all(|m| apart(motion, m))
+                && before.is_none_or(|p| apart(motion, &p.motion))
+        })
+    }
+
+    /// Accepts the proposals of others that keep apart from all that this UAV may fly.
+    fn accept(&mut self, apart: &dyn Fn(&M, &M) -> bool) -> bool {
+        let own = self.proposal.as_ref().map(|p| &p.motion);
+        let mut news = false;
+        for other in self.others.values_mut() {
+            let clear = |theirs: &&Promise<M>| {
+                apart(&self.in_force.motion, &theirs.motion)
+                    && own.is_none_or(|m| apart(m, &theirs.motion))
+            };
+            if let Some(version) = other.open().filter(clear).map(|p| p.version) {
+                other.told = version;
+                other.accepted = Some(version);
+                news = true;
+            }
+        }
+        news
+    }
+
+    /// Whether everybody has accepted the own proposal.
+    fn is_agreed(&self) -> bool {
+        self.proposal
+            .as_ref()
+            .is_some_and(|own| self.others.values().all(|o| o.accepts == own.version))
+    }
+}

@@ -1,0 +1,202 @@
+//! The rule by which promised motions change (docs/protocol.md §5.1), searched exhaustively:
+//! three UAVs, some ways each, and [`Promises`] as it flies. Geometry is a table of who
+//! conflicts with whom.
+//!
+//! Statements stay on the air, from where any may reach anybody at any time, in any order,
+//! again or never: that is loss, delay, reordering and repetition. Whoever crashes says
+//! nothing more and hears nothing more, which is one of the ways in which messages get lost.
+//! Time is left out: a proposal may be made, agreed on or withdrawn at any moment.
+//!
+//! These bounds are real: so many proposals of each UAV, and of each author's statements the
+//! three newest can still arrive.
+
+use skein_peer::PeerId;
+use skein_peer::protocol::promises::{Promises, Statement};
+use stateright::{Checker, Model, Property};
+
+/// A motion: whose it is, and which of its ways. Way 0 is in force at the beginning.
+type Way = (u16, u8);
+
+/// Statements of one author that can still arrive.
+const ON_AIR: usize = 3;
+
+/// What one search may do.
+struct Case {
+    uavs: u16,
+    /// Ways of each, that in force at the beginning included.
+    ways: u8,
+    /// Proposals that each may make.
+    proposals: u8,
+    /// Pairs that come too near to each other.
+    conflicts: &'static [(Way, Way)],
+    /// What must be met in some state: all on these ways.
+    reached: &'static [u8],
+}
+
+impl Case {
+    fn apart(&self, a: &Way, b: &Way) -> bool {
+        let meets = |p: &(Way, Way)| *p == (*a, *b) || *p == (*b, *a);
+        !self.conflicts.iter().any(meets)
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Sky {
+    uavs: Vec<Promises<Way>>,
+    made: Vec<u8>,
+    air: Vec<Vec<Statement<Way>>>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Action {
+    Propose(usize, u8),
+    Withdraw(usize),
+    Deliver {
+        author: usize,
+        nth: usize,
+        to: usize,
+    },
+}
+
+fn id(nth: usize) -> PeerId {
+    PeerId(u16::try_from(nth + 1).unwrap())
+}
+
+impl Sky {
+    /// What a UAV has to say goes on the air.
+    fn say(&mut self, i: usize) {
+        let said = self.uavs[i].statement();
+        let air = &mut self.air[i];
+        if air.last() != Some(&said) {
+            air.push(said);
+            if air.len() > ON_AIR {
+                air.remove(0);
+            }
+        }
+    }
+}
+
+impl Model for Case {
+    type State = Sky;
+    type Action = Action;
+
+    fn init_states(&self) -> Vec<Sky> {
+        let new = |i: u16| Promises::new((0, PeerId(i)), (i, 0));
+        let mut uavs: Vec<Promises<Way>> = (1..=self.uavs).map(new).collect();
+        let said: Vec<Statement<Way>> = uavs.iter().map(Promises::statement).collect();
+        for u in &mut uavs {
+            for (j, s) in said.iter().enumerate() {
+                let _ = u.hear(id(j), s);
+            }
+        }
+        vec![Sky {
+            made: vec![0; uavs.len()],
+            air: vec![Vec::new(); uavs.len()],
+            uavs,
+        }]
+    }
+
+    fn actions(&self, sky: &Sky, actions: &mut Vec<Action>) {
+        let apart = |a: &Way, b: &Way| self.apart(a, b);
+        for (i, u) in sky.uavs.iter().enumerate() {
+            if u.proposal().is_some() {
+                actions.push(Action::Withdraw(i));
+            } else if sky.made[i] < self.proposals {
+                let wanted = (0..self.ways).filter(|way| *way != u.in_force().1);
+                let clear = wanted.filter(|way| u.is_clear(&(id(i).0, *way), &apart));
+                actions.extend(clear.map(|way| Action::Propose(i, way)));
+            }
+            for (author, air) in sky.air.iter().enumerate().filter(|(a, _)| *a != i) {
+                let to = i;
+                actions.extend((0..air.len()).map(|nth| Action::Deliver { author, nth, to }));
+            }
+        }
+    }
+
+    fn next_state(&self, sky: &Sky, action: Action) -> Option<Sky> {
+        let apart = |a: &Way, b: &Way| self.apart(a, b);
+        let mut next = sky.clone();
+        let who = match action {
+            Action::Propose(i, way) => {
+                next.uavs[i].propose((id(i).0, way));
+                next.made[i] += 1;
+                i
+            }
+            Action::Withdraw(i) => {
+                let _ = next.uavs[i].withdraw();
+                i
+            }
+            Action::Deliver { author, nth, to } => {
+                let said = &sky.air[author][nth];
+                if !next.uavs[to].hear(id(author), said) {
+                    return None;
+                }
+                to
+            }
+        };
+        let _ = next.uavs[who].settle(true, &apart);
+        next.say(who);
+        Some(next)
+    }
+
+    fn properties(&self) -> Vec<Property<Self>> {
+        vec![
+            Property::always("motions in force keep apart", |case: &Case, sky: &Sky| {
+                let flown: Vec<&Way> = sky.uavs.iter().map(Promises::in_force).collect();
+                flown.iter().all(|a| flown.iter().all(|b| case.apart(a, b)))
+            }),
+            Property::sometimes("somebody gets through", |case: &Case, sky: &Sky| {
+                let flown = sky.uavs.iter().map(|u| u.in_force().1);
+                flown.eq(case.reached.iter().copied())
+            }),
+        ]
+    }
+}
+
+fn search(case: Case, states: usize) {
+    let checker = case.checker().threads(2).spawn_bfs().join();
+    checker.assert_properties();
+    let found = checker.unique_state_count();
+    assert!(found >= states, "only {found} states");
+}
+
+#[test]
+fn two_that_want_through_each_other() {
+    // Straight ways conflict; so does one's straight way with the other's loiter.
+    let conflicts = &[((1, 1), (2, 1)), ((1, 2), (2, 0)), ((1, 0), (2, 2))];
+    let case = Case {
+        uavs: 2,
+        ways: 3,
+        proposals: 3,
+        conflicts,
+        reached: &[2, 1],
+    };
+    search(case, 100_000);
+}
+
+#[test]
+fn three_that_meet_in_one_place() {
+    let conflicts = &[((1, 1), (2, 1)), ((2, 1), (3, 1)), ((1, 1), (3, 1))];
+    let case = Case {
+        uavs: 3,
+        ways: 2,
+        proposals: 1,
+        conflicts,
+        reached: &[0, 1, 0],
+    };
+    search(case, 100_000);
+}
+
+#[test]
+fn three_in_a_ring_of_loiters() {
+    // Each may go only once the one before it has left its loiter.
+    let conflicts = &[((1, 1), (2, 0)), ((2, 1), (3, 0)), ((3, 1), (1, 1))];
+    let case = Case {
+        uavs: 3,
+        ways: 2,
+        proposals: 2,
+        conflicts,
+        reached: &[0, 0, 1],
+    };
+    search(case, 100_000);
+}
