@@ -1,5 +1,6 @@
 //! Every verb and every flag; the help is written as prose.
 
+use crate::bench::BenchArgs;
 use crate::chaos::ChaosArgs;
 use crate::check::CheckArgs;
 use crate::console::{MissionArgs, OrderArgs};
@@ -8,7 +9,7 @@ use crate::peer::PeerArgs;
 use crate::plan::PlanArgs;
 use crate::sim::SimArgs;
 use crate::trial::TrialArgs;
-use crate::{chaos, check, console, exit, observe, peer, plan, sim, trial};
+use crate::{bench, chaos, check, console, exit, observe, peer, plan, sim, trial};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
@@ -50,6 +51,8 @@ pub enum Verb {
     Check(CheckArgs),
     /// Plans for a person, from files as other programs write them.
     Plan(PlanArgs),
+    /// Measures what the algorithms reach, on cases drawn from seeds.
+    Bench(BenchArgs),
     /// Outlives a trial and ends what it leaves behind.
     #[command(name = skein_broker::process::GUARD_COMMAND, hide = true)]
     Guard,
@@ -81,6 +84,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Observe(args) => observe::run(args),
         Verb::Check(args) => check::run(args),
         Verb::Plan(args) => Ok(plan::run(args)?),
+        Verb::Bench(args) => bench::run(args),
         Verb::Guard => {
             skein_broker::process::guard();
             Ok(ExitCode::from(exit::OK))

@@ -3,6 +3,7 @@
 // What a verb tells goes through `exit::print`: a closed pipe is no defect.
 #![deny(clippy::print_stdout)]
 
+mod bench;
 mod chaos;
 mod check;
 mod cli;

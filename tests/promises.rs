@@ -1,4 +1,4 @@
-//! The rule by which promised motions change (docs/protocol.md §5.1), searched exhaustively:
+//! The rule by which promised motions change (docs/protocol.md §11), searched exhaustively:
 //! three UAVs, some ways each, and [`Promises`] as it flies. Geometry is a table of who
 //! conflicts with whom.
 //!

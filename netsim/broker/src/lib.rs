@@ -16,6 +16,7 @@
 //! | [`live_world`] | the world and its radio links, as a trial uses them |
 //! | [`stream`] | percepts and setpoints, one loopback stream a peer |
 //! | [`proxy`] | one transport, which can go dark |
+//! | [`encounters`] | many encounters at once, without a trial |
 //! | [`process`] | processes, and the guard that leaves none behind |
 //! | [`control`], [`registry`] | how other commands find a trial and talk to it |
 //! | [`pacer`] | scenario time against wall time |
@@ -24,6 +25,7 @@
 pub mod batch;
 pub mod config;
 pub mod control;
+pub mod encounters;
 mod error;
 mod faults;
 mod live_peer;

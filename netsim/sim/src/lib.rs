@@ -13,6 +13,7 @@
 //! | [`prepared`] | what all runs of a scenario share |
 //! | [`runs`] | runs with the scenario's own faults, with drawn ones, without any |
 //! | [`swarm`] | peers, world and radio under one virtual clock |
+//! | [`encounters`] | UAVs at one height that would meet |
 //! | [`account`] | who took over what, when, and the verdict: one judge for simulated and live runs |
 //! | `check` | what must hold, judged while a run goes on |
 //! | `geometry_cache` | loops and routers, derived once for all peers and runs |

@@ -40,10 +40,11 @@ impl Judge {
                     .clamp(0.0, 1.0);
                 let nearest_m = (was + moved * share).norm();
                 self.nearest_m = self.nearest_m.min(nearest_m);
-                if nearest_m >= self.least_m {
-                    self.within.remove(&(*a, *b));
-                } else if self.within.insert((*a, *b)) {
+                if nearest_m < self.least_m && self.within.insert((*a, *b)) {
                     self.losses += 1;
+                }
+                if apart.norm() >= self.least_m {
+                    self.within.remove(&(*a, *b));
                 }
             }
         }
@@ -66,7 +67,7 @@ mod tests {
     #[test]
     fn two_that_cross_between_two_looks_are_found() {
         let mut judge = Judge::new(50.0);
-        let looks = [(-60.0, 60.0), (60.0, -60.0), (200.0, -200.0)];
+        let looks = [(-60.0, 60.0), (60.0, -60.0), (-60.0, 60.0)];
         for (a, b) in looks {
             let places = [
                 (PeerId(1), Point::new(a, 0.0)),

@@ -8,15 +8,20 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`scene`] | who begins where and wants to go where |
+//! | `alone` | those who hear nothing |
 //! | `channel` | statements on their way |
 //! | `judge` | the nearest approach, in continuous time |
+//! | [`totals`] | what many runs come to |
 
+mod alone;
 mod channel;
 mod judge;
 pub mod scene;
+#[cfg(test)]
+mod tests;
+pub mod totals;
 
 use crate::world::motion::Kinematic;
-use crate::world::percept_phase_ms;
 use channel::Channel;
 use judge::Judge;
 use scene::{Begin, Scene};
@@ -62,6 +67,18 @@ pub struct Air {
     pub delay_ms: u32,
 }
 
+/// Whether anything is heard at all.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Radio {
+    /// Statements travel.
+    Works(Air),
+    /// Nothing is heard: each UAV has its traffic sensor alone.
+    Jammed {
+        /// Within which it senses others, metres.
+        range_m: f64,
+    },
+}
+
 /// What a run came to.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Encounter {
@@ -69,7 +86,7 @@ pub struct Encounter {
     pub losses_of_separation: u32,
     /// The nearest approach, metres.
     pub min_separation_m: f64,
-    /// UAVs that flew.
+    /// UAVs that fly.
     pub uavs: u32,
     /// Those that arrived.
     pub arrived: u32,
@@ -98,52 +115,47 @@ struct Flyer {
 
 /// Flies a scene to its end.
 #[must_use]
-pub fn run(scene: &Scene, air: Air, seed: u64) -> Encounter {
-    let Some(begins) = scene.begin(seed) else {
-        return Encounter {
-            no_escape: true,
-            ..Encounter::default()
-        };
+pub fn run(scene: Scene, radio: Radio, seed: u64) -> Encounter {
+    let begun = scene.begin(seed).map(|begins| {
+        let flyers: Vec<Flyer> = begins.into_iter().map(Flyer::new).collect();
+        flyers
+    });
+    let none = Encounter {
+        no_escape: true,
+        ..Encounter::default()
     };
-    let mut flyers: Vec<Flyer> = begins.into_iter().map(Flyer::new).collect();
-    introduce(&mut flyers);
-    let mut channel = Channel::new(air, seed);
-    let mut judge = Judge::new(SEPARATION_M);
+    let Some(mut flyers) = begun else {
+        return none;
+    };
+    let mut channel = match radio {
+        Radio::Works(air) => {
+            introduce(&mut flyers);
+            Some(Channel::new(air, seed))
+        }
+        Radio::Jammed { range_m } => {
+            if !alone::all_have_room(&flyers, range_m) {
+                return none;
+            }
+            None
+        }
+    };
     let mut out = Encounter {
         uavs: u32::try_from(flyers.len()).unwrap_or(u32::MAX),
         ..Encounter::default()
     };
+    let mut judge = Judge::new(SEPARATION_M);
     let mut now_ms = 0;
     while now_ms < GIVE_UP_MS && flyers.iter().any(|f| f.arrived_ms.is_none()) {
-        for (to, from, intent) in channel.due(now_ms) {
-            if let Some(f) = flyers.get_mut(to).filter(|f| f.arrived_ms.is_none()) {
-                f.news |= f.mind.hear(from, &intent, now_ms);
-            }
-        }
-        let count = flyers.len();
-        for (nth, f) in flyers.iter_mut().enumerate() {
-            if f.arrived_ms.is_some() {
-                continue;
-            }
-            let phase_ms = percept_phase_ms(nth, count, 200);
-            if now_ms == 0 || now_ms % PERCEPT_MS == phase_ms % PERCEPT_MS {
-                f.decide(now_ms, &mut out);
-            }
-            if f.speaks(now_ms) {
-                let intent = f.mind.intent();
-                out.messages += u32::from(f.said.as_ref() != Some(&intent));
-                out.transmissions += 1;
-                channel.send(nth, f.id(), &intent, now_ms, count);
-                f.said = Some(intent);
-                f.said_ms = now_ms;
-                f.news = false;
-            }
+        match (&mut channel, radio) {
+            (Some(channel), _) => talk(&mut flyers, channel, now_ms, &mut out),
+            (None, Radio::Jammed { range_m }) => alone::decide(&mut flyers, range_m, now_ms),
+            (None, Radio::Works(_)) => {}
         }
         now_ms += STEP_MS;
         let mut flown = Vec::new();
         for f in flyers.iter_mut().filter(|f| f.arrived_ms.is_none()) {
             f.body.advance(now_ms, &mut flown);
-            if f.is_there(now_ms) {
+            if f.is_there(now_ms, channel.is_some()) {
                 f.arrived_ms = Some(now_ms);
             }
         }
@@ -159,6 +171,39 @@ pub fn run(scene: &Scene, air: Air, seed: u64) -> Encounter {
     out.losses_of_separation = judge.losses();
     out.min_separation_m = judge.nearest_m();
     out
+}
+
+/// What arrives is heard, each decides when it is its turn, and says what is new.
+fn talk(flyers: &mut [Flyer], channel: &mut Channel, now_ms: u64, out: &mut Encounter) {
+    for (to, from, intent) in channel.due(now_ms) {
+        if let Some(f) = flyers.get_mut(to).filter(|f| f.arrived_ms.is_none()) {
+            f.news |= f.mind.hear(from, &intent, now_ms);
+        }
+    }
+    let count = flyers.len();
+    for (nth, f) in flyers.iter_mut().enumerate() {
+        if f.arrived_ms.is_some() {
+            continue;
+        }
+        if is_turn(nth, count, now_ms) {
+            f.decide(now_ms, out);
+        }
+        if f.speaks(now_ms) {
+            let intent = f.mind.intent();
+            out.messages += u32::from(f.said.as_ref() != Some(&intent));
+            out.transmissions += 1;
+            channel.send(nth, f.id(), &intent, now_ms, count);
+            f.said = Some(intent);
+            f.said_ms = now_ms;
+            f.news = false;
+        }
+    }
+}
+
+/// Whether one of so many has a percept now: theirs are spread over the period.
+fn is_turn(nth: usize, of: usize, now_ms: u64) -> bool {
+    let phase_ms = nth as u64 * PERCEPT_MS / of.max(1) as u64;
+    now_ms == 0 || now_ms % PERCEPT_MS == phase_ms - phase_ms % STEP_MS
 }
 
 /// They begin with what they know of each other: those who fly together have agreed on what
@@ -221,9 +266,9 @@ impl Flyer {
         self.said.is_none() || since_ms >= AGAIN_MS || self.news && since_ms >= APART_MS
     }
 
-    fn is_there(&self, now_ms: u64) -> bool {
+    fn is_there(&self, now_ms: u64, promised: bool) -> bool {
         let off_m = (self.body.position() - self.begin.goal).norm();
-        off_m < ARRIVED_M || self.mind.in_force().has_left(now_ms)
+        off_m < ARRIVED_M || promised && self.mind.in_force().has_left(now_ms)
     }
 }
 

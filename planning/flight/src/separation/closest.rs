@@ -205,10 +205,18 @@ mod tests {
     #[test]
     fn head_on_is_found_when_it_happens() {
         let a = motion((0.0, 0.0, 0.0), &[(0, 1000, 20)], End::Leaves);
-        let b = motion((1000.0, 0.0, std::f64::consts::PI), &[(0, 1000, 20)], End::Leaves);
+        let b = motion(
+            (1000.0, 0.0, std::f64::consts::PI),
+            &[(0, 1000, 20)],
+            End::Leaves,
+        );
         let at_s = first_loss_s(&a, &b, 0, 50.0).unwrap();
         assert!((at_s - (1000.0 - 50.25) / 40.0).abs() < 1e-3, "{at_s}");
-        let c = motion((1000.0, 51.0, std::f64::consts::PI), &[(0, 1000, 20)], End::Leaves);
+        let c = motion(
+            (1000.0, 51.0, std::f64::consts::PI),
+            &[(0, 1000, 20)],
+            End::Leaves,
+        );
         assert_eq!(first_loss_s(&a, &c, 0, 50.0), None);
     }
 

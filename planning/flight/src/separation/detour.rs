@@ -70,13 +70,10 @@ impl Detours {
         Some(self.priced(&way, mps, 0.0))
     }
 
-    /// No way to a goal takes less than this, seconds: straight there, as fast as any way
-    /// is flown.
+    /// No way to a goal costs less than this, seconds: straight there at cruise.
     #[must_use]
-    pub fn fastest_s(&self, from: Pose, goal: Point) -> f64 {
-        let share = AIRSPEEDS.into_iter().fold(0.0, f64::max);
-        let mps = (share * self.airframe.cruise_mps).min(self.airframe.max_mps);
-        (goal - from.position()).norm() / mps
+    pub fn least_cost_s(&self, from: Pose, goal: Point) -> f64 {
+        (goal - from.position()).norm() / self.airframe.cruise_mps
     }
 
     /// All ways from a pose to a goal, cheapest first.

@@ -12,7 +12,7 @@
 //! | proposing | agreed before the branch | on its way | the way is flown |
 //! | proposing | the branch is passed | idle | the next branch is put off half as far again |
 //! | proposing | gave way | idle | another way is looked for at once |
-//! | on its way | every 5 s: a way that saves a second | proposing | the proposal is said |
+//! | on its way | every 5 s: a way that costs a second less | proposing | the proposal is said |
 //!
 //! # Complexity
 //! A proposal costs the candidates of [`Detours`] until one is clear, each held against
@@ -40,7 +40,8 @@ const SEARCH_AGAIN_MS: u64 = 1_000;
 /// in some seconds.
 const IMPROVE_MS: u64 = 5_000;
 
-/// And proposed if it saves this much, seconds: less is not worth the messages.
+/// And proposed if it costs this much less than the flying time that is left, seconds: less
+/// is not worth the messages.
 const WORTH_S: f64 = 1.0;
 
 /// A promise as it is sent.
@@ -231,15 +232,14 @@ impl Conflicts {
         ways.iter().find_map(clear)
     }
 
-    /// Ways that take at most so long, cheapest first.
+    /// Ways that cost at most so much, seconds, cheapest first.
     fn ways(&self, from: Pose, goal: Point, most_s: f64) -> Vec<Detour> {
         let detours = self.apart.detours;
-        let least_s = detours.fastest_s(from, goal);
-        if least_s > most_s {
+        if detours.least_cost_s(from, goal) > most_s {
             return Vec::new();
         }
         let mut ways = detours.all(from, goal);
-        ways.retain(|way| way.duration_s <= most_s);
+        ways.retain(|way| way.cost_s <= most_s);
         ways
     }
 }
@@ -279,4 +279,114 @@ fn received(said: &Intent, now_ms: u64) -> Option<Statement<Motion>> {
 )]
 fn seconds(ms: u64) -> f64 {
     ms as f64 / 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skein_flight::airframe::Airframe;
+    use skein_flight::separation::Stretch;
+
+    const LOITER: End = End::Loiter {
+        radius_mm: -75_000,
+        airspeed_mmps: 20_000,
+    };
+
+    /// A UAV that flies straight for ten seconds, then loiters, and wants on to a goal.
+    fn uav(id: u16, east_m: i32, heading_e7: i32, goal: Point) -> Conflicts {
+        let apart = Apart {
+            detours: Detours {
+                airframe: Airframe {
+                    stall_mps: 13.0,
+                    cruise_mps: 20.0,
+                    max_mps: 26.0,
+                    max_bank_rad: 0.52,
+                    endurance_s: 3600.0,
+                    reserve_s: 300.0,
+                    footprint_across_m: 40.0,
+                    footprint_along_m: 30.0,
+                },
+                separation_m: 50.0,
+            },
+            tubes_m: 4.0,
+        };
+        let motion = Motion::new(MotionPlan {
+            start_ms: 0,
+            east_mm: east_m * 1_000,
+            north_mm: 0,
+            heading_e7,
+            stretches: vec![Stretch {
+                radius_mm: 0,
+                length_mm: 200_000,
+                airspeed_mmps: 20_000,
+            }],
+            end: LOITER,
+        });
+        let mut uav = Conflicts::new(PeerId(id), 0, apart, motion.unwrap());
+        uav.wish(Some(Wish { goal, then: LOITER }));
+        uav
+    }
+
+    fn head_on() -> (Conflicts, Conflicts) {
+        let mut a = uav(1, -600, 0, Point::new(600.0, 0.0));
+        let mut b = uav(2, 600, 31_415_926, Point::new(-600.0, 0.0));
+        let _ = a.hear(PeerId(2), &b.intent(), 0);
+        let _ = b.hear(PeerId(1), &a.intent(), 0);
+        (a, b)
+    }
+
+    #[test]
+    fn who_is_alone_needs_nobody() {
+        let mut a = uav(1, -600, 0, Point::new(600.0, 0.0));
+        assert!(a.tick(0));
+        assert!(a.in_force().ends_at_s() > 50.0, "on its way at once");
+        assert_eq!(a.intent().proposal, None);
+    }
+
+    #[test]
+    fn two_agree_with_four_statements() {
+        let (mut a, mut b) = head_on();
+        assert!(a.tick(0) && b.tick(0), "both propose to fly straight on");
+        // The second hears the first and gives way, looks anew and accepts.
+        assert!(b.hear(PeerId(1), &a.intent(), 100));
+        let _ = b.tick(100);
+        // The first hears both at once, and flies; then the second does.
+        assert!(a.hear(PeerId(2), &b.intent(), 200));
+        assert!(a.in_force().ends_at_s() > 50.0);
+        assert!(b.hear(PeerId(1), &a.intent(), 300));
+        assert!(b.in_force().ends_at_s() > 50.0);
+        let nearest = first_loss_s(a.in_force(), b.in_force(), 300, 54.0);
+        assert_eq!(nearest, None);
+    }
+
+    #[test]
+    fn without_an_answer_the_promise_stands() {
+        let (mut a, b) = head_on();
+        let before = a.in_force().clone();
+        for now_ms in (0..60_000).step_by(200) {
+            let _ = a.tick(now_ms);
+        }
+        assert_eq!(a.in_force(), &before);
+        // An answer to what was withdrawn long ago changes nothing either.
+        let mut late = b.intent();
+        late.number = 9;
+        late.accepts = vec![(PeerId(1), 2)];
+        let _ = a.hear(PeerId(2), &late, 60_000);
+        assert_eq!(a.in_force(), &before);
+    }
+
+    #[test]
+    fn what_cannot_be_flown_or_has_not_begun_changes_nothing() {
+        let (mut a, b) = head_on();
+        let before = a.intent();
+        let mut said = b.intent();
+        said.number = 7;
+        said.in_force.plan.stretches[0].airspeed_mmps = 0;
+        assert!(!a.hear(PeerId(2), &said, 100));
+        let mut said = b.intent();
+        said.number = 7;
+        said.in_force.plan.start_ms = 5_000;
+        assert!(!a.hear(PeerId(2), &said, 100));
+        assert_eq!(a.intent(), before);
+    }
 }

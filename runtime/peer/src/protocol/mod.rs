@@ -4,7 +4,8 @@
 //! [`sections`] holds the rules by which cells change hands, [`runs`] how they are
 //! written into a claim, [`rounds`] the exchange of bids, `negotiation` when each
 //! is used, [`division`] what a complete round decides, `sharing` what is taken without
-//! one, [`launches`] what everybody begins with. What travels is `relay`'s, and how much of it [`airtime`]'s.
+//! one, [`launches`] what everybody begins with. [`promises`] holds the rule by which committed
+//! motions change, [`conflict`] which one is asked for. What travels is `relay`'s, and how much of it [`airtime`]'s.
 
 pub mod airtime;
 pub mod conflict;
