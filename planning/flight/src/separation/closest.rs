@@ -10,7 +10,7 @@
 //!
 //! # Complexity
 //! O(stretches) where both fly straight; in turns some steps for every halving of the
-//! distance, none shorter than [`LEAST_STEP_M`].
+//! distance, none shorter than 0.4 m of approach.
 
 use super::motion::{End, Motion, Piece, seconds};
 use skein_geometry::frame::{Point, Vector};
