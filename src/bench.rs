@@ -4,7 +4,7 @@ use crate::exit;
 use clap::{Args, Subcommand};
 use skein_broker::encounters;
 use skein_netsim::encounters::scene::Scene;
-use skein_netsim::encounters::{Air, Radio};
+use skein_netsim::encounters::{Air, Radio, least_range_m};
 use skein_scenario::Seeds;
 use std::num::NonZeroUsize;
 use std::process::ExitCode;
@@ -52,9 +52,10 @@ pub struct ConflictsArgs {
     /// No message arrives at all: each UAV has its traffic sensor alone.
     #[arg(long, conflicts_with_all = ["loss", "delay_ms"])]
     pub jam: bool,
-    /// Range of the traffic sensor with --jam, metres.
-    #[arg(long, value_name = "M", default_value_t = 500.0, requires = "jam")]
-    pub range_m: f64,
+    /// Range of the traffic sensor with --jam, metres; without it the least with which the rule
+    /// promises anything, which is told.
+    #[arg(long, value_name = "M", requires = "jam", value_parser = range)]
+    pub range_m: Option<f64>,
     /// Runs at the same time; without it one a processor.
     #[arg(long, value_name = "J")]
     pub jobs: Option<NonZeroUsize>,
@@ -67,6 +68,28 @@ fn share(text: &str) -> Result<f64, String> {
     } else {
         Err("a share is between 0 and 1".to_owned())
     }
+}
+
+fn range(text: &str) -> Result<f64, String> {
+    let range_m: f64 = text.parse().map_err(|_| format!("{text:?} is no number"))?;
+    if (0.0..=100_000.0).contains(&range_m) {
+        Ok(range_m)
+    } else {
+        Err("a range is between 0 and 100000 m".to_owned())
+    }
+}
+
+/// The range of the sensor: what is asked for, or the least that promises anything.
+fn sensed_m(asked_m: Option<f64>, scene: Scene) -> f64 {
+    let least_m = least_range_m(scene).ceil();
+    match asked_m {
+        None => eprintln!("note: traffic sensors of {least_m} m"),
+        Some(m) if m < least_m => {
+            eprintln!("note: below {least_m} m the rule promises nothing");
+        }
+        Some(_) => {}
+    }
+    asked_m.unwrap_or(least_m)
 }
 
 /// Runs the verb.
@@ -82,7 +105,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
     };
     let radio = if args.jam {
         Radio::Jammed {
-            range_m: args.range_m,
+            range_m: sensed_m(args.range_m, scene),
         }
     } else {
         Radio::Works(Air {

@@ -3,6 +3,7 @@
 use super::{Flyer, PERCEPT_MS, SEPARATION_M, TUBES_M, is_turn, seconds};
 use skein_behaviors::reactive::sensed_traffic::{Contact, Rule};
 use skein_behaviors::setpoint::{Setpoint, Side, Steer};
+use skein_flight::airframe::Airframe;
 
 /// Turns of a setpoint last until the airframe's failsafe would act, milliseconds.
 const STEER_MS: u32 = 1_000;
@@ -39,6 +40,22 @@ pub(super) fn decide(flyers: &mut [Flyer], range_m: f64, now_ms: u64) {
     }
 }
 
+/// The range that sensors need if all fly such airframes, metres.
+pub(super) fn least_range_m(airframe: &Airframe) -> f64 {
+    let circle_m = circle_m(airframe);
+    rule(airframe).least_range_m(airframe.cruise_mps, circle_m)
+}
+
+fn rule(airframe: &Airframe) -> Rule {
+    Rule {
+        airspeed_mps: airframe.cruise_mps,
+        circle_m: circle_m(airframe),
+        separation_m: SEPARATION_M,
+        errors_m: TUBES_M,
+        step_s: seconds(PERCEPT_MS),
+    }
+}
+
 fn sensed(flyers: &[Flyer], nth: usize, range_m: f64) -> (Rule, Vec<Contact>) {
     let own = &flyers[nth];
     let others = flyers.iter().enumerate();
@@ -49,20 +66,12 @@ fn sensed(flyers: &[Flyer], nth: usize, range_m: f64) -> (Rule, Vec<Contact>) {
         .map(|(_, f)| Contact {
             pose: f.body.pose(),
             airspeed_mps: f.begin.airframe.cruise_mps,
-            circle_m: Some(circle_m(f)),
+            circle_m: Some(circle_m(&f.begin.airframe)),
         })
         .collect();
-    let rule = Rule {
-        airspeed_mps: own.begin.airframe.cruise_mps,
-        circle_m: circle_m(own),
-        separation_m: SEPARATION_M,
-        errors_m: TUBES_M,
-        step_s: seconds(PERCEPT_MS),
-    };
-    (rule, contacts)
+    (rule(&own.begin.airframe), contacts)
 }
 
-fn circle_m(f: &Flyer) -> f64 {
-    let airframe = &f.begin.airframe;
+fn circle_m(airframe: &Airframe) -> f64 {
     airframe.ground_turn_radius_m(airframe.cruise_mps, 0.0)
 }

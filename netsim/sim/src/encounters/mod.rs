@@ -206,6 +206,12 @@ fn is_turn(nth: usize, of: usize, now_ms: u64) -> bool {
     now_ms == 0 || now_ms % PERCEPT_MS == phase_ms - phase_ms % STEP_MS
 }
 
+/// The range that the sensors of a scene need for the rule to promise anything, metres.
+#[must_use]
+pub fn least_range_m(scene: Scene) -> f64 {
+    alone::least_range_m(&scene.fastest())
+}
+
 /// They begin with what they know of each other: those who fly together have agreed on what
 /// is in force before.
 fn introduce(flyers: &mut [Flyer]) {

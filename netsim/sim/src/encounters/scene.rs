@@ -47,6 +47,14 @@ pub(super) struct Begin {
 }
 
 impl Scene {
+    /// The fastest airframe that may fly in it.
+    pub(super) fn fastest(self) -> Airframe {
+        match self {
+            Self::Circle(_) => airframe(20.0),
+            Self::Pair => airframe(24.0),
+        }
+    }
+
     /// Begins a run; `None` if there is no room for everybody's loiter.
     pub(super) fn begin(self, seed: u64) -> Option<Vec<Begin>> {
         let mut random = SplitMix64::new(seed);
