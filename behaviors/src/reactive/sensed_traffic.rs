@@ -1,5 +1,5 @@
 //! Keeping apart from traffic that is only sensed: no message is sent or heard (D2.7
-//! §1.2.3, §2.3.1).
+//! §1.2.3).
 //!
 //! Everybody holds the same contingency: a circle to the right for ever. Two that fly it
 //! at one turn rate keep the distance of their centres less that of their phases, for the

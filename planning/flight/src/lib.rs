@@ -8,7 +8,7 @@
 //! | [`airframe`] | what a UAV can fly | 2.2 |
 //! | [`route`] | the shortest route with clearance | 2.3.2 |
 //! | [`trajectory`] | Dubins words, flights in wind, timed trajectories | 2.4 |
-//! | [`separation`] | promised motions, whether two keep apart, ways round | 1.2.2, 2.3.1 |
+//! | [`separation`] | promised motions, whether two keep apart, ways round | 1.3 |
 //! | [`coverage`] | closed loops over areas, points and lines, and their division among UAVs | 3.4–3.6 |
 //!
 //! ```

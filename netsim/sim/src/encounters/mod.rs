@@ -1,5 +1,5 @@
 //! Encounters: fixed wings at one height that would meet, and what their promises to each
-//! other come to (D2.7 §1.2.2, §2.3.1).
+//! other come to (D2.7 §1.3).
 //!
 //! The same machine that a peer has ([`skein_peer::protocol::conflict`]) negotiates over a
 //! channel that loses and delays; the same reactive layer flies what was agreed; kinematic

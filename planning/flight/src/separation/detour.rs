@@ -1,7 +1,7 @@
 //! Ways to a goal with lateral offsets, airspeeds and waiting, cheapest first.
 //!
 //! The candidates among which a UAV chooses when it has to keep clear of others (D2.7
-//! §1.2.2 names speed and course): each turns towards a place beside the straight way,
+//! §1.3: negotiation of approaching vehicles): each turns towards a place beside the straight way,
 //! flies there, turns towards the goal and flies there; at another airspeed where that
 //! helps; after circles where it does not.
 //!
@@ -9,8 +9,8 @@
 //! Equal inputs give equal lists. Turns keep the bank limit at their airspeed.
 //!
 //! # Complexity
-//! O(offsets · places · airspeeds), some six hundred candidates; made lazily by nobody,
-//! because the cheapest need not be the first that is clear.
+//! O(offsets · places · airspeeds · circles): some sixteen hundred candidates, made and
+//! sorted at each search.
 
 use super::motion::{Stretch, radius_mm, to_mm};
 use crate::airframe::{Airframe, GRAVITY_MPS2, PowerModel};

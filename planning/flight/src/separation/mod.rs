@@ -1,5 +1,5 @@
 //! Separation of UAVs at one height: motions that are promised, how near two of them
-//! come, and ways round each other (D2.7 §2.3.1, §3.7.3 in spirit: approach conflicts).
+//! come, and ways round each other (D2.7 §1.3: approach conflicts).
 //!
 //! | module | what it holds |
 //! |---|---|

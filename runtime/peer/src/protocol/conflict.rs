@@ -1,4 +1,4 @@
-//! Approach conflicts: which motion a UAV asks for, and until when (D2.7 §1.2.2, §2.3.1).
+//! Approach conflicts: which motion a UAV asks for, and until when (D2.7 §1.3).
 //!
 //! A UAV that wants to go somewhere looks for the cheapest way that keeps apart from all
 //! that stands, and proposes to turn off onto it a little ahead of where it is. What then

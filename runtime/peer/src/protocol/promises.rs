@@ -1,5 +1,5 @@
 //! Promises: what a UAV flies, what it would rather fly, and who has accepted that (D2.7
-//! §1.2.2, §2.3.1).
+//! §1.3).
 //!
 //! Each UAV has one promised motion in force, which ends in a loiter for ever. It flies
 //! another one only when everybody whom it may meet has accepted that; until then, and if
