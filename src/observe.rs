@@ -4,6 +4,7 @@ use crate::{cli, exit};
 use clap::{Args, ValueEnum};
 use skein_broker::registry;
 use skein_node::bus::{Observed, Observer};
+use skein_peer::PeerId;
 use skein_peer::wire::codec::{Body, open};
 use skein_peer::wire::message::{ListedRun, Record};
 use skein_peer::wire::signature::Off;
@@ -188,6 +189,8 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Finished(b) => serde_json::to_value(b),
         Body::Heartbeat(b) => serde_json::to_value(b),
         Body::Lacking(b) => serde_json::to_value(b),
+        Body::Intent(b) => serde_json::to_value(b),
+        Body::Conflict(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -261,7 +264,24 @@ fn words(body: &Body) -> String {
             l.pieces.iter().map(|b| b.count_ones()).sum::<u32>(),
             l.revision
         ),
+        Body::Intent(i) => promises(
+            i.in_force.version,
+            i.proposal.as_ref().map(|p| p.version),
+            &i.accepts,
+        ),
+        Body::Conflict(b) => promises(b.in_force, b.proposal, &b.accepts),
     }
+}
+
+/// What is flown, offered and accepted, by versions.
+fn promises(in_force: u32, proposal: Option<u32>, accepts: &[(PeerId, u32)]) -> String {
+    let offers = proposal.map_or_else(String::new, |version| format!(", offers {version}"));
+    let accepts = accepts.iter();
+    let accepts = accepts.map(|(id, version)| format!(", accepts {version} of uav{}", id.0));
+    format!(
+        "flies promise {in_force}{offers}{}",
+        accepts.collect::<String>()
+    )
 }
 
 fn listings(all: &[ListedRun]) -> String {

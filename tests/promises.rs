@@ -134,7 +134,7 @@ impl Model for Case {
                 to
             }
         };
-        let _ = next.uavs[who].settle(true, &apart);
+        let _ = next.uavs[who].settle(true, &|_| true, &apart);
         next.say(who);
         Some(next)
     }

@@ -25,6 +25,7 @@ pub mod camera;
 mod clearance_check;
 mod goal_change;
 pub mod prediction;
+pub mod promised;
 mod transfer;
 pub mod transit;
 
@@ -175,6 +176,8 @@ pub struct Executive {
     /// Where it must be able to return to, and how long that takes from the farthest
     /// boundary of the loop, milliseconds.
     home: Option<(Point, u32)>,
+    /// What it flies where nothing else was agreed, if it flies by promises.
+    contingency: Option<promised::Contingency>,
 }
 
 impl Executive {
@@ -203,6 +206,7 @@ impl Executive {
             recent: VecDeque::with_capacity(RECENT),
             pending: Vec::new(),
             home: None,
+            contingency: None,
         }
     }
 
@@ -257,6 +261,9 @@ impl Executive {
         self.note_wind(percept);
         if percept.takes_off_in_ms > 0 {
             return (self.on_ground(percept), events);
+        }
+        if self.promises(percept) {
+            return self.step_promised(percept, is_open, events);
         }
         self.report_seen(percept, is_open, &mut events);
         let offset = self.progress(percept);

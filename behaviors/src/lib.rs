@@ -4,6 +4,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`percept`] | what a UAV senses |
+//! | [`traffic`] | what it senses of other UAVs |
 //! | [`setpoint`] | what it is told to fly |
 //! | [`order`] | what the operator wants of all |
 //! | [`event`] | what the executive layer reports upwards |
@@ -18,6 +19,7 @@ pub mod reactive;
 pub mod setpoint;
 #[cfg(test)]
 mod testing;
+pub mod traffic;
 
 pub use event::Event;
 pub use executive::{Executive, Forecast, Goal};

@@ -1,5 +1,6 @@
 //! What a UAV senses, from a simulator or an autopilot.
 
+use crate::traffic::Traffic;
 use serde::{Deserialize, Serialize};
 use skein_geometry::frame::Pose;
 
@@ -25,4 +26,7 @@ pub struct Percept {
     pub takes_off_in_ms: u32,
     /// Whether the airframe flies its own failsafe loiter for want of setpoints.
     pub failsafe: bool,
+    /// Other UAVs that it senses.
+    #[serde(default, skip_serializing_if = "Traffic::is_absent")]
+    pub traffic: Traffic,
 }

@@ -42,6 +42,7 @@ pub fn percept_at(pose: Pose, time_ms: u64) -> Percept {
         endurance_s: 3000.0,
         takes_off_in_ms: 0,
         failsafe: false,
+        traffic: crate::traffic::Traffic::default(),
     }
 }
 

@@ -35,6 +35,14 @@ impl Transit {
         }
     }
 
+    /// Whether a circle keeps off the zones by what its flight may stray, twice: one that is
+    /// flown for as long as it takes.
+    #[must_use]
+    pub fn has_room(&self, circle: &Segment) -> bool {
+        let zones = self.router.zones();
+        zones.is_clear(&halves(circle), 2.0 * self.tracking_error_m)
+    }
+
     /// Of moves that follow each other from a place, what may be flown. Where one lacks
     /// its proof, the cell they lead to is refused; without a cell it is held instead.
     pub(super) fn cleared(

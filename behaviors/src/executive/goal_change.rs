@@ -20,7 +20,11 @@ impl Executive {
             Goal::Legs(legs) => {
                 let visits = self.visits(&legs);
                 begins_with = visits.iter().find(|visit| is_open(visit.cell)).copied();
-                let (kept, queue) = self.continued(visits, is_open);
+                let (kept, queue) = if self.contingency.is_some() {
+                    self.agreed_continued(visits, is_open)
+                } else {
+                    self.continued(visits, is_open)
+                };
                 (Aim::Legs, kept, queue)
             }
             Goal::Hold => (
@@ -38,7 +42,20 @@ impl Executive {
             }
         };
         self.end_reported = false;
+        let same_aim = self.aim == aim;
         self.aim = aim;
+        if self.contingency.is_some() {
+            if !same_aim {
+                self.aim_anew();
+            }
+            self.queue = queue;
+            let kept = if self.replan { 0 } else { kept };
+            self.unwant_beyond(kept, false);
+            if kept > 0 {
+                self.serve_first(begins_with);
+            }
+            return;
+        }
         self.replan = self.replan || kept == 0;
         if kept > 0 {
             self.keep(kept);

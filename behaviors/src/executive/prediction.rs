@@ -244,11 +244,14 @@ impl Executive {
         let mut items = Vec::with_capacity(kept + queue.len());
         let mut place = *from;
         let mut end_m = 0.0;
+        // By promises a UAV may circle and fly on.
+        let goes_on = self.contingency.is_some();
+        let flown = kept.min(self.flight_stretches());
         for s in self
             .stretches
             .iter()
-            .take(kept)
-            .take_while(|s| !matches!(s.kind, Kind::Loiter(_)))
+            .take(flown)
+            .take_while(|s| goes_on || !matches!(s.kind, Kind::Loiter(_)))
         {
             end_m = self.air_m_until(s.end_m);
             place = s.end;

@@ -122,14 +122,7 @@ impl Track {
     /// The pose on the curve where the UAV should be; `None` on an empty track.
     #[must_use]
     pub fn pose(&self) -> Option<Pose> {
-        let mut from = self.front_m;
-        for s in &self.segments {
-            if self.at_m <= from + s.length_m {
-                return Some(s.pose_at(self.at_m - from));
-            }
-            from += s.length_m;
-        }
-        self.segments.back().map(Segment::end)
+        self.pose_at(self.at_m)
     }
 
     /// The pose at the end of the track; `None` on an empty one.
@@ -192,14 +185,19 @@ impl Track {
     /// What is ahead of the UAV, at most `length_m` of it.
     #[must_use]
     pub fn ahead(&self, length_m: f64) -> Curve {
-        let mut ahead = Curve::empty();
-        let until_m = self.at_m + length_m;
+        self.between(self.at_m, self.at_m + length_m)
+    }
+
+    /// The part of the track between two arc lengths, as far as it is held.
+    #[must_use]
+    pub fn between(&self, from_m: f64, until_m: f64) -> Curve {
+        let mut part = Curve::empty();
         let mut from = self.front_m;
         for s in &self.segments {
             let to = from + s.length_m;
-            let (a, b) = (from.max(self.at_m), to.min(until_m));
+            let (a, b) = (from.max(from_m), to.min(until_m));
             if b > a {
-                ahead.push(Segment {
+                part.push(Segment {
                     start: s.pose_at(a - from),
                     length_m: b - a,
                     ..*s
@@ -210,7 +208,21 @@ impl Track {
             }
             from = to;
         }
-        ahead
+        part
+    }
+
+    /// The pose at an arc length, at the nearest end of what is held where it lies beyond;
+    /// `None` on an empty track.
+    #[must_use]
+    pub fn pose_at(&self, at_m: f64) -> Option<Pose> {
+        let mut from = self.front_m;
+        for s in &self.segments {
+            if at_m <= from + s.length_m {
+                return Some(s.pose_at((at_m - from).max(0.0)));
+            }
+            from += s.length_m;
+        }
+        self.end()
     }
 
     /// The turns of the next [`HORIZON_S`] for a UAV that is off by `offset`,

@@ -20,7 +20,7 @@ use skein_geometry::math::wrap_pi;
 pub const CATCH_UP_S: f64 = 2.0;
 
 /// Catching up changes the airspeed by at most this share.
-const MOST_SHARE: f64 = 0.1;
+pub const MOST_SHARE: f64 = 0.1;
 
 /// The setpoint that keeps a UAV on its promise.
 #[must_use]

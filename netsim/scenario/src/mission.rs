@@ -7,6 +7,7 @@ use crate::read::Stated;
 use crate::read::targets::Asked;
 use crate::request::AreaPlanner;
 use skein_flight::airframe::Airframe;
+use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::Point;
 use skein_geometry::{NoFlyZones, Polygon};
 use skein_interop::json::Error;
@@ -71,7 +72,14 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
         further_laps: laps(s)? - 1,
         tree: lanes.tree.unwrap_or_default(),
         division: s.division,
+        separation_mm: length_mm((s.fleet.separation_m * 1000.0).ceil()),
+        fastest_mmps: if s.fleet.separation_m > 0.0 {
+            length_mm((airframes().map(|a| a.cruise_mps).fold(0.0, f64::max) * 1000.0).ceil())
+        } else {
+            0
+        },
     };
+    check_separation(s, &mission)?;
     check_size(s)?;
     check_places(s, &mission)?;
     Ok(mission)
@@ -93,6 +101,47 @@ fn turning(s: &Stated) -> Result<f64, Error> {
         )));
     }
     Ok(calm_m.max(widest(&|a| turn_radius_m(a, s.wind, spacing_m))))
+}
+
+/// How far UAVs sense each other, metres: what is stated, or what flying at one height asks
+/// for.
+pub(crate) fn traffic_range_m(s: &Stated, mission: &Mission) -> f64 {
+    if s.fleet.separation_m <= 0.0 {
+        return 0.0;
+    }
+    let stated = s.fleet.traffic_range_m;
+    stated.unwrap_or_else(|| mission.least_traffic_range_m().ceil())
+}
+
+/// What flying at one height by agreement asks for.
+fn check_separation(s: &Stated, mission: &Mission) -> Result<(), Error> {
+    if s.fleet.separation_m <= 0.0 {
+        return Ok(());
+    }
+    if s.wind != Wind::CALM {
+        return Err(s.places.wrong(
+            "fleet.separation_m",
+            "UAVs keep apart at one height in still air only; leave the wind out, or separation_m, so that each has a height of its own",
+        ));
+    }
+    if let Some(range_m) = s.fleet.traffic_range_m
+        && range_m < mission.least_traffic_range_m()
+    {
+        return Err(s.places.wrong(
+            "fleet.traffic_range_m",
+            format!(
+                "{range_m} m are too short: two UAVs that are farther apart could meet before either asks the other; expected at least {:.0} m",
+                mission.least_traffic_range_m().ceil()
+            ),
+        ));
+    }
+    if s.fleet.members.iter().any(|m| m.takeoff_ms.is_some()) {
+        return Err(s.places.wrong(
+            "fleet.separation_m",
+            "UAVs that take off one after the other at one place need heights of their own; expected launch: \"spread\", or separation_m left out",
+        ));
+    }
+    Ok(())
 }
 
 /// How often everything is to be seen.

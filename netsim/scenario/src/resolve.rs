@@ -7,6 +7,7 @@ use crate::feasibility::{self, Summary, blamed};
 use crate::files::Files;
 use crate::forecast::{self, Forecast};
 use crate::mission::mission;
+use crate::mission::traffic_range_m;
 use crate::read::fleet::{Fleet, Member};
 use crate::read::targets::Asked;
 use crate::read::{self, Stated};
@@ -133,7 +134,8 @@ fn spec(s: &Stated, geometry: &MissionGeometry) -> Spec {
         time_scale: s.run.time_scale,
         max_time_s: s.run.max_time_s,
         min_coverable: s.run.min_coverable,
-        min_separation_m: s.run.min_separation_m,
+        min_separation_m: s.run.min_separation_m.max(s.fleet.separation_m),
+        traffic_range_m: traffic_range_m(s, &geometry.mission),
         faults: s.faults.clone(),
         storm: s.storm,
         seed: s.run.seed,

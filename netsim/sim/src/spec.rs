@@ -45,8 +45,11 @@ pub struct Spec {
     pub max_time_s: u32,
     /// Share of the area that must be coverable, 0 to 1.
     pub min_coverable: f64,
-    /// Smallest separation of airborne UAVs, metres (recorded).
+    /// Smallest separation of airborne UAVs, metres: recorded, and a rule where the mission
+    /// has UAVs keep apart by agreement.
     pub min_separation_m: f64,
+    /// How far UAVs sense each other, metres; 0 without such sensors.
+    pub traffic_range_m: f64,
     /// Faults of the scenario, ascending by time.
     pub faults: Vec<TimedFault>,
     /// From what random faults are drawn.

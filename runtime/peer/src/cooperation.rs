@@ -36,7 +36,7 @@ use crate::journal::Durable;
 use crate::mission::{GeometryError, Library, Mission};
 use crate::mission_state::MissionState;
 use crate::offload::{Job, MissionGeometry};
-use crate::output::Report;
+use crate::output::{Report, Status};
 use crate::protocol::membership::Membership;
 use crate::protocol::negotiation::{Adoption, are_many};
 use crate::protocol::runs::{PlannedCell, legs_of};
@@ -215,7 +215,7 @@ impl Cooperation {
     }
 
     /// A percept: fly, and note what the camera saw.
-    pub fn on_percept(&mut self, percept: &Percept) -> Effects {
+    pub fn on_percept(&mut self, now: Time, percept: &Percept) -> Effects {
         let Some(state) = &mut self.state else {
             return Effects::new();
         };
@@ -223,8 +223,12 @@ impl Cooperation {
         let Some(executive) = &mut state.executive else {
             return Effects::new();
         };
-        let (setpoint, events) = executive.step(percept, &|c| !sections.covered().contains(c));
+        let is_open = |c: u16| !sections.covered().contains(c);
+        let (setpoint, events) = executive.step(percept, &is_open);
         let mut effects = vec![Effect::Fly(setpoint)];
+        if let Some(separation) = &mut state.separation {
+            effects.extend(separation.on_percept(now, percept, executive, &is_open));
+        }
         for event in events {
             effects.extend(state.on_event(event));
         }
@@ -274,6 +278,17 @@ impl Cooperation {
                 self.hear_order(*order, (record.incarnation, record.seq, record.author));
                 Effects::new()
             }
+            Body::Intent(_) | Body::Conflict(_) => {
+                let state = self.state.as_mut();
+                if let Some(separation) = state.and_then(|s| s.separation.as_mut()) {
+                    match body {
+                        Body::Intent(intent) => separation.hear(now, author, intent),
+                        Body::Conflict(brief) => separation.hear_brief(now, author, brief),
+                        _ => {}
+                    }
+                }
+                Effects::new()
+            }
             body => match &mut self.state {
                 Some(state) => state.hear(now, author, record.seq, body),
                 None => Effects::new(),
@@ -289,6 +304,11 @@ impl Cooperation {
             return effects;
         };
         effects.extend(state.watch_fuel(s.percept));
+        if let Some(separation) = &mut state.separation {
+            let all = s.membership.all();
+            let down = all.filter(|(.., status)| *status == Status::Down);
+            separation.believe_down(s.now, down.map(|(id, ..)| id));
+        }
         if order == Order::Resume {
             effects.extend(state.check_endurance(s));
         }

@@ -25,6 +25,8 @@ pub(crate) type Effects = Vec<Effect>;
 pub(crate) enum Effect {
     /// Speak a record of this peer's own, under a subject.
     Speak(u16, Body),
+    /// Say what nobody passes on, at once.
+    SayNow(Body),
     /// Make an entry durable; the promise is kept once it is.
     Store(Promise, Entry),
     /// Have a job computed, unless it is under way.

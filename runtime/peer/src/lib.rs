@@ -105,6 +105,8 @@ mod outbound;
 pub mod output;
 pub mod peer;
 pub mod protocol;
+
+mod separation;
 mod taking;
 mod task;
 #[cfg(any(test, feature = "testing"))]

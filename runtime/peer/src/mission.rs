@@ -5,6 +5,7 @@ use crate::task::CoverageTask;
 use crate::wire::limits::{CHUNK_MAX_BYTES, CHUNKS_MAX};
 use crate::wire::message::{Lacking, MissionChunk};
 use serde::{Deserialize, Serialize};
+use skein_behaviors::executive::promised::reach_m;
 use skein_flight::coverage::lanes;
 use skein_flight::coverage::passes::{self, PassesProblem};
 use skein_flight::coverage::ring::division::Rule;
@@ -66,6 +67,13 @@ pub struct Mission {
     /// By what rule the loop is divided.
     #[serde(default, skip_serializing_if = "Rule::is_default")]
     pub division: Rule,
+    /// What any two UAVs keep between them by agreement, all at one height, mm; 0 where each
+    /// has a height of its own.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub separation_mm: u32,
+    /// The fastest cruise of the fleet, mm/s; of use with a separation alone.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub fastest_mmps: u32,
 }
 
 #[allow(
@@ -73,6 +81,14 @@ pub struct Mission {
     reason = "the signature that serde asks for"
 )]
 fn is_zero(n: &u16) -> bool {
+    *n == 0
+}
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "the signature that serde asks for"
+)]
+fn is_none(n: &u32) -> bool {
     *n == 0
 }
 
@@ -170,6 +186,26 @@ impl Mission {
         metres(self.tracking_error_mm)
     }
 
+    /// What any two UAVs keep between them by agreement; 0 where heights keep them apart.
+    #[must_use]
+    pub fn separation_m(&self) -> f64 {
+        metres(self.separation_mm)
+    }
+
+    /// The fastest cruise of the fleet, m/s.
+    #[must_use]
+    pub fn fastest_mps(&self) -> f64 {
+        metres(self.fastest_mmps)
+    }
+
+    /// How far UAVs have to sense each other to keep apart by agreement: two that are farther
+    /// apart do not meet on what either may have promised.
+    #[must_use]
+    pub fn least_traffic_range_m(&self) -> f64 {
+        let reach_m = reach_m(self.fastest_mps(), self.turn_radius_m());
+        2.0 * reach_m + self.separation_m() + 2.0 * self.tracking_error_m()
+    }
+
     /// A launch point, which must reach the loop.
     #[must_use]
     pub fn launch_m(&self) -> Point {
@@ -223,6 +259,10 @@ impl Mission {
         }
         if !self.division.is_default() {
             h.write_i64(1);
+        }
+        if self.separation_mm > 0 {
+            h.write_i64(i64::from(self.separation_mm));
+            h.write_i64(i64::from(self.fastest_mmps));
         }
         if self.is_patrol() {
             h.write_i64(i64::from(self.lap));
@@ -506,6 +546,8 @@ mod tests {
             further_laps: 0,
             tree: Tree::default(),
             division: Rule::default(),
+            separation_mm: 0,
+            fastest_mmps: 0,
         }
     }
 

@@ -7,6 +7,7 @@ use crate::journal::Durable;
 use crate::mission::{PointMm, ring_mm};
 use crate::offload::MissionGeometry;
 use crate::protocol::Negotiation;
+use crate::separation::{Rules, Separation};
 use crate::wire::message::{Claim, Member};
 use skein_behaviors::Executive;
 use skein_flight::coverage::ring::patch::Patches;
@@ -24,12 +25,34 @@ pub(crate) fn executive_for(geometry: &MissionGeometry, config: &PeerConfig) -> 
         Arc::clone(coverage_loop),
         Arc::clone(router),
     );
-    Some(
+    let executive = executive
+        .with_tracking_error_m(mission.tracking_error_m())
+        .with_objective(config.objective)
+        .with_home(mission.base_m());
+    Some(if mission.separation_mm > 0 {
+        executive.with_promises()
+    } else {
         executive
-            .with_tracking_error_m(mission.tracking_error_m())
-            .with_objective(config.objective)
-            .with_home(mission.base_m()),
-    )
+    })
+}
+
+/// How a UAV is kept apart from others at its height; not at all where the mission gives
+/// each a height of its own.
+pub(crate) fn separation_for(
+    geometry: &MissionGeometry,
+    me: Member,
+    config: &PeerConfig,
+) -> Option<Separation> {
+    let (mission, airframe) = (&geometry.mission, config.airframe?);
+    (mission.separation_mm > 0).then(|| {
+        let rules = Rules {
+            separation_m: mission.separation_m(),
+            tubes_m: 2.0 * mission.tracking_error_m(),
+            fastest_mps: mission.fastest_mps(),
+            turn_radius_m: mission.turn_radius_m(),
+        };
+        Separation::new(me, rules, airframe)
+    })
 }
 
 /// A negotiation on a new loop, with all that is known to be covered: before, on the loop of

@@ -22,13 +22,14 @@ use crate::effect::{Effect, Effects, PendingJob, Promise};
 use crate::input::Time;
 use crate::journal::{Durable, Entry};
 use crate::mission::Mission;
-use crate::mission_change::{executive_for, negotiation_begun};
+use crate::mission_change::{executive_for, negotiation_begun, separation_for};
 use crate::offload::{Job, MissionGeometry};
 use crate::output::Report;
 use crate::protocol::division;
 use crate::protocol::negotiation::{Action, Context, Negotiation};
 use crate::protocol::runs::{PlannedCell, legs_of};
 use crate::protocol::sections::FIRST_LIFE;
+use crate::separation::Separation;
 use crate::timers::{Timer, Timers};
 use crate::wire::codec::Body;
 use crate::wire::limits::BID_COVERED_MAX_BYTES;
@@ -93,6 +94,8 @@ impl ClaimsWritten {
 pub(crate) struct MissionState {
     pub geometry: Arc<MissionGeometry>,
     pub executive: Option<Executive>,
+    /// How it is kept apart from others at its height.
+    pub separation: Option<Separation>,
     pub negotiation: Negotiation,
     goal: Option<Goal>,
     /// Whether the goal is to be given to the executive again.
@@ -127,6 +130,9 @@ impl MissionState {
         }
         self.able_since = None;
         self.replan = true;
+        if let Some(separation) = &mut self.separation {
+            separation.begin_life(me);
+        }
     }
 
     pub fn revision(&self) -> u32 {
@@ -628,6 +634,7 @@ impl MissionState {
                 cells,
             ),
             executive: executive_for(&geometry, config),
+            separation: separation_for(&geometry, me, config),
             goal: None,
             replan: true,
             able_since: None,
@@ -669,6 +676,7 @@ impl MissionState {
         if flown_alike {
             let base = new.base_m();
             self.executive = old.executive.map(|e| e.with_home(base));
+            self.separation = old.separation;
             self.goal = old.goal;
             self.replan = old.replan;
         }

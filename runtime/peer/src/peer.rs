@@ -20,7 +20,7 @@ use crate::input::{Command, Input, Time};
 use crate::journal::{Durable, Entry};
 use crate::offload::{Job, JobResult};
 use crate::outbound::{self, Outbound, Sources};
-use crate::output::{Output, Priority, Report, Status};
+use crate::output::{Output, Report, Status};
 use crate::protocol::life::Life;
 use crate::protocol::membership::{Change, Membership};
 use crate::protocol::negotiation::are_many;
@@ -237,7 +237,7 @@ impl Peer {
             return self.refuse("a percept that is not finite".into());
         }
         self.percept = Some(percept);
-        let mut effects = self.cooperation.on_percept(&percept);
+        let mut effects = self.cooperation.on_percept(self.now, &percept);
         // One airframe is not flown by two.
         if self.life.shares_airframe() {
             effects.retain(|e| !matches!(e, Effect::Fly(_)));
@@ -470,6 +470,7 @@ impl Peer {
                     self.carry_out(effects);
                 }
             }
+            Effect::SayNow(body) => self.say_now(&body),
             Effect::CoverageChanged => self.outbound.coverage_changed(&mut self.timers),
             Effect::CoverageHeard(loop_hash, cells) => {
                 if self.relay.air.is_crowded() {
@@ -617,7 +618,7 @@ impl Peer {
             key: key::key(&self.config.fleet, kind, 0, self.me().id),
             bytes,
             hops: 0,
-            priority: Priority::Beacon,
+            priority: kind.priority(),
             lifetime_ms: self.relay.lifetime_ms(kind),
         });
     }
@@ -645,11 +646,19 @@ impl Peer {
             return;
         };
         self.lacking_told = true;
-        let (me, body) = (self.me(), Body::Lacking(lacking));
-        let record = self.outbound.record(me.id, me.incarnation, 0, &body);
+        self.say_now(&Body::Lacking(lacking));
+    }
+
+    /// Says what nobody passes on.
+    fn say_now(&mut self, body: &Body) {
+        if !self.speaks() {
+            return;
+        }
+        let me = self.me();
+        let record = self.outbound.record(me.id, me.incarnation, 0, body);
         let bytes = codec::encode_record(&record);
         self.relay.air.charge(self.now, bytes.len());
-        self.broadcast(Kind::Lacking, bytes);
+        self.broadcast(body.kind(), bytes);
     }
 
     /// Sends what the relay lets go.

@@ -64,6 +64,8 @@ pub fn mission(revision: u32, cols: i32, rows: i32) -> Mission {
         further_laps: 0,
         tree: Tree::default(),
         division: Rule::default(),
+        separation_mm: 0,
+        fastest_mmps: 0,
     }
 }
 
@@ -159,6 +161,7 @@ impl Seat {
             endurance_s: self.fuel_s,
             takes_off_in_ms: 0,
             failsafe: false,
+            traffic: skein_behaviors::traffic::Traffic::default(),
         }
     }
 

@@ -37,6 +37,11 @@ pub(crate) struct Member {
 #[derive(Clone, Debug)]
 pub(crate) struct Fleet {
     pub(crate) key: String,
+    /// What any two keep between them by agreement, all at one height, metres; 0 where each
+    /// has a height of its own.
+    pub(crate) separation_m: f64,
+    /// How far UAVs sense each other, metres, where the file says so.
+    pub(crate) traffic_range_m: Option<f64>,
     pub(crate) members: Vec<Member>,
 }
 
@@ -94,6 +99,8 @@ pub(crate) fn read(
     let f = node.fields(&[
         "key",
         "slot_step_m",
+        "separation_m",
+        "traffic_range_m",
         "count",
         "airframes",
         "launch",
@@ -101,7 +108,20 @@ pub(crate) fn read(
         "uavs",
     ])?;
     let key = f.get("key").map_or(Ok(name.to_owned()), Node::word)?;
-    let step_m = f.number_or("slot_step_m", 5.0, 0.0, 500.0, "metres")?;
+    let separation_m = match f.get("separation_m") {
+        Some(node) => node.number(1.0, 1_000.0, "metres")?,
+        None => 0.0,
+    };
+    let default_step_m = if separation_m > 0.0 { 0.0 } else { 5.0 };
+    let step_m = f.number_or("slot_step_m", default_step_m, 0.0, 500.0, "metres")?;
+    if let Some(node) = f
+        .get("slot_step_m")
+        .filter(|_| separation_m > 0.0 && step_m > 0.0)
+    {
+        return Err(node.wrong(
+            "UAVs with a separation_m fly at one height; leave slot_step_m out, or separation_m",
+        ));
+    }
     let top_m = |n: usize| level_m + step_m * n.saturating_sub(1) as f64;
     let members = match f.get("uavs") {
         Some(list) => {
@@ -120,7 +140,21 @@ pub(crate) fn read(
             top_m(members.len())
         )));
     }
-    Ok(Fleet { key, members })
+    let range = f.get("traffic_range_m");
+    let traffic_range_m = range
+        .map(|n| n.number(0.0, 20_000.0, "metres"))
+        .transpose()?;
+    if let Some(node) = range.filter(|_| separation_m <= 0.0) {
+        return Err(
+            node.wrong("only UAVs that fly at one height sense each other; give separation_m too")
+        );
+    }
+    Ok(Fleet {
+        key,
+        separation_m,
+        traffic_range_m,
+        members,
+    })
 }
 
 /// How a generated fleet gets into the air.

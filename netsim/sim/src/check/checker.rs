@@ -12,6 +12,7 @@ use super::twins::TwinCheck;
 use super::{Bounds, Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::fault::Fault;
 use crate::spec::Spec;
+use crate::world::Approach;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;
@@ -356,6 +357,11 @@ impl Checker {
         } else {
             self.rules.on_received(at_ms, (id, life), said);
         }
+    }
+
+    /// Two UAVs that keep apart by agreement came too close (S1).
+    pub fn on_too_close(&mut self, approach: &Approach) {
+        ProgressCheck::on_too_close(approach, &mut self.found);
     }
 
     /// A UAV flew into a zone.

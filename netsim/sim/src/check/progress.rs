@@ -3,6 +3,7 @@
 
 use super::membership::Membership;
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
+use crate::world::Approach;
 use std::collections::BTreeMap;
 
 /// A plan may be longer than the fuel by this much, milliseconds: ETA and fuel are
@@ -58,6 +59,19 @@ impl ProgressCheck {
     /// new, or a cell orphaned.
     pub fn on_loss(&mut self) {
         self.losses += 1;
+    }
+
+    /// Two UAVs that keep apart by agreement came too close.
+    pub fn on_too_close(approach: &Approach, found: &mut Findings) {
+        let Approach {
+            at_ms,
+            a,
+            b,
+            distance_m,
+        } = *approach;
+        found.broken("S1", at_ms, Some(a), || {
+            format!("came within {distance_m:.1} m of uav{b}")
+        });
     }
 
     /// A UAV flew into a zone.

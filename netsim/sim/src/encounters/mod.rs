@@ -236,6 +236,8 @@ impl Flyer {
                 separation_m: SEPARATION_M,
             },
             tubes_m: TUBES_M,
+            circle_radius_m: 0.0,
+            reach: None,
         };
         let mind = Conflicts::new(begin.id, 0, apart, begin.motion.clone());
         Self {

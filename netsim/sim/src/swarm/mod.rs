@@ -425,11 +425,14 @@ impl Swarm {
                 }
                 _ => drop(self.account.happened(self.now_ms, &fact)),
             }
-            if let Fact::ZoneEntry {
-                at_ms, uav, zone, ..
-            } = fact
-            {
-                self.checker.on_zone_entry(at_ms, uav, zone);
+            match fact {
+                Fact::ZoneEntry {
+                    at_ms, uav, zone, ..
+                } => self.checker.on_zone_entry(at_ms, uav, zone),
+                Fact::TooClose(approach) if self.spec.mission.separation_mm > 0 => {
+                    self.checker.on_too_close(&approach);
+                }
+                _ => {}
             }
         }
         if self.account.covered_ms().is_none() && self.air.judge().complete() {

@@ -129,6 +129,7 @@ pub fn square(n_uavs: u16) -> Spec {
         max_time_s: 1800,
         min_coverable: 0.97,
         min_separation_m: 4.0,
+        traffic_range_m: 0.0,
         faults: Vec::new(),
         storm: storm(n_uavs),
         seed: 1,
@@ -163,6 +164,8 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         further_laps: 0,
         tree: skein_flight::coverage::ring::Tree::default(),
         division: Default::default(),
+        separation_mm: 0,
+        fastest_mmps: 0,
     }
 }
 

@@ -24,8 +24,10 @@ pub use survey::{Cell, Survey, Uncoverable};
 
 use crate::spec::Spec;
 use motion::{Kinematic, Piece};
+use skein_behaviors::traffic::{Sighting as Seen, Traffic};
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::patch::Patches;
+use skein_peer::mission::mm;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::{CoverageTask, Mission};
 use std::iter;
@@ -138,6 +140,7 @@ pub struct World {
     ground: Option<(u16, Place)>,
     nodes: Vec<u16>,
     min_separation_m: f64,
+    traffic_range_m: f64,
     judge: Judge,
     facts: Vec<Fact>,
     flown: Vec<Piece>,
@@ -209,6 +212,7 @@ impl World {
             ground,
             nodes,
             min_separation_m: spec.min_separation_m,
+            traffic_range_m: spec.traffic_range_m,
             judge,
             facts: Vec::new(),
             flown: Vec::new(),
@@ -346,8 +350,28 @@ impl World {
         Some(Percept {
             time_ms: self.now_ms,
             takes_off_in_ms: u32::try_from(ground_ms).unwrap_or(u32::MAX),
+            traffic: self.traffic(uav, body.position()),
             ..body.percept()?
         })
+    }
+
+    /// Whom a UAV senses, where they carry sensors.
+    fn traffic(&self, uav: u16, at: skein_geometry::frame::Point) -> Traffic {
+        if self.traffic_range_m <= 0.0 {
+            return Traffic::default();
+        }
+        let airborne = self.uavs.iter().filter(|u| {
+            u.id != uav && u.body.airborne() && u.body.takes_off_in_ms(self.now_ms) == 0
+        });
+        let near = airborne.map(|u| ((u.body.position() - at).norm(), u));
+        let mut near: Vec<_> = near.filter(|(m, _)| *m <= self.traffic_range_m).collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let sighting = |(_, u): (f64, &Uav)| Seen {
+            id: u.id,
+            east_dm: mm(u.body.position().x) / 100,
+            north_dm: mm(u.body.position().y) / 100,
+        };
+        Traffic::new(self.traffic_range_m, near.into_iter().map(sighting))
     }
 
     /// Takes an airframe out of the air.

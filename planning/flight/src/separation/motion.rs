@@ -11,8 +11,9 @@ use skein_geometry::math::wrap_pi;
 use thiserror::Error;
 
 /// Stretches that a plan may have: what is left of the present flight (two at most), a
-/// circle to wait, and a way with two turns take seven.
-pub const STRETCHES_MAX: usize = 12;
+/// circle to wait, and a way with two turns take seven; lanes round a zone, between two
+/// places with room for a circle, up to two dozen.
+pub const STRETCHES_MAX: usize = 24;
 
 /// The tightest circle that makes sense of a fixed wing, millimetres.
 const RADIUS_LEAST_MM: u32 = 1_000;
@@ -28,6 +29,9 @@ const AIRSPEED_MOST_MMPS: u32 = 200_000;
 
 /// Headings are said in so many parts of a radian: over a kilometre one is 0.1 mm.
 const HEADING_PARTS: f64 = 1e7;
+
+/// The largest heading, in those parts: half a turn.
+pub const HEADING_MOST_E7: u32 = 31_415_927;
 
 /// One stretch of a flight, as it is said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -292,6 +296,31 @@ impl Motion {
         }
     }
 
+    /// How near it comes to a place from a time on, metres, to within a tenth of a second of
+    /// flight; one round of the loiter counts for all.
+    #[must_use]
+    pub fn nearest_to_m(&self, place: Point, from_ms: u64) -> f64 {
+        const STEP_MS: usize = 200;
+        let round_s = match (self.plan.end, self.pieces.last()) {
+            (End::Loiter { .. }, Some(p)) => {
+                core::f64::consts::TAU / (p.segment.curvature_per_m.abs() * p.airspeed_mps)
+            }
+            _ => 0.0,
+        };
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "flights of some minutes"
+        )]
+        let until_ms = ((self.ends_at_s() + round_s) * 1e3) as u64;
+        let fastest = self.pieces.iter().map(|p| p.airspeed_mps);
+        let stray_m = fastest.fold(0.0, f64::max) * 1e-3 * STEP_MS as f64 / 2.0;
+        (from_ms..=until_ms.max(from_ms))
+            .step_by(STEP_MS)
+            .map(|at_ms| (self.pose_at(at_ms).position() - place).norm() - stray_m)
+            .fold(f64::INFINITY, f64::min)
+    }
+
     /// The centre and radius of a disc in which it stays from a time on, metres.
     #[must_use]
     pub fn extent_from(&self, at_ms: u64) -> (Point, f64) {
@@ -460,8 +489,8 @@ mod tests {
             MotionError::Airspeed(0)
         );
         assert_eq!(
-            refused(&|p| p.stretches = vec![p.stretches[0]; 13]),
-            MotionError::TooMany(13)
+            refused(&|p| p.stretches = vec![p.stretches[0]; STRETCHES_MAX + 1]),
+            MotionError::TooMany(STRETCHES_MAX + 1)
         );
         assert_eq!(
             refused(&|p| p.stretches[0].length_mm = u32::MAX),

@@ -18,11 +18,13 @@
 //! A proposal costs the candidates of [`Detours`] until one is clear, each held against
 //! all others.
 
-use super::promises::{Promise, Promises, Settled, Statement};
+use super::promises::{Brief, Promise, Promises, Rank, Settled, Statement};
 use crate::PeerId;
+use crate::wire::limits::ACCEPTS_MAX;
 use serde::{Deserialize, Serialize};
 use skein_flight::separation::{Detour, Detours, End, Motion, MotionPlan, first_loss_s};
 use skein_geometry::frame::{Point, Pose};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How far ahead of now a proposal turns off at first, milliseconds: what one exchange takes
 /// when each of its messages is half a second late and one of them has to be repeated.
@@ -64,7 +66,7 @@ pub struct Intent {
     pub in_force: PromisedPlan,
     /// What would rather be flown.
     pub proposal: Option<PromisedPlan>,
-    /// Which version of whom was accepted last, ascending by peer.
+    /// Which version of whom is accepted, while that is on offer, ascending by peer.
     pub accepts: Vec<(PeerId, u32)>,
 }
 
@@ -84,13 +86,45 @@ pub struct Apart {
     pub detours: Detours,
     /// How far any two may stray from their promises together, metres: kept on top.
     pub tubes_m: f64,
+    /// The radius on which UAVs circle that answer nothing, metres.
+    pub circle_radius_m: f64,
+    /// Without it all who are known are asked.
+    pub reach: Option<Reach>,
+}
+
+/// How far UAVs get before they are heard again: who is farther off need not be asked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reach {
+    /// How far anybody gets on what it has in force, its circle included, metres.
+    pub promised_m: f64,
+    /// The fastest airspeed of all, m/s.
+    pub fastest_mps: f64,
+}
+
+/// Whom a UAV lets pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InTheWay {
+    /// Those who go before it.
+    OfThoseBefore,
+    /// All: it has nothing to do.
+    OfAnybody,
+}
+
+/// Where another UAV was seen last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Sighting {
+    at: Point,
+    at_ms: u64,
 }
 
 impl Apart {
     /// A test whether two motions keep apart from a moment on.
     fn since(self, now_ms: u64) -> impl Fn(&Motion, &Motion) -> bool {
         let least_m = self.detours.separation_m + self.tubes_m;
-        move |a, b| first_loss_s(a, b, now_ms, least_m).is_none()
+        move |a, b| {
+            let begun_ms = now_ms.max(a.plan().start_ms).max(b.plan().start_ms);
+            first_loss_s(a, b, begun_ms, least_m).is_none()
+        }
     }
 }
 
@@ -106,6 +140,10 @@ pub struct Conflicts {
     branch_ms: u64,
     lead_ms: u64,
     search_from_ms: u64,
+    /// Where the others were seen last, whether or not they said what they fly.
+    seen: BTreeMap<PeerId, Sighting>,
+    /// Who is near and answers nothing, where.
+    silent: BTreeMap<PeerId, Point>,
 }
 
 impl Conflicts {
@@ -120,7 +158,17 @@ impl Conflicts {
             branch_ms: 0,
             lead_ms: LEAD_FIRST_MS,
             search_from_ms: 0,
+            seen: BTreeMap::new(),
+            silent: BTreeMap::new(),
         }
+    }
+
+    /// The same in a later life: what it promises is numbered above `before`.
+    #[must_use]
+    pub fn after(mut self, before: u32) -> Self {
+        let (rank, flown) = (self.promises.rank(), self.promises.in_force().clone());
+        self.promises = Promises::after(before, rank, flown);
+        self
     }
 
     /// What is to be flown.
@@ -138,8 +186,26 @@ impl Conflicts {
             endurance_s: s.endurance_s,
             in_force: sent(&s.in_force),
             proposal: s.proposal.as_ref().map(sent),
-            accepts: s.accepts,
+            accepts: s.accepts.into_iter().take(ACCEPTS_MAX).collect(),
         }
+    }
+
+    /// The same without motions, for those who know them.
+    #[must_use]
+    pub fn brief(&self) -> Brief {
+        let mut brief = self.promises.brief();
+        brief.accepts.truncate(ACCEPTS_MAX);
+        brief
+    }
+
+    /// A statement without motions. Returns whether there is something new to say.
+    pub fn hear_brief(&mut self, author: PeerId, said: &Brief, now_ms: u64) -> bool {
+        let _ = self.promises.hear_brief(author, said);
+        if let Some(motion) = self.promises.flown_by(author) {
+            let at = motion.pose_at(now_ms).position();
+            self.saw(author, at, now_ms);
+        }
+        self.settle(now_ms).news
     }
 
     /// From now on it wants to go there.
@@ -149,13 +215,143 @@ impl Conflicts {
         self.search_from_ms = 0;
     }
 
+    /// Another UAV was somewhere. Until it is heard again it may be as far from there as it
+    /// flies meanwhile, and gets on what it has in force.
+    pub fn saw(&mut self, id: PeerId, at: Point, at_ms: u64) {
+        let sighting = Sighting { at, at_ms };
+        let known = self.seen.entry(id).or_insert(sighting);
+        if known.at_ms <= at_ms {
+            *known = sighting;
+        }
+    }
+
+    /// All UAVs near by are where they are sensed; nobody else is near enough to be asked.
+    pub fn sensed(&mut self, others: impl Iterator<Item = (PeerId, Point)>, at_ms: u64) {
+        self.seen = others
+            .map(|(id, at)| (id, Sighting { at, at_ms }))
+            .collect();
+    }
+
+    /// These answer nothing, and circle where they are.
+    pub fn are_silent(&mut self, others: BTreeMap<PeerId, Point>) {
+        self.silent = others;
+    }
+
+    /// Another UAV begins anew: what it said before is void.
+    pub fn begins_anew(&mut self, id: PeerId) {
+        self.promises.forget_one(id);
+    }
+
+    /// Another UAV is in nobody's way any more.
+    pub fn is_gone(&mut self, id: PeerId) {
+        self.promises.forget_one(id);
+        self.seen.remove(&id);
+    }
+
+    /// What another UAV flies, as far as is known.
+    #[must_use]
+    pub fn flown_by(&self, id: PeerId) -> Option<&Motion> {
+        self.promises.flown_by(id)
+    }
+
+    /// The UAV is not where it was to be: from now on it flies this, whatever others say.
+    pub fn impose(&mut self, motion: Motion) {
+        self.promises.impose(motion);
+    }
+
+    /// The number of the promise that is flown.
+    #[must_use]
+    pub fn version(&self) -> u32 {
+        self.promises.version()
+    }
+
+    /// Whether something is on offer.
+    #[must_use]
+    pub fn is_proposing(&self) -> bool {
+        self.promises.proposal().is_some()
+    }
+
+    /// Withdraws what is on offer. Returns whether there was anything.
+    pub fn withdraw(&mut self) -> bool {
+        self.promises.withdraw()
+    }
+
+    /// How long before it turns off a motion has to be offered, milliseconds.
+    #[must_use]
+    pub fn lead_ms(&self) -> u64 {
+        self.lead_ms
+    }
+
+    /// Offers the first of some motions that keeps clear, each with the time until which it
+    /// has to be agreed; of ways aside, the first that also lets pass whoever is held up.
+    /// Returns which.
+    pub fn offer<'a>(
+        &mut self,
+        now_ms: u64,
+        motions: impl IntoIterator<Item = (&'a MotionPlan, u64)>,
+        aside: Option<InTheWay>,
+    ) -> Option<usize> {
+        let apart = self.apart.since(now_ms);
+        let suits = |motion: &Motion| {
+            let passes = |others| self.held_up(now_ms, others).all(|m| apart(motion, &m));
+            self.keeps_off_silent(motion, now_ms)
+                && self.promises.is_clear(motion, &apart)
+                && aside.is_none_or(passes)
+        };
+        let (nth, until_ms, motion) =
+            motions
+                .into_iter()
+                .enumerate()
+                .find_map(|(nth, (plan, until_ms))| {
+                    let motion = Motion::new(plan.clone()).ok()?;
+                    suits(&motion).then_some((nth, until_ms, motion))
+                })?;
+        self.branch_ms = until_ms;
+        self.promises.propose(motion);
+        Some(nth)
+    }
+
+    /// Whether what others propose is held up by what is flown here, and by nothing else
+    /// that this UAV says.
+    #[must_use]
+    pub fn is_in_the_way(&self, now_ms: u64, of: InTheWay) -> bool {
+        self.held_up(now_ms, of).next().is_some()
+    }
+
+    /// Whether a motion keeps off the circles of those who answer nothing.
+    fn keeps_off_silent(&self, motion: &Motion, now_ms: u64) -> bool {
+        let least_m = self.apart.detours.separation_m + self.apart.tubes_m;
+        let circle_m = 2.0 * self.apart.circle_radius_m;
+        let off = |at: &Point| motion.nearest_to_m(*at, now_ms) >= least_m + circle_m;
+        self.silent.values().all(off)
+    }
+
+    fn held_up(&self, now_ms: u64, of: InTheWay) -> impl Iterator<Item = Motion> {
+        let apart = self.apart.since(now_ms);
+        let mine: Rank = self.promises.rank();
+        let all: Vec<Motion> = self
+            .promises
+            .held_up(&apart)
+            .filter(|(rank, _)| of == InTheWay::OfAnybody || *rank < mine)
+            .map(|(_, theirs)| theirs.clone())
+            .collect();
+        all.into_iter()
+    }
+
     /// A statement of another UAV. Returns whether there is something new to say. One that
     /// promises what no fixed wing flies, or begins later than now, changes nothing.
     pub fn hear(&mut self, author: PeerId, said: &Intent, now_ms: u64) -> bool {
         let Some(statement) = received(said, now_ms) else {
             return false;
         };
-        self.promises.hear(author, &statement) && self.settle(now_ms).news
+        let at = statement.in_force.motion.pose_at(now_ms).position();
+        let is_newer = self.promises.hear(author, &statement);
+        if is_newer {
+            self.saw(author, at, now_ms);
+        }
+        // Who asks again has not heard the answer.
+        let again = !is_newer && said.proposal.is_some() && self.promises.has_accepted(author);
+        self.settle(now_ms).news || again
     }
 
     /// Time goes on. Returns whether there is something new to say.
@@ -174,8 +370,20 @@ impl Conflicts {
     }
 
     fn settle(&mut self, now_ms: u64) -> Settled {
-        let may_adopt = now_ms <= self.branch_ms;
-        let settled = self.promises.settle(may_adopt, &self.apart.since(now_ms));
+        let far = |id: &&PeerId| !self.is_asked(**id, now_ms);
+        let far: BTreeSet<PeerId> = self.seen.keys().filter(far).copied().collect();
+        // Who is seen and has not said what it flies cannot be asked yet.
+        let is_silent = |id: &PeerId| self.silent.contains_key(id);
+        let strangers = self
+            .seen
+            .keys()
+            .any(|id| !far.contains(id) && !is_silent(id) && !self.promises.knows(*id));
+        let may_adopt = now_ms <= self.branch_ms && !strangers;
+        let by_distance = self.apart.reach.is_some();
+        let near = |id: PeerId| !by_distance || self.seen.contains_key(&id);
+        let is_asked = |id: PeerId| near(id) && !far.contains(&id) && !is_silent(&id);
+        let apart = self.apart.since(now_ms);
+        let settled = self.promises.settle(may_adopt, &is_asked, &apart);
         if settled.gave_way {
             self.search_from_ms = now_ms;
         }
@@ -185,6 +393,21 @@ impl Conflicts {
             self.search_from_ms = now_ms + IMPROVE_MS;
         }
         settled
+    }
+
+    /// Whether another UAV may come near on what this one proposes, before either hears of
+    /// the other's next promise.
+    fn is_asked(&self, id: PeerId, now_ms: u64) -> bool {
+        let (Some(reach), Some(seen)) = (self.apart.reach, self.seen.get(&id)) else {
+            return true;
+        };
+        let Some(proposal) = self.promises.proposal() else {
+            return true;
+        };
+        let (mine, own_m) = proposal.extent_from(now_ms);
+        let flown_m = reach.fastest_mps * seconds(now_ms.saturating_sub(seen.at_ms));
+        let least_m = self.apart.detours.separation_m + self.apart.tubes_m;
+        (mine - seen.at).norm() < own_m + flown_m + reach.promised_m + least_m
     }
 
     /// Looks for a way to what is wanted, and proposes it.
@@ -309,6 +532,8 @@ mod tests {
                 separation_m: 50.0,
             },
             tubes_m: 4.0,
+            circle_radius_m: 75.0,
+            reach: None,
         };
         let motion = Motion::new(MotionPlan {
             start_ms: 0,

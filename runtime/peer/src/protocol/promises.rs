@@ -36,6 +36,7 @@
 //! A statement heard costs as many tests of separation as there are open proposals.
 
 use crate::PeerId;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Who goes before: the lower. Endurance in seconds, then the number of the peer.
@@ -61,7 +62,20 @@ pub struct Statement<M> {
     pub in_force: Promise<M>,
     /// What it would rather fly.
     pub proposal: Option<Promise<M>>,
-    /// Which version of whom it accepted last, ascending by peer.
+    /// Which version it has accepted of whom, while that is on offer, ascending by peer.
+    pub accepts: Vec<(PeerId, u32)>,
+}
+
+/// A statement without its motions, for those who know them.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Brief {
+    /// Number of the statement: the newest counts.
+    pub number: u32,
+    /// The version of what is flown.
+    pub in_force: u32,
+    /// The version of what would rather be flown.
+    pub proposal: Option<u32>,
+    /// Which version is accepted of whom, while that is on offer, ascending by peer.
     pub accepts: Vec<(PeerId, u32)>,
 }
 
@@ -122,12 +136,19 @@ impl<M: Clone> Promises<M> {
     /// A UAV that flies a motion and wants nothing else.
     #[must_use]
     pub fn new(rank: Rank, in_force: M) -> Self {
+        Self::after(0, rank, in_force)
+    }
+
+    /// The same, counting on: no version up to `before` was this life's.
+    #[must_use]
+    pub fn after(before: u32, rank: Rank, in_force: M) -> Self {
+        let version = before.saturating_add(1);
         Self {
             rank,
             number: 1,
-            last_version: 1,
+            last_version: version,
             in_force: Promise {
-                version: 1,
+                version,
                 motion: in_force,
             },
             proposal: None,
@@ -155,7 +176,18 @@ impl<M: Clone> Promises<M> {
             endurance_s: self.rank.0,
             in_force: self.in_force.clone(),
             proposal: self.proposal.clone(),
-            accepts: self.others.iter().map(|(id, o)| (*id, o.told)).collect(),
+            accepts: self.others.iter().filter_map(answer).collect(),
+        }
+    }
+
+    /// The same without motions.
+    #[must_use]
+    pub fn brief(&self) -> Brief {
+        Brief {
+            number: self.number,
+            in_force: self.in_force.version,
+            proposal: self.proposal.as_ref().map(|p| p.version),
+            accepts: self.others.iter().filter_map(answer).collect(),
         }
     }
 
@@ -176,19 +208,111 @@ impl<M: Clone> Promises<M> {
             told: 0,
             accepts: 0,
         });
+        if let Some((_, version)) = said.accepts.iter().find(|(id, _)| *id == me) {
+            other.accepts = other.accepts.max(*version);
+        }
         if said.number <= other.number {
             return false;
         }
         other.number = said.number;
         other.rank = rank;
         other.in_force = said.in_force.clone();
-        let accepts = said.accepts.iter().find(|(id, _)| *id == me);
-        other.accepts = accepts.map_or(0, |(_, version)| *version);
         // What is no longer proposed is in force, or withdrawn for ever.
         let proposed = said.proposal.as_ref().map(|p| p.version);
         other.accepted = other.accepted.filter(|a| Some(*a) == proposed);
         other.proposal = said.proposal.clone();
         true
+    }
+
+    /// Takes note of a statement that names motions by their versions; says whether it was
+    /// newer than what was known. Where one of them is not known it changes nothing: the
+    /// motions are said again.
+    pub fn hear_brief(&mut self, author: PeerId, said: &Brief) -> bool {
+        let me = self.rank.1;
+        let Some(other) = self.others.get_mut(&author) else {
+            return false;
+        };
+        if let Some((_, version)) = said.accepts.iter().find(|(id, _)| *id == me) {
+            other.accepts = other.accepts.max(*version);
+        }
+        let proposed = other.proposal.as_ref();
+        let adopted = proposed.filter(|p| p.version == said.in_force).cloned();
+        let known = adopted.is_some() || other.in_force.version == said.in_force;
+        let same = proposed.is_some_and(|p| Some(p.version) == said.proposal);
+        if said.number <= other.number || !known || !(same || said.proposal.is_none()) {
+            return false;
+        }
+        other.number = said.number;
+        if let Some(adopted) = adopted {
+            other.in_force = adopted;
+        }
+        if said.proposal.is_none() {
+            other.proposal = None;
+            other.accepted = None;
+        }
+        true
+    }
+
+    /// Whether this UAV has accepted what another proposes, as far as is known.
+    #[must_use]
+    pub fn has_accepted(&self, author: PeerId) -> bool {
+        self.others
+            .get(&author)
+            .is_some_and(|o| o.accepted.is_some())
+    }
+
+    /// Puts another motion in force without asking: the UAV is not where it was to be.
+    pub fn impose(&mut self, motion: M) {
+        self.last_version = self.last_version.saturating_add(1);
+        self.number = self.number.saturating_add(1);
+        self.proposal = None;
+        self.in_force = Promise {
+            version: self.last_version,
+            motion,
+        };
+    }
+
+    /// Forgets what another UAV said: it begins anew, or is not there any more.
+    pub fn forget_one(&mut self, id: PeerId) {
+        self.others.remove(&id);
+    }
+
+    /// Whether anything was heard of another UAV.
+    #[must_use]
+    pub fn knows(&self, id: PeerId) -> bool {
+        self.others.contains_key(&id)
+    }
+
+    /// What another UAV flies, as far as is known.
+    #[must_use]
+    pub fn flown_by(&self, id: PeerId) -> Option<&M> {
+        self.others.get(&id).map(|o| &o.in_force.motion)
+    }
+
+    /// Proposals of others that this UAV's motion in force alone keeps from being accepted.
+    pub fn held_up<'a>(
+        &'a self,
+        apart: &'a dyn Fn(&M, &M) -> bool,
+    ) -> impl Iterator<Item = (Rank, &'a M)> {
+        let open = self
+            .others
+            .values()
+            .filter_map(|o| Some((o.rank, o.open()?)));
+        let mine = &self.in_force.motion;
+        open.filter(move |(_, p)| !apart(mine, &p.motion))
+            .map(|(rank, p)| (rank, &p.motion))
+    }
+
+    /// Who goes before: the lower.
+    #[must_use]
+    pub fn rank(&self) -> Rank {
+        self.rank
+    }
+
+    /// The version of what is in force.
+    #[must_use]
+    pub fn version(&self) -> u32 {
+        self.in_force.version
     }
 
     /// Forgets those who can meet nobody any more.
@@ -214,8 +338,14 @@ impl<M: Clone> Promises<M> {
     }
 
     /// Gives way, accepts and adopts whatever can be. `may_adopt` is false once the place
-    /// is passed at which the proposal leaves what is in force.
-    pub fn settle(&mut self, may_adopt: bool, apart: &dyn Fn(&M, &M) -> bool) -> Settled {
+    /// is passed at which the proposal leaves what is in force; `is_asked` tells who has to
+    /// accept it: all who may meet the UAV before they are heard again.
+    pub fn settle(
+        &mut self,
+        may_adopt: bool,
+        is_asked: &dyn Fn(PeerId) -> bool,
+        apart: &dyn Fn(&M, &M) -> bool,
+    ) -> Settled {
         let mut settled = Settled::default();
         if let Some(own) = &self.proposal
             && !self.is_clear(&own.motion, apart)
@@ -224,7 +354,7 @@ impl<M: Clone> Promises<M> {
             settled.gave_way = true;
         }
         let accepted = self.accept(apart);
-        if may_adopt && self.is_agreed() {
+        if may_adopt && self.is_agreed(is_asked) {
             if let Some(own) = self.proposal.take() {
                 self.in_force = own;
             }
@@ -266,10 +396,17 @@ impl<M: Clone> Promises<M> {
         news
     }
 
-    /// Whether everybody has accepted the own proposal.
-    fn is_agreed(&self) -> bool {
-        self.proposal
-            .as_ref()
-            .is_some_and(|own| self.others.values().all(|o| o.accepts == own.version))
+    /// Whether everybody who is asked has accepted the own proposal.
+    fn is_agreed(&self, is_asked: &dyn Fn(PeerId) -> bool) -> bool {
+        self.proposal.as_ref().is_some_and(|own| {
+            let mut asked = self.others.iter().filter(|(id, _)| is_asked(**id));
+            asked.all(|(_, o)| o.accepts == own.version)
+        })
     }
+}
+
+/// Which proposal of another was accepted, as long as it is on offer.
+fn answer<M>((id, other): (&PeerId, &Other<M>)) -> Option<(PeerId, u32)> {
+    let proposed = other.proposal.as_ref()?.version;
+    (other.told == proposed).then_some((*id, proposed))
 }

@@ -21,6 +21,8 @@ use super::message::{
     State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
+use crate::protocol::conflict::Intent;
+use crate::protocol::promises::Brief;
 use crate::varint;
 
 /// Largest envelope around a body: heads and numbers at their longest, 23 bytes, and
@@ -83,6 +85,8 @@ pub enum Body {
     Finished(Finished),
     Heartbeat(Heartbeat),
     Lacking(Lacking),
+    Intent(Intent),
+    Conflict(Brief),
 }
 
 impl Body {
@@ -100,6 +104,8 @@ impl Body {
             Self::Finished(_) => Kind::Finished,
             Self::Heartbeat(_) => Kind::Heartbeat,
             Self::Lacking(_) => Kind::Lacking,
+            Self::Intent(_) => Kind::Intent,
+            Self::Conflict(_) => Kind::Conflict,
         }
     }
 
@@ -131,6 +137,8 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Finished(b) => b.put(&mut out),
         Body::Heartbeat(b) => b.put(&mut out),
         Body::Lacking(b) => b.put(&mut out),
+        Body::Intent(b) => b.put(&mut out),
+        Body::Conflict(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -161,7 +169,9 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Finished => Body::Finished(Wire::get(&mut input)?),
         Kind::Heartbeat => Body::Heartbeat(Wire::get(&mut input)?),
         Kind::Lacking => Body::Lacking(Wire::get(&mut input)?),
-        Kind::Event | Kind::Task | Kind::Intent | Kind::Conflict => {
+        Kind::Intent => Body::Intent(Wire::get(&mut input)?),
+        Kind::Conflict => Body::Conflict(Wire::get(&mut input)?),
+        Kind::Event | Kind::Task => {
             return Err(WireError::Kind {
                 number: kind.number(),
             });

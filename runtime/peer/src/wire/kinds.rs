@@ -33,9 +33,9 @@ pub enum Kind {
     Event = 8,
     /// Reserved: tasks other than coverage.
     Task = 9,
-    /// Reserved: committed trajectories.
+    /// What the author flies, would rather fly, and has accepted of others.
     Intent = 10,
-    /// Reserved: approach conflicts.
+    /// An intent by its versions, for those who know its motions.
     Conflict = 11,
     /// "I am here", with heartbeats of others at most.
     Heartbeat = 12,
@@ -187,21 +187,21 @@ const TABLE: [KindRow; 14] = [
         )
     },
     KindRow {
-        spoken: false,
+        relayed: false,
         ..row(
             Kind::Intent,
             "intent",
-            512,
+            1216,
             Priority::Conflict,
             Lifetime::Beacons(1),
         )
     },
     KindRow {
-        spoken: false,
+        relayed: false,
         ..row(
             Kind::Conflict,
             "conflict",
-            512,
+            320,
             Priority::Conflict,
             Lifetime::Beacons(1),
         )

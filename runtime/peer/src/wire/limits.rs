@@ -48,6 +48,9 @@ pub const HEADING_MAX_E4: i32 = 62_832;
 pub const SPEED_MAX_MMPS: u32 = 200_000;
 /// Longest duration of any plan or endurance, milliseconds: a day.
 pub const DURATION_MAX_MS: u32 = 86_400_000;
+/// Promises of others that are accepted at once: as many as propose in one earshot. Of more
+/// the author says those of the lowest numbers.
+pub const ACCEPTS_MAX: usize = 32;
 /// Hops beyond which nothing travels.
 pub const HOPS_MAX: u8 = 16;
 
@@ -65,6 +68,8 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
         }
         Body::Operator(_) | Body::Finished(_) => Ok(()),
         Body::Heartbeat(h) => check_heartbeat(h),
+        Body::Intent(i) => super::intent::check(i),
+        Body::Conflict(b) => super::intent::check_brief(b),
         Body::Lacking(l) => {
             in_range("holders", usize::from(l.holders) <= PEERS_MAX)?;
             at_most("pieces", l.pieces.len(), LACKING_MAX_BYTES)?;

@@ -2,6 +2,7 @@
 
 pub(crate) mod cbor;
 pub mod codec;
+mod intent;
 pub mod key;
 pub mod kinds;
 pub mod limits;

@@ -3,6 +3,11 @@
 use super::codec::Body;
 use super::limits::*;
 use super::message::*;
+use crate::PeerId;
+use crate::protocol::conflict::{Intent, PromisedPlan};
+use crate::protocol::promises::Brief;
+use skein_flight::separation::motion::STRETCHES_MAX;
+use skein_flight::separation::{End, MotionPlan, Stretch};
 
 /// What is known of a peer, typically.
 pub fn gossip(id: u16) -> Gossip {
@@ -235,7 +240,71 @@ pub fn golden() -> Vec<(Body, &'static str)> {
             }),
             "84020601428102",
         ),
+        (
+            Body::Intent(Intent {
+                number: 9,
+                endurance_s: 5_400,
+                in_force: promise(4, 1),
+                proposal: Some(promise(5, 2)),
+                accepts: vec![(PeerId(3), 17)],
+            }),
+            "850919151888041a0001d588195dc01a000514c83a00efaf3a8183395dbf1993431938a41967201938a48188051a0001d588195dc01a000514c83a00efaf3a8283395dbf1993431938a483395dbf1993431938a41967201938a481820311",
+        ),
+        (
+            Body::Conflict(Brief {
+                number: 10,
+                in_force: 5,
+                proposal: None,
+                accepts: vec![(PeerId(3), 17)],
+            }),
+            "840a050081820311",
+        ),
     ]
+}
+
+/// A promise of some stretches, typically.
+fn promise(version: u32, stretches: usize) -> PromisedPlan {
+    let stretch = Stretch {
+        radius_mm: -24_000,
+        length_mm: 37_699,
+        airspeed_mmps: 14_500,
+    };
+    PromisedPlan {
+        version,
+        plan: MotionPlan {
+            start_ms: 120_200,
+            east_mm: 24_000,
+            north_mm: 333_000,
+            heading_e7: -15_707_963,
+            stretches: vec![stretch; stretches],
+            end: End::Loiter {
+                radius_mm: 26_400,
+                airspeed_mmps: 14_500,
+            },
+        },
+    }
+}
+
+fn longest_promise() -> PromisedPlan {
+    let stretch = Stretch {
+        radius_mm: i32::MIN,
+        length_mm: 40_000_000,
+        airspeed_mmps: SPEED_MAX_MMPS,
+    };
+    PromisedPlan {
+        version: u32::MAX,
+        plan: MotionPlan {
+            start_ms: u64::MAX,
+            east_mm: -POSITION_MAX_MM,
+            north_mm: -POSITION_MAX_MM,
+            heading_e7: -31_415_927,
+            stretches: vec![stretch; STRETCHES_MAX],
+            end: End::Loiter {
+                radius_mm: i32::MIN,
+                airspeed_mmps: SPEED_MAX_MMPS,
+            },
+        },
+    }
 }
 
 /// The largest valid body of each kind.
@@ -381,6 +450,23 @@ pub fn largest() -> Vec<Body> {
             content_hash: u64::MAX,
             holders: u16::try_from(PEERS_MAX).unwrap_or(u16::MAX),
             pieces: vec![255; LACKING_MAX_BYTES],
+        }),
+        Body::Intent(Intent {
+            number: u32::MAX,
+            endurance_s: DURATION_MAX_MS / 1000,
+            in_force: longest_promise(),
+            proposal: Some(longest_promise()),
+            accepts: (u16::MAX - 31..=u16::MAX)
+                .map(|id| (PeerId(id), u32::MAX))
+                .collect(),
+        }),
+        Body::Conflict(Brief {
+            number: u32::MAX,
+            in_force: u32::MAX,
+            proposal: Some(u32::MAX),
+            accepts: (u16::MAX - 31..=u16::MAX)
+                .map(|id| (PeerId(id), u32::MAX))
+                .collect(),
         }),
     ]
 }

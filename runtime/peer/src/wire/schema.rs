@@ -6,12 +6,13 @@
 
 use super::kinds::Kind;
 use super::limits::{
-    BID_COVERED_MAX_BYTES, CHUNK_MAX_BYTES, CHUNKS_MAX, COMMITS_MAX, COVERED_MAX_BYTES,
-    DURATION_MAX_MS, FRESH_MAX_BYTES, GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX, HOPS_MAX,
-    INTERVAL_LEAST, INTERVAL_MOST, LACKING_MAX_BYTES, MEMBERS_MAX, PEERS_MAX, PLAN_MAX,
+    ACCEPTS_MAX, BID_COVERED_MAX_BYTES, CHUNK_MAX_BYTES, CHUNKS_MAX, COMMITS_MAX,
+    COVERED_MAX_BYTES, DURATION_MAX_MS, FRESH_MAX_BYTES, GOSSIP_MAX, HEADING_MAX_E4, HELD_MAX,
+    HOPS_MAX, INTERVAL_LEAST, INTERVAL_MOST, LACKING_MAX_BYTES, MEMBERS_MAX, PEERS_MAX, PLAN_MAX,
     POSITION_MAX_MM, SPEED_MAX_MMPS,
 };
 use core::fmt::Write as _;
+use skein_flight::separation::motion::{HEADING_MOST_E7, STRETCHES_MAX};
 
 /// What a place of an array may hold.
 #[derive(Clone, Copy, Debug)]
@@ -51,6 +52,7 @@ const U8: Shape = Shape::Number(0, u8::MAX as i128);
 const U16: Shape = Shape::Number(0, u16::MAX as i128);
 const COUNT: Shape = Shape::Number(1, u16::MAX as i128);
 const U32: Shape = Shape::Number(0, u32::MAX as i128);
+const I32: Shape = Shape::Number(i32::MIN as i128, i32::MAX as i128);
 const U64: Shape = Shape::Number(0, u64::MAX as i128);
 const INTERVAL: Shape = Shape::Number(INTERVAL_LEAST as i128, INTERVAL_MOST as i128);
 const HOPS: Shape = Shape::Number(0, HOPS_MAX as i128);
@@ -369,6 +371,93 @@ const LACKING: &[Place] = &[
     ),
 ];
 
+const AIRSPEED: Place = at("airspeed_mmps", "airspeed, mm/s", SPEED);
+
+const STRETCH: &[Place] = &[
+    at(
+        "radius_mm",
+        "radius of the turn, mm, positive to the left; 0 on a line",
+        I32,
+    ),
+    at("length_mm", "length, mm", U32),
+    AIRSPEED,
+];
+
+const PROMISE: &[Place] = &[
+    at("version", "counts what the author promised", U32),
+    at(
+        "start_ms",
+        "when it begins, ms of the clock that all share",
+        U64,
+    ),
+    EAST,
+    NORTH,
+    at(
+        "heading_e7",
+        "1e-7 rad counter-clockwise from east",
+        Shape::Number(-(HEADING_MOST_E7 as i128), HEADING_MOST_E7 as i128),
+    ),
+    at(
+        "stretches",
+        "what is flown",
+        Shape::Rows(STRETCH, STRETCHES_MAX),
+    ),
+    at(
+        "radius_mm",
+        "the circle at its end, as for a stretch; 0 where it leaves the airspace",
+        I32,
+    ),
+    AIRSPEED,
+];
+
+const ACCEPTED: &[Place] = &[
+    at("id", "whose promise", U16),
+    at("version", "which one", U32),
+];
+
+const INTENT: &[Place] = &[
+    at("number", "counts what the author says of its flight", U32),
+    at(
+        "endurance_s",
+        "when the mission began, s: who has less goes before",
+        Shape::Number(0, DURATION_MAX_MS as i128 / 1000),
+    ),
+    at("in_force", "what it flies", Shape::Row(PROMISE)),
+    at(
+        "proposal",
+        "what it would rather fly, or nothing",
+        Shape::Rows(PROMISE, 1),
+    ),
+    at(
+        "accepts",
+        "what it has accepted of others and is still on offer, ascending by id",
+        Shape::Rows(ACCEPTED, ACCEPTS_MAX),
+    ),
+];
+
+const CONFLICT: &[Place] = &[
+    at(
+        "number",
+        "counts what the author says of its flight, with intents",
+        U32,
+    ),
+    at(
+        "in_force",
+        "the version of what it flies",
+        Shape::Number(1, u32::MAX as i128),
+    ),
+    at(
+        "proposal",
+        "the version of what it would rather fly; 0 for none",
+        U32,
+    ),
+    at(
+        "accepts",
+        "what it has accepted of others and is still on offer, ascending by id",
+        Shape::Rows(ACCEPTED, ACCEPTS_MAX),
+    ),
+];
+
 /// The places of a kind's body; `None` for a reserved kind.
 #[must_use]
 pub fn places(kind: Kind) -> Option<&'static [Place]> {
@@ -383,7 +472,9 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Finished => Some(FINISHED),
         Kind::Heartbeat => Some(HEARTBEAT),
         Kind::Lacking => Some(LACKING),
-        Kind::Event | Kind::Task | Kind::Intent | Kind::Conflict => None,
+        Kind::Intent => Some(INTENT),
+        Kind::Conflict => Some(CONFLICT),
+        Kind::Event | Kind::Task => None,
     }
 }
 

@@ -265,6 +265,7 @@ impl Kinematic {
             endurance_s: seconds(self.fuel_ms),
             takes_off_in_ms: 0,
             failsafe: self.failsafe,
+            traffic: skein_behaviors::traffic::Traffic::default(),
         })
     }
 

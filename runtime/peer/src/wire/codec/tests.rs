@@ -4,8 +4,10 @@ use super::super::limits::*;
 use super::super::samples::{fresh, golden, gossip, largest, listing};
 use super::super::signature::Off;
 use super::*;
+use crate::PeerId;
 use proptest::collection::vec;
 use proptest::prelude::*;
+use skein_flight::separation::Stretch;
 
 fn record_of(body: &Body) -> Record {
     Record {
@@ -302,10 +304,44 @@ fn every_limit_is_sharp() {
                 with(&|l| l.pieces.push(1), "pieces");
                 with(&|l| l.pieces[31] = 0, "pieces");
             }
+            Body::Intent(i) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut Intent), field| {
+                    let mut i = i.clone();
+                    change(&mut i);
+                    refused(&Body::Intent(i), field);
+                };
+                with(&|i| i.endurance_s += 1, "endurance_s");
+                with(&|i| i.in_force.plan.east_mm -= 1, "east_mm");
+                with(&|i| i.in_force.plan.heading_e7 -= 1, "heading_e7");
+                let first = |i: &mut Intent, change: &dyn Fn(&mut Stretch)| {
+                    i.proposal
+                        .iter_mut()
+                        .for_each(|p| change(&mut p.plan.stretches[0]));
+                };
+                with(&|i| first(i, &|s| s.airspeed_mmps += 1), "airspeed_mmps");
+                with(&|i| first(i, &|s| s.length_mm += 1), "stretches");
+                with(&|i| first(i, &|s| s.radius_mm = 999), "stretches");
+                let longer = |i: &mut Intent| {
+                    let again = i.in_force.plan.stretches[0];
+                    i.in_force.plan.stretches.push(again);
+                };
+                with(&longer, "stretches");
+                with(&|i| i.accepts.push((PeerId(7), 1)), "accepts");
+                with(&|i| i.accepts[1] = i.accepts[0], "accepts");
+            }
+            Body::Conflict(mut b) => {
+                kinds += 1;
+                b.accepts.push((PeerId(7), 1));
+                refused(&Body::Conflict(b.clone()), "accepts");
+                b.accepts.clear();
+                b.in_force = 0;
+                refused(&Body::Conflict(b), "in_force");
+            }
             Body::Operator(_) | Body::Finished(_) => {}
         }
     }
-    assert_eq!(kinds, 8);
+    assert_eq!(kinds, 10);
 }
 
 #[test]
@@ -412,7 +448,7 @@ fn a_signature_covers_every_byte_before_it() {
 
 proptest! {
     #[test]
-    fn random_bytes_never_panic(kind in 0_usize..12, bytes in vec(any::<u8>(), 0..200)) {
+    fn random_bytes_never_panic(kind in 0_usize..14, bytes in vec(any::<u8>(), 0..200)) {
         let kind = Kind::ALL[kind];
         if let Ok(body) = decode_body(kind, &bytes) {
             prop_assert_eq!(encode_body(&body), bytes.clone());

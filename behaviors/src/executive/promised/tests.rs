@@ -1,0 +1,187 @@
+//! One UAV that flies by promises, accepted late or never.
+
+use super::*;
+use crate::Goal;
+use crate::testing::{LANE_M, Wing, airframe, loop_and_router, square};
+use skein_flight::coverage::ring::Direction::Forward;
+use skein_flight::coverage::ring::backtracking::Leg;
+use skein_flight::separation::Motion;
+use skein_geometry::Polygon;
+
+const PERCEPT_MS: u64 = 200;
+const LEAD_MS: u64 = 2_000;
+
+/// One UAV whose promises are accepted after `answer_ms`, unless nobody answers.
+struct Flight {
+    executive: Executive,
+    wing: Wing,
+    open: Vec<bool>,
+    answer_ms: u64,
+    asked: Option<(u64, Extension)>,
+    in_force: Option<Motion>,
+    imposed: u32,
+    done: bool,
+}
+
+impl Flight {
+    fn new(zones: Vec<Polygon>, promises: bool) -> Self {
+        let (coverage_loop, router) = loop_and_router(6, 4, zones);
+        let n = u16::try_from(coverage_loop.len()).unwrap();
+        let start = coverage_loop.boundary_towards(0, Forward);
+        let mut executive = Executive::new(airframe(), 90.0, coverage_loop, router);
+        if promises {
+            executive = executive.with_promises();
+        }
+        let mut flight = Self {
+            executive,
+            wing: Wing::new(start),
+            open: vec![true; usize::from(n)],
+            answer_ms: 400,
+            asked: None,
+            in_force: None,
+            imposed: 0,
+            done: false,
+        };
+        flight.legs(0, n);
+        flight
+    }
+
+    fn legs(&mut self, first: u16, count: u16) {
+        let direction = Forward;
+        let legs = vec![Leg {
+            first,
+            count,
+            direction,
+        }];
+        let open = self.open.clone();
+        let is_open = |c: u16| open[usize::from(c)];
+        self.executive.set_goal(Goal::Legs(legs), &is_open);
+        self.asked = None;
+    }
+
+    /// Flies for so long, or until all is seen.
+    fn fly(&mut self, seconds: u64) {
+        let end_ms = self.wing.time_ms + 1_000 * seconds;
+        while self.wing.time_ms < end_ms && !self.done {
+            self.percept();
+            self.wing.fly(PERCEPT_MS);
+            if let Some(motion) = &self.in_force {
+                let at = motion.pose_at(self.wing.time_ms).position();
+                let off_m = (self.wing.pose.position() - at).norm();
+                assert!(off_m < 0.5, "{off_m} m off at {} ms", self.wing.time_ms);
+            }
+        }
+    }
+
+    fn percept(&mut self) {
+        let (percept, open) = (self.wing.percept(), self.open.clone());
+        let is_open = |c: u16| open[usize::from(c)];
+        let (setpoint, events) = self.executive.step(&percept, &is_open);
+        self.wing.setpoint = Some(setpoint);
+        for event in events {
+            match event {
+                Event::Seen(cells) => cells
+                    .iter()
+                    .for_each(|c| self.open[usize::from(*c)] = false),
+                Event::PlanDone => {}
+                Event::Refused { cells } => panic!("refused {cells:?}"),
+            }
+        }
+        self.done = !self.open.contains(&true);
+        let now_ms = percept.time_ms;
+        if self.executive.take_imposed() {
+            self.imposed += 1;
+            self.in_force = self
+                .executive
+                .in_force(now_ms)
+                .and_then(|p| Motion::new(p).ok());
+        }
+        if let Some((at_ms, asked)) = self.asked.take() {
+            if now_ms > asked.branch_ms {
+                // Withdrawn.
+            } else if now_ms < at_ms + self.answer_ms {
+                self.asked = Some((at_ms, asked));
+            } else {
+                self.in_force = Motion::new(asked.plan.clone()).ok();
+                self.executive.agree(asked);
+            }
+        } else if self.executive.wants_more(now_ms) {
+            let best = self.executive.extensions(now_ms, LEAD_MS, &is_open);
+            self.asked = best.into_iter().next().map(|e| (now_ms, e));
+        }
+    }
+}
+
+fn time_to_see_all_s(promises: bool, zones: Vec<Polygon>) -> f64 {
+    let mut flight = Flight::new(zones, promises);
+    flight.fly(1_500);
+    assert!(
+        flight.done,
+        "{} open",
+        flight.open.iter().filter(|o| **o).count()
+    );
+    #[allow(clippy::cast_precision_loss)]
+    let took_s = flight.wing.time_ms as f64 / 1e3;
+    took_s
+}
+
+#[test]
+fn who_is_answered_in_time_takes_as_long_as_who_asks_nobody() {
+    for zones in [vec![], vec![square(2.2 * LANE_M, 1.2 * LANE_M, 20.0)]] {
+        let free_s = time_to_see_all_s(false, zones.clone());
+        let asks_s = time_to_see_all_s(true, zones);
+        // The first circle has begun before anybody could answer.
+        assert!(asks_s < free_s + 40.0, "{asks_s} s instead of {free_s} s");
+    }
+}
+
+#[test]
+fn who_is_not_answered_circles_where_it_promised_and_then_goes_on() {
+    let mut flight = Flight::new(vec![], true);
+    flight.fly(60);
+    let seen = flight.open.iter().filter(|o| !**o).count();
+    assert!(seen > 8, "{seen}");
+    flight.answer_ms = u64::MAX / 2;
+    flight.fly(40);
+    let before = flight.wing.pose.position();
+    let motion = flight.in_force.clone().unwrap();
+    flight.fly(120);
+    assert_eq!(
+        flight.in_force.as_ref(),
+        Some(&motion),
+        "nothing was agreed"
+    );
+    assert!((flight.wing.pose.position() - before).norm() < 60.0);
+    flight.answer_ms = 400;
+    flight.asked = None;
+    flight.fly(1_500);
+    assert!(flight.done);
+    assert_eq!(flight.imposed, 1, "only the first circle was imposed");
+}
+
+#[test]
+fn another_goal_is_taken_up_when_that_is_agreed() {
+    let mut flight = Flight::new(vec![], true);
+    flight.fly(40);
+    let n = u16::try_from(flight.open.len()).unwrap();
+    flight.legs(n / 2, n / 2);
+    flight.fly(60);
+    let seen = (n / 2..n).filter(|c| !flight.open[usize::from(*c)]).count();
+    assert!(seen > 3, "{seen}");
+    flight.legs(0, n);
+    flight.fly(1_500);
+    assert!(flight.done && flight.imposed == 1);
+}
+
+#[test]
+fn ways_aside_lead_away_and_end_in_a_circle() {
+    let mut flight = Flight::new(vec![], true);
+    flight.fly(30);
+    let now_ms = flight.wing.time_ms;
+    let ways = flight.executive.ways_aside(now_ms, LEAD_MS);
+    assert!(ways.len() > 20);
+    for way in ways {
+        assert!(matches!(way.plan.end, End::Loiter { .. }));
+        assert!(Motion::new(way.plan).is_ok());
+    }
+}

@@ -1,0 +1,87 @@
+//! What a UAV senses of others near by, whether or not they speak to it: by their
+//! transponders or by remote identification.
+
+use serde::{Deserialize, Serialize};
+use skein_geometry::frame::Point;
+
+/// Most UAVs that a reading holds, the nearest: more are never within a few hundred metres
+/// of one at one height.
+pub const TRAFFIC_MAX: usize = 12;
+
+/// One other UAV.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sighting {
+    /// Who.
+    pub id: u16,
+    /// Where, decimetres east of the mission's origin.
+    pub east_dm: i32,
+    /// Where, decimetres north of it.
+    pub north_dm: i32,
+}
+
+impl Sighting {
+    /// Where, in metres.
+    #[must_use]
+    pub fn at(&self) -> Point {
+        Point::new(
+            f64::from(self.east_dm) / 10.0,
+            f64::from(self.north_dm) / 10.0,
+        )
+    }
+}
+
+/// All that is sensed of others at one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Traffic {
+    /// Whoever is nearer than this is sensed, metres; 0 without a sensor.
+    pub range_m: f64,
+    seen: [Option<Sighting>; TRAFFIC_MAX],
+}
+
+impl Traffic {
+    /// A reading of a sensor: of more than [`TRAFFIC_MAX`] the first, so the nearest come
+    /// first.
+    #[must_use]
+    pub fn new(range_m: f64, nearest_first: impl IntoIterator<Item = Sighting>) -> Self {
+        let mut seen = [None; TRAFFIC_MAX];
+        for (place, sighting) in seen.iter_mut().zip(nearest_first) {
+            *place = Some(sighting);
+        }
+        Self { range_m, seen }
+    }
+
+    /// Whether there is no sensor.
+    #[must_use]
+    pub fn is_absent(&self) -> bool {
+        !self.is_sensed()
+    }
+
+    /// Whether there is a sensor.
+    #[must_use]
+    pub fn is_sensed(&self) -> bool {
+        self.range_m > 0.0
+    }
+
+    /// Who is sensed.
+    pub fn seen(&self) -> impl Iterator<Item = &Sighting> {
+        self.seen.iter().flatten()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reading_holds_the_nearest() {
+        let all = (0..20).map(|id| Sighting {
+            id,
+            ..Sighting::default()
+        });
+        let traffic = Traffic::new(500.0, all);
+        assert!(traffic.is_sensed());
+        let ids: Vec<u16> = traffic.seen().map(|s| s.id).collect();
+        assert_eq!(ids, (0..12).collect::<Vec<u16>>());
+        assert!(!Traffic::default().is_sensed());
+    }
+}

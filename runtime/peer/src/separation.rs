@@ -1,0 +1,346 @@
+//! Flies at one height with others: asks them for what the executive wants next, and has it
+//! flown once all who may meet this UAV have accepted it (D2.7 §1.3).
+//!
+//! What is agreed and what not is [`conflict`](crate::protocol::conflict)'s; what could be
+//! flown, the executive's.
+//!
+//! | event | what follows |
+//! |---|---|
+//! | a percept of a UAV that is not where it was to be | a circle from there is imposed, and said |
+//! | what was offered is agreed | it is flown |
+//! | the goal does not lead where the offer does | the offer is withdrawn |
+//! | what is in force is nearly flown, or is not wanted any more | the first extension that keeps clear is offered; where none does, that is looked at again after a second |
+//! | one who goes before is held up by this UAV, which gets no further itself, or anybody by one with nothing to do | a way aside is offered that lets them pass |
+//! | another UAV is believed down, for so long that it would have circled | it is in nobody's way |
+
+use crate::effect::{Effect, Effects};
+use crate::input::Time;
+use crate::protocol::conflict::{Apart, Conflicts, InTheWay, Intent, Reach};
+use crate::protocol::promises::Brief;
+use crate::wire::codec::Body;
+use crate::wire::message::Member;
+use crate::{Incarnation, PeerId};
+use skein_behaviors::executive::promised::{Extension, PROMISED_MOST_S};
+use skein_behaviors::traffic::Sighting;
+use skein_behaviors::{Executive, Percept};
+use skein_flight::airframe::Airframe;
+use skein_flight::separation::{Detours, Motion};
+use std::collections::BTreeMap;
+
+/// An extension has to be agreed so long before it turns off, milliseconds: two percepts,
+/// by the first of which it is known and by the second flown.
+const GUARD_MS: u64 = 400;
+
+/// After a search that found nothing the next one waits for so long, milliseconds.
+const SEARCH_AGAIN_MS: u64 = 1_000;
+
+/// What waits for an answer is said again after so long, milliseconds.
+const SAY_AGAIN_MS: u64 = 900;
+
+/// What asks for nothing is said again with its motions after so long, milliseconds: who
+/// comes into earshot learns of it before the two can meet.
+const SAY_MS: u64 = 5_000;
+
+/// Two statements are at least so far apart, milliseconds.
+const SAY_LEAST_MS: u64 = 200;
+
+/// Versions of a life begin above those of the lives before it: more than any makes.
+const VERSIONS_OF_A_LIFE: u32 = 1 << 20;
+
+/// How UAVs of a mission are kept apart at one height.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rules {
+    /// What any two keep, metres.
+    pub separation_m: f64,
+    /// How far any two stray together from what they promised, metres.
+    pub tubes_m: f64,
+    /// The fastest cruise of the mission, m/s.
+    pub fastest_mps: f64,
+    /// The turn radius that all fly, metres: also of those who circle without a computer.
+    pub turn_radius_m: f64,
+}
+
+/// What one UAV does to be kept apart from the others.
+#[derive(Debug)]
+pub(crate) struct Separation {
+    me: Member,
+    rules: Rules,
+    airframe: Airframe,
+    conflicts: Option<Conflicts>,
+    /// What is on offer.
+    offered: Option<Extension>,
+    /// The promise that the executive flies.
+    flown: u32,
+    search_from_ms: u64,
+    is_news: bool,
+    /// What is in force nobody has been told yet.
+    is_imposed: bool,
+    said_ms: u64,
+    /// When its motions were said last, and which proposal that was.
+    said_whole: (u64, Option<u32>),
+    /// The peer's own time and the common clock at the last percept.
+    clocks: (Time, u64),
+    lives: BTreeMap<u16, Incarnation>,
+    /// Since when others are believed down.
+    down_since: BTreeMap<u16, Time>,
+}
+
+impl Separation {
+    /// Nothing is flown yet.
+    pub fn new(me: Member, rules: Rules, airframe: Airframe) -> Self {
+        Self {
+            me,
+            rules,
+            airframe,
+            conflicts: None,
+            offered: None,
+            flown: 0,
+            search_from_ms: 0,
+            is_news: false,
+            is_imposed: false,
+            said_ms: 0,
+            said_whole: (0, None),
+            clocks: (Time(0), 0),
+            lives: BTreeMap::new(),
+            down_since: BTreeMap::new(),
+        }
+    }
+
+    /// A life of this peer begins.
+    pub fn begin_life(&mut self, me: Member) {
+        self.me = me;
+        self.is_imposed = true;
+    }
+
+    /// The executive has answered a percept: what is next.
+    pub fn on_percept(
+        &mut self,
+        now: Time,
+        percept: &Percept,
+        executive: &mut Executive,
+        is_open: &dyn Fn(u16) -> bool,
+    ) -> Effects {
+        self.clocks = (now, percept.time_ms);
+        let now_ms = percept.time_ms;
+        self.sense(percept);
+        if executive.take_imposed() {
+            self.impose(now_ms, percept, executive);
+        }
+        let Some(conflicts) = &mut self.conflicts else {
+            return Effects::new();
+        };
+        self.is_news |= conflicts.tick(now_ms);
+        self.take_up(executive);
+        self.withdraw_unwanted(executive);
+        let proposes = self.conflicts.as_ref().is_some_and(Conflicts::is_proposing);
+        if !proposes && now_ms >= self.search_from_ms {
+            self.search(now_ms, executive, is_open);
+            if let Some(conflicts) = &mut self.conflicts {
+                // Where nobody has to be asked it is agreed already.
+                self.is_news |= conflicts.tick(now_ms);
+            }
+            self.take_up(executive);
+        }
+        self.speak(now_ms)
+    }
+
+    /// Who is near, and who of them answers nothing.
+    fn sense(&mut self, percept: &Percept) {
+        let traffic = &percept.traffic;
+        let Some(conflicts) = self.conflicts.as_mut().filter(|_| traffic.is_sensed()) else {
+            return;
+        };
+        let near = traffic.seen().map(|s| (PeerId(s.id), s.at()));
+        conflicts.sensed(near, percept.time_ms);
+        let down = |s: &&Sighting| self.down_since.contains_key(&s.id);
+        let silent = traffic.seen().filter(down).map(|s| (PeerId(s.id), s.at()));
+        conflicts.are_silent(silent.collect());
+    }
+
+    fn impose(&mut self, now_ms: u64, percept: &Percept, executive: &Executive) {
+        let plan = executive.in_force(now_ms);
+        let Some(motion) = plan.and_then(|p| Motion::new(p).ok()) else {
+            return;
+        };
+        self.offered = None;
+        self.is_news = true;
+        self.is_imposed = true;
+        let conflicts = match self.conflicts.take() {
+            Some(mut known) => {
+                known.impose(motion);
+                known
+            }
+            None => self.begun(percept, executive, motion),
+        };
+        self.flown = conflicts.version();
+        self.conflicts = Some(conflicts);
+    }
+
+    fn begun(&self, percept: &Percept, executive: &Executive, motion: Motion) -> Conflicts {
+        let reach = Reach {
+            promised_m: executive.reach_m(self.rules.fastest_mps),
+            fastest_mps: self.rules.fastest_mps,
+        };
+        let apart = Apart {
+            detours: Detours {
+                airframe: self.airframe,
+                separation_m: self.rules.separation_m,
+            },
+            tubes_m: self.rules.tubes_m,
+            circle_radius_m: self.rules.turn_radius_m,
+            reach: Some(reach),
+        };
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "some hours"
+        )]
+        let endurance_s = percept.endurance_s.max(0.0) as u32;
+        let before = self.me.incarnation.saturating_mul(VERSIONS_OF_A_LIFE);
+        Conflicts::new(PeerId(self.me.id), endurance_s, apart, motion).after(before)
+    }
+
+    /// Has the executive fly what was agreed.
+    fn take_up(&mut self, executive: &mut Executive) {
+        let Some(conflicts) = &self.conflicts else {
+            return;
+        };
+        if conflicts.version() != self.flown {
+            self.flown = conflicts.version();
+            if let Some(extension) = self.offered.take() {
+                executive.agree(extension);
+            }
+        }
+        if !conflicts.is_proposing() {
+            self.offered = None;
+        }
+    }
+
+    fn withdraw_unwanted(&mut self, executive: &Executive) {
+        let unwanted = self.offered.as_ref().is_some_and(|e| !executive.suits(e));
+        if unwanted && let Some(conflicts) = &mut self.conflicts {
+            self.is_news |= conflicts.withdraw();
+            self.offered = None;
+        }
+    }
+
+    /// Looks for what to fly next, and offers it.
+    fn search(&mut self, now_ms: u64, executive: &mut Executive, is_open: &dyn Fn(u16) -> bool) {
+        let Some(conflicts) = &mut self.conflicts else {
+            return;
+        };
+        let lead_ms = conflicts.lead_ms() + GUARD_MS;
+        let until = |e: &Extension| e.branch_ms.saturating_sub(GUARD_MS);
+        let wants = executive.wants_more(now_ms);
+        if wants {
+            let mut ways = executive.extensions(now_ms, lead_ms, is_open);
+            let offers = ways.iter().map(|e| (&e.plan, until(e)));
+            if let Some(nth) = conflicts.offer(now_ms, offers, None) {
+                self.offered = Some(ways.swap_remove(nth));
+                self.is_news = true;
+                return;
+            }
+        }
+        self.search_from_ms = now_ms + SEARCH_AGAIN_MS;
+        let of = if wants {
+            InTheWay::OfThoseBefore
+        } else {
+            InTheWay::OfAnybody
+        };
+        if executive.circles(now_ms) && conflicts.is_in_the_way(now_ms, of) {
+            let mut ways = executive.ways_aside(now_ms, lead_ms);
+            let offers = ways.iter().map(|e| (&e.plan, until(e)));
+            if let Some(nth) = conflicts.offer(now_ms, offers, Some(of)) {
+                self.offered = Some(ways.swap_remove(nth));
+                self.is_news = true;
+            }
+        }
+    }
+
+    /// What is to be said now.
+    fn speak(&mut self, now_ms: u64) -> Effects {
+        let Some(conflicts) = &self.conflicts else {
+            return Effects::new();
+        };
+        let brief = conflicts.brief();
+        let whole_ms = now_ms.saturating_sub(self.said_whole.0);
+        let again_ms = if brief.proposal.is_some() {
+            SAY_AGAIN_MS
+        } else {
+            SAY_MS
+        };
+        let offers_anew = brief.proposal.is_some() && brief.proposal != self.said_whole.1;
+        let is_whole = offers_anew || self.is_imposed || whole_ms >= again_ms;
+        let since_ms = now_ms.saturating_sub(self.said_ms);
+        if since_ms < SAY_LEAST_MS || !(self.is_news || is_whole) {
+            return Effects::new();
+        }
+        self.is_news = false;
+        self.said_ms = now_ms;
+        if !is_whole {
+            return vec![Effect::SayNow(Body::Conflict(brief))];
+        }
+        self.is_imposed = false;
+        self.said_whole = (now_ms, brief.proposal);
+        vec![Effect::SayNow(Body::Intent(conflicts.intent()))]
+    }
+
+    /// What another UAV flies and asks for.
+    pub fn hear(&mut self, now: Time, author: Member, intent: &Intent) {
+        let now_ms = self.common_ms(now);
+        let conflicts = self.of_present_life(author);
+        let news = conflicts.is_some_and(|c| c.hear(PeerId(author.id), intent, now_ms));
+        self.is_news |= news;
+    }
+
+    /// The same in brief.
+    pub fn hear_brief(&mut self, now: Time, author: Member, brief: &Brief) {
+        let now_ms = self.common_ms(now);
+        let conflicts = self.of_present_life(author);
+        let news = conflicts.is_some_and(|c| c.hear_brief(PeerId(author.id), brief, now_ms));
+        self.is_news |= news;
+    }
+
+    /// What is settled with others, if the author speaks in the last life known of it; what
+    /// it said in an earlier one is void.
+    fn of_present_life(&mut self, author: Member) -> Option<&mut Conflicts> {
+        let conflicts = self.conflicts.as_mut()?;
+        let known = self.lives.entry(author.id).or_insert(author.incarnation);
+        if author.incarnation < *known {
+            return None;
+        }
+        if author.incarnation > *known {
+            *known = author.incarnation;
+            conflicts.begins_anew(PeerId(author.id));
+        }
+        self.down_since.remove(&author.id);
+        Some(conflicts)
+    }
+
+    /// Who is believed down, at a time.
+    pub fn believe_down(&mut self, now: Time, down: impl Iterator<Item = u16>) {
+        let Some(conflicts) = &mut self.conflicts else {
+            return;
+        };
+        let before = core::mem::take(&mut self.down_since);
+        for id in down {
+            let since = before.get(&id).copied().unwrap_or(now);
+            self.down_since.insert(id, since);
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a constant of some seconds"
+            )]
+            let circled_ms = (PROMISED_MOST_S * 1e3) as u64;
+            if now.since_ms(since) >= circled_ms {
+                conflicts.is_gone(PeerId(id));
+            }
+        }
+    }
+
+    /// The clock that all share, from the last percept on.
+    fn common_ms(&self, now: Time) -> u64 {
+        let (then, at_ms) = self.clocks;
+        at_ms + now.since_ms(then)
+    }
+}
