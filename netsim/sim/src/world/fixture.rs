@@ -161,6 +161,9 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         task: skein_peer::CoverageTask::Area,
         lap: 0,
         further_laps: 0,
+        added_zones: std::collections::BTreeMap::new(),
+        sortie: 0,
+        cancelled: false,
         tree: skein_flight::coverage::ring::Tree::default(),
         division: Default::default(),
     }
