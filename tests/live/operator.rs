@@ -87,7 +87,7 @@ fn a_zone_is_added(place: &Place) {
     assert!(code == 0 && said.contains("as revision 3"), "{said}");
     let (code, said) = place.skein(&[&["nfz", "add"], &zone[..]].concat());
     assert!(code == 3 && said.contains("is there already"), "{said}");
-    let (code, said) = place.skein(&["nfz", "add", "--circle", "60.16763,24.93658,20"]);
+    let (code, said) = place.skein(&["nfz", "add", "--circle", "60.169273,24.936583,20"]);
     assert!(code == 3 && said.contains("its base is"), "{said}");
     let (code, said) = place.skein(&["nfz", "list"]);
     assert!(code == 0 && said.starts_with("fire  60.16"), "{said}");

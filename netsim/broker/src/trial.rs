@@ -361,6 +361,8 @@ impl<'a> Trial<'a> {
                 self.world.revise(Arc::new(survey), &geometry);
                 self.account.revised();
                 self.cancelled = mission.cancelled;
+                // Whoever believed the last one finished has not begun this one.
+                self.all_finished_ms = None;
                 let mut text = format!("the operator gives revision {}", mission.revision);
                 if left_out > 0 {
                     let _ = write!(

@@ -69,7 +69,9 @@ fn without_geometry(spec: &Spec) -> Vec<Finding> {
 pub(crate) fn blamed(e: &GeometryError) -> &'static str {
     match e {
         GeometryError::Area(_) => "area",
-        GeometryError::Zone(..) | GeometryError::AddedZone(..) => "no_fly",
+        GeometryError::Zone(..) | GeometryError::AddedZone(..) | GeometryError::ZoneName => {
+            "no_fly"
+        }
         GeometryError::Loop(e) => match e {
             LoopError::TurnRadius { .. } | LoopError::TooManyCells(_) => "lanes.spacing_m",
             LoopError::Footprint { .. } => "airframes",

@@ -129,6 +129,9 @@ pub enum GeometryError {
     /// A no-fly zone that the operator added, by its name, is no simple polygon.
     #[error("zone {0:?}: {1}")]
     AddedZone(String, PolygonError),
+    /// A no-fly zone that somebody added has a name that no operator can give.
+    #[error("a zone has a name that is none")]
+    ZoneName,
     /// There is no loop over what is to be seen.
     #[error(transparent)]
     Loop(#[from] LoopError),

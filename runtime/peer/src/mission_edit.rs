@@ -145,6 +145,9 @@ impl Mission {
     /// # Errors
     /// Which zone is no simple polygon.
     pub fn no_fly_zones(&self) -> Result<Arc<NoFlyZones>, GeometryError> {
+        if self.added_zones.keys().any(|name| !is_zone_name(name)) {
+            return Err(GeometryError::ZoneName);
+        }
         let names = self.added_zones.keys();
         let mut zones = Vec::with_capacity(self.zones.len() + self.added_zones.len());
         for (i, zone) in self.zones_m().enumerate() {
@@ -233,6 +236,19 @@ mod tests {
         );
         let why = crossed.no_fly_zones().unwrap_err().to_string();
         assert!(why.starts_with("zone \"bow\": "), "{why}");
+        let mut unnamed = mission(1, 6, 4);
+        unnamed
+            .added_zones
+            .insert("\u{1b}[2J".into(), RING.to_vec());
+        assert_eq!(
+            unnamed.no_fly_zones().map(drop),
+            Err(GeometryError::ZoneName)
+        );
+        assert!(
+            crate::Overview::of(&unnamed, crate::wire::message::Order::Hold, None, vec![])
+                .added_zones
+                .is_empty()
+        );
     }
 
     #[test]

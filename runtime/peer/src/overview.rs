@@ -2,6 +2,7 @@
 //! revision of it, how far it is. Asking changes nothing.
 
 use crate::mission::{Mission, PointMm};
+use crate::mission_edit::is_zone_name;
 use crate::output::Status;
 use crate::why::{Other, Work};
 use crate::wire::message::Order;
@@ -51,6 +52,8 @@ impl Overview {
         work: Option<Work>,
         others: Vec<Other>,
     ) -> Self {
+        let zones = mission.added_zones.iter();
+        let named = zones.filter(|(name, _)| is_zone_name(name));
         Self {
             revision: mission.revision,
             content_hash: mission.content_hash(),
@@ -63,7 +66,10 @@ impl Overview {
             area: mission.area.clone(),
             base: mission.base,
             zones: mission.zones.len(),
-            added_zones: mission.added_zones.clone(),
+            // What anybody may have put on the air is shown on a terminal.
+            added_zones: named
+                .map(|(name, ring)| (name.clone(), ring.clone()))
+                .collect(),
             order,
             work,
             others,

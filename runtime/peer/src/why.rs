@@ -248,9 +248,11 @@ pub(crate) fn flight(state: Option<&MissionState>, percept: &Percept, reserve_s:
 pub(crate) fn work(state: &MissionState, order: Order) -> Work {
     let sections = &state.negotiation.sections;
     let coverage_loop = &state.geometry.coverage_loop;
+    // Of a mission that was cancelled nothing is to be seen.
+    let asked = !state.geometry.mission.cancelled;
     let needed = (0_u16..)
         .zip(coverage_loop.cells())
-        .filter(|(_, c)| c.needed);
+        .filter(|(_, c)| c.needed && asked);
     let (claim, covered) = (state.claim(), sections.covered());
     let open: Vec<u16> = sections
         .plan()

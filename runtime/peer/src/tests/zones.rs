@@ -151,10 +151,10 @@ fn a_zone_takes_cells_away_and_its_removal_brings_them_back() {
     let before = covered(&h, 1);
     assert!(before > 2);
     let far = [
-        (300_000, 200_000),
-        (360_000, 200_000),
-        (360_000, 260_000),
-        (300_000, 260_000),
+        (240_000, 120_000),
+        (380_000, 120_000),
+        (380_000, 260_000),
+        (240_000, 260_000),
     ];
     revise(&mut h, |m| m.with_zone("z", &far).unwrap());
     assert!(h.run_until(10, |h| (1..=2).all(|id| h.beliefs(id).revision == 2)));
@@ -181,7 +181,8 @@ fn a_cancelled_mission_sends_all_home_and_one_that_is_submitted_begins_with_noth
     revise(&mut h, |m| m.cancelled().unwrap());
     assert!(h.run_until(10, |h| (1..=2).all(|id| h.beliefs(id).finished)));
     assert!((1..=2).all(|id| h.beliefs(id).plan.is_empty()));
-    assert_eq!(h.why(1).work.unwrap().reason, Reason::Cancelled);
+    let work = h.why(1).work.unwrap();
+    assert_eq!((work.reason, work.cells), (Reason::Cancelled, 0));
     let away_m = |h: &Harness, id| (h.pose(id).position() - Point::new(-60.0, -60.0)).norm();
     assert!(h.run_until(90, |h| (1..=2).all(|id| away_m(h, id) < 80.0)));
     revise(&mut h, |old| mission(1, 6, 4).submitted_after(old));
