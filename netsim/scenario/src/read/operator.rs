@@ -191,7 +191,7 @@ mod tests {
             ),
             (
                 "[{ at_s: 60, nfz_add: { id: 'a', zone: { circle: { east_m: 528, north_m: 480, radius_m: 20 } } } }]".to_owned(),
-                "from a no-fly zone",
+                "the launch point lies inside a no-fly zone",
             ),
             (
                 format!("[{{ at_s: 60, nfz_add: {{ id: 'a', {zone} }} }}, {{ at_s: 61, nfz_add: {{ id: 'a', {zone} }} }}]"),

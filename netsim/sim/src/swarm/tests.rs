@@ -357,7 +357,10 @@ fn a_zone_that_is_added_in_flight_is_kept_clear_of_and_opens_its_cells_again() {
             let o = run_with(5, seed, faults.clone());
             passed(&o);
             let coverable = o.report.coverage.coverable_cells;
-            assert_eq!(coverable == whole, reopened, "{coverable} of {whole}");
+            assert!(
+                coverable <= whole && (!reopened || coverable == whole),
+                "{coverable} of {whole}"
+            );
         }
     }
 }
