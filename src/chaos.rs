@@ -106,7 +106,11 @@ pub enum What {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Group(Vec<u16>);
 
-fn peer(text: &str) -> Result<u16, String> {
+/// A peer by its number, as people write it: `3` or `uav3`.
+///
+/// # Errors
+/// When it names none.
+pub(crate) fn peer(text: &str) -> Result<u16, String> {
     let digits = text.strip_prefix("uav").unwrap_or(text);
     digits
         .parse()

@@ -3,13 +3,18 @@
 use crate::bench::BenchArgs;
 use crate::chaos::ChaosArgs;
 use crate::check::CheckArgs;
-use crate::console::{MissionArgs, OrderArgs};
+use crate::console::OrderArgs;
+use crate::mission::MissionArgs;
+use crate::nfz::NfzArgs;
 use crate::observe::ObserveArgs;
 use crate::peer::PeerArgs;
 use crate::plan::PlanArgs;
 use crate::sim::SimArgs;
 use crate::trial::TrialArgs;
-use crate::{bench, chaos, check, console, exit, observe, peer, plan, sim, trial};
+use crate::why::WhyArgs;
+use crate::{
+    bench, chaos, check, console, exit, mission, nfz, observe, peer, plan, sim, trial, why,
+};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
@@ -41,10 +46,14 @@ pub enum Verb {
     Peer(PeerArgs),
     /// Makes something go wrong in a running trial, or puts it right.
     Chaos(ChaosArgs),
-    /// Tells all UAVs to hold, to go on or to come home, at a ground station's console.
+    /// The same as `mission hold`, `resume` and `rtb`.
     Order(OrderArgs),
-    /// Gives all UAVs a new mission, at a ground station's console.
+    /// Gives, shows, changes and ends the mission, at a ground station's console.
     Mission(MissionArgs),
+    /// Adds and removes no-fly zones in flight, at a ground station's console.
+    Nfz(NfzArgs),
+    /// What a peer does and why, at its console.
+    Why(WhyArgs),
     /// Shows what the swarm publishes.
     Observe(ObserveArgs),
     /// Checks a scenario before it is flown.
@@ -80,7 +89,9 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Peer(args) => peer::run(args),
         Verb::Chaos(args) => chaos::run(args),
         Verb::Order(args) => console::order(args),
-        Verb::Mission(args) => console::mission(args),
+        Verb::Mission(args) => mission::run(args),
+        Verb::Nfz(args) => nfz::run(args),
+        Verb::Why(args) => why::run(args),
         Verb::Observe(args) => observe::run(args),
         Verb::Check(args) => check::run(args),
         Verb::Plan(args) => Ok(plan::run(args)?),

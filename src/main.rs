@@ -9,12 +9,15 @@ mod check;
 mod cli;
 mod console;
 mod exit;
+mod mission;
+mod nfz;
 mod observe;
 mod peer;
 mod plan;
 mod scenario_args;
 mod sim;
 mod trial;
+mod why;
 
 use clap::Parser;
 use std::process::ExitCode;

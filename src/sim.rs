@@ -2,8 +2,8 @@
 //! summary.
 
 use crate::check::Format;
-use crate::exit;
 use crate::scenario_args::ScenarioArgs;
+use crate::{chaos, exit};
 use anyhow::Context;
 use clap::Args;
 use skein_broker::batch::{self, Batch};
@@ -45,6 +45,10 @@ pub struct SimArgs {
     /// Writes the main events of a single run into this file, one JSON object a line.
     #[arg(long, value_name = "FILE", conflicts_with = "seeds")]
     pub history: Option<PathBuf>,
+    /// Flies only until some time, and tells what a peer does then and why: `3@120` is UAV 3
+    /// at 120 s.
+    #[arg(long, value_name = "UAV@SECONDS", value_parser = moment, conflicts_with_all = ["seeds", "history"])]
+    pub why: Option<(u16, u64)>,
     /// How the result is printed.
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
@@ -68,7 +72,42 @@ pub fn run(args: &SimArgs) -> anyhow::Result<ExitCode> {
     )
 }
 
+/// A peer and a time in milliseconds.
+fn moment(text: &str) -> Result<(u16, u64), String> {
+    let wrong = || format!("{text:?} is no peer and time; write 3@120 or uav3@120");
+    let (id, at_s) = text.split_once('@').ok_or_else(wrong)?;
+    let at_s: f64 = at_s.parse().map_err(|_| wrong())?;
+    if !(0.0..=1e7).contains(&at_s) {
+        return Err(wrong());
+    }
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "between 0 and 1e10"
+    )]
+    Ok((chaos::peer(id)?, (at_s * 1000.0).round() as u64))
+}
+
+/// What a peer does at some time of a run, and why.
+fn why(args: &SimArgs, prepared: &Prepared, (id, at_ms): (u16, u64)) -> anyhow::Result<ExitCode> {
+    let seed = args.seed.unwrap_or(prepared.spec.seed);
+    let storm = args.storm.then(|| runs::failure_free_makespan_ms(prepared));
+    let swarm = runs::until(prepared, seed, storm, at_ms);
+    let Some(why) = swarm.why(id) else {
+        eprintln!("error: no peer {id} runs at that time");
+        return Ok(ExitCode::from(exit::NO_PEERS));
+    };
+    match args.format {
+        Format::Json => exit::print(serde_json::to_string_pretty(&why)?)?,
+        Format::Text => exit::print(&why)?,
+    }
+    Ok(ExitCode::from(exit::OK))
+}
+
 fn fly(args: &SimArgs, prepared: &Prepared) -> anyhow::Result<ExitCode> {
+    if let Some(moment) = args.why {
+        return why(args, prepared, moment);
+    }
     let ok = match args.seeds {
         Some(seeds) => many(args, prepared, seeds)?,
         None => one(args, prepared)?,

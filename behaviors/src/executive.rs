@@ -24,6 +24,7 @@
 pub mod camera;
 mod clearance_check;
 mod goal_change;
+pub mod new_zones;
 pub mod prediction;
 pub mod promised;
 mod transfer;

@@ -20,7 +20,7 @@ mod upload;
 pub mod verify;
 mod view;
 pub mod visit;
-mod zone_input;
+pub(crate) mod zone_input;
 
 use crate::exit;
 use anyhow::{Context, Result, ensure};

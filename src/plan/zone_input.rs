@@ -12,20 +12,20 @@ use std::path::Path;
 
 /// Zones and fences of a file.
 #[derive(Default)]
-pub(super) struct ZoneInput {
+pub(crate) struct ZoneInput {
     /// What must be kept out of.
-    pub(super) keep_out: Vec<NamedZone>,
+    pub(crate) keep_out: Vec<NamedZone>,
     /// What must be stayed within.
     pub(super) keep_in: Vec<Fence>,
     /// The same as the file draws it, for other files: whether it is to be stayed within.
     pub(super) drawn: Vec<(bool, Shape)>,
     /// What was left out or put right.
-    pub(super) notices: Vec<String>,
+    pub(crate) notices: Vec<String>,
 }
 
 /// Which polygons of GeoJSON are zones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Polygons {
+pub(crate) enum Polygons {
     /// All, from the ground to the sky: a file of zones.
     All,
     /// All, up to their height: a file of buildings.
@@ -38,7 +38,7 @@ pub(super) enum Polygons {
 ///
 /// # Errors
 /// When the file cannot be read or something of it is wrong; names the place.
-pub(super) fn read(file: &Path, origin: Origin, polygons: Polygons) -> Result<ZoneInput> {
+pub(crate) fn read(file: &Path, origin: Origin, polygons: Polygons) -> Result<ZoneInput> {
     let text = std::fs::read_to_string(file).with_context(|| format!("{}", file.display()))?;
     of_text(file, &text, origin, polygons).with_context(|| format!("{}", file.display()))
 }

@@ -32,14 +32,14 @@ fn distance_m(state: &Value, east_m: f64, north_m: f64) -> f64 {
 }
 
 #[test]
-fn the_operator_of_a_trial_revises_the_mission_and_calls_all_home() {
+fn the_operator_of_a_trial_revises_the_mission_adds_a_zone_and_calls_all_home() {
     let _alone = alone();
     let place = Place::new();
     let mut trial = Trial::start(&place, "operator", &["--time-scale", "4"]);
     trial.wait_for_time(6.0, DEADLINE);
     strangers_are_refused(&place);
 
-    let (code, said) = place.skein(&["mission", &wide(&place)]);
+    let (code, said) = place.skein(&["mission", "revise", &wide(&place)]);
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("as revision 2"), "{said}");
     let uavs = [1, 2, 3, 4];
@@ -48,7 +48,10 @@ fn the_operator_of_a_trial_revises_the_mission_and_calls_all_home() {
             .all(|id| newest.get(id).is_some_and(|s| s["cells"] == 100))
     });
 
-    let (code, said) = place.skein(&["order", "return-to-base"]);
+    a_zone_is_added(&place);
+    a_uav_says_why(&place);
+
+    let (code, said) = place.skein(&["mission", "rtb"]);
     assert_eq!(
         (code, said.trim()),
         (0, "the ground station says return-to-base to all")
@@ -61,7 +64,10 @@ fn the_operator_of_a_trial_revises_the_mission_and_calls_all_home() {
         })
     });
     let (code, said) = place.skein(&["mission", "--base", "240,192"]);
-    assert!(code == 0 && said.contains("as revision 3"), "{said}");
+    assert!(code == 0 && said.contains("as revision 4"), "{said}");
+    let (code, said) = place.skein(&["nfz", "remove", "fire"]);
+    assert!(code == 0 && said.contains("as revision 5"), "{said}");
+    assert!(said.contains("return-to-base stands"), "{said}");
     let (code, said) = place.skein(&["order", "resume"]);
     assert_eq!(code, 0, "{said}");
 
@@ -72,6 +78,68 @@ fn the_operator_of_a_trial_revises_the_mission_and_calls_all_home() {
         4,
         "{verdict:#}"
     );
+}
+
+/// A zone in a corner of the area: all hear of it, and ask for fewer cells.
+fn a_zone_is_added(place: &Place) {
+    let zone = ["--circle", "60.168734,24.942002,20", "--id", "fire"];
+    let (code, said) = place.skein(&[&["nfz", "add"], &zone[..]].concat());
+    assert!(code == 0 && said.contains("as revision 3"), "{said}");
+    let (code, said) = place.skein(&[&["nfz", "add"], &zone[..]].concat());
+    assert!(code == 3 && said.contains("is there already"), "{said}");
+    let (code, said) = place.skein(&["nfz", "add", "--circle", "60.169273,24.936583,20"]);
+    assert!(
+        code == 3 && said.contains("cannot be flown: the launch point"),
+        "{said}"
+    );
+    let (code, said) = place.skein(&["nfz", "list"]);
+    assert!(code == 0 && said.starts_with("fire  60.16"), "{said}");
+    crate::support::wait_until(DEADLINE, "all follow revision 3", || {
+        let (code, said) = place.skein(&["mission", "show", "--json"]);
+        let shown: Value = serde_json::from_str(&said).unwrap_or(Value::Null);
+        let others = shown["others"].as_array().cloned().unwrap_or_default();
+        let work = &shown["work"];
+        code == 0
+            && work["revision"] == 3
+            && work["cells"]
+                .as_u64()
+                .is_some_and(|n| (80..100).contains(&n))
+            && (1..=4).all(|id| {
+                let follows = |o: &Value| o["id"] == id && o["revision"] == 3;
+                others.iter().any(follows)
+            })
+    });
+}
+
+/// A UAV is asked what it does and why; it takes no orders at its console.
+fn a_uav_says_why(place: &Place) {
+    let (code, said) = place.skein(&["why", "uav2"]);
+    assert!(code == 0 && said.starts_with("uav2 at"), "{said}");
+    for word in [
+        "order     resume",
+        "revision 3",
+        "fuel",
+        "peer 1    alive",
+        "s ago  ",
+    ] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+    let (code, said) = place.skein(&["why", "2", "--json"]);
+    let why: Value = serde_json::from_str(&said).unwrap();
+    assert!(
+        code == 0 && why["id"] == 2 && why["work"]["revision"] == 3,
+        "{why:#}"
+    );
+    let (code, said) = place.skein(&["why", "77"]);
+    assert!(code == 4 && said.contains("no peer 77"), "{said}");
+    let console = place.entry()["consoles"]["2"].clone();
+    let at = console["at"].as_str().unwrap();
+    let token_file = console["token_file"].as_str().unwrap();
+    let flags = ["--at", at, "--token-file", token_file];
+    let (code, said) = place.skein(&[&["mission", "cancel"], &flags[..]].concat());
+    assert!(code == 3 && said.contains("no ground station"), "{said}");
+    let (code, said) = place.skein(&[&["why", "3"], &flags[..]].concat());
+    assert!(code == 4 && said.contains("peer 2 answers there"), "{said}");
 }
 
 /// A wrong token, a mission that does not fit, garbage: nothing follows from them.
@@ -175,7 +243,22 @@ fn without_a_simulated_world_a_mission_and_an_order_reach_peers_over_the_radio()
     assert!(code == 0 && said.contains("as revision 2"), "{said}");
     watching.until("its revision at 101", DEADLINE, cells(101, 100));
 
-    let (code, said) = say(&["order", "hold"]);
+    // Its end, and another one after it.
+    let (code, said) = say(&["mission", "cancel"]);
+    assert!(code == 0 && said.contains("as revision 3"), "{said}");
+    let (code, said) = say(&["mission", "revise", square.to_str().unwrap()]);
+    assert!(code == 3 && said.contains("is cancelled"), "{said}");
+    let (code, said) = say(&["mission", "submit", square.to_str().unwrap()]);
+    assert!(code == 0 && said.contains("as revision 4"), "{said}");
+    let (code, said) = say(&["mission", "show"]);
+    assert!(
+        code == 0 && said.starts_with("revision 4, content"),
+        "{said}"
+    );
+    let (code, said) = say(&["mission", "submit", &wide(&place)]);
+    assert!(code == 0 && said.contains("as revision 5"), "{said}");
+
+    let (code, said) = say(&["mission", "hold"]);
     assert_eq!(
         (code, said.trim()),
         (0, "the ground station says hold to all")

@@ -147,11 +147,17 @@ impl Executive {
             .collect()
     }
 
+    /// What the way home may take from anywhere on the loop, milliseconds.
+    #[must_use]
+    pub fn home_ms(&self) -> u32 {
+        self.home.map_or(0, |(_, ms)| ms)
+    }
+
     /// Flight time that may still be planned: what is left less the reserve and the way
     /// home, milliseconds.
     #[must_use]
     pub fn spendable_ms(&self, percept: &Percept) -> u32 {
-        let home_ms = self.home.map_or(0, |(_, ms)| ms);
+        let home_ms = self.home_ms();
         whole_ms((percept.endurance_s - self.transit.airframe.reserve_s) * 1000.0)
             .saturating_sub(home_ms)
     }

@@ -70,6 +70,12 @@ impl Envelope {
         }
     }
 
+    /// Keeps clear of these zones from now on.
+    pub fn set_zones(&mut self, zones: Arc<NoFlyZones>) {
+        self.zones = zones;
+        self.gathered_at = None;
+    }
+
     /// The airspeed nearest to `mps` that may be commanded, m/s.
     #[must_use]
     pub fn airspeed_mps(&self, mps: f64) -> f64 {

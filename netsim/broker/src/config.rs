@@ -48,28 +48,29 @@ pub struct Surroundings<'a> {
     pub links: Vec<SocketAddr>,
 }
 
+/// The same with a console at any free port.
+fn with_console(mut config: serde_json::Value, id: u16) -> serde_json::Value {
+    config["console"] = serde_json::json!({
+        "listen": "127.0.0.1:0",
+        "token_file": format!("uav{id}.token"),
+    });
+    config
+}
+
 impl Surroundings<'_> {
     /// The configuration of a UAV.
     #[must_use]
     pub fn uav(&self, uav: &UavSpec) -> serde_json::Value {
         let airframe = skein_interop::airframe::to_json(&uav.airframe);
-        self.config(uav.id, "uav", uav.height_m, airframe)
+        with_console(self.config(uav.id, "uav", uav.height_m, airframe), uav.id)
     }
 
     /// The configuration of the ground station.
     #[must_use]
     pub fn ground(&self, ground: &GroundStationSpec) -> serde_json::Value {
-        let mut config = self.config(
-            ground.id,
-            "ground",
-            ground.height_m,
-            serde_json::Value::Null,
-        );
-        config["console"] = serde_json::json!({
-            "listen": "127.0.0.1:0",
-            "token_file": format!("uav{}.token", ground.id),
-        });
-        config
+        let airframe = serde_json::Value::Null;
+        let config = self.config(ground.id, "ground", ground.height_m, airframe);
+        with_console(config, ground.id)
     }
 
     fn config(

@@ -58,6 +58,7 @@ mod tests {
             run_dir: std::path::PathBuf::new(),
             observe: None,
             console: None,
+            consoles: std::collections::BTreeMap::new(),
             fleet: "f".to_owned(),
         }
     }

@@ -5,7 +5,7 @@ use crate::live_peer::LivePeer;
 use crate::live_world::LiveWorld;
 use crate::peers::Peers;
 use crate::registry::ConsoleEntry;
-use skein_console::{Answer, Command, Token, ask};
+use skein_console::{Answer, Command, NewZone, Token, ask};
 use skein_netsim::account::{Account, Cause, secs};
 use skein_netsim::fault::{Fault, TimedFault};
 use std::time::Duration;
@@ -119,8 +119,16 @@ impl Injector<'_> {
                 self.operate(&Command::Base((*east_mm, *north_mm))).await
             }
             Fault::Order { order } => self.operate(&Command::Order(*order)).await,
+            Fault::AddZone { name, ring } => {
+                let zone = NewZone {
+                    name: Some(name.clone()),
+                    ring: ring.clone(),
+                };
+                self.operate(&Command::AddZones(vec![zone])).await
+            }
+            Fault::RemoveZone { name } => self.operate(&Command::RemoveZone(name.clone())).await,
             Fault::Revise { .. } => {
-                Err("another mission is given by `skein mission`".to_owned())
+                Err("another mission is given by `skein mission revise`".to_owned())
             }
             Fault::FailStores { .. }
             | Fault::SlowStores { .. }

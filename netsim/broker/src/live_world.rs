@@ -6,7 +6,7 @@ use skein_link::{Hearing, LinkState};
 use skein_netsim::fault::Fault;
 use skein_netsim::radio::{LinkTable, Overlay};
 use skein_netsim::spec::Spec;
-use skein_netsim::world::{Fact, Judge, Site, World};
+use skein_netsim::world::{Fact, Judge, Site, Survey, World};
 use skein_peer::offload::MissionGeometry;
 use std::sync::Arc;
 
@@ -106,6 +106,16 @@ impl LiveWorld {
     pub fn relaunch(&mut self, uav: u16) {
         self.world.respawn(uav);
         self.links.compute(&self.world, &self.faults);
+    }
+
+    /// A revision of the mission is judged by from now on.
+    pub fn revise(&mut self, survey: Arc<Survey>, geometry: &MissionGeometry) {
+        self.world.revise(survey, geometry);
+    }
+
+    /// The computer of a UAV follows this revision of the mission.
+    pub fn follows(&mut self, uav: u16, revision: u32) {
+        self.world.follows(uav, revision);
     }
 
     /// What was seen and what went wrong.

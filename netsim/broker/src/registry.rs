@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 use skein_console::replace_private_file;
+use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
@@ -30,11 +31,14 @@ pub struct Entry {
     pub observe: Option<String>,
     /// The console of the ground station, once it is up.
     pub console: Option<ConsoleEntry>,
+    /// The consoles of all peers that are up, by their numbers.
+    #[serde(default)]
+    pub consoles: BTreeMap<u16, ConsoleEntry>,
     /// First part of every key.
     pub fleet: String,
 }
 
-/// How the console of a ground station is reached.
+/// How the console of a peer is reached.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ConsoleEntry {
     /// Where it listens.
@@ -143,12 +147,20 @@ impl Registered {
         self.entry.console.as_ref()
     }
 
-    /// Says where the ground station's console is.
+    /// Says where the console of a peer is, and whether that is the ground station.
     ///
     /// # Errors
     /// When the entry cannot be written.
-    pub fn console_at(&mut self, console: ConsoleEntry) -> Result<(), RegistryError> {
-        self.entry.console = Some(console);
+    pub fn console_at(
+        &mut self,
+        id: u16,
+        is_ground_station: bool,
+        console: ConsoleEntry,
+    ) -> Result<(), RegistryError> {
+        if is_ground_station {
+            self.entry.console = Some(console.clone());
+        }
+        self.entry.consoles.insert(id, console);
         self.write()
     }
 
@@ -239,6 +251,7 @@ mod tests {
             run_dir: PathBuf::new(),
             observe: None,
             console: None,
+            consoles: BTreeMap::new(),
             fleet: "f".to_owned(),
         }
     }

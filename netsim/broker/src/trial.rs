@@ -14,8 +14,11 @@ use skein_netsim::account::{
 };
 use skein_netsim::fault::Fault;
 use skein_netsim::spec::Spec;
-use skein_netsim::world::{Fact, Loss};
+use skein_netsim::world::{Fact, Loss, Survey};
 use skein_peer::offload::MissionGeometry;
+use skein_peer::{Mission, Report};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -37,6 +40,10 @@ const LOOK_MS: u64 = 1_000;
 /// long, milliseconds of scenario time, what was not seen by then never will be. Long
 /// enough for somebody to learn that it was wrong.
 const IDLE_MS: u64 = 30_000;
+
+/// After a mission was cancelled the operator may submit another one for so long, milliseconds
+/// of scenario time: all fly home meanwhile.
+const CANCELLED_IDLE_MS: u64 = 120_000;
 
 /// What a trial is to be.
 #[derive(Debug)]
@@ -139,6 +146,8 @@ struct Trial<'a> {
     now_ms: u64,
     progress_due_ms: u64,
     all_finished_ms: Option<u64>,
+    /// Whether the operator ended the mission that is judged.
+    cancelled: bool,
     /// Transmissions that reached a node since it was last looked at, and late ones.
     transmissions: (u64, u64),
     /// Setpoints that arrived.
@@ -182,6 +191,7 @@ impl<'a> Trial<'a> {
             run_dir: run_dir.clone(),
             observe: None,
             console: None,
+            consoles: BTreeMap::new(),
             fleet: spec.fleet.clone(),
         })?;
         let peers = Peers::prepare(&spec, seed, &run_dir, &program, token.secret()).await?;
@@ -201,6 +211,7 @@ impl<'a> Trial<'a> {
             now_ms: 0,
             progress_due_ms: 0,
             all_finished_ms: None,
+            cancelled: false,
             transmissions: (0, 0),
             setpoints: 0,
             starved: 0,
@@ -294,7 +305,7 @@ impl<'a> Trial<'a> {
             }) => {
                 self.observable(id, locator);
                 if let Some(console) = console {
-                    self.operable(console);
+                    self.operable(id, console);
                 }
             }
             Some(Said::Setpoint { id, setpoint, runs }) => {
@@ -310,6 +321,11 @@ impl<'a> Trial<'a> {
                 self.transmissions.1 += late;
             }
             Some(Said::Report { id, report }) => {
+                match &report {
+                    Report::Ready { revision, .. } => self.world.follows(id, *revision),
+                    Report::Revised { mission } => self.revise(mission),
+                    _ => {}
+                }
                 if let Some(line) = self.account.reported(self.now_ms, id, &report) {
                     self.note(line);
                 }
@@ -326,6 +342,39 @@ impl<'a> Trial<'a> {
         }
     }
 
+    /// The operator gave another mission: it is judged by from now on. Time stands still while
+    /// its site is surveyed.
+    fn revise(&mut self, mission: &Arc<Mission>) {
+        let surveyed = tokio::task::block_in_place(|| {
+            let geometry = mission.geometry().map_err(|e| e.to_string())?;
+            let survey = Survey::of_mission(&self.spec, mission).map_err(|e| e.to_string())?;
+            Ok::<_, String>((
+                survey.left_out(&geometry),
+                survey.as_planned(&geometry),
+                geometry,
+            ))
+        });
+        match surveyed {
+            // The ground station checked it before it spoke.
+            Err(why) => self.note(format!("a mission cannot be judged: {why}")),
+            Ok((left_out, survey, geometry)) => {
+                self.world.revise(Arc::new(survey), &geometry);
+                self.account.revised();
+                self.cancelled = mission.cancelled;
+                // Whoever believed the last one finished has not begun this one.
+                self.all_finished_ms = None;
+                let mut text = format!("the operator gives revision {}", mission.revision);
+                if left_out > 0 {
+                    let _ = write!(
+                        text,
+                        "; {left_out} cells that could be seen are left out by the planner and not asked for"
+                    );
+                }
+                self.note(text);
+            }
+        }
+    }
+
     /// Observers attach to the ground station, or to the first UAV where there is none.
     fn observable(&mut self, id: u16, locator: String) {
         let ground = self.spec.ground.as_ref().map(|g| g.id);
@@ -337,10 +386,12 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Orders and missions enter at the ground station's console.
-    fn operable(&mut self, console: ConsoleEntry) {
-        if let Err(cause) = self.registered.console_at(console) {
-            tracing::warn!(%cause, "orders will not find the ground station of this trial");
+    /// Orders and missions enter at the ground station's console; any peer tells at its own what
+    /// it does.
+    fn operable(&mut self, id: u16, console: ConsoleEntry) {
+        let station = self.spec.ground.as_ref().map(|g| g.id);
+        if let Err(cause) = self.registered.console_at(id, station == Some(id), console) {
+            tracing::warn!(%cause, id, "this peer of the trial will not be found");
         }
     }
 
@@ -450,10 +501,15 @@ impl<'a> Trial<'a> {
         let live = self.account.live_uavs();
         let finished = live.iter().all(|id| self.account.is_finished(*id));
         self.all_finished_ms = finished.then(|| self.all_finished_ms.unwrap_or(self.now_ms));
+        let longest_ms = if self.cancelled {
+            CANCELLED_IDLE_MS
+        } else {
+            IDLE_MS
+        };
         let idle = self
             .all_finished_ms
-            .is_some_and(|since| self.now_ms - since >= IDLE_MS);
-        let done = finished && self.account.covered_ms().is_some();
+            .is_some_and(|since| self.now_ms - since >= longest_ms);
+        let done = finished && self.account.covered_ms().is_some() && !self.cancelled;
         done || idle || live.is_empty() || self.now_ms >= u64::from(self.spec.max_time_s) * 1000
     }
 

@@ -69,7 +69,9 @@ fn without_geometry(spec: &Spec) -> Vec<Finding> {
 pub(crate) fn blamed(e: &GeometryError) -> &'static str {
     match e {
         GeometryError::Area(_) => "area",
-        GeometryError::Zone(..) => "no_fly",
+        GeometryError::Zone(..) | GeometryError::AddedZone(..) | GeometryError::ZoneName => {
+            "no_fly"
+        }
         GeometryError::Loop(e) => match e {
             LoopError::TurnRadius { .. } | LoopError::TooManyCells(_) => "lanes.spacing_m",
             LoopError::Footprint { .. } => "airframes",
@@ -168,9 +170,7 @@ fn faults(spec: &Spec, out: &mut Vec<Finding>) {
                 );
                 tell(Severity::Warning, text);
             }
-            Fault::Order { .. } | Fault::Rebase { .. } | Fault::Revise { .. }
-                if spec.ground.is_none() =>
-            {
+            fault if fault.is_spoken() && spec.ground.is_none() => {
                 let text = format!("at {at_s} s there is no ground station to speak it");
                 tell(Severity::Error, text);
             }

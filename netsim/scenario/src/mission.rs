@@ -13,6 +13,7 @@ use skein_geometry::{NoFlyZones, Polygon};
 use skein_interop::json::Error;
 use skein_peer::mission::{mm, ring_mm};
 use skein_peer::{CoverageTask, Mission};
+use std::collections::BTreeMap;
 
 #[allow(
     clippy::cast_possible_truncation,
@@ -70,6 +71,9 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
         },
         lap: 0,
         further_laps: laps(s)? - 1,
+        added_zones: BTreeMap::new(),
+        sortie: 0,
+        cancelled: false,
         tree: lanes.tree.unwrap_or_default(),
         division: s.division,
         separation_mm: length_mm((s.fleet.separation_m * 1000.0).ceil()),

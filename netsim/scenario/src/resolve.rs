@@ -10,9 +10,10 @@ use crate::mission::mission;
 use crate::mission::traffic_range_m;
 use crate::read::fleet::{Fleet, Member};
 use crate::read::targets::Asked;
-use crate::read::{self, Stated};
+use crate::read::{self, Stated, operator};
 use crate::request::{AreaPlanner, Overrides};
 use skein_geometry::frame::Pose;
+use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{Spec, UavSpec};
 use skein_netsim::world::Survey;
 use skein_peer::offload::MissionGeometry;
@@ -74,6 +75,7 @@ impl Scenario {
                 ..finding
             });
         }
+        operator::check(&stated.operator, &spec, &stated.places)?;
         Ok(Self {
             spec,
             geometry,
@@ -136,10 +138,18 @@ fn spec(s: &Stated, geometry: &MissionGeometry) -> Spec {
         min_coverable: s.run.min_coverable,
         min_separation_m: s.run.min_separation_m.max(s.fleet.separation_m),
         traffic_range_m: traffic_range_m(s, &geometry.mission),
-        faults: s.faults.clone(),
+        faults: with_operator(s),
         storm: s.storm,
         seed: s.run.seed,
     }
+}
+
+/// The faults, and what the operator does: both happen at their times.
+fn with_operator(s: &Stated) -> Vec<TimedFault> {
+    let acts = s.operator.iter().map(|act| act.timed.clone());
+    let mut all: Vec<TimedFault> = s.faults.iter().cloned().chain(acts).collect();
+    all.sort_by_key(|f| f.at_ms);
+    all
 }
 
 /// Gives every UAV its launch pose: its own, at the base, or evenly spread round the loop.

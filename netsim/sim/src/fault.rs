@@ -79,6 +79,19 @@ pub enum Fault {
         #[serde(default)]
         task: Option<CoverageTask>,
     },
+    /// The operator adds a no-fly zone to the mission that is flown: the ground station speaks
+    /// the next revision.
+    AddZone {
+        /// What it is called from now on.
+        name: String,
+        /// Its corners, millimetres from the mission's origin.
+        ring: Vec<PointMm>,
+    },
+    /// The operator takes a no-fly zone away that was added.
+    RemoveZone {
+        /// Which.
+        name: String,
+    },
     /// The operator wants something of all UAVs: the ground station speaks it.
     Order {
         /// What.
@@ -158,6 +171,21 @@ pub enum Fault {
 }
 
 impl Fault {
+    /// Whether something else is to be seen after it.
+    #[must_use]
+    pub fn changes_mission(&self) -> bool {
+        matches!(
+            self,
+            Self::Revise { .. } | Self::AddZone { .. } | Self::RemoveZone { .. }
+        )
+    }
+
+    /// Whether a ground station has to speak it.
+    #[must_use]
+    pub fn is_spoken(&self) -> bool {
+        self.changes_mission() || matches!(self, Self::Order { .. } | Self::Rebase { .. })
+    }
+
     /// The peers that it names.
     #[must_use]
     pub fn peers(&self) -> Vec<u16> {
@@ -182,6 +210,8 @@ impl Fault {
             Self::Heal
             | Self::Rebase { .. }
             | Self::Revise { .. }
+            | Self::AddZone { .. }
+            | Self::RemoveZone { .. }
             | Self::Order { .. }
             | Self::Loss { .. } => Vec::new(),
         }
@@ -213,6 +243,12 @@ impl fmt::Display for Fault {
                     f,
                     "the operator gives another mission, with {n} no-fly zones"
                 )
+            }
+            Self::AddZone { name, .. } => {
+                write!(f, "the operator adds the no-fly zone {name}")
+            }
+            Self::RemoveZone { name } => {
+                write!(f, "the operator takes the no-fly zone {name} away")
             }
             Self::Order { order } => write!(f, "the operator says {}", order.name()),
             Self::FailStores {

@@ -245,6 +245,9 @@ pub fn report_hash(report: &Report) -> u64 {
                 .iter()
                 .for_each(|c| words(&mut h, 0, &[u64::from(*c)]));
         }
+        Report::Revised { mission } => {
+            words(&mut h, 11, &[mission.content_hash()]);
+        }
         Report::Silenced => words(&mut h, 10, &[]),
         Report::Finished { revision } => words(&mut h, 7, &[u64::from(*revision)]),
         Report::Alarm { text } => {

@@ -124,6 +124,8 @@ impl<'a> Baseline<'a> {
             | Fault::Loss { .. }
             | Fault::Rebase { .. }
             | Fault::Revise { .. }
+            | Fault::AddZone { .. }
+            | Fault::RemoveZone { .. }
             | Fault::Order { .. }
             | Fault::FailStores { .. }
             | Fault::SlowStores { .. }

@@ -32,7 +32,8 @@ pub struct Wanted {
 #[must_use]
 pub fn run(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, wanted: Wanted) -> Outcome {
     // A baseline knows of one mission and of one UAV under each id.
-    let replaced = |f: &TimedFault| matches!(f.fault, Fault::Revise { .. } | Fault::Twin { .. });
+    let replaced =
+        |f: &TimedFault| f.fault.changes_mission() || matches!(f.fault, Fault::Twin { .. });
     let comparable = COMPARED_KILLS.max(prepared.spec.uavs.len() / 4);
     let compare = wanted.baseline
         && fault_generator::kills(&faults) as usize <= comparable
@@ -65,6 +66,20 @@ pub fn storm(prepared: &Prepared, seed: u64, failure_free_ms: u64, wanted: Wante
     let ran = |s: &&Struck| s.at_ms < outcome.report.end_ms;
     outcome.struck = storm.struck.iter().filter(ran).map(|s| s.name).collect();
     outcome
+}
+
+/// The swarm of a seed at some time, or at its end if that is sooner: with the scenario's own
+/// faults, or with those of its storm where the makespan without faults is given.
+#[must_use]
+pub fn until(prepared: &Prepared, seed: u64, failure_free_ms: Option<u64>, at_ms: u64) -> Swarm {
+    let storm = failure_free_ms.map(|ms| fault_generator::draw(&prepared.spec, seed, ms));
+    let (prepared, faults) = match storm {
+        Some(storm) => (prepared.with_uavs(storm.uavs), storm.faults),
+        None => (prepared.clone(), prepared.spec.faults.clone()),
+    };
+    let mut swarm = Swarm::new(&prepared, seed, faults, false);
+    swarm.run_until(at_ms);
+    swarm
 }
 
 /// How long the mission takes without faults, milliseconds; the scenario's longest

@@ -95,6 +95,9 @@ fn reported(peer: u16, report: &Report, told: &mut BTreeSet<String>) -> Option<S
         Report::Finished { .. } => format!("peer {peer} knows that the mission is finished"),
         Report::Alarm { text } => format!("peer {peer} alarm: {text}"),
         Report::Refused { reason } => format!("peer {peer} refused bytes: {reason}"),
+        Report::Revised { mission } => {
+            format!("peer {peer} was given revision {}", mission.revision)
+        }
         Report::Membership { .. } | Report::Covered { .. } => return None,
     };
     Some(line)

@@ -123,6 +123,7 @@ pub const RARE: &[Kind] = &[
     Kind::new("mission", can_be_given, missions),
     Kind::new("mission-elsewhere", can_be_elsewhere, missions_elsewhere),
     Kind::new("twin", |s| s.uavs.len() > 1, twin),
+    Kind::new("zones", can_be_given, zones),
 ];
 
 /// Each of the rare kinds strikes in one run of so many.
@@ -518,6 +519,30 @@ fn missions(d: &mut Draw<'_>) {
     }
 }
 
+/// The operator adds a no-fly zone or two, and takes half of them away again.
+fn zones(d: &mut Draw<'_>) {
+    let area = d.spec.mission.area_m();
+    for n in 1..=d.s.between(1, d.spec.storm.troubles.max_missions.into()) {
+        let Some(ring) = new_zone(d, &area) else {
+            continue;
+        };
+        let name = format!("zone-{n}");
+        let at_ms = d.s.between(0, d.end_ms);
+        let again_ms = d.s.between(at_ms, d.end_ms);
+        let again = d.s.one_in(2);
+        d.push(
+            at_ms,
+            Fault::AddZone {
+                name: name.clone(),
+                ring,
+            },
+        );
+        if again {
+            d.push(again_ms, Fault::RemoveZone { name });
+        }
+    }
+}
+
 /// A number from 0 to 1, in thousandths.
 fn share(s: &mut Stream, least_permille: u64, most_permille: u64) -> f64 {
     let drawn = s.between(least_permille, most_permille);
@@ -758,6 +783,11 @@ mod tests {
                             let first = &spec.mission;
                             assert!(*area != first.area || *zones != first.zones);
                             assert!(area.len() > 2 && zones.len() <= first.zones.len() + 1);
+                        }
+                        Fault::AddZone { ref ring, .. } => assert!(ring.len() == 8),
+                        Fault::RemoveZone { ref name } => {
+                            let added = |f: &TimedFault| matches!(&f.fault, Fault::AddZone { name: n, .. } if n == name);
+                            assert!(d.out.iter().any(|a| added(a) && a.at_ms <= f.at_ms));
                         }
                         Fault::ShortFuel { peer, lasts_ms } => {
                             assert!(peer != 1 && lasts_ms > 100_000);

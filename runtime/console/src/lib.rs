@@ -20,7 +20,7 @@ mod port;
 mod private_file;
 mod token;
 
-pub use command::Command;
+pub use command::{Command, NewZone};
 pub use port::{Answer, AskError, Asked, MAX_LINE_BYTES, Port, ask};
 pub use private_file::replace_private_file;
 pub use token::{Token, TokenError};

@@ -4,7 +4,8 @@
 //! |---|---|
 //! | an order | it is spoken in this life of the peer and in every later one, until the next |
 //! | a mission | it is checked, gets the next revision and is spoken |
-//! | another base | the newest mission, with that base, likewise |
+//! | another base, a no-fly zone more or less, the end | the newest mission with that change, likewise |
+//! | what there is, or why | it is answered, and nothing follows |
 //!
 //! What was said is kept over restarts of the ground station ([`crate::standing`]).
 //!
@@ -100,6 +101,52 @@ impl Console for LocalConsole {
     }
 }
 
+/// The mission that a request asks for, where `newest` is the one that is held.
+///
+/// # Errors
+/// A sentence that says why there is none.
+pub fn edited(request: Command, newest: Option<&Mission>) -> Result<Mission, String> {
+    let held =
+        |what: &str| newest.ok_or_else(|| format!("the ground station holds no mission {what}"));
+    let edited = match request {
+        Command::Mission(mission) => {
+            let mission = Arc::unwrap_or_clone(mission);
+            match newest {
+                Some(old) => mission.revising(old),
+                None => Ok(mission),
+            }
+        }
+        Command::Submit(mission) => {
+            let mission = Arc::unwrap_or_clone(mission);
+            Ok(match newest {
+                Some(old) => mission.submitted_after(old),
+                None => mission,
+            })
+        }
+        Command::Cancel => held("that could end")?.cancelled(),
+        Command::Base(base) => Ok(Mission {
+            base,
+            ..held("whose base could move")?.clone()
+        }),
+        Command::AddZones(zones) => {
+            let mut mission = held("that a zone could be added to")?.clone();
+            for zone in zones {
+                let name = zone.name.unwrap_or_else(|| mission.free_zone_name());
+                mission = mission
+                    .with_zone(&name, &zone.ring)
+                    .map_err(|e| e.to_string())?;
+            }
+            Ok(mission)
+        }
+        Command::RemoveZone(name) => held("with zones")?.without_zone(&name),
+        // Answered before, without a mission.
+        Command::Order(_) | Command::Show | Command::Why => {
+            return Err("no mission follows from that".to_owned());
+        }
+    };
+    edited.map_err(|e| e.to_string())
+}
+
 /// Whether a mission fits the swarm that flies `running`: positions count from the same
 /// origin, and no airframe is asked for more than it was launched for.
 ///
@@ -166,12 +213,5 @@ pub fn fits(mission: &Mission, running: Option<&Mission>) -> Result<(), String> 
 /// A sentence that says why not.
 pub fn can_be_flown(mission: &Arc<Mission>) -> Result<(), String> {
     let geometry = mission.geometry().map_err(|e| e.to_string())?;
-    let clearance_m = mission.clearance_m();
-    let base_m = geometry.router.zones().distance_m(mission.base_m());
-    if base_m < clearance_m {
-        return Err(format!(
-            "its base is {base_m:.1} m from a no-fly zone; expected at least the clearance of {clearance_m:.1} m"
-        ));
-    }
-    Ok(())
+    geometry.base_is_clear()
 }

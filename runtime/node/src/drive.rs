@@ -9,7 +9,7 @@
 //! The only thing decided here is what an operator is told ([`crate::console`]).
 
 use crate::clock::Clock;
-use crate::console::{Console, can_be_flown, fits};
+use crate::console::{Console, can_be_flown, edited, fits};
 use crate::journal::{Journal, Stored};
 use crate::outgoing::Frame;
 use crate::radio::Radio;
@@ -50,6 +50,12 @@ pub trait PeerLogic: Send {
     fn mission(&self) -> Option<Arc<Mission>>;
     /// The revision that the operator's next mission must have to be flown.
     fn next_revision(&self) -> u32;
+    /// Whether it is a ground station: any other is asked only what it does.
+    fn is_ground_station(&self) -> bool;
+    /// What it does and why, as JSON.
+    fn why(&self) -> String;
+    /// What it knows of the mission, as JSON; none without a mission.
+    fn overview(&self) -> Option<String>;
 }
 
 impl PeerLogic for Peer {
@@ -75,6 +81,19 @@ impl PeerLogic for Peer {
 
     fn next_revision(&self) -> u32 {
         Peer::next_revision(self)
+    }
+
+    fn is_ground_station(&self) -> bool {
+        Peer::is_ground_station(self)
+    }
+
+    fn why(&self) -> String {
+        // Numbers and names alone: nothing of it cannot be written.
+        serde_json::to_string(&Peer::why(self)).unwrap_or_default()
+    }
+
+    fn overview(&self) -> Option<String> {
+        serde_json::to_string(&Peer::overview(self)?).ok()
     }
 }
 
@@ -374,21 +393,29 @@ where
     /// The operator wants something.
     async fn asked(&mut self, asked: Asked<Request>) {
         let Asked { request, answer } = asked;
-        let mission = match request {
-            Request::Order(order) => {
-                let told = self.order(order).await;
-                // Who asked may have gone away; likewise below.
-                return drop(answer.send(told));
+        let told = match &request {
+            Request::Why => Some(Ok(vec![self.peer.why()])),
+            _ if !self.peer.is_ground_station() => {
+                let why = "this peer is no ground station: it can be asked only what it does";
+                Some(Err(why.to_owned()))
             }
-            Request::Mission(mission) => Ok((*mission).clone()),
-            Request::Base(base) => match self.peer.mission() {
-                Some(newest) => Ok(Mission {
-                    base,
-                    ..(*newest).clone()
-                }),
-                None => Err("the ground station holds no mission whose base could move".to_owned()),
-            },
+            Request::Show => {
+                let nothing = || "the ground station holds no mission".to_owned();
+                Some(
+                    self.peer
+                        .overview()
+                        .map(|line| vec![line])
+                        .ok_or_else(nothing),
+                )
+            }
+            Request::Order(order) => Some(self.order(*order).await),
+            _ => None,
         };
+        if let Some(told) = told {
+            // Who asked may have gone away; likewise below.
+            return drop(answer.send(told));
+        }
+        let mission = edited(request, self.peer.mission().as_deref());
         let fitting = mission.and_then(|m| {
             fits(&m, self.peer.mission().as_deref())?;
             if self.checking {
@@ -473,9 +500,16 @@ where
                 .map_err(unkept)?;
         }
         self.step(Input::Command(Command::Mission(mission))).await;
-        Ok(vec![format!(
+        let mut told = vec![format!(
             "the ground station speaks the mission as revision {revision}"
-        )])
+        )];
+        if let Some(order) = self.order.filter(|order| *order != Order::Resume) {
+            told.push(format!(
+                "the order {} stands; `skein mission resume` ends it",
+                order.name()
+            ));
+        }
+        Ok(told)
     }
 
     /// Flushes what is under way and says goodbye.

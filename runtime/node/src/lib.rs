@@ -46,7 +46,7 @@ use radio::Radio;
 use simulator::{Hello, Joined, StreamError};
 use skein_link::medium::Channel;
 use skein_peer::protocol::airtime::{FRAME_BYTES, OVERHEAD_BYTES, PART_BYTES};
-use skein_peer::{Input, Peer};
+use skein_peer::{Input, Peer, Role};
 use standing::{Standing, StandingError};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
@@ -86,13 +86,11 @@ pub async fn run(mut config: NodeConfig, stop: impl Future<Output = ()>) -> Resu
             "the journal was cut off behind its last whole record"
         );
     }
-    let standing = match &config.console {
-        Some(_) => Some(Standing::open(
-            &config.journal,
-            config.peer.mission.as_deref(),
-        )?),
-        None => None,
-    };
+    // At the console of a UAV nobody says anything that had to be kept.
+    let is_operated = config.console.is_some() && config.peer.role == Role::GroundStation;
+    let standing = is_operated
+        .then(|| Standing::open(&config.journal, config.peer.mission.as_deref()))
+        .transpose()?;
     let revised = standing.as_ref().and_then(Standing::mission);
     config.peer.mission = revised.or(config.peer.mission);
     let bus = Bus::open(&config.bus).await?;

@@ -4,14 +4,14 @@
 //! | what holds | goal |
 //! |---|---|
 //! | the operator said hold | loiter here |
-//! | the operator said return, or all is covered, or the fuel is due, or another process speaks under its id | loiter at base |
+//! | the operator said return or cancelled the mission, or all is covered, or the fuel is due, or another process speaks under its id | loiter at base |
 //! | the plan has cells | fly them |
 //! | nothing to fly, others at work | loiter where it is |
 //! | and among many nobody is heard | loiter at base |
 //!
 //! | event | what follows |
 //! |---|---|
-//! | a newer mission is whole | its geometry is asked for, once |
+//! | a newer mission is whole | its zones are kept clear of; its geometry is asked for, once |
 //! | the geometry arrives | the mission begins; claims and bids held are heard again |
 //! | there is no geometry | an alarm; the old mission stays |
 //! | a percept | a setpoint; what the camera saw is covered, told, and durable every 5 cells |
@@ -41,6 +41,7 @@ use crate::protocol::membership::Membership;
 use crate::protocol::negotiation::{Adoption, are_many};
 use crate::protocol::runs::{PlannedCell, legs_of};
 use crate::timers::{Timer, Timers};
+use crate::why::Reason;
 use crate::wire::codec::Body;
 use crate::wire::message::{Beacon, Bid, Epoch, Lacking, Member, Order, Record};
 use skein_behaviors::{Goal, Percept};
@@ -178,6 +179,13 @@ impl Cooperation {
         newest.map(ask).into_iter().collect()
     }
 
+    /// The last piece of a newer mission came: its zones are kept clear of at once.
+    fn mission_is_whole(&mut self) -> Effects {
+        let (newest, state) = (self.library.newest(), self.state.as_mut());
+        let zones = state.zip(newest).and_then(|(s, newest)| s.heed(&newest));
+        zones.into_iter().chain(self.consider_mission()).collect()
+    }
+
     /// The geometry of the mission with this hash arrived: from now on it is the mission.
     pub fn geometry_arrived(
         &mut self,
@@ -269,7 +277,7 @@ impl Cooperation {
             Body::Mission(chunk) => {
                 self.piece_came = now;
                 match self.library.chunk(record.subject, chunk) {
-                    Ok(true) => self.consider_mission(),
+                    Ok(true) => self.mission_is_whole(),
                     Ok(false) => Effects::new(),
                     Err(why) => vec![Effect::Alarm(why)],
                 }
@@ -451,17 +459,14 @@ impl Cooperation {
 /// Where a peer flies: by the first line of the table that holds.
 fn goal_of(state: &MissionState, order: Order) -> Goal {
     let sections = &state.negotiation.sections;
-    let home = Goal::Point(state.geometry.mission.base_m());
-    if order == Order::Hold {
-        Goal::Hold
-    } else if order == Order::ReturnToBase || state.finished || state.exhausted || state.silent {
-        home
-    } else if !sections.plan().is_empty() {
-        Goal::Legs(legs_of(sections.plan(), sections.cells()))
-    } else if state.astray {
-        // Where the ground station is and whoever is finished, somebody is heard.
-        home
-    } else {
-        Goal::Hold
+    match Reason::of(state, order) {
+        Reason::ToldToHold | Reason::OthersAtWork => Goal::Hold,
+        Reason::Plan => Goal::Legs(legs_of(sections.plan(), sections.cells())),
+        Reason::ToldToReturn
+        | Reason::Cancelled
+        | Reason::Finished
+        | Reason::FuelIsDue
+        | Reason::Twin
+        | Reason::Astray => Goal::Point(state.geometry.mission.base_m()),
     }
 }

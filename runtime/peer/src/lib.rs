@@ -93,16 +93,19 @@ mod company;
 pub mod config;
 mod cooperation;
 mod coverage_told;
+mod diary;
 mod effect;
 mod inbound;
 pub mod input;
 pub mod journal;
 pub mod mission;
 mod mission_change;
+pub mod mission_edit;
 mod mission_state;
 pub mod offload;
 mod outbound;
 pub mod output;
+pub mod overview;
 pub mod peer;
 pub mod protocol;
 
@@ -116,16 +119,20 @@ mod tests;
 mod timers;
 pub mod transmission;
 mod varint;
+pub mod why;
 pub mod wire;
+mod zone_watch;
 
 pub use beliefs::Beliefs;
 pub use config::{PeerConfig, Role};
 pub use input::{Command, Input, Time};
 pub use mission::Mission;
 pub use output::{Output, Priority, Report};
+pub use overview::Overview;
 pub use peer::Peer;
 pub use task::{CoverageTask, LineTask, PointTask};
 pub use transmission::Transmission;
+pub use why::Why;
 
 use serde::{Deserialize, Serialize};
 

@@ -14,7 +14,7 @@ use skein_flight::coverage::ring::{CoverageLoop, LoopError, LoopProblem, Tree};
 use skein_flight::coverage::stations::{self, StationsProblem};
 use skein_flight::route::{RouteLimits, Router};
 use skein_geometry::frame::Point;
-use skein_geometry::{NoFlyZones, Polygon, PolygonError};
+use skein_geometry::{Polygon, PolygonError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -74,6 +74,16 @@ pub struct Mission {
     /// The fastest cruise of the fleet, mm/s; of use with a separation alone.
     #[serde(default, skip_serializing_if = "is_none")]
     pub fastest_mmps: u32,
+    /// No-fly zones that the operator added in flight, by name; besides `zones`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub added_zones: BTreeMap<String, Vec<PointMm>>,
+    /// Counts the missions that the operator began anew: nothing that was covered in an
+    /// earlier one counts.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub sortie: u16,
+    /// Whether the operator ended it: nothing is to be seen, and all fly home.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub cancelled: bool,
 }
 
 #[allow(
@@ -132,6 +142,12 @@ pub enum GeometryError {
     /// A no-fly zone, by its index, is no simple polygon.
     #[error("zone {0}: {1}")]
     Zone(usize, PolygonError),
+    /// A no-fly zone that the operator added, by its name, is no simple polygon.
+    #[error("zone {0:?}: {1}")]
+    AddedZone(String, PolygonError),
+    /// A no-fly zone that somebody added has a name that no operator can give.
+    #[error("a zone has a name that is none")]
+    ZoneName,
     /// There is no loop over what is to be seen.
     #[error(transparent)]
     Loop(#[from] LoopError),
@@ -145,9 +161,10 @@ impl Mission {
         ring_m(&self.area)
     }
 
-    /// The no-fly zones.
+    /// The no-fly zones, those that the operator added last, by name.
     pub fn zones_m(&self) -> impl Iterator<Item = Vec<Point>> + '_ {
-        self.zones.iter().map(|zone| ring_m(zone))
+        let all = self.zones.iter().chain(self.added_zones.values());
+        all.map(|zone| ring_m(zone))
     }
 
     /// Lane spacing.
@@ -268,6 +285,7 @@ impl Mission {
             h.write_i64(i64::from(self.lap));
             h.write_i64(i64::from(self.further_laps));
         }
+        self.hash_operated(&mut h);
         h.finish()
     }
 
@@ -324,11 +342,7 @@ impl Mission {
     /// [`GeometryError`] names what is wrong with the mission.
     pub fn geometry(self: &Arc<Self>) -> Result<Arc<MissionGeometry>, GeometryError> {
         let area = Polygon::new(self.area_m()).map_err(GeometryError::Area)?;
-        let mut zones = Vec::with_capacity(self.zones.len());
-        for (i, zone) in self.zones_m().enumerate() {
-            zones.push(Polygon::new(zone).map_err(|e| GeometryError::Zone(i, e))?);
-        }
-        let zones = Arc::new(NoFlyZones::new(zones));
+        let zones = self.no_fly_zones()?;
         let problem = LoopProblem {
             area,
             zones: Arc::clone(&zones),
@@ -347,7 +361,7 @@ impl Mission {
             clearance_m: problem.clearance_m,
         };
         let router = Router::new(zones, limits);
-        let coverage_loop = coverage_loop.of_lap(self.lap);
+        let coverage_loop = coverage_loop.of_lap(self.lap).of_sortie(self.sortie);
         let geometry = MissionGeometry::new(Arc::clone(self), coverage_loop, router);
         Ok(Arc::new(geometry))
     }
@@ -544,6 +558,9 @@ mod tests {
             task: CoverageTask::Area,
             lap: 0,
             further_laps: 0,
+            added_zones: BTreeMap::new(),
+            sortie: 0,
+            cancelled: false,
             tree: Tree::default(),
             division: Rule::default(),
             separation_mm: 0,
@@ -664,7 +681,7 @@ mod tests {
 
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 26] = [
+        let changes: [fn(&mut Mission); 32] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -691,6 +708,27 @@ mod tests {
             |m| m.lap = 1,
             |m| m.further_laps = 1,
             |m| (m.lap, m.further_laps) = (1, 1),
+            |m| m.sortie = 1,
+            |m| m.cancelled = true,
+            |m| (m.sortie, m.cancelled) = (1, true),
+            |m| {
+                drop(
+                    m.added_zones
+                        .insert("a".into(), vec![(1, 2), (3, 4), (5, 9)]),
+                )
+            },
+            |m| {
+                drop(
+                    m.added_zones
+                        .insert("b".into(), vec![(1, 2), (3, 4), (5, 9)]),
+                )
+            },
+            |m| {
+                drop(
+                    m.added_zones
+                        .insert("a".into(), vec![(1, 2), (3, 4), (5, 8)]),
+                )
+            },
         ];
         let hashes = changes.map(|change| {
             let mut m = mission(1, 4);

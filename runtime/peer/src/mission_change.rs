@@ -4,7 +4,7 @@
 use crate::cells::CellSet;
 use crate::config::PeerConfig;
 use crate::journal::Durable;
-use crate::mission::{PointMm, ring_mm};
+use crate::mission::{Mission, PointMm, ring_mm};
 use crate::offload::MissionGeometry;
 use crate::protocol::Negotiation;
 use crate::separation::{Rules, Separation};
@@ -65,17 +65,20 @@ pub(crate) fn negotiation_begun(
     cells: u16,
 ) -> Negotiation {
     let coverage_loop = &geometry.coverage_loop;
+    // Of a mission that was cancelled nothing is to be seen.
     let without_need = (0u16..)
         .zip(coverage_loop.cells())
-        .filter(|(_, c)| !c.needed);
+        .filter(|(_, c)| !c.needed || geometry.mission.cancelled);
     let needless = CellSet::of(cells, without_need.map(|(i, _)| i));
     let counter = old.map_or(0, |(_, negotiation)| negotiation.rounds.counter());
     let mut negotiation = Negotiation::new(me, needless, counter.max(durable.counter));
     if old.is_some_and(|(before, _)| before.coverage_loop.hash() != coverage_loop.hash()) {
         negotiation.rounds.begin_at(geometry.mission.revision);
     }
-    // Every lap begins with nothing covered.
-    if let Some((before, old)) = old.filter(|(g, _)| g.mission.lap == geometry.mission.lap) {
+    // Every lap begins with nothing covered, and every mission that is begun anew.
+    let begun_with = |m: &Mission| (m.lap, m.sortie);
+    let is_same = |g: &MissionGeometry| begun_with(&g.mission) == begun_with(&geometry.mission);
+    if let Some((before, old)) = old.filter(|(g, _)| is_same(g)) {
         let covered = old.sections.covered();
         let covered = carried_over(&before.coverage_loop, covered, coverage_loop);
         negotiation.sections.cover(&covered);
@@ -123,7 +126,7 @@ fn carried_over(old: &CoverageLoop, covered: &CellSet, new: &CoverageLoop) -> Ce
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{CoverageTask, Mission, PointTask};
+    use crate::{CoverageTask, PointTask};
 
     #[test]
     fn covered_cells_are_carried_to_another_loop_by_name() {

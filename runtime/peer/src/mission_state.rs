@@ -5,8 +5,8 @@
 //! |---|---|
 //! | the same loop | sections, rounds, claims being written, since when it is able |
 //! | and the same zones, turn radius and clearance | the flight itself, with its goal |
-//! | another loop, the same lap | covered cells of the same places |
-//! | another lap | nothing is covered |
+//! | another loop, the same lap and sortie | covered cells of the same places |
+//! | another lap or sortie | nothing is covered |
 //! | any | the highest round counter; what the journal knows of that loop; that the fuel is due |
 //!
 //! And what it does with them: it hears of others' cells, negotiates, watches the fuel and
@@ -671,11 +671,12 @@ impl MissionState {
         self.unsaved_cells = old.unsaved_cells;
         let (new, before) = (&self.geometry.mission, &old.geometry.mission);
         let flown_alike = new.zones == before.zones
+            && new.added_zones == before.added_zones
             && new.turn_radius_mm == before.turn_radius_mm
             && new.clearance_mm == before.clearance_mm;
         if flown_alike {
             let base = new.base_m();
-            self.executive = old.executive.map(|e| e.with_home(base));
+            self.executive = old.executive.map(|e| e.with_home(base).without_heeded());
             self.separation = old.separation;
             self.goal = old.goal;
             self.replan = old.replan;

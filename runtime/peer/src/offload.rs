@@ -38,6 +38,21 @@ impl MissionGeometry {
         }
     }
 
+    /// Whether UAVs may loiter above the base.
+    ///
+    /// # Errors
+    /// A sentence that says how near a no-fly zone is.
+    pub fn base_is_clear(&self) -> Result<(), String> {
+        let clearance_m = self.mission.clearance_m();
+        let base_m = self.router.zones().distance_m(self.mission.base_m());
+        if base_m < clearance_m {
+            return Err(format!(
+                "its base is {base_m:.1} m from a no-fly zone; expected at least the clearance of {clearance_m:.1} m"
+            ));
+        }
+        Ok(())
+    }
+
     /// The sections that a roster begins with. Those of the first roster are remembered: peers
     /// of one process share the geometry.
     #[must_use]

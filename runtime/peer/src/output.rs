@@ -1,10 +1,11 @@
 //! What a peer wants done, and what it reports.
 
 use crate::offload::Job;
-use crate::{Incarnation, PeerId};
+use crate::{Incarnation, Mission, PeerId};
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Setpoint;
 use skein_flight::coverage::ring::backtracking::Leg;
+use std::sync::Arc;
 
 /// One thing to do. Drain them all after each input.
 #[derive(Clone, Debug)]
@@ -125,6 +126,11 @@ pub enum Report {
     Finished {
         /// Mission revision.
         revision: u32,
+    },
+    /// The operator gave this ground station a newer mission, which it speaks.
+    Revised {
+        /// The mission.
+        mission: Arc<Mission>,
     },
     /// Another process speaks under this id: this one is silent from now on, until it
     /// reports that it runs under another incarnation.

@@ -14,6 +14,7 @@
 use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
 use crate::cooperation::{Cooperation, Situation};
+use crate::diary::Diary;
 use crate::effect::{Effect, Effects, PendingJob, Promise};
 use crate::inbound::{self, Heard};
 use crate::input::{Command, Input, Time};
@@ -21,12 +22,14 @@ use crate::journal::{Durable, Entry};
 use crate::offload::{Job, JobResult};
 use crate::outbound::{self, Outbound, Sources};
 use crate::output::{Output, Report, Status};
+use crate::overview::Overview;
 use crate::protocol::life::Life;
 use crate::protocol::membership::{Change, Membership};
 use crate::protocol::negotiation::are_many;
 use crate::protocol::relay::{Offer, Relay};
 use crate::timers::{Timer, Timers};
 use crate::transmission::Transmission;
+use crate::why::{self, Other, Why};
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
@@ -88,6 +91,7 @@ pub struct Peer {
     jobs: BTreeMap<u64, PendingJob>,
     /// Whether the last beacon was one with which goes what is lacking.
     lacking_told: bool,
+    diary: Diary,
 }
 
 impl Peer {
@@ -115,6 +119,7 @@ impl Peer {
             stores: BTreeMap::new(),
             jobs: BTreeMap::new(),
             lacking_told: false,
+            diary: Diary::default(),
             now: Time(0),
             started: false,
             life: Life::default(),
@@ -289,6 +294,9 @@ impl Peer {
                 if kind.relayed() && self.relay.offer(self.now, record, bytes, hops) != Offer::New {
                     return;
                 }
+                if let Body::Bid(bid) = body {
+                    self.diary.note_bid(self.now, record.author, bid);
+                }
                 let effects = self.cooperation.hear(self.now, record, body);
                 self.carry_out(effects);
             }
@@ -416,7 +424,8 @@ impl Peer {
                     return self
                         .alarm("a mission is no newer than the one that is held; it was ignored");
                 }
-                self.cooperation.offer(mission);
+                self.cooperation.offer(Arc::clone(&mission));
+                self.report(Report::Revised { mission });
                 if self.speaks() {
                     let effects = self.with_sources(|o, s, _, _| o.speak_mission(s));
                     self.carry_out(effects);
@@ -513,6 +522,9 @@ impl Peer {
             return;
         }
         let me = self.me();
+        if let Body::Bid(bid) = body {
+            self.diary.note_bid(self.now, me.id, bid);
+        }
         let record = self.outbound.record(me.id, me.incarnation, subject, body);
         let bytes = codec::encode_record(&record);
         self.relay.own(self.now, &record, bytes);
@@ -746,6 +758,7 @@ impl Peer {
     }
 
     fn report(&mut self, report: Report) {
+        self.diary.note(self.now, &report);
         self.outputs.push_back(Output::Report(report));
     }
 
@@ -831,6 +844,12 @@ impl Peer {
         held.map_or(newest.saturating_add(1), |m| m.revision_after(newest))
     }
 
+    /// Whether it is a ground station, at which an operator may speak.
+    #[must_use]
+    pub fn is_ground_station(&self) -> bool {
+        self.config.role == Role::GroundStation
+    }
+
     /// The life in which it speaks at present; none while it only listens.
     #[must_use]
     pub fn speaks_in(&self) -> Option<Incarnation> {
@@ -863,6 +882,52 @@ impl Peer {
         self.cooperation
             .fill(&mut beliefs, counter, self.percept.as_ref());
         beliefs
+    }
+
+    /// What it does and why, for a person.
+    #[must_use]
+    pub fn why(&self) -> Why {
+        let state = self.cooperation.state();
+        let reserve_s = self.config.airframe.map_or(0.0, |a| a.reserve_s);
+        let percept = self.percept.as_ref();
+        Why {
+            id: self.config.id.0,
+            incarnation: self.life.incarnation(),
+            time_ms: self.now.0,
+            ground_station: self.config.role == Role::GroundStation,
+            speaks: self.speaks(),
+            order: self.cooperation.order(),
+            flight: percept.map(|p| why::flight(state, p, reserve_s)),
+            work: state.map(|s| why::work(s, self.cooperation.order())),
+            round: self.diary.round(self.now),
+            others: self.others(),
+            events: self.diary.events(self.now),
+        }
+    }
+
+    /// What it knows of the newest mission that it holds, for a person; none without one.
+    #[must_use]
+    pub fn overview(&self) -> Option<Overview> {
+        let (mission, order) = (self.mission()?, self.cooperation.order());
+        let work = self.cooperation.state().map(|s| why::work(s, order));
+        Some(Overview::of(&mission, order, work, self.others()))
+    }
+
+    fn others(&self) -> Vec<Other> {
+        let state = self.cooperation.state();
+        let of = |(id, incarnation, status): (u16, Incarnation, Status)| {
+            let info = self.membership.info(id).unwrap_or_default();
+            Other {
+                id,
+                incarnation,
+                status,
+                since_ms: self.diary.since_ms(self.now, id),
+                heard_ms_ago: info.heard.map(|at| self.now.since_ms(at)),
+                revision: info.revision,
+                open_cells: state.map_or(0, |s| s.negotiation.sections.n_left(id)),
+            }
+        };
+        self.membership.all().map(of).collect()
     }
 
     /// Predicted end of its plan, milliseconds from now; 0 without a plan.

@@ -62,6 +62,9 @@ pub fn mission(revision: u32, cols: i32, rows: i32) -> Mission {
         task: CoverageTask::Area,
         lap: 0,
         further_laps: 0,
+        added_zones: BTreeMap::new(),
+        sortie: 0,
+        cancelled: false,
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,
@@ -375,6 +378,15 @@ impl Harness {
     #[must_use]
     pub fn beliefs(&self, id: u16) -> Beliefs {
         self.peer(id).map(Peer::beliefs).unwrap_or_default()
+    }
+
+    /// What a running peer does and why.
+    ///
+    /// # Panics
+    /// When it does not run.
+    #[must_use]
+    pub fn why(&self, id: u16) -> crate::Why {
+        self.seats[&id].peer.as_ref().expect("it runs").why()
     }
 
     /// Predicted end of a running peer's plan, milliseconds from now.

@@ -116,7 +116,7 @@ fn names_known(fault: &Fault, known: &Known<'_>) -> bool {
     }
 }
 
-fn at_ms(f: &Fields<'_>, name: &str, known: &Known<'_>) -> Result<u64, Error> {
+pub(super) fn at_ms(f: &Fields<'_>, name: &str, known: &Known<'_>) -> Result<u64, Error> {
     let seconds = f.need(name, "70")?.number(
         0.0,
         f64::from(known.max_time_s),
@@ -276,7 +276,7 @@ fn one(item: &Node<'_>, known: &Known<'_>) -> Result<(TimedFault, Option<TimedFa
     Ok((TimedFault { at_ms, fault }, end))
 }
 
-fn order(node: &Node<'_>) -> Result<Order, Error> {
+pub(super) fn order(node: &Node<'_>) -> Result<Order, Error> {
     let text = node.text()?;
     let names = Order::ALL.map(Order::name);
     let found = Order::ALL.into_iter().find(|o| o.name() == text);

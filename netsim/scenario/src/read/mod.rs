@@ -4,6 +4,7 @@
 pub(crate) mod faults;
 pub(crate) mod fleet;
 pub(crate) mod lanes;
+pub(crate) mod operator;
 pub(crate) mod radio;
 pub(crate) mod run;
 mod shared;
@@ -59,6 +60,7 @@ const FIELDS: &[&str] = &[
     "beacon_period_s",
     "percept_period_ms",
     "faults",
+    "operator",
     "storm",
     "checks",
 ];
@@ -84,6 +86,8 @@ pub(crate) struct Stated {
     pub(crate) objective: Objective,
     pub(crate) radio: RadioSpec,
     pub(crate) faults: Vec<TimedFault>,
+    /// What the operator does, ascending by time.
+    pub(crate) operator: Vec<operator::Act>,
     pub(crate) storm: StormSpec,
     /// What its files told besides what was asked, and faults that were left out.
     pub(crate) findings: Vec<Finding>,
@@ -106,13 +110,6 @@ pub(crate) fn scenario(
     let mut notices = Notices::new();
     let (terrain, asked) = terrain::read(&f, files, &mut notices)?;
     let asked = planned_by(&f, asked, over.planner)?;
-    let mut findings: Vec<Finding> = notices
-        .into_iter()
-        .map(|(field, text)| Finding {
-            place: Some(places.locate(&field)),
-            ..Finding::new(Severity::Note, &field, text)
-        })
-        .collect();
     let ground_station = f.get("ground").map(fleet::ground_station).transpose()?;
     let ground_id = ground_station.as_ref().map(|g| g.id);
     let fleet = fleet::read(&f, &name, terrain.level_m, ground_id, over)?;
@@ -130,6 +127,17 @@ pub(crate) fn scenario(
         loss_permille: radio.loss_permille,
         lenient: over.peers.is_some(),
     };
+    let operator = f.get("operator").map_or_else(
+        || Ok(Vec::new()),
+        |list| operator::read(list, (&terrain, files), &known, &mut notices),
+    )?;
+    let mut findings: Vec<Finding> = notices
+        .into_iter()
+        .map(|(field, text)| Finding {
+            place: Some(places.locate(&field)),
+            ..Finding::new(Severity::Note, &field, text)
+        })
+        .collect();
     let faults = match f.get("faults") {
         Some(list) => faults::read(list, &known, &mut findings)?,
         None => Vec::new(),
@@ -155,6 +163,7 @@ pub(crate) fn scenario(
         ground_station,
         radio,
         faults,
+        operator,
         findings,
         places,
     })

@@ -79,6 +79,21 @@ pub(crate) fn read(
     Ok((terrain, asked))
 }
 
+/// The no-fly zones of one entry, whose files count from the scenario's place.
+pub(super) fn zone(
+    node: &Node<'_>,
+    origin: Origin,
+    files: &Files<'_>,
+    notices: &mut Notices,
+) -> Result<Vec<Polygon>, Error> {
+    let mut reader = Reader {
+        origin,
+        files,
+        shapes: BTreeMap::new(),
+    };
+    reader.zones(node, notices)
+}
+
 /// Whether nothing of the area sticks out of the zone.
 fn swallows(zone: &Polygon, area: &Polygon) -> bool {
     area.vertices().iter().all(|p| zone.contains(*p))

@@ -208,7 +208,7 @@ impl Account {
                 self.lifetimes.paused(now_ms, peer);
                 None
             }
-            Report::Round { .. } => None,
+            Report::Round { .. } | Report::Revised { .. } => None,
         }
     }
 

@@ -80,6 +80,15 @@ impl FlightCheck {
         }
     }
 
+    /// A mission has these zones: ways round them count, too.
+    pub fn on_zones(&mut self, zones: impl Iterator<Item = Vec<Point>>) {
+        for zone in zones.filter_map(|ring| Polygon::new(ring).ok()) {
+            if !self.zones.iter().any(|z| z.vertices() == zone.vertices()) {
+                self.zones.push(zone);
+            }
+        }
+    }
+
     /// A process ends or stands still: its airframe loiters where it is.
     pub fn on_silent(&mut self, id: u16) {
         self.homing.remove(&id);

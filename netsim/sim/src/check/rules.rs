@@ -73,6 +73,7 @@ impl Rules {
     /// The operator has a mission.
     pub fn on_mission(&mut self, mission: &Mission) {
         self.bases.insert(mission.revision, point_m(mission.base));
+        self.flight.on_zones(mission.zones_m());
         self.spread
             .on_mission(chunks(mission).map_or(0, |pieces| pieces.len()));
     }

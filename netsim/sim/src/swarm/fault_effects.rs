@@ -7,9 +7,7 @@ use crate::account::Cause;
 use crate::check::record::Said;
 use crate::disk::Trouble;
 use crate::fault::Fault;
-use crate::spec::Spec;
 use crate::world::Survey;
-use skein_geometry::Polygon;
 use skein_peer::input::Command;
 use skein_peer::{Beliefs, Input, Mission, Role, Transmission};
 use std::sync::Arc;
@@ -79,6 +77,17 @@ impl Swarm {
                     task: task.clone().unwrap_or_else(|| before.task.clone()),
                     ..before
                 });
+                0
+            }
+            Fault::AddZone { name, ring } => {
+                let zoned = self.operator.mission().with_zone(name, ring);
+                // The reader of a scenario refuses what cannot be done.
+                zoned.into_iter().for_each(|next| self.give_mission(next));
+                0
+            }
+            Fault::RemoveZone { name } => {
+                let freed = self.operator.mission().without_zone(name);
+                freed.into_iter().for_each(|next| self.give_mission(next));
                 0
             }
             Fault::Order { order } => {
@@ -252,25 +261,12 @@ impl Swarm {
     /// operator wants one of which the planner leaves out what could be seen.
     fn give_mission(&mut self, mission: Mission) {
         let next = self.operator.next(mission);
-        let zones: Result<Vec<Polygon>, _> = next.zones_m().map(Polygon::new).collect();
-        let (Ok(geometry), Ok(zones)) = (self.geometry_cache.of(&next), zones) else {
+        let survey = Survey::of_mission(&self.spec, &next);
+        let (Ok(geometry), Ok(survey)) = (self.geometry_cache.of(&next), survey) else {
             return;
         };
-        let survey = Survey::new(&Spec {
-            mission: Arc::clone(&next),
-            zones,
-            ..(*self.spec).clone()
-        });
-        let coverage_loop = &geometry.coverage_loop;
-        // Elsewhere the judge has squares or pieces of its own.
-        let is_planned = |id| {
-            let cell = coverage_loop.index_of(id);
-            !next.task.is_area()
-                || cell.is_some_and(|c| coverage_loop.cells()[usize::from(c)].needed)
-        };
-        let mut coverable = survey.cells().iter().filter(|c| c.uncoverable.is_none());
         let enough = survey.coverable_share() >= self.spec.min_coverable;
-        if enough && coverable.all(|c| is_planned(c.id)) {
+        if enough && survey.left_out(&geometry) == 0 {
             self.air.revise(Arc::new(survey), &geometry);
             self.account.revised();
             self.revise(next);

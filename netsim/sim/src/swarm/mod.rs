@@ -58,7 +58,7 @@ use skein_link::medium::key_hash;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
 use skein_peer::wire;
-use skein_peer::{Beliefs, Command, Input, Output, Peer, Report, Role, Transmission};
+use skein_peer::{Beliefs, Command, Input, Output, Peer, Report, Role, Transmission, Why};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stream::{Concern, Stream};
@@ -279,6 +279,13 @@ impl Swarm {
     pub fn view(&self, id: u16) -> Option<Beliefs> {
         let sim_peer = &self.peers[self.peer_idx(id)?];
         sim_peer.peer.as_deref().map(skein_peer::Peer::beliefs)
+    }
+
+    /// What a running peer does and why.
+    #[must_use]
+    pub fn why(&self, id: u16) -> Option<Why> {
+        let sim_peer = &self.peers[self.peer_idx(id)?];
+        sim_peer.peer.as_deref().map(skein_peer::Peer::why)
     }
 
     /// Where a UAV is; nothing once its airframe is gone.

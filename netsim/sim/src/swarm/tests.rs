@@ -320,6 +320,51 @@ fn another_mission_in_flight_is_covered_and_checked_to_the_end() {
     assert_eq!(o.report.coverage.cells, 80);
 }
 
+/// What is asked for follows the zones that the operator adds and takes away, and nobody enters
+/// one that it could turn away from.
+#[test]
+fn a_zone_that_is_added_in_flight_is_kept_clear_of_and_opens_its_cells_again() {
+    let ring = vec![
+        (96_000, 144_000),
+        (126_000, 144_000),
+        (126_000, 174_000),
+        (96_000, 174_000),
+    ];
+    let add = |at_ms| {
+        let (name, ring) = ("fire".to_owned(), ring.clone());
+        at(at_ms, Fault::AddZone { name, ring })
+    };
+    let gone = |at_ms| {
+        at(
+            at_ms,
+            Fault::RemoveZone {
+                name: "fire".to_owned(),
+            },
+        )
+    };
+    let whole = run_with(5, 3, vec![]).report.coverage.coverable_cells;
+    for (faults, reopened) in [
+        (vec![add(30_000)], false),
+        (
+            vec![add(30_000), at(60_000, Fault::Kill { peer: 2 })],
+            false,
+        ),
+        (vec![add(20_000), gone(45_000)], true),
+        // What is not there cannot be taken away.
+        (vec![gone(20_000)], true),
+    ] {
+        for seed in [3, 4] {
+            let o = run_with(5, seed, faults.clone());
+            passed(&o);
+            let coverable = o.report.coverage.coverable_cells;
+            assert!(
+                coverable <= whole && (!reopened || coverable == whole),
+                "{coverable} of {whole}"
+            );
+        }
+    }
+}
+
 fn run_with(n_uavs: u16, seed: u64, faults: Vec<TimedFault>) -> Outcome {
     run(&prepared(n_uavs), seed, faults, true)
 }

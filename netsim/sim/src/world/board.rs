@@ -82,8 +82,11 @@ impl Board {
     }
 
     /// Takes over what another board saw of the same places: squares of one grid, or pieces
-    /// with the same corners.
+    /// with the same corners; nothing where the mission was begun anew.
     pub(super) fn remember(&mut self, other: &Self) {
+        if self.survey.sortie() != other.survey.sortie() {
+            return;
+        }
         for i in 0..self.seen.len() {
             let Some(j) = self.same_place(other, i) else {
                 continue;

@@ -6,7 +6,7 @@
 use super::board::Board;
 use super::fact::{Approach, Fact};
 use super::motion::Piece;
-use super::no_fly::Zones;
+use super::no_fly::{TurnAway, Zones};
 use super::obstacles::Place;
 use super::pieces::Pieces;
 use super::separation::Separation;
@@ -69,16 +69,16 @@ impl Judge {
 
     /// From now on what another revision of the mission asks for is to be seen, so many
     /// times, and its zones are to be kept clear of. What was seen of the same places counts.
-    /// A zone that is new binds a UAV once it follows the revision and has been farther than
-    /// `room_m` from it. Peers that follow an older revision yet are judged by that.
+    /// A zone that is new binds a UAV from the first moment in which it follows the revision and
+    /// can still turn away. Peers that follow an older revision yet are judged by that.
     pub fn revise(
         &mut self,
         wanted: Arc<Survey>,
         (claims, laps): (Option<Arc<Pieces>>, u16),
         revision: u32,
-        room_m: f64,
+        turn: TurnAway,
     ) {
-        self.zones.revise(wanted.zones(), revision, room_m);
+        self.zones.revise(wanted.zones(), revision, turn);
         let mut board = Board::new(revision, wanted);
         board.watch_claims(claims);
         board.want_laps(laps);
@@ -209,6 +209,10 @@ mod tests {
         }
     }
 
+    fn turn() -> TurnAway {
+        TurnAway::of(&square(1).mission)
+    }
+
     fn judge_with(zones: &[&[(i32, i32)]]) -> Judge {
         let mut spec = square(1);
         spec.zones = zones.iter().map(|z| polygon(z)).collect();
@@ -240,7 +244,7 @@ mod tests {
         let before = judge.n_covered();
         let far = (5_000_000, 5_000_000);
         let zone = [far, (far.0 + 9_000, far.1), (far.0, far.1 + 9_000)];
-        judge.revise(revised(240_000, &zone), (None, 1), 2, 80.0);
+        judge.revise(revised(240_000, &zone), (None, 1), 2, turn());
         assert_eq!(judge.survey().cells().len(), 40);
         assert!(judge.n_covered() >= 4 && judge.n_covered() < before);
         assert!(judge.saw(1, CellId { col: 7, row: 0 }, 1), "seen before");
@@ -279,7 +283,7 @@ mod tests {
             &piece(320.0, 24.0, 0.0, 4_000, 0.0),
             &mut Vec::new(),
         );
-        judge.revise(Arc::new(Survey::new(&spec)), (None, 1), 2, 80.0);
+        judge.revise(Arc::new(Survey::new(&spec)), (None, 1), 2, turn());
         let before = judge.n_covered();
         assert!(before > 0 && judge.saw(2, id(both), 1) && !judge.saw(2, id(new), 1));
         let mut facts = Vec::new();
@@ -313,10 +317,10 @@ mod tests {
         judge.watch(1, &airframe(), &over_a, &mut Vec::new());
         let saw = |j: &Judge, revision, n| j.saw(revision, CellId::numbered(n), 1);
         assert!(saw(&judge, 1, 0) && !saw(&judge, 1, 1));
-        judge.revise(survey(&[c, a]), (None, 1), 2, 80.0);
+        judge.revise(survey(&[c, a]), (None, 1), 2, turn());
         assert!(!saw(&judge, 2, 0) && saw(&judge, 2, 1) && saw(&judge, 1, 0));
         // Of laps the first is over for what was seen in any.
-        judge.revise(survey(&[a]), (None, 2), 3, 80.0);
+        judge.revise(survey(&[a]), (None, 2), 3, turn());
         assert!(!judge.complete());
         judge.watch(1, &airframe(), &over_a, &mut Vec::new());
         assert!(judge.complete());
@@ -333,7 +337,7 @@ mod tests {
         let over = piece(40.0, 240.0, 0.0, 20_000, 0.0);
         for (told, from_m, entries) in [(true, 40.0, 1), (false, 40.0, 0), (true, 200.0, 0)] {
             let mut judge = judge_with(&[]);
-            judge.revise(revised(480_000, &block), (None, 1), 2, 80.0);
+            judge.revise(revised(480_000, &block), (None, 1), 2, turn());
             judge.follows(1, if told { 2 } else { 1 });
             let mut facts = Vec::new();
             let steps = (0..20).map(|k| Piece {
@@ -350,12 +354,12 @@ mod tests {
         // What was lifted binds nobody.
         let mut judge = judge_with(&[&block]);
         let elsewhere = [(0, 0), (9_000, 0), (0, 9_000)];
-        judge.revise(revised(480_000, &elsewhere), (None, 1), 2, 80.0);
+        judge.revise(revised(480_000, &elsewhere), (None, 1), 2, turn());
         judge.zones.watch(1, &over, &mut Vec::new());
         assert_eq!(judge.entries(), 0);
         // Nor does it when it comes back, before it is known again.
         judge.follows(1, 2);
-        judge.revise(revised(480_000, &block), (None, 1), 3, 80.0);
+        judge.revise(revised(480_000, &block), (None, 1), 3, turn());
         judge.zones.watch(1, &over, &mut Vec::new());
         assert_eq!(judge.entries(), 0);
         judge.follows(1, 3);

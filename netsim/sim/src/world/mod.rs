@@ -19,6 +19,7 @@ pub mod survey;
 pub use fact::{Approach, Fact};
 pub use judge::{Judge, Sighting};
 pub use motion::kinematic::Loss;
+pub use no_fly::TurnAway;
 pub use obstacles::{Obstacles, Place};
 pub use survey::{Cell, Survey, Uncoverable};
 
@@ -45,9 +46,6 @@ pub fn percept_phase_ms(nth: usize, of: usize, period_ms: u32) -> u64 {
     let spread_ms = nth as u64 * u64::from(period_ms) / of.max(1) as u64;
     spread_ms - spread_ms % STEP_MS
 }
-
-/// So many turn radii from a zone that it did not know a UAV still turns away from it.
-const TURNS_TO_STAY_CLEAR: f64 = 3.0;
 
 /// What does not change during a run and can be shared by many: a storm of a thousand
 /// seeds surveys the area once.
@@ -291,11 +289,14 @@ impl World {
     /// From now on a revision of the mission with this geometry is judged by.
     pub fn revise(&mut self, survey: Arc<Survey>, geometry: &MissionGeometry) {
         let mission = &*geometry.mission;
-        let room_m = mission.clearance_m() + TURNS_TO_STAY_CLEAR * mission.turn_radius_m();
         let laps = mission.further_laps.saturating_add(1);
         let claims = claims(mission, Some(geometry));
-        self.judge
-            .revise(survey, (claims, laps), mission.revision, room_m);
+        self.judge.revise(
+            survey,
+            (claims, laps),
+            mission.revision,
+            TurnAway::of(mission),
+        );
     }
 
     /// The computer with this number follows this revision of the mission: so does its UAV,

@@ -1,9 +1,13 @@
 //! No-fly zones, who is bound by them and who enters them (D2.7 §2.3.1).
 
 use super::fact::Fact;
-use super::flat::{Bounds, point_ring_m, segment_ring_m};
+use super::flat::{Bounds, circle_ring_m, point_ring_m, segment_ring_m};
 use super::motion::Piece;
+use super::motion::kinematic::FAILSAFE_MS;
 use super::survey::Zone;
+use skein_geometry::frame::{Point, Vector};
+use skein_geometry::math::sin_cos;
+use skein_peer::Mission;
 use skein_peer::mission::ring_mm;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,12 +15,72 @@ use std::collections::{BTreeMap, BTreeSet};
 /// zones are exact to this much.
 const SAGITTA_M: f64 = 0.01;
 
+/// What a UAV that hears of a new zone flies meanwhile as it was told before, milliseconds: a
+/// percept and its answer, and if its computer ends just then what its failsafe waits.
+const REACTION_MS: u64 = FAILSAFE_MS + 200;
+
+/// A turn away from a zone takes so many looks at what is flown before it begins.
+const REACTION_LOOKS: u8 = 6;
+
+/// What turning away from a new zone takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TurnAway {
+    /// Radius of the tightest circle over the ground that every UAV can fly, metres.
+    pub radius_m: f64,
+    /// How far a UAV may stray from its curve, metres.
+    pub stray_m: f64,
+}
+
+impl TurnAway {
+    /// What it takes the UAVs of a mission.
+    #[must_use]
+    pub fn of(mission: &Mission) -> Self {
+        Self {
+            radius_m: mission.turn_radius_m(),
+            stray_m: mission.tracking_error_m(),
+        }
+    }
+
+    /// Whether a UAV that flies this piece can still keep out of a zone: if it goes on like
+    /// that for [`REACTION_MS`] and then flies the tightest circle, to the left or to the
+    /// right, it does not enter.
+    fn is_possible(&self, piece: &Piece, zone: &Zone) -> bool {
+        #[allow(clippy::cast_precision_loss, reason = "about a second")]
+        let reaction_s = REACTION_MS as f64 / 1000.0;
+        let speed_mps = piece.speed_mps + piece.wind.speed_mps();
+        let here = piece.start.position();
+        let reach_m = speed_mps * reaction_s + 2.0 * self.radius_m + self.stray_m;
+        if point_ring_m(here, &zone.ring) > reach_m {
+            return true;
+        }
+        let at = |k: u8| piece.pose_after(reaction_s * f64::from(k) / f64::from(REACTION_LOOKS));
+        let stray_m = self.stray_m;
+        let keeps_out = |k: u8| {
+            let (from, to) = (at(k).position(), at(k + 1).position());
+            segment_ring_m(from, to, &zone.ring) > stray_m
+        };
+        if !(0..REACTION_LOOKS).all(keeps_out) {
+            return false;
+        }
+        let then = at(REACTION_LOOKS);
+        let (sin, cos) = sin_cos(then.heading_rad);
+        let over_ground = Vector::new(cos, sin) * piece.speed_mps + piece.wind.velocity();
+        let along = over_ground / over_ground.norm().max(1e-9);
+        let circle_m = |side: f64| {
+            let out = Vector::new(-along.y, along.x) * (side * self.radius_m);
+            let centre: Point = then.position() + out;
+            circle_ring_m(centre, self.radius_m, &zone.ring)
+        };
+        circle_m(1.0) > stray_m || circle_m(-1.0) > stray_m
+    }
+}
+
 /// A no-fly zone that a revision added.
 #[derive(Clone, Debug)]
 struct Added {
     revision: u32,
     zone: Zone,
-    /// Who has been told of it and was clear of it since.
+    /// Who has been told of it and could turn away since.
     binds: BTreeSet<u16>,
 }
 
@@ -30,8 +94,8 @@ pub(super) struct Zones {
     added: Vec<Added>,
     /// Which revision each UAV follows.
     told: BTreeMap<u16, u32>,
-    /// Farther from a new zone than this a UAV has room to stay clear of it, metres.
-    room_m: f64,
+    /// What turning away takes; nothing is new before the first revision.
+    turn: Option<TurnAway>,
     entries: usize,
     /// By UAV: for every zone whether the UAV was inside it at the end of its last piece.
     inside: BTreeMap<u16, Vec<bool>>,
@@ -44,15 +108,15 @@ impl Zones {
             lifted: vec![false; first.len()],
             added: Vec::new(),
             told: BTreeMap::new(),
-            room_m: 0.0,
+            turn: None,
             entries: 0,
             inside: BTreeMap::new(),
         }
     }
 
-    /// From now on these are to be kept clear of. One that is new binds a UAV once it follows
-    /// the revision and has been farther than `room_m` from it.
-    pub(super) fn revise(&mut self, zones: &[Zone], revision: u32, room_m: f64) {
+    /// From now on these are to be kept clear of. One that is new binds a UAV from the first
+    /// moment in which it follows the revision and can still turn away.
+    pub(super) fn revise(&mut self, zones: &[Zone], revision: u32, turn: TurnAway) {
         let same = |a: &Zone, b: &Zone| ring_mm(&a.ring) == ring_mm(&b.ring);
         let is_wanted = |old: &Zone| zones.iter().any(|new| same(old, new));
         // A zone that was lifted and comes back is new to whoever flew without it.
@@ -74,7 +138,7 @@ impl Zones {
             }
         }
         self.inside.clear();
-        self.room_m = room_m;
+        self.turn = Some(turn);
     }
 
     /// A UAV follows this revision of the mission.
@@ -98,9 +162,9 @@ impl Zones {
             return;
         }
         let told = self.told.get(&uav).copied().unwrap_or(0);
-        let room_m = self.room_m + piece.length_m();
-        for added in self.added.iter_mut().filter(|a| a.revision <= told) {
-            if point_ring_m(piece.start.position(), &added.zone.ring) > room_m {
+        let not_bound = |a: &&mut Added| a.revision <= told && !a.binds.contains(&uav);
+        for added in self.added.iter_mut().filter(not_bound) {
+            if self.turn.is_none_or(|t| t.is_possible(piece, &added.zone)) {
                 added.binds.insert(uav);
             }
         }

@@ -20,8 +20,11 @@ use crate::spec::Spec;
 use skein_flight::coverage::ring::CellId;
 use skein_geometry::frame::{Point, Pose, Vector};
 use skein_geometry::math::{PI, sin_cos};
+use skein_geometry::{Polygon, PolygonError};
 use skein_peer::CoverageTask;
 use skein_peer::Mission;
+use skein_peer::offload::MissionGeometry;
+use std::sync::Arc;
 
 /// Headings tried, over half a turn: a pass flown backwards is the same pass.
 const HEADINGS: u32 = 24;
@@ -48,6 +51,8 @@ pub enum Uncoverable {
     CutOff,
     /// The mission asks only for what is farther from all zones than the clearance.
     NotAsked,
+    /// The planner finds no way to it, beside a zone that was added in flight.
+    LeftOut,
 }
 
 impl core::fmt::Display for Uncoverable {
@@ -56,6 +61,7 @@ impl core::fmt::Display for Uncoverable {
             Self::NoPass => "no straight pass with room to turn sees it clear of the no-fly zones",
             Self::CutOff => "no-fly zones part it from the launch point",
             Self::NotAsked => "nearer to a no-fly zone than the clearance",
+            Self::LeftOut => "the planner finds no way to it",
         })
     }
 }
@@ -95,6 +101,8 @@ pub struct Survey {
     area_m2: f64,
     /// The pieces of a mission for targets, in the order of `cells`.
     pieces: Option<Pieces>,
+    /// Which of the missions that the operator began anew it is of.
+    sortie: u16,
 }
 
 impl Survey {
@@ -127,8 +135,12 @@ impl Survey {
             zones,
             area_m2: area_m2(&area).abs(),
             pieces: mission.pieces().map(Pieces::new),
+            sortie: mission.sortie,
         };
-        if survey.pieces.is_some() {
+        if mission.cancelled {
+            // Nothing of it is to be seen any more.
+            survey.pieces = None;
+        } else if survey.pieces.is_some() {
             survey.lay_pieces();
         } else {
             survey.lay_cells(&area);
@@ -141,6 +153,45 @@ impl Survey {
             survey.cells[i].uncoverable = survey.verdict(mission, &free, i);
         }
         survey
+    }
+
+    /// What the operator's next mission asks for, where this scenario is flown.
+    ///
+    /// # Errors
+    /// Which zone is no simple polygon.
+    pub fn of_mission(spec: &Spec, mission: &Arc<Mission>) -> Result<Self, PolygonError> {
+        Ok(Self::new(&Spec {
+            mission: Arc::clone(mission),
+            zones: mission
+                .zones_m()
+                .map(Polygon::new)
+                .collect::<Result<_, _>>()?,
+            ..spec.clone()
+        }))
+    }
+
+    /// How many cells could be seen, and the planner leaves them out.
+    #[must_use]
+    pub fn left_out(&self, geometry: &MissionGeometry) -> usize {
+        let coverable = self.cells.iter().filter(|c| c.uncoverable.is_none());
+        coverable.filter(|c| !is_planned(geometry, c.id)).count()
+    }
+
+    /// The same without the cells that the planner leaves out: nobody will look for them.
+    #[must_use]
+    pub fn as_planned(mut self, geometry: &MissionGeometry) -> Self {
+        for cell in &mut self.cells {
+            if cell.uncoverable.is_none() && !is_planned(geometry, cell.id) {
+                cell.uncoverable = Some(Uncoverable::LeftOut);
+            }
+        }
+        self
+    }
+
+    /// Counts the missions that the operator began anew.
+    #[must_use]
+    pub fn sortie(&self) -> u16 {
+        self.sortie
     }
 
     /// The pieces of a mission for targets; none where cells of the area are to be seen.
@@ -584,6 +635,14 @@ impl FreePlane {
         // Outside the raster there are no zones, hence only one part.
         inside.peek().is_none() || inside.any(|i| self.reached[i])
     }
+}
+
+/// Whether the loop serves a cell; of other tasks the judge has squares or pieces of its own.
+fn is_planned(geometry: &MissionGeometry, id: CellId) -> bool {
+    let coverage_loop = &geometry.coverage_loop;
+    let cell = coverage_loop.index_of(id);
+    let cell = cell.and_then(|c| coverage_loop.cells().get(usize::from(c)));
+    !geometry.mission.task.is_area() || cell.is_some_and(|c| c.needed)
 }
 
 #[cfg(test)]

@@ -106,6 +106,18 @@ impl PeerLogic for Double {
     fn next_revision(&self) -> u32 {
         7
     }
+
+    fn is_ground_station(&self) -> bool {
+        self.mission.is_some()
+    }
+
+    fn why(&self) -> String {
+        "{}".to_owned()
+    }
+
+    fn overview(&self) -> Option<String> {
+        None
+    }
 }
 
 /// One end of everything: the driver's when it holds receivers.

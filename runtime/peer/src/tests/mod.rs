@@ -8,6 +8,7 @@ mod orders;
 mod stores;
 mod swarm;
 mod twins;
+mod zones;
 
 use crate::mission::Mission;
 use crate::testing::{GROUND_STATION, Harness};

@@ -202,6 +202,15 @@ impl CoverageLoop {
         self
     }
 
+    /// The same loop of another mission that is begun anew: what was covered before does not
+    /// count on it.
+    #[must_use]
+    pub fn of_sortie(mut self, sortie: u16) -> Self {
+        // Laps take small multiples of the same number; a turn keeps the two apart.
+        self.hash ^= lap_bits(sortie).rotate_left(32);
+        self
+    }
+
     /// What identifies the loop in another lap than `lap`, which this one is of.
     #[must_use]
     pub fn hash_in_lap(&self, lap: u16, other: u16) -> u64 {

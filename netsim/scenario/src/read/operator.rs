@@ -1,0 +1,205 @@
+//! What the operator of a scenario does while it is flown: adds and removes no-fly zones and
+//! gives orders, each at its time. Whether the mission can still be flown then is asked by
+//! [`check`], once there is a mission.
+
+use super::faults::{Known, at_ms, order};
+use super::shared::Notices;
+use super::terrain::{self, Terrain};
+use crate::files::Files;
+use skein_interop::json::{Error, Node, Places};
+use skein_netsim::fault::{Fault, TimedFault};
+use skein_netsim::spec::Spec;
+use skein_netsim::world::Survey;
+use skein_peer::Mission;
+use skein_peer::mission::ring_mm;
+use skein_peer::mission_edit::{ZONE_NAME_MAX_BYTES, is_zone_name};
+use std::sync::Arc;
+
+/// What the operator does at some time, and where the file says so.
+#[derive(Clone, Debug)]
+pub(crate) struct Act {
+    path: String,
+    pub(crate) timed: TimedFault,
+}
+
+/// Reads the schedule; it comes back ascending by time.
+pub(crate) fn read(
+    list: &Node<'_>,
+    (terrain, files): (&Terrain, &Files<'_>),
+    known: &Known<'_>,
+    notices: &mut Notices,
+) -> Result<Vec<Act>, Error> {
+    let mut acts = Vec::new();
+    for item in list.items()? {
+        let f = item.fields(&["at_s", "nfz_add", "nfz_remove", "order"])?;
+        let at_ms = at_ms(&f, "at_s", known)?;
+        let given: Vec<_> = ["nfz_add", "nfz_remove", "order"]
+            .into_iter()
+            .filter_map(|name| Some((name, f.get(name)?)))
+            .collect();
+        let [(name, node)] = given[..] else {
+            return Err(item
+                .wrong("does one thing at a time; expected one of nfz_add, nfz_remove and order"));
+        };
+        let fault = match name {
+            "nfz_add" => added(node, (terrain, files), notices)?,
+            "nfz_remove" => Fault::RemoveZone {
+                name: zone_name(node)?,
+            },
+            _ => Fault::Order {
+                order: order(node)?,
+            },
+        };
+        if known.peers.is_some() && known.ground.is_none() {
+            return Err(item.wrong("there is no ground station to speak it"));
+        }
+        acts.push(Act {
+            path: node.path(),
+            timed: TimedFault { at_ms, fault },
+        });
+    }
+    acts.sort_by_key(|act| act.timed.at_ms);
+    Ok(acts)
+}
+
+fn added(
+    node: &Node<'_>,
+    (terrain, files): (&Terrain, &Files<'_>),
+    notices: &mut Notices,
+) -> Result<Fault, Error> {
+    let f = node.fields(&["id", "zone"])?;
+    let zone = f.need(
+        "zone",
+        "{ circle: { east_m: 250, north_m: 250, radius_m: 40 } }",
+    )?;
+    let mut polygons = terrain::zone(zone, terrain.origin, files, notices)?;
+    match (polygons.pop(), polygons.len()) {
+        (Some(one), 0) => Ok(Fault::AddZone {
+            name: zone_name(f.need("id", "\"fire\"")?)?,
+            ring: ring_mm(one.vertices()),
+        }),
+        (last, n) => Err(zone.wrong(format!(
+            "holds {} zones; one is added at a time",
+            n + usize::from(last.is_some())
+        ))),
+    }
+}
+
+fn zone_name(node: &Node<'_>) -> Result<String, Error> {
+    let name = node.text()?;
+    if is_zone_name(name) {
+        Ok(name.to_owned())
+    } else {
+        Err(node.wrong(format!(
+            "{name:?} is no name of a zone; expected 1 to {ZONE_NAME_MAX_BYTES} letters, digits, '-', '_' or '.'"
+        )))
+    }
+}
+
+/// Whether the mission can be flown after each change of its zones, and as much of it be
+/// covered as the scenario asks for.
+pub(crate) fn check(acts: &[Act], spec: &Spec, places: &Places) -> Result<(), Error> {
+    let mut mission = (*spec.mission).clone();
+    for act in acts {
+        let wrong = |why: String| places.wrong(&act.path, why);
+        let changed = match &act.timed.fault {
+            Fault::AddZone { name, ring } => mission.with_zone(name, ring),
+            Fault::RemoveZone { name } => mission.without_zone(name),
+            _ => continue,
+        };
+        mission = changed.map_err(|e| wrong(e.to_string()))?;
+        can_be_flown(&mission, spec).map_err(wrong)?;
+    }
+    Ok(())
+}
+
+fn can_be_flown(mission: &Mission, spec: &Spec) -> Result<(), String> {
+    let mission = Arc::new(mission.clone());
+    let geometry = mission.geometry().map_err(|e| e.to_string())?;
+    geometry.base_is_clear()?;
+    let survey = Survey::of_mission(spec, &mission).map_err(|e| e.to_string())?;
+    let left_out = survey.left_out(&geometry);
+    if left_out > 0 {
+        return Err(format!(
+            "the planner finds no way to {left_out} cells that could still be seen"
+        ));
+    }
+    let share = survey.coverable_share();
+    if share < spec.min_coverable {
+        return Err(format!(
+            "only {:.1} % of the area can be covered then, {:.1} % are asked for",
+            share * 100.0,
+            spec.min_coverable * 100.0
+        ));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Files, Overrides};
+    use std::path::PathBuf;
+
+    /// The default scenario with this schedule.
+    fn field(operator: &str) -> Result<crate::Scenario, String> {
+        let text = include_str!("../../../../configs/trials/helsinki.json5");
+        assert!(text.contains("operator: [],"));
+        // The default asks for nearly all of its area.
+        let text = text.replace("min_coverable: 0.97", "min_coverable: 0.9");
+        let text = text.replacen("operator: [],", &format!("operator: {operator},"), 1);
+        let beside = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/trials"));
+        let (files, over) = (Files::Directory(beside), Overrides::default());
+        crate::parse_with("s.json5", &text, &files, &over).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_schedule_is_read_and_what_is_wrong_is_named_with_its_place() {
+        let zone = "zone: { circle: { east_m: 300, north_m: 250, radius_m: 30 } }";
+        let good = format!(
+            "[{{ at_s: 90, nfz_remove: 'a' }}, {{ at_s: 60, nfz_add: {{ id: 'a', {zone} }} }}, {{ at_s: 70, order: 'hold' }}]"
+        );
+        let scenario = field(&good).unwrap();
+        let spoken: Vec<u64> = scenario
+            .spec
+            .faults
+            .iter()
+            .filter(|f| f.fault.is_spoken())
+            .map(|f| f.at_ms)
+            .collect();
+        assert_eq!(spoken, [60_000, 70_000, 90_000]);
+        for (wrong, why) in [
+            ("[{ at_s: 60 }]".to_owned(), "does one thing at a time"),
+            (
+                "[{ at_s: 60, order: 'hold', nfz_remove: 'a' }]".to_owned(),
+                "does one thing at a time",
+            ),
+            (
+                "[{ at_s: 60, nfz_remove: 'a' }]".to_owned(),
+                "operator[0].nfz_remove: no added zone is named \"a\"; there are: none",
+            ),
+            (
+                format!("[{{ at_s: 60, nfz_add: {{ id: 'a b', {zone} }} }}]"),
+                "is no name of a zone",
+            ),
+            (
+                "[{ at_s: 60, nfz_add: { id: 'a', zone: { ring_m: [[0, 0], [9, 9], [9, 0], [0, 9]] } } }]".to_owned(),
+                "operator[0].nfz_add.zone.ring_m",
+            ),
+            (
+                "[{ at_s: 60, nfz_add: { id: 'a', zone: { circle: { east_m: 300, north_m: 250, radius_m: 200 } } } }]".to_owned(),
+                "can be covered then",
+            ),
+            (
+                "[{ at_s: 60, nfz_add: { id: 'a', zone: { circle: { east_m: 528, north_m: 480, radius_m: 20 } } } }]".to_owned(),
+                "the launch point lies inside a no-fly zone",
+            ),
+            (
+                format!("[{{ at_s: 60, nfz_add: {{ id: 'a', {zone} }} }}, {{ at_s: 61, nfz_add: {{ id: 'a', {zone} }} }}]"),
+                "operator[1].nfz_add: a zone \"a\" is there already",
+            ),
+        ] {
+            let said = field(&wrong).unwrap_err();
+            assert!(said.contains(why), "{wrong}: {said}");
+        }
+    }
+}

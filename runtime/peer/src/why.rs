@@ -1,0 +1,450 @@
+//! What a peer does and why, for a person who asks (D2.7 §1.2.3): its goal and the reason for
+//! it, its claim, the last round, whom it believes what, and what happened last. Asking
+//! changes nothing: all of it is a copy.
+
+use crate::Incarnation;
+use crate::cells::CellSet;
+use crate::mission_state::MissionState;
+use crate::output::Status;
+use crate::wire::message::{Epoch, ListedRun, Order};
+use core::fmt;
+use serde::{Deserialize, Serialize};
+use skein_behaviors::Percept;
+use std::fmt::Write as _;
+
+/// Next cells that are told.
+const NEXT_CELLS: usize = 8;
+
+/// By which line of the goal table a UAV flies where it flies (`docs/protocol.md` §6).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reason {
+    /// The operator said hold.
+    ToldToHold,
+    /// The operator said return to base.
+    ToldToReturn,
+    /// The operator ended the mission.
+    Cancelled,
+    /// Everything is covered.
+    Finished,
+    /// Its fuel is due.
+    FuelIsDue,
+    /// Another process speaks under its id.
+    Twin,
+    /// It has cells to fly.
+    Plan,
+    /// It knew many, has nothing to fly and hears nobody.
+    Astray,
+    /// It has nothing to fly, and others are at work.
+    OthersAtWork,
+}
+
+impl Reason {
+    /// The first line that holds.
+    pub(crate) fn of(state: &MissionState, order: Order) -> Self {
+        if order == Order::Hold {
+            Self::ToldToHold
+        } else if order == Order::ReturnToBase {
+            Self::ToldToReturn
+        } else if state.geometry.mission.cancelled {
+            Self::Cancelled
+        } else if state.finished {
+            Self::Finished
+        } else if state.exhausted {
+            Self::FuelIsDue
+        } else if state.silent {
+            Self::Twin
+        } else if !state.negotiation.sections.plan().is_empty() {
+            Self::Plan
+        } else if state.astray {
+            // Where the ground station is and whoever is finished, somebody is heard.
+            Self::Astray
+        } else {
+            Self::OthersAtWork
+        }
+    }
+
+    /// What it does, and why, in a sentence.
+    #[must_use]
+    pub fn sentence(self) -> &'static str {
+        match self {
+            Self::ToldToHold => "loiters where it is: the operator said hold",
+            Self::ToldToReturn => "flies home: the operator said return-to-base",
+            Self::Cancelled => "flies home: the operator cancelled the mission",
+            Self::Finished => "flies home: everything is covered",
+            Self::FuelIsDue => "flies home: its fuel is due",
+            Self::Twin => "flies home: another process speaks under its id",
+            Self::Plan => "flies its section",
+            Self::Astray => "flies home: it has nothing to fly and hears nobody",
+            Self::OthersAtWork => "loiters where it is: it has nothing to fly, others are at work",
+        }
+    }
+}
+
+/// Where a UAV is and what it has left.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Flight {
+    /// East of the mission's origin, metres.
+    pub east_m: f64,
+    /// North of it, metres.
+    pub north_m: f64,
+    /// Height above it, metres.
+    pub height_m: f64,
+    /// Heading, radians counter-clockwise from east.
+    pub heading_rad: f64,
+    /// Airspeed, m/s.
+    pub airspeed_mps: f64,
+    /// Wind towards the east, m/s.
+    pub wind_east_mps: f64,
+    /// Wind towards the north, m/s.
+    pub wind_north_mps: f64,
+    /// Flight time left, seconds.
+    pub endurance_s: f64,
+    /// Of that what it keeps in reserve, seconds.
+    pub reserve_s: f64,
+    /// Of that what the way home may take, seconds.
+    pub return_s: f64,
+    /// Of that what is left for work, seconds.
+    pub spendable_s: f64,
+}
+
+/// A round of which this peer knows bids.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LastRound {
+    /// Its counter.
+    pub counter: u32,
+    /// Who is in it.
+    pub members: Vec<u16>,
+    /// Whether it answers a loss; any other rebalances.
+    pub repair: bool,
+    /// How long it waits for bids, milliseconds.
+    pub wait_ms: u32,
+    /// How long ago the first of the bids was known here, milliseconds.
+    pub first_bid_ms_ago: u64,
+    /// Whose bids are known here.
+    pub bids: Vec<BidHeard>,
+}
+
+/// A bid, as far as people want to know it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BidHeard {
+    /// Whose.
+    pub by: u16,
+    /// Boundary of the loop where it will be.
+    pub anchor: u16,
+    /// When, milliseconds after the bid.
+    pub release_ms: u32,
+    /// What it may fly after that, milliseconds.
+    pub endurance_ms: u32,
+    /// Expected end of the plan that it had, milliseconds after the bid.
+    pub eta_ms: u32,
+}
+
+/// What is believed of somebody else.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Other {
+    /// Who.
+    pub id: u16,
+    /// In which life.
+    pub incarnation: Incarnation,
+    /// What it is believed to be.
+    pub status: Status,
+    /// Since when, milliseconds ago; none where that is forgotten.
+    pub since_ms: Option<u64>,
+    /// When its own beacon was heard last, milliseconds ago; none where it never was.
+    pub heard_ms_ago: Option<u64>,
+    /// Which revision it follows, as far as is known; 0 where it is not.
+    pub revision: u32,
+    /// How many of its cells are open, as its claim says.
+    pub open_cells: usize,
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PastEvent {
+    /// How long ago, milliseconds.
+    pub ms_ago: u64,
+    /// What.
+    pub text: String,
+}
+
+/// The mission as one peer follows it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Work {
+    /// Its revision.
+    pub revision: u32,
+    /// Identifies the loop.
+    pub loop_hash: u64,
+    /// Cells that are to be seen.
+    pub cells: usize,
+    /// Of them those that it knows to be covered.
+    pub covered: usize,
+    /// Cells that nobody has the endurance for.
+    pub unassigned: usize,
+    /// By which line of the goal table it flies.
+    pub reason: Reason,
+    /// Whether it takes part in planning.
+    pub able: bool,
+    /// Its open cells that come next, in order of flight.
+    pub next_cells: Vec<u16>,
+    /// How many open cells it lists.
+    pub open_cells: usize,
+    /// When it expects to have flown them, milliseconds from now.
+    pub eta_ms: u32,
+    /// The division that it adopted last.
+    pub epoch: Epoch,
+    /// What it lists, in order of flight, each run with its stamp.
+    pub plan: Vec<ListedRun>,
+    /// What it gave away and still answers for.
+    pub held: Vec<ListedRun>,
+}
+
+/// What a peer does and why.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Why {
+    /// Who.
+    pub id: u16,
+    /// In which life; 0 before the first.
+    pub incarnation: Incarnation,
+    /// Its clock, milliseconds.
+    pub time_ms: u64,
+    /// Whether it is a ground station.
+    pub ground_station: bool,
+    /// Whether it speaks.
+    pub speaks: bool,
+    /// The standing order, as far as it heard.
+    pub order: Order,
+    /// Its flight; none of a ground station, and before the first percept.
+    pub flight: Option<Flight>,
+    /// The mission; none before it has derived the loop of one.
+    pub work: Option<Work>,
+    /// The last round of which it knows bids.
+    pub round: Option<LastRound>,
+    /// What it believes of others, by their numbers.
+    pub others: Vec<Other>,
+    /// What happened last, the oldest first.
+    pub events: Vec<PastEvent>,
+}
+
+pub(crate) fn flight(state: Option<&MissionState>, percept: &Percept, reserve_s: f64) -> Flight {
+    let seconds = |ms: u32| f64::from(ms) / 1000.0;
+    Flight {
+        east_m: percept.pose.east_m,
+        north_m: percept.pose.north_m,
+        height_m: percept.height_m,
+        heading_rad: percept.pose.heading_rad,
+        airspeed_mps: percept.airspeed_mps,
+        wind_east_mps: percept.wind_east_mps,
+        wind_north_mps: percept.wind_north_mps,
+        endurance_s: percept.endurance_s,
+        reserve_s,
+        return_s: state
+            .and_then(|s| s.executive.as_ref())
+            .map_or(0.0, |e| seconds(e.home_ms())),
+        spendable_s: state.map_or(0.0, |s| seconds(s.spendable_ms(Some(percept)))),
+    }
+}
+
+pub(crate) fn work(state: &MissionState, order: Order) -> Work {
+    let sections = &state.negotiation.sections;
+    let coverage_loop = &state.geometry.coverage_loop;
+    // Of a mission that was cancelled nothing is to be seen.
+    let asked = !state.geometry.mission.cancelled;
+    let needed = (0_u16..)
+        .zip(coverage_loop.cells())
+        .filter(|(_, c)| c.needed && asked);
+    let (claim, covered) = (state.claim(), sections.covered());
+    let open: Vec<u16> = sections
+        .plan()
+        .iter()
+        .map(|p| p.cell)
+        .filter(|c| !covered.contains(*c))
+        .collect();
+    Work {
+        revision: state.revision(),
+        loop_hash: state.loop_hash(),
+        cells: needed.clone().count(),
+        covered: needed.filter(|(i, _)| covered.contains(*i)).count(),
+        unassigned: usize::from(CellSet::count(sections.unassigned())),
+        reason: Reason::of(state, order),
+        able: state.able(),
+        next_cells: open.iter().copied().take(NEXT_CELLS).collect(),
+        open_cells: open.len(),
+        eta_ms: state.eta_ms(),
+        epoch: claim.epoch,
+        plan: claim.plan,
+        held: claim.held,
+    }
+}
+
+fn s(ms: u64) -> f64 {
+    #[allow(clippy::cast_precision_loss, reason = "for people")]
+    let seconds = ms as f64 / 1000.0;
+    seconds
+}
+
+impl fmt::Display for Why {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = if self.ground_station {
+            format!("the ground station {}", self.id)
+        } else {
+            format!("uav{}", self.id)
+        };
+        let voice = if self.speaks {
+            ""
+        } else {
+            ", and only listens"
+        };
+        writeln!(
+            f,
+            "{name} at {:.1} s of its clock, life {}{voice}",
+            s(self.time_ms),
+            self.incarnation
+        )?;
+        writeln!(f, "  order     {}", self.order.name())?;
+        match &self.work {
+            None => writeln!(f, "  mission   none yet")?,
+            Some(work) => self.write_work(work, f)?,
+        }
+        if let Some(flight) = &self.flight {
+            write_flight(flight, f)?;
+        }
+        if let Some(round) = &self.round {
+            write_round(round, f)?;
+        }
+        for other in &self.others {
+            write_other(other, f)?;
+        }
+        for event in &self.events {
+            writeln!(f, "  {:>7.1} s ago  {}", s(event.ms_ago), event.text)?;
+        }
+        Ok(())
+    }
+}
+
+impl Why {
+    fn write_work(&self, work: &Work, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "  mission   revision {}, loop {:016x}, {} of {} cells covered, {} beyond everybody's fuel",
+            work.revision, work.loop_hash, work.covered, work.cells, work.unassigned
+        )?;
+        if self.ground_station {
+            return Ok(());
+        }
+        let able = if work.able {
+            ""
+        } else {
+            "; takes no part in planning"
+        };
+        writeln!(f, "  does      {}{able}", work.reason.sentence())?;
+        let (counter, hash) = (work.epoch.counter, work.epoch.hash);
+        writeln!(f, "  epoch     {counter}.{hash:08x}")?;
+        let next: Vec<String> = work.next_cells.iter().map(ToString::to_string).collect();
+        writeln!(
+            f,
+            "  plan      {} open cells until {:.1} s from now, next {}",
+            work.open_cells,
+            s(work.eta_ms.into()),
+            if next.is_empty() {
+                "none".to_owned()
+            } else {
+                next.join(" ")
+            }
+        )?;
+        for (what, runs) in [("claims", &work.plan), ("holds", &work.held)] {
+            for listed in runs {
+                write_run(what, listed, f)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn write_run(what: &str, listed: &ListedRun, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let (run, stamp) = (listed.run, listed.stamp);
+    let way = if listed.backward { ", backward" } else { "" };
+    writeln!(
+        f,
+        "  {what:<9} {} cells from {}{way}, stamp {}.{:08x} take {} by {}",
+        run.count, run.first, stamp.epoch.counter, stamp.epoch.hash, stamp.take, stamp.id
+    )
+}
+
+fn write_flight(flight: &Flight, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    writeln!(
+        f,
+        "  flies     at {:.0} m east, {:.0} m north, {:.0} m high, {:.1} m/s, heading {:.2} rad, wind {:.1} {:.1} m/s",
+        flight.east_m,
+        flight.north_m,
+        flight.height_m,
+        flight.airspeed_mps,
+        flight.heading_rad,
+        flight.wind_east_mps,
+        flight.wind_north_mps
+    )?;
+    writeln!(
+        f,
+        "  fuel      {:.0} s left: {:.0} s reserve, {:.0} s to return, {:.0} s for work",
+        flight.endurance_s, flight.reserve_s, flight.return_s, flight.spendable_s
+    )
+}
+
+fn write_round(round: &LastRound, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let kind = if round.repair {
+        "repair"
+    } else {
+        "rebalancing"
+    };
+    let missing = round.members.iter();
+    let missing = missing.filter(|m| round.bids.iter().all(|b| b.by != **m));
+    let mut lacks = String::new();
+    for m in missing {
+        write!(lacks, " {m}")?;
+    }
+    writeln!(
+        f,
+        "  round     {}, a {kind} of {} members {:.1} s ago, waits {:.1} s; bids lacking of:{}",
+        round.counter,
+        round.members.len(),
+        s(round.first_bid_ms_ago),
+        s(round.wait_ms.into()),
+        if lacks.is_empty() { " nobody" } else { &lacks }
+    )?;
+    for bid in &round.bids {
+        writeln!(
+            f,
+            "    bid of {}: at boundary {} in {:.1} s, {:.0} s of fuel after it, its plan then ended in {:.1} s",
+            bid.by,
+            bid.anchor,
+            s(bid.release_ms.into()),
+            s(bid.endurance_ms.into()),
+            s(bid.eta_ms.into())
+        )?;
+    }
+    Ok(())
+}
+
+fn write_other(other: &Other, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let status = match other.status {
+        Status::Alive => "alive",
+        Status::Suspect => "suspect",
+        Status::Down => "down",
+    };
+    write!(f, "  peer {:<4} {status}", other.id)?;
+    if let Some(ms) = other.since_ms {
+        write!(f, " for {:.1} s", s(ms))?;
+    }
+    write!(f, ", life {}", other.incarnation)?;
+    match other.heard_ms_ago {
+        Some(ms) => write!(f, ", heard itself {:.1} s ago", s(ms))?,
+        None => write!(f, ", never heard itself")?,
+    }
+    if other.revision > 0 {
+        write!(f, ", revision {}", other.revision)?;
+    }
+    if other.open_cells > 0 {
+        write!(f, ", {} open cells", other.open_cells)?;
+    }
+    writeln!(f)
+}
