@@ -475,7 +475,7 @@ mod tests {
                 turned += usize::from(back);
             }
         }
-        assert!(moved > 0, "{moved} moved, {turned} turned back");
+        assert!(moved > 3 && turned > 0, "{moved} {turned}");
     }
 
     #[test]
