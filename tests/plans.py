@@ -24,6 +24,8 @@ ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / "target" / "plans-python"
 TAKEOFFS, LANDINGS = (22, 84), (17, 20, 21, 85)
 WAYPOINT, SPEED, TRIGGER = 16, 178, 206
+LAND_START, LOITER_TO_ALT, LAND = 189, 31, 21
+FIXED_WING = 1
 RELATIVE, MISSION = 3, 2
 
 
@@ -51,18 +53,29 @@ FENCE = {
 }
 
 
-def survey(vehicle, firmware):
+LANDING = {
+    "type": "ComplexItem", "complexItemType": "fwLandingPattern", "version": 2, "altitudesAreRelative": True,
+    "landCoordinate": [47.3995, 8.5452, 0], "landingApproachCoordinate": [47.3955, 8.5455, 35],
+    "loiterClockwise": False, "loiterRadius": 75, "stopTakingPhotos": True, "stopVideoPhotos": True,
+    "useLoiterToAlt": True, "valueSetIsDistance": False,
+}
+# The same with its circle across the fence.
+OUTSIDE = {**LANDING, "landingApproachCoordinate": [47.3902, 8.5455, 35]}
+
+
+def survey(vehicle, firmware, refly=False, landing=None):
     camera = {
         "version": 2, "AdjustedFootprintSide": 60, "AdjustedFootprintFrontal": 40,
         "DistanceToSurface": 80, "DistanceMode": 1, "CameraName": "Manual (no camera specs)",
     }
     item = {
         "type": "ComplexItem", "complexItemType": "survey", "version": 5, "angle": 0, "polygon": RING,
-        "TransectStyleComplexItem": {"version": 2, "TurnAroundDistance": 20, "CameraCalc": camera},
+        "TransectStyleComplexItem": {"version": 2, "TurnAroundDistance": 20, "CameraCalc": camera, "Refly90Degrees": refly},
     }
     mission = {
         "version": 2, "firmwareType": firmware, "vehicleType": vehicle, "cruiseSpeed": 15,
-        "hoverSpeed": 5, "plannedHomePosition": [47.399, 8.545, 431], "items": [item],
+        "hoverSpeed": 5, "plannedHomePosition": [47.399, 8.545, 431],
+        "items": [item, landing] if landing else [item],
     }
     rally = {"version": 2, "points": [[47.399, 8.539, 30]]}
     return {
@@ -105,6 +118,10 @@ CASES = [
     ("survey of three", "cover", survey(1, 12), ["--k", "3"]),
     ("survey of ArduPilot", "cover", survey(1, 3), ["--k", "2", "--end", "loiter"]),
     ("survey of a VTOL", "cover", survey(22, 12), ["--end", "land"]),
+    ("survey flown twice", "cover", survey(1, 12, refly=True), ["--k", "2"]),
+    ("landing as drawn", "cover", survey(1, 12, landing=LANDING), ["--k", "2"]),
+    ("landing made anew", "cover", survey(1, 3, landing=OUTSIDE), []),
+    ("landing not asked for", "cover", survey(1, 12, landing=LANDING), ["--end", "rtl"]),
     ("lane cells", "cover", survey(1, 12), ["--approximate", "--turn-radius-m", "20"]),
     ("hole and zone", "cover", AREA, ["--k", "2", "--exact", "--trigger-m", "15"]),
     ("land", "cover", AREA, ["--exact", "--end", "land", "--home-altitude-m", "12.5"]),
@@ -155,7 +172,7 @@ def check_items(items, dialects):
                 said = entry.param.get(number, "Empty").lower()
                 if said.startswith(("empty", "reserved")):
                     need(value in (0, None), f"item {i}: {entry.name} has no parameter {number}, found {value}")
-            need(placed or getattr(entry, "has_location", False) is not True or command == 20,
+            need(placed or getattr(entry, "has_location", False) is not True or command in (20, LAND_START),
                  f"item {i}: {entry.name} needs a place")
             lat, lon = (round(x * 1e7) if placed else 0 for x in params[4:6])
             nan = [float("nan") if x is None else float(x) for x in params]
@@ -168,18 +185,62 @@ def check_items(items, dialects):
             need(item["Altitude"] == params[6] and item["AltitudeMode"] == 1, f"item {i}: its altitudes differ")
 
 
-def check_flight(plan, flight, asked):
+def drawn_landing(before):
+    items = before.get("mission", {}).get("items", [])
+    return next((item for item in items if item["complexItemType"] == "fwLandingPattern"), None)
+
+
+def descent(items):
+    """Places of the circle and the glide of a fixed wing, and the course from its tangent to its end."""
+    if [item["command"] for item in items[-3:]] != [LAND_START, LOITER_TO_ALT, LAND]:
+        return []
+    (lat, lon), radius = items[-2]["params"][4:6], items[-2]["params"][1]
+    north, east = 1 / 111_200, 1 / (111_200 * math.cos(math.radians(lat)))
+    land = items[-1]["params"][4:6]
+    x, y = (land[1] - lon) / east, (land[0] - lat) / north
+    away = math.hypot(x, y)
+    need(away > abs(radius), "the circle reaches over where it lands")
+    at = lambda angle: (abs(radius) * math.cos(angle), abs(radius) * math.sin(angle))
+    # Clockwise it leaves its circle to the left of the line to where it lands.
+    tangent = at(math.atan2(y, x) + math.copysign(math.acos(abs(radius) / away), radius))
+    glide = [(tangent[0] + (x - tangent[0]) * i / 20, tangent[1] + (y - tangent[1]) * i / 20) for i in range(21)]
+    circle = [at(math.radians(10 * i)) for i in range(36)]
+    return [[lat + p[1] * north, lon + p[0] * east] for p in circle + glide]
+
+
+def check_landing(items, before, height):
+    need([item["command"] for item in items[-3:]] == [LAND_START, LOITER_TO_ALT, LAND], "lands without a pattern")
+    start, loiter, land = (item["params"] for item in items[-3:])
+    need(start == [0] * 7 and loiter[0] == 1 and loiter[2:4] == [0, 1] and land[:4] == [0] * 4, "not QGroundControl's pattern")
+    need(loiter[6] > land[6] and loiter[6] <= height, f"comes down from {loiter[6]} m")
+    drawn = drawn_landing(before)
+    if drawn is LANDING:
+        need(metres(loiter[4:6], drawn["landingApproachCoordinate"]) < 0.01, "another circle")
+        need(metres(land[4:6], drawn["landCoordinate"]) < 0.01, "another place to land")
+        need(loiter[1] == -drawn["loiterRadius"], f"circles with {loiter[1]} m")
+        need((loiter[6], land[6]) == (35, 0), f"comes down from {loiter[6]} m to {land[6]} m")
+    before_it = [item["params"][4:6] for item in items[:-3] if item["command"] == WAYPOINT][-1]
+    off = abs(metres(before_it, loiter[4:6]) - abs(loiter[1]))
+    need(off < 1, f"comes to its circle {off} m beside it")
+
+
+def check_flight(plan, flight, asked, before):
     items = plan["mission"]["items"]
     commands = [item["command"] for item in items]
     need(commands[0] in TAKEOFFS and commands[1] == SPEED, f"begins with {commands[:2]}")
     need(commands[-1] in LANDINGS, f"ends with {commands[-1]}")
-    end = asked[asked.index("--end") + 1] if "--end" in asked else "rtl"
+    end = "land" if drawn_landing(before) else "rtl"
+    end = asked[asked.index("--end") + 1] if "--end" in asked else end
     need(commands[-1] in {"rtl": (20,), "loiter": (17,), "land": (21, 85)}[end], f"--end {end}: {commands[-1]}")
-    need(all(c in (WAYPOINT, TRIGGER) for c in commands[2:-1]), f"in between are {set(commands)}")
     height = flight["altitude_m"]
+    between = commands[2:-1]
+    if end == "land" and plan["mission"]["vehicleType"] == FIXED_WING:
+        check_landing(items, before, height)
+        between = commands[2:-3]
+    need(all(c in (WAYPOINT, TRIGGER) for c in between), f"in between are {set(commands)}")
     need(0 < height <= 120, f"flies at {height} m")
     for i, item in enumerate(items, 1):
-        if item["frame"] == RELATIVE and item["command"] not in (21, 85):
+        if item["frame"] == RELATIVE and item["command"] not in (LOITER_TO_ALT, LAND, 85):
             need(item["params"][6] == height, f"item {i} is at {item['params'][6]} m, not {height} m")
     triggers = [item["params"][0] for item in items if item["command"] == TRIGGER]
     need(len(triggers) % 2 == 0, "the camera is not switched off")
@@ -207,7 +268,8 @@ def check_fence(plan, before, asked):
             need(any(sorted(ring) == sorted(found) for found in rings), f"no exclusion polygon {ring}")
     for polygon in fence["polygons"]:
         need(len(polygon["polygon"]) >= 3, "a fence polygon without an area")
-    places = [i["params"][4:6] for i in plan["mission"]["items"] if i["frame"] == RELATIVE]
+    items = plan["mission"]["items"]
+    places = [i["params"][4:6] for i in items if i["frame"] == RELATIVE] + descent(items)
     for place in places:
         for polygon in fence["polygons"]:
             inside = contains(polygon["polygon"], place)
@@ -292,7 +354,7 @@ def main():
                     plan = json.loads(path.read_text())
                     need((plan["fileType"], plan["version"], plan["mission"]["version"]) == ("Plan", 1, 2), "versions")
                     check_items(plan["mission"]["items"], [common, ardupilotmega])
-                    seen += check_flight(plan, flight, flags)
+                    seen += check_flight(plan, flight, flags, before)
                     check_fence(plan, before, flags)
                     items += len(plan["mission"]["items"])
                     all_files.append(path)

@@ -14,4 +14,28 @@ pub enum Event {
         /// The cells of the loop, by index, that this UAV cannot reach.
         cells: Vec<u16>,
     },
+    /// The given flight ends early.
+    CutShort {
+        /// So far it is flown, metres along it; there the UAV waits.
+        at_m: f64,
+        /// What is in the way of the rest.
+        why: Unflyable,
+    },
+}
+
+/// Why a stretch of a given flight is not flown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Unflyable {
+    /// It has no proof that it keeps clear of the zones.
+    NearZone,
+    /// It bends tighter than the airframe can follow in this wind.
+    Bend,
+    /// The wind is too strong to make way on it.
+    Wind,
+    /// It does not follow on the stretch before, or is no curve.
+    Gap,
+    /// No clear way leads to it.
+    NoWay,
+    /// At its end there is no room to wait, nor on a way from there.
+    NoRoom,
 }

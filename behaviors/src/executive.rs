@@ -1,10 +1,11 @@
 //! The executive layer: flies legs of the coverage loop one after the other, and
-//! goes to a point when told to (D2.7 §1.2.3, executive layer).
+//! goes to a point when told to, or flies what was planned before (D2.7 §1.2.3,
+//! executive layer).
 //!
 //! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
 //! it cell by cell. Ways between cells come from [`transit`], what the camera saw from
 //! [`camera`], expectations for the peer from [`prediction`], what stays of a flight when the
-//! goal changes from `goal_change`, the proof of each stretch from `clearance_check`;
+//! goal changes from `goal_change`, how far a given flight reaches from [`given`], the proof of each stretch from `clearance_check`;
 //! following the track and the safety of every setpoint are the reactive layer's.
 //!
 //! | goal | track | events |
@@ -12,6 +13,7 @@
 //! | hold | the nearest circle with room | none |
 //! | legs | open cells in order, then a circle | `Seen`, `Refused`, `PlanDone` once |
 //! | point | a route, then a circle | `Refused` without cells if there is no route |
+//! | given | a route to its start, its pieces, then a circle | `CutShort` where it ends early, `PlanDone` once |
 //!
 //! # Guarantees
 //! An open cell of the legs is flown until it is seen or refused. Equal inputs give
@@ -23,6 +25,7 @@
 
 pub mod camera;
 mod clearance_check;
+pub mod given;
 mod goal_change;
 pub mod new_zones;
 pub mod prediction;
@@ -37,6 +40,8 @@ use crate::reactive::envelope::{Envelope, is_finite};
 use crate::reactive::follow::{HORIZON_S, Offset, Track};
 use crate::setpoint::{Setpoint, Side};
 use camera::{Played, look};
+use given::Given;
+pub use given::GivenFlight;
 pub use prediction::UNREACHABLE_MS;
 use serde::{Deserialize, Serialize};
 use skein_flight::airframe::Airframe;
@@ -92,6 +97,8 @@ pub enum Goal {
     Legs(Vec<Leg>),
     /// Fly to this point, then loiter around it.
     Point(Point),
+    /// Fly this from its start to its end, then loiter.
+    Given(GivenFlight),
 }
 
 /// Where the UAV will be when it has flown for a while under its present goal.
@@ -108,16 +115,17 @@ pub struct Forecast {
     /// Where it is, if nothing keeps it from leaving for anywhere, at once or when it takes
     /// off: it is in no cell, and will serve none that soon.
     pub off_loop: Option<OffLoop>,
-    /// When all legs are flown, milliseconds from now.
+    /// When all legs, or the given flight, are flown, milliseconds from now.
     pub finish_ms: u32,
 }
 
-/// The goal, without its legs: those are in the queue.
+/// The goal, without its legs, which are in the queue, and the flight that was given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Aim {
     Hold,
     Legs,
     Point(Point),
+    Given,
 }
 
 /// What a stretch of the track is for.
@@ -126,6 +134,11 @@ enum Kind {
     Serve(CellVisit),
     Pass(u16, Direction),
     Route,
+    /// A piece of the given flight, from and to so many metres along it.
+    Piece {
+        from_m: f64,
+        to_m: f64,
+    },
     Loiter(Segment),
 }
 
@@ -164,6 +177,8 @@ pub struct Executive {
     aim: Aim,
     /// Cells to be served after those on the track.
     queue: VecDeque<CellVisit>,
+    /// What was planned before and is to be flown.
+    given: Option<Given>,
     track: Track,
     stretches: VecDeque<Stretch>,
     /// Whether the track is to be given up at the next step.
@@ -199,6 +214,7 @@ impl Executive {
             envelope,
             aim: Aim::Hold,
             queue: VecDeque::new(),
+            given: None,
             track: Track::default(),
             stretches: VecDeque::new(),
             replan: true,
@@ -290,7 +306,9 @@ impl Executive {
         };
         let offset = offset.unwrap_or(still);
         let steps = air::steps(&self.track, offset, self.transit.air(), limit);
-        let setpoint = self.envelope.check(percept, self.setpoint(percept, steps));
+        let setpoint = self.setpoint(percept, steps);
+        let looks_s = self.lands_in_s().unwrap_or(HORIZON_S);
+        let setpoint = self.envelope.check_until(percept, setpoint, looks_s);
         let steps = setpoint.steps.clone();
         self.played = Some(Played {
             percept: *percept,
@@ -344,10 +362,13 @@ impl Executive {
     fn set_air(&mut self, wind: Wind) {
         let radius_m = self.transit.router.limits().turn_radius_m;
         let (airframe, objective) = (&self.transit.airframe, self.transit.objective);
-        let wanted = Air::airspeed_for_mps(objective, airframe, wind, radius_m);
+        let wanted = self
+            .given_airspeed_mps(wind)
+            .unwrap_or_else(|| Air::airspeed_for_mps(objective, airframe, wind, radius_m));
         let airspeed_mps = self.envelope.airspeed_mps(wanted);
         self.transit.set_air(Air { wind, airspeed_mps });
         self.home = self.home.map(|(home, _)| (home, self.return_ms(home)));
+        self.assess_given();
     }
 
     /// Reports the cells that the camera saw since the last percept.
@@ -429,6 +450,7 @@ impl Executive {
 
     /// Puts the cells on the track back into the queue and takes the stretches off.
     fn requeue(&mut self) {
+        self.requeue_given();
         for s in self.stretches.drain(..).rev() {
             if let Some(visit) = s.kind.visit() {
                 self.queue.push_front(visit);
@@ -489,7 +511,13 @@ impl Executive {
         let mut at = start;
         while self.track.left_m() < least_m {
             let moves = self.next_moves(&at, is_open, events);
-            for step in self.transit.cleared(&at, moves, events) {
+            let is_piece = |step: &Move| matches!(step, Move::Piece(..));
+            let goes_on = moves.iter().any(is_piece);
+            let cleared = self.transit.cleared(&at, moves, events);
+            if goes_on && !cleared.iter().any(is_piece) {
+                self.not_cleared();
+            }
+            for step in cleared {
                 at = self.push(&at, step);
             }
         }
@@ -513,8 +541,14 @@ impl Executive {
                 return moves;
             }
         }
+        if let Some(moves) = self.given_moves(at) {
+            return moves;
+        }
         if let Some(Kind::Loiter(circle)) = self.stretches.back().map(|s| s.kind) {
             return vec![Move::Loiter(circle)];
+        }
+        if let Some(moves) = self.back_to_wait(at) {
+            return moves;
         }
         if let Aim::Point(p) = self.aim {
             match self.transit.way_to_wait_at(at, p) {
@@ -545,6 +579,14 @@ impl Executive {
                 self.track.extend(&curve);
                 Kind::Route
             }
+            Move::Piece(piece, to_m) => {
+                let from_m = to_m - piece.length_m;
+                let mut curve = Curve::empty();
+                curve.push(piece);
+                self.track.extend(&curve);
+                self.is_on_track(to_m);
+                Kind::Piece { from_m, to_m }
+            }
             Move::Loiter(circle) => {
                 let mut curve = Curve::empty();
                 curve.push(circle);
@@ -567,11 +609,15 @@ impl Executive {
         self.track.advance(&pose, WINDOW_M)
     }
 
-    /// Reports the end of the legs, once.
+    /// Reports the end of the legs or of the given flight, once.
     fn report_end(&mut self, events: &mut Vec<Event>) {
         let is_left = |s: &Stretch| s.kind.visit().is_some();
-        let are_flown = self.queue.is_empty() && !self.stretches.iter().any(is_left);
-        if self.aim == Aim::Legs && are_flown && !self.end_reported {
+        let are_flown = match self.aim {
+            Aim::Legs => self.queue.is_empty() && !self.stretches.iter().any(is_left),
+            Aim::Given => !self.is_given_left(),
+            Aim::Hold | Aim::Point(_) => false,
+        };
+        if are_flown && !self.end_reported {
             self.end_reported = true;
             events.push(Event::PlanDone);
         }

@@ -8,7 +8,7 @@
 //! | [`setpoint`] | what it is told to fly |
 //! | [`order`] | what the operator wants of all |
 //! | [`event`] | what the executive layer reports upwards |
-//! | [`executive`] | a plan on the coverage loop, flown leg by leg |
+//! | [`executive`] | a plan on the coverage loop, flown leg by leg, or a flight given whole |
 //! | [`reactive`] | path following, and the envelope that has the last word |
 
 pub mod event;
@@ -21,8 +21,8 @@ pub mod setpoint;
 mod testing;
 pub mod traffic;
 
-pub use event::Event;
-pub use executive::{Executive, Forecast, Goal};
+pub use event::{Event, Unflyable};
+pub use executive::{Executive, Forecast, GivenFlight, Goal};
 pub use order::Order;
 pub use percept::Percept;
 pub use setpoint::{Setpoint, Side, Steer};

@@ -62,7 +62,8 @@ pub struct CoverArgs {
     /// The planner.
     #[arg(long, value_enum)]
     pub planner: Planner,
-    /// Go on improving for this many milliseconds; without it for a fixed number of steps,
+    /// With `--planner best`, go on improving for this many milliseconds, or until nothing
+    /// better is found; without it for a fixed number of steps,
     /// as in `skein plan`.
     #[arg(long, value_name = "MS")]
     pub budget_ms: Option<u64>,
@@ -128,6 +129,9 @@ struct Answer {
 /// # Errors
 /// When a file is missing or malformed, or a root is not free; the error names the line.
 pub fn run(args: &CoverArgs) -> Result<String> {
+    if args.budget_ms.is_some() && args.planner != Planner::Best {
+        bail!("--budget-ms is for --planner best: the others take what they take");
+    }
     let file = std::fs::File::create(&args.out)
         .with_context(|| format!("cannot write {}", args.out.display()))?;
     let mut out = BufWriter::new(file);

@@ -32,6 +32,7 @@ pub mod fleet;
 pub mod geojson;
 pub mod height;
 pub mod json;
+pub mod landing;
 pub mod mission;
 pub mod place;
 pub mod plan;

@@ -20,9 +20,11 @@ const NAV_LOITER_UNLIM: i64 = 17;
 const NAV_RETURN_TO_LAUNCH: i64 = 20;
 const NAV_LAND: i64 = 21;
 const NAV_TAKEOFF: i64 = 22;
+const NAV_LOITER_TO_ALT: i64 = 31;
 const NAV_VTOL_TAKEOFF: i64 = 84;
 const NAV_VTOL_LAND: i64 = 85;
 const DO_CHANGE_SPEED: i64 = 178;
+const DO_LAND_START: i64 = 189;
 const DO_SET_CAM_TRIGG_DIST: i64 = 206;
 
 /// The least pitch of a fixed wing that takes off, degrees.
@@ -109,6 +111,24 @@ pub enum Item {
     Land {
         /// Where.
         at: LatLon,
+    },
+    /// From here on it lands: an autopilot that is told to land goes on here.
+    LandStart,
+    /// Circles until it is at a height, and leaves the circle towards the next place.
+    LoiterTo {
+        /// Middle of the circle.
+        at: LatLon,
+        /// Height above home, metres.
+        height_m: f64,
+        /// Radius of the circle, metres; negative to the left.
+        radius_m: f64,
+    },
+    /// Touches down at the end of a glide.
+    Touchdown {
+        /// Where.
+        at: LatLon,
+        /// Height above home, metres.
+        height_m: f64,
     },
     /// Circles over a place until told otherwise.
     Loiter {
@@ -203,14 +223,18 @@ pub fn write(mission: &Mission) -> String {
 
 /// An item; the seven parameters are MAVLink's, `null` leaves the yaw to the autopilot.
 fn item_json(item: &Item, vehicle: Vehicle, id: usize) -> Value {
-    let placed = |command: i64, [p1, p2, p3]: [f64; 3], at: LatLon, height_m: f64| {
-        json!({
-            "AMSLAltAboveTerrain": null, "Altitude": height_m + 0.0,
-            "AltitudeMode": ALTITUDE_RELATIVE, "autoContinue": true, "command": command,
-            "doJumpId": id, "frame": FRAME_RELATIVE_ALT, "type": "SimpleItem",
-            // Adding 0 leaves no zero its sign.
-            "params": [p1, p2, p3, null, at.lat_deg + 0.0, at.lon_deg + 0.0, height_m + 0.0],
-        })
+    let with_four =
+        |command: i64, [p1, p2, p3]: [f64; 3], p4: Option<f64>, at: LatLon, height_m: f64| {
+            json!({
+                "AMSLAltAboveTerrain": null, "Altitude": height_m + 0.0,
+                "AltitudeMode": ALTITUDE_RELATIVE, "autoContinue": true, "command": command,
+                "doJumpId": id, "frame": FRAME_RELATIVE_ALT, "type": "SimpleItem",
+                // Adding 0 leaves no zero its sign.
+                "params": [p1, p2, p3, p4, at.lat_deg + 0.0, at.lon_deg + 0.0, height_m + 0.0],
+            })
+        };
+    let placed = |command: i64, params: [f64; 3], at: LatLon, height_m: f64| {
+        with_four(command, params, None, at, height_m)
     };
     let unplaced = |command: i64, [p1, p2, p3]: [f64; 3]| {
         json!({
@@ -246,6 +270,21 @@ fn item_json(item: &Item, vehicle: Vehicle, id: usize) -> Value {
             placed(NAV_VTOL_LAND, [0.0, 0.0, f64::NAN], at, 0.0)
         }
         Item::Land { at } => placed(NAV_LAND, [0.0; 3], at, 0.0),
+        Item::LandStart => unplaced(DO_LAND_START, [0.0; 3]),
+        // Leaves the circle on the course to the next place (1), on its tangent (1).
+        Item::LoiterTo {
+            at,
+            height_m,
+            radius_m,
+        } => with_four(
+            NAV_LOITER_TO_ALT,
+            [1.0, radius_m, 0.0],
+            Some(1.0),
+            at,
+            height_m,
+        ),
+        // QGroundControl knows its landing pattern again by these zeros.
+        Item::Touchdown { at, height_m } => with_four(NAV_LAND, [0.0; 3], Some(0.0), at, height_m),
         Item::Loiter {
             at,
             height_m,
@@ -335,6 +374,33 @@ mod tests {
         assert_eq!(items[2]["params"][1], 7.5);
         assert_eq!(items[3]["params"], json!([20.0, 0.0, 1.0, 0, 0, 0, 0]));
         assert_eq!(items[4]["params"], json!([0.0, 0.0, 1.0, 0, 0, 0, 0]));
+        let mut lands = mission(Vehicle::default());
+        lands.items = vec![
+            Item::LandStart,
+            Item::LoiterTo {
+                at: HERE,
+                height_m: 40.0,
+                radius_m: -75.0,
+            },
+            Item::Touchdown {
+                at: HERE,
+                height_m: 0.0,
+            },
+        ];
+        let plan: Value = serde_json::from_str(&write(&lands)).unwrap();
+        let items = &plan["mission"]["items"];
+        assert_eq!(
+            (&items[0]["command"], &items[0]["frame"]),
+            (&json!(189), &json!(2))
+        );
+        assert_eq!(
+            items[1]["params"],
+            json!([1.0, -75.0, 0.0, 1.0, 47.0, 8.0, 40.0])
+        );
+        assert_eq!(
+            items[2]["params"],
+            json!([0.0, 0.0, 0.0, 0.0, 47.0, 8.0, 0.0])
+        );
         let vtol = Vehicle {
             vehicle_type: 22,
             ..Vehicle::default()

@@ -51,8 +51,10 @@ pub struct TooFar {
 pub fn to_plane(origin: Origin, at: LatLon) -> Result<Point, TooFar> {
     let p = origin.to_enu(at.lat_deg, at.lon_deg);
     let distance_m = p.coords.norm();
-    // Half the earth away the plane folds back on itself, hence the second test.
-    let near = (at.lat_deg - origin.lat_deg).abs() < 1.0;
+    // Half the earth away the plane folds back on itself, hence the second test: near the
+    // equator the far side has the same latitude, near a pole every longitude is near.
+    let around = cos((at.lon_deg - origin.lon_deg).to_radians()) > 0.0;
+    let near = (at.lat_deg - origin.lat_deg).abs() < 1.0 && (around || origin.lat_deg.abs() > 89.0);
     if near && distance_m <= MAX_MISSION_RADIUS_M {
         Ok(p)
     } else {
@@ -68,7 +70,26 @@ pub fn to_plane(origin: Origin, at: LatLon) -> Result<Point, TooFar> {
 #[must_use]
 pub fn from_plane(origin: Origin, p: Point) -> LatLon {
     let (lat_deg, lon_deg) = origin.to_geodetic(p);
+    // East of the antimeridian longitudes begin anew.
+    let lon_deg = if lon_deg >= 180.0 {
+        lon_deg - 360.0
+    } else if lon_deg < -180.0 {
+        lon_deg + 360.0
+    } else {
+        lon_deg
+    };
     LatLon { lat_deg, lon_deg }
+}
+
+/// A ring in degrees east and north, its longitudes counted on beyond the antimeridian from
+/// where it begins: so that a ring across it is one.
+fn counted_on(ring: &[LatLon]) -> Vec<Point> {
+    let first_deg = ring.first().map_or(0.0, |p| p.lon_deg);
+    let point = |p: &LatLon| {
+        let turns = ((p.lon_deg - first_deg) / 360.0).round();
+        Point::new(p.lon_deg - 360.0 * turns, p.lat_deg)
+    };
+    ring.iter().map(point).collect()
 }
 
 /// Corners of the polygon that stands for a circle: 32 keep the difference between
@@ -117,11 +138,11 @@ impl Shape {
 
 /// Twice the signed area of a ring in degrees: positive when counter-clockwise.
 fn winding(ring: &[LatLon]) -> f64 {
-    let n = ring.len();
+    let (ring, n) = (counted_on(ring), ring.len());
     (0..n)
         .map(|i| {
             let (a, b) = (ring[i], ring[(i + 1) % n]);
-            a.lon_deg * b.lat_deg - b.lon_deg * a.lat_deg
+            a.x * b.y - b.x * a.y
         })
         .sum()
 }
@@ -165,11 +186,12 @@ pub struct Crossing {
 /// # Errors
 /// [`Crossing`] names the first two such edges.
 pub fn check_ring(ring: &[LatLon]) -> Result<(), Crossing> {
-    let n = ring.len();
+    let (points, n) = (counted_on(ring), ring.len());
     let edge = |i: usize| [ring[i], ring[(i + 1) % n]];
+    let line = |i: usize| [points[i], points[(i + 1) % n]];
     for i in 0..n {
         for j in i + 2..n {
-            if let Some(at) = crossing(edge(i), edge(j)) {
+            if let Some(at) = crossing(line(i), line(j)) {
                 return Err(Crossing {
                     at,
                     first: edge(i),
@@ -182,9 +204,7 @@ pub fn check_ring(ring: &[LatLon]) -> Result<(), Crossing> {
 }
 
 /// Where two edges cross, if each lies on both sides of the other.
-fn crossing(first: [LatLon; 2], second: [LatLon; 2]) -> Option<LatLon> {
-    let point = |p: LatLon| Point::new(p.lon_deg, p.lat_deg);
-    let ([a, b], [c, d]) = (first.map(point), second.map(point));
+fn crossing([a, b]: [Point; 2], [c, d]: [Point; 2]) -> Option<LatLon> {
     // Most edges lie apart, and this is told without a product.
     let beside = |a: f64, b: f64, c: f64, d: f64| a.max(b) < c.min(d) || c.max(d) < a.min(b);
     if beside(a.x, b.x, c.x, d.x) || beside(a.y, b.y, c.y, d.y) {
@@ -277,6 +297,35 @@ mod tests {
             lon_deg: 24.9355 - 180.0,
         };
         assert!(to_plane(ORIGIN, antipode).is_err());
+        // Near the equator the far side has the same latitude.
+        let (lat_deg, lon_deg) = (0.1, 10.0);
+        let equator = Origin { lat_deg, lon_deg };
+        let lon_deg = lon_deg - 180.0;
+        assert!(to_plane(equator, LatLon { lat_deg, lon_deg }).is_err());
+    }
+
+    #[test]
+    fn a_ring_across_the_antimeridian_is_one() {
+        let (lat_deg, lon_deg) = (-17.0, 179.999);
+        let fiji = Origin { lat_deg, lon_deg };
+        let corners = [(0.0, 0.0), (900.0, 0.0), (900.0, 500.0), (0.0, 500.0)];
+        let ring: Vec<LatLon> = corners
+            .iter()
+            .map(|&(x, y)| from_plane(fiji, Point::new(x, y)))
+            .collect();
+        assert!(
+            ring[1].lon_deg < -179.9 && ring[0].lon_deg > 179.9,
+            "{ring:?}"
+        );
+        assert_eq!(orient(ring.clone()), ring);
+        assert_eq!(check_ring(&ring), Ok(()));
+        for (at, (x, y)) in ring.iter().zip(corners) {
+            let back = to_plane(fiji, *at).unwrap();
+            assert!((back - Point::new(x, y)).norm() < 1e-6);
+        }
+        let bow_tie = [ring[0], ring[2], ring[1], ring[3]];
+        let lon_deg = check_ring(&bow_tie).unwrap_err().at.lon_deg;
+        assert!((179.9..180.1).contains(&lon_deg.abs()), "{lon_deg}");
     }
 
     #[test]

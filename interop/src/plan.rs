@@ -4,6 +4,7 @@
 
 use crate::Notice;
 use crate::json::{Document, Error, Node};
+use crate::landing::{self, LandingPattern};
 use crate::place::{LatLon, Shape, orient};
 use serde_json::Value;
 
@@ -80,6 +81,8 @@ pub struct SurveyGrid {
     pub turn_around_m: Option<f64>,
     /// Whether pictures are taken in turns too.
     pub pictures_in_turns: bool,
+    /// Whether the area is flown a second time, with lanes across the first ones.
+    pub refly: bool,
     /// What the camera is called.
     pub camera: Option<String>,
     /// Whether the camera's lens is known, so that its footprint grows with the height.
@@ -95,6 +98,8 @@ pub struct PlanFile {
     pub keep_out: Vec<Shape>,
     /// Survey items.
     pub surveys: Vec<Survey>,
+    /// How a fixed wing lands; the first of several.
+    pub landing: Option<LandingPattern>,
     /// Simple items that have a place.
     pub waypoints: Vec<Waypoint>,
     /// Where the vehicle starts, as planned.
@@ -297,21 +302,13 @@ fn survey_grid(
         let course_deg = angle.number(-360.0, 360.0, "degrees")?.rem_euclid(360.0);
         grid.course_deg = Some(course_deg);
     }
-    for (name, text) in [
-        (
-            "Refly90Degrees",
-            "Refly90Degrees is ignored: lanes have one course",
-        ),
-        (
-            "HoverAndCapture",
-            "HoverAndCapture is ignored: nobody hovers",
-        ),
-    ] {
-        if let Some(flag) = transects.get(name)?
-            && flag.flag()?
-        {
-            tell(text);
-        }
+    if let Some(refly) = transects.get("Refly90Degrees")? {
+        grid.refly = refly.flag()?;
+    }
+    if let Some(hover) = transects.get("HoverAndCapture")?
+        && hover.flag()?
+    {
+        tell("HoverAndCapture is ignored: nobody hovers");
     }
     if let Some(in_turns) = transects.get("CameraTriggerInTurnAround")? {
         grid.pictures_in_turns = in_turns.flag()?;
@@ -407,6 +404,8 @@ fn mission(at: &Node<'_>, out: &mut PlanFile) -> Result<(), Error> {
                 let complex = item.need("complexItemType")?.text()?;
                 if complex == "survey" {
                     survey(&item, out)?;
+                } else if complex == landing::KIND && out.landing.is_none() {
+                    out.landing = Some(landing::read(&item)?);
                 } else {
                     out.notices.push(Notice {
                         pointer: item.pointer(),
@@ -539,6 +538,7 @@ mod tests {
                 frontal_overlap_percent: Some(75.0),
                 turn_around_m: Some(10.0),
                 pictures_in_turns: true,
+                refly: false,
                 camera: Some("Sony ILCE-QX1".to_owned()),
                 lens_known: true,
             }
@@ -558,6 +558,7 @@ mod tests {
         assert!(notices.iter().any(|n| n.text.contains("terrain")));
         let before = "\"DistanceToSurfaceRelative\":false";
         assert_eq!(of("\"DistanceMode\":1", before).0.height_m, None);
+        assert!(of("90Degrees\":false", "90Degrees\":true").0.refly);
         assert_eq!(of("Frontal\":20", "Frontal\":0").0.trigger_m, None);
         let (grid, notices) = of("\"version\":5", "\"version\":3");
         assert_eq!(grid, SurveyGrid::default());

@@ -140,6 +140,13 @@ fn push_line(
     if way.len() < 2 {
         return Err(at.wrong(format!("a line has at least 2 points, found {}", way.len())));
     }
+    if way.iter().all(|p| *p == way[0]) {
+        out.notices.push(Notice {
+            pointer: pointer.to_owned(),
+            text: "all points of the line are the same: ignored".to_owned(),
+        });
+        return Ok(());
+    }
     out.lines.push(LineTarget {
         pointer: pointer.to_owned(),
         way,
@@ -253,6 +260,15 @@ mod tests {
         assert!(says("25,", "-1,").contains("features[0].properties.radius_m: -1 is"));
         assert!(says("\"rgb\"", "[]").contains("features[0].properties.sensor: "));
         assert!(says(",[24.91,60.1]]}", "]}").contains("at least 2 points"));
+    }
+
+    #[test]
+    fn a_line_of_no_length_is_left_out_and_told() {
+        let text = r#"{"type":"FeatureCollection","features":[{"type":"Feature","properties":{},
+            "geometry":{"type":"LineString","coordinates":[[8,47],[8,47],[8,47]]}}]}"#;
+        let found = read(text).unwrap();
+        assert!(found.lines.is_empty());
+        assert!(found.notices[0].text.contains("are the same"));
     }
 
     #[test]

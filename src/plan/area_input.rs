@@ -1,9 +1,9 @@
 //! An area to be covered, as files have it: survey polygons and fences of a QGroundControl
 //! `.plan`, polygons of GeoJSON (D2.7 §3.6).
 
-use super::lat_lon;
 use super::site::Site;
 use super::zone_input::{self, Polygons, ZoneInput, is_plan, polygon, simple};
+use super::{lat_lon, plane_at};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 use skein_geometry::frame::{Origin, Point};
@@ -112,10 +112,7 @@ pub fn read(file: &Path, asked: Asked<'_>) -> Result<AreaInput> {
             None => bail!("{}: {}: the area has no corner", shown(), area.name),
         },
     };
-    let origin = Origin {
-        lat_deg: launch.lat_deg,
-        lon_deg: launch.lon_deg,
-    };
+    let origin = plane_at(launch).with_context(shown)?;
     let fenced = shapes.fenced;
     let mut input = in_plane(area, shapes, origin, asked.cross_holes).with_context(shown)?;
     let own = zone_input::of_text(file, &text, origin, Polygons::NoFly);

@@ -7,7 +7,7 @@ use super::output::{OutputArgs, Printed, Sheet};
 use super::size::Work;
 use super::view::{Flags, View};
 use super::{team_input, why_home};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use serde_json::{Map, Value, json};
 use skein_survey::area::{
@@ -112,6 +112,16 @@ pub struct CoverArgs {
     /// metres; by default what the file's survey says, else 0.
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub run_out_m: Option<f64>,
+    /// Flies the area a second time in the same flight, by passes across the first ones; by
+    /// default what the file's survey says (`Refly90Degrees`).
+    #[arg(
+        long,
+        value_name = "BOOL",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "true"
+    )]
+    pub refly: Option<bool>,
     /// The sensor to see the area with: UAVs without it stay, and its swath counts.
     #[arg(long, value_name = "NAME")]
     pub sensor: Option<String>,
@@ -169,7 +179,10 @@ pub fn run(args: &CoverArgs) -> Result<String> {
     input.check_starts(&team).with_context(shown)?;
     input.site.trigger_m = view.trigger_m.or(view.look_ahead_m.filter(|m| *m > 0.0));
     input.site.pictures_in_turns = view.pictures_in_turns;
+    input.site.clearance_m = args.clearance_m;
+    input.site.wind_mps = args.wind.velocity();
     input.notices.extend(view.notices.iter().cloned());
+    let refly = refly(args, &mut input)?;
     let sensor = sensor(args, &input)?;
     let work = Work {
         area: &input.area,
@@ -178,7 +191,7 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         lanes: args.lanes.asked(),
         altitude_m: view.altitude_m,
     };
-    let planners = work.planners(asked_planners(args, &view));
+    let planners = work.planners(asked_planners(args, &view, refly));
     let (planners, told) = planners.with_context(shown)?;
     input.notices.extend(told);
     let request = AreaRequest {
@@ -201,13 +214,38 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         altitude_m: view.altitude_m,
         steps: args.steps,
     };
-    let plan = area::plan(&request).map_err(|error| area_error(error, &args.file))?;
+    let plan = if refly {
+        area::plan_crossed(&request)
+    } else {
+        area::plan(&request)
+    };
+    let plan = plan.map_err(|error| area_error(error, &args.file))?;
     args.output.print(&sheet(args, &input, &request, &plan))
 }
 
+/// Whether the area is flown a second time, across.
+fn refly(args: &CoverArgs, input: &mut AreaInput) -> Result<bool> {
+    let own = input.survey.as_ref().is_some_and(|grid| grid.refly);
+    let (flag, approximate) = (args.refly, args.approximate);
+    ensure!(
+        !(approximate && flag == Some(true)),
+        "--refly is for straight passes: not with --approximate"
+    );
+    let told = match (own, flag) {
+        (false, _) => None,
+        (true, None) if approximate => Some("is ignored: lane cells have no course"),
+        (true, None) => Some("is honoured: a second crossing; --refly=false overrides it"),
+        (true, Some(false)) => Some("is not honoured: --refly=false"),
+        (true, Some(true)) => Some("is honoured"),
+    };
+    let told = told.map(|told| format!("Refly90Degrees of the survey {told}"));
+    input.notices.extend(told);
+    Ok(flag.unwrap_or(own && !approximate))
+}
+
 /// The planners that are asked: only passes have a course.
-fn asked_planners(args: &CoverArgs, view: &View) -> Planners {
-    let exact = args.exact || (view.course_deg.is_some() && !args.approximate);
+fn asked_planners(args: &CoverArgs, view: &View, refly: bool) -> Planners {
+    let exact = args.exact || refly || (view.course_deg.is_some() && !args.approximate);
     planners(exact, args.approximate)
 }
 

@@ -7,6 +7,7 @@
 mod area_input;
 mod args;
 pub mod cover;
+mod landing;
 pub mod line;
 mod output;
 pub mod patrol;
@@ -25,6 +26,7 @@ pub(crate) mod zone_input;
 use crate::exit;
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand};
+use skein_geometry::frame::Origin;
 use skein_interop::place::LatLon;
 use std::io;
 use std::process::ExitCode;
@@ -102,6 +104,24 @@ fn lat_lon(text: &str) -> Result<LatLon> {
     Ok(LatLon {
         lat_deg: degrees(lat, "latitude", 90.0)?,
         lon_deg: degrees(lon, "longitude", 180.0)?,
+    })
+}
+
+/// The most that is planned at, degrees north or south: nearer to a pole longitudes run
+/// together, and places of the plane have none that could be written down.
+const MOST_LAT_DEG: f64 = 89.0;
+
+/// The plane that touches at a place.
+fn plane_at(at: LatLon) -> Result<Origin> {
+    ensure!(
+        at.lat_deg.abs() <= MOST_LAT_DEG,
+        "the launch point at {:.7}, {:.7} is too near to a pole: {MOST_LAT_DEG} degrees of latitude are the most",
+        at.lat_deg,
+        at.lon_deg
+    );
+    Ok(Origin {
+        lat_deg: at.lat_deg,
+        lon_deg: at.lon_deg,
     })
 }
 

@@ -2,7 +2,7 @@
 //! Planned by [`skein_survey::patrol`].
 
 use super::args::{area_error, detour_error, planners, tours_error, within};
-use super::output::{Printed, Sheet};
+use super::output::{Printed, Sheet, trajectory};
 use super::site::Site;
 use super::target_input::{Kind, TargetInput};
 use super::tour_args::TourArgs;
@@ -87,7 +87,7 @@ pub fn run(args: &PatrolArgs) -> Result<String> {
     );
     args.tours.check()?;
     within("--turn-radius-m", args.turn_radius_m, TURN_RADIUS_M, "m")?;
-    let input = match args.over {
+    let mut input = match args.over {
         Over::Area => over_area(args),
         Over::Points => over_targets(args, Kind::Points),
         Over::Lines => over_targets(args, Kind::Lines),
@@ -106,6 +106,8 @@ pub fn run(args: &PatrolArgs) -> Result<String> {
         losses: (!args.lost.is_empty()).then_some(losses),
     });
     let plan = plan.map_err(|error| patrol_error(error, args))?;
+    input.site.clearance_m = args.tours.clearance_m;
+    input.site.wind_mps = args.tours.wind.velocity();
     args.tours.output.print(&sheet(&plan, args, input))
 }
 
@@ -159,6 +161,10 @@ fn over_area(args: &PatrolArgs) -> Result<Input> {
         zones: None,
     };
     let mut site = area_input::read(&args.file, asked)?;
+    if site.survey.as_ref().is_some_and(|grid| grid.refly) {
+        let text = "Refly90Degrees of the survey is ignored: a patrol comes again on one course";
+        site.notices.push(text.to_owned());
+    }
     let flags = Flags {
         altitude_m: tours.output.altitude_m,
         swath_m: tours.swath_m,
@@ -328,6 +334,7 @@ fn goes_on(uav: &GoesOn, origin: Origin) -> Value {
         "joins": uav.joins,
         "way_s": uav.way_s,
         "loiter_s": uav.loiter_s,
+        "trajectory": trajectory(origin, &uav.legs),
         "period_s": uav.period_s,
     });
     if let Some((from_m, arc_m)) = uav.arc_m {

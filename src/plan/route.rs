@@ -1,13 +1,15 @@
 //! `plan route`: the shortest way round the zones of a file with clearance (D2.7 §2.3).
 //! Planned by [`skein_survey::route`].
 
-use super::lat_lon;
+use super::args::within;
 use super::output::{text, trajectory};
 use super::zone_input::{self, Polygons, ZoneInput};
+use super::{lat_lon, plane_at};
 use anyhow::{Context, Error, Result, anyhow, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use skein_geometry::frame::{Origin, Point};
+use skein_interop::fleet::TURN_RADIUS_M;
 use skein_interop::place::{LatLon, from_plane, to_plane};
 use skein_survey::flown::{length_m, track};
 use skein_survey::route::{self, NamedRepair, RouteError, RoutePlace, RoutePlan, RouteRequest};
@@ -87,10 +89,11 @@ pub enum Format {
 /// When the file or a flag is wrong, an end is too near to a zone, or there is no way.
 pub fn run(args: &RouteArgs) -> Result<String> {
     let from = lat_lon(&args.from).context("--from")?;
-    let origin = Origin {
-        lat_deg: from.lat_deg,
-        lon_deg: from.lon_deg,
-    };
+    let origin = plane_at(from).context("--from")?;
+    // 0 stands for nobody who turns.
+    if args.turn_radius_m != 0.0 {
+        within("--turn-radius-m", args.turn_radius_m, TURN_RADIUS_M, "m")?;
+    }
     let place = |text: &str, flag: String| -> Result<RoutePlace> {
         let at = lat_lon(text).and_then(|p| Ok(to_plane(origin, p)?));
         Ok(RoutePlace {
@@ -125,7 +128,7 @@ pub fn run(args: &RouteArgs) -> Result<String> {
             Engine::Mesh => route::Engine::Mesh,
             Engine::Graph => route::Engine::Graph,
         },
-        turn_radius_m: (args.turn_radius_m.abs() > 0.0).then_some(args.turn_radius_m),
+        turn_radius_m: (args.turn_radius_m > 0.0).then_some(args.turn_radius_m),
     });
     let plan = plan.map_err(|error| route_error(error, args))?;
     notices.extend(plan.notices.iter().cloned());
@@ -386,6 +389,11 @@ mod tests {
         let mut a = args(PLAN, HERE, THERE, 5.0);
         a.level_m = Some(f64::NAN);
         assert!(error(&a).contains("--level-m"));
+        let mut turns = args(PLAN, HERE, THERE, 5.0);
+        for radius_m in [f64::NAN, -1.0, 1e9] {
+            turns.turn_radius_m = radius_m;
+            assert!(error(&turns).contains("--turn-radius-m must be between"));
+        }
         a.vertical_margin_m = -1.0;
         assert!(error(&a).contains("--vertical-margin-m"));
     }

@@ -2,6 +2,8 @@
 //! fence and rally points.
 
 use serde_json::Value;
+use skein_geometry::frame::Vector;
+use skein_interop::landing::LandingPattern;
 use skein_interop::mission::{Vehicle, add_to_fence, no_fence, no_rally};
 use skein_interop::place::{LatLon, Shape};
 use skein_interop::plan::PlanFile;
@@ -23,6 +25,14 @@ pub struct Site {
     pub trigger_m: Option<f64>,
     /// Whether the camera goes on between the first pass and the last one.
     pub pictures_in_turns: bool,
+    /// How a fixed wing lands, as the file has it.
+    pub landing: Option<LandingPattern>,
+    /// What the fence holds: whether to stay within, and what.
+    pub shapes: Vec<(bool, Shape)>,
+    /// Distance kept from all of it, metres.
+    pub clearance_m: f64,
+    /// The wind, where it blows to, m/s.
+    pub wind_mps: Vector,
 }
 
 impl Default for Site {
@@ -36,6 +46,10 @@ impl Default for Site {
             rally: no_rally(),
             trigger_m: None,
             pictures_in_turns: false,
+            landing: None,
+            shapes: Vec::new(),
+            clearance_m: 0.0,
+            wind_mps: Vector::zeros(),
         }
     }
 }
@@ -55,13 +69,17 @@ impl Site {
             },
             fence: file.fence.clone().unwrap_or_else(no_fence),
             rally: file.rally.clone().unwrap_or_else(no_rally),
-            trigger_m: None,
-            pictures_in_turns: false,
+            landing: file.landing,
+            ..Self::default()
         };
         // A fence of version 1 is skipped by today's QGroundControl.
         if file.fence.is_none() {
             site.keep(true, &file.keep_in);
             site.keep(false, &file.keep_out);
+        } else {
+            let within = file.keep_in.iter().map(|shape| (true, shape.clone()));
+            let out = file.keep_out.iter().map(|shape| (false, shape.clone()));
+            site.shapes = within.chain(out).collect();
         }
         site
     }
@@ -70,6 +88,7 @@ impl Site {
     pub fn keep<'a>(&mut self, inclusion: bool, shapes: impl IntoIterator<Item = &'a Shape>) {
         for shape in shapes {
             add_to_fence(&mut self.fence, inclusion, shape);
+            self.shapes.push((inclusion, shape.clone()));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! How much work an area is, told before it is begun.
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use skein_geometry::Polygon;
 use skein_survey::area::{Lanes, Planner, Planners};
 use skein_survey::team::Uav;
@@ -11,6 +11,9 @@ const MOST_CELLS: f64 = 250_000.0;
 
 /// The most lanes that the exact planner lays across an area's box; its own limit.
 const MOST_LANES: f64 = 1_500.0;
+
+/// An area is at least so wide on average, metres: less is a line, or a slip of the pen.
+const LEAST_WIDTH_M: f64 = 0.1;
 
 /// What is to be seen, and how.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +42,11 @@ impl Work<'_> {
         };
         let (low, high) = self.area.bounds();
         let across_m = (high - low).norm();
+        ensure!(
+            self.area.area_m2() >= LEAST_WIDTH_M * across_m.max(1.0),
+            "the area has {:.4} m² over {across_m:.1} m: that is no area to be covered (see `skein plan line`, `skein plan visit`)",
+            self.area.area_m2()
+        );
         let (lanes, cells) = (across_m / lane_m, self.area.area_m2() / (lane_m * lane_m));
         let too_many_passes = lanes > MOST_LANES;
         let too_many_cells = cells > MOST_CELLS;

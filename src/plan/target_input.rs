@@ -3,7 +3,7 @@
 use super::site::Site;
 use super::tour_args::TourArgs;
 use super::zone_input::{self, Polygons, ZoneInput, is_plan};
-use super::{lat_lon, team_input};
+use super::{lat_lon, plane_at, team_input};
 use anyhow::{Context, Result};
 use skein_geometry::frame::{Origin, Point};
 use skein_geometry::offset::Zone;
@@ -73,10 +73,7 @@ impl TargetInput {
                 .or(first)
                 .context("the file holds nothing to plan")?,
         };
-        let origin = Origin {
-            lat_deg: depot.lat_deg,
-            lon_deg: depot.lon_deg,
-        };
+        let origin = plane_at(depot).with_context(shown)?;
         let team = team_input::team(
             args.fleet.as_deref(),
             args.k,

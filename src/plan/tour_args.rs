@@ -130,6 +130,8 @@ pub fn run(kind: Kind, file: &Path, args: &TourArgs, wishes: &Wishes) -> Result<
     let mut site = input.site;
     // Half of what a picture sees along, if it sees as far along as across.
     site.trigger_m = site.trigger_m.or(Some(args.swath_m() / 2.0));
+    site.clearance_m = args.clearance_m;
+    site.wind_mps = args.wind.velocity();
     args.output.print(&Sheet {
         origin: input.origin,
         site,

@@ -4,6 +4,7 @@
 //! An autopilot flies from waypoint to waypoint. A turn becomes waypoints on its circle, so
 //! close that no chord leaves it by more than a thirtieth of its radius.
 
+use super::landing::{self, Down};
 use super::output::Printed;
 use super::site::Site;
 use clap::{Args, ValueEnum};
@@ -42,7 +43,7 @@ const ACCEPTED_WITHOUT_TURNS_M: f64 = 10.0;
 const LOITER_RADIUS_M: f64 = 60.0;
 
 /// What is written into `.plan` files beside the flights.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args)]
 pub struct UploadArgs {
     /// In `.plan` files: altitude of home above the sea, metres; by default that of the
     /// file's home position, else 0.
@@ -52,18 +53,20 @@ pub struct UploadArgs {
     /// survey says, else half of what a picture sees along the track.
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub trigger_m: Option<f64>,
-    /// In `.plan` files: what a UAV does when it is back.
-    #[arg(long, value_enum, default_value_t = End::Rtl)]
-    pub end: End,
+    /// In `.plan` files: what a UAV does when it is back; by default it lands by the file's
+    /// landing pattern, and returns to launch where there is none.
+    #[arg(long, value_enum)]
+    pub end: Option<End>,
 }
 
-impl Default for UploadArgs {
-    fn default() -> Self {
-        Self {
-            home_altitude_m: None,
-            trigger_m: None,
-            end: End::Rtl,
-        }
+impl UploadArgs {
+    /// What a UAV does when it is back.
+    fn end(&self, site: &Site) -> End {
+        self.end.unwrap_or(if site.landing.is_some() {
+            End::Land
+        } else {
+            End::Rtl
+        })
     }
 }
 
@@ -72,7 +75,8 @@ impl Default for UploadArgs {
 pub enum End {
     /// What the autopilot does on return to launch.
     Rtl,
-    /// Lands at its start; no approach is planned.
+    /// Lands: by the file's landing pattern where that is clear, else from a circle and by a
+    /// glide to its start that are planned.
     Land,
     /// Circles over its start until told otherwise.
     Loiter,
@@ -111,6 +115,7 @@ pub(super) fn mission(
             site.pictures_in_turns,
         );
     }
+    let acceptance_m = way.acceptance_m;
     let mut items = way.items;
     // A fixed wing climbs towards the place of its take-off, and has no way to where it is.
     let first = items.iter().find_map(|item| match item {
@@ -119,15 +124,19 @@ pub(super) fn mission(
     });
     let at = first.unwrap_or(home);
     items.insert(0, Item::Takeoff { at, height_m });
-    items.push(match asked.end {
-        End::Rtl => Item::ReturnToLaunch,
-        End::Land => Item::Land { at: home },
-        End::Loiter => Item::Loiter {
+    match asked.end(site) {
+        End::Rtl => items.push(Item::ReturnToLaunch),
+        End::Land => items.extend(match landing::of(flight, origin, site) {
+            Down::Upright => vec![Item::Land { at: home }],
+            Down::Glides(down) => down.items(to, height_m, acceptance_m),
+            Down::Not(_) => vec![Item::ReturnToLaunch],
+        }),
+        End::Loiter => items.push(Item::Loiter {
             at: home,
             height_m,
             radius_m: radius_m.unwrap_or(LOITER_RADIUS_M),
-        },
-    });
+        }),
+    }
     Mission {
         home,
         home_altitude_m: asked
@@ -184,14 +193,19 @@ pub(super) fn notices(
             blind.join(", ")
         ));
     }
-    if asked.end == End::Land {
-        notices.push("--end land: no approach is planned; draw one before the flight".to_owned());
+    if asked.end(site) == End::Land {
+        for flight in flying() {
+            notices.extend(landing::notice(flight, origin, site));
+        }
+        if flying().count() > 1 && site.vehicle.is_fixed_wing() {
+            notices.push("all land in one place: one after the other".to_owned());
+        }
     }
     notices
 }
 
 /// Radius of the tightest turn, metres.
-fn tightest_m(flight: &Printed) -> Option<f64> {
+pub(super) fn tightest_m(flight: &Printed) -> Option<f64> {
     let curved = flight
         .legs
         .iter()
@@ -265,7 +279,7 @@ impl<F: Fn(Point) -> LatLon> Way<F> {
 }
 
 /// Points of a piece without its beginning: its end, and on an arc others before that.
-fn along(piece: &Segment) -> impl Iterator<Item = Point> {
+pub(super) fn along(piece: &Segment) -> impl Iterator<Item = Point> + use<> {
     let turned_rad = piece.curvature_per_m.abs() * piece.length_m;
     // A hair less than a whole number of steps is that number.
     let parts = (turned_rad / MOST_TURN_RAD - 1e-9).ceil();
@@ -357,7 +371,8 @@ mod tests {
                 Item::Trigger { distance_m } if *distance_m > 0.0 => '(',
                 Item::Trigger { .. } => ')',
                 Item::ReturnToLaunch => 'R',
-                Item::Land { .. } => 'L',
+                Item::Land { .. } | Item::LandStart | Item::Touchdown { .. } => 'L',
+                Item::LoiterTo { .. } => 'O',
                 Item::Loiter { .. } => 'o',
             });
         }
@@ -380,15 +395,17 @@ mod tests {
         let mut asked = UploadArgs::default();
         assert_eq!(trigger(&site, &asked), (25.0, Item::ReturnToLaunch));
         site.trigger_m = Some(18.0);
-        asked.end = End::Loiter;
+        asked.end = Some(End::Loiter);
         let (distance_m, end) = trigger(&site, &asked);
         assert!((distance_m - 18.0).abs() < 1e-9);
         assert!(matches!(end, Item::Loiter { radius_m, .. } if (radius_m - 40.0).abs() < 1e-9));
         asked.trigger_m = Some(9.0);
-        asked.end = End::Land;
+        asked.end = Some(End::Land);
         let (distance_m, end) = trigger(&site, &asked);
         assert!((distance_m - 9.0).abs() < 1e-9);
-        assert!(matches!(end, Item::Land { .. }));
+        assert!(matches!(end, Item::Touchdown { .. }));
+        site.vehicle.vehicle_type = 22;
+        assert!(matches!(trigger(&site, &asked).1, Item::Land { .. }));
     }
 
     #[test]

@@ -191,6 +191,7 @@ mod tests {
             frontal_overlap_percent: Some(75.0),
             turn_around_m: Some(25.0),
             pictures_in_turns: true,
+            refly: false,
             camera: Some("Sony".to_owned()),
             lens_known: false,
         }

@@ -3,7 +3,8 @@
 //! Cells, routes, turns, trochoids as the arcs that stand for them, and loiters: each is
 //! measured exactly against the zones as they are, and must keep the tracking margin
 //! from them, so that a UAV which strays by that much is still outside. Whoever is
-//! nearer already, blown there or lost, must come no nearer on its way out. A stretch
+//! nearer already, blown there or lost, must come no nearer on its way out. A given flight
+//! must keep the whole clearance: nearer the envelope would stop it. A stretch
 //! without proof is not flown: its cell is refused, its route is replaced by the circle
 //! here that keeps farthest.
 
@@ -12,12 +13,22 @@ use super::transit::{ESCAPE_SLACK_M, Move, Place, Transit};
 use skein_geometry::frame::Pose;
 use skein_geometry::{Curve, Segment};
 
+/// A given flight may come this much nearer than the clearance, metres: whoever planned it
+/// rounded, too.
+const GIVEN_SLACK_M: f64 = 1e-3;
+
 impl Transit {
     /// Distance from the zones that a stretch beginning at a pose must keep, metres.
     #[must_use]
     pub fn margin_m(&self, from: &Pose) -> f64 {
         let here_m = self.router.zones().distance_m(from.position()) - ESCAPE_SLACK_M;
         self.tracking_error_m.min(here_m.max(0.0))
+    }
+
+    /// Distance from the zones that a given flight must keep, metres.
+    fn given_margin_m(&self) -> f64 {
+        let clearance_m = self.router.limits().clearance_m - GIVEN_SLACK_M;
+        clearance_m.max(self.tracking_error_m)
     }
 
     /// Whether a move that begins at a place is proved to keep the margin.
@@ -31,6 +42,7 @@ impl Transit {
             }
             Move::Pass(cell, d) => zones.is_clear(&c.curve(usize::from(*cell), *d), margin_m),
             Move::Route(curve) => zones.is_clear(curve, margin_m),
+            Move::Piece(piece, _) => zones.is_segment_clear(piece, self.given_margin_m()),
             Move::Loiter(circle) => zones.is_clear(&halves(circle), margin_m),
         }
     }

@@ -16,6 +16,9 @@ impl Executive {
     /// not are passed, or flown round by a direct route where that is shorter.
     pub fn set_goal(&mut self, goal: Goal, is_open: &dyn Fn(u16) -> bool) {
         let mut begins_with = None;
+        if !matches!(goal, Goal::Given(_)) {
+            self.take_back();
+        }
         let (aim, kept, queue) = match goal {
             Goal::Legs(legs) => {
                 let visits = self.visits(&legs);
@@ -36,6 +39,14 @@ impl Executive {
                 let same = self.aim == Aim::Point(p) && !self.replan;
                 (
                     Aim::Point(p),
+                    if same { self.stretches.len() } else { 0 },
+                    VecDeque::new(),
+                )
+            }
+            Goal::Given(flight) => {
+                let same = self.give(flight) && !self.replan;
+                (
+                    Aim::Given,
                     if same { self.stretches.len() } else { 0 },
                     VecDeque::new(),
                 )
@@ -81,6 +92,7 @@ impl Executive {
         };
         let mut events = std::mem::take(&mut self.pending);
         self.lengthen(end, is_open, &mut events);
+        events.append(&mut self.pending);
         self.pending = events;
     }
 

@@ -30,6 +30,8 @@ struct Item {
     visit: Option<CellVisit>,
     /// The cell that it flies, served or passed.
     cell: Option<(u16, Direction)>,
+    /// Whether it is of the given flight.
+    given: bool,
     /// Distance through the air from here to its end, metres.
     end_m: f64,
     /// Where it ends.
@@ -90,7 +92,10 @@ impl Executive {
                 off_loop,
                 finish_ms,
             },
-            None => Self::nowhere(),
+            None => Forecast {
+                finish_ms,
+                ..Self::nowhere()
+            },
         }
     }
 
@@ -106,11 +111,23 @@ impl Executive {
     /// All that is still to fly from a place on, and how much of it was kept from the last plan.
     fn ahead(&self, from: &Place, is_open: &dyn Fn(u16) -> bool) -> (usize, Vec<Item>) {
         let kept = if self.replan { 0 } else { self.stretches.len() };
-        (kept, self.items(from, kept, self.waiting(kept), is_open))
+        let mut items = self.items(from, kept, self.waiting(kept), is_open);
+        let (place, flown_m) = items.last().map_or((*from, 0.0), |i| (i.end, i.end_m));
+        if let Some((end, air_m)) = self.given_ahead(&place, kept) {
+            items.push(Item {
+                visit: None,
+                cell: None,
+                given: true,
+                end_m: flown_m + air_m,
+                end,
+            });
+        }
+        (kept, items)
     }
 
     fn last_visit_ms(&self, items: &[Item]) -> u32 {
-        let last = items.iter().rev().find(|i| i.visit.is_some());
+        let counts = |i: &&Item| i.visit.is_some() || i.given;
+        let last = items.iter().rev().find(counts);
         last.map_or(0, |i| self.when_ms(i.end_m))
     }
 
@@ -264,6 +281,7 @@ impl Executive {
             items.push(Item {
                 visit: s.kind.visit(),
                 cell: s.kind.cell(),
+                given: matches!(s.kind, Kind::Piece { .. }),
                 end_m,
                 end: place,
             });
@@ -277,11 +295,12 @@ impl Executive {
                 let (visit, cell) = match &step {
                     Move::Serve(h) => (Some(*h), Some((h.cell, h.direction))),
                     Move::Pass(c, d) => (None, Some((*c, *d))),
-                    Move::Route(_) | Move::Loiter(_) => (None, None),
+                    Move::Route(_) | Move::Piece(..) | Move::Loiter(_) => (None, None),
                 };
                 items.push(Item {
                     visit,
                     cell,
+                    given: false,
                     end_m,
                     end: place,
                 });

@@ -79,6 +79,8 @@ pub enum Move {
     Pass(u16, Direction),
     /// A curve off the loop.
     Route(Curve),
+    /// A piece of a given flight, and where along that it ends, metres.
+    Piece(Segment, f64),
     /// A full circle, to be flown again and again.
     Loiter(Segment),
 }
@@ -252,8 +254,8 @@ impl Transit {
                 pose: curve.end().unwrap_or(from.pose),
                 boundary: None,
             },
-            Move::Loiter(circle) => Place {
-                pose: circle.end(),
+            Move::Piece(piece, _) | Move::Loiter(piece) => Place {
+                pose: piece.end(),
                 boundary: None,
             },
         }
@@ -271,6 +273,11 @@ impl Transit {
                 .cell_air_m(*cell, *direction)
                 .unwrap_or_else(|| self.travel_m(*cell)),
             Move::Route(curve) => self.air.air_length_m(curve),
+            Move::Piece(piece, _) => {
+                let mut curve = Curve::empty();
+                curve.push(*piece);
+                self.air.air_length_m(&curve)
+            }
             Move::Loiter(circle) => self.air.longest_m(circle.length_m),
         }
     }
@@ -460,7 +467,7 @@ impl Transit {
 
     /// A clear route; from inside a zone's clearance with a piece that leads out of
     /// it first.
-    fn route(&self, from: Pose, to: Pose) -> Result<Curve, RouteError> {
+    pub(super) fn route(&self, from: Pose, to: Pose) -> Result<Curve, RouteError> {
         let is_this = |(a, b, _): &&FoundRoute| (*a, *b) == (from, to);
         if let Some((_, _, route)) = self.routes.borrow().iter().find(is_this) {
             return route.clone();
@@ -650,6 +657,12 @@ impl Transit {
     #[must_use]
     pub fn stay(&self, at: &Place) -> Move {
         Move::Loiter(self.circle(&at.pose).0)
+    }
+
+    /// Whether a circle through a pose keeps clear of the zones.
+    #[must_use]
+    pub fn has_room(&self, pose: &Pose) -> bool {
+        self.roomy_circle(pose).is_some()
     }
 
     /// A circle through a pose that keeps clear of the zones, if there is one.

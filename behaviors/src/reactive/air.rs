@@ -51,6 +51,12 @@ impl Air {
         }
     }
 
+    /// The same airspeed in another wind.
+    #[must_use]
+    pub fn with(self, wind: Wind) -> Self {
+        Self { wind, ..self }
+    }
+
     /// Whether there is no wind worth a thought.
     #[must_use]
     pub fn is_calm(&self) -> bool {

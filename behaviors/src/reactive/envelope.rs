@@ -93,6 +93,12 @@ impl Envelope {
 
     /// The setpoint to fly instead of `wanted`, which is `wanted` where it is safe.
     pub fn check(&mut self, percept: &Percept, wanted: Setpoint) -> Setpoint {
+        self.check_until(percept, wanted, HORIZON_S)
+    }
+
+    /// The same for a flight that ends in so many seconds: no more of it is looked at.
+    pub fn check_until(&mut self, percept: &Percept, wanted: Setpoint, looks_s: f64) -> Setpoint {
+        let looks_s = looks_s.clamp(0.0, HORIZON_S);
         let mut out = wanted;
         out.airspeed_mps = self.airspeed_mps(out.airspeed_mps);
         let drift = wind_of(percept);
@@ -116,7 +122,7 @@ impl Envelope {
             self.side = self.choose_side(&percept.pose);
         }
         out.loiter = self.side;
-        if !finite || out.steps.is_empty() || self.too_near(percept, &out) {
+        if !finite || out.steps.is_empty() || self.too_near(percept, &out, looks_s) {
             out.steps = self.loiter_steps(&percept.pose, limit);
         }
         out
@@ -235,7 +241,7 @@ impl Envelope {
 
     /// Whether the commanded flight comes too near to a zone and a loiter does not
     /// come as near.
-    fn too_near(&self, percept: &Percept, setpoint: &Setpoint) -> bool {
+    fn too_near(&self, percept: &Percept, setpoint: &Setpoint, looks_s: f64) -> bool {
         let (pose, wind) = (&percept.pose, wind_of(percept));
         if self.near.zones().is_empty() {
             return false;
@@ -244,16 +250,22 @@ impl Envelope {
         if self.near.distance_m(pose.position()) - reach_m >= self.least_m {
             return false;
         }
-        let commanded = self.flight_distance_m(pose, setpoint, wind);
+        let commanded = self.flight_distance_m(pose, setpoint, wind, looks_s);
         commanded < self.least_m
             && self.loiter_distance_m(pose, setpoint.airspeed_mps, wind) > commanded + 1e-6
     }
 
-    /// Distance of the commanded flight over [`HORIZON_S`] from the nearest zone, metres.
-    fn flight_distance_m(&self, pose: &Pose, setpoint: &Setpoint, wind: Vector) -> f64 {
+    /// Distance of the commanded flight over some seconds from the nearest zone, metres.
+    fn flight_distance_m(
+        &self,
+        pose: &Pose,
+        setpoint: &Setpoint,
+        wind: Vector,
+        looks_s: f64,
+    ) -> f64 {
         let v = setpoint.airspeed_mps;
         let mut start = *pose;
-        let mut left_s = HORIZON_S;
+        let mut left_s = looks_s;
         let mut least = f64::INFINITY;
         for (i, s) in setpoint.steps.iter().enumerate() {
             let last = i + 1 == setpoint.steps.len();

@@ -193,7 +193,7 @@ impl<'a> Baseline<'a> {
                 Event::PlanDone => {
                     self.busy.insert(id, false);
                 }
-                Event::Refused { .. } => {}
+                Event::Refused { .. } | Event::CutShort { .. } => {}
             }
         }
         true

@@ -21,6 +21,7 @@
 //! | [`objective`], [`heights`] | what is to be least; heights of flights that meet | 3.1, 3.6 |
 //! | [`flight`] | what a UAV flies, and what that takes | 3.6 |
 //! | [`zones`], [`detours`] | zones and fences, and the ways round them | 2.3.1 |
+//! | [`landing`] | how a fixed wing comes down after its flight | 2.3, 2.4 |
 //! | [`fleet`] | teams whose UAVs differ: sections, selection, layers | 3.1, 3.6 |
 //! | [`regions`] | an area in lane cells, one connected region for each UAV | 3.6.2, 3.6.4–3.6.5 |
 //! | [`passes`] | the straight passes of an area shared out among a team | 3.6.3 |
@@ -58,6 +59,7 @@ pub mod fleet;
 pub mod flight;
 pub mod flown;
 pub mod heights;
+pub mod landing;
 pub mod measure;
 pub mod objective;
 pub mod passes;

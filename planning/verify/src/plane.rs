@@ -166,6 +166,47 @@ mod tests {
         }
     }
 
+    /// The greatest distance between where the planners and this put a place, metres, and
+    /// between a point and itself by way of degrees: of sites of 5 km at a latitude.
+    fn apart_m(lat_deg: f64, lon_deg: f64) -> (f64, f64) {
+        let plane = Plane { lat_deg, lon_deg };
+        let theirs = skein_geometry::frame::Origin { lat_deg, lon_deg };
+        let (mut placed_m, mut there_and_back_m) = (0.0_f64, 0.0_f64);
+        for i in -5..=5 {
+            for j in -5..=5 {
+                let p = Point::new(500.0 * f64::from(i), 500.0 * f64::from(j));
+                let at = plane.place(p);
+                let other = theirs.to_enu(at.lat_deg, at.lon_deg);
+                placed_m = placed_m.max(plane.project(at).distance(Point::new(other.x, other.y)));
+                let (lat_deg, lon_deg) =
+                    theirs.to_geodetic(skein_geometry::frame::Point::new(p.x, p.y));
+                let back = plane.project(LatLon { lat_deg, lon_deg });
+                there_and_back_m = there_and_back_m.max(back.distance(p));
+            }
+        }
+        (placed_m, there_and_back_m)
+    }
+
+    #[test]
+    fn both_agree_to_the_millimetre_up_to_89_degrees() {
+        let mut worst = (0.0_f64, 0.0_f64);
+        for i in -89..=89 {
+            let lat_deg = f64::from(i);
+            for lon_deg in [0.0, 8.55, -71.3, 179.999, -180.0] {
+                let (placed_m, there_and_back_m) = apart_m(lat_deg, lon_deg);
+                worst = (worst.0.max(placed_m), worst.1.max(there_and_back_m));
+            }
+        }
+        for near_equator in [1e-9, -1e-6, 0.001, -0.02] {
+            let (placed_m, there_and_back_m) = apart_m(near_equator, 33.0);
+            worst = (worst.0.max(placed_m), worst.1.max(there_and_back_m));
+        }
+        assert!(worst.0 < 1e-3 && worst.1 < 1e-3, "{worst:?}");
+        // Within some kilometres of a pole, where longitudes run together, degrees are found
+        // no more; where both put a place is the same even there.
+        assert!(apart_m(89.9, 20.0).0 < 1e-3);
+    }
+
     #[test]
     fn the_far_side_of_the_earth_is_not_near() {
         let plane = Plane {

@@ -157,7 +157,7 @@ impl MissionState {
 
     pub fn activity(&self) -> Activity {
         match &self.goal {
-            Some(Goal::Legs(_)) => Activity::Covering,
+            Some(Goal::Legs(_) | Goal::Given(_)) => Activity::Covering,
             Some(Goal::Hold) => Activity::Holding,
             Some(Goal::Point(_)) => Activity::Returning,
             None => Activity::Waiting,
@@ -235,6 +235,10 @@ impl MissionState {
                 self.negotiation.sections.give_up(&cells);
                 let text = "a cell could not be reached clear of the zones; it was given up";
                 vec![self.claim_changed(), Effect::Alarm(text.into())]
+            }
+            Event::CutShort { at_m, why } => {
+                let text = format!("the given flight ends after {at_m:.0} m: {why:?}");
+                vec![Effect::Alarm(text)]
             }
         }
     }

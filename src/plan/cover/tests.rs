@@ -466,3 +466,44 @@ fn an_area_is_covered_in_the_wind() {
     assert!(format!("{error:#}").contains("--wind-mps"), "{error:#}");
     std::fs::remove_dir_all(&dir).unwrap();
 }
+
+#[test]
+fn a_survey_that_is_to_be_flown_twice_is() {
+    let dir = Dir::new("refly");
+    let refly = SURVEY.replace(
+        "\"TurnAroundDistance\":30",
+        "\"TurnAroundDistance\":30,\"Refly90Degrees\":true",
+    );
+    let passes = |told: &Value| told["passes"].as_u64().unwrap();
+    let once = dir.plan(SURVEY, &[]).unwrap();
+    let twice = dir.plan(&refly, &[]).unwrap();
+    assert!(passes(&twice) > passes(&once) + 2, "{twice}");
+    assert!(twice["makespan_s"].as_f64().unwrap() > 1.5 * once["makespan_s"].as_f64().unwrap());
+    let told = twice["notices"].to_string();
+    assert!(told.contains("Refly90Degrees of the survey is honoured"));
+    let not = dir.plan(&refly, &["--refly=false"]).unwrap();
+    assert_eq!(passes(&not), passes(&once));
+    let asked = dir.plan(SURVEY, &["--refly"]).unwrap();
+    assert_eq!(passes(&asked), passes(&twice));
+    let cells = dir.plan(&refly, &["--approximate"]).unwrap();
+    assert!(cells["notices"].to_string().contains("is ignored"));
+    let error = dir.plan(SURVEY, &["--approximate", "--refly"]);
+    assert!(error.unwrap_err().to_string().starts_with("--refly"));
+}
+
+#[test]
+fn what_is_no_area_or_too_near_to_a_pole_is_refused() {
+    let dir = Dir::new("degenerate");
+    let of = |corners: &str| {
+        let area = format!(
+            r#"{{"type":"FeatureCollection","features":[{{"type":"Feature","properties":{{}},"geometry":{{"type":"Polygon","coordinates":[{corners}]}}}}]}}"#
+        );
+        format!("{:#}", told(&dir.0, &area, &[]).unwrap_err())
+    };
+    let line = of("[[8.54,47.4],[8.55,47.4],[8.56,47.4],[8.54,47.4]]");
+    assert!(line.contains("no area to be covered"), "{line}");
+    let dot = of("[[8.54,47.4],[8.5400001,47.4],[8.54,47.4000001],[8.54,47.4]]");
+    assert!(dot.contains("no area to be covered"), "{dot}");
+    let pole = of("[[0,89.99],[90,89.99],[180,89.99],[-90,89.99],[0,89.99]]");
+    assert!(pole.contains("too near to a pole"), "{pole}");
+}

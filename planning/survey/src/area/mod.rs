@@ -7,6 +7,7 @@
 //! | `flown_passes` | the exact planner: passes shared out, ordered and flown |
 //! | `courses` | the course of exact passes, searched by what they take |
 //! | `gaps` | passes for what lanes leave unseen beside walls |
+//! | `crossing` | a second crossing at right angles to the first |
 //! | `cells` | the approximate planner: a region of lane cells for each UAV |
 //! | `lanes` | lanes for unlike swaths: one width for all, or a section for each crew |
 //! | `team_selection` | which UAVs of the team fly |
@@ -16,6 +17,7 @@
 
 mod cells;
 mod courses;
+mod crossing;
 mod flights;
 mod flown_passes;
 mod gaps;
@@ -33,6 +35,7 @@ use crate::objective::{Objective, SAME_SHARE, in_watt_hours};
 use crate::regions::TaskError;
 use crate::regions::raster::RasterError;
 use crate::team::{self, PlannedUav, TeamError, Uav, taking_part};
+pub use crossing::plan_crossed;
 use flights::Flights;
 use lanes::Desk;
 use planners::OpenArea;

@@ -164,6 +164,18 @@ pub struct Stand {
     pub forward: bool,
 }
 
+/// How a UAV comes to its new arc: back on its place first or as it flies, and then along
+/// the tour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToArc {
+    /// Whether it turns back first.
+    pub turns: bool,
+    /// Whether it then flies forward.
+    pub forward: bool,
+    /// How far along the tour, units.
+    pub along: f64,
+}
+
 /// What follows a failure. Times begin at the failure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
@@ -175,6 +187,8 @@ pub struct Change {
     pub stands: Vec<Option<Stand>>,
     /// By UAV: how long it loiters, seconds.
     pub loiter_s: Vec<f64>,
+    /// By UAV: how it comes to its new arc; none for one that flies round, or is on it.
+    pub to_arc: Vec<Option<ToArc>>,
     /// When all fly the new pattern, seconds.
     pub steady_s: f64,
     /// The longest time between two visits of a place from the last one before the
@@ -187,7 +201,8 @@ pub struct Change {
 /// Turning round at the end of an arc takes `turn` units.
 ///
 /// `joins(uav)` says where one that has rested would come to the tour, and how long it
-/// takes to be there.
+/// takes to be there; `turns_back(stand)` what turning back at a place of the tour takes,
+/// units, none where there is no room.
 ///
 /// # Guarantees
 /// Round a tour the cyclic order stays and the longest loiter is the shortest for it: after
@@ -206,6 +221,7 @@ pub fn after_losses(
     t_s: f64,
     lost: &[usize],
     joins: impl Fn(usize) -> (u32, f64),
+    turns_back: impl Fn(&Stand) -> Option<f64>,
 ) -> Option<Change> {
     let round = f64::from(n);
     let left: Vec<Uav> = uavs
@@ -241,12 +257,13 @@ pub fn after_losses(
         courses: vec![Course::Rest; uavs.len()],
         stands,
         loiter_s: vec![0.0; uavs.len()],
+        to_arc: vec![None; uavs.len()],
         steady_s: 0.0,
         gap_s: 0.0,
     };
     match change.patrol.pattern.clone() {
         Pattern::Round { uavs, speed } => change.round(n, &uavs, speed),
-        Pattern::Arcs { .. } => change.arcs(n, turn, &left),
+        Pattern::Arcs { .. } => change.arcs(n, turn, &left, turns_back),
     }
     let since = change.courses.iter().filter_map(Course::since_s);
     change.steady_s = since.fold(0.0, f64::max);
@@ -286,21 +303,30 @@ impl Change {
     }
 
     /// Everyone moves along the tour to its new arc, in the order in which they are.
-    fn arcs(&mut self, n: u32, turn: u32, uavs: &[Uav]) {
+    fn arcs(
+        &mut self,
+        n: u32,
+        turn: u32,
+        uavs: &[Uav],
+        turns_back: impl Fn(&Stand) -> Option<f64>,
+    ) {
         let flying = self.stands.iter().enumerate();
         let mut order: Vec<(usize, Stand)> = flying.filter_map(|(i, s)| Some((i, (*s)?))).collect();
         order.sort_by(|a, b| a.1.place.total_cmp(&b.1.place).then(a.0.cmp(&b.0)));
         let speeds: Vec<u32> = order.iter().map(|(i, _)| uavs[*i].speed).collect();
+        let backs = order.iter().map(|(_, stand)| turns_back(stand));
+        let backs: Vec<f64> = backs.map(|b| b.unwrap_or(f64::INFINITY)).collect();
         let lens = equal_periods(n, turn, &speeds);
         let course = |j: usize, by: u32| {
             let (i, stand) = order[j];
             let (from, len) = (u64::from(lens[j].0) + u64::from(by), lens[j].1);
             let from = u32::try_from(from % u64::from(n)).unwrap_or(0);
             let speed = f64::from(uavs[i].speed);
-            to_arc(f64::from(n), stand, (from, len), f64::from(turn), speed)
+            let turns = (f64::from(turn), backs[j]);
+            to_arc(f64::from(n), stand, (from, len), turns, speed)
         };
         let last = |by: u32| {
-            let since = (0..order.len()).filter_map(|j| course(j, by).since_s());
+            let since = (0..order.len()).filter_map(|j| course(j, by).0.since_s());
             since.fold(0.0, f64::max)
         };
         let shifts = (0..SHIFTS).map(|i| share(n, i as usize, SHIFTS as usize));
@@ -313,7 +339,7 @@ impl Change {
             let from = (u64::from(lens[j].0) + u64::from(by)) % u64::from(n);
             arcs[*i] = (u32::try_from(from).unwrap_or(0), lens[j].1);
             if lens[j].1 > 0 {
-                self.courses[*i] = course(j, by);
+                (self.courses[*i], self.to_arc[*i]) = course(j, by);
                 let period_s = to_and_fro_s(lens[j].1, turn, uavs[*i].speed);
                 revisit_s = revisit_s.max(period_s);
             }
@@ -357,33 +383,47 @@ impl Change {
     }
 }
 
-/// The motion of a UAV that moves along the tour to its arc, the shorter way.
-fn to_arc(n: f64, stand: Stand, arc: (u32, u32), turn: f64, speed: f64) -> Course {
+/// The motion of a UAV that moves along the tour to its arc, the shorter way, and how it
+/// comes there. A turn at an end of the arc takes the first of `turns`, one back where the UAV
+/// is the second.
+fn to_arc(
+    n: f64,
+    stand: Stand,
+    arc: (u32, u32),
+    (turn, back): (f64, f64),
+    speed: f64,
+) -> (Course, Option<ToArc>) {
     let (from, len) = (f64::from(arc.0), f64::from(arc.1));
     let ahead = |from: f64, to: f64| {
         let d = to - from;
         if d < 0.0 { d + n } else { d }
     };
     let y = ahead(from, stand.place);
-    let (at, way) = if y <= len {
-        let back = 2.0 * len + turn - y;
-        (if stand.forward { y } else { back }, 0.0)
+    let (at, way, comes) = if y <= len {
+        let homeward = 2.0 * len + turn - y;
+        (if stand.forward { y } else { homeward }, 0.0, None)
     } else {
         // Forward to the arc's beginning, or back to its end; who flies the other way turns.
-        let turned = |forward: bool| if stand.forward == forward { 0.0 } else { turn };
-        let (forth, back) = (n - y + turned(true), y - len + turned(false));
-        if forth <= back {
-            (0.0, forth)
+        let comes = |forward: bool, along: f64| ToArc {
+            turns: stand.forward != forward,
+            forward,
+            along,
+        };
+        let (forth, fro) = (comes(true, n - y), comes(false, y - len));
+        let way = |c: &ToArc| c.along + if c.turns { back } else { 0.0 };
+        if way(&forth) <= way(&fro) {
+            (0.0, way(&forth), Some(forth))
         } else {
-            (len + turn, back)
+            (len + turn, way(&fro), Some(fro))
         }
     };
-    Course::ToAndFro {
+    let course = Course::ToAndFro {
         from,
         len,
         turn,
         at,
         since_s: stand.way_s + way / speed,
         speed,
-    }
+    };
+    (course, comes)
 }

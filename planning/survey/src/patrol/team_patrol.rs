@@ -196,6 +196,9 @@ pub struct GoesOn {
     pub at: Point,
     /// Whether it rested before.
     pub joins: bool,
+    /// What it flies there: onto the tour if it rested, back where it is if it must, and
+    /// along the tour to its arc; empty where it has only to wait.
+    pub legs: Vec<Leg>,
     /// How long it flies there, seconds.
     pub way_s: f64,
     /// How long it loiters, seconds.
@@ -286,8 +289,8 @@ pub enum PatrolError {
 /// As [`crate::patrol::patrol_within`], for the tour that was found. What is flown at first, the tour and
 /// the ways there and back, are lines and arcs of the widest turn of the team that join
 /// without a bend and keep the clearance. After losses the turns at the ends of new arcs are
-/// flown ones too, and who joins flies its way; a turn on the way to a new arc takes as long as
-/// the longest of these, and loitering any time. The same request gives the same plan everywhere.
+/// flown ones too, and so is the way there: who joins flies onto the tour, and who must turns
+/// back where it is. Loitering takes any time. The same request gives the same plan everywhere.
 ///
 /// # Errors
 /// [`PatrolError`] when a figure has no meaning, there is no tour, or nobody can fly one
@@ -433,6 +436,46 @@ mod tests {
         asked.losses = losses(&["uav-2", "uav-1"], 33.0);
         let two = plan(&asked).unwrap().after_losses.unwrap();
         assert_eq!((two.uavs.len(), two.lost.len()), (2, 2));
+    }
+
+    #[test]
+    fn after_a_loss_the_ways_to_new_arcs_are_flown_ones() {
+        let mut asked = request(points(), &[15.0; 8]);
+        for uav in &mut asked.team {
+            // Not once round, but to and fro on a quarter of it.
+            uav.start = Point::new(750.0, 550.0);
+            uav.endurance_s = Some(390.0);
+        }
+        let (mut turned, mut moved) = (0, 0);
+        for after_s in [0.0, 31.0, 60.0, 95.0] {
+            // Four side by side are left: on quarters of the tour they lie apart.
+            asked.losses = losses(&["uav-5", "uav-6", "uav-7", "uav-8"], after_s);
+            let after = plan(&asked).unwrap().after_losses.unwrap();
+            assert!(matches!(after.pattern, Pattern::Arcs { .. }));
+            for uav in &after.uavs {
+                let flown = crate::flown::time_s(&uav.legs, &asked.air(15.0));
+                assert!((flown - uav.way_s).abs() < 0.01, "{flown} {}", uav.way_s);
+                let curves: Vec<_> = uav.legs.iter().map(|leg| &leg.curve).collect();
+                for pair in curves.windows(2) {
+                    let (end, start) = (pair[0].end().unwrap(), pair[1].start().unwrap());
+                    assert!((end.position() - start.position()).norm() < 2e-3);
+                    let bend = skein_geometry::math::wrap_pi(end.heading_rad - start.heading_rad);
+                    assert!(bend.abs() < 1e-3, "{bend}");
+                }
+                let bends = curves.iter().map(|c| c.max_curvature_per_m());
+                assert!(bends.fold(0.0, f64::max) <= 1.0 / 20.0 + 1e-9);
+                let Some(first) = curves.first() else {
+                    continue;
+                };
+                let (start, end) = (first.start().unwrap(), first.end().unwrap());
+                assert!((start.position() - uav.at).norm() < 2e-3);
+                moved += 1;
+                // Who turns back does so where it is.
+                let back = (end.position() - start.position()).norm() < 2e-3;
+                turned += usize::from(back);
+            }
+        }
+        assert!(moved > 3 && turned > 0, "{moved} {turned}");
     }
 
     #[test]

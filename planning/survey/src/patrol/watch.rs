@@ -7,8 +7,8 @@ use super::team_patrol::{
 };
 use super::team_tour::Course;
 use super::{
-    Change, Patrol, Station, Tour, Uav as PatrolUav, after_losses, patrol_within, revisit_bound,
-    spread,
+    Change, Patrol, Stand, Station, Tour, Uav as PatrolUav, after_losses, patrol_within,
+    revisit_bound, spread,
 };
 use crate::flight::Leg;
 use crate::flown::{Air, length_m, time_s, track};
@@ -228,11 +228,7 @@ impl<'a> Watch<'a> {
                 let end = forth.last().and_then(|leg| leg.curve.end());
                 let turn = end.and_then(|end| self.turn(end));
                 let (turn, _) = turn.ok_or(PatrolError::NoTurn)?;
-                let back = forth.iter().rev().map(|leg| Leg {
-                    curve: leg.curve.reversed(),
-                    sees: leg.sees,
-                });
-                let back: Vec<Leg> = back.collect();
+                let back = backwards(&forth);
                 let turn = Leg {
                     curve: turn,
                     sees: false,
@@ -386,7 +382,8 @@ impl<'a> Watch<'a> {
         let n = self.tour.len_mm();
         let before = flown.patrol.courses(&self.speeds, &flown.stations);
         let joins = |uav: usize| self.nearest[uav];
-        let turned = |turn| after_losses(n, turn, &self.uavs, &before, t_s, lost, joins);
+        let back = |stand: &Stand| self.turn(self.on_tour(stand)).map(|t| t.1 * 1000.0);
+        let turned = |turn| after_losses(n, turn, &self.uavs, &before, t_s, lost, joins, back);
         let mut turn = match flown.patrol.pattern {
             Pattern::Arcs { turn, .. } => turn,
             Pattern::Round { .. } => millimetres(self.free_turn_m()),
@@ -412,6 +409,54 @@ impl<'a> Watch<'a> {
         }
     }
 
+    /// Where a UAV is on the tour, and where it looks.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a place on the tour"
+    )]
+    fn on_tour(&self, stand: &Stand) -> Pose {
+        let pose = self.tour.pose(stand.place as u32);
+        if stand.forward { pose } else { pose.reversed() }
+    }
+
+    /// What a UAV flies to the tour if it joins, and to its new arc.
+    fn legs_there(&self, flown: &Flown, change: &Change, uav: usize) -> Vec<Leg> {
+        let Some(stand) = &change.stands[uav] else {
+            return Vec::new();
+        };
+        let unseen = |curve| Leg { curve, sees: false };
+        let on = self.on_tour(stand);
+        let joins = flown.flights[uav].is_none();
+        let way = joins.then(|| self.way(uav, on).ok()).flatten();
+        let mut legs: Vec<Leg> = way.map(unseen).into_iter().collect();
+        let Some(comes) = change.to_arc[uav] else {
+            return legs;
+        };
+        if comes.turns {
+            legs.extend(self.turn(on).map(|turn| unseen(turn.0)));
+        }
+        let n = f64::from(self.tour.len_mm());
+        let from = if comes.forward {
+            stand.place
+        } else {
+            stand.place - comes.along
+        };
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "places and lengths on the tour"
+        )]
+        let along = (from.rem_euclid(n) as u32, comes.along as u32);
+        let stretch = self.tour.stretch(along.0, along.1);
+        if comes.forward {
+            legs.extend(stretch);
+        } else {
+            legs.extend(backwards(&stretch));
+        }
+        legs
+    }
+
     /// What one of those who are left does.
     fn goes_on(&self, flown: &Flown, change: &Change, uav: usize) -> GoesOn {
         let n = self.tour.len_mm();
@@ -422,6 +467,7 @@ impl<'a> Watch<'a> {
             reason = "a place on the tour"
         )]
         let at = self.tour.point(place as u32);
+        let legs = self.legs_there(flown, change, uav);
         let since_s = change.courses[uav].since_s().unwrap_or(0.0);
         let arc = |arcs: &[(u32, u32)]| {
             let (from, len) = arcs[uav];
@@ -432,6 +478,7 @@ impl<'a> Watch<'a> {
             place_m: place / 1000.0,
             at,
             joins: flown.flights[uav].is_none(),
+            legs,
             way_s: since_s - change.loiter_s[uav],
             loiter_s: change.loiter_s[uav],
             period_s: change.patrol.period_s(n, uav, &self.speeds),
@@ -441,6 +488,15 @@ impl<'a> Watch<'a> {
             },
         }
     }
+}
+
+/// Legs flown from their end to their beginning.
+fn backwards(legs: &[Leg]) -> Vec<Leg> {
+    let back = legs.iter().rev().map(|leg| Leg {
+        curve: leg.curve.reversed(),
+        sees: leg.sees,
+    });
+    back.collect()
 }
 
 /// What a way takes through the air, metres: the mean of both directions. In a wind that is

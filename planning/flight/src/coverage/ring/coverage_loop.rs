@@ -7,7 +7,7 @@
 
 use super::backtracking::RingCell;
 use super::grid::{CellId, Grid};
-use super::patch::Patches;
+use super::patch::{Listed, Patches};
 use serde::{Deserialize, Serialize};
 use skein_geometry::Curve;
 use skein_geometry::frame::{Point, Pose};
@@ -93,6 +93,13 @@ impl CoverageLoop {
             uncoverable,
             hash,
         }
+    }
+
+    /// No loop: for a UAV that flies what was planned before, and has nothing to share.
+    #[must_use]
+    pub fn none() -> Self {
+        let patches = Patches::Listed(Listed::new(Vec::new(), 0.0));
+        Self::assembled(patches, Vec::new(), Vec::new(), 0)
     }
 
     /// Number of cells.
