@@ -366,9 +366,9 @@ fn the_core_asks_neither_clock_nor_chance() {
         "std::net",
         "OsRng",
     ];
-    // Plans for people on several courses at once, joined in the order of the courses: no
-    // answer depends on which is done first.
-    let threads = "planning/survey/src/area/courses.rs";
+    // Plans for people made several at once, joined in the order in which they were asked for:
+    // no answer depends on which is done first.
+    let threads = "planning/survey/src/area/at_once.rs";
     for file in sources(&[
         "planning/geometry/src",
         "planning/flight/src",

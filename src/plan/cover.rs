@@ -9,11 +9,14 @@ use super::view::{Flags, View};
 use super::{team_input, why_home};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Map, Value, json};
 use skein_survey::area::{
-    self, AreaPlan, AreaRequest, Facts, Figures, Laid, Planner, Planners, ShapeKind,
+    self, AreaError, AreaPlan, AreaRequest, Facts, Figures, Laid, Planner, Planners, Progress,
+    ShapeKind,
 };
 use skein_survey::flight::Stays;
+use std::io::IsTerminal;
 use std::path::PathBuf;
 
 /// An area covered by a team: one closed flight a UAV, the longest as short as can be
@@ -103,11 +106,14 @@ pub struct CoverArgs {
     /// passes: without `--approximate` only these are planned then.
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     pub course_deg: Option<f64>,
-    /// Plans every course of the search in full, so that none that `--course-deg` can ask for in
-    /// steps of 5 degrees is sooner, also where that takes longer than a minute; where it does
-    /// not, that is done anyway.
+    /// Searches for the best course also where the file's survey says one.
     #[arg(long, conflicts_with_all = ["course_deg", "approximate"])]
     pub every_course: bool,
+    /// Plans in full only on those courses that promise most when they are planned quickly, and
+    /// not on every one that may be best: less time on large areas. Fewer UAVs may then be as
+    /// soon as more.
+    #[arg(long, conflicts_with_all = ["course_deg", "approximate"])]
+    pub quick: bool,
     /// How far each pass runs out straight beyond both ends before a turn, where that is clear,
     /// metres; by default what the file's survey says, else 0.
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
@@ -204,7 +210,7 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         clearance_m: args.clearance_m,
         look_ahead_m: view.look_ahead_m,
         heading_rad: view.course_deg.map(|course| (90.0 - course).to_radians()),
-        every_course: args.every_course,
+        quick: args.quick,
         run_out_m: view.run_out_m,
         wind_mps: args.wind.velocity(),
         planners,
@@ -214,13 +220,31 @@ pub fn run(args: &CoverArgs) -> Result<String> {
         altitude_m: view.altitude_m,
         steps: args.steps,
     };
-    let plan = if refly {
-        area::plan_crossed(&request)
-    } else {
-        area::plan(&request)
-    };
-    let plan = plan.map_err(|error| area_error(error, &args.file))?;
+    let plan = planned(&request, refly).map_err(|error| area_error(error, &args.file))?;
     args.output.print(&sheet(args, &input, &request, &plan))
+}
+
+/// Plans, with a bar on a terminal while courses are searched.
+fn planned(request: &AreaRequest, refly: bool) -> Result<AreaPlan, AreaError> {
+    if refly {
+        return area::plan_crossed(request);
+    }
+    let terminal = std::io::stderr().is_terminal();
+    let bar = terminal.then(|| {
+        let bar = ProgressBar::new(0);
+        bar.set_style(ProgressStyle::default_bar());
+        bar
+    });
+    let plan = area::plan_telling(request, &|progress: Progress| {
+        if let Some(bar) = &bar {
+            bar.set_length(progress.courses as u64);
+            bar.set_position(progress.courses_done as u64);
+        }
+    });
+    if let Some(bar) = &bar {
+        bar.finish_and_clear();
+    }
+    plan
 }
 
 /// Whether the area is flown a second time, across.

@@ -5,9 +5,21 @@
 use crate::flight::Flight;
 use crate::team::{TeamError, Uav};
 
-/// Shares of the work that differ by less than this are the same to a person: samples
-/// are no finer.
+/// Shares of the work are told apart in steps of this, from all of it down: samples are no
+/// finer.
 pub(crate) const SAME_SHARE: f64 = 0.002;
+
+/// How many whole steps a share of the work is below all of it. What has the same number is
+/// the same to a person; so that of three plans no two can each be better than the next.
+pub(crate) fn lacks(share: f64) -> u32 {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a cast of a float saturates"
+    )]
+    let steps = ((1.0 - share) / SAME_SHARE).max(0.0) as u32;
+    steps
+}
 
 /// Figures that differ by less than this share are the same.
 const SAME: f64 = 1e-9;
@@ -70,9 +82,9 @@ impl Worth {
     /// Whether this plan does more than the other, or as much for less; for as much, what
     /// is sooner and then shorter.
     pub(crate) fn beats(&self, other: &Self, objective: Objective) -> bool {
-        let more = self.share - other.share;
-        if more.abs() > SAME_SHARE {
-            return more > 0.0;
+        let (lacks, others) = (lacks(self.share), lacks(other.share));
+        if lacks != others {
+            return lacks < others;
         }
         let both = |w: &Self| [w.figure(objective), w.makespan_s, w.total_m];
         for (a, b) in both(self).into_iter().zip(both(other)) {

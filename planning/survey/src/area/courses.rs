@@ -1,19 +1,20 @@
 //! The course of straight passes, searched by what they take when they are flown.
 //!
 //! Lengths of passes and a guess for each turn say little of a plan where turns are wide,
-//! zones stand close or several UAVs share the work. So every course is flown quickly, those
-//! that promise most with more steps and with their lanes moved aside, and the best of these
-//! as thoroughly as any plan. Where that is not too much work, all of them are planned as
-//! thoroughly at once. Leaves to [`super::planners`] the flights on a course.
+//! zones stand close or several UAVs share the work. So passes are laid on every course and
+//! flown, those that promise most first; a course is left out only where it is proved that no
+//! flights over its passes are better than a plan that was found. Where a quick answer is
+//! asked for, courses are flown with few steps and the best of these in full. Leaves to
+//! [`super::planners`] the flights on a course, and to [`super::promise`] the proofs.
 
+use super::at_once::{BATCH, at_once};
 use super::planners::Part;
-use super::{DEFAULT_STEPS, PlannerError};
-use crate::objective::{Objective, SAME_SHARE, Worth};
+use super::promise::Promise;
+use super::{DEFAULT_STEPS, PlannerError, Progress};
+use crate::objective::{Objective, Worth, lacks};
 use skein_flight::coverage::passes::{Directions, SHIFTS};
 use skein_geometry::Polygon;
 use skein_geometry::math::{PI, atan2};
-use std::panic::resume_unwind;
-use std::thread;
 
 /// Courses over half a turn: every 5°.
 const COURSES: u32 = 36;
@@ -33,7 +34,7 @@ const LONGER: usize = 16;
 /// Courses of these whose lanes are moved aside.
 const ASIDE: usize = 2;
 
-/// The same where every course is planned in full.
+/// The same where all courses are planned in full.
 const ASIDE_IN_FULL: usize = 3;
 
 /// Plans that are made in full beside the guessed one, as long as there is work left.
@@ -44,13 +45,6 @@ const IN_FULL: usize = 8;
 /// of improvement.
 const WORK_PLANS: u64 = 24;
 const WORK: (u64, u64) = (150_000_000, 600_000_000);
-
-/// What planning every course in full may take unless it is asked for, in the same unit and
-/// proportion: some 40 seconds of two processors, which few areas need.
-const EVERY_WORK: u64 = 2_400_000_000;
-
-/// Plans that are made at once.
-const BATCH: usize = 4;
 
 /// While plans are only compared: what sees a percent of the area less counts as if it took so
 /// many percent longer.
@@ -86,6 +80,30 @@ impl Effort {
     }
 }
 
+/// What is planned on courses.
+pub(super) trait Courses: Sync {
+    /// Passes on a course.
+    type Laid: Send;
+
+    /// Lays passes on a course.
+    ///
+    /// # Errors
+    /// When there are none.
+    fn laid(&self, directions: Directions, effort: Effort) -> Result<Self::Laid, PlannerError>;
+
+    /// What flights over passes come to at best.
+    fn promise(&self, laid: &Self::Laid) -> Promise;
+
+    /// Flies them.
+    ///
+    /// # Errors
+    /// When there are no flights.
+    fn flown(&self, laid: Self::Laid, effort: Effort) -> Result<Part, PlannerError>;
+
+    /// What a plan is worth.
+    fn worth(&self, part: &Part, effort: Effort) -> Worth;
+}
+
 /// A course and what came of it.
 struct Tried {
     directions: Directions,
@@ -93,75 +111,153 @@ struct Tried {
     worth: Worth,
 }
 
-/// What plans on courses are made by.
-struct Search<F, W> {
-    objective: Objective,
-    fly: F,
-    worth: W,
-    /// What may still be done.
-    left: u64,
-    /// Courses that were planned in full.
-    in_full: Vec<Directions>,
+/// Passes on a course that are not flown yet.
+struct Waiting<L> {
+    directions: Directions,
+    laid: L,
+    promise: Promise,
 }
 
-impl<F, W> Search<F, W>
-where
-    F: Fn(Directions, Effort) -> Result<Part, PlannerError> + Sync,
-    W: Fn(&Part, Effort) -> Worth + Sync,
-{
+/// A search for the best course.
+struct Search<'a, C> {
+    asked: Asked<'a>,
+    courses: &'a C,
+    /// What may still be done by a quick search.
+    left: u64,
+    /// The first reason for which there is no plan on a course.
+    refused: Option<PlannerError>,
+    /// Courses that a quick search has planned in full.
+    in_full: Vec<Directions>,
+    /// What all courses promise that were looked at in full.
+    promises: Vec<Promise>,
+}
+
+impl<C: Courses> Search<'_, C> {
+    /// The best plan on any of these courses, and on the best of them with lanes moved aside:
+    /// all are planned in full that are not proved to be no better.
+    fn all_in_full(&mut self, all: &[Directions]) -> Vec<Tried> {
+        let mut found = Vec::new();
+        self.fly_all(all, &mut found);
+        found = self.best_first(found);
+        let best = found.iter().take(ASIDE_IN_FULL);
+        let moved: Vec<Directions> = best.flat_map(|t| aside(t.directions)).collect();
+        self.fly_all(&moved, &mut found);
+        found
+    }
+
+    /// Lays passes on all of these courses and flies those that may be better than what was
+    /// found, the most promising ones first.
+    fn fly_all(&mut self, all: &[Directions], found: &mut Vec<Tried>) {
+        let mut waiting: Vec<Waiting<C::Laid>> = Vec::new();
+        for batch in all.chunks(BATCH) {
+            let courses = self.courses;
+            let laid = at_once(batch.to_vec(), |directions| {
+                let laid = courses.laid(directions, Effort::FULL)?;
+                let promise = courses.promise(&laid);
+                Ok(Waiting {
+                    directions,
+                    laid,
+                    promise,
+                })
+            });
+            for laid in laid {
+                match laid {
+                    Ok(laid) => {
+                        self.promises.push(laid.promise.clone());
+                        waiting.push(laid);
+                    }
+                    Err(error) => self.refused = self.refused.take().or(Some(error)),
+                }
+            }
+        }
+        self.promising_last(&mut waiting);
+        let of = waiting.len();
+        while !waiting.is_empty() {
+            (self.asked.tell)(Progress {
+                courses_done: of - waiting.len(),
+                courses: of,
+            });
+            let mut batch = Vec::new();
+            while batch.len() < BATCH
+                && let Some(next) = waiting.pop()
+            {
+                if self.may_win(&next.promise, found) {
+                    batch.push(next);
+                }
+            }
+            let courses = self.courses;
+            let flown = at_once(batch, |next| {
+                let part = courses.flown(next.laid, Effort::FULL)?;
+                let worth = courses.worth(&part, Effort::FULL);
+                Ok(Tried {
+                    directions: next.directions,
+                    part,
+                    worth,
+                })
+            });
+            for flown in flown {
+                match flown {
+                    Ok(flown) => found.push(flown),
+                    Err(error) => self.refused = self.refused.take().or(Some(error)),
+                }
+            }
+        }
+    }
+
+    /// Whether flights over passes may be better than all that was found, and than what is to
+    /// be better.
+    fn may_win(&self, promise: &Promise, found: &[Tried]) -> bool {
+        let known = found.iter().map(|t| &t.worth);
+        let mut known = known.chain(&self.asked.better_than);
+        known.all(|worth| promise.may_be_better(worth, self.asked.objective))
+    }
+
+    /// Sorts so that those are last that may see most, and of those the ones that may take
+    /// least.
+    fn promising_last(&self, waiting: &mut [Waiting<C::Laid>]) {
+        let objective = self.asked.objective;
+        let key = |w: &Waiting<C::Laid>| (lacks(w.promise.share()), w.promise.figure(objective));
+        waiting.sort_by(|a, b| {
+            let (a, b) = (key(a), key(b));
+            b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
+        });
+    }
+
     /// Plans on courses, as many at once as a batch has, while more than `reserve` is left to
     /// do; how many processors there are changes nothing.
-    fn tried(&mut self, courses: &[Directions], effort: Effort, reserve: u64) -> Vec<Tried> {
-        let mut all = Vec::new();
-        for batch in courses.chunks(BATCH) {
+    fn tried(&mut self, all: &[Directions], effort: Effort, reserve: u64) -> Vec<Tried> {
+        let mut found = Vec::new();
+        for batch in all.chunks(BATCH) {
             if self.left <= reserve {
                 break;
             }
-            let flown = thread::scope(|scope| {
-                let plan = |d: &Directions| {
-                    let directions = *d;
-                    let (fly, worth) = (&self.fly, &self.worth);
-                    scope.spawn(move || {
-                        let part = fly(directions, effort).ok()?;
-                        let worth = worth(&part, effort);
-                        Some(Tried {
-                            directions,
-                            part,
-                            worth,
-                        })
-                    })
-                };
-                let begun: Vec<_> = batch.iter().map(plan).collect();
-                let done = begun
-                    .into_iter()
-                    .map(|t| t.join().unwrap_or_else(|p| resume_unwind(p)));
-                done.flatten().collect::<Vec<Tried>>()
+            let courses = self.courses;
+            let flown = at_once(batch.to_vec(), |directions| {
+                let laid = courses.laid(directions, effort).ok()?;
+                let part = courses.flown(laid, effort).ok()?;
+                let worth = courses.worth(&part, effort);
+                Some(Tried {
+                    directions,
+                    part,
+                    worth,
+                })
             });
+            let flown: Vec<Tried> = flown.into_iter().flatten().collect();
             let work: u64 = flown.iter().map(|t| t.part.work).sum();
             self.left = self.left.saturating_sub(work);
             if effort.is_full() {
                 self.in_full.extend_from_slice(batch);
             }
-            all.extend(flown);
+            found.extend(flown);
         }
-        all
-    }
-
-    /// Plans in full on every course, and on the best of them with lanes moved aside.
-    fn all_in_full(&mut self, courses: &[Directions]) -> Vec<Tried> {
-        let found = self.tried(courses, Effort::FULL, 0);
-        let mut found = self.best_first(found);
-        let best = found.iter().take(ASIDE_IN_FULL);
-        let moved: Vec<Directions> = best.flat_map(|t| aside(t.directions)).collect();
-        found.extend(self.tried(&moved, Effort::FULL, 0));
         found
     }
 
-    /// Plans in full on the courses that promise most.
-    fn best_in_full(&mut self, courses: &[Directions]) -> Vec<Tried> {
+    /// Plans in full on the courses that promise most when they are flown quickly.
+    fn best_in_full(&mut self, all: &[Directions]) -> Vec<Tried> {
         // What is left for the better ones, and of that for full plans.
         let (longer_left, full_left) = (self.left / 2, self.left / 3);
-        let quick = self.tried(courses, Effort::QUICK, longer_left);
+        let quick = self.tried(all, Effort::QUICK, longer_left);
         let quick = self.promising_first(quick);
         let longer = self.tried(&promising(&quick), Effort::LONGER, full_left);
         let promising = match self.promising_first(longer) {
@@ -175,35 +271,30 @@ where
     /// Those that see as much as any first, the best of them before others; then those that
     /// see less. What is known already is left out.
     fn best_first(&self, all: Vec<Tried>) -> Vec<Tried> {
-        self.sorted(
-            all,
-            |lacks| if lacks > SAME_SHARE { lacks } else { 0.0 },
-            |_| 1.0,
-        )
+        self.sorted(all, |share, _| (lacks(share), 1.0))
     }
 
     /// Those that promise most first: what a quick plan sees is told by few samples, and a
     /// thorough one sees more.
     fn promising_first(&self, all: Vec<Tried>) -> Vec<Tried> {
-        self.sorted(all, |_| 0.0, |lacks| 1.0 + SHARE_WORTH * lacks)
+        self.sorted(all, |share, most| {
+            let lacks = (most - share).max(0.0);
+            (0, 1.0 + SHARE_WORTH * lacks)
+        })
     }
 
-    fn sorted(
-        &self,
-        mut all: Vec<Tried>,
-        rank: impl Fn(f64) -> f64,
-        dearer: impl Fn(f64) -> f64,
-    ) -> Vec<Tried> {
+    /// Sorted by a rank, and by what they take times how much dearer that counts.
+    fn sorted(&self, mut all: Vec<Tried>, rank: impl Fn(f64, f64) -> (u32, f64)) -> Vec<Tried> {
         let most = all.iter().map(|t| t.worth.share).fold(0.0, f64::max);
-        let figure = |t: &Tried| {
-            let lacks = (most - t.worth.share).max(0.0);
-            let own = t.worth.figure(self.objective) * dearer(lacks);
-            (rank(lacks), own, t.worth.makespan_s)
+        let key = |t: &Tried| {
+            let (rank, dearer) = rank(t.worth.share, most);
+            let own = t.worth.figure(self.asked.objective) * dearer;
+            (rank, own, t.worth.makespan_s)
         };
         all.sort_by(|a, b| {
-            let (a, b) = (figure(a), figure(b));
-            let by_share = a.0.total_cmp(&b.0);
-            by_share.then(a.1.total_cmp(&b.1)).then(a.2.total_cmp(&b.2))
+            let (a, b) = (key(a), key(b));
+            let by_rank = a.0.cmp(&b.0);
+            by_rank.then(a.1.total_cmp(&b.1)).then(a.2.total_cmp(&b.2))
         });
         all.dedup_by(|a, b| a.worth == b.worth);
         all
@@ -211,72 +302,88 @@ where
 }
 
 /// What is asked of the search.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Asked {
+#[derive(Clone, Copy)]
+pub(super) struct Asked<'a> {
     /// What is to be least.
     pub objective: Objective,
     /// Steps of improvement.
     pub steps: usize,
-    /// Whether every course is planned in full, whatever it takes.
-    pub every: bool,
+    /// Whether only those courses are planned in full that promise most when they are
+    /// planned quickly.
+    pub quick: bool,
+    /// Plans are wanted only that may be better than this.
+    pub better_than: Option<Worth>,
+    /// Told how far the search is.
+    pub tell: &'a (dyn Fn(Progress) + Sync),
 }
 
-/// The best plan that was found on any course, with so many steps of improvement; `fly` plans
-/// on one.
+/// The best plan that was found on any course; none where no plan can be better than what is
+/// to be beaten.
 ///
 /// # Guarantees
-/// Where no courses are left in the plan, none sees more, or as much for less.
+/// Unless a quick search is asked for, no plan in full on one of the courses sees more, or as
+/// much for less.
 ///
 /// # Errors
-/// When there is no plan on the course that is guessed to be the shortest.
+/// When there is no plan on any course.
 pub(super) fn best(
     area: &Polygon,
-    asked: Asked,
-    fly: impl Fn(Directions, Effort) -> Result<Part, PlannerError> + Sync,
-    worth: impl Fn(&Part, Effort) -> Worth + Sync,
-) -> Result<Part, PlannerError> {
-    let guessed = fly(Directions::Best, Effort::FULL)?;
-    if guessed.work == 0 {
-        return Ok(guessed);
-    }
-    let all = courses(area);
-    let by_steps = |work: u64| work.saturating_mul(asked.steps as u64) / DEFAULT_STEPS as u64;
-    let every_work = if asked.every {
-        u64::MAX
-    } else {
-        by_steps(EVERY_WORK)
-    };
-    let all_fit = guessed.work.saturating_mul(all.len() as u64) <= every_work;
-    let left = if all_fit {
-        every_work
-    } else {
-        let most = guessed.work.saturating_mul(WORK_PLANS);
-        by_steps(most.clamp(WORK.0, WORK.1)).saturating_sub(guessed.work)
-    };
-    let first = Tried {
-        directions: Directions::Best,
-        worth: worth(&guessed, Effort::FULL),
-        part: guessed,
-    };
+    asked: Asked<'_>,
+    courses: &impl Courses,
+) -> Result<Option<Part>, PlannerError> {
+    let all = all_round(area);
     let mut search = Search {
-        objective: asked.objective,
-        fly,
-        worth,
-        left,
+        asked,
+        courses,
+        left: 0,
+        refused: None,
         in_full: Vec::new(),
+        promises: Vec::new(),
     };
-    let mut found = if all_fit {
-        search.all_in_full(&all)
+    let found = if asked.quick {
+        search.quickly(&all)?
     } else {
-        search.best_in_full(&all)
+        let guessed = [Directions::Best].into_iter().chain(all.iter().copied());
+        let all: Vec<Directions> = guessed.collect();
+        search.all_in_full(&all)
     };
-    found.push(first);
     let left = all.iter().filter(|d| !search.in_full.contains(d));
-    let courses_left = left.count();
+    let courses_left = if asked.quick { left.count() } else { 0 };
     let best = search.best_first(found).into_iter().next();
-    let mut part = best.map(|t| t.part).unwrap_or_default();
-    part.courses_left = courses_left;
-    Ok(part)
+    let promises = search.promises;
+    match (best, search.refused) {
+        (Some(best), _) => {
+            let mut part = best.part;
+            (part.courses_left, part.promises) = (courses_left, promises);
+            Ok(Some(part))
+        }
+        (None, Some(error)) if asked.better_than.is_none() => Err(error),
+        (None, _) => Ok(None),
+    }
+}
+
+impl<C: Courses> Search<'_, C> {
+    /// The plan on the guessed course and those on the courses that promise most.
+    fn quickly(&mut self, all: &[Directions]) -> Result<Vec<Tried>, PlannerError> {
+        let laid = self.courses.laid(Directions::Best, Effort::FULL)?;
+        if !self.may_win(&self.courses.promise(&laid), &[]) {
+            return Ok(Vec::new());
+        }
+        let guessed = self.courses.flown(laid, Effort::FULL)?;
+        let most = guessed
+            .work
+            .saturating_mul(WORK_PLANS)
+            .clamp(WORK.0, WORK.1);
+        let by_steps = most.saturating_mul(self.asked.steps as u64) / DEFAULT_STEPS as u64;
+        self.left = by_steps.saturating_sub(guessed.work);
+        let mut found = self.best_in_full(all);
+        found.push(Tried {
+            directions: Directions::Best,
+            worth: self.courses.worth(&guessed, Effort::FULL),
+            part: guessed,
+        });
+        Ok(found)
+    }
 }
 
 /// The courses that are flown with more steps, and those of them with lanes moved aside.
@@ -307,7 +414,7 @@ pub(super) fn apart_rad(a_rad: f64, b_rad: f64) -> f64 {
 }
 
 /// What is tried: lanes cell by cell, courses along edges of the area, and courses all round.
-fn courses(area: &Polygon) -> Vec<Directions> {
+fn all_round(area: &Polygon) -> Vec<Directions> {
     let mut edges: Vec<_> = area.edges().map(|(a, b)| b - a).collect();
     edges.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
     let along = edges.iter().map(|d| atan2(d.y, d.x).rem_euclid(PI));
@@ -340,7 +447,7 @@ mod tests {
     fn courses_lie_along_edges_and_all_round() {
         let corners = [(0.0, 0.0), (400.0, 30.0), (380.0, 200.0), (0.0, 200.0)];
         let corners = corners.map(|(x, y)| Point::new(x, y)).to_vec();
-        let all = courses(&Polygon::new(corners).unwrap());
+        let all = all_round(&Polygon::new(corners).unwrap());
         let has = |course_rad: f64| {
             let is = |d: &Directions| matches!(d, Directions::Fixed(h) if (h - course_rad).abs() < SAME_RAD);
             all.iter().any(is)

@@ -1,8 +1,11 @@
 //! Flights of a team over an area while plans are compared, and the share that they see.
 
+use super::promise::Promise;
+use super::sight::{Footprint, Points};
 use super::{Facts, Figures, Laid, Planner, Shape};
 use crate::flight::Flight;
 use crate::objective::Worth;
+use skein_flight::coverage::passes::Pass;
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Vector};
 
@@ -43,6 +46,8 @@ pub(crate) struct Flights {
     pub shapes: Vec<Shape>,
     /// Courses that would have taken too long to plan in full.
     pub courses_left: usize,
+    /// What all courses promise that were looked at; none where that is not known.
+    pub promises: Vec<Promise>,
 }
 
 impl Flights {
@@ -84,7 +89,10 @@ pub(super) fn span(points: &[Point], axis: Vector) -> (f64, f64) {
 }
 
 /// The wanted ground of an area, as points that are spread evenly over it.
-pub(crate) struct Samples(Vec<Point>);
+pub(crate) struct Samples(Points);
+
+/// Passes that are flown, and how far they see.
+pub(crate) type Seen<'a> = (&'a [Pass], Footprint);
 
 impl Samples {
     /// About so many at most, an eighth of a swath apart at least.
@@ -115,13 +123,57 @@ impl Samples {
             }
             i += 1.0;
         }
-        Self(points)
+        Self(Points::new(points))
     }
 
     /// The share of them that is seen.
-    pub(crate) fn share(&self, sees: impl Fn(Point) -> bool) -> f64 {
-        let seen = self.0.iter().filter(|p| sees(**p)).count();
-        seen as f64 / self.0.len().max(1) as f64
+    pub(crate) fn share<'a>(&self, seen: impl Iterator<Item = Seen<'a>>) -> f64 {
+        self.part(&self.seen(seen), |_, seen| seen)
+    }
+
+    /// The share of them that is seen, and the share that is not and for which `holds`.
+    pub(crate) fn shares<'a>(
+        &self,
+        seen: impl Iterator<Item = Seen<'a>>,
+        holds: impl Fn(Point) -> bool,
+    ) -> (f64, f64) {
+        let seen = self.seen(seen);
+        let unseen = self.part(&seen, |p, seen| !seen && holds(p));
+        (self.part(&seen, |_, seen| seen), unseen)
+    }
+
+    /// The share of them that passes see, and by pass the share that no other one sees.
+    pub(super) fn alone(&self, passes: &[Pass], footprint: Footprint) -> (f64, Vec<f64>) {
+        let n = self.0.all().len().max(1) as f64;
+        // By sample: how many see it, and the last that does.
+        let mut seen = vec![(0u32, 0); self.0.all().len()];
+        for (i, pass) in passes.iter().enumerate() {
+            let see = |p: usize| seen[p] = (seen[p].0 + 1, i);
+            self.0.each_seen(pass, footprint, see);
+        }
+        let mut alone = vec![0.0; passes.len()];
+        for (_, pass) in seen.iter().filter(|s| s.0 == 1) {
+            alone[*pass] += 1.0 / n;
+        }
+        let share = seen.iter().filter(|s| s.0 > 0).count() as f64 / n;
+        (share, alone)
+    }
+
+    /// By sample: whether it is seen.
+    fn seen<'a>(&self, seen: impl Iterator<Item = Seen<'a>>) -> Vec<bool> {
+        let mut all = vec![false; self.0.all().len()];
+        for (passes, footprint) in seen {
+            for pass in passes {
+                self.0.each_seen(pass, footprint, |i| all[i] = true);
+            }
+        }
+        all
+    }
+
+    fn part(&self, seen: &[bool], holds: impl Fn(Point, bool) -> bool) -> f64 {
+        let all = self.0.all();
+        let n = all.iter().zip(seen).filter(|(p, seen)| holds(**p, **seen));
+        n.count() as f64 / all.len().max(1) as f64
     }
 }
 
@@ -142,16 +194,27 @@ mod tests {
             .unwrap()
         };
         let (area, hole) = (square(100.0), square(50.0));
-        let covered_share = |area, wanted: &dyn Fn(Point) -> bool, sees: &dyn Fn(Point) -> bool| {
-            Samples::new(area, wanted, 40.0, MOST_SAMPLES).share(sees)
+        // One pass that sees all to the east of a place.
+        let east_of = |x: f64| Pass {
+            from: at(x, 0.0),
+            to: at(x + 1000.0, 0.0),
         };
-        let half = covered_share(&area, &|_| true, &|p| p.x > 0.0);
-        assert!((half - 0.5).abs() < 0.01);
-        let rest = covered_share(&area, &|p| !hole.contains(p), &|p| p.x.abs() > 50.0);
-        // 2 × 50 × 200 of 30,000 square metres.
-        assert!((rest - 2.0 / 3.0).abs() < 0.01, "{rest}");
+        let footprint = Footprint {
+            across_m: 1000.0,
+            along_m: 0.0,
+        };
+        let share = |area, wanted: &dyn Fn(Point) -> bool, x: f64| {
+            let samples = Samples::new(area, wanted, 40.0, MOST_SAMPLES);
+            let pass = [east_of(x)];
+            samples.shares([(&pass[..], footprint)].into_iter(), |p| p.y > 0.0)
+        };
+        let (half, unseen) = share(&area, &|_| true, 0.0);
+        assert!((half - 0.5).abs() < 0.01 && (unseen - 0.25).abs() < 0.01);
+        let (rest, _) = share(&area, &|p| !hole.contains(p), 50.0);
+        // 50 × 200 of 30,000 square metres.
+        assert!((rest - 1.0 / 3.0).abs() < 0.01, "{rest}");
         let needle = Polygon::new(vec![at(0.0, 0.0), at(700.0, 697.0), at(703.0, 700.0)]).unwrap();
-        let half = covered_share(&needle, &|_| true, &|p| p.x > 497.0);
+        let (half, _) = share(&needle, &|_| true, 497.0);
         assert!((half - 0.5).abs() < 0.005, "{half}");
     }
 }

@@ -5,12 +5,13 @@
 //! what these ways then took. Leaves to [`crate::flown`] which curves there are.
 
 use super::gaps;
+use super::promise::Flyers;
 use crate::flown::{Air, Fineness, Flown, Stop, clear_ahead_m, fly, turnable, turnable_by};
 use crate::passes::{Uav, cut, launches};
 use skein_flight::coverage::lines::{self, LineError};
-use skein_flight::coverage::metric::Matrix;
+use skein_flight::coverage::metric::{Matrix, Metric};
 use skein_flight::coverage::passes::{
-    CellPlan, Layout, NEAR_TURNS, Pass, PassesError, PassesProblem, Places, lines,
+    CellPlan, GrownZones, Layout, NEAR_TURNS, Pass, PassesError, PassesProblem, Places, Ways, lines,
 };
 use skein_flight::route::{RouteLimits, Router};
 use skein_geometry::frame::{Point, Pose};
@@ -38,6 +39,14 @@ const PAIR_WORK: usize = 10;
 /// What is looked at in a step of improvement for each pass.
 const STEP_WORK: usize = 5;
 
+/// Steps of improvement for each pass at most: the order of few is as good as it gets after
+/// that.
+const MOST_STEPS_A_PASS: usize = 1_000;
+
+/// Orders after the first are improved in this part of the steps: few ways take what was not
+/// thought.
+const AGAIN_PART: usize = 4;
+
 /// Times that a shorter endurance is planned for where turns take what was left.
 const ENDURANCE_ROUNDS: usize = 3;
 
@@ -58,106 +67,194 @@ pub(super) struct FlownPasses {
     pub work: u64,
 }
 
-/// Plans flights for a team so that every pass that can be is flown once, and the longest
-/// time is short; `problem.launch` is not used. `airs` is what each flies through. Passes are
-/// ordered `rounds` times, after the first by what the ways took, and run out straight so far
-/// where that is clear.
-///
-/// # Errors
-/// [`PassesError`]; nothing is planned then.
-pub(super) fn fly_team(
-    problem: &PassesProblem,
-    team: &[Uav],
-    airs: &[Air],
-    rounds: usize,
+/// What plans over one part of an area share, however its passes are laid: who flies, and what
+/// is known of the zones.
+pub(super) struct Ground<'a> {
+    team: &'a [Uav],
+    /// By UAV: what it flies through.
+    airs: &'a [Air],
+    /// How far passes run out straight where that is clear, metres.
     run_out_m: f64,
-) -> Result<FlownPasses, PassesError> {
-    fly_layout(
-        problem,
-        Layout::new(problem)?,
-        team,
-        airs,
-        rounds,
-        run_out_m,
-    )
+    router: Router,
+    zones: GrownZones,
+    ways: Ways,
+    /// The places where UAVs start, and by UAV which is its own.
+    starts: Vec<Point>,
+    from: Vec<usize>,
+    lattice: gaps::Lattice,
+    /// Edges of zones, of which ways are searched for among.
+    edges: usize,
 }
 
-/// The same with passes that were laid already, and such that see what these do not.
-///
-/// # Errors
-/// [`PassesError`]; nothing is planned then.
-pub(super) fn fly_layout(
-    problem: &PassesProblem,
-    layout: Layout,
-    team: &[Uav],
-    airs: &[Air],
-    rounds: usize,
-    run_out_m: f64,
-) -> Result<FlownPasses, PassesError> {
-    if team.is_empty() {
-        return Err(PassesError::Team(LineError::NoTeam));
+/// Passes to be flown.
+pub(super) struct Laid {
+    passes: Vec<Pass>,
+    /// Passes to which no curve leads that keeps clear.
+    unreached: Vec<Pass>,
+    cells: Vec<CellPlan>,
+    /// Whether their ends are as far out as can be.
+    thorough: bool,
+    /// What it took to lay them, in edges that were looked at.
+    work: u64,
+}
+
+impl Laid {
+    /// The passes, cut for the team.
+    pub(super) fn passes(&self) -> &[Pass] {
+        &self.passes
     }
-    let (starts, from) = launches(team)?;
-    let router = Router::new(
-        problem.zones.clone(),
-        RouteLimits {
-            turn_radius_m: problem.turn_radius_m,
-            clearance_m: problem.clearance_m,
-        },
-    );
-    let ways = layout.ways(&starts)?;
-    let is_open = |p: Point| starts.iter().any(|s| ways.joins(*s, p));
-    // Where orders are only compared, one is enough, and so are coarse ends.
-    let thorough = rounds > 1;
-    let (fineness, pass_work) = if thorough {
-        (Fineness::FULL, PASS_WORK.0)
-    } else {
-        (Fineness::COARSE, PASS_WORK.1)
-    };
-    let (mut passes, mut unreached) = (Vec::new(), Vec::new());
-    for pass in &layout.passes {
-        match turnable_by(&router, *pass, fineness).filter(|_| is_open(pass.from)) {
-            Some(part) => passes.push(part),
-            None => unreached.push(*pass),
+}
+
+impl<'a> Ground<'a> {
+    /// Looks at the zones of a problem; its directions and steps do not matter, nor does its
+    /// launch point.
+    ///
+    /// # Errors
+    /// [`PassesError`]; nothing can be planned then.
+    pub(super) fn new(
+        problem: &PassesProblem,
+        team: &'a [Uav],
+        airs: &'a [Air],
+        run_out_m: f64,
+    ) -> Result<Self, PassesError> {
+        if team.is_empty() {
+            return Err(PassesError::Team(LineError::NoTeam));
+        }
+        let zones = GrownZones::new(problem)?;
+        let (starts, from) = launches(team)?;
+        let (low, high) = problem.area.bounds();
+        let reach_m = low.coords.amax().max(high.coords.amax()) + problem.lane_spacing_m;
+        let edges = problem.zones.zones().iter().map(|z| z.vertices().len());
+        Ok(Self {
+            team,
+            airs,
+            run_out_m,
+            router: Router::new(
+                problem.zones.clone(),
+                RouteLimits {
+                    turn_radius_m: problem.turn_radius_m,
+                    clearance_m: problem.clearance_m,
+                },
+            ),
+            ways: zones.ways(&starts, reach_m)?,
+            zones,
+            starts,
+            from,
+            lattice: gaps::Lattice::new(problem),
+            edges: edges.sum::<usize>() + FREE_EDGES,
+        })
+    }
+
+    /// By UAV: what it flies through.
+    pub(super) fn airs(&self) -> &[Air] {
+        self.airs
+    }
+
+    /// Who flies, as far as it matters to what that takes at least.
+    pub(super) fn flyers(&self) -> Flyers {
+        let fastest = |air: &Air| air.airspeed_mps + air.wind_mps.norm();
+        Flyers {
+            starts: self.starts.clone(),
+            speeds_mps: self.airs.iter().map(fastest).collect(),
+            turn_radius_m: self.router.limits().turn_radius_m,
         }
     }
-    let (more, tried) = gaps::fill(problem, &router, &passes, is_open, thorough);
-    let tried = tried + layout.passes.len();
-    passes.extend(more);
-    cut(&mut passes, team.len(), problem.shortest_pass_m);
-    if passes.is_empty() {
-        return Ok(FlownPasses {
-            flights: vec![Flown::default(); team.len()],
-            tours: vec![Vec::new(); team.len()],
+
+    /// Lays passes in the directions of a problem, and such that see what these do not.
+    ///
+    /// # Errors
+    /// [`PassesError`]; nothing is laid then.
+    pub(super) fn laid(
+        &self,
+        problem: &PassesProblem,
+        thorough: bool,
+    ) -> Result<Laid, PassesError> {
+        Ok(self.finished(problem, Layout::among(problem, &self.zones)?, thorough))
+    }
+
+    /// The same with passes that were laid already.
+    ///
+    /// # Errors
+    /// [`PassesError`]; nothing is laid then.
+    pub(super) fn laid_before(
+        &self,
+        problem: &PassesProblem,
+        passes: Vec<Pass>,
+    ) -> Result<Laid, PassesError> {
+        let layout = Layout::of_passes(&self.zones, passes)?;
+        Ok(self.finished(problem, layout, true))
+    }
+
+    fn finished(&self, problem: &PassesProblem, layout: Layout, thorough: bool) -> Laid {
+        let is_open = |p: Point| self.starts.iter().any(|s| self.ways.joins(*s, p));
+        let (fineness, pass_work) = if thorough {
+            (Fineness::FULL, PASS_WORK.0)
+        } else {
+            (Fineness::COARSE, PASS_WORK.1)
+        };
+        let (mut passes, mut unreached) = (Vec::new(), Vec::new());
+        for pass in &layout.passes {
+            match turnable_by(&self.router, *pass, fineness).filter(|_| is_open(pass.from)) {
+                Some(part) => passes.push(part),
+                None => unreached.push(*pass),
+            }
+        }
+        let (lattice, router) = (&self.lattice, &self.router);
+        let (more, tried) = gaps::fill(problem, router, lattice, &passes, is_open, thorough);
+        let tried = tried + layout.passes.len();
+        passes.extend(more);
+        cut(&mut passes, self.team.len(), problem.shortest_pass_m);
+        Laid {
+            passes,
             unreached,
             cells: layout.cells,
-            ..FlownPasses::default()
-        });
+            thorough,
+            work: (pass_work * tried * self.edges) as u64,
+        }
     }
-    let desk = Desk {
-        problem,
-        router: &router,
-        team,
-        airs,
-        thorough,
-        run_out_m,
-        from: &from,
-        passes: &passes,
-        places: Places::new(&ways, &passes, &starts, problem.turn_radius_m),
-        starts: starts.len(),
-        lines: lines(&passes),
-    };
-    let mut found = desk.best(rounds)?;
-    let edges = problem.zones.zones().iter().map(|z| z.vertices().len());
-    let edges = edges.sum::<usize>() + FREE_EDGES;
-    let pairs = passes.len() * passes.len();
-    found.work = (WAY_WORK * found.work + (pass_work * tried) as u64 + SAMPLES_WORK)
-        .saturating_mul(edges as u64)
-        .saturating_add((PAIR_WORK * pairs) as u64)
-        .saturating_add((STEP_WORK * passes.len()) as u64 * (problem.steps * rounds) as u64);
-    found.unreached.extend(unreached);
-    found.cells = layout.cells;
-    Ok(found)
+
+    /// Plans flights for the team so that every pass that can be is flown once, and the
+    /// longest time is short. Passes are ordered `rounds` times, after the first by what the
+    /// ways took.
+    ///
+    /// # Errors
+    /// [`PassesError`]; nothing is planned then.
+    pub(super) fn flown(
+        &self,
+        problem: &PassesProblem,
+        laid: Laid,
+        rounds: usize,
+    ) -> Result<FlownPasses, PassesError> {
+        let passes = &laid.passes;
+        if passes.is_empty() {
+            return Ok(FlownPasses {
+                flights: vec![Flown::default(); self.team.len()],
+                tours: vec![Vec::new(); self.team.len()],
+                unreached: laid.unreached,
+                cells: laid.cells,
+                work: laid.work,
+                ..FlownPasses::default()
+            });
+        }
+        let desk = Desk {
+            ground: self,
+            problem,
+            thorough: laid.thorough,
+            passes,
+            places: Places::new(&self.ways, passes, &self.starts, problem.turn_radius_m),
+            lines: lines(passes),
+        };
+        let mut found = desk.best(rounds)?;
+        let pairs = passes.len() * passes.len();
+        found.work = (WAY_WORK * found.work + SAMPLES_WORK)
+            .saturating_mul(self.edges as u64)
+            .saturating_add(laid.work)
+            .saturating_add((PAIR_WORK * pairs) as u64)
+            .saturating_add((STEP_WORK * passes.len()) as u64 * (problem.steps * rounds) as u64);
+        found.unreached.extend(laid.unreached);
+        found.cells = laid.cells;
+        Ok(found)
+    }
 }
 
 /// What one UAV flies over passes in this order, as many from the first on as it may fly so
@@ -221,23 +318,15 @@ fn is_forward(stand: usize) -> bool {
     stand.is_multiple_of(2)
 }
 
-/// What flights are planned from.
+/// What flights over passes are planned from.
 struct Desk<'a> {
+    ground: &'a Ground<'a>,
     problem: &'a PassesProblem,
-    router: &'a Router,
-    team: &'a [Uav],
-    /// By UAV: what it flies through.
-    airs: &'a [Air],
     /// Whether the order is searched for at length; else passes are joined in the cheapest
     /// way at hand.
     thorough: bool,
-    /// How far passes run out, metres.
-    run_out_m: f64,
-    /// By UAV: which of the starts is its own.
-    from: &'a [usize],
     passes: &'a [Pass],
     places: Places<'a>,
-    starts: usize,
     lines: Vec<lines::Line>,
 }
 
@@ -248,10 +337,20 @@ impl Desk<'_> {
     fn best(&self, mut rounds: usize) -> Result<FlownPasses, PassesError> {
         let mut known = Known::new();
         let mut best: Option<FlownPasses> = None;
-        let mut endurances: Vec<f64> = self.team.iter().map(|u| u.endurance).collect();
+        let mut endurances: Vec<f64> = self.ground.team.iter().map(|u| u.endurance).collect();
         let (mut shorter, mut work) = (ENDURANCE_ROUNDS, 0);
+        let most = MOST_STEPS_A_PASS * self.passes.len();
+        let steps = self.problem.steps.min(most);
+        let near_m = NEAR_TURNS * self.problem.turn_m();
+        let guess = |a, b| self.places.guess_m(a, b, near_m);
+        let guessed = Matrix::of(2 * self.passes.len() + self.ground.starts.len(), &guess);
         while rounds > 0 {
-            let found = self.ordered(&endurances, &mut known)?;
+            let steps = if best.is_none() {
+                steps
+            } else {
+                steps / AGAIN_PART
+            };
+            let found = self.ordered(&endurances, &guessed, &mut known, steps.max(1))?;
             work += found.flights.iter().map(|f| f.work).sum::<u64>();
             let late = self.too_long(&found);
             if late.is_empty() || shorter == 0 {
@@ -273,25 +372,35 @@ impl Desk<'_> {
     }
 
     /// Shared out, ordered and flown; what the ways took is noted.
-    fn ordered(&self, endurances: &[f64], known: &mut Known) -> Result<FlownPasses, PassesError> {
+    fn ordered(
+        &self,
+        endurances: &[f64],
+        guessed: &Matrix,
+        known: &mut Known,
+        steps: usize,
+    ) -> Result<FlownPasses, PassesError> {
         let first = 2 * self.passes.len();
-        let near_m = NEAR_TURNS * self.problem.turn_m();
         let cost = |a: usize, b: usize| {
             let flown = known.get(&(a.min(b), a.max(b))).copied();
-            flown.unwrap_or_else(|| self.places.guess_m(a, b, near_m))
+            flown.unwrap_or_else(|| guessed.cost(a, b))
         };
-        let costs = Matrix::of(first + self.starts, &cost);
+        let costs = Matrix::of(guessed.len(), &cost);
         let uav = |((u, start), endurance): ((&Uav, &usize), &f64)| lines::Uav {
             speed: u.speed,
             endurance: *endurance,
             ..lines::Uav::at(first + start)
         };
-        let uavs = self.team.iter().zip(self.from).zip(endurances);
+        let uavs = self
+            .ground
+            .team
+            .iter()
+            .zip(&self.ground.from)
+            .zip(endurances);
         let uavs: Vec<lines::Uav> = uavs.map(uav).collect();
         let found = if self.thorough {
-            lines::plan(&self.lines, &uavs, &costs, self.problem.steps)?
+            lines::plan(&self.lines, &uavs, &costs, steps)?
         } else {
-            lines::plan_passes(&self.lines, &uavs, &costs, self.problem.steps)?
+            lines::plan_passes(&self.lines, &uavs, &costs, steps)?
         };
         let mut flown = FlownPasses {
             unserved: found.unserved.iter().map(|i| self.passes[*i]).collect(),
@@ -302,10 +411,10 @@ impl Desk<'_> {
             let stops = tour.passes.iter().filter_map(|t| {
                 let pass = self.passes[t.line];
                 let wanted = if t.backward { pass.reversed() } else { pass };
-                stop(self.router, wanted, self.run_out_m)
+                stop(&self.ground.router, wanted, self.ground.run_out_m)
             });
             let stops: Vec<Stop> = stops.collect();
-            let flight = fly(self.router, self.team[i].launch, &stops);
+            let flight = fly(&self.ground.router, self.ground.team[i].launch, &stops);
             // By stand the end of a pass where a way comes in, and where one goes out.
             let ends = |(stop, stand): (usize, usize)| {
                 let line = 2 * order[stop];
@@ -315,7 +424,7 @@ impl Desk<'_> {
                     (line, line + 1)
                 }
             };
-            let start = first + self.from[i];
+            let start = first + self.ground.from[i];
             for (a, b, length_m) in &flight.ways {
                 let out = a.map_or(start, |a| ends(a).1);
                 let into = b.map_or(start, |b| ends(b).0);
@@ -336,7 +445,11 @@ impl Desk<'_> {
     }
 
     fn times(&self, flown: &FlownPasses) -> Vec<f64> {
-        let flights = flown.flights.iter().zip(self.team).zip(self.airs);
+        let flights = flown
+            .flights
+            .iter()
+            .zip(self.ground.team)
+            .zip(self.ground.airs);
         flights
             .map(|((f, u), air)| f.air_m(air) / u.speed)
             .collect()
@@ -344,15 +457,19 @@ impl Desk<'_> {
 
     /// Who flies longer than it may, and how many times as long.
     fn too_long(&self, flown: &FlownPasses) -> Vec<(usize, f64)> {
-        let times = self.times(flown).into_iter().zip(self.team).enumerate();
+        let times = self
+            .times(flown)
+            .into_iter()
+            .zip(self.ground.team)
+            .enumerate();
         let over = times.map(|(i, (time, u))| (i, time / u.endurance));
         over.filter(|(_, over)| *over > 1.0).collect()
     }
 
     /// Passes are left off the ends of flights until all are within their endurance.
     fn within_endurance(&self, mut flown: FlownPasses) -> FlownPasses {
-        for (i, uav) in self.team.iter().enumerate() {
-            while flown.flights[i].air_m(&self.airs[i]) / uav.speed > uav.endurance {
+        for (i, uav) in self.ground.team.iter().enumerate() {
+            while flown.flights[i].air_m(&self.ground.airs[i]) / uav.speed > uav.endurance {
                 let Some(last) = flown.tours[i].pop() else {
                     flown.flights[i] = Flown::default();
                     break;
@@ -360,9 +477,9 @@ impl Desk<'_> {
                 flown.unserved.push(last);
                 let stops = flown.tours[i].iter();
                 let stops: Vec<Stop> = stops
-                    .filter_map(|p| stop(self.router, *p, self.run_out_m))
+                    .filter_map(|p| stop(&self.ground.router, *p, self.ground.run_out_m))
                     .collect();
-                flown.flights[i] = fly(self.router, uav.launch, &stops);
+                flown.flights[i] = fly(&self.ground.router, uav.launch, &stops);
                 let ordered = flown.flights[i].order.iter().map(|(stop, stand)| {
                     let pass = flown.tours[i][*stop];
                     if is_forward(*stand) {

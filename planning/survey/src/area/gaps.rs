@@ -7,6 +7,7 @@
 
 use super::courses::apart_rad;
 use super::flights::span;
+use super::sight::{Footprint, Points};
 use crate::flown::{Fineness, straight, turnable_by};
 use skein_flight::coverage::passes::{Pass, PassesProblem};
 use skein_flight::route::Router;
@@ -47,6 +48,7 @@ const FEW_SHIFTS: usize = 3;
 pub(super) fn fill(
     problem: &PassesProblem,
     router: &Router,
+    lattice: &Lattice,
     passes: &[Pass],
     is_open: impl Fn(Point) -> bool,
     thorough: bool,
@@ -57,7 +59,7 @@ pub(super) fn fill(
         (FEW_SHIFTS, Fineness::COARSE)
     };
     let (mut added, mut tried) = (Vec::new(), 0);
-    for mut group in unseen(problem, passes) {
+    for mut group in lattice.unseen(problem, passes) {
         let pool = candidates(
             problem,
             router,
@@ -102,64 +104,105 @@ struct Group {
     least: f64,
 }
 
-/// The samples that no pass sees, in groups of neighbours.
-fn unseen(problem: &PassesProblem, passes: &[Pass]) -> Vec<Group> {
-    let (low, high) = problem.area.bounds();
-    let size = high - low;
-    let pitch_m =
-        (problem.lane_spacing_m / SAMPLES_A_LANE).max((size.x * size.y / MOST_SAMPLES).sqrt());
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a cast of a float saturates, and samples are bounded"
-    )]
-    let count = |m: f64| ((m / pitch_m).ceil().max(1.0) as usize).min(MOST_SAMPLES as usize);
-    let (columns, rows) = (count(size.x), count(size.y));
-    let at = |i: usize, j: usize| {
-        low + Vector::new((i as f64 + 0.5) * pitch_m, (j as f64 + 0.5) * pitch_m)
-    };
-    let mut open = vec![false; columns * rows];
-    for i in 0..columns {
-        for j in 0..rows {
-            let p = at(i, j);
-            open[i * rows + j] = problem.area.contains(p)
+/// Samples of what is to be seen, in rows and columns.
+pub(super) struct Lattice {
+    low: Point,
+    pitch_m: f64,
+    columns: usize,
+    rows: usize,
+    /// The samples that are to be seen, column by column, and the place of each.
+    wanted: Points,
+    places: Vec<usize>,
+}
+
+impl Lattice {
+    /// Samples of an area without its holes and zones as they are drawn.
+    pub(super) fn new(problem: &PassesProblem) -> Self {
+        let (low, high) = problem.area.bounds();
+        let size = high - low;
+        let pitch_m =
+            (problem.lane_spacing_m / SAMPLES_A_LANE).max((size.x * size.y / MOST_SAMPLES).sqrt());
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a cast of a float saturates, and samples are bounded"
+        )]
+        let count = |m: f64| ((m / pitch_m).ceil().max(1.0) as usize).min(MOST_SAMPLES as usize);
+        let mut lattice = Self {
+            low,
+            pitch_m,
+            columns: count(size.x),
+            rows: count(size.y),
+            wanted: Points::new(Vec::new()),
+            places: Vec::new(),
+        };
+        let is_wanted = |p: Point| {
+            problem.area.contains(p)
                 && problem.zones.distance_m(p) > 0.0
                 && !problem.holes.iter().any(|h| h.contains(p))
-                && !passes.iter().any(|pass| sees(problem, pass, p));
-        }
+        };
+        let all = 0..lattice.columns * lattice.rows;
+        lattice.places = all.filter(|k| is_wanted(lattice.at(*k))).collect();
+        let points = lattice.places.iter().map(|k| lattice.at(*k));
+        lattice.wanted = Points::new(points.collect());
+        lattice
     }
-    let per_lane = problem.lane_spacing_m / pitch_m;
-    let least = (LEAST_SHARE * per_lane * per_lane).max(2.0);
-    let widest = GROUP_LANES * per_lane;
-    let mut groups = Vec::new();
-    for first in 0..open.len() {
-        if !open[first] {
-            continue;
+
+    fn at(&self, place: usize) -> Point {
+        let (i, j) = (place / self.rows, place % self.rows);
+        self.low + Vector::new(i as f64 + 0.5, j as f64 + 0.5) * self.pitch_m
+    }
+
+    /// The samples that no pass sees, in groups of neighbours.
+    fn unseen(&self, problem: &PassesProblem, passes: &[Pass]) -> Vec<Group> {
+        let footprint = Footprint {
+            across_m: problem.lane_spacing_m / 2.0,
+            along_m: problem.look_ahead_m,
+        };
+        let seen = self.wanted.seen(passes.iter(), footprint);
+        let mut open = vec![false; self.columns * self.rows];
+        for (place, seen) in self.places.iter().zip(seen) {
+            open[*place] = seen == 0;
         }
-        open[first] = false;
-        let (mut queue, mut points) = (vec![first], Vec::new());
-        while let Some(k) = queue.pop() {
-            let (i, j) = (k / rows, k % rows);
-            points.push(at(i, j));
-            let near = [
-                (i.wrapping_sub(1), j),
-                (i + 1, j),
-                (i, j.wrapping_sub(1)),
-                (i, j + 1),
-            ];
-            for (x, y) in near {
-                let far = x.abs_diff(first / rows).max(y.abs_diff(first % rows)) as f64 > widest;
-                if x < columns && y < rows && !far && open[x * rows + y] {
-                    open[x * rows + y] = false;
-                    queue.push(x * rows + y);
+        self.groups(problem.lane_spacing_m, open)
+    }
+
+    fn groups(&self, lane_m: f64, mut open: Vec<bool>) -> Vec<Group> {
+        let per_lane = lane_m / self.pitch_m;
+        let least = (LEAST_SHARE * per_lane * per_lane).max(2.0);
+        let widest = GROUP_LANES * per_lane;
+        let (columns, rows) = (self.columns, self.rows);
+        let mut groups = Vec::new();
+        for first in 0..open.len() {
+            if !open[first] {
+                continue;
+            }
+            open[first] = false;
+            let (mut queue, mut points) = (vec![first], Vec::new());
+            while let Some(k) = queue.pop() {
+                let (i, j) = (k / rows, k % rows);
+                points.push(self.at(k));
+                let near = [
+                    (i.wrapping_sub(1), j),
+                    (i + 1, j),
+                    (i, j.wrapping_sub(1)),
+                    (i, j + 1),
+                ];
+                for (x, y) in near {
+                    let far =
+                        x.abs_diff(first / rows).max(y.abs_diff(first % rows)) as f64 > widest;
+                    if x < columns && y < rows && !far && open[x * rows + y] {
+                        open[x * rows + y] = false;
+                        queue.push(x * rows + y);
+                    }
                 }
             }
+            if points.len() as f64 >= least {
+                groups.push(Group { points, least });
+            }
         }
-        if points.len() as f64 >= least {
-            groups.push(Group { points, least });
-        }
+        groups
     }
-    groups
 }
 
 /// Passes over a group that can be flown to and from.
@@ -188,6 +231,11 @@ fn candidates(
                     from: at(u0 + ahead_m),
                     to: at((u1 - ahead_m).max(u0 + ahead_m + 1.0)),
                 };
+                // What is left of it sees no more.
+                let n = group.points.iter().filter(|q| sees(problem, &pass, **q));
+                if (n.count() as f64) < group.least {
+                    continue;
+                }
                 *tried += 1;
                 let open = clear_part(router, pass).filter(|p| is_open(p.from));
                 found.extend(open.and_then(|p| turnable_by(router, p, fineness)));

@@ -9,7 +9,7 @@ use super::planners::{Job, OpenArea, Part};
 use super::{Facts, Laid, Lanes, Planner, PlannerError, Shape, ShapeKind};
 use crate::fleet::sections::{self, Crew, Outcome, Uav, alike, evened, styles};
 use crate::flight::Flight;
-use crate::objective::Objective;
+use crate::objective::{Objective, Worth};
 use crate::team::PlannedUav;
 use skein_geometry::Polygon;
 
@@ -32,6 +32,8 @@ pub(crate) struct Care {
     pub steps: usize,
     /// Whether it is only compared with others.
     pub rough: bool,
+    /// A plan is wanted only if it may be better than this.
+    pub better_than: Option<Worth>,
 }
 
 /// What plans of a team are asked.
@@ -66,7 +68,8 @@ impl Desk<'_> {
         worth(a).beats(&worth(b), self.objective)
     }
 
-    /// Plans a team, with all lanes that were asked for.
+    /// Plans a team, with all lanes that were asked for; some of the plans may be left out that
+    /// are proved to be no better than what is to be beaten.
     ///
     /// # Errors
     /// When there is no plan.
@@ -79,7 +82,7 @@ impl Desk<'_> {
         let groups = alike(&swaths);
         let mut plans = Vec::new();
         if groups.len() < 2 || self.lanes != Lanes::Sections {
-            plans.push(self.common(team, care));
+            plans.extend(self.common(team, care).transpose());
         }
         if groups.len() > 1 && self.lanes != Lanes::Common {
             plans.extend(self.sections(team, &groups, care).map(Ok));
@@ -91,12 +94,17 @@ impl Desk<'_> {
     }
 
     /// One width for all.
-    fn common(&self, team: &[PlannedUav], care: Care) -> Result<Flights, PlannerError> {
+    fn common(&self, team: &[PlannedUav], care: Care) -> Result<Option<Flights>, PlannerError> {
         let part = self.part(&self.ground.request.area, team, care)?;
-        Ok(self.joined(Laid::Common, vec![part], care))
+        Ok(part.map(|part| self.joined(Laid::Common, vec![part], care)))
     }
 
-    fn part(&self, area: &Polygon, crew: &[PlannedUav], care: Care) -> Result<Part, PlannerError> {
+    fn part(
+        &self,
+        area: &Polygon,
+        crew: &[PlannedUav],
+        care: Care,
+    ) -> Result<Option<Part>, PlannerError> {
         let lane_m = crew.iter().map(|f| f.swath_m).fold(f64::INFINITY, f64::min);
         let turn_radius_m = crew.iter().map(|f| f.turn_radius_m).fold(0.0, f64::max);
         let job = Job {
@@ -107,6 +115,7 @@ impl Desk<'_> {
             steps: care.steps,
             in_watt_hours: self.in_watt_hours,
             rough: care.rough,
+            better_than: care.better_than,
         };
         self.ground.plan(self.planner, job)
     }
@@ -125,6 +134,7 @@ impl Desk<'_> {
         let rough = Care {
             steps: care.steps / EVENING_PART,
             rough: true,
+            better_than: None,
         };
         let (n, rounds) = if care.rough {
             (1, 1)
@@ -164,7 +174,12 @@ impl Desk<'_> {
                 times_s.push(0.0);
                 continue;
             };
-            let mut part = self.part(section, crew, care).ok()?;
+            // A section by itself may be worse than what is to be beaten.
+            let care = Care {
+                better_than: None,
+                ..care
+            };
+            let mut part = self.part(section, crew, care).ok()??;
             times_s.push(part.makespan_s() / part.done_share.max(LEAST_DONE));
             let kind = ShapeKind::Section {
                 number: parts.len() + 1,
@@ -193,16 +208,17 @@ impl Desk<'_> {
         } else {
             MOST_SAMPLES
         };
-        let sees = |p| parts.iter().any(|part| part.sees(p));
         let wanted = |p| self.ground.wants(p);
         let samples = Samples::new(&self.ground.request.area, wanted, lane_m, most);
-        let share = samples.share(sees);
-        let near = samples.share(|p| self.ground.is_too_near(p) && !sees(p));
+        let seen = parts.iter().filter_map(Part::seen);
+        let (share, near) = samples.shares(seen, |p| self.ground.is_too_near(p));
         let courses_left = parts.iter().map(|p| p.courses_left).max().unwrap_or(0);
         let mut facts: Option<Facts> = None;
+        let mut promises = Vec::new();
         let (mut flights, mut shapes): (Vec<Flight>, Vec<_>) = (Vec::new(), Vec::new());
         for part in parts {
             flights.extend(part.flights);
+            promises.extend(part.promises);
             shapes.extend(part.shapes);
             facts = match (facts, part.facts) {
                 (Some(all), Some(own)) => Some(all.and(own)),
@@ -223,6 +239,11 @@ impl Desk<'_> {
             facts,
             shapes,
             courses_left,
+            // Those of sections say nothing of all.
+            promises: match laid {
+                Laid::Common => promises,
+                Laid::Sections => Vec::new(),
+            },
         }
     }
 }

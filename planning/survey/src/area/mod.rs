@@ -6,15 +6,19 @@
 //! | `planners` | both planners behind one question: a part of the area, lanes of one width |
 //! | `flown_passes` | the exact planner: passes shared out, ordered and flown |
 //! | `courses` | the course of exact passes, searched by what they take |
+//! | `promise` | what flights over passes come to at best |
 //! | `gaps` | passes for what lanes leave unseen beside walls |
 //! | `crossing` | a second crossing at right angles to the first |
 //! | `cells` | the approximate planner: a region of lane cells for each UAV |
 //! | `lanes` | lanes for unlike swaths: one width for all, or a section for each crew |
 //! | `team_selection` | which UAVs of the team fly |
+//! | `sight` | which points passes see |
+//! | `at_once` | plans made at once, each in a thread |
 //! | `flights` | what a plan comes to, and the share that it sees |
 //!
 //! Leaves to others: files, and what a person is shown.
 
+mod at_once;
 mod cells;
 mod courses;
 mod crossing;
@@ -23,6 +27,8 @@ mod flown_passes;
 mod gaps;
 mod lanes;
 mod planners;
+mod promise;
+mod sight;
 mod team_selection;
 #[cfg(test)]
 mod tests;
@@ -78,9 +84,9 @@ pub struct AreaRequest {
     /// Heading of all exact passes, radians counter-clockwise from east; `None` for the
     /// best found by plans on courses all round.
     pub heading_rad: Option<f64>,
-    /// Whether every course of the search is planned in full also where that takes long, and
-    /// not only those that promise most when they are planned quickly.
-    pub every_course: bool,
+    /// Whether only those courses are planned in full that promise most when they are planned
+    /// quickly, and not all that may be best.
+    pub quick: bool,
     /// How far each pass runs out straight beyond both ends before a turn, where that is
     /// clear, metres: cameras and autopilots settle there.
     pub run_out_m: f64,
@@ -115,7 +121,7 @@ impl AreaRequest {
             clearance_m,
             look_ahead_m: None,
             heading_rad: None,
-            every_course: false,
+            quick: false,
             run_out_m: 0.0,
             wind_mps: Vector::zeros(),
             planners: Planners::Both,
@@ -397,6 +403,26 @@ pub enum PlannerError {
 /// [`AreaError`] when a figure of the request has no meaning, or no planner that is asked
 /// has a plan.
 pub fn plan(request: &AreaRequest) -> Result<AreaPlan, AreaError> {
+    plan_telling(request, &|_| {})
+}
+
+/// How far a search of courses is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Courses that are planned, or known to be no better.
+    pub courses_done: usize,
+    /// All that are looked at; more may follow.
+    pub courses: usize,
+}
+
+/// As [`plan`], and tells now and then how far it is.
+///
+/// # Errors
+/// As [`plan`].
+pub fn plan_telling(
+    request: &AreaRequest,
+    tell: &(dyn Fn(Progress) + Sync),
+) -> Result<AreaPlan, AreaError> {
     team::check(&request.team)?;
     for uav in &request.team {
         InWind::new(&[], uav.speed_mps, request.wind_mps)?;
@@ -404,6 +430,7 @@ pub fn plan(request: &AreaRequest) -> Result<AreaPlan, AreaError> {
     request.separation.check()?;
     let job = Job {
         request,
+        tell,
         in_watt_hours: in_watt_hours(&request.team, request.objective)?,
     };
     let chosen = job.planned()?;
@@ -413,6 +440,7 @@ pub fn plan(request: &AreaRequest) -> Result<AreaPlan, AreaError> {
 /// What is asked.
 struct Job<'a> {
     request: &'a AreaRequest,
+    tell: &'a (dyn Fn(Progress) + Sync),
     in_watt_hours: bool,
 }
 
@@ -481,7 +509,7 @@ impl Job<'_> {
     fn at_heights(&self, heights_m: &[f64]) -> Result<Chosen, AreaError> {
         let request = self.request;
         let uavs = self.taking_part(heights_m)?;
-        let ground = OpenArea::new(request, uavs.iter().map(|u| u.start))?;
+        let ground = OpenArea::new(request, self.tell, uavs.iter().map(|u| u.start))?;
         let mut plans: Vec<Flights> = Vec::new();
         let mut errors = Vec::new();
         for planner in [Planner::Exact, Planner::Approximate] {
@@ -552,7 +580,7 @@ impl Job<'_> {
         notices.extend(unseen(&best));
         if best.courses_left > 0 {
             notices.push(format!(
-                "{} courses were only looked at, not planned in full: that would take long",
+                "{} courses were only looked at, not planned in full: a quick plan was asked for",
                 best.courses_left
             ));
         }

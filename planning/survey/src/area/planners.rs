@@ -4,18 +4,20 @@
 //! Leaves to [`super::lanes`] which UAVs work on which part.
 
 use super::cells::{self, CellFlights, CellProblem};
-use super::courses::{self, Effort};
-use super::flights::{MOST_SAMPLES, Samples};
-use super::flown_passes::{FlownPasses, fly_layout, fly_team, fly_within};
+use super::courses::{self, Courses, Effort};
+use super::flights::{self, MOST_SAMPLES, Samples};
+use super::flown_passes::{FlownPasses, Ground, Laid, fly_within};
 use super::lanes::FEW_SAMPLES;
-use super::{AreaError, AreaRequest, Facts, Planner, PlannerError, Shape, ShapeKind};
+use super::promise::{Flyers, Promise};
+use super::sight::Footprint;
+use super::{AreaError, AreaRequest, Facts, Planner, PlannerError, Progress, Shape, ShapeKind};
 use crate::detours::{DetourError, Detours};
 use crate::flight::Flight;
 use crate::flown::{Air, Airspace};
 use crate::objective::Worth;
 use crate::passes;
 use crate::team::PlannedUav;
-use skein_flight::coverage::passes::{Directions, Layout, Pass, PassesError, PassesProblem};
+use skein_flight::coverage::passes::{Directions, Pass, PassesError, PassesProblem};
 use skein_geometry::frame::Point;
 use skein_geometry::offset::Zone;
 use skein_geometry::{NoFlyZones, Polygon};
@@ -31,8 +33,53 @@ const ENDURANCE_ROUNDS: usize = 3;
 pub(crate) struct OpenArea<'a> {
     /// What is asked.
     pub request: &'a AreaRequest,
+    /// Told how far a search is.
+    tell: &'a (dyn Fn(Progress) + Sync),
     airspace: Airspace,
     detours: Detours,
+}
+
+/// Plans of a part on one course after the other.
+struct CourseDesk<'a> {
+    open: &'a OpenArea<'a>,
+    job: Job<'a>,
+    ground: Ground<'a>,
+    flyers: Flyers,
+    /// Samples for plans that are only compared, and for others.
+    few: Samples,
+    all: Samples,
+}
+
+impl Courses for CourseDesk<'_> {
+    type Laid = Laid;
+
+    fn laid(&self, directions: Directions, effort: Effort) -> Result<Laid, PlannerError> {
+        let problem = self.open.passes_problem(&self.job, directions, effort);
+        Ok(self.ground.laid(&problem, effort.rounds > 1)?)
+    }
+
+    fn promise(&self, laid: &Laid) -> Promise {
+        let footprint = self.open.footprint(&self.job);
+        Promise::of(laid.passes(), &self.flyers, &self.all, footprint)
+    }
+
+    fn flown(&self, laid: Laid, effort: Effort) -> Result<Part, PlannerError> {
+        let problem = self
+            .open
+            .passes_problem(&self.job, Directions::Best, effort);
+        let plan = self.ground.flown(&problem, laid, effort.rounds)?;
+        Ok(self.open.part(&self.job, plan, self.ground.airs()))
+    }
+
+    fn worth(&self, part: &Part, effort: Effort) -> Worth {
+        let samples = if effort.is_full() {
+            &self.all
+        } else {
+            &self.few
+        };
+        let share = samples.share(part.seen().into_iter());
+        Worth::of(part.flights.iter(), share, self.job.in_watt_hours)
+    }
 }
 
 /// A part of the area, and who sees it.
@@ -52,6 +99,8 @@ pub(crate) struct Job<'a> {
     pub in_watt_hours: bool,
     /// Whether the plan is only compared with others: no courses are searched for it.
     pub rough: bool,
+    /// A plan is wanted only if it may be better than this.
+    pub better_than: Option<Worth>,
 }
 
 /// The flights over a part.
@@ -69,32 +118,27 @@ pub(crate) struct Part {
     pub work: u64,
     /// Courses that would have taken too long to plan in full.
     pub courses_left: usize,
+    /// What all courses promise that were looked at; none where some were not.
+    pub promises: Vec<Promise>,
     seen: Seen,
 }
 
-/// What of the ground is seen.
-#[derive(Default)]
-enum Seen {
-    #[default]
-    Nothing,
-    Passes {
-        passes: Vec<Pass>,
-        across_m: f64,
-        along_m: f64,
-    },
-}
+/// What of the ground is seen: from passes, and how far.
+type Seen = Option<(Vec<Pass>, Footprint)>;
 
 impl Part {
+    /// What of the ground is seen.
+    pub(crate) fn seen(&self) -> Option<flights::Seen<'_>> {
+        let (passes, footprint) = self.seen.as_ref()?;
+        Some((passes, *footprint))
+    }
+
     /// Whether a point is seen.
-    pub(crate) fn sees(&self, p: Point) -> bool {
-        match &self.seen {
-            Seen::Nothing => false,
-            Seen::Passes {
-                passes,
-                across_m,
-                along_m,
-            } => passes.iter().any(|pass| pass.sees(p, *across_m, *along_m)),
-        }
+    fn sees(&self, p: Point) -> bool {
+        self.seen()
+            .is_some_and(|(passes, Footprint { across_m, along_m })| {
+                passes.iter().any(|pass| pass.sees(p, across_m, along_m))
+            })
     }
 
     /// When its last UAV is back, seconds.
@@ -110,6 +154,7 @@ impl<'a> OpenArea<'a> {
     /// When the clearance is no length, or a fence has no outside.
     pub(crate) fn new(
         request: &'a AreaRequest,
+        tell: &'a (dyn Fn(Progress) + Sync),
         starts: impl Iterator<Item = Point>,
     ) -> Result<Self, AreaError> {
         let starts: Vec<Point> = starts.collect();
@@ -119,6 +164,7 @@ impl<'a> OpenArea<'a> {
         let keep_m = airspace.clearance_m();
         Ok(Self {
             request,
+            tell,
             detours: detours(&request.area, airspace.zones(), keep_m, starts.into_iter())?,
             airspace,
         })
@@ -135,57 +181,69 @@ impl<'a> OpenArea<'a> {
         self.airspace.zones().distance_m(p) < self.airspace.clearance_m()
     }
 
-    /// Plans a part.
+    /// Plans a part; none where no plan can be better than what is to be beaten.
     ///
     /// # Errors
     /// When there is no plan.
-    pub(crate) fn plan(&self, planner: Planner, job: Job<'_>) -> Result<Part, PlannerError> {
+    pub(crate) fn plan(
+        &self,
+        planner: Planner,
+        job: Job<'_>,
+    ) -> Result<Option<Part>, PlannerError> {
         match planner {
-            Planner::Exact => match self.request.heading_rad {
-                Some(heading_rad) => self.exact(job, Directions::Fixed(heading_rad), Effort::FULL),
-                None if job.rough => self.exact(job, Directions::Best, Effort::FULL),
-                None => self.on_best_course(job),
+            Planner::Exact => match self.exact(job) {
+                // A section that zones and holes fill is no work.
+                Err(PlannerError::Passes(PassesError::Nothing))
+                    if job.area != &self.request.area =>
+                {
+                    Ok(Some(self.at_home(&job)))
+                }
+                plan => plan,
             },
-            Planner::Approximate => self.approximate(job),
+            Planner::Approximate => self.approximate(job).map(Some),
         }
     }
 
-    /// Passes on the course that is best when they are flown.
-    fn on_best_course(&self, job: Job<'_>) -> Result<Part, PlannerError> {
-        let fly = |directions, effort| self.exact(job, directions, effort);
+    /// Straight passes on the course that is asked for, or the one that is best when they are
+    /// flown.
+    fn exact(&self, job: Job<'_>) -> Result<Option<Part>, PlannerError> {
+        let problem = self.passes_problem(&job, Directions::Best, Effort::FULL);
+        let (crew, airs) = (crew_of(&job), self.airs(&job));
+        let ground = Ground::new(&problem, &crew, &airs, self.request.run_out_m)?;
         let wants = |p| self.wants(p);
-        let few = Samples::new(job.area, wants, job.lane_m, FEW_SAMPLES);
-        let all = Samples::new(job.area, wants, job.lane_m, MOST_SAMPLES);
-        let worth = |part: &Part, effort: Effort| {
-            let samples = if effort.is_full() { &all } else { &few };
-            let share = samples.share(|p| part.sees(p));
-            Worth::of(part.flights.iter(), share, job.in_watt_hours)
+        let samples = |most| Samples::new(job.area, wants, job.lane_m, most);
+        let desk = CourseDesk {
+            open: self,
+            job,
+            flyers: ground.flyers(),
+            ground,
+            few: samples(FEW_SAMPLES),
+            all: samples(MOST_SAMPLES),
         };
         let asked = courses::Asked {
             objective: self.request.objective,
             steps: job.steps,
-            every: self.request.every_course,
+            quick: self.request.quick,
+            better_than: job.better_than,
+            tell: self.tell,
         };
-        courses::best(job.area, asked, fly, worth)
-    }
-
-    fn exact(
-        &self,
-        job: Job<'_>,
-        directions: Directions,
-        effort: Effort,
-    ) -> Result<Part, PlannerError> {
-        let problem = self.passes_problem(&job, directions, effort);
-        let airs = self.airs(&job);
-        let run_out_m = self.request.run_out_m;
-        let plan = match fly_team(&problem, &crew_of(&job), &airs, effort.rounds, run_out_m) {
-            // A section that zones and holes fill is no work.
-            Err(PassesError::Nothing) if job.area != &self.request.area => {
-                return Ok(self.at_home(&job));
-            }
-            plan => plan?,
+        let one = match self.request.heading_rad {
+            Some(heading_rad) => Directions::Fixed(heading_rad),
+            None if job.rough => Directions::Best,
+            None => return courses::best(job.area, asked, &desk),
         };
-        Ok(self.part(&job, plan, &airs))
+        let laid = desk.laid(one, Effort::FULL)?;
+        let promise = desk.promise(&laid);
+        if let Some(worth) = &job.better_than
+            && !promise.may_be_better(worth, asked.objective)
+        {
+            return Ok(None);
+        }
+        let part = desk.flown(laid, Effort::FULL)?;
+        Ok(Some(Part {
+            promises: vec![promise],
+            ..part
+        }))
     }
 
     fn passes_problem(
@@ -212,6 +270,13 @@ impl<'a> OpenArea<'a> {
 
     fn look_ahead_m(&self, job: &Job<'_>) -> f64 {
         self.request.look_ahead_m.unwrap_or(job.lane_m / 2.0)
+    }
+
+    fn footprint(&self, job: &Job<'_>) -> Footprint {
+        Footprint {
+            across_m: job.lane_m / 2.0,
+            along_m: self.look_ahead_m(job),
+        }
     }
 
     /// By UAV: what it flies through.
@@ -261,11 +326,8 @@ impl<'a> OpenArea<'a> {
             shapes: shapes.collect(),
             work: plan.work,
             courses_left: 0,
-            seen: Seen::Passes {
-                passes,
-                across_m: job.lane_m / 2.0,
-                along_m: self.look_ahead_m(job),
-            },
+            promises: Vec::new(),
+            seen: Some((passes, self.footprint(job))),
         }
     }
 
@@ -284,7 +346,7 @@ impl<'a> OpenArea<'a> {
         };
         let samples = Samples::new(job.area, |p| self.wants(p), job.lane_m, MOST_SAMPLES);
         let worth = |part: &Part| {
-            let share = samples.share(|p| part.sees(p));
+            let share = samples.share(part.seen().into_iter());
             Worth::of(part.flights.iter(), share, job.in_watt_hours)
         };
         let sooner = worth(&by_pass).beats(&worth(&by_cell), self.request.objective);
@@ -361,11 +423,7 @@ impl<'a> OpenArea<'a> {
         let part = Part {
             flights,
             done_share: covered * seen_m / f64::max(wanted_m, f64::MIN_POSITIVE),
-            seen: Seen::Passes {
-                passes: seen,
-                across_m: job.lane_m / 2.0,
-                along_m: self.look_ahead_m(job),
-            },
+            seen: Some((seen, self.footprint(job))),
             ..Part::default()
         };
         of_cells(part, job, cells, cells.left.clone())
@@ -374,20 +432,12 @@ impl<'a> OpenArea<'a> {
     /// The passes over all cells, and such that see what no cell does, shared out and ordered
     /// by what they take when they are flown.
     fn pass_by_pass(&self, job: &Job<'_>, cells: &CellFlights) -> Result<Part, PlannerError> {
-        let effort = Effort::FULL;
-        let problem = self.passes_problem(job, Directions::Best, effort);
+        let problem = self.passes_problem(job, Directions::Best, Effort::FULL);
         let passes = cells.passes.iter().flatten().copied().collect();
-        let layout = Layout::of_passes(&problem, passes)?;
-        let airs = self.airs(job);
-        let run_out_m = self.request.run_out_m;
-        let plan = fly_layout(
-            &problem,
-            layout,
-            &crew_of(job),
-            &airs,
-            effort.rounds,
-            run_out_m,
-        )?;
+        let (crew, airs) = (crew_of(job), self.airs(job));
+        let ground = Ground::new(&problem, &crew, &airs, self.request.run_out_m)?;
+        let laid = ground.laid_before(&problem, passes)?;
+        let plan = ground.flown(&problem, laid, Effort::FULL.rounds)?;
         let part = self.part(job, plan, &airs);
         let left = cells.left.iter().filter(|p| !part.sees(**p));
         let left = left.copied().collect();

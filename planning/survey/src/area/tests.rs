@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::flight::Leg;
+use crate::objective::lacks;
 use crate::team::Sensor;
 use core::f64::consts::PI;
 use proptest::prelude::*;
@@ -345,6 +346,47 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(6))]
+
+    /// Few lanes for many: who shares them is in the way of others.
+    #[test]
+    fn more_uavs_are_never_slower(
+        size in (150.0..500.0f64, 120.0..300.0f64),
+        start in (-300.0..0.0f64, -100.0..300.0f64),
+        course in prop::option::of(0.0..PI),
+        needle in any::<bool>(),
+        narrow in any::<bool>(),
+    ) {
+        let zone = polygon(&[(60.0, 50.0), (90.0, 55.0), (75.0, 95.0)]);
+        let one = |i: usize| {
+            let width_m = if narrow && i == 1 { 40.0 } else { 60.0 };
+            Uav { start: Point::new(start.0, start.1), ..uav(&format!("u{i}"), swath(width_m)) }
+        };
+        let all: Vec<Uav> = (0..5).map(one).collect();
+        for planner in PLANNERS {
+            let mut before: Vec<Figures> = Vec::new();
+            for k in 1..=all.len() {
+                let asked = AreaRequest {
+                    zones: Arc::new(NoFlyZones::new(vec![zone.clone(); usize::from(needle)])),
+                    heading_rad: course.filter(|_| planner == Planner::Exact),
+                    steps: 60,
+                    ..request(rectangle(size.0, size.1), &all[..k], planner)
+                };
+                let own = planned(&asked).figures;
+                for (i, fewer) in before.iter().enumerate() {
+                    let as_much = fewer.covered_share >= own.covered_share;
+                    prop_assert!(
+                        !as_much || own.makespan_s <= fewer.makespan_s * (1.0 + 1e-9),
+                        "{planner:?}, {k} UAVs: {own:?} after {} with {fewer:?}", i + 1
+                    );
+                }
+                before.push(own);
+            }
+        }
+    }
+}
+
 #[test]
 fn no_course_that_is_asked_for_is_flown_sooner() {
     let area = polygon(&[(0.0, 0.0), (420.0, 60.0), (380.0, 260.0), (-40.0, 200.0)]);
@@ -369,13 +411,12 @@ fn no_course_that_is_asked_for_is_flown_sooner() {
 }
 
 #[test]
-fn when_every_course_is_planned_none_is_better() {
+fn among_needles_no_course_is_better() {
     let area = polygon(&[(0.0, 0.0), (420.0, 60.0), (380.0, 260.0), (-40.0, 200.0)]);
     let needle = |x: f64| polygon(&[(x, 60.0), (x + 4.0, 60.0), (x + 30.0, 170.0)]);
     let team = ["a", "b"].map(|name| uav(name, swath(45.0)));
     let free = AreaRequest {
         zones: Arc::new(NoFlyZones::new(vec![needle(120.0), needle(230.0)])),
-        every_course: true,
         steps: 200,
         ..request(area, &team, Planner::Exact)
     };
@@ -390,5 +431,28 @@ fn when_every_course_is_planned_none_is_better() {
             own.covered_share < found.covered_share || own.makespan_s >= found.makespan_s,
             "{i}: {own:?} {found:?}"
         );
+    }
+}
+
+#[test]
+fn a_quick_plan_says_what_it_left() {
+    let team = [uav("a", swath(30.0))];
+    let needle = |x: f64| polygon(&[(x, 160.0), (x + 4.0, 160.0), (x + 30.0, 270.0)]);
+    let asked = |quick| AreaRequest {
+        zones: Arc::new(NoFlyZones::new(vec![needle(120.0), needle(430.0)])),
+        quick,
+        ..request(rectangle(900.0, 700.0), &team, Planner::Exact)
+    };
+    let said = |plan: &AreaPlan| plan.notices.iter().any(|n| n.contains("a quick plan"));
+    let (quick, full) = (planned(&asked(true)), planned(&asked(false)));
+    assert!(said(&quick) && !said(&full), "{:?}", quick.notices);
+    assert!(!quick.figures.beats(&full.figures), "{quick:?} {full:?}");
+}
+
+impl Figures {
+    /// Whether it sees more, or as much sooner.
+    fn beats(&self, other: &Self) -> bool {
+        let (own, others) = (lacks(self.covered_share), lacks(other.covered_share));
+        own < others || (own == others && self.makespan_s < other.makespan_s - 1e-6)
     }
 }

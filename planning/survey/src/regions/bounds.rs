@@ -6,6 +6,7 @@
 
 mod gates;
 mod pairs;
+mod sides;
 
 use super::map::UNREACHED;
 use super::plan::Task;
@@ -53,8 +54,8 @@ pub fn reach_moves(task: &Task) -> u32 {
 }
 
 /// No plan for equal UAVs has a shorter longest path, in moves: the greatest of
-/// [`reach_moves`], the bound of narrow places and the bound of cells that are no
-/// neighbours.
+/// [`reach_moves`], the bound of narrow places, the bound of sides and the bound of cells that
+/// are no neighbours.
 ///
 /// # Guarantees
 /// At most the optimum, open or closed as the task says; speeds and endurance are left
@@ -77,7 +78,8 @@ pub fn least_moves(task: &Task) -> u32 {
         (2 * visits).saturating_sub(2)
     };
     let paired = u32::try_from(paired).unwrap_or(u32::MAX);
-    let moves = gates::Gates::new(task).least(reach.max(paired));
+    let sides = u32::try_from(sides::moves(task)).unwrap_or(u32::MAX);
+    let moves = gates::Gates::new(task).least(reach.max(paired).max(sides));
     // A closed walk on a grid has as many moves east as west, north as south.
     moves + u32::from(task.closed && moves % 2 == 1)
 }

@@ -11,7 +11,7 @@ use super::plan::{Plan, Task};
 use super::root_distances::Home;
 use super::search::{PACE, Search};
 use super::spanning::{Tree, best_offset, region_loops};
-use super::{bounds, corridor_first};
+use super::{bounds, corridor_first, loop_arcs};
 use std::sync::Arc;
 
 /// Steps in a round: between two of them the aim is set anew and the caller may stop.
@@ -41,6 +41,10 @@ const TRY: usize = 6 * ROUND;
 
 /// A first plan that takes this many times as long as the other one is not tried.
 const OUT_OF_REACH: i64 = 2;
+
+/// First plans that take more than so many hundredths of what any takes at least, seen from
+/// the ways alone, are far from even: then UAVs are sent far, too.
+const UNEVEN: i64 = 125;
 
 /// Steps by default.
 pub const STEPS: usize = 2 * TRY + 2 * FIRST_COOLING;
@@ -107,18 +111,24 @@ impl<'a> Improver<'a> {
             .into_iter()
             .map(|orders| Search::with(task, Arc::clone(&home), orders))
             .collect();
-        firsts.sort_by_key(Search::score);
-        let search = firsts.remove(0);
-        let least = search.makespan();
-        firsts.retain(|s| s.makespan() < least * OUT_OF_REACH);
-        let best = search.orders().to_vec();
-        let best_score = search.score();
         let equal = task.speeds.iter().all(|v| *v == task.speeds[0]);
         let bound = if equal {
             i64::from(bounds::reach_moves(task)) * PACE
         } else {
             0
         };
+        let soonest = firsts.iter().map(Search::makespan).min();
+        if soonest.is_none_or(|m| m > bound / 100 * UNEVEN)
+            && let Some(orders) = loop_arcs::orders(task, &home)
+        {
+            firsts.push(Search::with(task, Arc::clone(&home), orders));
+        }
+        firsts.sort_by_key(Search::score);
+        let search = firsts.remove(0);
+        let least = search.makespan();
+        firsts.retain(|s| s.makespan() < least * OUT_OF_REACH);
+        let best = search.orders().to_vec();
+        let best_score = search.score();
         firsts.reverse();
         Self {
             task,

@@ -11,6 +11,7 @@
 //! | `loop_repair` | cells that a loop leaves out, brought together so that they cost nothing |
 //! | [`partition`] | a connected region for each UAV |
 //! | [`corridor_first`] | work for UAVs that begin close together, farthest first |
+//! | `loop_arcs` | work for UAVs of whom many have to fly far: arcs of one loop |
 //! | [`search`] | local search over the orders of cells |
 //! | [`improve`] | the default planner |
 //! | [`raster`] | which cells an area becomes |
@@ -21,6 +22,7 @@ pub mod bounds;
 pub mod corridor_first;
 pub mod improve;
 mod insertion;
+mod loop_arcs;
 mod loop_repair;
 pub mod map;
 pub mod partition;

@@ -10,7 +10,7 @@
 //! Left to others: which pieces may pass, which regions are settled anew, the path through
 //! a region, and the balance of single cells.
 
-mod assign;
+pub(super) mod assign;
 mod border_moves;
 mod resettle;
 

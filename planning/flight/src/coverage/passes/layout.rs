@@ -16,6 +16,7 @@ use super::{
 use skein_geometry::frame::Point;
 use skein_geometry::math::PI;
 use skein_geometry::offset::{Growth, Region, Zone, grow};
+use std::sync::Arc;
 
 /// What lanes keep beyond the clearance, so that their ends are outside of the outlines
 /// that the ways between them go round, metres.
@@ -46,8 +47,48 @@ pub struct Layout {
     pub pocket_passes: usize,
     /// What is to be seen, square metres.
     pub area_m2: f64,
-    /// The zones grown by the clearance.
-    zones: Vec<Region>,
+    zones: GrownZones,
+}
+
+/// The zones of an area grown by the clearance: the same however passes are laid among them.
+#[derive(Clone, Debug)]
+pub struct GrownZones {
+    /// With what lanes keep beyond the clearance: what lanes are laid among.
+    outlines: Arc<[Region]>,
+    /// By the clearance alone: what ways lead round.
+    zones: Arc<[Region]>,
+}
+
+impl GrownZones {
+    /// Grows the zones of a problem; its directions do not matter.
+    ///
+    /// # Errors
+    /// [`PassesError`] when a figure of the problem is not usable, or zones cannot be grown.
+    pub fn new(problem: &PassesProblem) -> Result<Self, PassesError> {
+        problem.check()?;
+        let grown = |more_m| {
+            let zones: Vec<Zone> = problem.zones.zones().iter().map(Zone::from).collect();
+            let growth = Growth::new(problem.clearance_m + more_m)?.with_overshoot(OVERSHOOT)?;
+            Ok::<_, PassesError>(Arc::from(grow(&zones, &growth)?.regions))
+        };
+        Ok(Self {
+            outlines: grown(GAP_M)?,
+            zones: grown(0.0)?,
+        })
+    }
+
+    /// The ways round them between launch points and places within `reach_m` of the origin.
+    ///
+    /// # Errors
+    /// [`PassesError::Launch`] when a launch point lies in a grown zone.
+    pub fn ways(&self, launches: &[Point], reach_m: f64) -> Result<Ways, PassesError> {
+        let inside = |p: &Point| self.zones.iter().any(|z| z.contains(*p));
+        if launches.iter().any(inside) {
+            return Err(PassesError::Launch);
+        }
+        let reaches = launches.iter().map(|p| p.coords.amax());
+        Ok(Ways::new(&self.zones, reaches.fold(reach_m, f64::max)))
+    }
 }
 
 /// The borders of an area in the plane.
@@ -228,9 +269,16 @@ impl Layout {
     /// # Errors
     /// [`PassesError`]; nothing is laid out then.
     pub fn new(problem: &PassesProblem) -> Result<Self, PassesError> {
+        Self::among(problem, &GrownZones::new(problem)?)
+    }
+
+    /// As [`Layout::new`], with the zones of the problem grown already.
+    ///
+    /// # Errors
+    /// [`PassesError`]; nothing is laid out then.
+    pub fn among(problem: &PassesProblem, zones: &GrownZones) -> Result<Self, PassesError> {
         problem.check()?;
-        let outlines = grown(problem, GAP_M)?;
-        let borders = Borders::new(problem, &outlines);
+        let borders = Borders::new(problem, &zones.outlines);
         let measures = problem.measures();
         let mut best: Option<(f64, Draft)> = None;
         let mut offer = |draft: Draft| {
@@ -278,23 +326,22 @@ impl Layout {
         if draft.passes.is_empty() {
             return Err(PassesError::Nothing);
         }
-        Self::assemble(draft, grown(problem, 0.0)?)
+        Self::assemble(draft, zones)
     }
 
     /// Passes that were laid in another way, among the same zones.
     ///
     /// # Errors
     /// [`PassesError`], as for passes that are laid here; there may be none.
-    pub fn of_passes(problem: &PassesProblem, passes: Vec<Pass>) -> Result<Self, PassesError> {
-        problem.check()?;
+    pub fn of_passes(zones: &GrownZones, passes: Vec<Pass>) -> Result<Self, PassesError> {
         let draft = Draft {
             passes,
             ..Draft::default()
         };
-        Self::assemble(draft, grown(problem, 0.0)?)
+        Self::assemble(draft, zones)
     }
 
-    fn assemble(draft: Draft, zones: Vec<Region>) -> Result<Self, PassesError> {
+    fn assemble(draft: Draft, zones: &GrownZones) -> Result<Self, PassesError> {
         let Draft {
             passes,
             cells,
@@ -308,7 +355,7 @@ impl Layout {
             area_m2: cells.iter().map(|c| c.area_m2).sum(),
             cells,
             pocket_passes: extra,
-            zones,
+            zones: zones.clone(),
         })
     }
 
@@ -317,25 +364,10 @@ impl Layout {
     /// # Errors
     /// [`PassesError::Launch`] when a launch point lies in a grown zone.
     pub fn ways(&self, launches: &[Point]) -> Result<Ways, PassesError> {
-        if launches
-            .iter()
-            .any(|p| self.zones.iter().any(|z| z.contains(*p)))
-        {
-            return Err(PassesError::Launch);
-        }
         let ends = self.passes.iter().flat_map(|p| [p.from, p.to]);
-        let reach_m = ends
-            .chain(launches.iter().copied())
-            .map(|p| p.coords.amax())
-            .fold(0.0, f64::max);
-        Ok(Ways::new(&self.zones, reach_m))
+        let reach_m = ends.map(|p| p.coords.amax()).fold(0.0, f64::max);
+        self.zones.ways(launches, reach_m)
     }
-}
-
-fn grown(problem: &PassesProblem, more_m: f64) -> Result<Vec<Region>, PassesError> {
-    let zones: Vec<Zone> = problem.zones.zones().iter().map(Zone::from).collect();
-    let growth = Growth::new(problem.clearance_m + more_m)?.with_overshoot(OVERSHOOT)?;
-    Ok(grow(&zones, &growth)?.regions)
 }
 
 /// The headings with the least altitudes.

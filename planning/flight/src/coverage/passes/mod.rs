@@ -42,7 +42,7 @@ use crate::coverage::lines::{self, Line, LineError, Uav};
 use crate::coverage::metric::Matrix;
 pub use cells::Decomposition;
 pub use direction::{altitudes_m, sweep_directions};
-pub use layout::{Layout, SHIFTS};
+pub use layout::{GrownZones, Layout, SHIFTS};
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::atan2;
 use skein_geometry::offset::OffsetError;

@@ -11,7 +11,7 @@
 ///
 /// # Complexity
 /// O(n³).
-pub(super) fn assign(n: usize, cost: impl Fn(usize, usize) -> i64) -> Vec<usize> {
+pub(in crate::regions) fn assign(n: usize, cost: impl Fn(usize, usize) -> i64) -> Vec<usize> {
     // Row and column n stand for "none" at the beginning of a way.
     let mut row_price = vec![0i64; n + 1];
     let mut col_price = vec![0i64; n + 1];
