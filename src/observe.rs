@@ -188,6 +188,8 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Finished(b) => serde_json::to_value(b),
         Body::Heartbeat(b) => serde_json::to_value(b),
         Body::Lacking(b) => serde_json::to_value(b),
+        Body::Task(b) => serde_json::to_value(b),
+        Body::Bundle(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -260,6 +262,19 @@ fn words(body: &Body) -> String {
             "lacks {} pieces of mission revision {}",
             l.pieces.iter().map(|b| b.count_ones()).sum::<u32>(),
             l.revision
+        ),
+        Body::Task(t) => format!(
+            "asks for a {:?}, revision {}{}, worth {}",
+            t.kind,
+            t.revision,
+            if t.cancelled { ", cancelled" } else { "" },
+            t.worth
+        ),
+        Body::Bundle(b) => format!(
+            "holds {} tasks, {} of them since before its offer; {} done before",
+            b.tasks.len(),
+            b.kept,
+            b.done.len()
         ),
     }
 }

@@ -21,6 +21,7 @@ use super::message::{
     State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
+use super::tasks::{Bundle, Task};
 use crate::varint;
 
 /// Largest envelope around a body: heads and numbers at their longest, 23 bytes, and
@@ -83,6 +84,8 @@ pub enum Body {
     Finished(Finished),
     Heartbeat(Heartbeat),
     Lacking(Lacking),
+    Task(Task),
+    Bundle(Bundle),
 }
 
 impl Body {
@@ -100,6 +103,8 @@ impl Body {
             Self::Finished(_) => Kind::Finished,
             Self::Heartbeat(_) => Kind::Heartbeat,
             Self::Lacking(_) => Kind::Lacking,
+            Self::Task(_) => Kind::Task,
+            Self::Bundle(_) => Kind::Bundle,
         }
     }
 
@@ -131,6 +136,8 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Finished(b) => b.put(&mut out),
         Body::Heartbeat(b) => b.put(&mut out),
         Body::Lacking(b) => b.put(&mut out),
+        Body::Task(b) => b.put(&mut out),
+        Body::Bundle(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -161,7 +168,9 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Finished => Body::Finished(Wire::get(&mut input)?),
         Kind::Heartbeat => Body::Heartbeat(Wire::get(&mut input)?),
         Kind::Lacking => Body::Lacking(Wire::get(&mut input)?),
-        Kind::Event | Kind::Task | Kind::Intent | Kind::Conflict => {
+        Kind::Task => Body::Task(Wire::get(&mut input)?),
+        Kind::Bundle => Body::Bundle(Wire::get(&mut input)?),
+        Kind::Event | Kind::Intent | Kind::Conflict => {
             return Err(WireError::Kind {
                 number: kind.number(),
             });

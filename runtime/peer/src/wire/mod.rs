@@ -10,3 +10,4 @@ pub mod message;
 pub(crate) mod samples;
 pub mod schema;
 pub mod signature;
+pub mod tasks;

@@ -43,7 +43,7 @@ pub struct Place {
     pub shape: Shape,
 }
 
-const fn at(name: &'static str, what: &'static str, shape: Shape) -> Place {
+pub(super) const fn at(name: &'static str, what: &'static str, shape: Shape) -> Place {
     Place { name, what, shape }
 }
 
@@ -383,7 +383,9 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Finished => Some(FINISHED),
         Kind::Heartbeat => Some(HEARTBEAT),
         Kind::Lacking => Some(LACKING),
-        Kind::Event | Kind::Task | Kind::Intent | Kind::Conflict => None,
+        Kind::Task => Some(super::tasks::TASK),
+        Kind::Bundle => Some(super::tasks::BUNDLE),
+        Kind::Event | Kind::Intent | Kind::Conflict => None,
     }
 }
 
