@@ -399,11 +399,16 @@ impl Auction {
         let spent = self.free
             && !self.settled.unassigned.is_empty()
             && held.all(|t| t.progress > Progress::Tentative);
-        if self.stale || ((changed || spent) && has_acted(&self.own)) {
+        let anew = self.stale || ((changed || spent) && has_acted(&self.own));
+        if anew {
             self.offer_anew();
         }
         let basis = self.basis();
         if basis == self.own.basis {
+            // The offer may be new and the same as before: what was won stays won.
+            if anew {
+                self.list_won();
+            }
             return;
         }
         self.quiet = 0;
