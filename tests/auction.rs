@@ -10,6 +10,8 @@
 //! exchanges all agree, no two who live hold one task, every task is held, and when the UAVs
 //! then fly on every task gets done. So there is no way into a livelock.
 //!
+//! With three UAVs only the 20,000 states nearest to the beginning are looked at.
+//!
 //! These bounds are real: so many acts of each UAV, one trouble, one change of a task, and of
 //! each author's bundles the two newest can still arrive.
 
@@ -24,7 +26,7 @@ use std::collections::{BTreeMap, BTreeSet};
 const ON_AIR: usize = 2;
 
 /// Exchanges of everybody with everybody after which all must agree.
-const EXCHANGES: usize = 8;
+const EXCHANGES: usize = 16;
 
 /// What a UAV gains by a task, less the more it did before.
 struct Worth(&'static [&'static [u32]]);
@@ -389,8 +391,10 @@ impl Model for Case {
     }
 }
 
-fn search(case: Case, states: usize) {
-    let checker = case.checker().threads(2).spawn_bfs().join();
+/// Searches all states there are, or so many, the nearest to the beginning first.
+fn search(case: Case, states: usize, most: usize) {
+    let checker = case.checker().threads(2).target_state_count(most);
+    let checker = checker.spawn_bfs().join();
     checker.assert_properties();
     let found = checker.unique_state_count();
     assert!(found >= states, "only {found} states");
@@ -400,24 +404,24 @@ fn search(case: Case, states: usize) {
 fn two_share_three_tasks_while_one_is_cut_off() {
     let case = Case {
         worth: Worth(&[&[10, 8, 6], &[9, 9, 3]]),
-        asks: 2,
+        asks: 1,
         cut: true,
         crash: false,
         change: false,
     };
-    search(case, 5_000);
+    search(case, 10_000, 1_000_000);
 }
 
 #[test]
 fn two_share_two_tasks_of_which_one_changes_and_one_uav_crashes() {
     let case = Case {
         worth: Worth(&[&[10, 8], &[9, 9]]),
-        asks: 2,
+        asks: 1,
         cut: false,
         crash: true,
         change: true,
     };
-    search(case, 5_000);
+    search(case, 10_000, 1_000_000);
 }
 
 #[test]
@@ -429,5 +433,5 @@ fn three_of_whom_one_crashes_and_only_two_can_do_the_second_task() {
         crash: true,
         change: false,
     };
-    search(case, 5_000);
+    search(case, 20_000, 20_000);
 }
