@@ -5,8 +5,8 @@ use super::settlement::{Desk, Flying, Place, Plan};
 use crate::wire::tasks::TaskId;
 use skein_geometry::random::SplitMix64;
 
-/// Steps of flying that an improvement may try, all exchanges together: some hundredths of a
-/// second of a companion computer.
+/// Steps of flying that an improvement may try, all exchanges together: beyond eight tasks it is
+/// what bounds them.
 pub const STEPS_MAX: u64 = 100_000;
 
 /// So often tasks are taken out and put back: with ten tasks more finds nothing better.

@@ -37,7 +37,7 @@
 //! # Guarantees
 //! - Once nothing changes and everything has arrived, all bases are equal, so that no two
 //!   living peers list one task, every task that somebody can do is listed, and the value is
-//!   at least that of sequential greedy. `tests/auction.rs` searches that exhaustively.
+//!   at least that of sequential greedy. `tests/auction.rs` searches for ways out of that.
 //! - Committing, beginning and finishing do not change the settlement: it rests on offers,
 //!   which stay as they are. So an owner changes only after a failure or another task.
 //!
