@@ -191,6 +191,8 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Lacking(b) => serde_json::to_value(b),
         Body::Intent(b) => serde_json::to_value(b),
         Body::Conflict(b) => serde_json::to_value(b),
+        Body::Task(b) => serde_json::to_value(b),
+        Body::Bundle(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -270,6 +272,19 @@ fn words(body: &Body) -> String {
             &i.accepts,
         ),
         Body::Conflict(b) => promises(b.in_force, b.proposal, &b.accepts),
+        Body::Task(t) => format!(
+            "asks for a {:?}, revision {}{}, worth {}",
+            t.kind,
+            t.revision,
+            if t.cancelled { ", cancelled" } else { "" },
+            t.worth
+        ),
+        Body::Bundle(b) => format!(
+            "holds {} tasks, {} of them since before its offer; {} done before",
+            b.tasks.len(),
+            b.kept,
+            b.done.len()
+        ),
     }
 }
 

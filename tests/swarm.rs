@@ -7,6 +7,7 @@
 )]
 
 mod architecture;
+mod auction;
 mod configs;
 mod d27;
 mod documents;

@@ -16,12 +16,13 @@
 //! | [`live_world`] | the world and its radio links, as a trial uses them |
 //! | [`stream`] | percepts and setpoints, one loopback stream a peer |
 //! | [`proxy`] | one transport, which can go dark |
-//! | [`encounters`] | many encounters at once, without a trial |
+//! | [`encounters`], [`auctions`] | many encounters, or task auctions, at once, without a trial; `seeds` runs them on all threads |
 //! | [`process`] | processes, and the guard that leaves none behind |
 //! | [`control`], [`registry`] | how other commands find a trial and talk to it |
 //! | [`pacer`] | scenario time against wall time |
 //! | [`batch`] | many simulated runs at the same time |
 
+pub mod auctions;
 pub mod batch;
 pub mod config;
 pub mod control;
@@ -35,6 +36,7 @@ mod peers;
 pub mod process;
 pub mod proxy;
 pub mod registry;
+mod seeds;
 pub mod stream;
 mod transports;
 pub mod trial;

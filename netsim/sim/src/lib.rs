@@ -13,6 +13,7 @@
 //! | [`prepared`] | what all runs of a scenario share |
 //! | [`runs`] | runs with the scenario's own faults, with drawn ones, without any |
 //! | [`swarm`] | peers, world and radio under one virtual clock |
+//! | [`auctions`] | UAVs that share tasks, over a channel of rounds |
 //! | [`encounters`] | UAVs at one height that would meet |
 //! | [`account`] | who took over what, when, and the verdict: one judge for simulated and live runs |
 //! | `check` | what must hold, judged while a run goes on |
@@ -23,6 +24,7 @@
 //! | [`summary`] | what many runs come to |
 
 pub mod account;
+pub mod auctions;
 mod check;
 pub mod disk;
 pub mod encounters;

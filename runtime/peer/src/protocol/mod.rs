@@ -5,9 +5,10 @@
 //! written into a claim, [`rounds`] the exchange of bids, `negotiation` when each
 //! is used, [`division`] what a complete round decides, `sharing` what is taken without
 //! one, [`launches`] what everybody begins with. [`promises`] holds the rule by which committed
-//! motions change, [`conflict`] which one is asked for. What travels is `relay`'s, and how much of it [`airtime`]'s.
+//! motions change, [`conflict`] which one is asked for. Tasks other than coverage are [`auction`]'s. What travels is `relay`'s, and how much of it [`airtime`]'s.
 
 pub mod airtime;
+pub mod auction;
 pub mod conflict;
 pub mod division;
 pub mod launches;

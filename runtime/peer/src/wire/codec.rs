@@ -21,6 +21,7 @@ use super::message::{
     State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
+use super::tasks::{Bundle, Task};
 use crate::protocol::conflict::Intent;
 use crate::protocol::promises::Brief;
 use crate::varint;
@@ -87,6 +88,8 @@ pub enum Body {
     Lacking(Lacking),
     Intent(Intent),
     Conflict(Brief),
+    Task(Task),
+    Bundle(Bundle),
 }
 
 impl Body {
@@ -106,6 +109,8 @@ impl Body {
             Self::Lacking(_) => Kind::Lacking,
             Self::Intent(_) => Kind::Intent,
             Self::Conflict(_) => Kind::Conflict,
+            Self::Task(_) => Kind::Task,
+            Self::Bundle(_) => Kind::Bundle,
         }
     }
 
@@ -139,6 +144,8 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Lacking(b) => b.put(&mut out),
         Body::Intent(b) => b.put(&mut out),
         Body::Conflict(b) => b.put(&mut out),
+        Body::Task(b) => b.put(&mut out),
+        Body::Bundle(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -171,7 +178,9 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Lacking => Body::Lacking(Wire::get(&mut input)?),
         Kind::Intent => Body::Intent(Wire::get(&mut input)?),
         Kind::Conflict => Body::Conflict(Wire::get(&mut input)?),
-        Kind::Event | Kind::Task => {
+        Kind::Task => Body::Task(Wire::get(&mut input)?),
+        Kind::Bundle => Body::Bundle(Wire::get(&mut input)?),
+        Kind::Event => {
             return Err(WireError::Kind {
                 number: kind.number(),
             });

@@ -31,7 +31,7 @@ pub enum Kind {
     Finished = 7,
     /// Reserved: something people should look at.
     Event = 8,
-    /// Reserved: tasks other than coverage.
+    /// A task other than coverage that its author asks for.
     Task = 9,
     /// What the author flies, would rather fly, and has accepted of others.
     Intent = 10,
@@ -41,6 +41,8 @@ pub enum Kind {
     Heartbeat = 12,
     /// Which pieces of a mission the author lacks.
     Lacking = 13,
+    /// What the author offers and holds of such tasks.
+    Bundle = 14,
 }
 
 /// How long a record waiting to be sent matters.
@@ -98,7 +100,7 @@ const fn row(
 // matters until the longest partition a mission tolerates, and is repaired by
 // anti-entropy afterwards.
 // Caps: the largest valid body, which a test of `codec` computes, rounded up.
-const TABLE: [KindRow; 14] = [
+const TABLE: [KindRow; 15] = [
     KindRow {
         relayed: false,
         ..row(
@@ -177,13 +179,13 @@ const TABLE: [KindRow; 14] = [
         )
     },
     KindRow {
-        spoken: false,
+        subjects: super::tasks::TASKS_MAX,
         ..row(
             Kind::Task,
             "task",
-            512,
+            288,
             Priority::Claim,
-            Lifetime::Beacons(9),
+            Lifetime::Ms(60_000),
         )
     },
     KindRow {
@@ -226,11 +228,18 @@ const TABLE: [KindRow; 14] = [
             Lifetime::Beacons(1),
         )
     },
+    row(
+        Kind::Bundle,
+        "bundle",
+        2048,
+        Priority::Claim,
+        Lifetime::Beacons(9),
+    ),
 ];
 
 impl Kind {
     /// All kinds, by number.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Beacon,
         Self::State,
         Self::Bid,
@@ -245,6 +254,7 @@ impl Kind {
         Self::Conflict,
         Self::Heartbeat,
         Self::Lacking,
+        Self::Bundle,
     ];
 
     /// Its number on the wire.
@@ -348,7 +358,7 @@ mod tests {
             assert_eq!(Kind::of_name(kind.name()), Some(kind));
             assert!(kind.cap_bytes() + super::super::codec::ENVELOPE_MAX_BYTES <= RECORD_MAX_BYTES);
         }
-        assert_eq!(Kind::of_number(14), None);
+        assert_eq!(Kind::of_number(15), None);
         assert_eq!(Kind::of_name("rumour"), None);
     }
 

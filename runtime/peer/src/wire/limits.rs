@@ -75,6 +75,8 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
             at_most("pieces", l.pieces.len(), LACKING_MAX_BYTES)?;
             in_range("pieces", l.pieces.last() != Some(&0))
         }
+        Body::Task(t) => super::tasks::check_task(t),
+        Body::Bundle(b) => super::tasks::check_bundle(b),
     }
 }
 

@@ -11,3 +11,4 @@ pub mod message;
 pub(crate) mod samples;
 pub mod schema;
 pub mod signature;
+pub mod tasks;

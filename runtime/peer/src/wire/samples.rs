@@ -100,6 +100,12 @@ pub fn listing(first: u16) -> ListedRun {
 /// A typical body of each kind and its bytes: who changes them changes the format, which
 /// from the first release on is another version.
 pub fn golden() -> Vec<(Body, &'static str)> {
+    let mut all = golden_of_cells();
+    all.extend(super::tasks::samples::golden());
+    all
+}
+
+fn golden_of_cells() -> Vec<(Body, &'static str)> {
     let round = Round {
         counter: 7,
         members: vec![
@@ -309,6 +315,12 @@ fn longest_promise() -> PromisedPlan {
 
 /// The largest valid body of each kind.
 pub fn largest() -> Vec<Body> {
+    let mut all = largest_of_cells();
+    all.extend(super::tasks::samples::largest());
+    all
+}
+
+fn largest_of_cells() -> Vec<Body> {
     let gossip = Gossip {
         id: u16::MAX,
         incarnation: u32::MAX,

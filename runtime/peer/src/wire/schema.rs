@@ -44,7 +44,7 @@ pub struct Place {
     pub shape: Shape,
 }
 
-const fn at(name: &'static str, what: &'static str, shape: Shape) -> Place {
+pub(super) const fn at(name: &'static str, what: &'static str, shape: Shape) -> Place {
     Place { name, what, shape }
 }
 
@@ -474,7 +474,9 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Lacking => Some(LACKING),
         Kind::Intent => Some(INTENT),
         Kind::Conflict => Some(CONFLICT),
-        Kind::Event | Kind::Task => None,
+        Kind::Task => Some(super::tasks::TASK),
+        Kind::Bundle => Some(super::tasks::BUNDLE),
+        Kind::Event => None,
     }
 }
 

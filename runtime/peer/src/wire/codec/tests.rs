@@ -3,6 +3,7 @@
 use super::super::limits::*;
 use super::super::samples::{fresh, golden, gossip, largest, listing};
 use super::super::signature::Off;
+use super::super::tasks::{Progress, TaskKind};
 use super::*;
 use crate::PeerId;
 use proptest::collection::vec;
@@ -338,10 +339,48 @@ fn every_limit_is_sharp() {
                 b.in_force = 0;
                 refused(&Body::Conflict(b), "in_force");
             }
+            Body::Task(t) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut Task), field| {
+                    let mut t = t.clone();
+                    change(&mut t);
+                    refused(&Body::Task(t), field);
+                };
+                with(&|t| t.places.truncate(1), "places");
+                with(&|t| t.places.push(t.places[0]), "places");
+                with(&|t| t.places[1] = t.places[0], "places");
+                with(&|t| t.places[0].north_mm -= 1, "places");
+                with(&|t| t.kind = TaskKind::Relay, "places");
+                with(&|t| t.sensor += 1, "sensor");
+                with(&|t| t.worth += 1, "worth");
+                with(&|t| t.worth = 0, "worth");
+                with(&|t| t.stay_ms += 1, "stay_ms");
+            }
+            Body::Bundle(b) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut Bundle), field| {
+                    let mut b = b.clone();
+                    change(&mut b);
+                    refused(&Body::Bundle(b), field);
+                };
+                with(&|b| b.offer.east_mm -= 1, "east_mm");
+                with(&|b| b.offer.north_mm -= 1, "north_mm");
+                with(&|b| b.offer.course_e4 -= 1, "course_e4");
+                with(&|b| b.offer.speed_mmps += 1, "speed_mmps");
+                with(&|b| b.offer.radius_mm += 1, "radius_mm");
+                with(&|b| b.offer.radius_mm = 0, "radius_mm");
+                with(&|b| b.offer.endurance_ms += 1, "endurance_ms");
+                with(&|b| b.kept += 1, "kept");
+                with(&|b| b.begun += 1, "begun");
+                with(&|b| b.tasks[1] = b.tasks[0], "tasks");
+                with(&|b| b.tasks[3].progress = Progress::Tentative, "kept");
+                with(&|b| b.done.swap(0, 1), "done");
+                with(&|b| b.done[1] = b.done[0], "done");
+            }
             Body::Operator(_) | Body::Finished(_) => {}
         }
     }
-    assert_eq!(kinds, 10);
+    assert_eq!(kinds, 12);
 }
 
 #[test]
@@ -396,8 +435,8 @@ fn envelopes_beyond_the_table_are_refused() {
         decode_record(&encode_record(&record))
     };
     assert!(of(|_| ()).is_ok());
-    assert_eq!(of(|r| r.kind = 9), Err(WireError::Kind { number: 9 }));
-    assert_eq!(of(|r| r.kind = 14), Err(WireError::Kind { number: 14 }));
+    assert_eq!(of(|r| r.kind = 10), Err(WireError::Kind { number: 10 }));
+    assert_eq!(of(|r| r.kind = 15), Err(WireError::Kind { number: 15 }));
     assert_eq!(
         of(|r| r.subject = 1),
         Err(WireError::Range { field: "subject" })
@@ -448,7 +487,7 @@ fn a_signature_covers_every_byte_before_it() {
 
 proptest! {
     #[test]
-    fn random_bytes_never_panic(kind in 0_usize..14, bytes in vec(any::<u8>(), 0..200)) {
+    fn random_bytes_never_panic(kind in 0_usize..Kind::ALL.len(), bytes in vec(any::<u8>(), 0..200)) {
         let kind = Kind::ALL[kind];
         if let Ok(body) = decode_body(kind, &bytes) {
             prop_assert_eq!(encode_body(&body), bytes.clone());
@@ -460,7 +499,7 @@ proptest! {
 
     #[test]
     fn mutated_bytes_are_refused_or_have_one_encoding(
-        which in 0_usize..8,
+        which in 0_usize..12,
         big: bool,
         edits in vec((any::<prop::sample::Index>(), any::<u8>(), 0_u8..3), 1..6),
     ) {
@@ -481,7 +520,7 @@ proptest! {
     }
 
     #[test]
-    fn bytes_cut_short_are_refused(which in 0_usize..8, at in any::<prop::sample::Index>()) {
+    fn bytes_cut_short_are_refused(which in 0_usize..12, at in any::<prop::sample::Index>()) {
         let bytes = encode_record(&record_of(&golden().remove(which).0));
         prop_assert!(decode_record(&bytes[..at.index(bytes.len())]).is_err());
     }

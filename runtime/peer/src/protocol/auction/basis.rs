@@ -1,0 +1,93 @@
+//! What a settlement follows from: offers of the living, what they claimed before, what is
+//! open, and the hash of all that.
+
+use super::settlement::{Bidder, Problem};
+use super::{Auction, Rank, kept, rank};
+use crate::PeerId;
+use crate::wire::tasks::{BUNDLE_MAX, Bundle, BundleTask, DONE_MAX, Progress, TaskId};
+use skein_geometry::hash::Fnv;
+use std::collections::{BTreeMap, BTreeSet};
+use std::hash::{Hash, Hasher};
+
+impl Auction {
+    /// All who bid, ascending: this peer and those who live, as far as they were heard.
+    pub(super) fn bidders(&self) -> Vec<(PeerId, &Bundle)> {
+        let mut all: Vec<(PeerId, &Bundle)> = self.living().chain([(self.me, &self.own)]).collect();
+        all.sort_by_key(|(id, _)| *id);
+        all
+    }
+
+    /// What is to be settled, with claims as they are; and whether claims of those who are
+    /// only on their way are open too.
+    pub(super) fn problem(&self, moves: bool) -> Problem {
+        let bidders = self.bidders();
+        let mut holders: BTreeMap<TaskId, Rank> = BTreeMap::new();
+        for (id, bundle) in &bidders {
+            let fixed = if moves { bundle.begun } else { bundle.kept };
+            let fixed = kept(bundle).take(usize::from(fixed));
+            let stays = |t: &&BundleTask| t.progress != Progress::Leaving && self.is_current(t);
+            for held in fixed.filter(stays) {
+                let best = holders.entry(held.task).or_insert_with(|| rank(*id, held));
+                *best = (*best).max(rank(*id, held));
+            }
+        }
+        let done = self.done_before_offers(&bidders);
+        let open = self.tasks.iter().filter(|(id, task)| {
+            !task.cancelled && !holders.contains_key(id) && !done.contains(id)
+        });
+        let bidder = |(id, bundle): &(PeerId, &Bundle)| {
+            let first = kept(bundle).map(|t| t.task);
+            let mine = |t: &TaskId| holders.get(t).is_some_and(|h| h.2.0 == *id);
+            let leaving = kept(bundle).filter(|t| t.progress == Progress::Leaving);
+            let used = usize::from(bundle.kept) + bundle.done.len();
+            Bidder {
+                id: *id,
+                offer: bundle.offer,
+                first: first.filter(mine).collect(),
+                barred: leaving.map(|t| t.task).collect(),
+                room: DONE_MAX
+                    .saturating_sub(used)
+                    .min(BUNDLE_MAX.saturating_sub(usize::from(bundle.kept))),
+            }
+        };
+        Problem {
+            bidders: bidders.iter().map(bidder).collect(),
+            open: open.map(|(id, _)| *id).collect(),
+        }
+    }
+
+    /// What was done before the offers of those who live, and what others did at all: what
+    /// was done since an offer is still settled on it, so that doing changes nothing.
+    fn done_before_offers(&self, bidders: &[(PeerId, &Bundle)]) -> BTreeSet<TaskId> {
+        let current = |task: &TaskId, revision: u32| {
+            let known = self.tasks.get(task);
+            known.is_some_and(|t| t.revision == revision)
+        };
+        let before = bidders.iter().map(|(_, b)| *b);
+        let gone = self.others.iter().filter(|(id, _)| !self.live.contains(id));
+        let gone: Vec<&Bundle> = gone.map(|(_, (_, b))| b).collect();
+        let by_gone = gone.iter().flat_map(|b| b.tasks.iter());
+        let by_gone = by_gone.filter(|t| t.progress == Progress::Done);
+        let by_gone = by_gone.map(|t| (t.task, t.revision));
+        let told = before.chain(gone.iter().copied());
+        let told = told.flat_map(|b| b.done.iter().map(|d| (d.task, d.revision)));
+        let all = told.chain(by_gone);
+        all.filter(|(task, revision)| current(task, *revision))
+            .map(|(task, _)| task)
+            .collect()
+    }
+
+    /// Hash of all that a settlement follows from. 0 stands for none.
+    pub(super) fn basis(&self) -> u32 {
+        let mut hash = Fnv::new();
+        for (id, task) in &self.tasks {
+            (id, task.revision, task.cancelled).hash(&mut hash);
+        }
+        self.problem(false).hash(&mut hash);
+        self.problem(true).hash(&mut hash);
+        let hash = Hasher::finish(&hash);
+        u32::try_from((hash ^ hash >> 32) & 0xffff_ffff)
+            .unwrap_or(0)
+            .max(1)
+    }
+}

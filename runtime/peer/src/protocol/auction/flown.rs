@@ -1,0 +1,225 @@
+//! What tasks are worth to a UAV: flown time along Dubins curves (D2.7 §2.4.1, §3.4, §3.5).
+//!
+//! A task counts its worth at the moment at which it is done, less the later that is: after
+//! [`HALF_TIME_MS`] one half, after three times as long a quarter, and never nothing, so that
+//! even the last of a hundred tasks is better done sooner. What goes on (a target, a relay)
+//! counts at arrival.
+//!
+//! A place is flown over on the course on which it lies from the last one. Air that moves and
+//! zones are left out: bids compare UAVs, and what is flown is planned by the executive.
+
+use super::settlement::Flying;
+use crate::PeerId;
+use crate::wire::tasks::{Offer, Task, TaskId, TaskKind, TaskPlace};
+use skein_flight::trajectory::dubins::length_m;
+use skein_geometry::frame::{Point, Pose};
+use skein_geometry::math::atan2;
+
+/// After so long a task is worth half, milliseconds.
+pub const HALF_TIME_MS: u64 = 60_000;
+
+/// Bids are in millionths of [`Task::worth`].
+const MILLION: u64 = 1_000_000;
+
+/// Nearer than this there is no course from one place to the next, metres.
+const SAME_PLACE_M: f64 = 0.001;
+
+/// What tasks are worth by flown time.
+#[derive(Clone, Copy, Debug)]
+pub struct FlownTime;
+
+/// A UAV in the course of its order.
+#[derive(Clone, Copy, Debug)]
+pub struct Airborne {
+    pose: Pose,
+    time_ms: u64,
+    offer: Offer,
+}
+
+fn point(p: TaskPlace) -> Point {
+    crate::mission::point_m((p.east_mm, p.north_mm))
+}
+
+fn course(from: Point, to: Point) -> Option<f64> {
+    let way = to - from;
+    (way.norm() > SAME_PLACE_M).then(|| atan2(way.y, way.x))
+}
+
+/// The time that a way takes at a speed, milliseconds, rounded up.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "ways are within some hundred kilometres, and conversions saturate"
+)]
+fn flight_ms(way_m: f64, speed_mmps: u32) -> u64 {
+    (way_m * MILLION as f64 / f64::from(speed_mmps)).ceil() as u64
+}
+
+/// What is left of a worth after a time.
+#[must_use]
+pub fn value(worth: u16, after_ms: u64) -> u32 {
+    let full = u64::from(worth) * MILLION;
+    let left = full * HALF_TIME_MS / HALF_TIME_MS.saturating_add(after_ms);
+    u32::try_from(left).unwrap_or(u32::MAX)
+}
+
+impl Airborne {
+    /// Flies over places: where it is then.
+    fn along(&self, places: &[TaskPlace]) -> Option<(Pose, u64)> {
+        let speed_mmps = self.offer.speed_mmps;
+        let first = point(*places.first()?);
+        let next = places.get(1).and_then(|p| course(first, point(*p)));
+        let here = self.pose.position();
+        let heading_rad = next.or_else(|| course(here, first));
+        let heading_rad = heading_rad.unwrap_or(self.pose.heading_rad);
+        let entry = Pose::new(first, heading_rad);
+        let radius_m = f64::from(self.offer.radius_mm.max(1)) / 1000.0;
+        let mut way_m = length_m(self.pose, entry, radius_m);
+        let mut pose = entry;
+        for pair in places.windows(2) {
+            let (a, b) = (point(pair[0]), point(pair[1]));
+            way_m += (b - a).norm();
+            pose = Pose::new(b, course(a, b).unwrap_or(pose.heading_rad));
+        }
+        Some((pose, self.time_ms + flight_ms(way_m, speed_mmps)))
+    }
+
+    fn has(&self, sensor: u8) -> bool {
+        let bit = u32::from(sensor).checked_sub(1);
+        bit.is_none_or(|bit| self.offer.sensors >> bit.min(31) & 1 == 1)
+    }
+}
+
+impl Flying for FlownTime {
+    type At = Airborne;
+
+    fn begin(&self, _: PeerId, offer: &Offer) -> Airborne {
+        let at = crate::mission::point_m((offer.east_mm, offer.north_mm));
+        Airborne {
+            pose: Pose::new(at, f64::from(offer.course_e4) / 10_000.0),
+            time_ms: 0,
+            offer: *offer,
+        }
+    }
+
+    fn then(&self, at: &Airborne, _: TaskId, task: &Task) -> Option<(Airborne, u32)> {
+        if at.offer.speed_mmps == 0 || !at.has(task.sensor) {
+            return None;
+        }
+        let mut flown = at.along(&task.places)?;
+        if task.kind == TaskKind::Line {
+            let back: Vec<TaskPlace> = task.places.iter().rev().copied().collect();
+            flown = at.along(&back).filter(|b| b.1 < flown.1).unwrap_or(flown);
+        }
+        let (pose, there_ms) = flown;
+        let time_ms = there_ms + u64::from(task.stay_ms);
+        if time_ms > u64::from(at.offer.endurance_ms) {
+            return None;
+        }
+        let counts_ms = if task.kind.goes_on() {
+            there_ms
+        } else {
+            time_ms
+        };
+        let next = Airborne {
+            pose,
+            time_ms,
+            ..*at
+        };
+        Some((next, value(task.worth, counts_ms)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OFFER: Offer = Offer {
+        east_mm: 0,
+        north_mm: 0,
+        course_e4: 0,
+        speed_mmps: 20_000,
+        radius_mm: 70_000,
+        endurance_ms: 600_000,
+        sensors: 0b10,
+    };
+
+    fn at(east_m: i32, north_m: i32) -> TaskPlace {
+        TaskPlace {
+            east_mm: east_m * 1000,
+            north_mm: north_m * 1000,
+        }
+    }
+
+    fn task(kind: TaskKind, places: &[TaskPlace]) -> Task {
+        Task {
+            revision: 1,
+            cancelled: false,
+            kind,
+            places: places.to_vec(),
+            sensor: 0,
+            worth: 100,
+            stay_ms: 0,
+        }
+    }
+
+    fn fly(offer: Offer, task: &Task) -> Option<(u64, u32)> {
+        let from = FlownTime.begin(PeerId(1), &offer);
+        let (at, value) = FlownTime.then(&from, TaskId::default(), task)?;
+        Some((at.time_ms, value))
+    }
+
+    #[test]
+    fn a_place_straight_ahead_takes_its_distance() {
+        let ahead = task(TaskKind::Pinpoint, &[at(1200, 0)]);
+        // A minute away it is worth half.
+        assert_eq!(fly(OFFER, &ahead), Some((60_000, 50_000_000)));
+        let (behind_ms, _) = fly(OFFER, &task(TaskKind::Pinpoint, &[at(-1200, 0)])).unwrap();
+        // The way back costs half a circle of 70 m more or less.
+        assert!((60_000..80_000).contains(&behind_ms), "{behind_ms}");
+        assert_eq!(
+            fly(OFFER, &task(TaskKind::Pinpoint, &[at(0, 0)])),
+            Some((0, 100_000_000))
+        );
+    }
+
+    #[test]
+    fn a_line_is_flown_from_the_nearer_end() {
+        let line = [at(400, 0), at(800, 0)];
+        let mut back = line;
+        back.reverse();
+        let forth = fly(OFFER, &task(TaskKind::Line, &line));
+        assert_eq!(forth, fly(OFFER, &task(TaskKind::Line, &back)));
+        assert_eq!(forth.map(|f| f.0), Some(40_000));
+    }
+
+    #[test]
+    fn what_goes_on_counts_from_arrival_and_an_area_when_it_is_seen() {
+        let stays = |kind| {
+            let mut task = task(kind, &[at(1200, 0)]);
+            task.stay_ms = 60_000;
+            fly(OFFER, &task)
+        };
+        assert_eq!(stays(TaskKind::Track), Some((120_000, 50_000_000)));
+        assert_eq!(stays(TaskKind::Relay), stays(TaskKind::Track));
+        assert_eq!(stays(TaskKind::Area), Some((120_000, 33_333_333)));
+    }
+
+    #[test]
+    fn who_lacks_the_sensor_the_time_or_the_wings_takes_nothing() {
+        let mut near = task(TaskKind::Pinpoint, &[at(100, 0)]);
+        for (sensor, can) in [(0, true), (1, false), (2, true), (32, false)] {
+            near.sensor = sensor;
+            assert_eq!(fly(OFFER, &near).is_some(), can, "sensor {sensor}");
+        }
+        let grounded = Offer {
+            speed_mmps: 0,
+            ..OFFER
+        };
+        assert_eq!(fly(grounded, &near), None);
+        let far = task(TaskKind::Pinpoint, &[at(12_001, 0)]);
+        assert_eq!(fly(OFFER, &far), None);
+        let nowhere = task(TaskKind::Pinpoint, &[]);
+        assert_eq!(fly(OFFER, &nowhere), None);
+    }
+}
