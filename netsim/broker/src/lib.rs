@@ -17,6 +17,7 @@
 //! | [`stream`] | percepts and setpoints, one loopback stream a peer |
 //! | [`proxy`] | one transport, which can go dark |
 //! | [`encounters`] | many encounters at once, without a trial |
+//! | [`pursuits`] | many pursuits at once, likewise |
 //! | [`process`] | processes, and the guard that leaves none behind |
 //! | [`control`], [`registry`] | how other commands find a trial and talk to it |
 //! | [`pacer`] | scenario time against wall time |
@@ -34,6 +35,7 @@ pub mod pacer;
 mod peers;
 pub mod process;
 pub mod proxy;
+pub mod pursuits;
 pub mod registry;
 pub mod stream;
 mod transports;

@@ -14,6 +14,7 @@
 //! | [`runs`] | runs with the scenario's own faults, with drawn ones, without any |
 //! | [`swarm`] | peers, world and radio under one virtual clock |
 //! | [`encounters`] | UAVs at one height that would meet |
+//! | [`pursuit`] | UAVs that follow vehicles on roads |
 //! | [`account`] | who took over what, when, and the verdict: one judge for simulated and live runs |
 //! | `check` | what must hold, judged while a run goes on |
 //! | `geometry_cache` | loops and routers, derived once for all peers and runs |
@@ -32,6 +33,7 @@ mod geometry_cache;
 pub mod history;
 mod omniscient_baseline;
 pub mod prepared;
+pub mod pursuit;
 pub mod radio;
 pub mod runs;
 pub mod spec;
