@@ -1,5 +1,7 @@
 //! `skein bench`: what the algorithms reach, measured on cases drawn from seeds.
 
+mod tracking;
+
 use crate::exit;
 use clap::{Args, Subcommand};
 use skein_broker::encounters;
@@ -22,6 +24,8 @@ pub struct BenchArgs {
 pub enum What {
     /// UAVs that would meet, all at one height: 50 m have to stay between any two.
     Conflicts(ConflictsArgs),
+    /// UAVs that follow vehicles on the streets of a town.
+    Tracking(tracking::TrackingArgs),
 }
 
 /// Fixed wings at one height that would meet, kept apart by promises that change only by
@@ -97,7 +101,13 @@ fn sensed_m(asked_m: Option<f64>, scene: Scene) -> f64 {
 /// # Errors
 /// When stdout cannot be written.
 pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
-    let What::Conflicts(args) = &args.what;
+    match &args.what {
+        What::Conflicts(args) => conflicts(args),
+        What::Tracking(args) => tracking::run(args),
+    }
+}
+
+fn conflicts(args: &ConflictsArgs) -> anyhow::Result<ExitCode> {
     let scene = if args.encounters {
         Scene::Pair
     } else {
