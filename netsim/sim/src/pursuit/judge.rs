@@ -16,6 +16,9 @@ use std::collections::BTreeMap;
 /// A circle is reached this near to it, metres.
 const REACHED_M: f64 = 2.0;
 
+/// And while the distance to the target changes by less than this, m/s.
+const ALONG_MPS: f64 = 0.5;
+
 /// Its error counts from so long after it was reached, seconds, until a turn is taken that the
 /// airframe does not have.
 const ON_CIRCLE_S: f64 = 5.0;
@@ -57,6 +60,8 @@ pub(super) struct Look<'a> {
 #[derive(Clone, Copy, Debug, Default)]
 struct Orbiting {
     since_s: Option<f64>,
+    /// The error of the look before, metres.
+    off_m: Option<f64>,
 }
 
 /// Modes of one UAV.
@@ -151,7 +156,13 @@ impl Judge {
         let flyable = as_asked && self.is_flyable(l, c.airspeed_mps, t);
         let since = self.orbiting.entry(l.id).or_default();
         let off_m = (l.pose.position() - t.motion.position).norm() - self.stand_off_m;
-        let reached = flyable && (since.since_s.is_some() || off_m.abs() < REACHED_M);
+        // Who only crosses the circle has not reached it.
+        let crossing_mps = since
+            .off_m
+            .map_or(f64::INFINITY, |m| (off_m - m).abs() / step_s);
+        since.off_m = Some(off_m);
+        let settles = off_m.abs() < REACHED_M && crossing_mps < ALONG_MPS;
+        let reached = flyable && (since.since_s.is_some() || settles);
         since.since_s = reached.then(|| since.since_s.unwrap_or(now_s));
         if since.since_s.is_some_and(|s| now_s - s >= ON_CIRCLE_S) {
             self.squares_m2 += off_m * off_m * step_s;
