@@ -1,6 +1,7 @@
 //! `skein bench`: what the algorithms reach, measured on cases drawn from seeds.
 
 mod auction;
+mod tracking;
 
 use crate::exit;
 use auction::AuctionArgs;
@@ -27,6 +28,8 @@ pub enum What {
     Conflicts(ConflictsArgs),
     /// UAVs that share tasks, beside the published bundle algorithm.
     Auction(AuctionArgs),
+    /// UAVs that follow vehicles on the streets of a town.
+    Tracking(tracking::TrackingArgs),
 }
 
 /// Fixed wings at one height that would meet, kept apart by promises that change only by
@@ -105,6 +108,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<ExitCode> {
     match &args.what {
         What::Conflicts(args) => conflicts(args),
         What::Auction(args) => auction::run(args),
+        What::Tracking(args) => tracking::run(args),
     }
 }
 

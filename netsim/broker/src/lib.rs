@@ -16,7 +16,7 @@
 //! | [`live_world`] | the world and its radio links, as a trial uses them |
 //! | [`stream`] | percepts and setpoints, one loopback stream a peer |
 //! | [`proxy`] | one transport, which can go dark |
-//! | [`encounters`], [`auctions`] | many encounters, or task auctions, at once, without a trial; `seeds` runs them on all threads |
+//! | [`encounters`], [`auctions`], [`pursuits`] | many encounters, task auctions or pursuits at once, without a trial; `seeds` runs them on all threads |
 //! | [`process`] | processes, and the guard that leaves none behind |
 //! | [`control`], [`registry`] | how other commands find a trial and talk to it |
 //! | [`pacer`] | scenario time against wall time |
@@ -35,6 +35,7 @@ pub mod pacer;
 mod peers;
 pub mod process;
 pub mod proxy;
+pub mod pursuits;
 pub mod registry;
 mod seeds;
 pub mod stream;

@@ -88,7 +88,7 @@ pub fn text(name: &str) -> Option<&'static str> {
         .map(|(_, _, text)| *text)
 }
 
-fn data(name: &str) -> Result<String, String> {
+pub(crate) fn data(name: &str) -> Result<String, String> {
     let found = DATA.iter().find(|(n, _)| *n == name);
     found
         .map(|(_, text)| (*text).to_owned())

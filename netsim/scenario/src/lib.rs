@@ -17,6 +17,7 @@
 //! | `feasibility` | what cannot succeed, or may disappoint |
 //! | `forecast` | what it is expected to take |
 //! | `resolve` | all of it in order: a [`Scenario`] |
+//! | [`town`] | streets and buildings without a mission |
 //! | `coverable` | what the world's own geometry says of the same area |
 //!
 //! ```
@@ -36,6 +37,7 @@ mod mission;
 mod read;
 mod request;
 mod resolve;
+pub mod town;
 
 pub use builtin::{
     DEFAULT, files as builtin_files, load_builtin, names as builtin_names, text as builtin_text,

@@ -15,6 +15,7 @@
 //! | [`swarm`] | peers, world and radio under one virtual clock |
 //! | [`auctions`] | UAVs that share tasks, over a channel of rounds |
 //! | [`encounters`] | UAVs at one height that would meet |
+//! | [`pursuit`] | UAVs that follow vehicles on roads |
 //! | [`account`] | who took over what, when, and the verdict: one judge for simulated and live runs |
 //! | `check` | what must hold, judged while a run goes on |
 //! | `geometry_cache` | loops and routers, derived once for all peers and runs |
@@ -34,6 +35,7 @@ mod geometry_cache;
 pub mod history;
 mod omniscient_baseline;
 pub mod prepared;
+pub mod pursuit;
 pub mod radio;
 pub mod runs;
 pub mod spec;

@@ -9,6 +9,7 @@
 //! | [`route`] | the shortest route with clearance | 2.3.2 |
 //! | [`trajectory`] | Dubins words, flights in wind, timed trajectories | 2.4 |
 //! | [`separation`] | promised motions, whether two keep apart, ways round | 1.3 |
+//! | [`tracking`] | following targets: guidance, estimates, hand-over | 3.7 |
 //! | [`coverage`] | closed loops over areas, points and lines, and their division among UAVs | 3.4–3.6 |
 //!
 //! ```
@@ -62,4 +63,5 @@ pub mod airframe;
 pub mod coverage;
 pub mod route;
 pub mod separation;
+pub mod tracking;
 pub mod trajectory;

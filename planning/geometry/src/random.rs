@@ -5,6 +5,8 @@
 //! part of the problem. Steele, Lea and Flood, "Fast splittable pseudorandom number
 //! generators", OOPSLA 2014, <https://doi.org/10.1145/2660193.2660195>.
 
+use crate::math::{TAU, cos, ln};
+
 /// What the state grows by at each draw: 2⁶⁴ over the golden ratio, odd.
 const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 
@@ -51,6 +53,13 @@ impl SplitMix64 {
         unit(self.bits())
     }
 
+    /// A number of the standard normal distribution, by the transform of Box and Muller.
+    pub fn normal(&mut self) -> f64 {
+        // One less the draw is never zero, so its logarithm is finite.
+        let radius = (-2.0 * ln(1.0 - self.unit())).sqrt();
+        radius * cos(TAU * self.unit())
+    }
+
     /// Puts a list into some order (Fisher and Yates).
     pub fn shuffle<T>(&mut self, list: &mut [T]) {
         for i in (1..list.len()).rev() {
@@ -77,6 +86,19 @@ mod tests {
         ];
         assert_eq!(expected.map(|_| random.bits()), expected);
         assert_eq!(SplitMix64::new(1).below(0), 0);
+    }
+
+    #[test]
+    #[allow(clippy::cast_precision_loss, reason = "a few thousand draws")]
+    fn normal_draws_have_mean_zero_and_variance_one() {
+        let mut random = SplitMix64::new(11);
+        let draws: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
+        let n = draws.len() as f64;
+        let mean = draws.iter().sum::<f64>() / n;
+        let variance = draws.iter().map(|x| x * x).sum::<f64>() / n;
+        let beyond_two = draws.iter().filter(|x| x.abs() > 2.0).count() as f64 / n;
+        assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.04);
+        assert!((beyond_two - 0.0455).abs() < 0.006, "{beyond_two}");
     }
 
     #[test]

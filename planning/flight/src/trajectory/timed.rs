@@ -31,7 +31,7 @@
 //! ```
 
 mod clearance;
-mod elliptic;
+pub(crate) mod elliptic;
 mod fit;
 mod piece;
 mod plan;

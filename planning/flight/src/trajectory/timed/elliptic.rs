@@ -58,7 +58,7 @@ pub(super) fn second_kind_between(from: f64, to: f64, m: f64) -> f64 {
 }
 
 /// E(φ | m): the integral of √(1 − m sin²) from 0 to `phi`, for 0 ≤ m ≤ 1.
-pub(super) fn second_kind(phi: f64, m: f64) -> f64 {
+pub(crate) fn second_kind(phi: f64, m: f64) -> f64 {
     let halves = (phi / PI).round();
     2.0 * halves * within(PI / 2.0, m) + within(phi - halves * PI, m)
 }

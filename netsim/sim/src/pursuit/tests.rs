@@ -1,0 +1,134 @@
+//! Pursuits as short stories.
+
+use super::roads::tests::grid;
+use super::totals::{Tally, Totals};
+use super::*;
+use skein_geometry::Polygon;
+use std::sync::Arc;
+
+fn settings() -> Settings {
+    Settings {
+        roads: Roads::of(&grid(8, 180.0)).unwrap(),
+        buildings: None,
+        zones: None,
+        uavs: 2,
+        targets: 1,
+        wind_mps: 4.0,
+        target_mps: 8.0,
+        behaviour: None,
+        field: Field::HOPF,
+        airspeeds: None,
+        stand_off_m: 150.0,
+        optics: Optics::gimballed(),
+        noise: None,
+        kill: false,
+        lasts_s: 240.0,
+    }
+}
+
+fn fly(settings: &Settings, seeds: std::ops::Range<u64>) -> Totals {
+    let mut tally = Tally::default();
+    for seed in seeds {
+        tally.add(seed, run(settings, seed));
+    }
+    tally.totals()
+}
+
+#[test]
+fn without_noise_an_orbit_that_can_be_flown_is_kept_to_half_a_metre() {
+    for field in [Field::HOPF, Field::Lyapunov] {
+        let t = fly(
+            &Settings {
+                field,
+                ..settings()
+            },
+            0..4,
+        );
+        assert!(t.flyable_share > 0.2, "{t:?}");
+        assert!(t.rms_standoff_m.unwrap() < 0.5, "{field:?}: {t:?}");
+        assert!(t.in_footprint_share.unwrap() >= 0.99, "{t:?}");
+        assert_eq!(t.chatter, 0, "{t:?}");
+    }
+}
+
+#[test]
+fn with_noise_targets_stay_in_sight_and_estimates_know_their_errors() {
+    let noisy = Settings {
+        noise: Some(Noise::usual()),
+        ..settings()
+    };
+    let t = fly(&noisy, 10..14);
+    assert!(t.in_footprint_share.unwrap() > 0.98, "{t:?}");
+    assert!(t.position_rms_m.unwrap() < 8.0, "{t:?}");
+    // Cars are not white noise; the filter may be somewhat too cautious, and no surer.
+    let (nees, fused) = (t.nees.unwrap(), t.nees_fused.unwrap());
+    assert!((1.0..5.5).contains(&nees) && fused < 5.5, "{t:?}");
+}
+
+#[test]
+fn who_is_taken_away_is_relieved() {
+    let s = Settings {
+        noise: Some(Noise::usual()),
+        kill: true,
+        uavs: 3,
+        targets: 2,
+        ..settings()
+    };
+    let t = fly(&s, 20..24);
+    assert_eq!(t.trackers_lost, 4);
+    assert!(t.reacquired_worst_s.is_some(), "{t:?}");
+}
+
+#[test]
+fn buildings_hide_and_zones_are_kept_clear_of() {
+    let block = |x: f64, y: f64| {
+        let corners = [(x, y), (x + 80.0, y), (x + 80.0, y + 80.0), (x, y + 80.0)];
+        Polygon::new(corners.map(|(x, y)| Point::new(x, y)).to_vec()).unwrap()
+    };
+    let houses: Vec<Building> = (0..8)
+        .flat_map(|i| {
+            (0..8).map(move |k| (f64::from(i) * 180.0 + 50.0, f64::from(k) * 180.0 + 50.0))
+        })
+        .map(|(x, y)| Building {
+            footprint: block(x, y),
+            height_m: 60.0,
+        })
+        .collect();
+    let hidden = Settings {
+        buildings: Some(Arc::new(obstacles(&houses))),
+        ..settings()
+    };
+    let t = fly(&hidden, 30..32);
+    assert!(t.hidden_share > 0.02, "{t:?}");
+    let zone = NoFlyZones::new(vec![block(500.0, 500.0), block(900.0, 300.0)]);
+    let zoned = Settings {
+        zones: Some((zone, 10.0)),
+        uavs: 1,
+        ..settings()
+    };
+    let t = fly(&zoned, 40..43);
+    assert!(t.in_zone_s < 1.0, "{t:?}");
+}
+
+#[test]
+fn a_seed_always_ends_alike_and_nobody_to_follow_is_nothing() {
+    let s = Settings {
+        noise: Some(Noise::usual()),
+        lasts_s: 60.0,
+        ..settings()
+    };
+    assert_eq!(run(&s, 7), run(&s, 7));
+    let nobody = fly(
+        &Settings {
+            targets: 0,
+            ..s.clone()
+        },
+        0..1,
+    );
+    assert_eq!(
+        (nobody.rms_standoff_m, nobody.in_footprint_share),
+        (None, None)
+    );
+    let no_uavs = fly(&Settings { uavs: 0, ..s }, 0..1);
+    assert_eq!(no_uavs.runs, 1);
+}

@@ -1,0 +1,332 @@
+//! Ground vehicles under surveillance (D2.7 §1.5.2): on roads, by a script or by a simple
+//! heuristic of who does not want to be followed.
+//!
+//! A vehicle steers towards a point that runs ahead of it on its road, with a bounded
+//! curvature, and brakes before corners; so its velocity has no jumps.
+
+use super::roads::Roads;
+use serde::{Deserialize, Serialize};
+use skein_geometry::frame::{Point, Vector};
+use skein_geometry::math::{TAU, atan2, sin, sin_cos, tan, wrap_pi};
+use skein_geometry::random::SplitMix64;
+
+/// The world moves a vehicle in steps of this, seconds.
+pub(super) const STEP_S: f64 = 0.05;
+
+/// Speeding up, m/s².
+const SPEED_UP_MPS2: f64 = 2.0;
+
+/// Braking, m/s².
+const BRAKE_MPS2: f64 = 3.0;
+
+/// Sideways in a curve, m/s².
+const SIDEWAYS_MPS2: f64 = 2.5;
+
+/// The tightest curve, metres.
+const TIGHTEST_M: f64 = 6.0;
+
+/// The point ahead is at least this far, metres.
+const AHEAD_M: f64 = 6.0;
+
+/// Corners are looked for this far ahead, metres.
+const LOOK_M: f64 = 120.0;
+
+/// Who evades notices UAVs within this, metres.
+const NOTICES_M: f64 = 250.0;
+
+/// Who evades then drives so much faster.
+const HURRIES: f64 = 1.3;
+
+/// What a vehicle does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Behaviour {
+    /// Stands where it is.
+    Parked,
+    /// Drives on.
+    Drives,
+    /// Stands for some seconds now and then.
+    StopsAndGoes,
+    /// Hurries and turns off away from the nearest UAV, and now and then stands still until
+    /// it may have been passed.
+    Evades,
+}
+
+/// A vehicle.
+#[derive(Clone, Debug)]
+pub(super) struct Vehicle {
+    pub(super) at: Point,
+    heading_rad: f64,
+    speed_mps: f64,
+    acceleration_mps2: Vector,
+    behaviour: Behaviour,
+    usual_mps: f64,
+    /// Places of the road from behind the point ahead on: it is between the first two.
+    way: Vec<usize>,
+    ahead: Point,
+    /// The last corner that the point ahead has passed: its speed, and the way since, metres.
+    corner: Option<(f64, f64)>,
+    /// Stands, or drives on, until then, seconds.
+    until_s: f64,
+    stands: bool,
+    random: SplitMix64,
+}
+
+impl Vehicle {
+    /// One that stands somewhere on the roads.
+    pub(super) fn new(roads: &Roads, behaviour: Behaviour, usual_mps: f64, seed: u64) -> Self {
+        let mut random = SplitMix64::new(seed);
+        let (from, to) = roads.draw(&mut random);
+        let at = roads.place(from);
+        let along = roads.place(to) - at;
+        let first_s = 10.0 + 30.0 * random.unit();
+        Self {
+            at,
+            heading_rad: atan2(along.y, along.x),
+            speed_mps: 0.0,
+            acceleration_mps2: Vector::zeros(),
+            behaviour,
+            usual_mps,
+            way: vec![from, to],
+            ahead: at,
+            corner: None,
+            until_s: first_s,
+            stands: behaviour == Behaviour::Parked,
+            random,
+        }
+    }
+
+    pub(super) fn velocity_mps(&self) -> Vector {
+        let (s, c) = sin_cos(self.heading_rad);
+        Vector::new(c, s) * self.speed_mps
+    }
+
+    pub(super) fn acceleration_mps2(&self) -> Vector {
+        self.acceleration_mps2
+    }
+
+    /// Drives for one step; `uavs` are where UAVs are.
+    pub(super) fn drive(&mut self, roads: &Roads, now_s: f64, uavs: &[Point]) {
+        if self.behaviour == Behaviour::Parked {
+            return;
+        }
+        self.decide(now_s);
+        self.lead(roads, uavs);
+        let wanted_mps = if self.stands {
+            0.0
+        } else {
+            self.wanted_mps(roads, uavs)
+        };
+        let change = (wanted_mps - self.speed_mps) / STEP_S;
+        let along = change.clamp(-BRAKE_MPS2, SPEED_UP_MPS2);
+        let to = self.ahead - self.at;
+        let off_rad = wrap_pi(atan2(to.y, to.x) - self.heading_rad);
+        let most =
+            (SIDEWAYS_MPS2 / (self.speed_mps * self.speed_mps).max(0.1)).min(1.0 / TIGHTEST_M);
+        // The circle through the point ahead that the vehicle is tangent to.
+        let asked = 2.0 * sin(off_rad.clamp(-1.57, 1.57)) / to.norm().max(1.0);
+        let curvature_per_m = asked.clamp(-most, most);
+        let (s, c) = sin_cos(self.heading_rad);
+        let (forward, left) = (Vector::new(c, s), Vector::new(-s, c));
+        let sideways = self.speed_mps * self.speed_mps * curvature_per_m;
+        self.acceleration_mps2 = forward * along + left * sideways;
+        let driven_m = (self.speed_mps + along * STEP_S / 2.0).max(0.0) * STEP_S;
+        let turned_rad = curvature_per_m * driven_m;
+        let (s, c) = sin_cos(self.heading_rad + turned_rad / 2.0);
+        self.at += Vector::new(c, s) * driven_m;
+        self.heading_rad = wrap_pi(self.heading_rad + turned_rad);
+        self.speed_mps = (self.speed_mps + along * STEP_S).max(0.0);
+        self.corner = self
+            .corner
+            .map(|(mps, since_m)| (mps, since_m + driven_m))
+            .filter(|(_, since_m)| *since_m < 2.0 * self.ahead_m());
+    }
+
+    fn decide(&mut self, now_s: f64) {
+        let moves_on = matches!(self.behaviour, Behaviour::StopsAndGoes | Behaviour::Evades);
+        if now_s < self.until_s || !moves_on {
+            return;
+        }
+        self.stands = !self.stands;
+        let lasts_s = if self.stands {
+            5.0 + 15.0 * self.random.unit()
+        } else {
+            20.0 + 30.0 * self.random.unit()
+        };
+        self.until_s = now_s + lasts_s;
+    }
+
+    fn ahead_m(&self) -> f64 {
+        AHEAD_M.max(0.8 * self.speed_mps)
+    }
+
+    /// Moves the point ahead on along the road.
+    fn lead(&mut self, roads: &Roads, uavs: &[Point]) {
+        let reach_m = self.ahead_m();
+        while (self.ahead - self.at).norm() < reach_m {
+            self.extend(roads, uavs);
+            let next = roads.place(self.way[1]);
+            let left = next - self.ahead;
+            let left_m = left.norm();
+            let step_m = 0.5;
+            if left_m > step_m {
+                self.ahead += left * (step_m / left_m);
+                continue;
+            }
+            self.ahead = next;
+            let mps = corner_mps(roads, self.way[0], self.way[1], self.way[2]);
+            if mps < self.usual_mps * HURRIES {
+                let slower = self.corner.is_none_or(|(before, _)| mps <= before);
+                if slower {
+                    self.corner = Some((mps, 0.0));
+                }
+            }
+            self.way.remove(0);
+        }
+    }
+
+    /// The road is known as far as corners are looked for.
+    fn extend(&mut self, roads: &Roads, uavs: &[Point]) {
+        let length_m = |way: &[usize]| -> f64 {
+            way.windows(2)
+                .map(|w| (roads.place(w[1]) - roads.place(w[0])).norm())
+                .sum()
+        };
+        while self.way.len() < 3 || length_m(&self.way[1..]) < LOOK_M {
+            let n = self.way.len();
+            let (before, at) = (self.way[n - 2], self.way[n - 1]);
+            let others: Vec<usize> = roads
+                .next_of(at)
+                .iter()
+                .copied()
+                .filter(|p| *p != before)
+                .collect();
+            let next = match others.len() {
+                0 => before,
+                1 => others[0],
+                _ => self.choose(roads, at, &others, uavs),
+            };
+            self.way.push(next);
+        }
+    }
+
+    /// At a crossing: anywhere, or away from the nearest UAV.
+    fn choose(&mut self, roads: &Roads, at: usize, others: &[usize], uavs: &[Point]) -> usize {
+        let drawn = others[self.random.below(others.len())];
+        let here = roads.place(at);
+        let nearest = uavs
+            .iter()
+            .min_by(|a, b| (*a - here).norm().total_cmp(&(*b - here).norm()));
+        let (Behaviour::Evades, Some(uav)) = (self.behaviour, nearest) else {
+            return drawn;
+        };
+        let away = |n: &usize| {
+            let along = (roads.place(*n) - here).normalize();
+            along.dot(&(here - uav))
+        };
+        let farthest = others.iter().max_by(|a, b| away(a).total_cmp(&away(b)));
+        farthest.copied().unwrap_or(drawn)
+    }
+
+    /// As fast as it likes, and as corners allow.
+    fn wanted_mps(&self, roads: &Roads, uavs: &[Point]) -> f64 {
+        let noticed = uavs.iter().any(|u| (u - self.at).norm() < NOTICES_M);
+        let hurries = self.behaviour == Behaviour::Evades && noticed;
+        let free_mps = self.usual_mps * if hurries { HURRIES } else { 1.0 };
+        let mut most_mps = self.corner.map_or(free_mps, |(mps, _)| free_mps.min(mps));
+        // To the vertex of the road, and to where the vehicle itself is half as far.
+        let mut distance_m = 0.5 * (self.ahead - self.at).norm();
+        let mut from = self.ahead;
+        for w in self.way.windows(3) {
+            let corner = roads.place(w[1]);
+            distance_m += (corner - from).norm();
+            from = corner;
+            let mps = corner_mps(roads, w[0], w[1], w[2]);
+            let now_mps = (mps * mps + 1.6 * BRAKE_MPS2 * distance_m).sqrt();
+            most_mps = most_mps.min(now_mps);
+        }
+        most_mps
+    }
+}
+
+/// How fast a corner of a road is taken, m/s.
+fn corner_mps(roads: &Roads, a: usize, b: usize, c: usize) -> f64 {
+    let (before, after) = (
+        roads.place(b) - roads.place(a),
+        roads.place(c) - roads.place(b),
+    );
+    let turn_rad = wrap_pi(atan2(after.y, after.x) - atan2(before.y, before.x)).abs();
+    let half = tan((turn_rad / 2.0).min(TAU / 4.0 - 0.05)).max(1e-6);
+    (SIDEWAYS_MPS2 * TIGHTEST_M / half).sqrt().max(2.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::roads::tests::grid;
+    use super::*;
+
+    fn drive(behaviour: Behaviour, mps: f64, seed: u64, look: &mut dyn FnMut(&Vehicle, f64)) {
+        let roads = Roads::of(&grid(6, 150.0)).unwrap();
+        let mut v = Vehicle::new(&roads, behaviour, mps, seed);
+        for k in 0..6_000_u32 {
+            let now_s = f64::from(k) * STEP_S;
+            v.drive(&roads, now_s, &[Point::new(450.0, 450.0)]);
+            look(&v, now_s);
+        }
+    }
+
+    #[test]
+    fn a_vehicle_stays_on_its_road_and_within_its_limits() {
+        for (mps, seed) in [(8.0, 1), (14.0, 2), (20.0, 3)] {
+            let (mut worst_m, mut most_mps, mut hardest) = (0.0_f64, 0.0_f64, 0.0_f64);
+            let mut before: Option<Vector> = None;
+            drive(Behaviour::Drives, mps, seed, &mut |v, _| {
+                // Distance to the nearest street of the grid.
+                let off = |x: f64| (x - (x / 150.0).round() * 150.0).abs();
+                worst_m = worst_m.max(off(v.at.x).min(off(v.at.y)));
+                most_mps = most_mps.max(v.speed_mps);
+                if let Some(b) = before {
+                    hardest = hardest.max((v.velocity_mps() - b).norm() / STEP_S);
+                }
+                before = Some(v.velocity_mps());
+            });
+            assert!(worst_m < 6.0, "{mps}: {worst_m} m beside the road");
+            assert!(most_mps > 0.7 * mps && most_mps <= mps + 0.2, "{most_mps}");
+            assert!(hardest < 5.0, "{hardest} m/s²");
+        }
+    }
+
+    #[test]
+    fn who_stops_and_goes_does_both_and_who_is_parked_neither() {
+        let (mut stood_s, mut drove_s) = (0.0, 0.0);
+        drive(Behaviour::StopsAndGoes, 10.0, 5, &mut |v, _| {
+            if v.speed_mps < 0.1 {
+                stood_s += STEP_S;
+            }
+            if v.speed_mps > 5.0 {
+                drove_s += STEP_S;
+            }
+        });
+        assert!(stood_s > 20.0 && drove_s > 50.0, "{stood_s} {drove_s}");
+        let mut farthest_m = 0.0_f64;
+        let mut first = None;
+        drive(Behaviour::Parked, 10.0, 5, &mut |v, _| {
+            let from = *first.get_or_insert(v.at);
+            farthest_m = farthest_m.max((v.at - from).norm());
+        });
+        assert!(farthest_m < f64::EPSILON);
+    }
+
+    #[test]
+    fn who_evades_is_farther_from_the_uav_than_who_does_not_mind() {
+        let mean = |behaviour| {
+            let mut sum = 0.0;
+            for seed in 0..6 {
+                drive(behaviour, 12.0, seed, &mut |v, _| {
+                    sum += (v.at - Point::new(450.0, 450.0)).norm();
+                });
+            }
+            sum
+        };
+        assert!(mean(Behaviour::Evades) > 1.05 * mean(Behaviour::Drives));
+    }
+}
