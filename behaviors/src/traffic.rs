@@ -4,9 +4,9 @@
 use serde::{Deserialize, Serialize};
 use skein_geometry::frame::Point;
 
-/// Most UAVs that a reading holds, the nearest: more are never within a few hundred metres
-/// of one at one height.
-pub const TRAFFIC_MAX: usize = 12;
+/// Most UAVs that a reading holds, the nearest. Who senses that many plans nothing new: there
+/// may be more.
+pub const TRAFFIC_MAX: usize = 16;
 
 /// One other UAV.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -62,6 +62,12 @@ impl Traffic {
         self.range_m > 0.0
     }
 
+    /// Whether there may be more than it holds.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        self.seen.iter().all(Option::is_some)
+    }
+
     /// Who is sensed.
     pub fn seen(&self) -> impl Iterator<Item = &Sighting> {
         self.seen.iter().flatten()
@@ -81,7 +87,8 @@ mod tests {
         let traffic = Traffic::new(500.0, all);
         assert!(traffic.is_sensed());
         let ids: Vec<u16> = traffic.seen().map(|s| s.id).collect();
-        assert_eq!(ids, (0..12).collect::<Vec<u16>>());
+        assert_eq!(ids, (0..16).collect::<Vec<u16>>());
+        assert!(traffic.is_full());
         assert!(!Traffic::default().is_sensed());
     }
 }

@@ -50,7 +50,7 @@ impl Transit {
     /// Whether a circle keeps off the zones by what its flight may stray, twice: one that is
     /// flown for as long as it takes.
     #[must_use]
-    pub fn has_room(&self, circle: &Segment) -> bool {
+    pub fn has_room_for(&self, circle: &Segment) -> bool {
         let zones = self.router.zones();
         zones.is_clear(&halves(circle), 2.0 * self.tracking_error_m)
     }

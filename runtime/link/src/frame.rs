@@ -20,6 +20,10 @@ const LENGTH_BYTES: usize = 4;
 
 /// From the world to a node.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "a frame lives until it is written or read, and most hold a percept"
+)]
 pub enum ToPeer {
     /// Answers [`ToWorld::Hello`]; always the first frame.
     Welcome {

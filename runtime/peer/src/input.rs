@@ -30,6 +30,10 @@ impl Time {
 
 /// One thing that happened.
 #[derive(Clone, Debug)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "an input lives for one call, and percepts are the most frequent"
+)]
 pub enum Input {
     /// The first input: what the journal held, in the order it was written
     /// (empty on a fresh disk), and a boot nonce the driver drew.

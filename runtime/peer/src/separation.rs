@@ -133,7 +133,7 @@ impl Separation {
         self.take_up(executive);
         self.withdraw_unwanted(executive);
         let proposes = self.conflicts.as_ref().is_some_and(Conflicts::is_proposing);
-        if !proposes && now_ms >= self.search_from_ms {
+        if !proposes && !percept.traffic.is_full() && now_ms >= self.search_from_ms {
             self.search(now_ms, executive, is_open);
             if let Some(conflicts) = &mut self.conflicts {
                 // Where nobody has to be asked it is agreed already.

@@ -88,8 +88,8 @@ impl Executive {
         let soonest_m = self.scheduled_m(at_ms + lead_ms);
         let flight_end_m = self.flight_end_m();
         let keep_m = c.wanted_m.min(flight_end_m);
-        let ends = self.stretches.iter().filter(|s| s.end_m <= keep_m + 1e-6);
-        if let Some(last) = ends.last().filter(|s| s.end_m >= soonest_m) {
+        let mut ends = self.stretches.iter().filter(|s| s.end_m <= keep_m + 1e-6);
+        if let Some(last) = ends.next_back().filter(|s| s.end_m >= soonest_m) {
             return vec![(last.end_m, last.end)];
         }
         let mut cuts = Vec::new();
@@ -123,7 +123,7 @@ impl Executive {
             arrives: None,
         };
         match self.aim {
-            Aim::Hold => {}
+            Aim::Hold | Aim::Given => {}
             Aim::Legs => self.way_along_legs(&mut way, is_open, events),
             Aim::Point(p) => self.way_to_point(&mut way, p, events),
         }
@@ -271,7 +271,7 @@ impl Executive {
             return;
         }
         for bend_per_m in sides {
-            if !self.transit.has_room(&circle_at(&at.pose, bend_per_m)) {
+            if !self.transit.has_room_for(&circle_at(&at.pose, bend_per_m)) {
                 continue;
             }
             let Some(plan) = self.plan(at_ms, start, &flight, bend_per_m) else {
@@ -315,9 +315,9 @@ impl Executive {
             Move::Serve(visit) => coverage_loop.curve(usize::from(visit.cell), visit.direction),
             Move::Pass(cell, direction) => coverage_loop.curve(usize::from(*cell), *direction),
             Move::Route(curve) => curve.clone(),
-            Move::Loiter(circle) => {
+            Move::Loiter(piece) | Move::Piece(piece, _) => {
                 let mut curve = Curve::empty();
-                curve.push(*circle);
+                curve.push(*piece);
                 curve
             }
         }

@@ -83,7 +83,7 @@ impl Flight {
                 Event::Seen(cells) => cells
                     .iter()
                     .for_each(|c| self.open[usize::from(*c)] = false),
-                Event::PlanDone => {}
+                Event::PlanDone | Event::CutShort { .. } => {}
                 Event::Refused { cells } => panic!("refused {cells:?}"),
             }
         }

@@ -198,7 +198,7 @@ pub struct Change {
 
 /// The others go on after some have failed, all at once, `t_s` seconds into a patrol that
 /// has been steady for one period at least. `None` when nobody is left who can fly.
-/// Turning round at the end of an arc takes `turn` units.
+/// The tour has `n` units, and turning round at the end of an arc takes `turn` of them.
 ///
 /// `joins(uav)` says where one that has rested would come to the tour, and how long it
 /// takes to be there; `turns_back(stand)` what turning back at a place of the tour takes,
@@ -214,8 +214,7 @@ pub struct Change {
 /// O(k² log k).
 #[must_use]
 pub fn after_losses(
-    n: u32,
-    turn: u32,
+    (n, turn): (u32, u32),
     uavs: &[Uav],
     before: &[Course],
     t_s: f64,

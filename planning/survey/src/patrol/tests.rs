@@ -105,7 +105,7 @@ proptest! {
         let (_, courses) = begun(n, turn, &uavs);
         let lost: Vec<usize> = picks.iter().map(|p| p.index(speeds.len())).collect();
         let joins = |uav: usize| ((uav as u32 * 5) % n, 2.5 + uav as f64);
-        let Some(change) = after_losses(n, turn, &uavs, &courses, t_s, &lost, joins, |_| back.map(f64::from)) else {
+        let Some(change) = after_losses((n, turn), &uavs, &courses, t_s, &lost, joins, |_| back.map(f64::from)) else {
             prop_assert!((0..speeds.len()).all(|i| lost.contains(&i)));
             return Ok(());
         };
@@ -139,7 +139,7 @@ proptest! {
     ) {
         let (uavs, lost) = (team(&vec![10; k]), lost.index(k));
         let (_, courses) = begun(n, 0, &uavs);
-        let change = after_losses(n, 0, &uavs, &courses, t_s, &[lost], |_| (0, 0.0), |_| None).unwrap();
+        let change = after_losses((n, 0), &uavs, &courses, t_s, &[lost], |_| (0, 0.0), |_| None).unwrap();
         let spacing_s = f64::from(n) / 10.0 / k as f64;
         prop_assert!(change.steady_s <= spacing_s + 0.2);
         prop_assert!(change.gap_s <= 2.0 * spacing_s + 0.2);

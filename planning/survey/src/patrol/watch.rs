@@ -383,7 +383,7 @@ impl<'a> Watch<'a> {
         let before = flown.patrol.courses(&self.speeds, &flown.stations);
         let joins = |uav: usize| self.nearest[uav];
         let back = |stand: &Stand| self.turn(self.on_tour(stand)).map(|t| t.1 * 1000.0);
-        let turned = |turn| after_losses(n, turn, &self.uavs, &before, t_s, lost, joins, back);
+        let turned = |turn| after_losses((n, turn), &self.uavs, &before, t_s, lost, joins, back);
         let mut turn = match flown.patrol.pattern {
             Pattern::Arcs { turn, .. } => turn,
             Pattern::Round { .. } => millimetres(self.free_turn_m()),

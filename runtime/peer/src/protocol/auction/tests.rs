@@ -279,12 +279,12 @@ fn plain_greedy(problem: &Problem, tasks: &Tasks, worth: &Worth) -> u64 {
     };
     loop {
         let mut best: Option<(i64, usize, TaskId, Vec<TaskId>)> = None;
-        for b in 0..orders.len() {
-            let now = i64::try_from(value(b, &orders[b]).unwrap()).unwrap();
+        for (b, held) in orders.iter().enumerate() {
+            let now = i64::try_from(value(b, held).unwrap()).unwrap();
             for task in &open {
                 let mut own: Option<(i64, Vec<TaskId>)> = None;
-                for at in (0..=orders[b].len()).rev() {
-                    let mut order = orders[b].clone();
+                for at in (0..=held.len()).rev() {
+                    let mut order = held.clone();
                     order.insert(at, *task);
                     let Some(value) = value(b, &order) else {
                         continue;
