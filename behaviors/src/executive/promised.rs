@@ -46,7 +46,7 @@ use std::collections::VecDeque;
 pub const PROMISED_S: f64 = 9.0;
 
 /// And at most, where there is no room for a circle earlier, seconds.
-pub const PROMISED_MOST_S: f64 = 14.0;
+pub const PROMISED_MOST_S: f64 = 20.0;
 
 /// What is promised is lengthened when it lasts no longer than this, seconds: several
 /// exchanges of messages before it ends.

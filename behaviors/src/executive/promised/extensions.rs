@@ -223,27 +223,29 @@ impl Executive {
         }
     }
 
-    /// Offers parts of the ways, each with a circle to either side at its end: those that
-    /// last as long as is promised first, then shorter ones, then longer ones.
+    /// Offers parts of the ways, each with a circle to either side at its end: those in which
+    /// a cell is served before others, those of shorter ways before those of longer ones, and
+    /// of each what lasts as long as is promised, then shorter parts, then longer ones.
     fn offer(&self, ways: &[Way], at_ms: u64) -> Vec<Extension> {
         let promised_m = PROMISED_S * self.speed_mps();
-        let mut ends: Vec<(f64, usize, usize)> = Vec::new();
+        let mut ends: Vec<(bool, usize, f64, usize)> = Vec::new();
         for (nth, way) in ways.iter().enumerate() {
-            let mut length_m = 0.0;
+            let (mut length_m, mut is_idle) = (0.0, true);
             for (i, step) in way.moves.iter().enumerate() {
                 length_m += self.transit.length_m(step);
+                is_idle &= !matches!(step, Move::Serve(_));
                 let late_m = (promised_m - length_m).abs();
                 let rank_m = if length_m > promised_m {
                     promised_m + late_m
                 } else {
                     late_m
                 };
-                ends.push((rank_m, nth, i + 1));
+                ends.push((is_idle, nth, rank_m, i + 1));
             }
         }
-        ends.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        ends.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)));
         let mut offered = Vec::new();
-        for (_, nth, count) in ends {
+        for (_, nth, _, count) in ends {
             if let Some(way) = ways.get(nth) {
                 self.offer_part(way, count, at_ms, &mut offered);
             }

@@ -504,7 +504,10 @@ impl Auction {
         let may = self.is_agreed() || self.quiet >= self.patience;
         let is_free = |t: &BundleTask| {
             let won = t.progress == Progress::Tentative;
-            won && !self.is_done(t.task) && self.claim_of_another(t.task).is_none()
+            let claim = self.claim_of_another(t.task);
+            // Who wants to leave waits for somebody to come.
+            let open = claim.is_none_or(|(progress, ..)| progress == Progress::Leaving);
+            won && open && !self.is_done(t.task)
         };
         let next = self.own.tasks.iter().position(is_free);
         let Some(next) = next.filter(|_| self.free && may) else {

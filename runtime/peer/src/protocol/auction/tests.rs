@@ -99,6 +99,7 @@ impl Swarm {
             all.extend(effects.into_iter().map(|e| (*i, e)));
         }
         all.extend(self.exchange(these));
+        all.retain(|(_, e)| *e != Effect::Publish);
         all
     }
 
