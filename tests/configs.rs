@@ -503,6 +503,21 @@ const WRONG: &[(&str, &str, &str)] = &[
     ),
     ("count: 8,", "count: 0,", "fleet.count: 0 is out of range"),
     (
+        "slot_step_m: 5,",
+        "separation_m: 30,",
+        "fleet.separation_m: UAVs that take off one after the other at one place need heights",
+    ),
+    (
+        "slot_step_m: 5,",
+        "separation_m: 30, slot_step_m: 5,",
+        "fleet.slot_step_m: UAVs with a separation_m fly at one height",
+    ),
+    (
+        "slot_step_m: 5,",
+        "slot_step_m: 5, traffic_range_m: 900,",
+        "fleet.traffic_range_m: only UAVs that fly at one height sense each other",
+    ),
+    (
         "count: 8,",
         "count: 257,",
         "fleet.count: 257 is out of range; expected the number of UAVs, of which one peer knows at most 256, between 1 and 256",

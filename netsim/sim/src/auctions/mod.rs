@@ -52,7 +52,7 @@ pub struct Setup {
     /// The share of messages that is lost, drawn for each listener by itself.
     pub loss: f64,
     /// Begins in two halves that do not hear each other, commit to their first tasks, and
-    /// meet after [`PARTITION_ROUNDS`].
+    /// meet after `PARTITION_ROUNDS`.
     pub partition: bool,
 }
 

@@ -202,7 +202,8 @@ fn what_the_dead_claimed_is_open_and_what_they_did_is_done() {
     // Both fly to it: of equal claims the higher bid keeps it.
     let effects = s.meet(&[0, 1]);
     assert_eq!(effects, [(1, Effect::Drop(name(1)))]);
-    assert_eq!(s.holds(0), [(1, Committed)]);
+    // What it did stays listed until it has a reason for another offer.
+    assert_eq!(s.holds(0), [(0, Progress::Done), (1, Committed)]);
 }
 
 #[test]
