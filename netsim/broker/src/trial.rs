@@ -346,7 +346,7 @@ impl<'a> Trial<'a> {
     /// its site is surveyed.
     fn revise(&mut self, mission: &Arc<Mission>) {
         let surveyed = tokio::task::block_in_place(|| {
-            let geometry = mission.geometry().map_err(|e| e.to_string())?;
+            let geometry = skein_netsim::geometry_of(mission).map_err(|e| e.to_string())?;
             let survey = Survey::of_mission(&self.spec, mission).map_err(|e| e.to_string())?;
             Ok::<_, String>((
                 survey.left_out(&geometry),

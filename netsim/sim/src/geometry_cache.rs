@@ -28,6 +28,14 @@ struct Divided {
     division: Division,
 }
 
+/// The geometry of a mission that is asked for once.
+///
+/// # Errors
+/// [`GeometryError`] names what is wrong with the mission.
+pub fn geometry_of(mission: &Arc<Mission>) -> Result<Arc<MissionGeometry>, GeometryError> {
+    GeometryCache::default().of(mission)
+}
+
 impl GeometryCache {
     /// A cache that holds what was derived from this mission.
     #[must_use]

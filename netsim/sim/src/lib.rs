@@ -46,4 +46,5 @@ mod troubles;
 mod twins;
 pub mod world;
 
+pub use geometry_cache::geometry_of;
 pub use prepared::Prepared;
