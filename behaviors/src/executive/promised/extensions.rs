@@ -7,6 +7,7 @@ use super::super::transit::{CellVisit, Move, Place};
 use super::super::{Aim, Executive};
 use super::{Extension, PROMISED_MOST_S, PROMISED_S, circle_at, whole_ms};
 use crate::event::Event;
+use crate::reactive::follow::Track;
 use skein_geometry::frame::{Point, Pose, Vector};
 use skein_geometry::math::{TAU, sin_cos};
 use skein_geometry::{Curve, Segment};
@@ -365,21 +366,6 @@ fn parts(curve: &Curve) -> impl Iterator<Item = Curve> {
     )]
     let count = ((length_m / PART_M) as u32).max(1);
     let each_m = length_m / f64::from(count);
-    let pieces = curve.segments().to_vec();
-    (0..count).map(move |k| {
-        let (from_m, until_m) = (each_m * f64::from(k), each_m * f64::from(k + 1));
-        let (mut part, mut at_m) = (Curve::empty(), 0.0);
-        for s in &pieces {
-            let (a, b) = (from_m.max(at_m), until_m.min(at_m + s.length_m));
-            if b > a {
-                part.push(Segment {
-                    start: s.pose_at(a - at_m),
-                    length_m: b - a,
-                    ..*s
-                });
-            }
-            at_m += s.length_m;
-        }
-        part
-    })
+    let whole = Track::new(curve);
+    (0..count).map(move |k| whole.between(each_m * f64::from(k), each_m * f64::from(k + 1)))
 }
