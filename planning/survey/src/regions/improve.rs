@@ -68,14 +68,13 @@ pub struct Improver<'a> {
     cooling: usize,
 }
 
-/// A plan that takes more than so many hundredths of what any takes at least is far from it.
-const FAR: u64 = 115;
+/// Steps that are worth it while a plan takes more than so many hundredths of what any takes at
+/// least: few plans are that far, mostly of many UAVs that share few doors.
+const WHILE_FAR: [(i64, usize); 3] = [(108, 8 * STEPS), (115, 16 * STEPS), (125, 48 * STEPS)];
 
-/// Steps while a plan is far from what any takes at least.
-const MOST_STEPS: usize = 8 * STEPS;
-
-/// Plans with the default number of steps, and up to eight times as many while the plan is far
-/// from what any takes at least: more than 1.15 times.
+/// Plans with the default number of steps, and with more while the plan is far from what any
+/// takes at least: up to 8, 16 and 48 times as many while it takes more than 1.08, 1.15 and 1.25
+/// times that.
 ///
 /// # Guarantees
 /// Covers every cell of the task, unless a UAV's endurance is too short. The same task
@@ -89,9 +88,12 @@ const MOST_STEPS: usize = 8 * STEPS;
 pub fn best(task: &Task) -> Plan {
     let mut improver = Improver::new(task, STEPS);
     while improver.round() {}
-    let far = improver.far();
-    improver.steps = MOST_STEPS;
-    while far.is_some_and(|far| improver.best_score > (0, far)) && improver.round() {}
+    let least = improver.least();
+    for (hundredths, steps) in WHILE_FAR {
+        improver.steps = steps;
+        let far = least.map(|least| least * PACE * hundredths / 100);
+        while far.is_some_and(|far| improver.best_score > (0, far)) && improver.round() {}
+    }
     improver.plan()
 }
 
@@ -146,11 +148,10 @@ impl<'a> Improver<'a> {
         }
     }
 
-    /// Above this makespan a plan is far from what any takes at least; for equal UAVs only.
-    fn far(&self) -> Option<i64> {
+    /// Moves that any plan takes at least; for equal UAVs only.
+    fn least(&self) -> Option<i64> {
         let equal = self.task.speeds.iter().all(|v| *v == self.task.speeds[0]);
-        let least = u64::from(bounds::least_moves(self.task)) * FAR / 100;
-        equal.then(|| i64::try_from(least).unwrap_or(i64::MAX / PACE) * PACE)
+        equal.then(|| i64::from(bounds::least_moves(self.task)))
     }
 
     /// Improves for one round; false when the steps are spent or nothing better exists.
