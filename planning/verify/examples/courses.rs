@@ -9,12 +9,15 @@
 mod planned;
 
 use skein_flight::coverage::passes::{Directions, Layout, Pass, PassesProblem};
+use skein_flight::route::{RouteLimits, Router};
 use skein_flight::trajectory::dubins;
+use skein_geometry::NoFlyZones;
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::{PI, sin_cos};
 use skein_survey::area::{self, AreaRequest, DEFAULT_STEPS, Figures, Planner, Planners};
 use skein_verify::generate::Site;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Courses that are asked for: every 5°.
@@ -70,9 +73,20 @@ fn lawnmower_s(request: &AreaRequest, heading_rad: f64) -> Option<f64> {
         lanes.iter().enumerate().flat_map(lane).collect()
     };
     let turn = |a: Pose, b: Pose| dubins::shortest(a, b, uav.turn_radius_m).length_m();
-    // From the launch point and back in any heading.
-    let way = |pass: &Pass| (pass.from - uav.start).norm();
-    let home = |pass: &Pass| (pass.to - uav.start).norm();
+    // From the launch point in any heading and back in any: with a turn at the pass.
+    let router = Router::new(
+        Arc::new(NoFlyZones::new(Vec::new())),
+        RouteLimits {
+            turn_radius_m: uav.turn_radius_m,
+            clearance_m: 0.0,
+        },
+    );
+    let from_start_m = |pose: Pose| {
+        let way = router.route_to_point(pose, uav.start);
+        way.map_or(f64::INFINITY, |way| way.length_m())
+    };
+    let way = |pass: &Pass| from_start_m(pass.start().reversed());
+    let home = |pass: &Pass| from_start_m(pass.end());
     let time_s = |snake: &[Pass]| {
         let pose = |p: Point, pass: &Pass| Pose::new(p, pass.heading_rad());
         let joins: Vec<f64> = snake
