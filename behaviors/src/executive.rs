@@ -32,6 +32,7 @@ pub mod prediction;
 pub mod promised;
 mod transfer;
 pub mod transit;
+mod way_home;
 
 use crate::event::Event;
 use crate::percept::Percept;
@@ -55,6 +56,7 @@ use skein_geometry::{Curve, Segment};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use transit::{CellVisit, Move, Place, Transit};
+use way_home::WaysHome;
 
 /// How far a UAV may stray from its curve unless the mission says otherwise, metres.
 pub const DEFAULT_TRACKING_ERROR_M: f64 = 2.0;
@@ -189,9 +191,8 @@ pub struct Executive {
     recent: VecDeque<u16>,
     /// Events that came up between two steps.
     pending: Vec<Event>,
-    /// Where it must be able to return to, and how long that takes from the farthest
-    /// boundary of the loop, milliseconds.
-    home: Option<(Point, u32)>,
+    /// How it gets home, and what that takes at most from the loop, milliseconds.
+    home: Option<(WaysHome, u32)>,
     /// What it flies where nothing else was agreed, if it flies by promises.
     contingency: Option<promised::Contingency>,
 }
@@ -239,7 +240,9 @@ impl Executive {
     /// The same with a place to which it must be able to return before its reserve.
     #[must_use]
     pub fn with_home(mut self, home: Point) -> Self {
-        self.home = Some((home, self.return_ms(home)));
+        let ways = WaysHome::new(&self.transit, home);
+        let longest_ms = self.return_ms(&ways);
+        self.home = Some((ways, longest_ms));
         self
     }
 
@@ -367,7 +370,10 @@ impl Executive {
             .unwrap_or_else(|| Air::airspeed_for_mps(objective, airframe, wind, radius_m));
         let airspeed_mps = self.envelope.airspeed_mps(wanted);
         self.transit.set_air(Air { wind, airspeed_mps });
-        self.home = self.home.map(|(home, _)| (home, self.return_ms(home)));
+        if let Some((ways, _)) = self.home.take() {
+            let longest_ms = self.return_ms(&ways);
+            self.home = Some((ways, longest_ms));
+        }
         self.assess_given();
     }
 

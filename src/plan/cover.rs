@@ -18,6 +18,8 @@ use skein_survey::area::{
 use skein_survey::flight::Stays;
 use std::io::IsTerminal;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 /// An area covered by a team: one closed flight a UAV, the longest as short as can be
 /// found, or what `--objective` asks for.
@@ -224,7 +226,11 @@ pub fn run(args: &CoverArgs) -> Result<String> {
     args.output.print(&sheet(args, &input, &request, &plan))
 }
 
-/// Plans, with a bar on a terminal while courses are searched.
+/// After so long somebody who waits is told what a plan waits for.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Plans. While courses are searched a terminal shows a bar, and elsewhere a line on stderr says
+/// so once.
 fn planned(request: &AreaRequest, refly: bool) -> Result<AreaPlan, AreaError> {
     if refly {
         return area::plan_crossed(request);
@@ -232,13 +238,23 @@ fn planned(request: &AreaRequest, refly: bool) -> Result<AreaPlan, AreaError> {
     let terminal = std::io::stderr().is_terminal();
     let bar = terminal.then(|| {
         let bar = ProgressBar::new(0);
-        bar.set_style(ProgressStyle::default_bar());
+        let style = ProgressStyle::with_template("{bar:30.cyan} {pos} of {len} courses {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar
     });
+    let (began, told) = (Instant::now(), AtomicBool::new(false));
     let plan = area::plan_telling(request, &|progress: Progress| {
+        let late = began.elapsed() > PATIENCE;
         if let Some(bar) = &bar {
             bar.set_length(progress.courses as u64);
             bar.set_position(progress.courses_done as u64);
+            if late {
+                bar.set_message("(--quick plans the most promising ones only)");
+            }
+        } else if late && !told.swap(true, Ordering::Relaxed) {
+            eprintln!(
+                "planning all courses in full: this may take minutes; --quick plans the most promising ones only"
+            );
         }
     });
     if let Some(bar) = &bar {

@@ -4,13 +4,13 @@
 //! Everything here is a question; nothing changes what is flown.
 
 use super::transit::{CellVisit, Move, Place};
+use super::way_home::WaysHome;
 use super::{Executive, Forecast, Kind};
 use crate::percept::Percept;
 use skein_flight::coverage::ring::Direction;
 use skein_flight::coverage::ring::backtracking::{Leg, OffLoop};
-use skein_flight::trajectory::wind::Course;
-use skein_geometry::frame::{Point, Pose};
-use skein_geometry::math::{PI, atan2};
+use skein_geometry::frame::Pose;
+use skein_geometry::math::PI;
 use std::collections::VecDeque;
 
 /// Told instead of a time when there is no way: a day, beyond any endurance.
@@ -167,7 +167,7 @@ impl Executive {
     /// What the way home may take from anywhere on the loop, milliseconds.
     #[must_use]
     pub fn home_ms(&self) -> u32 {
-        self.home.map_or(0, |(_, ms)| ms)
+        self.home.as_ref().map_or(0, |(_, ms)| *ms)
     }
 
     /// Flight time that may still be planned: what is left less the reserve and the way
@@ -179,26 +179,11 @@ impl Executive {
             .saturating_sub(home_ms)
     }
 
-    /// The straight way home from the farthest boundary of the loop, at cruise, in a wind at
-    /// what it leaves of the airspeed on that course, with a turn at each end, milliseconds.
-    /// Detours round zones are not in it: the airframe's reserve has to pay for them.
-    pub(super) fn return_ms(&self, home: Point) -> u32 {
+    /// The longest way home from the loop, round zones and in this wind, with a turn at each
+    /// end, milliseconds.
+    pub(super) fn return_ms(&self, ways: &WaysHome) -> u32 {
         let (transit, air) = (&self.transit, self.transit.air());
-        let cruise_mps = transit.airframe.cruise_mps.max(1.0);
-        let way_s = |i: usize| {
-            let way = home - transit.coverage_loop.boundary(i).position();
-            let speed_mps = if air.is_calm() {
-                Some(cruise_mps)
-            } else {
-                let course = Course(atan2(way.y, way.x));
-                air.wind.ground_speed_mps(course, air.airspeed_mps)
-            };
-            let makes_way = speed_mps.filter(|speed| *speed > 0.0);
-            makes_way.map_or(f64::INFINITY, |speed| way.norm() / speed)
-        };
-        let longest_s = (0..transit.coverage_loop.len())
-            .map(way_s)
-            .fold(0.0, f64::max);
+        let longest_s = ways.longest_s(air, transit.airframe.cruise_mps.max(1.0));
         let turns_s = if air.is_calm() {
             TURNS_S
         } else {
