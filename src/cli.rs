@@ -9,11 +9,14 @@ use crate::nfz::NfzArgs;
 use crate::observe::ObserveArgs;
 use crate::peer::PeerArgs;
 use crate::plan::PlanArgs;
+use crate::schema::SchemaArgs;
+use crate::shell::{CompletionsArgs, ManArgs};
 use crate::sim::SimArgs;
 use crate::trial::TrialArgs;
 use crate::why::WhyArgs;
 use crate::{
-    bench, chaos, check, console, exit, mission, nfz, observe, peer, plan, sim, trial, why,
+    bench, chaos, check, console, exit, mission, nfz, observe, peer, plan, schema, shell, sim,
+    trial, why,
 };
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -56,12 +59,18 @@ pub enum Verb {
     Why(WhyArgs),
     /// Shows what the swarm publishes.
     Observe(ObserveArgs),
+    /// What the records of the swarm look like, as JSON Schemas.
+    Schema(SchemaArgs),
     /// Checks a scenario before it is flown.
     Check(CheckArgs),
     /// Plans for a person, from files as other programs write them.
     Plan(PlanArgs),
     /// Measures what the algorithms reach, on cases drawn from seeds.
     Bench(BenchArgs),
+    /// Completions for a shell.
+    Completions(CompletionsArgs),
+    /// Man pages.
+    Man(ManArgs),
     /// Outlives a trial and ends what it leaves behind.
     #[command(name = skein_broker::process::GUARD_COMMAND, hide = true)]
     Guard,
@@ -93,9 +102,12 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Nfz(args) => nfz::run(args),
         Verb::Why(args) => why::run(args),
         Verb::Observe(args) => observe::run(args),
+        Verb::Schema(args) => schema::run(args),
         Verb::Check(args) => check::run(args),
         Verb::Plan(args) => Ok(plan::run(args)?),
         Verb::Bench(args) => bench::run(args),
+        Verb::Completions(args) => shell::completions(args),
+        Verb::Man(args) => shell::man(args),
         Verb::Guard => {
             skein_broker::process::guard();
             Ok(ExitCode::from(exit::OK))

@@ -15,6 +15,8 @@ mod observe;
 mod peer;
 mod plan;
 mod scenario_args;
+mod schema;
+mod shell;
 mod sim;
 mod trial;
 mod why;

@@ -11,12 +11,17 @@ use crate::radio::Hop;
 use crate::transport::{Event, Transport};
 use skein_link::medium::key_hash;
 use skein_peer::Priority;
+use skein_peer::wire::key::VERSION;
+use skein_peer::wire::kinds::Kind;
+use skein_peer::wire::schema::{envelope_schema, schema};
 use std::collections::VecDeque;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::sync::Notify;
+use zenoh::Wait;
 use zenoh::bytes::Encoding;
+use zenoh::key_expr::KeyExpr;
 use zenoh::qos::CongestionControl;
 use zenoh::sample::{Locality, Sample, SampleKind};
 
@@ -179,6 +184,47 @@ impl Bus {
         })
     }
 
+    /// Answers queries for `FLEET/v3/schema/KIND` with the JSON Schema of the bodies of that
+    /// kind, and for `FLEET/v3/schema/record` with that of the array around them, so that an
+    /// observer in any language needs no source of ours.
+    ///
+    /// # Errors
+    /// When Zenoh refuses the keys.
+    pub async fn serve_schemas(&self, fleet: &str) -> Result<(), BusError> {
+        let prefix = format!("{fleet}/{VERSION}/schema");
+        let kinds = Kind::ALL.into_iter();
+        let kinds = kinds.filter_map(|kind| Some((kind.name(), schema(kind)?)));
+        let all = kinds.chain([("record", envelope_schema())]);
+        let answers: Vec<(KeyExpr<'static>, String)> = all
+            .filter_map(|(name, text)| {
+                let key = KeyExpr::try_from(format!("{prefix}/{name}")).ok()?;
+                Some((key, text))
+            })
+            .collect();
+        let refused = |cause: zenoh::Error| BusError::Configuration {
+            key: prefix.clone(),
+            cause: cause.to_string(),
+        };
+        self.session
+            .declare_queryable(format!("{prefix}/*"))
+            .callback(move |query| {
+                for (key, text) in &answers {
+                    if !query.key_expr().intersects(key) {
+                        continue;
+                    }
+                    let reply = query
+                        .reply(key, text.as_str())
+                        .encoding(Encoding::APPLICATION_JSON);
+                    if let Err(cause) = reply.wait() {
+                        tracing::debug!(%key, %cause, "a schema was not sent");
+                    }
+                }
+            })
+            .background()
+            .await
+            .map_err(refused)
+    }
+
     /// Where it listens, with the port that the system chose.
     #[must_use]
     pub fn locator(&self) -> &str {
@@ -291,6 +337,30 @@ impl Observer {
     /// Whether the session is linked to a peer at present.
     pub async fn linked(&self) -> bool {
         self.session.info().transports().await.next().is_some()
+    }
+
+    /// What answers a query within so long, by key.
+    ///
+    /// # Errors
+    /// When the expression is malformed.
+    pub async fn ask(
+        &self,
+        key_expression: &str,
+        within: Duration,
+    ) -> Result<Vec<(String, Vec<u8>)>, BusError> {
+        let replies = self.session.get(key_expression).timeout(within).await;
+        let replies = replies.map_err(|cause| BusError::Configuration {
+            key: key_expression.to_owned(),
+            cause: cause.to_string(),
+        })?;
+        let mut all = Vec::new();
+        while let Ok(reply) = replies.recv_async().await {
+            if let Ok(sample) = reply.result() {
+                let bytes = sample.payload().to_bytes().into_owned();
+                all.push((sample.key_expr().to_string(), bytes));
+            }
+        }
+        Ok(all)
     }
 
     /// Leaves.
@@ -668,5 +738,30 @@ mod tests {
         observer.close().await;
         a.close().await;
         b.close().await;
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
+    async fn an_observer_is_told_what_records_look_like() {
+        let bus = Bus::open(&config(9, vec![])).await.unwrap();
+        bus.serve_schemas("t").await.unwrap();
+        let observer = Observer::open(bus.locator(), "t/**").await.unwrap();
+        let within = Duration::from_secs(5);
+        let all = observer.ask("t/v3/schema/*", within).await.unwrap();
+        for kind in Kind::ALL {
+            let key = format!("t/v3/schema/{}", kind.name());
+            let told = all.iter().find(|(k, _)| *k == key);
+            let told = told.map(|(_, text)| String::from_utf8(text.clone()).unwrap());
+            assert_eq!(told, schema(kind), "{key}");
+        }
+        let one = observer.ask("t/v3/schema/record", within).await.unwrap();
+        let record = (
+            "t/v3/schema/record".to_owned(),
+            envelope_schema().into_bytes(),
+        );
+        assert_eq!(one, [record]);
+        let none = observer.ask("t/v3/schema/rumour", within).await.unwrap();
+        assert!(none.is_empty(), "{none:?}");
+        observer.close().await;
+        bus.close().await;
     }
 }

@@ -94,6 +94,9 @@ pub async fn run(mut config: NodeConfig, stop: impl Future<Output = ()>) -> Resu
     let revised = standing.as_ref().and_then(Standing::mission);
     config.peer.mission = revised.or(config.peer.mission);
     let bus = Bus::open(&config.bus).await?;
+    if config.peer.role == Role::GroundStation {
+        bus.serve_schemas(&config.bus.fleet).await?;
+    }
     let console = match &config.console {
         Some(config) => Some(LocalConsole::open(config).await?),
         None => None,
