@@ -20,7 +20,7 @@ const CONSOLE_TIMEOUT: Duration = Duration::from_secs(20);
 #[derive(Clone, Debug)]
 struct Due {
     timed: TimedFault,
-    /// Whether the scenario wants it, so that the trial fails without it.
+    /// Whether the scenario wants it.
     scenario: bool,
 }
 
@@ -28,6 +28,8 @@ struct Due {
 #[derive(Clone, Debug)]
 pub(crate) struct Schedule {
     due: Vec<Due>,
+    /// Whether somebody made something go wrong by hand.
+    by_hand: bool,
 }
 
 impl Schedule {
@@ -39,14 +41,21 @@ impl Schedule {
         };
         Self {
             due: faults.iter().map(due).collect(),
+            by_hand: false,
         }
     }
 
-    /// The next fault that is due by now, and whether the scenario wants it.
+    /// Somebody makes something go wrong by hand: whom the scenario wants killed may be gone.
+    pub(crate) fn note_by_hand(&mut self) {
+        self.by_hand = true;
+    }
+
+    /// The next fault that is due by now, and whether the run fails without it: the scenario
+    /// wants it, and nobody came before it.
     pub(crate) fn take_due(&mut self, now_ms: u64) -> Option<(Fault, bool)> {
         let at = self.due.iter().position(|f| f.timed.at_ms <= now_ms)?;
         let Due { timed, scenario } = self.due.remove(at);
-        Some((timed.fault, scenario))
+        Some((timed.fault, scenario && !self.by_hand))
     }
 
     /// Adds faults whose times count from now.
@@ -158,9 +167,10 @@ impl Injector<'_> {
 
     async fn kill(&mut self, id: u16, cause: Cause) -> Answer {
         let computer_only = !cause.takes_airframe();
+        let since = self.since(id);
         let peer = self.peers.known(id)?;
         if !peer.has_process() && (computer_only || !peer.airborne()) {
-            return Err(format!("{} does not run", peer.name()));
+            return Err(format!("{} does not run{since}", peer.name()));
         }
         peer.kill().await;
         if !computer_only {
@@ -207,12 +217,23 @@ impl Injector<'_> {
         ])
     }
 
+    /// Since when a peer that ended does not run, and what brings it back.
+    fn since(&self, id: u16) -> String {
+        self.account.ended_ms(id).map_or_else(String::new, |ms| {
+            format!(
+                ": it ended at {:.1} s; `skein chaos restart {id}` starts it again",
+                secs(ms)
+            )
+        })
+    }
+
     fn running(&mut self, id: u16) -> Result<&mut LivePeer, String> {
+        let since = self.since(id);
         let peer = self.peers.known(id)?;
         if peer.runs() {
             Ok(peer)
         } else {
-            Err(format!("{} does not run", peer.name()))
+            Err(format!("{} does not run{since}", peer.name()))
         }
     }
 
@@ -373,6 +394,13 @@ mod tests {
             s.missed(),
             ["over before the fault at 90 s: Kill { peer: 2 }"]
         );
+    }
+
+    #[test]
+    fn whoever_is_killed_by_hand_need_not_be_killed_by_the_scenario() {
+        let mut s = Schedule::new(&[at(2_000, 1)]);
+        s.note_by_hand();
+        assert_eq!(s.take_due(2_000), Some((Fault::Kill { peer: 1 }, false)));
     }
 
     #[test]

@@ -514,6 +514,7 @@ impl<'a> Trial<'a> {
     }
 
     async fn answer(&mut self, asked: Asked<Request>) {
+        self.faults.note_by_hand();
         let answer: Answer = match asked.request {
             Request::Fault(fault) => self.inject(&fault).await,
             Request::Later(faults) => self.faults.later(self.now_ms, faults),
@@ -524,11 +525,11 @@ impl<'a> Trial<'a> {
 
     /// Carries out what is due by now, in the order of the times.
     async fn carry_out_due(&mut self) {
-        while let Some((fault, scenario)) = self.faults.take_due(self.now_ms) {
+        while let Some((fault, needed)) = self.faults.take_due(self.now_ms) {
             if let Err(why) = self.inject(&fault).await {
                 let text = format!("a fault could not be carried out: {fault:?}: {why}");
                 self.note(text.clone());
-                if scenario {
+                if needed {
                     self.account.failed(text);
                 }
             }

@@ -190,6 +190,14 @@ impl Lifetimes {
         }
     }
 
+    /// When the last process of a peer ended, milliseconds; `None` while one runs.
+    #[must_use]
+    pub fn ended_ms(&self, peer: u16) -> Option<u64> {
+        let lifetime = self.by_peer.get(&peer)?;
+        let ended = lifetime.process == Process::Stopped;
+        lifetime.ran.last().filter(|_| ended).map(|(_, to)| *to)
+    }
+
     /// UAVs whose computers run, ascending.
     #[must_use]
     pub fn live_uavs(&self) -> Vec<u16> {

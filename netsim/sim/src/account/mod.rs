@@ -129,6 +129,13 @@ impl Account {
         self.work.ended(now_ms, peer, cause)
     }
 
+    /// When the last process of a peer ended, milliseconds; `None` while one runs, and of those
+    /// that never did.
+    #[must_use]
+    pub fn ended_ms(&self, peer: u16) -> Option<u64> {
+        self.lifetimes.ended_ms(peer)
+    }
+
     /// The battery of a UAV lasts for less: it has something to spend until then.
     pub fn limited(&mut self, peer: u16, until_ms: u64) {
         self.lifetimes.limited(peer, until_ms);
