@@ -79,6 +79,7 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
         spec: scenario.spec,
         run_dir: args.run_dir.clone(),
         program: std::env::current_exe().context("this program's own file")?,
+        sinks: Vec::new(),
     };
     let mut display = Display::new();
     let mut tell = |event: Event| display.show(event);

@@ -136,12 +136,24 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-scenario",
             "skein-survey",
             "skein-lab",
+            "skein-recording",
         ],
+    ),
+    (
+        "skein-recording",
+        &[
+            "skein-netsim",
+            "skein-peer",
+            "skein-flight",
+            "skein-geometry",
+        ],
+        &["tokio", "zenoh", "skein-node", "skein-survey", "skein-lab"],
     ),
     (
         "skein-broker",
         &[
             "skein-interop",
+            "skein-recording",
             "skein-scenario",
             "skein-netsim",
             "skein-link",

@@ -4,6 +4,7 @@ use crate::control::{Control, Request};
 use crate::error::{TrialError, io};
 use crate::faults::{Injector, Schedule};
 use crate::live_world::LiveWorld;
+use crate::observed::Observed;
 use crate::pacer::{Due, Pacer, STEP_MS};
 use crate::peers::{Clock, Peers, Said};
 use crate::process::Used;
@@ -17,6 +18,7 @@ use skein_netsim::spec::Spec;
 use skein_netsim::world::{Fact, Loss, Survey};
 use skein_peer::offload::MissionGeometry;
 use skein_peer::{Mission, Report};
+use skein_recording::Sink;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -58,6 +60,8 @@ pub struct Options {
     pub run_dir: Option<PathBuf>,
     /// This program's own file, which peers run.
     pub program: PathBuf,
+    /// Who looks at it, besides.
+    pub sinks: Vec<Box<dyn Sink>>,
 }
 
 /// Something that happened, for a person.
@@ -123,6 +127,7 @@ pub async fn run(
     }
     let result = flown.map(|()| trial.conclude(wall, &used));
     if let Ok(report) = &result {
+        trial.observed.tell(|o| o.end(report));
         let json = serde_json::to_vec_pretty(report).map_err(|e| io("the report")(e.into()))?;
         private_file(&trial.run_dir.join("report.json"), &json)?;
     }
@@ -139,6 +144,7 @@ struct Trial<'a> {
     world: LiveWorld,
     faults: Schedule,
     account: Account,
+    observed: Observed,
     pacer: Pacer,
     control: Control,
     registered: Registered,
@@ -169,6 +175,7 @@ impl<'a> Trial<'a> {
             seed,
             run_dir,
             program,
+            sinks,
         } = options;
         let id = format!("{}-{}", spec.name, std::process::id());
         let run_dir = match run_dir {
@@ -203,6 +210,8 @@ impl<'a> Trial<'a> {
             peers,
             world: LiveWorld::new(&spec, &geometry, seed),
             faults: Schedule::new(&spec.faults),
+            observed: Observed::new(&spec, &geometry, seed, sinks)
+                .map_err(io("the thread of those who look at it"))?,
             account: Account::new(Setting::new(&spec, Some(&geometry), seed)),
             pacer: Pacer::new(spec.time_scale, Instant::now()),
             control,
@@ -326,6 +335,7 @@ impl<'a> Trial<'a> {
                     Report::Revised { mission } => self.revise(mission),
                     _ => {}
                 }
+                self.observed.reported(self.now_ms, id, &report);
                 if let Some(line) = self.account.reported(self.now_ms, id, &report) {
                     self.note(line);
                 }
@@ -334,6 +344,7 @@ impl<'a> Trial<'a> {
             Some(Said::Crashed { id, radio, why }) => {
                 self.account.radio(&radio);
                 self.account.ended(self.now_ms, id, Cause::Crashed);
+                self.observed.tell(|o| o.ended(self.now_ms, id, false));
                 let text = format!("{} ended by itself: {why}", self.peers.name(id));
                 self.account.failed(text.clone());
                 self.note(text);
@@ -359,6 +370,7 @@ impl<'a> Trial<'a> {
             Err(why) => self.note(format!("a mission cannot be judged: {why}")),
             Ok((left_out, survey, geometry)) => {
                 self.world.revise(Arc::new(survey), &geometry);
+                self.observed.tell(|o| o.given(&geometry));
                 self.account.revised();
                 self.cancelled = mission.cancelled;
                 // Whoever believed the last one finished has not begun this one.
@@ -423,8 +435,13 @@ impl<'a> Trial<'a> {
         }
         if self.world.judge().complete() {
             self.account.covered(self.now_ms);
+            self.observed.tell(|o| o.all_covered(self.now_ms));
         }
         let components = self.world.components(|id| self.peers.on_air(id));
+        self.observed
+            .tell(|o| o.connected(self.now_ms, &components));
+        self.observed
+            .stepped(self.now_ms, &self.world, &|id| self.peers.on_air(id));
         if let Some(text) = self.account.connected(&components) {
             self.note(text);
         }
@@ -445,6 +462,7 @@ impl<'a> Trial<'a> {
 
     /// What truly happened in the world.
     fn fact(&mut self, fact: &Fact) {
+        self.observed.fact(self.now_ms, fact);
         if let Some(text) = self.account.happened(self.now_ms, fact) {
             self.note(text);
         }
@@ -546,6 +564,7 @@ impl<'a> Trial<'a> {
             period_s: f64::from(self.spec.beacon_period_ms) / 1000.0,
         };
         let lines = injector.inject(fault).await?;
+        self.observed.fault(self.now_ms, fault);
         if let Some(text) = lines.first() {
             self.note(text.clone());
         }
@@ -576,6 +595,7 @@ impl<'a> Trial<'a> {
     /// Ends the guard and removes what is not worth keeping.
     async fn close(self, keep: bool) {
         self.peers.close().await;
+        tokio::task::block_in_place(|| self.observed.close());
         if !keep {
             let _ = std::fs::remove_dir_all(&self.run_dir);
         }
