@@ -4,16 +4,19 @@ use crate::bench::BenchArgs;
 use crate::chaos::ChaosArgs;
 use crate::check::CheckArgs;
 use crate::console::OrderArgs;
+use crate::export::ExportArgs;
 use crate::mission::MissionArgs;
 use crate::nfz::NfzArgs;
 use crate::observe::ObserveArgs;
 use crate::peer::PeerArgs;
 use crate::plan::PlanArgs;
+use crate::report::ReportArgs;
 use crate::sim::SimArgs;
 use crate::trial::TrialArgs;
 use crate::why::WhyArgs;
 use crate::{
-    bench, chaos, check, console, exit, mission, nfz, observe, peer, plan, sim, trial, why,
+    bench, chaos, check, console, exit, export, mission, nfz, observe, peer, plan, report, sim,
+    trial, why,
 };
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -62,6 +65,10 @@ pub enum Verb {
     Plan(PlanArgs),
     /// Measures what the algorithms reach, on cases drawn from seeds.
     Bench(BenchArgs),
+    /// The report of a run, or of a batch of runs, as one HTML file.
+    Report(ReportArgs),
+    /// A recorded run as CSV, lines of JSON, GeoJSON or KML.
+    Export(ExportArgs),
     /// Outlives a trial and ends what it leaves behind.
     #[command(name = skein_broker::process::GUARD_COMMAND, hide = true)]
     Guard,
@@ -96,6 +103,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Check(args) => check::run(args),
         Verb::Plan(args) => Ok(plan::run(args)?),
         Verb::Bench(args) => bench::run(args),
+        Verb::Report(args) => report::run(args),
+        Verb::Export(args) => export::run(args),
         Verb::Guard => {
             skein_broker::process::guard();
             Ok(ExitCode::from(exit::OK))

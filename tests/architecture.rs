@@ -137,6 +137,7 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-survey",
             "skein-lab",
             "skein-recording",
+            "mcap",
         ],
     ),
     (
@@ -147,6 +148,11 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-flight",
             "skein-geometry",
         ],
+        &["tokio", "zenoh", "skein-node", "skein-survey", "skein-lab"],
+    ),
+    (
+        "skein-report",
+        &["skein-recording", "skein-netsim", "skein-geometry"],
         &["tokio", "zenoh", "skein-node", "skein-survey", "skein-lab"],
     ),
     (

@@ -8,7 +8,7 @@ use crate::observed::Observed;
 use crate::pacer::{Due, Pacer, STEP_MS};
 use crate::peers::{Clock, Peers, Said};
 use crate::process::Used;
-use crate::registry::{ConsoleEntry, Entry, Registered, private_dir, private_file, shared_dir};
+use crate::registry::{ConsoleEntry, Entry, Registered, private_dir, shared_dir};
 use skein_console::{Answer, Asked, Token};
 use skein_netsim::account::{
     Account, Cause, Details, Ending, Live, Processes, RunReport, Setting, secs,
@@ -19,6 +19,8 @@ use skein_netsim::world::{Fact, Loss, Survey};
 use skein_peer::offload::MissionGeometry;
 use skein_peer::{Mission, Report};
 use skein_recording::Sink;
+use skein_recording::run_dir::{self, Manifest};
+use skein_recording::writer::Writer;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -62,7 +64,12 @@ pub struct Options {
     pub program: PathBuf,
     /// Who looks at it, besides.
     pub sinks: Vec<Box<dyn Sink>>,
+    /// What its run directory says of it.
+    pub manifest: Manifest,
 }
+
+/// Run directories of passed trials that are kept, the newest; a helsinki takes some MB.
+const KEPT_TRIALS: usize = 10;
 
 /// Something that happened, for a person.
 #[derive(Clone, Debug, PartialEq)]
@@ -114,7 +121,8 @@ pub async fn run(
     stop: impl Future<Output = ()>,
     tell: &mut (dyn FnMut(Event) + Send),
 ) -> Result<RunReport, TrialError> {
-    let keep = options.run_dir.is_some();
+    let (keep, disposable) = (options.run_dir.is_some(), options.run_dir.is_none());
+    let manifest = options.manifest.clone();
     let mut trial = Trial::prepare(options, tell).await?;
     let flown = tokio::select! {
         flown = trial.fly() => flown,
@@ -128,12 +136,27 @@ pub async fn run(
     let result = flown.map(|()| trial.conclude(wall, &used));
     if let Ok(report) = &result {
         trial.observed.tell(|o| o.end(report));
-        let json = serde_json::to_vec_pretty(report).map_err(|e| io("the report")(e.into()))?;
-        private_file(&trial.run_dir.join("report.json"), &json)?;
     }
-    trial
-        .close(keep || result.as_ref().is_ok_and(|r| !r.passed))
-        .await;
+    let run_dir = trial.run_dir.clone();
+    trial.close().await;
+    let Ok(report) = &result else {
+        if !keep {
+            let _ = std::fs::remove_dir_all(&run_dir);
+        }
+        return result;
+    };
+    let disposable = disposable && report.passed;
+    let manifest = Manifest {
+        disposable,
+        ..manifest
+    };
+    manifest
+        .conclude(&run_dir, report)
+        .map_err(io(run_dir.display().to_string()))?;
+    if disposable {
+        run_dir::strip(&run_dir);
+        run_dir::prune(&shared_dir()?, KEPT_TRIALS);
+    }
     result
 }
 
@@ -175,7 +198,8 @@ impl<'a> Trial<'a> {
             seed,
             run_dir,
             program,
-            sinks,
+            mut sinks,
+            manifest,
         } = options;
         let id = format!("{}-{}", spec.name, std::process::id());
         let run_dir = match run_dir {
@@ -186,6 +210,12 @@ impl<'a> Trial<'a> {
         let run_dir = run_dir
             .canonicalize()
             .map_err(io(run_dir.display().to_string()))?;
+        manifest
+            .write(&run_dir)
+            .map_err(io(run_dir.display().to_string()))?;
+        let recording = run_dir.join(run_dir::RECORDING);
+        let writer = Writer::create(&recording).map_err(io(recording.display().to_string()))?;
+        sinks.push(Box::new(writer));
         let token = Token::draw()?;
         let control = Control::listen(0, token.clone())
             .await
@@ -592,13 +622,10 @@ impl<'a> Trial<'a> {
         })
     }
 
-    /// Ends the guard and removes what is not worth keeping.
-    async fn close(self, keep: bool) {
+    /// Ends the guard, and waits until everything that was said is on the disk.
+    async fn close(self) {
         self.peers.close().await;
         tokio::task::block_in_place(|| self.observed.close());
-        if !keep {
-            let _ = std::fs::remove_dir_all(&self.run_dir);
-        }
     }
 }
 

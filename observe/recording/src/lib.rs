@@ -12,6 +12,10 @@
 //! | [`observer`] | from a driver's values to the model |
 //! | [`simulated`] | a simulated run that is observed |
 //! | [`cells`] | who has which cell, folded from scenes and events |
+//! | [`writer`], [`reader`] | a run as an MCAP file; [`channels`] are its channels, [`foxglove`] its messages for Foxglove |
+//! | [`run_dir`] | the directory of a run: manifest, recording, report |
+//! | [`export`] | a run as CSV, lines of JSON, GeoJSON, KML |
+//! | [`tracks`] | where each UAV flew, life by life |
 //!
 //! ```
 //! use skein_netsim::{Prepared, runs::Wanted, world::fixture::square};
@@ -25,11 +29,18 @@
 //! ```
 
 pub mod cells;
+pub mod channels;
+pub mod export;
+pub mod foxglove;
 pub mod model;
 pub mod observer;
+pub mod reader;
+pub mod run_dir;
 pub mod simulated;
 pub mod sink;
 mod stage;
+pub mod tracks;
+pub mod writer;
 
 pub use model::{End, Event, Frame, Record, Scene};
 pub use observer::Observer;
