@@ -4,19 +4,21 @@ use crate::bench::BenchArgs;
 use crate::chaos::ChaosArgs;
 use crate::check::CheckArgs;
 use crate::console::OrderArgs;
+use crate::export::ExportArgs;
 use crate::mission::MissionArgs;
 use crate::nfz::NfzArgs;
 use crate::observe::ObserveArgs;
 use crate::peer::PeerArgs;
 use crate::plan::PlanArgs;
+use crate::report::ReportArgs;
 use crate::schema::SchemaArgs;
 use crate::shell::{CompletionsArgs, ManArgs};
 use crate::sim::SimArgs;
 use crate::trial::TrialArgs;
 use crate::why::WhyArgs;
 use crate::{
-    bench, chaos, check, console, exit, mission, nfz, observe, peer, plan, schema, shell, sim,
-    trial, why,
+    bench, chaos, check, console, exit, export, mission, nfz, observe, peer, plan, report, schema,
+    shell, sim, trial, why,
 };
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -67,6 +69,10 @@ pub enum Verb {
     Plan(PlanArgs),
     /// Measures what the algorithms reach, on cases drawn from seeds.
     Bench(BenchArgs),
+    /// The report of a run, or of a batch of runs, as one HTML file.
+    Report(ReportArgs),
+    /// A recorded run as CSV, lines of JSON, GeoJSON or KML.
+    Export(ExportArgs),
     /// Completions for a shell.
     Completions(CompletionsArgs),
     /// Man pages.
@@ -106,6 +112,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Check(args) => check::run(args),
         Verb::Plan(args) => Ok(plan::run(args)?),
         Verb::Bench(args) => bench::run(args),
+        Verb::Report(args) => report::run(args),
+        Verb::Export(args) => export::run(args),
         Verb::Completions(args) => shell::completions(args),
         Verb::Man(args) => shell::man(args),
         Verb::Guard => {

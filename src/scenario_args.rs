@@ -40,6 +40,15 @@ impl ScenarioArgs {
         skein_scenario::open(self.scenario.as_deref(), &over)
     }
 
+    /// The text of the scenario, as it can be read by now; empty where it cannot.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let name = self.scenario.as_deref().unwrap_or(skein_scenario::DEFAULT);
+        let read = std::fs::read_to_string(name).ok();
+        let builtin = || skein_scenario::builtin_text(name).map(str::to_owned);
+        read.or_else(builtin).unwrap_or_default()
+    }
+
     /// These arguments as one would type them, each after a space.
     #[must_use]
     pub fn as_typed(&self) -> String {

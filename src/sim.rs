@@ -9,12 +9,16 @@ use clap::Args;
 use skein_broker::batch::{self, Batch};
 use skein_netsim::Prepared;
 use skein_netsim::runs::{self, Wanted};
+use skein_netsim::swarm::Outcome;
 use skein_netsim::timeline::timeline;
+use skein_recording::model::scene::Driver;
+use skein_recording::run_dir::{Manifest, RECORDING};
+use skein_recording::simulated;
+use skein_recording::writer::Writer;
 use skein_scenario::Seeds;
-use std::fmt::Write as _;
 use std::io::{BufWriter, Write as _};
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Flies a scenario in virtual time, in this process: the same peers, world and radio
@@ -45,9 +49,13 @@ pub struct SimArgs {
     /// Writes the main events of a single run into this file, one JSON object a line.
     #[arg(long, value_name = "FILE", conflicts_with = "seeds")]
     pub history: Option<PathBuf>,
+    /// Keeps the recording of a single run in this directory, with its manifest and its report:
+    /// for `skein report`, `skein export`, Foxglove and Python.
+    #[arg(long, value_name = "DIR", conflicts_with = "seeds")]
+    pub run_dir: Option<PathBuf>,
     /// Flies only until some time, and tells what a peer does then and why: `3@120` is UAV 3
     /// at 120 s.
-    #[arg(long, value_name = "UAV@SECONDS", value_parser = moment, conflicts_with_all = ["seeds", "history"])]
+    #[arg(long, value_name = "UAV@SECONDS", value_parser = moment, conflicts_with_all = ["seeds", "history", "run_dir"])]
     pub why: Option<(u16, u64)>,
     /// How the result is printed.
     #[arg(long, value_enum, default_value_t = Format::Text)]
@@ -125,11 +133,11 @@ fn one(args: &SimArgs, prepared: &Prepared) -> anyhow::Result<bool> {
         events: true,
         baseline: true,
     };
-    let outcome = if args.storm {
-        let free_ms = runs::failure_free_makespan_ms(prepared);
-        runs::storm(prepared, seed, free_ms, wanted)
-    } else {
-        runs::planned(prepared, seed, wanted)
+    let free_ms = args.storm.then(|| runs::failure_free_makespan_ms(prepared));
+    let outcome = match (&args.run_dir, free_ms) {
+        (Some(dir), _) => recorded(args, prepared, (seed, free_ms), (wanted, dir))?,
+        (None, Some(free_ms)) => runs::storm(prepared, seed, free_ms, wanted),
+        (None, None) => runs::planned(prepared, seed, wanted),
     };
     if let Some(path) = &args.history {
         let file = std::fs::File::create(path)
@@ -152,13 +160,40 @@ fn one(args: &SimArgs, prepared: &Prepared) -> anyhow::Result<bool> {
     Ok(report.passed)
 }
 
+/// Runs once, and keeps its recording, manifest and report in a directory.
+fn recorded(
+    args: &SimArgs,
+    prepared: &Prepared,
+    (seed, free_ms): (u64, Option<u64>),
+    (wanted, dir): (Wanted, &Path),
+) -> anyhow::Result<Outcome> {
+    std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
+    let writes = || format!("cannot write into {}", dir.display());
+    let manifest = Manifest {
+        scenario_text: args.scenario.text(),
+        command: replay(args, seed),
+        ..Manifest::new(&prepared.spec.name, seed, Driver::Sim)
+    };
+    manifest.write(dir).with_context(writes)?;
+    let mut writer = Writer::create(&dir.join(RECORDING)).with_context(writes)?;
+    let outcome =
+        simulated::fly(prepared, seed, free_ms, wanted, &mut writer).with_context(writes)?;
+    writer.finish().with_context(writes)?;
+    manifest
+        .conclude(dir, &outcome.report)
+        .with_context(writes)?;
+    let dir = dir.display();
+    eprintln!("recorded in {dir}: skein report {dir} -o report.html");
+    Ok(outcome)
+}
+
 fn many(args: &SimArgs, prepared: &Prepared, seeds: Seeds) -> anyhow::Result<bool> {
     let batch = Batch {
         seeds: seeds.from..seeds.to,
         storm: args.storm,
         jobs: args.jobs,
     };
-    let total = batch::run(prepared, &batch, &|outcome| {
+    let mut total = batch::run(prepared, &batch, &|outcome| {
         let report = &outcome.report;
         eprintln!("seed {} failed: {}", report.seed, report.reasons.join("; "));
         for v in outcome.violations().iter().take(3) {
@@ -166,6 +201,7 @@ fn many(args: &SimArgs, prepared: &Prepared, seeds: Seeds) -> anyhow::Result<boo
         }
         eprintln!("replay: {}", replay(args, report.seed));
     });
+    total.replay = replay_without_seed(args);
     match args.format {
         Format::Json => exit::print(serde_json::to_string(&total)?)?,
         Format::Text => exit::print(&total)?,
@@ -175,13 +211,13 @@ fn many(args: &SimArgs, prepared: &Prepared, seeds: Seeds) -> anyhow::Result<boo
 
 /// The command that replays a seed.
 fn replay(args: &SimArgs, seed: u64) -> String {
-    let mut s = "skein sim".to_owned();
-    s.push_str(&args.scenario.as_typed());
-    let _ = write!(s, " --seed {seed}");
-    if args.storm {
-        s.push_str(" --storm");
-    }
-    s
+    format!("{} {seed}", replay_without_seed(args))
+}
+
+/// The same, but for the number at its end.
+fn replay_without_seed(args: &SimArgs) -> String {
+    let storm = if args.storm { " --storm" } else { "" };
+    format!("skein sim{}{storm} --seed", args.scenario.as_typed())
 }
 
 #[cfg(test)]

@@ -7,6 +7,8 @@ use anyhow::Context;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use skein_broker::{Event, Options, Progress, TrialError};
+use skein_recording::model::scene::Driver;
+use skein_recording::run_dir::Manifest;
 use skein_scenario::Severity;
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -33,8 +35,9 @@ pub struct TrialArgs {
     /// Stops after so many scenario seconds if the mission is not over by then.
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..))]
     pub max_time: Option<u32>,
-    /// Keeps configurations, journals, logs and the report in this directory. Without
-    /// it they are kept only if the mission failed.
+    /// Keeps configurations, journals and logs in this directory, beside recording,
+    /// manifest and report. Without it those three are kept of the last ten trials that
+    /// went well, and everything of one that failed.
     #[arg(long, value_name = "DIR")]
     pub run_dir: Option<PathBuf>,
     /// How the report is printed.
@@ -73,12 +76,23 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
         spec.faults
             .retain(|f| f.at_ms < u64::from(longest_s) * 1000);
     }
+    let manifest = Manifest {
+        scenario_text: args.scenario.text(),
+        command: format!(
+            "skein trial{} --seed {}",
+            args.scenario.as_typed(),
+            scenario.spec.seed
+        ),
+        ..Manifest::new(&scenario.spec.name, scenario.spec.seed, Driver::Live)
+    };
     let options = Options {
         seed: scenario.spec.seed,
         geometry: scenario.geometry,
         spec: scenario.spec,
         run_dir: args.run_dir.clone(),
         program: std::env::current_exe().context("this program's own file")?,
+        sinks: Vec::new(),
+        manifest,
     };
     let mut display = Display::new();
     let mut tell = |event: Event| display.show(event);
@@ -87,6 +101,7 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
     display.end();
     match ended {
         Ok(report) => {
+            display.recorded();
             match args.format {
                 Format::Text => exit::print(&report)?,
                 Format::Json => exit::print(serde_json::to_string_pretty(&report)?)?,
@@ -112,6 +127,7 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
 /// A bar on a terminal, plain lines elsewhere.
 struct Display {
     bar: Option<ProgressBar>,
+    run_dir: Option<PathBuf>,
 }
 
 /// The bar counts in tenths of a percent.
@@ -126,13 +142,22 @@ impl Display {
             }
             bar
         });
-        Self { bar }
+        Self { bar, run_dir: None }
+    }
+
+    /// Says where the trial was recorded.
+    fn recorded(&self) {
+        if let Some(dir) = &self.run_dir {
+            let dir = dir.display();
+            eprintln!("recorded in {dir}: skein report {dir} -o report.html");
+        }
     }
 
     fn show(&mut self, event: Event) {
         match event {
             Event::Begun { id, run_dir } => {
                 self.line(&format!("trial {id} in {}", run_dir.display()));
+                self.run_dir = Some(run_dir);
             }
             Event::Note { time_s, text } => self.line(&format!("{time_s:7.1} s  {text}")),
             Event::Progress(progress) => match &self.bar {

@@ -136,12 +136,30 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-scenario",
             "skein-survey",
             "skein-lab",
+            "skein-recording",
+            "mcap",
         ],
+    ),
+    (
+        "skein-recording",
+        &[
+            "skein-netsim",
+            "skein-peer",
+            "skein-flight",
+            "skein-geometry",
+        ],
+        &["tokio", "zenoh", "skein-node", "skein-survey", "skein-lab"],
+    ),
+    (
+        "skein-report",
+        &["skein-recording", "skein-netsim", "skein-geometry"],
+        &["tokio", "zenoh", "skein-node", "skein-survey", "skein-lab"],
     ),
     (
         "skein-broker",
         &[
             "skein-interop",
+            "skein-recording",
             "skein-scenario",
             "skein-netsim",
             "skein-link",

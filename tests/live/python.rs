@@ -30,23 +30,52 @@ fn main() {
     let place = Place::new();
     let mut trial = Trial::start(&place, "python", &["--time-scale", "4"]);
     trial.wait_for_time(6.0, Duration::from_secs(120));
-    let entry = place.entry();
-    let out = std::process::Command::new(python)
-        .arg(support::root().join("examples/observe.py"))
-        .args([entry["observe"].as_str().unwrap(), "3"])
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&out.stdout) + String::from_utf8_lossy(&out.stderr);
+    let script = |file: &str, args: &[&str]| {
+        let out = std::process::Command::new(&python)
+            .arg(support::root().join(file))
+            .args(args)
+            .env("TMPDIR", place.path(""))
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&out.stdout) + String::from_utf8_lossy(&out.stderr);
+        (out.status.code(), said.into_owned())
+    };
+    // Without arguments it finds the trial, and tells degrees.
+    let (_, said) = script("examples/observe.py", &[]);
     for expected in [
         "live/v3/state/",
         "live/v3/beacon/",
         "live/v3/cover/",
         "peer 1 life",
+        "'lat_deg': 60.1",
+        "'activity': 'covering'",
     ] {
         let begin: String = said.chars().take(1000).collect();
         assert!(said.contains(expected), "no {expected:?} in: {begin}");
     }
+    let entry = place.entry();
+    let endpoint = entry["observe"].as_str().unwrap();
+    let (code, named) = script("examples/observe.py", &[endpoint, "2"]);
+    assert!(
+        code == Some(0) && named.contains("'lon_deg': 24.9"),
+        "{named}"
+    );
     trial.interrupt();
     trial.wait(Duration::from_secs(20));
+    let (code, none) = script("examples/observe.py", &[]);
+    assert!(
+        code == Some(1) && none.contains("start one with `skein trial`"),
+        "{none}"
+    );
+    assert!(!none.contains("Traceback"), "{none}");
+    // A simulated run, recorded, reads back.
+    let run_dir = place.path("run");
+    let (code, told) = place.skein(&["sim", "field", "--run-dir", &run_dir]);
+    assert!(code == 0 && told.contains("recorded in"), "{told}");
+    let (code, recording) = script("tests/live/recording.py", &[&run_dir]);
+    assert!(
+        code == Some(0) && recording.contains("recording: ok"),
+        "{recording}"
+    );
     println!("python: ok, {} records seen", said.lines().count());
 }

@@ -14,6 +14,7 @@
 //! | `transports` | the proxies of all pairs, dark while their links are down |
 //! | `faults` | which faults are to come, what each does and what should follow |
 //! | [`live_world`] | the world and its radio links, as a trial uses them |
+//! | `observed` | what a trial tells those who look at it |
 //! | [`stream`] | percepts and setpoints, one loopback stream a peer |
 //! | [`proxy`] | one transport, which can go dark |
 //! | [`encounters`], [`auctions`], [`pursuits`] | many encounters, task auctions or pursuits at once, without a trial; `seeds` runs them on all threads |
@@ -31,6 +32,7 @@ mod error;
 mod faults;
 mod live_peer;
 pub mod live_world;
+mod observed;
 pub mod pacer;
 mod peers;
 pub mod process;

@@ -118,6 +118,18 @@ impl LiveWorld {
         self.world.follows(uav, revision);
     }
 
+    /// The world itself.
+    #[must_use]
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Who hears whom.
+    #[must_use]
+    pub fn links(&self) -> &LinkTable {
+        &self.links
+    }
+
     /// What was seen and what went wrong.
     #[must_use]
     pub fn judge(&self) -> &Judge {

@@ -4,10 +4,11 @@ use crate::control::{Control, Request};
 use crate::error::{TrialError, io};
 use crate::faults::{Injector, Schedule};
 use crate::live_world::LiveWorld;
+use crate::observed::Observed;
 use crate::pacer::{Due, Pacer, STEP_MS};
 use crate::peers::{Clock, Peers, Said};
 use crate::process::Used;
-use crate::registry::{ConsoleEntry, Entry, Registered, private_dir, private_file, shared_dir};
+use crate::registry::{ConsoleEntry, Entry, Registered, private_dir, shared_dir};
 use skein_console::{Answer, Asked, Token};
 use skein_netsim::account::{
     Account, Cause, Details, Ending, Live, Processes, RunReport, Setting, secs,
@@ -17,6 +18,9 @@ use skein_netsim::spec::Spec;
 use skein_netsim::world::{Fact, Loss, Survey};
 use skein_peer::offload::MissionGeometry;
 use skein_peer::{Mission, Report};
+use skein_recording::Sink;
+use skein_recording::run_dir::{self, Manifest};
+use skein_recording::writer::Writer;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -58,7 +62,14 @@ pub struct Options {
     pub run_dir: Option<PathBuf>,
     /// This program's own file, which peers run.
     pub program: PathBuf,
+    /// Who looks at it, besides.
+    pub sinks: Vec<Box<dyn Sink>>,
+    /// What its run directory says of it.
+    pub manifest: Manifest,
 }
+
+/// Run directories of passed trials that are kept, the newest; a helsinki takes some MB.
+const KEPT_TRIALS: usize = 10;
 
 /// Something that happened, for a person.
 #[derive(Clone, Debug, PartialEq)]
@@ -110,7 +121,8 @@ pub async fn run(
     stop: impl Future<Output = ()>,
     tell: &mut (dyn FnMut(Event) + Send),
 ) -> Result<RunReport, TrialError> {
-    let keep = options.run_dir.is_some();
+    let (keep, disposable) = (options.run_dir.is_some(), options.run_dir.is_none());
+    let manifest = options.manifest.clone();
     let mut trial = Trial::prepare(options, tell).await?;
     let flown = tokio::select! {
         flown = trial.fly() => flown,
@@ -123,12 +135,28 @@ pub async fn run(
     }
     let result = flown.map(|()| trial.conclude(wall, &used));
     if let Ok(report) = &result {
-        let json = serde_json::to_vec_pretty(report).map_err(|e| io("the report")(e.into()))?;
-        private_file(&trial.run_dir.join("report.json"), &json)?;
+        trial.observed.tell(|o| o.end(report));
     }
-    trial
-        .close(keep || result.as_ref().is_ok_and(|r| !r.passed))
-        .await;
+    let run_dir = trial.run_dir.clone();
+    trial.close().await;
+    let Ok(report) = &result else {
+        if !keep {
+            let _ = std::fs::remove_dir_all(&run_dir);
+        }
+        return result;
+    };
+    let disposable = disposable && report.passed;
+    let manifest = Manifest {
+        disposable,
+        ..manifest
+    };
+    manifest
+        .conclude(&run_dir, report)
+        .map_err(io(run_dir.display().to_string()))?;
+    if disposable {
+        run_dir::strip(&run_dir);
+        run_dir::prune(&shared_dir()?, KEPT_TRIALS);
+    }
     result
 }
 
@@ -139,6 +167,7 @@ struct Trial<'a> {
     world: LiveWorld,
     faults: Schedule,
     account: Account,
+    observed: Observed,
     pacer: Pacer,
     control: Control,
     registered: Registered,
@@ -169,6 +198,8 @@ impl<'a> Trial<'a> {
             seed,
             run_dir,
             program,
+            mut sinks,
+            manifest,
         } = options;
         let id = format!("{}-{}", spec.name, std::process::id());
         let run_dir = match run_dir {
@@ -179,6 +210,12 @@ impl<'a> Trial<'a> {
         let run_dir = run_dir
             .canonicalize()
             .map_err(io(run_dir.display().to_string()))?;
+        manifest
+            .write(&run_dir)
+            .map_err(io(run_dir.display().to_string()))?;
+        let recording = run_dir.join(run_dir::RECORDING);
+        let writer = Writer::create(&recording).map_err(io(recording.display().to_string()))?;
+        sinks.push(Box::new(writer));
         let token = Token::draw()?;
         let control = Control::listen(0, token.clone())
             .await
@@ -203,6 +240,8 @@ impl<'a> Trial<'a> {
             peers,
             world: LiveWorld::new(&spec, &geometry, seed),
             faults: Schedule::new(&spec.faults),
+            observed: Observed::new(&spec, &geometry, seed, sinks)
+                .map_err(io("the thread of those who look at it"))?,
             account: Account::new(Setting::new(&spec, Some(&geometry), seed)),
             pacer: Pacer::new(spec.time_scale, Instant::now()),
             control,
@@ -326,6 +365,7 @@ impl<'a> Trial<'a> {
                     Report::Revised { mission } => self.revise(mission),
                     _ => {}
                 }
+                self.observed.reported(self.now_ms, id, &report);
                 if let Some(line) = self.account.reported(self.now_ms, id, &report) {
                     self.note(line);
                 }
@@ -334,6 +374,7 @@ impl<'a> Trial<'a> {
             Some(Said::Crashed { id, radio, why }) => {
                 self.account.radio(&radio);
                 self.account.ended(self.now_ms, id, Cause::Crashed);
+                self.observed.tell(|o| o.ended(self.now_ms, id, false));
                 let text = format!("{} ended by itself: {why}", self.peers.name(id));
                 self.account.failed(text.clone());
                 self.note(text);
@@ -359,6 +400,7 @@ impl<'a> Trial<'a> {
             Err(why) => self.note(format!("a mission cannot be judged: {why}")),
             Ok((left_out, survey, geometry)) => {
                 self.world.revise(Arc::new(survey), &geometry);
+                self.observed.tell(|o| o.given(&geometry));
                 self.account.revised();
                 self.cancelled = mission.cancelled;
                 // Whoever believed the last one finished has not begun this one.
@@ -423,8 +465,13 @@ impl<'a> Trial<'a> {
         }
         if self.world.judge().complete() {
             self.account.covered(self.now_ms);
+            self.observed.tell(|o| o.all_covered(self.now_ms));
         }
         let components = self.world.components(|id| self.peers.on_air(id));
+        self.observed
+            .tell(|o| o.connected(self.now_ms, &components));
+        self.observed
+            .stepped(self.now_ms, &self.world, &|id| self.peers.on_air(id));
         if let Some(text) = self.account.connected(&components) {
             self.note(text);
         }
@@ -445,6 +492,7 @@ impl<'a> Trial<'a> {
 
     /// What truly happened in the world.
     fn fact(&mut self, fact: &Fact) {
+        self.observed.fact(self.now_ms, fact);
         if let Some(text) = self.account.happened(self.now_ms, fact) {
             self.note(text);
         }
@@ -547,6 +595,7 @@ impl<'a> Trial<'a> {
             period_s: f64::from(self.spec.beacon_period_ms) / 1000.0,
         };
         let lines = injector.inject(fault).await?;
+        self.observed.fault(self.now_ms, fault);
         if let Some(text) = lines.first() {
             self.note(text.clone());
         }
@@ -574,12 +623,10 @@ impl<'a> Trial<'a> {
         })
     }
 
-    /// Ends the guard and removes what is not worth keeping.
-    async fn close(self, keep: bool) {
+    /// Ends the guard, and waits until everything that was said is on the disk.
+    async fn close(self) {
         self.peers.close().await;
-        if !keep {
-            let _ = std::fs::remove_dir_all(&self.run_dir);
-        }
+        tokio::task::block_in_place(|| self.observed.close());
     }
 }
 

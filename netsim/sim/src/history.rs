@@ -11,6 +11,7 @@ use skein_geometry::frame::Pose;
 use skein_geometry::hash::Fnv;
 use skein_peer::Report;
 use skein_peer::output::Status;
+use std::borrow::Cow;
 
 /// One kept event.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -38,10 +39,29 @@ pub enum What {
     Components(Vec<Vec<u16>>),
     /// The last coverable cell was seen.
     Covered,
+    /// A UAV flew into a no-fly zone.
+    ZoneEntry {
+        /// Which UAV.
+        peer: u16,
+        /// Which zone, by its place in the mission.
+        zone: usize,
+    },
+    /// An airframe is gone, by no fault that took it.
+    Lost {
+        /// Which UAV.
+        peer: u16,
+    },
+    /// An airframe began or ceased to loiter by itself.
+    Failsafe {
+        /// Which UAV.
+        peer: u16,
+        /// Whether it began.
+        on: bool,
+    },
     /// A rule was broken.
     Violation {
         /// Which rule.
-        check: &'static str,
+        check: Cow<'static, str>,
         /// By or at which peer.
         peer: Option<u16>,
         /// How.

@@ -31,6 +31,19 @@ pub struct Wanted {
 /// Runs once with these faults. A panic becomes a violation of S12 that names the seed.
 #[must_use]
 pub fn run(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, wanted: Wanted) -> Outcome {
+    watched(prepared, seed, faults, wanted, None)
+}
+
+/// The same, looked at before its first event, every so often and at its end: nothing of it
+/// depends on that.
+#[must_use]
+pub fn watched(
+    prepared: &Prepared,
+    seed: u64,
+    faults: Vec<TimedFault>,
+    wanted: Wanted,
+    watch: Option<&mut Watch<'_>>,
+) -> Outcome {
     // A baseline knows of one mission and of one UAV under each id.
     let replaced =
         |f: &TimedFault| f.fault.changes_mission() || matches!(f.fault, Fault::Twin { .. });
@@ -39,7 +52,7 @@ pub fn run(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, wanted: Want
         && fault_generator::kills(&faults) as usize <= comparable
         && !faults.iter().any(replaced);
     let compared = compare.then(|| faults.clone());
-    let mut outcome = guarded(prepared, seed, faults, wanted.events);
+    let mut outcome = guarded(prepared, seed, faults, (wanted.events, watch));
     if let Some(faults) = compared
         && outcome.report.makespan_ms.is_some()
     {
@@ -48,6 +61,14 @@ pub fn run(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, wanted: Want
             .compare(omniscient_baseline::makespan_ms(prepared, seed, &faults));
     }
     outcome
+}
+
+/// Looks at a swarm while it runs.
+pub struct Watch<'a> {
+    /// How often, milliseconds of scenario time.
+    pub every_ms: u64,
+    /// What is done with what is seen.
+    pub look: &'a mut dyn FnMut(&Swarm),
 }
 
 /// Runs a seed with the scenario's own faults.
@@ -68,15 +89,26 @@ pub fn storm(prepared: &Prepared, seed: u64, failure_free_ms: u64, wanted: Wante
     outcome
 }
 
+/// What happens to which UAVs in a seed: the scenario's own faults, or those of its storm where
+/// the makespan without faults is given.
+#[must_use]
+pub fn faults_of(
+    prepared: &Prepared,
+    seed: u64,
+    failure_free_ms: Option<u64>,
+) -> (Prepared, Vec<TimedFault>) {
+    let storm = failure_free_ms.map(|ms| fault_generator::draw(&prepared.spec, seed, ms));
+    match storm {
+        Some(storm) => (prepared.with_uavs(storm.uavs), storm.faults),
+        None => (prepared.clone(), prepared.spec.faults.clone()),
+    }
+}
+
 /// The swarm of a seed at some time, or at its end if that is sooner: with the scenario's own
 /// faults, or with those of its storm where the makespan without faults is given.
 #[must_use]
 pub fn until(prepared: &Prepared, seed: u64, failure_free_ms: Option<u64>, at_ms: u64) -> Swarm {
-    let storm = failure_free_ms.map(|ms| fault_generator::draw(&prepared.spec, seed, ms));
-    let (prepared, faults) = match storm {
-        Some(storm) => (prepared.with_uavs(storm.uavs), storm.faults),
-        None => (prepared.clone(), prepared.spec.faults.clone()),
-    };
+    let (prepared, faults) = faults_of(prepared, seed, failure_free_ms);
     let mut swarm = Swarm::new(&prepared, seed, faults, false);
     swarm.run_until(at_ms);
     swarm
@@ -94,8 +126,19 @@ pub fn failure_free_makespan_ms(prepared: &Prepared) -> u64 {
         .unwrap_or(longest_ms)
 }
 
-fn guarded(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, keep: bool) -> Outcome {
-    let run = std::panic::AssertUnwindSafe(|| Swarm::new(prepared, seed, faults, keep).run());
+fn guarded(
+    prepared: &Prepared,
+    seed: u64,
+    faults: Vec<TimedFault>,
+    (keep, watch): (bool, Option<&mut Watch<'_>>),
+) -> Outcome {
+    let run = std::panic::AssertUnwindSafe(|| {
+        let swarm = Swarm::new(prepared, seed, faults, keep);
+        match watch {
+            Some(watch) => swarm.run_watched(watch.every_ms, watch.look),
+            None => swarm.run(),
+        }
+    });
     std::panic::catch_unwind(run).unwrap_or_else(|payload| {
         let text = payload
             .downcast_ref::<&str>()
@@ -103,7 +146,7 @@ fn guarded(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>, keep: bool) 
             .or_else(|| payload.downcast_ref::<String>().cloned())
             .unwrap_or_else(|| "a panic without words".to_owned());
         let violation = Violation {
-            check: "S12",
+            check: "S12".into(),
             seed,
             time_ms: 0,
             peer: None,

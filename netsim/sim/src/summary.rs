@@ -5,7 +5,7 @@ use crate::check::{Grade, Violation};
 use crate::spec::Spec;
 use crate::swarm::Outcome;
 use crate::troubles::{KINDS, Kind, RARE};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use skein_geometry::hash::Fnv;
 use skein_peer::CoverageTask;
 use skein_peer::wire::limits::MEMBERS_MAX;
@@ -16,7 +16,7 @@ use std::fmt;
 const QUOTED: usize = 20;
 
 /// Three figures that describe many.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// Half are at most this.
     pub p50: f64,
@@ -48,7 +48,7 @@ impl Spread {
 }
 
 /// How often a batch reached the hard places.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Places {
     /// Takeovers of cells that had been taken over before.
     pub takeover_of_takeover: u32,
@@ -62,9 +62,60 @@ pub struct Places {
     pub staggered_revision: u32,
 }
 
+/// The figures of one run of a batch.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SeedFigures {
+    /// Its seed.
+    pub seed: u64,
+    /// Whether it is as it must be.
+    pub passed: bool,
+    /// When the last coverable cell was seen, ms.
+    pub makespan_ms: Option<u64>,
+    /// The makespan over that of the omniscient baseline.
+    pub makespan_over_baseline: Option<f64>,
+    /// The makespan over the work bound.
+    pub makespan_over_work_bound: Option<f64>,
+    /// Share of the coverable cells that was seen, 0 to 1.
+    pub covered_share: f64,
+    /// UAVs that were gone at the end.
+    pub dead: u32,
+    /// From each death to its detection by each live peer, seconds.
+    pub detect_s: Vec<f64>,
+    /// From the detection of each death to the last of its cells being listed again, seconds.
+    pub takeover_s: Vec<f64>,
+    /// The smallest distance of two airborne UAVs, metres.
+    pub nearest_approach_m: Option<f64>,
+    /// Bytes transmitted per second that a peer ran.
+    pub bytes_per_peer_s: f64,
+}
+
+impl SeedFigures {
+    fn of(o: &Outcome) -> Self {
+        let r = &o.report;
+        Self {
+            seed: r.seed,
+            passed: r.passed,
+            makespan_ms: r.makespan_ms,
+            makespan_over_baseline: r.makespan_over_baseline,
+            makespan_over_work_bound: r.makespan_over_work_bound,
+            covered_share: r.coverage.covered_share,
+            dead: o.dead,
+            detect_s: detect_s(o),
+            takeover_s: takeover_s(o),
+            nearest_approach_m: r.nearest_approach_m,
+            bytes_per_peer_s: r.radio.bytes_per_peer_s,
+        }
+    }
+}
+
 /// The figures of a batch.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// The command that flies one of the runs again, but for the number of its seed, which
+    /// comes last; empty where nobody said.
+    pub replay: String,
     /// Runs.
     pub runs: usize,
     /// Runs that covered everything and ended in time.
@@ -110,6 +161,8 @@ pub struct Summary {
     pub quoted: Vec<Violation>,
     /// Hash over the histories of all runs, in the order of seeds, hexadecimal.
     pub history_hash: String,
+    /// Each run, in the order of seeds.
+    pub seeds: Vec<SeedFigures>,
 }
 
 impl fmt::Display for Summary {
@@ -170,6 +223,8 @@ impl fmt::Display for Summary {
 pub fn summarise(mut runs: Vec<Outcome>, wall_s: f64) -> Summary {
     runs.sort_by_key(Outcome::seed);
     let mut s = Summary {
+        scenario: (runs.first()).map_or_else(String::new, |o| o.report.scenario.clone()),
+        seeds: runs.iter().map(SeedFigures::of).collect(),
         runs: runs.len(),
         completed: runs.iter().filter(|o| o.report.completed).count(),
         infeasible: runs.iter().filter(|o| o.infeasible()).count(),

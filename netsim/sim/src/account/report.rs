@@ -7,7 +7,7 @@
 use super::lifetimes::Cause;
 use crate::check::{Findings, Violation};
 use crate::world::Judge;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use skein_link::{RadioCounters, Reason};
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 pub const SCHEMA_VERSION: u32 = 1;
 
 /// What a run came to.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunReport {
     /// [`SCHEMA_VERSION`] of the program that wrote it.
     pub schema_version: u32,
@@ -88,7 +88,7 @@ pub struct RunReport {
 }
 
 /// What moved the run on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Driver {
     /// Virtual time, in one process.
@@ -99,7 +99,7 @@ pub enum Driver {
 }
 
 /// What only a simulated run can tell.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Simulated {
     /// Hash of the history, hexadecimal: the same seed gives the same on every machine.
     pub history_hash: String,
@@ -114,7 +114,7 @@ pub struct Simulated {
 }
 
 /// What only a live trial can tell.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Live {
     /// Wall time of the flight, s.
     pub wall_s: f64,
@@ -137,7 +137,7 @@ pub struct Live {
 }
 
 /// What the processes of a trial used; zeros where the system does not tell.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Processes {
     /// Of how many it is told.
     pub counted: usize,
@@ -163,7 +163,7 @@ pub enum Details {
 }
 
 /// A living peer in reach that was declared down.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FalseDown {
     /// When, ms.
     pub at_ms: u64,
@@ -174,7 +174,7 @@ pub struct FalseDown {
 }
 
 /// Rules of the protocol that were broken.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Violations {
     /// How often each rule was broken; empty when all held.
     pub counts: BTreeMap<String, u64>,
@@ -183,7 +183,7 @@ pub struct Violations {
 }
 
 /// What was seen.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
     /// Coverable cells that were seen whole.
     pub covered_cells: usize,
@@ -206,7 +206,7 @@ pub struct Coverage {
 }
 
 /// A cell that cannot be seen.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Uncovered {
     /// Column of the lane grid.
     pub col: i16,
@@ -217,7 +217,7 @@ pub struct Uncovered {
 }
 
 /// What became of a peer that ended, and of its work.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KillReport {
     /// Who.
     pub peer: u16,
@@ -254,7 +254,7 @@ pub struct KillReport {
 }
 
 /// A peer that took over cells of another.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Taker {
     /// Who.
     pub peer: u16,
@@ -265,7 +265,7 @@ pub struct Taker {
 }
 
 /// What became of a peer that was started again.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RestartReport {
     /// Who.
     pub peer: u16,
@@ -282,7 +282,7 @@ pub struct RestartReport {
 }
 
 /// How the swarm held together, by the true link graph.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Swarm {
     /// How often one component became more.
     pub splits: usize,
@@ -293,7 +293,7 @@ pub struct Swarm {
 }
 
 /// What the radios did.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Radio {
     /// Transmissions of all peers.
     pub sent: u64,
@@ -410,7 +410,7 @@ impl RunReport {
             scenario,
             seed,
             violations: Some(Violations {
-                counts: BTreeMap::from([(violation.check.to_owned(), 1)]),
+                counts: BTreeMap::from([(violation.check.to_string(), 1)]),
                 first: vec![violation],
             }),
             ..Self::default()

@@ -251,7 +251,8 @@ impl RunReport {
 }
 
 /// What people call a peer.
-pub(super) fn name(peer: u16, flies: bool) -> String {
+#[must_use]
+pub fn name(peer: u16, flies: bool) -> String {
     if flies {
         format!("uav{peer}")
     } else {

@@ -3,15 +3,16 @@
 
 use super::Grade;
 use crate::account::secs;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
 /// A rule that was broken.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Violation {
     /// Which rule: its name in the protocol, `S3` to `L7`, or `detect`.
-    pub check: &'static str,
+    pub check: Cow<'static, str>,
     /// Seed of the run.
     pub seed: u64,
     /// When, milliseconds of scenario time.
@@ -77,7 +78,7 @@ impl Findings {
         *n += 1;
         if *n <= KEPT_PER_CHECK as u64 {
             self.violations.push(Violation {
-                check,
+                check: Cow::Borrowed(check),
                 seed: self.seed,
                 time_ms,
                 peer,

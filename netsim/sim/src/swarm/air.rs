@@ -160,6 +160,18 @@ impl Air {
         self.world.judge().saw(revision, cell, laps)
     }
 
+    /// The world, as far as it has moved.
+    #[must_use]
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Who heard whom when that was computed last.
+    #[must_use]
+    pub fn links(&self) -> &LinkTable {
+        &self.links
+    }
+
     /// The judge and its score.
     #[must_use]
     pub fn judge(&self) -> &Judge {

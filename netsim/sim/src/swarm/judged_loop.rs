@@ -35,6 +35,11 @@ impl JudgedLoop {
         }
     }
 
+    /// What follows from the mission, where it has a loop.
+    pub(super) fn geometry(&self) -> Option<&Arc<MissionGeometry>> {
+        self.geometry.as_ref()
+    }
+
     pub(super) fn hash(&self) -> u64 {
         self.hash
     }

@@ -11,6 +11,7 @@
 //! | `operator` | the mission and the order given last |
 //! | `judged_loop` | the loop on which cells are counted |
 //! | `traffic` | what the radios were given and brought |
+//! | `observed` | what an observer may look at |
 //! | `names` | whom peers mean by an id that two processes have |
 //! | `sim_peer` | one peer: process, clock, disk, inbox |
 //! | `air` | the world and the medium as the driver uses them |
@@ -23,6 +24,7 @@ mod fault_effects;
 mod judged_loop;
 pub mod meter;
 mod names;
+mod observed;
 mod operator;
 pub mod outcome;
 mod queue;
@@ -432,6 +434,7 @@ impl Swarm {
                 }
                 _ => drop(self.account.happened(self.now_ms, &fact)),
             }
+            self.keep_fact(&fact);
             match fact {
                 Fact::ZoneEntry {
                     at_ms, uav, zone, ..
@@ -803,7 +806,7 @@ impl Swarm {
         self.done = self.account.covered_ms().is_some() && flying > 0 && finished;
         for v in self.checker.found.drain_fresh() {
             self.history.keep(v.time_ms, || What::Violation {
-                check: v.check,
+                check: v.check.clone(),
                 peer: v.peer,
                 text: v.text,
             });

@@ -1,0 +1,117 @@
+//! Who takes the words of a run.
+
+use crate::model::{End, Event, Frame, Record, Scene};
+use std::fmt::Debug;
+use std::io;
+
+/// Takes what a run shows, in the order of its times: a scene first, another one wherever the
+/// mission changes, and the end last.
+///
+/// A sink is called by the driver itself and holds it up: whoever may wait for a disk, a socket
+/// or a screen hands the words to a thread of its own.
+pub trait Sink: Debug + Send {
+    /// What does not change until the next one.
+    ///
+    /// # Errors
+    /// When it cannot be taken; the driver tells so once and gives no more.
+    fn scene(&mut self, scene: &Scene) -> io::Result<()>;
+
+    /// How everything stands, about twice a second of scenario time.
+    ///
+    /// # Errors
+    /// As [`Sink::scene`].
+    fn frame(&mut self, frame: &Frame) -> io::Result<()>;
+
+    /// Something happened.
+    ///
+    /// # Errors
+    /// As [`Sink::scene`].
+    fn event(&mut self, event: &Event) -> io::Result<()>;
+
+    /// The run is over.
+    ///
+    /// # Errors
+    /// As [`Sink::scene`].
+    fn end(&mut self, end: &End) -> io::Result<()>;
+
+    /// Any of them.
+    ///
+    /// # Errors
+    /// As [`Sink::scene`].
+    fn take(&mut self, record: &Record) -> io::Result<()> {
+        match record {
+            Record::Scene(scene) => self.scene(scene),
+            Record::Frame(frame) => self.frame(frame),
+            Record::Event(event) => self.event(event),
+            Record::End(end) => self.end(end),
+        }
+    }
+}
+
+/// A whole run in memory.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Collected {
+    /// One, and one more for each time the mission changed.
+    pub scenes: Vec<Scene>,
+    /// In the order of time.
+    pub frames: Vec<Frame>,
+    /// In the order of time.
+    pub events: Vec<Event>,
+    /// None where the run was cut off.
+    pub end: Option<End>,
+}
+
+impl Sink for Collected {
+    fn scene(&mut self, scene: &Scene) -> io::Result<()> {
+        self.scenes.push(scene.clone());
+        Ok(())
+    }
+
+    fn frame(&mut self, frame: &Frame) -> io::Result<()> {
+        self.frames.push(frame.clone());
+        Ok(())
+    }
+
+    fn event(&mut self, event: &Event) -> io::Result<()> {
+        self.events.push(event.clone());
+        Ok(())
+    }
+
+    fn end(&mut self, end: &End) -> io::Result<()> {
+        self.end = Some(end.clone());
+        Ok(())
+    }
+}
+
+/// Several sinks at once: one that fails gets no more, the others go on.
+#[derive(Debug, Default)]
+pub struct Tee {
+    sinks: Vec<Box<dyn Sink>>,
+}
+
+impl Tee {
+    /// These.
+    #[must_use]
+    pub fn new(sinks: Vec<Box<dyn Sink>>) -> Self {
+        Self { sinks }
+    }
+
+    /// Whether nobody takes anything any more.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.sinks.is_empty()
+    }
+
+    /// Gives a word to each; says which failed, and why.
+    pub fn give(&mut self, record: &Record) -> Vec<io::Error> {
+        let mut failed = Vec::new();
+        self.sinks.retain_mut(|sink| match sink.take(record) {
+            Ok(()) => true,
+            Err(why) => {
+                failed.push(why);
+                false
+            }
+        });
+        failed
+    }
+}
