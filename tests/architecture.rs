@@ -137,6 +137,9 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-survey",
             "skein-lab",
             "skein-recording",
+            "skein-view",
+            "skein-web",
+            "skein-terminal",
         ],
     ),
     (
@@ -148,6 +151,34 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-geometry",
         ],
         &["tokio", "zenoh", "skein-node", "skein-survey", "skein-lab"],
+    ),
+    (
+        "skein-view",
+        &["skein-recording", "skein-peer", "skein-geometry"],
+        &["tokio", "zenoh", "skein-node", "skein-survey", "skein-lab"],
+    ),
+    (
+        "skein-web",
+        &["skein-recording", "skein-console", "skein-netsim"],
+        &[
+            "zenoh",
+            "skein-node",
+            "skein-broker",
+            "skein-survey",
+            "skein-lab",
+        ],
+    ),
+    (
+        "skein-terminal",
+        &["skein-recording", "skein-view", "skein-geometry"],
+        &[
+            "tokio",
+            "zenoh",
+            "skein-node",
+            "skein-broker",
+            "skein-survey",
+            "skein-lab",
+        ],
     ),
     (
         "skein-broker",

@@ -34,3 +34,4 @@ mod stage;
 pub use model::{End, Event, Frame, Record, Scene};
 pub use observer::Observer;
 pub use sink::Sink;
+pub use stage::{compass_deg, of_mission};
