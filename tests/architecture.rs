@@ -138,6 +138,9 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
             "skein-lab",
             "skein-recording",
             "mcap",
+            "skein-view",
+            "skein-web",
+            "skein-terminal",
         ],
     ),
     (
@@ -154,6 +157,34 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
         "skein-report",
         &["skein-recording", "skein-netsim", "skein-geometry"],
         &["tokio", "zenoh", "skein-node", "skein-survey", "skein-lab"],
+    ),
+    (
+        "skein-view",
+        &["skein-recording", "skein-peer", "skein-geometry"],
+        &["tokio", "zenoh", "skein-node", "skein-survey", "skein-lab"],
+    ),
+    (
+        "skein-web",
+        &["skein-recording", "skein-console", "skein-netsim"],
+        &[
+            "zenoh",
+            "skein-node",
+            "skein-broker",
+            "skein-survey",
+            "skein-lab",
+        ],
+    ),
+    (
+        "skein-terminal",
+        &["skein-recording", "skein-view", "skein-geometry"],
+        &[
+            "tokio",
+            "zenoh",
+            "skein-node",
+            "skein-broker",
+            "skein-survey",
+            "skein-lab",
+        ],
     ),
     (
         "skein-broker",

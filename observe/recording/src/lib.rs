@@ -45,3 +45,4 @@ pub mod writer;
 pub use model::{End, Event, Frame, Record, Scene};
 pub use observer::Observer;
 pub use sink::Sink;
+pub use stage::{compass_deg, of_mission};

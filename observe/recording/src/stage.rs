@@ -73,6 +73,23 @@ pub(crate) fn scene(
     scene
 }
 
+/// The scene of a mission alone, as whoever hears a swarm knows it: without buildings, UAVs and
+/// bounds.
+#[must_use]
+pub fn of_mission(geometry: &MissionGeometry, fleet: &str) -> Scene {
+    let mut scene = Scene {
+        model_version: MODEL_VERSION,
+        program_version: env!("CARGO_PKG_VERSION").to_owned(),
+        scenario: fleet.to_owned(),
+        fleet: fleet.to_owned(),
+        driver: Driver::Live,
+        origin: Place::of(&origin(&geometry.mission), Point::origin()),
+        ..Scene::default()
+    };
+    revise(&mut scene, geometry);
+    scene
+}
+
 /// Puts what a mission says into a scene.
 fn give(scene: &mut Scene, mission: &Mission) {
     let origin = origin(mission);
@@ -125,7 +142,8 @@ fn bounds(spec: &Spec, geometry: Option<&Arc<MissionGeometry>>, seed: u64) -> Bo
 }
 
 /// Degrees clockwise from north of radians counter-clockwise from east.
-pub(crate) fn compass_deg(heading_rad: f64) -> f64 {
+#[must_use]
+pub fn compass_deg(heading_rad: f64) -> f64 {
     (90.0 - heading_rad.to_degrees()).rem_euclid(360.0)
 }
 

@@ -1,0 +1,17 @@
+//! What a terminal and a page share: a run at one moment, its way from a driver to whoever
+//! draws it, and what a swarm says of itself.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`standing`] | how all stands, folded from the words of a run |
+//! | [`line`](mod@line) | the way from a driver to a thread that draws |
+//! | [`belief`] | a run from nothing but what a swarm says on the air; `believed` holds one peer |
+
+pub mod belief;
+mod believed;
+pub mod line;
+pub mod standing;
+
+pub use belief::Belief;
+pub use line::{Line, line};
+pub use standing::Standing;
