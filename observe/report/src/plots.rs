@@ -49,7 +49,8 @@ pub(crate) fn coverage(run: &Run<'_>) -> String {
     let mut chart = Chart::new(320.0, x_max, 100.0, "coverage over time");
     chart.y_axis(" %", 5.0);
     chart.x_axis("seconds");
-    if let Some(bound_s) = bound_s {
+    // Of several laps each begins at nothing.
+    if let Some(bound_s) = bound_s.filter(|_| run.scene.lap == 0) {
         let path = chart.line(&[(0.0, 0.0), (bound_s, 100.0)]);
         chart.raw(&format!("<path class=\"bound\" d=\"{path}\"/>"));
     }
