@@ -15,7 +15,6 @@ import os
 import pathlib
 import queue
 import shutil
-import socket
 import subprocess
 import tempfile
 import time
@@ -46,9 +45,8 @@ def trials():
     for path in sorted(shared.glob("*.json")):
         try:
             entry = json.loads(path.read_text())
-            host, port = entry["control"].rsplit(":", 1)
-            # An entry whose port does not answer is of a trial that is gone.
-            socket.create_connection((host, int(port)), timeout=0.5).close()
+            # An entry without a process is of a trial that is gone.
+            os.kill(entry["pid"], 0)
         except (OSError, ValueError, KeyError):
             continue
         run_dir = pathlib.Path(entry["run_dir"])
@@ -260,7 +258,10 @@ def load(run, tables=True):
     scenes, uavs, frames, events, report = [], [], [], [], None
     with path.open("rb") as file:
         try:
-            for _, channel, message in NonSeekingReader(file).iter_messages():
+            # In the order of the file, which is that of time: sorting reads all of it first, and
+            # of a file that breaks off nothing would be left.
+            messages = NonSeekingReader(file).iter_messages(log_time_order=False)
+            for _, channel, message in messages:
                 if not channel.topic.startswith("/skein/"):
                     continue
                 value = json.loads(message.data)

@@ -457,6 +457,7 @@ fn only_the_bus_speaks_zenoh() {
         "planning",
         "behaviors",
         "interop",
+        "observe",
     ]) {
         let text = std::fs::read_to_string(&file).unwrap();
         let code = text.lines().filter(|l| !l.trim_start().starts_with("//"));

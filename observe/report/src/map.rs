@@ -6,6 +6,7 @@ use crate::plots::Run;
 use skein_geometry::frame::Point;
 use skein_recording::cells::{Cell, Cells};
 use skein_recording::foxglove::colour;
+use skein_recording::model::scene::Building;
 use skein_recording::model::{Ring, Scene};
 use skein_recording::tracks;
 use std::collections::BTreeMap;
@@ -56,6 +57,11 @@ impl View {
             (east_m - self.west_m) * self.scale + MARGIN,
             (self.north_m - north_m) * self.scale + MARGIN,
         )
+    }
+
+    fn holds(&self, place: [f64; 2]) -> bool {
+        let p = self.at(place);
+        (0.0..=WIDTH).contains(&p.x) && (0.0..=self.height).contains(&p.y)
     }
 
     fn line(&self, points: impl Iterator<Item = [f64; 2]>) -> String {
@@ -142,7 +148,8 @@ fn shapes(run: &Run<'_>, cells: &Cells, view: &View) -> String {
     let all = |rings: &mut dyn Iterator<Item = &Ring>| -> String {
         rings.map(|r| view.ring(r)).collect()
     };
-    let buildings = all(&mut scene.buildings.iter().map(|b| &b.ring));
+    let inside = |b: &&Building| b.ring.east_north_m.iter().all(|p| view.holds(*p));
+    let buildings = all(&mut scene.buildings.iter().filter(inside).map(|b| &b.ring));
     let _ = write!(svg, "<path class=\"building\" d=\"{buildings}\"/>");
     let mut by: BTreeMap<u16, String> = BTreeMap::new();
     let mut left = String::new();

@@ -79,8 +79,7 @@ impl Page {
         for row in rows {
             self.0.push_str("<tr>");
             for cell in row {
-                let number = cell.starts_with(|c: char| c.is_ascii_digit()) && !cell.contains("..");
-                let class = if number { " class=\"n\"" } else { "" };
+                let class = if is_number(cell) { " class=\"n\"" } else { "" };
                 let _ = write!(self.0, "<td{class}>{}</td>", escaped(cell));
             }
             self.0.push_str("</tr>");
@@ -93,6 +92,12 @@ impl Page {
         self.0.push_str("</body></html>\n");
         self.0
     }
+}
+
+/// Whether a cell is a number, with a unit or without.
+fn is_number(cell: &str) -> bool {
+    let (number, unit) = cell.split_once(' ').unwrap_or((cell, ""));
+    number.parse::<f64>().is_ok() && ["", "s", "m", "%", "times"].contains(&unit)
 }
 
 /// Seconds of milliseconds, with one digit.

@@ -49,7 +49,8 @@ pub(crate) fn coverage(run: &Run<'_>) -> String {
     let mut chart = Chart::new(320.0, x_max, 100.0, "coverage over time");
     chart.y_axis(" %", 5.0);
     chart.x_axis("seconds");
-    if let Some(bound_s) = bound_s {
+    // Of several laps each begins at nothing.
+    if let Some(bound_s) = bound_s.filter(|_| run.scene.lap == 0) {
         let path = chart.line(&[(0.0, 0.0), (bound_s, 100.0)]);
         chart.raw(&format!("<path class=\"bound\" d=\"{path}\"/>"));
     }
@@ -70,7 +71,7 @@ pub(crate) fn coverage(run: &Run<'_>) -> String {
 }
 
 /// Height of the row of one UAV.
-const ROW: f64 = 34.0;
+const ROW: f64 = 42.0;
 
 /// The open cells of each UAV's section over time, with takeovers, deaths and restarts.
 pub(crate) fn sections(run: &Run<'_>) -> String {
@@ -100,30 +101,50 @@ pub(crate) fn sections(run: &Run<'_>) -> String {
         row(&mut rows, &chart, run, (uav.id, floor, most, fill));
     }
     chart.raw(&rows);
-    for event in run.events {
-        let (Some(by), at_s) = (event.uav, secs(event.time_ms)) else {
-            continue;
-        };
-        let Some(i) = run.scene.uavs.iter().position(|u| u.id == by) else {
-            continue;
-        };
+    marks(&mut chart, run);
+    chart.end()
+}
+
+/// Takeovers of one UAV that follow each other within this share of the run are told together:
+/// their words would lie upon each other.
+const TOGETHER: f64 = 0.09;
+
+/// Ends, new lives and takeovers.
+fn marks(chart: &mut Chart, run: &Run<'_>) {
+    for (i, uav) in run.scene.uavs.iter().enumerate() {
         #[allow(clippy::cast_precision_loss, reason = "at most some hundred UAVs")]
         let middle = 14.0 + ROW * (i as f64 + 0.5);
-        let at = (chart.x(at_s), middle + 5.0);
-        match &event.what {
-            What::Ended { .. } => chart.text(at, "middle", "ink", "×"),
-            What::Booted { incarnation } if *incarnation > 1 => {
-                chart.text(at, "middle", "ink", "↺");
+        let mut taken: Vec<(f64, usize, Vec<u16>)> = Vec::new();
+        for event in run.events.iter().filter(|e| e.uav == Some(uav.id)) {
+            let at_s = secs(event.time_ms);
+            let at = (chart.x(at_s), middle + 5.0);
+            match &event.what {
+                What::Ended { .. } => chart.text(at, "middle", "ink", "×"),
+                What::Booted { incarnation } if *incarnation > 1 => {
+                    chart.text(at, "middle", "ink", "↺");
+                }
+                What::Takeover { from, cells, .. } => {
+                    let near =
+                        |t: &&mut (f64, usize, Vec<u16>)| at_s - t.0 < TOGETHER * run.end_s();
+                    match taken.last_mut().filter(near) {
+                        Some((_, n, of)) => {
+                            *n += cells.len();
+                            of.push(*from);
+                            of.dedup();
+                        }
+                        None => taken.push((at_s, cells.len(), vec![*from])),
+                    }
+                }
+                _ => {}
             }
-            What::Takeover { from, cells, .. } => {
-                let text = format!("+{} of {from}", cells.len());
-                let anchor = if at.0 > WIDTH * 0.85 { "end" } else { "start" };
-                chart.text(at, anchor, "ink", &text);
-            }
-            _ => {}
+        }
+        for (at_s, n, of) in taken {
+            let at = (chart.x(at_s), middle + 3.0);
+            let anchor = if at.0 > WIDTH * 0.85 { "end" } else { "start" };
+            let of: Vec<String> = of.iter().map(u16::to_string).collect();
+            chart.text(at, anchor, "ink", &format!("+{n} of {}", of.join(", ")));
         }
     }
-    chart.end()
 }
 
 /// One UAV: how many cells it has left, as a height; a thin line while it flies without any.

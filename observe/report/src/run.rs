@@ -6,6 +6,7 @@ use crate::plots::{self, Run};
 use skein_geometry::frame::Point;
 use skein_netsim::account::RunReport;
 use skein_netsim::account::report::KillReport;
+use skein_netsim::account::text::name;
 use skein_netsim::world::flat::{in_ring, point_ring_m};
 use skein_recording::export::cells_at_end;
 use skein_recording::foxglove::colour;
@@ -34,12 +35,12 @@ pub(crate) fn page(kept: &Kept) -> String {
     page.heading("Coverage");
     page.plot(
         &plots::coverage(&run),
-        "Share of the coverable cells that cameras saw. Dashed: the work bound, as if nobody were lost and no way were flown twice; the omniscient baseline, where it was computed. ×N: the end of UAV N.",
+        "Share of the coverable cells that cameras saw. Dashed: an even pace that ends at the work bound, as if nobody were lost and no way were flown twice; upright, the omniscient baseline, where it was computed. ×N: the end of UAV N.",
     );
     page.heading("Sections");
     page.plot(
         &plots::sections(&run),
-        "How many open cells each UAV lists, as a height. ×: its end. ↺: a new life. +N of M: it lists N orphans of UAV M.",
+        "How many open cells each UAV lists, as a height. ×: its end. ↺: a new life. +N of M: it takes over N cells of UAV M.",
     );
     page.heading("Map");
     let drawn = map::draw(&run, &cells_at_end(collected));
@@ -219,18 +220,18 @@ fn kills(page: &mut Page, r: &RunReport) {
         return;
     }
     page.heading("Losses and takeovers");
+    let called = |id: u16| name(id, r.uavs.contains(&id));
     let row = |k: &KillReport| {
         let takers = k.taken_over_by.iter();
         let takers: Vec<String> = takers
-            .map(|t| format!("uav{}: {}", t.peer, t.cells))
+            .map(|t| format!("{}: {}", called(t.peer), t.cells))
             .collect();
         vec![
-            format!("uav{}", k.peer),
+            called(k.peer),
             s(k.at_ms),
             format!("{:?}", k.cause),
             k.cells_held.to_string(),
-            k.detected_by
-                .map_or_else(|| "nobody".to_owned(), |by| format!("uav{by}")),
+            k.detected_by.map_or_else(|| "nobody".to_owned(), called),
             s_of(k.detection_ms),
             s_of(k.takeover_ms),
             takers.join(", "),
@@ -251,8 +252,8 @@ fn kills(page: &mut Page, r: &RunReport) {
     page.table(&head, &r.kills.iter().map(row).collect::<Vec<_>>());
     for restart in &r.restarts {
         page.note(&format!(
-            "uav{} starts again at {} {} its disk; of use after {}",
-            restart.peer,
+            "{} starts again at {} {} its disk; of use after {}",
+            called(restart.peer),
             s(restart.at_ms),
             if restart.fresh_disk {
                 "without"

@@ -36,7 +36,7 @@ impl JudgedLoop {
     }
 
     /// What follows from the mission, where it has a loop.
-    pub(super) fn geometry(&self) -> Option<&Arc<MissionGeometry>> {
+    pub(super) fn derived(&self) -> Option<&Arc<MissionGeometry>> {
         self.geometry.as_ref()
     }
 

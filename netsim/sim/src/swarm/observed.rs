@@ -53,7 +53,7 @@ impl Swarm {
     /// loop.
     #[must_use]
     pub fn geometry(&self) -> Option<&Arc<MissionGeometry>> {
-        self.judged.geometry()
+        self.judged.derived()
     }
 
     /// Keeps what the world recorded and no report says.
