@@ -10,10 +10,11 @@ use crate::observe::ObserveArgs;
 use crate::peer::PeerArgs;
 use crate::plan::PlanArgs;
 use crate::sim::SimArgs;
+use crate::task::TaskArgs;
 use crate::trial::TrialArgs;
 use crate::why::WhyArgs;
 use crate::{
-    bench, chaos, check, console, exit, mission, nfz, observe, peer, plan, sim, trial, why,
+    bench, chaos, check, console, exit, mission, nfz, observe, peer, plan, sim, task, trial, why,
 };
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -52,6 +53,8 @@ pub enum Verb {
     Mission(MissionArgs),
     /// Adds and removes no-fly zones in flight, at a ground station's console.
     Nfz(NfzArgs),
+    /// Asks for tasks in flight and cancels them, at a ground station's console.
+    Task(TaskArgs),
     /// What a peer does and why, at its console.
     Why(WhyArgs),
     /// Shows what the swarm publishes.
@@ -91,6 +94,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Order(args) => console::order(args),
         Verb::Mission(args) => mission::run(args),
         Verb::Nfz(args) => nfz::run(args),
+        Verb::Task(args) => task::run(args),
         Verb::Why(args) => why::run(args),
         Verb::Observe(args) => observe::run(args),
         Verb::Check(args) => check::run(args),

@@ -16,6 +16,7 @@ mod peer;
 mod plan;
 mod scenario_args;
 mod sim;
+mod task;
 mod trial;
 mod why;
 
