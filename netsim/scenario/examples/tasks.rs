@@ -60,6 +60,14 @@ fn compare(prepared: &Prepared, seeds: &Seeds, n_tasks: usize, wrong: &str) {
         with.extend(tasks(&prepared, seed, free_ms, n_tasks));
         with.sort_by_key(|f| f.at_ms);
         let plain = run(&prepared, seed, faults, Wanted::default());
+        if let Ok(text) = std::env::var("WHY") {
+            let (id, at_s) = text.split_once('@').unwrap_or((&text, "500"));
+            let mut swarm = skein_netsim::swarm::Swarm::new(&prepared, seed, with.clone(), false);
+            swarm.run_until(at_s.parse::<u64>().unwrap_or(500) * 1000);
+            if let Some(why) = swarm.why(id.parse().unwrap_or(1)) {
+                println!("{why}");
+            }
+        }
         let tasked = run(&prepared, seed, with, Wanted::default());
         let said = |o: &skein_netsim::swarm::Outcome| {
             let simulated = o.report.simulated.as_ref();
@@ -77,6 +85,9 @@ fn compare(prepared: &Prepared, seeds: &Seeds, n_tasks: usize, wrong: &str) {
             over += u32::from(t.seen_ms.is_none() && t.nobody_can.is_some());
             again += u32::try_from(t.done_by.len().saturating_sub(1)).unwrap_or(0);
             took_ms.extend(t.seen_ms.map(|ms| ms.saturating_sub(t.asked_ms) as f64));
+            if t.done_by.len() > 1 {
+                println!("  seed {seed}: {} done by {:?}, flown by {:?}", t.name, t.done_by, t.flown_by);
+            }
             if t.seen_ms.is_none() {
                 println!("  seed {seed}: {}", t.line());
             }

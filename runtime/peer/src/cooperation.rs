@@ -251,7 +251,7 @@ impl Cooperation {
                 Event::Sighted { seen, of } => {
                     effects.extend(self.tasking.sighted(now, seen >= of, state));
                 }
-                Event::DetourFlown => effects.extend(self.tasking.flown_in_vain(now, state)),
+                Event::DetourFlown => effects.extend(self.tasking.flown_in_vain(state)),
                 event => effects.extend(state.on_event(event)),
             }
         }
@@ -367,12 +367,11 @@ impl Cooperation {
     /// The flight of a task is planned, or there is none.
     pub fn errand_planned(
         &mut self,
-        now: Time,
         task: (TaskId, u32),
         planned: Result<Errand, String>,
     ) -> Effects {
         match &mut self.state {
-            Some(state) => self.tasking.planned(now, task, planned, state),
+            Some(state) => self.tasking.planned(task, planned, state),
             None => Effects::new(),
         }
     }

@@ -411,7 +411,7 @@ impl Peer {
             }
             (Some(PendingJob::Errand(id, revision, _)), JobResult::Errand(planned)) => {
                 let task = (id, revision);
-                self.cooperation.errand_planned(self.now, task, planned)
+                self.cooperation.errand_planned(task, planned)
             }
             _ => Effects::new(),
         };

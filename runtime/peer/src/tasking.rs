@@ -283,6 +283,8 @@ impl Tasking {
         if self.is_active() && s.speaks {
             effects.extend(self.settle(s, order, state));
         }
+        // That the last task is done is said, too.
+        effects.extend(self.speak(s));
         state.has_tasks = self.has_work();
         effects
     }
@@ -365,8 +367,11 @@ impl Tasking {
         if self.flown.is_none() && able && order == Order::Resume {
             events.push(Event::Free);
         }
-        let mut effects = self.handle(events, s.now, state);
-        effects.extend(self.speak(s));
+        let mut effects = self.handle(events, state);
+        // Without a percept, or while a mission changes, there was no flight to plan.
+        if self.flown.as_ref().is_some_and(|f| !f.is_planned) {
+            effects.extend(self.plan(state));
+        }
         effects.extend(self.tell_hopeless());
         effects
     }
@@ -391,7 +396,7 @@ impl Tasking {
     }
 
     /// Lets the auction handle events; what it gives to fly is planned.
-    fn handle(&mut self, events: Vec<Event>, now: Time, state: &mut MissionState) -> Effects {
+    fn handle(&mut self, events: Vec<Event>, state: &mut MissionState) -> Effects {
         let geometry = std::sync::Arc::clone(&state.geometry);
         let ways = RoutedTime::new(&geometry.router);
         let mut effects = Effects::new();
@@ -417,7 +422,6 @@ impl Tasking {
                 }
             }
         }
-        let _ = now;
         effects
     }
 
@@ -447,7 +451,6 @@ impl Tasking {
     /// The flight of a task is planned, or there is none.
     pub fn planned(
         &mut self,
-        now: Time,
         (id, revision): (TaskId, u32),
         planned: Result<Errand, String>,
         state: &mut MissionState,
@@ -462,12 +465,12 @@ impl Tasking {
                 state.set_errand(Some((errand.flight, Watched::new(errand.pieces))));
                 vec![Effect::Negotiate]
             }
-            Err(why) => self.relieve(now, &why, state),
+            Err(why) => self.relieve(&why, state),
         }
     }
 
     /// Others are asked to do what this UAV could not.
-    fn relieve(&mut self, now: Time, why: &str, state: &mut MissionState) -> Effects {
+    fn relieve(&mut self, why: &str, state: &mut MissionState) -> Effects {
         let Some(id) = self.flown() else {
             return Effects::new();
         };
@@ -478,7 +481,7 @@ impl Tasking {
             .map_or_else(String::new, |k| k.task.name());
         let text = format!("the task {name:?} is left to others: {why}");
         let mut effects = vec![Effect::Alarm(text)];
-        effects.extend(self.handle(vec![Event::Relieve(id)], now, state));
+        effects.extend(self.handle(vec![Event::Relieve(id)], state));
         effects.push(Effect::Negotiate);
         effects
     }
@@ -493,19 +496,19 @@ impl Tasking {
             known.done = Some((self.me, now));
         }
         let mut effects: Effects = self.told(flown.id, TaskNews::Seen).into_iter().collect();
-        effects.extend(self.handle(vec![Event::Finished(flown.id)], now, state));
+        effects.extend(self.handle(vec![Event::Finished(flown.id)], state));
         effects.push(Effect::Negotiate);
         effects
     }
 
     /// The flight is over, and not all of it was seen.
-    pub fn flown_in_vain(&mut self, now: Time, state: &mut MissionState) -> Effects {
+    pub fn flown_in_vain(&mut self, state: &mut MissionState) -> Effects {
         let Some(flown) = self.flown.as_mut().filter(|f| f.is_planned) else {
             return Effects::new();
         };
         flown.tries += 1;
         if flown.tries >= MAX_TRIES {
-            return self.relieve(now, "its flight was cut short, or saw not all of it", state);
+            return self.relieve("its flight was cut short, or saw not all of it", state);
         }
         self.plan_anew(state).into_iter().collect()
     }

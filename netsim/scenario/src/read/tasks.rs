@@ -90,3 +90,77 @@ pub(crate) fn task_name(node: &Node<'_>) -> Result<String, Error> {
         )))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{Files, Overrides};
+    use std::path::PathBuf;
+
+    /// The default scenario with this schedule, and these sensors.
+    fn asked(operator: &str, sensors: &str) -> Result<crate::Scenario, String> {
+        let text = include_str!("../../../../configs/trials/helsinki.json5");
+        let fleet = "    airframes: [\"swift\", \"scout\"],\n";
+        assert!(text.contains("operator: [],") && text.contains(fleet));
+        let text = text.replacen("operator: [],", &format!("operator: {operator},"), 1);
+        let text = text.replacen(fleet, &format!("{fleet}    {sensors}\n"), 1);
+        let beside = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/trials"));
+        let (files, over) = (Files::Directory(beside), Overrides::default());
+        crate::parse_with("s.json5", &text, &files, &over).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn tasks_are_read_and_what_is_wrong_is_named_with_its_place() {
+        let point = "point: { east_m: 120, north_m: 340 }";
+        let good = format!(
+            "[{{ at_s: 80, task_add: {{ id: 'gate', {point}, needs: 'infrared', within_s: 60 }} }}, {{ at_s: 90, task_cancel: 'gate' }}]"
+        );
+        let carried = "sensors: [['camera'], ['camera', 'infrared']],";
+        let scenario = asked(&good, carried).unwrap();
+        let carriers = scenario.spec.uavs.iter().filter(|u| u.carries(2)).count();
+        assert_eq!((carriers, scenario.spec.uavs.len()), (4, 8));
+        let spoken = scenario.spec.faults.iter().filter(|f| f.fault.is_spoken());
+        assert_eq!(spoken.count(), 2);
+        let add = |what: &str| format!("[{{ at_s: 80, task_add: {{ {what} }} }}]");
+        for (wrong, sensors, why) in [
+            (
+                good.clone(),
+                "",
+                "operator[0].task_add: no UAV of the fleet carries infrared",
+            ),
+            (
+                good,
+                "sensors: [['eyes']],",
+                "fleet.sensors[0][0]: no sensor is named \"eyes\"",
+            ),
+            (add("id: 'gate'"), "", "expected either point"),
+            (
+                add(&format!("id: 'a b', {point}")),
+                "",
+                "is no name of a task",
+            ),
+            (
+                add(&format!("id: 'a', {point}, needs: 'eyes'")),
+                "",
+                "no sensor is named",
+            ),
+            (
+                add(&format!("id: 'a', {point}, radius_m: 300")),
+                "",
+                "larger than what one frame",
+            ),
+            (
+                add("id: 'a', line: [{ east_m: 1, north_m: 1 }]"),
+                "",
+                "has 1 places",
+            ),
+            (
+                "[{ at_s: 9, task_cancel: 'x' }]".into(),
+                "",
+                "no task \"x\" was asked for before",
+            ),
+        ] {
+            let said = asked(&wrong, sensors).map(drop).unwrap_err();
+            assert!(said.contains(why), "{wrong}: {said}");
+        }
+    }
+}

@@ -846,6 +846,10 @@ impl Swarm {
         let tasks = peer.operators_tasks();
         let mission = self.operator.mission();
         for asked in &tasks {
+            self.account.asked(self.now_ms, asked);
+            if !asked.task.is_open() {
+                continue;
+            }
             let pieces = mission.pieces_of(&asked.task).unwrap_or_default();
             let needed = asked.task.sensor;
             let uavs = self.spec.uavs.iter();
@@ -855,7 +859,6 @@ impl Swarm {
                 pieces,
                 carriers.collect(),
             );
-            self.account.asked(self.now_ms, asked);
         }
         self.operator.note_tasks(self.now_ms, tasks);
     }

@@ -471,6 +471,7 @@ impl Auction {
         // Who has done all that it had room for offers anew for the rest.
         let mut held = self.own.tasks.iter();
         let spent = self.free
+            && !self.own.tasks.is_empty()
             && !self.settled.unassigned.is_empty()
             && held.all(|t| t.progress > Progress::Tentative);
         let anew = self.stale || ((changed || spent) && has_acted(&self.own));
