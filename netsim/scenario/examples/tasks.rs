@@ -86,7 +86,10 @@ fn compare(prepared: &Prepared, seeds: &Seeds, n_tasks: usize, wrong: &str) {
             again += u32::try_from(t.done_by.len().saturating_sub(1)).unwrap_or(0);
             took_ms.extend(t.seen_ms.map(|ms| ms.saturating_sub(t.asked_ms) as f64));
             if t.done_by.len() > 1 {
-                println!("  seed {seed}: {} done by {:?}, flown by {:?}", t.name, t.done_by, t.flown_by);
+                println!(
+                    "  seed {seed}: {} done by {:?}, flown by {:?}",
+                    t.name, t.done_by, t.flown_by
+                );
             }
             if t.seen_ms.is_none() {
                 println!("  seed {seed}: {}", t.line());

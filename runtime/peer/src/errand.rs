@@ -270,7 +270,7 @@ mod tests {
             (TaskKind::Line, vec![(20, 250), (330, 250)], 5),
             (
                 TaskKind::Line,
-                vec![(20, 40), (180, 60), (330, 220), (330, 20)],
+                vec![(20, 40), (180, 60), (330, 70), (330, 250)],
                 0,
             ),
         ] {
@@ -306,7 +306,7 @@ mod tests {
                 "larger than what one frame of the camera holds",
             ),
             (
-                task(TaskKind::Line, &[(100, 130), (350, 130)], 0),
+                task(TaskKind::Line, &[(205, 105), (255, 155)], 0),
                 "of the line cannot be seen",
             ),
             (task(TaskKind::Relay, &[(100, 100)], 0), "no mission flies"),

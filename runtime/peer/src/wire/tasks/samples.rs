@@ -61,10 +61,14 @@ pub(crate) fn bundle() -> Bundle {
 /// The typical bodies and their bytes.
 pub(crate) fn golden() -> Vec<(Body, &'static str)> {
     vec![
-        (Body::Task(task()), "8702f40081821a0001d4c0397ab601186400"),
+        (
+            Body::Task(task()),
+            "8c02000081821a0001d4c0397ab601186400193a980044676174650000",
+        ),
         (
             Body::Bundle(bundle()),
-            "86871903e83907cf193d5c19465019dea81a00124f800101008285090702\
+            "86881903e83907cf193d5c19465019dea81a00124f80011a00015f90010082\
+             85090702\
              1a02faf080028509\
              19012c021a02faf080008183090101\
              1adeadbeef",
