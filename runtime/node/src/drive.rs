@@ -19,7 +19,7 @@ use crate::vehicle::Vehicle;
 use crate::world::{News, Tick, World};
 use skein_behaviors::{Order, Percept};
 use skein_console::{Answer, Asked, Command as Request};
-use skein_peer::input::TaskEdit;
+use skein_peer::input::{AskedTask, TaskEdit};
 use skein_peer::offload::{Job, JobResult, run};
 use skein_peer::{Command, Incarnation, Input, Mission, Output, Peer, Time, Transmission};
 use std::sync::Arc;
@@ -57,6 +57,12 @@ pub trait PeerLogic: Send {
     fn why(&self) -> String;
     /// What it knows of the mission, as JSON; none without a mission.
     fn overview(&self) -> Option<String>;
+    /// Whether the operator's words on tasks can be carried out; a sentence that says why not.
+    fn check_task(&self, edit: &TaskEdit) -> Result<(), String>;
+    /// The tasks of its operator.
+    fn operators_tasks(&self) -> Vec<AskedTask>;
+    /// A number that grows with each change of these.
+    fn tasks_version(&self) -> u64;
 }
 
 impl PeerLogic for Peer {
@@ -95,6 +101,18 @@ impl PeerLogic for Peer {
 
     fn overview(&self) -> Option<String> {
         serde_json::to_string(&Peer::overview(self)?).ok()
+    }
+
+    fn check_task(&self, edit: &TaskEdit) -> Result<(), String> {
+        Peer::check_task(self, edit)
+    }
+
+    fn operators_tasks(&self) -> Vec<AskedTask> {
+        Peer::operators_tasks(self)
+    }
+
+    fn tasks_version(&self) -> u64 {
+        Peer::tasks_version(self)
     }
 }
 
