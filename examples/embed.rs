@@ -105,6 +105,7 @@ impl Uav {
             mission: Some(Arc::clone(mission)),
             launches: [].into(),
             seed: 1,
+            sensors: [].into(),
         });
         // What its disk held when it was started, and a number that no earlier start had.
         let start = Input::Start {

@@ -14,11 +14,12 @@ use crate::report::ReportArgs;
 use crate::schema::SchemaArgs;
 use crate::shell::{CompletionsArgs, ManArgs};
 use crate::sim::SimArgs;
+use crate::task::TaskArgs;
 use crate::trial::TrialArgs;
 use crate::why::WhyArgs;
 use crate::{
     bench, chaos, check, console, exit, export, mission, nfz, observe, peer, plan, report, schema,
-    shell, sim, trial, why,
+    shell, sim, task, trial, why,
 };
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -57,6 +58,8 @@ pub enum Verb {
     Mission(MissionArgs),
     /// Adds and removes no-fly zones in flight, at a ground station's console.
     Nfz(NfzArgs),
+    /// Asks for tasks in flight and cancels them, at a ground station's console.
+    Task(TaskArgs),
     /// What a peer does and why, at its console.
     Why(WhyArgs),
     /// Shows what the swarm publishes.
@@ -106,6 +109,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Order(args) => console::order(args),
         Verb::Mission(args) => mission::run(args),
         Verb::Nfz(args) => nfz::run(args),
+        Verb::Task(args) => task::run(args),
         Verb::Why(args) => why::run(args),
         Verb::Observe(args) => observe::run(args),
         Verb::Schema(args) => schema::run(args),

@@ -20,6 +20,7 @@ mod scenario_args;
 mod schema;
 mod shell;
 mod sim;
+mod task;
 mod trial;
 mod why;
 

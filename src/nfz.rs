@@ -75,7 +75,7 @@ fn place(lat_deg: f64, lon_deg: f64) -> Option<LatLon> {
     on_earth.then_some(LatLon { lat_deg, lon_deg })
 }
 
-fn corner(text: &str) -> Result<LatLon, String> {
+pub(crate) fn corner(text: &str) -> Result<LatLon, String> {
     let found = match numbers(text).as_deref() {
         Some([lat_deg, lon_deg]) => place(*lat_deg, *lon_deg),
         _ => None,

@@ -273,10 +273,11 @@ fn words(body: &Body) -> String {
         ),
         Body::Conflict(b) => promises(b.in_force, b.proposal, &b.accepts),
         Body::Task(t) => format!(
-            "asks for a {:?}, revision {}{}, worth {}",
+            "asks for a {:?} {:?}, revision {}, {:?}, worth {}",
             t.kind,
+            t.name(),
             t.revision,
-            if t.cancelled { ", cancelled" } else { "" },
+            t.state,
             t.worth
         ),
         Body::Bundle(b) => format!(

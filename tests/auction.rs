@@ -107,7 +107,6 @@ fn task(number: usize, revision: u32) -> (TaskId, Task) {
     };
     let task = Task {
         revision,
-        cancelled: false,
         kind: TaskKind::Pinpoint,
         places: vec![TaskPlace {
             east_mm: 0,
@@ -115,7 +114,7 @@ fn task(number: usize, revision: u32) -> (TaskId, Task) {
         }],
         sensor: 0,
         worth: 1,
-        stay_ms: 0,
+        ..Task::default()
     };
     (name, task)
 }

@@ -7,6 +7,15 @@ use serde::{Deserialize, Serialize};
 pub enum Event {
     /// The camera has seen the whole of these cells of the loop, by index.
     Seen(Vec<u16>),
+    /// So many pieces of what is watched were seen whole by now, of so many.
+    Sighted {
+        /// So many.
+        seen: u16,
+        /// Of so many.
+        of: u16,
+    },
+    /// A detour is flown, as far as it can be; its legs follow.
+    DetourFlown,
     /// All legs are flown.
     PlanDone,
     /// No clear route exists to the next leg; its cells are given up.

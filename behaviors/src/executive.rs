@@ -4,7 +4,7 @@
 //!
 //! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
 //! it cell by cell. Ways between cells come from [`transit`], what the camera saw from
-//! [`camera`], expectations for the peer from [`prediction`], what stays of a flight when the
+//! [`camera`], a flight between cells and what it is for from [`detour`], expectations for the peer from [`prediction`], what stays of a flight when the
 //! goal changes from `goal_change`, how far a given flight reaches from [`given`], the proof of each stretch from `clearance_check`;
 //! following the track and the safety of every setpoint are the reactive layer's.
 //!
@@ -14,6 +14,7 @@
 //! | legs | open cells in order, then a circle | `Seen`, `Refused`, `PlanDone` once |
 //! | point | a route, then a circle | `Refused` without cells if there is no route |
 //! | given | a route to its start, its pieces, then a circle | `CutShort` where it ends early, `PlanDone` once |
+//! | detour | the cell that is flown, a given flight, then legs | those of both, `DetourFlown` once |
 //!
 //! # Guarantees
 //! An open cell of the legs is flown until it is seen or refused. Equal inputs give
@@ -25,6 +26,7 @@
 
 pub mod camera;
 mod clearance_check;
+pub mod detour;
 pub mod given;
 mod goal_change;
 pub mod new_zones;
@@ -101,6 +103,8 @@ pub enum Goal {
     Point(Point),
     /// Fly this from its start to its end, then loiter.
     Given(GivenFlight),
+    /// Fly this once the cell that is being flown is done, then these legs, then loiter.
+    Detour(GivenFlight, Vec<Leg>),
 }
 
 /// Where the UAV will be when it has flown for a while under its present goal.
@@ -128,6 +132,14 @@ enum Aim {
     Legs,
     Point(Point),
     Given,
+    Detour,
+}
+
+impl Aim {
+    /// Whether a given flight is part of it.
+    fn gives(self) -> bool {
+        matches!(self, Self::Given | Self::Detour)
+    }
 }
 
 /// What a stretch of the track is for.
@@ -187,6 +199,10 @@ pub struct Executive {
     replan: bool,
     /// Whether the end of the legs has been reported.
     end_reported: bool,
+    /// Whether it has been reported that a detour is flown.
+    detour_reported: bool,
+    /// What is looked for besides the cells of the loop.
+    watched: Option<detour::Watched>,
     played: Option<Played>,
     recent: VecDeque<u16>,
     /// Events that came up between two steps.
@@ -220,6 +236,8 @@ impl Executive {
             stretches: VecDeque::new(),
             replan: true,
             end_reported: false,
+            detour_reported: false,
+            watched: None,
             played: None,
             recent: VecDeque::with_capacity(RECENT),
             pending: Vec::new(),
@@ -286,6 +304,7 @@ impl Executive {
             return self.step_promised(percept, is_open, events);
         }
         self.report_seen(percept, is_open, &mut events);
+        self.report_sighted(percept, &mut events);
         let offset = self.progress(percept);
         self.count_misses(is_open, &mut events);
         self.skip_closed(is_open);
@@ -387,7 +406,7 @@ impl Executive {
         let mut seen = Vec::new();
         let transit = &self.transit;
         look(
-            &transit.coverage_loop,
+            &*transit.coverage_loop,
             &transit.airframe,
             self.played.as_ref(),
             percept,
@@ -472,6 +491,10 @@ impl Executive {
         if front.kind.visit().is_some() || matches!(front.kind, Kind::Loiter(_)) {
             return;
         }
+        // What was given is flown whole; cells that closed behind it are skipped then.
+        if self.has_pieces() {
+            return;
+        }
         let target = self.stretches.iter().find_map(|s| s.kind.visit());
         if target.is_some_and(|visit| !is_open(visit.cell)) {
             if front.kind == Kind::Route {
@@ -536,7 +559,10 @@ impl Executive {
         is_open: &dyn Fn(u16) -> bool,
         events: &mut Vec<Event>,
     ) -> Vec<Move> {
-        if self.aim == Aim::Legs {
+        if let Some(moves) = self.given_moves(at) {
+            return moves;
+        }
+        if matches!(self.aim, Aim::Legs | Aim::Detour) {
             let mut cells = Vec::new();
             let next = self.transit.next(at, &mut self.queue, is_open, &mut cells);
             if !cells.is_empty() {
@@ -546,9 +572,6 @@ impl Executive {
                 moves.push(Move::Serve(visit));
                 return moves;
             }
-        }
-        if let Some(moves) = self.given_moves(at) {
-            return moves;
         }
         if let Some(Kind::Loiter(circle)) = self.stretches.back().map(|s| s.kind) {
             return vec![Move::Loiter(circle)];
@@ -618,9 +641,16 @@ impl Executive {
     /// Reports the end of the legs or of the given flight, once.
     fn report_end(&mut self, events: &mut Vec<Event>) {
         let is_left = |s: &Stretch| s.kind.visit().is_some();
+        let legs = || self.queue.is_empty() && !self.stretches.iter().any(is_left);
+        let is_detour_flown = self.aim == Aim::Detour && !self.is_given_left();
+        if is_detour_flown && !self.detour_reported {
+            self.detour_reported = true;
+            events.push(Event::DetourFlown);
+        }
         let are_flown = match self.aim {
-            Aim::Legs => self.queue.is_empty() && !self.stretches.iter().any(is_left),
+            Aim::Legs => legs(),
             Aim::Given => !self.is_given_left(),
+            Aim::Detour => is_detour_flown && legs(),
             Aim::Hold | Aim::Point(_) => false,
         };
         if are_flown && !self.end_reported {

@@ -50,6 +50,7 @@ fn the_operator_of_a_trial_revises_the_mission_adds_a_zone_and_calls_all_home() 
 
     a_zone_is_added(&place);
     a_uav_says_why(&place);
+    a_task_is_done(&place);
 
     let (code, said) = place.skein(&["mission", "rtb"]);
     assert_eq!(
@@ -108,6 +109,47 @@ fn a_zone_is_added(place: &Place) {
                 let follows = |o: &Value| o["id"] == id && o["revision"] == 3;
                 others.iter().any(follows)
             })
+    });
+}
+
+/// A place is asked for in flight: somebody is given it, sees it, and all are told.
+fn a_task_is_done(place: &Place) {
+    let task = [
+        "task",
+        "add",
+        "point",
+        "60.168642,24.938208",
+        "--id",
+        "gate",
+    ];
+    let (code, said) = place.skein(&task);
+    assert!(
+        code == 0 && said.contains("the task gate is asked for"),
+        "{said}"
+    );
+    let (code, said) = place.skein(&task);
+    assert!(code == 3 && said.contains("is open already"), "{said}");
+    let wide = [&task[..4], &["--radius-m", "90"]].concat();
+    let (code, said) = place.skein(&wide);
+    assert!(code == 3 && said.contains("larger than"), "{said}");
+    let (code, said) = place.skein(&["task", "cancel", "door"]);
+    assert!(code == 3 && said.contains("there are: gate"), "{said}");
+    crate::support::wait_until(DEADLINE, "the task is done", || {
+        let (code, said) = place.skein(&["task", "list", "--json"]);
+        let told: Value = serde_json::from_str(&said).unwrap_or(Value::Null);
+        let gate = &told["tasks"][0];
+        code == 0 && gate["state"] == "done" && gate["done_by"].as_u64().is_some()
+    });
+    let (_, said) = place.skein(&["task", "list"]);
+    let by = said
+        .trim()
+        .rsplit("uav")
+        .next()
+        .unwrap_or_default()
+        .to_owned();
+    crate::support::wait_until(DEADLINE, "who did it says so", || {
+        let (code, why) = place.skein(&["why", &by]);
+        code == 0 && why.contains("it did the task \"gate\"")
     });
 }
 

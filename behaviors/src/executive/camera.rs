@@ -9,8 +9,8 @@ use crate::reactive::follow::fly;
 use crate::setpoint::Steer;
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::CoverageLoop;
-use skein_flight::coverage::ring::patch::frame_holds;
-use skein_geometry::frame::Pose;
+use skein_flight::coverage::ring::patch::{Corners, frame_holds};
+use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::wrap_pi;
 
 /// Margin taken off the footprint, metres: what a percept's pose may be off and rounding,
@@ -43,10 +43,34 @@ pub struct Played {
     pub airspeed_mps: f64,
 }
 
-/// Reports open cells of the loop, by index, that were seen whole at `now` or since
+/// Patches of the ground by number, and which lie near a camera.
+pub trait Ground {
+    /// Calls `visit` with each that a frame at `at` reaching `across_m` and `along_m` to its
+    /// sides may hold whole.
+    fn near(&self, at: Point, across_m: f64, along_m: f64, visit: &mut dyn FnMut(u16, &Corners));
+}
+
+impl Ground for CoverageLoop {
+    fn near(&self, at: Point, across_m: f64, along_m: f64, visit: &mut dyn FnMut(u16, &Corners)) {
+        self.cells_near(at, across_m, along_m, &mut |cell, corners| {
+            visit(cell, corners);
+        });
+    }
+}
+
+/// A few patches: each is looked at.
+impl Ground for [Corners] {
+    fn near(&self, _: Point, _: f64, _: f64, visit: &mut dyn FnMut(u16, &Corners)) {
+        (0u16..)
+            .zip(self)
+            .for_each(|(n, corners)| visit(n, corners));
+    }
+}
+
+/// Reports open patches of the ground, by number, that were seen whole at `now` or since
 /// `before`.
-pub fn look(
-    coverage_loop: &CoverageLoop,
+pub fn look<G: Ground + ?Sized>(
+    ground: &G,
     airframe: &Airframe,
     before: Option<&Played>,
     now: &Percept,
@@ -54,7 +78,7 @@ pub fn look(
     seen: &mut Vec<u16>,
 ) {
     let lens = Lens {
-        coverage_loop,
+        ground,
         airframe,
         is_open,
     };
@@ -105,19 +129,19 @@ pub fn look(
     }
 }
 
-struct Lens<'a> {
-    coverage_loop: &'a CoverageLoop,
+struct Lens<'a, G: ?Sized> {
+    ground: &'a G,
     airframe: &'a Airframe,
     is_open: &'a dyn Fn(u16) -> bool,
 }
 
-impl Lens<'_> {
+impl<G: Ground + ?Sized> Lens<'_, G> {
     /// Cells that the footprint at `pose` contains, its sides shortened by `slack_m`.
     fn look(&self, pose: &Pose, slack_m: f64, seen: &mut Vec<u16>) {
         let across_m = self.airframe.footprint_across_m - slack_m;
         let along_m = self.airframe.footprint_along_m - slack_m;
         let p = pose.position();
-        let mut contained = |cell: u16, corners: &_| {
+        let mut contained = |cell: u16, corners: &Corners| {
             if (self.is_open)(cell)
                 && !seen.contains(&cell)
                 && frame_holds(corners, *pose, across_m, along_m)
@@ -125,7 +149,6 @@ impl Lens<'_> {
                 seen.push(cell);
             }
         };
-        self.coverage_loop
-            .cells_near(p, across_m, along_m, &mut contained);
+        self.ground.near(p, across_m, along_m, &mut contained);
     }
 }

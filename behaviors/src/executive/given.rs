@@ -235,7 +235,7 @@ fn tightest_m(airframe: &Airframe, wind: Wind) -> f64 {
 impl Executive {
     /// Takes up a flight; returns whether it is the one that is being flown.
     pub(super) fn give(&mut self, flight: GivenFlight) -> bool {
-        if self.aim == Aim::Given
+        if self.aim.gives()
             && let Some(given) = &self.given
             && given.flight == flight
         {
@@ -323,7 +323,7 @@ impl Executive {
 
     /// What follows of the given flight at the end of the track, with the way to it.
     pub(super) fn given_moves(&mut self, from: &Place) -> Option<Vec<Move>> {
-        let given = self.given.as_ref().filter(|_| self.aim == Aim::Given)?;
+        let given = self.given.as_ref().filter(|_| self.aim.gives())?;
         let (piece, to_m) = given.next()?;
         let step = Move::Piece(piece, to_m);
         if is_near(&from.pose, &piece.start) {
@@ -376,9 +376,18 @@ impl Executive {
 
     /// Whether something of a given flight is not on the track yet, or not flown.
     pub(super) fn is_given_left(&self) -> bool {
+        self.given.as_ref().is_some_and(|g| g.next().is_some()) || self.has_pieces()
+    }
+
+    /// Whether something of a given flight is on the track.
+    pub(super) fn has_pieces(&self) -> bool {
         let is_piece = |kind: &Kind| matches!(kind, Kind::Piece { .. });
+        self.stretches.iter().any(|s| is_piece(&s.kind))
+    }
+
+    /// Whether something of a given flight is not on the track yet.
+    pub(super) fn is_given_waiting(&self) -> bool {
         self.given.as_ref().is_some_and(|g| g.next().is_some())
-            || self.stretches.iter().any(|s| is_piece(&s.kind))
     }
 
     /// In how many seconds the UAV lands, if all that is left of a given flight is on the
@@ -396,7 +405,7 @@ impl Executive {
     /// Where the given flight will end that goes on from a place after the first `kept`
     /// stretches, and the distance through the air to there, metres.
     pub(super) fn given_ahead(&self, from: &Place, kept: usize) -> Option<(Place, f64)> {
-        let given = self.given.as_ref().filter(|_| self.aim == Aim::Given)?;
+        let given = self.given.as_ref().filter(|_| self.aim.gives())?;
         let rest = given.rest(self.goes_on_m(given, kept));
         let (start, end) = rest.start().zip(rest.end())?;
         let mut air_m = self.transit.air().air_length_m(&rest);
@@ -409,8 +418,11 @@ impl Executive {
 
     /// The way back along the given flight to a place where there is room to wait.
     pub(super) fn back_to_wait(&self, from: &Place) -> Option<Vec<Move>> {
-        let given = self.given.as_ref().filter(|_| self.aim == Aim::Given)?;
-        if self.transit.has_room(&from.pose) {
+        let given = self.given.as_ref().filter(|_| self.aim.gives())?;
+        // After the legs of a detour it is not on the flight any more.
+        let is_piece = |s: &super::Stretch| matches!(s.kind, Kind::Piece { .. });
+        let left_it = self.aim == Aim::Detour && !self.stretches.back().is_some_and(is_piece);
+        if left_it || self.transit.has_room(&from.pose) {
             return None;
         }
         self.back_from(given, from, given.next_m)

@@ -16,7 +16,12 @@ impl Executive {
     /// not are passed, or flown round by a direct route where that is shorter.
     pub fn set_goal(&mut self, goal: Goal, is_open: &dyn Fn(u16) -> bool) {
         let mut begins_with = None;
-        if !matches!(goal, Goal::Given(_)) {
+        let goal = match goal {
+            // By promises nothing but cells is flown.
+            Goal::Detour(_, legs) if self.contingency.is_some() => Goal::Legs(legs),
+            goal => goal,
+        };
+        if !matches!(goal, Goal::Given(_) | Goal::Detour(..)) {
             self.take_back();
         }
         let (aim, kept, queue) = match goal {
@@ -50,6 +55,12 @@ impl Executive {
                     if same { self.stretches.len() } else { 0 },
                     VecDeque::new(),
                 )
+            }
+            Goal::Detour(flight, legs) => {
+                let same = self.give(flight);
+                self.detour_reported &= same;
+                let (kept, queue) = self.detoured(same, self.visits(&legs), is_open);
+                (Aim::Detour, kept, queue)
             }
         };
         self.end_reported = false;
@@ -168,7 +179,7 @@ impl Executive {
 
     /// Of the stretches after the first `kept`, those stay too that lead to the cells
     /// that `visits` wants next; these are taken off it.
-    fn matching(&self, mut kept: usize, visits: &mut VecDeque<CellVisit>) -> usize {
+    pub(super) fn matching(&self, mut kept: usize, visits: &mut VecDeque<CellVisit>) -> usize {
         for (i, s) in self.stretches.iter().enumerate().skip(kept) {
             let Some(visit) = s.kind.visit() else {
                 continue;

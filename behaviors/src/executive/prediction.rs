@@ -5,7 +5,7 @@
 
 use super::transit::{CellVisit, Move, Place};
 use super::way_home::WaysHome;
-use super::{Executive, Forecast, Kind};
+use super::{Aim, Executive, Forecast, Kind};
 use crate::percept::Percept;
 use skein_flight::coverage::ring::Direction;
 use skein_flight::coverage::ring::backtracking::{Leg, OffLoop};
@@ -80,9 +80,14 @@ impl Executive {
         }
         let on_loop = anchor.and_then(|(place, m)| place.boundary.map(|b| (b, m)));
         let is_in_a_cell = kept > 0 && items.first().is_some_and(|i| i.cell.is_some());
+        // From the end of a detour it may leave for anywhere.
+        let detour = items.iter().rev().find(|i| i.given);
+        let detour = detour.filter(|_| self.aim == Aim::Detour);
+        let (free, free_m) = detour.map_or((from.pose, 0.0), |i| (i.end.pose, i.end_m));
         let off_loop =
-            (cells.is_empty() && !is_in_a_cell).then(|| OffLoop::of(from.pose, self.when_ms(0.0)));
-        let found = on_loop.or_else(|| self.transit.way_on(from.pose).map(|(b, d, m)| ((b, d), m)));
+            (cells.is_empty() && !is_in_a_cell).then(|| OffLoop::of(free, self.when_ms(free_m)));
+        let way_on = || self.transit.way_on(free);
+        let found = on_loop.or_else(|| way_on().map(|(b, d, m)| ((b, d), free_m + m)));
         match found {
             Some(((anchor, heading), m)) => Forecast {
                 cells,
@@ -113,7 +118,9 @@ impl Executive {
         let kept = if self.replan { 0 } else { self.stretches.len() };
         let mut items = self.items(from, kept, self.waiting(kept), is_open);
         let (place, flown_m) = items.last().map_or((*from, 0.0), |i| (i.end, i.end_m));
-        if let Some((end, air_m)) = self.given_ahead(&place, kept) {
+        if self.aim == Aim::Given
+            && let Some((end, air_m)) = self.given_ahead(&place, kept)
+        {
             items.push(Item {
                 visit: None,
                 cell: None,
@@ -156,7 +163,11 @@ impl Executive {
         let Some(from) = self.here() else {
             return Vec::new();
         };
-        let (kept, queue) = self.continued(self.visits(legs), is_open);
+        let (kept, queue) = if self.aim == Aim::Detour {
+            self.detoured(true, self.visits(legs), is_open)
+        } else {
+            self.continued(self.visits(legs), is_open)
+        };
         let items = self.items(&from, kept, queue, is_open);
         items
             .iter()
@@ -215,6 +226,13 @@ impl Executive {
         self.ms(way_m).saturating_add(whole_ms(TURN_MARGIN_MS))
     }
 
+    /// Where the UAV is on its track, or is where it has none, over the ground; none before the
+    /// first percept.
+    #[must_use]
+    pub fn pose(&self) -> Option<Pose> {
+        self.here().map(|place| place.pose)
+    }
+
     /// Where the flight to come begins.
     fn here(&self) -> Option<Place> {
         let pose = self
@@ -269,6 +287,18 @@ impl Executive {
                 given: matches!(s.kind, Kind::Piece { .. }),
                 end_m,
                 end: place,
+            });
+        }
+        if self.aim == Aim::Detour
+            && let Some((end, air_m)) = self.given_ahead(&place, kept)
+        {
+            (place, end_m) = (end, end_m + air_m);
+            items.push(Item {
+                visit: None,
+                cell: None,
+                given: true,
+                end_m,
+                end,
             });
         }
         let mut refused = Vec::new();

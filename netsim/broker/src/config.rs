@@ -1,6 +1,7 @@
 //! The configuration of each peer, as its process reads it.
 
 use skein_netsim::spec::{GroundStationSpec, Spec, UavSpec};
+use skein_peer::wire::tasks::SENSORS;
 use std::net::SocketAddr;
 
 /// After so many beacon periods of scenario time without a byte a transport gives its
@@ -62,7 +63,11 @@ impl Surroundings<'_> {
     #[must_use]
     pub fn uav(&self, uav: &UavSpec) -> serde_json::Value {
         let airframe = skein_interop::airframe::to_json(&uav.airframe);
-        with_console(self.config(uav.id, "uav", uav.height_m, airframe), uav.id)
+        let mut config = self.config(uav.id, "uav", uav.height_m, airframe);
+        let carried = (1..).zip(SENSORS).filter(|(n, _)| uav.carries(*n));
+        let carried: Vec<&str> = carried.map(|(_, name)| name).collect();
+        config["sensors"] = carried.into();
+        with_console(config, uav.id)
     }
 
     /// The configuration of the ground station.

@@ -8,6 +8,7 @@ use crate::registry::ConsoleEntry;
 use skein_console::{Answer, Command, NewZone, Token, ask};
 use skein_netsim::account::{Account, Cause, secs};
 use skein_netsim::fault::{Fault, TimedFault};
+use skein_peer::input::TaskEdit;
 use std::time::Duration;
 
 /// Faults that wait for their times; a plan of a person is shorter.
@@ -136,6 +137,14 @@ impl Injector<'_> {
                 self.operate(&Command::AddZones(vec![zone])).await
             }
             Fault::RemoveZone { name } => self.operate(&Command::RemoveZone(name.clone())).await,
+            Fault::AddTask { task } => {
+                let edit = TaskEdit::Add(task.clone());
+                self.operate(&Command::Task(edit)).await
+            }
+            Fault::CancelTask { name } => {
+                let edit = TaskEdit::Cancel(name.clone());
+                self.operate(&Command::Task(edit)).await
+            }
             Fault::Revise { .. } => {
                 Err("another mission is given by `skein mission revise`".to_owned())
             }

@@ -168,6 +168,7 @@ fn launch(fleet: &Fleet, geometry: &MissionGeometry) -> Vec<UavSpec> {
         },
         takeoff_ms: m.takeoff_ms.unwrap_or(0),
         height_m: m.height_m,
+        sensors: m.sensors,
         twin_of: None,
         aboard: false,
     };

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 pub use skein_behaviors::Order;
 use skein_peer::CoverageTask;
+use skein_peer::input::NewTask;
 use skein_peer::mission::PointMm;
 use std::fmt;
 
@@ -90,6 +91,16 @@ pub enum Fault {
     /// The operator takes a no-fly zone away that was added.
     RemoveZone {
         /// Which.
+        name: String,
+    },
+    /// The operator asks for a task other than coverage: the ground station speaks it.
+    AddTask {
+        /// What is asked for.
+        task: NewTask,
+    },
+    /// The operator wants a task no more.
+    CancelTask {
+        /// Which, by name.
         name: String,
     },
     /// The operator wants something of all UAVs: the ground station speaks it.
@@ -183,7 +194,14 @@ impl Fault {
     /// Whether a ground station has to speak it.
     #[must_use]
     pub fn is_spoken(&self) -> bool {
-        self.changes_mission() || matches!(self, Self::Order { .. } | Self::Rebase { .. })
+        self.changes_mission()
+            || matches!(
+                self,
+                Self::Order { .. }
+                    | Self::Rebase { .. }
+                    | Self::AddTask { .. }
+                    | Self::CancelTask { .. }
+            )
     }
 
     /// The peers that it names.
@@ -212,6 +230,8 @@ impl Fault {
             | Self::Revise { .. }
             | Self::AddZone { .. }
             | Self::RemoveZone { .. }
+            | Self::AddTask { .. }
+            | Self::CancelTask { .. }
             | Self::Order { .. }
             | Self::Loss { .. } => Vec::new(),
         }
@@ -250,6 +270,11 @@ impl fmt::Display for Fault {
             Self::RemoveZone { name } => {
                 write!(f, "the operator takes the no-fly zone {name} away")
             }
+            Self::AddTask { task } => {
+                let name = task.name.as_deref().unwrap_or("without a name");
+                write!(f, "the operator asks for the task {name}")
+            }
+            Self::CancelTask { name } => write!(f, "the operator wants the task {name} no more"),
             Self::Order { order } => write!(f, "the operator says {}", order.name()),
             Self::FailStores {
                 peer,

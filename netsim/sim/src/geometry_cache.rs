@@ -58,6 +58,7 @@ impl GeometryCache {
     pub fn answer(&mut self, job: &Job) -> JobResult {
         match job {
             Job::Geometry(mission) => JobResult::Geometry(self.of(mission)),
+            Job::Errand(request) => JobResult::Errand(request.plan()),
             Job::Divide {
                 geometry,
                 ring,

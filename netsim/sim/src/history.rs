@@ -269,6 +269,10 @@ pub fn report_hash(report: &Report) -> u64 {
             words(&mut h, 11, &[mission.content_hash()]);
         }
         Report::Silenced => words(&mut h, 10, &[]),
+        Report::Task { .. } => {
+            words(&mut h, 12, &[]);
+            h.write(format!("{report:?}").as_bytes());
+        }
         Report::Finished { revision } => words(&mut h, 7, &[u64::from(*revision)]),
         Report::Alarm { text } => {
             words(&mut h, 8, &[]);

@@ -126,6 +126,8 @@ impl<'a> Baseline<'a> {
             | Fault::Revise { .. }
             | Fault::AddZone { .. }
             | Fault::RemoveZone { .. }
+            | Fault::AddTask { .. }
+            | Fault::CancelTask { .. }
             | Fault::Order { .. }
             | Fault::FailStores { .. }
             | Fault::SlowStores { .. }
@@ -193,7 +195,10 @@ impl<'a> Baseline<'a> {
                 Event::PlanDone => {
                     self.busy.insert(id, false);
                 }
-                Event::Refused { .. } | Event::CutShort { .. } => {}
+                Event::Refused { .. }
+                | Event::CutShort { .. }
+                | Event::Sighted { .. }
+                | Event::DetourFlown => {}
             }
         }
         true

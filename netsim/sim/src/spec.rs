@@ -106,11 +106,22 @@ pub struct UavSpec {
     pub takeoff_ms: u32,
     /// Its height slot above the origin, metres.
     pub height_m: f64,
+    /// What it carries: a bit for each sensor, the lowest for sensor 1.
+    pub sensors: u32,
     /// As which other one it was configured by mistake: its peer speaks under that id. It is
     /// switched on by a fault, and its number is that of its airframe and radio.
     pub twin_of: Option<u16>,
     /// Whether it is a program in the airframe of that one, with a radio of its own.
     pub aboard: bool,
+}
+
+impl UavSpec {
+    /// Whether it carries a sensor, by number; 0 for any.
+    #[must_use]
+    pub fn carries(&self, sensor: u8) -> bool {
+        let bit = u32::from(sensor).checked_sub(1);
+        bit.is_none_or(|bit| self.sensors >> bit.min(31) & 1 == 1)
+    }
 }
 
 /// The ground station.

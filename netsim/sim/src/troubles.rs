@@ -9,7 +9,9 @@ use crate::swarm::stream::{Concern, Stream};
 use crate::world::flat::{Bounds, clip};
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::{PI, sin_cos};
-use skein_peer::mission::{PointMm, ring_mm};
+use skein_peer::input::NewTask;
+use skein_peer::mission::{PointMm, mm, ring_mm};
+use skein_peer::wire::tasks::TaskKind;
 use skein_peer::{CoverageTask, LineTask, PointTask};
 
 /// Shortest time for which something is wrong, milliseconds: two beacon periods.
@@ -40,6 +42,13 @@ const FARTHEST_MM: i32 = 40_000;
 
 /// So often a place for a new zone is drawn at most.
 const ZONE_TRIES: u32 = 16;
+
+/// The operator of a storm asks for so many tasks at most, each for so long, milliseconds.
+const MOST_TASKS: u64 = 6;
+/// See [`MOST_TASKS`].
+const LEAST_WITHIN_MS: u64 = 20_000;
+/// See [`MOST_TASKS`].
+const MOST_WITHIN_MS: u64 = 200_000;
 
 /// A new zone leaves so much room round where UAVs start and loiter at last, metres.
 const ZONE_APART_M: f64 = 80.0;
@@ -124,6 +133,7 @@ pub const RARE: &[Kind] = &[
     Kind::new("mission-elsewhere", can_be_elsewhere, missions_elsewhere),
     Kind::new("twin", |s| s.uavs.len() > 1, twin),
     Kind::new("zones", can_be_given, zones),
+    Kind::new("tasks", can_be_asked, tasks),
 ];
 
 /// Each of the rare kinds strikes in one run of so many.
@@ -541,6 +551,62 @@ fn zones(d: &mut Draw<'_>) {
             d.push(again_ms, Fault::RemoveZone { name });
         }
     }
+}
+
+/// Whether an operator can ask for tasks: somebody speaks them, and no UAVs are kept apart by
+/// agreement.
+fn can_be_asked(spec: &Spec) -> bool {
+    spec.ground.is_some() && spec.mission.separation_mm == 0
+}
+
+/// The operator asks for some places and lines in and around the area, some of them within a
+/// time, and cancels one in four.
+fn tasks(d: &mut Draw<'_>) {
+    for n in 1..=d.s.between(1, MOST_TASKS) {
+        let Some(task) = new_task(d, n) else {
+            continue;
+        };
+        let name = task.name.clone().unwrap_or_default();
+        let at_ms = d.s.between(0, d.end_ms);
+        let cancelled_ms = d.s.between(at_ms, d.end_ms + LEAST_WITHIN_MS);
+        let is_cancelled = d.s.one_in(4);
+        d.push(at_ms, Fault::AddTask { task });
+        if is_cancelled {
+            d.push(cancelled_ms, Fault::CancelTask { name });
+        }
+    }
+}
+
+/// A place, or now and then a line of two legs, that can be seen in the mission.
+fn new_task(d: &mut Draw<'_>, n: u64) -> Option<NewTask> {
+    let within = Bounds::around(&d.spec.mission.area_m());
+    let size = within.max - within.min;
+    (0..ZONE_TRIES).find_map(|_| {
+        let place = |d: &mut Draw<'_>| {
+            let (east, north) = (share(d.s, 0, 1400) - 0.2, share(d.s, 0, 1400) - 0.2);
+            let at = within.min + Vector::new(size.x * east, size.y * north);
+            (mm(at.x), mm(at.y))
+        };
+        let is_line = d.s.one_in(4);
+        let places = (0..if is_line { 3 } else { 1 }).map(|_| place(d)).collect();
+        let is_late = d.s.one_in(3);
+        let within_ms = d.s.between(LEAST_WITHIN_MS, MOST_WITHIN_MS);
+        let task = NewTask {
+            name: Some(format!("task-{n}")),
+            kind: if is_line {
+                TaskKind::Line
+            } else {
+                TaskKind::Pinpoint
+            },
+            places,
+            radius_mm: if is_line { 2_000 } else { 10_000 },
+            worth: 100,
+            within_ms: is_late.then(|| u32::try_from(within_ms).unwrap_or(u32::MAX)),
+            sensor: 0,
+        };
+        let asked = task.asked(0, 1).ok()?;
+        d.spec.mission.can_do(&asked).ok().map(|()| task)
+    })
 }
 
 /// A number from 0 to 1, in thousandths.

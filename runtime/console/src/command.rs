@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Order;
 use skein_peer::Mission;
+use skein_peer::input::TaskEdit;
 use skein_peer::mission::PointMm;
 use std::sync::Arc;
 
@@ -28,6 +29,8 @@ pub enum Command {
     AddZones(Vec<NewZone>),
     /// The mission goes on without a no-fly zone that was added.
     RemoveZone(String),
+    /// Something about tasks other than coverage: one more, one less.
+    Task(TaskEdit),
     /// What the ground station knows of the mission: one line of JSON, an
     /// [`Overview`](skein_peer::Overview).
     Show,

@@ -7,8 +7,9 @@ use crate::bus::{BusConfig, loopback_address};
 use crate::console::ConsoleConfig;
 use crate::simulator::SimulatorConfig;
 use skein_interop::airframe;
-use skein_interop::json::{Document, Error, Fields, Node, Place};
+use skein_interop::json::{Document, Error, Fields, Node, Place, suggestion};
 use skein_peer::config::{Launch, Objective};
+use skein_peer::wire::tasks::{CAMERA_ALONE, SENSORS, sensor_of_name};
 use skein_peer::{Mission, PeerConfig, PeerId, Role};
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -23,6 +24,7 @@ const FIELDS: &[&str] = &[
     "rate_bps",
     "queue_age_ms",
     "height_m",
+    "sensors",
     "airframe",
     "objective",
     "mission",
@@ -67,6 +69,19 @@ pub enum ConfigError {
     /// Its content is wrong.
     #[error(transparent)]
     Field(#[from] Error),
+}
+
+/// What a UAV carries, by names.
+fn sensors(node: &Node<'_>) -> Result<u32, Error> {
+    let one = |carried: u32, name: &Node<'_>| {
+        let text = name.text()?;
+        let sensor = sensor_of_name(text).ok_or_else(|| {
+            let known = suggestion(text, &SENSORS);
+            name.wrong(format!("no sensor is named \"{text}\"; {known}"))
+        })?;
+        Ok(carried | 1 << (sensor - 1))
+    };
+    node.items()?.iter().try_fold(0, one)
 }
 
 impl NodeConfig {
@@ -120,6 +135,7 @@ impl NodeConfig {
             launches: f
                 .given("launches")
                 .map_or_else(|| Ok(Arc::from([])), launches)?,
+            sensors: f.given("sensors").map_or(Ok(CAMERA_ALONE), sensors)?,
             seed: f.need("seed", "1")?.count(0, u64::MAX, "any number")?,
         };
         let links = f.need("links", "[]")?.items()?;

@@ -5,6 +5,7 @@
 //! | an order | it is spoken in this life of the peer and in every later one, until the next |
 //! | a mission | it is checked, gets the next revision and is spoken |
 //! | another base, a no-fly zone more or less, the end | the newest mission with that change, likewise |
+//! | a task more or less | it is checked, kept and spoken |
 //! | what there is, or why | it is answered, and nothing follows |
 //!
 //! What was said is kept over restarts of the ground station ([`crate::standing`]).
@@ -140,7 +141,7 @@ pub fn edited(request: Command, newest: Option<&Mission>) -> Result<Mission, Str
         }
         Command::RemoveZone(name) => held("with zones")?.without_zone(&name),
         // Answered before, without a mission.
-        Command::Order(_) | Command::Show | Command::Why => {
+        Command::Order(_) | Command::Task(_) | Command::Show | Command::Why => {
             return Err("no mission follows from that".to_owned());
         }
     };

@@ -19,6 +19,7 @@ use crate::vehicle::Vehicle;
 use crate::world::{News, Tick, World};
 use skein_behaviors::{Order, Percept};
 use skein_console::{Answer, Asked, Command as Request};
+use skein_peer::input::{AskedTask, TaskEdit};
 use skein_peer::offload::{Job, JobResult, run};
 use skein_peer::{Command, Incarnation, Input, Mission, Output, Peer, Time, Transmission};
 use std::sync::Arc;
@@ -56,6 +57,12 @@ pub trait PeerLogic: Send {
     fn why(&self) -> String;
     /// What it knows of the mission, as JSON; none without a mission.
     fn overview(&self) -> Option<String>;
+    /// Whether the operator's words on tasks can be carried out; a sentence that says why not.
+    fn check_task(&self, edit: &TaskEdit) -> Result<(), String>;
+    /// The tasks of its operator.
+    fn operators_tasks(&self) -> Vec<AskedTask>;
+    /// A number that grows with each change of these.
+    fn tasks_version(&self) -> u64;
 }
 
 impl PeerLogic for Peer {
@@ -94,6 +101,18 @@ impl PeerLogic for Peer {
 
     fn overview(&self) -> Option<String> {
         serde_json::to_string(&Peer::overview(self)?).ok()
+    }
+
+    fn check_task(&self, edit: &TaskEdit) -> Result<(), String> {
+        Peer::check_task(self, edit)
+    }
+
+    fn operators_tasks(&self) -> Vec<AskedTask> {
+        Peer::operators_tasks(self)
+    }
+
+    fn tasks_version(&self) -> u64 {
+        Peer::tasks_version(self)
     }
 }
 
@@ -140,6 +159,10 @@ pub struct Driver<P, V, W, C, T> {
     order: Option<Order>,
     /// The life in which the order was spoken.
     ordered_in: Option<Incarnation>,
+    /// Whether the tasks that were kept were said in this process.
+    tasks_told: bool,
+    /// The version of the tasks that were kept last.
+    tasks_kept: u64,
     /// Came while the clock stood still.
     early: Option<Event>,
     counters_due: Time,
@@ -197,6 +220,8 @@ where
             order: standing.as_ref().and_then(Standing::order),
             standing,
             ordered_in: None,
+            tasks_told: false,
+            tasks_kept: 0,
             early: None,
             counters_due: Time(0),
         }
@@ -234,6 +259,7 @@ where
             }
             self.deliver().await;
             self.repeat_order().await;
+            self.repeat_tasks().await;
             self.fire_timers().await;
             self.transmit().await;
         }
@@ -409,6 +435,7 @@ where
                 )
             }
             Request::Order(order) => Some(self.order(*order).await),
+            Request::Task(edit) => Some(self.task(edit.clone()).await),
             _ => None,
         };
         if let Some(told) = told {
@@ -445,6 +472,67 @@ where
                 "the ground station will say {name} to all, as soon as it has listened long enough to speak"
             ),
         }])
+    }
+
+    /// A task more or less: checked, spoken, and kept for the next start of this process.
+    async fn task(&mut self, edit: TaskEdit) -> Answer {
+        self.peer.check_task(&edit)?;
+        let told = match &edit {
+            TaskEdit::Add(_) => "asked for",
+            TaskEdit::Cancel(_) => "cancelled",
+            TaskEdit::Again(_) => {
+                return Err("tasks are said again by the ground station itself".to_owned());
+            }
+        };
+        let before: Vec<String> = self.names_of_tasks();
+        self.step(Input::Command(Command::Task(edit.clone()))).await;
+        self.keep_tasks()?;
+        let added = self.names_of_tasks().into_iter();
+        let added: Vec<String> = added.filter(|n| !before.contains(n)).collect();
+        let name = match edit {
+            TaskEdit::Cancel(name) => name,
+            TaskEdit::Add(task) => task.name.unwrap_or_else(|| added.join(", ")),
+            TaskEdit::Again(_) => String::new(),
+        };
+        Ok(vec![format!("the task {name} is {told}")])
+    }
+
+    fn names_of_tasks(&self) -> Vec<String> {
+        let tasks = self.peer.operators_tasks().into_iter();
+        let open = tasks.filter(|t| t.task.is_open());
+        open.map(|t| t.task.name()).collect()
+    }
+
+    /// Keeps the operator's tasks, where they are others than before.
+    fn keep_tasks(&mut self) -> Result<(), String> {
+        let version = self.peer.tasks_version();
+        if version == self.tasks_kept {
+            return Ok(());
+        }
+        self.tasks_kept = version;
+        let tasks = self.peer.operators_tasks();
+        match &mut self.standing {
+            Some(standing) => standing.keep_tasks(tasks).map_err(unkept),
+            None => Ok(()),
+        }
+    }
+
+    /// Tasks of before this process started are said again once it speaks; what became of
+    /// them since is kept.
+    async fn repeat_tasks(&mut self) {
+        if self.peer.speaks_in().is_none() {
+            return;
+        }
+        if !std::mem::replace(&mut self.tasks_told, true) {
+            let tasks = self.standing.as_ref().map_or(&[][..], Standing::tasks);
+            if !tasks.is_empty() {
+                let again = TaskEdit::Again(tasks.to_vec());
+                self.step(Input::Command(Command::Task(again))).await;
+            }
+        }
+        if let Err(why) = self.keep_tasks() {
+            tracing::warn!("{why}");
+        }
     }
 
     /// Speaks the standing order once in each life of the peer: what an earlier life

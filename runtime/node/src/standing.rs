@@ -1,5 +1,5 @@
 //! What the operator of a ground station said last, kept over its restarts: the
-//! standing order, and the mission that replaced the configured one.
+//! standing order, the tasks that were asked for, and the mission that replaced the configured one.
 //!
 //! A record of a later life voids those of earlier ones, at every peer. So a ground
 //! station that came back knowing only its configuration would silence the operator.
@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use skein_behaviors::Order;
 use skein_console::replace_private_file;
 use skein_peer::Mission;
+use skein_peer::input::AskedTask;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -49,6 +50,8 @@ struct Kept {
     configured: u64,
     order: Option<Order>,
     mission: Option<Arc<Mission>>,
+    #[serde(default)]
+    tasks: Vec<AskedTask>,
 }
 
 impl Standing {
@@ -93,6 +96,23 @@ impl Standing {
     #[must_use]
     pub fn mission(&self) -> Option<Arc<Mission>> {
         self.kept.mission.clone()
+    }
+
+    /// The tasks that the operator asked for, as they were said last.
+    #[must_use]
+    pub fn tasks(&self) -> &[AskedTask] {
+        &self.kept.tasks
+    }
+
+    /// Keeps tasks.
+    ///
+    /// # Errors
+    /// When it cannot be written; those before stand.
+    pub fn keep_tasks(&mut self, tasks: Vec<AskedTask>) -> Result<(), StandingError> {
+        self.keep(Kept {
+            tasks,
+            ..self.kept.clone()
+        })
     }
 
     /// Keeps an order.

@@ -3,6 +3,7 @@
 use crate::cells::CellSet;
 use crate::output::Status;
 use crate::wire::message::{Epoch, Order, Stamp};
+use crate::wire::tasks::{Progress, TaskId};
 use crate::{Incarnation, PeerId};
 use std::collections::BTreeMap;
 
@@ -49,6 +50,10 @@ pub struct Beliefs {
     pub order: Order,
     /// Flight time it may still spend, milliseconds (endurance less reserve).
     pub spendable_ms: u32,
+    /// What it holds of tasks: which, in which revision, how far it is.
+    pub tasks: Vec<(TaskId, u32, Progress)>,
+    /// Tasks that it knows to be open, and in its eyes somebody can do.
+    pub open_tasks: Vec<(TaskId, u32)>,
     /// Records held, bytes waiting to be sent, open stores: each with its cap.
     pub loads: Vec<(&'static str, usize, usize)>,
 }

@@ -57,6 +57,9 @@ pub struct PeerConfig {
     /// Who is launched where and when, as planned; empty where nobody planned it. The same for
     /// the whole fleet.
     pub launches: Arc<[Launch]>,
+    /// What it carries, for a UAV: a bit for each of [`crate::wire::tasks::SENSORS`], the lowest
+    /// for the first.
+    pub sensors: u32,
     /// Seed of the peer's own random stream (beacon jitter, boot nonce).
     pub seed: u64,
 }

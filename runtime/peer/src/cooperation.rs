@@ -5,6 +5,7 @@
 //! |---|---|
 //! | the operator said hold | loiter here |
 //! | the operator said return or cancelled the mission, or all is covered, or the fuel is due, or another process speaks under its id | loiter at base |
+//! | it was given a task, and its flight is planned | fly that, then the cells of the plan |
 //! | the plan has cells | fly them |
 //! | nothing to fly, others at work | loiter where it is |
 //! | and among many nobody is heard | loiter at base |
@@ -31,6 +32,7 @@ use crate::Incarnation;
 use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
 use crate::effect::{Effect, Effects, PendingJob, Promise};
+use crate::errand::Errand;
 use crate::input::Time;
 use crate::journal::Durable;
 use crate::mission::{GeometryError, Library, Mission};
@@ -40,11 +42,13 @@ use crate::output::{Report, Status};
 use crate::protocol::membership::Membership;
 use crate::protocol::negotiation::{Adoption, are_many};
 use crate::protocol::runs::{PlannedCell, legs_of};
+use crate::tasking::Tasking;
 use crate::timers::{Timer, Timers};
 use crate::why::Reason;
 use crate::wire::codec::Body;
 use crate::wire::message::{Beacon, Bid, Epoch, Lacking, Member, Order, Record};
-use skein_behaviors::{Goal, Percept};
+use crate::wire::tasks::TaskId;
+use skein_behaviors::{Event, Goal, Percept};
 use skein_flight::coverage::ring::backtracking::Division;
 use std::sync::Arc;
 
@@ -83,6 +87,7 @@ pub(crate) struct Cooperation {
     library: Library,
     order: StandingOrder,
     state: Option<MissionState>,
+    pub(crate) tasking: Tasking,
     mismatch_told: bool,
     /// When a piece of a mission came last.
     piece_came: Time,
@@ -90,9 +95,10 @@ pub(crate) struct Cooperation {
 
 impl Cooperation {
     /// A manager that begins with the mission found on disk, if any.
-    pub fn new(mission: Option<Arc<Mission>>) -> Self {
+    pub fn new(config: &PeerConfig) -> Self {
         Self {
-            library: Library::new(mission),
+            library: Library::new(config.mission.clone()),
+            tasking: Tasking::new(config),
             order: StandingOrder::default(),
             state: None,
             mismatch_told: false,
@@ -153,6 +159,7 @@ impl Cooperation {
         if let Some(state) = &mut self.state {
             state.void_ownership(me, timers);
         }
+        self.tasking.void_ownership(me, self.state.as_mut());
     }
 
     /// For so long this peer did not listen: it waits that much longer for others.
@@ -211,8 +218,10 @@ impl Cooperation {
             loop_hash: state.loop_hash(),
             cells: state.covered().capacity(),
         };
-        self.state = Some(state);
-        vec![Effect::Report(ready), Effect::HearAgain]
+        let state = self.state.insert(state);
+        let mut effects = vec![Effect::Report(ready), Effect::HearAgain];
+        effects.extend(self.tasking.plan_anew(state));
+        effects
     }
 
     /// Lists only what can be flown, by what the UAV has left.
@@ -238,7 +247,13 @@ impl Cooperation {
             effects.extend(separation.on_percept(now, percept, executive, &is_open));
         }
         for event in events {
-            effects.extend(state.on_event(event));
+            match event {
+                Event::Sighted { seen, of } => {
+                    effects.extend(self.tasking.sighted(now, seen >= of, state));
+                }
+                Event::DetourFlown => effects.extend(self.tasking.flown_in_vain(state)),
+                event => effects.extend(state.on_event(event)),
+            }
         }
         effects
     }
@@ -286,6 +301,7 @@ impl Cooperation {
                 self.hear_order(*order, (record.incarnation, record.seq, record.author));
                 Effects::new()
             }
+            Body::Task(_) | Body::Bundle(_) => self.tasking.hear(now, record, body),
             Body::Intent(_) | Body::Conflict(_) => {
                 let state = self.state.as_mut();
                 if let Some(separation) = state.and_then(|s| s.separation.as_mut()) {
@@ -323,6 +339,7 @@ impl Cooperation {
         let able = s.speaks && order == Order::Resume && state.can_fly_plans(s);
         let able = able && !s.membership.is_deaf(s.now);
         effects.extend(state.negotiate(s, able, timers));
+        effects.extend(self.tasking.tick(s, order, state));
         effects.extend(state.notice_end(s, timers));
         state.astray = s.membership.hears_nobody(s.now) && are_many(s.membership.uavs());
         state.silent = s.is_silent;
@@ -344,6 +361,18 @@ impl Cooperation {
             vec![Effect::Speak(0, Body::Bid(bid)), Effect::Negotiate]
         } else {
             Effects::new()
+        }
+    }
+
+    /// The flight of a task is planned, or there is none.
+    pub fn errand_planned(
+        &mut self,
+        task: (TaskId, u32),
+        planned: Result<Errand, String>,
+    ) -> Effects {
+        match &mut self.state {
+            Some(state) => self.tasking.planned(task, planned, state),
+            None => Effects::new(),
         }
     }
 
@@ -436,6 +465,7 @@ impl Cooperation {
 
     /// Fills the mission's part of what the peer believes.
     pub fn fill(&self, beliefs: &mut Beliefs, counter: u32, percept: Option<&Percept>) {
+        self.tasking.fill(beliefs);
         let Some(state) = &self.state else {
             return;
         };
@@ -462,6 +492,13 @@ fn goal_of(state: &MissionState, order: Order) -> Goal {
     match Reason::of(state, order) {
         Reason::ToldToHold | Reason::OthersAtWork => Goal::Hold,
         Reason::Plan => Goal::Legs(legs_of(sections.plan(), sections.cells())),
+        Reason::Task => {
+            let legs = legs_of(sections.plan(), sections.cells());
+            match &state.errand {
+                Some(flight) => Goal::Detour(flight.clone(), legs),
+                None => Goal::Legs(legs),
+            }
+        }
         Reason::ToldToReturn
         | Reason::Cancelled
         | Reason::Finished

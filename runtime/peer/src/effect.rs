@@ -14,6 +14,7 @@ use crate::protocol::negotiation::Adoption;
 use crate::protocol::runs::PlannedCell;
 use crate::wire::codec::Body;
 use crate::wire::message::{Bid, Epoch};
+use crate::wire::tasks::TaskId;
 use skein_behaviors::Setpoint;
 use std::sync::Arc;
 
@@ -83,4 +84,6 @@ pub(crate) enum PendingJob {
     Geometry(u64),
     /// A division of this epoch.
     Division(Epoch),
+    /// The flight that does a task, in which revision, for which try.
+    Errand(TaskId, u32, u8),
 }

@@ -1,8 +1,9 @@
 //! What can happen to a peer.
 
-use crate::mission::Mission;
+use crate::mission::{Mission, PointMm};
 use crate::offload::JobResult;
 use crate::transmission::Transmission;
+use crate::wire::tasks::{Task, TaskKind};
 use serde::{Deserialize, Serialize};
 use skein_behaviors::{Order, Percept};
 use std::sync::Arc;
@@ -89,4 +90,48 @@ pub enum Command {
     Mission(Arc<Mission>),
     /// A new standing order for every UAV.
     Order(Order),
+    /// Something about the tasks that the operator asks for.
+    Task(TaskEdit),
+}
+
+/// What an operator wants of tasks.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TaskEdit {
+    /// One more.
+    Add(NewTask),
+    /// One less, by name.
+    Cancel(String),
+    /// Those of an earlier life are said again.
+    Again(Vec<AskedTask>),
+}
+
+/// A task that is asked for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NewTask {
+    /// What people call it; none for the next free number.
+    pub name: Option<String>,
+    /// What kind it is.
+    pub kind: TaskKind,
+    /// Where, millimetres from the mission's origin: one place, of a line two at least.
+    pub places: Vec<PointMm>,
+    /// How far around the place, or to the sides of the line, is to be seen, mm.
+    pub radius_mm: u32,
+    /// What it is worth, 1 to 1000.
+    pub worth: u16,
+    /// After so long it is not wanted any more, milliseconds; none for never.
+    pub within_ms: Option<u32>,
+    /// The sensor that it needs, by number; 0 for any.
+    pub sensor: u8,
+}
+
+/// A task with the number of its register.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AskedTask {
+    /// The number.
+    pub number: u16,
+    /// The task as it was said last.
+    pub task: Task,
+    /// How long ago it was asked for, milliseconds.
+    pub age_ms: u64,
 }

@@ -17,6 +17,7 @@
 //! | [`peer`] | routes events to the parts and carries out their effects |
 //! | [`transmission`], `inbound`, `outbound` | bytes as they are read, and what they are to a peer; what is spoken, and when |
 //! | `cooperation`, `mission_state` | mission, goal, the peer's part in negotiations |
+//! | `tasking`, `task_desk`, [`errand`] | tasks other than coverage: the peer's part in their auction, its operator's, the flight that does one |
 //! | [`protocol`] | the machines and rules by which peers agree |
 //! | `timers` | every deadline, in one table |
 //! | [`journal`] | what is durable before it is spoken of |
@@ -49,6 +50,7 @@
 //!     height_m: 0.0,
 //!     mission: None,
 //!     launches: [].into(),
+//!     sensors: 0,
 //!     seed: 1,
 //! });
 //! let (mut now, mut journal, mut sent) = (Time(0), Vec::new(), 0);
@@ -95,6 +97,7 @@ mod cooperation;
 mod coverage_told;
 mod diary;
 mod effect;
+pub mod errand;
 mod inbound;
 pub mod input;
 pub mod journal;
@@ -112,6 +115,8 @@ pub mod protocol;
 mod separation;
 mod taking;
 mod task;
+mod task_desk;
+mod tasking;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 #[cfg(test)]
@@ -131,6 +136,7 @@ pub use output::{Output, Priority, Report};
 pub use overview::Overview;
 pub use peer::Peer;
 pub use task::{CoverageTask, LineTask, PointTask};
+pub use task_desk::{TaskHolder, TaskView};
 pub use transmission::Transmission;
 pub use why::Why;
 

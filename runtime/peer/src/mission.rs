@@ -341,20 +341,8 @@ impl Mission {
     /// # Errors
     /// [`GeometryError`] names what is wrong with the mission.
     pub fn geometry(self: &Arc<Self>) -> Result<Arc<MissionGeometry>, GeometryError> {
-        let area = Polygon::new(self.area_m()).map_err(GeometryError::Area)?;
         let zones = self.no_fly_zones()?;
-        let problem = LoopProblem {
-            area,
-            zones: Arc::clone(&zones),
-            lane_spacing_m: self.lane_m(),
-            turn_radius_m: self.turn_radius_m(),
-            clearance_m: self.clearance_m(),
-            footprint_across_m: self.footprint_across_m(),
-            footprint_along_m: self.footprint_along_m(),
-            tracking_error_m: self.tracking_error_m(),
-            launch: self.launch_m(),
-            tree: self.tree,
-        };
+        let problem = self.loop_problem(&zones)?;
         let coverage_loop = self.the_loop(&problem)?;
         let limits = RouteLimits {
             turn_radius_m: problem.turn_radius_m,
@@ -364,6 +352,28 @@ impl Mission {
         let coverage_loop = coverage_loop.of_lap(self.lap).of_sortie(self.sortie);
         let geometry = MissionGeometry::new(Arc::clone(self), coverage_loop, router);
         Ok(Arc::new(geometry))
+    }
+
+    /// Zones, lengths and launch point by which ways of this mission are planned.
+    ///
+    /// # Errors
+    /// Where its area is no simple polygon.
+    pub fn loop_problem(
+        &self,
+        zones: &Arc<skein_geometry::NoFlyZones>,
+    ) -> Result<LoopProblem, GeometryError> {
+        Ok(LoopProblem {
+            area: Polygon::new(self.area_m()).map_err(GeometryError::Area)?,
+            zones: Arc::clone(zones),
+            lane_spacing_m: self.lane_m(),
+            turn_radius_m: self.turn_radius_m(),
+            clearance_m: self.clearance_m(),
+            footprint_across_m: self.footprint_across_m(),
+            footprint_along_m: self.footprint_along_m(),
+            tracking_error_m: self.tracking_error_m(),
+            launch: self.launch_m(),
+            tree: self.tree,
+        })
     }
 
     fn the_loop(&self, problem: &LoopProblem) -> Result<CoverageLoop, LoopError> {

@@ -245,9 +245,14 @@ mod tests {
             Err(GeometryError::ZoneName)
         );
         assert!(
-            crate::Overview::of(&unnamed, crate::wire::message::Order::Hold, None, vec![])
-                .added_zones
-                .is_empty()
+            crate::Overview::of(
+                &unnamed,
+                crate::wire::message::Order::Hold,
+                None,
+                (vec![], vec![])
+            )
+            .added_zones
+            .is_empty()
         );
     }
 

@@ -34,7 +34,8 @@ use crate::timers::{Timer, Timers};
 use crate::wire::codec::Body;
 use crate::wire::limits::BID_COVERED_MAX_BYTES;
 use crate::wire::message::{Activity, Beacon, Bid, Claim, Epoch, Member, MissionStatus};
-use skein_behaviors::executive::UNREACHABLE_MS;
+use skein_behaviors::executive::detour::Watched;
+use skein_behaviors::executive::{GivenFlight, UNREACHABLE_MS};
 use skein_behaviors::{Event, Executive, Goal, Percept};
 use skein_flight::coverage::ring::Direction;
 use skein_flight::coverage::ring::backtracking::{Division, Uav};
@@ -98,6 +99,10 @@ pub(crate) struct MissionState {
     pub separation: Option<Separation>,
     pub negotiation: Negotiation,
     goal: Option<Goal>,
+    /// The flight of the task that it was given, between two cells of its section.
+    pub errand: Option<GivenFlight>,
+    /// Whether a task is open that somebody can do.
+    pub has_tasks: bool,
     /// Whether the goal is to be given to the executive again.
     replan: bool,
     /// Since when this peer can plan without a break.
@@ -157,7 +162,7 @@ impl MissionState {
 
     pub fn activity(&self) -> Activity {
         match &self.goal {
-            Some(Goal::Legs(_) | Goal::Given(_)) => Activity::Covering,
+            Some(Goal::Legs(_) | Goal::Given(_) | Goal::Detour(..)) => Activity::Covering,
             Some(Goal::Hold) => Activity::Holding,
             Some(Goal::Point(_)) => Activity::Returning,
             None => Activity::Waiting,
@@ -227,6 +232,8 @@ impl MissionState {
                 effects.extend(self.save_covered(false));
                 effects
             }
+            // Whoever flies a task is told of these.
+            Event::Sighted { .. } | Event::DetourFlown => Effects::new(),
             Event::PlanDone => {
                 self.replan |= !self.negotiation.sections.plan().is_empty();
                 Effects::new()
@@ -548,8 +555,9 @@ impl MissionState {
     /// All that can be covered is covered, or again not: the mission ends, the next lap
     /// begins once the others had the time to hear of the last cells, or it goes on.
     pub fn notice_end(&mut self, s: &Situation<'_>, timers: &mut Timers) -> Effects {
-        let complete = self.negotiation.sections.complete();
-        if complete && self.geometry.mission.further_laps > 0 {
+        let covered = self.negotiation.sections.complete();
+        let complete = covered && !self.has_tasks;
+        if covered && self.geometry.mission.further_laps > 0 {
             return self.next_lap(s, timers);
         }
         if complete == self.finished {
@@ -595,11 +603,21 @@ impl MissionState {
             .collect()
     }
 
+    /// From now on this flight is flown between two cells, and this is looked for; or nothing.
+    pub fn set_errand(&mut self, errand: Option<(GivenFlight, Watched)>) {
+        let (flight, watched) = errand.unzip();
+        self.errand = flight;
+        if let Some(executive) = &mut self.executive {
+            executive.watch(watched);
+        }
+    }
+
     /// Gives the executive its goal, if that changed.
     pub fn steer(&mut self, goal: Goal) {
         let sections = &self.negotiation.sections;
         let same_kind = match (&self.goal, &goal) {
             (Some(Goal::Legs(_)), Goal::Legs(_)) => true,
+            (Some(Goal::Detour(a, _)), Goal::Detour(b, _)) => a == b,
             (Some(a), b) => a == b,
             (None, _) => false,
         };
@@ -607,7 +625,7 @@ impl MissionState {
             return;
         }
         self.replan = false;
-        if same_kind && !matches!(goal, Goal::Legs(_)) {
+        if same_kind && !matches!(goal, Goal::Legs(_) | Goal::Detour(..)) {
             return;
         }
         if let Some(executive) = &mut self.executive {
@@ -640,6 +658,8 @@ impl MissionState {
             executive: executive_for(&geometry, config),
             separation: separation_for(&geometry, me, config),
             goal: None,
+            errand: None,
+            has_tasks: old.as_ref().is_some_and(|m| m.has_tasks),
             replan: true,
             able_since: None,
             company: Company::begun(old.is_none(), me, config, durable),
@@ -682,6 +702,7 @@ impl MissionState {
             let base = new.base_m();
             self.executive = old.executive.map(|e| e.with_home(base).without_heeded());
             self.separation = old.separation;
+            self.errand = old.errand;
             self.goal = old.goal;
             self.replan = old.replan;
         }

@@ -2,6 +2,7 @@
 //! computed by the driver with [`run`], answered by an input.
 
 use crate::config::Launch;
+use crate::errand::{self, Errand};
 use crate::mission::{GeometryError, Mission};
 use crate::protocol::launches::{self, Planned};
 use skein_flight::coverage::ring::CoverageLoop;
@@ -92,6 +93,8 @@ pub enum Job {
         /// The members of the round.
         uavs: Vec<Uav>,
     },
+    /// Plan the flight that does a task.
+    Errand(Box<errand::Request>),
 }
 
 /// The answer to a [`Job`] of the same name.
@@ -101,6 +104,8 @@ pub enum JobResult {
     Geometry(Result<Arc<MissionGeometry>, GeometryError>),
     /// The division.
     Divide(Division),
+    /// The flight, or why there is none.
+    Errand(Result<Errand, String>),
 }
 
 /// Solves a problem. Pure; may take milliseconds.
@@ -113,5 +118,6 @@ pub fn run(job: &Job) -> JobResult {
             ring,
             uavs,
         } => JobResult::Divide(geometry.divide(ring, uavs)),
+        Job::Errand(request) => JobResult::Errand(request.plan()),
     }
 }

@@ -12,6 +12,8 @@
 //! | mission | all pieces, by a ground station and to whom its neighbours' beacons show that they follow an older revision |
 //! | lacking | with a beacon, in a crowd with every second, while a newer mission than the one followed is collected or followed by a neighbour |
 //! | operator | when the operator gives an order, by a ground station |
+//! | task | when it is asked for, cancelled, expired, or somebody did it, and once in each life, by a ground station |
+//! | bundle | while a task is open: when the offer or a claim is new; what was won once an interval has passed without news |
 //!
 //! I is the interval that this peer's beacons announce, a period T where there is room.
 

@@ -1,6 +1,7 @@
 //! What a peer wants done, and what it reports.
 
 use crate::offload::Job;
+use crate::wire::tasks::{TaskId, TaskState};
 use crate::{Incarnation, Mission, PeerId};
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Setpoint;
@@ -54,6 +55,26 @@ pub enum Priority {
     Beacon,
     /// States, missions and all else.
     Telemetry,
+}
+
+/// What became known of a task.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TaskNews {
+    /// Somebody asks for it.
+    Asked,
+    /// This UAV won it and flies there.
+    Flies,
+    /// This UAV saw all of it.
+    Seen,
+    /// It is another's, changed or over: this UAV left it.
+    Left,
+    /// Another UAV says that it did it.
+    DoneBy(PeerId),
+    /// Nobody who lives can do it, and why.
+    NobodyCan(String),
+    /// Who asked for it says that it is over, or its time is.
+    Over(TaskState),
 }
 
 /// What a peer believes of another.
@@ -131,6 +152,17 @@ pub enum Report {
     Revised {
         /// The mission.
         mission: Arc<Mission>,
+    },
+    /// Something about a task other than coverage.
+    Task {
+        /// Which.
+        id: TaskId,
+        /// In which revision it was asked for.
+        revision: u32,
+        /// What people call it.
+        name: String,
+        /// What.
+        news: TaskNews,
     },
     /// Another process speaks under this id: this one is silent from now on, until it
     /// reports that it runs under another incarnation.

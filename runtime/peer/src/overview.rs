@@ -4,6 +4,7 @@
 use crate::mission::{Mission, PointMm};
 use crate::mission_edit::is_zone_name;
 use crate::output::Status;
+use crate::task_desk::TaskView;
 use crate::why::{Other, Work};
 use crate::wire::message::Order;
 use core::fmt;
@@ -41,6 +42,9 @@ pub struct Overview {
     pub order: Order,
     /// How far the mission is that is followed; none before its loop is derived.
     pub work: Option<Work>,
+    /// Tasks other than coverage that it knows.
+    #[serde(default)]
+    pub tasks: Vec<TaskView>,
     /// Who else there is, and which revision each follows.
     pub others: Vec<Other>,
 }
@@ -50,7 +54,7 @@ impl Overview {
         mission: &Mission,
         order: Order,
         work: Option<Work>,
-        others: Vec<Other>,
+        (tasks, others): (Vec<TaskView>, Vec<Other>),
     ) -> Self {
         let zones = mission.added_zones.iter();
         let named = zones.filter(|(name, _)| is_zone_name(name));
@@ -72,6 +76,7 @@ impl Overview {
                 .collect(),
             order,
             work,
+            tasks,
             others,
         }
     }

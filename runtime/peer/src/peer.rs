@@ -17,6 +17,7 @@ use crate::cooperation::{Cooperation, Situation};
 use crate::diary::Diary;
 use crate::effect::{Effect, Effects, PendingJob, Promise};
 use crate::inbound::{self, Heard};
+use crate::input::{AskedTask, TaskEdit};
 use crate::input::{Command, Input, Time};
 use crate::journal::{Durable, Entry};
 use crate::offload::{Job, JobResult};
@@ -27,6 +28,7 @@ use crate::protocol::life::Life;
 use crate::protocol::membership::{Change, Membership};
 use crate::protocol::negotiation::are_many;
 use crate::protocol::relay::{Offer, Relay};
+use crate::task_desk::TaskView;
 use crate::timers::{Timer, Timers};
 use crate::transmission::Transmission;
 use crate::why::{self, Other, Why};
@@ -111,7 +113,7 @@ impl Peer {
             membership: Membership::new(config.id.0, period),
             relay,
             outbound: Outbound::new(u64::from(period), &mut timers),
-            cooperation: Cooperation::new(config.mission.clone()),
+            cooperation: Cooperation::new(&config),
             percept: None,
             durable: Durable::default(),
             outputs: VecDeque::new(),
@@ -407,6 +409,10 @@ impl Peer {
                 let (situation, cooperation, _) = self.situation();
                 cooperation.divided(&situation, epoch, &division)
             }
+            (Some(PendingJob::Errand(id, revision, _)), JobResult::Errand(planned)) => {
+                let task = (id, revision);
+                self.cooperation.errand_planned(task, planned)
+            }
             _ => Effects::new(),
         };
         self.carry_out(effects);
@@ -432,7 +438,45 @@ impl Peer {
                 }
             }
             Command::Order(order) => self.give_order(order),
+            Command::Task(edit) => self.edit_task(&edit),
         }
+    }
+
+    /// The operator asks for a task, changes one or wants it no more.
+    fn edit_task(&mut self, edit: &TaskEdit) {
+        let mission = self.cooperation.newest_mission();
+        match self.cooperation.edit_task(self.now, edit, mission.as_ref()) {
+            Ok(effects) => self.carry_out(effects),
+            Err(why) => self.alarm(&format!("a task is not asked for: {why}")),
+        }
+    }
+
+    /// Whether the operator's words on tasks can be carried out.
+    ///
+    /// # Errors
+    /// A sentence that says why not.
+    pub fn check_task(&self, edit: &TaskEdit) -> Result<(), String> {
+        let mission = self.mission();
+        self.cooperation.check_task(edit, mission.as_ref())
+    }
+
+    /// The tasks of this ground station's operator with their numbers, and how long ago each
+    /// was asked for, milliseconds: what is to be said again in another life.
+    #[must_use]
+    pub fn operators_tasks(&self) -> Vec<AskedTask> {
+        self.cooperation.tasking.asked(self.now)
+    }
+
+    /// A number that grows with each change of its operator's tasks; 0 where there are none.
+    #[must_use]
+    pub fn tasks_version(&self) -> u64 {
+        self.cooperation.tasking.asked_version()
+    }
+
+    /// All tasks that it knows, for a person.
+    #[must_use]
+    pub fn tasks(&self) -> Vec<TaskView> {
+        self.cooperation.tasking.views(self.now)
     }
 
     fn give_order(&mut self, order: Order) {
@@ -900,6 +944,7 @@ impl Peer {
             flight: percept.map(|p| why::flight(state, p, reserve_s)),
             work: state.map(|s| why::work(s, self.cooperation.order())),
             round: self.diary.round(self.now),
+            tasks: self.tasks(),
             others: self.others(),
             events: self.diary.events(self.now),
         }
@@ -910,7 +955,8 @@ impl Peer {
     pub fn overview(&self) -> Option<Overview> {
         let (mission, order) = (self.mission()?, self.cooperation.order());
         let work = self.cooperation.state().map(|s| why::work(s, order));
-        Some(Overview::of(&mission, order, work, self.others()))
+        let others = (self.tasks(), self.others());
+        Some(Overview::of(&mission, order, work, others))
     }
 
     fn others(&self) -> Vec<Other> {

@@ -268,6 +268,7 @@ impl Harness {
     pub fn add(&mut self, id: u16, role: Role, mission: Option<Arc<Mission>>) {
         let uav = role == Role::Uav;
         let config = PeerConfig {
+            sensors: crate::wire::tasks::CAMERA_ALONE,
             id: PeerId(id),
             role,
             fleet: "harness".into(),
@@ -609,7 +610,7 @@ impl Harness {
                 .entry(mission.content_hash())
                 .or_insert_with(|| offload::run(job))
                 .clone(),
-            Job::Divide { .. } => offload::run(job),
+            Job::Divide { .. } | Job::Errand(_) => offload::run(job),
         }
     }
 

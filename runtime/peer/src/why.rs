@@ -6,6 +6,7 @@ use crate::Incarnation;
 use crate::cells::CellSet;
 use crate::mission_state::MissionState;
 use crate::output::Status;
+use crate::task_desk::TaskView;
 use crate::wire::message::{Epoch, ListedRun, Order};
 use core::fmt;
 use serde::{Deserialize, Serialize};
@@ -31,6 +32,8 @@ pub enum Reason {
     FuelIsDue,
     /// Another process speaks under its id.
     Twin,
+    /// It was given a task to do.
+    Task,
     /// It has cells to fly.
     Plan,
     /// It knew many, has nothing to fly and hears nobody.
@@ -54,6 +57,8 @@ impl Reason {
             Self::FuelIsDue
         } else if state.silent {
             Self::Twin
+        } else if state.errand.is_some() {
+            Self::Task
         } else if !state.negotiation.sections.plan().is_empty() {
             Self::Plan
         } else if state.astray {
@@ -74,6 +79,7 @@ impl Reason {
             Self::Finished => "flies home: everything is covered",
             Self::FuelIsDue => "flies home: its fuel is due",
             Self::Twin => "flies home: another process speaks under its id",
+            Self::Task => "flies to a task that it was given, between two cells of its section",
             Self::Plan => "flies its section",
             Self::Astray => "flies home: it has nothing to fly and hears nobody",
             Self::OthersAtWork => "loiters where it is: it has nothing to fly, others are at work",
@@ -220,6 +226,9 @@ pub struct Why {
     pub work: Option<Work>,
     /// The last round of which it knows bids.
     pub round: Option<LastRound>,
+    /// Tasks other than coverage that it knows.
+    #[serde(default)]
+    pub tasks: Vec<TaskView>,
     /// What it believes of others, by their numbers.
     pub others: Vec<Other>,
     /// What happened last, the oldest first.
@@ -311,6 +320,9 @@ impl fmt::Display for Why {
         }
         if let Some(round) = &self.round {
             write_round(round, f)?;
+        }
+        for task in &self.tasks {
+            write_task(task, f)?;
         }
         for other in &self.others {
             write_other(other, f)?;
@@ -423,6 +435,23 @@ fn write_round(round: &LastRound, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         )?;
     }
     Ok(())
+}
+
+fn write_task(task: &TaskView, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let state = format!("{:?}", task.state).to_lowercase();
+    write!(f, "  task      {} {state}, needs {}", task.name, task.needs)?;
+    if let Some(by) = task.done_by {
+        write!(f, ", by uav{by}")?;
+    }
+    for holder in &task.held_by {
+        let progress = format!("{:?}", holder.progress).to_lowercase();
+        let bid = f64::from(holder.bid) / 1e6;
+        write!(f, ", uav{} {progress} (bid {bid:.1})", holder.uav)?;
+    }
+    if let Some(why) = &task.nobody_can {
+        write!(f, ", nobody can: {why}")?;
+    }
+    writeln!(f)
 }
 
 fn write_other(other: &Other, f: &mut fmt::Formatter<'_>) -> fmt::Result {

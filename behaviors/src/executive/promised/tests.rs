@@ -82,7 +82,10 @@ impl Flight {
                 Event::Seen(cells) => cells
                     .iter()
                     .for_each(|c| self.open[usize::from(*c)] = false),
-                Event::PlanDone | Event::CutShort { .. } => {}
+                Event::PlanDone
+                | Event::CutShort { .. }
+                | Event::Sighted { .. }
+                | Event::DetourFlown => {}
                 Event::Refused { cells } => panic!("refused {cells:?}"),
             }
         }

@@ -10,6 +10,7 @@ use skein_interop::airframe;
 use skein_interop::json::{Error, Fields, Node, suggestion};
 use skein_netsim::spec::GroundStationSpec;
 use skein_peer::wire::limits::PEERS_MAX;
+use skein_peer::wire::tasks::{CAMERA_ALONE, SENSORS, sensor_of_name};
 
 /// Most UAVs of one scenario: a peer knows no more others.
 #[allow(clippy::cast_possible_truncation, reason = "256")]
@@ -31,6 +32,8 @@ pub(crate) struct Member {
     /// it does.
     pub(crate) takeoff_ms: Option<u32>,
     pub(crate) height_m: f64,
+    /// What it carries, a bit for each sensor.
+    pub(crate) sensors: u32,
 }
 
 /// The flying peers of a scenario.
@@ -103,6 +106,7 @@ pub(crate) fn read(
         "traffic_range_m",
         "count",
         "airframes",
+        "sensors",
         "launch",
         "takeoff_interval_s",
         "uavs",
@@ -123,7 +127,7 @@ pub(crate) fn read(
         ));
     }
     let top_m = |n: usize| level_m + step_m * n.saturating_sub(1) as f64;
-    let members = match f.get("uavs") {
+    let mut members = match f.get("uavs") {
         Some(list) => {
             for other in ["count", "airframes", "launch", "takeoff_interval_s"] {
                 if let Some(n) = f.get(other) {
@@ -134,6 +138,11 @@ pub(crate) fn read(
         }
         None => generated(&f, airframes, level_m, step_m, ground_id, over)?,
     };
+    if let Some(node) = f.get("sensors") {
+        let carried = sensors(node)?;
+        let members = members.iter_mut().zip(carried.iter().cycle());
+        members.for_each(|(m, carried)| m.sensors = *carried);
+    }
     if top_m(members.len()) > MAX_HEIGHT_M {
         return Err(node.wrong(format!(
             "the highest slot is at {} m; expected at most {MAX_HEIGHT_M} m",
@@ -155,6 +164,29 @@ pub(crate) fn read(
         traffic_range_m,
         members,
     })
+}
+
+/// What UAVs carry, one after the other: lists of names that go round like airframes.
+fn sensors(node: &Node<'_>) -> Result<Vec<u32>, Error> {
+    let lists = node.items()?;
+    if lists.is_empty() {
+        return Err(node.wrong("the list is empty; leave it out where all carry a camera alone"));
+    }
+    let one = |list: &Node<'_>| {
+        let names = list.items()?;
+        names.iter().try_fold(0, |carried, name| {
+            let text = name.text()?;
+            let sensor = sensor_of_name(text);
+            let sensor = sensor.ok_or_else(|| {
+                name.wrong(format!(
+                    "no sensor is named \"{text}\"; {}",
+                    suggestion(text, &SENSORS)
+                ))
+            })?;
+            Ok(carried | 1 << (sensor - 1))
+        })
+    };
+    lists.iter().map(one).collect()
 }
 
 /// How a generated fleet gets into the air.
@@ -291,6 +323,7 @@ fn generated(
             launch,
             takeoff_ms: nth.map(|n| interval_ms.saturating_mul(n)),
             height_m: level_m + step_m * i as f64,
+            sensors: CAMERA_ALONE,
         }
     };
     Ok(members.map(member).collect())
@@ -351,6 +384,7 @@ fn listed(
             launch: Some(launch),
             takeoff_ms: None,
             height_m,
+            sensors: CAMERA_ALONE,
         });
     }
     members.sort_by_key(|m| m.id);

@@ -9,6 +9,7 @@ pub(crate) mod radio;
 pub(crate) mod run;
 mod shared;
 pub(crate) mod targets;
+mod tasks;
 pub(crate) mod terrain;
 pub(crate) mod wind;
 

@@ -4,6 +4,7 @@
 
 use super::faults::{Known, at_ms, order};
 use super::shared::Notices;
+use super::tasks;
 use super::terrain::{self, Terrain};
 use crate::files::Files;
 use skein_interop::json::{Error, Node, Places};
@@ -11,9 +12,15 @@ use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::spec::Spec;
 use skein_netsim::world::Survey;
 use skein_peer::Mission;
+use skein_peer::input::NewTask;
 use skein_peer::mission::ring_mm;
 use skein_peer::mission_edit::{ZONE_NAME_MAX_BYTES, is_zone_name};
+use skein_peer::wire::tasks::sensor_name;
+use std::collections::BTreeSet;
 use std::sync::Arc;
+
+/// What the operator can do, one at a time.
+const DOINGS: [&str; 5] = ["nfz_add", "nfz_remove", "task_add", "task_cancel", "order"];
 
 /// What the operator does at some time, and where the file says so.
 #[derive(Clone, Debug)]
@@ -31,20 +38,28 @@ pub(crate) fn read(
 ) -> Result<Vec<Act>, Error> {
     let mut acts = Vec::new();
     for item in list.items()? {
-        let f = item.fields(&["at_s", "nfz_add", "nfz_remove", "order"])?;
+        let mut fields = vec!["at_s"];
+        fields.extend(DOINGS);
+        let f = item.fields(&fields)?;
         let at_ms = at_ms(&f, "at_s", known)?;
-        let given: Vec<_> = ["nfz_add", "nfz_remove", "order"]
+        let given: Vec<_> = DOINGS
             .into_iter()
             .filter_map(|name| Some((name, f.get(name)?)))
             .collect();
         let [(name, node)] = given[..] else {
-            return Err(item
-                .wrong("does one thing at a time; expected one of nfz_add, nfz_remove and order"));
+            return Err(item.wrong(format!(
+                "does one thing at a time; expected one of {}",
+                DOINGS.join(", ")
+            )));
         };
         let fault = match name {
             "nfz_add" => added(node, (terrain, files), notices)?,
             "nfz_remove" => Fault::RemoveZone {
                 name: zone_name(node)?,
+            },
+            "task_add" => tasks::added(node)?,
+            "task_cancel" => Fault::CancelTask {
+                name: tasks::task_name(node)?,
             },
             _ => Fault::Order {
                 order: order(node)?,
@@ -100,17 +115,48 @@ fn zone_name(node: &Node<'_>) -> Result<String, Error> {
 /// covered as the scenario asks for.
 pub(crate) fn check(acts: &[Act], spec: &Spec, places: &Places) -> Result<(), Error> {
     let mut mission = (*spec.mission).clone();
+    let mut asked: BTreeSet<String> = BTreeSet::new();
     for act in acts {
         let wrong = |why: String| places.wrong(&act.path, why);
         let changed = match &act.timed.fault {
             Fault::AddZone { name, ring } => mission.with_zone(name, ring),
             Fault::RemoveZone { name } => mission.without_zone(name),
+            Fault::AddTask { task } => {
+                let name = task.name.clone().unwrap_or_default();
+                if !asked.insert(name.clone()) {
+                    return Err(wrong(format!("a task {name:?} was asked for before")));
+                }
+                can_be_done(task, &mission, spec).map_err(wrong)?;
+                continue;
+            }
+            Fault::CancelTask { name } => {
+                if !asked.contains(name) {
+                    return Err(wrong(format!("no task {name:?} was asked for before")));
+                }
+                continue;
+            }
             _ => continue,
         };
         mission = changed.map_err(|e| wrong(e.to_string()))?;
         can_be_flown(&mission, spec).map_err(wrong)?;
     }
     Ok(())
+}
+
+/// Whether some UAV of the fleet could do a task.
+fn can_be_done(task: &NewTask, mission: &Mission, spec: &Spec) -> Result<(), String> {
+    if mission.separation_mm > 0 {
+        return Err("no tasks are flown where UAVs are kept apart by agreement".to_owned());
+    }
+    let asked = task.asked(0, 1)?;
+    Arc::new(mission.clone()).can_do(&asked)?;
+    if spec.uavs.iter().any(|u| u.carries(task.sensor)) {
+        return Ok(());
+    }
+    let needed = sensor_name(task.sensor);
+    Err(format!(
+        "no UAV of the fleet carries {needed}; say who does in fleet.sensors"
+    ))
 }
 
 fn can_be_flown(mission: &Mission, spec: &Spec) -> Result<(), String> {

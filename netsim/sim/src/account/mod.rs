@@ -14,6 +14,7 @@
 //! | [`lifetimes`] | which process ran when, which UAV flew; the work bound |
 //! | [`detection`] | from a death to its detection by each live peer |
 //! | [`work`] | whose cells were open when a peer died, and who took them over |
+//! | [`tasks`] | what became of the tasks that were asked for in flight |
 //! | [`restarts`] | when a restarted peer was of use again |
 //! | [`connectivity`] | how often the swarm fell apart and met again |
 //! | [`report`] | the report and its verdict, one JSON schema |
@@ -24,6 +25,7 @@ pub mod detection;
 pub mod lifetimes;
 pub mod report;
 pub mod restarts;
+pub mod tasks;
 pub mod text;
 pub mod work;
 
@@ -42,8 +44,10 @@ use report::{Coverage, Radio, Swarm};
 use restarts::Restarts;
 use skein_link::RadioCounters;
 use skein_peer::Report;
+use skein_peer::input::AskedTask;
 use skein_peer::output::Status;
 use std::collections::{BTreeMap, BTreeSet};
+use tasks::Tasks;
 use work::Work;
 
 /// Alarms and refusals that are kept; a peer that repeats itself must not fill the
@@ -80,6 +84,7 @@ pub struct Account {
     finished: BTreeSet<u16>,
     alarms: Vec<String>,
     failures: Vec<String>,
+    tasks: Tasks,
 }
 
 impl Account {
@@ -98,6 +103,7 @@ impl Account {
             finished: BTreeSet::new(),
             alarms: Vec::new(),
             failures: Vec::new(),
+            tasks: Tasks::default(),
             setting,
         }
     }
@@ -106,6 +112,11 @@ impl Account {
     pub fn started(&mut self, now_ms: u64, peer: u16) {
         self.lifetimes.started(now_ms, peer);
         self.detection.started(peer);
+    }
+
+    /// The ground station of its operator holds this task.
+    pub fn asked(&mut self, now_ms: u64, task: &AskedTask) {
+        self.tasks.asked(now_ms, task);
     }
 
     /// A process starts again, with its journal or with a fresh disk.
@@ -213,6 +224,10 @@ impl Account {
             // It is of no use while its twin speaks.
             Report::Silenced => {
                 self.lifetimes.paused(now_ms, peer);
+                None
+            }
+            Report::Task { .. } => {
+                self.tasks.reported(peer, report);
                 None
             }
             Report::Round { .. } | Report::Revised { .. } => None,
@@ -361,6 +376,7 @@ impl Account {
             revisit_ms: ending.judge.longest_gap_ms(),
             kills: self.work.kills(&self.detection),
             restarts: self.restarts.reports(),
+            tasks: self.tasks.reports(ending.judge),
             finished,
             unfinished,
             swarm: Swarm {

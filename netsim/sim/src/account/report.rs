@@ -5,6 +5,7 @@
 //! milliseconds of scenario time. What one driver cannot tell is `null`.
 
 use super::lifetimes::Cause;
+use super::tasks::TaskReport;
 use crate::check::{Findings, Violation};
 use crate::world::Judge;
 use serde::{Deserialize, Serialize};
@@ -69,6 +70,9 @@ pub struct RunReport {
     pub kills: Vec<KillReport>,
     /// Each restart, in the order of the times.
     pub restarts: Vec<RestartReport>,
+    /// Each task other than coverage that was asked for in flight.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tasks: Vec<TaskReport>,
     /// Live UAVs at the end that believe the mission finished.
     pub finished: Vec<u16>,
     /// Live UAVs at the end that do not.

@@ -25,6 +25,9 @@ impl fmt::Display for RunReport {
         for restart in &self.restarts {
             self.write_restart(restart, f)?;
         }
+        for task in &self.tasks {
+            writeln!(f, "  task       {}", task.line())?;
+        }
         self.write_radio(f)?;
         self.write_checks(f)?;
         for alarm in &self.alarms {

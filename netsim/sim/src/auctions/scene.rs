@@ -65,6 +65,7 @@ impl Draw {
             radius_mm: u32::try_from(radius_mm).unwrap_or(u32::MAX),
             endurance_ms: 14_400_000,
             sensors: by_turn | by_chance,
+            section_ms: 0,
         }
     }
 
@@ -106,12 +107,12 @@ impl Draw {
         let sensor = if any { 0 } else { self.within(1, 3) };
         Task {
             revision: 1,
-            cancelled: false,
             kind,
             places,
             sensor: u8::try_from(sensor).unwrap_or(0),
             worth: u16::try_from(self.within(100, 300)).unwrap_or(100),
             stay_ms,
+            ..Task::default()
         }
     }
 }

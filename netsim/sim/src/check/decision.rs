@@ -221,7 +221,8 @@ impl DecisionCheck {
             let reach_m = mover.fastest_mps * f64::from(bid.release_ms) / 1000.0 + slack_m;
             let strayed = bid.off_loop.iter().any(|off| {
                 let off_m = (off.pose().position() - mover.at).norm();
-                off_m > slack_m
+                // Who is on the way of a task leaves from its end.
+                off_m > slack_m + mover.fastest_mps * f64::from(off.ready_ms) / 1000.0
             });
             if strayed {
                 lies.push("says that it is where it is not".to_owned());

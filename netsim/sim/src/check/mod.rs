@@ -19,6 +19,7 @@
 //! | [`patience`] | when rounds are opened: prompt, patience, waiting |
 //! | [`decision`] | what rounds decide, from the bids alone; the bids themselves |
 //! | [`spoken`] | what is published against what is held |
+//! | [`tasks`] | each task in one bundle, and in one at least |
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
 //! | [`airtime`] | S9: shares of the channel |
 //! | [`flight`] | what is flown against what is wanted: hold, home |
@@ -47,6 +48,7 @@ pub mod rules;
 pub mod snapshot;
 pub mod spoken;
 pub mod spread;
+pub mod tasks;
 #[cfg(test)]
 mod testing;
 pub mod twins;

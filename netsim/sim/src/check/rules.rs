@@ -9,6 +9,7 @@ use super::patience::PatienceCheck;
 use super::record::Said;
 use super::spoken::SpokenCheck;
 use super::spread::SpreadCheck;
+use super::tasks::TaskCheck;
 use super::{Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::spec::{Spec, UavSpec};
 use crate::twins::Twins;
@@ -36,6 +37,7 @@ pub struct Rules {
     patience: PatienceCheck,
     spoken: SpokenCheck,
     spread: SpreadCheck,
+    tasks: TaskCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -62,6 +64,7 @@ impl Rules {
             patience: PatienceCheck::new(period_ms),
             spoken: SpokenCheck::default(),
             spread: SpreadCheck::new(spec.twins()),
+            tasks: TaskCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -278,6 +281,7 @@ impl Rules {
         self.patience.on_snapshot(snapshot, found);
         self.spoken.on_snapshot(snapshot, found);
         self.spread.on_snapshot(snapshot, found);
+        self.tasks.on_snapshot(snapshot, found);
         self.airtime.on_snapshot(snapshot, found);
         self.on_way_home(snapshot, found);
     }

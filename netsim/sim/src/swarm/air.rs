@@ -10,9 +10,11 @@ use crate::spec::RadioSpec;
 use crate::world::{Fact, Judge, Survey, World};
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::CellId;
+use skein_flight::coverage::ring::patch::Corners;
 use skein_link::medium::Links;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::protocol::airtime::{FRAME_BYTES, OVERHEAD_BYTES, PART_BYTES};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// World, links and channel of one run.
@@ -108,6 +110,11 @@ impl Air {
     /// A revision of the mission is judged by from now on.
     pub fn revise(&mut self, survey: Arc<Survey>, geometry: &MissionGeometry) {
         self.world.revise(survey, geometry);
+    }
+
+    /// A task is to be seen, by one of these; asked twice it is asked once.
+    pub fn ask(&mut self, task: (u16, u32), pieces: Vec<Corners>, carriers: BTreeSet<u16>) {
+        self.world.ask(task, pieces, carriers);
     }
 
     /// A UAV follows this revision of the mission.

@@ -8,7 +8,7 @@ use crate::check::record::Said;
 use crate::disk::Trouble;
 use crate::fault::Fault;
 use crate::world::Survey;
-use skein_peer::input::Command;
+use skein_peer::input::{Command, TaskEdit};
 use skein_peer::{Beliefs, Input, Mission, Role, Transmission};
 use std::sync::Arc;
 
@@ -90,6 +90,14 @@ impl Swarm {
                 freed.into_iter().for_each(|next| self.give_mission(next));
                 0
             }
+            Fault::AddTask { task } => {
+                self.edit_task(TaskEdit::Add(task.clone()));
+                0
+            }
+            Fault::CancelTask { name } => {
+                self.edit_task(TaskEdit::Cancel(name.clone()));
+                0
+            }
             Fault::Order { order } => {
                 self.operator.order(*order);
                 self.repeat_order();
@@ -127,6 +135,12 @@ impl Swarm {
         };
         self.history.fold(self.now_ms, subject, Kind::Fault, 0);
         self.observe_graph();
+    }
+
+    /// The operator says something about tasks, as soon as the ground station speaks.
+    fn edit_task(&mut self, edit: TaskEdit) {
+        self.operator.wants(edit);
+        self.speak_tasks();
     }
 
     /// What is in an airframe can work until its battery has nothing but the reserve.

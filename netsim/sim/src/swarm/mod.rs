@@ -59,6 +59,7 @@ use skein_geometry::frame::Pose;
 use skein_link::medium::key_hash;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
+use skein_peer::output::TaskNews;
 use skein_peer::wire;
 use skein_peer::{Beliefs, Command, Input, Output, Peer, Report, Role, Transmission, Why};
 use std::collections::BTreeMap;
@@ -75,6 +76,10 @@ const GEOMETRY_MS: u64 = 200;
 /// The longest time in which those who are finished may fly home, milliseconds: longer
 /// than the endurance that any of them has left.
 const LONGEST_WAY_HOME_MS: u64 = 1_200_000;
+
+/// A task that nobody has seen yet keeps a run going for so many beacon periods, though all
+/// believe that everything is done: they may not have heard of it.
+const FRESH_TASK_PERIODS: u64 = 30;
 
 /// Something to come.
 #[derive(Debug)]
@@ -670,7 +675,7 @@ impl Swarm {
             Output::Compute { token, job } => {
                 let takes_ms = match job {
                     Job::Geometry(_) => GEOMETRY_MS,
-                    Job::Divide { .. } => DIVIDE_MS,
+                    Job::Divide { .. } | Job::Errand(_) => DIVIDE_MS,
                 };
                 let before = self.meter.enter(Part::Planning);
                 let answer = self.geometry_cache.answer(&job);
@@ -751,6 +756,7 @@ impl Swarm {
         self.meter.enter(before);
         self.account.reported(self.now_ms, id, &meant);
         self.note_voice(id, &report);
+        self.note_task(id, &report);
         if let Report::Refused { reason } = &report
             && !std::mem::take(&mut self.spoilt)
         {
@@ -779,6 +785,7 @@ impl Swarm {
         self.observe_graph();
         self.refresh_covered();
         self.repeat_order();
+        self.speak_tasks();
         let (silent, peers): (Vec<PeerSnapshot>, Vec<PeerSnapshot>) =
             self.snapshots().into_iter().partition(|m| m.view.is_silent);
         self.carry_order(&peers);
@@ -803,7 +810,8 @@ impl Swarm {
             flying += 1;
             finished &= m.view.finished;
         }
-        self.done = self.account.covered_ms().is_some() && flying > 0 && finished;
+        let waits = self.has_fresh_task();
+        self.done = self.account.covered_ms().is_some() && flying > 0 && finished && !waits;
         for v in self.checker.found.drain_fresh() {
             self.history.keep(v.time_ms, || What::Violation {
                 check: v.check.clone(),
@@ -823,6 +831,47 @@ impl Swarm {
         if let Some(order) = self.operator.speaks(speaks_in) {
             self.feed(idx, Input::Command(Command::Order(order)));
         }
+    }
+
+    /// The ground station is told what its operator wants of tasks, once in each life.
+    fn speak_tasks(&mut self) {
+        let Some(idx) = self.ground_station() else {
+            return;
+        };
+        let peer = self.peers[idx].peer.as_ref();
+        let speaks_in = peer.and_then(|p| p.speaks_in());
+        for edit in self.operator.task_edits(self.now_ms, speaks_in) {
+            self.feed(idx, Input::Command(Command::Task(edit)));
+        }
+        let Some(peer) = self.peers[idx].peer.as_ref() else {
+            return;
+        };
+        let tasks = peer.operators_tasks();
+        let mission = self.operator.mission();
+        for asked in &tasks {
+            self.account.asked(self.now_ms, asked);
+            if !asked.task.is_open() {
+                continue;
+            }
+            let pieces = mission.pieces_of(&asked.task).unwrap_or_default();
+            let needed = asked.task.sensor;
+            let uavs = self.spec.uavs.iter();
+            let carriers = uavs.filter(|u| u.carries(needed)).map(|u| u.id);
+            self.air.ask(
+                (asked.number, asked.task.revision_as_asked()),
+                pieces,
+                carriers.collect(),
+            );
+        }
+        self.operator.note_tasks(self.now_ms, tasks);
+    }
+
+    /// Whether a task was asked for so lately that not all may have heard of it.
+    fn has_fresh_task(&self) -> bool {
+        let fresh = |t: &skein_peer::input::AskedTask| {
+            t.task.is_open() && t.age_ms < FRESH_TASK_PERIODS * self.period_ms()
+        };
+        self.operator.tasks().iter().any(fresh)
     }
 
     /// Whoever waits for the operator out of reach of the ground station is told to go on
@@ -884,6 +933,31 @@ impl Swarm {
                 self.checker.on_silenced(now_ms, id, &heirs);
             }
             _ => {}
+        }
+    }
+
+    /// A UAV says that it saw all of a task: the judge knows.
+    fn note_task(&mut self, id: u16, report: &Report) {
+        let Report::Task {
+            id: task,
+            revision,
+            name,
+            news: TaskNews::Seen,
+        } = report
+        else {
+            return;
+        };
+        self.air.advance(self.now_ms);
+        if self
+            .air
+            .judge()
+            .saw_task((task.number, *revision))
+            .is_none()
+        {
+            let text = format!("says that it saw the task {name:?}, and did not");
+            self.checker
+                .found
+                .broken("task-seen", self.now_ms, Some(id), || text);
         }
     }
 

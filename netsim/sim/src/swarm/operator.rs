@@ -1,7 +1,10 @@
-//! The operator of a simulated swarm: the mission and the order given last.
+//! The operator of a simulated swarm: the mission and the order given last, and the tasks
+//! that are asked for.
 
 use skein_behaviors::Order;
+use skein_peer::input::{AskedTask, TaskEdit};
 use skein_peer::{Incarnation, Mission};
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// So long it takes to carry an order to where no radio brings it, milliseconds.
@@ -15,6 +18,13 @@ pub(super) struct Operator {
     order: Option<(Order, Option<Incarnation>)>,
     /// The record in which it spoke last.
     spoken: Vec<u8>,
+    /// What was not said of tasks yet.
+    edits: VecDeque<TaskEdit>,
+    /// The tasks as the ground station held them last, when that was, milliseconds, and in
+    /// which life it was told of them.
+    tasks: Vec<AskedTask>,
+    tasks_at_ms: u64,
+    tasks_in: Option<Incarnation>,
     /// Since when somebody waits who cannot be told to go on, milliseconds.
     stranded_ms: Option<u64>,
 }
@@ -25,6 +35,10 @@ impl Operator {
             mission,
             order: None,
             spoken: Vec::new(),
+            edits: VecDeque::new(),
+            tasks: Vec::new(),
+            tasks_at_ms: 0,
+            tasks_in: None,
             stranded_ms: None,
         }
     }
@@ -51,6 +65,41 @@ impl Operator {
     /// Gives an order.
     pub(super) fn order(&mut self, order: Order) {
         self.order = Some((order, None));
+    }
+
+    /// Something about tasks is to be said.
+    pub(super) fn wants(&mut self, edit: TaskEdit) {
+        self.edits.push_back(edit);
+    }
+
+    /// What the ground station is to be told of tasks in the life in which it speaks: those of
+    /// an earlier one once, and what is new.
+    pub(super) fn task_edits(&mut self, now_ms: u64, life: Option<Incarnation>) -> Vec<TaskEdit> {
+        if life.is_none() {
+            return Vec::new();
+        }
+        let anew = self.tasks_in != life && !self.tasks.is_empty();
+        self.tasks_in = life;
+        let again = anew.then(|| {
+            let older = |t: &AskedTask| AskedTask {
+                age_ms: t.age_ms + now_ms.saturating_sub(self.tasks_at_ms),
+                ..t.clone()
+            };
+            TaskEdit::Again(self.tasks.iter().map(older).collect())
+        });
+        again.into_iter().chain(self.edits.drain(..)).collect()
+    }
+
+    /// The tasks as the ground station holds them now.
+    pub(super) fn note_tasks(&mut self, now_ms: u64, tasks: Vec<AskedTask>) {
+        if !tasks.is_empty() {
+            (self.tasks, self.tasks_at_ms) = (tasks, now_ms);
+        }
+    }
+
+    /// The tasks as the ground station held them last.
+    pub(super) fn tasks(&self) -> &[AskedTask] {
+        &self.tasks
     }
 
     /// The order that the ground station is to say in the life in which it speaks, once.

@@ -254,6 +254,7 @@ pub fn of_scenario(spec: &Spec, seed: u64) -> Vec<SimPeer> {
         height_m: 0.0,
         mission: Some(Arc::clone(&spec.mission)),
         launches: Arc::clone(&launches),
+        sensors: 0,
         seed: 0,
     };
     let mut peers: Vec<SimPeer> = spec
@@ -266,6 +267,7 @@ pub fn of_scenario(spec: &Spec, seed: u64) -> Vec<SimPeer> {
                 PeerConfig {
                     airframe: Some(u.airframe),
                     height_m: u.height_m,
+                    sensors: u.sensors,
                     ..config(u.twin_of.unwrap_or(u.id))
                 },
             )

@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// The camera looks at least once per this length of flight, metres.
-const LOOK_M: f64 = 0.25;
+pub(super) const LOOK_M: f64 = 0.25;
 
 /// Who saw a cell first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub(super) struct Board {
 }
 
 /// From corner to corner of a picture, metres.
-fn diagonal_m(airframe: &Airframe) -> f64 {
+pub(super) fn diagonal_m(airframe: &Airframe) -> f64 {
     let (a, b) = (airframe.footprint_across_m, airframe.footprint_along_m);
     (a * a + b * b).sqrt()
 }

@@ -92,6 +92,7 @@ pub fn square(n_uavs: u16) -> Spec {
             launch: ring_pose(f64::from(i) / f64::from(n_uavs.max(1))),
             takeoff_ms: 0,
             height_m: 45.0 + 5.0 * f64::from(i),
+            sensors: skein_peer::wire::tasks::CAMERA_ALONE,
             twin_of: None,
             aboard: false,
         })

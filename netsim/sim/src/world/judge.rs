@@ -11,8 +11,11 @@ use super::obstacles::Place;
 use super::pieces::Pieces;
 use super::separation::Separation;
 use super::survey::Survey;
+use super::task_board::TaskBoard;
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::CellId;
+use skein_geometry::frame::Point;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 pub use super::board::Sighting;
@@ -24,6 +27,7 @@ pub struct Judge {
     boards: Vec<Board>,
     zones: Zones,
     separation: Separation,
+    tasks: TaskBoard,
 }
 
 impl Judge {
@@ -33,6 +37,7 @@ impl Judge {
         Self {
             zones: Zones::new(survey.zones()),
             separation: Separation::default(),
+            tasks: TaskBoard::default(),
             boards: vec![Board::new(0, survey)],
         }
     }
@@ -161,6 +166,19 @@ impl Judge {
             board.look(uav, airframe, piece, told);
         }
         self.zones.watch(uav, piece, facts);
+        self.tasks.look(uav, airframe, piece);
+    }
+
+    /// A task, by number and revision, is to be seen by one of these UAVs; asked twice it is
+    /// asked once.
+    pub fn ask(&mut self, task: (u16, u32), pieces: Vec<[Point; 4]>, carriers: BTreeSet<u16>) {
+        self.tasks.ask(task, pieces, carriers);
+    }
+
+    /// Who saw the last of a task and when, if all of it was seen since it was asked for.
+    #[must_use]
+    pub fn saw_task(&self, task: (u16, u32)) -> Option<Sighting> {
+        self.tasks.saw(task)
     }
 
     /// A UAV follows this revision of the mission.
@@ -190,7 +208,7 @@ impl Judge {
 mod tests {
     use super::*;
     use crate::world::fixture::{airframe, polygon, square};
-    use skein_geometry::frame::{Point, Pose};
+    use skein_geometry::frame::Pose;
     use skein_peer::mission::PointMm;
     use skein_peer::{CoverageTask, PointTask};
 

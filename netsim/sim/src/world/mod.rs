@@ -15,6 +15,7 @@ pub mod obstacles;
 pub mod pieces;
 mod separation;
 pub mod survey;
+mod task_board;
 
 pub use fact::{Approach, Fact};
 pub use judge::{Judge, Sighting};
@@ -27,10 +28,11 @@ use crate::spec::Spec;
 use motion::{Kinematic, Piece};
 use skein_behaviors::traffic::{Sighting as Seen, Traffic};
 use skein_behaviors::{Percept, Setpoint};
-use skein_flight::coverage::ring::patch::Patches;
+use skein_flight::coverage::ring::patch::{Corners, Patches};
 use skein_peer::mission::mm;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::{CoverageTask, Mission};
+use std::collections::BTreeSet;
 use std::iter;
 use std::sync::Arc;
 
@@ -297,6 +299,11 @@ impl World {
             mission.revision,
             TurnAway::of(mission),
         );
+    }
+
+    /// A task is to be seen, by one of these UAVs; asked twice it is asked once.
+    pub fn ask(&mut self, task: (u16, u32), pieces: Vec<Corners>, carriers: BTreeSet<u16>) {
+        self.judge.ask(task, pieces, carriers);
     }
 
     /// The computer with this number follows this revision of the mission: so does its UAV,

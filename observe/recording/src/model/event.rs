@@ -132,6 +132,13 @@ pub enum What {
         /// Which.
         revision: u32,
     },
+    /// Something became known of a task other than coverage.
+    Task {
+        /// What people call it.
+        name: String,
+        /// What: `asked`, `flies`, `seen`, `left`, `done-by`, `nobody-can` or `over`.
+        news: String,
+    },
     /// A peer is silent: another process speaks under its id.
     Silenced,
     /// Something a person should look at.
@@ -178,6 +185,7 @@ impl What {
             Self::Components { .. } => "components",
             Self::Finished { .. } => "finished",
             Self::Revised { .. } => "revised",
+            Self::Task { .. } => "task",
             Self::Silenced => "silenced",
             Self::Alarm => "alarm",
             Self::Refused => "refused",

@@ -118,6 +118,18 @@ impl PeerLogic for Double {
     fn overview(&self) -> Option<String> {
         None
     }
+
+    fn check_task(&self, _: &TaskEdit) -> Result<(), String> {
+        Ok(())
+    }
+
+    fn operators_tasks(&self) -> Vec<AskedTask> {
+        Vec::new()
+    }
+
+    fn tasks_version(&self) -> u64 {
+        0
+    }
 }
 
 /// One end of everything: the driver's when it holds receivers.

@@ -7,6 +7,7 @@ mod missions;
 mod orders;
 mod stores;
 mod swarm;
+mod tasks;
 mod twins;
 mod zones;
 

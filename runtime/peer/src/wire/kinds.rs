@@ -183,7 +183,7 @@ const TABLE: [KindRow; 15] = [
         ..row(
             Kind::Task,
             "task",
-            288,
+            352,
             Priority::Claim,
             Lifetime::Ms(60_000),
         )

@@ -27,6 +27,22 @@ pub const SENSORS_MAX: u8 = 32;
 pub const BUNDLE_MAX: usize = 40;
 /// Tasks that a bundle tells as done before its offer: who has done so many takes no more.
 pub const DONE_MAX: usize = 100;
+/// The longest name of a task, bytes.
+pub const TASK_NAME_MAX_BYTES: usize = 32;
+/// Farthest around a place that a task may ask to see, mm.
+pub const TASK_RADIUS_MAX_MM: u32 = 1_000_000;
+/// Sensors by name; the first has the number 1. Who says nothing of its sensors carries a
+/// camera.
+pub const SENSORS: [&str; 6] = [
+    "camera",
+    "infrared",
+    "multispectral",
+    "lidar",
+    "radio",
+    "gas",
+];
+/// Bits of [`Offer::sensors`] of a UAV with a camera and nothing else.
+pub const CAMERA_ALONE: u32 = 1;
 /// Farthest turn radius that makes sense of a UAV, mm.
 pub const RADIUS_MAX_MM: u32 = 10_000_000;
 
@@ -68,6 +84,23 @@ impl TaskKind {
     }
 }
 
+/// What became of a task.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, Default,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum TaskState {
+    /// It is to be done.
+    #[default]
+    Open,
+    /// Nobody wants it any more.
+    Cancelled,
+    /// Its time is over.
+    Expired,
+    /// It was done.
+    Done,
+}
+
 /// A place, in whole millimetres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct TaskPlace {
@@ -78,12 +111,12 @@ pub struct TaskPlace {
 }
 
 /// What somebody asks for. The highest revision counts; of equal ones the greater.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Task {
     /// Grows with each change.
     pub revision: u32,
-    /// Nobody wants it any more.
-    pub cancelled: bool,
+    /// Whether it is still to be done.
+    pub state: TaskState,
     /// What kind it is.
     pub kind: TaskKind,
     /// Where: one place, of a line at least two.
@@ -94,6 +127,56 @@ pub struct Task {
     pub worth: u16,
     /// How long a UAV stays there, milliseconds.
     pub stay_ms: u32,
+    /// How far around the place, or to the sides of the line, is to be seen, mm.
+    pub radius_mm: u32,
+    /// After so long it is not wanted any more, milliseconds from when it was asked for; 0
+    /// for never.
+    pub within_ms: u32,
+    /// What people call it.
+    pub name: Vec<u8>,
+    /// Of a task that is done, who did it; else 0.
+    pub done_by: u16,
+    /// Of a task that is over, how long after it was asked for, milliseconds; else 0.
+    pub over_after_ms: u32,
+}
+
+impl Task {
+    /// Whether it is to be done.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.state == TaskState::Open
+    }
+
+    /// The revision in which it was asked for: that it was done is told in the next.
+    #[must_use]
+    pub fn revision_as_asked(&self) -> u32 {
+        let told = u32::from(self.state == TaskState::Done);
+        self.revision.saturating_sub(told)
+    }
+
+    /// What people call it.
+    #[must_use]
+    pub fn name(&self) -> String {
+        String::from_utf8_lossy(&self.name).into_owned()
+    }
+}
+
+/// The number of a sensor of this name.
+#[must_use]
+pub fn sensor_of_name(name: &str) -> Option<u8> {
+    let place = SENSORS.iter().position(|s| *s == name)?;
+    u8::try_from(place + 1).ok()
+}
+
+/// The name of a sensor of this number; `any` for 0.
+#[must_use]
+pub fn sensor_name(sensor: u8) -> String {
+    match usize::from(sensor).checked_sub(1) {
+        None => "any".to_owned(),
+        Some(i) => SENSORS
+            .get(i)
+            .map_or_else(|| format!("sensor {sensor}"), |s| (*s).to_owned()),
+    }
 }
 
 /// What a UAV offered when it was last asked: all that its bids follow from.
@@ -115,6 +198,9 @@ pub struct Offer {
     pub endurance_ms: u32,
     /// A bit for each sensor on board, the lowest for sensor 1.
     pub sensors: u32,
+    /// What it has left to fly of its section, milliseconds; 0 where it has none. Who has some
+    /// comes back to it.
+    pub section_ms: u32,
 }
 
 /// How far a UAV is with a task. Of two claims on one task the higher state goes before.
@@ -179,6 +265,12 @@ number_of!(TaskKind {
     Track,
     Relay
 });
+number_of!(TaskState {
+    Open,
+    Cancelled,
+    Expired,
+    Done
+});
 number_of!(Progress {
     Tentative,
     Leaving,
@@ -189,12 +281,17 @@ number_of!(Progress {
 array_of!(TaskPlace { east_mm, north_mm });
 array_of!(Task {
     revision,
-    cancelled,
+    state,
     kind,
     places,
     sensor,
     worth,
-    stay_ms
+    stay_ms,
+    radius_mm,
+    within_ms,
+    name,
+    done_by,
+    over_after_ms
 });
 array_of!(Offer {
     east_mm,
@@ -203,7 +300,8 @@ array_of!(Offer {
     speed_mmps,
     radius_mm,
     endurance_ms,
-    sensors
+    sensors,
+    section_ms
 });
 array_of!(Bundle {
     offer,
@@ -274,7 +372,7 @@ fn is_near(mm: i32) -> bool {
 }
 
 /// The first field of a task that is out of range.
-pub(super) fn check_task(t: &Task) -> Result<(), WireError> {
+pub(crate) fn check_task(t: &Task) -> Result<(), WireError> {
     let least = if t.kind == TaskKind::Line { 2 } else { 1 };
     let most = if t.kind == TaskKind::Line {
         TASK_PLACES_MAX
@@ -287,7 +385,18 @@ pub(super) fn check_task(t: &Task) -> Result<(), WireError> {
     in_range("places", t.places.iter().all(near))?;
     in_range("sensor", t.sensor <= SENSORS_MAX)?;
     in_range("worth", (1..=WORTH_MAX).contains(&t.worth))?;
-    in_range("stay_ms", t.stay_ms <= DURATION_MAX_MS)
+    in_range("stay_ms", t.stay_ms <= DURATION_MAX_MS)?;
+    in_range("radius_mm", t.radius_mm <= TASK_RADIUS_MAX_MM)?;
+    in_range("within_ms", t.within_ms <= DURATION_MAX_MS)?;
+    in_range("over_after_ms", t.over_after_ms <= DURATION_MAX_MS)?;
+    let named = core::str::from_utf8(&t.name).is_ok_and(is_task_name);
+    in_range("name", t.name.is_empty() || named)
+}
+
+/// Whether people can type it and a terminal shows it.
+#[must_use]
+pub fn is_task_name(name: &str) -> bool {
+    name.len() <= TASK_NAME_MAX_BYTES && crate::mission_edit::is_zone_name(name)
 }
 
 /// The first field of a bundle that is out of range.
@@ -302,6 +411,7 @@ pub(super) fn check_bundle(b: &Bundle) -> Result<(), WireError> {
         (1..=RADIUS_MAX_MM).contains(&b.offer.radius_mm) || b.offer.speed_mmps == 0,
     )?;
     in_range("endurance_ms", b.offer.endurance_ms <= DURATION_MAX_MS)?;
+    in_range("section_ms", b.offer.section_ms <= DURATION_MAX_MS)?;
     at_most("tasks", b.tasks.len(), BUNDLE_MAX)?;
     in_range("kept", usize::from(b.kept) <= b.tasks.len())?;
     in_range("begun", b.begun <= b.kept)?;
@@ -330,7 +440,11 @@ const PLACE: &[Place] = &[
 /// The places of a task's body.
 pub(super) const TASK: &[Place] = &[
     at("revision", "grows with each change", U32),
-    at("cancelled", "whether nobody wants it", Shape::Flag),
+    at(
+        "state",
+        "whether it is still to be done",
+        Shape::Choice(&["open", "cancelled", "expired", "done"]),
+    ),
     at(
         "kind",
         "what kind it is",
@@ -352,6 +466,27 @@ pub(super) const TASK: &[Place] = &[
         Shape::Number(1, WORTH_MAX as i128),
     ),
     at("stay_ms", "how long a UAV stays there, ms", MS),
+    at(
+        "radius_mm",
+        "how far around it is to be seen, mm",
+        Shape::Number(0, TASK_RADIUS_MAX_MM as i128),
+    ),
+    at(
+        "within_ms",
+        "how long after it was asked for it is wanted, ms; 0 for ever",
+        MS,
+    ),
+    at(
+        "name",
+        "what people call it",
+        Shape::Bytes(TASK_NAME_MAX_BYTES),
+    ),
+    at("done_by", "who did it; 0 where nobody did", U16),
+    at(
+        "over_after_ms",
+        "how long after it was asked for it was over, ms; 0 while it is not",
+        MS,
+    ),
 ];
 
 const OFFER: &[Place] = &[
@@ -381,6 +516,11 @@ const OFFER: &[Place] = &[
         "sensors",
         "a bit for each sensor, the lowest for sensor 1",
         U32,
+    ),
+    at(
+        "section_ms",
+        "flight time left in its section, ms; 0 without one",
+        MS,
     ),
 ];
 

@@ -102,6 +102,25 @@ pub fn build(problem: &StationsProblem<'_>) -> Result<CoverageLoop, LoopError> {
     ))
 }
 
+/// The poses at which one station may be seen, a straight before and after each clear of the
+/// zones.
+///
+/// # Errors
+/// A clause that says why there is none, or what is wrong with the problem.
+pub fn views(problem: &StationsProblem<'_>, station: usize) -> Result<Vec<Pose>, String> {
+    check(problem).map_err(|e| e.to_string())?;
+    if station >= problem.stations.len() {
+        return Err("no such piece".to_owned());
+    }
+    stand::stands(problem, station).map_err(str::to_owned)
+}
+
+/// The straight that is flown through such a pose.
+#[must_use]
+pub fn pass_through(pose: Pose) -> Curve {
+    stand::run(pose)
+}
+
 /// The name of the cell of a station.
 fn name(n: usize) -> CellId {
     CellId::numbered(u16::try_from(n).unwrap_or(u16::MAX))

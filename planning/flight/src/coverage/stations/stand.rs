@@ -126,7 +126,7 @@ impl Lens {
 }
 
 /// The short straight through a pose.
-fn run(pose: Pose) -> Curve {
+pub(super) fn run(pose: Pose) -> Curve {
     let start = Pose::new(pose.position() - pose.direction() * RUN_M, pose.heading_rad);
     Curve::from_pieces(start, &[(0.0, 2.0 * RUN_M)])
 }

@@ -4,7 +4,9 @@
 use super::settlement::{Bidder, Problem};
 use super::{Auction, Rank, kept, rank};
 use crate::PeerId;
-use crate::wire::tasks::{BUNDLE_MAX, Bundle, BundleTask, DONE_MAX, Progress, TaskId};
+use crate::wire::tasks::{
+    BUNDLE_MAX, Bundle, BundleTask, DONE_MAX, Progress, Task, TaskId, TaskState,
+};
 use skein_geometry::hash::Fnv;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{Hash, Hasher};
@@ -33,7 +35,7 @@ impl Auction {
         }
         let done = self.done_before_offers(&bidders);
         let open = self.tasks.iter().filter(|(id, task)| {
-            !task.cancelled && !holders.contains_key(id) && !done.contains(id)
+            self.counts_open(**id, task) && !holders.contains_key(id) && !done.contains(id)
         });
         let bidder = |(id, bundle): &(PeerId, &Bundle)| {
             let first = kept(bundle).map(|t| t.task);
@@ -61,7 +63,7 @@ impl Auction {
     fn done_before_offers(&self, bidders: &[(PeerId, &Bundle)]) -> BTreeSet<TaskId> {
         let current = |task: &TaskId, revision: u32| {
             let known = self.tasks.get(task);
-            known.is_some_and(|t| t.revision == revision)
+            known.is_some_and(|t| t.revision_as_asked() == revision)
         };
         let before = bidders.iter().map(|(_, b)| *b);
         let gone = self.others.iter().filter(|(id, _)| !self.live.contains(id));
@@ -77,12 +79,26 @@ impl Auction {
             .collect()
     }
 
+    /// Whether a task counts as open: it is, or it was done since an offer that stands, by
+    /// whom its author tells. So being told of what was done changes nobody's list.
+    fn counts_open(&self, id: TaskId, task: &Task) -> bool {
+        if task.is_open() || task.state != TaskState::Done {
+            return task.is_open();
+        }
+        let since = |b: &Bundle| {
+            let done = |t: &BundleTask| t.task == id && t.progress == Progress::Done;
+            b.tasks.iter().any(done)
+        };
+        self.living().any(|(_, b)| since(b)) || since(&self.own)
+    }
+
     /// Hash of all that a settlement follows from. 0 stands for none.
     pub(super) fn basis(&self) -> u32 {
         let mut hash = Fnv::new();
         for (id, task) in &self.tasks {
-            (id, task.revision, task.cancelled).hash(&mut hash);
+            (id, task.revision_as_asked(), self.counts_open(*id, task)).hash(&mut hash);
         }
+        self.map.hash(&mut hash);
         self.problem(false).hash(&mut hash);
         self.problem(true).hash(&mut hash);
         let hash = Hasher::finish(&hash);

@@ -5,15 +5,20 @@
 //! even the last of a hundred tasks is better done sooner. What goes on (a target, a relay)
 //! counts at arrival.
 //!
-//! A place is flown over on the course on which it lies from the last one. Air that moves and
-//! zones are left out: bids compare UAVs, and what is flown is planned by the executive.
+//! A place is flown over on the course on which it lies from the last one. Who has a section
+//! comes back to where it left it, and a task counts so much less as that way is long. Air
+//! that moves is left out, and zones where no router is known: bids compare UAVs, and what is
+//! flown is planned by the executive.
 
 use super::settlement::Flying;
 use crate::PeerId;
 use crate::wire::tasks::{Offer, Task, TaskId, TaskKind, TaskPlace};
-use skein_flight::trajectory::dubins::length_m;
+use skein_flight::route::Router;
+use skein_flight::trajectory::dubins::{length_m, shortest};
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::atan2;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 
 /// After so long a task is worth half, milliseconds.
 pub const HALF_TIME_MS: u64 = 60_000;
@@ -65,7 +70,7 @@ pub fn value(worth: u16, after_ms: u64) -> u32 {
 
 impl Airborne {
     /// Flies over places: where it is then.
-    fn along(&self, places: &[TaskPlace]) -> Option<(Pose, u64)> {
+    fn along(&self, places: &[TaskPlace], ways: &impl Ways) -> Option<(Pose, u64)> {
         let speed_mmps = self.offer.speed_mmps;
         let first = point(*places.first()?);
         let next = places.get(1).and_then(|p| course(first, point(*p)));
@@ -74,7 +79,7 @@ impl Airborne {
         let heading_rad = heading_rad.unwrap_or(self.pose.heading_rad);
         let entry = Pose::new(first, heading_rad);
         let radius_m = f64::from(self.offer.radius_mm.max(1)) / 1000.0;
-        let mut way_m = length_m(self.pose, entry, radius_m);
+        let mut way_m = ways.length_m(self.pose, entry, radius_m);
         let mut pose = entry;
         for pair in places.windows(2) {
             let (a, b) = (point(pair[0]), point(pair[1]));
@@ -84,9 +89,90 @@ impl Airborne {
         Some((pose, self.time_ms + flight_ms(way_m, speed_mmps)))
     }
 
+    /// The straight way back to where it was asked, milliseconds.
+    fn back_ms(&self, from: Pose) -> u64 {
+        let left = crate::mission::point_m((self.offer.east_mm, self.offer.north_mm));
+        flight_ms((left - from.position()).norm(), self.offer.speed_mmps)
+    }
+
     fn has(&self, sensor: u8) -> bool {
         let bit = u32::from(sensor).checked_sub(1);
         bit.is_none_or(|bit| self.offer.sensors >> bit.min(31) & 1 == 1)
+    }
+}
+
+/// How far it is from one pose to another.
+trait Ways {
+    /// The way with turns of this radius, metres.
+    fn length_m(&self, from: Pose, to: Pose, radius_m: f64) -> f64;
+}
+
+impl Ways for FlownTime {
+    fn length_m(&self, from: Pose, to: Pose, radius_m: f64) -> f64 {
+        length_m(from, to, radius_m)
+    }
+}
+
+/// What tasks are worth by flown time round the no-fly zones of a mission: all who hold the
+/// same zones get the same.
+#[derive(Debug)]
+pub struct RoutedTime<'a> {
+    router: &'a Router,
+    /// What was asked before, by poses to the millimetre.
+    asked: RefCell<BTreeMap<[i64; 6], f64>>,
+}
+
+impl<'a> RoutedTime<'a> {
+    /// Ways by this router; where it knows none they are reckoned as if there were no zones,
+    /// and whoever is to fly them finds out.
+    #[must_use]
+    pub fn new(router: &'a Router) -> Self {
+        Self {
+            router,
+            asked: RefCell::new(BTreeMap::new()),
+        }
+    }
+}
+
+impl Ways for RoutedTime<'_> {
+    fn length_m(&self, from: Pose, to: Pose, radius_m: f64) -> f64 {
+        let zones = self.router.zones();
+        if zones.zones().is_empty() {
+            return length_m(from, to, radius_m);
+        }
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "a cast of a float saturates"
+        )]
+        let whole = |v: f64| (v * 1000.0).round() as i64;
+        let key = [&from, &to].map(|p| [p.east_m, p.north_m, p.heading_rad].map(whole));
+        let key = [
+            key[0][0], key[0][1], key[0][2], key[1][0], key[1][1], key[1][2],
+        ];
+        if let Some(m) = self.asked.borrow().get(&key) {
+            return *m;
+        }
+        let straight = shortest(from, to, radius_m);
+        let way_m = if zones.is_clear(&straight, self.router.limits().clearance_m) {
+            straight.length_m()
+        } else {
+            let routed = self.router.route(from, to);
+            routed.map_or(straight.length_m(), |way| way.length_m())
+        };
+        self.asked.borrow_mut().insert(key, way_m);
+        way_m
+    }
+}
+
+impl Flying for RoutedTime<'_> {
+    type At = Airborne;
+
+    fn begin(&self, who: PeerId, offer: &Offer) -> Airborne {
+        FlownTime.begin(who, offer)
+    }
+
+    fn then(&self, at: &Airborne, _: TaskId, task: &Task) -> Option<(Airborne, u32)> {
+        flown(at, task, self)
     }
 }
 
@@ -103,31 +189,40 @@ impl Flying for FlownTime {
     }
 
     fn then(&self, at: &Airborne, _: TaskId, task: &Task) -> Option<(Airborne, u32)> {
-        if at.offer.speed_mmps == 0 || !at.has(task.sensor) {
-            return None;
-        }
-        let mut flown = at.along(&task.places)?;
-        if task.kind == TaskKind::Line {
-            let back: Vec<TaskPlace> = task.places.iter().rev().copied().collect();
-            flown = at.along(&back).filter(|b| b.1 < flown.1).unwrap_or(flown);
-        }
-        let (pose, there_ms) = flown;
-        let time_ms = there_ms + u64::from(task.stay_ms);
-        if time_ms > u64::from(at.offer.endurance_ms) {
-            return None;
-        }
-        let counts_ms = if task.kind.goes_on() {
-            there_ms
-        } else {
-            time_ms
-        };
-        let next = Airborne {
-            pose,
-            time_ms,
-            ..*at
-        };
-        Some((next, value(task.worth, counts_ms)))
+        flown(at, task, self)
     }
+}
+
+/// Where a task leaves a UAV, and what it is worth when it is done then.
+fn flown(at: &Airborne, task: &Task, ways: &impl Ways) -> Option<(Airborne, u32)> {
+    if at.offer.speed_mmps == 0 || !at.has(task.sensor) {
+        return None;
+    }
+    let mut flown = at.along(&task.places, ways)?;
+    if task.kind == TaskKind::Line {
+        let back: Vec<TaskPlace> = task.places.iter().rev().copied().collect();
+        let back = at.along(&back, ways).filter(|b| b.1 < flown.1);
+        flown = back.unwrap_or(flown);
+    }
+    let (pose, there_ms) = flown;
+    let time_ms = there_ms + u64::from(task.stay_ms);
+    // From where it was asked it knows that it can return.
+    let back_ms = at.back_ms(pose);
+    if time_ms + back_ms > u64::from(at.offer.endurance_ms) {
+        return None;
+    }
+    let returns_ms = if at.offer.section_ms == 0 { 0 } else { back_ms };
+    let counts_ms = if task.kind.goes_on() {
+        there_ms
+    } else {
+        time_ms
+    };
+    let next = Airborne {
+        pose,
+        time_ms,
+        ..*at
+    };
+    Some((next, value(task.worth, counts_ms + returns_ms)))
 }
 
 #[cfg(test)]
@@ -142,6 +237,7 @@ mod tests {
         radius_mm: 70_000,
         endurance_ms: 600_000,
         sensors: 0b10,
+        section_ms: 0,
     };
 
     fn at(east_m: i32, north_m: i32) -> TaskPlace {
@@ -154,12 +250,11 @@ mod tests {
     fn task(kind: TaskKind, places: &[TaskPlace]) -> Task {
         Task {
             revision: 1,
-            cancelled: false,
             kind,
             places: places.to_vec(),
             sensor: 0,
             worth: 100,
-            stay_ms: 0,
+            ..Task::default()
         }
     }
 

@@ -50,7 +50,7 @@ pub mod improvement;
 pub mod settlement;
 
 use crate::wire::limits::PEERS_MAX;
-use crate::wire::tasks::{Bundle, BundleTask, DoneTask, Offer, Progress, Task, TaskId};
+use crate::wire::tasks::{Bundle, BundleTask, DoneTask, Offer, Progress, Task, TaskId, TaskState};
 use crate::{Incarnation, PeerId};
 use settlement::{Settlement, Settler, Tasks};
 use std::cmp::Reverse;
@@ -88,6 +88,12 @@ pub enum Event {
     Finished(TaskId),
     /// It wants to be relieved of a task.
     Relieve(TaskId),
+    /// It can do no task any more: what it claims is open again.
+    GiveUp,
+    /// What was unassigned may be in its reach by now.
+    OfferAnew,
+    /// Identifies the map that ways follow from: whoever has another has another basis.
+    Map(u32),
     /// A beacon period has passed, in a component of this diameter.
     Period(u8),
 }
@@ -125,6 +131,10 @@ pub struct Auction {
     quiet: u32,
     /// So many are enough to commit without having heard from everybody.
     patience: u32,
+    /// What somebody said to have done, in which revision: a later life forgets it, this does
+    /// not.
+    known_done: BTreeSet<DoneTask>,
+    map: u32,
 }
 
 impl Auction {
@@ -149,7 +159,24 @@ impl Auction {
             free: false,
             quiet: 0,
             patience: u32::MAX,
+            known_done: BTreeSet::new(),
+            map: 0,
         }
+    }
+
+    /// Another life of this peer begins: what it held and did in the last one is void. What
+    /// was done stays done.
+    pub fn begin_life(&mut self, life: Incarnation) {
+        let (me, present) = (self.me, self.present);
+        let old = core::mem::replace(self, Self::new(me, life, present));
+        let own = (me, (old.version, old.own));
+        self.others = old.others;
+        self.tasks = old.tasks;
+        self.live = old.live;
+        self.patience = old.patience;
+        self.map = old.map;
+        self.known_done = old.known_done;
+        self.remember_done(&own.1.1);
     }
 
     /// What this peer says: the newest version counts.
@@ -180,6 +207,12 @@ impl Auction {
     #[must_use]
     pub fn tasks(&self) -> &Tasks {
         &self.tasks
+    }
+
+    /// What this peer and those who live offer.
+    pub fn offers(&self) -> impl Iterator<Item = &Offer> {
+        let others = self.living().map(|(_, b)| &b.offer);
+        others.chain([&self.own.offer])
     }
 
     /// Tasks that nobody who lives can do.
@@ -258,6 +291,7 @@ impl Auction {
                 if author == self.me || !newer {
                     return false;
                 }
+                self.remember_done(&bundle);
                 self.others.insert(author, (version, bundle));
             }
             Event::Live(live) => {
@@ -287,6 +321,20 @@ impl Auction {
                 self.progress(id, Progress::Leaving);
                 self.stale = true;
             }
+            Event::GiveUp => {
+                let claims = self.own.tasks.iter();
+                let claims = claims.filter(|t| t.progress != Progress::Done);
+                let all: Vec<TaskId> = claims.map(|t| t.task).collect();
+                self.let_go(&all);
+            }
+            Event::OfferAnew => self.stale = true,
+            Event::Map(map) => {
+                if self.map == map {
+                    return false;
+                }
+                self.map = map;
+                self.stale = true;
+            }
             Event::Period(diameter) => {
                 self.patience = 2 * u32::from(diameter) + 3;
                 self.quiet = (self.quiet + 1).min(self.patience);
@@ -301,10 +349,31 @@ impl Auction {
         let room = self.tasks.len() < KNOWN_MAX;
         let newer = self.tasks.get(&id).map_or(room, |known| task > *known);
         if newer {
+            // That a task was done changes nothing for who knows it already.
+            self.stale |= task.state != TaskState::Done || !self.is_done(id);
             self.tasks.insert(id, task);
-            self.stale = true;
         }
         newer
+    }
+
+    fn remember_done(&mut self, bundle: &Bundle) {
+        let since = bundle.tasks.iter();
+        let since = since.filter(|t| t.progress == Progress::Done);
+        let since = since.map(|t| DoneTask {
+            task: t.task,
+            revision: t.revision,
+        });
+        let tasks = &self.tasks;
+        let wanted = |d: &DoneTask| {
+            let known = tasks.get(&d.task);
+            known.is_none_or(|t| t.revision_as_asked() <= d.revision)
+        };
+        self.known_done
+            .extend(bundle.done.iter().copied().chain(since));
+        self.known_done.retain(wanted);
+        while self.known_done.len() > KNOWN_MAX {
+            self.known_done.pop_first();
+        }
     }
 
     fn progress(&mut self, id: TaskId, progress: Progress) {
@@ -316,7 +385,7 @@ impl Auction {
 
     fn is_current(&self, held: &BundleTask) -> bool {
         let task = self.tasks.get(&held.task);
-        task.is_some_and(|t| !t.cancelled && t.revision == held.revision)
+        task.is_some_and(|t| t.is_open() && t.revision == held.revision)
     }
 
     /// Bundles of others that live.
@@ -327,8 +396,13 @@ impl Auction {
     }
 
     /// Who has done a task in its present revision, living or not.
-    fn is_done(&self, id: TaskId) -> bool {
-        let revision = self.tasks.get(&id).map(|t| t.revision);
+    #[must_use]
+    pub fn is_done(&self, id: TaskId) -> bool {
+        let revision = self.tasks.get(&id).map(Task::revision_as_asked);
+        let remembered = revision.map(|revision| DoneTask { task: id, revision });
+        if remembered.is_some_and(|d| self.known_done.contains(&d)) {
+            return true;
+        }
         let all = self.others.values().map(|(_, b)| b).chain([&self.own]);
         all.into_iter().any(|b| {
             let before = b.done.iter();
@@ -397,6 +471,7 @@ impl Auction {
         // Who has done all that it had room for offers anew for the rest.
         let mut held = self.own.tasks.iter();
         let spent = self.free
+            && !self.own.tasks.is_empty()
             && !self.settled.unassigned.is_empty()
             && held.all(|t| t.progress > Progress::Tentative);
         let anew = self.stale || ((changed || spent) && has_acted(&self.own));
@@ -424,7 +499,7 @@ impl Auction {
         self.own.offer = self.present;
         let known = |d: &DoneTask| {
             let task = self.tasks.get(&d.task);
-            task.is_some_and(|t| !t.cancelled && t.revision == d.revision)
+            task.is_some_and(|t| t.is_open() && t.revision == d.revision)
         };
         let done = self.own.tasks.iter();
         let done = done.filter(|t| t.progress == Progress::Done);

@@ -31,7 +31,6 @@ fn name(number: u16) -> TaskId {
 fn task(kind: TaskKind, revision: u32) -> Task {
     Task {
         revision,
-        cancelled: false,
         kind,
         places: vec![TaskPlace {
             east_mm: 0,
@@ -39,7 +38,7 @@ fn task(kind: TaskKind, revision: u32) -> Task {
         }],
         sensor: 0,
         worth: 1,
-        stay_ms: 0,
+        ..Task::default()
     }
 }
 
@@ -51,6 +50,7 @@ const OFFER: Offer = Offer {
     radius_mm: 1,
     endurance_ms: 1,
     sensors: 0,
+    section_ms: 0,
 };
 
 /// Some peers that hear each other.
@@ -176,7 +176,11 @@ fn a_task_that_is_changed_or_cancelled_is_dropped_by_who_flies_to_it() {
         s.tell(0, Event::Free);
         s.exchange(&[0, 1]);
         let changed = Task {
-            cancelled,
+            state: if cancelled {
+                TaskState::Cancelled
+            } else {
+                TaskState::Open
+            },
             ..task(TaskKind::Pinpoint, 2)
         };
         let effects = s.tell_all(&Event::Task(name(0), changed));

@@ -355,6 +355,12 @@ fn every_limit_is_sharp() {
                 with(&|t| t.worth += 1, "worth");
                 with(&|t| t.worth = 0, "worth");
                 with(&|t| t.stay_ms += 1, "stay_ms");
+                with(&|t| t.radius_mm += 1, "radius_mm");
+                with(&|t| t.within_ms += 1, "within_ms");
+                with(&|t| t.over_after_ms += 1, "over_after_ms");
+                with(&|t| t.name.push(b'x'), "name");
+                with(&|t| t.name[0] = b' ', "name");
+                with(&|t| t.name[0] = 0xff, "name");
             }
             Body::Bundle(b) => {
                 kinds += 1;
@@ -370,6 +376,7 @@ fn every_limit_is_sharp() {
                 with(&|b| b.offer.radius_mm += 1, "radius_mm");
                 with(&|b| b.offer.radius_mm = 0, "radius_mm");
                 with(&|b| b.offer.endurance_ms += 1, "endurance_ms");
+                with(&|b| b.offer.section_ms += 1, "section_ms");
                 with(&|b| b.kept += 1, "kept");
                 with(&|b| b.begun += 1, "begun");
                 with(&|b| b.tasks[1] = b.tasks[0], "tasks");

@@ -7,7 +7,7 @@ use super::*;
 pub(crate) fn task() -> Task {
     Task {
         revision: 2,
-        cancelled: false,
+        state: TaskState::Open,
         kind: TaskKind::Pinpoint,
         places: vec![TaskPlace {
             east_mm: 120_000,
@@ -16,6 +16,9 @@ pub(crate) fn task() -> Task {
         sensor: 1,
         worth: 100,
         stay_ms: 0,
+        radius_mm: 15_000,
+        name: b"gate".to_vec(),
+        ..Task::default()
     }
 }
 
@@ -36,6 +39,7 @@ pub(crate) fn bundle() -> Bundle {
             radius_mm: 57_000,
             endurance_ms: 1_200_000,
             sensors: 1,
+            section_ms: 90_000,
         },
         kept: 1,
         begun: 0,
@@ -57,10 +61,14 @@ pub(crate) fn bundle() -> Bundle {
 /// The typical bodies and their bytes.
 pub(crate) fn golden() -> Vec<(Body, &'static str)> {
     vec![
-        (Body::Task(task()), "8702f40081821a0001d4c0397ab601186400"),
+        (
+            Body::Task(task()),
+            "8c02000081821a0001d4c0397ab601186400193a980044676174650000",
+        ),
         (
             Body::Bundle(bundle()),
-            "86871903e83907cf193d5c19465019dea81a00124f800101008285090702\
+            "86881903e83907cf193d5c19465019dea81a00124f80011a00015f90010082\
+             85090702\
              1a02faf080028509\
              19012c021a02faf080008183090101\
              1adeadbeef",
@@ -82,12 +90,17 @@ pub(crate) fn largest() -> Vec<Body> {
     vec![
         Body::Task(Task {
             revision: u32::MAX,
-            cancelled: true,
+            state: TaskState::Done,
             kind: TaskKind::Line,
             places: (0..24).map(place).collect(),
             sensor: SENSORS_MAX,
             worth: WORTH_MAX,
             stay_ms: DURATION_MAX_MS,
+            radius_mm: TASK_RADIUS_MAX_MM,
+            within_ms: DURATION_MAX_MS,
+            name: vec![b'x'; TASK_NAME_MAX_BYTES],
+            done_by: u16::MAX,
+            over_after_ms: DURATION_MAX_MS,
         }),
         Body::Bundle(Bundle {
             offer: Offer {
@@ -98,6 +111,7 @@ pub(crate) fn largest() -> Vec<Body> {
                 radius_mm: RADIUS_MAX_MM,
                 endurance_ms: DURATION_MAX_MS,
                 sensors: u32::MAX,
+                section_ms: DURATION_MAX_MS,
             },
             kept: count(BUNDLE_MAX),
             begun: count(BUNDLE_MAX),

@@ -1,0 +1,166 @@
+//! Tasks that the operator of a scenario asks for in flight: a place or a line, within a time,
+//! for a sensor.
+
+use super::shared::position;
+use skein_interop::json::{Error, Node, suggestion};
+use skein_netsim::fault::Fault;
+use skein_peer::input::NewTask;
+use skein_peer::mission::mm;
+use skein_peer::wire::tasks::{
+    SENSORS, TASK_NAME_MAX_BYTES, TASK_PLACES_MAX, TaskKind, WORTH_MAX, is_task_name,
+    sensor_of_name,
+};
+
+/// What a task is worth unless the file says so.
+pub(crate) const WORTH: u16 = 100;
+
+/// How far around a place is to be seen unless the file says so, metres.
+pub(crate) const RADIUS_M: f64 = 10.0;
+
+/// Reads `task_add`.
+pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
+    let f = node.fields(&[
+        "id", "point", "line", "radius_m", "within_s", "needs", "worth",
+    ])?;
+    let (kind, places) = match (f.get("point"), f.get("line")) {
+        (Some(point), None) => {
+            let at = position(&point.fields(&["east_m", "north_m"])?)?;
+            (TaskKind::Pinpoint, vec![(mm(at.x), mm(at.y))])
+        }
+        (None, Some(line)) => (TaskKind::Line, places(line)?),
+        _ => {
+            return Err(node.wrong(
+                "expected either point: { east_m: 250, north_m: 250 } or line: [{ east_m: 0, north_m: 0 }, ...]",
+            ));
+        }
+    };
+    let radius_m = f.number_or("radius_m", RADIUS_M, 0.0, 1_000.0, "metres")?;
+    let within_ms = f.get("within_s").map(|n| {
+        let within_s = n.number(1.0, 86_400.0, "seconds")?;
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "at most a day"
+        )]
+        let within_ms = (within_s * 1000.0).round() as u32;
+        Ok(within_ms)
+    });
+    let sensor = f.get("needs").map(|n| {
+        let name = n.text()?;
+        sensor_of_name(name).ok_or_else(|| {
+            let known = suggestion(name, &SENSORS);
+            n.wrong(format!("no sensor is named \"{name}\"; {known}"))
+        })
+    });
+    let task = NewTask {
+        name: Some(task_name(f.need("id", "\"gate\"")?)?),
+        kind,
+        places,
+        radius_mm: mm(radius_m).unsigned_abs(),
+        worth: f.small_or("worth", WORTH, 1, WORTH_MAX, "the worth of a task")?,
+        within_ms: within_ms.transpose()?,
+        sensor: sensor.transpose()?.unwrap_or(0),
+    };
+    Ok(Fault::AddTask { task })
+}
+
+fn places(line: &Node<'_>) -> Result<Vec<(i32, i32)>, Error> {
+    let items = line.items()?;
+    if !(2..=TASK_PLACES_MAX).contains(&items.len()) {
+        return Err(line.wrong(format!(
+            "has {} places; expected 2 to {TASK_PLACES_MAX}",
+            items.len()
+        )));
+    }
+    let place = |n: &Node<'_>| {
+        let at = position(&n.fields(&["east_m", "north_m"])?)?;
+        Ok((mm(at.x), mm(at.y)))
+    };
+    items.iter().map(place).collect()
+}
+
+/// Reads the name of a task.
+pub(crate) fn task_name(node: &Node<'_>) -> Result<String, Error> {
+    let name = node.text()?;
+    if is_task_name(name) {
+        Ok(name.to_owned())
+    } else {
+        Err(node.wrong(format!(
+            "{name:?} is no name of a task; expected 1 to {TASK_NAME_MAX_BYTES} letters, digits, '-', '_' or '.'"
+        )))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Files, Overrides};
+    use std::path::PathBuf;
+
+    /// The default scenario with this schedule, and these sensors.
+    fn asked(operator: &str, sensors: &str) -> Result<crate::Scenario, String> {
+        let text = include_str!("../../../../configs/trials/helsinki.json5");
+        let fleet = "    airframes: [\"swift\", \"scout\"],\n";
+        assert!(text.contains("operator: [],") && text.contains(fleet));
+        let text = text.replacen("operator: [],", &format!("operator: {operator},"), 1);
+        let text = text.replacen(fleet, &format!("{fleet}    {sensors}\n"), 1);
+        let beside = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/trials"));
+        let (files, over) = (Files::Directory(beside), Overrides::default());
+        crate::parse_with("s.json5", &text, &files, &over).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn tasks_are_read_and_what_is_wrong_is_named_with_its_place() {
+        let point = "point: { east_m: 120, north_m: 340 }";
+        let good = format!(
+            "[{{ at_s: 80, task_add: {{ id: 'gate', {point}, needs: 'infrared', within_s: 60 }} }}, {{ at_s: 90, task_cancel: 'gate' }}]"
+        );
+        let carried = "sensors: [['camera'], ['camera', 'infrared']],";
+        let scenario = asked(&good, carried).unwrap();
+        let carriers = scenario.spec.uavs.iter().filter(|u| u.carries(2)).count();
+        assert_eq!((carriers, scenario.spec.uavs.len()), (4, 8));
+        let spoken = scenario.spec.faults.iter().filter(|f| f.fault.is_spoken());
+        assert_eq!(spoken.count(), 2);
+        let add = |what: &str| format!("[{{ at_s: 80, task_add: {{ {what} }} }}]");
+        for (wrong, sensors, why) in [
+            (
+                good.clone(),
+                "",
+                "operator[0].task_add: no UAV of the fleet carries infrared",
+            ),
+            (
+                good,
+                "sensors: [['eyes']],",
+                "fleet.sensors[0][0]: no sensor is named \"eyes\"",
+            ),
+            (add("id: 'gate'"), "", "expected either point"),
+            (
+                add(&format!("id: 'a b', {point}")),
+                "",
+                "is no name of a task",
+            ),
+            (
+                add(&format!("id: 'a', {point}, needs: 'eyes'")),
+                "",
+                "no sensor is named",
+            ),
+            (
+                add(&format!("id: 'a', {point}, radius_m: 300")),
+                "",
+                "larger than what one frame",
+            ),
+            (
+                add("id: 'a', line: [{ east_m: 1, north_m: 1 }]"),
+                "",
+                "has 1 places",
+            ),
+            (
+                "[{ at_s: 9, task_cancel: 'x' }]".into(),
+                "",
+                "no task \"x\" was asked for before",
+            ),
+        ] {
+            let said = asked(&wrong, sensors).map(drop).unwrap_err();
+            assert!(said.contains(why), "{wrong}: {said}");
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! What became of the tasks that were asked for in flight (D2.7 §3.2): who flew to them, who
+//! says to have done them, and when the judge saw them.
+
+use crate::world::Judge;
+use serde::{Deserialize, Serialize};
+use skein_peer::Report;
+use skein_peer::input::AskedTask;
+use skein_peer::output::TaskNews;
+use skein_peer::wire::tasks::TaskState;
+use std::collections::BTreeMap;
+
+/// One task.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TaskReport {
+    /// What people call it.
+    pub name: String,
+    /// When it was asked for, ms.
+    pub asked_ms: u64,
+    /// What the ground station holds it to be at the end: `open`, `cancelled`, `expired` or
+    /// `done`.
+    pub state: TaskState,
+    /// When all of it had been seen, as the judge knows, ms.
+    pub seen_ms: Option<u64>,
+    /// Who saw the last of it, as the judge knows.
+    pub seen_by: Option<u16>,
+    /// Who flew to it, each time one did.
+    pub flown_by: Vec<u16>,
+    /// Who says to have done it; more than one did it more than once.
+    pub done_by: Vec<u16>,
+    /// Why nobody can do it, as the first UAV said that did.
+    pub nobody_can: Option<String>,
+}
+
+/// All of them, by register and revision.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tasks(BTreeMap<(u16, u32), TaskReport>);
+
+impl Tasks {
+    /// A task is known to the ground station of its operator.
+    pub(super) fn asked(&mut self, now_ms: u64, asked: &AskedTask) {
+        let key = (asked.number, asked.task.revision_as_asked());
+        let earlier = key.1.checked_sub(1).map(|before| (key.0, before));
+        // One that was cancelled or expired is told in a revision of its own.
+        let over = asked.task.state;
+        if !asked.task.is_open()
+            && let Some(task) = earlier.and_then(|k| self.0.get_mut(&k))
+        {
+            task.state = over;
+            return;
+        }
+        let task = self.0.entry(key).or_insert_with(|| TaskReport {
+            name: asked.task.name(),
+            asked_ms: now_ms.saturating_sub(asked.age_ms),
+            ..TaskReport::default()
+        });
+        task.state = over;
+    }
+
+    /// A peer says something of a task.
+    pub(super) fn reported(&mut self, peer: u16, report: &Report) {
+        let Report::Task {
+            id, revision, news, ..
+        } = report
+        else {
+            return;
+        };
+        let Some(task) = self.0.get_mut(&(id.number, *revision)) else {
+            return;
+        };
+        match news {
+            TaskNews::Flies => task.flown_by.push(peer),
+            TaskNews::Seen => task.done_by.push(peer),
+            TaskNews::NobodyCan(why) => {
+                task.nobody_can.get_or_insert_with(|| why.clone());
+            }
+            TaskNews::Asked | TaskNews::Left | TaskNews::DoneBy(_) | TaskNews::Over(_) => {}
+        }
+    }
+
+    /// What became of all.
+    pub(super) fn reports(&self, judge: &Judge) -> Vec<TaskReport> {
+        let told = |(key, task): (&(u16, u32), &TaskReport)| {
+            let seen = judge.saw_task(*key);
+            TaskReport {
+                seen_ms: seen.map(|s| s.at_ms),
+                seen_by: seen.map(|s| s.uav),
+                ..task.clone()
+            }
+        };
+        self.0.iter().map(told).collect()
+    }
+}
+
+impl TaskReport {
+    /// One line for a person.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let secs = super::secs;
+        let asked = format!("{} asked for at {:.1} s", self.name, secs(self.asked_ms));
+        let state = format!("{:?}", self.state).to_lowercase();
+        match (self.seen_ms, self.seen_by, &self.nobody_can) {
+            (Some(ms), Some(by), _) => format!(
+                "{asked}, seen by uav{by} after {:.1} s",
+                secs(ms.saturating_sub(self.asked_ms))
+            ),
+            (_, _, Some(why)) if self.state == TaskState::Open => {
+                format!("{asked}, not seen: {why}")
+            }
+            _ => format!("{asked}, not seen, {state}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skein_peer::PeerId;
+    use skein_peer::wire::tasks::{Task, TaskId};
+
+    #[test]
+    fn a_task_is_followed_over_its_revisions() {
+        let mut tasks = Tasks::default();
+        let asked = |revision, state| AskedTask {
+            number: 3,
+            task: Task {
+                revision,
+                state,
+                name: b"gate".to_vec(),
+                ..Task::default()
+            },
+            age_ms: 500,
+        };
+        let says = |news| Report::Task {
+            id: TaskId {
+                author: 100,
+                number: 3,
+            },
+            revision: 1,
+            name: "gate".into(),
+            news,
+        };
+        tasks.asked(10_000, &asked(1, TaskState::Open));
+        tasks.reported(2, &says(TaskNews::Flies));
+        tasks.reported(2, &says(TaskNews::Seen));
+        tasks.reported(1, &says(TaskNews::DoneBy(PeerId(2))));
+        tasks.asked(30_000, &asked(2, TaskState::Done));
+        // The register is used again, and that one is cancelled.
+        tasks.asked(40_000, &asked(3, TaskState::Open));
+        tasks.asked(50_000, &asked(4, TaskState::Cancelled));
+        let all: Vec<_> = tasks.0.values().collect();
+        assert_eq!(all.len(), 2);
+        assert_eq!((all[0].asked_ms, all[0].state), (9_500, TaskState::Done));
+        assert_eq!(
+            (&all[0].flown_by[..], &all[0].done_by[..]),
+            (&[2][..], &[2][..])
+        );
+        assert_eq!(all[1].state, TaskState::Cancelled);
+        assert!(all[1].line().ends_with("not seen, cancelled"));
+    }
+}

@@ -1,0 +1,133 @@
+//! Which tasks other than coverage were seen, by whom and when, as the judge sees it: by the
+//! flown pieces and geometry of its own (D2.7 §3.2).
+
+use super::board::{LOOK_M, Sighting, diagonal_m};
+use super::motion::Piece;
+use super::pieces::Pieces;
+use skein_flight::airframe::Airframe;
+use skein_geometry::frame::{Point, Pose};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A task that is to be seen.
+#[derive(Clone, Debug)]
+struct Asked {
+    pieces: Pieces,
+    seen: Vec<bool>,
+    left: usize,
+    /// Who carries what it needs.
+    carriers: BTreeSet<u16>,
+    last: Option<Sighting>,
+}
+
+/// All tasks that were asked for, by number and revision.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TaskBoard {
+    tasks: BTreeMap<(u16, u32), Asked>,
+    /// How many are not seen yet.
+    open: usize,
+}
+
+impl TaskBoard {
+    /// One more; asked twice it is asked once.
+    pub(super) fn ask(
+        &mut self,
+        task: (u16, u32),
+        pieces: Vec<[Point; 4]>,
+        carriers: BTreeSet<u16>,
+    ) {
+        if pieces.is_empty() || self.tasks.contains_key(&task) {
+            return;
+        }
+        let asked = Asked {
+            seen: vec![false; pieces.len()],
+            left: pieces.len(),
+            pieces: Pieces::new(pieces),
+            carriers,
+            last: None,
+        };
+        self.tasks.insert(task, asked);
+        self.open += 1;
+    }
+
+    /// Who saw the last piece of a task and when, once all were seen.
+    pub(super) fn saw(&self, task: (u16, u32)) -> Option<Sighting> {
+        let asked = self.tasks.get(&task)?;
+        asked.last.filter(|_| asked.left == 0)
+    }
+
+    /// Looks along a flown piece.
+    pub(super) fn look(&mut self, uav: u16, airframe: &Airframe, piece: &Piece) {
+        if self.open == 0 {
+            return;
+        }
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a piece is as long as one step of the world"
+        )]
+        let n = (piece.length_m() / LOOK_M).ceil().clamp(1.0, 1e6) as u32;
+        let span_ms = piece.to_ms - piece.from_ms;
+        for k in 0..=n {
+            #[allow(clippy::cast_precision_loss, reason = "milliseconds of one step")]
+            let dt_s = span_ms as f64 / 1000.0 * f64::from(k) / f64::from(n);
+            let at_ms = piece.from_ms + span_ms * u64::from(k) / u64::from(n);
+            self.snap(airframe, piece.pose_after(dt_s), Sighting { at_ms, uav });
+        }
+    }
+
+    fn snap(&mut self, airframe: &Airframe, pose: Pose, sighting: Sighting) {
+        let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
+        let open = self.tasks.values_mut().filter(|t| t.left > 0);
+        for task in open.filter(|t| t.carriers.contains(&sighting.uav)) {
+            for i in task.pieces.near(pose.position(), diagonal_m(airframe)) {
+                if !task.seen[i] && task.pieces.held(i, pose, across_m, along_m) {
+                    task.seen[i] = true;
+                    task.left -= 1;
+                    task.last = Some(sighting);
+                }
+            }
+            self.open -= usize::from(task.left == 0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::fixture::airframe;
+    use skein_flight::trajectory::wind::Wind;
+
+    fn flown(uav: u16, from: (f64, f64), board: &mut TaskBoard) {
+        let piece = Piece {
+            from_ms: 0,
+            to_ms: 10_000,
+            start: Pose::new(Point::new(from.0, from.1), 0.0),
+            speed_mps: 13.0,
+            turn_rate_radps: 0.0,
+            wind: Wind::CALM,
+        };
+        board.look(uav, &airframe(), &piece);
+    }
+
+    #[test]
+    fn a_task_is_seen_once_all_its_pieces_are_by_who_carries_what_it_needs() {
+        let square = |x: f64| {
+            [(-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)].map(|(a, b)| Point::new(x + a, b))
+        };
+        let mut board = TaskBoard::default();
+        board.ask((0, 1), vec![square(60.0), square(200.0)], [1].into());
+        board.ask((0, 1), vec![square(0.0)], [1].into());
+        flown(2, (0.0, 0.0), &mut board);
+        flown(2, (100.0, 0.0), &mut board);
+        assert_eq!(board.saw((0, 1)), None, "it carries nothing of use");
+        flown(1, (0.0, 0.0), &mut board);
+        assert_eq!(board.saw((0, 1)), None);
+        flown(1, (100.0, 0.0), &mut board);
+        let seen = board.saw((0, 1)).unwrap();
+        assert!(
+            seen.uav == 1 && (4_000..8_000).contains(&seen.at_ms),
+            "{seen:?}"
+        );
+        assert_eq!((board.saw((0, 2)), board.open), (None, 0));
+    }
+}

@@ -1,0 +1,320 @@
+//! The flight that does one task: past a place or along a line, so that all that the task asks
+//! for is seen (D2.7 §3.2, §3.4, §3.5).
+//!
+//! Stations of a loop are seen from poses that are proved clear; a task is a few of them. A
+//! place is passed on the heading that costs its UAV least, a line is flown from the end from
+//! which it is done sooner. The way there and back is the executive's.
+//!
+//! # Guarantees
+//! The flight keeps the clearance of the mission, and from it the camera holds every piece.
+//!
+//! # Complexity
+//! For a place some Dubins curves and at most [`ROUTED`] routes; for a line that of a loop of
+//! its pieces.
+
+use crate::mission::{Mission, point_m};
+use crate::offload::MissionGeometry;
+use crate::wire::tasks::{Task, TaskKind};
+use skein_behaviors::executive::GivenFlight;
+use skein_flight::coverage::ring::LoopProblem;
+use skein_flight::coverage::ring::patch::Corners;
+use skein_flight::coverage::stations::targets::{LineTarget, PointTarget, Targets};
+use skein_flight::coverage::stations::{StationsProblem, build, pass_through, views};
+use skein_flight::trajectory::dubins::length_m;
+use skein_geometry::Curve;
+use skein_geometry::frame::Pose;
+use std::sync::Arc;
+
+/// Of the headings past a place, so many of the nearest are asked of the router.
+const ROUTED: usize = 4;
+
+/// What is flown before the first and after the last pose from which a line is seen, metres.
+const RUN_M: f64 = 5.0;
+
+/// A flight that does a task.
+#[derive(Clone, Debug)]
+pub struct Errand {
+    /// What has to be seen, each piece by one frame.
+    pub pieces: Arc<[Corners]>,
+    /// From where it is seen.
+    pub flight: GivenFlight,
+}
+
+/// Who asks for such a flight, and for what.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// The mission that is flown meanwhile.
+    pub geometry: Arc<MissionGeometry>,
+    /// What is to be done.
+    pub task: Task,
+    /// From where, and where it comes back to.
+    pub from: Pose,
+    /// How fast, m/s.
+    pub airspeed_mps: f64,
+}
+
+/// What a task asks to see; none for kinds that no mission flies yet.
+#[must_use]
+pub fn targets(task: &Task) -> Option<Targets> {
+    let places = task.places.iter();
+    let mut places = places.map(|p| point_m((p.east_mm, p.north_mm)));
+    let radius_m = f64::from(task.radius_mm) / 1000.0;
+    match task.kind {
+        TaskKind::Pinpoint => {
+            let at = places.next()?;
+            Some(Targets::Points(vec![PointTarget { at, radius_m }]))
+        }
+        TaskKind::Line => Some(Targets::Lines(vec![LineTarget {
+            way: places.collect(),
+            width_m: 2.0 * radius_m,
+        }])),
+        TaskKind::Area | TaskKind::Track | TaskKind::Relay => None,
+    }
+}
+
+impl Mission {
+    /// The pieces that a task asks to see, as a judge cuts them; none for kinds that no
+    /// mission flies.
+    #[must_use]
+    pub fn pieces_of(&self, task: &Task) -> Option<Vec<Corners>> {
+        Some(targets(task)?.pieces(self.lane_m()))
+    }
+
+    /// Whether a task could be done by anybody in this mission.
+    ///
+    /// # Errors
+    /// A sentence that says why not.
+    pub fn can_do(self: &Arc<Self>, task: &Task) -> Result<(), String> {
+        let zones = self.no_fly_zones().map_err(|e| e.to_string())?;
+        let problem = self.loop_problem(&zones).map_err(|e| e.to_string())?;
+        planned(&problem, task).map(drop)
+    }
+}
+
+/// The curves that do a task, either of which will do, and what is seen from them.
+fn planned(problem: &LoopProblem, task: &Task) -> Result<(Vec<Curve>, Vec<Corners>), String> {
+    let targets = targets(task).ok_or_else(|| {
+        format!(
+            "no mission flies tasks of the kind {:?} yet; expected a point or a line",
+            task.kind
+        )
+    })?;
+    let stations = StationsProblem::of_targets(problem, &targets);
+    let pieces = stations.stations.clone();
+    for n in 0..pieces.len() {
+        views(&stations, n).map_err(|why| match pieces.len() {
+            1 => format!("it cannot be seen: {why}"),
+            all => format!("piece {} of {all} of the line cannot be seen: {why}", n + 1),
+        })?;
+    }
+    if let [_] = pieces[..] {
+        let poses = views(&stations, 0)?;
+        return Ok((poses.into_iter().map(pass_through).collect(), pieces));
+    }
+    let along = along(&stations)?;
+    Ok((vec![along.reversed(), along], pieces))
+}
+
+/// The loop of a line, cut open where it is longest between two of its pieces.
+fn along(stations: &StationsProblem<'_>) -> Result<Curve, String> {
+    let closed = build(stations).map_err(|e| format!("the line cannot be flown: {e}"))?;
+    if let Some((_, why)) = closed.uncoverable().first() {
+        return Err(format!("a piece of the line cannot be flown: {why}"));
+    }
+    let cells = closed.cells();
+    let n = cells.len();
+    let onward_m = |i: usize| {
+        let (cell, next) = (&cells[i], &cells[(i + 1) % n]);
+        cell.curve.length_m() - cell.view_m + next.view_m
+    };
+    let longest = (0..n).max_by(|a, b| onward_m(*a).total_cmp(&onward_m(*b)));
+    let Some(last) = longest.filter(|_| n > 1) else {
+        return Err("the line has no length".to_owned());
+    };
+    let mut curve = Curve::empty();
+    for k in 1..=n {
+        let cell = &cells[(last + k) % n];
+        let run_m = RUN_M
+            .min(cell.view_m)
+            .min(cell.curve.length_m() - cell.view_m);
+        let (from_m, to_m) = (cell.view_m - run_m, cell.view_m + run_m);
+        let piece = match k {
+            1 => cell.curve.split_at(from_m).1,
+            _ if k == n => cell.curve.split_at(to_m).0,
+            _ => cell.curve.clone(),
+        };
+        curve.extend(&piece);
+    }
+    Ok(curve)
+}
+
+impl Request {
+    /// Plans the flight.
+    ///
+    /// # Errors
+    /// A sentence that says why there is none.
+    pub fn plan(&self) -> Result<Errand, String> {
+        let zones = self.geometry.router.zones();
+        let mission = &self.geometry.mission;
+        let problem = mission.loop_problem(zones).map_err(|e| e.to_string())?;
+        let (curves, pieces) = planned(&problem, &self.task)?;
+        let curve = self.cheapest(curves);
+        let curve = curve.ok_or("no way leads to it that keeps clear of the no-fly zones")?;
+        Ok(Errand {
+            pieces: pieces.into(),
+            flight: GivenFlight {
+                curve,
+                airspeed_mps: self.airspeed_mps,
+                lands: false,
+            },
+        })
+    }
+
+    /// Of some curves that with the shortest way there, along it and back to where the UAV is.
+    fn cheapest(&self, curves: Vec<Curve>) -> Option<Curve> {
+        let radius_m = self.geometry.mission.turn_radius_m();
+        let guess = |c: Curve| {
+            let (start, end) = c.start().zip(c.end())?;
+            let way_m = length_m(self.from, start, radius_m);
+            Some((way_m + length_m(end, self.from, radius_m), c))
+        };
+        let mut all: Vec<(f64, Curve)> = curves.into_iter().filter_map(guess).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let routed = |(_, c): (f64, Curve)| {
+            let (start, end) = c.start().zip(c.end())?;
+            let there = self.geometry.router.route(self.from, start).ok()?;
+            let back = self.geometry.router.route(end, self.from).ok();
+            // Who begins in a corner need not come back to it.
+            let back_m = back.map_or_else(|| length_m(end, self.from, radius_m), |b| b.length_m());
+            Some((there.length_m() + back_m, c))
+        };
+        // Where none of the nearest can be reached, one of the others may.
+        let mut found: Vec<(f64, Curve)> = Vec::new();
+        for one in all {
+            if found.len() == ROUTED {
+                break;
+            }
+            found.extend(routed(one));
+        }
+        let best = found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        best.map(|(_, c)| c)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::mission;
+    use crate::wire::tasks::TaskPlace;
+    use skein_flight::coverage::ring::patch::frame_holds;
+    use skein_geometry::frame::Point;
+
+    fn task(kind: TaskKind, places: &[(i32, i32)], radius_m: u32) -> Task {
+        let place = |(east_m, north_m): &(i32, i32)| TaskPlace {
+            east_mm: east_m * 1000,
+            north_mm: north_m * 1000,
+        };
+        Task {
+            revision: 1,
+            kind,
+            places: places.iter().map(place).collect(),
+            radius_mm: radius_m * 1000,
+            worth: 100,
+            ..Task::default()
+        }
+    }
+
+    fn zoned() -> Arc<Mission> {
+        let mut m = mission(1, 8, 6);
+        m.zones = vec![vec![
+            (200_000, 100_000),
+            (260_000, 100_000),
+            (260_000, 160_000),
+            (200_000, 160_000),
+        ]];
+        Arc::new(m)
+    }
+
+    fn errand(task: &Task, from: Pose) -> Result<Errand, String> {
+        let geometry = zoned().geometry().unwrap();
+        let request = Request {
+            geometry,
+            task: task.clone(),
+            from,
+            airspeed_mps: 13.0,
+        };
+        request.plan()
+    }
+
+    /// Which pieces some pose of a flight holds, looked at every metre.
+    fn seen(errand: &Errand) -> Vec<bool> {
+        let curve = &errand.flight.curve;
+        let holds = |corners: &Corners| {
+            (0..=curve.length_m() as u32).any(|m| {
+                let pose = curve.pose_at(f64::from(m)).unwrap();
+                frame_holds(corners, pose, 45.0, 35.0)
+            })
+        };
+        errand.pieces.iter().map(holds).collect()
+    }
+
+    #[test]
+    fn places_and_lines_are_seen_whole_and_clear_of_the_zones() {
+        let from = Pose::new(Point::new(20.0, 20.0), 0.0);
+        let zones = zoned().no_fly_zones().unwrap();
+        for (kind, places, radius_m) in [
+            (TaskKind::Pinpoint, vec![(100, 100)], 15),
+            (TaskKind::Pinpoint, vec![(900, -300)], 0),
+            // Beside the zone, nearer than the clearance.
+            (TaskKind::Pinpoint, vec![(195, 130)], 5),
+            (TaskKind::Line, vec![(20, 250), (330, 250)], 5),
+            (
+                TaskKind::Line,
+                vec![(20, 40), (180, 60), (330, 70), (330, 250)],
+                0,
+            ),
+        ] {
+            let task = task(kind, &places, radius_m);
+            let errand = errand(&task, from).unwrap();
+            assert!(!errand.pieces.is_empty());
+            assert!(!seen(&errand).contains(&false), "{places:?}");
+            assert!(zones.is_clear(&errand.flight.curve, 7.99), "{places:?}");
+            assert!(errand.flight.curve.max_curvature_per_m() < 1.0 / 23.4);
+            assert!(errand.flight.curve.largest_gap_m() < 1e-6);
+            zoned().can_do(&task).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_line_is_begun_at_the_end_from_which_it_is_done_sooner() {
+        let line = task(TaskKind::Line, &[(20, 250), (330, 250)], 0);
+        for (x, begins_near) in [(-100.0, 20.0), (450.0, 330.0)] {
+            let facing = if x < 0.0 { 0.0 } else { core::f64::consts::PI };
+            let errand = errand(&line, Pose::new(Point::new(x, 250.0), facing)).unwrap();
+            let start = errand.flight.curve.start().unwrap();
+            assert!((start.east_m - begins_near).abs() < 40.0, "{start:?}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_seen_is_refused_with_the_reason() {
+        let from = Pose::new(Point::new(20.0, 20.0), 0.0);
+        for (task, why) in [
+            (task(TaskKind::Pinpoint, &[(230, 130)], 5), "no-fly zone"),
+            (
+                task(TaskKind::Pinpoint, &[(100, 100)], 60),
+                "larger than what one frame of the camera holds",
+            ),
+            (
+                task(TaskKind::Line, &[(205, 105), (255, 155)], 0),
+                "of the line cannot be seen",
+            ),
+            (task(TaskKind::Relay, &[(100, 100)], 0), "no mission flies"),
+            (task(TaskKind::Pinpoint, &[(90_000, 0)], 0), ""),
+        ] {
+            let said = errand(&task, from).unwrap_err();
+            assert!(said.contains(why), "{said}");
+            assert!(zoned().can_do(&task).is_err());
+        }
+    }
+}

@@ -1,0 +1,624 @@
+//! Tasks other than coverage in a mission (D2.7 §1.2.3, §1.3, §3.2): what of them this peer
+//! knows, its part in the auction, and the one that its UAV flies.
+//!
+//! | event | what follows |
+//! |---|---|
+//! | a task is heard, revised, over | the auction is told while a task is open |
+//! | a bundle is heard | likewise; what it says to be done is done |
+//! | a period passes | likewise, with the present offer and who lives |
+//! | the auction gives a task to fly | its flight is planned beside the loop |
+//! | the flight is planned | it is flown between two cells of the section |
+//! | all of it is seen | done: told, and the UAV is free for the next |
+//! | the flight is over and not all is seen, there is none | once more, then others are asked to relieve it |
+//! | the auction drops it, the fuel is due, another life begins | it is left |
+//! | its time is over | it is expired |
+//! | a ground station: somebody did a task of its operator, its time is over | that is told in the task's next revision |
+//!
+//! While no task is open nothing is said.
+
+use crate::beliefs::Beliefs;
+use crate::config::{PeerConfig, Role};
+use crate::cooperation::Situation;
+use crate::effect::{Effect, Effects, PendingJob};
+use crate::errand::{Errand, Request};
+use crate::input::Time;
+use crate::mission::mm;
+use crate::mission_state::{MissionState, speed_mmps};
+use crate::offload::Job;
+use crate::output::{Report, TaskNews};
+use crate::protocol::auction::flown::RoutedTime;
+use crate::protocol::auction::{self, Auction, Event, KNOWN_MAX, Version};
+use crate::protocol::runs::legs_of;
+use crate::wire::codec::Body;
+use crate::wire::limits::{DURATION_MAX_MS, PEERS_MAX};
+use crate::wire::message::{Member, Record};
+use crate::wire::tasks::{
+    Bundle, BundleTask, Offer, Progress, Task, TaskId, TaskState, sensor_name,
+};
+use crate::{Incarnation, PeerId};
+use skein_behaviors::Order;
+use skein_behaviors::executive::detour::Watched;
+use skein_flight::airframe::Airframe;
+use skein_geometry::hash::Fnv;
+use skein_geometry::math::wrap_pi;
+use std::collections::{BTreeMap, BTreeSet};
+use std::hash::{Hash, Hasher};
+
+/// A task whose flight did not see all of it is flown once more, then others are asked.
+const MAX_TRIES: u8 = 2;
+
+/// What nobody could do is offered for again after so many beacon periods, where that may
+/// have changed: a section is flown meanwhile.
+const AGAIN_PERIODS: u64 = 20;
+
+/// A task that is known.
+#[derive(Clone, Debug)]
+pub(crate) struct Known {
+    pub task: Task,
+    /// When it was heard of, or asked for here.
+    pub since: Time,
+    /// Who did it, and when that was known here.
+    pub done: Option<(u16, Time)>,
+    /// Whether people were told that nobody can do it.
+    hopeless_told: bool,
+}
+
+impl Known {
+    /// Whether somebody has yet to do it.
+    pub fn is_open(&self) -> bool {
+        self.task.is_open() && self.done.is_none()
+    }
+}
+
+/// The task that the UAV flies.
+#[derive(Clone, Debug)]
+struct Flown {
+    id: TaskId,
+    revision: u32,
+    tries: u8,
+    /// Whether its flight is the goal.
+    is_planned: bool,
+}
+
+/// Tasks as one peer has them.
+#[derive(Debug)]
+pub(crate) struct Tasking {
+    me: u16,
+    flies: Option<Airframe>,
+    sensors: u32,
+    pub(crate) auction: Auction,
+    pub(crate) known: BTreeMap<TaskId, Known>,
+    pub(crate) bundles: BTreeMap<PeerId, (Version, Bundle)>,
+    /// What the auction was not told yet.
+    news: BTreeSet<TaskId>,
+    heard: BTreeSet<PeerId>,
+    flown: Option<Flown>,
+    /// The version of the bundle that was spoken last.
+    spoken: Option<Version>,
+    /// The life in which the tasks of this peer's operator were spoken.
+    told_in: Incarnation,
+    last_period: Time,
+    last_again: Time,
+    was_able: bool,
+}
+
+impl Tasking {
+    /// Nothing is known.
+    pub fn new(config: &PeerConfig) -> Self {
+        Self {
+            me: config.id.0,
+            flies: config.airframe.filter(|_| config.role == Role::Uav),
+            sensors: config.sensors,
+            auction: Auction::new(config.id, 0, Offer::default()),
+            known: BTreeMap::new(),
+            bundles: BTreeMap::new(),
+            news: BTreeSet::new(),
+            heard: BTreeSet::new(),
+            flown: None,
+            spoken: None,
+            told_in: 0,
+            last_period: Time(0),
+            last_again: Time(0),
+            was_able: false,
+        }
+    }
+
+    /// A life begins, or another process silences this one: what it held is void.
+    pub fn void_ownership(&mut self, me: Member, state: Option<&mut MissionState>) {
+        self.auction.begin_life(me.incarnation);
+        self.spoken = None;
+        self.leave(state);
+    }
+
+    /// The UAV is on no errand any more.
+    fn leave(&mut self, state: Option<&mut MissionState>) {
+        if self.flown.take().is_some()
+            && let Some(state) = state
+        {
+            state.set_errand(None);
+        }
+    }
+
+    /// Who this peer is.
+    pub fn me_id(&self) -> u16 {
+        self.me
+    }
+
+    /// A task was asked for at this time, not when it was heard of.
+    pub fn was_asked(&mut self, id: TaskId, since: Time) {
+        if let Some(known) = self.known.get_mut(&id) {
+            known.since = since;
+        }
+    }
+
+    /// The task that the UAV flies to.
+    pub fn flown(&self) -> Option<TaskId> {
+        self.flown.as_ref().map(|f| f.id)
+    }
+
+    /// Whether a task is open that somebody can do, as far as is known.
+    pub fn has_work(&self) -> bool {
+        let hopeless = self.auction.unassigned();
+        let mut open = self.known.iter().filter(|(_, k)| k.is_open());
+        open.any(|(id, _)| !hopeless.contains(id))
+    }
+
+    /// What it holds, and what of all it knows to be open that somebody can do.
+    pub fn fill(&self, beliefs: &mut Beliefs) {
+        let held = self.auction.held().iter();
+        beliefs.tasks = held.map(|t| (t.task, t.revision, t.progress)).collect();
+        let hopeless = self.auction.unassigned();
+        let open = self.known.iter().filter(|(_, k)| k.is_open());
+        let open = open.filter(|(id, _)| !hopeless.contains(id));
+        beliefs.open_tasks = open.map(|(id, k)| (*id, k.task.revision)).collect();
+        beliefs.loads.push(("tasks", self.known.len(), KNOWN_MAX));
+        beliefs
+            .loads
+            .push(("bundles", self.bundles.len(), PEERS_MAX));
+    }
+
+    /// Whether anything is to be settled or flown.
+    fn is_active(&self) -> bool {
+        let claims = |t: &BundleTask| t.progress != Progress::Done;
+        self.known.values().any(Known::is_open)
+            || self.flown.is_some()
+            || self.auction.held().iter().any(claims)
+    }
+
+    /// A record of another peer.
+    pub fn hear(&mut self, now: Time, record: &Record, body: &Body) -> Effects {
+        match body {
+            Body::Task(task) => {
+                let id = TaskId {
+                    author: record.author,
+                    number: record.subject,
+                };
+                self.learn(now, id, task.clone())
+            }
+            Body::Bundle(bundle) => {
+                let author = PeerId(record.author);
+                let version = (record.incarnation, record.seq);
+                let held = self.bundles.get(&author).map(|(v, _)| *v);
+                let room = self.bundles.len() < PEERS_MAX;
+                if author.0 == self.me || !held.map_or(room, |v| version > v) {
+                    return Effects::new();
+                }
+                let mut effects = Effects::new();
+                for (task, revision) in done_in(bundle) {
+                    effects.extend(self.note_done(now, task, revision, author.0));
+                }
+                self.bundles.insert(author, (version, bundle.clone()));
+                self.heard.insert(author);
+                effects.push(Effect::Negotiate);
+                effects
+            }
+            _ => Effects::new(),
+        }
+    }
+
+    /// A task, a change of one, or its end.
+    pub fn learn(&mut self, now: Time, id: TaskId, task: Task) -> Effects {
+        let held = self.known.get(&id);
+        let room = self.known.len() < KNOWN_MAX;
+        if !held.map_or(room, |k| task > k.task) {
+            return Effects::new();
+        }
+        let asked = task.revision_as_asked();
+        let same = held.filter(|k| k.task.revision_as_asked() == asked);
+        let by = (task.state == TaskState::Done).then_some((task.done_by, now));
+        let known = Known {
+            since: same.map_or(now, |k| k.since),
+            done: same.and_then(|k| k.done).or(by),
+            hopeless_told: false,
+            task,
+        };
+        let news = match known.task.state {
+            TaskState::Open => TaskNews::Asked,
+            TaskState::Done => TaskNews::Over(TaskState::Done),
+            over => TaskNews::Over(over),
+        };
+        let report = report(id, &known.task, news);
+        self.known.insert(id, known);
+        self.news.insert(id);
+        vec![report, Effect::Negotiate]
+    }
+
+    fn note_done(&mut self, now: Time, id: TaskId, revision: u32, by: u16) -> Option<Effect> {
+        let known = self.known.get_mut(&id)?;
+        if known.done.is_some() || known.task.revision_as_asked() != revision {
+            return None;
+        }
+        known.done = Some((by, now));
+        Some(report(id, &known.task, TaskNews::DoneBy(PeerId(by))))
+    }
+
+    /// Tasks whose time is over are over for this peer, whoever says so.
+    fn expire(&mut self, now: Time) -> Vec<TaskId> {
+        let is_late = |k: &Known| {
+            let within_ms = u64::from(k.task.within_ms);
+            k.is_open() && within_ms > 0 && now.since_ms(k.since) >= within_ms
+        };
+        let late = self.known.iter_mut().filter(|(_, k)| is_late(k));
+        let mut expired = Vec::new();
+        for (id, known) in late {
+            known.task.state = TaskState::Expired;
+            self.news.insert(*id);
+            expired.push(*id);
+        }
+        expired
+    }
+
+    /// Looks at everything that depends on time, and at what was heard.
+    pub fn tick(&mut self, s: &Situation<'_>, order: Order, state: &mut MissionState) -> Effects {
+        if s.role == Role::GroundStation {
+            state.has_tasks = self.known.values().any(Known::is_open);
+            return self.tell_of_tasks(s);
+        }
+        let mut effects: Effects = self
+            .expire(s.now)
+            .iter()
+            .filter_map(|id| Some((*id, &self.known.get(id)?.task)))
+            .map(|(id, task)| report(id, task, TaskNews::Over(TaskState::Expired)))
+            .collect();
+        if self.is_active() && s.speaks {
+            effects.extend(self.settle(s, order, state));
+        }
+        // That the last task is done is said, too.
+        effects.extend(self.speak(s));
+        state.has_tasks = self.has_work();
+        effects
+    }
+
+    /// What this UAV can offer.
+    fn present(&self, s: &Situation<'_>, state: &MissionState) -> Option<Offer> {
+        let (percept, executive) = (s.percept?, state.executive.as_ref()?);
+        let can = state.can_fly_plans(s)
+            && !s.is_silent
+            && !state.geometry.mission.cancelled
+            && state.separation.is_none();
+        if !can {
+            return None;
+        }
+        let spendable_ms = state.spendable_ms(Some(percept));
+        let sections = &state.negotiation.sections;
+        let section_ms = if sections.plan().is_empty() {
+            0
+        } else {
+            let legs = legs_of(sections.plan(), sections.cells());
+            let times = executive.schedule(&legs, &|c| !sections.covered().contains(c));
+            times.last().map_or(0, |(_, ms)| *ms).min(DURATION_MAX_MS)
+        };
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "a heading is within ±31,416 of these"
+        )]
+        let course_e4 = (wrap_pi(percept.pose.heading_rad) * 10_000.0).round() as i32;
+        Some(Offer {
+            east_mm: mm(percept.pose.east_m),
+            north_mm: mm(percept.pose.north_m),
+            course_e4,
+            speed_mmps: speed_mmps(executive).max(1),
+            radius_mm: state.geometry.mission.turn_radius_mm,
+            endurance_ms: spendable_ms.saturating_sub(section_ms).min(DURATION_MAX_MS),
+            sensors: self.sensors,
+            section_ms,
+        })
+    }
+
+    /// Tells the auction what is new, and carries out what follows.
+    fn settle(&mut self, s: &Situation<'_>, order: Order, state: &mut MissionState) -> Effects {
+        let mut events = Vec::new();
+        for id in core::mem::take(&mut self.news) {
+            if let Some(known) = self.known.get(&id) {
+                events.push(Event::Task(id, known.task.clone()));
+            }
+        }
+        for author in core::mem::take(&mut self.heard) {
+            if let Some((version, bundle)) = self.bundles.get(&author) {
+                events.push(Event::Heard(author, *version, bundle.clone()));
+            }
+        }
+        let is_period = s.now.since_ms(self.last_period) >= s.membership.interval_ms();
+        let offer = self.present(s, state);
+        let able = offer.is_some();
+        if is_period || able != self.was_able {
+            let live = s.membership.live().map(|(id, _)| id);
+            let uav = |id: &u16| {
+                let info = s.membership.info(*id);
+                info.is_some_and(|i| !i.ground_station)
+            };
+            events.push(Event::Live(live.filter(uav).map(PeerId).collect()));
+            events.push(Event::Map(map_of(state)));
+            events.push(Event::Present(offer.unwrap_or_default()));
+        }
+        if self.was_able && !able {
+            events.push(Event::GiveUp);
+            self.leave(Some(state));
+        }
+        self.was_able = able;
+        if is_period {
+            self.last_period = s.now;
+            let diameter = s.membership.diameter(s.now);
+            events.push(Event::Period(u8::try_from(diameter).unwrap_or(u8::MAX)));
+            if self.may_offer_anew(s, offer.as_ref()) {
+                events.push(Event::OfferAnew);
+            }
+        }
+        if self.flown.is_none() && able && order == Order::Resume {
+            events.push(Event::Free);
+        }
+        let mut effects = self.handle(events, state);
+        // Without a percept, or while a mission changes, there was no flight to plan.
+        if self.flown.as_ref().is_some_and(|f| !f.is_planned) {
+            effects.extend(self.plan(state));
+        }
+        effects.extend(self.tell_hopeless());
+        effects
+    }
+
+    /// Whether a task that nobody could do is in the reach of this UAV by now.
+    fn may_offer_anew(&mut self, s: &Situation<'_>, offer: Option<&Offer>) -> bool {
+        let wait_ms = AGAIN_PERIODS * s.membership.interval_ms();
+        if s.now.since_ms(self.last_again) < wait_ms {
+            return false;
+        }
+        let Some(offer) = offer else { return false };
+        let more = offer.endurance_ms > self.auction.bundle().1.offer.endurance_ms;
+        let has = |id: &TaskId| {
+            let known = self.known.get(id);
+            known.is_some_and(|k| k.is_open() && carries(offer.sensors, k.task.sensor))
+        };
+        let again = more && self.auction.unassigned().iter().any(has);
+        if again {
+            self.last_again = s.now;
+        }
+        again
+    }
+
+    /// Lets the auction handle events; what it gives to fly is planned.
+    fn handle(&mut self, events: Vec<Event>, state: &mut MissionState) -> Effects {
+        let geometry = std::sync::Arc::clone(&state.geometry);
+        let ways = RoutedTime::new(&geometry.router);
+        let mut effects = Effects::new();
+        for effect in self.auction.handle(events, &ways) {
+            match effect {
+                auction::Effect::Publish => {}
+                auction::Effect::Drop(id) => {
+                    if self.flown() == Some(id) {
+                        self.leave(Some(state));
+                        effects.extend(self.told(id, TaskNews::Left));
+                    }
+                }
+                auction::Effect::Fly(id) => {
+                    let revision = self.known.get(&id).map_or(0, |k| k.task.revision);
+                    self.flown = Some(Flown {
+                        id,
+                        revision,
+                        tries: 0,
+                        is_planned: false,
+                    });
+                    effects.extend(self.told(id, TaskNews::Flies));
+                    effects.extend(self.plan(state));
+                }
+            }
+        }
+        effects
+    }
+
+    /// Asks for the flight that does the task.
+    fn plan(&self, state: &MissionState) -> Option<Effect> {
+        let flown = self.flown.as_ref()?;
+        let task = &self.known.get(&flown.id)?.task;
+        let (executive, airframe) = (state.executive.as_ref()?, self.flies?);
+        let request = Request {
+            geometry: std::sync::Arc::clone(&state.geometry),
+            task: task.clone(),
+            from: executive.pose()?,
+            airspeed_mps: airframe.cruise_mps,
+        };
+        let pending = PendingJob::Errand(flown.id, flown.revision, flown.tries);
+        Some(Effect::Compute(pending, Job::Errand(Box::new(request))))
+    }
+
+    /// The mission changed: what is flown is planned anew.
+    pub fn plan_anew(&mut self, state: &mut MissionState) -> Option<Effect> {
+        let flown = self.flown.as_mut()?;
+        flown.is_planned = false;
+        state.set_errand(None);
+        self.plan(state)
+    }
+
+    /// The flight of a task is planned, or there is none.
+    pub fn planned(
+        &mut self,
+        (id, revision): (TaskId, u32),
+        planned: Result<Errand, String>,
+        state: &mut MissionState,
+    ) -> Effects {
+        let wanted = |f: &&mut Flown| f.id == id && f.revision == revision && !f.is_planned;
+        let Some(flown) = self.flown.as_mut().filter(wanted) else {
+            return Effects::new();
+        };
+        match planned {
+            Ok(errand) => {
+                flown.is_planned = true;
+                state.set_errand(Some((errand.flight, Watched::new(errand.pieces))));
+                vec![Effect::Negotiate]
+            }
+            Err(why) => self.relieve(&why, state),
+        }
+    }
+
+    /// Others are asked to do what this UAV could not.
+    fn relieve(&mut self, why: &str, state: &mut MissionState) -> Effects {
+        let Some(id) = self.flown() else {
+            return Effects::new();
+        };
+        self.leave(Some(state));
+        let name = self
+            .known
+            .get(&id)
+            .map_or_else(String::new, |k| k.task.name());
+        let text = format!("the task {name:?} is left to others: {why}");
+        let mut effects = vec![Effect::Alarm(text)];
+        effects.extend(self.handle(vec![Event::Relieve(id)], state));
+        effects.push(Effect::Negotiate);
+        effects
+    }
+
+    /// The camera saw so many pieces of what is flown to.
+    pub fn sighted(&mut self, now: Time, whole: bool, state: &mut MissionState) -> Effects {
+        let Some(flown) = self.flown.clone().filter(|_| whole) else {
+            return Effects::new();
+        };
+        self.leave(Some(state));
+        if let Some(known) = self.known.get_mut(&flown.id) {
+            known.done = Some((self.me, now));
+        }
+        let mut effects: Effects = self.told(flown.id, TaskNews::Seen).into_iter().collect();
+        effects.extend(self.handle(vec![Event::Finished(flown.id)], state));
+        effects.push(Effect::Negotiate);
+        effects
+    }
+
+    /// The flight is over, and not all of it was seen.
+    pub fn flown_in_vain(&mut self, state: &mut MissionState) -> Effects {
+        let Some(flown) = self.flown.as_mut().filter(|f| f.is_planned) else {
+            return Effects::new();
+        };
+        flown.tries += 1;
+        if flown.tries >= MAX_TRIES {
+            return self.relieve("its flight was cut short, or saw not all of it", state);
+        }
+        self.plan_anew(state).into_iter().collect()
+    }
+
+    /// The bundle, where it is new and this peer speaks.
+    fn speak(&mut self, s: &Situation<'_>) -> Option<Effect> {
+        let (version, bundle) = self.auction.bundle();
+        let is_news = s.speaks && version.1 > 0 && self.spoken != Some(version);
+        is_news.then(|| {
+            self.spoken = Some(version);
+            Effect::Speak(0, Body::Bundle(bundle.clone()))
+        })
+    }
+
+    fn told(&self, id: TaskId, news: TaskNews) -> Option<Effect> {
+        let known = self.known.get(&id)?;
+        Some(report(id, &known.task, news))
+    }
+
+    /// People hear once that nobody can do a task.
+    fn tell_hopeless(&mut self) -> Effects {
+        if !self.auction.is_agreed() {
+            return Effects::new();
+        }
+        let mut effects = Effects::new();
+        for id in self.auction.unassigned() {
+            let Some(known) = self.known.get_mut(id).filter(|k| k.is_open()) else {
+                continue;
+            };
+            if !core::mem::replace(&mut known.hopeless_told, true) {
+                let why = why_nobody(&known.task, self.auction.offers());
+                effects.push(report(*id, &known.task, TaskNews::NobodyCan(why)));
+            }
+        }
+        effects
+    }
+
+    /// A ground station says its operator's tasks in each life, and what became of them.
+    fn tell_of_tasks(&mut self, s: &Situation<'_>) -> Effects {
+        let mut effects = Effects::new();
+        let expired = self.expire(s.now);
+        let mut over: Vec<(TaskId, Task)> = Vec::new();
+        for (id, known) in self.known.iter_mut().filter(|(id, _)| id.author == self.me) {
+            let done = known.done.filter(|_| known.task.is_open());
+            if done.is_none() && !expired.contains(id) {
+                continue;
+            }
+            let after_ms = done.map_or(s.now, |(_, at)| at).since_ms(known.since);
+            if let Some((by, _)) = done {
+                (known.task.state, known.task.done_by) = (TaskState::Done, by);
+            }
+            known.task.revision = known.task.revision.saturating_add(1);
+            known.task.over_after_ms = u32::try_from(after_ms).unwrap_or(DURATION_MAX_MS);
+            over.push((*id, known.task.clone()));
+        }
+        for (id, task) in over {
+            effects.push(report(id, &task, TaskNews::Over(task.state)));
+            effects.push(Effect::Speak(id.number, Body::Task(task)));
+        }
+        if s.speaks && self.told_in != s.me.incarnation {
+            self.told_in = s.me.incarnation;
+            let own = self.known.iter().filter(|(id, _)| id.author == self.me);
+            effects.extend(own.map(|(id, k)| Effect::Speak(id.number, Body::Task(k.task.clone()))));
+        }
+        effects
+    }
+}
+
+/// What a bundle says to be done, with the revisions.
+fn done_in(bundle: &Bundle) -> Vec<(TaskId, u32)> {
+    let since = bundle.tasks.iter();
+    let since = since.filter(|t| t.progress == Progress::Done);
+    let since = since.map(|t| (t.task, t.revision));
+    let before = bundle.done.iter().map(|d| (d.task, d.revision));
+    before.chain(since).collect()
+}
+
+fn report(id: TaskId, task: &Task, news: TaskNews) -> Effect {
+    Effect::Report(Report::Task {
+        id,
+        revision: task.revision_as_asked(),
+        name: task.name(),
+        news,
+    })
+}
+
+/// Whether somebody with these sensors carries the one that is needed.
+pub(crate) fn carries(sensors: u32, needed: u8) -> bool {
+    let bit = u32::from(needed).checked_sub(1);
+    bit.is_none_or(|bit| sensors >> bit.min(31) & 1 == 1)
+}
+
+/// Why nobody does a task, as far as the offers of all tell.
+pub(crate) fn why_nobody<'a>(task: &Task, offers: impl Iterator<Item = &'a Offer>) -> String {
+    let able: Vec<&Offer> = offers.filter(|o| o.speed_mmps > 0).collect();
+    if able.is_empty() {
+        "no UAV takes tasks".to_owned()
+    } else if !able.iter().any(|o| carries(o.sensors, task.sensor)) {
+        format!("no UAV carries {}", sensor_name(task.sensor))
+    } else {
+        "those who could have not the endurance beside their sections, or found no way".to_owned()
+    }
+}
+
+/// Identifies the zones by which ways are reckoned.
+fn map_of(state: &MissionState) -> u32 {
+    let mission = &state.geometry.mission;
+    let mut hash = Fnv::new();
+    (&mission.zones, &mission.added_zones).hash(&mut hash);
+    (mission.turn_radius_mm, mission.clearance_mm).hash(&mut hash);
+    let hash = Hasher::finish(&hash);
+    u32::try_from((hash ^ hash >> 32) & 0xffff_ffff).unwrap_or(0)
+}
