@@ -9,11 +9,14 @@ use crate::nfz::NfzArgs;
 use crate::observe::ObserveArgs;
 use crate::peer::PeerArgs;
 use crate::plan::PlanArgs;
+use crate::replay::ReplayArgs;
 use crate::sim::SimArgs;
 use crate::trial::TrialArgs;
+use crate::watch::WatchArgs;
 use crate::why::WhyArgs;
 use crate::{
-    bench, chaos, check, console, exit, mission, nfz, observe, peer, plan, sim, trial, why,
+    bench, chaos, check, console, exit, log, mission, nfz, observe, peer, plan, replay, sim, trial,
+    watch, why,
 };
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -54,6 +57,10 @@ pub enum Verb {
     Nfz(NfzArgs),
     /// What a peer does and why, at its console.
     Why(WhyArgs),
+    /// Draws a map of a running swarm, from what it says on the air.
+    Watch(WatchArgs),
+    /// Plays a recorded run on this terminal or on a page.
+    Replay(ReplayArgs),
     /// Shows what the swarm publishes.
     Observe(ObserveArgs),
     /// Checks a scenario before it is flown.
@@ -81,7 +88,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
     };
     tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(std::io::stderr)
+        .with_writer(|| log::Log)
         .init();
     match &cli.verb {
         Verb::Trial(args) => trial::run(args),
@@ -92,6 +99,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Mission(args) => mission::run(args),
         Verb::Nfz(args) => nfz::run(args),
         Verb::Why(args) => why::run(args),
+        Verb::Watch(args) => watch::run(args),
+        Verb::Replay(args) => replay::run(args),
         Verb::Observe(args) => observe::run(args),
         Verb::Check(args) => check::run(args),
         Verb::Plan(args) => Ok(plan::run(args)?),

@@ -2,6 +2,8 @@
 //! summary.
 
 use crate::check::Format;
+use crate::onlookers::{Map, Onlookers, Shows, stop_when_asked};
+use crate::page::{Page, WebArgs, hello};
 use crate::scenario_args::ScenarioArgs;
 use crate::{chaos, exit};
 use anyhow::Context;
@@ -9,8 +11,14 @@ use clap::Args;
 use skein_broker::batch::{self, Batch};
 use skein_netsim::Prepared;
 use skein_netsim::runs::{self, Wanted};
+use skein_netsim::swarm::Outcome;
 use skein_netsim::timeline::timeline;
+use skein_recording::{Sink, simulated};
 use skein_scenario::Seeds;
+use skein_terminal::picture::Knowledge;
+use skein_terminal::{Pace, screen};
+use skein_view::lines::Lines;
+use skein_web::Mode;
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write as _};
 use std::num::NonZeroUsize;
@@ -52,6 +60,17 @@ pub struct SimArgs {
     /// How the result is printed.
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
+    /// Writes all that a single run shows into this file, for `skein replay`: one JSON object a
+    /// line.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["seeds", "why"])]
+    pub lines: Option<PathBuf>,
+    /// Shows a single run as a map on this terminal, at so many scenario seconds per second.
+    #[arg(long, value_name = "X", num_args = 0..=1, default_missing_value = "8",
+        value_parser = clap::value_parser!(u32).range(1..=256), conflicts_with_all = ["seeds", "why"])]
+    pub watch: Option<u32>,
+    /// Where a single run is shown.
+    #[command(flatten)]
+    pub web: WebArgs,
 }
 
 /// Runs the verb: the result on stdout, progress on stderr.
@@ -125,11 +144,20 @@ fn one(args: &SimArgs, prepared: &Prepared) -> anyhow::Result<bool> {
         events: true,
         baseline: true,
     };
-    let outcome = if args.storm {
-        let free_ms = runs::failure_free_makespan_ms(prepared);
-        runs::storm(prepared, seed, free_ms, wanted)
+    let page = page(args, prepared, seed)?;
+    let map = map(args, prepared, seed)?;
+    let storm = args.storm.then(|| runs::failure_free_makespan_ms(prepared));
+    let lines = lines(args)?;
+    let outcome = if page.is_none() && map.is_none() && lines.is_none() {
+        unseen(prepared, seed, storm, wanted)
     } else {
-        runs::planned(prepared, seed, wanted)
+        let mut sinks: Vec<Box<dyn Sink>> = page.iter().map(Page::sink).collect();
+        sinks.extend(lines);
+        let (map, sink) = map.unzip();
+        sinks.extend(sink);
+        let outcome = simulated::fly(prepared, seed, storm, wanted, &mut Onlookers::new(sinks))?;
+        map.map(Map::join).transpose().context("the map")?;
+        outcome
     };
     if let Some(path) = &args.history {
         let file = std::fs::File::create(path)
@@ -149,7 +177,62 @@ fn one(args: &SimArgs, prepared: &Prepared) -> anyhow::Result<bool> {
     if !report.passed {
         eprintln!("replay: {}", replay(args, seed));
     }
+    if let Some(page) = page {
+        page.stay();
+    }
     Ok(report.passed)
+}
+
+/// A run that nobody looks at.
+fn unseen(prepared: &Prepared, seed: u64, storm: Option<u64>, wanted: Wanted) -> Outcome {
+    match storm {
+        Some(free_ms) => runs::storm(prepared, seed, free_ms, wanted),
+        None => runs::planned(prepared, seed, wanted),
+    }
+}
+
+/// The file of a single run, if one is wanted.
+fn lines(args: &SimArgs) -> anyhow::Result<Option<Box<dyn Sink>>> {
+    let Some(path) = &args.lines else {
+        return Ok(None);
+    };
+    let file =
+        std::fs::File::create(path).with_context(|| format!("cannot create {}", path.display()))?;
+    Ok(Some(Box::new(Lines(BufWriter::new(file)))))
+}
+
+/// The map of a single run on this terminal, if one is wanted.
+fn map(
+    args: &SimArgs,
+    prepared: &Prepared,
+    seed: u64,
+) -> anyhow::Result<Option<(Map, Box<dyn Sink>)>> {
+    let Some(speed) = args.watch else {
+        return Ok(None);
+    };
+    anyhow::ensure!(
+        screen::is_one(),
+        "--watch draws on a terminal, and here is none; --web shows the run on a page"
+    );
+    let opened = Map::open(Shows {
+        title: format!("{}, seed {seed}", prepared.spec.name),
+        pace: Pace::Play(speed),
+        knowledge: Knowledge::World,
+        trial: None,
+    })?;
+    stop_when_asked(opened.0.stop())?;
+    Ok(Some(opened))
+}
+
+/// The page of a single run, if one is wanted.
+fn page(args: &SimArgs, prepared: &Prepared, seed: u64) -> anyhow::Result<Option<Page>> {
+    let title = format!("{}, seed {seed}", prepared.spec.name);
+    let hello = hello(Mode::Sim, title, format!("{} --web", replay(args, seed)));
+    Ok(args
+        .web
+        .web
+        .map(|port| Page::open(port, &hello))
+        .transpose()?)
 }
 
 fn many(args: &SimArgs, prepared: &Prepared, seeds: Seeds) -> anyhow::Result<bool> {
