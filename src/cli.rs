@@ -13,13 +13,15 @@ use crate::plan::PlanArgs;
 use crate::report::ReportArgs;
 use crate::schema::SchemaArgs;
 use crate::shell::{CompletionsArgs, ManArgs};
+use crate::replay::ReplayArgs;
 use crate::sim::SimArgs;
 use crate::task::TaskArgs;
 use crate::trial::TrialArgs;
+use crate::watch::WatchArgs;
 use crate::why::WhyArgs;
 use crate::{
-    bench, chaos, check, console, exit, export, mission, nfz, observe, peer, plan, report, schema,
-    shell, sim, task, trial, why,
+    bench, chaos, check, console, exit, export, log, mission, nfz, observe, peer, plan, replay, report,
+    schema, shell, sim, task, trial, watch, why,
 };
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -62,6 +64,10 @@ pub enum Verb {
     Task(TaskArgs),
     /// What a peer does and why, at its console.
     Why(WhyArgs),
+    /// Draws a map of a running swarm, from what it says on the air.
+    Watch(WatchArgs),
+    /// Plays a recorded run on this terminal or on a page.
+    Replay(ReplayArgs),
     /// Shows what the swarm publishes.
     Observe(ObserveArgs),
     /// What the records of the swarm look like, as JSON Schemas.
@@ -99,7 +105,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
     };
     tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(std::io::stderr)
+        .with_writer(|| log::Log)
         .init();
     match &cli.verb {
         Verb::Trial(args) => trial::run(args),
@@ -111,6 +117,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Nfz(args) => nfz::run(args),
         Verb::Task(args) => task::run(args),
         Verb::Why(args) => why::run(args),
+        Verb::Watch(args) => watch::run(args),
+        Verb::Replay(args) => replay::run(args),
         Verb::Observe(args) => observe::run(args),
         Verb::Schema(args) => schema::run(args),
         Verb::Check(args) => check::run(args),

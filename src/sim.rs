@@ -2,6 +2,8 @@
 //! summary.
 
 use crate::check::Format;
+use crate::onlookers::{Map, Onlookers, Shows, stop_when_asked};
+use crate::page::{Page, WebArgs, hello};
 use crate::scenario_args::ScenarioArgs;
 use crate::{chaos, exit};
 use anyhow::Context;
@@ -13,12 +15,17 @@ use skein_netsim::swarm::Outcome;
 use skein_netsim::timeline::timeline;
 use skein_recording::model::scene::Driver;
 use skein_recording::run_dir::{Manifest, RECORDING};
-use skein_recording::simulated;
 use skein_recording::writer::Writer;
+use skein_recording::{Sink, simulated};
 use skein_scenario::Seeds;
+use skein_terminal::picture::Knowledge;
+use skein_terminal::{Pace, screen};
+use skein_view::lines::Lines;
+use skein_web::Mode;
+use std::fmt::Write as _;
 use std::io::{BufWriter, Write as _};
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Flies a scenario in virtual time, in this process: the same peers, world and radio
@@ -60,6 +67,17 @@ pub struct SimArgs {
     /// How the result is printed.
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
+    /// Writes all that a single run shows into this file, for `skein replay`: one JSON object a
+    /// line.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["seeds", "why"])]
+    pub lines: Option<PathBuf>,
+    /// Shows a single run as a map on this terminal, at so many scenario seconds per second.
+    #[arg(long, value_name = "X", num_args = 0..=1, default_missing_value = "8",
+        value_parser = clap::value_parser!(u32).range(1..=256), conflicts_with_all = ["seeds", "why"])]
+    pub watch: Option<u32>,
+    /// Where a single run is shown.
+    #[command(flatten)]
+    pub web: WebArgs,
 }
 
 /// Runs the verb: the result on stdout, progress on stderr.
@@ -133,12 +151,31 @@ fn one(args: &SimArgs, prepared: &Prepared) -> anyhow::Result<bool> {
         events: true,
         baseline: true,
     };
-    let free_ms = args.storm.then(|| runs::failure_free_makespan_ms(prepared));
-    let outcome = match (&args.run_dir, free_ms) {
-        (Some(dir), _) => recorded(args, prepared, (seed, free_ms), (wanted, dir))?,
-        (None, Some(free_ms)) => runs::storm(prepared, seed, free_ms, wanted),
-        (None, None) => runs::planned(prepared, seed, wanted),
+    let page = page(args, prepared, seed)?;
+    let map = map(args, prepared, seed)?;
+    let storm = args.storm.then(|| runs::failure_free_makespan_ms(prepared));
+    let kept = kept(args, prepared, seed)?;
+    let mut sinks: Vec<Box<dyn Sink>> = page.iter().map(Page::sink).collect();
+    sinks.extend(lines(args)?);
+    let (map, sink) = map.unzip();
+    sinks.extend(sink);
+    let manifest = kept.map(|(manifest, writer)| {
+        sinks.push(Box::new(writer));
+        manifest
+    });
+    let outcome = if sinks.is_empty() {
+        unseen(prepared, seed, storm, wanted)
+    } else {
+        simulated::fly(prepared, seed, storm, wanted, &mut Onlookers::new(sinks))?
     };
+    map.map(Map::join).transpose().context("the map")?;
+    if let (Some(manifest), Some(dir)) = (manifest, &args.run_dir) {
+        manifest
+            .conclude(dir, &outcome.report)
+            .with_context(|| format!("cannot write into {}", dir.display()))?;
+        let dir = dir.display();
+        eprintln!("recorded in {dir}: skein report {dir} -o report.html");
+    }
     if let Some(path) = &args.history {
         let file = std::fs::File::create(path)
             .with_context(|| format!("cannot create {}", path.display()))?;
@@ -157,16 +194,21 @@ fn one(args: &SimArgs, prepared: &Prepared) -> anyhow::Result<bool> {
     if !report.passed {
         eprintln!("replay: {}", replay(args, seed));
     }
+    if let Some(page) = page {
+        page.stay();
+    }
     Ok(report.passed)
 }
 
-/// Runs once, and keeps its recording, manifest and report in a directory.
-fn recorded(
+/// The manifest and the recording of a run that is kept.
+fn kept(
     args: &SimArgs,
     prepared: &Prepared,
-    (seed, free_ms): (u64, Option<u64>),
-    (wanted, dir): (Wanted, &Path),
-) -> anyhow::Result<Outcome> {
+    seed: u64,
+) -> anyhow::Result<Option<(Manifest, Writer)>> {
+    let Some(dir) = &args.run_dir else {
+        return Ok(None);
+    };
     std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
     let writes = || format!("cannot write into {}", dir.display());
     let manifest = Manifest {
@@ -175,16 +217,60 @@ fn recorded(
         ..Manifest::new(&prepared.spec.name, seed, Driver::Sim)
     };
     manifest.write(dir).with_context(writes)?;
-    let mut writer = Writer::create(&dir.join(RECORDING)).with_context(writes)?;
-    let outcome =
-        simulated::fly(prepared, seed, free_ms, wanted, &mut writer).with_context(writes)?;
-    writer.finish().with_context(writes)?;
-    manifest
-        .conclude(dir, &outcome.report)
-        .with_context(writes)?;
-    let dir = dir.display();
-    eprintln!("recorded in {dir}: skein report {dir} -o report.html");
-    Ok(outcome)
+    let writer = Writer::create(&dir.join(RECORDING)).with_context(writes)?;
+    Ok(Some((manifest, writer)))
+}
+
+/// A run that nobody looks at.
+fn unseen(prepared: &Prepared, seed: u64, storm: Option<u64>, wanted: Wanted) -> Outcome {
+    match storm {
+        Some(free_ms) => runs::storm(prepared, seed, free_ms, wanted),
+        None => runs::planned(prepared, seed, wanted),
+    }
+}
+
+/// The file of a single run, if one is wanted.
+fn lines(args: &SimArgs) -> anyhow::Result<Option<Box<dyn Sink>>> {
+    let Some(path) = &args.lines else {
+        return Ok(None);
+    };
+    let file =
+        std::fs::File::create(path).with_context(|| format!("cannot create {}", path.display()))?;
+    Ok(Some(Box::new(Lines(BufWriter::new(file)))))
+}
+
+/// The map of a single run on this terminal, if one is wanted.
+fn map(
+    args: &SimArgs,
+    prepared: &Prepared,
+    seed: u64,
+) -> anyhow::Result<Option<(Map, Box<dyn Sink>)>> {
+    let Some(speed) = args.watch else {
+        return Ok(None);
+    };
+    anyhow::ensure!(
+        screen::is_one(),
+        "--watch draws on a terminal, and here is none; --web shows the run on a page"
+    );
+    let opened = Map::open(Shows {
+        title: format!("{}, seed {seed}", prepared.spec.name),
+        pace: Pace::Play(speed),
+        knowledge: Knowledge::World,
+        trial: None,
+    })?;
+    stop_when_asked(opened.0.stop())?;
+    Ok(Some(opened))
+}
+
+/// The page of a single run, if one is wanted.
+fn page(args: &SimArgs, prepared: &Prepared, seed: u64) -> anyhow::Result<Option<Page>> {
+    let title = format!("{}, seed {seed}", prepared.spec.name);
+    let hello = hello(Mode::Sim, title, format!("{} --web", replay(args, seed)));
+    Ok(args
+        .web
+        .web
+        .map(|port| Page::open(port, &hello))
+        .transpose()?)
 }
 
 fn many(args: &SimArgs, prepared: &Prepared, seeds: Seeds) -> anyhow::Result<bool> {

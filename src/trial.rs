@@ -1,16 +1,21 @@
 //! `skein trial`: a scenario with real processes, a display, and a verdict.
 
 use crate::check::Format;
+use crate::onlookers::{Map, Shows};
+use crate::page::{Page, TrialName, WebArgs, hello};
 use crate::scenario_args::ScenarioArgs;
 use crate::{cli, exit};
 use anyhow::Context;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use skein_broker::{Event, Options, Progress, TrialError};
+use skein_netsim::account::RunReport;
+use skein_recording::Sink;
 use skein_recording::model::scene::Driver;
 use skein_recording::run_dir::Manifest;
 use skein_scenario::Severity;
-use std::io::IsTerminal;
+use skein_terminal::picture::Knowledge;
+use skein_terminal::{Pace, screen};
+use skein_web::Mode;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -43,9 +48,15 @@ pub struct TrialArgs {
     /// How the report is printed.
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
+    /// Tells what happens in lines, also where a terminal could show a map.
+    #[arg(long)]
+    pub plain: bool,
+    /// Where it is shown besides.
+    #[command(flatten)]
+    pub web: WebArgs,
 }
 
-/// Runs the verb: progress on stderr, the report on stdout.
+/// Runs the verb: a map or progress on stderr, the report on stdout.
 ///
 /// # Errors
 /// When the trial could not be run at all.
@@ -85,23 +96,33 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
         ),
         ..Manifest::new(&scenario.spec.name, scenario.spec.seed, Driver::Live)
     };
+    let (mut display, sinks) = Display::open(args, &scenario.spec.name, scenario.spec.seed)?;
     let options = Options {
         seed: scenario.spec.seed,
         geometry: scenario.geometry,
         spec: scenario.spec,
         run_dir: args.run_dir.clone(),
         program: std::env::current_exe().context("this program's own file")?,
-        sinks: Vec::new(),
+        sinks,
         manifest,
     };
-    let mut display = Display::new();
+    let stop = display.asked_to_stop();
     let mut tell = |event: Event| display.show(event);
-    let ended =
-        cli::runtime()?.block_on(skein_broker::run(options, cli::asked_to_stop(), &mut tell));
-    display.end();
+    let ended = cli::runtime()?.block_on(skein_broker::run(options, stop, &mut tell));
+    let is_over = ended.is_ok();
+    let page = display.end(is_over);
+    let code = verdict(args, ended)?;
+    // Who interrupted the trial wants no page either.
+    if let Some(page) = page.filter(|_| is_over) {
+        page.stay();
+    }
+    Ok(code)
+}
+
+/// Prints what the trial came to.
+fn verdict(args: &TrialArgs, ended: Result<RunReport, TrialError>) -> anyhow::Result<ExitCode> {
     match ended {
         Ok(report) => {
-            display.recorded();
             match args.format {
                 Format::Text => exit::print(&report)?,
                 Format::Json => exit::print(serde_json::to_string_pretty(&report)?)?,
@@ -124,68 +145,110 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// A bar on a terminal, plain lines elsewhere.
+/// A map on a terminal, plain lines elsewhere; a page beside either.
 struct Display {
-    bar: Option<ProgressBar>,
+    map: Option<Map>,
+    page: Option<Page>,
+    trial: TrialName,
+    /// Lines that wait until the map is gone.
+    held: Vec<String>,
+    /// Where the trial is kept.
     run_dir: Option<PathBuf>,
 }
 
-/// The bar counts in tenths of a percent.
-const BAR_LENGTH: u64 = 1000;
-
 impl Display {
-    fn new() -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let bar = ProgressBar::new(BAR_LENGTH);
-            if let Ok(style) = ProgressStyle::with_template("{bar:30.cyan} {msg}") {
-                bar.set_style(style);
-            }
-            bar
-        });
-        Self { bar, run_dir: None }
+    /// Opens what is wanted; gives what the trial tells of itself to.
+    fn open(
+        args: &TrialArgs,
+        scenario: &str,
+        seed: u64,
+    ) -> anyhow::Result<(Self, Vec<Box<dyn Sink>>)> {
+        let title = format!("{scenario}, seed {seed}");
+        let command = format!(
+            "skein trial{} --seed {seed} --web",
+            args.scenario.as_typed()
+        );
+        let hello = hello(Mode::Trial, title.clone(), command);
+        let page = args
+            .web
+            .web
+            .map(|port| Page::open(port, &hello))
+            .transpose()?;
+        let trial = page.as_ref().map(Page::trial).unwrap_or_default();
+        let mut sinks: Vec<Box<dyn Sink>> = page.iter().map(Page::sink).collect();
+        let mut map = None;
+        if screen::is_one() && !args.plain {
+            let (opened, sink) = Map::open(Shows {
+                title,
+                pace: Pace::Live,
+                knowledge: Knowledge::World,
+                trial: Some(TrialName::clone(&trial)),
+            })?;
+            sinks.push(sink);
+            map = Some(opened);
+        }
+        let display = Self {
+            map,
+            page,
+            trial,
+            held: Vec::new(),
+            run_dir: None,
+        };
+        Ok((display, sinks))
     }
 
-    /// Says where the trial was recorded.
-    fn recorded(&self) {
-        if let Some(dir) = &self.run_dir {
-            let dir = dir.display();
-            eprintln!("recorded in {dir}: skein report {dir} -o report.html");
+    /// Ends when the program is asked to stop, or the map was left.
+    fn asked_to_stop(&mut self) -> impl Future<Output = ()> + use<> {
+        let left = self.map.as_mut().map(Map::left);
+        async move {
+            match left {
+                Some(left) => tokio::select! {
+                    () = left => {}
+                    () = cli::asked_to_stop() => {}
+                },
+                None => cli::asked_to_stop().await,
+            }
         }
     }
 
     fn show(&mut self, event: Event) {
         match event {
             Event::Begun { id, run_dir } => {
-                self.line(&format!("trial {id} in {}", run_dir.display()));
+                let line = format!("trial {id} in {}", run_dir.display());
+                // Only one trial is flown by this process.
+                let _ = self.trial.set(id);
+                self.line(line);
                 self.run_dir = Some(run_dir);
             }
-            Event::Note { time_s, text } => self.line(&format!("{time_s:7.1} s  {text}")),
-            Event::Progress(progress) => match &self.bar {
-                Some(bar) => {
-                    #[allow(
-                        clippy::cast_possible_truncation,
-                        clippy::cast_sign_loss,
-                        reason = "0 to 1000"
-                    )]
-                    bar.set_position((progress.covered * BAR_LENGTH as f64) as u64);
-                    bar.set_message(words(&progress));
-                }
-                None => eprintln!("{}", words(&progress)),
-            },
+            Event::Note { time_s, text } => self.line(format!("{time_s:7.1} s  {text}")),
+            Event::Progress(progress) if self.map.is_none() => self.line(words(&progress)),
+            Event::Progress(_) => {}
         }
     }
 
-    fn line(&self, text: &str) {
-        match &self.bar {
-            Some(bar) => bar.println(text),
-            None => eprintln!("{text}"),
+    fn line(&mut self, text: String) {
+        if self.map.is_some() {
+            self.held.push(text);
+        } else {
+            eprintln!("{text}");
         }
     }
 
-    fn end(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
+    /// Gives the terminal back, and tells what waited for that and, of a trial that came to its
+    /// end, where it is kept.
+    fn end(self, over: bool) -> Option<Page> {
+        if let Some(map) = self.map {
+            map.stop().store(true, std::sync::atomic::Ordering::SeqCst);
+            if let Err(why) = map.join() {
+                eprintln!("warning: no map could be drawn: {why}");
+            }
         }
+        self.held.iter().for_each(|line| eprintln!("{line}"));
+        if let Some(dir) = self.run_dir.filter(|_| over) {
+            let dir = dir.display();
+            eprintln!("recorded in {dir}: skein report {dir} -o report.html");
+        }
+        self.page
     }
 }
 

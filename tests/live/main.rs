@@ -147,6 +147,9 @@ fn a_trial_that_is_killed_with_a_paused_peer_leaves_no_process() {
     support::wait_until(Duration::from_secs(10), "all processes are gone", || {
         place.processes().is_empty()
     });
+    let (code, said) = place.skein(&["watch", "--web"]);
+    assert_eq!(code, 4, "{said}");
+    assert!(said.contains("start one with `skein trial`"), "{said}");
     let (code, said) = place.skein(&["observe"]);
     assert_eq!(code, 4);
     assert!(said.contains("no trial is running"), "{said}");

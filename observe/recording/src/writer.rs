@@ -189,6 +189,6 @@ impl Sink for Writer {
     fn end(&mut self, end: &End) -> io::Result<()> {
         self.map(end.time_ms, true)?;
         self.write(channels::END, end.time_ms, end)?;
-        self.out.flush().map_err(io)
+        self.out.finish().map(drop).map_err(io)
     }
 }

@@ -103,9 +103,10 @@ impl Picture {
             let orphans = standing.cells.all();
             let orphans = orphans.iter().filter(|c| matches!(c, Cell::Orphaned(_)));
             words.push(format!("{:.1} s", frame.time_ms as f64 / 1000.0));
-            words.push(format!("{:.1} % covered", frame.covered_share * 100.0));
-            words.push(format!("{alive} of {} alive", frame.uavs.len()));
-            words.push(format!("{} parts", frame.components.len()));
+            words.push(format!("{:.1} %", frame.covered_share * 100.0));
+            words.push(format!("{alive}/{} alive", frame.uavs.len()));
+            let parts = frame.components.len();
+            words.push(format!("{parts} part{}", if parts == 1 { "" } else { "s" }));
             words.push(format!("{} orphans", orphans.count()));
         }
         if let Some(end) = &standing.end {
@@ -215,7 +216,8 @@ impl Picture {
             return;
         };
         let mut style = self.look.of_peer(uav.id).add_modifier(Modifier::BOLD);
-        if self.selected == Some(uav.id) {
+        // Without colours a number would be lost among those of planned cells.
+        if self.selected == Some(uav.id) || !self.look.colour {
             style = style.add_modifier(Modifier::REVERSED);
         }
         let heading = uav.pose.map_or(0.0, |p| p.heading_deg);

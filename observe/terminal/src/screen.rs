@@ -3,7 +3,7 @@
 use crossterm::{cursor, execute, terminal};
 use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
-use std::io::{self, IsTerminal, Stderr, stderr};
+use std::io::{self, BufWriter, IsTerminal, Stderr, stderr};
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -28,7 +28,7 @@ pub fn is_taken() -> bool {
 #[derive(Debug)]
 pub struct Screen {
     /// Where pictures are drawn: stderr, so that stdout stays for the report.
-    pub terminal: Terminal<CrosstermBackend<Stderr>>,
+    pub terminal: Terminal<CrosstermBackend<BufWriter<Stderr>>>,
 }
 
 impl Screen {
@@ -48,7 +48,7 @@ impl Screen {
         TAKEN.store(true, Ordering::SeqCst);
         let taken = terminal::enable_raw_mode()
             .and_then(|()| execute!(stderr(), terminal::EnterAlternateScreen, cursor::Hide))
-            .and_then(|()| Terminal::new(CrosstermBackend::new(stderr())));
+            .and_then(|()| Terminal::new(CrosstermBackend::new(BufWriter::new(stderr()))));
         taken
             .map(|terminal| Self { terminal })
             .inspect_err(|_| give_back())

@@ -6,7 +6,7 @@
 //! that others gossip, and from silence; who covered a cell is taken to be whoever listed it when
 //! it was told. Times are those of the listener's clock, from when it began.
 
-use crate::believed::Peer;
+use crate::believed::{Now, Peer};
 use skein_geometry::frame::Origin as Plane;
 use skein_peer::Mission;
 use skein_peer::cells::CellSet;
@@ -26,6 +26,10 @@ use std::sync::Arc;
 /// Peers that are kept in mind: as many as a swarm has at most.
 const MAX_PEERS: usize = 257;
 
+/// What lies between two words of a swarm counts as silence of one peer up to this,
+/// milliseconds: two peers alone say several things a second.
+const LONGEST_PAUSE_MS: u64 = 300;
+
 /// Rounds of which bids are kept: a new one makes the older ones history.
 const MAX_ROUNDS: usize = 16;
 
@@ -42,6 +46,8 @@ pub struct Belief {
     covered: CellSet,
     rounds: BTreeMap<u32, BTreeMap<u16, ToldBid>>,
     components: Vec<Vec<u16>>,
+    /// When anything was heard last.
+    last: Now,
     said: Vec<Record>,
 }
 
@@ -59,6 +65,7 @@ impl Belief {
             covered: CellSet::new(0),
             rounds: BTreeMap::new(),
             components: Vec::new(),
+            last: Now::default(),
             said: Vec::new(),
         }
     }
@@ -88,6 +95,12 @@ impl Belief {
         if *self.fleet.get_or_insert(key.fleet.clone()) != key.fleet {
             return;
         }
+        let pause_ms = now_ms.saturating_sub(self.last.ms).min(LONGEST_PAUSE_MS);
+        let now = Now {
+            ms: now_ms,
+            air_ms: self.last.air_ms + pause_ms,
+        };
+        self.last = now;
         let id = record.author;
         if !self.peers.contains_key(&id) && self.peers.len() >= MAX_PEERS {
             return;
@@ -105,14 +118,14 @@ impl Belief {
         }
         match &body {
             Body::Beacon(beacon) => {
-                peer_of(&mut self.peers, id).beacon(now_ms, beacon);
+                peer_of(&mut self.peers, id).beacon(now, beacon);
                 for gossip in &beacon.gossip {
-                    self.gossip(now_ms, gossip.id, gossip.incarnation, gossip.heartbeat);
+                    self.gossip(now, gossip.id, gossip.incarnation, gossip.heartbeat);
                 }
                 self.later_lap(now_ms, beacon.revision);
             }
-            Body::Heartbeat(beat) => peer_of(&mut self.peers, id).heartbeat(now_ms, beat),
-            Body::State(state) => peer_of(&mut self.peers, id).state(now_ms, state),
+            Body::Heartbeat(beat) => peer_of(&mut self.peers, id).heartbeat(now, beat),
+            Body::State(state) => peer_of(&mut self.peers, id).state(now, state),
             other => self.work(now_ms, (id, record.subject), other),
         }
     }
@@ -233,9 +246,9 @@ impl Belief {
         }
     }
 
-    fn gossip(&mut self, now_ms: u64, id: u16, incarnation: u32, heartbeat: u32) {
+    fn gossip(&mut self, now: Now, id: u16, incarnation: u32, heartbeat: u32) {
         if let Some(peer) = self.peers.get_mut(&id) {
-            peer.gossiped(now_ms, incarnation, heartbeat);
+            peer.gossiped(now, incarnation, heartbeat);
         }
     }
 
@@ -343,6 +356,8 @@ impl Belief {
             let Some(at) = peer.place() else { continue };
             let place = Place::of(&plane, at);
             if peer.is_ground_station() {
+                // It does not say where it stands: people put it where UAVs come home to.
+                let place = self.scene.base;
                 if station != Some(*id) {
                     let (id, height_m) = (*id, 0.0);
                     self.scene.ground = Some(Station {
@@ -381,7 +396,7 @@ impl Belief {
             let Some(peer) = self.peers.get_mut(&id) else {
                 continue;
             };
-            let is_gone = peer.is_gone(now_ms, suspected.contains(&id));
+            let is_gone = peer.is_gone(self.last, suspected.contains(&id));
             let was = std::mem::replace(&mut peer.gone, is_gone);
             let claim = peer.claim.clone();
             if is_gone && !was {

@@ -5,11 +5,13 @@
 //! |---|---|
 //! | [`standing`] | how all stands, folded from the words of a run |
 //! | [`line`](mod@line) | the way from a driver to a thread that draws |
+//! | [`lines`] | a run as text, written and read |
 //! | [`belief`] | a run from nothing but what a swarm says on the air; `believed` holds one peer |
 
 pub mod belief;
 mod believed;
 pub mod line;
+pub mod lines;
 pub mod standing;
 
 pub use belief::Belief;
