@@ -38,7 +38,13 @@ fn main() -> ExitCode {
         Ok(code) => code,
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::from(exit::INTERNAL)
+            let asked_wrongly =
+                error.is::<page::ServerError>() || error.is::<onlookers::NoTerminal>();
+            ExitCode::from(if asked_wrongly {
+                exit::USAGE
+            } else {
+                exit::INTERNAL
+            })
         }
     }
 }

@@ -10,6 +10,7 @@ use skein_terminal::picture::Knowledge;
 use skein_terminal::show::Kill;
 use skein_terminal::{Left, Look, Options, Pace, show};
 use skein_view::line::{Full, line};
+use std::fmt;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -55,6 +56,18 @@ impl Sink for Onlookers {
         Ok(())
     }
 }
+
+/// A map was asked for where there is no terminal.
+#[derive(Clone, Copy, Debug)]
+pub struct NoTerminal;
+
+impl fmt::Display for NoTerminal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a map is drawn on a terminal, and here is none; --web shows it on a page")
+    }
+}
+
+impl std::error::Error for NoTerminal {}
 
 /// A map on this terminal, in a thread of its own.
 #[derive(Debug)]

@@ -6,8 +6,9 @@ use skein_broker::control::{Request, command};
 use skein_broker::registry;
 use skein_netsim::fault::Fault;
 use skein_recording::Sink;
+pub use skein_web::ServerError;
 use skein_web::server::Answer;
-use skein_web::{Faults, Feed, Hello, Knowledge, Mode, Server, ServerError};
+use skein_web::{Faults, Feed, Hello, Knowledge, Mode, Server};
 use std::sync::{Arc, OnceLock};
 use tokio::runtime::Runtime;
 
@@ -118,4 +119,24 @@ pub fn inject(trial: &TrialName, fault: Fault) -> Answer {
         let lines = command(&entry, &Request::Fault(fault)).await;
         lines.map_err(|e| e.why.to_string())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_port_is_a_port_and_a_scenario_is_none() {
+        assert_eq!(port("8080"), Ok(8080));
+        for wrong in ["helsinki", "70000", "-1", ""] {
+            assert!(port(wrong).unwrap_err().contains("--web"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn only_what_is_heard_is_belief() {
+        let of = |mode| hello(mode, String::new(), String::new()).knowledge;
+        assert_eq!(of(Mode::Watch), Knowledge::Swarm);
+        assert_eq!(of(Mode::Trial), Knowledge::World);
+    }
 }

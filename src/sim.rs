@@ -2,7 +2,7 @@
 //! summary.
 
 use crate::check::Format;
-use crate::onlookers::{Map, Onlookers, Shows, stop_when_asked};
+use crate::onlookers::{Map, NoTerminal, Onlookers, Shows, stop_when_asked};
 use crate::page::{Page, WebArgs, hello};
 use crate::scenario_args::ScenarioArgs;
 use crate::{chaos, exit};
@@ -248,10 +248,9 @@ fn map(
     let Some(speed) = args.watch else {
         return Ok(None);
     };
-    anyhow::ensure!(
-        screen::is_one(),
-        "--watch draws on a terminal, and here is none; --web shows the run on a page"
-    );
+    if !screen::is_one() {
+        return Err(NoTerminal.into());
+    }
     let opened = Map::open(Shows {
         title: format!("{}, seed {seed}", prepared.spec.name),
         pace: Pace::Play(speed),
