@@ -10,18 +10,18 @@ use crate::nfz::NfzArgs;
 use crate::observe::ObserveArgs;
 use crate::peer::PeerArgs;
 use crate::plan::PlanArgs;
+use crate::replay::ReplayArgs;
 use crate::report::ReportArgs;
 use crate::schema::SchemaArgs;
 use crate::shell::{CompletionsArgs, ManArgs};
-use crate::replay::ReplayArgs;
 use crate::sim::SimArgs;
 use crate::task::TaskArgs;
 use crate::trial::TrialArgs;
 use crate::watch::WatchArgs;
 use crate::why::WhyArgs;
 use crate::{
-    bench, chaos, check, console, exit, export, log, mission, nfz, observe, peer, plan, replay, report,
-    schema, shell, sim, task, trial, watch, why,
+    bench, chaos, check, console, exit, export, log, mission, nfz, observe, peer, plan, replay,
+    report, schema, shell, sim, task, trial, watch, why,
 };
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

@@ -22,7 +22,6 @@ use skein_terminal::picture::Knowledge;
 use skein_terminal::{Pace, screen};
 use skein_view::lines::Lines;
 use skein_web::Mode;
-use std::fmt::Write as _;
 use std::io::{BufWriter, Write as _};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
