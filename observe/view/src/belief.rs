@@ -14,7 +14,7 @@ use skein_peer::mission::Library;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::wire::codec::{Body, open};
 use skein_peer::wire::key;
-use skein_peer::wire::message::{Bid, CellRun, Claim, Cover, ListedRun};
+use skein_peer::wire::message::{Bid, CellRun, Claim, Cover, ListedRun, MissionChunk};
 use skein_peer::wire::signature::Off;
 use skein_recording::cells::{Cell, Cells};
 use skein_recording::model::event::{Bid as ToldBid, Event, Origin, What};
@@ -136,11 +136,7 @@ impl Belief {
             Body::Claim(claim) => self.claim(now_ms, id, claim),
             Body::Bid(bid) => self.bid(now_ms, id, bid),
             Body::Cover(cover) => self.cover(now_ms, id, cover),
-            Body::Mission(chunk) => {
-                if self.library.chunk(subject, chunk) == Ok(true) {
-                    self.follow(now_ms);
-                }
-            }
+            Body::Mission(chunk) => self.piece(now_ms, subject, chunk),
             Body::Finished(finished) => {
                 let revision = finished.revision;
                 let text = format!("uav{id} holds that the mission is finished");
@@ -195,6 +191,13 @@ impl Belief {
             covered_share: covered as f64 / coverable.max(1) as f64,
         };
         self.said.push(Record::Frame(frame));
+    }
+
+    /// A piece of a mission was heard; one that does not fit changes nothing.
+    fn piece(&mut self, now_ms: u64, subject: u16, chunk: &MissionChunk) {
+        if self.library.chunk(subject, chunk) == Ok(true) {
+            self.follow(now_ms);
+        }
     }
 
     /// The newest mission is the one that is shown.
