@@ -4,10 +4,12 @@ use crate::exit;
 use crate::onlookers::{Map, Onlookers, Shows, stop_when_asked};
 use crate::page::{Page, WebArgs, hello};
 use clap::Args;
-use skein_recording::Sink;
+use skein_recording::export::in_order;
+use skein_recording::model::Record;
+use skein_recording::{Sink, run_dir};
 use skein_terminal::picture::Knowledge;
 use skein_terminal::{Pace, screen};
-use skein_view::lines::{self, Words};
+use skein_view::lines;
 use skein_web::Mode;
 use std::fs::File;
 use std::io::BufReader;
@@ -16,11 +18,12 @@ use std::process::ExitCode;
 
 /// Plays a recorded run: as a map on this terminal, or with --web on a page.
 ///
-/// Reads what `skein sim SCENARIO --lines FILE` wrote. A recording that was cut off is played
-/// up to there.
+/// Reads the directory of a trial or of `skein sim SCENARIO --run-dir DIR`, its `run.mcap`, or
+/// what `skein sim SCENARIO --lines FILE` wrote. A recording that was cut off is played up to
+/// there.
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
-    /// The recording.
+    /// The directory of a run, or a recording.
     pub file: PathBuf,
     /// Scenario seconds per second on this terminal.
     #[arg(long, value_name = "X", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=256))]
@@ -49,7 +52,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
     // What is no recording at all is told before anything is opened.
     let first = match words.next() {
         Some(Ok(first)) => first,
-        Some(Err(why)) => return Ok(wrong(args, &why.to_string())),
+        Some(Err(why)) => return Ok(wrong(args, &why)),
         None => return Ok(wrong(args, "it is empty")),
     };
     let title = args.file.display().to_string();
@@ -99,13 +102,26 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
 
 fn wrong(args: &ReplayArgs, why: &str) -> ExitCode {
     eprintln!(
-        "error: {}: {why}; `skein sim SCENARIO --lines FILE` writes a recording",
+        "error: {}: {why}; `skein sim SCENARIO --run-dir DIR` writes a recording, and each trial does",
         args.file.display()
     );
     ExitCode::from(exit::CONFIG_INVALID)
 }
 
-/// The words of a recording: whatever its form, what follows takes them one by one.
-fn words(path: &Path) -> std::io::Result<Words> {
-    Ok(lines::read(BufReader::new(File::open(path)?)))
+/// The words of a recording, one by one; the last one says why it ends too early, if it does.
+type Words = Box<dyn Iterator<Item = Result<Record, String>>>;
+
+/// Of a run's directory or MCAP file, or of lines.
+fn words(path: &Path) -> Result<Words, String> {
+    let is_run = path.is_dir() || path.extension().is_some_and(|e| e == "mcap");
+    if !is_run {
+        let file = File::open(path).map_err(|why| why.to_string())?;
+        let words = lines::read(BufReader::new(file));
+        return Ok(Box::new(
+            words.map(|word| word.map_err(|why| why.to_string())),
+        ));
+    }
+    let recorded = run_dir::open(path).map_err(|why| why.problem)?.recorded;
+    let words = in_order(&recorded.run).into_iter().map(Ok);
+    Ok(Box::new(words.chain(recorded.cut.map(Err))))
 }
