@@ -105,7 +105,7 @@ impl Uav {
             mission: Some(Arc::clone(mission)),
             launches: [].into(),
             seed: 1,
-            sensors: [].into(),
+            sensors: 0,
         });
         // What its disk held when it was started, and a number that no earlier start had.
         let start = Input::Start {

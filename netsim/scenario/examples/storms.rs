@@ -43,7 +43,7 @@ fn main() -> ExitCode {
     let prepared = Prepared::new(scenario.spec);
     let free_ms = failure_free_makespan_ms(&prepared);
     let mut runs = Vec::new();
-    let mut told: BTreeMap<&str, u32> = BTreeMap::new();
+    let mut told: BTreeMap<String, u32> = BTreeMap::new();
     for seed in from..to {
         let wanted = Wanted {
             events: to == from + 1,
@@ -54,7 +54,7 @@ fn main() -> ExitCode {
             println!("{} {:?}", e.time_ms, e.what);
         }
         for v in run.violations() {
-            let n = told.entry(v.check).or_default();
+            let n = told.entry(v.check.clone().into_owned()).or_default();
             *n += 1;
             if *n <= 12 {
                 println!(

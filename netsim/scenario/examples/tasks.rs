@@ -77,7 +77,7 @@ fn compare(prepared: &Prepared, seeds: &Seeds, n_tasks: usize, wrong: &str) {
         completed += u32::from(tasked.report.completed);
         for v in tasked.violations() {
             println!("  seed {seed}: {} at {} ms: {}", v.check, v.time_ms, v.text);
-            *broken.entry(v.check.to_owned()).or_default() += 1;
+            *broken.entry(v.check.clone().into_owned()).or_default() += 1;
         }
         for t in &tasked.report.tasks {
             asked += 1;
