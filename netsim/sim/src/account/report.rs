@@ -71,7 +71,7 @@ pub struct RunReport {
     /// Each restart, in the order of the times.
     pub restarts: Vec<RestartReport>,
     /// Each task other than coverage that was asked for in flight.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tasks: Vec<TaskReport>,
     /// Live UAVs at the end that believe the mission finished.
     pub finished: Vec<u16>,
