@@ -56,7 +56,7 @@ pub enum Add {
     Point {
         /// Latitude and longitude in degrees.
         #[arg(value_name = "LAT,LON", value_parser = corner, allow_hyphen_values = true)]
-        at: LatLon,
+        place: LatLon,
         /// How it is to be done.
         #[command(flatten)]
         how: How,
@@ -133,7 +133,7 @@ pub fn run(args: &TaskArgs) -> anyhow::Result<ExitCode> {
 /// The task that is asked for, in the plane of the mission.
 fn asked(add: &Add, origin: Origin) -> Result<NewTask, Refusal> {
     let (kind, way, how) = match add {
-        Add::Point { at, how } => (TaskKind::Pinpoint, std::slice::from_ref(at), how),
+        Add::Point { place, how } => (TaskKind::Pinpoint, std::slice::from_ref(place), how),
         Add::Line { way, how } => (TaskKind::Line, &way[..], how),
     };
     let place = |p: &LatLon| {
