@@ -858,6 +858,14 @@ mod tests {
                         Fault::ShortFuel { peer, lasts_ms } => {
                             assert!(peer != 1 && lasts_ms > 100_000);
                         }
+                        Fault::AddTask { ref task } => {
+                            let asked = task.asked(0, 1).unwrap();
+                            assert!(spec.mission.can_do(&asked).is_ok());
+                        }
+                        Fault::CancelTask { ref name } => {
+                            let asked = |f: &TimedFault| matches!(&f.fault, Fault::AddTask { task } if task.name.as_ref() == Some(name));
+                            assert!(d.out.iter().any(|a| asked(a) && a.at_ms <= f.at_ms));
+                        }
                         ref other => panic!("{other:?} is no such trouble"),
                     }
                 }
