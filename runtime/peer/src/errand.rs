@@ -9,7 +9,7 @@
 //! The flight keeps the clearance of the mission, and from it the camera holds every piece.
 //!
 //! # Complexity
-//! For a place some Dubins curves and at most [`ROUTED`] routes; for a line that of a loop of
+//! For a place some Dubins curves and at most `ROUTED` routes; for a line that of a loop of
 //! its pieces.
 
 use crate::mission::{Mission, point_m};
