@@ -3,12 +3,9 @@
 use crate::exit;
 use clap::Args;
 use skein_peer::wire::kinds::Kind;
-use skein_peer::wire::schema::{envelope_schema, schema};
+use skein_peer::wire::schema::{self, ENVELOPE_NAME};
 use std::fmt::Write as _;
 use std::process::ExitCode;
-
-/// The name under which the array around every body is asked for.
-const ENVELOPE: &str = "record";
 
 /// The JSON Schema of the records of a kind.
 ///
@@ -30,15 +27,10 @@ pub fn run(args: &SchemaArgs) -> anyhow::Result<ExitCode> {
         exit::print(list())?;
         return Ok(ExitCode::from(exit::OK));
     };
-    let found = if name == ENVELOPE {
-        Some(envelope_schema())
-    } else {
-        Kind::of_name(name).and_then(schema)
-    };
-    let Some(found) = found else {
-        let names: Vec<&str> = spoken().map(Kind::name).collect();
+    let Some((_, found)) = schema::all().find(|(known, _)| *known == name) else {
+        let names: Vec<&str> = schema::all().map(|(name, _)| name).collect();
         eprintln!(
-            "error: no kind is called {name:?}; there are {ENVELOPE}, {}",
+            "error: no kind is called {name:?}; there are {}",
             names.join(", ")
         );
         return Ok(ExitCode::from(exit::USAGE));
@@ -47,14 +39,10 @@ pub fn run(args: &SchemaArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::from(exit::OK))
 }
 
-fn spoken() -> impl Iterator<Item = Kind> {
-    Kind::ALL.into_iter().filter(|kind| kind.row().spoken)
-}
-
 /// All kinds, one a line.
 fn list() -> String {
-    let mut out = format!("{ENVELOPE:<10} what is around every body");
-    for kind in spoken() {
+    let mut out = format!("{ENVELOPE_NAME:<10} what is around every body");
+    for kind in Kind::ALL.into_iter().filter(|kind| kind.row().spoken) {
         let (name, row) = (kind.name(), kind.row());
         let passed_on = if row.relayed { ", passed on" } else { "" };
         // Writing to a string cannot fail.

@@ -15,7 +15,7 @@ use skein_netsim::spec::Spec;
 use skein_netsim::world::World;
 use skein_peer::Report;
 use skein_peer::offload::MissionGeometry;
-use skein_peer::output::{Status, TaskNews};
+use skein_peer::output::Status;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -289,7 +289,13 @@ impl Observer {
                 let text = format!("the operator gives revision {revision}");
                 (What::Revised { revision }, text)
             }
-            Report::Task { name, news, .. } => task(&who, name, news),
+            Report::Task { name, news, .. } => {
+                let what = What::Task {
+                    name: name.clone(),
+                    news: news.word().to_owned(),
+                };
+                (what, format!("{who}: {}", news.sentence(name)))
+            }
             Report::Silenced => {
                 self.process(peer).silent = true;
                 let text = format!("{who} is silent: another process speaks under its id");
@@ -512,21 +518,4 @@ impl Observer {
         };
         self.say(time_ms, Origin::Peer, Some(peer), text, what);
     }
-}
-/// News of a task, and in words.
-fn task(who: &str, name: &str, news: &TaskNews) -> (What, String) {
-    let (news, text) = match news {
-        TaskNews::Asked => ("asked", format!("{who} hears of task {name}")),
-        TaskNews::Flies => ("flies", format!("{who} won task {name} and flies there")),
-        TaskNews::Seen => ("seen", format!("{who} saw all of task {name}")),
-        TaskNews::Left => ("left", format!("{who} left task {name}")),
-        TaskNews::DoneBy(by) => (
-            "done-by",
-            format!("{who} hears that uav{} did task {name}", by.0),
-        ),
-        TaskNews::NobodyCan(why) => ("nobody-can", format!("nobody can do task {name}: {why}")),
-        TaskNews::Over(state) => ("over", format!("{who} holds task {name} to be {state:?}")),
-    };
-    let (name, news) = (name.to_owned(), news.to_owned());
-    (What::Task { name, news }, text)
 }

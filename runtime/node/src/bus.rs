@@ -12,8 +12,7 @@ use crate::transport::{Event, Transport};
 use skein_link::medium::key_hash;
 use skein_peer::Priority;
 use skein_peer::wire::key::VERSION;
-use skein_peer::wire::kinds::Kind;
-use skein_peer::wire::schema::{envelope_schema, schema};
+use skein_peer::wire::schema;
 use std::collections::VecDeque;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -192,10 +191,7 @@ impl Bus {
     /// When Zenoh refuses the keys.
     pub async fn serve_schemas(&self, fleet: &str) -> Result<(), BusError> {
         let prefix = format!("{fleet}/{VERSION}/schema");
-        let kinds = Kind::ALL.into_iter();
-        let kinds = kinds.filter_map(|kind| Some((kind.name(), schema(kind)?)));
-        let all = kinds.chain([("record", envelope_schema())]);
-        let answers: Vec<(KeyExpr<'static>, String)> = all
+        let answers: Vec<(KeyExpr<'static>, String)> = schema::all()
             .filter_map(|(name, text)| {
                 let key = KeyExpr::try_from(format!("{prefix}/{name}")).ok()?;
                 Some((key, text))
@@ -574,6 +570,8 @@ fn event_of(sample: &Sample) -> Event {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use skein_peer::wire::kinds::Kind;
+    use skein_peer::wire::schema::{envelope_schema, schema};
 
     fn config(id: u16, links: Vec<String>) -> BusConfig {
         BusConfig {

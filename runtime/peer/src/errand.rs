@@ -189,14 +189,8 @@ impl Request {
             Some((there.length_m() + back_m, c))
         };
         // Where none of the nearest can be reached, one of the others may.
-        let mut found: Vec<(f64, Curve)> = Vec::new();
-        for one in all {
-            if found.len() == ROUTED {
-                break;
-            }
-            found.extend(routed(one));
-        }
-        let best = found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        let found = all.into_iter().filter_map(routed).take(ROUTED);
+        let best = found.min_by(|a, b| a.0.total_cmp(&b.0));
         best.map(|(_, c)| c)
     }
 }

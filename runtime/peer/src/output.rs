@@ -77,6 +77,36 @@ pub enum TaskNews {
     Over(TaskState),
 }
 
+impl TaskNews {
+    /// Its name.
+    #[must_use]
+    pub const fn word(&self) -> &'static str {
+        match self {
+            Self::Asked => "asked",
+            Self::Flies => "flies",
+            Self::Seen => "seen",
+            Self::Left => "left",
+            Self::DoneBy(_) => "done-by",
+            Self::NobodyCan(_) => "nobody-can",
+            Self::Over(_) => "over",
+        }
+    }
+
+    /// What it says of the task of a name, `it` being who tells.
+    #[must_use]
+    pub fn sentence(&self, name: &str) -> String {
+        match self {
+            Self::Asked => format!("the task {name:?} is asked for"),
+            Self::Flies => format!("it won the task {name:?} and flies there"),
+            Self::Seen => format!("it did the task {name:?}: all of it was seen"),
+            Self::Left => format!("it left the task {name:?}: another's, changed or over"),
+            Self::DoneBy(PeerId(by)) => format!("uav{by} did the task {name:?}"),
+            Self::NobodyCan(why) => format!("nobody can do the task {name:?}: {why}"),
+            Self::Over(state) => format!("the task {name:?} is {}", state.word()),
+        }
+    }
+}
+
 /// What a peer believes of another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Status {

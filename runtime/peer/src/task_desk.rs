@@ -1,12 +1,10 @@
 //! Where tasks are asked for, and what people are told of them (D2.7 §1.2.2): an operator's
 //! words at a ground station become registers of it, and every peer can say what it knows.
 
-use crate::PeerId;
 use crate::cooperation::Cooperation;
 use crate::effect::{Effect, Effects};
 use crate::input::{AskedTask, NewTask, TaskEdit, Time};
 use crate::mission::Mission;
-use crate::output::{Report, TaskNews};
 use crate::tasking::{Known, Tasking, why_nobody};
 use crate::wire::codec::Body;
 use crate::wire::tasks::{
@@ -65,25 +63,17 @@ pub struct TaskHolder {
 impl Tasking {
     /// The tasks of this peer's own operator.
     pub fn asked(&self, now: Time) -> Vec<AskedTask> {
-        let own = self
-            .known
-            .iter()
-            .filter(|(id, _)| id.author == self.me_id());
         let asked = |(id, known): (&TaskId, &Known)| AskedTask {
             number: id.number,
             task: known.task.clone(),
             age_ms: now.since_ms(known.since),
         };
-        own.map(asked).collect()
+        self.own().map(asked).collect()
     }
 
     /// Grows with each change of the tasks of this peer's own operator.
     pub fn asked_version(&self) -> u64 {
-        let own = self
-            .known
-            .iter()
-            .filter(|(id, _)| id.author == self.me_id());
-        own.map(|(_, k)| u64::from(k.task.revision)).sum()
+        self.own().map(|(_, k)| u64::from(k.task.revision)).sum()
     }
 
     /// All tasks that are known.
@@ -166,11 +156,8 @@ impl Tasking {
 
     /// The task of this operator with a name, the open one first.
     fn named(&self, name: &str) -> Option<(TaskId, &Known)> {
-        let own = self
-            .known
-            .iter()
-            .filter(|(id, _)| id.author == self.me_id());
-        let named = own.filter(|(_, k)| k.task.name == name.as_bytes());
+        let named = self.own();
+        let named = named.filter(|(_, k)| k.task.name == name.as_bytes());
         named
             .max_by_key(|(_, k)| k.is_open())
             .map(|(id, known)| (*id, known))
@@ -187,11 +174,7 @@ impl Tasking {
         if let Some(number) = unused {
             return Ok((number, 1));
         }
-        let own = self
-            .known
-            .iter()
-            .filter(|(id, _)| id.author == self.me_id());
-        let over = own.filter(|(_, k)| !k.task.is_open());
+        let over = self.own().filter(|(_, k)| !k.task.is_open());
         let first = over.min_by_key(|(id, k)| (k.since, **id));
         first
             .map(|(id, k)| (id.number, k.task.revision.saturating_add(1)))
@@ -345,29 +328,4 @@ impl Cooperation {
             }
         }
     }
-}
-
-/// A sentence on what became known of a task.
-pub(crate) fn sentence(report: &Report) -> Option<String> {
-    let Report::Task { name, news, .. } = report else {
-        return None;
-    };
-    let told = match news {
-        TaskNews::Asked => format!("the task {name:?} is asked for"),
-        TaskNews::Flies => format!("it won the task {name:?} and flies there"),
-        TaskNews::Seen => format!("it did the task {name:?}: all of it was seen"),
-        TaskNews::Left => format!("it left the task {name:?}: another's, changed or over"),
-        TaskNews::DoneBy(PeerId(by)) => format!("uav{by} did the task {name:?}"),
-        TaskNews::NobodyCan(why) => format!("nobody can do the task {name:?}: {why}"),
-        TaskNews::Over(state) => {
-            let over = match state {
-                TaskState::Open => "open",
-                TaskState::Cancelled => "cancelled",
-                TaskState::Expired => "expired",
-                TaskState::Done => "done",
-            };
-            format!("the task {name:?} is {over}")
-        }
-    };
-    Some(told)
 }

@@ -144,6 +144,11 @@ impl Tasking {
         self.me
     }
 
+    /// The tasks of this peer's own operator.
+    pub fn own(&self) -> impl Iterator<Item = (&TaskId, &Known)> {
+        self.known.iter().filter(|(id, _)| id.author == self.me)
+    }
+
     /// A task was asked for at this time, not when it was heard of.
     pub fn was_asked(&mut self, id: TaskId, since: Time) {
         if let Some(known) = self.known.get_mut(&id) {
@@ -234,7 +239,6 @@ impl Tasking {
         };
         let news = match known.task.state {
             TaskState::Open => TaskNews::Asked,
-            TaskState::Done => TaskNews::Over(TaskState::Done),
             over => TaskNews::Over(over),
         };
         let report = report(id, &known.task, news);
@@ -289,16 +293,17 @@ impl Tasking {
         effects
     }
 
-    /// What this UAV can offer.
-    fn present(&self, s: &Situation<'_>, state: &MissionState) -> Option<Offer> {
-        let (percept, executive) = (s.percept?, state.executive.as_ref()?);
-        let can = state.can_fly_plans(s)
+    /// Whether this UAV has anything to offer.
+    fn is_able(s: &Situation<'_>, state: &MissionState) -> bool {
+        state.can_fly_plans(s)
             && !s.is_silent
             && !state.geometry.mission.cancelled
-            && state.separation.is_none();
-        if !can {
-            return None;
-        }
+            && state.separation.is_none()
+    }
+
+    /// What this UAV can offer: its section is predicted for that.
+    fn present(&self, s: &Situation<'_>, state: &MissionState) -> Option<Offer> {
+        let (percept, executive) = (s.percept?, state.executive.as_ref()?);
         let spendable_ms = state.spendable_ms(Some(percept));
         let sections = &state.negotiation.sections;
         let section_ms = if sections.plan().is_empty() {
@@ -339,9 +344,10 @@ impl Tasking {
             }
         }
         let is_period = s.now.since_ms(self.last_period) >= s.membership.interval_ms();
-        let offer = self.present(s, state);
-        let able = offer.is_some();
-        if is_period || able != self.was_able {
+        let able = Self::is_able(s, state);
+        let is_told = is_period || able != self.was_able;
+        let offer = (is_told && able).then(|| self.present(s, state)).flatten();
+        if is_told {
             let live = s.membership.live().map(|(id, _)| id);
             let uav = |id: &u16| {
                 let info = s.membership.info(*id);
@@ -570,8 +576,9 @@ impl Tasking {
         }
         if s.speaks && self.told_in != s.me.incarnation {
             self.told_in = s.me.incarnation;
-            let own = self.known.iter().filter(|(id, _)| id.author == self.me);
-            effects.extend(own.map(|(id, k)| Effect::Speak(id.number, Body::Task(k.task.clone()))));
+            let say =
+                |(id, k): (&TaskId, &Known)| Effect::Speak(id.number, Body::Task(k.task.clone()));
+            effects.extend(self.own().map(say));
         }
         effects
     }

@@ -489,7 +489,18 @@ pub fn schema(kind: Kind) -> Option<String> {
 /// The JSON Schema of the envelope around every body.
 #[must_use]
 pub fn envelope_schema() -> String {
-    document("record", ENVELOPE)
+    document(ENVELOPE_NAME, ENVELOPE)
+}
+
+/// Under which name the envelope is asked for.
+pub const ENVELOPE_NAME: &str = "record";
+
+/// All schemas by the name under which they are asked for: the envelope's, then those of the
+/// kinds.
+pub fn all() -> impl Iterator<Item = (&'static str, String)> {
+    let kinds = Kind::ALL.into_iter();
+    let kinds = kinds.filter_map(|kind| Some((kind.name(), schema(kind)?)));
+    core::iter::once((ENVELOPE_NAME, envelope_schema())).chain(kinds)
 }
 
 fn document(title: &str, places: &[Place]) -> String {

@@ -101,6 +101,19 @@ pub enum TaskState {
     Done,
 }
 
+impl TaskState {
+    /// Its name.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Open => "open",
+            Self::Cancelled => "cancelled",
+            Self::Expired => "expired",
+            Self::Done => "done",
+        }
+    }
+}
+
 /// A place, in whole millimetres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct TaskPlace {
