@@ -17,6 +17,7 @@ mod observe;
 mod onlookers;
 mod page;
 mod peer;
+mod places;
 mod plan;
 mod replay;
 mod report;

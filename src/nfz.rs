@@ -2,14 +2,15 @@
 
 use crate::console::{AtArgs, Refusal, look, say};
 use crate::exit;
+use crate::places::{corner, numbers, origin, pairs, place, words};
 use crate::plan::zone_input::{self, Polygons};
 use clap::{ArgGroup, Args, Subcommand};
 use serde_json::{Value, json};
 use skein_console::{Command, NewZone};
 use skein_geometry::frame::{Origin, Point};
-use skein_interop::place::{LatLon, Side, circle_ring, from_plane, to_plane};
+use skein_interop::place::{LatLon, Side, circle_ring, to_plane};
 use skein_peer::Overview;
-use skein_peer::mission::{PointMm, point_m, ring_mm};
+use skein_peer::mission::{PointMm, ring_mm};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -65,24 +66,6 @@ pub struct AddArgs {
     pub id: Option<String>,
 }
 
-fn numbers(text: &str) -> Option<Vec<f64>> {
-    let number = |part: &str| part.trim().parse().ok().filter(|x: &f64| x.is_finite());
-    text.split(',').map(number).collect()
-}
-
-fn place(lat_deg: f64, lon_deg: f64) -> Option<LatLon> {
-    let on_earth = lat_deg.abs() <= 90.0 && lon_deg.abs() <= 180.0;
-    on_earth.then_some(LatLon { lat_deg, lon_deg })
-}
-
-pub(crate) fn corner(text: &str) -> Result<LatLon, String> {
-    let found = match numbers(text).as_deref() {
-        Some([lat_deg, lon_deg]) => place(*lat_deg, *lon_deg),
-        _ => None,
-    };
-    found.ok_or_else(|| "write degrees north and east, for example 60.1655,24.9355".to_owned())
-}
-
 fn circle(text: &str) -> Result<(LatLon, f64), String> {
     let found = match numbers(text).as_deref() {
         Some([lat_deg, lon_deg, radius_m]) if (1.0..=20_000.0).contains(radius_m) => {
@@ -124,13 +107,6 @@ pub fn run(args: &NfzArgs) -> anyhow::Result<ExitCode> {
             }
             Err(refusal) => Ok(refusal.told()),
         },
-    }
-}
-
-fn origin(overview: &Overview) -> Origin {
-    Origin {
-        lat_deg: overview.origin_lat_deg,
-        lon_deg: overview.origin_lon_deg,
     }
 }
 
@@ -176,19 +152,9 @@ fn zones(args: &AddArgs, origin: Origin) -> Result<Vec<NewZone>, Refusal> {
     Ok(read.keep_out.iter().enumerate().map(named).collect())
 }
 
-fn degrees(overview: &Overview, ring: &[PointMm]) -> Vec<LatLon> {
-    let origin = origin(overview);
-    ring.iter()
-        .map(|p| from_plane(origin, point_m(*p)))
-        .collect()
-}
-
 fn as_json(overview: &Overview) -> Value {
-    let zone = |(name, ring): (&String, &Vec<PointMm>)| {
-        let corners = degrees(overview, ring).into_iter();
-        let corners: Vec<[f64; 2]> = corners.map(|p| [p.lat_deg, p.lon_deg]).collect();
-        json!({ "name": name, "corners_lat_lon_deg": corners })
-    };
+    let origin = origin(overview);
+    let zone = |(name, ring): (&String, &Vec<PointMm>)| json!({ "name": name, "corners_lat_lon_deg": pairs(origin, ring) });
     let zones: Vec<Value> = overview.added_zones.iter().map(zone).collect();
     json!({ "revision": overview.revision, "zones": zones })
 }
@@ -197,13 +163,8 @@ fn as_text(overview: &Overview) -> String {
     if overview.added_zones.is_empty() {
         return format!("revision {}: no zone was added", overview.revision);
     }
-    let line = |(name, ring): (&String, &Vec<PointMm>)| {
-        let corners: Vec<String> = degrees(overview, ring)
-            .into_iter()
-            .map(|p| format!("{:.6},{:.6}", p.lat_deg, p.lon_deg))
-            .collect();
-        format!("{name}  {}", corners.join(" "))
-    };
+    let origin = origin(overview);
+    let line = |(name, ring): (&String, &Vec<PointMm>)| format!("{name}  {}", words(origin, ring));
     let lines: Vec<String> = overview.added_zones.iter().map(line).collect();
     lines.join("\n")
 }

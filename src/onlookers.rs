@@ -5,7 +5,7 @@ use crate::page::TrialName;
 use crate::{cli, log, page};
 use skein_netsim::fault::Fault;
 use skein_recording::sink::Tee;
-use skein_recording::{End, Event, Frame, Record, Scene, Sink};
+use skein_recording::{Record, Sink};
 use skein_terminal::picture::Knowledge;
 use skein_terminal::show::Kill;
 use skein_terminal::{Left, Look, Options, Pace, show};
@@ -31,22 +31,6 @@ impl Onlookers {
 }
 
 impl Sink for Onlookers {
-    fn scene(&mut self, scene: &Scene) -> io::Result<()> {
-        self.take(&Record::Scene(Box::new(scene.clone())))
-    }
-
-    fn frame(&mut self, frame: &Frame) -> io::Result<()> {
-        self.take(&Record::Frame(frame.clone()))
-    }
-
-    fn event(&mut self, event: &Event) -> io::Result<()> {
-        self.take(&Record::Event(event.clone()))
-    }
-
-    fn end(&mut self, end: &End) -> io::Result<()> {
-        self.take(&Record::End(end.clone()))
-    }
-
     fn take(&mut self, record: &Record) -> io::Result<()> {
         for why in self.0.give(record) {
             if why.kind() != io::ErrorKind::BrokenPipe {
@@ -163,6 +147,20 @@ impl Map {
         let shown = self.thread.join();
         log::release();
         shown.unwrap_or_else(|_| Err(io::Error::other("the map panicked")))
+    }
+}
+
+/// Ends when the program is asked to stop, or the map was left.
+pub fn asked_to_stop(map: Option<&mut Map>) -> impl Future<Output = ()> + use<> {
+    let left = map.map(Map::left);
+    async move {
+        match left {
+            Some(left) => tokio::select! {
+                () = left => {}
+                () = cli::asked_to_stop() => {}
+            },
+            None => cli::asked_to_stop().await,
+        }
     }
 }
 

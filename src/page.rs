@@ -21,6 +21,16 @@ pub struct WebArgs {
     pub web: Option<u16>,
 }
 
+impl WebArgs {
+    /// Serves the page, if one is wanted.
+    ///
+    /// # Errors
+    /// As [`Page::open`].
+    pub fn open(self, hello: &Hello) -> Result<Option<Page>, ServerError> {
+        self.web.map(|port| Page::open(port, hello)).transpose()
+    }
+}
+
 fn port(text: &str) -> Result<u16, String> {
     let wrong = "write a port from 1 to 65535 behind --web, or nothing; a scenario goes before it";
     text.parse().map_err(|_| wrong.to_owned())

@@ -58,11 +58,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
     let title = args.file.display().to_string();
     let command = format!("skein replay {title} --web");
     let hello = hello(Mode::Replay, title.clone(), command);
-    let page = args
-        .web
-        .web
-        .map(|port| Page::open(port, &hello))
-        .transpose()?;
+    let page = args.web.open(&hello)?;
     let mut sinks: Vec<Box<dyn Sink>> = page.iter().map(Page::sink).collect();
     let mut map = None;
     if page.is_none() {

@@ -49,3 +49,9 @@ fn page(path: &Path) -> Result<String, String> {
     let kept = run_dir::open(path).map_err(|e| e.to_string())?;
     Ok(skein_report::run(&kept))
 }
+
+/// Says on stderr where a run was recorded, and what to do with it.
+pub fn tell_recorded(dir: &Path) {
+    let dir = dir.display();
+    eprintln!("recorded in {dir}: skein report {dir} -o report.html");
+}

@@ -5,7 +5,7 @@ use crate::check::Format;
 use crate::onlookers::{Map, NoTerminal, Onlookers, Shows, stop_when_asked};
 use crate::page::{Page, WebArgs, hello};
 use crate::scenario_args::ScenarioArgs;
-use crate::{chaos, exit};
+use crate::{chaos, exit, report};
 use anyhow::Context;
 use clap::Args;
 use skein_broker::batch::{self, Batch};
@@ -172,8 +172,7 @@ fn one(args: &SimArgs, prepared: &Prepared) -> anyhow::Result<bool> {
         manifest
             .conclude(dir, &outcome.report)
             .with_context(|| format!("cannot write into {}", dir.display()))?;
-        let dir = dir.display();
-        eprintln!("recorded in {dir}: skein report {dir} -o report.html");
+        report::tell_recorded(dir);
     }
     if let Some(path) = &args.history {
         let file = std::fs::File::create(path)
@@ -264,11 +263,7 @@ fn map(
 fn page(args: &SimArgs, prepared: &Prepared, seed: u64) -> anyhow::Result<Option<Page>> {
     let title = format!("{}, seed {seed}", prepared.spec.name);
     let hello = hello(Mode::Sim, title, format!("{} --web", replay(args, seed)));
-    Ok(args
-        .web
-        .web
-        .map(|port| Page::open(port, &hello))
-        .transpose()?)
+    Ok(args.web.open(&hello)?)
 }
 
 fn many(args: &SimArgs, prepared: &Prepared, seeds: Seeds) -> anyhow::Result<bool> {

@@ -2,14 +2,14 @@
 
 use crate::console::{AtArgs, Refusal, look, say};
 use crate::exit;
-use crate::nfz::corner;
+use crate::places::{corner, origin, pairs, words};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use skein_console::Command;
 use skein_geometry::frame::Origin;
-use skein_interop::place::{LatLon, from_plane, to_plane};
+use skein_interop::place::{LatLon, to_plane};
 use skein_peer::input::{NewTask, TaskEdit};
-use skein_peer::mission::{mm, point_m};
+use skein_peer::mission::mm;
 use skein_peer::wire::tasks::{SENSORS, TaskKind, WORTH_MAX, sensor_of_name};
 use skein_peer::{Overview, TaskView};
 use std::process::ExitCode;
@@ -109,10 +109,7 @@ pub fn run(args: &TaskArgs) -> anyhow::Result<ExitCode> {
         Ok((overview, _)) => overview,
         Err(refusal) => return Ok(refusal.told()),
     };
-    let origin = Origin {
-        lat_deg: overview.origin_lat_deg,
-        lon_deg: overview.origin_lon_deg,
-    };
+    let origin = origin(&overview);
     match &args.what {
         What::Add(add) => match asked(add, origin) {
             Ok(task) => say(&args.at, &Command::Task(TaskEdit::Add(task))),
@@ -151,16 +148,7 @@ fn asked(add: &Add, origin: Origin) -> Result<NewTask, Refusal> {
     })
 }
 
-fn places(task: &TaskView, origin: Origin) -> Vec<LatLon> {
-    let places = task.places_mm.iter();
-    places.map(|p| from_plane(origin, point_m(*p))).collect()
-}
-
 fn as_json(task: &TaskView, origin: Origin) -> Value {
-    let places: Vec<[f64; 2]> = places(task, origin)
-        .iter()
-        .map(|p| [p.lat_deg, p.lon_deg])
-        .collect();
     let held: Vec<Value> = task
         .held_by
         .iter()
@@ -170,7 +158,7 @@ fn as_json(task: &TaskView, origin: Origin) -> Value {
         "name": task.name,
         "kind": task.kind,
         "state": task.state,
-        "places_lat_lon_deg": places,
+        "places_lat_lon_deg": pairs(origin, &task.places_mm),
         "radius_m": f64::from(task.radius_mm) / 1000.0,
         "needs": task.needs,
         "worth": task.worth,
@@ -188,16 +176,8 @@ fn as_text(tasks: &[TaskView], origin: Origin) -> String {
         return "no task was asked for".to_owned();
     }
     let line = |task: &TaskView| {
-        let places: Vec<String> = places(task, origin)
-            .iter()
-            .map(|p| format!("{:.6},{:.6}", p.lat_deg, p.lon_deg))
-            .collect();
-        let mut text = format!(
-            "{}  {}  {}",
-            task.name,
-            format!("{:?}", task.state).to_lowercase(),
-            places.join(" ")
-        );
+        let places = words(origin, &task.places_mm);
+        let mut text = format!("{}  {}  {places}", task.name, task.state.word());
         if let Some(by) = task.done_by {
             text += &format!("  by uav{by}");
         }

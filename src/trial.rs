@@ -4,7 +4,7 @@ use crate::check::Format;
 use crate::onlookers::{Map, Shows};
 use crate::page::{Page, TrialName, WebArgs, hello};
 use crate::scenario_args::ScenarioArgs;
-use crate::{cli, exit};
+use crate::{cli, exit, onlookers, report};
 use anyhow::Context;
 use clap::Args;
 use skein_broker::{Event, Options, Progress, TrialError};
@@ -106,7 +106,7 @@ pub fn run(args: &TrialArgs) -> anyhow::Result<ExitCode> {
         sinks,
         manifest,
     };
-    let stop = display.asked_to_stop();
+    let stop = onlookers::asked_to_stop(display.map.as_mut());
     let mut tell = |event: Event| display.show(event);
     let ended = cli::runtime()?.block_on(skein_broker::run(options, stop, &mut tell));
     let is_over = ended.is_ok();
@@ -169,11 +169,7 @@ impl Display {
             args.scenario.as_typed()
         );
         let hello = hello(Mode::Trial, title.clone(), command);
-        let page = args
-            .web
-            .web
-            .map(|port| Page::open(port, &hello))
-            .transpose()?;
+        let page = args.web.open(&hello)?;
         let trial = page.as_ref().map(Page::trial).unwrap_or_default();
         let mut sinks: Vec<Box<dyn Sink>> = page.iter().map(Page::sink).collect();
         let mut map = None;
@@ -195,20 +191,6 @@ impl Display {
             run_dir: None,
         };
         Ok((display, sinks))
-    }
-
-    /// Ends when the program is asked to stop, or the map was left.
-    fn asked_to_stop(&mut self) -> impl Future<Output = ()> + use<> {
-        let left = self.map.as_mut().map(Map::left);
-        async move {
-            match left {
-                Some(left) => tokio::select! {
-                    () = left => {}
-                    () = cli::asked_to_stop() => {}
-                },
-                None => cli::asked_to_stop().await,
-            }
-        }
     }
 
     fn show(&mut self, event: Event) {
@@ -245,8 +227,7 @@ impl Display {
         }
         self.held.iter().for_each(|line| eprintln!("{line}"));
         if let Some(dir) = self.run_dir.filter(|_| over) {
-            let dir = dir.display();
-            eprintln!("recorded in {dir}: skein report {dir} -o report.html");
+            report::tell_recorded(&dir);
         }
         self.page
     }

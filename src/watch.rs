@@ -1,6 +1,6 @@
 //! `skein watch`: a map of a running swarm, from nothing but what it says on the air.
 
-use crate::onlookers::{Map, Onlookers, Shows};
+use crate::onlookers::{Map, Onlookers, Shows, asked_to_stop};
 use crate::page::{Page, TrialName, WebArgs, hello};
 use crate::{cli, exit};
 use clap::Args;
@@ -114,11 +114,7 @@ pub fn run(args: &WatchArgs) -> anyhow::Result<ExitCode> {
     let title = swarm.title();
     let command = format!("skein watch {title} --web");
     let hello = hello(Mode::Watch, title.clone(), command);
-    let page = args
-        .web
-        .web
-        .map(|port| Page::open(port, &hello))
-        .transpose()?;
+    let page = args.web.open(&hello)?;
     let name = page.as_ref().map(Page::trial).unwrap_or_default();
     if let Some(trial) = &swarm.trial {
         // Nobody else has named it.
@@ -137,17 +133,8 @@ pub fn run(args: &WatchArgs) -> anyhow::Result<ExitCode> {
         sinks.push(sink);
         map = Some(opened);
     }
-    let left = map.as_mut().map(Map::left);
+    let stop = asked_to_stop(map.as_mut());
     let mut sinks = Onlookers::new(sinks);
-    let stop = async move {
-        match left {
-            Some(left) => tokio::select! {
-                () = left => {}
-                () = cli::asked_to_stop() => {}
-            },
-            None => cli::asked_to_stop().await,
-        }
-    };
     let gone = runtime.block_on(listen(&swarm, observer, first, &mut sinks, stop));
     drop(sinks);
     if let Some(map) = map {

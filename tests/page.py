@@ -23,21 +23,10 @@ import urllib.error
 import urllib.request
 from pathlib import Path
 
+import own_python
+
 ROOT = Path(__file__).resolve().parent.parent
-VENV = ROOT / "target" / "page-python"
 SIZES = ((1280, 800), (390, 844))
-
-
-def in_own_python():
-    """Goes on in the Python with the packages, which is made if it is not there."""
-    python = VENV / "bin" / "python"
-    if Path(sys.prefix).resolve() == VENV.resolve():
-        return
-    if not python.exists():
-        subprocess.run([sys.executable, "-m", "venv", str(VENV)], check=True)
-    pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([*pip, "-r", str(ROOT / "tests" / "requirements-page.txt")], check=True)
-    os.execv(str(python), [str(python), __file__, *sys.argv[1:]])
 
 
 def browser_program():
@@ -173,7 +162,7 @@ def main():
     parser.add_argument("--pictures", default=str(ROOT / "target" / "pictures"))
     parser.add_argument("--few", action="store_true")
     args = parser.parse_args()
-    in_own_python()
+    own_python.go_on_in("page-python", "requirements-page.txt")
     from playwright.sync_api import sync_playwright
 
     folder = Path(args.pictures)

@@ -20,26 +20,14 @@ import sys
 import tempfile
 from pathlib import Path
 
+import own_python
+
 ROOT = Path(__file__).resolve().parent.parent
-VENV = ROOT / "target" / "plans-python"
 TAKEOFFS, LANDINGS = (22, 84), (17, 20, 21, 85)
 WAYPOINT, SPEED, TRIGGER = 16, 178, 206
 LAND_START, LOITER_TO_ALT, LAND = 189, 31, 21
 FIXED_WING = 1
 RELATIVE, MISSION = 3, 2
-
-
-def in_own_python():
-    """Goes on in the Python with the packages, which is made if it is not there."""
-    python = VENV / "bin" / "python"
-    if Path(sys.prefix).resolve() == VENV.resolve():
-        return
-    if not python.exists():
-        subprocess.run([sys.executable, "-m", "venv", str(VENV)], check=True)
-    pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([*pip, "-r", str(ROOT / "tests" / "requirements-plans.txt")], check=True)
-    os.execv(str(python), [str(python), __file__, *sys.argv[1:]])
-
 
 RING = [[47.40, 8.54], [47.40, 8.55], [47.41, 8.55], [47.41, 8.54]]
 FENCE = {
@@ -376,5 +364,5 @@ def main():
 
 
 if __name__ == "__main__":
-    in_own_python()
+    own_python.go_on_in("plans-python", "requirements-plans.txt")
     main()

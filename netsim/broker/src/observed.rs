@@ -138,7 +138,6 @@ mod tests {
     use super::*;
     use skein_netsim::geometry_of;
     use skein_netsim::world::fixture::square;
-    use skein_recording::{End, Event, Frame, Scene};
     use std::io;
     use std::sync::Mutex;
 
@@ -159,16 +158,7 @@ mod tests {
     }
 
     impl Sink for Counting {
-        fn scene(&mut self, _: &Scene) -> io::Result<()> {
-            self.count()
-        }
-        fn frame(&mut self, _: &Frame) -> io::Result<()> {
-            self.count()
-        }
-        fn event(&mut self, _: &Event) -> io::Result<()> {
-            self.count()
-        }
-        fn end(&mut self, _: &End) -> io::Result<()> {
+        fn take(&mut self, _: &Record) -> io::Result<()> {
             self.count()
         }
     }

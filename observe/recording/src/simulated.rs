@@ -1,8 +1,8 @@
 //! A simulated run that is observed.
 
+use crate::model::Record;
 use crate::model::event::{Bid, Event, Origin, What as Said};
 use crate::model::scene::Driver;
-use crate::model::{Frame, Record};
 use crate::observer::Observer;
 use crate::sink::Sink;
 use skein_netsim::Prepared;
@@ -127,9 +127,9 @@ impl<'a> View<'a> {
         }
         self.n_told = swarm.history().entries().len();
         give(observer, self.sink)?;
-        let frame: Frame = observer.frame(swarm.world(), swarm.links(), &|id| swarm.runs(id));
+        let frame = observer.frame(swarm.world(), swarm.links(), &|id| swarm.runs(id));
         if self.framed_ms.replace(frame.time_ms) != Some(frame.time_ms) {
-            self.sink.frame(&frame)?;
+            self.sink.take(&Record::Frame(frame))?;
         }
         Ok(())
     }
@@ -170,6 +170,7 @@ fn bids(observer: &mut Observer, swarm: &Swarm, (time_ms, peer, counter): (u64, 
 mod tests {
     use super::*;
     use crate::cells::{Cell, Cells};
+    use crate::model::Frame;
     use crate::model::frame::State;
     use crate::sink::Collected;
     use skein_netsim::fault::{Fault, TimedFault};
@@ -264,17 +265,11 @@ mod tests {
         #[derive(Debug)]
         struct Full;
         impl Sink for Full {
-            fn scene(&mut self, _: &crate::model::Scene) -> io::Result<()> {
-                Ok(())
-            }
-            fn frame(&mut self, _: &Frame) -> io::Result<()> {
-                Err(io::ErrorKind::StorageFull.into())
-            }
-            fn event(&mut self, _: &Event) -> io::Result<()> {
-                Ok(())
-            }
-            fn end(&mut self, _: &crate::model::End) -> io::Result<()> {
-                Ok(())
+            fn take(&mut self, record: &Record) -> io::Result<()> {
+                match record {
+                    Record::Frame(_) => Err(io::ErrorKind::StorageFull.into()),
+                    _ => Ok(()),
+                }
             }
         }
         let why = fly(&prepared(), 4, None, Wanted::default(), &mut Full).unwrap_err();

@@ -10,42 +10,11 @@ use std::io;
 /// A sink is called by the driver itself and holds it up: whoever may wait for a disk, a socket
 /// or a screen hands the words to a thread of its own.
 pub trait Sink: Debug + Send {
-    /// What does not change until the next one.
+    /// One word.
     ///
     /// # Errors
     /// When it cannot be taken; the driver tells so once and gives no more.
-    fn scene(&mut self, scene: &Scene) -> io::Result<()>;
-
-    /// How everything stands, about twice a second of scenario time.
-    ///
-    /// # Errors
-    /// As [`Sink::scene`].
-    fn frame(&mut self, frame: &Frame) -> io::Result<()>;
-
-    /// Something happened.
-    ///
-    /// # Errors
-    /// As [`Sink::scene`].
-    fn event(&mut self, event: &Event) -> io::Result<()>;
-
-    /// The run is over.
-    ///
-    /// # Errors
-    /// As [`Sink::scene`].
-    fn end(&mut self, end: &End) -> io::Result<()>;
-
-    /// Any of them.
-    ///
-    /// # Errors
-    /// As [`Sink::scene`].
-    fn take(&mut self, record: &Record) -> io::Result<()> {
-        match record {
-            Record::Scene(scene) => self.scene(scene),
-            Record::Frame(frame) => self.frame(frame),
-            Record::Event(event) => self.event(event),
-            Record::End(end) => self.end(end),
-        }
-    }
+    fn take(&mut self, record: &Record) -> io::Result<()>;
 }
 
 /// A whole run in memory.
@@ -62,23 +31,13 @@ pub struct Collected {
 }
 
 impl Sink for Collected {
-    fn scene(&mut self, scene: &Scene) -> io::Result<()> {
-        self.scenes.push(scene.clone());
-        Ok(())
-    }
-
-    fn frame(&mut self, frame: &Frame) -> io::Result<()> {
-        self.frames.push(frame.clone());
-        Ok(())
-    }
-
-    fn event(&mut self, event: &Event) -> io::Result<()> {
-        self.events.push(event.clone());
-        Ok(())
-    }
-
-    fn end(&mut self, end: &End) -> io::Result<()> {
-        self.end = Some(end.clone());
+    fn take(&mut self, record: &Record) -> io::Result<()> {
+        match record {
+            Record::Scene(scene) => self.scenes.push(Scene::clone(scene)),
+            Record::Frame(frame) => self.frames.push(frame.clone()),
+            Record::Event(event) => self.events.push(event.clone()),
+            Record::End(end) => self.end = Some(end.clone()),
+        }
         Ok(())
     }
 }

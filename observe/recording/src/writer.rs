@@ -158,9 +158,20 @@ impl Writer {
 }
 
 impl Sink for Writer {
+    fn take(&mut self, record: &Record) -> io::Result<()> {
+        self.cells.hear(record);
+        match record {
+            Record::Scene(scene) => self.scene(scene),
+            Record::Frame(frame) => self.frame(frame),
+            Record::Event(event) => self.event(event),
+            Record::End(end) => self.end(end),
+        }
+    }
+}
+
+impl Writer {
     fn scene(&mut self, scene: &Scene) -> io::Result<()> {
         self.scene = scene.clone();
-        self.cells.hear(&Record::Scene(Box::new(scene.clone())));
         self.write(channels::SCENE, scene.time_ms, scene)?;
         let site = foxglove::geojson(foxglove::site(scene));
         self.write(channels::SITE, scene.time_ms, &site)?;
@@ -181,7 +192,6 @@ impl Sink for Writer {
     }
 
     fn event(&mut self, event: &Event) -> io::Result<()> {
-        self.cells.happen(event);
         self.write(channels::EVENT, event.time_ms, event)?;
         self.write(channels::LOG, event.time_ms, &foxglove::log(event))
     }

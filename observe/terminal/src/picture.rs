@@ -393,4 +393,4 @@ fn stroke(
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -130,20 +130,8 @@ fn holds(corners: &[Point], p: Point) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::picture::tests::square;
     use skein_recording::model::scene::{Cell, Zone};
-
-    fn square(east_m: f64, north_m: f64, side_m: f64) -> Ring {
-        let corner = |e: f64, n: f64| [east_m + e * side_m, north_m + n * side_m];
-        Ring {
-            east_north_m: vec![
-                corner(0.0, 0.0),
-                corner(1.0, 0.0),
-                corner(1.0, 1.0),
-                corner(0.0, 1.0),
-            ],
-            ..Ring::default()
-        }
-    }
 
     #[test]
     fn cells_and_zones_stand_where_they_lie_however_small() {

@@ -2,7 +2,7 @@
 //! ahead of who looks at it than this, and a trial, which may not be held up, loses frames
 //! where nobody takes them.
 
-use skein_recording::{End, Event, Frame, Record, Scene, Sink};
+use skein_recording::{Record, Sink};
 use std::io;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
@@ -33,22 +33,6 @@ pub fn line(full: Full) -> (Line, Receiver<Record>) {
 }
 
 impl Sink for Line {
-    fn scene(&mut self, scene: &Scene) -> io::Result<()> {
-        self.take(&Record::Scene(Box::new(scene.clone())))
-    }
-
-    fn frame(&mut self, frame: &Frame) -> io::Result<()> {
-        self.take(&Record::Frame(frame.clone()))
-    }
-
-    fn event(&mut self, event: &Event) -> io::Result<()> {
-        self.take(&Record::Event(event.clone()))
-    }
-
-    fn end(&mut self, end: &End) -> io::Result<()> {
-        self.take(&Record::End(end.clone()))
-    }
-
     fn take(&mut self, record: &Record) -> io::Result<()> {
         let gone = || io::Error::from(io::ErrorKind::BrokenPipe);
         if self.full == Full::SkipFrames && matches!(record, Record::Frame(_)) {
@@ -64,23 +48,24 @@ impl Sink for Line {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use skein_recording::Frame;
 
     #[test]
     fn frames_are_left_out_where_nobody_takes_them_and_nothing_else() {
         let (mut sink, out) = line(Full::SkipFrames);
-        sink.scene(&Scene::default()).unwrap();
+        sink.take(&Record::Scene(Box::default())).unwrap();
         for time_ms in 0..=WORDS as u64 {
             let frame = Frame {
                 time_ms,
                 ..Frame::default()
             };
-            sink.frame(&frame).unwrap();
+            sink.take(&Record::Frame(frame)).unwrap();
         }
         let came: Vec<Record> = out.try_iter().collect();
         assert_eq!(came.len(), WORDS);
         assert!(matches!(came[0], Record::Scene(_)));
         drop(out);
-        assert!(sink.frame(&Frame::default()).is_err());
-        assert!(sink.scene(&Scene::default()).is_err());
+        assert!(sink.take(&Record::Frame(Frame::default())).is_err());
+        assert!(sink.take(&Record::Scene(Box::default())).is_err());
     }
 }

@@ -1,59 +1,25 @@
 //! A run as text: one word of the model a line, as a JSON object with the kind of the word as its
 //! one field.
 
-use serde::{Deserialize, Serialize};
-use skein_recording::{End, Event, Frame, Record, Scene, Sink};
+use skein_recording::{Record, Sink};
 use std::fmt::Debug;
 use std::io::{self, BufRead, Read as _, Write};
 
 /// The longest line that is read, bytes: a scene of 65,000 cells takes half of it.
 const LINE_BYTES: u64 = 64 << 20;
 
-#[derive(Serialize)]
-#[serde(rename_all = "snake_case")]
-enum Told<'a> {
-    Scene(&'a Scene),
-    Frame(&'a Frame),
-    Event(&'a Event),
-    End(&'a End),
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum Word {
-    Scene(Box<Scene>),
-    Frame(Frame),
-    Event(Event),
-    End(End),
-}
-
 /// Writes lines.
 #[derive(Debug)]
 pub struct Lines<W>(pub W);
 
-impl<W: Write> Lines<W> {
-    fn line(&mut self, word: &Told<'_>) -> io::Result<()> {
-        serde_json::to_writer(&mut self.0, word)?;
-        self.0.write_all(b"\n")
-    }
-}
-
 impl<W: Write + Debug + Send> Sink for Lines<W> {
-    fn scene(&mut self, scene: &Scene) -> io::Result<()> {
-        self.line(&Told::Scene(scene))
-    }
-
-    fn frame(&mut self, frame: &Frame) -> io::Result<()> {
-        self.line(&Told::Frame(frame))
-    }
-
-    fn event(&mut self, event: &Event) -> io::Result<()> {
-        self.line(&Told::Event(event))
-    }
-
-    fn end(&mut self, end: &End) -> io::Result<()> {
-        self.line(&Told::End(end))?;
-        self.0.flush()
+    fn take(&mut self, record: &Record) -> io::Result<()> {
+        serde_json::to_writer(&mut self.0, record)?;
+        self.0.write_all(b"\n")?;
+        match record {
+            Record::End(_) => self.0.flush(),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -113,12 +79,7 @@ fn next(file: &mut impl BufRead, line: usize) -> Option<Result<Record, ReadError
         }
         Ok(_) => {}
     }
-    let word = serde_json::from_slice(&bytes).map(|word| match word {
-        Word::Scene(scene) => Record::Scene(scene),
-        Word::Frame(frame) => Record::Frame(frame),
-        Word::Event(event) => Record::Event(event),
-        Word::End(end) => Record::End(end),
-    });
+    let word = serde_json::from_slice(&bytes);
     Some(word.map_err(|cause| ReadError::Word { line, cause }))
 }
 

@@ -2,7 +2,7 @@
 //! still gets the run from its beginning, with fewer frames where the run was long.
 
 use crate::words::{self, Hello};
-use skein_recording::{End, Event, Frame, Record, Scene, Sink};
+use skein_recording::{Record, Sink};
 use std::collections::VecDeque;
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -132,22 +132,6 @@ impl Log {
 pub struct FeedSink(Arc<Feed>);
 
 impl Sink for FeedSink {
-    fn scene(&mut self, scene: &Scene) -> io::Result<()> {
-        self.take(&Record::Scene(Box::new(scene.clone())))
-    }
-
-    fn frame(&mut self, frame: &Frame) -> io::Result<()> {
-        self.take(&Record::Frame(frame.clone()))
-    }
-
-    fn event(&mut self, event: &Event) -> io::Result<()> {
-        self.take(&Record::Event(event.clone()))
-    }
-
-    fn end(&mut self, end: &End) -> io::Result<()> {
-        self.take(&Record::End(end.clone()))
-    }
-
     fn take(&mut self, record: &Record) -> io::Result<()> {
         self.0.give(record);
         Ok(())
@@ -158,6 +142,7 @@ impl Sink for FeedSink {
 mod tests {
     use super::*;
     use crate::words::{Knowledge, Mode};
+    use skein_recording::{Frame, Scene};
 
     fn feed(limit_bytes: usize) -> Arc<Feed> {
         let hello = Hello {
@@ -184,13 +169,13 @@ mod tests {
     fn who_comes_late_gets_all_in_order() {
         let feed = feed(KEPT_BYTES);
         let scene = Scene::default();
-        feed.sink().scene(&scene).unwrap();
+        feed.sink().take(&Record::Scene(Box::new(scene))).unwrap();
         for time_ms in 0..300 {
             let frame = Frame {
                 time_ms,
                 ..Frame::default()
             };
-            feed.sink().frame(&frame).unwrap();
+            feed.sink().take(&Record::Frame(frame)).unwrap();
         }
         let all = all(&feed);
         let numbers: Vec<u64> = all.iter().map(|w| w.number).collect();

@@ -95,7 +95,8 @@ pub struct End {
 }
 
 /// One word of a run.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Record {
     /// What does not change until the next one.
     Scene(Box<Scene>),

@@ -20,7 +20,7 @@ fn place(east_m: f64, north_m: f64) -> Place {
     }
 }
 
-fn square(east_m: f64, north_m: f64, side_m: f64) -> Ring {
+pub(crate) fn square(east_m: f64, north_m: f64, side_m: f64) -> Ring {
     let corner = |e: f64, n: f64| [east_m + e * side_m, north_m + n * side_m];
     Ring {
         east_north_m: vec![
