@@ -4,9 +4,9 @@
 use crate::page::TrialName;
 use crate::{cli, log, page};
 use skein_netsim::fault::Fault;
+use skein_recording::model::Knowledge;
 use skein_recording::sink::Tee;
 use skein_recording::{Record, Sink};
-use skein_terminal::picture::Knowledge;
 use skein_terminal::show::Kill;
 use skein_terminal::{Left, Look, Options, Pace, show};
 use skein_view::line::{Full, line};

@@ -6,9 +6,10 @@ use skein_broker::control::{Request, command};
 use skein_broker::registry;
 use skein_netsim::fault::Fault;
 use skein_recording::Sink;
+use skein_recording::model::Knowledge;
 pub use skein_web::ServerError;
 use skein_web::server::Answer;
-use skein_web::{Faults, Feed, Hello, Knowledge, Mode, Server};
+use skein_web::{Faults, Feed, Hello, Mode, Server};
 use std::sync::{Arc, OnceLock};
 use tokio::runtime::Runtime;
 

@@ -8,7 +8,7 @@ use skein_broker::registry::{self, Entry};
 use skein_node::bus::{Observed, Observer};
 use skein_peer::Mission;
 use skein_recording::Sink;
-use skein_terminal::picture::Knowledge;
+use skein_recording::model::Knowledge;
 use skein_terminal::{Pace, screen};
 use skein_view::Belief;
 use skein_web::Mode;

@@ -10,6 +10,7 @@ use ratatui::style::{Modifier, Style};
 use ratatui::text::{Line, Span};
 use skein_geometry::frame::Point;
 use skein_recording::cells::Cell;
+use skein_recording::model::Knowledge;
 use skein_recording::model::event::Origin;
 use skein_recording::model::frame::{State, UavState};
 use skein_recording::{Event, Scene};
@@ -23,15 +24,6 @@ const LEAST_WIDTH: u16 = 64;
 
 /// Lines of events below the map.
 const EVENT_LINES: u16 = 5;
-
-/// Who knows what the map shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Knowledge {
-    /// The simulated world.
-    World,
-    /// The swarm's own records.
-    Swarm,
-}
 
 /// What a person has chosen, and what stays between two pictures.
 #[derive(Debug)]

@@ -2,11 +2,12 @@
 
 use crate::keys::{Wish, wish};
 use crate::look::Look;
-use crate::picture::{Knowledge, Picture};
+use crate::picture::Picture;
 use crate::player::{Pace, Player};
 use crate::screen::Screen;
 use crossterm::event;
 use skein_recording::Record;
+use skein_recording::model::Knowledge;
 use skein_view::Standing;
 use std::fmt;
 use std::io;

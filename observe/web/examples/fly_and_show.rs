@@ -3,9 +3,10 @@
 
 use skein_netsim::Prepared;
 use skein_netsim::runs::Wanted;
+use skein_recording::model::Knowledge;
 use skein_recording::simulated;
 use skein_scenario::{Overrides, open};
-use skein_web::{Feed, Hello, Knowledge, Mode, Server};
+use skein_web::{Feed, Hello, Mode, Server};
 use std::error::Error;
 
 #[tokio::main]

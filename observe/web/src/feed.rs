@@ -141,7 +141,8 @@ impl Sink for FeedSink {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::words::{Knowledge, Mode};
+    use crate::words::Mode;
+    use skein_recording::model::Knowledge;
     use skein_recording::{Frame, Scene};
 
     fn feed(limit_bytes: usize) -> Arc<Feed> {

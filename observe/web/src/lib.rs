@@ -23,4 +23,4 @@ mod words;
 
 pub use feed::{Feed, FeedSink};
 pub use server::{Faults, Server, ServerError};
-pub use words::{Hello, Knowledge, Mode};
+pub use words::{Hello, Mode};

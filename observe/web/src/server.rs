@@ -269,7 +269,8 @@ async fn fault(State(shared): State<Shared>, headers: HeaderMap, body: Bytes) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::words::{Hello, Knowledge, Mode};
+    use crate::words::{Hello, Mode};
+    use skein_recording::model::Knowledge;
     use std::sync::Mutex;
     use tokio::io::{AsyncReadExt, AsyncWriteExt};
     use tokio::net::TcpStream;

@@ -7,7 +7,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use skein_recording::model::frame::UavState;
-use skein_recording::model::{End, Event, Frame, Record, Ring, Scene};
+use skein_recording::model::{End, Event, Frame, Knowledge, Record, Ring, Scene};
 
 /// What is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -21,16 +21,6 @@ pub enum Mode {
     Watch,
     /// A recording.
     Replay,
-}
-
-/// Who knows what frames say.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Knowledge {
-    /// The simulated world: it is true.
-    World,
-    /// The swarm's own records: it is believed, and as old as the radio makes it.
-    Swarm,
 }
 
 /// What a page is told first.

@@ -121,6 +121,16 @@ impl Record {
     }
 }
 
+/// Who knows what a run shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Knowledge {
+    /// The simulated world: it is true.
+    World,
+    /// The swarm's own records: it is believed, and as old as the radio makes it.
+    Swarm,
+}
+
 /// To the nearest of so many parts of one.
 pub(crate) fn rounded(x: f64, parts: f64) -> f64 {
     // Adding zero makes no difference but to the sign of zero, which people need not see.
