@@ -143,7 +143,7 @@ fn main() -> ExitCode {
     for seed in seeds {
         let mut site = Site::of(seed);
         site.manner.n_uavs = uavs;
-        let Ok(request) = planned::request(&site, Planners::Only(Planner::Exact)) else {
+        let Ok(request) = planned::request(&site, Planners::Only(Planner::Exact), false) else {
             continue;
         };
         let free = AreaRequest {

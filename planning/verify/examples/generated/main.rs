@@ -1,7 +1,7 @@
 //! Plans generated sites and recounts each plan.
 //!
-//! `cargo run --release -p skein-verify --example generated -- 0..10000 [exact|approximate]`
-//! prints a line for each site whose plan breaks a rule or whose planning panics, and a
+//! `cargo run --release -p skein-verify --example generated -- 0..10000 [exact|approximate]
+//! [quick]` prints a line for each site whose plan breaks a rule or whose planning panics, and a
 //! summary; the exit code is 1 if there is one. `-- write 17 DIR` writes the files of a site,
 //! and prints how `skein plan cover` is asked for it.
 
@@ -101,7 +101,7 @@ impl Tally {
     }
 }
 
-fn run(seeds: &Range<u64>, planners: Planners) -> bool {
+fn run(seeds: &Range<u64>, planners: Planners, quick: bool) -> bool {
     let said: Arc<Mutex<String>> = Arc::default();
     let heard = said.clone();
     set_hook(Box::new(move |info| {
@@ -114,7 +114,7 @@ fn run(seeds: &Range<u64>, planners: Planners) -> bool {
     for seed in seeds.clone() {
         let site = Site::of(seed);
         let at = Instant::now();
-        match catch_unwind(AssertUnwindSafe(|| outcome(&site, planners))) {
+        match catch_unwind(AssertUnwindSafe(|| outcome(&site, planners, quick))) {
             Ok(outcome) => tally.add(seed, &site, outcome),
             Err(_) => {
                 tally.panics.push(seed);
@@ -169,17 +169,23 @@ fn main() -> ExitCode {
         Some(from.parse().ok()?..to.parse().ok()?)
     };
     let asked = args.first().and_then(|text| range(text));
-    let planners = match args.get(1) {
+    let (quick, kinds) = match args.split_last() {
+        Some((&"quick", before)) => (true, before),
+        _ => (false, args.as_slice()),
+    };
+    let planners = match kinds.get(1) {
         None => Some(Planners::Both),
         Some(&"exact") => Some(Planners::Only(Planner::Exact)),
         Some(&"approximate") => Some(Planners::Only(Planner::Approximate)),
         Some(_) => None,
     };
     let (Some(seeds), Some(planners)) = (asked, planners) else {
-        eprintln!("usage: generated FROM..TO [exact|approximate], or generated write SEED DIR");
+        eprintln!(
+            "usage: generated FROM..TO [exact|approximate] [quick], or generated write SEED DIR"
+        );
         return ExitCode::from(2);
     };
-    if run(&seeds, planners) {
+    if run(&seeds, planners, quick) {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE

@@ -24,7 +24,7 @@ fn polygon(ring: &[Point]) -> Result<Polygon, String> {
 ///
 /// # Errors
 /// Which of its rings is no polygon.
-pub fn request(site: &Site, planners: Planners) -> Result<AreaRequest, String> {
+pub fn request(site: &Site, planners: Planners, quick: bool) -> Result<AreaRequest, String> {
     let manner = &site.manner;
     let camera = Sensor::Swath {
         width_m: manner.swath_m,
@@ -50,6 +50,7 @@ pub fn request(site: &Site, planners: Planners) -> Result<AreaRequest, String> {
         look_ahead_m: manner.look_ahead_m,
         planners,
         steps: STEPS,
+        quick,
         ..AreaRequest::new(polygon(&site.area)?, team, manner.clearance_m, 60.0)
     })
 }
@@ -107,9 +108,9 @@ pub enum Outcome {
 }
 
 /// Plans a site and recounts the plan.
-pub fn outcome(site: &Site, planners: Planners) -> Outcome {
-    let planned =
-        request(site, planners).and_then(|r| area::plan(&r).map_err(|error| format!("{error:?}")));
+pub fn outcome(site: &Site, planners: Planners, quick: bool) -> Outcome {
+    let planned = request(site, planners, quick)
+        .and_then(|r| area::plan(&r).map_err(|error| format!("{error:?}")));
     let plan = match planned {
         Ok(plan) => plan,
         Err(why) => return Outcome::Refused(kind(&why)),
