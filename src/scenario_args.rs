@@ -2,6 +2,7 @@
 
 use clap::Args;
 use skein_scenario::{AreaPlanner, Launch, Overrides, Scenario, ScenarioError};
+use std::path::PathBuf;
 
 /// A scenario, and what of it is replaced.
 #[derive(Debug, Args)]
@@ -18,6 +19,9 @@ pub struct ScenarioArgs {
     /// round the coverage loop.
     #[arg(long, value_name = "WHERE")]
     pub launch: Option<Launch>,
+    /// Faults of this file instead of the scenario's, in the form of a plan for `skein chaos`.
+    #[arg(long, value_name = "FILE")]
+    pub faults: Option<PathBuf>,
 }
 
 impl ScenarioArgs {
@@ -37,7 +41,11 @@ impl ScenarioArgs {
             planner: self.planner.chosen(),
             launch: self.launch,
         };
-        skein_scenario::open(self.scenario.as_deref(), &over)
+        let scenario = skein_scenario::open(self.scenario.as_deref(), &over)?;
+        match &self.faults {
+            Some(file) => scenario.with_faults(file),
+            None => Ok(scenario),
+        }
     }
 
     /// The text of the scenario, as it can be read by now; empty where it cannot.
@@ -59,6 +67,7 @@ impl ScenarioArgs {
             flag(self.planner.exact, "--exact"),
             flag(self.planner.approximate, "--approximate"),
             self.launch.map(|l| format!("--launch {}", l.name())),
+            (self.faults.as_ref()).map(|file| format!("--faults {}", file.display())),
         ]
         .iter()
         .flatten()

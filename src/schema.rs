@@ -2,6 +2,7 @@
 
 use crate::exit;
 use clap::Args;
+use skein_interop::json::suggestion;
 use skein_peer::wire::kinds::Kind;
 use skein_peer::wire::schema::{self, ENVELOPE_NAME};
 use std::fmt::Write as _;
@@ -30,8 +31,8 @@ pub fn run(args: &SchemaArgs) -> anyhow::Result<ExitCode> {
     let Some((_, found)) = schema::all().find(|(known, _)| *known == name) else {
         let names: Vec<&str> = schema::all().map(|(name, _)| name).collect();
         eprintln!(
-            "error: no kind is called {name:?}; there are {}",
-            names.join(", ")
+            "error: no kind is called {name:?}; {}",
+            suggestion(name, &names)
         );
         return Ok(ExitCode::from(exit::USAGE));
     };

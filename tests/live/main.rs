@@ -6,6 +6,8 @@
 //! whole machine; where two are to run side by side, one test starts both.
 
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod mistakes;
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod operator;
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod support;

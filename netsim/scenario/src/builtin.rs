@@ -4,6 +4,7 @@ use crate::error::ScenarioError;
 use crate::files::Files;
 use crate::request::Overrides;
 use crate::resolve::{Scenario, parse_with};
+use skein_interop::json::suggestion;
 
 /// The scenario that is run when none is named.
 pub const DEFAULT: &str = "helsinki";
@@ -111,8 +112,8 @@ pub fn load_builtin(name: &str, over: &Overrides) -> Result<Scenario, ScenarioEr
         None => Err(ScenarioError::Unreadable {
             file: name.to_owned(),
             problem: format!(
-                "no such file, and no built-in scenario of that name; built in: {}",
-                names().join(", ")
+                "no such file, and no built-in scenario of that name; {}",
+                suggestion(name, &names())
             ),
         }),
     }

@@ -51,6 +51,7 @@ pub use read::faults::{chaos_plan, load_chaos_plan};
 pub use request::{AreaPlanner, Launch, Overrides, Seeds};
 pub use resolve::{Scenario, parse_with};
 
+use skein_interop::json::suggestion;
 use skein_netsim::spec::Spec;
 use std::path::Path;
 
@@ -108,8 +109,8 @@ pub fn open(target: Option<&str>, over: &Overrides) -> Result<Scenario, Scenario
     }
     if !path.exists() {
         let problem = format!(
-            "no such file, and no built-in scenario of that name; built in: {}",
-            builtin::names().join(", ")
+            "no such file, and no built-in scenario of that name; {}",
+            suggestion(target, &builtin::names())
         );
         return Err(ScenarioError::Unreadable {
             file: target.to_owned(),

@@ -8,6 +8,7 @@ use crate::files::Files;
 use crate::forecast::{self, Forecast};
 use crate::mission::mission;
 use crate::mission::traffic_range_m;
+use crate::read::faults::load_chaos_plan;
 use crate::read::fleet::{Fleet, Member};
 use crate::read::targets::Asked;
 use crate::read::{self, Stated, operator};
@@ -17,6 +18,8 @@ use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{Spec, UavSpec};
 use skein_netsim::world::Survey;
 use skein_peer::offload::MissionGeometry;
+use std::collections::BTreeSet;
+use std::path::Path;
 use std::sync::Arc;
 
 /// A scenario, resolved, and all that was noticed on the way.
@@ -66,6 +69,19 @@ impl Scenario {
         let (found, summary) = feasibility::with_geometry(&spec, &geometry, &survey);
         let mut findings = stated.findings.clone();
         for finding in found {
+            let elsewhere =
+                (stated.faults_of.as_ref()).filter(|_| finding.field.starts_with("faults"));
+            if let Some(file) = elsewhere {
+                let told = format!("{}: {}", finding.field, finding.problem);
+                if finding.severity == Severity::Error {
+                    return Err(ScenarioError::Unreadable {
+                        file: file.clone(),
+                        problem: told,
+                    });
+                }
+                findings.push(finding);
+                continue;
+            }
             if finding.severity == Severity::Error {
                 let error = stated.places.wrong(&finding.field, finding.problem);
                 return Err(error.into());
@@ -83,6 +99,28 @@ impl Scenario {
             summary,
             findings,
             stated,
+        })
+    }
+
+    /// The same scenario with the faults of a plan, a file, instead of its own. What its
+    /// operator does stays.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] names the place of what is wrong with the plan.
+    pub fn with_faults(&self, plan: &Path) -> Result<Self, ScenarioError> {
+        self.faulty(&load_chaos_plan(plan, Some(&self.peers()))?, plan)
+    }
+
+    fn peers(&self) -> BTreeSet<u16> {
+        let uavs = self.spec.uavs.iter().map(|u| u.id);
+        uavs.chain(self.spec.ground.iter().map(|g| g.id)).collect()
+    }
+
+    fn faulty(&self, faults: &[TimedFault], plan: &Path) -> Result<Self, ScenarioError> {
+        Self::of(Stated {
+            faults: faults.to_vec(),
+            faults_of: Some(plan.display().to_string()),
+            ..self.stated.clone()
         })
     }
 
@@ -200,6 +238,33 @@ mod tests {
         assert!((told[0].loop_m - told[1].loop_m).abs() > 1.0);
         let points = crate::open(Some("points"), &over).unwrap();
         assert!(points.side_by_side().is_empty());
+    }
+
+    #[test]
+    fn faults_of_a_plan_replace_those_of_the_scenario_and_are_blamed_by_its_name() {
+        let scenario = crate::load_builtin("helsinki", &Overrides::default()).unwrap();
+        let own = scenario.spec.clone();
+        let with = |name: &str, faults: &str| {
+            let text = format!("{{ faults: [{faults}] }}");
+            let faults = crate::chaos_plan(name, &text, Some(&scenario.peers()))?;
+            scenario.faulty(&faults, Path::new(name))
+        };
+        assert!(own.faults.len() > 2);
+        assert!(with("none.json5", "").unwrap().spec.faults.is_empty());
+        let one = with("one.json5", "{ at_s: 9, kind: 'kill', peer: 3 }").unwrap();
+        assert_eq!(one.spec.faults.len(), 1);
+        assert_eq!(one.spec.uavs, own.uavs);
+        let nobody = with("nobody.json5", "{ at_s: 9, kind: 'kill', peer: 33 }");
+        let why = nobody.unwrap_err().to_string();
+        assert!(why.contains("nobody.json5:1:"), "{why}");
+        let all: Vec<String> = (1..=8)
+            .map(|peer| format!("{{ at_s: 1, kind: 'kill', peer: {peer} }}"))
+            .collect();
+        let told = match with("all.json5", &all.join(", ")) {
+            Ok(s) => s.findings.iter().map(|f| f.problem.clone()).collect(),
+            Err(why) => why.to_string(),
+        };
+        assert!(!told.contains("helsinki.json5"), "{told}");
     }
 
     #[test]

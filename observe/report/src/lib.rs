@@ -14,6 +14,7 @@
 
 mod batch;
 mod chart;
+mod links;
 mod map;
 mod page;
 mod plots;

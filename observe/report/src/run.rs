@@ -1,5 +1,6 @@
 //! The page of one run.
 
+use crate::links::{Links, links};
 use crate::map;
 use crate::page::{Page, escaped, s, s_of};
 use crate::plots::{self, Run};
@@ -298,6 +299,17 @@ fn radio(page: &mut Page, r: &RunReport) {
     let cuts = r.radio.link_cuts.iter();
     rows.extend(cuts.map(|(reason, n)| vec![format!("links cut by {reason}"), n.to_string()]));
     page.table(&[], &rows);
+    match links(r) {
+        Some(Links::Matrix(drawn)) => page.plot(
+            &drawn,
+            "Kilobytes of records that arrived: a row for each transmitter, a column for each receiver. All that a receiver heard counts, also what it had heard before.",
+        ),
+        Some(Links::Busiest(rows)) => {
+            page.note("The links over which most arrived, of all pairs:");
+            page.table(&["transmitter", "receiver", "bytes"], &rows);
+        }
+        None => {}
+    }
     let by_kind = r.simulated.as_ref().map(|s| &s.bytes_by_kind);
     if let Some(kinds) = by_kind.filter(|k| !k.is_empty()) {
         let total: u64 = kinds.values().sum::<u64>().max(1);

@@ -16,6 +16,8 @@ pub struct RadioCounters {
     pub multi_hop: u64,
     /// Receptions of passed-on records, by who transmitted them, ascending.
     pub relayed_by: Vec<(u16, u64)>,
+    /// Bytes of records that arrived, by who transmitted and who received them, ascending.
+    pub bytes_by_link: Vec<((u16, u16), u64)>,
     /// Transmissions that did not arrive here, by reason, ascending.
     pub lost: Vec<(Reason, u64)>,
     /// Transmissions refused for their form: no attachment, too many hops.

@@ -58,7 +58,9 @@ pub struct BusConfig {
 #[derive(Debug, thiserror::Error)]
 pub enum BusError {
     /// The configuration would let packets leave this machine.
-    #[error("{0}: refused, nothing may listen or connect beyond 127.0.0.1")]
+    #[error(
+        "{0}: refused, nothing may listen or connect beyond 127.0.0.1; write tcp/127.0.0.1:PORT"
+    )]
     NotLoopback(String),
     /// Zenoh does not understand its configuration.
     #[error("transport configuration {key}: {cause}")]
@@ -292,11 +294,12 @@ impl Observer {
     /// # Errors
     /// Within 2 s, when nobody answers there or the expression is malformed.
     pub async fn open(endpoint: &str, key_expression: &str) -> Result<Self, BusError> {
+        loopback_address(endpoint)?;
         let effective = observer_config(endpoint)?;
         refuse_non_loopback(&effective)?;
         let failed = |cause: String| BusError::NoPeer {
             endpoint: endpoint.to_owned(),
-            cause,
+            cause: without_source(&cause),
         };
         let limit = Duration::from_millis(OBSERVER_CONNECT_MS);
         let session = match tokio::time::timeout(limit, zenoh::open(effective)).await {
@@ -474,6 +477,12 @@ pub fn refuse_non_loopback(config: &zenoh::Config) -> Result<(), BusError> {
         }
     }
     Ok(())
+}
+
+/// What the transport says, without the lines of its own source that it names.
+fn without_source(cause: &str) -> String {
+    let plain = cause.split(" at /").next().unwrap_or(cause);
+    plain.trim_end_matches('.').to_owned()
 }
 
 /// The address of an endpoint, which must be `tcp/127.0.0.1:PORT` and nothing more.

@@ -79,6 +79,8 @@ pub struct Radio {
     arrivals: u64,
     counters: RadioCounters,
     relayed_by: BTreeMap<u16, u64>,
+    /// Bytes that arrived, by who transmitted them.
+    bytes_from: BTreeMap<u16, u64>,
 }
 
 #[derive(Debug)]
@@ -124,6 +126,7 @@ impl Radio {
             arrivals: 0,
             counters: RadioCounters::default(),
             relayed_by: BTreeMap::new(),
+            bytes_from: BTreeMap::new(),
         }
     }
 
@@ -224,6 +227,7 @@ impl Radio {
 
     fn arrives(&mut self, at_us: u64, arrived: Arrived) {
         self.counters.received += 1;
+        *self.bytes_from.entry(arrived.transmitter).or_default() += arrived.bytes.len() as u64;
         if arrived.hops > 0 {
             self.counters.multi_hop += 1;
             *self.relayed_by.entry(arrived.transmitter).or_default() += 1;
@@ -306,6 +310,11 @@ impl Radio {
         lost.retain(|_, n| *n > 0);
         RadioCounters {
             relayed_by: self.relayed_by.iter().map(|(k, v)| (*k, *v)).collect(),
+            bytes_by_link: self
+                .bytes_from
+                .iter()
+                .map(|(from, n)| ((*from, self.me), *n))
+                .collect(),
             lost: lost.into_iter().collect(),
             overrun,
             ..counters

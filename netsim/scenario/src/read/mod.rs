@@ -87,6 +87,8 @@ pub(crate) struct Stated {
     pub(crate) objective: Objective,
     pub(crate) radio: RadioSpec,
     pub(crate) faults: Vec<TimedFault>,
+    /// The file that they are of, where it is not the scenario's own.
+    pub(crate) faults_of: Option<String>,
     /// What the operator does, ascending by time.
     pub(crate) operator: Vec<operator::Act>,
     pub(crate) storm: StormSpec,
@@ -144,6 +146,7 @@ pub(crate) fn scenario(
         None => Vec::new(),
     };
     Ok(Stated {
+        faults_of: None,
         storm: faults::storm(f.get("storm"), fleet.members.len(), over.peers.is_some())?,
         laps: f.small_or("laps", 1, 1, 1000, "times")?,
         division: f.get("division").map_or(Ok(Rule::Best), division)?,

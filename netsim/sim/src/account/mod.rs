@@ -296,6 +296,7 @@ impl Account {
         sum.late += of.late;
         sum.ages.add(&of.ages);
         merge(&mut sum.relayed_by, &of.relayed_by);
+        merge(&mut sum.bytes_by_link, &of.bytes_by_link);
         merge(&mut sum.lost, &of.lost);
     }
 

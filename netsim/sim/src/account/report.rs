@@ -311,6 +311,9 @@ pub struct Radio {
     pub multi_hop: u64,
     /// Who passed those on, and how many.
     pub relayed_by: BTreeMap<u16, u64>,
+    /// Bytes of records that arrived: by who transmitted them, then by who received them.
+    #[serde(default)]
+    pub bytes_by_link: BTreeMap<u16, BTreeMap<u16, u64>>,
     /// Receptions that failed and transmissions never begun, by reason.
     pub lost: BTreeMap<String, u64>,
     /// Links that were up and went down, by reason: `range`, `sight`, `fault`.
@@ -345,6 +348,7 @@ impl Radio {
             received: all.received,
             multi_hop: all.multi_hop,
             relayed_by: all.relayed_by.iter().copied().collect(),
+            bytes_by_link: by_link(&all.bytes_by_link),
             lost: lost.collect(),
             link_cuts: cuts.map(|(r, n)| (r.to_owned(), n)).into(),
             overrun: all.overrun,
@@ -354,6 +358,14 @@ impl Radio {
             late_share: (all.arrived > 0).then(|| all.late as f64 / all.arrived as f64),
         }
     }
+}
+
+fn by_link(flat: &[((u16, u16), u64)]) -> BTreeMap<u16, BTreeMap<u16, u64>> {
+    let mut links: BTreeMap<u16, BTreeMap<u16, u64>> = BTreeMap::new();
+    for ((from, to), bytes) in flat {
+        links.entry(*from).or_default().insert(*to, *bytes);
+    }
+    links
 }
 
 fn reason(reason: Reason) -> &'static str {

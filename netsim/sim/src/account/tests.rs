@@ -254,6 +254,7 @@ fn radios_of_all_lives_add_up_to_bytes_a_second_and_peer() {
         received: 20,
         multi_hop: 4,
         relayed_by: vec![(2, 4)],
+        bytes_by_link: vec![((2, 1), 700), ((3, 1), 90)],
         lost: vec![(skein_link::Reason::Range, 5)],
         ..RadioCounters::default()
     };
@@ -263,6 +264,8 @@ fn radios_of_all_lives_add_up_to_bytes_a_second_and_peer() {
     let r = concluded(&a, 10_000).radio;
     assert_eq!((r.sent, r.received, r.multi_hop), (20, 40, 8));
     assert_eq!(r.relayed_by, BTreeMap::from([(2, 8)]));
+    assert_eq!(r.bytes_by_link[&2], BTreeMap::from([(1, 1400)]));
+    assert_eq!(r.bytes_by_link[&3], BTreeMap::from([(1, 180)]));
     assert_eq!(r.lost["range"], 10);
     assert_eq!(r.link_cuts["fault"], 3);
     // 6,000 bytes in 10 + 5 + 10 seconds.

@@ -528,12 +528,13 @@ impl Swarm {
             let known = last
                 .take()
                 .filter(|(bytes, _)| Arc::ptr_eq(bytes, &d.bytes));
+            let size = d.bytes.len();
             let (_, shared) = last.insert(known.unwrap_or_else(|| {
                 let shared = self.shared(&d.bytes);
                 (d.bytes, shared)
             }));
             self.fold(idx, Kind::Receive, shared.hash);
-            self.traffic.received(d.tx, d.hops);
+            self.traffic.received(d.tx, d.rx, size, d.hops);
             let s = &self.peers[idx];
             if s.process == Process::Running && s.slow_ms == 0 {
                 self.heard(self.now_ms, d.rx, shared.said.as_deref());

@@ -10,6 +10,8 @@ pub(super) struct Traffic {
     received: u64,
     /// Receptions of what had been passed on before, by who transmitted it.
     relayed_by: BTreeMap<u16, u64>,
+    /// Bytes of records received, by transmitter and receiver.
+    bytes_by_link: BTreeMap<(u16, u16), u64>,
     /// Bytes handed to the radios, by kind of record.
     bytes_by_kind: BTreeMap<String, u64>,
 }
@@ -23,8 +25,12 @@ impl Traffic {
         }
     }
 
-    pub(super) fn received(&mut self, transmitter: u16, hops: u8) {
+    pub(super) fn received(&mut self, transmitter: u16, receiver: u16, bytes: usize, hops: u8) {
         self.received += 1;
+        *self
+            .bytes_by_link
+            .entry((transmitter, receiver))
+            .or_default() += bytes as u64;
         if hops > 0 {
             *self.relayed_by.entry(transmitter).or_default() += 1;
         }
@@ -42,6 +48,7 @@ impl Traffic {
             received: self.received,
             multi_hop: self.relayed_by.values().sum(),
             relayed_by: self.relayed_by.iter().map(|(k, v)| (*k, *v)).collect(),
+            bytes_by_link: self.bytes_by_link.iter().map(|(k, v)| (*k, *v)).collect(),
             lost: channel.dropped.into_iter().collect(),
             ..RadioCounters::default()
         }
