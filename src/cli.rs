@@ -24,8 +24,24 @@ use crate::{
     report, schema, shell, sim, task, trial, watch, why,
 };
 use clap::{Parser, Subcommand};
+use std::ffi::OsString;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
+
+/// A word of the command line: a place in the south or the west begins with a hyphen and is
+/// no flag, so a space goes before it, which readers of places skip.
+pub fn south_or_west(word: OsString) -> OsString {
+    let is_place = word.to_str().is_some_and(|w| {
+        let begins = |rest: &str| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.');
+        w.strip_prefix('-').is_some_and(begins) && w.contains(',')
+    });
+    if !is_place {
+        return word;
+    }
+    let mut shifted = OsString::from(" ");
+    shifted.push(word);
+    shifted
+}
 
 /// A group of UAVs that plans and flies a mission together, without a leader.
 ///
@@ -35,7 +51,12 @@ use tracing_subscriber::EnvFilter;
 #[command(version, max_term_width = 100)]
 pub struct Cli {
     /// What to log on stderr, for example `info` or `skein_node=debug,zenoh=warn`.
-    #[arg(long, global = true, value_name = "FILTER", default_value = "warn")]
+    #[arg(
+        long,
+        global = true,
+        value_name = "FILTER",
+        default_value = "warn,zenoh::net::runtime::orchestrator=error"
+    )]
     pub log: String,
 
     /// What to do.

@@ -34,7 +34,7 @@ use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = cli::Cli::parse();
+    let cli = cli::Cli::parse_from(std::env::args_os().map(cli::south_or_west));
     match cli::run(&cli) {
         Ok(code) => code,
         Err(error) => {

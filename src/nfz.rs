@@ -58,7 +58,7 @@ pub struct AddArgs {
     #[arg(long, value_name = "LAT,LON,RADIUS_M", value_parser = circle, allow_hyphen_values = true)]
     pub circle: Option<(LatLon, f64)>,
     /// A polygon by its corners, latitude and longitude in degrees.
-    #[arg(long, value_name = "LAT,LON", value_parser = corner, num_args = 3.., allow_hyphen_values = true)]
+    #[arg(long, value_name = "LAT,LON", value_parser = corner, num_args = 3..)]
     pub polygon: Option<Vec<LatLon>>,
     /// What it is called from now on; without it `zone-1` and so on. Several zones of a file
     /// are numbered: NAME-1, NAME-2.

@@ -55,7 +55,7 @@ pub enum Add {
     /// A place that is to be seen, with what lies around it.
     Point {
         /// Latitude and longitude in degrees.
-        #[arg(value_name = "LAT,LON", value_parser = corner, allow_hyphen_values = true)]
+        #[arg(value_name = "LAT,LON", value_parser = corner)]
         place: LatLon,
         /// How it is to be done.
         #[command(flatten)]
@@ -64,7 +64,7 @@ pub enum Add {
     /// A line that is to be seen along its length, from either end.
     Line {
         /// Latitude and longitude of its vertices in degrees.
-        #[arg(value_name = "LAT,LON", value_parser = corner, num_args = 2.., required = true, allow_hyphen_values = true)]
+        #[arg(value_name = "LAT,LON", value_parser = corner, num_args = 2.., required = true)]
         way: Vec<LatLon>,
         /// How it is to be done.
         #[command(flatten)]

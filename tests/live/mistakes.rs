@@ -48,6 +48,28 @@ fn mistakes_without_a_trial_are_answered_with_what_to_do() {
     for verb in [vec!["report", &empty], vec!["export", &empty, "--csv"]] {
         mistaken(&place, &verb, &["holds no run.mcap", "skein sim --run-dir"]);
     }
+    // Flags may follow places, and places lie in the south and in the west.
+    let south = [
+        "task",
+        "add",
+        "line",
+        "-33.9,151.2",
+        "-33.8,-70.6",
+        "--needs",
+        "infrared",
+    ];
+    mistaken(&place, &south, &no_trial);
+    let west = [
+        "nfz",
+        "add",
+        "--polygon",
+        "-1.5,-70",
+        "-1.6,-70",
+        "-1.6,-70.1",
+        "--id",
+        "fire",
+    ];
+    mistaken(&place, &west, &no_trial);
     let lost = place.path("nowhere.plan");
     mistaken(
         &place,

@@ -35,6 +35,7 @@ fn main() {
             .arg(support::root().join(file))
             .args(args)
             .env("TMPDIR", place.path(""))
+            .env("SKEIN", env!("CARGO_BIN_EXE_skein"))
             .output()
             .unwrap();
         let said = String::from_utf8_lossy(&out.stdout) + String::from_utf8_lossy(&out.stderr);
@@ -77,5 +78,23 @@ fn main() {
         code == Some(0) && recording.contains("recording: ok"),
         "{recording}"
     );
+    // Curves of three rates of failure; without failures all of it is seen.
+    let picture = place.path("coverage.png");
+    let (code, told) = script("examples/coverage.py", &["field", "1", &picture]);
+    assert!(
+        code == Some(0)
+            && told.contains(
+                "0 losses per UAV and hour: 0.0 UAVs lost a run, all seen in 1 of 1 runs"
+            ),
+        "{told}"
+    );
+    let drawn = std::fs::read(&picture).unwrap();
+    assert!(drawn.starts_with(b"\x89PNG"), "{} bytes", drawn.len());
+    let (code, told) = script("examples/coverage.py", &["feild", "1", &picture]);
+    assert!(
+        code == Some(1) && told.contains("did you mean field?"),
+        "{told}"
+    );
+    assert!(!told.contains("Traceback"), "{told}");
     println!("python: ok, {} records seen", said.lines().count());
 }

@@ -74,3 +74,77 @@ fn every_command_of_the_tutorials_does_what_it_says() {
     }
     assert!(run >= 15, "{run} blocks were found");
 }
+
+/// The commands of the README and of the documents beside it: `skein` and its words, as they
+/// stand in shell blocks and between backticks.
+fn named_commands(text: &str) -> Vec<Vec<String>> {
+    let mut found = Vec::new();
+    let mut fenced = false;
+    for line in text.lines() {
+        if line.starts_with(FENCE) {
+            fenced = line == "```sh" && !fenced;
+            continue;
+        }
+        let indented = line.strip_prefix("    ").unwrap_or_default();
+        let parts: Vec<&str> = if fenced {
+            vec![line]
+        } else if indented.starts_with("skein ") {
+            vec![indented]
+        } else {
+            line.split('`').skip(1).step_by(2).collect()
+        };
+        for part in parts {
+            let part = part.split(" #").next().unwrap_or_default();
+            let part = part.split([';', '>', '|', '&']).next().unwrap_or_default();
+            let Some(words) = part.trim().strip_prefix("skein ") else {
+                continue;
+            };
+            let words = words.split_whitespace();
+            found.push(words.map(|w| w.trim_matches('\'').to_owned()).collect());
+        }
+    }
+    found
+}
+
+/// Words that stand for something else, such as `SCENARIO`, `[--k K]`, `A..B` or `...`.
+fn is_a_pattern(words: &[String]) -> bool {
+    words.iter().any(|w| {
+        // Such as N, FILE, A..B and UAV@SECONDS.
+        let letters = |part: &str| {
+            !part.is_empty() && part.chars().all(|c| c.is_ascii_uppercase() || c == '_')
+        };
+        let named = w.split(['.', '@']).any(letters);
+        named || w.contains(['[', '…', '|', '\\', '$', '{']) || w.contains("...")
+    })
+}
+
+#[test]
+fn every_command_that_documents_name_is_understood() {
+    let folder = fs::read_dir(root().join("docs")).unwrap();
+    let mut files: Vec<PathBuf> = folder.map(|entry| entry.unwrap().path()).collect();
+    files.retain(|path| path.extension().is_some_and(|e| e == "md"));
+    files.push(root().join("README.md"));
+    let mut understood = 0;
+    for file in files {
+        for mut words in named_commands(&fs::read_to_string(&file).unwrap()) {
+            if is_a_pattern(&words) {
+                continue;
+            }
+            // All that stands before it is parsed, and nothing is done.
+            words.push("--help".to_owned());
+            let out = Command::new(env!("CARGO_BIN_EXE_skein"))
+                .args(&words)
+                .output()
+                .unwrap();
+            let said = String::from_utf8_lossy(&out.stderr);
+            let named = file.display();
+            assert!(
+                out.status.success(),
+                "{named}: skein {}: {said}",
+                words.join(" ")
+            );
+            understood += 1;
+        }
+    }
+    assert!(understood > 40, "{understood} commands were found");
+}

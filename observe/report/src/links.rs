@@ -37,7 +37,11 @@ pub(crate) fn links(report: &RunReport) -> Option<Links> {
     let called = |id: u16| name(id, report.uavs.contains(&id));
     if stations.len() <= MOST_STATIONS {
         let stations: Vec<u16> = stations.into_iter().collect();
-        return Some(Links::Matrix(matrix(&stations, &all, called)));
+        let short = |id: u16| match report.uavs.contains(&id) {
+            true => called(id),
+            false => "ground".to_owned(),
+        };
+        return Some(Links::Matrix(matrix(&stations, &all, short)));
     }
     all.sort_by_key(|(from, to, bytes)| (std::cmp::Reverse(*bytes), *from, *to));
     let row = |(from, to, bytes): &Link| vec![called(*from), called(*to), bytes.to_string()];

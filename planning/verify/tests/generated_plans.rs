@@ -14,7 +14,7 @@ const SITES: u64 = 16;
 fn plans_of_generated_sites_hold() {
     let (mut planned, mut told) = (0, Vec::new());
     for seed in 0..SITES {
-        match outcome(&Site::of(seed), Planners::Both) {
+        match outcome(&Site::of(seed), Planners::Both, false) {
             Outcome::Recounted(report) => {
                 planned += 1;
                 told.extend(report.violations.iter().map(|v| (seed, v.text.clone())));
@@ -33,7 +33,7 @@ fn more_uavs_are_not_slower() {
     let makespan_s = |uavs| {
         let mut site = Site::of(140_010);
         site.manner.n_uavs = uavs;
-        let request = planned::request(&site, Planners::Both).unwrap();
+        let request = planned::request(&site, Planners::Both, false).unwrap();
         area::plan(&request).unwrap().figures.makespan_s
     };
     let (four_s, six_s) = (makespan_s(4), makespan_s(6));
