@@ -1,6 +1,7 @@
 #!/usr/bin/env node
 // Reads the recording of a run with the MCAP reader of npm, as viewers in a browser do: channels,
-// schemas, and each message, which must have the fields that its schema requires.
+// schemas, and each message, which must have the fields that its schema requires. Messages of
+// Foxglove's types are checked against Foxglove's own schemas, and have no field beside them.
 //
 //     tests/recording.mjs RUN      RUN is a directory with run.mcap, or the file
 //
@@ -14,14 +15,14 @@ import { createRequire } from "node:module";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
 
-const PACKAGES = { "@mcap/core": "2.2.2", "@mcap/nodejs": "1.0.2", "@mcap/support": "1.1.0" };
+const PACKAGES = { "@mcap/core": "2.2.2", "@mcap/nodejs": "1.0.2", "@mcap/support": "1.1.0", "@foxglove/schemas": "2.1.0", ajv: "8.20.0" };
 const WANTED = ["/skein/scene", "/skein/frame", "/skein/event", "/skein/end", "/map/site", "/map/cells", "/log"];
 
 const root = resolve(dirname(fileURLToPath(import.meta.url)), "..");
 const home = join(root, "target", "recording-node");
 
 function install() {
-  if (!existsSync(join(home, "node_modules", "@mcap", "support"))) {
+  if (!Object.keys(PACKAGES).every((name) => existsSync(join(home, "node_modules", name)))) {
     mkdirSync(home, { recursive: true });
     const named = Object.entries(PACKAGES).map(([name, version]) => `${name}@${version}`);
     execFileSync("npm", ["install", "--silent", "--no-fund", "--no-audit", "--prefix", home, ...named], { stdio: "inherit" });
@@ -43,6 +44,14 @@ const load = install();
 const { McapIndexedReader } = await load("@mcap/core");
 const { FileHandleReadable } = await load("@mcap/nodejs");
 const { loadDecompressHandlers } = await load("@mcap/support");
+const foxglove = (await load("@foxglove/schemas/jsonschema")).default;
+const { default: Ajv } = await load("ajv");
+
+const ajv = new Ajv({ strict: false });
+const theirs = new Map();
+for (const type of ["LocationFix", "GeoJSON", "Log"]) {
+  theirs.set(`foxglove.${type}`, { known: foxglove[type].properties, valid: ajv.compile(foxglove[type]) });
+}
 
 const file = await open(path, "r");
 const reader = await McapIndexedReader.Initialize({
@@ -57,6 +66,7 @@ for (const [id, schema] of reader.schemasById) {
 }
 const counts = new Map();
 let last = 0n;
+let checked = 0;
 for await (const message of reader.readMessages()) {
   const channel = reader.channelsById.get(message.channelId);
   const schema = schemas.get(channel.schemaId);
@@ -66,6 +76,14 @@ for await (const message of reader.readMessages()) {
   const value = JSON.parse(new TextDecoder().decode(message.data));
   const missing = (schema.required ?? []).filter((field) => !(field in value));
   if (missing.length) fail(`${channel.topic}: ${schema.name} lacks ${missing.join(", ")}`);
+  const type = theirs.get(schema.name);
+  if (!type && schema.name.startsWith("foxglove.")) fail(`${channel.topic}: nobody checks ${schema.name}`);
+  if (type) {
+    const strange = Object.keys(value).filter((field) => !(field in type.known));
+    if (strange.length) fail(`${channel.topic}: ${schema.name} has no ${strange.join(", ")}`);
+    if (!type.valid(value)) fail(`${channel.topic}: ${ajv.errorsText(type.valid.errors)}`);
+    checked += 1;
+  }
   counts.set(channel.topic, (counts.get(channel.topic) ?? 0) + 1);
 }
 await file.close();
@@ -73,4 +91,4 @@ for (const topic of WANTED) if (!counts.get(topic)) fail(`nothing under ${topic}
 const places = [...counts.keys()].filter((topic) => /^\/uav\/\d+\/location$/.test(topic));
 if (!places.length) fail("no place of any UAV");
 const all = [...counts.values()].reduce((sum, n) => sum + n, 0);
-console.log(`recording: ok, ${all} messages in ${counts.size} channels, ${places.length} UAVs, ${Number(last) / 1e9} s`);
+console.log(`recording: ok, ${all} messages in ${counts.size} channels, ${places.length} UAVs, ${checked} messages as Foxglove defines them, ${Number(last) / 1e9} s`);
