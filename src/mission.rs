@@ -63,11 +63,20 @@ pub enum What {
     /// Ends the mission: all fly home and wait there, until another one is submitted.
     Cancel,
     /// All loiter where they are, until `resume`.
-    Hold,
+    Hold(ToArgs),
     /// All carry on with the mission.
-    Resume,
-    /// All come home and loiter there, until `resume`.
-    Rtb,
+    Resume(ToArgs),
+    /// All come home and loiter there, until `resume`. Who returns lets go first of what it was
+    /// to fly: those who are not told to return fly it.
+    Rtb(ToArgs),
+}
+
+/// To whom an order is given.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct ToArgs {
+    /// To this UAV alone, until it or all are told something else; without it to all.
+    #[arg(long, value_name = "ID")]
+    pub uav: Option<u16>,
 }
 
 /// A scenario whose area, zones and lanes are taken; its fleet and radio play no part.
@@ -99,7 +108,13 @@ fn base(text: &str) -> Result<(i32, i32), String> {
 /// # Errors
 /// When there is no runtime or stdout cannot be written.
 pub fn run(args: &MissionArgs) -> anyhow::Result<ExitCode> {
-    let order = |order| say(&args.at, &Command::Order(order));
+    let order = |to: &ToArgs, order| {
+        let command = match to.uav {
+            Some(uav) => Command::OrderOne(uav, order),
+            None => Command::Order(order),
+        };
+        say(&args.at, &command)
+    };
     match &args.what {
         Some(What::Submit(given)) => {
             give(&args.at, &given.scenario, given.planner, Command::Submit)
@@ -110,9 +125,9 @@ pub fn run(args: &MissionArgs) -> anyhow::Result<ExitCode> {
         Some(What::Show { json }) => show(&args.at, *json),
         Some(What::Base { place }) => say(&args.at, &Command::Base(*place)),
         Some(What::Cancel) => say(&args.at, &Command::Cancel),
-        Some(What::Hold) => order(Order::Hold),
-        Some(What::Resume) => order(Order::Resume),
-        Some(What::Rtb) => order(Order::ReturnToBase),
+        Some(What::Hold(to)) => order(to, Order::Hold),
+        Some(What::Resume(to)) => order(to, Order::Resume),
+        Some(What::Rtb(to)) => order(to, Order::ReturnToBase),
         None => match (args.base, &args.scenario) {
             (Some(base), _) => say(&args.at, &Command::Base(base)),
             (None, scenario) => give(
@@ -193,6 +208,8 @@ mod tests {
             "mission hold",
             "mission resume",
             "mission rtb",
+            "mission rtb --uav 3",
+            "mission resume --uav 3 --trial x",
         ] {
             assert!(parse(new).is_ok_and(|c| c.mission.what.is_some()), "{new}");
         }
@@ -210,6 +227,8 @@ mod tests {
             "mission submit",
             "mission show --at 127.0.0.1:4",
             "mission hold 3",
+            "mission rtb --uav",
+            "mission cancel --uav 3",
         ] {
             assert!(parse(wrong).is_err(), "{wrong}");
         }

@@ -22,7 +22,7 @@ const SILENCE: Duration = Duration::from_millis(1_500);
 /// given by `--endpoint`, and prints each record once, whoever passed it on.
 #[derive(Debug, Args)]
 pub struct ObserveArgs {
-    /// Which keys, for example `*/v3/state/**`; without it all.
+    /// Which keys, for example `*/v4/state/**`; without it all.
     pub keyexpr: Option<String>,
     /// Ends after this many seconds; without it by an interrupt.
     #[arg(long, value_name = "SECONDS")]
@@ -254,7 +254,7 @@ fn words(body: &Body) -> String {
             c.covered.len()
         ),
         Body::Mission(m) => format!("mission revision {} of {} pieces", m.revision, m.chunks),
-        Body::Operator(order) => format!("{order:?}"),
+        Body::Operator(orders) => orders.to_string(),
         Body::Finished(f) => format!("revision {} is finished", f.revision),
         Body::Heartbeat(h) => format!(
             "at ({:.0}, {:.0}) m",

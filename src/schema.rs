@@ -12,7 +12,7 @@ use std::process::ExitCode;
 ///
 /// A record is a CBOR array, whose place `body` holds the bytes of another one: `skein schema
 /// record` describes the outer one, `skein schema claim` the body of a claim. The ground station
-/// of a trial answers the same to Zenoh queries for FLEET/v3/schema/KIND.
+/// of a trial answers the same to Zenoh queries for FLEET/v4/schema/KIND.
 #[derive(Debug, Args)]
 pub struct SchemaArgs {
     /// A kind, or `record` for what is around every body; without it all are listed.

@@ -6,7 +6,7 @@
 //! | [`percept`] | what a UAV senses |
 //! | [`traffic`] | what it senses of other UAVs |
 //! | [`setpoint`] | what it is told to fly |
-//! | [`order`] | what the operator wants of all |
+//! | [`order`] | what the operator wants of all and of single UAVs |
 //! | [`event`] | what the executive layer reports upwards |
 //! | [`executive`] | a plan on the coverage loop, flown leg by leg, or a flight given whole |
 //! | [`reactive`] | path following, and the envelope that has the last word |
@@ -23,6 +23,6 @@ pub mod traffic;
 
 pub use event::{Event, Unflyable};
 pub use executive::{Executive, Forecast, GivenFlight, Goal};
-pub use order::Order;
+pub use order::{Order, Orders};
 pub use percept::Percept;
 pub use setpoint::{Setpoint, Side, Steer};

@@ -60,7 +60,7 @@ fn a_killed_uav_is_taken_over_and_observers_see_the_swarm() {
 fn observe(place: &Place) {
     let (code, said) = place.skein(&[
         "observe",
-        "live/v3/state/**",
+        "live/v4/state/**",
         "--timeout",
         "4",
         "--format",

@@ -43,7 +43,7 @@ fn the_operator_of_a_trial_revises_the_mission_adds_a_zone_and_calls_all_home() 
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("as revision 2"), "{said}");
     let uavs = [1, 2, 3, 4];
-    place.observe_until(&["live/v3/state/**"], DEADLINE, |newest| {
+    place.observe_until(&["live/v4/state/**"], DEADLINE, |newest| {
         uavs.iter()
             .all(|id| newest.get(id).is_some_and(|s| s["cells"] == 100))
     });
@@ -57,7 +57,7 @@ fn the_operator_of_a_trial_revises_the_mission_adds_a_zone_and_calls_all_home() 
         (code, said.trim()),
         (0, "the ground station says return-to-base to all")
     );
-    place.observe_until(&["live/v3/state/**"], DEADLINE, |newest| {
+    place.observe_until(&["live/v4/state/**"], DEADLINE, |newest| {
         uavs.iter().all(|id| {
             newest
                 .get(id)

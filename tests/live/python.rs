@@ -44,9 +44,9 @@ fn main() {
     // Without arguments it finds the trial, and tells degrees.
     let (_, said) = script("examples/observe.py", &[]);
     for expected in [
-        "live/v3/state/",
-        "live/v3/beacon/",
-        "live/v3/cover/",
+        "live/v4/state/",
+        "live/v4/beacon/",
+        "live/v4/cover/",
         "peer 1 life",
         "'lat_deg': 60.1",
         "'activity': 'covering'",

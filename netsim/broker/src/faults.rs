@@ -128,7 +128,13 @@ impl Injector<'_> {
             Fault::Rebase { east_mm, north_mm } => {
                 self.operate(&Command::Base((*east_mm, *north_mm))).await
             }
-            Fault::Order { order } => self.operate(&Command::Order(*order)).await,
+            Fault::Order { order, uav } => {
+                let command = match uav {
+                    Some(uav) => Command::OrderOne(*uav, *order),
+                    None => Command::Order(*order),
+                };
+                self.operate(&command).await
+            }
             Fault::AddZone { name, ring } => {
                 let zone = NewZone {
                     name: Some(name.clone()),

@@ -103,10 +103,13 @@ pub enum Fault {
         /// Which, by name.
         name: String,
     },
-    /// The operator wants something of all UAVs: the ground station speaks it.
+    /// The operator wants something of all UAVs, or of one: the ground station speaks it.
     Order {
         /// What.
         order: Order,
+        /// Of whom, if not of all.
+        #[serde(default)]
+        uav: Option<u16>,
     },
     /// Writes to the peer's journal fail: every one, or one in so many.
     FailStores {
@@ -232,8 +235,8 @@ impl Fault {
             | Self::RemoveZone { .. }
             | Self::AddTask { .. }
             | Self::CancelTask { .. }
-            | Self::Order { .. }
             | Self::Loss { .. } => Vec::new(),
+            Self::Order { uav, .. } => uav.iter().copied().collect(),
         }
     }
 }
@@ -275,7 +278,10 @@ impl fmt::Display for Fault {
                 write!(f, "the operator asks for the task {name}")
             }
             Self::CancelTask { name } => write!(f, "the operator wants the task {name} no more"),
-            Self::Order { order } => write!(f, "the operator says {}", order.name()),
+            Self::Order { order, uav } => {
+                write!(f, "the operator says {}", order.name())?;
+                uav.map_or(Ok(()), |uav| write!(f, " to uav{uav}"))
+            }
             Self::FailStores {
                 peer,
                 one_in: 0 | 1,

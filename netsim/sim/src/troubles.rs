@@ -355,16 +355,20 @@ fn one_way(d: &mut Draw<'_>) {
     d.push(to_ms, Fault::Heal);
 }
 
-/// All are to hold, or to come back, and then to go on.
+/// All, or one, are to hold, or to come back, and then to go on.
 fn order(d: &mut Draw<'_>) {
     let (from_ms, to_ms) = d.span_ms(d.spec.storm.troubles.max_s);
     let order = match d.s.one_in(2) {
         true => Order::Hold,
         false => Order::ReturnToBase,
     };
-    d.push(from_ms, Fault::Order { order });
+    let one = d.s.one_in(2);
+    let uav = one
+        .then(|| d.s.shuffled(d.peers).first().copied())
+        .flatten();
+    d.push(from_ms, Fault::Order { order, uav });
     let order = Order::Resume;
-    d.push(to_ms, Fault::Order { order });
+    d.push(to_ms, Fault::Order { order, uav });
 }
 
 /// Not where there are laps: a ground station that comes back in a later one does not learn
@@ -833,8 +837,12 @@ mod tests {
                             assert!(ahead_ms <= limits.max_clock_jump_ms);
                         }
                         Fault::Cut { one_way, .. } => assert!(one_way),
-                        Fault::Order { order } => {
-                            count("order", 0, if order == Order::Resume { -1 } else { 1 });
+                        Fault::Order { order, uav } => {
+                            count(
+                                "order",
+                                uav.unwrap_or(0),
+                                if order == Order::Resume { -1 } else { 1 },
+                            );
                         }
                         Fault::KillComputer { peer } => count("down", peer, 1),
                         Fault::Restart { peer, .. } => count("down", peer, -1),

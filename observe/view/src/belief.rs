@@ -142,8 +142,8 @@ impl Belief {
                 let text = format!("uav{id} holds that the mission is finished");
                 self.say(now_ms, id, text, What::Finished { revision });
             }
-            Body::Operator(order) => {
-                let text = format!("the operator orders {order:?}");
+            Body::Operator(orders) => {
+                let text = format!("the operator orders {orders}");
                 self.say(now_ms, id, text, What::Note);
             }
             // Who is where was taken before; promises and tasks are not drawn.

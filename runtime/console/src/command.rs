@@ -14,6 +14,8 @@ use std::sync::Arc;
 pub enum Command {
     /// Every UAV is to do this until another order comes.
     Order(Order),
+    /// One UAV is to do this until another order comes to it or to all.
+    OrderOne(u16, Order),
     /// Every UAV is to fly this mission from now on: a change of the one that is flown. What
     /// was covered of the same places stays covered. Its revision is given by the ground
     /// station: the next one.

@@ -185,8 +185,8 @@ impl Bus {
         })
     }
 
-    /// Answers queries for `FLEET/v3/schema/KIND` with the JSON Schema of the bodies of that
-    /// kind, and for `FLEET/v3/schema/record` with that of the array around them, so that an
+    /// Answers queries for `FLEET/v4/schema/KIND` with the JSON Schema of the bodies of that
+    /// kind, and for `FLEET/v4/schema/record` with that of the array around them, so that an
     /// observer in any language needs no source of ours.
     ///
     /// # Errors
@@ -711,7 +711,7 @@ mod tests {
         };
         let speak = async {
             loop {
-                a.publish("bus-test/v3/state/0/1", vec![9, 9], hop, Priority::Beacon)
+                a.publish("bus-test/v4/state/0/1", vec![9, 9], hop, Priority::Beacon)
                     .await;
                 tokio::time::sleep(Duration::from_millis(50)).await;
             }
@@ -730,7 +730,7 @@ mod tests {
         let seen = tokio::time::timeout(deadline, async {
             let speak = async {
                 loop {
-                    b.publish("bus-test/v3/state/0/2", vec![4], hop, Priority::Claim)
+                    b.publish("bus-test/v4/state/0/2", vec![4], hop, Priority::Claim)
                         .await;
                     tokio::time::sleep(Duration::from_millis(50)).await;
                 }
@@ -753,20 +753,20 @@ mod tests {
         bus.serve_schemas("t").await.unwrap();
         let observer = Observer::open(bus.locator(), "t/**").await.unwrap();
         let within = Duration::from_secs(5);
-        let all = observer.ask("t/v3/schema/*", within).await.unwrap();
+        let all = observer.ask("t/v4/schema/*", within).await.unwrap();
         for kind in Kind::ALL {
-            let key = format!("t/v3/schema/{}", kind.name());
+            let key = format!("t/v4/schema/{}", kind.name());
             let told = all.iter().find(|(k, _)| *k == key);
             let told = told.map(|(_, text)| String::from_utf8(text.clone()).unwrap());
             assert_eq!(told, schema(kind), "{key}");
         }
-        let one = observer.ask("t/v3/schema/record", within).await.unwrap();
+        let one = observer.ask("t/v4/schema/record", within).await.unwrap();
         let record = (
-            "t/v3/schema/record".to_owned(),
+            "t/v4/schema/record".to_owned(),
             envelope_schema().into_bytes(),
         );
         assert_eq!(one, [record]);
-        let none = observer.ask("t/v3/schema/rumour", within).await.unwrap();
+        let none = observer.ask("t/v4/schema/rumour", within).await.unwrap();
         assert!(none.is_empty(), "{none:?}");
         observer.close().await;
         bus.close().await;

@@ -141,7 +141,11 @@ pub fn edited(request: Command, newest: Option<&Mission>) -> Result<Mission, Str
         }
         Command::RemoveZone(name) => held("with zones")?.without_zone(&name),
         // Answered before, without a mission.
-        Command::Order(_) | Command::Task(_) | Command::Show | Command::Why => {
+        Command::Order(_)
+        | Command::OrderOne(..)
+        | Command::Task(_)
+        | Command::Show
+        | Command::Why => {
             return Err("no mission follows from that".to_owned());
         }
     };

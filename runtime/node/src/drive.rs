@@ -17,7 +17,8 @@ use crate::standing::{Standing, StandingError};
 use crate::transport::{Event, Transport};
 use crate::vehicle::Vehicle;
 use crate::world::{News, Tick, World};
-use skein_behaviors::{Order, Percept};
+use skein_behaviors::order::SINGLES_MAX;
+use skein_behaviors::{Order, Orders, Percept};
 use skein_console::{Answer, Asked, Command as Request};
 use skein_peer::input::{AskedTask, TaskEdit};
 use skein_peer::offload::{Job, JobResult, run};
@@ -53,6 +54,10 @@ pub trait PeerLogic: Send {
     fn next_revision(&self) -> u32;
     /// Whether it is a ground station: any other is asked only what it does.
     fn is_ground_station(&self) -> bool;
+    /// What the operator ordered last, as far as it was heard.
+    fn orders(&self) -> Orders;
+    /// Whether it has heard of a UAV with this number.
+    fn knows_uav(&self, id: u16) -> bool;
     /// What it does and why, as JSON.
     fn why(&self) -> String;
     /// What it knows of the mission, as JSON; none without a mission.
@@ -80,6 +85,14 @@ impl PeerLogic for Peer {
 
     fn speaks_in(&self) -> Option<Incarnation> {
         Peer::speaks_in(self)
+    }
+
+    fn orders(&self) -> Orders {
+        Peer::orders(self).clone()
+    }
+
+    fn knows_uav(&self, id: u16) -> bool {
+        Peer::knows_uav(self, id)
     }
 
     fn mission(&self) -> Option<Arc<Mission>> {
@@ -156,8 +169,8 @@ pub struct Driver<P, V, W, C, T> {
     verdicts: mpsc::Receiver<Feasibility>,
     checkers: mpsc::Sender<Feasibility>,
     checking: bool,
-    order: Option<Order>,
-    /// The life in which the order was spoken.
+    orders: Option<Orders>,
+    /// The life in which the orders were spoken.
     ordered_in: Option<Incarnation>,
     /// Whether the tasks that were kept were said in this process.
     tasks_told: bool,
@@ -217,7 +230,7 @@ where
             verdicts,
             checkers,
             checking: false,
-            order: standing.as_ref().and_then(Standing::order),
+            orders: standing.as_ref().and_then(Standing::orders),
             standing,
             ordered_in: None,
             tasks_told: false,
@@ -434,7 +447,8 @@ where
                         .ok_or_else(nothing),
                 )
             }
-            Request::Order(order) => Some(self.order(*order).await),
+            Request::Order(order) => Some(self.order(None, *order).await),
+            Request::OrderOne(uav, order) => Some(self.order(Some(*uav), *order).await),
             Request::Task(edit) => Some(self.task(edit.clone()).await),
             _ => None,
         };
@@ -456,20 +470,33 @@ where
         }
     }
 
-    /// A new standing order: kept, then spoken. A ground station has no percept that
-    /// would wait for the disk.
-    async fn order(&mut self, order: Order) -> Answer {
-        if let Some(standing) = &mut self.standing {
-            standing.keep_order(order).map_err(unkept)?;
+    /// A new standing order, to one UAV or to all: kept, then spoken. A ground station has no
+    /// percept that would wait for the disk.
+    async fn order(&mut self, uav: Option<u16>, order: Order) -> Answer {
+        let unknown = uav.filter(|id| !self.peer.knows_uav(*id));
+        if let Some(id) = unknown {
+            return Err(format!(
+                "no UAV with the number {id} was heard of by this ground station"
+            ));
         }
-        self.order = Some(order);
+        // What stands is what was heard last; before it speaks, what was kept.
+        let kept = self.orders.clone().filter(|_| self.ordered_in.is_none());
+        let standing = kept.unwrap_or_else(|| self.peer.orders());
+        let orders = standing.told(uav, order).ok_or_else(|| {
+            format!("{SINGLES_MAX} UAVs are told something of their own; no more can be, until all are told something")
+        })?;
+        if let Some(standing) = &mut self.standing {
+            standing.keep_orders(orders.clone()).map_err(unkept)?;
+        }
+        self.orders = Some(orders);
         self.ordered_in = None;
         self.repeat_order().await;
         let name = order.name();
+        let whom = uav.map_or_else(|| "all".to_owned(), |id| format!("uav{id}"));
         Ok(vec![match self.ordered_in {
-            Some(_) => format!("the ground station says {name} to all"),
+            Some(_) => format!("the ground station says {name} to {whom}"),
             None => format!(
-                "the ground station will say {name} to all, as soon as it has listened long enough to speak"
+                "the ground station will say {name} to {whom}, as soon as it has listened long enough to speak"
             ),
         }])
     }
@@ -535,13 +562,14 @@ where
         }
     }
 
-    /// Speaks the standing order once in each life of the peer: what an earlier life
+    /// Speaks the standing orders once in each life of the peer: what an earlier life
     /// said is void.
     async fn repeat_order(&mut self) {
         let life = self.peer.speaks_in();
-        if let (Some(order), true) = (self.order, life.is_some() && life != self.ordered_in) {
+        let is_new = life.is_some() && life != self.ordered_in;
+        if let Some(orders) = self.orders.clone().filter(|_| is_new) {
             self.ordered_in = life;
-            self.step(Input::Command(Command::Order(order))).await;
+            self.step(Input::Command(Command::Orders(orders))).await;
         }
     }
 
@@ -591,10 +619,10 @@ where
         let mut told = vec![format!(
             "the ground station speaks the mission as revision {revision}"
         )];
-        if let Some(order) = self.order.filter(|order| *order != Order::Resume) {
+        let standing = self.orders.as_ref();
+        if let Some(orders) = standing.filter(|orders| **orders != Orders::default()) {
             told.push(format!(
-                "the order {} stands; `skein mission resume` ends it",
-                order.name()
+                "the order {orders} stands; `skein mission resume` ends it"
             ));
         }
         Ok(told)

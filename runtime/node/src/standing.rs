@@ -8,10 +8,11 @@
 //! whoever configures another one begins anew.
 
 use serde::{Deserialize, Serialize};
-use skein_behaviors::Order;
+use skein_behaviors::{Order, Orders};
 use skein_console::replace_private_file;
 use skein_peer::Mission;
 use skein_peer::input::AskedTask;
+use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -49,6 +50,8 @@ struct Kept {
     /// Content hash of the configured mission, 0 for none.
     configured: u64,
     order: Option<Order>,
+    #[serde(default)]
+    singles: BTreeMap<u16, Order>,
     mission: Option<Arc<Mission>>,
     #[serde(default)]
     tasks: Vec<AskedTask>,
@@ -86,10 +89,12 @@ impl Standing {
         Ok(Self { path, kept })
     }
 
-    /// The standing order.
+    /// The standing orders.
     #[must_use]
-    pub fn order(&self) -> Option<Order> {
-        self.kept.order
+    pub fn orders(&self) -> Option<Orders> {
+        let all = self.kept.order?;
+        let singles = self.kept.singles.clone();
+        Some(Orders { all, singles }).filter(Orders::is_bounded)
     }
 
     /// The mission that replaced the configured one.
@@ -115,13 +120,14 @@ impl Standing {
         })
     }
 
-    /// Keeps an order.
+    /// Keeps orders.
     ///
     /// # Errors
-    /// When it cannot be written; the one before stands.
-    pub fn keep_order(&mut self, order: Order) -> Result<(), StandingError> {
+    /// When it cannot be written; those before stand.
+    pub fn keep_orders(&mut self, orders: Orders) -> Result<(), StandingError> {
         self.keep(Kept {
-            order: Some(order),
+            order: Some(orders.all),
+            singles: orders.singles,
             ..self.kept.clone()
         })
     }
@@ -161,32 +167,35 @@ mod tests {
         let configured = mission();
         let open = |mission: &Mission| Standing::open(&journal, Some(mission)).unwrap();
         let mut standing = open(&configured);
-        assert_eq!((standing.order(), standing.mission()), (None, None));
+        assert_eq!((standing.orders(), standing.mission()), (None, None));
         let revised = Arc::new(Mission {
             revision: 4,
             ..mission()
         });
-        standing.keep_order(Order::Hold).unwrap();
+        standing.keep_orders(Order::Hold.into()).unwrap();
         standing.keep_mission(Arc::clone(&revised)).unwrap();
-        standing.keep_order(Order::ReturnToBase).unwrap();
+        standing.keep_orders(Order::ReturnToBase.into()).unwrap();
         let again = open(&configured);
-        assert_eq!(again.order(), Some(Order::ReturnToBase));
+        assert_eq!(again.orders(), Some(Order::ReturnToBase.into()));
         assert_eq!(again.mission(), Some(revised));
         let other = Mission {
             base: (1, 1),
             ..mission()
         };
         let anew = open(&other);
-        assert_eq!((anew.order(), anew.mission()), (None, None));
+        assert_eq!((anew.orders(), anew.mission()), (None, None));
     }
 
     #[test]
     fn what_cannot_be_kept_or_read_is_an_error_that_names_the_file() {
         let dir = tempfile::tempdir().unwrap();
         let mut standing = Standing::open(&dir.path().join("gone/j"), None).unwrap();
-        let error = standing.keep_order(Order::Hold).unwrap_err().to_string();
+        let error = standing
+            .keep_orders(Order::Hold.into())
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("j.operator"), "{error}");
-        assert_eq!(standing.order(), None);
+        assert_eq!(standing.orders(), None);
         std::fs::write(dir.path().join("j.operator"), "{").unwrap();
         let error = Standing::open(&dir.path().join("j"), None).unwrap_err();
         assert!(matches!(error, StandingError::Malformed { .. }), "{error}");

@@ -2,7 +2,7 @@
 
 use crate::cells::CellSet;
 use crate::output::Status;
-use crate::wire::message::{Epoch, Order, Stamp};
+use crate::wire::message::{Epoch, Order, Orders, Stamp};
 use crate::wire::tasks::{Progress, TaskId};
 use crate::{Incarnation, PeerId};
 use std::collections::BTreeMap;
@@ -48,6 +48,8 @@ pub struct Beliefs {
     pub finished: bool,
     /// The operator's standing order, as far as it has heard.
     pub order: Order,
+    /// All that the operator ordered, as far as it was heard.
+    pub orders: Orders,
     /// Flight time it may still spend, milliseconds (endurance less reserve).
     pub spendable_ms: u32,
     /// What it holds of tasks: which, in which revision, how far it is.

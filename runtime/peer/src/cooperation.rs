@@ -17,6 +17,7 @@
 //! | there is no geometry | an alarm; the old mission stays |
 //! | a percept | a setpoint; what the camera saw is covered, told, and durable every 5 cells |
 //! | the fuel is due | an alarm; the plan is given up; home |
+//! | the operator said return | the plan is given up, and a claim says so at once; home |
 //! | half a minute of fuel is back | it takes part again |
 //! | a claim or a bid of this loop | the negotiation ticks |
 //! | covered cells that are news | they are spoken |
@@ -46,7 +47,7 @@ use crate::tasking::Tasking;
 use crate::timers::{Timer, Timers};
 use crate::why::Reason;
 use crate::wire::codec::Body;
-use crate::wire::message::{Beacon, Bid, Epoch, Lacking, Member, Order, Record};
+use crate::wire::message::{Beacon, Bid, Epoch, Lacking, Member, Order, Orders, Record};
 use crate::wire::tasks::TaskId;
 use skein_behaviors::{Event, Goal, Percept};
 use skein_flight::coverage::ring::backtracking::Division;
@@ -73,10 +74,10 @@ pub(crate) struct Situation<'a> {
     pub membership: &'a Membership,
 }
 
-/// The operator's standing order and the version of the record that gave it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct StandingOrder {
-    order: Order,
+/// The operator's standing orders and the version of the record that gave them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+struct StandingOrders {
+    orders: Orders,
     /// (incarnation, seq, author) of the record; none yet when zero.
     version: (Incarnation, u32, u16),
 }
@@ -84,8 +85,10 @@ struct StandingOrder {
 /// The cooperation manager of one peer.
 #[derive(Debug)]
 pub(crate) struct Cooperation {
+    /// This peer's number.
+    id: u16,
     library: Library,
-    order: StandingOrder,
+    orders: StandingOrders,
     state: Option<MissionState>,
     pub(crate) tasking: Tasking,
     mismatch_told: bool,
@@ -97,9 +100,10 @@ impl Cooperation {
     /// A manager that begins with the mission found on disk, if any.
     pub fn new(config: &PeerConfig) -> Self {
         Self {
+            id: config.id.0,
             library: Library::new(config.mission.clone()),
             tasking: Tasking::new(config),
-            order: StandingOrder::default(),
+            orders: StandingOrders::default(),
             state: None,
             mismatch_told: false,
             piece_came: Time(0),
@@ -137,21 +141,26 @@ impl Cooperation {
         self.library.offer(mission);
     }
 
-    /// An order, by the version of its record; only a later one counts.
-    pub fn hear_order(&mut self, order: Order, version: (Incarnation, u32, u16)) {
-        if version > self.order.version {
-            self.order = StandingOrder { order, version };
+    /// Orders, by the version of their record; only later ones count.
+    fn hear_orders(&mut self, orders: &Orders, version: (Incarnation, u32, u16)) {
+        if version > self.orders.version {
+            self.give_orders(orders.clone(), version);
         }
     }
 
-    /// What the operator wants, as far as it was heard.
+    /// What the operator wants of this peer, as far as it was heard.
     pub fn order(&self) -> Order {
-        self.order.order
+        self.orders.orders.of(self.id)
     }
 
-    /// An order that this peer itself gives for its operator.
-    pub fn give_order(&mut self, order: Order, version: (Incarnation, u32, u16)) {
-        self.order = StandingOrder { order, version };
+    /// What the operator wants of everybody, as far as it was heard.
+    pub fn orders(&self) -> &Orders {
+        &self.orders.orders
+    }
+
+    /// Orders that this peer itself gives for its operator.
+    pub fn give_orders(&mut self, orders: Orders, version: (Incarnation, u32, u16)) {
+        self.orders = StandingOrders { orders, version };
     }
 
     /// What it owned is void: a life of this peer begins, or another process silences it.
@@ -297,8 +306,8 @@ impl Cooperation {
                     Err(why) => vec![Effect::Alarm(why)],
                 }
             }
-            Body::Operator(order) => {
-                self.hear_order(*order, (record.incarnation, record.seq, record.author));
+            Body::Operator(orders) => {
+                self.hear_orders(orders, (record.incarnation, record.seq, record.author));
                 Effects::new()
             }
             Body::Task(_) | Body::Bundle(_) => self.tasking.hear(now, record, body),
@@ -323,7 +332,7 @@ impl Cooperation {
     /// Looks at everything that depends on time.
     pub fn tick(&mut self, s: &Situation<'_>, timers: &mut Timers) -> Effects {
         let mut effects = self.consider_mission();
-        let order = self.order.order;
+        let order = self.order();
         let Some(state) = &mut self.state else {
             return effects;
         };
@@ -333,9 +342,12 @@ impl Cooperation {
             let down = all.filter(|(.., status)| *status == Status::Down);
             separation.believe_down(s.now, down.map(|(id, ..)| id));
         }
-        if order == Order::Resume {
-            effects.extend(state.check_endurance(s));
+        match order {
+            Order::Resume => effects.extend(state.check_endurance(s)),
+            Order::ReturnToBase => effects.extend(state.release_section(s.role)),
+            Order::Hold => {}
         }
+        state.has_released &= order == Order::ReturnToBase;
         let able = s.speaks && order == Order::Resume && state.can_fly_plans(s);
         let able = able && !s.membership.is_deaf(s.now);
         effects.extend(state.negotiate(s, able, timers));
@@ -392,7 +404,7 @@ impl Cooperation {
         adoption: &Adoption,
         timers: &mut Timers,
     ) -> Effects {
-        let order = self.order.order;
+        let order = self.order();
         let Some(state) = &mut self.state else {
             return Effects::new();
         };
@@ -424,7 +436,7 @@ impl Cooperation {
         written: u64,
         taken: &[PlannedCell],
     ) -> Effects {
-        let order = self.order.order;
+        let order = self.order();
         let Some(state) = &mut self.state else {
             return Effects::new();
         };

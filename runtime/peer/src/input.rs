@@ -5,7 +5,7 @@ use crate::offload::JobResult;
 use crate::transmission::Transmission;
 use crate::wire::tasks::{Task, TaskKind};
 use serde::{Deserialize, Serialize};
-use skein_behaviors::{Order, Percept};
+use skein_behaviors::{Orders, Percept};
 use std::sync::Arc;
 
 /// The peer's own clock, milliseconds of scenario time since it cares to remember.
@@ -88,8 +88,8 @@ pub enum Command {
     /// Publish a new mission; nobody takes one whose revision is not the highest, see
     /// [`crate::Peer::next_revision`].
     Mission(Arc<Mission>),
-    /// A new standing order for every UAV.
-    Order(Order),
+    /// New standing orders, to all and to single ones.
+    Orders(Orders),
     /// Something about the tasks that the operator asks for.
     Task(TaskEdit),
 }

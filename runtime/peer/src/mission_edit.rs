@@ -247,7 +247,7 @@ mod tests {
         assert!(
             crate::Overview::of(
                 &unnamed,
-                crate::wire::message::Order::Hold,
+                &crate::wire::message::Order::Hold.into(),
                 None,
                 (vec![], vec![])
             )

@@ -118,6 +118,8 @@ pub(crate) struct MissionState {
     pub silent: bool,
     /// Whether its fuel is due: it flies home until some is back.
     pub exhausted: bool,
+    /// Whether it said that it lists nothing since it was told to return.
+    pub has_released: bool,
     /// When its plan was last compared with what the fuel allows.
     fuel_looked_at: Option<crate::Time>,
     /// Cells covered by itself since the last entry of the journal.
@@ -350,6 +352,18 @@ impl MissionState {
             effects.push(Effect::Alarm(text.into()));
         }
         effects
+    }
+
+    /// It is told to return: what it was to fly is for those who are not, from now on, also
+    /// where a division gave it something meanwhile. What it gave away before it still holds,
+    /// until its new owner says so or it expires.
+    pub fn release_section(&mut self, role: Role) -> Effects {
+        let is_said = core::mem::replace(&mut self.has_released, true);
+        if role != Role::Uav || (is_said && self.negotiation.sections.plan().is_empty()) {
+            return Effects::new();
+        }
+        self.negotiation.sections.keep(0);
+        vec![self.claim_changed(), Effect::ClaimNow]
     }
 
     /// Whether this peer can fly what a division gives it.
@@ -668,6 +682,7 @@ impl MissionState {
             astray: false,
             silent: false,
             exhausted: old.as_ref().is_some_and(|m| m.exhausted),
+            has_released: false,
             fuel_looked_at: None,
             unsaved_cells: 0,
             // What is still being written was promised for the old loop.

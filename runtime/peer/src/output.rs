@@ -13,7 +13,7 @@ use std::sync::Arc;
 pub enum Output {
     /// Broadcast these bytes one hop, under this key.
     Publish {
-        /// The natural key, `<fleet>/v3/<kind>/<subject>/<author>`.
+        /// The natural key, `<fleet>/v4/<kind>/<subject>/<author>`.
         key: String,
         /// The record.
         bytes: Vec<u8>,

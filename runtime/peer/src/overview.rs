@@ -6,7 +6,7 @@ use crate::mission_edit::is_zone_name;
 use crate::output::Status;
 use crate::task_desk::TaskView;
 use crate::why::{Other, Work};
-use crate::wire::message::Order;
+use crate::wire::message::{Order, Orders};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -38,8 +38,11 @@ pub struct Overview {
     pub zones: usize,
     /// No-fly zones that were added in flight, by name, likewise.
     pub added_zones: BTreeMap<String, Vec<PointMm>>,
-    /// The standing order.
+    /// The standing order to all.
     pub order: Order,
+    /// Those to single UAVs.
+    #[serde(default)]
+    pub singles: BTreeMap<u16, Order>,
     /// How far the mission is that is followed; none before its loop is derived.
     pub work: Option<Work>,
     /// Tasks other than coverage that it knows.
@@ -52,7 +55,7 @@ pub struct Overview {
 impl Overview {
     pub(crate) fn of(
         mission: &Mission,
-        order: Order,
+        orders: &Orders,
         work: Option<Work>,
         (tasks, others): (Vec<TaskView>, Vec<Other>),
     ) -> Self {
@@ -74,7 +77,8 @@ impl Overview {
             added_zones: named
                 .map(|(name, ring)| (name.clone(), ring.clone()))
                 .collect(),
-            order,
+            order: orders.all,
+            singles: orders.singles.clone(),
             work,
             tasks,
             others,
@@ -94,7 +98,8 @@ impl fmt::Display for Overview {
             "revision {}{ended}, content {:016x}",
             self.revision, self.content_hash
         )?;
-        writeln!(f, "  order     {}", self.order.name())?;
+        let (all, singles) = (self.order, self.singles.clone());
+        writeln!(f, "  order     {}", Orders { all, singles })?;
         let points = self.area.iter().copied().map(metres);
         let (mut low, mut high) = ((f64::MAX, f64::MAX), (f64::MIN, f64::MIN));
         for (east, north) in points {

@@ -35,7 +35,7 @@ use crate::why::{self, Other, Why};
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
-use crate::wire::message::{Beacon, Fresh, Gossip, Heartbeat, Lacking, Member, Order, Record};
+use crate::wire::message::{Beacon, Fresh, Gossip, Heartbeat, Lacking, Member, Orders, Record};
 use crate::{Incarnation, Mission, PeerId};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
@@ -437,7 +437,7 @@ impl Peer {
                     self.carry_out(effects);
                 }
             }
-            Command::Order(order) => self.give_order(order),
+            Command::Orders(orders) => self.give_orders(orders),
             Command::Task(edit) => self.edit_task(&edit),
         }
     }
@@ -479,11 +479,11 @@ impl Peer {
         self.cooperation.tasking.views(self.now)
     }
 
-    fn give_order(&mut self, order: Order) {
-        self.carry_out(vec![Effect::Speak(0, Body::Operator(order))]);
+    fn give_orders(&mut self, orders: Orders) {
+        self.carry_out(vec![Effect::Speak(0, Body::Operator(orders.clone()))]);
         let me = self.me();
         let version = (me.incarnation, self.outbound.seq(), me.id);
-        self.cooperation.give_order(order, version);
+        self.cooperation.give_orders(orders, version);
     }
 
     // --- Effects.
@@ -900,6 +900,19 @@ impl Peer {
         self.speaks().then_some(self.life.incarnation())
     }
 
+    /// What the operator ordered last, as far as it was heard.
+    #[must_use]
+    pub fn orders(&self) -> &Orders {
+        self.cooperation.orders()
+    }
+
+    /// Whether it has heard of a UAV with this number.
+    #[must_use]
+    pub fn knows_uav(&self, id: u16) -> bool {
+        let info = self.membership.info(id);
+        info.is_some_and(|info| !info.ground_station)
+    }
+
     /// A copy of what it believes.
     #[must_use]
     pub fn beliefs(&self) -> Beliefs {
@@ -910,6 +923,7 @@ impl Peer {
             diameter: self.membership.diameter(self.now),
             interval_ms: self.relay.air.interval_ms(),
             order: self.cooperation.order(),
+            orders: self.cooperation.orders().clone(),
             ..Beliefs::default()
         };
         let others = self.membership.all();
@@ -941,6 +955,7 @@ impl Peer {
             ground_station: self.config.role == Role::GroundStation,
             speaks: self.speaks(),
             order: self.cooperation.order(),
+            orders: self.cooperation.orders().clone(),
             flight: percept.map(|p| why::flight(state, p, reserve_s)),
             work: state.map(|s| why::work(s, self.cooperation.order())),
             round: self.diary.round(self.now),
@@ -956,7 +971,8 @@ impl Peer {
         let (mission, order) = (self.mission()?, self.cooperation.order());
         let work = self.cooperation.state().map(|s| why::work(s, order));
         let others = (self.tasks(), self.others());
-        Some(Overview::of(&mission, order, work, others))
+        let orders = self.cooperation.orders();
+        Some(Overview::of(&mission, orders, work, others))
     }
 
     fn others(&self) -> Vec<Other> {

@@ -463,9 +463,16 @@ impl Harness {
         );
     }
 
-    /// The operator gives an order at a peer.
+    /// The operator gives an order to all at a peer.
     pub fn order(&mut self, id: u16, order: Order) {
-        self.feed(id, Input::Command(Command::Order(order)));
+        self.feed(id, Input::Command(Command::Orders(order.into())));
+    }
+
+    /// The operator gives an order to one UAV at a peer.
+    pub fn order_one(&mut self, id: u16, uav: u16, order: Order) {
+        let orders = self.beliefs(id).orders;
+        let orders = orders.told(Some(uav), order).expect("few are told");
+        self.feed(id, Input::Command(Command::Orders(orders)));
     }
 
     /// Runs for a while.

@@ -7,7 +7,7 @@ use crate::cells::CellSet;
 use crate::mission_state::MissionState;
 use crate::output::Status;
 use crate::task_desk::TaskView;
-use crate::wire::message::{Epoch, ListedRun, Order};
+use crate::wire::message::{Epoch, ListedRun, Order, Orders};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Percept;
@@ -220,6 +220,9 @@ pub struct Why {
     pub speaks: bool,
     /// The standing order, as far as it heard.
     pub order: Order,
+    /// All that the operator ordered, as far as it heard.
+    #[serde(default)]
+    pub orders: Orders,
     /// Its flight; none of a ground station, and before the first percept.
     pub flight: Option<Flight>,
     /// The mission; none before it has derived the loop of one.
@@ -310,7 +313,15 @@ impl fmt::Display for Why {
             s(self.time_ms),
             self.incarnation
         )?;
-        writeln!(f, "  order     {}", self.order.name())?;
+        let alone = self.orders.singles.contains_key(&self.id);
+        if self.ground_station {
+            writeln!(f, "  order     {}", self.orders)?;
+        } else if alone {
+            let (own, all) = (self.order.name(), self.orders.all.name());
+            writeln!(f, "  order     {own}, to it alone; {all} to all")?;
+        } else {
+            writeln!(f, "  order     {}", self.order.name())?;
+        }
         match &self.work {
             None => writeln!(f, "  mission   none yet")?,
             Some(work) => self.write_work(work, f)?,

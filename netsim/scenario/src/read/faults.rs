@@ -22,7 +22,7 @@ const KINDS: [(&str, &[&str]); 21] = [
     ("heal", &[]),
     ("loss", &["percent", "for_s"]),
     ("rebase", &["east_m", "north_m"]),
-    ("order", &["order"]),
+    ("order", &["order", "peer"]),
     ("fail-stores", &["peer", "one_in", "for_s"]),
     ("slow-stores", &["peer", "delay_s", "for_s"]),
     ("heal-stores", &["peer"]),
@@ -61,6 +61,15 @@ impl Known<'_> {
                 "no peer has the number {id}; there are {}",
                 all.join(", ")
             )));
+        }
+        Ok(id)
+    }
+
+    /// The number of a peer that is no ground station.
+    pub(super) fn uav(&self, node: &Node<'_>) -> Result<u16, Error> {
+        let id = self.peer(node)?;
+        if self.ground == Some(id) {
+            return Err(node.wrong(format!("{id} is the ground station; orders are for UAVs")));
         }
         Ok(id)
     }
@@ -234,6 +243,7 @@ fn one(item: &Node<'_>, known: &Known<'_>) -> Result<(TimedFault, Option<TimedFa
         },
         "order" => Fault::Order {
             order: order(f.need("order", "\"hold\"")?)?,
+            uav: f.get("peer").map(|node| known.uav(node)).transpose()?,
         },
         "fail-stores" => Fault::FailStores {
             peer: peer()?,
@@ -607,6 +617,14 @@ mod tests {
                 "{at_s:1, kind:'order', order:'return-to-base'}",
                 Fault::Order {
                     order: Order::ReturnToBase,
+                    uav: None,
+                },
+            ),
+            (
+                "{at_s:1, kind:'order', order:'return-to-base', peer:2}",
+                Fault::Order {
+                    order: Order::ReturnToBase,
+                    uav: Some(2),
                 },
             ),
             (

@@ -38,7 +38,7 @@ pub(crate) fn read(
 ) -> Result<Vec<Act>, Error> {
     let mut acts = Vec::new();
     for item in list.items()? {
-        let mut fields = vec!["at_s"];
+        let mut fields = vec!["at_s", "uav"];
         fields.extend(DOINGS);
         let f = item.fields(&fields)?;
         let at_ms = at_ms(&f, "at_s", known)?;
@@ -63,8 +63,12 @@ pub(crate) fn read(
             },
             _ => Fault::Order {
                 order: order(node)?,
+                uav: f.get("uav").map(|uav| known.uav(uav)).transpose()?,
             },
         };
+        if let (Some(uav), true) = (f.get("uav"), name != "order") {
+            return Err(uav.wrong("says to whom an order is given, so it needs order"));
+        }
         if known.peers.is_some() && known.ground.is_none() {
             return Err(item.wrong("there is no ground station to speak it"));
         }
@@ -218,6 +222,14 @@ mod tests {
             (
                 "[{ at_s: 60, order: 'hold', nfz_remove: 'a' }]".to_owned(),
                 "does one thing at a time",
+            ),
+            (
+                "[{ at_s: 60, order: 'hold', uav: 99 }]".to_owned(),
+                "operator[0].uav: no peer has the number 99",
+            ),
+            (
+                "[{ at_s: 60, nfz_remove: 'a', uav: 1 }]".to_owned(),
+                "operator[0].uav: says to whom an order is given",
             ),
             (
                 "[{ at_s: 60, nfz_remove: 'a' }]".to_owned(),

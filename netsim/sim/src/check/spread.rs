@@ -274,7 +274,7 @@ impl SpreadCheck {
                         a.view.revision != b.view.revision
                             && a.view.revision.min(b.view.revision) > 0,
                     ),
-                    (true, a.view.order != b.view.order),
+                    (true, a.view.orders != b.view.orders),
                 ];
                 for (of_order, differs) in differ {
                     let bound_ms = look_ms + if of_order { order_ms } else { mission_ms };
@@ -295,8 +295,8 @@ impl SpreadCheck {
                         found.broken("agree", snapshot.now_ms, Some(b.id), || {
                             let what = if of_order { "order" } else { "revision" };
                             format!(
-                                "follows another {what} than peer {} in its component, for {took_ms} ms (bound {bound_ms} ms): {} {:?}, {} {:?}",
-                                a.id, b.view.revision, b.view.order, a.view.revision, a.view.order
+                                "follows another {what} than peer {} in its component, for {took_ms} ms (bound {bound_ms} ms): {} {}, {} {}",
+                                a.id, b.view.revision, b.view.orders, a.view.revision, a.view.orders
                             )
                         });
                     }
@@ -431,7 +431,7 @@ mod tests {
         let changes: [(Change, [Option<u64>; 3]); 4] = [
             (|_| {}, [None; 3]),
             (|b| b.revision = 2, [Some(42), Some(42), None]),
-            (|b| b.order = Order::Hold, [Some(22); 3]),
+            (|b| b.orders = Order::Hold.into(), [Some(22); 3]),
             (|b| b.revision = 0, [None; 3]),
         ];
         for (n, (change, within)) in changes.into_iter().enumerate() {

@@ -98,10 +98,10 @@ impl Swarm {
                 self.edit_task(TaskEdit::Cancel(name.clone()));
                 0
             }
-            Fault::Order { order } => {
-                self.operator.order(*order);
+            Fault::Order { order, uav } => {
+                self.operator.order(*uav, *order);
                 self.repeat_order();
-                0
+                uav.unwrap_or(0)
             }
             Fault::FailStores { peer, one_in } => self.trouble(*peer, Trouble::Fails(*one_in)),
             Fault::SlowStores { peer, delay_ms } => self.trouble(*peer, Trouble::Slow(*delay_ms)),

@@ -829,8 +829,8 @@ impl Swarm {
         };
         let peer = self.peers[idx].peer.as_ref();
         let speaks_in = peer.and_then(|p| p.speaks_in());
-        if let Some(order) = self.operator.speaks(speaks_in) {
-            self.feed(idx, Input::Command(Command::Order(order)));
+        if let Some(orders) = self.operator.speaks(speaks_in) {
+            self.feed(idx, Input::Command(Command::Orders(orders)));
         }
     }
 
@@ -879,7 +879,9 @@ impl Swarm {
     /// by somebody who goes there with the record.
     fn carry_order(&mut self, peers: &[PeerSnapshot]) {
         let station = self.spec.ground.as_ref().map_or(0, |g| g.id);
-        let waits = |m: &&PeerSnapshot| m.uav && m.view.order != Order::Resume;
+        let waits = |m: &&PeerSnapshot| {
+            m.uav && m.view.order != Order::Resume && self.operator.wants_to_fly(m.id)
+        };
         let out_of_reach = |m: &&PeerSnapshot| !self.checker.graph().joined(m.id, station);
         let stranded = peers.iter().filter(waits).find(out_of_reach).map(|m| m.id);
         if let Some(bytes) = self.operator.courier(self.now_ms, stranded.is_some())

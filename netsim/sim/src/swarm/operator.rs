@@ -1,7 +1,7 @@
 //! The operator of a simulated swarm: the mission and the order given last, and the tasks
 //! that are asked for.
 
-use skein_behaviors::Order;
+use skein_behaviors::{Order, Orders};
 use skein_peer::input::{AskedTask, TaskEdit};
 use skein_peer::{Incarnation, Mission};
 use std::collections::VecDeque;
@@ -14,8 +14,8 @@ const COURIER_MS: u64 = 60_000;
 #[derive(Debug)]
 pub(super) struct Operator {
     mission: Arc<Mission>,
-    /// The standing order, and in which life the ground station spoke it.
-    order: Option<(Order, Option<Incarnation>)>,
+    /// The standing orders, and in which life the ground station spoke them.
+    orders: Option<(Orders, Option<Incarnation>)>,
     /// The record in which it spoke last.
     spoken: Vec<u8>,
     /// What was not said of tasks yet.
@@ -33,7 +33,7 @@ impl Operator {
     pub(super) fn new(mission: Arc<Mission>) -> Self {
         Self {
             mission,
-            order: None,
+            orders: None,
             spoken: Vec::new(),
             edits: VecDeque::new(),
             tasks: Vec::new(),
@@ -62,9 +62,18 @@ impl Operator {
         self.mission = next;
     }
 
-    /// Gives an order.
-    pub(super) fn order(&mut self, order: Order) {
-        self.order = Some((order, None));
+    /// Gives an order to one UAV, or to all. One that no record has room for is not given.
+    pub(super) fn order(&mut self, uav: Option<u16>, order: Order) {
+        let standing = self.orders.as_ref().map(|(orders, _)| orders.clone());
+        if let Some(next) = standing.unwrap_or_default().told(uav, order) {
+            self.orders = Some((next, None));
+        }
+    }
+
+    /// Whether a UAV is to go on, as far as it is up to the operator.
+    pub(super) fn wants_to_fly(&self, uav: u16) -> bool {
+        let orders = self.orders.as_ref();
+        orders.is_none_or(|(orders, _)| orders.of(uav) == Order::Resume)
     }
 
     /// Something about tasks is to be said.
@@ -102,13 +111,13 @@ impl Operator {
         &self.tasks
     }
 
-    /// The order that the ground station is to say in the life in which it speaks, once.
-    pub(super) fn speaks(&mut self, life: Option<Incarnation>) -> Option<Order> {
-        let (order, said_in) = self.order.as_mut()?;
+    /// The orders that the ground station is to say in the life in which it speaks, once.
+    pub(super) fn speaks(&mut self, life: Option<Incarnation>) -> Option<Orders> {
+        let (orders, said_in) = self.orders.as_mut()?;
         let news = life.is_some() && *said_in != life;
         news.then(|| {
             *said_in = life;
-            *order
+            orders.clone()
         })
     }
 
@@ -120,8 +129,8 @@ impl Operator {
     /// The record to hand to whoever waits out of reach for an order that was spoken, once a
     /// courier has had time to go there.
     pub(super) fn courier(&mut self, now_ms: u64, is_stranded: bool) -> Option<Vec<u8>> {
-        let goes_on = matches!(self.order, Some((Order::Resume, Some(_))));
-        if !is_stranded || !goes_on {
+        let is_said = matches!(self.orders, Some((_, Some(_))));
+        if !is_stranded || !is_said {
             self.stranded_ms = None;
             return None;
         }
@@ -142,15 +151,17 @@ mod tests {
     fn an_order_is_said_once_in_each_life_and_carried_to_who_waits_out_of_reach_for_a_minute() {
         let mut operator = Operator::new(fixture::square(1).mission);
         assert_eq!(operator.speaks(Some(1)), None);
-        operator.order(Order::Hold);
+        operator.order(None, Order::Hold);
         assert_eq!(operator.speaks(None), None);
-        assert_eq!(operator.speaks(Some(1)), Some(Order::Hold));
+        assert_eq!(operator.speaks(Some(1)), Some(Order::Hold.into()));
         assert_eq!(operator.speaks(Some(1)), None);
-        assert_eq!(operator.speaks(Some(2)), Some(Order::Hold));
+        assert_eq!(operator.speaks(Some(2)), Some(Order::Hold.into()));
         operator.was_spoken(&[7]);
-        assert_eq!(operator.courier(0, true), None);
-        assert_eq!(operator.courier(COURIER_MS, true), None, "nobody goes on");
-        operator.order(Order::Resume);
+        assert_eq!(operator.courier(0, false), None);
+        assert_eq!(operator.courier(COURIER_MS, false), None, "nobody goes on");
+        operator.order(Some(2), Order::Resume);
+        assert!(operator.wants_to_fly(2) && !operator.wants_to_fly(1));
+        operator.order(None, Order::Resume);
         assert_eq!(operator.courier(COURIER_MS, true), None, "nobody said it");
         operator.speaks(Some(2));
         assert_eq!(operator.courier(10, true), None);

@@ -512,11 +512,18 @@ fn is_down(r: &Report) -> bool {
 #[test]
 fn an_order_to_hold_stops_the_work_until_it_is_to_go_on() {
     let faults = vec![
-        at(30_000, Fault::Order { order: Order::Hold }),
+        at(
+            30_000,
+            Fault::Order {
+                order: Order::Hold,
+                uav: None,
+            },
+        ),
         at(
             90_000,
             Fault::Order {
                 order: Order::Resume,
+                uav: None,
             },
         ),
     ];
@@ -543,7 +550,7 @@ fn an_order_to_return_brings_all_uavs_to_the_base() {
     let mut swarm = Swarm::new(
         &prepared(3),
         12,
-        vec![at(30_000, Fault::Order { order })],
+        vec![at(30_000, Fault::Order { order, uav: None })],
         false,
     );
     swarm.run_until(120_000);
@@ -555,6 +562,28 @@ fn an_order_to_return_brings_all_uavs_to_the_base() {
         // Two turn radii of the fixture's airframe, and room for the way in.
         assert!(away_m < 120.0, "uav{id} is {away_m:.0} m from the base");
     }
+}
+
+/// One of three is told to return and later to go on; the others fly its part meanwhile.
+#[test]
+fn an_order_to_one_brings_it_home_while_the_others_finish_its_part() {
+    let to = |order| Fault::Order {
+        order,
+        uav: Some(2),
+    };
+    let faults = vec![at(30_000, to(Order::ReturnToBase))];
+    let mut swarm = Swarm::new(&prepared(3), 14, faults.clone(), false);
+    swarm.run_until(40_000);
+    let beliefs = |swarm: &Swarm, id| {
+        let peer = swarm.peers[swarm.peer_idx(id).unwrap()].peer.as_ref();
+        peer.unwrap().beliefs()
+    };
+    assert!(beliefs(&swarm, 2).plan.is_empty() && beliefs(&swarm, 2).order == Order::ReturnToBase);
+    assert_eq!(beliefs(&swarm, 1).order, Order::Resume);
+    passed(&swarm.run());
+    // And with three again.
+    let again = vec![faults[0].clone(), at(70_000, to(Order::Resume))];
+    passed(&Swarm::new(&prepared(3), 14, again, false).run());
 }
 
 #[test]

@@ -263,8 +263,8 @@ fn what_is_no_record_of_this_swarm_changes_nothing() {
     let mut air = Air::new();
     let _ = air.look(100);
     for (key, bytes) in [
-        ("f/v3/beacon/0/1", &b"\xff\x00"[..]),
-        ("other/v3/beacon/0/1", b""),
+        ("f/v4/beacon/0/1", &b"\xff\x00"[..]),
+        ("other/v4/beacon/0/1", b""),
         ("no key", b"1"),
     ] {
         air.belief.heard(200, key, bytes);

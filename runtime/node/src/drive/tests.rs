@@ -4,8 +4,8 @@ use super::*;
 use crate::journal::{Disk, MAX_RECORD_BYTES};
 use crate::radio::Hop;
 use crate::testing::{mission, percept};
-use skein_behaviors::Setpoint;
 use skein_behaviors::setpoint::Side;
+use skein_behaviors::{Orders, Setpoint};
 use skein_link::medium::Channel;
 use skein_link::{RadioCounters, Reason};
 use skein_peer::{Priority, Report};
@@ -49,10 +49,10 @@ impl Log {
     }
 
     /// Orders that the peer was given.
-    fn orders(&self) -> Vec<Order> {
+    fn orders(&self) -> Vec<Orders> {
         let seen = self.seen();
         let order = |(_, input): &(u64, Input)| match input {
-            Input::Command(Command::Order(order)) => Some(*order),
+            Input::Command(Command::Orders(orders)) => Some(orders.clone()),
             _ => None,
         };
         seen.inputs.iter().filter_map(order).collect()
@@ -97,6 +97,14 @@ impl PeerLogic for Double {
 
     fn speaks_in(&self) -> Option<Incarnation> {
         *self.life.lock().unwrap()
+    }
+
+    fn orders(&self) -> Orders {
+        self.log.orders().last().cloned().unwrap_or_default()
+    }
+
+    fn knows_uav(&self, id: u16) -> bool {
+        id == 3
     }
 
     fn mission(&self) -> Option<Arc<Mission>> {
@@ -424,13 +432,23 @@ async fn an_order_is_spoken_in_each_life_until_the_next_order() {
         running.log.until("a percept", sensed).await;
         // The order follows the percept in the same turn of the loop.
         running.ask(Request::Base((0, 0))).await.unwrap();
-        assert_eq!(running.log.orders(), vec![Order::Hold; n], "{life:?}");
+        assert_eq!(
+            running.log.orders(),
+            vec![Orders::from(Order::Hold); n],
+            "{life:?}"
+        );
     }
     let told = running.ask(Request::Order(Order::Resume)).await.unwrap();
     assert_eq!(told, ["the ground station says resume to all"]);
-    assert_eq!(running.log.orders().last(), Some(&Order::Resume));
+    assert_eq!(running.log.orders().last(), Some(&Order::Resume.into()));
+    let one = |id| running.ask(Request::OrderOne(id, Order::ReturnToBase));
+    assert!(one(4).await.is_err_and(|e| e.contains("number 4")));
+    let told = one(3).await.unwrap();
+    assert_eq!(told, ["the ground station says return-to-base to uav3"]);
+    let orders = Orders::default().told(Some(3), Order::ReturnToBase);
+    assert_eq!(running.log.orders().last(), orders.as_ref());
     let standing = Standing::open(&running.dir.path().join("j"), Some(&mission())).unwrap();
-    assert_eq!(standing.order(), Some(Order::Resume));
+    assert_eq!(standing.orders(), orders);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 1)]

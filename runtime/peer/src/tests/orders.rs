@@ -2,6 +2,7 @@
 
 use super::{covered, with_operator};
 use crate::testing::{GROUND_STATION, Harness, mission};
+use crate::wire::codec::Body;
 use crate::wire::kinds::Kind;
 use skein_behaviors::Order;
 
@@ -48,6 +49,102 @@ fn return_flies_home_and_resume_finishes_the_mission() {
     }
     h.order(GROUND_STATION, Order::Resume);
     assert!(h.run_until(250, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+}
+
+/// What the last claim of a peer lists.
+fn listed(h: &mut Harness, id: u16) -> Option<usize> {
+    let said = h.seat(id).said.iter().rev();
+    let mut claims = said.filter_map(|(_, _, body)| match body {
+        Body::Claim(claim) => Some(claim.plan.len()),
+        _ => None,
+    });
+    claims.next()
+}
+
+#[test]
+fn who_is_told_to_return_lets_go_first_and_when_all_are_nobody_takes_over() {
+    let mut h = at_work();
+    assert!(listed(&mut h, 1) > Some(0));
+    h.order(GROUND_STATION, Order::ReturnToBase);
+    h.run_s(3);
+    for id in [1, 2] {
+        assert_eq!(listed(&mut h, id), Some(0), "{id}");
+    }
+    let seen = covered(&h, 1);
+    for _ in 0..60 {
+        h.run_s(1);
+        let beliefs = [1, 2].map(|id| h.beliefs(id));
+        assert!(
+            beliefs
+                .iter()
+                .all(|b| b.plan.is_empty() && b.held.is_empty())
+        );
+    }
+    assert_eq!(covered(&h, 1), seen);
+}
+
+#[test]
+fn one_that_returns_leaves_its_cells_to_the_other_and_joins_again() {
+    let mut h = with_operator(2, mission(1, 8, 6));
+    h.run_s(25);
+    let left: Vec<u16> = h.beliefs(1).plan;
+    assert!(left.len() > 8);
+    h.order_one(GROUND_STATION, 1, Order::ReturnToBase);
+    h.run_s(3);
+    assert_eq!(
+        (h.beliefs(1).order, h.beliefs(2).order),
+        (Order::ReturnToBase, Order::Resume)
+    );
+    assert!(h.beliefs(1).plan.is_empty() && h.beliefs(2).able);
+    h.run_s(20);
+    let (other, open) = (h.beliefs(2).plan, h.beliefs(2).covered);
+    assert!(left.iter().all(|c| other.contains(c) || open.contains(*c)));
+    h.run_s(30);
+    assert!(from_base_m(&mut h, 1) < 100.0 && from_base_m(&mut h, 2) > 0.0);
+    h.order_one(GROUND_STATION, 1, Order::Resume);
+    assert!(h.run_until(60, |h| !h.beliefs(1).plan.is_empty()));
+    assert!(h.run_until(400, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+}
+
+#[test]
+fn what_a_round_gives_to_who_returns_meanwhile_is_let_go_too() {
+    // The order comes while bids are on their way: at any time of the first seconds.
+    for second in 1..20 {
+        let mut h = with_operator(2, mission(1, 6, 4));
+        h.run_s(second);
+        h.order_one(GROUND_STATION, 1, Order::ReturnToBase);
+        h.run_s(5);
+        for _ in 0..10 {
+            h.run_s(1);
+            assert!(h.beliefs(1).plan.is_empty(), "told after {second} s");
+        }
+        assert!(
+            h.run_until(400, |h| h.beliefs(2).finished),
+            "told after {second} s"
+        );
+    }
+}
+
+#[test]
+fn an_order_to_all_ends_those_to_single_ones() {
+    let mut h = at_work();
+    h.order_one(GROUND_STATION, 1, Order::ReturnToBase);
+    h.order_one(GROUND_STATION, 2, Order::Hold);
+    h.run_s(5);
+    let orders = h.beliefs(1).orders;
+    assert_eq!(orders.to_string(), "resume, uav1 return-to-base, uav2 hold");
+    assert_eq!(h.beliefs(2).orders, orders);
+    let why = h.why(1).to_string();
+    assert!(
+        why.contains("order     return-to-base, to it alone; resume to all"),
+        "{why}"
+    );
+    assert!(
+        why.contains("flies home: the operator said return-to-base"),
+        "{why}"
+    );
+    h.order(GROUND_STATION, Order::Resume);
+    assert!(h.run_until(300, |h| h.beliefs(1).finished && h.beliefs(2).finished));
 }
 
 #[test]

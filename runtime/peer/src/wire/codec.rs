@@ -10,21 +10,22 @@
 //! Nothing here recurses with the input, allocates more than a few times its length,
 //! or panics. The primitives are in `cbor.rs`, schemas in [`super::schema`].
 
-use super::cbor::{In, Listed, Out, Wire, array_of, number_of};
+use super::cbor::{In, Listed, Out, Wire, array_of, in_field, number_of};
 use super::kinds::{Kind, RECORD_MAX_BYTES};
 use super::limits::{
     self, COMMITS_MAX, FRESH_MAX_BYTES, GOSSIP_MAX, MEMBERS_MAX, PLAN_MAX, at_most, in_range,
 };
 use super::message::{
     Activity, Beacon, Bid, CellRun, Claim, Cover, Epoch, Finished, Fresh, Gossip, Heartbeat,
-    Lacking, ListedRun, Member, MissionChunk, MissionStatus, OffLoop, Order, Record, Round, Stamp,
-    State,
+    Lacking, ListedRun, Member, MissionChunk, MissionStatus, OffLoop, Order, Orders, Record, Round,
+    Stamp, State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
 use super::tasks::{Bundle, Task};
 use crate::protocol::conflict::Intent;
 use crate::protocol::promises::Brief;
 use crate::varint;
+use skein_behaviors::order::SINGLES_MAX;
 
 /// Largest envelope around a body: heads and numbers at their longest, 23 bytes, and
 /// a signature with its head.
@@ -82,7 +83,7 @@ pub enum Body {
     Claim(Claim),
     Cover(Cover),
     Mission(MissionChunk),
-    Operator(Order),
+    Operator(Orders),
     Finished(Finished),
     Heartbeat(Heartbeat),
     Lacking(Lacking),
@@ -135,10 +136,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Claim(b) => b.put(&mut out),
         Body::Cover(b) => b.put(&mut out),
         Body::Mission(b) => b.put(&mut out),
-        Body::Operator(b) => {
-            out.array(1);
-            b.put(&mut out);
-        }
+        Body::Operator(b) => b.put(&mut out),
         Body::Finished(b) => b.put(&mut out),
         Body::Heartbeat(b) => b.put(&mut out),
         Body::Lacking(b) => b.put(&mut out),
@@ -169,10 +167,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Claim => Body::Claim(Wire::get(&mut input)?),
         Kind::Cover => Body::Cover(Wire::get(&mut input)?),
         Kind::Mission => Body::Mission(Wire::get(&mut input)?),
-        Kind::Operator => {
-            input.array("order", 1)?;
-            Body::Operator(Wire::get(&mut input)?)
-        }
+        Kind::Operator => Body::Operator(Wire::get(&mut input)?),
         Kind::Finished => Body::Finished(Wire::get(&mut input)?),
         Kind::Heartbeat => Body::Heartbeat(Wire::get(&mut input)?),
         Kind::Lacking => Body::Lacking(Wire::get(&mut input)?),
@@ -401,6 +396,42 @@ number_of!(Order {
     Hold,
     ReturnToBase
 });
+
+/// An order to one UAV.
+struct Single {
+    uav: u16,
+    order: Order,
+}
+array_of!(Single { uav, order });
+impl Listed for Single {
+    const MAX: usize = SINGLES_MAX;
+}
+
+impl Wire for Orders {
+    fn put(&self, out: &mut Out) {
+        out.array(2);
+        self.all.put(out);
+        let singles = self.singles.iter();
+        let singles: Vec<Single> = singles
+            .map(|(uav, order)| Single {
+                uav: *uav,
+                order: *order,
+            })
+            .collect();
+        singles.put(out);
+    }
+
+    fn get(input: &mut In<'_>) -> Result<Self, WireError> {
+        input.array("Orders", 2)?;
+        let all = Wire::get(input).map_err(|e| in_field(e, "order"))?;
+        let listed: Vec<Single> = Wire::get(input).map_err(|e| in_field(e, "singles"))?;
+        if listed.windows(2).any(|pair| pair[0].uav >= pair[1].uav) {
+            return Err(WireError::Range { field: "singles" });
+        }
+        let singles = listed.into_iter().map(|s| (s.uav, s.order)).collect();
+        Ok(Self { all, singles })
+    }
+}
 
 impl Listed for Gossip {
     const MAX: usize = GOSSIP_MAX;

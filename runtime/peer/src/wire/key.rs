@@ -1,4 +1,4 @@
-//! Natural keys: `<fleet>/v3/<kind>/<subject>/<author>`.
+//! Natural keys: `<fleet>/v4/<kind>/<subject>/<author>`.
 //!
 //! The addressing of docs/protocol.md §7: an observer attached to any peer sees the
 //! whole fleet under names that say what they carry. Only the author *originates*
@@ -8,7 +8,7 @@ use super::kinds::Kind;
 
 /// The version of everything on the wire. Another layout of any body is another
 /// version: peers of two versions do not hear each other.
-pub const VERSION: &str = "v3";
+pub const VERSION: &str = "v4";
 
 /// Longest fleet name, bytes: a key stays below 64 bytes.
 pub const FLEET_MAX_BYTES: usize = 32;
@@ -23,7 +23,7 @@ pub enum KeyError {
         name: String,
     },
     /// The key is not one of ours.
-    #[error("key is not <fleet>/v3/<kind>/<subject>/<author>; what came under it is ignored")]
+    #[error("key is not <fleet>/v4/<kind>/<subject>/<author>; what came under it is ignored")]
     Shape,
 }
 
@@ -105,7 +105,7 @@ mod tests {
         }
 
         #[test]
-        fn whatever_parses_is_what_would_be_written(text in "[a-z/]{0,3}/v3/(state|cover)/[+0-9]{1,6}/[0-9]{1,3}") {
+        fn whatever_parses_is_what_would_be_written(text in "[a-z/]{0,3}/v4/(state|cover)/[+0-9]{1,6}/[0-9]{1,3}") {
             if let Ok(k) = parse(&text) {
                 prop_assert_eq!(key(&k.fleet, k.kind, k.subject, k.author), text);
             }
@@ -119,12 +119,12 @@ mod tests {
         }
         for text in [
             "",
-            "a/v3/state/0",
-            "a/v3/state/0/1/2",
+            "a/v4/state/0",
+            "a/v4/state/0/1/2",
             "a/v1/state/0/1",
-            "a/v3/rumour/0/1",
-            "a/v3/state/00/1",
-            "a/v3/state/0/65536",
+            "a/v4/rumour/0/1",
+            "a/v4/state/00/1",
+            "a/v4/state/0/65536",
         ] {
             assert_eq!(parse(text), Err(KeyError::Shape), "{text}");
         }

@@ -25,7 +25,7 @@ pub enum Kind {
     Cover = 4,
     /// A piece of a mission.
     Mission = 5,
-    /// What the operator wants of everybody.
+    /// What the operator wants of everybody, and of single UAVs.
     Operator = 6,
     /// "All that can be covered is covered."
     Finished = 7,
@@ -156,7 +156,7 @@ const TABLE: [KindRow; 15] = [
     row(
         Kind::Operator,
         "operator",
-        8,
+        168,
         Priority::Claim,
         Lifetime::Ms(60_000),
     ),

@@ -66,7 +66,8 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
             at_most("bytes", m.bytes.len(), CHUNK_MAX_BYTES)?;
             in_range("chunks", (1..=CHUNKS_MAX).contains(&m.chunks))
         }
-        Body::Operator(_) | Body::Finished(_) => Ok(()),
+        Body::Operator(orders) => in_range("singles", orders.is_bounded()),
+        Body::Finished(_) => Ok(()),
         Body::Heartbeat(h) => check_heartbeat(h),
         Body::Intent(i) => super::intent::check(i),
         Body::Conflict(b) => super::intent::check_brief(b),

@@ -5,7 +5,7 @@
 
 use crate::Incarnation;
 use serde::{Deserialize, Serialize};
-pub use skein_behaviors::Order;
+pub use skein_behaviors::{Order, Orders};
 pub use skein_flight::coverage::ring::backtracking::OffLoop;
 
 /// The envelope around every body. Relays pass it on unchanged.

@@ -6,6 +6,7 @@ use super::message::*;
 use crate::PeerId;
 use crate::protocol::conflict::{Intent, PromisedPlan};
 use crate::protocol::promises::Brief;
+use skein_behaviors::order::SINGLES_MAX;
 use skein_flight::separation::motion::STRETCHES_MAX;
 use skein_flight::separation::{End, MotionPlan, Stretch};
 
@@ -225,7 +226,13 @@ fn golden_of_cells() -> Vec<(Body, &'static str)> {
             }),
             "8401060243010203",
         ),
-        (Body::Operator(Order::ReturnToBase), "8102"),
+        (
+            Body::Operator(Orders {
+                all: Order::Resume,
+                singles: [(3, Order::ReturnToBase)].into(),
+            }),
+            "820081820302",
+        ),
         (Body::Finished(Finished { revision: 3 }), "8103"),
         (
             Body::Heartbeat(Heartbeat {
@@ -448,7 +455,12 @@ fn largest_of_cells() -> Vec<Body> {
             chunks: CHUNKS_MAX,
             bytes: vec![9; CHUNK_MAX_BYTES],
         }),
-        Body::Operator(Order::ReturnToBase),
+        Body::Operator(Orders {
+            all: Order::ReturnToBase,
+            singles: (0..u16::try_from(SINGLES_MAX).unwrap_or(u16::MAX))
+                .map(|i| (u16::MAX - i, Order::Hold))
+                .collect(),
+        }),
         Body::Finished(Finished { revision: u32::MAX }),
         Body::Heartbeat(Heartbeat {
             interval: INTERVAL_MOST,

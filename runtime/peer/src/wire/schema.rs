@@ -12,6 +12,7 @@ use super::limits::{
     POSITION_MAX_MM, SPEED_MAX_MMPS,
 };
 use core::fmt::Write as _;
+use skein_behaviors::order::SINGLES_MAX;
 use skein_flight::separation::motion::{HEADING_MOST_E7, STRETCHES_MAX};
 
 /// What a place of an array may hold.
@@ -348,11 +349,21 @@ const MISSION: &[Place] = &[
     at("bytes", "the piece", Shape::Bytes(CHUNK_MAX_BYTES)),
 ];
 
-const OPERATOR: &[Place] = &[at(
-    "order",
-    "what everybody is to do",
-    Shape::Choice(&["resume", "hold", "return to base"]),
-)];
+const ORDER: Shape = Shape::Choice(&["resume", "hold", "return to base"]);
+
+const SINGLE: &[Place] = &[
+    at("uav", "number of the UAV", U16),
+    at("order", "what it is to do, another thing than all", ORDER),
+];
+
+const OPERATOR: &[Place] = &[
+    at("order", "what all are to do that are not listed", ORDER),
+    at(
+        "singles",
+        "what single UAVs are to do, ascending by their numbers",
+        Shape::Rows(SINGLE, SINGLES_MAX),
+    ),
+];
 
 const FINISHED: &[Place] = &[REVISION];
 
@@ -672,7 +683,7 @@ mod tests {
         ));
         assert!(!fits(
             Shape::Row(OPERATOR),
-            &Value::Array(vec![Value::Integer(3)])
+            &Value::Array(vec![Value::Integer(3), Value::Array(vec![])])
         ));
     }
 
@@ -696,7 +707,7 @@ mod tests {
         assert_eq!(
             schema(Kind::Finished).unwrap(),
             "{\"$schema\":\"https://json-schema.org/draft/2020-12/schema\",\
-             \"title\":\"skein v3 finished\",\"type\":\"array\",\"prefixItems\":[\
+             \"title\":\"skein v4 finished\",\"type\":\"array\",\"prefixItems\":[\
              {\"title\":\"revision\",\"description\":\"mission revision\",\
              \"type\":\"integer\",\"minimum\":0,\"maximum\":4294967295}],\
              \"items\":false,\"minItems\":1,\"maxItems\":1}"

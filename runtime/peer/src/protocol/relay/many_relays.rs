@@ -323,7 +323,7 @@ fn a_later_life_voids_what_waits_of_the_earlier_one() {
         }
     }
     out.sort();
-    assert_eq!(out, ["f/v3/state/0/1", "f/v3/state/0/2"]);
+    assert_eq!(out, ["f/v4/state/0/1", "f/v4/state/0/2"]);
 }
 
 #[test]

@@ -517,7 +517,7 @@ fn what_is_due_goes_before_what_only_shares_its_headers() {
     let authors: Vec<String> = sent.map(|out| out.key).collect();
     assert_eq!(
         authors,
-        ["f/v3/finished/0/2", "f/v3/state/0/1", "f/v3/claim/0/3"]
+        ["f/v4/finished/0/2", "f/v4/state/0/1", "f/v4/claim/0/3"]
     );
 }
 

@@ -384,10 +384,20 @@ fn every_limit_is_sharp() {
                 with(&|b| b.done.swap(0, 1), "done");
                 with(&|b| b.done[1] = b.done[0], "done");
             }
-            Body::Operator(_) | Body::Finished(_) => {}
+            Body::Operator(orders) => {
+                kinds += 1;
+                let mut same = orders.clone();
+                same.singles.insert(7, orders.all);
+                refused(&Body::Operator(same), "singles");
+                let mut many = orders;
+                let other = Order::Hold;
+                many.singles.extend((0..=32).map(|uav| (uav, other)));
+                refused(&Body::Operator(many), "singles");
+            }
+            Body::Finished(_) => {}
         }
     }
-    assert_eq!(kinds, 12);
+    assert_eq!(kinds, 13);
 }
 
 #[test]
