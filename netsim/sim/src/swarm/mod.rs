@@ -943,6 +943,7 @@ impl Swarm {
             revision,
             name,
             news: TaskNews::Seen,
+            ..
         } = report
         else {
             return;
