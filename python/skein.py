@@ -243,6 +243,7 @@ class Run:
     frames: object  # a row for each frame: coverage, links, components
     events: object  # a row for each event
     report: dict  # what the run came to (docs/report.md); None where it was cut off
+    failure_free: dict = None  # the same run without failures, where it is known
 
 
 def load(run, tables=True):
@@ -255,7 +256,7 @@ def load(run, tables=True):
     path = path / "run.mcap" if path.is_dir() else path
     if not path.exists():
         raise SkeinError(f"{path}: no such recording; `skein sim --run-dir DIR` makes one")
-    scenes, uavs, frames, events, report = [], [], [], [], None
+    scenes, uavs, frames, events, report, failure_free = [], [], [], [], None, None
     with path.open("rb") as file:
         try:
             # In the order of the file, which is that of time: sorting reads all of it first, and
@@ -272,6 +273,8 @@ def load(run, tables=True):
                     uavs.extend(_rows(value))
                 elif channel.topic == "/skein/event":
                     events.append(value)
+                elif channel.topic == "/skein/failure_free":
+                    failure_free = value
                 elif channel.topic == "/skein/end":
                     report = value["report"]
         except McapError as why:
@@ -281,7 +284,7 @@ def load(run, tables=True):
         raise SkeinError(f"{path}: holds no scene of a run")
     if tables:
         uavs, frames, events = _table(uavs), _table(frames), _table(events)
-    return Run(scenes, uavs, frames, events, report)
+    return Run(scenes, uavs, frames, events, report, failure_free)
 
 
 def _frame(value):

@@ -13,6 +13,7 @@ use skein_netsim::Prepared;
 use skein_netsim::runs::{self, Wanted};
 use skein_netsim::swarm::Outcome;
 use skein_netsim::timeline::timeline;
+use skein_recording::failure_free::Compared;
 use skein_recording::model::Knowledge;
 use skein_recording::model::scene::Driver;
 use skein_recording::run_dir::{Manifest, RECORDING};
@@ -165,7 +166,9 @@ fn one(args: &SimArgs, prepared: &Prepared) -> anyhow::Result<bool> {
     let outcome = if sinks.is_empty() {
         unseen(prepared, seed, storm, wanted)
     } else {
-        simulated::fly(prepared, seed, storm, wanted, &mut Onlookers::new(sinks))?
+        // Whoever looks sees what it would have been without failures, too.
+        let mut sink = Compared::begin(Onlookers::new(sinks), prepared, seed)?;
+        simulated::fly(prepared, seed, storm, wanted, &mut sink)?
     };
     map.map(Map::join).transpose().context("the map")?;
     if let (Some(manifest), Some(dir)) = (manifest, &args.run_dir) {

@@ -122,10 +122,48 @@ def through_a_kill(skein, browser):
         check(events >= len(wanted), f"the events tell {events} takeovers of uav{dead}")
         page.keyboard.press("3")
         page.wait_for_timeout(300)
-        check(page.locator(".round").count() > 0, "rounds with their bids are told")
+        rounds(page, at_s, dead)
+        note = page.locator("#curve-note").inner_text()
+        check(re.search(r"without failures \d+\.\d % by then, done at \d+:\d\d", note), f"the curve without failures is told: {note!r}")
+        reference(page, report)
         check(not said, f"the console is quiet: {said}")
         page.context.close()
         strangers(run.url.partition("#")[0])
+
+
+def rounds(page, at_s, dead):
+    """The rounds up to a moment after the kill, and that those that came later are gone before it."""
+    told = page.locator("#round-list .round").all()
+    texts = [one.inner_text() for one in told]
+    check(bool(told), f"{len(told)} rounds are told")
+    check(any(re.search(r"opened by uav\d+: (cells that nobody lists|to even out the work)", text) for text in texts), "who opened a round and why is told")
+    rows = page.locator("#round-list .round tbody tr").all_inner_texts()
+    full = [row for row in rows if re.match(r"uav\d+\t\d+\t\d+ s\t\d+ s\t\d+\t\S", row)]
+    check(bool(full), f"{len(full)} of {len(rows)} members have a bid and got a section: {full[:1]}")
+    adopted = [one for one in told if "all adopted it" in one.inner_text() and at_s < moment(one)]
+    members = [[row.get_attribute("data-uav") for row in one.locator("tbody tr").all()] for one in adopted]
+    check(bool(members) and all(str(dead) not in of for of in members), f"a round after the kill was adopted without uav{dead}")
+    page.evaluate(f"seek({int(at_s * 1000) - 1000})")
+    page.wait_for_timeout(400)
+    before = [moment(one) for one in page.locator("#round-list .round").all()]
+    check(all(t <= at_s for t in before) and len(before) < len(told), f"a second before it {len(before)} rounds are told, none of them later")
+    page.evaluate("seek(run.lastMs)")
+    page.wait_for_timeout(400)
+
+
+def moment(one):
+    """When a round was opened, seconds."""
+    minutes, seconds = one.locator(".moment").first.inner_text().split(":")
+    return int(minutes) * 60 + int(seconds)
+
+
+def reference(page, report):
+    """The curve without failures rises to all, and sooner than the run did."""
+    points = page.evaluate("run.failureFree.coverage")
+    check(points[0] == [0, 0] and points[-1][1] == 1, f"the curve without failures has {len(points)} points, the last at 100 %")
+    check(all(a[0] < b[0] and a[1] <= b[1] for a, b in zip(points, points[1:])), "and never falls")
+    made = page.evaluate("run.failureFree.makespan_ms")
+    check(made < report["makespan_ms"], f"without failures it is done sooner: {made} of {report['makespan_ms']} ms")
 
 
 def strangers(url):
@@ -142,9 +180,45 @@ def strangers(url):
             check(refused.code in (403, 421), f"a request {name} is refused ({refused.code})")
 
 
+def recorded(skein, folder, scenario):
+    """The directory of a recorded run."""
+    run_dir = folder / scenario
+    subprocess.run([skein, "sim", scenario, "--run-dir", str(run_dir), "--format", "json"], stdout=subprocess.DEVNULL, check=False)
+    return run_dir
+
+
+def response(page, name):
+    """How long it takes from a jump in time to the moment drawn, panels and charts too."""
+    took = page.evaluate("""() => {
+        const took = [];
+        for (let i = 1; i <= 20; i += 1) {
+            const at = performance.now();
+            seek(run.lastMs * ((i * 7) % 20) / 20);
+            panelsAt = 0;
+            draw(performance.now());
+            took.push(performance.now() - at);
+        }
+        return took.sort((a, b) => a - b);
+    }""")
+    check(took[10] < 250 and took[-1] < 1500, f"{name}: a jump in time is drawn within {took[10]:.0f} ms at the median, {took[-1]:.0f} ms at most")
+
+
 def pictures(skein, browser, folder, scenario, at_s):
-    with Run(skein, ["sim", scenario, "--web"]) as run:
+    with Run(skein, ["replay", str(recorded(skein, folder, scenario)), "--web"]) as run:
         for size in SIZES:
+            for tab in ("rounds", "tasks", "events"):
+                page, said = opened(browser, run.url, size, at_s, theme="light", tab=tab)
+                page.wait_for_timeout(1000)
+                file = folder / f"{scenario}-{size[0]}-{tab}.png"
+                page.screenshot(path=str(file), full_page=True)
+                wide = page.locator("html").evaluate("node => node.scrollWidth")
+                check(wide <= size[0], f"{file.name}: nothing is wider than the window ({wide} px)")
+                inner = page.locator(f"#{tab}").evaluate("node => node.scrollWidth - node.clientWidth")
+                check(inner <= 0, f"{file.name}: the tab need not be moved sideways ({inner} px)")
+                if tab == "rounds":
+                    response(page, file.name)
+                check(not said, f"{file.name}: the console is quiet: {said}")
+                page.context.close()
             for theme in ("light", "dark"):
                 page, said = opened(browser, run.url, size, at_s, theme=theme)
                 page.wait_for_timeout(1000)

@@ -1,11 +1,13 @@
 //! What a trial tells those who look at it: a thread of its own gives it to their sinks, so that
 //! none of them holds the world up.
 
+use skein_netsim::Prepared;
 use skein_netsim::fault::Fault;
 use skein_netsim::spec::Spec;
 use skein_netsim::world::{Fact, Loss};
 use skein_peer::Report;
 use skein_peer::offload::MissionGeometry;
+use skein_recording::failure_free::Beside;
 use skein_recording::model::scene::Driver;
 use skein_recording::simulated::FRAME_MS;
 use skein_recording::sink::Tee;
@@ -20,6 +22,10 @@ use crate::live_world::LiveWorld;
 /// hundred some hundred: this is a minute of theirs at least.
 const MAX_WAITING: usize = 8192;
 
+/// A trial of so many UAVs is compared with a simulated run without failures, which takes some
+/// seconds of one core beside it; of more that would slow its peers down.
+const MAX_COMPARED: usize = 32;
+
 /// The observer of one trial, and the thread of its sinks.
 #[derive(Debug)]
 pub(crate) struct Observed {
@@ -27,6 +33,8 @@ pub(crate) struct Observed {
     /// None where nobody looks, or the sinks were too slow.
     words: Option<SyncSender<Record>>,
     thread: Option<JoinHandle<()>>,
+    /// The run without failures, until it was told.
+    beside: Option<Beside>,
     frame_due_ms: u64,
 }
 
@@ -50,9 +58,15 @@ impl Observed {
             observer: Observer::new(spec, Some(geometry), seed, Driver::Live),
             words,
             thread,
+            beside: None,
             frame_due_ms: 0,
         };
         observed.flush();
+        if observed.words.is_some() && spec.uavs.len() <= MAX_COMPARED {
+            let (spec, geometry) = (spec.clone(), Arc::clone(geometry));
+            let prepare = move || Prepared::with_geometry(spec, geometry);
+            observed.beside = Some(Beside::begin(prepare, seed)?);
+        }
         Ok(observed)
     }
 
@@ -90,6 +104,10 @@ impl Observed {
             return;
         }
         self.frame_due_ms = now_ms + FRAME_MS;
+        if let Some(flown) = self.beside.as_ref().and_then(Beside::poll) {
+            self.beside = None;
+            self.send(Record::FailureFree(flown));
+        }
         let frame = self.observer.frame(world.world(), world.links(), runs);
         self.send(Record::Frame(frame));
     }
@@ -158,7 +176,11 @@ mod tests {
     }
 
     impl Sink for Counting {
-        fn take(&mut self, _: &Record) -> io::Result<()> {
+        fn take(&mut self, record: &Record) -> io::Result<()> {
+            // It comes when it comes.
+            if matches!(record, Record::FailureFree(_)) {
+                return Ok(());
+            }
             self.count()
         }
     }

@@ -226,7 +226,9 @@ pub fn report_hash(report: &Report) -> u64 {
                 &[u64::from(peer.0), u64::from(*incarnation), status],
             );
         }
-        Report::Round { counter, members } => {
+        Report::Round {
+            counter, members, ..
+        } => {
             words(&mut h, 4, &[u64::from(*counter)]);
             members
                 .iter()
@@ -269,9 +271,18 @@ pub fn report_hash(report: &Report) -> u64 {
             words(&mut h, 11, &[mission.content_hash()]);
         }
         Report::Silenced => words(&mut h, 10, &[]),
-        Report::Task { .. } => {
+        Report::Task {
+            id,
+            revision,
+            name,
+            news,
+            ..
+        } => {
             words(&mut h, 12, &[]);
-            h.write(format!("{report:?}").as_bytes());
+            let told = format!(
+                "Task {{ id: {id:?}, revision: {revision}, name: {name:?}, news: {news:?} }}"
+            );
+            h.write(told.as_bytes());
         }
         Report::Finished { revision } => words(&mut h, 7, &[u64::from(*revision)]),
         Report::Alarm { text } => {

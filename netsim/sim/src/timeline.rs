@@ -63,7 +63,9 @@ fn reported(peer: u16, report: &Report, told: &mut BTreeSet<String>) -> Option<S
                 of.0
             )
         }
-        Report::Round { counter, members } => {
+        Report::Round {
+            counter, members, ..
+        } => {
             let members: Vec<String> = members.iter().map(|m| m.0.to_string()).collect();
             let line = format!("round {counter} among {}", members.join(", "));
             return told.insert(line.clone()).then_some(line);

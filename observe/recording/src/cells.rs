@@ -48,7 +48,7 @@ impl Cells {
             Record::Scene(scene) if scene.loop_hash != self.loop_hash => *self = Self::of(scene),
             Record::Scene(scene) => self.covered.resize(scene.cells.len(), None),
             Record::Event(event) => self.happen(event),
-            Record::Frame(_) | Record::End(_) => {}
+            Record::Frame(_) | Record::FailureFree(_) | Record::End(_) => {}
         }
     }
 

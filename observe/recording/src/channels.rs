@@ -1,7 +1,7 @@
 //! The channels of a recording: their topics, and the JSON schema of each.
 
 use crate::foxglove;
-use crate::model::{End, Event, Frame, Scene};
+use crate::model::{End, Event, FailureFree, Frame, Scene};
 use schemars::{JsonSchema, SchemaGenerator, generate::SchemaSettings};
 use serde_json::Value;
 
@@ -24,6 +24,8 @@ pub const SCENE: Channel = channel("/skein/scene", "skein.Scene");
 pub const FRAME: Channel = channel("/skein/frame", "skein.Frame");
 /// What happened.
 pub const EVENT: Channel = channel("/skein/event", "skein.Event");
+/// The run without failures, where one is known.
+pub const FAILURE_FREE: Channel = channel("/skein/failure_free", "skein.FailureFree");
 /// What the run came to.
 pub const END: Channel = channel("/skein/end", "skein.End");
 /// Where a UAV is.
@@ -36,7 +38,17 @@ pub const CELLS: Channel = channel("/map/cells", "foxglove.GeoJSON");
 pub const LOG: Channel = channel("/log", "foxglove.Log");
 
 /// All of them.
-pub const ALL: [Channel; 8] = [SCENE, FRAME, EVENT, END, LOCATION, SITE, CELLS, LOG];
+pub const ALL: [Channel; 9] = [
+    SCENE,
+    FRAME,
+    EVENT,
+    FAILURE_FREE,
+    END,
+    LOCATION,
+    SITE,
+    CELLS,
+    LOG,
+];
 
 impl Channel {
     /// The JSON schema of its messages.
@@ -46,6 +58,7 @@ impl Channel {
             "skein.Scene" => of::<Scene>(self.schema),
             "skein.Frame" => of::<Frame>(self.schema),
             "skein.Event" => of::<Event>(self.schema),
+            "skein.FailureFree" => of::<FailureFree>(self.schema),
             "skein.End" => of::<End>(self.schema),
             name => foxglove::schema(name),
         }

@@ -82,6 +82,7 @@ pub fn jsonl(run: &Collected, out: &mut dyn Write) -> io::Result<()> {
             Record::Scene(scene) => line(out, "scene", scene)?,
             Record::Frame(frame) => line(out, "frame", frame)?,
             Record::Event(event) => line(out, "event", event)?,
+            Record::FailureFree(run) => line(out, "failure_free", run)?,
             Record::End(end) => line(out, "end", end)?,
         }
     }
@@ -104,7 +105,12 @@ pub fn in_order(run: &Collected) -> Vec<Record> {
         .map(|s| Record::Scene(Box::new(s.clone())));
     let events = run.events.iter().cloned().map(Record::Event);
     let frames = run.frames.iter().cloned().map(Record::Frame);
-    let mut all: Vec<Record> = scenes.chain(events).chain(frames).collect();
+    // It holds from the start on, and follows the first scene.
+    let compared = run.failure_free.iter().cloned().map(Record::FailureFree);
+    let mut all: Vec<Record> = (scenes.chain(compared))
+        .chain(events)
+        .chain(frames)
+        .collect();
     all.sort_by_key(Record::time_ms);
     all.extend(run.end.clone().map(Record::End));
     all

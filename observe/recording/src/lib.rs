@@ -13,6 +13,7 @@
 //! | [`simulated`] | a simulated run that is observed |
 //! | [`cells`] | who has which cell, folded from scenes and events |
 //! | [`writer`], [`reader`] | a run as an MCAP file; [`channels`] are its channels, [`foxglove`] its messages for Foxglove |
+//! | [`failure_free`] | the run without failures with which one is compared |
 //! | [`run_dir`] | the directory of a run: manifest, recording, report |
 //! | [`export`] | a run as CSV, lines of JSON, GeoJSON, KML |
 //! | [`tracks`] | where each UAV flew, life by life |
@@ -31,6 +32,7 @@
 pub mod cells;
 pub mod channels;
 pub mod export;
+pub mod failure_free;
 pub mod foxglove;
 pub mod model;
 pub mod observer;
@@ -42,7 +44,7 @@ mod stage;
 pub mod tracks;
 pub mod writer;
 
-pub use model::{End, Event, Frame, Record, Scene};
+pub use model::{End, Event, FailureFree, Frame, Record, Scene};
 pub use observer::Observer;
 pub use sink::Sink;
 pub use stage::{compass_deg, of_mission};

@@ -2,7 +2,7 @@
 //! for simulated runs and live trials.
 
 use crate::cells::Cells;
-use crate::model::event::{Belief, Event, Origin, What};
+use crate::model::event::{Belief, Bid, Event, Origin, What};
 use crate::model::frame::{Frame, Pose, State, UavState};
 use crate::model::scene::Driver;
 use crate::model::{End, Place, Record, Scene, rounded};
@@ -13,15 +13,18 @@ use skein_netsim::fault::Fault;
 use skein_netsim::radio::LinkTable;
 use skein_netsim::spec::Spec;
 use skein_netsim::world::World;
-use skein_peer::Report;
 use skein_peer::offload::MissionGeometry;
-use skein_peer::output::Status;
+use skein_peer::output::{Status, TaskNews};
+use skein_peer::{PeerId, Report};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// A UAV that holds that the mission is finished is at home within so many turn radii of the
 /// base: it loiters there on one, others beside it.
 const HOME_TURN_RADII: f64 = 4.0;
+
+/// Rounds of which bids are kept: a new one makes the older ones history.
+const MAX_ROUNDS: usize = 16;
 
 /// What became of one peer's process, as far as was told.
 #[derive(Clone, Debug, Default)]
@@ -54,6 +57,9 @@ pub struct Observer {
     /// Who holds whom for down.
     down: BTreeMap<u16, BTreeSet<u16>>,
     cells: Cells,
+    /// The bids of the newest rounds, by counter and members: a swarm that is divided has two
+    /// rounds of one counter.
+    rounds: BTreeMap<(u32, Vec<u16>), Vec<Bid>>,
     /// When each peer ended last, milliseconds.
     ended_ms: BTreeMap<u16, u64>,
     components: Vec<Vec<u16>>,
@@ -83,6 +89,7 @@ impl Observer {
             processes: BTreeMap::new(),
             down: BTreeMap::new(),
             cells: Cells::of(&scene),
+            rounds: BTreeMap::new(),
             ended_ms: BTreeMap::new(),
             components: Vec::new(),
             all_covered: false,
@@ -269,12 +276,7 @@ impl Observer {
                 let text = format!("{who} holds {} for {word}", self.name(of.0));
                 (what, text)
             }
-            Report::Round { counter, members } => {
-                let members: Vec<u16> = members.iter().map(|m| m.0).collect();
-                let text = format!("{who} is in round {counter} among {members:?}");
-                let counter = *counter;
-                (What::Round { counter, members }, text)
-            }
+            Report::Round { .. } => return self.bid(time_ms, peer, report),
             Report::Claim { .. } => return self.claimed(time_ms, peer, report),
             Report::Covered { cells } => return self.saw(time_ms, peer, cells),
             Report::Finished { revision } => {
@@ -290,11 +292,8 @@ impl Observer {
                 (What::Revised { revision }, text)
             }
             Report::Task { name, news, .. } => {
-                let what = What::Task {
-                    name: name.clone(),
-                    news: news.word().to_owned(),
-                };
-                (what, format!("{who}: {}", news.sentence(name)))
+                let text = format!("{who}: {}", news.sentence(name));
+                (task_news(report), text)
             }
             Report::Silenced => {
                 self.process(peer).silent = true;
@@ -453,6 +452,39 @@ impl Observer {
         self.said.push(Record::Scene(Box::new(self.scene.clone())));
     }
 
+    /// A peer bids in a round, which it has opened if nobody bid in it before.
+    fn bid(&mut self, time_ms: u64, peer: u16, report: &Report) {
+        let Report::Round {
+            counter,
+            members,
+            repair,
+            bid,
+        } = report
+        else {
+            return;
+        };
+        let (counter, who) = (*counter, self.name(peer));
+        let members: Vec<u16> = members.iter().map(|m| m.0).collect();
+        let text = format!("{who} is in round {counter} among {members:?}");
+        let bids = self.rounds.entry((counter, members.clone())).or_default();
+        bids.retain(|b| b.by != peer);
+        bids.push(bid.into());
+        let bids = bids.clone();
+        while self.rounds.len() > MAX_ROUNDS {
+            self.rounds.pop_first();
+        }
+        let repair = Some(*repair);
+        let what = What::Round {
+            counter,
+            members,
+            repair,
+        };
+        self.say(time_ms, Origin::Peer, Some(peer), text, what);
+        let text = format!("round {counter} has {} bids", bids.len());
+        let what = What::Bids { counter, bids };
+        self.say(time_ms, Origin::Peer, Some(peer), text, what);
+    }
+
     fn on_newest(&self, peer: u16) -> bool {
         let on = self.processes.get(&peer).and_then(|p| p.loop_hash);
         on == Some(self.newest.1)
@@ -517,5 +549,31 @@ impl Observer {
             new,
         };
         self.say(time_ms, Origin::Peer, Some(peer), text, what);
+    }
+}
+
+/// What a peer says of a task.
+fn task_news(report: &Report) -> What {
+    let Report::Task {
+        id,
+        revision,
+        name,
+        news,
+        held_by,
+    } = report
+    else {
+        return What::Note;
+    };
+    What::Task {
+        name: name.clone(),
+        news: news.word().to_owned(),
+        author: Some(id.author),
+        number: Some(id.number),
+        revision: Some(*revision),
+        by: match news {
+            TaskNews::DoneBy(PeerId(by)) => Some(*by),
+            _ => None,
+        },
+        held_by: held_by.iter().map(Into::into).collect(),
     }
 }

@@ -94,6 +94,8 @@ fn of_bytes(bytes: &[u8]) -> Result<Recorded, String> {
             run.frames.push(parsed(data).map_err(place)?);
         } else if topic == channels::EVENT.topic {
             run.events.push(parsed(data).map_err(place)?);
+        } else if topic == channels::FAILURE_FREE.topic {
+            run.failure_free = Some(parsed(data).map_err(place)?);
         } else if topic == channels::END.topic {
             run.end = Some(parsed(data).map_err(place)?);
         }

@@ -1,7 +1,6 @@
 //! A simulated run that is observed.
 
 use crate::model::Record;
-use crate::model::event::{Bid, Event, Origin, What as Said};
 use crate::model::scene::Driver;
 use crate::observer::Observer;
 use crate::sink::Sink;
@@ -9,8 +8,6 @@ use skein_netsim::Prepared;
 use skein_netsim::history::What;
 use skein_netsim::runs::{self, Wanted, Watch};
 use skein_netsim::swarm::{Outcome, Swarm};
-use skein_peer::Report;
-use std::collections::BTreeSet;
 use std::io;
 
 /// How often a run is looked at, milliseconds of scenario time: a UAV flies some 10 m meanwhile.
@@ -50,8 +47,6 @@ pub struct View<'a> {
     observer: Option<Observer>,
     /// Entries of the history that were told.
     n_told: usize,
-    /// Rounds whose bids were told.
-    rounds: BTreeSet<u32>,
     framed_ms: Option<u64>,
     failed: Option<io::Error>,
 }
@@ -64,7 +59,6 @@ impl<'a> View<'a> {
             sink,
             observer: None,
             n_told: 0,
-            rounds: BTreeSet::new(),
             framed_ms: None,
             failed: None,
         }
@@ -107,14 +101,7 @@ impl<'a> View<'a> {
             let time_ms = entry.time_ms;
             match &entry.what {
                 What::Fault(fault) => observer.fault(time_ms, fault),
-                What::Report { peer, report } => {
-                    observer.reported(time_ms, *peer, report);
-                    if let Report::Claim { counter, .. } = report
-                        && self.rounds.insert(*counter)
-                    {
-                        bids(observer, swarm, (time_ms, *peer, *counter));
-                    }
-                }
+                What::Report { peer, report } => observer.reported(time_ms, *peer, report),
                 What::Components(parts) => observer.connected(time_ms, parts),
                 What::Covered => observer.all_covered(time_ms),
                 What::Violation { check, peer, text } => {
@@ -141,36 +128,12 @@ fn give(observer: &mut Observer, sink: &mut dyn Sink) -> io::Result<()> {
     said.iter().try_for_each(|record| sink.take(record))
 }
 
-/// The bids of a round, as a member knows them that has adopted its division.
-fn bids(observer: &mut Observer, swarm: &Swarm, (time_ms, peer, counter): (u64, u16, u32)) {
-    let why = swarm.why(peer);
-    let round = why.and_then(|why| why.round);
-    let Some(round) = round.filter(|r| r.counter == counter) else {
-        return;
-    };
-    let bids: Vec<Bid> = (round.bids.iter())
-        .map(|b| Bid {
-            by: b.by,
-            anchor: b.anchor,
-            release_ms: b.release_ms,
-            endurance_ms: b.endurance_ms,
-            eta_ms: b.eta_ms,
-        })
-        .collect();
-    observer.add(Event {
-        time_ms,
-        origin: Origin::Peer,
-        uav: Some(peer),
-        text: format!("round {counter} has {} bids", bids.len()),
-        what: Said::Bids { counter, bids },
-    });
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::cells::{Cell, Cells};
     use crate::model::Frame;
+    use crate::model::event::{Event, What as Said};
     use crate::model::frame::State;
     use crate::sink::Collected;
     use skein_netsim::fault::{Fault, TimedFault};

@@ -1,6 +1,6 @@
 //! Who takes the words of a run.
 
-use crate::model::{End, Event, Frame, Record, Scene};
+use crate::model::{End, Event, FailureFree, Frame, Record, Scene};
 use std::fmt::Debug;
 use std::io;
 
@@ -26,6 +26,8 @@ pub struct Collected {
     pub frames: Vec<Frame>,
     /// In the order of time.
     pub events: Vec<Event>,
+    /// None where it is not known.
+    pub failure_free: Option<FailureFree>,
     /// None where the run was cut off.
     pub end: Option<End>,
 }
@@ -36,6 +38,7 @@ impl Sink for Collected {
             Record::Scene(scene) => self.scenes.push(Scene::clone(scene)),
             Record::Frame(frame) => self.frames.push(frame.clone()),
             Record::Event(event) => self.events.push(event.clone()),
+            Record::FailureFree(run) => self.failure_free = Some(run.clone()),
             Record::End(end) => self.end = Some(end.clone()),
         }
         Ok(())

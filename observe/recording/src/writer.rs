@@ -4,7 +4,7 @@
 use crate::cells::Cells;
 use crate::channels::{self, Channel};
 use crate::foxglove;
-use crate::model::{End, Event, Frame, Record, Scene};
+use crate::model::{End, Event, FailureFree, Frame, Record, Scene};
 use crate::sink::Sink;
 use mcap::records::MessageHeader;
 use serde::Serialize;
@@ -34,6 +34,8 @@ pub struct Writer {
     sequence: u32,
     scene: Scene,
     cells: Cells,
+    /// Of the last word.
+    time_ms: u64,
     flushed_ms: u64,
     cells_due_ms: u64,
     cells_told: Option<Cells>,
@@ -74,6 +76,7 @@ impl Writer {
             sequence: 0,
             scene: Scene::default(),
             cells: Cells::default(),
+            time_ms: 0,
             flushed_ms: 0,
             cells_due_ms: 0,
             cells_told: None,
@@ -160,10 +163,12 @@ impl Writer {
 impl Sink for Writer {
     fn take(&mut self, record: &Record) -> io::Result<()> {
         self.cells.hear(record);
+        self.time_ms = self.time_ms.max(record.time_ms());
         match record {
             Record::Scene(scene) => self.scene(scene),
             Record::Frame(frame) => self.frame(frame),
             Record::Event(event) => self.event(event),
+            Record::FailureFree(run) => self.failure_free(run),
             Record::End(end) => self.end(end),
         }
     }
@@ -194,6 +199,12 @@ impl Writer {
     fn event(&mut self, event: &Event) -> io::Result<()> {
         self.write(channels::EVENT, event.time_ms, event)?;
         self.write(channels::LOG, event.time_ms, &foxglove::log(event))
+    }
+
+    /// It is of no moment of the run: its time is that when it became known, so that a file is
+    /// in the order of time.
+    fn failure_free(&mut self, run: &FailureFree) -> io::Result<()> {
+        self.write(channels::FAILURE_FREE, self.time_ms, run)
     }
 
     fn end(&mut self, end: &End) -> io::Result<()> {

@@ -16,7 +16,7 @@ p.note,figcaption,.soft{color:var(--soft);font-size:.9rem}
 figure{margin:.6em 0;overflow-x:auto}figure.plot svg{min-width:620px}
 svg{display:block;width:100%;height:auto;font-family:system-ui,sans-serif}
 .ink{fill:var(--ink)}.axis{stroke:var(--soft);fill:none}.grid{stroke:var(--line);fill:none}.tick{fill:var(--soft)}
-.mark{stroke:var(--ink);fill:none}.bound{stroke:var(--soft);stroke-dasharray:6 4;fill:none}
+.mark{stroke:var(--ink);fill:none}.bound{stroke:var(--soft);stroke-dasharray:6 4;fill:none}.free{stroke-dasharray:2 3}
 .area{fill:none;stroke:var(--ink)}.building{fill:var(--soft);fill-opacity:.22}.zone{fill:var(--zone);fill-opacity:.4;stroke:var(--zone)}
 .scroll{overflow-x:auto}table{border-collapse:collapse;font-size:.93rem}
 td,th{padding:.25em .8em .25em 0;text-align:left;vertical-align:top;border-bottom:1px solid var(--line)}

@@ -5,7 +5,7 @@ use skein_netsim::account::{RunReport, secs};
 use skein_recording::foxglove::colour;
 use skein_recording::model::event::What;
 use skein_recording::model::frame::{State, UavState};
-use skein_recording::model::{Event, Frame, Scene};
+use skein_recording::model::{Event, FailureFree, Frame, Scene};
 use skein_recording::sink::Collected;
 use std::fmt::Write as _;
 
@@ -14,6 +14,7 @@ pub(crate) struct Run<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) frames: &'a [Frame],
     pub(crate) events: &'a [Event],
+    pub(crate) failure_free: Option<&'a FailureFree>,
     pub(crate) report: Option<&'a RunReport>,
 }
 
@@ -24,6 +25,7 @@ impl<'a> Run<'a> {
             scene: run.scenes.last().unwrap_or(empty),
             frames: &run.frames,
             events: &run.events,
+            failure_free: run.failure_free.as_ref(),
             report: run.end.as_ref().map(|e| &*e.report),
         }
     }
@@ -45,7 +47,8 @@ impl<'a> Run<'a> {
 /// The share that was covered, against the work bound and the baseline.
 pub(crate) fn coverage(run: &Run<'_>) -> String {
     let bound_s = run.scene.bounds.work_bound_ms.map(secs);
-    let x_max = run.end_s().max(bound_s.unwrap_or(0.0));
+    let free_s = run.failure_free.map_or(0.0, |f| secs(f.end_ms));
+    let x_max = run.end_s().max(bound_s.unwrap_or(0.0)).max(free_s);
     let mut chart = Chart::new(320.0, x_max, 100.0, "coverage over time");
     chart.y_axis(" %", 5.0);
     chart.x_axis("seconds");
@@ -59,6 +62,12 @@ pub(crate) fn coverage(run: &Run<'_>) -> String {
     }
     for (at_s, uav) in run.ends() {
         chart.upright(at_s, "grid", &format!("×{uav}"));
+    }
+    if let Some(free) = run.failure_free {
+        let points = free.coverage.iter();
+        let points: Vec<(f64, f64)> = points.map(|(t, s)| (secs(*t), s * 100.0)).collect();
+        let path = chart.line(&points);
+        chart.raw(&format!("<path class=\"bound free\" d=\"{path}\"/>"));
     }
     let points: Vec<(f64, f64)> = (run.frames.iter())
         .map(|f| (secs(f.time_ms), f.covered_share * 100.0))

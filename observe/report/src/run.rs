@@ -36,7 +36,7 @@ pub(crate) fn page(kept: &Kept) -> String {
     page.heading("Coverage");
     page.plot(
         &plots::coverage(&run),
-        "Share of the coverable cells that cameras saw. Dashed: an even pace that ends at the work bound, as if nobody were lost and no way were flown twice; upright, the omniscient baseline, where it was computed. ×N: the end of UAV N.",
+        "Share of the coverable cells that cameras saw. Dashed: an even pace that ends at the work bound, as if nobody were lost and no way were flown twice; dotted, the same run without failures, where it was flown; upright, the omniscient baseline, where it was computed. ×N: the end of UAV N.",
     );
     page.heading("Sections");
     page.plot(

@@ -7,6 +7,7 @@
 //! it was told. Times are those of the listener's clock, from when it began.
 
 use crate::believed::{Now, Peer};
+use crate::believed_tasks::Tasks;
 use skein_geometry::frame::Origin as Plane;
 use skein_peer::Mission;
 use skein_peer::cells::CellSet;
@@ -44,7 +45,8 @@ pub struct Belief {
     peers: BTreeMap<u16, Peer>,
     cells: Cells,
     covered: CellSet,
-    rounds: BTreeMap<u32, BTreeMap<u16, ToldBid>>,
+    rounds: BTreeMap<(u32, Vec<u16>), BTreeMap<u16, ToldBid>>,
+    tasks: Tasks,
     components: Vec<Vec<u16>>,
     /// When anything was heard last.
     last: Now,
@@ -64,6 +66,7 @@ impl Belief {
             cells: Cells::default(),
             covered: CellSet::new(0),
             rounds: BTreeMap::new(),
+            tasks: Tasks::default(),
             components: Vec::new(),
             last: Now::default(),
             said: Vec::new(),
@@ -146,7 +149,15 @@ impl Belief {
                 let text = format!("the operator orders {orders}");
                 self.say(now_ms, id, text, What::Note);
             }
-            // Who is where was taken before; promises and tasks are not drawn.
+            Body::Task(task) => {
+                let told = self.tasks.asked(id, subject, task);
+                self.tell_all(now_ms, id, told);
+            }
+            Body::Bundle(bundle) => {
+                let told = self.tasks.bundle(id, bundle);
+                self.tell_all(now_ms, id, told);
+            }
+            // Who is where was taken before; promises are not drawn.
             _ => {}
         }
     }
@@ -299,13 +310,20 @@ impl Belief {
 
     fn bid(&mut self, now_ms: u64, id: u16, bid: &Bid) {
         let counter = bid.round.counter;
-        let is_new = !self.rounds.contains_key(&counter);
         let members: Vec<u16> = bid.round.members.iter().map(|m| m.id).collect();
+        let key = (counter, members.clone());
+        let is_new = !self.rounds.contains_key(&key);
         if is_new {
             let text = format!("uav{id} is in round {counter} among {members:?}");
-            self.say(now_ms, id, text, What::Round { counter, members });
+            let repair = Some(bid.round.repair);
+            let what = What::Round {
+                counter,
+                members,
+                repair,
+            };
+            self.say(now_ms, id, text, what);
         }
-        let bids = self.rounds.entry(counter).or_default();
+        let bids = self.rounds.entry(key).or_default();
         let told = ToldBid {
             by: id,
             anchor: bid.anchor,
@@ -506,6 +524,12 @@ impl Belief {
             lat_deg: f64::from(mission.origin_lat_e7) / 1e7,
             lon_deg: f64::from(mission.origin_lon_e7) / 1e7,
         })
+    }
+
+    fn tell_all(&mut self, now_ms: u64, peer: u16, told: Vec<(String, What)>) {
+        for (text, what) in told {
+            self.say(now_ms, peer, text, what);
+        }
     }
 
     fn say(&mut self, time_ms: u64, peer: u16, text: String, what: What) {

@@ -1,10 +1,11 @@
 //! How all stands at one moment, folded from the words of a run.
 
+use crate::History;
 use skein_geometry::frame::Point;
 use skein_recording::cells::Cells;
 use skein_recording::model::event::{Belief, What};
 use skein_recording::model::frame::UavState;
-use skein_recording::{End, Event, Frame, Record, Scene};
+use skein_recording::{End, Event, FailureFree, Frame, Record, Scene};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Events that are kept: more than any screen shows.
@@ -24,6 +25,10 @@ pub struct Standing {
     pub cells: Cells,
     /// What happened lately that is worth a line, the newest last.
     pub events: VecDeque<Event>,
+    /// The run without failures, where one is known.
+    pub failure_free: Option<FailureFree>,
+    /// Its rounds and tasks.
+    pub history: History,
     /// The last word, once it was said.
     pub end: Option<End>,
     /// Of each UAV that took cells over: how many of whom.
@@ -40,10 +45,12 @@ impl Standing {
     /// Takes the next word.
     pub fn hear(&mut self, record: Record) {
         self.cells.hear(&record);
+        self.history.hear(&record);
         match record {
             Record::Scene(scene) => self.scene = Some(scene),
             Record::Frame(frame) => self.stand(frame),
             Record::Event(event) => self.happen(event),
+            Record::FailureFree(run) => self.failure_free = Some(run),
             Record::End(end) => self.end = Some(end),
         }
     }

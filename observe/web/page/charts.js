@@ -4,7 +4,8 @@
 const LEFT = 46, RIGHT = 12;
 
 function timeScale(width) {
-  const last = Math.max(60000, run.lastMs, workBoundMs() || 0);
+  const without = run.failureFree ? run.failureFree.makespan_ms || run.failureFree.end_ms : 0;
+  const last = Math.max(60000, run.lastMs, workBoundMs() || 0, without);
   return { last, x: (ms) => LEFT + (width - LEFT - RIGHT) * ms / last, ms: (x) => (x - LEFT) / (width - LEFT - RIGHT) * last };
 }
 
@@ -72,7 +73,7 @@ function drawGantt(uavs) {
       g.font = "11px system-ui, sans-serif";
       g.fillStyle = uav.id === selected ? css("--accent") : css("--dim");
       g.textAlign = "right";
-      g.fillText(nameOf(uav.id), LEFT - 5, mid + 4);
+      g.fillText(nameOf(uav.id), LEFT - 5, Math.max(10, mid + 4));
       g.textAlign = "left";
     }
   }
@@ -132,7 +133,7 @@ function drawCurve() {
   g.textAlign = "left";
   const scene = run.scenes[0];
   bound(g, scale, y, scene.work_bound_ms, "work bound", [5, 4]);
-  bound(g, scale, y, scene.failure_free_ms, "without faults", [2, 3]);
+  if (run.failureFree) without(g, scale, y, run.failureFree.coverage);
   g.strokeStyle = css("--accent");
   g.lineWidth = 2;
   g.beginPath();
@@ -167,8 +168,45 @@ function bound(g, scale, y, ms, name, dash) {
   g.setLineDash([]);
 }
 
+// The curve of the same run without failures.
+function without(g, scale, y, points) {
+  g.strokeStyle = css("--good");
+  g.lineWidth = 1.5;
+  g.setLineDash([2, 2]);
+  g.beginPath();
+  points.forEach(([ms, share], i) => {
+    if (i === 0) g.moveTo(scale.x(ms), y(share)); else g.lineTo(scale.x(ms), y(share));
+  });
+  g.stroke();
+  g.setLineDash([]);
+}
+
+// The share that was covered by then without failures.
+function shareWithout(ms) {
+  const points = run.failureFree.coverage;
+  let share = 0;
+  for (const [at, by] of points) {
+    if (at > ms) break;
+    share = by;
+  }
+  return share;
+}
+
+function withoutNote() {
+  if (!run.failureFree) {
+    const knows = run.hello && run.hello.knowledge !== "swarm" && run.hello.mode !== "replay" && !run.end;
+    return knows ? "without failures: not reckoned yet" : "without failures: not known";
+  }
+  const over = run.failureFree.makespan_ms;
+  return "dotted: without failures " + (shareWithout(play.ms) * 100).toFixed(1) + " % by then"
+    + (over === null ? "" : ", done at " + clock(over));
+}
+
 function drawNotes() {
-  const bound = workBoundMs(), share = frameAt(play.ms);
-  say(el("curve-note"), bound ? "dashed: work bound " + clock(bound) + (share ? ", " + share.n[0] + " of " + share.n[1] + " cells" : "") : "");
+  const bound = workBoundMs(), share = frameAt(play.ms), parts = [];
+  if (share) parts.push(share.n[0] + " of " + share.n[1] + " cells");
+  if (bound) parts.push("dashed: work bound " + clock(bound));
+  parts.push(withoutNote());
+  say(el("curve-note"), parts.join("; "));
   say(el("gantt-note"), "✕ gone, ▲ back, → takeover; click to go there");
 }

@@ -50,7 +50,7 @@ function theme(to) {
 }
 
 function tab(name) {
-  for (const of of ["roster", "events", "rounds"]) {
+  for (const of of ["roster", "events", "rounds", "tasks"]) {
     el(of).hidden = of !== name;
     document.querySelector('[data-tab="' + of + '"]').setAttribute("aria-selected", String(of === name));
   }
@@ -99,6 +99,7 @@ function draw(now) {
   if (!el("roster").hidden) drawRoster(uavs);
   if (!el("events").hidden) drawEvents();
   if (!el("rounds").hidden) drawRounds();
+  if (!el("tasks").hidden) drawTasks();
   drawCard(uavs);
   drawGantt(uavs);
   drawCurve();
@@ -169,7 +170,7 @@ function keys(event) {
     " ": () => el("play").click(), ",": () => seek(play.ms - 5000), ".": () => seek(play.ms + 5000),
     "[": () => speed(-1), "]": () => speed(1), l: () => { play.live = true; }, "+": () => zoom(1.3), "=": () => zoom(1.3),
     "-": () => zoom(1 / 1.3), 0: fit, n: () => next(1), p: () => next(-1), d: () => el("theme").click(),
-    1: () => tab("roster"), 2: () => tab("events"), 3: () => tab("rounds"), "?": () => el("help").showModal(),
+    1: () => tab("roster"), 2: () => tab("events"), 3: () => tab("rounds"), 4: () => tab("tasks"), "?": () => el("help").showModal(),
     Escape: () => { card.cutFrom = 0; select(0); },
     ArrowLeft: () => { map.cx -= pan; }, ArrowRight: () => { map.cx += pan; },
     ArrowUp: () => { map.cy += pan; }, ArrowDown: () => { map.cy -= pan; },

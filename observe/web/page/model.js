@@ -1,7 +1,9 @@
 // What the page was sent, and how all stands at one moment of it.
 
 const nothing = () => ({
-  hello: null, scenes: [], frames: [], events: [], end: null, lastMs: 0,
+  hello: null, scenes: [], frames: [], events: [], end: null, lastMs: 0, failureFree: null,
+  // Rounds and tasks by their numbers, as they are by now: each piece of them has its time.
+  rounds: new Map(), tasks: new Map(), told: 0,
   // Of each UAV where it was last each time its airframe was gone, and its stretches of one state.
   gone: new Map(), stretches: new Map(),
 });
@@ -22,11 +24,23 @@ function take(word) {
     case "scene": run.scenes.push(word); break;
     case "frame": note(word); run.frames.push(word); break;
     case "event": run.events.push(word); break;
+    case "failure_free": run.failureFree = word; break;
+    case "round": keep(run.rounds, word); break;
+    case "task": keep(run.tasks, word); break;
     case "end": run.end = word; break;
     default: return word.k;
   }
   if (word.t !== undefined) run.lastMs = Math.max(run.lastMs, word.t);
   return word.k;
+}
+
+// As many as the program keeps: the oldest goes first.
+const KEPT = 256;
+
+function keep(all, word) {
+  all.set(word.id, word);
+  run.told += 1;
+  if (all.size > KEPT) all.delete(Math.min(...all.keys()));
 }
 
 // Keeps of a frame what is looked up often.
@@ -109,7 +123,7 @@ const standing = {
   reset() {
     this.nEvents = 0; this.scene = null; this.ms = 0;
     this.clear(0);
-    this.took = new Map(); this.rounds = new Map(); this.marks = [];
+    this.took = new Map(); this.marks = [];
     this.version += 1;
   },
   clear(nCells) {
@@ -146,8 +160,6 @@ const standing = {
         for (const cell of event.cells) this.orphans.delete(cell);
         this.listed.set(uav, event.cells);
         this.held.set(uav, event.held);
-        const round = this.rounds.get(event.counter);
-        if (round && !round.got.has(uav)) round.got.set(uav, event.cells.length);
         this.version += 1;
         break;
       }
@@ -173,18 +185,6 @@ const standing = {
         of.set(event.from, (of.get(event.from) || 0) + event.cells.length);
         this.took.set(uav, of);
         this.marks.push({ t: event.t, kind: "takeover", uav, from: event.from });
-        break;
-      }
-      case "round": {
-        const round = this.rounds.get(event.counter) || { t: event.t, members: event.members, bids: [], got: new Map() };
-        this.rounds.set(event.counter, round);
-        break;
-      }
-      case "bids": {
-        const round = this.rounds.get(event.counter)
-          || { t: event.t, members: event.bids.map((b) => b.by), bids: [], got: new Map() };
-        round.bids = event.bids;
-        this.rounds.set(event.counter, round);
         break;
       }
     }

@@ -132,42 +132,6 @@ function drawEvents() {
   el("event-list").replaceChildren(...lines);
 }
 
-let roundsKey = "";
-
-function drawRounds() {
-  const key = [...standing.rounds].map(([c, r]) => c + ":" + r.bids.length + ":" + r.got.size).join();
-  if (key === roundsKey && el("round-list").children.length) return;
-  roundsKey = key;
-  const nodes = [...standing.rounds].sort((a, b) => b[0] - a[0]).slice(0, 100).map(([counter, round]) => {
-    const node = document.createElement("div");
-    node.className = "round";
-    const head = document.createElement("b");
-    head.textContent = "Round " + counter + " at " + clock(round.t);
-    const members = document.createElement("div");
-    members.textContent = "among " + round.members.map(nameOf).join(", ");
-    node.append(head, members);
-    const bids = new Map(round.bids.map((b) => [b.by, b]));
-    const table = document.createElement("table");
-    table.createTHead().insertRow().innerHTML = "<th>UAV</th><th>bid: from cell</th><th>free in</th><th>may fly</th><th>got cells</th>";
-    const body = table.createTBody();
-    for (const id of round.members) {
-      const row = body.insertRow(), bid = bids.get(id), got = round.got.get(id);
-      const cells = [nameOf(id), bid ? String(bid.anchor) : "–", bid ? (bid.release_ms / 1000).toFixed(0) + " s" : "–",
-        bid ? (bid.endurance_ms / 1000).toFixed(0) + " s" : "–", got === undefined ? "–" : String(got)];
-      cells.forEach((text) => { row.insertCell().textContent = text; });
-    }
-    node.append(table);
-    return node;
-  });
-  if (!nodes.length) {
-    const none = document.createElement("p");
-    none.className = "small";
-    none.textContent = "No round yet: each UAV begins with a section that it takes by itself. Large swarms take and relieve without rounds.";
-    nodes.push(none);
-  }
-  el("round-list").replaceChildren(...nodes);
-}
-
 // The card: what the selected UAV is, and what may be done to it.
 const card = { of: null, state: null, cutFrom: 0 };
 

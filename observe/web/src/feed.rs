@@ -3,6 +3,7 @@
 
 use crate::words::{self, Hello};
 use skein_recording::{Record, Sink};
+use skein_view::History;
 use std::collections::VecDeque;
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -27,6 +28,8 @@ pub(crate) struct Word {
 
 #[derive(Debug, Default)]
 struct Log {
+    /// Rounds and tasks, which are sent whole with each change.
+    history: History,
     words: VecDeque<Word>,
     bytes: usize,
     /// Number of the last word; 0 before the first.
@@ -63,6 +66,10 @@ impl Feed {
     pub fn give(&self, record: &Record) {
         let (json, spare) = words::of(record);
         self.push(json, spare);
+        let changed = self.log().history.hear(record);
+        for changed in changed {
+            self.push(words::changed(&changed), false);
+        }
     }
 
     /// A sink of this feed.
@@ -202,5 +209,45 @@ mod tests {
         assert!(all[0].json.contains("hello") && all[1].json.contains("scene"));
         assert_eq!(all.last().unwrap().number, 2_002);
         assert!(all.is_sorted_by(|a, b| a.number < b.number));
+    }
+
+    #[test]
+    fn a_round_is_told_anew_with_each_bid() {
+        use skein_recording::model::event::{Bid, Event, Origin, What};
+        let feed = feed(KEPT_BYTES);
+        let told = |uav, what| {
+            feed.give(&Record::Event(Event {
+                time_ms: 5,
+                origin: Origin::Peer,
+                uav: Some(uav),
+                text: String::new(),
+                what,
+            }));
+        };
+        let (counter, members) = (3, vec![1, 2]);
+        let repair = Some(false);
+        told(
+            2,
+            What::Round {
+                counter,
+                members,
+                repair,
+            },
+        );
+        let bids = vec![Bid {
+            by: 2,
+            anchor: 9,
+            release_ms: 0,
+            endurance_ms: 0,
+            eta_ms: 0,
+        }];
+        told(2, What::Bids { counter, bids });
+        let words = all(&feed);
+        let rounds: Vec<&Word> = (words.iter())
+            .filter(|w| w.json.contains("\"k\":\"round\""))
+            .collect();
+        assert_eq!(rounds.len(), 2);
+        assert!(!rounds[0].json.contains("\"anchor\":9"));
+        assert!(rounds[1].json.contains("\"anchor\":9"));
     }
 }

@@ -11,6 +11,7 @@ pub(crate) const PAGE: &str = concat!(
     include_str!("../page/model.js"),
     include_str!("../page/map.js"),
     include_str!("../page/panels.js"),
+    include_str!("../page/history.js"),
     include_str!("../page/charts.js"),
     include_str!("../page/main.js"),
     "</script>\n</body>\n</html>\n",

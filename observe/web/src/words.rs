@@ -1,13 +1,16 @@
 //! The model in few bytes: what a page draws of a run. A frame of a hundred UAVs takes a
 //! quarter of what it takes in the model's own words, and a page keeps thousands of them.
 //!
-//! Each word is a JSON object with its kind as `k`: `hello`, `scene`, `frame`, `event`, `end`.
+//! Each word is a JSON object with its kind as `k`: `hello`, `scene`, `frame`, `event`, `round`,
+//! `task`, `failure_free`, `end`. A round or a task is told anew, as it is by then, whenever it
+//! changes.
 //! Times are milliseconds of scenario time, places metres east and north of the origin.
 
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use skein_recording::model::frame::UavState;
-use skein_recording::model::{End, Event, Frame, Knowledge, Record, Ring, Scene};
+use skein_recording::model::{End, Event, FailureFree, Frame, Knowledge, Record, Ring, Scene};
+use skein_view::history::Changed;
 
 /// What is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -51,8 +54,22 @@ pub(crate) fn of(record: &Record) -> (String, bool) {
         Record::Scene(said) => (scene(said).to_string(), false),
         Record::Frame(said) => (frame(said).to_string(), true),
         Record::Event(said) => (event(said), false),
+        Record::FailureFree(said) => (failure_free(said), false),
         Record::End(said) => (end(said), false),
     }
+}
+
+/// A round or a task as it is now.
+pub(crate) fn changed(changed: &Changed) -> String {
+    let (kind, value) = match changed {
+        Changed::Round(round) => ("round", serde_json::to_value(round)),
+        Changed::Task(task) => ("task", serde_json::to_value(task)),
+    };
+    of_kind(kind, value).to_string()
+}
+
+fn failure_free(run: &FailureFree) -> String {
+    of_kind("failure_free", serde_json::to_value(run)).to_string()
 }
 
 /// To the decimetre: finer than a pixel of any map.
@@ -99,7 +116,6 @@ fn scene(scene: &Scene) -> Value {
         "needed": scene.cells.iter().map(|c| u8::from(c.needed)).collect::<Vec<_>>(),
         "uavs": scene.uavs.iter().map(uav).collect::<Vec<_>>(),
         "work_bound_ms": scene.bounds.work_bound_ms,
-        "failure_free_ms": scene.bounds.failure_free_ms,
         "wind_mps": [scene.wind_east_mps, scene.wind_north_mps],
         "range_m": scene.radio_range_m,
     })
@@ -144,13 +160,18 @@ fn end(end: &End) -> String {
 }
 
 fn with_kind(kind: &str, time_ms: u64, value: serde_json::Result<Value>) -> String {
+    let mut word = of_kind(kind, value);
+    word["t"] = json!(time_ms);
+    word.to_string()
+}
+
+fn of_kind(kind: &str, value: serde_json::Result<Value>) -> Value {
     let mut fields = match value {
         Ok(Value::Object(fields)) => fields,
         _ => Map::new(),
     };
     fields.insert("k".to_owned(), json!(kind));
-    fields.insert("t".to_owned(), json!(time_ms));
-    Value::Object(fields).to_string()
+    Value::Object(fields)
 }
 
 #[cfg(test)]
@@ -202,5 +223,38 @@ mod tests {
             json!(4),
         ];
         assert_eq!(fields, told);
+    }
+
+    #[test]
+    fn a_round_is_told_with_the_times_of_its_bids_and_the_curve_as_pairs() {
+        let round = skein_view::history::Round {
+            id: 7,
+            bids: vec![skein_view::history::Told {
+                time_ms: 40,
+                what: skein_recording::model::event::Bid {
+                    by: 2,
+                    anchor: 3,
+                    release_ms: 4,
+                    endurance_ms: 5,
+                    eta_ms: 6,
+                },
+            }],
+            ..skein_view::history::Round::default()
+        };
+        let word: Value = serde_json::from_str(&changed(&Changed::Round(round))).unwrap();
+        assert_eq!((&word["k"], &word["id"]), (&json!("round"), &json!(7)));
+        let bid = &word["bids"][0];
+        assert_eq!((&bid["time_ms"], &bid["by"]), (&json!(40), &json!(2)));
+        let run = FailureFree {
+            makespan_ms: Some(9),
+            coverage: vec![(0, 0.0), (9, 1.0)],
+            ..FailureFree::default()
+        };
+        let (word, spare) = of(&Record::FailureFree(run));
+        let word: Value = serde_json::from_str(&word).unwrap();
+        assert!(!spare);
+        assert_eq!(word["coverage"], json!([[0, 0.0], [9, 1.0]]));
+        // It has no moment of its own: the run does not last as long as it.
+        assert_eq!(word["t"], Value::Null);
     }
 }

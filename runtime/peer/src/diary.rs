@@ -71,13 +71,7 @@ impl Diary {
             && round.members.contains(&author)
             && round.bids.iter().all(|b| b.by != author)
         {
-            round.bids.push(BidHeard {
-                by: author,
-                anchor: bid.anchor,
-                release_ms: bid.release_ms,
-                endurance_ms: bid.endurance_ms,
-                eta_ms: bid.eta_ms,
-            });
+            round.bids.push(BidHeard::of(author, bid));
         }
     }
 
@@ -123,7 +117,9 @@ fn told(report: &Report) -> Option<String> {
             };
             format!("believes {peer} {believed}")
         }
-        Report::Round { counter, members } => {
+        Report::Round {
+            counter, members, ..
+        } => {
             format!("bid in round {counter} of {} members", members.len())
         }
         Report::Claim {

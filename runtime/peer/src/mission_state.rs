@@ -31,6 +31,7 @@ use crate::protocol::runs::{PlannedCell, legs_of};
 use crate::protocol::sections::FIRST_LIFE;
 use crate::separation::Separation;
 use crate::timers::{Timer, Timers};
+use crate::why::BidHeard;
 use crate::wire::codec::Body;
 use crate::wire::limits::BID_COVERED_MAX_BYTES;
 use crate::wire::message::{Activity, Beacon, Bid, Claim, Epoch, Member, MissionStatus};
@@ -495,6 +496,8 @@ impl MissionState {
         let report = Report::Round {
             counter: bid.round.counter,
             members: bid.round.members.iter().map(|m| PeerId(m.id)).collect(),
+            repair: bid.round.repair,
+            bid: BidHeard::of(s.me.id, &bid),
         };
         let entry = Entry::Bid(bid.clone());
         vec![

@@ -1,6 +1,8 @@
 //! What a peer wants done, and what it reports.
 
 use crate::offload::Job;
+use crate::task_desk::TaskHolder;
+use crate::why::BidHeard;
 use crate::wire::tasks::{TaskId, TaskState};
 use crate::{Incarnation, Mission, PeerId};
 use serde::{Deserialize, Serialize};
@@ -150,6 +152,10 @@ pub enum Report {
         counter: u32,
         /// Its members.
         members: Vec<PeerId>,
+        /// Whether it answers cells that nobody lists; any other rebalances.
+        repair: bool,
+        /// The own bid.
+        bid: BidHeard,
     },
     /// The own claim was spoken: a division was adopted, cells were taken without a round, or
     /// the expected end changed.
@@ -193,6 +199,9 @@ pub enum Report {
         name: String,
         /// What.
         news: TaskNews,
+        /// Who holds it by then, with which bids, as far as this peer knows; told with what it
+        /// does of the task itself.
+        held_by: Vec<TaskHolder>,
     },
     /// Another process speaks under this id: this one is silent from now on, until it
     /// reports that it runs under another incarnation.

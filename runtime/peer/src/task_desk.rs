@@ -119,7 +119,8 @@ impl Tasking {
         }
     }
 
-    fn holders(&self, id: TaskId) -> Vec<TaskHolder> {
+    /// Who holds a task, with its bid, as far as this peer knows.
+    pub(crate) fn holders(&self, id: TaskId) -> Vec<TaskHolder> {
         let own = self.auction.held().iter();
         let own = own.map(|t| (self.me_id(), t));
         let others = self.bundles.iter();

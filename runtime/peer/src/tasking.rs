@@ -531,7 +531,11 @@ impl Tasking {
 
     fn told(&self, id: TaskId, news: TaskNews) -> Option<Effect> {
         let known = self.known.get(&id)?;
-        Some(report(id, &known.task, news))
+        let mut told = report(id, &known.task, news);
+        if let Effect::Report(Report::Task { held_by, .. }) = &mut told {
+            *held_by = self.holders(id);
+        }
+        Some(told)
     }
 
     /// People hear once that nobody can do a task.
@@ -599,6 +603,7 @@ fn report(id: TaskId, task: &Task, news: TaskNews) -> Effect {
         revision: task.revision_as_asked(),
         name: task.name(),
         news,
+        held_by: Vec::new(),
     })
 }
 

@@ -7,7 +7,7 @@ use crate::cells::CellSet;
 use crate::mission_state::MissionState;
 use crate::output::Status;
 use crate::task_desk::TaskView;
-use crate::wire::message::{Epoch, ListedRun, Order, Orders};
+use crate::wire::message::{Bid, Epoch, ListedRun, Order, Orders};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Percept;
@@ -129,6 +129,20 @@ pub struct LastRound {
     pub first_bid_ms_ago: u64,
     /// Whose bids are known here.
     pub bids: Vec<BidHeard>,
+}
+
+impl BidHeard {
+    /// The same of a bid of somebody.
+    #[must_use]
+    pub fn of(by: u16, bid: &Bid) -> Self {
+        Self {
+            by,
+            anchor: bid.anchor,
+            release_ms: bid.release_ms,
+            endurance_ms: bid.endurance_ms,
+            eta_ms: bid.eta_ms,
+        }
+    }
 }
 
 /// A bid, as far as people want to know it.

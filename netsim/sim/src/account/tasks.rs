@@ -138,6 +138,7 @@ mod tests {
             revision: 1,
             name: "gate".into(),
             news,
+            held_by: Vec::new(),
         };
         tasks.asked(10_000, &asked(1, TaskState::Open));
         tasks.reported(2, &says(TaskNews::Flies));

@@ -946,6 +946,7 @@ impl Swarm {
             revision,
             name,
             news: TaskNews::Seen,
+            ..
         } = report
         else {
             return;

@@ -78,8 +78,12 @@ pub enum What {
         counter: u32,
         /// Its members.
         members: Vec<u16>,
+        /// Whether it answers cells that nobody lists; any other rebalances. None in recordings
+        /// of older programs.
+        #[serde(default)]
+        repair: Option<bool>,
     },
-    /// The bids of a round, as one of its members heard them; simulated runs only.
+    /// The bids of a round, as far as they were told by then.
     Bids {
         /// Counter of the round.
         counter: u32,
@@ -136,8 +140,24 @@ pub enum What {
     Task {
         /// What people call it.
         name: String,
-        /// What: `asked`, `flies`, `seen`, `left`, `done-by`, `nobody-can` or `over`.
+        /// What: `asked`, `won`, `flies`, `seen`, `left`, `done-by`, `nobody-can` or `over`; `won`
+        /// where bundles are heard.
         news: String,
+        /// Who asked for it; none in recordings of older programs.
+        #[serde(default)]
+        author: Option<u16>,
+        /// Which of its author's tasks it is.
+        #[serde(default)]
+        number: Option<u16>,
+        /// In which revision it was asked for.
+        #[serde(default)]
+        revision: Option<u32>,
+        /// Of `done-by` who did it.
+        #[serde(default)]
+        by: Option<u16>,
+        /// Who holds it by then, with their bids, as far as who tells knows.
+        #[serde(default)]
+        held_by: Vec<TaskBid>,
     },
     /// A peer is silent: another process speaks under its id.
     Silenced,
@@ -210,6 +230,15 @@ pub enum Belief {
     Down,
 }
 
+/// A bid for a task.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct TaskBid {
+    /// Whose.
+    pub by: u16,
+    /// What the task adds to the value of what that UAV does, in millionths of the task's worth.
+    pub bid_ppm: u32,
+}
+
 /// A bid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Bid {
@@ -223,4 +252,25 @@ pub struct Bid {
     pub endurance_ms: u32,
     /// Expected end of the plan that it had, milliseconds of scenario time after the bid.
     pub eta_ms: u32,
+}
+
+impl From<&skein_peer::why::BidHeard> for Bid {
+    fn from(bid: &skein_peer::why::BidHeard) -> Self {
+        Self {
+            by: bid.by,
+            anchor: bid.anchor,
+            release_ms: bid.release_ms,
+            endurance_ms: bid.endurance_ms,
+            eta_ms: bid.eta_ms,
+        }
+    }
+}
+
+impl From<&skein_peer::TaskHolder> for TaskBid {
+    fn from(holder: &skein_peer::TaskHolder) -> Self {
+        Self {
+            by: holder.uav,
+            bid_ppm: holder.bid,
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! The model of what a run shows.
 //!
 //! A run is one [`Scene`], then [`Frame`]s and [`Event`]s in the order of their times, then one
-//! [`End`]. Another scene follows wherever the mission changes: what was covered, claimed or
+//! [`End`]; somewhere between them stands the [`FailureFree`] run, where one is known. Another scene follows wherever the mission changes: what was covered, claimed or
 //! orphaned before it says nothing about its cells. All is JSON in `snake_case` with the unit
 //! in the name; places are told twice, in metres east and north of the scene's origin, in which
 //! things are drawn, and in degrees of WGS84. Numbers are rounded to millimetres and to 1e-7
@@ -94,6 +94,22 @@ pub struct End {
     pub report: Box<RunReport>,
 }
 
+/// The run of the same scenario and seed without failures: what the operator wants happens as
+/// in the run itself.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FailureFree {
+    /// Its seed.
+    pub seed: u64,
+    /// When it ended, milliseconds of scenario time.
+    pub end_ms: u64,
+    /// When all was covered and everybody knew it, milliseconds of scenario time; none where
+    /// that was never so.
+    pub makespan_ms: Option<u64>,
+    /// Pairs of a time, milliseconds of scenario time, and the covered share by then, between 0
+    /// and 1.
+    pub coverage: Vec<(u64, f64)>,
+}
+
 /// One word of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -104,6 +120,8 @@ pub enum Record {
     Frame(Frame),
     /// Something happened.
     Event(Event),
+    /// What the run would have been without failures: said once, when it is known.
+    FailureFree(FailureFree),
     /// The run is over.
     End(End),
 }
@@ -116,6 +134,7 @@ impl Record {
             Self::Scene(scene) => scene.time_ms,
             Self::Frame(frame) => frame.time_ms,
             Self::Event(event) => event.time_ms,
+            Self::FailureFree(_) => 0,
             Self::End(end) => end.time_ms,
         }
     }

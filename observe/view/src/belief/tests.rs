@@ -115,7 +115,7 @@ impl Air {
             match record {
                 Record::Event(event) => events.push(event),
                 Record::Frame(last) => frame = Some(last),
-                Record::Scene(_) | Record::End(_) => {}
+                Record::Scene(_) | Record::FailureFree(_) | Record::End(_) => {}
             }
         }
         (events, frame.unwrap())
@@ -213,6 +213,13 @@ fn a_round_is_told_as_its_bids_are_heard() {
     }
     let (events, _) = air.look(1_100);
     assert_eq!(kinds(&events)[..3], ["round", "bids", "bids"]);
+    assert!(matches!(
+        events[0].what,
+        What::Round {
+            repair: Some(true),
+            ..
+        }
+    ));
     assert!(matches!(&events[2].what, What::Bids { counter: 3, bids } if bids.len() == 2));
 }
 
