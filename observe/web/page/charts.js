@@ -4,7 +4,7 @@
 const LEFT = 46, RIGHT = 12;
 
 function timeScale(width) {
-  const without = run.failureFree ? run.failureFree.makespan_ms || run.failureFree.end_ms : 0;
+  const without = run.failureFree ? run.failureFree.end_ms : 0;
   const last = Math.max(60000, run.lastMs, workBoundMs() || 0, without);
   return { last, x: (ms) => LEFT + (width - LEFT - RIGHT) * ms / last, ms: (x) => (x - LEFT) / (width - LEFT - RIGHT) * last };
 }
@@ -35,7 +35,7 @@ function ticks(g, scale, h) {
 function cursor(g, scale, h) {
   g.fillStyle = css("--panel");
   g.globalAlpha = 0.62;
-  const x = scale.x(play.ms), end = scale.x(run.lastMs);
+  const x = scale.x(play.ms), end = scale.x(scale.last);
   if (end > x) g.fillRect(x, 0, end - x + 1, h - 16);
   g.globalAlpha = 1;
   g.strokeStyle = css("--accent");
@@ -73,7 +73,7 @@ function drawGantt(uavs) {
       g.font = "11px system-ui, sans-serif";
       g.fillStyle = uav.id === selected ? css("--accent") : css("--dim");
       g.textAlign = "right";
-      g.fillText(nameOf(uav.id), LEFT - 5, Math.max(10, mid + 4));
+      g.fillText(nameOf(uav.id), LEFT - 5, Math.max(8, mid + 4));
       g.textAlign = "left";
     }
   }
