@@ -5,7 +5,7 @@ use crate::journal::{Disk, MAX_RECORD_BYTES};
 use crate::radio::Hop;
 use crate::testing::{mission, percept};
 use skein_behaviors::setpoint::Side;
-use skein_behaviors::{Orders, Setpoint};
+use skein_behaviors::Setpoint;
 use skein_link::medium::Channel;
 use skein_link::{RadioCounters, Reason};
 use skein_peer::{Priority, Report};
