@@ -43,6 +43,13 @@ pub fn south_or_west(word: OsString) -> OsString {
     shifted
 }
 
+/// The words of a command line, as the program takes them.
+#[cfg(test)]
+pub fn typed(text: &str) -> impl Iterator<Item = OsString> {
+    let words = text.split_whitespace();
+    words.map(|word| south_or_west(word.into()))
+}
+
 /// A group of UAVs that plans and flies a mission together, without a leader.
 ///
 /// Exit codes: 0 all well, 1 the mission failed, 2 wrong usage, 3 a scenario or
@@ -55,7 +62,7 @@ pub struct Cli {
         long,
         global = true,
         value_name = "FILTER",
-        default_value = "warn,zenoh::net::runtime::orchestrator=error"
+        default_value = "warn,zenoh=error"
     )]
     pub log: String,
 

@@ -172,6 +172,7 @@ fn as_text(overview: &Overview) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::typed;
     use clap::Parser;
 
     #[derive(Parser)]
@@ -186,7 +187,7 @@ mod tests {
     };
 
     fn added(text: &str) -> Result<Vec<NewZone>, String> {
-        let cli = Cli::try_parse_from(text.split_whitespace()).map_err(|e| e.to_string())?;
+        let cli = Cli::try_parse_from(typed(text)).map_err(|e| e.to_string())?;
         match cli.nfz.what {
             What::Add(add) => zones(&add, ORIGIN).map_err(|r| format!("{r:?}")),
             other => Err(format!("{other:?}")),
@@ -208,7 +209,7 @@ mod tests {
                 .iter()
                 .all(|p| (39.5..43.0).contains(&far(p)))
         );
-        let ring = added("nfz add --polygon 60,25 60.001,25 60,25.001").unwrap();
+        let ring = added("nfz add --polygon 60,25 60.001,25 60,25.001 --id flag-after").unwrap();
         assert_eq!((ring[0].ring.len(), ring[0].ring[0]), (3, (0, 0)));
         let far = added("nfz add --polygon -33,-70 -33.1,-70 -33,-70.1");
         assert!(far.unwrap_err().contains("km"));

@@ -200,6 +200,7 @@ fn as_text(tasks: &[TaskView], origin: Origin) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::typed;
     use clap::Parser;
 
     #[derive(Parser)]
@@ -214,7 +215,7 @@ mod tests {
     };
 
     fn added(text: &str) -> Result<NewTask, String> {
-        let cli = Cli::try_parse_from(text.split_whitespace()).map_err(|e| e.to_string())?;
+        let cli = Cli::try_parse_from(typed(text)).map_err(|e| e.to_string())?;
         match cli.task.what {
             What::Add(add) => asked(&add, ORIGIN).map_err(|r| format!("{r:?}")),
             other => Err(format!("{other:?}")),

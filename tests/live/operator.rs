@@ -275,7 +275,9 @@ fn without_a_simulated_world_a_mission_and_an_order_reach_peers_over_the_radio()
         move |r: &Value| r["kind"] == "state" && r["author"] == of && r["body"]["cells"] == cells
     };
     let hold_in_life = |life: u64| {
-        move |r: &Value| r["kind"] == "operator" && r["incarnation"] == life && r["body"] == "hold"
+        move |r: &Value| {
+            r["kind"] == "operator" && r["incarnation"] == life && r["body"]["all"] == "hold"
+        }
     };
     let square = root().join("tests/live/square.json5");
     let (code, said) = say(&["mission", square.to_str().unwrap()]);
@@ -306,6 +308,17 @@ fn without_a_simulated_world_a_mission_and_an_order_reach_peers_over_the_radio()
         (0, "the ground station says hold to all")
     );
     watching.until("the order at 101", DEADLINE, hold_in_life(1));
+
+    // One UAV is told something of its own; a number that nobody has is refused.
+    let (code, said) = say(&["mission", "rtb", "--uav", "101"]);
+    assert!(code == 0 && said.contains("to uav101"), "{said}");
+    let alone = |r: &Value| r["body"]["singles"]["101"] == "return-to-base";
+    watching.until("the order to 101 alone", DEADLINE, alone);
+    let (code, said) = say(&["mission", "rtb", "--uav", "77"]);
+    assert!(
+        code != 0 && said.contains("no UAV with the number 77"),
+        "{said}"
+    );
 
     // A ground station that comes back says the same again, also to who was not there.
     drop(ground);
