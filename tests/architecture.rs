@@ -165,7 +165,12 @@ const RULES: &[(&str, &[&str], &[&str])] = &[
     ),
     (
         "skein-web",
-        &["skein-recording", "skein-view", "skein-console", "skein-netsim"],
+        &[
+            "skein-recording",
+            "skein-view",
+            "skein-console",
+            "skein-netsim",
+        ],
         &[
             "zenoh",
             "skein-node",
