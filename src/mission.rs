@@ -108,13 +108,7 @@ fn base(text: &str) -> Result<(i32, i32), String> {
 /// # Errors
 /// When there is no runtime or stdout cannot be written.
 pub fn run(args: &MissionArgs) -> anyhow::Result<ExitCode> {
-    let order = |to: &ToArgs, order| {
-        let command = match to.uav {
-            Some(uav) => Command::OrderOne(uav, order),
-            None => Command::Order(order),
-        };
-        say(&args.at, &command)
-    };
+    let order = |to: &ToArgs, order| say(&args.at, &Command::order(to.uav, order));
     match &args.what {
         Some(What::Submit(given)) => {
             give(&args.at, &given.scenario, given.planner, Command::Submit)

@@ -40,12 +40,9 @@ impl ScenarioArgs {
             time_scale,
             planner: self.planner.chosen(),
             launch: self.launch,
+            faults: self.faults.clone(),
         };
-        let scenario = skein_scenario::open(self.scenario.as_deref(), &over)?;
-        match &self.faults {
-            Some(file) => scenario.with_faults(file),
-            None => Ok(scenario),
-        }
+        skein_scenario::open(self.scenario.as_deref(), &over)
     }
 
     /// The text of the scenario, as it can be read by now; empty where it cannot.

@@ -128,13 +128,7 @@ impl Injector<'_> {
             Fault::Rebase { east_mm, north_mm } => {
                 self.operate(&Command::Base((*east_mm, *north_mm))).await
             }
-            Fault::Order { order, uav } => {
-                let command = match uav {
-                    Some(uav) => Command::OrderOne(*uav, *order),
-                    None => Command::Order(*order),
-                };
-                self.operate(&command).await
-            }
+            Fault::Order { order, uav } => self.operate(&Command::order(*uav, *order)).await,
             Fault::AddZone { name, ring } => {
                 let zone = NewZone {
                     name: Some(name.clone()),

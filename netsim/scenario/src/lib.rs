@@ -51,7 +51,6 @@ pub use read::faults::{chaos_plan, load_chaos_plan};
 pub use request::{AreaPlanner, Launch, Overrides, Seeds};
 pub use resolve::{Scenario, parse_with};
 
-use skein_interop::json::suggestion;
 use skein_netsim::spec::Spec;
 use std::path::Path;
 
@@ -104,18 +103,8 @@ pub fn builtin(name: &str) -> Result<Spec, ScenarioError> {
 pub fn open(target: Option<&str>, over: &Overrides) -> Result<Scenario, ScenarioError> {
     let target = target.unwrap_or(DEFAULT);
     let path = Path::new(target);
-    if builtin::text(target).is_some() && !path.exists() {
-        return load_builtin(target, over);
-    }
     if !path.exists() {
-        let problem = format!(
-            "no such file, and no built-in scenario of that name; {}",
-            suggestion(target, &builtin::names())
-        );
-        return Err(ScenarioError::Unreadable {
-            file: target.to_owned(),
-            problem,
-        });
+        return load_builtin(target, over);
     }
     load_with(path, over)
 }

@@ -2,6 +2,7 @@
 //! name, and what a command line changes.
 
 use skein_peer::CoverageTask;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// How an area is covered.
@@ -101,7 +102,7 @@ impl FromStr for Seeds {
 }
 
 /// What a command line changes in a scenario.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overrides {
     /// Number of UAVs of a generated fleet. Faults that name others are left out.
     pub peers: Option<u16>,
@@ -113,6 +114,9 @@ pub struct Overrides {
     pub planner: Option<AreaPlanner>,
     /// Where the UAVs of a generated fleet begin, instead of where the scenario says.
     pub launch: Option<Launch>,
+    /// A chaos plan, a file, whose faults happen instead of the scenario's. What its operator
+    /// does stays.
+    pub faults: Option<PathBuf>,
 }
 
 #[cfg(test)]

@@ -8,7 +8,6 @@ use crate::files::Files;
 use crate::forecast::{self, Forecast};
 use crate::mission::mission;
 use crate::mission::traffic_range_m;
-use crate::read::faults::load_chaos_plan;
 use crate::read::fleet::{Fleet, Member};
 use crate::read::targets::Asked;
 use crate::read::{self, Stated, operator};
@@ -18,8 +17,6 @@ use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{Spec, UavSpec};
 use skein_netsim::world::Survey;
 use skein_peer::offload::MissionGeometry;
-use std::collections::BTreeSet;
-use std::path::Path;
 use std::sync::Arc;
 
 /// A scenario, resolved, and all that was noticed on the way.
@@ -69,25 +66,20 @@ impl Scenario {
         let (found, summary) = feasibility::with_geometry(&spec, &geometry, &survey);
         let mut findings = stated.findings.clone();
         for finding in found {
-            let elsewhere =
-                (stated.faults_of.as_ref()).filter(|_| finding.field.starts_with("faults"));
-            if let Some(file) = elsewhere {
-                let told = format!("{}: {}", finding.field, finding.problem);
-                if finding.severity == Severity::Error {
-                    return Err(ScenarioError::Unreadable {
-                        file: file.clone(),
-                        problem: told,
-                    });
-                }
-                findings.push(finding);
-                continue;
-            }
+            let plan = (stated.faults_of.as_ref()).filter(|_| finding.field.starts_with("faults"));
             if finding.severity == Severity::Error {
-                let error = stated.places.wrong(&finding.field, finding.problem);
-                return Err(error.into());
+                return Err(match plan {
+                    Some(plan) => ScenarioError::Unreadable {
+                        file: plan.clone(),
+                        problem: format!("{}: {}", finding.field, finding.problem),
+                    },
+                    None => stated.places.wrong(&finding.field, finding.problem).into(),
+                });
             }
+            // What stands in a plan has no place in the scenario.
+            let own = plan.is_none();
             findings.push(Finding {
-                place: Some(stated.places.locate(&finding.field)),
+                place: own.then(|| stated.places.locate(&finding.field)),
                 ..finding
             });
         }
@@ -99,28 +91,6 @@ impl Scenario {
             summary,
             findings,
             stated,
-        })
-    }
-
-    /// The same scenario with the faults of a plan, a file, instead of its own. What its
-    /// operator does stays.
-    ///
-    /// # Errors
-    /// [`ScenarioError`] names the place of what is wrong with the plan.
-    pub fn with_faults(&self, plan: &Path) -> Result<Self, ScenarioError> {
-        self.faulty(&load_chaos_plan(plan, Some(&self.peers()))?, plan)
-    }
-
-    fn peers(&self) -> BTreeSet<u16> {
-        let uavs = self.spec.uavs.iter().map(|u| u.id);
-        uavs.chain(self.spec.ground.iter().map(|g| g.id)).collect()
-    }
-
-    fn faulty(&self, faults: &[TimedFault], plan: &Path) -> Result<Self, ScenarioError> {
-        Self::of(Stated {
-            faults: faults.to_vec(),
-            faults_of: Some(plan.display().to_string()),
-            ..self.stated.clone()
         })
     }
 
@@ -244,10 +214,14 @@ mod tests {
     fn faults_of_a_plan_replace_those_of_the_scenario_and_are_blamed_by_its_name() {
         let scenario = crate::load_builtin("helsinki", &Overrides::default()).unwrap();
         let own = scenario.spec.clone();
+        let peers = own.uavs.iter().map(|u| u.id).collect();
         let with = |name: &str, faults: &str| {
             let text = format!("{{ faults: [{faults}] }}");
-            let faults = crate::chaos_plan(name, &text, Some(&scenario.peers()))?;
-            scenario.faulty(&faults, Path::new(name))
+            Scenario::of(Stated {
+                faults: crate::chaos_plan(name, &text, Some(&peers))?,
+                faults_of: Some(name.to_owned()),
+                ..scenario.stated.clone()
+            })
         };
         assert!(own.faults.len() > 2);
         assert!(with("none.json5", "").unwrap().spec.faults.is_empty());

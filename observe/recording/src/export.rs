@@ -240,17 +240,12 @@ mod tests {
     use super::*;
     use crate::simulated;
     use skein_netsim::Prepared;
-    use skein_netsim::fault::{Fault, TimedFault};
     use skein_netsim::runs::Wanted;
-    use skein_netsim::world::fixture::square;
+    use skein_netsim::world::fixture::square_losing;
 
     fn run() -> Collected {
-        let mut spec = square(2);
+        let mut spec = square_losing(2, 2, 20_000);
         spec.name = "a <square> & more".to_owned();
-        spec.faults = vec![TimedFault {
-            at_ms: 20_000,
-            fault: Fault::Kill { peer: 2 },
-        }];
         let mut run = Collected::default();
         let wanted = Wanted::default();
         simulated::fly(&Prepared::new(spec), 3, None, wanted, &mut run).unwrap();

@@ -15,14 +15,9 @@ use std::thread::JoinHandle;
 const MAX_POINTS: usize = 1024;
 
 /// Flies it: what the operator wants happens as in the run, and nothing breaks. None where it
-/// was given up, or the swarm broke a rule so badly that it panicked.
+/// was given up.
 #[must_use]
 pub fn fly(prepared: &Prepared, seed: u64, give_up: &AtomicBool) -> Option<FailureFree> {
-    let flown = std::panic::AssertUnwindSafe(|| curve(prepared, seed, give_up));
-    std::panic::catch_unwind(flown).ok().flatten()
-}
-
-fn curve(prepared: &Prepared, seed: u64, give_up: &AtomicBool) -> Option<FailureFree> {
     let asked = prepared.spec.faults.iter();
     let orders = asked.filter(|f| f.fault.is_spoken()).cloned().collect();
     let mut swarm = Swarm::new(prepared, seed, orders, false);
@@ -175,17 +170,11 @@ mod tests {
     use super::*;
     use crate::simulated;
     use crate::sink::Collected;
-    use skein_netsim::fault::{Fault, TimedFault};
     use skein_netsim::runs::{self, Wanted};
-    use skein_netsim::world::fixture::square;
+    use skein_netsim::world::fixture::square_losing;
 
     fn prepared() -> Prepared {
-        let mut spec = square(3);
-        spec.faults = vec![TimedFault {
-            at_ms: 30_000,
-            fault: Fault::Kill { peer: 2 },
-        }];
-        Prepared::new(spec)
+        Prepared::new(square_losing(3, 2, 30_000))
     }
 
     #[test]

@@ -184,17 +184,11 @@ mod tests {
     use crate::sink::Collected;
     use crate::writer::Writer;
     use skein_netsim::Prepared;
-    use skein_netsim::fault::{Fault, TimedFault};
     use skein_netsim::runs::Wanted;
-    use skein_netsim::world::fixture::square;
+    use skein_netsim::world::fixture::square_losing;
 
     fn recorded(dir: &Path) -> Collected {
-        let mut spec = square(2);
-        spec.faults = vec![TimedFault {
-            at_ms: 20_000,
-            fault: Fault::Kill { peer: 2 },
-        }];
-        let prepared = Prepared::new(spec);
+        let prepared = Prepared::new(square_losing(2, 2, 20_000));
         let mut writer = Writer::create(&dir.join(RECORDING)).unwrap();
         let wanted = Wanted::default();
         let outcome = simulated::fly(&prepared, 3, None, wanted, &mut writer).unwrap();

@@ -137,16 +137,11 @@ mod tests {
     use crate::model::frame::State;
     use crate::sink::Collected;
     use skein_netsim::fault::{Fault, TimedFault};
-    use skein_netsim::world::fixture::square;
+    use skein_netsim::world::fixture::{square, square_losing};
 
     /// Three UAVs, one of which is killed.
     fn prepared() -> Prepared {
-        let mut spec = square(3);
-        spec.faults = vec![TimedFault {
-            at_ms: 30_000,
-            fault: Fault::Kill { peer: 2 },
-        }];
-        Prepared::new(spec)
+        Prepared::new(square_losing(3, 2, 30_000))
     }
 
     fn flown(prepared: &Prepared) -> (Outcome, Collected) {

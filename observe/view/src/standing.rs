@@ -1,11 +1,10 @@
 //! How all stands at one moment, folded from the words of a run.
 
-use crate::History;
 use skein_geometry::frame::Point;
 use skein_recording::cells::Cells;
 use skein_recording::model::event::{Belief, What};
 use skein_recording::model::frame::UavState;
-use skein_recording::{End, Event, FailureFree, Frame, Record, Scene};
+use skein_recording::{End, Event, Frame, Record, Scene};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Events that are kept: more than any screen shows.
@@ -25,10 +24,6 @@ pub struct Standing {
     pub cells: Cells,
     /// What happened lately that is worth a line, the newest last.
     pub events: VecDeque<Event>,
-    /// The run without failures, where one is known.
-    pub failure_free: Option<FailureFree>,
-    /// Its rounds and tasks.
-    pub history: History,
     /// The last word, once it was said.
     pub end: Option<End>,
     /// Of each UAV that took cells over: how many of whom.
@@ -45,12 +40,11 @@ impl Standing {
     /// Takes the next word.
     pub fn hear(&mut self, record: Record) {
         self.cells.hear(&record);
-        self.history.hear(&record);
         match record {
             Record::Scene(scene) => self.scene = Some(scene),
             Record::Frame(frame) => self.stand(frame),
             Record::Event(event) => self.happen(event),
-            Record::FailureFree(run) => self.failure_free = Some(run),
+            Record::FailureFree(_) => {}
             Record::End(end) => self.end = Some(end),
         }
     }
@@ -128,18 +122,13 @@ pub fn worth_a_line(what: &What) -> bool {
 mod tests {
     use super::*;
     use skein_netsim::Prepared;
-    use skein_netsim::fault::{Fault, TimedFault};
     use skein_netsim::runs::Wanted;
-    use skein_netsim::world::fixture::square;
+    use skein_netsim::world::fixture::square_losing;
     use skein_recording::sink::Collected;
 
     #[test]
     fn a_run_stands_in_the_end_as_its_report_says() {
-        let mut spec = square(3);
-        spec.faults = vec![TimedFault {
-            at_ms: 30_000,
-            fault: Fault::Kill { peer: 2 },
-        }];
+        let spec = square_losing(3, 2, 30_000);
         let mut run = Collected::default();
         let prepared = Prepared::new(spec);
         skein_recording::simulated::fly(&prepared, 4, None, Wanted::default(), &mut run).unwrap();

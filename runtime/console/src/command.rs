@@ -40,6 +40,17 @@ pub enum Command {
     Why,
 }
 
+impl Command {
+    /// An order to one UAV, or to all.
+    #[must_use]
+    pub const fn order(uav: Option<u16>, order: Order) -> Self {
+        match uav {
+            Some(uav) => Self::OrderOne(uav, order),
+            None => Self::Order(order),
+        }
+    }
+}
+
 /// A no-fly zone that is to be added.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NewZone {

@@ -29,6 +29,7 @@ use crate::output::{Report, TaskNews};
 use crate::protocol::auction::flown::RoutedTime;
 use crate::protocol::auction::{self, Auction, Event, KNOWN_MAX, Version};
 use crate::protocol::runs::legs_of;
+use crate::task_desk::TaskHolder;
 use crate::wire::codec::Body;
 use crate::wire::limits::{DURATION_MAX_MS, PEERS_MAX};
 use crate::wire::message::{Member, Record};
@@ -531,11 +532,7 @@ impl Tasking {
 
     fn told(&self, id: TaskId, news: TaskNews) -> Option<Effect> {
         let known = self.known.get(&id)?;
-        let mut told = report(id, &known.task, news);
-        if let Effect::Report(Report::Task { held_by, .. }) = &mut told {
-            *held_by = self.holders(id);
-        }
-        Some(told)
+        Some(report_held(id, &known.task, news, self.holders(id)))
     }
 
     /// People hear once that nobody can do a task.
@@ -598,12 +595,16 @@ fn done_in(bundle: &Bundle) -> Vec<(TaskId, u32)> {
 }
 
 fn report(id: TaskId, task: &Task, news: TaskNews) -> Effect {
+    report_held(id, task, news, Vec::new())
+}
+
+fn report_held(id: TaskId, task: &Task, news: TaskNews, held_by: Vec<TaskHolder>) -> Effect {
     Effect::Report(Report::Task {
         id,
         revision: task.revision_as_asked(),
         name: task.name(),
         news,
-        held_by: Vec::new(),
+        held_by,
     })
 }
 

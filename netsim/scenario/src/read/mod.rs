@@ -13,7 +13,7 @@ mod tasks;
 pub(crate) mod terrain;
 pub(crate) mod wind;
 
-use crate::error::{Finding, Severity};
+use crate::error::{Finding, ScenarioError, Severity};
 use crate::files::Files;
 use crate::request::{AreaPlanner, Overrides};
 use faults::Known;
@@ -103,7 +103,7 @@ pub(crate) fn scenario(
     text: &str,
     files: &Files<'_>,
     over: &Overrides,
-) -> Result<Stated, Error> {
+) -> Result<Stated, ScenarioError> {
     let document = Document::parse("scenario", file, text)?;
     let root = document.root();
     let f = root.fields(FIELDS)?;
@@ -141,12 +141,16 @@ pub(crate) fn scenario(
             ..Finding::new(Severity::Note, &field, text)
         })
         .collect();
-    let faults = match f.get("faults") {
+    let own = match f.get("faults") {
         Some(list) => faults::read(list, &known, &mut findings)?,
         None => Vec::new(),
     };
+    let faults = match &over.faults {
+        Some(plan) => faults::load_chaos_plan(plan, Some(&peers))?,
+        None => own,
+    };
     Ok(Stated {
-        faults_of: None,
+        faults_of: over.faults.as_ref().map(|plan| plan.display().to_string()),
         storm: faults::storm(f.get("storm"), fleet.members.len(), over.peers.is_some())?,
         laps: f.small_or("laps", 1, 1, 1000, "times")?,
         division: f.get("division").map_or(Ok(Rule::Best), division)?,

@@ -2,6 +2,7 @@
 //! buildings (D2.7 §2.2). Every field is public, so a test starts from it and changes
 //! what it is about. Scenario files are read elsewhere.
 
+use crate::fault::{Fault, TimedFault};
 use crate::spec::{Building, GroundStationSpec, RadioSpec, Spec, StormSpec, TroubleSpec, UavSpec};
 use skein_flight::airframe::Airframe;
 use skein_geometry::Polygon;
@@ -170,6 +171,16 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         division: Default::default(),
         separation_mm: 0,
         fastest_mmps: 0,
+    }
+}
+
+/// [`square`] with one UAV killed at a time, milliseconds of scenario time.
+#[must_use]
+pub fn square_losing(n_uavs: u16, peer: u16, at_ms: u64) -> Spec {
+    let fault = Fault::Kill { peer };
+    Spec {
+        faults: vec![TimedFault { at_ms, fault }],
+        ..square(n_uavs)
     }
 }
 

@@ -1,8 +1,7 @@
 use super::*;
 use skein_netsim::Prepared;
-use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::runs::Wanted;
-use skein_netsim::world::fixture::square;
+use skein_netsim::world::fixture::square_losing;
 use skein_recording::model::event::Origin;
 use skein_recording::sink::Collected;
 
@@ -178,11 +177,7 @@ fn what_is_kept_is_bounded() {
 
 #[test]
 fn a_kill_opens_a_repair_in_which_those_who_live_bid_and_get_all_that_is_left() {
-    let mut spec = square(3);
-    spec.faults = vec![TimedFault {
-        at_ms: 30_000,
-        fault: Fault::Kill { peer: 2 },
-    }];
+    let spec = square_losing(3, 2, 30_000);
     let mut run = Collected::default();
     let prepared = Prepared::new(spec);
     skein_recording::simulated::fly(&prepared, 4, None, Wanted::default(), &mut run).unwrap();
