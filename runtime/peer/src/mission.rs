@@ -284,6 +284,7 @@ impl Mission {
         if self.is_patrol() {
             h.write_i64(i64::from(self.lap));
             h.write_i64(i64::from(self.further_laps));
+            h.write_i64(i64::from(self.edit()));
         }
         self.hash_operated(&mut h);
         h.finish()
@@ -293,6 +294,12 @@ impl Mission {
     #[must_use]
     pub fn is_patrol(&self) -> bool {
         self.lap > 0 || self.further_laps > 0
+    }
+
+    /// How often an operator changed a patrol; 0 for what is flown once.
+    fn edit(&self) -> u16 {
+        let high = u16::try_from(self.revision >> 16).unwrap_or(u16::MAX);
+        if self.is_patrol() { high } else { 0 }
     }
 
     /// The mission of the next lap, the same for whoever derives it; none after
@@ -350,6 +357,7 @@ impl Mission {
         };
         let router = Router::new(zones, limits);
         let coverage_loop = coverage_loop.of_lap(self.lap).of_sortie(self.sortie);
+        let coverage_loop = coverage_loop.of_edit(self.edit());
         let geometry = MissionGeometry::new(Arc::clone(self), coverage_loop, router);
         Ok(Arc::new(geometry))
     }
@@ -614,6 +622,28 @@ mod tests {
             library.chunk(i, piece).unwrap();
         }
         assert_eq!(*library.newest().unwrap(), second);
+    }
+
+    /// What is said of a lap stays on the air; when an operator closes a zone and opens it
+    /// again, laps that were flown before may be flown once more.
+    #[test]
+    fn a_lap_that_is_begun_again_after_changes_has_another_loop() {
+        let mut m = mission(1, 4);
+        m.further_laps = 4;
+        let hash = |m: &Mission| Arc::new(m.clone()).geometry().unwrap().coverage_loop.hash();
+        let again = Mission {
+            revision: m.revision_after(m.revision + 2),
+            ..m.clone()
+        };
+        let flown = |m: &Mission| -> Vec<u64> {
+            let later = (0..4).map(|n| m.later_lap(m.revision + 1 + n).unwrap());
+            later.chain([m.clone()]).map(|m| hash(&m)).collect()
+        };
+        let (before, after) = (flown(&m), flown(&again));
+        assert!(after.iter().all(|h| !before.contains(h)));
+        // The other laps of one mission are told apart by what each derives of the other.
+        let geometry = Arc::new(again.clone()).geometry().unwrap();
+        assert_eq!(geometry.coverage_loop.hash_in_lap(0, 1), after[0]);
     }
 
     #[test]

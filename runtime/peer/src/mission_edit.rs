@@ -96,7 +96,8 @@ impl Mission {
     }
 
     /// What this mission is when it replaces `old` and is a change of it: what was covered of
-    /// the same places stays covered, and zones that were added stay.
+    /// the same places stays covered, and zones that were added stay. A patrol goes on with the
+    /// lap that is flown, or with its last one if it has fewer now.
     ///
     /// # Errors
     /// [`EditError::Cancelled`] when the old one was ended.
@@ -104,7 +105,11 @@ impl Mission {
         if old.cancelled {
             return Err(EditError::Cancelled);
         }
+        let last = self.lap.saturating_add(self.further_laps);
+        let lap = self.lap.max(old.lap.min(last));
         Ok(Self {
+            lap,
+            further_laps: last - lap,
             added_zones: old.added_zones.clone(),
             sortie: old.sortie,
             cancelled: false,
@@ -254,6 +259,21 @@ mod tests {
             .added_zones
             .is_empty()
         );
+    }
+
+    #[test]
+    fn a_revised_patrol_goes_on_with_the_lap_that_is_flown() {
+        let patrol = |revision, further_laps| Mission {
+            further_laps,
+            ..mission(revision, 6, 4)
+        };
+        let old = patrol(1, 4).later_lap(4).unwrap();
+        let laps = |all: u16| {
+            let revised = patrol(65_536, all - 1).revising(&old).unwrap();
+            (revised.lap, revised.further_laps)
+        };
+        assert_eq!((laps(6), laps(5), laps(4)), ((3, 2), (3, 1), (3, 0)));
+        assert_eq!((laps(2), laps(1)), ((1, 0), (0, 0)));
     }
 
     #[test]

@@ -65,7 +65,7 @@ impl Swarm {
             Fault::Rebase { east_mm, north_mm } => {
                 let base = (*east_mm, *north_mm);
                 let before = (**self.operator.mission()).clone();
-                let next = self.operator.next(Mission { base, ..before });
+                let next = self.next_mission(Mission { base, ..before });
                 self.revise(next);
                 0
             }
@@ -271,10 +271,17 @@ impl Swarm {
         self.observe_graph();
     }
 
+    /// What the operator says at the ground station; where that is down, of what was given last.
+    fn next_mission(&self, mission: Mission) -> Arc<Mission> {
+        let ground = self.ground_station().map(|idx| &self.peers[idx]);
+        let held = ground.and_then(|s| s.peer.as_ref()?.mission());
+        self.operator.next(mission, held.as_deref())
+    }
+
     /// The operator gives another mission. A console refuses one that cannot be flown; no
     /// operator wants one of which the planner leaves out what could be seen.
     fn give_mission(&mut self, mission: Mission) {
-        let next = self.operator.next(mission);
+        let next = self.next_mission(mission);
         let survey = Survey::of_mission(&self.spec, &next);
         let (Ok(geometry), Ok(survey)) = (self.geometry_cache.of(&next), survey) else {
             return;

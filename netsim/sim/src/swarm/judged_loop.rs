@@ -58,11 +58,12 @@ impl JudgedLoop {
         loop_hash: u64,
         (cache, air): (&mut GeometryCache, &Air),
     ) -> bool {
-        let lap = revision.checked_sub(given.revision);
-        let lap = lap.and_then(|lap| u16::try_from(lap).ok());
-        let Some(lap) = lap.filter(|lap| *lap <= given.further_laps) else {
+        let laps = revision.checked_sub(given.revision);
+        let laps = laps.and_then(|laps| u16::try_from(laps).ok());
+        let Some(laps) = laps.filter(|laps| *laps <= given.further_laps) else {
             return false;
         };
+        let lap = given.lap.saturating_add(laps);
         if (given.revision, lap) <= (self.mission.revision, self.lap) {
             return false;
         }

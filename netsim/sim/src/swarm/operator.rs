@@ -48,13 +48,27 @@ impl Operator {
         &self.mission
     }
 
-    /// What a mission would be as the next revision.
-    pub(super) fn next(&self, mission: Mission) -> Arc<Mission> {
-        let revision = self.mission.revision_after(self.mission.revision);
+    /// What a mission would be as the next revision, of a patrol in the lap of which the ground
+    /// station knows.
+    pub(super) fn next(&self, mission: Mission, at_ground: Option<&Mission>) -> Arc<Mission> {
+        let held = at_ground.filter(|m| self.is_a_lap(m));
+        let (lap, further_laps) = held.map_or((mission.lap, mission.further_laps), |m| {
+            (m.lap, m.further_laps)
+        });
+        let newest = held.map_or(0, |m| m.revision).max(self.mission.revision);
+        let revision = self.mission.revision_after(newest);
         Arc::new(Mission {
             revision,
+            lap,
+            further_laps,
             ..mission
         })
+    }
+
+    /// Whether this is a later lap of the mission given last.
+    fn is_a_lap(&self, held: &Mission) -> bool {
+        let lap = self.mission.later_lap(held.revision);
+        lap.is_some_and(|lap| lap.content_hash() == held.content_hash())
     }
 
     /// Gives the next revision.

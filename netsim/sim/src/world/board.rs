@@ -81,8 +81,16 @@ impl Board {
         });
     }
 
-    /// Takes over what another board saw of the same places: squares of one grid, or pieces
-    /// with the same corners; nothing where the mission was begun anew.
+    /// What is asked for is seen for this lap, from 0; the ones before are over.
+    pub(super) fn begin_at(&mut self, lap: u16, further_laps: u16) {
+        self.lap = lap.saturating_add(1);
+        self.laps = self.lap.saturating_add(further_laps);
+        self.times.fill((lap, 0));
+    }
+
+    /// Takes over what another board saw of the same places in this lap or in a later one:
+    /// squares of one grid, or pieces with the same corners; nothing where the mission was
+    /// begun anew.
     pub(super) fn remember(&mut self, other: &Self) {
         if self.survey.sortie() != other.survey.sortie() {
             return;
@@ -91,11 +99,12 @@ impl Board {
             let Some(j) = self.same_place(other, i) else {
                 continue;
             };
-            if let (None, (1.., at_ms), Some(sighting)) =
-                (self.seen[i], other.times[j], other.last_sighting(j))
-            {
+            let (times, at_ms) = other.times[j];
+            if times < self.lap {
+                self.times[i].1 = self.times[i].1.max(at_ms);
+            } else if let (None, Some(sighting)) = (self.seen[i], other.last_sighting(j)) {
                 self.seen[i] = Some(sighting);
-                self.times[i] = (1, at_ms);
+                self.times[i] = (self.lap, at_ms);
                 let cell = self.survey.cells()[i];
                 self.n_covered += usize::from(is_coverable(&cell));
             }
@@ -283,7 +292,8 @@ impl Board {
             cell: cell.id,
         });
         let (times, before_ms) = self.times[i];
-        if times > 0 {
+        // A cell that was not asked for in earlier laps was not seen in them either.
+        if before_ms > 0 {
             let gap_ms = sighting.at_ms.saturating_sub(before_ms);
             self.longest_gap_ms = self.longest_gap_ms.max(gap_ms);
         }

@@ -72,21 +72,22 @@ impl Judge {
         self
     }
 
-    /// From now on what another revision of the mission asks for is to be seen, so many
-    /// times, and its zones are to be kept clear of. What was seen of the same places counts.
+    /// From now on what another revision of the mission asks for is to be seen in this lap,
+    /// from 0, and in so many further ones, and its zones are to be kept clear of. What was
+    /// seen of the same places in this lap, or in a later one, counts.
     /// A zone that is new binds a UAV from the first moment in which it follows the revision and
     /// can still turn away. Peers that follow an older revision yet are judged by that.
     pub fn revise(
         &mut self,
         wanted: Arc<Survey>,
-        (claims, laps): (Option<Arc<Pieces>>, u16),
+        (claims, lap, further_laps): (Option<Arc<Pieces>>, u16, u16),
         revision: u32,
         turn: TurnAway,
     ) {
         self.zones.revise(wanted.zones(), revision, turn);
         let mut board = Board::new(revision, wanted);
         board.watch_claims(claims);
-        board.want_laps(laps);
+        board.begin_at(lap, further_laps);
         for old in self.boards.iter().rev() {
             board.remember(old);
         }
@@ -262,7 +263,7 @@ mod tests {
         let before = judge.n_covered();
         let far = (5_000_000, 5_000_000);
         let zone = [far, (far.0 + 9_000, far.1), (far.0, far.1 + 9_000)];
-        judge.revise(revised(240_000, &zone), (None, 1), 2, turn());
+        judge.revise(revised(240_000, &zone), (None, 0, 0), 2, turn());
         assert_eq!(judge.survey().cells().len(), 40);
         assert!(judge.n_covered() >= 4 && judge.n_covered() < before);
         assert!(judge.saw(1, CellId { col: 7, row: 0 }, 1), "seen before");
@@ -301,7 +302,7 @@ mod tests {
             &piece(320.0, 24.0, 0.0, 4_000, 0.0),
             &mut Vec::new(),
         );
-        judge.revise(Arc::new(Survey::new(&spec)), (None, 1), 2, turn());
+        judge.revise(Arc::new(Survey::new(&spec)), (None, 0, 0), 2, turn());
         let before = judge.n_covered();
         assert!(before > 0 && judge.saw(2, id(both), 1) && !judge.saw(2, id(new), 1));
         let mut facts = Vec::new();
@@ -316,29 +317,59 @@ mod tests {
         );
     }
 
+    fn places(points: &[PointMm]) -> Arc<Survey> {
+        let mut spec = square(1);
+        let mut mission = (*spec.mission).clone();
+        let point = |at: &PointMm| PointTask {
+            at: *at,
+            radius_mm: 1_000,
+        };
+        mission.task = CoverageTask::Points(points.iter().map(point).collect());
+        spec.mission = Arc::new(mission);
+        Arc::new(Survey::new(&spec))
+    }
+
+    /// A change in the second lap of a patrol: what was seen in the first counts for that one
+    /// alone, and a place that is new was not to be seen before.
+    #[test]
+    fn a_patrol_that_is_changed_goes_on_with_its_lap() {
+        let (a, b, c) = ((100_000, 24_000), (100_000, 240_000), (300_000, 240_000));
+        let mut judge = Judge::new(places(&[a, b])).with_laps(3);
+        let fly = |judge: &mut Judge, north_m: f64| {
+            let along = piece(40.0, north_m, 0.0, 10_000, 0.0);
+            judge.watch(1, &airframe(), &along, &mut Vec::new());
+        };
+        // The place that ends a lap is seen again in the next one from where it was seen.
+        for north_m in [240.0, 24.0] {
+            fly(&mut judge, north_m);
+        }
+        judge.revise(places(&[c, b, a]), (None, 1, 1), 2, turn());
+        let saw = |j: &Judge, n, laps| j.saw(2, CellId::numbered(n), laps);
+        for (n, times) in [(0, 1), (1, 1), (2, 2)] {
+            assert!(saw(&judge, n, times) && !saw(&judge, n, times + 1), "{n}");
+        }
+        // Who is told of the lap before sees all of that one for seen.
+        judge.revise(places(&[b, a]), (None, 0, 2), 3, turn());
+        assert!(saw(&judge, 1, 1) && !judge.complete());
+        for north_m in [24.0, 240.0, 24.0] {
+            assert!(!judge.complete());
+            fly(&mut judge, north_m);
+        }
+        assert!(judge.complete());
+    }
+
     #[test]
     fn of_other_targets_what_was_seen_of_the_same_places_counts_whatever_their_numbers() {
-        let survey = |points: &[PointMm]| {
-            let mut spec = square(1);
-            let mut mission = (*spec.mission).clone();
-            let point = |at: &PointMm| PointTask {
-                at: *at,
-                radius_mm: 1_000,
-            };
-            mission.task = CoverageTask::Points(points.iter().map(point).collect());
-            spec.mission = Arc::new(mission);
-            Arc::new(Survey::new(&spec))
-        };
         let (a, b, c) = ((100_000, 24_000), (200_000, 240_000), (300_000, 240_000));
-        let mut judge = Judge::new(survey(&[a, b]));
+        let mut judge = Judge::new(places(&[a, b]));
         let over_a = piece(40.0, 24.0, 0.0, 10_000, 0.0);
         judge.watch(1, &airframe(), &over_a, &mut Vec::new());
         let saw = |j: &Judge, revision, n| j.saw(revision, CellId::numbered(n), 1);
         assert!(saw(&judge, 1, 0) && !saw(&judge, 1, 1));
-        judge.revise(survey(&[c, a]), (None, 1), 2, turn());
+        judge.revise(places(&[c, a]), (None, 0, 0), 2, turn());
         assert!(!saw(&judge, 2, 0) && saw(&judge, 2, 1) && saw(&judge, 1, 0));
         // Of laps the first is over for what was seen in any.
-        judge.revise(survey(&[a]), (None, 2), 3, turn());
+        judge.revise(places(&[a]), (None, 0, 1), 3, turn());
         assert!(!judge.complete());
         judge.watch(1, &airframe(), &over_a, &mut Vec::new());
         assert!(judge.complete());
@@ -355,7 +386,7 @@ mod tests {
         let over = piece(40.0, 240.0, 0.0, 20_000, 0.0);
         for (told, from_m, entries) in [(true, 40.0, 1), (false, 40.0, 0), (true, 200.0, 0)] {
             let mut judge = judge_with(&[]);
-            judge.revise(revised(480_000, &block), (None, 1), 2, turn());
+            judge.revise(revised(480_000, &block), (None, 0, 0), 2, turn());
             judge.follows(1, if told { 2 } else { 1 });
             let mut facts = Vec::new();
             let steps = (0..20).map(|k| Piece {
@@ -372,12 +403,12 @@ mod tests {
         // What was lifted binds nobody.
         let mut judge = judge_with(&[&block]);
         let elsewhere = [(0, 0), (9_000, 0), (0, 9_000)];
-        judge.revise(revised(480_000, &elsewhere), (None, 1), 2, turn());
+        judge.revise(revised(480_000, &elsewhere), (None, 0, 0), 2, turn());
         judge.zones.watch(1, &over, &mut Vec::new());
         assert_eq!(judge.entries(), 0);
         // Nor does it when it comes back, before it is known again.
         judge.follows(1, 2);
-        judge.revise(revised(480_000, &block), (None, 1), 3, turn());
+        judge.revise(revised(480_000, &block), (None, 0, 0), 3, turn());
         judge.zones.watch(1, &over, &mut Vec::new());
         assert_eq!(judge.entries(), 0);
         judge.follows(1, 3);

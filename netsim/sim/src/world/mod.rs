@@ -291,11 +291,10 @@ impl World {
     /// From now on a revision of the mission with this geometry is judged by.
     pub fn revise(&mut self, survey: Arc<Survey>, geometry: &MissionGeometry) {
         let mission = &*geometry.mission;
-        let laps = mission.further_laps.saturating_add(1);
         let claims = claims(mission, Some(geometry));
         self.judge.revise(
             survey,
-            (claims, laps),
+            (claims, mission.lap, mission.further_laps),
             mission.revision,
             TurnAway::of(mission),
         );

@@ -218,6 +218,14 @@ impl CoverageLoop {
         self
     }
 
+    /// The same loop of a patrol that an operator changed so many times: laps that are begun
+    /// again after a change are others than those of the same number before it.
+    #[must_use]
+    pub fn of_edit(mut self, edit: u16) -> Self {
+        self.hash ^= lap_bits(edit).rotate_left(16);
+        self
+    }
+
     /// What identifies the loop in another lap than `lap`, which this one is of.
     #[must_use]
     pub fn hash_in_lap(&self, lap: u16, other: u16) -> u64 {

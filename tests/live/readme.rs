@@ -1,0 +1,428 @@
+//! Every command of the README is run, in the order in which somebody would who reads it.
+//!
+//! Where it names a word in capitals, something stands in its place; where it names several
+//! words, each is run. Left out are `cargo test`, which runs this, and `cargo install`, which
+//! builds for minutes; `cargo run --release -- trial` is run as `skein trial`; of its thousand
+//! storms four are flown.
+
+use crate::alone;
+use crate::commands::{is_a_pattern, named, words};
+use nix::pty::{Winsize, openpty};
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// A trial takes a minute; a slow machine slows it down.
+const DEADLINE: Duration = Duration::from_secs(400);
+
+/// The README's commands, and which of them were run.
+struct Readme {
+    named: BTreeSet<String>,
+    run: BTreeSet<String>,
+    dir: tempfile::TempDir,
+    /// Keeps other trials out of sight.
+    tmp: tempfile::TempDir,
+}
+
+impl Readme {
+    fn new() -> Self {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let text = fs::read_to_string(root.join("README.md")).unwrap();
+        Self {
+            named: named(&text).into_iter().collect(),
+            run: BTreeSet::new(),
+            dir: tempfile::tempdir().unwrap(),
+            tmp: tempfile::tempdir().unwrap(),
+        }
+    }
+
+    /// The command, as the README has it.
+    fn exactly(&mut self, written: &str) -> Command {
+        assert!(
+            !is_a_pattern(written),
+            "{written}: capitals have to be filled in"
+        );
+        self.instead(written, written)
+    }
+
+    /// What is run where the README has words in capitals, or more than a test has time for.
+    fn instead(&mut self, written: &str, filled: &str) -> Command {
+        assert!(
+            self.named.contains(written),
+            "the README names no {written:?}"
+        );
+        self.run.insert(written.to_owned());
+        let mut command = Command::new(env!("CARGO_BIN_EXE_skein"));
+        command
+            .args(words(filled))
+            .current_dir(self.dir.path())
+            .env("TMPDIR", self.tmp.path())
+            .stdin(Stdio::null());
+        command
+    }
+
+    fn file(&self, name: &str, text: &str) {
+        fs::write(self.dir.path().join(name), text).unwrap();
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+}
+
+/// Runs it to its end, which has to be a good one.
+fn well(mut command: Command) -> Output {
+    let out = command.output().unwrap();
+    assert!(
+        out.status.success(),
+        "{command:?}: {}\n{}{}",
+        out.status,
+        String::from_utf8_lossy(&out.stdout),
+        String::from_utf8_lossy(&out.stderr)
+    );
+    out
+}
+
+/// What it prints.
+fn told(command: Command) -> String {
+    String::from_utf8(well(command).stdout).unwrap()
+}
+
+/// Something that goes on until it is asked to stop.
+struct Running {
+    child: Child,
+    lines: Receiver<String>,
+    seen: Vec<String>,
+}
+
+impl Running {
+    fn start(mut command: Command) -> Self {
+        let mut child = command
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (told, lines) = channel();
+        let stderr = child.stderr.take().unwrap();
+        thread::spawn(move || {
+            for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+                let _ = told.send(line);
+            }
+        });
+        let seen = Vec::new();
+        Self { child, lines, seen }
+    }
+
+    /// The rest of the first line that begins so.
+    fn line(&mut self, begin: &str) -> String {
+        let deadline = Instant::now() + DEADLINE;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let line = self.lines.recv_timeout(left);
+            let line = line.unwrap_or_else(|e| panic!("no {begin:?}: {e}: {:#?}", self.seen));
+            if let Some(rest) = line.strip_prefix(begin) {
+                return rest.to_owned();
+            }
+            self.seen.push(line);
+        }
+    }
+
+    fn interrupt(&self) {
+        let pid = self.child.id().to_string();
+        let kill = Command::new("kill").args(["-INT", &pid]).status();
+        assert!(kill.unwrap().success());
+    }
+
+    /// Waits for its end: the exit code.
+    fn end(&mut self) -> Option<i32> {
+        ended(&mut self.child)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn ended(child: &mut Child) -> Option<i32> {
+    let deadline = Instant::now() + DEADLINE;
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status.code();
+        }
+        assert!(Instant::now() < deadline, "it does not end");
+        thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// A command on a terminal of 100 columns and 30 rows.
+struct OnTerminal {
+    child: Child,
+    keys: File,
+    screen: thread::JoinHandle<String>,
+}
+
+impl OnTerminal {
+    fn start(mut command: Command) -> Self {
+        let size = Winsize {
+            ws_row: 30,
+            ws_col: 100,
+            ws_xpixel: 0,
+            ws_ypixel: 0,
+        };
+        let pty = openpty(Some(&size), None).unwrap();
+        let end = || Stdio::from(pty.slave.try_clone().unwrap());
+        let child = command
+            .env("TERM", "xterm-256color")
+            .stdin(end())
+            .stdout(end())
+            .stderr(end())
+            .spawn()
+            .unwrap();
+        let (keys, mut screen) = (
+            File::from(pty.master.try_clone().unwrap()),
+            File::from(pty.master),
+        );
+        let screen = thread::spawn(move || {
+            let (mut all, mut part) = (Vec::new(), [0; 4096]);
+            // The end of a terminal whose processes are gone is an error.
+            while let Ok(n @ 1..) = screen.read(&mut part) {
+                all.extend_from_slice(&part[..n]);
+            }
+            String::from_utf8_lossy(&all).into_owned()
+        });
+        Self {
+            child,
+            keys,
+            screen,
+        }
+    }
+
+    fn press(&mut self, key: &str) {
+        self.keys.write_all(key.as_bytes()).unwrap();
+    }
+
+    /// Waits for its end: the exit code, and all that was drawn.
+    fn end(mut self) -> (Option<i32>, String) {
+        let code = ended(&mut self.child);
+        (code, self.screen.join().unwrap())
+    }
+}
+
+/// The page behind such an address, which is on this computer.
+fn page(url: &str) -> String {
+    let place = url.trim().strip_prefix("http://").unwrap();
+    let host = place.split('/').next().unwrap();
+    assert!(host.starts_with("127.0.0.1:"), "{url}");
+    let mut stream = TcpStream::connect(host).unwrap();
+    write!(
+        stream,
+        "GET / HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"
+    )
+    .unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+    answer
+}
+
+/// A page as `--web` serves it, until it is asked to stop.
+fn serves_a_page(command: Command) {
+    let mut running = Running::start(command);
+    let url = running.line("page: ");
+    assert!(page(&url).contains("<html"), "no page");
+    running.interrupt();
+    assert_eq!(running.end(), Some(0), "{:#?}", running.seen);
+}
+
+#[test]
+fn every_command_of_the_readme_is_run() {
+    let _alone = alone();
+    let mut readme = Readme::new();
+    on_the_ground(&mut readme);
+    plans(&mut readme);
+    a_simulated_run(&mut readme);
+    a_trial_on_a_terminal(&mut readme);
+    a_trial_with_everything(&mut readme);
+    let left: Vec<&String> = readme.named.difference(&readme.run).collect();
+    assert!(left.is_empty(), "never run: {left:#?}");
+}
+
+/// What needs no swarm.
+fn on_the_ground(r: &mut Readme) {
+    for verb in ["trial", "peer", "plan"] {
+        let help = format!("skein {verb} --help");
+        assert!(told(r.instead("skein VERB --help", &help)).contains("Usage"));
+    }
+    assert!(told(r.instead("skein plan", "skein plan --help")).contains("cover"));
+    well(r.instead("skein check SCENARIO", "skein check helsinki"));
+    assert!(told(r.instead("skein schema [KIND]", "skein schema")).contains("claim"));
+    assert!(told(r.instead("skein schema [KIND]", "skein schema state")).contains("$schema"));
+    let shell = r.instead("skein completions SHELL", "skein completions bash");
+    assert!(told(shell).contains("complete"));
+    well(r.instead("skein man [DIR]", "skein man man"));
+    assert!(r.path("man/skein.1").is_file());
+    let bench = "skein bench conflicts|auction|tracking";
+    let conflicts = "skein bench conflicts --n 8 --seeds 0..10";
+    assert!(told(r.exactly(conflicts)).contains("losses_of_separation"));
+    let auction = "skein bench auction --n 8 --tasks 24 --seeds 0..10";
+    assert!(told(r.exactly(auction)).contains("value"));
+    for which in ["conflicts", "auction", "tracking"] {
+        let some = format!("skein bench {which} --seeds 0..2");
+        assert!(!told(r.instead(bench, &some)).is_empty());
+    }
+}
+
+const FIELD: &str = r#"{"type": "FeatureCollection", "features": [
+  {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [
+    [[24.9355, 60.1655], [24.9445, 60.1655], [24.9445, 60.1690], [24.9355, 60.1690], [24.9355, 60.1655]]]}}
+]}"#;
+
+const ROAD: &str = r#"{"type": "FeatureCollection", "features": [
+  {"type": "Feature", "properties": {}, "geometry": {"type": "LineString", "coordinates": [
+    [24.9355, 60.1655], [24.9400, 60.1670], [24.9445, 60.1655]]}}
+]}"#;
+
+const PLACES: &str = r#"{"type": "FeatureCollection", "features": [
+  {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [24.9360, 60.1660]}},
+  {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [24.9400, 60.1680]}},
+  {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [24.9440, 60.1660]}}
+]}"#;
+
+/// Plans for a person.
+fn plans(r: &mut Readme) {
+    r.file("field.geojson", FIELD);
+    r.file("road.geojson", ROAD);
+    r.file("places.geojson", PLACES);
+    let plan = "skein plan cover|line|visit|patrol|route FILE";
+    let how = "--turn-radius-m 25 --clearance-m 10";
+    let filled = [
+        format!(
+            "skein plan cover field.geojson --k 2 --swath-m 45 --quick {how} --format plan --out plans"
+        ),
+        format!("skein plan line road.geojson --swath-m 45 {how}"),
+        format!("skein plan visit places.geojson {how}"),
+        format!("skein plan patrol road.geojson --swath-m 45 {how}"),
+        format!("skein plan route places.geojson {how}"),
+    ];
+    for verb in filled {
+        well(r.instead(plan, &verb));
+    }
+    let file = fs::read_dir(r.path("plans"))
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap();
+    let file = file.path().display().to_string();
+    well(r.instead(
+        "skein plan verify FILE --area FILE",
+        &format!("skein plan verify {file} --area field.geojson --swath-m 45 {how}"),
+    ));
+}
+
+/// A run in virtual time, and what is made of its recording.
+fn a_simulated_run(r: &mut Readme) {
+    let recorded = "skein sim helsinki --seed 1 --run-dir run";
+    assert!(told(r.instead("skein sim [SCENARIO]", recorded)).contains("PASSED"));
+    well(r.instead("skein sim", "skein sim --seed 2"));
+    assert!(told(r.exactly("skein sim --why 3@120")).contains("uav3"));
+    serves_a_page(r.exactly("skein sim helsinki --web"));
+    well(r.instead("skein report RUN", "skein report run"));
+    assert!(told(r.instead("skein export RUN --csv", "skein export run --csv")).contains(','));
+    serves_a_page(r.instead("skein replay RUN", "skein replay run --web"));
+    let mut played = OnTerminal::start(r.instead("skein replay RUN", "skein replay run"));
+    thread::sleep(Duration::from_secs(3));
+    played.press("q");
+    let (code, screen) = played.end();
+    assert_eq!(code, Some(0), "{screen}");
+    assert!(screen.contains("uav3"), "{screen}");
+    let storms = r.instead(
+        "skein sim helsinki --seeds 0..1000 --storm",
+        "skein sim helsinki --seeds 0..4 --storm",
+    );
+    assert!(told(storms).contains('4'));
+}
+
+/// The first command, where somebody looks on.
+fn a_trial_on_a_terminal(r: &mut Readme) {
+    let trial = OnTerminal::start(r.exactly("skein trial"));
+    let (code, screen) = trial.end();
+    assert_eq!(code, Some(0), "{screen}");
+    assert!(screen.contains("PASSED"), "{screen}");
+}
+
+/// A trial with a page, an operator and faults; what it is called to do at last is to return.
+fn a_trial_with_everything(r: &mut Readme) {
+    let mut trial = Running::start(r.exactly("skein trial --web"));
+    let url = trial.line("page: ");
+    assert!(page(&url).contains("<html"), "no page");
+    let deadline = Instant::now() + DEADLINE;
+    let observe = |r: &mut Readme| {
+        let mut command = r.exactly("skein observe '*/v4/claim/**'");
+        command.args(["--timeout", "5"]);
+        command.output().unwrap()
+    };
+    while !observe(r).status.success() {
+        assert!(Instant::now() < deadline, "nobody is heard");
+    }
+    assert!(told(r.exactly("skein why 3")).contains("uav3"));
+
+    let mut map = OnTerminal::start(r.exactly("skein watch"));
+    thread::sleep(Duration::from_secs(4));
+    map.press("q");
+    let (code, screen) = map.end();
+    assert_eq!(code, Some(0), "{screen}");
+    assert!(screen.contains("uav3"), "{screen}");
+    serves_a_page(r.instead("skein watch [TRIAL]", "skein watch --web"));
+
+    let nfz = "skein nfz add|remove|list";
+    well(r.exactly("skein nfz add --circle 60.1690,24.9400,30 --id fire"));
+    assert!(told(r.instead(nfz, "skein nfz list")).contains("fire"));
+    well(r.instead(nfz, "skein nfz remove fire"));
+    let task = "skein task add|cancel|list";
+    well(r.exactly("skein task add point 60.1690,24.9400"));
+    well(r.exactly("skein task add line 60.1690,24.9400 60.1701,24.9422 --needs infrared"));
+    let id = "skein task add point 60.1700,24.9410 --id later";
+    well(r.instead("skein task add point 60.1690,24.9400", id));
+    assert!(told(r.instead(task, "skein task list")).contains("later"));
+    well(r.instead(task, "skein task cancel later"));
+
+    well(r.exactly("skein chaos kill 3"));
+    let order = "skein mission hold|resume|rtb [--uav ID]";
+    for one in ["hold --uav 2", "resume --uav 2", "hold", "resume"] {
+        well(r.instead(order, &format!("skein mission {one}")));
+    }
+    let given = "skein mission submit|revise SCENARIO";
+    well(r.instead(given, "skein mission revise helsinki"));
+    well(r.instead(given, "skein mission submit helsinki"));
+    well(r.instead(order, "skein mission rtb"));
+
+    peer_of_its_own(r);
+    // All that flies returns, and the trial says that the area was not covered.
+    trial.line("the page stays until Ctrl-C");
+    trial.interrupt();
+    assert_eq!(trial.end(), Some(1), "{:#?}", trial.seen);
+}
+
+/// One peer, by the configuration that explains every field.
+fn peer_of_its_own(r: &mut Readme) {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/peer.json5");
+    let filled = format!("skein peer --config {}", config.display());
+    let mut peer = r
+        .instead("skein peer --config FILE", &filled)
+        .spawn()
+        .unwrap();
+    thread::sleep(Duration::from_secs(3));
+    assert_eq!(peer.try_wait().unwrap(), None, "the peer has ended");
+    peer.kill().unwrap();
+    peer.wait().unwrap();
+    r.instead("skein peer", &filled);
+}
