@@ -10,6 +10,7 @@ use skein_recording::model::Knowledge;
 pub use skein_web::ServerError;
 use skein_web::server::Answer;
 use skein_web::{Faults, Feed, Hello, Mode, Server};
+use std::pin::pin;
 use std::sync::{Arc, OnceLock};
 use tokio::runtime::Runtime;
 
@@ -88,8 +89,19 @@ impl Page {
 
     /// Goes on until the program is asked to stop.
     pub fn stay(self) {
-        eprintln!("the page stays until Ctrl-C: {}", self.server.url());
-        self.runtime.block_on(cli::asked_to_stop());
+        self.runtime.block_on(async {
+            let mut stop = pin!(cli::asked_to_stop());
+            // Polled once, it listens before anybody is told.
+            let asked = tokio::select! {
+                biased;
+                () = &mut stop => true,
+                () = async {} => false,
+            };
+            if !asked {
+                eprintln!("the page stays until Ctrl-C: {}", self.server.url());
+                stop.await;
+            }
+        });
     }
 }
 

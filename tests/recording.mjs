@@ -16,7 +16,7 @@ import { dirname, join, resolve } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
 
 const PACKAGES = { "@mcap/core": "2.2.2", "@mcap/nodejs": "1.0.2", "@mcap/support": "1.1.0", "@foxglove/schemas": "2.1.0", ajv: "8.20.0" };
-const WANTED = ["/skein/scene", "/skein/frame", "/skein/event", "/skein/end", "/map/site", "/map/cells", "/log"];
+const WANTED = ["/skein/scene", "/skein/frame", "/skein/event", "/skein/end", "/map/site", "/map/cells", "/tf", "/drawn/site", "/drawn/uavs", "/log"];
 
 const root = resolve(dirname(fileURLToPath(import.meta.url)), "..");
 const home = join(root, "target", "recording-node");
@@ -49,7 +49,7 @@ const { default: Ajv } = await load("ajv");
 
 const ajv = new Ajv({ strict: false });
 const theirs = new Map();
-for (const type of ["LocationFix", "GeoJSON", "Log"]) {
+for (const type of ["LocationFix", "GeoJSON", "Log", "FrameTransforms", "SceneUpdate"]) {
   theirs.set(`foxglove.${type}`, { known: foxglove[type].properties, valid: ajv.compile(foxglove[type]) });
 }
 
@@ -59,10 +59,26 @@ const reader = await McapIndexedReader.Initialize({
   decompressHandlers: await loadDecompressHandlers(),
 });
 
+// What viewers make of a schema: a field is of one plain type, an object, or a list of those.
+// A channel that has another field is dropped by them.
+const PLAIN = ["boolean", "string", "number", "integer"];
+function understood(schema, where) {
+  for (const [name, field] of Object.entries(schema.properties ?? {})) {
+    const here = `${where}.${name}`;
+    const one = field.type === "array" ? field.items ?? {} : field;
+    if (field.oneOf || one.oneOf) fail(`schema ${here}: alternatives`);
+    if (one.type === "object") understood(one, here);
+    else if (!PLAIN.includes(one.type)) fail(`schema ${here}: viewers know no ${JSON.stringify(one.type)} there`);
+  }
+}
+
 const schemas = new Map();
 for (const [id, schema] of reader.schemasById) {
   if (schema.encoding !== "jsonschema") fail(`schema ${schema.name}: encoding ${schema.encoding}`);
-  schemas.set(id, { name: schema.name, ...JSON.parse(new TextDecoder().decode(schema.data)) });
+  const told = JSON.parse(new TextDecoder().decode(schema.data));
+  if (told.type !== "object" || told.oneOf) fail(`schema ${schema.name}: no plain object`);
+  understood(told, schema.name);
+  schemas.set(id, { name: schema.name, valid: ajv.compile(told), required: told.required });
 }
 const counts = new Map();
 let last = 0n;
@@ -77,6 +93,7 @@ for await (const message of reader.readMessages()) {
   const missing = (schema.required ?? []).filter((field) => !(field in value));
   if (missing.length) fail(`${channel.topic}: ${schema.name} lacks ${missing.join(", ")}`);
   const type = theirs.get(schema.name);
+  if (!schema.valid(value)) fail(`${channel.topic}: ${ajv.errorsText(schema.valid.errors)}`);
   if (!type && schema.name.startsWith("foxglove.")) fail(`${channel.topic}: nobody checks ${schema.name}`);
   if (type) {
     const strange = Object.keys(value).filter((field) => !(field in type.known));

@@ -28,7 +28,8 @@ with (folder / "run.mcap").open("rb") as file:
         last[channel.topic] = value
         assert message.log_time >= 0
 names = {schema.name for schema in summary.schemas.values()}
-assert {"skein.Scene", "foxglove.LocationFix", "foxglove.GeoJSON", "foxglove.Log"} <= names, names
+known = {"LocationFix", "GeoJSON", "Log", "FrameTransforms", "SceneUpdate"}
+assert {"skein.Scene", *(f"foxglove.{name}" for name in known)} <= names, names
 for uav in report["uavs"]:
     assert topics[f"/uav/{uav}/location"] > 10, topics
 covered = json.loads(last["/map/cells"]["geojson"])["features"]

@@ -1,7 +1,7 @@
 //! The channels of a recording: their topics, and the JSON schema of each.
 
-use crate::foxglove;
 use crate::model::{End, Event, FailureFree, Frame, Scene};
+use crate::{foxglove, space, viewers};
 use schemars::{JsonSchema, SchemaGenerator, generate::SchemaSettings};
 use serde_json::Value;
 
@@ -34,11 +34,17 @@ pub const LOCATION: Channel = channel("/uav/*/location", "foxglove.LocationFix")
 pub const SITE: Channel = channel("/map/site", "foxglove.GeoJSON");
 /// The cells, by who has them.
 pub const CELLS: Channel = channel("/map/cells", "foxglove.GeoJSON");
+/// Where the UAVs are, as frames of coordinates.
+pub const TRANSFORMS: Channel = channel("/tf", "foxglove.FrameTransforms");
+/// Area, zones and roofs in three dimensions.
+pub const SITE_DRAWN: Channel = channel("/drawn/site", "foxglove.SceneUpdate");
+/// The UAVs in three dimensions.
+pub const UAVS_DRAWN: Channel = channel("/drawn/uavs", "foxglove.SceneUpdate");
 /// Events in words.
 pub const LOG: Channel = channel("/log", "foxglove.Log");
 
 /// All of them.
-pub const ALL: [Channel; 9] = [
+pub const ALL: [Channel; 12] = [
     SCENE,
     FRAME,
     EVENT,
@@ -47,6 +53,9 @@ pub const ALL: [Channel; 9] = [
     LOCATION,
     SITE,
     CELLS,
+    TRANSFORMS,
+    SITE_DRAWN,
+    UAVS_DRAWN,
     LOG,
 ];
 
@@ -60,6 +69,7 @@ impl Channel {
             "skein.Event" => of::<Event>(self.schema),
             "skein.FailureFree" => of::<FailureFree>(self.schema),
             "skein.End" => of::<End>(self.schema),
+            name @ ("foxglove.FrameTransforms" | "foxglove.SceneUpdate") => space::schema(name),
             name => foxglove::schema(name),
         }
     }
@@ -69,11 +79,8 @@ impl Channel {
 /// are made.
 fn of<T: JsonSchema>(title: &str) -> Value {
     let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
-    let mut value = SchemaGenerator::new(settings)
-        .into_root_schema_for::<T>()
-        .to_value();
-    value["title"] = title.into();
-    value
+    let whole = SchemaGenerator::new(settings).into_root_schema_for::<T>();
+    viewers::schema_for_both(title, whole.to_value())
 }
 
 #[cfg(test)]
@@ -92,7 +99,7 @@ mod tests {
         let uav = &frame["properties"]["uavs"]["items"]["properties"];
         assert_eq!(uav["cells_left"]["type"], "integer");
         let event = EVENT.json_schema();
-        let kinds = event["oneOf"].as_array().unwrap();
+        let kinds = event["allOf"][0]["oneOf"].as_array().unwrap();
         let kind = |k: &Value| k["properties"]["kind"]["const"].clone();
         assert!(kinds.iter().any(|k| kind(k) == "takeover"), "{event}");
     }

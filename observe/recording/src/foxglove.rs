@@ -22,8 +22,18 @@ pub fn colour(scene: &Scene, uav: u16) -> &'static str {
     COLOURS[at % COLOURS.len()]
 }
 
+/// A colour such as `#0072b2` in parts of 1.
+pub(crate) fn rgba(colour: &str) -> Value {
+    let part = |from: usize| {
+        let hex = colour.get(from..from + 2);
+        hex.and_then(|h| u8::from_str_radix(h, 16).ok())
+            .map_or(0.0, |n| f64::from(n) / 255.0)
+    };
+    json!({ "r": part(1), "g": part(3), "b": part(5), "a": 1 })
+}
+
 /// Scenario time as seconds and nanoseconds.
-fn stamp(time_ms: u64) -> Value {
+pub(crate) fn stamp(time_ms: u64) -> Value {
     json!({ "sec": time_ms / 1000, "nsec": time_ms % 1000 * 1_000_000 })
 }
 
@@ -31,11 +41,6 @@ fn stamp(time_ms: u64) -> Value {
 #[must_use]
 pub fn location(time_ms: u64, scene: &Scene, uav: &UavState) -> Option<Value> {
     let pose = uav.pose?;
-    let part = |from: usize| {
-        let hex = colour(scene, uav.id).get(from..from + 2);
-        hex.and_then(|h| u8::from_str_radix(h, 16).ok())
-            .map_or(0.0, |n| f64::from(n) / 255.0)
-    };
     Some(json!({
         "timestamp": stamp(time_ms),
         "frame_id": format!("uav{}", uav.id),
@@ -45,7 +50,7 @@ pub fn location(time_ms: u64, scene: &Scene, uav: &UavState) -> Option<Value> {
         "position_covariance": [0, 0, 0, 0, 0, 0, 0, 0, 0],
         "position_covariance_type": 0,
         "heading": pose.heading_deg.to_radians(),
-        "color": { "r": part(1), "g": part(3), "b": part(5), "a": 1 },
+        "color": rgba(colour(scene, uav.id)),
         "metadata": [{ "key": "state", "value": uav.state.word() }],
     }))
 }
@@ -184,6 +189,17 @@ pub fn cells(scene: &Scene, cells: &Cells) -> Vec<Value> {
         )
     });
     told.collect()
+}
+
+/// Those of the cells that were covered, or were left by somebody who is gone: a map on which
+/// later messages are laid over earlier ones stays right.
+#[must_use]
+pub fn settled(features: Vec<Value>) -> Vec<Value> {
+    let is_settled = |feature: &Value| {
+        let status = feature["properties"]["status"].as_str();
+        matches!(status, Some("covered" | "orphaned"))
+    };
+    features.into_iter().filter(is_settled).collect()
 }
 
 /// Features as one message.

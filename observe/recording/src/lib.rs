@@ -12,7 +12,7 @@
 //! | [`observer`] | from a driver's values to the model |
 //! | [`simulated`] | a simulated run that is observed |
 //! | [`cells`] | who has which cell, folded from scenes and events |
-//! | [`writer`], [`reader`] | a run as an MCAP file; [`channels`] are its channels, [`foxglove`] its messages for Foxglove |
+//! | [`writer`], [`reader`] | a run as an MCAP file; [`channels`] are its channels, [`foxglove`] and [`space`] its messages for Foxglove, [`viewers`] the schemas that it takes |
 //! | [`failure_free`] | the run without failures with which one is compared |
 //! | [`run_dir`] | the directory of a run: manifest, recording, report |
 //! | [`export`] | a run as CSV, lines of JSON, GeoJSON, KML |
@@ -40,8 +40,10 @@ pub mod reader;
 pub mod run_dir;
 pub mod simulated;
 pub mod sink;
+pub mod space;
 mod stage;
 pub mod tracks;
+pub mod viewers;
 pub mod writer;
 
 pub use model::{End, Event, FailureFree, Frame, Record, Scene};

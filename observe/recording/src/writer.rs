@@ -6,6 +6,7 @@ use crate::channels::{self, Channel};
 use crate::foxglove;
 use crate::model::{End, Event, FailureFree, Frame, Record, Scene};
 use crate::sink::Sink;
+use crate::space;
 use mcap::records::MessageHeader;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -39,6 +40,7 @@ pub struct Writer {
     flushed_ms: u64,
     cells_due_ms: u64,
     cells_told: Option<Cells>,
+    features_told: Vec<serde_json::Value>,
 }
 
 impl fmt::Debug for Writer {
@@ -80,6 +82,7 @@ impl Writer {
             flushed_ms: 0,
             cells_due_ms: 0,
             cells_told: None,
+            features_told: Vec::new(),
         })
     }
 
@@ -146,8 +149,12 @@ impl Writer {
         }
         let every_ms = CELLS_MS.max(CELLS_MS_PER_CELL * self.cells.len() as u64);
         self.cells_due_ms = time_ms + every_ms;
-        let features = foxglove::cells(&self.scene, &self.cells);
         self.cells_told = Some(self.cells.clone());
+        let features = foxglove::settled(foxglove::cells(&self.scene, &self.cells));
+        if features == self.features_told {
+            return Ok(());
+        }
+        self.features_told.clone_from(&features);
         self.write(channels::CELLS, time_ms, &foxglove::geojson(features))
     }
 
@@ -180,6 +187,7 @@ impl Writer {
         self.write(channels::SCENE, scene.time_ms, scene)?;
         let site = foxglove::geojson(foxglove::site(scene));
         self.write(channels::SITE, scene.time_ms, &site)?;
+        self.write(channels::SITE_DRAWN, scene.time_ms, &space::site(scene))?;
         self.cells_due_ms = 0;
         self.out.flush().map_err(io)
     }
@@ -192,6 +200,11 @@ impl Writer {
                 self.write_on(channels::LOCATION, topic, (frame.time_ms, &fix))?;
             }
         }
+        if let Some(transforms) = space::transforms(frame) {
+            self.write(channels::TRANSFORMS, frame.time_ms, &transforms)?;
+        }
+        let drawn = space::uavs(&self.scene, frame);
+        self.write(channels::UAVS_DRAWN, frame.time_ms, &drawn)?;
         self.map(frame.time_ms, false)?;
         self.flush(frame.time_ms)
     }
