@@ -284,6 +284,9 @@ impl Mission {
         if self.is_patrol() {
             h.write_i64(i64::from(self.lap));
             h.write_i64(i64::from(self.further_laps));
+        }
+        if self.edit() > 0 {
+            h.write_i64(-4);
             h.write_i64(i64::from(self.edit()));
         }
         self.hash_operated(&mut h);
@@ -628,7 +631,7 @@ mod tests {
     /// again, laps that were flown before may be flown once more.
     #[test]
     fn a_lap_that_is_begun_again_after_changes_has_another_loop() {
-        let mut m = mission(1, 4);
+        let mut m = crate::testing::mission(1, 6, 4);
         m.further_laps = 4;
         let hash = |m: &Mission| Arc::new(m.clone()).geometry().unwrap().coverage_loop.hash();
         let again = Mission {
