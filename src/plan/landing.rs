@@ -1,9 +1,10 @@
 //! How the flights of a plan come down, in the words of files for upload (D2.7 §2.3); the
 //! landings are [`skein_survey::landing`]'s.
 
+use super::corners::waypoints;
 use super::output::Printed;
 use super::site::Site;
-use super::upload::{along, tightest_m};
+use super::upload::tightest_m;
 use skein_geometry::frame::{Origin, Point};
 use skein_geometry::math::PI;
 use skein_geometry::{NoFlyZones, Polygon};
@@ -44,11 +45,12 @@ impl Glides {
     pub(super) fn items(
         &self,
         to: impl Fn(Point) -> LatLon,
-        height_m: f64,
-        acceptance_m: f64,
+        (height_m, acceptance_m): (f64, f64),
+        air: Option<&Airspace>,
     ) -> Vec<Item> {
         let pieces = self.landing.way.segments().iter();
-        let way = pieces.flat_map(along).map(|p| Item::Waypoint {
+        let points = pieces.flat_map(|piece| waypoints(piece, air).0);
+        let way = points.map(|p| Item::Waypoint {
             at: to(p),
             height_m,
             acceptance_m,
@@ -146,7 +148,11 @@ fn glide(flight: &Printed, origin: Origin, site: &Site) -> Result<Glides, String
 }
 
 /// Zones and fences of a site.
-fn airspace(origin: Origin, site: &Site, places: [Point; 2]) -> Result<Airspace, String> {
+pub(super) fn airspace(
+    origin: Origin,
+    site: &Site,
+    places: impl IntoIterator<Item = Point>,
+) -> Result<Airspace, String> {
     let (mut zones, mut fences) = (Vec::new(), Vec::new());
     for (inclusion, shape) in &site.shapes {
         let side = if *inclusion {

@@ -6,6 +6,7 @@
 
 mod area_input;
 mod args;
+mod corners;
 pub mod cover;
 mod landing;
 pub mod line;

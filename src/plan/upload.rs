@@ -2,30 +2,25 @@
 //! (D2.7 §3.4–3.6).
 //!
 //! An autopilot flies from waypoint to waypoint. A turn becomes waypoints on its circle, so
-//! close that no chord leaves it by more than a thirtieth of its radius.
+//! close that no chord leaves it by more than a thirtieth of its radius, or closer, or on lines
+//! that touch it, where chords would come too near to a zone ([`corners`](super::corners)).
 
+use super::corners::waypoints;
 use super::landing::{self, Down};
 use super::output::Printed;
 use super::site::Site;
 use clap::{Args, ValueEnum};
 use skein_geometry::Segment;
 use skein_geometry::frame::{Origin, Point};
-use skein_geometry::math::PI;
 use skein_interop::mission::{Item, Mission};
 use skein_interop::place::{LatLon, from_plane, to_plane};
+use skein_survey::flown::Airspace;
 
 /// Points nearer to each other than this are one, metres.
 const COINCIDENT_M: f64 = 1e-3;
 
 /// A first waypoint nearer to home than this is left out: a take-off leads somewhere, metres.
 const OVER_HOME_M: f64 = 2.0;
-
-/// The most that an arc turns between two waypoints, radians: its chord is within 3.4 % of
-/// the radius then.
-const MOST_TURN_RAD: f64 = PI / 6.0;
-
-/// The most waypoints of one arc, so that no curve is endless.
-const MOST_ON_ARC: f64 = 1_000.0;
 
 /// A waypoint counts as reached from this part of the tightest turn: half of the way to the
 /// next one on its circle.
@@ -102,6 +97,7 @@ pub(super) fn mission(
         last: start,
         height_m,
         acceptance_m: accepted.unwrap_or(ACCEPTED_WITHOUT_TURNS_M),
+        air: airspace_of(flight, origin, site),
         to,
     };
     if flight.legs.is_empty() {
@@ -115,7 +111,7 @@ pub(super) fn mission(
             site.pictures_in_turns,
         );
     }
-    let acceptance_m = way.acceptance_m;
+    let (acceptance_m, air) = (way.acceptance_m, way.air);
     let mut items = way.items;
     // A fixed wing climbs towards the place of its take-off, and has no way to where it is.
     let first = items.iter().find_map(|item| match item {
@@ -128,7 +124,7 @@ pub(super) fn mission(
         End::Rtl => items.push(Item::ReturnToLaunch),
         End::Land => items.extend(match landing::of(flight, origin, site) {
             Down::Upright => vec![Item::Land { at: home }],
-            Down::Glides(down) => down.items(to, height_m, acceptance_m),
+            Down::Glides(down) => down.items(to, (height_m, acceptance_m), air.as_ref()),
             Down::Not(_) => vec![Item::ReturnToLaunch],
         }),
         End::Loiter => items.push(Item::Loiter {
@@ -149,6 +145,13 @@ pub(super) fn mission(
         fence: site.fence.clone(),
         rally: site.rally.clone(),
     }
+}
+
+/// Zones and fences of a site, round all of a flight.
+fn airspace_of(flight: &Printed, origin: Origin, site: &Site) -> Option<Airspace> {
+    let ends = flight.legs.iter().filter_map(|leg| leg.curve.end());
+    let places = ends.map(|end| end.position()).chain(flight.track.clone());
+    landing::airspace(origin, site, places).ok()
 }
 
 /// What is worth saying about the files of some flights.
@@ -193,6 +196,17 @@ pub(super) fn notices(
             blind.join(", ")
         ));
     }
+    for flight in flying() {
+        let air = airspace_of(flight, origin, site);
+        let pieces = flight.legs.iter().flat_map(|leg| leg.curve.segments());
+        let is_near = |piece: &&Segment| !waypoints(piece, air.as_ref()).1;
+        if let n @ 1.. = pieces.filter(is_near).count() {
+            notices.push(format!(
+                "{}: {n} pieces cannot be written as straight legs with the clearance",
+                flight.name
+            ));
+        }
+    }
     if asked.end(site) == End::Land {
         for flight in flying() {
             notices.extend(landing::notice(flight, origin, site));
@@ -220,6 +234,8 @@ struct Way<F> {
     last: Point,
     height_m: f64,
     acceptance_m: f64,
+    /// What is kept clear of; none where it is not known.
+    air: Option<Airspace>,
     to: F,
 }
 
@@ -260,9 +276,8 @@ impl<F: Fn(Point) -> LatLon> Way<F> {
                 seeing = sees;
             }
             for piece in leg.curve.segments() {
-                for p in along(piece) {
-                    self.fly(p);
-                }
+                let (way, _) = waypoints(piece, self.air.as_ref());
+                way.into_iter().for_each(|p| self.fly(p));
             }
         }
         if seeing {
@@ -278,35 +293,13 @@ impl<F: Fn(Point) -> LatLon> Way<F> {
     }
 }
 
-/// Points of a piece without its beginning: its end, and on an arc others before that.
-pub(super) fn along(piece: &Segment) -> impl Iterator<Item = Point> + use<> {
-    let turned_rad = piece.curvature_per_m.abs() * piece.length_m;
-    // A hair less than a whole number of steps is that number.
-    let parts = (turned_rad / MOST_TURN_RAD - 1e-9).ceil();
-    let parts = if turned_rad.is_finite() {
-        parts.clamp(1.0, MOST_ON_ARC)
-    } else {
-        1.0
-    };
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "between 1 and a thousand"
-    )]
-    let n = parts as u32;
-    let piece = *piece;
-    (1..=n).map(move |i| {
-        let s_m = piece.length_m * f64::from(i) / f64::from(n);
-        piece.pose_at(s_m).position()
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use serde_json::Map;
     use skein_geometry::Curve;
     use skein_geometry::frame::Pose;
+    use skein_geometry::math::PI;
     use skein_survey::flight::Leg;
 
     const ORIGIN: Origin = Origin {
@@ -454,18 +447,5 @@ mod tests {
         flight.legs.clear();
         let items = mission(&flight, ORIGIN, &Site::default(), &UploadArgs::default()).items;
         assert_eq!(items.len(), 5, "{items:?}");
-    }
-
-    #[test]
-    fn an_endless_arc_has_an_end() {
-        let piece = |length_m| Segment {
-            start: Pose::new(Point::origin(), 0.0),
-            curvature_per_m: 0.1,
-            length_m,
-        };
-        assert_eq!(along(&piece(1e9)).count(), 1_000);
-        assert_eq!(along(&piece(f64::INFINITY)).count(), 1);
-        assert_eq!(along(&piece(10.0 * PI / 6.0)).count(), 1);
-        assert_eq!(along(&piece(10.0 * PI / 6.0 + 0.1)).count(), 2);
     }
 }
