@@ -6,8 +6,8 @@
 //! one; the more there are, the nearer both are to the arc, which is proved clear.
 
 use skein_geometry::Segment;
-use skein_geometry::frame::{Point, Pose};
-use skein_geometry::math::{PI, atan2};
+use skein_geometry::frame::Point;
+use skein_geometry::math::PI;
 use skein_survey::flown::Airspace;
 
 /// The most that an arc turns between two waypoints, radians: its chord is within 3.4 % of
@@ -24,15 +24,10 @@ const HALVINGS: u32 = 4;
 /// Whether straight legs from one to the next keep clear.
 fn keeps(air: &Airspace, from: Point, way: &[Point]) -> bool {
     let starts = std::iter::once(&from).chain(way);
-    starts.zip(way).all(|(a, b)| {
-        let leg = *b - *a;
-        let segment = Segment {
-            start: Pose::new(*a, atan2(leg.y, leg.x)),
-            curvature_per_m: 0.0,
-            length_m: leg.norm(),
-        };
-        air.zones().is_segment_clear(&segment, air.clearance_m())
-    })
+    starts
+        .zip(way)
+        .map(|(a, b)| Segment::straight(*a, *b))
+        .all(|leg| air.zones().is_segment_clear(&leg, air.clearance_m()))
 }
 
 /// Points of a piece without its beginning, up to its end, and whether straight legs between
@@ -50,22 +45,18 @@ pub(super) fn waypoints(piece: &Segment, air: Option<&Airspace>) -> (Vec<Point>,
     let Some(air) = air else {
         return (chords, true);
     };
-    let from = piece.start.position();
-    if keeps(air, from, &chords) {
+    let is_clear = |way: &Vec<Point>| keeps(air, piece.start.position(), way);
+    if is_clear(&chords) {
         return (chords, true);
     }
-    if turned_rad.is_finite() && turned_rad > 0.0 {
-        let mut finer = parts;
-        for _ in 0..=HALVINGS {
-            for way in [touching(piece, finer), on_circle(piece, finer)] {
-                if keeps(air, from, &way) {
-                    return (way, true);
-                }
-            }
-            finer = (2.0 * finer).min(MOST_ON_ARC);
-        }
+    let mut others = (0..=HALVINGS)
+        .filter(|_| turned_rad.is_finite() && turned_rad > 0.0)
+        .map(|halvings| (parts * f64::from(1_u32 << halvings)).min(MOST_ON_ARC))
+        .flat_map(|finer| [touching(piece, finer), on_circle(piece, finer)]);
+    match others.find(is_clear) {
+        Some(way) => (way, true),
+        None => (chords, false),
     }
-    (chords, false)
 }
 
 /// The ends of so many equal parts.
@@ -102,6 +93,7 @@ fn whole(parts: f64) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use skein_geometry::frame::{Pose, Vector};
     use skein_geometry::{NoFlyZones, Polygon};
 
     const RADIUS_M: f64 = 25.0;
@@ -146,10 +138,7 @@ mod tests {
         let inner_m = RADIUS_M - diagonal_m;
         // Its corner towards the circle is at 45 degrees.
         let away_m = (RADIUS_M + inner_m) / 2_f64.sqrt() + half_m;
-        let outer = zone(
-            centre + skein_geometry::frame::Vector::new(away_m, away_m),
-            half_m,
-        );
+        let outer = zone(centre + Vector::new(away_m, away_m), half_m);
         for (zones, keeps_m) in [
             (vec![inner.clone()], inner_m),
             (vec![outer.clone()], inner_m),

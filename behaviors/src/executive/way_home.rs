@@ -9,7 +9,7 @@
 use super::transit::Transit;
 use crate::reactive::air::Air;
 use skein_flight::trajectory::wind::Course;
-use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::atan2;
 use skein_geometry::{Curve, Segment};
 
@@ -37,12 +37,7 @@ impl WaysHome {
         let clearance_m = router.limits().clearance_m;
         let from = |i: usize| coverage_loop.boundary(i).position();
         let sees_home = |i: usize| {
-            let way = home - from(i);
-            let line = Segment {
-                start: Pose::new(from(i), atan2(way.y, way.x)),
-                curvature_per_m: 0.0,
-                length_m: way.norm(),
-            };
+            let line = Segment::straight(from(i), home);
             router.zones().is_segment_clear(&line, clearance_m)
         };
         let (seen, hidden): (Vec<usize>, Vec<usize>) =

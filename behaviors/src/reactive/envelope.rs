@@ -18,7 +18,7 @@ use skein_flight::airframe::Airframe;
 use skein_flight::trajectory::wind::Wind;
 use skein_geometry::NoFlyZones;
 use skein_geometry::frame::{Point, Pose, Vector};
-use skein_geometry::math::{TAU, atan2};
+use skein_geometry::math::TAU;
 use skein_geometry::{Curve, Segment};
 use std::sync::Arc;
 
@@ -332,13 +332,7 @@ impl Envelope {
         };
         let (mut least, mut i) = (f64::INFINITY, 0.0);
         while i < chords {
-            let (a, b) = (at(i), at(i + 1.0));
-            let along = b - a;
-            let chord = Segment {
-                start: Pose::new(a, atan2(along.y, along.x)),
-                curvature_per_m: 0.0,
-                length_m: along.norm(),
-            };
+            let chord = Segment::straight(at(i), at(i + 1.0));
             least = least.min(self.near.segment_distance_m(&chord));
             i += 1.0;
         }

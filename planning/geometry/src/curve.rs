@@ -4,7 +4,7 @@
 //! words, loiters. They are sampled exactly by arc length.
 
 use crate::frame::{Point, Pose};
-use crate::math::{sin_cos, wrap_pi};
+use crate::math::{atan2, sin_cos, wrap_pi};
 use serde::{Deserialize, Serialize};
 
 /// One piece: it starts at `start` and bends by `curvature_per_m` (positive to
@@ -20,6 +20,17 @@ pub struct Segment {
 }
 
 impl Segment {
+    /// The straight line from one point to another; due east where they are the same.
+    #[must_use]
+    pub fn straight(from: Point, to: Point) -> Self {
+        let along = to - from;
+        Self {
+            start: Pose::new(from, atan2(along.y, along.x)),
+            curvature_per_m: 0.0,
+            length_m: along.norm(),
+        }
+    }
+
     /// The pose after `s_m` metres along the piece.
     #[must_use]
     pub fn pose_at(&self, s_m: f64) -> Pose {

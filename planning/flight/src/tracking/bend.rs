@@ -13,7 +13,6 @@ use skein_geometry::NoFlyZones;
 use skein_geometry::Segment;
 use skein_geometry::clearance::loiter_clear;
 use skein_geometry::frame::Pose;
-use skein_geometry::math::atan2;
 
 /// How far ahead the wanted way has to be clear, seconds.
 pub const LOOK_S: f64 = 6.0;
@@ -73,12 +72,7 @@ impl Guard<'_> {
         let mut at = pose;
         for c in way {
             let next = fly(&at, c, wind);
-            let step = next.position() - at.position();
-            let chord = Segment {
-                start: Pose::new(at.position(), atan2(step.y, step.x)),
-                curvature_per_m: 0.0,
-                length_m: step.norm(),
-            };
+            let chord = Segment::straight(at.position(), next.position());
             // An arc strays from its chord by its angle times its length over eight.
             let turned_rad = (c.turn_rate_radps * c.lasts_s).abs();
             let stray_m = turned_rad * c.airspeed_mps * c.lasts_s / 8.0;

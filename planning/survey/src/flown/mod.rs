@@ -162,15 +162,10 @@ impl Stop {
 
 /// A straight line as a curve; empty where both ends are the same.
 pub fn straight(from: Point, to: Point) -> Curve {
-    let d = to - from;
     let mut curve = Curve::empty();
-    let length_m = d.norm();
-    if length_m > 0.0 {
-        curve.push(Segment {
-            start: Pose::new(from, skein_geometry::math::atan2(d.y, d.x)),
-            curvature_per_m: 0.0,
-            length_m,
-        });
+    let line = Segment::straight(from, to);
+    if line.length_m > 0.0 {
+        curve.push(line);
     }
     curve
 }

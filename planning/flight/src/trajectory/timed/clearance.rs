@@ -9,8 +9,6 @@
 use super::{Piece, Trajectory};
 use crate::trajectory::wind::Wind;
 use skein_geometry::NoFlyZones;
-use skein_geometry::frame::Pose;
-use skein_geometry::math::atan2;
 use skein_geometry::{Curve, Segment};
 
 /// Slack of every certificate, metres, as for curves: routes are built to touch the
@@ -53,7 +51,7 @@ fn piece_is_clear(piece: &Piece, wind: Wind, zones: &NoFlyZones, margin_m: f64) 
     }
     let straight = piece.segment.curvature_per_m.abs() * piece.segment.length_m < 1e-9;
     let segment = if straight {
-        chord(from.position, to.position)
+        Segment::straight(from.position, to.position)
     } else {
         piece.segment
     };
@@ -84,7 +82,7 @@ fn stretch_is_clear(
         piece.state_after(from_s, wind),
         piece.state_after(to_s, wind),
     );
-    let chord_m = zones.segment_distance_m(&chord(a.position, b.position));
+    let chord_m = zones.segment_distance_m(&Segment::straight(a.position, b.position));
     if chord_m - doubt_m >= margin_m - ROUNDING_M {
         return true;
     }
@@ -93,13 +91,4 @@ fn stretch_is_clear(
     }
     stretch_is_clear(piece, wind, zones, margin_m, (from_s, middle_s))
         && stretch_is_clear(piece, wind, zones, margin_m, (middle_s, to_s))
-}
-
-fn chord(from: skein_geometry::frame::Point, to: skein_geometry::frame::Point) -> Segment {
-    let along = to - from;
-    Segment {
-        start: Pose::new(from, atan2(along.y, along.x)),
-        curvature_per_m: 0.0,
-        length_m: along.norm(),
-    }
 }

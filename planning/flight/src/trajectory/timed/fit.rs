@@ -46,7 +46,7 @@ impl Trajectory {
                 fit.stretch(whole, DEEPEST, &mut curve);
             } else if piece.medium == Medium::Air && !piece.is_arc() {
                 let (a, b) = ends(piece, self.wind, whole);
-                push(&mut curve, line(a.position, b.position));
+                push(&mut curve, Segment::straight(a.position, b.position));
             } else {
                 push(&mut curve, piece.segment);
             }
@@ -68,7 +68,7 @@ impl Fit<'_> {
         let found = biarc(&a, &b).filter(|arcs| self.is_close(arcs, from_s, to_s));
         match found {
             Some(arcs) => arcs.into_iter().for_each(|arc| push(out, arc)),
-            None if depth == 0 => push(out, line(a.position, b.position)),
+            None if depth == 0 => push(out, Segment::straight(a.position, b.position)),
             None => {
                 let middle_s = 0.5 * (from_s + to_s);
                 self.stretch((from_s, middle_s), depth - 1, out);
@@ -99,15 +99,6 @@ fn ends(piece: &Piece, wind: Wind, (from_s, to_s): (f64, f64)) -> (State, State)
 fn push(curve: &mut Curve, segment: Segment) {
     if segment.length_m > SHORTEST_M {
         curve.push(segment);
-    }
-}
-
-fn line(from: Point, to: Point) -> Segment {
-    let along = to - from;
-    Segment {
-        start: Pose::new(from, atan2(along.y, along.x)),
-        curvature_per_m: 0.0,
-        length_m: along.norm(),
     }
 }
 
