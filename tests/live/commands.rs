@@ -1,65 +1,77 @@
 //! The commands that documents name.
 
+use std::fmt::Write as _;
+
 /// How a block begins and ends.
 const FENCE: &str = "```";
 
-/// A block of commands for a shell.
-pub struct Block {
-    /// Its first line in the page, from 1.
-    pub line: usize,
-    pub text: String,
+/// Where a line of a page stands.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stands {
+    Outside,
+    /// The fence of a block of commands for a shell.
+    BeforeShell,
+    InShell,
+    InOther,
 }
 
-/// The shell blocks of a page.
-///
-/// # Panics
-/// When one of them has no end.
-pub fn shell_blocks(page: &str) -> Vec<Block> {
-    let mut blocks: Vec<Block> = Vec::new();
-    let mut fence = None;
-    for (line, text) in (1..).zip(page.lines()) {
-        match fence {
+/// The lines of a page without the fences that end blocks, each with its number from 1.
+fn lines(page: &str) -> Vec<(usize, Stands, &str)> {
+    let mut lines = Vec::new();
+    let mut inside = None;
+    for (number, text) in (1..).zip(page.lines()) {
+        match inside {
             None if text.starts_with(FENCE) => {
-                let shell = text == "```sh";
-                fence = Some(shell);
-                if shell {
-                    let (line, text) = (line + 1, String::new());
-                    blocks.push(Block { line, text });
-                }
+                inside = Some(if text == "```sh" {
+                    lines.push((number, Stands::BeforeShell, text));
+                    Stands::InShell
+                } else {
+                    Stands::InOther
+                });
             }
-            Some(_) if text == FENCE => fence = None,
-            Some(true) => {
-                let block = blocks.last_mut().expect("one has begun");
-                block.text += text;
-                block.text.push('\n');
-            }
-            _ => {}
+            None => lines.push((number, Stands::Outside, text)),
+            Some(_) if text == FENCE => inside = None,
+            Some(stands) => lines.push((number, stands, text)),
         }
     }
-    assert_eq!(fence, None, "a block has no end");
-    blocks
+    assert!(inside.is_none(), "a block has no end");
+    lines
+}
+
+/// The shell blocks of a page as one script, which says which block it is in, and how many
+/// there are.
+pub fn script(page: &str) -> (usize, String) {
+    let (mut blocks, mut script) = (0, String::new());
+    for (number, stands, text) in lines(page) {
+        match stands {
+            Stands::BeforeShell => {
+                blocks += 1;
+                writeln!(script, "echo \"== line {}\"", number + 1).unwrap();
+            }
+            Stands::InShell => writeln!(script, "{text}").unwrap(),
+            Stands::Outside | Stands::InOther => {}
+        }
+    }
+    (blocks, script)
 }
 
 /// The commands of a page: `skein` and its words, as they stand in shell blocks, on indented
 /// lines and between backticks, without what a shell does with their output.
 pub fn named(page: &str) -> Vec<String> {
-    let shown = shell_blocks(page).into_iter().map(|block| block.text);
-    let mut parts: Vec<String> = shown
-        .flat_map(|text| text.lines().map(str::to_owned).collect::<Vec<_>>())
-        .collect();
-    let mut fenced = false;
-    for line in page.lines() {
-        let indented = line.strip_prefix("    ").unwrap_or_default();
-        if line.starts_with(FENCE) {
-            fenced = !fenced;
-        } else if fenced {
-            // A shell's block is taken above, and others are no commands.
-        } else if indented.starts_with("skein ") {
-            parts.push(indented.to_owned());
-        } else {
-            parts.extend(line.split('`').skip(1).step_by(2).map(str::to_owned));
+    let parts = |(_, stands, text): (usize, Stands, &str)| -> Vec<String> {
+        let indented = text.strip_prefix("    ").unwrap_or_default();
+        match stands {
+            Stands::InShell => vec![text.to_owned()],
+            Stands::Outside if indented.starts_with("skein ") => vec![indented.to_owned()],
+            Stands::Outside => text
+                .split('`')
+                .skip(1)
+                .step_by(2)
+                .map(str::to_owned)
+                .collect(),
+            Stands::BeforeShell | Stands::InOther => Vec::new(),
         }
-    }
+    };
     let command = |part: String| {
         // In a table a bar between words has a backslash before it.
         let part = part.replace("\\|", "|");
@@ -68,7 +80,11 @@ pub fn named(page: &str) -> Vec<String> {
         let part = part[..end.unwrap_or(part.len())].trim();
         part.starts_with("skein ").then(|| part.to_owned())
     };
-    parts.into_iter().filter_map(command).collect()
+    lines(page)
+        .into_iter()
+        .flat_map(parts)
+        .filter_map(command)
+        .collect()
 }
 
 /// The words of a command behind `skein`, as a shell would split them.

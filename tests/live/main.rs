@@ -1,16 +1,24 @@
 //! Real processes over real Zenoh on 127.0.0.1: launch, kill and takeover, cut and
-//! heal, restart, an operator, observation, and nothing left behind. Observation from
-//! Python is a test of its own, `python`.
+//! heal, restart, an operator, observation, and nothing left behind; and all commands that the
+//! tutorials and the README name. Observation from Python is a test of its own, `python`.
 //!
 //! Each test has a deadline. Trials run one after the other, because each wants the
 //! whole machine; where two are to run side by side, one test starts both.
 
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod commands;
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod mistakes;
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod operator;
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod readme;
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod support;
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod terminal;
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tutorials;
 
 use serde_json::Value;
 use std::time::Duration;

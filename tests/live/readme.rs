@@ -5,18 +5,18 @@
 //! builds for minutes; `cargo run --release -- trial` is run as `skein trial`; of its thousand
 //! storms four are flown.
 
-use crate::alone;
 use crate::commands::{is_a_pattern, named, words};
-use nix::pty::{Winsize, openpty};
+use crate::support::{Place, alone, ended, interrupt, lines_of, root, wait_until};
+use crate::terminal::OnTerminal;
 use std::collections::BTreeSet;
-use std::fs::{self, File};
-use std::io::{BufRead, BufReader, Read, Write};
+use std::fs;
+use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A trial takes a minute; a slow machine slows it down.
 const DEADLINE: Duration = Duration::from_secs(400);
@@ -28,20 +28,16 @@ const STAYS: &str = "the page stays until Ctrl-C";
 struct Readme {
     named: BTreeSet<String>,
     run: BTreeSet<String>,
-    dir: tempfile::TempDir,
-    /// Keeps other trials out of sight.
-    tmp: tempfile::TempDir,
+    place: Place,
 }
 
 impl Readme {
     fn new() -> Self {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let text = fs::read_to_string(root.join("README.md")).unwrap();
+        let text = fs::read_to_string(root().join("README.md")).unwrap();
         Self {
             named: named(&text).into_iter().collect(),
             run: BTreeSet::new(),
-            dir: tempfile::tempdir().unwrap(),
-            tmp: tempfile::tempdir().unwrap(),
+            place: Place::new(),
         }
     }
 
@@ -61,21 +57,11 @@ impl Readme {
             "the README names no {written:?}"
         );
         self.run.insert(written.to_owned());
-        let mut command = Command::new(env!("CARGO_BIN_EXE_skein"));
+        let words = words(filled);
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        let mut command = self.place.command(&words);
+        command.current_dir(self.place.path(""));
         command
-            .args(words(filled))
-            .current_dir(self.dir.path())
-            .env("TMPDIR", self.tmp.path())
-            .stdin(Stdio::null());
-        command
-    }
-
-    fn file(&self, name: &str, text: &str) {
-        fs::write(self.dir.path().join(name), text).unwrap();
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.dir.path().join(name)
     }
 }
 
@@ -100,51 +86,34 @@ fn told(command: Command) -> String {
 /// Something that goes on until it is asked to stop.
 struct Running {
     child: Child,
-    lines: Receiver<String>,
-    seen: Vec<String>,
+    lines: Arc<Mutex<Vec<String>>>,
 }
 
 impl Running {
     fn start(mut command: Command) -> Self {
-        let mut child = command
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let (told, lines) = channel();
-        let stderr = child.stderr.take().unwrap();
-        thread::spawn(move || {
-            for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                let _ = told.send(line);
-            }
-        });
-        let seen = Vec::new();
-        Self { child, lines, seen }
+        let piped = command.stdout(Stdio::null()).stderr(Stdio::piped());
+        let mut child = piped.spawn().unwrap();
+        let lines = lines_of(child.stderr.take().unwrap());
+        Self { child, lines }
     }
 
     /// The rest of the first line that begins so.
-    fn line(&mut self, begin: &str) -> String {
-        let deadline = Instant::now() + DEADLINE;
-        loop {
-            let left = deadline.saturating_duration_since(Instant::now());
-            let line = self.lines.recv_timeout(left);
-            let line = line.unwrap_or_else(|e| panic!("no {begin:?}: {e}: {:#?}", self.seen));
-            if let Some(rest) = line.strip_prefix(begin) {
-                return rest.to_owned();
-            }
-            self.seen.push(line);
-        }
+    fn line(&self, begin: &str) -> String {
+        let mut found = None;
+        wait_until(DEADLINE, begin, || {
+            let lines = self.lines.lock().unwrap();
+            let rest = |line: &String| Some(line.strip_prefix(begin)?.to_owned());
+            found = lines.iter().find_map(rest);
+            found.is_some()
+        });
+        found.unwrap()
     }
 
-    fn interrupt(&self) {
-        let pid = self.child.id().to_string();
-        let kill = Command::new("kill").args(["-INT", &pid]).status();
-        assert!(kill.unwrap().success());
-    }
-
-    /// Waits for its end: the exit code.
-    fn end(&mut self) -> Option<i32> {
-        ended(&mut self.child)
+    /// Asks it to stop: it has to end with this code.
+    fn ends(&mut self, code: i32) {
+        interrupt(&self.child);
+        let ended = ended(&mut self.child, DEADLINE);
+        assert_eq!(ended, Some(code), "{:#?}", self.lines.lock().unwrap());
     }
 }
 
@@ -152,71 +121,6 @@ impl Drop for Running {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
-    }
-}
-
-fn ended(child: &mut Child) -> Option<i32> {
-    let deadline = Instant::now() + DEADLINE;
-    loop {
-        if let Some(status) = child.try_wait().unwrap() {
-            return status.code();
-        }
-        assert!(Instant::now() < deadline, "it does not end");
-        thread::sleep(Duration::from_millis(50));
-    }
-}
-
-/// A command on a terminal of 100 columns and 30 rows.
-struct OnTerminal {
-    child: Child,
-    keys: File,
-    screen: thread::JoinHandle<String>,
-}
-
-impl OnTerminal {
-    fn start(mut command: Command) -> Self {
-        let size = Winsize {
-            ws_row: 30,
-            ws_col: 100,
-            ws_xpixel: 0,
-            ws_ypixel: 0,
-        };
-        let pty = openpty(Some(&size), None).unwrap();
-        let end = || Stdio::from(pty.slave.try_clone().unwrap());
-        let child = command
-            .env("TERM", "xterm-256color")
-            .stdin(end())
-            .stdout(end())
-            .stderr(end())
-            .spawn()
-            .unwrap();
-        let (keys, mut screen) = (
-            File::from(pty.master.try_clone().unwrap()),
-            File::from(pty.master),
-        );
-        let screen = thread::spawn(move || {
-            let (mut all, mut part) = (Vec::new(), [0; 4096]);
-            // The end of a terminal whose processes are gone is an error.
-            while let Ok(n @ 1..) = screen.read(&mut part) {
-                all.extend_from_slice(&part[..n]);
-            }
-            String::from_utf8_lossy(&all).into_owned()
-        });
-        Self {
-            child,
-            keys,
-            screen,
-        }
-    }
-
-    fn press(&mut self, key: &str) {
-        self.keys.write_all(key.as_bytes()).unwrap();
-    }
-
-    /// Waits for its end: the exit code, and all that was drawn.
-    fn end(mut self) -> (Option<i32>, String) {
-        let code = ended(&mut self.child);
-        (code, self.screen.join().unwrap())
     }
 }
 
@@ -248,8 +152,7 @@ fn serves_a_page(command: Command, of_a_run: bool) {
         // Who watches goes on until then, and listens for it once the page is there.
         thread::sleep(Duration::from_secs(2));
     }
-    running.interrupt();
-    assert_eq!(running.end(), Some(0), "{:#?}", running.seen);
+    running.ends(0);
 }
 
 #[test]
@@ -278,7 +181,7 @@ fn on_the_ground(r: &mut Readme) {
     let shell = r.instead("skein completions SHELL", "skein completions bash");
     assert!(told(shell).contains("complete"));
     well(r.instead("skein man [DIR]", "skein man man"));
-    assert!(r.path("man/skein.1").is_file());
+    assert!(Path::new(&r.place.path("man/skein.1")).is_file());
     let bench = "skein bench conflicts|auction|tracking";
     let conflicts = "skein bench conflicts --n 8 --seeds 0..10";
     assert!(told(r.exactly(conflicts)).contains("losses_of_separation"));
@@ -308,9 +211,9 @@ const PLACES: &str = r#"{"type": "FeatureCollection", "features": [
 
 /// Plans for a person.
 fn plans(r: &mut Readme) {
-    r.file("field.geojson", FIELD);
-    r.file("road.geojson", ROAD);
-    r.file("places.geojson", PLACES);
+    r.place.file("field.geojson", FIELD);
+    r.place.file("road.geojson", ROAD);
+    r.place.file("places.geojson", PLACES);
     let plan = "skein plan cover|line|visit|patrol|route FILE";
     let (margin, turn) = ("--clearance-m 10", "--turn-radius-m 25");
     let filled = [
@@ -351,7 +254,7 @@ fn a_simulated_run(r: &mut Readme) {
     let mut played = OnTerminal::start(r.instead("skein replay RUN", "skein replay run"));
     thread::sleep(Duration::from_secs(3));
     played.press("q");
-    let (code, screen) = played.end();
+    let (code, screen) = played.end(DEADLINE);
     assert_eq!(code, Some(0), "{screen}");
     assert!(screen.contains("alive"), "{screen}");
     let storms = r.instead(
@@ -364,10 +267,10 @@ fn a_simulated_run(r: &mut Readme) {
 /// The first command, where somebody looks on.
 fn a_trial_on_a_terminal(r: &mut Readme) {
     let trial = OnTerminal::start(r.exactly("skein trial"));
-    let (code, screen) = trial.end();
+    let (code, screen) = trial.end(DEADLINE);
     assert_eq!(code, Some(0), "{screen}");
     assert!(screen.contains("PASSED"), "{screen}");
-    let small = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/live/square.json5");
+    let small = root().join("tests/live/square.json5");
     let small = format!("skein trial {} --time-scale 4", small.display());
     well(r.instead("skein trial [SCENARIO]", &small));
 }
@@ -377,21 +280,17 @@ fn a_trial_with_everything(r: &mut Readme) {
     let mut trial = Running::start(r.exactly("skein trial --web"));
     let url = trial.line("page: ");
     assert!(page(&url).contains("<html"), "no page");
-    let deadline = Instant::now() + DEADLINE;
-    let observe = |r: &mut Readme| {
+    wait_until(DEADLINE, "somebody is heard", || {
         let mut command = r.exactly("skein observe '*/v4/claim/**'");
         command.args(["--timeout", "5"]);
-        command.output().unwrap()
-    };
-    while !observe(r).status.success() {
-        assert!(Instant::now() < deadline, "nobody is heard");
-    }
+        command.output().unwrap().status.success()
+    });
     assert!(told(r.exactly("skein why 3")).contains("uav3"));
 
     let mut map = OnTerminal::start(r.exactly("skein watch"));
     thread::sleep(Duration::from_secs(4));
     map.press("q");
-    let (code, screen) = map.end();
+    let (code, screen) = map.end(DEADLINE);
     assert_eq!(code, Some(0), "{screen}");
     assert!(screen.contains("alive"), "{screen}");
     serves_a_page(r.instead("skein watch [TRIAL]", "skein watch --web"), false);
@@ -420,20 +319,21 @@ fn a_trial_with_everything(r: &mut Readme) {
 
     peer_of_its_own(r);
     // Nobody is told to go on, so that the trial would last until its scenario's time is over.
-    trial.interrupt();
-    assert_eq!(trial.end(), Some(4), "{:#?}", trial.seen);
+    trial.ends(4);
 }
 
 /// A trial runs this verb for each UAV; by the configuration that explains every field it finds
 /// no world, and says so.
 fn peer_of_its_own(r: &mut Readme) {
-    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/peer.json5");
-    let filled = format!("skein peer --config {}", config.display());
-    let peer = r.instead("skein peer --config FILE", &filled).output();
+    let config = fs::read_to_string(root().join("configs/peer.json5")).unwrap();
+    // Its journal is made beside it.
+    r.place.file("peer.json5", &config);
+    let filled = "skein peer --config peer.json5";
+    let peer = r.instead("skein peer --config FILE", filled).output();
     let said = String::from_utf8(peer.unwrap().stderr).unwrap();
     assert!(
         said.contains("the world at 127.0.0.1:4000 cannot be reached"),
         "{said}"
     );
-    r.instead("skein peer", &filled);
+    r.instead("skein peer", filled);
 }

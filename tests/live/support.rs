@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStderr, Command, Stdio};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -29,6 +29,35 @@ pub fn wait_until(limit: Duration, what: &str, mut done: impl FnMut() -> bool) {
     }
 }
 
+/// Waits for its end: the exit code, none where a signal ended it.
+pub fn ended(child: &mut Child, limit: Duration) -> Option<i32> {
+    let mut status = None;
+    wait_until(limit, "it ends", || {
+        status = child.try_wait().unwrap();
+        status.is_some()
+    });
+    status.and_then(|s| s.code())
+}
+
+/// Asks it to stop, as Ctrl-C does.
+pub fn interrupt(child: &Child) {
+    let pid = child.id().to_string();
+    let kill = Command::new("kill").args(["-INT", &pid]).status();
+    assert!(kill.unwrap().success());
+}
+
+/// What somebody says, as it comes.
+pub fn lines_of(stderr: ChildStderr) -> Arc<Mutex<Vec<String>>> {
+    let lines = Arc::new(Mutex::new(Vec::new()));
+    let said = Arc::clone(&lines);
+    std::thread::spawn(move || {
+        for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+            said.lock().unwrap().push(line);
+        }
+    });
+    lines
+}
+
 /// A directory of its own, which also keeps trials of other tests out of sight.
 pub struct Place {
     dir: tempfile::TempDir,
@@ -41,7 +70,8 @@ impl Place {
         }
     }
 
-    fn command(&self, args: &[&str]) -> Command {
+    /// The command with these words, out of sight of other trials.
+    pub fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_skein"));
         command
             .args(args)
@@ -219,14 +249,7 @@ impl Trial {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        let lines = Arc::new(Mutex::new(Vec::new()));
-        let stderr = child.stderr.take().unwrap();
-        let said = Arc::clone(&lines);
-        std::thread::spawn(move || {
-            for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                said.lock().unwrap().push(line);
-            }
-        });
+        let lines = lines_of(child.stderr.take().unwrap());
         let stdout = child.stdout.take();
         let mut trial = Self {
             child,
@@ -305,12 +328,7 @@ impl Trial {
 
     /// Waits for the end; the exit code.
     pub fn wait(&mut self, limit: Duration) -> Option<i32> {
-        let mut status = None;
-        wait_until(limit, "the trial ends", || {
-            status = self.child.try_wait().unwrap();
-            status.is_some()
-        });
-        status.and_then(|s| s.code())
+        ended(&mut self.child, limit)
     }
 
     /// Waits for the end, and reads the verdict.
@@ -332,14 +350,7 @@ impl Trial {
     }
 
     pub fn interrupt(&self) {
-        let pid = self.child.id().to_string();
-        assert!(
-            Command::new("kill")
-                .args(["-INT", &pid])
-                .status()
-                .unwrap()
-                .success()
-        );
+        interrupt(&self.child);
     }
 }
 

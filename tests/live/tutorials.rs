@@ -1,30 +1,11 @@
-//! Every command of the tutorials is run, as they are written, from an empty directory; so is
-//! every one of the README.
+//! Every command of the tutorials is run, as they are written, from an empty directory; what
+//! other documents name is at least understood.
 
-#![allow(
-    clippy::unwrap_used,
-    reason = "a test may panic; the lint's own exception knows no test without a harness"
-)]
-
-mod commands;
-mod readme;
-
-use commands::{is_a_pattern, named, shell_blocks, words};
-use std::fmt::Write as _;
+use crate::commands::{is_a_pattern, named, script, words};
+use crate::support::{alone, root};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// Waits for the machine to be free of other trials.
-fn alone() -> MutexGuard<'static, ()> {
-    static MACHINE: Mutex<()> = Mutex::new(());
-    MACHINE.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// The pages, by name.
 fn pages() -> Vec<PathBuf> {
@@ -34,23 +15,13 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// The shell blocks of a page as one script, which says which block it is in.
-fn script(page: &Path) -> (usize, String) {
-    let blocks = shell_blocks(&fs::read_to_string(page).unwrap());
-    let mut script = String::from("set -eu\nskein() { \"$SKEIN\" \"$@\"; }\n");
-    for block in &blocks {
-        writeln!(script, "echo \"== line {}\"", block.line).unwrap();
-        script.push_str(&block.text);
-    }
-    (blocks.len(), script)
-}
-
 #[test]
 fn every_command_of_the_tutorials_does_what_it_says() {
     let _alone = alone();
     let mut run = 0;
     for page in pages() {
-        let (blocks, script) = script(&page);
+        let (blocks, script) = script(&fs::read_to_string(&page).unwrap());
+        let script = format!("set -eu\nskein() {{ \"$SKEIN\" \"$@\"; }}\n{script}");
         run += blocks;
         if blocks == 0 {
             continue;
