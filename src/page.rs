@@ -10,7 +10,6 @@ use skein_recording::model::Knowledge;
 pub use skein_web::ServerError;
 use skein_web::server::Answer;
 use skein_web::{Faults, Feed, Hello, Mode, Server};
-use std::pin::pin;
 use std::sync::{Arc, OnceLock};
 use tokio::runtime::Runtime;
 
@@ -89,18 +88,13 @@ impl Page {
 
     /// Goes on until the program is asked to stop.
     pub fn stay(self) {
+        // Polled first, it listens before anybody is told.
         self.runtime.block_on(async {
-            let mut stop = pin!(cli::asked_to_stop());
-            // Polled once, it listens before anybody is told.
-            let asked = tokio::select! {
+            tokio::join!(
                 biased;
-                () = &mut stop => true,
-                () = async {} => false,
-            };
-            if !asked {
-                eprintln!("the page stays until Ctrl-C: {}", self.server.url());
-                stop.await;
-            }
+                cli::asked_to_stop(),
+                async { eprintln!("the page stays until Ctrl-C: {}", self.server.url()) },
+            )
         });
     }
 }

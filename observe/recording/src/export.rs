@@ -132,7 +132,7 @@ pub fn geojson(run: &Collected) -> Value {
         return foxglove::collection(Vec::new());
     };
     let mut all = foxglove::site(scene);
-    all.extend(foxglove::cells(scene, &cells_at_end(run)));
+    all.extend(foxglove::cells(scene, &cells_at_end(run), |_| true));
     for (uav, lives) in tracks::of(&run.frames) {
         for (life, track) in (1u32..).zip(&lives) {
             let at = |(_, p): &tracks::Fix| [p.place.lon_deg, p.place.lat_deg, p.height_m];

@@ -37,13 +37,18 @@ pub(crate) fn stamp(time_ms: u64) -> Value {
     json!({ "sec": time_ms / 1000, "nsec": time_ms % 1000 * 1_000_000 })
 }
 
+/// The frame of coordinates of a UAV.
+pub(crate) fn frame_id(uav: u16) -> String {
+    format!("uav{uav}")
+}
+
 /// Where a UAV is; none once its airframe is gone.
 #[must_use]
 pub fn location(time_ms: u64, scene: &Scene, uav: &UavState) -> Option<Value> {
     let pose = uav.pose?;
     Some(json!({
         "timestamp": stamp(time_ms),
-        "frame_id": format!("uav{}", uav.id),
+        "frame_id": frame_id(uav.id),
         "latitude": pose.place.lat_deg,
         "longitude": pose.place.lon_deg,
         "altitude": pose.height_m,
@@ -148,12 +153,13 @@ pub fn site(scene: &Scene) -> Vec<Value> {
     all
 }
 
-/// The cells as one feature for each UAV and status: covered by it, planned by it, orphaned
-/// from it.
+/// Those of the cells that are told as one feature for each UAV and status: covered by it,
+/// planned by it, orphaned from it.
 #[must_use]
-pub fn cells(scene: &Scene, cells: &Cells) -> Vec<Value> {
+pub fn cells(scene: &Scene, cells: &Cells, is_told: impl Fn(Cell) -> bool) -> Vec<Value> {
     let mut groups: BTreeMap<(u8, u16), Vec<Value>> = BTreeMap::new();
-    for (cell, is) in scene.cells.iter().zip(cells.all()) {
+    let all = scene.cells.iter().zip(cells.all());
+    for (cell, is) in all.filter(|(_, is)| is_told(*is)) {
         let group = match is {
             Cell::Open => (3, 0),
             Cell::Planned(by) => (1, by),
@@ -189,17 +195,6 @@ pub fn cells(scene: &Scene, cells: &Cells) -> Vec<Value> {
         )
     });
     told.collect()
-}
-
-/// Those of the cells that were covered, or were left by somebody who is gone: a map on which
-/// later messages are laid over earlier ones stays right.
-#[must_use]
-pub fn settled(features: Vec<Value>) -> Vec<Value> {
-    let is_settled = |feature: &Value| {
-        let status = feature["properties"]["status"].as_str();
-        matches!(status, Some("covered" | "orphaned"))
-    };
-    features.into_iter().filter(is_settled).collect()
 }
 
 /// Features as one message.

@@ -3,7 +3,7 @@
 //!
 //! The fixed frame is [`FIXED`]: x east, y north, z up, metres from the scene's origin.
 
-use crate::foxglove::{colour, rgba, stamp};
+use crate::foxglove::{colour, frame_id, rgba, stamp};
 use crate::model::frame::{Pose, UavState};
 use crate::model::{Frame, Ring, Scene};
 use serde_json::{Value, json};
@@ -11,22 +11,21 @@ use serde_json::{Value, json};
 /// The frame in which everything stands.
 pub const FIXED: &str = "site";
 
-/// What an entity may consist of besides lines, arrows and texts.
-const OTHER_KINDS: [&str; 6] = [
+/// What an entity may consist of.
+const KINDS: [&str; 9] = [
+    "arrows",
     "cubes",
-    "spheres",
     "cylinders",
-    "triangles",
-    "models",
+    "lines",
     "metadata",
+    "models",
+    "spheres",
+    "texts",
+    "triangles",
 ];
 
 /// How large a UAV is drawn, metres: large enough to be seen from where all of it is in view.
 const UAV_M: f64 = 34.0;
-
-fn name(uav: u16) -> String {
-    format!("uav{uav}")
-}
 
 fn at_origin() -> Value {
     json!({
@@ -51,7 +50,7 @@ pub fn transforms(frame: &Frame) -> Option<Value> {
         Some(json!({
             "timestamp": stamp(frame.time_ms),
             "parent_frame_id": FIXED,
-            "child_frame_id": name(uav.id),
+            "child_frame_id": frame_id(uav.id),
             "translation": translation,
             "rotation": rotation,
         }))
@@ -60,24 +59,17 @@ pub fn transforms(frame: &Frame) -> Option<Value> {
     (!all.is_empty()).then(|| json!({ "transforms": all }))
 }
 
-fn entity(time_ms: u64, id: &str, drawn: Value) -> Value {
+/// Something that is drawn, of nothing yet.
+fn entity(time_ms: u64, id: &str) -> Value {
     let mut entity = json!({
         "timestamp": stamp(time_ms),
         "frame_id": FIXED,
         "id": id,
         "lifetime": { "sec": 0, "nsec": 0 },
         "frame_locked": false,
-        "arrows": [],
-        "lines": [],
-        "texts": [],
     });
-    for kind in OTHER_KINDS {
+    for kind in KINDS {
         entity[kind] = json!([]);
-    }
-    if let Value::Object(drawn) = drawn {
-        for (kind, what) in drawn {
-            entity[kind] = what;
-        }
     }
     entity
 }
@@ -107,7 +99,8 @@ pub fn site(scene: &Scene) -> Value {
     lines.extend(scene.zones.iter().map(|z| outline(&z.ring, 0.0, "#dd1111")));
     let roofs = scene.buildings.iter();
     lines.extend(roofs.map(|b| outline(&b.ring, b.height_m, "#999999")));
-    let drawn = entity(scene.time_ms, "site", json!({ "lines": lines }));
+    let mut drawn = entity(scene.time_ms, "site");
+    drawn["lines"] = lines.into();
     json!({ "deletions": [], "entities": [drawn] })
 }
 
@@ -116,7 +109,7 @@ pub fn site(scene: &Scene) -> Value {
 pub fn uavs(scene: &Scene, frame: &Frame) -> Value {
     let (mut entities, mut deletions) = (Vec::new(), Vec::new());
     for uav in &frame.uavs {
-        let id = name(uav.id);
+        let id = frame_id(uav.id);
         let Some(pose) = &uav.pose else {
             deletions.push(json!({ "timestamp": stamp(frame.time_ms), "type": 0, "id": id }));
             continue;
@@ -145,8 +138,10 @@ pub fn uavs(scene: &Scene, frame: &Frame) -> Value {
             "color": colour,
             "text": format!("{} {}", uav.id, uav.state.word()),
         });
-        let drawn = json!({ "arrows": [arrow], "texts": [text] });
-        entities.push(entity(frame.time_ms, &id, drawn));
+        let mut drawn = entity(frame.time_ms, &id);
+        drawn["arrows"] = json!([arrow]);
+        drawn["texts"] = json!([text]);
+        entities.push(drawn);
     }
     json!({ "deletions": deletions, "entities": entities })
 }
@@ -224,13 +219,13 @@ pub fn schema(name: &str) -> Value {
         "id": text,
         "lifetime": object("duration", json!({ "sec": whole, "nsec": whole })),
         "frame_locked": truth,
-        "arrows": list(object("foxglove.ArrowPrimitive", arrow)),
-        "lines": list(object("foxglove.LinePrimitive", line)),
-        "texts": list(object("foxglove.TextPrimitive", words)),
     });
-    for kind in OTHER_KINDS {
+    for kind in KINDS {
         entity[kind] = list(object("", json!({})));
     }
+    entity["arrows"] = list(object("foxglove.ArrowPrimitive", arrow));
+    entity["lines"] = list(object("foxglove.LinePrimitive", line));
+    entity["texts"] = list(object("foxglove.TextPrimitive", words));
     let deletion = json!({ "timestamp": time, "type": whole, "id": text });
     object(
         name,

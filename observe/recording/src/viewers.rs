@@ -1,9 +1,9 @@
 //! The part of a JSON schema that viewers of recordings understand.
 //!
 //! Foxglove and its kin make tables of fields out of a schema, and drop a channel whose schema
-//! has anything else in its fields: no type or several (as what may be null has), arrays of arrays, alternatives that are
-//! no numbers. What they take is told first, and all of it behind `allOf`, which they skip and
-//! validators heed.
+//! has anything else in its fields: no type or several (as what may be null has), arrays of
+//! arrays, alternatives that are no numbers. What they take is told first, and all of it behind
+//! `allOf`, which they skip and validators heed.
 
 use serde_json::{Map, Value, json};
 
@@ -32,21 +32,11 @@ fn fields(schema: &Value) -> Value {
     json!({ "type": "object", "properties": told })
 }
 
-/// What can be told of a field; none of what is of no one type.
+/// What can be told of a field; nothing of what is of no one type.
 fn field(schema: &Value) -> Option<Value> {
-    let mut told = match only_type(schema)?.as_str() {
-        "object" => fields(schema),
-        "array" => {
-            let items = &schema["items"];
-            let items = match only_type(items)?.as_str() {
-                "object" => fields(items),
-                plain if PLAIN.contains(&plain) => json!({ "type": plain }),
-                _ => return None,
-            };
-            json!({ "type": "array", "items": items })
-        }
-        plain if PLAIN.contains(&plain) => json!({ "type": plain }),
-        _ => return None,
+    let mut told = match only_type(schema)? {
+        "array" => json!({ "type": "array", "items": single(&schema["items"])? }),
+        _ => single(schema)?,
     };
     if let Some(text) = schema.get("description") {
         told["description"] = text.clone();
@@ -54,15 +44,23 @@ fn field(schema: &Value) -> Option<Value> {
     Some(told)
 }
 
+/// What can be told of what is no list.
+fn single(schema: &Value) -> Option<Value> {
+    match only_type(schema)? {
+        "object" => Some(fields(schema)),
+        plain => PLAIN.contains(&plain).then(|| json!({ "type": plain })),
+    }
+}
+
 /// The type, where there is one; of alternatives that are all words, a string. What may be
 /// `null` has two: validators would refuse it where only the other one is told.
-fn only_type(schema: &Value) -> Option<String> {
-    if let Value::String(one) = &schema["type"] {
-        return Some(one.clone());
+fn only_type(schema: &Value) -> Option<&str> {
+    if let Some(one) = schema["type"].as_str() {
+        return Some(one);
     }
     let words = schema["oneOf"].as_array()?;
     let is_word = |one: &Value| one["const"].is_string() || one["enum"].is_array();
-    words.iter().all(is_word).then(|| "string".to_owned())
+    words.iter().all(is_word).then_some("string")
 }
 
 #[cfg(test)]

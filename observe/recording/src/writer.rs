@@ -1,7 +1,7 @@
 //! Writes a run into an MCAP file (mcap.dev): each word of the model as JSON on its channel,
 //! and the same for Foxglove.
 
-use crate::cells::Cells;
+use crate::cells::{Cell, Cells};
 use crate::channels::{self, Channel};
 use crate::foxglove;
 use crate::model::{End, Event, FailureFree, Frame, Record, Scene};
@@ -9,6 +9,7 @@ use crate::sink::Sink;
 use crate::space;
 use mcap::records::MessageHeader;
 use serde::Serialize;
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::File;
@@ -39,8 +40,8 @@ pub struct Writer {
     time_ms: u64,
     flushed_ms: u64,
     cells_due_ms: u64,
-    cells_told: Option<Cells>,
-    features_told: Vec<serde_json::Value>,
+    /// The features of the last map.
+    cells_told: Vec<Value>,
 }
 
 impl fmt::Debug for Writer {
@@ -81,8 +82,7 @@ impl Writer {
             time_ms: 0,
             flushed_ms: 0,
             cells_due_ms: 0,
-            cells_told: None,
-            features_told: Vec::new(),
+            cells_told: Vec::new(),
         })
     }
 
@@ -140,21 +140,21 @@ impl Writer {
         self.out.write_to_known_channel(&header, &data).map_err(io)
     }
 
-    /// Draws the map of the cells, where it is time and it has changed.
+    /// Draws the map of the cells, where it is time and it has changed: those that were covered,
+    /// or were left by somebody who is gone. Viewers lay later maps over earlier ones, and these
+    /// stay right below them.
     fn map(&mut self, time_ms: u64, at_once: bool) -> io::Result<()> {
-        if (time_ms < self.cells_due_ms && !at_once)
-            || self.cells_told.as_ref() == Some(&self.cells)
-        {
+        if time_ms < self.cells_due_ms && !at_once {
             return Ok(());
         }
         let every_ms = CELLS_MS.max(CELLS_MS_PER_CELL * self.cells.len() as u64);
         self.cells_due_ms = time_ms + every_ms;
-        self.cells_told = Some(self.cells.clone());
-        let features = foxglove::settled(foxglove::cells(&self.scene, &self.cells));
-        if features == self.features_told {
+        let is_settled = |cell| matches!(cell, Cell::Covered(_) | Cell::Orphaned(_));
+        let features = foxglove::cells(&self.scene, &self.cells, is_settled);
+        if features == self.cells_told {
             return Ok(());
         }
-        self.features_told.clone_from(&features);
+        self.cells_told.clone_from(&features);
         self.write(channels::CELLS, time_ms, &foxglove::geojson(features))
     }
 

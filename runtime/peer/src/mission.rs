@@ -285,10 +285,6 @@ impl Mission {
             h.write_i64(i64::from(self.lap));
             h.write_i64(i64::from(self.further_laps));
         }
-        if self.edit() > 0 {
-            h.write_i64(-4);
-            h.write_i64(i64::from(self.edit()));
-        }
         self.hash_operated(&mut h);
         h.finish()
     }
@@ -300,7 +296,7 @@ impl Mission {
     }
 
     /// How often an operator changed a patrol; 0 for what is flown once.
-    fn edit(&self) -> u16 {
+    pub(crate) fn edit(&self) -> u16 {
         let high = u16::try_from(self.revision >> 16).unwrap_or(u16::MAX);
         if self.is_patrol() { high } else { 0 }
     }

@@ -169,6 +169,10 @@ impl Mission {
     /// What of its content an operator changed in flight.
     pub(crate) fn hash_operated(&self, h: &mut Fnv) {
         // Each has a mark of its own, so that no two of them look alike.
+        if self.edit() > 0 {
+            h.write_i64(-4);
+            h.write_i64(i64::from(self.edit()));
+        }
         if !self.added_zones.is_empty() {
             h.write_i64(-1);
             for (name, ring) in &self.added_zones {

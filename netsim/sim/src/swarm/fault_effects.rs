@@ -275,7 +275,7 @@ impl Swarm {
     fn next_mission(&self, mission: Mission) -> Arc<Mission> {
         let ground = self.ground_station().map(|idx| &self.peers[idx]);
         let held = ground.and_then(|s| s.peer.as_ref()?.mission());
-        self.operator.next(mission, held.as_deref())
+        self.operator.next(mission, held.map(|m| m.revision))
     }
 
     /// The operator gives another mission. A console refuses one that cannot be flown; no

@@ -48,27 +48,19 @@ impl Operator {
         &self.mission
     }
 
-    /// What a mission would be as the next revision, of a patrol in the lap of which the ground
-    /// station knows.
-    pub(super) fn next(&self, mission: Mission, at_ground: Option<&Mission>) -> Arc<Mission> {
-        let held = at_ground.filter(|m| self.is_a_lap(m));
-        let (lap, further_laps) = held.map_or((mission.lap, mission.further_laps), |m| {
-            (m.lap, m.further_laps)
-        });
-        let newest = held.map_or(0, |m| m.revision).max(self.mission.revision);
-        let revision = self.mission.revision_after(newest);
+    /// What a mission would be as the next revision, a patrol in the lap that the ground station
+    /// holds: that with this revision.
+    pub(super) fn next(&self, mission: Mission, held: Option<u32>) -> Arc<Mission> {
+        let revision = self.mission.revision_after(self.mission.revision);
+        let flown = held.and_then(|held| self.mission.later_lap(held));
+        let of_laps = flown.as_ref().unwrap_or(&mission);
+        let (lap, further_laps) = (of_laps.lap, of_laps.further_laps);
         Arc::new(Mission {
             revision,
             lap,
             further_laps,
             ..mission
         })
-    }
-
-    /// Whether this is a later lap of the mission given last.
-    fn is_a_lap(&self, held: &Mission) -> bool {
-        let lap = self.mission.later_lap(held.revision);
-        lap.is_some_and(|lap| lap.content_hash() == held.content_hash())
     }
 
     /// Gives the next revision.

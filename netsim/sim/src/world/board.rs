@@ -119,11 +119,6 @@ impl Board {
         }
     }
 
-    /// Everything is to be seen so many times.
-    pub(super) fn want_laps(&mut self, laps: u16) {
-        self.laps = laps.max(1);
-    }
-
     pub(super) fn revision(&self) -> u32 {
         self.revision
     }

@@ -45,7 +45,7 @@ impl Judge {
     /// Wants everything to be seen so many times, one lap after the other.
     #[must_use]
     pub fn with_laps(mut self, laps: u16) -> Self {
-        self.board_mut().want_laps(laps);
+        self.board_mut().begin_at(0, laps.saturating_sub(1));
         self
     }
 
