@@ -175,7 +175,7 @@ impl Executive {
     }
 
     /// What the way home may take from a boundary of the loop, turns included, milliseconds:
-    /// none where zones or the wind leave no way. No more than a moment where nobody waits.
+    /// none where zones or the wind leave no way. Nothing where no home is known.
     #[must_use]
     pub fn home_from_ms(&self, boundary: u16) -> Option<u32> {
         self.home
@@ -513,5 +513,32 @@ mod tests {
             assert!(f.executive.home_from_ms(after).is_some());
         }
         assert_eq!(f.executive.offered_ms(&f.percept(), &|_| true), 0);
+    }
+
+    #[test]
+    fn the_loop_leads_to_where_a_way_home_is_known() {
+        let home = Point::new(240.0, -200.0);
+        let wall = [rectangle(-300.0, -80.0, 1000.0, 20.0)];
+        let f = Flight::new(&wall, home, 0, 400.0);
+        let (transit, known) = (&f.executive.transit, f.executive.home.as_ref().unwrap());
+        let mut along = 0;
+        for boundary in (0..u16::try_from(f.open.len()).unwrap()).step_by(7) {
+            for direction in BOTH {
+                let from = transit.place(boundary, direction);
+                let moves = known.by_loop(transit, &from, home).unwrap();
+                along += usize::from(matches!(moves[0], Move::Pass(..)));
+                let mut at = from;
+                for step in &moves {
+                    assert!(transit.is_cleared(&at, step), "from {boundary}: {step:?}");
+                    at = transit.end_of(&at, step);
+                }
+                assert!(matches!(moves.last(), Some(Move::Loiter(_))));
+                assert!((at.pose.position() - home).norm() < 100.0);
+            }
+        }
+        assert!(along > 4, "{along}");
+        let elsewhere = Point::new(0.0, 0.0);
+        let from = transit.place(0, Direction::Forward);
+        assert!(known.by_loop(transit, &from, elsewhere).is_none());
     }
 }

@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | enough | what is left is no more than reserve and way home | due: the plan is given up, an alarm |
 //! | due | some was added, and enough may be spent from here | enough |
-//! | due | enough is left from anywhere (the reading was wrong, the wind dropped) | enough |
+//! | due | enough may be spent, and from the farthest open cell too (the reading was wrong, the wind dropped) | enough |
 //! | any | a plan that cannot be flown and returned from | it is cut, its end is orphaned |
 //!
 //! How long the way home takes is the executive's: [`skein_behaviors::executive::endurance`].
@@ -97,12 +97,11 @@ impl MissionState {
         // Nearer to the base more may be spent than where it came due: that is for the way.
         let least_s = least_s.min(percept.endurance_s);
         let added_s = percept.endurance_s - least_s;
-        let spendable_ms = if added_s * 1000.0 >= f64::from(FUEL_BACK_MS) {
-            self.spendable_ms(Some(percept))
-        } else {
-            self.offered_ms(Some(percept))
-        };
-        self.fuel.due_s = (spendable_ms < FUEL_BACK_MS).then_some(least_s);
+        let is_refuelled = added_s * 1000.0 >= f64::from(FUEL_BACK_MS);
+        let offered_ms = || self.offered_ms(Some(percept));
+        let is_back = self.spendable_ms(Some(percept)) >= FUEL_BACK_MS
+            && (is_refuelled || offered_ms() >= FUEL_BACK_MS);
+        self.fuel.due_s = (!is_back).then_some(least_s);
         Effects::new()
     }
 
