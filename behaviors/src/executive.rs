@@ -4,7 +4,7 @@
 //!
 //! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
 //! it cell by cell. Ways between cells come from [`transit`], what the camera saw from
-//! [`camera`], a flight between cells and what it is for from [`detour`], expectations for the peer from [`prediction`], what stays of a flight when the
+//! [`camera`], a flight between cells and what it is for from [`detour`], expectations for the peer from [`prediction`], what the fuel allows from [`endurance`], what stays of a flight when the
 //! goal changes from `goal_change`, how far a given flight reaches from [`given`], the proof of each stretch from `clearance_check`;
 //! following the track and the safety of every setpoint are the reactive layer's.
 //!
@@ -27,6 +27,7 @@
 pub mod camera;
 mod clearance_check;
 pub mod detour;
+pub mod endurance;
 pub mod given;
 mod goal_change;
 pub mod new_zones;
@@ -43,6 +44,7 @@ use crate::reactive::envelope::{Envelope, is_finite};
 use crate::reactive::follow::{HORIZON_S, Offset, Track};
 use crate::setpoint::{Setpoint, Side};
 use camera::{Played, look};
+use endurance::Home;
 use given::Given;
 pub use given::GivenFlight;
 pub use prediction::UNREACHABLE_MS;
@@ -207,8 +209,10 @@ pub struct Executive {
     recent: VecDeque<u16>,
     /// Events that came up between two steps.
     pending: Vec<Event>,
-    /// How it gets home, and what that takes at most from the loop, milliseconds.
-    home: Option<(WaysHome, u32)>,
+    /// How it gets home, and what that takes.
+    home: Option<Home>,
+    /// How late it may be noticed that the fuel is due, milliseconds.
+    late_ms: u32,
     /// What it flies where nothing else was agreed, if it flies by promises.
     contingency: Option<promised::Contingency>,
 }
@@ -242,6 +246,7 @@ impl Executive {
             recent: VecDeque::with_capacity(RECENT),
             pending: Vec::new(),
             home: None,
+            late_ms: 0,
             contingency: None,
         }
     }
@@ -259,8 +264,15 @@ impl Executive {
     #[must_use]
     pub fn with_home(mut self, home: Point) -> Self {
         let ways = WaysHome::new(&self.transit, home);
-        let longest_ms = self.return_ms(&ways);
-        self.home = Some((ways, longest_ms));
+        self.home = Some(Home::new(&self.transit, home, ways));
+        self
+    }
+
+    /// The same with how late it may be noticed that the fuel is due, milliseconds: so much
+    /// more is kept.
+    #[must_use]
+    pub fn with_late_ms(mut self, late_ms: u32) -> Self {
+        self.late_ms = late_ms;
         self
     }
 
@@ -389,9 +401,8 @@ impl Executive {
             .unwrap_or_else(|| Air::airspeed_for_mps(objective, airframe, wind, radius_m));
         let airspeed_mps = self.envelope.airspeed_mps(wanted);
         self.transit.set_air(Air { wind, airspeed_mps });
-        if let Some((ways, _)) = self.home.take() {
-            let longest_ms = self.return_ms(&ways);
-            self.home = Some((ways, longest_ms));
+        if let Some(home) = self.home.take() {
+            self.home = Some(home.in_air_of(&self.transit));
         }
         self.assess_given();
     }
@@ -580,7 +591,11 @@ impl Executive {
             return moves;
         }
         if let Aim::Point(p) = self.aim {
-            match self.transit.way_to_wait_at(at, p) {
+            let moves = self.transit.way_to_wait_at(at, p).or_else(|| {
+                let home = self.home.as_ref()?;
+                home.by_loop(&self.transit, at, p)
+            });
+            match moves {
                 Some(moves) => return moves,
                 None => events.push(Event::Refused { cells: Vec::new() }),
             }

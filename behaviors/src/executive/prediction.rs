@@ -4,9 +4,7 @@
 //! Everything here is a question; nothing changes what is flown.
 
 use super::transit::{CellVisit, Move, Place};
-use super::way_home::WaysHome;
 use super::{Aim, Executive, Forecast, Kind};
-use crate::percept::Percept;
 use skein_flight::coverage::ring::Direction;
 use skein_flight::coverage::ring::backtracking::{Leg, OffLoop};
 use skein_geometry::frame::Pose;
@@ -18,10 +16,6 @@ pub const UNREACHABLE_MS: u32 = 86_400_000;
 
 /// Time added to a turn, milliseconds: a setpoint and its corrections.
 const TURN_MARGIN_MS: f64 = 1000.0;
-
-/// The least time for a turn at each end of the way home, seconds: two full circles of
-/// 30 m at 13 m/s; in a wind more where turning round takes longer.
-const TURNS_S: f64 = 30.0;
 
 /// One stretch of the flight to come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -160,6 +154,16 @@ impl Executive {
     /// reached are left out.
     #[must_use]
     pub fn schedule(&self, legs: &[Leg], is_open: &dyn Fn(u16) -> bool) -> Vec<(u16, u32)> {
+        let visits = self.visited(legs, is_open).into_iter();
+        visits.map(|(visit, ms, _)| (visit.cell, ms)).collect()
+    }
+
+    /// The same, with the place where each of them ends.
+    pub(super) fn visited(
+        &self,
+        legs: &[Leg],
+        is_open: &dyn Fn(u16) -> bool,
+    ) -> Vec<(CellVisit, u32, Place)> {
         let Some(from) = self.here() else {
             return Vec::new();
         };
@@ -171,36 +175,8 @@ impl Executive {
         let items = self.items(&from, kept, queue, is_open);
         items
             .iter()
-            .filter_map(|i| i.visit.map(|h| (h.cell, self.when_ms(i.end_m))))
+            .filter_map(|i| Some((i.visit?, self.when_ms(i.end_m), i.end)))
             .collect()
-    }
-
-    /// What the way home may take from anywhere on the loop, milliseconds.
-    #[must_use]
-    pub fn home_ms(&self) -> u32 {
-        self.home.as_ref().map_or(0, |(_, ms)| *ms)
-    }
-
-    /// Flight time that may still be planned: what is left less the reserve and the way
-    /// home, milliseconds.
-    #[must_use]
-    pub fn spendable_ms(&self, percept: &Percept) -> u32 {
-        let home_ms = self.home_ms();
-        whole_ms((percept.endurance_s - self.transit.airframe.reserve_s) * 1000.0)
-            .saturating_sub(home_ms)
-    }
-
-    /// The longest way home from the loop, round zones and in this wind, with a turn at each
-    /// end, milliseconds.
-    pub(super) fn return_ms(&self, ways: &WaysHome) -> u32 {
-        let (transit, air) = (&self.transit, self.transit.air());
-        let longest_s = ways.longest_s(air, transit.airframe.cruise_mps.max(1.0));
-        let turns_s = if air.is_calm() {
-            TURNS_S
-        } else {
-            TURNS_S.max(2.0 * transit.turn_round_s())
-        };
-        whole_ms((longest_s + turns_s) * 1000.0).min(UNREACHABLE_MS)
     }
 
     /// Mean speed over the ground along the whole loop, m/s: cruise in calm air.
@@ -234,7 +210,7 @@ impl Executive {
     }
 
     /// Where the flight to come begins.
-    fn here(&self) -> Option<Place> {
+    pub(super) fn here(&self) -> Option<Place> {
         let pose = self
             .transit
             .air()
@@ -347,7 +323,7 @@ impl Executive {
     }
 
     /// Time to fly so many metres through the air, milliseconds, rounded up.
-    fn ms(&self, length_m: f64) -> u32 {
+    pub(super) fn ms(&self, length_m: f64) -> u32 {
         whole_ms((length_m / self.speed_mps() * 1000.0).ceil()).min(UNREACHABLE_MS)
     }
 }
@@ -357,6 +333,6 @@ impl Executive {
     clippy::cast_sign_loss,
     reason = "a cast of a float saturates"
 )]
-fn whole_ms(ms: f64) -> u32 {
+pub(super) fn whole_ms(ms: f64) -> u32 {
     ms as u32
 }

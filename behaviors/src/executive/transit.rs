@@ -176,6 +176,16 @@ impl Transit {
         f64::from(self.coverage_loop.cells()[usize::from(cell)].travel_mm) / 1000.0
     }
 
+    /// Distance through the air along a cell that is only passed, metres; infinite where the
+    /// wind forbids it.
+    pub(super) fn passed_m(&self, cell: u16, direction: Direction) -> f64 {
+        if self.coverage_loop.cells()[usize::from(cell)].excursion {
+            return 0.0;
+        }
+        let through_air_m = self.cell_air_m(cell, direction);
+        through_air_m.unwrap_or_else(|| self.travel_m(cell))
+    }
+
     /// Length of the whole loop over the ground over that through the air, both ways; 0
     /// where the wind forbids a part of it.
     #[must_use]

@@ -50,8 +50,11 @@ pub struct Beliefs {
     pub order: Order,
     /// All that the operator ordered, as far as it was heard.
     pub orders: Orders,
-    /// Flight time it may still spend, milliseconds (endurance less reserve).
+    /// Flight time before it must turn home from where it is, milliseconds (endurance less
+    /// reserve and way home); 0 where there is no way home.
     pub spendable_ms: u32,
+    /// Whether its fuel is due: it flies home.
+    pub is_fuel_due: bool,
     /// What it holds of tasks: which, in which revision, how far it is.
     pub tasks: Vec<(TaskId, u32, Progress)>,
     /// Tasks that it knows to be open, and in its eyes somebody can do.

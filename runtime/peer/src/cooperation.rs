@@ -343,7 +343,7 @@ impl Cooperation {
             separation.believe_down(s.now, down.map(|(id, ..)| id));
         }
         match order {
-            Order::Resume => effects.extend(state.check_endurance(s)),
+            Order::Resume => effects.extend(state.check_endurance(s.now, s.percept, s.period_ms)),
             Order::ReturnToBase => effects.extend(state.release_section(s.role)),
             Order::Hold => {}
         }
@@ -381,9 +381,10 @@ impl Cooperation {
         &mut self,
         task: (TaskId, u32),
         planned: Result<Errand, String>,
+        percept: Option<&Percept>,
     ) -> Effects {
         match &mut self.state {
-            Some(state) => self.tasking.planned(task, planned, state),
+            Some(state) => self.tasking.planned(task, planned, percept, state),
             None => Effects::new(),
         }
     }
@@ -495,6 +496,7 @@ impl Cooperation {
         beliefs.adoptions = state.negotiation.adoptions;
         beliefs.finished = state.finished;
         beliefs.spendable_ms = state.spendable_ms(percept);
+        beliefs.is_fuel_due = state.fuel.is_due();
     }
 }
 

@@ -98,6 +98,7 @@ mod coverage_told;
 mod diary;
 mod effect;
 pub mod errand;
+mod fuel;
 mod inbound;
 pub mod input;
 pub mod journal;

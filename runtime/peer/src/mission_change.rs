@@ -28,7 +28,8 @@ pub(crate) fn executive_for(geometry: &MissionGeometry, config: &PeerConfig) -> 
     let executive = executive
         .with_tracking_error_m(mission.tracking_error_m())
         .with_objective(config.objective)
-        .with_home(mission.base_m());
+        .with_home(mission.base_m())
+        .with_late_ms(config.beacon_period_ms);
     Some(if mission.separation_mm > 0 {
         executive.with_promises()
     } else {

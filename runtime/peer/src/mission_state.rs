@@ -9,9 +9,9 @@
 //! | another lap or sortie | nothing is covered |
 //! | any | the highest round counter; what the journal knows of that loop; that the fuel is due |
 //!
-//! And what it does with them: it hears of others' cells, negotiates, watches the fuel and
+//! And what it does with them: it hears of others' cells, negotiates and watches
 //! the end. When that is, and where it flies, is the cooperation manager's; what it takes
-//! without a round is in `taking`.
+//! without a round is in `taking`, what its fuel allows in `fuel`.
 
 use crate::PeerId;
 use crate::cells::CellSet;
@@ -19,6 +19,7 @@ use crate::company::Company;
 use crate::config::{PeerConfig, Role};
 use crate::cooperation::Situation;
 use crate::effect::{Effect, Effects, PendingJob, Promise};
+use crate::fuel::Fuel;
 use crate::input::Time;
 use crate::journal::{Durable, Entry};
 use crate::mission::Mission;
@@ -27,7 +28,7 @@ use crate::offload::{Job, MissionGeometry};
 use crate::output::Report;
 use crate::protocol::division;
 use crate::protocol::negotiation::{Action, Context, Negotiation};
-use crate::protocol::runs::{PlannedCell, legs_of};
+use crate::protocol::runs::PlannedCell;
 use crate::protocol::sections::FIRST_LIFE;
 use crate::separation::Separation;
 use crate::timers::{Timer, Timers};
@@ -37,7 +38,7 @@ use crate::wire::limits::BID_COVERED_MAX_BYTES;
 use crate::wire::message::{Activity, Beacon, Bid, Claim, Epoch, Member, MissionStatus};
 use skein_behaviors::executive::detour::Watched;
 use skein_behaviors::executive::{GivenFlight, UNREACHABLE_MS};
-use skein_behaviors::{Event, Executive, Goal, Percept};
+use skein_behaviors::{Event, Executive, Goal};
 use skein_flight::coverage::ring::Direction;
 use skein_flight::coverage::ring::backtracking::{Division, Uav};
 use std::sync::Arc;
@@ -49,10 +50,6 @@ pub const CELLS_PER_COVERED_RECORD: u16 = 5;
 /// one to speak, two to be passed on. Who misses them flies those cells again, and hears
 /// of the next lap from the ground station.
 const LAP_PERIODS: u64 = 3;
-
-/// A UAV whose fuel was due works again when it may spend this much, milliseconds: less
-/// would be due again before the next round is decided.
-const FUEL_BACK_MS: u32 = 30_000;
 
 /// Claims on their way to the journal, numbered in the order in which it gets them. Only
 /// the last of them may be installed, for it is the one that the journal ends with.
@@ -105,7 +102,7 @@ pub(crate) struct MissionState {
     /// Whether a task is open that somebody can do.
     pub has_tasks: bool,
     /// Whether the goal is to be given to the executive again.
-    replan: bool,
+    pub(crate) replan: bool,
     /// Since when this peer can plan without a break.
     pub able_since: Option<crate::Time>,
     /// Who shares the work.
@@ -117,12 +114,10 @@ pub(crate) struct MissionState {
     pub astray: bool,
     /// Whether another process under its id has silenced this peer.
     pub silent: bool,
-    /// Whether its fuel is due: it flies home until some is back.
-    pub exhausted: bool,
+    /// What is known of its fuel.
+    pub fuel: Fuel,
     /// Whether it said that it lists nothing since it was told to return.
     pub has_released: bool,
-    /// When its plan was last compared with what the fuel allows.
-    fuel_looked_at: Option<crate::Time>,
     /// Cells covered by itself since the last entry of the journal.
     pub unsaved_cells: u16,
     pub claims: ClaimsWritten,
@@ -205,13 +200,6 @@ impl MissionState {
             Some(e) if !sections.plan().is_empty() => {
                 e.finish_ms(&|c| !sections.covered().contains(c))
             }
-            _ => 0,
-        }
-    }
-
-    pub fn spendable_ms(&self, percept: Option<&Percept>) -> u32 {
-        match (&self.executive, percept) {
-            (Some(e), Some(p)) => e.spendable_ms(p),
             _ => 0,
         }
     }
@@ -322,39 +310,6 @@ impl MissionState {
         Some(Effect::Store(Promise::Covered(cells), entry))
     }
 
-    /// Whether the fuel is due, and the plan was not given up for it yet.
-    fn fuel_is_due(&self, percept: Option<&Percept>) -> bool {
-        percept.is_some() && !self.exhausted && self.spendable_ms(percept) == 0
-    }
-
-    /// Whether a UAV whose fuel was due has some to spend again: it was refuelled, or what
-    /// it had sensed was wrong.
-    fn fuel_is_back(&self, percept: Option<&Percept>) -> bool {
-        self.exhausted && self.spendable_ms(percept) >= FUEL_BACK_MS
-    }
-
-    /// Gives up the plan when the fuel is due, and takes part again when some is back.
-    pub fn watch_fuel(&mut self, percept: Option<&Percept>) -> Effects {
-        if self.fuel_is_due(percept) {
-            return self.give_up_for_fuel();
-        }
-        self.exhausted &= !self.fuel_is_back(percept);
-        Effects::new()
-    }
-
-    /// The fuel is due: the plan is given up.
-    fn give_up_for_fuel(&mut self) -> Effects {
-        assert!(!self.exhausted, "fuel that is due comes due once");
-        self.exhausted = true;
-        self.negotiation.sections.keep(0);
-        let mut effects = vec![self.claim_changed()];
-        if self.executive.is_some() {
-            let text = "the fuel is due: returning to base";
-            effects.push(Effect::Alarm(text.into()));
-        }
-        effects
-    }
-
     /// It is told to return: what it was to fly is for those who are not, from now on, also
     /// where a division gave it something meanwhile. What it gave away before it still holds,
     /// until its new owner says so or it expires.
@@ -370,7 +325,7 @@ impl MissionState {
     /// Whether this peer can fly what a division gives it.
     pub fn can_fly_plans(&self, s: &Situation<'_>) -> bool {
         let senses = s.percept.is_some() && self.executive.is_some();
-        s.role == Role::Uav && senses && !self.exhausted
+        s.role == Role::Uav && senses && !self.fuel.is_due()
     }
 
     /// Lets the negotiation look at the time, and carries out what it wants.
@@ -484,7 +439,7 @@ impl MissionState {
             speed_mmps: speed_mmps(executive),
             turn_ms: executive.turn_ms(),
             endurance_ms: self
-                .spendable_ms(s.percept)
+                .offered_ms(s.percept)
                 .saturating_sub(forecast.release_ms),
             covered: sections.covered().encode_rle(Some(BID_COVERED_MAX_BYTES)),
             commits: CellSet::of(sections.cells(), commits).runs(),
@@ -534,39 +489,6 @@ impl MissionState {
         );
         let promise = Promise::Adopt(self.claims.next(), Box::new(adoption));
         vec![Effect::Store(promise, Entry::Claim(claim))]
-    }
-
-    /// Lists only what can be flown (S10): the rest is orphaned, and that is a loss.
-    /// Returns whether anything was given up.
-    pub fn keep_within_endurance(&mut self, percept: Option<&Percept>) -> bool {
-        let spendable = self.spendable_ms(percept);
-        let Some(executive) = &self.executive else {
-            return false;
-        };
-        let sections = &self.negotiation.sections;
-        let legs = legs_of(sections.plan(), sections.cells());
-        let times = executive.schedule(&legs, &|c| !sections.covered().contains(c));
-        let Some((late, _)) = times.iter().find(|(_, ms)| *ms > spendable) else {
-            return false;
-        };
-        let good = sections.plan().iter().position(|p| p.cell == *late);
-        self.negotiation.sections.keep(good.unwrap_or(0));
-        self.replan = true;
-        true
-    }
-
-    /// A plan takes longer than when it was adopted if its first turn is begun from another
-    /// pose, or if the UAV waited elsewhere meanwhile: what the fuel allows is looked at
-    /// once a period.
-    pub fn check_endurance(&mut self, s: &Situation<'_>) -> Option<Effect> {
-        let looked_ago_ms = self.fuel_looked_at.map(|t| s.now.since_ms(t));
-        let planned = !self.negotiation.sections.plan().is_empty();
-        if !planned || looked_ago_ms.is_some_and(|ms| ms < s.period_ms) {
-            return None;
-        }
-        self.fuel_looked_at = Some(s.now);
-        self.keep_within_endurance(s.percept)
-            .then(|| self.claim_changed())
     }
 
     /// All that can be covered is covered, or again not: the mission ends, the next lap
@@ -684,9 +606,8 @@ impl MissionState {
             finished: false,
             astray: false,
             silent: false,
-            exhausted: old.as_ref().is_some_and(|m| m.exhausted),
+            fuel: old.as_ref().map_or_else(Fuel::default, |m| m.fuel.kept()),
             has_released: false,
-            fuel_looked_at: None,
             unsaved_cells: 0,
             // What is still being written was promised for the old loop.
             claims: old

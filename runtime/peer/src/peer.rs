@@ -411,7 +411,8 @@ impl Peer {
             }
             (Some(PendingJob::Errand(id, revision, _)), JobResult::Errand(planned)) => {
                 let task = (id, revision);
-                self.cooperation.errand_planned(task, planned)
+                let percept = self.percept.as_ref();
+                self.cooperation.errand_planned(task, planned, percept)
             }
             _ => Effects::new(),
         };

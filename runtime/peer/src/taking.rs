@@ -59,8 +59,7 @@ impl MissionState {
         // A claim is stored, spoken, and heard even if it is lost once.
         let least_ms = SETTLE_INTERVALS * ctx.interval_ms;
         let (cells, by_ms) = sharing::relief(&owners, &hands, me.id, pace, least_ms)?;
-        let spendable_ms = u64::from(self.spendable_ms(s.percept));
-        let cells = self.flown_besides(cells, by_ms.min(spendable_ms))?;
+        let cells = self.flown_besides(cells, by_ms, s.percept)?;
         self.negotiation.begin_take(&cells)
     }
 
@@ -86,10 +85,7 @@ impl MissionState {
         }
         let idle = self.negotiation.sections.plan().is_empty();
         let any = || self.within_reach(orphans, s.percept).filter(|_| idle);
-        let spendable_ms = u64::from(self.spendable_ms(s.percept));
-        let cells = self
-            .flown_besides(cells, by_ms.min(spendable_ms))
-            .or_else(any)?;
+        let cells = self.flown_besides(cells, by_ms, s.percept).or_else(any)?;
         Some((begins_ms, cells))
     }
 
@@ -111,7 +107,7 @@ impl MissionState {
         if !self.negotiation.is_my_turn_at_last(ctx, first, sooner) {
             return None;
         }
-        let cells = self.flown_besides(cells, u64::from(self.spendable_ms(s.percept)))?;
+        let cells = self.flown_besides(cells, u64::MAX, s.percept)?;
         Some((begins_ms, cells))
     }
 
@@ -161,7 +157,7 @@ impl MissionState {
             sections.presume(p.id, p.run, p.direction, eta_ms);
         }
         self.company.expect(expected);
-        let mine = self.flown_besides(mine, u64::from(self.spendable_ms(s.percept)))?;
+        let mine = self.flown_besides(mine, u64::MAX, s.percept)?;
         self.negotiation.begin_take(&mine)
     }
 
@@ -201,23 +197,29 @@ impl MissionState {
         let mine = cells_of(run, n).filter(|c| orphans.contains(*c));
         let mine: Vec<_> = mine.map(|c| (c, Direction::Forward)).collect();
         let way_ms = self.pace()?.way_ms(self.hand(s)?.at, run.first);
-        let mine = self.flown_besides(mine, u64::from(self.spendable_ms(s.percept)))?;
+        let mine = self.flown_besides(mine, u64::MAX, s.percept)?;
         self.negotiation.begin_nearest(&mine, way_ms)
     }
 
-    /// Of cells that are to be flown after the plan those that are flown by then, if any are.
+    /// Of cells that are to be flown after the plan those that are flown by then, with enough
+    /// left for the way home, if any are.
     fn flown_besides(
         &self,
         mut cells: Vec<(u16, Direction)>,
         by_ms: u64,
+        percept: Option<&Percept>,
     ) -> Option<Vec<(u16, Direction)>> {
         let sections = &self.negotiation.sections;
         let mut plan = sections.plan().to_vec();
         plan.extend(sections.taken(&cells));
         let legs = legs_of(&plan, sections.cells());
         let is_open = |c: u16| !sections.covered().contains(c);
-        let times = self.executive.as_ref()?.schedule(&legs, &is_open);
-        let in_time = times.iter().take_while(|(_, ms)| u64::from(*ms) <= by_ms);
+        let executive = self.executive.as_ref()?;
+        let within = executive.within_endurance(&legs, &is_open, percept?);
+        let in_time = within
+            .cells
+            .iter()
+            .take_while(|(_, ms)| u64::from(*ms) <= by_ms);
         let in_time = CellSet::of(sections.cells(), in_time.map(|(c, _)| *c));
         cells.retain(|(c, _)| in_time.contains(*c));
         (!cells.is_empty()).then_some(cells)
@@ -258,15 +260,14 @@ impl MissionState {
         open.div_ceil(members.max(1)).max(meanwhile)
     }
 
-    /// Of the runs of some cells the part that can be flown with the fuel that is left, from
-    /// one end on: the longest.
+    /// Of the runs of some cells the part that can be flown with the fuel that is left, with the
+    /// way home from where it ends, from one end on: the longest.
     pub(crate) fn within_reach(
         &self,
         cells: &CellSet,
         percept: Option<&Percept>,
     ) -> Option<Vec<(u16, Direction)>> {
-        let executive = self.executive.as_ref()?;
-        let spendable = self.spendable_ms(percept);
+        let (executive, percept) = (self.executive.as_ref()?, percept?);
         let both_ways = |run: CellRun| {
             let leg = |first: u16, direction: Direction| Leg {
                 first,
@@ -280,9 +281,10 @@ impl MissionState {
             ]
         };
         let flown = |leg: Leg| -> Vec<(u16, Direction)> {
-            let times = executive.schedule(&[leg], &|c| cells.contains(c));
-            let within = times.into_iter().take_while(|(_, ms)| *ms <= spendable);
-            within.map(|(cell, _)| (cell, leg.direction)).collect()
+            let is_open = |c| cells.contains(c);
+            let within = executive.within_endurance(&[leg], &is_open, percept);
+            let cells = within.cells.into_iter();
+            cells.map(|(cell, _)| (cell, leg.direction)).collect()
         };
         let reach = cells.runs().into_iter().flat_map(both_ways).map(flown);
         reach.max_by_key(Vec::len).filter(|run| !run.is_empty())

@@ -28,7 +28,6 @@ use crate::offload::Job;
 use crate::output::{Report, TaskNews};
 use crate::protocol::auction::flown::RoutedTime;
 use crate::protocol::auction::{self, Auction, Event, KNOWN_MAX, Version};
-use crate::protocol::runs::legs_of;
 use crate::task_desk::TaskHolder;
 use crate::wire::codec::Body;
 use crate::wire::limits::{DURATION_MAX_MS, PEERS_MAX};
@@ -37,8 +36,8 @@ use crate::wire::tasks::{
     Bundle, BundleTask, Offer, Progress, Task, TaskId, TaskState, sensor_name,
 };
 use crate::{Incarnation, PeerId};
-use skein_behaviors::Order;
 use skein_behaviors::executive::detour::Watched;
+use skein_behaviors::{Order, Percept};
 use skein_flight::airframe::Airframe;
 use skein_geometry::hash::Fnv;
 use skein_geometry::math::wrap_pi;
@@ -305,15 +304,12 @@ impl Tasking {
     /// What this UAV can offer: its section is predicted for that.
     fn present(&self, s: &Situation<'_>, state: &MissionState) -> Option<Offer> {
         let (percept, executive) = (s.percept?, state.executive.as_ref()?);
-        let spendable_ms = state.spendable_ms(Some(percept));
-        let sections = &state.negotiation.sections;
-        let section_ms = if sections.plan().is_empty() {
-            0
-        } else {
-            let legs = legs_of(sections.plan(), sections.cells());
-            let times = executive.schedule(&legs, &|c| !sections.covered().contains(c));
-            times.last().map_or(0, |(_, ms)| *ms).min(DURATION_MAX_MS)
-        };
+        // What may be flown from here and back before the section is flown, and all would still
+        // end with enough for the way home.
+        let within = state.plan_within_endurance(Some(percept))?;
+        let is_whole = within.cut.is_none();
+        let spare_ms = if is_whole { within.spare_ms } else { 0 };
+        let section_ms = within.cells.last().map_or(0, |(_, ms)| *ms);
         #[allow(
             clippy::cast_possible_truncation,
             reason = "a heading is within ±31,416 of these"
@@ -325,9 +321,9 @@ impl Tasking {
             course_e4,
             speed_mmps: speed_mmps(executive).max(1),
             radius_mm: state.geometry.mission.turn_radius_mm,
-            endurance_ms: spendable_ms.saturating_sub(section_ms).min(DURATION_MAX_MS),
+            endurance_ms: spare_ms.min(DURATION_MAX_MS),
             sensors: self.sensors,
-            section_ms,
+            section_ms: section_ms.min(DURATION_MAX_MS),
         })
     }
 
@@ -460,6 +456,7 @@ impl Tasking {
         &mut self,
         (id, revision): (TaskId, u32),
         planned: Result<Errand, String>,
+        percept: Option<&Percept>,
         state: &mut MissionState,
     ) -> Effects {
         let wanted = |f: &&mut Flown| f.id == id && f.revision == revision && !f.is_planned;
@@ -467,6 +464,9 @@ impl Tasking {
             return Effects::new();
         };
         match planned {
+            Ok(errand) if !state.returns_from(&errand.flight, percept) => {
+                self.relieve("too little fuel is left to fly it and come home", state)
+            }
             Ok(errand) => {
                 flown.is_planned = true;
                 state.set_errand(Some((errand.flight, Watched::new(errand.pieces))));

@@ -4,7 +4,7 @@
 //! disk that can fail or be slow, a planner that can withhold its results, and a wing that
 //! flies setpoints exactly in calm air; links have a delay, a loss and a cut in each
 //! direction. Nothing in here draws randomness but from a seed, so a story is the same in
-//! every run. What a world adds (wind, bodies, radio range, airtime) is left to the
+//! every run. What a world adds (bodies, radio range, airtime) is left to the
 //! simulator.
 
 use crate::config::Launch;
@@ -128,6 +128,8 @@ pub struct Seat {
     pub senses: bool,
     /// Flight time left, seconds.
     pub fuel_s: f64,
+    /// The wind that it flies in and senses, m/s towards east and north.
+    pub wind_mps: (f64, f64),
     /// Where it is.
     pub pose: Pose,
     setpoint: Option<Setpoint>,
@@ -159,8 +161,8 @@ impl Seat {
                 .setpoint
                 .as_ref()
                 .map_or(cruise_mps, |s| s.airspeed_mps),
-            wind_east_mps: 0.0,
-            wind_north_mps: 0.0,
+            wind_east_mps: self.wind_mps.0,
+            wind_north_mps: self.wind_mps.1,
             endurance_s: self.fuel_s,
             takes_off_in_ms: 0,
             failsafe: false,
@@ -176,6 +178,8 @@ impl Seat {
         self.pose = fly(self.pose, speed_mps, steps, ms32);
         #[allow(clippy::cast_precision_loss, reason = "a fraction of a second")]
         let flown_s = ms as f64 / 1000.0;
+        self.pose.east_m += self.wind_mps.0 * flown_s;
+        self.pose.north_m += self.wind_mps.1 * flown_s;
         self.fuel_s = (self.fuel_s - flown_s).max(0.0);
     }
 }
@@ -292,6 +296,7 @@ impl Harness {
             planner_withholds: false,
             senses: uav,
             fuel_s: 3600.0,
+            wind_mps: (0.0, 0.0),
             pose: Pose {
                 east_m: 96.0 * f64::from(id) - 72.0,
                 north_m: 24.0,

@@ -53,7 +53,7 @@ impl Reason {
             Self::Cancelled
         } else if state.finished {
             Self::Finished
-        } else if state.exhausted {
+        } else if state.fuel.is_due() {
             Self::FuelIsDue
         } else if state.silent {
             Self::Twin
@@ -108,9 +108,10 @@ pub struct Flight {
     pub endurance_s: f64,
     /// Of that what it keeps in reserve, seconds.
     pub reserve_s: f64,
-    /// Of that what the way home may take, seconds.
+    /// Of that what the way home from here may take, and is kept because it may be noticed
+    /// late that the fuel is due, seconds.
     pub return_s: f64,
-    /// Of that what is left for work, seconds.
+    /// Of that what is left before it must turn home, seconds.
     pub spendable_s: f64,
 }
 
@@ -266,7 +267,7 @@ pub(crate) fn flight(state: Option<&MissionState>, percept: &Percept, reserve_s:
         reserve_s,
         return_s: state
             .and_then(|s| s.executive.as_ref())
-            .map_or(0.0, |e| seconds(e.home_ms())),
+            .map_or(0.0, |e| seconds(e.kept_ms())),
         spendable_s: state.map_or(0.0, |s| seconds(s.spendable_ms(Some(percept)))),
     }
 }

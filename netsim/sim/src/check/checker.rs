@@ -333,8 +333,15 @@ impl Checker {
             .on_beacon(now_ms, id, said, view, &mut self.found);
     }
 
-    /// A peer makes a bid durable while it believes this, at this place.
-    pub fn on_bid(&mut self, now_ms: u64, id: u16, bid: &Bid, of: (&Beliefs, Option<Point>)) {
+    /// A peer makes a bid durable while it believes this, at this place, with so much fuel,
+    /// seconds.
+    pub fn on_bid(
+        &mut self,
+        now_ms: u64,
+        id: u16,
+        bid: &Bid,
+        of: (&Beliefs, Option<(Point, f64)>),
+    ) {
         self.rules
             .on_bid(now_ms, id, bid, of, &self.handicaps, &mut self.found);
     }

@@ -200,6 +200,7 @@ mod tests {
                 uav: true,
                 since_ms: 0,
                 at: None,
+                fuel_ms: None,
                 eta_ms: 0,
                 view: Beliefs {
                     speaks: true,

@@ -38,6 +38,9 @@ pub struct Mover {
     pub at: Point,
     /// How fast at most, the wind behind it, m/s.
     pub fastest_mps: f64,
+    /// How long it may offer to fly at most from now on, milliseconds; nothing of a mission that
+    /// the judge does not know.
+    pub may_offer_ms: Option<u64>,
 }
 
 /// What the rounds of one run were found to be.
@@ -185,11 +188,14 @@ impl DecisionCheck {
             lies.push(format!("ends nothing in {} ms", bid.eta_ms));
         }
         let budget_ms = u64::from(bid.release_ms) + u64::from(bid.endurance_ms);
-        // A bid that cannot be flown at all offers nothing, whenever it is released.
-        if bid.endurance_ms > 0 && budget_ms > u64::from(view.spendable_ms) + 1_000 {
+        // A bid that cannot be flown at all offers nothing, whenever it is released. A late
+        // computer knows only what it had.
+        let late_ms = handicaps.late_ms(id, now_ms, now_ms);
+        let may_offer_ms = mover.and_then(|m| m.may_offer_ms).unwrap_or(u64::MAX);
+        if bid.endurance_ms > 0 && budget_ms > may_offer_ms.saturating_add(1_000 + late_ms) {
             lies.push(format!(
-                "offers {} ms of flight from {} ms on, it may spend {} ms",
-                bid.endurance_ms, bid.release_ms, view.spendable_ms
+                "offers {} ms of flight from {} ms on, {may_offer_ms} ms are above its reserve and the way home from the farthest open cell",
+                bid.endurance_ms, bid.release_ms
             ));
         }
         if told {
@@ -729,6 +735,7 @@ mod tests {
         let mover = |east_m| Mover {
             at: Point::new(east_m, 0.0),
             fastest_mps: 20.0,
+            may_offer_ms: Some(2_000_000),
         };
         type Lie = fn(&mut Bid);
         let lies: [(Lie, u64, f64, u8, bool); 9] = [

@@ -128,7 +128,8 @@ impl FlightCheck {
                 continue;
             };
             let returns = m.view.order == Order::ReturnToBase;
-            let spent = m.view.loop_hash != 0 && m.view.spendable_ms == 0 && !m.view.able;
+            let spent = m.view.is_fuel_due || m.view.spendable_ms == 0 && !m.view.able;
+            let spent = m.view.loop_hash != 0 && spent;
             let silent = m.view.is_silent;
             let goes = returns || m.view.finished || spent || silent;
             let goes = goes && m.view.order != Order::Hold;
@@ -160,6 +161,13 @@ impl FlightCheck {
         DETOUR * (to - from).norm() + if across { along_m } else { 0.0 }
     }
 
+    /// How long the way home takes at most, with the turn before it, milliseconds.
+    #[must_use]
+    pub fn longest_home_ms(&self, from: Point, base: Point, flyer: Flyer) -> u64 {
+        let way_s = self.longest_way_m(from, base) / flyer.slowest_mps.max(0.1);
+        milliseconds(way_s + HOME_SLACK_S)
+    }
+
     fn judge_homing(
         &mut self,
         now_ms: u64,
@@ -169,9 +177,8 @@ impl FlightCheck {
         found: &mut Findings,
     ) {
         let away_m = (at - base).norm();
-        let takes_s = self.longest_way_m(at, base) / flyer.slowest_mps.max(0.1) + HOME_SLACK_S;
         let fresh = Homing {
-            due_ms: now_ms.saturating_add(milliseconds(takes_s)),
+            due_ms: now_ms.saturating_add(self.longest_home_ms(at, base, flyer)),
             base,
             told: false,
         };
@@ -286,10 +293,11 @@ mod tests {
 
     #[test]
     fn whoever_is_to_fly_home_and_does_not_is_found() {
-        let wanted: [fn(&mut Beliefs); 4] = [
+        let wanted: [fn(&mut Beliefs); 5] = [
             |b| b.finished = true,
             |b| b.order = Order::ReturnToBase,
             |b| (b.spendable_ms, b.able) = (0, false),
+            |b| b.is_fuel_due = true,
             |b| (b.is_silent, b.speaks) = (true, false),
         ];
         let arrives = |t: u64| 600.0 - 10.0 * f64::from(u8::try_from(t.min(55)).unwrap());

@@ -22,8 +22,9 @@
 //! | [`tasks`] | each task in one bundle, and in one at least |
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
 //! | [`airtime`] | S9: shares of the channel |
+//! | [`fuel`] | S10, bids and returns against fuel and place |
 //! | [`flight`] | what is flown against what is wanted: hold, home |
-//! | [`progress`] | S2, S9, S10, L6, L7: limits and restarts |
+//! | [`progress`] | S2, S9, L6, L7: limits and restarts |
 //!
 //! S1 is recorded by the world, S12 caught by the driver, L5 decided at the end of a
 //! run, S8 tested in the peer's crate. Checks run incrementally on reports and
@@ -37,6 +38,7 @@ pub mod cover;
 pub mod decision;
 pub mod findings;
 pub mod flight;
+pub mod fuel;
 pub mod graph;
 pub mod handicaps;
 pub mod listing;

@@ -1,23 +1,16 @@
-//! Limits and progress: no zone entered (S2), every queue within its cap (S9), plans
-//! within endurance (S10), restarted peers productive again (L6), adoptions bounded (L7).
+//! Limits and progress: no zone entered (S2), every queue within its cap (S9), restarted
+//! peers productive again (L6), adoptions bounded (L7).
 
 use super::membership::Membership;
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use crate::world::Approach;
 use std::collections::BTreeMap;
 
-/// A plan may be longer than the fuel by this much, milliseconds: ETA and fuel are
-/// rounded to a millisecond and taken at two percepts half a second apart; a late
-/// computer has its percepts later.
-const ETA_ROUNDING_MS: u32 = 1_000;
-
 /// What progress found out in one run.
 #[derive(Clone, Debug, Default)]
 pub struct ProgressCheck {
     restarted: BTreeMap<u16, Restarted>,
     over: Clocks<(u16, &'static str)>,
-    /// Since when a plan has been longer than the fuel.
-    short_since_ms: BTreeMap<u16, u64>,
     losses: u64,
 }
 
@@ -45,7 +38,6 @@ impl ProgressCheck {
     pub fn on_silent(&mut self, id: u16) {
         self.restarted.remove(&id);
         self.over.retain(|(p, _)| *p != id);
-        self.short_since_ms.remove(&id);
     }
 
     /// A peer saw cells that nobody had covered.
@@ -102,25 +94,6 @@ impl ProgressCheck {
                 });
             }
         }
-        let v = &m.view;
-        let late_ms = snapshot.late_ms(m.id, now_ms);
-        let slack_ms = ETA_ROUNDING_MS.saturating_add(u32::try_from(late_ms).unwrap_or(u32::MAX));
-        let short = !v.plan.is_empty() && m.eta_ms > v.spendable_ms.saturating_add(slack_ms);
-        // A plan may become too long while it is flown; its peer looks once a period, so that
-        // of two snapshots running one is after that.
-        if !short {
-            self.short_since_ms.remove(&m.id);
-            self.over.stop((m.id, "plan"));
-            return;
-        }
-        let since_ms = *self.short_since_ms.entry(m.id).or_insert(now_ms);
-        let took_ms = snapshot.lived_ms(m.id, since_ms);
-        let lasts = took_ms > snapshot.bounds.period_ms / 2 + late_ms;
-        if self.exceeds((m.id, "plan"), lasts, now_ms) {
-            found.broken("S10", now_ms, Some(m.id), || {
-                format!("plans {} ms with {} ms to spend", m.eta_ms, v.spendable_ms)
-            });
-        }
     }
 
     fn exceeds(&mut self, key: (u16, &'static str), over: bool, now_ms: u64) -> bool {
@@ -161,7 +134,8 @@ impl ProgressCheck {
             };
             let waits = m.view.able && all_listed(snapshot);
             // Whose fuel is due is to fly home.
-            let waits = waits || m.view.loop_hash != 0 && m.view.spendable_ms == 0;
+            let is_spent = m.view.spendable_ms == 0 || m.view.is_fuel_due;
+            let waits = waits || m.view.loop_hash != 0 && is_spent;
             if m.view.finished || !m.view.plan.is_empty() || waits {
                 r.productive = true;
                 continue;
@@ -244,6 +218,7 @@ mod tests {
                 uav: true,
                 since_ms: 0,
                 at: None,
+                fuel_ms: None,
                 eta_ms: 5000,
                 view: view.clone(),
             }];
@@ -281,17 +256,11 @@ mod tests {
         };
         assert!(run(&good, 3, false).is_empty());
         let bad = Beliefs {
-            spendable_ms: 1000,
             adoptions: 4,
             loads: vec![("queue", 5, 4)],
             ..good
         };
-        // A plan that has become too long is to be cut within a period.
-        assert!(!run(&bad, 1, false).contains_key("S10"));
-        assert_eq!(
-            run(&bad, 2, false),
-            BTreeMap::from([("L7", 1), ("S10", 1), ("S9", 1)])
-        );
+        assert_eq!(run(&bad, 2, false), BTreeMap::from([("L7", 1), ("S9", 1)]));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
 use super::decision::{DecisionCheck, Mover};
 use super::flight::{FlightCheck, Flyer, at_base};
+use super::fuel::FuelCheck;
 use super::listing::ListingCheck;
 use super::patience::PatienceCheck;
 use super::record::Said;
@@ -30,6 +31,7 @@ use std::sync::Arc;
 pub struct Rules {
     /// What is flown.
     pub flight: FlightCheck,
+    fuel: FuelCheck,
     flyers: BTreeMap<u16, Flyer>,
     airtime: AirtimeCheck,
     cadence: CadenceCheck,
@@ -57,6 +59,7 @@ impl Rules {
                 spec.zones.clone(),
                 spec.mission.clearance_m(),
             ),
+            fuel: FuelCheck::new(spec),
             flyers,
             airtime: AirtimeCheck::new(spec.radio.rate_bps, period_ms),
             cadence: CadenceCheck::new(period_ms),
@@ -84,6 +87,7 @@ impl Rules {
     /// A loop was derived.
     pub fn on_loop(&mut self, geometry: &Arc<MissionGeometry>) {
         self.decision.on_loop(geometry);
+        self.fuel.on_loop(geometry);
     }
 
     /// A process starts.
@@ -99,6 +103,7 @@ impl Rules {
         self.cadence.on_silent(id);
         self.patience.on_silent(id);
         self.flight.on_silent(id);
+        self.fuel.on_silent(id);
         self.spread.on_silent(id);
         self.spoken.on_silent(id, death);
         if death {
@@ -243,19 +248,23 @@ impl Rules {
         }
     }
 
-    /// A peer makes a bid durable while it believes this, at this place.
+    /// A peer makes a bid durable while it believes this, at this place, with so much fuel,
+    /// seconds.
     pub fn on_bid(
         &mut self,
         now_ms: u64,
         id: u16,
         bid: &Bid,
-        (view, at): (&Beliefs, Option<Point>),
+        (view, at): (&Beliefs, Option<(Point, f64)>),
         handicaps: &Handicaps,
         found: &mut Findings,
     ) {
-        let mover = at.zip(self.flyers.get(&id)).map(|(at, flyer)| Mover {
+        let base = self.base_of(view.revision);
+        let mover = at.zip(self.flyers.get(&id));
+        let mover = mover.map(|((at, fuel_s), flyer)| Mover {
             at,
             fastest_mps: flyer.fastest_mps,
+            may_offer_ms: base.and_then(|base| self.fuel.may_offer_ms(id, view, fuel_s, base)),
         });
         self.decision
             .on_bid(now_ms, id, bid, (view, mover), handicaps, found);
@@ -289,8 +298,15 @@ impl Rules {
     /// Judges only what is flown: all else is over.
     pub fn on_way_home(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let bases = &self.bases;
-        let base = |revision| bases.range(..=revision).next_back().map(|(_, b)| *b);
+        let base = |revision| base_of(bases, revision);
         self.flight.on_snapshot(snapshot, base, found);
+        let flyers = (&self.flyers, &self.flight);
+        self.fuel.on_snapshot(snapshot, base, flyers, found);
+    }
+
+    /// Where the mission of a revision ends.
+    fn base_of(&self, revision: u32) -> Option<Point> {
+        base_of(&self.bases, revision)
     }
 
     /// Judges how those who are silent fly home, of whom these can; whoever could not is on
@@ -303,6 +319,7 @@ impl Rules {
     ) {
         for id in silent.filter(|id| steered.iter().all(|m| m.id != *id)) {
             self.flight.on_silent(id);
+            self.fuel.on_silent(id);
         }
         let of_silent = Snapshot {
             peers: steered,
@@ -323,6 +340,10 @@ impl Rules {
     pub fn all_home(&self, peers: &[PeerSnapshot]) -> bool {
         self.flight.all_home(peers)
     }
+}
+
+fn base_of(bases: &BTreeMap<u32, Point>, revision: u32) -> Option<Point> {
+    bases.range(..=revision).next_back().map(|(_, b)| *b)
 }
 
 fn flyer(uav: &UavSpec, spec: &Spec) -> Flyer {

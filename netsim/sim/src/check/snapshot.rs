@@ -20,6 +20,8 @@ pub struct PeerSnapshot {
     pub since_ms: u64,
     /// Where its airframe is, if it flies.
     pub at: Option<Point>,
+    /// How long its fuel lasts, if it flies, milliseconds.
+    pub fuel_ms: Option<u64>,
     /// When it expects its plan to be flown, milliseconds from now.
     pub eta_ms: u32,
     /// What it believes.

@@ -38,6 +38,9 @@ pub(super) struct Story {
     loss_permille: u16,
     covered: CellSet,
     places: BTreeMap<u16, Point>,
+    fuel_ms: BTreeMap<u16, u64>,
+    /// When all expect their plans to be flown, milliseconds from now.
+    pub(super) eta_ms: u32,
     /// Who speaks under the id of another.
     pub(super) twins: Twins,
     /// Whose clock, computer or disk is how late.
@@ -52,6 +55,8 @@ impl Story {
             loss_permille,
             covered: CellSet::new(4),
             places: BTreeMap::new(),
+            fuel_ms: BTreeMap::new(),
+            eta_ms: 0,
             twins: Twins::default(),
             handicaps: Handicaps::default(),
         }
@@ -60,6 +65,11 @@ impl Story {
     /// Puts a UAV somewhere.
     pub(super) fn place(&mut self, id: u16, at: Point) {
         self.places.insert(id, at);
+    }
+
+    /// Fills the tank of a UAV.
+    pub(super) fn fuel(&mut self, id: u16, lasts_ms: u64) {
+        self.fuel_ms.insert(id, lasts_ms);
     }
 
     /// One snapshot of these peers, all UAVs, for a check.
@@ -77,7 +87,8 @@ impl Story {
                 uav: true,
                 since_ms: 0,
                 at: self.places.get(id).copied(),
-                eta_ms: 0,
+                fuel_ms: self.fuel_ms.get(id).copied(),
+                eta_ms: self.eta_ms,
                 view: view.clone(),
             })
             .collect();

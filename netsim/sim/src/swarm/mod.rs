@@ -665,7 +665,8 @@ impl Swarm {
             }
             Output::Store { token, record } => {
                 if let Some(Entry::Bid(bid)) = Entry::decode(&record) {
-                    let at = self.air.percept(id).map(|p| p.pose.position());
+                    let at = self.air.percept(id);
+                    let at = at.map(|p| (p.pose.position(), p.endurance_s));
                     self.checker
                         .on_bid(self.now_ms, id, &bid, (&peer.beliefs(), at));
                 }

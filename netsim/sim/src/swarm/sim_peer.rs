@@ -5,6 +5,7 @@ use super::stream::{Concern, Stream};
 use crate::check::PeerSnapshot;
 use crate::disk::Disk;
 use crate::spec::Spec;
+use skein_behaviors::Percept;
 use skein_peer::protocol::airtime::Filling;
 use skein_peer::{Input, Peer, PeerConfig, PeerId, Role, Time};
 use std::collections::VecDeque;
@@ -227,12 +228,20 @@ impl SimPeer {
     pub fn snapshot(&self, air: &Air) -> Option<PeerSnapshot> {
         let running = self.process == Process::Running;
         let peer = self.peer.as_ref().filter(|_| running)?;
+        let percept = air.percept(self.id());
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "the world counts fuel in milliseconds, and none is negative"
+        )]
+        let fuel_ms = |p: &Percept| (p.endurance_s * 1000.0) as u64;
         Some(PeerSnapshot {
             id: self.id(),
             speaks_as: self.config.id.0,
             uav: self.config.role == Role::Uav,
             since_ms: self.since_ms,
-            at: air.percept(self.id()).map(|p| p.pose.position()),
+            at: percept.as_ref().map(|p| p.pose.position()),
+            fuel_ms: percept.as_ref().map(fuel_ms),
             eta_ms: peer.eta_ms(),
             view: peer.beliefs(),
         })

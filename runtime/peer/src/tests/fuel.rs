@@ -2,12 +2,35 @@
 
 use super::covered;
 use crate::Input;
+use crate::mission::{Mission, PointMm};
 use crate::output::Report;
 use crate::testing::{Harness, mission};
 use crate::wire::codec::Body;
 use crate::wire::message::MissionStatus;
+use std::sync::Arc;
 
 const DUE: &str = "the fuel is due: returning to base";
+
+/// The straight way home from the farthest end of some cells, seconds.
+fn home_s<'a>(cells: impl Iterator<Item = &'a u16>) -> f64 {
+    let geometry = Arc::new(mission(1, 8, 6)).geometry().unwrap();
+    let lp = &geometry.coverage_loop;
+    let base = geometry.mission.base_m();
+    let away_m = |i: usize| (lp.boundary(i % lp.len()).position() - base).norm();
+    let ends = cells.map(|c| usize::from(*c)).flat_map(|i| [i, i + 1]);
+    ends.map(away_m).fold(0.0, f64::max) / 13.0
+}
+
+/// Whether a UAV comes home with its reserve, but for two seconds, from where its plan ends.
+fn comes_home(h: &mut Harness, id: u16) -> bool {
+    let b = h.beliefs(id);
+    let Some(last) = b.plan.last() else {
+        return true;
+    };
+    let cell_s = 5.0;
+    let takes_s = f64::from(h.eta_ms(id)) / 1000.0 + home_s([*last].iter()) - cell_s;
+    takes_s <= h.seat(id).fuel_s - 60.0 + 2.0
+}
 
 #[test]
 fn a_uav_whose_fuel_is_due_flies_home_and_the_other_finishes() {
@@ -39,12 +62,7 @@ fn no_plan_is_longer_than_what_may_be_spent() {
         h.run_s(1);
         let b = h.beliefs(1);
         longest = longest.max(b.plan.len());
-        let eta_ms = h.eta_ms(1);
-        assert!(
-            eta_ms <= b.spendable_ms + 2000,
-            "{eta_ms} {}",
-            b.spendable_ms
-        );
+        assert!(comes_home(&mut h, 1), "{b:?}");
     }
     assert!(longest > 4);
     let all = |(_, r): &(u64, Report)| matches!(r, Report::Alarm { text } if text.ends_with("beyond the endurance of all"));
@@ -56,12 +74,13 @@ fn a_plan_that_became_longer_than_the_fuel_is_cut_while_it_is_flown() {
     let mut h = Harness::started(2, mission(1, 8, 6));
     h.run_s(25);
     let before = h.beliefs(1);
-    let spent_ms = before.spendable_ms - h.eta_ms(1) / 2;
-    h.seat(1).fuel_s -= f64::from(spent_ms) / 1000.0;
+    let farthest_s = home_s(before.plan.iter());
+    let takes_s = f64::from(h.eta_ms(1)) / 2000.0 + farthest_s + 31.0;
+    h.seat(1).fuel_s = 60.0 + takes_s;
     h.run_s(2);
     let after = h.beliefs(1);
     assert!(!after.plan.is_empty() && after.plan.len() < before.plan.len());
-    assert!(h.eta_ms(1) <= after.spendable_ms, "{after:?}");
+    assert!(comes_home(&mut h, 1), "{after:?}");
     assert!(h.run_until(500, |h| h.beliefs(2).finished));
 }
 
@@ -87,7 +106,9 @@ fn cells_beyond_everybody_are_taken_once_somebody_has_the_fuel() {
     }
     let idle = |h: &Harness| [1, 2].iter().all(|id| h.beliefs(*id).plan.is_empty());
     assert!(h.run_until(60, |h| !h.beliefs(1).unassigned.is_empty()));
-    assert!(h.run_until(300, idle));
+    // What was left over is taken run by run, until nobody can fly any more of it.
+    let is_due = |h: &Harness| [1, 2].iter().all(|id| h.beliefs(*id).is_fuel_due);
+    assert!(h.run_until(300, is_due));
     h.run_s(20);
     let before = covered(&h, 1);
     assert!(idle(&h) && before < 48, "{before}");
@@ -135,4 +156,108 @@ fn who_was_refuelled_a_little_works_again_with_half_a_minute_to_spend() {
     }
     h.run_s(1);
     assert!(h.beliefs(1).able);
+}
+
+/// A rectangle between two corners, millimetres.
+fn rectangle(west: i32, south: i32, east: i32, north: i32) -> Vec<PointMm> {
+    vec![(west, south), (east, south), (east, north), (west, north)]
+}
+
+/// How far a UAV is from the base of a mission, metres.
+fn away_m(h: &Harness, id: u16, mission: &Mission) -> f64 {
+    let (pose, base) = (h.pose(id), mission.base_m());
+    (pose.east_m - base.x).hypot(pose.north_m - base.y)
+}
+
+/// Whether the fuel of the only UAV is due within three seconds with so much above its reserve,
+/// once it is so far from its base.
+fn is_due_at(mission: &Mission, far: impl Fn(f64) -> bool, above_s: f64, wind: (f64, f64)) -> bool {
+    let mut h = Harness::started(1, mission.clone());
+    h.seat(1).wind_mps = wind;
+    let at_work = |h: &Harness| !h.beliefs(1).plan.is_empty() && far(away_m(h, 1, mission));
+    assert!(h.run_until(200, at_work));
+    h.seat(1).fuel_s = 60.0 + above_s;
+    h.run_s(3);
+    h.beliefs(1).is_fuel_due
+}
+
+#[test]
+fn beside_the_base_it_flies_on_with_fuel_that_is_due_in_the_far_corner() {
+    let m = mission(1, 8, 6);
+    let calm = (0.0, 0.0);
+    assert!(!is_due_at(&m, |away_m| away_m < 250.0, 60.0, calm));
+    assert!(is_due_at(&m, |away_m| away_m > 500.0, 60.0, calm));
+}
+
+#[test]
+fn behind_a_wall_its_fuel_is_due_earlier() {
+    let open = Mission {
+        base: (192_000, -120_000),
+        ..mission(1, 8, 6)
+    };
+    let walled = Mission {
+        zones: vec![rectangle(-500_000, -50_000, 900_000, -40_000)],
+        ..open.clone()
+    };
+    let near = |away_m| away_m < 400.0;
+    assert!(!is_due_at(&open, near, 70.0, (0.0, 0.0)));
+    assert!(is_due_at(&walled, near, 70.0, (0.0, 0.0)));
+}
+
+#[test]
+fn the_way_home_against_the_wind_counts() {
+    let m = mission(1, 8, 6);
+    // The base lies in the southwest.
+    let far = |away_m| away_m > 400.0;
+    assert!(!is_due_at(&m, far, 90.0, (0.0, 0.0)));
+    assert!(is_due_at(&m, far, 90.0, (3.5, 3.0)));
+}
+
+#[test]
+fn the_last_cells_are_flown_beside_the_base_and_the_reserve_is_untouched() {
+    let m = mission(1, 8, 6);
+    let mut h = Harness::new(1, m.clone());
+    h.seat(1).fuel_s = 260.0;
+    h.start(1);
+    assert!(h.run_until(260, |h| h.beliefs(1).is_fuel_due));
+    let home = |h: &Harness| away_m(h, 1, &m) < 100.0;
+    assert!(h.run_until(90, home));
+    let left_s = h.seat(1).fuel_s;
+    assert!(left_s >= 60.0, "{left_s} s");
+    let seen = h.seat(1).reports.iter();
+    let seen = seen.filter(|(_, r)| matches!(r, Report::Covered { .. }));
+    let last_ms = seen.map(|(at, _)| *at).max().unwrap();
+    // From the farthest corner it is 73 s home: with that in reserve it would have turned home
+    // after 127 s.
+    assert!(last_ms > 130_000, "{last_ms} ms");
+}
+
+#[test]
+fn nothing_is_planned_from_where_there_is_no_way_home() {
+    // The base lies in a yard without a gate.
+    let yard = Mission {
+        base: (192_000, -250_000),
+        zones: vec![
+            rectangle(0, -100_000, 400_000, -90_000),
+            rectangle(0, -400_000, 10_000, -100_000),
+            rectangle(390_000, -400_000, 400_000, -100_000),
+            rectangle(0, -410_000, 400_000, -400_000),
+        ],
+        ..mission(1, 8, 6)
+    };
+    let mut h = Harness::started(2, yard);
+    for _ in 0..60 {
+        h.run_s(1);
+        for id in [1, 2] {
+            assert!(h.beliefs(id).plan.is_empty(), "{:?}", h.beliefs(id).plan);
+        }
+    }
+    for id in [1, 2] {
+        // Where it waits its camera sees some.
+        let (b, seen) = (h.beliefs(id), covered(&h, id));
+        assert_eq!(b.unassigned.len() + seen, 48);
+        let why = |a: &String| a.starts_with("no way home is known from ");
+        let told = h.alarms(id).into_iter().filter(why);
+        assert_eq!(told.count(), 1, "{:?}", h.alarms(id));
+    }
 }
