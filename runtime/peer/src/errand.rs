@@ -14,6 +14,7 @@
 
 use crate::mission::{Mission, point_m};
 use crate::offload::MissionGeometry;
+use crate::relay_circle::{self, RelayCircle};
 use crate::wire::tasks::{Task, TaskKind};
 use skein_behaviors::executive::GivenFlight;
 use skein_flight::coverage::ring::LoopProblem;
@@ -38,6 +39,15 @@ pub struct Errand {
     pub pieces: Arc<[Corners]>,
     /// From where it is seen.
     pub flight: GivenFlight,
+}
+
+/// What was planned for a task.
+#[derive(Clone, Debug)]
+pub enum Planned {
+    /// A flight from which all of it is seen.
+    Flight(Errand),
+    /// A circle to be held.
+    Circle(RelayCircle),
 }
 
 /// Who asks for such a flight, and for what.
@@ -86,6 +96,9 @@ impl Mission {
     /// A sentence that says why not.
     pub fn can_do(self: &Arc<Self>, task: &Task) -> Result<(), String> {
         let zones = self.no_fly_zones().map_err(|e| e.to_string())?;
+        if task.kind == TaskKind::Relay {
+            return self.relay_circle(task, &zones).map(drop);
+        }
         let problem = self.loop_problem(&zones).map_err(|e| e.to_string())?;
         planned(&problem, task).map(drop)
     }
@@ -95,7 +108,7 @@ impl Mission {
 fn planned(problem: &LoopProblem, task: &Task) -> Result<(Vec<Curve>, Vec<Corners>), String> {
     let targets = targets(task).ok_or_else(|| {
         format!(
-            "no mission flies tasks of the kind {:?} yet; expected a point or a line",
+            "no mission flies tasks of the kind {:?} yet; expected a point, a line or a relay position",
             task.kind
         )
     })?;
@@ -149,11 +162,20 @@ fn along(stations: &StationsProblem<'_>) -> Result<Curve, String> {
 }
 
 impl Request {
-    /// Plans the flight.
+    /// Plans the flight, or the circle.
     ///
     /// # Errors
     /// A sentence that says why there is none.
-    pub fn plan(&self) -> Result<Errand, String> {
+    pub fn plan(&self) -> Result<Planned, String> {
+        if self.task.kind == TaskKind::Relay {
+            let (mission, router) = (&self.geometry.mission, &self.geometry.router);
+            let circle = relay_circle::planned(mission, router, &self.task, self.from)?;
+            return Ok(Planned::Circle(circle));
+        }
+        self.flight().map(Planned::Flight)
+    }
+
+    fn flight(&self) -> Result<Errand, String> {
         let zones = self.geometry.router.zones();
         let mission = &self.geometry.mission;
         let problem = mission.loop_problem(zones).map_err(|e| e.to_string())?;
@@ -237,7 +259,7 @@ mod tests {
             from,
             airspeed_mps: 13.0,
         };
-        request.plan()
+        request.flight()
     }
 
     /// Which pieces some pose of a flight holds, looked at every metre.
@@ -303,7 +325,7 @@ mod tests {
                 task(TaskKind::Line, &[(205, 105), (255, 155)], 0),
                 "of the line cannot be seen",
             ),
-            (task(TaskKind::Relay, &[(100, 100)], 0), "no mission flies"),
+            (task(TaskKind::Track, &[(100, 100)], 0), "no mission flies"),
             (task(TaskKind::Pinpoint, &[(90_000, 0)], 0), ""),
         ] {
             let said = errand(&task, from).unwrap_err();

@@ -8,9 +8,12 @@
 //! | a period passes | likewise, with the present offer and who lives |
 //! | the auction gives a task to fly | its flight is planned beside the loop |
 //! | the flight is planned | it is flown between two cells of the section |
+//! | it is a relay position | the section is given up at once; the circle is flown until the task is over |
+//! | the circle is reached | begun: told |
+//! | the fuel lasts for as long as it takes others to come | others are asked to relieve it; it stays until one has begun |
 //! | all of it is seen | done: told, and the UAV is free for the next |
 //! | the flight is over and not all is seen, there is none | once more, then others are asked to relieve it |
-//! | the auction drops it, the fuel is due, another life begins | it is left |
+//! | the auction drops it, the fuel is due, the operator says return, another life begins | it is left |
 //! | its time is over | it is expired |
 //! | a ground station: somebody did a task of its operator, its time is over | that is told in the task's next revision |
 //!
@@ -20,10 +23,10 @@ use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
 use crate::cooperation::Situation;
 use crate::effect::{Effect, Effects, PendingJob};
-use crate::errand::{Errand, Request};
+use crate::errand::{Planned, Request};
 use crate::input::Time;
 use crate::mission::mm;
-use crate::mission_state::{MissionState, speed_mmps};
+use crate::mission_state::{MissionState, RelayPosition, speed_mmps};
 use crate::offload::Job;
 use crate::output::{Report, TaskNews};
 use crate::protocol::auction::flown::RoutedTime;
@@ -40,6 +43,7 @@ use crate::{Incarnation, PeerId};
 use skein_behaviors::Order;
 use skein_behaviors::executive::detour::Watched;
 use skein_flight::airframe::Airframe;
+use skein_geometry::Curve;
 use skein_geometry::hash::Fnv;
 use skein_geometry::math::wrap_pi;
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,6 +55,10 @@ const MAX_TRIES: u8 = 2;
 /// What nobody could do is offered for again after so many beacon periods, where that may
 /// have changed: a section is flown meanwhile.
 const AGAIN_PERIODS: u64 = 20;
+
+/// Why a relay position is nobody's while all others hold one, or there is one UAV alone.
+pub(crate) const KEPT_FOR_COVER: &str =
+    "nobody would be left to cover; it is taken when another UAV is there or everything is covered";
 
 /// A task that is known.
 #[derive(Clone, Debug)]
@@ -79,6 +87,19 @@ struct Flown {
     tries: u8,
     /// Whether its flight is the goal.
     is_planned: bool,
+    /// Of a relay position, how far it is with it.
+    held: Option<Held>,
+}
+
+/// How far a UAV is with a relay position.
+#[derive(Clone, Debug, Default)]
+struct Held {
+    /// The way home from there.
+    home: Curve,
+    /// Whether it was there, and said so.
+    has_begun: bool,
+    /// Whether it asked others to relieve it.
+    is_leaving: bool,
 }
 
 /// Tasks as one peer has them.
@@ -137,6 +158,7 @@ impl Tasking {
             && let Some(state) = state
         {
             state.set_errand(None);
+            state.relay = None;
         }
     }
 
@@ -162,11 +184,13 @@ impl Tasking {
         self.flown.as_ref().map(|f| f.id)
     }
 
-    /// Whether a task is open that somebody can do, as far as is known.
+    /// Whether a task is open that somebody can do, as far as is known; a relay position keeps
+    /// nobody in the air but who holds it.
     pub fn has_work(&self) -> bool {
         let hopeless = self.auction.unassigned();
+        let mine = |id: &TaskId| self.flown() == Some(*id);
         let mut open = self.known.iter().filter(|(_, k)| k.is_open());
-        open.any(|(id, _)| !hopeless.contains(id))
+        open.any(|(id, k)| !hopeless.contains(id) && (!k.task.is_held() || mine(id)))
     }
 
     /// What it holds, and what of all it knows to be open that somebody can do.
@@ -276,7 +300,8 @@ impl Tasking {
     /// Looks at everything that depends on time, and at what was heard.
     pub fn tick(&mut self, s: &Situation<'_>, order: Order, state: &mut MissionState) -> Effects {
         if s.role == Role::GroundStation {
-            state.has_tasks = self.known.values().any(Known::is_open);
+            let keeps = |k: &Known| k.is_open() && !k.task.is_held();
+            state.has_tasks = self.known.values().any(keeps);
             return self.tell_of_tasks(s);
         }
         let mut effects: Effects = self
@@ -295,8 +320,9 @@ impl Tasking {
     }
 
     /// Whether this UAV has anything to offer.
-    fn is_able(s: &Situation<'_>, state: &MissionState) -> bool {
+    fn is_able(s: &Situation<'_>, order: Order, state: &MissionState) -> bool {
         state.can_fly_plans(s)
+            && order != Order::ReturnToBase
             && !s.is_silent
             && !state.geometry.mission.cancelled
             && state.separation.is_none()
@@ -345,7 +371,7 @@ impl Tasking {
             }
         }
         let is_period = s.now.since_ms(self.last_period) >= s.membership.interval_ms();
-        let able = Self::is_able(s, state);
+        let able = Self::is_able(s, order, state);
         let is_told = is_period || able != self.was_able;
         let offer = (is_told && able).then(|| self.present(s, state)).flatten();
         if is_told {
@@ -356,10 +382,15 @@ impl Tasking {
             };
             events.push(Event::Live(live.filter(uav).map(PeerId).collect()));
             events.push(Event::Map(map_of(state)));
+            events.push(Event::Cells(!state.negotiation.sections.complete()));
             events.push(Event::Present(offer.unwrap_or_default()));
         }
+        let mut effects = Effects::new();
         if self.was_able && !able {
             events.push(Event::GiveUp);
+            if let Some(id) = self.flown() {
+                effects.extend(self.told(id, TaskNews::Left));
+            }
             self.leave(Some(state));
         }
         self.was_able = able;
@@ -374,7 +405,8 @@ impl Tasking {
         if self.flown.is_none() && able && order == Order::Resume {
             events.push(Event::Free);
         }
-        let mut effects = self.handle(events, state);
+        effects.extend(self.handle(events, state));
+        effects.extend(self.hold(s, state));
         // Without a percept, or while a mission changes, there was no flight to plan.
         if self.flown.as_ref().is_some_and(|f| !f.is_planned) {
             effects.extend(self.plan(state));
@@ -391,11 +423,13 @@ impl Tasking {
         }
         let Some(offer) = offer else { return false };
         let more = offer.endurance_ms > self.auction.bundle().1.offer.endurance_ms;
+        let kept = self.auction.kept_for_cover();
         let has = |id: &TaskId| {
             let known = self.known.get(id);
             known.is_some_and(|k| k.is_open() && carries(offer.sensors, k.task.sensor))
         };
-        let again = more && self.auction.unassigned().iter().any(has);
+        let mut hopeless = self.auction.unassigned().iter();
+        let again = more && hopeless.any(|id| has(id) && !kept.contains(id));
         if again {
             self.last_again = s.now;
         }
@@ -417,14 +451,22 @@ impl Tasking {
                     }
                 }
                 auction::Effect::Fly(id) => {
-                    let revision = self.known.get(&id).map_or(0, |k| k.task.revision);
+                    let known = self.known.get(&id).map(|k| &k.task);
+                    let is_held = known.is_some_and(Task::is_held);
                     self.flown = Some(Flown {
                         id,
-                        revision,
+                        revision: known.map_or(0, |task| task.revision),
                         tries: 0,
                         is_planned: false,
+                        held: is_held.then(Held::default),
                     });
-                    effects.extend(self.told(id, TaskNews::Flies));
+                    state.relay = is_held.then(RelayPosition::default);
+                    let news = if is_held {
+                        TaskNews::Relays
+                    } else {
+                        TaskNews::Flies
+                    };
+                    effects.extend(self.told(id, news));
                     effects.extend(self.plan(state));
                 }
             }
@@ -452,6 +494,7 @@ impl Tasking {
         let flown = self.flown.as_mut()?;
         flown.is_planned = false;
         state.set_errand(None);
+        state.relay = flown.held.is_some().then(RelayPosition::default);
         self.plan(state)
     }
 
@@ -459,7 +502,7 @@ impl Tasking {
     pub fn planned(
         &mut self,
         (id, revision): (TaskId, u32),
-        planned: Result<Errand, String>,
+        planned: Result<Planned, String>,
         state: &mut MissionState,
     ) -> Effects {
         let wanted = |f: &&mut Flown| f.id == id && f.revision == revision && !f.is_planned;
@@ -467,13 +510,60 @@ impl Tasking {
             return Effects::new();
         };
         match planned {
-            Ok(errand) => {
+            Ok(Planned::Flight(errand)) => {
                 flown.is_planned = true;
                 state.set_errand(Some((errand.flight, Watched::new(errand.pieces))));
                 vec![Effect::Negotiate]
             }
+            Ok(Planned::Circle(planned)) => {
+                flown.is_planned = true;
+                if let Some(held) = &mut flown.held {
+                    held.home = planned.home;
+                }
+                state.relay = Some(RelayPosition {
+                    circle: Some(planned.circle),
+                });
+                vec![Effect::Negotiate]
+            }
             Err(why) => self.relieve(&why, state),
         }
+    }
+
+    /// A relay position is reached, or its holder is to be relieved of it: its fuel will be due,
+    /// or in another wind the way home from there takes longer than what is kept for that.
+    fn hold(&mut self, s: &Situation<'_>, state: &mut MissionState) -> Effects {
+        let (Some(executive), Some(flown)) = (&state.executive, &mut self.flown) else {
+            return Effects::new();
+        };
+        let (id, Some(held)) = (flown.id, &mut flown.held) else {
+            return Effects::new();
+        };
+        if !flown.is_planned {
+            return Effects::new();
+        }
+        if executive.takes_ms(&held.home) > executive.home_ms() {
+            return self.relieve("the fuel kept for the way home is too little there", state);
+        }
+        let (mut events, mut news) = (Vec::new(), Vec::new());
+        if !held.has_begun && executive.is_on_circle() {
+            held.has_begun = true;
+            events.push(Event::Begun(id));
+            news.push(TaskNews::Holds);
+        }
+        let diameter = s.membership.diameter(s.now);
+        let settled_ms = relieved_ms(diameter, s.membership.interval_ms(), executive.home_ms());
+        let left_ms = u64::from(state.spendable_ms(s.percept));
+        if held.has_begun && !held.is_leaving && left_ms <= settled_ms {
+            held.is_leaving = true;
+            events.push(Event::Relieve(id));
+            news.push(TaskNews::Leaving);
+        }
+        let told = news.into_iter().filter_map(|news| self.told(id, news));
+        let mut effects: Effects = told.collect();
+        if !events.is_empty() {
+            effects.extend(self.handle(events, state));
+        }
+        effects
     }
 
     /// Others are asked to do what this UAV could not.
@@ -541,12 +631,17 @@ impl Tasking {
             return Effects::new();
         }
         let mut effects = Effects::new();
+        let kept = self.auction.kept_for_cover();
         for id in self.auction.unassigned() {
             let Some(known) = self.known.get_mut(id).filter(|k| k.is_open()) else {
                 continue;
             };
             if !core::mem::replace(&mut known.hopeless_told, true) {
-                let why = why_nobody(&known.task, self.auction.offers());
+                let why = if kept.contains(id) {
+                    KEPT_FOR_COVER.to_owned()
+                } else {
+                    why_nobody(&known.task, self.auction.offers())
+                };
                 effects.push(report(*id, &known.task, TaskNews::NobodyCan(why)));
             }
         }
@@ -624,6 +719,13 @@ pub(crate) fn why_nobody<'a>(task: &Task, offers: impl Iterator<Item = &'a Offer
     } else {
         "those who could have not the endurance beside their sections, or found no way".to_owned()
     }
+}
+
+/// How long before its fuel is due who holds a relay position asks to be relieved, milliseconds:
+/// all offer anew and settle, twice the patience of the auction, and whoever comes flies no
+/// longer than from anywhere home.
+fn relieved_ms(diameter: u32, interval_ms: u64, home_ms: u32) -> u64 {
+    2 * (2 * u64::from(diameter) + 3) * interval_ms + u64::from(home_ms)
 }
 
 /// Identifies the zones by which ways are reckoned.

@@ -7,6 +7,7 @@ use super::flight::{FlightCheck, Flyer, at_base};
 use super::listing::ListingCheck;
 use super::patience::PatienceCheck;
 use super::record::Said;
+use super::relays::RelayCheck;
 use super::spoken::SpokenCheck;
 use super::spread::SpreadCheck;
 use super::tasks::TaskCheck;
@@ -38,6 +39,8 @@ pub struct Rules {
     spoken: SpokenCheck,
     spread: SpreadCheck,
     tasks: TaskCheck,
+    /// Who holds relay positions.
+    pub relays: RelayCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -65,6 +68,7 @@ impl Rules {
             spoken: SpokenCheck::default(),
             spread: SpreadCheck::new(spec.twins()),
             tasks: TaskCheck::default(),
+            relays: RelayCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -282,6 +286,7 @@ impl Rules {
         self.spoken.on_snapshot(snapshot, found);
         self.spread.on_snapshot(snapshot, found);
         self.tasks.on_snapshot(snapshot, found);
+        self.relays.on_snapshot(snapshot, found);
         self.airtime.on_snapshot(snapshot, found);
         self.on_way_home(snapshot, found);
     }

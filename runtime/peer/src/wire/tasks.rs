@@ -138,9 +138,10 @@ pub struct Task {
     pub sensor: u8,
     /// What it is worth if it were done at once, 1 to 1000.
     pub worth: u16,
-    /// How long a UAV stays there, milliseconds.
+    /// How long a UAV stays there, milliseconds; 0 of what goes on: until somebody ends it.
     pub stay_ms: u32,
-    /// How far around the place, or to the sides of the line, is to be seen, mm.
+    /// How far around the place, or to the sides of the line, is to be seen; of a relay position
+    /// how far from the place a UAV may be that holds it, mm.
     pub radius_mm: u32,
     /// After so long it is not wanted any more, milliseconds from when it was asked for; 0
     /// for never.
@@ -158,6 +159,13 @@ impl Task {
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.state == TaskState::Open
+    }
+
+    /// Whether who does it stays until somebody ends it, and does nothing else meanwhile: a
+    /// relay position.
+    #[must_use]
+    pub fn is_held(&self) -> bool {
+        self.kind.goes_on() && self.stay_ms == 0
     }
 
     /// The revision in which it was asked for: that it was done is told in the next.
