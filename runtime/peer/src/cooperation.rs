@@ -262,6 +262,9 @@ impl Cooperation {
                 Event::Sighted { seen, of } => {
                     effects.extend(self.tasking.sighted(now, seen >= of, state));
                 }
+                Event::Refused { cells } if cells.is_empty() && state.relay.is_some() => {
+                    effects.extend(self.tasking.no_way(state));
+                }
                 Event::DetourFlown => effects.extend(self.tasking.flown_in_vain(state)),
                 event => effects.extend(state.on_event(event)),
             }

@@ -109,8 +109,12 @@ pub fn planned(
     from: Pose,
 ) -> Result<RelayCircle, String> {
     let circle = mission.relay_circle(task, router.zones())?;
+    // Who is nearer to a zone than that, since one came, gets away from it first.
+    let is_clear = router.zones().distance_m(from.position()) >= mission.clearance_m();
     let no_way = |_| "no way leads to it that keeps clear of the no-fly zones".to_owned();
-    router.route(from, circle.start).map_err(no_way)?;
+    if is_clear {
+        router.route(from, circle.start).map_err(no_way)?;
+    }
     let home = router.route_to_point(circle.start, mission.base_m());
     let home = home.map_err(|_| "no way leads home from it".to_owned())?;
     Ok(RelayCircle { circle, home })

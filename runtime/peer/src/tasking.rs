@@ -583,6 +583,11 @@ impl Tasking {
         effects
     }
 
+    /// There is no way to what it is to hold.
+    pub fn no_way(&mut self, state: &mut MissionState) -> Effects {
+        self.relieve("no way leads to it that keeps clear of the zones", state)
+    }
+
     /// The camera saw so many pieces of what is flown to.
     pub fn sighted(&mut self, now: Time, whole: bool, state: &mut MissionState) -> Effects {
         let Some(flown) = self.flown.clone().filter(|_| whole) else {
@@ -627,7 +632,7 @@ impl Tasking {
 
     /// People hear once that nobody can do a task.
     fn tell_hopeless(&mut self) -> Effects {
-        if !self.auction.is_agreed() {
+        if !self.auction.is_agreed() || self.auction.unassigned().is_empty() {
             return Effects::new();
         }
         let mut effects = Effects::new();

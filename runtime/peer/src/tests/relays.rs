@@ -204,6 +204,8 @@ fn who_is_told_to_return_leaves_its_position_to_others() {
     assert!(!relays(&h, one));
     // Who is told to hold stays where it is: on its circle.
     let next = others.iter().copied().find(|id| relays(&h, *id)).unwrap();
+    h.run_s(20);
+    assert_eq!(times(&mut h, next, &TaskNews::Holds), 1);
     h.order_one(GROUND_STATION, next, Order::Hold);
     h.run_s(60);
     assert!(away_m(&h, next) < WITHIN_M);
