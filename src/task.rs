@@ -63,6 +63,24 @@ pub enum Add {
         #[command(flatten)]
         how: How,
     },
+    /// An area that is to be seen, in one flight.
+    Area {
+        /// Latitude and longitude of its corners in degrees.
+        #[arg(value_name = "LAT,LON", value_parser = corner, num_args = 3.., required = true)]
+        corners: Vec<LatLon>,
+        /// After so long it is not wanted any more.
+        #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..=86_400))]
+        within_s: Option<u32>,
+        /// The sensor that it needs; only UAVs that carry it bid.
+        #[arg(long, value_name = "SENSOR", value_parser = SENSORS)]
+        needs: Option<String>,
+        /// What it is worth, next to other tasks.
+        #[arg(long, value_name = "WORTH", default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=i64::from(WORTH_MAX)))]
+        worth: u16,
+        /// What it is called from now on; without it `task-1` and so on.
+        #[arg(long, value_name = "NAME")]
+        id: Option<String>,
+    },
     /// A place that is to be held as a relay: who wins gives its section up and circles there.
     Relay {
         /// Latitude and longitude in degrees.
@@ -156,6 +174,23 @@ fn asked(add: &Add, origin: Origin) -> Result<NewTask, Refusal> {
     let (kind, way, how) = match add {
         Add::Point { place, how } => (TaskKind::Pinpoint, std::slice::from_ref(place), how),
         Add::Line { way, how } => (TaskKind::Line, &way[..], how),
+        Add::Area {
+            corners,
+            within_s,
+            needs,
+            worth,
+            id,
+        } => {
+            return Ok(NewTask {
+                name: id.clone(),
+                kind: TaskKind::Area,
+                places: corners.iter().map(place).collect::<Result<_, Refusal>>()?,
+                radius_mm: 0,
+                worth: *worth,
+                within_ms: within_s.map(|s| s * 1000),
+                sensor: needs.as_deref().and_then(sensor_of_name).unwrap_or(0),
+            });
+        }
         Add::Relay {
             place: at,
             for_s,
@@ -272,6 +307,9 @@ mod tests {
         let line = added("task add line 60,25 60.001,25 60.001,25.002").unwrap();
         assert_eq!((line.kind, line.places.len()), (TaskKind::Line, 3));
         assert_eq!((line.worth, line.within_ms, line.sensor), (100, None, 0));
+        let area = added("task add area 60,25 60.001,25 60.001,25.002 --within-s 90").unwrap();
+        assert_eq!((area.kind, area.places.len()), (TaskKind::Area, 3));
+        assert_eq!((area.within_ms, area.radius_mm), (Some(90_000), 0));
         let relay = added("task add relay 60.001,25 --for 300 --id link").unwrap();
         assert_eq!((relay.kind, relay.radius_mm), (TaskKind::Relay, 100_000));
         assert_eq!((relay.within_ms, relay.places.len()), (Some(300_000), 1));
@@ -285,6 +323,7 @@ mod tests {
             "task add point 60,25 --needs eyes",
             "task add point 60,25 --worth 0",
             "task add line 60,25",
+            "task add area 60,25 60.001,25",
             "task add relay 60,25 60,26",
             "task add relay 60,25 --within-s 60",
             "task cancel",

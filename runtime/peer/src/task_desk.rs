@@ -287,7 +287,10 @@ impl Cooperation {
         let author = self.tasking.me_id();
         match edit {
             TaskEdit::Add(new) => {
-                let (number, task) = self.tasking.asked_for(new)?;
+                let (number, mut task) = self.tasking.asked_for(new)?;
+                if let Some(mission) = mission {
+                    task.stay_ms = mission.area_ms(&task)?;
+                }
                 let id = TaskId { author, number };
                 let mut effects = self.tasking.learn(now, id, task.clone());
                 effects.push(Effect::Speak(number, Body::Task(task)));

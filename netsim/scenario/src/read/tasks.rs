@@ -1,5 +1,5 @@
-//! Tasks that the operator of a scenario asks for in flight: a place or a line, within a time,
-//! for a sensor; or a relay position, for a time.
+//! Tasks that the operator of a scenario asks for in flight: a place, a line or an area, within
+//! a time, for a sensor; or a relay position, for a time.
 
 use super::shared::position;
 use skein_interop::json::{Error, Node, suggestion};
@@ -23,19 +23,23 @@ pub(crate) const RELAY_RADIUS_M: f64 = 100.0;
 /// Reads `task_add`.
 pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
     let f = node.fields(&[
-        "id", "point", "line", "relay", "radius_m", "within_s", "for_s", "needs", "worth",
+        "id", "point", "line", "area", "relay", "radius_m", "within_s", "for_s", "needs", "worth",
     ])?;
     let place = |node: &Node<'_>| {
         let at = position(&node.fields(&["east_m", "north_m"])?)?;
         Ok(vec![(mm(at.x), mm(at.y))])
     };
-    let (kind, places) = match (f.get("point"), f.get("line"), f.get("relay")) {
-        (Some(point), None, None) => (TaskKind::Pinpoint, place(point)?),
-        (None, Some(line), None) => (TaskKind::Line, places(line)?),
-        (None, None, Some(relay)) => (TaskKind::Relay, place(relay)?),
+    let given = ["point", "line", "area", "relay"];
+    let given = given.iter().filter_map(|name| Some((*name, f.get(name)?)));
+    let given: Vec<_> = given.collect();
+    let (kind, places) = match given[..] {
+        [("point", point)] => (TaskKind::Pinpoint, place(point)?),
+        [("line", line)] => (TaskKind::Line, places(line, 2)?),
+        [("area", area)] => (TaskKind::Area, places(area, 3)?),
+        [("relay", relay)] => (TaskKind::Relay, place(relay)?),
         _ => {
             return Err(node.wrong(
-                "expected either point: { east_m: 250, north_m: 250 }, line: [{ east_m: 0, north_m: 0 }, ...] or relay: { east_m: 250, north_m: 250 }",
+                "expected either point: { east_m: 250, north_m: 250 }, line: [{ east_m: 0, north_m: 0 }, ...], area: [three corners or more] or relay: { east_m: 250, north_m: 250 }",
             ));
         }
     };
@@ -48,7 +52,11 @@ pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
     if let Some(other) = f.get(other) {
         return Err(other.wrong(format!(
             "a {} says {lasts}",
-            if is_held { "relay" } else { "point or line" }
+            if is_held {
+                "relay"
+            } else {
+                "point, line or area"
+            }
         )));
     }
     let radius_m = f.number_or("radius_m", usual_m, 0.0, 1_000.0, "metres")?;
@@ -81,11 +89,11 @@ pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
     Ok(Fault::AddTask { task })
 }
 
-fn places(line: &Node<'_>) -> Result<Vec<(i32, i32)>, Error> {
+fn places(line: &Node<'_>, least: usize) -> Result<Vec<(i32, i32)>, Error> {
     let items = line.items()?;
-    if !(2..=TASK_PLACES_MAX).contains(&items.len()) {
+    if !(least..=TASK_PLACES_MAX).contains(&items.len()) {
         return Err(line.wrong(format!(
-            "has {} places; expected 2 to {TASK_PLACES_MAX}",
+            "has {} places; expected {least} to {TASK_PLACES_MAX}",
             items.len()
         )));
     }
@@ -164,6 +172,11 @@ mod tests {
                 add(&format!("id: 'a', {relay}, within_s: 9")),
                 "",
                 "within_s: a relay says for_s",
+            ),
+            (
+                add("id: 'a', area: [{ east_m: 9, north_m: 9 }, { east_m: 9, north_m: 99 }]"),
+                "",
+                "has 2 places; expected 3 to",
             ),
             (
                 add(&format!("id: 'a', {point}, {relay}")),

@@ -67,7 +67,8 @@ pub enum TaskKind {
     Pinpoint,
     /// To be flown along once, from either end.
     Line,
-    /// A place and what lies around it, seen in the time that it says.
+    /// A place and what lies around it, or what lies within corners, seen in the time that it
+    /// says.
     Area,
     /// A target to be followed from that place on.
     Track,
@@ -132,7 +133,7 @@ pub struct Task {
     pub state: TaskState,
     /// What kind it is.
     pub kind: TaskKind,
-    /// Where: one place, of a line at least two.
+    /// Where: one place, of a line at least two, of an area one or its corners.
     pub places: Vec<TaskPlace>,
     /// The sensor that it needs, 1 to 32; 0 for any.
     pub sensor: u8,
@@ -394,13 +395,13 @@ fn is_near(mm: i32) -> bool {
 
 /// The first field of a task that is out of range.
 pub(crate) fn check_task(t: &Task) -> Result<(), WireError> {
-    let least = if t.kind == TaskKind::Line { 2 } else { 1 };
-    let most = if t.kind == TaskKind::Line {
-        TASK_PLACES_MAX
-    } else {
-        1
+    let n = t.places.len();
+    let fits = match t.kind {
+        TaskKind::Line => (2..=TASK_PLACES_MAX).contains(&n),
+        TaskKind::Area => n == 1 || (3..=TASK_PLACES_MAX).contains(&n),
+        TaskKind::Pinpoint | TaskKind::Track | TaskKind::Relay => n == 1,
     };
-    in_range("places", (least..=most).contains(&t.places.len()))?;
+    in_range("places", fits)?;
     in_range("places", t.places.is_sorted_by(|a, b| a != b))?;
     let near = |p: &TaskPlace| is_near(p.east_mm) && is_near(p.north_mm);
     in_range("places", t.places.iter().all(near))?;
@@ -473,7 +474,7 @@ pub(super) const TASK: &[Place] = &[
     ),
     at(
         "places",
-        "where: one place, of a line at least two",
+        "where: one place, of a line at least two, of an area one or its corners",
         Shape::Rows(PLACE, TASK_PLACES_MAX),
     ),
     at(

@@ -206,7 +206,12 @@ fn flown(at: &Airborne, task: &Task, ways: &impl Ways) -> Option<(Airborne, u32)
     if at.offer.speed_mmps == 0 || at.stays || !at.has(task.sensor) {
         return None;
     }
-    let mut flown = at.along(&task.places, ways)?;
+    // An area is begun at a corner, and its time says how long it takes.
+    let way = match task.kind {
+        TaskKind::Area => task.places.get(..1)?,
+        _ => &task.places[..],
+    };
+    let mut flown = at.along(way, ways)?;
     if task.kind == TaskKind::Line {
         let back: Vec<TaskPlace> = task.places.iter().rev().copied().collect();
         let back = at.along(&back, ways).filter(|b| b.1 < flown.1);
@@ -335,6 +340,13 @@ mod tests {
         // Who holds it has no section to fly.
         assert!(fly(lasts(40_000, 200_000), &relay).is_some());
         assert!(fly(lasts(40_000, 200_000), &ahead).is_none());
+    }
+
+    #[test]
+    fn an_area_takes_its_time_from_its_first_corner_on() {
+        let mut area = task(TaskKind::Area, &[at(1200, 0), at(1400, 0), at(1400, 300)]);
+        area.stay_ms = 60_000;
+        assert_eq!(fly(OFFER, &area), Some((120_000, 33_333_333)));
     }
 
     #[test]
