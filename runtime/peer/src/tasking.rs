@@ -19,6 +19,8 @@
 //!
 //! While no task is open nothing is said.
 
+mod relaying;
+
 use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
 use crate::cooperation::Situation;
@@ -40,10 +42,11 @@ use crate::wire::tasks::{
     Bundle, BundleTask, Offer, Progress, Task, TaskId, TaskState, sensor_name,
 };
 use crate::{Incarnation, PeerId};
+use relaying::Held;
+pub(crate) use relaying::KEPT_FOR_COVER;
 use skein_behaviors::Order;
 use skein_behaviors::executive::detour::Watched;
 use skein_flight::airframe::Airframe;
-use skein_geometry::Curve;
 use skein_geometry::hash::Fnv;
 use skein_geometry::math::wrap_pi;
 use std::collections::{BTreeMap, BTreeSet};
@@ -55,10 +58,6 @@ const MAX_TRIES: u8 = 2;
 /// What nobody could do is offered for again after so many beacon periods, where that may
 /// have changed: a section is flown meanwhile.
 const AGAIN_PERIODS: u64 = 20;
-
-/// Why a relay position is nobody's while all others hold one, or there is one UAV alone.
-pub(crate) const KEPT_FOR_COVER: &str =
-    "nobody would be left to cover; it is taken when another UAV is there or everything is covered";
 
 /// A task that is known.
 #[derive(Clone, Debug)]
@@ -89,17 +88,6 @@ struct Flown {
     is_planned: bool,
     /// Of a relay position, how far it is with it.
     held: Option<Held>,
-}
-
-/// How far a UAV is with a relay position.
-#[derive(Clone, Debug, Default)]
-struct Held {
-    /// The way home from there.
-    home: Curve,
-    /// Whether it was there, and said so.
-    has_begun: bool,
-    /// Whether it asked others to relieve it.
-    is_leaving: bool,
 }
 
 /// Tasks as one peer has them.
@@ -529,43 +517,6 @@ impl Tasking {
         }
     }
 
-    /// A relay position is reached, or its holder is to be relieved of it: its fuel will be due,
-    /// or in another wind the way home from there takes longer than what is kept for that.
-    fn hold(&mut self, s: &Situation<'_>, state: &mut MissionState) -> Effects {
-        let (Some(executive), Some(flown)) = (&state.executive, &mut self.flown) else {
-            return Effects::new();
-        };
-        let (id, Some(held)) = (flown.id, &mut flown.held) else {
-            return Effects::new();
-        };
-        if !flown.is_planned {
-            return Effects::new();
-        }
-        if executive.takes_ms(&held.home) > executive.home_ms() {
-            return self.relieve("the fuel kept for the way home is too little there", state);
-        }
-        let (mut events, mut news) = (Vec::new(), Vec::new());
-        if !held.has_begun && executive.is_on_circle() {
-            held.has_begun = true;
-            events.push(Event::Begun(id));
-            news.push(TaskNews::Holds);
-        }
-        let diameter = s.membership.diameter(s.now);
-        let settled_ms = relieved_ms(diameter, s.membership.interval_ms(), executive.home_ms());
-        let left_ms = u64::from(state.spendable_ms(s.percept));
-        if held.has_begun && !held.is_leaving && left_ms <= settled_ms {
-            held.is_leaving = true;
-            events.push(Event::Relieve(id));
-            news.push(TaskNews::Leaving);
-        }
-        let told = news.into_iter().filter_map(|news| self.told(id, news));
-        let mut effects: Effects = told.collect();
-        if !events.is_empty() {
-            effects.extend(self.handle(events, state));
-        }
-        effects
-    }
-
     /// Others are asked to do what this UAV could not.
     fn relieve(&mut self, why: &str, state: &mut MissionState) -> Effects {
         let Some(id) = self.flown() else {
@@ -581,11 +532,6 @@ impl Tasking {
         effects.extend(self.handle(vec![Event::Relieve(id)], state));
         effects.push(Effect::Negotiate);
         effects
-    }
-
-    /// There is no way to what it is to hold.
-    pub fn no_way(&mut self, state: &mut MissionState) -> Effects {
-        self.relieve("no way leads to it that keeps clear of the zones", state)
     }
 
     /// The camera saw so many pieces of what is flown to.
@@ -724,13 +670,6 @@ pub(crate) fn why_nobody<'a>(task: &Task, offers: impl Iterator<Item = &'a Offer
     } else {
         "those who could have not the endurance beside their sections, or found no way".to_owned()
     }
-}
-
-/// How long before its fuel is due who holds a relay position asks to be relieved, milliseconds:
-/// all offer anew and settle, twice the patience of the auction, and whoever comes flies no
-/// longer than from anywhere home.
-fn relieved_ms(diameter: u32, interval_ms: u64, home_ms: u32) -> u64 {
-    2 * (2 * u64::from(diameter) + 3) * interval_ms + u64::from(home_ms)
 }
 
 /// Identifies the zones by which ways are reckoned.
