@@ -17,7 +17,9 @@ use std::process::ExitCode;
 /// Asks for tasks in flight and cancels them.
 ///
 /// The UAVs settle by auction who does which: who wins leaves its section between two cells,
-/// flies there, and comes back. A task is done when a UAV saw all of it. The mission is over
+/// flies there, and comes back. A task is done when a UAV saw all of it. A relay
+/// position is held until it is cancelled or its time is over, and keeps nobody else in the air;
+/// while cells are open one UAV at least is left to cover. The mission is over
 /// when everything is covered and no task is open that somebody can do. Without flags the
 /// ground station of the only running trial is meant.
 #[derive(Debug, Args)]
@@ -60,6 +62,42 @@ pub enum Add {
         /// How it is to be done.
         #[command(flatten)]
         how: How,
+    },
+    /// An area that is to be seen, in one flight.
+    Area {
+        /// Latitude and longitude of its corners in degrees.
+        #[arg(value_name = "LAT,LON", value_parser = corner, num_args = 3.., required = true)]
+        corners: Vec<LatLon>,
+        /// After so long it is not wanted any more.
+        #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..=86_400))]
+        within_s: Option<u32>,
+        /// The sensor that it needs; only UAVs that carry it bid.
+        #[arg(long, value_name = "SENSOR", value_parser = SENSORS)]
+        needs: Option<String>,
+        /// What it is worth, next to other tasks.
+        #[arg(long, value_name = "WORTH", default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=i64::from(WORTH_MAX)))]
+        worth: u16,
+        /// What it is called from now on; without it `task-1` and so on.
+        #[arg(long, value_name = "NAME")]
+        id: Option<String>,
+    },
+    /// A place that is to be held as a relay: who wins gives its section up and circles there.
+    Relay {
+        /// Latitude and longitude in degrees.
+        #[arg(value_name = "LAT,LON", value_parser = corner)]
+        place: LatLon,
+        /// For how long it is to be held; without it until it is cancelled.
+        #[arg(long = "for", value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..=86_400))]
+        for_s: Option<u32>,
+        /// How far from the place a UAV may be that holds it.
+        #[arg(long, value_name = "METRES", default_value_t = 100.0, value_parser = radius_m)]
+        radius_m: f64,
+        /// What it is worth, next to other tasks.
+        #[arg(long, value_name = "WORTH", default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=i64::from(WORTH_MAX)))]
+        worth: u16,
+        /// What it is called from now on; without it `task-1` and so on.
+        #[arg(long, value_name = "NAME")]
+        id: Option<String>,
     },
     /// A line that is to be seen along its length, from either end.
     Line {
@@ -129,13 +167,47 @@ pub fn run(args: &TaskArgs) -> anyhow::Result<ExitCode> {
 
 /// The task that is asked for, in the plane of the mission.
 fn asked(add: &Add, origin: Origin) -> Result<NewTask, Refusal> {
-    let (kind, way, how) = match add {
-        Add::Point { place, how } => (TaskKind::Pinpoint, std::slice::from_ref(place), how),
-        Add::Line { way, how } => (TaskKind::Line, &way[..], how),
-    };
     let place = |p: &LatLon| {
         let at = to_plane(origin, *p).map_err(Refusal::of_input)?;
         Ok((mm(at.x), mm(at.y)))
+    };
+    let (kind, way, how) = match add {
+        Add::Point { place, how } => (TaskKind::Pinpoint, std::slice::from_ref(place), how),
+        Add::Line { way, how } => (TaskKind::Line, &way[..], how),
+        Add::Area {
+            corners,
+            within_s,
+            needs,
+            worth,
+            id,
+        } => {
+            return Ok(NewTask {
+                name: id.clone(),
+                kind: TaskKind::Area,
+                places: corners.iter().map(place).collect::<Result<_, Refusal>>()?,
+                radius_mm: 0,
+                worth: *worth,
+                within_ms: within_s.map(|s| s * 1000),
+                sensor: needs.as_deref().and_then(sensor_of_name).unwrap_or(0),
+            });
+        }
+        Add::Relay {
+            place: at,
+            for_s,
+            radius_m,
+            worth,
+            id,
+        } => {
+            return Ok(NewTask {
+                name: id.clone(),
+                kind: TaskKind::Relay,
+                places: vec![place(at)?],
+                radius_mm: mm(*radius_m).unsigned_abs(),
+                worth: *worth,
+                within_ms: for_s.map(|s| s * 1000),
+                sensor: 0,
+            });
+        }
     };
     Ok(NewTask {
         name: how.id.clone(),
@@ -235,6 +307,12 @@ mod tests {
         let line = added("task add line 60,25 60.001,25 60.001,25.002").unwrap();
         assert_eq!((line.kind, line.places.len()), (TaskKind::Line, 3));
         assert_eq!((line.worth, line.within_ms, line.sensor), (100, None, 0));
+        let area = added("task add area 60,25 60.001,25 60.001,25.002 --within-s 90").unwrap();
+        assert_eq!((area.kind, area.places.len()), (TaskKind::Area, 3));
+        assert_eq!((area.within_ms, area.radius_mm), (Some(90_000), 0));
+        let relay = added("task add relay 60.001,25 --for 300 --id link").unwrap();
+        assert_eq!((relay.kind, relay.radius_mm), (TaskKind::Relay, 100_000));
+        assert_eq!((relay.within_ms, relay.places.len()), (Some(300_000), 1));
         assert!(added("task add point -33,-70").unwrap_err().contains("km"));
         for wrong in [
             "task add",
@@ -245,6 +323,9 @@ mod tests {
             "task add point 60,25 --needs eyes",
             "task add point 60,25 --worth 0",
             "task add line 60,25",
+            "task add area 60,25 60.001,25",
+            "task add relay 60,25 60,26",
+            "task add relay 60,25 --within-s 60",
             "task cancel",
         ] {
             assert!(added(wrong).is_err(), "{wrong}");

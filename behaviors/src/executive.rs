@@ -4,7 +4,9 @@
 //!
 //! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
 //! it cell by cell. Ways between cells come from [`transit`], what the camera saw from
-//! [`camera`], a flight between cells and what it is for from [`detour`], expectations for the peer from [`prediction`], what the fuel allows from [`endurance`], what stays of a flight when the
+//! [`camera`], the way to a given circle from [`circle`], a flight between cells and what it
+//! is for from [`detour`], expectations for the peer from [`prediction`], what the fuel allows
+//! from [`endurance`], what stays of a flight when the
 //! goal changes from `goal_change`, how far a given flight reaches from [`given`], the proof of each stretch from `clearance_check`;
 //! following the track and the safety of every setpoint are the reactive layer's.
 //!
@@ -13,6 +15,7 @@
 //! | hold | the nearest circle with room | none |
 //! | legs | open cells in order, then a circle | `Seen`, `Refused`, `PlanDone` once |
 //! | point | a route, then a circle | `Refused` without cells if there is no route |
+//! | circle | a route to the given circle, then that | likewise |
 //! | given | a route to its start, its pieces, then a circle | `CutShort` where it ends early, `PlanDone` once |
 //! | detour | the cell that is flown, a given flight, then legs | those of both, `DetourFlown` once |
 //!
@@ -25,6 +28,7 @@
 //! asked only where the next open cell does not follow on the loop.
 
 pub mod camera;
+pub mod circle;
 mod clearance_check;
 pub mod detour;
 pub mod endurance;
@@ -103,6 +107,8 @@ pub enum Goal {
     Legs(Vec<Leg>),
     /// Fly to this point, then loiter around it.
     Point(Point),
+    /// Fly to this circle and stay on it.
+    Circle(Segment),
     /// Fly this from its start to its end, then loiter.
     Given(GivenFlight),
     /// Fly this once the cell that is being flown is done, then these legs, then loiter.
@@ -133,6 +139,7 @@ enum Aim {
     Hold,
     Legs,
     Point(Point),
+    Circle(Segment),
     Given,
     Detour,
 }
@@ -600,6 +607,12 @@ impl Executive {
                 None => events.push(Event::Refused { cells: Vec::new() }),
             }
         }
+        if let Aim::Circle(circle) = self.aim {
+            match self.transit.way_to_circle(at, &circle) {
+                Some(moves) => return moves,
+                None => events.push(Event::Refused { cells: Vec::new() }),
+            }
+        }
         self.transit.way_to_loiter(at)
     }
 
@@ -666,7 +679,7 @@ impl Executive {
             Aim::Legs => legs(),
             Aim::Given => !self.is_given_left(),
             Aim::Detour => is_detour_flown && legs(),
-            Aim::Hold | Aim::Point(_) => false,
+            Aim::Hold | Aim::Point(_) | Aim::Circle(_) => false,
         };
         if are_flown && !self.end_reported {
             self.end_reported = true;

@@ -51,6 +51,7 @@ fn the_operator_of_a_trial_revises_the_mission_adds_a_zone_and_calls_all_home() 
     a_zone_is_added(&place);
     a_uav_says_why(&place);
     a_task_is_done(&place);
+    a_relay_position_is_held(&place);
 
     // One is told alone, and only it turns home.
     let (code, said) = place.skein(&["mission", "rtb", "--uav", "3"]);
@@ -161,6 +162,46 @@ fn a_task_is_done(place: &Place) {
     crate::support::wait_until(DEADLINE, "who did it says so", || {
         let (code, why) = place.skein(&["why", &by]);
         code == 0 && why.contains("it did the task \"gate\"")
+    });
+}
+
+/// A relay position is asked for in flight: somebody holds it until it is cancelled.
+fn a_relay_position_is_held(place: &Place) {
+    let task = [
+        "task",
+        "add",
+        "relay",
+        "60.168642,24.938208",
+        "--id",
+        "link",
+    ];
+    let narrow = [&task[..4], &["--radius-m", "5"]].concat();
+    let (code, said) = place.skein(&narrow);
+    assert!(code == 3 && said.contains("expected a radius"), "{said}");
+    let (code, said) = place.skein(&task);
+    assert!(
+        code == 0 && said.contains("the task link is asked for"),
+        "{said}"
+    );
+    let link = || {
+        let (_, said) = place.skein(&["task", "list"]);
+        let line = said.lines().find(|line| line.starts_with("link"));
+        line.unwrap_or_default().to_owned()
+    };
+    crate::support::wait_until(DEADLINE, "somebody holds the relay position", || {
+        link().contains("begun")
+    });
+    let line = link();
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let by = words.iter().find(|word| word.starts_with("uav"));
+    let by = by.copied().unwrap_or_default().to_owned();
+    let (code, why) = place.skein(&["why", &by]);
+    assert!(code == 0 && why.contains("relay position"), "{why}");
+    let (code, said) = place.skein(&["task", "cancel", "link"]);
+    assert_eq!(code, 0, "{said}");
+    crate::support::wait_until(DEADLINE, "the relay position is left", || {
+        let (code, why) = place.skein(&["why", &by]);
+        code == 0 && why.contains("it left the task \"link\"")
     });
 }
 

@@ -9,9 +9,10 @@
 //! here that keeps farthest.
 
 use super::Event;
+use super::circle::halves;
 use super::transit::{ESCAPE_SLACK_M, Move, Place, Transit};
+use skein_geometry::Segment;
 use skein_geometry::frame::Pose;
-use skein_geometry::{Curve, Segment};
 
 /// A given flight may come this much nearer than the clearance, metres: whoever planned it
 /// rounded, too.
@@ -85,10 +86,4 @@ impl Transit {
         events.push(Event::Refused { cells });
         Vec::new()
     }
-}
-
-/// A full circle in two halves, because a whole one ends where it begins.
-fn halves(circle: &Segment) -> Curve {
-    let piece = (circle.curvature_per_m, 0.5 * circle.length_m);
-    Curve::from_pieces(circle.start, &[piece, piece])
 }

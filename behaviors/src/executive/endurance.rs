@@ -8,13 +8,15 @@
 //! A cell that [`Executive::within_endurance`] lets stay ends where the way home is known, and
 //! with at least what that takes, turns included, beside the reserve.
 
+use super::Executive;
 use super::prediction::{UNREACHABLE_MS, whole_ms};
 use super::transit::{Move, Place, Transit};
 use super::way_home::{WaysHome, flown_s, is_straight_clear, straight_s};
-use super::{Executive, GivenFlight};
 use crate::percept::Percept;
 use skein_flight::coverage::ring::Direction;
 use skein_flight::coverage::ring::backtracking::Leg;
+use skein_flight::trajectory::dubins::shortest;
+use skein_geometry::Curve;
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::PI;
 use std::cell::Cell;
@@ -218,7 +220,7 @@ impl Executive {
     /// Whether there is enough left to fly what a task asks for, once the cell that is flown is
     /// done, and to come home from its end.
     #[must_use]
-    pub fn returns_from(&self, flight: &GivenFlight, percept: &Percept) -> bool {
+    pub fn returns_from(&self, flown: &Curve, percept: &Percept) -> bool {
         let (Some(home), Some(here)) = (&self.home, self.here()) else {
             return true;
         };
@@ -228,10 +230,17 @@ impl Executive {
             (s.end.pose, self.air_m_until(s.end_m))
         });
         let transit = &self.transit;
+        let router = &transit.router;
+        let here_m = router.zones().distance_m(from.position());
         let takes_ms = || {
-            let (start, end) = flight.curve.start().zip(flight.curve.end())?;
-            let there = transit.route(from, start).ok()?;
-            let air_m = [&there, &flight.curve].map(|curve| transit.air().air_length_m(curve));
+            let (start, end) = flown.start().zip(flown.end())?;
+            // No route begins where a zone came near: the UAV gets away from it first.
+            let there = if here_m < router.limits().clearance_m {
+                shortest(from, start, transit.turn_radius_m())
+            } else {
+                transit.route(from, start).ok()?
+            };
+            let air_m = [&there, flown].map(|curve| transit.air().air_length_m(curve));
             let flown_ms = self.ms(before_m + air_m.iter().sum::<f64>());
             home.off_loop_ms(transit, end)?.checked_add(flown_ms)
         };

@@ -19,6 +19,7 @@ impl Executive {
         let goal = match goal {
             // By promises nothing but cells is flown.
             Goal::Detour(_, legs) if self.contingency.is_some() => Goal::Legs(legs),
+            Goal::Circle(_) if self.contingency.is_some() => Goal::Hold,
             goal => goal,
         };
         if !matches!(goal, Goal::Given(_) | Goal::Detour(..)) {
@@ -37,13 +38,22 @@ impl Executive {
             }
             Goal::Hold => (
                 Aim::Hold,
-                self.loitering(self.aim == Aim::Hold),
+                // Who circles where it was told to stays there.
+                self.loitering(matches!(self.aim, Aim::Hold | Aim::Circle(_))),
                 VecDeque::new(),
             ),
             Goal::Point(p) => {
                 let same = self.aim == Aim::Point(p) && !self.replan;
                 (
                     Aim::Point(p),
+                    if same { self.stretches.len() } else { 0 },
+                    VecDeque::new(),
+                )
+            }
+            Goal::Circle(circle) => {
+                let same = self.aim == Aim::Circle(circle) && !self.replan;
+                (
+                    Aim::Circle(circle),
                     if same { self.stretches.len() } else { 0 },
                     VecDeque::new(),
                 )

@@ -547,7 +547,7 @@ impl<'a> Trial<'a> {
 
     fn is_over(&mut self) -> bool {
         let live = self.account.live_uavs();
-        let finished = live.iter().all(|id| self.account.is_finished(*id));
+        let finished = live.iter().all(|id| self.account.is_through(*id));
         self.all_finished_ms = finished.then(|| self.all_finished_ms.unwrap_or(self.now_ms));
         let longest_ms = if self.cancelled {
             CANCELLED_IDLE_MS

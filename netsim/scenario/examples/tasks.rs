@@ -4,9 +4,12 @@
 //! The arguments are a scenario, numbers of UAVs, seeds, tasks a run, and what goes wrong
 //! meanwhile: `none`, `deaths` (a quarter of the UAVs are killed, one every twenty seconds from
 //! the 60th on) or `storm` (what the storm of the seed draws). A sixth argument, `base` or
-//! `spread`, says where the UAVs begin. Prints a line a number of UAVs: the share of
+//! `spread`, says where the UAVs begin, a seventh, how many relay positions are asked for
+//! besides; `own` for those of the scenario. Prints a line a number of UAVs: the share of
 //! tasks that was seen, the time from the request until that, the makespan over that without
-//! tasks, the bytes, what was done more than once, and the rules broken.
+//! tasks, the bytes, what was done more than once, and the rules broken; with relay positions a
+//! second one: the share of the time in which each was held, and in which the ground station
+//! knew of more, or of less, of what was seen than without them.
 
 use skein_geometry::random::SplitMix64;
 use skein_netsim::fault::{Fault, TimedFault};
@@ -44,12 +47,13 @@ fn main() -> ExitCode {
                 return ExitCode::from(2);
             }
         };
-        compare(&prepared, &seeds, n_tasks, &wrong);
+        compare(&prepared, &seeds, (n_tasks, &arg(6, "0")), &wrong);
     }
     ExitCode::SUCCESS
 }
 
-fn compare(prepared: &Prepared, seeds: &Seeds, n_tasks: usize, wrong: &str) {
+fn compare(prepared: &Prepared, seeds: &Seeds, (n_tasks, relays): (usize, &str), wrong: &str) {
+    let (mut held_ms, mut wanted_ms, mut sooner, mut later, mut alike) = (0, 0, 0u32, 0u32, 0u32);
     let free_ms = failure_free_makespan_ms(prepared);
     let (mut asked, mut seen, mut over, mut again, mut completed) = (0, 0, 0, 0, 0);
     let (mut took_ms, mut ratios, mut bytes) = (Vec::new(), Vec::new(), Vec::new());
@@ -58,7 +62,9 @@ fn compare(prepared: &Prepared, seeds: &Seeds, n_tasks: usize, wrong: &str) {
         let (prepared, faults) = faults(prepared, seed, free_ms, wrong);
         let mut with = faults.clone();
         with.extend(tasks(&prepared, seed, free_ms, n_tasks));
+        with.extend(relay_positions(&prepared, seed, free_ms, relays));
         with.sort_by_key(|f| f.at_ms);
+        let asked_for = with.clone();
         let plain = run(&prepared, seed, faults, Wanted::default());
         if let Ok(text) = std::env::var("WHY") {
             let (id, at_s) = text.split_once('@').unwrap_or((&text, "500"));
@@ -79,7 +85,35 @@ fn compare(prepared: &Prepared, seeds: &Seeds, n_tasks: usize, wrong: &str) {
             println!("  seed {seed}: {} at {} ms: {}", v.check, v.time_ms, v.text);
             *broken.entry(v.check.clone().into_owned()).or_default() += 1;
         }
+        let end_ms = tasked.report.end_ms;
+        let until_ms = tasked.report.makespan_ms.unwrap_or(end_ms);
+        held_ms += tasked.relays_held_ms.values().sum::<u64>();
+        let lasts_ms = |f: &TimedFault| match &f.fault {
+            Fault::AddTask { task } if task.kind == TaskKind::Relay => {
+                let lasts_ms = task.within_ms.map_or(u64::MAX, u64::from);
+                end_ms.saturating_sub(f.at_ms).min(lasts_ms)
+            }
+            _ => 0,
+        };
+        wanted_ms += asked_for.iter().map(lasts_ms).sum::<u64>();
+        let both = tasked.ground_lacks.iter().zip(&plain.ground_lacks);
+        let until = usize::try_from(until_ms / 1000).unwrap_or(usize::MAX);
+        for (a, b) in both.take(until).filter_map(|(a, b)| Some((*a)?).zip(*b)) {
+            match a.cmp(&b) {
+                std::cmp::Ordering::Less => sooner += 1,
+                std::cmp::Ordering::Equal => alike += 1,
+                std::cmp::Ordering::Greater => later += 1,
+            }
+        }
+        let is_relay = |name: &str| {
+            let mut all = asked_for.iter();
+            all.any(|f| matches!(&f.fault, Fault::AddTask { task } if task.kind == TaskKind::Relay && task.name.as_deref() == Some(name)))
+        };
         for t in &tasked.report.tasks {
+            if is_relay(&t.name) {
+                println!("  seed {seed}: {}", t.line());
+                continue;
+            }
             asked += 1;
             seen += u32::from(t.seen_ms.is_some());
             over += u32::from(t.seen_ms.is_none() && t.nobody_can.is_some());
@@ -110,6 +144,61 @@ fn compare(prepared: &Prepared, seeds: &Seeds, n_tasks: usize, wrong: &str) {
         part(&mut ratios, 0.95),
         part(&mut bytes, 0.5),
     );
+    if wanted_ms > 0 {
+        let all = f64::from(sooner + later + alike).max(1.0);
+        println!(
+            "  relay positions held {:.1} % of the time that they were asked for; the ground station knew more than without in {:.1} % of the periods, as much in {:.1} %, less in {:.1} %",
+            held_ms as f64 / wanted_ms as f64 * 100.0,
+            f64::from(sooner) / all * 100.0,
+            f64::from(alike) / all * 100.0,
+            f64::from(later) / all * 100.0,
+        );
+    }
+}
+
+/// The relay positions of the scenario itself, or so many in the box around the area, each for
+/// a tenth to a half of the failure-free makespan, asked for in its first half.
+fn relay_positions(prepared: &Prepared, seed: u64, free_ms: u64, many: &str) -> Vec<TimedFault> {
+    let spec = &prepared.spec;
+    if many == "own" {
+        let faults = spec.faults.iter();
+        return faults.filter(|f| f.fault.is_spoken()).cloned().collect();
+    }
+    let mut random = SplitMix64::new(seed ^ 0x7265_6c61);
+    let within = skein_netsim::world::flat::Bounds::around(&spec.mission.area_m());
+    let mut asked = Vec::new();
+    for n in 0..many.parse().unwrap_or(0) {
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "some minutes"
+        )]
+        let mut ms =
+            |least: f64, more: f64| (free_ms as f64 * (least + more * random.unit())) as u32;
+        let (at_ms, within_ms) = (ms(0.0, 0.5), ms(0.1, 0.4));
+        let drawn = (0..100).find_map(|_| {
+            let (x, y) = (random.unit() * 1.2 - 0.1, random.unit() * 1.2 - 0.1);
+            let size = within.max - within.min;
+            let task = NewTask {
+                name: Some(format!("relay-{n}")),
+                kind: TaskKind::Relay,
+                places: vec![(mm(within.min.x + size.x * x), mm(within.min.y + size.y * y))],
+                radius_mm: 100_000,
+                worth: 100,
+                within_ms: Some(within_ms),
+                sensor: 0,
+            };
+            let fits = task
+                .asked(0, 1)
+                .is_ok_and(|t| spec.mission.can_do(&t).is_ok());
+            fits.then_some(task)
+        });
+        asked.extend(drawn.map(|task| TimedFault {
+            at_ms: u64::from(at_ms),
+            fault: Fault::AddTask { task },
+        }));
+    }
+    asked
 }
 
 /// The value that a share of all does not exceed; 0 of none.

@@ -42,6 +42,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/points.json5"),
     ),
     (
+        "relay",
+        "relay.json5",
+        include_str!("../../../configs/trials/relay.json5"),
+    ),
+    (
         "roads",
         "roads.json5",
         include_str!("../../../configs/trials/roads.json5"),

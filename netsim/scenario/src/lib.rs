@@ -34,6 +34,8 @@ mod files;
 mod flight_model;
 mod forecast;
 mod mission;
+#[cfg(test)]
+mod operated;
 mod read;
 mod request;
 mod resolve;

@@ -45,6 +45,10 @@ const ZONE_TRIES: u32 = 16;
 
 /// The operator of a storm asks for so many tasks at most, each for so long, milliseconds.
 const MOST_TASKS: u64 = 6;
+/// And for so many relay positions, each so far around, mm.
+const MOST_RELAYS: u64 = 2;
+/// See [`MOST_RELAYS`].
+const RELAY_RADIUS_MM: u32 = 100_000;
 /// See [`MOST_TASKS`].
 const LEAST_WITHIN_MS: u64 = 20_000;
 /// See [`MOST_TASKS`].
@@ -134,6 +138,7 @@ pub const RARE: &[Kind] = &[
     Kind::new("twin", |s| s.uavs.len() > 1, twin),
     Kind::new("zones", can_be_given, zones),
     Kind::new("tasks", can_be_asked, tasks),
+    Kind::new("relays", can_be_asked, relays),
 ];
 
 /// Each of the rare kinds strikes in one run of so many.
@@ -570,6 +575,40 @@ fn tasks(d: &mut Draw<'_>) {
         let Some(task) = new_task(d, n) else {
             continue;
         };
+        let name = task.name.clone().unwrap_or_default();
+        let at_ms = d.s.between(0, d.end_ms);
+        let cancelled_ms = d.s.between(at_ms, d.end_ms + LEAST_WITHIN_MS);
+        let is_cancelled = d.s.one_in(4);
+        d.push(at_ms, Fault::AddTask { task });
+        if is_cancelled {
+            d.push(cancelled_ms, Fault::CancelTask { name });
+        }
+    }
+}
+
+/// The operator asks for one or two relay positions in and around the area for some time, and
+/// cancels one in four sooner.
+fn relays(d: &mut Draw<'_>) {
+    let within = Bounds::around(&d.spec.mission.area_m());
+    let size = within.max - within.min;
+    for n in 1..=d.s.between(1, MOST_RELAYS) {
+        let drawn = (0..ZONE_TRIES).find_map(|_| {
+            let (east, north) = (share(d.s, 0, 1400) - 0.2, share(d.s, 0, 1400) - 0.2);
+            let at = within.min + Vector::new(size.x * east, size.y * north);
+            let within_ms = d.s.between(LEAST_WITHIN_MS, MOST_WITHIN_MS);
+            let task = NewTask {
+                name: Some(format!("relay-{n}")),
+                kind: TaskKind::Relay,
+                places: vec![(mm(at.x), mm(at.y))],
+                radius_mm: RELAY_RADIUS_MM,
+                worth: 100,
+                within_ms: u32::try_from(within_ms).ok(),
+                sensor: 0,
+            };
+            let asked = task.asked(0, 1).ok()?;
+            d.spec.mission.can_do(&asked).ok().map(|()| task)
+        });
+        let Some(task) = drawn else { continue };
         let name = task.name.clone().unwrap_or_default();
         let at_ms = d.s.between(0, d.end_ms);
         let cancelled_ms = d.s.between(at_ms, d.end_ms + LEAST_WITHIN_MS);

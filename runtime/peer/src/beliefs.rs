@@ -57,6 +57,8 @@ pub struct Beliefs {
     pub is_fuel_due: bool,
     /// What it holds of tasks: which, in which revision, how far it is.
     pub tasks: Vec<(TaskId, u32, Progress)>,
+    /// Whether it gave its section up to hold a relay position.
+    pub relays: bool,
     /// Tasks that it knows to be open, and in its eyes somebody can do.
     pub open_tasks: Vec<(TaskId, u32)>,
     /// Records held, bytes waiting to be sent, open stores: each with its cap.

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | the operator said hold | loiter here |
 //! | the operator said return or cancelled the mission, or all is covered, or the fuel is due, or another process speaks under its id | loiter at base |
+//! | it was given a relay position, and its circle is planned | fly there and circle |
 //! | it was given a task, and its flight is planned | fly that, then the cells of the plan |
 //! | the plan has cells | fly them |
 //! | nothing to fly, others at work | loiter where it is |
@@ -18,6 +19,7 @@
 //! | a percept | a setpoint; what the camera saw is covered, told, and durable every 5 cells |
 //! | the fuel is due | an alarm; the plan is given up; home |
 //! | the operator said return | the plan is given up, and a claim says so at once; home |
+//! | it is given a relay position | the plan is given up likewise; it takes part again when it leaves it |
 //! | half a minute of fuel is back | it takes part again |
 //! | a claim or a bid of this loop | the negotiation ticks |
 //! | covered cells that are news | they are spoken |
@@ -33,7 +35,7 @@ use crate::Incarnation;
 use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
 use crate::effect::{Effect, Effects, PendingJob, Promise};
-use crate::errand::Errand;
+use crate::errand::Planned;
 use crate::input::Time;
 use crate::journal::Durable;
 use crate::mission::{GeometryError, Library, Mission};
@@ -260,6 +262,9 @@ impl Cooperation {
                 Event::Sighted { seen, of } => {
                     effects.extend(self.tasking.sighted(now, seen >= of, state));
                 }
+                Event::Refused { cells } if cells.is_empty() && state.relay.is_some() => {
+                    effects.extend(self.tasking.no_way(state));
+                }
                 Event::DetourFlown => effects.extend(self.tasking.flown_in_vain(state)),
                 event => effects.extend(state.on_event(event)),
             }
@@ -342,13 +347,15 @@ impl Cooperation {
             let down = all.filter(|(.., status)| *status == Status::Down);
             separation.believe_down(s.now, down.map(|(id, ..)| id));
         }
+        let releases = order == Order::ReturnToBase || state.relay.is_some();
         match order {
+            _ if releases => effects.extend(state.release_section(s.role)),
             Order::Resume => effects.extend(state.check_endurance(s.now, s.percept, s.period_ms)),
-            Order::ReturnToBase => effects.extend(state.release_section(s.role)),
-            Order::Hold => {}
+            Order::ReturnToBase | Order::Hold => {}
         }
-        state.has_released &= order == Order::ReturnToBase;
+        state.has_released &= releases;
         let able = s.speaks && order == Order::Resume && state.can_fly_plans(s);
+        let able = able && state.relay.is_none();
         let able = able && !s.membership.is_deaf(s.now);
         effects.extend(state.negotiate(s, able, timers));
         effects.extend(self.tasking.tick(s, order, state));
@@ -380,7 +387,7 @@ impl Cooperation {
     pub fn errand_planned(
         &mut self,
         task: (TaskId, u32),
-        planned: Result<Errand, String>,
+        planned: Result<Planned, String>,
         percept: Option<&Percept>,
     ) -> Effects {
         match &mut self.state {
@@ -495,6 +502,7 @@ impl Cooperation {
         beliefs.counter = counter;
         beliefs.adoptions = state.negotiation.adoptions;
         beliefs.finished = state.finished;
+        beliefs.relays = state.relay.is_some();
         beliefs.spendable_ms = state.spendable_ms(percept);
         beliefs.is_fuel_due = state.fuel.is_due();
     }
@@ -506,6 +514,7 @@ fn goal_of(state: &MissionState, order: Order) -> Goal {
     match Reason::of(state, order) {
         Reason::ToldToHold | Reason::OthersAtWork => Goal::Hold,
         Reason::Plan => Goal::Legs(legs_of(sections.plan(), sections.cells())),
+        Reason::Relay => state.relay_circle().map_or(Goal::Hold, Goal::Circle),
         Reason::Task => {
             let legs = legs_of(sections.plan(), sections.cells());
             match &state.errand {

@@ -1,32 +1,44 @@
-//! The flight that does one task: past a place or along a line, so that all that the task asks
-//! for is seen (D2.7 §3.2, §3.4, §3.5).
+//! The flight that does one task: past a place, along a line or over an area, so that all that the
+//! task asks for is seen (D2.7 §3.2, §3.4, §3.5).
 //!
 //! Stations of a loop are seen from poses that are proved clear; a task is a few of them. A
 //! place is passed on the heading that costs its UAV least, a line is flown from the end from
-//! which it is done sooner. The way there and back is the executive's.
+//! which it is done sooner, and so are the passes over an area. The way there and back is the executive's.
 //!
 //! # Guarantees
 //! The flight keeps the clearance of the mission, and from it the camera holds every piece.
 //!
 //! # Complexity
-//! For a place some Dubins curves and at most `ROUTED` routes; for a line that of a loop of
-//! its pieces.
+//! For a place some Dubins curves and at most `ROUTED` routes; for a line or an area that of a
+//! loop of its pieces.
 
 use crate::mission::{Mission, point_m};
 use crate::offload::MissionGeometry;
+use crate::relay_circle;
+use crate::wire::limits::DURATION_MAX_MS;
 use crate::wire::tasks::{Task, TaskKind};
 use skein_behaviors::executive::GivenFlight;
+use skein_behaviors::executive::circle::halves;
+use skein_flight::coverage::passes::{self, PassesProblem};
 use skein_flight::coverage::ring::LoopProblem;
 use skein_flight::coverage::ring::patch::Corners;
 use skein_flight::coverage::stations::targets::{LineTarget, PointTarget, Targets};
 use skein_flight::coverage::stations::{StationsProblem, build, pass_through, views};
 use skein_flight::trajectory::dubins::length_m;
-use skein_geometry::Curve;
 use skein_geometry::frame::Pose;
+use skein_geometry::{Curve, NoFlyZones, Polygon, Segment};
 use std::sync::Arc;
 
 /// Of the headings past a place, so many of the nearest are asked of the router.
 const ROUTED: usize = 4;
+
+/// An area that takes more pieces is several tasks: of so many lanes of four a UAV comes back to
+/// its section within some minutes, and nobody else waits for it meanwhile.
+pub const AREA_PIECES_MAX: usize = 64;
+
+/// The time of an area is reckoned at this speed, that of a slow UAV, m/s: who asks for it need
+/// not know who will fly.
+const AREA_MPS: f64 = 10.0;
 
 /// What is flown before the first and after the last pose from which a line is seen, metres.
 const RUN_M: f64 = 5.0;
@@ -38,6 +50,26 @@ pub struct Errand {
     pub pieces: Arc<[Corners]>,
     /// From where it is seen.
     pub flight: GivenFlight,
+}
+
+/// What was planned for a task.
+#[derive(Clone, Debug)]
+pub enum Planned {
+    /// A flight from which all of it is seen.
+    Flight(Errand),
+    /// A circle to be held.
+    Circle(Segment),
+}
+
+impl Planned {
+    /// What is flown of it before the way home can be begun.
+    #[must_use]
+    pub fn flown(&self) -> Curve {
+        match self {
+            Self::Flight(errand) => errand.flight.curve.clone(),
+            Self::Circle(circle) => halves(circle),
+        }
+    }
 }
 
 /// Who asks for such a flight, and for what.
@@ -53,9 +85,8 @@ pub struct Request {
     pub airspeed_mps: f64,
 }
 
-/// What a task asks to see; none for kinds that no mission flies yet.
-#[must_use]
-pub fn targets(task: &Task) -> Option<Targets> {
+/// What a task asks to see, of a place or a line; none for other kinds.
+fn targets(task: &Task) -> Option<Targets> {
     let places = task.places.iter();
     let mut places = places.map(|p| point_m((p.east_mm, p.north_mm)));
     let radius_m = f64::from(task.radius_mm) / 1000.0;
@@ -73,11 +104,37 @@ pub fn targets(task: &Task) -> Option<Targets> {
 }
 
 impl Mission {
-    /// The pieces that a task asks to see, as a judge cuts them; none for kinds that no
-    /// mission flies.
+    /// The pieces that a task asks to see, as a judge cuts them; none for kinds of which nothing
+    /// is to be seen.
     #[must_use]
     pub fn pieces_of(&self, task: &Task) -> Option<Vec<Corners>> {
+        if task.kind == TaskKind::Area {
+            let problem = self.loop_problem(&Arc::new(NoFlyZones::new(Vec::new())));
+            return Some(stations_of(&problem.ok()?, task).ok()?.stations);
+        }
         Some(targets(task)?.pieces(self.lane_m()))
+    }
+
+    /// How long the flight over an area takes, from its first piece to its last, milliseconds; 0
+    /// of other tasks.
+    ///
+    /// # Errors
+    /// A sentence that says why there is none.
+    pub fn area_ms(self: &Arc<Self>, task: &Task) -> Result<u32, String> {
+        if task.kind != TaskKind::Area {
+            return Ok(0);
+        }
+        let zones = self.no_fly_zones().map_err(|e| e.to_string())?;
+        let problem = self.loop_problem(&zones).map_err(|e| e.to_string())?;
+        let (curves, _) = planned(&problem, task)?;
+        let longest_m = curves.iter().map(Curve::length_m).fold(0.0, f64::max);
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a cast of a float saturates"
+        )]
+        let takes_ms = (longest_m / AREA_MPS * 1000.0).ceil() as u32;
+        Ok(takes_ms.min(DURATION_MAX_MS))
     }
 
     /// Whether a task could be done by anybody in this mission.
@@ -86,40 +143,90 @@ impl Mission {
     /// A sentence that says why not.
     pub fn can_do(self: &Arc<Self>, task: &Task) -> Result<(), String> {
         let zones = self.no_fly_zones().map_err(|e| e.to_string())?;
+        if task.kind == TaskKind::Relay {
+            return self.relay_circle(task, &zones).map(drop);
+        }
         let problem = self.loop_problem(&zones).map_err(|e| e.to_string())?;
         planned(&problem, task).map(drop)
     }
 }
 
+/// The pieces of a task in the order in which they are flown. Those of an area follow from its
+/// corners alone, whatever zones there are: who plans and who judges cut the same way.
+fn stations_of<'a>(problem: &'a LoopProblem, task: &Task) -> Result<StationsProblem<'a>, String> {
+    if task.kind != TaskKind::Area {
+        let targets = targets(task).ok_or_else(|| {
+            format!(
+                "no mission flies tasks of the kind {:?} yet; expected a point, a line, an area or a relay position",
+                task.kind
+            )
+        })?;
+        return Ok(StationsProblem::of_targets(problem, &targets));
+    }
+    let corners = task.places.iter();
+    let corners = corners.map(|p| point_m((p.east_mm, p.north_mm))).collect();
+    let area = Polygon::new(corners).map_err(|e| format!("it is no area: {e}"))?;
+    let lane_m = problem.lane_spacing_m;
+    let most_m2 = AREA_PIECES_MAX as f64 * lane_m * lane_m;
+    let too_large = |pieces: usize| {
+        format!(
+            "the area takes {pieces} pieces of {lane_m:.0} m by {lane_m:.0} m, more than the {AREA_PIECES_MAX} of one task; expected several areas, each smaller than {most_m2:.0} m²"
+        )
+    };
+    // What is beyond doubt too large is not planned.
+    if area.area_m2() > most_m2 {
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a cast of a float saturates"
+        )]
+        let pieces = (area.area_m2() / lane_m / lane_m).ceil() as usize;
+        return Err(too_large(pieces));
+    }
+    let passes = passes::plan(&PassesProblem {
+        // What the camera sees beyond the ends of a pass is left for the turns.
+        look_ahead_m: 0.0,
+        ..PassesProblem::new(area, lane_m, problem.turn_radius_m, problem.launch)
+    });
+    let passes = passes.map_err(|e| format!("the area cannot be cut into passes: {e}"))?;
+    let stations = StationsProblem::of_passes(problem, &passes.passes);
+    match stations.stations.len() {
+        pieces if pieces > AREA_PIECES_MAX => Err(too_large(pieces)),
+        _ => Ok(stations),
+    }
+}
+
 /// The curves that do a task, either of which will do, and what is seen from them.
 fn planned(problem: &LoopProblem, task: &Task) -> Result<(Vec<Curve>, Vec<Corners>), String> {
-    let targets = targets(task).ok_or_else(|| {
-        format!(
-            "no mission flies tasks of the kind {:?} yet; expected a point or a line",
-            task.kind
-        )
-    })?;
-    let stations = StationsProblem::of_targets(problem, &targets);
+    let stations = stations_of(problem, task)?;
     let pieces = stations.stations.clone();
+    let what = if task.kind == TaskKind::Area {
+        "area"
+    } else {
+        "line"
+    };
     for n in 0..pieces.len() {
         views(&stations, n).map_err(|why| match pieces.len() {
             1 => format!("it cannot be seen: {why}"),
-            all => format!("piece {} of {all} of the line cannot be seen: {why}", n + 1),
+            all => format!(
+                "piece {} of {all} of the {what} cannot be seen: {why}",
+                n + 1
+            ),
         })?;
     }
     if let [_] = pieces[..] {
         let poses = views(&stations, 0)?;
         return Ok((poses.into_iter().map(pass_through).collect(), pieces));
     }
-    let along = along(&stations)?;
+    let along = along(&stations, what)?;
     Ok((vec![along.reversed(), along], pieces))
 }
 
-/// The loop of a line, cut open where it is longest between two of its pieces.
-fn along(stations: &StationsProblem<'_>) -> Result<Curve, String> {
-    let closed = build(stations).map_err(|e| format!("the line cannot be flown: {e}"))?;
+/// The loop of a line or an area, cut open where it is longest between two of its pieces.
+fn along(stations: &StationsProblem<'_>, what: &str) -> Result<Curve, String> {
+    let closed = build(stations).map_err(|e| format!("the {what} cannot be flown: {e}"))?;
     if let Some((_, why)) = closed.uncoverable().first() {
-        return Err(format!("a piece of the line cannot be flown: {why}"));
+        return Err(format!("a piece of the {what} cannot be flown: {why}"));
     }
     let cells = closed.cells();
     let n = cells.len();
@@ -129,7 +236,7 @@ fn along(stations: &StationsProblem<'_>) -> Result<Curve, String> {
     };
     let longest = (0..n).max_by(|a, b| onward_m(*a).total_cmp(&onward_m(*b)));
     let Some(last) = longest.filter(|_| n > 1) else {
-        return Err("the line has no length".to_owned());
+        return Err(format!("the {what} has no length"));
     };
     let mut curve = Curve::empty();
     for k in 1..=n {
@@ -149,11 +256,20 @@ fn along(stations: &StationsProblem<'_>) -> Result<Curve, String> {
 }
 
 impl Request {
-    /// Plans the flight.
+    /// Plans the flight, or the circle.
     ///
     /// # Errors
     /// A sentence that says why there is none.
-    pub fn plan(&self) -> Result<Errand, String> {
+    pub fn plan(&self) -> Result<Planned, String> {
+        if self.task.kind == TaskKind::Relay {
+            let (mission, router) = (&self.geometry.mission, &self.geometry.router);
+            let circle = relay_circle::planned(mission, router, &self.task, self.from)?;
+            return Ok(Planned::Circle(circle));
+        }
+        self.flight().map(Planned::Flight)
+    }
+
+    fn flight(&self) -> Result<Errand, String> {
         let zones = self.geometry.router.zones();
         let mission = &self.geometry.mission;
         let problem = mission.loop_problem(zones).map_err(|e| e.to_string())?;
@@ -237,7 +353,7 @@ mod tests {
             from,
             airspeed_mps: 13.0,
         };
-        request.plan()
+        request.flight()
     }
 
     /// Which pieces some pose of a flight holds, looked at every metre.
@@ -279,6 +395,100 @@ mod tests {
         }
     }
 
+    /// A mission whose camera holds a square of a lane.
+    fn wide() -> Arc<Mission> {
+        let mut m = (*zoned()).clone();
+        (m.footprint_across_mm, m.footprint_along_mm) = (110_000, 90_000);
+        Arc::new(m)
+    }
+
+    #[test]
+    fn an_area_is_seen_whole_in_one_flight_and_judged_by_the_same_pieces() {
+        let mission = wide();
+        let zones = mission.no_fly_zones().unwrap();
+        let request = |places: &[(i32, i32)]| Request {
+            geometry: mission.geometry().unwrap(),
+            task: task(TaskKind::Area, places, 0),
+            from: Pose::new(Point::new(20.0, 20.0), 0.0),
+            airspeed_mps: 13.0,
+        };
+        for places in [
+            vec![(20, 180), (140, 180), (140, 280), (20, 280)],
+            vec![(-200, -200), (-60, -180), (-120, -60)],
+        ] {
+            let request = request(&places);
+            let errand = request.flight().unwrap();
+            assert!(errand.pieces.len() > 3);
+            let holds = |corners: &Corners| {
+                let curve = &errand.flight.curve;
+                (0..=curve.length_m() as u32).any(|m| {
+                    let pose = curve.pose_at(f64::from(m)).unwrap();
+                    frame_holds(corners, pose, 110.0, 90.0)
+                })
+            };
+            assert!(errand.pieces.iter().all(holds), "{places:?}");
+            assert!(zones.is_clear(&errand.flight.curve, 7.99), "{places:?}");
+            assert!(errand.flight.curve.largest_gap_m() < 1e-6);
+            let judged = mission.pieces_of(&request.task).unwrap();
+            assert_eq!(judged.len(), errand.pieces.len());
+            // What lies within the corners lies in a piece.
+            let ring = places
+                .iter()
+                .map(|(x, y)| Point::new(f64::from(*x), f64::from(*y)));
+            let area = Polygon::new(ring.collect()).unwrap();
+            let is_in = |p: Point, c: &Corners, slack_m: f64| {
+                let left = |a: Point, b: Point| (b - a).perp(&(p - a));
+                let sides = (0..4).map(|i| left(c[i], c[(i + 1) % 4]));
+                let (low, high) = sides.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+                    (l.min(v), h.max(v))
+                });
+                low >= -slack_m * 48.0 || high <= slack_m * 48.0
+            };
+            let (mut inside, mut held) = (0, 0);
+            for k in 0..10_000 {
+                let (x, y) = (f64::from(k % 100), f64::from(k / 100));
+                let p = Point::new(4.0 * x - 220.0, 5.0 * y - 220.0);
+                if area.distance_m(p) > 0.0 {
+                    continue;
+                }
+                inside += 1;
+                held += u32::from(judged.iter().any(|c| is_in(p, c, 0.0)));
+                // At its corners a metre or two is left out.
+                assert!(judged.iter().any(|c| is_in(p, c, 3.0)), "{p:?}");
+            }
+            assert!(held * 100 >= inside * 99, "{held} of {inside}");
+            let takes_ms = mission.area_ms(&request.task).unwrap();
+            assert!(takes_ms > 10_000, "{takes_ms}");
+        }
+    }
+
+    #[test]
+    fn an_area_that_is_none_too_large_or_in_a_zone_is_refused() {
+        let mut mission = (*wide()).clone();
+        mission.zones = vec![vec![
+            (200_000, 80_000),
+            (360_000, 80_000),
+            (360_000, 240_000),
+            (200_000, 240_000),
+        ]];
+        let mission = Arc::new(mission);
+        for (places, why) in [
+            (vec![(0, 0), (90, 90), (90, 0), (0, 80)], "it is no area"),
+            (
+                vec![(0, 0), (900, 0), (900, 900)],
+                "expected several areas, each smaller",
+            ),
+            (
+                vec![(250, 130), (310, 130), (310, 190), (250, 190)],
+                "cannot be seen",
+            ),
+        ] {
+            let task = task(TaskKind::Area, &places, 0);
+            let said = mission.can_do(&task).err().unwrap_or_default();
+            assert!(said.contains(why), "{places:?}: {said:?}");
+        }
+    }
+
     #[test]
     fn a_line_is_begun_at_the_end_from_which_it_is_done_sooner() {
         let line = task(TaskKind::Line, &[(20, 250), (330, 250)], 0);
@@ -303,7 +513,7 @@ mod tests {
                 task(TaskKind::Line, &[(205, 105), (255, 155)], 0),
                 "of the line cannot be seen",
             ),
-            (task(TaskKind::Relay, &[(100, 100)], 0), "no mission flies"),
+            (task(TaskKind::Track, &[(100, 100)], 0), "no mission flies"),
             (task(TaskKind::Pinpoint, &[(90_000, 0)], 0), ""),
         ] {
             let said = errand(&task, from).unwrap_err();

@@ -15,8 +15,8 @@ use crate::input::Time;
 use crate::mission_state::MissionState;
 use crate::protocol::runs::legs_of;
 use skein_behaviors::Percept;
-use skein_behaviors::executive::GivenFlight;
 use skein_behaviors::executive::endurance::Within;
+use skein_geometry::Curve;
 
 /// A UAV whose fuel was due works again when it may spend this much, milliseconds: less
 /// would be due again before the next round is decided.
@@ -75,9 +75,9 @@ impl MissionState {
 
     /// Whether there is enough left to fly this and to come home from its end; taken to be so
     /// where nothing is known of it.
-    pub fn returns_from(&self, flight: &GivenFlight, percept: Option<&Percept>) -> bool {
+    pub fn returns_from(&self, flown: &Curve, percept: Option<&Percept>) -> bool {
         let both = self.executive.as_ref().zip(percept);
-        both.is_none_or(|(executive, percept)| executive.returns_from(flight, percept))
+        both.is_none_or(|(executive, percept)| executive.returns_from(flown, percept))
     }
 
     /// Gives up the plan when the fuel is due, and takes part again when some is back.

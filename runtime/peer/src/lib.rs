@@ -17,7 +17,7 @@
 //! | [`peer`] | routes events to the parts and carries out their effects |
 //! | [`transmission`], `inbound`, `outbound` | bytes as they are read, and what they are to a peer; what is spoken, and when |
 //! | `cooperation`, `mission_state` | mission, goal, the peer's part in negotiations |
-//! | `tasking`, `task_desk`, [`errand`] | tasks other than coverage: the peer's part in their auction, its operator's, the flight that does one |
+//! | `tasking`, `task_desk`, [`errand`], [`relay_circle`] | tasks other than coverage: the peer's part in their auction, its operator's, the flight that does one, the circle that is held |
 //! | [`protocol`] | the machines and rules by which peers agree |
 //! | `timers` | every deadline, in one table |
 //! | [`journal`] | what is durable before it is spoken of |
@@ -112,7 +112,7 @@ pub mod output;
 pub mod overview;
 pub mod peer;
 pub mod protocol;
-
+pub mod relay_circle;
 mod separation;
 mod taking;
 mod task;

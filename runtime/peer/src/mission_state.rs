@@ -41,6 +41,7 @@ use skein_behaviors::executive::{GivenFlight, UNREACHABLE_MS};
 use skein_behaviors::{Event, Executive, Goal};
 use skein_flight::coverage::ring::Direction;
 use skein_flight::coverage::ring::backtracking::{Division, Uav};
+use skein_geometry::Segment;
 use std::sync::Arc;
 
 /// Own coverage is made durable every so many cells: a crash costs at most these.
@@ -88,6 +89,13 @@ impl ClaimsWritten {
     }
 }
 
+/// A relay position that a UAV was given.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct RelayPosition {
+    /// The circle that is flown there, once it is planned.
+    pub circle: Option<Segment>,
+}
+
 /// What a peer has once it holds a mission and its geometry.
 #[derive(Debug)]
 pub(crate) struct MissionState {
@@ -99,6 +107,8 @@ pub(crate) struct MissionState {
     goal: Option<Goal>,
     /// The flight of the task that it was given, between two cells of its section.
     pub errand: Option<GivenFlight>,
+    /// The relay position that it was given, which it holds instead of a section.
+    pub relay: Option<RelayPosition>,
     /// Whether a task is open that somebody can do.
     pub has_tasks: bool,
     /// Whether the goal is to be given to the executive again.
@@ -161,7 +171,7 @@ impl MissionState {
     pub fn activity(&self) -> Activity {
         match &self.goal {
             Some(Goal::Legs(_) | Goal::Given(_) | Goal::Detour(..)) => Activity::Covering,
-            Some(Goal::Hold) => Activity::Holding,
+            Some(Goal::Hold | Goal::Circle(_)) => Activity::Holding,
             Some(Goal::Point(_)) => Activity::Returning,
             None => Activity::Waiting,
         }
@@ -310,7 +320,7 @@ impl MissionState {
         Some(Effect::Store(Promise::Covered(cells), entry))
     }
 
-    /// It is told to return: what it was to fly is for those who are not, from now on, also
+    /// It is told to return, or holds a relay position: what it was to fly is for the others, from now on, also
     /// where a division gave it something meanwhile. What it gave away before it still holds,
     /// until its new owner says so or it expires.
     pub fn release_section(&mut self, role: Role) -> Effects {
@@ -551,6 +561,11 @@ impl MissionState {
         }
     }
 
+    /// The circle that is flown as a relay position, once it is planned.
+    pub fn relay_circle(&self) -> Option<Segment> {
+        self.relay.as_ref().and_then(|r| r.circle)
+    }
+
     /// Gives the executive its goal, if that changed.
     pub fn steer(&mut self, goal: Goal) {
         let sections = &self.negotiation.sections;
@@ -598,6 +613,7 @@ impl MissionState {
             separation: separation_for(&geometry, me, config),
             goal: None,
             errand: None,
+            relay: None,
             has_tasks: old.as_ref().is_some_and(|m| m.has_tasks),
             replan: true,
             able_since: None,
@@ -642,6 +658,7 @@ impl MissionState {
             self.executive = old.executive.map(|e| e.with_home(base).without_heeded());
             self.separation = old.separation;
             self.errand = old.errand;
+            self.relay = old.relay;
             self.goal = old.goal;
             self.replan = old.replan;
         }

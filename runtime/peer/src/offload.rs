@@ -2,7 +2,7 @@
 //! computed by the driver with [`run`], answered by an input.
 
 use crate::config::Launch;
-use crate::errand::{self, Errand};
+use crate::errand;
 use crate::mission::{GeometryError, Mission};
 use crate::protocol::launches::{self, Planned};
 use skein_flight::coverage::ring::CoverageLoop;
@@ -105,7 +105,7 @@ pub enum JobResult {
     /// The division.
     Divide(Division),
     /// The flight, or why there is none.
-    Errand(Result<Errand, String>),
+    Errand(Result<errand::Planned, String>),
 }
 
 /// Solves a problem. Pure; may take milliseconds.

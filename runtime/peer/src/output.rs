@@ -67,6 +67,12 @@ pub enum TaskNews {
     Asked,
     /// This UAV won it and flies there.
     Flies,
+    /// This UAV won it, a relay position, and gives its section up for it.
+    Relays,
+    /// This UAV is at the relay position.
+    Holds,
+    /// This UAV wants to be relieved of it: its fuel will be due.
+    Leaving,
     /// This UAV saw all of it.
     Seen,
     /// It is another's, changed or over: this UAV left it.
@@ -86,6 +92,9 @@ impl TaskNews {
         match self {
             Self::Asked => "asked",
             Self::Flies => "flies",
+            Self::Relays => "relays",
+            Self::Holds => "holds",
+            Self::Leaving => "leaving",
             Self::Seen => "seen",
             Self::Left => "left",
             Self::DoneBy(_) => "done-by",
@@ -100,6 +109,15 @@ impl TaskNews {
         match self {
             Self::Asked => format!("the task {name:?} is asked for"),
             Self::Flies => format!("it won the task {name:?} and flies there"),
+            Self::Relays => {
+                format!("it won the relay position {name:?}, gives its section up and flies there")
+            }
+            Self::Holds => format!("it holds the relay position {name:?}"),
+            Self::Leaving => {
+                format!(
+                    "it asks to be relieved of the relay position {name:?}: its fuel will be due"
+                )
+            }
             Self::Seen => format!("it did the task {name:?}: all of it was seen"),
             Self::Left => format!("it left the task {name:?}: another's, changed or over"),
             Self::DoneBy(PeerId(by)) => format!("uav{by} did the task {name:?}"),

@@ -5,7 +5,7 @@ use crate::cooperation::Cooperation;
 use crate::effect::{Effect, Effects};
 use crate::input::{AskedTask, NewTask, TaskEdit, Time};
 use crate::mission::Mission;
-use crate::tasking::{Known, Tasking, why_nobody};
+use crate::tasking::{KEPT_FOR_COVER, Known, Tasking, why_nobody};
 use crate::wire::codec::Body;
 use crate::wire::tasks::{
     Progress, TASK_NAME_MAX_BYTES, TASKS_MAX, Task, TaskId, TaskKind, TaskPlace, TaskState,
@@ -139,6 +139,9 @@ impl Tasking {
     /// whom.
     fn why_not(&self, id: TaskId, task: &Task) -> Option<String> {
         if self.auction.unassigned().contains(&id) {
+            if self.auction.kept_for_cover().contains(&id) {
+                return Some(KEPT_FOR_COVER.to_owned());
+            }
             return Some(why_nobody(task, self.auction.offers()));
         }
         let heard = self.bundles.values().map(|(_, b)| &b.offer);
@@ -284,7 +287,10 @@ impl Cooperation {
         let author = self.tasking.me_id();
         match edit {
             TaskEdit::Add(new) => {
-                let (number, task) = self.tasking.asked_for(new)?;
+                let (number, mut task) = self.tasking.asked_for(new)?;
+                if let Some(mission) = mission {
+                    task.stay_ms = mission.area_ms(&task)?;
+                }
                 let id = TaskId { author, number };
                 let mut effects = self.tasking.learn(now, id, task.clone());
                 effects.push(Effect::Speak(number, Body::Task(task)));

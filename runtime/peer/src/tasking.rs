@@ -8,22 +8,27 @@
 //! | a period passes | likewise, with the present offer and who lives |
 //! | the auction gives a task to fly | its flight is planned beside the loop |
 //! | the flight is planned | it is flown between two cells of the section |
+//! | it is a relay position | the section is given up at once; the circle is flown until the task is over |
+//! | the circle is reached | begun: told |
+//! | the fuel lasts for as long as it takes others to come | others are asked to relieve it; it stays until one has begun |
 //! | all of it is seen | done: told, and the UAV is free for the next |
 //! | the flight is over and not all is seen, there is none | once more, then others are asked to relieve it |
-//! | the auction drops it, the fuel is due, another life begins | it is left |
+//! | the auction drops it, the fuel is due, the operator says return, another life begins | it is left |
 //! | its time is over | it is expired |
 //! | a ground station: somebody did a task of its operator, its time is over | that is told in the task's next revision |
 //!
 //! While no task is open nothing is said.
 
+mod relaying;
+
 use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
 use crate::cooperation::Situation;
 use crate::effect::{Effect, Effects, PendingJob};
-use crate::errand::{Errand, Request};
+use crate::errand::{Planned, Request};
 use crate::input::Time;
 use crate::mission::mm;
-use crate::mission_state::{MissionState, speed_mmps};
+use crate::mission_state::{MissionState, RelayPosition, speed_mmps};
 use crate::offload::Job;
 use crate::output::{Report, TaskNews};
 use crate::protocol::auction::flown::RoutedTime;
@@ -36,6 +41,8 @@ use crate::wire::tasks::{
     Bundle, BundleTask, Offer, Progress, Task, TaskId, TaskState, sensor_name,
 };
 use crate::{Incarnation, PeerId};
+use relaying::Held;
+pub(crate) use relaying::KEPT_FOR_COVER;
 use skein_behaviors::executive::detour::Watched;
 use skein_behaviors::{Order, Percept};
 use skein_flight::airframe::Airframe;
@@ -78,6 +85,8 @@ struct Flown {
     tries: u8,
     /// Whether its flight is the goal.
     is_planned: bool,
+    /// Of a relay position, how far it is with it.
+    held: Option<Held>,
 }
 
 /// Tasks as one peer has them.
@@ -136,6 +145,7 @@ impl Tasking {
             && let Some(state) = state
         {
             state.set_errand(None);
+            state.relay = None;
         }
     }
 
@@ -161,11 +171,13 @@ impl Tasking {
         self.flown.as_ref().map(|f| f.id)
     }
 
-    /// Whether a task is open that somebody can do, as far as is known.
+    /// Whether a task is open that somebody can do, as far as is known; a relay position keeps
+    /// nobody in the air but who holds it.
     pub fn has_work(&self) -> bool {
         let hopeless = self.auction.unassigned();
+        let mine = |id: &TaskId| self.flown() == Some(*id);
         let mut open = self.known.iter().filter(|(_, k)| k.is_open());
-        open.any(|(id, _)| !hopeless.contains(id))
+        open.any(|(id, k)| !hopeless.contains(id) && (!k.task.is_held() || mine(id)))
     }
 
     /// What it holds, and what of all it knows to be open that somebody can do.
@@ -275,7 +287,8 @@ impl Tasking {
     /// Looks at everything that depends on time, and at what was heard.
     pub fn tick(&mut self, s: &Situation<'_>, order: Order, state: &mut MissionState) -> Effects {
         if s.role == Role::GroundStation {
-            state.has_tasks = self.known.values().any(Known::is_open);
+            let keeps = |k: &Known| k.is_open() && !k.task.is_held();
+            state.has_tasks = self.known.values().any(keeps);
             return self.tell_of_tasks(s);
         }
         let mut effects: Effects = self
@@ -294,8 +307,9 @@ impl Tasking {
     }
 
     /// Whether this UAV has anything to offer.
-    fn is_able(s: &Situation<'_>, state: &MissionState) -> bool {
+    fn is_able(s: &Situation<'_>, order: Order, state: &MissionState) -> bool {
         state.can_fly_plans(s)
+            && order != Order::ReturnToBase
             && !s.is_silent
             && !state.geometry.mission.cancelled
             && state.separation.is_none()
@@ -341,7 +355,7 @@ impl Tasking {
             }
         }
         let is_period = s.now.since_ms(self.last_period) >= s.membership.interval_ms();
-        let able = Self::is_able(s, state);
+        let able = Self::is_able(s, order, state);
         let is_told = is_period || able != self.was_able;
         let offer = (is_told && able).then(|| self.present(s, state)).flatten();
         if is_told {
@@ -352,10 +366,15 @@ impl Tasking {
             };
             events.push(Event::Live(live.filter(uav).map(PeerId).collect()));
             events.push(Event::Map(map_of(state)));
+            events.push(Event::Cells(!state.negotiation.sections.complete()));
             events.push(Event::Present(offer.unwrap_or_default()));
         }
+        let mut effects = Effects::new();
         if self.was_able && !able {
             events.push(Event::GiveUp);
+            if let Some(id) = self.flown() {
+                effects.extend(self.told(id, TaskNews::Left));
+            }
             self.leave(Some(state));
         }
         self.was_able = able;
@@ -370,7 +389,8 @@ impl Tasking {
         if self.flown.is_none() && able && order == Order::Resume {
             events.push(Event::Free);
         }
-        let mut effects = self.handle(events, state);
+        effects.extend(self.handle(events, state));
+        effects.extend(self.hold(s, state));
         // Without a percept, or while a mission changes, there was no flight to plan.
         if self.flown.as_ref().is_some_and(|f| !f.is_planned) {
             effects.extend(self.plan(state));
@@ -387,11 +407,13 @@ impl Tasking {
         }
         let Some(offer) = offer else { return false };
         let more = offer.endurance_ms > self.auction.bundle().1.offer.endurance_ms;
+        let kept = self.auction.kept_for_cover();
         let has = |id: &TaskId| {
             let known = self.known.get(id);
             known.is_some_and(|k| k.is_open() && carries(offer.sensors, k.task.sensor))
         };
-        let again = more && self.auction.unassigned().iter().any(has);
+        let mut hopeless = self.auction.unassigned().iter();
+        let again = more && hopeless.any(|id| has(id) && !kept.contains(id));
         if again {
             self.last_again = s.now;
         }
@@ -413,14 +435,22 @@ impl Tasking {
                     }
                 }
                 auction::Effect::Fly(id) => {
-                    let revision = self.known.get(&id).map_or(0, |k| k.task.revision);
+                    let known = self.known.get(&id).map(|k| &k.task);
+                    let is_held = known.is_some_and(Task::is_held);
                     self.flown = Some(Flown {
                         id,
-                        revision,
+                        revision: known.map_or(0, |task| task.revision),
                         tries: 0,
                         is_planned: false,
+                        held: is_held.then(Held::default),
                     });
-                    effects.extend(self.told(id, TaskNews::Flies));
+                    state.relay = is_held.then(RelayPosition::default);
+                    let news = if is_held {
+                        TaskNews::Relays
+                    } else {
+                        TaskNews::Flies
+                    };
+                    effects.extend(self.told(id, news));
                     effects.extend(self.plan(state));
                 }
             }
@@ -448,6 +478,7 @@ impl Tasking {
         let flown = self.flown.as_mut()?;
         flown.is_planned = false;
         state.set_errand(None);
+        state.relay = flown.held.is_some().then(RelayPosition::default);
         self.plan(state)
     }
 
@@ -455,7 +486,7 @@ impl Tasking {
     pub fn planned(
         &mut self,
         (id, revision): (TaskId, u32),
-        planned: Result<Errand, String>,
+        planned: Result<Planned, String>,
         percept: Option<&Percept>,
         state: &mut MissionState,
     ) -> Effects {
@@ -464,12 +495,19 @@ impl Tasking {
             return Effects::new();
         };
         match planned {
-            Ok(errand) if !state.returns_from(&errand.flight, percept) => {
-                self.relieve("too little fuel is left to fly it and come home", state)
+            Ok(planned) if !state.returns_from(&planned.flown(), percept) => {
+                self.relieve("with the fuel that is left it could not come home", state)
             }
-            Ok(errand) => {
+            Ok(Planned::Flight(errand)) => {
                 flown.is_planned = true;
                 state.set_errand(Some((errand.flight, Watched::new(errand.pieces))));
+                vec![Effect::Negotiate]
+            }
+            Ok(Planned::Circle(circle)) => {
+                flown.is_planned = true;
+                state.relay = Some(RelayPosition {
+                    circle: Some(circle),
+                });
                 vec![Effect::Negotiate]
             }
             Err(why) => self.relieve(&why, state),
@@ -537,16 +575,21 @@ impl Tasking {
 
     /// People hear once that nobody can do a task.
     fn tell_hopeless(&mut self) -> Effects {
-        if !self.auction.is_agreed() {
+        if !self.auction.is_agreed() || self.auction.unassigned().is_empty() {
             return Effects::new();
         }
         let mut effects = Effects::new();
+        let kept = self.auction.kept_for_cover();
         for id in self.auction.unassigned() {
             let Some(known) = self.known.get_mut(id).filter(|k| k.is_open()) else {
                 continue;
             };
             if !core::mem::replace(&mut known.hopeless_told, true) {
-                let why = why_nobody(&known.task, self.auction.offers());
+                let why = if kept.contains(id) {
+                    KEPT_FOR_COVER.to_owned()
+                } else {
+                    why_nobody(&known.task, self.auction.offers())
+                };
                 effects.push(report(*id, &known.task, TaskNews::NobodyCan(why)));
             }
         }

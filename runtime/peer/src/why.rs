@@ -32,6 +32,8 @@ pub enum Reason {
     FuelIsDue,
     /// Another process speaks under its id.
     Twin,
+    /// It was given a relay position to hold.
+    Relay,
     /// It was given a task to do.
     Task,
     /// It has cells to fly.
@@ -57,6 +59,8 @@ impl Reason {
             Self::FuelIsDue
         } else if state.silent {
             Self::Twin
+        } else if state.relay_circle().is_some() {
+            Self::Relay
         } else if state.errand.is_some() {
             Self::Task
         } else if !state.negotiation.sections.plan().is_empty() {
@@ -79,6 +83,7 @@ impl Reason {
             Self::Finished => "flies home: everything is covered",
             Self::FuelIsDue => "flies home: its fuel is due",
             Self::Twin => "flies home: another process speaks under its id",
+            Self::Relay => "holds a relay position that it was given, or flies to it",
             Self::Task => "flies to a task that it was given, between two cells of its section",
             Self::Plan => "flies its section",
             Self::Astray => "flies home: it has nothing to fly and hears nobody",

@@ -1,5 +1,5 @@
-//! Tasks that the operator of a scenario asks for in flight: a place or a line, within a time,
-//! for a sensor.
+//! Tasks that the operator of a scenario asks for in flight: a place, a line or an area, within
+//! a time, for a sensor; or a relay position, for a time.
 
 use super::shared::position;
 use skein_interop::json::{Error, Node, suggestion};
@@ -17,25 +17,50 @@ pub(crate) const WORTH: u16 = 100;
 /// How far around a place is to be seen unless the file says so, metres.
 pub(crate) const RADIUS_M: f64 = 10.0;
 
+/// How far from a relay position a UAV may be that holds it unless the file says so, metres.
+pub(crate) const RELAY_RADIUS_M: f64 = 100.0;
+
 /// Reads `task_add`.
 pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
     let f = node.fields(&[
-        "id", "point", "line", "radius_m", "within_s", "needs", "worth",
+        "id", "point", "line", "area", "relay", "radius_m", "within_s", "for_s", "needs", "worth",
     ])?;
-    let (kind, places) = match (f.get("point"), f.get("line")) {
-        (Some(point), None) => {
-            let at = position(&point.fields(&["east_m", "north_m"])?)?;
-            (TaskKind::Pinpoint, vec![(mm(at.x), mm(at.y))])
-        }
-        (None, Some(line)) => (TaskKind::Line, places(line)?),
+    let place = |node: &Node<'_>| {
+        let at = position(&node.fields(&["east_m", "north_m"])?)?;
+        Ok(vec![(mm(at.x), mm(at.y))])
+    };
+    let given = ["point", "line", "area", "relay"];
+    let given = given.iter().filter_map(|name| Some((*name, f.get(name)?)));
+    let given: Vec<_> = given.collect();
+    let (kind, places) = match given[..] {
+        [("point", point)] => (TaskKind::Pinpoint, place(point)?),
+        [("line", line)] => (TaskKind::Line, places(line, 2)?),
+        [("area", area)] => (TaskKind::Area, places(area, 3)?),
+        [("relay", relay)] => (TaskKind::Relay, place(relay)?),
         _ => {
             return Err(node.wrong(
-                "expected either point: { east_m: 250, north_m: 250 } or line: [{ east_m: 0, north_m: 0 }, ...]",
+                "expected either point: { east_m: 250, north_m: 250 }, line: [{ east_m: 0, north_m: 0 }, ...], area: [three corners or more] or relay: { east_m: 250, north_m: 250 }",
             ));
         }
     };
-    let radius_m = f.number_or("radius_m", RADIUS_M, 0.0, 1_000.0, "metres")?;
-    let within_ms = f.get("within_s").map(|n| {
+    let is_held = kind == TaskKind::Relay;
+    let (usual_m, lasts, other) = if is_held {
+        (RELAY_RADIUS_M, "for_s", "within_s")
+    } else {
+        (RADIUS_M, "within_s", "for_s")
+    };
+    if let Some(other) = f.get(other) {
+        return Err(other.wrong(format!(
+            "a {} says {lasts}",
+            if is_held {
+                "relay"
+            } else {
+                "point, line or area"
+            }
+        )));
+    }
+    let radius_m = f.number_or("radius_m", usual_m, 0.0, 1_000.0, "metres")?;
+    let within_ms = f.get(lasts).map(|n| {
         let within_s = n.number(1.0, 86_400.0, "seconds")?;
         #[allow(
             clippy::cast_possible_truncation,
@@ -64,11 +89,11 @@ pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
     Ok(Fault::AddTask { task })
 }
 
-fn places(line: &Node<'_>) -> Result<Vec<(i32, i32)>, Error> {
+fn places(line: &Node<'_>, least: usize) -> Result<Vec<(i32, i32)>, Error> {
     let items = line.items()?;
-    if !(2..=TASK_PLACES_MAX).contains(&items.len()) {
+    if !(least..=TASK_PLACES_MAX).contains(&items.len()) {
         return Err(line.wrong(format!(
-            "has {} places; expected 2 to {TASK_PLACES_MAX}",
+            "has {} places; expected {least} to {TASK_PLACES_MAX}",
             items.len()
         )));
     }
@@ -93,6 +118,7 @@ pub(crate) fn task_name(node: &Node<'_>) -> Result<String, Error> {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::{Files, Overrides};
     use std::path::PathBuf;
 
@@ -116,6 +142,15 @@ mod tests {
         );
         let carried = "sensors: [['camera'], ['camera', 'infrared']],";
         let scenario = asked(&good, carried).unwrap();
+        let relay = "relay: { east_m: 300, north_m: 200 }";
+        let link = format!("[{{ at_s: 9, task_add: {{ id: 'link', {relay}, for_s: 300 }} }}]");
+        let linked = asked(&link, "").unwrap().spec;
+        let tasks = linked.faults.iter().filter_map(|f| match &f.fault {
+            Fault::AddTask { task } => Some((task.kind, task.radius_mm, task.within_ms)),
+            _ => None,
+        });
+        let tasks: Vec<_> = tasks.collect();
+        assert_eq!(tasks, [(TaskKind::Relay, 100_000, Some(300_000))]);
         let carriers = scenario.spec.uavs.iter().filter(|u| u.carries(2)).count();
         assert_eq!((carriers, scenario.spec.uavs.len()), (4, 8));
         let spoken = scenario.spec.faults.iter().filter(|f| f.fault.is_spoken());
@@ -133,6 +168,31 @@ mod tests {
                 "fleet.sensors[0][0]: no sensor is named \"eyes\"",
             ),
             (add("id: 'gate'"), "", "expected either point"),
+            (
+                add(&format!("id: 'a', {relay}, within_s: 9")),
+                "",
+                "within_s: a relay says for_s",
+            ),
+            (
+                add("id: 'a', area: [{ east_m: 9, north_m: 9 }, { east_m: 9, north_m: 99 }]"),
+                "",
+                "has 2 places; expected 3 to",
+            ),
+            (
+                add(&format!("id: 'a', {point}, {relay}")),
+                "",
+                "expected either point",
+            ),
+            (
+                add(&format!("id: 'a', {relay}, radius_m: 9")),
+                "",
+                "expected a radius of at least",
+            ),
+            (
+                add("id: 'a', relay: { east_m: 9000, north_m: 0 }"),
+                "",
+                "expected one nearer to the base",
+            ),
             (
                 add(&format!("id: 'a b', {point}")),
                 "",

@@ -45,7 +45,7 @@ use restarts::Restarts;
 use skein_link::RadioCounters;
 use skein_peer::Report;
 use skein_peer::input::AskedTask;
-use skein_peer::output::Status;
+use skein_peer::output::{Status, TaskNews};
 use std::collections::{BTreeMap, BTreeSet};
 use tasks::Tasks;
 use work::Work;
@@ -82,6 +82,8 @@ pub struct Account {
     covered_ms: Option<u64>,
     ready: BTreeMap<u16, u32>,
     finished: BTreeSet<u16>,
+    /// Who holds a relay position or flies to it, which is over for nobody else.
+    relaying: BTreeSet<u16>,
     alarms: Vec<String>,
     failures: Vec<String>,
     tasks: Tasks,
@@ -101,6 +103,7 @@ impl Account {
             covered_ms: None,
             ready: BTreeMap::new(),
             finished: BTreeSet::new(),
+            relaying: BTreeSet::new(),
             alarms: Vec::new(),
             failures: Vec::new(),
             tasks: Tasks::default(),
@@ -126,6 +129,7 @@ impl Account {
         self.work.restarted(peer);
         self.restarts.restarted(now_ms, peer, fresh_disk, before);
         self.finished.remove(&peer);
+        self.relaying.remove(&peer);
     }
 
     /// A process ends. Gives what the peer held; one that has ended before ends no more.
@@ -226,7 +230,16 @@ impl Account {
                 self.lifetimes.paused(now_ms, peer);
                 None
             }
-            Report::Task { .. } => {
+            Report::Task { news, .. } => {
+                match news {
+                    TaskNews::Relays => {
+                        self.relaying.insert(peer);
+                    }
+                    TaskNews::Left => {
+                        self.relaying.remove(&peer);
+                    }
+                    _ => {}
+                }
                 self.tasks.reported(peer, report);
                 None
             }
@@ -317,6 +330,13 @@ impl Account {
         self.finished.contains(&peer)
     }
 
+    /// Whether that peer has nothing to cover any more, as it believes: its newest mission is
+    /// finished, but for a relay position that it holds.
+    #[must_use]
+    pub fn is_through(&self, peer: u16) -> bool {
+        self.is_finished(peer) || self.covered_ms.is_some() && self.relaying.contains(&peer)
+    }
+
     /// When every coverable cell had been seen, milliseconds.
     #[must_use]
     pub fn covered_ms(&self) -> Option<u64> {
@@ -346,11 +366,12 @@ impl Account {
     pub fn conclude(&self, ending: Ending<'_>) -> RunReport {
         let now_ms = ending.now_ms;
         let coverage = Coverage::of(ending.judge, self.setting.needed_share);
-        let (finished, unfinished): (Vec<u16>, Vec<u16>) = self
+        let (through, unfinished): (Vec<u16>, Vec<u16>) = self
             .live_uavs()
             .into_iter()
-            .partition(|id| self.is_finished(*id));
-        let completed = self.covered_ms.is_some() && unfinished.is_empty() && !finished.is_empty();
+            .partition(|id| self.is_through(*id));
+        let completed = self.covered_ms.is_some() && unfinished.is_empty() && !through.is_empty();
+        let (finished, relaying) = through.into_iter().partition(|id| self.is_finished(*id));
         let work_bound_ms = self.lifetimes.work_bound_ms();
         let launch_bound_ms = self.lifetimes.launch_bound_ms();
         let (driver, simulated, live) = match ending.details {
@@ -379,6 +400,7 @@ impl Account {
             restarts: self.restarts.reports(),
             tasks: self.tasks.reports(ending.judge),
             finished,
+            relaying,
             unfinished,
             swarm: Swarm {
                 splits: self.connectivity.splits,

@@ -75,7 +75,10 @@ pub struct RunReport {
     pub tasks: Vec<TaskReport>,
     /// Live UAVs at the end that believe the mission finished.
     pub finished: Vec<u16>,
-    /// Live UAVs at the end that do not.
+    /// Live UAVs at the end that hold a relay position, with everything covered.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub relaying: Vec<u16>,
+    /// Live UAVs at the end that do neither.
     pub unfinished: Vec<u16>,
     /// How the swarm held together.
     pub swarm: Swarm,
@@ -457,7 +460,10 @@ impl RunReport {
             let n = self.zone_entries;
             reasons.push(format!("no-fly zones were entered {n} times"));
         }
-        if self.finished.is_empty() && self.unfinished.is_empty() {
+        if [&self.finished, &self.relaying, &self.unfinished]
+            .iter()
+            .all(|ids| ids.is_empty())
+        {
             reasons.push("no UAV is left".to_owned());
         }
         if !self.unfinished.is_empty() {

@@ -25,6 +25,9 @@ pub struct TaskReport {
     pub seen_by: Option<u16>,
     /// Who flew to it, each time one did.
     pub flown_by: Vec<u16>,
+    /// Who held it, if it is a relay position, each time one did.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub held_by: Vec<u16>,
     /// Who says to have done it; more than one did it more than once.
     pub done_by: Vec<u16>,
     /// Why nobody can do it, as the first UAV said that did.
@@ -68,12 +71,17 @@ impl Tasks {
             return;
         };
         match news {
-            TaskNews::Flies => task.flown_by.push(peer),
+            TaskNews::Flies | TaskNews::Relays => task.flown_by.push(peer),
+            TaskNews::Holds => task.held_by.push(peer),
             TaskNews::Seen => task.done_by.push(peer),
             TaskNews::NobodyCan(why) => {
                 task.nobody_can.get_or_insert_with(|| why.clone());
             }
-            TaskNews::Asked | TaskNews::Left | TaskNews::DoneBy(_) | TaskNews::Over(_) => {}
+            TaskNews::Asked
+            | TaskNews::Leaving
+            | TaskNews::Left
+            | TaskNews::DoneBy(_)
+            | TaskNews::Over(_) => {}
         }
     }
 
@@ -98,6 +106,10 @@ impl TaskReport {
         let secs = super::secs;
         let asked = format!("{} asked for at {:.1} s", self.name, secs(self.asked_ms));
         let state = format!("{:?}", self.state).to_lowercase();
+        if !self.held_by.is_empty() {
+            let names: Vec<String> = self.held_by.iter().map(|id| format!("uav{id}")).collect();
+            return format!("{asked}, held by {}, {state}", names.join(", "));
+        }
         match (self.seen_ms, self.seen_by, &self.nobody_can) {
             (Some(ms), Some(by), _) => format!(
                 "{asked}, seen by uav{by} after {:.1} s",

@@ -104,6 +104,9 @@ impl RunReport {
             writeln!(f, "  revisit    {:.1} s at most", secs(ms))?;
         }
         writeln!(f, "  finished   {}", self.names(&self.finished))?;
+        if !self.relaying.is_empty() {
+            writeln!(f, "  relaying   {}", self.names(&self.relaying))?;
+        }
         if !self.unfinished.is_empty() {
             writeln!(f, "  unfinished {}", self.names(&self.unfinished))?;
         }

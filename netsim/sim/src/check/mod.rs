@@ -20,6 +20,7 @@
 //! | [`decision`] | what rounds decide, from the bids alone; the bids themselves |
 //! | [`spoken`] | what is published against what is held |
 //! | [`tasks`] | each task in one bundle, and in one at least |
+//! | [`relays`] | who holds a relay position is there |
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
 //! | [`airtime`] | S9: shares of the channel |
 //! | [`fuel`] | S10, bids and returns against fuel and place |
@@ -46,6 +47,7 @@ pub mod membership;
 pub mod patience;
 pub mod progress;
 pub mod record;
+pub mod relays;
 pub mod rules;
 pub mod snapshot;
 pub mod spoken;

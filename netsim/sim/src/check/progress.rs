@@ -119,7 +119,7 @@ impl ProgressCheck {
         }
     }
 
-    /// L6: a restarted peer covers, plans, is done, or is not needed: everything open is
+    /// L6: a restarted peer covers, plans, relays, is done, or is not needed: everything open is
     /// listed by others, near whose seam it waits.
     fn check_restarted(
         &mut self,
@@ -136,7 +136,7 @@ impl ProgressCheck {
             // Whose fuel is due is to fly home.
             let is_spent = m.view.spendable_ms == 0 || m.view.is_fuel_due;
             let waits = waits || m.view.loop_hash != 0 && is_spent;
-            if m.view.finished || !m.view.plan.is_empty() || waits {
+            if m.view.finished || !m.view.plan.is_empty() || m.view.relays || waits {
                 r.productive = true;
                 continue;
             }

@@ -8,6 +8,7 @@ use super::fuel::FuelCheck;
 use super::listing::ListingCheck;
 use super::patience::PatienceCheck;
 use super::record::Said;
+use super::relays::RelayCheck;
 use super::spoken::SpokenCheck;
 use super::spread::SpreadCheck;
 use super::tasks::TaskCheck;
@@ -40,6 +41,8 @@ pub struct Rules {
     spoken: SpokenCheck,
     spread: SpreadCheck,
     tasks: TaskCheck,
+    /// Who holds relay positions.
+    pub relays: RelayCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -68,6 +71,7 @@ impl Rules {
             spoken: SpokenCheck::default(),
             spread: SpreadCheck::new(spec.twins()),
             tasks: TaskCheck::default(),
+            relays: RelayCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -291,6 +295,7 @@ impl Rules {
         self.spoken.on_snapshot(snapshot, found);
         self.spread.on_snapshot(snapshot, found);
         self.tasks.on_snapshot(snapshot, found);
+        self.relays.on_snapshot(snapshot, found);
         self.airtime.on_snapshot(snapshot, found);
         self.on_way_home(snapshot, found);
     }

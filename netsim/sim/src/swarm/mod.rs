@@ -153,6 +153,8 @@ pub struct Swarm {
     /// Which group of the last partition each peer was in.
     sides: BTreeMap<u16, usize>,
     loss_max_permille: u16,
+    /// Cells that were seen and the ground station did not know of, once a period.
+    ground_lacks: Vec<Option<u16>>,
     meter: Meter,
 }
 
@@ -189,6 +191,7 @@ impl Swarm {
             spoilt: false,
             sides: BTreeMap::new(),
             loss_max_permille: spec.radio.loss_permille,
+            ground_lacks: Vec::new(),
             meter: Meter::default(),
         };
         for (i, f) in swarm.faults.iter().enumerate() {
@@ -810,8 +813,10 @@ impl Swarm {
         let mut finished = true;
         for m in peers.iter().filter(|m| m.uav) {
             flying += 1;
-            finished &= m.view.finished;
+            // A relay position is over for nobody but who holds it.
+            finished &= m.view.finished || m.view.relays;
         }
+        self.note_ground(&peers);
         let waits = self.has_fresh_task();
         self.done = self.account.covered_ms().is_some() && flying > 0 && finished && !waits;
         for v in self.checker.found.drain_fresh() {
@@ -852,6 +857,7 @@ impl Swarm {
         let mission = self.operator.mission();
         for asked in &tasks {
             self.account.asked(self.now_ms, asked);
+            self.checker.rules.relays.on_asked(asked);
             if !asked.task.is_open() {
                 continue;
             }
@@ -866,6 +872,17 @@ impl Swarm {
             );
         }
         self.operator.note_tasks(self.now_ms, tasks);
+    }
+
+    /// How many cells were seen of which the ground station does not know.
+    fn note_ground(&mut self, peers: &[PeerSnapshot]) {
+        let same = |m: &&PeerSnapshot| !m.uav && m.view.loop_hash == self.judged.hash();
+        let lacks = peers.iter().find(same).map(|m| {
+            let mut lacks = self.judged.covered().clone();
+            lacks.subtract(&m.view.covered);
+            lacks.count()
+        });
+        self.ground_lacks.push(lacks);
     }
 
     /// Whether a task was asked for so lately that not all may have heard of it.

@@ -23,6 +23,11 @@ pub struct Outcome {
     pub reached: Reached,
     /// The kinds of trouble that struck.
     pub struck: Vec<&'static str>,
+    /// Cells that were seen and the ground station did not know of, once a beacon period;
+    /// nothing while it does not run, or has another loop.
+    pub ground_lacks: Vec<Option<u16>>,
+    /// For how long somebody held each relay position, milliseconds, by number and revision.
+    pub relays_held_ms: BTreeMap<(u16, u32), u64>,
     /// Hash of the history.
     pub history_hash: u64,
     /// The main events, where they were kept.
@@ -103,6 +108,8 @@ impl Swarm {
             loss_permille: self.loss_max_permille,
             reached: self.checker.reached,
             struck: Vec::new(),
+            ground_lacks: std::mem::take(&mut self.ground_lacks),
+            relays_held_ms: std::mem::take(&mut self.checker.rules.relays.held_ms),
             history_hash,
             entries: self.history.entries().to_vec(),
         }
@@ -130,7 +137,10 @@ impl Swarm {
     fn unfinished(&self) -> Vec<u16> {
         let running = self.peers.iter().filter(|p| p.config.airframe.is_some());
         running
-            .filter(|p| p.peer.as_ref().is_some_and(|p| !p.beliefs().finished))
+            .filter(|p| {
+                let believes = p.peer.as_ref().map(|p| p.beliefs());
+                believes.is_some_and(|b| !b.finished && !b.relays)
+            })
             .map(SimPeer::id)
             .collect()
     }

@@ -5,6 +5,7 @@ mod hostile;
 mod life;
 mod missions;
 mod orders;
+mod relays;
 mod stores;
 mod swarm;
 mod tasks;

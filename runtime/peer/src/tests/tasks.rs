@@ -242,8 +242,8 @@ fn words_that_cannot_be_carried_out_are_refused_with_the_reason() {
         ),
         (
             TaskEdit::Add(NewTask {
-                kind: TaskKind::Relay,
-                ..point("relay", 0.0, 0.0)
+                kind: TaskKind::Track,
+                ..point("truck", 0.0, 0.0)
             }),
             "no mission flies",
         ),

@@ -67,7 +67,8 @@ pub enum TaskKind {
     Pinpoint,
     /// To be flown along once, from either end.
     Line,
-    /// A place and what lies around it, seen in the time that it says.
+    /// A place and what lies around it, or what lies within corners, seen in the time that it
+    /// says.
     Area,
     /// A target to be followed from that place on.
     Track,
@@ -132,15 +133,16 @@ pub struct Task {
     pub state: TaskState,
     /// What kind it is.
     pub kind: TaskKind,
-    /// Where: one place, of a line at least two.
+    /// Where: one place, of a line at least two, of an area one or its corners.
     pub places: Vec<TaskPlace>,
     /// The sensor that it needs, 1 to 32; 0 for any.
     pub sensor: u8,
     /// What it is worth if it were done at once, 1 to 1000.
     pub worth: u16,
-    /// How long a UAV stays there, milliseconds.
+    /// How long a UAV stays there, milliseconds; 0 of what goes on: until somebody ends it.
     pub stay_ms: u32,
-    /// How far around the place, or to the sides of the line, is to be seen, mm.
+    /// How far around the place, or to the sides of the line, is to be seen; of a relay position
+    /// how far from the place a UAV may be that holds it, mm.
     pub radius_mm: u32,
     /// After so long it is not wanted any more, milliseconds from when it was asked for; 0
     /// for never.
@@ -158,6 +160,13 @@ impl Task {
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.state == TaskState::Open
+    }
+
+    /// Whether who does it stays until somebody ends it, and does nothing else meanwhile: a
+    /// relay position.
+    #[must_use]
+    pub fn is_held(&self) -> bool {
+        self.kind.goes_on() && self.stay_ms == 0
     }
 
     /// The revision in which it was asked for: that it was done is told in the next.
@@ -386,13 +395,13 @@ fn is_near(mm: i32) -> bool {
 
 /// The first field of a task that is out of range.
 pub(crate) fn check_task(t: &Task) -> Result<(), WireError> {
-    let least = if t.kind == TaskKind::Line { 2 } else { 1 };
-    let most = if t.kind == TaskKind::Line {
-        TASK_PLACES_MAX
-    } else {
-        1
+    let n = t.places.len();
+    let fits = match t.kind {
+        TaskKind::Line => (2..=TASK_PLACES_MAX).contains(&n),
+        TaskKind::Area => n == 1 || (3..=TASK_PLACES_MAX).contains(&n),
+        TaskKind::Pinpoint | TaskKind::Track | TaskKind::Relay => n == 1,
     };
-    in_range("places", (least..=most).contains(&t.places.len()))?;
+    in_range("places", fits)?;
     in_range("places", t.places.is_sorted_by(|a, b| a != b))?;
     let near = |p: &TaskPlace| is_near(p.east_mm) && is_near(p.north_mm);
     in_range("places", t.places.iter().all(near))?;
@@ -465,7 +474,7 @@ pub(super) const TASK: &[Place] = &[
     ),
     at(
         "places",
-        "where: one place, of a line at least two",
+        "where: one place, of a line at least two, of an area one or its corners",
         Shape::Rows(PLACE, TASK_PLACES_MAX),
     ),
     at(

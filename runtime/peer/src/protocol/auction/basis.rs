@@ -23,8 +23,45 @@ impl Auction {
     /// only on their way are open too.
     pub(super) fn problem(&self, moves: bool) -> Problem {
         let bidders = self.bidders();
+        let (holders, open) = self.to_be_had(&bidders, moves);
+        let held_back = self.held_back(&bidders, &holders, &open);
+        let bidder = |(id, bundle): &(PeerId, &Bundle)| {
+            let first = kept(bundle).map(|t| t.task);
+            let mine = |t: &TaskId| holders.get(t).is_some_and(|h| h.2.0 == *id);
+            let leaving = kept(bundle).filter(|t| t.progress == Progress::Leaving);
+            let used = usize::from(bundle.kept) + bundle.done.len();
+            let fixed = if moves { bundle.begun } else { bundle.kept };
+            let mut fixed = kept(bundle).take(usize::from(fixed));
+            // Who is to hold something does nothing else.
+            let is_tied = fixed.any(|t| self.is_current(t) && self.is_held(t.task));
+            let room = DONE_MAX
+                .saturating_sub(used)
+                .min(BUNDLE_MAX.saturating_sub(usize::from(bundle.kept)));
+            Bidder {
+                id: *id,
+                offer: bundle.offer,
+                first: first.filter(mine).collect(),
+                barred: leaving
+                    .map(|t| t.task)
+                    .chain(held_back.iter().copied())
+                    .collect(),
+                room: if is_tied { 0 } else { room },
+            }
+        };
+        Problem {
+            bidders: bidders.iter().map(bidder).collect(),
+            open,
+        }
+    }
+
+    /// Which tasks are somebody's, and which are to be had.
+    pub(super) fn to_be_had(
+        &self,
+        bidders: &[(PeerId, &Bundle)],
+        moves: bool,
+    ) -> (BTreeMap<TaskId, Rank>, Vec<TaskId>) {
         let mut holders: BTreeMap<TaskId, Rank> = BTreeMap::new();
-        for (id, bundle) in &bidders {
+        for (id, bundle) in bidders {
             let fixed = if moves { bundle.begun } else { bundle.kept };
             let fixed = kept(bundle).take(usize::from(fixed));
             let stays = |t: &&BundleTask| t.progress != Progress::Leaving && self.is_current(t);
@@ -33,29 +70,12 @@ impl Auction {
                 *best = (*best).max(rank(*id, held));
             }
         }
-        let done = self.done_before_offers(&bidders);
+        let done = self.done_before_offers(bidders);
         let open = self.tasks.iter().filter(|(id, task)| {
             self.counts_open(**id, task) && !holders.contains_key(id) && !done.contains(id)
         });
-        let bidder = |(id, bundle): &(PeerId, &Bundle)| {
-            let first = kept(bundle).map(|t| t.task);
-            let mine = |t: &TaskId| holders.get(t).is_some_and(|h| h.2.0 == *id);
-            let leaving = kept(bundle).filter(|t| t.progress == Progress::Leaving);
-            let used = usize::from(bundle.kept) + bundle.done.len();
-            Bidder {
-                id: *id,
-                offer: bundle.offer,
-                first: first.filter(mine).collect(),
-                barred: leaving.map(|t| t.task).collect(),
-                room: DONE_MAX
-                    .saturating_sub(used)
-                    .min(BUNDLE_MAX.saturating_sub(usize::from(bundle.kept))),
-            }
-        };
-        Problem {
-            bidders: bidders.iter().map(bidder).collect(),
-            open: open.map(|(id, _)| *id).collect(),
-        }
+        let open = open.map(|(id, _)| *id).collect();
+        (holders, open)
     }
 
     /// What was done before the offers of those who live, and what others did at all: what

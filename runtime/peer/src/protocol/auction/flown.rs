@@ -3,7 +3,8 @@
 //! A task counts its worth at the moment at which it is done, less the later that is: after
 //! [`HALF_TIME_MS`] one half, after three times as long a quarter, and never nothing, so that
 //! even the last of a hundred tasks is better done sooner. What goes on (a target, a relay)
-//! counts at arrival.
+//! counts at arrival. Who holds something until somebody ends it does nothing after that, and
+//! has no section meanwhile, so that the fuel for it is free.
 //!
 //! A place is flown over on the course on which it lies from the last one. Who has a section
 //! comes back to where it left it, and a task counts so much less as that way is long. Air
@@ -23,6 +24,10 @@ use std::collections::BTreeMap;
 /// After so long a task is worth half, milliseconds.
 pub const HALF_TIME_MS: u64 = 60_000;
 
+/// Who takes what is held until somebody ends it must be able to stay there for so long,
+/// milliseconds: it takes others half a minute to hear of it, to settle and to come.
+pub const LEAST_HELD_MS: u64 = 120_000;
+
 /// Bids are in millionths of [`Task::worth`].
 const MILLION: u64 = 1_000_000;
 
@@ -38,6 +43,8 @@ pub struct FlownTime;
 pub struct Airborne {
     pose: Pose,
     time_ms: u64,
+    /// Whether it stays where it is until somebody says otherwise.
+    stays: bool,
     offer: Offer,
 }
 
@@ -184,6 +191,7 @@ impl Flying for FlownTime {
         Airborne {
             pose: Pose::new(at, f64::from(offer.course_e4) / 10_000.0),
             time_ms: 0,
+            stays: false,
             offer: *offer,
         }
     }
@@ -195,10 +203,15 @@ impl Flying for FlownTime {
 
 /// Where a task leaves a UAV, and what it is worth when it is done then.
 fn flown(at: &Airborne, task: &Task, ways: &impl Ways) -> Option<(Airborne, u32)> {
-    if at.offer.speed_mmps == 0 || !at.has(task.sensor) {
+    if at.offer.speed_mmps == 0 || at.stays || !at.has(task.sensor) {
         return None;
     }
-    let mut flown = at.along(&task.places, ways)?;
+    // An area is begun at a corner, and its time says how long it takes.
+    let way = match task.kind {
+        TaskKind::Area => task.places.get(..1)?,
+        _ => &task.places[..],
+    };
+    let mut flown = at.along(way, ways)?;
     if task.kind == TaskKind::Line {
         let back: Vec<TaskPlace> = task.places.iter().rev().copied().collect();
         let back = at.along(&back, ways).filter(|b| b.1 < flown.1);
@@ -208,7 +221,14 @@ fn flown(at: &Airborne, task: &Task, ways: &impl Ways) -> Option<(Airborne, u32)
     let time_ms = there_ms + u64::from(task.stay_ms);
     // From where it was asked it knows that it can return.
     let back_ms = at.back_ms(pose);
-    if time_ms + back_ms > u64::from(at.offer.endurance_ms) {
+    let endurance_ms = u64::from(at.offer.endurance_ms);
+    let (needs_ms, has_ms) = if task.is_held() {
+        let freed_ms = u64::from(at.offer.section_ms);
+        (time_ms + LEAST_HELD_MS + back_ms, endurance_ms + freed_ms)
+    } else {
+        (time_ms + back_ms, endurance_ms)
+    };
+    if needs_ms > has_ms {
         return None;
     }
     let returns_ms = if at.offer.section_ms == 0 { 0 } else { back_ms };
@@ -220,6 +240,7 @@ fn flown(at: &Airborne, task: &Task, ways: &impl Ways) -> Option<(Airborne, u32)
     let next = Airborne {
         pose,
         time_ms,
+        stays: task.is_held(),
         ..*at
     };
     Some((next, value(task.worth, counts_ms + returns_ms)))
@@ -298,6 +319,34 @@ mod tests {
         assert_eq!(stays(TaskKind::Track), Some((120_000, 50_000_000)));
         assert_eq!(stays(TaskKind::Relay), stays(TaskKind::Track));
         assert_eq!(stays(TaskKind::Area), Some((120_000, 33_333_333)));
+    }
+
+    #[test]
+    fn what_is_held_until_somebody_ends_it_is_the_last_of_an_order_and_needs_time_to_stay() {
+        let relay = task(TaskKind::Relay, &[at(1200, 0)]);
+        let from = FlownTime.begin(PeerId(1), &OFFER);
+        let (there, value) = FlownTime.then(&from, TaskId::default(), &relay).unwrap();
+        assert_eq!((there.time_ms, value), (60_000, 50_000_000));
+        let ahead = task(TaskKind::Pinpoint, &[at(1300, 0)]);
+        assert!(FlownTime.then(&there, TaskId::default(), &ahead).is_none());
+        // A minute there, two minutes to stay, a minute back.
+        let lasts = |endurance_ms, section_ms| Offer {
+            endurance_ms,
+            section_ms,
+            ..OFFER
+        };
+        assert!(fly(lasts(239_999, 0), &relay).is_none());
+        assert!(fly(lasts(240_000, 0), &relay).is_some());
+        // Who holds it has no section to fly.
+        assert!(fly(lasts(40_000, 200_000), &relay).is_some());
+        assert!(fly(lasts(40_000, 200_000), &ahead).is_none());
+    }
+
+    #[test]
+    fn an_area_takes_its_time_from_its_first_corner_on() {
+        let mut area = task(TaskKind::Area, &[at(1200, 0), at(1400, 0), at(1400, 300)]);
+        area.stay_ms = 60_000;
+        assert_eq!(fly(OFFER, &area), Some((120_000, 33_333_333)));
     }
 
     #[test]

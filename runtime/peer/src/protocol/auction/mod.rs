@@ -30,6 +30,9 @@
 //! | another's offer changes, after it committed to something | likewise |
 //! | another's offer changes else | it is settled anew on its old offer |
 //!
+//! A task that is held until somebody ends it (a relay position) ties who holds it; `held` says
+//! how many may be, while cells are to be covered.
+//!
 //! Of two claims of living peers on one task done goes before begun, begun before
 //! committed, that before leaving; of equal ones the higher bid, then the lower id. What the
 //! dead claimed is open; what they did is done.
@@ -46,6 +49,7 @@
 
 mod basis;
 pub mod flown;
+mod held;
 pub mod improvement;
 pub mod settlement;
 
@@ -92,6 +96,8 @@ pub enum Event {
     GiveUp,
     /// What was unassigned may be in its reach by now.
     OfferAnew,
+    /// Whether cells are to be covered, for which somebody has to be left.
+    Cells(bool),
     /// Identifies the map that ways follow from: whoever has another has another basis.
     Map(u32),
     /// A beacon period has passed, in a component of this diameter.
@@ -135,6 +141,10 @@ pub struct Auction {
     /// not.
     known_done: BTreeSet<DoneTask>,
     map: u32,
+    /// Whether cells are to be covered.
+    cells_open: bool,
+    /// Periods for which too many have held something for anybody to be left to cover.
+    too_many: u32,
 }
 
 impl Auction {
@@ -161,6 +171,8 @@ impl Auction {
             patience: u32::MAX,
             known_done: BTreeSet::new(),
             map: 0,
+            cells_open: false,
+            too_many: 0,
         }
     }
 
@@ -175,6 +187,7 @@ impl Auction {
         self.live = old.live;
         self.patience = old.patience;
         self.map = old.map;
+        self.cells_open = old.cells_open;
         self.known_done = old.known_done;
         self.remember_done(&own.1.1);
     }
@@ -246,6 +259,7 @@ impl Auction {
             return Vec::new();
         }
         let mut effects = self.drop_lost();
+        effects.extend(self.drop_to_cover());
         self.settle_anew(settler);
         effects.extend(self.give_up_moving(settler));
         effects.extend(self.commit());
@@ -328,6 +342,13 @@ impl Auction {
                 self.let_go(&all);
             }
             Event::OfferAnew => self.stale = true,
+            Event::Cells(open) => {
+                if self.cells_open == open {
+                    return false;
+                }
+                self.cells_open = open;
+                self.stale |= self.tasks.values().any(|t| t.is_open() && t.is_held());
+            }
             Event::Map(map) => {
                 if self.map == map {
                     return false;
@@ -338,8 +359,15 @@ impl Auction {
             Event::Period(diameter) => {
                 self.patience = 2 * u32::from(diameter) + 3;
                 self.quiet = (self.quiet + 1).min(self.patience);
+                self.too_many = if self.is_one_too_many() {
+                    self.too_many.saturating_add(1)
+                } else {
+                    0
+                };
                 // Nothing else changes with time.
-                return self.quiet == self.patience || self.has_more_to_say();
+                return self.quiet == self.patience
+                    || self.has_more_to_say()
+                    || self.too_many >= self.patience;
             }
         }
         true

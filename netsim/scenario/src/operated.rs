@@ -1,0 +1,89 @@
+//! What the operator of a built-in trial asks for while it is flown, and what comes of it.
+
+use crate::{Overrides, load_builtin};
+use skein_netsim::Prepared;
+use skein_netsim::fault::{Fault, TimedFault};
+use skein_netsim::runs::{Wanted, run};
+use skein_netsim::swarm::Outcome;
+use skein_peer::input::NewTask;
+use skein_peer::wire::tasks::TaskKind;
+
+/// The relay trial with so many UAVs: as it is, and without its operator.
+fn relayed(uavs: u16) -> [Outcome; 2] {
+    let over = Overrides {
+        peers: Some(uavs),
+        ..Overrides::default()
+    };
+    let prepared = Prepared::new(load_builtin("relay", &over).unwrap().spec);
+    let asked = prepared.spec.faults.clone();
+    [asked, Vec::new()].map(|faults| run(&prepared, 1, faults, Wanted::default()))
+}
+
+/// Of the periods in which both lasted, in how many the first ground station knew more and
+/// in how many less, percent.
+fn sooner([with, without]: &[Outcome; 2]) -> (usize, usize) {
+    let both = with.ground_lacks.iter().zip(&without.ground_lacks);
+    let both: Vec<(u16, u16)> = both.filter_map(|(a, b)| Some(((*a)?, (*b)?))).collect();
+    let share = |is: fn(&(u16, u16)) -> bool| {
+        both.iter().filter(|p| is(p)).count() * 100 / both.len().max(1)
+    };
+    (share(|(a, b)| a < b), share(|(a, b)| a > b))
+}
+
+#[test]
+fn a_relay_position_tells_the_ground_station_of_what_it_cannot_hear() {
+    for uavs in [1, 3, 8] {
+        let runs = relayed(uavs);
+        for outcome in &runs {
+            let broken = outcome.violations();
+            assert!(outcome.report.completed && broken.is_empty(), "{broken:?}");
+        }
+        let held_ms: u64 = runs[0].relays_held_ms.values().sum();
+        let (more, less) = sooner(&runs);
+        println!("{uavs} UAVs: held for {held_ms} ms, {more} % more, {less} % less");
+        if uavs == 1 {
+            assert_eq!(held_ms, 0, "one UAV alone covers first");
+            continue;
+        }
+        assert!(held_ms * 2 > runs[0].report.end_ms, "{held_ms}");
+        assert!(more >= 40 && less <= 10, "{more} % more, {less} % less");
+        assert_eq!(runs[0].report.relaying.len(), 1);
+    }
+}
+
+#[test]
+fn an_area_is_seen_in_one_flight_and_what_is_told_of_it_is_true() {
+    let scenario = load_builtin("relay", &Overrides::default()).unwrap();
+    let prepared = Prepared::new(scenario.spec);
+    let task = NewTask {
+        name: Some("yard".to_owned()),
+        kind: TaskKind::Area,
+        // South of what is covered, beside the no-fly zone.
+        places: vec![
+            (280_000, 380_000),
+            (430_000, 380_000),
+            (430_000, 520_000),
+            (340_000, 560_000),
+        ],
+        radius_mm: 0,
+        worth: 100,
+        within_ms: None,
+        sensor: 0,
+    };
+    let asked = TimedFault {
+        at_ms: 8_000,
+        fault: Fault::AddTask { task },
+    };
+    let outcome = run(&prepared, 2, vec![asked], Wanted::default());
+    let broken = outcome.violations();
+    assert!(outcome.report.completed && broken.is_empty(), "{broken:?}");
+    let [told] = &outcome.report.tasks[..] else {
+        panic!("{:?}", outcome.report.tasks);
+    };
+    assert!(
+        told.seen_ms.is_some() && told.done_by.len() == 1,
+        "{}",
+        told.line()
+    );
+    assert_eq!(told.flown_by.len(), 1, "{}", told.line());
+}

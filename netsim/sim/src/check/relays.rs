@@ -1,0 +1,144 @@
+//! Relay positions: who says that it holds one is where it was asked to be (`relay-place`); and
+//! for how long somebody was.
+
+use super::{Clocks, Findings, Snapshot};
+use skein_geometry::frame::Point;
+use skein_peer::input::AskedTask;
+use skein_peer::mission::point_m;
+use skein_peer::wire::tasks::{Progress, TaskId};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// For so long a holder may be away: its process stood still meanwhile, or a zone came and it
+/// flies to another circle, milliseconds.
+const AWAY_MS: u64 = 30_000;
+
+/// Places are told in whole millimetres, metres.
+const ROUNDING_M: f64 = 0.01;
+
+/// A relay position: where, and how far from there a holder may be, metres.
+#[derive(Clone, Copy, Debug)]
+struct Position {
+    at: Point,
+    within_m: f64,
+}
+
+/// What came of relay positions in one run.
+#[derive(Clone, Debug, Default)]
+pub struct RelayCheck {
+    asked: BTreeMap<(u16, u32), Position>,
+    away: Clocks<(u16, TaskId, u32)>,
+    /// For how long each was held, as the world knows, milliseconds, by number and revision.
+    pub held_ms: BTreeMap<(u16, u32), u64>,
+}
+
+impl RelayCheck {
+    /// The ground station holds a task of its operator.
+    pub fn on_asked(&mut self, asked: &AskedTask) {
+        let task = &asked.task;
+        if let (true, Some(place)) = (task.is_held(), task.places.first()) {
+            let at = point_m((place.east_mm, place.north_mm));
+            let within_m = f64::from(task.radius_mm) / 1000.0;
+            let key = (asked.number, task.revision_as_asked());
+            self.asked.entry(key).or_insert(Position { at, within_m });
+        }
+    }
+
+    /// Looks at all who hold one.
+    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        let mut seen = BTreeSet::new();
+        let mut held = BTreeSet::new();
+        for m in snapshot.peers.iter().filter(|m| m.uav && m.view.speaks) {
+            let Some(at) = m.at else { continue };
+            for (id, revision, progress) in &m.view.tasks {
+                let holds = matches!(progress, Progress::Begun | Progress::Leaving);
+                let asked = self.asked.get(&(id.number, *revision));
+                let Some(position) = asked.filter(|_| holds) else {
+                    continue;
+                };
+                let away_m = (at - position.at).norm();
+                if away_m <= position.within_m + ROUNDING_M {
+                    held.insert((id.number, *revision));
+                    continue;
+                }
+                // Who asked to be relieved may have been unable to stay.
+                if *progress == Progress::Leaving {
+                    continue;
+                }
+                let key = (m.id, *id, *revision);
+                seen.insert(key);
+                let since_ms = self.away.start(key, snapshot.now_ms).max(m.since_ms);
+                let took_ms = snapshot.now_ms.saturating_sub(since_ms);
+                let bound_ms = snapshot.grown_ms(AWAY_MS, since_ms);
+                if took_ms > bound_ms && self.away.tell_once(key) {
+                    let within_m = position.within_m;
+                    found.broken("relay-place", snapshot.now_ms, Some(m.id), || {
+                        format!(
+                            "says that it holds the relay position {}.{} and is {away_m:.0} m from it (at most {within_m:.0} m), for {took_ms} ms (bound {bound_ms} ms)",
+                            id.author, id.number
+                        )
+                    });
+                }
+            }
+        }
+        self.away.retain(|k| seen.contains(k));
+        for key in held {
+            *self.held_ms.entry(key).or_default() += snapshot.bounds.period_ms;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Story, speaking};
+    use super::*;
+    use skein_peer::Beliefs;
+    use skein_peer::wire::tasks::{Task, TaskKind, TaskPlace};
+
+    const TASK: TaskId = TaskId {
+        author: 100,
+        number: 3,
+    };
+
+    /// What is broken when peer 1 says this for so long, so far from the place.
+    fn after(seconds: u64, progress: Progress, away_m: f64) -> (bool, u64) {
+        let (mut story, mut found) = (Story::new(300), Findings::new(1));
+        let mut check = RelayCheck::default();
+        check.on_asked(&AskedTask {
+            number: 3,
+            task: Task {
+                revision: 1,
+                kind: TaskKind::Relay,
+                places: vec![TaskPlace {
+                    east_mm: 50_000,
+                    north_mm: 0,
+                }],
+                radius_mm: 100_000,
+                ..Task::default()
+            },
+            age_ms: 0,
+        });
+        story.place(1, Point::new(50.0, away_m));
+        let view = Beliefs {
+            tasks: vec![(TASK, 1, progress)],
+            ..speaking()
+        };
+        for t in 0..seconds {
+            story.snapshot(t * 1000, &[(1, view.clone())], |s| {
+                check.on_snapshot(s, &mut found);
+            });
+        }
+        let held_ms = check.held_ms.values().sum();
+        (found.counts.contains_key("relay-place"), held_ms)
+    }
+
+    #[test]
+    fn who_says_that_it_holds_a_position_and_is_elsewhere_is_found() {
+        assert_eq!(after(60, Progress::Begun, 120.0), (true, 0));
+        assert_eq!(after(25, Progress::Begun, 120.0), (false, 0));
+        assert_eq!(after(60, Progress::Begun, 99.0), (false, 60_000));
+        assert_eq!(after(60, Progress::Leaving, 99.0), (false, 60_000));
+        for under_way in [Progress::Tentative, Progress::Committed, Progress::Leaving] {
+            assert_eq!(after(60, under_way, 120.0), (false, 0));
+        }
+    }
+}

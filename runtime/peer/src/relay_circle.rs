@@ -1,0 +1,186 @@
+//! The circle that is flown as a relay position (D2.7 §3.2, §2.3.1): around the place that was
+//! asked for, or as near to it as zones leave room, and nowhere farther from it than was asked.
+//!
+//! # Guarantees
+//! The circle keeps the clearance of the mission, and a UAV that strays from it by the tracking
+//! error is still within the distance.
+//!
+//! # Complexity
+//! At most some hundred circles are measured against the zones.
+
+use crate::mission::{Mission, point_m};
+use crate::wire::tasks::Task;
+use skein_behaviors::executive::circle::halves;
+use skein_flight::route::Router;
+use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::math::{FRAC_PI_2, TAU, cos, sin};
+use skein_geometry::{NoFlyZones, Segment};
+
+/// Circles are flown with so many times the turn radius where there is room, so that following
+/// them has authority on both sides in a wind.
+const RADII: [f64; 2] = [1.2, 1.0];
+
+/// Centres away from the place are tried at so many distances.
+const DISTANCES: u32 = 16;
+
+/// And in so many directions.
+const DIRECTIONS: u32 = 24;
+
+fn circle_round(centre: Point, radius_m: f64) -> Segment {
+    Segment {
+        start: Pose::new(centre + Vector::new(radius_m, 0.0), FRAC_PI_2),
+        curvature_per_m: 1.0 / radius_m,
+        length_m: TAU * radius_m,
+    }
+}
+
+impl Mission {
+    /// The circle of a relay position in this mission.
+    ///
+    /// # Errors
+    /// A sentence that says why there is none.
+    pub fn relay_circle(&self, task: &Task, zones: &NoFlyZones) -> Result<Segment, String> {
+        let place = task.places.first().ok_or("a relay position has a place")?;
+        let place = point_m((place.east_mm, place.north_mm));
+        let within_m = f64::from(task.radius_mm) / 1000.0;
+        let (turn_m, stray_m) = (self.turn_radius_m(), self.tracking_error_m());
+        let least_m = turn_m + stray_m;
+        if within_m < least_m {
+            return Err(format!(
+                "the circle flown there takes {least_m:.1} m with what a UAV may stray, more than the {within_m:.1} m that it may be away; expected a radius of at least {least_m:.1} m"
+            ));
+        }
+        self.is_near_enough(place)?;
+        let clearance_m = self.clearance_m();
+        let around = |factor: f64| {
+            let radius_m = factor * turn_m;
+            let room_m = within_m - radius_m - stray_m;
+            let rings = (0..=DISTANCES).filter(move |_| room_m >= 0.0);
+            let centres = rings.flat_map(move |ring| {
+                let away_m = room_m * f64::from(ring) / f64::from(DISTANCES);
+                let directions = if ring == 0 { 1 } else { DIRECTIONS };
+                (0..directions).map(move |k| {
+                    let course = TAU * f64::from(k) / f64::from(DIRECTIONS);
+                    place + Vector::new(cos(course), sin(course)) * away_m
+                })
+            });
+            centres.map(move |centre| circle_round(centre, radius_m))
+        };
+        let mut all = RADII.into_iter().flat_map(around);
+        all.find(|c| zones.is_clear(&halves(c), clearance_m))
+            .ok_or_else(|| {
+                format!(
+                    "no circle of {turn_m:.1} m within {within_m:.1} m of the place keeps {clearance_m:.1} m from the no-fly zones; expected another place or a larger radius"
+                )
+            })
+    }
+
+    /// Who relieves its holder in time may be as far away as any place of the area is from the
+    /// base, and no farther.
+    fn is_near_enough(&self, place: Point) -> Result<(), String> {
+        let away_m = |p: Point| (p - self.base_m()).norm();
+        let farthest_m = self.area_m().into_iter().map(away_m).fold(0.0, f64::max);
+        let there_m = away_m(place);
+        if there_m > farthest_m {
+            return Err(format!(
+                "the place is {there_m:.0} m from the base, and every place of the area within {farthest_m:.0} m: who relieves its holder might come too late; expected one nearer to the base"
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// The same, and a way there from a pose is known.
+///
+/// # Errors
+/// A sentence that says why there is none.
+pub fn planned(
+    mission: &Mission,
+    router: &Router,
+    task: &Task,
+    from: Pose,
+) -> Result<Segment, String> {
+    let circle = mission.relay_circle(task, router.zones())?;
+    // Who is nearer to a zone than that, since one came, gets away from it first.
+    let is_clear = router.zones().distance_m(from.position()) >= mission.clearance_m();
+    let no_way = |_| "no way leads to it that keeps clear of the no-fly zones".to_owned();
+    if is_clear {
+        router.route(from, circle.start).map_err(no_way)?;
+    }
+    Ok(circle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::mission;
+    use crate::wire::tasks::{TaskKind, TaskPlace};
+    use skein_behaviors::executive::circle::centre;
+    use std::sync::Arc;
+
+    fn zoned() -> Mission {
+        let mut m = mission(1, 8, 6);
+        m.zones = vec![vec![
+            (200_000, 100_000),
+            (260_000, 100_000),
+            (260_000, 160_000),
+            (200_000, 160_000),
+        ]];
+        m
+    }
+
+    fn relay(east_m: i32, north_m: i32, radius_m: u32) -> Task {
+        Task {
+            revision: 1,
+            kind: TaskKind::Relay,
+            places: vec![TaskPlace {
+                east_mm: east_m * 1000,
+                north_mm: north_m * 1000,
+            }],
+            radius_mm: radius_m * 1000,
+            worth: 100,
+            ..Task::default()
+        }
+    }
+
+    #[test]
+    fn the_circle_is_round_the_place_or_as_near_as_is_clear() {
+        let m = zoned();
+        let zones = m.no_fly_zones().unwrap();
+        for (east_m, north_m, radius_m, off_m) in [
+            (100, 200, 100, 0.0..0.1),
+            // Beside the zone, in it, and with room for the tightest circle alone.
+            (190, 130, 100, 10.0..40.0),
+            (230, 130, 120, 60.0..90.0),
+            (100, 200, 26, 0.0..0.1),
+        ] {
+            let circle = m
+                .relay_circle(&relay(east_m, north_m, radius_m), &zones)
+                .unwrap();
+            let place = Point::new(f64::from(east_m), f64::from(north_m));
+            let away_m = (centre(&circle) - place).norm();
+            assert!(off_m.contains(&away_m), "{east_m}: {away_m} m");
+            assert!(zones.is_clear(&halves(&circle), m.clearance_m() - 1e-6));
+            let radius = 1.0 / circle.curvature_per_m;
+            assert!(radius >= m.turn_radius_m());
+            assert!(away_m + radius + m.tracking_error_m() <= f64::from(radius_m) + 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_relay_position_without_room_is_refused_with_place_and_remedy() {
+        let m = Arc::new(zoned());
+        for (task, why) in [
+            (relay(100, 100, 10), "expected a radius of at least"),
+            (
+                relay(230, 130, 30),
+                "expected another place or a larger radius",
+            ),
+            (relay(90_000, 0, 100), "expected one nearer to the base"),
+        ] {
+            let said = m.can_do(&task).unwrap_err();
+            assert!(said.contains(why), "{said}");
+        }
+        m.can_do(&relay(100, 200, 100)).unwrap();
+    }
+}
