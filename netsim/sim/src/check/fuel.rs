@@ -10,9 +10,9 @@ use super::flight::{FlightCheck, Flyer, at_base};
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use crate::spec::Spec;
 use skein_flight::trajectory::wind::{Course, Wind};
+use skein_geometry::Segment;
 use skein_geometry::frame::Point;
 use skein_geometry::math::atan2;
-use skein_geometry::{Segment, frame::Pose};
 use skein_peer::Beliefs;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::wire::message::Order;
@@ -119,12 +119,7 @@ impl FuelCheck {
         let from = ground.coverage_loop.boundary(boundary);
         let straight_s = self.straight_s(tank, from.position(), base);
         let router = &ground.router;
-        let way = base - from.position();
-        let line = Segment {
-            start: Pose::new(from.position(), atan2(way.y, way.x)),
-            curvature_per_m: 0.0,
-            length_m: way.norm(),
-        };
+        let line = Segment::straight(from.position(), base);
         // A mission that moves only its base keeps what it has of routes to the one before.
         let is_its_base = (ground.mission.base_m() - base).norm() < 0.01;
         if !is_its_base || router.zones().is_segment_clear(&line, 0.0) {

@@ -1,16 +1,22 @@
-//! Relay positions: who says that it holds one is where it was asked to be (`relay-place`); and
-//! for how long somebody was.
+//! Relay positions: who says that it holds one is where it was asked to be (`relay-place`), who
+//! gave up its section for one gets there (`relay-way`); and for how long somebody was there.
 
-use super::{Clocks, Findings, Snapshot};
+use super::flight::{FlightCheck, Flyer};
+use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use skein_geometry::frame::Point;
 use skein_peer::input::AskedTask;
 use skein_peer::mission::point_m;
+use skein_peer::wire::message::Order;
 use skein_peer::wire::tasks::{Progress, TaskId};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// For so long a holder may be away: its process stood still meanwhile, or a zone came and it
 /// flies to another circle, milliseconds.
 const AWAY_MS: u64 = 30_000;
+
+/// From when a UAV is given a position to when it flies there: it ends its cell, and the circle
+/// is planned, milliseconds. It may be given another one on its way, or its circle be moved.
+const SET_OUT_MS: u64 = 60_000;
 
 /// Places are told in whole millimetres, metres.
 const ROUNDING_M: f64 = 0.01;
@@ -27,6 +33,8 @@ struct Position {
 pub struct RelayCheck {
     asked: BTreeMap<(u16, u32), Position>,
     away: Clocks<(u16, TaskId, u32)>,
+    /// Who is under way to one, until when at most, milliseconds, and whether that was told.
+    under_way: BTreeMap<u16, (u64, u64, bool)>,
     /// For how long each was held, as the world knows, milliseconds, by number and revision.
     pub held_ms: BTreeMap<(u16, u32), u64>,
 }
@@ -44,11 +52,17 @@ impl RelayCheck {
     }
 
     /// Looks at all who hold one.
-    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+    pub fn on_snapshot(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        flyers: (&BTreeMap<u16, Flyer>, &FlightCheck),
+        found: &mut Findings,
+    ) {
         let mut seen = BTreeSet::new();
         let mut held = BTreeSet::new();
         for m in snapshot.peers.iter().filter(|m| m.uav && m.view.speaks) {
             let Some(at) = m.at else { continue };
+            self.check_way(snapshot, (m, at), flyers, found);
             for (id, revision, progress) in &m.view.tasks {
                 let holds = matches!(progress, Progress::Begun | Progress::Leaving);
                 let asked = self.asked.get(&(id.number, *revision));
@@ -85,6 +99,48 @@ impl RelayCheck {
             *self.held_ms.entry(key).or_default() += snapshot.bounds.period_ms;
         }
     }
+
+    /// Who covers nothing since it is to hold a position gets to one.
+    fn check_way(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        (m, at): (&PeerSnapshot, Point),
+        (flyers, flight): (&BTreeMap<u16, Flyer>, &FlightCheck),
+        found: &mut Findings,
+    ) {
+        let now_ms = snapshot.now_ms;
+        let is_there =
+            |progress: &Progress| matches!(progress, Progress::Begun | Progress::Leaving);
+        let positions = || {
+            let asked = |(id, revision, _): &(TaskId, u32, Progress)| {
+                self.asked.get(&(id.number, *revision)).copied()
+            };
+            m.view.tasks.iter().filter_map(asked)
+        };
+        let holds = m.view.tasks.iter().any(|(id, revision, progress)| {
+            is_there(progress) && self.asked.contains_key(&(id.number, *revision))
+        });
+        if !m.view.relays || holds || m.view.order != Order::Resume {
+            self.under_way.remove(&m.id);
+            return;
+        }
+        let longest_ms = || {
+            let flyer = flyers.get(&m.id)?;
+            let each = positions().map(|p| flight.longest_home_ms(at, p.at, *flyer));
+            each.max()
+        };
+        let begun = (now_ms, SET_OUT_MS + longest_ms().unwrap_or(0), false);
+        let (since_ms, bound_ms, told) = self.under_way.entry(m.id).or_insert(begun);
+        let since_ms = (*since_ms).max(m.since_ms);
+        let took_ms = now_ms.saturating_sub(since_ms);
+        let bound_ms = snapshot.grown_ms(*bound_ms, since_ms);
+        if took_ms > bound_ms && !*told {
+            *told = true;
+            found.broken("relay-way", now_ms, Some(m.id), || {
+                format!("is to hold a relay position and has been on its way for {took_ms} ms (bound {bound_ms} ms)")
+            });
+        }
+    }
 }
 
 #[cfg(test)]
@@ -99,9 +155,7 @@ mod tests {
         number: 3,
     };
 
-    /// What is broken when peer 1 says this for so long, so far from the place.
-    fn after(seconds: u64, progress: Progress, away_m: f64) -> (bool, u64) {
-        let (mut story, mut found) = (Story::new(300), Findings::new(1));
+    fn asked() -> RelayCheck {
         let mut check = RelayCheck::default();
         check.on_asked(&AskedTask {
             number: 3,
@@ -117,6 +171,26 @@ mod tests {
             },
             age_ms: 0,
         });
+        check
+    }
+
+    fn flyers() -> BTreeMap<u16, Flyer> {
+        let flyer = Flyer {
+            turn_radius_m: 30.0,
+            fastest_mps: 15.0,
+            slowest_mps: 12.0,
+        };
+        BTreeMap::from([(1, flyer)])
+    }
+
+    fn flight() -> FlightCheck {
+        FlightCheck::new(flyers(), Vec::new(), 10.0)
+    }
+
+    /// What is broken when peer 1 says this for so long, so far from the place.
+    fn after(seconds: u64, progress: Progress, away_m: f64) -> (bool, u64) {
+        let (mut story, mut found) = (Story::new(300), Findings::new(1));
+        let mut check = asked();
         story.place(1, Point::new(50.0, away_m));
         let view = Beliefs {
             tasks: vec![(TASK, 1, progress)],
@@ -124,11 +198,38 @@ mod tests {
         };
         for t in 0..seconds {
             story.snapshot(t * 1000, &[(1, view.clone())], |s| {
-                check.on_snapshot(s, &mut found);
+                check.on_snapshot(s, (&flyers(), &flight()), &mut found);
             });
         }
         let held_ms = check.held_ms.values().sum();
         (found.counts.contains_key("relay-place"), held_ms)
+    }
+
+    /// Whether a rule is broken by who is on its way for so long, ordered this.
+    fn is_late(seconds: u64, progress: Progress, order: Order) -> bool {
+        let (mut story, mut found) = (Story::new(300), Findings::new(1));
+        let mut check = asked();
+        story.place(1, Point::new(50.0, 300.0));
+        let view = Beliefs {
+            tasks: vec![(TASK, 1, progress)],
+            relays: true,
+            order,
+            ..speaking()
+        };
+        for t in 0..seconds {
+            story.snapshot(t * 1000, &[(1, view.clone())], |s| {
+                check.on_snapshot(s, (&flyers(), &flight()), &mut found);
+            });
+        }
+        found.counts.contains_key("relay-way")
+    }
+
+    #[test]
+    fn who_never_gets_to_its_position_is_found() {
+        assert!(is_late(300, Progress::Committed, Order::Resume));
+        assert!(!is_late(60, Progress::Committed, Order::Resume));
+        assert!(!is_late(300, Progress::Leaving, Order::Resume));
+        assert!(!is_late(300, Progress::Committed, Order::Hold));
     }
 
     #[test]
