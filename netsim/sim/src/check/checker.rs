@@ -333,8 +333,8 @@ impl Checker {
             .on_beacon(now_ms, id, said, view, &mut self.found);
     }
 
-    /// A peer makes a bid durable while it believes this, at this place, with so much fuel,
-    /// seconds.
+    /// A peer makes a bid durable while it believes this, at this place; it was told of so
+    /// much fuel, seconds.
     pub fn on_bid(
         &mut self,
         now_ms: u64,

@@ -188,11 +188,9 @@ impl DecisionCheck {
             lies.push(format!("ends nothing in {} ms", bid.eta_ms));
         }
         let budget_ms = u64::from(bid.release_ms) + u64::from(bid.endurance_ms);
-        // A bid that cannot be flown at all offers nothing, whenever it is released. A late
-        // computer knows only what it had.
-        let late_ms = handicaps.late_ms(id, now_ms, now_ms);
+        // A bid that cannot be flown at all offers nothing, whenever it is released.
         let may_offer_ms = mover.and_then(|m| m.may_offer_ms).unwrap_or(u64::MAX);
-        if bid.endurance_ms > 0 && budget_ms > may_offer_ms.saturating_add(1_000 + late_ms) {
+        if bid.endurance_ms > 0 && budget_ms > may_offer_ms.saturating_add(1_000) {
             lies.push(format!(
                 "offers {} ms of flight from {} ms on, {may_offer_ms} ms are above its reserve and the way home from the farthest open cell",
                 bid.endurance_ms, bid.release_ms

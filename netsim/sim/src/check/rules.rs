@@ -252,8 +252,8 @@ impl Rules {
         }
     }
 
-    /// A peer makes a bid durable while it believes this, at this place, with so much fuel,
-    /// seconds.
+    /// A peer makes a bid durable while it believes this, at this place; it was told of so
+    /// much fuel, seconds.
     pub fn on_bid(
         &mut self,
         now_ms: u64,

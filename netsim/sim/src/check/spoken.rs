@@ -3,7 +3,7 @@
 //! finished says so (`spoken`). What is published as covered was seen (S6).
 
 use super::snapshot::is_alone;
-use super::{Clocks, Findings, PeerSnapshot, Snapshot};
+use super::{Findings, PeerSnapshot, Snapshot};
 use skein_peer::cells::CellSet;
 use skein_peer::wire::codec::Body;
 use skein_peer::wire::message::{Beacon, Claim};
@@ -42,12 +42,21 @@ enum Owed {
     Finished,
 }
 
+/// Something that was not said yet: since when, the longest interval in force meanwhile, which
+/// it may have been put off by, and whether it was told.
+#[derive(Clone, Copy, Debug)]
+struct Unspoken {
+    since_ms: u64,
+    interval_ms: u64,
+    told: bool,
+}
+
 /// What the records of one run were found to say.
 #[derive(Clone, Debug, Default)]
 pub struct SpokenCheck {
     claims: BTreeMap<u16, Published>,
     finished: BTreeSet<(u16, Incarnation, u32)>,
-    unspoken: Clocks<(u16, Owed)>,
+    unspoken: BTreeMap<(u16, Owed), Unspoken>,
     /// Cells published as covered that the world had not seen yet: when, by whom, of which
     /// loop. A frame may be judged a moment after its peer has looked at it.
     unseen: Vec<(u64, u16, u64, u16)>,
@@ -60,7 +69,7 @@ impl SpokenCheck {
         if death {
             self.claims.remove(&id);
         }
-        self.unspoken.retain(|(p, _)| *p != id);
+        self.unspoken.retain(|(p, _), _| *p != id);
     }
 
     /// A peer puts its own beacon on the air while it believes `view`: they agree.
@@ -159,7 +168,7 @@ impl SpokenCheck {
         let owed = snapshot.peers.iter().map(|m| (m.id, self.owed(m)));
         let owed: BTreeMap<u16, BTreeSet<Owed>> = owed.collect();
         self.unspoken
-            .retain(|(p, what)| owed.get(p).is_none_or(|owed| owed.contains(what)));
+            .retain(|(p, what), _| owed.get(p).is_none_or(|owed| owed.contains(what)));
         for m in snapshot.peers {
             for what in owed.get(&m.id).into_iter().flatten() {
                 self.judge(snapshot, (m.id, *what), found);
@@ -181,8 +190,13 @@ impl SpokenCheck {
     }
 
     fn judge(&mut self, snapshot: &Snapshot<'_>, key: (u16, Owed), found: &mut Findings) {
-        let crowded = snapshot.bounds.interval_ms > snapshot.bounds.period_ms;
-        let claimed = if crowded {
+        let unspoken = self.unspoken.entry(key).or_insert(Unspoken {
+            since_ms: snapshot.now_ms,
+            interval_ms: 0,
+            told: false,
+        });
+        unspoken.interval_ms = unspoken.interval_ms.max(snapshot.bounds.interval_ms);
+        let claimed = if unspoken.interval_ms > snapshot.bounds.period_ms {
             CROWDED_CLAIM_PERIODS
         } else {
             CLAIM_PERIODS
@@ -191,10 +205,11 @@ impl SpokenCheck {
             Owed::Cell(_) | Owed::Alone => claimed,
             Owed::Finished => FINISHED_PERIODS,
         };
-        let since_ms = self.unspoken.start(key, snapshot.now_ms);
+        let since_ms = unspoken.since_ms;
         let took_ms = snapshot.lived_ms(key.0, since_ms);
-        let bound_ms = periods * snapshot.bounds.interval_ms + snapshot.late_ms(key.0, since_ms);
-        if took_ms > bound_ms && self.unspoken.tell_once(key) {
+        let bound_ms = periods * unspoken.interval_ms + snapshot.late_ms(key.0, since_ms);
+        if took_ms > bound_ms && !unspoken.told {
+            unspoken.told = true;
             found.broken("spoken", snapshot.now_ms, Some(key.0), || {
                 let text = match key.1 {
                     Owed::Cell(c) => format!("its claim and its plan differ in cell {c}"),

@@ -616,6 +616,9 @@ impl Swarm {
         let Some(mut peer) = s.peer.take() else {
             return;
         };
+        if let Input::Percept(percept) = &input {
+            s.told_fuel_s = percept.endurance_s;
+        }
         self.meter.input();
         let before = self.meter.enter(Part::Peer);
         peer.handle(s.clock.reads(now_ms), input);
@@ -669,7 +672,8 @@ impl Swarm {
             Output::Store { token, record } => {
                 if let Some(Entry::Bid(bid)) = Entry::decode(&record) {
                     let at = self.air.percept(id);
-                    let at = at.map(|p| (p.pose.position(), p.endurance_s));
+                    let fuel_s = self.peers[idx].told_fuel_s;
+                    let at = at.map(|p| (p.pose.position(), fuel_s));
                     self.checker
                         .on_bid(self.now_ms, id, &bid, (&peer.beliefs(), at));
                 }

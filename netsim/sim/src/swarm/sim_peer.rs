@@ -106,6 +106,8 @@ pub struct SimPeer {
     pub inbox: VecDeque<(u64, Input)>,
     /// For when the earliest timer event in the queue is, scenario time.
     pub timer_ms: Option<u64>,
+    /// The fuel that its last percept told it of, seconds.
+    pub told_fuel_s: f64,
     /// What it handed to its radio last.
     pub frame: Filling,
     /// Whether it held that the mission is finished when last judged.
@@ -135,6 +137,7 @@ impl SimPeer {
             disk: Disk::new(Stream::new(seed, Concern::Disk(id))),
             inbox: VecDeque::new(),
             timer_ms: None,
+            told_fuel_s: 0.0,
             frame: Filling::default(),
             finished: false,
             silent: false,
