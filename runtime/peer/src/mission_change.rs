@@ -12,7 +12,7 @@ use crate::wire::message::{Claim, Member};
 use skein_behaviors::Executive;
 use skein_flight::coverage::ring::patch::Patches;
 use skein_flight::coverage::ring::{CellId, CoverageLoop};
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 /// An executive for a mission; none for a ground station.
@@ -56,11 +56,47 @@ pub(crate) fn separation_for(
     })
 }
 
+/// Of so many loops a peer remembers what was covered.
+const REMEMBERED: usize = 4;
+
+/// What was covered on the last loops: a zone that comes over some cells and goes again gives
+/// back the loop there was, and what was seen of those cells is known still.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SeenBefore(VecDeque<(Begun, u64, CellSet)>);
+
+/// Every lap begins with nothing covered, and every mission that is begun anew.
+type Begun = (u16, u16);
+
+fn begun(mission: &Mission) -> Begun {
+    (mission.lap, mission.sortie)
+}
+
+impl SeenBefore {
+    /// With what is known of one more loop, which is left now.
+    pub fn left(mut self, geometry: &MissionGeometry, negotiation: &Negotiation) -> Self {
+        let key = (begun(&geometry.mission), geometry.coverage_loop.hash());
+        self.0.retain(|(begun, hash, _)| (*begun, *hash) != key);
+        let covered = negotiation.sections.covered().clone();
+        self.0.push_back((key.0, key.1, covered));
+        if self.0.len() > REMEMBERED {
+            self.0.pop_front();
+        }
+        self
+    }
+
+    fn of(&self, geometry: &MissionGeometry) -> Option<&CellSet> {
+        let key = (begun(&geometry.mission), geometry.coverage_loop.hash());
+        let same = self.0.iter().find(|(b, hash, _)| (*b, *hash) == key);
+        same.map(|(_, _, covered)| covered)
+    }
+}
+
 /// A negotiation on a new loop, with all that is known to be covered: before, on the loop of
-/// an `old` mission, and by the journal.
+/// an `old` mission and on those before it, and by the journal.
 pub(crate) fn negotiation_begun(
     geometry: &MissionGeometry,
     old: Option<(&MissionGeometry, &Negotiation)>,
+    seen_before: &SeenBefore,
     me: Member,
     durable: &Durable,
     cells: u16,
@@ -76,13 +112,14 @@ pub(crate) fn negotiation_begun(
     if old.is_some_and(|(before, _)| before.coverage_loop.hash() != coverage_loop.hash()) {
         negotiation.rounds.begin_at(geometry.mission.revision);
     }
-    // Every lap begins with nothing covered, and every mission that is begun anew.
-    let begun_with = |m: &Mission| (m.lap, m.sortie);
-    let is_same = |g: &MissionGeometry| begun_with(&g.mission) == begun_with(&geometry.mission);
+    let is_same = |g: &MissionGeometry| begun(&g.mission) == begun(&geometry.mission);
     if let Some((before, old)) = old.filter(|(g, _)| is_same(g)) {
         let covered = old.sections.covered();
         let covered = carried_over(&before.coverage_loop, covered, coverage_loop);
         negotiation.sections.cover(&covered);
+    }
+    if let Some(covered) = seen_before.of(geometry) {
+        negotiation.sections.cover(covered);
     }
     if let Some(covered) = remembered(durable, coverage_loop.hash(), cells) {
         negotiation.sections.cover(&covered);

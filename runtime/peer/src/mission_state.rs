@@ -23,7 +23,7 @@ use crate::fuel::Fuel;
 use crate::input::Time;
 use crate::journal::{Durable, Entry};
 use crate::mission::Mission;
-use crate::mission_change::{executive_for, negotiation_begun, separation_for};
+use crate::mission_change::{SeenBefore, executive_for, negotiation_begun, separation_for};
 use crate::offload::{Job, MissionGeometry};
 use crate::output::Report;
 use crate::protocol::division;
@@ -131,6 +131,8 @@ pub(crate) struct MissionState {
     /// Cells covered by itself since the last entry of the journal.
     pub unsaved_cells: u16,
     pub claims: ClaimsWritten,
+    /// What was covered on the loops before this one.
+    seen_before: SeenBefore,
 }
 
 impl MissionState {
@@ -601,14 +603,11 @@ impl MissionState {
         // A loop of more cells is no geometry: `LoopError::TooManyCells`.
         let cells = u16::try_from(geometry.coverage_loop.len()).unwrap_or(u16::MAX);
         timers.stop(Timer::NextLap);
+        let before = old.as_ref().map(|m| (&*m.geometry, &m.negotiation));
+        let seen_before = old.as_ref().map(|m| m.seen_before.clone());
+        let seen_before = seen_before.unwrap_or_default();
         let mut new = Self {
-            negotiation: negotiation_begun(
-                &geometry,
-                old.as_ref().map(|m| (&*m.geometry, &m.negotiation)),
-                me,
-                durable,
-                cells,
-            ),
+            negotiation: negotiation_begun(&geometry, before, &seen_before, me, durable, cells),
             executive: executive_for(&geometry, config),
             separation: separation_for(&geometry, me, config),
             goal: None,
@@ -629,7 +628,11 @@ impl MissionState {
             claims: old
                 .as_ref()
                 .map_or_else(Default::default, |m| m.claims.void()),
-            geometry,
+            geometry: Arc::clone(&geometry),
+            seen_before: match before {
+                Some((geometry, negotiation)) => seen_before.left(geometry, negotiation),
+                None => seen_before,
+            },
         };
         match old {
             Some(old) if old.loop_hash() == new.loop_hash() => new.keep_on(old),

@@ -42,12 +42,15 @@ enum Owed {
     Finished,
 }
 
-/// Something that was not said yet: since when, the longest interval in force meanwhile, which
-/// it may have been put off by, and whether it was told.
+/// Something that was not said yet.
 #[derive(Clone, Copy, Debug)]
 struct Unspoken {
     since_ms: u64,
+    /// The longest interval in force meanwhile.
     interval_ms: u64,
+    /// Bids of its author that went before it.
+    bids: u64,
+    /// Whether that it is late was told.
     told: bool,
 }
 
@@ -125,6 +128,10 @@ impl SpokenCheck {
         (loop_hash, seen): (u64, &CellSet),
         found: &mut Findings,
     ) {
+        if let Body::Bid(_) = body {
+            let of_author = self.unspoken.iter_mut().filter(|((p, _), _)| *p == id);
+            of_author.for_each(|(_, unspoken)| unspoken.bids += 1);
+        }
         let marks = match body {
             Body::Claim(_) | Body::Beacon(_) => None,
             Body::Finished(f) => {
@@ -193,6 +200,7 @@ impl SpokenCheck {
         let unspoken = self.unspoken.entry(key).or_insert(Unspoken {
             since_ms: snapshot.now_ms,
             interval_ms: 0,
+            bids: 0,
             told: false,
         });
         unspoken.interval_ms = unspoken.interval_ms.max(snapshot.bounds.interval_ms);
@@ -207,6 +215,8 @@ impl SpokenCheck {
         };
         let since_ms = unspoken.since_ms;
         let took_ms = snapshot.lived_ms(key.0, since_ms);
+        // A bid is more urgent, and the share lets one record go in an interval.
+        let periods = periods + unspoken.bids;
         let bound_ms = periods * unspoken.interval_ms + snapshot.late_ms(key.0, since_ms);
         if took_ms > bound_ms && !unspoken.told {
             unspoken.told = true;
@@ -259,7 +269,7 @@ impl SpokenCheck {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{LOOP, Story, speaking};
+    use super::super::testing::{LOOP, Story, bid, speaking};
     use super::*;
     use skein_peer::PeerId;
     use skein_peer::output::Status;
@@ -350,6 +360,30 @@ mod tests {
                 story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
             }
             assert_eq!(found.counts.contains_key("spoken"), broken, "{view:?}");
+        }
+    }
+
+    #[test]
+    fn a_bid_that_goes_before_a_claim_puts_it_off_by_an_interval() {
+        let view = Beliefs {
+            plan: vec![0, 1, 2],
+            ..speaking()
+        };
+        for (bids, seconds, broken) in [(0, 6, true), (1, 6, false), (1, 7, true), (2, 7, false)] {
+            let (mut check, mut found) = (SpokenCheck::default(), Findings::new(1));
+            let mut story = Story::new(300);
+            check.on_claim(1, 1, claim_of(0, 2));
+            for t in 0..seconds {
+                let views = [(1, view.clone())];
+                story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
+                if t < bids {
+                    let body = Body::Bid(bid(1, true, 2_000));
+                    let seen = (0, &CellSet::default());
+                    check.on_said(t * 1000, (1, 1), &body, seen, &mut found);
+                }
+            }
+            let case = (bids, seconds);
+            assert_eq!(found.counts.contains_key("spoken"), broken, "{case:?}");
         }
     }
 

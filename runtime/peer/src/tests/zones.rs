@@ -172,6 +172,28 @@ fn a_zone_takes_cells_away_and_its_removal_brings_them_back() {
     assert_eq!(h.why(1).work.unwrap().covered, 48);
 }
 
+/// A zone that was put over covered cells by mistake costs nothing of what is known of them.
+#[test]
+fn what_was_seen_under_a_zone_is_known_still_when_the_zone_is_removed() {
+    let mut h = with_operator(2, mission(1, 8, 6));
+    assert!(h.run_until(300, |h| h.beliefs(1).covered.count() > 40));
+    let before = h.beliefs(1).covered.clone();
+    let zone = [
+        (240_000, 120_000),
+        (380_000, 120_000),
+        (380_000, 260_000),
+        (240_000, 260_000),
+    ];
+    revise(&mut h, |m| m.with_zone("z", &zone).unwrap());
+    assert!(h.run_until(10, |h| h.beliefs(1).revision == 2));
+    assert!(h.beliefs(1).covered.count() < before.count());
+    revise(&mut h, |m| m.without_zone("z").unwrap());
+    assert!(h.run_until(10, |h| h.beliefs(1).revision == 3));
+    let mut forgotten = before;
+    forgotten.subtract(&h.beliefs(1).covered);
+    assert_eq!(forgotten.count(), 0, "{forgotten:?}");
+}
+
 #[test]
 fn a_cancelled_mission_sends_all_home_and_one_that_is_submitted_begins_with_nothing_covered() {
     let mut h = with_operator(2, mission(1, 6, 4));
