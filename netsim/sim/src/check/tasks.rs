@@ -20,12 +20,19 @@ type Asked = (TaskId, u32);
 pub struct TaskCheck {
     twice: Clocks<(u16, u16, Asked)>,
     lost: Clocks<(u16, Asked)>,
+    /// What somebody said to have done, who may be dead by now: those who heard it need no
+    /// other, though the word of who asked for it does not reach them.
+    done: BTreeSet<Asked>,
 }
 
 impl TaskCheck {
     /// Looks at all components.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let (mut twice, mut lost) = (BTreeSet::new(), BTreeSet::new());
+        let all = snapshot.peers.iter().flat_map(|m| &m.view.tasks);
+        let done = all.filter(|(.., progress)| *progress == Progress::Done);
+        self.done
+            .extend(done.map(|(id, revision, _)| (*id, *revision)));
         for members in snapshot.graph.components() {
             let peers: Vec<&PeerSnapshot> = members
                 .iter()
@@ -98,7 +105,8 @@ impl TaskCheck {
             .collect();
         let bound_ms = WAYS * snapshot.bounds.spread_ms();
         for m in able {
-            for task in m.view.open_tasks.iter().filter(|t| !held.contains(t)) {
+            let nobodys = |t: &&Asked| !held.contains(t) && !self.done.contains(t);
+            for task in m.view.open_tasks.iter().filter(nobodys) {
                 let key = (m.id, *task);
                 seen.insert(key);
                 let began_ms = self.lost.start(key, snapshot.now_ms);
@@ -169,6 +177,15 @@ mod tests {
             &[(1, holding(None)), (2, holding(Some(Progress::Done)))],
             100
         ));
+        // Done by who is dead since.
+        let mut check = TaskCheck::default();
+        let (mut story, mut found) = (Story::new(0), Findings::new(1));
+        for t in 0..100 {
+            let both = [(1, holding(None)), (2, holding(Some(Progress::Done)))];
+            let views = if t == 0 { &both[..] } else { &both[..1] };
+            story.snapshot(t * 1000, views, |s| check.on_snapshot(s, &mut found));
+        }
+        assert!(found.counts.is_empty(), "{:?}", found.violations);
         let cannot = Beliefs {
             able: false,
             ..holding(None)
