@@ -367,9 +367,37 @@ fn listed(claim: &Claim, n: u16) -> impl Iterator<Item = u16> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{LOOP, Story, bid, speaking};
+    use super::super::testing::{LOOP, Story, speaking};
     use super::*;
-    use skein_peer::wire::message::{CellRun, ListedRun, Stamp};
+    use skein_peer::wire::message::{CellRun, ListedRun, Round, Stamp};
+
+    fn bid(counter: u32, repair: bool, wait_ms: u32) -> Bid {
+        Bid {
+            round: Round {
+                counter,
+                members: vec![Member {
+                    id: 1,
+                    incarnation: 1,
+                }],
+                revision: 1,
+                loop_hash: LOOP,
+                repair,
+                wait_ms,
+            },
+            anchor: 0,
+            backward: false,
+            release_ms: 0,
+            speed_mmps: 1,
+            turn_ms: 0,
+            endurance_ms: 0,
+            covered: Vec::new(),
+            commits: Vec::new(),
+            off_loop: Vec::new(),
+            eta_ms: 0,
+            calm: false,
+            progressed: false,
+        }
+    }
 
     /// Peer 1 able from second 0 to second `until`.
     fn able_until(check: &mut PatienceCheck, until_s: u64, found: &mut Findings) {

@@ -3,7 +3,7 @@
 //! finished says so (`spoken`). What is published as covered was seen (S6).
 
 use super::snapshot::is_alone;
-use super::{Findings, PeerSnapshot, Snapshot};
+use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use skein_peer::cells::CellSet;
 use skein_peer::wire::codec::Body;
 use skein_peer::wire::message::{Beacon, Claim};
@@ -42,24 +42,12 @@ enum Owed {
     Finished,
 }
 
-/// Something that was not said yet.
-#[derive(Clone, Copy, Debug)]
-struct Unspoken {
-    since_ms: u64,
-    /// The longest interval in force meanwhile.
-    interval_ms: u64,
-    /// Bids of its author that went before it.
-    bids: u64,
-    /// Whether that it is late was told.
-    told: bool,
-}
-
 /// What the records of one run were found to say.
 #[derive(Clone, Debug, Default)]
 pub struct SpokenCheck {
     claims: BTreeMap<u16, Published>,
     finished: BTreeSet<(u16, Incarnation, u32)>,
-    unspoken: BTreeMap<(u16, Owed), Unspoken>,
+    unspoken: Clocks<(u16, Owed)>,
     /// Cells published as covered that the world had not seen yet: when, by whom, of which
     /// loop. A frame may be judged a moment after its peer has looked at it.
     unseen: Vec<(u64, u16, u64, u16)>,
@@ -72,7 +60,7 @@ impl SpokenCheck {
         if death {
             self.claims.remove(&id);
         }
-        self.unspoken.retain(|(p, _), _| *p != id);
+        self.unspoken.retain(|(p, _)| *p != id);
     }
 
     /// A peer puts its own beacon on the air while it believes `view`: they agree.
@@ -128,10 +116,6 @@ impl SpokenCheck {
         (loop_hash, seen): (u64, &CellSet),
         found: &mut Findings,
     ) {
-        if let Body::Bid(_) = body {
-            let of_author = self.unspoken.iter_mut().filter(|((p, _), _)| *p == id);
-            of_author.for_each(|(_, unspoken)| unspoken.bids += 1);
-        }
         let marks = match body {
             Body::Claim(_) | Body::Beacon(_) => None,
             Body::Finished(f) => {
@@ -175,7 +159,7 @@ impl SpokenCheck {
         let owed = snapshot.peers.iter().map(|m| (m.id, self.owed(m)));
         let owed: BTreeMap<u16, BTreeSet<Owed>> = owed.collect();
         self.unspoken
-            .retain(|(p, what), _| owed.get(p).is_none_or(|owed| owed.contains(what)));
+            .retain(|(p, what)| owed.get(p).is_none_or(|owed| owed.contains(what)));
         for m in snapshot.peers {
             for what in owed.get(&m.id).into_iter().flatten() {
                 self.judge(snapshot, (m.id, *what), found);
@@ -197,14 +181,8 @@ impl SpokenCheck {
     }
 
     fn judge(&mut self, snapshot: &Snapshot<'_>, key: (u16, Owed), found: &mut Findings) {
-        let unspoken = self.unspoken.entry(key).or_insert(Unspoken {
-            since_ms: snapshot.now_ms,
-            interval_ms: 0,
-            bids: 0,
-            told: false,
-        });
-        unspoken.interval_ms = unspoken.interval_ms.max(snapshot.bounds.interval_ms);
-        let claimed = if unspoken.interval_ms > snapshot.bounds.period_ms {
+        let crowded = snapshot.bounds.interval_ms > snapshot.bounds.period_ms;
+        let claimed = if crowded {
             CROWDED_CLAIM_PERIODS
         } else {
             CLAIM_PERIODS
@@ -213,13 +191,10 @@ impl SpokenCheck {
             Owed::Cell(_) | Owed::Alone => claimed,
             Owed::Finished => FINISHED_PERIODS,
         };
-        let since_ms = unspoken.since_ms;
+        let since_ms = self.unspoken.start(key, snapshot.now_ms);
         let took_ms = snapshot.lived_ms(key.0, since_ms);
-        // A bid is more urgent, and the share lets one record go in an interval.
-        let periods = periods + unspoken.bids;
-        let bound_ms = periods * unspoken.interval_ms + snapshot.late_ms(key.0, since_ms);
-        if took_ms > bound_ms && !unspoken.told {
-            unspoken.told = true;
+        let bound_ms = periods * snapshot.bounds.interval_ms + snapshot.late_ms(key.0, since_ms);
+        if took_ms > bound_ms && self.unspoken.tell_once(key) {
             found.broken("spoken", snapshot.now_ms, Some(key.0), || {
                 let text = match key.1 {
                     Owed::Cell(c) => format!("its claim and its plan differ in cell {c}"),
@@ -269,7 +244,7 @@ impl SpokenCheck {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{LOOP, Story, bid, speaking};
+    use super::super::testing::{LOOP, Story, speaking};
     use super::*;
     use skein_peer::PeerId;
     use skein_peer::output::Status;
@@ -360,30 +335,6 @@ mod tests {
                 story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
             }
             assert_eq!(found.counts.contains_key("spoken"), broken, "{view:?}");
-        }
-    }
-
-    #[test]
-    fn a_bid_that_goes_before_a_claim_puts_it_off_by_an_interval() {
-        let view = Beliefs {
-            plan: vec![0, 1, 2],
-            ..speaking()
-        };
-        for (bids, seconds, broken) in [(0, 6, true), (1, 6, false), (1, 7, true), (2, 7, false)] {
-            let (mut check, mut found) = (SpokenCheck::default(), Findings::new(1));
-            let mut story = Story::new(300);
-            check.on_claim(1, 1, claim_of(0, 2));
-            for t in 0..seconds {
-                let views = [(1, view.clone())];
-                story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
-                if t < bids {
-                    let body = Body::Bid(bid(1, true, 2_000));
-                    let seen = (0, &CellSet::default());
-                    check.on_said(t * 1000, (1, 1), &body, seen, &mut found);
-                }
-            }
-            let case = (bids, seconds);
-            assert_eq!(found.counts.contains_key("spoken"), broken, "{case:?}");
         }
     }
 

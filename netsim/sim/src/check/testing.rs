@@ -5,7 +5,6 @@ use crate::twins::Twins;
 use skein_geometry::frame::Point;
 use skein_peer::Beliefs;
 use skein_peer::cells::CellSet;
-use skein_peer::wire::message::{Bid, Member, Round};
 use std::collections::BTreeMap;
 
 /// Identifies the loop of these snapshots.
@@ -106,34 +105,5 @@ impl Story {
             covered: &self.covered,
             loop_hash: LOOP,
         });
-    }
-}
-
-/// A bid of member 1 that offers nothing.
-pub(super) fn bid(counter: u32, repair: bool, wait_ms: u32) -> Bid {
-    Bid {
-        round: Round {
-            counter,
-            members: vec![Member {
-                id: 1,
-                incarnation: 1,
-            }],
-            revision: 1,
-            loop_hash: LOOP,
-            repair,
-            wait_ms,
-        },
-        anchor: 0,
-        backward: false,
-        release_ms: 0,
-        speed_mmps: 1,
-        turn_ms: 0,
-        endurance_ms: 0,
-        covered: Vec::new(),
-        commits: Vec::new(),
-        off_loop: Vec::new(),
-        eta_ms: 0,
-        calm: false,
-        progressed: false,
     }
 }
