@@ -62,6 +62,8 @@ pub struct Beliefs {
     pub relays: bool,
     /// In which state of its mission's diagram it is, by number, and the event that led there.
     pub stage: Option<(usize, MissionEvent)>,
+    /// Whether it knew many and hears nobody.
+    pub hears_nobody: bool,
     /// Tasks that it knows to be open, and in its eyes somebody can do.
     pub open_tasks: Vec<(TaskId, u32)>,
     /// Records held, bytes waiting to be sent, open stores: each with its cap.

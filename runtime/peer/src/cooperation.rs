@@ -508,6 +508,7 @@ impl Cooperation {
         beliefs.adoptions = state.negotiation.adoptions;
         beliefs.finished = state.finished;
         beliefs.relays = state.relay.is_some();
+        beliefs.hears_nobody = state.astray;
         beliefs.stage = Some((state.stage.at(), state.stage.by()));
         beliefs.spendable_ms = state.spendable_ms(percept);
         beliefs.is_fuel_due = state.fuel.is_due();

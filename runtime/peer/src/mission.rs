@@ -387,6 +387,13 @@ impl Mission {
         Machine::new(&diagram)
     }
 
+    /// After how many seconds it ends, whatever was seen; none where it ends by what was seen
+    /// alone.
+    #[must_use]
+    pub fn ends_after_s(&self) -> Option<u32> {
+        self.machine().ok().and_then(|m| m.ends_after_s())
+    }
+
     /// Derives the loop and the router.
     ///
     /// # Errors

@@ -111,16 +111,7 @@ impl Stage {
     /// Somebody who follows this mission says that it is finished: where its time ends it, that
     /// is over for all.
     pub fn hear_finished(&mut self) {
-        self.told_over |= self.ends_after_s().is_some();
-    }
-
-    /// After how many seconds the mission ends, whatever was seen.
-    fn ends_after_s(&self) -> Option<u32> {
-        let states = 0..self.machine.states().len();
-        let ways = states.flat_map(|i| self.machine.ways(i));
-        let ends = |to: usize| self.machine.state(to).part == Part::Ends;
-        let timers = ways.filter(|w| w.on == MissionEvent::Timer && ends(w.to));
-        timers.map(|w| w.after_s).min()
+        self.told_over |= self.machine.ends_after_s().is_some();
     }
 }
 
@@ -156,7 +147,8 @@ impl MissionState {
             MissionEvent::LowFuel => self.fuel.is_due(),
             MissionEvent::TwinSpeaks => self.silent,
             MissionEvent::Timer => {
-                let told = stage.told_over && stage.ends_after_s() >= Some(after_s);
+                let ends_after_s = stage.machine.ends_after_s();
+                let told = stage.told_over && ends_after_s >= Some(after_s);
                 told || is_past(stage.began, after_s, now)
             }
             MissionEvent::Stayed => is_past(stage.since, after_s, now),

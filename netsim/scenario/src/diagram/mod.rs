@@ -11,7 +11,7 @@ use crate::error::ScenarioError;
 use crate::files::{Files, read_text};
 use crate::request::Overrides;
 use skein_interop::json::{Document, Error, Node, suggestion};
-use skein_peer::diagram::Diagram;
+use skein_peer::diagram::{AFTER_MAX_S, Diagram, MissionEvent, Part};
 use std::path::Path;
 
 /// Name, file as errors show it, text.
@@ -97,9 +97,9 @@ fn flown(scenario: Result<crate::Scenario, ScenarioError>) -> Result<Diagram, Sc
 /// What a scenario says of its mission: the diagram that it is flown by, where it names one or
 /// brings its own; none where that is the default one.
 pub(crate) fn of_mission(node: &Node<'_>, files: &Files<'_>) -> Result<Option<Diagram>, Error> {
-    let f = node.fields(&["diagram"])?;
+    let f = node.fields(&["diagram", "for_s"])?;
     let at = f.need("diagram", "\"patrol\"")?;
-    let diagram = if let Ok(name) = at.text() {
+    let mut diagram = if let Ok(name) = at.text() {
         builtin(name).ok_or_else(|| {
             let known = suggestion(name, &names());
             at.wrong(format!("no diagram is called \"{name}\"; {known}; or bring your own: {{ file: \"watch.json5\" }}"))
@@ -112,7 +112,32 @@ pub(crate) fn of_mission(node: &Node<'_>, files: &Files<'_>) -> Result<Option<Di
     } else {
         read::diagram(at)?
     };
+    if let Some(for_s) = f.get("for_s") {
+        last_for(&mut diagram, for_s)?;
+    }
     Ok(Some(diagram).filter(|d| *d != Diagram::coverage()))
+}
+
+/// From now on the mission ends after so long.
+fn last_for(diagram: &mut Diagram, node: &Node<'_>) -> Result<(), Error> {
+    let for_s = node.whole(1, AFTER_MAX_S, "seconds")?;
+    let ends = |name: &str| {
+        let mut states = diagram.states.iter();
+        states.any(|s| s.name == name && s.part == Part::Ends)
+    };
+    let timers = diagram.transitions.iter().enumerate();
+    let timers = timers.filter(|(_, t)| t.on == MissionEvent::Timer && ends(&t.to));
+    let timers: Vec<usize> = timers.map(|(k, _)| k).collect();
+    if timers.is_empty() {
+        return Err(node.wrong(format!(
+            "the diagram \"{}\" ends by what is seen, and has no timer that ends it; leave for_s out, or take \"patrol\"",
+            diagram.name
+        )));
+    }
+    for k in timers {
+        diagram.transitions[k].after_s = for_s;
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -444,6 +444,16 @@ impl Machine {
         &self.ways[at]
     }
 
+    /// After how many seconds the mission ends, whatever was seen; none where it ends by what was
+    /// seen alone.
+    #[must_use]
+    pub fn ends_after_s(&self) -> Option<u32> {
+        let ends = |to: usize| self.state(to).part == Part::Ends;
+        let all = self.ways.iter().flatten();
+        let timers = all.filter(|w| w.on == MissionEvent::Timer && ends(w.to));
+        timers.map(|w| w.after_s).min()
+    }
+
     /// Which state follows, and by which event; none where no event holds that leads anywhere.
     /// `holds` says of an event, with the seconds that it counts, whether it holds.
     #[must_use]
