@@ -11,9 +11,9 @@ use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::Point;
 use skein_geometry::{NoFlyZones, Polygon};
 use skein_interop::json::Error;
+use skein_peer::diagram::DiagramError;
 use skein_peer::mission::{mm, ring_mm};
 use skein_peer::{CoverageTask, Mission};
-use skein_peer::diagram::DiagramError;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

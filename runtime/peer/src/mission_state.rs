@@ -36,7 +36,9 @@ use crate::timers::{Timer, Timers};
 use crate::why::BidHeard;
 use crate::wire::codec::Body;
 use crate::wire::limits::BID_COVERED_MAX_BYTES;
-use crate::wire::message::{Activity, Beacon, Bid, Claim, Epoch, Finished, Member, MissionStatus, Order};
+use crate::wire::message::{
+    Activity, Beacon, Bid, Claim, Epoch, Finished, Member, MissionStatus, Order,
+};
 use skein_behaviors::executive::detour::Watched;
 use skein_behaviors::executive::{GivenFlight, UNREACHABLE_MS};
 use skein_behaviors::{Event, Executive, Goal};

@@ -50,7 +50,8 @@ impl Stage {
     /// # Panics
     /// Where the diagram cannot be flown: then the mission has no geometry.
     pub fn begun(mission: &Mission, old: Option<(&Mission, &Self)>) -> Self {
-        let same = old.filter(|(m, _)| (m.sortie, &m.diagram) == (mission.sortie, &mission.diagram));
+        let same =
+            old.filter(|(m, _)| (m.sortie, &m.diagram) == (mission.sortie, &mission.diagram));
         if let Some((before, stage)) = same {
             let is_edited = mission.edit() != before.edit();
             return Self {

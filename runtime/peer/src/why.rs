@@ -3,10 +3,10 @@
 //! changes nothing: all of it is a copy.
 
 use crate::Incarnation;
-use crate::input::Time;
 use crate::cells::CellSet;
-use crate::diagram::StateGoal;
 use crate::diagram::MissionEvent;
+use crate::diagram::StateGoal;
+use crate::input::Time;
 use crate::mission_state::MissionState;
 use crate::output::Status;
 use crate::task_desk::TaskView;
@@ -413,7 +413,10 @@ impl Why {
         if !work.state.is_empty() {
             let (state, diagram, ms) = (&work.state, &work.diagram, work.state_ms);
             let since_s = s(ms);
-            writeln!(f, "  state     {state} of the diagram {diagram}, for {since_s:.1} s")?;
+            writeln!(
+                f,
+                "  state     {state} of the diagram {diagram}, for {since_s:.1} s"
+            )?;
         }
         let (counter, hash) = (work.epoch.counter, work.epoch.hash);
         writeln!(f, "  epoch     {counter}.{hash:08x}")?;

@@ -160,7 +160,11 @@ fn svg(diagram: &Diagram) -> String {
         let text = lines(state).join("\n");
         nodes.insert(state.name.as_str(), add(ShapeKind::new_box(&text), 12));
     }
-    if let Some(start) = diagram.states.first().and_then(|s| nodes.get(s.name.as_str())) {
+    if let Some(start) = diagram
+        .states
+        .first()
+        .and_then(|s| nodes.get(s.name.as_str()))
+    {
         graph.add_edge(Arrow::simple(""), begin, *start);
     }
     for (from, to, labels) in arrows(diagram) {

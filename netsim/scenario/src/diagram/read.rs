@@ -13,10 +13,7 @@ const NOT_YET: &[(&str, &str)] = &[
         "object_detected",
         "no camera tells objects apart yet: what is seen are cells and places",
     ),
-    (
-        "target_lost",
-        "no UAV of a mission follows a target yet",
-    ),
+    ("target_lost", "no UAV of a mission follows a target yet"),
     (
         "wind_above",
         "the wind of a run is the same all the time; a wind in which the mission cannot be flown is refused before it begins",
@@ -52,7 +49,11 @@ pub(super) fn diagram(node: &Node<'_>) -> Result<Diagram, Error> {
     }
     let diagram = Diagram {
         name: f.need("name", "\"patrol\"")?.text()?.to_owned(),
-        states: states.items()?.iter().map(state).collect::<Result<_, _>>()?,
+        states: states
+            .items()?
+            .iter()
+            .map(state)
+            .collect::<Result<_, _>>()?,
         transitions: all,
     };
     match Machine::new(&diagram) {
@@ -69,7 +70,11 @@ fn placed<'a>(node: &Node<'a>, path: &str, lines: &[usize]) -> Node<'a> {
         let next = match part.strip_suffix(']').map(str::parse::<usize>) {
             Some(Ok(i)) => {
                 let is_line = path.starts_with("transitions");
-                let i = if is_line { lines.get(i).copied().unwrap_or(i) } else { i };
+                let i = if is_line {
+                    lines.get(i).copied().unwrap_or(i)
+                } else {
+                    i
+                };
                 at.items().ok().and_then(|items| items.into_iter().nth(i))
             }
             _ => at.get(part).ok().flatten(),
@@ -127,9 +132,9 @@ fn behaviour(node: &Node<'_>) -> Result<Behaviour, Error> {
 fn transitions(node: &Node<'_>) -> Result<Vec<Transition>, Error> {
     let f = node.fields(&["priority", "on", "after_s", "from", "to"])?;
     let on = event(f.need("on", "\"mission_complete\"")?)?;
-    let after_s = f.get("after_s").map_or(Ok(0), |n| {
-        n.whole(1, AFTER_MAX_S, "seconds")
-    })?;
+    let after_s = f
+        .get("after_s")
+        .map_or(Ok(0), |n| n.whole(1, AFTER_MAX_S, "seconds"))?;
     let priority = f.need("priority", "1")?.small(1, 255, "the priority")?;
     let from = f.need("from", "\"any\", a state or a list of states")?;
     let names = if from.is_list() {

@@ -33,27 +33,127 @@ fn a_scenario_is_opened_by_its_diagram() {
 fn what_is_wrong_is_told_with_its_place_and_a_remedy() {
     let low_fuel = "{ priority: 5, on: \"low_fuel\", from: \"any\", to: \"home\" },";
     for (old, new, place, remedy) in [
-        ("on: \"low_fuel\"", "on: \"low_feul\"", "transitions[4].on", "did you mean"),
-        ("on: \"low_fuel\"", "on: \"object_detected\"", "transitions[4].on", "no camera tells"),
-        ("on: \"low_fuel\"", "on: \"timer\"", "transitions[4].after_s", "expected after_s"),
+        (
+            "on: \"low_fuel\"",
+            "on: \"low_feul\"",
+            "transitions[4].on",
+            "did you mean",
+        ),
+        (
+            "on: \"low_fuel\"",
+            "on: \"object_detected\"",
+            "transitions[4].on",
+            "no camera tells",
+        ),
+        (
+            "on: \"low_fuel\"",
+            "on: \"timer\"",
+            "transitions[4].after_s",
+            "expected after_s",
+        ),
         (low_fuel, "", "states[0]", "counts before \"low_fuel\""),
-        ("priority: 5,", "priority: 4,", "transitions[4].priority", "expected another number"),
-        ("priority: 5,", "priority: 10,", "transitions[9].priority", "expected another number"),
-        ("from: \"any\", to: \"section\"", "from: \"any\", to: \"sections\"", "transitions[8].to", "no state is called \"sections\""),
-        ("from: \"any\", to: \"section\"", "from: \"nobody\", to: \"section\"", "transitions[8].from", "no state is called \"nobody\""),
-        ("from: \"any\", to: \"section\"", "from: \"any\", to: \"wait\"", "transitions", "expected \"cells_given\""),
-        ("{ priority: 2, on: \"operator_return\", from: \"any\", to: \"recalled\" },", "", "states[0]", "expected a transition on \"operator_return\""),
-        ("{ priority: 1, on: \"operator_hold\"", "{ priority: 12, on: \"operator_hold\"", "states[0]", "does not obey the operator first"),
-        ("priority: 3,", "priority: 20,", "states[0]", "counts before \"mission_cancelled\""),
-        ("priority: 10, on: \"nobody_heard\"", "priority: 200, on: \"nobody_heard\"", "transitions", "comes after \"otherwise\""),
-        ("on: \"operator_return\", from: \"any\", to: \"recalled\"", "on: \"operator_return\", from: \"any\", to: \"home\"", "states[5]", "never reached"),
-        ("purpose: \"traveling\", actions: [\"displacing\"]", "purpose: \"tracking\", actions: [\"displacing\"]", "states[1].behaviour.purpose", "which is for traveling or watching"),
-        ("purpose: \"traveling\", actions: [\"displacing\"]", "purpose: \"watching\", actions: [\"displacing\"]", "states[1].behaviour", "endless: true"),
-        ("dimension: 1, actions: [\"displacing\"]", "dimension: 2, actions: [\"displacing\"]", "states[2].behaviour.dimension", "of dimension 1"),
-        ("name: \"task\", goal: \"task\"", "name: \"task\", goal: \"follow\"", "states[2].goal", "docs/tracking.md"),
-        ("name: \"task\"", "name: \"home\"", "states[6].name", "rename one"),
-        ("name: \"task\"", "name: \"a task\"", "states[2].name", "is no name"),
-        ("goal: \"hold\", part: \"keeps\"", "goal: \"hold\", part: \"ends\"", "states[0]", "does not obey the operator first"),
+        (
+            "priority: 5,",
+            "priority: 4,",
+            "transitions[4].priority",
+            "expected another number",
+        ),
+        (
+            "priority: 5,",
+            "priority: 10,",
+            "transitions[9].priority",
+            "expected another number",
+        ),
+        (
+            "from: \"any\", to: \"section\"",
+            "from: \"any\", to: \"sections\"",
+            "transitions[8].to",
+            "no state is called \"sections\"",
+        ),
+        (
+            "from: \"any\", to: \"section\"",
+            "from: \"nobody\", to: \"section\"",
+            "transitions[8].from",
+            "no state is called \"nobody\"",
+        ),
+        (
+            "from: \"any\", to: \"section\"",
+            "from: \"any\", to: \"wait\"",
+            "transitions",
+            "expected \"cells_given\"",
+        ),
+        (
+            "{ priority: 2, on: \"operator_return\", from: \"any\", to: \"recalled\" },",
+            "",
+            "states[0]",
+            "expected a transition on \"operator_return\"",
+        ),
+        (
+            "{ priority: 1, on: \"operator_hold\"",
+            "{ priority: 12, on: \"operator_hold\"",
+            "states[0]",
+            "does not obey the operator first",
+        ),
+        (
+            "priority: 3,",
+            "priority: 20,",
+            "states[0]",
+            "counts before \"mission_cancelled\"",
+        ),
+        (
+            "priority: 10, on: \"nobody_heard\"",
+            "priority: 200, on: \"nobody_heard\"",
+            "transitions",
+            "comes after \"otherwise\"",
+        ),
+        (
+            "on: \"operator_return\", from: \"any\", to: \"recalled\"",
+            "on: \"operator_return\", from: \"any\", to: \"home\"",
+            "states[5]",
+            "never reached",
+        ),
+        (
+            "purpose: \"traveling\", actions: [\"displacing\"]",
+            "purpose: \"tracking\", actions: [\"displacing\"]",
+            "states[1].behaviour.purpose",
+            "which is for traveling or watching",
+        ),
+        (
+            "purpose: \"traveling\", actions: [\"displacing\"]",
+            "purpose: \"watching\", actions: [\"displacing\"]",
+            "states[1].behaviour",
+            "endless: true",
+        ),
+        (
+            "dimension: 1, actions: [\"displacing\"]",
+            "dimension: 2, actions: [\"displacing\"]",
+            "states[2].behaviour.dimension",
+            "of dimension 1",
+        ),
+        (
+            "name: \"task\", goal: \"task\"",
+            "name: \"task\", goal: \"follow\"",
+            "states[2].goal",
+            "docs/tracking.md",
+        ),
+        (
+            "name: \"task\"",
+            "name: \"home\"",
+            "states[6].name",
+            "rename one",
+        ),
+        (
+            "name: \"task\"",
+            "name: \"a task\"",
+            "states[2].name",
+            "is no name",
+        ),
+        (
+            "goal: \"hold\", part: \"keeps\"",
+            "goal: \"hold\", part: \"ends\"",
+            "states[0]",
+            "does not obey the operator first",
+        ),
     ] {
         let whole = text("coverage");
         assert!(whole.contains(old), "{old}");
@@ -81,19 +181,30 @@ fn pictures_name_every_state_and_every_event_and_are_the_same_twice() {
         }
     }
     let dot = picture(&Diagram::coverage(), Format::Dot);
-    assert!(dot.contains("\"any state\" -> \"home\" [label=\"3 mission_cancelled\\n4 mission_complete"));
+    assert!(
+        dot.contains("\"any state\" -> \"home\" [label=\"3 mission_cancelled\\n4 mission_complete")
+    );
 }
 
 /// What the inspection does that coverage does not.
 #[test]
 fn an_inspection_stays_over_the_last_place_and_comes_home() {
     let machine = Machine::new(&builtin("inspection").unwrap()).unwrap();
-    let called = |name: &str| machine.states().iter().position(|s| s.name == name).unwrap();
+    let called = |name: &str| {
+        machine
+            .states()
+            .iter()
+            .position(|s| s.name == name)
+            .unwrap()
+    };
     let complete = |on, _| matches!(on, MissionEvent::MissionComplete | MissionEvent::Otherwise);
     let stays = machine.look(called("visit"), &complete);
     assert_eq!(stays, Some((called("stay"), MissionEvent::MissionComplete)));
     let later = |on, s| complete(on, s) || on == MissionEvent::Stayed;
     let (home, by) = machine.look(called("stay"), &later).unwrap();
-    assert_eq!((machine.state(home).goal, by), (StateGoal::Home, MissionEvent::Stayed));
+    assert_eq!(
+        (machine.state(home).goal, by),
+        (StateGoal::Home, MissionEvent::Stayed)
+    );
     assert_eq!(machine.look(home, &complete).unwrap().0, home);
 }

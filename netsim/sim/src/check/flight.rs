@@ -344,9 +344,8 @@ mod tests {
     #[test]
     fn who_is_finished_and_to_stay_stays() {
         let finished = |b: &mut Beliefs| b.finished = true;
-        let stays = |away_m: fn(u64) -> f64| {
-            flown_round(Vec::new(), StateGoal::Hold, finished, away_m)
-        };
+        let stays =
+            |away_m: fn(u64) -> f64| flown_round(Vec::new(), StateGoal::Hold, finished, away_m);
         assert!(stays(|_| 600.0).is_empty());
         let leaves = |t: u64| 600.0 - 3.0 * f64::from(u8::try_from(t).unwrap());
         assert!(stays(leaves).contains_key("hold"));

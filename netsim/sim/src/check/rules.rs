@@ -1,9 +1,9 @@
 //! The rules of single peers behind one door: what they say and fly, and when.
 
+use super::activity::ActivityCheck;
 use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
 use super::decision::{DecisionCheck, Mover};
-use super::activity::ActivityCheck;
 use super::flight::{FlightCheck, Flyer, at_base};
 use super::fuel::FuelCheck;
 use super::listing::ListingCheck;

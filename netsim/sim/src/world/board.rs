@@ -209,7 +209,9 @@ impl Board {
         if self.lap > 1 && self.n_covered < self.n_coverable {
             self.lap -= 1;
             self.n_covered = self.n_coverable;
-            self.seen = (0..self.seen.len()).map(|i| self.last_sighting(i)).collect();
+            self.seen = (0..self.seen.len())
+                .map(|i| self.last_sighting(i))
+                .collect();
         }
         self.laps = self.lap;
         self.complete()

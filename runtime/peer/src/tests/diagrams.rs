@@ -97,14 +97,23 @@ fn a_mission_ends_by_its_timer_whatever_is_seen() {
     for id in [1, 2] {
         let (view, work) = (h.beliefs(id), work(&h, id));
         assert!(view.plan.is_empty() && !view.able, "{view:?}");
-        assert_eq!((work.state.as_str(), work.reason), ("over", Reason::TimeIsOver));
+        assert_eq!(
+            (work.state.as_str(), work.reason),
+            ("over", Reason::TimeIsOver)
+        );
         let finished = h.seat(id).reports.iter();
         let finished = finished.filter(|(_, r)| matches!(r, Report::Finished { .. }));
         assert_eq!(finished.count(), 1);
     }
     let told = h.why(1).to_string();
-    assert!(told.contains("flies home: the time of its mission is over"), "{told}");
-    assert!(told.contains("state     over of the diagram coverage, for"), "{told}");
+    assert!(
+        told.contains("flies home: the time of its mission is over"),
+        "{told}"
+    );
+    assert!(
+        told.contains("state     over of the diagram coverage, for"),
+        "{told}"
+    );
     let away = |h: &Harness| {
         let at = h.pose(1);
         (at.east_m + 60.0).hypot(at.north_m + 60.0)
@@ -120,7 +129,10 @@ fn who_comes_back_hears_that_the_time_is_over() {
     h.stop(2);
     h.run_s(2);
     h.start(2);
-    assert!(h.run_until(30, |h| h.beliefs(2).finished), "its own timer is at 0");
+    assert!(
+        h.run_until(30, |h| h.beliefs(2).finished),
+        "its own timer is at 0"
+    );
     assert_eq!(work(&h, 2).state, "over");
 }
 
@@ -156,7 +168,10 @@ fn all_stay_where_they_are_when_all_is_seen_if_the_mission_says_so() {
     h.run_s(60);
     let moved_m = (h.pose(1).east_m - at.east_m).hypot(h.pose(1).north_m - at.north_m);
     assert!(moved_m < 60.0, "{moved_m} m");
-    assert_eq!(work(&h, 1).does, "loiters where it is: everything is covered");
+    assert_eq!(
+        work(&h, 1).does,
+        "loiters where it is: everything is covered"
+    );
     // The fuel leads home all the same.
     h.seat(1).fuel_s = 70.0;
     assert!(h.run_until(5, |h| work(h, 1).reason == Reason::FuelIsDue));
@@ -183,12 +198,17 @@ fn a_mission_whose_diagram_cannot_be_flown_leaves_the_old_one_in_force() {
     let mut h = with_operator(1, mission(1, 6, 4));
     h.run_s(10);
     let mut diagram = Diagram::coverage();
-    diagram.transitions.retain(|t| t.on != MissionEvent::LowFuel);
+    diagram
+        .transitions
+        .retain(|t| t.on != MissionEvent::LowFuel);
     let wrong = Mission {
         diagram: Some(Arc::new(diagram)),
         ..mission(2, 6, 4)
     };
-    h.feed(GROUND_STATION, Input::Command(Command::Mission(Arc::new(wrong))));
+    h.feed(
+        GROUND_STATION,
+        Input::Command(Command::Mission(Arc::new(wrong))),
+    );
     h.run_s(10);
     assert_eq!(h.beliefs(1).revision, 1);
     let alarms = h.alarms(1);
@@ -220,7 +240,9 @@ fn a_diagram_travels_with_its_mission_and_counts_in_its_hash() {
 fn a_diagram_that_asks_for_something_else_than_the_mission_is_refused() {
     let once = flown_by(Diagram::coverage(), 3).machine().unwrap_err();
     assert!(once.problem.contains("flown once"), "{once}");
-    let watch = flown_by(watching(Diagram::coverage()), 1).machine().unwrap_err();
+    let watch = flown_by(watching(Diagram::coverage()), 1)
+        .machine()
+        .unwrap_err();
     assert!(watch.problem.contains("ask for laps"), "{watch}");
     let mut lines = Diagram::coverage();
     lines.states[1].behaviour.dimension = Some(1);
