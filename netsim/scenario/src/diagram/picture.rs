@@ -4,8 +4,8 @@
 use layout::backends::svg::SVGWriter;
 use layout::core::base::Orientation;
 use layout::core::color::Color;
+use layout::core::geometry::Point;
 use layout::core::style::StyleAttr;
-use layout::std_shapes::render::get_shape_size;
 use layout::std_shapes::shapes::{Arrow, Element, ShapeKind};
 use layout::topo::layout::VisualGraph;
 use skein_peer::diagram::{Behaviour, Diagram, Part, State, Transition};
@@ -139,8 +139,27 @@ fn mermaid(diagram: &Diagram) -> String {
     text
 }
 
-/// Size of all letters of an SVG, pixels.
-const LETTERS_PX: usize = 14;
+/// Size of all letters of an SVG, pixels: that which the library gives to what stands at arrows,
+/// since the order in which it tells two sizes is another one each time.
+const LETTERS_PX: usize = 15;
+
+/// How wide a letter is, as a share of its size.
+const LETTER_WIDTH: f64 = 0.5;
+
+/// Room around the text of a box, pixels.
+const ROOM_PX: f64 = 16.0;
+
+/// The size of a box with these lines, pixels.
+fn box_size(lines: &[String]) -> Point {
+    #[allow(clippy::cast_precision_loss, reason = "letters of a picture")]
+    let (longest, n, px) = (
+        lines.iter().map(String::len).max().unwrap_or(0) as f64,
+        lines.len() as f64,
+        LETTERS_PX as f64,
+    );
+    let (width, height) = (longest * px * LETTER_WIDTH, n * px);
+    Point::new(width + 2.0 * ROOM_PX, height + 2.0 * ROOM_PX)
+}
 
 fn svg(diagram: &Diagram) -> String {
     let way = Orientation::LeftToRight;
@@ -149,16 +168,19 @@ fn svg(diagram: &Diagram) -> String {
         StyleAttr::new(line, 1, Some(fill), rounded, LETTERS_PX)
     };
     let mut graph = VisualGraph::new(way);
-    let mut add = |shape: ShapeKind, rounded: usize| {
-        let size = get_shape_size(way, &shape, LETTERS_PX, false);
+    let mut add = |shape: ShapeKind, size: Point, rounded: usize| {
         graph.add_node(Element::create(shape, look(rounded), way, size))
     };
-    let begin = add(ShapeKind::new_circle("begin"), 0);
-    let any = add(ShapeKind::new_circle(ANY), 0);
+    let mut round = |text: &str| {
+        let size = box_size(&[text.to_owned()]);
+        add(ShapeKind::new_circle(text), size, 0)
+    };
+    let (begin, any) = (round("begin"), round(ANY));
     let mut nodes = BTreeMap::new();
     for state in &diagram.states {
-        let text = lines(state).join("\n");
-        nodes.insert(state.name.as_str(), add(ShapeKind::new_box(&text), 12));
+        let lines = lines(state);
+        let shape = ShapeKind::new_box(&lines.join("\n"));
+        nodes.insert(state.name.as_str(), add(shape, box_size(&lines), 12));
     }
     if let Some(start) = diagram
         .states

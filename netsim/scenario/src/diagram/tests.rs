@@ -48,7 +48,7 @@ fn what_is_wrong_is_told_with_its_place_and_a_remedy() {
         (
             "on: \"low_fuel\"",
             "on: \"timer\"",
-            "transitions[4].after_s",
+            "transitions[4]: ",
             "expected after_s",
         ),
         (low_fuel, "", "states[0]", "counts before \"low_fuel\""),

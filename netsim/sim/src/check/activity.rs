@@ -16,6 +16,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// it may be in another state than its events lead to.
 const PERIODS: u64 = 3;
 
+/// A state that was reached since the last snapshot lasts for so many periods at most.
+const FRESH_PERIODS: u64 = 3;
+
 /// Most transitions between two snapshots: a peer looks twice a quarter of a period.
 const LOOKS: usize = 8;
 
@@ -52,6 +55,8 @@ struct Last {
     revision: u32,
     /// When it was first seen in that state.
     entered_ms: u64,
+    /// Whether it was seen in another one just before.
+    came: bool,
     facts: BTreeMap<(MissionEvent, u32), bool>,
 }
 
@@ -109,40 +114,66 @@ impl ActivityCheck {
 
     /// Looks at the states of all UAVs.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
-        for m in snapshot.peers.iter().filter(|m| m.uav) {
+        // Who ends a mission is heard at once: whoever may have been the first counts for all.
+        let uavs = || snapshot.peers.iter().filter(|m| m.uav);
+        for may_be_first in [true, false] {
+            for m in uavs() {
+                self.judge_end(snapshot, m, may_be_first, found);
+            }
+        }
+        for m in uavs() {
             self.look_at(snapshot, m, found);
         }
     }
 
+    /// What is known of a UAV whose mission is known.
+    fn facts<'a>(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        m: &'a PeerSnapshot,
+        flown: &'a Flown,
+    ) -> Facts<'a> {
+        let began = self.began.entry(m.id);
+        let began = began.or_insert((flown.sortie, snapshot.now_ms));
+        if began.0 != flown.sortie {
+            *began = (flown.sortie, snapshot.now_ms);
+        }
+        let began_ms = began.1;
+        Facts {
+            m,
+            flown,
+            full: snapshot.covered.is_full(),
+            told_over: self.ended.contains(&flown.sortie),
+            age_ms: lasts(snapshot, m.id, began_ms),
+            here_ms: None,
+            fresh_ms: FRESH_PERIODS * snapshot.bounds.period_ms + snapshot.late_ms(m.id, began_ms),
+        }
+    }
+
+    /// By what the mission of a UAV is flown.
+    fn flown(&self, m: &PeerSnapshot) -> Option<Flown> {
+        let flown = self.missions.range(..=m.view.revision).next_back();
+        flown.map(|(_, flown)| flown.clone())
+    }
+
     fn look_at(&mut self, snapshot: &Snapshot<'_>, m: &PeerSnapshot, found: &mut Findings) {
         let (id, now_ms) = (m.id, snapshot.now_ms);
-        let flown = self.missions.range(..=m.view.revision).next_back();
-        let (Some((at, by)), Some((_, flown))) = (m.view.stage, flown) else {
+        let (Some((at, by)), Some(flown)) = (m.view.stage, self.flown(m)) else {
             self.on_silent(id, false);
             return;
         };
-        let flown = flown.clone();
-        let began = self.began.entry(id).or_insert((flown.sortie, now_ms));
-        if began.0 != flown.sortie {
-            *began = (flown.sortie, now_ms);
-        }
-        let began_ms = began.1;
-        let facts = Facts {
-            m,
-            flown: &flown,
-            full: snapshot.covered.is_full(),
-            told_over: self.ended.contains(&flown.sortie),
-            age_ms: lasts(snapshot, id, began_ms),
-            here_ms: None,
-        };
-        self.judge_end(snapshot, &facts, found);
+        let facts = self.facts(snapshot, m, &flown);
         let last = self.last.get(&id).filter(|l| {
             let same = self.missions.range(..=l.revision).next_back();
             same.is_some_and(|(_, f)| f.machine == flown.machine && f.sortie == flown.sortie)
         });
         let entered_ms = last.filter(|l| l.at == at).map_or(now_ms, |l| l.entered_ms);
         let last_at = last.map_or(at, |l| l.at);
-        let here_ms = lasts(snapshot, id, last.map_or(now_ms, |l| l.entered_ms));
+        let (low_ms, high_ms) = lasts(snapshot, id, last.map_or(now_ms, |l| l.entered_ms));
+        let came = last.is_some_and(|l| l.came || l.at != at);
+        // Who was in it when it was first seen may have been so for long.
+        let is_known = last.is_some_and(|l| l.came);
+        let here_ms = (low_ms, if is_known { high_ms } else { u64::MAX });
         let facts = Facts {
             here_ms: Some((last_at, here_ms)),
             ..facts
@@ -191,6 +222,7 @@ impl ActivityCheck {
             at,
             revision: m.view.revision,
             entered_ms,
+            came,
             facts: facts.known(),
         };
         self.last.insert(id, next);
@@ -219,16 +251,25 @@ impl ActivityCheck {
     }
 
     /// Who says that a mission is finished of which something is left says that its time is over.
-    fn judge_end(&mut self, snapshot: &Snapshot<'_>, facts: &Facts<'_>, found: &mut Findings) {
-        let (m, flown) = (facts.m, facts.flown);
+    fn judge_end(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        m: &PeerSnapshot,
+        may_be_first: bool,
+        found: &mut Findings,
+    ) {
         if !m.view.finished || m.view.covered.is_full() {
             return;
         }
+        let Some(flown) = self.flown(m) else {
+            return;
+        };
+        let facts = self.facts(snapshot, m, &flown);
         let after_s = flown.machine.ends_after_s();
         let timer = after_s.map(|s| facts.holds(0, (MissionEvent::Timer, s)));
         if timer.is_some_and(|holds| holds != Holds::No) {
             self.ended.insert(flown.sortie);
-        } else if self.early.insert(m.id) {
+        } else if !may_be_first && self.early.insert(m.id) {
             found.broken("activity", snapshot.now_ms, Some(m.id), || {
                 "says that its mission is finished before its time is over, and not everything is seen"
                     .to_owned()
@@ -275,6 +316,8 @@ struct Facts<'a> {
     age_ms: (u64, u64),
     /// In which state it was, and for how long.
     here_ms: Option<(usize, (u64, u64))>,
+    /// For how long it may be in a state to which it came since the last snapshot.
+    fresh_ms: u64,
 }
 
 impl Facts<'_> {
@@ -304,7 +347,7 @@ impl Facts<'_> {
             },
             MissionEvent::Stayed => {
                 let here = self.here_ms.filter(|(s, _)| *s == at);
-                let fresh = (0, self.here_ms.map_or(u64::MAX, |_| 4_000));
+                let fresh = (0, self.here_ms.map_or(u64::MAX, |_| self.fresh_ms));
                 Holds::past(here.map_or(fresh, |(_, ms)| ms), after_s)
             }
             MissionEvent::PeerLost => {
