@@ -291,16 +291,24 @@ fn is_passing(on: MissionEvent) -> bool {
     )
 }
 
-/// How long something lasts for a peer that was first seen then: at least, and at most.
+/// How long something lasts for a peer that was first seen then: at least, and at most. By its
+/// own clock, whether that runs fast or jumps.
 fn lasts(snapshot: &Snapshot<'_>, id: u16, from_ms: u64) -> (u64, u64) {
-    let (lived_ms, true_ms) = (
+    let now_ms = snapshot.now_ms;
+    let all = [
+        now_ms.saturating_sub(from_ms),
         snapshot.lived_ms(id, from_ms),
-        snapshot.now_ms.saturating_sub(from_ms),
-    );
+        snapshot.handicaps.shown_ms(id, from_ms, now_ms),
+    ];
+    let (low_ms, high_ms) = all.iter().fold((u64::MAX, 0), |(low, high), ms| {
+        (low.min(*ms), high.max(*ms))
+    });
     let slack_ms = 2 * snapshot.bounds.period_ms;
-    let low_ms = lived_ms.min(true_ms).saturating_sub(slack_ms);
     let late_ms = snapshot.late_ms(id, from_ms);
-    (low_ms, lived_ms.max(true_ms) + slack_ms + late_ms)
+    (
+        low_ms.saturating_sub(slack_ms),
+        high_ms.saturating_add(slack_ms + late_ms),
+    )
 }
 
 /// What a UAV believes and the world knows, beside the diagram that it obeys.
