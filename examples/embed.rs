@@ -70,6 +70,7 @@ fn mission() -> Mission {
         added_zones: BTreeMap::new(),
         sortie: 0,
         cancelled: false,
+        diagram: None,
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

@@ -3,11 +3,12 @@
 use crate::console::{AtArgs, look, say};
 use crate::exit;
 use crate::scenario_args::PlannerArgs;
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use skein_behaviors::Order;
 use skein_console::Command;
 use skein_peer::mission::mm;
 use skein_peer::{Mission, Overview};
+use skein_scenario::diagram::{self, Format};
 use skein_scenario::{Overrides, Severity};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -60,6 +61,16 @@ pub enum What {
         #[arg(value_name = "EAST,NORTH", value_parser = base, allow_hyphen_values = true)]
         place: (i32, i32),
     },
+    /// Draws the diagram by which a mission is flown: what a UAV does in it, and what follows on
+    /// which event. Needs no ground station.
+    Diagram {
+        /// A built-in diagram, a file that holds one, or a scenario whose mission is flown by it.
+        #[arg(value_name = "NAME|FILE")]
+        diagram: String,
+        /// As a picture, or as text from which other programs draw one.
+        #[arg(long, value_enum, default_value_t = Drawn::Svg)]
+        format: Drawn,
+    },
     /// Ends the mission: all fly home and wait there, until another one is submitted.
     Cancel,
     /// All loiter where they are, until `resume`.
@@ -69,6 +80,27 @@ pub enum What {
     /// All come home and loiter there, until `resume`. Who returns lets go first of what it was
     /// to fly: those who are not told to return fly it.
     Rtb(ToArgs),
+}
+
+/// How a diagram is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Drawn {
+    /// A picture for a browser.
+    Svg,
+    /// Text for Graphviz.
+    Dot,
+    /// Text for Mermaid.
+    Mermaid,
+}
+
+impl Drawn {
+    fn format(self) -> Format {
+        match self {
+            Self::Svg => Format::Svg,
+            Self::Dot => Format::Dot,
+            Self::Mermaid => Format::Mermaid,
+        }
+    }
 }
 
 /// To whom an order is given.
@@ -118,6 +150,7 @@ pub fn run(args: &MissionArgs) -> anyhow::Result<ExitCode> {
         }
         Some(What::Show { json }) => show(&args.at, *json),
         Some(What::Base { place }) => say(&args.at, &Command::Base(*place)),
+        Some(What::Diagram { diagram, format }) => draw(diagram, *format),
         Some(What::Cancel) => say(&args.at, &Command::Cancel),
         Some(What::Hold(to)) => order(to, Order::Hold),
         Some(What::Resume(to)) => order(to, Order::Resume),
@@ -158,6 +191,19 @@ fn give(
     say(at, &command(scenario.spec.mission))
 }
 
+fn draw(target: &str, format: Drawn) -> anyhow::Result<ExitCode> {
+    match diagram::open(target) {
+        Ok(diagram) => {
+            exit::print(diagram::picture(&diagram, format.format()))?;
+            Ok(ExitCode::from(exit::OK))
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            Ok(ExitCode::from(exit::CONFIG_INVALID))
+        }
+    }
+}
+
 fn show(at: &AtArgs, json: bool) -> anyhow::Result<ExitCode> {
     let (overview, line) = match look::<Overview>(at, None, &Command::Show)? {
         Ok(found) => found,
@@ -196,6 +242,8 @@ mod tests {
         for new in [
             "mission submit helsinki --exact",
             "mission show --json",
+            "mission diagram patrol",
+            "mission diagram watch.json5 --format mermaid",
             "mission revise field --at 127.0.0.1:4 --token-file f",
             "mission base -4,3.5",
             "mission cancel --trial x",

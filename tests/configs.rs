@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use skein_flight::coverage::ring::patch::Patches;
 use skein_geometry::frame::{Point, Vector};
 use skein_netsim::Prepared;
+use skein_netsim::runs::{Wanted, run};
 use skein_peer::CoverageTask;
 use skein_scenario::{
     Overrides, Severity, builtin_files, builtin_text, load_builtin, load_with, parse, parse_with,
@@ -266,6 +267,57 @@ fn a_patrol_goes_round_as_often_as_it_says() {
             .unwrap_err()
             .to_string();
         assert!(said.contains(what), "{said}");
+    }
+}
+
+/// Each to its verdict: an open line and a closed one watched for a time, places that are stayed
+/// over.
+#[test]
+fn missions_by_diagrams_of_their_own_pass_with_one_uav_and_with_eight() {
+    for name in ["border", "fire", "inspection"] {
+        for peers in [1, 8] {
+            let over = Overrides {
+                peers: Some(peers),
+                ..Overrides::default()
+            };
+            let spec = load_builtin(name, &over).unwrap().spec;
+            let prepared = Prepared::new(spec);
+            let faults = prepared.spec.faults.clone();
+            let report = run(&prepared, 1, faults, Wanted::default()).report;
+            assert!(report.passed, "{name} {peers}: {:?}", report.reasons);
+        }
+    }
+}
+
+#[test]
+fn wrong_missions_are_refused_where_they_stand() {
+    let text = builtin_text("border").unwrap();
+    let from = "mission: { diagram: \"patrol\", for_s: 900 },";
+    assert!(text.contains(from));
+    for (to, problem) in [
+        (
+            "mission: { diagram: \"patrl\" },",
+            "did you mean \"patrol\"",
+        ),
+        (
+            "mission: { diagram: \"inspection\" },",
+            "is flown once, and the mission has laps",
+        ),
+        (
+            "mission: { diagram: \"coverage\", for_s: 9 },",
+            "has no timer that ends it",
+        ),
+        ("mission: { diagram: \"patrol\", for_s: 0 },", "for_s"),
+        (
+            "mission: { diagram: { name: \"own\" } },",
+            "mission.diagram.states is missing",
+        ),
+        ("mission: { },", "mission.diagram is missing"),
+    ] {
+        let text = text.replacen(from, to, 1);
+        let said = parse("border.json5", &text, &builtin_files()).map(drop);
+        let said = said.unwrap_err().to_string();
+        assert!(said.contains(problem), "{to}: {said}");
     }
 }
 

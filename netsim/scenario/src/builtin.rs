@@ -22,6 +22,16 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/helsinki_wind.json5"),
     ),
     (
+        "border",
+        "border.json5",
+        include_str!("../../../configs/trials/border.json5"),
+    ),
+    (
+        "fire",
+        "fire.json5",
+        include_str!("../../../configs/trials/fire.json5"),
+    ),
+    (
         "geofence",
         "geofence.json5",
         include_str!("../../../configs/trials/geofence.json5"),
@@ -30,6 +40,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         "field",
         "field.json5",
         include_str!("../../../configs/trials/field.json5"),
+    ),
+    (
+        "inspection",
+        "inspection.json5",
+        include_str!("../../../configs/trials/inspection.json5"),
     ),
     (
         "patrol",

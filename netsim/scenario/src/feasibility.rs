@@ -69,6 +69,7 @@ fn without_geometry(spec: &Spec) -> Vec<Finding> {
 pub(crate) fn blamed(e: &GeometryError) -> &'static str {
     match e {
         GeometryError::Area(_) => "area",
+        GeometryError::Diagram(_) => "mission.diagram",
         GeometryError::Zone(..) | GeometryError::AddedZone(..) | GeometryError::ZoneName => {
             "no_fly"
         }

@@ -17,6 +17,7 @@
 //! | `feasibility` | what cannot succeed, or may disappoint |
 //! | `forecast` | what it is expected to take |
 //! | `resolve` | all of it in order: a [`Scenario`] |
+//! | [`diagram`] | diagrams of missions, built in and from files, and pictures of them |
 //! | [`town`] | streets and buildings without a mission |
 //! | `coverable` | what the world's own geometry says of the same area |
 //!
@@ -28,6 +29,7 @@
 mod builtin;
 mod choose_tree;
 mod coverable;
+pub mod diagram;
 mod error;
 mod feasibility;
 mod files;

@@ -11,9 +11,11 @@ use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::Point;
 use skein_geometry::{NoFlyZones, Polygon};
 use skein_interop::json::Error;
+use skein_peer::diagram::DiagramError;
 use skein_peer::mission::{mm, ring_mm};
 use skein_peer::{CoverageTask, Mission};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 #[allow(
     clippy::cast_possible_truncation,
@@ -74,6 +76,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
         added_zones: BTreeMap::new(),
         sortie: 0,
         cancelled: false,
+        diagram: s.diagram.clone().map(Arc::new),
         tree: lanes.tree.unwrap_or_default(),
         division: s.division,
         separation_mm: length_mm((s.fleet.separation_m * 1000.0).ceil()),
@@ -84,6 +87,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
         },
     };
     check_separation(s, &mission)?;
+    check_diagram(s, &mission)?;
     check_size(s)?;
     check_places(s, &mission)?;
     Ok(mission)
@@ -146,6 +150,15 @@ fn check_separation(s: &Stated, mission: &Mission) -> Result<(), Error> {
         ));
     }
     Ok(())
+}
+
+/// A diagram has to fit what is asked for.
+fn check_diagram(s: &Stated, mission: &Mission) -> Result<(), Error> {
+    let wrong = |e: DiagramError| {
+        let text = format!("does not fit this mission: {e}");
+        s.places.wrong("mission.diagram", text)
+    };
+    mission.machine().map(drop).map_err(wrong)
 }
 
 /// How often everything is to be seen.

@@ -1,6 +1,7 @@
 //! What checks may look at: a copy of what one peer believes.
 
 use crate::cells::CellSet;
+use crate::diagram::MissionEvent;
 use crate::output::Status;
 use crate::wire::message::{Epoch, Order, Orders, Stamp};
 use crate::wire::tasks::{Progress, TaskId};
@@ -59,6 +60,10 @@ pub struct Beliefs {
     pub tasks: Vec<(TaskId, u32, Progress)>,
     /// Whether it gave its section up to hold a relay position.
     pub relays: bool,
+    /// In which state of its mission's diagram it is, by number, and the event that led there.
+    pub stage: Option<(usize, MissionEvent)>,
+    /// Whether it knew many and hears nobody.
+    pub hears_nobody: bool,
     /// Tasks that it knows to be open, and in its eyes somebody can do.
     pub open_tasks: Vec<(TaskId, u32)>,
     /// Records held, bytes waiting to be sent, open stores: each with its cap.

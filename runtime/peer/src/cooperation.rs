@@ -1,6 +1,8 @@
 //! The cooperation manager (D2.7 §1.2.3): mission, goal, and the peer's part in the
 //! negotiations.
 //!
+//! Where it flies is the goal of its state in the mission's diagram (`stage.rs`), by default:
+//!
 //! | what holds | goal |
 //! |---|---|
 //! | the operator said hold | loiter here |
@@ -44,14 +46,13 @@ use crate::offload::{Job, MissionGeometry};
 use crate::output::{Report, Status};
 use crate::protocol::membership::Membership;
 use crate::protocol::negotiation::{Adoption, are_many};
-use crate::protocol::runs::{PlannedCell, legs_of};
+use crate::protocol::runs::PlannedCell;
 use crate::tasking::Tasking;
 use crate::timers::{Timer, Timers};
-use crate::why::Reason;
 use crate::wire::codec::Body;
 use crate::wire::message::{Beacon, Bid, Epoch, Lacking, Member, Order, Orders, Record};
 use crate::wire::tasks::TaskId;
-use skein_behaviors::{Event, Goal, Percept};
+use skein_behaviors::{Event, Percept};
 use skein_flight::coverage::ring::backtracking::Division;
 use std::sync::Arc;
 
@@ -342,12 +343,16 @@ impl Cooperation {
             return effects;
         };
         effects.extend(state.watch_fuel(s.percept));
+        let mut all = s.membership.all();
+        state.lost = all.any(|(.., status)| status == Status::Down);
+        state.look(s.now, order);
         if let Some(separation) = &mut state.separation {
             let all = s.membership.all();
             let down = all.filter(|(.., status)| *status == Status::Down);
             separation.believe_down(s.now, down.map(|(id, ..)| id));
         }
         let releases = order == Order::ReturnToBase || state.relay.is_some();
+        let releases = releases || state.stage.lets_go();
         match order {
             _ if releases => effects.extend(state.release_section(s.role)),
             Order::Resume => effects.extend(state.check_endurance(s.now, s.percept, s.period_ms)),
@@ -355,14 +360,14 @@ impl Cooperation {
         }
         state.has_released &= releases;
         let able = s.speaks && order == Order::Resume && state.can_fly_plans(s);
-        let able = able && state.relay.is_none();
+        let able = able && state.relay.is_none() && state.stage.takes_part();
         let able = able && !s.membership.is_deaf(s.now);
         effects.extend(state.negotiate(s, able, timers));
         effects.extend(self.tasking.tick(s, order, state));
         effects.extend(state.notice_end(s, timers));
         state.astray = s.membership.hears_nobody(s.now) && are_many(s.membership.uavs());
         state.silent = s.is_silent;
-        state.steer(goal_of(state, order));
+        state.steer_by_state(s.now, order);
         assert!(
             !effects.iter().any(|e| matches!(e, Effect::Negotiate)),
             "a tick asks for no tick"
@@ -432,7 +437,7 @@ impl Cooperation {
         }
         effects.push(state.claim_changed());
         effects.extend(state.save_covered(true));
-        state.steer(goal_of(state, order));
+        state.steer_by_state(s.now, order);
         effects.push(Effect::ClaimNow);
         effects
     }
@@ -457,7 +462,7 @@ impl Cooperation {
         // Runs of orphans are taken one after the other, several in a period: the claim
         // tells of all of them at once.
         let changed = state.claim_changed();
-        state.steer(goal_of(state, order));
+        state.steer_by_state(s.now, order);
         vec![changed]
     }
 
@@ -503,30 +508,9 @@ impl Cooperation {
         beliefs.adoptions = state.negotiation.adoptions;
         beliefs.finished = state.finished;
         beliefs.relays = state.relay.is_some();
+        beliefs.hears_nobody = state.astray;
+        beliefs.stage = Some((state.stage.at(), state.stage.by()));
         beliefs.spendable_ms = state.spendable_ms(percept);
         beliefs.is_fuel_due = state.fuel.is_due();
-    }
-}
-
-/// Where a peer flies: by the first line of the table that holds.
-fn goal_of(state: &MissionState, order: Order) -> Goal {
-    let sections = &state.negotiation.sections;
-    match Reason::of(state, order) {
-        Reason::ToldToHold | Reason::OthersAtWork => Goal::Hold,
-        Reason::Plan => Goal::Legs(legs_of(sections.plan(), sections.cells())),
-        Reason::Relay => state.relay_circle().map_or(Goal::Hold, Goal::Circle),
-        Reason::Task => {
-            let legs = legs_of(sections.plan(), sections.cells());
-            match &state.errand {
-                Some(flight) => Goal::Detour(flight.clone(), legs),
-                None => Goal::Legs(legs),
-            }
-        }
-        Reason::ToldToReturn
-        | Reason::Cancelled
-        | Reason::Finished
-        | Reason::FuelIsDue
-        | Reason::Twin
-        | Reason::Astray => Goal::Point(state.geometry.mission.base_m()),
     }
 }

@@ -1,5 +1,6 @@
 //! What a mission is: area, zones, lanes, level, origin, revision.
 
+use crate::diagram::{Diagram, DiagramError, Machine, check};
 use crate::offload::MissionGeometry;
 use crate::task::CoverageTask;
 use crate::wire::limits::{CHUNK_MAX_BYTES, CHUNKS_MAX};
@@ -15,6 +16,7 @@ use skein_flight::coverage::stations::{self, StationsProblem};
 use skein_flight::route::{RouteLimits, Router};
 use skein_geometry::frame::Point;
 use skein_geometry::{Polygon, PolygonError};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -84,6 +86,9 @@ pub struct Mission {
     /// Whether the operator ended it: nothing is to be seen, and all fly home.
     #[serde(default, skip_serializing_if = "core::ops::Not::not")]
     pub cancelled: bool,
+    /// What a UAV does in it when; [`Diagram::coverage`] where none is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub diagram: Option<Arc<Diagram>>,
 }
 
 #[allow(
@@ -148,6 +153,9 @@ pub enum GeometryError {
     /// A no-fly zone that somebody added has a name that no operator can give.
     #[error("a zone has a name that is none")]
     ZoneName,
+    /// Its diagram cannot be flown, or does not fit what is to be seen.
+    #[error("diagram: {0}")]
+    Diagram(#[from] DiagramError),
     /// There is no loop over what is to be seen.
     #[error(transparent)]
     Loop(#[from] LoopError),
@@ -286,6 +294,9 @@ impl Mission {
             h.write_i64(i64::from(self.further_laps));
         }
         self.hash_operated(&mut h);
+        if let Some(diagram) = &self.diagram {
+            diagram.hash(&mut h);
+        }
         h.finish()
     }
 
@@ -299,6 +310,19 @@ impl Mission {
     pub(crate) fn edit(&self) -> u16 {
         let high = u16::try_from(self.revision >> 16).unwrap_or(u16::MAX);
         if self.is_patrol() { high } else { 0 }
+    }
+
+    /// Whether a revision is this one or another lap of the same patrol, as far as its number
+    /// tells.
+    pub(crate) fn has_lap_of(&self, revision: u32) -> bool {
+        let edited = u32::from(self.edit()) << 16;
+        let first = if edited > 0 {
+            edited
+        } else {
+            self.revision.saturating_sub(u32::from(self.lap))
+        };
+        let last = self.revision.saturating_add(u32::from(self.further_laps));
+        (first..=last).contains(&revision)
     }
 
     /// The mission of the next lap, the same for whoever derives it; none after
@@ -342,11 +366,40 @@ impl Mission {
         Some(targets.pieces(self.lane_m()))
     }
 
+    /// The diagram that is obeyed.
+    #[must_use]
+    pub fn flown_by(&self) -> Cow<'_, Diagram> {
+        match &self.diagram {
+            Some(diagram) => Cow::Borrowed(diagram.as_ref()),
+            None => Cow::Owned(Diagram::coverage()),
+        }
+    }
+
+    /// The same, checked and ready.
+    ///
+    /// # Errors
+    /// [`DiagramError`] where it cannot be flown, or asks for something else than the mission.
+    pub fn machine(&self) -> Result<Machine, DiagramError> {
+        let diagram = self.flown_by();
+        if self.diagram.is_some() {
+            check::fits(&diagram, self.task.dimension(), self.is_patrol())?;
+        }
+        Machine::new(&diagram)
+    }
+
+    /// After how many seconds it ends, whatever was seen; none where it ends by what was seen
+    /// alone.
+    #[must_use]
+    pub fn ends_after_s(&self) -> Option<u32> {
+        self.machine().ok().and_then(|m| m.ends_after_s())
+    }
+
     /// Derives the loop and the router.
     ///
     /// # Errors
     /// [`GeometryError`] names what is wrong with the mission.
     pub fn geometry(self: &Arc<Self>) -> Result<Arc<MissionGeometry>, GeometryError> {
+        self.machine()?;
         let zones = self.no_fly_zones()?;
         let problem = self.loop_problem(&zones)?;
         let coverage_loop = self.the_loop(&problem)?;
@@ -578,6 +631,7 @@ mod tests {
             added_zones: BTreeMap::new(),
             sortie: 0,
             cancelled: false,
+            diagram: None,
             tree: Tree::default(),
             division: Rule::default(),
             separation_mm: 0,

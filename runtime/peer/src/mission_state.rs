@@ -31,11 +31,14 @@ use crate::protocol::negotiation::{Action, Context, Negotiation};
 use crate::protocol::runs::PlannedCell;
 use crate::protocol::sections::FIRST_LIFE;
 use crate::separation::Separation;
+use crate::stage::Stage;
 use crate::timers::{Timer, Timers};
 use crate::why::BidHeard;
 use crate::wire::codec::Body;
 use crate::wire::limits::BID_COVERED_MAX_BYTES;
-use crate::wire::message::{Activity, Beacon, Bid, Claim, Epoch, Member, MissionStatus};
+use crate::wire::message::{
+    Activity, Beacon, Bid, Claim, Epoch, Finished, Member, MissionStatus, Order,
+};
 use skein_behaviors::executive::detour::Watched;
 use skein_behaviors::executive::{GivenFlight, UNREACHABLE_MS};
 use skein_behaviors::{Event, Executive, Goal};
@@ -124,6 +127,12 @@ pub(crate) struct MissionState {
     pub astray: bool,
     /// Whether another process under its id has silenced this peer.
     pub silent: bool,
+    /// Whether it believes a peer of its fleet to be down.
+    pub lost: bool,
+    /// Whether everything is seen, and no task is open that somebody can do.
+    pub complete: bool,
+    /// Where in the diagram of its mission it is.
+    pub stage: Stage,
     /// What is known of its fuel.
     pub fuel: Fuel,
     /// Whether it said that it lists nothing since it was told to return.
@@ -296,6 +305,12 @@ impl MissionState {
                 let news = news.then_some(Effect::CoverageChanged);
                 let heard = Effect::CoverageHeard(mine, covered);
                 news.into_iter().chain([heard]).collect()
+            }
+            Body::Finished(Finished { revision }) => {
+                if self.geometry.mission.has_lap_of(*revision) {
+                    self.stage.hear_finished();
+                }
+                Effects::new()
             }
             _ => Effects::new(),
         }
@@ -508,15 +523,18 @@ impl MissionState {
     pub fn notice_end(&mut self, s: &Situation<'_>, timers: &mut Timers) -> Effects {
         let covered = self.negotiation.sections.complete();
         let complete = covered && !self.has_tasks;
-        if covered && self.geometry.mission.further_laps > 0 {
+        let ended = self.stage.ended();
+        if covered && self.geometry.mission.further_laps > 0 && !ended {
             return self.next_lap(s, timers);
         }
-        if complete == self.finished {
+        self.complete = complete;
+        let finished = complete || ended;
+        if finished == self.finished {
             return Effects::new();
         }
-        self.finished = complete;
+        self.finished = finished;
         self.replan = true;
-        if !complete || s.role != Role::Uav {
+        if !finished || s.role != Role::Uav {
             return Effects::new();
         }
         let revision = self.revision();
@@ -568,8 +586,14 @@ impl MissionState {
         self.relay.as_ref().and_then(|r| r.circle)
     }
 
+    /// Looks at the events that hold, and gives the executive the goal of the state.
+    pub fn steer_by_state(&mut self, now: Time, order: Order) {
+        self.look(now, order);
+        self.steer(self.goal_of_state());
+    }
+
     /// Gives the executive its goal, if that changed.
-    pub fn steer(&mut self, goal: Goal) {
+    fn steer(&mut self, goal: Goal) {
         let sections = &self.negotiation.sections;
         let same_kind = match (&self.goal, &goal) {
             (Some(Goal::Legs(_)), Goal::Legs(_)) => true,
@@ -621,6 +645,12 @@ impl MissionState {
             finished: false,
             astray: false,
             silent: false,
+            lost: false,
+            complete: false,
+            stage: Stage::begun(
+                &geometry.mission,
+                old.as_ref().map(|m| (&*m.geometry.mission, &m.stage)),
+            ),
             fuel: old.as_ref().map_or_else(Fuel::default, |m| m.fuel.kept()),
             has_released: false,
             unsaved_cells: 0,

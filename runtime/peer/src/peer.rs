@@ -958,7 +958,7 @@ impl Peer {
             order: self.cooperation.order(),
             orders: self.cooperation.orders().clone(),
             flight: percept.map(|p| why::flight(state, p, reserve_s)),
-            work: state.map(|s| why::work(s, self.cooperation.order())),
+            work: state.map(|s| why::work(s, self.now)),
             round: self.diary.round(self.now),
             tasks: self.tasks(),
             others: self.others(),
@@ -969,8 +969,8 @@ impl Peer {
     /// What it knows of the newest mission that it holds, for a person; none without one.
     #[must_use]
     pub fn overview(&self) -> Option<Overview> {
-        let (mission, order) = (self.mission()?, self.cooperation.order());
-        let work = self.cooperation.state().map(|s| why::work(s, order));
+        let mission = self.mission()?;
+        let work = self.cooperation.state().map(|s| why::work(s, self.now));
         let others = (self.tasks(), self.others());
         let orders = self.cooperation.orders();
         Some(Overview::of(&mission, orders, work, others))

@@ -50,6 +50,16 @@ impl CoverageTask {
         *self == Self::Area
     }
 
+    /// Dimension of what is to be seen (D2.7 §1.2.2): 0 points, 1 lines, 2 an area.
+    #[must_use]
+    pub fn dimension(&self) -> u8 {
+        match self {
+            Self::Points(_) => 0,
+            Self::Lines(_) => 1,
+            Self::Area | Self::Exact => 2,
+        }
+    }
+
     /// The targets, in metres; none for areas.
     #[must_use]
     pub fn targets(&self) -> Option<Targets> {

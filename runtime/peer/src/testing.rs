@@ -65,6 +65,7 @@ pub fn mission(revision: u32, cols: i32, rows: i32) -> Mission {
         added_zones: BTreeMap::new(),
         sortie: 0,
         cancelled: false,
+        diagram: None,
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

@@ -1,9 +1,12 @@
-//! What a peer does and why, for a person who asks (D2.7 §1.2.3): its goal and the reason for
-//! it, its claim, the last round, whom it believes what, and what happened last. Asking
+//! What a peer does and why, for a person who asks (D2.7 §1.2.3): the state of its mission's
+//! diagram, the goal and the event that led to it, its claim, the last round, whom it believes what, and what happened last. Asking
 //! changes nothing: all of it is a copy.
 
 use crate::Incarnation;
 use crate::cells::CellSet;
+use crate::diagram::MissionEvent;
+use crate::diagram::StateGoal;
+use crate::input::Time;
 use crate::mission_state::MissionState;
 use crate::output::Status;
 use crate::task_desk::TaskView;
@@ -16,7 +19,7 @@ use std::fmt::Write as _;
 /// Next cells that are told.
 const NEXT_CELLS: usize = 8;
 
-/// By which line of the goal table a UAV flies where it flies (`docs/protocol.md` §6).
+/// By which event of its mission's diagram a UAV does what it does (`docs/protocol.md` §6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reason {
@@ -42,52 +45,51 @@ pub enum Reason {
     Astray,
     /// It has nothing to fly, and others are at work.
     OthersAtWork,
+    /// The time of its mission is over.
+    TimeIsOver,
+    /// It stayed where it was for as long as it was to.
+    Stayed,
+    /// It believes a peer of its fleet to be down.
+    PeerLost,
 }
 
 impl Reason {
-    /// The first line that holds.
-    pub(crate) fn of(state: &MissionState, order: Order) -> Self {
-        if order == Order::Hold {
-            Self::ToldToHold
-        } else if order == Order::ReturnToBase {
-            Self::ToldToReturn
-        } else if state.geometry.mission.cancelled {
-            Self::Cancelled
-        } else if state.finished {
-            Self::Finished
-        } else if state.fuel.is_due() {
-            Self::FuelIsDue
-        } else if state.silent {
-            Self::Twin
-        } else if state.relay_circle().is_some() {
-            Self::Relay
-        } else if state.errand.is_some() {
-            Self::Task
-        } else if !state.negotiation.sections.plan().is_empty() {
-            Self::Plan
-        } else if state.astray {
-            // Where the ground station is and whoever is finished, somebody is heard.
-            Self::Astray
-        } else {
-            Self::OthersAtWork
+    /// What an event of the mission's diagram is for a person.
+    pub(crate) fn of(event: MissionEvent) -> Self {
+        match event {
+            MissionEvent::OperatorHold => Self::ToldToHold,
+            MissionEvent::OperatorReturn => Self::ToldToReturn,
+            MissionEvent::MissionCancelled => Self::Cancelled,
+            MissionEvent::MissionComplete => Self::Finished,
+            MissionEvent::LowFuel => Self::FuelIsDue,
+            MissionEvent::TwinSpeaks => Self::Twin,
+            MissionEvent::Timer => Self::TimeIsOver,
+            MissionEvent::Stayed => Self::Stayed,
+            MissionEvent::PeerLost => Self::PeerLost,
+            MissionEvent::RelayGiven => Self::Relay,
+            MissionEvent::TaskGiven => Self::Task,
+            MissionEvent::CellsGiven => Self::Plan,
+            MissionEvent::NobodyHeard => Self::Astray,
+            MissionEvent::Otherwise => Self::OthersAtWork,
         }
     }
 
-    /// What it does, and why, in a sentence.
+    /// Why it does something, in half a sentence; nothing where what it does says so.
     #[must_use]
-    pub fn sentence(self) -> &'static str {
+    pub fn cause(self) -> &'static str {
         match self {
-            Self::ToldToHold => "loiters where it is: the operator said hold",
-            Self::ToldToReturn => "flies home: the operator said return-to-base",
-            Self::Cancelled => "flies home: the operator cancelled the mission",
-            Self::Finished => "flies home: everything is covered",
-            Self::FuelIsDue => "flies home: its fuel is due",
-            Self::Twin => "flies home: another process speaks under its id",
-            Self::Relay => "holds a relay position that it was given, or flies to it",
-            Self::Task => "flies to a task that it was given, between two cells of its section",
-            Self::Plan => "flies its section",
-            Self::Astray => "flies home: it has nothing to fly and hears nobody",
-            Self::OthersAtWork => "loiters where it is: it has nothing to fly, others are at work",
+            Self::ToldToHold => "the operator said hold",
+            Self::ToldToReturn => "the operator said return-to-base",
+            Self::Cancelled => "the operator cancelled the mission",
+            Self::Finished => "everything is covered",
+            Self::FuelIsDue => "its fuel is due",
+            Self::Twin => "another process speaks under its id",
+            Self::Relay | Self::Task | Self::Plan => "",
+            Self::Astray => "it has nothing to fly and hears nobody",
+            Self::OthersAtWork => "it has nothing to fly, others are at work",
+            Self::TimeIsOver => "the time of its mission is over",
+            Self::Stayed => "it stayed for as long as it was to",
+            Self::PeerLost => "it believes a peer of its fleet to be down",
         }
     }
 }
@@ -207,8 +209,20 @@ pub struct Work {
     pub covered: usize,
     /// Cells that nobody has the endurance for.
     pub unassigned: usize,
-    /// By which line of the goal table it flies.
+    /// By which event it does what it does.
     pub reason: Reason,
+    /// The diagram that it obeys.
+    #[serde(default)]
+    pub diagram: String,
+    /// In which state of it.
+    #[serde(default)]
+    pub state: String,
+    /// For how long it has been in it, milliseconds.
+    #[serde(default)]
+    pub state_ms: u64,
+    /// What is done in that state, for a person.
+    #[serde(default)]
+    pub does: String,
     /// Whether it takes part in planning.
     pub able: bool,
     /// Its open cells that come next, in order of flight.
@@ -277,7 +291,17 @@ pub(crate) fn flight(state: Option<&MissionState>, percept: &Percept, reserve_s:
     }
 }
 
-pub(crate) fn work(state: &MissionState, order: Order) -> Work {
+/// What is done, and why, in a sentence.
+fn does(goal: StateGoal, reason: Reason) -> String {
+    let (goal, cause) = (goal.sentence(), reason.cause());
+    if cause.is_empty() {
+        goal.to_owned()
+    } else {
+        format!("{goal}: {cause}")
+    }
+}
+
+pub(crate) fn work(state: &MissionState, now: Time) -> Work {
     let sections = &state.negotiation.sections;
     let coverage_loop = &state.geometry.coverage_loop;
     // Of a mission that was cancelled nothing is to be seen.
@@ -286,6 +310,7 @@ pub(crate) fn work(state: &MissionState, order: Order) -> Work {
         .zip(coverage_loop.cells())
         .filter(|(_, c)| c.needed && asked);
     let (claim, covered) = (state.claim(), sections.covered());
+    let (at, reason) = (state.stage.state(), Reason::of(state.stage.by()));
     let open: Vec<u16> = sections
         .plan()
         .iter()
@@ -298,7 +323,11 @@ pub(crate) fn work(state: &MissionState, order: Order) -> Work {
         cells: needed.clone().count(),
         covered: needed.filter(|(i, _)| covered.contains(*i)).count(),
         unassigned: usize::from(CellSet::count(sections.unassigned())),
-        reason: Reason::of(state, order),
+        reason,
+        diagram: state.geometry.mission.flown_by().name.clone(),
+        state: at.name.clone(),
+        state_ms: state.stage.state_ms(now),
+        does: does(at.goal, reason),
         able: state.able(),
         next_cells: open.iter().copied().take(NEXT_CELLS).collect(),
         open_cells: open.len(),
@@ -380,7 +409,15 @@ impl Why {
         } else {
             "; takes no part in planning"
         };
-        writeln!(f, "  does      {}{able}", work.reason.sentence())?;
+        writeln!(f, "  does      {}{able}", work.does)?;
+        if !work.state.is_empty() {
+            let (state, diagram, ms) = (&work.state, &work.diagram, work.state_ms);
+            let since_s = s(ms);
+            writeln!(
+                f,
+                "  state     {state} of the diagram {diagram}, for {since_s:.1} s"
+            )?;
+        }
         let (counter, hash) = (work.epoch.counter, work.epoch.hash);
         writeln!(f, "  epoch     {counter}.{hash:08x}")?;
         let next: Vec<String> = work.next_cells.iter().map(ToString::to_string).collect();

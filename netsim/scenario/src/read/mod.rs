@@ -13,6 +13,7 @@ mod tasks;
 pub(crate) mod terrain;
 pub(crate) mod wind;
 
+use crate::diagram;
 use crate::error::{Finding, ScenarioError, Severity};
 use crate::files::Files;
 use crate::request::{AreaPlanner, Overrides};
@@ -29,6 +30,7 @@ use skein_interop::airframe;
 use skein_interop::json::{Document, Error, Fields, Node, Places};
 use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{GroundStationSpec, RadioSpec, StormSpec};
+use skein_peer::diagram::Diagram;
 use std::collections::BTreeSet;
 use targets::Asked;
 use terrain::Terrain;
@@ -45,6 +47,7 @@ const FIELDS: &[&str] = &[
     "lines",
     "planner",
     "laps",
+    "mission",
     "division",
     "level_m",
     "vertical_margin_m",
@@ -76,6 +79,8 @@ pub(crate) struct Stated {
     pub(crate) asked: Asked,
     /// How often everything is to be seen.
     pub(crate) laps: u16,
+    /// The diagram that the mission is flown by; none for the default one.
+    pub(crate) diagram: Option<Diagram>,
     /// By what rule the loop is divided.
     pub(crate) division: Rule,
     pub(crate) lanes: Lanes,
@@ -153,6 +158,9 @@ pub(crate) fn scenario(
         faults_of: over.faults.as_ref().map(|plan| plan.display().to_string()),
         storm: faults::storm(f.get("storm"), fleet.members.len(), over.peers.is_some())?,
         laps: f.small_or("laps", 1, 1, 1000, "times")?,
+        diagram: f
+            .get("mission")
+            .map_or(Ok(None), |node| diagram::of_mission(node, files))?,
         division: f.get("division").map_or(Ok(Rule::Best), division)?,
         lanes: lanes::read(&f)?,
         base: f

@@ -47,7 +47,11 @@ impl Setting {
             takeoffs_ms: (spec.uavs.iter())
                 .map(|u| (u.id, u64::from(u.takeoff_ms)))
                 .collect(),
-            work_m: once_m * (f64::from(spec.mission.further_laps) + 1.0),
+            // Of what ends by its time nobody knows how much it is.
+            work_m: match spec.mission.ends_after_s() {
+                Some(_) => 0.0,
+                None => once_m * (f64::from(spec.mission.further_laps) + 1.0),
+            },
             needed_share: spec.min_coverable,
         }
     }

@@ -1,10 +1,11 @@
 //! What is flown against what is wanted: who holds or waits stays where it is (`hold`);
-//! who is finished, ordered home, out of fuel or silent for a twin flies home (`home`).
+//! who is finished and to come home by its mission, ordered home, out of fuel or silent for a twin flies home (`home`).
 
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use crate::world::flat::{self, segment_ring_m};
 use skein_geometry::Polygon;
 use skein_geometry::frame::Point;
+use skein_peer::diagram::StateGoal;
 use skein_peer::wire::message::Order;
 use std::collections::BTreeMap;
 
@@ -19,6 +20,9 @@ const HOLD_RADII: f64 = 5.0;
 /// The way home is at most so many times the straight one, where no zone lies across that:
 /// turns, and the curve at the end.
 const DETOUR: f64 = 2.0;
+
+/// Who stays when all is over is looked at for so long, milliseconds.
+const STAY_MS: u64 = 180_000;
 
 /// And before it begins a peer turns round, and looks four times a period, seconds.
 const HOME_SLACK_S: f64 = 30.0;
@@ -50,6 +54,8 @@ struct Holding {
     loop_hash: u64,
     /// Where it was once it had settled.
     place: Option<Point>,
+    /// For how long it was looked at since.
+    for_ms: u64,
 }
 
 /// What the flights of one run were found to be.
@@ -101,7 +107,9 @@ impl FlightCheck {
     pub fn all_home(&self, snapshot_peers: &[PeerSnapshot]) -> bool {
         snapshot_peers.iter().filter(|m| m.uav).all(|m| {
             let homing = self.homing.get(&m.id);
-            homing.is_none_or(|h| h.told || self.is_home(m, h))
+            let stays = self.holding.get(&m.id).filter(|_| m.view.finished);
+            let is_seen = stays.is_none_or(|h| h.for_ms >= STAY_MS);
+            is_seen && homing.is_none_or(|h| h.told || self.is_home(m, h))
         })
     }
 
@@ -112,11 +120,13 @@ impl FlightCheck {
         at_base(at, homing.base, *flyer)
     }
 
-    /// Judges where everybody is; `base` tells where the mission of a revision ends.
+    /// Judges where everybody is; `base` tells where the mission of a revision ends, and `wanted`
+    /// what the mission of a UAV asks of it now.
     pub fn on_snapshot(
         &mut self,
         snapshot: &Snapshot<'_>,
         base: impl Fn(u32) -> Option<Point>,
+        wanted: impl Fn(u16) -> Option<StateGoal>,
         found: &mut Findings,
     ) {
         let open = !snapshot.covered.is_full();
@@ -131,7 +141,8 @@ impl FlightCheck {
             let spent = m.view.is_fuel_due || m.view.spendable_ms == 0 && !m.view.able;
             let spent = m.view.loop_hash != 0 && spent;
             let silent = m.view.is_silent;
-            let goes = returns || m.view.finished || spent || silent;
+            let finished = |goal| m.view.finished && wanted(m.id) == Some(goal);
+            let goes = returns || finished(StateGoal::Home) || spent || silent;
             let goes = goes && m.view.order != Order::Hold;
             match base(m.view.revision).filter(|_| goes && (m.view.speaks || silent)) {
                 Some(base) => self.judge_homing(snapshot.now_ms, m, (at, base), flyer, found),
@@ -139,7 +150,9 @@ impl FlightCheck {
                     self.homing.remove(&m.id);
                 }
             }
-            if m.view.order == Order::Hold && m.view.loop_hash != 0 {
+            let stays = finished(StateGoal::Hold) && !goes;
+            let holds = m.view.order == Order::Hold || stays;
+            if holds && m.view.loop_hash != 0 {
                 self.judge_holding(snapshot.now_ms, m, at, flyer, found);
             } else {
                 self.holding.remove(&m.id);
@@ -210,6 +223,7 @@ impl FlightCheck {
             since_ms: now_ms,
             loop_hash,
             place: None,
+            for_ms: 0,
         };
         let holding = self.holding.entry(id).or_insert(fresh);
         if holding.loop_hash != loop_hash {
@@ -221,6 +235,7 @@ impl FlightCheck {
             return;
         }
         let place = *holding.place.get_or_insert(at);
+        holding.for_ms = now_ms - holding.since_ms;
         let away_m = (at - place).norm();
         let most_m = HOLD_RADII * flyer.turn_radius_m;
         if away_m <= most_m {
@@ -262,11 +277,12 @@ mod tests {
         change: impl Fn(&mut Beliefs),
         away_m: impl Fn(u64) -> f64,
     ) -> BTreeMap<&'static str, u64> {
-        flown_round(Vec::new(), change, away_m)
+        flown_round(Vec::new(), StateGoal::Home, change, away_m)
     }
 
     fn flown_round(
         zones: Vec<Polygon>,
+        wanted: StateGoal,
         change: impl Fn(&mut Beliefs),
         away_m: impl Fn(u64) -> f64,
     ) -> BTreeMap<&'static str, u64> {
@@ -285,7 +301,8 @@ mod tests {
             story.place(1, Point::new(away_m(t), 0.0));
             let views = [(1, view)];
             story.snapshot(t * 1000, &views, |s| {
-                check.on_snapshot(s, |_| Some(Point::new(0.0, 0.0)), &mut found);
+                let base = |_| Some(Point::new(0.0, 0.0));
+                check.on_snapshot(s, base, |_| Some(wanted), &mut found);
             });
         }
         found.counts
@@ -317,10 +334,21 @@ mod tests {
         };
         let late = |t: u64| if t < 170 { 600.0 } else { 0.0 };
         let finished = |b: &mut Beliefs| b.finished = true;
-        assert!(flown_round(vec![wall(300.0)], finished, late).is_empty());
+        assert!(flown_round(vec![wall(300.0)], StateGoal::Home, finished, late).is_empty());
         for zones in [Vec::new(), vec![wall(900.0)]] {
-            assert!(flown_round(zones, finished, late).contains_key("home"));
+            assert!(flown_round(zones, StateGoal::Home, finished, late).contains_key("home"));
         }
+    }
+
+    /// A mission may say that who is finished stays.
+    #[test]
+    fn who_is_finished_and_to_stay_stays() {
+        let finished = |b: &mut Beliefs| b.finished = true;
+        let stays =
+            |away_m: fn(u64) -> f64| flown_round(Vec::new(), StateGoal::Hold, finished, away_m);
+        assert!(stays(|_| 600.0).is_empty());
+        let leaves = |t: u64| 600.0 - 3.0 * f64::from(u8::try_from(t).unwrap());
+        assert!(stays(leaves).contains_key("hold"));
     }
 
     #[test]

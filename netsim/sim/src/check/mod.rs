@@ -24,6 +24,7 @@
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
 //! | [`airtime`] | S9: shares of the channel |
 //! | [`fuel`] | S10, bids and returns against fuel and place |
+//! | [`activity`] | what is done against the diagram of the mission |
 //! | [`flight`] | what is flown against what is wanted: hold, home |
 //! | [`progress`] | S2, S9, L6, L7: limits and restarts |
 //!
@@ -31,6 +32,7 @@
 //! run, S8 tested in the peer's crate. Checks run incrementally on reports and
 //! transmissions, and once a beacon period on a copy of each peer's beliefs.
 
+pub mod activity;
 pub mod airtime;
 pub mod bounds;
 pub mod cadence;

@@ -1,5 +1,6 @@
 //! The rules of single peers behind one door: what they say and fly, and when.
 
+use super::activity::ActivityCheck;
 use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
 use super::decision::{DecisionCheck, Mover};
@@ -33,6 +34,7 @@ pub struct Rules {
     /// What is flown.
     pub flight: FlightCheck,
     fuel: FuelCheck,
+    activity: ActivityCheck,
     flyers: BTreeMap<u16, Flyer>,
     airtime: AirtimeCheck,
     cadence: CadenceCheck,
@@ -63,6 +65,7 @@ impl Rules {
                 spec.mission.clearance_m(),
             ),
             fuel: FuelCheck::new(spec),
+            activity: ActivityCheck::default(),
             flyers,
             airtime: AirtimeCheck::new(spec.radio.rate_bps, period_ms),
             cadence: CadenceCheck::new(period_ms),
@@ -84,6 +87,7 @@ impl Rules {
     pub fn on_mission(&mut self, mission: &Mission) {
         self.bases.insert(mission.revision, point_m(mission.base));
         self.flight.on_zones(mission.zones_m());
+        self.activity.on_mission(mission);
         self.spread
             .on_mission(chunks(mission).map_or(0, |pieces| pieces.len()));
     }
@@ -107,6 +111,7 @@ impl Rules {
         self.cadence.on_silent(id);
         self.patience.on_silent(id);
         self.flight.on_silent(id);
+        self.activity.on_silent(id, death);
         self.fuel.on_silent(id);
         self.spread.on_silent(id);
         self.spoken.on_silent(id, death);
@@ -305,7 +310,9 @@ impl Rules {
     pub fn on_way_home(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let bases = &self.bases;
         let base = |revision| base_of(bases, revision);
-        self.flight.on_snapshot(snapshot, base, found);
+        self.activity.on_snapshot(snapshot, found);
+        let wanted = |id| self.activity.wanted(id);
+        self.flight.on_snapshot(snapshot, base, wanted, found);
         let flyers = (&self.flyers, &self.flight);
         self.fuel.on_snapshot(snapshot, base, flyers, found);
     }

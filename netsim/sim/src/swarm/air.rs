@@ -167,6 +167,12 @@ impl Air {
         self.world.judge().saw(revision, cell, laps)
     }
 
+    /// A mission ended by its time: nothing is to be seen after the last lap that is complete.
+    /// Returns whether there is one.
+    pub fn end_laps(&mut self) -> bool {
+        self.world.end_laps()
+    }
+
     /// The world, as far as it has moved.
     #[must_use]
     pub fn world(&self) -> &World {

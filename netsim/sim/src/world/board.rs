@@ -203,6 +203,20 @@ impl Board {
         }
     }
 
+    /// What was seen so far is all that is to be seen: the last lap that is complete was the
+    /// last. Returns whether there is one.
+    pub(super) fn end_laps(&mut self) -> bool {
+        if self.lap > 1 && self.n_covered < self.n_coverable {
+            self.lap -= 1;
+            self.n_covered = self.n_coverable;
+            self.seen = (0..self.seen.len())
+                .map(|i| self.last_sighting(i))
+                .collect();
+        }
+        self.laps = self.lap;
+        self.complete()
+    }
+
     pub(super) fn look(
         &mut self,
         uav: u16,

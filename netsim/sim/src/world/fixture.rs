@@ -167,6 +167,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         added_zones: std::collections::BTreeMap::new(),
         sortie: 0,
         cancelled: false,
+        diagram: None,
         tree: skein_flight::coverage::ring::Tree::default(),
         division: Default::default(),
         separation_mm: 0,

@@ -139,6 +139,12 @@ impl Judge {
         self.board().covered_share()
     }
 
+    /// A mission ended by its time: nothing is to be seen after the last lap that is complete.
+    /// Returns whether there is one.
+    pub fn end_laps(&mut self) -> bool {
+        self.board_mut().end_laps()
+    }
+
     /// Whether every coverable cell was seen.
     #[must_use]
     pub fn complete(&self) -> bool {

@@ -288,6 +288,12 @@ impl World {
         &self.judge
     }
 
+    /// A mission ended by its time: nothing is to be seen after the last lap that is complete.
+    /// Returns whether there is one.
+    pub fn end_laps(&mut self) -> bool {
+        self.judge.end_laps()
+    }
+
     /// From now on a revision of the mission with this geometry is judged by.
     pub fn revise(&mut self, survey: Arc<Survey>, geometry: &MissionGeometry) {
         let mission = &*geometry.mission;

@@ -1,0 +1,67 @@
+//! Missions with other numbers of UAVs, each to its verdict:
+//! `cargo run --release -p skein-scenario --example missions -- border,fire,inspection 1,8 1..4`.
+//!
+//! A fourth argument, `storm`, draws the faults instead of those of the scenario. Prints a line a
+//! run: the verdict, when all was over, the longest time between two visits of a place, and what
+//! was wrong. Exit code 1 if anything was.
+
+use skein_netsim::prepared::Prepared;
+use skein_netsim::runs::{Wanted, failure_free_makespan_ms, run, storm};
+use skein_scenario::{Overrides, Seeds, open};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let arg = |i: usize, default: &str| args.get(i).map_or(default, String::as_str).to_owned();
+    let Ok(seeds) = arg(2, "1..2").parse::<Seeds>() else {
+        eprintln!("expected seeds such as 1..4");
+        return ExitCode::from(2);
+    };
+    let mut passed = true;
+    for name in arg(0, "border,fire,inspection").split(',') {
+        for n in arg(1, "1,8").split(',').filter_map(|n| n.parse().ok()) {
+            let over = Overrides {
+                peers: Some(n),
+                ..Overrides::default()
+            };
+            let prepared = match open(Some(name), &over) {
+                Ok(scenario) => Prepared::new(scenario.spec),
+                Err(e) => {
+                    eprintln!("{e}");
+                    return ExitCode::from(2);
+                }
+            };
+            let storms = arg(3, "") == "storm";
+            let free_ms = storms.then(|| failure_free_makespan_ms(&prepared));
+            for seed in seeds.from..seeds.to {
+                let outcome = match free_ms {
+                    Some(free_ms) => storm(&prepared, seed, free_ms, Wanted::default()),
+                    None => run(
+                        &prepared,
+                        seed,
+                        prepared.spec.faults.clone(),
+                        Wanted::default(),
+                    ),
+                };
+                let r = &outcome.report;
+                passed &= r.passed;
+                let verdict = if r.passed { "passed" } else { "FAILED" };
+                println!(
+                    "{name} {n} uavs, seed {seed}: {verdict}, over {:?} ms, end {} ms, revisit {:?} ms {:?}",
+                    r.makespan_ms, r.end_ms, r.revisit_ms, r.reasons
+                );
+                for v in outcome.violations() {
+                    println!(
+                        "  {} at {} ms, {:?}: {}",
+                        v.check, v.time_ms, v.peer, v.text
+                    );
+                }
+            }
+        }
+    }
+    if passed {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}

@@ -1,0 +1,512 @@
+//! What UAVs do against the diagram of their mission (`activity`): the state of a UAV changes
+//! only along transitions whose events hold, and it takes those that do; and nobody ends a
+//! mission by its timer before its time. Which events hold is told from orders, fuel, plans and
+//! time, beside the peer's own evaluation of its diagram; of the flights of tasks and relay
+//! positions only whether there may be one.
+
+use super::{Clocks, Findings, PeerSnapshot, Snapshot};
+use skein_peer::Mission;
+use skein_peer::diagram::{Machine, MissionEvent, StateGoal};
+use skein_peer::output::Status;
+use skein_peer::wire::message::Order;
+use skein_peer::wire::tasks::Progress;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A peer looks four times a period, and a snapshot may fall between two looks: so many periods
+/// it may be in another state than its events lead to.
+const PERIODS: u64 = 3;
+
+/// A state that was reached since the last snapshot lasts for so many periods at most.
+const FRESH_PERIODS: u64 = 3;
+
+/// Most transitions between two snapshots: a peer looks twice a quarter of a period.
+const LOOKS: usize = 8;
+
+/// What is known of an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Holds {
+    Yes,
+    No,
+    Maybe,
+}
+
+impl Holds {
+    fn of(holds: bool) -> Self {
+        if holds { Self::Yes } else { Self::No }
+    }
+
+    /// Of something that lasts from `low_ms` to `high_ms` by now, whether it lasts so long.
+    fn past((low_ms, high_ms): (u64, u64), after_s: u32) -> Self {
+        let after_ms = 1000 * u64::from(after_s);
+        if low_ms >= after_ms {
+            Self::Yes
+        } else if high_ms < after_ms {
+            Self::No
+        } else {
+            Self::Maybe
+        }
+    }
+}
+
+/// What was seen of a UAV in the last snapshot.
+#[derive(Clone, Debug)]
+struct Last {
+    at: usize,
+    revision: u32,
+    /// When it was first seen in that state.
+    entered_ms: u64,
+    /// Whether it was seen in another one just before.
+    came: bool,
+    facts: BTreeMap<(MissionEvent, u32), bool>,
+}
+
+#[derive(Clone, Debug)]
+struct Flown {
+    machine: Machine,
+    sortie: u16,
+    cancelled: bool,
+}
+
+/// What the states of one run were found to be.
+#[derive(Clone, Debug, Default)]
+pub struct ActivityCheck {
+    missions: BTreeMap<u32, Flown>,
+    last: BTreeMap<u16, Last>,
+    /// When a process was first seen with this sortie.
+    began: BTreeMap<u16, (u16, u64)>,
+    /// Sorties that some UAV ended by its timer.
+    ended: BTreeSet<u16>,
+    /// The goals to which the events of now lead, where they lead to one.
+    wanted: BTreeMap<u16, StateGoal>,
+    wrong: Clocks<u16>,
+    early: BTreeSet<u16>,
+}
+
+impl ActivityCheck {
+    /// The operator has a mission.
+    pub fn on_mission(&mut self, mission: &Mission) {
+        if let Ok(machine) = mission.machine() {
+            let flown = Flown {
+                machine,
+                sortie: mission.sortie,
+                cancelled: mission.cancelled,
+            };
+            self.missions.insert(mission.revision, flown);
+        }
+    }
+
+    /// A process ends, with all that it knew, or stands still (`death` is false).
+    pub fn on_silent(&mut self, id: u16, death: bool) {
+        self.last.remove(&id);
+        self.wrong.stop(id);
+        self.wanted.remove(&id);
+        if death {
+            self.began.remove(&id);
+            self.early.remove(&id);
+        }
+    }
+
+    /// The goal to which the events lead that hold for a UAV, where they lead to one.
+    #[must_use]
+    pub fn wanted(&self, id: u16) -> Option<StateGoal> {
+        self.wanted.get(&id).copied()
+    }
+
+    /// Looks at the states of all UAVs.
+    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+        // Who ends a mission is heard at once: whoever may have been the first counts for all.
+        let uavs = || snapshot.peers.iter().filter(|m| m.uav);
+        for may_be_first in [true, false] {
+            for m in uavs() {
+                self.judge_end(snapshot, m, may_be_first, found);
+            }
+        }
+        for m in uavs() {
+            self.look_at(snapshot, m, found);
+        }
+    }
+
+    /// What is known of a UAV whose mission is known.
+    fn facts<'a>(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        m: &'a PeerSnapshot,
+        flown: &'a Flown,
+    ) -> Facts<'a> {
+        let began = self.began.entry(m.id);
+        let began = began.or_insert((flown.sortie, snapshot.now_ms));
+        if began.0 != flown.sortie {
+            *began = (flown.sortie, snapshot.now_ms);
+        }
+        let began_ms = began.1;
+        Facts {
+            m,
+            flown,
+            full: snapshot.covered.is_full(),
+            told_over: self.ended.contains(&flown.sortie),
+            age_ms: lasts(snapshot, m.id, began_ms),
+            here_ms: None,
+            fresh_ms: FRESH_PERIODS * snapshot.bounds.period_ms + snapshot.late_ms(m.id, began_ms),
+        }
+    }
+
+    /// By what the mission of a UAV is flown.
+    fn flown(&self, m: &PeerSnapshot) -> Option<Flown> {
+        let flown = self.missions.range(..=m.view.revision).next_back();
+        flown.map(|(_, flown)| flown.clone())
+    }
+
+    fn look_at(&mut self, snapshot: &Snapshot<'_>, m: &PeerSnapshot, found: &mut Findings) {
+        let (id, now_ms) = (m.id, snapshot.now_ms);
+        let (Some((at, by)), Some(flown)) = (m.view.stage, self.flown(m)) else {
+            self.on_silent(id, false);
+            return;
+        };
+        let facts = self.facts(snapshot, m, &flown);
+        let last = self.last.get(&id).filter(|l| {
+            let same = self.missions.range(..=l.revision).next_back();
+            same.is_some_and(|(_, f)| f.machine == flown.machine && f.sortie == flown.sortie)
+        });
+        let entered_ms = last.filter(|l| l.at == at).map_or(now_ms, |l| l.entered_ms);
+        let last_at = last.map_or(at, |l| l.at);
+        let (low_ms, high_ms) = lasts(snapshot, id, last.map_or(now_ms, |l| l.entered_ms));
+        let came = last.is_some_and(|l| l.came || l.at != at);
+        // Who was in it when it was first seen may have been so for long.
+        let is_known = last.is_some_and(|l| l.came);
+        let here_ms = (low_ms, if is_known { high_ms } else { u64::MAX });
+        let facts = Facts {
+            here_ms: Some((last_at, here_ms)),
+            ..facts
+        };
+        // By the events of now alone: what is wanted of its flight.
+        let mut to = BTreeSet::from([last_at]);
+        for _ in 0..LOOKS {
+            to = to.iter().flat_map(|s| facts.step(*s, &|_, h| h)).collect();
+        }
+        let goals: BTreeSet<&str> = to
+            .iter()
+            .map(|s| flown.machine.state(*s).goal.name())
+            .collect();
+        self.wanted.remove(&id);
+        if let (1, Some(s)) = (goals.len(), to.first()) {
+            self.wanted.insert(id, flown.machine.state(*s).goal);
+        }
+        // By those of now and of the last snapshot: where it may be.
+        let before = last.map(|l| l.facts.clone()).unwrap_or_default();
+        let either = |key: (MissionEvent, u32), now: Holds| match (before.get(&key), now) {
+            (Some(true), Holds::No) | (Some(false), Holds::Yes) => Holds::Maybe,
+            _ => now,
+        };
+        let mut may = BTreeSet::new();
+        let mut from = BTreeSet::from([last_at]);
+        for _ in 0..LOOKS {
+            from = from.iter().flat_map(|s| facts.step(*s, &either)).collect();
+            may.extend(from.iter().copied());
+        }
+        let is_first = last.is_none();
+        // And where, whatever came and went between the two.
+        let passing = |key: (MissionEvent, u32), now: Holds| {
+            if is_passing(key.0) {
+                Holds::Maybe
+            } else {
+                either(key, now)
+            }
+        };
+        let mut reached = BTreeSet::from([last_at]);
+        for _ in 0..LOOKS {
+            let next = reached.iter().flat_map(|s| facts.step(*s, &passing));
+            reached = next.chain(reached.iter().copied()).collect();
+        }
+        let jumped = !is_first && !reached.contains(&at);
+        let next = Last {
+            at,
+            revision: m.view.revision,
+            entered_ms,
+            came,
+            facts: facts.known(),
+        };
+        self.last.insert(id, next);
+        if may.contains(&at) || is_first {
+            self.wrong.stop(id);
+            return;
+        }
+        let since_ms = self.wrong.start(id, now_ms).max(m.since_ms);
+        let took_ms = now_ms.saturating_sub(since_ms);
+        let bound_ms = snapshot.grown_ms(PERIODS * snapshot.bounds.period_ms, since_ms);
+        // A late computer may have been where its events of long ago led.
+        let is_late = snapshot.late_ms(id, since_ms) > 0;
+        if (took_ms > bound_ms || jumped && !is_late) && self.wrong.tell_once(id) {
+            let name = |s: usize| flown.machine.state(s).name.clone();
+            let to: Vec<String> = to.iter().map(|s| name(*s)).collect();
+            found.broken("activity", now_ms, Some(id), || {
+                format!(
+                    "is in the state {} by {}, and was in {}; its events lead to {}",
+                    name(at),
+                    by.name(),
+                    name(last_at),
+                    to.join(" or ")
+                )
+            });
+        }
+    }
+
+    /// Who says that a mission is finished of which something is left says that its time is over.
+    fn judge_end(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        m: &PeerSnapshot,
+        may_be_first: bool,
+        found: &mut Findings,
+    ) {
+        if !m.view.finished || m.view.covered.is_full() {
+            return;
+        }
+        let Some(flown) = self.flown(m) else {
+            return;
+        };
+        let facts = self.facts(snapshot, m, &flown);
+        let after_s = flown.machine.ends_after_s();
+        let timer = after_s.map(|s| facts.holds(0, (MissionEvent::Timer, s)));
+        if timer.is_some_and(|holds| holds != Holds::No) {
+            self.ended.insert(flown.sortie);
+        } else if !may_be_first && self.early.insert(m.id) {
+            found.broken("activity", snapshot.now_ms, Some(m.id), || {
+                "says that its mission is finished before its time is over, and not everything is seen"
+                    .to_owned()
+            });
+        }
+    }
+}
+
+/// Whether an event may hold between two snapshots and in neither: a run of one cell is taken and
+/// seen, a word is heard.
+fn is_passing(on: MissionEvent) -> bool {
+    matches!(
+        on,
+        MissionEvent::CellsGiven
+            | MissionEvent::TaskGiven
+            | MissionEvent::RelayGiven
+            | MissionEvent::PeerLost
+            | MissionEvent::NobodyHeard
+    )
+}
+
+/// How long something lasts for a peer that was first seen then: at least, and at most. By its
+/// own clock, whether that runs fast or jumps.
+fn lasts(snapshot: &Snapshot<'_>, id: u16, from_ms: u64) -> (u64, u64) {
+    let now_ms = snapshot.now_ms;
+    let all = [
+        now_ms.saturating_sub(from_ms),
+        snapshot.lived_ms(id, from_ms),
+        snapshot.handicaps.shown_ms(id, from_ms, now_ms),
+    ];
+    let (low_ms, high_ms) = all.iter().fold((u64::MAX, 0), |(low, high), ms| {
+        (low.min(*ms), high.max(*ms))
+    });
+    let slack_ms = 2 * snapshot.bounds.period_ms;
+    let late_ms = snapshot.late_ms(id, from_ms);
+    (
+        low_ms.saturating_sub(slack_ms),
+        high_ms.saturating_add(slack_ms + late_ms),
+    )
+}
+
+/// What a UAV believes and the world knows, beside the diagram that it obeys.
+#[derive(Clone, Copy)]
+struct Facts<'a> {
+    m: &'a PeerSnapshot,
+    flown: &'a Flown,
+    /// Whether everything was seen.
+    full: bool,
+    /// Whether somebody ended this sortie by its timer.
+    told_over: bool,
+    /// For how long it follows this sortie.
+    age_ms: (u64, u64),
+    /// In which state it was, and for how long.
+    here_ms: Option<(usize, (u64, u64))>,
+    /// For how long it may be in a state to which it came since the last snapshot.
+    fresh_ms: u64,
+}
+
+impl Facts<'_> {
+    fn holds(&self, at: usize, (on, after_s): (MissionEvent, u32)) -> Holds {
+        let view = &self.m.view;
+        let claims = view.tasks.iter();
+        let mut claims =
+            claims.filter(|(.., p)| matches!(p, Progress::Committed | Progress::Begun));
+        match on {
+            MissionEvent::OperatorHold => Holds::of(view.order == Order::Hold),
+            MissionEvent::OperatorReturn => Holds::of(view.order == Order::ReturnToBase),
+            MissionEvent::MissionCancelled => Holds::of(self.flown.cancelled),
+            // Of a mission that ends by its timer somebody may be finished with cells left.
+            MissionEvent::MissionComplete if view.finished && self.ends() => {
+                if self.full || view.covered.is_full() {
+                    Holds::Maybe
+                } else {
+                    Holds::No
+                }
+            }
+            MissionEvent::MissionComplete => Holds::of(view.finished),
+            MissionEvent::LowFuel => Holds::of(view.is_fuel_due),
+            MissionEvent::TwinSpeaks => Holds::of(view.is_silent),
+            MissionEvent::Timer => match Holds::past(self.age_ms, after_s) {
+                Holds::No if self.told_over => Holds::Maybe,
+                holds => holds,
+            },
+            MissionEvent::Stayed => {
+                let here = self.here_ms.filter(|(s, _)| *s == at);
+                let fresh = (0, self.here_ms.map_or(u64::MAX, |_| self.fresh_ms));
+                Holds::past(here.map_or(fresh, |(_, ms)| ms), after_s)
+            }
+            MissionEvent::PeerLost => {
+                Holds::of(view.peers.values().any(|(_, s)| *s == Status::Down))
+            }
+            MissionEvent::RelayGiven if view.relays => Holds::Maybe,
+            MissionEvent::TaskGiven if claims.next().is_some() => Holds::Maybe,
+            MissionEvent::RelayGiven | MissionEvent::TaskGiven => Holds::No,
+            MissionEvent::CellsGiven => Holds::of(!view.plan.is_empty()),
+            MissionEvent::NobodyHeard => Holds::of(view.hears_nobody),
+            MissionEvent::Otherwise => Holds::Yes,
+        }
+    }
+
+    fn ends(&self) -> bool {
+        self.flown.machine.ends_after_s().is_some()
+    }
+
+    /// To which states one look may lead from there.
+    fn step(&self, at: usize, heed: &dyn Fn((MissionEvent, u32), Holds) -> Holds) -> Vec<usize> {
+        let mut to = Vec::new();
+        for way in self.flown.machine.ways(at) {
+            let key = (way.on, way.after_s);
+            match heed(key, self.holds(at, key)) {
+                Holds::Yes => {
+                    to.push(way.to);
+                    return to;
+                }
+                Holds::Maybe => to.push(way.to),
+                Holds::No => {}
+            }
+        }
+        to.push(at);
+        to
+    }
+
+    /// What is known of all events.
+    fn known(&self) -> BTreeMap<(MissionEvent, u32), bool> {
+        let machine = &self.flown.machine;
+        let ways =
+            (0..machine.states().len()).flat_map(|s| machine.ways(s).iter().map(move |w| (s, w)));
+        let known = ways.filter(|(_, w)| !w.on.is_timed()).map(|(s, w)| {
+            let key = (w.on, w.after_s);
+            (key, self.holds(s, key))
+        });
+        known
+            .filter(|(_, h)| *h != Holds::Maybe)
+            .map(|(key, h)| (key, h == Holds::Yes))
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Story, speaking};
+    use super::*;
+    use crate::world::fixture;
+    use skein_peer::Beliefs;
+    use skein_peer::Mission;
+    use std::sync::Arc;
+
+    fn mission() -> Arc<Mission> {
+        fixture::square(1).mission
+    }
+
+    /// Whether the rule is broken when peer 1 says this after each second.
+    fn broken(seconds: u64, view: impl Fn(u64) -> Beliefs) -> bool {
+        let (mut story, mut found) = (Story::new(300), Findings::new(1));
+        let mut check = ActivityCheck::default();
+        check.on_mission(&mission());
+        for t in 0..seconds {
+            story.snapshot(t * 1000, &[(1, view(t))], |s| {
+                check.on_snapshot(s, &mut found);
+            });
+        }
+        found.counts.contains_key("activity")
+    }
+
+    /// A state of the default diagram.
+    fn in_state(name: &str, view: Beliefs) -> Beliefs {
+        let machine = mission().machine().unwrap();
+        let at = machine.states().iter().position(|s| s.name == name);
+        Beliefs {
+            stage: at.map(|at| (at, MissionEvent::Otherwise)),
+            ..view
+        }
+    }
+
+    fn flying() -> Beliefs {
+        Beliefs {
+            plan: vec![1, 2],
+            ..speaking()
+        }
+    }
+
+    #[test]
+    fn who_does_not_what_its_diagram_says_is_found() {
+        assert!(!broken(20, |_| in_state("section", flying())));
+        assert!(!broken(20, |_| in_state("wait", speaking())));
+        // It has cells, and waits.
+        assert!(broken(20, |_| in_state("wait", flying())));
+        assert!(!broken(3, |_| in_state("wait", flying())));
+        let due = || Beliefs {
+            is_fuel_due: true,
+            ..flying()
+        };
+        assert!(broken(20, |_| in_state("section", due())));
+        assert!(!broken(20, |_| in_state("home", due())));
+        let told = || Beliefs {
+            order: Order::Hold,
+            is_fuel_due: true,
+            ..flying()
+        };
+        assert!(broken(20, |_| in_state("home", told())));
+        assert!(!broken(20, |_| in_state("hold", told())));
+    }
+
+    #[test]
+    fn a_state_that_no_event_led_to_is_found_at_once() {
+        let jumps = |t| match t {
+            9.. => in_state("recalled", flying()),
+            _ => in_state("section", flying()),
+        };
+        assert!(broken(10, jumps));
+        assert!(!broken(9, jumps));
+        // Cells may come and go between two snapshots, and an event may end with one.
+        let ends = |t| match t {
+            9 => in_state("section", speaking()),
+            7 | 10.. => in_state("wait", speaking()),
+            _ => in_state("section", flying()),
+        };
+        assert!(!broken(30, ends));
+    }
+
+    #[test]
+    fn who_is_finished_with_cells_left_is_found_where_no_timer_ends_the_mission() {
+        let finished = || Beliefs {
+            finished: true,
+            ..speaking()
+        };
+        assert!(broken(2, |_| in_state("home", finished())));
+        let all = || {
+            let mut covered = skein_peer::cells::CellSet::new(4);
+            (0..4).for_each(|c| {
+                covered.insert(c);
+            });
+            Beliefs {
+                covered,
+                ..finished()
+            }
+        };
+        assert!(!broken(20, |_| in_state("home", all())));
+    }
+}

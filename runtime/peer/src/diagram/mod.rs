@@ -1,0 +1,468 @@
+//! Missions as transition diagrams (D2.7 §1.2.2, §1.2.3): states, each with a behaviour and the
+//! goal that it stands for, and transitions by named events. A peer obeys the diagram of its
+//! mission, and a picture is drawn from the same data. Which events hold now is the
+//! cooperation manager's; whether a diagram may be flown is [`check`]'s.
+//!
+//! | the diagram | a look at the events that hold |
+//! |---|---|
+//! | a transition from this state or from any, its event holds, and none of those before it by priority does | its state; the same state where it leads there |
+//! | none of them holds | nothing changes |
+//!
+//! # Guarantees
+//! A look takes one transition at most, and equal events give equal states. In a diagram that
+//! was checked, fuel that is due and an operator who says return lead home from each state, by
+//! one look.
+//!
+//! # Example
+//! ```
+//! use skein_peer::diagram::{Diagram, Machine, MissionEvent};
+//!
+//! let machine = Machine::new(&Diagram::coverage()).unwrap();
+//! let (at, by) = machine.look(machine.start(), &|on, _| on == MissionEvent::LowFuel).unwrap();
+//! assert_eq!((machine.state(at).name.as_str(), by), ("home", MissionEvent::LowFuel));
+//! ```
+
+pub mod check;
+mod coverage;
+
+pub use check::DiagramError;
+
+use serde::{Deserialize, Serialize};
+use skein_geometry::hash::Fnv;
+
+/// Most states of a diagram: a person takes in no more in one picture.
+pub const STATES_MAX: usize = 16;
+
+/// Most transitions of a diagram: four a state.
+pub const TRANSITIONS_MAX: usize = 64;
+
+/// Longest name of a diagram or a state, bytes.
+pub const NAME_MAX_BYTES: usize = 24;
+
+/// Longest time that an event may count, seconds: a day.
+pub const AFTER_MAX_S: u32 = 86_400;
+
+/// What leads from one state to another. Each of them holds or does not, at any moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MissionEvent {
+    /// The operator said hold.
+    OperatorHold,
+    /// The operator said return to base.
+    OperatorReturn,
+    /// The operator ended the mission.
+    MissionCancelled,
+    /// Everything is seen, and no task is open that somebody can do.
+    MissionComplete,
+    /// Its fuel is due.
+    LowFuel,
+    /// Another process speaks under its id.
+    TwinSpeaks,
+    /// So long ago it began this mission.
+    Timer,
+    /// So long it has been in this state.
+    Stayed,
+    /// It believes a peer of its fleet to be down.
+    PeerLost,
+    /// It was given a relay position, and its circle is planned.
+    RelayGiven,
+    /// It was given a task, and its flight is planned.
+    TaskGiven,
+    /// Its plan has cells.
+    CellsGiven,
+    /// It knew many, and hears nobody.
+    NobodyHeard,
+    /// Always.
+    Otherwise,
+}
+
+impl MissionEvent {
+    /// All, in the order of the default diagram.
+    pub const ALL: [Self; 14] = [
+        Self::OperatorHold,
+        Self::OperatorReturn,
+        Self::MissionCancelled,
+        Self::MissionComplete,
+        Self::LowFuel,
+        Self::TwinSpeaks,
+        Self::Timer,
+        Self::Stayed,
+        Self::PeerLost,
+        Self::RelayGiven,
+        Self::TaskGiven,
+        Self::CellsGiven,
+        Self::NobodyHeard,
+        Self::Otherwise,
+    ];
+
+    /// Its name in a file.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OperatorHold => "operator_hold",
+            Self::OperatorReturn => "operator_return",
+            Self::MissionCancelled => "mission_cancelled",
+            Self::MissionComplete => "mission_complete",
+            Self::LowFuel => "low_fuel",
+            Self::TwinSpeaks => "twin_speaks",
+            Self::Timer => "timer",
+            Self::Stayed => "stayed",
+            Self::PeerLost => "peer_lost",
+            Self::RelayGiven => "relay_given",
+            Self::TaskGiven => "task_given",
+            Self::CellsGiven => "cells_given",
+            Self::NobodyHeard => "nobody_heard",
+            Self::Otherwise => "otherwise",
+        }
+    }
+
+    /// Whether it counts seconds, which its transition says.
+    #[must_use]
+    pub fn is_timed(self) -> bool {
+        matches!(self, Self::Timer | Self::Stayed)
+    }
+}
+
+/// What a behaviour is for (D2.7 §1.2.2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Purpose {
+    /// Points or a way are visited, once, as soon as possible.
+    Traveling,
+    /// Points or a closed way are visited again and again, so that all are seen often.
+    Watching,
+    /// A point is kept or followed, for as long as the state lasts.
+    Tracking,
+}
+
+impl Purpose {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Traveling, Self::Watching, Self::Tracking];
+
+    /// Its name in a file.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Traveling => "traveling",
+            Self::Watching => "watching",
+            Self::Tracking => "tracking",
+        }
+    }
+}
+
+/// Of what a behaviour is made (D2.7 §1.2.2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Action {
+    /// Flying from one place to another.
+    Displacing,
+    /// Circling at a place.
+    Loitering,
+}
+
+impl Action {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Displacing, Self::Loitering];
+
+    /// Its name in a file.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Displacing => "displacing",
+            Self::Loitering => "loitering",
+        }
+    }
+}
+
+/// A behaviour as data.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Behaviour {
+    /// What it is for.
+    pub purpose: Purpose,
+    /// Dimension of what is flown: 0 a point or points, 1 a line, 2 an area, 3 a volume; that of
+    /// what the mission asks to see where none is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dimension: Option<u8>,
+    /// Whether it ends where it began.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub closed: bool,
+    /// Whether it goes on for as long as its state lasts; else it is done once.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub endless: bool,
+    /// Of what it is made, in this order.
+    pub actions: Vec<Action>,
+}
+
+/// The goal that a state stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StateGoal {
+    /// Loiter where it is.
+    Hold,
+    /// Fly the cells of its plan, then loiter.
+    Section,
+    /// Fly to its relay position and circle there.
+    Relay,
+    /// Fly its task, then the cells of its plan.
+    Task,
+    /// Fly to the base and loiter there.
+    Home,
+}
+
+impl StateGoal {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Hold,
+        Self::Section,
+        Self::Relay,
+        Self::Task,
+        Self::Home,
+    ];
+
+    /// Its name in a file.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hold => "hold",
+            Self::Section => "section",
+            Self::Relay => "relay",
+            Self::Task => "task",
+            Self::Home => "home",
+        }
+    }
+
+    /// What a UAV does, for a person.
+    #[must_use]
+    pub fn sentence(self) -> &'static str {
+        match self {
+            Self::Hold => "loiters where it is",
+            Self::Section => "flies its section",
+            Self::Relay => "holds a relay position that it was given, or flies to it",
+            Self::Task => "flies to a task that it was given, between two cells of its section",
+            Self::Home => "flies home",
+        }
+    }
+}
+
+/// What becomes of the work of a UAV that is in a state, beside what orders and fuel leave it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Part {
+    /// It takes part in planning.
+    #[default]
+    Takes,
+    /// It takes no part, and its plan stays listed.
+    Keeps,
+    /// It takes no part, and lets its plan go: others fly it.
+    Releases,
+    /// The same, and the mission is over for it.
+    Ends,
+}
+
+impl Part {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Takes, Self::Keeps, Self::Releases, Self::Ends];
+
+    /// Its name in a file.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Takes => "takes",
+            Self::Keeps => "keeps",
+            Self::Releases => "releases",
+            Self::Ends => "ends",
+        }
+    }
+
+    /// Whether the plan is let go.
+    #[must_use]
+    pub fn lets_go(self) -> bool {
+        matches!(self, Self::Releases | Self::Ends)
+    }
+
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// A state of a mission.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct State {
+    /// What it is called.
+    pub name: String,
+    /// What is done in it.
+    pub behaviour: Behaviour,
+    /// By which goal.
+    pub goal: StateGoal,
+    /// What becomes of its work.
+    #[serde(default, skip_serializing_if = "Part::is_default")]
+    pub part: Part,
+}
+
+/// A way from one state to another.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Transition {
+    /// From which state; from any where none is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
+    /// When this holds.
+    pub on: MissionEvent,
+    /// After so many seconds, of an event that counts them; 0 of all others.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub after_s: u32,
+    /// To which state.
+    pub to: String,
+    /// Of several events that hold, the one of the lowest number counts.
+    pub priority: u8,
+}
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "the signature that serde asks for"
+)]
+fn is_zero(n: &u32) -> bool {
+    *n == 0
+}
+
+/// A mission as a transition diagram. It begins in its first state.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Diagram {
+    /// What it is called.
+    pub name: String,
+    /// Its states, at most [`STATES_MAX`].
+    pub states: Vec<State>,
+    /// Its transitions, at most [`TRANSITIONS_MAX`].
+    pub transitions: Vec<Transition>,
+}
+
+impl Diagram {
+    /// The diagram of a mission that brings none.
+    #[must_use]
+    pub fn coverage() -> Self {
+        coverage::diagram()
+    }
+
+    /// Folds it into the hash of a mission.
+    pub(crate) fn hash(&self, h: &mut Fnv) {
+        let text = |h: &mut Fnv, text: &str| {
+            h.write_i64(i64::try_from(text.len()).unwrap_or(i64::MAX));
+            text.bytes().for_each(|b| h.write_i64(i64::from(b)));
+        };
+        let count = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
+        text(h, &self.name);
+        h.write_i64(count(self.states.len()));
+        for state in &self.states {
+            let Behaviour {
+                purpose,
+                dimension,
+                closed,
+                endless,
+                actions,
+            } = &state.behaviour;
+            text(h, &state.name);
+            text(h, purpose.name());
+            h.write_i64(dimension.map_or(-1, i64::from));
+            h.write_i64(i64::from(*closed));
+            h.write_i64(i64::from(*endless));
+            h.write_i64(count(actions.len()));
+            actions.iter().for_each(|a| text(h, a.name()));
+            text(h, state.goal.name());
+            text(h, state.part.name());
+        }
+        h.write_i64(count(self.transitions.len()));
+        for t in &self.transitions {
+            text(h, t.from.as_deref().unwrap_or_default());
+            text(h, t.on.name());
+            h.write_i64(i64::from(t.after_s));
+            text(h, &t.to);
+            h.write_i64(i64::from(t.priority));
+        }
+    }
+}
+
+/// One transition of a state, by number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Way {
+    /// When this holds.
+    pub on: MissionEvent,
+    /// After so many seconds, where the event counts them.
+    pub after_s: u32,
+    /// To the state of this number.
+    pub to: usize,
+    /// Lower numbers come first.
+    pub priority: u8,
+}
+
+/// A diagram that was checked, ready to be obeyed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Machine {
+    states: Vec<State>,
+    /// Of each state what leads out of it, by priority.
+    ways: Vec<Vec<Way>>,
+}
+
+impl Machine {
+    /// # Errors
+    /// [`DiagramError`] says what of the diagram cannot be flown, where, and what would help.
+    pub fn new(diagram: &Diagram) -> Result<Self, DiagramError> {
+        let ways = check::ways(diagram)?;
+        let machine = Self {
+            states: diagram.states.clone(),
+            ways,
+        };
+        check::flown(&machine)?;
+        Ok(machine)
+    }
+
+    /// The state in which a mission begins.
+    #[must_use]
+    pub fn start(&self) -> usize {
+        0
+    }
+
+    /// All states, by number.
+    #[must_use]
+    pub fn states(&self) -> &[State] {
+        &self.states
+    }
+
+    /// A state by its number.
+    ///
+    /// # Panics
+    /// Where there is none of this number.
+    #[must_use]
+    pub fn state(&self, at: usize) -> &State {
+        &self.states[at]
+    }
+
+    /// What leads out of a state, by priority.
+    ///
+    /// # Panics
+    /// Where there is none of this number.
+    #[must_use]
+    pub fn ways(&self, at: usize) -> &[Way] {
+        &self.ways[at]
+    }
+
+    /// After how many seconds the mission ends, whatever was seen; none where it ends by what was
+    /// seen alone.
+    #[must_use]
+    pub fn ends_after_s(&self) -> Option<u32> {
+        let ends = |to: usize| self.state(to).part == Part::Ends;
+        let all = self.ways.iter().flatten();
+        let timers = all.filter(|w| w.on == MissionEvent::Timer && ends(w.to));
+        timers.map(|w| w.after_s).min()
+    }
+
+    /// Which state follows, and by which event; none where no event holds that leads anywhere.
+    /// `holds` says of an event, with the seconds that it counts, whether it holds.
+    #[must_use]
+    pub fn look(
+        &self,
+        at: usize,
+        holds: &dyn Fn(MissionEvent, u32) -> bool,
+    ) -> Option<(usize, MissionEvent)> {
+        let taken = self.ways(at).iter().find(|w| holds(w.on, w.after_s));
+        taken.map(|w| (w.to, w.on))
+    }
+}

@@ -1,0 +1,181 @@
+//! Where in the diagram of its mission a peer is (D2.7 §1.2.3): the events that hold now lead to
+//! a state, and the state says what becomes of its work and by which goal it flies. The diagram
+//! is [`crate::diagram`]'s.
+//!
+//! | event | holds while |
+//! |---|---|
+//! | operator_hold, operator_return | that is the standing order to it |
+//! | mission_cancelled | the operator ended the mission |
+//! | mission_complete | all is seen, and no task is open that somebody can do |
+//! | low_fuel | its fuel is due (`fuel.rs`) |
+//! | twin_speaks | another process has silenced it |
+//! | timer | it follows this sortie for so long in this life, or of a timer that ends the mission: another peer of it said finished |
+//! | stayed | it is in this state for so long |
+//! | peer_lost | it believes a peer to be down |
+//! | relay_given | it holds a relay position whose circle is planned |
+//! | task_given | it holds a task whose flight is planned |
+//! | cells_given | its plan has cells |
+//! | nobody_heard | it knew many, and hears nobody |
+//! | otherwise | always |
+
+use crate::diagram::{Machine, MissionEvent, Part, State, StateGoal};
+use crate::input::Time;
+use crate::mission::Mission;
+use crate::mission_state::MissionState;
+use crate::protocol::runs::legs_of;
+use crate::wire::message::Order;
+use skein_behaviors::Goal;
+use std::sync::Arc;
+
+/// In which state a peer is, and since when.
+#[derive(Clone, Debug)]
+pub(crate) struct Stage {
+    machine: Arc<Machine>,
+    at: usize,
+    by: MissionEvent,
+    /// When it came there; none before it looked.
+    since: Option<Time>,
+    /// When it began this sortie; none before it looked.
+    began: Option<Time>,
+    /// Whether a state was reached that ends the mission.
+    ended: bool,
+    /// Whether somebody said that the time of this mission is over.
+    told_over: bool,
+}
+
+impl Stage {
+    /// The first state of a mission; or the present one, where the mission before was the same
+    /// sortie by the same diagram, as laps are.
+    ///
+    /// # Panics
+    /// Where the diagram cannot be flown: then the mission has no geometry.
+    pub fn begun(mission: &Mission, old: Option<(&Mission, &Self)>) -> Self {
+        let same =
+            old.filter(|(m, _)| (m.sortie, &m.diagram) == (mission.sortie, &mission.diagram));
+        if let Some((before, stage)) = same {
+            let is_edited = mission.edit() != before.edit();
+            return Self {
+                // What was said of a patrol before it was changed says nothing of it now.
+                told_over: stage.told_over && !is_edited,
+                ended: stage.ended && !is_edited,
+                ..stage.clone()
+            };
+        }
+        let machine = mission.machine();
+        let machine = machine.expect("a mission whose diagram cannot be flown has no geometry");
+        let sortie = old.filter(|(m, _)| m.sortie == mission.sortie);
+        Self {
+            at: machine.start(),
+            machine: Arc::new(machine),
+            by: MissionEvent::Otherwise,
+            since: None,
+            began: sortie.and_then(|(_, stage)| stage.began),
+            ended: false,
+            told_over: false,
+        }
+    }
+
+    pub fn state(&self) -> &State {
+        self.machine.state(self.at)
+    }
+
+    /// The number of its state.
+    pub fn at(&self) -> usize {
+        self.at
+    }
+
+    /// The event that led to it.
+    pub fn by(&self) -> MissionEvent {
+        self.by
+    }
+
+    /// For how long it has been in it, milliseconds.
+    pub fn state_ms(&self, now: Time) -> u64 {
+        self.since.map_or(0, |t| now.since_ms(t))
+    }
+
+    /// Whether it takes part in planning, as far as its state says.
+    pub fn takes_part(&self) -> bool {
+        self.state().part == Part::Takes && !self.ended
+    }
+
+    /// Whether its plan is let go.
+    pub fn lets_go(&self) -> bool {
+        self.state().part.lets_go() || self.ended
+    }
+
+    /// Whether a state was reached that ends the mission.
+    pub fn ended(&self) -> bool {
+        self.ended
+    }
+
+    /// Somebody who follows this mission says that it is finished: where its time ends it, that
+    /// is over for all.
+    pub fn hear_finished(&mut self) {
+        self.told_over |= self.machine.ends_after_s().is_some();
+    }
+}
+
+/// Whether so many seconds have gone by since then.
+fn is_past(since: Option<Time>, after_s: u32, now: Time) -> bool {
+    since.is_some_and(|t| now.since_ms(t) >= 1000 * u64::from(after_s))
+}
+
+impl MissionState {
+    /// Looks at the events that hold: one transition at most is taken.
+    pub fn look(&mut self, now: Time, order: Order) {
+        self.stage.began.get_or_insert(now);
+        self.stage.since.get_or_insert(now);
+        let holds = |on, after_s| self.holds(on, after_s, order, now);
+        let Some((to, by)) = self.stage.machine.look(self.stage.at, &holds) else {
+            return;
+        };
+        let stage = &mut self.stage;
+        if stage.at != to {
+            stage.since = Some(now);
+        }
+        (stage.at, stage.by) = (to, by);
+        stage.ended |= stage.state().part == Part::Ends;
+    }
+
+    fn holds(&self, on: MissionEvent, after_s: u32, order: Order, now: Time) -> bool {
+        let stage = &self.stage;
+        match on {
+            MissionEvent::OperatorHold => order == Order::Hold,
+            MissionEvent::OperatorReturn => order == Order::ReturnToBase,
+            MissionEvent::MissionCancelled => self.geometry.mission.cancelled,
+            MissionEvent::MissionComplete => self.complete,
+            MissionEvent::LowFuel => self.fuel.is_due(),
+            MissionEvent::TwinSpeaks => self.silent,
+            MissionEvent::Timer => {
+                let ends_after_s = stage.machine.ends_after_s();
+                let told = stage.told_over && ends_after_s >= Some(after_s);
+                told || is_past(stage.began, after_s, now)
+            }
+            MissionEvent::Stayed => is_past(stage.since, after_s, now),
+            MissionEvent::PeerLost => self.lost,
+            MissionEvent::RelayGiven => self.relay_circle().is_some(),
+            MissionEvent::TaskGiven => self.errand.is_some(),
+            MissionEvent::CellsGiven => !self.negotiation.sections.plan().is_empty(),
+            // Where the ground station is and whoever is finished, somebody is heard.
+            MissionEvent::NobodyHeard => self.astray,
+            MissionEvent::Otherwise => true,
+        }
+    }
+
+    /// Where the peer flies in its state.
+    pub fn goal_of_state(&self) -> Goal {
+        let sections = &self.negotiation.sections;
+        let legs = || legs_of(sections.plan(), sections.cells());
+        match self.stage.state().goal {
+            StateGoal::Hold => Goal::Hold,
+            StateGoal::Section => Goal::Legs(legs()),
+            StateGoal::Relay => self.relay_circle().map_or(Goal::Hold, Goal::Circle),
+            StateGoal::Task => match &self.errand {
+                Some(flight) => Goal::Detour(flight.clone(), legs()),
+                None => Goal::Legs(legs()),
+            },
+            StateGoal::Home => Goal::Point(self.geometry.mission.base_m()),
+        }
+    }
+}

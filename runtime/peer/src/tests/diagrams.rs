@@ -1,0 +1,252 @@
+//! Missions by diagrams of their own: what follows when all is seen, when the time is over, when
+//! a peer is lost.
+
+use super::{record, with_operator};
+use crate::diagram::{
+    Action, Behaviour, Diagram, MissionEvent, Part, Purpose, State, StateGoal, Transition,
+};
+use crate::input::Command;
+use crate::mission::Mission;
+use crate::testing::{GROUND_STATION, Harness, mission};
+use crate::why::{Reason, Work};
+use crate::wire::codec::Body;
+use crate::wire::message::Finished;
+use crate::{Input, Report};
+use std::sync::Arc;
+
+/// The default diagram with one more state, reached from any on this event, which counts next
+/// after a mission that was cancelled.
+fn with(name: &str, goal: StateGoal, part: Part, (on, after_s): (MissionEvent, u32)) -> Diagram {
+    let mut diagram = Diagram::coverage();
+    let (purpose, actions) = match goal {
+        StateGoal::Home => (
+            Purpose::Traveling,
+            vec![Action::Displacing, Action::Loitering],
+        ),
+        _ => (Purpose::Tracking, vec![Action::Loitering]),
+    };
+    let keeps = purpose == Purpose::Tracking;
+    diagram.states.push(State {
+        name: name.into(),
+        behaviour: Behaviour {
+            purpose,
+            dimension: Some(if keeps { 0 } else { 1 }),
+            closed: keeps,
+            endless: keeps,
+            actions,
+        },
+        goal,
+        part,
+    });
+    for t in &mut diagram.transitions {
+        t.priority *= 10;
+    }
+    diagram.transitions.push(Transition {
+        from: None,
+        on,
+        after_s,
+        to: name.into(),
+        // Before all is seen, and where it leads elsewhere than home after the fuel.
+        priority: if keeps { 65 } else { 35 },
+    });
+    diagram
+}
+
+/// The same, watching: for a mission of several laps.
+fn watching(mut diagram: Diagram) -> Diagram {
+    for state in &mut diagram.states {
+        if state.goal == StateGoal::Section {
+            state.behaviour.purpose = Purpose::Watching;
+            (state.behaviour.closed, state.behaviour.endless) = (true, true);
+        }
+    }
+    diagram
+}
+
+fn flown_by(diagram: Diagram, laps: u16) -> Mission {
+    Mission {
+        further_laps: laps - 1,
+        diagram: Some(Arc::new(diagram)),
+        ..mission(1, 6, 4)
+    }
+}
+
+fn patrol(after_s: u32) -> Mission {
+    let over = (MissionEvent::Timer, after_s);
+    let over = with("over", StateGoal::Home, Part::Ends, over);
+    flown_by(watching(over), 100)
+}
+
+/// What a peer says whose mission is finished.
+fn says_finished() -> Vec<u8> {
+    record(9, 1, 1, 0, &Body::Finished(Finished { revision: 1 }))
+}
+
+fn work(h: &Harness, id: u16) -> Work {
+    h.why(id).work.unwrap()
+}
+
+#[test]
+fn a_mission_ends_by_its_timer_whatever_is_seen() {
+    let mut h = with_operator(2, patrol(70));
+    h.run_s(65);
+    assert_eq!(work(&h, 1).state, "section");
+    assert!(!h.beliefs(1).finished && !h.beliefs(1).plan.is_empty());
+    assert!(h.run_until(25, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+    h.run_s(2);
+    for id in [1, 2] {
+        let (view, work) = (h.beliefs(id), work(&h, id));
+        assert!(view.plan.is_empty() && !view.able, "{view:?}");
+        assert_eq!(
+            (work.state.as_str(), work.reason),
+            ("over", Reason::TimeIsOver)
+        );
+        let finished = h.seat(id).reports.iter();
+        let finished = finished.filter(|(_, r)| matches!(r, Report::Finished { .. }));
+        assert_eq!(finished.count(), 1);
+    }
+    let told = h.why(1).to_string();
+    assert!(
+        told.contains("flies home: the time of its mission is over"),
+        "{told}"
+    );
+    assert!(
+        told.contains("state     over of the diagram coverage, for"),
+        "{told}"
+    );
+    let away = |h: &Harness| {
+        let at = h.pose(1);
+        (at.east_m + 60.0).hypot(at.north_m + 60.0)
+    };
+    assert!(h.run_until(120, |h| away(h) < 60.0), "{}", away(&h));
+}
+
+#[test]
+fn who_comes_back_hears_that_the_time_is_over() {
+    let mut h = with_operator(2, patrol(70));
+    h.run_s(85);
+    assert!(h.beliefs(1).finished);
+    h.stop(2);
+    h.run_s(2);
+    h.start(2);
+    assert!(
+        h.run_until(30, |h| h.beliefs(2).finished),
+        "its own timer is at 0"
+    );
+    assert_eq!(work(&h, 2).state, "over");
+}
+
+/// Without a timer that ends the mission, who says finished says what it saw.
+#[test]
+fn without_a_timer_nobody_ends_a_mission_for_another() {
+    let mut h = with_operator(1, mission(1, 6, 4));
+    h.run_s(20);
+    h.inject(1, says_finished());
+    h.run_s(5);
+    assert!(!h.beliefs(1).finished);
+    let mut h = with_operator(1, patrol(700));
+    h.run_s(20);
+    h.inject(1, says_finished());
+    assert!(h.run_until(5, |h| h.beliefs(1).finished));
+}
+
+#[test]
+fn all_stay_where_they_are_when_all_is_seen_if_the_mission_says_so() {
+    let mut diagram = with(
+        "stay",
+        StateGoal::Hold,
+        Part::Takes,
+        (MissionEvent::MissionComplete, 0),
+    );
+    diagram
+        .transitions
+        .retain(|t| t.on != MissionEvent::MissionComplete || t.to == "stay");
+    let mut h = with_operator(1, flown_by(diagram, 1));
+    assert!(h.run_until(300, |h| h.beliefs(1).finished));
+    h.run_s(10);
+    let at = h.pose(1);
+    h.run_s(60);
+    let moved_m = (h.pose(1).east_m - at.east_m).hypot(h.pose(1).north_m - at.north_m);
+    assert!(moved_m < 60.0, "{moved_m} m");
+    assert_eq!(
+        work(&h, 1).does,
+        "loiters where it is: everything is covered"
+    );
+    // The fuel leads home all the same.
+    h.seat(1).fuel_s = 70.0;
+    assert!(h.run_until(5, |h| work(h, 1).reason == Reason::FuelIsDue));
+    assert_eq!(work(&h, 1).state, "home");
+}
+
+#[test]
+fn who_loses_a_peer_comes_home_until_it_is_back_if_the_mission_says_so() {
+    let lost = (MissionEvent::PeerLost, 0);
+    let diagram = with("gather", StateGoal::Home, Part::Releases, lost);
+    let mut h = with_operator(3, flown_by(diagram, 1));
+    h.run_s(30);
+    assert_eq!(work(&h, 1).state, "section");
+    h.isolate(3, true);
+    assert!(h.run_until(60, |h| work(h, 1).state == "gather"));
+    assert_eq!(work(&h, 1).reason, Reason::PeerLost);
+    assert!(h.run_until(3, |h| h.beliefs(1).plan.is_empty() && !h.beliefs(1).able));
+    h.isolate(3, false);
+    assert!(h.run_until(60, |h| work(h, 1).state == "section"));
+}
+
+#[test]
+fn a_mission_whose_diagram_cannot_be_flown_leaves_the_old_one_in_force() {
+    let mut h = with_operator(1, mission(1, 6, 4));
+    h.run_s(10);
+    let mut diagram = Diagram::coverage();
+    diagram
+        .transitions
+        .retain(|t| t.on != MissionEvent::LowFuel);
+    let wrong = Mission {
+        diagram: Some(Arc::new(diagram)),
+        ..mission(2, 6, 4)
+    };
+    h.feed(
+        GROUND_STATION,
+        Input::Command(Command::Mission(Arc::new(wrong))),
+    );
+    h.run_s(10);
+    assert_eq!(h.beliefs(1).revision, 1);
+    let alarms = h.alarms(1);
+    assert!(alarms.iter().any(|a| a.contains("low_fuel")), "{alarms:?}");
+}
+
+/// Which states a diagram has is part of what a mission is.
+#[test]
+fn a_diagram_travels_with_its_mission_and_counts_in_its_hash() {
+    let plain = mission(1, 6, 4);
+    let same = flown_by(Diagram::coverage(), 1);
+    assert_ne!(plain.content_hash(), same.content_hash());
+    let mut renamed = Diagram::coverage();
+    renamed.states[0].part = Part::Keeps;
+    assert_ne!(same.content_hash(), flown_by(renamed, 1).content_hash());
+    let mut h = with_operator(1, mission(1, 6, 4));
+    h.run_s(5);
+    let later = Mission {
+        revision: 2,
+        ..same
+    };
+    let command = Command::Mission(Arc::new(later.clone()));
+    h.feed(GROUND_STATION, Input::Command(command));
+    assert!(h.run_until(20, |h| h.beliefs(1).revision == 2));
+    assert_eq!(h.newest_mission(1).as_deref(), Some(&later));
+}
+
+#[test]
+fn a_diagram_that_asks_for_something_else_than_the_mission_is_refused() {
+    let once = flown_by(Diagram::coverage(), 3).machine().unwrap_err();
+    assert!(once.problem.contains("flown once"), "{once}");
+    let watch = flown_by(watching(Diagram::coverage()), 1)
+        .machine()
+        .unwrap_err();
+    assert!(watch.problem.contains("ask for laps"), "{watch}");
+    let mut lines = Diagram::coverage();
+    lines.states[1].behaviour.dimension = Some(1);
+    let lines = flown_by(lines, 1).machine().unwrap_err();
+    assert_eq!(lines.place, "states[1].behaviour.dimension");
+    assert!(mission(1, 6, 4).machine().is_ok());
+}
