@@ -108,6 +108,11 @@ impl LiveWorld {
         self.links.compute(&self.world, &self.faults);
     }
 
+    /// A mission ended by its time; see [`World::end_laps`].
+    pub fn end_laps(&mut self) -> bool {
+        self.world.end_laps()
+    }
+
     /// A revision of the mission is judged by from now on.
     pub fn revise(&mut self, survey: Arc<Survey>, geometry: &MissionGeometry) {
         self.world.revise(survey, geometry);

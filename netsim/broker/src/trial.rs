@@ -177,6 +177,8 @@ struct Trial<'a> {
     all_finished_ms: Option<u64>,
     /// Whether the operator ended the mission that is judged.
     cancelled: bool,
+    /// Whether the mission that is judged ends by its time.
+    timed: bool,
     /// Transmissions that reached a node since it was last looked at, and late ones.
     transmissions: (u64, u64),
     /// Setpoints that arrived.
@@ -251,6 +253,7 @@ impl<'a> Trial<'a> {
             progress_due_ms: 0,
             all_finished_ms: None,
             cancelled: false,
+            timed: geometry.mission.ends_after_s().is_some(),
             transmissions: (0, 0),
             setpoints: 0,
             starved: 0,
@@ -403,6 +406,7 @@ impl<'a> Trial<'a> {
                 self.observed.tell(|o| o.given(&geometry));
                 self.account.revised();
                 self.cancelled = mission.cancelled;
+                self.timed = mission.ends_after_s().is_some();
                 // Whoever believed the last one finished has not begun this one.
                 self.all_finished_ms = None;
                 let mut text = format!("the operator gives revision {}", mission.revision);
@@ -464,8 +468,7 @@ impl<'a> Trial<'a> {
             self.fact(&fact);
         }
         if self.world.judge().complete() {
-            self.account.covered(self.now_ms);
-            self.observed.tell(|o| o.all_covered(self.now_ms));
+            self.all_covered();
         }
         let components = self.world.components(|id| self.peers.on_air(id));
         self.observed
@@ -545,9 +548,19 @@ impl<'a> Trial<'a> {
         }
     }
 
+    /// All of the mission is seen, or its time is over.
+    fn all_covered(&mut self) {
+        self.account.covered(self.now_ms);
+        self.observed.tell(|o| o.all_covered(self.now_ms));
+    }
+
     fn is_over(&mut self) -> bool {
         let live = self.account.live_uavs();
         let finished = live.iter().all(|id| self.account.is_through(*id));
+        let open = self.account.covered_ms().is_none();
+        if self.timed && open && finished && !live.is_empty() && self.world.end_laps() {
+            self.all_covered();
+        }
         self.all_finished_ms = finished.then(|| self.all_finished_ms.unwrap_or(self.now_ms));
         let longest_ms = if self.cancelled {
             CANCELLED_IDLE_MS
