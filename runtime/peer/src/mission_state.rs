@@ -94,6 +94,8 @@ impl ClaimsWritten {
 pub(crate) struct RelayPosition {
     /// The circle that is flown there, once it is planned.
     pub circle: Option<Segment>,
+    /// Of a target to follow, once it is near: how far from it the UAV stays, metres.
+    pub follow: Option<f64>,
 }
 
 /// What a peer has once it holds a mission and its geometry.
@@ -171,7 +173,7 @@ impl MissionState {
     pub fn activity(&self) -> Activity {
         match &self.goal {
             Some(Goal::Legs(_) | Goal::Given(_) | Goal::Detour(..)) => Activity::Covering,
-            Some(Goal::Hold | Goal::Circle(_)) => Activity::Holding,
+            Some(Goal::Hold | Goal::Circle(_) | Goal::Follow(_)) => Activity::Holding,
             Some(Goal::Point(_)) => Activity::Returning,
             None => Activity::Waiting,
         }
@@ -561,9 +563,12 @@ impl MissionState {
         }
     }
 
-    /// The circle that is flown as a relay position, once it is planned.
-    pub fn relay_circle(&self) -> Option<Segment> {
-        self.relay.as_ref().and_then(|r| r.circle)
+    /// What is flown to hold what it was given, once that is known: after a target, else the
+    /// circle that is planned.
+    pub fn held_goal(&self) -> Option<Goal> {
+        let relay = self.relay?;
+        let follow = relay.follow.map(Goal::Follow);
+        follow.or(relay.circle.map(Goal::Circle))
     }
 
     /// Gives the executive its goal, if that changed.

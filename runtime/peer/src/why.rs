@@ -34,6 +34,8 @@ pub enum Reason {
     Twin,
     /// It was given a relay position to hold.
     Relay,
+    /// It was given a target to follow, and knows where it may be.
+    Track,
     /// It was given a task to do.
     Task,
     /// It has cells to fly.
@@ -59,7 +61,9 @@ impl Reason {
             Self::FuelIsDue
         } else if state.silent {
             Self::Twin
-        } else if state.relay_circle().is_some() {
+        } else if state.relay.is_some_and(|r| r.follow.is_some()) {
+            Self::Track
+        } else if state.held_goal().is_some() {
             Self::Relay
         } else if state.errand.is_some() {
             Self::Task
@@ -84,6 +88,7 @@ impl Reason {
             Self::FuelIsDue => "flies home: its fuel is due",
             Self::Twin => "flies home: another process speaks under its id",
             Self::Relay => "holds a relay position that it was given, or flies to it",
+            Self::Track => "follows a target that it was given, or searches for it",
             Self::Task => "flies to a task that it was given, between two cells of its section",
             Self::Plan => "flies its section",
             Self::Astray => "flies home: it has nothing to fly and hears nobody",

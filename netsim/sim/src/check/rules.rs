@@ -9,6 +9,7 @@ use super::listing::ListingCheck;
 use super::patience::PatienceCheck;
 use super::record::Said;
 use super::relays::RelayCheck;
+use super::tracks::TrackCheck;
 use super::spoken::SpokenCheck;
 use super::spread::SpreadCheck;
 use super::tasks::TaskCheck;
@@ -43,6 +44,8 @@ pub struct Rules {
     tasks: TaskCheck,
     /// Who holds relay positions.
     pub relays: RelayCheck,
+    /// Who follows targets.
+    pub tracks: TrackCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -72,6 +75,7 @@ impl Rules {
             spread: SpreadCheck::new(spec.twins()),
             tasks: TaskCheck::default(),
             relays: RelayCheck::default(),
+            tracks: TrackCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),

@@ -103,6 +103,7 @@ pub fn listing(first: u16) -> ListedRun {
 pub fn golden() -> Vec<(Body, &'static str)> {
     let mut all = golden_of_cells();
     all.extend(super::tasks::samples::golden());
+    all.push((Body::Target(super::target::samples::target()), "00"));
     all
 }
 
@@ -324,6 +325,7 @@ fn longest_promise() -> PromisedPlan {
 pub fn largest() -> Vec<Body> {
     let mut all = largest_of_cells();
     all.extend(super::tasks::samples::largest());
+    all.extend(super::target::samples::largest());
     all
 }
 
