@@ -62,6 +62,32 @@ fn deaths(prepared: &Prepared, seed: u64, mut faults: Vec<TimedFault>) -> Vec<Ti
     faults
 }
 
+/// Prints every five seconds what whoever follows says of it, and where vehicles are.
+fn watch(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>) {
+    let mut swarm = Swarm::new(prepared, seed, faults, false);
+    for at_s in (10..900).step_by(5) {
+        swarm.run_until(at_s * 1000);
+        let cars: Vec<String> = swarm
+            .vehicles()
+            .map(|v| format!("({:.0}, {:.0})", v.x, v.y))
+            .collect();
+        for u in &prepared.spec.uavs {
+            let Some(b) = swarm.beliefs(u.id) else { continue };
+            if let Some(pose) = swarm.pose(u.id).filter(|_| b.relays) {
+                println!(
+                    "  {at_s} s: uav{} at ({:.0}, {:.0}) {:?} {:?}; vehicles {}",
+                    u.id,
+                    pose.east_m,
+                    pose.north_m,
+                    b.tasks,
+                    b.follows.map(|f| (f.at_mm, f.sees)),
+                    cars.join(" ")
+                );
+            }
+        }
+    }
+}
+
 fn bytes(o: &Outcome, kind: Option<&str>) -> u64 {
     let Some(simulated) = o.report.simulated.as_ref() else {
         return 0;
@@ -94,6 +120,9 @@ fn compare(n: u16, prepared: &Prepared, seeds: &Seeds, wrong: &str) {
         }
         let is_asked = |f: &&TimedFault| !matches!(f.fault, Fault::AddTask { .. });
         let without: Vec<TimedFault> = with.iter().filter(is_asked).cloned().collect();
+        if std::env::var_os("WATCH").is_some() {
+            watch(&prepared, seed, with.clone());
+        }
         let plain = run(&prepared, seed, without, Wanted::default());
         let tasked = run(&prepared, seed, with, Wanted::default());
         runs += 1;

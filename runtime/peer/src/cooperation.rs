@@ -248,7 +248,7 @@ impl Cooperation {
         let Some(state) = &mut self.state else {
             return Effects::new();
         };
-        let aims_anew = self.tasking.look(percept, state);
+        let aims_anew = self.tasking.look(now, percept, state);
         let sections = &state.negotiation.sections;
         let Some(executive) = &mut state.executive else {
             return Effects::new();

@@ -51,8 +51,19 @@ const AHEAD_MS: u64 = 2_000;
 /// may be beyond it.
 const INNER: f64 = 0.85;
 
-/// A task is bound to nothing farther from its place than this, metres.
-const FOUND_M: f64 = 250.0;
+/// What was seen for less long may be a false alarm, and is not told, milliseconds.
+const WATCHED_MS: u64 = 2_000;
+
+/// A target is seen when so many looks within so long, milliseconds, told it: a false alarm may be
+/// taken for one that is out of sight, three within ten looks are hardly ever.
+const HITS: usize = 3;
+const HITS_MS: u64 = 2_000;
+
+/// A task is bound to nothing farther from its place than this, metres, and so much more for
+/// each second since it was asked for; and never farther than that.
+const FOUND_M: f64 = 150.0;
+const FOUND_MPS: f64 = 10.0;
+const FOUND_MOST_M: f64 = 600.0;
 
 /// Nobody saw a target for so long: another one where it may be is taken for it, seconds.
 const LOST_S: f64 = 2.5;
@@ -63,6 +74,9 @@ const STRAYS_MPS: f64 = 10.0;
 
 /// And at most, metres.
 const STRAYS_MOST_M: f64 = 250.0;
+
+/// After so long without sight it may be anywhere, seconds.
+const ANYWHERE_S: f64 = 60.0;
 
 /// Nobody saw it for so long: whoever follows flies out to look for it, seconds.
 const SEARCH_S: f64 = 4.0;
@@ -109,6 +123,8 @@ pub(crate) struct Targets {
     tracks: Tracks,
     board: Board,
     bound: BTreeMap<Sought, Bound>,
+    /// When each of its own targets was in the last looks that told it, the latest last.
+    hits: BTreeMap<TargetName, [u64; HITS]>,
     /// The time of the last percept, milliseconds.
     now_ms: u64,
     /// Which of the registers is of which target, the first of what is followed.
@@ -127,6 +143,7 @@ impl Targets {
             tracks: Tracks::new(me, DENSITY),
             board: Board::default(),
             bound: BTreeMap::new(),
+            hits: BTreeMap::new(),
             now_ms: 0,
             subjects: [None; TARGETS_MAX as usize],
             said: BTreeMap::new(),
@@ -148,6 +165,7 @@ impl Targets {
             along && forward.perp(&to).abs() <= INNER * airframe.footprint_across_m
         };
         self.tracks.look(self.now_ms, &look, &in_view);
+        self.count_hits();
         let own: Vec<Register> = self.own().collect();
         for mut r in own {
             let before = r.name;
@@ -159,6 +177,9 @@ impl Targets {
                 r.name = name;
             }
             // What it follows it follows under its new name.
+            if r.name != before && let Some(hits) = self.hits.remove(&before) {
+                self.hits.insert(r.name, hits);
+            }
             if r.name != before && r.name == name {
                 let renamed = self.bound.values_mut().filter(|b| b.name == before);
                 renamed.for_each(|b| b.name = name);
@@ -170,9 +191,34 @@ impl Targets {
         self.keep_in_mind();
     }
 
-    /// Its own confirmed targets, as they are told.
+    /// Notes which of its own targets the last look told.
+    fn count_hits(&mut self) {
+        let mut hits = core::mem::take(&mut self.hits);
+        for t in self.tracks.all() {
+            let mut last = hits.remove(&t.name).unwrap_or_default();
+            if t.seen_ms == self.now_ms {
+                last.rotate_left(1);
+                last[HITS - 1] = self.now_ms;
+            }
+            self.hits.insert(t.name, last);
+        }
+    }
+
+    /// When one of its own targets was seen last beyond doubt, milliseconds.
+    fn sure_ms(&self, name: TargetName) -> Option<u64> {
+        let hits = self.hits.get(&name)?;
+        let (first, last) = (hits[0], hits[HITS - 1]);
+        (first > 0 && last - first <= HITS_MS).then_some(last)
+    }
+
+    /// Its own targets that it sees, as they are told.
     fn own(&self) -> impl Iterator<Item = Register> {
-        self.tracks.confirmed().map(|t| Register {
+        let sure = self.tracks.confirmed();
+        let sure = sure.filter(|t| {
+            let is_seen = self.sure_ms(t.name) == Some(t.seen_ms);
+            is_seen && t.watched_ms() >= WATCHED_MS
+        });
+        sure.map(|t| Register {
             author: self.me,
             name: t.name,
             kind: t.kind,
@@ -199,7 +245,11 @@ impl Targets {
                 continue;
             }
             let expected = bound.last.expected(self.now_ms, DENSITY);
-            let strays_m = (STRAYS_M + STRAYS_MPS * unseen_s).min(STRAYS_MOST_M);
+            let strays_m = if unseen_s > ANYWHERE_S {
+                f64::INFINITY
+            } else {
+                (STRAYS_M + STRAYS_MPS * unseen_s).min(STRAYS_MOST_M)
+            };
             let away_m = |f: &Fused| (f.estimate.position() - expected).norm();
             let may_be = |f: &&Fused| {
                 f.kind == bound.last.kind
@@ -262,13 +312,14 @@ impl Targets {
         self.bound.insert(sought, bound);
     }
 
-    /// What is known of whom a task is bound to; bound to what is seen nearest to its place, if
+    /// What is known of whom a task is bound to, asked for so many seconds ago; bound to what is seen nearest to its place, if
     /// it is bound to nothing yet.
-    pub fn follow(&mut self, sought: Sought, place: Point) -> Option<Followed> {
+    pub fn follow(&mut self, sought: Sought, place: Point, asked_s: f64) -> Option<Followed> {
         if !self.bound.contains_key(&sought) {
+            let found_m = (FOUND_M + FOUND_MPS * asked_s).min(FOUND_MOST_M);
             let away_m = |f: &Fused| (f.estimate.position() - place).norm();
             let fused = self.board.fused(self.now_ms, DENSITY);
-            let near = fused.into_iter().filter(|f| away_m(f) <= FOUND_M);
+            let near = fused.into_iter().filter(|f| away_m(f) <= found_m);
             let found = near.min_by(|a, b| away_m(a).total_cmp(&away_m(b)))?;
             let said = (found.seen_ms, self.me);
             let bound = Bound {
@@ -294,9 +345,9 @@ impl Targets {
     /// does not know it by its own eyes.
     pub fn unseen_ms(&self, sought: Sought) -> Option<u64> {
         let name = self.bound.get(&sought)?.name;
-        let own = self.tracks.confirmed().filter(|t| t.name == name);
-        let seen_ms = own.map(|t| t.seen_ms).max()?;
-        Some(self.now_ms.saturating_sub(seen_ms))
+        let mut own = self.tracks.confirmed().filter(|t| t.name == name);
+        let seen_ms = own.find_map(|t| self.sure_ms(t.name));
+        Some(self.now_ms.saturating_sub(seen_ms?))
     }
 
     /// Registers to be said now: `serves` is the task that is flown.
@@ -363,6 +414,19 @@ impl Targets {
 }
 
 impl Followed {
+    /// Nothing is known but a place, where it was not for so long, seconds.
+    #[must_use]
+    pub fn nowhere(place: Point, for_s: f64) -> Self {
+        Self {
+            motion: TargetMotion {
+                position: place,
+                velocity_mps: Vector::zeros(),
+                acceleration_mps2: Vector::zeros(),
+            },
+            unseen_s: SEARCH_S + for_s,
+        }
+    }
+
     /// Where to fly after it: to where it should be, and winding outwards from there the longer
     /// nobody has seen it.
     #[must_use]

@@ -306,6 +306,11 @@ impl Swarm {
         sim_peer.peer.as_deref().map(skein_peer::Peer::beliefs)
     }
 
+    /// Where the vehicles are.
+    pub fn vehicles(&self) -> impl Iterator<Item = Point> + '_ {
+        self.air.vehicles().places()
+    }
+
     /// Where a UAV is; nothing once its airframe is gone.
     #[must_use]
     pub fn pose(&self, id: u16) -> Option<Pose> {
@@ -921,7 +926,13 @@ impl Swarm {
         let fresh = |t: &skein_peer::input::AskedTask| {
             t.task.is_open() && t.age_ms < FRESH_TASK_PERIODS * self.period_ms()
         };
-        self.operator.tasks().iter().any(fresh)
+        // While somebody is to be followed for some time that is not over.
+        let follows = |t: &skein_peer::input::AskedTask| {
+            let is_track = t.task.kind == wire::tasks::TaskKind::Track;
+            t.task.is_open() && is_track && t.task.within_ms > 0
+        };
+        let mut tasks = self.operator.tasks().iter();
+        tasks.any(|t| fresh(t) || follows(t))
     }
 
     /// Whoever waits for the operator out of reach of the ground station is told to go on

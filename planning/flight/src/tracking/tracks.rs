@@ -257,6 +257,13 @@ impl Tracks {
 }
 
 impl Track {
+    /// From when it was seen first until it was seen last, milliseconds: false alarms seldom
+    /// come to much.
+    #[must_use]
+    pub fn watched_ms(&self) -> u64 {
+        self.seen_ms.saturating_sub(self.begun_ms)
+    }
+
     /// The logarithm of how large its spread is: the less the surer.
     fn sureness(&self) -> f64 {
         skein_geometry::math::ln(self.estimate.spread_m().max(f64::MIN_POSITIVE))

@@ -68,8 +68,8 @@ fn without_a_detector_nothing_is_kept_and_nothing_said() {
 fn what_is_followed_is_told_with_its_task_and_found_by_who_hears_it() {
     let (mut one, mut two) = (targets(1), targets(2));
     watched(&mut one, 1_000, 9_000);
-    assert_eq!(one.follow(TASK, Point::new(5_000.0, 0.0)), None, "too far");
-    one.follow(TASK, Point::new(200.0, 50.0)).unwrap();
+    assert_eq!(one.follow(TASK, Point::new(5_000.0, 0.0), 9.0), None, "too far");
+    one.follow(TASK, Point::new(200.0, 50.0), 0.0).unwrap();
     assert!(one.unseen_ms(TASK).unwrap() == 0);
     let told = said(&one.tell(Time(60_000), 1_000, Some(TASK)));
     let [(0, target)] = told[..] else {
@@ -102,7 +102,7 @@ fn what_is_followed_is_told_with_its_task_and_found_by_who_hears_it() {
 fn of_registers_the_newest_counts_whatever_the_order() {
     let mut one = targets(1);
     watched(&mut one, 1_000, 4_000);
-    one.follow(TASK, Point::new(115.0, 50.0)).unwrap();
+    one.follow(TASK, Point::new(115.0, 50.0), 0.0).unwrap();
     let first = said(&one.tell(Time(10_000), 1_000, Some(TASK)))[0].1;
     watched(&mut one, 4_000, 6_000);
     let second = said(&one.tell(Time(12_000), 1_000, Some(TASK)))[0].1;
@@ -122,7 +122,7 @@ fn of_registers_the_newest_counts_whatever_the_order() {
 fn what_is_of_another_time_or_no_covariance_is_left_out() {
     let mut one = targets(1);
     watched(&mut one, 1_000, 4_000);
-    one.follow(TASK, Point::new(115.0, 50.0)).unwrap();
+    one.follow(TASK, Point::new(115.0, 50.0), 0.0).unwrap();
     let told = said(&one.tell(Time(10_000), 1_000, Some(TASK)))[0].1;
     let mut two = targets(2);
     two.on_percept(&percept(4_000, Point::new(900.0, 900.0), &[]));
@@ -153,7 +153,7 @@ fn what_is_of_another_time_or_no_covariance_is_left_out() {
 fn who_is_lost_is_looked_for_outwards_and_taken_up_again_where_it_may_be() {
     let mut one = targets(1);
     watched(&mut one, 1_000, 6_000);
-    one.follow(TASK, Point::new(125.0, 50.0)).unwrap();
+    one.follow(TASK, Point::new(125.0, 50.0), 0.0).unwrap();
     let mut farthest_m = 0.0_f64;
     for now_ms in (6_000..60_000).step_by(200) {
         one.on_percept(&percept(now_ms, Point::new(400.0, 400.0), &[]));

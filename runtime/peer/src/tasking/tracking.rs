@@ -3,13 +3,14 @@
 //!
 //! | what is known of the target | what is flown | what is said |
 //! |---|---|---|
-//! | nothing | the circle round the task's place | nothing |
+//! | nothing | the circle round the task's place, and outwards from there | nothing |
 //! | where it may be, and that is not near | a circle round that | nothing |
 //! | where it may be, and that is near | after it, winding outwards the longer nobody sees it | once it had seen it: it searches |
 //! | it is seen | after it | it follows; the first time the task is begun |
 //! | it is beyond the reach of the mission | at the edge of that | as above |
 
 use super::Tasking;
+use crate::input::Time;
 use crate::mission::{Mission, mm, point_m};
 use crate::mission_state::MissionState;
 use crate::output::TaskNews;
@@ -57,6 +58,8 @@ pub struct Follows {
 pub(super) struct Sight {
     /// Whether it was said that it follows, and not since that it searches.
     pub follows: bool,
+    /// Since when it has been where the target was to be, milliseconds of percepts.
+    pub awaits_ms: Option<u64>,
 }
 
 impl Task {
@@ -91,6 +94,10 @@ fn within_reach(motion: TargetMotion, mission: &Mission) -> TargetMotion {
     }
 }
 
+fn seconds(ms: u64) -> f64 {
+    f64::from(u32::try_from(ms).unwrap_or(u32::MAX)) / 1e3
+}
+
 impl Tasking {
     /// The target that is flown after, if it is one: the task in its revision.
     pub(super) fn sought(&self) -> Option<Sought> {
@@ -106,23 +113,36 @@ impl Tasking {
     }
 
     /// A percept: what the camera saw, and where whom it follows is. Whether its goal changed.
-    pub fn look(&mut self, percept: &Percept, state: &mut MissionState) -> bool {
+    pub fn look(&mut self, now: Time, percept: &Percept, state: &mut MissionState) -> bool {
         self.targets.on_percept(percept);
         let (Some(sought), Some(airframe)) = (self.sought(), self.flies) else {
             return false;
         };
-        let Some(task) = self.known.get(&sought.0).map(|k| &k.task) else {
+        let Some(known) = self.known.get(&sought.0) else {
             return false;
         };
-        let (Some(place), stand_off_m) = (task.place(), task.stand_off_m(&airframe)) else {
+        let stand_off_m = known.task.stand_off_m(&airframe);
+        let (Some(place), asked_s) = (known.task.place(), seconds(now.since_ms(known.since))) else {
             return false;
         };
-        let followed = self.targets.follow(sought, place);
+        let followed = self.targets.follow(sought, place, asked_s);
         let sees = self.targets.unseen_ms(sought).is_some_and(|ms| ms <= SEEN_MS);
         let (Some(executive), Some(relay)) = (&mut state.executive, &mut state.relay) else {
             return false;
         };
-        let Some(followed) = followed else {
+        // Where nothing is known it is looked for from the circle round the place outwards.
+        let Some(held) = self.flown.as_mut().and_then(|f| f.held.as_mut()) else {
+            return false;
+        };
+        if executive.is_on_circle() {
+            held.sight.awaits_ms.get_or_insert(percept.time_ms);
+        }
+        let awaited = held.sight.awaits_ms;
+        let nowhere = || {
+            let for_s = seconds(percept.time_ms.saturating_sub(awaited?));
+            Some(Followed::nowhere(place, for_s))
+        };
+        let Some(followed) = followed.or_else(nowhere) else {
             return false;
         };
         let motion = within_reach(followed.sought(), &state.geometry.mission);
