@@ -14,6 +14,7 @@
 //! # Complexity
 //! A percept costs some hundred steps of the law, with zones some more for each turn tried.
 
+use super::transit::Transit;
 use super::{Aim, Executive};
 use crate::executive::camera::Played;
 use crate::percept::Percept;
@@ -31,6 +32,9 @@ const GROUPS: [usize; MAX_STEPS] = [4, 4, 6, 6, 6, 8, 8, 8];
 
 /// D2.7's α: outside of its circle the field then bends nowhere harder than the circle.
 const GAIN: f64 = 1.0;
+
+/// What is kept clear of is this much less than what is kept, metres: rounding.
+const NEARER_M: f64 = 0.2;
 
 /// A command of the law lasts so long, milliseconds.
 const COMMAND_MS: u32 = 50;
@@ -114,9 +118,10 @@ impl Executive {
             let follower = &mut pursuit.follower;
             follower.commands(percept.pose, wind, &target, passed_s, None);
         }
+        let zones = self.transit.router.zones();
         let guard = Guard {
-            zones: self.transit.router.zones(),
-            clearance_m: self.transit.router.limits().clearance_m,
+            zones,
+            clearance_m: guarded_m(&self.transit, zones.distance_m(percept.pose.position())),
         };
         let mut ahead = pursuit.follower.clone();
         let commands = ahead.commands(percept.pose, wind, &target, HORIZON_S, Some(&guard));
@@ -136,6 +141,18 @@ impl Executive {
         });
         Some(setpoint)
     }
+}
+
+/// What a UAV that far from the zones keeps clear of them, metres. The law turns tighter than
+/// routes do, and whatever comes next begins with a route: room is left for its wider turn, and
+/// for what a UAV may stray. Who is nearer than that already comes no nearer.
+fn guarded_m(transit: &Transit, away_m: f64) -> f64 {
+    let limits = transit.router.limits();
+    let airframe = &transit.airframe;
+    let least_m = airframe.turn_radius_m(airframe.least_airspeed_mps());
+    let wider_m = 2.0 * (limits.turn_radius_m - least_m).max(0.0);
+    let wanted_m = limits.clearance_m + transit.tracking_error_m + wider_m;
+    wanted_m.min(away_m - NEARER_M).max(0.0)
 }
 
 /// Commands of the law as a few turns, each the mean of those that it stands for.

@@ -16,6 +16,7 @@
 //! Registers merge in any order: of each author and target the newest counts. All that is kept
 //! is bounded. Without sightings nothing is kept and nothing said.
 
+use crate::Incarnation;
 use crate::effect::Effect;
 use crate::input::Time;
 use crate::mission::{mm, point_m};
@@ -81,11 +82,15 @@ const ANYWHERE_S: f64 = 60.0;
 /// Nobody saw it for so long: whoever follows flies out to look for it, seconds.
 const SEARCH_S: f64 = 4.0;
 
-/// A search winds outwards at so many metres a second, each turn so far from the last, and no
-/// farther than this, metres.
+/// A search winds outwards at so many metres a second, slow enough to circle about, each turn so far from the last, no
+/// farther than this, metres, and then inwards and outwards again.
 const SEARCH_MPS: f64 = 6.0;
-const SEARCH_TURN_M: f64 = 60.0;
-const SEARCH_MOST_M: f64 = 200.0;
+const SEARCH_TURN_M: f64 = 90.0;
+const SEARCH_MOST_M: f64 = 250.0;
+
+/// Names that a UAV gives in one life before it comes to those of the next: one a second for
+/// an hour and more.
+const NAMES_OF_LIFE: u32 = 4_096;
 
 /// Registers that are said in an interval.
 const SAID: usize = 2;
@@ -149,6 +154,14 @@ impl Targets {
             said: BTreeMap::new(),
             said_at: Time(0),
         }
+    }
+
+    /// A life begins: what it names from now on nobody has named, and what it saw it sees anew.
+    pub fn begin_life(&mut self, incarnation: Incarnation) {
+        let first = incarnation.wrapping_mul(NAMES_OF_LIFE);
+        self.tracks = Tracks::new(self.me, DENSITY).named_from(first);
+        self.hits.clear();
+        self.said.clear();
     }
 
     /// Takes in a look.
@@ -435,13 +448,14 @@ impl Followed {
         if on_s <= 0.0 {
             return self.motion;
         }
+        let whole_s = TAU / 2.0 * SEARCH_MOST_M * SEARCH_MOST_M / SEARCH_TURN_M / SEARCH_MPS;
         let at = |s: f64| {
-            // Of a spiral with so much between its turns, flown at one speed.
-            let far_m = (SEARCH_TURN_M * SEARCH_MPS * s.max(0.0) / (TAU / 2.0)).sqrt();
-            let turned_rad = TAU * far_m / SEARCH_TURN_M;
-            let beyond_m = (far_m - SEARCH_MOST_M).max(0.0);
-            let (sin, cos) = sin_cos(turned_rad);
-            Vector::new(cos, sin) * (far_m - beyond_m)
+            // Of a spiral with so much between its turns, flown at one speed, to and fro.
+            let s = s % (2.0 * whole_s);
+            let s = s.min(2.0 * whole_s - s).max(0.0);
+            let far_m = (SEARCH_TURN_M * SEARCH_MPS * s / (TAU / 2.0)).sqrt();
+            let (sin, cos) = sin_cos(TAU * far_m / SEARCH_TURN_M);
+            Vector::new(cos, sin) * far_m
         };
         let (here, then) = (at(on_s), at(on_s + 0.1));
         let wound = (then - here) / 0.1;

@@ -144,6 +144,7 @@ impl Tasking {
     /// A life begins, or another process silences this one: what it held is void.
     pub fn void_ownership(&mut self, me: Member, state: Option<&mut MissionState>) {
         self.auction.begin_life(me.incarnation);
+        self.targets.begin_life(me.incarnation);
         self.spoken = None;
         self.leave(state);
     }

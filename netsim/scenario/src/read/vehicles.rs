@@ -116,14 +116,13 @@ fn of_file(
 
 #[cfg(test)]
 mod tests {
-    use crate::{Files, Overrides};
+    use crate::Overrides;
 
     /// The default scenario with these vehicles.
     fn with(vehicles: &str) -> Result<crate::Scenario, String> {
         let text = include_str!("../../../../configs/trials/helsinki.json5");
-        let text = text.replacen("operator: [],", &format!("operator: [], vehicles: {vehicles},"), 1);
+        let text = text.replacen("vehicles: [],", &format!("vehicles: {vehicles},"), 1);
         let files = crate::builtin::files();
-        let _: &Files<'_> = &files;
         crate::parse_with("s.json5", &text, &files, &Overrides::default()).map_err(|e| e.to_string())
     }
 

@@ -112,6 +112,14 @@ impl Tracks {
         }
     }
 
+    /// The same, with names that count from a number on: a UAV that has lived before named
+    /// others.
+    #[must_use]
+    pub fn named_from(mut self, number: u32) -> Self {
+        self.next = number;
+        self
+    }
+
     /// All tracks, tentative ones too.
     #[must_use]
     pub fn all(&self) -> &[Track] {

@@ -103,7 +103,10 @@ pub fn listing(first: u16) -> ListedRun {
 pub fn golden() -> Vec<(Body, &'static str)> {
     let mut all = golden_of_cells();
     all.extend(super::tasks::samples::golden());
-    all.push((Body::Target(super::target::samples::target()), "00"));
+    all.push((
+        Body::Target(super::target::samples::target()),
+        "8f0302011a00013df818c81a0001d682397ab619170c39018f1911f819015e1904b018640001",
+    ));
     all
 }
 
