@@ -72,7 +72,9 @@ fn watch(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>) {
             .map(|v| format!("({:.0}, {:.0})", v.x, v.y))
             .collect();
         for u in &prepared.spec.uavs {
-            let Some(b) = swarm.beliefs(u.id) else { continue };
+            let Some(b) = swarm.beliefs(u.id) else {
+                continue;
+            };
             if let Some(pose) = swarm.pose(u.id).filter(|_| b.relays) {
                 println!(
                     "  {at_s} s: uav{} at ({:.0}, {:.0}) {:?} {:?}; vehicles {}",
@@ -92,9 +94,7 @@ fn bytes(o: &Outcome, kind: Option<&str>) -> u64 {
     let Some(simulated) = o.report.simulated.as_ref() else {
         return 0;
     };
-    let of = |(k, bytes): (&String, &u64)| {
-        kind.is_none_or(|kind| kind == k).then_some(*bytes)
-    };
+    let of = |(k, bytes): (&String, &u64)| kind.is_none_or(|kind| kind == k).then_some(*bytes);
     simulated.bytes_by_kind.iter().filter_map(of).sum()
 }
 

@@ -320,7 +320,9 @@ impl Cooperation {
                 self.hear_orders(orders, (record.incarnation, record.seq, record.author));
                 Effects::new()
             }
-            Body::Task(_) | Body::Bundle(_) | Body::Target(_) => self.tasking.hear(now, record, body),
+            Body::Task(_) | Body::Bundle(_) | Body::Target(_) => {
+                self.tasking.hear(now, record, body)
+            }
             Body::Intent(_) | Body::Conflict(_) => {
                 let state = self.state.as_mut();
                 if let Some(separation) = state.and_then(|s| s.separation.as_mut()) {

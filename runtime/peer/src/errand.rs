@@ -513,10 +513,6 @@ mod tests {
                 task(TaskKind::Line, &[(205, 105), (255, 155)], 0),
                 "of the line cannot be seen",
             ),
-            (
-                task(TaskKind::Track, &[(90_000, 0)], 0),
-                "expected one nearer to the base",
-            ),
             (task(TaskKind::Pinpoint, &[(90_000, 0)], 0), ""),
         ] {
             let said = errand(&task, from).unwrap_err();

@@ -116,9 +116,9 @@ pub mod protocol;
 pub mod relay_circle;
 mod separation;
 mod taking;
+mod targets;
 mod task;
 mod task_desk;
-mod targets;
 mod tasking;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;

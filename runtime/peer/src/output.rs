@@ -123,7 +123,9 @@ impl TaskNews {
             }
             Self::Holds => format!("it holds the relay position {name:?}"),
             Self::Tracks => {
-                format!("it won the task {name:?} to follow a target, gives its section up and flies there")
+                format!(
+                    "it won the task {name:?} to follow a target, gives its section up and flies there"
+                )
             }
             Self::Follows => format!("it sees the target of the task {name:?} and follows it"),
             Self::Searches => {

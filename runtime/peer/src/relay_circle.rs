@@ -158,6 +158,13 @@ mod tests {
         }
     }
 
+    fn track(east_m: i32, north_m: i32) -> Task {
+        Task {
+            kind: TaskKind::Track,
+            ..relay(east_m, north_m, 0)
+        }
+    }
+
     #[test]
     fn the_circle_is_round_the_place_or_as_near_as_is_clear() {
         let m = zoned();
@@ -192,10 +199,13 @@ mod tests {
                 "expected another place or a larger radius",
             ),
             (relay(90_000, 0, 100), "expected one nearer to the base"),
+            (track(90_000, 0), "expected one nearer to the base"),
         ] {
             let said = m.can_do(&task).unwrap_err();
             assert!(said.contains(why), "{said}");
         }
         m.can_do(&relay(100, 200, 100)).unwrap();
+        // A target beside a zone, or in one, is looked for from where there is room.
+        m.can_do(&track(230, 130)).unwrap();
     }
 }

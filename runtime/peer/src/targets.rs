@@ -190,7 +190,9 @@ impl Targets {
                 r.name = name;
             }
             // What it follows it follows under its new name.
-            if r.name != before && let Some(hits) = self.hits.remove(&before) {
+            if r.name != before
+                && let Some(hits) = self.hits.remove(&before)
+            {
                 self.hits.insert(r.name, hits);
             }
             if r.name != before && r.name == name {
@@ -200,7 +202,8 @@ impl Targets {
             self.board.put(r);
         }
         self.board.forget(self.now_ms.saturating_sub(TOLD_MS));
-        self.said.retain(|_, seen_ms| *seen_ms + TOLD_MS >= self.now_ms);
+        self.said
+            .retain(|_, seen_ms| *seen_ms + TOLD_MS >= self.now_ms);
         self.keep_in_mind();
     }
 
@@ -311,7 +314,14 @@ impl Targets {
                 let same = b.name == last.name && b.last.seen_ms >= last.seen_ms;
                 if same { b.last } else { last }
             });
-            self.bind(sought, Bound { name: register.name, last, said });
+            self.bind(
+                sought,
+                Bound {
+                    name: register.name,
+                    last,
+                    said,
+                },
+            );
         }
     }
 

@@ -45,7 +45,6 @@ use crate::wire::tasks::{
 use crate::{Incarnation, PeerId};
 use relaying::Held;
 pub(crate) use relaying::KEPT_FOR_COVER;
-pub use tracking::Follows;
 use skein_behaviors::executive::detour::Watched;
 use skein_behaviors::{Order, Percept};
 use skein_flight::airframe::Airframe;
@@ -53,6 +52,7 @@ use skein_geometry::hash::Fnv;
 use skein_geometry::math::wrap_pi;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{Hash, Hasher};
+pub use tracking::Follows;
 
 /// A task whose flight did not see all of it is flown once more, then others are asked.
 const MAX_TRIES: u8 = 2;

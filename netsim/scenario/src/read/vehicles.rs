@@ -36,7 +36,9 @@ pub(crate) fn read(
                 ));
             }
         };
-        let start = f.get("start").map(|s| position(&s.fields(&["east_m", "north_m"])?));
+        let start = f
+            .get("start")
+            .map(|s| position(&s.fields(&["east_m", "north_m"])?));
         Ok(VehicleSpec {
             roads: Arc::new(roads),
             // A way begins where it begins; among streets any place will do.
@@ -46,7 +48,10 @@ pub(crate) fn read(
             kind: kind(&f)?,
         })
     };
-    list.items()?.iter().map(|item| one(item, notices)).collect()
+    list.items()?
+        .iter()
+        .map(|item| one(item, notices))
+        .collect()
 }
 
 fn kind(f: &Fields<'_>) -> Result<u8, Error> {
@@ -95,8 +100,8 @@ fn of_file(
     notices: &mut Notices,
 ) -> Result<Roads, Error> {
     let name = node.text()?;
-    let found = targets::read(&files.read(node)?)
-        .map_err(|e| node.wrong(e.in_file(name).to_string()))?;
+    let found =
+        targets::read(&files.read(node)?).map_err(|e| node.wrong(e.in_file(name).to_string()))?;
     notices.extend(found.notices.iter().map(|n| {
         let said = format!("{name}: at {}: {}", n.pointer, n.text);
         (node.path(), said)
@@ -123,7 +128,8 @@ mod tests {
         let text = include_str!("../../../../configs/trials/helsinki.json5");
         let text = text.replacen("vehicles: [],", &format!("vehicles: {vehicles},"), 1);
         let files = crate::builtin::files();
-        crate::parse_with("s.json5", &text, &files, &Overrides::default()).map_err(|e| e.to_string())
+        crate::parse_with("s.json5", &text, &files, &Overrides::default())
+            .map_err(|e| e.to_string())
     }
 
     #[test]
@@ -138,7 +144,10 @@ mod tests {
         for (text, why) in [
             ("[{ speed_mps: 5 }]", "expected either way_m"),
             ("[{ way_m: [[0, 0], [50, 0]] }]", "200 m of it at least"),
-            ("[{ way_m: [[0, 0], [500, 0]], does: 'flies' }]", "vehicles[0].does"),
+            (
+                "[{ way_m: [[0, 0], [500, 0]], does: 'flies' }]",
+                "vehicles[0].does",
+            ),
             ("[{ way_m: [[0, 0], [500]] }]", "expected [east, north]"),
             ("[{ streets: 'none.geojson' }]", "cannot read none.geojson"),
         ] {

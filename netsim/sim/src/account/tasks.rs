@@ -134,7 +134,10 @@ impl TaskReport {
         let state = format!("{:?}", self.state).to_lowercase();
         if !self.held_by.is_empty() {
             let names: Vec<String> = self.held_by.iter().map(|id| format!("uav{id}")).collect();
-            let tracked = self.tracked.as_ref().map_or_else(String::new, Tracked::words);
+            let tracked = self
+                .tracked
+                .as_ref()
+                .map_or_else(String::new, Tracked::words);
             return format!("{asked}, held by {}{tracked}, {state}", names.join(", "));
         }
         match (self.seen_ms, self.seen_by, &self.nobody_can) {

@@ -135,7 +135,8 @@ impl TrackCheck {
     ) {
         let passed_ms = now_ms.saturating_sub(self.last_ms);
         self.last_ms = now_ms;
-        self.windows.retain(|id, _| looks.iter().any(|l| l.uav == *id));
+        self.windows
+            .retain(|id, _| looks.iter().any(|l| l.uav == *id));
         let mut seen: BTreeMap<(u16, u32), (u16, f64, f64)> = BTreeMap::new();
         for look in looks {
             let Some(says) = look.says.filter(|s| s.sees) else {
@@ -187,7 +188,9 @@ impl TrackCheck {
         if window.said < WINDOW {
             return;
         }
-        let Window { pictured, from_ms, .. } = *window;
+        let Window {
+            pictured, from_ms, ..
+        } = *window;
         self.windows.remove(&look.uav);
         if pictured < PICTURED {
             let (east_mm, north_mm) = says.at_mm;
@@ -304,8 +307,18 @@ mod tests {
         // Nothing in its picture; another place; too seldom.
         assert!(after(60, &|_| look(1, 5, true, &[])).0);
         assert!(after(60, &|_| look(1, 90, true, &[0])).0);
-        assert!(after(60, &|t| look(1, 5, true, if t % 3 == 0 { &[0] } else { &[] })).0);
-        let seldom = after(60, &|t| look(1, 5, true, if t % 3 > 0 { &[0] } else { &[] }));
+        assert!(
+            after(60, &|t| look(
+                1,
+                5,
+                true,
+                if t % 3 == 0 { &[0] } else { &[] }
+            ))
+            .0
+        );
+        let seldom = after(60, &|t| {
+            look(1, 5, true, if t % 3 > 0 { &[0] } else { &[] })
+        });
         assert!(!seldom.0 && seldom.1.sight_ms < 45_000);
         // Who says that it searches may.
         assert!(!after(60, &|_| look(1, 5, false, &[])).0);

@@ -121,9 +121,9 @@ impl Flyer {
             airspeed_mps,
             self.turn_rate_radps,
         );
-        let aim = self.target().map(|t| {
-            t.expected(now_ms, DENSITY) + searched(t, now_ms) - self.sensor.displaced()
-        });
+        let aim = self
+            .target()
+            .map(|t| t.expected(now_ms, DENSITY) + searched(t, now_ms) - self.sensor.displaced());
         self.camera
             .advance(&pose, self.body.height_m(), &attitude, aim, over_s);
     }

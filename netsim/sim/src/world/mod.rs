@@ -362,7 +362,9 @@ impl World {
             time_ms: self.now_ms,
             takes_off_in_ms: u32::try_from(ground_ms).unwrap_or(u32::MAX),
             traffic: self.traffic(uav, body.position()),
-            sightings: self.vehicles.look(body, uav, self.now_ms, &self.site.obstacles),
+            sightings: self
+                .vehicles
+                .look(body, uav, self.now_ms, &self.site.obstacles),
             ..body.percept()?
         })
     }
@@ -375,7 +377,9 @@ impl World {
 
     /// Which of them are in the picture of a UAV, unhidden, now.
     pub fn pictured(&self, uav: u16) -> impl Iterator<Item = usize> + '_ {
-        let body = self.body(uav).filter(|b| b.takes_off_in_ms(self.now_ms) == 0);
+        let body = self
+            .body(uav)
+            .filter(|b| b.takes_off_in_ms(self.now_ms) == 0);
         let all = 0..self.vehicles.len();
         all.filter(move |n| {
             body.is_some_and(|b| self.vehicles.is_pictured(*n, b, &self.site.obstacles))

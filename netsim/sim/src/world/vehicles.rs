@@ -82,7 +82,10 @@ impl Vehicles {
         let uavs: Vec<Point> = airborne.iter().map(|(_, place)| place.at).collect();
         while self.driven_ms + STEP_MS <= to_ms {
             self.driven_ms += STEP_MS;
-            #[allow(clippy::cast_precision_loss, reason = "runs last far less than 2^53 ms")]
+            #[allow(
+                clippy::cast_precision_loss,
+                reason = "runs last far less than 2^53 ms"
+            )]
             let now_s = self.driven_ms as f64 / 1000.0;
             for (v, spec) in self.all.iter_mut().zip(self.specs.iter()) {
                 v.drive(&spec.roads, now_s, &uavs);
@@ -224,15 +227,16 @@ mod tests {
         let at = fixture::square(1).uavs[0].launch.position();
         let near = at + Vector::new(10.0, 5.0);
         let mut spec = scene(near, Behaviour::Parked);
-        spec.vehicles[0].roads = Arc::new(
-            Roads::of(&[vec![near, near + Vector::new(300.0, 0.0)]]).unwrap(),
-        );
+        spec.vehicles[0].roads =
+            Arc::new(Roads::of(&[vec![near, near + Vector::new(300.0, 0.0)]]).unwrap());
         let world = World::new(&spec, 5);
         let uav = spec.uavs[0].id;
         let body = world.body(uav).unwrap();
         let (mut hits, mut false_alarms, mut worst_m) = (0, 0, 0.0_f64);
         for look in 0..400 {
-            let told = world.vehicles.look(body, uav, look * 200, world.obstacles());
+            let told = world
+                .vehicles
+                .look(body, uav, look * 200, world.obstacles());
             for s in told.seen() {
                 let off_m = (s.at() - near).norm();
                 if off_m < 12.0 {

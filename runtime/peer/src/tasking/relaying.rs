@@ -41,7 +41,11 @@ impl Tasking {
         }
         let mut events = Vec::new();
         let mut news: Vec<TaskNews> = sight.into_iter().collect();
-        let is_there = if tracks { sees } else { executive.is_on_circle() };
+        let is_there = if tracks {
+            sees
+        } else {
+            executive.is_on_circle()
+        };
         if !held.has_begun && is_there {
             held.has_begun = true;
             events.push(Event::Begun(id));

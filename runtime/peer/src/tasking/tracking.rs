@@ -122,11 +122,15 @@ impl Tasking {
             return false;
         };
         let stand_off_m = known.task.stand_off_m(&airframe);
-        let (Some(place), asked_s) = (known.task.place(), seconds(now.since_ms(known.since))) else {
+        let (Some(place), asked_s) = (known.task.place(), seconds(now.since_ms(known.since)))
+        else {
             return false;
         };
         let followed = self.targets.follow(sought, place, asked_s);
-        let sees = self.targets.unseen_ms(sought).is_some_and(|ms| ms <= SEEN_MS);
+        let sees = self
+            .targets
+            .unseen_ms(sought)
+            .is_some_and(|ms| ms <= SEEN_MS);
         let (Some(executive), Some(relay)) = (&mut state.executive, &mut state.relay) else {
             return false;
         };
@@ -197,7 +201,10 @@ impl Tasking {
     }
 
     /// What is said of targets, while somebody is to be followed.
-    pub(super) fn tell_of_targets(&mut self, s: &crate::cooperation::Situation<'_>) -> crate::effect::Effects {
+    pub(super) fn tell_of_targets(
+        &mut self,
+        s: &crate::cooperation::Situation<'_>,
+    ) -> crate::effect::Effects {
         if !s.speaks || !self.is_tracking() {
             return Vec::new();
         }
