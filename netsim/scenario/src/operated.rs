@@ -110,7 +110,7 @@ fn tracked(uavs: u16, seed: u64, killed_at_ms: &[u64]) -> Outcome {
 
 #[test]
 fn a_car_is_followed_and_by_another_when_its_follower_is_killed() {
-    let outcome = tracked(3, 5, &[250_000]);
+    let outcome = tracked(3, 5, &[150_000]);
     let broken = outcome.violations();
     assert!(outcome.report.completed && broken.is_empty(), "{broken:?}");
     let [told] = &outcome.report.tasks[..] else {
