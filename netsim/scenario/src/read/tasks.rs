@@ -64,10 +64,10 @@ pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
     if let Some(other) = f.get(other) {
         return Err(other.wrong(format!(
             "a {} says {lasts}",
-            if is_held {
-                "relay or track"
-            } else {
-                "point, line or area"
+            match kind {
+                TaskKind::Relay => "relay",
+                TaskKind::Track => "track",
+                _ => "point, line or area",
             }
         )));
     }
