@@ -8,6 +8,7 @@
 //! learns nothing but through [`Input`].
 
 use skein_behaviors::reactive::follow::fly;
+use skein_behaviors::sightings::Sightings;
 use skein_behaviors::traffic::Traffic;
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::airframe::Airframe;
@@ -145,6 +146,7 @@ impl Uav {
             takes_off_in_ms: 0,
             failsafe: false,
             traffic: Traffic::default(),
+            sightings: Sightings::default(),
         }
     }
 

@@ -193,6 +193,7 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Conflict(b) => serde_json::to_value(b),
         Body::Task(b) => serde_json::to_value(b),
         Body::Bundle(b) => serde_json::to_value(b),
+        Body::Target(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -285,6 +286,14 @@ fn words(body: &Body) -> String {
             b.tasks.len(),
             b.kept,
             b.done.len()
+        ),
+        Body::Target(t) => format!(
+            "saw target {}.{} at {:.1} m east, {:.1} m north, at {} ms of the clock of percepts",
+            t.by,
+            t.number,
+            f64::from(t.east_mm) / 1000.0,
+            f64::from(t.north_mm) / 1000.0,
+            t.seen_ms
         ),
     }
 }

@@ -99,6 +99,25 @@ pub enum Add {
         #[arg(long, value_name = "NAME")]
         id: Option<String>,
     },
+    /// A target that is to be followed: who wins gives its section up, flies to the place and
+    /// follows the vehicle that is seen nearest to it.
+    Track {
+        /// Latitude and longitude in degrees of where it is about.
+        #[arg(value_name = "LAT,LON", value_parser = corner)]
+        place: LatLon,
+        /// For how long it is to be followed; without it until it is cancelled.
+        #[arg(long = "for", value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..=86_400))]
+        for_s: Option<u32>,
+        /// How far from it a UAV stays; without it half of what its camera sees to either side.
+        #[arg(long, value_name = "METRES", value_parser = radius_m)]
+        stand_off_m: Option<f64>,
+        /// What it is worth, next to other tasks.
+        #[arg(long, value_name = "WORTH", default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=i64::from(WORTH_MAX)))]
+        worth: u16,
+        /// What it is called from now on; without it `task-1` and so on.
+        #[arg(long, value_name = "NAME")]
+        id: Option<String>,
+    },
     /// A line that is to be seen along its length, from either end.
     Line {
         /// Latitude and longitude of its vertices in degrees.
@@ -189,6 +208,23 @@ fn asked(add: &Add, origin: Origin) -> Result<NewTask, Refusal> {
                 worth: *worth,
                 within_ms: within_s.map(|s| s * 1000),
                 sensor: needs.as_deref().and_then(sensor_of_name).unwrap_or(0),
+            });
+        }
+        Add::Track {
+            place: at,
+            for_s,
+            stand_off_m,
+            worth,
+            id,
+        } => {
+            return Ok(NewTask {
+                name: id.clone(),
+                kind: TaskKind::Track,
+                places: vec![place(at)?],
+                radius_mm: mm(stand_off_m.unwrap_or(0.0)).unsigned_abs(),
+                worth: *worth,
+                within_ms: for_s.map(|s| s * 1000),
+                sensor: 0,
             });
         }
         Add::Relay {

@@ -4,7 +4,7 @@
 //!
 //! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
 //! it cell by cell. Ways between cells come from [`transit`], what the camera saw from
-//! [`camera`], the way to a given circle from [`circle`], a flight between cells and what it
+//! [`camera`], the way to a given circle from [`circle`], turns after a moving target from [`pursuit`], a flight between cells and what it
 //! is for from [`detour`], expectations for the peer from [`prediction`], what the fuel allows
 //! from [`endurance`], what stays of a flight when the
 //! goal changes from `goal_change`, how far a given flight reaches from [`given`], the proof of each stretch from `clearance_check`;
@@ -16,6 +16,7 @@
 //! | legs | open cells in order, then a circle | `Seen`, `Refused`, `PlanDone` once |
 //! | point | a route, then a circle | `Refused` without cells if there is no route |
 //! | circle | a route to the given circle, then that | likewise |
+//! | follow | none: turns that follow the target, from percept to percept | none |
 //! | given | a route to its start, its pieces, then a circle | `CutShort` where it ends early, `PlanDone` once |
 //! | detour | the cell that is flown, a given flight, then legs | those of both, `DetourFlown` once |
 //!
@@ -37,6 +38,7 @@ mod goal_change;
 pub mod new_zones;
 pub mod prediction;
 pub mod promised;
+pub mod pursuit;
 mod transfer;
 pub mod transit;
 mod way_home;
@@ -109,6 +111,9 @@ pub enum Goal {
     Point(Point),
     /// Fly to this circle and stay on it.
     Circle(Segment),
+    /// Follow the target that it is told of, this far from it, metres; hold while it is told of
+    /// none.
+    Follow(f64),
     /// Fly this from its start to its end, then loiter.
     Given(GivenFlight),
     /// Fly this once the cell that is being flown is done, then these legs, then loiter.
@@ -140,6 +145,7 @@ enum Aim {
     Legs,
     Point(Point),
     Circle(Segment),
+    Follow,
     Given,
     Detour,
 }
@@ -222,6 +228,8 @@ pub struct Executive {
     late_ms: u32,
     /// What it flies where nothing else was agreed, if it flies by promises.
     contingency: Option<promised::Contingency>,
+    /// Of whom it follows, if it does.
+    pursuit: Option<pursuit::Pursuit>,
 }
 
 impl Executive {
@@ -255,6 +263,7 @@ impl Executive {
             home: None,
             late_ms: 0,
             contingency: None,
+            pursuit: None,
         }
     }
 
@@ -324,6 +333,9 @@ impl Executive {
         }
         self.report_seen(percept, is_open, &mut events);
         self.report_sighted(percept, &mut events);
+        if let Some(setpoint) = self.pursue(percept) {
+            return (setpoint, events);
+        }
         let offset = self.progress(percept);
         self.count_misses(is_open, &mut events);
         self.skip_closed(is_open);
@@ -679,7 +691,7 @@ impl Executive {
             Aim::Legs => legs(),
             Aim::Given => !self.is_given_left(),
             Aim::Detour => is_detour_flown && legs(),
-            Aim::Hold | Aim::Point(_) | Aim::Circle(_) => false,
+            Aim::Hold | Aim::Point(_) | Aim::Circle(_) | Aim::Follow => false,
         };
         if are_flown && !self.end_reported {
             self.end_reported = true;

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`percept`] | what a UAV senses |
 //! | [`traffic`] | what it senses of other UAVs |
+//! | [`sightings`] | what its camera sees of vehicles |
 //! | [`setpoint`] | what it is told to fly |
 //! | [`order`] | what the operator wants of all and of single UAVs |
 //! | [`event`] | what the executive layer reports upwards |
@@ -17,6 +18,7 @@ pub mod order;
 pub mod percept;
 pub mod reactive;
 pub mod setpoint;
+pub mod sightings;
 #[cfg(test)]
 mod testing;
 pub mod traffic;

@@ -1,5 +1,6 @@
 //! What a UAV senses, from a simulator or an autopilot.
 
+use crate::sightings::Sightings;
 use crate::traffic::Traffic;
 use serde::{Deserialize, Serialize};
 use skein_geometry::frame::Pose;
@@ -29,4 +30,7 @@ pub struct Percept {
     /// Other UAVs that it senses.
     #[serde(default, skip_serializing_if = "Traffic::is_absent")]
     pub traffic: Traffic,
+    /// Vehicles that its camera sees.
+    #[serde(default, skip_serializing_if = "Sightings::is_absent")]
+    pub sightings: Sightings,
 }

@@ -43,6 +43,7 @@ pub fn percept_at(pose: Pose, time_ms: u64) -> Percept {
         takes_off_in_ms: 0,
         failsafe: false,
         traffic: crate::traffic::Traffic::default(),
+        sightings: crate::sightings::Sightings::default(),
     }
 }
 

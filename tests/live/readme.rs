@@ -178,6 +178,8 @@ fn on_the_ground(r: &mut Readme) {
     well(r.instead("skein check SCENARIO", "skein check helsinki"));
     assert!(told(r.instead("skein schema [KIND]", "skein schema")).contains("claim"));
     assert!(told(r.instead("skein schema [KIND]", "skein schema state")).contains("$schema"));
+    let drawn = "skein mission diagram NAME|FILE";
+    assert!(told(r.instead(drawn, "skein mission diagram patrol")).contains("<svg"));
     let shell = r.instead("skein completions SHELL", "skein completions bash");
     assert!(told(shell).contains("complete"));
     well(r.instead("skein man [DIR]", "skein man man"));

@@ -19,11 +19,14 @@ impl Executive {
         let goal = match goal {
             // By promises nothing but cells is flown.
             Goal::Detour(_, legs) if self.contingency.is_some() => Goal::Legs(legs),
-            Goal::Circle(_) if self.contingency.is_some() => Goal::Hold,
+            Goal::Circle(_) | Goal::Follow(_) if self.contingency.is_some() => Goal::Hold,
             goal => goal,
         };
         if !matches!(goal, Goal::Given(_) | Goal::Detour(..)) {
             self.take_back();
+        }
+        if !matches!(goal, Goal::Follow(_)) {
+            self.end_pursuit();
         }
         let (aim, kept, queue) = match goal {
             Goal::Legs(legs) => {
@@ -57,6 +60,10 @@ impl Executive {
                     if same { self.stretches.len() } else { 0 },
                     VecDeque::new(),
                 )
+            }
+            Goal::Follow(stand_off_m) => {
+                self.begin_pursuit(stand_off_m);
+                (Aim::Follow, 0, VecDeque::new())
             }
             Goal::Given(flight) => {
                 let same = self.give(flight) && !self.replan;

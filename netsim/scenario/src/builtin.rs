@@ -67,6 +67,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/roads.json5"),
     ),
     (
+        "track",
+        "track.json5",
+        include_str!("../../../configs/trials/track.json5"),
+    ),
+    (
         "swarm_20",
         "swarm_20.json5",
         include_str!("../../../configs/trials/swarm_20.json5"),

@@ -4,7 +4,7 @@ use crate::{Overrides, load_builtin};
 use skein_netsim::Prepared;
 use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::runs::{Wanted, run};
-use skein_netsim::swarm::Outcome;
+use skein_netsim::swarm::{Outcome, Swarm};
 use skein_peer::input::NewTask;
 use skein_peer::wire::tasks::TaskKind;
 
@@ -86,4 +86,53 @@ fn an_area_is_seen_in_one_flight_and_what_is_told_of_it_is_true() {
         told.line()
     );
     assert_eq!(told.flown_by.len(), 1, "{}", told.line());
+}
+
+/// The track trial with so many UAVs: as it is, or with whoever follows at these times killed.
+fn tracked(uavs: u16, seed: u64, killed_at_ms: &[u64]) -> Outcome {
+    let over = Overrides {
+        peers: Some(uavs),
+        ..Overrides::default()
+    };
+    let prepared = Prepared::new(load_builtin("track", &over).unwrap().spec);
+    let mut faults = prepared.spec.faults.clone();
+    for &at_ms in killed_at_ms {
+        let mut swarm = Swarm::new(&prepared, seed, faults.clone(), false);
+        swarm.run_until(at_ms);
+        let follows = |id: &u16| swarm.beliefs(*id).is_some_and(|b| b.follows.is_some());
+        let ids = prepared.spec.uavs.iter().map(|u| u.id);
+        let peer = ids.into_iter().find(follows).unwrap();
+        let fault = Fault::Kill { peer };
+        faults.push(TimedFault { at_ms, fault });
+    }
+    run(&prepared, seed, faults, Wanted::default())
+}
+
+#[test]
+fn a_car_is_followed_and_by_another_when_its_follower_is_killed() {
+    let outcome = tracked(3, 5, &[150_000]);
+    let broken = outcome.violations();
+    assert!(outcome.report.completed && broken.is_empty(), "{broken:?}");
+    let [told] = &outcome.report.tasks[..] else {
+        panic!("{:?}", outcome.report.tasks);
+    };
+    let seen = told.tracked.as_ref().unwrap();
+    assert!(told.held_by.len() >= 2, "{}", told.line());
+    assert!(seen.sight_ms > 150_000, "{}", told.line());
+    assert!(!seen.retaken_ms.is_empty(), "{}", told.line());
+    assert!(seen.stand_off_rms_mm < 15_000, "{}", told.line());
+    assert!(seen.place_rms_mm < 12_000, "{}", told.line());
+}
+
+#[test]
+fn one_uav_alone_covers_first_and_eight_cover_while_one_follows() {
+    for uavs in [1, 8] {
+        let outcome = tracked(uavs, 3, &[]);
+        let broken = outcome.violations();
+        assert!(outcome.report.completed && broken.is_empty(), "{broken:?}");
+        let told = &outcome.report.tasks[0];
+        let covered_ms = outcome.report.makespan_ms.unwrap();
+        let first_ms = told.tracked.as_ref().and_then(|t| t.first_ms).unwrap();
+        assert_eq!(first_ms > covered_ms, uavs == 1, "{}", told.line());
+    }
 }

@@ -146,6 +146,7 @@ fn spec(s: &Stated, geometry: &MissionGeometry) -> Spec {
         min_coverable: s.run.min_coverable,
         min_separation_m: s.run.min_separation_m.max(s.fleet.separation_m),
         traffic_range_m: traffic_range_m(s, &geometry.mission),
+        vehicles: s.vehicles.clone(),
         faults: with_operator(s),
         storm: s.storm,
         seed: s.run.seed,

@@ -1,6 +1,8 @@
 //! A scenario with nothing left to resolve: no file names, no units to convert.
 
 use crate::fault::TimedFault;
+use crate::pursuit::roads::Roads;
+use crate::pursuit::vehicle::Behaviour;
 use crate::twins::Twins;
 use skein_flight::airframe::Airframe;
 use skein_flight::trajectory::timed::Objective;
@@ -50,6 +52,8 @@ pub struct Spec {
     pub min_separation_m: f64,
     /// How far UAVs sense each other, metres; 0 without such sensors.
     pub traffic_range_m: f64,
+    /// Vehicles on the ground, of which cameras see those in their pictures.
+    pub vehicles: Vec<VehicleSpec>,
     /// Faults of the scenario, ascending by time.
     pub faults: Vec<TimedFault>,
     /// From what random faults are drawn.
@@ -122,6 +126,21 @@ impl UavSpec {
         let bit = u32::from(sensor).checked_sub(1);
         bit.is_none_or(|bit| self.sensors >> bit.min(31) & 1 == 1)
     }
+}
+
+/// A vehicle on the ground.
+#[derive(Clone, Debug)]
+pub struct VehicleSpec {
+    /// Where it drives.
+    pub roads: Arc<Roads>,
+    /// Near which place it starts, if it matters; else anywhere.
+    pub start: Option<Point>,
+    /// What it does.
+    pub behaviour: Behaviour,
+    /// Its usual speed on a straight road, m/s.
+    pub speed_mps: f64,
+    /// What it looks like to a detector.
+    pub kind: u8,
 }
 
 /// The ground station.

@@ -192,7 +192,7 @@ struct Feasibility {
 /// Something that happened.
 enum Happened {
     World(News),
-    Sensed(Percept),
+    Sensed(Box<Percept>),
     Stored(Stored),
     Computed(u64, JobResult),
     Asked(Asked<Request>),
@@ -259,7 +259,7 @@ where
                 biased;
                 () = &mut stop => break,
                 news = world.next() => Happened::World(news),
-                percept = vehicle.sense() => Happened::Sensed(percept),
+                percept = vehicle.sense() => Happened::Sensed(Box::new(percept)),
                 Some(stored) = self.journal.answer() => Happened::Stored(stored),
                 Some((token, result)) = self.results.recv() => Happened::Computed(token, result),
                 asked = console.next() => Happened::Asked(asked),
@@ -298,7 +298,7 @@ where
         match happened {
             Happened::World(News::End) => return false,
             Happened::World(News::Tick(tick)) => self.tick(tick).await,
-            Happened::Sensed(percept) => self.step(Input::Percept(percept)).await,
+            Happened::Sensed(percept) => self.step(Input::Percept(*percept)).await,
             Happened::Stored(Stored { token, ok }) => self.step(Input::Stored { token, ok }).await,
             Happened::Computed(token, result) => self.step(Input::Computed { token, result }).await,
             Happened::Asked(asked) => self.asked(asked).await,

@@ -3,6 +3,7 @@
 use crate::cells::CellSet;
 use crate::diagram::MissionEvent;
 use crate::output::Status;
+use crate::tasking::Follows;
 use crate::wire::message::{Epoch, Order, Orders, Stamp};
 use crate::wire::tasks::{Progress, TaskId};
 use crate::{Incarnation, PeerId};
@@ -64,6 +65,8 @@ pub struct Beliefs {
     pub stage: Option<(usize, MissionEvent)>,
     /// Whether it knew many and hears nobody.
     pub hears_nobody: bool,
+    /// Whom it says that it follows, once it had seen it.
+    pub follows: Option<Follows>,
     /// Tasks that it knows to be open, and in its eyes somebody can do.
     pub open_tasks: Vec<(TaskId, u32)>,
     /// Records held, bytes waiting to be sent, open stores: each with its cap.

@@ -8,6 +8,7 @@
 //! | the operator said hold | loiter here |
 //! | the operator said return or cancelled the mission, or all is covered, or the fuel is due, or another process speaks under its id | loiter at base |
 //! | it was given a relay position, and its circle is planned | fly there and circle |
+//! | it was given a target to follow, and where that may be is near | follow it |
 //! | it was given a task, and its flight is planned | fly that, then the cells of the plan |
 //! | the plan has cells | fly them |
 //! | nothing to fly, others at work | loiter where it is |
@@ -248,6 +249,7 @@ impl Cooperation {
         let Some(state) = &mut self.state else {
             return Effects::new();
         };
+        let aims_anew = self.tasking.look(now, percept, state);
         let sections = &state.negotiation.sections;
         let Some(executive) = &mut state.executive else {
             return Effects::new();
@@ -255,6 +257,9 @@ impl Cooperation {
         let is_open = |c: u16| !sections.covered().contains(c);
         let (setpoint, events) = executive.step(percept, &is_open);
         let mut effects = vec![Effect::Fly(setpoint)];
+        if aims_anew {
+            effects.push(Effect::Negotiate);
+        }
         if let Some(separation) = &mut state.separation {
             effects.extend(separation.on_percept(now, percept, executive, &is_open));
         }
@@ -316,7 +321,9 @@ impl Cooperation {
                 self.hear_orders(orders, (record.incarnation, record.seq, record.author));
                 Effects::new()
             }
-            Body::Task(_) | Body::Bundle(_) => self.tasking.hear(now, record, body),
+            Body::Task(_) | Body::Bundle(_) | Body::Target(_) => {
+                self.tasking.hear(now, record, body)
+            }
             Body::Intent(_) | Body::Conflict(_) => {
                 let state = self.state.as_mut();
                 if let Some(separation) = state.and_then(|s| s.separation.as_mut()) {

@@ -17,6 +17,7 @@
 //! | [`peer`] | routes events to the parts and carries out their effects |
 //! | [`transmission`], `inbound`, `outbound` | bytes as they are read, and what they are to a peer; what is spoken, and when |
 //! | `cooperation`, `mission_state` | mission, goal, the peer's part in negotiations |
+//! | `targets` | vehicles on the ground: tracks, what all tell of them, whom a task is bound to |
 //! | `tasking`, `task_desk`, [`errand`], [`relay_circle`] | tasks other than coverage: the peer's part in their auction, its operator's, the flight that does one, the circle that is held |
 //! | [`protocol`] | the machines and rules by which peers agree |
 //! | `timers` | every deadline, in one table |
@@ -117,6 +118,7 @@ pub mod relay_circle;
 mod separation;
 mod stage;
 mod taking;
+mod targets;
 mod task;
 mod task_desk;
 mod tasking;
@@ -140,6 +142,7 @@ pub use overview::Overview;
 pub use peer::Peer;
 pub use task::{CoverageTask, LineTask, PointTask};
 pub use task_desk::{TaskHolder, TaskView};
+pub use tasking::Follows;
 pub use transmission::Transmission;
 pub use why::Why;
 

@@ -97,6 +97,8 @@ impl ClaimsWritten {
 pub(crate) struct RelayPosition {
     /// The circle that is flown there, once it is planned.
     pub circle: Option<Segment>,
+    /// Of a target to follow, once it is near: how far from it the UAV stays, metres.
+    pub follow: Option<f64>,
 }
 
 /// What a peer has once it holds a mission and its geometry.
@@ -182,7 +184,7 @@ impl MissionState {
     pub fn activity(&self) -> Activity {
         match &self.goal {
             Some(Goal::Legs(_) | Goal::Given(_) | Goal::Detour(..)) => Activity::Covering,
-            Some(Goal::Hold | Goal::Circle(_)) => Activity::Holding,
+            Some(Goal::Hold | Goal::Circle(_) | Goal::Follow(_)) => Activity::Holding,
             Some(Goal::Point(_)) => Activity::Returning,
             None => Activity::Waiting,
         }
@@ -581,9 +583,14 @@ impl MissionState {
         }
     }
 
-    /// The circle that is flown as a relay position, once it is planned.
+    /// How far it stays from the target that it was given, metres, once that may be near.
+    pub fn followed_at_m(&self) -> Option<f64> {
+        self.relay.and_then(|r| r.follow)
+    }
+
+    /// The circle of the relay position that it was given, once it is planned.
     pub fn relay_circle(&self) -> Option<Segment> {
-        self.relay.as_ref().and_then(|r| r.circle)
+        self.relay.and_then(|r| r.circle)
     }
 
     /// Looks at the events that hold, and gives the executive the goal of the state.

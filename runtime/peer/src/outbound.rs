@@ -14,6 +14,7 @@
 //! | operator | when the operator gives an order, by a ground station |
 //! | task | when it is asked for, cancelled, expired, or somebody did it, and once in each life, by a ground station |
 //! | bundle | while a task is open: when the offer or a claim is new; what was won once an interval has passed without news |
+//! | target | while somebody is to be followed: what was seen since it was told last, two at most every I |
 //!
 //! I is the interval that this peer's beacons announce, a period T where there is room.
 

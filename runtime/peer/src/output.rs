@@ -71,6 +71,12 @@ pub enum TaskNews {
     Relays,
     /// This UAV is at the relay position.
     Holds,
+    /// This UAV won it, a target to follow, and gives its section up for it.
+    Tracks,
+    /// This UAV sees the target and follows it.
+    Follows,
+    /// This UAV lost the target and searches where it may be.
+    Searches,
     /// This UAV wants to be relieved of it: its fuel will be due.
     Leaving,
     /// This UAV saw all of it.
@@ -94,6 +100,9 @@ impl TaskNews {
             Self::Flies => "flies",
             Self::Relays => "relays",
             Self::Holds => "holds",
+            Self::Tracks => "tracks",
+            Self::Follows => "follows",
+            Self::Searches => "searches",
             Self::Leaving => "leaving",
             Self::Seen => "seen",
             Self::Left => "left",
@@ -113,10 +122,17 @@ impl TaskNews {
                 format!("it won the relay position {name:?}, gives its section up and flies there")
             }
             Self::Holds => format!("it holds the relay position {name:?}"),
-            Self::Leaving => {
+            Self::Tracks => {
                 format!(
-                    "it asks to be relieved of the relay position {name:?}: its fuel will be due"
+                    "it won the task {name:?} to follow a target, gives its section up and flies there"
                 )
+            }
+            Self::Follows => format!("it sees the target of the task {name:?} and follows it"),
+            Self::Searches => {
+                format!("it lost the target of the task {name:?} and searches where it may be")
+            }
+            Self::Leaving => {
+                format!("it asks to be relieved of the task {name:?}: its fuel will be due")
             }
             Self::Seen => format!("it did the task {name:?}: all of it was seen"),
             Self::Left => format!("it left the task {name:?}: another's, changed or over"),

@@ -9,7 +9,7 @@
 //! At most some hundred circles are measured against the zones.
 
 use crate::mission::{Mission, point_m};
-use crate::wire::tasks::Task;
+use crate::wire::tasks::{Task, TaskKind};
 use skein_behaviors::executive::circle::halves;
 use skein_flight::route::Router;
 use skein_geometry::frame::{Point, Pose, Vector};
@@ -19,6 +19,10 @@ use skein_geometry::{NoFlyZones, Segment};
 /// Circles are flown with so many times the turn radius where there is room, so that following
 /// them has authority on both sides in a wind.
 const RADII: [f64; 2] = [1.2, 1.0];
+
+/// Who is to follow a target that it does not see yet circles no farther than this from where it
+/// may be, metres.
+const AWAIT_M: f64 = 250.0;
 
 /// Centres away from the place are tried at so many distances.
 const DISTANCES: u32 = 16;
@@ -35,14 +39,18 @@ fn circle_round(centre: Point, radius_m: f64) -> Segment {
 }
 
 impl Mission {
-    /// The circle of a relay position in this mission.
+    /// The circle of a relay position in this mission; of a target to follow that on which a UAV
+    /// looks for it first.
     ///
     /// # Errors
     /// A sentence that says why there is none.
     pub fn relay_circle(&self, task: &Task, zones: &NoFlyZones) -> Result<Segment, String> {
-        let place = task.places.first().ok_or("a relay position has a place")?;
+        let place = task.places.first().ok_or("it has no place")?;
         let place = point_m((place.east_mm, place.north_mm));
-        let within_m = f64::from(task.radius_mm) / 1000.0;
+        let within_m = match task.kind {
+            TaskKind::Track => AWAIT_M,
+            _ => f64::from(task.radius_mm) / 1000.0,
+        };
         let (turn_m, stray_m) = (self.turn_radius_m(), self.tracking_error_m());
         let least_m = turn_m + stray_m;
         if within_m < least_m {
@@ -75,12 +83,19 @@ impl Mission {
             })
     }
 
+    /// How far from the base somebody may hold or follow anything, metres: as far as any place
+    /// of the area is, as fuel is kept for the way home from the loop.
+    #[must_use]
+    pub fn reach_m(&self) -> f64 {
+        let away_m = |p: Point| (p - self.base_m()).norm();
+        self.area_m().into_iter().map(away_m).fold(0.0, f64::max)
+    }
+
     /// Who relieves its holder in time may be as far away as any place of the area is from the
     /// base, and no farther.
     fn is_near_enough(&self, place: Point) -> Result<(), String> {
-        let away_m = |p: Point| (p - self.base_m()).norm();
-        let farthest_m = self.area_m().into_iter().map(away_m).fold(0.0, f64::max);
-        let there_m = away_m(place);
+        let farthest_m = self.reach_m();
+        let there_m = (place - self.base_m()).norm();
         if there_m > farthest_m {
             return Err(format!(
                 "the place is {there_m:.0} m from the base, and every place of the area within {farthest_m:.0} m: who relieves its holder might come too late; expected one nearer to the base"
@@ -114,7 +129,7 @@ pub fn planned(
 mod tests {
     use super::*;
     use crate::testing::mission;
-    use crate::wire::tasks::{TaskKind, TaskPlace};
+    use crate::wire::tasks::TaskPlace;
     use skein_behaviors::executive::circle::centre;
     use std::sync::Arc;
 
@@ -140,6 +155,13 @@ mod tests {
             radius_mm: radius_m * 1000,
             worth: 100,
             ..Task::default()
+        }
+    }
+
+    fn track(east_m: i32, north_m: i32) -> Task {
+        Task {
+            kind: TaskKind::Track,
+            ..relay(east_m, north_m, 0)
         }
     }
 
@@ -177,10 +199,13 @@ mod tests {
                 "expected another place or a larger radius",
             ),
             (relay(90_000, 0, 100), "expected one nearer to the base"),
+            (track(90_000, 0), "expected one nearer to the base"),
         ] {
             let said = m.can_do(&task).unwrap_err();
             assert!(said.contains(why), "{said}");
         }
         m.can_do(&relay(100, 200, 100)).unwrap();
+        // A target beside a zone, or in one, is looked for from where there is room.
+        m.can_do(&track(230, 130)).unwrap();
     }
 }

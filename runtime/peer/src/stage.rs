@@ -12,6 +12,7 @@
 //! | timer | it follows this sortie for so long in this life, or of a timer that ends the mission: another peer of it said finished |
 //! | stayed | it is in this state for so long |
 //! | peer_lost | it believes a peer to be down |
+//! | target_given | it holds a target to follow, and where that may be is near |
 //! | relay_given | it holds a relay position whose circle is planned |
 //! | task_given | it holds a task whose flight is planned |
 //! | cells_given | its plan has cells |
@@ -154,6 +155,7 @@ impl MissionState {
             }
             MissionEvent::Stayed => is_past(stage.since, after_s, now),
             MissionEvent::PeerLost => self.lost,
+            MissionEvent::TargetGiven => self.followed_at_m().is_some(),
             MissionEvent::RelayGiven => self.relay_circle().is_some(),
             MissionEvent::TaskGiven => self.errand.is_some(),
             MissionEvent::CellsGiven => !self.negotiation.sections.plan().is_empty(),
@@ -170,6 +172,7 @@ impl MissionState {
         match self.stage.state().goal {
             StateGoal::Hold => Goal::Hold,
             StateGoal::Section => Goal::Legs(legs()),
+            StateGoal::Follow => self.followed_at_m().map_or(Goal::Hold, Goal::Follow),
             StateGoal::Relay => self.relay_circle().map_or(Goal::Hold, Goal::Circle),
             StateGoal::Task => match &self.errand {
                 Some(flight) => Goal::Detour(flight.clone(), legs()),

@@ -8,7 +8,7 @@
 //! | a period passes | likewise, with the present offer and who lives |
 //! | the auction gives a task to fly | its flight is planned beside the loop |
 //! | the flight is planned | it is flown between two cells of the section |
-//! | it is a relay position | the section is given up at once; the circle is flown until the task is over |
+//! | it is a relay position, or a target to follow | the section is given up at once; the circle is flown, or the target followed, until the task is over |
 //! | the circle is reached | begun: told |
 //! | the fuel lasts for as long as it takes others to come | others are asked to relieve it; it stays until one has begun |
 //! | all of it is seen | done: told, and the UAV is free for the next |
@@ -20,6 +20,7 @@
 //! While no task is open nothing is said.
 
 mod relaying;
+mod tracking;
 
 use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
@@ -33,12 +34,13 @@ use crate::offload::Job;
 use crate::output::{Report, TaskNews};
 use crate::protocol::auction::flown::RoutedTime;
 use crate::protocol::auction::{self, Auction, Event, KNOWN_MAX, Version};
+use crate::targets::Targets;
 use crate::task_desk::TaskHolder;
 use crate::wire::codec::Body;
 use crate::wire::limits::{DURATION_MAX_MS, PEERS_MAX};
 use crate::wire::message::{Member, Record};
 use crate::wire::tasks::{
-    Bundle, BundleTask, Offer, Progress, Task, TaskId, TaskState, sensor_name,
+    Bundle, BundleTask, Offer, Progress, Task, TaskId, TaskKind, TaskState, sensor_name,
 };
 use crate::{Incarnation, PeerId};
 use relaying::Held;
@@ -50,6 +52,7 @@ use skein_geometry::hash::Fnv;
 use skein_geometry::math::wrap_pi;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{Hash, Hasher};
+pub use tracking::Follows;
 
 /// A task whose flight did not see all of it is flown once more, then others are asked.
 const MAX_TRIES: u8 = 2;
@@ -102,6 +105,8 @@ pub(crate) struct Tasking {
     news: BTreeSet<TaskId>,
     heard: BTreeSet<PeerId>,
     flown: Option<Flown>,
+    /// Vehicles that were seen.
+    pub(crate) targets: Targets,
     /// The version of the bundle that was spoken last.
     spoken: Option<Version>,
     /// The life in which the tasks of this peer's operator were spoken.
@@ -124,6 +129,10 @@ impl Tasking {
             news: BTreeSet::new(),
             heard: BTreeSet::new(),
             flown: None,
+            targets: Targets::new(
+                config.id.0,
+                config.airframe.filter(|_| config.role == Role::Uav),
+            ),
             spoken: None,
             told_in: 0,
             last_period: Time(0),
@@ -135,6 +144,7 @@ impl Tasking {
     /// A life begins, or another process silences this one: what it held is void.
     pub fn void_ownership(&mut self, me: Member, state: Option<&mut MissionState>) {
         self.auction.begin_life(me.incarnation);
+        self.targets.begin_life(me.incarnation);
         self.spoken = None;
         self.leave(state);
     }
@@ -182,6 +192,8 @@ impl Tasking {
 
     /// What it holds, and what of all it knows to be open that somebody can do.
     pub fn fill(&self, beliefs: &mut Beliefs) {
+        beliefs.follows = self.follows();
+        beliefs.loads.extend(self.targets.loads());
         let held = self.auction.held().iter();
         beliefs.tasks = held.map(|t| (t.task, t.revision, t.progress)).collect();
         let hopeless = self.auction.unassigned();
@@ -205,6 +217,10 @@ impl Tasking {
     /// A record of another peer.
     pub fn hear(&mut self, now: Time, record: &Record, body: &Body) -> Effects {
         match body {
+            Body::Target(target) => {
+                self.targets.hear(record.author, target);
+                Effects::new()
+            }
             Body::Task(task) => {
                 let id = TaskId {
                     author: record.author,
@@ -302,6 +318,7 @@ impl Tasking {
         }
         // That the last task is done is said, too.
         effects.extend(self.speak(s));
+        effects.extend(self.tell_of_targets(s));
         state.has_tasks = self.has_work();
         effects
     }
@@ -437,6 +454,7 @@ impl Tasking {
                 auction::Effect::Fly(id) => {
                     let known = self.known.get(&id).map(|k| &k.task);
                     let is_held = known.is_some_and(Task::is_held);
+                    let tracks = known.is_some_and(|t| t.kind == TaskKind::Track);
                     self.flown = Some(Flown {
                         id,
                         revision: known.map_or(0, |task| task.revision),
@@ -445,7 +463,9 @@ impl Tasking {
                         held: is_held.then(Held::default),
                     });
                     state.relay = is_held.then(RelayPosition::default);
-                    let news = if is_held {
+                    let news = if tracks && is_held {
+                        TaskNews::Tracks
+                    } else if is_held {
                         TaskNews::Relays
                     } else {
                         TaskNews::Flies
@@ -465,7 +485,7 @@ impl Tasking {
         let (executive, airframe) = (state.executive.as_ref()?, self.flies?);
         let request = Request {
             geometry: std::sync::Arc::clone(&state.geometry),
-            task: task.clone(),
+            task: self.as_flown((flown.id, flown.revision), task, &state.geometry.mission),
             from: executive.pose()?,
             airspeed_mps: airframe.cruise_mps,
         };
@@ -478,7 +498,11 @@ impl Tasking {
         let flown = self.flown.as_mut()?;
         flown.is_planned = false;
         state.set_errand(None);
-        state.relay = flown.held.is_some().then(RelayPosition::default);
+        let follow = state.relay.and_then(|r| r.follow);
+        state.relay = flown.held.is_some().then_some(RelayPosition {
+            circle: None,
+            follow,
+        });
         self.plan(state)
     }
 
@@ -505,8 +529,10 @@ impl Tasking {
             }
             Ok(Planned::Circle(circle)) => {
                 flown.is_planned = true;
+                let follow = state.relay.and_then(|r| r.follow);
                 state.relay = Some(RelayPosition {
                     circle: Some(circle),
+                    follow,
                 });
                 vec![Effect::Negotiate]
             }

@@ -168,6 +168,7 @@ impl Seat {
             takes_off_in_ms: 0,
             failsafe: false,
             traffic: skein_behaviors::traffic::Traffic::default(),
+            sightings: skein_behaviors::sightings::Sightings::default(),
         }
     }
 

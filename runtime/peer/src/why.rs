@@ -37,6 +37,8 @@ pub enum Reason {
     Twin,
     /// It was given a relay position to hold.
     Relay,
+    /// It was given a target to follow, and knows where it may be.
+    Track,
     /// It was given a task to do.
     Task,
     /// It has cells to fly.
@@ -66,6 +68,7 @@ impl Reason {
             MissionEvent::Timer => Self::TimeIsOver,
             MissionEvent::Stayed => Self::Stayed,
             MissionEvent::PeerLost => Self::PeerLost,
+            MissionEvent::TargetGiven => Self::Track,
             MissionEvent::RelayGiven => Self::Relay,
             MissionEvent::TaskGiven => Self::Task,
             MissionEvent::CellsGiven => Self::Plan,
@@ -84,7 +87,7 @@ impl Reason {
             Self::Finished => "everything is covered",
             Self::FuelIsDue => "its fuel is due",
             Self::Twin => "another process speaks under its id",
-            Self::Relay | Self::Task | Self::Plan => "",
+            Self::Relay | Self::Track | Self::Task | Self::Plan => "",
             Self::Astray => "it has nothing to fly and hears nobody",
             Self::OthersAtWork => "it has nothing to fly, others are at work",
             Self::TimeIsOver => "the time of its mission is over",

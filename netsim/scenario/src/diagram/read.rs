@@ -11,9 +11,12 @@ use skein_peer::diagram::{
 const NOT_YET: &[(&str, &str)] = &[
     (
         "object_detected",
-        "no camera tells objects apart yet: what is seen are cells and places",
+        "what is seen is followed where the operator asks for it, with a track task",
     ),
-    ("target_lost", "no UAV of a mission follows a target yet"),
+    (
+        "target_lost",
+        "who loses the target that it was given searches for it, as long as it is to follow it",
+    ),
     (
         "wind_above",
         "the wind of a run is the same all the time; a wind in which the mission cannot be flown is refused before it begins",
@@ -91,9 +94,6 @@ fn state(node: &Node<'_>) -> Result<State, Error> {
     let f = node.fields(&["name", "goal", "part", "behaviour"])?;
     let goals = StateGoal::ALL.map(|g| (g.name(), g));
     let goal = f.need("goal", "\"home\"")?;
-    if goal.text()? == "follow" {
-        return Err(goal.wrong("no UAV of a mission follows a target yet; see docs/tracking.md"));
-    }
     let parts = Part::ALL.map(|p| (p.name(), p));
     let example = "{ purpose: \"traveling\", actions: [\"displacing\"] }";
     Ok(State {

@@ -133,8 +133,8 @@ fn what_is_wrong_is_told_with_its_place_and_a_remedy() {
         (
             "name: \"task\", goal: \"task\"",
             "name: \"task\", goal: \"follow\"",
-            "states[2].goal",
-            "docs/tracking.md",
+            "states[2].behaviour.purpose",
+            "is for tracking",
         ),
         (
             "name: \"task\"",

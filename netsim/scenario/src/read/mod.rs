@@ -11,6 +11,7 @@ mod shared;
 pub(crate) mod targets;
 mod tasks;
 pub(crate) mod terrain;
+mod vehicles;
 pub(crate) mod wind;
 
 use crate::diagram;
@@ -29,7 +30,7 @@ use skein_geometry::frame::Point;
 use skein_interop::airframe;
 use skein_interop::json::{Document, Error, Fields, Node, Places};
 use skein_netsim::fault::TimedFault;
-use skein_netsim::spec::{GroundStationSpec, RadioSpec, StormSpec};
+use skein_netsim::spec::{GroundStationSpec, RadioSpec, StormSpec, VehicleSpec};
 use skein_peer::diagram::Diagram;
 use std::collections::BTreeSet;
 use targets::Asked;
@@ -65,6 +66,7 @@ const FIELDS: &[&str] = &[
     "percept_period_ms",
     "faults",
     "operator",
+    "vehicles",
     "storm",
     "checks",
 ];
@@ -96,6 +98,8 @@ pub(crate) struct Stated {
     pub(crate) faults_of: Option<String>,
     /// What the operator does, ascending by time.
     pub(crate) operator: Vec<operator::Act>,
+    /// Vehicles on the ground.
+    pub(crate) vehicles: Vec<VehicleSpec>,
     pub(crate) storm: StormSpec,
     /// What its files told besides what was asked, and faults that were left out.
     pub(crate) findings: Vec<Finding>,
@@ -139,6 +143,10 @@ pub(crate) fn scenario(
         || Ok(Vec::new()),
         |list| operator::read(list, (&terrain, files), &known, &mut notices),
     )?;
+    let vehicles = f.get("vehicles").map_or_else(
+        || Ok(Vec::new()),
+        |list| vehicles::read(list, (terrain.origin, files), &mut notices),
+    )?;
     let mut findings: Vec<Finding> = notices
         .into_iter()
         .map(|(field, text)| Finding {
@@ -180,6 +188,7 @@ pub(crate) fn scenario(
         radio,
         faults,
         operator,
+        vehicles,
         findings,
         places,
     })

@@ -1,5 +1,5 @@
 //! Tasks that the operator of a scenario asks for in flight: a place, a line or an area, within
-//! a time, for a sensor; or a relay position, for a time.
+//! a time, for a sensor; or a relay position or a target to follow, for a time.
 
 use super::shared::position;
 use skein_interop::json::{Error, Node, suggestion};
@@ -23,13 +23,24 @@ pub(crate) const RELAY_RADIUS_M: f64 = 100.0;
 /// Reads `task_add`.
 pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
     let f = node.fields(&[
-        "id", "point", "line", "area", "relay", "radius_m", "within_s", "for_s", "needs", "worth",
+        "id",
+        "point",
+        "line",
+        "area",
+        "relay",
+        "track",
+        "radius_m",
+        "stand_off_m",
+        "within_s",
+        "for_s",
+        "needs",
+        "worth",
     ])?;
     let place = |node: &Node<'_>| {
         let at = position(&node.fields(&["east_m", "north_m"])?)?;
         Ok(vec![(mm(at.x), mm(at.y))])
     };
-    let given = ["point", "line", "area", "relay"];
+    let given = ["point", "line", "area", "relay", "track"];
     let given = given.iter().filter_map(|name| Some((*name, f.get(name)?)));
     let given: Vec<_> = given.collect();
     let (kind, places) = match given[..] {
@@ -37,13 +48,14 @@ pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
         [("line", line)] => (TaskKind::Line, places(line, 2)?),
         [("area", area)] => (TaskKind::Area, places(area, 3)?),
         [("relay", relay)] => (TaskKind::Relay, place(relay)?),
+        [("track", track)] => (TaskKind::Track, place(track)?),
         _ => {
             return Err(node.wrong(
-                "expected either point: { east_m: 250, north_m: 250 }, line: [{ east_m: 0, north_m: 0 }, ...], area: [three corners or more] or relay: { east_m: 250, north_m: 250 }",
+                "expected either point: { east_m: 250, north_m: 250 }, line: [{ east_m: 0, north_m: 0 }, ...], area: [three corners or more], relay: { east_m: 250, north_m: 250 } or track: { east_m: 250, north_m: 250 }",
             ));
         }
     };
-    let is_held = kind == TaskKind::Relay;
+    let is_held = kind.goes_on();
     let (usual_m, lasts, other) = if is_held {
         (RELAY_RADIUS_M, "for_s", "within_s")
     } else {
@@ -52,14 +64,24 @@ pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
     if let Some(other) = f.get(other) {
         return Err(other.wrong(format!(
             "a {} says {lasts}",
-            if is_held {
-                "relay"
-            } else {
-                "point, line or area"
+            match kind {
+                TaskKind::Relay => "relay",
+                TaskKind::Track => "track",
+                _ => "point, line or area",
             }
         )));
     }
-    let radius_m = f.number_or("radius_m", usual_m, 0.0, 1_000.0, "metres")?;
+    // Of a target to follow a radius is how far from it a UAV stays; 0 for half of what its
+    // camera sees to either side.
+    let (radius, usual_m, other) = if kind == TaskKind::Track {
+        ("stand_off_m", 0.0, "radius_m")
+    } else {
+        ("radius_m", usual_m, "stand_off_m")
+    };
+    if let Some(other) = f.get(other) {
+        return Err(other.wrong(format!("this task says {radius}")));
+    }
+    let radius_m = f.number_or(radius, usual_m, 0.0, 1_000.0, "metres")?;
     let within_ms = f.get(lasts).map(|n| {
         let within_s = n.number(1.0, 86_400.0, "seconds")?;
         #[allow(

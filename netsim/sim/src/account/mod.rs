@@ -36,6 +36,7 @@ pub use lifetimes::{Cause, Setting};
 pub use report::{Details, Driver, FalseDown, Live, Processes, RunReport, Simulated, Violations};
 pub use work::Held;
 
+pub use crate::check::tracks::Tracked;
 use crate::world::{Fact, Judge, Loss};
 use connectivity::Connectivity;
 use detection::Detection;
@@ -120,6 +121,11 @@ impl Account {
     /// The ground station of its operator holds this task.
     pub fn asked(&mut self, now_ms: u64, task: &AskedTask) {
         self.tasks.asked(now_ms, task);
+    }
+
+    /// What the world knows of a target that is to be followed.
+    pub fn tracked(&mut self, task: (u16, u32), tracked: &Tracked) {
+        self.tasks.tracked(task, tracked);
     }
 
     /// A process starts again, with its journal or with a fresh disk.
@@ -232,7 +238,7 @@ impl Account {
             }
             Report::Task { news, .. } => {
                 match news {
-                    TaskNews::Relays => {
+                    TaskNews::Relays | TaskNews::Tracks => {
                         self.relaying.insert(peer);
                     }
                     TaskNews::Left => {

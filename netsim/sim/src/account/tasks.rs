@@ -1,6 +1,7 @@
 //! What became of the tasks that were asked for in flight (D2.7 §3.2): who flew to them, who
 //! says to have done them, and when the judge saw them.
 
+use crate::check::tracks::Tracked;
 use crate::world::Judge;
 use serde::{Deserialize, Serialize};
 use skein_peer::Report;
@@ -28,10 +29,21 @@ pub struct TaskReport {
     /// Who held it, if it is a relay position, each time one did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub held_by: Vec<u16>,
+    /// How often whoever followed its target said that it lost it.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub lost: u32,
+    /// What became of its target, as the world knows, if it is one to follow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracked: Option<Tracked>,
     /// Who says to have done it; more than one did it more than once.
     pub done_by: Vec<u16>,
     /// Why nobody can do it, as the first UAV said that did.
     pub nobody_can: Option<String>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "as serde asks")]
+fn is_none(n: &u32) -> bool {
+    *n == 0
 }
 
 /// All of them, by register and revision.
@@ -71,17 +83,31 @@ impl Tasks {
             return;
         };
         match news {
-            TaskNews::Flies | TaskNews::Relays => task.flown_by.push(peer),
+            TaskNews::Flies | TaskNews::Relays | TaskNews::Tracks => task.flown_by.push(peer),
             TaskNews::Holds => task.held_by.push(peer),
+            TaskNews::Follows => {
+                // Who lost the target and found it again holds it all the while.
+                if task.held_by.last() != Some(&peer) {
+                    task.held_by.push(peer);
+                }
+            }
             TaskNews::Seen => task.done_by.push(peer),
             TaskNews::NobodyCan(why) => {
                 task.nobody_can.get_or_insert_with(|| why.clone());
             }
+            TaskNews::Searches => task.lost += 1,
             TaskNews::Asked
             | TaskNews::Leaving
             | TaskNews::Left
             | TaskNews::DoneBy(_)
             | TaskNews::Over(_) => {}
+        }
+    }
+
+    /// What the world knows of a target that was to be followed.
+    pub(super) fn tracked(&mut self, key: (u16, u32), tracked: &Tracked) {
+        if let Some(task) = self.0.get_mut(&key) {
+            task.tracked = Some(tracked.clone());
         }
     }
 
@@ -108,7 +134,11 @@ impl TaskReport {
         let state = format!("{:?}", self.state).to_lowercase();
         if !self.held_by.is_empty() {
             let names: Vec<String> = self.held_by.iter().map(|id| format!("uav{id}")).collect();
-            return format!("{asked}, held by {}, {state}", names.join(", "));
+            let tracked = self
+                .tracked
+                .as_ref()
+                .map_or_else(String::new, Tracked::words);
+            return format!("{asked}, held by {}{tracked}, {state}", names.join(", "));
         }
         match (self.seen_ms, self.seen_by, &self.nobody_can) {
             (Some(ms), Some(by), _) => format!(

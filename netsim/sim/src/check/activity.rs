@@ -285,6 +285,7 @@ fn is_passing(on: MissionEvent) -> bool {
         on,
         MissionEvent::CellsGiven
             | MissionEvent::TaskGiven
+            | MissionEvent::TargetGiven
             | MissionEvent::RelayGiven
             | MissionEvent::PeerLost
             | MissionEvent::NobodyHeard
@@ -361,9 +362,11 @@ impl Facts<'_> {
             MissionEvent::PeerLost => {
                 Holds::of(view.peers.values().any(|(_, s)| *s == Status::Down))
             }
-            MissionEvent::RelayGiven if view.relays => Holds::Maybe,
+            MissionEvent::TargetGiven | MissionEvent::RelayGiven if view.relays => Holds::Maybe,
             MissionEvent::TaskGiven if claims.next().is_some() => Holds::Maybe,
-            MissionEvent::RelayGiven | MissionEvent::TaskGiven => Holds::No,
+            MissionEvent::TargetGiven | MissionEvent::RelayGiven | MissionEvent::TaskGiven => {
+                Holds::No
+            }
             MissionEvent::CellsGiven => Holds::of(!view.plan.is_empty()),
             MissionEvent::NobodyHeard => Holds::of(view.hears_nobody),
             MissionEvent::Otherwise => Holds::Yes,

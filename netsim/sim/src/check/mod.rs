@@ -21,6 +21,7 @@
 //! | [`spoken`] | what is published against what is held |
 //! | [`tasks`] | each task in one bundle, and in one at least |
 //! | [`relays`] | who holds a relay position is there |
+//! | [`tracks`] | who says that it follows a target sees it |
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
 //! | [`airtime`] | S9: shares of the channel |
 //! | [`fuel`] | S10, bids and returns against fuel and place |
@@ -57,6 +58,7 @@ pub mod spread;
 pub mod tasks;
 #[cfg(test)]
 mod testing;
+pub mod tracks;
 pub mod twins;
 
 pub use bounds::{Bounds, Grade};

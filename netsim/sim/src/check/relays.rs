@@ -7,7 +7,7 @@ use skein_geometry::frame::Point;
 use skein_peer::input::AskedTask;
 use skein_peer::mission::point_m;
 use skein_peer::wire::message::Order;
-use skein_peer::wire::tasks::{Progress, TaskId};
+use skein_peer::wire::tasks::{Progress, TaskId, TaskKind};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// For so long a holder may be away: its process stood still meanwhile, or a zone came and it
@@ -43,7 +43,9 @@ impl RelayCheck {
     /// The ground station holds a task of its operator.
     pub fn on_asked(&mut self, asked: &AskedTask) {
         let task = &asked.task;
-        if let (true, Some(place)) = (task.is_held(), task.places.first()) {
+        // A target to follow is no place: it has a rule of its own.
+        let is_relay = task.is_held() && task.kind == TaskKind::Relay;
+        if let (true, Some(place)) = (is_relay, task.places.first()) {
             let at = point_m((place.east_mm, place.north_mm));
             let within_m = f64::from(task.radius_mm) / 1000.0;
             let key = (asked.number, task.revision_as_asked());
@@ -148,7 +150,7 @@ mod tests {
     use super::super::testing::{Story, speaking};
     use super::*;
     use skein_peer::Beliefs;
-    use skein_peer::wire::tasks::{Task, TaskKind, TaskPlace};
+    use skein_peer::wire::tasks::{Task, TaskPlace};
 
     const TASK: TaskId = TaskId {
         author: 100,

@@ -13,6 +13,7 @@ use super::relays::RelayCheck;
 use super::spoken::SpokenCheck;
 use super::spread::SpreadCheck;
 use super::tasks::TaskCheck;
+use super::tracks::TrackCheck;
 use super::{Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::spec::{Spec, UavSpec};
 use crate::twins::Twins;
@@ -45,6 +46,8 @@ pub struct Rules {
     tasks: TaskCheck,
     /// Who holds relay positions.
     pub relays: RelayCheck,
+    /// Who follows targets.
+    pub tracks: TrackCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -75,6 +78,7 @@ impl Rules {
             spread: SpreadCheck::new(spec.twins()),
             tasks: TaskCheck::default(),
             relays: RelayCheck::default(),
+            tracks: TrackCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),

@@ -18,7 +18,7 @@ use skein_flight::tracking::mode::{Airspeeds, Mode};
 use skein_flight::tracking::tracks::{TargetName, Tracks};
 use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::{Point, Vector};
-use skein_geometry::math::{exp, sin_cos};
+use skein_geometry::math::sin_cos;
 use std::collections::BTreeMap;
 
 /// Who was not heard of for so long is taken for gone, milliseconds: ten statements.
@@ -121,10 +121,9 @@ impl Flyer {
             airspeed_mps,
             self.turn_rate_radps,
         );
-        let aim = self.target().map(|t| {
-            let expected = expected(t, now_ms);
-            expected + searched(t, now_ms) - self.sensor.displaced()
-        });
+        let aim = self
+            .target()
+            .map(|t| t.expected(now_ms, DENSITY) + searched(t, now_ms) - self.sensor.displaced());
         self.camera
             .advance(&pose, self.body.height_m(), &attitude, aim, over_s);
     }
@@ -240,11 +239,7 @@ impl Flyer {
         guard: Option<&Guard<'_>>,
         now_ms: u64,
     ) {
-        let known = self.target().map(|t| TargetMotion {
-            position: expected(t, now_ms),
-            velocity_mps: t.estimate.velocity_mps() * exp(-unseen_s(t, now_ms) / ON_S),
-            acceleration_mps2: Vector::zeros(),
-        });
+        let known = self.target().map(|t| t.motion(now_ms, DENSITY));
         let Some(motion) = exact.or(known) else {
             return self.hold(now_ms);
         };
@@ -328,9 +323,6 @@ impl Flyer {
     }
 }
 
-/// Who is out of sight goes on as it was for about so long, seconds: then it has turned off.
-const ON_S: f64 = 8.0;
-
 /// For so long nobody may see a target before it is looked for beside where it should be,
 /// seconds.
 const SEARCH_S: f64 = 1.2;
@@ -338,21 +330,9 @@ const SEARCH_S: f64 = 1.2;
 /// The camera looks elsewhere so often, milliseconds.
 const GLANCE_MS: u64 = 400;
 
-fn unseen_s(t: &Fused, now_ms: u64) -> f64 {
-    seconds(now_ms.saturating_sub(t.seen_ms))
-}
-
-/// Where a target probably is: on its way, and less far on it the longer nobody saw it.
-fn expected(t: &Fused, now_ms: u64) -> Point {
-    let aged = t.estimate.at(now_ms, DENSITY);
-    let unseen_s = unseen_s(t, now_ms);
-    let on_s = ON_S * (1.0 - exp(-unseen_s / ON_S));
-    aged.position() - aged.velocity_mps() * (unseen_s - on_s)
-}
-
 /// Where the camera looks beside that: round about, as far as the target may have come.
 fn searched(t: &Fused, now_ms: u64) -> Vector {
-    if unseen_s(t, now_ms) < SEARCH_S {
+    if t.unseen_s(now_ms) < SEARCH_S {
         return Vector::zeros();
     }
     let glance = now_ms / GLANCE_MS;

@@ -74,6 +74,15 @@ impl Roads {
         (from, next[random.below(next.len())])
     }
 
+    /// The place nearest to a given one, and one to drive to from there.
+    pub(super) fn nearest(&self, to: Point, random: &mut SplitMix64) -> (usize, usize) {
+        let away = |n: &usize| (self.places[*n] - to).norm();
+        let all = 0..self.places.len();
+        let from = all.min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0);
+        let next = &self.neighbours[from];
+        (from, next[random.below(next.len())])
+    }
+
     fn join(&mut self, a: usize, b: usize) {
         for (from, to) in [(a, b), (b, a)] {
             if !self.neighbours[from].contains(&to) {

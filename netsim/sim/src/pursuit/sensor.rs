@@ -131,7 +131,7 @@ impl Sensor {
 }
 
 /// Draws of the standard normal distribution, spread as a covariance says.
-fn rooted(covariance_m2: &Matrix2<f64>, off: Vector) -> Vector {
+pub(crate) fn rooted(covariance_m2: &Matrix2<f64>, off: Vector) -> Vector {
     let root = covariance_m2.cholesky().map(|c| c.l());
     root.map_or_else(Vector::zeros, |l| l * off)
 }

@@ -11,7 +11,7 @@ use skein_geometry::math::{TAU, atan2, sin, sin_cos, tan, wrap_pi};
 use skein_geometry::random::SplitMix64;
 
 /// The world moves a vehicle in steps of this, seconds.
-pub(super) const STEP_S: f64 = 0.05;
+pub(crate) const STEP_S: f64 = 0.05;
 
 /// Speeding up, m/s².
 const SPEED_UP_MPS2: f64 = 2.0;
@@ -53,8 +53,8 @@ pub enum Behaviour {
 
 /// A vehicle.
 #[derive(Clone, Debug)]
-pub(super) struct Vehicle {
-    pub(super) at: Point,
+pub(crate) struct Vehicle {
+    pub(crate) at: Point,
     heading_rad: f64,
     speed_mps: f64,
     acceleration_mps2: Vector,
@@ -73,9 +73,32 @@ pub(super) struct Vehicle {
 
 impl Vehicle {
     /// One that stands somewhere on the roads.
-    pub(super) fn new(roads: &Roads, behaviour: Behaviour, usual_mps: f64, seed: u64) -> Self {
+    pub(crate) fn new(roads: &Roads, behaviour: Behaviour, usual_mps: f64, seed: u64) -> Self {
         let mut random = SplitMix64::new(seed);
-        let (from, to) = roads.draw(&mut random);
+        let first = roads.draw(&mut random);
+        Self::from(roads, first, behaviour, usual_mps, random)
+    }
+
+    /// One that stands at the place of the roads that is nearest to a given one.
+    pub(crate) fn near(
+        roads: &Roads,
+        start: Point,
+        behaviour: Behaviour,
+        usual_mps: f64,
+        seed: u64,
+    ) -> Self {
+        let mut random = SplitMix64::new(seed);
+        let first = roads.nearest(start, &mut random);
+        Self::from(roads, first, behaviour, usual_mps, random)
+    }
+
+    fn from(
+        roads: &Roads,
+        (from, to): (usize, usize),
+        behaviour: Behaviour,
+        usual_mps: f64,
+        mut random: SplitMix64,
+    ) -> Self {
         let at = roads.place(from);
         let along = roads.place(to) - at;
         let first_s = 10.0 + 30.0 * random.unit();
@@ -105,7 +128,7 @@ impl Vehicle {
     }
 
     /// Drives for one step; `uavs` are where UAVs are.
-    pub(super) fn drive(&mut self, roads: &Roads, now_s: f64, uavs: &[Point]) {
+    pub(crate) fn drive(&mut self, roads: &Roads, now_s: f64, uavs: &[Point]) {
         if self.behaviour == Behaviour::Parked {
             return;
         }

@@ -7,6 +7,7 @@ use crate::fault::Fault;
 use crate::prepared::Prepared;
 use crate::radio::{Channel, Delivery, Frame, LinkTable, Medium, Overlay, Tally};
 use crate::spec::RadioSpec;
+use crate::world::vehicles::Vehicles;
 use crate::world::{Fact, Judge, Survey, World};
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::CellId;
@@ -79,6 +80,18 @@ impl Air {
     #[must_use]
     pub fn percept(&self, id: u16) -> Option<Percept> {
         self.world.percept(id)
+    }
+
+    /// The vehicles on the ground, as they are.
+    #[must_use]
+    pub fn vehicles(&self) -> &Vehicles {
+        self.world.vehicles()
+    }
+
+    /// Which of them are in the picture of a UAV.
+    #[must_use]
+    pub fn pictured(&self, id: u16) -> Vec<usize> {
+        self.world.pictured(id).collect()
     }
 
     /// Hands a setpoint to an airframe; says whether it was taken.

@@ -39,6 +39,7 @@ mod tests;
 
 use crate::account::{Account, Cause};
 use crate::check::record::Said;
+use crate::check::tracks::Look;
 use crate::check::{Checker, PeerSnapshot};
 use crate::fault::TimedFault;
 use crate::geometry_cache::GeometryCache;
@@ -55,7 +56,7 @@ use operator::Operator;
 use queue::{Phase, Queue};
 use sim_peer::{Process, SimPeer};
 use skein_behaviors::Order;
-use skein_geometry::frame::Pose;
+use skein_geometry::frame::{Point, Pose};
 use skein_link::medium::key_hash;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
@@ -296,6 +297,18 @@ impl Swarm {
     pub fn why(&self, id: u16) -> Option<Why> {
         let sim_peer = &self.peers[self.peer_idx(id)?];
         sim_peer.peer.as_deref().map(skein_peer::Peer::why)
+    }
+
+    /// What a running peer believes.
+    #[must_use]
+    pub fn beliefs(&self, id: u16) -> Option<Beliefs> {
+        let sim_peer = &self.peers[self.peer_idx(id)?];
+        sim_peer.peer.as_deref().map(skein_peer::Peer::beliefs)
+    }
+
+    /// Where the vehicles are.
+    pub fn vehicles(&self) -> impl Iterator<Item = Point> + '_ {
+        self.air.vehicles().places()
     }
 
     /// Where a UAV is; nothing once its airframe is gone.
@@ -812,6 +825,7 @@ impl Swarm {
             self.judged.covered(),
             self.judged.hash(),
         );
+        self.judge_tracks(&peers);
         self.unassigned = peers.iter().any(|m| !m.view.unassigned.is_empty());
         let mut flying = 0;
         let mut finished = true;
@@ -836,6 +850,27 @@ impl Swarm {
                 peer: v.peer,
                 text: v.text,
             });
+        }
+    }
+
+    /// Who says that it follows somebody is looked at beside where vehicles are.
+    fn judge_tracks(&mut self, peers: &[PeerSnapshot]) {
+        if self.air.vehicles().is_empty() {
+            return;
+        }
+        let look = |m: &PeerSnapshot| Look {
+            uav: m.id,
+            at: m.at,
+            since_ms: m.since_ms,
+            says: m.view.follows.filter(|_| m.view.speaks),
+            pictured: self.air.pictured(m.id),
+        };
+        let looks: Vec<Look> = peers.iter().filter(|m| m.uav).map(look).collect();
+        let truth: Vec<Point> = self.air.vehicles().places().collect();
+        let tracks = &mut self.checker.rules.tracks;
+        tracks.on_looks(self.now_ms, &truth, &looks, &mut self.checker.found);
+        for (task, tracked) in tracks.tracked() {
+            self.account.tracked(task, tracked);
         }
     }
 
@@ -869,6 +904,7 @@ impl Swarm {
         for asked in &tasks {
             self.account.asked(self.now_ms, asked);
             self.checker.rules.relays.on_asked(asked);
+            self.checker.rules.tracks.on_asked(asked);
             if !asked.task.is_open() {
                 continue;
             }
@@ -901,7 +937,13 @@ impl Swarm {
         let fresh = |t: &skein_peer::input::AskedTask| {
             t.task.is_open() && t.age_ms < FRESH_TASK_PERIODS * self.period_ms()
         };
-        self.operator.tasks().iter().any(fresh)
+        // While somebody is to be followed for some time that is not over.
+        let follows = |t: &skein_peer::input::AskedTask| {
+            let is_track = t.task.kind == wire::tasks::TaskKind::Track;
+            t.task.is_open() && is_track && t.task.within_ms > 0
+        };
+        let mut tasks = self.operator.tasks().iter();
+        tasks.any(|t| fresh(t) || follows(t))
     }
 
     /// Whoever waits for the operator out of reach of the ground station is told to go on

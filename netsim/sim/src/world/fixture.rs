@@ -132,6 +132,7 @@ pub fn square(n_uavs: u16) -> Spec {
         min_coverable: 0.97,
         min_separation_m: 4.0,
         traffic_range_m: 0.0,
+        vehicles: Vec::new(),
         faults: Vec::new(),
         storm: storm(n_uavs),
         seed: 1,

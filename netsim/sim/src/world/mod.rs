@@ -16,6 +16,7 @@ pub mod pieces;
 mod separation;
 pub mod survey;
 mod task_board;
+pub mod vehicles;
 
 pub use fact::{Approach, Fact};
 pub use judge::{Judge, Sighting};
@@ -35,6 +36,7 @@ use skein_peer::{CoverageTask, Mission};
 use std::collections::BTreeSet;
 use std::iter;
 use std::sync::Arc;
+use vehicles::Vehicles;
 
 /// The world moves in steps of at most this long, aligned to its multiples, so that
 /// separation is looked at this often however seldom the driver asks.
@@ -142,6 +144,7 @@ pub struct World {
     min_separation_m: f64,
     traffic_range_m: f64,
     judge: Judge,
+    vehicles: Vehicles,
     facts: Vec<Fact>,
     flown: Vec<Piece>,
     airborne: Vec<(u16, Place)>,
@@ -214,6 +217,7 @@ impl World {
             min_separation_m: spec.min_separation_m,
             traffic_range_m: spec.traffic_range_m,
             judge,
+            vehicles: Vehicles::new(&spec.vehicles, seed),
             facts: Vec::new(),
             flown: Vec::new(),
             airborne: Vec::new(),
@@ -364,7 +368,27 @@ impl World {
             time_ms: self.now_ms,
             takes_off_in_ms: u32::try_from(ground_ms).unwrap_or(u32::MAX),
             traffic: self.traffic(uav, body.position()),
+            sightings: self
+                .vehicles
+                .look(body, uav, self.now_ms, &self.site.obstacles),
             ..body.percept()?
+        })
+    }
+
+    /// The vehicles on the ground, as they are.
+    #[must_use]
+    pub fn vehicles(&self) -> &Vehicles {
+        &self.vehicles
+    }
+
+    /// Which of them are in the picture of a UAV, unhidden, now.
+    pub fn pictured(&self, uav: u16) -> impl Iterator<Item = usize> + '_ {
+        let body = self
+            .body(uav)
+            .filter(|b| b.takes_off_in_ms(self.now_ms) == 0);
+        let all = 0..self.vehicles.len();
+        all.filter(move |n| {
+            body.is_some_and(|b| self.vehicles.is_pictured(*n, b, &self.site.obstacles))
         })
     }
 
@@ -478,6 +502,7 @@ impl World {
                 self.airborne.push((u.id, place_of(&u.body)));
             }
         }
+        self.vehicles.drive(to_ms, &self.airborne);
         self.judge.separate(
             to_ms,
             &self.airborne,

@@ -12,9 +12,12 @@
 //! fusion based on fast covariance intersection filtering", 2002), so that all compute alike.
 
 use super::estimate::Estimate;
+use super::follower::TargetMotion;
 use super::tracks::{Kind, TargetName};
 use nalgebra::{Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
+use skein_geometry::frame::{Point, Vector};
+use skein_geometry::math::exp;
 use std::collections::BTreeMap;
 
 /// The most targets that one author tells of.
@@ -67,6 +70,38 @@ pub struct Fused {
     pub seen_ms: u64,
     /// How many tell of it.
     pub authors: u32,
+}
+
+/// Who is out of sight goes on as it was for about so long, seconds: then it has turned off.
+const ON_S: f64 = 8.0;
+
+impl Fused {
+    /// For how long nobody has seen it, seconds.
+    #[must_use]
+    pub fn unseen_s(&self, now_ms: u64) -> f64 {
+        #[allow(clippy::cast_precision_loss, reason = "far less than 2^53 ms")]
+        let ms = now_ms.saturating_sub(self.seen_ms) as f64;
+        ms / 1e3
+    }
+
+    /// Where it probably is: on its way, and less far on it the longer nobody saw it.
+    #[must_use]
+    pub fn expected(&self, now_ms: u64, density_m2ps3: f64) -> Point {
+        let aged = self.estimate.at(now_ms, density_m2ps3);
+        let unseen_s = self.unseen_s(now_ms);
+        let on_s = ON_S * (1.0 - exp(-unseen_s / ON_S));
+        aged.position() - aged.velocity_mps() * (unseen_s - on_s)
+    }
+
+    /// How it probably moves there: slower the longer nobody saw it.
+    #[must_use]
+    pub fn motion(&self, now_ms: u64, density_m2ps3: f64) -> TargetMotion {
+        TargetMotion {
+            position: self.expected(now_ms, density_m2ps3),
+            velocity_mps: self.estimate.velocity_mps() * exp(-self.unseen_s(now_ms) / ON_S),
+            acceleration_mps2: Vector::zeros(),
+        }
+    }
 }
 
 impl Board {

@@ -12,6 +12,7 @@
 //! | [`bend`] | ways beside the wanted one that keep clear of zones | 2.3.1 |
 //! | [`estimate`] | position and velocity of a target from detections | 3.7.1 |
 //! | [`tracks`] | several targets, false alarms, targets lost and found | 3.7 |
+//! | [`told`] | estimates in few numbers, for the radio | 3.7 |
 //! | [`fusion`] | what all UAVs know of a target together | 3.7 |
 //! | [`handover`] | who follows which target | 3.7 |
 //!
@@ -27,6 +28,7 @@ pub mod fusion;
 pub mod handover;
 pub mod mode;
 pub mod orbit;
+pub mod told;
 pub mod tracks;
 pub mod weave;
 

@@ -112,6 +112,14 @@ impl Tracks {
         }
     }
 
+    /// The same, with names that count from a number on: a UAV that has lived before named
+    /// others.
+    #[must_use]
+    pub fn named_from(mut self, number: u32) -> Self {
+        self.next = number;
+        self
+    }
+
     /// All tracks, tentative ones too.
     #[must_use]
     pub fn all(&self) -> &[Track] {
@@ -257,6 +265,13 @@ impl Tracks {
 }
 
 impl Track {
+    /// From when it was seen first until it was seen last, milliseconds: false alarms seldom
+    /// come to much.
+    #[must_use]
+    pub fn watched_ms(&self) -> u64 {
+        self.seen_ms.saturating_sub(self.begun_ms)
+    }
+
     /// The logarithm of how large its spread is: the less the surer.
     fn sureness(&self) -> f64 {
         skein_geometry::math::ln(self.estimate.spread_m().max(f64::MIN_POSITIVE))

@@ -165,7 +165,7 @@ fn check_behaviour(state: &State) -> Result<(), (&'static str, String)> {
     } = &state.behaviour;
     let goal = state.goal;
     let purposes: &[Purpose] = match goal {
-        StateGoal::Hold | StateGoal::Relay => &[Purpose::Tracking],
+        StateGoal::Hold | StateGoal::Relay | StateGoal::Follow => &[Purpose::Tracking],
         StateGoal::Section => &[Purpose::Traveling, Purpose::Watching],
         StateGoal::Task | StateGoal::Home => &[Purpose::Traveling],
     };
@@ -192,7 +192,7 @@ fn check_behaviour(state: &State) -> Result<(), (&'static str, String)> {
         return Err(("behaviour.closed", text));
     }
     let dimensions: &[Option<u8>] = match goal {
-        StateGoal::Hold | StateGoal::Relay => &[Some(0)],
+        StateGoal::Hold | StateGoal::Relay | StateGoal::Follow => &[Some(0)],
         StateGoal::Task | StateGoal::Home => &[Some(1), None],
         StateGoal::Section => &[None, Some(0), Some(1), Some(2), Some(3)],
     };
@@ -208,7 +208,7 @@ fn check_behaviour(state: &State) -> Result<(), (&'static str, String)> {
     let made_of: &[&[Action]] = match goal {
         StateGoal::Hold => &[&[Loitering]],
         StateGoal::Section | StateGoal::Task => &[&[Displacing], &[Displacing, Loitering]],
-        StateGoal::Relay | StateGoal::Home => &[&[Displacing, Loitering]],
+        StateGoal::Relay | StateGoal::Follow | StateGoal::Home => &[&[Displacing, Loitering]],
     };
     if !made_of.contains(&actions.as_slice()) {
         let each = made_of.iter().map(|all| {
@@ -235,7 +235,8 @@ const HOMEWARD: [MissionEvent; 4] = [
 ];
 
 /// Events that hand a UAV something, and the goal that takes it up.
-const GIVEN: [(MissionEvent, StateGoal); 3] = [
+const GIVEN: [(MissionEvent, StateGoal); 4] = [
+    (MissionEvent::TargetGiven, StateGoal::Follow),
     (MissionEvent::RelayGiven, StateGoal::Relay),
     (MissionEvent::TaskGiven, StateGoal::Task),
     (MissionEvent::CellsGiven, StateGoal::Section),

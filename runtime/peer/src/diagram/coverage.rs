@@ -12,7 +12,7 @@ fn state(name: &str, purpose: Purpose, dimension: Option<u8>, goal: StateGoal) -
     let actions = match goal {
         StateGoal::Hold => &[Action::Loitering][..],
         StateGoal::Section | StateGoal::Task => &[Action::Displacing],
-        StateGoal::Relay | StateGoal::Home => KEPT,
+        StateGoal::Relay | StateGoal::Follow | StateGoal::Home => KEPT,
     };
     State {
         name: name.to_owned(),
@@ -36,6 +36,7 @@ const ORDER: &[(MissionEvent, &str)] = &[
     (MissionEvent::MissionComplete, "home"),
     (MissionEvent::LowFuel, "home"),
     (MissionEvent::TwinSpeaks, "home"),
+    (MissionEvent::TargetGiven, "follow"),
     (MissionEvent::RelayGiven, "relay"),
     (MissionEvent::TaskGiven, "task"),
     (MissionEvent::CellsGiven, "section"),
@@ -52,6 +53,10 @@ pub(super) fn diagram() -> Diagram {
         State {
             part: Part::Releases,
             ..state("relay", Tracking, Some(0), StateGoal::Relay)
+        },
+        State {
+            part: Part::Releases,
+            ..state("follow", Tracking, Some(0), StateGoal::Follow)
         },
         State {
             part: Part::Keeps,

@@ -64,6 +64,8 @@ pub enum MissionEvent {
     Stayed,
     /// It believes a peer of its fleet to be down.
     PeerLost,
+    /// It was given a target to follow, and where that may be is near.
+    TargetGiven,
     /// It was given a relay position, and its circle is planned.
     RelayGiven,
     /// It was given a task, and its flight is planned.
@@ -78,7 +80,7 @@ pub enum MissionEvent {
 
 impl MissionEvent {
     /// All, in the order of the default diagram.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::OperatorHold,
         Self::OperatorReturn,
         Self::MissionCancelled,
@@ -88,6 +90,7 @@ impl MissionEvent {
         Self::Timer,
         Self::Stayed,
         Self::PeerLost,
+        Self::TargetGiven,
         Self::RelayGiven,
         Self::TaskGiven,
         Self::CellsGiven,
@@ -108,6 +111,7 @@ impl MissionEvent {
             Self::Timer => "timer",
             Self::Stayed => "stayed",
             Self::PeerLost => "peer_lost",
+            Self::TargetGiven => "target_given",
             Self::RelayGiven => "relay_given",
             Self::TaskGiven => "task_given",
             Self::CellsGiven => "cells_given",
@@ -203,6 +207,8 @@ pub enum StateGoal {
     Section,
     /// Fly to its relay position and circle there.
     Relay,
+    /// Follow its target, or search for it.
+    Follow,
     /// Fly its task, then the cells of its plan.
     Task,
     /// Fly to the base and loiter there.
@@ -211,10 +217,11 @@ pub enum StateGoal {
 
 impl StateGoal {
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Hold,
         Self::Section,
         Self::Relay,
+        Self::Follow,
         Self::Task,
         Self::Home,
     ];
@@ -226,6 +233,7 @@ impl StateGoal {
             Self::Hold => "hold",
             Self::Section => "section",
             Self::Relay => "relay",
+            Self::Follow => "follow",
             Self::Task => "task",
             Self::Home => "home",
         }
@@ -238,6 +246,7 @@ impl StateGoal {
             Self::Hold => "loiters where it is",
             Self::Section => "flies its section",
             Self::Relay => "holds a relay position that it was given, or flies to it",
+            Self::Follow => "follows a target that it was given, or searches for it",
             Self::Task => "flies to a task that it was given, between two cells of its section",
             Self::Home => "flies home",
         }

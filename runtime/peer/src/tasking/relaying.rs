@@ -2,6 +2,7 @@
 //! are to relieve it.
 
 use super::Tasking;
+use super::tracking::Sight;
 use crate::cooperation::Situation;
 use crate::effect::Effects;
 use crate::mission_state::MissionState;
@@ -19,25 +20,38 @@ pub(super) struct Held {
     pub has_begun: bool,
     /// Whether it asked others to relieve it.
     pub is_leaving: bool,
+    /// Of a target to follow, what was said of sight.
+    pub sight: Sight,
 }
 
 impl Tasking {
     /// A relay position is reached, or its holder is to be relieved of it: its fuel will be due.
     pub(super) fn hold(&mut self, s: &Situation<'_>, state: &mut MissionState) -> Effects {
+        let tracks = self.sought().is_some();
+        let (sight, sees) = self.watch_sight();
         let (Some(executive), Some(flown)) = (&state.executive, &mut self.flown) else {
             return Effects::new();
         };
         let (id, Some(held)) = (flown.id, &mut flown.held) else {
             return Effects::new();
         };
-        if !flown.is_planned {
+        // Who sees whom it is to follow follows it, planned or not.
+        if !flown.is_planned && !tracks {
             return Effects::new();
         }
-        let (mut events, mut news) = (Vec::new(), Vec::new());
-        if !held.has_begun && executive.is_on_circle() {
+        let mut events = Vec::new();
+        let mut news: Vec<TaskNews> = sight.into_iter().collect();
+        let is_there = if tracks {
+            sees
+        } else {
+            executive.is_on_circle()
+        };
+        if !held.has_begun && is_there {
             held.has_begun = true;
             events.push(Event::Begun(id));
-            news.push(TaskNews::Holds);
+            if !tracks {
+                news.push(TaskNews::Holds);
+            }
         }
         let diameter = s.membership.diameter(s.now);
         let settled_ms = relieved_ms(diameter, s.membership.interval_ms(), executive.home_ms());

@@ -243,9 +243,9 @@ fn words_that_cannot_be_carried_out_are_refused_with_the_reason() {
         (
             TaskEdit::Add(NewTask {
                 kind: TaskKind::Track,
-                ..point("truck", 0.0, 0.0)
+                ..point("truck", 15_000.0, 0.0)
             }),
-            "no mission flies",
+            "expected one nearer to the base",
         ),
     ] {
         edit(&mut h, task);

@@ -21,6 +21,7 @@ use super::message::{
     Stamp, State,
 };
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
+use super::target::Target;
 use super::tasks::{Bundle, Task};
 use crate::protocol::conflict::Intent;
 use crate::protocol::promises::Brief;
@@ -91,6 +92,7 @@ pub enum Body {
     Conflict(Brief),
     Task(Task),
     Bundle(Bundle),
+    Target(Target),
 }
 
 impl Body {
@@ -112,6 +114,7 @@ impl Body {
             Self::Conflict(_) => Kind::Conflict,
             Self::Task(_) => Kind::Task,
             Self::Bundle(_) => Kind::Bundle,
+            Self::Target(_) => Kind::Target,
         }
     }
 
@@ -144,6 +147,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Conflict(b) => b.put(&mut out),
         Body::Task(b) => b.put(&mut out),
         Body::Bundle(b) => b.put(&mut out),
+        Body::Target(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -175,6 +179,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Conflict => Body::Conflict(Wire::get(&mut input)?),
         Kind::Task => Body::Task(Wire::get(&mut input)?),
         Kind::Bundle => Body::Bundle(Wire::get(&mut input)?),
+        Kind::Target => Body::Target(Wire::get(&mut input)?),
         Kind::Event => {
             return Err(WireError::Kind {
                 number: kind.number(),

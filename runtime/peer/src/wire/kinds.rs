@@ -43,6 +43,8 @@ pub enum Kind {
     Lacking = 13,
     /// What the author offers and holds of such tasks.
     Bundle = 14,
+    /// A vehicle that the author saw.
+    Target = 15,
 }
 
 /// How long a record waiting to be sent matters.
@@ -100,7 +102,7 @@ const fn row(
 // matters until the longest partition a mission tolerates, and is repaired by
 // anti-entropy afterwards.
 // Caps: the largest valid body, which a test of `codec` computes, rounded up.
-const TABLE: [KindRow; 15] = [
+const TABLE: [KindRow; 16] = [
     KindRow {
         relayed: false,
         ..row(
@@ -235,11 +237,22 @@ const TABLE: [KindRow; 15] = [
         Priority::Claim,
         Lifetime::Beacons(9),
     ),
+    // A target is out of date when the next look at it is told.
+    KindRow {
+        subjects: super::target::TARGETS_MAX,
+        ..row(
+            Kind::Target,
+            "target",
+            72,
+            Priority::Telemetry,
+            Lifetime::Beacons(2),
+        )
+    },
 ];
 
 impl Kind {
     /// All kinds, by number.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Beacon,
         Self::State,
         Self::Bid,
@@ -255,6 +268,7 @@ impl Kind {
         Self::Heartbeat,
         Self::Lacking,
         Self::Bundle,
+        Self::Target,
     ];
 
     /// Its number on the wire.
@@ -358,7 +372,7 @@ mod tests {
             assert_eq!(Kind::of_name(kind.name()), Some(kind));
             assert!(kind.cap_bytes() + super::super::codec::ENVELOPE_MAX_BYTES <= RECORD_MAX_BYTES);
         }
-        assert_eq!(Kind::of_number(15), None);
+        assert_eq!(Kind::of_number(16), None);
         assert_eq!(Kind::of_name("rumour"), None);
     }
 

@@ -78,6 +78,7 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
         }
         Body::Task(t) => super::tasks::check_task(t),
         Body::Bundle(b) => super::tasks::check_bundle(b),
+        Body::Target(t) => super::target::check(t),
     }
 }
 

@@ -11,4 +11,5 @@ pub mod message;
 pub(crate) mod samples;
 pub mod schema;
 pub mod signature;
+pub mod target;
 pub mod tasks;

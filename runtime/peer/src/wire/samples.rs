@@ -103,6 +103,10 @@ pub fn listing(first: u16) -> ListedRun {
 pub fn golden() -> Vec<(Body, &'static str)> {
     let mut all = golden_of_cells();
     all.extend(super::tasks::samples::golden());
+    all.push((
+        Body::Target(super::target::samples::target()),
+        "8f0302011a00013df818c81a0001d682397ab619170c39018f1911f819015e1904b018640001",
+    ));
     all
 }
 
@@ -324,6 +328,7 @@ fn longest_promise() -> PromisedPlan {
 pub fn largest() -> Vec<Body> {
     let mut all = largest_of_cells();
     all.extend(super::tasks::samples::largest());
+    all.extend(super::target::samples::largest());
     all
 }
 

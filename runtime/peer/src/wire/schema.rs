@@ -487,6 +487,7 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Conflict => Some(CONFLICT),
         Kind::Task => Some(super::tasks::TASK),
         Kind::Bundle => Some(super::tasks::BUNDLE),
+        Kind::Target => Some(super::target::TARGET),
         Kind::Event => None,
     }
 }

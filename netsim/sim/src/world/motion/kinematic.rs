@@ -266,6 +266,7 @@ impl Kinematic {
             takes_off_in_ms: 0,
             failsafe: self.failsafe,
             traffic: skein_behaviors::traffic::Traffic::default(),
+            sightings: skein_behaviors::sightings::Sightings::default(),
         })
     }
 

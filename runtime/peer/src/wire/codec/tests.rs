@@ -3,6 +3,7 @@
 use super::super::limits::*;
 use super::super::samples::{fresh, golden, gossip, largest, listing};
 use super::super::signature::Off;
+use super::super::target::Target;
 use super::super::tasks::{Progress, TaskKind};
 use super::*;
 use crate::PeerId;
@@ -384,6 +385,24 @@ fn every_limit_is_sharp() {
                 with(&|b| b.done.swap(0, 1), "done");
                 with(&|b| b.done[1] = b.done[0], "done");
             }
+            Body::Target(t) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut Target), field| {
+                    let mut t = t;
+                    change(&mut t);
+                    refused(&Body::Target(t), field);
+                };
+                with(&|t| t.seen_ms += 1, "seen_ms");
+                with(&|t| t.east_mm -= 1, "east_mm");
+                with(&|t| t.north_mm -= 1, "north_mm");
+                with(&|t| t.east_mmps -= 1, "east_mmps");
+                with(&|t| t.north_mmps -= 1, "north_mmps");
+                with(&|t| t.place_e3 += 1, "place_e3");
+                with(&|t| t.place_e3 = 0, "place_e3");
+                with(&|t| t.speed_e3 += 1, "speed_e3");
+                with(&|t| t.both_e3 -= 1, "both_e3");
+                with(&|t| t.task_by = 0, "task");
+            }
             Body::Operator(orders) => {
                 kinds += 1;
                 let mut same = orders.clone();
@@ -397,7 +416,7 @@ fn every_limit_is_sharp() {
             Body::Finished(_) => {}
         }
     }
-    assert_eq!(kinds, 13);
+    assert_eq!(kinds, 14);
 }
 
 #[test]
@@ -453,7 +472,7 @@ fn envelopes_beyond_the_table_are_refused() {
     };
     assert!(of(|_| ()).is_ok());
     assert_eq!(of(|r| r.kind = 8), Err(WireError::Kind { number: 8 }));
-    assert_eq!(of(|r| r.kind = 15), Err(WireError::Kind { number: 15 }));
+    assert_eq!(of(|r| r.kind = 16), Err(WireError::Kind { number: 16 }));
     assert_eq!(
         of(|r| r.subject = 1),
         Err(WireError::Range { field: "subject" })

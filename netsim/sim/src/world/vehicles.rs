@@ -1,0 +1,261 @@
+//! Vehicles on the ground in a mission's world, and what cameras see of them (D2.7 §1.5.2,
+//! §3.7): the vehicles of pursuits under the camera of a mission, which looks straight down
+//! and stays level in turns, as the judge takes it.
+//!
+//! # Guarantees
+//! Truth stays here: percepts hold places with errors, misses and false alarms, drawn from the
+//! seed, the UAV and the time alone, so who asks twice at one time is told the same. Without
+//! vehicles there is no detector, and nothing is drawn.
+
+use super::motion::Kinematic;
+use super::obstacles::{Obstacles, Place};
+use crate::pursuit::KINDS;
+use crate::pursuit::sensor::{Noise, rooted};
+use crate::pursuit::vehicle::Vehicle;
+use crate::spec::VehicleSpec;
+use nalgebra::Matrix2;
+use skein_behaviors::sightings::{Sighted, Sightings};
+use skein_flight::tracking::estimate::Detection;
+use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::random::{SplitMix64, mix};
+use skein_peer::mission::mm;
+use std::sync::Arc;
+
+/// Vehicles move in steps of this, milliseconds.
+const STEP_MS: u64 = 50;
+
+/// A vehicle is seen by its middle, metres above the ground.
+const MIDDLE_M: f64 = 1.0;
+
+/// All vehicles.
+#[derive(Clone, Debug, Default)]
+pub struct Vehicles {
+    specs: Arc<[VehicleSpec]>,
+    all: Vec<Vehicle>,
+    /// How far they have been moved, milliseconds.
+    driven_ms: u64,
+    seed: u64,
+}
+
+impl Vehicles {
+    /// All at their starts.
+    #[must_use]
+    pub(super) fn new(specs: &[VehicleSpec], seed: u64) -> Self {
+        let seed = mix(seed ^ 0x00CA_2000);
+        let started = |(v, nth): (&VehicleSpec, u64)| {
+            let own = mix(seed ^ nth);
+            match v.start {
+                Some(at) => Vehicle::near(&v.roads, at, v.behaviour, v.speed_mps, own),
+                None => Vehicle::new(&v.roads, v.behaviour, v.speed_mps, own),
+            }
+        };
+        Self {
+            all: specs.iter().zip(1..).map(started).collect(),
+            specs: specs.into(),
+            driven_ms: 0,
+            seed,
+        }
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// Where they are, metres.
+    pub fn places(&self) -> impl Iterator<Item = Point> + '_ {
+        self.all.iter().map(|v| v.at)
+    }
+
+    /// Moves them on; who evades does so from the UAVs in the air.
+    pub(super) fn drive(&mut self, to_ms: u64, airborne: &[(u16, Place)]) {
+        if self.all.is_empty() {
+            return;
+        }
+        let uavs: Vec<Point> = airborne.iter().map(|(_, place)| place.at).collect();
+        while self.driven_ms + STEP_MS <= to_ms {
+            self.driven_ms += STEP_MS;
+            #[allow(
+                clippy::cast_precision_loss,
+                reason = "runs last far less than 2^53 ms"
+            )]
+            let now_s = self.driven_ms as f64 / 1000.0;
+            for (v, spec) in self.all.iter_mut().zip(self.specs.iter()) {
+                v.drive(&spec.roads, now_s, &uavs);
+            }
+        }
+    }
+
+    /// Whether one of them is in the picture of a UAV, and nothing stands in between.
+    #[must_use]
+    pub(super) fn is_pictured(&self, nth: usize, body: &Kinematic, obstacles: &Obstacles) -> bool {
+        let Some(v) = self.all.get(nth) else {
+            return false;
+        };
+        let airframe = body.airframe();
+        let half_m = (airframe.footprint_across_m, airframe.footprint_along_m);
+        let middle = Place {
+            at: v.at,
+            height_m: MIDDLE_M,
+        };
+        let from = Place {
+            at: body.position(),
+            height_m: body.height_m(),
+        };
+        frames(body.pose(), v.at, half_m) && obstacles.sees(from, middle)
+    }
+
+    /// One look of the detector of a UAV.
+    pub(super) fn look(
+        &self,
+        body: &Kinematic,
+        uav: u16,
+        now_ms: u64,
+        obstacles: &Obstacles,
+    ) -> Sightings {
+        if self.all.is_empty() {
+            return Sightings::default();
+        }
+        if body.takes_off_in_ms(now_ms) > 0 {
+            return Sightings::new([]);
+        }
+        let noise = Noise::usual();
+        let (from, height_m) = (body.position(), body.height_m() - MIDDLE_M);
+        let of_uav = mix(self.seed ^ u64::from(uav) << 48);
+        let mut random = SplitMix64::new(of_uav);
+        let displaced = Vector::new(random.normal(), random.normal()) * noise.place_m;
+        let mut random = SplitMix64::new(mix(of_uav ^ now_ms));
+        let mut seen = Vec::new();
+        for (nth, (v, spec)) in self.all.iter().zip(self.specs.iter()).enumerate() {
+            let recognised = random.unit() < noise.detection;
+            let off = Vector::new(random.normal(), random.normal());
+            if recognised && self.is_pictured(nth, body, obstacles) {
+                let told = Detection::from_sight(from, height_m, v.at, &noise.sight);
+                let at = v.at + rooted(&told.covariance_m2, off) + displaced;
+                seen.push(sighted(at, &told.covariance_m2, spec.kind));
+            }
+        }
+        let is_false = random.unit() < noise.false_alarms;
+        let (x, y) = (2.0 * random.unit() - 1.0, 2.0 * random.unit() - 1.0);
+        let kind = random.below(usize::from(KINDS));
+        if is_false {
+            let pose = body.pose();
+            let (forward, airframe) = (pose.direction(), body.airframe());
+            let left = Vector::new(-forward.y, forward.x);
+            let along = forward * (x * airframe.footprint_along_m);
+            let at = from + along + left * (y * airframe.footprint_across_m);
+            let told = Detection::from_sight(from, height_m, at, &noise.sight);
+            let kind = u8::try_from(kind).unwrap_or(0);
+            seen.push(sighted(at, &told.covariance_m2, kind));
+        }
+        seen.sort_by_key(|s| s.spread_mm);
+        Sightings::new(seen)
+    }
+}
+
+/// Whether a place is in the picture of a level camera of these half sizes.
+fn frames(pose: Pose, at: Point, (across_m, along_m): (f64, f64)) -> bool {
+    let (forward, to) = (pose.direction(), at - pose.position());
+    forward.dot(&to).abs() <= along_m && forward.perp(&to).abs() <= across_m
+}
+
+fn sighted(at: Point, covariance_m2: &Matrix2<f64>, kind: u8) -> Sighted {
+    let half = f64::midpoint(covariance_m2[(0, 0)], covariance_m2[(1, 1)]);
+    let skew = (covariance_m2[(0, 0)] - covariance_m2[(1, 1)]) / 2.0;
+    let worst = half + (skew * skew + covariance_m2[(0, 1)] * covariance_m2[(0, 1)]).sqrt();
+    Sighted {
+        east_mm: mm(at.x),
+        north_mm: mm(at.y),
+        spread_mm: mm(worst.max(0.0).sqrt()).unsigned_abs(),
+        kind,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pursuit::roads::Roads;
+    use crate::pursuit::vehicle::{Behaviour, STEP_S};
+    use crate::spec::Spec;
+    use crate::world::{World, fixture};
+
+    /// A UAV that stands above the road, level, and a vehicle that drives along below.
+    fn scene(start: Point, behaviour: Behaviour) -> Spec {
+        let road = vec![Point::new(0.0, 300.0), Point::new(460.0, 300.0)];
+        Spec {
+            vehicles: vec![VehicleSpec {
+                roads: Arc::new(Roads::of(&[road]).unwrap()),
+                start: Some(start),
+                behaviour,
+                speed_mps: 8.0,
+                kind: 1,
+            }],
+            ..fixture::square(1)
+        }
+    }
+
+    #[test]
+    fn steps_of_vehicles_are_those_of_pursuits() {
+        assert!((STEP_S * 1000.0 - STEP_MS as f64).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_vehicle_drives_and_who_asks_twice_is_told_the_same() {
+        let spec = scene(Point::new(0.0, 300.0), Behaviour::Drives);
+        let mut world = World::new(&spec, 3);
+        let start = world.vehicles().places().next().unwrap();
+        world.advance(10_030);
+        let then = world.vehicles().places().next().unwrap();
+        assert!((55.0..80.0).contains(&(then - start).norm()), "{then}");
+        let uav = spec.uavs[0].id;
+        assert_eq!(world.percept(uav), world.percept(uav));
+        let mut again = World::new(&spec, 3);
+        again.advance(4_000);
+        again.advance(10_030);
+        assert_eq!(again.vehicles().places().next().unwrap(), then);
+    }
+
+    #[test]
+    fn what_is_in_the_picture_is_told_with_an_error_and_now_and_then_missed() {
+        let at = fixture::square(1).uavs[0].launch.position();
+        let near = at + Vector::new(10.0, 5.0);
+        let mut spec = scene(near, Behaviour::Parked);
+        spec.vehicles[0].roads =
+            Arc::new(Roads::of(&[vec![near, near + Vector::new(300.0, 0.0)]]).unwrap());
+        let world = World::new(&spec, 5);
+        let uav = spec.uavs[0].id;
+        let body = world.body(uav).unwrap();
+        let (mut hits, mut false_alarms, mut worst_m) = (0, 0, 0.0_f64);
+        for look in 0..400 {
+            let told = world
+                .vehicles
+                .look(body, uav, look * 200, world.obstacles());
+            for s in told.seen() {
+                let off_m = (s.at() - near).norm();
+                if off_m < 12.0 {
+                    hits += 1;
+                    worst_m = worst_m.max(off_m);
+                } else {
+                    false_alarms += 1;
+                }
+            }
+        }
+        assert!((330..395).contains(&hits), "{hits}");
+        assert!((5..45).contains(&false_alarms), "{false_alarms}");
+        assert!(worst_m > 0.3, "{worst_m}");
+        assert_eq!(world.pictured(uav).collect::<Vec<_>>(), [0]);
+    }
+
+    #[test]
+    fn without_vehicles_there_is_no_detector() {
+        let world = World::new(&fixture::square(2), 1);
+        assert!(world.percept(1).unwrap().sightings.is_absent());
+    }
+}

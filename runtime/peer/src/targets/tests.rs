@@ -1,0 +1,184 @@
+//! Targets of two peers that see, tell and hear.
+
+use super::*;
+use skein_behaviors::sightings::{Sighted, Sightings};
+use skein_geometry::frame::Pose;
+
+const TASK: Sought = (
+    TaskId {
+        author: 100,
+        number: 0,
+    },
+    1,
+);
+
+fn percept(now_ms: u64, at: Point, seen: &[(f64, f64, u8)]) -> Percept {
+    let sighted = |(x, y, kind): &(f64, f64, u8)| Sighted {
+        east_mm: mm(*x),
+        north_mm: mm(*y),
+        spread_mm: 700,
+        kind: *kind,
+    };
+    Percept {
+        time_ms: now_ms,
+        pose: Pose::new(at, 0.0),
+        sightings: Sightings::new(seen.iter().map(sighted)),
+        height_m: 60.0,
+        airspeed_mps: 13.0,
+        wind_east_mps: 0.0,
+        wind_north_mps: 0.0,
+        endurance_s: 1_000.0,
+        takes_off_in_ms: 0,
+        failsafe: false,
+        traffic: skein_behaviors::traffic::Traffic::default(),
+    }
+}
+
+fn targets(me: u16) -> Targets {
+    Targets::new(me, Some(crate::testing::airframe()))
+}
+
+/// Looks from above a car that drives east at 5 m/s from (100, 50).
+fn watched(t: &mut Targets, from_ms: u64, to_ms: u64) {
+    for now_ms in (from_ms..to_ms).step_by(200) {
+        let x = 100.0 + now_ms as f64 / 200.0;
+        t.on_percept(&percept(now_ms, Point::new(x, 50.0), &[(x, 50.0, 1)]));
+    }
+}
+
+fn said(effects: &[Effect]) -> Vec<(u16, Target)> {
+    let of = |e: &Effect| match e {
+        Effect::Speak(subject, Body::Target(t)) => Some((*subject, *t)),
+        _ => None,
+    };
+    effects.iter().filter_map(of).collect()
+}
+
+#[test]
+fn without_a_detector_nothing_is_kept_and_nothing_said() {
+    let mut t = targets(1);
+    let mut p = percept(5_000, Point::origin(), &[]);
+    p.sightings = Sightings::default();
+    t.on_percept(&p);
+    assert_eq!(t.now_ms, 0);
+    assert!(t.tell(Time(9_000), 1_000, Some(TASK)).is_empty());
+}
+
+#[test]
+fn what_is_followed_is_told_with_its_task_and_found_by_who_hears_it() {
+    let (mut one, mut two) = (targets(1), targets(2));
+    watched(&mut one, 1_000, 9_000);
+    assert_eq!(
+        one.follow(TASK, Point::new(5_000.0, 0.0), 9.0),
+        None,
+        "too far"
+    );
+    one.follow(TASK, Point::new(200.0, 50.0), 0.0).unwrap();
+    assert!(one.unseen_ms(TASK).unwrap() == 0);
+    let told = said(&one.tell(Time(60_000), 1_000, Some(TASK)));
+    let [(0, target)] = told[..] else {
+        panic!("{told:?}")
+    };
+    assert_eq!((target.task_by, target.task, target.revision), (100, 0, 1));
+    Body::Target(target).check().unwrap();
+    // Nothing new, nothing said; and no more than once an interval.
+    assert!(one.tell(Time(62_000), 1_000, Some(TASK)).is_empty());
+    watched(&mut one, 9_000, 9_400);
+    assert!(one.tell(Time(60_500), 1_000, Some(TASK)).is_empty());
+    assert_eq!(said(&one.tell(Time(62_000), 1_000, Some(TASK))).len(), 1);
+    // The other is elsewhere, and sees nothing of it.
+    two.hear(1, &target);
+    assert_eq!(two.known(TASK), None, "it has no clock yet");
+    two.on_percept(&percept(9_100, Point::new(900.0, 900.0), &[]));
+    two.hear(1, &target);
+    let known = two.known(TASK).unwrap();
+    let truth = Point::new(100.0 + 9_100.0 / 200.0, 50.0);
+    assert!((known.motion.position - truth).norm() < 5.0, "{known:?}");
+    assert!(two.unseen_ms(TASK).is_none());
+    // Long after it is still known where it was seen last.
+    two.on_percept(&percept(99_000, Point::new(900.0, 900.0), &[]));
+    let late = two.known(TASK).unwrap();
+    assert!(late.unseen_s > 80.0);
+    assert!((late.motion.position - truth).norm() < 60.0, "{late:?}");
+}
+
+#[test]
+fn of_registers_the_newest_counts_whatever_the_order() {
+    let mut one = targets(1);
+    watched(&mut one, 1_000, 4_000);
+    one.follow(TASK, Point::new(115.0, 50.0), 0.0).unwrap();
+    let first = said(&one.tell(Time(10_000), 1_000, Some(TASK)))[0].1;
+    watched(&mut one, 4_000, 6_000);
+    let second = said(&one.tell(Time(12_000), 1_000, Some(TASK)))[0].1;
+    let heard = |order: &[Target]| {
+        let mut two = targets(2);
+        two.on_percept(&percept(6_000, Point::new(900.0, 900.0), &[]));
+        order.iter().for_each(|t| two.hear(1, t));
+        two.known(TASK)
+    };
+    let both = heard(&[first, second]);
+    assert!(both.is_some());
+    assert_eq!(both, heard(&[second, first]));
+    assert_eq!(both, heard(&[second, second, first, first]));
+}
+
+#[test]
+fn what_is_of_another_time_or_no_covariance_is_left_out() {
+    let mut one = targets(1);
+    watched(&mut one, 1_000, 4_000);
+    one.follow(TASK, Point::new(115.0, 50.0), 0.0).unwrap();
+    let told = said(&one.tell(Time(10_000), 1_000, Some(TASK)))[0].1;
+    let mut two = targets(2);
+    two.on_percept(&percept(4_000, Point::new(900.0, 900.0), &[]));
+    let ahead = Target {
+        seen_ms: 7_000,
+        ..told
+    };
+    two.hear(1, &ahead);
+    two.hear(2, &told);
+    assert_eq!(two.known(TASK), None);
+    for (author, number) in (3..200).zip(0..) {
+        two.hear(author, &Target { number, ..told });
+        two.hear(
+            author,
+            &Target {
+                task: 1 + number as u16,
+                number: number + 1,
+                ..told
+            },
+        );
+    }
+    for (name, used, cap) in two.loads() {
+        assert!(used <= cap, "{name}: {used}");
+    }
+}
+
+#[test]
+fn who_is_lost_is_looked_for_outwards_and_taken_up_again_where_it_may_be() {
+    let mut one = targets(1);
+    watched(&mut one, 1_000, 6_000);
+    one.follow(TASK, Point::new(125.0, 50.0), 0.0).unwrap();
+    let mut farthest_m = 0.0_f64;
+    for now_ms in (6_000..60_000).step_by(200) {
+        one.on_percept(&percept(now_ms, Point::new(400.0, 400.0), &[]));
+        let known = one.known(TASK).unwrap();
+        let off_m = (known.sought().position - known.motion.position).norm();
+        assert!(known.sought().velocity_mps.norm() < 20.0);
+        farthest_m = farthest_m.max(off_m);
+    }
+    assert!(
+        (80.0..=SEARCH_MOST_M + 1.0).contains(&farthest_m),
+        "{farthest_m}"
+    );
+    // A car of the same kind within where it may have strayed, by now.
+    for now_ms in (60_000..63_000).step_by(200) {
+        one.on_percept(&percept(
+            now_ms,
+            Point::new(250.0, 100.0),
+            &[(250.0, 100.0, 1)],
+        ));
+    }
+    let known = one.known(TASK).unwrap();
+    assert!((known.motion.position - Point::new(250.0, 100.0)).norm() < 5.0);
+    assert!(one.unseen_ms(TASK).unwrap() < 500);
+}

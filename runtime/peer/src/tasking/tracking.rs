@@ -1,0 +1,230 @@
+//! Targets to follow as one peer has them (D2.7 §3.7): after whom its UAV flies, whether it sees
+//! it, and what is said of that.
+//!
+//! | what is known of the target | what is flown | what is said |
+//! |---|---|---|
+//! | nothing | the circle round the task's place, and outwards from there | nothing |
+//! | where it may be, and that is not near | a circle round that | nothing |
+//! | where it may be, and that is near | after it, winding outwards the longer nobody sees it | once it had seen it: it searches |
+//! | it is seen | after it | it follows; the first time the task is begun |
+//! | it is beyond the reach of the mission | at the edge of that | as above |
+
+use super::Tasking;
+use crate::input::Time;
+use crate::mission::{Mission, mm, point_m};
+use crate::mission_state::MissionState;
+use crate::output::TaskNews;
+use crate::targets::{Followed, Sought};
+use crate::wire::tasks::{Task, TaskId, TaskKind, TaskPlace};
+use serde::{Deserialize, Serialize};
+use skein_behaviors::Percept;
+use skein_behaviors::executive::pursuit::Quarry;
+use skein_flight::airframe::Airframe;
+use skein_flight::tracking::follower::TargetMotion;
+use skein_geometry::frame::{Point, Vector};
+
+/// Own sightings this recent are sight, milliseconds: ten looks.
+const SEEN_MS: u64 = 2_000;
+
+/// Who has not seen it for so long says that it searches, milliseconds.
+const SEARCHES_MS: u64 = 5_000;
+
+/// Nearer than this to where the target may be it is flown after, metres; from farther away a
+/// way round the zones is planned.
+const NEAR_M: f64 = 250.0;
+
+/// The stand-off, as a share of how far the camera sees to either side: what is asked for if
+/// nothing is, and the most.
+const STAND_OFF: f64 = 0.5;
+const STAND_OFF_MOST: f64 = 0.75;
+
+/// A UAV says that it follows a target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Follows {
+    /// For which task.
+    pub task: TaskId,
+    /// In which revision.
+    pub revision: u32,
+    /// Where it takes the target to be, mm from the origin.
+    pub at_mm: (i32, i32),
+    /// Whether it says that it sees it; else it searches.
+    pub sees: bool,
+    /// How far from it it means to stay, mm.
+    pub stand_off_mm: u32,
+}
+
+/// What was said of sight.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Sight {
+    /// Whether it was said that it follows, and not since that it searches.
+    pub follows: bool,
+    /// Since when it has been where the target was to be, milliseconds of percepts.
+    pub awaits_ms: Option<u64>,
+}
+
+impl Task {
+    /// How far from its target a UAV is to stay, metres, which sees so far to either side.
+    #[must_use]
+    pub(crate) fn stand_off_m(&self, airframe: &Airframe) -> f64 {
+        let across_m = airframe.footprint_across_m;
+        let asked_m = match self.radius_mm {
+            0 => STAND_OFF * across_m,
+            mm => f64::from(mm) / 1000.0,
+        };
+        asked_m.min(STAND_OFF_MOST * across_m)
+    }
+
+    fn place(&self) -> Option<Point> {
+        let place = self.places.first()?;
+        Some(point_m((place.east_mm, place.north_mm)))
+    }
+}
+
+/// The target as it may be followed: no farther from the base than anybody may fly.
+fn within_reach(motion: TargetMotion, mission: &Mission) -> TargetMotion {
+    let (base, reach_m) = (mission.base_m(), mission.reach_m());
+    let out = motion.position - base;
+    if out.norm() <= reach_m {
+        return motion;
+    }
+    TargetMotion {
+        position: base + out * (reach_m / out.norm()),
+        velocity_mps: Vector::zeros(),
+        acceleration_mps2: Vector::zeros(),
+    }
+}
+
+fn seconds(ms: u64) -> f64 {
+    f64::from(u32::try_from(ms).unwrap_or(u32::MAX)) / 1e3
+}
+
+impl Tasking {
+    /// The target that is flown after, if it is one: the task in its revision.
+    pub(super) fn sought(&self) -> Option<Sought> {
+        let flown = self.flown.as_ref()?;
+        let task = &self.known.get(&flown.id)?.task;
+        (task.kind == TaskKind::Track).then_some((flown.id, flown.revision))
+    }
+
+    /// Whether somebody is to be followed.
+    fn is_tracking(&self) -> bool {
+        let mut open = self.known.values().filter(|k| k.is_open());
+        open.any(|k| k.task.kind == TaskKind::Track)
+    }
+
+    /// A percept: what the camera saw, and where whom it follows is. Whether its goal changed.
+    pub fn look(&mut self, now: Time, percept: &Percept, state: &mut MissionState) -> bool {
+        self.targets.on_percept(percept);
+        let (Some(sought), Some(airframe)) = (self.sought(), self.flies) else {
+            return false;
+        };
+        let Some(known) = self.known.get(&sought.0) else {
+            return false;
+        };
+        let stand_off_m = known.task.stand_off_m(&airframe);
+        let (Some(place), asked_s) = (known.task.place(), seconds(now.since_ms(known.since)))
+        else {
+            return false;
+        };
+        let followed = self.targets.follow(sought, place, asked_s);
+        let sees = self
+            .targets
+            .unseen_ms(sought)
+            .is_some_and(|ms| ms <= SEEN_MS);
+        let (Some(executive), Some(relay)) = (&mut state.executive, &mut state.relay) else {
+            return false;
+        };
+        // Where nothing is known it is looked for from the circle round the place outwards.
+        let Some(held) = self.flown.as_mut().and_then(|f| f.held.as_mut()) else {
+            return false;
+        };
+        if executive.is_on_circle() {
+            held.sight.awaits_ms.get_or_insert(percept.time_ms);
+        }
+        let awaited = held.sight.awaits_ms;
+        let nowhere = || {
+            let for_s = seconds(percept.time_ms.saturating_sub(awaited?));
+            Some(Followed::nowhere(place, for_s))
+        };
+        let Some(followed) = followed.or_else(nowhere) else {
+            return false;
+        };
+        let motion = within_reach(followed.sought(), &state.geometry.mission);
+        let away_m = (motion.position - percept.pose.position()).norm();
+        let is_near = relay.follow.is_some() || away_m <= NEAR_M || executive.is_on_circle();
+        let follow = (sees || is_near).then_some(stand_off_m);
+        executive.pursue_at(Some(Quarry {
+            at_ms: percept.time_ms,
+            motion,
+        }));
+        let changed = relay.follow != follow;
+        relay.follow = follow;
+        changed
+    }
+
+    /// What is to be said of sight, and whether the task is begun by it.
+    pub(super) fn watch_sight(&mut self) -> (Option<TaskNews>, bool) {
+        let Some(sought) = self.sought() else {
+            return (None, false);
+        };
+        let unseen_ms = self.targets.unseen_ms(sought);
+        let Some(sight) = self.flown.as_mut().and_then(|f| f.held.as_mut()) else {
+            return (None, false);
+        };
+        let sees = unseen_ms.is_some_and(|ms| ms <= SEEN_MS);
+        let has_lost = unseen_ms.is_none_or(|ms| ms > SEARCHES_MS);
+        if sees && !sight.sight.follows {
+            sight.sight.follows = true;
+            return (Some(TaskNews::Follows), true);
+        }
+        if has_lost && sight.sight.follows {
+            sight.sight.follows = false;
+            return (Some(TaskNews::Searches), false);
+        }
+        (None, false)
+    }
+
+    /// What it says of whom it follows, once it had seen it.
+    pub(super) fn follows(&self) -> Option<Follows> {
+        let sought = self.sought()?;
+        let held = self.flown.as_ref()?.held.as_ref()?;
+        let known: Followed = self.targets.known(sought).filter(|_| held.has_begun)?;
+        let task = &self.known.get(&sought.0)?.task;
+        let stand_off_m = task.stand_off_m(&self.flies?);
+        Some(Follows {
+            task: sought.0,
+            revision: sought.1,
+            at_mm: (mm(known.motion.position.x), mm(known.motion.position.y)),
+            sees: held.sight.follows,
+            stand_off_mm: mm(stand_off_m).unsigned_abs(),
+        })
+    }
+
+    /// What is said of targets, while somebody is to be followed.
+    pub(super) fn tell_of_targets(
+        &mut self,
+        s: &crate::cooperation::Situation<'_>,
+    ) -> crate::effect::Effects {
+        if !s.speaks || !self.is_tracking() {
+            return Vec::new();
+        }
+        let serves = self.sought();
+        self.targets.tell(s.now, s.membership.interval_ms(), serves)
+    }
+
+    /// The task as it is flown to: a target at the place where it is by now, as far as is known.
+    pub(super) fn as_flown(&self, sought: Sought, task: &Task, mission: &Mission) -> Task {
+        let known = self.targets.known(sought);
+        let Some(known) = known.filter(|_| task.kind == TaskKind::Track) else {
+            return task.clone();
+        };
+        let at = within_reach(known.motion, mission).position;
+        Task {
+            places: vec![TaskPlace {
+                east_mm: mm(at.x),
+                north_mm: mm(at.y),
+            }],
+            ..task.clone()
+        }
+    }
+}

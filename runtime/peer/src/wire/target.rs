@@ -1,0 +1,185 @@
+//! What a UAV tells of a vehicle that it saw: type, bytes and limits of the kind `target`
+//! (docs/protocol.md §12, D2.7 §3.7).
+//!
+//! One register a target, made of the author's own sightings alone, so that registers of all
+//! authors merge in any order. Of the covariance three numbers are told that bound it: a
+//! spread of place and of velocity alike in all directions, and what both have in common.
+
+use super::cbor::array_of;
+use super::codec::WireError;
+use super::limits::{POSITION_MAX_MM, SPEED_MAX_MMPS, in_range};
+use super::schema::{Place, Shape, at};
+use serde::{Deserialize, Serialize};
+
+/// Targets that one author tells of at a time: subjects `0 .. 8`, of which the first is that
+/// which it follows.
+pub const TARGETS_MAX: u16 = 8;
+
+/// The latest time, milliseconds: what a double counts.
+pub const TIME_MAX_MS: u64 = 1 << 53;
+
+/// The widest spread that is told, thousandths of m² and of m²/s².
+pub const SPREAD_MAX_E3: u32 = 1_000_000_000;
+
+/// A target as one UAV saw it.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+pub struct Target {
+    /// Who named it.
+    pub by: u16,
+    /// Its how-manieth target that was.
+    pub number: u32,
+    /// What it looks like.
+    pub looks: u8,
+    /// When it was seen last, milliseconds of the clock of percepts.
+    pub seen_ms: u64,
+    /// How long after that its estimate is of, milliseconds.
+    pub aged_ms: u16,
+    /// Where it was then, mm east of the origin.
+    pub east_mm: i32,
+    /// And north of it.
+    pub north_mm: i32,
+    /// Its velocity, mm/s to the east.
+    pub east_mmps: i32,
+    /// And to the north.
+    pub north_mmps: i32,
+    /// Variance of its place, thousandths of m².
+    pub place_e3: u32,
+    /// Covariance of place and velocity, thousandths of m²/s.
+    pub both_e3: i32,
+    /// Variance of its velocity, thousandths of m²/s².
+    pub speed_e3: u32,
+    /// Who asked for the task that its author follows it for; 0 where it follows it for none.
+    pub task_by: u16,
+    /// Which of its tasks.
+    pub task: u16,
+    /// In which revision.
+    pub revision: u32,
+}
+
+array_of!(Target {
+    by,
+    number,
+    looks,
+    seen_ms,
+    aged_ms,
+    east_mm,
+    north_mm,
+    east_mmps,
+    north_mmps,
+    place_e3,
+    both_e3,
+    speed_e3,
+    task_by,
+    task,
+    revision
+});
+
+/// The first field that is out of range.
+pub(super) fn check(t: &Target) -> Result<(), WireError> {
+    let near = |mm: i32| mm.unsigned_abs() <= POSITION_MAX_MM.unsigned_abs();
+    let slow = |mmps: i32| mmps.unsigned_abs() <= SPEED_MAX_MMPS;
+    let spread = |e3: u32| (1..=SPREAD_MAX_E3).contains(&e3);
+    in_range("seen_ms", t.seen_ms <= TIME_MAX_MS)?;
+    in_range("east_mm", near(t.east_mm))?;
+    in_range("north_mm", near(t.north_mm))?;
+    in_range("east_mmps", slow(t.east_mmps))?;
+    in_range("north_mmps", slow(t.north_mmps))?;
+    in_range("place_e3", spread(t.place_e3))?;
+    in_range("speed_e3", spread(t.speed_e3))?;
+    // No covariance is as large as both variances.
+    let both = u64::from(t.both_e3.unsigned_abs());
+    let most = u64::from(t.place_e3) * u64::from(t.speed_e3);
+    in_range("both_e3", both * both < most)?;
+    in_range("task", t.task_by > 0 || (t.task, t.revision) == (0, 0))
+}
+
+const U16: Shape = Shape::Number(0, u16::MAX as i128);
+const U32: Shape = Shape::Number(0, u32::MAX as i128);
+const MM: Shape = Shape::Number(-(POSITION_MAX_MM as i128), POSITION_MAX_MM as i128);
+const MMPS: Shape = Shape::Number(-(SPEED_MAX_MMPS as i128), SPEED_MAX_MMPS as i128);
+const SPREAD: Shape = Shape::Number(1, SPREAD_MAX_E3 as i128);
+
+/// The places of a target's body.
+pub(super) const TARGET: &[Place] = &[
+    at("by", "who named it", U16),
+    at("number", "its how-manieth target that was", U32),
+    at(
+        "looks",
+        "what it looks like",
+        Shape::Number(0, u8::MAX as i128),
+    ),
+    at(
+        "seen_ms",
+        "when it was seen last, ms of the clock of percepts",
+        Shape::Number(0, TIME_MAX_MS as i128),
+    ),
+    at("aged_ms", "how long after that its estimate is of, ms", U16),
+    at("east_mm", "mm east of the mission's origin", MM),
+    at("north_mm", "mm north of the mission's origin", MM),
+    at("east_mmps", "mm/s to the east", MMPS),
+    at("north_mmps", "mm/s to the north", MMPS),
+    at("place_e3", "variance of its place, 0.001 m²", SPREAD),
+    at(
+        "both_e3",
+        "covariance of place and velocity, 0.001 m²/s",
+        Shape::Number(-(SPREAD_MAX_E3 as i128), SPREAD_MAX_E3 as i128),
+    ),
+    at("speed_e3", "variance of its velocity, 0.001 m²/s²", SPREAD),
+    at(
+        "task_by",
+        "who asked for the task that it is followed for; 0 for none",
+        U16,
+    ),
+    at("task", "which of its tasks", U16),
+    at("revision", "in which revision", U32),
+];
+
+#[cfg(test)]
+pub(crate) mod samples {
+    use super::super::codec::Body;
+    use super::*;
+
+    /// A target that drives along and is followed for a task, typically.
+    pub(crate) fn target() -> Target {
+        Target {
+            by: 3,
+            number: 2,
+            looks: 1,
+            seen_ms: 81_400,
+            aged_ms: 200,
+            east_mm: 120_450,
+            north_mm: -31_415,
+            east_mmps: 5_900,
+            north_mmps: -400,
+            place_e3: 4_600,
+            both_e3: 350,
+            speed_e3: 1_200,
+            task_by: 100,
+            task: 0,
+            revision: 1,
+        }
+    }
+
+    /// The largest valid ones.
+    pub(crate) fn largest() -> Vec<Body> {
+        vec![Body::Target(Target {
+            by: u16::MAX,
+            number: u32::MAX,
+            looks: u8::MAX,
+            seen_ms: TIME_MAX_MS,
+            aged_ms: u16::MAX,
+            east_mm: -POSITION_MAX_MM,
+            north_mm: -POSITION_MAX_MM,
+            east_mmps: -200_000,
+            north_mmps: -200_000,
+            place_e3: SPREAD_MAX_E3,
+            both_e3: -999_999_999,
+            speed_e3: SPREAD_MAX_E3,
+            task_by: u16::MAX,
+            task: u16::MAX,
+            revision: u32::MAX,
+        })]
+    }
+}
