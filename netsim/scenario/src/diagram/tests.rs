@@ -43,7 +43,7 @@ fn what_is_wrong_is_told_with_its_place_and_a_remedy() {
             "on: \"low_fuel\"",
             "on: \"object_detected\"",
             "transitions[4].on",
-            "no camera tells",
+            "with a track task",
         ),
         (
             "on: \"low_fuel\"",
@@ -67,13 +67,13 @@ fn what_is_wrong_is_told_with_its_place_and_a_remedy() {
         (
             "from: \"any\", to: \"section\"",
             "from: \"any\", to: \"sections\"",
-            "transitions[8].to",
+            "transitions[9].to",
             "no state is called \"sections\"",
         ),
         (
             "from: \"any\", to: \"section\"",
             "from: \"nobody\", to: \"section\"",
-            "transitions[8].from",
+            "transitions[9].from",
             "no state is called \"nobody\"",
         ),
         (
@@ -109,7 +109,7 @@ fn what_is_wrong_is_told_with_its_place_and_a_remedy() {
         (
             "on: \"operator_return\", from: \"any\", to: \"recalled\"",
             "on: \"operator_return\", from: \"any\", to: \"home\"",
-            "states[5]",
+            "states[6]",
             "never reached",
         ),
         (
@@ -139,7 +139,7 @@ fn what_is_wrong_is_told_with_its_place_and_a_remedy() {
         (
             "name: \"task\"",
             "name: \"home\"",
-            "states[6].name",
+            "states[7].name",
             "rename one",
         ),
         (

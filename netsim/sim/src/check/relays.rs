@@ -114,15 +114,16 @@ impl RelayCheck {
         let is_there =
             |progress: &Progress| matches!(progress, Progress::Begun | Progress::Leaving);
         let positions = || {
-            let asked = |(id, revision, _): &(TaskId, u32, Progress)| {
-                self.asked.get(&(id.number, *revision)).copied()
-            };
-            m.view.tasks.iter().filter_map(asked)
+            let claimed = m.view.tasks.iter();
+            let claimed = claimed.filter(|t| t.2 == Progress::Committed);
+            claimed.filter_map(|(id, revision, _)| self.asked.get(&(id.number, *revision)))
         };
         let holds = m.view.tasks.iter().any(|(id, revision, progress)| {
             is_there(progress) && self.asked.contains_key(&(id.number, *revision))
         });
-        if !m.view.relays || holds || m.view.order != Order::Resume {
+        // Who follows a target gave its section up too.
+        let is_sent = m.view.relays && positions().next().is_some();
+        if !is_sent || holds || m.view.order != Order::Resume {
             self.under_way.remove(&m.id);
             return;
         }
