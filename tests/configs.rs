@@ -295,10 +295,7 @@ fn wrong_missions_are_refused_where_they_stand() {
     let from = "mission: { diagram: \"patrol\", for_s: 900 },";
     assert!(text.contains(from));
     for (to, problem) in [
-        (
-            "mission: { diagram: \"patrl\" },",
-            "did you mean \"patrol\"",
-        ),
+        ("mission: { diagram: \"patrl\" },", "did you mean patrol?"),
         (
             "mission: { diagram: \"inspection\" },",
             "is flown once, and the mission has laps",

@@ -102,7 +102,7 @@ pub(crate) fn of_mission(node: &Node<'_>, files: &Files<'_>) -> Result<Option<Di
     let mut diagram = if let Ok(name) = at.text() {
         builtin(name).ok_or_else(|| {
             let known = suggestion(name, &names());
-            at.wrong(format!("no diagram is called \"{name}\"; {known}; or bring your own: {{ file: \"watch.json5\" }}"))
+            at.wrong(format!("no diagram is called \"{name}\"; bring your own, {{ file: \"watch.json5\" }}, or name a built-in one: {known}"))
         })?
     } else if let Some(file) = at.get("file")? {
         at.fields(&["file"])?;

@@ -90,7 +90,7 @@ fn what_is_wrong_is_told_with_its_place_and_a_remedy() {
         ),
         (
             "{ priority: 1, on: \"operator_hold\"",
-            "{ priority: 12, on: \"operator_hold\"",
+            "{ priority: 13, on: \"operator_hold\"",
             "states[0]",
             "does not obey the operator first",
         ),
@@ -101,7 +101,7 @@ fn what_is_wrong_is_told_with_its_place_and_a_remedy() {
             "counts before \"mission_cancelled\"",
         ),
         (
-            "priority: 10, on: \"nobody_heard\"",
+            "priority: 11, on: \"nobody_heard\"",
             "priority: 200, on: \"nobody_heard\"",
             "transitions",
             "comes after \"otherwise\"",
