@@ -262,7 +262,7 @@ pub fn at_base(at: Point, base: Point, flyer: Flyer) -> bool {
     clippy::cast_sign_loss,
     reason = "casts from floats saturate, and a flight is not negative"
 )]
-fn milliseconds(s: f64) -> u64 {
+pub(super) fn milliseconds(s: f64) -> u64 {
     (s * 1000.0) as u64
 }
 

@@ -6,7 +6,7 @@
 //! at cruise, or the route round the zones with the wind behind it all the way. It knows no
 //! turns. Where no line leads home, for a wind against it, there is no way.
 
-use super::flight::{FlightCheck, Flyer, at_base};
+use super::flight::{FlightCheck, Flyer, at_base, milliseconds};
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use crate::spec::Spec;
 use skein_flight::trajectory::wind::{Course, Wind};
@@ -293,15 +293,6 @@ fn ends_of(plan: &[u16], cells: usize) -> Option<[usize; 2]> {
         Some(before) if before == next => [last, last],
         _ => [last, next],
     })
-}
-
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "casts from floats saturate, and a time is not negative"
-)]
-fn milliseconds(s: f64) -> u64 {
-    (s * 1000.0) as u64
 }
 
 #[cfg(test)]
