@@ -1,7 +1,7 @@
 //! What the fuel allows, by place: from wherever a plan leaves a UAV it must come home with its
 //! reserve (D2.7 §2.3.1, §3.6.5).
 //!
-//! What the way home takes is known at each boundary of the loop ([`way_home`](super::way_home)).
+//! What the way home takes is known at each boundary of the loop (`way_home.rs`).
 //! Everything here is a question; nothing changes what is flown.
 //!
 //! # Guarantees
