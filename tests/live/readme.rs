@@ -304,6 +304,7 @@ fn a_trial_with_everything(r: &mut Readme) {
     let task = "skein task add|cancel|list";
     well(r.exactly("skein task add point 60.1690,24.9400"));
     well(r.exactly("skein task add line 60.1690,24.9400 60.1701,24.9422 --needs infrared"));
+    well(r.exactly("skein task add track 60.1690,24.9400 --for 60"));
     let id = "skein task add point 60.1700,24.9410 --id later";
     well(r.instead("skein task add point 60.1690,24.9400", id));
     assert!(told(r.instead(task, "skein task list")).contains("later"));
