@@ -12,6 +12,7 @@ mod configs;
 mod d27;
 mod documents;
 mod flown_plans;
+mod fuel;
 mod many;
 mod model;
 mod names_of_checks;
