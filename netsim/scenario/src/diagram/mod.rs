@@ -70,7 +70,9 @@ pub fn open(target: &str) -> Result<Diagram, ScenarioError> {
         if crate::builtin_names().contains(&target) {
             return flown(crate::load_builtin(target, &Overrides::default()));
         }
-        let known = [names(), crate::builtin_names()].concat();
+        let mut known = [names(), crate::builtin_names()].concat();
+        known.sort_unstable();
+        known.dedup();
         return Err(ScenarioError::Unreadable {
             file: target.to_owned(),
             problem: format!(
