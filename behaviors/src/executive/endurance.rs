@@ -84,9 +84,9 @@ impl Home {
         if to != self.at || self.each_ms.iter().all(Option::is_none) {
             return None;
         }
-        let (boundary, ..) = match from.boundary {
-            Some((boundary, looking)) => (boundary, looking, 0.0),
-            None => transit.way_on(from.pose)?,
+        let boundary = match from.boundary {
+            Some((boundary, _)) => boundary,
+            None => transit.way_on(from.pose)?.0,
         };
         let mut found = BOTH.map(|d| (self.ways.next_known(boundary, d), d));
         let away = |to: &Option<(u16, usize)>| to.map_or(usize::MAX, |(_, cells)| cells);

@@ -25,6 +25,7 @@ use skein_flight::tracking::field::Field;
 use skein_flight::tracking::follower::{Command, Follower, Settings, StandOff, TargetMotion};
 use skein_flight::tracking::mode::Airspeeds;
 use skein_flight::trajectory::wind::Wind;
+use skein_geometry::math::seconds;
 
 /// Commands of the law that make each step of a setpoint: the first until the next percept,
 /// later ones longer. All together they last as long as a setpoint looks ahead.
@@ -175,10 +176,6 @@ fn steps(commands: &[Command]) -> Vec<Steer> {
         });
     }
     steps
-}
-
-fn seconds(ms: u64) -> f64 {
-    f64::from(u32::try_from(ms).unwrap_or(u32::MAX)) / 1e3
 }
 
 #[cfg(test)]

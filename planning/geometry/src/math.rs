@@ -81,3 +81,13 @@ pub fn wrap_pi(a_rad: f64) -> f64 {
     let r = wrap_tau(a_rad);
     if r > PI { r - TAU } else { r }
 }
+
+/// Milliseconds of a clock as seconds.
+#[must_use]
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "clocks stay far below 2^53 milliseconds"
+)]
+pub fn seconds(ms: u64) -> f64 {
+    ms as f64 / 1e3
+}

@@ -143,7 +143,7 @@ impl Mission {
     /// A sentence that says why not.
     pub fn can_do(self: &Arc<Self>, task: &Task) -> Result<(), String> {
         let zones = self.no_fly_zones().map_err(|e| e.to_string())?;
-        if matches!(task.kind, TaskKind::Relay | TaskKind::Track) {
+        if task.is_held() {
             return self.relay_circle(task, &zones).map(drop);
         }
         let problem = self.loop_problem(&zones).map_err(|e| e.to_string())?;
@@ -261,7 +261,7 @@ impl Request {
     /// # Errors
     /// A sentence that says why there is none.
     pub fn plan(&self) -> Result<Planned, String> {
-        if matches!(self.task.kind, TaskKind::Relay | TaskKind::Track) {
+        if self.task.is_held() {
             let (mission, router) = (&self.geometry.mission, &self.geometry.router);
             let circle = relay_circle::planned(mission, router, &self.task, self.from)?;
             return Ok(Planned::Circle(circle));

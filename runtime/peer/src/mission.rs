@@ -57,10 +57,10 @@ pub struct Mission {
     #[serde(default, skip_serializing_if = "CoverageTask::is_area")]
     pub task: CoverageTask,
     /// Which lap it is, from 0 (D2.7 §3.6.6: continuous coverage).
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub lap: u16,
     /// How many more times everything is to be seen after this one.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub further_laps: u16,
     /// Which spanning tree the lanes of an area follow: whoever makes the mission knows
     /// the wind and chooses.
@@ -71,17 +71,17 @@ pub struct Mission {
     pub division: Rule,
     /// What any two UAVs keep between them by agreement, all at one height, mm; 0 where each
     /// has a height of its own.
-    #[serde(default, skip_serializing_if = "is_none")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub separation_mm: u32,
     /// The fastest cruise of the fleet, mm/s; of use with a separation alone.
-    #[serde(default, skip_serializing_if = "is_none")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub fastest_mmps: u32,
     /// No-fly zones that the operator added in flight, by name; besides `zones`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub added_zones: BTreeMap<String, Vec<PointMm>>,
     /// Counts the missions that the operator began anew: nothing that was covered in an
     /// earlier one counts.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub sortie: u16,
     /// Whether the operator ended it: nothing is to be seen, and all fly home.
     #[serde(default, skip_serializing_if = "core::ops::Not::not")]
@@ -91,20 +91,9 @@ pub struct Mission {
     pub diagram: Option<Arc<Diagram>>,
 }
 
-#[allow(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "the signature that serde asks for"
-)]
-fn is_zero(n: &u16) -> bool {
-    *n == 0
-}
-
-#[allow(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "the signature that serde asks for"
-)]
-fn is_none(n: &u32) -> bool {
-    *n == 0
+/// Whether a field need not be said.
+pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 fn metres(mm: u32) -> f64 {

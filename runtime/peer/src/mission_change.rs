@@ -56,8 +56,8 @@ pub(crate) fn separation_for(
     })
 }
 
-/// Of so many loops a peer remembers what was covered.
-const REMEMBERED: usize = 4;
+/// Of so many loops a peer remembers what was covered, that which it left last among them.
+const REMEMBERED: usize = 5;
 
 /// What was covered on the last loops: a zone that comes over some cells and goes again gives
 /// back the loop there was, and what was seen of those cells is known still.

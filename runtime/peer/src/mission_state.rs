@@ -635,8 +635,8 @@ impl MissionState {
         let cells = u16::try_from(geometry.coverage_loop.len()).unwrap_or(u16::MAX);
         timers.stop(Timer::NextLap);
         let before = old.as_ref().map(|m| (&*m.geometry, &m.negotiation));
-        let seen_before = old.as_ref().map(|m| m.seen_before.clone());
-        let seen_before = seen_before.unwrap_or_default();
+        let left = |m: &Self| m.seen_before.clone().left(&m.geometry, &m.negotiation);
+        let seen_before = old.as_ref().map_or_else(SeenBefore::default, left);
         let mut new = Self {
             negotiation: negotiation_begun(&geometry, before, &seen_before, me, durable, cells),
             executive: executive_for(&geometry, config),
@@ -665,11 +665,8 @@ impl MissionState {
             claims: old
                 .as_ref()
                 .map_or_else(Default::default, |m| m.claims.void()),
-            geometry: Arc::clone(&geometry),
-            seen_before: match before {
-                Some((geometry, negotiation)) => seen_before.left(geometry, negotiation),
-                None => seen_before,
-            },
+            geometry,
+            seen_before,
         };
         match old {
             Some(old) if old.loop_hash() == new.loop_hash() => new.keep_on(old),

@@ -84,15 +84,13 @@ impl Mission {
     }
 
     /// How far from the base somebody may hold or follow anything, metres: as far as any place
-    /// of the area is, as fuel is kept for the way home from the loop.
+    /// of the area is. From there who relieves it comes in time.
     #[must_use]
     pub fn reach_m(&self) -> f64 {
         let away_m = |p: Point| (p - self.base_m()).norm();
         self.area_m().into_iter().map(away_m).fold(0.0, f64::max)
     }
 
-    /// Who relieves its holder in time may be as far away as any place of the area is from the
-    /// base, and no farther.
     fn is_near_enough(&self, place: Point) -> Result<(), String> {
         let farthest_m = self.reach_m();
         let there_m = (place - self.base_m()).norm();

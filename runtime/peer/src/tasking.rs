@@ -424,13 +424,16 @@ impl Tasking {
         }
         let Some(offer) = offer else { return false };
         let more = offer.endurance_ms > self.auction.bundle().1.offer.endurance_ms;
+        if !more {
+            return false;
+        }
         let kept = self.auction.kept_for_cover();
         let has = |id: &TaskId| {
             let known = self.known.get(id);
             known.is_some_and(|k| k.is_open() && carries(offer.sensors, k.task.sensor))
         };
         let mut hopeless = self.auction.unassigned().iter();
-        let again = more && hopeless.any(|id| has(id) && !kept.contains(id));
+        let again = hopeless.any(|id| has(id) && !kept.contains(id));
         if again {
             self.last_again = s.now;
         }
@@ -454,7 +457,11 @@ impl Tasking {
                 auction::Effect::Fly(id) => {
                     let known = self.known.get(&id).map(|k| &k.task);
                     let is_held = known.is_some_and(Task::is_held);
-                    let tracks = known.is_some_and(|t| t.kind == TaskKind::Track);
+                    let news = match known.map(|task| task.kind) {
+                        Some(TaskKind::Track) => TaskNews::Tracks,
+                        Some(TaskKind::Relay) => TaskNews::Relays,
+                        _ => TaskNews::Flies,
+                    };
                     self.flown = Some(Flown {
                         id,
                         revision: known.map_or(0, |task| task.revision),
@@ -463,13 +470,6 @@ impl Tasking {
                         held: is_held.then(Held::default),
                     });
                     state.relay = is_held.then(RelayPosition::default);
-                    let news = if tracks && is_held {
-                        TaskNews::Tracks
-                    } else if is_held {
-                        TaskNews::Relays
-                    } else {
-                        TaskNews::Flies
-                    };
                     effects.extend(self.told(id, news));
                     effects.extend(self.plan(state));
                 }
@@ -498,7 +498,7 @@ impl Tasking {
         let flown = self.flown.as_mut()?;
         flown.is_planned = false;
         state.set_errand(None);
-        let follow = state.relay.and_then(|r| r.follow);
+        let follow = state.followed_at_m();
         state.relay = flown.held.is_some().then_some(RelayPosition {
             circle: None,
             follow,
@@ -529,11 +529,7 @@ impl Tasking {
             }
             Ok(Planned::Circle(circle)) => {
                 flown.is_planned = true;
-                let follow = state.relay.and_then(|r| r.follow);
-                state.relay = Some(RelayPosition {
-                    circle: Some(circle),
-                    follow,
-                });
+                state.relay.get_or_insert_default().circle = Some(circle);
                 vec![Effect::Negotiate]
             }
             Err(why) => self.relieve(&why, state),

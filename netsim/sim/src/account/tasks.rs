@@ -30,7 +30,7 @@ pub struct TaskReport {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub held_by: Vec<u16>,
     /// How often whoever followed its target said that it lost it.
-    #[serde(default, skip_serializing_if = "is_none")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub lost: u32,
     /// What became of its target, as the world knows, if it is one to follow.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -42,7 +42,7 @@ pub struct TaskReport {
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "as serde asks")]
-fn is_none(n: &u32) -> bool {
+fn is_zero(n: &u32) -> bool {
     *n == 0
 }
 

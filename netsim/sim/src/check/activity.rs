@@ -11,6 +11,7 @@ use skein_peer::output::Status;
 use skein_peer::wire::message::Order;
 use skein_peer::wire::tasks::Progress;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// A peer looks four times a period, and a snapshot may fall between two looks: so many periods
 /// it may be in another state than its events lead to.
@@ -70,7 +71,7 @@ struct Flown {
 /// What the states of one run were found to be.
 #[derive(Clone, Debug, Default)]
 pub struct ActivityCheck {
-    missions: BTreeMap<u32, Flown>,
+    missions: BTreeMap<u32, Arc<Flown>>,
     last: BTreeMap<u16, Last>,
     /// When a process was first seen with this sortie.
     began: BTreeMap<u16, (u16, u64)>,
@@ -91,7 +92,7 @@ impl ActivityCheck {
                 sortie: mission.sortie,
                 cancelled: mission.cancelled,
             };
-            self.missions.insert(mission.revision, flown);
+            self.missions.insert(mission.revision, Arc::new(flown));
         }
     }
 
@@ -151,9 +152,9 @@ impl ActivityCheck {
     }
 
     /// By what the mission of a UAV is flown.
-    fn flown(&self, m: &PeerSnapshot) -> Option<Flown> {
+    fn flown(&self, m: &PeerSnapshot) -> Option<Arc<Flown>> {
         let flown = self.missions.range(..=m.view.revision).next_back();
-        flown.map(|(_, flown)| flown.clone())
+        flown.map(|(_, flown)| Arc::clone(flown))
     }
 
     fn look_at(&mut self, snapshot: &Snapshot<'_>, m: &PeerSnapshot, found: &mut Findings) {

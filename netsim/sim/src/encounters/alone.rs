@@ -1,9 +1,10 @@
 //! UAVs that hear nothing: each has its traffic sensor alone.
 
-use super::{Flyer, PERCEPT_MS, SEPARATION_M, TUBES_M, is_turn, seconds};
+use super::{Flyer, PERCEPT_MS, SEPARATION_M, TUBES_M, is_turn};
 use skein_behaviors::reactive::sensed_traffic::{Contact, Rule};
 use skein_behaviors::setpoint::{Setpoint, Side, Steer};
 use skein_flight::airframe::Airframe;
+use skein_geometry::math::seconds;
 
 /// Turns of a setpoint last until the airframe's failsafe would act, milliseconds.
 const STEER_MS: u32 = 1_000;

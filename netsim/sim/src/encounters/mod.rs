@@ -29,6 +29,7 @@ use serde::{Deserialize, Serialize};
 use skein_behaviors::reactive::promise;
 use skein_flight::separation::{Detours, End, Motion};
 use skein_geometry::frame::Point;
+use skein_geometry::math::seconds;
 use skein_peer::PeerId;
 use skein_peer::protocol::conflict::{Apart, Conflicts, Intent, Wish};
 
@@ -299,9 +300,4 @@ pub(crate) fn all_apart(motions: &[Motion]) -> bool {
             .into_iter()
             .all(|b| skein_flight::separation::first_loss_s(a, b, 0, least_m).is_none())
     })
-}
-
-#[allow(clippy::cast_precision_loss, reason = "runs last minutes")]
-fn seconds(ms: u64) -> f64 {
-    ms as f64 / 1e3
 }

@@ -6,7 +6,7 @@
 
 use super::camera::{Attitude, Camera};
 use super::sensor::{Noise, Seen, Sensor};
-use super::{DENSITY, FOLLOWED, LOOK_MS, Settings, seconds};
+use super::{DENSITY, FOLLOWED, LOOK_MS, Settings};
 use crate::world::motion::Kinematic;
 use crate::world::obstacles::Obstacles;
 use skein_behaviors::setpoint::{Setpoint, Side, Steer};
@@ -18,7 +18,7 @@ use skein_flight::tracking::mode::{Airspeeds, Mode};
 use skein_flight::tracking::tracks::{TargetName, Tracks};
 use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::{Point, Vector};
-use skein_geometry::math::sin_cos;
+use skein_geometry::math::{seconds, sin_cos};
 use std::collections::BTreeMap;
 
 /// Who was not heard of for so long is taken for gone, milliseconds: ten statements.

@@ -44,7 +44,7 @@ use skein_flight::tracking::tracks::{Kind, TargetName};
 use skein_flight::trajectory::wind::Wind;
 use skein_geometry::NoFlyZones;
 use skein_geometry::frame::{Point, Pose, Vector};
-use skein_geometry::math::{TAU, sin_cos};
+use skein_geometry::math::{TAU, seconds, sin_cos};
 use skein_geometry::random::{SplitMix64, mix};
 use totals::Pursuit;
 use vehicle::{Behaviour, Vehicle};
@@ -422,12 +422,4 @@ fn cues(
         });
     }
     cues
-}
-
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "runs last far less than 2^53 ms"
-)]
-fn seconds(ms: u64) -> f64 {
-    ms as f64 / 1e3
 }

@@ -82,6 +82,12 @@ impl Air {
         self.world.percept(id)
     }
 
+    /// What a UAV knows of itself, without what it senses of others.
+    #[must_use]
+    pub fn own(&self, id: u16) -> Option<Percept> {
+        self.world.own(id)
+    }
+
     /// The vehicles on the ground, as they are.
     #[must_use]
     pub fn vehicles(&self) -> &Vehicles {

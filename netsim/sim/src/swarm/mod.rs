@@ -314,7 +314,7 @@ impl Swarm {
     /// Where a UAV is; nothing once its airframe is gone.
     #[must_use]
     pub fn pose(&self, id: u16) -> Option<Pose> {
-        self.air.percept(id).map(|p| p.pose)
+        self.air.own(id).map(|p| p.pose)
     }
 
     /// The share of the coverable cells that was seen, 0 to 1.
@@ -684,7 +684,7 @@ impl Swarm {
             }
             Output::Store { token, record } => {
                 if let Some(Entry::Bid(bid)) = Entry::decode(&record) {
-                    let at = self.air.percept(id);
+                    let at = self.air.own(id);
                     let fuel_s = self.peers[idx].told_fuel_s;
                     let at = at.map(|p| (p.pose.position(), fuel_s));
                     self.checker
@@ -836,9 +836,9 @@ impl Swarm {
         }
         self.note_ground(&peers);
         // Whoever ends it by its time before that is found by a rule.
-        let timed = self.operator.mission().ends_after_s().is_some();
+        let timed = || self.operator.mission().ends_after_s().is_some();
         let open = self.account.covered_ms().is_none();
-        if timed && open && flying > 0 && finished && self.air.end_laps() {
+        if open && flying > 0 && finished && timed() && self.air.end_laps() {
             self.account.covered(self.now_ms);
             self.history.keep(self.now_ms, || What::Covered);
         }

@@ -231,7 +231,7 @@ impl SimPeer {
     pub fn snapshot(&self, air: &Air) -> Option<PeerSnapshot> {
         let running = self.process == Process::Running;
         let peer = self.peer.as_ref().filter(|_| running)?;
-        let percept = air.percept(self.id());
+        let percept = air.own(self.id());
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,

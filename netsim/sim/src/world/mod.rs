@@ -359,6 +359,12 @@ impl World {
         true
     }
 
+    /// What a UAV knows of itself now, without what it senses of others; nothing once it is lost.
+    #[must_use]
+    pub fn own(&self, uav: u16) -> Option<Percept> {
+        self.body(uav)?.percept()
+    }
+
     /// What a UAV senses now; nothing once it is lost.
     #[must_use]
     pub fn percept(&self, uav: u16) -> Option<Percept> {

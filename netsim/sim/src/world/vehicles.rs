@@ -13,10 +13,10 @@ use crate::pursuit::KINDS;
 use crate::pursuit::sensor::{Noise, rooted};
 use crate::pursuit::vehicle::Vehicle;
 use crate::spec::VehicleSpec;
-use nalgebra::Matrix2;
 use skein_behaviors::sightings::{Sighted, Sightings};
 use skein_flight::tracking::estimate::Detection;
 use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::math::seconds;
 use skein_geometry::random::{SplitMix64, mix};
 use skein_peer::mission::mm;
 use std::sync::Arc;
@@ -82,11 +82,7 @@ impl Vehicles {
         let uavs: Vec<Point> = airborne.iter().map(|(_, place)| place.at).collect();
         while self.driven_ms + STEP_MS <= to_ms {
             self.driven_ms += STEP_MS;
-            #[allow(
-                clippy::cast_precision_loss,
-                reason = "runs last far less than 2^53 ms"
-            )]
-            let now_s = self.driven_ms as f64 / 1000.0;
+            let now_s = seconds(self.driven_ms);
             for (v, spec) in self.all.iter_mut().zip(self.specs.iter()) {
                 v.drive(&spec.roads, now_s, &uavs);
             }
@@ -139,7 +135,7 @@ impl Vehicles {
             if recognised && self.is_pictured(nth, body, obstacles) {
                 let told = Detection::from_sight(from, height_m, v.at, &noise.sight);
                 let at = v.at + rooted(&told.covariance_m2, off) + displaced;
-                seen.push(sighted(at, &told.covariance_m2, spec.kind));
+                seen.push(sighted(at, &told, spec.kind));
             }
         }
         let is_false = random.unit() < noise.false_alarms;
@@ -153,7 +149,7 @@ impl Vehicles {
             let at = from + along + left * (y * airframe.footprint_across_m);
             let told = Detection::from_sight(from, height_m, at, &noise.sight);
             let kind = u8::try_from(kind).unwrap_or(0);
-            seen.push(sighted(at, &told.covariance_m2, kind));
+            seen.push(sighted(at, &told, kind));
         }
         seen.sort_by_key(|s| s.spread_mm);
         Sightings::new(seen)
@@ -166,14 +162,11 @@ fn frames(pose: Pose, at: Point, (across_m, along_m): (f64, f64)) -> bool {
     forward.dot(&to).abs() <= along_m && forward.perp(&to).abs() <= across_m
 }
 
-fn sighted(at: Point, covariance_m2: &Matrix2<f64>, kind: u8) -> Sighted {
-    let half = f64::midpoint(covariance_m2[(0, 0)], covariance_m2[(1, 1)]);
-    let skew = (covariance_m2[(0, 0)] - covariance_m2[(1, 1)]) / 2.0;
-    let worst = half + (skew * skew + covariance_m2[(0, 1)] * covariance_m2[(0, 1)]).sqrt();
+fn sighted(at: Point, told: &Detection, kind: u8) -> Sighted {
     Sighted {
         east_mm: mm(at.x),
         north_mm: mm(at.y),
-        spread_mm: mm(worst.max(0.0).sqrt()).unsigned_abs(),
+        spread_mm: mm(told.spread_m()).unsigned_abs(),
         kind,
     }
 }

@@ -12,8 +12,9 @@
 //! O(stretches) where both fly straight; in turns some steps for every halving of the
 //! distance, none shorter than 0.4 m of approach.
 
-use super::motion::{End, Motion, Piece, seconds};
+use super::motion::{End, Motion, Piece};
 use skein_geometry::frame::{Point, Vector};
+use skein_geometry::math::seconds;
 
 /// Time advances by at least as much as two UAVs need to approach by this, metres.
 const LEAST_STEP_M: f64 = 0.4;

@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 use skein_geometry::Segment;
 use skein_geometry::frame::{Point, Pose};
-use skein_geometry::math::wrap_pi;
+use skein_geometry::math::{seconds, wrap_pi};
 use thiserror::Error;
 
 /// Stretches that a plan may have: what is left of the present flight (two at most), a
@@ -401,14 +401,6 @@ pub fn heading_e7(heading_rad: f64) -> i32 {
     )]
     let e7 = (wrap_pi(heading_rad) * HEADING_PARTS).round() as i32;
     e7
-}
-
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "clocks stay far below 2^53 milliseconds"
-)]
-pub(super) fn seconds(ms: u64) -> f64 {
-    ms as f64 / 1e3
 }
 
 #[cfg(test)]

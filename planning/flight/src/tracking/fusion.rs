@@ -17,7 +17,7 @@ use super::tracks::{Kind, TargetName};
 use nalgebra::{Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
 use skein_geometry::frame::{Point, Vector};
-use skein_geometry::math::exp;
+use skein_geometry::math::{exp, seconds};
 use std::collections::BTreeMap;
 
 /// The most targets that one author tells of.
@@ -79,9 +79,7 @@ impl Fused {
     /// For how long nobody has seen it, seconds.
     #[must_use]
     pub fn unseen_s(&self, now_ms: u64) -> f64 {
-        #[allow(clippy::cast_precision_loss, reason = "far less than 2^53 ms")]
-        let ms = now_ms.saturating_sub(self.seen_ms) as f64;
-        ms / 1e3
+        seconds(now_ms.saturating_sub(self.seen_ms))
     }
 
     /// Where it probably is: on its way, and less far on it the longer nobody saw it.

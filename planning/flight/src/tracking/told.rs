@@ -43,11 +43,7 @@ impl Estimate {
     #[must_use]
     pub fn spread(&self) -> Spread {
         let p = &self.covariance;
-        let worst = |i: usize| {
-            let (a, b, c) = (p[(i, i)], p[(i + 1, i + 1)], p[(i, i + 1)]);
-            let (half, skew) = (f64::midpoint(a, b), (a - b) / 2.0);
-            half + (skew * skew + c * c).sqrt()
-        };
+        let worst = |i: usize| largest(p[(i, i)], p[(i + 1, i + 1)], p[(i, i + 1)]);
         let both = f64::midpoint(p[(0, 2)], p[(1, 3)]);
         let off = [p[(0, 2)] - both, p[(1, 3)] - both, p[(0, 3)], p[(1, 2)]];
         let left_out = off.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -61,6 +57,12 @@ impl Estimate {
     }
 }
 
+/// The largest variance in any direction, of those along two axes and what they have in common.
+fn largest(a: f64, b: f64, both: f64) -> f64 {
+    let (half, skew) = (f64::midpoint(a, b), (a - b) / 2.0);
+    half + (skew * skew + both * both).sqrt()
+}
+
 impl Detection {
     /// A place with the same error in all directions, a standard deviation in metres.
     #[must_use]
@@ -69,6 +71,13 @@ impl Detection {
             at,
             covariance_m2: Matrix2::identity() * (spread_m * spread_m),
         }
+    }
+
+    /// The largest error in any direction, a standard deviation in metres.
+    #[must_use]
+    pub fn spread_m(&self) -> f64 {
+        let p = &self.covariance_m2;
+        largest(p[(0, 0)], p[(1, 1)], p[(0, 1)]).max(0.0).sqrt()
     }
 }
 

@@ -27,6 +27,7 @@ mod coverage;
 
 pub use check::DiagramError;
 
+use crate::mission::is_default;
 use serde::{Deserialize, Serialize};
 use skein_geometry::hash::Fnv;
 
@@ -288,10 +289,6 @@ impl Part {
     pub fn lets_go(self) -> bool {
         matches!(self, Self::Releases | Self::Ends)
     }
-
-    fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
 }
 
 /// A state of a mission.
@@ -304,7 +301,7 @@ pub struct State {
     /// By which goal.
     pub goal: StateGoal,
     /// What becomes of its work.
-    #[serde(default, skip_serializing_if = "Part::is_default")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub part: Part,
 }
 
@@ -317,20 +314,12 @@ pub struct Transition {
     /// When this holds.
     pub on: MissionEvent,
     /// After so many seconds, of an event that counts them; 0 of all others.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub after_s: u32,
     /// To which state.
     pub to: String,
     /// Of several events that hold, the one of the lowest number counts.
     pub priority: u8,
-}
-
-#[allow(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "the signature that serde asks for"
-)]
-fn is_zero(n: &u32) -> bool {
-    *n == 0
 }
 
 /// A mission as a transition diagram. It begins in its first state.

@@ -24,6 +24,7 @@ use crate::wire::limits::ACCEPTS_MAX;
 use serde::{Deserialize, Serialize};
 use skein_flight::separation::{Detour, Detours, End, Motion, MotionPlan, first_loss_s};
 use skein_geometry::frame::{Point, Pose};
+use skein_geometry::math::seconds;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How far ahead of now a proposal turns off at first, milliseconds: what one exchange takes
@@ -494,14 +495,6 @@ fn received(said: &Intent, now_ms: u64) -> Option<Statement<Motion>> {
         proposal,
         accepts: said.accepts.clone(),
     })
-}
-
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "clocks stay far below 2^53 milliseconds"
-)]
-fn seconds(ms: u64) -> f64 {
-    ms as f64 / 1e3
 }
 
 #[cfg(test)]

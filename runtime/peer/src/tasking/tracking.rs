@@ -22,6 +22,7 @@ use skein_behaviors::executive::pursuit::Quarry;
 use skein_flight::airframe::Airframe;
 use skein_flight::tracking::follower::TargetMotion;
 use skein_geometry::frame::{Point, Vector};
+use skein_geometry::math::seconds;
 
 /// Own sightings this recent are sight, milliseconds: ten looks.
 const SEEN_MS: u64 = 2_000;
@@ -94,10 +95,6 @@ fn within_reach(motion: TargetMotion, mission: &Mission) -> TargetMotion {
     }
 }
 
-fn seconds(ms: u64) -> f64 {
-    f64::from(u32::try_from(ms).unwrap_or(u32::MAX)) / 1e3
-}
-
 impl Tasking {
     /// The target that is flown after, if it is one: the task in its revision.
     pub(super) fn sought(&self) -> Option<Sought> {
@@ -168,17 +165,17 @@ impl Tasking {
             return (None, false);
         };
         let unseen_ms = self.targets.unseen_ms(sought);
-        let Some(sight) = self.flown.as_mut().and_then(|f| f.held.as_mut()) else {
+        let Some(held) = self.flown.as_mut().and_then(|f| f.held.as_mut()) else {
             return (None, false);
         };
         let sees = unseen_ms.is_some_and(|ms| ms <= SEEN_MS);
         let has_lost = unseen_ms.is_none_or(|ms| ms > SEARCHES_MS);
-        if sees && !sight.sight.follows {
-            sight.sight.follows = true;
+        if sees && !held.sight.follows {
+            held.sight.follows = true;
             return (Some(TaskNews::Follows), true);
         }
-        if has_lost && sight.sight.follows {
-            sight.sight.follows = false;
+        if has_lost && held.sight.follows {
+            held.sight.follows = false;
             return (Some(TaskNews::Searches), false);
         }
         (None, false)

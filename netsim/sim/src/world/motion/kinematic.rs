@@ -9,7 +9,7 @@ use skein_behaviors::{Percept, Setpoint, Side};
 use skein_flight::airframe::Airframe;
 use skein_flight::trajectory::wind::{Course, Heading, Wind};
 use skein_geometry::frame::{Point, Pose};
-use skein_geometry::math::{FRAC_PI_2, atan2, sin, sin_cos, tan, wrap_pi};
+use skein_geometry::math::{FRAC_PI_2, atan2, seconds, sin, sin_cos, tan, wrap_pi};
 
 /// An airframe that was given no setpoint for this long loiters on its own. Two
 /// percept periods of the slowest sensible peer (500 ms) are lost before it trips.
@@ -120,14 +120,6 @@ pub enum Loss {
     Fuel,
     /// A fault took it.
     Killed,
-}
-
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "missions last far less than 2^53 ms"
-)]
-fn seconds(ms: u64) -> f64 {
-    ms as f64 / 1000.0
 }
 
 /// One airframe in flight.
