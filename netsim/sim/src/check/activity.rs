@@ -72,6 +72,8 @@ struct Flown {
 #[derive(Clone, Debug, Default)]
 pub struct ActivityCheck {
     missions: BTreeMap<u32, Arc<Flown>>,
+    /// What an operator ever wanted: an order may come and go between two snapshots.
+    ordered: Vec<Order>,
     last: BTreeMap<u16, Last>,
     /// When a process was first seen with this sortie.
     began: BTreeMap<u16, (u16, u64)>,
@@ -96,6 +98,13 @@ impl ActivityCheck {
         }
     }
 
+    /// The operator gives an order.
+    pub fn on_order(&mut self, order: Order) {
+        if !self.ordered.contains(&order) {
+            self.ordered.push(order);
+        }
+    }
+
     /// A process ends, with all that it knew, or stands still (`death` is false).
     pub fn on_silent(&mut self, id: u16, death: bool) {
         self.last.remove(&id);
@@ -117,6 +126,9 @@ impl ActivityCheck {
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         // Who ends a mission is heard at once: whoever may have been the first counts for all.
         let uavs = || snapshot.peers.iter().filter(|m| m.uav);
+        for m in uavs() {
+            self.on_order(m.view.order);
+        }
         for may_be_first in [true, false] {
             for m in uavs() {
                 self.judge_end(snapshot, m, may_be_first, found);
@@ -207,7 +219,7 @@ impl ActivityCheck {
         let is_first = last.is_none();
         // And where, whatever came and went between the two.
         let passing = |key: (MissionEvent, u32), now: Holds| {
-            if is_passing(key.0) {
+            if self.is_passing(key.0) {
                 Holds::Maybe
             } else {
                 either(key, now)
@@ -277,20 +289,22 @@ impl ActivityCheck {
             });
         }
     }
-}
 
-/// Whether an event may hold between two snapshots and in neither: a run of one cell is taken and
-/// seen, a word is heard.
-fn is_passing(on: MissionEvent) -> bool {
-    matches!(
-        on,
-        MissionEvent::CellsGiven
+    /// Whether an event may hold between two snapshots and in neither: a run of one cell is taken
+    /// and seen, a word is heard, an order comes late and the next one after it.
+    fn is_passing(&self, on: MissionEvent) -> bool {
+        match on {
+            MissionEvent::CellsGiven
             | MissionEvent::TaskGiven
             | MissionEvent::TargetGiven
             | MissionEvent::RelayGiven
             | MissionEvent::PeerLost
-            | MissionEvent::NobodyHeard
-    )
+            | MissionEvent::NobodyHeard => true,
+            MissionEvent::OperatorHold => self.ordered.contains(&Order::Hold),
+            MissionEvent::OperatorReturn => self.ordered.contains(&Order::ReturnToBase),
+            _ => false,
+        }
+    }
 }
 
 /// How long something lasts for a peer that was first seen then: at least, and at most. By its
@@ -492,6 +506,22 @@ mod tests {
             _ => in_state("section", flying()),
         };
         assert!(!broken(30, ends));
+    }
+
+    #[test]
+    fn an_order_that_came_and_went_leads_somewhere_where_one_was_given() {
+        let held_once = |ordered: Option<u64>| {
+            broken(20, move |t| match t {
+                _ if Some(t) == ordered => Beliefs {
+                    order: Order::Hold,
+                    ..in_state("hold", flying())
+                },
+                9 => in_state("hold", flying()),
+                _ => in_state("section", flying()),
+            })
+        };
+        assert!(!held_once(Some(4)));
+        assert!(held_once(None) && held_once(Some(12)));
     }
 
     #[test]

@@ -24,7 +24,7 @@ use skein_peer::mission::{Mission, chunks, point_m};
 use skein_peer::offload::MissionGeometry;
 use skein_peer::output::Status;
 use skein_peer::wire::codec::Body;
-use skein_peer::wire::message::{Bid, Heartbeat};
+use skein_peer::wire::message::{Bid, Heartbeat, Order};
 use skein_peer::{Beliefs, Incarnation, Report};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -94,6 +94,11 @@ impl Rules {
         self.activity.on_mission(mission);
         self.spread
             .on_mission(chunks(mission).map_or(0, |pieces| pieces.len()));
+    }
+
+    /// The operator gives an order, to all or to one.
+    pub fn on_order(&mut self, order: Order) {
+        self.activity.on_order(order);
     }
 
     /// A loop was derived.

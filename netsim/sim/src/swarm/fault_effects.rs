@@ -100,6 +100,7 @@ impl Swarm {
             }
             Fault::Order { order, uav } => {
                 self.operator.order(*uav, *order);
+                self.checker.rules.on_order(*order);
                 self.repeat_order();
                 uav.unwrap_or(0)
             }
