@@ -14,6 +14,9 @@ use std::collections::BTreeMap;
 /// period. In quarters of an interval.
 const CLAIM_QUARTERS: u64 = 4 * 10 + 1 + 1;
 
+/// A peer looks at the time so often in a period.
+const LOOKS_A_PERIOD: u64 = 4;
+
 /// Clocks count whole milliseconds, and a timer is set a few times in a duration.
 const ROUNDING_MS: u64 = 5;
 
@@ -206,7 +209,10 @@ impl CadenceCheck {
             _ => 0,
         };
         let passed_on_ms = handicaps.grown_ms(patience_ms, heard.at_ms, now_ms) - patience_ms;
-        let slack_ms = 100 * (diameter + 1) + rounding_ms + passed_on_ms;
+        let look_ms = self.period_ms / LOOKS_A_PERIOD;
+        let (heard_ms, now) = (heard.at_ms, now_ms);
+        let jumped_ms = handicaps.taken_for_listening_ms(observer, heard_ms, now, look_ms);
+        let slack_ms = 100 * (diameter + 1) + rounding_ms + passed_on_ms + jumped_ms;
         let silent_ms = handicaps.lived_ms(observer, heard.at_ms, now_ms);
         if silent_ms + slack_ms < patience_ms {
             found.broken("haste", now_ms, Some(observer), || {
@@ -262,6 +268,7 @@ impl CadenceCheck {
 mod tests {
     use super::super::testing::{Story, speaking};
     use super::*;
+    use crate::fault::Fault;
     use skein_peer::wire::message::Gossip;
 
     fn check() -> (CadenceCheck, Findings) {
@@ -333,6 +340,23 @@ mod tests {
                 broken,
                 "{status:?} {after_ms}"
             );
+        }
+    }
+
+    #[test]
+    fn a_jump_of_the_clock_counts_as_silence_up_to_one_look_at_the_time() {
+        for (after_ms, broken) in [(3_700, true), (3_850, false)] {
+            let (mut c, mut found) = check();
+            let mut jumps = Handicaps::default();
+            c.on_beacon_heard((50_000, 50_000), (1, 1, 1), (2, 4), &beacon(None));
+            let jump = Fault::ClockJump {
+                peer: 1,
+                ahead_ms: 20_000,
+            };
+            jumps.on_fault(52_000, &jump);
+            let suspects = (4, Status::Suspect);
+            c.on_belief(50_000 + after_ms, (1, 2), suspects, (1, &jumps), &mut found);
+            assert_eq!(found.counts.contains_key("haste"), broken, "{after_ms}");
         }
     }
 

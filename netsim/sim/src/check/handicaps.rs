@@ -5,7 +5,7 @@
 //! | what is wrong | what grows | until |
 //! |---|---|---|
 //! | a clock drifts | nothing of the peer's own, which is judged by its clock; what several do together, by the share of the drift | it ends |
-//! | a clock jumps | nothing: what is to last at least so long counts the jump, what at most does not | – |
+//! | a clock jumps | nothing: what is to last at least so long counts the jump, what at most does not; a silence that is to last counts what a peer takes for its own waiting, up to a look at the time | – |
 //! | a computer is x ms late | whatever the peer does after it heard of something, by 2 x: it hears late, and its timer comes late | it is quick again |
 //! | a disk is x ms late | whatever is written before it is spoken, by 4 x a write: four kinds of promises share one disk | the last of these is written |
 //! | a disk takes no writes, or not all | as above without end, for what must be written | it is healed |
@@ -106,10 +106,23 @@ impl Handicaps {
     /// this, and what the peer says of its own past.
     #[must_use]
     pub fn shown_ms(&self, id: u16, from_ms: u64, to_ms: u64) -> u64 {
-        let clock = self.peers.get(&id).into_iter().flat_map(|of| &of.clock);
-        let within = clock.filter(|s| (from_ms..=to_ms).contains(&s.from_ms));
-        let jumped_ms: u64 = within.map(|s| s.jump_ms).sum();
+        let jumped_ms: u64 = self.jumps_ms(id, from_ms, to_ms).sum();
         self.lived_ms(id, from_ms, to_ms).saturating_add(jumped_ms)
+    }
+
+    /// How much of the jumps of its clock a peer may take for time in which it listened, when
+    /// it looks at the time this often: one that comes just after a look is late only from the
+    /// next on.
+    #[must_use]
+    pub fn taken_for_listening_ms(&self, id: u16, from_ms: u64, to_ms: u64, look_ms: u64) -> u64 {
+        let jumps = self.jumps_ms(id, from_ms, to_ms);
+        jumps.map(|jump_ms| jump_ms.min(look_ms)).sum()
+    }
+
+    fn jumps_ms(&self, id: u16, from_ms: u64, to_ms: u64) -> impl Iterator<Item = u64> + '_ {
+        let clock = self.peers.get(&id).into_iter().flat_map(|of| &of.clock);
+        let within = clock.filter(move |s| (from_ms..=to_ms).contains(&s.from_ms));
+        within.map(|s| s.jump_ms)
     }
 
     /// How much later a peer may have done something that it was to do between these
