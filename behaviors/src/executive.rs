@@ -4,7 +4,7 @@
 //!
 //! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
 //! it cell by cell. Ways between cells come from [`transit`], what the camera saw from
-//! [`camera`], the way to a given circle from [`circle`], turns after a moving target from [`pursuit`], a flight between cells and what it
+//! [`camera`], the way to a given circle from [`circle`], rounds of the loop from [`circuit`], turns after a moving target from [`pursuit`], a flight between cells and what it
 //! is for from [`detour`], expectations for the peer from [`prediction`], what the fuel allows
 //! from [`endurance`], what stays of a flight when the
 //! goal changes from `goal_change`, how far a given flight reaches from [`given`], the proof of each stretch from `clearance_check`;
@@ -16,6 +16,7 @@
 //! | legs | open cells in order, then a circle | `Seen`, `Refused`, `PlanDone` once |
 //! | point | a route, then a circle | `Refused` without cells if there is no route |
 //! | circle | a route to the given circle, then that | likewise |
+//! | round | a route onto the loop, then the loop, forward, without end | `Refused` without cells if there is no route |
 //! | follow | none: turns that follow the target, from percept to percept | none |
 //! | given | a route to its start, its pieces, then a circle | `CutShort` where it ends early, `PlanDone` once |
 //! | detour | the cell that is flown, a given flight, then legs | those of both, `DetourFlown` once |
@@ -30,6 +31,7 @@
 
 pub mod camera;
 pub mod circle;
+pub mod circuit;
 mod clearance_check;
 pub mod detour;
 pub mod endurance;
@@ -111,6 +113,8 @@ pub enum Goal {
     Point(Point),
     /// Fly to this circle and stay on it.
     Circle(Segment),
+    /// Fly round the loop, forward, again and again, evenly spaced among those who do.
+    Round,
     /// Follow the target that it is told of, this far from it, metres; hold while it is told of
     /// none.
     Follow(f64),
@@ -145,6 +149,7 @@ enum Aim {
     Legs,
     Point(Point),
     Circle(Segment),
+    Round,
     Follow,
     Given,
     Detour,
@@ -230,6 +235,8 @@ pub struct Executive {
     contingency: Option<promised::Contingency>,
     /// Of whom it follows, if it does.
     pursuit: Option<pursuit::Pursuit>,
+    /// How it keeps its place among those who fly round the loop.
+    circuit: circuit::Circuit,
 }
 
 impl Executive {
@@ -264,6 +271,7 @@ impl Executive {
             late_ms: 0,
             contingency: None,
             pursuit: None,
+            circuit: circuit::Circuit::default(),
         }
     }
 
@@ -358,7 +366,7 @@ impl Executive {
             heading_rad: 0.0,
         };
         let offset = offset.unwrap_or(still);
-        let steps = air::steps(&self.track, offset, self.transit.air(), limit);
+        let steps = air::steps(&self.track, offset, &self.flown_air(), limit);
         let setpoint = self.setpoint(percept, steps);
         let looks_s = self.lands_in_s().unwrap_or(HORIZON_S);
         let setpoint = self.envelope.check_until(percept, setpoint, looks_s);
@@ -398,7 +406,7 @@ impl Executive {
 
     /// The airspeed that is commanded, m/s.
     fn speed_mps(&self) -> f64 {
-        self.transit.air().airspeed_mps
+        self.flown_air().airspeed_mps
     }
 
     /// Takes note of the wind: curves over the ground must stay flyable in it, and
@@ -469,7 +477,7 @@ impl Executive {
             .min(WINDOW_S);
         let wind_mps = self.transit.air().wind.speed_mps();
         let window_m = (self.transit.airframe.max_mps + wind_mps) * since_s + WINDOW_M;
-        let pose = self.transit.air().over_ground(percept.pose);
+        let pose = self.flown_air().over_ground(percept.pose);
         let offset = self.track.advance(&pose, window_m);
         let lost =
             offset.is_none_or(|o| o.cross_m.abs() > LOST_M || o.heading_rad.abs() > LOST_RAD);
@@ -552,7 +560,7 @@ impl Executive {
         }
         let near = offset
             .is_some_and(|o| o.cross_m.abs() < ON_TRACK_M && o.heading_rad.abs() < ON_TRACK_RAD);
-        let here = self.transit.air().over_ground(percept.pose);
+        let here = self.flown_air().over_ground(percept.pose);
         let pose = self.track.pose().filter(|_| near).unwrap_or(here);
         Place {
             pose,
@@ -601,6 +609,13 @@ impl Executive {
             if let Some((mut moves, visit)) = next {
                 moves.push(Move::Serve(visit));
                 return moves;
+            }
+        }
+        if self.aim == Aim::Round {
+            let circle = self.waits_for_room(at).map(|c| vec![Move::Loiter(c)]);
+            match circle.or_else(|| self.transit.way_round(at)) {
+                Some(moves) => return moves,
+                None => events.push(Event::Refused { cells: Vec::new() }),
             }
         }
         if let Some(Kind::Loiter(circle)) = self.stretches.back().map(|s| s.kind) {
@@ -674,7 +689,7 @@ impl Executive {
     /// Where the UAV is on a track that has just been made anew.
     fn restart(&mut self, percept: &Percept) -> Option<Offset> {
         self.replan = false;
-        let pose = self.transit.air().over_ground(percept.pose);
+        let pose = self.flown_air().over_ground(percept.pose);
         self.track.advance(&pose, WINDOW_M)
     }
 
@@ -691,7 +706,7 @@ impl Executive {
             Aim::Legs => legs(),
             Aim::Given => !self.is_given_left(),
             Aim::Detour => is_detour_flown && legs(),
-            Aim::Hold | Aim::Point(_) | Aim::Circle(_) | Aim::Follow => false,
+            Aim::Hold | Aim::Point(_) | Aim::Circle(_) | Aim::Round | Aim::Follow => false,
         };
         if are_flown && !self.end_reported {
             self.end_reported = true;

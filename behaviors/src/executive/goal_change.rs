@@ -3,6 +3,7 @@
 //! New legs that go on where the UAV is must not disturb the flight; others are taken
 //! up at the next percept, or at the end of the cell where that is no detour.
 
+use super::circuit::Circuit;
 use super::transit::{CellVisit, Place};
 use super::{Aim, Executive, Goal, Kind, Stretch};
 use skein_flight::coverage::ring::backtracking::Leg;
@@ -19,7 +20,9 @@ impl Executive {
         let goal = match goal {
             // By promises nothing but cells is flown.
             Goal::Detour(_, legs) if self.contingency.is_some() => Goal::Legs(legs),
-            Goal::Circle(_) | Goal::Follow(_) if self.contingency.is_some() => Goal::Hold,
+            Goal::Circle(_) | Goal::Round | Goal::Follow(_) if self.contingency.is_some() => {
+                Goal::Hold
+            }
             goal => goal,
         };
         if !matches!(goal, Goal::Given(_) | Goal::Detour(..)) {
@@ -61,6 +64,7 @@ impl Executive {
                     VecDeque::new(),
                 )
             }
+            Goal::Round => (Aim::Round, self.rounded(), VecDeque::new()),
             Goal::Follow(stand_off_m) => {
                 self.begin_pursuit(stand_off_m);
                 (Aim::Follow, 0, VecDeque::new())
@@ -81,6 +85,9 @@ impl Executive {
             }
         };
         self.end_reported = false;
+        if aim != Aim::Round {
+            self.circuit = Circuit::default();
+        }
         let same_aim = self.aim == aim;
         self.aim = aim;
         if self.contingency.is_some() {

@@ -439,7 +439,11 @@ impl Transit {
     }
 
     /// The shortest of the routes to the nearest boundaries.
-    fn join(&self, from: Pose, directions: &[Direction]) -> Option<((u16, Direction), Curve)> {
+    pub(super) fn join(
+        &self,
+        from: Pose,
+        directions: &[Direction],
+    ) -> Option<((u16, Direction), Curve)> {
         let mut best: Option<((u16, Direction), Curve, f64)> = None;
         for b in self.nearest(from.position(), MAX_JOIN_TRIES) {
             for d in directions {
@@ -676,7 +680,7 @@ impl Transit {
     }
 
     /// A circle through a pose that keeps clear of the zones, if there is one.
-    fn roomy_circle(&self, pose: &Pose) -> Option<Segment> {
+    pub(super) fn roomy_circle(&self, pose: &Pose) -> Option<Segment> {
         let (circle, room_m) = self.circle(pose);
         (room_m >= self.router.limits().clearance_m - ROUNDING_M).then_some(circle)
     }
