@@ -17,15 +17,15 @@
 //! give equal outputs.
 //!
 //! # Complexity
-//! A look at the others costs a few operations for each of them and each cell of the loop.
+//! A look at the others costs a few operations for each of them and each 15 m of the loop.
 
-use super::transit::{Move, Place, Transit};
+use super::transit::{CellVisit, Move, Place, Transit};
 use super::{Aim, Executive, Kind};
 use crate::reactive::air::Air;
 use skein_flight::coverage::ring::Direction;
 use skein_geometry::Segment;
-use skein_geometry::frame::{Point, Pose};
-use skein_geometry::math::cos;
+use skein_geometry::frame::Pose;
+use skein_geometry::math::{cos, sin};
 
 /// By how much slower somebody flies for each metre by which who is ahead is nearer than who is
 /// behind, m/s: differences between n UAVs are halved in some n²/π² · 14 s.
@@ -33,6 +33,9 @@ pub const SLOWER_PER_S: f64 = 0.05;
 
 /// A circle takes twice its length from the difference; one more may be under way.
 const CIRCLES: f64 = 2.5;
+
+/// Places on the loop are no farther apart, metres.
+const MARK_M: f64 = 15.0;
 
 /// Farther from the loop than this somebody is not on it, metres: two lanes.
 const OFF_M: f64 = 100.0;
@@ -76,23 +79,21 @@ impl Gaps {
     }
 }
 
-/// How a UAV keeps its place among others.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Circuit {
-    gaps: Option<Gaps>,
+/// A place on the loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Mark {
+    pose: Pose,
+    cell: u16,
+    /// How much of the cell is before it.
+    share: f64,
 }
 
-/// The distance of a point from a straight piece, and how much of that piece is before the
-/// nearest point of it.
-fn beside(p: Point, (from, to): (Point, Point)) -> (f64, f64) {
-    let (along, d) = (to - from, p - from);
-    let squared = along.norm_squared();
-    let share = if squared > 0.0 {
-        (d.dot(&along) / squared).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    ((d - along * share).norm(), share)
+/// How a UAV keeps its place among others.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Circuit {
+    /// None before the loop is flown round.
+    marks: Vec<Mark>,
+    gaps: Option<Gaps>,
 }
 
 impl Transit {
@@ -111,41 +112,68 @@ impl Transit {
         }
     }
 
-    /// Distance through the air along a cell, forward, metres.
+    /// Places along the loop, for who looks where somebody is on it.
+    fn marks(&self) -> Vec<Mark> {
+        let cells = 0..self.coverage_loop.len();
+        let each = cells.zip(0u16..).flat_map(|(i, cell)| {
+            let curve = self.coverage_loop.curve(i, Direction::Forward);
+            let length_m = curve.length_m();
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a cell is no longer than an area"
+            )]
+            let steps = (length_m / MARK_M).ceil().clamp(1.0, 1e5) as u32;
+            (0..steps).filter_map(move |k| {
+                let share = f64::from(k) / f64::from(steps);
+                let pose = curve.pose_at(share * length_m)?;
+                Some(Mark { pose, cell, share })
+            })
+        });
+        each.collect()
+    }
+
+    /// Distance through the air along a cell that is flown whole, forward, metres.
     fn forward_m(&self, cell: u16) -> f64 {
-        self.length_m(&Move::Pass(cell, Direction::Forward))
+        let direction = Direction::Forward;
+        self.length_m(&Move::Serve(CellVisit {
+            cell,
+            direction,
+            tries: 0,
+        }))
     }
 
     /// How far along the loop a pose is, through the air, and how long the loop is, metres.
     /// `None` where it is not on the loop.
-    fn along_loop_m(&self, pose: Pose) -> Option<(f64, f64)> {
-        let cells = self.coverage_loop.len();
-        let (mut whole_m, mut best) = (0.0, None);
-        for (cell, i) in (0..cells).zip(0u16..) {
-            let from = self.coverage_loop.boundary(cell);
-            let to = self.coverage_loop.boundary((cell + 1) % cells);
-            let length_m = self.forward_m(i);
-            let (off_m, share) = beside(pose.position(), (from.position(), to.position()));
-            let turned_rad = pose.heading_rad - from.heading_rad;
-            let turned_by =
-                (1.0 - share) * cos(turned_rad) + share * cos(pose.heading_rad - to.heading_rad);
-            let cost_m = off_m + AGAINST_M * (1.0 - turned_by);
-            if off_m <= OFF_M && best.is_none_or(|(least_m, _)| cost_m < least_m) {
-                best = Some((cost_m, whole_m + share * length_m));
+    fn along_loop_m(&self, marks: &[Mark], pose: Pose) -> Option<(f64, f64)> {
+        let cost_m = |mark: &Mark| {
+            let off_m = (pose.position() - mark.pose.position()).norm();
+            let turned = cos(pose.heading_rad - mark.pose.heading_rad);
+            (off_m <= OFF_M).then(|| off_m + AGAINST_M * (1.0 - turned))
+        };
+        let costs = marks.iter().filter_map(|m| Some((cost_m(m)?, m)));
+        let (_, nearest) = costs.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (mut whole_m, mut at_m) = (0.0, 0.0);
+        for (_, cell) in (0..self.coverage_loop.len()).zip(0u16..) {
+            let length_m = self.forward_m(cell);
+            if cell == nearest.cell {
+                at_m = whole_m + nearest.share * length_m;
             }
             whole_m += length_m;
         }
-        best.map(|(_, at_m)| (at_m, whole_m))
+        let (sin, cos) = (sin(nearest.pose.heading_rad), cos(nearest.pose.heading_rad));
+        let off = pose.position() - nearest.pose.position();
+        at_m += (off.x * cos + off.y * sin).clamp(-MARK_M, MARK_M);
+        Some((at_m, whole_m))
     }
 
     /// Who is next ahead of a pose on the loop and who behind. `None` where it is not on the
     /// loop, or nobody else is.
-    #[must_use]
-    pub fn gaps(&self, pose: Pose, others: &[Fellow]) -> Option<Gaps> {
-        let (at_m, whole_m) = self.along_loop_m(pose)?;
+    fn gaps(&self, marks: &[Mark], pose: Pose, others: &[Fellow]) -> Option<Gaps> {
+        let (at_m, whole_m) = self.along_loop_m(marks, pose)?;
         let speed_mps = self.air().airspeed_mps;
         let ahead_m = |other: &Fellow| {
-            let (then_m, _) = self.along_loop_m(other.pose)?;
+            let (then_m, _) = self.along_loop_m(marks, other.pose)?;
             let now_m = then_m + speed_mps * f64::from(other.age_ms) / 1000.0;
             Some((now_m - at_m).rem_euclid(whole_m))
         };
@@ -166,8 +194,13 @@ impl Executive {
         let Some(here) = self.played.as_ref().map(|p| p.percept.pose) else {
             return;
         };
-        let is_round = self.aim == Aim::Round;
-        self.circuit.gaps = is_round.then(|| self.transit.gaps(here, others)).flatten();
+        if self.aim != Aim::Round {
+            return;
+        }
+        if self.circuit.marks.is_empty() {
+            self.circuit.marks = self.transit.marks();
+        }
+        self.circuit.gaps = self.transit.gaps(&self.circuit.marks, here, others);
     }
 
     /// Who is before and behind it, where it flies round the loop and knows of others.
@@ -222,8 +255,7 @@ mod tests {
     use super::*;
     use crate::Goal;
     use crate::testing::{Wing, airframe, loop_and_router, square};
-    use skein_geometry::frame::Vector;
-    use skein_geometry::math::sin;
+    use skein_geometry::frame::{Point, Vector};
 
     fn round(wing: &Wing) -> Executive {
         let (coverage_loop, router) = loop_and_router(12, 10, vec![square(200.0, 100.0, 80.0)]);
@@ -309,7 +341,7 @@ mod tests {
         let gaps = |all: &[(Wing, Executive)]| {
             let at: Vec<(f64, f64)> = all
                 .iter()
-                .map(|(w, e)| e.transit.along_loop_m(w.pose).unwrap())
+                .map(|(w, e)| e.transit.along_loop_m(&e.transit.marks(), w.pose).unwrap())
                 .collect();
             let whole_m = at[0].1;
             let to_next = |m: f64| {
@@ -344,26 +376,31 @@ mod tests {
         assert!(ended < 1.1, "{ended}");
     }
 
+    /// Where an excursion leaves the loop it comes back: its beginning and its end are one place.
     #[test]
-    fn a_heading_tells_which_of_two_ways_on_one_line_is_flown() {
-        let pose = Pose::new(Point::new(0.0, 0.0), 0.0);
-        let wing = Wing::new(pose);
+    fn a_place_on_the_loop_is_as_far_along_as_the_cells_before_it() {
+        let wing = Wing::new(Pose::new(Point::new(0.0, 0.0), 0.0));
         let executive = round(&wing);
-        for boundary in [3, 20, 41] {
-            let there = on(&executive, boundary);
-            let (at_m, whole_m) = executive.transit.along_loop_m(there).unwrap();
-            let until: f64 = (0..u16::try_from(boundary).unwrap())
-                .map(|c| executive.transit.forward_m(c))
-                .sum();
-            let off_m = (at_m - until).rem_euclid(whole_m);
-            assert!(off_m.min(whole_m - off_m) < 1.0, "{at_m} {until}");
-            let east = Pose::new(
-                there.position()
-                    + 2.0 * Vector::new(cos(there.heading_rad), sin(there.heading_rad)),
-                there.heading_rad,
-            );
-            let (on_m, _) = executive.transit.along_loop_m(east).unwrap();
-            assert!((on_m - at_m).rem_euclid(whole_m) < 5.0);
+        let marks = executive.transit.marks();
+        let along = |pose| executive.transit.along_loop_m(&marks, pose).unwrap();
+        let cells = executive.transit.coverage_loop.cells();
+        let (mut until_m, mut looked) = (0.0, 0);
+        for (cell, i) in cells.iter().zip(0u16..) {
+            let there = on(&executive, usize::from(i));
+            let before = executive.transit.coverage_loop.len() + usize::from(i) - 1;
+            let beside = cells[before % cells.len()].excursion || cell.excursion;
+            if !beside {
+                let (at_m, whole_m) = along(there);
+                let off_m = (at_m - until_m).rem_euclid(whole_m);
+                assert!(off_m.min(whole_m - off_m) < 1.0, "{i}: {at_m} {until_m}");
+                let heading = Vector::new(cos(there.heading_rad), sin(there.heading_rad));
+                let ahead = Pose::new(there.position() + 2.0 * heading, there.heading_rad);
+                let on_m = (along(ahead).0 - at_m).rem_euclid(whole_m);
+                assert!(on_m > 0.5 && on_m < 4.0, "{i}: {on_m}");
+                looked += 1;
+            }
+            until_m += executive.transit.forward_m(i);
         }
+        assert!(looked > cells.len() / 2, "{looked}");
     }
 }
