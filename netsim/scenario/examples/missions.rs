@@ -1,7 +1,8 @@
 //! Missions with other numbers of UAVs, each to its verdict:
 //! `cargo run --release -p skein-scenario --example missions -- border,fire,inspection 1,8 1..4`.
 //!
-//! A fourth argument, `storm`, draws the faults instead of those of the scenario. Prints a line a
+//! A fourth argument, `storm`, draws the faults instead of those of the scenario, and `calm` has
+//! none. Prints a line a
 //! run: the verdict, when all was over, the longest time between two visits of a place, and what
 //! was wrong. Exit code 1 if anything was.
 
@@ -32,6 +33,7 @@ fn main() -> ExitCode {
                 }
             };
             let storms = arg(3, "") == "storm";
+            let calm = arg(3, "") == "calm";
             let free_ms = storms.then(|| failure_free_makespan_ms(&prepared));
             for seed in seeds.from..seeds.to {
                 let outcome = match free_ms {
@@ -39,7 +41,11 @@ fn main() -> ExitCode {
                     None => run(
                         &prepared,
                         seed,
-                        prepared.spec.faults.clone(),
+                        if calm {
+                            Vec::new()
+                        } else {
+                            prepared.spec.faults.clone()
+                        },
                         Wanted::default(),
                     ),
                 };
@@ -47,8 +53,8 @@ fn main() -> ExitCode {
                 passed &= r.passed;
                 let verdict = if r.passed { "passed" } else { "FAILED" };
                 println!(
-                    "{name} {n} uavs, seed {seed}: {verdict}, over {:?} ms, end {} ms, revisit {:?} ms {:?}",
-                    r.makespan_ms, r.end_ms, r.revisit_ms, r.reasons
+                    "{name} {n} uavs, seed {seed}: {verdict}, over {:?} ms, end {} ms, revisit {:?} ms, late {:?} ms {:?}",
+                    r.makespan_ms, r.end_ms, r.revisit_ms, r.revisit_late_ms, r.reasons
                 );
                 for v in outcome.violations() {
                     println!(

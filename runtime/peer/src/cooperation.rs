@@ -11,6 +11,7 @@
 //! | it was given a target to follow, and where that may be is near | follow it |
 //! | it was given a task, and its flight is planned | fly that, then the cells of the plan |
 //! | the plan has cells | fly them |
+//! | everything is seen, and the mission goes on round | fly round the loop, evenly spaced |
 //! | nothing to fly, others at work | loiter where it is |
 //! | and among many nobody is heard | loiter at base |
 //!
@@ -375,6 +376,7 @@ impl Cooperation {
         state.astray = s.membership.hears_nobody(s.now) && are_many(s.membership.uavs());
         state.silent = s.is_silent;
         state.steer_by_state(s.now, order);
+        state.keep_even(s);
         assert!(
             !effects.iter().any(|e| matches!(e, Effect::Negotiate)),
             "a tick asks for no tick"

@@ -383,6 +383,12 @@ impl Mission {
         self.machine().ok().and_then(|m| m.ends_after_s())
     }
 
+    /// Whether it goes on once everything is seen, until something else ends it.
+    #[must_use]
+    pub fn goes_round(&self) -> bool {
+        self.machine().is_ok_and(|m| m.goes_round())
+    }
+
     /// Derives the loop and the router.
     ///
     /// # Errors

@@ -39,6 +39,7 @@ use crate::wire::limits::BID_COVERED_MAX_BYTES;
 use crate::wire::message::{
     Activity, Beacon, Bid, Claim, Epoch, Finished, Member, MissionStatus, Order,
 };
+use skein_behaviors::executive::circuit::Fellow;
 use skein_behaviors::executive::detour::Watched;
 use skein_behaviors::executive::{GivenFlight, UNREACHABLE_MS};
 use skein_behaviors::{Event, Executive, Goal};
@@ -54,6 +55,9 @@ pub const CELLS_PER_COVERED_RECORD: u16 = 5;
 /// one to speak, two to be passed on. Who misses them flies those cells again, and hears
 /// of the next lap from the ground station.
 const LAP_PERIODS: u64 = 3;
+
+/// For so many periods after a beacon its author is taken to fly on round the loop.
+const FELLOW_PERIODS: u64 = 10;
 
 /// Claims on their way to the journal, numbered in the order in which it gets them. Only
 /// the last of them may be installed, for it is the one that the journal ends with.
@@ -183,7 +187,9 @@ impl MissionState {
 
     pub fn activity(&self) -> Activity {
         match &self.goal {
-            Some(Goal::Legs(_) | Goal::Given(_) | Goal::Detour(..)) => Activity::Covering,
+            Some(Goal::Legs(_) | Goal::Round | Goal::Given(_) | Goal::Detour(..)) => {
+                Activity::Covering
+            }
             Some(Goal::Hold | Goal::Circle(_) | Goal::Follow(_)) => Activity::Holding,
             Some(Goal::Point(_)) => Activity::Returning,
             None => Activity::Waiting,
@@ -530,7 +536,7 @@ impl MissionState {
             return self.next_lap(s, timers);
         }
         self.complete = complete;
-        let finished = complete || ended;
+        let finished = complete && !self.stage.goes_round() || ended;
         if finished == self.finished {
             return Effects::new();
         }
@@ -597,6 +603,32 @@ impl MissionState {
     pub fn steer_by_state(&mut self, now: Time, order: Order) {
         self.look(now, order);
         self.steer(self.goal_of_state());
+    }
+
+    /// Tells the executive who else flies round, as far as their beacons said so: who is able has
+    /// nothing else to do once everything is seen, and who is elsewhere is not on the loop.
+    pub fn keep_even(&mut self, s: &Situation<'_>) {
+        let loop_hash = self.loop_hash();
+        let Some(executive) = self
+            .executive
+            .as_mut()
+            .filter(|_| self.goal == Some(Goal::Round))
+        else {
+            return;
+        };
+        let fellow = |(id, _)| {
+            let info = s.membership.info(id)?;
+            let age_ms = s.now.since_ms(info.heard?);
+            let place = info
+                .place
+                .filter(|_| info.able && info.loop_hash == loop_hash)?;
+            let is_new = age_ms <= FELLOW_PERIODS * s.period_ms;
+            let age_ms = u32::try_from(age_ms).ok().filter(|_| is_new)?;
+            let pose = place.pose();
+            Some(Fellow { pose, age_ms })
+        };
+        let fellows: Vec<Fellow> = s.membership.live().filter_map(fellow).collect();
+        executive.keep_even(&fellows);
     }
 
     /// Gives the executive its goal, if that changed.

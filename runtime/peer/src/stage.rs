@@ -16,6 +16,7 @@
 //! | relay_given | it holds a relay position whose circle is planned |
 //! | task_given | it holds a task whose flight is planned |
 //! | cells_given | its plan has cells |
+//! | all_seen | everything is seen, whatever tasks are open |
 //! | nobody_heard | it knew many, and hears nobody |
 //! | otherwise | always |
 
@@ -110,6 +111,11 @@ impl Stage {
         self.ended
     }
 
+    /// Whether what is seen does not end the mission.
+    pub fn goes_round(&self) -> bool {
+        self.machine.goes_round()
+    }
+
     /// Somebody who follows this mission says that it is finished: where its time ends it, that
     /// is over for all.
     pub fn hear_finished(&mut self) {
@@ -159,6 +165,7 @@ impl MissionState {
             MissionEvent::RelayGiven => self.relay_circle().is_some(),
             MissionEvent::TaskGiven => self.errand.is_some(),
             MissionEvent::CellsGiven => !self.negotiation.sections.plan().is_empty(),
+            MissionEvent::AllSeen => self.negotiation.sections.complete(),
             // Where the ground station is and whoever is finished, somebody is heard.
             MissionEvent::NobodyHeard => self.astray,
             MissionEvent::Otherwise => true,
@@ -172,6 +179,7 @@ impl MissionState {
         match self.stage.state().goal {
             StateGoal::Hold => Goal::Hold,
             StateGoal::Section => Goal::Legs(legs()),
+            StateGoal::Round => Goal::Round,
             StateGoal::Follow => self.followed_at_m().map_or(Goal::Hold, Goal::Follow),
             StateGoal::Relay => self.relay_circle().map_or(Goal::Hold, Goal::Circle),
             StateGoal::Task => match &self.errand {

@@ -13,7 +13,8 @@ use crate::task_desk::TaskView;
 use crate::wire::message::{Bid, Epoch, ListedRun, Order, Orders};
 use core::fmt;
 use serde::{Deserialize, Serialize};
-use skein_behaviors::Percept;
+use skein_behaviors::executive::circuit::Gaps;
+use skein_behaviors::{Executive, Percept};
 use std::fmt::Write as _;
 
 /// Next cells that are told.
@@ -43,6 +44,8 @@ pub enum Reason {
     Task,
     /// It has cells to fly.
     Plan,
+    /// Everything is seen, and the mission goes on.
+    AllSeen,
     /// It knew many, has nothing to fly and hears nobody.
     Astray,
     /// It has nothing to fly, and others are at work.
@@ -72,6 +75,7 @@ impl Reason {
             MissionEvent::RelayGiven => Self::Relay,
             MissionEvent::TaskGiven => Self::Task,
             MissionEvent::CellsGiven => Self::Plan,
+            MissionEvent::AllSeen => Self::AllSeen,
             MissionEvent::NobodyHeard => Self::Astray,
             MissionEvent::Otherwise => Self::OthersAtWork,
         }
@@ -87,7 +91,7 @@ impl Reason {
             Self::Finished => "everything is covered",
             Self::FuelIsDue => "its fuel is due",
             Self::Twin => "another process speaks under its id",
-            Self::Relay | Self::Track | Self::Task | Self::Plan => "",
+            Self::Relay | Self::Track | Self::Task | Self::Plan | Self::AllSeen => "",
             Self::Astray => "it has nothing to fly and hears nobody",
             Self::OthersAtWork => "it has nothing to fly, others are at work",
             Self::TimeIsOver => "the time of its mission is over",
@@ -304,6 +308,12 @@ fn does(goal: StateGoal, reason: Reason) -> String {
     }
 }
 
+/// Who is ahead of it and behind, where it flies round and hears others who do.
+fn spacing(gaps: Gaps) -> String {
+    let Gaps { ahead_m, behind_m } = gaps;
+    format!("the next one is {ahead_m:.0} m ahead and the last one {behind_m:.0} m behind")
+}
+
 pub(crate) fn work(state: &MissionState, now: Time) -> Work {
     let sections = &state.negotiation.sections;
     let coverage_loop = &state.geometry.coverage_loop;
@@ -320,6 +330,11 @@ pub(crate) fn work(state: &MissionState, now: Time) -> Work {
         .map(|p| p.cell)
         .filter(|c| !covered.contains(*c))
         .collect();
+    let gaps = state.executive.as_ref().and_then(Executive::gaps);
+    let does = match gaps.filter(|_| at.goal == StateGoal::Round) {
+        Some(gaps) => format!("{}; {}", does(at.goal, reason), spacing(gaps)),
+        None => does(at.goal, reason),
+    };
     Work {
         revision: state.revision(),
         loop_hash: state.loop_hash(),
@@ -330,7 +345,7 @@ pub(crate) fn work(state: &MissionState, now: Time) -> Work {
         diagram: state.geometry.mission.flown_by().name.clone(),
         state: at.name.clone(),
         state_ms: state.stage.state_ms(now),
-        does: does(at.goal, reason),
+        does,
         able: state.able(),
         next_cells: open.iter().copied().take(NEXT_CELLS).collect(),
         open_cells: open.len(),

@@ -402,6 +402,7 @@ impl Account {
             zone_entries: ending.judge.entries(),
             nearest_approach_m: ending.judge.closest().map(|a| a.distance_m),
             revisit_ms: ending.judge.longest_gap_ms(),
+            revisit_late_ms: ending.judge.watched_gap_ms(now_ms / 2),
             kills: self.work.kills(&self.detection),
             restarts: self.restarts.reports(),
             tasks: self.tasks.reports(ending.judge),

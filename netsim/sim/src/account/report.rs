@@ -66,6 +66,10 @@ pub struct RunReport {
     /// The longest time in which a cell was not seen again, ms, where everything is to be
     /// seen several times.
     pub revisit_ms: Option<u64>,
+    /// The same of visits in the second half of the mission, where it goes on once everything is
+    /// seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub revisit_late_ms: Option<u64>,
     /// Each process that ended before the run did, in the order of the times.
     pub kills: Vec<KillReport>,
     /// Each restart, in the order of the times.

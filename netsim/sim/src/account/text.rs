@@ -101,7 +101,11 @@ impl RunReport {
         }
         writeln!(f)?;
         if let Some(ms) = self.revisit_ms {
-            writeln!(f, "  revisit    {:.1} s at most", secs(ms))?;
+            write!(f, "  revisit    {:.1} s at most", secs(ms))?;
+            if let Some(ms) = self.revisit_late_ms {
+                write!(f, ", {:.1} s in the second half", secs(ms))?;
+            }
+            writeln!(f)?;
         }
         writeln!(f, "  finished   {}", self.names(&self.finished))?;
         if !self.relaying.is_empty() {

@@ -362,6 +362,14 @@ impl Facts<'_> {
                     Holds::No
                 }
             }
+            // Where it goes on, tasks may be open that nobody here knows of.
+            MissionEvent::MissionComplete if self.flown.machine.goes_round() => {
+                if view.covered.is_full() {
+                    Holds::Maybe
+                } else {
+                    Holds::No
+                }
+            }
             MissionEvent::MissionComplete => Holds::of(view.finished),
             MissionEvent::LowFuel => Holds::of(view.is_fuel_due),
             MissionEvent::TwinSpeaks => Holds::of(view.is_silent),
@@ -383,6 +391,7 @@ impl Facts<'_> {
                 Holds::No
             }
             MissionEvent::CellsGiven => Holds::of(!view.plan.is_empty()),
+            MissionEvent::AllSeen => Holds::of(view.covered.is_full()),
             MissionEvent::NobodyHeard => Holds::of(view.hears_nobody),
             MissionEvent::Otherwise => Holds::Yes,
         }

@@ -6,6 +6,7 @@ use super::fact::Fact;
 use super::motion::Piece;
 use super::pieces::Pieces;
 use super::survey::{Cell, Survey};
+use super::watch::Watch;
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::CellId;
 use skein_geometry::frame::Pose;
@@ -45,6 +46,8 @@ pub(super) struct Board {
     longest_gap_ms: u64,
     /// How often a camera saw something for the first time in a lap.
     marks: u64,
+    /// How often it is seen again, where the mission goes on once everything is seen.
+    watch: Option<Watch>,
 }
 
 /// From corner to corner of a picture, metres.
@@ -70,8 +73,14 @@ impl Board {
             times: vec![(0, 0); survey.cells().len()],
             longest_gap_ms: 0,
             marks: 0,
+            watch: None,
             survey,
         }
+    }
+
+    /// From now on what was seen is looked at again.
+    pub(super) fn watch_again(&mut self) {
+        self.watch = Some(Watch::new(self.survey.cells().len()));
     }
 
     pub(super) fn watch_claims(&mut self, pieces: Option<Arc<Pieces>>) {
@@ -99,6 +108,9 @@ impl Board {
             let Some(j) = self.same_place(other, i) else {
                 continue;
             };
+            if let (Some(watch), Some(watched)) = (&mut self.watch, &other.watch) {
+                watch.remember(i, watched, j);
+            }
             let (times, at_ms) = other.times[j];
             if times < self.lap {
                 self.times[i].1 = self.times[i].1.max(at_ms);
@@ -131,8 +143,15 @@ impl Board {
         &self.survey
     }
 
+    /// The longest time between two visits that began at a time or later, milliseconds; none
+    /// where nothing is watched.
+    pub(super) fn watched_gap_ms(&self, from_ms: u64) -> Option<u64> {
+        self.watch.as_ref().map(|w| w.longest_gap_ms(from_ms))
+    }
+
     pub(super) fn longest_gap_ms(&self) -> Option<u64> {
-        (self.laps > 1).then_some(self.longest_gap_ms)
+        let again = self.watched_gap_ms(0);
+        again.or((self.laps > 1).then_some(self.longest_gap_ms))
     }
 
     pub(super) fn sighting(&self, cell: CellId) -> Option<Sighting> {
@@ -232,7 +251,7 @@ impl Board {
                 .any(|i| self.seen[i].is_none()),
             None => self.anything_new(piece.start, reach_m),
         };
-        if !new && self.claims.is_none() {
+        if !new && self.claims.is_none() && self.watch.is_none() {
             return;
         }
         #[allow(
@@ -284,13 +303,24 @@ impl Board {
         };
         let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
         for i in pieces.near(pose.position(), self.reach_m(airframe)) {
-            if self.seen[i].is_none() && pieces.held(i, pose, across_m, along_m) {
+            if self.looks_for(i) && pieces.held(i, pose, across_m, along_m) {
                 self.see(i, Sighting { at_ms, uav }, facts);
             }
         }
     }
 
+    /// Whether it matters that a cell is in a picture.
+    fn looks_for(&self, i: usize) -> bool {
+        self.seen[i].is_none() || self.watch.is_some()
+    }
+
     pub(super) fn see(&mut self, i: usize, sighting: Sighting, facts: &mut Vec<Fact>) {
+        if let Some(watch) = &mut self.watch {
+            watch.see(i, sighting.at_ms);
+        }
+        if self.seen[i].is_some() {
+            return;
+        }
         self.seen[i] = Some(sighting);
         self.marks += 1;
         let cell = self.survey.cells()[i];
@@ -378,7 +408,7 @@ impl Board {
                 let Some(i) = self.survey.at(col, row) else {
                     continue;
                 };
-                if self.seen[i].is_some() {
+                if !self.looks_for(i) {
                     continue;
                 }
                 let (x, y) = (

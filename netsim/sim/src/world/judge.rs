@@ -49,6 +49,15 @@ impl Judge {
         self
     }
 
+    /// What was seen is looked at again, as long as the mission goes on.
+    #[must_use]
+    pub fn with_watch(mut self, goes_round: bool) -> Self {
+        if goes_round {
+            self.board_mut().watch_again();
+        }
+        self
+    }
+
     fn board(&self) -> &Board {
         &self.boards[self.boards.len() - 1]
     }
@@ -58,10 +67,19 @@ impl Judge {
         &mut self.boards[last]
     }
 
-    /// The longest time between the first sightings of a cell in one lap and the next, milliseconds; none where everything is seen once.
+    /// The longest time between the first sightings of a cell in one lap and the next, or between
+    /// two visits where the mission goes on once everything is seen, milliseconds; none where
+    /// everything is seen once.
     #[must_use]
     pub fn longest_gap_ms(&self) -> Option<u64> {
         self.board().longest_gap_ms()
+    }
+
+    /// The longest time between two visits of a cell that began at a time or later, milliseconds;
+    /// none where no mission goes on once everything is seen.
+    #[must_use]
+    pub fn watched_gap_ms(&self, from_ms: u64) -> Option<u64> {
+        self.board().watched_gap_ms(from_ms)
     }
 
     /// Watches these pieces besides, so that what peers claim to have seen can be
@@ -73,14 +91,15 @@ impl Judge {
     }
 
     /// From now on what another revision of the mission asks for is to be seen in this lap,
-    /// from 0, and in so many further ones, and its zones are to be kept clear of. What was
+    /// from 0, and in so many further ones, or again and again where the mission goes on once
+    /// everything is seen, and its zones are to be kept clear of. What was
     /// seen of the same places in this lap, or in a later one, counts.
     /// A zone that is new binds a UAV from the first moment in which it follows the revision and
     /// can still turn away. Peers that follow an older revision yet are judged by that.
     pub fn revise(
         &mut self,
         wanted: Arc<Survey>,
-        (claims, lap, further_laps): (Option<Arc<Pieces>>, u16, u16),
+        (claims, lap, further_laps, goes_round): (Option<Arc<Pieces>>, u16, u16, bool),
         revision: u32,
         turn: TurnAway,
     ) {
@@ -88,6 +107,9 @@ impl Judge {
         let mut board = Board::new(revision, wanted);
         board.watch_claims(claims);
         board.begin_at(lap, further_laps);
+        if goes_round {
+            board.watch_again();
+        }
         for old in self.boards.iter().rev() {
             board.remember(old);
         }
@@ -269,7 +291,7 @@ mod tests {
         let before = judge.n_covered();
         let far = (5_000_000, 5_000_000);
         let zone = [far, (far.0 + 9_000, far.1), (far.0, far.1 + 9_000)];
-        judge.revise(revised(240_000, &zone), (None, 0, 0), 2, turn());
+        judge.revise(revised(240_000, &zone), (None, 0, 0, false), 2, turn());
         assert_eq!(judge.survey().cells().len(), 40);
         assert!(judge.n_covered() >= 4 && judge.n_covered() < before);
         assert!(judge.saw(1, CellId { col: 7, row: 0 }, 1), "seen before");
@@ -308,7 +330,7 @@ mod tests {
             &piece(320.0, 24.0, 0.0, 4_000, 0.0),
             &mut Vec::new(),
         );
-        judge.revise(Arc::new(Survey::new(&spec)), (None, 0, 0), 2, turn());
+        judge.revise(Arc::new(Survey::new(&spec)), (None, 0, 0, false), 2, turn());
         let before = judge.n_covered();
         assert!(before > 0 && judge.saw(2, id(both), 1) && !judge.saw(2, id(new), 1));
         let mut facts = Vec::new();
@@ -349,13 +371,13 @@ mod tests {
         for north_m in [240.0, 24.0] {
             fly(&mut judge, north_m);
         }
-        judge.revise(places(&[c, b, a]), (None, 1, 1), 2, turn());
+        judge.revise(places(&[c, b, a]), (None, 1, 1, false), 2, turn());
         let saw = |j: &Judge, n, laps| j.saw(2, CellId::numbered(n), laps);
         for (n, times) in [(0, 1), (1, 1), (2, 2)] {
             assert!(saw(&judge, n, times) && !saw(&judge, n, times + 1), "{n}");
         }
         // Who is told of the lap before sees all of that one for seen.
-        judge.revise(places(&[b, a]), (None, 0, 2), 3, turn());
+        judge.revise(places(&[b, a]), (None, 0, 2, false), 3, turn());
         assert!(saw(&judge, 1, 1) && !judge.complete());
         for north_m in [24.0, 240.0, 24.0] {
             assert!(!judge.complete());
@@ -372,10 +394,10 @@ mod tests {
         judge.watch(1, &airframe(), &over_a, &mut Vec::new());
         let saw = |j: &Judge, revision, n| j.saw(revision, CellId::numbered(n), 1);
         assert!(saw(&judge, 1, 0) && !saw(&judge, 1, 1));
-        judge.revise(places(&[c, a]), (None, 0, 0), 2, turn());
+        judge.revise(places(&[c, a]), (None, 0, 0, false), 2, turn());
         assert!(!saw(&judge, 2, 0) && saw(&judge, 2, 1) && saw(&judge, 1, 0));
         // Of laps the first is over for what was seen in any.
-        judge.revise(places(&[a]), (None, 0, 1), 3, turn());
+        judge.revise(places(&[a]), (None, 0, 1, false), 3, turn());
         assert!(!judge.complete());
         judge.watch(1, &airframe(), &over_a, &mut Vec::new());
         assert!(judge.complete());
@@ -392,7 +414,7 @@ mod tests {
         let over = piece(40.0, 240.0, 0.0, 20_000, 0.0);
         for (told, from_m, entries) in [(true, 40.0, 1), (false, 40.0, 0), (true, 200.0, 0)] {
             let mut judge = judge_with(&[]);
-            judge.revise(revised(480_000, &block), (None, 0, 0), 2, turn());
+            judge.revise(revised(480_000, &block), (None, 0, 0, false), 2, turn());
             judge.follows(1, if told { 2 } else { 1 });
             let mut facts = Vec::new();
             let steps = (0..20).map(|k| Piece {
@@ -409,12 +431,12 @@ mod tests {
         // What was lifted binds nobody.
         let mut judge = judge_with(&[&block]);
         let elsewhere = [(0, 0), (9_000, 0), (0, 9_000)];
-        judge.revise(revised(480_000, &elsewhere), (None, 0, 0), 2, turn());
+        judge.revise(revised(480_000, &elsewhere), (None, 0, 0, false), 2, turn());
         judge.zones.watch(1, &over, &mut Vec::new());
         assert_eq!(judge.entries(), 0);
         // Nor does it when it comes back, before it is known again.
         judge.follows(1, 2);
-        judge.revise(revised(480_000, &block), (None, 0, 0), 3, turn());
+        judge.revise(revised(480_000, &block), (None, 0, 0, false), 3, turn());
         judge.zones.watch(1, &over, &mut Vec::new());
         assert_eq!(judge.entries(), 0);
         judge.follows(1, 3);

@@ -17,6 +17,7 @@ mod separation;
 pub mod survey;
 mod task_board;
 pub mod vehicles;
+mod watch;
 
 pub use fact::{Approach, Fact};
 pub use judge::{Judge, Sighting};
@@ -205,7 +206,8 @@ impl World {
         }
         let judge = Judge::new(Arc::clone(&site.survey))
             .with_claims(site.claims.clone())
-            .with_laps(spec.mission.further_laps.saturating_add(1));
+            .with_laps(spec.mission.further_laps.saturating_add(1))
+            .with_watch(spec.mission.goes_round());
         Self {
             site,
             seed,
@@ -304,7 +306,12 @@ impl World {
         let claims = claims(mission, Some(geometry));
         self.judge.revise(
             survey,
-            (claims, mission.lap, mission.further_laps),
+            (
+                claims,
+                mission.lap,
+                mission.further_laps,
+                mission.goes_round(),
+            ),
             mission.revision,
             TurnAway::of(mission),
         );

@@ -167,6 +167,7 @@ fn check_behaviour(state: &State) -> Result<(), (&'static str, String)> {
     let purposes: &[Purpose] = match goal {
         StateGoal::Hold | StateGoal::Relay | StateGoal::Follow => &[Purpose::Tracking],
         StateGoal::Section => &[Purpose::Traveling, Purpose::Watching],
+        StateGoal::Round => &[Purpose::Watching],
         StateGoal::Task | StateGoal::Home => &[Purpose::Traveling],
     };
     if !purposes.contains(purpose) {
@@ -194,7 +195,7 @@ fn check_behaviour(state: &State) -> Result<(), (&'static str, String)> {
     let dimensions: &[Option<u8>] = match goal {
         StateGoal::Hold | StateGoal::Relay | StateGoal::Follow => &[Some(0)],
         StateGoal::Task | StateGoal::Home => &[Some(1), None],
-        StateGoal::Section => &[None, Some(0), Some(1), Some(2), Some(3)],
+        StateGoal::Section | StateGoal::Round => &[None, Some(0), Some(1), Some(2), Some(3)],
     };
     if !dimensions.contains(dimension) {
         let known: Vec<String> = dimensions.iter().flatten().map(u8::to_string).collect();
@@ -208,6 +209,7 @@ fn check_behaviour(state: &State) -> Result<(), (&'static str, String)> {
     let made_of: &[&[Action]] = match goal {
         StateGoal::Hold => &[&[Loitering]],
         StateGoal::Section | StateGoal::Task => &[&[Displacing], &[Displacing, Loitering]],
+        StateGoal::Round => &[&[Displacing]],
         StateGoal::Relay | StateGoal::Follow | StateGoal::Home => &[&[Displacing, Loitering]],
     };
     if !made_of.contains(&actions.as_slice()) {
@@ -242,6 +244,10 @@ const GIVEN: [(MissionEvent, StateGoal); 4] = [
     (MissionEvent::CellsGiven, StateGoal::Section),
 ];
 
+/// What a state needs to be reached, beside what a UAV is given: round it flies when everything
+/// is seen.
+const REACHED_BY: [(MissionEvent, StateGoal); 1] = [(MissionEvent::AllSeen, StateGoal::Round)];
+
 /// What a diagram leads to.
 pub(super) fn flown(machine: &Machine) -> Result<(), DiagramError> {
     let states = || machine.states().iter().enumerate();
@@ -266,7 +272,10 @@ pub(super) fn flown(machine: &Machine) -> Result<(), DiagramError> {
         for way in machine.ways(i) {
             let goal = machine.state(way.to).goal;
             let taken_up = GIVEN.into_iter().find(|(on, _)| *on == way.on);
-            let needs = GIVEN.into_iter().find(|(_, g)| *g == goal);
+            let needs = GIVEN
+                .into_iter()
+                .chain(REACHED_BY)
+                .find(|(_, g)| *g == goal);
             // Of a section nothing need be left to be flown.
             let needs = needs.filter(|(_, g)| *g != StateGoal::Section);
             if let Some((on, wanted)) = taken_up.or(needs).filter(|g| *g != (way.on, goal)) {
@@ -381,7 +390,8 @@ fn all_reached(machine: &Machine) -> Result<(), DiagramError> {
 /// once.
 pub(crate) fn fits(diagram: &Diagram, dimension: u8, again: bool) -> Result<(), DiagramError> {
     let all = diagram.states.iter().enumerate();
-    for (i, state) in all.filter(|(_, s)| s.goal == StateGoal::Section) {
+    let flown = |s: &State| matches!(s.goal, StateGoal::Section | StateGoal::Round);
+    for (i, state) in all.filter(|(_, s)| flown(s)) {
         let behaviour = &state.behaviour;
         if let Some(d) = behaviour.dimension.filter(|d| *d != dimension) {
             let text = format!(
@@ -389,6 +399,16 @@ pub(crate) fn fits(diagram: &Diagram, dimension: u8, again: bool) -> Result<(), 
                 state.name
             );
             return Err(wrong(format!("states[{i}].behaviour.dimension"), text));
+        }
+        if state.goal == StateGoal::Round {
+            if again {
+                let text = format!(
+                    "the state \"{}\" goes round once everything is seen, and the mission has laps; leave the laps out",
+                    state.name
+                );
+                return Err(wrong(format!("states[{i}].goal"), text));
+            }
+            continue;
         }
         if behaviour.endless != again {
             let text = if again {

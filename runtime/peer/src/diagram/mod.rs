@@ -73,6 +73,8 @@ pub enum MissionEvent {
     TaskGiven,
     /// Its plan has cells.
     CellsGiven,
+    /// Everything is seen, whatever tasks are open.
+    AllSeen,
     /// It knew many, and hears nobody.
     NobodyHeard,
     /// Always.
@@ -81,7 +83,7 @@ pub enum MissionEvent {
 
 impl MissionEvent {
     /// All, in the order of the default diagram.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::OperatorHold,
         Self::OperatorReturn,
         Self::MissionCancelled,
@@ -95,6 +97,7 @@ impl MissionEvent {
         Self::RelayGiven,
         Self::TaskGiven,
         Self::CellsGiven,
+        Self::AllSeen,
         Self::NobodyHeard,
         Self::Otherwise,
     ];
@@ -116,6 +119,7 @@ impl MissionEvent {
             Self::RelayGiven => "relay_given",
             Self::TaskGiven => "task_given",
             Self::CellsGiven => "cells_given",
+            Self::AllSeen => "all_seen",
             Self::NobodyHeard => "nobody_heard",
             Self::Otherwise => "otherwise",
         }
@@ -206,6 +210,8 @@ pub enum StateGoal {
     Hold,
     /// Fly the cells of its plan, then loiter.
     Section,
+    /// Fly round the loop again and again, evenly spaced among those who do.
+    Round,
     /// Fly to its relay position and circle there.
     Relay,
     /// Follow its target, or search for it.
@@ -218,9 +224,10 @@ pub enum StateGoal {
 
 impl StateGoal {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Hold,
         Self::Section,
+        Self::Round,
         Self::Relay,
         Self::Follow,
         Self::Task,
@@ -233,6 +240,7 @@ impl StateGoal {
         match self {
             Self::Hold => "hold",
             Self::Section => "section",
+            Self::Round => "round",
             Self::Relay => "relay",
             Self::Follow => "follow",
             Self::Task => "task",
@@ -246,6 +254,7 @@ impl StateGoal {
         match self {
             Self::Hold => "loiters where it is",
             Self::Section => "flies its section",
+            Self::Round => "flies round, evenly spaced among those who do",
             Self::Relay => "holds a relay position that it was given, or flies to it",
             Self::Follow => "follows a target that it was given, or searches for it",
             Self::Task => "flies to a task that it was given, between two cells of its section",
@@ -450,6 +459,12 @@ impl Machine {
         let all = self.ways.iter().flatten();
         let timers = all.filter(|w| w.on == MissionEvent::Timer && ends(w.to));
         timers.map(|w| w.after_s).min()
+    }
+
+    /// Whether it goes on once everything is seen, until something else ends it.
+    #[must_use]
+    pub fn goes_round(&self) -> bool {
+        self.states().iter().any(|s| s.goal == StateGoal::Round)
     }
 
     /// Which state follows, and by which event; none where no event holds that leads anywhere.
