@@ -57,7 +57,7 @@ pub const CELLS_PER_COVERED_RECORD: u16 = 5;
 const LAP_PERIODS: u64 = 3;
 
 /// For so many periods after a beacon its author is taken to fly on round the loop.
-const FELLOW_PERIODS: u64 = 10;
+const FELLOW_PERIODS: u64 = 60;
 
 /// Claims on their way to the journal, numbered in the order in which it gets them. Only
 /// the last of them may be installed, for it is the one that the journal ends with.

@@ -122,6 +122,14 @@ impl ActivityCheck {
         self.wanted.get(&id).copied()
     }
 
+    /// The goal of the state in which a UAV says that it is.
+    #[must_use]
+    pub fn goal(&self, m: &PeerSnapshot) -> Option<StateGoal> {
+        let (at, _) = m.view.stage.filter(|_| m.view.loop_hash != 0)?;
+        let flown = self.flown(m)?;
+        flown.machine.states().get(at).map(|s| s.goal)
+    }
+
     /// Looks at the states of all UAVs.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         // Who ends a mission is heard at once: whoever may have been the first counts for all.

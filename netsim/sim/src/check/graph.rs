@@ -74,6 +74,15 @@ impl Graph {
         heard.map_or(0, |n| u32::try_from(n).unwrap_or(u32::MAX))
     }
 
+    /// Whether two radios hear each other.
+    #[must_use]
+    pub fn linked(&self, a: u16, b: u16) -> bool {
+        match (self.ids.binary_search(&a), self.ids.binary_search(&b)) {
+            (Ok(i), Ok(j)) => self.adjacent[i].contains(j),
+            _ => false,
+        }
+    }
+
     /// Whether a path joins two radios.
     #[must_use]
     pub fn joined(&self, a: u16, b: u16) -> bool {

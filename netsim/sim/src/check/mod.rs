@@ -22,6 +22,7 @@
 //! | [`tasks`] | each task in one bundle, and in one at least |
 //! | [`relays`] | who holds a relay position is there |
 //! | [`tracks`] | who says that it follows a target sees it |
+//! | [`watch`] | who flies round leaves no place waiting, and spreads evenly |
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
 //! | [`airtime`] | S9: shares of the channel |
 //! | [`fuel`] | S10, bids and returns against fuel and place |
@@ -60,6 +61,7 @@ pub mod tasks;
 mod testing;
 pub mod tracks;
 pub mod twins;
+pub mod watch;
 
 pub use bounds::{Bounds, Grade};
 pub use checker::{Checker, Reached};

@@ -14,12 +14,14 @@ use super::spoken::SpokenCheck;
 use super::spread::SpreadCheck;
 use super::tasks::TaskCheck;
 use super::tracks::TrackCheck;
+use super::watch::WatchCheck;
 use super::{Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::spec::{Spec, UavSpec};
 use crate::twins::Twins;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;
+use skein_peer::diagram::StateGoal;
 use skein_peer::mission::{Mission, chunks, point_m};
 use skein_peer::offload::MissionGeometry;
 use skein_peer::output::Status;
@@ -48,6 +50,7 @@ pub struct Rules {
     pub relays: RelayCheck,
     /// Who follows targets.
     pub tracks: TrackCheck,
+    watch: WatchCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -79,6 +82,7 @@ impl Rules {
             tasks: TaskCheck::default(),
             relays: RelayCheck::default(),
             tracks: TrackCheck::default(),
+            watch: WatchCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -105,6 +109,7 @@ impl Rules {
     pub fn on_loop(&mut self, geometry: &Arc<MissionGeometry>) {
         self.decision.on_loop(geometry);
         self.fuel.on_loop(geometry);
+        self.watch.on_loop(geometry);
     }
 
     /// A process starts.
@@ -313,6 +318,9 @@ impl Rules {
         self.relays.on_snapshot(snapshot, flyers, found);
         self.airtime.on_snapshot(snapshot, found);
         self.on_way_home(snapshot, found);
+        let is_round = |m: &PeerSnapshot| self.activity.goal(m) == Some(StateGoal::Round);
+        self.watch
+            .on_snapshot(snapshot, is_round, &self.flyers, found);
     }
 
     /// Judges only what is flown: all else is over.
