@@ -271,7 +271,8 @@ impl ActivityCheck {
         }
     }
 
-    /// Who says that a mission is finished of which something is left says that its time is over.
+    /// Who says that a mission is finished of which something is left, or that goes on once
+    /// everything is seen, says that its time is over.
     fn judge_end(
         &mut self,
         snapshot: &Snapshot<'_>,
@@ -279,12 +280,12 @@ impl ActivityCheck {
         may_be_first: bool,
         found: &mut Findings,
     ) {
-        if !m.view.finished || m.view.covered.is_full() {
-            return;
-        }
-        let Some(flown) = self.flown(m) else {
+        let Some(flown) = self.flown(m).filter(|_| m.view.finished) else {
             return;
         };
+        if m.view.covered.is_full() && !flown.machine.goes_round() {
+            return;
+        }
         let facts = self.facts(snapshot, m, &flown);
         let after_s = flown.machine.ends_after_s();
         let timer = after_s.map(|s| facts.holds(0, (MissionEvent::Timer, s)));
@@ -292,7 +293,7 @@ impl ActivityCheck {
             self.ended.insert(flown.sortie);
         } else if !may_be_first && self.early.insert(m.id) {
             found.broken("activity", snapshot.now_ms, Some(m.id), || {
-                "says that its mission is finished before its time is over, and not everything is seen"
+                "says that its mission is finished before its time is over, and not everything is seen, or it was to go on then"
                     .to_owned()
             });
         }

@@ -63,6 +63,35 @@ fn watching(mut diagram: Diagram) -> Diagram {
     diagram
 }
 
+/// The default diagram of a mission that goes round once everything is seen, until a timer.
+fn rounds(after_s: u32) -> Diagram {
+    let over = (MissionEvent::Timer, after_s);
+    let mut diagram = with("over", StateGoal::Home, Part::Ends, over);
+    diagram
+        .transitions
+        .retain(|t| t.on != MissionEvent::MissionComplete);
+    diagram.states.push(State {
+        name: "watch".into(),
+        behaviour: Behaviour {
+            purpose: Purpose::Watching,
+            dimension: None,
+            closed: true,
+            endless: true,
+            actions: vec![Action::Displacing],
+        },
+        goal: StateGoal::Round,
+        part: Part::Takes,
+    });
+    diagram.transitions.push(Transition {
+        from: None,
+        on: MissionEvent::AllSeen,
+        after_s: 0,
+        to: "watch".into(),
+        priority: 105,
+    });
+    diagram
+}
+
 fn flown_by(diagram: Diagram, laps: u16) -> Mission {
     Mission {
         further_laps: laps - 1,
@@ -119,6 +148,52 @@ fn a_mission_ends_by_its_timer_whatever_is_seen() {
         (at.east_m + 60.0).hypot(at.north_m + 60.0)
     };
     assert!(h.run_until(120, |h| away(h) < 60.0), "{}", away(&h));
+}
+
+#[test]
+fn once_all_is_seen_they_fly_round_evenly_spaced_until_the_time_is_over() {
+    let mut h = with_operator(2, flown_by(rounds(600), 1));
+    h.run_s(10);
+    let watches = |h: &Harness, id| work(h, id).state == "watch";
+    assert!(h.run_until(300, |h| watches(h, 1) && watches(h, 2)));
+    h.run_s(5);
+    let full = |h: &Harness, id| h.beliefs(id).covered.is_full();
+    assert!(full(&h, 1) && full(&h, 2));
+    for id in [1, 2] {
+        let (view, work) = (h.beliefs(id), work(&h, id));
+        assert!(
+            !view.finished && view.able && view.plan.is_empty(),
+            "{view:?}"
+        );
+        assert_eq!(work.reason, Reason::AllSeen);
+        assert!(
+            work.does.starts_with("flies round, evenly spaced"),
+            "{}",
+            work.does
+        );
+        assert!(
+            work.does.contains("m ahead and the last one"),
+            "{}",
+            work.does
+        );
+    }
+    let at = h.pose(1);
+    let away = |h: &Harness| (h.pose(1).east_m - at.east_m).hypot(h.pose(1).north_m - at.north_m);
+    assert!(h.run_until(60, |h| away(h) > 100.0), "{}", away(&h));
+    assert!(h.run_until(600, |h| h.beliefs(1).finished && h.beliefs(2).finished));
+    assert_eq!(work(&h, 1).state, "over");
+}
+
+#[test]
+fn a_mission_that_goes_round_is_checked() {
+    let laps = flown_by(rounds(600), 3).machine().unwrap_err();
+    assert!(laps.problem.contains("leave the laps out"), "{laps}");
+    let mut elsewhere = rounds(600);
+    let t = elsewhere.transitions.last_mut().unwrap();
+    t.on = MissionEvent::PeerLost;
+    let elsewhere = flown_by(elsewhere, 1).machine().unwrap_err();
+    assert!(elsewhere.problem.contains("\"all_seen\""), "{elsewhere}");
+    assert!(flown_by(rounds(600), 1).goes_round() && !mission(1, 6, 4).goes_round());
 }
 
 #[test]
