@@ -64,6 +64,7 @@ use skein_flight::route::Router;
 use skein_flight::trajectory::timed::Objective;
 use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::Point;
+use skein_geometry::math::TAU;
 use skein_geometry::{Curve, Segment};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -235,6 +236,8 @@ pub struct Executive {
     contingency: Option<promised::Contingency>,
     /// Of whom it follows, if it does.
     pursuit: Option<pursuit::Pursuit>,
+    /// Whether it circles because there was no way to where it is to go.
+    stranded: bool,
     /// How it keeps its place among those who fly round the loop.
     circuit: circuit::Circuit,
 }
@@ -271,6 +274,7 @@ impl Executive {
             late_ms: 0,
             contingency: None,
             pursuit: None,
+            stranded: false,
             circuit: circuit::Circuit::default(),
         }
     }
@@ -614,33 +618,64 @@ impl Executive {
         if self.aim == Aim::Round {
             let circle = self.waits_for_room(at).map(|c| vec![Move::Loiter(c)]);
             match circle.or_else(|| self.transit.way_round(at)) {
-                Some(moves) => return moves,
-                None => events.push(Event::Refused { cells: Vec::new() }),
+                Some(moves) => {
+                    self.stranded = false;
+                    return moves;
+                }
+                None if self.stranded => {}
+                None => {
+                    events.push(Event::Refused { cells: Vec::new() });
+                    self.stranded = true;
+                }
             }
         }
         if let Some(Kind::Loiter(circle)) = self.stretches.back().map(|s| s.kind) {
-            return vec![Move::Loiter(circle)];
+            return self.circled(at, circle);
         }
         if let Some(moves) = self.back_to_wait(at) {
             return moves;
         }
-        if let Aim::Point(p) = self.aim {
-            let moves = self.transit.way_to_wait_at(at, p).or_else(|| {
-                let home = self.home.as_ref()?;
-                home.by_loop(&self.transit, at, p)
-            });
-            match moves {
-                Some(moves) => return moves,
-                None => events.push(Event::Refused { cells: Vec::new() }),
+        match self.way_to_aim(at) {
+            Some(moves) => {
+                self.stranded = false;
+                return moves;
             }
-        }
-        if let Aim::Circle(circle) = self.aim {
-            match self.transit.way_to_circle(at, &circle) {
-                Some(moves) => return moves,
-                None => events.push(Event::Refused { cells: Vec::new() }),
+            None if matches!(self.aim, Aim::Point(_) | Aim::Circle(_)) => {
+                events.push(Event::Refused { cells: Vec::new() });
+                self.stranded = true;
             }
+            None => {}
         }
         self.transit.way_to_loiter(at)
+    }
+
+    /// The way to where it is to stay; `None` where there is none, or it is to stay nowhere.
+    fn way_to_aim(&self, at: &Place) -> Option<Vec<Move>> {
+        match self.aim {
+            Aim::Point(p) => self.transit.way_to_wait_at(at, p).or_else(|| {
+                let home = self.home.as_ref()?;
+                home.by_loop(&self.transit, at, p)
+            }),
+            Aim::Circle(circle) => self.transit.way_to_circle(at, &circle),
+            _ => None,
+        }
+    }
+
+    /// What follows a circle: the same again; of who had no way to where it is to go another way
+    /// there, from a third of the circle on each time, since each pose has ways of its own.
+    fn circled(&mut self, at: &Place, circle: Segment) -> Vec<Move> {
+        if !self.stranded {
+            return vec![Move::Loiter(circle)];
+        }
+        if let Some(moves) = self.way_to_aim(at) {
+            self.stranded = false;
+            return moves;
+        }
+        vec![Move::Loiter(Segment {
+            start: at.pose,
+            length_m: TAU / (3.0 * circle.curvature_per_m.abs()),
+            ..circle
+        })]
     }
 
     /// Appends a move to the track.

@@ -89,6 +89,7 @@ impl Executive {
             self.circuit = Circuit::default();
         }
         let same_aim = self.aim == aim;
+        self.stranded &= same_aim;
         self.aim = aim;
         if self.contingency.is_some() {
             if !same_aim {

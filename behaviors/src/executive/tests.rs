@@ -686,3 +686,42 @@ fn who_has_not_taken_off_sees_nothing_and_is_foretold_from_where_it_stands() {
     let (_, events) = f.executive.step(&percept(on_cell, 9_000, 0), &is_open);
     assert!(matches!(&events[..], [Event::Seen(_)]), "{events:?}");
 }
+
+/// From close before a zone no way home is found; from elsewhere on the circle there is one.
+#[test]
+fn who_finds_no_way_from_where_it_is_tries_again_from_its_circle() {
+    let zones = vec![square(200.0, 100.0, 40.0)];
+    let (coverage_loop, router) = loop_and_router(12, 10, zones);
+    let transit = Transit::new(Arc::clone(&coverage_loop), Arc::clone(&router), airframe());
+    let home = Point::new(225.0, 420.0);
+    let poses = (0..12).flat_map(|k| {
+        let at = move |n: u32| Point::new(150.0 + 4.0 * f64::from(k), 90.0 + 10.0 * f64::from(n));
+        (0..6).map(move |n| Pose::new(at(n), 0.1))
+    });
+    let is_stranded = |pose: &Pose| {
+        let from = Place {
+            pose: *pose,
+            boundary: None,
+        };
+        transit.way_to_wait_at(&from, home).is_none()
+    };
+    let stranded: Vec<Pose> = poses.filter(is_stranded).collect();
+    assert!(stranded.len() > 3, "{}", stranded.len());
+    for pose in stranded.into_iter().step_by(2) {
+        let mut executive = Executive::new(
+            airframe(),
+            90.0,
+            Arc::clone(&coverage_loop),
+            Arc::clone(&router),
+        );
+        executive.set_goal(Goal::Point(home), &|_| false);
+        let mut wing = Wing::new(pose);
+        for _ in 0..600 {
+            let (setpoint, _) = executive.step(&wing.percept(), &|_| false);
+            wing.setpoint = Some(setpoint);
+            wing.fly(200);
+        }
+        let away_m = (wing.pose.position() - home).norm();
+        assert!(away_m < 60.0, "{pose:?}: {away_m} m");
+    }
+}

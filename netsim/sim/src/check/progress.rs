@@ -4,6 +4,7 @@
 use super::membership::Membership;
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use crate::world::Approach;
+use skein_peer::wire::message::Order;
 use std::collections::BTreeMap;
 
 /// What progress found out in one run.
@@ -17,6 +18,8 @@ pub struct ProgressCheck {
 #[derive(Clone, Copy, Debug)]
 struct Restarted {
     boot_ms: u64,
+    /// When an operator last wanted something else of it.
+    told_ms: u64,
     productive: bool,
     told: bool,
 }
@@ -28,6 +31,7 @@ impl ProgressCheck {
             id,
             Restarted {
                 boot_ms: now_ms,
+                told_ms: 0,
                 productive: false,
                 told: false,
             },
@@ -132,6 +136,10 @@ impl ProgressCheck {
             let Some(m) = snapshot.peer(*id).filter(|m| m.uav && !r.productive) else {
                 continue;
             };
+            if m.view.order != Order::Resume {
+                r.told_ms = snapshot.now_ms;
+                continue;
+            }
             let waits = m.view.able && all_listed(snapshot);
             // Whose fuel is due is to fly home.
             let is_spent = m.view.spendable_ms == 0 || m.view.is_fuel_due;
@@ -147,6 +155,7 @@ impl ProgressCheck {
             let writes_ms = snapshot.handicaps.writes_since_ms(*id, snapshot.now_ms);
             let from_ms = (r.boot_ms + bounds.probation_ms())
                 .max(stable_ms)
+                .max(r.told_ms)
                 .max(writes_ms.unwrap_or(snapshot.now_ms));
             let took_ms = snapshot.now_ms.saturating_sub(from_ms);
             // What it is to fly it must be able to write down.
@@ -279,6 +288,12 @@ mod tests {
         assert!(run(&out_of_fuel, 60, true).is_empty());
         assert!(run(&idle, 23, true).is_empty());
         assert_eq!(run(&idle, 26, true), BTreeMap::from([("L6", 1)]));
+        let told = Beliefs {
+            order: Order::ReturnToBase,
+            able: false,
+            ..idle.clone()
+        };
+        assert!(run(&told, 60, true).is_empty());
         let busy = Beliefs {
             plan: vec![1],
             ..idle.clone()
