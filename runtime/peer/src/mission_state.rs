@@ -160,6 +160,8 @@ impl MissionState {
         }
         self.able_since = None;
         self.replan = true;
+        // What another life said of the end this one has not.
+        self.finished = false;
         if let Some(separation) = &mut self.separation {
             separation.begin_life(me);
         }

@@ -74,6 +74,35 @@ fn a_twin_takes_over_when_the_first_is_gone_as_after_a_restart() {
     assert!(covered(&h, 2) > seen);
 }
 
+/// Both said that all is seen, each in its own life; who is silenced and speaks again later has
+/// said it in none that counts.
+#[test]
+fn a_twin_that_takes_over_after_the_end_says_again_that_the_mission_is_finished() {
+    let mut h = Harness::started(2, mission(1, 6, 4));
+    h.add_twin(TWIN, 1);
+    let apart = |h: &mut Harness, cut: bool| {
+        for (a, b) in [(1, TWIN), (1, 2)] {
+            h.link(a, b).cut = cut;
+            h.link(b, a).cut = cut;
+        }
+    };
+    apart(&mut h, true);
+    h.start(TWIN);
+    assert!(h.run_until(400, |h| h.beliefs(1).finished && h.beliefs(TWIN).finished));
+    h.run_s(10);
+    apart(&mut h, false);
+    assert!(h.run_until(10, |h| silent(h, 1) != silent(h, TWIN)));
+    h.run_s(20);
+    let (stays, goes) = if silent(&h, 1) { (TWIN, 1) } else { (1, TWIN) };
+    h.stop(stays);
+    assert!(h.run_until(60, |h| h.beliefs(goes).speaks));
+    let life = h.beliefs(goes).incarnation;
+    h.run_s(10);
+    let mut said = h.seat(goes).said.iter();
+    assert!(said.any(|(_, r, body)| r.incarnation == life && matches!(body, Body::Finished(_))));
+    assert!(h.beliefs(goes).finished);
+}
+
 #[test]
 fn twins_that_both_speak_and_meet_leave_one_and_no_cell_without_an_owner() {
     for elder_alone in [true, false] {
