@@ -371,7 +371,8 @@ impl Mission {
     pub fn machine(&self) -> Result<Machine, DiagramError> {
         let diagram = self.flown_by();
         if self.diagram.is_some() {
-            check::fits(&diagram, self.task.dimension(), self.is_patrol())?;
+            let (again, apart) = (self.is_patrol(), self.separation_mm > 0);
+            check::fits(&diagram, self.task.dimension(), again, apart)?;
         }
         Machine::new(&diagram)
     }

@@ -387,8 +387,13 @@ fn all_reached(machine: &Machine) -> Result<(), DiagramError> {
 }
 
 /// Whether a diagram fits what a mission asks to see: of this dimension, and several times or
-/// once.
-pub(crate) fn fits(diagram: &Diagram, dimension: u8, again: bool) -> Result<(), DiagramError> {
+/// once; and how its UAVs are kept apart, by agreement or by heights.
+pub(crate) fn fits(
+    diagram: &Diagram,
+    dimension: u8,
+    again: bool,
+    apart: bool,
+) -> Result<(), DiagramError> {
     let all = diagram.states.iter().enumerate();
     let flown = |s: &State| matches!(s.goal, StateGoal::Section | StateGoal::Round);
     for (i, state) in all.filter(|(_, s)| flown(s)) {
@@ -404,6 +409,13 @@ pub(crate) fn fits(diagram: &Diagram, dimension: u8, again: bool) -> Result<(), 
             if again {
                 let text = format!(
                     "the state \"{}\" goes round once everything is seen, and the mission has laps; leave the laps out",
+                    state.name
+                );
+                return Err(wrong(format!("states[{i}].goal"), text));
+            }
+            if apart {
+                let text = format!(
+                    "the state \"{}\" goes round, and UAVs that are kept apart by agreement fly cells alone; leave the separation out",
                     state.name
                 );
                 return Err(wrong(format!("states[{i}].goal"), text));

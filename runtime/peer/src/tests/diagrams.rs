@@ -188,6 +188,15 @@ fn once_all_is_seen_they_fly_round_evenly_spaced_until_the_time_is_over() {
 fn a_mission_that_goes_round_is_checked() {
     let laps = flown_by(rounds(600), 3).machine().unwrap_err();
     assert!(laps.problem.contains("leave the laps out"), "{laps}");
+    let apart = Mission {
+        separation_mm: 50_000,
+        ..flown_by(rounds(600), 1)
+    };
+    let apart = apart.machine().unwrap_err();
+    assert!(
+        apart.problem.contains("leave the separation out"),
+        "{apart}"
+    );
     let mut elsewhere = rounds(600);
     let t = elsewhere.transitions.last_mut().unwrap();
     t.on = MissionEvent::PeerLost;
