@@ -72,6 +72,7 @@ fn mission() -> Mission {
         sortie: 0,
         cancelled: false,
         diagram: None,
+        detections: Vec::new(),
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

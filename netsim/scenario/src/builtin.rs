@@ -67,9 +67,19 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/roads.json5"),
     ),
     (
+        "search",
+        "search.json5",
+        include_str!("../../../configs/trials/search.json5"),
+    ),
+    (
         "track",
         "track.json5",
         include_str!("../../../configs/trials/track.json5"),
+    ),
+    (
+        "watchers",
+        "watchers.json5",
+        include_str!("../../../configs/trials/watchers.json5"),
     ),
     (
         "swarm_20",

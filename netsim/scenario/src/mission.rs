@@ -77,6 +77,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
         sortie: 0,
         cancelled: false,
         diagram: s.diagram.clone().map(Arc::new),
+        detections: s.detections.clone(),
         tree: lanes.tree.unwrap_or_default(),
         division: s.division,
         separation_mm: length_mm((s.fleet.separation_m * 1000.0).ceil()),

@@ -1,5 +1,6 @@
 //! What a mission is: area, zones, lanes, level, origin, revision.
 
+use crate::criteria::{CRITERIA_MAX, Criterion};
 use crate::diagram::{Diagram, DiagramError, Machine, check};
 use crate::offload::MissionGeometry;
 use crate::task::CoverageTask;
@@ -89,6 +90,9 @@ pub struct Mission {
     /// What a UAV does in it when; [`Diagram::coverage`] where none is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub diagram: Option<Arc<Diagram>>,
+    /// What is looked for besides, and what follows when it is seen; at most [`CRITERIA_MAX`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub detections: Vec<Criterion>,
 }
 
 /// Whether a field need not be said.
@@ -145,6 +149,9 @@ pub enum GeometryError {
     /// Its diagram cannot be flown, or does not fit what is to be seen.
     #[error("diagram: {0}")]
     Diagram(#[from] DiagramError),
+    /// What it looks for is beyond what may be asked.
+    #[error("detections: {0}")]
+    Detections(String),
     /// There is no loop over what is to be seen.
     #[error(transparent)]
     Loop(#[from] LoopError),
@@ -286,6 +293,10 @@ impl Mission {
         if let Some(diagram) = &self.diagram {
             diagram.hash(&mut h);
         }
+        if !self.detections.is_empty() {
+            h.write_i64(-5);
+            self.detections.iter().for_each(|c| c.hash(&mut h));
+        }
         h.finish()
     }
 
@@ -383,12 +394,38 @@ impl Mission {
         self.machine().ok().and_then(|m| m.ends_after_s())
     }
 
+    /// Whether it ends when something that it looks for was told, whatever is left to be seen.
+    #[must_use]
+    pub fn ends_when_found(&self) -> bool {
+        self.machine().is_ok_and(|m| m.ends_when_found())
+    }
+
+    /// Whether what it looks for may be asked.
+    ///
+    /// # Errors
+    /// [`GeometryError::Detections`] names the criterion and what is wrong.
+    pub fn check_detections(&self) -> Result<(), GeometryError> {
+        if self.detections.len() > CRITERIA_MAX {
+            let text = format!("at most {CRITERIA_MAX} criteria fit");
+            return Err(GeometryError::Detections(text));
+        }
+        let wrong = self.detections.iter().enumerate();
+        let wrong = wrong.filter_map(|(i, c)| Some((i, c.check().err()?)));
+        match wrong.into_iter().next() {
+            Some((i, (field, text))) => {
+                Err(GeometryError::Detections(format!("[{i}].{field}: {text}")))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Derives the loop and the router.
     ///
     /// # Errors
     /// [`GeometryError`] names what is wrong with the mission.
     pub fn geometry(self: &Arc<Self>) -> Result<Arc<MissionGeometry>, GeometryError> {
         self.machine()?;
+        self.check_detections()?;
         let zones = self.no_fly_zones()?;
         let problem = self.loop_problem(&zones)?;
         let coverage_loop = self.the_loop(&problem)?;
@@ -621,6 +658,7 @@ mod tests {
             sortie: 0,
             cancelled: false,
             diagram: None,
+            detections: Vec::new(),
             tree: Tree::default(),
             division: Rule::default(),
             separation_mm: 0,

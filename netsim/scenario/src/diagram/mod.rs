@@ -31,6 +31,11 @@ const DIAGRAMS: &[(&str, &str, &str)] = &[
         "patrol.json5",
         include_str!("../../../../configs/diagrams/patrol.json5"),
     ),
+    (
+        "search",
+        "search.json5",
+        include_str!("../../../../configs/diagrams/search.json5"),
+    ),
 ];
 
 /// Names of the built-in diagrams.
@@ -99,8 +104,11 @@ fn flown(scenario: Result<crate::Scenario, ScenarioError>) -> Result<Diagram, Sc
 /// What a scenario says of its mission: the diagram that it is flown by, where it names one or
 /// brings its own; none where that is the default one.
 pub(crate) fn of_mission(node: &Node<'_>, files: &Files<'_>) -> Result<Option<Diagram>, Error> {
-    let f = node.fields(&["diagram", "for_s"])?;
-    let at = f.need("diagram", "\"patrol\"")?;
+    let f = node.fields(&["diagram", "for_s", "detections"])?;
+    let at = match f.get("diagram") {
+        None if f.get("detections").is_some() && f.get("for_s").is_none() => return Ok(None),
+        _ => f.need("diagram", "\"patrol\"")?,
+    };
     let mut diagram = if let Ok(name) = at.text() {
         builtin(name).ok_or_else(|| {
             let known = suggestion(name, &names());

@@ -48,6 +48,7 @@ use skein_peer::Report;
 use skein_peer::input::AskedTask;
 use skein_peer::output::{Status, TaskNews};
 use std::collections::{BTreeMap, BTreeSet};
+use crate::check::detections::DetectionReport;
 use tasks::Tasks;
 use work::Work;
 
@@ -88,6 +89,8 @@ pub struct Account {
     alarms: Vec<String>,
     failures: Vec<String>,
     tasks: Tasks,
+    detections: Vec<DetectionReport>,
+    found_ms: Option<u64>,
 }
 
 impl Account {
@@ -108,6 +111,8 @@ impl Account {
             alarms: Vec::new(),
             failures: Vec::new(),
             tasks: Tasks::default(),
+            detections: Vec::new(),
+            found_ms: None,
             setting,
         }
     }
@@ -121,6 +126,17 @@ impl Account {
     /// The ground station of its operator holds this task.
     pub fn asked(&mut self, now_ms: u64, task: &AskedTask) {
         self.tasks.asked(now_ms, task);
+    }
+
+    /// What ends the mission was found, and all who live know it.
+    pub fn found(&mut self, now_ms: u64) {
+        self.covered(now_ms);
+        self.found_ms.get_or_insert(now_ms);
+    }
+
+    /// What came so far of the objects that the mission looks for, as the world knows.
+    pub fn detected(&mut self, reports: Vec<DetectionReport>) {
+        self.detections = reports;
     }
 
     /// What the world knows of a target that is to be followed.
@@ -236,7 +252,7 @@ impl Account {
                 self.lifetimes.paused(now_ms, peer);
                 None
             }
-            Report::Task { news, .. } => {
+            Report::Task { id, news, .. } => {
                 match news {
                     TaskNews::Relays | TaskNews::Tracks => {
                         self.relaying.insert(peer);
@@ -246,8 +262,14 @@ impl Account {
                     }
                     _ => {}
                 }
-                self.tasks.reported(peer, report);
+                // What UAVs ask for has registers of its own.
+                if !self.setting.uavs.contains_key(&id.author) {
+                    self.tasks.reported(peer, report);
+                }
                 None
+            }
+            Report::Detected { id, told } => {
+                (id.author == peer).then(|| told.sentence(id.author))
             }
             Report::Round { .. } | Report::Revised { .. } => None,
         }
@@ -293,6 +315,7 @@ impl Account {
     /// and there is no bound on the work of two.
     pub fn revised(&mut self) {
         self.covered_ms = None;
+        self.found_ms = None;
         self.lifetimes.revised();
     }
 
@@ -405,6 +428,8 @@ impl Account {
             kills: self.work.kills(&self.detection),
             restarts: self.restarts.reports(),
             tasks: self.tasks.reports(ending.judge),
+            detections: self.detections.clone(),
+            found_ms: self.found_ms,
             finished,
             relaying,
             unfinished,

@@ -3,6 +3,7 @@
 use super::activity::ActivityCheck;
 use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
+use super::detections::DetectionCheck;
 use super::decision::{DecisionCheck, Mover};
 use super::flight::{FlightCheck, Flyer, at_base};
 use super::fuel::FuelCheck;
@@ -48,6 +49,8 @@ pub struct Rules {
     pub relays: RelayCheck,
     /// Who follows targets.
     pub tracks: TrackCheck,
+    /// What the mission looks for.
+    pub detections: DetectionCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -79,6 +82,7 @@ impl Rules {
             tasks: TaskCheck::default(),
             relays: RelayCheck::default(),
             tracks: TrackCheck::default(),
+            detections: DetectionCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -92,6 +96,7 @@ impl Rules {
         self.bases.insert(mission.revision, point_m(mission.base));
         self.flight.on_zones(mission.zones_m());
         self.activity.on_mission(mission);
+        self.detections.on_mission(mission);
         self.spread
             .on_mission(chunks(mission).map_or(0, |pieces| pieces.len()));
     }

@@ -39,6 +39,7 @@ mod tests;
 
 use crate::account::{Account, Cause};
 use crate::check::record::Said;
+use crate::check::detections::Truth;
 use crate::check::tracks::Look;
 use crate::check::{Checker, PeerSnapshot};
 use crate::fault::TimedFault;
@@ -779,6 +780,7 @@ impl Swarm {
         self.account.reported(self.now_ms, id, &meant);
         self.note_voice(id, &report);
         self.note_task(id, &report);
+        self.note_detection(id, &report);
         if let Report::Refused { reason } = &report
             && !std::mem::take(&mut self.spoilt)
         {
@@ -826,6 +828,7 @@ impl Swarm {
             self.judged.hash(),
         );
         self.judge_tracks(&peers);
+        self.judge_detections(&peers);
         self.unassigned = peers.iter().any(|m| !m.view.unassigned.is_empty());
         let mut flying = 0;
         let mut finished = true;
@@ -842,7 +845,20 @@ impl Swarm {
             self.account.covered(self.now_ms);
             self.history.keep(self.now_ms, || What::Covered);
         }
-        let waits = self.has_fresh_task();
+        // Whoever ends it by what is not there is found by a rule.
+        let is_found = || {
+            let found = self.checker.rules.detections.has_found();
+            found && self.operator.mission().ends_when_found()
+        };
+        if open && flying > 0 && finished && is_found() {
+            self.account.found(self.now_ms);
+            self.history.keep(self.now_ms, || What::Covered);
+        }
+        let fresh_ms = FRESH_TASK_PERIODS * self.period_ms();
+        let detections = &self.checker.rules.detections;
+        let waits = self.has_fresh_task()
+            || self.is_following(&peers)
+            || detections.has_fresh(self.now_ms, fresh_ms);
         self.done = self.account.covered_ms().is_some() && flying > 0 && finished && !waits;
         for v in self.checker.found.drain_fresh() {
             self.history.keep(v.time_ms, || What::Violation {
@@ -872,6 +888,52 @@ impl Swarm {
         for (task, tracked) in tracks.tracked() {
             self.account.tracked(task, tracked);
         }
+    }
+
+    /// What the mission looks for is judged beside what was in the pictures of those who fly it.
+    fn judge_detections(&mut self, peers: &[PeerSnapshot]) {
+        if self.checker.rules.detections.is_idle() {
+            return;
+        }
+        let newest = self.operator.mission().revision;
+        let flies = |m: &&PeerSnapshot| m.uav && m.view.speaks && m.view.revision >= newest;
+        let look = |m: &PeerSnapshot| Look {
+            uav: m.id,
+            at: m.at,
+            since_ms: m.since_ms,
+            says: m.view.follows,
+            pictured: self.air.pictured(m.id),
+        };
+        let looks: Vec<Look> = peers.iter().filter(flies).map(look).collect();
+        let truth: Vec<Truth> = self.air.vehicles().truth().collect();
+        self.checker.on_detections(self.now_ms, &truth, &looks);
+        let reports = self.checker.rules.detections.reports();
+        self.account.detected(reports);
+    }
+
+    /// A UAV tells of an object of its own: the world knows whether it is there.
+    fn note_detection(&mut self, id: u16, report: &Report) {
+        let Report::Detected { id: task, told } = report else {
+            return;
+        };
+        let is_own = self
+            .peer_idx(id)
+            .is_some_and(|idx| self.peers[idx].config.id.0 == task.author);
+        if !is_own {
+            return;
+        }
+        self.air.advance(self.now_ms);
+        let truth: Vec<Truth> = self.air.vehicles().truth().collect();
+        let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
+        let at = (self.now_ms, id);
+        rules.detections.on_told(at, (*task, told), &truth, found);
+    }
+
+    /// Whether somebody is to follow what a UAV saw.
+    fn is_following(&self, peers: &[PeerSnapshot]) -> bool {
+        let uavs = peers.iter().filter(|m| m.uav);
+        let mut open = uavs.flat_map(|m| &m.view.open_tasks);
+        open.any(|(id, _)| self.spec.uavs.iter().any(|u| u.id == id.author))
     }
 
     /// The ground station says the standing order once in each life, as a live one does.

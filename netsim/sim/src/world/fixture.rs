@@ -169,6 +169,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         sortie: 0,
         cancelled: false,
         diagram: None,
+        detections: Vec::new(),
         tree: skein_flight::coverage::ring::Tree::default(),
         division: Default::default(),
         separation_mm: 0,
