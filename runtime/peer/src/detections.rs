@@ -6,6 +6,7 @@
 //! | a look of the own camera | each of its own targets is watched: since when, from where on |
 //! | one was watched for three seconds, with two hits in three looks, and fits a criterion | it is told, unless it is known |
 //! | a detection of another | kept; told to people here |
+//! | a later life of its author is heard, which knows nothing of it | it stands no more, if it is still to be followed: whoever sees that tells it anew |
 //! | an own one turns out to be the object of one that was told before | it is withdrawn |
 //!
 //! Two that are seen at once by two who do not hear each other are told twice; who told the
@@ -98,7 +99,8 @@ pub(crate) struct Detections {
     life: Incarnation,
     told: u16,
     watches: BTreeMap<TargetName, Watch>,
-    known: BTreeMap<TaskId, Detection>,
+    /// Each with the life of its author in which it was told.
+    known: BTreeMap<TaskId, (Detection, Incarnation)>,
 }
 
 impl Detection {
@@ -260,25 +262,43 @@ impl Detections {
 
     /// What another, or this peer, tells; says whether that is news. Of more than are kept it is
     /// not.
-    pub fn hear(&mut self, id: TaskId, told: Detection) -> bool {
+    pub fn hear(&mut self, id: TaskId, told: Detection, life: Incarnation) -> bool {
         let held = self.known.get(&id);
-        if held == Some(&told) || held.is_none() && self.known.len() >= KNOWN_MAX {
+        if held == Some(&(told, life)) || held.is_none() && self.known.len() >= KNOWN_MAX {
             return false;
         }
-        self.known.insert(id, told);
+        self.known.insert(id, (told, life));
         true
     }
 
     /// All that count in a sortie.
     pub fn standing(&self, sortie: u16) -> impl Iterator<Item = (TaskId, &Detection)> {
         let all = self.known.iter();
-        let all = all.filter(move |(_, d)| d.stands == Stands::Told && d.sortie == sortie);
-        all.map(|(id, d)| (*id, d))
+        let all = all.filter(move |(_, (d, _))| d.stands == Stands::Told && d.sortie == sortie);
+        all.map(|(id, (d, _))| (*id, d))
     }
 
     /// All that are known.
     pub fn known(&self) -> impl Iterator<Item = (TaskId, &Detection)> {
-        self.known.iter().map(|(id, d)| (*id, d))
+        self.known.iter().map(|(id, (d, _))| (*id, d))
+    }
+
+    /// Those that were told in a life of their authors before the one of which is known now: their
+    /// authors know nothing of them any more, and nobody passes them on.
+    pub fn former(&self, life_of: &dyn Fn(u16) -> Option<Incarnation>) -> Vec<TaskId> {
+        let all = self.known.iter();
+        let former = all.filter(|(id, (d, life))| {
+            let is_old = life_of(id.author).is_some_and(|now| now > *life);
+            is_old && d.stands == Stands::Told
+        });
+        former.map(|(id, _)| *id).collect()
+    }
+
+    /// One does not stand any more, as far as this peer is concerned.
+    pub fn void(&mut self, id: TaskId) {
+        if let Some((d, _)) = self.known.get_mut(&id) {
+            d.stands = Stands::Withdrawn;
+        }
     }
 
     /// Whether what is seen was told: it may be the object of a detection, by where that was
@@ -334,7 +354,7 @@ impl Detections {
             east_mmps: mm(seen.velocity_mps.x),
             north_mmps: mm(seen.velocity_mps.y),
         };
-        if !self.hear(id, told) {
+        if !self.hear(id, told, self.life) {
             return None;
         }
         self.told += 1;
@@ -348,14 +368,14 @@ impl Detections {
         followed: &dyn Fn(TaskId) -> Option<Place>,
     ) -> Vec<(TaskId, Detection)> {
         let own = self.known.iter();
-        let own = own.filter(|(id, d)| id.author == me && d.stands == Stands::Told);
+        let own = own.filter(|(id, (d, _))| id.author == me && d.stands == Stands::Told);
         let doubles: Vec<TaskId> = own
-            .filter(|(id, d)| self.is_double(**id, d, followed))
+            .filter(|(id, (d, _))| self.is_double(**id, d, followed))
             .map(|(id, _)| *id)
             .collect();
         let mut withdrawn = Vec::new();
         for id in doubles {
-            if let Some(d) = self.known.get_mut(&id) {
+            if let Some((d, _)) = self.known.get_mut(&id) {
                 d.stands = Stands::Withdrawn;
                 withdrawn.push((id, *d));
             }
@@ -379,7 +399,7 @@ impl Detections {
     /// Which of two detections goes before, where both are known.
     pub fn goes_before(&self, a: TaskId, b: TaskId) -> bool {
         match (self.known.get(&a), self.known.get(&b)) {
-            (Some(first), Some(second)) => (first.seen_ms, a) < (second.seen_ms, b),
+            (Some((first, _)), Some((second, _))) => (first.seen_ms, a) < (second.seen_ms, b),
             // What an operator asks for goes before what was seen.
             (None, Some(_)) => true,
             (Some(_), None) => false,

@@ -319,7 +319,10 @@ impl Tasking {
         if s.role == Role::GroundStation {
             let keeps = |k: &Known| k.is_open() && !k.task.is_held();
             state.has_tasks = self.known.values().any(keeps);
-            return self.tell_of_tasks(s);
+            let mut effects = self.void_former(s);
+            effects.retain(|e| !matches!(e, Effect::Negotiate));
+            effects.extend(self.tell_of_tasks(s));
+            return effects;
         }
         let found = if s.speaks {
             self.detect(s, state)

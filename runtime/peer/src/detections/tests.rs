@@ -70,20 +70,20 @@ fn of_two_of_one_object_the_later_is_withdrawn_by_whose_it_is() {
     let mut theirs = Detections::default();
     let (a, told_a) = mine.tell(3, (0, 0), &at_once(1, 10_000)).unwrap();
     let (b, told_b) = theirs.tell(5, (0, 0), &at_once(2, 11_000)).unwrap();
-    assert!(mine.hear(b, told_b) && theirs.hear(a, told_a));
-    assert!(!mine.hear(b, told_b), "it is no news twice");
+    assert!(mine.hear(b, told_b, 0) && theirs.hear(a, told_a, 0));
+    assert!(!mine.hear(b, told_b, 0), "it is no news twice");
     assert!(mine.withdraw(3, &nobody).is_empty());
     let withdrawn = theirs.withdraw(5, &nobody);
     assert_eq!(withdrawn.len(), 1);
     assert_eq!(withdrawn[0].0, b);
     assert!(theirs.withdraw(5, &nobody).is_empty());
-    assert!(mine.hear(b, withdrawn[0].1));
+    assert!(mine.hear(b, withdrawn[0].1, 0));
     assert_eq!(mine.standing(0).count(), 1);
     assert!(mine.goes_before(a, b) && !mine.goes_before(b, a));
     // Minutes apart two who drive may be two.
     let mut later = Detections::default();
     let (c, told_c) = later.tell(7, (0, 0), &at_once(3, 200_000)).unwrap();
-    assert!(later.hear(a, told_a) && later.withdraw(7, &nobody).is_empty());
+    assert!(later.hear(a, told_a, 0) && later.withdraw(7, &nobody).is_empty());
     // As long as nobody sees both at one place.
     let there = Place {
         at: Point::new(50.0, 0.0),
@@ -118,7 +118,7 @@ fn at_most_so_many_are_kept() {
             author: 1 + n / 64,
             number: n % 64,
         };
-        all.hear(id, told)
+        all.hear(id, told, 0)
     });
     assert_eq!(kept.count(), KNOWN_MAX);
 }
@@ -156,4 +156,17 @@ fn a_false_alarm_is_not_seen_and_a_car_is_after_three_seconds() {
         }
     }
     assert!((13_000..14_500).contains(&first_ms.unwrap()), "{first_ms:?}");
+}
+
+#[test]
+fn what_an_earlier_life_told_is_found() {
+    let mut all = Detections::default();
+    let id = |author| TaskId { author, number: 8 };
+    assert!(all.hear(id(3), Detection::default(), 1));
+    assert!(all.hear(id(5), Detection::default(), 2));
+    let former = |all: &Detections| all.former(&|author| (author < 9).then_some(2));
+    assert_eq!(former(&all), [id(3)]);
+    all.void(id(3));
+    assert!(former(&all).is_empty());
+    assert_eq!(all.standing(0).count(), 1);
 }

@@ -7,6 +7,7 @@
 //! | something was watched for long enough, fits a criterion and is not told yet | told: to all and to people |
 //! | and its criterion says follow, and it can be flown after | a task of this peer to follow it, for so long |
 //! | a detection of another | told to people |
+//! | a later life of who told it is heard, and it is still followed | both are void: nobody passes on what an earlier life said; who sees it tells it anew |
 //! | an own one is the object of an earlier one | withdrawn, and its task cancelled |
 //! | who is followed for a task is followed by another for one that goes before | the later task is done |
 //! | the mission is cancelled, or begun anew | own tasks of it are cancelled |
@@ -35,7 +36,7 @@ impl Tasking {
             author: record.author,
             number: record.subject,
         };
-        if !self.detections.hear(id, *told) {
+        if !self.detections.hear(id, *told, record.incarnation) {
             return Effects::new();
         }
         vec![Effect::Report(Report::Detected { id, told: *told })]
@@ -64,6 +65,7 @@ impl Tasking {
             return effects;
         }
         self.date_tasks(s.now);
+        effects.extend(self.void_former(s));
         effects.extend(self.drop_old(s.now, (mission.sortie, mission.cancelled)));
         if mission.cancelled {
             return effects;
@@ -80,6 +82,33 @@ impl Tasking {
         let seen: Vec<Seen> = self.detections.seen(now_ms, tracks, PLACE_M).collect();
         for seen in seen {
             effects.extend(self.tell_of(s, &seen, mission));
+        }
+        effects
+    }
+
+    /// What an earlier life of somebody told and is still followed is void: that one knows nothing
+    /// of it, so it would never be settled among all.
+    pub(super) fn void_former(&mut self, s: &Situation<'_>) -> Effects {
+        let life_of = |author: u16| {
+            if author == s.me.id {
+                return Some(s.me.incarnation);
+            }
+            let mut all = s.membership.all();
+            all.find(|(id, ..)| *id == author).map(|(_, life, _)| life)
+        };
+        let former = self.detections.former(&life_of).into_iter();
+        let open: Vec<TaskId> = former
+            .filter(|id| self.known.get(id).is_some_and(Known::is_open))
+            .collect();
+        let mut effects = Effects::new();
+        for id in open {
+            self.detections.void(id);
+            if let Some(known) = self.known.get(&id) {
+                let (since, mut task) = (known.since, known.task.clone());
+                task.state = TaskState::Cancelled;
+                effects.extend(self.learn(s.now, id, task));
+                self.was_asked(id, since);
+            }
         }
         effects
     }
