@@ -73,6 +73,7 @@ fn mission() -> Mission {
         cancelled: false,
         diagram: None,
         detections: Vec::new(),
+        tasks: Vec::new(),
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

@@ -17,6 +17,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/helsinki.json5"),
     ),
     (
+        "convoy",
+        "convoy.json5",
+        include_str!("../../../configs/trials/convoy.json5"),
+    ),
+    (
         "helsinki_wind",
         "helsinki_wind.json5",
         include_str!("../../../configs/trials/helsinki_wind.json5"),

@@ -71,6 +71,7 @@ pub(crate) fn blamed(e: &GeometryError) -> &'static str {
         GeometryError::Area(_) => "area",
         GeometryError::Diagram(_) => "mission.diagram",
         GeometryError::Detections(_) => "mission.detections",
+        GeometryError::Tasks(_) => "mission.tasks",
         GeometryError::Zone(..) | GeometryError::AddedZone(..) | GeometryError::ZoneName => {
             "no_fly"
         }

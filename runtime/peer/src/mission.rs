@@ -2,8 +2,10 @@
 
 use crate::criteria::{CRITERIA_MAX, Criterion};
 use crate::diagram::{Diagram, DiagramError, Machine, check};
+use crate::input::NewTask;
 use crate::offload::MissionGeometry;
 use crate::task::CoverageTask;
+use crate::tasking::BROUGHT_MAX;
 use crate::wire::limits::{CHUNK_MAX_BYTES, CHUNKS_MAX};
 use crate::wire::message::{Lacking, MissionChunk};
 use serde::{Deserialize, Serialize};
@@ -93,6 +95,9 @@ pub struct Mission {
     /// What is looked for besides, and what follows when it is seen; at most [`CRITERIA_MAX`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub detections: Vec<Criterion>,
+    /// Tasks that begin with it, besides what is to be seen; at most [`BROUGHT_MAX`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tasks: Vec<NewTask>,
 }
 
 /// Whether a field need not be said.
@@ -152,6 +157,9 @@ pub enum GeometryError {
     /// What it looks for is beyond what may be asked.
     #[error("detections: {0}")]
     Detections(String),
+    /// Tasks that it brings cannot be asked for.
+    #[error("tasks: {0}")]
+    Tasks(String),
     /// There is no loop over what is to be seen.
     #[error(transparent)]
     Loop(#[from] LoopError),
@@ -297,6 +305,7 @@ impl Mission {
             h.write_i64(-5);
             self.detections.iter().for_each(|c| c.hash(&mut h));
         }
+        self.hash_brought(&mut h);
         h.finish()
     }
 
@@ -426,6 +435,10 @@ impl Mission {
     pub fn geometry(self: &Arc<Self>) -> Result<Arc<MissionGeometry>, GeometryError> {
         self.machine()?;
         self.check_detections()?;
+        if self.tasks.len() > BROUGHT_MAX || self.brought(false).len() < self.tasks.len() {
+            let text = format!("at most {BROUGHT_MAX} fit, each as an operator may ask for it");
+            return Err(GeometryError::Tasks(text));
+        }
         let zones = self.no_fly_zones()?;
         let problem = self.loop_problem(&zones)?;
         let coverage_loop = self.the_loop(&problem)?;
@@ -659,6 +672,7 @@ mod tests {
             cancelled: false,
             diagram: None,
             detections: Vec::new(),
+            tasks: Vec::new(),
             tree: Tree::default(),
             division: Rule::default(),
             separation_mm: 0,

@@ -19,6 +19,7 @@
 //!
 //! While no task is open nothing is said.
 
+mod brought;
 mod detecting;
 mod relaying;
 mod tracking;
@@ -54,6 +55,7 @@ use skein_geometry::hash::Fnv;
 use skein_geometry::math::wrap_pi;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{Hash, Hasher};
+pub use brought::{BROUGHT_MAX, MISSION};
 pub use tracking::Follows;
 
 /// A task whose flight did not see all of it is flown once more, then others are asked.
@@ -193,7 +195,9 @@ impl Tasking {
         let hopeless = self.auction.unassigned();
         let mine = |id: &TaskId| self.flown() == Some(*id);
         let mut open = self.known.iter().filter(|(_, k)| k.is_open());
-        open.any(|(id, k)| !hopeless.contains(id) && (!k.task.is_held() || mine(id)))
+        // What a mission brings is a part of it.
+        let keeps = |id: &TaskId, k: &Known| !k.task.is_held() || id.author == MISSION || mine(id);
+        open.any(|(id, k)| !hopeless.contains(id) && keeps(id, k))
     }
 
     /// What it holds, and what of all it knows to be open that somebody can do.
@@ -320,10 +324,14 @@ impl Tasking {
             let keeps = |k: &Known| k.is_open() && !k.task.is_held();
             state.has_tasks = self.known.values().any(keeps);
             let mut effects = self.void_former(s);
+            let (mission, ended) = (&state.geometry.mission, state.stage.ended());
+            effects.extend(self.take_brought(s.now, mission, ended));
             effects.retain(|e| !matches!(e, Effect::Negotiate));
             effects.extend(self.tell_of_tasks(s));
             return effects;
         }
+        let geometry = std::sync::Arc::clone(&state.geometry);
+        let brought = self.take_brought(s.now, &geometry.mission, state.stage.ended());
         let found = if s.speaks {
             self.detect(s, state)
         } else {
@@ -335,7 +343,7 @@ impl Tasking {
             .filter_map(|id| Some((*id, &self.known.get(id)?.task)))
             .map(|(id, task)| report(id, task, TaskNews::Over(TaskState::Expired)))
             .collect();
-        effects.extend(found.into_iter().filter(|e| !matches!(e, Effect::Negotiate)));
+        effects.extend(brought.into_iter().chain(found).filter(|e| !matches!(e, Effect::Negotiate)));
         if self.is_active() && s.speaks {
             effects.extend(self.settle(s, order, state));
         }
@@ -407,7 +415,10 @@ impl Tasking {
             };
             events.push(Event::Live(live.filter(uav).map(PeerId).collect()));
             events.push(Event::Map(map_of(state)));
-            let is_open = !state.negotiation.sections.complete() && !state.stage.ended();
+            // What a mission brings goes before its cells.
+            let is_open = !state.negotiation.sections.complete()
+                && !state.stage.ended()
+                && state.geometry.mission.tasks.is_empty();
             events.push(Event::Cells(is_open));
             events.push(Event::Present(offer.unwrap_or_default()));
         }

@@ -34,6 +34,7 @@ use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{GroundStationSpec, RadioSpec, StormSpec, VehicleSpec};
 use skein_peer::criteria::Criterion;
 use skein_peer::diagram::Diagram;
+use skein_peer::input::NewTask;
 use std::collections::BTreeSet;
 use targets::Asked;
 use terrain::Terrain;
@@ -87,6 +88,8 @@ pub(crate) struct Stated {
     pub(crate) diagram: Option<Diagram>,
     /// What is looked for besides.
     pub(crate) detections: Vec<Criterion>,
+    /// Tasks that begin with the mission.
+    pub(crate) brought: Vec<NewTask>,
     /// By what rule the loop is divided.
     pub(crate) division: Rule,
     pub(crate) lanes: Lanes,
@@ -176,6 +179,9 @@ pub(crate) fn scenario(
         detections: f
             .get("mission")
             .map_or(Ok(Vec::new()), detections::of_mission)?,
+        brought: f
+            .get("mission")
+            .map_or(Ok(Vec::new()), tasks::of_mission)?,
         division: f.get("division").map_or(Ok(Rule::Best), division)?,
         lanes: lanes::read(&f)?,
         base: f

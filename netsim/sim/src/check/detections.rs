@@ -256,6 +256,15 @@ impl DetectionCheck {
         self.told.insert(key, told);
     }
 
+    /// Somebody says that it follows what was told, where nobody looks into the peers.
+    pub fn on_follows(&mut self, now_ms: u64, task: TaskId) {
+        let key = (task.author, task.number);
+        let all = self.told.range_mut((key.0, key.1, 0)..=(key.0, key.1, u64::MAX));
+        if let Some((_, t)) = all.into_iter().next_back() {
+            t.report.followed_ms.get_or_insert(now_ms);
+        }
+    }
+
     /// Looks at all UAVs, beside where the vehicles are.
     pub fn on_looks(
         &mut self,

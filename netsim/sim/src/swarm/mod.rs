@@ -61,6 +61,7 @@ use skein_geometry::frame::{Point, Pose};
 use skein_link::medium::key_hash;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
+use skein_peer::MISSION;
 use skein_peer::output::TaskNews;
 use skein_peer::wire;
 use skein_peer::{Beliefs, Command, Input, Output, Peer, Report, Role, Transmission, Why};
@@ -933,7 +934,10 @@ impl Swarm {
     fn is_following(&self, peers: &[PeerSnapshot]) -> bool {
         let uavs = peers.iter().filter(|m| m.uav);
         let mut open = uavs.flat_map(|m| &m.view.open_tasks);
-        open.any(|(id, _)| self.spec.uavs.iter().any(|u| u.id == id.author))
+        open.any(|(id, _)| {
+            let is_uav = self.spec.uavs.iter().any(|u| u.id == id.author);
+            is_uav || id.author == MISSION
+        })
     }
 
     /// The ground station says the standing order once in each life, as a live one does.
@@ -963,7 +967,8 @@ impl Swarm {
         };
         let tasks = peer.operators_tasks();
         let mission = self.operator.mission();
-        for asked in &tasks {
+        let brought = mission.brought(false);
+        for asked in tasks.iter().chain(&brought) {
             self.account.asked(self.now_ms, asked);
             self.checker.rules.relays.on_asked(asked);
             self.checker.rules.tracks.on_asked(asked);

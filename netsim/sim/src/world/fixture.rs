@@ -170,6 +170,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         cancelled: false,
         diagram: None,
         detections: Vec::new(),
+        tasks: Vec::new(),
         tree: skein_flight::coverage::ring::Tree::default(),
         division: Default::default(),
         separation_mm: 0,
