@@ -18,6 +18,8 @@ pub(crate) struct LookedFor {
     check: DetectionCheck,
     criteria: Vec<Criterion>,
     ends_when_found: bool,
+    /// Whether the mission brings tasks, which go before its cells.
+    brings: bool,
     /// Until when what was told is followed, milliseconds.
     until_ms: u64,
 }
@@ -29,6 +31,7 @@ impl LookedFor {
             check: DetectionCheck::default(),
             criteria: Vec::new(),
             ends_when_found: false,
+            brings: false,
             until_ms: 0,
         };
         new.given(mission);
@@ -40,6 +43,7 @@ impl LookedFor {
         self.check.on_mission(mission);
         self.criteria.clone_from(&mission.detections);
         self.ends_when_found = mission.ends_when_found();
+        self.brings = !mission.tasks.is_empty();
         if mission.cancelled {
             self.until_ms = 0;
         }
@@ -73,6 +77,11 @@ impl LookedFor {
     /// What came of each.
     pub(crate) fn reports(&self) -> Vec<DetectionReport> {
         self.check.reports()
+    }
+
+    /// Whether the mission brings tasks.
+    pub(crate) fn brings(&self) -> bool {
+        self.brings
     }
 
     /// Whether something was found that ends the mission.

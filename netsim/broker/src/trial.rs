@@ -575,8 +575,14 @@ impl<'a> Trial<'a> {
         let live = self.account.live_uavs();
         let finished = live.iter().all(|id| self.account.is_through(*id));
         let open = self.account.covered_ms().is_none();
-        if self.timed && open && finished && !live.is_empty() && self.world.end_laps() {
-            self.all_covered();
+        if self.timed && open && finished && !live.is_empty() {
+            if self.world.end_laps() {
+                self.all_covered();
+            } else if self.looked_for.brings()
+                && live.iter().all(|id| self.account.is_finished(*id))
+            {
+                self.account.over(self.now_ms);
+            }
         }
         if open && finished && !live.is_empty() && self.looked_for.ends_it() {
             self.account.found(self.now_ms);
@@ -593,7 +599,9 @@ impl<'a> Trial<'a> {
             .is_some_and(|since| self.now_ms - since >= longest_ms);
         let done = finished && self.account.covered_ms().is_some() && !self.cancelled;
         let waits = self.looked_for.waits(self.now_ms) && !live.is_empty();
-        (done || idle) && !waits || live.is_empty() || self.now_ms >= u64::from(self.spec.max_time_s) * 1000
+        (done || idle) && !waits
+            || live.is_empty()
+            || self.now_ms >= u64::from(self.spec.max_time_s) * 1000
     }
 
     async fn answer(&mut self, asked: Asked<Request>) {

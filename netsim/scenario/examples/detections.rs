@@ -51,11 +51,17 @@ fn main() -> ExitCode {
                     r.end_ms,
                     r.reasons
                 );
+                for task in &r.tasks {
+                    println!("  {}", task.line());
+                }
                 for told in &r.detections {
                     println!("  {}", told.line());
                 }
                 for v in outcome.violations() {
-                    println!("  {} at {} ms, {:?}: {}", v.check, v.time_ms, v.peer, v.text);
+                    println!(
+                        "  {} at {} ms, {:?}: {}",
+                        v.check, v.time_ms, v.peer, v.text
+                    );
                 }
                 if lines {
                     println!("{}", skein_netsim::timeline::timeline(&outcome.entries));

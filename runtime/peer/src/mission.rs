@@ -813,9 +813,22 @@ mod tests {
         CoverageTask::Points((0..n).map(point).collect())
     }
 
+    /// A vehicle near a place that the mission asks to be followed.
+    fn escort(east_mm: i32) -> NewTask {
+        NewTask {
+            name: Some("escort".into()),
+            kind: crate::wire::tasks::TaskKind::Track,
+            places: vec![(east_mm, 0)],
+            radius_mm: 0,
+            worth: 100,
+            within_ms: None,
+            sensor: 0,
+        }
+    }
+
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 32] = [
+        let changes: [fn(&mut Mission); 36] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -845,6 +858,17 @@ mod tests {
             |m| m.sortie = 1,
             |m| m.cancelled = true,
             |m| (m.sortie, m.cancelled) = (1, true),
+            |m| m.detections.push(Criterion::default()),
+            |m| {
+                let looks = Some(1);
+                let car = Criterion {
+                    looks,
+                    ..Criterion::default()
+                };
+                m.detections.push(car);
+            },
+            |m| m.tasks.push(escort(0)),
+            |m| m.tasks.push(escort(1)),
             |m| {
                 drop(
                     m.added_zones

@@ -46,6 +46,7 @@ use crate::wire::tasks::{
     Bundle, BundleTask, Offer, Progress, Task, TaskId, TaskKind, TaskState, sensor_name,
 };
 use crate::{Incarnation, PeerId};
+pub use brought::{BROUGHT_MAX, MISSION};
 use relaying::Held;
 pub(crate) use relaying::KEPT_FOR_COVER;
 use skein_behaviors::executive::detour::Watched;
@@ -55,7 +56,6 @@ use skein_geometry::hash::Fnv;
 use skein_geometry::math::wrap_pi;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{Hash, Hasher};
-pub use brought::{BROUGHT_MAX, MISSION};
 pub use tracking::Follows;
 
 /// A task whose flight did not see all of it is flown once more, then others are asked.
@@ -343,7 +343,12 @@ impl Tasking {
             .filter_map(|id| Some((*id, &self.known.get(id)?.task)))
             .map(|(id, task)| report(id, task, TaskNews::Over(TaskState::Expired)))
             .collect();
-        effects.extend(brought.into_iter().chain(found).filter(|e| !matches!(e, Effect::Negotiate)));
+        effects.extend(
+            brought
+                .into_iter()
+                .chain(found)
+                .filter(|e| !matches!(e, Effect::Negotiate)),
+        );
         if self.is_active() && s.speaks {
             effects.extend(self.settle(s, order, state));
         }

@@ -64,7 +64,11 @@ mod tests {
 
     fn with(mission: &str) -> Result<Vec<Criterion>, String> {
         let text = include_str!("../../../../configs/trials/helsinki.json5");
-        let text = text.replacen("vehicles: [],", &format!("vehicles: [], mission: {mission},"), 1);
+        let text = text.replacen(
+            "vehicles: [],",
+            &format!("vehicles: [], mission: {mission},"),
+            1,
+        );
         let files = crate::builtin::files();
         let read = crate::parse_with("s.json5", &text, &files, &Overrides::default());
         read.map(|s| s.spec.mission.detections.clone())
@@ -82,11 +86,23 @@ mod tests {
         assert_eq!((read[1].looks, read[1].at_most), (Some(3), 2));
         for (text, why) in [
             ("{ detections: [{ kind: 'car' }] }", "then"),
-            ("{ detections: [{ then: 'follow' }] }", "expected 1 to 86400 seconds"),
+            (
+                "{ detections: [{ then: 'follow' }] }",
+                "expected 1 to 86400 seconds",
+            ),
             ("{ detections: [{ then: 'shoot' }] }", "detections[0].then"),
-            ("{ detections: [{ kind: 'cart', then: 'notify' }] }", "no vehicle is a"),
-            ("{ detections: [{ then: 'notify', for_s: 9 }] }", "is not followed"),
-            ("{ detections: [{ then: 'notify', colour: 'red' }] }", "colour"),
+            (
+                "{ detections: [{ kind: 'cart', then: 'notify' }] }",
+                "no vehicle is a",
+            ),
+            (
+                "{ detections: [{ then: 'notify', for_s: 9 }] }",
+                "is not followed",
+            ),
+            (
+                "{ detections: [{ then: 'notify', colour: 'red' }] }",
+                "colour",
+            ),
         ] {
             let said = with(text).unwrap_err();
             assert!(said.contains(why), "{said}");

@@ -179,9 +179,7 @@ pub(crate) fn scenario(
         detections: f
             .get("mission")
             .map_or(Ok(Vec::new()), detections::of_mission)?,
-        brought: f
-            .get("mission")
-            .map_or(Ok(Vec::new()), tasks::of_mission)?,
+        brought: f.get("mission").map_or(Ok(Vec::new()), tasks::of_mission)?,
         division: f.get("division").map_or(Ok(Rule::Best), division)?,
         lanes: lanes::read(&f)?,
         base: f

@@ -4,8 +4,8 @@
 use super::shared::position;
 use skein_interop::json::{Error, Node, suggestion};
 use skein_netsim::fault::Fault;
-use skein_peer::input::NewTask;
 use skein_peer::BROUGHT_MAX;
+use skein_peer::input::NewTask;
 use skein_peer::mission::mm;
 use skein_peer::wire::tasks::{
     SENSORS, TASK_NAME_MAX_BYTES, TASK_PLACES_MAX, TaskKind, WORTH_MAX, is_task_name,

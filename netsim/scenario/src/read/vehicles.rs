@@ -27,7 +27,15 @@ pub(crate) fn read(
     notices: &mut Notices,
 ) -> Result<Vec<VehicleSpec>, Error> {
     let one = |item: &Node<'_>, notices: &mut Notices| {
-        let f = item.fields(&["way_m", "streets", "start", "speed_mps", "does", "kind", "confused"])?;
+        let f = item.fields(&[
+            "way_m",
+            "streets",
+            "start",
+            "speed_mps",
+            "does",
+            "kind",
+            "confused",
+        ])?;
         let roads = match (f.get("way_m"), f.get("streets")) {
             (Some(way), None) => of_way(way)?,
             (None, Some(file)) => of_file(file, (origin, files), notices)?,

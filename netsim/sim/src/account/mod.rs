@@ -36,6 +36,7 @@ pub use lifetimes::{Cause, Setting};
 pub use report::{Details, Driver, FalseDown, Live, Processes, RunReport, Simulated, Violations};
 pub use work::Held;
 
+use crate::check::detections::DetectionReport;
 pub use crate::check::tracks::Tracked;
 use crate::world::{Fact, Judge, Loss};
 use connectivity::Connectivity;
@@ -48,7 +49,6 @@ use skein_peer::Report;
 use skein_peer::input::AskedTask;
 use skein_peer::output::{Status, TaskNews};
 use std::collections::{BTreeMap, BTreeSet};
-use crate::check::detections::DetectionReport;
 use tasks::Tasks;
 use work::Work;
 
@@ -91,6 +91,7 @@ pub struct Account {
     tasks: Tasks,
     detections: Vec<DetectionReport>,
     found_ms: Option<u64>,
+    over_ms: Option<u64>,
 }
 
 impl Account {
@@ -113,6 +114,7 @@ impl Account {
             tasks: Tasks::default(),
             detections: Vec::new(),
             found_ms: None,
+            over_ms: None,
             setting,
         }
     }
@@ -126,6 +128,13 @@ impl Account {
     /// The ground station of its operator holds this task.
     pub fn asked(&mut self, now_ms: u64, task: &AskedTask) {
         self.tasks.asked(now_ms, task);
+    }
+
+    /// The time of a mission is over whose own tasks go before what is to be seen, and all who live
+    /// know it.
+    pub fn over(&mut self, now_ms: u64) {
+        self.covered(now_ms);
+        self.over_ms.get_or_insert(now_ms);
     }
 
     /// What ends the mission was found, and all who live know it.
@@ -268,9 +277,7 @@ impl Account {
                 }
                 None
             }
-            Report::Detected { id, told } => {
-                (id.author == peer).then(|| told.sentence(id.author))
-            }
+            Report::Detected { id, told } => (id.author == peer).then(|| told.sentence(id.author)),
             Report::Round { .. } | Report::Revised { .. } => None,
         }
     }
@@ -316,6 +323,7 @@ impl Account {
     pub fn revised(&mut self) {
         self.covered_ms = None;
         self.found_ms = None;
+        self.over_ms = None;
         self.lifetimes.revised();
     }
 
@@ -430,6 +438,7 @@ impl Account {
             tasks: self.tasks.reports(ending.judge),
             detections: self.detections.clone(),
             found_ms: self.found_ms,
+            over_ms: self.over_ms,
             finished,
             relaying,
             unfinished,

@@ -58,6 +58,10 @@ pub struct RunReport {
     pub launch_bound_ms: Option<u64>,
     /// `makespan_ms` over `launch_bound_ms`.
     pub makespan_over_launch_bound: Option<f64>,
+    /// When its time was over, of a mission whose own tasks go before what is to be seen, and which
+    /// is over by that, whatever is left to be seen, ms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub over_ms: Option<u64>,
     /// When something was found that ends the mission, whatever is left to be seen, ms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub found_ms: Option<u64>,
@@ -450,8 +454,16 @@ impl RunReport {
     pub(super) fn judge(&mut self, failures: &[String]) {
         let mut reasons = failures.to_vec();
         let c = &self.coverage;
-        if self.found_ms.is_some() {
-            let mut asked = self.detections.iter().filter(|d| d.to_follow && !d.withdrawn);
+        if self.over_ms.is_some() {
+            let mut brought = self.tasks.iter().filter_map(|t| t.tracked.as_ref());
+            if brought.any(|t| t.first_ms.is_none()) {
+                reasons.push("nobody ever saw what the mission was to follow".to_owned());
+            }
+        } else if self.found_ms.is_some() {
+            let mut asked = self
+                .detections
+                .iter()
+                .filter(|d| d.to_follow && !d.withdrawn);
             if asked.all(|d| d.followed_ms.is_none()) && !self.finished.is_empty() {
                 reasons.push("nobody watched what was found".to_owned());
             }

@@ -260,7 +260,7 @@ impl ActivityCheck {
         may_be_first: bool,
         found: &mut Findings,
     ) {
-        if !m.view.finished || m.view.covered.is_full() {
+        if !m.view.finished {
             return;
         }
         let Some(flown) = self.flown(m) else {
@@ -273,7 +273,10 @@ impl ActivityCheck {
             return;
         }
         if timer.is_some_and(|holds| holds != Holds::No) {
+            // Also where everything is seen, and tasks of the mission kept it from its end.
             self.ended.insert(flown.sortie);
+        } else if m.view.covered.is_full() {
+            // It ended by what was seen.
         } else if !may_be_first && self.early.insert(m.id) {
             found.broken("activity", snapshot.now_ms, Some(m.id), || {
                 "says that its mission is finished before its time is over, and not everything is seen"

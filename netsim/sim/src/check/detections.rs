@@ -259,7 +259,9 @@ impl DetectionCheck {
     /// Somebody says that it follows what was told, where nobody looks into the peers.
     pub fn on_follows(&mut self, now_ms: u64, task: TaskId) {
         let key = (task.author, task.number);
-        let all = self.told.range_mut((key.0, key.1, 0)..=(key.0, key.1, u64::MAX));
+        let all = self
+            .told
+            .range_mut((key.0, key.1, 0)..=(key.0, key.1, u64::MAX));
         if let Some((_, t)) = all.into_iter().next_back() {
             t.report.followed_ms.get_or_insert(now_ms);
         }
@@ -422,7 +424,11 @@ impl DetectionCheck {
             Some((l.uav, task, meant(l, truth)?))
         };
         let all: Vec<(u16, TaskId, usize)> = looks.iter().filter_map(follow).collect();
-        let is_seen = |id: TaskId| self.told.keys().any(|k| (k.0, k.1) == (id.author, id.number));
+        let is_seen = |id: TaskId| {
+            self.told
+                .keys()
+                .any(|k| (k.0, k.1) == (id.author, id.number))
+        };
         let mut now = BTreeSet::new();
         let pairs = all.iter().enumerate();
         for (a, b) in pairs.flat_map(|(i, a)| all[i + 1..].iter().map(move |b| (a, b))) {
@@ -457,7 +463,9 @@ impl DetectionCheck {
         }
         // A register that was used again is that of the latest.
         for (author, number) in sees {
-            let all = self.told.range_mut((author, number, 0)..=(author, number, u64::MAX));
+            let all = self
+                .told
+                .range_mut((author, number, 0)..=(author, number, u64::MAX));
             if let Some((_, t)) = all.into_iter().next_back() {
                 if t.report.followed_ms.is_some() {
                     t.report.sight_ms += passed_ms;
@@ -472,7 +480,11 @@ impl DetectionCheck {
 fn meant(look: &Look, truth: &[Truth]) -> Option<usize> {
     let says = look.says.filter(|s| s.sees)?;
     let told = skein_peer::mission::point_m(says.at_mm);
-    let off_m = |n: &usize| truth.get(*n).map_or(f64::INFINITY, |v| (v.at - told).norm());
+    let off_m = |n: &usize| {
+        truth
+            .get(*n)
+            .map_or(f64::INFINITY, |v| (v.at - told).norm())
+    };
     let seen = look.pictured.iter().copied();
     let nearest = seen.min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
     (off_m(&nearest) <= MEANT_M).then_some(nearest)

@@ -3,8 +3,8 @@
 use super::activity::ActivityCheck;
 use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
-use super::detections::DetectionCheck;
 use super::decision::{DecisionCheck, Mover};
+use super::detections::DetectionCheck;
 use super::flight::{FlightCheck, Flyer, at_base};
 use super::fuel::FuelCheck;
 use super::listing::ListingCheck;

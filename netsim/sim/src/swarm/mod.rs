@@ -38,8 +38,8 @@ pub use outcome::Outcome;
 mod tests;
 
 use crate::account::{Account, Cause};
-use crate::check::record::Said;
 use crate::check::detections::Truth;
+use crate::check::record::Said;
 use crate::check::tracks::Look;
 use crate::check::{Checker, PeerSnapshot};
 use crate::fault::TimedFault;
@@ -59,9 +59,9 @@ use sim_peer::{Process, SimPeer};
 use skein_behaviors::Order;
 use skein_geometry::frame::{Point, Pose};
 use skein_link::medium::key_hash;
+use skein_peer::MISSION;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
-use skein_peer::MISSION;
 use skein_peer::output::TaskNews;
 use skein_peer::wire;
 use skein_peer::{Beliefs, Command, Input, Output, Peer, Report, Role, Transmission, Why};
@@ -832,19 +832,25 @@ impl Swarm {
         self.judge_detections(&peers);
         self.unassigned = peers.iter().any(|m| !m.view.unassigned.is_empty());
         let mut flying = 0;
-        let mut finished = true;
+        let (mut finished, mut ended) = (true, true);
         for m in peers.iter().filter(|m| m.uav) {
             flying += 1;
             // A relay position is over for nobody but who holds it.
             finished &= m.view.finished || m.view.relays;
+            ended &= m.view.finished;
         }
         self.note_ground(&peers);
         // Whoever ends it by its time before that is found by a rule.
         let timed = || self.operator.mission().ends_after_s().is_some();
         let open = self.account.covered_ms().is_none();
-        if open && flying > 0 && finished && timed() && self.air.end_laps() {
-            self.account.covered(self.now_ms);
-            self.history.keep(self.now_ms, || What::Covered);
+        if open && flying > 0 && finished && timed() {
+            if self.air.end_laps() {
+                self.account.covered(self.now_ms);
+                self.history.keep(self.now_ms, || What::Covered);
+            } else if ended && !self.operator.mission().tasks.is_empty() {
+                // What it brings goes before its cells: it is over by its time.
+                self.account.over(self.now_ms);
+            }
         }
         // Whoever ends it by what is not there is found by a rule.
         let is_found = || {

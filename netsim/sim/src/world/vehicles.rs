@@ -8,8 +8,8 @@
 //! vehicles there is no detector, and nothing is drawn.
 
 use super::motion::Kinematic;
-use crate::check::detections::Truth;
 use super::obstacles::{Obstacles, Place};
+use crate::check::detections::Truth;
 use crate::pursuit::KINDS;
 use crate::pursuit::sensor::{Noise, rooted};
 use crate::pursuit::vehicle::Vehicle;

@@ -54,12 +54,7 @@ fn who_drives_may_have_come_here_since_and_who_is_followed_is_where_that_is_told
     assert!(all.is_told(0, &here(30, 130.0), &followed));
     assert!(!all.is_told(0, &here(30, 200.0), &followed));
     // Who follows it lost it: it may be anywhere that it can have reached.
-    let lost = |d: TaskId| {
-        followed(d).map(|p| Place {
-            unseen_s: 9.0,
-            ..p
-        })
-    };
+    let lost = |d: TaskId| followed(d).map(|p| Place { unseen_s: 9.0, ..p });
     assert!(all.is_told(0, &here(30, 200.0), &lost));
 }
 
@@ -155,7 +150,10 @@ fn a_false_alarm_is_not_seen_and_a_car_is_after_three_seconds() {
             assert!(s.speed_mmps() > STILL_MMPS && s.error_m < 12.0);
         }
     }
-    assert!((13_000..14_500).contains(&first_ms.unwrap()), "{first_ms:?}");
+    assert!(
+        (13_000..14_500).contains(&first_ms.unwrap()),
+        "{first_ms:?}"
+    );
 }
 
 #[test]

@@ -272,7 +272,9 @@ pub(super) fn flown(machine: &Machine) -> Result<(), DiagramError> {
             // Who lost whom it follows follows it still.
             let seeks = (way.on, goal) == (MissionEvent::TargetLost, StateGoal::Follow)
                 && machine.state(i).goal == StateGoal::Follow;
-            let amiss = taken_up.or(needs).filter(|g| *g != (way.on, goal) && !seeks);
+            let amiss = taken_up
+                .or(needs)
+                .filter(|g| *g != (way.on, goal) && !seeks);
             if let Some((on, wanted)) = amiss {
                 let text = format!(
                     "from the state \"{}\" \"{}\" leads to \"{}\": expected \"{}\" and a state with the goal \"{}\" together",

@@ -109,7 +109,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
     ));
     all.push((
         Body::Detection(super::detection::samples::detection()),
-        "8c0000000319100201",
+        "8c00000003191002011a00013df81a0001d682397ab619213419170c39018f",
     ));
     all
 }

@@ -82,8 +82,7 @@ impl Story {
     fn looks(&mut self, s: u64, truth: &[Truth], looks: &[Look]) {
         let ids: Vec<u16> = looks.iter().map(|l| l.uav).collect();
         let graph = Graph::new(ids, |_, _| true);
-        self.stability
-            .observe(s * 1000, &graph, |_| 1, 10_000);
+        self.stability.observe(s * 1000, &graph, |_| 1, 10_000);
         let around = Around {
             graph: &graph,
             stability: &self.stability,
@@ -94,7 +93,10 @@ impl Story {
     }
 
     fn tell(&mut self, s: u64, by: u16, told: &Detection, truth: &[Truth]) {
-        let id = TaskId { author: by, number: 8 };
+        let id = TaskId {
+            author: by,
+            number: 8,
+        };
         let at = (s * 1000, by);
         self.check.on_told(at, (id, told), truth, &mut self.found);
     }
@@ -178,7 +180,13 @@ fn what_is_told_has_to_be_there_and_look_so() {
         ..told(9_000, -6.0)
     };
     assert!(!falsely(drives, car(0.0)));
-    assert!(falsely(Detection { east_mmps: 0, ..told(9_000, -20.0) }, car(0.0)));
+    assert!(falsely(
+        Detection {
+            east_mmps: 0,
+            ..told(9_000, -20.0)
+        },
+        car(0.0)
+    ));
 }
 
 #[test]
@@ -224,8 +232,19 @@ fn what_came_of_each_is_told() {
     let all = story.check.reports();
     assert_eq!(all.len(), 1);
     let r = &all[0];
-    assert_eq!((r.vehicle, r.off_mm, r.seen_ms), (Some(0), 2_000, Some(1_000)));
+    assert_eq!(
+        (r.vehicle, r.off_mm, r.seen_ms),
+        (Some(0), 2_000, Some(1_000))
+    );
     assert_eq!((r.followed_ms, r.sight_ms), (Some(10_000), 10_000));
-    assert!(r.line().contains("5.0 s after it was first in sight"), "{}", r.line());
-    assert!(story.found.counts.is_empty(), "{:?}", story.found.violations);
+    assert!(
+        r.line().contains("5.0 s after it was first in sight"),
+        "{}",
+        r.line()
+    );
+    assert!(
+        story.found.counts.is_empty(),
+        "{:?}",
+        story.found.violations
+    );
 }

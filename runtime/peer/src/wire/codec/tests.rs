@@ -488,7 +488,7 @@ fn envelopes_beyond_the_table_are_refused() {
     };
     assert!(of(|_| ()).is_ok());
     assert_eq!(of(|r| r.kind = 8), Err(WireError::Kind { number: 8 }));
-    assert_eq!(of(|r| r.kind = 16), Err(WireError::Kind { number: 16 }));
+    assert_eq!(of(|r| r.kind = 17), Err(WireError::Kind { number: 17 }));
     assert_eq!(
         of(|r| r.subject = 1),
         Err(WireError::Range { field: "subject" })
