@@ -2,8 +2,7 @@
 //! somebody watches it. The rule is that of a simulated run (`detect-false`); what was missed
 //! is not judged here, for nobody looks into the peers.
 
-use skein_netsim::check::Findings;
-use skein_netsim::check::detections::{DetectionCheck, DetectionReport, Truth};
+use skein_netsim::{DetectionCheck, DetectionReport, Findings, Truth};
 use skein_peer::Mission;
 use skein_peer::criteria::Criterion;
 use skein_peer::wire::detection::{Detection, Stands};

@@ -41,7 +41,7 @@ fn what_drives_is_followed_until_services_are_there_and_what_else_drives_is_told
     let outcome = flown("watchers", 3, 2, &[]);
     passed(&outcome);
     let told = &outcome.report.detections;
-    let of = |looks: &str| told.iter().filter(move |d| d.looks == looks);
+    let of = |looks: &'static str| told.iter().filter(move |d| d.looks == looks);
     // Each once, though three fly over them for minutes; and nothing of the bus that stands.
     assert_eq!((of("lorry").count(), of("car").count()), (1, 1), "{told:?}");
     assert_eq!(told.len(), 2);
