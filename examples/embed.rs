@@ -72,6 +72,8 @@ fn mission() -> Mission {
         sortie: 0,
         cancelled: false,
         diagram: None,
+        detections: Vec::new(),
+        tasks: Vec::new(),
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

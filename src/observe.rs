@@ -169,7 +169,7 @@ fn show(format: Format, newest: &mut Newest, seen: &Observed) -> std::io::Result
                 out,
                 "{}  peer {author} life {life} #{seq}  {}",
                 seen.key,
-                words(&body)
+                words(author, &body)
             )?;
         }
         Format::Jsonl => writeln!(out, "{}", json(seen, &record, &body))?,
@@ -194,6 +194,7 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Task(b) => serde_json::to_value(b),
         Body::Bundle(b) => serde_json::to_value(b),
         Body::Target(b) => serde_json::to_value(b),
+        Body::Detection(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -208,7 +209,7 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
 }
 
 /// A record in words.
-fn words(body: &Body) -> String {
+fn words(author: u16, body: &Body) -> String {
     let metres = |mm: i32| f64::from(mm) / 1000.0;
     match body {
         Body::Beacon(b) => format!(
@@ -295,6 +296,7 @@ fn words(body: &Body) -> String {
             f64::from(t.north_mm) / 1000.0,
             t.seen_ms
         ),
+        Body::Detection(d) => d.sentence(author),
     }
 }
 

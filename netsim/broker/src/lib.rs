@@ -32,6 +32,7 @@ mod error;
 mod faults;
 mod live_peer;
 pub mod live_world;
+mod looked_for;
 mod observed;
 pub mod pacer;
 mod peers;

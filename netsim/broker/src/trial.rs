@@ -4,6 +4,7 @@ use crate::control::{Control, Request};
 use crate::error::{TrialError, io};
 use crate::faults::{Injector, Schedule};
 use crate::live_world::LiveWorld;
+use crate::looked_for::LookedFor;
 use crate::observed::Observed;
 use crate::pacer::{Due, Pacer, STEP_MS};
 use crate::peers::{Clock, Peers, Said};
@@ -17,6 +18,7 @@ use skein_netsim::fault::Fault;
 use skein_netsim::spec::Spec;
 use skein_netsim::world::{Fact, Loss, Survey};
 use skein_peer::offload::MissionGeometry;
+use skein_peer::output::TaskNews;
 use skein_peer::{Mission, Report};
 use skein_recording::Sink;
 use skein_recording::run_dir::{self, Manifest};
@@ -179,6 +181,8 @@ struct Trial<'a> {
     cancelled: bool,
     /// Whether the mission that is judged ends by its time.
     timed: bool,
+    /// What the mission looks for.
+    looked_for: LookedFor,
     /// Transmissions that reached a node since it was last looked at, and late ones.
     transmissions: (u64, u64),
     /// Setpoints that arrived.
@@ -254,6 +258,7 @@ impl<'a> Trial<'a> {
             all_finished_ms: None,
             cancelled: false,
             timed: geometry.mission.ends_after_s().is_some(),
+            looked_for: LookedFor::new(&geometry.mission),
             transmissions: (0, 0),
             setpoints: 0,
             starved: 0,
@@ -366,6 +371,17 @@ impl<'a> Trial<'a> {
                 match &report {
                     Report::Ready { revision, .. } => self.world.follows(id, *revision),
                     Report::Revised { mission } => self.revise(mission),
+                    Report::Detected { id: task, told } if task.author == id => {
+                        let at = (self.now_ms, id);
+                        let truth = self.world.world().vehicles().truth();
+                        let wrong = self.looked_for.told(at, (*task, told), truth);
+                        wrong.into_iter().for_each(|text| self.account.failed(text));
+                        self.account.detected(self.looked_for.reports());
+                    }
+                    Report::Task { id: task, news, .. } if *news == TaskNews::Follows => {
+                        self.looked_for.follows(self.now_ms, *task);
+                        self.account.detected(self.looked_for.reports());
+                    }
                     _ => {}
                 }
                 self.observed.reported(self.now_ms, id, &report);
@@ -407,6 +423,7 @@ impl<'a> Trial<'a> {
                 self.account.revised();
                 self.cancelled = mission.cancelled;
                 self.timed = mission.ends_after_s().is_some();
+                self.looked_for.given(mission);
                 // Whoever believed the last one finished has not begun this one.
                 self.all_finished_ms = None;
                 let mut text = format!("the operator gives revision {}", mission.revision);
@@ -558,7 +575,17 @@ impl<'a> Trial<'a> {
         let live = self.account.live_uavs();
         let finished = live.iter().all(|id| self.account.is_through(*id));
         let open = self.account.covered_ms().is_none();
-        if self.timed && open && finished && !live.is_empty() && self.world.end_laps() {
+        if self.timed && open && finished && !live.is_empty() {
+            if self.world.end_laps() {
+                self.all_covered();
+            } else if self.looked_for.brings()
+                && live.iter().all(|id| self.account.is_finished(*id))
+            {
+                self.account.over(self.now_ms);
+            }
+        }
+        if open && finished && !live.is_empty() && self.looked_for.ends_it() {
+            self.account.found(self.now_ms);
             self.all_covered();
         }
         self.all_finished_ms = finished.then(|| self.all_finished_ms.unwrap_or(self.now_ms));
@@ -571,7 +598,10 @@ impl<'a> Trial<'a> {
             .all_finished_ms
             .is_some_and(|since| self.now_ms - since >= longest_ms);
         let done = finished && self.account.covered_ms().is_some() && !self.cancelled;
-        done || idle || live.is_empty() || self.now_ms >= u64::from(self.spec.max_time_s) * 1000
+        let waits = self.looked_for.waits(self.now_ms) && !live.is_empty();
+        (done || idle) && !waits
+            || live.is_empty()
+            || self.now_ms >= u64::from(self.spec.max_time_s) * 1000
     }
 
     async fn answer(&mut self, asked: Asked<Request>) {

@@ -17,6 +17,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/helsinki.json5"),
     ),
     (
+        "convoy",
+        "convoy.json5",
+        include_str!("../../../configs/trials/convoy.json5"),
+    ),
+    (
         "helsinki_wind",
         "helsinki_wind.json5",
         include_str!("../../../configs/trials/helsinki_wind.json5"),
@@ -67,9 +72,19 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/roads.json5"),
     ),
     (
+        "search",
+        "search.json5",
+        include_str!("../../../configs/trials/search.json5"),
+    ),
+    (
         "track",
         "track.json5",
         include_str!("../../../configs/trials/track.json5"),
+    ),
+    (
+        "watchers",
+        "watchers.json5",
+        include_str!("../../../configs/trials/watchers.json5"),
     ),
     (
         "swarm_20",

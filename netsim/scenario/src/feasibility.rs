@@ -70,6 +70,8 @@ pub(crate) fn blamed(e: &GeometryError) -> &'static str {
     match e {
         GeometryError::Area(_) => "area",
         GeometryError::Diagram(_) => "mission.diagram",
+        GeometryError::Detections(_) => "mission.detections",
+        GeometryError::Tasks(_) => "mission.tasks",
         GeometryError::Zone(..) | GeometryError::AddedZone(..) | GeometryError::ZoneName => {
             "no_fly"
         }

@@ -29,6 +29,8 @@
 mod builtin;
 mod choose_tree;
 mod coverable;
+#[cfg(test)]
+mod detected;
 pub mod diagram;
 mod error;
 mod feasibility;

@@ -13,6 +13,7 @@ use skein_geometry::{NoFlyZones, Polygon};
 use skein_interop::json::Error;
 use skein_peer::diagram::DiagramError;
 use skein_peer::mission::{mm, ring_mm};
+use skein_peer::wire::tasks::TaskKind;
 use skein_peer::{CoverageTask, Mission};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -77,6 +78,8 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
         sortie: 0,
         cancelled: false,
         diagram: s.diagram.clone().map(Arc::new),
+        detections: s.detections.clone(),
+        tasks: s.brought.clone(),
         tree: lanes.tree.unwrap_or_default(),
         division: s.division,
         separation_mm: length_mm((s.fleet.separation_m * 1000.0).ceil()),
@@ -88,6 +91,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
     };
     check_separation(s, &mission)?;
     check_diagram(s, &mission)?;
+    check_brought(s, &mission)?;
     check_size(s)?;
     check_places(s, &mission)?;
     Ok(mission)
@@ -148,6 +152,26 @@ fn check_separation(s: &Stated, mission: &Mission) -> Result<(), Error> {
             "fleet.separation_m",
             "UAVs that take off one after the other at one place need heights of their own; expected launch: \"spread\", or separation_m left out",
         ));
+    }
+    Ok(())
+}
+
+/// What it brings has to be done in it.
+fn check_brought(s: &Stated, mission: &Mission) -> Result<(), Error> {
+    let whole = Arc::new(mission.clone());
+    for (i, asked) in mission.brought(false).iter().enumerate() {
+        let place = format!("mission.tasks[{i}]");
+        if mission.separation_mm > 0 {
+            let text = "no tasks are flown where UAVs are kept apart by agreement";
+            return Err(s.places.wrong(&place, text));
+        }
+        if asked.task.kind == TaskKind::Area {
+            let text = "an area is asked for in flight, by an operator; give its places as points, or a line";
+            return Err(s.places.wrong(&place, text));
+        }
+        whole
+            .can_do(&asked.task)
+            .map_err(|why| s.places.wrong(&place, why))?;
     }
     Ok(())
 }

@@ -284,6 +284,10 @@ pub fn report_hash(report: &Report) -> u64 {
             );
             h.write(told.as_bytes());
         }
+        Report::Detected { id, told } => {
+            words(&mut h, 13, &[u64::from(id.author), u64::from(id.number)]);
+            h.write(format!("{told:?}").as_bytes());
+        }
         Report::Finished { revision } => words(&mut h, 7, &[u64::from(*revision)]),
         Report::Alarm { text } => {
             words(&mut h, 8, &[]);

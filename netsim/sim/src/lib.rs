@@ -46,5 +46,7 @@ mod troubles;
 mod twins;
 pub mod world;
 
+pub use check::Findings;
+pub use check::detections::{DetectionCheck, DetectionReport, Truth};
 pub use geometry_cache::geometry_of;
 pub use prepared::Prepared;

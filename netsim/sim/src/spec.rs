@@ -141,6 +141,8 @@ pub struct VehicleSpec {
     pub speed_mps: f64,
     /// What it looks like to a detector.
     pub kind: u8,
+    /// In how many looks of a thousand a detector takes it for another kind.
+    pub confused_permille: u16,
 }
 
 /// The ground station.

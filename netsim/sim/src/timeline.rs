@@ -98,6 +98,10 @@ fn reported(peer: u16, report: &Report, told: &mut BTreeSet<String>) -> Option<S
             });
         }
         Report::Task { name, news, .. } => format!("peer {peer}, task {name}: {news:?}"),
+        Report::Detected { id, told: of } => {
+            let line = of.sentence(id.author);
+            return told.insert(line.clone()).then_some(line);
+        }
         Report::Silenced => format!("peer {peer} is silent: another process speaks under its id"),
         Report::Finished { .. } => format!("peer {peer} knows that the mission is finished"),
         Report::Alarm { text } => format!("peer {peer} alarm: {text}"),

@@ -13,8 +13,10 @@ use skein_netsim::fault::Fault;
 use skein_netsim::radio::LinkTable;
 use skein_netsim::spec::Spec;
 use skein_netsim::world::World;
+use skein_peer::criteria::looks_name;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::output::{Status, TaskNews};
+use skein_peer::wire::detection::Stands;
 use skein_peer::{PeerId, Report};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -294,6 +296,18 @@ impl Observer {
             Report::Task { name, news, .. } => {
                 let text = format!("{who}: {}", news.sentence(name));
                 (task_news(report), text)
+            }
+            Report::Detected { id, told } => {
+                let what = What::Detected {
+                    by: id.author,
+                    looks: looks_name(told.looks),
+                    east_m: f64::from(told.east_mm) / 1000.0,
+                    north_m: f64::from(told.north_mm) / 1000.0,
+                    error_m: f64::from(told.error_mm) / 1000.0,
+                    stands: told.stands == Stands::Told,
+                };
+                let text = format!("{who}: {}", told.sentence(id.author));
+                (what, text)
             }
             Report::Silenced => {
                 self.process(peer).silent = true;

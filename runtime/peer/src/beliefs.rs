@@ -4,6 +4,7 @@ use crate::cells::CellSet;
 use crate::diagram::MissionEvent;
 use crate::output::Status;
 use crate::tasking::Follows;
+use crate::wire::detection::Detection;
 use crate::wire::message::{Epoch, Order, Orders, Stamp};
 use crate::wire::tasks::{Progress, TaskId};
 use crate::{Incarnation, PeerId};
@@ -69,6 +70,8 @@ pub struct Beliefs {
     pub follows: Option<Follows>,
     /// Tasks that it knows to be open, and in its eyes somebody can do.
     pub open_tasks: Vec<(TaskId, u32)>,
+    /// Objects that its mission looks for, as it knows them.
+    pub detections: Vec<(TaskId, Detection)>,
     /// Records held, bytes waiting to be sent, open stores: each with its cap.
     pub loads: Vec<(&'static str, usize, usize)>,
 }

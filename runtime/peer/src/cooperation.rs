@@ -322,7 +322,7 @@ impl Cooperation {
                 self.hear_orders(orders, (record.incarnation, record.seq, record.author));
                 Effects::new()
             }
-            Body::Task(_) | Body::Bundle(_) | Body::Target(_) => {
+            Body::Task(_) | Body::Bundle(_) | Body::Target(_) | Body::Detection(_) => {
                 self.tasking.hear(now, record, body)
             }
             Body::Intent(_) | Body::Conflict(_) => {

@@ -96,6 +96,8 @@ mod company;
 pub mod config;
 mod cooperation;
 mod coverage_told;
+pub mod criteria;
+pub mod detections;
 pub mod diagram;
 mod diary;
 mod effect;
@@ -142,7 +144,7 @@ pub use overview::Overview;
 pub use peer::Peer;
 pub use task::{CoverageTask, LineTask, PointTask};
 pub use task_desk::{TaskHolder, TaskView};
-pub use tasking::Follows;
+pub use tasking::{BROUGHT_MAX, Follows, MISSION};
 pub use transmission::Transmission;
 pub use why::Why;
 

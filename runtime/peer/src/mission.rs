@@ -1,8 +1,11 @@
 //! What a mission is: area, zones, lanes, level, origin, revision.
 
+use crate::criteria::{CRITERIA_MAX, Criterion};
 use crate::diagram::{Diagram, DiagramError, Machine, check};
+use crate::input::NewTask;
 use crate::offload::MissionGeometry;
 use crate::task::CoverageTask;
+use crate::tasking::BROUGHT_MAX;
 use crate::wire::limits::{CHUNK_MAX_BYTES, CHUNKS_MAX};
 use crate::wire::message::{Lacking, MissionChunk};
 use serde::{Deserialize, Serialize};
@@ -89,6 +92,12 @@ pub struct Mission {
     /// What a UAV does in it when; [`Diagram::coverage`] where none is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub diagram: Option<Arc<Diagram>>,
+    /// What is looked for besides, and what follows when it is seen; at most [`CRITERIA_MAX`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub detections: Vec<Criterion>,
+    /// Tasks that begin with it, besides what is to be seen; at most [`BROUGHT_MAX`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tasks: Vec<NewTask>,
 }
 
 /// Whether a field need not be said.
@@ -145,6 +154,12 @@ pub enum GeometryError {
     /// Its diagram cannot be flown, or does not fit what is to be seen.
     #[error("diagram: {0}")]
     Diagram(#[from] DiagramError),
+    /// What it looks for is beyond what may be asked.
+    #[error("detections: {0}")]
+    Detections(String),
+    /// Tasks that it brings cannot be asked for.
+    #[error("tasks: {0}")]
+    Tasks(String),
     /// There is no loop over what is to be seen.
     #[error(transparent)]
     Loop(#[from] LoopError),
@@ -286,6 +301,11 @@ impl Mission {
         if let Some(diagram) = &self.diagram {
             diagram.hash(&mut h);
         }
+        if !self.detections.is_empty() {
+            h.write_i64(-5);
+            self.detections.iter().for_each(|c| c.hash(&mut h));
+        }
+        self.hash_brought(&mut h);
         h.finish()
     }
 
@@ -390,12 +410,42 @@ impl Mission {
         self.machine().is_ok_and(|m| m.goes_round())
     }
 
+    /// Whether it ends when something that it looks for was told, whatever is left to be seen.
+    #[must_use]
+    pub fn ends_when_found(&self) -> bool {
+        self.machine().is_ok_and(|m| m.ends_when_found())
+    }
+
+    /// Whether what it looks for may be asked.
+    ///
+    /// # Errors
+    /// [`GeometryError::Detections`] names the criterion and what is wrong.
+    pub fn check_detections(&self) -> Result<(), GeometryError> {
+        if self.detections.len() > CRITERIA_MAX {
+            let text = format!("at most {CRITERIA_MAX} criteria fit");
+            return Err(GeometryError::Detections(text));
+        }
+        let wrong = self.detections.iter().enumerate();
+        let wrong = wrong.filter_map(|(i, c)| Some((i, c.check().err()?)));
+        match wrong.into_iter().next() {
+            Some((i, (field, text))) => {
+                Err(GeometryError::Detections(format!("[{i}].{field}: {text}")))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Derives the loop and the router.
     ///
     /// # Errors
     /// [`GeometryError`] names what is wrong with the mission.
     pub fn geometry(self: &Arc<Self>) -> Result<Arc<MissionGeometry>, GeometryError> {
         self.machine()?;
+        self.check_detections()?;
+        if self.tasks.len() > BROUGHT_MAX || self.brought(false).len() < self.tasks.len() {
+            let text = format!("at most {BROUGHT_MAX} fit, each as an operator may ask for it");
+            return Err(GeometryError::Tasks(text));
+        }
         let zones = self.no_fly_zones()?;
         let problem = self.loop_problem(&zones)?;
         let coverage_loop = self.the_loop(&problem)?;
@@ -628,6 +678,8 @@ mod tests {
             sortie: 0,
             cancelled: false,
             diagram: None,
+            detections: Vec::new(),
+            tasks: Vec::new(),
             tree: Tree::default(),
             division: Rule::default(),
             separation_mm: 0,
@@ -768,9 +820,22 @@ mod tests {
         CoverageTask::Points((0..n).map(point).collect())
     }
 
+    /// A vehicle near a place that the mission asks to be followed.
+    fn escort(east_mm: i32) -> NewTask {
+        NewTask {
+            name: Some("escort".into()),
+            kind: crate::wire::tasks::TaskKind::Track,
+            places: vec![(east_mm, 0)],
+            radius_mm: 0,
+            worth: 100,
+            within_ms: None,
+            sensor: 0,
+        }
+    }
+
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 32] = [
+        let changes: [fn(&mut Mission); 36] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -800,6 +865,17 @@ mod tests {
             |m| m.sortie = 1,
             |m| m.cancelled = true,
             |m| (m.sortie, m.cancelled) = (1, true),
+            |m| m.detections.push(Criterion::default()),
+            |m| {
+                let looks = Some(1);
+                let car = Criterion {
+                    looks,
+                    ..Criterion::default()
+                };
+                m.detections.push(car);
+            },
+            |m| m.tasks.push(escort(0)),
+            |m| m.tasks.push(escort(1)),
             |m| {
                 drop(
                     m.added_zones

@@ -135,6 +135,10 @@ pub(crate) struct MissionState {
     pub silent: bool,
     /// Whether it believes a peer of its fleet to be down.
     pub lost: bool,
+    /// Whether something that the mission looks for was told.
+    pub detected: bool,
+    /// Whether it lost the target that it follows.
+    pub target_lost: bool,
     /// Whether everything is seen, and no task is open that somebody can do.
     pub complete: bool,
     /// Where in the diagram of its mission it is.
@@ -687,6 +691,8 @@ impl MissionState {
             astray: false,
             silent: false,
             lost: false,
+            detected: false,
+            target_lost: false,
             complete: false,
             stage: Stage::begun(
                 &geometry.mission,

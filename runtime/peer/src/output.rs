@@ -3,6 +3,7 @@
 use crate::offload::Job;
 use crate::task_desk::TaskHolder;
 use crate::why::BidHeard;
+use crate::wire::detection::Detection;
 use crate::wire::tasks::{TaskId, TaskState};
 use crate::{Incarnation, Mission, PeerId};
 use serde::{Deserialize, Serialize};
@@ -236,6 +237,14 @@ pub enum Report {
         /// Who holds it by then, with which bids, as far as this peer knows; told with what it
         /// does of the task itself.
         held_by: Vec<TaskHolder>,
+    },
+    /// An object that the mission looks for: this peer saw it, or was told of it, and tells or
+    /// withdraws it.
+    Detected {
+        /// By whom, and in which of its registers.
+        id: TaskId,
+        /// What, where and when.
+        told: Detection,
     },
     /// Another process speaks under this id: this one is silent from now on, until it
     /// reports that it runs under another incarnation.

@@ -961,6 +961,7 @@ impl Peer {
             work: state.map(|s| why::work(s, self.now)),
             round: self.diary.round(self.now),
             tasks: self.tasks(),
+            detections: self.cooperation.tasking.detections_told(),
             others: self.others(),
             events: self.diary.events(self.now),
         }

@@ -12,6 +12,8 @@
 //! | timer | it follows this sortie for so long in this life, or of a timer that ends the mission: another peer of it said finished |
 //! | stayed | it is in this state for so long |
 //! | peer_lost | it believes a peer to be down |
+//! | object_detected | something that its mission looks for was told in this sortie, and not withdrawn |
+//! | target_lost | it had its target in sight, lost it, and said that it searches |
 //! | target_given | it holds a target to follow, and where that may be is near |
 //! | relay_given | it holds a relay position whose circle is planned |
 //! | task_given | it holds a task whose flight is planned |
@@ -161,6 +163,8 @@ impl MissionState {
             }
             MissionEvent::Stayed => is_past(stage.since, after_s, now),
             MissionEvent::PeerLost => self.lost,
+            MissionEvent::ObjectDetected => self.detected,
+            MissionEvent::TargetLost => self.target_lost && self.followed_at_m().is_some(),
             MissionEvent::TargetGiven => self.followed_at_m().is_some(),
             MissionEvent::RelayGiven => self.relay_circle().is_some(),
             MissionEvent::TaskGiven => self.errand.is_some(),

@@ -40,7 +40,7 @@ const DENSITY: f64 = 5.0;
 
 /// A UAV's own place is off by this for a whole flight, a standard deviation in metres:
 /// satellite navigation without corrections.
-const PLACE_M: f64 = 2.0;
+pub(crate) const PLACE_M: f64 = 2.0;
 
 /// What was told of a target is fused for so long, milliseconds.
 const TOLD_MS: u64 = 8_000;
@@ -421,6 +421,11 @@ impl Targets {
         let at = at.unwrap_or(1);
         self.subjects[at] = Some(name);
         u16::try_from(at).unwrap_or(1)
+    }
+
+    /// Its own targets, and the time of the last percept, milliseconds.
+    pub fn tracks(&self) -> (&Tracks, u64) {
+        (&self.tracks, self.now_ms)
     }
 
     /// How many registers and tasks are kept, with their caps.

@@ -19,12 +19,15 @@
 //!
 //! While no task is open nothing is said.
 
+mod brought;
+mod detecting;
 mod relaying;
 mod tracking;
 
 use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
 use crate::cooperation::Situation;
+use crate::detections::Detections;
 use crate::effect::{Effect, Effects, PendingJob};
 use crate::errand::{Planned, Request};
 use crate::input::Time;
@@ -43,6 +46,7 @@ use crate::wire::tasks::{
     Bundle, BundleTask, Offer, Progress, Task, TaskId, TaskKind, TaskState, sensor_name,
 };
 use crate::{Incarnation, PeerId};
+pub use brought::{BROUGHT_MAX, MISSION};
 use relaying::Held;
 pub(crate) use relaying::KEPT_FOR_COVER;
 use skein_behaviors::executive::detour::Watched;
@@ -107,6 +111,8 @@ pub(crate) struct Tasking {
     flown: Option<Flown>,
     /// Vehicles that were seen.
     pub(crate) targets: Targets,
+    /// What of them the mission looks for.
+    pub(crate) detections: Detections,
     /// The version of the bundle that was spoken last.
     spoken: Option<Version>,
     /// The life in which the tasks of this peer's operator were spoken.
@@ -133,6 +139,7 @@ impl Tasking {
                 config.id.0,
                 config.airframe.filter(|_| config.role == Role::Uav),
             ),
+            detections: Detections::default(),
             spoken: None,
             told_in: 0,
             last_period: Time(0),
@@ -145,6 +152,7 @@ impl Tasking {
     pub fn void_ownership(&mut self, me: Member, state: Option<&mut MissionState>) {
         self.auction.begin_life(me.incarnation);
         self.targets.begin_life(me.incarnation);
+        self.detections.begin_life(me.incarnation);
         self.spoken = None;
         self.leave(state);
     }
@@ -187,7 +195,9 @@ impl Tasking {
         let hopeless = self.auction.unassigned();
         let mine = |id: &TaskId| self.flown() == Some(*id);
         let mut open = self.known.iter().filter(|(_, k)| k.is_open());
-        open.any(|(id, k)| !hopeless.contains(id) && (!k.task.is_held() || mine(id)))
+        // What a mission brings is a part of it.
+        let keeps = |id: &TaskId, k: &Known| !k.task.is_held() || id.author == MISSION || mine(id);
+        open.any(|(id, k)| !hopeless.contains(id) && keeps(id, k))
     }
 
     /// What it holds, and what of all it knows to be open that somebody can do.
@@ -200,10 +210,15 @@ impl Tasking {
         let open = self.known.iter().filter(|(_, k)| k.is_open());
         let open = open.filter(|(id, _)| !hopeless.contains(id));
         beliefs.open_tasks = open.map(|(id, k)| (*id, k.task.revision)).collect();
+        let standing = self.detections.known();
+        beliefs.detections = standing.map(|(id, d)| (id, *d)).collect();
         beliefs.loads.push(("tasks", self.known.len(), KNOWN_MAX));
         beliefs
             .loads
             .push(("bundles", self.bundles.len(), PEERS_MAX));
+        let detections = self.detections.known().count();
+        let cap = crate::detections::KNOWN_MAX;
+        beliefs.loads.push(("detections", detections, cap));
     }
 
     /// Whether anything is to be settled or flown.
@@ -221,6 +236,7 @@ impl Tasking {
                 self.targets.hear(record.author, target);
                 Effects::new()
             }
+            Body::Detection(told) => self.hear_detection(record, told),
             Body::Task(task) => {
                 let id = TaskId {
                     author: record.author,
@@ -302,17 +318,37 @@ impl Tasking {
 
     /// Looks at everything that depends on time, and at what was heard.
     pub fn tick(&mut self, s: &Situation<'_>, order: Order, state: &mut MissionState) -> Effects {
+        let sortie = state.geometry.mission.sortie;
+        state.detected = self.detections.standing(sortie).next().is_some();
         if s.role == Role::GroundStation {
             let keeps = |k: &Known| k.is_open() && !k.task.is_held();
             state.has_tasks = self.known.values().any(keeps);
-            return self.tell_of_tasks(s);
+            let mut effects = self.void_former(s);
+            let (mission, ended) = (&state.geometry.mission, state.stage.ended());
+            effects.extend(self.take_brought(s.now, mission, ended));
+            effects.retain(|e| !matches!(e, Effect::Negotiate));
+            effects.extend(self.tell_of_tasks(s));
+            return effects;
         }
+        let geometry = std::sync::Arc::clone(&state.geometry);
+        let brought = self.take_brought(s.now, &geometry.mission, state.stage.ended());
+        let found = if s.speaks {
+            self.detect(s, state)
+        } else {
+            Effects::new()
+        };
         let mut effects: Effects = self
             .expire(s.now)
             .iter()
             .filter_map(|id| Some((*id, &self.known.get(id)?.task)))
             .map(|(id, task)| report(id, task, TaskNews::Over(TaskState::Expired)))
             .collect();
+        effects.extend(
+            brought
+                .into_iter()
+                .chain(found)
+                .filter(|e| !matches!(e, Effect::Negotiate)),
+        );
         if self.is_active() && s.speaks {
             effects.extend(self.settle(s, order, state));
         }
@@ -320,6 +356,7 @@ impl Tasking {
         effects.extend(self.speak(s));
         effects.extend(self.tell_of_targets(s));
         state.has_tasks = self.has_work();
+        state.target_lost = self.has_lost();
         effects
     }
 
@@ -383,7 +420,11 @@ impl Tasking {
             };
             events.push(Event::Live(live.filter(uav).map(PeerId).collect()));
             events.push(Event::Map(map_of(state)));
-            events.push(Event::Cells(!state.negotiation.sections.complete()));
+            // What a mission brings goes before its cells.
+            let is_open = !state.negotiation.sections.complete()
+                && !state.stage.ended()
+                && state.geometry.mission.tasks.is_empty();
+            events.push(Event::Cells(is_open));
             events.push(Event::Present(offer.unwrap_or_default()));
         }
         let mut effects = Effects::new();

@@ -66,6 +66,8 @@ pub fn mission(revision: u32, cols: i32, rows: i32) -> Mission {
         sortie: 0,
         cancelled: false,
         diagram: None,
+        detections: Vec::new(),
+        tasks: Vec::new(),
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

@@ -56,6 +56,10 @@ pub enum Reason {
     Stayed,
     /// It believes a peer of its fleet to be down.
     PeerLost,
+    /// What its mission looks for was told.
+    Detected,
+    /// It lost the target that it follows.
+    TargetLost,
 }
 
 impl Reason {
@@ -71,6 +75,8 @@ impl Reason {
             MissionEvent::Timer => Self::TimeIsOver,
             MissionEvent::Stayed => Self::Stayed,
             MissionEvent::PeerLost => Self::PeerLost,
+            MissionEvent::ObjectDetected => Self::Detected,
+            MissionEvent::TargetLost => Self::TargetLost,
             MissionEvent::TargetGiven => Self::Track,
             MissionEvent::RelayGiven => Self::Relay,
             MissionEvent::TaskGiven => Self::Task,
@@ -97,6 +103,8 @@ impl Reason {
             Self::TimeIsOver => "the time of its mission is over",
             Self::Stayed => "it stayed for as long as it was to",
             Self::PeerLost => "it believes a peer of its fleet to be down",
+            Self::Detected => "what its mission looks for was found",
+            Self::TargetLost => "it lost the target that it follows",
         }
     }
 }
@@ -273,6 +281,9 @@ pub struct Why {
     /// Tasks other than coverage that it knows.
     #[serde(default)]
     pub tasks: Vec<TaskView>,
+    /// Objects that its mission looks for, as it was told of them, a sentence each.
+    #[serde(default)]
+    pub detections: Vec<String>,
     /// What it believes of others, by their numbers.
     pub others: Vec<Other>,
     /// What happened last, the oldest first.
@@ -401,6 +412,9 @@ impl fmt::Display for Why {
         }
         for task in &self.tasks {
             write_task(task, f)?;
+        }
+        for told in &self.detections {
+            writeln!(f, "  {told}")?;
         }
         for other in &self.others {
             write_other(other, f)?;

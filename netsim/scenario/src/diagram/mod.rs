@@ -22,6 +22,11 @@ const DIAGRAMS: &[(&str, &str, &str)] = &[
         include_str!("../../../../configs/diagrams/coverage.json5"),
     ),
     (
+        "convoy",
+        "convoy.json5",
+        include_str!("../../../../configs/diagrams/convoy.json5"),
+    ),
+    (
         "inspection",
         "inspection.json5",
         include_str!("../../../../configs/diagrams/inspection.json5"),
@@ -30,6 +35,11 @@ const DIAGRAMS: &[(&str, &str, &str)] = &[
         "patrol",
         "patrol.json5",
         include_str!("../../../../configs/diagrams/patrol.json5"),
+    ),
+    (
+        "search",
+        "search.json5",
+        include_str!("../../../../configs/diagrams/search.json5"),
     ),
 ];
 
@@ -99,8 +109,15 @@ fn flown(scenario: Result<crate::Scenario, ScenarioError>) -> Result<Diagram, Sc
 /// What a scenario says of its mission: the diagram that it is flown by, where it names one or
 /// brings its own; none where that is the default one.
 pub(crate) fn of_mission(node: &Node<'_>, files: &Files<'_>) -> Result<Option<Diagram>, Error> {
-    let f = node.fields(&["diagram", "for_s"])?;
-    let at = f.need("diagram", "\"patrol\"")?;
+    let f = node.fields(&["diagram", "for_s", "detections", "tasks"])?;
+    let at = match f.get("diagram") {
+        None if f.get("for_s").is_none()
+            && (f.get("detections").is_some() || f.get("tasks").is_some()) =>
+        {
+            return Ok(None);
+        }
+        _ => f.need("diagram", "\"patrol\"")?,
+    };
     let mut diagram = if let Ok(name) = at.text() {
         builtin(name).ok_or_else(|| {
             let known = suggestion(name, &names());

@@ -10,14 +10,6 @@ use skein_peer::diagram::{
 /// Events that people ask for, and why nothing can follow from them yet.
 const NOT_YET: &[(&str, &str)] = &[
     (
-        "object_detected",
-        "what is seen is followed where the operator asks for it, with a track task",
-    ),
-    (
-        "target_lost",
-        "who loses the target that it was given searches for it, as long as it is to follow it",
-    ),
-    (
         "wind_above",
         "the wind of a run is the same all the time; a wind in which the mission cannot be flown is refused before it begins",
     ),

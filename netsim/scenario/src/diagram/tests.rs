@@ -41,9 +41,9 @@ fn what_is_wrong_is_told_with_its_place_and_a_remedy() {
         ),
         (
             "on: \"low_fuel\"",
-            "on: \"object_detected\"",
+            "on: \"wind_above\"",
             "transitions[4].on",
-            "with a track task",
+            "is refused before it begins",
         ),
         (
             "on: \"low_fuel\"",

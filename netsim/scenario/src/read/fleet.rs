@@ -80,7 +80,7 @@ fn airframe_named(node: &Node<'_>, airframes: &Airframes) -> Result<Airframe, Er
 pub(crate) fn ground_station(node: &Node<'_>) -> Result<GroundStationSpec, Error> {
     let f = node.fields(&["id", "east_m", "north_m", "height_m"])?;
     Ok(GroundStationSpec {
-        id: f.small_or("id", 100, 1, u16::MAX, "a peer's number")?,
+        id: f.small_or("id", 100, 1, u16::MAX - 1, "a peer's number")?,
         position: position(&f)?,
         height_m: f.number_or("height_m", 2.0, 0.0, MAX_HEIGHT_M, "metres")?,
     })
@@ -308,7 +308,7 @@ fn generated(
             places.len()
         )));
     }
-    let ids = (1..=u16::MAX).filter(|id| Some(*id) != ground_id);
+    let ids = (1..u16::MAX).filter(|id| Some(*id) != ground_id);
     let members = ids
         .zip(kinds.iter().cycle())
         .take(usize::from(count))
@@ -359,7 +359,7 @@ fn listed(
     for (i, item) in items.iter().enumerate() {
         let f = item.fields(&["id", "airframe", "launch", "height_m"])?;
         let id_node = f.need("id", "1")?;
-        let id = id_node.small(1, u16::MAX, "a peer's number")?;
+        let id = id_node.small(1, u16::MAX - 1, "a peer's number")?;
         if ground_id == Some(id) || members.iter().any(|m| m.id == id) {
             return Err(id_node.wrong(format!(
                 "the number {id} is already taken; every peer has its own"

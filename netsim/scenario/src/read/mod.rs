@@ -1,6 +1,7 @@
 //! From the text of a scenario to values with units, one subject a file. Leaves what the
 //! values mean together (mission, loop, feasibility) to the modules that follow.
 
+pub(crate) mod detections;
 pub(crate) mod faults;
 pub(crate) mod fleet;
 pub(crate) mod lanes;
@@ -31,7 +32,9 @@ use skein_interop::airframe;
 use skein_interop::json::{Document, Error, Fields, Node, Places};
 use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{GroundStationSpec, RadioSpec, StormSpec, VehicleSpec};
+use skein_peer::criteria::Criterion;
 use skein_peer::diagram::Diagram;
+use skein_peer::input::NewTask;
 use std::collections::BTreeSet;
 use targets::Asked;
 use terrain::Terrain;
@@ -83,6 +86,10 @@ pub(crate) struct Stated {
     pub(crate) laps: u16,
     /// The diagram that the mission is flown by; none for the default one.
     pub(crate) diagram: Option<Diagram>,
+    /// What is looked for besides.
+    pub(crate) detections: Vec<Criterion>,
+    /// Tasks that begin with the mission.
+    pub(crate) brought: Vec<NewTask>,
     /// By what rule the loop is divided.
     pub(crate) division: Rule,
     pub(crate) lanes: Lanes,
@@ -169,6 +176,10 @@ pub(crate) fn scenario(
         diagram: f
             .get("mission")
             .map_or(Ok(None), |node| diagram::of_mission(node, files))?,
+        detections: f
+            .get("mission")
+            .map_or(Ok(Vec::new()), detections::of_mission)?,
+        brought: f.get("mission").map_or(Ok(Vec::new()), tasks::of_mission)?,
         division: f.get("division").map_or(Ok(Rule::Best), division)?,
         lanes: lanes::read(&f)?,
         base: f

@@ -4,6 +4,7 @@
 use super::shared::position;
 use skein_interop::json::{Error, Node, suggestion};
 use skein_netsim::fault::Fault;
+use skein_peer::BROUGHT_MAX;
 use skein_peer::input::NewTask;
 use skein_peer::mission::mm;
 use skein_peer::wire::tasks::{
@@ -20,8 +21,27 @@ pub(crate) const RADIUS_M: f64 = 10.0;
 /// How far from a relay position a UAV may be that holds it unless the file says so, metres.
 pub(crate) const RELAY_RADIUS_M: f64 = 100.0;
 
+/// Reads `mission.tasks`: what begins with it, as an operator would ask for it.
+pub(crate) fn of_mission(mission: &Node<'_>) -> Result<Vec<NewTask>, Error> {
+    let Some(list) = mission.get("tasks")? else {
+        return Ok(Vec::new());
+    };
+    let items = list.items()?;
+    if items.len() > BROUGHT_MAX {
+        return Err(list.wrong(format!(
+            "has {} tasks; expected {BROUGHT_MAX} at most",
+            items.len()
+        )));
+    }
+    items.iter().map(asked).collect()
+}
+
 /// Reads `task_add`.
 pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
+    Ok(Fault::AddTask { task: asked(node)? })
+}
+
+fn asked(node: &Node<'_>) -> Result<NewTask, Error> {
     let f = node.fields(&[
         "id",
         "point",
@@ -108,7 +128,7 @@ pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
         within_ms: within_ms.transpose()?,
         sensor: sensor.transpose()?.unwrap_or(0),
     };
-    Ok(Fault::AddTask { task })
+    Ok(task)
 }
 
 fn places(line: &Node<'_>, least: usize) -> Result<Vec<(i32, i32)>, Error> {

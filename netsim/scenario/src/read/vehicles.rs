@@ -4,13 +4,14 @@
 use super::shared::{Notices, position};
 use crate::files::Files;
 use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
-use skein_interop::json::{Error, Fields, Node};
+use skein_interop::json::{Error, Fields, Node, suggestion};
 use skein_interop::place::to_plane;
 use skein_interop::targets;
 use skein_netsim::pursuit::KINDS;
 use skein_netsim::pursuit::roads::Roads;
 use skein_netsim::pursuit::vehicle::Behaviour;
 use skein_netsim::spec::VehicleSpec;
+use skein_peer::criteria::LOOKS;
 use std::sync::Arc;
 
 /// The usual speed of a vehicle unless the file says so, m/s.
@@ -26,7 +27,15 @@ pub(crate) fn read(
     notices: &mut Notices,
 ) -> Result<Vec<VehicleSpec>, Error> {
     let one = |item: &Node<'_>, notices: &mut Notices| {
-        let f = item.fields(&["way_m", "streets", "start", "speed_mps", "does", "kind"])?;
+        let f = item.fields(&[
+            "way_m",
+            "streets",
+            "start",
+            "speed_mps",
+            "does",
+            "kind",
+            "confused",
+        ])?;
         let roads = match (f.get("way_m"), f.get("streets")) {
             (Some(way), None) => of_way(way)?,
             (None, Some(file)) => of_file(file, (origin, files), notices)?,
@@ -46,6 +55,7 @@ pub(crate) fn read(
             behaviour: f.get("does").map_or(Ok(Behaviour::Drives), does)?,
             speed_mps: f.number_or("speed_mps", SPEED_MPS, 0.0, 40.0, "m/s")?,
             kind: kind(&f)?,
+            confused_permille: confused(&f)?,
         })
     };
     list.items()?
@@ -54,10 +64,34 @@ pub(crate) fn read(
         .collect()
 }
 
-fn kind(f: &Fields<'_>) -> Result<u8, Error> {
+fn confused(f: &Fields<'_>) -> Result<u16, Error> {
+    let share = f.number_or("confused", 0.0, 0.0, 0.5, "of the looks")?;
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "at most 500"
+    )]
+    let permille = (share * 1000.0).round() as u16;
+    Ok(permille)
+}
+
+/// What a vehicle looks like: by its number, or by its name.
+pub(super) fn looks(node: &Node<'_>) -> Result<u8, Error> {
+    if let Ok(name) = node.text() {
+        let found = LOOKS.iter().position(|l| *l == name);
+        let found = found.and_then(|n| u8::try_from(n).ok());
+        return found.ok_or_else(|| {
+            let known = suggestion(name, &LOOKS);
+            node.wrong(format!("no vehicle is a \"{name}\"; {known}"))
+        });
+    }
     let most = u16::from(KINDS) - 1;
-    let kind = f.small_or("kind", u16::from(KIND), 0, most, "the kind of a vehicle")?;
+    let kind = node.small(0, most, "the kind of a vehicle")?;
     Ok(u8::try_from(kind).unwrap_or(KIND))
+}
+
+fn kind(f: &Fields<'_>) -> Result<u8, Error> {
+    f.get("kind").map_or(Ok(KIND), looks)
 }
 
 fn does(node: &Node<'_>) -> Result<Behaviour, Error> {

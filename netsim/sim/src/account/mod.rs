@@ -36,6 +36,7 @@ pub use lifetimes::{Cause, Setting};
 pub use report::{Details, Driver, FalseDown, Live, Processes, RunReport, Simulated, Violations};
 pub use work::Held;
 
+use crate::check::detections::DetectionReport;
 pub use crate::check::tracks::Tracked;
 use crate::world::{Fact, Judge, Loss};
 use connectivity::Connectivity;
@@ -88,6 +89,9 @@ pub struct Account {
     alarms: Vec<String>,
     failures: Vec<String>,
     tasks: Tasks,
+    detections: Vec<DetectionReport>,
+    found_ms: Option<u64>,
+    over_ms: Option<u64>,
 }
 
 impl Account {
@@ -108,6 +112,9 @@ impl Account {
             alarms: Vec::new(),
             failures: Vec::new(),
             tasks: Tasks::default(),
+            detections: Vec::new(),
+            found_ms: None,
+            over_ms: None,
             setting,
         }
     }
@@ -121,6 +128,24 @@ impl Account {
     /// The ground station of its operator holds this task.
     pub fn asked(&mut self, now_ms: u64, task: &AskedTask) {
         self.tasks.asked(now_ms, task);
+    }
+
+    /// The time of a mission is over whose own tasks go before what is to be seen, and all who live
+    /// know it.
+    pub fn over(&mut self, now_ms: u64) {
+        self.covered(now_ms);
+        self.over_ms.get_or_insert(now_ms);
+    }
+
+    /// What ends the mission was found, and all who live know it.
+    pub fn found(&mut self, now_ms: u64) {
+        self.covered(now_ms);
+        self.found_ms.get_or_insert(now_ms);
+    }
+
+    /// What came so far of the objects that the mission looks for, as the world knows.
+    pub fn detected(&mut self, reports: Vec<DetectionReport>) {
+        self.detections = reports;
     }
 
     /// What the world knows of a target that is to be followed.
@@ -236,7 +261,7 @@ impl Account {
                 self.lifetimes.paused(now_ms, peer);
                 None
             }
-            Report::Task { news, .. } => {
+            Report::Task { id, news, .. } => {
                 match news {
                     TaskNews::Relays | TaskNews::Tracks => {
                         self.relaying.insert(peer);
@@ -246,9 +271,13 @@ impl Account {
                     }
                     _ => {}
                 }
-                self.tasks.reported(peer, report);
+                // What UAVs ask for has registers of its own.
+                if !self.setting.uavs.contains_key(&id.author) {
+                    self.tasks.reported(peer, report);
+                }
                 None
             }
+            Report::Detected { id, told } => (id.author == peer).then(|| told.sentence(id.author)),
             Report::Round { .. } | Report::Revised { .. } => None,
         }
     }
@@ -293,6 +322,8 @@ impl Account {
     /// and there is no bound on the work of two.
     pub fn revised(&mut self) {
         self.covered_ms = None;
+        self.found_ms = None;
+        self.over_ms = None;
         self.lifetimes.revised();
     }
 
@@ -406,6 +437,9 @@ impl Account {
             kills: self.work.kills(&self.detection),
             restarts: self.restarts.reports(),
             tasks: self.tasks.reports(ending.judge),
+            detections: self.detections.clone(),
+            found_ms: self.found_ms,
+            over_ms: self.over_ms,
             finished,
             relaying,
             unfinished,

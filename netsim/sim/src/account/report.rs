@@ -6,6 +6,7 @@
 
 use super::lifetimes::Cause;
 use super::tasks::TaskReport;
+use crate::check::detections::DetectionReport;
 use crate::check::{Findings, Violation};
 use crate::world::Judge;
 use serde::{Deserialize, Serialize};
@@ -57,6 +58,13 @@ pub struct RunReport {
     pub launch_bound_ms: Option<u64>,
     /// `makespan_ms` over `launch_bound_ms`.
     pub makespan_over_launch_bound: Option<f64>,
+    /// When its time was over, of a mission whose own tasks go before what is to be seen, and which
+    /// is over by that, whatever is left to be seen, ms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub over_ms: Option<u64>,
+    /// When something was found that ends the mission, whatever is left to be seen, ms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub found_ms: Option<u64>,
     /// What was seen of the area, lines or points.
     pub coverage: Coverage,
     /// Flown segments that entered a no-fly zone.
@@ -77,6 +85,9 @@ pub struct RunReport {
     /// Each task other than coverage that was asked for in flight.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tasks: Vec<TaskReport>,
+    /// Each object that the mission looks for and a UAV told of.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub detections: Vec<DetectionReport>,
     /// Live UAVs at the end that believe the mission finished.
     pub finished: Vec<u16>,
     /// Live UAVs at the end that hold a relay position, with everything covered.
@@ -447,7 +458,20 @@ impl RunReport {
     pub(super) fn judge(&mut self, failures: &[String]) {
         let mut reasons = failures.to_vec();
         let c = &self.coverage;
-        if c.covered_cells < c.coverable_cells {
+        if self.over_ms.is_some() {
+            let mut brought = self.tasks.iter().filter_map(|t| t.tracked.as_ref());
+            if brought.any(|t| t.first_ms.is_none()) {
+                reasons.push("nobody ever saw what the mission was to follow".to_owned());
+            }
+        } else if self.found_ms.is_some() {
+            let mut asked = self
+                .detections
+                .iter()
+                .filter(|d| d.to_follow && !d.withdrawn);
+            if asked.all(|d| d.followed_ms.is_none()) && !self.finished.is_empty() {
+                reasons.push("nobody watched what was found".to_owned());
+            }
+        } else if c.covered_cells < c.coverable_cells {
             let n = c.coverable_cells - c.covered_cells;
             reasons.push(format!("{n} coverable cells were not seen"));
         } else if self.makespan_ms.is_none() {

@@ -28,6 +28,9 @@ impl fmt::Display for RunReport {
         for task in &self.tasks {
             writeln!(f, "  task       {}", task.line())?;
         }
+        for detection in &self.detections {
+            writeln!(f, "  detection  {}", detection.line())?;
+        }
         self.write_radio(f)?;
         self.write_checks(f)?;
         for alarm in &self.alarms {

@@ -8,6 +8,7 @@ use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use skein_peer::Mission;
 use skein_peer::diagram::{Machine, MissionEvent, StateGoal};
 use skein_peer::output::Status;
+use skein_peer::wire::detection::Stands;
 use skein_peer::wire::message::Order;
 use skein_peer::wire::tasks::Progress;
 use std::collections::{BTreeMap, BTreeSet};
@@ -283,14 +284,17 @@ impl ActivityCheck {
         let Some(flown) = self.flown(m).filter(|_| m.view.finished) else {
             return;
         };
-        if m.view.covered.is_full() && !flown.machine.goes_round() {
-            return;
-        }
         let facts = self.facts(snapshot, m, &flown);
         let after_s = flown.machine.ends_after_s();
         let timer = after_s.map(|s| facts.holds(0, (MissionEvent::Timer, s)));
+        if flown.machine.ends_when_found() && facts.is_found() {
+            return;
+        }
         if timer.is_some_and(|holds| holds != Holds::No) {
+            // Also where everything is seen, and tasks of the mission kept it from its end.
             self.ended.insert(flown.sortie);
+        } else if m.view.covered.is_full() && !flown.machine.goes_round() {
+            // It ended by what was seen.
         } else if !may_be_first && self.early.insert(m.id) {
             found.broken("activity", snapshot.now_ms, Some(m.id), || {
                 "says that its mission is finished before its time is over, and not everything is seen, or it was to go on then"
@@ -306,6 +310,7 @@ impl ActivityCheck {
             MissionEvent::CellsGiven
             | MissionEvent::TaskGiven
             | MissionEvent::TargetGiven
+            | MissionEvent::TargetLost
             | MissionEvent::RelayGiven
             | MissionEvent::PeerLost
             | MissionEvent::NobodyHeard => true,
@@ -394,6 +399,9 @@ impl Facts<'_> {
             MissionEvent::PeerLost => {
                 Holds::of(view.peers.values().any(|(_, s)| *s == Status::Down))
             }
+            MissionEvent::ObjectDetected => Holds::of(self.is_found()),
+            MissionEvent::TargetLost if view.relays => Holds::Maybe,
+            MissionEvent::TargetLost => Holds::No,
             MissionEvent::TargetGiven | MissionEvent::RelayGiven if view.relays => Holds::Maybe,
             MissionEvent::TaskGiven if claims.next().is_some() => Holds::Maybe,
             MissionEvent::TargetGiven | MissionEvent::RelayGiven | MissionEvent::TaskGiven => {
@@ -407,7 +415,15 @@ impl Facts<'_> {
     }
 
     fn ends(&self) -> bool {
-        self.flown.machine.ends_after_s().is_some()
+        let machine = &self.flown.machine;
+        machine.ends_after_s().is_some() || machine.ends_when_found()
+    }
+
+    /// Whether it knows of something that its mission looks for. Whether that is there is judged
+    /// by a rule of its own.
+    fn is_found(&self) -> bool {
+        let mut all = self.m.view.detections.iter();
+        all.any(|(_, d)| d.stands == Stands::Told && d.sortie == self.flown.sortie)
     }
 
     /// To which states one look may lead from there.

@@ -2,12 +2,14 @@
 //! decide what it means.
 
 use super::cover::CoverCheck;
+use super::detections::{Around, Truth};
 use super::graph::{Graph, Stability};
 use super::listing::ListingCheck;
 use super::membership::Membership;
 use super::progress::ProgressCheck;
 use super::record::{RecordCheck, Said};
 use super::rules::Rules;
+use super::tracks::Look;
 use super::twins::TwinCheck;
 use super::{Bounds, Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::fault::Fault;
@@ -385,6 +387,17 @@ impl Checker {
             .observe(now_ms, &graph, |id| members.life(id), window_ms);
         self.graph = graph;
         changed
+    }
+
+    /// What was in the pictures of those who fly a mission that looks for something.
+    pub fn on_detections(&mut self, now_ms: u64, truth: &[Truth], looks: &[Look]) {
+        let around = Around {
+            graph: &self.graph,
+            stability: &self.stability,
+            handicaps: &self.handicaps,
+        };
+        let detections = &mut self.rules.detections;
+        detections.on_looks(now_ms, (truth, looks), around, &mut self.found);
     }
 
     /// The true graph in the last snapshot.

@@ -23,6 +23,7 @@
 //! | [`relays`] | who holds a relay position is there |
 //! | [`tracks`] | who says that it follows a target sees it |
 //! | [`watch`] | who flies round leaves no place waiting, and spreads evenly |
+//! | [`detections`] | what a mission looks for and one had in sight is told, once, and is there |
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
 //! | [`airtime`] | S9: shares of the channel |
 //! | [`fuel`] | S10, bids and returns against fuel and place |
@@ -41,6 +42,7 @@ pub mod cadence;
 pub mod checker;
 pub mod cover;
 pub mod decision;
+pub mod detections;
 pub mod findings;
 pub mod flight;
 pub mod fuel;

@@ -66,7 +66,9 @@ impl RelayCheck {
             let Some(at) = m.at else { continue };
             self.check_way(snapshot, (m, at), flyers, found);
             for (id, revision, progress) in &m.view.tasks {
-                let holds = matches!(progress, Progress::Begun | Progress::Leaving);
+                // What UAVs ask for has numbers of its own.
+                let is_seen = m.view.detections.iter().any(|(d, _)| d == id);
+                let holds = matches!(progress, Progress::Begun | Progress::Leaving) && !is_seen;
                 let asked = self.asked.get(&(id.number, *revision));
                 let Some(position) = asked.filter(|_| holds) else {
                     continue;

@@ -4,6 +4,7 @@ use super::activity::ActivityCheck;
 use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
 use super::decision::{DecisionCheck, Mover};
+use super::detections::DetectionCheck;
 use super::flight::{FlightCheck, Flyer, at_base};
 use super::fuel::FuelCheck;
 use super::listing::ListingCheck;
@@ -51,6 +52,8 @@ pub struct Rules {
     /// Who follows targets.
     pub tracks: TrackCheck,
     watch: WatchCheck,
+    /// What the mission looks for.
+    pub detections: DetectionCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -83,6 +86,7 @@ impl Rules {
             relays: RelayCheck::default(),
             tracks: TrackCheck::default(),
             watch: WatchCheck::default(),
+            detections: DetectionCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -96,6 +100,7 @@ impl Rules {
         self.bases.insert(mission.revision, point_m(mission.base));
         self.flight.on_zones(mission.zones_m());
         self.activity.on_mission(mission);
+        self.detections.on_mission(mission);
         self.spread
             .on_mission(chunks(mission).map_or(0, |pieces| pieces.len()));
     }

@@ -38,6 +38,7 @@ pub use outcome::Outcome;
 mod tests;
 
 use crate::account::{Account, Cause};
+use crate::check::detections::Truth;
 use crate::check::record::Said;
 use crate::check::tracks::Look;
 use crate::check::{Checker, PeerSnapshot};
@@ -58,6 +59,7 @@ use sim_peer::{Process, SimPeer};
 use skein_behaviors::Order;
 use skein_geometry::frame::{Point, Pose};
 use skein_link::medium::key_hash;
+use skein_peer::MISSION;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
 use skein_peer::output::TaskNews;
@@ -779,6 +781,7 @@ impl Swarm {
         self.account.reported(self.now_ms, id, &meant);
         self.note_voice(id, &report);
         self.note_task(id, &report);
+        self.note_detection(id, &report);
         if let Report::Refused { reason } = &report
             && !std::mem::take(&mut self.spoilt)
         {
@@ -826,23 +829,43 @@ impl Swarm {
             self.judged.hash(),
         );
         self.judge_tracks(&peers);
+        self.judge_detections(&peers);
         self.unassigned = peers.iter().any(|m| !m.view.unassigned.is_empty());
         let mut flying = 0;
-        let mut finished = true;
+        let (mut finished, mut ended) = (true, true);
         for m in peers.iter().filter(|m| m.uav) {
             flying += 1;
             // A relay position is over for nobody but who holds it.
             finished &= m.view.finished || m.view.relays;
+            ended &= m.view.finished;
         }
         self.note_ground(&peers);
         // Whoever ends it by its time before that is found by a rule.
         let timed = || self.operator.mission().ends_after_s().is_some();
         let open = self.account.covered_ms().is_none();
-        if open && flying > 0 && finished && timed() && self.air.end_laps() {
-            self.account.covered(self.now_ms);
+        if open && flying > 0 && finished && timed() {
+            if self.air.end_laps() {
+                self.account.covered(self.now_ms);
+                self.history.keep(self.now_ms, || What::Covered);
+            } else if ended && !self.operator.mission().tasks.is_empty() {
+                // What it brings goes before its cells: it is over by its time.
+                self.account.over(self.now_ms);
+            }
+        }
+        // Whoever ends it by what is not there is found by a rule.
+        let is_found = || {
+            let found = self.checker.rules.detections.has_found();
+            found && self.operator.mission().ends_when_found()
+        };
+        if open && flying > 0 && finished && is_found() {
+            self.account.found(self.now_ms);
             self.history.keep(self.now_ms, || What::Covered);
         }
-        let waits = self.has_fresh_task();
+        let fresh_ms = FRESH_TASK_PERIODS * self.period_ms();
+        let detections = &self.checker.rules.detections;
+        let waits = self.has_fresh_task()
+            || self.is_following(&peers)
+            || detections.has_fresh(self.now_ms, fresh_ms);
         self.done = self.account.covered_ms().is_some() && flying > 0 && finished && !waits;
         for v in self.checker.found.drain_fresh() {
             self.history.keep(v.time_ms, || What::Violation {
@@ -874,6 +897,55 @@ impl Swarm {
         }
     }
 
+    /// What the mission looks for is judged beside what was in the pictures of those who fly it.
+    fn judge_detections(&mut self, peers: &[PeerSnapshot]) {
+        if self.checker.rules.detections.is_idle() {
+            return;
+        }
+        let newest = self.operator.mission().revision;
+        let flies = |m: &&PeerSnapshot| m.uav && m.view.speaks && m.view.revision >= newest;
+        let look = |m: &PeerSnapshot| Look {
+            uav: m.id,
+            at: m.at,
+            since_ms: m.since_ms,
+            says: m.view.follows,
+            pictured: self.air.pictured(m.id),
+        };
+        let looks: Vec<Look> = peers.iter().filter(flies).map(look).collect();
+        let truth: Vec<Truth> = self.air.vehicles().truth().collect();
+        self.checker.on_detections(self.now_ms, &truth, &looks);
+        let reports = self.checker.rules.detections.reports();
+        self.account.detected(reports);
+    }
+
+    /// A UAV tells of an object of its own: the world knows whether it is there.
+    fn note_detection(&mut self, id: u16, report: &Report) {
+        let Report::Detected { id: task, told } = report else {
+            return;
+        };
+        let is_own = self
+            .peer_idx(id)
+            .is_some_and(|idx| self.peers[idx].config.id.0 == task.author);
+        if !is_own {
+            return;
+        }
+        self.air.advance(self.now_ms);
+        let truth: Vec<Truth> = self.air.vehicles().truth().collect();
+        let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
+        let at = (self.now_ms, id);
+        rules.detections.on_told(at, (*task, told), &truth, found);
+    }
+
+    /// Whether somebody is to follow what a UAV saw.
+    fn is_following(&self, peers: &[PeerSnapshot]) -> bool {
+        let uavs = peers.iter().filter(|m| m.uav);
+        let mut open = uavs.flat_map(|m| &m.view.open_tasks);
+        open.any(|(id, _)| {
+            let is_uav = self.spec.uavs.iter().any(|u| u.id == id.author);
+            is_uav || id.author == MISSION
+        })
+    }
+
     /// The ground station says the standing order once in each life, as a live one does.
     fn repeat_order(&mut self) {
         let Some(idx) = self.ground_station() else {
@@ -901,7 +973,8 @@ impl Swarm {
         };
         let tasks = peer.operators_tasks();
         let mission = self.operator.mission();
-        for asked in &tasks {
+        let brought = mission.brought(false);
+        for asked in tasks.iter().chain(&brought) {
             self.account.asked(self.now_ms, asked);
             self.checker.rules.relays.on_asked(asked);
             self.checker.rules.tracks.on_asked(asked);

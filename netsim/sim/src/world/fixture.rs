@@ -169,6 +169,8 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         sortie: 0,
         cancelled: false,
         diagram: None,
+        detections: Vec::new(),
+        tasks: Vec::new(),
         tree: skein_flight::coverage::ring::Tree::default(),
         division: Default::default(),
         separation_mm: 0,

@@ -9,6 +9,7 @@
 
 use super::motion::Kinematic;
 use super::obstacles::{Obstacles, Place};
+use crate::check::detections::Truth;
 use crate::pursuit::KINDS;
 use crate::pursuit::sensor::{Noise, rooted};
 use crate::pursuit::vehicle::Vehicle;
@@ -67,6 +68,16 @@ impl Vehicles {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
+    }
+
+    /// What they are, and where.
+    pub fn truth(&self) -> impl Iterator<Item = Truth> + '_ {
+        let all = self.all.iter().zip(self.specs.iter());
+        all.map(|(v, spec)| Truth {
+            at: v.at,
+            kind: spec.kind,
+            is_confused: spec.confused_permille > 0,
+        })
     }
 
     /// Where they are, metres.
@@ -135,7 +146,8 @@ impl Vehicles {
             if recognised && self.is_pictured(nth, body, obstacles) {
                 let told = Detection::from_sight(from, height_m, v.at, &noise.sight);
                 let at = v.at + rooted(&told.covariance_m2, off) + displaced;
-                seen.push(sighted(at, &told, spec.kind));
+                let kind = spec.kind_in(of_uav ^ now_ms, nth);
+                seen.push(sighted(at, &told, kind));
             }
         }
         let is_false = random.unit() < noise.false_alarms;
@@ -153,6 +165,22 @@ impl Vehicles {
         }
         seen.sort_by_key(|s| s.spread_mm);
         Sightings::new(seen)
+    }
+}
+
+impl VehicleSpec {
+    /// What a detector takes it for in one look: where it is never confused nothing is drawn.
+    fn kind_in(&self, look: u64, nth: usize) -> u8 {
+        if self.confused_permille == 0 {
+            return self.kind;
+        }
+        let own = mix(look ^ 0x5EE4 << 40) ^ nth as u64;
+        let mut random = SplitMix64::new(mix(own));
+        if random.unit() >= f64::from(self.confused_permille) / 1000.0 {
+            return self.kind;
+        }
+        let other = 1 + random.below(usize::from(KINDS) - 1);
+        u8::try_from((usize::from(self.kind) + other) % usize::from(KINDS)).unwrap_or(self.kind)
     }
 }
 
@@ -189,6 +217,7 @@ mod tests {
                 behaviour,
                 speed_mps: 8.0,
                 kind: 1,
+                confused_permille: 0,
             }],
             ..fixture::square(1)
         }

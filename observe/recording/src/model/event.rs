@@ -159,6 +159,21 @@ pub enum What {
         #[serde(default)]
         held_by: Vec<TaskBid>,
     },
+    /// An object that the mission looks for was told, or withdrawn.
+    Detected {
+        /// Who saw it.
+        by: u16,
+        /// What it looks like.
+        looks: String,
+        /// Where, metres east of the origin.
+        east_m: f64,
+        /// And north of it.
+        north_m: f64,
+        /// No farther from there than this, metres.
+        error_m: f64,
+        /// Whether it counts; else it was told before.
+        stands: bool,
+    },
     /// A peer is silent: another process speaks under its id.
     Silenced,
     /// Something a person should look at.
@@ -206,6 +221,7 @@ impl What {
             Self::Finished { .. } => "finished",
             Self::Revised { .. } => "revised",
             Self::Task { .. } => "task",
+            Self::Detected { .. } => "detected",
             Self::Silenced => "silenced",
             Self::Alarm => "alarm",
             Self::Refused => "refused",

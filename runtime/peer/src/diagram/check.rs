@@ -278,7 +278,13 @@ pub(super) fn flown(machine: &Machine) -> Result<(), DiagramError> {
                 .find(|(_, g)| *g == goal);
             // Of a section nothing need be left to be flown.
             let needs = needs.filter(|(_, g)| *g != StateGoal::Section);
-            if let Some((on, wanted)) = taken_up.or(needs).filter(|g| *g != (way.on, goal)) {
+            // Who lost whom it follows follows it still.
+            let seeks = (way.on, goal) == (MissionEvent::TargetLost, StateGoal::Follow)
+                && machine.state(i).goal == StateGoal::Follow;
+            let amiss = taken_up
+                .or(needs)
+                .filter(|g| *g != (way.on, goal) && !seeks);
+            if let Some((on, wanted)) = amiss {
                 let text = format!(
                     "from the state \"{}\" \"{}\" leads to \"{}\": expected \"{}\" and a state with the goal \"{}\" together",
                     state.name,

@@ -65,6 +65,10 @@ pub enum MissionEvent {
     Stayed,
     /// It believes a peer of its fleet to be down.
     PeerLost,
+    /// Something that its mission looks for was told, by itself or by another.
+    ObjectDetected,
+    /// It lost the target that it follows, and searches for it.
+    TargetLost,
     /// It was given a target to follow, and where that may be is near.
     TargetGiven,
     /// It was given a relay position, and its circle is planned.
@@ -83,7 +87,7 @@ pub enum MissionEvent {
 
 impl MissionEvent {
     /// All, in the order of the default diagram.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 18] = [
         Self::OperatorHold,
         Self::OperatorReturn,
         Self::MissionCancelled,
@@ -93,6 +97,8 @@ impl MissionEvent {
         Self::Timer,
         Self::Stayed,
         Self::PeerLost,
+        Self::ObjectDetected,
+        Self::TargetLost,
         Self::TargetGiven,
         Self::RelayGiven,
         Self::TaskGiven,
@@ -115,6 +121,8 @@ impl MissionEvent {
             Self::Timer => "timer",
             Self::Stayed => "stayed",
             Self::PeerLost => "peer_lost",
+            Self::ObjectDetected => "object_detected",
+            Self::TargetLost => "target_lost",
             Self::TargetGiven => "target_given",
             Self::RelayGiven => "relay_given",
             Self::TaskGiven => "task_given",
@@ -465,6 +473,13 @@ impl Machine {
     #[must_use]
     pub fn goes_round(&self) -> bool {
         self.states().iter().any(|s| s.goal == StateGoal::Round)
+    }
+
+    /// Whether the mission ends when something that it looks for was told.
+    #[must_use]
+    pub fn ends_when_found(&self) -> bool {
+        let mut all = self.ways.iter().flatten();
+        all.any(|w| w.on == MissionEvent::ObjectDetected && self.state(w.to).part == Part::Ends)
     }
 
     /// Which state follows, and by which event; none where no event holds that leads anywhere.

@@ -112,6 +112,10 @@ impl Tasking {
     /// A percept: what the camera saw, and where whom it follows is. Whether its goal changed.
     pub fn look(&mut self, now: Time, percept: &Percept, state: &mut MissionState) -> bool {
         self.targets.on_percept(percept);
+        if !state.geometry.mission.detections.is_empty() && !percept.sightings.is_absent() {
+            let (tracks, now_ms) = self.targets.tracks();
+            self.detections.watch(now_ms, tracks);
+        }
         let (Some(sought), Some(airframe)) = (self.sought(), self.flies) else {
             return false;
         };
@@ -179,6 +183,12 @@ impl Tasking {
             return (Some(TaskNews::Searches), false);
         }
         (None, false)
+    }
+
+    /// Whether it had its target in sight, and said that it searches for it.
+    pub(super) fn has_lost(&self) -> bool {
+        let held = self.flown.as_ref().and_then(|f| f.held.as_ref());
+        self.sought().is_some() && held.is_some_and(|h| h.has_begun && !h.sight.follows)
     }
 
     /// What it says of whom it follows, once it had seen it.

@@ -11,6 +11,7 @@
 //! or panics. The primitives are in `cbor.rs`, schemas in [`super::schema`].
 
 use super::cbor::{In, Listed, Out, Wire, array_of, in_field, number_of};
+use super::detection::Detection;
 use super::kinds::{Kind, RECORD_MAX_BYTES};
 use super::limits::{
     self, COMMITS_MAX, FRESH_MAX_BYTES, GOSSIP_MAX, MEMBERS_MAX, PLAN_MAX, at_most, in_range,
@@ -93,6 +94,7 @@ pub enum Body {
     Task(Task),
     Bundle(Bundle),
     Target(Target),
+    Detection(Detection),
 }
 
 impl Body {
@@ -115,6 +117,7 @@ impl Body {
             Self::Task(_) => Kind::Task,
             Self::Bundle(_) => Kind::Bundle,
             Self::Target(_) => Kind::Target,
+            Self::Detection(_) => Kind::Detection,
         }
     }
 
@@ -148,6 +151,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Task(b) => b.put(&mut out),
         Body::Bundle(b) => b.put(&mut out),
         Body::Target(b) => b.put(&mut out),
+        Body::Detection(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -180,6 +184,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Task => Body::Task(Wire::get(&mut input)?),
         Kind::Bundle => Body::Bundle(Wire::get(&mut input)?),
         Kind::Target => Body::Target(Wire::get(&mut input)?),
+        Kind::Detection => Body::Detection(Wire::get(&mut input)?),
         Kind::Event => {
             return Err(WireError::Kind {
                 number: kind.number(),

@@ -45,6 +45,8 @@ pub enum Kind {
     Bundle = 14,
     /// A vehicle that the author saw.
     Target = 15,
+    /// An object that the mission looks for, which the author saw.
+    Detection = 16,
 }
 
 /// How long a record waiting to be sent matters.
@@ -102,7 +104,7 @@ const fn row(
 // matters until the longest partition a mission tolerates, and is repaired by
 // anti-entropy afterwards.
 // Caps: the largest valid body, which a test of `codec` computes, rounded up.
-const TABLE: [KindRow; 16] = [
+const TABLE: [KindRow; 17] = [
     KindRow {
         relayed: false,
         ..row(
@@ -248,11 +250,22 @@ const TABLE: [KindRow; 16] = [
             Lifetime::Beacons(2),
         )
     },
+    // Told once: it matters as long as what the operator says.
+    KindRow {
+        subjects: super::detection::DETECTIONS_MAX,
+        ..row(
+            Kind::Detection,
+            "detection",
+            64,
+            Priority::Claim,
+            Lifetime::Ms(60_000),
+        )
+    },
 ];
 
 impl Kind {
     /// All kinds, by number.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Beacon,
         Self::State,
         Self::Bid,
@@ -269,6 +282,7 @@ impl Kind {
         Self::Lacking,
         Self::Bundle,
         Self::Target,
+        Self::Detection,
     ];
 
     /// Its number on the wire.
@@ -372,7 +386,7 @@ mod tests {
             assert_eq!(Kind::of_name(kind.name()), Some(kind));
             assert!(kind.cap_bytes() + super::super::codec::ENVELOPE_MAX_BYTES <= RECORD_MAX_BYTES);
         }
-        assert_eq!(Kind::of_number(16), None);
+        assert_eq!(Kind::of_number(17), None);
         assert_eq!(Kind::of_name("rumour"), None);
     }
 

@@ -79,6 +79,7 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
         Body::Task(t) => super::tasks::check_task(t),
         Body::Bundle(b) => super::tasks::check_bundle(b),
         Body::Target(t) => super::target::check(t),
+        Body::Detection(d) => super::detection::check(d),
     }
 }
 

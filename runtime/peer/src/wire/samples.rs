@@ -107,6 +107,10 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         Body::Target(super::target::samples::target()),
         "8f0302011a00013df818c81a0001d682397ab619170c39018f1911f819015e1904b018640001",
     ));
+    all.push((
+        Body::Detection(super::detection::samples::detection()),
+        "8c00000003191002011a00013df81a0001d682397ab619213419170c39018f",
+    ));
     all
 }
 
@@ -329,6 +333,7 @@ pub fn largest() -> Vec<Body> {
     let mut all = largest_of_cells();
     all.extend(super::tasks::samples::largest());
     all.extend(super::target::samples::largest());
+    all.extend(super::detection::samples::largest());
     all
 }
 

@@ -488,6 +488,7 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Task => Some(super::tasks::TASK),
         Kind::Bundle => Some(super::tasks::BUNDLE),
         Kind::Target => Some(super::target::TARGET),
+        Kind::Detection => Some(super::detection::DETECTION),
         Kind::Event => None,
     }
 }

@@ -1,5 +1,6 @@
 //! Bytes of all kinds: typical, largest, refused, cut short, changed.
 
+use super::super::detection::Detection;
 use super::super::limits::*;
 use super::super::samples::{fresh, golden, gossip, largest, listing};
 use super::super::signature::Off;
@@ -403,6 +404,21 @@ fn every_limit_is_sharp() {
                 with(&|t| t.both_e3 -= 1, "both_e3");
                 with(&|t| t.task_by = 0, "task");
             }
+            Body::Detection(d) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut Detection), field| {
+                    let mut d = d;
+                    change(&mut d);
+                    refused(&Body::Detection(d), field);
+                };
+                with(&|d| d.criterion += 1, "criterion");
+                with(&|d| d.seen_ms += 1, "seen_ms");
+                with(&|d| d.east_mm -= 1, "east_mm");
+                with(&|d| d.north_mm -= 1, "north_mm");
+                with(&|d| d.error_mm += 1, "error_mm");
+                with(&|d| d.east_mmps -= 1, "east_mmps");
+                with(&|d| d.north_mmps -= 1, "north_mmps");
+            }
             Body::Operator(orders) => {
                 kinds += 1;
                 let mut same = orders.clone();
@@ -416,7 +432,7 @@ fn every_limit_is_sharp() {
             Body::Finished(_) => {}
         }
     }
-    assert_eq!(kinds, 14);
+    assert_eq!(kinds, 15);
 }
 
 #[test]
@@ -472,7 +488,7 @@ fn envelopes_beyond_the_table_are_refused() {
     };
     assert!(of(|_| ()).is_ok());
     assert_eq!(of(|r| r.kind = 8), Err(WireError::Kind { number: 8 }));
-    assert_eq!(of(|r| r.kind = 16), Err(WireError::Kind { number: 16 }));
+    assert_eq!(of(|r| r.kind = 17), Err(WireError::Kind { number: 17 }));
     assert_eq!(
         of(|r| r.subject = 1),
         Err(WireError::Range { field: "subject" })

@@ -1,0 +1,121 @@
+//! Built-in trials whose missions look for something, or escort it: what comes of that.
+
+use crate::{Overrides, load_builtin};
+use skein_netsim::Prepared;
+use skein_netsim::fault::{Fault, TimedFault};
+use skein_netsim::runs::{Wanted, run};
+use skein_netsim::swarm::{Outcome, Swarm};
+use skein_peer::Beliefs;
+use skein_peer::wire::tasks::Progress;
+
+fn prepared(name: &str, uavs: u16) -> Prepared {
+    let over = Overrides {
+        peers: Some(uavs),
+        ..Overrides::default()
+    };
+    Prepared::new(load_builtin(name, &over).unwrap().spec)
+}
+
+fn flown(name: &str, uavs: u16, seed: u64) -> Outcome {
+    let prepared = prepared(name, uavs);
+    let faults = prepared.spec.faults.clone();
+    run(&prepared, seed, faults, Wanted::default())
+}
+
+fn passed(outcome: &Outcome) {
+    let broken = outcome.violations();
+    let report = &outcome.report;
+    assert!(report.passed, "{:?} {broken:?}", report.reasons);
+}
+
+#[test]
+fn what_drives_is_followed_until_services_are_there_and_what_else_drives_is_told() {
+    let outcome = flown("watchers", 3, 2);
+    passed(&outcome);
+    let told = &outcome.report.detections;
+    let of = |looks: &'static str| told.iter().filter(move |d| d.looks == looks);
+    // Each once, though three fly over them for minutes; and nothing of the bus that stands.
+    assert_eq!((of("lorry").count(), of("car").count()), (1, 1), "{told:?}");
+    assert_eq!(told.len(), 2);
+    let lorry = of("lorry").next().unwrap();
+    assert!(lorry.to_follow && lorry.vehicle == Some(0) && lorry.off_mm < 8_500);
+    assert!(
+        (200_000..245_000).contains(&lorry.sight_ms),
+        "{}",
+        lorry.line()
+    );
+    let car = of("car").next().unwrap();
+    assert!(!car.to_follow && car.followed_ms.is_none() && car.vehicle == Some(1));
+    // Then who followed it covers again: all is seen, and all are finished.
+    assert_eq!(outcome.report.finished.len(), 3);
+}
+
+#[test]
+fn a_search_ends_when_it_is_found_and_it_is_watched_by_one_uav_and_of_many() {
+    for uavs in [1, 3, 8] {
+        let outcome = flown("search", uavs, 4);
+        passed(&outcome);
+        let report = &outcome.report;
+        let [bus] = &report.detections[..] else {
+            panic!("{:?}", report.detections);
+        };
+        assert!(
+            bus.looks == "bus" && bus.vehicle == Some(0),
+            "{}",
+            bus.line()
+        );
+        assert!(bus.sight_ms > 560_000, "{}", bus.line());
+        // Not everything was seen, and nobody flew on for that.
+        let c = &report.coverage;
+        assert!(c.covered_cells < c.coverable_cells);
+        assert!(report.found_ms.unwrap() < bus.told_ms + 10_000);
+        assert_eq!(report.finished.len(), usize::from(uavs));
+    }
+}
+
+#[test]
+fn when_who_watches_what_was_found_is_killed_another_is_given_it_though_all_are_home() {
+    let prepared = prepared("search", 3);
+    let mut faults = prepared.spec.faults.clone();
+    let holders = |swarm: &Swarm| {
+        let views = [1, 2, 3].map(|id| (id, swarm.beliefs(id)));
+        let holds = |b: &Beliefs| {
+            let mut all = b.tasks.iter();
+            all.any(|(.., p)| matches!(p, Progress::Committed | Progress::Begun))
+        };
+        let all = views
+            .into_iter()
+            .filter(|(_, b)| b.as_ref().is_some_and(holds));
+        all.map(|(id, _)| id).collect::<Vec<u16>>()
+    };
+    let mut swarm = Swarm::new(&prepared, 4, faults.clone(), false);
+    swarm.run_until(300_000);
+    let [watches] = holders(&swarm)[..] else {
+        panic!("one watches");
+    };
+    faults.push(TimedFault {
+        at_ms: 300_000,
+        fault: Fault::Kill { peer: watches },
+    });
+    let mut swarm = Swarm::new(&prepared, 4, faults, false);
+    swarm.run_until(330_000);
+    let [next] = holders(&swarm)[..] else {
+        panic!("another goes there");
+    };
+    assert!(next != watches && swarm.beliefs(next).unwrap().relays);
+}
+
+#[test]
+fn a_convoy_is_escorted_by_one_uav_and_of_many() {
+    for uavs in [1, 3, 8] {
+        let outcome = flown("convoy", uavs, 6);
+        passed(&outcome);
+        let [task] = &outcome.report.tasks[..] else {
+            panic!("{:?}", outcome.report.tasks);
+        };
+        let seen = task.tracked.as_ref().unwrap();
+        assert!(seen.first_ms.unwrap() < 60_000, "{}", task.line());
+        assert!(seen.sight_ms * 100 > seen.wanted_ms * 90, "{}", task.line());
+        assert!((475_000..500_000).contains(&outcome.report.end_ms));
+    }
+}
