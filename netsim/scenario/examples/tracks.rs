@@ -13,6 +13,7 @@ use skein_netsim::fault_generator;
 use skein_netsim::prepared::Prepared;
 use skein_netsim::runs::{Wanted, failure_free_makespan_ms, run};
 use skein_netsim::swarm::{Outcome, Swarm};
+use skein_peer::output::Status;
 use skein_scenario::{Overrides, Seeds, open};
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -62,6 +63,96 @@ fn deaths(prepared: &Prepared, seed: u64, mut faults: Vec<TimedFault>) -> Vec<Ti
     faults
 }
 
+/// Where the time goes after a death, seconds from it: until a peer that lives suspects it,
+/// until one believes it down, until another has the task, until another is where the target
+/// was lost, until another has it in sight; and the least that was possible.
+#[derive(Clone, Copy, Debug, Default)]
+struct Parts {
+    suspected: Option<f64>,
+    down: Option<f64>,
+    given: Option<f64>,
+    there: Option<f64>,
+    seen: Option<f64>,
+    /// How far off the nearest of the others was, metres.
+    away_m: f64,
+    /// What it takes the nearest to have it in its picture, after the least silence that is
+    /// taken for a death.
+    bound: f64,
+}
+
+/// Who is so near to where the target was lost is there, metres.
+const THERE_M: f64 = 60.0;
+
+/// The death of whoever follows is suspected after this silence at the earliest, seconds: k1
+/// periods.
+const SILENCE_S: f64 = 4.0;
+
+/// Follows what comes after each death for ten minutes.
+fn parts(prepared: &Prepared, seed: u64, faults: &[TimedFault]) -> Vec<Parts> {
+    let mut told = Vec::new();
+    for fault in faults.iter().filter(|f| DEATHS_MS.contains(&f.at_ms)) {
+        let Fault::Kill { peer } = fault.fault else {
+            continue;
+        };
+        let mut swarm = Swarm::new(prepared, seed, faults.to_vec(), false);
+        swarm.run_until(fault.at_ms - 1);
+        let beliefs = swarm.beliefs(peer);
+        let Some(says) = beliefs.and_then(|b| b.follows).filter(|f| f.sees) else {
+            continue;
+        };
+        let said = skein_peer::mission::point_m(says.at_mm);
+        let lost = swarm
+            .vehicles()
+            .min_by(|a, b| (a - said).norm().total_cmp(&(b - said).norm()))
+            .unwrap_or(said);
+        let mut p = Parts {
+            away_m: f64::INFINITY,
+            bound: f64::INFINITY,
+            ..Parts::default()
+        };
+        let others = || prepared.spec.uavs.iter().filter(|u| u.id != peer);
+        for u in others() {
+            let Some(pose) = swarm.pose(u.id) else { continue };
+            let away_m = (pose.position() - lost).norm();
+            let flown_m = (away_m - u.airframe.footprint_across_m).max(0.0);
+            p.away_m = p.away_m.min(away_m);
+            p.bound = p.bound.min(SILENCE_S + flown_m / u.airframe.cruise_mps);
+        }
+        for step in 1..1200_u64 {
+            swarm.run_until(fault.at_ms + step * 500);
+            let now = Some(step as f64 / 2.0);
+            for u in others() {
+                let Some(b) = swarm.beliefs(u.id) else { continue };
+                let of = b.peers.get(&skein_peer::PeerId(peer)).map(|(_, s)| *s);
+                if of != Some(Status::Alive) {
+                    p.suspected = p.suspected.or(now);
+                }
+                if of == Some(Status::Down) {
+                    p.down = p.down.or(now);
+                }
+                let holds = b.relays && b.tasks.iter().any(|(id, _, _)| *id == says.task);
+                if !holds {
+                    continue;
+                }
+                p.given = p.given.or(now);
+                let pose = swarm.pose(u.id);
+                if pose.is_some_and(|pose| (pose.position() - lost).norm() <= THERE_M) {
+                    p.there = p.there.or(now);
+                }
+                if b.follows.is_some_and(|f| f.sees) {
+                    p.there = p.there.or(now);
+                    p.seen = p.seen.or(now);
+                }
+            }
+            if p.seen.is_some() {
+                break;
+            }
+        }
+        told.push(p);
+    }
+    told
+}
+
 /// Prints every five seconds what whoever follows says of it, and where vehicles are.
 fn watch(prepared: &Prepared, seed: u64, faults: Vec<TimedFault>) {
     let mut swarm = Swarm::new(prepared, seed, faults, false);
@@ -104,6 +195,7 @@ fn compare(n: u16, prepared: &Prepared, seeds: &Seeds, wrong: &str) {
     let (mut retaken, mut ratios, mut stand_off, mut place) = (vec![], vec![], vec![], vec![]);
     let (mut more, mut targets, mut lost) = (vec![], vec![], 0);
     let mut broken: BTreeMap<String, u64> = BTreeMap::new();
+    let mut after: Vec<Parts> = vec![];
     for seed in seeds.from..seeds.to {
         let own = prepared.spec.faults.clone();
         let (prepared, faults) = match wrong {
@@ -122,6 +214,10 @@ fn compare(n: u16, prepared: &Prepared, seeds: &Seeds, wrong: &str) {
         let without: Vec<TimedFault> = with.iter().filter(is_asked).cloned().collect();
         if std::env::var_os("WATCH").is_some() {
             watch(&prepared, seed, with.clone());
+        }
+        for p in parts(&prepared, seed, &with) {
+            println!("  seed {seed}: {p:?}");
+            after.push(p);
         }
         let plain = run(&prepared, seed, without, Wanted::default());
         let tasked = run(&prepared, seed, with, Wanted::default());
@@ -161,6 +257,32 @@ fn compare(n: u16, prepared: &Prepared, seeds: &Seeds, wrong: &str) {
         spread(&ratios),
         spread(&more),
         spread(&targets),
+    );
+    if !after.is_empty() {
+        print_parts(&after);
+    }
+}
+
+/// Where the time went, middle and most of each part, and how many had it in time.
+fn print_parts(all: &[Parts]) {
+    let of = |pick: &dyn Fn(&Parts) -> Option<f64>| {
+        let list: Vec<f64> = all.iter().filter_map(pick).collect();
+        format!("{} of {}", spread(&list), list.len())
+    };
+    let over = |p: &Parts| Some(p.seen? - p.bound);
+    let within = |s: f64| all.iter().filter(|p| p.seen.is_some_and(|x| x <= s)).count();
+    println!(
+        "  after {} deaths: nearest {} m off, suspected {}, down {}, given {}, there {}, in sight {}; bound {}, over it {}; within 10 s {}",
+        all.len(),
+        of(&|p| Some(p.away_m)),
+        of(&|p| p.suspected),
+        of(&|p| p.down),
+        of(&|p| Some(p.given? - p.down?)),
+        of(&|p| Some(p.there? - p.given?)),
+        of(&|p| Some(p.seen? - p.there?)),
+        of(&|p| Some(p.bound)),
+        of(&over),
+        within(10.0),
     );
 }
 

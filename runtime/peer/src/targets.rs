@@ -25,13 +25,13 @@ use crate::wire::target::{SPREAD_MAX_E3, TARGETS_MAX, Target};
 use crate::wire::tasks::TaskId;
 use skein_behaviors::Percept;
 use skein_flight::airframe::Airframe;
+use skein_flight::tracking::chance::ChanceMap;
 use skein_flight::tracking::estimate::{Detection, Estimate};
 use skein_flight::tracking::follower::TargetMotion;
 use skein_flight::tracking::fusion::{Board, Fused, Register};
 use skein_flight::tracking::told::Spread;
 use skein_flight::tracking::tracks::{Kind, Sighting, TargetName, Tracks};
-use skein_geometry::frame::{Point, Vector};
-use skein_geometry::math::{TAU, sin_cos};
+use skein_geometry::frame::{Point, Pose, Vector};
 use std::collections::BTreeMap;
 
 /// Density of the acceleration of targets, m²/s³: a car that brakes or turns off at 2.5 m/s²
@@ -79,14 +79,16 @@ const STRAYS_MOST_M: f64 = 250.0;
 /// After so long without sight it may be anywhere, seconds.
 const ANYWHERE_S: f64 = 60.0;
 
-/// Nobody saw it for so long: whoever follows flies out to look for it, seconds.
+/// Nobody saw it for so long: whoever follows looks for it, seconds.
 const SEARCH_S: f64 = 4.0;
 
-/// A search winds outwards at so many metres a second, slow enough to circle about, each turn so far from the last, no
-/// farther than this, metres, and then inwards and outwards again.
-const SEARCH_MPS: f64 = 6.0;
-const SEARCH_TURN_M: f64 = 90.0;
-const SEARCH_MOST_M: f64 = 250.0;
+/// Who searches takes note of what it looked at, and chooses where to look next, so often,
+/// milliseconds.
+const LOOK_MS: u64 = 1_000;
+
+/// A target that nobody has seen yet is about the task's place to this, a standard deviation in
+/// metres.
+const ABOUT_M: f64 = 75.0;
 
 /// Names that a UAV gives in one life before it comes to those of the next: one a second for
 /// an hour and more.
@@ -120,6 +122,17 @@ pub(crate) struct Followed {
     pub unseen_s: f64,
 }
 
+/// A search for a target that is out of sight.
+#[derive(Clone, Debug)]
+struct Search {
+    /// For which task, and when the target was seen last.
+    of: (Sought, u64),
+    map: ChanceMap,
+    looked_ms: u64,
+    /// Where to fly.
+    aim: Option<Point>,
+}
+
 /// Vehicles as one peer knows them.
 #[derive(Debug)]
 pub(crate) struct Targets {
@@ -137,6 +150,8 @@ pub(crate) struct Targets {
     /// What was said of when.
     said: BTreeMap<TargetName, u64>,
     said_at: Time,
+    /// Whom it looks for.
+    search: Option<Search>,
 }
 
 impl Targets {
@@ -153,6 +168,7 @@ impl Targets {
             subjects: [None; TARGETS_MAX as usize],
             said: BTreeMap::new(),
             said_at: Time(0),
+            search: None,
         }
     }
 
@@ -162,6 +178,7 @@ impl Targets {
         self.tracks = Tracks::new(self.me, DENSITY).named_from(first);
         self.hits.clear();
         self.said.clear();
+        self.search = None;
     }
 
     /// Takes in a look.
@@ -171,12 +188,7 @@ impl Targets {
         };
         self.now_ms = percept.time_ms;
         let look: Vec<Sighting> = percept.sightings.seen().map(sighting).collect();
-        let pose = percept.pose;
-        let in_view = |p: Point| {
-            let (forward, to) = (pose.direction(), p - pose.position());
-            let along = forward.dot(&to).abs() <= INNER * airframe.footprint_along_m;
-            along && forward.perp(&to).abs() <= INNER * airframe.footprint_across_m
-        };
+        let in_view = |p: Point| is_in_view(percept.pose, &airframe, p);
         self.tracks.look(self.now_ms, &look, &in_view);
         self.count_hits();
         let own: Vec<Register> = self.own().collect();
@@ -355,6 +367,43 @@ impl Targets {
         self.known(sought)
     }
 
+    /// Where to fly to have in view again whom nobody has seen for a while: what was known of it
+    /// last, or the place that was asked for, drives on, less where this UAV looked since.
+    pub fn look_for(
+        &mut self,
+        (sought, place, asked_s): (Sought, Point, f64),
+        percept: &Percept,
+        may_fly: &dyn Fn(Point) -> bool,
+    ) -> Option<TargetMotion> {
+        let airframe = self.flies?;
+        let last = self.bound.get(&sought).map(|b| b.last);
+        let since_ms = last.map_or(0, |l| l.seen_ms);
+        let goes_on = self.search.take().filter(|s| s.of == (sought, since_ms));
+        let mut search = goes_on.unwrap_or_else(|| Search {
+            of: (sought, since_ms),
+            map: first_map(last, place, self.now_ms, asked_s),
+            looked_ms: 0,
+            aim: None,
+        });
+        if search.looked_ms + LOOK_MS <= self.now_ms {
+            search.looked_ms = self.now_ms;
+            let from = percept.pose;
+            search.map.go_on(self.now_ms);
+            search.map.look(&|p| is_in_view(from, &airframe, p));
+            let speed_mps = airframe.cruise_mps;
+            let next = search.map.look_next(from.position(), speed_mps, may_fly);
+            search.aim = next;
+        }
+        let aim = search.aim;
+        self.search = Some(search);
+        aim.map(standing)
+    }
+
+    /// Whom it looked for is seen, or it looks for nobody.
+    pub fn end_search(&mut self) {
+        self.search = None;
+    }
+
     /// What is known of whom a task is bound to, if it is.
     pub fn known(&self, sought: Sought) -> Option<Followed> {
         let bound = self.bound.get(&sought)?;
@@ -437,44 +486,52 @@ impl Targets {
 }
 
 impl Followed {
-    /// Nothing is known but a place, where it was not for so long, seconds.
+    /// Nothing is known but a place.
     #[must_use]
-    pub fn nowhere(place: Point, for_s: f64) -> Self {
+    pub fn nowhere(place: Point) -> Self {
         Self {
-            motion: TargetMotion {
-                position: place,
-                velocity_mps: Vector::zeros(),
-                acceleration_mps2: Vector::zeros(),
-            },
-            unseen_s: SEARCH_S + for_s,
+            motion: standing(place),
+            unseen_s: f64::INFINITY,
         }
     }
 
-    /// Where to fly after it: to where it should be, and winding outwards from there the longer
-    /// nobody has seen it.
+    /// Whether whoever follows looks for it.
     #[must_use]
-    pub fn sought(&self) -> TargetMotion {
-        let on_s = self.unseen_s - SEARCH_S;
-        if on_s <= 0.0 {
-            return self.motion;
-        }
-        let whole_s = TAU / 2.0 * SEARCH_MOST_M * SEARCH_MOST_M / SEARCH_TURN_M / SEARCH_MPS;
-        let at = |s: f64| {
-            // Of a spiral with so much between its turns, flown at one speed, to and fro.
-            let s = s % (2.0 * whole_s);
-            let s = s.min(2.0 * whole_s - s).max(0.0);
-            let far_m = (SEARCH_TURN_M * SEARCH_MPS * s / (TAU / 2.0)).sqrt();
-            let (sin, cos) = sin_cos(TAU * far_m / SEARCH_TURN_M);
-            Vector::new(cos, sin) * far_m
-        };
-        let (here, then) = (at(on_s), at(on_s + 0.1));
-        let wound = (then - here) / 0.1;
-        let faster = (wound.norm() / SEARCH_MPS).max(1.0);
-        TargetMotion {
-            position: self.motion.position + here,
-            velocity_mps: self.motion.velocity_mps + wound / faster,
-            acceleration_mps2: Vector::zeros(),
-        }
+    pub fn is_lost(&self) -> bool {
+        self.unseen_s > SEARCH_S
+    }
+}
+
+/// Whether a place is in what counts of the picture of a camera.
+fn is_in_view(pose: Pose, airframe: &Airframe, p: Point) -> bool {
+    let (forward, to) = (pose.direction(), p - pose.position());
+    let along = forward.dot(&to).abs() <= INNER * airframe.footprint_along_m;
+    along && forward.perp(&to).abs() <= INNER * airframe.footprint_across_m
+}
+
+/// Where a target may be that was seen so last, or was to be about a place when it was asked
+/// for.
+fn first_map(last: Option<Fused>, place: Point, now_ms: u64, asked_s: f64) -> ChanceMap {
+    if let Some(f) = last {
+        let e = f.estimate;
+        return ChanceMap::new(e.time_ms, e.position(), e.spread_m(), e.velocity_mps());
+    }
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a cast of a float saturates"
+    )]
+    let asked_ms = (asked_s * 1000.0) as u64;
+    let begun_ms = now_ms.saturating_sub(asked_ms);
+    ChanceMap::new(begun_ms, place, ABOUT_M, Vector::zeros())
+}
+
+/// A target that stands.
+pub(crate) fn standing(position: Point) -> TargetMotion {
+    TargetMotion {
+        position,
+        velocity_mps: Vector::zeros(),
+        acceleration_mps2: Vector::zeros(),
     }
 }
 

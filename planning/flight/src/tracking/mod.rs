@@ -13,6 +13,7 @@
 //! | [`estimate`] | position and velocity of a target from detections | 3.7.1 |
 //! | [`tracks`] | several targets, false alarms, targets lost and found | 3.7 |
 //! | [`told`] | estimates in few numbers, for the radio | 3.7 |
+//! | [`chance`] | where a target that is out of sight may be, and where to look for it | 3.7 |
 //! | [`fusion`] | what all UAVs know of a target together | 3.7 |
 //! | [`handover`] | who follows which target | 3.7 |
 //!
@@ -20,6 +21,7 @@
 //! caller keeps.
 
 pub mod bend;
+pub mod chance;
 pub mod estimate;
 pub mod field;
 pub mod flyable;

@@ -3,9 +3,9 @@
 //!
 //! | what is known of the target | what is flown | what is said |
 //! |---|---|---|
-//! | nothing | the circle round the task's place, and outwards from there | nothing |
+//! | nothing | the circle round the task's place, and from there where most chance of it is soonest looked at | nothing |
 //! | where it may be, and that is not near | a circle round that | nothing |
-//! | where it may be, and that is near | after it, winding outwards the longer nobody sees it | once it had seen it: it searches |
+//! | where it may be, and that is near | after it, or where most chance of it is soonest looked at | once it had seen it: it searches |
 //! | it is seen | after it | it follows; the first time the task is begun |
 //! | it is beyond the reach of the mission | at the edge of that | as above |
 
@@ -59,8 +59,6 @@ pub struct Follows {
 pub(super) struct Sight {
     /// Whether it was said that it follows, and not since that it searches.
     pub follows: bool,
-    /// Since when it has been where the target was to be, milliseconds of percepts.
-    pub awaits_ms: Option<u64>,
 }
 
 impl Task {
@@ -131,22 +129,22 @@ impl Tasking {
         let (Some(executive), Some(relay)) = (&mut state.executive, &mut state.relay) else {
             return false;
         };
-        // Where nothing is known it is looked for from the circle round the place outwards.
-        let Some(held) = self.flown.as_mut().and_then(|f| f.held.as_mut()) else {
+        if self.flown.as_ref().is_none_or(|f| f.held.is_none()) {
             return false;
-        };
-        if executive.is_on_circle() {
-            held.sight.awaits_ms.get_or_insert(percept.time_ms);
         }
-        let awaited = held.sight.awaits_ms;
-        let nowhere = || {
-            let for_s = seconds(percept.time_ms.saturating_sub(awaited?));
-            Some(Followed::nowhere(place, for_s))
+        let mission = &state.geometry.mission;
+        let followed = followed.unwrap_or_else(|| Followed::nowhere(place));
+        let motion = if followed.is_lost() {
+            let (base, reach_m) = (mission.base_m(), mission.reach_m());
+            let may_fly = |p: Point| (p - base).norm() <= reach_m;
+            let looked_for = (sought, place, asked_s);
+            let next = self.targets.look_for(looked_for, percept, &may_fly);
+            next.unwrap_or(followed.motion)
+        } else {
+            self.targets.end_search();
+            followed.motion
         };
-        let Some(followed) = followed.or_else(nowhere) else {
-            return false;
-        };
-        let motion = within_reach(followed.sought(), &state.geometry.mission);
+        let motion = within_reach(motion, mission);
         let away_m = (motion.position - percept.pose.position()).norm();
         let is_near = relay.follow.is_some() || away_m <= NEAR_M || executive.is_on_circle();
         let follow = (sees || is_near).then_some(stand_off_m);
