@@ -1,7 +1,8 @@
 //! Targets that are followed in a mission, beside the same runs without the operator:
 //! `cargo run -p skein-scenario --example tracks -- track 1,3,8 0..20 deaths`.
 //!
-//! The arguments are a scenario, numbers of UAVs, seeds, and what goes wrong meanwhile: `none`,
+//! The arguments are a scenario, numbers of UAVs, seeds, what goes wrong meanwhile, and how many
+//! UAVs are asked to stay with each target (1). What goes wrong: `none`,
 //! `deaths` (whoever follows is killed, twice at most, 150 and 350 s after the beginning) or
 //! `storm` (what the storm of the seed draws). Prints a line a run, and one a number of UAVs:
 //! the share of time in sight, how far off its stand-off and its place, the time from a loss
@@ -37,7 +38,11 @@ fn main() -> ExitCode {
             ..Overrides::default()
         };
         match open(Some(&arg(0, "track")), &over) {
-            Ok(scenario) => compare(n, &Prepared::new(scenario.spec), &seeds, &arg(3, "none")),
+            Ok(mut scenario) => {
+                let beside = arg(4, "1").parse().unwrap_or(1);
+                watched_by(&mut scenario.spec.faults, beside);
+                compare(n, &Prepared::new(scenario.spec), &seeds, &arg(3, "none"));
+            }
             Err(e) => {
                 eprintln!("{e}");
                 return ExitCode::from(2);
@@ -45,6 +50,26 @@ fn main() -> ExitCode {
         }
     }
     ExitCode::SUCCESS
+}
+
+/// Asks for so many UAVs for each target: tasks at one place are of one target.
+fn watched_by(faults: &mut Vec<TimedFault>, watchers: u32) {
+    let mut more = Vec::new();
+    for fault in faults.iter() {
+        let Fault::AddTask { task } = &fault.fault else {
+            continue;
+        };
+        for nth in 2..=watchers {
+            let mut task = task.clone();
+            task.name = task.name.map(|name| format!("{name}.{nth}"));
+            more.push(TimedFault {
+                at_ms: fault.at_ms,
+                fault: Fault::AddTask { task },
+            });
+        }
+    }
+    faults.extend(more);
+    faults.sort_by_key(|f| f.at_ms);
 }
 
 /// Kills of whoever follows at those times, found by flying until then.
@@ -193,7 +218,7 @@ fn compare(n: u16, prepared: &Prepared, seeds: &Seeds, wrong: &str) {
     let free_ms = failure_free_makespan_ms(prepared);
     let (mut wanted, mut sight, mut runs, mut completed) = (0, 0, 0_u32, 0_u32);
     let (mut retaken, mut ratios, mut stand_off, mut place) = (vec![], vec![], vec![], vec![]);
-    let (mut more, mut targets, mut lost) = (vec![], vec![], 0);
+    let (mut more, mut targets, mut lost, mut twice) = (vec![], vec![], 0, 0);
     let mut broken: BTreeMap<String, u64> = BTreeMap::new();
     let mut after: Vec<Parts> = vec![];
     for seed in seeds.from..seeds.to {
@@ -232,6 +257,7 @@ fn compare(n: u16, prepared: &Prepared, seeds: &Seeds, wrong: &str) {
             let Some(tracked) = &t.tracked else { continue };
             wanted += tracked.wanted_ms;
             sight += tracked.sight_ms;
+            twice += tracked.twice_ms;
             lost += t.lost;
             retaken.extend(tracked.retaken_ms.iter().map(|ms| *ms as f64 / 1e3));
             if tracked.sight_ms > 0 {
@@ -247,9 +273,10 @@ fn compare(n: u16, prepared: &Prepared, seeds: &Seeds, wrong: &str) {
         targets.push(bytes(&tasked, Some("target")) as f64 * 8.0 / lasted_s.max(1.0));
     }
     println!(
-        "{n} UAVs, {wrong}: {completed} of {runs} complete, in sight {:.1} % of {} s, lost {lost} times, {:.1} m off the stand-off, {:.1} m off its place, had again after {} losses: {}, makespan {}, bytes {}, targets {} bit/s, broken {broken:?}",
+        "{n} UAVs, {wrong}: {completed} of {runs} complete, in sight {:.1} % of {} s (of two {:.1} %), lost {lost} times, {:.1} m off the stand-off, {:.1} m off its place, had again after {} losses: {}, makespan {}, bytes {}, targets {} bit/s, broken {broken:?}",
         100.0 * sight as f64 / wanted.max(1) as f64,
         wanted / 1000,
+        100.0 * twice as f64 / wanted.max(1) as f64,
         middle(&stand_off),
         middle(&place),
         retaken.len(),

@@ -347,6 +347,15 @@ impl Targets {
         self.bound.insert(sought, bound);
     }
 
+    /// Whom one task was bound to goes by another from now on, unless that is bound already.
+    pub fn goes_by(&mut self, before: Sought, task: Sought) {
+        if let Some(bound) = self.bound.remove(&before)
+            && !self.bound.contains_key(&task)
+        {
+            self.bind(task, bound);
+        }
+    }
+
     /// What is known of whom a task is bound to, asked for so many seconds ago; bound to what is seen nearest to its place, if
     /// it is bound to nothing yet.
     pub fn follow(&mut self, sought: Sought, place: Point, asked_s: f64) -> Option<Followed> {

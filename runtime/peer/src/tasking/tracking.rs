@@ -8,6 +8,9 @@
 //! | where it may be, and that is near | after it, or where most chance of it is soonest looked at | once it had seen it: it searches |
 //! | it is seen | after it | it follows; the first time the task is begun |
 //! | it is beyond the reach of the mission | at the edge of that | as above |
+//!
+//! Several tasks of one author with one place are of one target: as many UAVs stay with it, and
+//! all that is known and said of it goes by the first of these tasks.
 
 use super::Tasking;
 use crate::input::Time;
@@ -57,6 +60,8 @@ pub struct Follows {
 /// What was said of sight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Sight {
+    /// By which task its target goes.
+    pub of: Option<Sought>,
     /// Whether it was said that it follows, and not since that it searches.
     pub follows: bool,
 }
@@ -98,7 +103,21 @@ impl Tasking {
     pub(super) fn sought(&self) -> Option<Sought> {
         let flown = self.flown.as_ref()?;
         let task = &self.known.get(&flown.id)?.task;
-        (task.kind == TaskKind::Track).then_some((flown.id, flown.revision))
+        let tracks = task.kind == TaskKind::Track;
+        tracks.then(|| self.first_of((flown.id, flown.revision), task))
+    }
+
+    /// Tasks of one author to follow what is at one place are of one target: it goes by the
+    /// first of them that is open.
+    fn first_of(&self, own: Sought, task: &Task) -> Sought {
+        let author = own.0.author;
+        let from = TaskId { author, number: 0 };
+        let mut before = self.known.range(from..own.0).filter(|(_, k)| {
+            k.is_open() && k.task.kind == TaskKind::Track && k.task.places == task.places
+        });
+        before
+            .next()
+            .map_or(own, |(id, k)| (*id, k.task.revision))
     }
 
     /// Whether somebody is to be followed.
@@ -113,6 +132,13 @@ impl Tasking {
         let (Some(sought), Some(airframe)) = (self.sought(), self.flies) else {
             return false;
         };
+        if let Some(held) = self.flown.as_mut().and_then(|f| f.held.as_mut()) {
+            // The first task of its target was heard of since, or is over.
+            let before = held.sight.of.replace(sought).filter(|b| *b != sought);
+            if let Some(before) = before {
+                self.targets.goes_by(before, sought);
+            }
+        }
         let Some(known) = self.known.get(&sought.0) else {
             return false;
         };
@@ -209,8 +235,10 @@ impl Tasking {
 
     /// The task as it is flown to: a target at the place where it is by now, as far as is known.
     pub(super) fn as_flown(&self, sought: Sought, task: &Task, mission: &Mission) -> Task {
-        let known = self.targets.known(sought);
-        let Some(known) = known.filter(|_| task.kind == TaskKind::Track) else {
+        if task.kind != TaskKind::Track {
+            return task.clone();
+        }
+        let Some(known) = self.targets.known(self.first_of(sought, task)) else {
             return task.clone();
         };
         let at = within_reach(known.motion, mission).position;
