@@ -137,7 +137,9 @@ fn parts(prepared: &Prepared, seed: u64, faults: &[TimedFault]) -> Vec<Parts> {
         };
         let others = || prepared.spec.uavs.iter().filter(|u| u.id != peer);
         for u in others() {
-            let Some(pose) = swarm.pose(u.id) else { continue };
+            let Some(pose) = swarm.pose(u.id) else {
+                continue;
+            };
             let away_m = (pose.position() - lost).norm();
             let flown_m = (away_m - u.airframe.footprint_across_m).max(0.0);
             p.away_m = p.away_m.min(away_m);
@@ -147,7 +149,9 @@ fn parts(prepared: &Prepared, seed: u64, faults: &[TimedFault]) -> Vec<Parts> {
             swarm.run_until(fault.at_ms + step * 500);
             let now = Some(step as f64 / 2.0);
             for u in others() {
-                let Some(b) = swarm.beliefs(u.id) else { continue };
+                let Some(b) = swarm.beliefs(u.id) else {
+                    continue;
+                };
                 let of = b.peers.get(&skein_peer::PeerId(peer)).map(|(_, s)| *s);
                 if of != Some(Status::Alive) {
                     p.suspected = p.suspected.or(now);
@@ -297,7 +301,11 @@ fn print_parts(all: &[Parts]) {
         format!("{} of {}", spread(&list), list.len())
     };
     let over = |p: &Parts| Some(p.seen? - p.bound);
-    let within = |s: f64| all.iter().filter(|p| p.seen.is_some_and(|x| x <= s)).count();
+    let within = |s: f64| {
+        all.iter()
+            .filter(|p| p.seen.is_some_and(|x| x <= s))
+            .count()
+    };
     println!(
         "  after {} deaths: nearest {} m off, suspected {}, down {}, given {}, there {}, in sight {}; bound {}, over it {}; within 10 s {}",
         all.len(),

@@ -72,6 +72,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/track.json5"),
     ),
     (
+        "tracks",
+        "tracks.json5",
+        include_str!("../../../configs/trials/tracks.json5"),
+    ),
+    (
         "swarm_20",
         "swarm_20.json5",
         include_str!("../../../configs/trials/swarm_20.json5"),

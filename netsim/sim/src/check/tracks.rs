@@ -384,4 +384,37 @@ mod tests {
         assert_eq!((told.wanted_ms, told.sight_ms), (49_000, 25_000));
         assert!(told.words().contains("had again 25 s after a loss"));
     }
+
+    #[test]
+    fn who_is_asked_for_beside_another_counts_for_the_same_target() {
+        let (mut check, mut found) = (TrackCheck::default(), Findings::new(1));
+        let beside = AskedTask {
+            number: 4,
+            ..asked(1, TaskState::Open)
+        };
+        for t in 1..=30 {
+            check.on_asked(&asked(1, TaskState::Open));
+            check.on_asked(&beside);
+            // The first dies after twenty seconds.
+            let looks: Vec<Look> = [1, 2]
+                .into_iter()
+                .filter(|uav| *uav == 2 || t <= 20)
+                .map(|uav| look(uav, 0, true, &[0]))
+                .collect();
+            check.on_looks(t * 1000, &[Point::origin()], &looks, &mut found);
+        }
+        let told: Vec<Tracked> = check.tracked().map(|(_, t)| t.clone()).collect();
+        assert_eq!(told.len(), 1);
+        assert_eq!((told[0].sight_ms, told[0].twice_ms), (29_000, 19_000));
+        assert_eq!(told[0].retaken_ms, [1_000]);
+        assert!(told[0].words().contains("by two for 19 s"));
+        // At another place it is another target.
+        let mut other = beside.clone();
+        other.task.places = vec![TaskPlace {
+            east_mm: 9,
+            north_mm: 9,
+        }];
+        check.on_asked(&other);
+        assert_eq!(check.tracked().count(), 2);
+    }
 }

