@@ -32,7 +32,7 @@ use skein_flight::tracking::fusion::{Board, Fused, Register};
 use skein_flight::tracking::told::Spread;
 use skein_flight::tracking::tracks::{Kind, Sighting, TargetName, Tracks};
 use skein_geometry::frame::{Point, Pose, Vector};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Density of the acceleration of targets, m²/s³: a car that brakes or turns off at 2.5 m/s²
 /// for some three seconds, a quarter of the time.
@@ -81,6 +81,14 @@ const ANYWHERE_S: f64 = 60.0;
 
 /// Nobody saw it for so long: whoever follows looks for it, seconds.
 const SEARCH_S: f64 = 4.0;
+
+/// Ways that were driven on are known in squares of this side, metres, and so many of them: all
+/// streets of two square kilometres of a city.
+const WAY_M: f64 = 25.0;
+const WAYS_MAX: usize = 2_048;
+
+/// Who is told to move so fast drives, m/s: errors of speed are less.
+const DRIVES_MPS: f64 = 3.0;
 
 /// Who searches takes note of what it looked at, and chooses where to look next, so often,
 /// milliseconds.
@@ -152,6 +160,9 @@ pub(crate) struct Targets {
     said_at: Time,
     /// Whom it looks for.
     search: Option<Search>,
+    /// Squares of [`WAY_M`] where vehicles were seen to drive, by whomever: since missions bring
+    /// no streets, these are what is known of them.
+    ways: BTreeSet<(i16, i16)>,
 }
 
 impl Targets {
@@ -169,6 +180,7 @@ impl Targets {
             said: BTreeMap::new(),
             said_at: Time(0),
             search: None,
+            ways: BTreeSet::new(),
         }
     }
 
@@ -214,9 +226,20 @@ impl Targets {
             self.board.put(r);
         }
         self.board.forget(self.now_ms.saturating_sub(TOLD_MS));
+        self.learn_ways();
         self.said
             .retain(|_, seen_ms| *seen_ms + TOLD_MS >= self.now_ms);
         self.keep_in_mind();
+    }
+
+    /// Where vehicles drive is where ways are.
+    fn learn_ways(&mut self) {
+        for r in self.board.registers() {
+            let drives = r.estimate.velocity_mps().norm() >= DRIVES_MPS;
+            if drives && self.ways.len() < WAYS_MAX {
+                self.ways.insert(way_square(r.estimate.position()));
+            }
+        }
     }
 
     /// Notes which of its own targets the last look told.
@@ -387,10 +410,20 @@ impl Targets {
         let airframe = self.flies?;
         let last = self.bound.get(&sought).map(|b| b.last);
         let since_ms = last.map_or(0, |l| l.seen_ms);
+        let ways = &self.ways;
+        // A way is as wide as a square, and what is known of it ends between two looks.
+        let is_driven = |p: Point| {
+            let (east, north) = way_square(p);
+            let near = |n: i16| n.saturating_sub(1)..=n.saturating_add(1);
+            near(east).any(|e| near(north).any(|n| ways.contains(&(e, n))))
+        };
         let goes_on = self.search.take().filter(|s| s.of == (sought, since_ms));
         let mut search = goes_on.unwrap_or_else(|| Search {
             of: (sought, since_ms),
-            map: first_map(last, place, self.now_ms, asked_s),
+            map: match first_map(last, place, self.now_ms, asked_s) {
+                map if ways.is_empty() => map,
+                map => map.on_ways(&is_driven),
+            },
             looked_ms: 0,
             aim: None,
         });
@@ -482,7 +515,7 @@ impl Targets {
     }
 
     /// How many registers and tasks are kept, with their caps.
-    pub fn loads(&self) -> [(&'static str, usize, usize); 2] {
+    pub fn loads(&self) -> [(&'static str, usize, usize); 3] {
         [
             (
                 "targets",
@@ -490,6 +523,7 @@ impl Targets {
                 skein_flight::tracking::fusion::MOST_REGISTERS,
             ),
             ("followed", self.bound.len(), BOUND_MAX),
+            ("ways", self.ways.len(), WAYS_MAX),
         ]
     }
 }
@@ -509,6 +543,16 @@ impl Followed {
     pub fn is_lost(&self) -> bool {
         self.unseen_s > SEARCH_S
     }
+}
+
+/// The square of a way at a place.
+fn way_square(p: Point) -> (i16, i16) {
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "a cast of a float saturates"
+    )]
+    let nth = |m: f64| (m / WAY_M).floor() as i16;
+    (nth(p.x), nth(p.y))
 }
 
 /// Whether a place is in what counts of the picture of a camera.

@@ -37,6 +37,10 @@ const SEARCHES_MS: u64 = 5_000;
 /// way round the zones is planned.
 const NEAR_M: f64 = 250.0;
 
+/// Nobody searches farther outside of the box of the area than this, metres: as far as a car
+/// is that turns round at its edge.
+const AROUND_M: f64 = 100.0;
+
 /// The stand-off, as a share of how far the camera sees to either side: what is asked for if
 /// nothing is, and the most.
 const STAND_OFF: f64 = 0.5;
@@ -96,6 +100,20 @@ fn within_reach(motion: TargetMotion, mission: &Mission) -> TargetMotion {
         velocity_mps: Vector::zeros(),
         acceleration_mps2: Vector::zeros(),
     }
+}
+
+/// The box that is searched: that of the area, and a little around it.
+fn searched(mission: &Mission) -> (Point, Point) {
+    let corners = mission.area_m();
+    let first = corners.first().copied().unwrap_or_else(|| mission.base_m());
+    let (low, high) = corners.iter().fold((first, first), |(low, high), p| {
+        (
+            Point::new(low.x.min(p.x), low.y.min(p.y)),
+            Point::new(high.x.max(p.x), high.y.max(p.y)),
+        )
+    });
+    let around = Vector::new(AROUND_M, AROUND_M);
+    (low - around, high + around)
 }
 
 impl Tasking {
@@ -160,7 +178,12 @@ impl Tasking {
         let followed = followed.unwrap_or_else(|| Followed::nowhere(place));
         let motion = if followed.is_lost() {
             let (base, reach_m) = (mission.base_m(), mission.reach_m());
-            let may_fly = |p: Point| (p - base).norm() <= reach_m;
+            let (low, high) = searched(mission);
+            let may_fly = |p: Point| {
+                let near = (p - followed.motion.position).norm() <= NEAR_M;
+                let inside = near || low.x <= p.x && p.x <= high.x && low.y <= p.y && p.y <= high.y;
+                inside && (p - base).norm() <= reach_m
+            };
             let looked_for = (sought, place, asked_s);
             let next = self.targets.look_for(looked_for, percept, &may_fly);
             next.unwrap_or(followed.motion)
