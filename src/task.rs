@@ -268,13 +268,14 @@ fn asked(add: &Add, origin: Origin) -> Result<NewTask, Refusal> {
 }
 
 /// What is asked for once for each UAV that is to stay with a target: tasks of one place are of
-/// one target.
+/// one target. Who stays beside is worth half: a target that nobody follows goes before.
 fn for_all_watchers(add: &Add, task: NewTask) -> Vec<NewTask> {
     let Add::Track { watchers, .. } = add else {
         return vec![task];
     };
     let beside = (2..=*watchers).map(|nth| NewTask {
         name: task.name.as_ref().map(|name| format!("{name}.{nth}")),
+        worth: (task.worth / 2).max(1),
         ..task.clone()
     });
     core::iter::once(task.clone()).chain(beside).collect()
@@ -379,6 +380,7 @@ mod tests {
         };
         let both = for_all_watchers(&add, asked(&add, ORIGIN).unwrap());
         assert_eq!(both[0].places, both[1].places);
+        assert_eq!([both[0].worth, both[1].worth], [100, 50]);
         let names: Vec<_> = both.into_iter().filter_map(|t| t.name).collect();
         assert_eq!(names, ["car", "car.2"]);
         assert!(added("task add point -33,-70").unwrap_err().contains("km"));

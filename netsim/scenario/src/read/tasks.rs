@@ -116,7 +116,8 @@ pub(crate) fn added(node: &Node<'_>) -> Result<Fault, Error> {
 }
 
 /// What is asked for once for each UAV that is to stay with a target (`watchers`): tasks of
-/// one place are of one target.
+/// one place are of one target. Who stays beside is worth half: a target that nobody follows
+/// goes before.
 pub(crate) fn for_all_watchers(node: &Node<'_>, fault: Fault) -> Result<Vec<Fault>, Error> {
     let Fault::AddTask { task } = fault else {
         return Ok(vec![fault]);
@@ -129,6 +130,7 @@ pub(crate) fn for_all_watchers(node: &Node<'_>, fault: Fault) -> Result<Vec<Faul
         n.whole(1, WATCHERS_MAX, "UAVs that follow one target")
     })?;
     let name = task.name.clone().unwrap_or_default();
+    let beside = |worth: u16| (worth / 2).max(1);
     let nth = |nth: u32| match nth {
         1 => Ok(Fault::AddTask { task: task.clone() }),
         _ => {
@@ -138,6 +140,7 @@ pub(crate) fn for_all_watchers(node: &Node<'_>, fault: Fault) -> Result<Vec<Faul
             }
             let task = NewTask {
                 name: Some(name),
+                worth: beside(task.worth),
                 ..task.clone()
             };
             Ok(Fault::AddTask { task })
@@ -212,11 +215,14 @@ mod tests {
         let beside = format!("[{{ at_s: 9, task_add: {{ id: 'car', {beside} }} }}]");
         let beside = asked(&beside, "").unwrap().spec.faults;
         let named = beside.iter().filter_map(|f| match &f.fault {
-            Fault::AddTask { task } => Some((task.name.clone()?, task.places[0])),
+            Fault::AddTask { task } => Some((task.name.clone()?, task.places[0], task.worth)),
             _ => None,
         });
         let place = (300_000, 200_000);
-        let both = [("car".to_owned(), place), ("car.2".to_owned(), place)];
+        let both = [
+            ("car".to_owned(), place, 100),
+            ("car.2".to_owned(), place, 50),
+        ];
         assert_eq!(named.collect::<Vec<_>>(), both);
         let carriers = scenario.spec.uavs.iter().filter(|u| u.carries(2)).count();
         assert_eq!((carriers, scenario.spec.uavs.len()), (4, 8));

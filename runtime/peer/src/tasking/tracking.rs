@@ -181,8 +181,8 @@ impl Tasking {
             let (low, high) = searched(mission);
             let may_fly = |p: Point| {
                 let near = (p - followed.motion.position).norm() <= NEAR_M;
-                let inside = near || low.x <= p.x && p.x <= high.x && low.y <= p.y && p.y <= high.y;
-                inside && (p - base).norm() <= reach_m
+                let inside = low.x <= p.x && p.x <= high.x && low.y <= p.y && p.y <= high.y;
+                (near || inside) && (p - base).norm() <= reach_m
             };
             let looked_for = (sought, place, asked_s);
             let next = self.targets.look_for(looked_for, percept, &may_fly);
