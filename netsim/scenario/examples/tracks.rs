@@ -159,7 +159,10 @@ fn parts(prepared: &Prepared, seed: u64, faults: &[TimedFault]) -> Vec<Parts> {
                 if of == Some(Status::Down) {
                     p.down = p.down.or(now);
                 }
-                let holds = b.relays && b.tasks.iter().any(|(id, _, _)| *id == says.task);
+                // Who stays beside holds a task of its own.
+                let beside = b.follows.is_some_and(|f| f.task == says.task);
+                let holds = beside || b.tasks.iter().any(|(id, _, _)| *id == says.task);
+                let holds = b.relays && holds;
                 if !holds {
                     continue;
                 }
