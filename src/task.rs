@@ -111,6 +111,10 @@ pub enum Add {
         /// How far from it a UAV stays; without it half of what its camera sees to either side.
         #[arg(long, value_name = "METRES", value_parser = radius_m)]
         stand_off_m: Option<f64>,
+        /// How many UAVs stay with it, so that it is not lost with one of them: each is a task
+        /// of its own, `NAME.2` and so on.
+        #[arg(long, value_name = "UAVS", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=4))]
+        watchers: u8,
         /// What it is worth, next to other tasks.
         #[arg(long, value_name = "WORTH", default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=i64::from(WORTH_MAX)))]
         worth: u16,
@@ -169,7 +173,13 @@ pub fn run(args: &TaskArgs) -> anyhow::Result<ExitCode> {
     let origin = origin(&overview);
     match &args.what {
         What::Add(add) => match asked(add, origin) {
-            Ok(task) => say(&args.at, &Command::Task(TaskEdit::Add(task))),
+            Ok(task) => {
+                let mut code = ExitCode::from(exit::OK);
+                for task in for_all_watchers(add, task) {
+                    code = say(&args.at, &Command::Task(TaskEdit::Add(task)))?;
+                }
+                Ok(code)
+            }
             Err(refusal) => Ok(refusal.told()),
         },
         What::List { json: true } => {
@@ -216,6 +226,7 @@ fn asked(add: &Add, origin: Origin) -> Result<NewTask, Refusal> {
             stand_off_m,
             worth,
             id,
+            watchers: _,
         } => {
             return Ok(NewTask {
                 name: id.clone(),
@@ -254,6 +265,20 @@ fn asked(add: &Add, origin: Origin) -> Result<NewTask, Refusal> {
         within_ms: how.within_s.map(|s| s * 1000),
         sensor: how.needs.as_deref().and_then(sensor_of_name).unwrap_or(0),
     })
+}
+
+/// What is asked for once for each UAV that is to stay with a target: tasks of one place are of
+/// one target. Who stays beside is worth half: a target that nobody follows goes before.
+fn for_all_watchers(add: &Add, task: NewTask) -> Vec<NewTask> {
+    let Add::Track { watchers, .. } = add else {
+        return vec![task];
+    };
+    let beside = (2..=*watchers).map(|nth| NewTask {
+        name: task.name.as_ref().map(|name| format!("{name}.{nth}")),
+        worth: (task.worth / 2).max(1),
+        ..task.clone()
+    });
+    core::iter::once(task.clone()).chain(beside).collect()
 }
 
 fn as_json(task: &TaskView, origin: Origin) -> Value {
@@ -349,6 +374,15 @@ mod tests {
         let relay = added("task add relay 60.001,25 --for 300 --id link").unwrap();
         assert_eq!((relay.kind, relay.radius_mm), (TaskKind::Relay, 100_000));
         assert_eq!((relay.within_ms, relay.places.len()), (Some(300_000), 1));
+        let cli = Cli::try_parse_from(typed("task add track 60,25 --watchers 2 --id car"));
+        let What::Add(add) = cli.unwrap().task.what else {
+            panic!("a task is added");
+        };
+        let both = for_all_watchers(&add, asked(&add, ORIGIN).unwrap());
+        assert_eq!(both[0].places, both[1].places);
+        assert_eq!([both[0].worth, both[1].worth], [100, 50]);
+        let names: Vec<_> = both.into_iter().filter_map(|t| t.name).collect();
+        assert_eq!(names, ["car", "car.2"]);
         assert!(added("task add point -33,-70").unwrap_err().contains("km"));
         for wrong in [
             "task add",
@@ -362,6 +396,7 @@ mod tests {
             "task add area 60,25 60.001,25",
             "task add relay 60,25 60,26",
             "task add relay 60,25 --within-s 60",
+            "task add track 60,25 --watchers 0",
             "task cancel",
         ] {
             assert!(added(wrong).is_err(), "{wrong}");

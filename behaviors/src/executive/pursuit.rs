@@ -20,6 +20,7 @@ use crate::executive::camera::Played;
 use crate::percept::Percept;
 use crate::reactive::follow::HORIZON_S;
 use crate::setpoint::{MAX_STEPS, Setpoint, Steer};
+use skein_flight::tracking::aside::aside;
 use skein_flight::tracking::bend::Guard;
 use skein_flight::tracking::field::Field;
 use skein_flight::tracking::follower::{Command, Follower, Settings, StandOff, TargetMotion};
@@ -39,6 +40,10 @@ const NEARER_M: f64 = 0.2;
 
 /// A command of the law lasts so long, milliseconds.
 const COMMAND_MS: u32 = 50;
+
+/// Farthest that a circle is moved aside from its target, as a share of what the camera sees
+/// to either side: with the usual stand-off, of half of that, the target stays in its picture.
+const ASIDE: f64 = 0.4;
 
 /// Longest time for which the law's own state goes on between two percepts, seconds.
 const LATE_S: f64 = 2.0;
@@ -111,7 +116,14 @@ impl Executive {
         let quarry = pursuit.quarry?;
         let wind = Wind::new(percept.wind_east_mps, percept.wind_north_mps);
         let since_s = |ms: u64| seconds(percept.time_ms.saturating_sub(ms)).min(LATE_S);
-        let target = quarry.motion.after(since_s(quarry.at_ms));
+        let mut target = quarry.motion.after(since_s(quarry.at_ms));
+        let zones = self.transit.router.zones();
+        // Where zones take a part of its circle, the circle lies aside from them.
+        if let StandOff::Distance(stand_off_m) = pursuit.follower.settings().stand_off {
+            let wanted_m = guarded_m(&self.transit, f64::INFINITY) + stand_off_m;
+            let most_m = ASIDE * self.transit.airframe.footprint_across_m;
+            target.position += aside(target.position, zones, wanted_m, most_m);
+        }
         // The state of the law goes on by the time that has passed, and what is to come is
         // flown by a copy: percepts may be late.
         if let Some(flown_ms) = pursuit.flown_ms.replace(percept.time_ms) {
@@ -119,7 +131,6 @@ impl Executive {
             let follower = &mut pursuit.follower;
             follower.commands(percept.pose, wind, &target, passed_s, None);
         }
-        let zones = self.transit.router.zones();
         let guard = Guard {
             zones,
             clearance_m: guarded_m(&self.transit, zones.distance_m(percept.pose.position())),

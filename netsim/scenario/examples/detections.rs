@@ -1,7 +1,7 @@
 //! Missions that look for something besides what they are to see, run by run: what was told, by
 //! whom, how soon and how far off, and for how long it was followed.
 //!
-//! `cargo run --release -p skein-scenario --example detections -- watchers,search 1,3,8 0..10 storm`
+//! `cargo run --release -p skein-scenario --example detections -- lookout,search 1,3,8 0..10 storm`
 //!
 //! Faults are `none` or what the `storm` of the seed draws.
 
@@ -19,7 +19,7 @@ fn main() -> ExitCode {
     };
     let lines = args.iter().any(|a| a == "timeline");
     let mut passed = true;
-    for name in arg(0, "watchers,search").split(',') {
+    for name in arg(0, "lookout,search").split(',') {
         for n in arg(1, "1,3,8").split(',').filter_map(|n| n.parse().ok()) {
             let over = Overrides {
                 peers: Some(n),

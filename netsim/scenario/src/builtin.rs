@@ -82,9 +82,14 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/track.json5"),
     ),
     (
-        "watchers",
-        "watchers.json5",
-        include_str!("../../../configs/trials/watchers.json5"),
+        "lookout",
+        "lookout.json5",
+        include_str!("../../../configs/trials/lookout.json5"),
+    ),
+    (
+        "tracks",
+        "tracks.json5",
+        include_str!("../../../configs/trials/tracks.json5"),
     ),
     (
         "swarm_20",

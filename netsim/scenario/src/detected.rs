@@ -30,7 +30,7 @@ fn passed(outcome: &Outcome) {
 
 #[test]
 fn what_drives_is_followed_until_services_are_there_and_what_else_drives_is_told() {
-    let outcome = flown("watchers", 3, 2);
+    let outcome = flown("lookout", 3, 2);
     passed(&outcome);
     let told = &outcome.report.detections;
     let of = |looks: &'static str| told.iter().filter(move |d| d.looks == looks);

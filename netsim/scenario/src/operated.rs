@@ -90,12 +90,31 @@ fn an_area_is_seen_in_one_flight_and_what_is_told_of_it_is_true() {
 
 /// The track trial with so many UAVs: as it is, or with whoever follows at these times killed.
 fn tracked(uavs: u16, seed: u64, killed_at_ms: &[u64]) -> Outcome {
+    tracked_by(uavs, 1, seed, killed_at_ms)
+}
+
+/// Likewise, with so many UAVs asked for to stay with the car.
+fn tracked_by(uavs: u16, watchers: u32, seed: u64, killed_at_ms: &[u64]) -> Outcome {
     let over = Overrides {
         peers: Some(uavs),
         ..Overrides::default()
     };
     let prepared = Prepared::new(load_builtin("track", &over).unwrap().spec);
     let mut faults = prepared.spec.faults.clone();
+    let asked = faults.iter().find_map(|f| match &f.fault {
+        Fault::AddTask { task } => Some((f.at_ms, task.clone())),
+        _ => None,
+    });
+    let (asked_ms, task) = asked.unwrap();
+    faults.extend((2..=watchers).map(|nth| TimedFault {
+        at_ms: asked_ms,
+        fault: Fault::AddTask {
+            task: NewTask {
+                name: Some(format!("car.{nth}")),
+                ..task.clone()
+            },
+        },
+    }));
     for &at_ms in killed_at_ms {
         let mut swarm = Swarm::new(&prepared, seed, faults.clone(), false);
         swarm.run_until(at_ms);
@@ -122,6 +141,26 @@ fn a_car_is_followed_and_by_another_when_its_follower_is_killed() {
     assert!(!seen.retaken_ms.is_empty(), "{}", told.line());
     assert!(seen.stand_off_rms_mm < 15_000, "{}", told.line());
     assert!(seen.place_rms_mm < 12_000, "{}", told.line());
+}
+
+#[test]
+fn who_stays_with_it_beside_has_it_at_once_when_its_follower_is_killed() {
+    let outcome = tracked_by(4, 2, 5, &[150_000]);
+    let broken = outcome.violations();
+    assert!(outcome.report.completed && broken.is_empty(), "{broken:?}");
+    let told = &outcome.report.tasks[0];
+    let seen = told.tracked.as_ref().unwrap();
+    assert!(seen.twice_ms > 120_000, "{}", told.line());
+    assert!(
+        seen.retaken_ms.iter().all(|ms| *ms <= 10_000),
+        "{}",
+        told.line()
+    );
+    assert!(
+        seen.sight_ms * 100 >= seen.wanted_ms * 97,
+        "{}",
+        told.line()
+    );
 }
 
 #[test]

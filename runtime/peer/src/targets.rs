@@ -16,6 +16,8 @@
 //! Registers merge in any order: of each author and target the newest counts. All that is kept
 //! is bounded. Without sightings nothing is kept and nothing said.
 
+mod search;
+
 use crate::Incarnation;
 use crate::effect::Effect;
 use crate::input::Time;
@@ -23,6 +25,7 @@ use crate::mission::{mm, point_m};
 use crate::wire::codec::Body;
 use crate::wire::target::{SPREAD_MAX_E3, TARGETS_MAX, Target};
 use crate::wire::tasks::TaskId;
+use search::{Search, WAYS_MAX};
 use skein_behaviors::Percept;
 use skein_flight::airframe::Airframe;
 use skein_flight::tracking::estimate::{Detection, Estimate};
@@ -30,9 +33,8 @@ use skein_flight::tracking::follower::TargetMotion;
 use skein_flight::tracking::fusion::{Board, Fused, Register};
 use skein_flight::tracking::told::Spread;
 use skein_flight::tracking::tracks::{Kind, Sighting, TargetName, Tracks};
-use skein_geometry::frame::{Point, Vector};
-use skein_geometry::math::{TAU, sin_cos};
-use std::collections::BTreeMap;
+use skein_geometry::frame::{Point, Pose, Vector};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Density of the acceleration of targets, m²/s³: a car that brakes or turns off at 2.5 m/s²
 /// for some three seconds, a quarter of the time.
@@ -79,14 +81,8 @@ const STRAYS_MOST_M: f64 = 250.0;
 /// After so long without sight it may be anywhere, seconds.
 const ANYWHERE_S: f64 = 60.0;
 
-/// Nobody saw it for so long: whoever follows flies out to look for it, seconds.
+/// Nobody saw it for so long: whoever follows looks for it, seconds.
 const SEARCH_S: f64 = 4.0;
-
-/// A search winds outwards at so many metres a second, slow enough to circle about, each turn so far from the last, no
-/// farther than this, metres, and then inwards and outwards again.
-const SEARCH_MPS: f64 = 6.0;
-const SEARCH_TURN_M: f64 = 90.0;
-const SEARCH_MOST_M: f64 = 250.0;
 
 /// Names that a UAV gives in one life before it comes to those of the next: one a second for
 /// an hour and more.
@@ -137,6 +133,11 @@ pub(crate) struct Targets {
     /// What was said of when.
     said: BTreeMap<TargetName, u64>,
     said_at: Time,
+    /// Whom it looks for.
+    search: Option<Search>,
+    /// Squares of [`WAY_M`] where vehicles were seen to drive, by whomever: since missions bring
+    /// no streets, these are what is known of them.
+    ways: BTreeSet<(i16, i16)>,
 }
 
 impl Targets {
@@ -153,6 +154,8 @@ impl Targets {
             subjects: [None; TARGETS_MAX as usize],
             said: BTreeMap::new(),
             said_at: Time(0),
+            search: None,
+            ways: BTreeSet::new(),
         }
     }
 
@@ -162,6 +165,7 @@ impl Targets {
         self.tracks = Tracks::new(self.me, DENSITY).named_from(first);
         self.hits.clear();
         self.said.clear();
+        self.search = None;
     }
 
     /// Takes in a look.
@@ -171,12 +175,7 @@ impl Targets {
         };
         self.now_ms = percept.time_ms;
         let look: Vec<Sighting> = percept.sightings.seen().map(sighting).collect();
-        let pose = percept.pose;
-        let in_view = |p: Point| {
-            let (forward, to) = (pose.direction(), p - pose.position());
-            let along = forward.dot(&to).abs() <= INNER * airframe.footprint_along_m;
-            along && forward.perp(&to).abs() <= INNER * airframe.footprint_across_m
-        };
+        let in_view = |p: Point| is_in_view(percept.pose, &airframe, p);
         self.tracks.look(self.now_ms, &look, &in_view);
         self.count_hits();
         let own: Vec<Register> = self.own().collect();
@@ -202,6 +201,7 @@ impl Targets {
             self.board.put(r);
         }
         self.board.forget(self.now_ms.saturating_sub(TOLD_MS));
+        self.learn_ways();
         self.said
             .retain(|_, seen_ms| *seen_ms + TOLD_MS >= self.now_ms);
         self.keep_in_mind();
@@ -335,6 +335,15 @@ impl Targets {
         self.bound.insert(sought, bound);
     }
 
+    /// Whom one task was bound to goes by another from now on, unless that is bound already.
+    pub fn goes_by(&mut self, before: Sought, task: Sought) {
+        if let Some(bound) = self.bound.remove(&before)
+            && !self.bound.contains_key(&task)
+        {
+            self.bind(task, bound);
+        }
+    }
+
     /// What is known of whom a task is bound to, asked for so many seconds ago; bound to what is seen nearest to its place, if
     /// it is bound to nothing yet.
     pub fn follow(&mut self, sought: Sought, place: Point, asked_s: f64) -> Option<Followed> {
@@ -429,7 +438,7 @@ impl Targets {
     }
 
     /// How many registers and tasks are kept, with their caps.
-    pub fn loads(&self) -> [(&'static str, usize, usize); 2] {
+    pub fn loads(&self) -> [(&'static str, usize, usize); 3] {
         [
             (
                 "targets",
@@ -437,49 +446,41 @@ impl Targets {
                 skein_flight::tracking::fusion::MOST_REGISTERS,
             ),
             ("followed", self.bound.len(), BOUND_MAX),
+            ("ways", self.ways.len(), WAYS_MAX),
         ]
     }
 }
 
 impl Followed {
-    /// Nothing is known but a place, where it was not for so long, seconds.
+    /// Nothing is known but a place.
     #[must_use]
-    pub fn nowhere(place: Point, for_s: f64) -> Self {
+    pub fn nowhere(place: Point) -> Self {
         Self {
-            motion: TargetMotion {
-                position: place,
-                velocity_mps: Vector::zeros(),
-                acceleration_mps2: Vector::zeros(),
-            },
-            unseen_s: SEARCH_S + for_s,
+            motion: standing(place),
+            unseen_s: f64::INFINITY,
         }
     }
 
-    /// Where to fly after it: to where it should be, and winding outwards from there the longer
-    /// nobody has seen it.
+    /// Whether whoever follows looks for it.
     #[must_use]
-    pub fn sought(&self) -> TargetMotion {
-        let on_s = self.unseen_s - SEARCH_S;
-        if on_s <= 0.0 {
-            return self.motion;
-        }
-        let whole_s = TAU / 2.0 * SEARCH_MOST_M * SEARCH_MOST_M / SEARCH_TURN_M / SEARCH_MPS;
-        let at = |s: f64| {
-            // Of a spiral with so much between its turns, flown at one speed, to and fro.
-            let s = s % (2.0 * whole_s);
-            let s = s.min(2.0 * whole_s - s).max(0.0);
-            let far_m = (SEARCH_TURN_M * SEARCH_MPS * s / (TAU / 2.0)).sqrt();
-            let (sin, cos) = sin_cos(TAU * far_m / SEARCH_TURN_M);
-            Vector::new(cos, sin) * far_m
-        };
-        let (here, then) = (at(on_s), at(on_s + 0.1));
-        let wound = (then - here) / 0.1;
-        let faster = (wound.norm() / SEARCH_MPS).max(1.0);
-        TargetMotion {
-            position: self.motion.position + here,
-            velocity_mps: self.motion.velocity_mps + wound / faster,
-            acceleration_mps2: Vector::zeros(),
-        }
+    pub fn is_lost(&self) -> bool {
+        self.unseen_s > SEARCH_S
+    }
+}
+
+/// Whether a place is in what counts of the picture of a camera.
+fn is_in_view(pose: Pose, airframe: &Airframe, p: Point) -> bool {
+    let (forward, to) = (pose.direction(), p - pose.position());
+    let along = forward.dot(&to).abs() <= INNER * airframe.footprint_along_m;
+    along && forward.perp(&to).abs() <= INNER * airframe.footprint_across_m
+}
+
+/// A target that stands.
+pub(crate) fn standing(position: Point) -> TargetMotion {
+    TargetMotion {
+        position,
+        velocity_mps: Vector::zeros(),
+        acceleration_mps2: Vector::zeros(),
     }
 }
 

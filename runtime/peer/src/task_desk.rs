@@ -167,6 +167,23 @@ impl Tasking {
             .map(|(id, known)| (*id, known))
     }
 
+    /// A task of this operator, and if it is the first for its target those who are to stay
+    /// with that beside it.
+    fn with_those_beside(&self, first: TaskId) -> Vec<TaskId> {
+        let place = |k: &Known| (k.task.kind, k.task.places.clone());
+        let Some(asked) = self.known.get(&first).map(place) else {
+            return Vec::new();
+        };
+        let tracks = asked.0 == TaskKind::Track;
+        let same = self.own().filter(|(_, k)| k.is_open() && place(k) == asked);
+        let same: Vec<TaskId> = same.map(|(id, _)| *id).collect();
+        if tracks && same.first() == Some(&first) {
+            same
+        } else {
+            vec![first]
+        }
+    }
+
     /// A register for one more task: one that was never used, or of those that are over the one
     /// asked for first; with the revision that it gets.
     fn free_register(&self) -> Result<(u16, u32), String> {
@@ -297,22 +314,13 @@ impl Cooperation {
                 Ok(effects)
             }
             TaskEdit::Cancel(name) => {
-                let Some((id, known)) = self.tasking.named(name) else {
+                let Some((id, _)) = self.tasking.named(name) else {
                     return Ok(Effects::new());
                 };
-                let after_ms = now.since_ms(known.since);
-                let task = Task {
-                    revision: known.task.revision.saturating_add(1),
-                    state: TaskState::Cancelled,
-                    over_after_ms: u32::try_from(after_ms)
-                        .unwrap_or(u32::MAX)
-                        .min(crate::wire::limits::DURATION_MAX_MS),
-                    ..known.task.clone()
-                };
-                let since = known.since;
-                let mut effects = self.tasking.learn(now, id, task.clone());
-                self.tasking.was_asked(id, since);
-                effects.push(Effect::Speak(id.number, Body::Task(task)));
+                let mut effects = Effects::new();
+                for id in self.tasking.with_those_beside(id) {
+                    effects.extend(self.cancel(now, id));
+                }
                 Ok(effects)
             }
             TaskEdit::Again(tasks) => {
@@ -334,5 +342,26 @@ impl Cooperation {
                 Ok(effects)
             }
         }
+    }
+
+    /// The operator wants a task no more.
+    fn cancel(&mut self, now: Time, id: TaskId) -> Effects {
+        let Some(known) = self.tasking.known.get(&id) else {
+            return Effects::new();
+        };
+        let after_ms = now.since_ms(known.since);
+        let task = Task {
+            revision: known.task.revision.saturating_add(1),
+            state: TaskState::Cancelled,
+            over_after_ms: u32::try_from(after_ms)
+                .unwrap_or(u32::MAX)
+                .min(crate::wire::limits::DURATION_MAX_MS),
+            ..known.task.clone()
+        };
+        let since = known.since;
+        let mut effects = self.tasking.learn(now, id, task.clone());
+        self.tasking.was_asked(id, since);
+        effects.push(Effect::Speak(id.number, Body::Task(task)));
+        effects
     }
 }

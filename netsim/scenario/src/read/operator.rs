@@ -72,10 +72,12 @@ pub(crate) fn read(
         if known.peers.is_some() && known.ground.is_none() {
             return Err(item.wrong("there is no ground station to speak it"));
         }
-        acts.push(Act {
-            path: node.path(),
-            timed: TimedFault { at_ms, fault },
-        });
+        for fault in tasks::for_all_watchers(node, fault)? {
+            acts.push(Act {
+                path: node.path(),
+                timed: TimedFault { at_ms, fault },
+            });
+        }
     }
     acts.sort_by_key(|act| act.timed.at_ms);
     Ok(acts)

@@ -21,6 +21,9 @@ pub(crate) const RADIUS_M: f64 = 10.0;
 /// How far from a relay position a UAV may be that holds it unless the file says so, metres.
 pub(crate) const RELAY_RADIUS_M: f64 = 100.0;
 
+/// Most UAVs that may be asked to stay with one target.
+const WATCHERS_MAX: u32 = 4;
+
 /// Reads `mission.tasks`: what begins with it, as an operator would ask for it.
 pub(crate) fn of_mission(mission: &Node<'_>) -> Result<Vec<NewTask>, Error> {
     let Some(list) = mission.get("tasks")? else {
@@ -51,6 +54,7 @@ fn asked(node: &Node<'_>) -> Result<NewTask, Error> {
         "track",
         "radius_m",
         "stand_off_m",
+        "watchers",
         "within_s",
         "for_s",
         "needs",
@@ -131,6 +135,40 @@ fn asked(node: &Node<'_>) -> Result<NewTask, Error> {
     Ok(task)
 }
 
+/// What is asked for once for each UAV that is to stay with a target (`watchers`): tasks of
+/// one place are of one target. Who stays beside is worth half: a target that nobody follows
+/// goes before.
+pub(crate) fn for_all_watchers(node: &Node<'_>, fault: Fault) -> Result<Vec<Fault>, Error> {
+    let Fault::AddTask { task } = fault else {
+        return Ok(vec![fault]);
+    };
+    let asked = node.get("watchers")?;
+    if let Some(n) = asked.as_ref().filter(|_| task.kind != TaskKind::Track) {
+        return Err(n.wrong("is said of a target to follow alone"));
+    }
+    let watchers = asked.map_or(Ok(1), |n| {
+        n.whole(1, WATCHERS_MAX, "UAVs that follow one target")
+    })?;
+    let name = task.name.clone().unwrap_or_default();
+    let beside = |worth: u16| (worth / 2).max(1);
+    let nth = |nth: u32| match nth {
+        1 => Ok(Fault::AddTask { task: task.clone() }),
+        _ => {
+            let name = format!("{name}.{nth}");
+            if !is_task_name(&name) {
+                return Err(node.wrong(format!("the name {name:?} of the UAV beside is too long")));
+            }
+            let task = NewTask {
+                name: Some(name),
+                worth: beside(task.worth),
+                ..task.clone()
+            };
+            Ok(Fault::AddTask { task })
+        }
+    };
+    (1..=watchers).map(nth).collect()
+}
+
 fn places(line: &Node<'_>, least: usize) -> Result<Vec<(i32, i32)>, Error> {
     let items = line.items()?;
     if !(least..=TASK_PLACES_MAX).contains(&items.len()) {
@@ -193,6 +231,19 @@ mod tests {
         });
         let tasks: Vec<_> = tasks.collect();
         assert_eq!(tasks, [(TaskKind::Relay, 100_000, Some(300_000))]);
+        let beside = "track: { east_m: 300, north_m: 200 }, watchers: 2";
+        let beside = format!("[{{ at_s: 9, task_add: {{ id: 'car', {beside} }} }}]");
+        let beside = asked(&beside, "").unwrap().spec.faults;
+        let named = beside.iter().filter_map(|f| match &f.fault {
+            Fault::AddTask { task } => Some((task.name.clone()?, task.places[0], task.worth)),
+            _ => None,
+        });
+        let place = (300_000, 200_000);
+        let both = [
+            ("car".to_owned(), place, 100),
+            ("car.2".to_owned(), place, 50),
+        ];
+        assert_eq!(named.collect::<Vec<_>>(), both);
         let carriers = scenario.spec.uavs.iter().filter(|u| u.carries(2)).count();
         assert_eq!((carriers, scenario.spec.uavs.len()), (4, 8));
         let spoken = scenario.spec.faults.iter().filter(|f| f.fault.is_spoken());
@@ -234,6 +285,11 @@ mod tests {
                 add("id: 'a', relay: { east_m: 9000, north_m: 0 }"),
                 "",
                 "expected one nearer to the base",
+            ),
+            (
+                add(&format!("id: 'a', {point}, watchers: 2")),
+                "",
+                "watchers: is said of a target to follow alone",
             ),
             (
                 add(&format!("id: 'a b', {point}")),

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use skein_geometry::frame::Point;
 use skein_peer::Follows;
 use skein_peer::input::AskedTask;
-use skein_peer::wire::tasks::{Task, TaskKind};
+use skein_peer::wire::tasks::{Task, TaskKind, TaskPlace};
 use std::collections::BTreeMap;
 
 /// So many looks of one who says that it follows are judged together: half a minute and more,
@@ -45,6 +45,9 @@ pub struct Tracked {
     pub wanted_ms: u64,
     /// Of that, how long it was in the picture of one that followed it, ms.
     pub sight_ms: u64,
+    /// Of that, how long it was in the pictures of two or more at once, ms.
+    #[serde(default)]
+    pub twice_ms: u64,
     /// The root mean square of how far who saw it was off its stand-off, mm.
     pub stand_off_rms_mm: u64,
     /// The root mean square of how far the target was from where it was said to be, mm.
@@ -64,6 +67,9 @@ impl Tracked {
             self.wanted_ms / 1000,
             metres(self.stand_off_rms_mm)
         );
+        if self.twice_ms > 0 {
+            words += &format!(", by two for {} s", self.twice_ms / 1000);
+        }
         for ms in &self.retaken_ms {
             words += &format!(", had again {} s after a loss", ms / 1000);
         }
@@ -76,6 +82,7 @@ impl Tracked {
 struct Watched {
     told: Tracked,
     open: bool,
+    places: Vec<TaskPlace>,
     /// Looks with it in the picture, and the sums of the squares of both errors, mm².
     looks: u64,
     stand_off_mm2: f64,
@@ -84,6 +91,16 @@ struct Watched {
     last: Option<(u16, u64)>,
     /// When one that followed was lost, and nobody had it since.
     lost_ms: Option<u64>,
+}
+
+/// One look at a target: the first UAV that follows it and has it in its picture, its errors,
+/// and how many do.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    uav: u16,
+    stand_off_m: f64,
+    place_m: f64,
+    by: u32,
 }
 
 /// The claims of one UAV in its present window.
@@ -110,8 +127,17 @@ impl TrackCheck {
             return;
         }
         let key = (asked.number, task.revision_as_asked());
+        // Who is asked for beside another one, at the same place, is one more for its target.
+        let is_first = |(number, _): &(u16, u32), w: &Watched| {
+            *number < key.0 && w.open && w.places == task.places
+        };
+        if self.asked.iter().any(|(key, w)| is_first(key, w)) {
+            return;
+        }
         if task.is_open() {
-            self.asked.entry(key).or_default().open = true;
+            let watched = self.asked.entry(key).or_default();
+            watched.open = true;
+            watched.places.clone_from(&task.places);
         } else {
             // What is over is told in a revision of its own.
             for (_, w) in self.asked.range_mut((asked.number, 0)..=key) {
@@ -137,7 +163,7 @@ impl TrackCheck {
         self.last_ms = now_ms;
         self.windows
             .retain(|id, _| looks.iter().any(|l| l.uav == *id));
-        let mut seen: BTreeMap<(u16, u32), (u16, f64, f64)> = BTreeMap::new();
+        let mut seen: BTreeMap<(u16, u32), Seen> = BTreeMap::new();
         for look in looks {
             let Some(says) = look.says.filter(|s| s.sees) else {
                 self.windows.remove(&look.uav);
@@ -153,8 +179,13 @@ impl TrackCheck {
                 let away_m = (vehicles[n] - at).norm();
                 let stand_off_m = f64::from(says.stand_off_mm) / 1000.0;
                 let key = (says.task.number, says.revision);
-                let errors = (look.uav, away_m - stand_off_m, off_m(n));
-                seen.entry(key).or_insert(errors);
+                let first = seen.entry(key).or_insert(Seen {
+                    uav: look.uav,
+                    stand_off_m: away_m - stand_off_m,
+                    place_m: off_m(n),
+                    by: 0,
+                });
+                first.by += 1;
             }
         }
         let lives = |uav: u16| looks.iter().any(|l| l.uav == uav && l.at.is_some());
@@ -212,13 +243,19 @@ impl Watched {
         &mut self,
         now_ms: u64,
         passed_ms: u64,
-        seen: Option<(u16, f64, f64)>,
+        seen: Option<Seen>,
         lives: &dyn Fn(u16) -> bool,
     ) {
         if self.told.first_ms.is_some() {
             self.told.wanted_ms += passed_ms;
         }
-        let Some((uav, stand_off_m, place_m)) = seen else {
+        let Some(Seen {
+            uav,
+            stand_off_m,
+            place_m,
+            by,
+        }) = seen
+        else {
             if let Some((last, at_ms)) = self.last.filter(|(last, _)| !lives(*last)) {
                 self.lost_ms.get_or_insert(at_ms);
                 self.last = Some((last, at_ms));
@@ -229,6 +266,7 @@ impl Watched {
             self.told.first_ms = Some(now_ms);
         } else {
             self.told.sight_ms += passed_ms;
+            self.told.twice_ms += if by > 1 { passed_ms } else { 0 };
         }
         let gone = self.last.filter(|(last, _)| *last != uav && !lives(*last));
         if let Some(from_ms) = self.lost_ms.take().or(gone.map(|(_, at_ms)| at_ms)) {
@@ -345,5 +383,38 @@ mod tests {
         assert_eq!(told.retaken_ms, [25_000]);
         assert_eq!((told.wanted_ms, told.sight_ms), (49_000, 25_000));
         assert!(told.words().contains("had again 25 s after a loss"));
+    }
+
+    #[test]
+    fn who_is_asked_for_beside_another_counts_for_the_same_target() {
+        let (mut check, mut found) = (TrackCheck::default(), Findings::new(1));
+        let beside = AskedTask {
+            number: 4,
+            ..asked(1, TaskState::Open)
+        };
+        for t in 1..=30 {
+            check.on_asked(&asked(1, TaskState::Open));
+            check.on_asked(&beside);
+            // The first dies after twenty seconds.
+            let looks: Vec<Look> = [1, 2]
+                .into_iter()
+                .filter(|uav| *uav == 2 || t <= 20)
+                .map(|uav| look(uav, 0, true, &[0]))
+                .collect();
+            check.on_looks(t * 1000, &[Point::origin()], &looks, &mut found);
+        }
+        let told: Vec<Tracked> = check.tracked().map(|(_, t)| t.clone()).collect();
+        assert_eq!(told.len(), 1);
+        assert_eq!((told[0].sight_ms, told[0].twice_ms), (29_000, 19_000));
+        assert_eq!(told[0].retaken_ms, [1_000]);
+        assert!(told[0].words().contains("by two for 19 s"));
+        // At another place it is another target.
+        let mut other = beside.clone();
+        other.task.places = vec![TaskPlace {
+            east_mm: 9,
+            north_mm: 9,
+        }];
+        check.on_asked(&other);
+        assert_eq!(check.tracked().count(), 2);
     }
 }

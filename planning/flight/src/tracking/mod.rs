@@ -9,17 +9,21 @@
 //! | [`weave`] | sinusoids as long as their target is slow | 3.7.2 |
 //! | [`mode`] | which of the two is flown, without chatter | 3.7.2 |
 //! | [`follower`] | turn rate and airspeed, from percept to percept | 3.7 |
+//! | [`aside`] | circles beside a zone lie aside from the target | 2.3.1, 3.7.1 |
 //! | [`bend`] | ways beside the wanted one that keep clear of zones | 2.3.1 |
 //! | [`estimate`] | position and velocity of a target from detections | 3.7.1 |
 //! | [`tracks`] | several targets, false alarms, targets lost and found | 3.7 |
 //! | [`told`] | estimates in few numbers, for the radio | 3.7 |
+//! | [`chance`] | where a target that is out of sight may be, and where to look for it | 3.7 |
 //! | [`fusion`] | what all UAVs know of a target together | 3.7 |
 //! | [`handover`] | who follows which target | 3.7 |
 //!
 //! All of it is pure: the state that it needs from percept to percept is a value that the
 //! caller keeps.
 
+pub mod aside;
 pub mod bend;
+pub mod chance;
 pub mod estimate;
 pub mod field;
 pub mod flyable;

@@ -154,24 +154,38 @@ fn what_is_of_another_time_or_no_covariance_is_left_out() {
 }
 
 #[test]
-fn who_is_lost_is_looked_for_outwards_and_taken_up_again_where_it_may_be() {
+fn who_is_lost_is_looked_for_all_over_and_taken_up_again_where_it_may_be() {
     let mut one = targets(1);
     watched(&mut one, 1_000, 6_000);
     one.follow(TASK, Point::new(125.0, 50.0), 0.0).unwrap();
-    let mut farthest_m = 0.0_f64;
-    for now_ms in (6_000..60_000).step_by(200) {
-        one.on_percept(&percept(now_ms, Point::new(400.0, 400.0), &[]));
+    let lost_at = one.known(TASK).unwrap().motion.position;
+    // It flies to where it looks next, at 14 m/s.
+    let mut at = lost_at;
+    let (mut farthest_m, mut places) = (0.0_f64, Vec::<Point>::new());
+    for now_ms in (6_000..300_000).step_by(200) {
+        let looked = percept(now_ms, at, &[]);
+        one.on_percept(&looked);
         let known = one.known(TASK).unwrap();
-        let off_m = (known.sought().position - known.motion.position).norm();
-        assert!(known.sought().velocity_mps.norm() < 20.0);
-        farthest_m = farthest_m.max(off_m);
+        if !known.is_lost() {
+            continue;
+        }
+        let looked_for = (TASK, Point::new(125.0, 50.0), 9.0);
+        let aim = one
+            .look_for(looked_for, &looked, &|p| p.y > -200.0)
+            .unwrap();
+        assert!(aim.position.y > -200.0 && aim.velocity_mps.norm() < 1e-9);
+        if places.last() != Some(&aim.position) {
+            places.push(aim.position);
+        }
+        let to = aim.position - at;
+        at += to * (2.8 / to.norm().max(2.8));
+        farthest_m = farthest_m.max((aim.position - lost_at).norm());
     }
-    assert!(
-        (80.0..=SEARCH_MOST_M + 1.0).contains(&farthest_m),
-        "{farthest_m}"
-    );
-    // A car of the same kind within where it may have strayed, by now.
-    for now_ms in (60_000..63_000).step_by(200) {
+    // Ahead first, then all over.
+    assert!(places[0].x > lost_at.x, "{:?}", places[0]);
+    assert!(places.len() > 8 && farthest_m > 250.0, "{places:?}");
+    // A car of the same kind, by now.
+    for now_ms in (300_000..303_000).step_by(200) {
         one.on_percept(&percept(
             now_ms,
             Point::new(250.0, 100.0),
@@ -181,4 +195,11 @@ fn who_is_lost_is_looked_for_outwards_and_taken_up_again_where_it_may_be() {
     let known = one.known(TASK).unwrap();
     assert!((known.motion.position - Point::new(250.0, 100.0)).norm() < 5.0);
     assert!(one.unseen_ms(TASK).unwrap() < 500);
+    // Whom nobody has seen is looked for about the place that was asked for.
+    let mut other = targets(2);
+    let looked = percept(9_000, Point::origin(), &[]);
+    other.on_percept(&looked);
+    let place = Point::new(300.0, 300.0);
+    let aim = other.look_for((TASK, place, 4.0), &looked, &|_| true);
+    assert!((aim.unwrap().position - place).norm() < 100.0);
 }

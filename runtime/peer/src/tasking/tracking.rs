@@ -3,11 +3,14 @@
 //!
 //! | what is known of the target | what is flown | what is said |
 //! |---|---|---|
-//! | nothing | the circle round the task's place, and outwards from there | nothing |
+//! | nothing | the circle round the task's place, and from there where most chance of it is soonest looked at | nothing |
 //! | where it may be, and that is not near | a circle round that | nothing |
-//! | where it may be, and that is near | after it, winding outwards the longer nobody sees it | once it had seen it: it searches |
+//! | where it may be, and that is near | after it, or where most chance of it is soonest looked at | once it had seen it: it searches |
 //! | it is seen | after it | it follows; the first time the task is begun |
 //! | it is beyond the reach of the mission | at the edge of that | as above |
+//!
+//! Several tasks of one author with one place are of one target: as many UAVs stay with it, and
+//! all that is known and said of it goes by the first of these tasks.
 
 use super::Tasking;
 use crate::input::Time;
@@ -34,6 +37,10 @@ const SEARCHES_MS: u64 = 5_000;
 /// way round the zones is planned.
 const NEAR_M: f64 = 250.0;
 
+/// Nobody searches farther outside of the box of the area than this, metres: as far as a car
+/// is that turns round at its edge.
+const AROUND_M: f64 = 100.0;
+
 /// The stand-off, as a share of how far the camera sees to either side: what is asked for if
 /// nothing is, and the most.
 const STAND_OFF: f64 = 0.5;
@@ -57,10 +64,10 @@ pub struct Follows {
 /// What was said of sight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Sight {
+    /// By which task its target goes.
+    pub of: Option<Sought>,
     /// Whether it was said that it follows, and not since that it searches.
     pub follows: bool,
-    /// Since when it has been where the target was to be, milliseconds of percepts.
-    pub awaits_ms: Option<u64>,
 }
 
 impl Task {
@@ -95,12 +102,38 @@ fn within_reach(motion: TargetMotion, mission: &Mission) -> TargetMotion {
     }
 }
 
+/// The box that is searched: that of the area, and a little around it.
+fn searched(mission: &Mission) -> (Point, Point) {
+    let corners = mission.area_m();
+    let first = corners.first().copied().unwrap_or_else(|| mission.base_m());
+    let (low, high) = corners.iter().fold((first, first), |(low, high), p| {
+        (
+            Point::new(low.x.min(p.x), low.y.min(p.y)),
+            Point::new(high.x.max(p.x), high.y.max(p.y)),
+        )
+    });
+    let around = Vector::new(AROUND_M, AROUND_M);
+    (low - around, high + around)
+}
+
 impl Tasking {
     /// The target that is flown after, if it is one: the task in its revision.
     pub(super) fn sought(&self) -> Option<Sought> {
         let flown = self.flown.as_ref()?;
         let task = &self.known.get(&flown.id)?.task;
-        (task.kind == TaskKind::Track).then_some((flown.id, flown.revision))
+        let tracks = task.kind == TaskKind::Track;
+        tracks.then(|| self.first_of((flown.id, flown.revision), task))
+    }
+
+    /// Tasks of one author to follow what is at one place are of one target: it goes by the
+    /// first of them that is open.
+    fn first_of(&self, own: Sought, task: &Task) -> Sought {
+        let author = own.0.author;
+        let from = TaskId { author, number: 0 };
+        let mut before = self.known.range(from..own.0).filter(|(_, k)| {
+            k.is_open() && k.task.kind == TaskKind::Track && k.task.places == task.places
+        });
+        before.next().map_or(own, |(id, k)| (*id, k.task.revision))
     }
 
     /// Whether somebody is to be followed.
@@ -119,6 +152,13 @@ impl Tasking {
         let (Some(sought), Some(airframe)) = (self.sought(), self.flies) else {
             return false;
         };
+        if let Some(held) = self.flown.as_mut().and_then(|f| f.held.as_mut()) {
+            // The first task of its target was heard of since, or is over.
+            let before = held.sight.of.replace(sought).filter(|b| *b != sought);
+            if let Some(before) = before {
+                self.targets.goes_by(before, sought);
+            }
+        }
         let Some(known) = self.known.get(&sought.0) else {
             return false;
         };
@@ -135,22 +175,27 @@ impl Tasking {
         let (Some(executive), Some(relay)) = (&mut state.executive, &mut state.relay) else {
             return false;
         };
-        // Where nothing is known it is looked for from the circle round the place outwards.
-        let Some(held) = self.flown.as_mut().and_then(|f| f.held.as_mut()) else {
+        if self.flown.as_ref().is_none_or(|f| f.held.is_none()) {
             return false;
-        };
-        if executive.is_on_circle() {
-            held.sight.awaits_ms.get_or_insert(percept.time_ms);
         }
-        let awaited = held.sight.awaits_ms;
-        let nowhere = || {
-            let for_s = seconds(percept.time_ms.saturating_sub(awaited?));
-            Some(Followed::nowhere(place, for_s))
+        let mission = &state.geometry.mission;
+        let followed = followed.unwrap_or_else(|| Followed::nowhere(place));
+        let motion = if followed.is_lost() {
+            let (base, reach_m) = (mission.base_m(), mission.reach_m());
+            let (low, high) = searched(mission);
+            let may_fly = |p: Point| {
+                let near = (p - followed.motion.position).norm() <= NEAR_M;
+                let inside = low.x <= p.x && p.x <= high.x && low.y <= p.y && p.y <= high.y;
+                (near || inside) && (p - base).norm() <= reach_m
+            };
+            let looked_for = (sought, place, asked_s);
+            let next = self.targets.look_for(looked_for, percept, &may_fly);
+            next.unwrap_or(followed.motion)
+        } else {
+            self.targets.end_search();
+            followed.motion
         };
-        let Some(followed) = followed.or_else(nowhere) else {
-            return false;
-        };
-        let motion = within_reach(followed.sought(), &state.geometry.mission);
+        let motion = within_reach(motion, mission);
         let away_m = (motion.position - percept.pose.position()).norm();
         let is_near = relay.follow.is_some() || away_m <= NEAR_M || executive.is_on_circle();
         let follow = (sees || is_near).then_some(stand_off_m);
@@ -221,8 +266,10 @@ impl Tasking {
 
     /// The task as it is flown to: a target at the place where it is by now, as far as is known.
     pub(super) fn as_flown(&self, sought: Sought, task: &Task, mission: &Mission) -> Task {
-        let known = self.targets.known(sought);
-        let Some(known) = known.filter(|_| task.kind == TaskKind::Track) else {
+        if task.kind != TaskKind::Track {
+            return task.clone();
+        }
+        let Some(known) = self.targets.known(self.first_of(sought, task)) else {
             return task.clone();
         };
         let at = within_reach(known.motion, mission).position;

@@ -253,3 +253,30 @@ fn words_that_cannot_be_carried_out_are_refused_with_the_reason() {
         assert!(alarm.contains(why), "{alarm}");
     }
 }
+
+#[test]
+fn who_cancels_the_first_task_of_a_target_cancels_those_beside_it() {
+    let mut h = with_operator(1, mission(1, 8, 6));
+    h.run_s(10);
+    let car = |name: &str, east_m: f64| NewTask {
+        kind: TaskKind::Track,
+        radius_mm: 0,
+        ..point(name, east_m, 100.0)
+    };
+    for (name, east_m) in [
+        ("car", 100.0),
+        ("car.2", 100.0),
+        ("car.3", 100.0),
+        ("van", 90.0),
+    ] {
+        add(&mut h, car(name, east_m));
+    }
+    let open = |h: &Harness| {
+        ["car", "car.2", "car.3", "van"]
+            .map(|n| state(h, GROUND_STATION, n) == Some(TaskState::Open))
+    };
+    edit(&mut h, TaskEdit::Cancel("car.2".into()));
+    assert_eq!(open(&h), [true, false, true, true]);
+    edit(&mut h, TaskEdit::Cancel("car".into()));
+    assert_eq!(open(&h), [false, false, false, true]);
+}
