@@ -174,18 +174,30 @@ impl Survey {
     #[must_use]
     pub fn left_out(&self, geometry: &MissionGeometry) -> usize {
         let coverable = self.cells.iter().filter(|c| c.uncoverable.is_none());
-        coverable.filter(|c| !is_planned(geometry, c.id)).count()
+        coverable.filter(|c| !self.is_planned(geometry, c.id)).count()
     }
 
     /// The same without the cells that the planner leaves out: nobody will look for them.
     #[must_use]
     pub fn as_planned(mut self, geometry: &MissionGeometry) -> Self {
-        for cell in &mut self.cells {
-            if cell.uncoverable.is_none() && !is_planned(geometry, cell.id) {
+        let left_out = |c: &Cell| c.uncoverable.is_none() && !self.is_planned(geometry, c.id);
+        let left_out: Vec<bool> = self.cells.iter().map(left_out).collect();
+        for (cell, left_out) in self.cells.iter_mut().zip(left_out) {
+            if left_out {
                 cell.uncoverable = Some(Uncoverable::LeftOut);
             }
         }
         self
+    }
+
+    /// Whether the loop serves a cell: of an area one that is to be seen, of places and lines a
+    /// piece that has a station; of straight passes the judge has squares of its own.
+    fn is_planned(&self, geometry: &MissionGeometry, id: CellId) -> bool {
+        let coverage_loop = &geometry.coverage_loop;
+        let cell = coverage_loop.index_of(id);
+        let cell = cell.and_then(|c| coverage_loop.cells().get(usize::from(c)));
+        let by_name = geometry.mission.task.is_area() || self.pieces.is_some();
+        !by_name || cell.is_some_and(|c| c.needed)
     }
 
     /// Counts the missions that the operator began anew.
@@ -635,14 +647,6 @@ impl FreePlane {
         // Outside the raster there are no zones, hence only one part.
         inside.peek().is_none() || inside.any(|i| self.reached[i])
     }
-}
-
-/// Whether the loop serves a cell; of other tasks the judge has squares or pieces of its own.
-fn is_planned(geometry: &MissionGeometry, id: CellId) -> bool {
-    let coverage_loop = &geometry.coverage_loop;
-    let cell = coverage_loop.index_of(id);
-    let cell = cell.and_then(|c| coverage_loop.cells().get(usize::from(c)));
-    !geometry.mission.task.is_area() || cell.is_some_and(|c| c.needed)
 }
 
 #[cfg(test)]
