@@ -297,12 +297,16 @@ fn wrong_missions_are_refused_where_they_stand() {
     for (to, problem) in [
         ("mission: { diagram: \"patrl\" },", "did you mean patrol?"),
         (
-            "mission: { diagram: \"inspection\" },",
+            "mission: { diagram: \"inspection\" }, laps: 3,",
             "is flown once, and the mission has laps",
         ),
         (
             "mission: { diagram: \"coverage\", for_s: 9 },",
             "has no timer that ends it",
+        ),
+        (
+            "mission: { diagram: \"patrol\", for_s: 900 }, laps: 3,",
+            "leave the laps out",
         ),
         ("mission: { diagram: \"patrol\", for_s: 0 },", "for_s"),
         (

@@ -11,7 +11,6 @@
 //! | it was given a target to follow, and where that may be is near | follow it |
 //! | it was given a task, and its flight is planned | fly that, then the cells of the plan |
 //! | the plan has cells | fly them |
-//! | everything is seen, and the mission goes on round | fly round the loop, evenly spaced |
 //! | nothing to fly, others at work | loiter where it is |
 //! | and among many nobody is heard | loiter at base |
 //!

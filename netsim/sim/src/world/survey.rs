@@ -174,7 +174,9 @@ impl Survey {
     #[must_use]
     pub fn left_out(&self, geometry: &MissionGeometry) -> usize {
         let coverable = self.cells.iter().filter(|c| c.uncoverable.is_none());
-        coverable.filter(|c| !self.is_planned(geometry, c.id)).count()
+        coverable
+            .filter(|c| !self.is_planned(geometry, c.id))
+            .count()
     }
 
     /// The same without the cells that the planner leaves out: nobody will look for them.
