@@ -97,12 +97,17 @@ fn when_who_watches_what_was_found_is_killed_another_is_given_it_though_all_are_
         at_ms: 300_000,
         fault: Fault::Kill { peer: watches },
     });
-    let mut swarm = Swarm::new(&prepared, 4, faults, false);
+    let mut swarm = Swarm::new(&prepared, 4, faults.clone(), false);
     swarm.run_until(330_000);
     let [next] = holders(&swarm)[..] else {
         panic!("another goes there");
     };
     assert!(next != watches && swarm.beliefs(next).unwrap().relays);
+    // And sees it, for most of the ten minutes.
+    let outcome = run(&prepared, 4, faults, Wanted::default());
+    passed(&outcome);
+    let bus = &outcome.report.detections[0];
+    assert!(bus.sight_ms > 500_000, "{}", bus.line());
 }
 
 #[test]
