@@ -191,13 +191,14 @@ impl WatchCheck {
 mod tests {
     use super::super::testing::{Story, speaking};
     use super::*;
+    use crate::geometry_cache::geometry_of;
     use crate::world::fixture;
     use skein_peer::Beliefs;
 
     /// Where so many are who are so far apart, metres, when each flies at 12 m/s; whether a rule
     /// is broken by then.
     fn broken(apart_m: &[f64], mps: f64, seconds: u64) -> bool {
-        let geometry = fixture::square(1).mission.geometry().unwrap();
+        let geometry = geometry_of(&fixture::square(1).mission).unwrap();
         let watched = Arc::new(Watched::of(&geometry));
         let mut check = WatchCheck::default();
         check
@@ -245,7 +246,8 @@ mod tests {
 
     #[test]
     fn who_flies_close_behind_another_is_not_evenly_spaced() {
-        let length_m = Watched::of(&fixture::square(1).mission.geometry().unwrap()).length_m;
+        let geometry = geometry_of(&fixture::square(1).mission).unwrap();
+        let length_m = Watched::of(&geometry).length_m;
         let even: Vec<f64> = (0..4).map(|k| f64::from(k) * length_m / 4.0).collect();
         assert!(!broken(&even, 12.0, 4_000));
         assert!(broken(&[0.0, 30.0, 60.0, 90.0], 12.0, 4_000));

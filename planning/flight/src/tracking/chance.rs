@@ -2,8 +2,8 @@
 //!
 //! A map of chances over squares and headings, after Bourgault, Furukawa and Durrant-Whyte,
 //! "Coordinated decentralized search for a lost target in a Bayesian world" (2003). It begins
-//! where the target was seen last. From there all of it drives on at the target's speed, and
-//! turns off now and then, mostly at right angles, as on streets that nobody told of; where
+//! where the target was seen last. Of one that drove all of it drives on at the target's speed, and
+//! turns off now and then; of one that stood most stays, and the rest sets off in any direction, mostly at right angles, as on streets that nobody told of; where
 //! vehicles were seen to drive is likelier than elsewhere. What was
 //! looked at and not seen becomes less likely. Who searches flies to where most chance can be
 //! looked at soonest.
@@ -13,7 +13,7 @@
 //! What would leave the map turns back at its edge. No place is flown to for ever.
 //!
 //! # Complexity
-//! [`SIDE`]² squares with [`HEADINGS`] headings each: 33,000 numbers, gone through once for
+//! [`SIDE`]² squares with [`HEADINGS`] headings each, and standing: 37,000 numbers, gone through once for
 //! each [`STEP_S`] and each look, and once for each choice of where to fly.
 
 use skein_geometry::frame::{Point, Vector};
@@ -40,11 +40,25 @@ const BLOCK_M: f64 = 120.0;
 /// Of those that turn off, so many take a right angle to each side; the others half of one.
 const SQUARE_TURNS: f64 = 0.4;
 
-/// Who stands, or of whom no speed is known, moves on at this, m/s.
+/// Who sets off, or of whom no speed is known, moves on at this, m/s.
 const LEAST_MPS: f64 = 4.0;
 
 /// Slower than this it has no heading, m/s.
 const STANDS_MPS: f64 = 1.0;
+
+/// Of who stands so much still does when nobody saw it any more; of who drives slower than
+/// [`LEAST_MPS`] so much may stand after all, for a speed of some looks is off by a walk's.
+const STANDING: f64 = 0.8;
+const MAY_STAND: f64 = 0.4;
+
+/// Who stands sets off once in so many seconds.
+const SETS_OFF_S: f64 = 600.0;
+
+/// Chances of a square: those of each heading, and that it stands.
+const STATES: usize = HEADINGS + 1;
+
+/// The last of them.
+const STANDS: usize = HEADINGS;
 
 /// What a second leaves of the chance that it drives where nobody was seen to drive, beside
 /// that it keeps to a known way: after half a minute it is a tenth.
@@ -83,7 +97,7 @@ pub struct ChanceMap {
     /// drive on; empty where none is known.
     kept: Vec<f64>,
     /// Chances by row from the south, column from the west, and heading from the east on
-    /// counter-clockwise.
+    /// counter-clockwise; after these that it stands there.
     chances: Vec<f64>,
     /// Where is flown to, as a square, and until when, milliseconds.
     aim: Option<(usize, u64)>,
@@ -108,7 +122,7 @@ fn turned(heading: usize, by: usize) -> usize {
 
 impl ChanceMap {
     /// It was seen at a time, milliseconds, about a place with this spread, metres, and moved
-    /// so, m/s; who stands may leave in any direction.
+    /// so, m/s; who stands may set off in any direction.
     #[must_use]
     pub fn new(time_ms: u64, at: Point, spread_m: f64, velocity_mps: Vector) -> Self {
         #[allow(clippy::cast_precision_loss, reason = "64")]
@@ -118,7 +132,7 @@ impl ChanceMap {
             speed_mps: velocity_mps.norm().clamp(LEAST_MPS, MOST_MPS),
             time_ms,
             kept: Vec::new(),
-            chances: vec![0.0; SIDE * SIDE * HEADINGS],
+            chances: vec![0.0; SIDE * SIDE * STATES],
             aim: None,
         };
         let headings = if velocity_mps.norm() < STANDS_MPS {
@@ -126,13 +140,20 @@ impl ChanceMap {
         } else {
             along(velocity_mps)
         };
+        let stands = match velocity_mps.norm() {
+            mps if mps < STANDS_MPS => STANDING,
+            mps if mps < LEAST_MPS => MAY_STAND,
+            _ => 0.0,
+        };
+        let whole: f64 = headings.iter().sum();
         let spread_m = spread_m.clamp(SQUARE_M / 2.0, half_m);
         for square in 0..SIDE * SIDE {
             let off = (map.middle(square) - at).norm() / spread_m;
             let here = skein_geometry::math::exp(-off * off / 2.0);
             for (heading, share) in headings.iter().enumerate() {
-                map.chances[square * HEADINGS + heading] = here * share;
+                map.chances[square * STATES + heading] = here * share * (1.0 - stands);
             }
+            map.chances[square * STATES + STANDS] = here * whole * stands;
         }
         map.normalise();
         map
@@ -162,8 +183,8 @@ impl ChanceMap {
 
     /// Sum of the chances of a square.
     fn of_square(&self, square: usize) -> f64 {
-        let first = square * HEADINGS;
-        self.chances[first..first + HEADINGS].iter().sum()
+        let first = square * STATES;
+        self.chances[first..first + STATES].iter().sum()
     }
 
     fn normalise(&mut self) {
@@ -172,7 +193,7 @@ impl ChanceMap {
             self.chances.iter_mut().for_each(|c| *c /= whole);
         } else {
             // It is nowhere, so it is anywhere.
-            #[allow(clippy::cast_precision_loss, reason = "33,000")]
+            #[allow(clippy::cast_precision_loss, reason = "37,000")]
             let even = 1.0 / self.chances.len() as f64;
             self.chances.fill(even);
         }
@@ -202,8 +223,18 @@ impl ChanceMap {
         let turns = (STEP_S * self.speed_mps / BLOCK_M).min(0.5);
         let mut next = vec![0.0; self.chances.len()];
         for square in 0..SIDE * SIDE {
+            let stands = self.chances[square * STATES + STANDS];
+            if stands > 0.0 {
+                let sets_off = stands * STEP_S / SETS_OFF_S;
+                next[square * STATES + STANDS] += stands - sets_off;
+                #[allow(clippy::cast_precision_loss, reason = "8")]
+                let each = sets_off / HEADINGS as f64;
+                for heading in 0..HEADINGS {
+                    next[square * STATES + heading] += each;
+                }
+            }
             for heading in 0..HEADINGS {
-                let chance = self.chances[square * HEADINGS + heading];
+                let chance = self.chances[square * STATES + heading];
                 if chance <= 0.0 {
                     continue;
                 }
@@ -219,7 +250,7 @@ impl ChanceMap {
                     None => (square, turned(heading, HEADINGS / 2)),
                 };
                 let mut put = |square: usize, heading: usize, chance: f64| {
-                    next[square * HEADINGS + heading] += chance;
+                    next[square * STATES + heading] += chance;
                 };
                 for (place, course, part) in [(square, heading, 1.0 - moves), (to, course, moves)] {
                     let part = chance * part;
@@ -235,8 +266,9 @@ impl ChanceMap {
                 }
             }
         }
-        for (here, kept) in next.chunks_mut(HEADINGS).zip(&self.kept) {
-            here.iter_mut().for_each(|c| *c *= kept);
+        for (here, kept) in next.chunks_mut(STATES).zip(&self.kept) {
+            // Who stands may stand in a yard.
+            here[..HEADINGS].iter_mut().for_each(|c| *c *= kept);
         }
         self.chances = next;
     }
@@ -308,8 +340,8 @@ impl ChanceMap {
     }
 
     fn scale(&mut self, square: usize, by: f64) {
-        let first = square * HEADINGS;
-        let here = &mut self.chances[first..first + HEADINGS];
+        let first = square * STATES;
+        let here = &mut self.chances[first..first + STATES];
         here.iter_mut().for_each(|c| *c *= by);
     }
 
@@ -421,6 +453,23 @@ mod tests {
         map.aim = None;
         assert!(map.look_next(from, 14.0, &|p| p.y > 100.0).unwrap().y > 100.0);
         assert_eq!(map.look_next(from, 14.0, &|_| false), None);
+    }
+
+    /// What is to be rescued mostly stays where it is.
+    #[test]
+    fn who_stood_is_looked_for_where_it_stood_also_after_minutes() {
+        let at = Point::new(40.0, 10.0);
+        for (mps, least) in [(0.0, 0.6), (0.9, 0.6), (1.2, 0.25)] {
+            let mut map = ChanceMap::new(0, at, 5.0, Vector::new(mps, 0.0));
+            map.go_on(120_000);
+            let here = map.within(at, 60.0);
+            assert!(here > least, "{mps} {here}");
+            let first = map.look_next(Point::new(-300.0, 0.0), 14.0, &|_| true);
+            assert!((first.unwrap() - at).norm() < 60.0, "{mps} {first:?}");
+        }
+        let mut drives = ChanceMap::new(0, at, 5.0, Vector::new(6.0, 0.0));
+        drives.go_on(120_000);
+        assert!(drives.within(at, 60.0) < 0.1);
     }
 
     #[test]
