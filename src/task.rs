@@ -11,7 +11,7 @@ use skein_interop::place::{LatLon, to_plane};
 use skein_peer::input::{NewTask, TaskEdit};
 use skein_peer::mission::mm;
 use skein_peer::wire::tasks::{SENSORS, TaskKind, WORTH_MAX, sensor_of_name};
-use skein_peer::{Overview, TaskView};
+use skein_peer::{Overview, TaskView, WATCHERS_MAX};
 use std::process::ExitCode;
 
 /// Asks for tasks in flight and cancels them.
@@ -113,7 +113,7 @@ pub enum Add {
         stand_off_m: Option<f64>,
         /// How many UAVs stay with it, so that it is not lost with one of them: each is a task
         /// of its own, `NAME.2` and so on.
-        #[arg(long, value_name = "UAVS", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=4))]
+        #[arg(long, value_name = "UAVS", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=i64::from(WATCHERS_MAX)))]
         watchers: u8,
         /// What it is worth, next to other tasks.
         #[arg(long, value_name = "WORTH", default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=i64::from(WORTH_MAX)))]
@@ -267,18 +267,12 @@ fn asked(add: &Add, origin: Origin) -> Result<NewTask, Refusal> {
     })
 }
 
-/// What is asked for once for each UAV that is to stay with a target: tasks of one place are of
-/// one target. Who stays beside is worth half: a target that nobody follows goes before.
+/// What is asked for once for each UAV that is to stay with a target.
 fn for_all_watchers(add: &Add, task: NewTask) -> Vec<NewTask> {
-    let Add::Track { watchers, .. } = add else {
-        return vec![task];
-    };
-    let beside = (2..=*watchers).map(|nth| NewTask {
-        name: task.name.as_ref().map(|name| format!("{name}.{nth}")),
-        worth: (task.worth / 2).max(1),
-        ..task.clone()
-    });
-    core::iter::once(task.clone()).chain(beside).collect()
+    match add {
+        Add::Track { watchers, .. } => task.for_watchers(*watchers),
+        _ => vec![task],
+    }
 }
 
 fn as_json(task: &TaskView, origin: Origin) -> Value {

@@ -615,21 +615,11 @@ impl Executive {
                 return moves;
             }
         }
-        if self.aim == Aim::Round {
-            let circle = self.waits_for_room(at).map(|c| vec![Move::Loiter(c)]);
-            match circle.or_else(|| self.transit.way_round(at)) {
-                Some(moves) => {
-                    self.stranded = false;
-                    return moves;
-                }
-                None if self.stranded => {}
-                None => {
-                    events.push(Event::Refused { cells: Vec::new() });
-                    self.stranded = true;
-                }
-            }
-        }
-        if let Some(Kind::Loiter(circle)) = self.stretches.back().map(|s| s.kind) {
+        // Who flies round circles once, to let who is ahead get away.
+        let stays = self.aim != Aim::Round || self.stranded;
+        if let Some(Kind::Loiter(circle)) = self.stretches.back().map(|s| s.kind)
+            && stays
+        {
             return self.circled(at, circle);
         }
         if let Some(moves) = self.back_to_wait(at) {
@@ -640,7 +630,7 @@ impl Executive {
                 self.stranded = false;
                 return moves;
             }
-            None if matches!(self.aim, Aim::Point(_) | Aim::Circle(_)) => {
+            None if matches!(self.aim, Aim::Point(_) | Aim::Circle(_) | Aim::Round) => {
                 events.push(Event::Refused { cells: Vec::new() });
                 self.stranded = true;
             }
@@ -649,7 +639,8 @@ impl Executive {
         self.transit.way_to_loiter(at)
     }
 
-    /// The way to where it is to stay; `None` where there is none, or it is to stay nowhere.
+    /// The way to where it is to stay, or round; `None` where there is none, or it is to stay
+    /// nowhere.
     fn way_to_aim(&self, at: &Place) -> Option<Vec<Move>> {
         match self.aim {
             Aim::Point(p) => self.transit.way_to_wait_at(at, p).or_else(|| {
@@ -657,6 +648,10 @@ impl Executive {
                 home.by_loop(&self.transit, at, p)
             }),
             Aim::Circle(circle) => self.transit.way_to_circle(at, &circle),
+            Aim::Round => {
+                let circle = self.waits_for_room(at).map(|c| vec![Move::Loiter(c)]);
+                circle.or_else(|| self.transit.way_round(at))
+            }
             _ => None,
         }
     }

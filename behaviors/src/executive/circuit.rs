@@ -25,7 +25,7 @@ use crate::reactive::air::Air;
 use skein_flight::coverage::ring::Direction;
 use skein_geometry::Segment;
 use skein_geometry::frame::Pose;
-use skein_geometry::math::{cos, sin};
+use skein_geometry::math::cos;
 
 /// By how much slower somebody flies for each metre by which who is ahead is nearer than who is
 /// behind, m/s: differences between n UAVs are halved in some n²/π² · 14 s.
@@ -88,6 +88,15 @@ struct Mark {
     share: f64,
 }
 
+/// How long the loop is, and where each of its cells begins, through the present air.
+#[derive(Debug)]
+struct Measured<'a> {
+    transit: &'a Transit,
+    marks: &'a [Mark],
+    begins_m: Vec<f64>,
+    whole_m: f64,
+}
+
 /// How a UAV keeps its place among others.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Circuit {
@@ -143,48 +152,65 @@ impl Transit {
         }))
     }
 
-    /// How far along the loop a pose is, through the air, and how long the loop is, metres.
-    /// `None` where it is not on the loop.
-    fn along_loop_m(&self, marks: &[Mark], pose: Pose) -> Option<(f64, f64)> {
-        let cost_m = |mark: &Mark| {
-            let off_m = (pose.position() - mark.pose.position()).norm();
-            let turned = cos(pose.heading_rad - mark.pose.heading_rad);
-            (off_m <= OFF_M).then_some(off_m + AGAINST_M * (1.0 - turned))
-        };
-        let costs = marks.iter().filter_map(|m| Some((cost_m(m)?, m)));
-        let (_, nearest) = costs.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let (mut whole_m, mut at_m) = (0.0, 0.0);
-        for (_, cell) in (0..self.coverage_loop.len()).zip(0u16..) {
-            let length_m = self.forward_m(cell);
-            if cell == nearest.cell {
-                at_m = whole_m + nearest.share * length_m;
-            }
-            whole_m += length_m;
+    /// The loop as it is in the present air.
+    fn measured<'a>(&'a self, marks: &'a [Mark]) -> Measured<'a> {
+        let mut whole_m = 0.0;
+        let cells = (0..self.coverage_loop.len()).zip(0u16..);
+        let begins_m = cells.map(|(_, cell)| {
+            let begins_m = whole_m;
+            whole_m += self.forward_m(cell);
+            begins_m
+        });
+        Measured {
+            transit: self,
+            marks,
+            begins_m: begins_m.collect(),
+            whole_m,
         }
-        let (sin, cos) = (sin(nearest.pose.heading_rad), cos(nearest.pose.heading_rad));
-        let off = pose.position() - nearest.pose.position();
-        at_m += (off.x * cos + off.y * sin).clamp(-MARK_M, MARK_M);
-        Some((at_m, whole_m))
+    }
+}
+
+impl Measured<'_> {
+    /// How far along the loop a pose is, through the air, metres. `None` where it is not on it.
+    fn along_m(&self, pose: Pose) -> Option<f64> {
+        let (mark, on_m) = nearest(self.marks, pose)?;
+        let before_m = mark.share * self.transit.forward_m(mark.cell);
+        Some(self.begins_m[usize::from(mark.cell)] + before_m + on_m)
     }
 
     /// Who is next ahead of a pose on the loop and who behind. `None` where it is not on the
     /// loop, or nobody else is.
-    fn gaps(&self, marks: &[Mark], pose: Pose, others: &[Fellow]) -> Option<Gaps> {
-        let (at_m, whole_m) = self.along_loop_m(marks, pose)?;
-        let speed_mps = self.air().airspeed_mps;
+    fn gaps(&self, pose: Pose, others: &[Fellow]) -> Option<Gaps> {
+        let at_m = self.along_m(pose)?;
+        let speed_mps = self.transit.air().airspeed_mps;
         let ahead_m = |other: &Fellow| {
-            let (then_m, _) = self.along_loop_m(marks, other.pose)?;
+            let then_m = self.along_m(other.pose)?;
             let now_m = then_m + speed_mps * f64::from(other.age_ms) / 1000.0;
-            Some((now_m - at_m).rem_euclid(whole_m))
+            Some((now_m - at_m).rem_euclid(self.whole_m))
         };
         let all = || others.iter().filter_map(ahead_m);
         let ahead_m = all().min_by(f64::total_cmp)?;
         let farthest_m = all().max_by(f64::total_cmp)?;
         Some(Gaps {
             ahead_m,
-            behind_m: whole_m - farthest_m,
+            behind_m: self.whole_m - farthest_m,
         })
     }
+}
+
+/// The place on the loop that is nearest to a pose, and how far on from there the pose is, metres.
+/// `None` where it is not on the loop.
+fn nearest(marks: &[Mark], pose: Pose) -> Option<(&Mark, f64)> {
+    let cost_m = |mark: &Mark| {
+        let off_m = (pose.position() - mark.pose.position()).norm();
+        let turned = cos(pose.heading_rad - mark.pose.heading_rad);
+        (off_m <= OFF_M).then_some(off_m + AGAINST_M * (1.0 - turned))
+    };
+    let costs = marks.iter().filter_map(|m| Some((cost_m(m)?, m)));
+    let (_, nearest) = costs.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let off = pose.position() - nearest.pose.position();
+    let on_m = off.dot(&nearest.pose.direction());
+    Some((nearest, on_m.clamp(-MARK_M, MARK_M)))
 }
 
 impl Executive {
@@ -200,7 +226,8 @@ impl Executive {
         if self.circuit.marks.is_empty() {
             self.circuit.marks = self.transit.marks();
         }
-        self.circuit.gaps = self.transit.gaps(&self.circuit.marks, here, others);
+        let measured = self.transit.measured(&self.circuit.marks);
+        self.circuit.gaps = measured.gaps(here, others);
     }
 
     /// Who is before and behind it, where it flies round the loop and knows of others.
@@ -255,7 +282,7 @@ mod tests {
     use super::*;
     use crate::Goal;
     use crate::testing::{Wing, airframe, loop_and_router, square};
-    use skein_geometry::frame::{Point, Vector};
+    use skein_geometry::frame::Point;
 
     fn round(wing: &Wing) -> Executive {
         let (coverage_loop, router) = loop_and_router(12, 10, vec![square(200.0, 100.0, 80.0)]);
@@ -340,16 +367,16 @@ mod tests {
             })
             .collect();
         let gaps = |all: &[(Wing, Executive)]| {
-            let at: Vec<(f64, f64)> = all
-                .iter()
-                .map(|(w, e)| e.transit.along_loop_m(&e.transit.marks(), w.pose).unwrap())
-                .collect();
-            let whole_m = at[0].1;
+            let marks = all[0].1.transit.marks();
+            let measured = all[0].1.transit.measured(&marks);
+            let whole_m = measured.whole_m;
+            let at = all.iter().map(|(w, _)| measured.along_m(w.pose));
+            let at: Vec<f64> = at.map(Option::unwrap).collect();
             let to_next = |m: f64| {
-                let others = at.iter().map(|o| (o.0 - m).rem_euclid(whole_m));
+                let others = at.iter().map(|o| (o - m).rem_euclid(whole_m));
                 others.filter(|d| *d > 0.0).fold(whole_m, f64::min)
             };
-            at.iter().map(|a| to_next(a.0)).fold(0.0, f64::max) / (whole_m / 4.0)
+            at.iter().map(|a| to_next(*a)).fold(0.0, f64::max) / (whole_m / 4.0)
         };
         let mut begun = None;
         for step in 0..12_000 {
@@ -383,7 +410,8 @@ mod tests {
         let wing = Wing::new(Pose::new(Point::new(0.0, 0.0), 0.0));
         let executive = round(&wing);
         let marks = executive.transit.marks();
-        let along = |pose| executive.transit.along_loop_m(&marks, pose).unwrap();
+        let measured = executive.transit.measured(&marks);
+        let (along, whole_m) = (|pose| measured.along_m(pose).unwrap(), measured.whole_m);
         let cells = executive.transit.coverage_loop.cells();
         let (mut until_m, mut looked) = (0.0, 0);
         for (cell, i) in cells.iter().zip(0u16..) {
@@ -391,12 +419,12 @@ mod tests {
             let before = executive.transit.coverage_loop.len() + usize::from(i) - 1;
             let beside = cells[before % cells.len()].excursion || cell.excursion;
             if !beside {
-                let (at_m, whole_m) = along(there);
+                let at_m = along(there);
                 let off_m = (at_m - until_m).rem_euclid(whole_m);
                 assert!(off_m.min(whole_m - off_m) < 1.0, "{i}: {at_m} {until_m}");
-                let heading = Vector::new(cos(there.heading_rad), sin(there.heading_rad));
-                let ahead = Pose::new(there.position() + 2.0 * heading, there.heading_rad);
-                let on_m = (along(ahead).0 - at_m).rem_euclid(whole_m);
+                let at = there.position() + 2.0 * there.direction();
+                let ahead = Pose::new(at, there.heading_rad);
+                let on_m = (along(ahead) - at_m).rem_euclid(whole_m);
                 assert!(on_m > 0.5 && on_m < 4.0, "{i}: {on_m}");
                 looked += 1;
             }

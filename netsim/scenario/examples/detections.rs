@@ -5,32 +5,26 @@
 //!
 //! Faults are `none` or what the `storm` of the seed draws.
 
+mod shared;
+
 use skein_netsim::prepared::Prepared;
 use skein_netsim::runs::{Wanted, failure_free_makespan_ms, run, storm};
-use skein_scenario::{Overrides, Seeds, open};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let arg = |i: usize, default: &str| args.get(i).map_or(default, String::as_str).to_owned();
-    let Ok(seeds) = arg(2, "1..2").parse::<Seeds>() else {
-        eprintln!("expected seeds such as 1..4");
-        return ExitCode::from(2);
+    let seeds = match shared::seeds(&arg(2, "1..2")) {
+        Ok(seeds) => seeds,
+        Err(code) => return code,
     };
     let lines = args.iter().any(|a| a == "timeline");
     let mut passed = true;
     for name in arg(0, "lookout,search").split(',') {
         for n in arg(1, "1,3,8").split(',').filter_map(|n| n.parse().ok()) {
-            let over = Overrides {
-                peers: Some(n),
-                ..Overrides::default()
-            };
-            let prepared = match open(Some(name), &over) {
+            let prepared = match shared::scenario(name, n, None) {
                 Ok(scenario) => Prepared::new(scenario.spec),
-                Err(e) => {
-                    eprintln!("{e}");
-                    return ExitCode::from(2);
-                }
+                Err(code) => return code,
             };
             let free_ms = (arg(3, "none") == "storm").then(|| failure_free_makespan_ms(&prepared));
             for seed in seeds.from..seeds.to {

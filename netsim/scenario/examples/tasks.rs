@@ -11,6 +11,8 @@
 //! second one: the share of the time in which each was held, and in which the ground station
 //! knew of more, or of less, of what was seen than without them.
 
+mod shared;
+
 use skein_geometry::random::SplitMix64;
 use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::fault_generator;
@@ -19,33 +21,23 @@ use skein_netsim::runs::{Wanted, failure_free_makespan_ms, run};
 use skein_peer::input::NewTask;
 use skein_peer::mission::mm;
 use skein_peer::wire::tasks::TaskKind;
-use skein_scenario::{Overrides, Seeds, open};
+use skein_scenario::Seeds;
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let arg = |i: usize, default: &str| args.get(i).map_or(default, String::as_str).to_owned();
-    let seeds: Seeds = match arg(2, "0..3").parse() {
+    let seeds = match shared::seeds(&arg(2, "0..3")) {
         Ok(seeds) => seeds,
-        Err(e) => {
-            eprintln!("{e}");
-            return ExitCode::from(2);
-        }
+        Err(code) => return code,
     };
     let (n_tasks, wrong) = (arg(3, "6").parse().unwrap_or(6), arg(4, "none"));
     for n in arg(1, "8").split(',').filter_map(|n| n.parse::<u16>().ok()) {
-        let over = Overrides {
-            peers: Some(n),
-            launch: args.get(5).and_then(|word| word.parse().ok()),
-            ..Overrides::default()
-        };
-        let prepared = match open(Some(&arg(0, "helsinki")), &over) {
+        let launch = args.get(5).and_then(|word| word.parse().ok());
+        let prepared = match shared::scenario(&arg(0, "helsinki"), n, launch) {
             Ok(scenario) => Prepared::new(scenario.spec),
-            Err(e) => {
-                eprintln!("{e}");
-                return ExitCode::from(2);
-            }
+            Err(code) => return code,
         };
         compare(&prepared, &seeds, (n_tasks, &arg(6, "0")), &wrong);
     }

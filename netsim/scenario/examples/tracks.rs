@@ -9,13 +9,15 @@
 //! until another had the target, the makespan over that without the task, the bytes, and the
 //! rules broken.
 
+mod shared;
+
 use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::fault_generator;
 use skein_netsim::prepared::Prepared;
 use skein_netsim::runs::{Wanted, failure_free_makespan_ms, run};
 use skein_netsim::swarm::{Outcome, Swarm};
 use skein_peer::output::Status;
-use skein_scenario::{Overrides, Seeds, open};
+use skein_scenario::Seeds;
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 
@@ -25,28 +27,18 @@ const DEATHS_MS: [u64; 2] = [150_000, 350_000];
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let arg = |i: usize, default: &str| args.get(i).map_or(default, String::as_str).to_owned();
-    let seeds: Seeds = match arg(2, "0..3").parse() {
+    let seeds = match shared::seeds(&arg(2, "0..3")) {
         Ok(seeds) => seeds,
-        Err(e) => {
-            eprintln!("{e}");
-            return ExitCode::from(2);
-        }
+        Err(code) => return code,
     };
     for n in arg(1, "3").split(',').filter_map(|n| n.parse::<u16>().ok()) {
-        let over = Overrides {
-            peers: Some(n),
-            ..Overrides::default()
-        };
-        match open(Some(&arg(0, "track")), &over) {
+        match shared::scenario(&arg(0, "track"), n, None) {
             Ok(mut scenario) => {
                 let beside = arg(4, "1").parse().unwrap_or(1);
                 watched_by(&mut scenario.spec.faults, beside);
                 compare(n, &Prepared::new(scenario.spec), &seeds, &arg(3, "none"));
             }
-            Err(e) => {
-                eprintln!("{e}");
-                return ExitCode::from(2);
-            }
+            Err(code) => return code,
         }
     }
     ExitCode::SUCCESS

@@ -161,10 +161,6 @@ fn check_brought(s: &Stated, mission: &Mission) -> Result<(), Error> {
     let whole = Arc::new(mission.clone());
     for (i, asked) in mission.brought(false).iter().enumerate() {
         let place = format!("mission.tasks[{i}]");
-        if mission.separation_mm > 0 {
-            let text = "no tasks are flown where UAVs are kept apart by agreement";
-            return Err(s.places.wrong(&place, text));
-        }
         if asked.task.kind == TaskKind::Area {
             let text = "an area is asked for in flight, by an operator; give its places as points, or a line";
             return Err(s.places.wrong(&place, text));

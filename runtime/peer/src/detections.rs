@@ -93,6 +93,19 @@ pub(crate) struct Place {
     pub unseen_s: f64,
 }
 
+impl Place {
+    /// Whether somebody saw it lately.
+    fn is_fresh(&self) -> bool {
+        self.unseen_s <= LATELY_S
+    }
+
+    /// Whether two that were seen lately are one object.
+    pub fn is_one_with(self, other: Self) -> bool {
+        let are_fresh = self.is_fresh() && other.is_fresh();
+        are_fresh && (self.at - other.at).norm() <= SLACK_M
+    }
+}
+
 /// All that one peer knows of them.
 #[derive(Debug, Default)]
 pub(crate) struct Detections {
@@ -182,7 +195,7 @@ impl Seen {
     /// Whether it is where somebody who follows one says that this is.
     pub fn is_at(&self, place: Place) -> bool {
         let away_m = (self.at - place.at).norm();
-        place.unseen_s <= LATELY_S && away_m <= self.error_m + FOLLOWED_M
+        place.is_fresh() && away_m <= self.error_m + FOLLOWED_M
     }
 }
 
@@ -310,7 +323,7 @@ impl Detections {
         followed: &dyn Fn(TaskId) -> Option<Place>,
     ) -> bool {
         self.standing(sortie).any(|(id, d)| {
-            let now = followed(id).filter(|p| p.unseen_s <= LATELY_S);
+            let now = followed(id).filter(Place::is_fresh);
             match now {
                 Some(place) => seen.name == d.name() || seen.is_at(place),
                 None => seen.may_be(&d.seen()),
@@ -417,9 +430,9 @@ fn is_one(
     if a.name() == b.name() {
         return true;
     }
-    let lately = |id| followed(id).filter(|p: &Place| p.unseen_s <= LATELY_S);
+    let lately = |id| followed(id).filter(Place::is_fresh);
     if let (Some(p), Some(q)) = (lately(a_id), lately(b_id)) {
-        return a.looks == b.looks && (p.at - q.at).norm() <= SLACK_M;
+        return a.looks == b.looks && p.is_one_with(q);
     }
     let still = |d: &Detection| {
         let mmps = d.velocity_mps().norm() * 1e3;

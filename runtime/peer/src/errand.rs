@@ -142,6 +142,9 @@ impl Mission {
     /// # Errors
     /// A sentence that says why not.
     pub fn can_do(self: &Arc<Self>, task: &Task) -> Result<(), String> {
+        if self.separation_mm > 0 {
+            return Err("no tasks are flown where UAVs are kept apart by agreement".to_owned());
+        }
         let zones = self.no_fly_zones().map_err(|e| e.to_string())?;
         if task.is_held() {
             return self.relay_circle(task, &zones).map(drop);

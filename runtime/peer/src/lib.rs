@@ -143,7 +143,7 @@ pub use output::{Output, Priority, Report};
 pub use overview::Overview;
 pub use peer::Peer;
 pub use task::{CoverageTask, LineTask, PointTask};
-pub use task_desk::{TaskHolder, TaskView};
+pub use task_desk::{TaskHolder, TaskView, WATCHERS_MAX};
 pub use tasking::{BROUGHT_MAX, Follows, MISSION};
 pub use transmission::Transmission;
 pub use why::Why;

@@ -7,6 +7,7 @@ use crate::input::{AskedTask, NewTask, TaskEdit, Time};
 use crate::mission::Mission;
 use crate::tasking::{KEPT_FOR_COVER, Known, Tasking, why_nobody};
 use crate::wire::codec::Body;
+use crate::wire::limits::DURATION_MAX_MS;
 use crate::wire::tasks::{
     Progress, TASK_NAME_MAX_BYTES, TASKS_MAX, Task, TaskId, TaskKind, TaskPlace, TaskState,
     check_task, is_task_name, sensor_name,
@@ -69,6 +70,25 @@ impl Tasking {
             age_ms: now.since_ms(known.since),
         };
         self.own().map(asked).collect()
+    }
+
+    /// A task that this peer asked for is wanted no more, by this revision of it.
+    pub fn take_back(&mut self, now: Time, id: TaskId, revision: u32) -> Effects {
+        let Some(known) = self.known.get(&id) else {
+            return Effects::new();
+        };
+        let since = known.since;
+        let over_ms = u32::try_from(now.since_ms(since)).unwrap_or(u32::MAX);
+        let task = Task {
+            revision,
+            state: TaskState::Cancelled,
+            over_after_ms: over_ms.min(DURATION_MAX_MS),
+            ..known.task.clone()
+        };
+        let mut effects = self.learn(now, id, task.clone());
+        self.was_asked(id, since);
+        effects.push(Effect::Speak(id.number, Body::Task(task)));
+        effects
     }
 
     /// Grows with each change of the tasks of this peer's own operator.
@@ -225,7 +245,24 @@ impl Tasking {
     }
 }
 
+/// Most UAVs that may be asked to stay with one target.
+pub const WATCHERS_MAX: u8 = 4;
+
 impl NewTask {
+    /// The same for so many UAVs, each by a task of its own: tasks to follow what is at one place
+    /// are of one target. Who stays beside is worth half: a target that nobody follows goes
+    /// before.
+    #[must_use]
+    pub fn for_watchers(self, watchers: u8) -> Vec<Self> {
+        let beside = (2..=watchers).map(|nth| Self {
+            name: self.name.as_ref().map(|name| format!("{name}.{nth}")),
+            worth: (self.worth / 2).max(1),
+            ..self.clone()
+        });
+        let beside: Vec<Self> = beside.collect();
+        core::iter::once(self).chain(beside).collect()
+    }
+
     /// The task as it is said in a register and a revision.
     ///
     /// # Errors
@@ -265,11 +302,6 @@ impl Cooperation {
             TaskEdit::Add(new) => {
                 let (_, task) = self.tasking.asked_for(new)?;
                 let mission = mission.ok_or("the ground station holds no mission with a place")?;
-                if mission.separation_mm > 0 {
-                    return Err(
-                        "no tasks are flown where UAVs are kept apart by agreement".to_owned()
-                    );
-                }
                 mission.can_do(&task)
             }
             TaskEdit::Cancel(name) => match self.tasking.named(name) {
@@ -319,7 +351,9 @@ impl Cooperation {
                 };
                 let mut effects = Effects::new();
                 for id in self.tasking.with_those_beside(id) {
-                    effects.extend(self.cancel(now, id));
+                    let held = self.tasking.known.get(&id);
+                    let revision = held.map_or(0, |k| k.task.revision.saturating_add(1));
+                    effects.extend(self.tasking.take_back(now, id, revision));
                 }
                 Ok(effects)
             }
@@ -342,26 +376,5 @@ impl Cooperation {
                 Ok(effects)
             }
         }
-    }
-
-    /// The operator wants a task no more.
-    fn cancel(&mut self, now: Time, id: TaskId) -> Effects {
-        let Some(known) = self.tasking.known.get(&id) else {
-            return Effects::new();
-        };
-        let after_ms = now.since_ms(known.since);
-        let task = Task {
-            revision: known.task.revision.saturating_add(1),
-            state: TaskState::Cancelled,
-            over_after_ms: u32::try_from(after_ms)
-                .unwrap_or(u32::MAX)
-                .min(crate::wire::limits::DURATION_MAX_MS),
-            ..known.task.clone()
-        };
-        let since = known.since;
-        let mut effects = self.tasking.learn(now, id, task.clone());
-        self.tasking.was_asked(id, since);
-        effects.push(Effect::Speak(id.number, Body::Task(task)));
-        effects
     }
 }

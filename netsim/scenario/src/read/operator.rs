@@ -151,9 +151,6 @@ pub(crate) fn check(acts: &[Act], spec: &Spec, places: &Places) -> Result<(), Er
 
 /// Whether some UAV of the fleet could do a task.
 fn can_be_done(task: &NewTask, mission: &Mission, spec: &Spec) -> Result<(), String> {
-    if mission.separation_mm > 0 {
-        return Err("no tasks are flown where UAVs are kept apart by agreement".to_owned());
-    }
     let asked = task.asked(0, 1)?;
     Arc::new(mission.clone()).can_do(&asked)?;
     if spec.uavs.iter().any(|u| u.carries(task.sensor)) {

@@ -4,13 +4,13 @@
 use super::shared::position;
 use skein_interop::json::{Error, Node, suggestion};
 use skein_netsim::fault::Fault;
-use skein_peer::BROUGHT_MAX;
 use skein_peer::input::NewTask;
 use skein_peer::mission::mm;
 use skein_peer::wire::tasks::{
     SENSORS, TASK_NAME_MAX_BYTES, TASK_PLACES_MAX, TaskKind, WORTH_MAX, is_task_name,
     sensor_of_name,
 };
+use skein_peer::{BROUGHT_MAX, WATCHERS_MAX};
 
 /// What a task is worth unless the file says so.
 pub(crate) const WORTH: u16 = 100;
@@ -20,9 +20,6 @@ pub(crate) const RADIUS_M: f64 = 10.0;
 
 /// How far from a relay position a UAV may be that holds it unless the file says so, metres.
 pub(crate) const RELAY_RADIUS_M: f64 = 100.0;
-
-/// Most UAVs that may be asked to stay with one target.
-const WATCHERS_MAX: u32 = 4;
 
 /// Reads `mission.tasks`: what begins with it, as an operator would ask for it.
 pub(crate) fn of_mission(mission: &Node<'_>) -> Result<Vec<NewTask>, Error> {
@@ -135,9 +132,7 @@ fn asked(node: &Node<'_>) -> Result<NewTask, Error> {
     Ok(task)
 }
 
-/// What is asked for once for each UAV that is to stay with a target (`watchers`): tasks of
-/// one place are of one target. Who stays beside is worth half: a target that nobody follows
-/// goes before.
+/// What is asked for once for each UAV that is to stay with a target (`watchers`).
 pub(crate) fn for_all_watchers(node: &Node<'_>, fault: Fault) -> Result<Vec<Fault>, Error> {
     let Fault::AddTask { task } = fault else {
         return Ok(vec![fault]);
@@ -146,27 +141,15 @@ pub(crate) fn for_all_watchers(node: &Node<'_>, fault: Fault) -> Result<Vec<Faul
     if let Some(n) = asked.as_ref().filter(|_| task.kind != TaskKind::Track) {
         return Err(n.wrong("is said of a target to follow alone"));
     }
-    let watchers = asked.map_or(Ok(1), |n| {
-        n.whole(1, WATCHERS_MAX, "UAVs that follow one target")
-    })?;
-    let name = task.name.clone().unwrap_or_default();
-    let beside = |worth: u16| (worth / 2).max(1);
-    let nth = |nth: u32| match nth {
-        1 => Ok(Fault::AddTask { task: task.clone() }),
-        _ => {
-            let name = format!("{name}.{nth}");
-            if !is_task_name(&name) {
-                return Err(node.wrong(format!("the name {name:?} of the UAV beside is too long")));
-            }
-            let task = NewTask {
-                name: Some(name),
-                worth: beside(task.worth),
-                ..task.clone()
-            };
-            Ok(Fault::AddTask { task })
-        }
+    let most = u32::from(WATCHERS_MAX);
+    let watchers = asked.map_or(Ok(1), |n| n.whole(1, most, "UAVs that follow one target"))?;
+    let watchers = u8::try_from(watchers).unwrap_or(WATCHERS_MAX);
+    let nth = |task: NewTask| match task.name.as_deref().filter(|name| !is_task_name(name)) {
+        Some(name) => Err(node.wrong(format!("the name {name:?} of the UAV beside is too long"))),
+        None => Ok(Fault::AddTask { task }),
     };
-    (1..=watchers).map(nth).collect()
+    let all = task.for_watchers(watchers).into_iter();
+    all.map(nth).collect()
 }
 
 fn places(line: &Node<'_>, least: usize) -> Result<Vec<(i32, i32)>, Error> {

@@ -7,7 +7,7 @@
 //! | somebody | one of them takes for the whole loop, slowed down, and [`JOIN_MS`] |
 //! | the same ones for so long that they may have spread, and all hear each other | that at cruise, shared evenly among them, times [`UNEVEN`], and [`LATE_MS`] |
 
-use super::flight::Flyer;
+use super::flight::{Flyer, milliseconds};
 use super::{Findings, PeerSnapshot, Snapshot};
 use skein_geometry::frame::Point;
 use skein_peer::offload::MissionGeometry;
@@ -153,13 +153,8 @@ impl WatchCheck {
         if !slowest_mps.is_finite() || slowest_mps <= 0.0 {
             return None;
         }
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a time, not negative"
-        )]
-        let ms = |mps: f64| (1000.0 * watched.length_m / mps) as u64;
-        let lap_ms = ms(slowest_mps);
+        let lap_ms = |mps: f64| milliseconds(watched.length_m / mps);
+        let slowed_ms = lap_ms(SLOWED * slowest_mps);
         let late_ms = |since_ms| {
             let each = self
                 .rounders
@@ -167,21 +162,15 @@ impl WatchCheck {
                 .map(|id| snapshot.late_ms(*id, since_ms));
             each.max().unwrap_or(0)
         };
-        let loose_ms = ms(SLOWED * slowest_mps) + JOIN_MS;
+        let loose_ms = slowed_ms + JOIN_MS;
         let together_ms = self.since_ms.max(self.linked_ms);
-        let spread_ms = snapshot.grown_ms(SPREAD_LAPS * ms(SLOWED * slowest_mps), together_ms);
+        let spread_ms = snapshot.grown_ms(SPREAD_LAPS * slowed_ms, together_ms);
         let n = u32::try_from(self.rounders.len()).unwrap_or(u32::MAX);
         let loose_ms = loose_ms + late_ms(self.since_ms);
         if snapshot.now_ms.saturating_sub(together_ms) < spread_ms {
             return Some((loose_ms, "together"));
         }
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
-            reason = "a time of hours at most, not negative"
-        )]
-        let even_ms = (UNEVEN * lap_ms as f64 / f64::from(n)) as u64;
+        let even_ms = lap_ms(slowest_mps * f64::from(n) / UNEVEN);
         let even_ms = even_ms + LATE_MS + late_ms(self.since_ms);
         Some((even_ms.min(loose_ms), "evenly"))
     }

@@ -10,6 +10,7 @@
 //! | `stream` | independent random streams |
 //! | `operator` | the mission and the order given last |
 //! | `judged_loop` | the loop on which cells are counted |
+//! | `looks` | what is followed and looked for, beside where vehicles are |
 //! | `traffic` | what the radios were given and brought |
 //! | `observed` | what an observer may look at |
 //! | `names` | whom peers mean by an id that two processes have |
@@ -22,6 +23,7 @@
 mod air;
 mod fault_effects;
 mod judged_loop;
+mod looks;
 pub mod meter;
 mod names;
 mod observed;
@@ -38,9 +40,7 @@ pub use outcome::Outcome;
 mod tests;
 
 use crate::account::{Account, Cause};
-use crate::check::detections::Truth;
 use crate::check::record::Said;
-use crate::check::tracks::Look;
 use crate::check::{Checker, PeerSnapshot};
 use crate::fault::TimedFault;
 use crate::geometry_cache::GeometryCache;
@@ -59,7 +59,6 @@ use sim_peer::{Process, SimPeer};
 use skein_behaviors::Order;
 use skein_geometry::frame::{Point, Pose};
 use skein_link::medium::key_hash;
-use skein_peer::MISSION;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
 use skein_peer::output::TaskNews;
@@ -874,76 +873,6 @@ impl Swarm {
                 text: v.text,
             });
         }
-    }
-
-    /// Who says that it follows somebody is looked at beside where vehicles are.
-    fn judge_tracks(&mut self, peers: &[PeerSnapshot]) {
-        if self.air.vehicles().is_empty() {
-            return;
-        }
-        let look = |m: &PeerSnapshot| Look {
-            uav: m.id,
-            at: m.at,
-            since_ms: m.since_ms,
-            says: m.view.follows.filter(|_| m.view.speaks),
-            pictured: self.air.pictured(m.id),
-        };
-        let looks: Vec<Look> = peers.iter().filter(|m| m.uav).map(look).collect();
-        let truth: Vec<Point> = self.air.vehicles().places().collect();
-        let tracks = &mut self.checker.rules.tracks;
-        tracks.on_looks(self.now_ms, &truth, &looks, &mut self.checker.found);
-        for (task, tracked) in tracks.tracked() {
-            self.account.tracked(task, tracked);
-        }
-    }
-
-    /// What the mission looks for is judged beside what was in the pictures of those who fly it.
-    fn judge_detections(&mut self, peers: &[PeerSnapshot]) {
-        if self.checker.rules.detections.is_idle() {
-            return;
-        }
-        let newest = self.operator.mission().revision;
-        let flies = |m: &&PeerSnapshot| m.uav && m.view.speaks && m.view.revision >= newest;
-        let look = |m: &PeerSnapshot| Look {
-            uav: m.id,
-            at: m.at,
-            since_ms: m.since_ms,
-            says: m.view.follows,
-            pictured: self.air.pictured(m.id),
-        };
-        let looks: Vec<Look> = peers.iter().filter(flies).map(look).collect();
-        let truth: Vec<Truth> = self.air.vehicles().truth().collect();
-        self.checker.on_detections(self.now_ms, &truth, &looks);
-        let reports = self.checker.rules.detections.reports();
-        self.account.detected(reports);
-    }
-
-    /// A UAV tells of an object of its own: the world knows whether it is there.
-    fn note_detection(&mut self, id: u16, report: &Report) {
-        let Report::Detected { id: task, told } = report else {
-            return;
-        };
-        let is_own = self
-            .peer_idx(id)
-            .is_some_and(|idx| self.peers[idx].config.id.0 == task.author);
-        if !is_own {
-            return;
-        }
-        self.air.advance(self.now_ms);
-        let truth: Vec<Truth> = self.air.vehicles().truth().collect();
-        let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
-        let at = (self.now_ms, id);
-        rules.detections.on_told(at, (*task, told), &truth, found);
-    }
-
-    /// Whether somebody is to follow what a UAV saw.
-    fn is_following(&self, peers: &[PeerSnapshot]) -> bool {
-        let uavs = peers.iter().filter(|m| m.uav);
-        let mut open = uavs.flat_map(|m| &m.view.open_tasks);
-        open.any(|(id, _)| {
-            let is_uav = self.spec.uavs.iter().any(|u| u.id == id.author);
-            is_uav || id.author == MISSION
-        })
     }
 
     /// The ground station says the standing order once in each life, as a live one does.

@@ -159,22 +159,13 @@ impl Tasking {
         ]
     }
 
-    /// A task of this peer's own is wanted no more.
+    /// A task of this peer's own is wanted no more, if it was.
     fn cancel(&mut self, now: Time, id: TaskId) -> Effects {
-        let Some(known) = self.known.get(&id).filter(|k| k.is_open()) else {
-            return Effects::new();
-        };
-        let since = known.since;
-        let over_ms = u32::try_from(now.since_ms(since)).unwrap_or(u32::MAX);
-        let task = Task {
-            state: TaskState::Cancelled,
-            over_after_ms: over_ms.min(crate::wire::limits::DURATION_MAX_MS),
-            ..known.task.clone()
-        };
-        let mut effects = self.learn(now, id, task.clone());
-        self.was_asked(id, since);
-        effects.push(Effect::Speak(id.number, Body::Task(task)));
-        effects
+        let open = self.known.get(&id).filter(|k| k.is_open());
+        match open.map(|k| k.task.revision) {
+            Some(revision) => self.take_back(now, id, revision),
+            None => Effects::new(),
+        }
     }
 
     /// Own tasks of an earlier sortie, or of a mission that is cancelled, are wanted no more.
@@ -224,8 +215,7 @@ impl Tasking {
             let theirs = self.followed(**other);
             **other != id
                 && self.detections.goes_before(**other, id)
-                && theirs.is_some_and(|p| p.unseen_s < 3.0 && mine.unseen_s < 3.0)
-                && theirs.is_some_and(|p| (p.at - mine.at).norm() < 15.0)
+                && theirs.is_some_and(|p| p.is_one_with(mine))
                 && is_begun(**other)
         };
         let open = self.known.iter().filter(|(_, k)| k.is_open());

@@ -6,8 +6,8 @@
 
 use super::cbor::{array_of, number_of};
 use super::codec::WireError;
-use super::limits::{POSITION_MAX_MM, SPEED_MAX_MMPS, in_range};
-use super::schema::{Place, Shape, at};
+use super::limits::{in_range, is_near, is_slow};
+use super::schema::{MM, MMPS, Place, Shape, U8, U16, U32, at};
 use super::target::TIME_MAX_MS;
 use crate::criteria::CRITERIA_MAX;
 use serde::{Deserialize, Serialize};
@@ -83,20 +83,14 @@ array_of!(Detection {
 
 /// The first field that is out of range.
 pub(super) fn check(d: &Detection) -> Result<(), WireError> {
-    let near = |mm: i32| mm.unsigned_abs() <= POSITION_MAX_MM.unsigned_abs();
-    let slow = |mmps: i32| mmps.unsigned_abs() <= SPEED_MAX_MMPS;
     in_range("criterion", usize::from(d.criterion) < CRITERIA_MAX)?;
     in_range("seen_ms", d.seen_ms <= TIME_MAX_MS)?;
-    in_range("east_mm", near(d.east_mm))?;
-    in_range("north_mm", near(d.north_mm))?;
+    in_range("east_mm", is_near(d.east_mm))?;
+    in_range("north_mm", is_near(d.north_mm))?;
     in_range("error_mm", d.error_mm <= ERROR_MAX_MM)?;
-    in_range("east_mmps", slow(d.east_mmps))?;
-    in_range("north_mmps", slow(d.north_mmps))
+    in_range("east_mmps", is_slow(d.east_mmps))?;
+    in_range("north_mmps", is_slow(d.north_mmps))
 }
-
-const U16: Shape = Shape::Number(0, u16::MAX as i128);
-const MM: Shape = Shape::Number(-(POSITION_MAX_MM as i128), POSITION_MAX_MM as i128);
-const MMPS: Shape = Shape::Number(-(SPEED_MAX_MMPS as i128), SPEED_MAX_MMPS as i128);
 
 /// The places of a detection's body.
 pub(super) const DETECTION: &[Place] = &[
@@ -112,16 +106,8 @@ pub(super) const DETECTION: &[Place] = &[
         Shape::Number(0, CRITERIA_MAX as i128 - 1),
     ),
     at("by", "who named it as a target", U16),
-    at(
-        "number",
-        "its how-manieth target that was",
-        Shape::Number(0, u32::MAX as i128),
-    ),
-    at(
-        "looks",
-        "what it looks like",
-        Shape::Number(0, u8::MAX as i128),
-    ),
+    at("number", "its how-manieth target that was", U32),
+    at("looks", "what it looks like", U8),
     at(
         "seen_ms",
         "when it was seen, ms of the clock of percepts",
@@ -141,6 +127,7 @@ pub(super) const DETECTION: &[Place] = &[
 #[cfg(test)]
 pub(crate) mod samples {
     use super::super::codec::Body;
+    use super::super::limits::POSITION_MAX_MM;
     use super::*;
 
     /// A car that drives along, typically.

@@ -7,9 +7,7 @@
 
 use super::cbor::{In, Listed, Out, Wire, array_of, in_field};
 use super::codec::WireError;
-use super::limits::{
-    ACCEPTS_MAX, DURATION_MAX_MS, POSITION_MAX_MM, SPEED_MAX_MMPS, at_most, in_range,
-};
+use super::limits::{ACCEPTS_MAX, DURATION_MAX_MS, SPEED_MAX_MMPS, at_most, in_range, is_near};
 use crate::PeerId;
 use crate::protocol::conflict::{Intent, PromisedPlan};
 use crate::protocol::promises::Brief;
@@ -180,9 +178,8 @@ fn check_accepts(accepts: &[(PeerId, u32)]) -> Result<(), WireError> {
 
 fn check_promise(promise: &PromisedPlan) -> Result<(), WireError> {
     let plan = &promise.plan;
-    let near = |mm: i32| mm.unsigned_abs() <= POSITION_MAX_MM.unsigned_abs();
-    in_range("east_mm", near(plan.east_mm))?;
-    in_range("north_mm", near(plan.north_mm))?;
+    in_range("east_mm", is_near(plan.east_mm))?;
+    in_range("north_mm", is_near(plan.north_mm))?;
     in_range(
         "heading_e7",
         plan.heading_e7.unsigned_abs() <= HEADING_MOST_E7,

@@ -91,15 +91,25 @@ pub(super) fn in_range(field: &'static str, holds: bool) -> Result<(), WireError
     }
 }
 
+/// Whether a place along one axis lies in a mission.
+pub(super) fn is_near(mm: i32) -> bool {
+    mm.unsigned_abs() <= POSITION_MAX_MM.unsigned_abs()
+}
+
+/// Whether something moves along one axis as fast as anything may.
+pub(super) fn is_slow(mmps: i32) -> bool {
+    mmps.unsigned_abs() <= SPEED_MAX_MMPS
+}
+
 pub(super) fn at_most(field: &'static str, len: usize, cap: usize) -> Result<(), WireError> {
     in_range(field, len <= cap)
 }
 
 fn check_pose(east_mm: i32, north_mm: i32, heading_e4: i32) -> Result<(), WireError> {
-    let near = |v: i32, max: i32| v.unsigned_abs() <= max.unsigned_abs();
-    in_range("east_mm", near(east_mm, POSITION_MAX_MM))?;
-    in_range("north_mm", near(north_mm, POSITION_MAX_MM))?;
-    in_range("heading_e4", near(heading_e4, HEADING_MAX_E4))
+    in_range("east_mm", is_near(east_mm))?;
+    in_range("north_mm", is_near(north_mm))?;
+    let turned = heading_e4.unsigned_abs();
+    in_range("heading_e4", turned <= HEADING_MAX_E4.unsigned_abs())
 }
 
 fn check_beacon(b: &Beacon) -> Result<(), WireError> {
@@ -134,10 +144,7 @@ fn is_interval(quarters: u8) -> bool {
 
 fn check_state(s: &State) -> Result<(), WireError> {
     check_pose(s.east_mm, s.north_mm, s.heading_e4)?;
-    in_range(
-        "height_mm",
-        s.height_mm.unsigned_abs() <= POSITION_MAX_MM.unsigned_abs(),
-    )?;
+    in_range("height_mm", is_near(s.height_mm))?;
     in_range("airspeed_mmps", s.airspeed_mmps <= SPEED_MAX_MMPS)?;
     in_range("endurance_s", s.endurance_s <= DURATION_MAX_MS / 1000)?;
     in_range("covered", s.covered <= s.cells)

@@ -49,18 +49,19 @@ pub(super) const fn at(name: &'static str, what: &'static str, shape: Shape) -> 
     Place { name, what, shape }
 }
 
-const U8: Shape = Shape::Number(0, u8::MAX as i128);
-const U16: Shape = Shape::Number(0, u16::MAX as i128);
+pub(super) const U8: Shape = Shape::Number(0, u8::MAX as i128);
+pub(super) const U16: Shape = Shape::Number(0, u16::MAX as i128);
 const COUNT: Shape = Shape::Number(1, u16::MAX as i128);
-const U32: Shape = Shape::Number(0, u32::MAX as i128);
+pub(super) const U32: Shape = Shape::Number(0, u32::MAX as i128);
 const I32: Shape = Shape::Number(i32::MIN as i128, i32::MAX as i128);
 const U64: Shape = Shape::Number(0, u64::MAX as i128);
 const INTERVAL: Shape = Shape::Number(INTERVAL_LEAST as i128, INTERVAL_MOST as i128);
 const HOPS: Shape = Shape::Number(0, HOPS_MAX as i128);
-const MM: Shape = Shape::Number(-(POSITION_MAX_MM as i128), POSITION_MAX_MM as i128);
+pub(super) const MM: Shape = Shape::Number(-(POSITION_MAX_MM as i128), POSITION_MAX_MM as i128);
 const E4: Shape = Shape::Number(-(HEADING_MAX_E4 as i128), HEADING_MAX_E4 as i128);
 const SPEED: Shape = Shape::Number(0, SPEED_MAX_MMPS as i128);
-const MS: Shape = Shape::Number(0, DURATION_MAX_MS as i128);
+pub(super) const MMPS: Shape = Shape::Number(-(SPEED_MAX_MMPS as i128), SPEED_MAX_MMPS as i128);
+pub(super) const MS: Shape = Shape::Number(0, DURATION_MAX_MS as i128);
 
 const REVISION: Place = at("revision", "mission revision", U32);
 const LOOP_HASH: Place = at("loop_hash", "identifies the loop; 0 for none", U64);

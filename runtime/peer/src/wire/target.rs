@@ -7,8 +7,8 @@
 
 use super::cbor::array_of;
 use super::codec::WireError;
-use super::limits::{POSITION_MAX_MM, SPEED_MAX_MMPS, in_range};
-use super::schema::{Place, Shape, at};
+use super::limits::{in_range, is_near, is_slow};
+use super::schema::{MM, MMPS, Place, Shape, U8, U16, U32, at};
 use serde::{Deserialize, Serialize};
 
 /// Targets that one author tells of at a time: subjects `0 .. 8`, of which the first is that
@@ -78,14 +78,12 @@ array_of!(Target {
 
 /// The first field that is out of range.
 pub(super) fn check(t: &Target) -> Result<(), WireError> {
-    let near = |mm: i32| mm.unsigned_abs() <= POSITION_MAX_MM.unsigned_abs();
-    let slow = |mmps: i32| mmps.unsigned_abs() <= SPEED_MAX_MMPS;
     let spread = |e3: u32| (1..=SPREAD_MAX_E3).contains(&e3);
     in_range("seen_ms", t.seen_ms <= TIME_MAX_MS)?;
-    in_range("east_mm", near(t.east_mm))?;
-    in_range("north_mm", near(t.north_mm))?;
-    in_range("east_mmps", slow(t.east_mmps))?;
-    in_range("north_mmps", slow(t.north_mmps))?;
+    in_range("east_mm", is_near(t.east_mm))?;
+    in_range("north_mm", is_near(t.north_mm))?;
+    in_range("east_mmps", is_slow(t.east_mmps))?;
+    in_range("north_mmps", is_slow(t.north_mmps))?;
     in_range("place_e3", spread(t.place_e3))?;
     in_range("speed_e3", spread(t.speed_e3))?;
     // No covariance is as large as both variances.
@@ -95,21 +93,13 @@ pub(super) fn check(t: &Target) -> Result<(), WireError> {
     in_range("task", t.task_by > 0 || (t.task, t.revision) == (0, 0))
 }
 
-const U16: Shape = Shape::Number(0, u16::MAX as i128);
-const U32: Shape = Shape::Number(0, u32::MAX as i128);
-const MM: Shape = Shape::Number(-(POSITION_MAX_MM as i128), POSITION_MAX_MM as i128);
-const MMPS: Shape = Shape::Number(-(SPEED_MAX_MMPS as i128), SPEED_MAX_MMPS as i128);
 const SPREAD: Shape = Shape::Number(1, SPREAD_MAX_E3 as i128);
 
 /// The places of a target's body.
 pub(super) const TARGET: &[Place] = &[
     at("by", "who named it", U16),
     at("number", "its how-manieth target that was", U32),
-    at(
-        "looks",
-        "what it looks like",
-        Shape::Number(0, u8::MAX as i128),
-    ),
+    at("looks", "what it looks like", U8),
     at(
         "seen_ms",
         "when it was seen last, ms of the clock of percepts",
@@ -139,6 +129,7 @@ pub(super) const TARGET: &[Place] = &[
 #[cfg(test)]
 pub(crate) mod samples {
     use super::super::codec::Body;
+    use super::super::limits::POSITION_MAX_MM;
     use super::*;
 
     /// A target that drives along and is followed for a task, typically.

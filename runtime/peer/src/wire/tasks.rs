@@ -10,7 +10,7 @@ use super::codec::WireError;
 use super::limits::{
     DURATION_MAX_MS, HEADING_MAX_E4, POSITION_MAX_MM, SPEED_MAX_MMPS, at_most, in_range,
 };
-use super::schema::{Place, Shape, at};
+use super::schema::{MM, MS, Place, Shape, U16, U32, at};
 use serde::{Deserialize, Serialize};
 
 /// Tasks that one author may ask for at a time: numbers `0 .. 256` are the subjects of its
@@ -448,11 +448,6 @@ pub(super) fn check_bundle(b: &Bundle) -> Result<(), WireError> {
     at_most("done", b.done.len(), DONE_MAX)?;
     in_range("done", b.done.is_sorted_by(|a, b| a.task < b.task))
 }
-
-const U16: Shape = Shape::Number(0, u16::MAX as i128);
-const U32: Shape = Shape::Number(0, u32::MAX as i128);
-const MM: Shape = Shape::Number(-(POSITION_MAX_MM as i128), POSITION_MAX_MM as i128);
-const MS: Shape = Shape::Number(0, DURATION_MAX_MS as i128);
 
 const PLACE: &[Place] = &[
     at("east_mm", "mm east of the mission's origin", MM),

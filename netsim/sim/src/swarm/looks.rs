@@ -1,0 +1,79 @@
+//! What is followed and looked for, beside where vehicles are and who has them in its picture.
+
+use super::Swarm;
+use crate::check::PeerSnapshot;
+use crate::check::detections::Truth;
+use crate::check::tracks::Look;
+use skein_geometry::frame::Point;
+use skein_peer::{MISSION, Report};
+
+impl Swarm {
+    /// What a UAV has in its picture, and what it says that it follows.
+    fn look(&self, m: &PeerSnapshot) -> Look {
+        Look {
+            uav: m.id,
+            at: m.at,
+            since_ms: m.since_ms,
+            says: m.view.follows.filter(|_| m.view.speaks),
+            pictured: self.air.pictured(m.id),
+        }
+    }
+
+    /// Who says that it follows somebody is looked at beside where vehicles are.
+    pub(super) fn judge_tracks(&mut self, peers: &[PeerSnapshot]) {
+        if self.air.vehicles().is_empty() {
+            return;
+        }
+        let uavs = peers.iter().filter(|m| m.uav);
+        let looks: Vec<Look> = uavs.map(|m| self.look(m)).collect();
+        let truth: Vec<Point> = self.air.vehicles().places().collect();
+        let tracks = &mut self.checker.rules.tracks;
+        tracks.on_looks(self.now_ms, &truth, &looks, &mut self.checker.found);
+        for (task, tracked) in tracks.tracked() {
+            self.account.tracked(task, tracked);
+        }
+    }
+
+    /// What the mission looks for is judged beside what was in the pictures of those who fly it.
+    pub(super) fn judge_detections(&mut self, peers: &[PeerSnapshot]) {
+        if self.checker.rules.detections.is_idle() {
+            return;
+        }
+        let newest = self.operator.mission().revision;
+        let flies = |m: &&PeerSnapshot| m.uav && m.view.speaks && m.view.revision >= newest;
+        let flying = peers.iter().filter(flies);
+        let looks: Vec<Look> = flying.map(|m| self.look(m)).collect();
+        let truth: Vec<Truth> = self.air.vehicles().truth().collect();
+        self.checker.on_detections(self.now_ms, &truth, &looks);
+        let reports = self.checker.rules.detections.reports();
+        self.account.detected(reports);
+    }
+
+    /// A UAV tells of an object of its own: the world knows whether it is there.
+    pub(super) fn note_detection(&mut self, id: u16, report: &Report) {
+        let Report::Detected { id: task, told } = report else {
+            return;
+        };
+        let is_own = self
+            .peer_idx(id)
+            .is_some_and(|idx| self.peers[idx].config.id.0 == task.author);
+        if !is_own {
+            return;
+        }
+        self.air.advance(self.now_ms);
+        let truth: Vec<Truth> = self.air.vehicles().truth().collect();
+        let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
+        let at = (self.now_ms, id);
+        rules.detections.on_told(at, (*task, told), &truth, found);
+    }
+
+    /// Whether somebody is to follow what a UAV saw.
+    pub(super) fn is_following(&self, peers: &[PeerSnapshot]) -> bool {
+        let uavs = peers.iter().filter(|m| m.uav);
+        let mut open = uavs.flat_map(|m| &m.view.open_tasks);
+        open.any(|(id, _)| {
+            let is_uav = self.spec.uavs.iter().any(|u| u.id == id.author);
+            is_uav || id.author == MISSION
+        })
+    }
+}
