@@ -19,7 +19,9 @@
 use skein_peer::PeerId;
 use skein_peer::protocol::auction::settlement::Flying;
 use skein_peer::protocol::auction::{Auction, Effect, Event, Version};
-use skein_peer::wire::tasks::{Bundle, Offer, Progress, Task, TaskId, TaskKind, TaskPlace};
+use skein_peer::wire::tasks::{
+    Bundle, EVERY_KIND, Offer, Progress, Task, TaskId, TaskKind, TaskPlace,
+};
 use stateright::{Checker, Model, Property};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -272,6 +274,7 @@ impl Model for Case {
     fn init_states(&self) -> Vec<Sky> {
         let offer = Offer {
             speed_mmps: 1,
+            takes: EVERY_KIND,
             ..Offer::default()
         };
         let n = self.n();

@@ -895,6 +895,12 @@ impl Peer {
         self.config.role == Role::GroundStation
     }
 
+    /// Whether its journal holds the life that it is in: before that it says nothing.
+    #[must_use]
+    pub fn has_life(&self) -> bool {
+        self.life.incarnation() > 0
+    }
+
     /// The life in which it speaks at present; none while it only listens.
     #[must_use]
     pub fn speaks_in(&self) -> Option<Incarnation> {

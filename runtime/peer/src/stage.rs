@@ -28,6 +28,7 @@ use crate::mission::Mission;
 use crate::mission_state::MissionState;
 use crate::protocol::runs::legs_of;
 use crate::wire::message::Order;
+use crate::wire::tasks::{ERRANDS, RELAYS, TRACKS};
 use skein_behaviors::Goal;
 use std::sync::Arc;
 
@@ -145,6 +146,32 @@ impl MissionState {
         }
         (stage.at, stage.by) = (to, by);
         stage.ended |= stage.state().part == Part::Ends;
+    }
+
+    /// How its mission, as it stands, would fly tasks if they were given to it: a bit for each
+    /// way, as [`crate::wire::tasks::Offer::takes`] has them. What the operator orders meanwhile
+    /// does not count.
+    pub fn takes(&self, now: Time) -> u8 {
+        use MissionEvent::{MissionComplete, RelayGiven, TargetGiven, TargetLost, TaskGiven};
+        let machine = &self.stage.machine;
+        let leads_to = |event, goal| {
+            let holds = |on, after_s| match on {
+                // A task that is open leaves no mission complete.
+                TaskGiven | RelayGiven | TargetGiven | TargetLost | MissionComplete => on == event,
+                _ => self.holds(on, after_s, Order::Resume, now),
+            };
+            let to = machine.look(self.stage.at, &holds);
+            machine.state(to.map_or(self.stage.at, |(to, _)| to)).goal == goal
+        };
+        let ways = [
+            (ERRANDS, TaskGiven, StateGoal::Task),
+            (RELAYS, RelayGiven, StateGoal::Relay),
+            (TRACKS, TargetGiven, StateGoal::Follow),
+        ];
+        let led = ways
+            .iter()
+            .filter(|(_, event, goal)| leads_to(*event, *goal));
+        led.map(|(bit, _, _)| bit).sum()
     }
 
     fn holds(&self, on: MissionEvent, after_s: u32, order: Order, now: Time) -> bool {

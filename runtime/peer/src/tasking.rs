@@ -14,6 +14,7 @@
 //! | all of it is seen | done: told, and the UAV is free for the next |
 //! | the flight is over and not all is seen, there is none | once more, then others are asked to relieve it |
 //! | the auction drops it, the fuel is due, the operator says return, another life begins | it is left |
+//! | what it claims its mission, as it stands, does not lead it to | it is let go |
 //! | its time is over | it is expired |
 //! | a ground station: somebody did a task of its operator, its time is over | that is told in the task's next revision |
 //!
@@ -392,6 +393,7 @@ impl Tasking {
             endurance_ms: spare_ms.min(DURATION_MAX_MS),
             sensors: self.sensors,
             section_ms: section_ms.min(DURATION_MAX_MS),
+            takes: state.takes(s.now),
         })
     }
 
@@ -410,7 +412,13 @@ impl Tasking {
         }
         let is_period = s.now.since_ms(self.last_period) >= s.membership.interval_ms();
         let able = Self::is_able(s, order, state);
-        let is_told = is_period || able != self.was_able;
+        // What a mission brings goes before its cells.
+        let is_open = !state.negotiation.sections.complete()
+            && !state.stage.ended()
+            && state.geometry.mission.tasks.is_empty();
+        // Nobody has to be left for cells from now on, or somebody has.
+        let turns = is_open != self.auction.cells_open();
+        let is_told = is_period || able != self.was_able || turns;
         let offer = (is_told && able).then(|| self.present(s, state)).flatten();
         if is_told {
             let live = s.membership.live().map(|(id, _)| id);
@@ -420,10 +428,6 @@ impl Tasking {
             };
             events.push(Event::Live(live.filter(uav).map(PeerId).collect()));
             events.push(Event::Map(map_of(state)));
-            // What a mission brings goes before its cells.
-            let is_open = !state.negotiation.sections.complete()
-                && !state.stage.ended()
-                && state.geometry.mission.tasks.is_empty();
             events.push(Event::Cells(is_open));
             events.push(Event::Present(offer.unwrap_or_default()));
         }
@@ -436,6 +440,14 @@ impl Tasking {
             self.leave(Some(state));
         }
         self.was_able = able;
+        if let Some(offer) = offer {
+            let strays = self.led_off(offer.takes);
+            events.extend(strays.iter().map(|id| Event::LetGo(*id)));
+            if let Some(id) = self.flown().filter(|id| strays.contains(id)) {
+                effects.extend(self.told(id, TaskNews::Left));
+                self.leave(Some(state));
+            }
+        }
         if is_period {
             self.last_period = s.now;
             let diameter = s.membership.diameter(s.now);
@@ -455,6 +467,17 @@ impl Tasking {
         }
         effects.extend(self.tell_hopeless());
         effects
+    }
+
+    /// What it claims, and its mission does not lead it to.
+    fn led_off(&self, takes: u8) -> Vec<TaskId> {
+        let claims = self.auction.held().iter();
+        let claims = claims.filter(|t| t.progress != Progress::Done);
+        let strays = |id: &TaskId| {
+            let known = self.known.get(id);
+            known.is_some_and(|k| takes & k.task.kind.taken_as() == 0)
+        };
+        claims.map(|t| t.task).filter(strays).collect()
     }
 
     /// Whether a task that nobody could do is in the reach of this UAV by now.
@@ -725,6 +748,8 @@ pub(crate) fn why_nobody<'a>(task: &Task, offers: impl Iterator<Item = &'a Offer
     let able: Vec<&Offer> = offers.filter(|o| o.speed_mmps > 0).collect();
     if able.is_empty() {
         "no UAV takes tasks".to_owned()
+    } else if !able.iter().any(|o| o.takes & task.kind.taken_as() != 0) {
+        "as it stands, the mission leads no UAV to it".to_owned()
     } else if !able.iter().any(|o| carries(o.sensors, task.sensor)) {
         format!("no UAV carries {}", sensor_name(task.sensor))
     } else {

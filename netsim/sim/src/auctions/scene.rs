@@ -5,7 +5,7 @@ use skein_geometry::random::SplitMix64;
 use skein_peer::PeerId;
 use skein_peer::protocol::auction::flown::FlownTime;
 use skein_peer::protocol::auction::settlement::{Bidder, Flying, Problem, Tasks};
-use skein_peer::wire::tasks::{Offer, Task, TaskId, TaskKind, TaskPlace};
+use skein_peer::wire::tasks::{EVERY_KIND, Offer, Task, TaskId, TaskKind, TaskPlace};
 use std::collections::BTreeSet;
 
 /// Side of the square in which everything lies, mm.
@@ -66,6 +66,7 @@ impl Draw {
             endurance_ms: 14_400_000,
             sensors: by_turn | by_chance,
             section_ms: 0,
+            takes: EVERY_KIND,
         }
     }
 

@@ -374,6 +374,7 @@ impl Swarm {
                     && let Some((token, ok)) = self.peers[idx].disk.sync()
                 {
                     self.fold(idx, Kind::Stored, token);
+                    self.peers[idx].on_stored(ok);
                     self.feed(idx, Input::Stored { token, ok });
                 }
             }
@@ -998,7 +999,11 @@ impl Swarm {
         };
         let now_ms = self.now_ms;
         match report {
-            Report::Booted { .. } if self.peers[idx].silent => {
+            Report::Booted { .. } => {
+                self.peers[idx].is_lifeless = false;
+                if !self.peers[idx].silent {
+                    return;
+                }
                 self.peers[idx].silent = false;
                 self.peers[idx].since_ms = now_ms;
                 self.checker.on_voice(id);
@@ -1051,11 +1056,7 @@ impl Swarm {
     }
 
     fn observe_graph(&mut self) {
-        let running = self
-            .peers
-            .iter()
-            .filter(|s| s.process == Process::Running && !s.silent)
-            .map(SimPeer::id);
+        let running = self.peers.iter().filter(|s| s.has_voice()).map(SimPeer::id);
         let mut ids: Vec<u16> = running.collect();
         ids.sort_unstable();
         let graph = self.air.graph(ids);

@@ -114,6 +114,9 @@ pub struct SimPeer {
     pub finished: bool,
     /// Whether it is silent since a twin speaks.
     pub silent: bool,
+    /// Whether its disk did not take the life that it was to begin: it says nothing, and passes
+    /// nothing on.
+    pub is_lifeless: bool,
     clock_draws: Stream,
     nonce: Stream,
 }
@@ -141,6 +144,7 @@ impl SimPeer {
             frame: Filling::default(),
             finished: false,
             silent: false,
+            is_lifeless: false,
             clock_draws,
             nonce: Stream::new(seed, Concern::Nonce(id)),
         }
@@ -174,6 +178,7 @@ impl SimPeer {
         self.timer_ms = None;
         self.finished = false;
         self.silent = false;
+        self.is_lifeless = false;
         self.inbox.clear();
         self.peer = Some(Box::new(Peer::new(self.config.clone())));
         #[allow(
@@ -194,6 +199,7 @@ impl SimPeer {
         self.disk.crash();
         self.finished = false;
         self.silent = false;
+        self.is_lifeless = false;
         self.peer.take()
     }
 
@@ -224,6 +230,19 @@ impl SimPeer {
             self.inbox.remove(oldest);
         }
         self.inbox.push_back((now_ms, input));
+    }
+
+    /// Its disk took a write, or did not.
+    pub fn on_stored(&mut self, ok: bool) {
+        let has_life = self.peer.as_ref().is_some_and(|p| p.has_life());
+        self.is_lifeless |= !ok && !has_life;
+    }
+
+    /// Whether its radio carries anything: what it says itself, and in its beacons what it
+    /// knows of others.
+    #[must_use]
+    pub fn has_voice(&self) -> bool {
+        self.process == Process::Running && !self.silent && !self.is_lifeless
     }
 
     /// What it believes and where it is, while it runs.

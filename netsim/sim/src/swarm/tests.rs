@@ -399,6 +399,32 @@ fn a_peer_whose_disk_takes_no_writes_says_so_and_is_of_use_again_when_it_does() 
 }
 
 #[test]
+fn who_could_write_down_no_life_joins_nobody_until_it_can() {
+    let faults = vec![
+        at(
+            0,
+            Fault::FailStores {
+                peer: 100,
+                one_in: 1,
+            },
+        ),
+        at(40_000, Fault::HealStores { peer: 100 }),
+    ];
+    let o = run_with(2, 6, faults);
+    passed(&o);
+    let has_station = |e: &crate::history::Entry| match &e.what {
+        What::Components(all) => Some((e.time_ms, all.iter().flatten().any(|id| *id == 100))),
+        _ => None,
+    };
+    let seen: Vec<(u64, bool)> = o.entries.iter().filter_map(has_station).collect();
+    let first_ms = seen
+        .iter()
+        .find(|(t, there)| *there && *t > 1_000)
+        .map(|s| s.0);
+    assert!(first_ms.is_some_and(|t| t >= 40_000), "{seen:?}");
+}
+
+#[test]
 fn what_a_slow_disk_holds_up_is_spoken_late_and_breaks_no_rule() {
     let slow = Fault::SlowStores {
         peer: 2,

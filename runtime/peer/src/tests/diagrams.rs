@@ -5,12 +5,14 @@ use super::{record, with_operator};
 use crate::diagram::{
     Action, Behaviour, Diagram, MissionEvent, Part, Purpose, State, StateGoal, Transition,
 };
-use crate::input::Command;
+use crate::input::{Command, NewTask, TaskEdit};
 use crate::mission::Mission;
+use crate::output::TaskNews;
 use crate::testing::{GROUND_STATION, Harness, mission};
 use crate::why::{Reason, Work};
 use crate::wire::codec::Body;
 use crate::wire::message::Finished;
+use crate::wire::tasks::TaskKind;
 use crate::{Input, Report};
 use std::sync::Arc;
 
@@ -148,6 +150,34 @@ fn a_mission_ends_by_its_timer_whatever_is_seen() {
         (at.east_m + 60.0).hypot(at.north_m + 60.0)
     };
     assert!(h.run_until(120, |h| away(h) < 60.0), "{}", away(&h));
+}
+
+#[test]
+fn what_the_mission_leads_nobody_to_is_let_go_and_that_is_said() {
+    let mut h = with_operator(1, patrol(40));
+    h.run_s(34);
+    let task = NewTask {
+        name: Some("gate".into()),
+        kind: TaskKind::Pinpoint,
+        places: vec![(2_000_000, 2_000_000)],
+        radius_mm: 10_000,
+        worth: 100,
+        within_ms: None,
+        sensor: 0,
+    };
+    h.feed(
+        GROUND_STATION,
+        Input::Command(Command::Task(TaskEdit::Add(task))),
+    );
+    assert!(h.run_until(5, |h| work(h, 1).reason == Reason::Task));
+    // The time of the mission is over before it is there.
+    assert!(h.run_until(30, |h| work(h, 1).reason == Reason::TimeIsOver));
+    h.run_s(3);
+    assert_eq!(h.beliefs(1).tasks, []);
+    assert!(h.beliefs(1).finished);
+    let led_off = |(_, r): &(u64, Report)| matches!(r, Report::Task { news: TaskNews::NobodyCan(why), .. } if why.contains("leads no UAV"));
+    let said = h.seat(1).reports.iter().filter(|r| led_off(r)).count();
+    assert_eq!(said, 1);
 }
 
 #[test]

@@ -223,6 +223,30 @@ pub struct Offer {
     /// What it has left to fly of its section, milliseconds; 0 where it has none. Who has some
     /// comes back to it.
     pub section_ms: u32,
+    /// A bit for each way in which its mission, as it stands, would fly a task: [`ERRANDS`],
+    /// [`RELAYS`], [`TRACKS`].
+    pub takes: u8,
+}
+
+/// Of [`Offer::takes`]: places, lines and areas, flown to and seen.
+pub const ERRANDS: u8 = 1;
+/// Of [`Offer::takes`]: relay positions.
+pub const RELAYS: u8 = 2;
+/// Of [`Offer::takes`]: targets to follow.
+pub const TRACKS: u8 = 4;
+/// Of [`Offer::takes`]: tasks of every kind.
+pub const EVERY_KIND: u8 = ERRANDS | RELAYS | TRACKS;
+
+impl TaskKind {
+    /// Its bit of [`Offer::takes`].
+    #[must_use]
+    pub fn taken_as(self) -> u8 {
+        match self {
+            Self::Pinpoint | Self::Line | Self::Area => ERRANDS,
+            Self::Relay => RELAYS,
+            Self::Track => TRACKS,
+        }
+    }
 }
 
 /// How far a UAV is with a task. Of two claims on one task the higher state goes before.
@@ -323,7 +347,8 @@ array_of!(Offer {
     radius_mm,
     endurance_ms,
     sensors,
-    section_ms
+    section_ms,
+    takes
 });
 array_of!(Bundle {
     offer,
@@ -434,6 +459,7 @@ pub(super) fn check_bundle(b: &Bundle) -> Result<(), WireError> {
     )?;
     in_range("endurance_ms", b.offer.endurance_ms <= DURATION_MAX_MS)?;
     in_range("section_ms", b.offer.section_ms <= DURATION_MAX_MS)?;
+    in_range("takes", b.offer.takes <= EVERY_KIND)?;
     at_most("tasks", b.tasks.len(), BUNDLE_MAX)?;
     in_range("kept", usize::from(b.kept) <= b.tasks.len())?;
     in_range("begun", b.begun <= b.kept)?;
@@ -538,6 +564,11 @@ const OFFER: &[Place] = &[
         "section_ms",
         "flight time left in its section, ms; 0 without one",
         MS,
+    ),
+    at(
+        "takes",
+        "what its mission would fly, as bits: 1 places, lines and areas; 2 relay positions; 4 targets",
+        Shape::Number(0, EVERY_KIND as i128),
     ),
 ];
 

@@ -102,6 +102,10 @@ impl Airborne {
         flight_ms((left - from.position()).norm(), self.offer.speed_mmps)
     }
 
+    fn takes(&self, kind: TaskKind) -> bool {
+        self.offer.takes & kind.taken_as() != 0
+    }
+
     fn has(&self, sensor: u8) -> bool {
         let bit = u32::from(sensor).checked_sub(1);
         bit.is_none_or(|bit| self.offer.sensors >> bit.min(31) & 1 == 1)
@@ -203,7 +207,7 @@ impl Flying for FlownTime {
 
 /// Where a task leaves a UAV, and what it is worth when it is done then.
 fn flown(at: &Airborne, task: &Task, ways: &impl Ways) -> Option<(Airborne, u32)> {
-    if at.offer.speed_mmps == 0 || at.stays || !at.has(task.sensor) {
+    if at.offer.speed_mmps == 0 || at.stays || !at.has(task.sensor) || !at.takes(task.kind) {
         return None;
     }
     // An area is begun at a corner, and its time says how long it takes.
@@ -249,6 +253,7 @@ fn flown(at: &Airborne, task: &Task, ways: &impl Ways) -> Option<(Airborne, u32)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wire::tasks::{EVERY_KIND, TRACKS};
 
     const OFFER: Offer = Offer {
         east_mm: 0,
@@ -259,6 +264,7 @@ mod tests {
         endurance_ms: 600_000,
         sensors: 0b10,
         section_ms: 0,
+        takes: EVERY_KIND,
     };
 
     fn at(east_m: i32, north_m: i32) -> TaskPlace {
@@ -363,6 +369,15 @@ mod tests {
         assert_eq!(fly(grounded, &near), None);
         let far = task(TaskKind::Pinpoint, &[at(12_001, 0)]);
         assert_eq!(fly(OFFER, &far), None);
+        // Its mission is over for all but targets.
+        let follows = Offer {
+            takes: TRACKS,
+            ..OFFER
+        };
+        near.sensor = 0;
+        assert_eq!(fly(follows, &near), None);
+        assert!(fly(follows, &task(TaskKind::Track, &[at(100, 0)])).is_some());
+        assert!(fly(follows, &task(TaskKind::Relay, &[at(100, 0)])).is_none());
         let nowhere = task(TaskKind::Pinpoint, &[]);
         assert_eq!(fly(OFFER, &nowhere), None);
     }

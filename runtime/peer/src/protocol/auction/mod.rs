@@ -94,6 +94,8 @@ pub enum Event {
     Relieve(TaskId),
     /// It can do no task any more: what it claims is open again.
     GiveUp,
+    /// Its mission does not lead it to this task any more: it is open again.
+    LetGo(TaskId),
     /// What was unassigned may be in its reach by now.
     OfferAnew,
     /// Whether cells are to be covered, for which somebody has to be left.
@@ -228,6 +230,12 @@ impl Auction {
         others.chain([&self.own.offer])
     }
 
+    /// Whether cells are to be covered, as far as it was told.
+    #[must_use]
+    pub fn cells_open(&self) -> bool {
+        self.cells_open
+    }
+
     /// Tasks that nobody who lives can do.
     #[must_use]
     pub fn unassigned(&self) -> &[TaskId] {
@@ -318,10 +326,10 @@ impl Auction {
                 self.stale = true;
             }
             Event::Present(offer) => {
-                // Only whether it can do anything at all is news; where it is will be asked
-                // for when there is a reason.
-                let could = self.present.speed_mmps > 0;
-                self.stale |= could != (offer.speed_mmps > 0);
+                // Only what it can do at all is news; where it is will be asked for when there
+                // is a reason.
+                let can = |o: &Offer| (o.speed_mmps > 0, o.takes);
+                self.stale |= can(&self.present) != can(&offer);
                 self.present = offer;
             }
             Event::Free => self.free = true,
@@ -340,6 +348,9 @@ impl Auction {
                 let claims = claims.filter(|t| t.progress != Progress::Done);
                 let all: Vec<TaskId> = claims.map(|t| t.task).collect();
                 self.let_go(&all);
+            }
+            Event::LetGo(id) => {
+                self.let_go(&[id]);
             }
             Event::OfferAnew => self.stale = true,
             Event::Cells(open) => {

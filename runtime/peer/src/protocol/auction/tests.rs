@@ -2,7 +2,7 @@
 
 use super::settlement::{Bidder, Flying, Problem, settle, settle_greedily, value_of};
 use super::*;
-use crate::wire::tasks::{TaskKind, TaskPlace};
+use crate::wire::tasks::{EVERY_KIND, TaskKind, TaskPlace};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -51,6 +51,7 @@ const OFFER: Offer = Offer {
     endurance_ms: 1,
     sensors: 0,
     section_ms: 0,
+    takes: EVERY_KIND,
 };
 
 /// Some peers that hear each other.

@@ -379,6 +379,7 @@ fn every_limit_is_sharp() {
                 with(&|b| b.offer.radius_mm = 0, "radius_mm");
                 with(&|b| b.offer.endurance_ms += 1, "endurance_ms");
                 with(&|b| b.offer.section_ms += 1, "section_ms");
+                with(&|b| b.offer.takes += 1, "takes");
                 with(&|b| b.kept += 1, "kept");
                 with(&|b| b.begun += 1, "begun");
                 with(&|b| b.tasks[1] = b.tasks[0], "tasks");

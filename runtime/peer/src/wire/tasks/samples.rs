@@ -40,6 +40,7 @@ pub(crate) fn bundle() -> Bundle {
             endurance_ms: 1_200_000,
             sensors: 1,
             section_ms: 90_000,
+            takes: ERRANDS | TRACKS,
         },
         kept: 1,
         begun: 0,
@@ -67,7 +68,7 @@ pub(crate) fn golden() -> Vec<(Body, &'static str)> {
         ),
         (
             Body::Bundle(bundle()),
-            "86881903e83907cf193d5c19465019dea81a00124f80011a00015f90010082\
+            "86891903e83907cf193d5c19465019dea81a00124f80011a00015f9005010082\
              85090702\
              1a02faf080028509\
              19012c021a02faf080008183090101\
@@ -112,6 +113,7 @@ pub(crate) fn largest() -> Vec<Body> {
                 endurance_ms: DURATION_MAX_MS,
                 sensors: u32::MAX,
                 section_ms: DURATION_MAX_MS,
+                takes: EVERY_KIND,
             },
             kept: count(BUNDLE_MAX),
             begun: count(BUNDLE_MAX),
