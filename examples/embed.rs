@@ -144,6 +144,7 @@ impl Uav {
                 .map_or(cruise_mps, |s| s.airspeed_mps),
             wind_east_mps: 0.0,
             wind_north_mps: 0.0,
+            wind_unknown: false,
             endurance_s: (airframe().endurance_s - flown_s as f64).max(0.0),
             takes_off_in_ms: 0,
             failsafe: false,

@@ -61,7 +61,7 @@ fn a_wind_comes_from_where_it_is_said_to_and_must_leave_the_turns_flyable() {
         let text = text.replacen("min_coverable: 0.97", "min_coverable: 0.96", 1);
         parse_with("x", &text, &builtin_files(), &Overrides::default())
     };
-    let wind = windy("2").unwrap().spec.wind;
+    let wind = windy("2").unwrap().spec.wind.first;
     assert!(
         (wind.east_mps - 2f64.sqrt()).abs() < 1e-9 && (wind.north_mps - 2f64.sqrt()).abs() < 1e-9
     );

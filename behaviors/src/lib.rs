@@ -4,6 +4,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`percept`] | what a UAV senses |
+//! | [`wind_estimate`] | the wind, where nobody tells it |
 //! | [`traffic`] | what it senses of other UAVs |
 //! | [`sightings`] | what its camera sees of vehicles |
 //! | [`setpoint`] | what it is told to fly |
@@ -22,6 +23,7 @@ pub mod sightings;
 #[cfg(test)]
 mod testing;
 pub mod traffic;
+pub mod wind_estimate;
 
 pub use event::{Event, Unflyable};
 pub use executive::{Executive, Forecast, GivenFlight, Goal};

@@ -20,6 +20,10 @@ pub struct Percept {
     pub wind_east_mps: f64,
     /// Wind, m/s towards north.
     pub wind_north_mps: f64,
+    /// Whether nobody tells the wind, and the two above say nothing: then it is estimated
+    /// ([`crate::wind_estimate`]).
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub wind_unknown: bool,
     /// Flight time left at cruise, seconds.
     pub endurance_s: f64,
     /// Time until it takes off, milliseconds; 0 in the air.

@@ -39,6 +39,7 @@ pub fn percept_at(pose: Pose, time_ms: u64) -> Percept {
         airspeed_mps: 13.0,
         wind_east_mps: 0.0,
         wind_north_mps: 0.0,
+        wind_unknown: false,
         endurance_s: 3000.0,
         takes_off_in_ms: 0,
         failsafe: false,
@@ -122,6 +123,7 @@ impl Wing {
             failsafe: self.failsafe,
             wind_east_mps: self.wind_mps.0,
             wind_north_mps: self.wind_mps.1,
+            wind_unknown: false,
             ..percept_at(self.pose, self.time_ms)
         }
     }

@@ -512,6 +512,7 @@ mod tests {
             let percept = Percept {
                 wind_east_mps: wind.x,
                 wind_north_mps: wind.y,
+                wind_unknown: false,
                 ..percept_at(pose, i * 200)
             };
             let out = e.check(&percept, straight(speed_mps));

@@ -37,6 +37,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/fire.json5"),
     ),
     (
+        "gusts",
+        "gusts.json5",
+        include_str!("../../../configs/trials/gusts.json5"),
+    ),
+    (
         "geofence",
         "geofence.json5",
         include_str!("../../../configs/trials/geofence.json5"),

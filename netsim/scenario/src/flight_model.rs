@@ -37,7 +37,11 @@ pub(crate) fn turning_mps(airframe: &Airframe, wind_mps: f64, radius_m: f64) -> 
 
 fn airspeed_mps(u: &UavSpec, spec: &Spec) -> f64 {
     let radius_m = spec.mission.turn_radius_m();
-    turning_mps(&u.airframe, spec.wind.speed_mps(), radius_m)
+    turning_mps(
+        &u.airframe,
+        spec.wind.strongest_held().speed_mps(),
+        radius_m,
+    )
 }
 
 /// Half the footprint across and along the course that the camera sees for certain,
@@ -85,7 +89,8 @@ pub(crate) fn return_s(pace: &Pace, spec: &Spec, the_loop: &CoverageLoop) -> f64
 impl Pace {
     /// The pace of a UAV in the wind of its scenario.
     pub(crate) fn of(u: &UavSpec, spec: &Spec, the_loop: &CoverageLoop) -> Self {
-        let (v, w) = (airspeed_mps(u, spec), spec.wind.speed_mps());
+        let wind = spec.wind.strongest();
+        let (v, w) = (airspeed_mps(u, spec), wind.speed_mps());
         if w <= 0.0 {
             let radius_m = u.airframe.min_turn_radius_m();
             return Self {
@@ -96,9 +101,9 @@ impl Pace {
         }
         let uav = Performance::of(&u.airframe, v);
         Self {
-            loop_mps: loop_mps(the_loop, v, spec.wind),
+            loop_mps: loop_mps(the_loop, v, wind),
             least_mps: v - w,
-            turn_s: turn_round_s(uav, spec.wind).unwrap_or(f64::INFINITY),
+            turn_s: turn_round_s(uav, wind).unwrap_or(f64::INFINITY),
         }
     }
 }
@@ -149,14 +154,21 @@ pub(crate) fn loop_energy_s(
 /// What to say when the wind carries a UAV away, or out of the turns of the loop even
 /// at its slowest.
 pub(crate) fn too_windy(spec: &Spec) -> Option<String> {
-    let wind_mps = spec.wind.speed_mps();
+    let wind_mps = spec.wind.strongest_held().speed_mps();
     if wind_mps <= 0.0 {
         return None;
     }
+    let blows = match spec.wind.estimated {
+        None => format!("a wind of {wind_mps:.1} m/s"),
+        Some(_) => format!(
+            "a wind of {:.1} m/s, taken for {wind_mps:.1} m/s at most by who estimates it,",
+            spec.wind.strongest().speed_mps()
+        ),
+    };
     let drifting = spec.uavs.iter().find(|u| airspeed_mps(u, spec) <= wind_mps);
     if let Some(u) = drifting {
         return Some(format!(
-            "a wind of {wind_mps} m/s carries UAV {} away, which flies {:.1} m/s through the air; expected less wind than that",
+            "{blows} carries UAV {} away, which flies {:.1} m/s through the air; expected less wind than that",
             u.id,
             airspeed_mps(u, spec)
         ));
@@ -175,7 +187,7 @@ pub(crate) fn too_windy(spec: &Spec) -> Option<String> {
         let a = &worst.airframe;
         let wide_m = a.ground_turn_radius_m(a.least_airspeed_mps(), wind_mps);
         format!(
-            "a wind of {wind_mps} m/s carries UAV {} out of turns of {radius_m} m even at its slowest; at most {:.1} m/s, or wider lanes: {:.0} m",
+            "{blows} carries UAV {} out of turns of {radius_m} m even at its slowest; at most {:.1} m/s, or wider lanes: {:.0} m",
             worst.id,
             most_mps.max(0.0),
             (2.0 * wide_m).ceil()
@@ -191,7 +203,7 @@ mod tests {
 
     fn with(wind: Wind) -> Spec {
         let mut spec = fixture::square(3);
-        spec.wind = wind;
+        spec.wind = wind.into();
         spec
     }
 

@@ -50,7 +50,7 @@ pub(crate) fn forecast(
         makespan_s: total.makespan_s,
         seen_share: seen_share(spec, geometry),
         loop_m: total.loop_m,
-        energy_s: loop_energy_s(the_loop, &airframes, spec.wind, radius_m),
+        energy_s: loop_energy_s(the_loop, &airframes, spec.wind.first, radius_m),
     })
 }
 

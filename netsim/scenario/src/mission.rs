@@ -47,7 +47,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
     let first = s.fleet.members.first().and_then(|m| m.launch);
     let launch = first.map_or(base, |l| l.position());
     let seen = |side: fn((f64, f64)) -> f64| {
-        let each = airframes().map(|a| side(footprint_m(a, s.wind, turn_m)));
+        let each = airframes().map(|a| side(footprint_m(a, s.wind.strongest_held(), turn_m)));
         each.fold(f64::MAX, f64::min)
     };
     let mission = Mission {
@@ -112,7 +112,9 @@ fn turning(s: &Stated) -> Result<f64, Error> {
             2.0 * calm_m
         )));
     }
-    Ok(calm_m.max(widest(&|a| turn_radius_m(a, s.wind, spacing_m))))
+    Ok(calm_m.max(widest(&|a| {
+        turn_radius_m(a, s.wind.strongest_held(), spacing_m)
+    })))
 }
 
 /// How far UAVs sense each other, metres: what is stated, or what flying at one height asks
@@ -130,7 +132,7 @@ fn check_separation(s: &Stated, mission: &Mission) -> Result<(), Error> {
     if s.fleet.separation_m <= 0.0 {
         return Ok(());
     }
-    if s.wind != Wind::CALM {
+    if s.wind.winds().any(|w| w != Wind::CALM) {
         return Err(s.places.wrong(
             "fleet.separation_m",
             "UAVs keep apart at one height in still air only; leave the wind out, or separation_m, so that each has a height of its own",

@@ -57,7 +57,7 @@ impl Scenario {
         let geometry = if stated.lanes.tree.is_none() {
             let fleet = &stated.fleet.members;
             let airframes: Vec<_> = fleet.iter().map(|m| m.airframe).collect();
-            cheapest(geometry, &airframes, stated.wind)
+            cheapest(geometry, &airframes, stated.wind.first)
         } else {
             geometry
         };
@@ -136,7 +136,7 @@ fn spec(s: &Stated, geometry: &MissionGeometry) -> Spec {
         zones: s.terrain.zones.clone(),
         uavs: launch(&s.fleet, geometry),
         ground: s.ground_station.clone(),
-        wind: s.wind,
+        wind: s.wind.clone(),
         objective: s.objective,
         radio: s.radio,
         beacon_period_ms: s.run.beacon_period_ms,

@@ -44,6 +44,7 @@ pub mod swarm;
 pub mod timeline;
 mod troubles;
 mod twins;
+pub mod weather;
 pub mod world;
 
 pub use check::Findings;

@@ -4,9 +4,9 @@ use crate::fault::TimedFault;
 use crate::pursuit::roads::Roads;
 use crate::pursuit::vehicle::Behaviour;
 use crate::twins::Twins;
+use crate::weather::Weather;
 use skein_flight::airframe::Airframe;
 use skein_flight::trajectory::timed::Objective;
-use skein_flight::trajectory::wind::Wind;
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Pose};
 use skein_peer::Mission;
@@ -31,8 +31,8 @@ pub struct Spec {
     pub uavs: Vec<UavSpec>,
     /// The ground station, if there is one.
     pub ground: Option<GroundStationSpec>,
-    /// The wind, everywhere and all the time.
-    pub wind: Wind,
+    /// The wind, everywhere the same.
+    pub wind: Weather,
     /// What UAVs spend little of, off the loop.
     pub objective: Objective,
     /// The radio.

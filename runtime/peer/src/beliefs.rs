@@ -56,6 +56,8 @@ pub struct Beliefs {
     /// Flight time before it must turn home from where it is, milliseconds (endurance less
     /// reserve and way home); 0 where there is no way home.
     pub spendable_ms: u32,
+    /// What it takes the wind for, m/s towards east and north; `None` before it flies.
+    pub wind_mps: Option<(f64, f64)>,
     /// Whether its fuel is due: it flies home.
     pub is_fuel_due: bool,
     /// What it holds of tasks: which, in which revision, how far it is.
@@ -64,6 +66,10 @@ pub struct Beliefs {
     pub relays: bool,
     /// In which state of its mission's diagram it is, by number, and the event that led there.
     pub stage: Option<(usize, MissionEvent)>,
+    /// Whether cells of its mission are beyond everybody's fuel.
+    pub cannot_fly_all: bool,
+    /// Whether a peer that it believed to be down since it came to its state is there again.
+    pub missed: bool,
     /// Whether it knew many and hears nobody.
     pub hears_nobody: bool,
     /// Whom it says that it follows, once it had seen it.

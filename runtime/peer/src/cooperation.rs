@@ -350,8 +350,10 @@ impl Cooperation {
             return effects;
         };
         effects.extend(state.watch_fuel(s.percept));
-        let mut all = s.membership.all();
-        state.lost = all.any(|(.., status)| status == Status::Down);
+        let all = s.membership.all();
+        state.lost = all.filter(|(.., status)| *status == Status::Down).count();
+        let wind = |p: &Percept| p.wind_east_mps.hypot(p.wind_north_mps);
+        state.wind_mps = s.percept.map_or(0.0, wind);
         state.look(s.now, order);
         if let Some(separation) = &mut state.separation {
             let all = s.membership.all();
@@ -517,6 +519,8 @@ impl Cooperation {
         beliefs.finished = state.finished;
         beliefs.relays = state.relay.is_some();
         beliefs.hears_nobody = state.astray;
+        beliefs.cannot_fly_all = state.cannot_fly_all();
+        beliefs.missed = state.stage.missed(state.lost);
         beliefs.stage = Some((state.stage.at(), state.stage.by()));
         beliefs.spendable_ms = state.spendable_ms(percept);
         beliefs.is_fuel_due = state.fuel.is_due();

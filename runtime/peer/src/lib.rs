@@ -142,6 +142,7 @@ pub use mission::Mission;
 pub use output::{Output, Priority, Report};
 pub use overview::Overview;
 pub use peer::Peer;
+pub use stage::WIND_CALMER_MPS;
 pub use task::{CoverageTask, LineTask, PointTask};
 pub use task_desk::{TaskHolder, TaskView, WATCHERS_MAX};
 pub use tasking::{BROUGHT_MAX, Follows, MISSION};

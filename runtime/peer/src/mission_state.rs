@@ -133,8 +133,10 @@ pub(crate) struct MissionState {
     pub astray: bool,
     /// Whether another process under its id has silenced this peer.
     pub silent: bool,
-    /// Whether it believes a peer of its fleet to be down.
-    pub lost: bool,
+    /// How many peers of its fleet it believes to be down.
+    pub lost: usize,
+    /// What it takes the wind for, m/s; 0 without a percept.
+    pub wind_mps: f64,
     /// Whether something that the mission looks for was told.
     pub detected: bool,
     /// Whether it lost the target that it follows.
@@ -690,7 +692,8 @@ impl MissionState {
             finished: false,
             astray: false,
             silent: false,
-            lost: false,
+            lost: 0,
+            wind_mps: 0.0,
             detected: false,
             target_lost: false,
             complete: false,

@@ -40,6 +40,7 @@ use crate::{Incarnation, Mission, PeerId};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use skein_behaviors::Percept;
+use skein_behaviors::wind_estimate::WindEstimate;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
@@ -86,6 +87,8 @@ pub struct Peer {
     outbound: Outbound,
     cooperation: Cooperation,
     percept: Option<Percept>,
+    /// The wind, where percepts do not tell it.
+    wind: WindEstimate,
     durable: Durable,
     outputs: VecDeque<Output>,
     last_token: u64,
@@ -115,6 +118,7 @@ impl Peer {
             outbound: Outbound::new(u64::from(period), &mut timers),
             cooperation: Cooperation::new(&config),
             percept: None,
+            wind: WindEstimate::default(),
             durable: Durable::default(),
             outputs: VecDeque::new(),
             last_token: 1,
@@ -243,6 +247,7 @@ impl Peer {
         if finite.iter().any(|v| !v.is_finite()) {
             return self.refuse("a percept that is not finite".into());
         }
+        let percept = self.wind.complete(percept);
         self.percept = Some(percept);
         let mut effects = self.cooperation.on_percept(self.now, &percept);
         // One airframe is not flown by two.
@@ -931,6 +936,10 @@ impl Peer {
             interval_ms: self.relay.air.interval_ms(),
             order: self.cooperation.order(),
             orders: self.cooperation.orders().clone(),
+            wind_mps: self.percept.and_then(|p| {
+                let flies = p.takes_off_in_ms == 0;
+                flies.then_some((p.wind_east_mps, p.wind_north_mps))
+            }),
             ..Beliefs::default()
         };
         let others = self.membership.all();

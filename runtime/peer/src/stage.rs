@@ -12,6 +12,9 @@
 //! | timer | it follows this sortie for so long in this life, or of a timer that ends the mission: another peer of it said finished |
 //! | stayed | it is in this state for so long |
 //! | peer_lost | it believes a peer to be down |
+//! | peer_back | a peer that it believed to be down since it came to this state is there again |
+//! | wind_above | it takes the wind for stronger; once it came to a state by that, until it is 1 m/s below |
+//! | plan_infeasible | cells are beyond everybody's fuel |
 //! | object_detected | something that its mission looks for was told in this sortie, and not withdrawn |
 //! | target_lost | it had its target in sight, lost it, and said that it searches |
 //! | target_given | it holds a target to follow, and where that may be is near |
@@ -32,6 +35,10 @@ use crate::wire::tasks::{ERRANDS, RELAYS, TRACKS};
 use skein_behaviors::Goal;
 use std::sync::Arc;
 
+/// A wind for which a UAV came to a state has to be so much weaker before it does not hold any
+/// more, m/s.
+pub const WIND_CALMER_MPS: f64 = 1.0;
+
 /// In which state a peer is, and since when.
 #[derive(Clone, Debug)]
 pub(crate) struct Stage {
@@ -42,6 +49,8 @@ pub(crate) struct Stage {
     since: Option<Time>,
     /// When it began this sortie; none before it looked.
     began: Option<Time>,
+    /// The most peers that it believed to be down in this state.
+    most_lost: usize,
     /// Whether a state was reached that ends the mission.
     ended: bool,
     /// Whether somebody said that the time of this mission is over.
@@ -75,6 +84,7 @@ impl Stage {
             by: MissionEvent::Otherwise,
             since: None,
             began: sortie.and_then(|(_, stage)| stage.began),
+            most_lost: 0,
             ended: false,
             told_over: false,
         }
@@ -114,6 +124,12 @@ impl Stage {
         self.ended
     }
 
+    /// Whether a peer is there again that it believed to be down in this state, where so many are
+    /// believed to be now.
+    pub fn missed(&self, lost: usize) -> bool {
+        lost < self.most_lost
+    }
+
     /// Whether what is seen does not end the mission.
     pub fn goes_round(&self) -> bool {
         self.machine.goes_round()
@@ -136,13 +152,15 @@ impl MissionState {
     pub fn look(&mut self, now: Time, order: Order) {
         self.stage.began.get_or_insert(now);
         self.stage.since.get_or_insert(now);
-        let holds = |on, after_s| self.holds(on, after_s, order, now);
+        self.stage.most_lost = self.stage.most_lost.max(self.lost);
+        let holds = |on, amount| self.holds(on, amount, order, now);
         let Some((to, by)) = self.stage.machine.look(self.stage.at, &holds) else {
             return;
         };
         let stage = &mut self.stage;
         if stage.at != to {
             stage.since = Some(now);
+            stage.most_lost = self.lost;
         }
         (stage.at, stage.by) = (to, by);
         stage.ended |= stage.state().part == Part::Ends;
@@ -155,10 +173,10 @@ impl MissionState {
         use MissionEvent::{MissionComplete, RelayGiven, TargetGiven, TargetLost, TaskGiven};
         let machine = &self.stage.machine;
         let leads_to = |event, goal| {
-            let holds = |on, after_s| match on {
+            let holds = |on, amount| match on {
                 // A task that is open leaves no mission complete.
                 TaskGiven | RelayGiven | TargetGiven | TargetLost | MissionComplete => on == event,
-                _ => self.holds(on, after_s, Order::Resume, now),
+                _ => self.holds(on, amount, Order::Resume, now),
             };
             let to = machine.look(self.stage.at, &holds);
             machine.state(to.map_or(self.stage.at, |(to, _)| to)).goal == goal
@@ -174,7 +192,7 @@ impl MissionState {
         led.map(|(bit, _, _)| bit).sum()
     }
 
-    fn holds(&self, on: MissionEvent, after_s: u32, order: Order, now: Time) -> bool {
+    fn holds(&self, on: MissionEvent, amount: u32, order: Order, now: Time) -> bool {
         let stage = &self.stage;
         match on {
             MissionEvent::OperatorHold => order == Order::Hold,
@@ -185,11 +203,18 @@ impl MissionState {
             MissionEvent::TwinSpeaks => self.silent,
             MissionEvent::Timer => {
                 let ends_after_s = stage.machine.ends_after_s();
-                let told = stage.told_over && ends_after_s >= Some(after_s);
-                told || is_past(stage.began, after_s, now)
+                let told = stage.told_over && ends_after_s >= Some(amount);
+                told || is_past(stage.began, amount, now)
             }
-            MissionEvent::Stayed => is_past(stage.since, after_s, now),
-            MissionEvent::PeerLost => self.lost,
+            MissionEvent::Stayed => is_past(stage.since, amount, now),
+            MissionEvent::PeerLost => self.lost > 0,
+            MissionEvent::PeerBack => stage.missed(self.lost),
+            MissionEvent::WindAbove => {
+                // What it came for holds on, or it would go to and fro by every gust.
+                let calmer_mps = if stage.by == on { WIND_CALMER_MPS } else { 0.0 };
+                self.wind_mps + calmer_mps > f64::from(amount) / 10.0
+            }
+            MissionEvent::PlanInfeasible => self.cannot_fly_all(),
             MissionEvent::ObjectDetected => self.detected,
             MissionEvent::TargetLost => self.target_lost && self.followed_at_m().is_some(),
             MissionEvent::TargetGiven => self.followed_at_m().is_some(),
@@ -201,6 +226,11 @@ impl MissionState {
             MissionEvent::NobodyHeard => self.astray,
             MissionEvent::Otherwise => true,
         }
+    }
+
+    /// Whether something of its mission can be flown by nobody.
+    pub fn cannot_fly_all(&self) -> bool {
+        !self.negotiation.sections.unassigned().is_empty()
     }
 
     /// Where the peer flies in its state.

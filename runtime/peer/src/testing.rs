@@ -166,6 +166,7 @@ impl Seat {
                 .map_or(cruise_mps, |s| s.airspeed_mps),
             wind_east_mps: self.wind_mps.0,
             wind_north_mps: self.wind_mps.1,
+            wind_unknown: false,
             endurance_s: self.fuel_s,
             takes_off_in_ms: 0,
             failsafe: false,

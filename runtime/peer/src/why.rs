@@ -56,6 +56,12 @@ pub enum Reason {
     Stayed,
     /// It believes a peer of its fleet to be down.
     PeerLost,
+    /// A peer that it believed to be down is there again.
+    PeerBack,
+    /// The wind is too strong for its mission.
+    Windy,
+    /// A part of its mission cannot be flown.
+    Infeasible,
     /// What its mission looks for was told.
     Detected,
     /// It lost the target that it follows.
@@ -75,6 +81,9 @@ impl Reason {
             MissionEvent::Timer => Self::TimeIsOver,
             MissionEvent::Stayed => Self::Stayed,
             MissionEvent::PeerLost => Self::PeerLost,
+            MissionEvent::PeerBack => Self::PeerBack,
+            MissionEvent::WindAbove => Self::Windy,
+            MissionEvent::PlanInfeasible => Self::Infeasible,
             MissionEvent::ObjectDetected => Self::Detected,
             MissionEvent::TargetLost => Self::TargetLost,
             MissionEvent::TargetGiven => Self::Track,
@@ -103,6 +112,9 @@ impl Reason {
             Self::TimeIsOver => "the time of its mission is over",
             Self::Stayed => "it stayed for as long as it was to",
             Self::PeerLost => "it believes a peer of its fleet to be down",
+            Self::PeerBack => "a peer of its fleet is there again",
+            Self::Windy => "the wind is stronger than its mission takes",
+            Self::Infeasible => "a part of its mission cannot be flown",
             Self::Detected => "what its mission looks for was found",
             Self::TargetLost => "it lost the target that it follows",
         }

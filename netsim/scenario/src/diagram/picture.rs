@@ -81,6 +81,9 @@ fn label(t: &Transition) -> String {
     if t.on.is_timed() {
         let _ = write!(text, " {} s", t.after_s);
     }
+    if t.on.is_of_wind() {
+        let _ = write!(text, " {:.1} m/s", f64::from(t.above_dmps) / 10.0);
+    }
     text
 }
 

@@ -4,24 +4,8 @@
 use skein_interop::json::{Error, Node, suggestion};
 use skein_peer::diagram::{
     AFTER_MAX_S, Action, Behaviour, Diagram, Machine, MissionEvent, Part, Purpose, State,
-    StateGoal, Transition,
+    StateGoal, Transition, WIND_MAX_DMPS,
 };
-
-/// Events that people ask for, and why nothing can follow from them yet.
-const NOT_YET: &[(&str, &str)] = &[
-    (
-        "wind_above",
-        "the wind of a run is the same all the time; a wind in which the mission cannot be flown is refused before it begins",
-    ),
-    (
-        "peer_back",
-        "\"peer_lost\" holds no longer once all are back; let a later transition lead on",
-    ),
-    (
-        "plan_infeasible",
-        "what cannot be flown is refused with the mission, and cells that cannot be reached are given up",
-    ),
-];
 
 /// Reads a diagram, and checks it.
 pub(super) fn diagram(node: &Node<'_>) -> Result<Diagram, Error> {
@@ -122,11 +106,21 @@ fn behaviour(node: &Node<'_>) -> Result<Behaviour, Error> {
 
 /// One of each state that it leaves.
 fn transitions(node: &Node<'_>) -> Result<Vec<Transition>, Error> {
-    let f = node.fields(&["priority", "on", "after_s", "from", "to"])?;
+    let f = node.fields(&["priority", "on", "after_s", "above_mps", "from", "to"])?;
     let on = event(f.need("on", "\"mission_complete\"")?)?;
     let after_s = f
         .get("after_s")
         .map_or(Ok(0), |n| n.whole(1, AFTER_MAX_S, "seconds"))?;
+    let most_mps = f64::from(WIND_MAX_DMPS) / 10.0;
+    let above_mps = f
+        .get("above_mps")
+        .map_or(Ok(0.0), |n| n.number(0.1, most_mps, "m/s"))?;
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "checked to be some tenths"
+    )]
+    let above_dmps = (above_mps * 10.0).round() as u32;
     let priority = f.need("priority", "1")?.small(1, 255, "the priority")?;
     let from = f.need("from", "\"any\", a state or a list of states")?;
     let names = if from.is_list() {
@@ -142,6 +136,7 @@ fn transitions(node: &Node<'_>) -> Result<Vec<Transition>, Error> {
         from,
         on,
         after_s,
+        above_dmps,
         to: to.to_owned(),
         priority: u8::try_from(priority).unwrap_or(u8::MAX),
     };
@@ -150,9 +145,6 @@ fn transitions(node: &Node<'_>) -> Result<Vec<Transition>, Error> {
 
 fn event(node: &Node<'_>) -> Result<MissionEvent, Error> {
     let name = node.text()?;
-    if let Some((_, why)) = NOT_YET.iter().find(|(n, _)| *n == name) {
-        return Err(node.wrong(format!("nothing follows from \"{name}\" yet: {why}")));
-    }
     let found = MissionEvent::ALL.into_iter().find(|e| e.name() == name);
     found.ok_or_else(|| {
         let known = MissionEvent::ALL.map(MissionEvent::name);

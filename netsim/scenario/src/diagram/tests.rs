@@ -42,8 +42,8 @@ fn what_is_wrong_is_told_with_its_place_and_a_remedy() {
         (
             "on: \"low_fuel\"",
             "on: \"wind_above\"",
-            "transitions[4].on",
-            "is refused before it begins",
+            "transitions[4]: ",
+            "expected above_mps",
         ),
         (
             "on: \"low_fuel\"",

@@ -26,12 +26,12 @@ use run::Run;
 use shared::{Notices, position};
 use skein_flight::coverage::ring::division::Rule;
 use skein_flight::trajectory::timed::Objective;
-use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::Point;
 use skein_interop::airframe;
 use skein_interop::json::{Document, Error, Fields, Node, Places};
 use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{GroundStationSpec, RadioSpec, StormSpec, VehicleSpec};
+use skein_netsim::weather::Weather;
 use skein_peer::criteria::Criterion;
 use skein_peer::diagram::Diagram;
 use skein_peer::input::NewTask;
@@ -97,7 +97,7 @@ pub(crate) struct Stated {
     pub(crate) ground_station: Option<GroundStationSpec>,
     /// Where UAVs loiter at the end, where the file says so.
     pub(crate) base: Option<Point>,
-    pub(crate) wind: Wind,
+    pub(crate) wind: Weather,
     pub(crate) objective: Objective,
     pub(crate) radio: RadioSpec,
     pub(crate) faults: Vec<TimedFault>,
@@ -186,7 +186,9 @@ pub(crate) fn scenario(
             .get("base")
             .map(|node| position(&node.fields(&["east_m", "north_m"])?))
             .transpose()?,
-        wind: f.get("wind").map_or(Ok(Wind::CALM), wind::read)?,
+        wind: f
+            .get("wind")
+            .map_or(Ok(Weather::default()), |n| wind::read(&n))?,
         objective: f
             .get("objective")
             .map_or(Ok(Objective::Time), airframe::objective)?,

@@ -7,6 +7,7 @@
 use super::lifetimes::Cause;
 use super::tasks::TaskReport;
 use crate::check::detections::DetectionReport;
+use crate::check::wind::WindErrors;
 use crate::check::{Findings, Violation};
 use crate::world::Judge;
 use serde::{Deserialize, Serialize};
@@ -121,7 +122,7 @@ pub enum Driver {
 }
 
 /// What only a simulated run can tell.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Simulated {
     /// Hash of the history, hexadecimal: the same seed gives the same on every machine.
     pub history_hash: String,
@@ -133,6 +134,9 @@ pub struct Simulated {
     pub false_downs: Vec<FalseDown>,
     /// Bytes handed to the radios with their headers, by kind of record.
     pub bytes_by_kind: BTreeMap<String, u64>,
+    /// How wrong the winds were by which UAVs flew, where they estimate it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wind_errors: Option<WindErrors>,
 }
 
 /// What only a live trial can tell.

@@ -153,6 +153,13 @@ impl RunReport {
                 writeln!(f, "    {v}")?;
             }
         }
+        if let Some(wind) = self.simulated.as_ref().and_then(|s| s.wind_errors) {
+            writeln!(
+                f,
+                "  wind       estimated, {:.2} m/s wrong (root of the mean square), {:.2} m/s at most",
+                wind.rms_mps, wind.max_mps
+            )?;
+        }
         if let Some(simulated) = &self.simulated {
             for d in &simulated.false_downs {
                 writeln!(

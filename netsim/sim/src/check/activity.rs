@@ -5,12 +5,12 @@
 //! positions only whether there may be one.
 
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
-use skein_peer::Mission;
-use skein_peer::diagram::{Machine, MissionEvent, StateGoal};
+use skein_peer::diagram::{Machine, MissionEvent, Part, StateGoal};
 use skein_peer::output::Status;
 use skein_peer::wire::detection::Stands;
 use skein_peer::wire::message::Order;
 use skein_peer::wire::tasks::Progress;
+use skein_peer::{Mission, WIND_CALMER_MPS};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -129,6 +129,16 @@ impl ActivityCheck {
         let (at, _) = m.view.stage.filter(|_| m.view.loop_hash != 0)?;
         let flown = self.flown(m)?;
         flown.machine.states().get(at).map(|s| s.goal)
+    }
+
+    /// Whether a UAV is in a state in which its mission has it take part in no planning. Whether
+    /// it is there rightly is judged here, too.
+    #[must_use]
+    pub fn stands_by(&self, m: &PeerSnapshot) -> bool {
+        let state = m.view.stage.filter(|_| m.view.loop_hash != 0);
+        let flown = self.flown(m);
+        let state = state.and_then(|(at, _)| Some(flown.as_ref()?.machine.states().get(at)?.part));
+        state.is_some_and(|part| part != Part::Takes)
     }
 
     /// Looks at the states of all UAVs.
@@ -359,7 +369,7 @@ struct Facts<'a> {
 }
 
 impl Facts<'_> {
-    fn holds(&self, at: usize, (on, after_s): (MissionEvent, u32)) -> Holds {
+    fn holds(&self, at: usize, (on, amount): (MissionEvent, u32)) -> Holds {
         let view = &self.m.view;
         let claims = view.tasks.iter();
         let mut claims =
@@ -387,18 +397,22 @@ impl Facts<'_> {
             MissionEvent::MissionComplete => Holds::of(view.finished),
             MissionEvent::LowFuel => Holds::of(view.is_fuel_due),
             MissionEvent::TwinSpeaks => Holds::of(view.is_silent),
-            MissionEvent::Timer => match Holds::past(self.age_ms, after_s) {
+            MissionEvent::Timer => match Holds::past(self.age_ms, amount) {
                 Holds::No if self.told_over => Holds::Maybe,
                 holds => holds,
             },
             MissionEvent::Stayed => {
                 let here = self.here_ms.filter(|(s, _)| *s == at);
                 let fresh = (0, self.here_ms.map_or(u64::MAX, |_| self.fresh_ms));
-                Holds::past(here.map_or(fresh, |(_, ms)| ms), after_s)
+                Holds::past(here.map_or(fresh, |(_, ms)| ms), amount)
             }
             MissionEvent::PeerLost => {
                 Holds::of(view.peers.values().any(|(_, s)| *s == Status::Down))
             }
+            // What was lost since it came to this state it knows best.
+            MissionEvent::PeerBack => Holds::of(view.missed),
+            MissionEvent::WindAbove => self.is_windy(f64::from(amount) / 10.0),
+            MissionEvent::PlanInfeasible => Holds::of(view.cannot_fly_all),
             MissionEvent::ObjectDetected => Holds::of(self.is_found()),
             MissionEvent::TargetLost if view.relays => Holds::Maybe,
             MissionEvent::TargetLost => Holds::No,
@@ -412,6 +426,26 @@ impl Facts<'_> {
             MissionEvent::NobodyHeard => Holds::of(view.hears_nobody),
             MissionEvent::Otherwise => Holds::Yes,
         }
+    }
+
+    /// Whether it takes the wind for one above so much. What it came to its state by holds on for
+    /// a while.
+    fn is_windy(&self, above_mps: f64) -> Holds {
+        let Some((east_mps, north_mps)) = self.m.view.wind_mps else {
+            return Holds::No;
+        };
+        let mps = east_mps.hypot(north_mps);
+        if mps > above_mps {
+            Holds::Yes
+        } else if self.came_by(MissionEvent::WindAbove) && mps + WIND_CALMER_MPS > above_mps {
+            Holds::Maybe
+        } else {
+            Holds::No
+        }
+    }
+
+    fn came_by(&self, event: MissionEvent) -> bool {
+        self.m.view.stage.is_some_and(|(_, by)| by == event)
     }
 
     fn ends(&self) -> bool {
@@ -430,7 +464,7 @@ impl Facts<'_> {
     fn step(&self, at: usize, heed: &dyn Fn((MissionEvent, u32), Holds) -> Holds) -> Vec<usize> {
         let mut to = Vec::new();
         for way in self.flown.machine.ways(at) {
-            let key = (way.on, way.after_s);
+            let key = (way.on, way.amount);
             match heed(key, self.holds(at, key)) {
                 Holds::Yes => {
                     to.push(way.to);
@@ -450,7 +484,7 @@ impl Facts<'_> {
         let ways =
             (0..machine.states().len()).flat_map(|s| machine.ways(s).iter().map(move |w| (s, w)));
         let known = ways.filter(|(_, w)| !w.on.is_timed()).map(|(s, w)| {
-            let key = (w.on, w.after_s);
+            let key = (w.on, w.amount);
             (key, self.holds(s, key))
         });
         known
@@ -556,6 +590,86 @@ mod tests {
         };
         assert!(!held_once(Some(4)));
         assert!(held_once(None) && held_once(Some(12)));
+    }
+
+    #[test]
+    fn what_a_uav_came_home_for_in_a_wind_holds_on_for_a_while() {
+        let mut diagram = mission().flown_by().into_owned();
+        let home = diagram
+            .states
+            .iter()
+            .find(|s| s.name == "recalled")
+            .unwrap();
+        let mut shelter = home.clone();
+        shelter.name = "shelter".into();
+        diagram.states.push(shelter);
+        for t in &mut diagram.transitions {
+            t.priority *= 2;
+        }
+        let low_fuel = diagram
+            .transitions
+            .iter()
+            .find(|t| t.on == MissionEvent::LowFuel);
+        diagram.transitions.push(skein_peer::diagram::Transition {
+            from: None,
+            on: MissionEvent::WindAbove,
+            after_s: 0,
+            above_dmps: 60,
+            to: "shelter".into(),
+            priority: low_fuel.unwrap().priority + 1,
+        });
+        let mission = Mission {
+            diagram: Some(Arc::new(diagram)),
+            ..(*mission()).clone()
+        };
+        let machine = mission.machine().unwrap();
+        let broken = |views: &[(&str, MissionEvent, f64)]| {
+            let (mut story, mut found) = (Story::new(0), Findings::new(1));
+            let mut check = ActivityCheck::default();
+            check.on_mission(&mission);
+            let each = views.iter().flat_map(|v| [v; 8]);
+            for (t, (name, by, mps)) in (0..).zip(each) {
+                let at = machine
+                    .states()
+                    .iter()
+                    .position(|s| s.name == *name)
+                    .unwrap();
+                let plan = if *name == "section" {
+                    vec![1, 2]
+                } else {
+                    Vec::new()
+                };
+                let view = Beliefs {
+                    stage: Some((at, *by)),
+                    wind_mps: Some((0.0, *mps)),
+                    plan,
+                    ..speaking()
+                };
+                story.snapshot(t * 1000, &[(1, view)], |s| check.on_snapshot(s, &mut found));
+            }
+            found.counts.contains_key("activity")
+        };
+        let (covers, came, waits) = (
+            MissionEvent::CellsGiven,
+            MissionEvent::WindAbove,
+            MissionEvent::Otherwise,
+        );
+        assert!(!broken(&[
+            ("section", covers, 5.9),
+            ("shelter", came, 6.1),
+            ("shelter", came, 5.2)
+        ]));
+        assert!(broken(&[
+            ("section", covers, 5.9),
+            ("section", covers, 6.1)
+        ]));
+        assert!(broken(&[("section", covers, 5.9), ("shelter", came, 5.9)]));
+        assert!(broken(&[
+            ("section", covers, 5.9),
+            ("shelter", came, 6.1),
+            ("shelter", came, 4.9)
+        ]));
+        assert!(!broken(&[("shelter", came, 6.1), ("wait", waits, 4.9)]));
     }
 
     #[test]

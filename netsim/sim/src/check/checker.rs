@@ -441,8 +441,10 @@ impl Checker {
         self.record.on_snapshot(&snapshot, &mut self.found);
         self.rules.on_snapshot(&snapshot, &mut self.found);
         self.cover.on_snapshot(&snapshot, &mut self.found);
+        let activity = &self.rules.activity;
+        let stands_by = |m: &PeerSnapshot| activity.stands_by(m);
         self.progress
-            .on_snapshot(&snapshot, &self.members, &mut self.found);
+            .on_snapshot(&snapshot, &self.members, stands_by, &mut self.found);
         self.twins.on_snapshot(&snapshot, silent, &mut self.found);
         let steered = self.twins.steered(peers, silent);
         let (silent, steered) = (silent.iter().map(|m| m.id), &steered);

@@ -9,6 +9,7 @@
 use super::flight::{FlightCheck, Flyer, at_base, milliseconds};
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use crate::spec::Spec;
+use crate::weather::{ESTIMATE_MARGIN_MPS, Weather};
 use skein_flight::trajectory::wind::{Course, Wind};
 use skein_geometry::Segment;
 use skein_geometry::frame::Point;
@@ -23,6 +24,10 @@ use std::sync::Arc;
 /// rounded to a millisecond and taken at two percepts half a second apart; a late
 /// computer has its percepts later.
 const ROUNDING_MS: u64 = 1_000;
+
+/// So long after a change of the wind a UAV may reckon by the one before, milliseconds: it finds
+/// it out by its own flight, and looks at its plan once a period.
+const WIND_KNOWN_MS: u64 = 10_000;
 
 /// The router's way round zones is this share of itself at least: the shortest there is has
 /// no turns in it.
@@ -52,7 +57,10 @@ struct Able {
 #[derive(Clone, Debug)]
 pub struct FuelCheck {
     tanks: BTreeMap<u16, Tank>,
-    wind: Wind,
+    weather: Weather,
+    /// Winds in which a way home may be reckoned now.
+    winds: Vec<Wind>,
+    looked_ms: u64,
     grounds: BTreeMap<(u32, u64), Arc<MissionGeometry>>,
     /// Lengths of routes home from boundaries of loops, metres, where zones lie across.
     routes_m: BTreeMap<(u32, u64, usize), Option<f64>>,
@@ -72,7 +80,9 @@ impl FuelCheck {
         };
         Self {
             tanks: spec.uavs.iter().map(|u| (u.id, tank(u))).collect(),
-            wind: spec.wind,
+            weather: spec.wind.clone(),
+            winds: vec![spec.wind.first],
+            looked_ms: 0,
             grounds: BTreeMap::new(),
             routes_m: BTreeMap::new(),
             short_since_ms: BTreeMap::new(),
@@ -96,6 +106,28 @@ impl FuelCheck {
         self.able.remove(&id);
     }
 
+    /// How far an estimated wind may be wrong, m/s.
+    fn error_mps(&self) -> f64 {
+        let estimated = self.weather.estimated;
+        estimated.map_or(0.0, |_| ESTIMATE_MARGIN_MPS)
+    }
+
+    /// Time passes, and maybe the wind changes. Who had the fuel to come home in the wind before
+    /// may have stayed out for what it then was, and lacks it in this one.
+    fn note_wind(&mut self, now_ms: u64) {
+        let next_ms = self.weather.next_after_ms(self.looked_ms);
+        if next_ms.is_some_and(|t| t <= now_ms) {
+            self.able.clear();
+        }
+        self.looked_ms = now_ms;
+        let mut at_ms = now_ms.saturating_sub(WIND_KNOWN_MS);
+        self.winds = vec![self.weather.at(at_ms)];
+        while let Some(t) = self.weather.next_after_ms(at_ms).filter(|t| *t <= now_ms) {
+            self.winds.push(self.weather.at(t));
+            at_ms = t;
+        }
+    }
+
     /// The least time of a straight flight, seconds; infinite where the wind allows none.
     fn straight_s(&self, tank: Tank, from: Point, to: Point) -> f64 {
         let way = to - from;
@@ -103,9 +135,12 @@ impl FuelCheck {
             return 0.0;
         }
         let course = Course(atan2(way.y, way.x));
-        let speed_mps = self.wind.ground_speed_mps(course, tank.cruise_mps);
-        let makes_way = speed_mps.filter(|speed| *speed > 0.0);
-        makes_way.map_or(f64::INFINITY, |speed| way.norm() / speed)
+        let made_mps = |wind: &Wind| {
+            let mps = wind.ground_speed_mps(course, tank.cruise_mps)?;
+            Some(mps + self.error_mps()).filter(|mps| *mps > 0.0)
+        };
+        let fastest_mps = self.winds.iter().filter_map(made_mps).fold(0.0, f64::max);
+        way.norm() / fastest_mps
     }
 
     /// The least time home from a boundary of a loop, milliseconds.
@@ -136,7 +171,8 @@ impl FuelCheck {
             let lengths = routes.map(|route| route.length_m());
             lengths.min_by(f64::total_cmp)
         });
-        let fastest_mps = tank.cruise_mps + self.wind.speed_mps();
+        let winds_mps = self.winds.iter().map(|w| w.speed_mps()).fold(0.0, f64::max);
+        let fastest_mps = tank.cruise_mps + winds_mps + self.error_mps();
         let round_s = length_m.map_or(0.0, |m| SHORTEST * m / fastest_mps);
         milliseconds(straight_s.max(round_s))
     }
@@ -173,6 +209,7 @@ impl FuelCheck {
         flyers: (&BTreeMap<u16, Flyer>, &FlightCheck),
         found: &mut Findings,
     ) {
+        self.note_wind(snapshot.now_ms);
         for m in snapshot.peers.iter().filter(|m| m.uav) {
             let (tank, base) = (self.tanks.get(&m.id).copied(), base(m.view.revision));
             let (Some(tank), Some(base), Some(fuel_ms)) = (tank, base, m.fuel_ms) else {
@@ -319,7 +356,7 @@ mod tests {
     impl Case {
         fn new(wind: Wind) -> Self {
             let mut spec = fixture::square(1);
-            spec.wind = wind;
+            spec.wind = wind.into();
             let geometry = GeometryCache::default().of(&spec.mission).unwrap();
             let lp = &geometry.coverage_loop;
             let base = spec.mission.base_m();

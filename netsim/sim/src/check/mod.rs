@@ -23,6 +23,7 @@
 //! | [`relays`] | who holds a relay position is there |
 //! | [`tracks`] | who says that it follows a target sees it |
 //! | [`watch`] | who flies round leaves no place waiting, and spreads evenly |
+//! | [`wind`] | who estimates the wind is right |
 //! | [`detections`] | what a mission looks for and one had in sight is told, once, and is there |
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
 //! | [`airtime`] | S9: shares of the channel |
@@ -64,6 +65,7 @@ mod testing;
 pub mod tracks;
 pub mod twins;
 pub mod watch;
+pub mod wind;
 
 pub use bounds::{Bounds, Grade};
 pub use checker::{Checker, Reached};

@@ -80,13 +80,14 @@ impl ProgressCheck {
         &mut self,
         snapshot: &Snapshot<'_>,
         members: &Membership,
+        stands_by: impl Fn(&PeerSnapshot) -> bool,
         found: &mut Findings,
     ) {
         for m in snapshot.peers {
             self.check_limits(snapshot, m, found);
             self.check_adoptions(snapshot, m, found);
         }
-        self.check_restarted(snapshot, members, found);
+        self.check_restarted(snapshot, members, stands_by, found);
     }
 
     fn check_limits(&mut self, snapshot: &Snapshot<'_>, m: &PeerSnapshot, found: &mut Findings) {
@@ -129,6 +130,7 @@ impl ProgressCheck {
         &mut self,
         snapshot: &Snapshot<'_>,
         members: &Membership,
+        stands_by: impl Fn(&PeerSnapshot) -> bool,
         found: &mut Findings,
     ) {
         let bounds = snapshot.bounds;
@@ -136,7 +138,7 @@ impl ProgressCheck {
             let Some(m) = snapshot.peer(*id).filter(|m| m.uav && !r.productive) else {
                 continue;
             };
-            if m.view.order != Order::Resume {
+            if m.view.order != Order::Resume || stands_by(m) {
                 r.told_ms = snapshot.now_ms;
                 continue;
             }
@@ -212,6 +214,15 @@ mod tests {
     use skein_peer::cells::CellSet;
 
     fn run(view: &Beliefs, seconds: u64, restart: bool) -> BTreeMap<&'static str, u64> {
+        run_standing_by(view, seconds, restart, false)
+    }
+
+    fn run_standing_by(
+        view: &Beliefs,
+        seconds: u64,
+        restart: bool,
+        stands_by: bool,
+    ) -> BTreeMap<&'static str, u64> {
         let (mut check, mut found, mut s) = (
             ProgressCheck::default(),
             Findings::new(1),
@@ -248,7 +259,7 @@ mod tests {
                 covered: &CellSet::new(2),
                 loop_hash: 3,
             };
-            check.on_snapshot(&snapshot, &Membership::default(), &mut found);
+            check.on_snapshot(&snapshot, &Membership::default(), |_| stands_by, &mut found);
         }
         found.counts
     }
@@ -294,6 +305,8 @@ mod tests {
             ..idle.clone()
         };
         assert!(run(&told, 60, true).is_empty());
+        // Its mission has it wait.
+        assert!(run_standing_by(&idle, 60, true, true).is_empty());
         let busy = Beliefs {
             plan: vec![1],
             ..idle.clone()

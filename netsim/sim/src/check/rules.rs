@@ -16,6 +16,7 @@ use super::spread::SpreadCheck;
 use super::tasks::TaskCheck;
 use super::tracks::TrackCheck;
 use super::watch::WatchCheck;
+use super::wind::WindCheck;
 use super::{Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::spec::{Spec, UavSpec};
 use crate::twins::Twins;
@@ -38,7 +39,7 @@ pub struct Rules {
     /// What is flown.
     pub flight: FlightCheck,
     fuel: FuelCheck,
-    activity: ActivityCheck,
+    pub(crate) activity: ActivityCheck,
     flyers: BTreeMap<u16, Flyer>,
     airtime: AirtimeCheck,
     cadence: CadenceCheck,
@@ -52,6 +53,7 @@ pub struct Rules {
     /// Who follows targets.
     pub tracks: TrackCheck,
     watch: WatchCheck,
+    pub(crate) wind: WindCheck,
     /// What the mission looks for.
     pub detections: DetectionCheck,
     loops: BTreeMap<u16, u64>,
@@ -86,6 +88,7 @@ impl Rules {
             relays: RelayCheck::default(),
             tracks: TrackCheck::default(),
             watch: WatchCheck::default(),
+            wind: WindCheck::new(&spec.wind),
             detections: DetectionCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
@@ -132,6 +135,7 @@ impl Rules {
         self.flight.on_silent(id);
         self.activity.on_silent(id, death);
         self.fuel.on_silent(id);
+        self.wind.on_silent(id);
         self.spread.on_silent(id);
         self.spoken.on_silent(id, death);
         if death {
@@ -337,6 +341,7 @@ impl Rules {
         self.flight.on_snapshot(snapshot, base, wanted, found);
         let flyers = (&self.flyers, &self.flight);
         self.fuel.on_snapshot(snapshot, base, flyers, found);
+        self.wind.on_snapshot(snapshot, found);
     }
 
     /// Where the mission of a revision ends.
@@ -382,7 +387,7 @@ fn base_of(bases: &BTreeMap<u32, Point>, revision: u32) -> Option<Point> {
 }
 
 fn flyer(uav: &UavSpec, spec: &Spec) -> Flyer {
-    let wind_mps = spec.wind.speed_mps();
+    let wind_mps = spec.wind.strongest().speed_mps();
     let airframe = &uav.airframe;
     Flyer {
         turn_radius_m: airframe.ground_turn_radius_m(airframe.cruise_mps, wind_mps),

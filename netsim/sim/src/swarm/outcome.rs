@@ -97,6 +97,7 @@ impl Swarm {
                     .map(|(at_ms, by, of)| FalseDown { at_ms, by, of })
                     .collect(),
                 bytes_by_kind: self.traffic.bytes_by_kind(),
+                wind_errors: self.checker.rules.wind.errors(),
             }),
         });
         Outcome {

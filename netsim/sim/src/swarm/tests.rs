@@ -94,7 +94,7 @@ fn a_wind_costs_time_and_nothing_else() {
     let calm = run(&prepared(3), 1, Vec::new(), false);
     for wind in [Wind::new(2.0, 1.0), Wind::new(-1.5, 2.0)] {
         let mut spec = fixture::square(3);
-        spec.wind = wind;
+        spec.wind = wind.into();
         let o = run(
             &Prepared::new(spec),
             1,

@@ -122,7 +122,7 @@ pub fn square(n_uavs: u16) -> Spec {
             position: Point::new(240.0, -30.0),
             height_m: 2.0,
         }),
-        wind: skein_flight::trajectory::wind::Wind::CALM,
+        wind: skein_flight::trajectory::wind::Wind::CALM.into(),
         objective: skein_flight::trajectory::timed::Objective::Time,
         radio: radio(),
         beacon_period_ms: 1000,

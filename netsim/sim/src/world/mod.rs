@@ -27,6 +27,7 @@ pub use obstacles::{Obstacles, Place};
 pub use survey::{Cell, Survey, Uncoverable};
 
 use crate::spec::Spec;
+use crate::weather::Weather;
 use motion::{Kinematic, Piece};
 use skein_behaviors::traffic::{Sighting as Seen, Traffic};
 use skein_behaviors::{Percept, Setpoint};
@@ -146,6 +147,7 @@ pub struct World {
     traffic_range_m: f64,
     judge: Judge,
     vehicles: Vehicles,
+    weather: Weather,
     facts: Vec<Fact>,
     flown: Vec<Piece>,
     airborne: Vec<(u16, Place)>,
@@ -172,7 +174,7 @@ impl World {
             .map(|u| Uav {
                 id: u.id,
                 body: Kinematic::new(u.airframe, u.launch, u.height_m, 0)
-                    .in_wind(spec.wind)
+                    .in_wind(spec.wind.at(0))
                     .taking_off_at(u64::from(u.takeoff_ms)),
                 failsafe: false,
                 computers: iter::once(Computer::new(u.id))
@@ -220,6 +222,7 @@ impl World {
             traffic_range_m: spec.traffic_range_m,
             judge,
             vehicles: Vehicles::new(&spec.vehicles, seed),
+            weather: spec.wind.clone(),
             facts: Vec::new(),
             flown: Vec::new(),
             airborne: Vec::new(),
@@ -377,6 +380,7 @@ impl World {
     pub fn percept(&self, uav: u16) -> Option<Percept> {
         let body = self.body(uav)?;
         let ground_ms = body.takes_off_in_ms(self.now_ms);
+        let own = self.weather.sensed(body.percept()?, self.seed, uav);
         Some(Percept {
             time_ms: self.now_ms,
             takes_off_in_ms: u32::try_from(ground_ms).unwrap_or(u32::MAX),
@@ -384,7 +388,7 @@ impl World {
             sightings: self
                 .vehicles
                 .look(body, uav, self.now_ms, &self.site.obstacles),
-            ..body.percept()?
+            ..own
         })
     }
 
@@ -477,9 +481,17 @@ impl World {
     /// Moves everything on to a time and judges what was flown.
     pub fn advance(&mut self, to_ms: u64) {
         while self.now_ms < to_ms {
-            let next_ms = to_ms.min((self.now_ms / STEP_MS + 1) * STEP_MS);
+            let step_ms = (self.now_ms / STEP_MS + 1) * STEP_MS;
+            let change_ms = self.weather.next_after_ms(self.now_ms);
+            let next_ms = to_ms.min(step_ms).min(change_ms.unwrap_or(u64::MAX));
             self.step(next_ms);
             self.now_ms = next_ms;
+            if change_ms == Some(next_ms) {
+                let wind = self.weather.at(next_ms);
+                for u in &mut self.uavs {
+                    u.body.take_wind(wind);
+                }
+            }
         }
     }
 

@@ -3,7 +3,7 @@
 
 use super::{
     AFTER_MAX_S, Action, Behaviour, Diagram, Machine, MissionEvent, NAME_MAX_BYTES, Part, Purpose,
-    STATES_MAX, State, StateGoal, TRANSITIONS_MAX, Way,
+    STATES_MAX, State, StateGoal, TRANSITIONS_MAX, WIND_MAX_DMPS, Way,
 };
 use std::collections::BTreeSet;
 
@@ -103,9 +103,19 @@ pub(super) fn ways(diagram: &Diagram) -> Result<Vec<Vec<Way>>, DiagramError> {
             let text = format!("\"{}\" counts no seconds; leave after_s out", t.on.name());
             return Err(wrong(place("after_s"), text));
         }
+        if t.on.is_of_wind() && !(1..=WIND_MAX_DMPS).contains(&t.above_dmps) {
+            let most_mps = WIND_MAX_DMPS / 10;
+            let on = t.on.name();
+            let text = format!("\"{on}\" is of a wind; expected above_mps of 0.1 to {most_mps}");
+            return Err(wrong(place("above_mps"), text));
+        }
+        if !t.on.is_of_wind() && t.above_dmps != 0 {
+            let text = format!("\"{}\" is of no wind; leave above_mps out", t.on.name());
+            return Err(wrong(place("above_mps"), text));
+        }
         let way = Way {
             on: t.on,
-            after_s: t.after_s,
+            amount: t.amount(),
             to,
             priority: t.priority,
         };
@@ -142,7 +152,7 @@ fn check_beside(
             return Err(wrong(format!("transitions[{k}].priority"), text));
         }
         let same_from = diagram.transitions[*j].from == diagram.transitions[k].from;
-        if same_from && (other.on, other.after_s) == (way.on, way.after_s) {
+        if same_from && (other.on, other.amount) == (way.on, way.amount) {
             let text = format!(
                 "transitions[{j}] leaves \"{name}\" on \"{}\", too; leave one out",
                 way.on.name()

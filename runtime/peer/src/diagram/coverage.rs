@@ -72,6 +72,7 @@ pub(super) fn diagram() -> Diagram {
         from: None,
         on: *on,
         after_s: 0,
+        above_dmps: 0,
         to: (*to).to_owned(),
         priority,
     });

@@ -43,6 +43,9 @@ pub const NAME_MAX_BYTES: usize = 24;
 /// Longest time that an event may count, seconds: a day.
 pub const AFTER_MAX_S: u32 = 86_400;
 
+/// The strongest wind that an event may be of, tenths of a metre a second.
+pub const WIND_MAX_DMPS: u32 = 500;
+
 /// What leads from one state to another. Each of them holds or does not, at any moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -65,6 +68,12 @@ pub enum MissionEvent {
     Stayed,
     /// It believes a peer of its fleet to be down.
     PeerLost,
+    /// A peer that it believed to be down since it came to this state is there again.
+    PeerBack,
+    /// The wind is so strong.
+    WindAbove,
+    /// Cells are beyond everybody's fuel.
+    PlanInfeasible,
     /// Something that its mission looks for was told, by itself or by another.
     ObjectDetected,
     /// It lost the target that it follows, and searches for it.
@@ -87,7 +96,7 @@ pub enum MissionEvent {
 
 impl MissionEvent {
     /// All, in the order of the default diagram.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 21] = [
         Self::OperatorHold,
         Self::OperatorReturn,
         Self::MissionCancelled,
@@ -97,6 +106,9 @@ impl MissionEvent {
         Self::Timer,
         Self::Stayed,
         Self::PeerLost,
+        Self::PeerBack,
+        Self::WindAbove,
+        Self::PlanInfeasible,
         Self::ObjectDetected,
         Self::TargetLost,
         Self::TargetGiven,
@@ -121,6 +133,9 @@ impl MissionEvent {
             Self::Timer => "timer",
             Self::Stayed => "stayed",
             Self::PeerLost => "peer_lost",
+            Self::PeerBack => "peer_back",
+            Self::WindAbove => "wind_above",
+            Self::PlanInfeasible => "plan_infeasible",
             Self::ObjectDetected => "object_detected",
             Self::TargetLost => "target_lost",
             Self::TargetGiven => "target_given",
@@ -131,6 +146,12 @@ impl MissionEvent {
             Self::NobodyHeard => "nobody_heard",
             Self::Otherwise => "otherwise",
         }
+    }
+
+    /// Whether it is of a wind, of which its transition says how strong it is.
+    #[must_use]
+    pub fn is_of_wind(self) -> bool {
+        self == Self::WindAbove
     }
 
     /// Whether it counts seconds, which its transition says.
@@ -333,10 +354,26 @@ pub struct Transition {
     /// After so many seconds, of an event that counts them; 0 of all others.
     #[serde(default, skip_serializing_if = "is_default")]
     pub after_s: u32,
+    /// Above so many tenths of a metre a second, of an event that is of a wind; 0 of all others.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub above_dmps: u32,
     /// To which state.
     pub to: String,
     /// Of several events that hold, the one of the lowest number counts.
     pub priority: u8,
+}
+
+impl Transition {
+    /// What its event is measured by: seconds of one that counts them, tenths of a metre a second
+    /// of a wind, and 0 of all others.
+    #[must_use]
+    pub fn amount(&self) -> u32 {
+        if self.on.is_of_wind() {
+            self.above_dmps
+        } else {
+            self.after_s
+        }
+    }
 }
 
 /// A mission as a transition diagram. It begins in its first state.
@@ -388,7 +425,7 @@ impl Diagram {
         for t in &self.transitions {
             text(h, t.from.as_deref().unwrap_or_default());
             text(h, t.on.name());
-            h.write_i64(i64::from(t.after_s));
+            h.write_i64(i64::from(t.amount()));
             text(h, &t.to);
             h.write_i64(i64::from(t.priority));
         }
@@ -400,8 +437,8 @@ impl Diagram {
 pub struct Way {
     /// When this holds.
     pub on: MissionEvent,
-    /// After so many seconds, where the event counts them.
-    pub after_s: u32,
+    /// Of it so much ([`Transition::amount`]).
+    pub amount: u32,
     /// To the state of this number.
     pub to: usize,
     /// Lower numbers come first.
@@ -466,7 +503,7 @@ impl Machine {
         let ends = |to: usize| self.state(to).part == Part::Ends;
         let all = self.ways.iter().flatten();
         let timers = all.filter(|w| w.on == MissionEvent::Timer && ends(w.to));
-        timers.map(|w| w.after_s).min()
+        timers.map(|w| w.amount).min()
     }
 
     /// Whether it goes on once everything is seen, until something else ends it.
@@ -490,7 +527,7 @@ impl Machine {
         at: usize,
         holds: &dyn Fn(MissionEvent, u32) -> bool,
     ) -> Option<(usize, MissionEvent)> {
-        let taken = self.ways(at).iter().find(|w| holds(w.on, w.after_s));
+        let taken = self.ways(at).iter().find(|w| holds(w.on, w.amount));
         taken.map(|w| (w.to, w.on))
     }
 }

@@ -27,6 +27,7 @@ fn percept(now_ms: u64, at: Point, seen: &[(f64, f64, u8)]) -> Percept {
         airspeed_mps: 13.0,
         wind_east_mps: 0.0,
         wind_north_mps: 0.0,
+        wind_unknown: false,
         endurance_s: 1_000.0,
         takes_off_in_ms: 0,
         failsafe: false,

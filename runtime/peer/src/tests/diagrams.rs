@@ -7,7 +7,7 @@ use crate::diagram::{
 };
 use crate::input::{Command, NewTask, TaskEdit};
 use crate::mission::Mission;
-use crate::output::TaskNews;
+use crate::output::{Status, TaskNews};
 use crate::testing::{GROUND_STATION, Harness, mission};
 use crate::why::{Reason, Work};
 use crate::wire::codec::Body;
@@ -47,6 +47,7 @@ fn with(name: &str, goal: StateGoal, part: Part, (on, after_s): (MissionEvent, u
         from: None,
         on,
         after_s,
+        above_dmps: 0,
         to: name.into(),
         // Before all is seen, and where it leads elsewhere than home after the fuel.
         priority: if keeps { 65 } else { 35 },
@@ -88,6 +89,7 @@ fn rounds(after_s: u32) -> Diagram {
         from: None,
         on: MissionEvent::AllSeen,
         after_s: 0,
+        above_dmps: 0,
         to: "watch".into(),
         priority: 105,
     });
@@ -305,6 +307,80 @@ fn who_loses_a_peer_comes_home_until_it_is_back_if_the_mission_says_so() {
     assert!(h.run_until(3, |h| h.beliefs(1).plan.is_empty() && !h.beliefs(1).able));
     h.isolate(3, false);
     assert!(h.run_until(60, |h| work(h, 1).state == "section"));
+}
+
+#[test]
+fn who_came_home_for_a_wind_goes_on_once_it_is_a_metre_a_second_weaker() {
+    let windy = (MissionEvent::WindAbove, 0);
+    let mut diagram = with("shelter", StateGoal::Home, Part::Releases, windy);
+    let last = diagram.transitions.last_mut().unwrap();
+    last.above_dmps = 35;
+    // After the fuel, which leads home too.
+    last.priority = 65;
+    let mut h = with_operator(1, flown_by(diagram, 1));
+    h.run_s(20);
+    for (wind_mps, state) in [
+        (3.4, "section"),
+        (3.7, "shelter"),
+        (3.4, "shelter"),
+        (2.6, "shelter"),
+        (2.4, "section"),
+        (3.4, "section"),
+    ] {
+        h.seat(1).wind_mps = (0.6 * wind_mps, -0.8 * wind_mps);
+        h.run_s(8);
+        assert_eq!(work(&h, 1).state, state, "{wind_mps} m/s");
+    }
+}
+
+#[test]
+fn one_of_those_who_were_lost_is_back() {
+    let mut diagram = with(
+        "gather",
+        StateGoal::Home,
+        Part::Releases,
+        (MissionEvent::PeerLost, 0),
+    );
+    let back = Transition {
+        from: Some("gather".into()),
+        on: MissionEvent::PeerBack,
+        after_s: 0,
+        above_dmps: 0,
+        to: "home".into(),
+        priority: 33,
+    };
+    // Once for each that is lost: whoever covers gathers.
+    diagram.transitions.last_mut().unwrap().from = Some("section".into());
+    diagram.transitions.push(back);
+    let mut h = with_operator(4, flown_by(diagram, 1));
+    h.run_s(30);
+    h.isolate(3, true);
+    h.isolate(4, true);
+    assert!(h.run_until(60, |h| work(h, 1).state == "gather"));
+    h.run_s(20);
+    assert_eq!(work(&h, 1).state, "gather");
+    // The other one is still away.
+    h.isolate(3, false);
+    assert!(h.run_until(60, |h| work(h, 1).state != "gather"));
+    let down = |h: &Harness| {
+        h.beliefs(1)
+            .peers
+            .values()
+            .filter(|(_, s)| *s == Status::Down)
+            .count()
+    };
+    assert_eq!(down(&h), 1);
+}
+
+#[test]
+fn a_mission_may_ask_for_what_follows_when_a_part_of_it_is_beyond_everybody() {
+    let beyond = (MissionEvent::PlanInfeasible, 0);
+    let diagram = with("short", StateGoal::Home, Part::Ends, beyond);
+    let mut h = with_operator(1, flown_by(diagram, 1));
+    h.seat(1).fuel_s = 130.0;
+    h.run_s(3);
+    assert!(h.run_until(60, |h| work(h, 1).reason == Reason::Infeasible));
+    assert!(h.beliefs(1).finished && h.beliefs(1).plan.is_empty());
 }
 
 #[test]

@@ -191,6 +191,20 @@ impl Kinematic {
         self
     }
 
+    /// Another wind blows from now on.
+    pub fn take_wind(&mut self, wind: Wind) {
+        let start = self.leg.pose_at(self.now_ms);
+        self.leg = Piece {
+            from_ms: self.now_ms,
+            to_ms: self.now_ms,
+            start,
+            wind,
+            ..self.leg
+        };
+        // What the failsafe held was laid out for the wind before.
+        self.hold = None;
+    }
+
     /// A new airframe at the launch point.
     pub fn relaunch(&mut self, now_ms: u64) {
         let wind = self.leg.wind;
@@ -254,6 +268,7 @@ impl Kinematic {
             airspeed_mps: self.leg.speed_mps,
             wind_east_mps: self.leg.wind.east_mps,
             wind_north_mps: self.leg.wind.north_mps,
+            wind_unknown: false,
             endurance_s: seconds(self.fuel_ms),
             takes_off_in_ms: 0,
             failsafe: self.failsafe,
