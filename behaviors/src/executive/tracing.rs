@@ -172,7 +172,8 @@ impl Executive {
         }
         let was_sought = t.sought;
         let had_thread = !t.thread.is_empty();
-        let seeks = was_sought > 0 || !t.is_fresh();
+        let is_beyond = |lead: &Lead| lead.beside(from).along_m > lead.length_m();
+        let seeks = was_sought > 0 || !t.is_fresh() || t.lead.as_ref().is_some_and(is_beyond);
         // Who comes onto what it was told of flies it as that runs.
         let prefers = match &t.lead {
             Some(lead) if !had_thread => lead.pose_at(lead.beside(from).along_m).direction(),

@@ -406,6 +406,12 @@ impl Mission {
 
     /// Whether it goes on once everything is seen, until something else ends it.
     #[must_use]
+    pub fn traces(&self) -> bool {
+        self.machine().is_ok_and(|m| m.traces())
+    }
+
+    /// Whether the loop is flown round and round once everything is seen.
+    #[must_use]
     pub fn goes_round(&self) -> bool {
         self.machine().is_ok_and(|m| m.goes_round())
     }

@@ -12,6 +12,7 @@
 
 use super::cbor::{In, Listed, Out, Wire, array_of, in_field, number_of};
 use super::detection::Detection;
+use super::trail::Trail;
 use super::kinds::{Kind, RECORD_MAX_BYTES};
 use super::limits::{
     self, COMMITS_MAX, FRESH_MAX_BYTES, GOSSIP_MAX, MEMBERS_MAX, PLAN_MAX, at_most, in_range,
@@ -95,6 +96,7 @@ pub enum Body {
     Bundle(Bundle),
     Target(Target),
     Detection(Detection),
+    Trail(Trail),
 }
 
 impl Body {
@@ -118,6 +120,7 @@ impl Body {
             Self::Bundle(_) => Kind::Bundle,
             Self::Target(_) => Kind::Target,
             Self::Detection(_) => Kind::Detection,
+            Self::Trail(_) => Kind::Trail,
         }
     }
 
@@ -152,6 +155,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Bundle(b) => b.put(&mut out),
         Body::Target(b) => b.put(&mut out),
         Body::Detection(b) => b.put(&mut out),
+        Body::Trail(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -185,6 +189,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Bundle => Body::Bundle(Wire::get(&mut input)?),
         Kind::Target => Body::Target(Wire::get(&mut input)?),
         Kind::Detection => Body::Detection(Wire::get(&mut input)?),
+        Kind::Trail => Body::Trail(Wire::get(&mut input)?),
         Kind::Event => {
             return Err(WireError::Kind {
                 number: kind.number(),
