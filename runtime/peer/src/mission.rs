@@ -404,7 +404,7 @@ impl Mission {
         self.machine().ok().and_then(|m| m.ends_after_s())
     }
 
-    /// Whether it goes on once everything is seen, until something else ends it.
+    /// Whether a contour is flown along once everything is seen.
     #[must_use]
     pub fn traces(&self) -> bool {
         self.machine().is_ok_and(|m| m.traces())

@@ -41,6 +41,11 @@ const DIAGRAMS: &[(&str, &str, &str)] = &[
         "search.json5",
         include_str!("../../../../configs/diagrams/search.json5"),
     ),
+    (
+        "trace",
+        "trace.json5",
+        include_str!("../../../../configs/diagrams/trace.json5"),
+    ),
 ];
 
 /// Names of the built-in diagrams.

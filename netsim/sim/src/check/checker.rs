@@ -2,7 +2,9 @@
 //! decide what it means.
 
 use super::cover::CoverCheck;
+use super::contours::Tracer;
 use super::detections::{Around, Truth};
+use crate::world::contour::Contour;
 use super::graph::{Graph, Stability};
 use super::listing::ListingCheck;
 use super::membership::Membership;
@@ -398,6 +400,12 @@ impl Checker {
         };
         let detections = &mut self.rules.detections;
         detections.on_looks(now_ms, (truth, looks), around, &mut self.found);
+    }
+
+    /// Who flies along a contour, beside where it is.
+    pub fn on_tracers(&mut self, now_ms: u64, contour: &Contour, all: &[Tracer]) {
+        let (rules, found) = (&mut self.rules, &mut self.found);
+        rules.on_tracers(now_ms, contour, all, &self.handicaps, found);
     }
 
     /// The true graph in the last snapshot.

@@ -4,6 +4,7 @@ use super::activity::ActivityCheck;
 use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
 use super::decision::{DecisionCheck, Mover};
+use super::contours::{ContourCheck, Tracer};
 use super::detections::DetectionCheck;
 use super::flight::{FlightCheck, Flyer, at_base};
 use super::fuel::FuelCheck;
@@ -30,6 +31,7 @@ use skein_peer::wire::codec::Body;
 use skein_peer::wire::message::{Bid, Heartbeat, Order};
 use skein_peer::{Beliefs, Incarnation, Report};
 use std::collections::BTreeMap;
+use crate::world::contour::Contour;
 use std::sync::Arc;
 
 /// The rules of single peers in one run.
@@ -54,6 +56,8 @@ pub struct Rules {
     watch: WatchCheck,
     /// What the mission looks for.
     pub detections: DetectionCheck,
+    /// Contours that are flown along.
+    pub contours: ContourCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -87,6 +91,7 @@ impl Rules {
             tracks: TrackCheck::default(),
             watch: WatchCheck::default(),
             detections: DetectionCheck::default(),
+            contours: ContourCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -337,6 +342,25 @@ impl Rules {
         self.flight.on_snapshot(snapshot, base, wanted, found);
         let flyers = (&self.flyers, &self.flight);
         self.fuel.on_snapshot(snapshot, base, flyers, found);
+    }
+
+    /// Whether a UAV is to fly along a contour, by its state.
+    #[must_use]
+    pub fn traces(&self, m: &PeerSnapshot) -> bool {
+        self.activity.goal(m) == Some(StateGoal::Trace)
+    }
+
+    /// Who flies along a contour, beside where it is.
+    pub fn on_tracers(
+        &mut self,
+        now_ms: u64,
+        contour: &Contour,
+        all: &[Tracer],
+        handicaps: &Handicaps,
+        found: &mut Findings,
+    ) {
+        let around = (&self.flyers, handicaps);
+        self.contours.on_looks(now_ms, contour, all, around, found);
     }
 
     /// Where the mission of a revision ends.

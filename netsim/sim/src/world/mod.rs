@@ -5,6 +5,7 @@
 //! of a tick is act, move, radio, sense, decide.
 
 mod board;
+pub mod contour;
 pub mod fact;
 pub mod fixture;
 pub mod flat;
@@ -27,6 +28,7 @@ pub use obstacles::{Obstacles, Place};
 pub use survey::{Cell, Survey, Uncoverable};
 
 use crate::spec::Spec;
+use contour::Contour;
 use motion::{Kinematic, Piece};
 use skein_behaviors::traffic::{Sighting as Seen, Traffic};
 use skein_behaviors::{Percept, Setpoint};
@@ -146,6 +148,7 @@ pub struct World {
     traffic_range_m: f64,
     judge: Judge,
     vehicles: Vehicles,
+    contour: Option<Contour>,
     facts: Vec<Fact>,
     flown: Vec<Piece>,
     airborne: Vec<(u16, Place)>,
@@ -220,6 +223,7 @@ impl World {
             traffic_range_m: spec.traffic_range_m,
             judge,
             vehicles: Vehicles::new(&spec.vehicles, seed),
+            contour: spec.contour.as_ref().map(|c| Contour::new(c, seed)),
             facts: Vec::new(),
             flown: Vec::new(),
             airborne: Vec::new(),
@@ -384,7 +388,26 @@ impl World {
             sightings: self
                 .vehicles
                 .look(body, uav, self.now_ms, &self.site.obstacles),
+            contour: self.contour.as_ref().map_or_else(Default::default, |c| {
+                c.look(body, uav, self.now_ms, &self.site.obstacles)
+            }),
             ..body.percept()?
+        })
+    }
+
+    /// The road or fire that no peer knows.
+    #[must_use]
+    pub fn contour(&self) -> Option<&Contour> {
+        self.contour.as_ref()
+    }
+
+    /// Which of its places are in the picture of a UAV now.
+    #[must_use]
+    pub fn contour_pictured(&self, uav: u16) -> Vec<bool> {
+        let flies = |b: &&Kinematic| b.takes_off_in_ms(self.now_ms) == 0;
+        let both = self.contour.as_ref().zip(self.body(uav).filter(flies));
+        both.map_or_else(Vec::new, |(c, body)| {
+            c.pictured(body, self.now_ms, &self.site.obstacles)
         })
     }
 
