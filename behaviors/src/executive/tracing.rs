@@ -70,6 +70,8 @@ pub(super) struct Tracing {
     now_ms: u64,
     /// Whether the last stretch that was laid is a circle to let somebody get away.
     circled: bool,
+    /// Whether it was seen since the UAV set out for it.
+    begun: bool,
 }
 
 impl Tracing {
@@ -125,6 +127,7 @@ impl Executive {
         self.tracing.lead = None;
         self.tracing.sought = 0;
         self.tracing.in_vain = 0;
+        self.tracing.begun = false;
         0
     }
 
@@ -149,7 +152,8 @@ impl Executive {
     /// Whether it flies along a contour that it sees.
     #[must_use]
     pub fn is_tracing(&self) -> bool {
-        self.aim == Aim::Trace && self.tracing.lead.is_some() && self.tracing.sought == 0
+        let t = &self.tracing;
+        self.aim == Aim::Trace && t.begun && t.lead.is_some() && t.sought == 0
     }
 
     /// Takes in a look: what is laid ahead is laid anew by it.
@@ -198,6 +202,7 @@ impl Executive {
             }
         }
         t.in_vain = 0;
+        t.begun = true;
         t.lead_anew();
         t.circled = false;
         self.lay_anew();
@@ -293,6 +298,7 @@ impl Executive {
             t.lead = None;
             t.sought = 0;
         }
+        t.begun = false;
         let passed = t.thread.take_passed();
         t.passed.extend(passed);
         let lead = t.lead.clone();

@@ -5,7 +5,7 @@
 //! |---|---|
 //! | its UAV has left a part of the contour behind | kept, simplified, in the register that grows |
 //! | that holds all that it can | said at once; the next register begins, the oldest is written over |
-//! | so many intervals pass, and the register grew | said |
+//! | so many intervals pass, and its UAV flies along the contour | that register is said, if it grew, and of its older ones the next in turn: nobody else brings them to who lacks them |
 //! | a trail of another | kept: of each register the newest counts |
 //! | some seconds pass, and something is new | one outline is made of all, the newest look first; the executive is told it, and who flies along it before and behind |
 //! | the outline has changed by much | told to people |
@@ -67,6 +67,8 @@ pub(crate) struct Trails {
     told_closed: bool,
     /// Registers that are full and not said yet.
     full: Vec<(u16, Trail)>,
+    /// Which of its own registers was said again last.
+    again: u16,
 }
 
 impl Trails {
@@ -154,10 +156,13 @@ impl Trails {
             let full = std::mem::take(&mut self.full).into_iter();
             effects.extend(full.map(|(n, trail)| Effect::Speak(n, Body::Trail(trail))));
             let pause_ms = SAID_INTERVALS * s.membership.interval_ms();
-            if self.grew && s.now.since_ms(self.said_at) >= pause_ms {
-                self.grew = false;
+            let traces = state.flown_goal() == Some(&Goal::Trace);
+            if traces && s.now.since_ms(self.said_at) >= pause_ms {
                 self.said_at = s.now;
-                effects.push(Effect::Speak(self.number, Body::Trail(self.own())));
+                if std::mem::take(&mut self.grew) {
+                    effects.push(Effect::Speak(self.number, Body::Trail(self.own())));
+                }
+                effects.extend(self.say_again(s.me.id));
             }
         }
         if self.is_news && s.now.since_ms(self.outlined_at) >= OUTLINED_MS {
@@ -169,6 +174,17 @@ impl Trails {
         }
         self.lead(s, state);
         effects
+    }
+
+    /// The next of its older registers.
+    fn say_again(&mut self, me: u16) -> Option<Effect> {
+        let own = self.known.range((me, 0)..=(me, u16::MAX));
+        let older = own.map(|((_, n), _)| *n).filter(|n| *n != self.number);
+        let after = |n: &u16| (*n <= self.again, *n);
+        let next = older.min_by_key(after)?;
+        self.again = next;
+        let trail = self.known.get(&(me, next))?.clone();
+        Some(Effect::Speak(next, Body::Trail(trail)))
     }
 
     fn tell_people(&mut self, now: Time) -> Option<Effect> {

@@ -263,7 +263,8 @@ const TABLE: [KindRow; 18] = [
             Lifetime::Ms(60_000),
         )
     },
-    // A stretch that grows is out of date when more of it is told; a full one is told once.
+    // A stretch that grows is out of date when more of it is told, and older ones are told again
+    // in turn.
     KindRow {
         subjects: super::trail::TRAILS_MAX,
         ..row(
@@ -271,7 +272,7 @@ const TABLE: [KindRow; 18] = [
             "trail",
             304,
             Priority::Telemetry,
-            Lifetime::Ms(60_000),
+            Lifetime::Beacons(8),
         )
     },
 ];
