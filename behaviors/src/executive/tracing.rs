@@ -12,7 +12,7 @@
 //! | an arc comes too near to a zone | a route to where it goes on beyond |
 //!
 //! # Guarantees
-//! No arc is laid that has no proof of the clearance of routes. Equal inputs give equal outputs.
+//! No arc is laid that has no proof of the clearance of routes, and of a circle at its end. Equal inputs give equal outputs.
 //!
 //! # Complexity
 //! A percept costs its look times what is kept of the last ones, and some ten arcs.
@@ -249,7 +249,8 @@ impl Executive {
         if self.is_arc_clear(&arc) {
             return Some(vec![laid(arc)]);
         }
-        self.onto(at, &lead, beside.along_m + TRIED_M).or_else(|| self.give_up(at))
+        let beyond_m = self.beyond_zone_m(&lead, beside.along_m);
+        self.onto(at, &lead, beyond_m).or_else(|| self.give_up(at))
     }
 
     /// The circle by which it lets who is ahead along the contour get away, one at a time.
@@ -263,6 +264,16 @@ impl Executive {
         let waits = nearer_m > super::circuit::CIRCLES * longest_m;
         self.tracing.circled = waits;
         waits.then_some(circle)
+    }
+
+    /// How far along it is clear of zones again, metres; a little on where none is on it.
+    fn beyond_zone_m(&self, lead: &Lead, from_m: f64) -> f64 {
+        let zones = self.transit.router.zones();
+        let clearance_m = self.transit.router.limits().clearance_m;
+        let steps = (0..TRIES * 4).map(|k| from_m + 0.25 * TRIED_M * f64::from(k));
+        let is_clear = |m: &f64| zones.distance_m(lead.pose_at(*m).position()) > clearance_m;
+        let mut blocked = steps.skip_while(is_clear);
+        blocked.find(is_clear).unwrap_or(from_m + TRIED_M)
     }
 
     /// A route onto the contour from so far along it on, or onto where it goes on.
@@ -309,11 +320,11 @@ impl Executive {
         back.or_else(|| self.transit.way_round(at))
     }
 
-    /// Whether an arc keeps the clearance of routes.
+    /// Whether an arc keeps the clearance of routes, and leaves room to turn off at its end.
     fn is_arc_clear(&self, arc: &Segment) -> bool {
         let limits = self.transit.router.limits();
         let zones = self.transit.router.zones();
-        zones.is_segment_clear(arc, limits.clearance_m)
+        zones.is_segment_clear(arc, limits.clearance_m) && self.transit.has_room(&arc.end())
     }
 }
 

@@ -306,9 +306,12 @@ impl ContourReport {
         let area = self.area_error.map_or_else(String::new, |(end, mean)| {
             format!(", area off by {:.1} % ({:.1} % over time)", 100.0 * end, 100.0 * mean)
         });
+        let at_s = |ms: Option<u64>| ms.map_or_else(|| "-".to_owned(), |ms| format!("{:.0}", seconds(ms)));
         format!(
-            "{what} of {:.0} m, {:.1} % seen, {:.1} % known at the end; told within {:.1} m ({:.1} m at most), apart by {:.1} m ({:.1} m at most, {:.1} m over time){area}; in the picture {:.1} % of the time, a place waits {:.0} s at most (least {:.0} s)",
+            "{what} of {:.0} m, flown along from {} s on, all seen by {} s, {:.1} % seen, {:.1} % known at the end; told within {:.1} m ({:.1} m at most), apart by {:.1} m ({:.1} m at most, {:.1} m over time){area}; in the picture {:.1} % of the time, a place waits {:.0} s at most (least {:.0} s)",
             self.length_m,
+            at_s(self.since_ms),
+            at_s(self.all_seen_ms),
             100.0 * self.seen_share,
             100.0 * self.known_share,
             self.told_error_m.0,

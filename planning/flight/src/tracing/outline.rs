@@ -201,13 +201,27 @@ fn is_old(mark: &Mark, way: Vector, sided: bool, pieces: &[Piece]) -> bool {
         } else {
             0.0
         };
-        if off_m(p.from, p.to, mark.at) > BESIDE_M + grown_m {
+        if !runs_beside(p, mark.at, grown_m) {
             return false;
         }
         let alike = way.dot(&p.way);
         let least = ALIKE * way.norm() * p.way.norm();
         if sided { alike >= least } else { alike.abs() >= least }
     })
+}
+
+/// Whether a place is beside a piece, and not before it: who is at its end has not seen what is
+/// ahead.
+fn runs_beside(p: &Piece, at: Point, grown_m: f64) -> bool {
+    let length_m = p.way.norm();
+    if length_m <= 0.0 {
+        return false;
+    }
+    let to = at - p.from;
+    let along_m = to.dot(&p.way) / length_m;
+    let across_m = p.way.perp(&to).abs() / length_m;
+    let overhang_m = (-along_m).max(along_m - length_m);
+    overhang_m <= BESIDE_M && across_m <= BESIDE_M + grown_m
 }
 
 /// Strings runs together where one ends near the begin of another.

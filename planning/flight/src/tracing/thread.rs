@@ -21,6 +21,9 @@ const GAP_M: f64 = 40.0;
 /// What was seen no longer ago than this, metres along it, is not taken for something new.
 const OLD_M: f64 = 30.0;
 
+/// What was shown before goes on this far beyond the end of a look, metres.
+const SPARE_M: f64 = 12.0;
+
 /// Shorter than this a look shows no way, metres.
 const LEAST_M: f64 = 10.0;
 
@@ -87,6 +90,8 @@ struct Continuation {
     piece: Vec<Point>,
     /// So much of the line stays, metres.
     stays_m: f64,
+    /// And what is farther along it than this: it was shown before, and is not now.
+    goes_on_m: f64,
     off_m: f64,
 }
 
@@ -138,7 +143,7 @@ impl Thread {
         let all = long.iter().flat_map(both);
         let goes_on = all.filter_map(|piece| continues(&line, &piece));
         if let Some(on) = goes_on.min_by(|a, b| a.off_m.total_cmp(&b.off_m)) {
-            self.go_on(now_ms, &on.piece, on.stays_m);
+            self.go_on(now_ms, &on);
             return true;
         }
         if !seeks {
@@ -204,24 +209,31 @@ impl Thread {
         true
     }
 
-    fn go_on(&mut self, now_ms: u64, piece: &[Point], stays_m: f64) {
+    fn go_on(&mut self, now_ms: u64, on: &Continuation) {
         let mut along_m = 0.0;
-        let mut kept = usize::from(stays_m > 0.0);
+        let mut kept = usize::from(on.stays_m > 0.0);
+        let mut tail = self.line.len();
         for (i, both) in self.line.windows(2).enumerate() {
             along_m += (both[1].at - both[0].at).norm();
-            if along_m < stays_m {
+            if along_m < on.stays_m {
                 kept = i + 2;
             }
+            if along_m > on.goes_on_m {
+                tail = tail.min(i + 1);
+            }
         }
+        let tail: Vec<Mark> = self.line.drain(tail.max(kept).max(self.finals)..).collect();
+        let kept = kept.min(self.line.len());
         let begins = kept == 0;
         self.hand_over(kept);
         self.line.truncate(kept);
         self.finals = kept;
-        self.line.extend(piece.iter().enumerate().map(|(i, at)| Mark {
+        self.line.extend(on.piece.iter().enumerate().map(|(i, at)| Mark {
             at: *at,
             seen_ms: now_ms,
             begins: begins && i == 0,
         }));
+        self.line.extend(tail);
         let spare = self.finals.saturating_sub(KEPT);
         self.line.drain(..spare);
         self.finals -= spare;
@@ -241,6 +253,10 @@ impl Thread {
 fn continues(line: &[Point], piece: &[Point]) -> Option<Continuation> {
     let (first, last) = (*piece.first()?, *piece.last()?);
     let way = last - first;
+    // Nearer to the end of the line than this it is the end that is shown.
+    let length_m = length_m(line);
+    let ends_m = nearest(line, last).filter(|(_, m, _)| *m <= GAP_M);
+    let goes_on_m = ends_m.map_or(length_m, |(s, ..)| s + SPARE_M);
     let all = piece.to_vec();
     if let Some((along_m, off_m, direction)) = nearest(line, first)
         && off_m <= GAP_M
@@ -249,6 +265,7 @@ fn continues(line: &[Point], piece: &[Point]) -> Option<Continuation> {
         return Some(Continuation {
             piece: all,
             stays_m: along_m,
+            goes_on_m: goes_on_m.max(along_m),
             off_m,
         });
     }
@@ -258,6 +275,7 @@ fn continues(line: &[Point], piece: &[Point]) -> Option<Continuation> {
     (off_m <= GAP_M && known.dot(&direction) >= 0.0).then_some(Continuation {
         piece: all,
         stays_m: 0.0,
+        goes_on_m: length_m,
         off_m,
     })
 }
