@@ -287,7 +287,7 @@ mod tests {
     fn what_is_left_behind_fills_registers_round_and_round() {
         let mut trails = Trails::default();
         trails.begin_life(0);
-        for k in 0..130 {
+        for k in 0..250 {
             trails.note(3, (vec![mark(k)], true));
         }
         assert!(trails.known.len() > 2 && trails.full.len() == trails.known.len() - 1);
@@ -297,7 +297,7 @@ mod tests {
         let all: Vec<Stretch> = trails.known.values().map(Trail::stretch).collect();
         let whole = outline(&all);
         assert!(whole.closed, "{whole:?}");
-        for k in 130..4_000 {
+        for k in 250..4_000 {
             trails.note(3, (vec![mark(k)], true));
         }
         assert_eq!(trails.known.len(), usize::from(TRAILS_MAX));

@@ -122,7 +122,6 @@ fn off_m(a: Point, b: Point, p: Point) -> f64 {
 /// Two places between which something was seen.
 struct Piece {
     from: Point,
-    to: Point,
     way: Vector,
     seen_ms: u64,
     sided: bool,
@@ -176,7 +175,6 @@ fn pieces_of(stretch: &Stretch) -> impl Iterator<Item = Piece> + '_ {
     let both = stretch.marks.windows(2).filter(|b| !b[1].begins);
     both.map(|b| Piece {
         from: b[0].at,
-        to: b[1].at,
         way: b[1].at - b[0].at,
         seen_ms: b[0].seen_ms.max(b[1].seen_ms),
         sided: stretch.sided,
