@@ -751,12 +751,9 @@ impl Executive {
             Aim::Legs => legs(),
             Aim::Given => !self.is_given_left(),
             Aim::Detour => is_detour_flown && legs(),
-            Aim::Hold
-            | Aim::Point(_)
-            | Aim::Circle(_)
-            | Aim::Round
-            | Aim::Trace
-            | Aim::Follow => false,
+            Aim::Hold | Aim::Point(_) | Aim::Circle(_) | Aim::Round | Aim::Trace | Aim::Follow => {
+                false
+            }
         };
         if are_flown && !self.end_reported {
             self.end_reported = true;

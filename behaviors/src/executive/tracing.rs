@@ -214,13 +214,23 @@ impl Executive {
             return;
         }
         let until_m = self.track.at_m() + KEPT_M;
-        let is_on_loop = self.stretches.iter().any(|s| matches!(s.kind, Kind::Pass(..)));
-        let is_circle = matches!(self.stretches.front().map(|s| s.kind), Some(Kind::Loiter(_)));
+        let is_on_loop = self
+            .stretches
+            .iter()
+            .any(|s| matches!(s.kind, Kind::Pass(..)));
+        let is_circle = matches!(
+            self.stretches.front().map(|s| s.kind),
+            Some(Kind::Loiter(_))
+        );
         if is_on_loop || is_circle {
             self.replan = true;
             return;
         }
-        let within = self.stretches.iter().take_while(|s| s.end_m <= until_m).count();
+        let within = self
+            .stretches
+            .iter()
+            .take_while(|s| s.end_m <= until_m)
+            .count();
         self.keep(within.max(1));
     }
 
@@ -243,7 +253,9 @@ impl Executive {
         let on = lead.pose_at(beside.along_m);
         let faces = cos(at.pose.heading_rad - on.heading_rad);
         if beside.off_m > BESIDE_M || faces < 0.0 {
-            return self.onto(at, &lead, beside.along_m).or_else(|| self.give_up(at));
+            return self
+                .onto(at, &lead, beside.along_m)
+                .or_else(|| self.give_up(at));
         }
         let arc = lead.arc(at.pose, radius_m, ARC_M);
         if self.is_arc_clear(&arc) {

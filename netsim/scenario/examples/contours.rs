@@ -46,7 +46,10 @@ fn main() -> ExitCode {
                 let verdict = if r.passed { "passed" } else { "FAILED" };
                 let contour = r.contour.as_ref();
                 let line = contour.map_or_else(|| "nobody flew along it".to_owned(), |c| c.line());
-                println!("{name} {n} uavs, seed {seed}: {verdict} {:?} {line}", r.reasons);
+                println!(
+                    "{name} {n} uavs, seed {seed}: {verdict} {:?} {line}",
+                    r.reasons
+                );
                 for v in outcome.violations() {
                     println!(
                         "  {} at {} ms, {:?}: {}",

@@ -5,9 +5,9 @@ use crate::diagram::MissionEvent;
 use crate::output::Status;
 use crate::tasking::Follows;
 use crate::wire::detection::Detection;
-use crate::wire::trail::Trail;
 use crate::wire::message::{Epoch, Order, Orders, Stamp};
 use crate::wire::tasks::{Progress, TaskId};
+use crate::wire::trail::Trail;
 use crate::{Incarnation, PeerId};
 use std::collections::BTreeMap;
 

@@ -120,10 +120,7 @@ impl Trails {
         self.number = (self.number + 1) % TRAILS_MAX;
         let last = self.open.last().copied();
         self.open.clear();
-        self.open.extend(last.map(|m| Mark {
-            begins: true,
-            ..m
-        }));
+        self.open.extend(last.map(|m| Mark { begins: true, ..m }));
     }
 
     /// What another tells.
@@ -224,7 +221,7 @@ impl Trails {
         executive.keep_even_along(gaps);
         executive.tell_contour(Told {
             pieces,
-            backward: s.me.id % 2 == 0,
+            backward: s.me.id.is_multiple_of(2),
         });
     }
 }

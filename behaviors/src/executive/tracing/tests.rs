@@ -41,7 +41,12 @@ fn road() -> Vec<Point> {
 
 /// Flies so many seconds along a line from beside a place of it; the farthest it was from it
 /// while it traced, the share of the line that was in its picture, and how near a zone it came.
-fn traced(line: &[Point], sided: bool, zones: Vec<skein_geometry::Polygon>, s: u32) -> (f64, f64, f64) {
+fn traced(
+    line: &[Point],
+    sided: bool,
+    zones: Vec<skein_geometry::Polygon>,
+    s: u32,
+) -> (f64, f64, f64) {
     let (coverage_loop, router) = loop_and_router(12, 10, zones);
     let zones = Arc::clone(router.zones());
     let mut executive = Executive::new(airframe(), 90.0, coverage_loop, router);

@@ -54,9 +54,7 @@ fn of_fire(node: &Node<'_>) -> Result<FireSpec, Error> {
         "stretch",
         "most_m",
     ])?;
-    let radius_m = f
-        .need("radius_m", "120")?
-        .number(10.0, 5_000.0, "metres")?;
+    let radius_m = f.need("radius_m", "120")?.number(10.0, 5_000.0, "metres")?;
     Ok(FireSpec {
         at: position(&f)?,
         radius_m,

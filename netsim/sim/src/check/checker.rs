@@ -1,10 +1,9 @@
 //! All checks of one run behind one door: the driver tells what happened, the checks
 //! decide what it means.
 
-use super::cover::CoverCheck;
 use super::contours::Tracer;
+use super::cover::CoverCheck;
 use super::detections::{Around, Truth};
-use crate::world::contour::Contour;
 use super::graph::{Graph, Stability};
 use super::listing::ListingCheck;
 use super::membership::Membership;
@@ -17,6 +16,7 @@ use super::{Bounds, Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::fault::Fault;
 use crate::spec::Spec;
 use crate::world::Approach;
+use crate::world::contour::Contour;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;

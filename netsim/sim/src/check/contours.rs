@@ -144,7 +144,8 @@ impl ContourCheck {
                 }
             }
         }
-        self.lost_ms.retain(|uav, _| flying.iter().any(|t| t.uav == *uav && t.says));
+        self.lost_ms
+            .retain(|uav, _| flying.iter().any(|t| t.uav == *uav && t.says));
         let tracers: BTreeSet<u16> = flying.iter().map(|t| t.uav).collect();
         if tracers.is_disjoint(&self.tracers) {
             self.since_ms = now_ms;
@@ -198,7 +199,11 @@ impl ContourCheck {
         }
         let length_m = length_m(&contour.line(now_ms));
         self.least_wait_s = length_m / speeds.iter().sum::<f64>();
-        let whole_m = if contour.is_closed() { length_m } else { 2.0 * length_m };
+        let whole_m = if contour.is_closed() {
+            length_m
+        } else {
+            2.0 * length_m
+        };
         let round_ms = milliseconds(whole_m / (SLOWED * slowest_mps));
         let late = |id: &u16| handicaps.late_ms(*id, self.since_ms, now_ms);
         let late_ms = self.tracers.iter().map(late).max().unwrap_or(0);
@@ -304,9 +309,14 @@ impl ContourReport {
     pub fn line(&self) -> String {
         let what = if self.closed { "edge" } else { "road" };
         let area = self.area_error.map_or_else(String::new, |(end, mean)| {
-            format!(", area off by {:.1} % ({:.1} % over time)", 100.0 * end, 100.0 * mean)
+            format!(
+                ", area off by {:.1} % ({:.1} % over time)",
+                100.0 * end,
+                100.0 * mean
+            )
         });
-        let at_s = |ms: Option<u64>| ms.map_or_else(|| "-".to_owned(), |ms| format!("{:.0}", seconds(ms)));
+        let at_s =
+            |ms: Option<u64>| ms.map_or_else(|| "-".to_owned(), |ms| format!("{:.0}", seconds(ms)));
         format!(
             "{what} of {:.0} m, flown along from {} s on, all seen by {} s, {:.1} % seen, {:.1} % known at the end; told within {:.1} m ({:.1} m at most), apart by {:.1} m ({:.1} m at most, {:.1} m over time){area}; in the picture {:.1} % of the time, a place waits {:.0} s at most (least {:.0} s)",
             self.length_m,
@@ -337,7 +347,11 @@ fn length_m(line: &[Point]) -> f64 {
 
 fn area_m2(ring: &[Point]) -> f64 {
     let next = ring.iter().skip(1).chain(ring.first());
-    let twice: f64 = ring.iter().zip(next).map(|(a, b)| a.x * b.y - a.y * b.x).sum();
+    let twice: f64 = ring
+        .iter()
+        .zip(next)
+        .map(|(a, b)| a.x * b.y - a.y * b.x)
+        .sum();
     0.5 * twice.abs()
 }
 
@@ -400,7 +414,13 @@ mod tests {
                 pictured: contour.places(0).iter().map(shows).collect(),
             };
             let now_ms = 1_000 * u64::from(t);
-            check.on_looks(now_ms, &contour, &[tracer], (&flyers, &handicaps), &mut found);
+            check.on_looks(
+                now_ms,
+                &contour,
+                &[tracer],
+                (&flyers, &handicaps),
+                &mut found,
+            );
             if check.is_due(now_ms) {
                 let mark = |k: u32| Mark {
                     at: Point::new(30.0 * f64::from(k), off_m),

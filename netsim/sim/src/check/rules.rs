@@ -3,8 +3,8 @@
 use super::activity::ActivityCheck;
 use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
-use super::decision::{DecisionCheck, Mover};
 use super::contours::{ContourCheck, Tracer};
+use super::decision::{DecisionCheck, Mover};
 use super::detections::DetectionCheck;
 use super::flight::{FlightCheck, Flyer, at_base};
 use super::fuel::FuelCheck;
@@ -20,6 +20,7 @@ use super::watch::WatchCheck;
 use super::{Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::spec::{Spec, UavSpec};
 use crate::twins::Twins;
+use crate::world::contour::Contour;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;
@@ -31,7 +32,6 @@ use skein_peer::wire::codec::Body;
 use skein_peer::wire::message::{Bid, Heartbeat, Order};
 use skein_peer::{Beliefs, Incarnation, Report};
 use std::collections::BTreeMap;
-use crate::world::contour::Contour;
 use std::sync::Arc;
 
 /// The rules of single peers in one run.

@@ -74,7 +74,9 @@ impl Swarm {
             if let Some(m) = ground.or_else(|| peers.first()) {
                 let all: Vec<Stretch> = m.view.trails.iter().map(|(_, t)| t.stretch()).collect();
                 let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
-                rules.contours.on_told(self.now_ms, contour, (m.id, &all), found);
+                rules
+                    .contours
+                    .on_told(self.now_ms, contour, (m.id, &all), found);
             }
         }
         self.account.traced(self.checker.rules.contours.report());

@@ -103,7 +103,12 @@ impl Contour {
 
     /// Which of its places are in the picture of a UAV, and nothing stands in between.
     #[must_use]
-    pub(super) fn pictured(&self, body: &Kinematic, at_ms: u64, obstacles: &Obstacles) -> Vec<bool> {
+    pub(super) fn pictured(
+        &self,
+        body: &Kinematic,
+        at_ms: u64,
+        obstacles: &Obstacles,
+    ) -> Vec<bool> {
         let places = self.places(at_ms).into_iter();
         places.map(|p| is_seen(body, p, obstacles)).collect()
     }
@@ -170,7 +175,9 @@ fn swayed(road: &RoadSpec, phases: [f64; 3]) -> Vec<Point> {
     (0..n)
         .map(|i| {
             let (before, after) = (way[i.saturating_sub(1)], way[(i + 1).min(n - 1)]);
-            let ahead = (after - before).try_normalize(1e-9).unwrap_or_else(Vector::x);
+            let ahead = (after - before)
+                .try_normalize(1e-9)
+                .unwrap_or_else(Vector::x);
             let left = Vector::new(-ahead.y, ahead.x);
             let each = phases.iter().zip([1.0, 2.0, 3.0]);
             let sway: f64 = each
@@ -256,9 +263,8 @@ mod tests {
     #[test]
     fn a_fire_grows_faster_down_wind_and_no_farther_than_it_may() {
         let contour = Contour::new(&fire(), 4);
-        let out_m = |ms: u64, ray: usize| {
-            (contour.places(ms)[ray] - Point::new(450.0, 390.0)).norm()
-        };
+        let out_m =
+            |ms: u64, ray: usize| (contour.places(ms)[ray] - Point::new(450.0, 390.0)).norm();
         let half = usize::try_from(RAYS / 2).unwrap();
         assert!(out_m(0, 0) > 1.5 * out_m(0, half));
         let grown = |ray| out_m(100_000, ray) - out_m(0, ray);

@@ -71,7 +71,11 @@ impl Outline {
         self.gap()?;
         let ring: Vec<Point> = self.pieces[0].iter().map(|m| m.at).collect();
         let next = ring.iter().skip(1).chain(ring.first());
-        let twice: f64 = ring.iter().zip(next).map(|(a, b)| a.coords.perp(&b.coords)).sum();
+        let twice: f64 = ring
+            .iter()
+            .zip(next)
+            .map(|(a, b)| a.coords.perp(&b.coords))
+            .sum();
         Some(0.5 * twice.abs())
     }
 
@@ -96,7 +100,9 @@ pub fn simplified(marks: &[Mark], tolerance_m: f64) -> Vec<Mark> {
             let (a, b) = (marks[from].at, marks[to].at);
             let between = marks[from + 1..to].iter();
             (b - a).norm() <= LONGEST_M
-                && between.into_iter().all(|m| off_m(a, b, m.at) <= tolerance_m)
+                && between
+                    .into_iter()
+                    .all(|m| off_m(a, b, m.at) <= tolerance_m)
         };
         let mut to = from + 1;
         while to + 1 < marks.len() && is_told(to + 1) && !marks[to + 1].begins {
@@ -167,7 +173,9 @@ impl Order {
 
 fn order(run: &[Mark]) -> Order {
     let length_m = run.windows(2).map(|b| (b[1].at - b[0].at).norm()).sum();
-    let first = run.first().map_or((0, Point::origin()), |m| (m.seen_ms, m.at));
+    let first = run
+        .first()
+        .map_or((0, Point::origin()), |m| (m.seen_ms, m.at));
     Order(length_m, first.0, first.1.x, first.1.y)
 }
 
@@ -204,7 +212,11 @@ fn is_old(mark: &Mark, way: Vector, sided: bool, pieces: &[Piece]) -> bool {
         }
         let alike = way.dot(&p.way);
         let least = ALIKE * way.norm() * p.way.norm();
-        if sided { alike >= least } else { alike.abs() >= least }
+        if sided {
+            alike >= least
+        } else {
+            alike.abs() >= least
+        }
     })
 }
 
@@ -250,9 +262,8 @@ fn strung(runs: Vec<(Vec<Mark>, bool)>) -> Outline {
                 piece.extend(run);
             }
         }
-        let closes = sided
-            && piece.len() > 4
-            && (piece[0].at - piece[piece.len() - 1].at).norm() <= JOIN_M;
+        let closes =
+            sided && piece.len() > 4 && (piece[0].at - piece[piece.len() - 1].at).norm() <= JOIN_M;
         all.closed |= closes && all.pieces.is_empty();
         all.pieces.push(piece);
     }
@@ -291,14 +302,22 @@ mod tests {
         assert!(told.closed, "{told:?}");
         let area_m2 = told.area_m2().unwrap();
         let round_m2 = 0.5 * TAU * 208.0 * 208.0;
-        assert!((area_m2 / round_m2 - 1.0).abs() < 0.06, "{}", area_m2 / round_m2);
+        assert!(
+            (area_m2 / round_m2 - 1.0).abs() < 0.06,
+            "{}",
+            area_m2 / round_m2
+        );
         let swapped = outline(&[all[1].clone(), all[0].clone()]);
         assert_eq!(told, swapped);
         assert!(!outline(&all[..1]).closed);
         // One who flies round alone twice tells what it saw in its last round.
         let alone = outline(&[arc(0.0, 1.0, 0), arc(1.0, 2.0, 60_000)]);
         assert!(alone.closed);
-        assert!((alone.length_m() / (TAU * 218.0) - 1.0).abs() < 0.08, "{}", alone.length_m());
+        assert!(
+            (alone.length_m() / (TAU * 218.0) - 1.0).abs() < 0.08,
+            "{}",
+            alone.length_m()
+        );
     }
 
     #[test]
@@ -310,7 +329,10 @@ mod tests {
         };
         let there = (0..20_u32).map(|k| mark(20.0 * f64::from(k), u64::from(k) * 1_500));
         let back = (0..20_u32).map(|k| mark(380.0 - 20.0 * f64::from(k), 60_000 + u64::from(k)));
-        let road = |marks: Vec<Mark>| Stretch { marks, sided: false };
+        let road = |marks: Vec<Mark>| Stretch {
+            marks,
+            sided: false,
+        };
         let told = outline(&[road(there.collect()), road(back.collect())]);
         assert_eq!(told.pieces.len(), 1);
         assert!((told.length_m() - 380.0).abs() < 1e-6 && !told.closed);

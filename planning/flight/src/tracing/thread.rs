@@ -228,11 +228,12 @@ impl Thread {
         self.hand_over(kept);
         self.line.truncate(kept);
         self.finals = kept;
-        self.line.extend(on.piece.iter().enumerate().map(|(i, at)| Mark {
-            at: *at,
-            seen_ms: now_ms,
-            begins: begins && i == 0,
-        }));
+        self.line
+            .extend(on.piece.iter().enumerate().map(|(i, at)| Mark {
+                at: *at,
+                seen_ms: now_ms,
+                begins: begins && i == 0,
+            }));
         self.line.extend(tail);
         let spare = self.finals.saturating_sub(KEPT);
         self.line.drain(..spare);

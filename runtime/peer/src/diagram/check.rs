@@ -414,7 +414,9 @@ pub(crate) fn fits(
     };
     for (i, state) in all.filter(|(_, s)| flown(s)) {
         let behaviour = &state.behaviour;
-        let asked = behaviour.dimension.filter(|_| state.goal != StateGoal::Trace);
+        let asked = behaviour
+            .dimension
+            .filter(|_| state.goal != StateGoal::Trace);
         if let Some(d) = asked.filter(|d| *d != dimension) {
             let text = format!(
                 "the state \"{}\" flies what has dimension {d}, and the mission asks to see what has dimension {dimension}; leave it out for any",

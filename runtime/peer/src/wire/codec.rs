@@ -12,7 +12,6 @@
 
 use super::cbor::{In, Listed, Out, Wire, array_of, in_field, number_of};
 use super::detection::Detection;
-use super::trail::Trail;
 use super::kinds::{Kind, RECORD_MAX_BYTES};
 use super::limits::{
     self, COMMITS_MAX, FRESH_MAX_BYTES, GOSSIP_MAX, MEMBERS_MAX, PLAN_MAX, at_most, in_range,
@@ -25,6 +24,7 @@ use super::message::{
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
 use super::target::Target;
 use super::tasks::{Bundle, Task};
+use super::trail::Trail;
 use crate::protocol::conflict::Intent;
 use crate::protocol::promises::Brief;
 use crate::varint;

@@ -13,5 +13,5 @@ pub(crate) mod samples;
 pub mod schema;
 pub mod signature;
 pub mod target;
-pub mod trail;
 pub mod tasks;
+pub mod trail;

@@ -1,12 +1,12 @@
 //! Bytes of all kinds: typical, largest, refused, cut short, changed.
 
 use super::super::detection::Detection;
-use super::super::trail::Trail;
 use super::super::limits::*;
 use super::super::samples::{fresh, golden, gossip, largest, listing};
 use super::super::signature::Off;
 use super::super::target::Target;
 use super::super::tasks::{Progress, TaskKind};
+use super::super::trail::Trail;
 use super::*;
 use crate::PeerId;
 use proptest::collection::vec;
