@@ -28,6 +28,9 @@ const GROWN_MOST_M: f64 = 120.0;
 /// Of two that run the same way directions differ by no more than this, as a cosine.
 const ALIKE: f64 = 0.3;
 
+/// A piece whose ends are that near closes where it is so many times as long.
+const ROUND: f64 = 4.0;
+
 /// What ends no farther from where another begins goes on there, metres.
 const JOIN_M: f64 = 120.0;
 
@@ -234,6 +237,16 @@ fn runs_beside(p: &Piece, at: Point, grown_m: f64) -> bool {
     overhang_m <= BESIDE_M && across_m <= BESIDE_M + grown_m
 }
 
+/// Whether a piece leads round: its ends are near each other, and it is far longer than that.
+fn is_round(piece: &[Mark]) -> bool {
+    let (Some(first), Some(last)) = (piece.first(), piece.last()) else {
+        return false;
+    };
+    let gap_m = (first.at - last.at).norm();
+    let length_m: f64 = piece.windows(2).map(|b| (b[1].at - b[0].at).norm()).sum();
+    gap_m <= JOIN_M && length_m > ROUND * gap_m && piece.len() > 4
+}
+
 /// Strings runs together where one ends near the begin of another.
 fn strung(runs: Vec<(Vec<Mark>, bool)>) -> Outline {
     let mut left: Vec<Option<(Vec<Mark>, bool)>> = runs.into_iter().map(Some).collect();
@@ -255,15 +268,14 @@ fn strung(runs: Vec<(Vec<Mark>, bool)>) -> Outline {
             };
             let own_m = (piece[0].at - end).norm();
             // It closes rather than go round twice.
-            if piece.len() > 4 && own_m < away_m {
+            if is_round(&piece) && own_m < away_m {
                 break;
             }
             if let Some((run, _)) = left[j].take() {
                 piece.extend(run);
             }
         }
-        let closes =
-            sided && piece.len() > 4 && (piece[0].at - piece[piece.len() - 1].at).norm() <= JOIN_M;
+        let closes = sided && is_round(&piece);
         all.closed |= closes && all.pieces.is_empty();
         all.pieces.push(piece);
     }
@@ -310,6 +322,8 @@ mod tests {
         let swapped = outline(&[all[1].clone(), all[0].clone()]);
         assert_eq!(told, swapped);
         assert!(!outline(&all[..1]).closed);
+        // A short stretch is not taken for a ring because its ends are near each other.
+        assert!(!outline(&[arc(0.0, 0.08, 0)]).closed);
         // One who flies round alone twice tells what it saw in its last round.
         let alone = outline(&[arc(0.0, 1.0, 0), arc(1.0, 2.0, 60_000)]);
         assert!(alone.closed);
