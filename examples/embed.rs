@@ -150,6 +150,7 @@ impl Uav {
             failsafe: false,
             traffic: Traffic::default(),
             sightings: Sightings::default(),
+            contour: skein_behaviors::contour::ContourLook::default(),
         }
     }
 

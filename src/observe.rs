@@ -195,6 +195,7 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Bundle(b) => serde_json::to_value(b),
         Body::Target(b) => serde_json::to_value(b),
         Body::Detection(b) => serde_json::to_value(b),
+        Body::Trail(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -297,6 +298,11 @@ fn words(author: u16, body: &Body) -> String {
             t.seen_ms
         ),
         Body::Detection(d) => d.sentence(author),
+        Body::Trail(t) => format!(
+            "tells {} places of a contour, the first seen at {} ms of the clock of percepts",
+            t.places.len(),
+            t.seen_ms
+        ),
     }
 }
 

@@ -271,10 +271,10 @@ fn a_patrol_goes_round_as_often_as_it_says() {
 }
 
 /// Each to its verdict: an open line and a closed one watched for a time, places that are stayed
-/// over.
+/// over, a road and a fire that nobody knows.
 #[test]
 fn missions_by_diagrams_of_their_own_pass_with_one_uav_and_with_eight() {
-    for name in ["border", "fire", "inspection"] {
+    for name in ["border", "fire", "inspection", "highway", "wildfire"] {
         for peers in [1, 8] {
             let over = Overrides {
                 peers: Some(peers),

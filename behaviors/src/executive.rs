@@ -4,7 +4,7 @@
 //!
 //! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
 //! it cell by cell. Ways between cells come from [`transit`], what the camera saw from
-//! [`camera`], the way to a given circle from [`circle`], rounds of the loop from [`circuit`], turns after a moving target from [`pursuit`], a flight between cells and what it
+//! [`camera`], the way to a given circle from [`circle`], rounds of the loop from [`circuit`], the way along a contour that is seen from [`tracing`], turns after a moving target from [`pursuit`], a flight between cells and what it
 //! is for from [`detour`], expectations for the peer from [`prediction`], what the fuel allows
 //! from [`endurance`], what stays of a flight when the
 //! goal changes from `goal_change`, how far a given flight reaches from [`given`], the proof of each stretch from `clearance_check`;
@@ -17,6 +17,7 @@
 //! | point | a route, then a circle | `Refused` without cells if there is no route |
 //! | circle | a route to the given circle, then that | likewise |
 //! | round | a route onto the loop, then the loop, forward, without end | `Refused` without cells if there is no route |
+//! | trace | turns along the contour that it sees; round until it sees one | likewise |
 //! | follow | none: turns that follow the target, from percept to percept | none |
 //! | given | a route to its start, its pieces, then a circle | `CutShort` where it ends early, `PlanDone` once |
 //! | detour | the cell that is flown, a given flight, then legs | those of both, `DetourFlown` once |
@@ -41,6 +42,7 @@ pub mod new_zones;
 pub mod prediction;
 pub mod promised;
 pub mod pursuit;
+pub mod tracing;
 mod transfer;
 pub mod transit;
 mod way_home;
@@ -116,6 +118,9 @@ pub enum Goal {
     Circle(Segment),
     /// Fly round the loop, forward, again and again, evenly spaced among those who do.
     Round,
+    /// Fly along the contour that it sees, evenly spaced among those who do; round the loop
+    /// until it sees one.
+    Trace,
     /// Follow the target that it is told of, this far from it, metres; hold while it is told of
     /// none.
     Follow(f64),
@@ -151,6 +156,7 @@ enum Aim {
     Point(Point),
     Circle(Segment),
     Round,
+    Trace,
     Follow,
     Given,
     Detour,
@@ -240,6 +246,8 @@ pub struct Executive {
     stranded: bool,
     /// How it keeps its place among those who fly round the loop.
     circuit: circuit::Circuit,
+    /// What it sees of a contour.
+    tracing: tracing::Tracing,
 }
 
 impl Executive {
@@ -276,6 +284,7 @@ impl Executive {
             pursuit: None,
             stranded: false,
             circuit: circuit::Circuit::default(),
+            tracing: tracing::Tracing::default(),
         }
     }
 
@@ -349,6 +358,7 @@ impl Executive {
             return (setpoint, events);
         }
         let offset = self.progress(percept);
+        self.see_contour(percept);
         self.count_misses(is_open, &mut events);
         self.skip_closed(is_open);
         if self.replan || self.stretches.is_empty() {
@@ -616,7 +626,7 @@ impl Executive {
             }
         }
         // Who flies round circles once, to let who is ahead get away.
-        let stays = self.aim != Aim::Round || self.stranded;
+        let stays = !matches!(self.aim, Aim::Round | Aim::Trace) || self.stranded;
         if let Some(Kind::Loiter(circle)) = self.stretches.back().map(|s| s.kind)
             && stays
         {
@@ -630,7 +640,11 @@ impl Executive {
                 self.stranded = false;
                 return moves;
             }
-            None if matches!(self.aim, Aim::Point(_) | Aim::Circle(_) | Aim::Round) => {
+            None if matches!(
+                self.aim,
+                Aim::Point(_) | Aim::Circle(_) | Aim::Round | Aim::Trace
+            ) =>
+            {
                 events.push(Event::Refused { cells: Vec::new() });
                 self.stranded = true;
             }
@@ -641,7 +655,7 @@ impl Executive {
 
     /// The way to where it is to stay, or round; `None` where there is none, or it is to stay
     /// nowhere.
-    fn way_to_aim(&self, at: &Place) -> Option<Vec<Move>> {
+    fn way_to_aim(&mut self, at: &Place) -> Option<Vec<Move>> {
         match self.aim {
             Aim::Point(p) => self.transit.way_to_wait_at(at, p).or_else(|| {
                 let home = self.home.as_ref()?;
@@ -652,6 +666,7 @@ impl Executive {
                 let circle = self.waits_for_room(at).map(|c| vec![Move::Loiter(c)]);
                 circle.or_else(|| self.transit.way_round(at))
             }
+            Aim::Trace => self.way_along(at),
             _ => None,
         }
     }
@@ -736,7 +751,9 @@ impl Executive {
             Aim::Legs => legs(),
             Aim::Given => !self.is_given_left(),
             Aim::Detour => is_detour_flown && legs(),
-            Aim::Hold | Aim::Point(_) | Aim::Circle(_) | Aim::Round | Aim::Follow => false,
+            Aim::Hold | Aim::Point(_) | Aim::Circle(_) | Aim::Round | Aim::Trace | Aim::Follow => {
+                false
+            }
         };
         if are_flown && !self.end_reported {
             self.end_reported = true;

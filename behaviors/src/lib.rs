@@ -7,12 +7,14 @@
 //! | [`wind_estimate`] | the wind, where nobody tells it |
 //! | [`traffic`] | what it senses of other UAVs |
 //! | [`sightings`] | what its camera sees of vehicles |
+//! | [`contour`] | what its camera sees of a road, or of the edge of a fire |
 //! | [`setpoint`] | what it is told to fly |
 //! | [`order`] | what the operator wants of all and of single UAVs |
 //! | [`event`] | what the executive layer reports upwards |
 //! | [`executive`] | a plan on the coverage loop, flown leg by leg, or a flight given whole |
 //! | [`reactive`] | path following, and the envelope that has the last word |
 
+pub mod contour;
 pub mod event;
 pub mod executive;
 pub mod order;

@@ -1,5 +1,6 @@
 //! What a UAV senses, from a simulator or an autopilot.
 
+use crate::contour::ContourLook;
 use crate::sightings::Sightings;
 use crate::traffic::Traffic;
 use serde::{Deserialize, Serialize};
@@ -37,4 +38,7 @@ pub struct Percept {
     /// Vehicles that its camera sees.
     #[serde(default, skip_serializing_if = "Sightings::is_absent")]
     pub sightings: Sightings,
+    /// What its camera sees of a contour.
+    #[serde(default, skip_serializing_if = "ContourLook::is_absent")]
+    pub contour: ContourLook,
 }

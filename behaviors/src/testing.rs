@@ -45,6 +45,7 @@ pub fn percept_at(pose: Pose, time_ms: u64) -> Percept {
         failsafe: false,
         traffic: crate::traffic::Traffic::default(),
         sightings: crate::sightings::Sightings::default(),
+        contour: crate::contour::ContourLook::default(),
     }
 }
 

@@ -32,7 +32,7 @@ use skein_geometry::math::cos;
 pub const SLOWER_PER_S: f64 = 0.05;
 
 /// A circle takes twice its length from the difference; one more may be under way.
-const CIRCLES: f64 = 2.5;
+pub(super) const CIRCLES: f64 = 2.5;
 
 /// Places on the loop are no farther apart, metres.
 const MARK_M: f64 = 15.0;
@@ -103,6 +103,13 @@ pub(super) struct Circuit {
     /// None before the loop is flown round.
     marks: Vec<Mark>,
     gaps: Option<Gaps>,
+}
+
+impl Circuit {
+    /// Who is before and behind it, where that is not counted along the loop.
+    pub(super) fn set_gaps(&mut self, gaps: Option<Gaps>) {
+        self.gaps = gaps;
+    }
 }
 
 impl Transit {

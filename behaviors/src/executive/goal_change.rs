@@ -20,7 +20,9 @@ impl Executive {
         let goal = match goal {
             // By promises nothing but cells is flown.
             Goal::Detour(_, legs) if self.contingency.is_some() => Goal::Legs(legs),
-            Goal::Circle(_) | Goal::Round | Goal::Follow(_) if self.contingency.is_some() => {
+            Goal::Circle(_) | Goal::Round | Goal::Trace | Goal::Follow(_)
+                if self.contingency.is_some() =>
+            {
                 Goal::Hold
             }
             goal => goal,
@@ -65,6 +67,7 @@ impl Executive {
                 )
             }
             Goal::Round => (Aim::Round, self.rounded(), VecDeque::new()),
+            Goal::Trace => (Aim::Trace, self.begin_trace(), VecDeque::new()),
             Goal::Follow(stand_off_m) => {
                 self.begin_pursuit(stand_off_m);
                 (Aim::Follow, 0, VecDeque::new())
@@ -85,7 +88,7 @@ impl Executive {
             }
         };
         self.end_reported = false;
-        if aim != Aim::Round {
+        if !matches!(aim, Aim::Round | Aim::Trace) {
             self.circuit = Circuit::default();
         }
         let same_aim = self.aim == aim;

@@ -368,9 +368,13 @@ impl Executive {
         let is_unwanted = c.wanted_m < end_m;
         let is_short = end_m - at_m < REFILL_S * self.speed_mps();
         let has_goal = match self.aim {
-            Aim::Hold | Aim::Circle(_) | Aim::Round | Aim::Follow | Aim::Given | Aim::Detour => {
-                false
-            }
+            Aim::Hold
+            | Aim::Circle(_)
+            | Aim::Round
+            | Aim::Trace
+            | Aim::Follow
+            | Aim::Given
+            | Aim::Detour => false,
             Aim::Legs => !self.queue.is_empty(),
             Aim::Point(_) => !c.arrived,
         };

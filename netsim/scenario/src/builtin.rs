@@ -52,6 +52,16 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/field.json5"),
     ),
     (
+        "highway",
+        "highway.json5",
+        include_str!("../../../configs/trials/highway.json5"),
+    ),
+    (
+        "wildfire",
+        "wildfire.json5",
+        include_str!("../../../configs/trials/wildfire.json5"),
+    ),
+    (
         "inspection",
         "inspection.json5",
         include_str!("../../../configs/trials/inspection.json5"),

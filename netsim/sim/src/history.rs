@@ -288,6 +288,15 @@ pub fn report_hash(report: &Report) -> u64 {
             words(&mut h, 13, &[u64::from(id.author), u64::from(id.number)]);
             h.write(format!("{told:?}").as_bytes());
         }
+        Report::Traced {
+            length_m,
+            area_m2,
+            places,
+        } => words(
+            &mut h,
+            14,
+            &[*length_m, area_m2.unwrap_or(0), u64::from(*places)],
+        ),
         Report::Finished { revision } => words(&mut h, 7, &[u64::from(*revision)]),
         Report::Alarm { text } => {
             words(&mut h, 8, &[]);

@@ -48,6 +48,7 @@ pub mod weather;
 pub mod world;
 
 pub use check::Findings;
+pub use check::contours::{ContourCheck, ContourReport};
 pub use check::detections::{DetectionCheck, DetectionReport, Truth};
 pub use geometry_cache::geometry_of;
 pub use prepared::Prepared;

@@ -54,6 +54,8 @@ pub struct Spec {
     pub traffic_range_m: f64,
     /// Vehicles on the ground, of which cameras see those in their pictures.
     pub vehicles: Vec<VehicleSpec>,
+    /// A road or a fire that no peer knows, of which cameras see what is in their pictures.
+    pub contour: Option<ContourSpec>,
     /// Faults of the scenario, ascending by time.
     pub faults: Vec<TimedFault>,
     /// From what random faults are drawn.
@@ -143,6 +145,41 @@ pub struct VehicleSpec {
     pub kind: u8,
     /// In how many looks of a thousand a detector takes it for another kind.
     pub confused_permille: u16,
+}
+
+/// A contour that no peer knows.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ContourSpec {
+    /// A road.
+    Road(RoadSpec),
+    /// The edge of a fire.
+    Fire(FireSpec),
+}
+
+/// A road that is on no map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RoadSpec {
+    /// Beside which way it leads.
+    pub way: Vec<Point>,
+    /// How far it sways to either side of that, metres: where is drawn from the seed.
+    pub sway_m: f64,
+}
+
+/// A fire that grows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FireSpec {
+    /// Where it began.
+    pub at: Point,
+    /// How far its head is from there at first, metres.
+    pub radius_m: f64,
+    /// How fast its head moves on, m/s.
+    pub growth_mps: f64,
+    /// Where its head moves to, radians.
+    pub towards_rad: f64,
+    /// How much slower it moves elsewhere, 0 to below 1: the eccentricity of its ellipse.
+    pub stretch: f64,
+    /// Its head moves no farther than this, metres.
+    pub most_m: f64,
 }
 
 /// The ground station.

@@ -102,6 +102,9 @@ fn reported(peer: u16, report: &Report, told: &mut BTreeSet<String>) -> Option<S
             let line = of.sentence(id.author);
             return told.insert(line.clone()).then_some(line);
         }
+        Report::Traced { length_m, .. } => {
+            format!("peer {peer} knows {length_m} m of a contour")
+        }
         Report::Silenced => format!("peer {peer} is silent: another process speaks under its id"),
         Report::Finished { .. } => format!("peer {peer} knows that the mission is finished"),
         Report::Alarm { text } => format!("peer {peer} alarm: {text}"),

@@ -309,6 +309,19 @@ impl Observer {
                 let text = format!("{who}: {}", told.sentence(id.author));
                 (what, text)
             }
+            Report::Traced {
+                length_m, area_m2, ..
+            } => {
+                let what = What::Traced {
+                    length_m: *length_m,
+                    area_m2: *area_m2,
+                };
+                let text = match area_m2 {
+                    Some(m2) => format!("{who} knows a contour of {length_m} m around {m2} m²"),
+                    None => format!("{who} knows {length_m} m of a contour"),
+                };
+                (what, text)
+            }
             Report::Silenced => {
                 self.process(peer).silent = true;
                 let text = format!("{who} is silent: another process speaks under its id");

@@ -10,6 +10,7 @@
 //! | [`trajectory`] | Dubins words, flights in wind, timed trajectories | 2.4 |
 //! | [`separation`] | promised motions, whether two keep apart, ways round | 1.3 |
 //! | [`tracking`] | following targets: guidance, estimates, hand-over | 3.7 |
+//! | [`tracing`] | following a road or a fire's edge by what is seen of it | 3.1 |
 //! | [`coverage`] | closed loops over areas, points and lines, and their division among UAVs | 3.4–3.6 |
 //!
 //! ```
@@ -63,5 +64,6 @@ pub mod airframe;
 pub mod coverage;
 pub mod route;
 pub mod separation;
+pub mod tracing;
 pub mod tracking;
 pub mod trajectory;

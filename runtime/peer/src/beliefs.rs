@@ -7,6 +7,7 @@ use crate::tasking::Follows;
 use crate::wire::detection::Detection;
 use crate::wire::message::{Epoch, Order, Orders, Stamp};
 use crate::wire::tasks::{Progress, TaskId};
+use crate::wire::trail::Trail;
 use crate::{Incarnation, PeerId};
 use std::collections::BTreeMap;
 
@@ -78,6 +79,10 @@ pub struct Beliefs {
     pub open_tasks: Vec<(TaskId, u32)>,
     /// Objects that its mission looks for, as it knows them.
     pub detections: Vec<(TaskId, Detection)>,
+    /// What it knows of a contour: of each author and register what was told last.
+    pub trails: Vec<((u16, u16), Trail)>,
+    /// Whether its UAV flies along a contour that it sees.
+    pub traces: bool,
     /// Records held, bytes waiting to be sent, open stores: each with its cap.
     pub loads: Vec<(&'static str, usize, usize)>,
 }

@@ -50,6 +50,7 @@ use crate::protocol::negotiation::{Adoption, are_many};
 use crate::protocol::runs::PlannedCell;
 use crate::tasking::Tasking;
 use crate::timers::{Timer, Timers};
+use crate::trails::Trails;
 use crate::wire::codec::Body;
 use crate::wire::message::{Beacon, Bid, Epoch, Lacking, Member, Order, Orders, Record};
 use crate::wire::tasks::TaskId;
@@ -95,6 +96,7 @@ pub(crate) struct Cooperation {
     orders: StandingOrders,
     state: Option<MissionState>,
     pub(crate) tasking: Tasking,
+    pub(crate) trails: Trails,
     mismatch_told: bool,
     /// When a piece of a mission came last.
     piece_came: Time,
@@ -107,6 +109,7 @@ impl Cooperation {
             id: config.id.0,
             library: Library::new(config.mission.clone()),
             tasking: Tasking::new(config),
+            trails: Trails::default(),
             orders: StandingOrders::default(),
             state: None,
             mismatch_told: false,
@@ -173,6 +176,7 @@ impl Cooperation {
             state.void_ownership(me, timers);
         }
         self.tasking.void_ownership(me, self.state.as_mut());
+        self.trails.begin_life(me.incarnation);
     }
 
     /// For so long this peer did not listen: it waits that much longer for others.
@@ -256,6 +260,7 @@ impl Cooperation {
         };
         let is_open = |c: u16| !sections.covered().contains(c);
         let (setpoint, events) = executive.step(percept, &is_open);
+        self.trails.note(self.id, executive.take_traced());
         let mut effects = vec![Effect::Fly(setpoint)];
         if aims_anew {
             effects.push(Effect::Negotiate);
@@ -324,6 +329,10 @@ impl Cooperation {
             Body::Task(_) | Body::Bundle(_) | Body::Target(_) | Body::Detection(_) => {
                 self.tasking.hear(now, record, body)
             }
+            Body::Trail(trail) => {
+                self.trails.hear(record.author, record.subject, trail);
+                Effects::new()
+            }
             Body::Intent(_) | Body::Conflict(_) => {
                 let state = self.state.as_mut();
                 if let Some(separation) = state.and_then(|s| s.separation.as_mut()) {
@@ -378,6 +387,7 @@ impl Cooperation {
         state.silent = s.is_silent;
         state.steer_by_state(s.now, order);
         state.keep_even(s);
+        effects.extend(self.trails.tick(s, state));
         assert!(
             !effects.iter().any(|e| matches!(e, Effect::Negotiate)),
             "a tick asks for no tick"
@@ -501,6 +511,8 @@ impl Cooperation {
     /// Fills the mission's part of what the peer believes.
     pub fn fill(&self, beliefs: &mut Beliefs, counter: u32, percept: Option<&Percept>) {
         self.tasking.fill(beliefs);
+        let trails = self.trails.known();
+        beliefs.trails = trails.map(|(key, t)| (key, t.clone())).collect();
         let Some(state) = &self.state else {
             return;
         };
@@ -518,6 +530,7 @@ impl Cooperation {
         beliefs.adoptions = state.negotiation.adoptions;
         beliefs.finished = state.finished;
         beliefs.relays = state.relay.is_some();
+        beliefs.traces = state.executive.as_ref().is_some_and(|e| e.is_tracing());
         beliefs.hears_nobody = state.astray;
         beliefs.cannot_fly_all = state.cannot_fly_all();
         beliefs.missed = state.stage.missed(state.lost);

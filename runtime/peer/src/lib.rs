@@ -129,6 +129,7 @@ pub mod testing;
 #[cfg(test)]
 mod tests;
 mod timers;
+mod trails;
 pub mod transmission;
 mod varint;
 pub mod why;

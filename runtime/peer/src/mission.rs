@@ -404,7 +404,13 @@ impl Mission {
         self.machine().ok().and_then(|m| m.ends_after_s())
     }
 
-    /// Whether it goes on once everything is seen, until something else ends it.
+    /// Whether a contour is flown along once everything is seen.
+    #[must_use]
+    pub fn traces(&self) -> bool {
+        self.machine().is_ok_and(|m| m.traces())
+    }
+
+    /// Whether the loop is flown round and round once everything is seen.
     #[must_use]
     pub fn goes_round(&self) -> bool {
         self.machine().is_ok_and(|m| m.goes_round())

@@ -195,7 +195,7 @@ impl MissionState {
 
     pub fn activity(&self) -> Activity {
         match &self.goal {
-            Some(Goal::Legs(_) | Goal::Round | Goal::Given(_) | Goal::Detour(..)) => {
+            Some(Goal::Legs(_) | Goal::Round | Goal::Trace | Goal::Given(_) | Goal::Detour(..)) => {
                 Activity::Covering
             }
             Some(Goal::Hold | Goal::Circle(_) | Goal::Follow(_)) => Activity::Holding,
@@ -544,7 +544,7 @@ impl MissionState {
             return self.next_lap(s, timers);
         }
         self.complete = complete;
-        let finished = complete && !self.stage.goes_round() || ended;
+        let finished = complete && !self.stage.goes_on() || ended;
         if finished == self.finished {
             return Effects::new();
         }
@@ -616,14 +616,23 @@ impl MissionState {
     /// Tells the executive who else flies round, as far as their beacons said so: who is able has
     /// nothing else to do once everything is seen, and who is elsewhere is not on the loop.
     pub fn keep_even(&mut self, s: &Situation<'_>) {
-        let loop_hash = self.loop_hash();
-        let Some(executive) = self
-            .executive
-            .as_mut()
-            .filter(|_| self.goal == Some(Goal::Round))
-        else {
+        if self.goal != Some(Goal::Round) {
             return;
-        };
+        }
+        let fellows = self.fellows(s);
+        if let Some(executive) = &mut self.executive {
+            executive.keep_even(&fellows);
+        }
+    }
+
+    /// By which goal its executive flies.
+    pub fn flown_goal(&self) -> Option<&Goal> {
+        self.goal.as_ref()
+    }
+
+    /// Who else is able on its loop, as far as beacons said so lately.
+    pub fn fellows(&self, s: &Situation<'_>) -> Vec<Fellow> {
+        let loop_hash = self.loop_hash();
         let fellow = |(id, _)| {
             let info = s.membership.info(id)?;
             let age_ms = s.now.since_ms(info.heard?);
@@ -635,8 +644,7 @@ impl MissionState {
             let pose = place.pose();
             Some(Fellow { pose, age_ms })
         };
-        let fellows: Vec<Fellow> = s.membership.live().filter_map(fellow).collect();
-        executive.keep_even(&fellows);
+        s.membership.live().filter_map(fellow).collect()
     }
 
     /// Gives the executive its goal, if that changed.

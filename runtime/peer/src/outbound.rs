@@ -15,6 +15,7 @@
 //! | task | when it is asked for, cancelled, expired, or somebody did it, and once in each life, by a ground station |
 //! | bundle | while a task is open: when the offer or a claim is new; what was won once an interval has passed without news |
 //! | target | while somebody is to be followed: what was seen since it was told last, two at most every I |
+//! | trail | while its UAV flies along a contour: a stretch when it is full; every 8 I the one that grows, and the next of the older ones |
 //!
 //! I is the interval that this peer's beacons announce, a period T where there is room.
 

@@ -246,6 +246,15 @@ pub enum Report {
         /// What, where and when.
         told: Detection,
     },
+    /// What this peer knows of a contour has changed by much.
+    Traced {
+        /// Its length, metres.
+        length_m: u64,
+        /// What it encloses, m², where it closes.
+        area_m2: Option<u64>,
+        /// By so many places.
+        places: u32,
+    },
     /// Another process speaks under this id: this one is silent from now on, until it
     /// reports that it runs under another incarnation.
     Silenced,

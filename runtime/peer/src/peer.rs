@@ -977,6 +977,7 @@ impl Peer {
             round: self.diary.round(self.now),
             tasks: self.tasks(),
             detections: self.cooperation.tasking.detections_told(),
+            contour: self.cooperation.trails.sentence(),
             others: self.others(),
             events: self.diary.events(self.now),
         }

@@ -131,8 +131,8 @@ impl Stage {
     }
 
     /// Whether what is seen does not end the mission.
-    pub fn goes_round(&self) -> bool {
-        self.machine.goes_round()
+    pub fn goes_on(&self) -> bool {
+        self.machine.goes_on()
     }
 
     /// Somebody who follows this mission says that it is finished: where its time ends it, that
@@ -241,6 +241,7 @@ impl MissionState {
             StateGoal::Hold => Goal::Hold,
             StateGoal::Section => Goal::Legs(legs()),
             StateGoal::Round => Goal::Round,
+            StateGoal::Trace => Goal::Trace,
             StateGoal::Follow => self.followed_at_m().map_or(Goal::Hold, Goal::Follow),
             StateGoal::Relay => self.relay_circle().map_or(Goal::Hold, Goal::Circle),
             StateGoal::Task => match &self.errand {

@@ -172,6 +172,7 @@ impl Seat {
             failsafe: false,
             traffic: skein_behaviors::traffic::Traffic::default(),
             sightings: skein_behaviors::sightings::Sightings::default(),
+            contour: skein_behaviors::contour::ContourLook::default(),
         }
     }
 

@@ -296,6 +296,9 @@ pub struct Why {
     /// Objects that its mission looks for, as it was told of them, a sentence each.
     #[serde(default)]
     pub detections: Vec<String>,
+    /// What is known of a contour, in a sentence.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contour: Option<String>,
     /// What it believes of others, by their numbers.
     pub others: Vec<Other>,
     /// What happened last, the oldest first.
@@ -354,7 +357,7 @@ pub(crate) fn work(state: &MissionState, now: Time) -> Work {
         .filter(|c| !covered.contains(*c))
         .collect();
     let gaps = state.executive.as_ref().and_then(Executive::gaps);
-    let does = match gaps.filter(|_| at.goal == StateGoal::Round) {
+    let does = match gaps.filter(|_| matches!(at.goal, StateGoal::Round | StateGoal::Trace)) {
         Some(gaps) => format!("{}; {}", does(at.goal, reason), spacing(gaps)),
         None => does(at.goal, reason),
     };
@@ -427,6 +430,9 @@ impl fmt::Display for Why {
         }
         for told in &self.detections {
             writeln!(f, "  {told}")?;
+        }
+        if let Some(told) = &self.contour {
+            writeln!(f, "  contour   {told}")?;
         }
         for other in &self.others {
             write_other(other, f)?;

@@ -124,7 +124,13 @@ impl Executive {
             arrives: None,
         };
         match self.aim {
-            Aim::Hold | Aim::Circle(_) | Aim::Round | Aim::Follow | Aim::Given | Aim::Detour => {}
+            Aim::Hold
+            | Aim::Circle(_)
+            | Aim::Round
+            | Aim::Trace
+            | Aim::Follow
+            | Aim::Given
+            | Aim::Detour => {}
             Aim::Legs => self.way_along_legs(&mut way, is_open, events),
             Aim::Point(p) => self.way_to_point(&mut way, p, events),
         }

@@ -42,6 +42,11 @@ const DIAGRAMS: &[(&str, &str, &str)] = &[
         include_str!("../../../../configs/diagrams/search.json5"),
     ),
     (
+        "trace",
+        "trace.json5",
+        include_str!("../../../../configs/diagrams/trace.json5"),
+    ),
+    (
         "weather",
         "weather.json5",
         include_str!("../../../../configs/diagrams/weather.json5"),

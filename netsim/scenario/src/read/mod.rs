@@ -1,6 +1,7 @@
 //! From the text of a scenario to values with units, one subject a file. Leaves what the
 //! values mean together (mission, loop, feasibility) to the modules that follow.
 
+pub(crate) mod contour;
 pub(crate) mod detections;
 pub(crate) mod faults;
 pub(crate) mod fleet;
@@ -30,7 +31,7 @@ use skein_geometry::frame::Point;
 use skein_interop::airframe;
 use skein_interop::json::{Document, Error, Fields, Node, Places};
 use skein_netsim::fault::TimedFault;
-use skein_netsim::spec::{GroundStationSpec, RadioSpec, StormSpec, VehicleSpec};
+use skein_netsim::spec::{ContourSpec, GroundStationSpec, RadioSpec, StormSpec, VehicleSpec};
 use skein_netsim::weather::Weather;
 use skein_peer::criteria::Criterion;
 use skein_peer::diagram::Diagram;
@@ -70,6 +71,7 @@ const FIELDS: &[&str] = &[
     "faults",
     "operator",
     "vehicles",
+    "contour",
     "storm",
     "checks",
 ];
@@ -107,6 +109,8 @@ pub(crate) struct Stated {
     pub(crate) operator: Vec<operator::Act>,
     /// Vehicles on the ground.
     pub(crate) vehicles: Vec<VehicleSpec>,
+    /// A road or a fire that no peer knows.
+    pub(crate) contour: Option<ContourSpec>,
     pub(crate) storm: StormSpec,
     /// What its files told besides what was asked, and faults that were left out.
     pub(crate) findings: Vec<Finding>,
@@ -202,6 +206,7 @@ pub(crate) fn scenario(
         faults,
         operator,
         vehicles,
+        contour: f.get("contour").map(contour::read).transpose()?,
         findings,
         places,
     })

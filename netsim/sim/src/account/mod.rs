@@ -36,6 +36,7 @@ pub use lifetimes::{Cause, Setting};
 pub use report::{Details, Driver, FalseDown, Live, Processes, RunReport, Simulated, Violations};
 pub use work::Held;
 
+use crate::check::contours::ContourReport;
 use crate::check::detections::DetectionReport;
 pub use crate::check::tracks::Tracked;
 use crate::world::{Fact, Judge, Loss};
@@ -90,6 +91,7 @@ pub struct Account {
     failures: Vec<String>,
     tasks: Tasks,
     detections: Vec<DetectionReport>,
+    contour: Option<ContourReport>,
     found_ms: Option<u64>,
     over_ms: Option<u64>,
 }
@@ -113,6 +115,7 @@ impl Account {
             failures: Vec::new(),
             tasks: Tasks::default(),
             detections: Vec::new(),
+            contour: None,
             found_ms: None,
             over_ms: None,
             setting,
@@ -146,6 +149,11 @@ impl Account {
     /// What came so far of the objects that the mission looks for, as the world knows.
     pub fn detected(&mut self, reports: Vec<DetectionReport>) {
         self.detections = reports;
+    }
+
+    /// What came so far of the contour that is flown along, as the world knows.
+    pub fn traced(&mut self, report: Option<ContourReport>) {
+        self.contour = report;
     }
 
     /// What the world knows of a target that is to be followed.
@@ -278,7 +286,7 @@ impl Account {
                 None
             }
             Report::Detected { id, told } => (id.author == peer).then(|| told.sentence(id.author)),
-            Report::Round { .. } | Report::Revised { .. } => None,
+            Report::Round { .. } | Report::Revised { .. } | Report::Traced { .. } => None,
         }
     }
 
@@ -438,6 +446,7 @@ impl Account {
             restarts: self.restarts.reports(),
             tasks: self.tasks.reports(ending.judge),
             detections: self.detections.clone(),
+            contour: self.contour.clone(),
             found_ms: self.found_ms,
             over_ms: self.over_ms,
             finished,

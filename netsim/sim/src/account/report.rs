@@ -6,6 +6,7 @@
 
 use super::lifetimes::Cause;
 use super::tasks::TaskReport;
+use crate::check::contours::ContourReport;
 use crate::check::detections::DetectionReport;
 use crate::check::wind::WindErrors;
 use crate::check::{Findings, Violation};
@@ -89,6 +90,9 @@ pub struct RunReport {
     /// Each object that the mission looks for and a UAV told of.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub detections: Vec<DetectionReport>,
+    /// The contour that was flown along.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contour: Option<ContourReport>,
     /// Live UAVs at the end that believe the mission finished.
     pub finished: Vec<u16>,
     /// Live UAVs at the end that hold a relay position, with everything covered.

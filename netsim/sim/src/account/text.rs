@@ -31,6 +31,9 @@ impl fmt::Display for RunReport {
         for detection in &self.detections {
             writeln!(f, "  detection  {}", detection.line())?;
         }
+        if let Some(contour) = &self.contour {
+            writeln!(f, "  contour    {}", contour.line())?;
+        }
         self.write_radio(f)?;
         self.write_checks(f)?;
         for alarm in &self.alarms {

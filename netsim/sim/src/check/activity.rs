@@ -303,7 +303,7 @@ impl ActivityCheck {
         if timer.is_some_and(|holds| holds != Holds::No) {
             // Also where everything is seen, and tasks of the mission kept it from its end.
             self.ended.insert(flown.sortie);
-        } else if m.view.covered.is_full() && !flown.machine.goes_round() {
+        } else if m.view.covered.is_full() && !flown.machine.goes_on() {
             // It ended by what was seen.
         } else if !may_be_first && self.early.insert(m.id) {
             found.broken("activity", snapshot.now_ms, Some(m.id), || {
@@ -387,7 +387,7 @@ impl Facts<'_> {
                 }
             }
             // Where it goes on, tasks may be open that nobody here knows of.
-            MissionEvent::MissionComplete if self.flown.machine.goes_round() => {
+            MissionEvent::MissionComplete if self.flown.machine.goes_on() => {
                 if view.covered.is_full() {
                     Holds::Maybe
                 } else {

@@ -1,6 +1,7 @@
 //! All checks of one run behind one door: the driver tells what happened, the checks
 //! decide what it means.
 
+use super::contours::Tracer;
 use super::cover::CoverCheck;
 use super::detections::{Around, Truth};
 use super::graph::{Graph, Stability};
@@ -15,6 +16,7 @@ use super::{Bounds, Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::fault::Fault;
 use crate::spec::Spec;
 use crate::world::Approach;
+use crate::world::contour::Contour;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;
@@ -398,6 +400,12 @@ impl Checker {
         };
         let detections = &mut self.rules.detections;
         detections.on_looks(now_ms, (truth, looks), around, &mut self.found);
+    }
+
+    /// Who flies along a contour, beside where it is.
+    pub fn on_tracers(&mut self, now_ms: u64, contour: &Contour, all: &[Tracer]) {
+        let (rules, found) = (&mut self.rules, &mut self.found);
+        rules.on_tracers(now_ms, contour, all, &self.handicaps, found);
     }
 
     /// The true graph in the last snapshot.

@@ -24,6 +24,7 @@
 //! | [`tracks`] | who says that it follows a target sees it |
 //! | [`watch`] | who flies round leaves no place waiting, and spreads evenly |
 //! | [`wind`] | who estimates the wind is right |
+//! | [`contours`] | what is told of a contour is there, and who flies along one has it in its picture |
 //! | [`detections`] | what a mission looks for and one had in sight is told, once, and is there |
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
 //! | [`airtime`] | S9: shares of the channel |
@@ -41,6 +42,7 @@ pub mod airtime;
 pub mod bounds;
 pub mod cadence;
 pub mod checker;
+pub mod contours;
 pub mod cover;
 pub mod decision;
 pub mod detections;

@@ -3,6 +3,7 @@
 use super::activity::ActivityCheck;
 use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
+use super::contours::{ContourCheck, Tracer};
 use super::decision::{DecisionCheck, Mover};
 use super::detections::DetectionCheck;
 use super::flight::{FlightCheck, Flyer, at_base};
@@ -20,6 +21,7 @@ use super::wind::WindCheck;
 use super::{Findings, Handicaps, PeerSnapshot, Snapshot};
 use crate::spec::{Spec, UavSpec};
 use crate::twins::Twins;
+use crate::world::contour::Contour;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;
@@ -56,6 +58,8 @@ pub struct Rules {
     pub(crate) wind: WindCheck,
     /// What the mission looks for.
     pub detections: DetectionCheck,
+    /// Contours that are flown along.
+    pub contours: ContourCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -90,6 +94,7 @@ impl Rules {
             watch: WatchCheck::default(),
             wind: WindCheck::new(&spec.wind),
             detections: DetectionCheck::default(),
+            contours: ContourCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -342,6 +347,25 @@ impl Rules {
         let flyers = (&self.flyers, &self.flight);
         self.fuel.on_snapshot(snapshot, base, flyers, found);
         self.wind.on_snapshot(snapshot, found);
+    }
+
+    /// Whether a UAV is to fly along a contour, by its state.
+    #[must_use]
+    pub fn traces(&self, m: &PeerSnapshot) -> bool {
+        self.activity.goal(m) == Some(StateGoal::Trace)
+    }
+
+    /// Who flies along a contour, beside where it is.
+    pub fn on_tracers(
+        &mut self,
+        now_ms: u64,
+        contour: &Contour,
+        all: &[Tracer],
+        handicaps: &Handicaps,
+        found: &mut Findings,
+    ) {
+        let around = (&self.flyers, handicaps);
+        self.contours.on_looks(now_ms, contour, all, around, found);
     }
 
     /// Where the mission of a revision ends.

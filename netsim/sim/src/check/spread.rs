@@ -97,9 +97,9 @@ fn record_ms(bounds: &Bounds, peers: usize) -> u64 {
 
 /// Whether a record reaches everybody: passed on, and worth it for longer than the two
 /// periods of a state, which is for people and is said again soon. Pieces of a mission reach
-/// who follows an older one: that is `agree`.
+/// who follows an older one: that is `agree`. Trails are said again in turn by their authors.
 fn spreads(kind: u8) -> bool {
-    let some = [Kind::State, Kind::Mission];
+    let some = [Kind::State, Kind::Mission, Kind::Trail];
     Kind::of_number(kind).is_some_and(|k| k.relayed() && !some.contains(&k))
 }
 

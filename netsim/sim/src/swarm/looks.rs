@@ -2,8 +2,10 @@
 
 use super::Swarm;
 use crate::check::PeerSnapshot;
+use crate::check::contours::Tracer;
 use crate::check::detections::Truth;
 use crate::check::tracks::Look;
+use skein_flight::tracing::outline::Stretch;
 use skein_geometry::frame::Point;
 use skein_peer::{MISSION, Report};
 
@@ -47,6 +49,37 @@ impl Swarm {
         self.checker.on_detections(self.now_ms, &truth, &looks);
         let reports = self.checker.rules.detections.reports();
         self.account.detected(reports);
+    }
+
+    /// Who flies along a contour is judged beside where that is, and so is what is told of it: by
+    /// what the ground station knows, or the first UAV where there is none.
+    pub(super) fn judge_contour(&mut self, peers: &[PeerSnapshot]) {
+        let Some(contour) = self.air.world().contour() else {
+            return;
+        };
+        if !self.operator.mission().traces() {
+            return;
+        }
+        let uavs = peers.iter().filter(|m| m.uav);
+        let tracer = |m: &PeerSnapshot| Tracer {
+            uav: m.id,
+            is_to: m.view.speaks && self.checker.rules.traces(m),
+            says: m.view.traces,
+            pictured: self.air.world().contour_pictured(m.id),
+        };
+        let all: Vec<Tracer> = uavs.map(tracer).collect();
+        self.checker.on_tracers(self.now_ms, contour, &all);
+        if self.checker.rules.contours.is_due(self.now_ms) {
+            let ground = peers.iter().find(|m| !m.uav);
+            if let Some(m) = ground.or_else(|| peers.first()) {
+                let all: Vec<Stretch> = m.view.trails.iter().map(|(_, t)| t.stretch()).collect();
+                let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
+                rules
+                    .contours
+                    .on_told(self.now_ms, contour, (m.id, &all), found);
+            }
+        }
+        self.account.traced(self.checker.rules.contours.report());
     }
 
     /// A UAV tells of an object of its own: the world knows whether it is there.

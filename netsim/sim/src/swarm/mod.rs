@@ -830,6 +830,7 @@ impl Swarm {
         );
         self.judge_tracks(&peers);
         self.judge_detections(&peers);
+        self.judge_contour(&peers);
         self.unassigned = peers.iter().any(|m| !m.view.unassigned.is_empty());
         let mut flying = 0;
         let (mut finished, mut ended) = (true, true);

@@ -133,6 +133,7 @@ pub fn square(n_uavs: u16) -> Spec {
         min_separation_m: 4.0,
         traffic_range_m: 0.0,
         vehicles: Vec::new(),
+        contour: None,
         faults: Vec::new(),
         storm: storm(n_uavs),
         seed: 1,

@@ -5,6 +5,7 @@
 //! of a tick is act, move, radio, sense, decide.
 
 mod board;
+pub mod contour;
 pub mod fact;
 pub mod fixture;
 pub mod flat;
@@ -28,6 +29,7 @@ pub use survey::{Cell, Survey, Uncoverable};
 
 use crate::spec::Spec;
 use crate::weather::Weather;
+use contour::Contour;
 use motion::{Kinematic, Piece};
 use skein_behaviors::traffic::{Sighting as Seen, Traffic};
 use skein_behaviors::{Percept, Setpoint};
@@ -148,6 +150,7 @@ pub struct World {
     judge: Judge,
     vehicles: Vehicles,
     weather: Weather,
+    contour: Option<Contour>,
     facts: Vec<Fact>,
     flown: Vec<Piece>,
     airborne: Vec<(u16, Place)>,
@@ -223,6 +226,7 @@ impl World {
             judge,
             vehicles: Vehicles::new(&spec.vehicles, seed),
             weather: spec.wind.clone(),
+            contour: spec.contour.as_ref().map(|c| Contour::new(c, seed)),
             facts: Vec::new(),
             flown: Vec::new(),
             airborne: Vec::new(),
@@ -388,7 +392,26 @@ impl World {
             sightings: self
                 .vehicles
                 .look(body, uav, self.now_ms, &self.site.obstacles),
+            contour: self.contour.as_ref().map_or_else(Default::default, |c| {
+                c.look(body, uav, self.now_ms, &self.site.obstacles)
+            }),
             ..own
+        })
+    }
+
+    /// The road or fire that no peer knows.
+    #[must_use]
+    pub fn contour(&self) -> Option<&Contour> {
+        self.contour.as_ref()
+    }
+
+    /// Which of its places are in the picture of a UAV now.
+    #[must_use]
+    pub fn contour_pictured(&self, uav: u16) -> Vec<bool> {
+        let flies = |b: &&Kinematic| b.takes_off_in_ms(self.now_ms) == 0;
+        let both = self.contour.as_ref().zip(self.body(uav).filter(flies));
+        both.map_or_else(Vec::new, |(c, body)| {
+            c.pictured(body, self.now_ms, &self.site.obstacles)
         })
     }
 

@@ -174,6 +174,14 @@ pub enum What {
         /// Whether it counts; else it was told before.
         stands: bool,
     },
+    /// What a peer knows of a contour has changed by much.
+    Traced {
+        /// Its length, metres.
+        length_m: u64,
+        /// What it encloses, m², where it closes.
+        #[serde(default)]
+        area_m2: Option<u64>,
+    },
     /// A peer is silent: another process speaks under its id.
     Silenced,
     /// Something a person should look at.
@@ -222,6 +230,7 @@ impl What {
             Self::Revised { .. } => "revised",
             Self::Task { .. } => "task",
             Self::Detected { .. } => "detected",
+            Self::Traced { .. } => "traced",
             Self::Silenced => "silenced",
             Self::Alarm => "alarm",
             Self::Refused => "refused",

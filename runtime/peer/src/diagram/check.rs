@@ -178,6 +178,7 @@ fn check_behaviour(state: &State) -> Result<(), (&'static str, String)> {
         StateGoal::Hold | StateGoal::Relay | StateGoal::Follow => &[Purpose::Tracking],
         StateGoal::Section => &[Purpose::Traveling, Purpose::Watching],
         StateGoal::Round => &[Purpose::Watching],
+        StateGoal::Trace => &[Purpose::Watching, Purpose::Tracking],
         StateGoal::Task | StateGoal::Home => &[Purpose::Traveling],
     };
     if !purposes.contains(purpose) {
@@ -205,6 +206,7 @@ fn check_behaviour(state: &State) -> Result<(), (&'static str, String)> {
     let dimensions: &[Option<u8>] = match goal {
         StateGoal::Hold | StateGoal::Relay | StateGoal::Follow => &[Some(0)],
         StateGoal::Task | StateGoal::Home => &[Some(1), None],
+        StateGoal::Trace => &[Some(1)],
         StateGoal::Section | StateGoal::Round => &[None, Some(0), Some(1), Some(2), Some(3)],
     };
     if !dimensions.contains(dimension) {
@@ -219,7 +221,7 @@ fn check_behaviour(state: &State) -> Result<(), (&'static str, String)> {
     let made_of: &[&[Action]] = match goal {
         StateGoal::Hold => &[&[Loitering]],
         StateGoal::Section | StateGoal::Task => &[&[Displacing], &[Displacing, Loitering]],
-        StateGoal::Round => &[&[Displacing]],
+        StateGoal::Round | StateGoal::Trace => &[&[Displacing]],
         StateGoal::Relay | StateGoal::Follow | StateGoal::Home => &[&[Displacing, Loitering]],
     };
     if !made_of.contains(&actions.as_slice()) {
@@ -256,7 +258,10 @@ const GIVEN: [(MissionEvent, StateGoal); 4] = [
 
 /// What a state needs to be reached, beside what a UAV is given: round it flies when everything
 /// is seen.
-const REACHED_BY: [(MissionEvent, StateGoal); 1] = [(MissionEvent::AllSeen, StateGoal::Round)];
+const REACHED_BY: [(MissionEvent, StateGoal); 2] = [
+    (MissionEvent::AllSeen, StateGoal::Round),
+    (MissionEvent::AllSeen, StateGoal::Trace),
+];
 
 /// What a diagram leads to.
 pub(super) fn flown(machine: &Machine) -> Result<(), DiagramError> {
@@ -411,27 +416,35 @@ pub(crate) fn fits(
     apart: bool,
 ) -> Result<(), DiagramError> {
     let all = diagram.states.iter().enumerate();
-    let flown = |s: &State| matches!(s.goal, StateGoal::Section | StateGoal::Round);
+    let flown = |s: &State| {
+        matches!(
+            s.goal,
+            StateGoal::Section | StateGoal::Round | StateGoal::Trace
+        )
+    };
     for (i, state) in all.filter(|(_, s)| flown(s)) {
         let behaviour = &state.behaviour;
-        if let Some(d) = behaviour.dimension.filter(|d| *d != dimension) {
+        let asked = behaviour
+            .dimension
+            .filter(|_| state.goal != StateGoal::Trace);
+        if let Some(d) = asked.filter(|d| *d != dimension) {
             let text = format!(
                 "the state \"{}\" flies what has dimension {d}, and the mission asks to see what has dimension {dimension}; leave it out for any",
                 state.name
             );
             return Err(wrong(format!("states[{i}].behaviour.dimension"), text));
         }
-        if state.goal == StateGoal::Round {
+        if matches!(state.goal, StateGoal::Round | StateGoal::Trace) {
             if again {
                 let text = format!(
-                    "the state \"{}\" goes round once everything is seen, and the mission has laps; leave the laps out",
+                    "the state \"{}\" goes on once everything is seen, and the mission has laps; leave the laps out",
                     state.name
                 );
                 return Err(wrong(format!("states[{i}].goal"), text));
             }
             if apart {
                 let text = format!(
-                    "the state \"{}\" goes round, and UAVs that are kept apart by agreement fly cells alone; leave the separation out",
+                    "the state \"{}\" goes on, and UAVs that are kept apart by agreement fly cells alone; leave the separation out",
                     state.name
                 );
                 return Err(wrong(format!("states[{i}].goal"), text));

@@ -11,7 +11,9 @@ fn state(name: &str, purpose: Purpose, dimension: Option<u8>, goal: StateGoal) -
     let endless = purpose != Purpose::Traveling;
     let actions = match goal {
         StateGoal::Hold => &[Action::Loitering][..],
-        StateGoal::Section | StateGoal::Round | StateGoal::Task => &[Action::Displacing],
+        StateGoal::Section | StateGoal::Round | StateGoal::Trace | StateGoal::Task => {
+            &[Action::Displacing]
+        }
         StateGoal::Relay | StateGoal::Follow | StateGoal::Home => KEPT,
     };
     State {

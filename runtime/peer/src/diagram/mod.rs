@@ -241,6 +241,9 @@ pub enum StateGoal {
     Section,
     /// Fly round the loop again and again, evenly spaced among those who do.
     Round,
+    /// Fly along a contour that is seen, evenly spaced among those who do; round the loop until
+    /// it is.
+    Trace,
     /// Fly to its relay position and circle there.
     Relay,
     /// Follow its target, or search for it.
@@ -253,10 +256,11 @@ pub enum StateGoal {
 
 impl StateGoal {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Hold,
         Self::Section,
         Self::Round,
+        Self::Trace,
         Self::Relay,
         Self::Follow,
         Self::Task,
@@ -270,6 +274,7 @@ impl StateGoal {
             Self::Hold => "hold",
             Self::Section => "section",
             Self::Round => "round",
+            Self::Trace => "trace",
             Self::Relay => "relay",
             Self::Follow => "follow",
             Self::Task => "task",
@@ -284,6 +289,7 @@ impl StateGoal {
             Self::Hold => "loiters where it is",
             Self::Section => "flies its section",
             Self::Round => "flies round, evenly spaced among those who do",
+            Self::Trace => "flies along the contour that it sees, or looks for one",
             Self::Relay => "holds a relay position that it was given, or flies to it",
             Self::Follow => "follows a target that it was given, or searches for it",
             Self::Task => "flies to a task that it was given, between two cells of its section",
@@ -506,10 +512,22 @@ impl Machine {
         timers.map(|w| w.amount).min()
     }
 
-    /// Whether it goes on once everything is seen, until something else ends it.
+    /// Whether the loop is flown round and round once everything is seen.
     #[must_use]
     pub fn goes_round(&self) -> bool {
         self.states().iter().any(|s| s.goal == StateGoal::Round)
+    }
+
+    /// Whether a contour is flown along once everything is seen.
+    #[must_use]
+    pub fn traces(&self) -> bool {
+        self.states().iter().any(|s| s.goal == StateGoal::Trace)
+    }
+
+    /// Whether it goes on once everything is seen, until something else ends it.
+    #[must_use]
+    pub fn goes_on(&self) -> bool {
+        self.goes_round() || self.traces()
     }
 
     /// Whether the mission ends when something that it looks for was told.

@@ -25,7 +25,8 @@
 //!
 //! Pieces of missions are most of what there is to say, and all know the first mission before
 //! they start: they are no part of what a beacon tells of an author's records, so that one
-//! other record lacked does not bring them all again.
+//! other record lacked does not bring them all again. Nor are trails, which are as long and which
+//! their authors say again in turn.
 
 use crate::Incarnation;
 use crate::input::Time;
@@ -127,7 +128,7 @@ fn key_of(record: &Record) -> RecordKey {
 
 /// Whether a record is part of what a beacon tells of its author's records.
 fn is_counted(kind: Kind) -> bool {
-    kind.relayed() && kind != Kind::Mission
+    kind.relayed() && !matches!(kind, Kind::Mission | Kind::Trail)
 }
 
 /// Of which mission a record is a piece.

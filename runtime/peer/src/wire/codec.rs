@@ -24,6 +24,7 @@ use super::message::{
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
 use super::target::Target;
 use super::tasks::{Bundle, Task};
+use super::trail::Trail;
 use crate::protocol::conflict::Intent;
 use crate::protocol::promises::Brief;
 use crate::varint;
@@ -95,6 +96,7 @@ pub enum Body {
     Bundle(Bundle),
     Target(Target),
     Detection(Detection),
+    Trail(Trail),
 }
 
 impl Body {
@@ -118,6 +120,7 @@ impl Body {
             Self::Bundle(_) => Kind::Bundle,
             Self::Target(_) => Kind::Target,
             Self::Detection(_) => Kind::Detection,
+            Self::Trail(_) => Kind::Trail,
         }
     }
 
@@ -152,6 +155,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Bundle(b) => b.put(&mut out),
         Body::Target(b) => b.put(&mut out),
         Body::Detection(b) => b.put(&mut out),
+        Body::Trail(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -185,6 +189,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Bundle => Body::Bundle(Wire::get(&mut input)?),
         Kind::Target => Body::Target(Wire::get(&mut input)?),
         Kind::Detection => Body::Detection(Wire::get(&mut input)?),
+        Kind::Trail => Body::Trail(Wire::get(&mut input)?),
         Kind::Event => {
             return Err(WireError::Kind {
                 number: kind.number(),

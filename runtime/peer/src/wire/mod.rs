@@ -14,3 +14,4 @@ pub mod schema;
 pub mod signature;
 pub mod target;
 pub mod tasks;
+pub mod trail;

@@ -111,6 +111,10 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         Body::Detection(super::detection::samples::detection()),
         "8c00000003191002011a00013df81a0001d682397ab619213419170c39018f",
     ));
+    all.push((
+        Body::Trail(super::trail::samples::trail()),
+        "83f51a00013df883841904b439013900f5841905dc39012116f4841906f43877182ef4",
+    ));
     all
 }
 
@@ -334,6 +338,7 @@ pub fn largest() -> Vec<Body> {
     all.extend(super::tasks::samples::largest());
     all.extend(super::target::samples::largest());
     all.extend(super::detection::samples::largest());
+    all.extend(super::trail::samples::largest());
     all
 }
 

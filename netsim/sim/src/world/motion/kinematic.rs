@@ -274,6 +274,7 @@ impl Kinematic {
             failsafe: self.failsafe,
             traffic: skein_behaviors::traffic::Traffic::default(),
             sightings: skein_behaviors::sightings::Sightings::default(),
+            contour: skein_behaviors::contour::ContourLook::default(),
         })
     }
 

@@ -6,6 +6,7 @@ use super::super::samples::{fresh, golden, gossip, largest, listing};
 use super::super::signature::Off;
 use super::super::target::Target;
 use super::super::tasks::{Progress, TaskKind};
+use super::super::trail::Trail;
 use super::*;
 use crate::PeerId;
 use proptest::collection::vec;
@@ -405,6 +406,19 @@ fn every_limit_is_sharp() {
                 with(&|t| t.both_e3 -= 1, "both_e3");
                 with(&|t| t.task_by = 0, "task");
             }
+            Body::Trail(t) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut Trail), field| {
+                    let mut t = t.clone();
+                    change(&mut t);
+                    refused(&Body::Trail(t), field);
+                };
+                with(&|t| t.seen_ms += 1, "seen_ms");
+                with(&|t| t.places.push(t.places[0]), "places");
+                with(&|t| t.places[0].east_dm -= 1, "east_dm");
+                with(&|t| t.places[0].north_dm -= 1, "north_dm");
+                with(&|t| t.places[0].after_ds += 1, "after_ds");
+            }
             Body::Detection(d) => {
                 kinds += 1;
                 let with = |change: &dyn Fn(&mut Detection), field| {
@@ -433,7 +447,7 @@ fn every_limit_is_sharp() {
             Body::Finished(_) => {}
         }
     }
-    assert_eq!(kinds, 15);
+    assert_eq!(kinds, 16);
 }
 
 #[test]
@@ -489,7 +503,7 @@ fn envelopes_beyond_the_table_are_refused() {
     };
     assert!(of(|_| ()).is_ok());
     assert_eq!(of(|r| r.kind = 8), Err(WireError::Kind { number: 8 }));
-    assert_eq!(of(|r| r.kind = 17), Err(WireError::Kind { number: 17 }));
+    assert_eq!(of(|r| r.kind = 18), Err(WireError::Kind { number: 18 }));
     assert_eq!(
         of(|r| r.subject = 1),
         Err(WireError::Range { field: "subject" })
