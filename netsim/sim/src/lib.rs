@@ -47,6 +47,7 @@ mod twins;
 pub mod world;
 
 pub use check::Findings;
+pub use check::counts::CountReport;
 pub use check::detections::{DetectionCheck, DetectionReport, Truth};
 pub use geometry_cache::geometry_of;
 pub use prepared::Prepared;

@@ -1,6 +1,7 @@
 //! What checks may look at: a copy of what one peer believes.
 
 use crate::cells::CellSet;
+use crate::counting::SiteCount;
 use crate::diagram::MissionEvent;
 use crate::output::Status;
 use crate::tasking::Follows;
@@ -72,6 +73,8 @@ pub struct Beliefs {
     pub open_tasks: Vec<(TaskId, u32)>,
     /// Objects that its mission looks for, as it knows them.
     pub detections: Vec<(TaskId, Detection)>,
+    /// What all together counted at the sites of its mission, as it knows.
+    pub counts: Vec<SiteCount>,
     /// Records held, bytes waiting to be sent, open stores: each with its cap.
     pub loads: Vec<(&'static str, usize, usize)>,
 }

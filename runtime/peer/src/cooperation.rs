@@ -321,7 +321,11 @@ impl Cooperation {
                 self.hear_orders(orders, (record.incarnation, record.seq, record.author));
                 Effects::new()
             }
-            Body::Task(_) | Body::Bundle(_) | Body::Target(_) | Body::Detection(_) => {
+            Body::Task(_)
+            | Body::Bundle(_)
+            | Body::Target(_)
+            | Body::Detection(_)
+            | Body::Count(_) => {
                 self.tasking.hear(now, record, body)
             }
             Body::Intent(_) | Body::Conflict(_) => {
@@ -502,6 +506,7 @@ impl Cooperation {
         let Some(state) = &self.state else {
             return;
         };
+        beliefs.counts = self.tasking.counts(&state.geometry.mission);
         let sections = &state.negotiation.sections;
         beliefs.able = state.able();
         beliefs.loop_hash = state.loop_hash();

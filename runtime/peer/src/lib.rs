@@ -96,6 +96,8 @@ mod company;
 pub mod config;
 mod cooperation;
 mod coverage_told;
+pub mod count_site;
+pub mod counting;
 pub mod criteria;
 pub mod detections;
 pub mod diagram;

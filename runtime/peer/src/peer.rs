@@ -32,6 +32,7 @@ use crate::task_desk::TaskView;
 use crate::timers::{Timer, Timers};
 use crate::transmission::Transmission;
 use crate::why::{self, Other, Why};
+use crate::wire::count::Count;
 use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
@@ -943,6 +944,22 @@ impl Peer {
         beliefs
     }
 
+    /// What this UAV counts itself at each site of its mission, and whether it does so at present.
+    pub fn counted(&self) -> impl Iterator<Item = (bool, Count)> {
+        self.cooperation.tasking.counted()
+    }
+
+    /// What is known of the sites of its mission, for a person.
+    fn counts_told(&self) -> Vec<String> {
+        let Some(state) = self.cooperation.state() else {
+            return Vec::new();
+        };
+        let mission = &state.geometry.mission;
+        let counts = self.cooperation.tasking.counts(mission);
+        let of = mission.counts.iter().zip(counts);
+        of.map(|(site, count)| count.sentence(site)).collect()
+    }
+
     /// What it does and why, for a person.
     #[must_use]
     pub fn why(&self) -> Why {
@@ -962,6 +979,7 @@ impl Peer {
             round: self.diary.round(self.now),
             tasks: self.tasks(),
             detections: self.cooperation.tasking.detections_told(),
+            counts: self.counts_told(),
             others: self.others(),
             events: self.diary.events(self.now),
         }

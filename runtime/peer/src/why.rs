@@ -284,6 +284,9 @@ pub struct Why {
     /// Objects that its mission looks for, as it was told of them, a sentence each.
     #[serde(default)]
     pub detections: Vec<String>,
+    /// What was counted at the sites of its mission, a sentence each.
+    #[serde(default)]
+    pub counts: Vec<String>,
     /// What it believes of others, by their numbers.
     pub others: Vec<Other>,
     /// What happened last, the oldest first.
@@ -413,7 +416,7 @@ impl fmt::Display for Why {
         for task in &self.tasks {
             write_task(task, f)?;
         }
-        for told in &self.detections {
+        for told in self.detections.iter().chain(&self.counts) {
             writeln!(f, "  {told}")?;
         }
         for other in &self.others {

@@ -1,6 +1,7 @@
 //! From the text of a scenario to values with units, one subject a file. Leaves what the
 //! values mean together (mission, loop, feasibility) to the modules that follow.
 
+pub(crate) mod counts;
 pub(crate) mod detections;
 pub(crate) mod faults;
 pub(crate) mod fleet;
@@ -32,6 +33,7 @@ use skein_interop::airframe;
 use skein_interop::json::{Document, Error, Fields, Node, Places};
 use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{GroundStationSpec, RadioSpec, StormSpec, VehicleSpec};
+use skein_peer::count_site::CountSite;
 use skein_peer::criteria::Criterion;
 use skein_peer::diagram::Diagram;
 use skein_peer::input::NewTask;
@@ -90,6 +92,8 @@ pub(crate) struct Stated {
     pub(crate) detections: Vec<Criterion>,
     /// Tasks that begin with the mission.
     pub(crate) brought: Vec<NewTask>,
+    /// Where vehicles are counted.
+    pub(crate) counts: Vec<CountSite>,
     /// By what rule the loop is divided.
     pub(crate) division: Rule,
     pub(crate) lanes: Lanes,
@@ -180,6 +184,9 @@ pub(crate) fn scenario(
             .get("mission")
             .map_or(Ok(Vec::new()), detections::of_mission)?,
         brought: f.get("mission").map_or(Ok(Vec::new()), tasks::of_mission)?,
+        counts: f
+            .get("mission")
+            .map_or(Ok(Vec::new()), counts::of_mission)?,
         division: f.get("division").map_or(Ok(Rule::Best), division)?,
         lanes: lanes::read(&f)?,
         base: f

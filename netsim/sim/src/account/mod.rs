@@ -36,6 +36,7 @@ pub use lifetimes::{Cause, Setting};
 pub use report::{Details, Driver, FalseDown, Live, Processes, RunReport, Simulated, Violations};
 pub use work::Held;
 
+use crate::check::counts::CountReport;
 use crate::check::detections::DetectionReport;
 pub use crate::check::tracks::Tracked;
 use crate::world::{Fact, Judge, Loss};
@@ -90,6 +91,7 @@ pub struct Account {
     failures: Vec<String>,
     tasks: Tasks,
     detections: Vec<DetectionReport>,
+    counts: Vec<CountReport>,
     found_ms: Option<u64>,
     over_ms: Option<u64>,
 }
@@ -113,6 +115,7 @@ impl Account {
             failures: Vec::new(),
             tasks: Tasks::default(),
             detections: Vec::new(),
+            counts: Vec::new(),
             found_ms: None,
             over_ms: None,
             setting,
@@ -141,6 +144,11 @@ impl Account {
     pub fn found(&mut self, now_ms: u64) {
         self.covered(now_ms);
         self.found_ms.get_or_insert(now_ms);
+    }
+
+    /// What is known so far of the sites at which the mission counts, beside what is true.
+    pub fn counted(&mut self, reports: Vec<CountReport>) {
+        self.counts = reports;
     }
 
     /// What came so far of the objects that the mission looks for, as the world knows.
@@ -438,6 +446,7 @@ impl Account {
             restarts: self.restarts.reports(),
             tasks: self.tasks.reports(ending.judge),
             detections: self.detections.clone(),
+            counts: self.counts.clone(),
             found_ms: self.found_ms,
             over_ms: self.over_ms,
             finished,

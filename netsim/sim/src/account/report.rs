@@ -6,6 +6,7 @@
 
 use super::lifetimes::Cause;
 use super::tasks::TaskReport;
+use crate::check::counts::CountReport;
 use crate::check::detections::DetectionReport;
 use crate::check::{Findings, Violation};
 use crate::world::Judge;
@@ -88,6 +89,9 @@ pub struct RunReport {
     /// Each object that the mission looks for and a UAV told of.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub detections: Vec<DetectionReport>,
+    /// Each site at which vehicles are counted: what is known, beside what is true.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub counts: Vec<CountReport>,
     /// Live UAVs at the end that believe the mission finished.
     pub finished: Vec<u16>,
     /// Live UAVs at the end that hold a relay position, with everything covered.

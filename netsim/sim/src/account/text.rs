@@ -31,6 +31,9 @@ impl fmt::Display for RunReport {
         for detection in &self.detections {
             writeln!(f, "  detection  {}", detection.line())?;
         }
+        for count in &self.counts {
+            writeln!(f, "  count      {}", count.line())?;
+        }
         self.write_radio(f)?;
         self.write_checks(f)?;
         for alarm in &self.alarms {

@@ -23,6 +23,7 @@
 //! | [`relays`] | who holds a relay position is there |
 //! | [`tracks`] | who says that it follows a target sees it |
 //! | [`watch`] | who flies round leaves no place waiting, and spreads evenly |
+//! | [`counts`] | what is counted at the sites of a mission is what truly passes and stands there |
 //! | [`detections`] | what a mission looks for and one had in sight is told, once, and is there |
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
 //! | [`airtime`] | S9: shares of the channel |
@@ -40,6 +41,7 @@ pub mod airtime;
 pub mod bounds;
 pub mod cadence;
 pub mod checker;
+pub mod counts;
 pub mod cover;
 pub mod decision;
 pub mod detections;

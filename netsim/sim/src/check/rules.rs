@@ -3,6 +3,7 @@
 use super::activity::ActivityCheck;
 use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
+use super::counts::CountCheck;
 use super::decision::{DecisionCheck, Mover};
 use super::detections::DetectionCheck;
 use super::flight::{FlightCheck, Flyer, at_base};
@@ -54,6 +55,8 @@ pub struct Rules {
     watch: WatchCheck,
     /// What the mission looks for.
     pub detections: DetectionCheck,
+    /// What is counted at its sites.
+    pub counts: CountCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -87,6 +90,7 @@ impl Rules {
             tracks: TrackCheck::default(),
             watch: WatchCheck::default(),
             detections: DetectionCheck::default(),
+            counts: CountCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -101,6 +105,7 @@ impl Rules {
         self.flight.on_zones(mission.zones_m());
         self.activity.on_mission(mission);
         self.detections.on_mission(mission);
+        self.counts.on_mission(mission);
         self.spread
             .on_mission(chunks(mission).map_or(0, |pieces| pieces.len()));
     }

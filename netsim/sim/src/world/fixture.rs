@@ -171,6 +171,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         diagram: None,
         detections: Vec::new(),
         tasks: Vec::new(),
+        counts: Vec::new(),
         tree: skein_flight::coverage::ring::Tree::default(),
         division: Default::default(),
         separation_mm: 0,

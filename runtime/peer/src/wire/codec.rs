@@ -11,6 +11,7 @@
 //! or panics. The primitives are in `cbor.rs`, schemas in [`super::schema`].
 
 use super::cbor::{In, Listed, Out, Wire, array_of, in_field, number_of};
+use super::count::Count;
 use super::detection::Detection;
 use super::kinds::{Kind, RECORD_MAX_BYTES};
 use super::limits::{
@@ -95,6 +96,7 @@ pub enum Body {
     Bundle(Bundle),
     Target(Target),
     Detection(Detection),
+    Count(Count),
 }
 
 impl Body {
@@ -118,6 +120,7 @@ impl Body {
             Self::Bundle(_) => Kind::Bundle,
             Self::Target(_) => Kind::Target,
             Self::Detection(_) => Kind::Detection,
+            Self::Count(_) => Kind::Count,
         }
     }
 
@@ -152,6 +155,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Bundle(b) => b.put(&mut out),
         Body::Target(b) => b.put(&mut out),
         Body::Detection(b) => b.put(&mut out),
+        Body::Count(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -185,6 +189,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Bundle => Body::Bundle(Wire::get(&mut input)?),
         Kind::Target => Body::Target(Wire::get(&mut input)?),
         Kind::Detection => Body::Detection(Wire::get(&mut input)?),
+        Kind::Count => Body::Count(Wire::get(&mut input)?),
         Kind::Event => {
             return Err(WireError::Kind {
                 number: kind.number(),

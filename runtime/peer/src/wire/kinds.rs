@@ -47,6 +47,8 @@ pub enum Kind {
     Target = 15,
     /// An object that the mission looks for, which the author saw.
     Detection = 16,
+    /// What the author counted at a site of the mission.
+    Count = 17,
 }
 
 /// How long a record waiting to be sent matters.
@@ -104,7 +106,7 @@ const fn row(
 // matters until the longest partition a mission tolerates, and is repaired by
 // anti-entropy afterwards.
 // Caps: the largest valid body, which a test of `codec` computes, rounded up.
-const TABLE: [KindRow; 17] = [
+const TABLE: [KindRow; 18] = [
     KindRow {
         relayed: false,
         ..row(
@@ -261,11 +263,22 @@ const TABLE: [KindRow; 17] = [
             Lifetime::Ms(60_000),
         )
     },
+    // For people: nobody flies by it.
+    KindRow {
+        subjects: super::count::COUNTS_MAX,
+        ..row(
+            Kind::Count,
+            "count",
+            64,
+            Priority::Telemetry,
+            Lifetime::Ms(60_000),
+        )
+    },
 ];
 
 impl Kind {
     /// All kinds, by number.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Beacon,
         Self::State,
         Self::Bid,
@@ -283,6 +296,7 @@ impl Kind {
         Self::Bundle,
         Self::Target,
         Self::Detection,
+        Self::Count,
     ];
 
     /// Its number on the wire.
@@ -386,7 +400,7 @@ mod tests {
             assert_eq!(Kind::of_name(kind.name()), Some(kind));
             assert!(kind.cap_bytes() + super::super::codec::ENVELOPE_MAX_BYTES <= RECORD_MAX_BYTES);
         }
-        assert_eq!(Kind::of_number(17), None);
+        assert_eq!(Kind::of_number(18), None);
         assert_eq!(Kind::of_name("rumour"), None);
     }
 

@@ -80,6 +80,7 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
         Body::Bundle(b) => super::tasks::check_bundle(b),
         Body::Target(t) => super::target::check(t),
         Body::Detection(d) => super::detection::check(d),
+        Body::Count(c) => super::count::check(c),
     }
 }
 

@@ -111,6 +111,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         Body::Detection(super::detection::samples::detection()),
         "8c00000003191002011a00013df81a0001d682397ab619213419170c39018f",
     ));
+    all.push((Body::Count(super::count::samples::count()), "871a123456781a00013df80e19ee481910d60000"));
     all
 }
 
@@ -334,6 +335,7 @@ pub fn largest() -> Vec<Body> {
     all.extend(super::tasks::samples::largest());
     all.extend(super::target::samples::largest());
     all.extend(super::detection::samples::largest());
+    all.extend(super::count::samples::largest());
     all
 }
 

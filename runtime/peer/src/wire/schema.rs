@@ -490,6 +490,7 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Bundle => Some(super::tasks::BUNDLE),
         Kind::Target => Some(super::target::TARGET),
         Kind::Detection => Some(super::detection::DETECTION),
+        Kind::Count => Some(super::count::COUNT),
         Kind::Event => None,
     }
 }

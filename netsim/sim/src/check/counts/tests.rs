@@ -1,0 +1,1 @@
+//! What is counted beside what is true, on scenes made by hand.
