@@ -6,7 +6,7 @@
 //! | a look, all of a site is in the inner part of the picture, and nobody of a lower number is above it | the site is watched |
 //! | a vehicle that was outside of a site is inside, while that is watched | it passes, once it is known to drive |
 //! | a vehicle is inside of a watched site | the time that it takes and the way that it drives are counted |
-//! | a site is watched for a second | who stands in it is counted anew |
+//! | a site is watched for two seconds | who stands in it is counted anew |
 //! | a site is watched no more, or was for ten intervals since it was told | what was counted there is told |
 //! | a count of another | kept, of each author and life the newest |
 //! | another life begins, other sites or another sortie | its own counts begin at nothing |
@@ -42,20 +42,34 @@ const GAP_MS: u64 = 1_000;
 /// A vehicle left a site when it is so far outside, metres: who stands on the outline passes once.
 const LEFT_M: f64 = 3.0;
 
+/// Who drives in is no farther inside when it is seen there first, metres: two looks at 15 m/s. Who
+/// is was taken for another that was inside already.
+const DEPTH_M: f64 = 6.0;
+
 /// Who was seen so often is no false alarm.
 const HITS: u32 = 4;
 
-/// Slower than this is as good as still, m/s.
-const STILL_MPS: f64 = 1.5;
+/// Slower than this over the last looks is as good as still, m/s: three times what errors of two
+/// places come to in a second.
+const STILL_MPS: f64 = 2.5;
 
-/// And so far two places of who stands are apart by their errors, metres.
-const SLACK_M: f64 = 2.0;
+/// So many looks are the last ones, and they take so long at least, milliseconds.
+const LAST: usize = 6;
+const LAST_MS: u64 = 600;
 
-/// Who stands in a site is known after so long, milliseconds: tracks are confirmed by then.
-const SURE_MS: u64 = 1_000;
+/// A track of fewer looks may be on the wrong side of an outline.
+const SIDE_HITS: u32 = 3;
+
+/// Who stands in a site is known after so long, milliseconds: while many come into a picture at
+/// once, neighbours are taken for each other, and who was stands again in the looks of a second.
+const SURE_MS: u64 = 2_000;
 
 /// What is watched on and on is told once in so many intervals.
 const TOLD_INTERVALS: u64 = 10;
+
+/// Who stands there is the most that one of so many looks tells: one is missed for a look more
+/// often than there is one too many.
+const LOTS: usize = 5;
 
 /// Counts that are said at a time.
 const SAID: usize = 2;
@@ -196,8 +210,8 @@ impl SiteCount {
 #[derive(Clone, Copy, Debug)]
 struct Along {
     begun_ms: u64,
-    from: Point,
-    last_ms: u64,
+    /// Where it was when it was seen last, the latest last.
+    last: [(u64, Point); LAST],
     hits: u32,
     /// Where it is known to be inside or outside; where inside; where it drove in and is not
     /// counted yet.
@@ -214,6 +228,8 @@ struct Site {
     middle: Point,
     own: Count,
     driven_m: f64,
+    /// Who stood there in the last looks of this watch.
+    stood: [u16; LOTS],
     /// Since when it is watched in one go, by the clock of percepts.
     since_ms: Option<u64>,
     told: Count,
@@ -251,11 +267,10 @@ impl Mission {
 }
 
 impl Along {
-    fn begun(t: &Track, now_ms: u64) -> Self {
+    fn begun(t: &Track) -> Self {
         Self {
             begun_ms: t.seen_ms.saturating_sub(t.watched_ms()),
-            from: t.estimate.position(),
-            last_ms: now_ms,
+            last: [(t.seen_ms, t.estimate.position()); LAST],
             hits: 0,
             known: 0,
             inside: 0,
@@ -263,10 +278,22 @@ impl Along {
         }
     }
 
-    /// Whether it moved farther than one who stands seems to.
-    fn drives(&self, at: Point) -> bool {
-        let over_s = seconds(self.last_ms.saturating_sub(self.begun_ms));
-        (at - self.from).norm() > STILL_MPS * over_s + SLACK_M
+    fn seen(&mut self, now_ms: u64, at: Point) {
+        self.last.rotate_left(1);
+        self.last[LAST - 1] = (now_ms, at);
+        self.hits = self.hits.saturating_add(1);
+    }
+
+    fn last_ms(&self) -> u64 {
+        self.last[LAST - 1].0
+    }
+
+    /// Whether it drives, or stands; none where that is not known yet. Over the last looks alone:
+    /// who was taken for its neighbour once stands soon again.
+    fn drives(&self) -> Option<bool> {
+        let ((from_ms, from), (to_ms, to)) = (self.last[0], self.last[LAST - 1]);
+        let over_ms = to_ms.saturating_sub(from_ms);
+        (over_ms >= LAST_MS).then(|| (to - from).norm() > STILL_MPS * seconds(over_ms))
     }
 }
 
@@ -306,6 +333,7 @@ impl Counting {
                 middle: s.middle(),
                 own,
                 driven_m: 0.0,
+                stood: [0; LOTS],
                 since_ms: None,
                 told: own,
                 told_at: Time(0),
@@ -351,7 +379,7 @@ impl Counting {
         let mut before = core::mem::take(&mut self.tracks);
         for t in tracks.all() {
             let mut along = Self::before(&mut before, tracks, t)
-                .unwrap_or_else(|| Along::begun(t, now_ms));
+                .unwrap_or_else(|| Along::begun(t));
             if t.seen_ms == now_ms {
                 self.step(&mut along, t, now_ms, watched);
             }
@@ -377,11 +405,13 @@ impl Counting {
 
     fn step(&mut self, along: &mut Along, t: &Track, now_ms: u64, watched: u16) {
         let at = t.estimate.position();
-        let since_ms = now_ms.saturating_sub(along.last_ms);
-        along.hits = along.hits.saturating_add(1);
-        along.last_ms = now_ms;
+        let since_ms = now_ms.saturating_sub(along.last_ms());
+        along.seen(now_ms, at);
         let is_sure = t.confirmed && along.hits >= HITS;
-        let drives = along.drives(at);
+        let drives = along.drives() == Some(true);
+        if along.hits < SIDE_HITS {
+            return;
+        }
         for (i, site) in self.sites.iter_mut().enumerate() {
             let bit = 1_u16 << i;
             if site.what != Counted::Passing {
@@ -393,7 +423,8 @@ impl Counting {
             along.known |= bit;
             if is_inside {
                 along.inside |= bit;
-                if was_known && !was_inside && watched & bit > 0 {
+                let drove_in = was_known && !was_inside && watched & bit > 0;
+                if drove_in && site.outline.outline_distance_m(at) <= DEPTH_M {
                     along.entered |= bit;
                 }
             } else if was_inside && site.outline.outline_distance_m(at) > LEFT_M {
@@ -417,8 +448,8 @@ impl Counting {
         let stands = |t: &&Track| {
             let along = alongs.get(&t.name);
             along.is_some_and(|a| {
-                let is_fresh = now_ms.saturating_sub(a.last_ms) <= GAP_MS;
-                is_fresh && a.hits >= HITS && !a.drives(t.estimate.position())
+                let is_fresh = now_ms.saturating_sub(a.last_ms()) <= GAP_MS;
+                is_fresh && a.hits >= HITS && a.drives() == Some(false)
             })
         };
         for site in &mut self.sites {
@@ -426,11 +457,14 @@ impl Counting {
                 .since_ms
                 .is_some_and(|since_ms| now_ms.saturating_sub(since_ms) >= SURE_MS);
             if site.what != Counted::Standing || !is_sure {
+                site.stood = [0; LOTS];
                 continue;
             }
             let standing = tracks.confirmed().filter(stands);
             let inside = standing.filter(|t| site.outline.contains(t.estimate.position()));
-            site.own.standing = u16::try_from(inside.count()).unwrap_or(u16::MAX);
+            site.stood.rotate_left(1);
+            site.stood[LOTS - 1] = u16::try_from(inside.count()).unwrap_or(u16::MAX);
+            site.own.standing = site.stood.iter().copied().max().unwrap_or(0);
             site.own.seen_ms = now_ms;
         }
     }

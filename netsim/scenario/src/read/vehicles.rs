@@ -20,6 +20,9 @@ const SPEED_MPS: f64 = 6.0;
 /// Most vehicles of a scenario: each look of each UAV asks for all of them.
 const MOST: u16 = 256;
 
+/// How much faster and slower than said the fastest and the slowest of several of a kind are.
+const SPREAD: f64 = 0.2;
+
 /// Who is parked has a road that it never drives, metres.
 const PARKED_ROAD_M: f64 = 300.0;
 
@@ -79,7 +82,7 @@ pub(crate) fn read(
             let text = "they would all begin at one place; leave start and count out, or take streets";
             return Err(item.wrong(text));
         }
-        Ok(vec![vehicle; usize::from(n)])
+        Ok(spread(vehicle, n))
     };
     let mut all = Vec::new();
     for item in list.items()? {
@@ -89,6 +92,20 @@ pub(crate) fn read(
         return Err(list.wrong(format!("are {}; expected {MOST} at most", all.len())));
     }
     Ok(all)
+}
+
+/// Several of a kind, their usual speeds spread evenly: no two drive side by side for long.
+fn spread(vehicle: VehicleSpec, n: u16) -> Vec<VehicleSpec> {
+    let mut all = vec![vehicle; usize::from(n)];
+    for (i, v) in (0..n).zip(&mut all) {
+        let along = if n > 1 {
+            2.0 * f64::from(i) / f64::from(n - 1) - 1.0
+        } else {
+            0.0
+        };
+        v.speed_mps *= 1.0 + SPREAD * along;
+    }
+    all
 }
 
 /// Vehicles that are parked, one at each of some places.
