@@ -3,15 +3,29 @@
 //!
 //! `cargo run --release -p skein-scenario --example counts -- crossings,parking 1,2,3,8 0..10 storm`
 //!
-//! Faults are those of the scenario, `none`, or what the `storm` of the seed draws. At the end of
+//! Faults are those of the scenario, `none`, or what the `storm` of the seed draws, each with what
+//! the operator of the scenario asks for. At the end of
 //! each number of UAVs how often the true volume was in the range that is told with the estimate.
 
 mod shared;
 
 use skein_netsim::CountReport;
+use skein_netsim::account::secs;
+use skein_netsim::account::tasks::TaskReport;
 use skein_netsim::prepared::Prepared;
-use skein_netsim::runs::{Wanted, failure_free_makespan_ms, run, storm};
+use skein_netsim::fault::{Fault, TimedFault};
+use skein_netsim::runs::{Wanted, failure_free_makespan_ms, faults_of, run};
 use std::process::ExitCode;
+
+/// What the operator of the scenario asks for is asked for in its storms, too.
+fn is_request(f: &TimedFault) -> bool {
+    matches!(f.fault, Fault::AddTask { .. })
+}
+
+fn requests(prepared: &Prepared) -> Vec<TimedFault> {
+    let all = prepared.spec.faults.iter();
+    all.filter(|f| is_request(f)).cloned().collect()
+}
 
 /// All sites of all runs together.
 #[derive(Debug, Default)]
@@ -30,6 +44,8 @@ struct Totals {
     lots_exact: u32,
     lots_off: u32,
     lots_known: u32,
+    visits_s: Vec<f64>,
+    unseen: u32,
 }
 
 impl Totals {
@@ -58,12 +74,28 @@ impl Totals {
         }
     }
 
+    fn visited(&mut self, task: &TaskReport) {
+        let Some(ms) = task.seen_ms else {
+            self.unseen += u32::from(task.is_look);
+            return;
+        };
+        self.visits_s.push(secs(ms.saturating_sub(task.asked_ms)));
+        self.visits_s.sort_by(f64::total_cmp);
+    }
+
     fn line(&self) -> String {
+        let visit = |share: usize| self.visits_s.get((self.visits_s.len() * share) / 100);
+        let visits = visit(50).zip(visit(95)).zip(self.visits_s.last());
+        let visits = visits.map_or_else(String::new, |((p50, p95), most)| {
+            let n = self.visits_s.len();
+            let unseen = self.unseen;
+            format!("; {n} visits after {p50:.1} s, {p95:.1} s (p95), {most:.1} s at most, {unseen} not made")
+        });
         let n = f64::from(u32::try_from(self.speed_off_mps.len()).unwrap_or(u32::MAX)).max(1.0);
         let mean = self.speed_off_mps.iter().sum::<f64>() / n;
         let worst = self.speed_off_mps.iter().fold(0.0_f64, |w, o| w.max(o.abs()));
         format!(
-            "{} runs; known {} of {} counted, truly {}; watched {} of {} ms counted, {} ms well in pictures; range holds {} of {}; speed off {mean:.2} m/s, {worst:.2} at most; lots {} of {} known, {} exact, {} off at most",
+            "{} runs; known {} of {} counted, truly {}; watched {} of {} ms counted, {} ms well in pictures; range holds {} of {}; speed off {mean:.2} m/s, {worst:.2} at most; lots {} of {} known, {} exact, {} off at most{visits}",
             self.runs,
             self.known,
             self.counted,
@@ -104,8 +136,14 @@ fn main() -> ExitCode {
                     ..Wanted::default()
                 };
                 let outcome = match free_ms {
-                    Some(free_ms) => storm(&prepared, seed, free_ms, wanted),
-                    None if arg(3, "") == "none" => run(&prepared, seed, Vec::new(), wanted),
+                    Some(free_ms) => {
+                        let (struck, mut faults) = faults_of(&prepared, seed, Some(free_ms));
+                        let own = prepared.spec.faults.iter();
+                        faults.extend(own.filter(|f| is_request(f)).cloned());
+                        faults.sort_by_key(|f| f.at_ms);
+                        run(&struck, seed, faults, wanted)
+                    }
+                    None if arg(3, "") == "none" => run(&prepared, seed, requests(&prepared), wanted),
                     None => run(&prepared, seed, prepared.spec.faults.clone(), wanted),
                 };
                 let r = &outcome.report;
@@ -120,6 +158,10 @@ fn main() -> ExitCode {
                 );
                 for task in &r.tasks {
                     println!("  {}", task.line());
+                    totals.visited(task);
+                }
+                for told in &r.detections {
+                    println!("  {}", told.line());
                 }
                 for count in &r.counts {
                     println!("  {}", count.line());

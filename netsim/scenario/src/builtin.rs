@@ -32,6 +32,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/parking.json5"),
     ),
     (
+        "accident",
+        "accident.json5",
+        include_str!("../../../configs/trials/accident.json5"),
+    ),
+    (
         "helsinki_wind",
         "helsinki_wind.json5",
         include_str!("../../../configs/trials/helsinki_wind.json5"),

@@ -30,6 +30,8 @@ mod builtin;
 mod choose_tree;
 mod coverable;
 #[cfg(test)]
+mod counted;
+#[cfg(test)]
 mod detected;
 pub mod diagram;
 mod error;

@@ -3,7 +3,7 @@
 //!
 //! | event | what follows |
 //! |---|---|
-//! | a look, all of a site is in the inner part of the picture, and nobody of a lower number is above it | the site is watched |
+//! | a look, all of a site is in the inner part of the picture, and nobody of a lower number has it in its own | the site is watched |
 //! | a vehicle that was outside of a site is inside, while that is watched | it passes, once it is known to drive |
 //! | a vehicle is inside of a watched site | the time that it takes and the way that it drives are counted |
 //! | a site is watched for two seconds | who stands in it is counted anew |
@@ -31,7 +31,7 @@ use skein_behaviors::Percept;
 use skein_flight::airframe::Airframe;
 use skein_flight::tracking::tracks::{TargetName, Track, Tracks};
 use skein_geometry::Polygon;
-use skein_geometry::frame::Point;
+use skein_geometry::frame::{Point, Pose};
 use skein_geometry::hash::Fnv;
 use skein_geometry::math::seconds;
 use std::collections::BTreeMap;
@@ -52,6 +52,10 @@ const HITS: u32 = 4;
 /// Slower than this over the last looks is as good as still, m/s: three times what errors of two
 /// places come to in a second.
 const STILL_MPS: f64 = 2.5;
+
+/// And so is who the filter takes for slower than this, m/s: it forgets sooner that one was taken
+/// for its neighbour, and takes who stands for one that moves at two.
+const SLOW_MPS: f64 = 2.0;
 
 /// So many looks are the last ones, and they take so long at least, milliseconds.
 const LAST: usize = 6;
@@ -74,7 +78,7 @@ const LOTS: usize = 5;
 /// Counts that are said at a time.
 const SAID: usize = 2;
 
-/// Whoever was heard so many intervals ago is where it was.
+/// Whoever was heard so many intervals ago is where it flew straight on to.
 const HEARD_INTERVALS: u64 = 3;
 
 /// Most counts of others that are kept: sixteen sites of a hundred UAVs, and lives of some.
@@ -225,7 +229,6 @@ struct Along {
 struct Site {
     what: Counted,
     outline: Polygon,
-    middle: Point,
     own: Count,
     driven_m: f64,
     /// Who stood there in the last looks of this watch.
@@ -330,7 +333,6 @@ impl Counting {
             Some(Site {
                 what: s.what,
                 outline: s.outline()?,
-                middle: s.middle(),
                 own,
                 driven_m: 0.0,
                 stood: [0; LOTS],
@@ -361,7 +363,7 @@ impl Counting {
         let mut watched = 0_u16;
         for (i, site) in self.sites.iter_mut().enumerate() {
             let corners = site.outline.vertices();
-            let is_pictured = || corners.iter().all(|p| is_in_picture(percept, airframe, *p));
+            let is_pictured = || is_in_picture(percept.pose, airframe, corners);
             let is_watched = counts && !site.is_left_to_another && is_pictured();
             let was = site.since_ms.filter(|_| apart_ms > 0);
             if is_watched && was.is_some() {
@@ -449,7 +451,8 @@ impl Counting {
             let along = alongs.get(&t.name);
             along.is_some_and(|a| {
                 let is_fresh = now_ms.saturating_sub(a.last_ms()) <= GAP_MS;
-                is_fresh && a.hits >= HITS && a.drives() == Some(false)
+                let is_slow = t.estimate.velocity_mps().norm() < SLOW_MPS;
+                is_fresh && a.hits >= HITS && (is_slow || a.drives() == Some(false))
             })
         };
         for site in &mut self.sites {
@@ -469,14 +472,21 @@ impl Counting {
         }
     }
 
-    /// Where others of lower numbers are, and how long ago they said so, milliseconds: what one
-    /// of them has in its picture that one counts.
-    pub fn heed(&mut self, others: &[(Point, u64)], interval_ms: u64, airframe: &Airframe) {
-        let reach_m = airframe.footprint_along_m.min(airframe.footprint_across_m);
+    /// Where others of lower numbers were, and how long ago they said so, milliseconds: what one
+    /// of them has in its picture, if it flew straight on since, that one counts. They are taken to
+    /// have the own airframe.
+    pub fn heed(&mut self, others: &[(Pose, u64)], interval_ms: u64, airframe: &Airframe) {
+        let fresh = others
+            .iter()
+            .filter(|(_, age_ms)| *age_ms <= HEARD_INTERVALS * interval_ms);
+        let now = |(pose, age_ms): &(Pose, u64)| {
+            let on_m = airframe.cruise_mps * seconds(*age_ms);
+            Pose::new(pose.position() + pose.direction() * on_m, pose.heading_rad)
+        };
+        let poses: Vec<Pose> = fresh.map(now).collect();
         for site in &mut self.sites {
-            site.is_left_to_another = others.iter().any(|(at, age_ms)| {
-                *age_ms <= HEARD_INTERVALS * interval_ms && (at - site.middle).norm() <= reach_m
-            });
+            let has = |pose: &Pose| is_in_picture(*pose, airframe, site.outline.vertices());
+            site.is_left_to_another = poses.iter().any(has);
         }
     }
 
@@ -545,12 +555,14 @@ impl Counting {
     }
 }
 
-/// Whether a place is in the inner part of the picture.
-fn is_in_picture(percept: &Percept, airframe: &Airframe, p: Point) -> bool {
-    let pose = percept.pose;
-    let (forward, to) = (pose.direction(), p - pose.position());
-    let along = forward.dot(&to).abs() <= INNER * airframe.footprint_along_m;
-    along && forward.perp(&to).abs() <= INNER * airframe.footprint_across_m
+/// Whether all of these places are in the inner part of a picture.
+fn is_in_picture(pose: Pose, airframe: &Airframe, places: &[Point]) -> bool {
+    let forward = pose.direction();
+    places.iter().all(|p| {
+        let to = *p - pose.position();
+        let along = forward.dot(&to).abs() <= INNER * airframe.footprint_along_m;
+        along && forward.perp(&to).abs() <= INNER * airframe.footprint_across_m
+    })
 }
 
 #[allow(

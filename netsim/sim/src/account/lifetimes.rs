@@ -23,6 +23,8 @@ pub struct Setting {
     pub work_m: f64,
     /// Share of the area that must be coverable, 0 to 1.
     pub needed_share: f64,
+    /// How soon what the operator asks to be looked at is to be seen, ms.
+    pub max_visit_ms: Option<u64>,
 }
 
 impl Setting {
@@ -53,6 +55,7 @@ impl Setting {
                 None => once_m * (f64::from(spec.mission.further_laps) + 1.0),
             },
             needed_share: spec.min_coverable,
+            max_visit_ms: spec.max_visit_s.map(|s| 1_000 * u64::from(s)),
         }
     }
 }

@@ -50,7 +50,7 @@ use skein_peer::Report;
 use skein_peer::input::AskedTask;
 use skein_peer::output::{Status, TaskNews};
 use std::collections::{BTreeMap, BTreeSet};
-use tasks::Tasks;
+use tasks::{TaskReport, Tasks};
 use work::Work;
 
 /// Alarms and refusals that are kept; a peer that repeats itself must not fill the
@@ -464,7 +464,10 @@ impl Account {
             live,
             ..RunReport::default()
         };
-        report.judge(&self.failures);
+        let late = |t: &TaskReport| t.late(self.setting.max_visit_ms?, now_ms);
+        let late = report.tasks.iter().filter_map(late);
+        let failures: Vec<String> = self.failures.iter().cloned().chain(late).collect();
+        report.judge(&failures);
         report
     }
 }

@@ -131,6 +131,7 @@ pub fn square(n_uavs: u16) -> Spec {
         max_time_s: 1800,
         min_coverable: 0.97,
         min_separation_m: 4.0,
+        max_visit_s: None,
         traffic_range_m: 0.0,
         vehicles: Vec::new(),
         faults: Vec::new(),

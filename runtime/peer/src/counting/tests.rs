@@ -4,7 +4,7 @@ use super::*;
 use crate::testing::mission;
 use skein_flight::tracking::estimate::Detection;
 use skein_flight::tracking::tracks::{Kind, Sighting};
-use skein_geometry::frame::{Pose, Vector};
+use skein_geometry::frame::Vector;
 
 const CAR: Kind = Kind(1);
 
@@ -125,7 +125,7 @@ fn who_drove_in_before_the_site_was_watched_or_while_another_counts_does_not_cou
     assert!(scene.own().watched_ms >= 5_000);
 
     let mut scene = Scene::new(Counted::Passing);
-    let near = [(Point::new(20.0, 0.0), 900)];
+    let near = [(Pose::new(Point::new(8.0, 0.0), 0.0), 200)];
     scene.look(0.2, &|_| Vec::new());
     scene.counting.heed(&near, 1_000, &airframe());
     scene.look(8.0, &|s| vec![car(s)]);
@@ -142,7 +142,7 @@ fn who_stands_is_counted_at_the_last_look_and_who_drives_by_is_not() {
     let mut scene = Scene::new(Counted::Standing);
     let lot = |n: u32| (0..n).map(|i| Point::new(-9.0 + 6.0 * f64::from(i), 4.0));
     let car = drives(1.0);
-    scene.look(6.0, &|s| lot(3).chain([car(s)]).collect());
+    scene.look(7.0, &|s| lot(3).chain([car(s)]).collect());
     let own = scene.own();
     assert_eq!((own.standing, own.passed), (3, 0), "{own:?}");
     assert_eq!(own.seen_ms, scene.now_ms);

@@ -14,7 +14,7 @@ use crate::mission_state::MissionState;
 use crate::wire::count::Count;
 use crate::Mission;
 use skein_behaviors::Percept;
-use skein_geometry::frame::Point;
+use skein_geometry::frame::Pose;
 
 impl Tasking {
     /// A look at the sites.
@@ -42,9 +42,9 @@ impl Tasking {
         let place = |(id, _)| {
             let info = s.membership.info(id).filter(|i| !i.ground_station)?;
             let age_ms = s.now.since_ms(info.heard?);
-            Some((info.place?.pose().position(), age_ms))
+            Some((info.place?.pose(), age_ms))
         };
-        let others: Vec<(Point, u64)> = lower.filter_map(place).collect();
+        let others: Vec<(Pose, u64)> = lower.filter_map(place).collect();
         let interval_ms = s.membership.interval_ms();
         self.counting.heed(&others, interval_ms, &airframe);
         if s.speaks {
