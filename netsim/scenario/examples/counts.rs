@@ -12,8 +12,8 @@ mod shared;
 use skein_netsim::CountReport;
 use skein_netsim::account::secs;
 use skein_netsim::account::tasks::TaskReport;
-use skein_netsim::prepared::Prepared;
 use skein_netsim::fault::{Fault, TimedFault};
+use skein_netsim::prepared::Prepared;
 use skein_netsim::runs::{Wanted, failure_free_makespan_ms, faults_of, run};
 use std::process::ExitCode;
 
@@ -93,7 +93,10 @@ impl Totals {
         });
         let n = f64::from(u32::try_from(self.speed_off_mps.len()).unwrap_or(u32::MAX)).max(1.0);
         let mean = self.speed_off_mps.iter().sum::<f64>() / n;
-        let worst = self.speed_off_mps.iter().fold(0.0_f64, |w, o| w.max(o.abs()));
+        let worst = self
+            .speed_off_mps
+            .iter()
+            .fold(0.0_f64, |w, o| w.max(o.abs()));
         format!(
             "{} runs; known {} of {} counted, truly {}; watched {} of {} ms counted, {} ms well in pictures; range holds {} of {}; speed off {mean:.2} m/s, {worst:.2} at most; lots {} of {} known, {} exact, {} off at most{visits}",
             self.runs,
@@ -143,7 +146,9 @@ fn main() -> ExitCode {
                         faults.sort_by_key(|f| f.at_ms);
                         run(&struck, seed, faults, wanted)
                     }
-                    None if arg(3, "") == "none" => run(&prepared, seed, requests(&prepared), wanted),
+                    None if arg(3, "") == "none" => {
+                        run(&prepared, seed, requests(&prepared), wanted)
+                    }
                     None => run(&prepared, seed, prepared.spec.faults.clone(), wanted),
                 };
                 let r = &outcome.report;

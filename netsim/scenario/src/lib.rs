@@ -28,9 +28,9 @@
 
 mod builtin;
 mod choose_tree;
-mod coverable;
 #[cfg(test)]
 mod counted;
+mod coverable;
 #[cfg(test)]
 mod detected;
 pub mod diagram;

@@ -325,9 +325,7 @@ impl Cooperation {
             | Body::Bundle(_)
             | Body::Target(_)
             | Body::Detection(_)
-            | Body::Count(_) => {
-                self.tasking.hear(now, record, body)
-            }
+            | Body::Count(_) => self.tasking.hear(now, record, body),
             Body::Intent(_) | Body::Conflict(_) => {
                 let state = self.state.as_mut();
                 if let Some(separation) = state.and_then(|s| s.separation.as_mut()) {

@@ -6,7 +6,7 @@
 //! | a look, all of a site is in the inner part of the picture, and nobody of a lower number has it in its own | the site is watched |
 //! | a vehicle that was outside of a site is inside, while that is watched | it passes, once it is known to drive |
 //! | a vehicle is inside of a watched site | the time that it takes and the way that it drives are counted |
-//! | a site is watched for two seconds | who stands in it is counted anew |
+//! | a site is watched for three seconds, from not too high up | who stands in it is counted anew |
 //! | a site is watched no more, or was for ten intervals since it was told | what was counted there is told |
 //! | a count of another | kept, of each author and life the newest |
 //! | another life begins, other sites or another sortie | its own counts begin at nothing |
@@ -70,6 +70,10 @@ const SURE_MS: u64 = 2_000;
 
 /// What is watched on and on is told once in so many intervals.
 const TOLD_INTERVALS: u64 = 10;
+
+/// Who stand beside each other are told apart where places are told with no larger standard
+/// deviation, in the mean, mm: from high up they are not, and such a UAV leaves the count to others.
+const SHARP_MM: u64 = 1_100;
 
 /// Who stands there is the most that one of so many looks tells: one is missed for a look more
 /// often than there is one too many.
@@ -232,7 +236,7 @@ struct Site {
     own: Count,
     driven_m: f64,
     /// Who stood there in the last looks of this watch.
-    stood: [u16; LOTS],
+    stood: [Option<u16>; LOTS],
     /// Since when it is watched in one go, by the clock of percepts.
     since_ms: Option<u64>,
     told: Count,
@@ -335,7 +339,7 @@ impl Counting {
                 outline: s.outline()?,
                 own,
                 driven_m: 0.0,
-                stood: [0; LOTS],
+                stood: [None; LOTS],
                 since_ms: None,
                 told: own,
                 told_at: Time(0),
@@ -373,15 +377,14 @@ impl Counting {
             site.since_ms = is_watched.then(|| was.unwrap_or(now_ms));
         }
         self.go_along(now_ms, tracks, watched);
-        self.count_standing(now_ms, tracks);
+        self.count_standing(percept, tracks);
     }
 
     /// Takes in what each track did since the last look.
     fn go_along(&mut self, now_ms: u64, tracks: &Tracks, watched: u16) {
         let mut before = core::mem::take(&mut self.tracks);
         for t in tracks.all() {
-            let mut along = Self::before(&mut before, tracks, t)
-                .unwrap_or_else(|| Along::begun(t));
+            let mut along = Self::before(&mut before, tracks, t).unwrap_or_else(|| Along::begun(t));
             if t.seen_ms == now_ms {
                 self.step(&mut along, t, now_ms, watched);
             }
@@ -445,7 +448,8 @@ impl Counting {
     }
 
     /// Who stands at the sites that were watched for long enough.
-    fn count_standing(&mut self, now_ms: u64, tracks: &Tracks) {
+    fn count_standing(&mut self, percept: &Percept, tracks: &Tracks) {
+        let now_ms = percept.time_ms;
         let alongs = &self.tracks;
         let stands = |t: &&Track| {
             let along = alongs.get(&t.name);
@@ -459,16 +463,18 @@ impl Counting {
             let is_sure = site
                 .since_ms
                 .is_some_and(|since_ms| now_ms.saturating_sub(since_ms) >= SURE_MS);
-            if site.what != Counted::Standing || !is_sure {
-                site.stood = [0; LOTS];
+            if site.what != Counted::Standing || !is_sure || !is_sharp(percept, &site.outline) {
+                site.stood = [None; LOTS];
                 continue;
             }
             let standing = tracks.confirmed().filter(stands);
             let inside = standing.filter(|t| site.outline.contains(t.estimate.position()));
             site.stood.rotate_left(1);
-            site.stood[LOTS - 1] = u16::try_from(inside.count()).unwrap_or(u16::MAX);
-            site.own.standing = site.stood.iter().copied().max().unwrap_or(0);
-            site.own.seen_ms = now_ms;
+            site.stood[LOTS - 1] = Some(u16::try_from(inside.count()).unwrap_or(u16::MAX));
+            let most = site.stood.iter().flatten().max();
+            if let (Some(most), None) = (most, site.stood.iter().find(|n| n.is_none())) {
+                (site.own.standing, site.own.seen_ms) = (*most, now_ms);
+            }
         }
     }
 
@@ -544,9 +550,11 @@ impl Counting {
         sums
     }
 
-    /// Its own counts, and whether each site is watched now.
-    pub fn own(&self) -> impl Iterator<Item = (bool, Count)> {
-        self.sites.iter().map(|s| (s.since_ms.is_some(), s.own))
+    /// Its own counts, and whether each site is watched in the percept of this time.
+    pub fn own(&self, percept_ms: u64) -> impl Iterator<Item = (bool, Count)> {
+        let looks = self.last_ms == percept_ms;
+        let all = self.sites.iter();
+        all.map(move |s| (looks && s.since_ms.is_some(), s.own))
     }
 
     /// How many counts are kept.
@@ -563,6 +571,18 @@ fn is_in_picture(pose: Pose, airframe: &Airframe, places: &[Point]) -> bool {
         let along = forward.dot(&to).abs() <= INNER * airframe.footprint_along_m;
         along && forward.perp(&to).abs() <= INNER * airframe.footprint_across_m
     })
+}
+
+/// Whether who stands at a place is seen sharply enough to be told apart.
+fn is_sharp(percept: &Percept, outline: &Polygon) -> bool {
+    let inside = percept
+        .sightings
+        .seen()
+        .filter(|s| outline.contains(s.at()));
+    let (n, sum_mm) = inside.fold((0_u64, 0_u64), |(n, sum), s| {
+        (n + 1, sum + u64::from(s.spread_mm))
+    });
+    sum_mm <= n * SHARP_MM
 }
 
 #[allow(

@@ -32,8 +32,8 @@ use crate::task_desk::TaskView;
 use crate::timers::{Timer, Timers};
 use crate::transmission::Transmission;
 use crate::why::{self, Other, Why};
-use crate::wire::count::Count;
 use crate::wire::codec::{self, Body};
+use crate::wire::count::Count;
 use crate::wire::key;
 use crate::wire::kinds::Kind;
 use crate::wire::message::{Beacon, Fresh, Gossip, Heartbeat, Lacking, Member, Orders, Record};
@@ -944,9 +944,11 @@ impl Peer {
         beliefs
     }
 
-    /// What this UAV counts itself at each site of its mission, and whether it does so at present.
+    /// What this UAV counted itself at each site of its mission, and whether it does so by its last
+    /// percept.
     pub fn counted(&self) -> impl Iterator<Item = (bool, Count)> {
-        self.cooperation.tasking.counted()
+        let percept_ms = self.percept.as_ref().map_or(0, |p| p.time_ms);
+        self.cooperation.tasking.counted(percept_ms)
     }
 
     /// What is known of the sites of its mission, for a person.

@@ -112,7 +112,9 @@ pub(crate) fn of_mission(node: &Node<'_>, files: &Files<'_>) -> Result<Option<Di
     let f = node.fields(&["diagram", "for_s", "detections", "tasks", "counts"])?;
     let at = match f.get("diagram") {
         None if f.get("for_s").is_none()
-            && ["detections", "tasks", "counts"].iter().any(|name| f.get(name).is_some()) =>
+            && ["detections", "tasks", "counts"]
+                .iter()
+                .any(|name| f.get(name).is_some()) =>
         {
             return Ok(None);
         }

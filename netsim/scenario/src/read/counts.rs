@@ -98,10 +98,17 @@ mod tests {
             ("{ what: 'passing' }".to_owned(), "expected either ring_m"),
             (format!("{{ what: 'passing', {circle} }}"), "name"),
             (format!("{{ name: 'a', {circle} }}"), "what"),
-            (format!("{{ name: 'a', what: 'flying', {circle} }}"), "counts[0].what"),
-            (format!("{{ name: 'a', what: 'passing', capacity: 3, {circle} }}"), "leave it out"),
             (
-                "{ name: 'a', what: 'passing', circle: { east_m: 0, north_m: 0, radius_m: 60 } }".to_owned(),
+                format!("{{ name: 'a', what: 'flying', {circle} }}"),
+                "counts[0].what",
+            ),
+            (
+                format!("{{ name: 'a', what: 'passing', capacity: 3, {circle} }}"),
+                "leave it out",
+            ),
+            (
+                "{ name: 'a', what: 'passing', circle: { east_m: 0, north_m: 0, radius_m: 60 } }"
+                    .to_owned(),
                 "divide it, or fly higher",
             ),
         ] {

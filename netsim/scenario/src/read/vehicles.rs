@@ -79,7 +79,8 @@ pub(crate) fn read(
         };
         let n = f.small_or("count", 1, 1, MOST, "vehicles")?;
         if n > 1 && vehicle.start.is_some() {
-            let text = "they would all begin at one place; leave start and count out, or take streets";
+            let text =
+                "they would all begin at one place; leave start and count out, or take streets";
             return Err(item.wrong(text));
         }
         Ok(spread(vehicle, n))
@@ -110,9 +111,19 @@ fn spread(vehicle: VehicleSpec, n: u16) -> Vec<VehicleSpec> {
 
 /// Vehicles that are parked, one at each of some places.
 fn parked(f: &Fields<'_>, list: &Node<'_>) -> Result<Vec<VehicleSpec>, Error> {
-    for name in ["way_m", "ways_m", "streets", "start", "speed_mps", "does", "count"] {
+    for name in [
+        "way_m",
+        "ways_m",
+        "streets",
+        "start",
+        "speed_mps",
+        "does",
+        "count",
+    ] {
         if let Some(node) = f.get(name) {
-            return Err(node.wrong("who is parked at one of places_m does nothing else; leave it out"));
+            return Err(
+                node.wrong("who is parked at one of places_m does nothing else; leave it out")
+            );
         }
     }
     let (kind, confused_permille) = (kind(f)?, confused(f)?);
@@ -232,12 +243,18 @@ mod tests {
         );
         let many = many.unwrap().spec.vehicles;
         assert_eq!(many.len(), 7);
-        assert_eq!(many[6].behaviour, skein_netsim::pursuit::vehicle::Behaviour::Parked);
+        assert_eq!(
+            many[6].behaviour,
+            skein_netsim::pursuit::vehicle::Behaviour::Parked
+        );
         for (text, why) in [
             ("[{ speed_mps: 5 }]", "expected either way_m"),
             ("[{ way_m: [[0, 0], [300, 0]], count: 3 }]", "at one place"),
             ("[{ places_m: [[0, 0]], does: 'drives' }]", "leave it out"),
-            ("[{ streets: '../data/helsinki_roads.geojson', count: 200 }, { streets: '../data/helsinki_roads.geojson', count: 200 }]", "expected 256 at most"),
+            (
+                "[{ streets: '../data/helsinki_roads.geojson', count: 200 }, { streets: '../data/helsinki_roads.geojson', count: 200 }]",
+                "expected 256 at most",
+            ),
             ("[{ way_m: [[0, 0], [50, 0]] }]", "200 m of it at least"),
             (
                 "[{ way_m: [[0, 0], [500, 0]], does: 'flies' }]",

@@ -464,7 +464,10 @@ impl Account {
             live,
             ..RunReport::default()
         };
-        let late = |t: &TaskReport| t.late(self.setting.max_visit_ms?, now_ms);
+        let late = |t: &TaskReport| {
+            let is_visit = self.setting.visits.contains(&t.name);
+            t.late(self.setting.max_visit_ms.filter(|_| is_visit)?, now_ms)
+        };
         let late = report.tasks.iter().filter_map(late);
         let failures: Vec<String> = self.failures.iter().cloned().chain(late).collect();
         report.judge(&failures);

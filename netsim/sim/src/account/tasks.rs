@@ -221,7 +221,10 @@ mod tests {
         // Not seen for so long it is late; taken back it is not.
         assert!(all[0].is_look && all[0].late(20_000, 29_000).is_none());
         let why = all[0].late(20_000, 30_000).unwrap();
-        assert!(why.ends_with("not seen, done, and was to be within 20 s"), "{why}");
+        assert!(
+            why.ends_with("not seen, done, and was to be within 20 s"),
+            "{why}"
+        );
         let seen = TaskReport {
             seen_ms: Some(12_000),
             ..all[0].clone()

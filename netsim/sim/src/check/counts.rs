@@ -23,8 +23,10 @@ use std::collections::{BTreeMap, BTreeSet};
 /// A vehicle has left a site when it is so far outside, metres.
 const LEFT_M: f64 = 3.0;
 
-/// Slower than this a vehicle stands, m/s.
+/// Slower than this a vehicle stands, m/s; and slower than this it may be taken for one that does:
+/// nobody tells more exactly by a second of looks.
 const STANDS_MPS: f64 = 0.5;
+const MAY_STAND_MPS: f64 = 3.0;
 
 /// A count is off by no more than this, this share of what passed, and this times the root of how
 /// often it was begun: a place that is off by two metres puts one in seven or so of those who drive
@@ -34,7 +36,7 @@ const OFF_SHARE: f64 = 0.1;
 const OFF_BEGUN: f64 = 1.2;
 
 /// Who stands is off by no more than this, and this share of who stands.
-const OCCUPANCY_OFF: f64 = 1.0;
+const OCCUPANCY_OFF: f64 = 1.5;
 const OCCUPANCY_OFF_SHARE: f64 = 0.1;
 
 /// The space-mean speed is off by no more than this, m/s, and this share, where vehicles were
@@ -270,8 +272,8 @@ pub struct CountCheck {
     watchers: BTreeMap<u16, Watcher>,
     /// What was counted in lives that are over, and what truly drove meanwhile.
     former: Vec<(u32, u64, Driven)>,
-    /// Who stood at a site when one looked at it.
-    stood: BTreeMap<(usize, u16, u64), u16>,
+    /// Who stood at a site when one looked at it, and who may have.
+    stood: BTreeMap<(usize, u16, u64), (u16, u16)>,
     /// How fast each vehicle is, m/s, and from when and where on that is measured.
     speeds: Vec<f64>,
     paced: (u64, Vec<Point>),
@@ -359,13 +361,9 @@ impl CountCheck {
                 }
             }
             if own.seen_ms > watch.own.seen_ms {
-                let standing = self
-                    .speeds
-                    .iter()
-                    .zip(truth)
-                    .filter(|(mps, at)| **mps < STANDS_MPS && site.contains(**at));
-                let stands = u16::try_from(standing.count()).unwrap_or(u16::MAX);
-                self.stood.insert((i, look.uav, own.seen_ms), stands);
+                let slower = |than_mps| stand(site, truth, &self.speeds, than_mps);
+                let stood = (slower(STANDS_MPS), slower(MAY_STAND_MPS));
+                self.stood.insert((i, look.uav, own.seen_ms), stood);
             }
             let was = watch.counts;
             watch.begun += u32::from(counts && !was);
@@ -448,7 +446,8 @@ impl CountCheck {
                 reason = "runs last less than 2^52 ms"
             )]
             let least_ms = (WATCHED_SHARE * pictured_ms as f64) as u64;
-            if counted.1 + WATCHED_LESS_MS < least_ms
+            if site.site.what == Counted::Passing
+                && counted.1 + WATCHED_LESS_MS < least_ms
                 && !core::mem::replace(&mut self.idle_told, true)
             {
                 found.broken("count-idle", now_ms, None, || {
@@ -520,8 +519,6 @@ impl CountCheck {
             let known = known.get(i).copied().unwrap_or_default();
             let (counted, truth) = self.of_all(i);
             let seen = known.standing;
-            let stands = self.speeds.iter().zip(&self.all.places);
-            let stands = stands.filter(|(mps, at)| **mps < STANDS_MPS && s.contains(**at));
             CountReport {
                 name: s.site.name.clone(),
                 is_lot: s.site.what == Counted::Standing,
@@ -533,8 +530,10 @@ impl CountCheck {
                 passed: (self.driven[i].passed, over_ms),
                 speed_mps: self.driven[i].speed_mps(),
                 pictured_ms: self.pictured[i].1,
-                stood_then: seen.and_then(|s| self.stood.get(&(i, s.by, s.seen_ms)).copied()),
-                stands: u16::try_from(stands.count()).unwrap_or(u16::MAX),
+                stood_then: seen
+                    .and_then(|s| self.stood.get(&(i, s.by, s.seen_ms)))
+                    .map(|(stood, _)| *stood),
+                stands: stand(s, &self.all.places, &self.speeds, STANDS_MPS),
             }
         };
         self.sites.iter().enumerate().map(one).collect()
@@ -572,18 +571,26 @@ fn check_count(site: &Site, watch: &mut Watch, at: (u64, u16), found: &mut Findi
     }
 }
 
+/// How many vehicles at a site are slower than so.
+fn stand(site: &Site, places: &[Point], speeds: &[f64], than_mps: f64) -> u16 {
+    let all = speeds.iter().zip(places);
+    let slow = all.filter(|(mps, at)| **mps < than_mps && site.contains(**at));
+    u16::try_from(slow.count()).unwrap_or(u16::MAX)
+}
+
 fn check_occupancy(
     site: &Site,
     watch: &mut Watch,
-    stood: Option<&u16>,
+    stood: Option<&(u16, u16)>,
     at: (u64, u16),
     found: &mut Findings,
 ) {
-    let Some(is) = stood.map(|n| f64::from(*n)) else {
+    let Some((is, may_be)) = stood.map(|(n, more)| (f64::from(*n), f64::from(*more))) else {
         return;
     };
     let says = f64::from(watch.own.standing);
-    let off = (says - is).abs() > OCCUPANCY_OFF + OCCUPANCY_OFF_SHARE * is;
+    let slack = OCCUPANCY_OFF + OCCUPANCY_OFF_SHARE * is;
+    let off = says < is - slack || says > may_be + slack;
     if off && site.site.what == Counted::Standing && !core::mem::replace(&mut watch.told, true) {
         found.broken("occupancy", at.0, Some(at.1), || {
             format!(

@@ -44,7 +44,7 @@ const STRAYS_M: f64 = 15.0;
 const UNSEEN_MS: u64 = 2_000;
 
 /// The most tracks of a UAV.
-pub const MOST_TRACKS: usize = 32;
+pub const MOST_TRACKS: usize = 48;
 
 /// 99.9 % of detections of a target are no more surprising (chi-square of two).
 const GATE: f64 = 13.82;
@@ -355,7 +355,12 @@ mod tests {
         }
         assert_eq!(tracks.confirmed().count(), MOST_TRACKS);
         let (next, nowhere) = (far(most), |_: Point| false);
-        let sees = |tracks: &Tracks| tracks.all().iter().any(|t| (t.estimate.position() - next).norm() < 20.0);
+        let sees = |tracks: &Tracks| {
+            tracks
+                .all()
+                .iter()
+                .any(|t| (t.estimate.position() - next).norm() < 20.0)
+        };
         let new = [sighting(next, &mut random)];
         tracks.look(2_000, &new, &nowhere);
         assert!(!sees(&tracks), "all were seen a second ago");

@@ -56,7 +56,9 @@ impl Scene {
         for _ in 0..looks {
             self.now_ms += 200;
             let in_view = |p: Point| (p - self.at).norm() < 40.0;
-            let seen = vehicles(seconds(self.now_ms)).into_iter().filter(|p| in_view(*p));
+            let seen = vehicles(seconds(self.now_ms))
+                .into_iter()
+                .filter(|p| in_view(*p));
             let seen = seen.map(|p| Sighting {
                 detection: Detection::round(p, 1.0),
                 kind: CAR,
@@ -77,13 +79,12 @@ impl Scene {
                 sightings: skein_behaviors::sightings::Sightings::new([]),
             };
             let of = (&self.mission, true);
-            self.counting
-                .look(&percept, &airframe(), &self.tracks, of);
+            self.counting.look(&percept, &airframe(), &self.tracks, of);
         }
     }
 
     fn own(&self) -> Count {
-        self.counting.own().next().unwrap().1
+        self.counting.own(self.now_ms).next().unwrap().1
     }
 }
 
@@ -129,9 +130,17 @@ fn who_drove_in_before_the_site_was_watched_or_while_another_counts_does_not_cou
     scene.look(0.2, &|_| Vec::new());
     scene.counting.heed(&near, 1_000, &airframe());
     scene.look(8.0, &|s| vec![car(s)]);
-    assert_eq!(scene.own(), Count { sites: scene.own().sites, ..Count::default() });
+    assert_eq!(
+        scene.own(),
+        Count {
+            sites: scene.own().sites,
+            ..Count::default()
+        }
+    );
     // Of whom nothing was heard any more that one counts no longer.
-    scene.counting.heed(&[(near[0].0, 3_100)], 1_000, &airframe());
+    scene
+        .counting
+        .heed(&[(near[0].0, 3_100)], 1_000, &airframe());
     let car = drives(11.0);
     scene.look(8.0, &|s| vec![car(s)]);
     assert_eq!(scene.own().passed, 1);
@@ -156,7 +165,10 @@ fn who_stands_is_counted_at_the_last_look_and_who_drives_by_is_not() {
     assert_eq!(told.len(), 1);
     let sum = scene.counting.sums(&scene.mission)[0];
     let text = sum.sentence(&scene.mission.counts[0]);
-    assert!(text.starts_with("north: 1 of 4 (25 %) stood there"), "{text}");
+    assert!(
+        text.starts_with("north: 1 of 4 (25 %) stood there"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -7,12 +7,12 @@
 //! | the mission is over or cancelled, or another process speaks under its id | no more; what it counted it tells |
 
 use super::Tasking;
+use crate::Mission;
 use crate::cooperation::Situation;
 use crate::counting::SiteCount;
 use crate::effect::Effects;
 use crate::mission_state::MissionState;
 use crate::wire::count::Count;
-use crate::Mission;
 use skein_behaviors::Percept;
 use skein_geometry::frame::Pose;
 
@@ -34,7 +34,9 @@ impl Tasking {
 
     /// Heeds who else is above the sites, and tells what is to be told.
     pub(super) fn tell_of_counts(&mut self, s: &Situation<'_>, state: &MissionState) -> Effects {
-        let Some(airframe) = self.flies.filter(|_| !state.geometry.mission.counts.is_empty())
+        let Some(airframe) = self
+            .flies
+            .filter(|_| !state.geometry.mission.counts.is_empty())
         else {
             return Effects::new();
         };
@@ -62,8 +64,9 @@ impl Tasking {
         self.counting.sums(mission)
     }
 
-    /// What this UAV counts itself, site by site, and whether it is counting there now.
-    pub fn counted(&self) -> impl Iterator<Item = (bool, Count)> {
-        self.counting.own()
+    /// What this UAV counted itself, site by site, and whether it does so
+    /// in the percept of this time.
+    pub fn counted(&self, percept_ms: u64) -> impl Iterator<Item = (bool, Count)> {
+        self.counting.own(percept_ms)
     }
 }

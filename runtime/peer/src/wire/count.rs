@@ -87,7 +87,11 @@ pub(super) const COUNT: &[Place] = &[
         "how far they drove there, all together, dm",
         Shape::Number(0, DRIVEN_MAX_DM as i128),
     ),
-    at("standing", "vehicles that stood there when it was seen last", U16),
+    at(
+        "standing",
+        "vehicles that stood there when it was seen last",
+        U16,
+    ),
     at(
         "seen_ms",
         "when that was, ms of the clock of percepts; 0 for never",

@@ -111,7 +111,10 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         Body::Detection(super::detection::samples::detection()),
         "8c00000003191002011a00013df81a0001d682397ab619213419170c39018f",
     ));
-    all.push((Body::Count(super::count::samples::count()), "871a123456781a00013df80e19ee481910d60000"));
+    all.push((
+        Body::Count(super::count::samples::count()),
+        "871a123456781a00013df80e19ee481910d60000",
+    ));
     all
 }
 

@@ -40,12 +40,7 @@ impl Scene {
 
     /// Looks five times a second from one second to another; cars pass the site each four seconds,
     /// and the UAV tells `passed` of them after so many seconds.
-    fn look(
-        &mut self,
-        (from_s, to_s): (u32, u32),
-        at: Point,
-        says: &dyn Fn(f64) -> (bool, Count),
-    ) {
+    fn look(&mut self, (from_s, to_s): (u32, u32), at: Point, says: &dyn Fn(f64) -> (bool, Count)) {
         for look in 5 * from_s..5 * to_s {
             let s = f64::from(look) / 5.0;
             // Each drives 40 m to the north at 10 m/s and begins anew in the south.
