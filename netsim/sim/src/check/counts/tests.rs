@@ -3,7 +3,7 @@
 use super::*;
 
 fn mission(what: Counted) -> Mission {
-    let mut mission = crate::world::fixture::square(1).mission;
+    let mut mission = (*crate::world::fixture::square(1).mission).clone();
     mission.counts = vec![CountSite {
         name: "north".to_owned(),
         what,
