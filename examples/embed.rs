@@ -74,6 +74,7 @@ fn mission() -> Mission {
         diagram: None,
         detections: Vec::new(),
         tasks: Vec::new(),
+        counts: Vec::new(),
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

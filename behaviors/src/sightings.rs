@@ -4,8 +4,8 @@
 use serde::{Deserialize, Serialize};
 use skein_geometry::frame::Point;
 
-/// Most vehicles that one look tells, the surest first.
-pub const SIGHTINGS_MAX: usize = 8;
+/// Most vehicles that one look tells, the surest first: a car park that fits into a picture.
+pub const SIGHTINGS_MAX: usize = 24;
 
 /// One vehicle as one look saw it, or something that was taken for one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -72,7 +72,7 @@ mod tests {
         assert!(Sightings::default().is_absent());
         let look = Sightings::new([]);
         assert!(!look.is_absent() && look.seen().count() == 0);
-        let many = (0..20).map(|east_mm| Sighted {
+        let many = (0..40).map(|east_mm| Sighted {
             east_mm,
             ..Sighted::default()
         });

@@ -22,6 +22,21 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/convoy.json5"),
     ),
     (
+        "crossings",
+        "crossings.json5",
+        include_str!("../../../configs/trials/crossings.json5"),
+    ),
+    (
+        "parking",
+        "parking.json5",
+        include_str!("../../../configs/trials/parking.json5"),
+    ),
+    (
+        "accident",
+        "accident.json5",
+        include_str!("../../../configs/trials/accident.json5"),
+    ),
+    (
         "helsinki_wind",
         "helsinki_wind.json5",
         include_str!("../../../configs/trials/helsinki_wind.json5"),

@@ -72,6 +72,7 @@ pub(crate) fn blamed(e: &GeometryError) -> &'static str {
         GeometryError::Diagram(_) => "mission.diagram",
         GeometryError::Detections(_) => "mission.detections",
         GeometryError::Tasks(_) => "mission.tasks",
+        GeometryError::Counts(_) => "mission.counts",
         GeometryError::Zone(..) | GeometryError::AddedZone(..) | GeometryError::ZoneName => {
             "no_fly"
         }

@@ -28,6 +28,8 @@
 
 mod builtin;
 mod choose_tree;
+#[cfg(test)]
+mod counted;
 mod coverable;
 #[cfg(test)]
 mod detected;

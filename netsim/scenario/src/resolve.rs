@@ -144,6 +144,7 @@ fn spec(s: &Stated, geometry: &MissionGeometry) -> Spec {
         time_scale: s.run.time_scale,
         max_time_s: s.run.max_time_s,
         min_coverable: s.run.min_coverable,
+        max_visit_s: s.run.max_visit_s,
         min_separation_m: s.run.min_separation_m.max(s.fleet.separation_m),
         traffic_range_m: traffic_range_m(s, &geometry.mission),
         vehicles: s.vehicles.clone(),

@@ -50,6 +50,9 @@ pub struct Spec {
     /// Smallest separation of airborne UAVs, metres: recorded, and a rule where the mission
     /// has UAVs keep apart by agreement.
     pub min_separation_m: f64,
+    /// Within so many seconds what the operator asks to be looked at is seen, or the run has
+    /// failed; any time will do where none is said.
+    pub max_visit_s: Option<u32>,
     /// How far UAVs sense each other, metres; 0 without such sensors.
     pub traffic_range_m: f64,
     /// Vehicles on the ground, of which cameras see those in their pictures.

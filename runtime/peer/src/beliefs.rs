@@ -1,6 +1,7 @@
 //! What checks may look at: a copy of what one peer believes.
 
 use crate::cells::CellSet;
+use crate::counting::SiteCount;
 use crate::diagram::MissionEvent;
 use crate::output::Status;
 use crate::tasking::Follows;
@@ -83,6 +84,8 @@ pub struct Beliefs {
     pub trails: Vec<((u16, u16), Trail)>,
     /// Whether its UAV flies along a contour that it sees.
     pub traces: bool,
+    /// What all together counted at the sites of its mission, as it knows.
+    pub counts: Vec<SiteCount>,
     /// Records held, bytes waiting to be sent, open stores: each with its cap.
     pub loads: Vec<(&'static str, usize, usize)>,
 }

@@ -326,9 +326,11 @@ impl Cooperation {
                 self.hear_orders(orders, (record.incarnation, record.seq, record.author));
                 Effects::new()
             }
-            Body::Task(_) | Body::Bundle(_) | Body::Target(_) | Body::Detection(_) => {
-                self.tasking.hear(now, record, body)
-            }
+            Body::Task(_)
+            | Body::Bundle(_)
+            | Body::Target(_)
+            | Body::Detection(_)
+            | Body::Count(_) => self.tasking.hear(now, record, body),
             Body::Trail(trail) => {
                 self.trails.hear(record.author, record.subject, trail);
                 Effects::new()
@@ -516,6 +518,7 @@ impl Cooperation {
         let Some(state) = &self.state else {
             return;
         };
+        beliefs.counts = self.tasking.counts(&state.geometry.mission);
         let sections = &state.negotiation.sections;
         beliefs.able = state.able();
         beliefs.loop_hash = state.loop_hash();

@@ -95,6 +95,8 @@ pub mod cells;
 mod company;
 pub mod config;
 mod cooperation;
+pub mod count_site;
+pub mod counting;
 mod coverage_told;
 pub mod criteria;
 pub mod detections;

@@ -1,5 +1,6 @@
 //! What a mission is: area, zones, lanes, level, origin, revision.
 
+use crate::count_site::{CountSite, SITES_MAX};
 use crate::criteria::{CRITERIA_MAX, Criterion};
 use crate::diagram::{Diagram, DiagramError, Machine, check};
 use crate::input::NewTask;
@@ -98,6 +99,9 @@ pub struct Mission {
     /// Tasks that begin with it, besides what is to be seen; at most [`BROUGHT_MAX`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tasks: Vec<NewTask>,
+    /// Where vehicles are counted; at most [`SITES_MAX`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub counts: Vec<CountSite>,
 }
 
 /// Whether a field need not be said.
@@ -160,6 +164,9 @@ pub enum GeometryError {
     /// Tasks that it brings cannot be asked for.
     #[error("tasks: {0}")]
     Tasks(String),
+    /// A site at which it counts cannot be counted at.
+    #[error("counts: {0}")]
+    Counts(String),
     /// There is no loop over what is to be seen.
     #[error(transparent)]
     Loop(#[from] LoopError),
@@ -306,6 +313,10 @@ impl Mission {
             self.detections.iter().for_each(|c| c.hash(&mut h));
         }
         self.hash_brought(&mut h);
+        if !self.counts.is_empty() {
+            h.write_i64(-7);
+            self.counts.iter().for_each(|s| s.hash(&mut h));
+        }
         h.finish()
     }
 
@@ -441,6 +452,25 @@ impl Mission {
         }
     }
 
+    /// Whether vehicles can be counted at its sites.
+    ///
+    /// # Errors
+    /// [`GeometryError::Counts`] names the site and what is wrong.
+    pub fn check_counts(&self) -> Result<(), GeometryError> {
+        if self.counts.len() > SITES_MAX {
+            let text = format!("at most {SITES_MAX} sites fit");
+            return Err(GeometryError::Counts(text));
+        }
+        let half_mm = self.footprint_across_mm.min(self.footprint_along_mm);
+        let reach_m = crate::counting::INNER * metres(half_mm);
+        for (i, site) in self.counts.iter().enumerate() {
+            if let Err((field, text)) = site.check(reach_m) {
+                return Err(GeometryError::Counts(format!("[{i}].{field}: {text}")));
+            }
+        }
+        Ok(())
+    }
+
     /// Derives the loop and the router.
     ///
     /// # Errors
@@ -448,6 +478,7 @@ impl Mission {
     pub fn geometry(self: &Arc<Self>) -> Result<Arc<MissionGeometry>, GeometryError> {
         self.machine()?;
         self.check_detections()?;
+        self.check_counts()?;
         if self.tasks.len() > BROUGHT_MAX || self.brought(false).len() < self.tasks.len() {
             let text = format!("at most {BROUGHT_MAX} fit, each as an operator may ask for it");
             return Err(GeometryError::Tasks(text));
@@ -686,6 +717,7 @@ mod tests {
             diagram: None,
             detections: Vec::new(),
             tasks: Vec::new(),
+            counts: Vec::new(),
             tree: Tree::default(),
             division: Rule::default(),
             separation_mm: 0,
@@ -826,6 +858,16 @@ mod tests {
         CoverageTask::Points((0..n).map(point).collect())
     }
 
+    /// A site at which vehicles are counted.
+    fn crossing(east_mm: i32) -> CountSite {
+        CountSite {
+            name: "crossing".to_owned(),
+            what: crate::count_site::Counted::Passing,
+            ring: vec![(east_mm, 0), (20_000, 0), (0, 20_000)],
+            capacity: 0,
+        }
+    }
+
     /// A vehicle near a place that the mission asks to be followed.
     fn escort(east_mm: i32) -> NewTask {
         NewTask {
@@ -841,7 +883,7 @@ mod tests {
 
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 36] = [
+        let changes: [fn(&mut Mission); 39] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -882,6 +924,14 @@ mod tests {
             },
             |m| m.tasks.push(escort(0)),
             |m| m.tasks.push(escort(1)),
+            |m| m.counts.push(crossing(0)),
+            |m| m.counts.push(crossing(1)),
+            |m| {
+                m.counts.push(CountSite {
+                    what: crate::count_site::Counted::Standing,
+                    ..crossing(0)
+                });
+            },
             |m| {
                 drop(
                     m.added_zones

@@ -33,6 +33,7 @@ use crate::timers::{Timer, Timers};
 use crate::transmission::Transmission;
 use crate::why::{self, Other, Why};
 use crate::wire::codec::{self, Body};
+use crate::wire::count::Count;
 use crate::wire::key;
 use crate::wire::kinds::Kind;
 use crate::wire::message::{Beacon, Fresh, Gossip, Heartbeat, Lacking, Member, Orders, Record};
@@ -958,6 +959,24 @@ impl Peer {
         beliefs
     }
 
+    /// What this UAV counted itself at each site of its mission, and whether it does so by its last
+    /// percept.
+    pub fn counted(&self) -> impl Iterator<Item = (bool, Count)> {
+        let percept_ms = self.percept.as_ref().map_or(0, |p| p.time_ms);
+        self.cooperation.tasking.counted(percept_ms)
+    }
+
+    /// What is known of the sites of its mission, for a person.
+    fn counts_told(&self) -> Vec<String> {
+        let Some(state) = self.cooperation.state() else {
+            return Vec::new();
+        };
+        let mission = &state.geometry.mission;
+        let counts = self.cooperation.tasking.counts(mission);
+        let of = mission.counts.iter().zip(counts);
+        of.map(|(site, count)| count.sentence(site)).collect()
+    }
+
     /// What it does and why, for a person.
     #[must_use]
     pub fn why(&self) -> Why {
@@ -978,6 +997,7 @@ impl Peer {
             tasks: self.tasks(),
             detections: self.cooperation.tasking.detections_told(),
             contour: self.cooperation.trails.sentence(),
+            counts: self.counts_told(),
             others: self.others(),
             events: self.diary.events(self.now),
         }

@@ -21,6 +21,7 @@
 //! While no task is open nothing is said.
 
 mod brought;
+mod counts;
 mod detecting;
 mod relaying;
 mod tracking;
@@ -28,6 +29,7 @@ mod tracking;
 use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
 use crate::cooperation::Situation;
+use crate::counting::Counting;
 use crate::detections::Detections;
 use crate::effect::{Effect, Effects, PendingJob};
 use crate::errand::{Planned, Request};
@@ -114,6 +116,8 @@ pub(crate) struct Tasking {
     pub(crate) targets: Targets,
     /// What of them the mission looks for.
     pub(crate) detections: Detections,
+    /// What it and others counted at its sites.
+    pub(crate) counting: Counting,
     /// The version of the bundle that was spoken last.
     spoken: Option<Version>,
     /// The life in which the tasks of this peer's operator were spoken.
@@ -141,6 +145,7 @@ impl Tasking {
                 config.airframe.filter(|_| config.role == Role::Uav),
             ),
             detections: Detections::default(),
+            counting: Counting::new(config.id.0),
             spoken: None,
             told_in: 0,
             last_period: Time(0),
@@ -154,6 +159,7 @@ impl Tasking {
         self.auction.begin_life(me.incarnation);
         self.targets.begin_life(me.incarnation);
         self.detections.begin_life(me.incarnation);
+        self.counting.begin_life(me.incarnation);
         self.spoken = None;
         self.leave(state);
     }
@@ -220,6 +226,8 @@ impl Tasking {
         let detections = self.detections.known().count();
         let cap = crate::detections::KNOWN_MAX;
         beliefs.loads.push(("detections", detections, cap));
+        let cap = crate::counting::KNOWN_MAX;
+        beliefs.loads.push(("counts", self.counting.len(), cap));
     }
 
     /// Whether anything is to be settled or flown.
@@ -238,6 +246,11 @@ impl Tasking {
                 Effects::new()
             }
             Body::Detection(told) => self.hear_detection(record, told),
+            Body::Count(count) => {
+                let by = (record.author, record.incarnation);
+                self.counting.hear(by, record.subject, count);
+                Effects::new()
+            }
             Body::Task(task) => {
                 let id = TaskId {
                     author: record.author,
@@ -356,6 +369,7 @@ impl Tasking {
         // That the last task is done is said, too.
         effects.extend(self.speak(s));
         effects.extend(self.tell_of_targets(s));
+        effects.extend(self.tell_of_counts(s, state));
         state.has_tasks = self.has_work();
         state.target_lost = self.has_lost();
         effects

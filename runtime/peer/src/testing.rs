@@ -68,6 +68,7 @@ pub fn mission(revision: u32, cols: i32, rows: i32) -> Mission {
         diagram: None,
         detections: Vec::new(),
         tasks: Vec::new(),
+        counts: Vec::new(),
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

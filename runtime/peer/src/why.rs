@@ -299,6 +299,9 @@ pub struct Why {
     /// What is known of a contour, in a sentence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contour: Option<String>,
+    /// What was counted at the sites of its mission, a sentence each.
+    #[serde(default)]
+    pub counts: Vec<String>,
     /// What it believes of others, by their numbers.
     pub others: Vec<Other>,
     /// What happened last, the oldest first.
@@ -428,7 +431,7 @@ impl fmt::Display for Why {
         for task in &self.tasks {
             write_task(task, f)?;
         }
-        for told in &self.detections {
+        for told in self.detections.iter().chain(&self.counts) {
             writeln!(f, "  {told}")?;
         }
         if let Some(told) = &self.contour {

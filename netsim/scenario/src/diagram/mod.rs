@@ -119,10 +119,12 @@ fn flown(scenario: Result<crate::Scenario, ScenarioError>) -> Result<Diagram, Sc
 /// What a scenario says of its mission: the diagram that it is flown by, where it names one or
 /// brings its own; none where that is the default one.
 pub(crate) fn of_mission(node: &Node<'_>, files: &Files<'_>) -> Result<Option<Diagram>, Error> {
-    let f = node.fields(&["diagram", "for_s", "detections", "tasks"])?;
+    let f = node.fields(&["diagram", "for_s", "detections", "tasks", "counts"])?;
     let at = match f.get("diagram") {
         None if f.get("for_s").is_none()
-            && (f.get("detections").is_some() || f.get("tasks").is_some()) =>
+            && ["detections", "tasks", "counts"]
+                .iter()
+                .any(|name| f.get(name).is_some()) =>
         {
             return Ok(None);
         }

@@ -2,6 +2,7 @@
 //! values mean together (mission, loop, feasibility) to the modules that follow.
 
 pub(crate) mod contour;
+pub(crate) mod counts;
 pub(crate) mod detections;
 pub(crate) mod faults;
 pub(crate) mod fleet;
@@ -33,6 +34,7 @@ use skein_interop::json::{Document, Error, Fields, Node, Places};
 use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{ContourSpec, GroundStationSpec, RadioSpec, StormSpec, VehicleSpec};
 use skein_netsim::weather::Weather;
+use skein_peer::count_site::CountSite;
 use skein_peer::criteria::Criterion;
 use skein_peer::diagram::Diagram;
 use skein_peer::input::NewTask;
@@ -92,6 +94,8 @@ pub(crate) struct Stated {
     pub(crate) detections: Vec<Criterion>,
     /// Tasks that begin with the mission.
     pub(crate) brought: Vec<NewTask>,
+    /// Where vehicles are counted.
+    pub(crate) counts: Vec<CountSite>,
     /// By what rule the loop is divided.
     pub(crate) division: Rule,
     pub(crate) lanes: Lanes,
@@ -184,6 +188,9 @@ pub(crate) fn scenario(
             .get("mission")
             .map_or(Ok(Vec::new()), detections::of_mission)?,
         brought: f.get("mission").map_or(Ok(Vec::new()), tasks::of_mission)?,
+        counts: f
+            .get("mission")
+            .map_or(Ok(Vec::new()), counts::of_mission)?,
         division: f.get("division").map_or(Ok(Rule::Best), division)?,
         lanes: lanes::read(&f)?,
         base: f

@@ -18,13 +18,15 @@ pub(crate) struct Run {
     /// Share of the area that must be coverable.
     pub(crate) min_coverable: f64,
     pub(crate) min_separation_m: f64,
+    /// How soon what the operator asks for is to be seen, seconds.
+    pub(crate) max_visit_s: Option<u32>,
 }
 
 pub(crate) fn read(f: &Fields<'_>, over: &Overrides) -> Result<Run, Error> {
     let max_time_s = f.whole_or("max_time_s", 6000, 1, 604_800, "seconds")?;
     let (time_scale, beacon_period_ms) = times(f, over)?;
     let seed = f.whole_or("seed", 1, 0, u32::MAX, "any number")?;
-    let (min_coverable, min_separation_m) = checks(f)?;
+    let (min_coverable, min_separation_m, max_visit_s) = checks(f)?;
     Ok(Run {
         seed: over.seed.unwrap_or(u64::from(seed)),
         time_scale,
@@ -33,6 +35,7 @@ pub(crate) fn read(f: &Fields<'_>, over: &Overrides) -> Result<Run, Error> {
         percept_period_ms: f.whole_or("percept_period_ms", 200, 20, 1000, "milliseconds")?,
         min_coverable,
         min_separation_m,
+        max_visit_s,
     })
 }
 
@@ -61,13 +64,16 @@ fn times(f: &Fields<'_>, over: &Overrides) -> Result<(f64, u32), Error> {
     Ok((time_scale, (beacon_s * 1000.0).round() as u32))
 }
 
-fn checks(f: &Fields<'_>) -> Result<(f64, f64), Error> {
+fn checks(f: &Fields<'_>) -> Result<(f64, f64, Option<u32>), Error> {
     let Some(node) = f.get("checks") else {
-        return Ok((0.97, 0.0));
+        return Ok((0.97, 0.0, None));
     };
-    let f = node.fields(&["min_coverable", "min_separation_m"])?;
+    let f = node.fields(&["min_coverable", "min_separation_m", "max_visit_s"])?;
     Ok((
         f.number_or("min_coverable", 0.97, 0.0, 1.0, "as a share of the area")?,
         f.number_or("min_separation_m", 0.0, 0.0, 10_000.0, "metres")?,
+        f.get("max_visit_s")
+            .map(|n| n.whole(1, 86_400, "seconds"))
+            .transpose()?,
     ))
 }

@@ -1,7 +1,7 @@
 //! What several readers of a scenario share: positions, the highest height, notices.
 
 use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Point};
-use skein_interop::json::{Error, Fields};
+use skein_interop::json::{Error, Fields, Node};
 
 /// Highest flight level and roof that are accepted, metres: the service ceiling of
 /// small fixed wings with room to spare.
@@ -20,4 +20,20 @@ pub(crate) fn position(f: &Fields<'_>) -> Result<Point, Error> {
         )
     };
     Ok(Point::new(coordinate("east_m")?, coordinate("north_m")?))
+}
+
+/// Positions typed as `[[east, north], ...]`, metres.
+pub(crate) fn places(list: &Node<'_>) -> Result<Vec<Point>, Error> {
+    let far = |n: &Node<'_>| {
+        n.number(
+            -MAX_MISSION_RADIUS_M,
+            MAX_MISSION_RADIUS_M,
+            "metres from the origin",
+        )
+    };
+    let place = |n: &Node<'_>| match &n.items()?[..] {
+        [east, north] => Ok(Point::new(far(east)?, far(north)?)),
+        _ => Err(n.wrong("expected [east, north] in metres")),
+    };
+    list.items()?.iter().map(place).collect()
 }

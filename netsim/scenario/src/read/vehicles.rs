@@ -1,9 +1,9 @@
 //! Vehicles on the ground of a scenario (D2.7 §1.5.2): on which roads, from where, how fast,
 //! and what they do.
 
-use super::shared::{Notices, position};
+use super::shared::{Notices, places, position};
 use crate::files::Files;
-use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
+use skein_geometry::frame::{Origin, Point, Vector};
 use skein_interop::json::{Error, Fields, Node, suggestion};
 use skein_interop::place::to_plane;
 use skein_interop::targets;
@@ -17,6 +17,15 @@ use std::sync::Arc;
 /// The usual speed of a vehicle unless the file says so, m/s.
 const SPEED_MPS: f64 = 6.0;
 
+/// Most vehicles of a scenario: each look of each UAV asks for all of them.
+const MOST: u16 = 256;
+
+/// How much faster and slower than said the fastest and the slowest of several of a kind are.
+const SPREAD: f64 = 0.2;
+
+/// Who is parked has a road that it never drives, metres.
+const PARKED_ROAD_M: f64 = 300.0;
+
 /// What a vehicle looks like unless the file says so.
 const KIND: u8 = 1;
 
@@ -29,26 +38,37 @@ pub(crate) fn read(
     let one = |item: &Node<'_>, notices: &mut Notices| {
         let f = item.fields(&[
             "way_m",
+            "ways_m",
             "streets",
+            "places_m",
+            "count",
             "start",
             "speed_mps",
             "does",
             "kind",
             "confused",
         ])?;
-        let roads = match (f.get("way_m"), f.get("streets")) {
-            (Some(way), None) => of_way(way)?,
-            (None, Some(file)) => of_file(file, (origin, files), notices)?,
+        if let Some(list) = f.get("places_m") {
+            return parked(&f, list);
+        }
+        let roads = match (f.get("way_m"), f.get("ways_m"), f.get("streets")) {
+            (Some(way), None, None) => of_ways(way, &[places(way)?])?,
+            (None, Some(ways), None) => {
+                let lines: Result<Vec<Vec<Point>>, Error> =
+                    ways.items()?.iter().map(places).collect();
+                of_ways(ways, &lines?)?
+            }
+            (None, None, Some(file)) => of_file(file, (origin, files), notices)?,
             _ => {
                 return Err(item.wrong(
-                    "expected either way_m: [[0, 0], [400, 0]] or streets: \"roads.geojson\"",
+                    "expected either way_m: [[0, 0], [400, 0]], ways_m: [[[0, 0], [400, 0]], [[400, 0], [400, 200]]] or streets: \"roads.geojson\"",
                 ));
             }
         };
         let start = f
             .get("start")
             .map(|s| position(&s.fields(&["east_m", "north_m"])?));
-        Ok(VehicleSpec {
+        let vehicle = VehicleSpec {
             roads: Arc::new(roads),
             // A way begins where it begins; among streets any place will do.
             start: start.transpose()?.or(first_of(&f)?),
@@ -56,12 +76,70 @@ pub(crate) fn read(
             speed_mps: f.number_or("speed_mps", SPEED_MPS, 0.0, 40.0, "m/s")?,
             kind: kind(&f)?,
             confused_permille: confused(&f)?,
+        };
+        let n = f.small_or("count", 1, 1, MOST, "vehicles")?;
+        if n > 1 && vehicle.start.is_some() {
+            let text =
+                "they would all begin at one place; leave start and count out, or take streets";
+            return Err(item.wrong(text));
+        }
+        Ok(spread(vehicle, n))
+    };
+    let mut all = Vec::new();
+    for item in list.items()? {
+        all.extend(one(&item, notices)?);
+    }
+    if all.len() > usize::from(MOST) {
+        return Err(list.wrong(format!("are {}; expected {MOST} at most", all.len())));
+    }
+    Ok(all)
+}
+
+/// Several of a kind, their usual speeds spread evenly: no two drive side by side for long.
+fn spread(vehicle: VehicleSpec, n: u16) -> Vec<VehicleSpec> {
+    let mut all = vec![vehicle; usize::from(n)];
+    for (i, v) in (0..n).zip(&mut all) {
+        let along = if n > 1 {
+            2.0 * f64::from(i) / f64::from(n - 1) - 1.0
+        } else {
+            0.0
+        };
+        v.speed_mps *= 1.0 + SPREAD * along;
+    }
+    all
+}
+
+/// Vehicles that are parked, one at each of some places.
+fn parked(f: &Fields<'_>, list: &Node<'_>) -> Result<Vec<VehicleSpec>, Error> {
+    for name in [
+        "way_m",
+        "ways_m",
+        "streets",
+        "start",
+        "speed_mps",
+        "does",
+        "count",
+    ] {
+        if let Some(node) = f.get(name) {
+            return Err(
+                node.wrong("who is parked at one of places_m does nothing else; leave it out")
+            );
+        }
+    }
+    let (kind, confused_permille) = (kind(f)?, confused(f)?);
+    let one = |at: Point| {
+        let road = vec![at, at + Vector::new(PARKED_ROAD_M, 0.0)];
+        let roads = Roads::of(&[road]).ok_or_else(|| list.wrong("is no place to stand at"))?;
+        Ok(VehicleSpec {
+            roads: Arc::new(roads),
+            start: Some(at),
+            behaviour: Behaviour::Parked,
+            speed_mps: 0.0,
+            kind,
+            confused_permille,
         })
     };
-    list.items()?
-        .iter()
-        .map(|item| one(item, notices))
-        .collect()
+    places(list)?.into_iter().map(one).collect()
 }
 
 fn confused(f: &Fields<'_>) -> Result<u16, Error> {
@@ -103,28 +181,13 @@ fn does(node: &Node<'_>) -> Result<Behaviour, Error> {
     ])
 }
 
-fn places(way: &Node<'_>) -> Result<Vec<Point>, Error> {
-    let far = |n: &Node<'_>| {
-        n.number(
-            -MAX_MISSION_RADIUS_M,
-            MAX_MISSION_RADIUS_M,
-            "metres from the origin",
-        )
-    };
-    let place = |n: &Node<'_>| match &n.items()?[..] {
-        [east, north] => Ok(Point::new(far(east)?, far(north)?)),
-        _ => Err(n.wrong("expected [east, north] in metres")),
-    };
-    way.items()?.iter().map(place).collect()
-}
-
 fn first_of(f: &Fields<'_>) -> Result<Option<Point>, Error> {
     let way = f.get("way_m").map(places).transpose()?;
     Ok(way.and_then(|way| way.first().copied()))
 }
 
-fn of_way(way: &Node<'_>) -> Result<Roads, Error> {
-    Roads::of(&[places(way)?])
+fn of_ways(way: &Node<'_>, lines: &[Vec<Point>]) -> Result<Roads, Error> {
+    Roads::of(lines)
         .ok_or_else(|| way.wrong("is no road to drive on; expected 200 m of it at least"))
 }
 
@@ -175,8 +238,23 @@ mod tests {
         assert_eq!(vehicles.len(), 2);
         assert!(vehicles[0].start.is_some_and(|p| p.coords.norm() < 1e-9));
         assert_eq!((vehicles[1].speed_mps, vehicles[1].kind), (9.0, 2));
+        let many = with(
+            "[{ ways_m: [[[0, 0], [200, 0]], [[200, 0], [200, 90]]], count: 5 }, { places_m: [[10, 20], [30, 20]], kind: 'bus' }]",
+        );
+        let many = many.unwrap().spec.vehicles;
+        assert_eq!(many.len(), 7);
+        assert_eq!(
+            many[6].behaviour,
+            skein_netsim::pursuit::vehicle::Behaviour::Parked
+        );
         for (text, why) in [
             ("[{ speed_mps: 5 }]", "expected either way_m"),
+            ("[{ way_m: [[0, 0], [300, 0]], count: 3 }]", "at one place"),
+            ("[{ places_m: [[0, 0]], does: 'drives' }]", "leave it out"),
+            (
+                "[{ streets: '../data/helsinki_roads.geojson', count: 200 }, { streets: '../data/helsinki_roads.geojson', count: 200 }]",
+                "expected 256 at most",
+            ),
             ("[{ way_m: [[0, 0], [50, 0]] }]", "200 m of it at least"),
             (
                 "[{ way_m: [[0, 0], [500, 0]], does: 'flies' }]",

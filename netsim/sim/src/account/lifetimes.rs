@@ -1,11 +1,12 @@
 //! Which process ran when and which UAV flew: who is alive, and how long the work takes
 //! at the very least.
 
+use crate::fault::{Fault, TimedFault};
 use crate::spec::Spec;
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Executive;
 use skein_peer::offload::MissionGeometry;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// What an account must know of a scenario.
@@ -23,6 +24,10 @@ pub struct Setting {
     pub work_m: f64,
     /// Share of the area that must be coverable, 0 to 1.
     pub needed_share: f64,
+    /// How soon what the operator asks to be looked at is to be seen, ms.
+    pub max_visit_ms: Option<u64>,
+    /// What that is: the tasks of the scenario itself.
+    pub visits: BTreeSet<String>,
 }
 
 impl Setting {
@@ -53,8 +58,19 @@ impl Setting {
                 None => once_m * (f64::from(spec.mission.further_laps) + 1.0),
             },
             needed_share: spec.min_coverable,
+            max_visit_ms: spec.max_visit_s.map(|s| 1_000 * u64::from(s)),
+            visits: asked_by(spec),
         }
     }
+}
+
+/// Tasks that the scenario's operator asks for, by name.
+fn asked_by(spec: &Spec) -> BTreeSet<String> {
+    let name = |f: &TimedFault| match &f.fault {
+        Fault::AddTask { task } => task.name.clone(),
+        _ => None,
+    };
+    spec.faults.iter().filter_map(name).collect()
 }
 
 /// Why a process ended.

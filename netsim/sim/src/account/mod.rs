@@ -37,6 +37,7 @@ pub use report::{Details, Driver, FalseDown, Live, Processes, RunReport, Simulat
 pub use work::Held;
 
 use crate::check::contours::ContourReport;
+use crate::check::counts::CountReport;
 use crate::check::detections::DetectionReport;
 pub use crate::check::tracks::Tracked;
 use crate::world::{Fact, Judge, Loss};
@@ -50,7 +51,7 @@ use skein_peer::Report;
 use skein_peer::input::AskedTask;
 use skein_peer::output::{Status, TaskNews};
 use std::collections::{BTreeMap, BTreeSet};
-use tasks::Tasks;
+use tasks::{TaskReport, Tasks};
 use work::Work;
 
 /// Alarms and refusals that are kept; a peer that repeats itself must not fill the
@@ -92,6 +93,7 @@ pub struct Account {
     tasks: Tasks,
     detections: Vec<DetectionReport>,
     contour: Option<ContourReport>,
+    counts: Vec<CountReport>,
     found_ms: Option<u64>,
     over_ms: Option<u64>,
 }
@@ -116,6 +118,7 @@ impl Account {
             tasks: Tasks::default(),
             detections: Vec::new(),
             contour: None,
+            counts: Vec::new(),
             found_ms: None,
             over_ms: None,
             setting,
@@ -144,6 +147,11 @@ impl Account {
     pub fn found(&mut self, now_ms: u64) {
         self.covered(now_ms);
         self.found_ms.get_or_insert(now_ms);
+    }
+
+    /// What is known so far of the sites at which the mission counts, beside what is true.
+    pub fn counted(&mut self, reports: Vec<CountReport>) {
+        self.counts = reports;
     }
 
     /// What came so far of the objects that the mission looks for, as the world knows.
@@ -447,6 +455,7 @@ impl Account {
             tasks: self.tasks.reports(ending.judge),
             detections: self.detections.clone(),
             contour: self.contour.clone(),
+            counts: self.counts.clone(),
             found_ms: self.found_ms,
             over_ms: self.over_ms,
             finished,
@@ -464,7 +473,13 @@ impl Account {
             live,
             ..RunReport::default()
         };
-        report.judge(&self.failures);
+        let late = |t: &TaskReport| {
+            let is_visit = self.setting.visits.contains(&t.name);
+            t.late(self.setting.max_visit_ms.filter(|_| is_visit)?, now_ms)
+        };
+        let late = report.tasks.iter().filter_map(late);
+        let failures: Vec<String> = self.failures.iter().cloned().chain(late).collect();
+        report.judge(&failures);
         report
     }
 }

@@ -7,6 +7,7 @@
 use super::lifetimes::Cause;
 use super::tasks::TaskReport;
 use crate::check::contours::ContourReport;
+use crate::check::counts::CountReport;
 use crate::check::detections::DetectionReport;
 use crate::check::wind::WindErrors;
 use crate::check::{Findings, Violation};
@@ -93,6 +94,9 @@ pub struct RunReport {
     /// The contour that was flown along.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contour: Option<ContourReport>,
+    /// Each site at which vehicles are counted: what is known, beside what is true.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub counts: Vec<CountReport>,
     /// Live UAVs at the end that believe the mission finished.
     pub finished: Vec<u16>,
     /// Live UAVs at the end that hold a relay position, with everything covered.

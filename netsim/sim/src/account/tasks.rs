@@ -17,6 +17,9 @@ pub struct TaskReport {
     pub name: String,
     /// When it was asked for, ms.
     pub asked_ms: u64,
+    /// Whether it is a place, a line or an area, which is done once it was seen.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub is_look: bool,
     /// What the ground station holds it to be at the end: `open`, `cancelled`, `expired` or
     /// `done`.
     pub state: TaskState,
@@ -65,6 +68,7 @@ impl Tasks {
         }
         let task = self.0.entry(key).or_insert_with(|| TaskReport {
             name: asked.task.name(),
+            is_look: !asked.task.kind.goes_on(),
             asked_ms: now_ms.saturating_sub(asked.age_ms),
             ..TaskReport::default()
         });
@@ -126,6 +130,21 @@ impl Tasks {
 }
 
 impl TaskReport {
+    /// Why it was seen too late, if it was: what is to be looked at is to be seen within so long,
+    /// unless it was taken back before, or the run ended.
+    #[must_use]
+    pub fn late(&self, within_ms: u64, now_ms: u64) -> Option<String> {
+        let seen_ms = self.seen_ms.unwrap_or(now_ms).saturating_sub(self.asked_ms);
+        let counts = self.is_look && self.state != TaskState::Cancelled;
+        (counts && seen_ms > within_ms).then(|| {
+            format!(
+                "{}, and was to be within {:.0} s",
+                self.line(),
+                super::secs(within_ms)
+            )
+        })
+    }
+
     /// One line for a person.
     #[must_use]
     pub fn line(&self) -> String {
@@ -199,5 +218,18 @@ mod tests {
         );
         assert_eq!(all[1].state, TaskState::Cancelled);
         assert!(all[1].line().ends_with("not seen, cancelled"));
+        // Not seen for so long it is late; taken back it is not.
+        assert!(all[0].is_look && all[0].late(20_000, 29_000).is_none());
+        let why = all[0].late(20_000, 30_000).unwrap();
+        assert!(
+            why.ends_with("not seen, done, and was to be within 20 s"),
+            "{why}"
+        );
+        let seen = TaskReport {
+            seen_ms: Some(12_000),
+            ..all[0].clone()
+        };
+        assert!(seen.late(20_000, 90_000).is_none() && seen.late(2_000, 90_000).is_some());
+        assert!(all[1].late(1, 90_000).is_none());
     }
 }

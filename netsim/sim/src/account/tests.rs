@@ -51,6 +51,8 @@ fn two() -> Account {
         takeoffs_ms: BTreeMap::new(),
         work_m: 2_000.0,
         needed_share: 0.0,
+        max_visit_ms: None,
+        visits: std::collections::BTreeSet::new(),
     });
     for peer in [1, 2, 100] {
         a.started(0, peer);

@@ -34,6 +34,9 @@ impl fmt::Display for RunReport {
         if let Some(contour) = &self.contour {
             writeln!(f, "  contour    {}", contour.line())?;
         }
+        for count in &self.counts {
+            writeln!(f, "  count      {}", count.line())?;
+        }
         self.write_radio(f)?;
         self.write_checks(f)?;
         for alarm in &self.alarms {

@@ -25,6 +25,7 @@
 //! | [`watch`] | who flies round leaves no place waiting, and spreads evenly |
 //! | [`wind`] | who estimates the wind is right |
 //! | [`contours`] | what is told of a contour is there, and who flies along one has it in its picture |
+//! | [`counts`] | what is counted at the sites of a mission is what truly passes and stands there |
 //! | [`detections`] | what a mission looks for and one had in sight is told, once, and is there |
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
 //! | [`airtime`] | S9: shares of the channel |
@@ -43,6 +44,7 @@ pub mod bounds;
 pub mod cadence;
 pub mod checker;
 pub mod contours;
+pub mod counts;
 pub mod cover;
 pub mod decision;
 pub mod detections;

@@ -4,6 +4,7 @@ use super::activity::ActivityCheck;
 use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
 use super::contours::{ContourCheck, Tracer};
+use super::counts::CountCheck;
 use super::decision::{DecisionCheck, Mover};
 use super::detections::DetectionCheck;
 use super::flight::{FlightCheck, Flyer, at_base};
@@ -60,6 +61,8 @@ pub struct Rules {
     pub detections: DetectionCheck,
     /// Contours that are flown along.
     pub contours: ContourCheck,
+    /// What is counted at its sites.
+    pub counts: CountCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -95,6 +98,7 @@ impl Rules {
             wind: WindCheck::new(&spec.wind),
             detections: DetectionCheck::default(),
             contours: ContourCheck::default(),
+            counts: CountCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -109,6 +113,7 @@ impl Rules {
         self.flight.on_zones(mission.zones_m());
         self.activity.on_mission(mission);
         self.detections.on_mission(mission);
+        self.counts.on_mission(mission);
         self.spread
             .on_mission(chunks(mission).map_or(0, |pieces| pieces.len()));
     }

@@ -1,12 +1,15 @@
 //! What is followed and looked for, beside where vehicles are and who has them in its picture.
 
 use super::Swarm;
+use super::sim_peer::Process;
 use crate::check::PeerSnapshot;
 use crate::check::contours::Tracer;
+use crate::check::counts::CountLook;
 use crate::check::detections::Truth;
 use crate::check::tracks::Look;
 use skein_flight::tracing::outline::Stretch;
 use skein_geometry::frame::Point;
+use skein_peer::wire::count::Count;
 use skein_peer::{MISSION, Report};
 
 impl Swarm {
@@ -98,6 +101,55 @@ impl Swarm {
         let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
         let at = (self.now_ms, id);
         rules.detections.on_told(at, (*task, told), &truth, found);
+    }
+
+    /// A UAV looked: what it counts is judged beside what drives in its picture.
+    pub(super) fn note_counts(&mut self, idx: usize) {
+        let peer = &self.peers[idx];
+        let is_running = peer.process == Process::Running;
+        if self.checker.rules.counts.is_idle() || !is_running {
+            return;
+        }
+        let id = peer.id();
+        let (Some(mind), Some(body)) = (&peer.peer, self.air.world().body(id)) else {
+            return;
+        };
+        let counted: Vec<(bool, Count)> = mind.counted().collect();
+        let airframe = body.airframe();
+        let look = CountLook {
+            uav: id,
+            pose: body.pose(),
+            half_m: (airframe.footprint_across_m, airframe.footprint_along_m),
+            counted: &counted,
+        };
+        let truth: Vec<Point> = self.air.vehicles().places().collect();
+        let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
+        rules.counts.on_look(self.now_ms, &truth, look, found);
+    }
+
+    /// What the ground station knows of counts, beside what is true.
+    pub(super) fn judge_counts(&mut self, peers: &[PeerSnapshot]) {
+        if self.checker.rules.counts.is_idle() {
+            return;
+        }
+        let newest = self.operator.mission().revision;
+        let counts = |m: &&PeerSnapshot| {
+            let view = &m.view;
+            m.uav && view.speaks && view.revision >= newest && !view.finished
+        };
+        let able = peers.iter().filter(counts).map(|m| m.id).collect();
+        self.checker.rules.counts.on_able(able);
+        let watched_ms = |m: &PeerSnapshot| -> u64 {
+            let all = m.view.counts.iter();
+            all.map(|c| c.watched_ms).sum()
+        };
+        let ground = peers.iter().find(|m| !m.uav);
+        let most = || peers.iter().max_by_key(|m| watched_ms(m));
+        if let Some(knows) = ground.or_else(most) {
+            let known = &knows.view.counts;
+            let reports = self.checker.rules.counts.reports(self.now_ms, known);
+            self.account.counted(reports);
+        }
     }
 
     /// Whether somebody is to follow what a UAV saw.

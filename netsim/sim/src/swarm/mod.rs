@@ -434,6 +434,7 @@ impl Swarm {
         self.queue
             .push(again_ms, Phase::Sense, Event::Percept { idx, boot });
         self.feed(idx, Input::Percept(percept));
+        self.note_counts(idx);
     }
 
     fn advance_world(&mut self) {
@@ -831,6 +832,7 @@ impl Swarm {
         self.judge_tracks(&peers);
         self.judge_detections(&peers);
         self.judge_contour(&peers);
+        self.judge_counts(&peers);
         self.unassigned = peers.iter().any(|m| !m.view.unassigned.is_empty());
         let mut flying = 0;
         let (mut finished, mut ended) = (true, true);

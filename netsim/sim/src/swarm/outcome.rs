@@ -66,6 +66,8 @@ impl Swarm {
     pub(super) fn outcome(&mut self) -> Outcome {
         self.air.advance(self.now_ms);
         self.check_the_end();
+        let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
+        rules.counts.on_end(self.now_ms, found);
         for p in &self.peers {
             if let Some(peer) = &p.peer {
                 let kept = (&peer.durable(), p.disk.records(), p.untold_writes());

@@ -11,7 +11,8 @@
 //! | confirmed | not seen in [`GONE`] looks in which it should be | dropped; a younger track near to where it may be is it, and gets its name |
 //! | confirmed | less sure than [`LOST_M`] | dropped |
 //!
-//! At most [`MOST_TRACKS`] are kept; tentative ones make room.
+//! At most [`MOST_TRACKS`] are kept; tentative ones make room, then that which was out of sight for
+//! longest.
 
 use super::estimate::{Detection, Estimate};
 use serde::{Deserialize, Serialize};
@@ -39,8 +40,11 @@ const STRAYS_MPS: f64 = 40.0;
 /// And how far at once, metres.
 const STRAYS_M: f64 = 15.0;
 
+/// Who was out of sight for so long makes room for who is seen, milliseconds.
+const UNSEEN_MS: u64 = 2_000;
+
 /// The most tracks of a UAV.
-pub const MOST_TRACKS: usize = 32;
+pub const MOST_TRACKS: usize = 48;
 
 /// 99.9 % of detections of a target are no more surprising (chi-square of two).
 const GATE: f64 = 13.82;
@@ -239,6 +243,17 @@ impl Tracks {
         pairs
     }
 
+    /// Which track makes room: the oldest guess, or else that which was out of sight for longest.
+    fn least(&self, now_ms: u64) -> Option<usize> {
+        let guess = self.tracks.iter().position(|t| !t.confirmed);
+        let unseen = || {
+            let all = self.tracks.iter().enumerate();
+            let gone = all.filter(|(_, t)| t.seen_ms + UNSEEN_MS <= now_ms);
+            gone.min_by_key(|(_, t)| t.seen_ms).map(|(i, _)| i)
+        };
+        guess.or_else(unseen)
+    }
+
     /// Begins a track, if there is room or somebody makes it.
     fn begin(&mut self, now_ms: u64, sighting: &Sighting) {
         let estimate = Estimate::first(now_ms, &sighting.detection);
@@ -246,9 +261,10 @@ impl Tracks {
             return;
         }
         if self.tracks.len() >= MOST_TRACKS {
-            let oldest = self.tracks.iter().position(|t| !t.confirmed);
-            let Some(oldest) = oldest else { return };
-            self.tracks.remove(oldest);
+            let Some(least) = self.least(now_ms) else {
+                return;
+            };
+            self.tracks.remove(least);
         }
         let name = self.fresh();
         self.tracks.push(Track {
@@ -325,6 +341,31 @@ mod tests {
 
     fn everywhere(_: Point) -> bool {
         true
+    }
+
+    #[test]
+    fn who_is_out_of_sight_makes_room_for_who_is_seen() {
+        let mut random = SplitMix64::new(7);
+        let mut tracks = Tracks::new(1, DENSITY);
+        let most = u32::try_from(MOST_TRACKS).unwrap();
+        let far = |i: u32| Point::new(100.0 * f64::from(i), 0.0);
+        for look in 1..=5_u64 {
+            let all: Vec<Sighting> = (0..most).map(|i| sighting(far(i), &mut random)).collect();
+            tracks.look(200 * look, &all, &everywhere);
+        }
+        assert_eq!(tracks.confirmed().count(), MOST_TRACKS);
+        let (next, nowhere) = (far(most), |_: Point| false);
+        let sees = |tracks: &Tracks| {
+            tracks
+                .all()
+                .iter()
+                .any(|t| (t.estimate.position() - next).norm() < 20.0)
+        };
+        let new = [sighting(next, &mut random)];
+        tracks.look(2_000, &new, &nowhere);
+        assert!(!sees(&tracks), "all were seen a second ago");
+        tracks.look(3_200, &new, &nowhere);
+        assert!(sees(&tracks) && tracks.all().len() == MOST_TRACKS);
     }
 
     #[test]

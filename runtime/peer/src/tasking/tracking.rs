@@ -149,6 +149,7 @@ impl Tasking {
             let (tracks, now_ms) = self.targets.tracks();
             self.detections.watch(now_ms, tracks);
         }
+        self.count(percept, state);
         let (Some(sought), Some(airframe)) = (self.sought(), self.flies) else {
             return false;
         };

@@ -11,6 +11,7 @@
 //! or panics. The primitives are in `cbor.rs`, schemas in [`super::schema`].
 
 use super::cbor::{In, Listed, Out, Wire, array_of, in_field, number_of};
+use super::count::Count;
 use super::detection::Detection;
 use super::kinds::{Kind, RECORD_MAX_BYTES};
 use super::limits::{
@@ -97,6 +98,7 @@ pub enum Body {
     Target(Target),
     Detection(Detection),
     Trail(Trail),
+    Count(Count),
 }
 
 impl Body {
@@ -121,6 +123,7 @@ impl Body {
             Self::Target(_) => Kind::Target,
             Self::Detection(_) => Kind::Detection,
             Self::Trail(_) => Kind::Trail,
+            Self::Count(_) => Kind::Count,
         }
     }
 
@@ -156,6 +159,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Target(b) => b.put(&mut out),
         Body::Detection(b) => b.put(&mut out),
         Body::Trail(b) => b.put(&mut out),
+        Body::Count(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -190,6 +194,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Target => Body::Target(Wire::get(&mut input)?),
         Kind::Detection => Body::Detection(Wire::get(&mut input)?),
         Kind::Trail => Body::Trail(Wire::get(&mut input)?),
+        Kind::Count => Body::Count(Wire::get(&mut input)?),
         Kind::Event => {
             return Err(WireError::Kind {
                 number: kind.number(),

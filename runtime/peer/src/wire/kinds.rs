@@ -49,6 +49,8 @@ pub enum Kind {
     Detection = 16,
     /// A stretch of a contour that the author flew along.
     Trail = 17,
+    /// What the author counted at a site of the mission.
+    Count = 18,
 }
 
 /// How long a record waiting to be sent matters.
@@ -106,7 +108,7 @@ const fn row(
 // matters until the longest partition a mission tolerates, and is repaired by
 // anti-entropy afterwards.
 // Caps: the largest valid body, which a test of `codec` computes, rounded up.
-const TABLE: [KindRow; 18] = [
+const TABLE: [KindRow; 19] = [
     KindRow {
         relayed: false,
         ..row(
@@ -275,11 +277,22 @@ const TABLE: [KindRow; 18] = [
             Lifetime::Beacons(8),
         )
     },
+    // For people: nobody flies by it.
+    KindRow {
+        subjects: super::count::COUNTS_MAX,
+        ..row(
+            Kind::Count,
+            "count",
+            64,
+            Priority::Telemetry,
+            Lifetime::Ms(60_000),
+        )
+    },
 ];
 
 impl Kind {
     /// All kinds, by number.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Beacon,
         Self::State,
         Self::Bid,
@@ -298,6 +311,7 @@ impl Kind {
         Self::Target,
         Self::Detection,
         Self::Trail,
+        Self::Count,
     ];
 
     /// Its number on the wire.

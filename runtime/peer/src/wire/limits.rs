@@ -81,6 +81,7 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
         Body::Target(t) => super::target::check(t),
         Body::Detection(d) => super::detection::check(d),
         Body::Trail(t) => super::trail::check(t),
+        Body::Count(c) => super::count::check(c),
     }
 }
 

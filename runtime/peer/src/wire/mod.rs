@@ -2,6 +2,7 @@
 
 pub(crate) mod cbor;
 pub mod codec;
+pub mod count;
 pub mod detection;
 mod intent;
 pub mod key;

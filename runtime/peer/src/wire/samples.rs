@@ -114,6 +114,8 @@ pub fn golden() -> Vec<(Body, &'static str)> {
     all.push((
         Body::Trail(super::trail::samples::trail()),
         "83f51a00013df883841904b439013900f5841905dc39012116f4841906f43877182ef4",
+        Body::Count(super::count::samples::count()),
+        "871a123456781a00013df80e19ee481910d60000",
     ));
     all
 }
@@ -339,6 +341,7 @@ pub fn largest() -> Vec<Body> {
     all.extend(super::target::samples::largest());
     all.extend(super::detection::samples::largest());
     all.extend(super::trail::samples::largest());
+    all.extend(super::count::samples::largest());
     all
 }
 

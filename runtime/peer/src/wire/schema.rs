@@ -491,6 +491,7 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Target => Some(super::target::TARGET),
         Kind::Detection => Some(super::detection::DETECTION),
         Kind::Trail => Some(super::trail::TRAIL),
+        Kind::Count => Some(super::count::COUNT),
         Kind::Event => None,
     }
 }

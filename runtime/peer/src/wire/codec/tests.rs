@@ -1,5 +1,6 @@
 //! Bytes of all kinds: typical, largest, refused, cut short, changed.
 
+use super::super::count::Count;
 use super::super::detection::Detection;
 use super::super::limits::*;
 use super::super::samples::{fresh, golden, gossip, largest, listing};
@@ -433,6 +434,20 @@ fn every_limit_is_sharp() {
                 with(&|d| d.error_mm += 1, "error_mm");
                 with(&|d| d.east_mmps -= 1, "east_mmps");
                 with(&|d| d.north_mmps -= 1, "north_mmps");
+            }
+            Body::Count(c) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut Count), field| {
+                    let mut c = c;
+                    change(&mut c);
+                    refused(&Body::Count(c), field);
+                };
+                with(&|c| c.watched_ms += 1, "watched_ms");
+                with(&|c| c.passed += 1, "passed");
+                with(&|c| c.spent_ms += 1, "spent_ms");
+                with(&|c| c.driven_dm += 1, "driven_dm");
+                with(&|c| c.seen_ms += 1, "seen_ms");
+                with(&|c| c.seen_ms = 0, "standing");
             }
             Body::Operator(orders) => {
                 kinds += 1;

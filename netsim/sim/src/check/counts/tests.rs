@@ -1,0 +1,155 @@
+//! What is counted beside what is true, on scenes made by hand.
+
+use super::*;
+
+fn mission(what: Counted) -> Mission {
+    let mut mission = (*crate::world::fixture::square(1).mission).clone();
+    mission.counts = vec![CountSite {
+        name: "north".to_owned(),
+        what,
+        ring: vec![
+            (-10_000, -10_000),
+            (10_000, -10_000),
+            (10_000, 10_000),
+            (-10_000, 10_000),
+        ],
+        capacity: 0,
+    }];
+    mission
+}
+
+/// A UAV that flies over a site from one place to another at 10 m/s, and what it says.
+struct Scene {
+    check: CountCheck,
+    found: Findings,
+    sites: u32,
+}
+
+impl Scene {
+    fn new(what: Counted) -> Self {
+        let mission = mission(what);
+        let mut check = CountCheck::default();
+        check.on_mission(&mission);
+        check.on_able([1].into());
+        Self {
+            check,
+            found: Findings::new(0),
+            sites: mission.sites_hash(),
+        }
+    }
+
+    /// Looks five times a second from one second to another; cars pass the site each four seconds,
+    /// and the UAV tells `passed` of them after so many seconds.
+    fn look(&mut self, (from_s, to_s): (u32, u32), at: Point, says: &dyn Fn(f64) -> (bool, Count)) {
+        for look in 5 * from_s..5 * to_s {
+            let s = f64::from(look) / 5.0;
+            // Each drives 40 m to the north at 10 m/s and begins anew in the south.
+            let car = Point::new(0.0, -20.0 + 10.0 * (s % 4.0));
+            let parked = Point::new(5.0, 5.0);
+            let (counts, count) = says(s);
+            let counted = [(
+                counts,
+                Count {
+                    sites: self.sites,
+                    ..count
+                },
+            )];
+            let look = CountLook {
+                uav: 1,
+                pose: Pose::new(at, 0.0),
+                half_m: (40.0, 30.0),
+                counted: &counted,
+            };
+            let now_ms = (s * 1000.0).round() as u64;
+            self.check
+                .on_look(now_ms, &[car, parked], look, &mut self.found);
+        }
+    }
+
+    fn broken(&self) -> Vec<&'static str> {
+        self.found.counts.keys().copied().collect()
+    }
+}
+
+/// A count that is right but for a share.
+fn counting(share: f64) -> impl Fn(f64) -> (bool, Count) {
+    move |s| {
+        let passed = (s / 4.0 * share).round() as u32;
+        let count = Count {
+            watched_ms: (s * 1000.0) as u64,
+            passed,
+            ..Count::default()
+        };
+        (true, count)
+    }
+}
+
+#[test]
+fn a_right_count_passes_and_one_that_is_half_or_twice_of_it_does_not() {
+    for (share, broken) in [(1.0, vec![]), (0.5, vec!["count"]), (2.0, vec!["count"])] {
+        let mut scene = Scene::new(Counted::Passing);
+        scene.look((0, 80), Point::origin(), &counting(share));
+        scene.check.on_end(80_000, &mut scene.found);
+        assert_eq!(scene.broken(), broken, "{share}");
+    }
+    let mut scene = Scene::new(Counted::Passing);
+    scene.look((0, 80), Point::origin(), &counting(1.0));
+    let known = [SiteCount {
+        watched_ms: 80_000,
+        passed: 20,
+        ..SiteCount::default()
+    }];
+    let report = &scene.check.reports(80_000, &known)[0];
+    assert_eq!(report.passed_in_pictures, 19, "{report:?}");
+    assert_eq!((report.passed.0, report.counted.0), (19, 20));
+    assert_eq!(report.holds(), Some(true));
+    assert!(report.line().contains("truly 19 while it was counted"));
+}
+
+#[test]
+fn who_counts_at_what_is_not_in_its_picture_is_found_and_who_counts_at_nothing_too() {
+    let mut scene = Scene::new(Counted::Passing);
+    scene.look((0, 8), Point::new(25.0, 0.0), &counting(1.0));
+    assert_eq!(scene.broken(), ["count-sight"]);
+    let mut scene = Scene::new(Counted::Passing);
+    scene.look((0, 40), Point::origin(), &|_| (false, Count::default()));
+    scene.check.on_end(40_000, &mut scene.found);
+    assert_eq!(scene.broken(), ["count-idle"]);
+    // Of whom it is not asked it is not: it is on its way home, say.
+    let mut scene = Scene::new(Counted::Passing);
+    scene.check.on_able(BTreeSet::new());
+    scene.look((0, 40), Point::origin(), &|_| (false, Count::default()));
+    scene.check.on_end(40_000, &mut scene.found);
+    assert!(scene.broken().is_empty());
+}
+
+#[test]
+fn another_life_counts_from_nothing_and_what_the_first_counted_is_kept() {
+    let mut scene = Scene::new(Counted::Passing);
+    scene.look((0, 20), Point::origin(), &counting(1.0));
+    let anew = |s: f64| counting(1.0)(s - 20.0);
+    scene.look((20, 40), Point::origin(), &anew);
+    assert!(scene.broken().is_empty(), "{:?}", scene.found);
+    let report = &scene.check.reports(40_000, &[])[0];
+    assert_eq!(report.counted.0, 10, "{report:?}");
+}
+
+#[test]
+fn who_stands_is_compared_once_the_look_is_over() {
+    for (standing, broken) in [(1, vec![]), (0, vec![]), (3, vec!["occupancy"])] {
+        let mut scene = Scene::new(Counted::Standing);
+        let says = |s: f64| {
+            let count = Count {
+                watched_ms: (s * 1000.0) as u64,
+                standing,
+                seen_ms: 1 + (s.min(10.0) * 1000.0) as u64,
+                ..Count::default()
+            };
+            (s <= 10.0, count)
+        };
+        scene.look((0, 12), Point::origin(), &says);
+        assert_eq!(scene.broken(), broken, "{standing}");
+        let report = &scene.check.reports(12_000, &[])[0];
+        assert_eq!(report.stands, 1);
+    }
+}

@@ -1,0 +1,72 @@
+//! When a UAV counts at the sites of its mission, and when it tells of that (D2.7 §3.1). What
+//! counts is [`crate::counting`]'s.
+//!
+//! | what holds | it counts |
+//! |---|---|
+//! | its mission has sites, and is not over for it | in each look |
+//! | the mission is over or cancelled, or another process speaks under its id | no more; what it counted it tells |
+
+use super::Tasking;
+use crate::Mission;
+use crate::cooperation::Situation;
+use crate::counting::SiteCount;
+use crate::effect::Effects;
+use crate::mission_state::MissionState;
+use crate::wire::count::Count;
+use skein_behaviors::Percept;
+use skein_geometry::frame::Pose;
+
+impl Tasking {
+    /// A look at the sites.
+    pub(super) fn count(&mut self, percept: &Percept, state: &MissionState) {
+        let mission = &state.geometry.mission;
+        let (Some(airframe), false) = (self.flies, mission.counts.is_empty()) else {
+            return;
+        };
+        if percept.sightings.is_absent() {
+            return;
+        }
+        let counts = !mission.cancelled && !state.silent && !state.stage.ended();
+        let (tracks, _) = self.targets.tracks();
+        self.counting
+            .look(percept, &airframe, tracks, (mission, counts));
+    }
+
+    /// Heeds who else is above the sites, and tells what is to be told.
+    pub(super) fn tell_of_counts(&mut self, s: &Situation<'_>, state: &MissionState) -> Effects {
+        let Some(airframe) = self
+            .flies
+            .filter(|_| !state.geometry.mission.counts.is_empty())
+        else {
+            return Effects::new();
+        };
+        let lower = s.membership.live().filter(|(id, _)| *id < self.me);
+        let place = |(id, _)| {
+            let info = s.membership.info(id).filter(|i| !i.ground_station)?;
+            let age_ms = s.now.since_ms(info.heard?);
+            Some((info.place?.pose(), age_ms))
+        };
+        let others: Vec<(Pose, u64)> = lower.filter_map(place).collect();
+        let interval_ms = s.membership.interval_ms();
+        self.counting.heed(&others, interval_ms, &airframe);
+        if s.speaks {
+            self.counting.tell(s.now, interval_ms)
+        } else {
+            Effects::new()
+        }
+    }
+
+    /// What all together counted at each site of the mission, as far as is known here.
+    pub fn counts(&self, mission: &Mission) -> Vec<SiteCount> {
+        if mission.counts.is_empty() {
+            return Vec::new();
+        }
+        self.counting.sums(mission)
+    }
+
+    /// What this UAV counted itself, site by site, and whether it does so
+    /// in the percept of this time.
+    pub fn counted(&self, percept_ms: u64) -> impl Iterator<Item = (bool, Count)> {
+        self.counting.own(percept_ms)
+    }
+}
