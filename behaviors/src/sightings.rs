@@ -78,6 +78,6 @@ mod tests {
         });
         let look = Sightings::new(many);
         assert_eq!(look.seen().count(), SIGHTINGS_MAX);
-        assert!((look.seen().last().unwrap().at().x - 0.007).abs() < 1e-9);
+        assert!((look.seen().last().unwrap().at().x - 0.023).abs() < 1e-9);
     }
 }

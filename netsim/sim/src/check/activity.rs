@@ -663,7 +663,7 @@ mod tests {
             ("section", covers, 5.9),
             ("section", covers, 6.1)
         ]));
-        assert!(broken(&[("section", covers, 5.9), ("shelter", came, 5.9)]));
+        assert!(broken(&[("section", covers, 5.9), ("shelter", came, 4.9)]));
         assert!(broken(&[
             ("section", covers, 5.9),
             ("shelter", came, 6.1),

@@ -72,6 +72,8 @@ impl Scene {
                 airspeed_mps: 13.0,
                 wind_east_mps: 0.0,
                 wind_north_mps: 0.0,
+                wind_unknown: false,
+                contour: skein_behaviors::contour::ContourLook::default(),
                 endurance_s: 3_000.0,
                 takes_off_in_ms: 0,
                 failsafe: false,

@@ -349,10 +349,18 @@ fn one_of_those_who_were_lost_is_back() {
         to: "home".into(),
         priority: 33,
     };
-    // Once for each that is lost: whoever covers gathers.
-    diagram.transitions.last_mut().unwrap().from = Some("section".into());
+    // Whoever covers gathers, and stays until somebody is back.
+    let mut stays = diagram.transitions.pop().unwrap();
+    for from in ["section", "gather"] {
+        stays.from = Some(from.into());
+        diagram.transitions.push(stays.clone());
+    }
     diagram.transitions.push(back);
-    let mut h = with_operator(4, flown_by(diagram, 1));
+    let large = Mission {
+        diagram: Some(Arc::new(diagram)),
+        ..mission(1, 14, 8)
+    };
+    let mut h = with_operator(4, large);
     h.run_s(30);
     h.isolate(3, true);
     h.isolate(4, true);
@@ -361,6 +369,7 @@ fn one_of_those_who_were_lost_is_back() {
     assert_eq!(work(&h, 1).state, "gather");
     // The other one is still away.
     h.isolate(3, false);
+    h.isolate(4, true);
     assert!(h.run_until(60, |h| work(h, 1).state != "gather"));
     let down = |h: &Harness| {
         h.beliefs(1)
@@ -380,6 +389,7 @@ fn a_mission_may_ask_for_what_follows_when_a_part_of_it_is_beyond_everybody() {
     h.seat(1).fuel_s = 130.0;
     h.run_s(3);
     assert!(h.run_until(60, |h| work(h, 1).reason == Reason::Infeasible));
+    h.run_s(2);
     assert!(h.beliefs(1).finished && h.beliefs(1).plan.is_empty());
 }
 

@@ -114,6 +114,8 @@ pub fn golden() -> Vec<(Body, &'static str)> {
     all.push((
         Body::Trail(super::trail::samples::trail()),
         "83f51a00013df883841904b439013900f5841905dc39012116f4841906f43877182ef4",
+    ));
+    all.push((
         Body::Count(super::count::samples::count()),
         "871a123456781a00013df80e19ee481910d60000",
     ));
