@@ -196,6 +196,7 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Target(b) => serde_json::to_value(b),
         Body::Detection(b) => serde_json::to_value(b),
         Body::Trail(b) => serde_json::to_value(b),
+        Body::Count(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -298,6 +299,12 @@ fn words(author: u16, body: &Body) -> String {
             t.seen_ms
         ),
         Body::Detection(d) => d.sentence(author),
+        Body::Count(c) => format!(
+            "counted {} passing in {:.0} s; {} stood there when it was seen last",
+            c.passed,
+            c.watched_ms as f64 / 1000.0,
+            c.standing
+        ),
         Body::Trail(t) => format!(
             "tells {} places of a contour, the first seen at {} ms of the clock of percepts",
             t.places.len(),

@@ -61,8 +61,8 @@ pub(crate) fn scene(
         }),
         uavs: spec.uavs.iter().map(uav).collect(),
         bounds: bounds(spec, geometry, seed),
-        wind_east_mps: rounded(spec.wind.east_mps, 1e3),
-        wind_north_mps: rounded(spec.wind.north_mps, 1e3),
+        wind_east_mps: rounded(spec.wind.first.east_mps, 1e3),
+        wind_north_mps: rounded(spec.wind.first.north_mps, 1e3),
         radio_range_m: rounded(spec.radio.range_m, 1e3),
         ..Scene::default()
     };

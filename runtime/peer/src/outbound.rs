@@ -16,6 +16,7 @@
 //! | bundle | while a task is open: when the offer or a claim is new; what was won once an interval has passed without news |
 //! | target | while somebody is to be followed: what was seen since it was told last, two at most every I |
 //! | trail | while its UAV flies along a contour: a stretch when it is full; every 8 I the one that grows, and the next of the older ones |
+//! | count | once its site is out of the picture, and every 10 I while it is in it: two at most at a look |
 //!
 //! I is the interval that this peer's beacons announce, a period T where there is room.
 

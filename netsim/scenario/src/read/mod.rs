@@ -199,7 +199,7 @@ pub(crate) fn scenario(
             .transpose()?,
         wind: f
             .get("wind")
-            .map_or(Ok(Weather::default()), |n| wind::read(&n))?,
+            .map_or(Ok(Weather::default()), wind::read)?,
         objective: f
             .get("objective")
             .map_or(Ok(Objective::Time), airframe::objective)?,

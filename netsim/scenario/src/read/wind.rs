@@ -44,7 +44,7 @@ pub(crate) fn read(node: &Node<'_>) -> Result<Weather, Error> {
     Ok(Weather {
         first,
         changes,
-        estimated: f.get("airspeed_error").map(|n| errors(&n)).transpose()?,
+        estimated: f.get("airspeed_error").map(errors).transpose()?,
     })
 }
 

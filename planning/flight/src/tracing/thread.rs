@@ -4,7 +4,7 @@
 //! what it shows anew. What has left the picture is final, and is handed over once.
 //!
 //! # Guarantees
-//! Bounded: [`KEPT`] final places and one look. Equal looks give equal threads.
+//! Bounded: `KEPT` final places and one look. Equal looks give equal threads.
 //!
 //! # Complexity
 //! A look costs its points times what is kept.

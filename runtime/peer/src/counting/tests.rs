@@ -110,7 +110,7 @@ fn who_drives_in_passes_once_with_its_speed_and_who_was_there_does_not() {
     assert!((48..75).contains(&(own.driven_dm / 10)), "{own:?}");
     let driven_s = seconds(own.spent_ms) - 13.0;
     assert!((6.0..9.0).contains(&driven_s), "{own:?}");
-    assert_eq!(sum.volume_per_h().unwrap().round(), 522.0);
+    assert!((sum.volume_per_h().unwrap() - 522.0).abs() < 0.5);
     let (low, high) = sum.volume_range_per_h().unwrap();
     assert!(low < 150.0 && high > 1_500.0, "{low} {high}");
 }
