@@ -197,9 +197,7 @@ pub(crate) fn scenario(
             .get("base")
             .map(|node| position(&node.fields(&["east_m", "north_m"])?))
             .transpose()?,
-        wind: f
-            .get("wind")
-            .map_or(Ok(Weather::default()), wind::read)?,
+        wind: f.get("wind").map_or(Ok(Weather::default()), wind::read)?,
         objective: f
             .get("objective")
             .map_or(Ok(Objective::Time), airframe::objective)?,

@@ -5,7 +5,7 @@
 //! |---|---|---|---|
 //! | born | start | promised | the journal's incarnation plus one is stored |
 //! | promised | stored | listening | the life begins; probation of 3 T runs from the start |
-//! | promised | the store failed | as before the promise | stored again: if there is no life yet after one tick, two, four, up to 64, else when it hears of itself again |
+//! | promised | the store failed | as before the promise | stored again: if there is no life yet, or none of its own, after one tick, two, four, up to 64, else when it hears of itself again |
 //! | listening | its own id at this or a higher life | promised | that plus one is stored |
 //! | listening | 3 T are over | speaking | beacons |
 //! | listening | a twin lives | silent | an alarm |
@@ -69,6 +69,8 @@ pub(crate) struct Life {
     promised: Option<Incarnation>,
     nonce: u32,
     silent: Option<Silence>,
+    /// Why it was silent before the life that is being made durable.
+    was_silent: Option<Silence>,
     /// Since when this process runs.
     started: Time,
     /// Since when it has said nothing, where it does not speak.
@@ -147,6 +149,8 @@ impl Life {
             return Effects::new();
         }
         self.promised = None;
+        self.was_silent = None;
+        self.retry = (0, 0);
         self.incarnation = incarnation;
         let mut effects = vec![Effect::Live(incarnation)];
         // Who fell silent meanwhile speaks in a later one.
@@ -161,6 +165,14 @@ impl Life {
         self.promised = self.promised.filter(|p| *p != incarnation);
         let ticks = (2 * self.retry.1).clamp(1, RETRY_MAX_TICKS);
         self.retry = (ticks, ticks);
+        // The life that it has is shared with another process: it does not speak in that.
+        self.silent = self.silent.or(self.was_silent.take());
+    }
+
+    /// Whether a life that could not be stored is to be tried again by now.
+    fn tries_again(&mut self) -> bool {
+        self.retry.0 = self.retry.0.saturating_sub(1);
+        self.retry.0 == 0
     }
 
     /// Whether a life is so far above its own that it is not believed.
@@ -271,7 +283,7 @@ impl Life {
         }
     }
 
-    /// A first life that could not be stored is tried again. Who was silent begins a life
+    /// A life that could not be stored is tried again. Who was silent begins a life
     /// when its twin was not alive for longer than `patience_ms`.
     pub fn tick(
         &mut self,
@@ -285,14 +297,16 @@ impl Life {
             .silent
             .is_some_and(|s| now.since_ms(s.alive) > patience_ms)
         {
-            self.silent = None;
+            if !self.tries_again() {
+                return Effects::new();
+            }
+            self.was_silent = self.silent.take();
             timers.set(Timer::Probation, now.plus_ms(PROBATION_PERIODS * period_ms));
             let above = self.heard.max(self.incarnation).saturating_add(1);
             return self.promise(above);
         }
         if self.incarnation == 0 && self.promised.is_none() {
-            self.retry.0 = self.retry.0.saturating_sub(1);
-            if self.retry.0 > 0 {
+            if !self.tries_again() {
                 return Effects::new();
             }
             self.promise(durable.saturating_add(1))
@@ -317,6 +331,39 @@ mod tests {
     /// A tick of a peer whose journal ended with life 4.
     fn tick(life: &mut Life) -> Effects {
         life.tick(Time(0), (1000, 12_000), &mut Timers::default(), 4)
+    }
+
+    #[test]
+    fn who_was_silent_stays_so_until_its_next_life_is_durable() {
+        let mut life = living(2);
+        let twin = Twin {
+            incarnation: 3,
+            heartbeat: 9,
+            nonce: Some(1),
+        };
+        let mut timers = Timers::default();
+        let _ = life.hear_twin((Time(60_000), &timers), twin, 4, false);
+        assert!(life.is_silent());
+        let mut at_ms = 80_000;
+        let mut tick = |life: &mut Life, timers: &mut Timers| {
+            at_ms += 250;
+            stored(&life.tick(Time(at_ms), (1000, 12_000), timers, 2))
+        };
+        assert_eq!(tick(&mut life, &mut timers), [4]);
+        // The disk takes no writes: it is tried again, less and less often, and nothing is said.
+        let mut tries = 0;
+        for _ in 0..40 {
+            life.on_broken(4);
+            assert!(life.is_silent() && !life.speaks(Time(200_000), &timers));
+            while tick(&mut life, &mut timers).is_empty() {}
+            tries += 1;
+            if tries == 4 {
+                break;
+            }
+        }
+        assert!(life.retry.1 >= 8, "{:?}", life.retry);
+        assert!(!life.on_durable(4).is_empty());
+        assert!(!life.is_silent() && life.speaks(Time(200_000), &timers));
     }
 
     /// A life that was started and is durable.
