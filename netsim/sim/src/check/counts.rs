@@ -253,6 +253,8 @@ pub struct CountLook<'a> {
     pub uav: u16,
     /// Where it is.
     pub pose: Pose,
+    /// Whether its computer is late: what it says is of where it was.
+    pub is_late: bool,
     /// Half of what it sees there across and along, metres.
     pub half_m: (f64, f64),
     /// Site by site whether it says that it counts, and what it counted.
@@ -369,7 +371,10 @@ impl CountCheck {
             watch.begun += u32::from(counts && !was);
             (watch.counts, watch.own) = (counts, own);
             let at = (now_ms, look.uav);
-            if counts && !site.is_pictured(look, 1.0) && !core::mem::replace(&mut watch.told, true)
+            if counts
+                && !look.is_late
+                && !site.is_pictured(look, 1.0)
+                && !core::mem::replace(&mut watch.told, true)
             {
                 found.broken("count-sight", at.0, Some(at.1), || {
                     format!(

@@ -119,6 +119,7 @@ impl Swarm {
         let look = CountLook {
             uav: id,
             pose: body.pose(),
+            is_late: peer.slow_ms > 0,
             half_m: (airframe.footprint_across_m, airframe.footprint_along_m),
             counted: &counted,
         };

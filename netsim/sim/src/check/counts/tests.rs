@@ -23,6 +23,7 @@ struct Scene {
     check: CountCheck,
     found: Findings,
     sites: u32,
+    is_late: bool,
 }
 
 impl Scene {
@@ -35,6 +36,7 @@ impl Scene {
             check,
             found: Findings::new(0),
             sites: mission.sites_hash(),
+            is_late: false,
         }
     }
 
@@ -55,6 +57,7 @@ impl Scene {
                 },
             )];
             let look = CountLook {
+                is_late: self.is_late,
                 uav: 1,
                 pose: Pose::new(at, 0.0),
                 half_m: (40.0, 30.0),
@@ -111,6 +114,11 @@ fn who_counts_at_what_is_not_in_its_picture_is_found_and_who_counts_at_nothing_t
     let mut scene = Scene::new(Counted::Passing);
     scene.look((0, 8), Point::new(25.0, 0.0), &counting(1.0));
     assert_eq!(scene.broken(), ["count-sight"]);
+    // Of a late computer it is of where its UAV was.
+    let mut scene = Scene::new(Counted::Passing);
+    scene.is_late = true;
+    scene.look((0, 8), Point::new(25.0, 0.0), &counting(1.0));
+    assert!(scene.broken().is_empty());
     let mut scene = Scene::new(Counted::Passing);
     scene.look((0, 40), Point::origin(), &|_| (false, Count::default()));
     scene.check.on_end(40_000, &mut scene.found);
