@@ -335,15 +335,21 @@ impl ActivityCheck {
 /// own clock, whether that runs fast or jumps.
 fn lasts(snapshot: &Snapshot<'_>, id: u16, from_ms: u64) -> (u64, u64) {
     let now_ms = snapshot.now_ms;
+    let slack_ms = 2 * snapshot.bounds.period_ms;
+    // It began before it was seen, and its clock may have jumped in between.
+    let before_ms = from_ms.saturating_sub(slack_ms);
     let all = [
         now_ms.saturating_sub(from_ms),
         snapshot.lived_ms(id, from_ms),
         snapshot.handicaps.shown_ms(id, from_ms, now_ms),
+        snapshot
+            .handicaps
+            .shown_ms(id, before_ms, now_ms)
+            .saturating_sub(from_ms - before_ms),
     ];
     let (low_ms, high_ms) = all.iter().fold((u64::MAX, 0), |(low, high), ms| {
         (low.min(*ms), high.max(*ms))
     });
-    let slack_ms = 2 * snapshot.bounds.period_ms;
     let late_ms = snapshot.late_ms(id, from_ms);
     (
         low_ms.saturating_sub(slack_ms),
@@ -590,6 +596,23 @@ mod tests {
         };
         assert!(!held_once(Some(4)));
         assert!(held_once(None) && held_once(Some(12)));
+    }
+
+    #[test]
+    fn a_clock_that_jumped_just_before_the_first_look_counts_too() {
+        let mut story = Story::new(0);
+        let jump = crate::fault::Fault::ClockJump {
+            peer: 1,
+            ahead_ms: 45_000,
+        };
+        story.handicaps.on_fault(700, &jump);
+        let mut at = |from_ms| {
+            let mut both = (0, 0);
+            story.snapshot(100_000, &[(1, speaking())], |s| both = lasts(s, 1, from_ms));
+            both
+        };
+        assert_eq!(at(1_000), (97_000, 146_000));
+        assert_eq!(at(3_000), (95_000, 99_000));
     }
 
     #[test]
