@@ -76,8 +76,10 @@ pub struct ActivityCheck {
     /// What an operator ever wanted: an order may come and go between two snapshots.
     ordered: Vec<Order>,
     last: BTreeMap<u16, Last>,
-    /// When a process was first seen with this sortie.
-    began: BTreeMap<u16, (u16, u64)>,
+    /// Which sortie a process has, when it was first seen with it, and since when it may have it.
+    began: BTreeMap<u16, (u16, u64, u64)>,
+    /// When each process was last looked at, or started: who is silent for a twin is not looked at.
+    looked_ms: BTreeMap<u16, u64>,
     /// Sorties that some UAV ended by its timer.
     ended: BTreeSet<u16>,
     /// The goals to which the events of now lead, where they lead to one.
@@ -104,6 +106,11 @@ impl ActivityCheck {
         if !self.ordered.contains(&order) {
             self.ordered.push(order);
         }
+    }
+
+    /// A process starts.
+    pub fn on_boot(&mut self, now_ms: u64, id: u16) {
+        self.looked_ms.insert(id, now_ms);
     }
 
     /// A process ends, with all that it knew, or stands still (`death` is false).
@@ -165,18 +172,23 @@ impl ActivityCheck {
         m: &'a PeerSnapshot,
         flown: &'a Flown,
     ) -> Facts<'a> {
+        let now_ms = snapshot.now_ms;
+        let looked_ms = self.looked_ms.insert(m.id, now_ms).unwrap_or(now_ms);
         let began = self.began.entry(m.id);
-        let began = began.or_insert((flown.sortie, snapshot.now_ms));
+        let began = began.or_insert((flown.sortie, now_ms, looked_ms));
         if began.0 != flown.sortie {
-            *began = (flown.sortie, snapshot.now_ms);
+            *began = (flown.sortie, now_ms, looked_ms);
         }
-        let began_ms = began.1;
+        let (began_ms, may_ms) = (began.1, began.2);
         Facts {
             m,
             flown,
             full: snapshot.covered.is_full(),
             told_over: self.ended.contains(&flown.sortie),
-            age_ms: lasts(snapshot, m.id, began_ms),
+            age_ms: (
+                lasts(snapshot, m.id, began_ms).0,
+                lasts(snapshot, m.id, may_ms).1,
+            ),
             here_ms: None,
             fresh_ms: FRESH_PERIODS * snapshot.bounds.period_ms + snapshot.late_ms(m.id, began_ms),
         }
@@ -596,6 +608,23 @@ mod tests {
         };
         assert!(!held_once(Some(4)));
         assert!(held_once(None) && held_once(Some(12)));
+    }
+
+    #[test]
+    fn who_was_silent_may_have_its_mission_since_its_process_started() {
+        let (mut story, mut check) = (Story::new(0), ActivityCheck::default());
+        check.on_mission(&mission());
+        check.on_boot(10_000, 1);
+        let mut age_ms = |now_ms| {
+            let mut age_ms = (0, 0);
+            story.snapshot(now_ms, &[(1, flying())], |s| {
+                let flown = check.flown(&s.peers[0]).unwrap();
+                age_ms = check.facts(s, &s.peers[0], &flown).age_ms;
+            });
+            age_ms
+        };
+        assert_eq!(age_ms(100_000), (0, 92_000));
+        assert_eq!(age_ms(130_000), (28_000, 122_000));
     }
 
     #[test]

@@ -136,6 +136,7 @@ impl Rules {
         self.decision.on_anew(id);
         self.loops.remove(&id);
         self.cadence.on_boot(now_ms, id);
+        self.activity.on_boot(now_ms, id);
     }
 
     /// A process ends, with all that it knew, or stands still (`death` is false).
