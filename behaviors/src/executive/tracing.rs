@@ -25,6 +25,7 @@ use skein_flight::tracing::lead::{BEYOND_M, Lead, SEEK_ARCS, seek_arc};
 use skein_flight::tracing::thread::{Look, Mark, Thread};
 use skein_geometry::frame::{Point, Pose, Vector};
 use skein_geometry::math::cos;
+use skein_geometry::polyline::{length_m, nearest};
 use skein_geometry::{Curve, Segment};
 
 /// An arc along the contour, metres.
@@ -350,10 +351,9 @@ fn laid(arc: Segment) -> Move {
 #[must_use]
 pub fn gaps_along(ring: &[Point], mine: Pose, others: &[(Pose, f64)]) -> Option<Gaps> {
     let closed: Vec<Point> = ring.iter().chain(ring.first()).copied().collect();
-    let whole_m = skein_flight::tracing::thread::length_m(&closed);
+    let whole_m = length_m(&closed);
     let along = |pose: &Pose| {
-        let (along_m, off_m, way) =
-            skein_flight::tracing::thread::nearest(&closed, pose.position())?;
+        let (along_m, off_m, way) = nearest(&closed, pose.position())?;
         let faces = way.dot(&pose.direction()) > 0.0;
         (off_m <= 2.0 * BESIDE_M && faces).then_some(along_m)
     };

@@ -7,14 +7,18 @@
 //! the operator of the scenario asks for. At the end of
 //! each number of UAVs how often the true volume was in the range that is told with the estimate.
 
+#[path = "shared/campaign.rs"]
+mod campaign;
 mod shared;
 
+use campaign::{Campaign, Flown, Teller};
 use skein_netsim::CountReport;
 use skein_netsim::account::secs;
 use skein_netsim::account::tasks::TaskReport;
 use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::prepared::Prepared;
-use skein_netsim::runs::{Wanted, failure_free_makespan_ms, faults_of, run};
+use skein_netsim::runs::{Wanted, faults_of, run};
+use skein_netsim::swarm::Outcome;
 use std::process::ExitCode;
 
 /// What the operator of the scenario asks for is asked for in its storms, too.
@@ -116,78 +120,51 @@ impl Totals {
     }
 }
 
-fn main() -> ExitCode {
-    let args: Vec<String> = std::env::args().skip(1).collect();
-    let arg = |i: usize, default: &str| args.get(i).map_or(default, String::as_str).to_owned();
-    let seeds = match shared::seeds(&arg(2, "1..2")) {
-        Ok(seeds) => seeds,
-        Err(code) => return code,
-    };
-    let lines = args.iter().any(|a| a == "timeline");
-    let mut passed = true;
-    for name in arg(0, "crossings,parking").split(',') {
-        for n in arg(1, "1,2,3,8").split(',').filter_map(|n| n.parse().ok()) {
-            let prepared = match shared::scenario(name, n, None) {
-                Ok(scenario) => Prepared::new(scenario.spec),
-                Err(code) => return code,
-            };
-            let mut totals = Totals::default();
-            let free_ms = (arg(3, "") == "storm").then(|| failure_free_makespan_ms(&prepared));
-            for seed in seeds.from..seeds.to {
-                let wanted = Wanted {
-                    events: lines,
-                    ..Wanted::default()
-                };
-                let outcome = match free_ms {
-                    Some(free_ms) => {
-                        let (struck, mut faults) = faults_of(&prepared, seed, Some(free_ms));
-                        let own = prepared.spec.faults.iter();
-                        faults.extend(own.filter(|f| is_request(f)).cloned());
-                        faults.sort_by_key(|f| f.at_ms);
-                        run(&struck, seed, faults, wanted)
-                    }
-                    None if arg(3, "") == "none" => {
-                        run(&prepared, seed, requests(&prepared), wanted)
-                    }
-                    None => run(&prepared, seed, prepared.spec.faults.clone(), wanted),
-                };
-                let r = &outcome.report;
-                passed &= r.passed;
-                totals.runs += 1;
-                println!(
-                    "{name} {n} uavs, seed {seed}: {}, over {:?} ms, end {} ms {:?}",
-                    if r.passed { "passed" } else { "FAILED" },
-                    r.makespan_ms,
-                    r.end_ms,
-                    r.reasons
-                );
-                for task in &r.tasks {
-                    println!("  {}", task.line());
-                    totals.visited(task);
-                }
-                for told in &r.detections {
-                    println!("  {}", told.line());
-                }
-                for count in &r.counts {
-                    println!("  {}", count.line());
-                    totals.add(count);
-                }
-                for v in outcome.violations() {
-                    println!(
-                        "  {} at {} ms, {:?}: {}",
-                        v.check, v.time_ms, v.peer, v.text
-                    );
-                }
-                if lines {
-                    println!("{}", skein_netsim::timeline::timeline(&outcome.entries));
-                }
+impl Teller for Totals {
+    fn fly(
+        &self,
+        prepared: &Prepared,
+        seed: u64,
+        (wrong, free_ms): (&str, Option<u64>),
+        wanted: Wanted,
+    ) -> Outcome {
+        match (free_ms, wrong) {
+            (Some(_), _) => {
+                let (struck, mut faults) = faults_of(prepared, seed, free_ms);
+                faults.extend(requests(prepared));
+                faults.sort_by_key(|f| f.at_ms);
+                run(&struck, seed, faults, wanted)
             }
-            println!("{name} {n} uavs: {}", totals.line());
+            (None, "none") => run(prepared, seed, requests(prepared), wanted),
+            (None, _) => run(prepared, seed, prepared.spec.faults.clone(), wanted),
         }
     }
-    if passed {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
+
+    fn tell(&mut self, flown: &Flown<'_>) {
+        let r = &flown.outcome.report;
+        self.runs += 1;
+        println!("{flown}, {} {:?}", flown.times(), r.reasons);
+        for task in &r.tasks {
+            println!("  {}", task.line());
+            self.visited(task);
+        }
+        for told in &r.detections {
+            println!("  {}", told.line());
+        }
+        for count in &r.counts {
+            println!("  {}", count.line());
+            self.add(count);
+        }
+    }
+
+    fn conclude(&mut self, name: &str, uavs: u16) {
+        println!("{name} {uavs} uavs: {}", core::mem::take(self).line());
+    }
+}
+
+fn main() -> ExitCode {
+    match Campaign::of_arguments("crossings,parking", "1,2,3,8") {
+        Ok(campaign) => campaign.fly(&mut Totals::default()),
+        Err(code) => code,
     }
 }

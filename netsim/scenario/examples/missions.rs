@@ -2,66 +2,34 @@
 //! `cargo run --release -p skein-scenario --example missions -- border,fire,inspection 1,8 1..4`.
 //!
 //! A fourth argument, `storm`, draws the faults instead of those of the scenario, and `calm` has
-//! none. Prints a line a
-//! run: the verdict, when all was over, the longest time between two visits of a place, and what
-//! was wrong. Exit code 1 if anything was.
+//! none. Prints a line a run: the verdict, when all was over, the longest time between two visits
+//! of a place, and what was wrong. Exit code 1 if anything was.
 
+#[path = "shared/campaign.rs"]
+mod campaign;
 mod shared;
 
-use skein_netsim::prepared::Prepared;
-use skein_netsim::runs::{Wanted, failure_free_makespan_ms, run, storm};
+use campaign::{Campaign, Flown, Teller};
 use std::process::ExitCode;
 
-fn main() -> ExitCode {
-    let args: Vec<String> = std::env::args().skip(1).collect();
-    let arg = |i: usize, default: &str| args.get(i).map_or(default, String::as_str).to_owned();
-    let seeds = match shared::seeds(&arg(2, "1..2")) {
-        Ok(seeds) => seeds,
-        Err(code) => return code,
-    };
-    let mut passed = true;
-    for name in arg(0, "border,fire,inspection").split(',') {
-        for n in arg(1, "1,8").split(',').filter_map(|n| n.parse().ok()) {
-            let prepared = match shared::scenario(name, n, None) {
-                Ok(scenario) => Prepared::new(scenario.spec),
-                Err(code) => return code,
-            };
-            let storms = arg(3, "") == "storm";
-            let calm = arg(3, "") == "calm";
-            let free_ms = storms.then(|| failure_free_makespan_ms(&prepared));
-            for seed in seeds.from..seeds.to {
-                let outcome = match free_ms {
-                    Some(free_ms) => storm(&prepared, seed, free_ms, Wanted::default()),
-                    None => run(
-                        &prepared,
-                        seed,
-                        if calm {
-                            Vec::new()
-                        } else {
-                            prepared.spec.faults.clone()
-                        },
-                        Wanted::default(),
-                    ),
-                };
-                let r = &outcome.report;
-                passed &= r.passed;
-                let verdict = if r.passed { "passed" } else { "FAILED" };
-                println!(
-                    "{name} {n} uavs, seed {seed}: {verdict}, over {:?} ms, end {} ms, revisit {:?} ms, late {:?} ms {:?}",
-                    r.makespan_ms, r.end_ms, r.revisit_ms, r.revisit_late_ms, r.reasons
-                );
-                for v in outcome.violations() {
-                    println!(
-                        "  {} at {} ms, {:?}: {}",
-                        v.check, v.time_ms, v.peer, v.text
-                    );
-                }
-            }
-        }
+struct Times;
+
+impl Teller for Times {
+    fn tell(&mut self, flown: &Flown<'_>) {
+        let r = &flown.outcome.report;
+        println!(
+            "{flown}, {}, revisit {:?} ms, late {:?} ms {:?}",
+            flown.times(),
+            r.revisit_ms,
+            r.revisit_late_ms,
+            r.reasons
+        );
     }
-    if passed {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
+}
+
+fn main() -> ExitCode {
+    match Campaign::of_arguments("border,fire,inspection", "1,8") {
+        Ok(campaign) => campaign.fly(&mut Times),
+        Err(code) => code,
     }
 }

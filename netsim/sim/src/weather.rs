@@ -59,6 +59,22 @@ impl Weather {
             .map_or(self.first, |last| self.changes[last].wind)
     }
 
+    /// Since when it has been that, milliseconds.
+    #[must_use]
+    pub fn since_ms(&self, now_ms: u64) -> u64 {
+        let begun = self.changes.partition_point(|c| c.at_ms <= now_ms);
+        begun
+            .checked_sub(1)
+            .map_or(0, |last| self.changes[last].at_ms)
+    }
+
+    /// All winds that blow from one time to another.
+    pub fn between(&self, from_ms: u64, to_ms: u64) -> impl Iterator<Item = Wind> + '_ {
+        let begun = |now_ms| self.changes.partition_point(|c| c.at_ms <= now_ms);
+        let later = &self.changes[begun(from_ms)..begun(to_ms.max(from_ms))];
+        core::iter::once(self.at(from_ms)).chain(later.iter().map(|c| c.wind))
+    }
+
     /// When the wind changes next after a time, milliseconds.
     #[must_use]
     pub fn next_after_ms(&self, now_ms: u64) -> Option<u64> {
@@ -141,6 +157,13 @@ mod tests {
         assert_eq!(
             east.map(f64::to_bits),
             [0.0, 0.0, 5.0, 5.0, -1.0, -1.0].map(f64::to_bits)
+        );
+        let since = [0, 9_999, 10_000, 30_000].map(|t| w.since_ms(t));
+        assert_eq!(since, [0, 0, 10_000, 20_000]);
+        let blow = |from_ms, to_ms| w.between(from_ms, to_ms).count();
+        assert_eq!(
+            [blow(0, 9_999), blow(0, 10_000), blow(10_000, 90_000)],
+            [1, 2, 2]
         );
         let next = [0, 9_999, 10_000, 20_000].map(|t| w.next_after_ms(t));
         assert_eq!(next, [Some(10_000), Some(10_000), Some(20_000), None]);

@@ -9,6 +9,7 @@
 //! | [`frame`] | points, vectors, poses; the ENU tangent plane of a mission | 2.2 |
 //! | [`math`] | the only source of transcendental functions | |
 //! | [`polygon`] | simple polygons, valid by construction; exact orientation | 2.3.1 |
+//! | [`polyline`] | lines from place to place: their length, what is nearest on them | 3.5 |
 //! | [`curve`] | lines and arcs joined tangentially | 2.4 |
 //! | [`clearance`] | exact clearance of points and curves from no-fly zones | 2.3.1 |
 //! | [`offset`] | zones grown by a safety radius, with a certificate | 2.3.1 |
@@ -33,6 +34,7 @@ pub mod hash;
 pub mod math;
 pub mod offset;
 pub mod polygon;
+pub mod polyline;
 pub mod random;
 
 pub use clearance::{NoFlyZones, contingency_clear};

@@ -454,8 +454,8 @@ impl Tasking {
             self.leave(Some(state));
         }
         self.was_able = able;
-        if let Some(offer) = offer {
-            let strays = self.led_off(offer.takes);
+        if let Some(offer) = &offer {
+            let strays = self.led_off(offer);
             events.extend(strays.iter().map(|id| Event::LetGo(*id)));
             if let Some(id) = self.flown().filter(|id| strays.contains(id)) {
                 effects.extend(self.told(id, TaskNews::Left));
@@ -484,12 +484,12 @@ impl Tasking {
     }
 
     /// What it claims, and its mission does not lead it to.
-    fn led_off(&self, takes: u8) -> Vec<TaskId> {
+    fn led_off(&self, offer: &Offer) -> Vec<TaskId> {
         let claims = self.auction.held().iter();
         let claims = claims.filter(|t| t.progress != Progress::Done);
         let strays = |id: &TaskId| {
             let known = self.known.get(id);
-            known.is_some_and(|k| takes & k.task.kind.taken_as() == 0)
+            known.is_some_and(|k| !offer.flies(k.task.kind))
         };
         claims.map(|t| t.task).filter(strays).collect()
     }
@@ -762,7 +762,7 @@ pub(crate) fn why_nobody<'a>(task: &Task, offers: impl Iterator<Item = &'a Offer
     let able: Vec<&Offer> = offers.filter(|o| o.speed_mmps > 0).collect();
     if able.is_empty() {
         "no UAV takes tasks".to_owned()
-    } else if !able.iter().any(|o| o.takes & task.kind.taken_as() != 0) {
+    } else if !able.iter().any(|o| o.flies(task.kind)) {
         "as it stands, the mission leads no UAV to it".to_owned()
     } else if !able.iter().any(|o| carries(o.sensors, task.sensor)) {
         format!("no UAV carries {}", sensor_name(task.sensor))

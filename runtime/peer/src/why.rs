@@ -360,7 +360,7 @@ pub(crate) fn work(state: &MissionState, now: Time) -> Work {
         .filter(|c| !covered.contains(*c))
         .collect();
     let gaps = state.executive.as_ref().and_then(Executive::gaps);
-    let does = match gaps.filter(|_| matches!(at.goal, StateGoal::Round | StateGoal::Trace)) {
+    let does = match gaps.filter(|_| at.goal.goes_on()) {
         Some(gaps) => format!("{}; {}", does(at.goal, reason), spacing(gaps)),
         None => does(at.goal, reason),
     };

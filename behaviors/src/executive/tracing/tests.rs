@@ -2,8 +2,8 @@ use super::*;
 use crate::Goal;
 use crate::contour::{ContourLook, ContourPlace};
 use crate::testing::{CLEARANCE_M, Wing, airframe, loop_and_router, square};
-use skein_flight::tracing::thread::nearest;
 use skein_geometry::math::{TAU, sin};
+use skein_geometry::polyline::nearest;
 use std::sync::Arc;
 
 /// What a level camera shows of a polyline.

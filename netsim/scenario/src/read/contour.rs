@@ -1,8 +1,8 @@
 //! A contour of a scenario that no peer knows (D2.7 §3.1): a road beside a way, or a fire that
 //! grows.
 
-use super::shared::position;
-use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Point};
+use super::shared::{places, position};
+use skein_geometry::frame::Point;
 use skein_interop::json::{Error, Node};
 use skein_netsim::spec::{ContourSpec, FireSpec, RoadSpec};
 
@@ -24,16 +24,7 @@ pub(crate) fn read(node: &Node<'_>) -> Result<ContourSpec, Error> {
 fn of_road(node: &Node<'_>) -> Result<RoadSpec, Error> {
     let f = node.fields(&["way_m", "sway_m"])?;
     let way = f.need("way_m", "[[0, 0], [900, 300]]")?;
-    let far = -MAX_MISSION_RADIUS_M..=MAX_MISSION_RADIUS_M;
-    let mut all: Vec<Point> = Vec::new();
-    for item in way.items()? {
-        let both = item.items()?;
-        let [east, north] = both.as_slice() else {
-            return Err(item.wrong("expected a place, [east, north] in metres"));
-        };
-        let m = |n: &Node<'_>| n.number(*far.start(), *far.end(), "metres");
-        all.push(Point::new(m(east)?, m(north)?));
-    }
+    let all = places(way)?;
     let is_short = |b: &[Point]| (b[1] - b[0]).norm() < 1.0;
     if all.len() < 2 || all.windows(2).any(is_short) {
         return Err(way.wrong("expected two places or more, a metre apart at least"));

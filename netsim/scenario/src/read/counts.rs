@@ -69,19 +69,10 @@ fn circle(node: &Node<'_>) -> Result<Vec<Point>, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Overrides;
+    use crate::read::testing::mission_of;
 
     fn with(mission: &str) -> Result<Vec<CountSite>, String> {
-        let text = include_str!("../../../../configs/trials/helsinki.json5");
-        let text = text.replacen(
-            "vehicles: [],",
-            &format!("vehicles: [], mission: {mission},"),
-            1,
-        );
-        let files = crate::builtin::files();
-        let read = crate::parse_with("s.json5", &text, &files, &Overrides::default());
-        read.map(|s| s.spec.mission.counts.clone())
-            .map_err(|e| e.to_string())
+        mission_of(mission).map(|m| m.counts.clone())
     }
 
     #[test]

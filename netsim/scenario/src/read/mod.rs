@@ -14,6 +14,8 @@ mod shared;
 pub(crate) mod targets;
 mod tasks;
 pub(crate) mod terrain;
+#[cfg(test)]
+pub(crate) mod testing;
 mod vehicles;
 pub(crate) mod wind;
 

@@ -12,10 +12,12 @@
 use super::flight::{Flyer, milliseconds};
 use super::{Findings, Handicaps};
 use crate::world::contour::Contour;
+use crate::world::flat::{area_m2, point_segment_m};
 use serde::{Deserialize, Serialize};
 use skein_flight::tracing::outline::{Outline, Stretch, outline};
 use skein_geometry::frame::Point;
 use skein_geometry::math::seconds;
+use skein_geometry::polyline::length_m;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What is told is no farther from the contour than this, metres: four standard deviations of a
@@ -269,7 +271,7 @@ impl ContourCheck {
         if r.known_share > 0.5 {
             self.apart = (self.apart.0 + mean_m, self.apart.1 + 1);
         }
-        let truth_m2 = area_m2(&places);
+        let truth_m2 = area_m2(&places).abs();
         let error = told.area_m2().map(|m2| (m2 - truth_m2).abs() / truth_m2);
         if let Some(error) = error.filter(|_| r.closed) {
             self.area = (self.area.0 + error, self.area.1 + 1);
@@ -341,28 +343,8 @@ fn share(of: usize, all: usize) -> f64 {
     of as f64 / all.max(1) as f64
 }
 
-fn length_m(line: &[Point]) -> f64 {
-    line.windows(2).map(|b| (b[1] - b[0]).norm()).sum()
-}
-
-fn area_m2(ring: &[Point]) -> f64 {
-    let next = ring.iter().skip(1).chain(ring.first());
-    let twice: f64 = ring
-        .iter()
-        .zip(next)
-        .map(|(a, b)| a.x * b.y - a.y * b.x)
-        .sum();
-    0.5 * twice.abs()
-}
-
-fn off_piece_m(a: Point, b: Point, p: Point) -> f64 {
-    let way = b - a;
-    let on = ((p - a).dot(&way) / way.norm_squared().max(1e-12)).clamp(0.0, 1.0);
-    (p - (a + way * on)).norm()
-}
-
 fn off_line_m(line: &[Point], p: Point) -> f64 {
-    let each = line.windows(2).map(|b| off_piece_m(b[0], b[1], p));
+    let each = line.windows(2).map(|b| point_segment_m(p, b[0], b[1]));
     each.fold(f64::INFINITY, f64::min)
 }
 

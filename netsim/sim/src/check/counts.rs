@@ -11,6 +11,7 @@
 
 use super::Findings;
 use crate::account::secs;
+use crate::world::detector::frames;
 use serde::{Deserialize, Serialize};
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Pose};
@@ -144,6 +145,18 @@ struct Driven {
 impl Driven {
     fn speed_mps(&self) -> Option<f64> {
         (self.spent_ms > 0).then(|| self.driven_m / secs(self.spent_ms))
+    }
+
+    /// What all vehicles did at one site since the last look.
+    fn take(&mut self, steps: &[Step], site: usize, apart_ms: u64) {
+        let bit = 1_u32 << site;
+        for step in steps {
+            self.passed += u32::from(step.entered & bit > 0);
+            if step.stayed & bit > 0 {
+                self.spent_ms += apart_ms;
+                self.driven_m += step.moved_m;
+            }
+        }
     }
 
     fn add(&mut self, more: &Self) {
@@ -342,7 +355,6 @@ impl CountCheck {
             return;
         }
         for (i, site) in self.sites.iter().enumerate() {
-            let bit = 1_u32 << i;
             let (counts, own) = look.counted[i];
             let watch = &mut watcher.watches[i];
             // A later life, or another sortie, counts from nothing.
@@ -354,13 +366,7 @@ impl CountCheck {
                 former.2.add(&over.truth);
             }
             if watch.counts && counts && apart_ms <= GAP_MS {
-                for step in &steps {
-                    watch.truth.passed += u32::from(step.entered & bit > 0);
-                    if step.stayed & bit > 0 {
-                        watch.truth.spent_ms += apart_ms;
-                        watch.truth.driven_m += step.moved_m;
-                    }
-                }
+                watch.truth.take(&steps, i, apart_ms);
             }
             if own.seen_ms > watch.own.seen_ms {
                 let slower = |than_mps| stand(site, truth, &self.speeds, than_mps);
@@ -399,15 +405,8 @@ impl CountCheck {
         }
         let (apart_ms, steps) = self.all.step(now_ms, truth, &self.sites);
         self.pace(now_ms, truth);
-        for step in &steps {
-            for (i, driven) in self.driven.iter_mut().enumerate() {
-                let bit = 1_u32 << i;
-                driven.passed += u32::from(step.entered & bit > 0);
-                if step.stayed & bit > 0 {
-                    driven.spent_ms += apart_ms;
-                    driven.driven_m += step.moved_m;
-                }
-            }
+        for (i, driven) in self.driven.iter_mut().enumerate() {
+            driven.take(&steps, i, apart_ms);
         }
     }
 
@@ -549,11 +548,9 @@ impl Site {
     /// Whether all of it is in so much of a picture, each way.
     fn is_pictured(&self, look: CountLook<'_>, share: f64) -> bool {
         let (across_m, along_m) = look.half_m;
-        let forward = look.pose.direction();
-        self.outline.vertices().iter().all(|p| {
-            let to = *p - look.pose.position();
-            forward.dot(&to).abs() <= share * along_m && forward.perp(&to).abs() <= share * across_m
-        })
+        let half_m = (share * across_m, share * along_m);
+        let mut corners = self.outline.vertices().iter();
+        corners.all(|p| frames(look.pose, *p, half_m))
     }
 }
 

@@ -115,17 +115,12 @@ impl FuelCheck {
     /// Time passes, and maybe the wind changes. Who had the fuel to come home in the wind before
     /// may have stayed out for what it then was, and lacks it in this one.
     fn note_wind(&mut self, now_ms: u64) {
-        let next_ms = self.weather.next_after_ms(self.looked_ms);
-        if next_ms.is_some_and(|t| t <= now_ms) {
+        if self.weather.since_ms(now_ms) > self.looked_ms {
             self.able.clear();
         }
         self.looked_ms = now_ms;
-        let mut at_ms = now_ms.saturating_sub(WIND_KNOWN_MS);
-        self.winds = vec![self.weather.at(at_ms)];
-        while let Some(t) = self.weather.next_after_ms(at_ms).filter(|t| *t <= now_ms) {
-            self.winds.push(self.weather.at(t));
-            at_ms = t;
-        }
+        let from_ms = now_ms.saturating_sub(WIND_KNOWN_MS);
+        self.winds = self.weather.between(from_ms, now_ms).collect();
     }
 
     /// The least time of a straight flight, seconds; infinite where the wind allows none.

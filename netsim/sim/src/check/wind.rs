@@ -28,8 +28,6 @@ pub struct WindErrors {
 #[derive(Clone, Debug)]
 pub struct WindCheck {
     weather: Weather,
-    /// Since when the wind has been the same.
-    since_ms: u64,
     /// Since when each UAV has flown, and whether its estimate was told to be wrong.
     flies: BTreeMap<u16, (u64, bool)>,
     squares: f64,
@@ -42,7 +40,6 @@ impl WindCheck {
     pub fn new(weather: &Weather) -> Self {
         Self {
             weather: weather.clone(),
-            since_ms: 0,
             flies: BTreeMap::new(),
             squares: 0.0,
             errors: WindErrors::default(),
@@ -65,13 +62,6 @@ impl WindCheck {
         if self.weather.estimated.is_none() {
             return;
         }
-        let now_ms = snapshot.now_ms;
-        while let Some(t) = self.weather.next_after_ms(self.since_ms) {
-            if t > now_ms {
-                break;
-            }
-            self.since_ms = t;
-        }
         for m in snapshot.peers.iter().filter(|m| m.uav) {
             self.look_at(snapshot, m, found);
         }
@@ -84,7 +74,7 @@ impl WindCheck {
             return;
         };
         let (flies_ms, told) = self.flies.entry(m.id).or_insert((now_ms, false));
-        let since_ms = self.since_ms.max(*flies_ms);
+        let since_ms = self.weather.since_ms(now_ms).max(*flies_ms);
         let known_ms = since_ms + KNOWN_MS + snapshot.late_ms(m.id, since_ms);
         if now_ms < known_ms {
             *told = false;

@@ -9,13 +9,12 @@
 //! and the time alone. Where the contour is is a function of seed and time. Without one there is
 //! no detector, and nothing is drawn.
 
+use super::detector::{Look, is_in_view, is_seen};
 use super::motion::Kinematic;
 use super::obstacles::{Obstacles, Place};
-use crate::pursuit::sensor::{Noise, rooted};
 use crate::spec::{ContourSpec, FireSpec, RoadSpec};
 use skein_behaviors::contour::{CONTOUR_MAX, ContourLook, ContourPlace};
-use skein_flight::tracking::estimate::Detection;
-use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::{TAU, cos, seconds, sin, sin_cos};
 use skein_geometry::random::{SplitMix64, mix};
 use skein_peer::mission::mm;
@@ -110,7 +109,9 @@ impl Contour {
         obstacles: &Obstacles,
     ) -> Vec<bool> {
         let places = self.places(at_ms).into_iter();
-        places.map(|p| is_seen(body, p, obstacles)).collect()
+        places
+            .map(|p| is_seen(body, ground(p), obstacles))
+            .collect()
     }
 
     /// One look of the detector of a UAV.
@@ -125,37 +126,31 @@ impl Contour {
         if body.takes_off_in_ms(now_ms) > 0 {
             return ContourLook::new(sided, []);
         }
-        let noise = Noise::usual();
-        let of_uav = mix(self.seed ^ u64::from(uav) << 48);
-        let mut random = SplitMix64::new(of_uav);
-        let displaced = Vector::new(random.normal(), random.normal()) * noise.place_m;
-        let mut random = SplitMix64::new(mix(of_uav ^ now_ms));
+        let mut look = Look::new(self.seed, uav, now_ms);
         let line = self.line(now_ms);
-        let first = random.unit();
+        let first = look.random.unit();
         let count = walked(&line, LEAST_M, first)
-            .filter(|p| is_in_view(body.pose(), body, *p))
+            .filter(|p| is_in_view(body, *p))
             .count();
         #[allow(clippy::cast_precision_loss, reason = "some tens")]
         let apart_m = LEAST_M * (count as f64 / (CONTOUR_MAX - 1) as f64).max(1.0);
-        let (from, height_m) = (body.position(), body.height_m());
+        let from = (body.position(), body.height_m());
         let mut told: Vec<ContourPlace> = Vec::new();
         let mut begins = true;
         // A closed line is begun where it is out of the picture, so that no piece is cut in two.
         let all: Vec<Point> = walked(&line, apart_m, first).collect();
-        let out = all.iter().position(|p| !is_in_view(body.pose(), body, *p));
+        let out = all.iter().position(|p| !is_in_view(body, *p));
         let turned = if sided { out.unwrap_or(0) } else { 0 };
         for p in all.iter().cycle().skip(turned).take(all.len()) {
-            if !is_seen(body, *p, obstacles) {
+            if !is_seen(body, ground(*p), obstacles) {
                 begins = true;
                 continue;
             }
-            let recognised = random.unit() < noise.detection;
-            let off = Vector::new(random.normal(), random.normal());
+            let (recognised, off) = look.recognised();
             if !recognised {
                 continue;
             }
-            let error = Detection::from_sight(from, height_m, *p, &noise.sight);
-            let at = p + rooted(&error.covariance_m2, off) + displaced;
+            let (at, _) = look.told(from, *p, off);
             told.push(ContourPlace {
                 east_mm: mm(at.x),
                 north_mm: mm(at.y),
@@ -226,20 +221,9 @@ fn walked(line: &[Point], apart_m: f64, first: f64) -> impl Iterator<Item = Poin
     })
 }
 
-fn is_in_view(pose: Pose, body: &Kinematic, at: Point) -> bool {
-    let airframe = body.airframe();
-    let (ahead, to) = (pose.direction(), at - pose.position());
-    ahead.dot(&to).abs() <= airframe.footprint_along_m
-        && ahead.perp(&to).abs() <= airframe.footprint_across_m
-}
-
-fn is_seen(body: &Kinematic, at: Point, obstacles: &Obstacles) -> bool {
-    let from = Place {
-        at: body.position(),
-        height_m: body.height_m(),
-    };
-    let ground = Place { at, height_m: 1.0 };
-    is_in_view(body.pose(), body, at) && obstacles.sees(from, ground)
+/// A place as cameras see it: a step above the ground.
+fn ground(at: Point) -> Place {
+    Place { at, height_m: 1.0 }
 }
 
 #[cfg(test)]
@@ -247,7 +231,7 @@ mod tests {
     use super::*;
     use crate::spec::Spec;
     use crate::world::{World, fixture};
-    use skein_flight::tracing::thread::nearest;
+    use skein_geometry::polyline::nearest;
 
     fn fire() -> ContourSpec {
         ContourSpec::Fire(FireSpec {

@@ -6,6 +6,7 @@
 
 mod board;
 pub mod contour;
+pub(crate) mod detector;
 pub mod fact;
 pub mod fixture;
 pub mod flat;

@@ -7,16 +7,16 @@
 //! seed, the UAV and the time alone, so who asks twice at one time is told the same. Without
 //! vehicles there is no detector, and nothing is drawn.
 
+use super::detector::{Look, is_seen};
 use super::motion::Kinematic;
 use super::obstacles::{Obstacles, Place};
 use crate::check::detections::Truth;
 use crate::pursuit::KINDS;
-use crate::pursuit::sensor::{Noise, rooted};
 use crate::pursuit::vehicle::Vehicle;
 use crate::spec::VehicleSpec;
 use skein_behaviors::sightings::{Sighted, Sightings};
 use skein_flight::tracking::estimate::Detection;
-use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::seconds;
 use skein_geometry::random::{SplitMix64, mix};
 use skein_peer::mission::mm;
@@ -106,17 +106,11 @@ impl Vehicles {
         let Some(v) = self.all.get(nth) else {
             return false;
         };
-        let airframe = body.airframe();
-        let half_m = (airframe.footprint_across_m, airframe.footprint_along_m);
         let middle = Place {
             at: v.at,
             height_m: MIDDLE_M,
         };
-        let from = Place {
-            at: body.position(),
-            height_m: body.height_m(),
-        };
-        frames(body.pose(), v.at, half_m) && obstacles.sees(from, middle)
+        is_seen(body, middle, obstacles)
     }
 
     /// One look of the detector of a UAV.
@@ -133,23 +127,18 @@ impl Vehicles {
         if body.takes_off_in_ms(now_ms) > 0 {
             return Sightings::new([]);
         }
-        let noise = Noise::usual();
         let (from, height_m) = (body.position(), body.height_m() - MIDDLE_M);
-        let of_uav = mix(self.seed ^ u64::from(uav) << 48);
-        let mut random = SplitMix64::new(of_uav);
-        let displaced = Vector::new(random.normal(), random.normal()) * noise.place_m;
-        let mut random = SplitMix64::new(mix(of_uav ^ now_ms));
+        let mut look = Look::new(self.seed, uav, now_ms);
         let mut seen = Vec::new();
         for (nth, (v, spec)) in self.all.iter().zip(self.specs.iter()).enumerate() {
-            let recognised = random.unit() < noise.detection;
-            let off = Vector::new(random.normal(), random.normal());
+            let (recognised, off) = look.recognised();
             if recognised && self.is_pictured(nth, body, obstacles) {
-                let told = Detection::from_sight(from, height_m, v.at, &noise.sight);
-                let at = v.at + rooted(&told.covariance_m2, off) + displaced;
-                let kind = spec.kind_in(of_uav ^ now_ms, nth);
+                let (at, told) = look.told((from, height_m), v.at, off);
+                let kind = spec.kind_in(look.seed, nth);
                 seen.push(sighted(at, &told, kind));
             }
         }
+        let (random, noise) = (&mut look.random, &look.noise);
         let is_false = random.unit() < noise.false_alarms;
         let (x, y) = (2.0 * random.unit() - 1.0, 2.0 * random.unit() - 1.0);
         let kind = random.below(usize::from(KINDS));
@@ -182,12 +171,6 @@ impl VehicleSpec {
         let other = 1 + random.below(usize::from(KINDS) - 1);
         u8::try_from((usize::from(self.kind) + other) % usize::from(KINDS)).unwrap_or(self.kind)
     }
-}
-
-/// Whether a place is in the picture of a level camera of these half sizes.
-fn frames(pose: Pose, at: Point, (across_m, along_m): (f64, f64)) -> bool {
-    let (forward, to) = (pose.direction(), at - pose.position());
-    forward.dot(&to).abs() <= along_m && forward.perp(&to).abs() <= across_m
 }
 
 fn sighted(at: Point, told: &Detection, kind: u8) -> Sighted {

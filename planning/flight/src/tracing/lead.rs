@@ -9,10 +9,10 @@
 //! # Guarantees
 //! No arc bends tighter than the radius. Equal inputs give equal arcs.
 
-use super::thread::{length_m, nearest};
 use skein_geometry::Segment;
 use skein_geometry::frame::{Point, Pose, Vector};
 use skein_geometry::math::{PI, atan2, cos, sin, wrap_pi};
+use skein_geometry::polyline::{length_m, nearest};
 
 /// Beyond the end of what was seen it is taken to go straight on for so long, metres: two
 /// pictures.

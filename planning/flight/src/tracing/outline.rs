@@ -11,6 +11,7 @@
 //! Places times pieces of stretches.
 
 use super::thread::Mark;
+use core::cmp::Ordering;
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::seconds;
 
@@ -60,12 +61,8 @@ impl Outline {
     /// The length of all pieces, metres, with what closes the first.
     #[must_use]
     pub fn length_m(&self) -> f64 {
-        let of = |piece: &Vec<Mark>| -> f64 {
-            let both = piece.windows(2);
-            both.map(|b| (b[1].at - b[0].at).norm()).sum()
-        };
         let gap_m = self.gap().map_or(0.0, |(a, b)| (b - a).norm());
-        self.pieces.iter().map(of).sum::<f64>() + gap_m
+        self.pieces.iter().map(|p| length_m(p)).sum::<f64>() + gap_m
     }
 
     /// The area inside of the first piece, m²; none where it does not close.
@@ -145,11 +142,11 @@ pub fn outline(stretches: &[Stretch]) -> Outline {
         let mut run: Vec<Mark> = Vec::new();
         for (i, mark) in stretch.marks.iter().enumerate() {
             let way = way_at(&stretch.marks, i);
-            let breaks = mark.begins || is_old(mark, way, stretch.sided, &pieces);
-            if breaks && !run.is_empty() {
+            let is_old = is_old(mark, way, stretch.sided, &pieces);
+            if (mark.begins || is_old) && !run.is_empty() {
                 runs.push((std::mem::take(&mut run), stretch.sided));
             }
-            if !is_old(mark, way, stretch.sided, &pieces) {
+            if !is_old {
                 run.push(*mark);
             }
         }
@@ -157,29 +154,22 @@ pub fn outline(stretches: &[Stretch]) -> Outline {
             runs.push((run, stretch.sided));
         }
     }
-    runs.sort_by(|a, b| order(&b.0).total_cmp_with(&order(&a.0)));
+    runs.sort_by(|a, b| order(&b.0, &a.0));
     strung(runs)
 }
 
-/// By what runs are put in order: their lengths, and where and when they begin.
-struct Order(f64, u64, f64, f64);
-
-impl Order {
-    fn total_cmp_with(&self, other: &Self) -> core::cmp::Ordering {
-        self.0
-            .total_cmp(&other.0)
-            .then(self.1.cmp(&other.1))
-            .then(self.2.total_cmp(&other.2))
-            .then(self.3.total_cmp(&other.3))
-    }
+/// The order of two runs that are not empty: by their lengths, then by when and where they begin.
+fn order(a: &[Mark], b: &[Mark]) -> Ordering {
+    let (first, other) = (&a[0], &b[0]);
+    length_m(a)
+        .total_cmp(&length_m(b))
+        .then(first.seen_ms.cmp(&other.seen_ms))
+        .then(first.at.x.total_cmp(&other.at.x))
+        .then(first.at.y.total_cmp(&other.at.y))
 }
 
-fn order(run: &[Mark]) -> Order {
-    let length_m = run.windows(2).map(|b| (b[1].at - b[0].at).norm()).sum();
-    let first = run
-        .first()
-        .map_or((0, Point::origin()), |m| (m.seen_ms, m.at));
-    Order(length_m, first.0, first.1.x, first.1.y)
+fn length_m(marks: &[Mark]) -> f64 {
+    marks.windows(2).map(|b| (b[1].at - b[0].at).norm()).sum()
 }
 
 fn pieces_of(stretch: &Stretch) -> impl Iterator<Item = Piece> + '_ {
@@ -243,8 +233,7 @@ fn is_round(piece: &[Mark]) -> bool {
         return false;
     };
     let gap_m = (first.at - last.at).norm();
-    let length_m: f64 = piece.windows(2).map(|b| (b[1].at - b[0].at).norm()).sum();
-    gap_m <= JOIN_M && length_m > ROUND * gap_m && piece.len() > 4
+    gap_m <= JOIN_M && length_m(piece) > ROUND * gap_m && piece.len() > 4
 }
 
 /// Strings runs together where one ends near the begin of another.

@@ -10,6 +10,7 @@
 //! A look costs its points times what is kept.
 
 use skein_geometry::frame::{Point, Vector};
+use skein_geometry::polyline::{length_m, nearest};
 
 /// Final places that are kept to tell what goes on from them.
 const KEPT: usize = 16;
@@ -55,34 +56,6 @@ pub struct Thread {
     /// So many of them are final.
     finals: usize,
     passed: Vec<Mark>,
-}
-
-/// The nearest place of a polyline to a point: metres along it, metres from it, and the
-/// direction there. `None` where it has no piece.
-#[must_use]
-pub fn nearest(line: &[Point], to: Point) -> Option<(f64, f64, Vector)> {
-    let mut best: Option<(f64, f64, Vector)> = None;
-    let mut along_m = 0.0;
-    for both in line.windows(2) {
-        let way = both[1] - both[0];
-        let length_m = way.norm();
-        if length_m > 0.0 {
-            let direction = way / length_m;
-            let on_m = (to - both[0]).dot(&direction).clamp(0.0, length_m);
-            let off_m = (to - (both[0] + direction * on_m)).norm();
-            if best.is_none_or(|(_, least_m, _)| off_m < least_m) {
-                best = Some((along_m + on_m, off_m, direction));
-            }
-        }
-        along_m += length_m;
-    }
-    best
-}
-
-/// The length of a polyline, metres.
-#[must_use]
-pub fn length_m(line: &[Point]) -> f64 {
-    line.windows(2).map(|b| (b[1] - b[0]).norm()).sum()
 }
 
 /// How a piece goes on from what was seen.

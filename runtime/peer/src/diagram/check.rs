@@ -416,12 +416,7 @@ pub(crate) fn fits(
     apart: bool,
 ) -> Result<(), DiagramError> {
     let all = diagram.states.iter().enumerate();
-    let flown = |s: &State| {
-        matches!(
-            s.goal,
-            StateGoal::Section | StateGoal::Round | StateGoal::Trace
-        )
-    };
+    let flown = |s: &State| s.goal == StateGoal::Section || s.goal.goes_on();
     for (i, state) in all.filter(|(_, s)| flown(s)) {
         let behaviour = &state.behaviour;
         let asked = behaviour
@@ -434,7 +429,7 @@ pub(crate) fn fits(
             );
             return Err(wrong(format!("states[{i}].behaviour.dimension"), text));
         }
-        if matches!(state.goal, StateGoal::Round | StateGoal::Trace) {
+        if state.goal.goes_on() {
             if again {
                 let text = format!(
                     "the state \"{}\" goes on once everything is seen, and the mission has laps; leave the laps out",

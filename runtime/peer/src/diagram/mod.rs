@@ -267,6 +267,12 @@ impl StateGoal {
         Self::Home,
     ];
 
+    /// Whether it is flown on and on once everything is seen.
+    #[must_use]
+    pub fn goes_on(self) -> bool {
+        matches!(self, Self::Round | Self::Trace)
+    }
+
     /// Its name in a file.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -527,7 +533,7 @@ impl Machine {
     /// Whether it goes on once everything is seen, until something else ends it.
     #[must_use]
     pub fn goes_on(&self) -> bool {
-        self.goes_round() || self.traces()
+        self.states().iter().any(|s| s.goal.goes_on())
     }
 
     /// Whether the mission ends when something that it looks for was told.

@@ -9,7 +9,7 @@ use super::cbor::array_of;
 use super::codec::WireError;
 use super::limits::in_range;
 use super::schema::{Place, Shape, U16, U32, at};
-use super::target::TIME_MAX_MS;
+use super::target::{TIME_MAX_MS, TIME_MS};
 use serde::{Deserialize, Serialize};
 
 /// Registers of an author: one a site.
@@ -61,8 +61,6 @@ pub(super) fn check(c: &Count) -> Result<(), WireError> {
     in_range("seen_ms", c.seen_ms <= TIME_MAX_MS)?;
     in_range("standing", c.standing == 0 || c.seen_ms > 0)
 }
-
-const TIME_MS: Shape = Shape::Number(0, TIME_MAX_MS as i128);
 
 /// The places of a count's body.
 pub(super) const COUNT: &[Place] = &[

@@ -8,7 +8,7 @@ use super::cbor::{array_of, number_of};
 use super::codec::WireError;
 use super::limits::{in_range, is_near, is_slow};
 use super::schema::{MM, MMPS, Place, Shape, U8, U16, U32, at};
-use super::target::TIME_MAX_MS;
+use super::target::{TIME_MAX_MS, TIME_MS};
 use crate::criteria::CRITERIA_MAX;
 use serde::{Deserialize, Serialize};
 
@@ -111,7 +111,7 @@ pub(super) const DETECTION: &[Place] = &[
     at(
         "seen_ms",
         "when it was seen, ms of the clock of percepts",
-        Shape::Number(0, TIME_MAX_MS as i128),
+        TIME_MS,
     ),
     at("east_mm", "mm east of the mission's origin", MM),
     at("north_mm", "mm north of the mission's origin", MM),

@@ -18,6 +18,9 @@ pub const TARGETS_MAX: u16 = 8;
 /// The latest time, milliseconds: what a double counts.
 pub const TIME_MAX_MS: u64 = 1 << 53;
 
+/// A time of the clock of percepts, or one that is counted by it.
+pub(super) const TIME_MS: Shape = Shape::Number(0, TIME_MAX_MS as i128);
+
 /// The widest spread that is told, thousandths of m² and of m²/s².
 pub const SPREAD_MAX_E3: u32 = 1_000_000_000;
 
@@ -103,7 +106,7 @@ pub(super) const TARGET: &[Place] = &[
     at(
         "seen_ms",
         "when it was seen last, ms of the clock of percepts",
-        Shape::Number(0, TIME_MAX_MS as i128),
+        TIME_MS,
     ),
     at("aged_ms", "how long after that its estimate is of, ms", U16),
     at("east_mm", "mm east of the mission's origin", MM),

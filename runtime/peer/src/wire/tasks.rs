@@ -237,15 +237,16 @@ pub const TRACKS: u8 = 4;
 /// Of [`Offer::takes`]: tasks of every kind.
 pub const EVERY_KIND: u8 = ERRANDS | RELAYS | TRACKS;
 
-impl TaskKind {
-    /// Its bit of [`Offer::takes`].
+impl Offer {
+    /// Whether its mission, as it stands, would fly a task of this kind.
     #[must_use]
-    pub fn taken_as(self) -> u8 {
-        match self {
-            Self::Pinpoint | Self::Line | Self::Area => ERRANDS,
-            Self::Relay => RELAYS,
-            Self::Track => TRACKS,
-        }
+    pub fn flies(&self, kind: TaskKind) -> bool {
+        let bit = match kind {
+            TaskKind::Pinpoint | TaskKind::Line | TaskKind::Area => ERRANDS,
+            TaskKind::Relay => RELAYS,
+            TaskKind::Track => TRACKS,
+        };
+        self.takes & bit != 0
     }
 }
 

@@ -8,7 +8,7 @@ use super::cbor::{Listed, array_of};
 use super::codec::WireError;
 use super::limits::{DURATION_MAX_MS, POSITION_MAX_MM, at_most, in_range};
 use super::schema::{Place, Shape, at};
-use super::target::TIME_MAX_MS;
+use super::target::{TIME_MAX_MS, TIME_MS};
 use serde::{Deserialize, Serialize};
 use skein_flight::tracing::outline::Stretch;
 use skein_flight::tracing::thread::Mark;
@@ -142,7 +142,7 @@ pub(super) const TRAIL: &[Place] = &[
     at(
         "seen_ms",
         "when the first place was seen, ms of the clock of percepts",
-        Shape::Number(0, TIME_MAX_MS as i128),
+        TIME_MS,
     ),
     at(
         "places",

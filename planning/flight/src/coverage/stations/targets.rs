@@ -12,6 +12,7 @@ use crate::coverage::ring::LoopProblem;
 use crate::coverage::ring::patch::Corners;
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::atan2;
+use skein_geometry::polyline::length_m;
 
 /// A point to be looked at, with what lies around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,10 +172,6 @@ pub(super) fn stretches(lines: &[LineTarget], longest_m: f64) -> Vec<Stretch> {
         first += pieces;
     }
     stretches
-}
-
-fn length_m(way: &[Point]) -> f64 {
-    way.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
 }
 
 /// The pieces of a stretch, of equal length along it: for each the rectangle along its

@@ -102,10 +102,6 @@ impl Airborne {
         flight_ms((left - from.position()).norm(), self.offer.speed_mmps)
     }
 
-    fn takes(&self, kind: TaskKind) -> bool {
-        self.offer.takes & kind.taken_as() != 0
-    }
-
     fn has(&self, sensor: u8) -> bool {
         let bit = u32::from(sensor).checked_sub(1);
         bit.is_none_or(|bit| self.offer.sensors >> bit.min(31) & 1 == 1)
@@ -207,7 +203,7 @@ impl Flying for FlownTime {
 
 /// Where a task leaves a UAV, and what it is worth when it is done then.
 fn flown(at: &Airborne, task: &Task, ways: &impl Ways) -> Option<(Airborne, u32)> {
-    if at.offer.speed_mmps == 0 || at.stays || !at.has(task.sensor) || !at.takes(task.kind) {
+    if at.offer.speed_mmps == 0 || at.stays || !at.has(task.sensor) || !at.offer.flies(task.kind) {
         return None;
     }
     // An area is begun at a corner, and its time says how long it takes.

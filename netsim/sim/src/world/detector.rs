@@ -1,0 +1,84 @@
+//! What the detectors on board of a mission's UAVs have in common: a camera that looks straight
+//! down and stays level, places with errors, some missed; drawn from the seed, the UAV and the
+//! time alone, so who asks twice at one time is told the same.
+
+use super::motion::Kinematic;
+use super::obstacles::{Obstacles, Place};
+use crate::pursuit::sensor::{Noise, rooted};
+use skein_flight::tracking::estimate::Detection;
+use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::random::{SplitMix64, mix};
+
+/// Whether a place is in a picture that is taken from straight above: half of it reaches so far
+/// across and along, metres.
+pub fn frames(pose: Pose, at: Point, (across_m, along_m): (f64, f64)) -> bool {
+    let (forward, to) = (pose.direction(), at - pose.position());
+    forward.dot(&to).abs() <= along_m && forward.perp(&to).abs() <= across_m
+}
+
+/// Whether a place is in the picture of a UAV.
+pub fn is_in_view(body: &Kinematic, at: Point) -> bool {
+    let airframe = body.airframe();
+    let half_m = (airframe.footprint_across_m, airframe.footprint_along_m);
+    frames(body.pose(), at, half_m)
+}
+
+/// Whether a place is in the picture of a UAV, and nothing stands in between.
+pub fn is_seen(body: &Kinematic, place: Place, obstacles: &Obstacles) -> bool {
+    let from = Place {
+        at: body.position(),
+        height_m: body.height_m(),
+    };
+    is_in_view(body, place.at) && obstacles.sees(from, place)
+}
+
+/// What is drawn for one look.
+#[derive(Debug)]
+pub struct Look {
+    /// Tells looks of UAVs and times apart.
+    pub seed: u64,
+    /// By how much detectors err.
+    pub noise: Noise,
+    /// What else is drawn for it.
+    pub random: SplitMix64,
+    /// How far off its UAV takes itself to be, metres.
+    displaced: Vector,
+}
+
+impl Look {
+    /// The look of a UAV at a time.
+    pub fn new(seed: u64, uav: u16, now_ms: u64) -> Self {
+        let noise = Noise::usual();
+        let of_uav = mix(seed ^ u64::from(uav) << 48);
+        let mut random = SplitMix64::new(of_uav);
+        let displaced = Vector::new(random.normal(), random.normal()) * noise.place_m;
+        let seed = of_uav ^ now_ms;
+        Self {
+            seed,
+            noise,
+            random: SplitMix64::new(mix(seed)),
+            displaced,
+        }
+    }
+
+    /// Whether the next thing is recognised, and how far off its place is taken, in standard
+    /// deviations.
+    pub fn recognised(&mut self) -> (bool, Vector) {
+        let is_recognised = self.random.unit() < self.noise.detection;
+        let off = Vector::new(self.random.normal(), self.random.normal());
+        (is_recognised, off)
+    }
+
+    /// Where something is told to be that is so far off its place, with the error that is told:
+    /// seen from there, from so high above it, metres.
+    pub fn told(
+        &self,
+        (from, height_m): (Point, f64),
+        at: Point,
+        off: Vector,
+    ) -> (Point, Detection) {
+        let told = Detection::from_sight(from, height_m, at, &self.noise.sight);
+        let at = at + rooted(&told.covariance_m2, off) + self.displaced;
+        (at, told)
+    }
+}
