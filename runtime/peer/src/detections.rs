@@ -213,17 +213,12 @@ impl Detections {
         for t in tracks.confirmed() {
             let begun_ms = t.seen_ms.saturating_sub(t.watched_ms());
             let at = t.estimate.position();
-            // Who was given another name is watched on.
-            let renamed = || {
-                let same = |w: &&TargetName| before[*w].begun_ms == begun_ms;
-                let gone = |w: &&TargetName| !tracks.all().iter().any(|t| t.name == **w);
-                before.keys().filter(gone).find(same).copied()
-            };
-            let key = if before.contains_key(&t.name) {
-                Some(t.name)
-            } else {
-                renamed()
-            };
+            // Who was given another name is watched on. Whoever was given the name of one that
+            // was lost may be another: where that one was says nothing of how this one moves.
+            let same = |w: &TargetName| before.get(w).is_some_and(|w| w.begun_ms == begun_ms);
+            let gone = |w: &TargetName| !tracks.all().iter().any(|t| t.name == *w);
+            let renamed = || before.keys().find(|w| same(w) && gone(w)).copied();
+            let key = Some(t.name).filter(same).or_else(renamed);
             let anew = Watch {
                 begun_ms,
                 from: at,

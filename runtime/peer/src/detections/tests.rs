@@ -168,3 +168,35 @@ fn what_an_earlier_life_told_is_found() {
     assert!(former(&all).is_empty());
     assert_eq!(all.standing(0).count(), 1);
 }
+
+#[test]
+fn who_gets_the_name_of_one_that_was_lost_is_as_fast_as_it_is_itself() {
+    use skein_flight::tracking::estimate::Detection as Look;
+    use skein_flight::tracking::tracks::{Kind, Sighting};
+    let lorry = |x: f64, y: f64| Sighting {
+        detection: Look::round(Point::new(x, y), 0.6),
+        kind: Kind(2),
+    };
+    let mut tracks = Tracks::new(3, 5.0);
+    let mut all = Detections::default();
+    let mut speeds = Vec::new();
+    for k in 0..40_u64 {
+        let now_ms = 10_000 + 200 * k;
+        // One drives for two seconds and is seen no more; another, which stands, comes into the
+        // picture not far from there before the first is given up.
+        let driven_m = 8.0 * 0.2 * f64::from(u32::try_from(k).unwrap());
+        let mut look = Vec::new();
+        if k < 10 {
+            look.push(lorry(driven_m, 0.0));
+        } else {
+            look.push(lorry(30.0, 12.0));
+        }
+        tracks.look(now_ms, &look, &|_| true);
+        all.watch(now_ms, &tracks);
+        let seen = all.seen(now_ms, &tracks, 2.0);
+        speeds.extend(seen.map(|s| (s.name.number, s.speed_mmps())));
+    }
+    let heir = speeds.first().expect("it is seen beyond doubt");
+    assert_eq!(heir.0, 1, "it has the name of the first");
+    assert!(heir.1 < STILL_MMPS, "{speeds:?}");
+}
