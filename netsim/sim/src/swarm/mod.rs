@@ -985,14 +985,13 @@ impl Swarm {
     }
 
     /// What every running peer believes, and where it is.
-    fn snapshots(&self) -> Vec<PeerSnapshot> {
-        let air = &self.air;
-        let of = |s: &SimPeer| {
-            let mut m = s.snapshot(air)?;
+    fn snapshots(&mut self) -> Vec<PeerSnapshot> {
+        let of = |s: &SimPeer| s.snapshot(&self.air);
+        let mut all: Vec<PeerSnapshot> = self.peers.iter().filter_map(of).collect();
+        for m in &mut all {
             self.names.rename(m.id, &mut m.view, self.checker.graph());
-            Some(m)
-        };
-        self.peers.iter().filter_map(of).collect()
+        }
+        all
     }
 
     /// A peer begins a life, or falls silent since a twin speaks.

@@ -12,14 +12,18 @@ pub struct Names {
     twins: Twins,
     /// Who spoke in each life of an id, in that order, while it is not silent.
     lives: BTreeMap<(u16, Incarnation), Vec<u16>>,
+    /// Of whom each peer heard last by an id, by its number and the id.
+    heard: BTreeMap<(u16, u16), u16>,
 }
 
 impl Names {
     /// Before any of them spoke.
     #[must_use]
     pub fn new(twins: Twins) -> Self {
-        let lives = BTreeMap::new();
-        Self { twins, lives }
+        Self {
+            twins,
+            ..Self::default()
+        }
     }
 
     /// Who they are.
@@ -65,14 +69,14 @@ impl Names {
     /// A report with the numbers of those whom its author means: of several that live under an
     /// id one in its component that speaks.
     #[must_use]
-    pub fn meant_in(&self, by: u16, report: &Report, graph: &Graph) -> Report {
+    pub fn meant_in(&mut self, by: u16, report: &Report, graph: &Graph) -> Report {
         match *report {
             Report::Membership {
                 peer,
                 incarnation,
                 status,
             } if self.is_ambiguous(peer.0) => Report::Membership {
-                peer: PeerId(self.meant(peer.0, incarnation, |n| graph.joined(by, n))),
+                peer: PeerId(self.meant((by, peer.0), incarnation, |n| graph.joined(by, n))),
                 incarnation,
                 status,
             },
@@ -81,21 +85,31 @@ impl Names {
     }
 
     /// What a peer believes, of those whom it means.
-    pub fn rename(&self, by: u16, view: &mut Beliefs, graph: &Graph) {
+    pub fn rename(&mut self, by: u16, view: &mut Beliefs, graph: &Graph) {
         for id in self.ambiguous() {
             if let Some((life, status)) = view.peers.remove(&PeerId(id)) {
-                let meant = PeerId(self.meant(id, life, |n| graph.joined(by, n)));
+                let meant = PeerId(self.meant((by, id), life, |n| graph.joined(by, n)));
                 view.peers.insert(meant, (life, status));
             }
         }
     }
 
-    /// Who is meant by an id in a life: the first one that spoke in it of those in reach, else
-    /// the first one that did, else the one whose number it is.
-    fn meant(&self, id: u16, life: Incarnation, in_reach: impl Fn(u16) -> bool) -> u16 {
+    /// Who is meant by an id in a life: the first one that spoke in it of those in reach; else
+    /// of whom that was said last, since it is that one who went out of reach; else the first one
+    /// that spoke in it, else the one whose number it is.
+    fn meant(
+        &mut self,
+        (by, id): (u16, u16),
+        life: Incarnation,
+        in_reach: impl Fn(u16) -> bool,
+    ) -> u16 {
         let spoke = self.lives.get(&(id, life)).map_or(&[][..], Vec::as_slice);
-        let near = spoke.iter().find(|n| in_reach(**n));
-        near.or(spoke.first()).copied().unwrap_or(id)
+        if let Some(near) = spoke.iter().find(|n| in_reach(**n)) {
+            self.heard.insert((by, id), *near);
+            return *near;
+        }
+        let before = self.heard.get(&(by, id)).filter(|n| spoke.contains(n));
+        before.or(spoke.first()).copied().unwrap_or(id)
     }
 }
 
@@ -104,20 +118,32 @@ mod tests {
     use super::*;
 
     #[test]
+    fn who_goes_out_of_reach_is_who_was_heard_last() {
+        let mut names = Names::new(Twins::from_iter([(9, 3)]));
+        names.speaks(3, 1);
+        names.speaks(9, 1);
+        assert_eq!(names.meant((1, 3), 1, |_| false), 3, "nobody was heard yet");
+        assert_eq!(names.meant((1, 3), 1, |n| n == 9), 9);
+        assert_eq!(names.meant((1, 3), 1, |_| false), 9);
+        assert_eq!(names.meant((2, 3), 1, |_| false), 3, "by another");
+        assert_eq!(names.meant((1, 3), 1, |n| n == 3), 3);
+    }
+
+    #[test]
     fn an_id_in_a_life_means_who_spoke_in_it_and_is_in_reach() {
         let mut names = Names::new(Twins::from_iter([(9, 3)]));
         for (number, life) in [(3, 1), (9, 1), (9, 2), (4, 1)] {
             names.speaks(number, life);
         }
         assert_eq!(names.ambiguous(), BTreeSet::from([3]));
-        assert_eq!(names.meant(3, 1, |n| n == 3), 3);
-        assert_eq!(names.meant(3, 1, |n| n == 9), 9);
-        assert_eq!(names.meant(3, 2, |n| n == 3), 9, "nobody else spoke in it");
-        assert_eq!(names.meant(3, 5, |_| true), 3);
-        assert_eq!(names.meant(4, 1, |_| true), 4);
-        assert_eq!(names.meant(3, 1, |_| true), 3, "the first one");
+        assert_eq!(names.meant((1, 3), 1, |n| n == 3), 3);
+        assert_eq!(names.meant((1, 3), 1, |n| n == 9), 9);
+        assert_eq!(names.meant((1, 3), 2, |n| n == 3), 9, "nobody else spoke in it");
+        assert_eq!(names.meant((1, 3), 5, |_| true), 3);
+        assert_eq!(names.meant((1, 4), 1, |_| true), 4);
+        assert_eq!(names.meant((1, 3), 1, |_| true), 3, "the first one");
         assert_eq!(names.silence(3), [(1, 9)]);
-        assert_eq!(names.meant(3, 1, |n| n == 3), 9);
+        assert_eq!(names.meant((1, 3), 1, |n| n == 3), 9);
         assert!(names.silence(9).is_empty(), "nobody else is left");
     }
 }
