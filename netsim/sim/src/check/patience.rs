@@ -92,6 +92,8 @@ pub struct PatienceCheck {
     uavs: BTreeSet<u16>,
     /// Since when who takes whom for alive.
     believed: Clocks<(u16, u16)>,
+    /// In which life one peer took another for alive since the last snapshot.
+    lives: BTreeMap<(u16, u16), Incarnation>,
     /// The longest interval that counted at the last snapshot.
     interval_ms: u64,
 }
@@ -107,6 +109,7 @@ impl PatienceCheck {
             owed: Clocks::default(),
             uavs: BTreeSet::new(),
             believed: Clocks::default(),
+            lives: BTreeMap::new(),
             interval_ms: period_ms,
         }
     }
@@ -116,6 +119,7 @@ impl PatienceCheck {
         self.parts.remove(&id);
         self.owed.stop(id);
         self.believed.retain(|(observer, _)| *observer != id);
+        self.lives.retain(|(observer, _), _| *observer != id);
     }
 
     /// A process ends or stands still: it owes nothing meanwhile, and what it believed may be
@@ -129,8 +133,9 @@ impl PatienceCheck {
     }
 
     /// A belief about another peer changed, not to being down.
-    pub fn on_believed(&mut self, now_ms: u64, about: (u16, u16)) {
+    pub fn on_believed(&mut self, now_ms: u64, about: (u16, u16), life: Incarnation) {
         self.believed.start(about, now_ms);
+        self.lives.insert(about, life);
     }
 
     /// A peer tells what it will fly, having adopted so many divisions, the last one in
@@ -198,7 +203,9 @@ impl PatienceCheck {
         (observer, subject): (u16, u16),
         incarnation: Incarnation,
         heard: impl Fn(u16) -> Option<(&'a Arc<Claim>, Incarnation)>,
+        handicaps: &Handicaps,
     ) {
+        self.lives.remove(&(observer, subject));
         let believed_ms = self.believed.stop((observer, subject));
         let look_ms = self.period_ms / LOOKS_A_PERIOD;
         let was_counted = believed_ms.is_none_or(|t| now_ms > t + look_ms);
@@ -212,7 +219,9 @@ impl PatienceCheck {
             return;
         };
         let settled_ms = SETTLED_INTERVALS * self.interval_ms;
-        let settled = part.adopted_ms.is_some_and(|t| now_ms > t + settled_ms);
+        let settled = part
+            .adopted_ms
+            .is_some_and(|t| handicaps.lived_ms(observer, t, now_ms) > settled_ms);
         let believed = view.peers.get(&PeerId(subject));
         let was_alive = believed.is_some_and(|(i, s)| *i == incarnation && *s != Status::Down);
         let lives = |(id, (_, s)): (&PeerId, &(Incarnation, Status))| {
@@ -238,9 +247,13 @@ impl PatienceCheck {
         for c in mine.into_iter().flatten() {
             orphans.remove(c);
         }
-        for (other, (life, _)) in view.peers.iter().filter(|(o, _)| o.0 != subject) {
-            if let Some((claim, said_in)) = heard(other.0)
-                && said_in == *life
+        let mut lives: BTreeMap<u16, Incarnation> =
+            view.peers.iter().map(|(o, (life, _))| (o.0, *life)).collect();
+        let since = self.lives.range((observer, 0)..=(observer, u16::MAX));
+        lives.extend(since.map(|((_, other), life)| (*other, *life)));
+        for (other, life) in lives.into_iter().filter(|(o, _)| *o != subject) {
+            if let Some((claim, said_in)) = heard(other)
+                && said_in == life
             {
                 listed(claim, n).for_each(|c| {
                     orphans.remove(&c);
@@ -259,6 +272,7 @@ impl PatienceCheck {
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let now_ms = snapshot.now_ms;
         self.interval_ms = snapshot.bounds.interval_ms;
+        self.lives.clear();
         for m in snapshot.peers.iter().filter(|m| m.uav) {
             self.uavs.insert(m.id);
             let part = self.parts.entry(m.id).or_default();
@@ -312,7 +326,11 @@ fn judge_patience(
     // Since the snapshot in which it was able first; it may have been so for T before, and for
     // as long again if it stood still in between.
     let unseen_ms = period_ms * (1 + u64::from(part.stood_still));
-    let able_ms = part.able_since_ms.map_or(0, &ago_ms) + unseen_ms;
+    // By its own clock, which may be the faster one.
+    let before = |since_ms: u64| ago_ms(since_ms.saturating_sub(unseen_ms));
+    let able_ms = part
+        .able_since_ms
+        .map_or(unseen_ms, |t| before(t).max(ago_ms(t) + unseen_ms));
     let calm_ms = part.adopted_ms.map(&ago_ms);
     let hasty = able_ms < STEADY_PERIODS * period_ms;
     let restless = calm_ms.is_some_and(|c| c < CALM_PERIODS * period_ms);
@@ -369,6 +387,7 @@ fn listed(claim: &Claim, n: u16) -> impl Iterator<Item = u16> {
 mod tests {
     use super::super::testing::{LOOP, Story, speaking};
     use super::*;
+    use crate::fault::Fault;
     use skein_peer::wire::message::{CellRun, ListedRun, Round, Stamp};
 
     fn bid(counter: u32, repair: bool, wait_ms: u32) -> Bid {
@@ -450,7 +469,7 @@ mod tests {
             let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
             let mut handicaps = Handicaps::default();
             if disk_fails {
-                let fault = crate::fault::Fault::FailStores { peer: 1, one_in: 5 };
+                let fault = Fault::FailStores { peer: 1, one_in: 5 };
                 handicaps.on_fault(29_000, &fault);
             }
             able_until(&mut check, 30, &mut found);
@@ -541,6 +560,44 @@ mod tests {
     }
 
     #[test]
+    fn a_slow_clock_settles_and_a_fast_one_is_steady_by_its_own_time() {
+        let drift = |ppm| {
+            let mut handicaps = Handicaps::default();
+            handicaps.on_fault(0, &Fault::ClockDrift { peer: 1, ppm });
+            handicaps
+        };
+        let claim = Arc::new(Claim {
+            loop_hash: LOOP,
+            plan: vec![ListedRun {
+                run: CellRun { first: 0, count: 4 },
+                backward: false,
+                stamp: Stamp::default(),
+            }],
+            ..Claim::default()
+        });
+        for (ppm, broken) in [(0, true), (-20_000, false)] {
+            let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
+            check.on_told(25_050, 1, (1, 1));
+            able_until(&mut check, 30, &mut found);
+            let heard = |id| (id == 2).then_some((&claim, 1));
+            check.on_down(30_100, (1, 2), 1, heard, &drift(ppm));
+            Story::new(300).snapshot(31_000, &[(1, speaking())], |s| {
+                check.on_snapshot(s, &mut found);
+            });
+            assert_eq!(found.counts.contains_key("prompt"), broken, "{ppm}");
+        }
+        // Able from just after the snapshot before the first in which it is seen to be.
+        for (ppm, broken) in [(0, true), (9_200, false)] {
+            let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
+            able_until(&mut check, 8, &mut found);
+            check.parts.entry(1).or_default().able_since_ms = Some(1_000);
+            let rebalancing = bid(7, false, 5000);
+            check.on_bid(9_916, 1, (&rebalancing, 9), &drift(ppm), &mut found);
+            assert_eq!(found.counts.contains_key("patience"), broken, "{ppm}");
+        }
+    }
+
+    #[test]
     fn a_loss_that_opens_no_round_at_once_is_found() {
         let claim = |count| {
             Arc::new(Claim {
@@ -564,11 +621,13 @@ mod tests {
                 4,
                 false,
                 2,
-                |check| check.on_believed(29_900, (1, 2)),
+                |check| check.on_believed(29_900, (1, 2), 1),
                 false,
             ),
-            (4, false, 2, |check| check.on_believed(29_800, (1, 2)), true),
+            (4, false, 2, |check| check.on_believed(29_800, (1, 2), 1), true),
             (4, false, 2, |check| check.on_silent(1), false),
+            // Another one, in a life that began since the last snapshot, lists them.
+            (4, false, 2, |check| check.on_believed(29_900, (1, 3), 2), false),
             // Five of the longest intervals after a decision.
             (4, false, 2, |check| check.interval_ms = 6000, false),
         ] {
@@ -577,8 +636,12 @@ mod tests {
             able_until(&mut check, 30, &mut found);
             besides(&mut check);
             let dead = claim(cells);
-            let heard = |id| (id == 2).then_some((&dead, 1));
-            check.on_down(30_100, (1, 2), 1, heard);
+            let heard = |id| match id {
+                2 => Some((&dead, 1)),
+                3 => Some((&dead, 2)),
+                _ => None,
+            };
+            check.on_down(30_100, (1, 2), 1, heard, &Handicaps::default());
             if opens {
                 check.on_bid(
                     30_300,

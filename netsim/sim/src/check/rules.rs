@@ -178,9 +178,10 @@ impl Rules {
                     .on_belief(now_ms, about, belief, (diameter, handicaps), found);
                 if *status == Status::Down {
                     let heard = |author| listing.heard(id, author);
-                    self.patience.on_down(now_ms, about, *incarnation, heard);
+                    self.patience
+                        .on_down(now_ms, about, *incarnation, heard, handicaps);
                 } else {
-                    self.patience.on_believed(now_ms, about);
+                    self.patience.on_believed(now_ms, about, *incarnation);
                 }
             }
             Report::Claim { counter, .. } => {
