@@ -699,6 +699,10 @@ impl Executive {
                     .extend(&coverage_loop.curve(cell, visit.direction));
                 Kind::Serve(visit)
             }
+            Move::Rest(visit, curve) => {
+                self.track.extend(&curve);
+                Kind::Serve(visit)
+            }
             Move::Pass(cell, direction) => {
                 self.track
                     .extend(&coverage_loop.curve(usize::from(cell), direction));

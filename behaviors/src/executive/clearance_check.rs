@@ -42,7 +42,7 @@ impl Transit {
                 zones.is_clear(&c.curve(usize::from(visit.cell), visit.direction), margin_m)
             }
             Move::Pass(cell, d) => zones.is_clear(&c.curve(usize::from(*cell), *d), margin_m),
-            Move::Route(curve) => zones.is_clear(curve, margin_m),
+            Move::Route(curve) | Move::Rest(_, curve) => zones.is_clear(curve, margin_m),
             Move::Piece(piece, _) => zones.is_segment_clear(piece, self.given_margin_m()),
             Move::Loiter(circle) => zones.is_clear(&halves(circle), margin_m),
         }
@@ -75,10 +75,7 @@ impl Transit {
         }
         let cells: Vec<u16> = moves
             .iter()
-            .filter_map(|step| match step {
-                Move::Serve(visit) => Some(visit.cell),
-                _ => None,
-            })
+            .filter_map(|step| Some(step.serves()?.cell))
             .collect();
         if cells.is_empty() {
             return vec![self.stay(at)];

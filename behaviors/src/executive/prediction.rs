@@ -284,7 +284,7 @@ impl Executive {
                 end_m += self.transit.length_m(&step);
                 place = self.transit.end_of(&place, &step);
                 let (visit, cell) = match &step {
-                    Move::Serve(h) => (Some(*h), Some((h.cell, h.direction))),
+                    Move::Serve(h) | Move::Rest(h, _) => (Some(*h), Some((h.cell, h.direction))),
                     Move::Pass(c, d) => (None, Some((*c, *d))),
                     Move::Route(_) | Move::Piece(..) | Move::Loiter(_) => (None, None),
                 };

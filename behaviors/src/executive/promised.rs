@@ -337,6 +337,13 @@ impl Executive {
             }
             kept = i + 1;
         }
+        // What comes next of a way that was agreed in part leads there.
+        let rest = self.contingency.as_ref().map(|c| c.rest.as_slice());
+        let leads_to = rest.unwrap_or_default().iter().find_map(Move::serves);
+        let same = |next: &CellVisit| leads_to.is_some_and(|v| is_same(&v, next));
+        if visits.front().is_some_and(same) {
+            return (self.flight_stretches(), visits);
+        }
         if kept == 0
             && let (Some(front), Some(next)) = (self.stretches.front(), visits.front())
             && front.kind.cell() == Some((next.cell, next.direction))
@@ -421,10 +428,8 @@ impl Executive {
     pub fn suits(&self, extension: &Extension) -> bool {
         let same_goal = self.contingency.as_ref().map(|c| c.goals) == Some(extension.goals);
         let mut queued = self.queue.iter().map(|visit| (visit.cell, visit.direction));
-        let mut served = extension.moves.iter().filter_map(|step| match step {
-            Move::Serve(visit) => Some((visit.cell, visit.direction)),
-            _ => None,
-        });
+        let served = extension.moves.iter().filter_map(Move::serves);
+        let mut served = served.map(|visit| (visit.cell, visit.direction));
         same_goal && served.all(|visit| queued.any(|q| q == visit))
     }
 
@@ -439,19 +444,16 @@ impl Executive {
         self.cut(extension.cut_m, extension.cut);
         let mut at = extension.cut;
         for step in extension.moves {
-            let step = match step {
-                Move::Serve(visit) => {
-                    let same =
-                        |q: &CellVisit| (q.cell, q.direction) == (visit.cell, visit.direction);
-                    match self.queue.iter().position(same) {
-                        Some(i) => {
-                            self.queue.remove(i);
-                            Move::Serve(visit)
-                        }
-                        None => Move::Pass(visit.cell, visit.direction),
+            let step = match (step.serves(), step) {
+                (Some(visit), step) => match (place_in(&self.queue, &visit), step) {
+                    (Some(i), step) => {
+                        self.queue.remove(i);
+                        step
                     }
-                }
-                other => other,
+                    (None, Move::Rest(_, rest)) => Move::Route(rest),
+                    (None, _) => Move::Pass(visit.cell, visit.direction),
+                },
+                (None, step) => step,
             };
             at = self.push(&at, step);
         }
@@ -534,6 +536,16 @@ impl Executive {
     pub(super) fn promises(&self, percept: &Percept) -> bool {
         self.contingency.is_some() && is_finite(&percept.pose) && percept.takes_off_in_ms == 0
     }
+}
+
+/// Whether two visits are to one cell in one direction.
+fn is_same(a: &CellVisit, b: &CellVisit) -> bool {
+    (a.cell, a.direction) == (b.cell, b.direction)
+}
+
+/// Where in a queue a visit is.
+fn place_in(queue: &VecDeque<CellVisit>, visit: &CellVisit) -> Option<usize> {
+    queue.iter().position(|q| is_same(q, visit))
 }
 
 /// How far a UAV gets from where it is on what it promises, its circle included, metres.

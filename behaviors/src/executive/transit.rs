@@ -75,6 +75,8 @@ pub struct Place {
 pub enum Move {
     /// A cell, to see it.
     Serve(CellVisit),
+    /// What is left of a cell of which the way was flown in parts, to see it.
+    Rest(CellVisit, Curve),
     /// A cell, because it is on the way.
     Pass(u16, Direction),
     /// A curve off the loop.
@@ -83,6 +85,17 @@ pub enum Move {
     Piece(Segment, f64),
     /// A full circle, to be flown again and again.
     Loiter(Segment),
+}
+
+impl Move {
+    /// The visit that it serves.
+    #[must_use]
+    pub fn serves(&self) -> Option<CellVisit> {
+        match self {
+            Self::Serve(visit) | Self::Rest(visit, _) => Some(*visit),
+            _ => None,
+        }
+    }
 }
 
 /// The loop, the zones and the airframe, as far as ways depend on them.
@@ -256,7 +269,7 @@ impl Transit {
     #[must_use]
     pub fn end_of(&self, from: &Place, step: &Move) -> Place {
         match step {
-            Move::Serve(visit) => {
+            Move::Serve(visit) | Move::Rest(visit, _) => {
                 self.place(self.exit(visit.cell, visit.direction), visit.direction)
             }
             Move::Pass(cell, direction) => self.place(self.exit(*cell, *direction), *direction),
@@ -282,7 +295,7 @@ impl Transit {
             Move::Pass(cell, direction) => self
                 .cell_air_m(*cell, *direction)
                 .unwrap_or_else(|| self.travel_m(*cell)),
-            Move::Route(curve) => self.air.air_length_m(curve),
+            Move::Route(curve) | Move::Rest(_, curve) => self.air.air_length_m(curve),
             Move::Piece(piece, _) => {
                 let mut curve = Curve::empty();
                 curve.push(*piece);

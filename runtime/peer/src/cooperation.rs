@@ -307,12 +307,9 @@ impl Cooperation {
         Effects::new()
     }
 
-    /// A record of another peer that is new here.
-    pub fn hear(&mut self, now: Time, record: &Record, body: &Body) -> Effects {
-        let author = Member {
-            id: record.author,
-            incarnation: record.incarnation,
-        };
+    /// A record of another peer that is new here, after so many hops.
+    pub fn hear(&mut self, now: Time, (record, hops): (&Record, u8), body: &Body) -> Effects {
+        let author = record.said_by();
         match body {
             Body::Mission(chunk) => {
                 self.piece_came = now;
@@ -339,8 +336,8 @@ impl Cooperation {
                 let state = self.state.as_mut();
                 if let Some(separation) = state.and_then(|s| s.separation.as_mut()) {
                     match body {
-                        Body::Intent(intent) => separation.hear(now, author, intent),
-                        Body::Conflict(brief) => separation.hear_brief(now, author, brief),
+                        Body::Intent(intent) => separation.hear(now, (record, hops), intent),
+                        Body::Conflict(brief) => separation.hear_brief(now, (record, hops), brief),
                         _ => {}
                     }
                 }

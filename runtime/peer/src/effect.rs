@@ -13,7 +13,7 @@ use crate::output::Report;
 use crate::protocol::negotiation::Adoption;
 use crate::protocol::runs::PlannedCell;
 use crate::wire::codec::Body;
-use crate::wire::message::{Bid, Epoch};
+use crate::wire::message::{Bid, Epoch, Record};
 use crate::wire::tasks::TaskId;
 use skein_behaviors::Setpoint;
 use std::sync::Arc;
@@ -28,6 +28,8 @@ pub(crate) enum Effect {
     Speak(u16, Body),
     /// Say what nobody passes on, at once.
     SayNow(Body),
+    /// Pass on, at once, what another peer said and the relay does not.
+    PassOn(Record),
     /// Make an entry durable; the promise is kept once it is.
     Store(Promise, Entry),
     /// Have a job computed, unless it is under way.

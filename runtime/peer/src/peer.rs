@@ -305,7 +305,7 @@ impl Peer {
                 if let Body::Bid(bid) = body {
                     self.diary.note_bid(self.now, record.author, bid);
                 }
-                let effects = self.cooperation.hear(self.now, record, body);
+                let effects = self.cooperation.hear(self.now, (record, hops), body);
                 self.carry_out(effects);
             }
         }
@@ -531,6 +531,7 @@ impl Peer {
                 }
             }
             Effect::SayNow(body) => self.say_now(&body),
+            Effect::PassOn(record) => self.pass_on(&record),
             Effect::CoverageChanged => self.outbound.coverage_changed(&mut self.timers),
             Effect::CoverageHeard(loop_hash, cells) => {
                 if self.relay.air.is_crowded() {
@@ -560,7 +561,7 @@ impl Peer {
                 && record.author != self.config.id.0
                 && let Ok(body) = codec::decode_body(kind, &record.body)
             {
-                let effects = self.cooperation.hear(self.now, &record, &body);
+                let effects = self.cooperation.hear(self.now, (&record, 0), &body);
                 self.carry_out(effects);
             }
         }
@@ -722,6 +723,23 @@ impl Peer {
         let bytes = codec::encode_record(&record);
         self.relay.air.charge(self.now, bytes.len());
         self.broadcast(body.kind(), bytes);
+    }
+
+    /// Passes on, at once, what another peer said and the relay does not.
+    fn pass_on(&mut self, record: &Record) {
+        let kind = Kind::of_number(record.kind).filter(|_| self.speaks());
+        let Some(kind) = kind else {
+            return;
+        };
+        let bytes = codec::encode_record(record);
+        self.relay.air.charge(self.now, bytes.len());
+        self.outputs.push_back(Output::Publish {
+            key: key::key(&self.config.fleet, kind, record.subject, record.author),
+            bytes,
+            hops: 1,
+            priority: kind.priority(),
+            lifetime_ms: self.relay.lifetime_ms(kind),
+        });
     }
 
     /// Sends what the relay lets go.

@@ -13,13 +13,16 @@
 //! | one who goes before is held up by this UAV, which gets no further itself, or anybody by one with nothing to do | a way aside is offered that lets them pass |
 //! | another UAV is believed down, for so long that it would have circled | it is in nobody's way |
 
+mod passing;
+
 use crate::effect::{Effect, Effects};
 use crate::input::Time;
 use crate::protocol::conflict::{Apart, Conflicts, InTheWay, Intent, Reach};
 use crate::protocol::promises::Brief;
 use crate::wire::codec::Body;
-use crate::wire::message::Member;
+use crate::wire::message::{Member, Record};
 use crate::{Incarnation, PeerId};
+use passing::{Gist, Passing};
 use skein_behaviors::executive::promised::{Extension, PROMISED_MOST_S};
 use skein_behaviors::traffic::Sighting;
 use skein_behaviors::{Executive, Percept};
@@ -83,6 +86,7 @@ pub(crate) struct Separation {
     lives: BTreeMap<u16, Incarnation>,
     /// Since when others are believed down.
     down_since: BTreeMap<u16, Time>,
+    passing: Passing,
 }
 
 impl Separation {
@@ -103,6 +107,7 @@ impl Separation {
             clocks: (Time(0), 0),
             lives: BTreeMap::new(),
             down_since: BTreeMap::new(),
+            passing: Passing::default(),
         }
     }
 
@@ -141,7 +146,10 @@ impl Separation {
             }
             self.take_up(executive);
         }
-        self.speak(now_ms)
+        let mut effects = self.speak(now_ms);
+        let passed = self.passing.due(now_ms, u64::from(self.me.id));
+        effects.extend(passed.into_iter().map(Effect::PassOn));
+        effects
     }
 
     /// Who is near, and who of them answers nothing.
@@ -286,16 +294,30 @@ impl Separation {
     }
 
     /// What another UAV flies and asks for.
-    pub fn hear(&mut self, now: Time, author: Member, intent: &Intent) {
+    pub fn hear(&mut self, now: Time, (record, hops): (&Record, u8), intent: &Intent) {
         let now_ms = self.common_ms(now);
+        let author = record.said_by();
+        let gist = Gist {
+            is_whole: true,
+            offers: intent.proposal.as_ref().map(|p| p.version),
+            accepts: &intent.accepts,
+        };
+        self.passing.hear(now_ms, record, gist, hops);
         let conflicts = self.of_present_life(author);
         let news = conflicts.is_some_and(|c| c.hear(PeerId(author.id), intent, now_ms));
         self.is_news |= news;
     }
 
     /// The same in brief.
-    pub fn hear_brief(&mut self, now: Time, author: Member, brief: &Brief) {
+    pub fn hear_brief(&mut self, now: Time, (record, hops): (&Record, u8), brief: &Brief) {
         let now_ms = self.common_ms(now);
+        let author = record.said_by();
+        let gist = Gist {
+            is_whole: false,
+            offers: brief.proposal,
+            accepts: &brief.accepts,
+        };
+        self.passing.hear(now_ms, record, gist, hops);
         let conflicts = self.of_present_life(author);
         let news = conflicts.is_some_and(|c| c.hear_brief(PeerId(author.id), brief, now_ms));
         self.is_news |= news;
@@ -312,6 +334,7 @@ impl Separation {
         if author.incarnation > *known {
             *known = author.incarnation;
             conflicts.begins_anew(PeerId(author.id));
+            self.passing.forget(author.id);
         }
         self.down_since.remove(&author.id);
         Some(conflicts)

@@ -5,7 +5,7 @@
 
 use super::super::transit::{CellVisit, Move, Place};
 use super::super::{Aim, Executive};
-use super::{Extension, PROMISED_MOST_S, PROMISED_S, circle_at, whole_ms};
+use super::{Extension, PROMISED_MOST_S, PROMISED_S, circle_at, place_in, whole_ms};
 use crate::event::Event;
 use crate::reactive::follow::Track;
 use skein_geometry::frame::{Point, Pose, Vector};
@@ -16,6 +16,9 @@ use std::collections::VecDeque;
 /// Ways off the loop are promised in parts of this length, metres: at the end of each it may
 /// wait.
 const PART_M: f64 = 40.0;
+
+/// Cells whose way is longer are flown in such parts, too, metres.
+const LONG_M: f64 = 2.0 * PART_M;
 
 /// What is shorter is rounding, metres.
 const SHORT_M: f64 = 1e-3;
@@ -146,7 +149,7 @@ impl Executive {
         let mut queue: VecDeque<CellVisit> = self.queue.clone();
         let (mut at, mut length_m) = (way.cut, 0.0);
         for step in self.rest_from(way.cut_m, is_open) {
-            if let Move::Serve(visit) = step
+            if let Some(visit) = step.serves()
                 && let Some(i) = place_in(&queue, &visit)
             {
                 queue.remove(i);
@@ -168,14 +171,23 @@ impl Executive {
             for step in self.transit.cleared(&at, moves, events) {
                 let step_m = self.transit.length_m(&step);
                 length_m += step_m;
-                if !matches!(step, Move::Serve(_)) {
+                if step.serves().is_none() {
                     way.idle_m += step_m;
                 }
                 at = self.transit.end_of(&at, &step);
                 if matches!(step, Move::Loiter(_)) {
                     return;
                 }
-                way.push(step);
+                match step {
+                    Move::Serve(visit) if step_m > LONG_M => {
+                        let whole = self.curve_of(&Move::Serve(visit));
+                        let mut parts: Vec<Curve> = parts(&whole).collect();
+                        let last = parts.pop();
+                        way.moves.extend(parts.into_iter().map(Move::Route));
+                        way.moves.extend(last.map(|rest| Move::Rest(visit, rest)));
+                    }
+                    other => way.push(other),
+                }
             }
         }
     }
@@ -218,10 +230,8 @@ impl Executive {
         let rounds = (cut_m - self.flight_end_m()) / round_m;
         let at_its_end = (rounds - rounds.round()).abs() * round_m < SHORT_M;
         let mut queued = self.queue.iter().map(|visit| (visit.cell, visit.direction));
-        let mut served = c.rest.iter().filter_map(|step| match step {
-            Move::Serve(visit) => Some((visit.cell, visit.direction)),
-            _ => None,
-        });
+        let served = c.rest.iter().filter_map(Move::serves);
+        let mut served = served.map(|visit| (visit.cell, visit.direction));
         let leads_on = served.all(|visit| is_open(visit.0) && queued.any(|q| q == visit));
         if at_its_end && leads_on {
             c.rest.clone()
@@ -240,7 +250,7 @@ impl Executive {
             let (mut length_m, mut is_idle) = (0.0, true);
             for (i, step) in way.moves.iter().enumerate() {
                 length_m += self.transit.length_m(step);
-                is_idle &= !matches!(step, Move::Serve(_));
+                is_idle &= step.serves().is_none();
                 let late_m = (promised_m - length_m).abs();
                 let rank_m = if length_m > promised_m {
                     promised_m + late_m
@@ -323,7 +333,7 @@ impl Executive {
         match step {
             Move::Serve(visit) => coverage_loop.curve(usize::from(visit.cell), visit.direction),
             Move::Pass(cell, direction) => coverage_loop.curve(usize::from(*cell), *direction),
-            Move::Route(curve) => curve.clone(),
+            Move::Route(curve) | Move::Rest(_, curve) => curve.clone(),
             Move::Loiter(piece) | Move::Piece(piece, _) => {
                 let mut curve = Curve::empty();
                 curve.push(*piece);
@@ -354,12 +364,6 @@ impl Way {
             other => self.moves.push(other),
         }
     }
-}
-
-/// Where in a queue a visit is.
-fn place_in(queue: &VecDeque<CellVisit>, visit: &CellVisit) -> Option<usize> {
-    let same = |q: &CellVisit| (q.cell, q.direction) == (visit.cell, visit.direction);
-    queue.iter().position(same)
 }
 
 /// A curve in parts of [`PART_M`], the last one longer rather than short.

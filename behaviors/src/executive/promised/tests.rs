@@ -2,10 +2,11 @@
 
 use super::*;
 use crate::Goal;
-use crate::testing::{Wing, airframe, loop_and_router};
+use crate::testing::{Wing, airframe, loop_and_router, rectangle};
 use skein_flight::coverage::ring::Direction::Forward;
 use skein_flight::coverage::ring::backtracking::Leg;
 use skein_flight::separation::Motion;
+use skein_geometry::Polygon;
 
 const PERCEPT_MS: u64 = 200;
 const LEAD_MS: u64 = 2_000;
@@ -24,7 +25,12 @@ struct Flight {
 
 impl Flight {
     fn new(promises: bool) -> Self {
-        let (coverage_loop, router) = loop_and_router(6, 4, Vec::new());
+        Self::around(promises, (6, 4), Vec::new())
+    }
+
+    /// Over so many cells, around zones.
+    fn around(promises: bool, (cols, rows): (u32, u32), zones: Vec<Polygon>) -> Self {
+        let (coverage_loop, router) = loop_and_router(cols, rows, zones);
         let n = u16::try_from(coverage_loop.len()).unwrap();
         let start = coverage_loop.boundary_towards(0, Forward);
         let mut executive = Executive::new(airframe(), 90.0, coverage_loop, router);
@@ -157,6 +163,52 @@ fn who_is_not_answered_circles_where_it_promised_and_then_goes_on() {
     flight.fly(1_500);
     assert!(flight.done);
     assert_eq!(flight.imposed, 1, "only the first circle was imposed");
+}
+
+/// A wall from the edge into the area: the loop leads round it within one cell, farther than may
+/// be promised at once.
+fn at_a_wall(promises: bool) -> Flight {
+    let wall = rectangle(148.0, -60.0, 34.0, 380.0);
+    Flight::around(promises, (8, 8), vec![wall])
+}
+
+#[test]
+fn a_cell_whose_way_is_longer_than_a_promise_is_flown_in_parts() {
+    let mut flight = at_a_wall(true);
+    let cells = flight.executive.transit.coverage_loop.len();
+    let length_m = |c: usize| {
+        let coverage_loop = &flight.executive.transit.coverage_loop;
+        coverage_loop.curve(c, Forward).length_m()
+    };
+    let longest_m = (0..cells).map(length_m).fold(0.0, f64::max);
+    let most_m = PROMISED_MOST_S * flight.executive.speed_mps();
+    assert!(longest_m > most_m, "{longest_m} m, {most_m} m are promised");
+    flight.fly(2_000);
+    let open = flight.open.iter().filter(|o| **o).count();
+    assert!(flight.done, "{open} of {cells} open");
+    let mut free = at_a_wall(false);
+    free.fly(2_000);
+    assert!(free.done);
+    let (asks_ms, free_ms) = (flight.wing.time_ms, free.wing.time_ms);
+    assert!(
+        asks_ms < free_ms + 30_000,
+        "{asks_ms} ms instead of {free_ms} ms"
+    );
+}
+
+#[test]
+fn a_goal_that_is_told_again_lets_what_is_agreed_stand() {
+    let mut flight = at_a_wall(true);
+    let n = u16::try_from(flight.open.len()).unwrap();
+    // Every two seconds, as claims change.
+    for _ in 0..1_000 {
+        flight.fly(2);
+        let asked = flight.asked.take();
+        flight.legs(0, n);
+        flight.asked = asked.filter(|(_, e)| flight.executive.suits(e));
+    }
+    let open = flight.open.iter().filter(|o| **o).count();
+    assert!(flight.done, "{open} of {n} open");
 }
 
 #[test]

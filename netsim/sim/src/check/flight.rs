@@ -36,6 +36,8 @@ pub struct Flyer {
     pub slowest_mps: f64,
     /// Its speed at cruise with the wind, m/s.
     pub fastest_mps: f64,
+    /// How far beside where it is to wait others may leave it room, metres.
+    pub waits_beside_m: f64,
 }
 
 /// Somebody who is to be home by then.
@@ -254,7 +256,7 @@ impl FlightCheck {
 /// Whether somebody who loiters at a base may be here.
 #[must_use]
 pub fn at_base(at: Point, base: Point, flyer: Flyer) -> bool {
-    (at - base).norm() <= HOLD_RADII * flyer.turn_radius_m
+    (at - base).norm() <= HOLD_RADII * flyer.turn_radius_m + flyer.waits_beside_m
 }
 
 #[allow(
@@ -290,6 +292,7 @@ mod tests {
             turn_radius_m: 20.0,
             slowest_mps: 10.0,
             fastest_mps: 14.0,
+            waits_beside_m: 0.0,
         };
         let mut check = FlightCheck::new(BTreeMap::from([(1, flyer)]), zones, 10.0);
         let (mut story, mut found) = (Story::new(300), Findings::new(1));

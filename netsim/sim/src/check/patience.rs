@@ -247,8 +247,11 @@ impl PatienceCheck {
         for c in mine.into_iter().flatten() {
             orphans.remove(c);
         }
-        let mut lives: BTreeMap<u16, Incarnation> =
-            view.peers.iter().map(|(o, (life, _))| (o.0, *life)).collect();
+        let mut lives: BTreeMap<u16, Incarnation> = view
+            .peers
+            .iter()
+            .map(|(o, (life, _))| (o.0, *life))
+            .collect();
         let since = self.lives.range((observer, 0)..=(observer, u16::MAX));
         lives.extend(since.map(|((_, other), life)| (*other, *life)));
         for (other, life) in lives.into_iter().filter(|(o, _)| *o != subject) {
@@ -624,10 +627,22 @@ mod tests {
                 |check| check.on_believed(29_900, (1, 2), 1),
                 false,
             ),
-            (4, false, 2, |check| check.on_believed(29_800, (1, 2), 1), true),
+            (
+                4,
+                false,
+                2,
+                |check| check.on_believed(29_800, (1, 2), 1),
+                true,
+            ),
             (4, false, 2, |check| check.on_silent(1), false),
             // Another one, in a life that began since the last snapshot, lists them.
-            (4, false, 2, |check| check.on_believed(29_900, (1, 3), 2), false),
+            (
+                4,
+                false,
+                2,
+                |check| check.on_believed(29_900, (1, 3), 2),
+                false,
+            ),
             // Five of the longest intervals after a decision.
             (4, false, 2, |check| check.interval_ms = 6000, false),
         ] {

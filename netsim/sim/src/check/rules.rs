@@ -36,6 +36,10 @@ use skein_peer::{Beliefs, Incarnation, Report};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+/// A circle in which others are waited for has so many times the least radius, and as many times
+/// the separation is kept between two.
+const WAITING_RADII: f64 = 1.25;
+
 /// The rules of single peers in one run.
 #[derive(Clone, Debug)]
 pub struct Rules {
@@ -424,5 +428,19 @@ fn flyer(uav: &UavSpec, spec: &Spec) -> Flyer {
         turn_radius_m: airframe.ground_turn_radius_m(airframe.cruise_mps, wind_mps),
         slowest_mps: airframe.cruise_mps - wind_mps,
         fastest_mps: airframe.max_mps + wind_mps,
+        waits_beside_m: waits_beside_m(spec),
     }
+}
+
+/// How far from where all are to be the last of them waits who fly at one height, metres: their
+/// circles, and what they keep between them, lie in rings of six, twelve and so on round the first.
+fn waits_beside_m(spec: &Spec) -> f64 {
+    let separation_m = f64::from(spec.mission.separation_mm) / 1e3;
+    if separation_m <= 0.0 {
+        return 0.0;
+    }
+    let radius_m = f64::from(spec.mission.turn_radius_mm) / 1e3;
+    let apart_m = 2.0 * WAITING_RADII * radius_m + WAITING_RADII * separation_m;
+    let within = |rings: &u32| (1 + 3 * rings * (rings + 1)) as usize >= spec.uavs.len();
+    f64::from((0..).find(within).unwrap_or(0)) * apart_m
 }

@@ -202,9 +202,7 @@ impl SpreadCheck {
         let newest = self.places.iter().map(|(key, i)| (*key, *i, most[*i]));
         let is_held = |version: &Version| *version > Version::default();
         newest
-            .filter(|(key, _, version)| {
-                is_held(version) && lives.get(&key.0) == Some(&version.0)
-            })
+            .filter(|(key, _, version)| is_held(version) && lives.get(&key.0) == Some(&version.0))
             .collect()
     }
 

@@ -138,7 +138,11 @@ mod tests {
         assert_eq!(names.ambiguous(), BTreeSet::from([3]));
         assert_eq!(names.meant((1, 3), 1, |n| n == 3), 3);
         assert_eq!(names.meant((1, 3), 1, |n| n == 9), 9);
-        assert_eq!(names.meant((1, 3), 2, |n| n == 3), 9, "nobody else spoke in it");
+        assert_eq!(
+            names.meant((1, 3), 2, |n| n == 3),
+            9,
+            "nobody else spoke in it"
+        );
         assert_eq!(names.meant((1, 3), 5, |_| true), 3);
         assert_eq!(names.meant((1, 4), 1, |_| true), 4);
         assert_eq!(names.meant((1, 3), 1, |_| true), 3, "the first one");

@@ -29,6 +29,17 @@ pub struct Record {
     pub signature: Vec<u8>,
 }
 
+impl Record {
+    /// Who wrote it, in which life.
+    #[must_use]
+    pub fn said_by(&self) -> Member {
+        Member {
+            id: self.author,
+            incarnation: self.incarnation,
+        }
+    }
+}
+
 /// "I am here": one hop, between two beacons. Its number in the envelope counts on from
 /// that of the last beacon.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
