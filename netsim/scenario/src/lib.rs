@@ -26,6 +26,8 @@
 //! assert_eq!(spec.uavs.len(), 8);
 //! ```
 
+#[cfg(test)]
+mod at_one_height;
 mod builtin;
 mod choose_tree;
 #[cfg(test)]

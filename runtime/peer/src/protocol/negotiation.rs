@@ -56,6 +56,10 @@ const PATIENT_INTERVALS: u64 = 10;
 /// Rebalancings are at least so many intervals apart.
 const CALM_INTERVALS: u64 = 20;
 
+/// Who has nothing to fly and heard of no division for so many intervals waits for no calm any
+/// more: where links come and go with the circles that all of them fly there is none.
+const UNDIVIDED_INTERVALS: u64 = 3 * PATIENT_INTERVALS;
+
 /// What a living owner lists no more is covered, or listed by somebody else whose claim may be on
 /// the way: for half an interval at each hop beyond the first it is no orphan.
 fn claims_on_the_way_ms(ctx: &Context<'_>) -> u64 {
@@ -198,6 +202,9 @@ pub struct Negotiation {
     /// Cells that nobody lists, as of the last tick.
     orphans: CellSet,
     orphan_since: Option<Time>,
+    /// Since when this peer has nothing to fly, and nothing was divided on this loop, as far as
+    /// it knows.
+    undivided_since: Option<Time>,
     /// Among many, since when each of them is one.
     orphaned_at: OrphanedAt,
     somebody_gone: bool,
@@ -244,6 +251,7 @@ impl Negotiation {
             dividing: None,
             orphans: CellSet::new(cells),
             orphan_since: None,
+            undivided_since: None,
             orphaned_at: OrphanedAt::new(cells),
             somebody_gone: false,
             decided_at: None,
@@ -273,7 +281,11 @@ impl Negotiation {
     /// For so long this peer did not listen: bids, claims and progress that it did not hear
     /// meanwhile may have been said.
     pub fn was_late(&mut self, late_ms: u64) {
-        let waits = [&mut self.orphan_since, &mut self.idle_since];
+        let waits = [
+            &mut self.orphan_since,
+            &mut self.idle_since,
+            &mut self.undivided_since,
+        ];
         for since in waits.into_iter().flatten() {
             *since = since.plus_ms(late_ms);
         }
@@ -426,6 +438,8 @@ impl Negotiation {
             self.members_since = ctx.now;
         }
         let idle = self.sections.plan().is_empty();
+        let undivided = idle && self.decided_at.is_none() && !self.sections.complete();
+        self.undivided_since = self.undivided_since.or(Some(ctx.now)).filter(|_| undivided);
         self.idle_since = if idle {
             self.idle_since.or(Some(ctx.now))
         } else {
@@ -472,8 +486,9 @@ impl Negotiation {
         let company = ctx.members.len() > 1;
         let steady =
             company && ctx.now.since_ms(self.members_since) >= SHORT_INTERVALS * ctx.interval_ms;
-        if self.decided_at.is_none() && !steady && orphaned_ms < PATIENT_INTERVALS * ctx.interval_ms
-        {
+        let waits = orphaned_ms < PATIENT_INTERVALS * ctx.interval_ms;
+        let overdue = self.overdue_ms(ctx).is_some();
+        if self.decided_at.is_none() && !steady && waits && !overdue {
             return;
         }
         let settled = self
@@ -488,6 +503,16 @@ impl Negotiation {
         if (self.somebody_gone && settled) || orphaned_ms >= patience + stagger {
             self.start(ctx, true, 0);
         }
+    }
+
+    /// For how long, beyond all patience, nothing was divided; none as long as there is patience,
+    /// and in a peer that has not listened for a while.
+    fn overdue_ms(&self, ctx: &Context<'_>) -> Option<u64> {
+        let able_ms = ctx.now.since_ms(ctx.able_since?);
+        let undivided_ms = ctx.now.since_ms(self.undivided_since?);
+        (able_ms >= SHORT_INTERVALS * ctx.interval_ms)
+            .then(|| undivided_ms.checked_sub(UNDIVIDED_INTERVALS * ctx.interval_ms))
+            .flatten()
     }
 
     /// How long an open round is waited for, milliseconds: for its bids, and if they are

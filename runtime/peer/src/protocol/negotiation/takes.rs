@@ -187,8 +187,10 @@ impl Negotiation {
             if ctx.is_many() {
                 return None;
             }
-            let patience = SHORT_INTERVALS * ctx.interval_ms + ctx.first_wait_ms() + stagger;
-            return (ctx.now.since_ms(since) >= patience)
+            let waited = ctx.first_wait_ms() + stagger;
+            let patience = SHORT_INTERVALS * ctx.interval_ms + waited;
+            let overdue = self.overdue_ms(ctx).is_some_and(|ms| ms >= waited);
+            return (overdue || ctx.now.since_ms(since) >= patience)
                 .then(|| self.nearest_run(orphans, lp))
                 .flatten();
         }

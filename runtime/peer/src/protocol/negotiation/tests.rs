@@ -352,6 +352,35 @@ fn an_idle_peer_asks_for_a_share_of_what_others_have_left() {
 }
 
 #[test]
+fn where_links_come_and_go_for_ever_something_is_begun_all_the_same() {
+    let mut desk = Desk::new(&[2, 3]);
+    let began = desk.now;
+    let mut first_ms = None;
+    while desk.now.since_ms(began) < 120 * T && first_ms.is_none() {
+        let round_ms = desk.now.since_ms(began) % (8 * T);
+        // Of two others one comes and one goes in each eight periods, and for two of them this
+        // peer suspects itself of being deaf.
+        let others: &[u16] = match round_ms / (2 * T) {
+            0 => &[2, 3],
+            1 => &[2],
+            2 => &[],
+            _ => &[3],
+        };
+        desk.live = others.iter().map(|id| (*id, 1)).collect();
+        desk.able_since = (round_ms >= 2 * T).then(|| Time(desk.now.0 - round_ms + 2 * T));
+        let actions = desk.tick();
+        let begins = |a: &Action| matches!(a, Action::Bid | Action::Take(_));
+        if actions.iter().any(begins) {
+            first_ms = Some(desk.now.since_ms(began));
+        }
+        desk.now = desk.now.plus_ms(T / 4);
+    }
+    let first_ms = first_ms.expect("nothing was begun");
+    let bounds_ms = UNDIVIDED_INTERVALS * T..(UNDIVIDED_INTERVALS + 10) * T;
+    assert!(bounds_ms.contains(&first_ms), "{first_ms}");
+}
+
+#[test]
 fn a_return_waits_until_it_is_steady() {
     let mut desk = Desk::new(&[2]);
     desk.claim(2, 1, 0, 24, 600_000);
