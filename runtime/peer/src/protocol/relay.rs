@@ -10,8 +10,8 @@
 //! |---|---|---|
 //! | unknown, or of an older version | it is heard | held; passed on after 20 to 260 ms, if it made fewer than 16 hops |
 //! | held in this version | a copy is heard | with the second copy it is not passed on any more |
-//! | held in a newer version, or of an earlier life | it is heard | nothing |
-//! | any of an author | a later life of the author is heard | void: neither held nor sent |
+//! | held in a newer version, or of an earlier life and no piece of a mission | it is heard | nothing |
+//! | any of an author but pieces of missions | a later life of the author is heard | void: neither held nor sent |
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
 //! | a piece of a mission | a neighbour lacks it: its beacon, the last ten intervals considered, shows an older revision, and it says no pieces of that mission or this one; else it only is held | passed on, or sent again as to who lacks it |
 //! | a piece of a mission | it is due | of all that wait goes first what was never on the air, then what most lack, what nobody passed on, what was on the air longest ago |
@@ -284,7 +284,8 @@ impl Relay {
                 return Offer::Duplicate;
             }
         }
-        if self.newest_life(record.author) > record.incarnation {
+        let mission = mission_of(kind, record);
+        if mission.is_none() && self.newest_life(record.author) > record.incarnation {
             return Offer::Stale;
         }
         self.void(record.author, record.incarnation);
@@ -296,7 +297,7 @@ impl Relay {
             copies: 1,
             is_passed_on: false,
             repeats: 0,
-            mission: mission_of(kind, record),
+            mission,
             lack: 0,
             sent: now,
         };
@@ -339,9 +340,11 @@ impl Relay {
     }
 
     /// A later life supersedes all that earlier ones said: it is neither held nor
-    /// sent any more.
+    /// sent any more. Pieces of a mission stay: they count by its revision, and whoever holds
+    /// them may be the only one in reach who does.
     fn void(&mut self, author: u16, incarnation: Incarnation) {
-        self.forget(author, |held| held.record.incarnation < incarnation);
+        let is_past = |held: &Held| held.record.incarnation < incarnation;
+        self.forget(author, |held| is_past(held) && held.mission.is_none());
     }
 
     /// Such records of an author are neither held nor sent any more.

@@ -79,6 +79,33 @@ fn piece(subject: u16, chunks: u16) -> Record {
     }
 }
 
+#[test]
+fn pieces_of_a_mission_outlive_the_life_that_said_them() {
+    let mut r = relay(1);
+    let hear = |r: &mut Relay, record: &Record| {
+        r.offer(Time(5_000), record, &codec::encode_record(record), 0)
+    };
+    let said_later = |record: Record| Record {
+        incarnation: record.incarnation + 1,
+        ..record
+    };
+    assert_eq!(hear(&mut r, &piece(0, 3)), Offer::New);
+    // The station begins another life, and says one piece anew before it is out of reach.
+    assert_eq!(hear(&mut r, &said_later(piece(1, 3))), Offer::New);
+    let holds = |r: &Relay, subject| r.held.keys().any(|k| k.2 == subject);
+    assert!(holds(&r, 0) && holds(&r, 1));
+    // The others come from somebody who heard them in the first one.
+    assert_eq!(hear(&mut r, &piece(2, 3)), Offer::New);
+    assert_eq!(hear(&mut r, &piece(1, 3)), Offer::Stale);
+    assert!((0..3).all(|subject| holds(&r, subject)));
+    // All else that the first life said is void.
+    let state = Record {
+        kind: Kind::State.number(),
+        ..piece(9, 3)
+    };
+    assert_eq!(hear(&mut r, &state), Offer::Stale);
+}
+
 /// A piece of a mission of so many is heard.
 fn hear_piece(r: &mut Relay, now_ms: u64, subject: u64, chunks: u16) {
     let byte = u8::try_from(subject).unwrap();
