@@ -5,7 +5,7 @@
 //! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
 //! it cell by cell. Ways between cells come from [`transit`], what the camera saw from
 //! [`camera`], the way to a given circle from [`circle`], rounds of the loop from [`circuit`], the way along a contour that is seen from [`tracing`], turns after a moving target from [`pursuit`], a flight between cells and what it
-//! is for from [`detour`], expectations for the peer from [`prediction`], what the fuel allows
+//! is for from [`detour`], where a gimbal turns from `gaze`, expectations for the peer from [`prediction`], what the fuel allows
 //! from [`endurance`], what stays of a flight when the
 //! goal changes from `goal_change`, how far a given flight reaches from [`given`], the proof of each stretch from `clearance_check`;
 //! following the track and the safety of every setpoint are the reactive layer's.
@@ -34,9 +34,11 @@ pub mod camera;
 pub mod circle;
 pub mod circuit;
 mod clearance_check;
+
 pub mod detour;
 pub mod endurance;
 pub mod given;
+mod gaze;
 mod goal_change;
 pub mod new_zones;
 pub mod prediction;
@@ -331,8 +333,9 @@ impl Executive {
         Envelope::new(airframe, Arc::clone(router.zones()), least_m)
     }
 
-    /// Answers a percept with a setpoint, already passed through the envelope.
-    pub fn step(
+    /// Answers a percept with a setpoint, already passed through the envelope; where its gimbal
+    /// turns is not in it yet.
+    fn steer(
         &mut self,
         percept: &Percept,
         is_open: &dyn Fn(u16) -> bool,
@@ -389,6 +392,7 @@ impl Executive {
             percept: *percept,
             steps,
             airspeed_mps: setpoint.airspeed_mps,
+            gimbal: Vec::new(),
         });
         (setpoint, events)
     }
@@ -404,6 +408,7 @@ impl Executive {
             percept: *percept,
             steps: Vec::new(),
             airspeed_mps: setpoint.airspeed_mps,
+            gimbal: Vec::new(),
         });
         setpoint
     }
@@ -415,6 +420,7 @@ impl Executive {
             height_m: self.height_m,
             steps,
             loiter: Side::Left,
+            gimbal: Vec::new(),
         }
     }
 

@@ -34,6 +34,7 @@ pub mod height;
 pub mod json;
 pub mod landing;
 pub mod mission;
+pub mod mount;
 pub mod place;
 pub mod plan;
 pub mod targets;

@@ -252,6 +252,7 @@ mod tests {
                 steps
             ],
             loiter: Side::Left,
+            gimbal: Vec::new(),
         })
     }
 

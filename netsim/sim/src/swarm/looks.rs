@@ -115,12 +115,10 @@ impl Swarm {
             return;
         };
         let counted: Vec<(bool, Count)> = mind.counted().collect();
-        let airframe = body.airframe();
         let look = CountLook {
             uav: id,
-            pose: body.pose(),
+            picture: body.picture(),
             is_late: peer.slow_ms > 0,
-            half_m: (airframe.footprint_across_m, airframe.footprint_along_m),
             counted: &counted,
         };
         let truth: Vec<Point> = self.air.vehicles().places().collect();

@@ -1,9 +1,10 @@
 //! What truly happened: cells seen, zones entered, separation (D2.7 §3.6, §2.3.1).
 //!
 //! The judge follows the flown pieces themselves, not reports, and uses only the
-//! world's own geometry. The camera looks straight down and stays level in turns.
+//! world's own geometry.
 
 use super::board::Board;
+use super::camera::Eye;
 use super::fact::{Approach, Fact};
 use super::motion::Piece;
 use super::no_fly::{TurnAway, Zones};
@@ -12,7 +13,6 @@ use super::pieces::Pieces;
 use super::separation::Separation;
 use super::survey::Survey;
 use super::task_board::TaskBoard;
-use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::CellId;
 use skein_geometry::frame::Point;
 use std::collections::BTreeSet;
@@ -186,16 +186,23 @@ impl Judge {
     }
 
     /// Judges one flown piece of a UAV.
-    pub fn watch(&mut self, uav: u16, airframe: &Airframe, piece: &Piece, facts: &mut Vec<Fact>) {
+    pub fn watch<'a>(
+        &mut self,
+        uav: u16,
+        eye: impl Into<Eye<'a>>,
+        piece: &Piece,
+        facts: &mut Vec<Fact>,
+    ) {
+        let eye = &eye.into();
         let last = self.boards.len() - 1;
         for (i, board) in self.boards.iter_mut().enumerate() {
             // What of an older mission is seen is no news.
             let mut old = Vec::new();
             let told = if i == last { &mut *facts } else { &mut old };
-            board.look(uav, airframe, piece, told);
+            board.look(uav, eye, piece, told);
         }
         self.zones.watch(uav, piece, facts);
-        self.tasks.look(uav, airframe, piece);
+        self.tasks.look(uav, eye, piece);
     }
 
     /// A task, by number and revision, is to be seen by one of these UAVs; asked twice it is

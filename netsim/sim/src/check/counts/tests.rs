@@ -59,8 +59,7 @@ impl Scene {
             let look = CountLook {
                 is_late: self.is_late,
                 uav: 1,
-                pose: Pose::new(at, 0.0),
-                half_m: (40.0, 30.0),
+                picture: Picture::level(Pose::new(at, 0.0), (40.0, 30.0)),
                 counted: &counted,
             };
             let now_ms = (s * 1000.0).round() as u64;
