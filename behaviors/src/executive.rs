@@ -37,10 +37,11 @@ mod clearance_check;
 
 pub mod detour;
 pub mod endurance;
-pub mod given;
 mod gaze;
+pub mod given;
 mod goal_change;
 pub mod new_zones;
+pub mod passes;
 pub mod prediction;
 pub mod promised;
 pub mod pursuit;
@@ -250,6 +251,8 @@ pub struct Executive {
     circuit: circuit::Circuit,
     /// What it sees of a contour.
     tracing: tracing::Tracing,
+    /// How often cells were missed.
+    passes: passes::Passes,
 }
 
 impl Executive {
@@ -287,6 +290,7 @@ impl Executive {
             stranded: false,
             circuit: circuit::Circuit::default(),
             tracing: tracing::Tracing::default(),
+            passes: passes::Passes::default(),
         }
     }
 
@@ -482,6 +486,7 @@ impl Executive {
                 self.recent.push_back(cell);
             }
         }
+        self.passes.seen += u32::try_from(seen.len()).unwrap_or(0);
         events.push(Event::Seen(seen));
     }
 
@@ -519,6 +524,7 @@ impl Executive {
                 .filter(|visit| is_open(visit.cell) && !self.recent.contains(&visit.cell));
         }
         let Some(visit) = missed else { return };
+        self.passes.miss(&visit);
         let tries = visit.tries + 1;
         if tries >= MAX_TRIES {
             events.push(Event::Refused {

@@ -38,6 +38,14 @@ pub struct GimbalStep {
     pub pitch_rad: f64,
 }
 
+impl GimbalStep {
+    /// Whether both angles are numbers.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.roll_rad.is_finite() && self.pitch_rad.is_finite()
+    }
+}
+
 /// The most steps of a gimbal: until the airframe's failsafe acts, and half a second to spare,
 /// in tenths of a second.
 pub const MAX_GIMBAL_STEPS: usize = 16;

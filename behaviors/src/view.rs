@@ -51,7 +51,11 @@ impl View {
     #[must_use]
     pub fn moved(&self, pose: Pose, attitude: Option<Attitude>) -> Self {
         let tilt = self.tilt.map(|t| Tilt { attitude, ..t });
-        Self { pose, tilt, ..*self }
+        Self {
+            pose,
+            tilt,
+            ..*self
+        }
     }
 
     /// Where the camera is.
@@ -147,5 +151,67 @@ impl View {
         let corner = 1.0 + across * across + along * along;
         let off = off_m * corner.sqrt() / depth_m + off_rad * corner;
         x.abs() <= (along - off) * depth_m && y.abs() <= (across - off) * depth_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{airframe, percept_at};
+    use skein_flight::mount::Mount;
+
+    #[test]
+    fn a_picture_tilts_only_where_the_mount_does_and_the_percept_tells() {
+        let pose = Pose::new(Point::new(0.0, 0.0), 0.0);
+        let mut percept = percept_at(pose, 0);
+        let fixed = Airframe {
+            mount: Mount::Fixed,
+            ..airframe()
+        };
+        // 46 m of half a picture from 90 m above; 0.3 rad of bank put its middle 28 m aside.
+        let (left, right) = (Point::new(0.0, 40.0), Point::new(0.0, -65.0));
+        assert!(View::of(&percept, &airframe()).shows(left, 1.0));
+        assert!(
+            !View::of(&percept, &fixed).shows(left, 1.0),
+            "nothing is told"
+        );
+        percept.attitude = Some(Attitude {
+            bank_rad: 0.3,
+            ..Attitude::default()
+        });
+        assert!(View::of(&percept, &airframe()).shows(left, 1.0));
+        let view = View::of(&percept, &fixed);
+        assert!(!view.shows(left, 1.0) && view.shows(right, 1.0));
+        // A gimbal takes the bank away.
+        percept.attitude = Some(Attitude {
+            bank_rad: 0.3,
+            gimbal_roll_rad: -0.3,
+            ..Attitude::default()
+        });
+        let view = View::of(&percept, &fixed);
+        assert!(view.shows(left, 1.0) && !view.shows(right, 1.0));
+        // What may be off is taken from the sides: 3 m and 0.02 rad, 3.0 m in a corner.
+        let patch = |y: f64| {
+            [(0.0, y), (4.0, y), (4.0, y - 4.0), (0.0, y - 4.0)].map(|(x, y)| Point::new(x, y))
+        };
+        let (holds, not) = (view.holds(&patch(38.0), 3.0, 0.02), patch(42.0));
+        assert!(holds && view.holds(&not, 0.0, 0.0) && !view.holds(&not, 3.0, 0.02));
+    }
+
+    /// A bank of 60° shows the ground to the horizon: what is far is too small.
+    #[test]
+    fn what_is_far_is_not_recognised() {
+        let mut percept = percept_at(Pose::new(Point::new(0.0, 0.0), 0.0), 0);
+        percept.attitude = Some(Attitude {
+            bank_rad: 1.0,
+            ..Attitude::default()
+        });
+        let fixed = Airframe {
+            mount: Mount::Fixed,
+            ..airframe()
+        };
+        let view = View::of(&percept, &fixed);
+        assert!(view.shows(Point::new(0.0, -70.0), 1.0));
+        assert!(!view.shows(Point::new(0.0, -140.0), 1.0));
     }
 }

@@ -270,8 +270,14 @@ mod tests {
         }
         for (mount, want) in [
             ("\"fixd\"", "camera.mount"),
-            ("{ gimbal: { roll_deg: 95, pitch_deg: 4, rate_dps: 9 } }", "roll_deg: 95"),
-            ("{ gimbal: { roll_deg: 5, rate_dps: 9 } }", "pitch_deg is missing"),
+            (
+                "{ gimbal: { roll_deg: 95, pitch_deg: 4, rate_dps: 9 } }",
+                "roll_deg: 95",
+            ),
+            (
+                "{ gimbal: { roll_deg: 5, rate_dps: 9 } }",
+                "pitch_deg is missing",
+            ),
         ] {
             let held = text.replace("60 }", &format!("60, mount: {mount} }}"));
             let said = parse(&held, Some(45.0)).unwrap_err().to_string();

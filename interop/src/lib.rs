@@ -15,6 +15,7 @@
 //! | [`geojson`] | areas, and buildings with heights |
 //! | [`targets`] | points and lines to look at, of both formats |
 //! | [`airframe`] | airframes of scenarios and of peers, with their limits |
+//! | [`mount`] | how cameras are held |
 //! | [`fleet`] | fleet files of plans for a team |
 //! | [`height`] | heights as map data writes them: `12.13 m`, `3.5`, `40 ft` |
 //!

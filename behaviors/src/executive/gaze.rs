@@ -6,7 +6,6 @@ use crate::event::Event;
 use crate::percept::Percept;
 use crate::reactive::gaze::{Gaze, hold};
 use crate::setpoint::Setpoint;
-use skein_geometry::frame::Point;
 
 impl Executive {
     /// Answers a percept with a setpoint, already passed through the envelope.
@@ -30,13 +29,5 @@ impl Executive {
             played.gimbal.clone_from(&setpoint.gimbal);
         }
         (setpoint, events)
-    }
-
-    /// The place on the ground where the middle of the picture is to be: where the track says
-    /// that the UAV is. None where it flies along none.
-    #[must_use]
-    pub fn planned_ground(&self) -> Option<Point> {
-        let on_track = !self.is_pursuing() && self.track.left_m() > 0.0;
-        on_track.then(|| self.track.pose())?.map(|p| p.position())
     }
 }

@@ -4,16 +4,11 @@
 //!
 //! Estimates for feasibility; what is flown is the executive's.
 
-use skein_flight::airframe::{Airframe, ROLL_RATE_RADPS};
+use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
-use skein_flight::mount::{DIRECTION_OFF_RAD, Mount};
 use skein_flight::trajectory::Trajectory;
 use skein_flight::trajectory::wind::{Performance, Wind, turn_round_s};
 use skein_netsim::spec::{Spec, UavSpec};
-
-/// On a straight pass wings and nose are within so much of level, radians: 3° of bank take half a
-/// metre beside the pass away within a second, and the nose is up by less.
-const LEVEL_RAD: f64 = 0.05;
 
 /// Turning round on the spot, in turn radii: the shortest curve from a pose to its
 /// reverse is 7/3 of a half circle.
@@ -66,36 +61,6 @@ pub(crate) fn footprint_m(airframe: &Airframe, wind: Wind, radius_m: f64) -> (f6
         .min(along_m / (along_m * c + across_m * s))
         .min(1.0);
     (across_m * share, along_m * share)
-}
-
-/// The same of a camera that may tilt, `height_m` above the ground: what is left when its
-/// direction is off by what nobody knows, and if it is fixed to the airframe, by what wings do on
-/// a straight pass; there the picture lies ahead by the pitch, and the first of a pass is not seen
-/// before the wings are level.
-pub(crate) fn held_footprint_m(
-    airframe: &Airframe,
-    wind: Wind,
-    radius_m: f64,
-    height_m: f64,
-) -> (f64, f64) {
-    let (across_m, along_m) = footprint_m(airframe, wind, radius_m);
-    let (a, b) = (airframe.footprint_across_m, airframe.footprint_along_m);
-    // By so much a corner of the picture moves for each radian, metres.
-    let corner_m = height_m + (a * a + b * b) / height_m.max(1.0);
-    let told_m = DIRECTION_OFF_RAD * corner_m;
-    let (off_m, late_m) = match airframe.mount {
-        Mount::Level => return (across_m, along_m),
-        Mount::Gimbal(_) => (told_m, 0.0),
-        Mount::Fixed => {
-            let mps = airframe.cruise_mps + wind.speed_mps();
-            let rolls_m = airframe.max_bank_rad / ROLL_RATE_RADPS * mps;
-            (told_m + LEVEL_RAD * corner_m, rolls_m)
-        }
-    };
-    (
-        (across_m - off_m).max(0.0),
-        (along_m - off_m - late_m).max(0.0),
-    )
 }
 
 /// How fast a UAV gets on.

@@ -2,12 +2,12 @@
 //! millimetres here. Leaves the loop to the mission itself, and whether it can succeed to
 //! `feasibility`.
 
-use crate::flight_model::{held_footprint_m, turn_radius_m};
+use crate::flight_model::turn_radius_m;
+use crate::mounts::{check_mounts, held_footprint_m};
 use crate::read::Stated;
 use crate::read::targets::Asked;
 use crate::request::AreaPlanner;
 use skein_flight::airframe::Airframe;
-use skein_flight::mount::Mount;
 use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::Point;
 use skein_geometry::{NoFlyZones, Polygon};
@@ -50,8 +50,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
     let seen = |side: fn((f64, f64)) -> f64| {
         let wind = s.wind.strongest_held();
         let members = s.fleet.members.iter();
-        let each =
-            members.map(|m| side(held_footprint_m(&m.airframe, wind, turn_m, m.height_m)));
+        let each = members.map(|m| side(held_footprint_m(&m.airframe, wind, turn_m, m.height_m)));
         each.fold(f64::MAX, f64::min)
     };
     let mission = Mission {
@@ -121,33 +120,6 @@ fn turning(s: &Stated) -> Result<f64, Error> {
     Ok(calm_m.max(widest(&|a| {
         turn_radius_m(a, s.wind.strongest_held(), spacing_m)
     })))
-}
-
-/// Lanes are seen in turns, too: a picture that tilts with them is not where the lane is.
-fn check_mounts(s: &Stated) -> Result<(), Error> {
-    if s.asked != Asked::Area(AreaPlanner::Lanes) {
-        return Ok(());
-    }
-    for m in &s.fleet.members {
-        let bank_deg = m.airframe.max_bank_rad.to_degrees();
-        let why = match m.airframe.mount {
-            Mount::Level => continue,
-            Mount::Gimbal(g) if g.roll_rad >= m.airframe.max_bank_rad => continue,
-            Mount::Gimbal(g) => format!(
-                "a gimbal that rolls {:.0}° cannot hold a picture in turns of {bank_deg:.0}°",
-                g.roll_rad.to_degrees()
-            ),
-            Mount::Fixed => "a fixed camera tilts with the turns of lanes".to_owned(),
-        };
-        return Err(s.places.wrong(
-            "fleet",
-            format!(
-                "UAV {}: {why}; expected planner: \"exact\", whose turns end before what is seen, or another mount",
-                m.id
-            ),
-        ));
-    }
-    Ok(())
 }
 
 /// How far UAVs sense each other, metres: what is stated, or what flying at one height asks

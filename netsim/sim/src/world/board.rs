@@ -228,13 +228,7 @@ impl Board {
         self.complete()
     }
 
-    pub(super) fn look(
-        &mut self,
-        uav: u16,
-        eye: &Eye<'_>,
-        piece: &Piece,
-        facts: &mut Vec<Fact>,
-    ) {
+    pub(super) fn look(&mut self, uav: u16, eye: &Eye<'_>, piece: &Piece, facts: &mut Vec<Fact>) {
         let length_m = piece.length_m();
         let reach_m = self.reach_m(eye) + length_m;
         let new = match self.survey.pieces() {
@@ -383,12 +377,7 @@ impl Board {
             |v: f64| ((v - reach_m) / d - 0.5).ceil() as i32,
             |v: f64| ((v + reach_m) / d - 0.5).floor() as i32,
         );
-        (
-            lo(at.x),
-            hi(at.x),
-            lo(at.y),
-            hi(at.y),
-        )
+        (lo(at.x), hi(at.x), lo(at.y), hi(at.y))
     }
 
     fn anything_new(&self, at: Point, reach_m: f64) -> bool {

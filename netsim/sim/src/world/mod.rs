@@ -264,6 +264,13 @@ impl World {
         self.uav(number).map(|u| &u.body)
     }
 
+    /// Whether the computer with this number is the one whose setpoints fly its airframe.
+    #[must_use]
+    pub fn commands(&self, number: u16) -> bool {
+        self.uav(number)
+            .is_some_and(|u| u.commander == number && u.body.is_commanded(self.now_ms))
+    }
+
     /// The UAV in which the computer with this number is.
     fn uav(&self, number: u16) -> Option<&Uav> {
         self.uavs.get(self.seat(number)?)
@@ -532,8 +539,7 @@ impl World {
             self.flown.clear();
             u.body.advance(to_ms, &mut self.flown);
             for piece in &self.flown {
-                self.judge
-                    .watch(u.id, u.body.eye(), piece, &mut self.facts);
+                self.judge.watch(u.id, u.body.eye(), piece, &mut self.facts);
             }
             if u.body.failsafe() != u.failsafe && u.body.airborne() {
                 u.failsafe = u.body.failsafe();

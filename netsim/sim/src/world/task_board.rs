@@ -95,8 +95,8 @@ impl TaskBoard {
 mod tests {
     use super::*;
     use crate::world::fixture::airframe;
-    use skein_geometry::frame::Pose;
     use skein_flight::trajectory::wind::Wind;
+    use skein_geometry::frame::Pose;
 
     fn flown(uav: u16, from: (f64, f64), board: &mut TaskBoard) {
         let piece = Piece {

@@ -6,6 +6,7 @@
 //! from the anchor in closed form, so it does not depend on how often somebody asked.
 
 use crate::world::camera::{Camera, Eye, Picture};
+use skein_behaviors::setpoint::GimbalStep;
 use skein_behaviors::{Percept, Setpoint, Side};
 use skein_flight::airframe::Airframe;
 use skein_flight::trajectory::wind::{Course, Heading, Wind};
@@ -305,7 +306,8 @@ impl Kinematic {
         let fresh_until_ms = setpoint.from_ms.min(now_ms) + FAILSAFE_MS;
         let future = setpoint.from_ms > now_ms + FAILSAFE_MS;
         let finite = setpoint.airspeed_mps.is_finite()
-            && setpoint.steps.iter().all(|s| s.turn_rate_radps.is_finite());
+            && setpoint.steps.iter().all(|s| s.turn_rate_radps.is_finite())
+            && setpoint.gimbal.iter().all(GimbalStep::is_finite);
         let older = self
             .setpoint
             .as_ref()
