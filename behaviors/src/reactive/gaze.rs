@@ -207,7 +207,7 @@ mod tests {
                     ..attitude
                 });
                 let turned = f64::from(n + 1) * 0.1 * rate * 40.0;
-                let place = curve.pose_at(turned).position();
+                let place = curve.pose_at(turned).unwrap().position();
                 assert!(
                     View::of(&percept, &narrow).shows(place, 1.0),
                     "{cross_m} {n}"
