@@ -184,6 +184,7 @@ mod tests {
     use crate::pursuit::vehicle::{Behaviour, STEP_S};
     use crate::spec::Spec;
     use crate::world::{World, fixture};
+    use skein_geometry::frame::Vector;
 
     /// A UAV that stands above the road, level, and a vehicle that drives along below.
     fn scene(start: Point, behaviour: Behaviour) -> Spec {

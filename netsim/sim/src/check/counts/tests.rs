@@ -1,6 +1,7 @@
 //! What is counted beside what is true, on scenes made by hand.
 
 use super::*;
+use skein_geometry::frame::Pose;
 
 fn mission(what: Counted) -> Mission {
     let mut mission = (*crate::world::fixture::square(1).mission).clone();
